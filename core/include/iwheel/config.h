@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+/// Everything that can be configured in the core, checked once.
+///
+/// The names, units, ranges and defaults are those of the gateway's configuration file. The caller fills an
+/// `iw_config_t` (start from `iw_config_default`), `iw_gateway_init` checks it and copies it.
+#ifndef IW_CONFIG_H
+#define IW_CONFIG_H
+
+#include "iwheel/types.h"
+
+/// What the current beside the speed means to the wheel. The document does not say, so there is no default and the
+/// wheels do not move until it is set.
+typedef enum {
+    IW_ROLE_UNSET = 0,
+    IW_ROLE_LIMIT,    ///< Zero is speed 0 with the configured maximum current; its sign is never inverted.
+    IW_ROLE_SETPOINT, ///< Zero is 0/0; current ramps with the speed; `invert` negates it too.
+} iw_current_role_t;
+
+/// Unit of a wheel's raw normal force. The document says cN for the left and dN for the right wheel.
+typedef enum { IW_FORCE_CN = 0, IW_FORCE_DN = 1 } iw_force_unit_t;
+
+/// Ranges are inclusive.
+typedef struct {
+    uint16_t period_ms;       ///< Spacing of setpoint pairs, 5..50.
+    uint16_t lease_ms;        ///< A drive command holds this long, 20..500. Three client periods are a good value.
+    uint16_t accel_mm_s2;     ///< Slope away from zero, 50..20000.
+    uint16_t decel_mm_s2;     ///< Slope towards zero, 100..20000. Bounds the stop after a lost client.
+    uint16_t max_speed_mm_s;  ///< 10..5000. Faster commands are scaled, both wheels by one factor.
+    uint16_t max_current_mA;  ///< 0..2000.
+    uint16_t zero_hold_ms;    ///< Zeros are sent this long after a stop, 1100..5000: longer than the wheel's own 1 s.
+    uint16_t wheel_silent_ms; ///< A wheel not heard for this long is lost, 20..200.
+    uint16_t echo_ms;         ///< A setpoint not echoed for this long is stalled, 20..200.
+    uint16_t rest_rpm;        ///< At rest means |rpm| <= this, 0..20 ...
+    uint16_t rest_ms;         ///< ... for this long, 50..2000.
+    uint16_t follow_mm_s;     ///< A wheel faster than applied by this, 50..5000 ...
+    uint16_t follow_ms;       ///< ... for this long, 100..5000, latches.
+    uint16_t blocked_ms;      ///< A wheel below 20 % of its command for this long, 200..10000, stops the pair.
+    uint16_t radius_mm;       ///< Of the wheel, 20..500; the document says "approximately 192".
+    uint16_t gear_turns;      ///< Rotor turns in `gear_per` wheel turns, 1..1000.
+    uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1/100..100.
+    uint16_t setpoint_dlc;    ///< 5..8, zero padded. The document's table has 5 bytes.
+    uint8_t setpoint_type;    ///< Byte 0 of a setpoint. The document lists no values: valid only with `..._set`.
+    bool setpoint_type_set;   ///< The wheels do not move until this is true.
+    bool rpm_of_rotor;        ///< The rpm in telemetry are the rotor's, not the wheel's.
+    bool listen_only;         ///< Nothing is ever sent; arm is refused.
+    iw_current_role_t current_role;
+    bool invert[IW_SIDES];                ///< This wheel is mounted mirrored: negate its speed, both ways.
+    iw_force_unit_t force_unit[IW_SIDES]; ///< As documented unless the wheel proves otherwise.
+} iw_config_t;
+
+/// Which field `iw_config_check` found wrong, in the order of the struct; then relations between fields.
+typedef enum {
+    IW_CONFIG_OK = 0,
+    IW_CONFIG_PERIOD,
+    IW_CONFIG_LEASE,
+    IW_CONFIG_ACCEL,
+    IW_CONFIG_DECEL,
+    IW_CONFIG_MAX_SPEED,
+    IW_CONFIG_MAX_CURRENT,
+    IW_CONFIG_ZERO_HOLD,
+    IW_CONFIG_WHEEL_SILENT,
+    IW_CONFIG_ECHO,
+    IW_CONFIG_REST_RPM,
+    IW_CONFIG_REST,
+    IW_CONFIG_FOLLOW_SPEED,
+    IW_CONFIG_FOLLOW,
+    IW_CONFIG_BLOCKED,
+    IW_CONFIG_RADIUS,
+    IW_CONFIG_GEAR_TURNS,
+    IW_CONFIG_GEAR_PER,
+    IW_CONFIG_SETPOINT_DLC,
+    IW_CONFIG_CURRENT_ROLE, ///< Not an iw_current_role_t.
+    IW_CONFIG_FORCE_UNIT,   ///< Not an iw_force_unit_t.
+    IW_CONFIG_GEAR_RATIO,   ///< gear_turns / gear_per outside 1/100..100.
+    IW_CONFIG_STOP_BUDGET,  ///< lease + period + max_speed / decel exceeds 1000 ms, the wheel's own watchdog.
+} iw_config_fault_t;
+
+/// The inclusive range of the numeric field that a fault in IW_CONFIG_PERIOD..IW_CONFIG_SETPOINT_DLC names.
+typedef struct {
+    uint16_t min;
+    uint16_t max;
+} iw_config_range_t;
+iw_config_range_t iw_config_range(iw_config_fault_t field);
+
+/// The documented defaults. Setpoint type and current role are left unset: nobody can know them.
+void iw_config_default(iw_config_t *out_config);
+
+/// IW_CONFIG_OK, or the first field that is out of range or relation that does not hold.
+iw_config_fault_t iw_config_check(const iw_config_t *config);
+
+/// How long (milliseconds, rounded up) and how far (millimetres, rounded up) the machine goes on, at most, after the
+/// client's last command: lease, one period, ramp from the maximum speed.
+typedef struct {
+    uint32_t client_lost_ms;
+    uint32_t client_lost_mm;
+    uint32_t killed_ms; ///< Gateway killed and not restarted: the wheel's watchdog, then unknown.
+    uint32_t killed_mm; ///< At full command for that time; braking comes on top and is not documented.
+} iw_stop_budget_t;
+iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config);
+
+#endif

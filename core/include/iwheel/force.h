@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+/// The normal force on one wheel, and where its zero comes from.
+///
+/// The document: force on the shaft = normal force - offset, where the offset is the mean normal force at start-up and "only has
+/// sense if you don't apply any force to the shaft during the first two seconds". The wheel sends its own offset only in its first
+/// 60 s. So the offset carries its provenance, and the sooner of two questions decides nothing silently: a bad one is not a value.
+///
+///     OPEN --40 samples within 2 s--> judged: good  -> ESTIMATED (or a cross-check, if there is something better)
+///       ^                                     bad   -> CONTAMINATED: no value from it
+///       +--- wheel rebooted
+///
+/// Order of trust: OPERATOR (tare) > WHEEL > ESTIMATED > STORED > NONE. After a reboot WHEEL and ESTIMATED become STORED.
+/// WHEEL is not taken if we saw the wheel start and its first two seconds were contaminated.
+///
+/// Unit evidence: at rest the raw value divided by the wheel's offset in dN is about 10 (cN), 1 (dN) or 0 (offset
+/// already removed). Evidence against the configuration makes force invalid; nothing is ever rescaled.
+///
+/// Thresholds are ours; the document gives none.
+#ifndef IW_FORCE_H
+#define IW_FORCE_H
+
+#include "iwheel/config.h"
+
+/// Two seconds of force frames at their documented period of 50 ms.
+#define IW_FORCE_WINDOW_SAMPLES 40U
+/// The window's samples must have arrived within this, else it starts again.
+#define IW_FORCE_WINDOW_MAX_US 3000000U
+/// A quiet sensor: standard deviation, and difference of the means of both halves of the window, below these.
+#define IW_FORCE_QUIET_mN 1000U
+#define IW_FORCE_DRIFT_mN 1000U
+/// An offset further than this from one that was trusted before is taken for a load.
+#define IW_FORCE_LOADED_mN 20000U
+/// Unit evidence needs a wheel offset of at least this.
+#define IW_FORCE_EVIDENCE_MIN_dN 20
+/// Older than this (five periods), the force is not valid.
+#define IW_FORCE_STALE_US 250000U
+
+typedef enum {
+    IW_OFFSET_NONE = 0,
+    IW_OFFSET_STORED,    ///< From an earlier run of the gateway or of the wheel.
+    IW_OFFSET_ESTIMATED, ///< Our own mean over two quiet seconds.
+    IW_OFFSET_WHEEL,     ///< Sent by the wheel.
+    IW_OFFSET_OPERATOR,  ///< Tare.
+} iw_offset_provenance_t;
+
+/// What the window showed.
+typedef enum {
+    IW_WINDOW_OPEN = 0, ///< Still collecting.
+    IW_WINDOW_GOOD,
+    IW_WINDOW_MOVING, ///< Contaminated: the wheel turned.
+    IW_WINDOW_NOISY,  ///< Contaminated: somebody pressed and let go.
+    IW_WINDOW_DRIFT,  ///< Contaminated: the load changed slowly.
+    IW_WINDOW_LOADED, ///< Contaminated: far from the offset that was trusted before.
+    IW_WINDOW_SATURATED,
+} iw_window_t;
+
+typedef enum {
+    IW_UNIT_UNKNOWN = 0, ///< No wheel offset, or too small a one, or a contaminated window.
+    IW_UNIT_CN,
+    IW_UNIT_DN,
+    IW_UNIT_OFFSET_REMOVED, ///< Raw is about 0 at rest although the offset is not.
+    IW_UNIT_UNCLEAR,        ///< None of these, or more than one.
+} iw_unit_evidence_t;
+
+typedef enum {
+    IW_TARE_OK = 0,
+    IW_TARE_NO_FORCE, ///< Not enough recent samples.
+    IW_TARE_MOVING,
+    IW_TARE_NOISY, ///< Noise or drift.
+    IW_TARE_LOADED,
+    IW_TARE_SATURATED,
+} iw_tare_t;
+
+typedef enum {
+    IW_FORCE_VALID = 0,
+    IW_FORCE_NOT_HEARD,
+    IW_FORCE_SATURATED,     ///< Raw is -32768 or 32767.
+    IW_FORCE_NO_OFFSET,
+    IW_FORCE_UNIT_CONTRADICTED,
+    IW_FORCE_OFFSET_REMOVED, ///< The wheel seems to subtract the offset itself.
+} iw_force_validity_t;
+
+typedef struct {
+    uint32_t deviation_mN; ///< Standard deviation of the window.
+    int32_t drift_mN;      ///< Mean of its second half minus mean of its first half.
+    int32_t mean_mN;
+    uint8_t samples;
+    iw_window_t window;
+} iw_force_quality_t;
+
+typedef struct {
+    const iw_config_t *config;
+    iw_time_us_t raw_us;
+    iw_time_us_t oldest_us;    ///< When the window's first sample came.
+    iw_time_us_t offset_us;    ///< When the offset in force was taken; IW_NEVER: none, or STORED by an earlier run.
+    iw_time_us_t moved_us;     ///< When the wheel last moved.
+    int32_t offset_mN;         ///< The offset in force; 0 with IW_OFFSET_NONE.
+    int16_t wheel_offset_dN;   ///< The wheel's own, as sent.
+    int16_t sample[IW_FORCE_WINDOW_SAMPLES]; ///< Ring of raw values, the last two seconds.
+    int16_t raw;
+    uint8_t count;
+    uint8_t next;
+    iw_side_t side;
+    iw_offset_provenance_t provenance;
+    iw_unit_evidence_t evidence;
+    int32_t evidence_permille; ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
+    iw_force_quality_t quality; ///< Of the start-up window.
+    bool wheel_offset_heard;
+    bool boot_seen;
+} iw_force_t;
+
+/// `config` must be checked and outlive it.
+void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side);
+
+/// The wheel (re)started or was heard for the first time: the window opens. `boot_seen`: its start was observed, so that our
+/// window covers the wheel's own first two seconds.
+void iw_force_reopen(iw_force_t *self, bool boot_seen);
+
+/// Puts an offset of an earlier run in force, as STORED, if there is nothing better.
+void iw_force_restore(iw_force_t *self, int32_t offset_mN);
+
+/// Takes a force frame. `still`: the wheel is at rest.
+void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still);
+
+/// Takes an offset frame.
+void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN);
+
+/// Makes the mean of the last two seconds the offset, as OPERATOR. Refused, changing nothing, with the reason.
+iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us);
+
+/// Whether the net force means anything now, and if not, why.
+iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_us);
+
+/// Raw force in mN in the configured unit.
+int32_t iw_force_raw_mN(const iw_force_t *self);
+
+/// Raw minus offset. Only with IW_FORCE_VALID does it mean anything.
+int32_t iw_force_net_mN(const iw_force_t *self);
+
+#endif

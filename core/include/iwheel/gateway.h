@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+/// A pair of wheels: everything of the core wired together.
+///
+///     bus -> receive -> decode -> wheel state -> permission -> scheduler -> encode -> gate -> send -> bus
+///
+/// The owner calls `iw_gateway_step` when a frame, an e-stop edge or the time it returned is there, and as often as it likes.
+/// Requests may come between steps, from the same thread of execution. What the wheels do is a pure function of configuration,
+/// times, frames and requests: the same recording gives the same bytes on every port.
+///
+/// Size: see the README's table. No heap, no floating point, no file-scope state.
+#ifndef IW_GATEWAY_H
+#define IW_GATEWAY_H
+
+#include "iwheel/config.h"
+#include "iwheel/follow.h"
+#include "iwheel/force.h"
+#include "iwheel/gate.h"
+#include "iwheel/hal.h"
+#include "iwheel/ledger.h"
+#include "iwheel/outbox.h"
+#include "iwheel/permit.h"
+#include "iwheel/proto.h"
+#include "iwheel/setpoint.h"
+#include "iwheel/wheel.h"
+
+/// A step later than this cannot tell when its frames came: they neither refresh nor fail a wheel's liveness.
+#define IW_GATEWAY_LATE_US 20000U
+/// Later than this: STOPPING without ramp.
+#define IW_GATEWAY_STOP_US 100000U
+/// Later than this: LATCHED.
+#define IW_GATEWAY_HUNG_US 500000U
+/// Frames taken in one step at the most. A full bus brings 21 in a millisecond.
+#define IW_GATEWAY_DRAIN_MAX 512U
+
+/// What the port found out about the bus. All zero: nothing known, nothing contradicted.
+typedef struct {
+    bool timing_contradicted; ///< Rate or sample point differ from the configured ones: arm is refused.
+    bool echo_proven;         ///< An echo proves that the frame was on the bus (IFF_ECHO; bxCAN).
+} iw_bus_facts_t;
+
+typedef struct {
+    uint32_t received;    ///< Frames of the nine telemetry ids that were read.
+    uint32_t echoes;      ///< Echoes of our setpoints.
+    uint32_t bad_format;  ///< Known id on a remote, extended, error or FD frame: ignored.
+    uint32_t bad_length;  ///< Known id, shorter than the table: ignored.
+    uint32_t unknown;     ///< Any other id.
+    uint32_t foreign;     ///< Setpoints that are not ours.
+    uint32_t pairs;       ///< Setpoint pairs accepted by the port.
+    uint32_t send_later;  ///< Setpoints the port could not take (result 0 or broken).
+    uint32_t clamped;     ///< Currents the encoder had to clamp.
+    uint32_t late_steps;  ///< Steps later than IW_GATEWAY_LATE_US.
+    uint32_t out_of_range; ///< Drive requests refused for their values.
+    uint32_t purges;       ///< Purges the port confirmed.
+} iw_counters_t;
+
+/// A drive request. Values are taken as they come: what does not fit is refused here.
+typedef struct {
+    int32_t speed_mm_s[IW_SIDES];
+    int32_t current_mA[IW_SIDES];
+    bool has_current; ///< False: the configured maximum, allowed with IW_ROLE_LIMIT only.
+} iw_drive_t;
+
+typedef struct {
+    iw_pair_t pair; ///< The target after limits; ramps come on top.
+    bool limited;   ///< It differs from the request: both wheels scaled by one factor.
+} iw_applied_t;
+
+typedef struct {
+    iw_config_t config;
+    iw_hal_t hal;
+    iw_wheel_t wheel[IW_SIDES];
+    iw_force_t force[IW_SIDES];
+    iw_follow_t follow[IW_SIDES];
+    iw_permit_t permit;
+    iw_setpoint_t setpoint;
+    iw_outbox_t outbox;
+    iw_gate_t gate;
+    iw_ledger_t ledger;
+    iw_counters_t counters;
+    iw_time_us_t promised_us;  ///< When the last step asked to be called again.
+    iw_time_us_t pair_us;      ///< When the last pair was sent; IW_NEVER: none since silence.
+    iw_time_us_t pose_us;      ///< IW_NEVER: none.
+    uint32_t gap_us;           ///< Between the last two pairs.
+    uint32_t gap_max_us;       ///< The largest since arming.
+    iw_proto_pose_t pose;
+    iw_bus_state_t bus;
+    iw_bus_facts_t facts;
+    bool backlog;              ///< The last step left frames behind.
+} iw_gateway_t;
+
+/// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros: the process
+/// before us died while armed. On a fault the gateway is left untouched and must not be used. The gateway must not be moved or
+/// copied afterwards: its parts point to its configuration.
+iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal, iw_time_us_t now_us, bool restarted);
+
+/// One complete cycle: e-stop, bus, everything received, judgement, and what is due is sent. Returns when to call again at the
+/// latest (never later than one period from now). `now_us` must not go back.
+iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us);
+
+/// What the port knows of the bus, whenever it changes.
+void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts);
+
+/// Asks to be armed. IW_REFUSE_NONE: poll `iw_gateway_arming` after each step; when false, the state is ARMED with this client
+/// as holder, or `iw_gateway_arm_refusal` tells why not.
+iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
+bool iw_gateway_arming(const iw_gateway_t *self);
+iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self);
+
+/// Commands both wheels, whole or not at all. `*out_applied` is written only if IW_REFUSE_NONE.
+iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, const iw_drive_t *request,
+                              iw_applied_t *out_applied);
+
+/// Ramps down. Needs no lease. `cause`: IW_CAUSE_CLIENT_STOP or IW_CAUSE_SHUTDOWN.
+void iw_gateway_stop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause);
+
+/// Zero without ramp, latched. Needs no lease.
+void iw_gateway_estop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);
+
+/// Leaves the latch, if nothing speaks against it.
+iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us);
+
+/// A client's connection ended.
+void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);
+
+/// Makes the present force of a wheel its zero.
+iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side);
+
+iw_state_t iw_gateway_state(const iw_gateway_t *self);
+
+#endif

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+/// What a port provides: five functions and a context.
+///
+/// None may block, and none may call back into the core. All are called from `iw_gateway_step` only, so from one
+/// thread of execution and never from an interrupt. Unless said otherwise a result > 0 means done, 0 means later or
+/// none, < 0 means broken.
+#ifndef IW_HAL_H
+#define IW_HAL_H
+
+#include "iwheel/can_frame.h"
+
+typedef enum {
+    IW_BUS_DOWN = 0, ///< Interface absent, down, or not opened.
+    IW_BUS_OFF,      ///< Bus-off: nothing is sent or received.
+    IW_BUS_PASSIVE,  ///< Error passive: takes frames, but something is wrong.
+    IW_BUS_ACTIVE,   ///< Error active: the normal state.
+} iw_bus_state_t;
+
+typedef struct {
+    /// Hands one frame to the controller or its queue. A success proves nothing: only the echo does.
+    int (*send)(void *context, const iw_can_frame_t *frame);
+
+    /// Takes the oldest frame received, or the echo of one of ours, in the order of the bus. Frames that are not for
+    /// us may be left out, but the eleven ids come in every format (remote, extended, FD), so that they are counted.
+    int (*receive)(void *context, iw_can_frame_t *out_frame);
+
+    /// The state of the bus. A loss of the bus, however short, is reported by at least one call after it. When that
+    /// call returns, no frame sent before the loss is queued any more.
+    iw_bus_state_t (*bus_state)(void *context);
+
+    /// Takes back every setpoint that was handed over and is not on the bus yet. > 0: surely none is left; their
+    /// echoes never come. 0: cannot do that here.
+    int (*purge)(void *context);
+
+    /// 0: released, and was so without interruption since the last call. > 0: pressed, or any edge since the last
+    /// call. < 0: unreadable or gone, which counts as pressed.
+    int (*estop_pressed)(void *context);
+
+    void *context; ///< Passed to each of them.
+} iw_hal_t;
+
+#endif

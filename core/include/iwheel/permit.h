@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: MIT
+/// May the wheels move, and if not, why?
+///
+///     LISTENING --arm--> ARMED --lease lost | stop | disarm--> STOPPING --zeros held--> LISTENING
+///         ^                |                                      |
+///         |                +------------- latching cause --------+--> LATCHED
+///         +------------------------------- reset ------------------------'
+///
+/// LISTENING sends nothing, with one exception: `arm` sends one zero pair, and ARMED begins when it is echoed ("arming").
+/// Pure state machine: no I/O, no clock. In every step the owner first tells the faults it sees (`iw_permit_raise`), then
+/// calls `iw_permit_step`, then reads `iw_permit_demand`, which tells what the scheduler must aim at.
+///
+/// Latch in every state: ESTOP_LINE, ESTOP_SOFTWARE, INTERNAL. Latch in ARMED and STOPPING: the other causes up to INTERNAL. In
+/// LISTENING those are only remembered: they refuse arm while present. Causes after INTERNAL stop without a latch.
+///
+/// The lease is fed by accepted drive commands and by nothing else.
+#ifndef IW_PERMIT_H
+#define IW_PERMIT_H
+
+#include "iwheel/config.h"
+#include "iwheel/setpoint.h"
+
+/// Who asks: chosen by the owner, never reused for another connection. 0 is nobody.
+typedef uint32_t iw_client_t;
+#define IW_CLIENT_NONE 0U
+
+/// After arm the lease lasts at least this long, since only zeros leave before the first drive.
+#define IW_PERMIT_FIRST_LEASE_US 1000000U
+/// A nonzero drive command this recent (or within the lease, if longer) refuses arm and reset.
+#define IW_PERMIT_STALE_US 500000U
+/// An event-like cause is gone when not seen for this long.
+#define IW_PERMIT_EVENT_US 1000000U
+/// Zeros are held until both wheels were at rest for this long ...
+#define IW_PERMIT_SETTLED_US 500000U
+/// ... but at most this long.
+#define IW_PERMIT_HOLD_MAX_US 10000000U
+
+typedef enum { IW_STATE_LISTENING = 0, IW_STATE_ARMED, IW_STATE_STOPPING, IW_STATE_LATCHED } iw_state_t;
+
+/// Why the wheels were stopped. `iw_stop_t::detail` is given with each.
+typedef enum {
+    IW_CAUSE_NONE = 0,
+    IW_CAUSE_ESTOP_LINE,     ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
+    IW_CAUSE_ESTOP_SOFTWARE, ///< A client said estop. Detail: 0.
+    IW_CAUSE_WHEEL_LOST,     ///< Not heard. Detail: ms since it was; UINT32_MAX: never.
+    IW_CAUSE_WHEEL_REBOOTED, ///< Detail: an iw_reboot_t.
+    IW_CAUSE_SEND_STALLED,   ///< A setpoint was not echoed. Detail: ms waited.
+    IW_CAUSE_BUS_DOWN,       ///< Down, gone or bus-off. Detail: an iw_bus_state_t.
+    IW_CAUSE_SECOND_MASTER,  ///< Somebody else sends setpoints. Detail: their id.
+    IW_CAUSE_FEEDBACK_SIGN,  ///< Turns against its command. Detail: |measured| mm/s.
+    IW_CAUSE_OVERSPEED,      ///< Faster than applied. Detail: |measured| mm/s.
+    IW_CAUSE_LOOP_HUNG,      ///< Our own loop was late by more than 500 ms. Detail: ms.
+    IW_CAUSE_INTERNAL,       ///< An internal check failed. Detail: an iw_gate_verdict_t.
+    IW_CAUSE_LOOP_LATE,      ///< Late by 100 to 500 ms: zero without ramp. Detail: ms.
+    IW_CAUSE_WHEEL_BLOCKED,  ///< Below 20 % of its command. Detail: |measured| mm/s.
+    IW_CAUSE_LEASE_LOST,     ///< The holder sent no drive command in time. Detail: the lease in ms.
+    IW_CAUSE_CLIENT_GONE,    ///< The holder disconnected. Detail: 0.
+    IW_CAUSE_CLIENT_STOP,    ///< A client said stop or disarm. Detail: 0.
+    IW_CAUSE_SHUTDOWN,       ///< The gateway is ending. Detail: 0.
+    IW_CAUSE_RESTART,        ///< The gateway began anew after a crash while armed. Detail: 0.
+    IW_CAUSES,
+} iw_cause_t;
+
+/// Bits for `sides`: which wheel a cause speaks of.
+#define IW_SIDES_NONE  0U
+#define IW_SIDES_LEFT  1U
+#define IW_SIDES_RIGHT 2U
+#define IW_SIDES_BOTH  3U
+
+/// Why a request was refused. Each has one name in the northbound protocol.
+typedef enum {
+    IW_REFUSE_NONE = 0, ///< Not refused.
+    IW_REFUSE_OUT_OF_RANGE,
+    IW_REFUSE_MISSING_FIELD, ///< Currents omitted although the current is a setpoint.
+    IW_REFUSE_NOT_HOLDER,    ///< Somebody else holds the lease.
+    IW_REFUSE_BUSY,          ///< Somebody else holds the lease, and no takeover was asked for.
+    IW_REFUSE_NOT_ARMED,
+    IW_REFUSE_LATCHED,
+    IW_REFUSE_ESTOP_PRESSED,
+    IW_REFUSE_BUS_DOWN,
+    IW_REFUSE_TIMING_MISMATCH,
+    IW_REFUSE_WHEEL_LOST,
+    IW_REFUSE_WHEEL_BLOCKED,
+    IW_REFUSE_NOT_AT_REST,
+    IW_REFUSE_SEND_STALLED,
+    IW_REFUSE_SECOND_MASTER,
+    IW_REFUSE_CAUSE_PRESENT, ///< `iw_permit_present` tells which.
+    IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
+    IW_REFUSE_STALE_COMMAND, ///< `iw_permit_t::stale_client` sent a nonzero drive too recently.
+    IW_REFUSE_LISTEN_ONLY,
+} iw_refusal_t;
+
+/// The last stop, for `why`.
+typedef struct {
+    iw_time_us_t at_us;
+    uint32_t number; ///< Counts stops; 0: there was none.
+    uint32_t detail; ///< See iw_cause_t.
+    iw_client_t client; ///< Who held the lease, or asked for the stop.
+    iw_pair_t applied;  ///< What the wheels were told right before it, in the machine's frame.
+    iw_cause_t cause;
+    iw_state_t from;
+    uint8_t sides;
+    bool latched;
+} iw_stop_t;
+
+/// What the owner knows at this step.
+typedef struct {
+    bool heard;       ///< Both wheels heard.
+    bool at_rest;     ///< Both at rest for rest_ms.
+    bool settled;     ///< Both at rest for IW_PERMIT_SETTLED_US.
+    bool output_zero; ///< The pair last sent was zero, or none was sent since the last silence.
+    bool timing_ok;   ///< The bus timing is not contradicted.
+    bool can_send;    ///< No setpoint is waiting to be proven.
+    bool proven;      ///< Both frames of the arming pair have been echoed.
+    iw_pair_t applied;
+} iw_permit_view_t;
+
+typedef struct {
+    const iw_config_t *config;
+    iw_permit_view_t view;              ///< Of the last step: requests are judged by it.
+    iw_time_us_t seen_us[IW_CAUSE_LOOP_LATE]; ///< When each latching cause was last seen; IW_NEVER: never.
+    iw_time_us_t lease_until_us;
+    iw_time_us_t arming_us;  ///< When arming began.
+    iw_time_us_t hold_us;    ///< When the zeros began; IW_NEVER: not yet.
+    iw_time_us_t stale_us;   ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
+    iw_client_t stale_client;
+    iw_client_t holder;
+    uint32_t raised;  ///< Bit per cause: told since the last step.
+    uint32_t present; ///< Bit per cause: told in the last step.
+    uint32_t still_moving; ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
+    iw_stop_t stop;
+    iw_state_t state;
+    iw_refusal_t arm_refusal; ///< Why the last arming failed.
+    bool arming;
+    bool holding; ///< LATCHED: zeros are still being sent.
+    bool cut;     ///< STOPPING: zero at once instead of a ramp.
+} iw_permit_t;
+
+/// `config` must be checked and outlive it. `restarted`: begin with zeros (STOPPING, cause RESTART) because the
+/// process before us died while armed.
+void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted);
+
+/// Tells that a cause is present or has just happened. It takes effect at once; the first cause of a latch stays the cause.
+void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail);
+
+/// Everything that follows from time and from what the owner sees: end of lease, of arming and of the hold.
+void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view_t *view);
+
+/// What the scheduler must aim at now.
+iw_demand_t iw_permit_demand(const iw_permit_t *self);
+
+/// Asks to be armed. IW_REFUSE_NONE: arming has begun, or the client holds the lease already (which feeds nothing). With `takeover`
+/// the lease of another client moves over, when outputs are zero and both wheels at rest.
+iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
+
+/// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted or not.
+iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool nonzero);
+
+/// Somebody wants a stop without a latch: IW_CAUSE_CLIENT_STOP, IW_CAUSE_SHUTDOWN. Needs no lease. Ends arming.
+void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause);
+
+/// A client's connection ended.
+void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client);
+
+/// Leaves LATCHED for LISTENING if nothing speaks against it; not latched, it changes nothing and is not refused.
+iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us);
+
+/// Bit per latching cause that keeps reset from succeeding now (present, or event-like and seen less than IW_PERMIT_EVENT_US ago).
+uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us);
+
+/// When `iw_permit_step` has something to do although nothing happened; IW_NEVER if it has not.
+iw_time_us_t iw_permit_next_us(const iw_permit_t *self);
+
+#endif

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+/// Which setpoint pair is due now, and when is the next one?
+///
+/// Pure state machine: no I/O and no clock. What to aim at is told by the motion permission as a demand; what the client wants by
+/// `iw_setpoint_command`.
+///
+///     SILENCE --any other demand--> (first pair: zero) --FOLLOW--> ramps to the command
+///                                                      --BRAKE --> ramps to zero
+///                                                      --ZERO  --> zero at once
+///
+/// Ramps follow elapsed time, not calls. Both wheels ramp together: the one with the longest way sets the pace, so a machine in a
+/// curve stays in it while it stops. A sign change passes through zero. Away from zero a late call is granted two periods at the most
+/// (no burst); towards zero the whole time.
+///
+/// Pairs lie on a grid of `period_ms`. A changed command or demand moves the next pair forward, at least IW_SETPOINT_SPACING_US after
+/// the last one; ZERO is due at once.
+#ifndef IW_SETPOINT_H
+#define IW_SETPOINT_H
+
+#include "iwheel/config.h"
+
+/// A changed command leaves at once, but not sooner than this after the last pair.
+#define IW_SETPOINT_SPACING_US 5000U
+
+typedef enum {
+    IW_DEMAND_SILENCE = 0, ///< Send nothing.
+    IW_DEMAND_ZERO,        ///< Zero without ramp.
+    IW_DEMAND_BRAKE,       ///< Ramp to zero, then zero.
+    IW_DEMAND_FOLLOW,      ///< Ramp to the client's command.
+} iw_demand_t;
+
+typedef struct {
+    const iw_config_t *config;
+    iw_time_us_t last_us;               ///< When the last pair was taken.
+    iw_time_us_t due_us;                ///< When the next one is due; IW_NEVER in silence.
+    iw_pair_t target;                   ///< The client's command, cleared whenever the demand is not FOLLOW.
+    int32_t speed_um_s[IW_SIDES];       ///< Where the ramp is.
+    int32_t current_uA[IW_SIDES];       ///< Ramped only with IW_ROLE_SETPOINT.
+    iw_demand_t demand;
+} iw_setpoint_t;
+
+/// `config` must be checked and outlive it. Begins in silence.
+void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config);
+
+/// Tells what to aim at. The same demand again changes nothing.
+void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t demand);
+
+/// The client's new command, already within the limits. Ignored unless the demand is FOLLOW.
+void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair_t *target);
+
+/// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole. Under FOLLOW the ramp to the
+/// next command starts from zero.
+void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us);
+
+/// True if a pair must leave now.
+bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us);
+
+/// Advances the ramp to now, hands out the pair that must leave now and sets the time of the next.
+void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_pair);
+
+/// The pair as last taken, in the machine's frame (not inverted).
+iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self);
+
+/// True if the pair last taken is the zero pair.
+bool iw_setpoint_is_zero(const iw_setpoint_t *self);
+
+/// When a pair is due; IW_NEVER in silence.
+iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self);
+
+#endif

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+/// What is known of one wheel: its last values, how old they are, whether it is there, at rest, or has rebooted.
+///
+/// "Heard" means its speed frame (4 ms): that is the one the safety rules judge; other frames do not keep a wheel alive.
+///
+/// Two frames of reference: `speed_rpm` and `ticks` are the wheel's own, as on the bus; mm/s and distance are the machine's, with
+/// `invert` applied, so that they can be compared with commands.
+///
+/// A reboot is recognised by: silence of IW_WHEEL_REBOOT_SILENCE_US; odometry that jumps further than any wheel can turn; offset
+/// frames, which a wheel sends only in its first 60 s, from a wheel that has been heard for longer than that.
+#ifndef IW_WHEEL_H
+#define IW_WHEEL_H
+
+#include "iwheel/config.h"
+#include "iwheel/proto.h"
+
+/// Silent for this long, a wheel must be assumed to have been without power.
+#define IW_WHEEL_REBOOT_SILENCE_US 1000000U
+/// Offset frames end 60 s after the wheel's start (document); one period of slack.
+#define IW_WHEEL_OFFSET_WINDOW_US 61000000U
+/// No odometry step is faster than this: twice the highest configurable speed. Ours, not the document's.
+#define IW_WHEEL_FASTEST_MM_S 10000U
+/// Odometry steps up to this many ticks are believed whatever the time between them. Ours.
+#define IW_WHEEL_TICK_SLACK 30U
+/// Temperatures above this are not believed (trap 14: a byte cannot show below 0 degC).
+#define IW_WHEEL_TEMPERATURE_MAX_degC 200U
+
+typedef enum {
+    IW_REBOOT_NONE = 0,
+    IW_REBOOT_SILENCE,
+    IW_REBOOT_ODOMETRY,
+    IW_REBOOT_OFFSET_FRAMES,
+} iw_reboot_t;
+
+typedef struct {
+    const iw_config_t *config;
+    iw_time_us_t first_us;      ///< Heard without a reboot since; IW_NEVER: not heard yet.
+    iw_time_us_t heard_us;      ///< Last speed frame that counted for liveness.
+    iw_time_us_t speed_us;      ///< Last speed frame.
+    iw_time_us_t status_us;     ///< Last status frame.
+    iw_time_us_t rest_since_us; ///< Start of the unbroken run of speed frames at rest; IW_NEVER: moving.
+    iw_time_us_t excused_us;    ///< Our own stall ended here: silence before it is not the wheel's.
+    int64_t ticks;              ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
+    uint32_t nm_per_tick;
+    uint32_t um_s_per_rpm;
+    uint32_t us_per_tick_min; ///< At IW_WHEEL_FASTEST_MM_S.
+    uint32_t reboots;
+    iw_proto_speed_t speed;
+    iw_proto_status_t status;
+    iw_side_t side;
+    iw_reboot_t pending_reboot;
+    bool boot_seen; ///< This run of the wheel began while we were listening, not before.
+} iw_wheel_t;
+
+/// `config` must be checked and outlive the wheel.
+void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us);
+
+/// Takes a message from this wheel. `fresh` is false in a late step, when the time of reception is unknown: values are then taken,
+/// but the wheel's silence does not end and no run of rest begins.
+void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message_t *message, bool fresh);
+
+/// Our loop was late: until `wheel_silent_ms` from now silence is not held against the wheel. Repeated without
+/// `iw_wheel_hear` in between it extends nothing.
+void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us);
+
+/// True if its speed was heard within `wheel_silent_ms`.
+bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us);
+
+/// True if it was not, and no stall of ours excuses it.
+bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
+
+/// True if heard, and |rpm| <= rest_rpm without a gap for the last `for_us`.
+bool iw_wheel_at_rest(const iw_wheel_t *self, iw_time_us_t now_us, uint32_t for_us);
+
+/// Measured speed in the machine's frame, rounded towards zero. Meaningless while not heard.
+int32_t iw_wheel_speed_mm_s(const iw_wheel_t *self);
+
+/// Distance in the machine's frame in nanometres. 64 bits last for nine million kilometres.
+int64_t iw_wheel_distance_nm(const iw_wheel_t *self);
+
+/// The evidence of a reboot since the last call, then IW_REBOOT_NONE.
+iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self);
+
+#endif
