@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+/// The gateway's configuration file: read, checked as a whole, printed back.
+///
+/// Link `iwheel_gateway_config` (`add_subdirectory(config)` in app/gateway) and include "gateway_config.h".
+///
+/// A file that is wrong anywhere changes nothing: every error is told with file, line and cure (the first 20 of them), and
+/// the caller's structure is left alone. A key that is not given has its default. Used at start only: it reads a file and
+/// writes to a stream, so it may block. No heap, no file-scope state.
+#ifndef GATEWAY_CONFIG_H
+#define GATEWAY_CONFIG_H
+
+#include "iwheel/config.h"
+
+#include <stdio.h>
+
+/// Read when no `-c FILE` is given. Its absence is no error then: the caller goes on with the defaults.
+#define GATEWAY_CONFIG_PATH "/etc/iwheel/gateway.conf"
+/// A longer file is refused.
+#define GATEWAY_CONFIG_FILE_MAX 65536U
+/// What `gateway_config_load` returns on any error: EX_CONFIG of sysexits.
+#define GATEWAY_CONFIG_ERROR 78
+
+/// A path that fits a unix socket address, with its terminator.
+#define GATEWAY_PATH_SIZE 108U
+/// `unix:` and such a path.
+#define GATEWAY_ADDRESS_SIZE 113U
+
+typedef enum { GATEWAY_MISMATCH_REFUSE = 0, GATEWAY_MISMATCH_WARN } gateway_mismatch_t;
+
+/// Texts are terminated, never empty, printable, and within the lengths given here.
+typedef struct gateway_config {
+    iw_config_t core; ///< [wheels] [left] [right] [drive] [limits]; `listen_only` is no key: the command line sets it.
+    struct {
+        char interface[GATEWAY_ADDRESS_SIZE]; ///< SocketCAN interface (1..15 characters) or `unix:PATH`.
+        uint32_t bitrate;                     ///< Expected of the kernel, bit/s, 10000..1000000.
+        uint16_t sample_point_permille;       ///< Expected, 500..900.
+        gateway_mismatch_t on_mismatch;       ///< Whether a contradicted timing refuses arm or only warns.
+    } bus;
+    uint16_t track_mm; ///< Distance between the wheels, 50..5000. Only for twist commands.
+    struct {
+        char line[GATEWAY_ADDRESS_SIZE]; ///< gpiod line name, `gpiochipN:OFFSET`, `unix:PATH` (SIMULATED) or `none`.
+        bool active_high;                ///< Pressed, or a cut wire, reads high.
+        uint16_t debounce_ms;            ///< On release only, 0..1000.
+    } estop;
+    struct {
+        char socket[GATEWAY_PATH_SIZE];
+        uint16_t mode; ///< Permission bits of the socket; the owner's read and write are always among them.
+        char group[33]; ///< Owner group of the socket; `none`: the gateway's own.
+        uint16_t max_clients; ///< 1..64.
+    } northbound;
+    struct {
+        uint16_t blackbox_s; ///< Length of the ring in memory, 0 (none) ..600.
+        char directory[GATEWAY_PATH_SIZE];
+    } record;
+} gateway_config_t;
+
+/// The documented defaults. Setpoint type and current role are unset: arm is refused until they are configured.
+void gateway_config_default(gateway_config_t *out_config);
+
+/// Reads the file at `path` over the defaults. 0, or GATEWAY_CONFIG_ERROR with `*out_config` untouched and lines of the form
+/// `FILE:LINE: what is wrong; what to do` on `err`.
+int gateway_config_load(const char *path, gateway_config_t *out_config, FILE *err);
+
+/// The same for a text in memory of `size` bytes; `name` stands for the file in messages.
+int gateway_config_parse(const char *name, const char *text, size_t size, gateway_config_t *out_config, FILE *err);
+
+/// One key changed after loading, by the same rules, as the command line does. `name` is "SECTION.KEY"; `origin` (for example
+/// "--estop") begins the message. Returns as `gateway_config_load`.
+int gateway_config_override(gateway_config_t *config, const char *name, const char *value, const char *origin, FILE *err);
+
+/// Writes everything in force as a commented file. Loading that file gives the same configuration and prints the same bytes
+/// (`listen_only` excepted, which is printed as a comment).
+void gateway_config_print(const gateway_config_t *config, FILE *out);
+
+#endif
