@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel/gate.h"
+
+#include <string.h>
+
+/// Beyond this the slope times the time exceeds every speed.
+#define ELAPSED_MAX_US 10000000U
+
+void iw_gate_init(iw_gate_t *self, const iw_config_t *config)
+{
+    memset(self, 0, sizeof *self);
+    self->config = config;
+}
+
+static uint32_t magnitude(int32_t value)
+{
+    return (uint32_t)((value < 0) ? -value : value);
+}
+
+/// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
+static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us)
+{
+    const uint32_t elapsed = (elapsed_us < ELAPSED_MAX_US) ? (uint32_t)elapsed_us : ELAPSED_MAX_US;
+    return 1U + slope_mm_s2 * (elapsed / 100U) / 10000U + slope_mm_s2 * (elapsed % 100U) / 1000000U;
+}
+
+static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s)
+{
+    const int32_t last_mm_s = self->last_mm_s[side];
+    const uint32_t from = magnitude(last_mm_s);
+    const uint32_t to = magnitude(speed_mm_s);
+    if (speed_mm_s != 0 && last_mm_s != 0 && (speed_mm_s > 0) != (last_mm_s > 0)) {
+        return false;
+    }
+    return (to > from) ? to - from <= allowance(self->config->accel_mm_s2, elapsed_us)
+                       : from - to <= allowance(self->config->decel_mm_s2, elapsed_us);
+}
+
+static bool is_zero(const iw_config_t *config, const iw_proto_setpoint_t *setpoint)
+{
+    return setpoint->speed_mm_s == 0 && (config->current_role == IW_ROLE_LIMIT || setpoint->current_mA == 0);
+}
+
+static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame,
+                               const iw_proto_message_t *message)
+{
+    const iw_config_t *const config = self->config;
+    const iw_proto_setpoint_t *const setpoint = &message->as.setpoint;
+    const iw_time_us_t elapsed_us = now_us - self->last_us[message->side];
+    if (message->kind != IW_PROTO_SETPOINT || frame->dlc != config->setpoint_dlc) {
+        return IW_GATE_NOT_A_SETPOINT;
+    }
+    if (!config->setpoint_type_set || config->current_role == IW_ROLE_UNSET || setpoint->type != config->setpoint_type) {
+        return IW_GATE_TYPE;
+    }
+    if (magnitude(setpoint->current_mA) > config->max_current_mA ||
+        (config->current_role == IW_ROLE_LIMIT && setpoint->current_mA < 0)) {
+        return IW_GATE_CURRENT;
+    }
+    if (magnitude(setpoint->speed_mm_s) > config->max_speed_mm_s) {
+        return IW_GATE_SPEED;
+    }
+    if (!is_zero(config, setpoint) && !slew_ok(self, message->side, elapsed_us, setpoint->speed_mm_s)) {
+        return IW_GATE_SLEW;
+    }
+    return IW_GATE_PASS;
+}
+
+iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame)
+{
+    iw_proto_message_t message;
+    iw_gate_verdict_t verdict = IW_GATE_NOT_A_SETPOINT;
+    if (iw_proto_decode(frame, &message) == IW_OK) {
+        verdict = judge(self, now_us, frame, &message);
+    }
+    if (verdict == IW_GATE_PASS) {
+        self->last_us[message.side] = now_us;
+        self->last_mm_s[message.side] = message.as.setpoint.speed_mm_s;
+    } else {
+        self->stopped++;
+    }
+    return verdict;
+}
