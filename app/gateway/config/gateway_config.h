@@ -44,8 +44,8 @@ typedef struct gateway_config {
     } estop;
     struct {
         char socket[GATEWAY_PATH_SIZE];
-        uint16_t mode; ///< Permission bits of the socket; the owner's read and write are always among them.
-        char group[33]; ///< Owner group of the socket; `none`: the gateway's own.
+        uint16_t mode;        ///< Permission bits of the socket; the owner's read and write are always among them.
+        char group[33];       ///< Owner group of the socket; `none`: the gateway's own.
         uint16_t max_clients; ///< 1..64.
     } northbound;
     struct {
@@ -66,7 +66,8 @@ int gateway_config_parse(const char *name, const char *text, size_t size, gatewa
 
 /// One key changed after loading, by the same rules, as the command line does. `name` is "SECTION.KEY"; `origin` (for example
 /// "--estop") begins the message. Returns as `gateway_config_load`.
-int gateway_config_override(gateway_config_t *config, const char *name, const char *value, const char *origin, FILE *err);
+int gateway_config_override(gateway_config_t *config, const char *name, const char *value, const char *origin,
+                            FILE *err);
 
 /// Writes everything in force as a commented file. Loading that file gives the same configuration and prints the same bytes
 /// (`listen_only` excepted, which is printed as a comment).
