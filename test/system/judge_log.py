@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""What the judge reads: bus log and timeline, sorted into setpoints and sessions. No verdicts on motion here.
+
+Times are integer microseconds of CLOCK_MONOTONIC. Timeline events (Event.kind):
+  start, end        the gateway process was started; is gone (killed or exited)
+  restart_hold      it was started after a crash: zeros are due at once although nobody armed
+  arm, drive, reset a request was sent at t_us and answered at done_us; ok tells the answer; drive has left, right (mm/s)
+  stop, gone        somebody said stop; the holder of the lease disconnected: ramp
+  press, estop      the button was pressed; a client said estop: zero at once
+  cut, ramp         the scenario caused something that must stop the wheels within within_us, without or with ramp
+  dead, alive       the bus takes no frames any more; takes them again
+"""
+import bisect
+import math
+from typing import NamedTuple
+
+LEFT, RIGHT = 266, 298
+SPEED_IDS = (256, 288)
+KNOWN = {LEFT, RIGHT, 256, 257, 288, 289, 290, 512, 513, 544, 545}
+GAP_US = 100_000          # invariant 4
+PAIR_US = 3_000           # invariant 5: left and right of one cycle; 0.88 ms on a full bus
+ESTOP_US = 5_000          # invariant 2
+JITTER_US = 10_000        # between the gateway's clock and the bus
+REST_RPM = 2
+SETTLED_US = 500_000
+HOLD_MAX_US = 10_000_000
+FIRST_LEASE_US = 1_000_000
+ALWAYS_US = 200_000       # a limit missed by more than this is no matter of a busy machine
+ECHO_US = 50_000
+
+
+class Frame(NamedTuple):
+    t_us: int
+    id: int               # with the flag bits of struct can_frame
+    data: bytes
+    own: bool = False     # sent by the scenario itself
+
+
+class Event(NamedTuple):
+    t_us: int
+    kind: str
+    done_us: int = 0
+    ok: bool = True
+    left: int = 0
+    right: int = 0
+    within_us: int = 0
+
+
+class Config(NamedTuple):
+    setpoint_type: int = 1
+    role: str = "limit"
+    dlc: int = 5
+    period_ms: int = 20
+    lease_ms: int = 200
+    accel_mm_s2: int = 800
+    decel_mm_s2: int = 1500
+    max_speed_mm_s: int = 1000
+    max_current_mA: int = 2000
+    zero_hold_ms: int = 1500
+    invert: tuple = (False, False)
+
+
+class Violation(NamedTuple):
+    rule: str
+    t_us: int
+    text: str
+    timing: bool          # a stalled machine could have caused it
+
+
+class Setpoint(NamedTuple):
+    t_us: int
+    side: int             # 0 left, 1 right
+    speed: int            # mm/s in the machine's frame
+    current: int
+    zero: bool
+
+
+class Session:
+    """From one arm to the silence after it."""
+
+    def __init__(self, begin_us, armed_us):
+        self.begin_us, self.armed_us = begin_us, armed_us
+        self.drives = []
+        self.ends = []    # (t_us, kind, within_us), kind: ramp, cut, press, killed
+
+    def end_us(self):
+        return min((end[0] for end in self.ends), default=None)
+
+
+def signed(data, at):
+    return int.from_bytes(data[at:at + 2], "big", signed=True)
+
+
+class Reading:
+    """Setpoints, sessions and windows of a dead bus, and what is wrong with their form. `found` collects violations."""
+
+    def __init__(self, config, frames, events, moves=True, finished_us=None, estop_limit_us=ESTOP_US):
+        self.config, self.moves, self.estop_limit_us = config, moves, estop_limit_us
+        self.frames = sorted(frames, key=lambda frame: frame.t_us)
+        self.events = sorted(events, key=lambda event: event.t_us)
+        self.finished_us = finished_us or (self.frames[-1].t_us if self.frames else 0)
+        self.found = []
+        self.estop_latencies_us = []
+        self.gap_max_us = self.pair_max_us = 0
+        self.setpoints = []
+        self.dead = self._dead_windows()
+
+    def _say(self, rule, t_us, text, excess_us=None):
+        timing = excess_us is not None and excess_us < ALWAYS_US
+        self.found.append(Violation(rule, t_us, text, timing))
+
+    def _dead_windows(self):
+        windows, since = [], None
+        for event in self.events:
+            if event.kind == "dead" and since is None:
+                since = event.t_us
+            if event.kind == "alive" and since is not None:
+                windows.append((since, event.done_us or event.t_us))
+                since = None
+        return windows + ([(since, 1 << 62)] if since is not None else [])
+
+    def _is_dead(self, from_us, to_us):
+        return any(begin < to_us + GAP_US and from_us < end + GAP_US for begin, end in self.dead)
+
+    def _read(self):
+        """Sorts out the gateway's frames and checks their form (invariant 8)."""
+        for frame in self.frames:
+            if frame.own:
+                continue
+            if frame.id not in KNOWN:
+                if not frame.id & 0x20000000:
+                    self._say("unknown_id", frame.t_us, f"frame with id word 0x{frame.id:X}")
+                continue
+            if frame.id in (LEFT, RIGHT):
+                self._read_setpoint(frame)
+
+    def _read_setpoint(self, frame):
+        config, side = self.config, 0 if frame.id == LEFT else 1
+        if len(frame.data) != config.dlc:
+            self._say("dlc", frame.t_us, f"{len(frame.data)} bytes on {frame.id}, {config.dlc} configured")
+            return
+        if any(frame.data[5:]):
+            self._say("padding", frame.t_us, "bytes behind the setpoint are not zero")
+        if frame.data[0] != config.setpoint_type:
+            self._say("type", frame.t_us, f"setpoint type {frame.data[0]}, {config.setpoint_type} configured")
+        speed, current = signed(frame.data, 1), signed(frame.data, 3)
+        if abs(speed) > config.max_speed_mm_s:
+            self._say("speed", frame.t_us, f"{speed} mm/s, {config.max_speed_mm_s} allowed")
+        if abs(current) > min(config.max_current_mA, 2000):
+            self._say("current", frame.t_us, f"{current} mA, {config.max_current_mA} allowed")
+        zero = speed == 0 and (config.role == "limit" or current == 0)
+        speed = -speed if config.invert[side] else speed
+        self.setpoints.append(Setpoint(frame.t_us, side, speed, current, zero))
+
+    def _sessions(self):
+        sessions, current = [], None
+        for event in self.events:
+            if event.kind == "arm" and event.ok:
+                if current is None or current.ends:
+                    current = Session(event.t_us, event.done_us)
+                    sessions.append(current)
+                current.drives.append(Event(event.t_us, "arm", event.done_us))
+            elif event.kind == "restart_hold":
+                current = Session(event.t_us, event.t_us)
+                current.ends.append((event.t_us, "cut", 0))
+                sessions.append(current)
+            elif current is not None:
+                self._take(current, event)
+        for session in sessions:
+            self._lapse(session)
+        self.sessions, self._begins = sessions, [session.begin_us for session in sessions]
+
+    def _take(self, session, event):
+        if event.kind == "drive" and event.ok:
+            if session.ends and event.t_us > session.end_us() + ECHO_US:
+                self._say("drive_after_end", event.t_us, "a drive was accepted although the session had ended")
+            session.drives.append(event)
+        kinds = {"stop": "ramp", "gone": "ramp", "ramp": "ramp", "press": "press", "estop": "press", "cut": "cut", "end": "killed"}
+        if event.kind in kinds:
+            session.ends.append((event.t_us, kinds[event.kind], event.within_us))
+
+    def _lapse(self, session):
+        """The lease ends by itself; a drive that comes after that must have been refused."""
+        config, previous = self.config, None
+        for drive in session.drives:
+            if previous is not None and drive.kind == "drive":
+                late_us = drive.t_us - (previous.done_us + self._lease_us(previous)) - config.period_ms * 1000
+                if late_us > JITTER_US:
+                    self._say("late_drive", drive.t_us, f"a drive was accepted {late_us / 1000:.0f} ms after the lease had ended")
+            previous = drive
+        if previous is not None:
+            end_us = previous.done_us + self._lease_us(previous)
+            if end_us < self.finished_us:
+                session.ends.append((end_us, "ramp", 0))
+        session.ends.sort()
+
+    def _lease_us(self, feed):
+        lease_us = self.config.lease_ms * 1000
+        return max(lease_us, FIRST_LEASE_US) if feed.kind == "arm" else lease_us
+
+    def _session_at(self, t_us):
+        index = bisect.bisect_right(self._begins, t_us) - 1
+        return self.sessions[index] if index >= 0 else None
+
+
+def percentile(values, percent):
+    ordered = sorted(values)
+    return ordered[max(0, math.ceil(len(ordered) * percent / 100) - 1)]
