@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+/// What a kind of bus and a kind of e-stop provide, so that each is one file and nobody else knows which is in use.
+///
+/// A backend is opened once and stays open for the life of the process. What it stands for may come and go: the backend then says so
+/// through its state and comes back by itself from `tend`. It owns one descriptor that never changes (an epoll set of its own, if what
+/// it really reads is reopened): the owner watches it for reading and then runs a step.
+///
+/// Nothing here blocks or allocates after open. One thread of execution.
+#ifndef IWHEEL_LINUX_BACKEND_H
+#define IWHEEL_LINUX_BACKEND_H
+
+#include "iwheel/hal.h"
+
+/// Storage for the state of any backend, so that the owner need not know its size.
+typedef union {
+    uint64_t align;
+    uint8_t bytes[2048];
+} iw_backend_store_t;
+
+/// A kind of bus. `self` is its state, of a type that only the backend knows.
+typedef struct {
+    /// 0, or an errno. `name` must outlive the bus. A bus that is merely absent is no error: it is down until it comes.
+    int (*open)(void *self, const char *name);
+    void (*close)(void *self);
+    /// The descriptor to watch for reading; the same from open to close.
+    int (*watch_fd)(const void *self);
+    /// Reopens what is gone if its time has come, and gives up what is dead. Call it before every step.
+    void (*tend)(void *self, iw_time_us_t now_us);
+    /// When `tend` has something to do; IW_NEVER if it has not.
+    iw_time_us_t (*next_us)(const void *self);
+    /// As in iw_hal_t.
+    int (*send)(void *self, const iw_can_frame_t *frame);
+    int (*receive)(void *self, iw_can_frame_t *out_frame);
+    iw_bus_state_t (*state)(void *self);
+    int (*purge)(void *self);
+    /// An echo proves that the frame was on the bus.
+    bool echo_proven;
+} iw_bus_ops_t;
+
+/// A kind of e-stop input. The functions mean the same as those of a bus.
+typedef struct {
+    int (*open)(void *self, const char *name);
+    void (*close)(void *self);
+    int (*watch_fd)(const void *self); ///< -1: there is nothing to watch.
+    void (*tend)(void *self, iw_time_us_t now_us);
+    iw_time_us_t (*next_us)(const void *self);
+    int (*pressed)(void *self); ///< As `estop_pressed` of iw_hal_t.
+    bool simulated;             ///< Not a real button: announced wherever the e-stop is shown.
+    bool present;               ///< False: there is no e-stop at all.
+} iw_estop_ops_t;
+
+/// `unix:PATH`: the local bus. The echo comes from its hub when the simulated wheels have acknowledged, so it is a proof.
+extern const iw_bus_ops_t iw_local_bus_ops;
+
+/// `unix:PATH`: the simulator's button.
+extern const iw_estop_ops_t iw_unix_estop_ops;
+/// `none`: always released.
+extern const iw_estop_ops_t iw_no_estop_ops;
+
+/// The backend for a name as in the configuration; NULL if this build has none for it.
+const iw_bus_ops_t *iw_bus_backend(const char *name);
+const iw_estop_ops_t *iw_estop_backend(const char *name);
+
+#endif

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+/// The two clocks. Only the monotonic one decides anything; the wall clock is an annotation.
+#ifndef IWHEEL_LINUX_CLOCK_H
+#define IWHEEL_LINUX_CLOCK_H
+
+#include "iwheel/types.h"
+
+/// CLOCK_MONOTONIC in microseconds. Never steps, does not run while the machine is suspended.
+iw_time_us_t iw_clock_now_us(void);
+
+/// CLOCK_REALTIME in microseconds since 1970. May step in either direction.
+int64_t iw_clock_wall_us(void);
+
+#endif

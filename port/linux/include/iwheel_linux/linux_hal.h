@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+/// A bus backend and an e-stop backend, put together as the HAL that the core asks for.
+///
+/// Between them stand only a tap, which shows every frame received and every echo to whoever wants to look, and the memory of the last
+/// answers, so that nobody else need ask the backends (asking consumes: an edge or a loss is told once).
+#ifndef IWHEEL_LINUX_HAL_H
+#define IWHEEL_LINUX_HAL_H
+
+#include "iwheel_linux/backend.h"
+
+typedef struct {
+    const iw_bus_ops_t *bus_ops;
+    const iw_estop_ops_t *estop_ops;
+    /// Called with each frame the core receives, before the core sees it. May be NULL. Must not block or call back into the core.
+    void (*tap)(void *context, const iw_can_frame_t *frame);
+    void *tap_context;
+    int estop_last; ///< The last answer given to the core; -1 before the first.
+    iw_backend_store_t bus;
+    iw_backend_store_t estop;
+} iw_linux_hal_t;
+
+/// Opens both, by their names in the configuration. 0 or an errno; `*out_culprit` is then the name at fault. ENOTSUP: this build
+/// has no backend for it. Nothing stays open on failure. The names must outlive the HAL.
+int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const char *estop_name, const char **out_culprit);
+void iw_linux_hal_close(iw_linux_hal_t *self);
+
+/// What to hand to `iw_gateway_init`. `self` must not move afterwards.
+iw_hal_t iw_linux_hal_functions(iw_linux_hal_t *self);
+
+/// Descriptors to watch for reading; the e-stop's is -1 if there is nothing to watch.
+int iw_linux_hal_bus_fd(const iw_linux_hal_t *self);
+int iw_linux_hal_estop_fd(const iw_linux_hal_t *self);
+
+/// Call before every step.
+void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us);
+
+/// When `tend` has something to do; IW_NEVER if it has not.
+iw_time_us_t iw_linux_hal_next_us(const iw_linux_hal_t *self);
+
+#endif

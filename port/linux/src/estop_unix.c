@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_linux/backend.h"
+
+#include "unix_link.h"
+
+#include <errno.h>
+#include <sys/socket.h>
+
+/// Longer bursts of presses are read in the next step; the link is level-triggered.
+#define BURST_MAX 64
+
+typedef struct {
+    iw_unix_link_t link;
+    bool known;    ///< The button has told its level on this connection.
+    bool level;    ///< Pressed.
+    bool edge;     ///< It changed since the last call of `pressed`.
+    bool was_lost; ///< The connection broke since then.
+} unix_estop_t;
+
+IW_STATIC_ASSERT(sizeof(unix_estop_t) <= sizeof(iw_backend_store_t), unix_estop_fits);
+
+static int button_open(void *self, const char *name) {
+    unix_estop_t *button = (unix_estop_t *)self;
+    *button = (unix_estop_t){.level = true};
+    return iw_unix_link_open(&button->link, name, SOCK_STREAM);
+}
+
+static void button_close(void *self) {
+    iw_unix_link_close(&((unix_estop_t *)self)->link);
+}
+
+static int button_watch_fd(const void *self) {
+    return ((const unix_estop_t *)self)->link.watch_fd;
+}
+
+static void button_tend(void *self, iw_time_us_t now_us) {
+    (void)iw_unix_link_tend(&((unix_estop_t *)self)->link, now_us);
+}
+
+static iw_time_us_t button_next_us(const void *self) {
+    return ((const unix_estop_t *)self)->link.retry_us;
+}
+
+static void take_levels(unix_estop_t *button, const char *levels, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        const bool level = levels[i] != '0'; // Whatever is not clearly "released" is pressed.
+        button->edge = button->edge || level || (button->known && level != button->level);
+        button->level = level;
+        button->known = true;
+    }
+}
+
+static void listen_to(unix_estop_t *button) {
+    char levels[BURST_MAX];
+    if (!iw_unix_link_is_up(&button->link)) {
+        return;
+    }
+    const ssize_t count = recv(button->link.fd, levels, sizeof levels, MSG_DONTWAIT);
+    if (count > 0) {
+        take_levels(button, levels, (size_t)count);
+    } else if (count == 0 || (errno != EAGAIN && errno != EINTR)) {
+        iw_unix_link_lose(&button->link);
+        button->known = false;
+        button->was_lost = true;
+    }
+}
+
+static int button_pressed(void *self) {
+    unix_estop_t *button = (unix_estop_t *)self;
+    listen_to(button);
+    const bool unreadable = button->was_lost || !button->known;
+    const bool pressed = button->edge || button->level;
+    button->edge = false;
+    button->was_lost = false;
+    return unreadable ? -1 : (int)pressed;
+}
+
+const iw_estop_ops_t iw_unix_estop_ops = {
+    .open = button_open,
+    .close = button_close,
+    .watch_fd = button_watch_fd,
+    .tend = button_tend,
+    .next_us = button_next_us,
+    .pressed = button_pressed,
+    .simulated = true,
+    .present = true,
+};

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_linux/linux_hal.h"
+
+#include <errno.h>
+
+int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const char *estop_name, const char **out_culprit) {
+    *self = (iw_linux_hal_t){
+        .bus_ops = iw_bus_backend(bus_name), .estop_ops = iw_estop_backend(estop_name), .estop_last = -1};
+    *out_culprit = bus_name;
+    if (self->bus_ops == NULL) {
+        return ENOTSUP;
+    }
+    if (self->estop_ops == NULL) {
+        *out_culprit = estop_name;
+        return ENOTSUP;
+    }
+    int error = self->bus_ops->open(&self->bus, bus_name);
+    if (error != 0) {
+        return error;
+    }
+    error = self->estop_ops->open(&self->estop, estop_name);
+    if (error != 0) {
+        *out_culprit = estop_name;
+        self->bus_ops->close(&self->bus);
+    }
+    return error;
+}
+
+void iw_linux_hal_close(iw_linux_hal_t *self) {
+    self->bus_ops->close(&self->bus);
+    self->estop_ops->close(&self->estop);
+}
+
+static int hal_send(void *context, const iw_can_frame_t *frame) {
+    iw_linux_hal_t *self = (iw_linux_hal_t *)context;
+    return self->bus_ops->send(&self->bus, frame);
+}
+
+static int hal_receive(void *context, iw_can_frame_t *out_frame) {
+    iw_linux_hal_t *self = (iw_linux_hal_t *)context;
+    const int result = self->bus_ops->receive(&self->bus, out_frame);
+    if (result > 0 && self->tap != NULL) {
+        self->tap(self->tap_context, out_frame);
+    }
+    return result;
+}
+
+static iw_bus_state_t hal_bus_state(void *context) {
+    iw_linux_hal_t *self = (iw_linux_hal_t *)context;
+    return self->bus_ops->state(&self->bus);
+}
+
+static int hal_purge(void *context) {
+    iw_linux_hal_t *self = (iw_linux_hal_t *)context;
+    return self->bus_ops->purge(&self->bus);
+}
+
+static int hal_estop_pressed(void *context) {
+    iw_linux_hal_t *self = (iw_linux_hal_t *)context;
+    self->estop_last = self->estop_ops->pressed(&self->estop);
+    return self->estop_last;
+}
+
+iw_hal_t iw_linux_hal_functions(iw_linux_hal_t *self) {
+    return (iw_hal_t){
+        .send = hal_send,
+        .receive = hal_receive,
+        .bus_state = hal_bus_state,
+        .purge = hal_purge,
+        .estop_pressed = hal_estop_pressed,
+        .context = self,
+    };
+}
+
+int iw_linux_hal_bus_fd(const iw_linux_hal_t *self) {
+    return self->bus_ops->watch_fd(&self->bus);
+}
+
+int iw_linux_hal_estop_fd(const iw_linux_hal_t *self) {
+    return self->estop_ops->watch_fd(&self->estop);
+}
+
+void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us) {
+    self->bus_ops->tend(&self->bus, now_us);
+    self->estop_ops->tend(&self->estop, now_us);
+}
+
+iw_time_us_t iw_linux_hal_next_us(const iw_linux_hal_t *self) {
+    const iw_time_us_t bus_us = self->bus_ops->next_us(&self->bus);
+    const iw_time_us_t estop_us = self->estop_ops->next_us(&self->estop);
+    return bus_us < estop_us ? bus_us : estop_us;
+}
