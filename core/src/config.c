@@ -69,7 +69,7 @@ static iw_config_fault_t check_relations(const iw_config_t *config)
     if (config->force_unit[IW_LEFT] > IW_FORCE_DN || config->force_unit[IW_RIGHT] > IW_FORCE_DN) {
         return IW_CONFIG_FORCE_UNIT;
     }
-    if (config->gear_turns > GEAR_MAX * config->gear_per || config->gear_per > GEAR_MAX * config->gear_turns) {
+    if (config->gear_turns < config->gear_per || config->gear_turns > GEAR_MAX * config->gear_per) {
         return IW_CONFIG_GEAR_RATIO;
     }
     return (budget.client_lost_ms > WATCHDOG_MS) ? IW_CONFIG_STOP_BUDGET : IW_CONFIG_OK;

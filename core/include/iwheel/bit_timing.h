@@ -41,7 +41,8 @@ typedef struct {
 iw_status_t iw_bit_timing_solve(const iw_bit_timing_limits_t *limits, uint32_t clock_hz,
                                 const iw_bit_timing_achieved_t *wanted, iw_bit_timing_t *out_timing);
 
-/// What the given segments do on that clock. A prescaler of 0 gives {0, 0}.
+/// What the given segments do on that clock. A prescaler of 0 gives {0, 0}, and so does a bit of
+/// more than UINT32_MAX clock periods.
 iw_bit_timing_achieved_t iw_bit_timing_achieved(uint32_t clock_hz, const iw_bit_timing_t *timing);
 
 #endif

@@ -37,7 +37,7 @@ typedef struct {
     uint16_t blocked_ms;      ///< A wheel below 20 % of its command for this long, 200..10000, stops the pair.
     uint16_t radius_mm;       ///< Of the wheel, 20..500; the document says "approximately 192".
     uint16_t gear_turns;      ///< Rotor turns in `gear_per` wheel turns, 1..1000.
-    uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1/100..100.
+    uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1..100.
     uint16_t setpoint_dlc;    ///< 5..8, zero padded. The document's table has 5 bytes.
     uint8_t setpoint_type;    ///< Byte 0 of a setpoint. The document lists no values: valid only with `..._set`.
     bool setpoint_type_set;   ///< The wheels do not move until this is true.
@@ -71,7 +71,7 @@ typedef enum {
     IW_CONFIG_SETPOINT_DLC,
     IW_CONFIG_CURRENT_ROLE, ///< Not an iw_current_role_t.
     IW_CONFIG_FORCE_UNIT,   ///< Not an iw_force_unit_t.
-    IW_CONFIG_GEAR_RATIO,   ///< gear_turns / gear_per outside 1/100..100.
+    IW_CONFIG_GEAR_RATIO,   ///< gear_turns / gear_per outside 1..100.
     IW_CONFIG_STOP_BUDGET,  ///< lease + period + max_speed / decel exceeds 1000 ms, the wheel's own watchdog.
 } iw_config_fault_t;
 

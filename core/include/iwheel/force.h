@@ -3,9 +3,9 @@
 ///
 /// The document: force on the shaft = normal force - offset, where the offset is the mean normal force at start-up and "only has
 /// sense if you don't apply any force to the shaft during the first two seconds". The wheel sends its own offset only in its first
-/// 60 s. So the offset carries its provenance, and the sooner of two questions decides nothing silently: a bad one is not a value.
+/// 60 s. So the offset carries its provenance, and a bad one is not a value.
 ///
-///     OPEN --40 samples within 2 s--> judged: good  -> ESTIMATED (or a cross-check, if there is something better)
+///     OPEN --40 samples without a gap--> judged: good  -> ESTIMATED (or a cross-check, if there is something better)
 ///       ^                                     bad   -> CONTAMINATED: no value from it
 ///       +--- wheel rebooted
 ///
@@ -23,8 +23,6 @@
 
 /// Two seconds of force frames at their documented period of 50 ms.
 #define IW_FORCE_WINDOW_SAMPLES 40U
-/// The window's samples must have arrived within this, else it starts again.
-#define IW_FORCE_WINDOW_MAX_US 3000000U
 /// A quiet sensor: standard deviation, and difference of the means of both halves of the window, below these.
 #define IW_FORCE_QUIET_mN 1000U
 #define IW_FORCE_DRIFT_mN 1000U
@@ -32,7 +30,7 @@
 #define IW_FORCE_LOADED_mN 20000U
 /// Unit evidence needs a wheel offset of at least this.
 #define IW_FORCE_EVIDENCE_MIN_dN 20
-/// Older than this (five periods), the force is not valid.
+/// Older than this (five periods), the force is not valid, and a window with such a gap starts again.
 #define IW_FORCE_STALE_US 250000U
 
 typedef enum {
@@ -59,12 +57,12 @@ typedef enum {
     IW_UNIT_CN,
     IW_UNIT_DN,
     IW_UNIT_OFFSET_REMOVED, ///< Raw is about 0 at rest although the offset is not.
-    IW_UNIT_UNCLEAR,        ///< None of these, or more than one.
+    IW_UNIT_UNCLEAR,        ///< None of these, or more than one: somebody pressed during one of the two measurements.
 } iw_unit_evidence_t;
 
 typedef enum {
     IW_TARE_OK = 0,
-    IW_TARE_NO_FORCE, ///< Not enough recent samples.
+    IW_TARE_NO_FORCE, ///< No unbroken window of recent samples.
     IW_TARE_MOVING,
     IW_TARE_NOISY, ///< Noise or drift.
     IW_TARE_LOADED,
@@ -78,6 +76,7 @@ typedef enum {
     IW_FORCE_NO_OFFSET,
     IW_FORCE_UNIT_CONTRADICTED,
     IW_FORCE_OFFSET_REMOVED, ///< The wheel seems to subtract the offset itself.
+    IW_FORCE_OFFSET_DOUBTED, ///< Our own mean and the wheel's offset disagree: one of them was taken under load.
 } iw_force_validity_t;
 
 typedef struct {
@@ -91,14 +90,13 @@ typedef struct {
 typedef struct {
     const iw_config_t *config;
     iw_time_us_t raw_us;
-    iw_time_us_t oldest_us;    ///< When the window's first sample came.
     iw_time_us_t offset_us;    ///< When the offset in force was taken; IW_NEVER: none, or STORED by an earlier run.
-    iw_time_us_t moved_us;     ///< When the wheel last moved.
     int32_t offset_mN;         ///< The offset in force; 0 with IW_OFFSET_NONE.
     int16_t wheel_offset_dN;   ///< The wheel's own, as sent.
     int16_t sample[IW_FORCE_WINDOW_SAMPLES]; ///< Ring of raw values, the last two seconds.
     int16_t raw;
-    uint8_t count;
+    uint8_t count; ///< Samples in the ring.
+    uint8_t still; ///< Of the newest samples, how many in a row came from a wheel at rest.
     uint8_t next;
     iw_side_t side;
     iw_offset_provenance_t provenance;
@@ -125,7 +123,8 @@ void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool stil
 /// Takes an offset frame.
 void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN);
 
-/// Makes the mean of the last two seconds the offset, as OPERATOR. Refused, changing nothing, with the reason.
+/// Makes the mean of the last two seconds the offset, as OPERATOR. Refused, changing nothing, with the reason. LOADED is not judged
+/// where the offset in force is itself in doubt.
 iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us);
 
 /// Whether the net force means anything now, and if not, why.

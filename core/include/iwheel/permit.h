@@ -37,16 +37,17 @@ typedef uint32_t iw_client_t;
 
 typedef enum { IW_STATE_LISTENING = 0, IW_STATE_ARMED, IW_STATE_STOPPING, IW_STATE_LATCHED } iw_state_t;
 
-/// Why the wheels were stopped. `iw_stop_t::detail` is given with each.
+/// Why the wheels were stopped, the most telling first: of several present at once, the first is reported. `iw_stop_t::detail` is
+/// given with each.
 typedef enum {
     IW_CAUSE_NONE = 0,
     IW_CAUSE_ESTOP_LINE,     ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
-    IW_CAUSE_ESTOP_SOFTWARE, ///< A client said estop. Detail: 0.
-    IW_CAUSE_WHEEL_LOST,     ///< Not heard. Detail: ms since it was; UINT32_MAX: never.
-    IW_CAUSE_WHEEL_REBOOTED, ///< Detail: an iw_reboot_t.
-    IW_CAUSE_SEND_STALLED,   ///< A setpoint was not echoed. Detail: ms waited.
+    IW_CAUSE_ESTOP_SOFTWARE, ///< A client said estop. Detail: which iw_client_t.
     IW_CAUSE_BUS_DOWN,       ///< Down, gone or bus-off. Detail: an iw_bus_state_t.
     IW_CAUSE_SECOND_MASTER,  ///< Somebody else sends setpoints. Detail: their id.
+    IW_CAUSE_SEND_STALLED,   ///< A setpoint was not echoed. Detail: ms waited.
+    IW_CAUSE_WHEEL_REBOOTED, ///< Detail: an iw_reboot_t.
+    IW_CAUSE_WHEEL_LOST,     ///< Not heard. Detail: ms since it was; UINT32_MAX: never.
     IW_CAUSE_FEEDBACK_SIGN,  ///< Turns against its command. Detail: |measured| mm/s.
     IW_CAUSE_OVERSPEED,      ///< Faster than applied. Detail: |measured| mm/s.
     IW_CAUSE_LOOP_HUNG,      ///< Our own loop was late by more than 500 ms. Detail: ms.
@@ -155,6 +156,9 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
 
 /// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted or not.
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool nonzero);
+
+/// Somebody sent a nonzero drive command that was not even judged (out of range): it refuses arm and reset like any other.
+void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client);
 
 /// Somebody wants a stop without a latch: IW_CAUSE_CLIENT_STOP, IW_CAUSE_SHUTDOWN. Needs no lease. Ends arming.
 void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause);

@@ -9,7 +9,7 @@
 ///                                                      --ZERO  --> zero at once
 ///
 /// Ramps follow elapsed time, not calls. Both wheels ramp together: the one with the longest way sets the pace, so a machine in a
-/// curve stays in it while it stops. A sign change passes through zero. Away from zero a late call is granted two periods at the most
+/// curve stays in it while it stops. But an accelerating wheel never holds up one that brakes. A sign change passes through zero. Away from zero a late call is granted two periods at the most
 /// (no burst); towards zero the whole time.
 ///
 /// Pairs lie on a grid of `period_ms`. A changed command or demand moves the next pair forward, at least IW_SETPOINT_SPACING_US after
@@ -48,8 +48,8 @@ void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t de
 /// The client's new command, already within the limits. Ignored unless the demand is FOLLOW.
 void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair_t *target);
 
-/// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole. Under FOLLOW the ramp to the
-/// next command starts from zero.
+/// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole. The zero is due
+/// IW_SETPOINT_SPACING_US from now; under FOLLOW the ramp to the next command starts from it.
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us);
 
 /// True if a pair must leave now.
@@ -61,8 +61,11 @@ void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_p
 /// The pair as last taken, in the machine's frame (not inverted).
 iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self);
 
-/// True if the pair last taken is the zero pair.
+/// True if the output is zero: the pair last taken was, or a collapse or a new demand has made it so.
 bool iw_setpoint_is_zero(const iw_setpoint_t *self);
+
+/// True if the next pair will be zero, whenever it is taken.
+bool iw_setpoint_next_is_zero(const iw_setpoint_t *self);
 
 /// When a pair is due; IW_NEVER in silence.
 iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self);

@@ -35,6 +35,7 @@ typedef enum {
 typedef struct {
     const iw_config_t *config;
     iw_time_us_t first_us;      ///< Heard without a reboot since; IW_NEVER: not heard yet.
+    iw_time_us_t any_us;        ///< Last frame of any kind, or the end of our own stall, or the start.
     iw_time_us_t heard_us;      ///< Last speed frame that counted for liveness.
     iw_time_us_t speed_us;      ///< Last speed frame.
     iw_time_us_t status_us;     ///< Last status frame.
@@ -60,13 +61,13 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
 void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message_t *message, bool fresh);
 
 /// Our loop was late: until `wheel_silent_ms` from now silence is not held against the wheel. Repeated without
-/// `iw_wheel_hear` in between it extends nothing.
+/// a fresh speed frame in between it extends nothing.
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us);
 
-/// True if its speed was heard within `wheel_silent_ms`.
+/// True if its speed was heard less than `wheel_silent_ms` ago.
 bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us);
 
-/// True if it was not, and no stall of ours excuses it.
+/// True if it was never heard, or not for `wheel_silent_ms` and no stall of ours excuses that.
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
 
 /// True if heard, and |rpm| <= rest_rpm without a gap for the last `for_us`.
