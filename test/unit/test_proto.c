@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: MIT
+// The codec against the golden vectors, and the rules that no single vector shows.
+#include <string.h>
+
+#include "golden_vectors.h"
+#include "iwheel/proto.h"
+#include "unity.h"
+
+#define POISON 0xA5
+
+void setUp(void) {}
+
+void tearDown(void) {}
+
+static void assert_same_bytes(const iw_can_frame_t *expected, const iw_can_frame_t *actual, const char *name) {
+    TEST_ASSERT_EQUAL_HEX32_MESSAGE(expected->id, actual->id, name);
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(expected->dlc, actual->dlc, name);
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(expected->kind, actual->kind, name);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(expected->data, actual->data, IW_CAN_DATA_MAX, name);
+}
+
+static void assert_same_motion(const iw_proto_message_t *expected, const iw_proto_message_t *actual, const char *name) {
+    if (expected->kind == IW_PROTO_SETPOINT) {
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(expected->as.setpoint.type, actual->as.setpoint.type, name);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.setpoint.speed_mm_s, actual->as.setpoint.speed_mm_s, name);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.setpoint.current_mA, actual->as.setpoint.current_mA, name);
+    } else if (expected->kind == IW_PROTO_SPEED) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.speed.speed_rpm, actual->as.speed.speed_rpm, name);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.speed.acceleration_raw, actual->as.speed.acceleration_raw, name);
+    } else if (expected->kind == IW_PROTO_STATUS) {
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(expected->as.status.odometry_ticks, actual->as.status.odometry_ticks, name);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(expected->as.status.battery_dV, actual->as.status.battery_dV, name);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(expected->as.status.temperature_degC, actual->as.status.temperature_degC, name);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(expected->as.status.cpu_percent, actual->as.status.cpu_percent, name);
+    }
+}
+
+static void assert_same_rest(const iw_proto_message_t *expected, const iw_proto_message_t *actual, const char *name) {
+    if (expected->kind == IW_PROTO_POSE) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.pose.x_mm, actual->as.pose.x_mm, name);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.pose.y_mm, actual->as.pose.y_mm, name);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.pose.z_mm, actual->as.pose.z_mm, name);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.pose.psi_mrad, actual->as.pose.psi_mrad, name);
+    } else if (expected->kind == IW_PROTO_FORCE) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.force.force_raw, actual->as.force.force_raw, name);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.force.debug_raw, actual->as.force.debug_raw, name);
+    } else if (expected->kind == IW_PROTO_OFFSET) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(expected->as.offset.offset_dN, actual->as.offset.offset_dN, name);
+    }
+}
+
+static void assert_same_message(const iw_proto_message_t *expected, const iw_proto_message_t *actual,
+                                const char *name) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected->kind, actual->kind, name);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected->side, actual->side, name);
+    assert_same_motion(expected, actual, name);
+    assert_same_rest(expected, actual, name);
+}
+
+static void assert_untouched(const void *object, size_t size, const char *name) {
+    const uint8_t *bytes = object;
+    for (size_t i = 0; i < size; i++) {
+        TEST_ASSERT_EQUAL_HEX8_MESSAGE(POISON, bytes[i], name);
+    }
+}
+
+static void test_golden_table_covers_all_eleven_messages(void) {
+    static const uint32_t ids[] = {256, 257, 266, 288, 289, 290, 298, 512, 513, 544, 545};
+    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
+        unsigned found = 0;
+        for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
+            found += golden_vectors[v].frame.id == ids[i] ? 1U : 0U;
+        }
+        TEST_ASSERT_EQUAL_UINT(5, found);
+    }
+    TEST_ASSERT_EQUAL_UINT(55, GOLDEN_VECTORS);
+}
+
+static void test_decode_golden_frame_gives_golden_values(void) {
+    for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
+        const golden_vector_t *golden = &golden_vectors[v];
+        iw_proto_message_t message;
+        memset(&message, POISON, sizeof message);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(IW_OK, iw_proto_decode(&golden->frame, &message), golden->name);
+        assert_same_message(&golden->message, &message, golden->name);
+    }
+}
+
+static void test_encode_golden_values_gives_golden_frame(void) {
+    for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
+        const golden_vector_t *golden = &golden_vectors[v];
+        iw_can_frame_t frame;
+        memset(&frame, POISON, sizeof frame);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(IW_OK, iw_proto_encode(&golden->message, &frame), golden->name);
+        assert_same_bytes(&golden->frame, &frame, golden->name);
+    }
+}
+
+static void test_decode_longer_frame_ignores_what_is_behind_the_table(void) {
+    for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
+        const golden_vector_t *golden = &golden_vectors[v];
+        for (uint8_t dlc = golden->frame.dlc; dlc <= IW_CAN_DATA_MAX; dlc++) {
+            iw_can_frame_t frame = golden->frame;
+            iw_proto_message_t message;
+            memset(&message, POISON, sizeof message);
+            memset(frame.data + golden->frame.dlc, 0xFF, IW_CAN_DATA_MAX - (size_t)golden->frame.dlc);
+            frame.dlc = dlc;
+            TEST_ASSERT_EQUAL_INT_MESSAGE(IW_OK, iw_proto_decode(&frame, &message), golden->name);
+            assert_same_message(&golden->message, &message, golden->name);
+        }
+    }
+}
+
+static void test_decode_shorter_frame_is_refused_and_leaves_output_alone(void) {
+    for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
+        const golden_vector_t *golden = &golden_vectors[v];
+        for (uint8_t dlc = 0; dlc < golden->frame.dlc; dlc++) {
+            iw_can_frame_t frame = golden->frame;
+            iw_proto_message_t message;
+            memset(&message, POISON, sizeof message);
+            frame.dlc = dlc;
+            TEST_ASSERT_EQUAL_INT_MESSAGE(IW_ERR_LENGTH, iw_proto_decode(&frame, &message), golden->name);
+            assert_untouched(&message, sizeof message, golden->name);
+        }
+    }
+}
+
+static void test_decode_own_echo_gives_the_same_values(void) {
+    for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
+        iw_can_frame_t frame = golden_vectors[v].frame;
+        iw_proto_message_t message;
+        memset(&message, POISON, sizeof message);
+        frame.kind = IW_CAN_ECHO;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(IW_OK, iw_proto_decode(&frame, &message), golden_vectors[v].name);
+        assert_same_message(&golden_vectors[v].message, &message, golden_vectors[v].name);
+    }
+}
+
+static void test_decode_does_not_clamp_what_others_send(void) {
+    const iw_can_frame_t frame = {IW_ID_LEFT_SETPOINT, 5, IW_CAN_RECEIVED, {0xEE, 0x80, 0x00, 0x7F, 0xFF}};
+    iw_proto_message_t message;
+    memset(&message, POISON, sizeof message);
+    TEST_ASSERT_EQUAL_INT(IW_OK, iw_proto_decode(&frame, &message));
+    TEST_ASSERT_EQUAL_UINT8(0xEE, message.as.setpoint.type);
+    TEST_ASSERT_EQUAL_INT16(-32767 - 1, message.as.setpoint.speed_mm_s);
+    TEST_ASSERT_EQUAL_INT16(32767, message.as.setpoint.current_mA);
+}
+
+static void test_encode_pose_of_left_wheel_is_refused_and_leaves_output_alone(void) {
+    const iw_proto_message_t message = {IW_PROTO_POSE, IW_LEFT, {.pose = {1, 2, 3, 4}}};
+    iw_can_frame_t frame;
+    memset(&frame, POISON, sizeof frame);
+    TEST_ASSERT_EQUAL_INT(IW_ERR_ID, iw_proto_encode(&message, &frame));
+    assert_untouched(&frame, sizeof frame, "left pose");
+}
+
+static void test_encode_setpoint_pads_every_length_with_zeros(void) {
+    static const uint8_t bytes[IW_CAN_DATA_MAX] = {0x5A, 0x12, 0x34, 0xFF, 0xFE, 0, 0, 0};
+    static const uint32_t ids[IW_SIDES] = {266, 298};
+    const iw_proto_setpoint_t setpoint = {.type = 0x5A, .speed_mm_s = 0x1234, .current_mA = -2};
+    for (int side = 0; side < IW_SIDES; side++) {
+        for (uint8_t dlc = 5; dlc <= 8; dlc++) {
+            iw_can_frame_t frame;
+            memset(&frame, POISON, sizeof frame);
+            TEST_ASSERT_FALSE(iw_proto_encode_setpoint((iw_side_t)side, &setpoint, dlc, &frame));
+            TEST_ASSERT_EQUAL_HEX32(ids[side], frame.id);
+            TEST_ASSERT_EQUAL_UINT8(dlc, frame.dlc);
+            TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, frame.kind);
+            TEST_ASSERT_EQUAL_HEX8_ARRAY(bytes, frame.data, IW_CAN_DATA_MAX);
+        }
+    }
+}
+
+/// What must be on the bus for a wanted current.
+static int32_t clamped(int32_t current_mA) {
+    return current_mA > 2000 ? 2000 : current_mA < -2000 ? -2000 : current_mA;
+}
+
+static int32_t current_of(const iw_can_frame_t *frame) {
+    const int32_t value = frame->data[3] * 256 + frame->data[4];
+    return value >= 32768 ? value - 65536 : value;
+}
+
+static void test_encode_setpoint_clamps_every_current_and_reports_it(void) {
+    for (int32_t current = -32768; current <= 32767; current++) {
+        const iw_proto_setpoint_t setpoint = {.type = 1, .speed_mm_s = -5, .current_mA = (int16_t)current};
+        iw_can_frame_t frame;
+        const bool reported = iw_proto_encode_setpoint(IW_RIGHT, &setpoint, 5, &frame);
+        if (current_of(&frame) != clamped(current) || reported != (clamped(current) != current)) {
+            TEST_ASSERT_EQUAL_INT32(clamped(current), current_of(&frame));
+            TEST_ASSERT_EQUAL_INT_MESSAGE(clamped(current) != current, reported, "clamping must be reported");
+        }
+    }
+}
+
+static void test_encode_message_clamps_a_setpoint_too(void) {
+    static const int16_t wanted[] = {-32767 - 1, -2001, -2000, 2000, 2001, 32767};
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
+        const iw_proto_message_t message = {IW_PROTO_SETPOINT, IW_LEFT, {.setpoint = {.current_mA = wanted[i]}}};
+        iw_can_frame_t frame;
+        TEST_ASSERT_EQUAL_INT(IW_OK, iw_proto_encode(&message, &frame));
+        TEST_ASSERT_EQUAL_INT32(clamped(wanted[i]), current_of(&frame));
+    }
+}
+
+static void test_encode_setpoint_leaves_its_argument_alone(void) {
+    iw_proto_setpoint_t setpoint = {.type = 9, .speed_mm_s = 7, .current_mA = 30000};
+    iw_can_frame_t frame;
+    TEST_ASSERT_TRUE(iw_proto_encode_setpoint(IW_LEFT, &setpoint, 5, &frame));
+    TEST_ASSERT_EQUAL_INT16(30000, setpoint.current_mA);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_golden_table_covers_all_eleven_messages);
+    RUN_TEST(test_decode_golden_frame_gives_golden_values);
+    RUN_TEST(test_encode_golden_values_gives_golden_frame);
+    RUN_TEST(test_decode_longer_frame_ignores_what_is_behind_the_table);
+    RUN_TEST(test_decode_shorter_frame_is_refused_and_leaves_output_alone);
+    RUN_TEST(test_decode_own_echo_gives_the_same_values);
+    RUN_TEST(test_decode_does_not_clamp_what_others_send);
+    RUN_TEST(test_encode_pose_of_left_wheel_is_refused_and_leaves_output_alone);
+    RUN_TEST(test_encode_setpoint_pads_every_length_with_zeros);
+    RUN_TEST(test_encode_setpoint_clamps_every_current_and_reports_it);
+    RUN_TEST(test_encode_message_clamps_a_setpoint_too);
+    RUN_TEST(test_encode_setpoint_leaves_its_argument_alone);
+    return UNITY_END();
+}
