@@ -35,7 +35,9 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
     const int32_t measured = (measured_mm_s < 0) ? -measured_mm_s : measured_mm_s;
     const bool clear = applied > IW_FOLLOW_SIGN_MM_S && measured > IW_FOLLOW_SIGN_MM_S;
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);
-    const bool stuck = applied >= IW_FOLLOW_BLOCKED_MIN_MM_S && measured * 100 < applied * IW_FOLLOW_BLOCKED_PERCENT;
+    const int32_t progress = same ? measured : 0;
+    const bool stuck = applied >= IW_FOLLOW_BLOCKED_MIN_MM_S &&
+                       (int64_t)progress * 100 < (int64_t)applied * IW_FOLLOW_BLOCKED_PERCENT;
     const bool sign = lasts(&self->sign_since_us, now_us, clear && !same, IW_FOLLOW_SIGN_US);
     const bool over = lasts(&self->over_since_us, now_us, measured > applied + (int32_t)config->follow_mm_s,
                             (uint32_t)config->follow_ms * IW_US_PER_MS);

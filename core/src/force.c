@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel/force.h"
+
+#include <string.h>
+
+#define HALF (IW_FORCE_WINDOW_SAMPLES / 2U)
+/// Deviations of one sample are capped here (raw), so that the sum of their squares fits 32 bits. Far beyond quiet in either unit.
+#define SPREAD_MAX 8191
+/// A variance up to this (raw) can be scaled to mN before the root without leaving 32 bits.
+#define VARIANCE_FINE 400000U
+/// Unit evidence: the mean must be within this share of the ratio's prediction.
+#define EVIDENCE_PERCENT 15
+/// Unit evidence for a removed offset: the mean is below this share of the offset, in whichever unit is finer.
+#define REMOVED_PERCENT 30
+
+IW_STATIC_ASSERT(IW_FORCE_WINDOW_SAMPLES <= UINT8_MAX, ring_index_fits);
+IW_STATIC_ASSERT((uint64_t)SPREAD_MAX * SPREAD_MAX * IW_FORCE_WINDOW_SAMPLES <= UINT32_MAX, spread_fits);
+
+static int32_t scale_mN(const iw_force_t *self)
+{
+    return (self->config->force_unit[self->side] == IW_FORCE_CN) ? 10 : 100;
+}
+
+static bool saturated(int16_t raw)
+{
+    return raw == INT16_MIN || raw == INT16_MAX;
+}
+
+static int32_t magnitude(int32_t value)
+{
+    return (value < 0) ? -value : value;
+}
+
+void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side)
+{
+    memset(self, 0, sizeof *self);
+    self->config = config;
+    self->side = side;
+    self->raw_us = IW_NEVER;
+    self->offset_us = IW_NEVER;
+}
+
+void iw_force_reopen(iw_force_t *self, bool boot_seen)
+{
+    self->boot_seen = boot_seen;
+    self->count = 0;
+    self->still = 0;
+    self->wheel_offset_heard = false;
+    self->evidence = IW_UNIT_UNKNOWN;
+    self->evidence_permille = 0;
+    memset(&self->quality, 0, sizeof self->quality);
+    if (self->provenance == IW_OFFSET_WHEEL || self->provenance == IW_OFFSET_ESTIMATED) {
+        self->provenance = IW_OFFSET_STORED;
+    }
+}
+
+void iw_force_restore(iw_force_t *self, int32_t offset_mN)
+{
+    if (self->provenance <= IW_OFFSET_STORED) {
+        self->provenance = IW_OFFSET_STORED;
+        self->offset_mN = offset_mN;
+        self->offset_us = IW_NEVER;
+    }
+}
+
+static void adopt(iw_force_t *self, iw_time_us_t now_us, iw_offset_provenance_t provenance, int32_t offset_mN)
+{
+    self->provenance = provenance;
+    self->offset_mN = offset_mN;
+    self->offset_us = now_us;
+}
+
+static uint32_t square_root(uint32_t value)
+{
+    uint32_t root = 0;
+    for (uint32_t bit = 1U << 15; bit != 0U; bit >>= 1) {
+        if ((root | bit) * (root | bit) <= value) {
+            root |= bit;
+        }
+    }
+    return root;
+}
+
+static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw)
+{
+    const uint32_t scale = (uint32_t)scale_mN(self);
+    uint32_t sum = 0;
+    for (size_t i = 0; i < self->count; i++) {
+        const int32_t spread = magnitude(self->sample[i] - mean_raw);
+        const uint32_t capped = (uint32_t)((spread < SPREAD_MAX) ? spread : SPREAD_MAX);
+        sum += capped * capped;
+    }
+    const uint32_t variance = sum / self->count;
+    return (variance <= VARIANCE_FINE) ? square_root(variance * scale * scale) : square_root(variance) * scale;
+}
+
+/// What the full ring holds. The oldest sample stands at `next`.
+static iw_force_quality_t measure(const iw_force_t *self)
+{
+    const int32_t scale = scale_mN(self);
+    iw_force_quality_t quality = {0, 0, 0, self->count, IW_WINDOW_GOOD};
+    int32_t sum[2] = {0, 0};
+    for (size_t i = 0; i < IW_FORCE_WINDOW_SAMPLES; i++) {
+        const int16_t raw = self->sample[(self->next + i) % IW_FORCE_WINDOW_SAMPLES];
+        sum[i / HALF] += raw;
+        quality.window = saturated(raw) ? IW_WINDOW_SATURATED : quality.window;
+    }
+    quality.mean_mN = (sum[0] + sum[1]) * scale / (int32_t)IW_FORCE_WINDOW_SAMPLES;
+    quality.drift_mN = (sum[1] - sum[0]) * scale / (int32_t)HALF;
+    quality.deviation_mN = deviation_mN(self, (sum[0] + sum[1]) / (int32_t)IW_FORCE_WINDOW_SAMPLES);
+    if (quality.window == IW_WINDOW_SATURATED) {
+        return quality;
+    }
+    if (self->still < IW_FORCE_WINDOW_SAMPLES) {
+        quality.window = IW_WINDOW_MOVING;
+    } else if (quality.deviation_mN > IW_FORCE_QUIET_mN) {
+        quality.window = IW_WINDOW_NOISY;
+    } else if (magnitude(quality.drift_mN) > (int32_t)IW_FORCE_DRIFT_mN) {
+        quality.window = IW_WINDOW_DRIFT;
+    }
+    return quality;
+}
+
+static bool far_from_offset(const iw_force_t *self, int32_t mean_mN)
+{
+    return magnitude(mean_mN - self->offset_mN) > (int32_t)IW_FORCE_LOADED_mN;
+}
+
+/// Raw over offset at rest is 10, 1 or 0: exactly one of them must fit.
+static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN)
+{
+    const int32_t offset = magnitude(offset_dN);
+    const bool fits_cn = magnitude(mean_raw - 10 * offset_dN) * 100 <= 10 * offset * EVIDENCE_PERCENT;
+    const bool fits_dn = magnitude(mean_raw - offset_dN) * 100 <= offset * EVIDENCE_PERCENT;
+    const bool fits_none = magnitude(mean_raw) * 100 <= offset * REMOVED_PERCENT;
+    if (fits_cn) {
+        return IW_UNIT_CN;
+    }
+    if (fits_dn) {
+        return IW_UNIT_DN;
+    }
+    return fits_none ? IW_UNIT_OFFSET_REMOVED : IW_UNIT_UNCLEAR;
+}
+
+/// Compares our own mean with the wheel's offset, once there are both and the window was good.
+static void judge_evidence(iw_force_t *self)
+{
+    const int32_t offset_dN = self->wheel_offset_dN;
+    const int32_t mean_raw = self->quality.mean_mN / scale_mN(self);
+    if (!self->wheel_offset_heard || self->quality.window != IW_WINDOW_GOOD) {
+        return;
+    }
+    if (magnitude(offset_dN) >= IW_FORCE_EVIDENCE_MIN_dN) {
+        self->evidence = weigh(mean_raw, offset_dN);
+        self->evidence_permille = mean_raw * 1000 / offset_dN;
+    } else if (magnitude(self->quality.mean_mN - offset_dN * 100) > (int32_t)IW_FORCE_LOADED_mN) {
+        self->evidence = IW_UNIT_UNCLEAR;
+    }
+}
+
+/// Puts the wheel's own offset in force, unless we saw it being measured under load.
+static void settle(iw_force_t *self, iw_time_us_t now_us)
+{
+    const bool trusted = !self->boot_seen || self->quality.window == IW_WINDOW_GOOD;
+    judge_evidence(self);
+    if (self->wheel_offset_heard && trusted && self->provenance < IW_OFFSET_OPERATOR) {
+        adopt(self, now_us, IW_OFFSET_WHEEL, self->wheel_offset_dN * 100);
+    }
+}
+
+static void judge_window(iw_force_t *self, iw_time_us_t now_us)
+{
+    self->quality = measure(self);
+    const bool known = self->provenance == IW_OFFSET_STORED || self->provenance == IW_OFFSET_OPERATOR;
+    if (self->quality.window == IW_WINDOW_GOOD && known && far_from_offset(self, self->quality.mean_mN)) {
+        self->quality.window = IW_WINDOW_LOADED;
+    }
+    if (self->quality.window == IW_WINDOW_GOOD && self->provenance < IW_OFFSET_ESTIMATED) {
+        adopt(self, now_us, IW_OFFSET_ESTIMATED, self->quality.mean_mN);
+    }
+    settle(self, now_us);
+}
+
+void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still)
+{
+    if (self->raw_us == IW_NEVER || now_us - self->raw_us >= IW_FORCE_STALE_US) {
+        self->count = 0;
+        self->still = 0;
+    }
+    if (self->count == 0U) {
+        self->next = 0;
+    }
+    self->raw = raw;
+    self->raw_us = now_us;
+    self->sample[self->next] = raw;
+    self->next = (uint8_t)((self->next + 1U) % IW_FORCE_WINDOW_SAMPLES);
+    self->count = (uint8_t)(self->count + ((self->count < IW_FORCE_WINDOW_SAMPLES) ? 1U : 0U));
+    self->still = (uint8_t)(still ? self->still + ((self->still < IW_FORCE_WINDOW_SAMPLES) ? 1U : 0U) : 0U);
+    if (self->quality.window == IW_WINDOW_OPEN && self->count == IW_FORCE_WINDOW_SAMPLES) {
+        judge_window(self, now_us);
+    }
+}
+
+void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN)
+{
+    self->wheel_offset_dN = offset_dN;
+    self->wheel_offset_heard = true;
+    settle(self, now_us);
+}
+
+iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us)
+{
+    if (self->count < IW_FORCE_WINDOW_SAMPLES || now_us - self->raw_us >= IW_FORCE_STALE_US) {
+        return IW_TARE_NO_FORCE;
+    }
+    const iw_force_quality_t quality = measure(self);
+    const bool known = self->provenance != IW_OFFSET_NONE && self->evidence != IW_UNIT_UNCLEAR;
+    if (quality.window == IW_WINDOW_SATURATED) {
+        return IW_TARE_SATURATED;
+    }
+    if (quality.window != IW_WINDOW_GOOD) {
+        return (quality.window == IW_WINDOW_MOVING) ? IW_TARE_MOVING : IW_TARE_NOISY;
+    }
+    if (known && far_from_offset(self, quality.mean_mN)) {
+        return IW_TARE_LOADED;
+    }
+    adopt(self, now_us, IW_OFFSET_OPERATOR, quality.mean_mN);
+    return IW_TARE_OK;
+}
+
+static bool unit_contradicted(const iw_force_t *self)
+{
+    const iw_unit_evidence_t other =
+        (self->config->force_unit[self->side] == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
+    return self->evidence == other;
+}
+
+iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_us)
+{
+    if (self->raw_us == IW_NEVER || now_us - self->raw_us >= IW_FORCE_STALE_US) {
+        return IW_FORCE_NOT_HEARD;
+    }
+    if (saturated(self->raw)) {
+        return IW_FORCE_SATURATED;
+    }
+    if (self->provenance == IW_OFFSET_NONE) {
+        return IW_FORCE_NO_OFFSET;
+    }
+    if (unit_contradicted(self)) {
+        return IW_FORCE_UNIT_CONTRADICTED;
+    }
+    if (self->evidence == IW_UNIT_OFFSET_REMOVED) {
+        return IW_FORCE_OFFSET_REMOVED;
+    }
+    if (self->evidence == IW_UNIT_UNCLEAR && self->provenance < IW_OFFSET_OPERATOR) {
+        return IW_FORCE_OFFSET_DOUBTED;
+    }
+    return IW_FORCE_VALID;
+}
+
+int32_t iw_force_raw_mN(const iw_force_t *self)
+{
+    return self->raw * scale_mN(self);
+}
+
+int32_t iw_force_net_mN(const iw_force_t *self)
+{
+    return iw_force_raw_mN(self) - self->offset_mN;
+}
