@@ -99,7 +99,9 @@ void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us)
 {
     clear(self);
-    self->due_us = now_us + IW_SETPOINT_SPACING_US;
+    if (self->demand != IW_DEMAND_SILENCE) {
+        self->due_us = now_us + IW_SETPOINT_SPACING_US;
+    }
 }
 
 bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us)
