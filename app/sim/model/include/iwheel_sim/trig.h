@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+/// Sine and cosine in integers, so that a simulation gives the same bytes with every compiler and on every machine.
+#ifndef IWHEEL_SIM_TRIG_H
+#define IWHEEL_SIM_TRIG_H
+
+#include <stdint.h>
+
+/// The value that stands for 1.
+#define SIM_TRIG_ONE ((int64_t)1 << 30)
+/// One turn in nanoradians.
+#define SIM_TRIG_TURN_nrad INT64_C(6283185307)
+
+/// Sine of an angle in nanoradians, any angle, in units of 1 / SIM_TRIG_ONE. Error below 1e-5.
+int64_t sim_trig_sin(int64_t angle_nrad);
+
+int64_t sim_trig_cos(int64_t angle_nrad);
+
+#endif

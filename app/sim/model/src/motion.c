@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_sim/motion.h"
+
+/// Circumference at 192 mm.
+#define CIRCUMFERENCE_nm INT64_C(1206371579)
+/// Longest step of integration. A third of the shortest sensible response time.
+#define STEP_MAX_US 20000U
+/// Slower than this and told to stand still is standing still.
+#define STICTION_um_s 2000
+/// The motor's own losses, drawn while it turns.
+#define IDLE_DRAW_mA 150U
+#define TOP_SPEED_um_s 6000000
+
+void sim_motion_default(sim_motion_config_t *out_config) {
+    *out_config = (sim_motion_config_t){
+        .accel_mm_s2 = 4000U,
+        .coast_mm_s2 = 700U,
+        .response_us = 60000U,
+        .radius_mm = SIM_FIRMWARE_RADIUS_MM,
+        .gear_turns = 1U,
+        .gear_per = 1U,
+        .accepted_type = SIM_TYPE_ANY,
+    };
+}
+
+void sim_motion_init(sim_motion_t *self, const sim_motion_config_t *config, iw_time_us_t now_us) {
+    *self = (sim_motion_t){.config = *config, .now_us = now_us, .heard_us = IW_NEVER};
+}
+
+bool sim_motion_driven(const sim_motion_t *self) {
+    return self->heard_us != IW_NEVER;
+}
+
+static int64_t clamp(int64_t value, int64_t bound) {
+    if (value > bound) {
+        return bound;
+    }
+    return (value < -bound) ? -bound : value;
+}
+
+static int64_t coasting(const sim_motion_t *self, int64_t speed_um_s, int64_t dt_us) {
+    int64_t const friction = (int64_t)self->config.coast_mm_s2 * dt_us / 1000;
+    return speed_um_s - clamp(speed_um_s, friction);
+}
+
+/// Acceleration that the current gives, in mm/s2, with the current's sign.
+static int64_t torque_mm_s2(const sim_motion_t *self) {
+    int64_t const current = clamp(self->setpoint.current_mA, IW_CURRENT_LIMIT_mA);
+    return (int64_t)self->config.accel_mm_s2 * current / IW_CURRENT_LIMIT_mA;
+}
+
+static int64_t approaching(const sim_motion_t *self, int64_t target_um_s, int64_t torque, int64_t dt_us) {
+    int64_t const speed = self->speed_um_s;
+    int64_t const error = target_um_s - speed;
+    int64_t const response = self->config.response_us;
+    bool const braking = (error < 0) == (speed > 0) && speed != 0;
+    int64_t const helped = torque + (braking ? (int64_t)self->config.coast_mm_s2 : 0);
+    int64_t const wanted = (dt_us >= response) ? error : error * dt_us / response;
+    int64_t const next = speed + clamp(wanted, helped * dt_us / 1000);
+    return (target_um_s == 0 && clamp(next, STICTION_um_s) == next) ? 0 : next;
+}
+
+static int64_t driving(const sim_motion_t *self, int64_t dt_us) {
+    int64_t const torque = torque_mm_s2(self);
+    int64_t const told = (int64_t)self->setpoint.speed_mm_s * 1000;
+    if (self->runaway_mm_s != 0) {
+        int64_t const more = (int64_t)self->runaway_mm_s * 1000;
+        return approaching(self, told + ((told < 0) ? -more : more), self->config.accel_mm_s2, dt_us);
+    }
+    if (torque == 0) {
+        return coasting(self, self->speed_um_s, dt_us);
+    }
+    if (self->config.current_is_setpoint && told == 0) {
+        return clamp(self->speed_um_s + torque * dt_us / 1000, TOP_SPEED_um_s);
+    }
+    return approaching(self, clamp(told, TOP_SPEED_um_s), (torque < 0) ? -torque : torque, dt_us);
+}
+
+static void count_ticks(sim_motion_t *self, int64_t way_nm) {
+    int64_t const tick = CIRCUMFERENCE_nm * self->config.gear_per;
+    int64_t const signed_way = self->swapped ? -way_nm : way_nm;
+    int64_t const total = self->tick_rest + signed_way * (int64_t)IW_TICKS_PER_TURN * self->config.gear_turns;
+    int64_t ticks = total / tick;
+    if (total % tick < 0) {
+        ticks -= 1;
+    }
+    self->tick_rest = total - ticks * tick;
+    self->ticks += (uint32_t)(uint64_t)ticks;
+}
+
+static void integrate(sim_motion_t *self, int64_t dt_us) {
+    int64_t const before = self->speed_um_s;
+    int64_t after = 0;
+    if (!self->blocked) {
+        after = sim_motion_driven(self) ? driving(self, dt_us) : coasting(self, before, dt_us);
+    }
+    int64_t const way_nm = (before + after) * dt_us / 2000;
+    self->speed_um_s = (int32_t)after;
+    self->accel_mm_s2 = (int32_t)((after - before) * 1000 / dt_us);
+    self->position_nm += way_nm;
+    count_ticks(self, way_nm);
+}
+
+void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us) {
+    while (self->now_us < to_us) {
+        iw_time_us_t end_us = to_us;
+        if (sim_motion_driven(self)) {
+            iw_time_us_t const over_us = self->heard_us + IW_WHEEL_WATCHDOG_US;
+            if (over_us <= self->now_us) {
+                self->heard_us = IW_NEVER;
+            } else if (over_us < end_us) {
+                end_us = over_us;
+            }
+        }
+        if (!sim_motion_driven(self) && self->speed_um_s == 0) {
+            self->accel_mm_s2 = 0;
+            self->now_us = to_us;
+            return;
+        }
+        if (end_us - self->now_us > STEP_MAX_US) {
+            end_us = self->now_us + STEP_MAX_US;
+        }
+        integrate(self, (int64_t)(end_us - self->now_us));
+        self->now_us = end_us;
+    }
+    if (sim_motion_driven(self) && self->heard_us + IW_WHEEL_WATCHDOG_US <= self->now_us) {
+        self->heard_us = IW_NEVER;
+    }
+}
+
+bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_proto_setpoint_t *setpoint) {
+    sim_motion_advance(self, now_us);
+    if (self->config.accepted_type != SIM_TYPE_ANY && self->config.accepted_type != setpoint->type) {
+        return false;
+    }
+    self->setpoint = *setpoint;
+    self->heard_us = now_us;
+    self->setpoints += 1U;
+    return true;
+}
+
+void sim_motion_release(sim_motion_t *self, iw_time_us_t now_us) {
+    sim_motion_advance(self, now_us);
+    self->heard_us = IW_NEVER;
+}
+
+int64_t sim_motion_milli_rpm(const sim_motion_t *self) {
+    int64_t const wheel = (int64_t)self->speed_um_s * 60000000 / CIRCUMFERENCE_nm;
+    int64_t const signed_wheel = self->swapped ? -wheel : wheel;
+    if (!self->config.rpm_of_rotor) {
+        return signed_wheel;
+    }
+    return signed_wheel * self->config.gear_turns / self->config.gear_per;
+}
+
+int32_t sim_motion_um_s_of_milli_rpm(const sim_motion_config_t *config, int64_t milli_rpm) {
+    int64_t const wheel = config->rpm_of_rotor ? milli_rpm * config->gear_per / config->gear_turns : milli_rpm;
+    return (int32_t)clamp(wheel * CIRCUMFERENCE_nm / 60000000, INT32_MAX);
+}
+
+int32_t sim_motion_true_mm_s(const sim_motion_t *self) {
+    return (int32_t)((int64_t)self->speed_um_s * self->config.radius_mm / SIM_FIRMWARE_RADIUS_MM / 1000);
+}
+
+int64_t sim_motion_true_mm(const sim_motion_t *self) {
+    return self->position_nm / SIM_FIRMWARE_RADIUS_MM * self->config.radius_mm / 1000000;
+}
+
+uint32_t sim_motion_draw_mA(const sim_motion_t *self) {
+    if (!sim_motion_driven(self)) {
+        return 0U;
+    }
+    if (self->blocked && self->setpoint.speed_mm_s != 0) {
+        int64_t const current = clamp(self->setpoint.current_mA, IW_CURRENT_LIMIT_mA);
+        return (uint32_t)((current < 0) ? -current : current);
+    }
+    int64_t const accel = (self->accel_mm_s2 < 0) ? -(int64_t)self->accel_mm_s2 : self->accel_mm_s2;
+    uint32_t const torque = (uint32_t)clamp(accel * IW_CURRENT_LIMIT_mA / (int64_t)self->config.accel_mm_s2, IW_CURRENT_LIMIT_mA);
+    return torque + ((self->speed_um_s != 0) ? IDLE_DRAW_mA : 0U);
+}

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_sim/pair.h"
+
+#define SAG_mA_PER_dV 500U
+
+void sim_pair_default(sim_pair_config_t *out_config) {
+    *out_config = (sim_pair_config_t){.track_mm = 540U, .battery_dV = 248U};
+    sim_wheel_config_t *const left = &out_config->wheel[IW_LEFT];
+    sim_wheel_config_t *const right = &out_config->wheel[IW_RIGHT];
+    *left = (sim_wheel_config_t){.sensor_zero_mN = 12300, .boot_us = 400000U, .unit = IW_FORCE_CN};
+    *right = (sim_wheel_config_t){.sensor_zero_mN = 9800, .boot_us = 430000U, .unit = IW_FORCE_DN};
+    sim_motion_default(&left->motion);
+    sim_motion_default(&right->motion);
+}
+
+void sim_pair_init(sim_pair_t *self, const sim_pair_config_t *config, iw_time_us_t now_us, uint64_t seed) {
+    sim_pair_config_t standard;
+    if (config == NULL) {
+        sim_pair_default(&standard);
+        config = &standard;
+    }
+    *self = (sim_pair_t){.battery_dV = config->battery_dV, .power = true};
+    self->pose.track_mm = config->track_mm;
+    for (unsigned side = 0U; side < IW_SIDES; ++side) {
+        self->pose.mirrored[side] = config->mirrored[side];
+        sim_wheel_init(&self->wheel[side], &config->wheel[side], (iw_side_t)side, seed);
+        sim_wheel_power(&self->wheel[side], now_us, true);
+        if (config->age_us > 0U) {
+            sim_wheel_age(&self->wheel[side], now_us, config->age_us);
+        }
+    }
+    sim_pose_restart(&self->pose, now_us, 0);
+}
+
+iw_time_us_t sim_pair_next_us(const sim_pair_t *self) {
+    iw_time_us_t const left_us = self->wheel[IW_LEFT].next_us;
+    iw_time_us_t const right_us = self->wheel[IW_RIGHT].next_us;
+    return (left_us <= right_us) ? left_us : right_us;
+}
+
+bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent) {
+    for (;;) {
+        iw_time_us_t const due_us = sim_pair_next_us(self);
+        if (due_us > now_us || due_us == IW_NEVER) {
+            return false;
+        }
+        iw_side_t const side = (self->wheel[IW_LEFT].next_us == due_us) ? IW_LEFT : IW_RIGHT;
+        iw_proto_message_t message;
+        if (sim_wheel_step(&self->wheel[side], sim_pair_battery_dV(self), &self->pose, &message)) {
+            out_sent->due_us = due_us;
+            out_sent->side = side;
+            (void)iw_proto_encode(&message, &out_sent->frame);
+            return true;
+        }
+    }
+}
+
+static void hear_left_speed(sim_pair_t *self, iw_time_us_t now_us, const iw_proto_speed_t *speed) {
+    if (self->wheel[IW_RIGHT].state == SIM_WHEEL_RUNNING) {
+        int64_t const milli_rpm = (int64_t)speed->speed_rpm * 1000;
+        sim_motion_config_t const *const config = &self->wheel[IW_RIGHT].motion.config;
+        sim_pose_hear_left(&self->pose, now_us, sim_motion_um_s_of_milli_rpm(config, milli_rpm));
+    }
+}
+
+void sim_pair_hear(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
+    iw_proto_message_t message;
+    if (iw_proto_decode(frame, &message) != IW_OK) {
+        return;
+    }
+    if (message.kind == IW_PROTO_SETPOINT) {
+        sim_wheel_hear(&self->wheel[message.side], now_us, &message.as.setpoint);
+    } else if (message.kind == IW_PROTO_SPEED && message.side == IW_LEFT) {
+        hear_left_speed(self, now_us, &message.as.speed);
+    }
+}
+
+bool sim_pair_acknowledges(const sim_pair_t *self) {
+    return self->wheel[IW_LEFT].state == SIM_WHEEL_RUNNING || self->wheel[IW_RIGHT].state == SIM_WHEEL_RUNNING;
+}
+
+void sim_pair_power(sim_pair_t *self, iw_time_us_t now_us, bool on) {
+    self->power = on;
+    sim_wheel_power(&self->wheel[IW_LEFT], now_us, on);
+    sim_wheel_power(&self->wheel[IW_RIGHT], now_us, on);
+}
+
+void sim_pair_reboot(sim_pair_t *self, iw_time_us_t now_us, iw_side_t side) {
+    sim_wheel_reboot(&self->wheel[side], now_us);
+}
+
+uint8_t sim_pair_battery_dV(const sim_pair_t *self) {
+    uint32_t const draw_mA =
+        sim_motion_draw_mA(&self->wheel[IW_LEFT].motion) + sim_motion_draw_mA(&self->wheel[IW_RIGHT].motion);
+    uint32_t const sag_dV = draw_mA / SAG_mA_PER_dV;
+    return (uint8_t)((sag_dV < self->battery_dV) ? self->battery_dV - sag_dV : 0U);
+}
