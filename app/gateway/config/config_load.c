@@ -25,22 +25,15 @@ typedef struct {
 } loader_t;
 
 void gateway_config_default(gateway_config_t *out_config) {
-    memset(out_config, 0, sizeof(*out_config));
+    static const gateway_config_t standard = {
+        .bus = {"can0", 1000000U, 625U, GATEWAY_MISMATCH_REFUSE},
+        .track_mm = 540U,
+        .estop = {"ESTOP", true, 5U},
+        .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U},
+        .record = {30U, "/var/lib/iwheel"},
+    };
+    *out_config = standard;
     iw_config_default(&out_config->core);
-    strcpy(out_config->bus.interface, "can0");
-    out_config->bus.bitrate = 1000000U;
-    out_config->bus.sample_point_permille = 625U;
-    out_config->bus.on_mismatch = GATEWAY_MISMATCH_REFUSE;
-    out_config->track_mm = 540U;
-    strcpy(out_config->estop.line, "ESTOP");
-    out_config->estop.active_high = true;
-    out_config->estop.debounce_ms = 5U;
-    strcpy(out_config->northbound.socket, "/run/iwheel/gateway.sock");
-    out_config->northbound.mode = 0660U;
-    strcpy(out_config->northbound.group, "iwheel");
-    out_config->northbound.max_clients = 16U;
-    out_config->record.blackbox_s = 30U;
-    strcpy(out_config->record.directory, "/var/lib/iwheel");
 }
 
 /// The line promised to become a value, but inih made none of it.

@@ -141,11 +141,16 @@ static bool parse_ratio(const config_key_t *row, const char *text, gateway_confi
     if (turns < 1U || turns > GEAR_TERM_MAX || per < 1U || per > GEAR_TERM_MAX) {
         return wrong(out_why, "%s = %s is out of range; write N and M within 1..1000", row->key, text);
     }
-    if (turns > 100U * per || per > 100U * turns) {
-        return wrong(out_why, "%s = %s is out of range; the ratio must lie within 1/100..100", row->key, text);
+    iw_config_t trial;
+    iw_config_default(&trial);
+    trial.gear_turns = (uint16_t)turns;
+    trial.gear_per = (uint16_t)per;
+    if (iw_config_check(&trial) != IW_CONFIG_OK) {
+        return wrong(out_why, "%s = %s is out of range; rotor turns per wheel turn must lie within 1..100", row->key,
+                     text);
     }
-    config->core.gear_turns = (uint16_t)turns;
-    config->core.gear_per = (uint16_t)per;
+    config->core.gear_turns = trial.gear_turns;
+    config->core.gear_per = trial.gear_per;
     return true;
 }
 
