@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-/// Beyond this the slope times the time exceeds every speed.
-#define ELAPSED_MAX_US 10000000U
+/// By then even the gentlest slope (50 mm/s2) has reached the highest speed (5000 mm/s).
+#define IW_GATE_ELAPSED_MAX_US 100000000U
 
 void iw_gate_init(iw_gate_t *self, const iw_config_t *config)
 {
@@ -20,8 +20,8 @@ static uint32_t magnitude(int32_t value)
 /// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
 static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us)
 {
-    const uint32_t elapsed = (elapsed_us < ELAPSED_MAX_US) ? (uint32_t)elapsed_us : ELAPSED_MAX_US;
-    return 1U + slope_mm_s2 * (elapsed / 100U) / 10000U + slope_mm_s2 * (elapsed % 100U) / 1000000U;
+    const uint32_t elapsed = (elapsed_us < IW_GATE_ELAPSED_MAX_US) ? (uint32_t)elapsed_us : IW_GATE_ELAPSED_MAX_US;
+    return 1U + slope_mm_s2 * (elapsed / 1000U) / 1000U + slope_mm_s2 * (elapsed % 1000U) / 1000000U;
 }
 
 static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s)
