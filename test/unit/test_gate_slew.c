@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+// The gate and time: how far a speed may be from the one before.
+#include <string.h>
+
+#include "iwheel/gate.h"
+#include "unity.h"
+
+#define POISON 0xA5
+#define START_US 5000000123ULL
+#define AGES_US 3600000000ULL
+/// The contract gives slopes, not how they are rounded to whole mm/s: a verdict is demanded outside this band only.
+#define ROUNDING_MM_S 2
+
+static iw_config_t config;
+static iw_gate_t gate;
+
+static void restart(void) {
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
+    memset(&gate, POISON, sizeof gate);
+    iw_gate_init(&gate, &config);
+}
+
+void setUp(void) {
+    iw_config_default(&config);
+    config.setpoint_type = 7;
+    config.setpoint_type_set = true;
+    config.current_role = IW_ROLE_LIMIT;
+    restart();
+}
+
+void tearDown(void) {}
+
+static iw_gate_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
+    const uint32_t speed = (uint32_t)speed_mm_s;
+    const uint32_t current = (uint32_t)current_mA;
+    const iw_can_frame_t frame = {side == IW_LEFT ? 266U : 298U,
+                                  5,
+                                  IW_CAN_RECEIVED,
+                                  {7, (uint8_t)(speed >> 8 & 0xFFU), (uint8_t)(speed & 0xFFU),
+                                   (uint8_t)(current >> 8 & 0xFFU), (uint8_t)(current & 0xFFU)}};
+    return iw_gate_check(&gate, now_us, &frame);
+}
+
+static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us - AGES_US, side, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us, side, speed_mm_s, 0));
+}
+
+/// The verdict on going from one speed to another in the given time, with a fresh gate.
+static iw_gate_verdict_t change(int32_t from_mm_s, int32_t to_mm_s, iw_time_us_t elapsed_us) {
+    restart();
+    settle(START_US, IW_LEFT, from_mm_s);
+    return check(START_US + elapsed_us, IW_LEFT, to_mm_s, 0);
+}
+
+static const iw_time_us_t elapsed_list[] = {0, 1, 999, 1000, 4999, 5000, 19999, 20000, 20001, 50000, 100000, 333333};
+#define ELAPSED (sizeof elapsed_list / sizeof elapsed_list[0])
+
+/// Judges both sides of the boundary of a slope, forward and backward.
+static void check_boundary(int32_t from_mm_s, int32_t direction, uint32_t slope_mm_s2, iw_time_us_t elapsed_us) {
+    const int32_t allowed = (int32_t)(slope_mm_s2 * elapsed_us / 1000000U);
+    const int32_t inside = from_mm_s + direction * allowed;
+    const int32_t outside = from_mm_s + direction * (allowed + 1 + ROUNDING_MM_S);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(from_mm_s, inside, elapsed_us));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(-from_mm_s, -inside, elapsed_us));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(from_mm_s, outside, elapsed_us));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(-from_mm_s, -outside, elapsed_us));
+}
+
+static void test_check_away_from_zero_allows_the_acceleration_and_no_more(void) {
+    static const uint16_t slopes[] = {50, 800, 799, 2500};
+    config.decel_mm_s2 = 20000;
+    config.max_speed_mm_s = 2000;
+    for (size_t i = 0; i < 4 * ELAPSED; i++) {
+        config.accel_mm_s2 = slopes[i / ELAPSED];
+        check_boundary(600, 1, config.accel_mm_s2, elapsed_list[i % ELAPSED]);
+    }
+}
+
+static void test_check_towards_zero_allows_the_deceleration_and_no_more(void) {
+    static const uint16_t slopes[] = {100, 1500, 1501, 3333};
+    static const uint16_t speeds[] = {70, 1100, 1101, 2500};
+    config.accel_mm_s2 = 20000;
+    for (size_t i = 0; i < 4 * ELAPSED; i++) {
+        config.decel_mm_s2 = slopes[i / ELAPSED];
+        config.max_speed_mm_s = speeds[i / ELAPSED];
+        check_boundary(config.max_speed_mm_s, -1, config.decel_mm_s2, elapsed_list[i % ELAPSED]);
+    }
+}
+
+static void test_check_from_zero_allows_the_acceleration_and_no_more(void) {
+    for (size_t i = 0; i < ELAPSED; i++) {
+        check_boundary(0, 1, 800, elapsed_list[i]);
+    }
+}
+
+static void test_check_same_speed_at_once_passes(void) {
+    settle(START_US, IW_LEFT, 321);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 321, 0));
+}
+
+static void test_check_sign_change_is_stopped_until_zero_was_sent(void) {
+    static const int32_t speeds[] = {1, 2, 3, 10, 500, 1000};
+    for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
+        const int32_t speed = speeds[i];
+        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(speed, -speed, AGES_US));
+        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(-speed, speed, AGES_US));
+        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(speed, -1, AGES_US));
+        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(-speed, 1, AGES_US));
+        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(speed, 0, 0));
+        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + AGES_US, IW_LEFT, -speed, 0));
+    }
+}
+
+static void test_check_zero_passes_at_once_from_every_speed(void) {
+    for (int32_t speed = -1000; speed <= 1000; speed++) {
+        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(speed, 0, 0));
+    }
+}
+
+static void test_check_after_a_zero_the_ramp_begins_at_zero(void) {
+    settle(START_US, IW_LEFT, 1000);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 0, 2000));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 1000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 16 + ROUNDING_MM_S + 1, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 16, 0));
+}
+
+static void test_check_zero_speed_is_a_zero_whatever_the_limit_current(void) {
+    static const int32_t currents[] = {0, 1, 1999, 2000};
+    for (size_t i = 0; i < sizeof currents / sizeof currents[0]; i++) {
+        restart();
+        settle(START_US, IW_LEFT, 1000);
+        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 0, currents[i]));
+    }
+}
+
+static void test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoint(void) {
+    config.current_role = IW_ROLE_SETPOINT;
+    restart();
+    settle(START_US, IW_LEFT, 1000);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US, IW_LEFT, 0, 1));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 0, -2000));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 0, 0));
+}
+
+static void test_check_refused_frame_is_not_remembered(void) {
+    static const struct {
+        int32_t speed_mm_s;
+        int32_t current_mA;
+        iw_gate_verdict_t verdict;
+    } refused[] = {{0, 2001, IW_GATE_CURRENT}, {1001, 0, IW_GATE_SPEED}, {500, 0, IW_GATE_SLEW}, {-5, 0, IW_GATE_SLEW}};
+    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
+        restart();
+        settle(START_US, IW_LEFT, 100);
+        TEST_ASSERT_EQUAL_INT(refused[i].verdict,
+                              check(START_US + 10000, IW_LEFT, refused[i].speed_mm_s, refused[i].current_mA));
+        TEST_ASSERT_EQUAL_UINT32(1, gate.stopped);
+        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 116 + ROUNDING_MM_S + 1, 0));
+        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 116, 0));
+        TEST_ASSERT_EQUAL_UINT32(2, gate.stopped);
+    }
+}
+
+static void test_check_passed_frame_is_remembered_with_its_time(void) {
+    settle(START_US, IW_LEFT, 100);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 10000, IW_LEFT, 108, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 116 + ROUNDING_MM_S + 1, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 116, 0));
+}
+
+static void test_check_wheels_do_not_share_their_memory(void) {
+    settle(START_US, IW_LEFT, 1000);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_RIGHT, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_RIGHT, 1000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_RIGHT, -16, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 1000, 0));
+}
+
+static void test_check_slowest_slope_reaches_the_highest_speed_in_its_time(void) {
+    config.accel_mm_s2 = 50;
+    config.decel_mm_s2 = 20000;
+    config.max_speed_mm_s = 5000;
+    restart();
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 99000000U, IW_LEFT, 5000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 100000000U, IW_LEFT, 5000, 0));
+}
+
+static void test_check_after_ages_the_arithmetic_holds(void) {
+    config.accel_mm_s2 = 16384;
+    for (unsigned bit = 40; bit < 63; bit++) {
+        restart();
+        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 0, 0));
+        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + ((iw_time_us_t)1 << bit), IW_LEFT, 1000, 0));
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_check_away_from_zero_allows_the_acceleration_and_no_more);
+    RUN_TEST(test_check_towards_zero_allows_the_deceleration_and_no_more);
+    RUN_TEST(test_check_from_zero_allows_the_acceleration_and_no_more);
+    RUN_TEST(test_check_same_speed_at_once_passes);
+    RUN_TEST(test_check_sign_change_is_stopped_until_zero_was_sent);
+    RUN_TEST(test_check_zero_passes_at_once_from_every_speed);
+    RUN_TEST(test_check_after_a_zero_the_ramp_begins_at_zero);
+    RUN_TEST(test_check_zero_speed_is_a_zero_whatever_the_limit_current);
+    RUN_TEST(test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoint);
+    RUN_TEST(test_check_refused_frame_is_not_remembered);
+    RUN_TEST(test_check_passed_frame_is_remembered_with_its_time);
+    RUN_TEST(test_check_wheels_do_not_share_their_memory);
+    RUN_TEST(test_check_slowest_slope_reaches_the_highest_speed_in_its_time);
+    RUN_TEST(test_check_after_ages_the_arithmetic_holds);
+    return UNITY_END();
+}
