@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Fails unless the core is what it promises: no mutable data, nothing from libc but mem*, no floating point.
+
+usage: purity.py LIBRARY SOURCE_DIR
+
+LIBRARY is the core compiled for an ARM without an FPU, where every floating point operation is a call.
+"""
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+MUTABLE = set("bBdDCsSgGvV")
+LIBC = {"memcpy", "memset", "memmove", "memcmp"}
+# Integer helpers of the compiler's run-time library: division, multiplication and shifts of 64 bits, switch tables.
+RUNTIME = re.compile(r"__aeabi_(u?idiv(mod)?|u?ldivmod|lmul|ll?s[lr]|lasr|u?lcmp|mem(cpy|set|move|clr)[48]?|idiv0|ldiv0)$"
+                     r"|__gnu_thumb1_case_\w+$|__clzsi2$|__ctzsi2$|__popcountsi2$")
+HEADERS = {"stdbool.h", "stddef.h", "stdint.h", "limits.h", "string.h"}
+COMMENT = re.compile(r"//.*|/\*.*?\*/|\"[^\"\n]*\"", re.DOTALL)
+
+
+def symbol_findings(library):
+    run = subprocess.run(["arm-none-eabi-nm", "-A", library], capture_output=True, text=True, check=True)
+    rows = [re.match(r"(?:.*:)?([^:]+):(?:[0-9a-f]+)?\s+(\w) (\S+)$", line) for line in run.stdout.splitlines() if line]
+    symbols = [row.groups() for row in rows if row]
+    defined = {name for _, kind, name in symbols if kind != "U"}
+    if not defined:
+        yield f"{library} holds no symbols"
+    for unit, kind, name in symbols:
+        if kind in MUTABLE:
+            yield f"{unit}: {name}: mutable data (nm says {kind})"
+        if kind == "U" and name not in defined and name not in LIBC and not RUNTIME.match(name):
+            yield f"{unit}: {name}: undefined, and neither mem* nor an integer helper of the compiler"
+
+
+def source_findings(folder):
+    files = sorted(path for path in Path(folder).rglob("*.[ch]"))
+    if not files:
+        yield f"{folder} holds no sources"
+    for path in files:
+        code = COMMENT.sub(" ", path.read_text())
+        for header in re.findall(r"#\s*include\s*<([^>]+)>", code):
+            if header not in HEADERS:
+                yield f"{path}: <{header}> is not freestanding"
+        for word in re.findall(r"\b(?:float|double|malloc|calloc|realloc|free)\b", code):
+            yield f"{path}: {word}"
+
+
+def main(arguments):
+    if len(arguments) != 3:
+        sys.exit(__doc__)
+    findings = [*symbol_findings(arguments[1]), *source_findings(arguments[2])]
+    print(*findings, sep="\n")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))

@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Worst stack of every entry point of the core, from gcc's call graph; fails on recursion, variable stack or too much.
+
+usage: stack_usage.py BUILD_DIR LIMIT_BYTES
+
+BUILD_DIR was configured with cmake/arm-none-eabi.cmake. Functions of the compiler's run-time library, which the graph does not
+know, are found through the relocations and charged with EXTERNAL bytes. Calls through the HAL end here: a port adds its own.
+"""
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+NODE = re.compile(r'node: { title: "([^"]+)" label: "[^"]*?(?:(\d+) bytes \(([a-z,]+)\))?"')
+EDGE = re.compile(r'edge: { sourcename: "([^"]+)" targetname: "([^"]+)"')
+EXTERNAL = 64  # __aeabi_uldivmod, the deepest, needs 56 on a Cortex-M4.
+INDIRECT = "__indirect_call"
+
+
+def read_graph(objects):
+    """({function: bytes}, {function: {callees}}, [findings])"""
+    size, calls, findings = {}, {}, []
+    for path in objects:
+        for line in path.with_suffix(".ci").read_text().splitlines():
+            node, edge = NODE.match(line), EDGE.match(line)
+            if node and node[2] is not None:
+                size[node[1]] = int(node[2])
+                if node[3] != "static":
+                    findings.append(f"{node[1]}: stack is {node[3]}, must be static")
+            elif edge:
+                calls.setdefault(edge[1], set()).add(edge[2])
+    return size, calls, findings
+
+
+def add_runtime_calls(objects, size, calls):
+    """Calls of libgcc appear only when code is emitted, after the graph is written; each function has its own section."""
+    for path in objects:
+        section = None
+        relocations = subprocess.run(["arm-none-eabi-readelf", "-rW", str(path)], capture_output=True, text=True, check=True)
+        for line in relocations.stdout.splitlines():
+            header = re.match(r"Relocation section '\.rel\.text\.([^']+)'", line)
+            if header or line.startswith("Relocation section"):
+                section = header[1] if header else None
+            called = re.search(r"\s(__aeabi_\w+|__gnu_\w+)$", line)
+            if section and called:
+                for name in size:
+                    if name == section or name.endswith(f"{path.stem}:{section}"):
+                        calls.setdefault(name, set()).add(called[1])
+
+
+class Depth:
+    """Deepest path below each function."""
+
+    def __init__(self, size, calls):
+        self.size, self.calls, self.known, self.open, self.cycles = size, calls, {}, [], []
+
+    def of(self, name):
+        """(bytes, path) from this function down."""
+        if name in self.open:
+            self.cycles.append(self.open[self.open.index(name):] + [name])
+            return 0, [name]
+        if name not in self.known:
+            own = self.size.get(name, 0 if name == INDIRECT else EXTERNAL)
+            self.open.append(name)
+            below = max((self.of(callee) for callee in sorted(self.calls.get(name, ()))), default=(0, []))
+            self.open.pop()
+            self.known[name] = (own + below[0], [name] + below[1])
+        return self.known[name]
+
+
+def short(name):
+    return name.rsplit(":", 1)[-1]
+
+
+def main(arguments):
+    if len(arguments) != 3:
+        sys.exit(__doc__)
+    limit = int(arguments[2])
+    objects = sorted(path for path in Path(arguments[1]).rglob("*.c.o*") if "iwheel_core.dir" in path.parts)
+    objects = [path for path in objects if path.suffix in (".o", ".obj")]
+    if not objects:
+        sys.exit(f"no objects of the core in {arguments[1]}: build a preset of the arm family first")
+    size, calls, findings = read_graph(objects)
+    add_runtime_calls(objects, size, calls)
+    depth = Depth(size, calls)
+    worst = sorted(((depth.of(name), name) for name in size if ":" not in name), reverse=True)
+    findings += [f"recursion: {' -> '.join(map(short, cycle))}" for cycle in depth.cycles]
+    for (used, path), name in worst[:5]:
+        print(f"{used:4d} B  {' -> '.join(f'{short(step)} {size.get(step, 0 if step == INDIRECT else EXTERNAL)}' for step in path)}")
+    findings += [f"{name}: {used} B of stack, {limit} B allowed" for (used, _), name in worst if used > limit]
+    for finding in findings:
+        print(finding)
+    print(f"worst of {len(worst)} entry points: {worst[0][0][0]} B (limit {limit} B)")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))
