@@ -3,9 +3,6 @@
 
 #include <string.h>
 
-/// By then even the gentlest slope (50 mm/s2) has reached the highest speed (5000 mm/s).
-#define IW_GATE_ELAPSED_MAX_US 100000000U
-
 void iw_gate_init(iw_gate_t *self, const iw_config_t *config)
 {
     memset(self, 0, sizeof *self);

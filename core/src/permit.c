@@ -11,6 +11,12 @@
 
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
 
+/// True if the configuration allows sending at all.
+static bool may_send(const iw_config_t *config)
+{
+    return !config->listen_only && config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
+}
+
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted)
 {
     memset(self, 0, sizeof *self);
@@ -21,7 +27,7 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     for (size_t cause = 0; cause < IW_CAUSE_LOOP_LATE; cause++) {
         self->seen_us[cause] = IW_NEVER;
     }
-    if (restarted && !config->listen_only) {
+    if (restarted && may_send(config)) {
         self->state = IW_STATE_STOPPING;
         self->cut = true;
         self->hold_us = now_us;
@@ -90,8 +96,7 @@ static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us)
 
 static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us)
 {
-    const iw_time_us_t span_us = (lease_us(self) > IW_PERMIT_STALE_US) ? lease_us(self) : IW_PERMIT_STALE_US;
-    return within(now_us, self->stale_us, span_us);
+    return within(now_us, self->stale_us, IW_PERMIT_STALE_US);
 }
 
 static void end_arming(iw_permit_t *self, iw_refusal_t refusal)
@@ -170,12 +175,11 @@ void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, u
 
 static void step_arming(iw_permit_t *self, iw_time_us_t now_us)
 {
-    const iw_time_us_t first_us = (lease_us(self) > IW_PERMIT_FIRST_LEASE_US) ? lease_us(self) : IW_PERMIT_FIRST_LEASE_US;
     if (self->view.proven) {
         self->arming = false;
         self->state = IW_STATE_ARMED;
         self->cut = false;
-        self->lease_until_us = now_us + first_us;
+        self->lease_until_us = now_us + IW_PERMIT_FIRST_LEASE_US;
     } else if (now_us - self->arming_us >= (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS) {
         end_arming(self, IW_REFUSE_SEND_STALLED);
     }
@@ -241,7 +245,7 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     if (self->state == IW_STATE_LATCHED) {
         return (present == IW_REFUSE_ESTOP_PRESSED) ? present : IW_REFUSE_LATCHED;
     }
-    if (!self->config->setpoint_type_set || self->config->current_role == IW_ROLE_UNSET) {
+    if (!may_send(self->config)) {
         return IW_REFUSE_TYPE_NOT_SET;
     }
     if (present != IW_REFUSE_NONE) {
@@ -380,7 +384,7 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us)
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self)
 {
     iw_time_us_t next_us = IW_NEVER;
-    const bool held = self->state == IW_STATE_STOPPING || self->holding;
+    const bool held = (self->state == IW_STATE_STOPPING && !self->arming) || self->holding;
     if (self->state == IW_STATE_ARMED) {
         next_us = self->lease_until_us;
     } else if (held && self->hold_us != IW_NEVER) {

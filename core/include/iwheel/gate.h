@@ -12,6 +12,9 @@
 #include "iwheel/config.h"
 #include "iwheel/proto.h"
 
+/// Time between two frames counts up to this. Longer silence is no permission to jump: after it comes a zero.
+#define IW_GATE_ELAPSED_MAX_US 300000U
+
 typedef enum {
     IW_GATE_PASS = 0,
     IW_GATE_NOT_A_SETPOINT, ///< Wrong id, format or length.

@@ -14,12 +14,11 @@
 #include "iwheel/config.h"
 #include "iwheel/follow.h"
 #include "iwheel/force.h"
-#include "iwheel/gate.h"
 #include "iwheel/hal.h"
 #include "iwheel/ledger.h"
-#include "iwheel/outbox.h"
 #include "iwheel/permit.h"
 #include "iwheel/proto.h"
+#include "iwheel/sender.h"
 #include "iwheel/setpoint.h"
 #include "iwheel/wheel.h"
 
@@ -38,6 +37,7 @@ typedef struct {
     bool echo_proven;         ///< An echo proves that the frame was on the bus (IFF_ECHO; bxCAN).
 } iw_bus_facts_t;
 
+/// Beside these: `iw_sender_t` counts what was sent, `iw_gate_t::stopped`, `iw_outbox_t::stray`, `iw_wheel_t::reboots`.
 typedef struct {
     uint32_t received;    ///< Frames of the nine telemetry ids that were read.
     uint32_t echoes;      ///< Echoes of our setpoints.
@@ -45,9 +45,6 @@ typedef struct {
     uint32_t bad_length;  ///< Known id, shorter than the table: ignored.
     uint32_t unknown;     ///< Any other id.
     uint32_t foreign;     ///< Setpoints that are not ours.
-    uint32_t pairs;       ///< Setpoint pairs accepted by the port.
-    uint32_t send_later;  ///< Setpoints the port could not take (result 0 or broken).
-    uint32_t clamped;     ///< Currents the encoder had to clamp.
     uint32_t late_steps;  ///< Steps later than IW_GATEWAY_LATE_US.
     uint32_t out_of_range; ///< Drive requests refused for their values.
     uint32_t purges;       ///< Purges the port confirmed.
@@ -73,19 +70,18 @@ typedef struct {
     iw_follow_t follow[IW_SIDES];
     iw_permit_t permit;
     iw_setpoint_t setpoint;
-    iw_outbox_t outbox;
-    iw_gate_t gate;
+    iw_sender_t sender;
     iw_ledger_t ledger;
     iw_counters_t counters;
     iw_time_us_t promised_us;  ///< When the last step asked to be called again.
-    iw_time_us_t pair_us;      ///< When the last pair was sent; IW_NEVER: none since silence.
     iw_time_us_t pose_us;      ///< IW_NEVER: none.
-    uint32_t gap_us;           ///< Between the last two pairs.
-    uint32_t gap_max_us;       ///< The largest since arming.
+    uint32_t purged_stop;      ///< Number of the stop for which a purge was tried.
+    uint32_t step_late_us;     ///< How late this step is.
     iw_proto_pose_t pose;
     iw_bus_state_t bus;
     iw_bus_facts_t facts;
     bool backlog;              ///< The last step left frames behind.
+    bool stalled;              ///< This step cannot tell when its frames came.
 } iw_gateway_t;
 
 /// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros: the process

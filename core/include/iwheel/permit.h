@@ -24,9 +24,9 @@
 typedef uint32_t iw_client_t;
 #define IW_CLIENT_NONE 0U
 
-/// After arm the lease lasts at least this long, since only zeros leave before the first drive.
+/// After arm the lease lasts this long, since only zeros leave before the first drive. Longer than any lease_ms.
 #define IW_PERMIT_FIRST_LEASE_US 1000000U
-/// A nonzero drive command this recent (or within the lease, if longer) refuses arm and reset.
+/// A nonzero drive command this recent refuses arm and reset. No lease_ms is longer.
 #define IW_PERMIT_STALE_US 500000U
 /// An event-like cause is gone when not seen for this long.
 #define IW_PERMIT_EVENT_US 1000000U

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: MIT
+#include "cycle.h"
+
+#define ESTOP_PRESSED 1U
+#define ESTOP_UNREADABLE 2U
+
+static uint32_t whole_ms(iw_time_us_t span_us)
+{
+    return (span_us < UINT32_MAX) ? (uint32_t)span_us / IW_US_PER_MS : UINT32_MAX / IW_US_PER_MS;
+}
+
+static uint8_t side_bit(size_t side)
+{
+    return (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT;
+}
+
+static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    const iw_time_us_t late_us = (now_us > self->promised_us) ? now_us - self->promised_us : 0U;
+    const bool late = late_us > IW_GATEWAY_LATE_US;
+    self->stalled = late || (self->stalled && self->backlog);
+    if (!late) {
+        return;
+    }
+    self->counters.late_steps++;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        iw_wheel_excuse(&self->wheel[side], now_us);
+        iw_follow_restart(&self->follow[side]);
+    }
+    if (late_us > IW_GATEWAY_HUNG_US) {
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_LOOP_HUNG, IW_SIDES_NONE, whole_ms(late_us));
+    } else if (late_us >= IW_GATEWAY_STOP_US) {
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_LOOP_LATE, IW_SIDES_NONE, whole_ms(late_us));
+    }
+}
+
+void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    const int pressed = self->hal.estop_pressed(self->hal.context);
+    if (pressed != 0) {
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE, (pressed > 0) ? ESTOP_PRESSED : ESTOP_UNREADABLE);
+    }
+    watch_loop(self, now_us);
+    self->bus = self->hal.bus_state(self->hal.context);
+    if (self->bus < IW_BUS_PASSIVE) {
+        iw_outbox_clear(&self->sender.outbox);
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_BUS_DOWN, IW_SIDES_NONE, (uint32_t)self->bus);
+    }
+}
+
+/// What the force module found out about units, as entries of the ledger.
+static void note_force_evidence(iw_gateway_t *self, iw_side_t side)
+{
+    const iw_force_t *const force = &self->force[side];
+    const iw_ledger_item_t unit = (side == IW_LEFT) ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
+    const iw_unit_evidence_t configured = (self->config.force_unit[side] == IW_FORCE_CN) ? IW_UNIT_CN : IW_UNIT_DN;
+    if (force->evidence == IW_UNIT_OFFSET_REMOVED) {
+        iw_ledger_contradict(&self->ledger, IW_LEDGER_OFFSET_INCLUDED, IW_EVIDENCE_BUS, force->evidence_permille);
+    } else if (force->evidence == configured) {
+        iw_ledger_confirm(&self->ledger, unit, IW_EVIDENCE_BUS, force->evidence_permille);
+        iw_ledger_confirm(&self->ledger, IW_LEDGER_OFFSET_INCLUDED, IW_EVIDENCE_BUS, force->evidence_permille);
+    } else if (force->evidence == IW_UNIT_CN || force->evidence == IW_UNIT_DN) {
+        iw_ledger_contradict(&self->ledger, unit, IW_EVIDENCE_BUS, force->evidence_permille);
+    }
+}
+
+static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, const iw_proto_message_t *message)
+{
+    const iw_wheel_t *const wheel = &self->wheel[message->side];
+    iw_force_t *const force = &self->force[message->side];
+    const iw_unit_evidence_t before = force->evidence;
+    if (message->kind == IW_PROTO_FORCE) {
+        const bool still = wheel->speed_us == IW_NEVER || iw_wheel_at_rest(wheel, now_us, 0);
+        iw_force_hear(force, now_us, message->as.force.force_raw, still);
+    } else {
+        iw_force_hear_offset(force, now_us, message->as.offset.offset_dN);
+    }
+    if (force->evidence != before) {
+        note_force_evidence(self, message->side);
+    }
+}
+
+static void note_length(iw_gateway_t *self, const iw_can_frame_t *frame)
+{
+    if (frame->dlc == IW_DLC_STATUS) {
+        iw_ledger_confirm(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, frame->dlc);
+    } else {
+        iw_ledger_contradict(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, frame->dlc);
+    }
+}
+
+/// Telemetry. A reboot is acted upon before the frame that revealed it is used any further.
+static void hear(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame, const iw_proto_message_t *message)
+{
+    iw_wheel_t *const wheel = &self->wheel[message->side];
+    const bool first = wheel->first_us == IW_NEVER;
+    self->counters.received++;
+    iw_wheel_hear(wheel, now_us, message, !self->stalled);
+    const iw_reboot_t reboot = iw_wheel_take_reboot(wheel);
+    if (reboot != IW_REBOOT_NONE) {
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_REBOOTED, side_bit(message->side), (uint32_t)reboot);
+    }
+    if (first || reboot != IW_REBOOT_NONE) {
+        iw_force_reopen(&self->force[message->side], wheel->boot_seen);
+    }
+    if (message->kind == IW_PROTO_FORCE || message->kind == IW_PROTO_OFFSET) {
+        hear_force(self, now_us, message);
+    } else if (message->kind == IW_PROTO_STATUS) {
+        note_length(self, frame);
+    } else if (message->kind == IW_PROTO_POSE) {
+        self->pose = message->as.pose;
+        self->pose_us = now_us;
+    }
+}
+
+static void hear_foreign(iw_gateway_t *self, iw_time_us_t now_us, uint32_t id)
+{
+    self->counters.foreign++;
+    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SECOND_MASTER, (id == IW_ID_LEFT_SETPOINT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, id);
+}
+
+static bool is_setpoint_id(uint32_t id)
+{
+    return id == IW_ID_LEFT_SETPOINT || id == IW_ID_RIGHT_SETPOINT;
+}
+
+static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame)
+{
+    iw_proto_message_t message;
+    if (is_setpoint_id(frame->id)) {
+        if (frame->kind == IW_CAN_ECHO) {
+            self->counters.echoes++;
+            iw_outbox_echo(&self->sender.outbox, (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT);
+        } else {
+            hear_foreign(self, now_us, frame->id);
+        }
+        return;
+    }
+    switch (iw_proto_decode(frame, &message)) {
+    case IW_OK:
+        hear(self, now_us, frame, &message);
+        break;
+    case IW_ERR_FORMAT:
+        self->counters.bad_format++;
+        break;
+    case IW_ERR_LENGTH:
+        self->counters.bad_length++;
+        break;
+    default:
+        self->counters.unknown++;
+        break;
+    }
+}
+
+void iw_cycle_receive(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    iw_can_frame_t frame;
+    uint32_t taken = 0;
+    while (taken < IW_GATEWAY_DRAIN_MAX && self->hal.receive(self->hal.context, &frame) > 0) {
+        take_frame(self, now_us, &frame);
+        taken++;
+    }
+    self->backlog = taken == IW_GATEWAY_DRAIN_MAX;
+}
+
+static void watch_silence(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    uint8_t sides = IW_SIDES_NONE;
+    uint32_t silent_ms = 0;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        const iw_wheel_t *const wheel = &self->wheel[side];
+        if (iw_wheel_lost(wheel, now_us)) {
+            sides |= side_bit(side);
+            silent_ms = (wheel->heard_us == IW_NEVER) ? UINT32_MAX : whole_ms(now_us - wheel->heard_us);
+        }
+    }
+    if (sides != IW_SIDES_NONE) {
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_LOST, sides, silent_ms);
+    }
+}
+
+static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    const iw_time_us_t waiting_us = iw_outbox_waiting_us(&self->sender.outbox);
+    if (waiting_us == IW_NEVER || now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
+        return;
+    }
+    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SEND_STALLED, IW_SIDES_NONE, whole_ms(now_us - waiting_us));
+    if (self->permit.holding && self->purged_stop != self->permit.stop.number) {
+        self->purged_stop = self->permit.stop.number;
+        self->counters.purges += iw_sender_purge(&self->sender) ? 1U : 0U;
+    }
+}
+
+static iw_ledger_item_t sign_item(size_t side)
+{
+    return (side == IW_LEFT) ? IW_LEDGER_FEEDBACK_SIGN_LEFT : IW_LEDGER_FEEDBACK_SIGN_RIGHT;
+}
+
+static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s)
+{
+    iw_follow_t *const follow = &self->follow[side];
+    const int32_t measured_mm_s = iw_wheel_speed_mm_s(&self->wheel[side]);
+    const uint32_t detail = (uint32_t)((measured_mm_s < 0) ? -measured_mm_s : measured_mm_s);
+    switch (iw_follow_step(follow, now_us, applied_mm_s, measured_mm_s)) {
+    case IW_FOLLOW_SIGN:
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_FEEDBACK_SIGN, side_bit(side), detail);
+        iw_ledger_contradict(&self->ledger, sign_item(side), IW_EVIDENCE_BUS, measured_mm_s);
+        break;
+    case IW_FOLLOW_OVERSPEED:
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_OVERSPEED, side_bit(side), detail);
+        break;
+    case IW_FOLLOW_BLOCKED:
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_BLOCKED, side_bit(side), detail);
+        break;
+    case IW_FOLLOW_OK:
+    default:
+        break;
+    }
+    if (iw_follow_sign_confirmed(follow, now_us) && self->ledger.entry[sign_item(side)].state == IW_LEDGER_ASSUMED) {
+        iw_ledger_confirm(&self->ledger, sign_item(side), IW_EVIDENCE_BUS, measured_mm_s);
+    }
+}
+
+static void watch_wheels(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
+    const bool ours = self->permit.state == IW_STATE_ARMED || self->permit.state == IW_STATE_STOPPING;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        if (ours && iw_wheel_heard(&self->wheel[side], now_us)) {
+            watch_follow(self, now_us, side, applied.wheel[side].speed_mm_s);
+        } else {
+            iw_follow_restart(&self->follow[side]);
+        }
+    }
+}
+
+static bool both_at_rest(const iw_gateway_t *self, iw_time_us_t now_us, uint32_t for_us)
+{
+    return iw_wheel_at_rest(&self->wheel[IW_LEFT], now_us, for_us) && iw_wheel_at_rest(&self->wheel[IW_RIGHT], now_us, for_us);
+}
+
+void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    iw_permit_view_t view;
+    if (!self->stalled) {
+        watch_echo(self, now_us);
+        watch_silence(self, now_us);
+        watch_wheels(self, now_us);
+    }
+    view.heard = iw_wheel_heard(&self->wheel[IW_LEFT], now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], now_us);
+    view.at_rest = both_at_rest(self, now_us, (uint32_t)self->config.rest_ms * IW_US_PER_MS);
+    view.settled = both_at_rest(self, now_us, IW_PERMIT_SETTLED_US);
+    view.output_zero = iw_setpoint_is_zero(&self->setpoint);
+    view.timing_ok = !self->facts.timing_contradicted;
+    view.can_send = iw_outbox_waiting_us(&self->sender.outbox) == IW_NEVER;
+    view.proven = iw_outbox_proven_since(&self->sender.outbox, self->permit.arming_us);
+    view.applied = iw_setpoint_applied(&self->setpoint);
+    iw_permit_step(&self->permit, now_us, &view);
+}
+
+/// Takes the pair that is due and sends it. What the port does not take whole is followed by zero.
+static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    const bool zero = iw_setpoint_next_is_zero(&self->setpoint);
+    iw_pair_t pair;
+    if (!iw_setpoint_due(&self->setpoint, now_us) || !iw_sender_ready(&self->sender, zero)) {
+        return IW_SEND_DONE;
+    }
+    iw_setpoint_take(&self->setpoint, now_us, &pair);
+    const iw_send_result_t result = iw_sender_send(&self->sender, now_us, &pair, zero);
+    if (result == IW_SEND_LATER) {
+        iw_setpoint_collapse(&self->setpoint, now_us);
+    }
+    return result;
+}
+
+void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    const iw_demand_t demand = iw_permit_demand(&self->permit);
+    iw_setpoint_demand(&self->setpoint, now_us, demand);
+    if (demand == IW_DEMAND_SILENCE) {
+        iw_sender_rest(&self->sender);
+        return;
+    }
+    if (self->bus < IW_BUS_PASSIVE) {
+        return;
+    }
+    if (send_pair(self, now_us) == IW_SEND_STOPPED) {
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
+        iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
+        (void)send_pair(self, now_us);
+    }
+}
+
+static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b)
+{
+    return (a < b) ? a : b;
+}
+
+iw_time_us_t iw_cycle_next_us(const iw_gateway_t *self, iw_time_us_t now_us)
+{
+    const iw_time_us_t due_us = iw_setpoint_next_us(&self->setpoint);
+    iw_time_us_t next_us = sooner(now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));
+    if (self->backlog) {
+        return now_us;
+    }
+    if (due_us > now_us) {
+        next_us = sooner(next_us, due_us);
+    }
+    return (next_us > now_us) ? next_us : now_us;
+}

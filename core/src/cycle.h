@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+/// The parts of one cycle of the gateway, in the order in which `iw_gateway_step` calls them. Private to the core.
+#ifndef IW_CYCLE_H
+#define IW_CYCLE_H
+
+#include "iwheel/gateway.h"
+
+/// Our own lateness, the e-stop line, the state of the bus.
+void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us);
+
+/// Takes what was received: echoes to the account, telemetry to the wheels, foreign setpoints to the permission.
+void iw_cycle_receive(iw_gateway_t *self, iw_time_us_t now_us);
+
+/// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step.
+void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us);
+
+/// Sends what is due under the permission's demand.
+void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us);
+
+/// When to call again: not later than one period from now.
+iw_time_us_t iw_cycle_next_us(const iw_gateway_t *self, iw_time_us_t now_us);
+
+#endif

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel/gateway.h"
+
+#include "cycle.h"
+
+#include <string.h>
+
+/// Where each assumption comes from before anything is measured.
+static void assume(iw_gateway_t *self)
+{
+    const iw_config_t *const config = &self->config;
+    iw_ledger_t *const ledger = &self->ledger;
+    iw_ledger_init(ledger);
+    if (config->setpoint_type_set) {
+        iw_ledger_assume(ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_CONFIGURATION);
+    }
+    if (config->current_role != IW_ROLE_UNSET) {
+        iw_ledger_assume(ledger, IW_LEDGER_CURRENT_ROLE, IW_EVIDENCE_CONFIGURATION);
+    }
+    if (config->force_unit[IW_LEFT] != IW_FORCE_CN) {
+        iw_ledger_assume(ledger, IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_CONFIGURATION);
+    }
+    if (config->force_unit[IW_RIGHT] != IW_FORCE_DN) {
+        iw_ledger_assume(ledger, IW_LEDGER_FORCE_UNIT_RIGHT, IW_EVIDENCE_CONFIGURATION);
+    }
+}
+
+iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal, iw_time_us_t now_us, bool restarted)
+{
+    const iw_config_fault_t fault = iw_config_check(config);
+    if (fault != IW_CONFIG_OK) {
+        return fault;
+    }
+    memset(self, 0, sizeof *self);
+    self->config = *config;
+    self->hal = *hal;
+    self->promised_us = now_us;
+    self->pose_us = IW_NEVER;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        iw_wheel_init(&self->wheel[side], &self->config, (iw_side_t)side, now_us);
+        iw_force_init(&self->force[side], &self->config, (iw_side_t)side);
+        iw_follow_init(&self->follow[side], &self->config);
+    }
+    iw_permit_init(&self->permit, &self->config, now_us, restarted);
+    iw_setpoint_init(&self->setpoint, &self->config);
+    iw_sender_init(&self->sender, &self->config, &self->hal);
+    assume(self);
+    return IW_CONFIG_OK;
+}
+
+iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    iw_cycle_begin(self, now_us);
+    iw_cycle_receive(self, now_us);
+    iw_cycle_judge(self, now_us);
+    iw_cycle_send(self, now_us);
+    self->promised_us = iw_cycle_next_us(self, now_us);
+    return self->promised_us;
+}
+
+void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts)
+{
+    self->facts = *facts;
+}
+
+iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover)
+{
+    return iw_permit_arm(&self->permit, now_us, client, takeover);
+}
+
+bool iw_gateway_arming(const iw_gateway_t *self)
+{
+    return self->permit.arming;
+}
+
+iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self)
+{
+    return self->permit.arm_refusal;
+}
+
+static int32_t magnitude(int32_t value)
+{
+    return (value < 0) ? -value : value;
+}
+
+/// Both values by one factor, so that the larger is `limit`. True if they had to be.
+static bool scale_pair(int32_t values[IW_SIDES], int32_t limit)
+{
+    const int32_t left = magnitude(values[IW_LEFT]);
+    const int32_t right = magnitude(values[IW_RIGHT]);
+    const int32_t largest = (left > right) ? left : right;
+    if (largest <= limit) {
+        return false;
+    }
+    values[IW_LEFT] = values[IW_LEFT] * limit / largest;
+    values[IW_RIGHT] = values[IW_RIGHT] * limit / largest;
+    return true;
+}
+
+static bool drive_in_range(const iw_config_t *config, const iw_drive_t *request)
+{
+    const int32_t lowest_mA = (config->current_role == IW_ROLE_SETPOINT) ? -IW_CURRENT_LIMIT_mA : 0;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        if (request->speed_mm_s[side] < INT16_MIN || request->speed_mm_s[side] > INT16_MAX) {
+            return false;
+        }
+        if (request->has_current && (request->current_mA[side] < lowest_mA || request->current_mA[side] > IW_CURRENT_LIMIT_mA)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool drive_nonzero(const iw_config_t *config, const iw_drive_t *request)
+{
+    const bool speed = request->speed_mm_s[IW_LEFT] != 0 || request->speed_mm_s[IW_RIGHT] != 0;
+    const bool current = request->has_current && (request->current_mA[IW_LEFT] != 0 || request->current_mA[IW_RIGHT] != 0);
+    return speed || (current && config->current_role == IW_ROLE_SETPOINT);
+}
+
+static iw_applied_t limit_drive(const iw_config_t *config, const iw_drive_t *request)
+{
+    iw_drive_t drive = *request;
+    iw_applied_t applied;
+    if (!drive.has_current) {
+        drive.current_mA[IW_LEFT] = config->max_current_mA;
+        drive.current_mA[IW_RIGHT] = config->max_current_mA;
+    }
+    applied.limited = scale_pair(drive.speed_mm_s, config->max_speed_mm_s);
+    applied.limited = scale_pair(drive.current_mA, config->max_current_mA) || applied.limited;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        applied.pair.wheel[side].speed_mm_s = (int16_t)drive.speed_mm_s[side];
+        applied.pair.wheel[side].current_mA = (int16_t)drive.current_mA[side];
+    }
+    return applied;
+}
+
+iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, const iw_drive_t *request,
+                              iw_applied_t *out_applied)
+{
+    const iw_config_t *const config = &self->config;
+    const bool nonzero = drive_nonzero(config, request);
+    const bool in_range = drive_in_range(config, request);
+    if (!in_range || (!request->has_current && config->current_role == IW_ROLE_SETPOINT)) {
+        if (nonzero) {
+            iw_permit_remember(&self->permit, now_us, client);
+        }
+        self->counters.out_of_range += in_range ? 0U : 1U;
+        return in_range ? IW_REFUSE_MISSING_FIELD : IW_REFUSE_OUT_OF_RANGE;
+    }
+    const iw_refusal_t refusal = iw_permit_drive(&self->permit, now_us, client, nonzero);
+    if (refusal == IW_REFUSE_NONE) {
+        *out_applied = limit_drive(config, request);
+        iw_setpoint_command(&self->setpoint, now_us, &out_applied->pair);
+    }
+    return refusal;
+}
+
+void iw_gateway_stop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause)
+{
+    iw_permit_stop(&self->permit, now_us, client, cause);
+}
+
+void iw_gateway_estop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client)
+{
+    iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_SOFTWARE, IW_SIDES_NONE, client);
+}
+
+iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us)
+{
+    return iw_permit_reset(&self->permit, now_us);
+}
+
+void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client)
+{
+    iw_permit_disconnect(&self->permit, now_us, client);
+}
+
+iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side)
+{
+    return iw_force_tare(&self->force[side], now_us);
+}
+
+iw_state_t iw_gateway_state(const iw_gateway_t *self)
+{
+    return self->permit.state;
+}

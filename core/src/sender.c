@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel/sender.h"
+
+#include <string.h>
+
+void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t *hal)
+{
+    memset(self, 0, sizeof *self);
+    self->config = config;
+    self->hal = hal;
+    self->pair_us = IW_NEVER;
+    iw_outbox_init(&self->outbox);
+    iw_gate_init(&self->gate, config);
+}
+
+bool iw_sender_ready(const iw_sender_t *self, bool zero)
+{
+    const bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
+    const bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
+    return zero ? left || right : left && right;
+}
+
+/// The frame for one wheel, in its own frame of reference. False, with the reason in `verdict`, if the gate stops it.
+static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_command_t *command, iw_can_frame_t *out_frame)
+{
+    const iw_config_t *const config = self->config;
+    const bool invert = config->invert[side];
+    iw_proto_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
+    if (invert) {
+        setpoint.speed_mm_s = (int16_t)-setpoint.speed_mm_s;
+    }
+    if (invert && config->current_role == IW_ROLE_SETPOINT) {
+        setpoint.current_mA = (int16_t)-setpoint.current_mA;
+    }
+    self->clamped += iw_proto_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, out_frame) ? 1U : 0U;
+    const iw_gate_verdict_t verdict = iw_gate_check(&self->gate, now_us, out_frame);
+    self->verdict = (verdict == IW_GATE_PASS) ? self->verdict : verdict;
+    return verdict == IW_GATE_PASS;
+}
+
+static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_can_frame_t *frame)
+{
+    const bool accepted = self->hal->send(self->hal->context, frame) > 0;
+    iw_outbox_sent(&self->outbox, side, now_us, accepted);
+    self->later += accepted ? 0U : 1U;
+    return accepted;
+}
+
+static void measure_gap(iw_sender_t *self, iw_time_us_t now_us)
+{
+    if (self->pair_us != IW_NEVER) {
+        self->gap_us = (uint32_t)(now_us - self->pair_us);
+        self->gap_max_us = (self->gap_us > self->gap_max_us) ? self->gap_us : self->gap_max_us;
+    }
+    self->pair_us = now_us;
+    self->pairs++;
+}
+
+iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero)
+{
+    iw_can_frame_t frame[IW_SIDES];
+    bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
+    bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
+    const bool whole = left && right;
+    if (!prepare(self, now_us, IW_LEFT, &pair->wheel[IW_LEFT], &frame[IW_LEFT]) ||
+        !prepare(self, now_us, IW_RIGHT, &pair->wheel[IW_RIGHT], &frame[IW_RIGHT])) {
+        return IW_SEND_STOPPED;
+    }
+    const bool left_done = !left || hand_over(self, now_us, IW_LEFT, &frame[IW_LEFT]);
+    right = right && (left_done || zero);
+    const bool right_done = right ? hand_over(self, now_us, IW_RIGHT, &frame[IW_RIGHT]) : !whole;
+    if (!left_done || !right_done) {
+        return IW_SEND_LATER;
+    }
+    if (whole) {
+        measure_gap(self, now_us);
+    }
+    return IW_SEND_DONE;
+}
+
+void iw_sender_rest(iw_sender_t *self)
+{
+    self->pair_us = IW_NEVER;
+    self->gap_us = 0;
+    self->gap_max_us = 0;
+}
+
+bool iw_sender_purge(iw_sender_t *self)
+{
+    if (self->hal->purge(self->hal->context) <= 0) {
+        return false;
+    }
+    iw_outbox_clear(&self->outbox);
+    return true;
+}
