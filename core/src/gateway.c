@@ -65,7 +65,11 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts)
 
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover)
 {
-    return iw_permit_arm(&self->permit, now_us, client, takeover);
+    const iw_refusal_t refusal = iw_permit_arm(&self->permit, now_us, client, takeover);
+    if (self->permit.arming) {
+        iw_setpoint_hasten(&self->setpoint, now_us);
+    }
+    return refusal;
 }
 
 bool iw_gateway_arming(const iw_gateway_t *self)

@@ -48,10 +48,9 @@ static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, co
 
 static void measure_gap(iw_sender_t *self, iw_time_us_t now_us)
 {
-    if (self->pair_us != IW_NEVER) {
-        self->gap_us = (uint32_t)(now_us - self->pair_us);
-        self->gap_max_us = (self->gap_us > self->gap_max_us) ? self->gap_us : self->gap_max_us;
-    }
+    const bool first = self->pair_us == IW_NEVER;
+    self->gap_us = first ? 0U : (uint32_t)(now_us - self->pair_us);
+    self->gap_max_us = (first || self->gap_us > self->gap_max_us) ? self->gap_us : self->gap_max_us;
     self->pair_us = now_us;
     self->pairs++;
 }
@@ -81,8 +80,6 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw
 void iw_sender_rest(iw_sender_t *self)
 {
     self->pair_us = IW_NEVER;
-    self->gap_us = 0;
-    self->gap_max_us = 0;
 }
 
 bool iw_sender_purge(iw_sender_t *self)

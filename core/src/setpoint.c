@@ -49,10 +49,12 @@ void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config)
     clear(self);
 }
 
-/// Moves the next pair forward, but keeps its distance from the last one.
-static void hasten(iw_setpoint_t *self, iw_time_us_t now_us)
+void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us)
 {
     iw_time_us_t due_us = now_us;
+    if (self->demand == IW_DEMAND_SILENCE) {
+        return;
+    }
     if (self->last_us != IW_NEVER && now_us - self->last_us < IW_SETPOINT_SPACING_US) {
         due_us = self->last_us + IW_SETPOINT_SPACING_US;
     }
@@ -77,7 +79,7 @@ void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t de
         clear(self);
         self->due_us = now_us;
     } else {
-        hasten(self, now_us);
+        iw_setpoint_hasten(self, now_us);
     }
 }
 
@@ -92,7 +94,7 @@ void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair
                       same_command(&self->target.wheel[IW_RIGHT], &target->wheel[IW_RIGHT]);
     if (self->demand == IW_DEMAND_FOLLOW && !same) {
         self->target = *target;
-        hasten(self, now_us);
+        iw_setpoint_hasten(self, now_us);
     }
 }
 

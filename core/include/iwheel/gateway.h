@@ -4,7 +4,7 @@
 ///     bus -> receive -> decode -> wheel state -> permission -> scheduler -> encode -> gate -> send -> bus
 ///
 /// The owner calls `iw_gateway_step` when a frame, an e-stop edge or the time it returned is there, and as often as it likes.
-/// Requests may come between steps, from the same thread of execution. What the wheels do is a pure function of configuration,
+/// Requests may come between steps, from the same thread of execution; a step right after one sends what follows from it. What the wheels do is a pure function of configuration,
 /// times, frames and requests: the same recording gives the same bytes on every port.
 ///
 /// Size: see the README's table. No heap, no floating point, no file-scope state.

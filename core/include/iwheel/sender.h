@@ -25,7 +25,7 @@ typedef struct {
     iw_gate_t gate;
     iw_time_us_t pair_us;      ///< When the last whole pair was taken by the port; IW_NEVER: none since silence.
     uint32_t gap_us;           ///< Between the last two pairs.
-    uint32_t gap_max_us;       ///< The largest since silence.
+    uint32_t gap_max_us;       ///< The largest since the last silence ended.
     uint32_t pairs;            ///< Whole pairs taken by the port.
     uint32_t later;            ///< Setpoints that the port did not take.
     uint32_t clamped;          ///< Currents that the encoder had to clamp.

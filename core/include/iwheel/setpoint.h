@@ -48,6 +48,9 @@ void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t de
 /// The client's new command, already within the limits. Ignored unless the demand is FOLLOW.
 void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair_t *target);
 
+/// Moves the next pair forward, but not closer than IW_SETPOINT_SPACING_US to the last one. Nothing in silence.
+void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us);
+
 /// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole. The zero is due
 /// IW_SETPOINT_SPACING_US from now; under FOLLOW the ramp to the next command starts from it.
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us);
