@@ -51,7 +51,7 @@ static iw_gate_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t spee
     return iw_gate_check(&gate, now_us, &frame);
 }
 
-/// Brings the wheel to a speed: zero, and long after it the speed.
+/// Brings the wheel to a low speed: zero, and long after it the speed.
 static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
     TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us - AGES_US, side, 0, 0));
     TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us, side, speed_mm_s, 0));
@@ -171,8 +171,8 @@ static void test_check_every_current_passes_within_the_configured_maximum_only(v
         config.current_role = roles[i % 2];
         restart();
         sweep_currents(0);
-        settle(START_US, IW_LEFT, 250);
-        sweep_currents(250);
+        settle(START_US, IW_LEFT, 200);
+        sweep_currents(200);
     }
 }
 
@@ -180,6 +180,7 @@ static void test_check_every_speed_passes_within_the_configured_maximum_only(voi
     static const uint16_t maxima[] = {10, 11, 1000, 4999, 5000};
     for (size_t i = 0; i < sizeof maxima / sizeof maxima[0]; i++) {
         config.max_speed_mm_s = maxima[i];
+        config.accel_mm_s2 = 20000;
         config.decel_mm_s2 = 20000;
         restart();
         for (int32_t speed = -32768; speed <= 32767; speed++) {

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: MIT
+// The configuration: every value of every field, the relations between fields, the stop budget against figures worked out by hand.
+#include <string.h>
+
+#include "iwheel/config.h"
+#include "unity.h"
+
+#define POISON 0xA5
+
+/// A numeric field: where it is, what it may be (from the documentation), which fault names it.
+typedef struct {
+    size_t member;
+    uint16_t min;
+    uint16_t max;
+    iw_config_fault_t fault;
+} limit_t;
+
+static const limit_t limits[] = {
+    {offsetof(iw_config_t, period_ms), 5, 50, IW_CONFIG_PERIOD},
+    {offsetof(iw_config_t, lease_ms), 20, 500, IW_CONFIG_LEASE},
+    {offsetof(iw_config_t, accel_mm_s2), 50, 20000, IW_CONFIG_ACCEL},
+    {offsetof(iw_config_t, decel_mm_s2), 100, 20000, IW_CONFIG_DECEL},
+    {offsetof(iw_config_t, max_speed_mm_s), 10, 5000, IW_CONFIG_MAX_SPEED},
+    {offsetof(iw_config_t, max_current_mA), 0, 2000, IW_CONFIG_MAX_CURRENT},
+    {offsetof(iw_config_t, zero_hold_ms), 1100, 5000, IW_CONFIG_ZERO_HOLD},
+    {offsetof(iw_config_t, wheel_silent_ms), 20, 200, IW_CONFIG_WHEEL_SILENT},
+    {offsetof(iw_config_t, echo_ms), 20, 200, IW_CONFIG_ECHO},
+    {offsetof(iw_config_t, rest_rpm), 0, 20, IW_CONFIG_REST_RPM},
+    {offsetof(iw_config_t, rest_ms), 50, 2000, IW_CONFIG_REST},
+    {offsetof(iw_config_t, follow_mm_s), 50, 5000, IW_CONFIG_FOLLOW_SPEED},
+    {offsetof(iw_config_t, follow_ms), 100, 5000, IW_CONFIG_FOLLOW},
+    {offsetof(iw_config_t, blocked_ms), 200, 10000, IW_CONFIG_BLOCKED},
+    {offsetof(iw_config_t, radius_mm), 20, 500, IW_CONFIG_RADIUS},
+    {offsetof(iw_config_t, gear_turns), 1, 1000, IW_CONFIG_GEAR_TURNS},
+    {offsetof(iw_config_t, gear_per), 1, 1000, IW_CONFIG_GEAR_PER},
+    {offsetof(iw_config_t, setpoint_dlc), 5, 8, IW_CONFIG_SETPOINT_DLC},
+};
+#define LIMITS (sizeof limits / sizeof limits[0])
+
+static iw_config_t config;
+
+void setUp(void) {
+    memset(&config, POISON, sizeof config);
+    iw_config_default(&config);
+}
+
+void tearDown(void) {}
+
+static void put(const limit_t *limit, uint16_t value) {
+    memcpy((uint8_t *)&config + limit->member, &value, sizeof value);
+}
+
+/// Room on all sides: no value of one field within its range breaks the stop budget, nor the gear ratio if the other of its two
+/// numbers follows.
+static void make_room(uint16_t gear) {
+    iw_config_default(&config);
+    config.max_speed_mm_s = 10;
+    config.decel_mm_s2 = 20000;
+    config.gear_turns = gear;
+    config.gear_per = gear;
+}
+
+static void test_default_is_the_documented_one(void) {
+    TEST_ASSERT_EQUAL_UINT16(20, config.period_ms);
+    TEST_ASSERT_EQUAL_UINT16(200, config.lease_ms);
+    TEST_ASSERT_EQUAL_UINT16(800, config.accel_mm_s2);
+    TEST_ASSERT_EQUAL_UINT16(1500, config.decel_mm_s2);
+    TEST_ASSERT_EQUAL_UINT16(1000, config.max_speed_mm_s);
+    TEST_ASSERT_EQUAL_UINT16(2000, config.max_current_mA);
+    TEST_ASSERT_EQUAL_UINT16(1500, config.zero_hold_ms);
+    TEST_ASSERT_EQUAL_UINT16(50, config.wheel_silent_ms);
+    TEST_ASSERT_EQUAL_UINT16(50, config.echo_ms);
+    TEST_ASSERT_EQUAL_UINT16(2, config.rest_rpm);
+    TEST_ASSERT_EQUAL_UINT16(200, config.rest_ms);
+    TEST_ASSERT_EQUAL_UINT16(300, config.follow_mm_s);
+    TEST_ASSERT_EQUAL_UINT16(500, config.follow_ms);
+    TEST_ASSERT_EQUAL_UINT16(1000, config.blocked_ms);
+    TEST_ASSERT_EQUAL_UINT16(192, config.radius_mm);
+    TEST_ASSERT_EQUAL_UINT16(config.gear_per, config.gear_turns);
+    TEST_ASSERT_EQUAL_UINT16(5, config.setpoint_dlc);
+    TEST_ASSERT_FALSE(config.rpm_of_rotor);
+    TEST_ASSERT_FALSE(config.listen_only);
+    TEST_ASSERT_FALSE(config.invert[IW_LEFT]);
+    TEST_ASSERT_FALSE(config.invert[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_CN, config.force_unit[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_DN, config.force_unit[IW_RIGHT]);
+}
+
+static void test_default_leaves_open_what_nobody_can_know(void) {
+    TEST_ASSERT_FALSE(config.setpoint_type_set);
+    TEST_ASSERT_EQUAL_INT(IW_ROLE_UNSET, config.current_role);
+}
+
+static void test_check_default_is_fine(void) {
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
+}
+
+static void test_range_is_the_documented_one(void) {
+    for (size_t i = 0; i < LIMITS; i++) {
+        const iw_config_range_t range = iw_config_range(limits[i].fault);
+        TEST_ASSERT_EQUAL_UINT16(limits[i].min, range.min);
+        TEST_ASSERT_EQUAL_UINT16(limits[i].max, range.max);
+    }
+}
+
+static void test_faults_stand_in_the_order_of_the_struct(void) {
+    for (size_t i = 0; i < LIMITS; i++) {
+        TEST_ASSERT_EQUAL_INT((int)i + 1, limits[i].fault);
+        TEST_ASSERT_EQUAL_UINT(i * sizeof(uint16_t), limits[i].member);
+    }
+}
+
+static void test_check_every_value_of_every_field_is_judged_by_its_range(void) {
+    for (size_t i = 0; i < LIMITS; i++) {
+        for (uint32_t value = 0; value <= 65535; value++) {
+            const bool within = value >= limits[i].min && value <= limits[i].max;
+            make_room(value >= 1 && value <= 1000 ? (uint16_t)value : 1);
+            put(&limits[i], (uint16_t)value);
+            const iw_config_fault_t fault = iw_config_check(&config);
+            if (fault != (within ? IW_CONFIG_OK : limits[i].fault)) {
+                TEST_ASSERT_EQUAL_INT(within ? IW_CONFIG_OK : limits[i].fault, fault);
+            }
+        }
+    }
+}
+
+static void test_check_two_faults_names_the_first(void) {
+    for (size_t first = 0; first < LIMITS; first++) {
+        for (size_t second = first + 1; second < LIMITS; second++) {
+            make_room(1);
+            put(&limits[first], 65535);
+            put(&limits[second], 65535);
+            TEST_ASSERT_EQUAL_INT(limits[first].fault, iw_config_check(&config));
+        }
+    }
+}
+
+static void test_check_field_fault_comes_before_a_broken_relation(void) {
+    config.lease_ms = 500;
+    config.decel_mm_s2 = 100;
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_STOP_BUDGET, iw_config_check(&config));
+    config.setpoint_dlc = 9;
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_SETPOINT_DLC, iw_config_check(&config));
+}
+
+static void test_check_every_role_and_unit_that_exists_is_fine(void) {
+    for (int role = IW_ROLE_UNSET; role <= IW_ROLE_SETPOINT; role++) {
+        for (unsigned units = 0; units < 4; units++) {
+            config.current_role = (iw_current_role_t)role;
+            config.force_unit[IW_LEFT] = (iw_force_unit_t)(units & 1U);
+            config.force_unit[IW_RIGHT] = (iw_force_unit_t)(units >> 1);
+            TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
+        }
+    }
+}
+
+static void test_check_role_or_unit_that_does_not_exist_is_a_fault(void) {
+    for (int value = IW_ROLE_SETPOINT + 1; value < 300; value++) {
+        setUp();
+        config.current_role = (iw_current_role_t)value;
+        TEST_ASSERT_EQUAL_INT(IW_CONFIG_CURRENT_ROLE, iw_config_check(&config));
+        config.current_role = IW_ROLE_LIMIT;
+        config.force_unit[IW_LEFT] = (iw_force_unit_t)(value - 1);
+        TEST_ASSERT_EQUAL_INT(IW_CONFIG_FORCE_UNIT, iw_config_check(&config));
+        config.force_unit[IW_LEFT] = IW_FORCE_DN;
+        config.force_unit[IW_RIGHT] = (iw_force_unit_t)(value - 1);
+        TEST_ASSERT_EQUAL_INT(IW_CONFIG_FORCE_UNIT, iw_config_check(&config));
+    }
+}
+
+static void test_check_switches_and_types_are_never_at_fault(void) {
+    for (unsigned bits = 0; bits < 32; bits++) {
+        config.setpoint_type_set = (bits & 1U) != 0;
+        config.rpm_of_rotor = (bits & 2U) != 0;
+        config.listen_only = (bits & 4U) != 0;
+        config.invert[IW_LEFT] = (bits & 8U) != 0;
+        config.invert[IW_RIGHT] = (bits & 16U) != 0;
+        for (unsigned type = 0; type < 256; type++) {
+            config.setpoint_type = (uint8_t)type;
+            TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
+        }
+    }
+}
+
+static void test_check_every_gear_ratio_is_judged_by_one_and_one_hundred(void) {
+    for (uint16_t turns = 1; turns <= 1000; turns++) {
+        for (uint16_t per = 1; per <= 1000; per++) {
+            config.gear_turns = turns;
+            config.gear_per = per;
+            const double ratio = (double)turns / per;
+            const iw_config_fault_t wanted = ratio > 100.0 || ratio < 1.0 ? IW_CONFIG_GEAR_RATIO : IW_CONFIG_OK;
+            if (iw_config_check(&config) != wanted) {
+                TEST_ASSERT_EQUAL_UINT16_MESSAGE(per, turns, "wrong verdict for this pair");
+            }
+        }
+    }
+}
+
+static void test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more_is_not(void) {
+    static const struct {
+        uint16_t lease_ms;
+        uint16_t period_ms;
+        uint16_t max_speed_mm_s;
+        uint16_t decel_mm_s2;
+        iw_config_fault_t fault;
+    } cases[] = {
+        {200, 20, 780, 1000, IW_CONFIG_OK},           // 200 + 20 + 780
+        {200, 20, 781, 1000, IW_CONFIG_STOP_BUDGET},  // 200 + 20 + 781
+        {200, 20, 3900, 5000, IW_CONFIG_OK},          // 200 + 20 + 780
+        {200, 20, 3901, 5000, IW_CONFIG_STOP_BUDGET}, // 200 + 20 + 780.2
+        {201, 20, 780, 1000, IW_CONFIG_STOP_BUDGET},  // 201 + 20 + 780
+        {200, 21, 780, 1000, IW_CONFIG_STOP_BUDGET},  // 200 + 21 + 780
+        {500, 50, 4500, 10000, IW_CONFIG_OK},         // 500 + 50 + 450
+        {500, 50, 4500, 9999, IW_CONFIG_STOP_BUDGET}, // 500 + 50 + 450.05
+        {20, 5, 97, 100, IW_CONFIG_OK},               // 20 + 5 + 970
+        {20, 5, 98, 100, IW_CONFIG_STOP_BUDGET},      // 20 + 5 + 980
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        config.lease_ms = cases[i].lease_ms;
+        config.period_ms = cases[i].period_ms;
+        config.max_speed_mm_s = cases[i].max_speed_mm_s;
+        config.decel_mm_s2 = cases[i].decel_mm_s2;
+        TEST_ASSERT_EQUAL_INT(cases[i].fault, iw_config_check(&config));
+    }
+}
+
+static void test_check_gear_ratio_comes_before_the_stop_budget(void) {
+    config.decel_mm_s2 = 100;
+    config.gear_turns = 1000;
+    config.gear_per = 1;
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_GEAR_RATIO, iw_config_check(&config));
+}
+
+/// The way has two legs, and each may have been rounded up: 1 mm more than worked out is no fault, less is.
+static void test_stop_budget_rounds_up_what_was_worked_out_by_hand(void) {
+    static const struct {
+        uint16_t lease_ms;
+        uint16_t period_ms;
+        uint16_t max_speed_mm_s;
+        uint16_t decel_mm_s2;
+        iw_stop_budget_t budget;
+    } cases[] = {
+        {200, 20, 1000, 1500, {887, 554, 1000, 1000}},    // 220 + 666.67 ms; 220 + 333.33 mm
+        {200, 20, 780, 1000, {1000, 476, 1000, 780}},     // 220 + 780 ms; 171.6 + 304.2 mm
+        {500, 50, 4500, 10000, {1000, 3488, 1000, 4500}}, // 550 + 450 ms; 2475 + 1012.5 mm
+        {500, 50, 5000, 20000, {800, 3375, 1000, 5000}},  // 550 + 250 ms; 2750 + 625 mm
+        {20, 5, 10, 20000, {26, 1, 1000, 10}},            // 25 + 0.5 ms; 0.25 + 0.0025 mm
+        {100, 20, 1000, 2000, {620, 370, 1000, 1000}},    // 120 + 500 ms; 120 + 250 mm
+        {201, 20, 333, 700, {697, 153, 1000, 333}},       // 221 + 475.71 ms; 73.593 + 79.207 mm
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        config.lease_ms = cases[i].lease_ms;
+        config.period_ms = cases[i].period_ms;
+        config.max_speed_mm_s = cases[i].max_speed_mm_s;
+        config.decel_mm_s2 = cases[i].decel_mm_s2;
+        const iw_stop_budget_t budget = iw_config_stop_budget(&config);
+        TEST_ASSERT_EQUAL_UINT32(cases[i].budget.client_lost_ms, budget.client_lost_ms);
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT32(cases[i].budget.client_lost_mm, budget.client_lost_mm);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT32(cases[i].budget.client_lost_mm + 1U, budget.client_lost_mm);
+        TEST_ASSERT_EQUAL_UINT32(cases[i].budget.killed_ms, budget.killed_ms);
+        TEST_ASSERT_EQUAL_UINT32(cases[i].budget.killed_mm, budget.killed_mm);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_default_is_the_documented_one);
+    RUN_TEST(test_default_leaves_open_what_nobody_can_know);
+    RUN_TEST(test_check_default_is_fine);
+    RUN_TEST(test_range_is_the_documented_one);
+    RUN_TEST(test_faults_stand_in_the_order_of_the_struct);
+    RUN_TEST(test_check_every_value_of_every_field_is_judged_by_its_range);
+    RUN_TEST(test_check_two_faults_names_the_first);
+    RUN_TEST(test_check_field_fault_comes_before_a_broken_relation);
+    RUN_TEST(test_check_every_role_and_unit_that_exists_is_fine);
+    RUN_TEST(test_check_role_or_unit_that_does_not_exist_is_a_fault);
+    RUN_TEST(test_check_switches_and_types_are_never_at_fault);
+    RUN_TEST(test_check_every_gear_ratio_is_judged_by_one_and_one_hundred);
+    RUN_TEST(test_check_stop_budget_of_exactly_one_second_is_fine_and_a_hair_more_is_not);
+    RUN_TEST(test_check_gear_ratio_comes_before_the_stop_budget);
+    RUN_TEST(test_stop_budget_rounds_up_what_was_worked_out_by_hand);
+    return UNITY_END();
+}
