@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT
+// The account of sent and echoed frames, beside a model, through every sequence of events.
+#include <string.h>
+
+#include "iwheel/outbox.h"
+#include "unity.h"
+
+#define POISON 0xA5
+
+static iw_outbox_t outbox;
+
+void setUp(void) {
+    memset(&outbox, POISON, sizeof outbox);
+    iw_outbox_init(&outbox);
+}
+
+void tearDown(void) {}
+
+/// One wheel as the header describes it. Times are those of the walk, from 1; 0: none.
+typedef struct {
+    unsigned pending;
+    uint32_t sent[2];
+    uint32_t waiting; ///< An echo settles the refusals before it.
+    uint32_t proven;  ///< By an echo since the last clear.
+    uint32_t stray;
+} model_t;
+
+typedef enum { SEND_ZERO, SEND_NONZERO, REFUSED, ECHO, CLEAR, EVENTS } event_t;
+
+static bool model_may_send(const model_t *model, bool zero) {
+    return model->pending == 0 || (model->pending == 1 && zero);
+}
+
+static void model_sent(model_t *model, uint32_t now, bool accepted) {
+    model->waiting = model->waiting == 0 ? now : model->waiting;
+    if (accepted) {
+        model->sent[model->pending] = now;
+        model->pending++;
+    }
+}
+
+static void model_echo(model_t *model) {
+    if (model->pending == 0) {
+        model->stray++;
+        return;
+    }
+    model->proven = model->sent[0];
+    model->sent[0] = model->sent[1];
+    model->pending--;
+    model->waiting = model->pending > 0 ? model->sent[0] : 0;
+}
+
+static void model_clear(model_t *model) {
+    model->pending = 0;
+    model->waiting = 0;
+    model->proven = 0;
+}
+
+/// Does it to both. What may not be sent is not sent: that is the caller's contract.
+static void apply(iw_side_t side, event_t event, uint32_t now, model_t *models) {
+    model_t *model = &models[side];
+    const bool sends = event <= REFUSED;
+    if (sends && model_may_send(model, event != SEND_NONZERO)) {
+        iw_outbox_sent(&outbox, side, now, event != REFUSED);
+        model_sent(model, now, event != REFUSED);
+    } else if (event == ECHO) {
+        iw_outbox_echo(&outbox, side);
+        model_echo(model);
+    } else if (event == CLEAR) {
+        iw_outbox_clear(&outbox);
+        model_clear(&models[IW_LEFT]);
+        model_clear(&models[IW_RIGHT]);
+    }
+}
+
+static uint32_t earlier(uint32_t a, uint32_t b) {
+    return a == 0 ? b : b == 0 ? a : a < b ? a : b;
+}
+
+/// The same to whoever looks from outside?
+static bool agrees(const model_t *models, uint32_t now) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        for (int zero = 0; zero <= 1; zero++) {
+            if (iw_outbox_may_send(&outbox, (iw_side_t)side, zero != 0) != model_may_send(&models[side], zero != 0)) {
+                return false;
+            }
+        }
+    }
+    for (uint32_t since = 1; since <= now + 1; since++) {
+        const bool proven = models[IW_LEFT].proven >= since && models[IW_RIGHT].proven >= since;
+        if (iw_outbox_proven_since(&outbox, since) != proven) {
+            return false;
+        }
+    }
+    const uint32_t waiting = earlier(models[IW_LEFT].waiting, models[IW_RIGHT].waiting);
+    return iw_outbox_waiting_us(&outbox) == (waiting == 0 ? IW_NEVER : waiting) &&
+           outbox.stray == models[IW_LEFT].stray + models[IW_RIGHT].stray;
+}
+
+/// Walks one sequence of events of one wheel; the other is left alone.
+static void walk(iw_side_t side, uint32_t path, unsigned length) {
+    model_t models[IW_SIDES];
+    memset(models, 0, sizeof models);
+    setUp();
+    for (uint32_t now = 1; now <= length; now++, path /= EVENTS) {
+        apply(side, (event_t)(path % EVENTS), now, models);
+        if (!agrees(models, now)) {
+            TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, path, "disagrees with the model after this sequence (base 5)");
+        }
+    }
+}
+
+static void test_every_sequence_of_eight_events_of_one_wheel_agrees_with_the_model(void) {
+    for (uint32_t path = 0; path < 390625; path++) {
+        walk(IW_LEFT, path, 8);
+        walk(IW_RIGHT, path, 8);
+    }
+}
+
+static void walk_both(uint32_t path, unsigned length) {
+    model_t models[IW_SIDES];
+    memset(models, 0, sizeof models);
+    setUp();
+    for (uint32_t now = 1; now <= length; now++, path /= 2U * EVENTS) {
+        apply((iw_side_t)(path / EVENTS % 2U), (event_t)(path % EVENTS), now, models);
+        if (!agrees(models, now)) {
+            TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, path, "disagrees with the model after this sequence (base 10)");
+        }
+    }
+}
+
+static void test_every_sequence_of_six_events_of_both_wheels_agrees_with_the_model(void) {
+    for (uint32_t path = 0; path < 1000000; path++) {
+        walk_both(path, 6);
+    }
+}
+
+static void test_init_owes_nothing(void) {
+    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_RIGHT, false));
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
+    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 1));
+    TEST_ASSERT_EQUAL_UINT32(0, outbox.stray);
+}
+
+static void test_may_send_zero_never_waits_for_an_echo(void) {
+    iw_outbox_sent(&outbox, IW_LEFT, 100, true);
+    TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, true));
+    iw_outbox_sent(&outbox, IW_LEFT, 200, true);
+    TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, true));
+    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_RIGHT, false));
+}
+
+static void test_waiting_refused_frame_waits_from_the_first_refusal(void) {
+    iw_outbox_sent(&outbox, IW_RIGHT, 1000, false);
+    iw_outbox_sent(&outbox, IW_RIGHT, 2000, false);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
+    iw_outbox_sent(&outbox, IW_RIGHT, 3000, true);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
+    iw_outbox_echo(&outbox, IW_RIGHT);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
+}
+
+static void test_waiting_is_that_of_the_wheel_that_waits_longest(void) {
+    iw_outbox_sent(&outbox, IW_LEFT, 2000, true);
+    iw_outbox_sent(&outbox, IW_RIGHT, 1000, true);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
+    iw_outbox_echo(&outbox, IW_RIGHT);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 2000);
+}
+
+static void test_proven_since_needs_both_wheels(void) {
+    iw_outbox_sent(&outbox, IW_LEFT, 5000, true);
+    iw_outbox_sent(&outbox, IW_RIGHT, 5001, true);
+    iw_outbox_echo(&outbox, IW_LEFT);
+    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 5000));
+    iw_outbox_echo(&outbox, IW_RIGHT);
+    TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 5000));
+    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 5001));
+}
+
+static void test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer(void) {
+    iw_outbox_sent(&outbox, IW_LEFT, 1000, true);
+    iw_outbox_sent(&outbox, IW_LEFT, 9000, true);
+    iw_outbox_sent(&outbox, IW_RIGHT, 9000, true);
+    iw_outbox_echo(&outbox, IW_RIGHT);
+    iw_outbox_echo(&outbox, IW_LEFT);
+    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 1001));
+    iw_outbox_echo(&outbox, IW_LEFT);
+    TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 9000));
+}
+
+static void test_echo_after_clear_is_stray_and_proves_nothing(void) {
+    iw_outbox_sent(&outbox, IW_LEFT, 1000, true);
+    iw_outbox_sent(&outbox, IW_RIGHT, 1000, true);
+    iw_outbox_clear(&outbox);
+    iw_outbox_echo(&outbox, IW_LEFT);
+    iw_outbox_echo(&outbox, IW_RIGHT);
+    TEST_ASSERT_EQUAL_UINT32(2, outbox.stray);
+    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 1000));
+    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_init_owes_nothing);
+    RUN_TEST(test_may_send_zero_never_waits_for_an_echo);
+    RUN_TEST(test_waiting_refused_frame_waits_from_the_first_refusal);
+    RUN_TEST(test_waiting_is_that_of_the_wheel_that_waits_longest);
+    RUN_TEST(test_proven_since_needs_both_wheels);
+    RUN_TEST(test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer);
+    RUN_TEST(test_echo_after_clear_is_stray_and_proves_nothing);
+    RUN_TEST(test_every_sequence_of_eight_events_of_one_wheel_agrees_with_the_model);
+    RUN_TEST(test_every_sequence_of_six_events_of_both_wheels_agrees_with_the_model);
+    return UNITY_END();
+}
