@@ -27,10 +27,6 @@ void sim_motion_init(sim_motion_t *self, const sim_motion_config_t *config, iw_t
     *self = (sim_motion_t){.config = *config, .now_us = now_us, .heard_us = IW_NEVER};
 }
 
-bool sim_motion_driven(const sim_motion_t *self) {
-    return self->heard_us != IW_NEVER;
-}
-
 static int64_t clamp(int64_t value, int64_t bound) {
     if (value > bound) {
         return bound;
@@ -92,7 +88,7 @@ static void integrate(sim_motion_t *self, int64_t dt_us) {
     int64_t const before = self->speed_um_s;
     int64_t after = 0;
     if (!self->blocked) {
-        after = sim_motion_driven(self) ? driving(self, dt_us) : coasting(self, before, dt_us);
+        after = self->driven ? driving(self, dt_us) : coasting(self, before, dt_us);
     }
     int64_t const way_nm = (before + after) * dt_us / 2000;
     self->speed_um_s = (int32_t)after;
@@ -101,30 +97,28 @@ static void integrate(sim_motion_t *self, int64_t dt_us) {
     count_ticks(self, way_nm);
 }
 
+/// Where the next step of integration ends: nothing changes in the middle of one.
+static iw_time_us_t step_end_us(const sim_motion_t *self, iw_time_us_t to_us) {
+    iw_time_us_t end_us = to_us;
+    if (self->driven && self->heard_us + IW_WHEEL_WATCHDOG_US < end_us) {
+        end_us = self->heard_us + IW_WHEEL_WATCHDOG_US;
+    }
+    return (end_us - self->now_us > STEP_MAX_US) ? self->now_us + STEP_MAX_US : end_us;
+}
+
 void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us) {
     while (self->now_us < to_us) {
-        iw_time_us_t end_us = to_us;
-        if (sim_motion_driven(self)) {
-            iw_time_us_t const over_us = self->heard_us + IW_WHEEL_WATCHDOG_US;
-            if (over_us <= self->now_us) {
-                self->heard_us = IW_NEVER;
-            } else if (over_us < end_us) {
-                end_us = over_us;
-            }
-        }
-        if (!sim_motion_driven(self) && self->speed_um_s == 0) {
+        if (!self->driven && self->speed_um_s == 0) {
             self->accel_mm_s2 = 0;
             self->now_us = to_us;
             return;
         }
-        if (end_us - self->now_us > STEP_MAX_US) {
-            end_us = self->now_us + STEP_MAX_US;
-        }
+        iw_time_us_t const end_us = step_end_us(self, to_us);
         integrate(self, (int64_t)(end_us - self->now_us));
         self->now_us = end_us;
-    }
-    if (sim_motion_driven(self) && self->heard_us + IW_WHEEL_WATCHDOG_US <= self->now_us) {
-        self->heard_us = IW_NEVER;
+        if (self->driven && end_us - self->heard_us >= IW_WHEEL_WATCHDOG_US) {
+            self->driven = false;
+        }
     }
 }
 
@@ -135,13 +129,14 @@ bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_proto_set
     }
     self->setpoint = *setpoint;
     self->heard_us = now_us;
+    self->driven = true;
     self->setpoints += 1U;
     return true;
 }
 
 void sim_motion_release(sim_motion_t *self, iw_time_us_t now_us) {
     sim_motion_advance(self, now_us);
-    self->heard_us = IW_NEVER;
+    self->driven = false;
 }
 
 int64_t sim_motion_milli_rpm(const sim_motion_t *self) {
@@ -167,7 +162,7 @@ int64_t sim_motion_true_mm(const sim_motion_t *self) {
 }
 
 uint32_t sim_motion_draw_mA(const sim_motion_t *self) {
-    if (!sim_motion_driven(self)) {
+    if (!self->driven) {
         return 0U;
     }
     if (self->blocked && self->setpoint.speed_mm_s != 0) {

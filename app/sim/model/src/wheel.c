@@ -135,7 +135,7 @@ static void fill_status(sim_wheel_t *self, uint8_t battery_dV, iw_proto_status_t
     int32_t const target = (int32_t)sim_motion_draw_mA(&self->motion) * HEAT_PER_mA_mdegC;
     self->heat_mdegC += (target - self->heat_mdegC) / HEAT_RESPONSE_FRAMES;
     int32_t const temperature = self->ambient_degC + self->heat_mdegC / 1000;
-    uint32_t const driven = sim_motion_driven(&self->motion) ? CPU_DRIVEN_PERCENT : 0U;
+    uint32_t const driven = self->motion.driven ? CPU_DRIVEN_PERCENT : 0U;
     out_status->battery_dV = battery_dV;
     out_status->temperature_degC = (uint8_t)((temperature < 0) ? 0 : (temperature > 255) ? 255 : temperature);
     out_status->odometry_ticks = wrapped(self->motion.ticks);

@@ -39,7 +39,7 @@ typedef struct {
 typedef struct {
     sim_motion_config_t config;
     iw_time_us_t now_us;   ///< Advanced to here.
-    iw_time_us_t heard_us; ///< When the last setpoint was taken; IW_NEVER: none, or its time is over.
+    iw_time_us_t heard_us; ///< When the last setpoint was taken; IW_NEVER: never.
     int64_t position_nm;   ///< At the firmware's radius, since the start of the simulation.
     int64_t tick_rest;     ///< Way not yet counted as a tick.
     int32_t speed_um_s;    ///< At the firmware's radius, in the wheel's own sense of rotation.
@@ -48,6 +48,7 @@ typedef struct {
     uint32_t setpoints; ///< How many were taken.
     iw_proto_setpoint_t setpoint;
     int16_t runaway_mm_s; ///< Fault: this much faster than told, as long as it is told anything. 0: none.
+    bool driven;          ///< The last setpoint still counts.
     bool blocked;         ///< Fault: cannot turn.
     bool swapped;         ///< Fault: rpm and ticks have the wrong sign.
 } sim_motion_t;
@@ -65,9 +66,6 @@ bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_proto_set
 
 /// Forgets the setpoint: no power, or the firmware starts anew. The wheel coasts.
 void sim_motion_release(sim_motion_t *self, iw_time_us_t now_us);
-
-/// True while the last setpoint is younger than 1 s.
-bool sim_motion_driven(const sim_motion_t *self);
 
 /// Speed in thousandths of rpm as telemetry means it: of wheel or rotor, sign as reported.
 int64_t sim_motion_milli_rpm(const sim_motion_t *self);

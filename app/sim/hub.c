@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+#include "hub.h"
+
+#include <errno.h>
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+/// Messages taken from one client before the others have their turn.
+#define BATCH 32
+
+_Static_assert(IW_CAN_EXTENDED == CAN_EFF_FLAG && IW_CAN_REMOTE == CAN_RTR_FLAG && IW_CAN_ERROR == CAN_ERR_FLAG,
+               "the id word is that of <linux/can.h>");
+_Static_assert(sizeof(struct can_frame) == 16, "a message of the local bus has 16 bytes");
+
+iw_can_frame_t sim_hub_error_frame(sim_error_t error) {
+    iw_can_frame_t frame = {.id = CAN_ERR_FLAG | CAN_ERR_CRTL, .dlc = CAN_ERR_DLC};
+    if (error == SIM_ERROR_BUS_OFF) {
+        frame.id = CAN_ERR_FLAG | CAN_ERR_BUSOFF;
+    } else if (error == SIM_ERROR_RESTARTED) {
+        frame.id = CAN_ERR_FLAG | CAN_ERR_RESTARTED;
+    } else if (error == SIM_ERROR_PASSIVE) {
+        frame.data[1] = CAN_ERR_CRTL_TX_PASSIVE | CAN_ERR_CRTL_RX_PASSIVE;
+    } else {
+        frame.data[1] = CAN_ERR_CRTL_ACTIVE;
+    }
+    return frame;
+}
+
+static void drop(sim_client_t *client) {
+    sim_hub_t *const hub = client->hub;
+    sim_loop_remove(hub->loop, &client->watch);
+    (void)close(client->watch.fd);
+    client->watch.fd = -1;
+    hub->clients -= 1U;
+    sim_world_disconnect(hub->world, *hub->now_us, client->port);
+}
+
+static void pass_on(sim_client_t *client, const iw_can_frame_t *frame, bool echo) {
+    struct can_frame message = {.can_id = frame->id, .can_dlc = frame->dlc, .__res0 = echo ? 1U : 0U};
+    memcpy(message.data, frame->data, sizeof message.data);
+    if (send(client->watch.fd, &message, sizeof message, MSG_DONTWAIT | MSG_NOSIGNAL) != (ssize_t)sizeof message) {
+        client->lost += 1U;
+        client->hub->lost += 1U;
+    }
+}
+
+void sim_hub_deliver(sim_hub_t *self, const sim_delivery_t *delivery) {
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+        if (self->client[i].watch.fd >= 0) {
+            pass_on(&self->client[i], &delivery->frame, self->client[i].port == delivery->port);
+        }
+    }
+}
+
+static void tell_others(sim_hub_t *self, const sim_client_t *from, const iw_can_frame_t *frame) {
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+        if (self->client[i].watch.fd >= 0 && &self->client[i] != from) {
+            pass_on(&self->client[i], frame, false);
+        }
+    }
+}
+
+void sim_hub_tell(sim_hub_t *self, const iw_can_frame_t *error_frame) {
+    tell_others(self, NULL, error_frame);
+}
+
+static void take(sim_client_t *client, const struct can_frame *message) {
+    sim_hub_t *const hub = client->hub;
+    iw_can_frame_t frame = {.id = message->can_id, .dlc = message->can_dlc};
+    memcpy(frame.data, message->data, sizeof frame.data);
+    if ((frame.id & IW_CAN_ERROR) != 0U) {
+        tell_others(hub, client, &frame);
+        return;
+    }
+    if ((frame.id & IW_CAN_EXTENDED) == 0U) {
+        frame.id &= IW_CAN_ID_MASK | IW_CAN_REMOTE;
+    }
+    sim_world_submit(hub->world, *hub->now_us, client->port, &frame);
+}
+
+static void client_ready(sim_watch_t *watch) {
+    sim_client_t *const client = watch->owner;
+    for (unsigned i = 0U; i < BATCH && watch->fd >= 0; ++i) {
+        unsigned char bytes[sizeof(struct can_frame) + 1U];
+        struct can_frame message;
+        ssize_t const length = recv(watch->fd, bytes, sizeof bytes, MSG_DONTWAIT);
+        if (length < 0 && (errno == EAGAIN || errno == EINTR)) {
+            return;
+        }
+        if (length <= 0) {
+            drop(client);
+            return;
+        }
+        memcpy(&message, bytes, sizeof message);
+        if (length == (ssize_t)sizeof message && message.can_dlc <= CAN_MAX_DLEN) {
+            take(client, &message);
+        } else {
+            client->hub->malformed += 1U;
+        }
+    }
+}
+
+/// Gives the connection a free place; false if there is none.
+static bool admit(sim_hub_t *self, int fd) {
+    uint8_t const port = sim_world_connect(self->world);
+    if (port == SIM_BUS_NONE) {
+        return false;
+    }
+    sim_client_t *const client = &self->client[port - SIM_PORT_CLIENT];
+    *client = (sim_client_t){.watch = {client_ready, client, fd}, .hub = self, .port = port};
+    if (!sim_loop_add(self->loop, &client->watch)) {
+        client->watch.fd = -1;
+        sim_world_disconnect(self->world, *self->now_us, port);
+        return false;
+    }
+    self->clients += 1U;
+    if (self->world->bus_off) {
+        iw_can_frame_t const frame = sim_hub_error_frame(SIM_ERROR_BUS_OFF);
+        pass_on(client, &frame, false);
+    }
+    return true;
+}
+
+static void somebody_connects(sim_watch_t *watch) {
+    sim_hub_t *const self = watch->owner;
+    int const fd = sim_listener_accept(&self->listener);
+    if (fd >= 0 && (self->down || !admit(self, fd))) {
+        (void)close(fd);
+    }
+}
+
+bool sim_hub_open(sim_hub_t *self, const char *path, sim_reason_t *out_reason) {
+    self->watch = (sim_watch_t){somebody_connects, self, -1};
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+        self->client[i].watch.fd = -1;
+    }
+    if (!sim_listener_open(&self->listener, path, SOCK_SEQPACKET, out_reason)) {
+        return false;
+    }
+    self->watch.fd = self->listener.fd;
+    return sim_loop_add(self->loop, &self->watch);
+}
+
+static void drop_all(sim_hub_t *self) {
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+        if (self->client[i].watch.fd >= 0) {
+            drop(&self->client[i]);
+        }
+    }
+}
+
+void sim_hub_down(sim_hub_t *self, bool down) {
+    self->down = down;
+    if (down) {
+        drop_all(self);
+    }
+}
+
+void sim_hub_close(sim_hub_t *self) {
+    drop_all(self);
+    sim_listener_close(&self->listener);
+}

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "listener.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define BACKLOG 16
+
+static bool fill_address(struct sockaddr_un *address, const char *path) {
+    size_t const length = strlen(path);
+    *address = (struct sockaddr_un){.sun_family = AF_UNIX};
+    if (length == 0U || length >= sizeof address->sun_path) {
+        errno = ENAMETOOLONG;
+        return false;
+    }
+    memcpy(address->sun_path, path, length);
+    return true;
+}
+
+int sim_listener_connect(const char *path, int type) {
+    struct sockaddr_un address;
+    if (!fill_address(&address, path)) {
+        return -1;
+    }
+    int const fd = socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
+    if (fd >= 0 && connect(fd, (struct sockaddr *)&address, sizeof address) != 0) {
+        int const saved = errno;
+        (void)close(fd);
+        errno = saved;
+        return -1;
+    }
+    return fd;
+}
+
+static bool refuse(sim_reason_t *out_reason, const char *path, const char *why) {
+    (void)snprintf(out_reason->text, sizeof out_reason->text, "%.120s: %s", path, why);
+    return false;
+}
+
+/// Makes room at `path`: nothing there, or a dead socket that is removed.
+static bool make_room(const char *path, int type, sim_reason_t *out_reason) {
+    struct stat there;
+    if (lstat(path, &there) != 0) {
+        return errno == ENOENT || refuse(out_reason, path, strerror(errno));
+    }
+    if (!S_ISSOCK(there.st_mode)) {
+        return refuse(out_reason, path, "exists and is no socket; remove it or choose another path");
+    }
+    int const fd = sim_listener_connect(path, type);
+    if (fd >= 0 || errno != ECONNREFUSED) {
+        if (fd >= 0) {
+            (void)close(fd);
+        }
+        return refuse(out_reason, path, "somebody listens there; end the other iwheel-sim or choose another path");
+    }
+    return unlink(path) == 0 || refuse(out_reason, path, strerror(errno));
+}
+
+bool sim_listener_open(sim_listener_t *self, const char *path, int type, sim_reason_t *out_reason) {
+    struct sockaddr_un address;
+    struct stat made;
+    self->fd = -1;
+    if (!fill_address(&address, path)) {
+        return refuse(out_reason, path, "the path of a unix socket has 1 to 107 characters; choose a shorter one");
+    }
+    if (!make_room(path, type, out_reason)) {
+        return false;
+    }
+    int const fd = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    bool const bound = fd >= 0 && bind(fd, (struct sockaddr *)&address, sizeof address) == 0;
+    if (!bound || chmod(path, 0660) != 0 || lstat(path, &made) != 0 || listen(fd, BACKLOG) != 0) {
+        (void)refuse(out_reason, path, strerror(errno));
+        if (fd >= 0) {
+            (void)close(fd);
+        }
+        return false;
+    }
+    self->fd = fd;
+    self->device = made.st_dev;
+    self->inode = made.st_ino;
+    memcpy(self->path, address.sun_path, sizeof self->path);
+    return true;
+}
+
+int sim_listener_accept(const sim_listener_t *self) {
+    return accept4(self->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+}
+
+void sim_listener_close(sim_listener_t *self) {
+    struct stat there;
+    if (self->fd < 0) {
+        return;
+    }
+    (void)close(self->fd);
+    self->fd = -1;
+    if (lstat(self->path, &there) == 0 && there.st_dev == self->device && there.st_ino == self->inode) {
+        (void)unlink(self->path);
+    }
+}

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+#include "options.h"
+
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#define AGE_MAX_ms INT64_C(86400000)
+
+static const char usage[] =
+    "usage: iwheel-sim [OPTION]...             be a pair of simulated wheels and the bus they are on\n"
+    "       iwheel-sim [--control PATH] COMMAND   tell a running one, for example: iwheel-sim power off\n"
+    "\n"
+    "  --can unix:PATH     the bus: a local socket that the gateway connects to\n"
+    "  --estop PATH        the e-stop button: a local socket\n"
+    "  --control PATH      where commands come in, one a line; `iwheel-sim help` lists them\n"
+    "  --script FILE       commands at given times: `at 2.5 power off`, `wait 1`, `estop press`, # comment\n"
+    "  --log FILE          every frame on the bus as candump log, stamps of CLOCK_MONOTONIC; - is standard output.\n"
+    "                      Lines `# SECONDS COMMAND` tell what was done to the wheels\n"
+    "  --log-direction     ends each line of the log in T (a client sent it) or R\n"
+    "  --seed N            same seed, same noise (1)\n"
+    "  --uptime SECONDS    the wheels have been running so long already (0: they boot now)\n"
+    "  --quiet             print only errors\n"
+    "  --version, --help\n"
+    "\n"
+    "Exit codes: 0 ok, 1 the running simulator refused the command, 64 usage, 65 faulty script, 69 unavailable.\n";
+
+enum { OPTION_CAN = 256, OPTION_ESTOP, OPTION_CONTROL, OPTION_SCRIPT, OPTION_LOG, OPTION_DIRECTION, OPTION_SEED, OPTION_UPTIME };
+
+static const struct option long_options[] = {
+    {"can", required_argument, NULL, OPTION_CAN},         {"estop", required_argument, NULL, OPTION_ESTOP},
+    {"control", required_argument, NULL, OPTION_CONTROL}, {"script", required_argument, NULL, OPTION_SCRIPT},
+    {"log", required_argument, NULL, OPTION_LOG},         {"log-direction", no_argument, NULL, OPTION_DIRECTION},
+    {"seed", required_argument, NULL, OPTION_SEED},       {"uptime", required_argument, NULL, OPTION_UPTIME},
+    {"quiet", no_argument, NULL, 'q'},                    {"version", no_argument, NULL, 'V'},
+    {"help", no_argument, NULL, 'h'},                     {NULL, 0, NULL, 0},
+};
+
+static int complain(const char *what, const char *value) {
+    (void)fprintf(stderr, "iwheel-sim: %s%s\nTry: iwheel-sim --help\n", what, value);
+    return EX_USAGE;
+}
+
+/// A per-user folder that ends with the session, if there is one.
+static void default_path(char *out, const char *suffix) {
+    const char *const runtime = getenv("XDG_RUNTIME_DIR");
+    if (runtime != NULL && runtime[0] == '/') {
+        (void)snprintf(out, SIM_PATH_BYTES, "%s/iwheel-sim.%s", runtime, suffix);
+    } else {
+        (void)snprintf(out, SIM_PATH_BYTES, "/tmp/iwheel-sim-%u.%s", (unsigned)getuid(), suffix);
+    }
+}
+
+static int set_path(char *out, const char *value) {
+    const char *const path = (strncmp(value, "unix:", 5U) == 0) ? value + 5 : value;
+    if (path[0] == '\0' || strlen(path) >= SIM_PATH_BYTES) {
+        return complain("a path is empty or too long: ", value);
+    }
+    (void)snprintf(out, SIM_PATH_BYTES, "%s", path);
+    return -1;
+}
+
+static int set_can(sim_options_t *options, const char *value) {
+    if (strncmp(value, "unix:", 5U) != 0) {
+        (void)fprintf(stderr,
+                      "iwheel-sim: --can %s: this version simulates wheels on the local bus only, not on SocketCAN.\n"
+                      "Use --can unix:PATH here and the same for iwheel-gateway.\n",
+                      value);
+        return EX_UNAVAILABLE;
+    }
+    return set_path(options->can_path, value);
+}
+
+static int set_number(sim_options_t *options, int option, const char *value) {
+    int64_t number = 0;
+    if (option == OPTION_SEED) {
+        if (!sim_words_integer(value, (sim_range_t){0, INT64_MAX}, &number)) {
+            return complain("--seed must be a whole number of at most 12 digits, not ", value);
+        }
+        options->seed = (uint64_t)number;
+        return -1;
+    }
+    if (!sim_words_milli(value, (sim_range_t){0, AGE_MAX_ms}, &number)) {
+        return complain("--uptime must be seconds from 0 to 86400, not ", value);
+    }
+    options->age_us = (uint64_t)number * IW_US_PER_MS;
+    return -1;
+}
+
+static int set_option(sim_options_t *options, int option, const char *value) {
+    switch (option) {
+    case OPTION_CAN:
+        return set_can(options, value);
+    case OPTION_ESTOP:
+        return set_path(options->estop_path, value);
+    case OPTION_CONTROL:
+        return set_path(options->control_path, value);
+    case OPTION_SCRIPT:
+        options->script_path = value;
+        return -1;
+    case OPTION_LOG:
+        options->log_path = value;
+        return -1;
+    case OPTION_DIRECTION:
+        options->log_direction = true;
+        return -1;
+    case 'q':
+        options->quiet = true;
+        return -1;
+    case 'V':
+        (void)puts("iwheel-sim " IWHEEL_VERSION);
+        return EX_OK;
+    case 'h':
+        (void)fputs(usage, stdout);
+        return EX_OK;
+    case '?':
+        return complain("the command line is not right", "");
+    default:
+        return set_number(options, option, value);
+    }
+}
+
+static int set_command(sim_options_t *options, int argc, char **argv) {
+    size_t used = 0U;
+    for (int i = optind; i < argc; ++i) {
+        int const length =
+            snprintf(&options->command[used], sizeof options->command - used, "%s%s", (used > 0U) ? " " : "", argv[i]);
+        used += (size_t)length;
+        if (used >= sizeof options->command) {
+            return complain("a command has at most 255 characters", "");
+        }
+    }
+    return -1;
+}
+
+int sim_options_read(sim_options_t *out_options, int argc, char **argv) {
+    int result = -1;
+    int option = 0;
+    *out_options = (sim_options_t){.seed = 1U};
+    default_path(out_options->can_path, "bus");
+    default_path(out_options->estop_path, "estop");
+    default_path(out_options->control_path, "control");
+    while (result < 0 && (option = getopt_long(argc, argv, "+qVh", long_options, NULL)) != -1) {
+        result = set_option(out_options, option, optarg);
+    }
+    return (result < 0) ? set_command(out_options, argc, argv) : result;
+}

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: MIT
+// Commands that concern the wheels.
+#include "command.h"
+
+#include <string.h>
+
+#define RUNAWAY_DEFAULT_MM_S 1000
+
+typedef const char *result_t;
+
+/// The wheel of this side, if the mask has it.
+static sim_wheel_t *wheel_of(const sim_call_t *call, unsigned mask, unsigned side) {
+    return ((mask >> side) & 1U) != 0U ? &call->world->pair.wheel[side] : NULL;
+}
+
+#define FOR_WHEELS(call, mask, wheel)                                                                                  \
+    for (unsigned side_ = 0U; side_ < IW_SIDES; ++side_)                                                               \
+        for (sim_wheel_t *wheel = wheel_of((call), (mask), side_); wheel != NULL; wheel = NULL)
+
+static bool sides(const sim_call_t *call, unsigned *out_mask) {
+    return sim_words_sides(call->words->word[1], out_mask);
+}
+
+static bool one_of(const sim_call_t *call, unsigned index, sim_choice_t choice, bool *out_one) {
+    return sim_words_choice(call->words->word[index], choice, out_one);
+}
+
+static const sim_choice_t on_off = {"on", "off"};
+
+static result_t set_power(const sim_call_t *call) {
+    bool on = false;
+    if (!one_of(call, 1U, on_off, &on)) {
+        return SIM_USAGE;
+    }
+    sim_world_power(call->world, call->now_us, on);
+    return NULL;
+}
+
+static result_t reboot(const sim_call_t *call) {
+    unsigned mask = 0U;
+    if (!sides(call, &mask)) {
+        return SIM_USAGE;
+    }
+    if (!call->world->pair.power) {
+        return "the wheels have no power; first: power on";
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        sim_world_reboot(call->world, call->now_us, wheel->side);
+    }
+    return NULL;
+}
+
+static result_t set_muted(const sim_call_t *call) {
+    unsigned mask = 0U;
+    if (!sides(call, &mask)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->muted = call->words->word[0][0] == 'm';
+    }
+    return NULL;
+}
+
+static result_t set_blocked(const sim_call_t *call) {
+    unsigned mask = 0U;
+    if (!sides(call, &mask)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        sim_motion_advance(&wheel->motion, call->now_us);
+        wheel->motion.blocked = call->words->word[0][0] == 'b';
+    }
+    return NULL;
+}
+
+static result_t set_load(const sim_call_t *call) {
+    unsigned mask = 0U;
+    int64_t load_mN = 0;
+    if (!sides(call, &mask) || !sim_words_milli(call->words->word[2], (sim_range_t){-4000000, 4000000}, &load_mN)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->force.load_mN = (int32_t)load_mN;
+    }
+    return NULL;
+}
+
+static result_t set_unit(const sim_call_t *call) {
+    unsigned mask = 0U;
+    bool centi = false;
+    if (!sides(call, &mask) || !one_of(call, 2U, (sim_choice_t){"cN", "dN"}, &centi)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->force.unit = centi ? IW_FORCE_CN : IW_FORCE_DN;
+    }
+    return NULL;
+}
+
+static result_t set_sign(const sim_call_t *call) {
+    unsigned mask = 0U;
+    bool swapped = false;
+    if (!sides(call, &mask) || !one_of(call, 2U, (sim_choice_t){"swapped", "normal"}, &swapped)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        sim_motion_advance(&wheel->motion, call->now_us);
+        wheel->motion.swapped = swapped;
+    }
+    return NULL;
+}
+
+static result_t set_runaway(const sim_call_t *call) {
+    unsigned mask = 0U;
+    bool on = false;
+    int64_t more = RUNAWAY_DEFAULT_MM_S;
+    if (!sides(call, &mask) || !one_of(call, 2U, on_off, &on)) {
+        return SIM_USAGE;
+    }
+    if (call->words->count == 4U && !(on && sim_words_integer(call->words->word[3], (sim_range_t){1, 3000}, &more))) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        sim_motion_advance(&wheel->motion, call->now_us);
+        wheel->motion.runaway_mm_s = on ? (int16_t)more : 0;
+    }
+    return NULL;
+}
+
+static result_t set_removed(const sim_call_t *call) {
+    unsigned mask = 0U;
+    bool on = false;
+    if (!sides(call, &mask) || !one_of(call, 2U, on_off, &on)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->force.zero_removed = on;
+    }
+    return NULL;
+}
+
+static result_t set_raw(const sim_call_t *call) {
+    unsigned mask = 0U;
+    int64_t raw = SIM_FORCE_AUTO;
+    bool const automatic = strcmp(call->words->word[2], "auto") == 0;
+    if (!sides(call, &mask) ||
+        !(automatic || sim_words_integer(call->words->word[2], (sim_range_t){INT16_MIN, INT16_MAX}, &raw))) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->force.forced_raw = (int32_t)raw;
+    }
+    return NULL;
+}
+
+static result_t set_zero(const sim_call_t *call) {
+    unsigned mask = 0U;
+    int64_t zero_mN = 0;
+    if (!sides(call, &mask) || !sim_words_milli(call->words->word[2], (sim_range_t){-4000000, 4000000}, &zero_mN)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->force.sensor_zero_mN = (int32_t)zero_mN;
+    }
+    return NULL;
+}
+
+static result_t set_ticks(const sim_call_t *call) {
+    unsigned mask = 0U;
+    int64_t ticks = 0;
+    if (!sides(call, &mask) || !sim_words_integer(call->words->word[2], (sim_range_t){INT32_MIN, INT32_MAX}, &ticks)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->motion.ticks = (uint32_t)(uint64_t)ticks;
+    }
+    return NULL;
+}
+
+static result_t set_radius(const sim_call_t *call) {
+    unsigned mask = 0U;
+    int64_t radius_mm = 0;
+    if (!sides(call, &mask) || !sim_words_integer(call->words->word[2], (sim_range_t){20, 500}, &radius_mm)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->motion.config.radius_mm = (uint16_t)radius_mm;
+    }
+    return NULL;
+}
+
+static result_t set_gear(const sim_call_t *call) {
+    unsigned mask = 0U;
+    int64_t turns = 0;
+    int64_t per = 1;
+    sim_range_t const range = {1, 1000};
+    if (!sides(call, &mask) || !sim_words_integer(call->words->word[2], range, &turns)) {
+        return SIM_USAGE;
+    }
+    if (call->words->count == 4U && !sim_words_integer(call->words->word[3], range, &per)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        sim_motion_advance(&wheel->motion, call->now_us);
+        wheel->motion.tick_rest = 0;
+        wheel->motion.config.gear_turns = (uint16_t)turns;
+        wheel->motion.config.gear_per = (uint16_t)per;
+    }
+    return NULL;
+}
+
+static result_t set_rpm(const sim_call_t *call) {
+    unsigned mask = 0U;
+    bool rotor = false;
+    if (!sides(call, &mask) || !one_of(call, 2U, (sim_choice_t){"rotor", "wheel"}, &rotor)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        wheel->motion.config.rpm_of_rotor = rotor;
+    }
+    return NULL;
+}
+
+static result_t set_mirror(const sim_call_t *call) {
+    unsigned mask = 0U;
+    bool on = false;
+    if (!sides(call, &mask) || !one_of(call, 2U, on_off, &on)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, mask, wheel) {
+        call->world->pair.pose.mirrored[wheel->side] = on;
+    }
+    return NULL;
+}
+
+static result_t set_role(const sim_call_t *call) {
+    bool setpoint = false;
+    if (!one_of(call, 1U, (sim_choice_t){"setpoint", "limit"}, &setpoint)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, 3U, wheel) {
+        sim_motion_advance(&wheel->motion, call->now_us);
+        wheel->motion.config.current_is_setpoint = setpoint;
+    }
+    return NULL;
+}
+
+static result_t set_type(const sim_call_t *call) {
+    int64_t type = SIM_TYPE_ANY;
+    bool const any = strcmp(call->words->word[1], "any") == 0;
+    if (!any && !sim_words_integer(call->words->word[1], (sim_range_t){0, 255}, &type)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, 3U, wheel) {
+        wheel->motion.config.accepted_type = (int16_t)type;
+    }
+    if (!any) {
+        call->world->foreign.setpoint.type = (uint8_t)type;
+    }
+    return NULL;
+}
+
+static result_t set_loss(const sim_call_t *call) {
+    int64_t milli_percent = 0;
+    if (!sim_words_milli(call->words->word[1], (sim_range_t){0, 100000}, &milli_percent)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, 3U, wheel) {
+        wheel->loss_permille = (uint16_t)(milli_percent / 100);
+    }
+    return NULL;
+}
+
+static result_t set_slow(const sim_call_t *call) {
+    int64_t permille = 0;
+    if (!sim_words_milli(call->words->word[1], (sim_range_t){100, 1000000}, &permille)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, 3U, wheel) {
+        sim_wheel_slow(wheel, (uint32_t)permille);
+    }
+    return NULL;
+}
+
+static result_t set_battery(const sim_call_t *call) {
+    int64_t battery_dV = 0;
+    if (!sim_words_integer(call->words->word[1], (sim_range_t){0, 255}, &battery_dV)) {
+        return SIM_USAGE;
+    }
+    call->world->pair.battery_dV = (uint8_t)battery_dV;
+    return NULL;
+}
+
+static result_t set_ambient(const sim_call_t *call) {
+    int64_t ambient = 0;
+    if (!sim_words_integer(call->words->word[1], (sim_range_t){-40, 255}, &ambient)) {
+        return SIM_USAGE;
+    }
+    FOR_WHEELS(call, 3U, wheel) {
+        wheel->ambient_degC = (int32_t)ambient;
+    }
+    return NULL;
+}
+
+#define SIDE "left|right|both"
+
+const sim_command_t sim_wheel_commands[] = {
+    {"power", "on|off", "both wheels; off: silent, nobody acknowledges, they coast", set_power, 2U, 2U, SIM_CHANGED},
+    {"reboot", SIDE, "firmware starts anew: silent 0.4 s, ticks 0, offsets again", reboot, 2U, 2U, SIM_CHANGED},
+    {"mute", SIDE, "no telemetry; setpoints are still followed", set_muted, 2U, 2U, SIM_CHANGED},
+    {"unmute", SIDE, "telemetry again", set_muted, 2U, 2U, SIM_CHANGED},
+    {"block", SIDE, "the wheel cannot turn", set_blocked, 2U, 2U, SIM_CHANGED},
+    {"unblock", SIDE, "it can again", set_blocked, 2U, 2U, SIM_CHANGED},
+    {"runaway", SIDE " on|off [MM_S]", "faster than told by MM_S (1000)", set_runaway, 3U, 4U, SIM_CHANGED},
+    {"sign", SIDE " normal|swapped", "sign of rpm and ticks", set_sign, 3U, 3U, SIM_CHANGED},
+    {"load", SIDE " NEWTON", "force on the shaft, sways 5 %; -4000..4000", set_load, 3U, 3U, SIM_CHANGED},
+    {"unit", SIDE " cN|dN", "unit of the force frame; document: left cN, right dN", set_unit, 3U, 3U, SIM_CHANGED},
+    {"removed", SIDE " on|off", "the force frame has the sensor's zero taken out", set_removed, 3U, 3U, SIM_CHANGED},
+    {"zero", SIDE " NEWTON", "the sensor's zero; learnt at the next reboot", set_zero, 3U, 3U, SIM_CHANGED},
+    {"raw", SIDE " VALUE|auto", "the force frame carries this; -32768..32767", set_raw, 3U, 3U, SIM_CHANGED},
+    {"ticks", SIDE " N", "odometry jumps to N", set_ticks, 3U, 3U, SIM_CHANGED},
+    {"gear", SIDE " TURNS [PER]", "rotor turns in PER (1) wheel turns", set_gear, 3U, 4U, SIM_CHANGED},
+    {"rpm", SIDE " wheel|rotor", "whose rpm telemetry tells", set_rpm, 3U, 3U, SIM_CHANGED},
+    {"radius", SIDE " MM", "the real one; the firmware believes 192", set_radius, 3U, 3U, SIM_CHANGED},
+    {"mirror", SIDE " on|off", "mounted mirrored; matters to the pose only", set_mirror, 3U, 3U, SIM_CHANGED},
+    {"role", "limit|setpoint", "what the current beside the speed means", set_role, 2U, 2U, SIM_CHANGED},
+    {"type", "any|N", "setpoints of other types are ignored", set_type, 2U, 2U, SIM_CHANGED},
+    {"battery", "DECIVOLT", "supply without load, 0..255 (248)", set_battery, 2U, 2U, SIM_CHANGED},
+    {"ambient", "DEGC", "temperature around, -40..255 (28)", set_ambient, 2U, 2U, SIM_CHANGED},
+    {"loss", "PERCENT", "of telemetry and setpoints is lost", set_loss, 2U, 2U, SIM_CHANGED},
+    {"slow", "FACTOR", "all telemetry periods times 0.1..1000", set_slow, 2U, 2U, SIM_CHANGED},
+};
+const unsigned sim_wheel_command_count = sizeof sim_wheel_commands / sizeof sim_wheel_commands[0];

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: MIT
+#include "simulator.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/signalfd.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#define MESSAGE_BYTES 1024U
+
+/// Prints a line, unless nobody takes it: a full pipe must not hold up the wheels.
+__attribute__((format(printf, 2, 3))) static void say(const sim_simulator_t *self, const char *format, ...) {
+    char text[MESSAGE_BYTES];
+    struct pollfd out = {.fd = STDOUT_FILENO, .events = POLLOUT};
+    if (self->quiet || poll(&out, 1U, 0) != 1 || (out.revents & POLLOUT) == 0) {
+        return;
+    }
+    iw_time_us_t const elapsed_ms = (self->now_us - self->start_us) / IW_US_PER_MS;
+    int const head = snprintf(text, sizeof text, "[%5" PRIu64 ".%03" PRIu64 " s] ", elapsed_ms / 1000U, elapsed_ms % 1000U);
+    va_list arguments;
+    va_start(arguments, format);
+    int const body = vsnprintf(&text[head], sizeof text - (size_t)head - 1U, format, arguments);
+    va_end(arguments);
+    size_t length = (size_t)head + (size_t)body;
+    length = (length < sizeof text - 1U) ? length : sizeof text - 2U;
+    text[length++] = '\n';
+    (void)!write(STDOUT_FILENO, text, length);
+}
+
+static iw_time_us_t real_us(const sim_simulator_t *self, iw_time_us_t simulated_us) {
+    return simulated_us + self->skipped_us;
+}
+
+static void mark(void *context, const char *text) {
+    sim_simulator_t *const self = context;
+    sim_bus_log_mark(&self->log, real_us(self, self->now_us), text);
+}
+
+static void quit(void *context) {
+    sim_simulator_t *const self = context;
+    self->ended = true;
+}
+
+static const char *execute(void *context, const char *line) {
+    sim_simulator_t *const self = context;
+    if (sim_panel_execute(&self->panel, self->now_us, line) == SIM_CHANGED) {
+        mark(self, line);
+        say(self, "%s", line);
+    }
+    return self->panel.answer;
+}
+
+static const char *check_command(void *context, const char *command) {
+    sim_panel_t *const scratch = context;
+    if (sim_panel_execute(scratch, scratch->world->bus.free_us, command) != SIM_REFUSED) {
+        return NULL;
+    }
+    scratch->answer[strcspn(scratch->answer, "\n")] = '\0';
+    return scratch->answer;
+}
+
+static int load_script(sim_simulator_t *self, const char *path) {
+    sim_script_fault_t fault;
+    self->panel.world = &self->world;
+    if (sim_script_load(&self->script, path, check_command, &self->panel, &fault)) {
+        return -1;
+    }
+    if (fault.line == 0U) {
+        (void)fprintf(stderr, "iwheel-sim: %s: %s\n", path, fault.reason);
+        return EX_NOINPUT;
+    }
+    (void)fprintf(stderr, "iwheel-sim: %s:%u: %s\n", path, fault.line, fault.reason);
+    return EX_DATAERR;
+}
+
+/// Takes all that happened up to now from the world and passes it on.
+static void catch_up(sim_simulator_t *self) {
+    sim_delivery_t delivery;
+    while (sim_world_step(&self->world, self->now_us, &delivery)) {
+        bool const from_client = delivery.port >= SIM_PORT_CLIENT;
+        sim_bus_log_frame(&self->log, real_us(self, delivery.end_us), &delivery.frame, from_client);
+        if (!self->world.bus_off) {
+            sim_hub_deliver(&self->hub, &delivery);
+        }
+    }
+}
+
+/// Called at every wake-up before anything that came in is looked at.
+static void awake(void *context) {
+    sim_simulator_t *const self = context;
+    iw_time_us_t now_us = sim_loop_clock_us() - self->skipped_us;
+    if (self->wake_us != IW_NEVER && now_us > self->wake_us + SIM_PAUSE_US) {
+        iw_time_us_t const pause_us = now_us - self->wake_us;
+        self->skipped_us += pause_us;
+        now_us -= pause_us;
+        say(self, "this process stood still for %" PRIu64 " ms, and the wheels with it", pause_us / IW_US_PER_MS);
+    }
+    self->now_us = now_us;
+    catch_up(self);
+    if (sim_button_step(&self->button, now_us)) {
+        mark(self, "estop release");
+        say(self, "estop release (end of the pulse)");
+    }
+    for (;;) {
+        const char *const command = sim_script_take(&self->script, now_us - self->start_us);
+        if (command == NULL) {
+            break;
+        }
+        const char *const answer = execute(self, command);
+        if (answer[0] == 'e') {
+            say(self, "script: %s: %.*s", command, (int)strcspn(answer, "\n"), answer);
+        }
+    }
+}
+
+static iw_time_us_t earlier(iw_time_us_t one_us, iw_time_us_t other_us) {
+    return (one_us < other_us) ? one_us : other_us;
+}
+
+static iw_time_us_t next_us(const sim_simulator_t *self) {
+    iw_time_us_t const script_us = sim_script_next_us(&self->script);
+    iw_time_us_t const step_us = (script_us == IW_NEVER) ? IW_NEVER : self->start_us + script_us;
+    return earlier(earlier(step_us, sim_world_next_us(&self->world)), self->button.release_us);
+}
+
+void sim_simulator_run(sim_simulator_t *self) {
+    while (!self->ended) {
+        iw_time_us_t const log_us = sim_bus_log_step(&self->log, real_us(self, self->now_us));
+        self->wake_us = next_us(self);
+        iw_time_us_t const world_us = (self->wake_us == IW_NEVER) ? IW_NEVER : real_us(self, self->wake_us);
+        sim_loop_wait(&self->loop, earlier(world_us, log_us), awake, self);
+    }
+    say(self, "ended");
+}
+
+static void signalled(sim_watch_t *watch) {
+    struct signalfd_siginfo signal_info;
+    if (read(watch->fd, &signal_info, sizeof signal_info) == (ssize_t)sizeof signal_info) {
+        quit(watch->owner);
+    }
+}
+
+static bool open_signals(sim_simulator_t *self) {
+    sigset_t set;
+    (void)sigemptyset(&set);
+    (void)sigaddset(&set, SIGTERM);
+    (void)sigaddset(&set, SIGINT);
+    (void)sigprocmask(SIG_BLOCK, &set, NULL);
+    (void)signal(SIGPIPE, SIG_IGN);
+    self->signals = (sim_watch_t){signalled, self, signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC)};
+    return self->signals.fd >= 0 && sim_loop_add(&self->loop, &self->signals);
+}
+
+static int open_sockets(sim_simulator_t *self, const sim_options_t *options) {
+    sim_reason_t reason = {""};
+    self->hub = (sim_hub_t){.loop = &self->loop, .world = &self->world, .now_us = &self->now_us};
+    self->button = (sim_button_t){.loop = &self->loop};
+    self->control = (sim_control_t){.loop = &self->loop, .execute = execute, .context = self};
+    self->hub.listener.fd = -1;
+    self->button.listener.fd = -1;
+    self->control.listener.fd = -1;
+    if (sim_hub_open(&self->hub, options->can_path, &reason) &&
+        sim_button_open(&self->button, options->estop_path, &reason) &&
+        sim_control_open(&self->control, options->control_path, &reason)) {
+        return -1;
+    }
+    (void)fprintf(stderr, "iwheel-sim: %s\n", reason.text);
+    sim_listener_close(&self->hub.listener);
+    sim_listener_close(&self->button.listener);
+    sim_listener_close(&self->control.listener);
+    return EX_UNAVAILABLE;
+}
+
+static int system_refuses(const char *what) {
+    (void)fprintf(stderr, "iwheel-sim: %s: %s\n", what, strerror(errno));
+    return EX_UNAVAILABLE;
+}
+
+static void greet(sim_simulator_t *self, const sim_options_t *options) {
+    say(self, "two simulated wheels, seed %" PRIu64 "; end with Ctrl-C", options->seed);
+    say(self, "start the gateway with: --can unix:%s --estop unix:%s", options->can_path, options->estop_path);
+    say(self, "commands: iwheel-sim --control %s help", options->control_path);
+}
+
+int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {
+    sim_pair_config_t pair;
+    sim_pair_default(&pair);
+    pair.age_us = options->age_us;
+    self->quiet = options->quiet;
+    self->now_us = sim_loop_clock_us();
+    self->start_us = self->now_us;
+    self->wake_us = IW_NEVER;
+    sim_world_init(&self->world, &pair, self->now_us, options->seed);
+    if (options->script_path != NULL) {
+        int const result = load_script(self, options->script_path);
+        if (result >= 0) {
+            return result;
+        }
+        sim_world_init(&self->world, &pair, self->now_us, options->seed);
+    }
+    if (!sim_bus_log_open(&self->log, options->log_path, options->log_direction)) {
+        return system_refuses(options->log_path);
+    }
+    if (!sim_loop_open(&self->loop) || !open_signals(self)) {
+        return system_refuses("event loop");
+    }
+    int const result = open_sockets(self, options);
+    if (result < 0) {
+        self->panel.world = &self->world;
+        self->panel.hooks = (sim_hooks_t){&self->hub, &self->button, mark, quit, self};
+        greet(self, options);
+    }
+    return result;
+}
+
+void sim_simulator_close(sim_simulator_t *self) {
+    sim_control_close(&self->control);
+    sim_button_close(&self->button);
+    sim_hub_close(&self->hub);
+    sim_bus_log_flush(&self->log);
+}

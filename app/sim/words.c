@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+#include "words.h"
+
+#include "iwheel/types.h"
+
+#include <string.h>
+
+bool sim_words_split(sim_words_t *self, const char *line) {
+    size_t const length = strlen(line);
+    if (length >= sizeof self->text) {
+        return false;
+    }
+    memcpy(self->text, line, length + 1U);
+    self->count = 0U;
+    bool inside = false;
+    for (char *at = self->text; *at != '\0'; ++at) {
+        if (*at == ' ' || *at == '\t' || *at == '\r') {
+            *at = '\0';
+            inside = false;
+        } else if (*at < ' ' || *at > '~') {
+            return false;
+        } else if (!inside) {
+            if (self->count == SIM_WORDS_MAX) {
+                return false;
+            }
+            self->word[self->count++] = at;
+            inside = true;
+        }
+    }
+    return true;
+}
+
+bool sim_words_choice(const char *word, sim_choice_t choice, bool *out_one) {
+    bool const one = strcmp(word, choice.one) == 0;
+    if (!one && strcmp(word, choice.other) != 0) {
+        return false;
+    }
+    *out_one = one;
+    return true;
+}
+
+bool sim_words_sides(const char *word, unsigned *out_mask) {
+    bool left = false;
+    if (strcmp(word, "both") == 0) {
+        *out_mask = 3U;
+        return true;
+    }
+    if (!sim_words_choice(word, (sim_choice_t){"left", "right"}, &left)) {
+        return false;
+    }
+    *out_mask = left ? 1U << IW_LEFT : 1U << IW_RIGHT;
+    return true;
+}
+
+static bool is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+
+/// Digits with a sign and a point, scaled by 10^`places`. At most 12 digits, so that nothing overflows.
+static bool read_scaled(const char *word, unsigned places, int64_t *out_value) {
+    bool const negative = word[0] == '-';
+    const char *at = negative ? word + 1 : word;
+    int64_t value = 0;
+    unsigned digits = 0U;
+    unsigned behind = 0U;
+    bool point = false;
+    for (; *at != '\0'; ++at) {
+        if (*at == '.' && !point && digits > 0U && places > 0U) {
+            point = true;
+            continue;
+        }
+        if (!is_digit(*at) || digits == 12U || behind == places + (point ? 0U : 1U)) {
+            return false;
+        }
+        value = value * 10 + (*at - '0');
+        digits += 1U;
+        behind += point ? 1U : 0U;
+    }
+    if (digits == 0U || (point && behind == 0U)) {
+        return false;
+    }
+    for (; behind < places; ++behind) {
+        value *= 10;
+    }
+    *out_value = negative ? -value : value;
+    return true;
+}
+
+static bool within(sim_range_t range, int64_t value, int64_t *out_value) {
+    if (value < range.min || value > range.max) {
+        return false;
+    }
+    *out_value = value;
+    return true;
+}
+
+bool sim_words_integer(const char *word, sim_range_t range, int64_t *out_value) {
+    int64_t value = 0;
+    return read_scaled(word, 0U, &value) && within(range, value, out_value);
+}
+
+bool sim_words_milli(const char *word, sim_range_t range, int64_t *out_milli) {
+    int64_t value = 0;
+    return read_scaled(word, 3U, &value) && within(range, value, out_milli);
+}
+
+static int hex_value(char c) {
+    if (is_digit(c)) {
+        return c - '0';
+    }
+    if (c >= 'A' && c <= 'F') {
+        return c - 'A' + 10;
+    }
+    return (c >= 'a' && c <= 'f') ? c - 'a' + 10 : -1;
+}
+
+/// Reads exactly `count` hexadecimal digits.
+static bool read_hex(const char *at, size_t count, uint32_t *out_value) {
+    uint32_t value = 0U;
+    for (size_t i = 0U; i < count; ++i) {
+        int const digit = hex_value(at[i]);
+        if (digit < 0) {
+            return false;
+        }
+        value = (value << 4) | (uint32_t)digit;
+    }
+    *out_value = value;
+    return true;
+}
+
+static bool read_data(const char *at, iw_can_frame_t *frame) {
+    size_t const length = strlen(at);
+    if (strcmp(at, "R") == 0 || strcmp(at, "r") == 0) {
+        frame->id |= IW_CAN_REMOTE;
+        return true;
+    }
+    if (length % 2U != 0U || length / 2U > IW_CAN_DATA_MAX) {
+        return false;
+    }
+    for (size_t i = 0U; i < length / 2U; ++i) {
+        uint32_t byte = 0U;
+        if (!read_hex(&at[2U * i], 2U, &byte)) {
+            return false;
+        }
+        frame->data[i] = (uint8_t)byte;
+    }
+    frame->dlc = (uint8_t)(length / 2U);
+    return true;
+}
+
+bool sim_words_frame(const char *word, iw_can_frame_t *out_frame) {
+    const char *const hash = strchr(word, '#');
+    size_t const digits = (hash == NULL) ? 0U : (size_t)(hash - word);
+    iw_can_frame_t frame = {0};
+    bool const extended = digits == 8U;
+    if ((digits != 3U && !extended) || !read_hex(word, digits, &frame.id)) {
+        return false;
+    }
+    if (frame.id > (extended ? 0x1FFFFFFFU : IW_CAN_ID_MASK)) {
+        return false;
+    }
+    frame.id |= extended ? IW_CAN_EXTENDED : 0U;
+    if (!read_data(hash + 1, &frame)) {
+        return false;
+    }
+    *out_frame = frame;
+    return true;
+}
