@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+/// iwheelctl: what its verbs share.
+///
+/// Every verb is one function that takes the words after its name and returns the exit code of the program. A verb tells its own
+/// failure, cause and cure, on stderr; results go to stdout. Reading verbs never send a request that can move a wheel.
+#ifndef CTL_H
+#define CTL_H
+
+#include "client.h"
+
+/// Exit codes of all programs (sysexits).
+enum {
+    CTL_OK = 0,
+    CTL_NO = 1, ///< The gateway answered "no", or a drive did not run to its end.
+    CTL_USAGE = 64,
+    CTL_UNAVAILABLE = 69,
+    CTL_INTERNAL = 70,
+    CTL_TIMEOUT = 75,
+    CTL_PERMISSION = 77,
+};
+
+/// What the options say, for every verb.
+typedef struct {
+    const char *socket; ///< Of --socket; null: look for it.
+    bool json;          ///< Print the gateway's own reply lines instead of text for humans.
+    client_t client;
+} ctl_t;
+
+typedef int (*ctl_verb_t)(ctl_t *self, int count, char **words);
+
+int verb_status(ctl_t *self, int count, char **words);
+int verb_watch(ctl_t *self, int count, char **words);
+int verb_drive(ctl_t *self, int count, char **words);
+int verb_stop(ctl_t *self, int count, char **words);
+int verb_estop(ctl_t *self, int count, char **words);
+int verb_reset(ctl_t *self, int count, char **words);
+int verb_tare(ctl_t *self, int count, char **words);
+int verb_why(ctl_t *self, int count, char **words);
+
+/// Prints "iwheelctl: ..." on stderr and returns `code`.
+__attribute__((format(printf, 2, 3))) int ctl_fail(int code, const char *format, ...);
+
+/// Finds the socket and connects. An exit code; 0 is success.
+int ctl_connect(ctl_t *self);
+
+/// Connects if necessary, sends `request` (whose reference it takes) and waits for its reply. 0 with `*out_reply` (a new reference) if
+/// the gateway agreed; CTL_NO after telling its refusal; other codes after telling what is wrong. With --json the reply's line is
+/// printed, whatever it says.
+int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply);
+
+/// Tells that the gateway said no: its error name and message. Returns CTL_NO.
+int ctl_refused(const json_t *reply);
+
+/// What a result of `client_receive` that brought no line means to the user. Returns the exit code.
+int ctl_lost(const ctl_t *self, client_result_t result);
+
+/// True if there are no more words than `most`; else tells so.
+bool ctl_words_at_most(const char *verb, int count, int most, char **words);
+
+#endif

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#include "help.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    ctl_t *ctl;
+    const char *verb;
+    char **words; ///< What is not for us, after the verb.
+    int count;
+    bool help;
+    bool version;
+} arguments_t;
+
+/// Takes one of the options that stand anywhere. How many arguments it used; 0: it is none of them; -1 after telling a mistake.
+static int take_option(arguments_t *self, int left, char **argument) {
+    static const char socket[] = "--socket";
+    const size_t length = sizeof(socket) - 1U;
+    if (strcmp(argument[0], "--json") == 0) {
+        self->ctl->json = true;
+    } else if (strcmp(argument[0], "--help") == 0 || strcmp(argument[0], "-h") == 0) {
+        self->help = true;
+    } else if (strcmp(argument[0], "--version") == 0) {
+        self->version = true;
+    } else if (strncmp(argument[0], socket, length) == 0 && argument[0][length] == '=') {
+        self->ctl->socket = argument[0] + length + 1U;
+    } else if (strcmp(argument[0], socket) == 0 && left > 1) {
+        self->ctl->socket = argument[1];
+        return 2;
+    } else if (strcmp(argument[0], socket) == 0) {
+        (void)ctl_fail(CTL_USAGE, "--socket wants a path, such as --socket /run/iwheel/gateway.sock");
+        return -1;
+    } else {
+        return 0;
+    }
+    return 1;
+}
+
+/// False after telling a mistake.
+static bool take_arguments(arguments_t *self, int count, char **arguments) {
+    for (int i = 1; i < count;) {
+        const int used = take_option(self, count - i, &arguments[i]);
+        if (used < 0) {
+            return false;
+        }
+        if (used == 0 && self->verb == NULL && arguments[i][0] == '-') {
+            (void)ctl_fail(CTL_USAGE, "unknown option %s; see: iwheelctl --help", arguments[i]);
+            return false;
+        }
+        if (used == 0 && self->verb == NULL) {
+            self->verb = arguments[i];
+        } else if (used == 0) {
+            self->words[self->count] = arguments[i];
+            self->count++;
+        }
+        i += used == 0 ? 1 : used;
+    }
+    if (self->ctl->socket != NULL && self->ctl->socket[0] == '\0') {
+        (void)ctl_fail(CTL_USAGE, "--socket wants a path, such as --socket /run/iwheel/gateway.sock");
+        return false;
+    }
+    return true;
+}
+
+static int dispatch(const arguments_t *arguments) {
+    char names[256];
+    const verb_t *verb = arguments->verb != NULL ? help_find(arguments->verb) : NULL;
+    help_names(names, sizeof(names));
+    if (arguments->version) {
+        puts("iwheelctl " IWHEEL_VERSION);
+        return CTL_OK;
+    }
+    if (arguments->help && arguments->verb == NULL) {
+        help_print(stdout);
+        return CTL_OK;
+    }
+    if (arguments->verb == NULL) {
+        return ctl_fail(CTL_USAGE, "no verb given; known are: %s", names);
+    }
+    if (verb == NULL) {
+        return ctl_fail(CTL_USAGE, "unknown verb \"%s\"; known are: %s", arguments->verb, names);
+    }
+    if (arguments->help) {
+        help_print_verb(verb, stdout);
+        return CTL_OK;
+    }
+    return verb->run(arguments->ctl, arguments->count, arguments->words);
+}
+
+/// Results that could not be written are no success, unless their reader went away on purpose.
+static int check_output(int code) {
+    errno = 0;
+    if ((fflush(stdout) != 0 || ferror(stdout) != 0) && errno != EPIPE && errno != 0) {
+        return ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno));
+    }
+    return code;
+}
+
+int main(int count, char **arguments) {
+    static ctl_t ctl;
+    arguments_t self = {.ctl = &ctl};
+    (void)signal(SIGPIPE, SIG_IGN);
+    client_init(&ctl.client);
+    self.words = calloc((size_t)count + 1U, sizeof(*self.words));
+    if (self.words == NULL) {
+        return ctl_fail(CTL_INTERNAL, "out of memory");
+    }
+    int code = CTL_USAGE;
+    if (take_arguments(&self, count, arguments)) {
+        code = dispatch(&self);
+    }
+    client_close(&ctl.client);
+    free(self.words);
+    return check_output(code);
+}

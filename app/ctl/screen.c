@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT
+#include "screen.h"
+
+#include "advice.h"
+#include "paper.h"
+#include "text.h"
+
+#include <string.h>
+
+static bool is(const char *word, const char *other) {
+    return strcmp(word, other) == 0;
+}
+
+static const json_t *get(const json_t *object, const char *field) {
+    return json_object_get(object, field);
+}
+
+static tone_t state_tone(const char *state) {
+    if (is(state, "latched")) {
+        return TONE_BAD;
+    }
+    return is(state, "listening") ? TONE_PLAIN : TONE_CARE;
+}
+
+static void draw_state(const paper_t *paper, const json_t *status, const json_t *why) {
+    const char *state = text_word(status, "state");
+    const json_t *sentence = get(why, "sentence");
+    advice_t advice;
+    advice_collect(status, &advice);
+    paper_label(paper, "STATE");
+    paper_say(paper, state_tone(state), "%s", json_is_true(get(status, "arming")) ? "arming" : state);
+    if (json_is_string(get(status, "cause"))) {
+        paper_say(paper, state_tone(state), " (%s)", text_word(status, "cause"));
+    }
+    paper_end(paper);
+    for (unsigned i = 0; i < advice.lines; i++) {
+        paper_wrap(paper, i == 0 ? "next" : "", TONE_TITLE, advice.line[i]);
+    }
+    if (json_is_string(sentence)) {
+        paper_wrap(paper, "last stop", TONE_PLAIN, json_string_value(sentence));
+    }
+}
+
+static void draw_lease(const paper_t *paper, const json_t *lease) {
+    char number[TEXT_CELL];
+    paper_label(paper, "LEASE");
+    if (json_is_integer(get(lease, "holder"))) {
+        text_integer(get(lease, "holder"), "", number);
+        paper_say(paper, TONE_CARE, "%s (client %s", text_word(lease, "name"), number);
+        text_integer(get(lease, "pid"), "", number);
+        paper_say(paper, TONE_CARE, ", pid %s)", number);
+        text_integer(get(lease, "remaining_ms"), "ms", number);
+        paper_say(paper, TONE_PLAIN, ", %s left", number);
+    } else {
+        paper_say(paper, TONE_PLAIN, "nobody drives");
+    }
+    text_integer(get(lease, "lease_ms"), "ms", number);
+    paper_say(paper, TONE_PLAIN, "; a command holds for %s", number);
+    paper_end(paper);
+}
+
+static void draw_surroundings(const paper_t *paper, const json_t *status) {
+    const json_t *bus = get(status, "bus");
+    const json_t *estop = get(status, "estop");
+    const char *button = text_word(estop, "state");
+    paper_label(paper, "BUS");
+    paper_say(paper, TONE_PLAIN, "%s ", text_word(bus, "name"));
+    paper_say(paper, is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, "%s", text_word(bus, "state"));
+    paper_say(paper, TONE_PLAIN, ", timing %s, echo %s", text_word(bus, "timing"), text_word(bus, "echo"));
+    paper_end(paper);
+    paper_label(paper, "E-STOP");
+    paper_say(paper, is(button, "released") ? TONE_GOOD : TONE_BAD, "%s",
+              is(button, "none") ? "NONE CONFIGURED" : button);
+    paper_say(paper, TONE_PLAIN, ", line %s", text_word(estop, "line"));
+    paper_say(paper, TONE_CARE, "%s", json_is_true(get(estop, "simulated")) ? " SIMULATED" : "");
+    paper_end(paper);
+}
+
+/// One quantity of both wheels side by side.
+typedef struct {
+    const char *label;
+    const char *field;
+    const char *unit;
+    unsigned digits;
+    const char *remark;    ///< A field with a word that explains the value; may be null.
+    const char *prefix_if; ///< A flag of `saturated` that makes the value a lower bound; may be null.
+} row_t;
+
+static const row_t rows[] = {
+    {"measured", "speed_mm_s", "mm/s", 0, NULL, NULL},
+    {"", "speed_rpm", "rpm", 0, NULL, NULL},
+    {"commanded", "commanded_mm_s", "mm/s", 0, NULL, NULL},
+    {"applied", "applied_mm_s", "mm/s", 0, NULL, NULL},
+    {"", "applied_mA", "mA", 0, NULL, NULL},
+    {"distance", "distance_mm", "m", 3, NULL, NULL},
+    {"ticks", "ticks", "ticks", 0, NULL, NULL},
+    {"net force", "force_net_mN", "N", 3, "force_validity", NULL},
+    {"raw force", "force_raw_mN", "N", 3, NULL, NULL},
+    {"offset", "force_offset_mN", "N", 3, "offset_provenance", NULL},
+    {"force unit", NULL, NULL, 0, "unit_evidence", NULL},
+    {"battery", "battery_dV", "V", 1, NULL, "battery"},
+    {"temperature", "temperature_degC", "degC", 0, NULL, NULL},
+    {"CPU", "cpu_percent", "%", 0, NULL, NULL},
+    {"speed age", "speed_age_ms", "ms", 0, NULL, NULL},
+    {"status age", "status_age_ms", "ms", 0, NULL, NULL},
+    {"force age", "force_age_ms", "ms", 0, NULL, NULL},
+    {"reboots", "reboots", "seen", 0, NULL, NULL},
+};
+
+static void draw_cell(const paper_t *paper, const row_t *row, const json_t *wheel) {
+    char number[TEXT_CELL] = "";
+    char cell[2U * TEXT_CELL];
+    const char *remark = row->remark != NULL ? text_word(wheel, row->remark) : "";
+    const bool bound = row->prefix_if != NULL && json_is_true(get(get(wheel, "saturated"), row->prefix_if));
+    if (row->field != NULL) {
+        text_decimal(get(wheel, row->field), row->digits, row->unit, number);
+    }
+    if (is(remark, "valid")) {
+        remark = "";
+    }
+    (void)snprintf(cell, sizeof(cell), "%s%s%s%.40s", bound ? ">= " : "", number,
+                   number[0] != '\0' && remark[0] != '\0' ? " " : "", remark);
+    paper_text(paper, is(number, "--") ? TONE_FAINT : TONE_PLAIN, PAPER_CELL, cell);
+}
+
+static void draw_head(const paper_t *paper, const char *name, const json_t *wheel) {
+    const json_t *heard = get(wheel, "heard");
+    const char *rest = json_is_true(get(wheel, "at_rest")) ? "at rest" : "turning";
+    char head[TEXT_CELL];
+    (void)snprintf(head, sizeof(head), "%s %s", name, json_is_true(heard) ? rest : "NOT HEARD");
+    paper_text(paper, json_is_true(heard) ? TONE_TITLE : TONE_BAD, PAPER_CELL, head);
+}
+
+static void draw_wheels(const paper_t *paper, const json_t *left, const json_t *right) {
+    paper_label(paper, "WHEELS");
+    draw_head(paper, "LEFT", left);
+    draw_head(paper, "RIGHT", right);
+    paper_end(paper);
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        paper_label(paper, rows[i].label);
+        draw_cell(paper, &rows[i], left);
+        draw_cell(paper, &rows[i], right);
+        paper_end(paper);
+    }
+}
+
+static void draw_pose(const paper_t *paper, const json_t *pose) {
+    static const char *const fields[] = {"x_mm", "y_mm", "z_mm", "psi_mrad"};
+    static const char *const names[] = {"x", "y", "z", "psi"};
+    char number[TEXT_CELL];
+    paper_label(paper, "POSE");
+    for (size_t i = 0; i < 4; i++) {
+        text_integer(get(pose, fields[i]), i < 3 ? "mm" : "mrad", number);
+        paper_say(paper, TONE_PLAIN, "%s %s  ", names[i], number);
+    }
+    paper_say(paper, TONE_CARE, "%s", json_is_true(get(pose, "limited")) ? "AT THE END OF ITS RANGE" : "");
+    paper_end(paper);
+}
+
+/// The names of the ledger's items in one state, as one line; nothing if there are none.
+static void draw_ledger(const paper_t *paper, json_t *ledger, const char *state, tone_t tone) {
+    char text[1024] = "";
+    char title[PAPER_LABEL + 1U] = "";
+    size_t used = 0;
+    const char *name = NULL;
+    json_t *entry = NULL;
+    json_object_foreach(ledger, name, entry) {
+        const int n = is(text_word(entry, "state"), state)
+                          ? snprintf(text + used, sizeof(text) - used, "%s%s", used > 0 ? ", " : "", name)
+                          : 0;
+        used += n > 0 && (size_t)n < sizeof(text) - used ? (size_t)n : 0U;
+    }
+    if (used > 0) {
+        (void)snprintf(title, sizeof(title), "%s", is(state, "assumed") ? "UNVERIFIED" : "CONTRADICTED");
+        paper_wrap(paper, title, tone, text);
+    }
+}
+
+static void draw_budget(const paper_t *paper, const json_t *budget) {
+    static const char *const cases[][3] = {
+        {"client lost", "client_lost_ms", "client_lost_mm"},
+        {"gateway dies", "killed_ms", "killed_mm"},
+    };
+    char time[TEXT_CELL];
+    char way[TEXT_CELL];
+    for (size_t i = 0; i < 2; i++) {
+        text_integer(get(budget, cases[i][1]), "ms", time);
+        text_decimal(get(budget, cases[i][2]), 3, "m", way);
+        paper_label(paper, i == 0 ? "STOP BUDGET" : "");
+        paper_say(paper, TONE_PLAIN, "%s: at most %s, %s%s", cases[i][0], time, way, i == 0 ? "" : ", then unknown");
+        paper_end(paper);
+    }
+}
+
+static void draw_warnings(const paper_t *paper, const json_t *warnings) {
+    size_t index = 0;
+    const json_t *warning = NULL;
+    json_array_foreach(warnings, index, warning) {
+        paper_wrap(paper, index == 0 ? "WARNINGS" : "", TONE_CARE,
+                   json_is_string(warning) ? json_string_value(warning) : "--");
+    }
+}
+
+void screen_status(const json_t *status, const json_t *why, bool colour, FILE *out) {
+    const paper_t paper = {.out = out, .colour = colour};
+    draw_state(&paper, status, why);
+    draw_lease(&paper, get(status, "lease"));
+    draw_surroundings(&paper, status);
+    paper_end(&paper);
+    draw_wheels(&paper, get(status, "left"), get(status, "right"));
+    paper_end(&paper);
+    draw_pose(&paper, get(status, "pose"));
+    draw_budget(&paper, get(status, "budget"));
+    draw_ledger(&paper, json_object_get(status, "ledger"), "contradicted", TONE_BAD);
+    draw_ledger(&paper, json_object_get(status, "ledger"), "assumed", TONE_PLAIN);
+    draw_warnings(&paper, get(status, "warnings"));
+}

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+/// Text for people: safe on a terminal, with units, `--` for what is not known.
+#ifndef TEXT_H
+#define TEXT_H
+
+#include <jansson.h>
+#include <stdbool.h>
+#include <stdio.h>
+
+/// Long enough for every cell.
+#define TEXT_CELL 48U
+
+/// Writes `text` without what could command a terminal: names and reasons come from other people's programs.
+void text_safe(const char *text, FILE *out);
+
+/// True if `out` is a terminal that wants colours (NO_COLOR and TERM=dumb say no).
+bool text_wants_colour(FILE *out);
+
+/// "%lld unit", or "--" if `value` is no integer.
+void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]);
+
+/// The integer divided by 10 to the power of `digits`, with that many decimals and the unit; "--" if it is none.
+void text_decimal(const json_t *value, unsigned digits, const char *unit, char out[TEXT_CELL]);
+
+/// The string of that field, or "--".
+const char *text_word(const json_t *object, const char *field);
+
+#endif
