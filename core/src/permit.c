@@ -175,12 +175,14 @@ void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, u
 
 static void step_arming(iw_permit_t *self, iw_time_us_t now_us)
 {
-    if (self->view.proven) {
+    const iw_time_us_t limit_us = (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
+    const iw_time_us_t waited_us = now_us - self->arming_us;
+    if (self->view.proven && waited_us <= limit_us) {
         self->arming = false;
         self->state = IW_STATE_ARMED;
         self->cut = false;
         self->lease_until_us = now_us + IW_PERMIT_FIRST_LEASE_US;
-    } else if (now_us - self->arming_us >= (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS) {
+    } else if (waited_us >= limit_us) {
         end_arming(self, IW_REFUSE_SEND_STALLED);
     }
 }
