@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: MIT
+// Every cause in every situation: what it does, what it leaves behind, what it refuses.
+#include "permit_rig.h"
+#include "unity.h"
+
+static permit_rig_t rig;
+
+void setUp(void) {
+    permit_rig_init(&rig);
+}
+
+void tearDown(void) {}
+
+/// What a cause does.
+typedef enum { NOTHING, LATCH, LATCH_SILENT, RAMP, CUT, END_ARMING } effect_t;
+
+/// Indexed by permit_situation_t.
+typedef struct {
+    iw_cause_t cause;
+    effect_t effect[PERMIT_SITUATIONS];
+} row_t;
+
+#define ALWAYS(cause)                                                                                                  \
+    {                                                                                                                  \
+        cause, {                                                                                                       \
+            LATCH_SILENT, LATCH, LATCH, LATCH, LATCH, NOTHING                                                          \
+        }                                                                                                              \
+    }
+#define MOVING(cause)                                                                                                  \
+    {                                                                                                                  \
+        cause, {                                                                                                       \
+            NOTHING, END_ARMING, LATCH, LATCH, LATCH, NOTHING                                                          \
+        }                                                                                                              \
+    }
+
+static const row_t rows[] = {
+    ALWAYS(IW_CAUSE_ESTOP_LINE),
+    ALWAYS(IW_CAUSE_ESTOP_SOFTWARE),
+    ALWAYS(IW_CAUSE_INTERNAL),
+    MOVING(IW_CAUSE_WHEEL_LOST),
+    MOVING(IW_CAUSE_WHEEL_REBOOTED),
+    MOVING(IW_CAUSE_SEND_STALLED),
+    MOVING(IW_CAUSE_BUS_DOWN),
+    MOVING(IW_CAUSE_SECOND_MASTER),
+    MOVING(IW_CAUSE_FEEDBACK_SIGN),
+    MOVING(IW_CAUSE_OVERSPEED),
+    MOVING(IW_CAUSE_LOOP_HUNG),
+    {IW_CAUSE_LOOP_LATE, {NOTHING, END_ARMING, CUT, CUT, CUT, NOTHING}},
+    {IW_CAUSE_WHEEL_BLOCKED, {NOTHING, END_ARMING, RAMP, NOTHING, NOTHING, NOTHING}},
+};
+#define ROWS (sizeof rows / sizeof rows[0])
+
+static const iw_state_t state_of[PERMIT_SITUATIONS] = {IW_STATE_LISTENING, IW_STATE_LISTENING, IW_STATE_ARMED,
+                                                       IW_STATE_STOPPING,  IW_STATE_STOPPING,  IW_STATE_LATCHED};
+
+static void assert_stop_told(iw_cause_t cause, iw_state_t from, bool latched) {
+    const iw_stop_t *const stop = &rig.permit.stop;
+    TEST_ASSERT_EQUAL_INT(cause, stop->cause);
+    TEST_ASSERT_EQUAL_INT(from, stop->from);
+    TEST_ASSERT_EQUAL_INT(latched, stop->latched);
+    TEST_ASSERT_EQUAL_UINT32(42, stop->detail);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, stop->sides);
+    TEST_ASSERT_TRUE(stop->at_us == rig.now_us);
+}
+
+static void assert_effect(effect_t effect, const iw_permit_t *before, iw_cause_t cause) {
+    const iw_demand_t demand = iw_permit_demand(&rig.permit);
+    const bool stops = effect == LATCH || effect == LATCH_SILENT || effect == RAMP;
+    const bool cuts_armed = effect == CUT && before->state == IW_STATE_ARMED;
+    TEST_ASSERT_EQUAL_UINT32(before->stop.number + (stops || cuts_armed ? 1U : 0U), rig.permit.stop.number);
+    if (effect == LATCH || effect == LATCH_SILENT) {
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(effect == LATCH ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE, demand);
+        assert_stop_told(cause, before->state, true);
+    } else if (effect == RAMP) {
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, demand);
+        assert_stop_told(cause, before->state, false);
+    } else if (effect == CUT) {
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand);
+    } else if (effect == END_ARMING) {
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, demand);
+        TEST_ASSERT_TRUE(rig.permit.arm_refusal != IW_REFUSE_NONE);
+    } else {
+        TEST_ASSERT_EQUAL_INT(before->state, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(before->stop.cause, rig.permit.stop.cause);
+    }
+    TEST_ASSERT_TRUE(effect == NOTHING || rig.permit.holder == IW_CLIENT_NONE);
+}
+
+static void test_permit_every_cause_in_every_situation_takes_effect_at_once(void) {
+    for (size_t i = 0; i < ROWS; i++) {
+        for (int situation = 0; situation < PERMIT_SITUATIONS; situation++) {
+            permit_rig_begin(&rig, (permit_situation_t)situation);
+            TEST_ASSERT_EQUAL_INT(state_of[situation], rig.permit.state);
+            const iw_permit_t before = rig.permit;
+            permit_rig_raise(&rig, rows[i].cause);
+            assert_effect(rows[i].effect[situation], &before, rows[i].cause);
+            permit_rig_step(&rig);
+            assert_effect(rows[i].effect[situation], &before, rows[i].cause);
+        }
+    }
+}
+
+static void test_permit_cause_told_in_every_step_counts_as_one_stop(void) {
+    for (size_t i = 0; i < ROWS; i++) {
+        permit_rig_begin(&rig, PERMIT_ARMED);
+        permit_rig_raise(&rig, rows[i].cause);
+        const iw_stop_t first = rig.permit.stop;
+        for (uint32_t n = 0; n < 100; n++) {
+            permit_rig_wait(&rig, MS(1));
+            permit_rig_raise(&rig, rows[i].cause);
+        }
+        TEST_ASSERT_EQUAL_UINT32(first.number, rig.permit.stop.number);
+        TEST_ASSERT_TRUE(first.at_us == rig.permit.stop.at_us);
+    }
+}
+
+static void test_permit_first_cause_of_a_latch_stays_the_cause(void) {
+    for (size_t i = 0; i < ROWS; i++) {
+        permit_rig_begin(&rig, PERMIT_ARMED);
+        permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
+        permit_rig_raise(&rig, rows[i].cause);
+        permit_rig_wait(&rig, MS(1));
+        permit_rig_raise(&rig, rows[i].cause);
+        TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.permit.stop.cause);
+    }
+}
+
+static void test_permit_latch_after_a_stop_is_a_new_stop(void) {
+    permit_rig_begin(&rig, PERMIT_STOPPING);
+    const uint32_t number = rig.permit.stop.number;
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_ESTOP_LINE, rig.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.stop.from);
+    TEST_ASSERT_EQUAL_UINT32(number + 1U, rig.permit.stop.number);
+}
+
+static void test_permit_latched_while_listening_sends_nothing_however_long(void) {
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    for (uint32_t n = 0; n < 20; n++) {
+        permit_rig_wait(&rig, MS(700));
+        TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+        TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == IW_NEVER);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
+}
+
+static void test_permit_late_loop_leaves_no_ramp_tail(void) {
+    permit_rig_begin(&rig, PERMIT_STOPPING);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+    permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
+    for (uint32_t n = 0; n < 10; n++) {
+        permit_rig_wait(&rig, MS(20));
+        TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    }
+}
+
+static void test_permit_stop_after_a_cut_one_ramps_again(void) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
+    rig.view.output_zero = true;
+    rig.view.at_rest = true;
+    permit_rig_wait(&rig, MS(600));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    rig.view.proven = true;
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    iw_permit_stop(&rig.permit, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+}
+
+static void test_permit_cause_of_no_wheel_is_told_as_such(void) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    iw_permit_raise(&rig.permit, rig.now_us, IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, UINT32_MAX);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_RIGHT, rig.permit.stop.sides);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, rig.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
+}
+
+static void test_permit_present_tells_levels_while_told_and_events_for_a_second(void) {
+    static const iw_cause_t levels[] = {IW_CAUSE_ESTOP_LINE, IW_CAUSE_BUS_DOWN, IW_CAUSE_SEND_STALLED,
+                                        IW_CAUSE_WHEEL_LOST};
+    static const iw_cause_t events[] = {IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_SECOND_MASTER, IW_CAUSE_WHEEL_REBOOTED,
+                                        IW_CAUSE_FEEDBACK_SIGN,  IW_CAUSE_OVERSPEED,     IW_CAUSE_LOOP_HUNG,
+                                        IW_CAUSE_INTERNAL};
+    for (size_t i = 0; i < sizeof levels / sizeof levels[0]; i++) {
+        setUp();
+        permit_rig_raise(&rig, levels[i]);
+        TEST_ASSERT_EQUAL_HEX32(1U << levels[i], iw_permit_present(&rig.permit, rig.now_us));
+        permit_rig_wait(&rig, MS(1));
+        TEST_ASSERT_EQUAL_HEX32(1U << levels[i], iw_permit_present(&rig.permit, rig.now_us));
+        permit_rig_wait(&rig, MS(1));
+        TEST_ASSERT_EQUAL_HEX32(0, iw_permit_present(&rig.permit, rig.now_us));
+    }
+    for (size_t i = 0; i < sizeof events / sizeof events[0]; i++) {
+        setUp();
+        permit_rig_raise(&rig, events[i]);
+        permit_rig_wait(&rig, MS(500));
+        permit_rig_wait(&rig, MS(500) - 1U);
+        TEST_ASSERT_EQUAL_HEX32(1U << events[i], iw_permit_present(&rig.permit, rig.now_us));
+        permit_rig_wait(&rig, 1);
+        TEST_ASSERT_EQUAL_HEX32(0, iw_permit_present(&rig.permit, rig.now_us));
+    }
+}
+
+static void test_permit_present_does_not_tell_what_does_not_latch(void) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
+    permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);
+    TEST_ASSERT_EQUAL_HEX32(0, iw_permit_present(&rig.permit, rig.now_us));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_permit_every_cause_in_every_situation_takes_effect_at_once);
+    RUN_TEST(test_permit_cause_told_in_every_step_counts_as_one_stop);
+    RUN_TEST(test_permit_first_cause_of_a_latch_stays_the_cause);
+    RUN_TEST(test_permit_latch_after_a_stop_is_a_new_stop);
+    RUN_TEST(test_permit_latched_while_listening_sends_nothing_however_long);
+    RUN_TEST(test_permit_late_loop_leaves_no_ramp_tail);
+    RUN_TEST(test_permit_stop_after_a_cut_one_ramps_again);
+    RUN_TEST(test_permit_cause_of_no_wheel_is_told_as_such);
+    RUN_TEST(test_permit_present_tells_levels_while_told_and_events_for_a_second);
+    RUN_TEST(test_permit_present_does_not_tell_what_does_not_latch);
+    return UNITY_END();
+}

@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: MIT
+// How zeros are held, how a latch is left, how a gateway begins after a crash, and when it must be called.
+#include "permit_rig.h"
+#include "unity.h"
+#include <string.h>
+
+static permit_rig_t rig;
+
+void setUp(void) {
+    permit_rig_init(&rig);
+}
+
+void tearDown(void) {}
+
+/// Latched while armed; now the wheels stand and the cause is long gone.
+static void latch_and_calm(iw_cause_t cause) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    permit_rig_raise(&rig, cause);
+    rig.view.output_zero = true;
+    rig.view.at_rest = true;
+    rig.view.settled = true;
+    permit_rig_wait(&rig, MS(500));
+    permit_rig_wait(&rig, MS(500));
+}
+
+static void assert_holding_until(iw_time_us_t after_us, iw_state_t then) {
+    const iw_state_t state = rig.permit.state;
+    permit_rig_wait(&rig, after_us - 1U);
+    TEST_ASSERT_EQUAL_INT(state, rig.permit.state);
+    TEST_ASSERT_TRUE(iw_permit_demand(&rig.permit) != IW_DEMAND_SILENCE);
+    permit_rig_wait(&rig, 1);
+    TEST_ASSERT_EQUAL_INT(then, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+}
+
+static void test_permit_hold_begins_when_the_output_is_zero(void) {
+    permit_rig_begin(&rig, PERMIT_STOPPING);
+    rig.view.settled = true;
+    permit_rig_wait(&rig, MS(3000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    rig.view.output_zero = true;
+    permit_rig_step(&rig);
+    assert_holding_until(MS(1500), IW_STATE_LISTENING);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
+}
+
+static void test_permit_hold_follows_the_configuration(void) {
+    rig.config.zero_hold_ms = 1100;
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    rig.view.settled = true;
+    assert_holding_until(MS(1100), IW_STATE_LISTENING);
+}
+
+static void test_permit_hold_waits_for_settled_wheels(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    permit_rig_wait(&rig, MS(4000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    rig.view.settled = true;
+    permit_rig_wait(&rig, MS(1));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
+}
+
+static void test_permit_hold_ends_after_ten_seconds_and_tells_of_moving_wheels(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    assert_holding_until(MS(10000), IW_STATE_LISTENING);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    permit_rig_wait(&rig, MS(9999));
+    rig.view.settled = true;
+    permit_rig_wait(&rig, MS(1));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
+}
+
+static void test_permit_hold_of_a_cut_stop_begins_at_once(void) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
+    rig.view.settled = true;
+    permit_rig_step(&rig);
+    assert_holding_until(MS(1500), IW_STATE_LISTENING);
+}
+
+static void test_permit_latched_holds_zeros_as_stopping_does(void) {
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    rig.view.settled = true;
+    assert_holding_until(MS(1500), IW_STATE_LATCHED);
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    assert_holding_until(MS(10000), IW_STATE_LATCHED);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
+    permit_rig_wait(&rig, MS(60000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.permit.still_moving);
+}
+
+static void test_permit_latch_during_the_hold_begins_a_new_hold(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    rig.view.settled = true;
+    permit_rig_wait(&rig, MS(1400));
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    assert_holding_until(MS(1500), IW_STATE_LATCHED);
+}
+
+static void test_permit_reset_leaves_the_latch_in_silence(void) {
+    latch_and_calm(IW_CAUSE_INTERNAL);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+    TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == IW_NEVER);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
+}
+
+static void test_permit_reset_while_latched_from_listening_works_as_well(void) {
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, permit_rig_reset(&rig));
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+}
+
+static void test_permit_reset_repeated_or_elsewhere_changes_nothing(void) {
+    for (int situation = 0; situation < PERMIT_LATCHED; situation++) {
+        permit_rig_begin(&rig, (permit_situation_t)situation);
+        const iw_permit_t before = rig.permit;
+        for (uint32_t n = 0; n < 3; n++) {
+            TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+            TEST_ASSERT_EQUAL_MEMORY(&before, &rig.permit, sizeof before);
+        }
+    }
+}
+
+static void test_permit_reset_held_counts_once(void) {
+    latch_and_calm(IW_CAUSE_ESTOP_SOFTWARE);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_SOFTWARE);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_CAUSE_PRESENT, permit_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+}
+
+static void test_permit_reset_with_a_level_present_names_it(void) {
+    static const struct {
+        iw_cause_t cause;
+        iw_refusal_t refusal;
+    } cases[] = {{IW_CAUSE_ESTOP_LINE, IW_REFUSE_ESTOP_PRESSED},
+                 {IW_CAUSE_BUS_DOWN, IW_REFUSE_BUS_DOWN},
+                 {IW_CAUSE_SEND_STALLED, IW_REFUSE_SEND_STALLED},
+                 {IW_CAUSE_WHEEL_LOST, IW_REFUSE_WHEEL_LOST}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        latch_and_calm(IW_CAUSE_INTERNAL);
+        permit_rig_raise(&rig, cases[i].cause);
+        TEST_ASSERT_EQUAL_INT(cases[i].refusal, permit_rig_reset(&rig));
+        permit_rig_wait(&rig, MS(1));
+        TEST_ASSERT_EQUAL_INT(cases[i].refusal, permit_rig_reset(&rig));
+        permit_rig_wait(&rig, MS(1));
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    }
+}
+
+static void test_permit_reset_within_a_second_of_an_event_is_refused(void) {
+    static const iw_cause_t events[] = {IW_CAUSE_SECOND_MASTER, IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_FEEDBACK_SIGN,
+                                        IW_CAUSE_OVERSPEED,     IW_CAUSE_LOOP_HUNG,      IW_CAUSE_INTERNAL,
+                                        IW_CAUSE_ESTOP_SOFTWARE};
+    for (size_t i = 0; i < sizeof events / sizeof events[0]; i++) {
+        latch_and_calm(IW_CAUSE_INTERNAL);
+        permit_rig_raise(&rig, events[i]);
+        permit_rig_wait(&rig, MS(1000) - 1U);
+        const iw_refusal_t refusal = permit_rig_reset(&rig);
+        TEST_ASSERT_EQUAL_INT(events[i] == IW_CAUSE_SECOND_MASTER ? IW_REFUSE_SECOND_MASTER : IW_REFUSE_CAUSE_PRESENT,
+                              refusal);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+        permit_rig_wait(&rig, 1);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    }
+}
+
+static void test_permit_reset_needs_wheels_heard_and_at_rest(void) {
+    latch_and_calm(IW_CAUSE_INTERNAL);
+    rig.view.heard = false;
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, permit_rig_reset(&rig));
+    rig.view.heard = true;
+    rig.view.at_rest = false;
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_reset(&rig));
+    rig.view.at_rest = true;
+    rig.view.settled = false;
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+}
+
+static void test_permit_reset_while_somebody_still_commands_is_refused(void) {
+    latch_and_calm(IW_CAUSE_INTERNAL);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, permit_rig_drive(&rig, OTHER, true));
+    permit_rig_wait(&rig, MS(500) - 1U);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stale_client);
+    permit_rig_wait(&rig, 2);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+}
+
+static void test_permit_after_reset_the_old_holder_holds_nothing(void) {
+    latch_and_calm(IW_CAUSE_INTERNAL);
+    (void)permit_rig_reset(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
+    permit_rig_wait(&rig, MS(5000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+}
+
+static void test_permit_restarted_sends_zeros_before_listening(void) {
+    permit_rig_init_restarted(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_RESTART, rig.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.permit.stop.number);
+    assert_holding_until(MS(1500), IW_STATE_LISTENING);
+}
+
+static void test_permit_restarted_without_any_wheel_ends_as_well(void) {
+    permit_rig_init_restarted(&rig);
+    rig.view.heard = false;
+    rig.view.at_rest = false;
+    rig.view.settled = false;
+    permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    assert_holding_until(MS(1500), IW_STATE_LISTENING);
+}
+
+static void test_permit_restarted_gives_way_to_another_master_at_once(void) {
+    permit_rig_init_restarted(&rig);
+    permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+}
+
+static void test_permit_restarted_latches_on_estop(void) {
+    static const iw_cause_t causes[] = {IW_CAUSE_ESTOP_LINE, IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_INTERNAL};
+    for (size_t i = 0; i < 3; i++) {
+        permit_rig_init_restarted(&rig);
+        permit_rig_raise(&rig, causes[i]);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    }
+}
+
+static void test_permit_restarted_cannot_be_armed_before_the_hold_is_over(void) {
+    permit_rig_init_restarted(&rig);
+    permit_rig_wait(&rig, MS(1000));
+    TEST_ASSERT_TRUE(permit_rig_arm(&rig, HOLDER) != IW_REFUSE_NONE);
+    permit_rig_wait(&rig, MS(500));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+}
+
+static void assert_restarted_silent(void) {
+    memset(&rig.permit, FIXTURE_POISON, sizeof rig.permit);
+    iw_permit_init(&rig.permit, &rig.config, rig.now_us, true);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
+}
+
+static void test_permit_restarted_without_leave_to_send_stays_silent(void) {
+    rig.config.listen_only = true;
+    assert_restarted_silent();
+    setUp();
+    rig.config.setpoint_type_set = false;
+    assert_restarted_silent();
+    setUp();
+    rig.config.current_role = IW_ROLE_UNSET;
+    assert_restarted_silent();
+}
+
+/// What can be seen from outside.
+static uint32_t outside(const iw_permit_t *permit) {
+    return (uint32_t)permit->state | (uint32_t)iw_permit_demand(permit) << 4 | (uint32_t)permit->arming << 8 |
+           (uint32_t)permit->holding << 9 | permit->holder << 10 | (uint32_t)permit->arm_refusal << 16 |
+           permit->stop.number << 22;
+}
+
+/// A step at `next_us` changes something, a step before it nothing.
+static void assert_next_is_right(void) {
+    const iw_permit_t now = rig.permit;
+    const iw_time_us_t next_us = iw_permit_next_us(&rig.permit);
+    const iw_time_us_t before_us = next_us == IW_NEVER ? rig.now_us + MS(100000) : next_us - 1U;
+    if (before_us >= rig.now_us) {
+        iw_permit_step(&rig.permit, before_us, &rig.view);
+        TEST_ASSERT_EQUAL_HEX32_MESSAGE(outside(&now), outside(&rig.permit), "changed before next_us");
+        rig.permit = now;
+    }
+    if (next_us != IW_NEVER) {
+        TEST_ASSERT_TRUE_MESSAGE(next_us > rig.now_us, "asks to be called again at once");
+        iw_permit_step(&rig.permit, next_us, &rig.view);
+        TEST_ASSERT_TRUE_MESSAGE(outside(&now) != outside(&rig.permit), "nothing changed at next_us");
+        rig.permit = now;
+    }
+}
+
+static void random_input(fixture_random_t *random) {
+    const uint32_t choice = fixture_random(random) % 24U;
+    const iw_client_t client = (fixture_random(random) & 1U) != 0U ? HOLDER : OTHER;
+    rig.view.settled = rig.view.settled != (choice == 0U);
+    rig.view.at_rest = rig.view.settled || choice < 12U;
+    rig.view.output_zero = choice != 1U;
+    if (choice < 8U) {
+        (void)permit_rig_arm(&rig, client);
+        rig.view.proven = (fixture_random(random) & 3U) != 0U;
+    } else if (choice < 14U) {
+        (void)permit_rig_drive(&rig, client, choice == 9U);
+    } else if (choice < 15U) {
+        iw_permit_stop(&rig.permit, rig.now_us, client, IW_CAUSE_CLIENT_STOP);
+    } else if (choice < 16U) {
+        iw_permit_disconnect(&rig.permit, rig.now_us, client);
+    } else if (choice < 18U) {
+        permit_rig_raise(&rig, (iw_cause_t)fixture_random_in(random, IW_CAUSE_ESTOP_LINE, IW_CAUSE_WHEEL_BLOCKED));
+    } else {
+        (void)permit_rig_reset(&rig);
+    }
+}
+
+static void test_permit_next_us_is_right_in_twenty_thousand_random_situations(void) {
+    fixture_random_t random;
+    fixture_random_init(&random, 6);
+    uint32_t seen[4] = {0, 0, 0, 0};
+    for (uint32_t n = 0; n < 20000; n++) {
+        random_input(&random);
+        const iw_time_us_t next_us = iw_permit_next_us(&rig.permit);
+        const iw_time_us_t for_us = (iw_time_us_t)fixture_random_in(&random, 0, 300000);
+        const bool jump = next_us != IW_NEVER && next_us > rig.now_us && (fixture_random(&random) & 3U) == 0U;
+        permit_rig_wait(&rig, jump ? next_us - rig.now_us : for_us);
+        permit_rig_step(&rig);
+        seen[rig.permit.state]++;
+        assert_next_is_right();
+    }
+    for (size_t state = 0; state < 4; state++) {
+        TEST_ASSERT_TRUE_MESSAGE(seen[state] > 500, "a state was hardly visited");
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_permit_hold_begins_when_the_output_is_zero);
+    RUN_TEST(test_permit_hold_follows_the_configuration);
+    RUN_TEST(test_permit_hold_waits_for_settled_wheels);
+    RUN_TEST(test_permit_hold_ends_after_ten_seconds_and_tells_of_moving_wheels);
+    RUN_TEST(test_permit_hold_of_a_cut_stop_begins_at_once);
+    RUN_TEST(test_permit_latched_holds_zeros_as_stopping_does);
+    RUN_TEST(test_permit_latch_during_the_hold_begins_a_new_hold);
+    RUN_TEST(test_permit_reset_leaves_the_latch_in_silence);
+    RUN_TEST(test_permit_reset_while_latched_from_listening_works_as_well);
+    RUN_TEST(test_permit_reset_repeated_or_elsewhere_changes_nothing);
+    RUN_TEST(test_permit_reset_held_counts_once);
+    RUN_TEST(test_permit_reset_with_a_level_present_names_it);
+    RUN_TEST(test_permit_reset_within_a_second_of_an_event_is_refused);
+    RUN_TEST(test_permit_reset_needs_wheels_heard_and_at_rest);
+    RUN_TEST(test_permit_reset_while_somebody_still_commands_is_refused);
+    RUN_TEST(test_permit_after_reset_the_old_holder_holds_nothing);
+    RUN_TEST(test_permit_restarted_sends_zeros_before_listening);
+    RUN_TEST(test_permit_restarted_without_any_wheel_ends_as_well);
+    RUN_TEST(test_permit_restarted_gives_way_to_another_master_at_once);
+    RUN_TEST(test_permit_restarted_latches_on_estop);
+    RUN_TEST(test_permit_restarted_cannot_be_armed_before_the_hold_is_over);
+    RUN_TEST(test_permit_restarted_without_leave_to_send_stays_silent);
+    RUN_TEST(test_permit_next_us_is_right_in_twenty_thousand_random_situations);
+    return UNITY_END();
+}

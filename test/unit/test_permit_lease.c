@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: MIT
+// The lease: what feeds it, when it ends, who takes it over.
+#include "permit_rig.h"
+#include "unity.h"
+
+static permit_rig_t rig;
+
+void setUp(void) {
+    permit_rig_init(&rig);
+}
+
+void tearDown(void) {}
+
+/// Armed just now, at rest, no drive yet.
+static void arm(void) {
+    permit_rig_begin(&rig, PERMIT_LISTENING);
+    (void)permit_rig_arm(&rig, HOLDER);
+    rig.view.proven = true;
+    permit_rig_step(&rig);
+    rig.view.proven = false;
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+}
+
+static void assert_lost_after(iw_time_us_t for_us, iw_cause_t cause) {
+    permit_rig_wait(&rig, for_us - 1U);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    permit_rig_wait(&rig, 1);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(cause, rig.permit.stop.cause);
+    TEST_ASSERT_FALSE(rig.permit.stop.latched);
+}
+
+static void test_permit_lease_after_arm_lasts_a_second(void) {
+    arm();
+    assert_lost_after(MS(1000), IW_CAUSE_LEASE_LOST);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+    TEST_ASSERT_EQUAL_UINT32(200, rig.permit.stop.detail);
+    TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.stop.from);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.permit.stop.number);
+    TEST_ASSERT_TRUE(rig.permit.stop.at_us == rig.now_us);
+    TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
+}
+
+static void test_permit_lease_is_shortened_by_the_first_drive(void) {
+    arm();
+    permit_rig_wait(&rig, MS(10));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_drive(&rig, HOLDER, true));
+    assert_lost_after(MS(200), IW_CAUSE_LEASE_LOST);
+}
+
+static void test_permit_lease_follows_the_configuration(void) {
+    static const uint16_t leases_ms[] = {20, 100, 500};
+    for (size_t i = 0; i < 3; i++) {
+        rig.config.lease_ms = leases_ms[i];
+        arm();
+        (void)permit_rig_drive(&rig, HOLDER, true);
+        assert_lost_after(MS(leases_ms[i]), IW_CAUSE_LEASE_LOST);
+        TEST_ASSERT_EQUAL_UINT32(leases_ms[i], rig.permit.stop.detail);
+    }
+}
+
+static void test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one(void) {
+    arm();
+    for (uint32_t n = 0; n < 100; n++) {
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_drive(&rig, HOLDER, (n & 1U) != 0U));
+        permit_rig_wait(&rig, MS(200) - 1U);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    }
+    permit_rig_wait(&rig, 1);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+}
+
+static void test_permit_lease_is_fed_by_nothing_else(void) {
+    arm();
+    (void)permit_rig_drive(&rig, HOLDER, true);
+    permit_rig_wait(&rig, MS(150));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, HOLDER));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_HOLDER, permit_rig_drive(&rig, OTHER, true));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_reset(&rig));
+    iw_permit_remember(&rig.permit, rig.now_us, HOLDER);
+    iw_permit_disconnect(&rig.permit, rig.now_us, OTHER);
+    (void)permit_rig_arm(&rig, OTHER);
+    (void)permit_rig_takeover(&rig, OTHER);
+    assert_lost_after(MS(50), IW_CAUSE_LEASE_LOST);
+}
+
+static void test_permit_drive_at_or_after_the_end_does_not_revive_the_lease(void) {
+    static const uint32_t late_us[] = {0, 1, 1000, 1000000};
+    for (size_t i = 0; i < 4; i++) {
+        arm();
+        (void)permit_rig_drive(&rig, HOLDER, true);
+        rig.now_us += MS(200) + late_us[i];
+        TEST_ASSERT_TRUE(IW_REFUSE_NONE != permit_rig_drive(&rig, HOLDER, true));
+        permit_rig_step(&rig);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
+        permit_rig_step(&rig);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    }
+}
+
+static void test_permit_drive_just_before_the_end_keeps_the_lease(void) {
+    arm();
+    (void)permit_rig_drive(&rig, HOLDER, true);
+    rig.now_us += MS(200) - 1U;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_drive(&rig, HOLDER, true));
+    permit_rig_wait(&rig, MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+}
+
+static void test_permit_drive_is_refused_in_every_state_but_armed(void) {
+    static const struct {
+        permit_situation_t situation;
+        iw_refusal_t refusal;
+    } cases[] = {{PERMIT_LISTENING, IW_REFUSE_NOT_ARMED}, {PERMIT_ARMING, IW_REFUSE_NOT_ARMED},
+                 {PERMIT_ARMED, IW_REFUSE_NONE},          {PERMIT_STOPPING, IW_REFUSE_NOT_ARMED},
+                 {PERMIT_HOLDING, IW_REFUSE_NOT_ARMED},   {PERMIT_LATCHED, IW_REFUSE_LATCHED}};
+    for (size_t i = 0; i < PERMIT_SITUATIONS; i++) {
+        permit_rig_begin(&rig, cases[i].situation);
+        const iw_demand_t before = iw_permit_demand(&rig.permit);
+        TEST_ASSERT_EQUAL_INT(cases[i].refusal, permit_rig_drive(&rig, HOLDER, true));
+        TEST_ASSERT_EQUAL_INT(before, iw_permit_demand(&rig.permit));
+        TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stale_client);
+    }
+}
+
+static void test_permit_drive_refusals_name_what_the_client_can_mend(void) {
+    rig.config.listen_only = true;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_LISTEN_ONLY, permit_rig_drive(&rig, HOLDER, true));
+    setUp();
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, permit_rig_drive(&rig, HOLDER, true));
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_BLOCKED, permit_rig_drive(&rig, HOLDER, true));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, OTHER, true));
+}
+
+static void test_permit_refused_drive_changes_nothing_but_the_memory_of_it(void) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    iw_permit_t before = rig.permit;
+    (void)permit_rig_drive(&rig, OTHER, false);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rig.permit, sizeof before);
+    (void)permit_rig_drive(&rig, OTHER, true);
+    before.stale_us = rig.permit.stale_us;
+    before.stale_client = OTHER;
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rig.permit, sizeof before);
+}
+
+static void test_permit_arm_of_another_client_is_busy(void) {
+    arm();
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, permit_rig_arm(&rig, OTHER));
+    TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
+}
+
+static void test_permit_takeover_at_rest_moves_the_lease(void) {
+    arm();
+    (void)permit_rig_drive(&rig, HOLDER, false);
+    permit_rig_wait(&rig, MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
+    TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_HOLDER, permit_rig_drive(&rig, HOLDER, true));
+    assert_lost_after(MS(1000), IW_CAUSE_LEASE_LOST);
+    TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stop.client);
+}
+
+static void test_permit_takeover_in_motion_is_refused(void) {
+    arm();
+    rig.view.at_rest = false;
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_takeover(&rig, OTHER));
+    rig.view.at_rest = true;
+    rig.view.output_zero = false;
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_takeover(&rig, OTHER));
+    TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
+}
+
+static void test_permit_takeover_from_a_holder_who_wants_to_move_is_stale(void) {
+    arm();
+    (void)permit_rig_drive(&rig, HOLDER, true);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_takeover(&rig, OTHER));
+    TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
+}
+
+static void test_permit_takeover_of_nothing_is_an_ordinary_arm(void) {
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
+    TEST_ASSERT_TRUE(rig.permit.arming);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+}
+
+static void test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion(void) {
+    arm();
+    (void)permit_rig_drive(&rig, HOLDER, false);
+    rig.now_us += MS(200);
+    (void)permit_rig_takeover(&rig, OTHER);
+    permit_rig_step(&rig);
+    TEST_ASSERT_TRUE(rig.permit.holder != HOLDER);
+}
+
+static void test_permit_disconnect_of_the_holder_ends_the_lease_at_once(void) {
+    arm();
+    (void)permit_rig_drive(&rig, HOLDER, true);
+    iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, rig.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
+    TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
+}
+
+static void test_permit_disconnect_of_anybody_else_changes_nothing(void) {
+    for (int situation = 0; situation < PERMIT_SITUATIONS; situation++) {
+        permit_rig_begin(&rig, (permit_situation_t)situation);
+        const iw_permit_t before = rig.permit;
+        iw_permit_disconnect(&rig.permit, rig.now_us, OTHER);
+        TEST_ASSERT_EQUAL_MEMORY(&before, &rig.permit, sizeof before);
+    }
+}
+
+static void test_permit_disconnect_of_the_former_holder_changes_nothing(void) {
+    static const permit_situation_t after[] = {PERMIT_STOPPING, PERMIT_HOLDING, PERMIT_LATCHED};
+    for (size_t i = 0; i < 3; i++) {
+        permit_rig_begin(&rig, after[i]);
+        const iw_permit_t before = rig.permit;
+        iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
+        TEST_ASSERT_EQUAL_MEMORY(&before, &rig.permit, sizeof before);
+    }
+    arm();
+    (void)permit_rig_takeover(&rig, OTHER);
+    iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+}
+
+static void test_permit_stop_needs_no_lease_and_ramps(void) {
+    static const iw_cause_t causes[] = {IW_CAUSE_CLIENT_STOP, IW_CAUSE_SHUTDOWN};
+    for (size_t i = 0; i < 2; i++) {
+        permit_rig_begin(&rig, PERMIT_ARMED);
+        rig.view.applied.wheel[IW_LEFT].speed_mm_s = 123;
+        permit_rig_step(&rig);
+        iw_permit_stop(&rig.permit, rig.now_us, OTHER, causes[i]);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
+        TEST_ASSERT_EQUAL_INT(causes[i], rig.permit.stop.cause);
+        TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stop.client);
+        TEST_ASSERT_EQUAL_INT(123, rig.permit.stop.applied.wheel[IW_LEFT].speed_mm_s);
+    }
+}
+
+static void test_permit_stop_elsewhere_changes_nothing(void) {
+    static const permit_situation_t situations[] = {PERMIT_LISTENING, PERMIT_STOPPING, PERMIT_HOLDING, PERMIT_LATCHED};
+    for (size_t i = 0; i < 4; i++) {
+        permit_rig_begin(&rig, situations[i]);
+        const iw_permit_t before = rig.permit;
+        iw_permit_stop(&rig.permit, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
+        TEST_ASSERT_EQUAL_MEMORY(&before, &rig.permit, sizeof before);
+    }
+}
+
+static void test_permit_moving_again_after_stop_needs_arm_and_pause(void) {
+    permit_rig_begin(&rig, PERMIT_HOLDING);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, permit_rig_arm(&rig, HOLDER));
+    permit_rig_wait(&rig, MS(500));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_permit_lease_after_arm_lasts_a_second);
+    RUN_TEST(test_permit_lease_is_shortened_by_the_first_drive);
+    RUN_TEST(test_permit_lease_follows_the_configuration);
+    RUN_TEST(test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one);
+    RUN_TEST(test_permit_lease_is_fed_by_nothing_else);
+    RUN_TEST(test_permit_drive_at_or_after_the_end_does_not_revive_the_lease);
+    RUN_TEST(test_permit_drive_just_before_the_end_keeps_the_lease);
+    RUN_TEST(test_permit_drive_is_refused_in_every_state_but_armed);
+    RUN_TEST(test_permit_drive_refusals_name_what_the_client_can_mend);
+    RUN_TEST(test_permit_refused_drive_changes_nothing_but_the_memory_of_it);
+    RUN_TEST(test_permit_arm_of_another_client_is_busy);
+    RUN_TEST(test_permit_takeover_at_rest_moves_the_lease);
+    RUN_TEST(test_permit_takeover_in_motion_is_refused);
+    RUN_TEST(test_permit_takeover_from_a_holder_who_wants_to_move_is_stale);
+    RUN_TEST(test_permit_takeover_of_nothing_is_an_ordinary_arm);
+    RUN_TEST(test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion);
+    RUN_TEST(test_permit_disconnect_of_the_holder_ends_the_lease_at_once);
+    RUN_TEST(test_permit_disconnect_of_anybody_else_changes_nothing);
+    RUN_TEST(test_permit_disconnect_of_the_former_holder_changes_nothing);
+    RUN_TEST(test_permit_stop_needs_no_lease_and_ramps);
+    RUN_TEST(test_permit_stop_elsewhere_changes_nothing);
+    RUN_TEST(test_permit_moving_again_after_stop_needs_arm_and_pause);
+    return UNITY_END();
+}
