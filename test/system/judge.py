@@ -4,8 +4,8 @@
 Written from the rules of motion permission, not from the gateway's code. The bus log is the only witness of what the gateway
 did; the timeline tells what was done to it. Times are integer microseconds of CLOCK_MONOTONIC; see judge_log.py for the timeline.
 """
-from judge_log import (GAP_US, HOLD_MAX_US, JITTER_US, PAIR_US, REST_RPM, SETTLED_US, SPEED_IDS, Reading,
-                       percentile, signed)
+from judge_log import (ECHO_US, GAP_US, HOLD_MAX_US, JITTER_US, PAIR_US, RESIDUAL_US, RESIDUAL_ZERO_US, REST_RPM,
+                       SETTLED_US, SPEED_IDS, Reading, percentile, signed)
 
 
 class Judge(Reading):
@@ -59,10 +59,23 @@ class Judge(Reading):
             return
         if any(begin + 2 * ECHO_US < t_us < end for begin, end in self.dead):
             self._say("motion_on_dead_bus", t_us, f"{name} while the bus took no frames")
+        if self._is_residual(setpoint):
+            return
         self._within_command(setpoint, previous, drives)
         self._lease_rule(setpoint, name, drives)
         for end in session.ends:
             self._after_end(setpoint, name, session, end, after_press)
+
+    def _is_residual(self, setpoint):
+        """The one old frame per wheel that a controller had in hand when the bus died; its zero follows within 2 ms."""
+        for begin, end in self.dead:
+            later = [s for s in self.setpoints if s.side == setpoint.side and s.t_us >= max(end, begin + 2 * ECHO_US)]
+            if later and later[0] is setpoint and setpoint.t_us < end + RESIDUAL_US:
+                self.residual += 1
+                if len(later) < 2 or not later[1].zero or later[1].t_us - setpoint.t_us > RESIDUAL_ZERO_US:
+                    self._say("old_frame", setpoint.t_us, f"an old frame of {setpoint.speed} mm/s without a zero right behind it")
+                return True
+        return False
 
     def _within_command(self, setpoint, previous, drives):
         """Between what it was, zero and what was commanded lately; never beyond."""

@@ -27,6 +27,8 @@ HOLD_MAX_US = 10_000_000
 FIRST_LEASE_US = 1_000_000
 ALWAYS_US = 200_000       # a limit missed by more than this is no matter of a busy machine
 ECHO_US = 50_000
+RESIDUAL_US = 5_000_000   # an old frame comes out this soon after the bus lives again, if ever
+RESIDUAL_ZERO_US = 2_000  # and its zero follows
 
 
 class Frame(NamedTuple):
@@ -101,7 +103,7 @@ class Reading:
         self.finished_us = finished_us or (self.frames[-1].t_us if self.frames else 0)
         self.found = []
         self.estop_latencies_us = []
-        self.gap_max_us = self.pair_max_us = 0
+        self.gap_max_us = self.pair_max_us = self.residual = 0
         self.setpoints = []
         self.dead = self._dead_windows()
 

@@ -187,6 +187,13 @@ def faults():
     yield "sending after the process died", f, e + [Event(3_000 * MS, "end")], "nonzero_after_killed"
     yield "a latching fault answered late", f, e + [Event(3_000 * MS, "cut", within_us=100 * MS)], "nonzero_after_cut"
     yield "old setpoints out of a queue", f, e + [Event(2_500 * MS, "dead"), Event(3_300 * MS, "alive", 3_300 * MS)], "motion_on_dead_bus"
+    off = [Event(9_500 * MS, "dead"), Event(9_500 * MS, "cut", within_us=50 * MS), Event(12_000 * MS, "alive", 12_000 * MS)]
+    dark = between(f, 9_500, 99_999, drop)
+    yield "two old frames after the bus lives again", add(dark, *pair(12_001, -200, 200), *pair(12_002, -200, 200)), e + off, "old_frame"
+    yield "an old frame without its zero", add(dark, *pair(12_001, -200, 200)), e + off, "old_frame"
+    yield "an old frame, its zero 20 ms later", add(dark, *pair(12_001, -200, 200), *pair(12_021, 0, 0)), e + off, "old_frame"
+    yield "old frames again and again", add(dark, *pair(12_001, -200, 200), *pair(12_002, 0, 0), *pair(12_041, -200, 200)), e + off, \
+        "nonzero_after_cut"
     yield "motion after a restart", add(f, *pair(12_120, 50, 50)), e + [Event(12_100 * MS, "restart_hold")], "motion_without_drive"
     yield "no zeros after a crash while armed", f, e + [Event(12_100 * MS, "restart_hold")], "never_sent"
     yield "nonzero current in a zero", between(good(CONFIG._replace(role="setpoint")), 7_200, 8_300, with_data(3, 2000)), e, \
@@ -204,6 +211,9 @@ def goods():
         yield name, good(config), e, {"config": config}
     yield "foreign frames of the scenario's own", add(f, *(x._replace(own=True) for x in pair(12_000, 900, 900))), e, {}
     yield "one pair on its way at the e-stop", add(f, *pair(3_520.2, 300, 300)), e, {}
+    off = [Event(9_500 * MS, "dead"), Event(9_500 * MS, "cut", within_us=50 * MS), Event(12_000 * MS, "alive", 12_000 * MS)]
+    yield "one old frame per wheel and its zero", add(between(f, 9_500, 99_999, drop), *pair(12_001, -200, 200), *pair(12_001.5, 0, 0)), \
+        [x for x in e if x.t_us < 9_500 * MS] + off, {}
     yield "no motion wanted, none made", [x for x in f if not is_setpoint(x)], [e[0]], {"moves": False}
 
 

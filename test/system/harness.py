@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: MIT
+"""Starts simulator and gateway in a private folder, keeps the timeline, and ends what it started, by process id."""
+import ctypes
+import grp
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+from bus import Bus, now_us
+from client import Client, Closed
+from judge import Judge
+from judge_log import Config, Event, percentile
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+PR_SET_PDEATHSIG = 1
+DEFAULTS = {
+    "wheels": {"setpoint_type": 1, "current_role": "limit"},
+    "drive": {},
+    "northbound": {"mode": "0600"},
+}
+
+
+def die_with_parent():
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+class Process:
+    """A child whose output goes to a file."""
+
+    def __init__(self, command, output, setup=None, **options):
+        self.output = output
+
+        def prepare():
+            die_with_parent()
+            if setup:
+                setup()
+        with open(output, "ab") as file:
+            self.child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=options.pop("stdout", file), stderr=file,
+                                          preexec_fn=prepare, **options)
+
+    def signal(self, number):
+        if self.child.poll() is None:
+            self.child.send_signal(number)
+
+    def wait(self, seconds):
+        try:
+            return self.child.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+
+    def text(self):
+        with open(self.output, encoding="utf-8", errors="replace") as file:
+            return file.read()
+
+    def cpu_seconds(self):
+        with open(f"/proc/{self.child.pid}/stat", encoding="ascii") as file:
+            fields = file.read().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    def resident_kB(self):
+        with open(f"/proc/{self.child.pid}/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1024
+
+    def descriptors(self):
+        return len(os.listdir(f"/proc/{self.child.pid}/fd"))
+
+    def end(self):
+        self.signal(signal.SIGCONT)
+        self.signal(signal.SIGTERM)
+        if self.wait(0.3) is None:
+            self.signal(signal.SIGKILL)
+            self.wait(2)
+
+
+class Sim:
+    """The simulator and its control socket."""
+
+    def __init__(self, rig, extra=()):
+        self.rig = rig
+        command = [rig.program("iwheel-sim"), "--can", f"unix:{rig.path('bus')}", "--estop", rig.path("button"),
+                   "--control", rig.path("control"), "--seed", "1", *extra]
+        self.process = Process(command, rig.path("sim.out"))
+        self.control = wait_connect(rig.path("control"), self.process)
+        self.lines = self.control.makefile("r")
+
+    def ask(self, command):
+        """Sends one command and returns the answer's text; raises if it is refused."""
+        answer = self.try_ask(command)
+        if not answer.startswith("ok"):
+            raise RuntimeError(f"simulator: {command}: {answer}")
+        return answer[3:]
+
+    def try_ask(self, command):
+        self.control.sendall((command + "\n").encode())
+        return self.lines.readline().rstrip("\n")
+
+    def end(self):
+        self.control.close()
+        self.process.end()
+
+
+def wait_connect(path, process, seconds=5.0):
+    deadline = time.monotonic() + seconds
+    while True:
+        sock = socket.socket(socket.AF_UNIX)
+        sock.settimeout(3)
+        try:
+            sock.connect(path)
+            return sock
+        except OSError as error:
+            sock.close()
+            if process.child.poll() is not None:
+                raise RuntimeError(f"{process.child.args[0]} ended with {process.child.returncode}: {process.text()[-600:]}") from error
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.005)
+
+
+class Rig:
+    """One simulator, one bus recorder, one gateway (restartable), one timeline."""
+
+    def __init__(self, build, config=None, sim_args=(), estop=True):
+        self.build = build
+        self.folder = tempfile.mkdtemp(prefix="iwheel-")
+        self.timeline = []
+        self.processes, self.clients = [], []
+        self.gateway = None
+        self.estop, self.button = estop, "button"
+        self.settings = {section: dict(keys) for section, keys in DEFAULTS.items()}
+        self.settings["northbound"]["group"] = grp.getgrgid(os.getgid()).gr_name
+        for section, keys in (config or {}).items():
+            self.settings.setdefault(section, {}).update(keys)
+        self.write_config()
+        self.sim = Sim(self, sim_args)
+        self.bus = Bus(self.path("bus"))
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def program(self, name):
+        return find_program(self.build, name)
+
+    def write_config(self, name="gateway.conf"):
+        with open(self.path(name), "w", encoding="utf-8") as file:
+            for section, keys in self.settings.items():
+                file.write(f"[{section}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()))
+
+    def judge_config(self):
+        wheels, drive = self.settings["wheels"], self.settings["drive"]
+        values = {key: drive[key] for key in drive if key in Config._fields}
+        return Config(setpoint_type=wheels["setpoint_type"], role=wheels["current_role"], dlc=wheels.get("setpoint_dlc", 5),
+                      invert=tuple(self.settings.get(side, {}).get("invert") == "yes" for side in ("left", "right")), **values)
+
+    # The gateway ------------------------------------------------------------------------------------------------------
+
+    def gateway_command(self, *extra):
+        estop = f"unix:{self.path(self.button)}" if self.estop else "none"
+        return [self.program("iwheel-gateway"), "-c", self.path("gateway.conf"), "--can", f"unix:{self.path('bus')}",
+                "--socket", self.path("gateway.sock"), "--estop", estop, *extra]
+
+    def start_gateway(self, *extra, setup=None, wheels=True, restart_hold=False):
+        """Starts it and waits until it answers, and with `wheels` until both are heard. Returns the milliseconds to the answer."""
+        begin_us = now_us()
+        self.gateway = Process(self.gateway_command(*extra), self.path("gateway.out"), setup)
+        self.processes.append(self.gateway)
+        self.timeline.append(Event(begin_us, "start"))
+        if restart_hold:
+            self.timeline.append(Event(begin_us, "restart_hold"))
+        wait_connect(self.path("gateway.sock"), self.gateway).close()
+        client = self.client(name="starter")
+        client.request("hello")
+        answered_ms = (now_us() - begin_us) / 1000
+        if wheels:
+            self.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active"
+                             and s["estop"]["state"] in ("released", "none"))
+        client.close()
+        return answered_ms
+
+    def wait_status(self, client, condition, seconds=4.0):
+        """Asks until the snapshot fulfils the condition; returns it, or None after that time."""
+        deadline = time.monotonic() + seconds
+        while True:
+            status = client.request("status")
+            if condition(status):
+                return status
+            if time.monotonic() > deadline:
+                return None
+            time.sleep(0.02)
+
+    def kill_gateway(self, number):
+        """Ends it by a signal that it cannot or does not handle."""
+        self.timeline.append(Event(now_us(), "end"))
+        self.gateway.signal(number)
+        return self.gateway.wait(3)
+
+    def client(self, name="test"):
+        client = Client(self.path("gateway.sock"), self.timeline, name)
+        self.clients.append(client)
+        return client
+
+    def spawn(self, script, *arguments):
+        output = self.path(f"{script}.{len(self.processes)}.out")
+        process = Process([sys.executable, os.path.join(HERE, script), *map(str, arguments)], output)
+        self.processes.append(process)
+        return process
+
+    def take_events(self, process):
+        """What a drive_client.py wrote, into the timeline."""
+        for line in process.text().splitlines():
+            words = line.split()
+            if len(words) == len(Event._fields):
+                numbers = [int(word) if word.lstrip("-").isdigit() else word for word in words]
+                self.timeline.append(Event(*numbers)._replace(ok=words[3] == "True"))
+
+    def restart_sim(self, frames):
+        """Another simulator after the first one died; `frames` are what the recorder had until then."""
+        self.sim.end()
+        self.sim = Sim(self)
+        self.bus = Bus(self.path("bus"), frames)
+
+    # The timeline -----------------------------------------------------------------------------------------------------
+
+    def note(self, kind, **fields):
+        self.timeline.append(Event(now_us(), kind, **fields))
+
+    def press(self):
+        t_us = now_us()
+        self.sim.ask("estop press")
+        self.timeline.append(Event(t_us, "press", now_us()))
+        return t_us
+
+    def release(self):
+        self.sim.ask("estop release")
+
+    def fault(self, command, kind="cut", within_ms=0):
+        """Injects a fault that must stop the wheels."""
+        self.timeline.append(Event(now_us(), kind, within_us=within_ms * 1000))
+        return self.sim.ask(command)
+
+    def judge(self, moves=True, **options):
+        """Stops recording and judges. Call it once, at the end."""
+        time.sleep(0.05)
+        finished_us = now_us() - 20_000
+        self.bus.close()
+        frames = [frame for frame in self.bus.frames if frame.t_us <= finished_us]
+        judge = Judge(self.judge_config(), frames, self.timeline, moves=moves, finished_us=finished_us, **options)
+        judge.judge()
+        return judge
+
+    def close(self, keep=False):
+        for client in self.clients:
+            client.close()
+        for process in reversed(self.processes):
+            process.end()
+        self.sim.end()
+        self.bus.close()
+        if not keep:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def find_program(build, name):
+    folder = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim"}[name]
+    for path in (os.path.join(build, "app", folder, name), os.path.join(build, "bin", name), os.path.join(build, name)):
+        if os.access(path, os.X_OK):
+            return path
+    raise FileNotFoundError(f"{name} is not in {build}; build it first: cmake --build {build} --target {name}")
+
+
+__all__ = ["Closed", "Event", "Process", "Rig", "find_program", "now_us", "percentile", "wait_connect"]

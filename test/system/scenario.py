@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""What a scenario is given: a rig, checks, figures. Scenarios register themselves with @scenario."""
+import time
+
+from harness import Rig, percentile
+
+REGISTRY = {}
+
+
+class Skip(Exception):
+    """Cannot be tested here; the text says what is missing."""
+
+
+def scenario(title, seconds=5):
+    """`seconds`: roughly how long it takes; the longest start first."""
+    def register(function):
+        REGISTRY[function.__name__] = (title, seconds, function)
+        return function
+    return register
+
+
+class Test:
+    """Collects failures as [text, kind, t_us]; kind: "rule" is always judged, "timing" and "check" not on a stalled machine."""
+
+    def __init__(self, build):
+        self.build = build
+        self.failures, self.figures, self.latencies_us = [], [], []
+        self.rigs = []
+
+    def rig(self, *arguments, **options):
+        rig = Rig(self.build, *arguments, **options)
+        self.rigs.append(rig)
+        return rig
+
+    def running(self, config=None, **options):
+        """A rig with the gateway up, both wheels heard and at rest, and a client."""
+        rig = self.rig(config, **options)
+        rig.start_gateway()
+        return rig, rig.client()
+
+    def check(self, condition, text, timing=False, at_us=0):
+        if not condition:
+            self.failures.append([text, "timing" if timing else "check", at_us])
+        return bool(condition)
+
+    def expect(self, reply, error=None):
+        """The reply is ok, or has that error and a message worth reading."""
+        if error is None:
+            return self.check(reply["ok"], f"refused: {reply.get('error')}: {reply.get('message')}")
+        told = self.check(not reply["ok"] and reply["error"] == error, f"{error} expected, got {reply}")
+        return told and self.check(len(reply.get("message") or "") > 10, f"{error} without a message: {reply}")
+
+    def arm(self, client, **fields):
+        """Arms; tries again for a while if the wheels are not at rest yet."""
+        reply = client.arm(**fields)
+        for _ in range(150):
+            if reply["ok"] or reply["error"] not in ("not_at_rest", "stale_command", "cause_present"):
+                break
+            time.sleep(0.02)
+            reply = client.arm(**fields)
+        self.expect(reply)
+        return reply
+
+    def drive_for(self, client, left, right, seconds, every=0.05):
+        refusal = client.stream(left, right, seconds, every)
+        self.check(refusal is None, f"drive was refused: {refusal}")
+
+    def stopped_by(self, client, cause, state="latched"):
+        """`why` names that cause, and the state is as told."""
+        why, status = client.request("why"), client.request("status")
+        self.check(why.get("cause") == cause, f"cause {cause} expected, why says {why.get('cause')}: {why.get('sentence')}")
+        self.check(status["state"] == state, f"state {state} expected, it is {status['state']}")
+        self.check(len(why.get("sentence") or "") > 20, f"why has no sentence: {why}")
+        return why
+
+    def figure(self, text):
+        self.figures.append(text)
+
+    def first_after(self, rig, t_us, wanted, text, limit_ms):
+        """Milliseconds from t_us to the first setpoint that fulfils wanted(mm_s); checked against the limit."""
+        hit = next((t for t, _, speed in rig.bus.setpoints(t_us) if wanted(speed)), None)
+        if not self.check(hit is not None, f"{text}: never"):
+            return None
+        elapsed_ms = (hit - t_us) / 1000
+        self.check(elapsed_ms <= limit_ms, f"{text} after {elapsed_ms:.1f} ms, {limit_ms} ms allowed", True, hit)
+        return elapsed_ms
+
+    def judge(self, rig, moves=True, **options):
+        judge = rig.judge(moves=moves, **options)
+        for found in judge.found[:6]:
+            at = f"at {(found.t_us - rig.timeline[0].t_us) / 1e6:.3f} s: " if found.t_us else ""
+            self.failures.append([f"{found.rule}: {at}{found.text}", "timing" if found.timing else "rule", found.t_us])
+        if judge.gap_max_us:
+            self.figure(f"longest gap {judge.gap_max_us / 1000:.0f} ms")
+        if judge.estop_latencies_us:
+            self.latencies_us += judge.estop_latencies_us
+            if len(judge.estop_latencies_us) > 1:
+                self.figure(f"e-stop p99 {percentile(judge.estop_latencies_us, 99) / 1000:.2f} ms of {len(judge.estop_latencies_us)}")
+            else:
+                self.figure(f"e-stop to zero {judge.estop_latencies_us[0] / 1000:.2f} ms")
+        return judge

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: MIT
+"""Rows 15 (local bus), 18, 19, 20: power lost, foreign masters, frames that are none."""
+import signal
+import struct
+import time
+
+from bus import EXTENDED, REMOTE, ERROR
+from client import Streamer
+from harness import now_us
+from judge_log import LEFT, RIGHT, Event
+from scenario import scenario
+
+FOREIGN_ZERO = struct.pack(">Bhh", 1, 0, 2000)
+
+
+def wait_reset(t, client, seconds=6.0):
+    end, reasons = time.monotonic() + seconds, []
+    while True:
+        reply = client.request("reset")
+        if reply["ok"] or time.monotonic() > end:
+            t.expect(reply)
+            return reasons
+        reasons.append(reply["error"])
+        time.sleep(0.05)
+
+
+def power_cut(t, seconds, speed):
+    rig, client = t.running({"drive": {"accel_mm_s2": 2000}})
+    t.arm(client)
+    stream = Streamer(client, speed, speed)
+    time.sleep(1.0)
+    rig.note("dead")
+    rig.fault("power off", within_ms=70)
+    time.sleep(0.3)
+    stream.stop()
+    why = t.stopped_by(client, "wheel_lost") if client.request("why")["cause"] != "send_stalled" else t.stopped_by(client, "send_stalled")
+    refusal = client.request("reset")
+    t.check(not refusal["ok"], "reset waits until the wheels are heard")
+    time.sleep(seconds - 0.4)
+    back_us = now_us()
+    rig.sim.ask("power on")
+    rig.timeline.append(Event(back_us, "alive", now_us()))
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10), "the wheels are heard again")
+    time.sleep(0.5)
+    late = [(at, side, value) for at, side, value in rig.bus.setpoints(back_us)]
+    moving = [entry for entry in late if entry[2]]
+    t.check(len([e for e in moving if e[1] == LEFT]) <= 1 and len([e for e in moving if e[1] == RIGHT]) <= 1,
+            f"at most one old frame per wheel came out: {[(at - back_us, side, value) for at, side, value in moving]}")
+    t.check(max((abs(rig.bus.speed_rpm(side)) for side in (0, 1))) <= 2, "the wheels stand")
+    wait_reset(t, client)
+    t.figure(f"{why['cause']}, {len(moving)} old and {len(late) - len(moving)} zero frames afterwards")
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    client.request("stop")
+    time.sleep(0.4)
+    judge = t.judge(rig)
+    t.figure(f"residual {judge.residual}")
+
+
+@scenario("wheel power cut for 10 s at full command, then back", 18)
+def row18_power_cut_10_s(t):
+    power_cut(t, 10.0, 800)
+
+
+@scenario("wheel power cut for 0.6 s at full command, then back", 8)
+def row18_power_cut_short(t):
+    power_cut(t, 0.6, 800)
+
+
+@scenario("a second master while driving: stop, latched", 6)
+def row19_second_master_driving(t):
+    rig, client = t.running()
+    t.arm(client)
+    stream = Streamer(client, 300, 300)
+    time.sleep(0.7)
+    rig.timeline.append(Event(now_us(), "cut", within_us=30_000))
+    foreign_us = now_us()
+    rig.bus.send(RIGHT, struct.pack(">Bhh", 1, 300, 2000))
+    time.sleep(0.2)
+    stream.stop()
+    ms = t.first_after(rig, foreign_us, lambda speed: speed == 0, "zero after the foreign frame", 30)
+    t.figure(f"zero after {ms or 0:.1f} ms")
+    why = t.stopped_by(client, "second_master")
+    t.check(why["detail"] == RIGHT and "298" in why["sentence"] and "0x12A" in why["sentence"], f"why names the id: {why['sentence']}")
+    reasons = wait_reset(t, client)
+    t.check("cause_present" in reasons or "second_master" in reasons or "stale_command" in reasons, f"reset waits: {set(reasons)}")
+    t.judge(rig)
+
+
+@scenario("a second master while stopping: latched", 5)
+def row19_second_master_stopping(t):
+    rig, client = t.running()
+    t.arm(client)
+    t.drive_for(client, 300, 300, 0.7)
+    client.request("stop")
+    time.sleep(0.6)
+    rig.timeline.append(Event(now_us(), "cut", within_us=30_000))
+    rig.bus.send(LEFT, FOREIGN_ZERO)
+    time.sleep(0.1)
+    t.stopped_by(client, "second_master")
+    t.judge(rig)
+
+
+@scenario("a second master while listening: nothing is sent, arm refused", 6)
+def row19_second_master_listening(t):
+    rig, client = t.running()
+    client.request("watch", topics=["stop"])
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        rig.bus.send(LEFT, FOREIGN_ZERO)
+        rig.bus.send(RIGHT, FOREIGN_ZERO)
+        time.sleep(0.02)
+        if end - time.monotonic() < 0.9:  # after the first frames were surely seen
+            t.expect(client.arm(), "second_master")
+    t.check(client.request("status")["state"] == "listening", "it is an event, not a latch")
+    t.check(any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes")
+    t.check(not rig.bus.setpoints(), "nothing is sent")
+    time.sleep(1.1)
+    t.arm(client)
+    time.sleep(0.1)
+    t.judge(rig, moves=False)
+
+
+@scenario("forged error frames: nothing is sent while listening, never motion", 5)
+def row19_forged_error_frames(t):
+    rig, client = t.running()
+    for _ in range(50):
+        rig.bus.send(ERROR | 0x40, bytes(8))
+        rig.bus.send(ERROR | 0x04, bytes([0, 0x30, 0, 0, 0, 0, 0, 0]))
+        time.sleep(0.01)
+    t.check(not rig.bus.setpoints(), "nothing is sent while listening")
+    time.sleep(1.2)
+    rig.bus.send(ERROR | 0x100, bytes(8))
+    time.sleep(0.2)
+    t.check(client.request("status")["state"] in ("listening", "latched"), "alive")
+    t.judge(rig, moves=False)
+
+
+def feed(rig, seconds, can_id, data):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        rig.bus.send(can_id, data)
+        time.sleep(0.004)
+
+
+@scenario("remote, extended and short frames do not keep a wheel alive", 7)
+def row20_odd_frames(t):
+    rig, client = t.running()
+    before = client.request("status")["counters"]
+    t.arm(client)
+    stream = Streamer(client, 300, 300)
+    time.sleep(0.6)
+    speed = struct.pack(">hh", 15, 0)
+    rig.fault("mute left", within_ms=80)
+    muted_us, end = now_us(), time.monotonic() + 0.3
+    while time.monotonic() < end:
+        rig.bus.send(256 | REMOTE, b"", 4)
+        rig.bus.send(256 | EXTENDED, speed)
+        rig.bus.send(256, speed[:3])
+        time.sleep(0.004)
+    stream.stop()
+    ms = t.first_after(rig, muted_us, lambda value: value == 0, "zero although odd frames came", 80)
+    t.figure(f"zero after {ms or 0:.0f} ms")
+    t.stopped_by(client, "wheel_lost")
+    after = client.request("status")["counters"]
+    t.check(after["bad_format"] - before["bad_format"] >= 50, f"counted as bad format: {after['bad_format'] - before['bad_format']}")
+    t.check(after["bad_length"] - before["bad_length"] >= 25, f"counted as bad length: {after['bad_length'] - before['bad_length']}")
+    feed(rig, 0.3, 256, bytes(8))
+    t.check(client.request("status")["left"]["heard"], "a longer frame is accepted")
+    rig.sim.ask("unmute left")
+    t.judge(rig)
+
+
+@scenario("the bus goes away and comes back: stop, found again, nothing moves", 9)
+def row15_bus_gone(t):
+    rig, client = t.running()
+    t.arm(client)
+    stream = Streamer(client, 300, 300)
+    time.sleep(0.7)
+    first_bus = rig.bus
+    rig.note("dead")
+    rig.note("cut", within_us=60_000)
+    rig.sim.process.signal(signal.SIGKILL)
+    rig.sim.process.wait(2)
+    time.sleep(0.3)
+    stream.stop()
+    status = client.request("status")
+    t.check(status["state"] == "latched" and status["cause"] in ("bus_down", "estop_line"), f"{status['state']}, {status['cause']}")
+    first_bus.close()
+    rig.restart_sim(first_bus.frames)
+    rig.note("alive")
+    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6), "found again")
+    wait_reset(t, client)
+    time.sleep(0.3)
+    t.check(not rig.bus.setpoints(), "nothing is sent after the return")
+    t.judge(rig)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Row 5: observers that die, flood, connect a thousand times, use up the descriptors."""
+import os
+import resource
+import select
+import socket
+import threading
+import time
+
+from client import Streamer
+from scenario import scenario
+
+
+def connect(path):
+    sock = socket.socket(socket.AF_UNIX)
+    sock.settimeout(2)
+    sock.connect(path)
+    return sock
+
+
+def read_some(sock, seconds=0.5):
+    sock.settimeout(seconds)
+    try:
+        return sock.recv(65536)
+    except OSError:
+        return b""
+
+
+@scenario("observers die, flood, connect 1000 times: the owner is undisturbed", 10)
+def row05_many_observers(t):
+    rig, owner = t.running()
+    path = rig.path("gateway.sock")
+    t.arm(owner)
+    stream = Streamer(owner, 300, 300)
+    time.sleep(0.6)
+    descriptors, memory_kB, cpu, begin = rig.gateway.descriptors(), rig.gateway.resident_kB(), rig.gateway.cpu_seconds(), time.monotonic()
+    for number in range(1000):
+        sock = connect(path)
+        if number % 3 == 0:
+            sock.sendall(b'{"cmd":"watch","topics":["state","frame"],"rate_hz":100}\n')
+        sock.close()
+    t.figure(f"1000 connections in {time.monotonic() - begin:.1f} s")
+    crowd = [connect(path) for _ in range(30)]
+    time.sleep(0.2)
+    refused = [sock for sock in crowd if b"too_many_clients" in read_some(sock, 0.3)]
+    t.check(len(refused) >= 14, f"{len(refused)} of 30 were told too_many_clients, at most 16 clients are allowed")
+    for sock in crowd:
+        sock.close()
+    time.sleep(0.2)
+    flood_until = time.monotonic() + 1.5
+
+    def flood():
+        sock = connect(path)
+        while time.monotonic() < flood_until:
+            if select.select([], [sock], [], 0.1)[1]:
+                sock.sendall(b'{"cmd":"status"}\n' * 3)
+            while select.select([sock], [], [], 0)[0] and sock.recv(65536):
+                pass
+        sock.close()
+    floods = [threading.Thread(target=flood) for _ in range(2)]
+    for thread in floods:
+        thread.start()
+    for thread in floods:
+        thread.join()
+    refusal = stream.stop()
+    t.check(refusal is None, f"the owner was refused: {refusal}")
+    time.sleep(0.4)
+    t.check(rig.gateway.descriptors() <= descriptors, f"descriptors: {descriptors} before, {rig.gateway.descriptors()} after")
+    t.check(rig.gateway.resident_kB() <= memory_kB + 1024, f"memory: {memory_kB} kB before, {rig.gateway.resident_kB()} kB after")
+    t.figure(f"gateway took {100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin):.0f} % CPU")
+    time.sleep(0.5)
+    t.judge(rig)
+
+
+@scenario("no descriptor left: no busy loop, the owner is undisturbed", 8)
+def row05_out_of_descriptors(t):
+    rig = t.rig({"northbound": {"max_clients": 64}})
+    rig.start_gateway(setup=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (24, 24)))
+    owner = rig.client("owner")
+    t.arm(owner)
+    stream = Streamer(owner, 200, 200)
+    time.sleep(0.4)
+    crowd = []
+    for _ in range(40):
+        sock = socket.socket(socket.AF_UNIX)
+        sock.setblocking(False)
+        try:
+            sock.connect(rig.path("gateway.sock"))
+        except OSError:
+            pass
+        crowd.append(sock)
+    time.sleep(0.2)
+    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
+    time.sleep(1.5)
+    percent = 100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
+    t.check(percent < 50, f"{percent:.0f} % CPU while no descriptor is left", True)
+    t.figure(f"{percent:.0f} % CPU while starved of descriptors")
+    for sock in crowd:
+        sock.close()
+    time.sleep(0.5)
+    t.check(stream.stop() is None, f"the owner was refused: {stream.refusal}")
+    late = rig.client("late")
+    t.expect(late.request("hello"))
+    t.check(os.path.exists(rig.path("gateway.sock")), "the socket is still there")
+    time.sleep(0.4)
+    t.judge(rig)

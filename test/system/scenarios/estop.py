@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+"""Rows 11 to 13: the e-stop, by the simulator's button."""
+import os
+import random
+import socket
+import threading
+import time
+
+from client import Streamer
+from harness import now_us
+from judge_log import Event
+from scenario import scenario
+
+PRESSES = 25
+WORST_US = 20_000  # of a single press; 5 ms holds for the 99th percentile of all presses together
+
+
+def reset(t, client, seconds=4.0):
+    """Resets as soon as it is accepted. Returns the reasons given before."""
+    reasons, end = [], time.monotonic() + seconds
+    while True:
+        reply = client.request("reset")
+        if reply["ok"] or time.monotonic() > end:
+            t.expect(reply)
+            return reasons
+        reasons.append(reply["error"])
+        time.sleep(0.03)
+
+
+def presses(t, seed):
+    """Arm, drive, press at a random moment, release, reset; again and again."""
+    chance = random.Random(seed)
+    rig, client = t.running()
+    pusher = rig.client("watcher")
+    for number in range(PRESSES):
+        t.arm(client)
+        stream = Streamer(client, chance.randrange(100, 600), chance.randrange(100, 600))
+        time.sleep(chance.uniform(0.1, 0.4))
+        rig.press()
+        time.sleep(chance.uniform(0.02, 0.08))
+        status = pusher.request("status")
+        t.check(status["state"] == "latched" and status["cause"] == "estop_line", f"press {number}: {status['state']}, {status['cause']}")
+        refusal = stream.stop()
+        t.check(refusal and refusal["error"] in ("latched", "estop_pressed"), f"press {number}: drive after the press: {refusal}")
+        t.expect(pusher.request("reset"), "estop_pressed")
+        rig.release()
+        time.sleep(chance.uniform(0.0, 0.05))
+        t.check(pusher.request("status")["state"] == "latched", f"press {number}: release alone must not unlatch")
+        reset(t, pusher)
+        if t.failures:
+            break
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+for part in range(4):
+    def run(t, part=part):
+        presses(t, 100 + part)
+    run.__name__ = f"row11_presses_{part + 1}"
+    scenario(f"{PRESSES} presses in motion at random phase", 42)(run)
+
+
+@scenario("pulses of 1 to 20 ms latch", 8)
+def row12_short_pulses(t):
+    rig, client = t.running()
+    for pulse_ms in (1, 2, 5, 10, 20):
+        t.arm(client)
+        stream = Streamer(client, 200, 200)
+        time.sleep(0.25)
+        t_us = now_us()
+        rig.sim.ask(f"estop pulse {pulse_ms}")
+        rig.timeline.append(Event(t_us, "press", now_us()))
+        time.sleep(0.1)
+        stream.stop()
+        t.stopped_by(client, "estop_line")
+        reset(t, client)
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+@scenario("pressed at start: starts latched; reset while pressed refused; reset repeated counts once", 5)
+def row13_pressed_at_start(t):
+    rig = t.rig()
+    rig.sim.ask("estop press")
+    rig.start_gateway(wheels=False)
+    client = rig.client()
+    t.check(rig.wait_status(client, lambda s: s["state"] == "latched" and s["left"]["at_rest"] and s["right"]["at_rest"], 3), "latched from the start")
+    t.stopped_by(client, "estop_line")
+    refusal = client.arm()
+    t.check(not refusal["ok"] and refusal["error"] in ("estop_pressed", "latched"), f"arm is refused: {refusal}")
+    for _ in range(5):
+        t.expect(client.request("reset"), "estop_pressed")
+    rig.release()
+    time.sleep(0.3)
+    t.check(client.request("status")["state"] == "latched", "release does not unlatch")
+    reset(t, client)
+    for _ in range(5):
+        reply = client.request("reset")
+        t.check(reply["ok"] and reply["state"] == "listening", f"repeated reset: {reply}")
+    t.expect(client.drive(200, 200), "not_armed")
+    time.sleep(0.3)
+    t.check(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
+    t.judge(rig, moves=False)
+
+
+@scenario("reset says why not: pressed, moving, commanded, just happened", 6)
+def reset_refusals(t):
+    rig, client = t.running()
+    t.arm(client)
+    t.drive_for(client, 600, 600, 1.2)
+    rig.press()
+    t.expect(client.request("reset"), "estop_pressed")
+    rig.release()
+    time.sleep(0.02)
+    reasons = set(reset(t, client))
+    t.check(reasons & {"not_at_rest", "stale_command"}, f"reasons on the way: {reasons}")
+    t.figure("refused for " + ", ".join(sorted(reasons)))
+    t.expect(client.drive(100, 100), "not_armed")
+    t.expect(client.arm(), "stale_command")
+    t.arm(client)
+    time.sleep(0.2)
+    t.judge(rig)
+
+
+@scenario("software e-stop by somebody without the lease", 5)
+def software_estop(t):
+    rig, owner = t.running()
+    t.arm(owner)
+    stream = Streamer(owner, 400, 400)
+    time.sleep(0.6)
+    guard = rig.client("guard")
+    t.expect(guard.request("estop", reason="somebody in the way"))
+    time.sleep(0.1)
+    stream.stop()
+    why = t.stopped_by(guard, "estop_software")
+    t.check("somebody in the way" in why["sentence"], f"why tells the reason: {why['sentence']}")
+    reset(t, guard)
+    t.check(guard.request("status")["state"] == "listening", "reset leads to listening")
+    time.sleep(0.3)
+    t.judge(rig)
+
+
+class Button:
+    """A button process of our own, to let it die."""
+
+    def __init__(self, path):
+        self.path = path
+        self.open()
+
+    def open(self):
+        if os.path.exists(self.path):
+            os.unlink(self.path)
+        self.listener = socket.socket(socket.AF_UNIX)
+        self.listener.bind(self.path)
+        self.listener.listen(4)
+        self.connections = []
+        threading.Thread(target=self._serve, args=(self.listener,), daemon=True).start()
+
+    def _serve(self, listener):
+        while True:
+            try:
+                connection, _ = listener.accept()
+                connection.sendall(b"0")
+                self.connections.append(connection)
+            except OSError:
+                return
+
+    def die(self):
+        os.unlink(self.path)
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
+        for connection in self.connections:
+            connection.close()
+
+
+@scenario("the button's process dies: pressed; it comes back: reset needed", 6)
+def row14_button_dies(t):
+    rig = t.rig()
+    rig.button = "own-button"
+    button = Button(rig.path(rig.button))
+    rig.start_gateway()
+    client = rig.client()
+    t.arm(client)
+    stream = Streamer(client, 300, 300)
+    time.sleep(0.6)
+    t_us = now_us()
+    button.die()
+    rig.timeline.append(Event(t_us, "press", now_us()))
+    time.sleep(0.2)
+    stream.stop()
+    t.stopped_by(client, "estop_line")
+    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
+    time.sleep(1.0)
+    t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop while the button is gone", True)
+    t.expect(client.request("reset"), "estop_pressed")
+    button.open()
+    t.check(rig.wait_status(client, lambda s: s["estop"]["state"] == "released", 3), "found again")
+    t.check(client.request("status")["state"] == "latched", "its return alone does not unlatch")
+    reset(t, client)
+    button.die()
+    time.sleep(0.2)
+    t.check(client.request("status")["state"] == "latched", "gone while listening latches too")
+    t.judge(rig)
+
+
+@scenario("without an e-stop: may arm, and is warned", 4)
+def no_estop_line(t):
+    rig = t.rig(estop=False)
+    rig.start_gateway()
+    client = rig.client()
+    reply = t.arm(client)
+    t.check(any("e-stop" in warning or "estop" in warning for warning in reply.get("warnings", [])), f"arm warns: {reply.get('warnings')}")
+    t.check(client.request("status")["estop"]["state"] == "none", "status says none")
+    t.check("e-stop" in rig.gateway.text().lower(), "the start says so")
+    t.drive_for(client, 200, 200, 0.5)
+    client.request("stop")
+    time.sleep(0.4)
+    t.judge(rig)
