@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #define LINE_MAX_BYTES 320U
-#define US_PER_S       1000000U
+#define US_PER_S 1000000U
 
 bool sim_bus_log_open(sim_bus_log_t *self, const char *path, bool tell_direction) {
     self->oldest_us = IW_NEVER;
@@ -97,8 +97,8 @@ void sim_bus_log_mark(sim_bus_log_t *self, iw_time_us_t at_us, const char *text)
         return;
     }
     char line[LINE_MAX_BYTES];
-    int const wanted = snprintf(line, sizeof line - 1U, "# %" PRIu64 ".%06" PRIu64 " %s", at_us / US_PER_S,
-                                at_us % US_PER_S, text);
+    int const wanted =
+        snprintf(line, sizeof line - 1U, "# %" PRIu64 ".%06" PRIu64 " %s", at_us / US_PER_S, at_us % US_PER_S, text);
     size_t length = ((size_t)wanted < sizeof line - 1U) ? (size_t)wanted : sizeof line - 2U;
     line[length++] = '\n';
     append(self, at_us, line, length);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// What was on the bus, as a candump log: `(seconds.micros) sim ID#DATA`, stamped on CLOCK_MONOTONIC when the frame ended.
+/// What was on the bus, as a candump log: `(seconds.micros) sim ID#DATA`, stamped on CLOCK_MONOTONIC when the frame
+/// ended.
 ///
-/// Between the frames, lines that begin with `# seconds.micros` tell what was done to the world: every fault, every press of the button,
-/// every `log mark`. Written in blocks at most SIM_LOG_HOLD_US after the frame.
+/// Between the frames, lines that begin with `# seconds.micros` tell what was done to the world: every fault, every
+/// press of the button, every `log mark`. Written in blocks at most SIM_LOG_HOLD_US after the frame.
 #ifndef SIM_BUS_LOG_H
 #define SIM_BUS_LOG_H
 
@@ -10,7 +11,7 @@
 
 /// Nothing waits longer than this to be written.
 #define SIM_LOG_HOLD_US 20000U
-#define SIM_LOG_BUFFER  65536U
+#define SIM_LOG_BUFFER 65536U
 
 typedef struct {
     iw_time_us_t oldest_us; ///< IW_NEVER: nothing waits.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The simulated e-stop button: a unix stream socket that tells '0' (released) or '1' (pressed) on connect and at every change.
+/// The simulated e-stop button: a unix stream socket that tells '0' (released) or '1' (pressed) on connect and at every
+/// change.
 ///
 /// Whoever is connected to nothing must take it for pressed; `unplug` is the cut wire.
 #ifndef SIM_BUTTON_H

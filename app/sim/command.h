@@ -16,7 +16,8 @@ typedef struct {
     const char *name;
     const char *arguments; ///< For the usage line.
     const char *help;
-    /// NULL: done. SIM_USAGE: the arguments are not right. Else the reason why not. Nothing may have changed unless NULL.
+    /// NULL: done. SIM_USAGE: the arguments are not right. Else the reason why not. Nothing may have changed unless
+    /// NULL.
     const char *(*run)(const sim_call_t *call);
     unsigned words_min; ///< With the command's name.
     unsigned words_max;

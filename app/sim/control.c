@@ -51,7 +51,8 @@ static void client_ready(sim_watch_t *watch) {
     if (watch->fd < 0) {
         return;
     }
-    ssize_t const length = recv(watch->fd, &client->line[client->used], sizeof client->line - client->used, MSG_DONTWAIT);
+    ssize_t const length =
+        recv(watch->fd, &client->line[client->used], sizeof client->line - client->used, MSG_DONTWAIT);
     if (length > 0) {
         client->used += (size_t)length;
         execute_lines(client);

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// The hub of the local bus: clients connect to a unix SOCK_SEQPACKET socket and exchange `struct can_frame`, 16 bytes each.
+/// The hub of the local bus: clients connect to a unix SOCK_SEQPACKET socket and exchange `struct can_frame`, 16 bytes
+/// each.
 ///
-/// Every client hears every frame that was on the simulated bus; the sender gets its own as echo, with `__res0` = 1. A client that does
-/// not read loses frames, the others none. A closed connection is a bus that went down with all that its adapter had queued.
+/// Every client hears every frame that was on the simulated bus; the sender gets its own as echo, with `__res0` = 1. A
+/// client that does not read loses frames, the others none. A closed connection is a bus that went down with all that
+/// its adapter had queued.
 /// Error frames that a client sends go to the other clients at once, as on SocketCAN: any local user can forge them.
 #ifndef SIM_HUB_H
 #define SIM_HUB_H

@@ -19,8 +19,9 @@ typedef struct {
     char text[256];
 } sim_reason_t;
 
-/// Listens at `path` with sockets of `type` (SOCK_STREAM or SOCK_SEQPACKET), mode 0660. A file that is there is replaced only if it
-/// is a socket that nobody answers on. False, with cause and cure in `*out_reason`, if that cannot be.
+/// Listens at `path` with sockets of `type` (SOCK_STREAM or SOCK_SEQPACKET), mode 0660. A file that is there is
+/// replaced only if it is a socket that nobody answers on. False, with cause and cure in `*out_reason`, if that cannot
+/// be.
 bool sim_listener_open(sim_listener_t *self, const char *path, int type, sim_reason_t *out_reason);
 
 /// The next connection, not blocking; -1 if there is none.

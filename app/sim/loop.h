@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// One event loop: descriptors with handlers, and one wake-up time on CLOCK_MONOTONIC.
 ///
-/// A handler belongs to a watch that its owner embeds in its own struct; nothing is allocated. Any handler may remove any watch and
-/// close its descriptor, so a handler must bear being called with `fd` -1 or with nothing to read.
+/// A handler belongs to a watch that its owner embeds in its own struct; nothing is allocated. Any handler may remove
+/// any watch and close its descriptor, so a handler must bear being called with `fd` -1 or with nothing to read.
 #ifndef SIM_LOOP_H
 #define SIM_LOOP_H
 
@@ -29,7 +29,8 @@ bool sim_loop_open(sim_loop_t *self);
 bool sim_loop_add(const sim_loop_t *self, sim_watch_t *watch);
 void sim_loop_remove(const sim_loop_t *self, const sim_watch_t *watch);
 
-/// Waits for the next event or until `wake_us` (IW_NEVER: for events only) and calls `before`, then the handlers of what is ready.
+/// Waits for the next event or until `wake_us` (IW_NEVER: for events only) and calls `before`, then the handlers of
+/// what is ready.
 void sim_loop_wait(const sim_loop_t *self, iw_time_us_t wake_us, void (*before)(void *context), void *context);
 
 #endif

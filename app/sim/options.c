@@ -28,15 +28,30 @@ static const char usage[] =
     "\n"
     "Exit codes: 0 ok, 1 the running simulator refused the command, 64 usage, 65 faulty script, 69 unavailable.\n";
 
-enum { OPTION_CAN = 256, OPTION_ESTOP, OPTION_CONTROL, OPTION_SCRIPT, OPTION_LOG, OPTION_DIRECTION, OPTION_SEED, OPTION_UPTIME };
+enum {
+    OPTION_CAN = 256,
+    OPTION_ESTOP,
+    OPTION_CONTROL,
+    OPTION_SCRIPT,
+    OPTION_LOG,
+    OPTION_DIRECTION,
+    OPTION_SEED,
+    OPTION_UPTIME
+};
 
 static const struct option long_options[] = {
-    {"can", required_argument, NULL, OPTION_CAN},         {"estop", required_argument, NULL, OPTION_ESTOP},
-    {"control", required_argument, NULL, OPTION_CONTROL}, {"script", required_argument, NULL, OPTION_SCRIPT},
-    {"log", required_argument, NULL, OPTION_LOG},         {"log-direction", no_argument, NULL, OPTION_DIRECTION},
-    {"seed", required_argument, NULL, OPTION_SEED},       {"uptime", required_argument, NULL, OPTION_UPTIME},
-    {"quiet", no_argument, NULL, 'q'},                    {"version", no_argument, NULL, 'V'},
-    {"help", no_argument, NULL, 'h'},                     {NULL, 0, NULL, 0},
+    {"can", required_argument, NULL, OPTION_CAN},
+    {"estop", required_argument, NULL, OPTION_ESTOP},
+    {"control", required_argument, NULL, OPTION_CONTROL},
+    {"script", required_argument, NULL, OPTION_SCRIPT},
+    {"log", required_argument, NULL, OPTION_LOG},
+    {"log-direction", no_argument, NULL, OPTION_DIRECTION},
+    {"seed", required_argument, NULL, OPTION_SEED},
+    {"uptime", required_argument, NULL, OPTION_UPTIME},
+    {"quiet", no_argument, NULL, 'q'},
+    {"version", no_argument, NULL, 'V'},
+    {"help", no_argument, NULL, 'h'},
+    {NULL, 0, NULL, 0},
 };
 
 static int complain(const char *what, const char *value) {

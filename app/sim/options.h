@@ -20,7 +20,8 @@ typedef struct {
     char command[SIM_LINE_BYTES]; ///< To give to a running simulator; empty: be one.
 } sim_options_t;
 
-/// Returns -1 if the program shall go on, else the exit code to end with; everything the user must know has been printed.
+/// Returns -1 if the program shall go on, else the exit code to end with; everything the user must know has been
+/// printed.
 int sim_options_read(sim_options_t *out_options, int argc, char **argv);
 
 #endif

@@ -55,7 +55,8 @@ static sim_outcome_t run(sim_panel_t *self, const sim_command_t *command, const 
 sim_outcome_t sim_panel_execute(sim_panel_t *self, iw_time_us_t now_us, const char *line) {
     sim_words_t words;
     if (!sim_words_split(&words, line)) {
-        return refuse(self, "a command is a line of at most 255 printable ASCII characters; help lists the commands", "");
+        return refuse(self, "a command is a line of at most 255 printable ASCII characters; help lists the commands",
+                      "");
     }
     if (words.count == 0U) {
         return refuse(self, "empty line; help lists the commands", "");

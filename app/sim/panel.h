@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// The commands that plant faults into the simulated world and take them out again.
 ///
-/// One command a line; the answer is `ok`, `ok TEXT` or `error REASON`, and for `help` several lines with a single `.` behind them. A command
-/// that is refused changes nothing. Everything outside the world (button, connections, log) is reached through hooks, so a script
-/// can be checked beforehand against a scratch world with empty hooks.
+/// One command a line; the answer is `ok`, `ok TEXT` or `error REASON`, and for `help` several lines with a single `.`
+/// behind them. A command that is refused changes nothing. Everything outside the world (button, connections, log) is
+/// reached through hooks, so a script can be checked beforehand against a scratch world with empty hooks.
 #ifndef SIM_PANEL_H
 #define SIM_PANEL_H
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define PULSE_MAX_MS 60000
-#define US_PER_MS    1000U
+#define US_PER_MS 1000U
 
 typedef const char *result_t;
 
@@ -117,7 +117,8 @@ static result_t set_babble(const sim_call_t *call) {
     bool on = false;
     iw_can_frame_t frame;
     (void)snprintf(text, sizeof text, "%.10s#", words->word[1]);
-    if (!sim_words_frame(text, &frame) || !sim_words_integer(words->word[2], (sim_range_t){100, 10000000}, &period_us) ||
+    if (!sim_words_frame(text, &frame) ||
+        !sim_words_integer(words->word[2], (sim_range_t){100, 10000000}, &period_us) ||
         !sim_words_choice(words->word[3], on_off, &on)) {
         return SIM_USAGE;
     }

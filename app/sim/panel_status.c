@@ -43,12 +43,14 @@ static void add_wheel(text_t *text, const sim_wheel_t *wheel, iw_time_us_t now_u
     add(text, "{\"state\":\"%s\",\"boots\":%" PRIu32 ",\"speed_mm_s\":%" PRId32 ",\"position_mm\":%" PRId64 ",",
         state[wheel->state], wheel->boots, sim_motion_true_mm_s(&motion), sim_motion_true_mm(&motion));
     add_setpoint(text, &motion, now_us);
-    add(text, "\"driven\":%s,\"setpoints\":%" PRIu32 ",\"ticks\":%" PRId32 ",\"load_mN\":%" PRId32 ",\"lost\":%" PRIu32
-              ",\"muted\":%s,\"blocked\":%s,",
+    add(text,
+        "\"driven\":%s,\"setpoints\":%" PRIu32 ",\"ticks\":%" PRId32 ",\"load_mN\":%" PRId32 ",\"lost\":%" PRIu32
+        ",\"muted\":%s,\"blocked\":%s,",
         truth(motion.driven), motion.setpoints, (int32_t)motion.ticks, wheel->force.load_mN, wheel->lost,
         truth(wheel->muted), truth(wheel->motion.blocked));
-    add(text, "\"frames\":{\"speed\":%" PRIu32 ",\"status\":%" PRIu32 ",\"pose\":%" PRIu32 ",\"force\":%" PRIu32
-              ",\"offset\":%" PRIu32 "}}",
+    add(text,
+        "\"frames\":{\"speed\":%" PRIu32 ",\"status\":%" PRIu32 ",\"pose\":%" PRIu32 ",\"force\":%" PRIu32
+        ",\"offset\":%" PRIu32 "}}",
         wheel->sent[SIM_TELEMETRY_SPEED], wheel->sent[SIM_TELEMETRY_STATUS], wheel->sent[SIM_TELEMETRY_POSE],
         wheel->sent[SIM_TELEMETRY_FORCE], wheel->sent[SIM_TELEMETRY_OFFSET]);
 }

@@ -24,7 +24,8 @@ static const char *after(const char *line, unsigned words) {
     return at;
 }
 
-/// Understands `at` and `wait`: moves `*time_us`, and `*out_command` to what is left. False: no number, or back in time.
+/// Understands `at` and `wait`: moves `*time_us`, and `*out_command` to what is left. False: no number, or back in
+/// time.
 static bool read_time(const char *line, iw_time_us_t *time_us, const char **out_command) {
     sim_words_t words;
     bool is_at = false;
@@ -60,7 +61,8 @@ static bool read_line(sim_script_t *self, reader_t *reader, const char *line, si
         return true;
     }
     if (!read_time(line, &reader->time_us, &command)) {
-        return fail(out_fault, reader->line, "write: at SECONDS COMMAND, or: wait SECONDS [COMMAND]; time must not go back");
+        return fail(out_fault, reader->line,
+                    "write: at SECONDS COMMAND, or: wait SECONDS [COMMAND]; time must not go back");
     }
     if (command[0] == '\0') {
         return true;

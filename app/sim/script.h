@@ -7,7 +7,8 @@
 ///     power on               at the time reached
 ///     wait 0.5 estop press   both in one
 ///
-/// Read whole at the start. Every command is tried on a scratch world first, so a faulty script is refused before anything moves.
+/// Read whole at the start. Every command is tried on a scratch world first, so a faulty script is refused before
+/// anything moves.
 #ifndef SIM_SCRIPT_H
 #define SIM_SCRIPT_H
 
@@ -32,7 +33,8 @@ typedef struct {
     char reason[384];
 } sim_script_fault_t;
 
-/// `check` says NULL if a command is right, else why not. False, with the fault, if the script cannot be read or is not right.
+/// `check` says NULL if a command is right, else why not. False, with the fault, if the script cannot be read or is not
+/// right.
 bool sim_script_load(sim_script_t *self, const char *path, const char *(*check)(void *context, const char *command),
                      void *context, sim_script_fault_t *out_fault);
 

@@ -22,7 +22,8 @@ __attribute__((format(printf, 2, 3))) static void say(const sim_simulator_t *sel
         return;
     }
     iw_time_us_t const elapsed_ms = (self->now_us - self->start_us) / IW_US_PER_MS;
-    int const head = snprintf(text, sizeof text, "[%5" PRIu64 ".%03" PRIu64 " s] ", elapsed_ms / 1000U, elapsed_ms % 1000U);
+    int const head =
+        snprintf(text, sizeof text, "[%5" PRIu64 ".%03" PRIu64 " s] ", elapsed_ms / 1000U, elapsed_ms % 1000U);
     va_list arguments;
     va_start(arguments, format);
     int const body = vsnprintf(&text[head], sizeof text - (size_t)head - 1U, format, arguments);

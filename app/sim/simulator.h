@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// The running simulator: the world in real time, with its sockets, its script and its log.
 ///
-/// Simulated time is CLOCK_MONOTONIC. If the process itself stood still for more than SIM_PAUSE_US the world stood still with it:
-/// simulated time goes on where it was, and it is told. Stamps in the log are CLOCK_MONOTONIC in any case.
+/// Simulated time is CLOCK_MONOTONIC. If the process itself stood still for more than SIM_PAUSE_US the world stood
+/// still with it: simulated time goes on where it was, and it is told. Stamps in the log are CLOCK_MONOTONIC in any
+/// case.
 #ifndef SIM_SIMULATOR_H
 #define SIM_SIMULATOR_H
 

@@ -170,6 +170,7 @@ uint32_t sim_motion_draw_mA(const sim_motion_t *self) {
         return (uint32_t)((current < 0) ? -current : current);
     }
     int64_t const accel = (self->accel_mm_s2 < 0) ? -(int64_t)self->accel_mm_s2 : self->accel_mm_s2;
-    uint32_t const torque = (uint32_t)clamp(accel * IW_CURRENT_LIMIT_mA / (int64_t)self->config.accel_mm_s2, IW_CURRENT_LIMIT_mA);
+    uint32_t const torque =
+        (uint32_t)clamp(accel * IW_CURRENT_LIMIT_mA / (int64_t)self->config.accel_mm_s2, IW_CURRENT_LIMIT_mA);
     return torque + ((self->speed_um_s != 0) ? IDLE_DRAW_mA : 0U);
 }

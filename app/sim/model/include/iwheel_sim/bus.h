@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 /// A CAN bus at 1 Mbit/s with adapters that behave like real ones.
 ///
-/// Each port is a node with a queue: the frame in its controller, then those behind it. When the bus is free the ports' first frames
-/// arbitrate, the lowest id wins, and the bus is busy for the frame's bits (with stuff bits at their average). A frame that ended
-/// has been on the bus: that is when everybody hears it and the sender gets its echo.
+/// Each port is a node with a queue: the frame in its controller, then those behind it. When the bus is free the ports'
+/// first frames arbitrate, the lowest id wins, and the bus is busy for the frame's bits (with stuff bits at their
+/// average). A frame that ended has been on the bus: that is when everybody hears it and the sender gets its echo.
 ///
-/// A frame that nobody acknowledges stays in its controller and is retried for ever; those behind it wait. That is how old setpoints
-/// come out when power returns. Simplifications: the retries take no bus time, and only ports that `sim_bus_open` was told
-/// need an acknowledgement wait for it: wheels acknowledge each other and the gateway's controller acknowledges them.
+/// A frame that nobody acknowledges stays in its controller and is retried for ever; those behind it wait. That is how
+/// old setpoints come out when power returns. Simplifications: the retries take no bus time, and only ports that
+/// `sim_bus_open` was told need an acknowledgement wait for it: wheels acknowledge each other and the gateway's
+/// controller acknowledges them.
 ///
 /// Pure: no I/O, no clock, no heap. Times must not go back.
 #ifndef IWHEEL_SIM_BUS_H
@@ -32,7 +33,7 @@ typedef struct {
     uint32_t overflows; ///< Frames that found the queue full and were lost.
     uint8_t first;
     uint8_t count;
-    uint8_t depth;      ///< Frames the port holds, controller included; 0: the port is not open.
+    uint8_t depth; ///< Frames the port holds, controller included; 0: the port is not open.
     bool needs_ack;
 } sim_port_t;
 

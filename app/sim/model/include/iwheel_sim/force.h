@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// The normal-force sensor of one wheel: its own zero, the load on the shaft, noise, and the offset the wheel learns at its start.
+/// The normal-force sensor of one wheel: its own zero, the load on the shaft, noise, and the offset the wheel learns at
+/// its start.
 ///
-/// A load is a person: it sways by 5 % at 0.7 Hz. The offset is the mean of what the sensor shows during the first two seconds after
-/// the firmware started, whatever it shows: a load at that time goes into it, as in reality.
+/// A load is a person: it sways by 5 % at 0.7 Hz. The offset is the mean of what the sensor shows during the first two
+/// seconds after the firmware started, whatever it shows: a load at that time goes into it, as in reality.
 #ifndef IWHEEL_SIM_FORCE_H
 #define IWHEEL_SIM_FORCE_H
 
@@ -19,11 +20,11 @@ typedef struct {
     uint32_t learn_count;
     int32_t sensor_zero_mN; ///< What the sensor shows without load: unknown to the wheel.
     int32_t load_mN;
-    int32_t noise_mN;       ///< Amplitude.
-    int32_t forced_raw;     ///< Fault: the frame carries this; SIM_FORCE_AUTO: no.
-    int16_t learnt_dN;      ///< The wheel's offset, as its frame tells; meaningless before two seconds are over.
-    iw_force_unit_t unit;   ///< Of the frame's raw value. The offset is always in dN.
-    bool zero_removed;      ///< Fault: the raw value has the sensor's zero taken out already.
+    int32_t noise_mN;     ///< Amplitude.
+    int32_t forced_raw;   ///< Fault: the frame carries this; SIM_FORCE_AUTO: no.
+    int16_t learnt_dN;    ///< The wheel's offset, as its frame tells; meaningless before two seconds are over.
+    iw_force_unit_t unit; ///< Of the frame's raw value. The offset is always in dN.
+    bool zero_removed;    ///< Fault: the raw value has the sensor's zero taken out already.
 } sim_force_t;
 
 void sim_force_init(sim_force_t *self, int32_t sensor_zero_mN, iw_force_unit_t unit);

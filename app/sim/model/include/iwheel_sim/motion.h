@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
 /// How one wheel moves: what it was told last, for how long that counts, and how it gets there.
 ///
-/// Told a speed, it approaches it as a first-order system with the time constant `response_us`, never faster than the torque of
-/// the current allows: 2000 mA give `accel_mm_s2`. Speeds are those of the wheel's firmware, which takes the radius to be
-/// 192 mm; a wheel of another radius really goes faster or slower (`sim_motion_true_mm_s`).
+/// Told a speed, it approaches it as a first-order system with the time constant `response_us`, never faster than the
+/// torque of the current allows: 2000 mA give `accel_mm_s2`. Speeds are those of the wheel's firmware, which takes the
+/// radius to be 192 mm; a wheel of another radius really goes faster or slower (`sim_motion_true_mm_s`).
 ///
 /// Choices of this model where the document is silent:
 /// - 1 s after its last setpoint the wheel coasts: friction alone (`coast_mm_s2`) brings it to rest.
 /// - Current as a limit: 0 mA means no torque, the wheel coasts.
-/// - Current as a setpoint: with a speed, its magnitude bounds the torque; speed 0 with a current is torque without a speed to
-///   hold, so the wheel runs; 0/0 coasts.
+/// - Current as a setpoint: with a speed, its magnitude bounds the torque; speed 0 with a current is torque without a
+///   speed to hold, so the wheel runs; 0/0 coasts.
 /// - The unit of the acceleration field is rpm/s.
 ///
 /// Integers only. Advanced to exact instants by its owner, so that nothing depends on how often it is called.

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// A pair of simulated iWheels: frames in, frames out.
 ///
-/// Pure and deterministic: no I/O, no clock, no heap, no floating point. Time is an argument, chance comes from the seed: the same
-/// configuration, seed, frames and times give the same bytes, however often `sim_pair_step` is called in between.
+/// Pure and deterministic: no I/O, no clock, no heap, no floating point. Time is an argument, chance comes from the
+/// seed: the same configuration, seed, frames and times give the same bytes, however often `sim_pair_step` is called in
+/// between.
 /// One instance belongs to one thread; it may be copied. To read speed or position at an instant, advance a copy of
 /// `wheel[side].motion`.
 ///
@@ -13,8 +14,8 @@
 ///
 /// The pair hears its own frames because the right wheel needs the left one's speed for the pose.
 ///
-/// Faults are planted with the functions below or by writing the documented fault fields of `wheel[side]`; each is undone the same
-/// way. Times must not go back.
+/// Faults are planted with the functions below or by writing the documented fault fields of `wheel[side]`; each is
+/// undone the same way. Times must not go back.
 #ifndef IWHEEL_SIM_PAIR_H
 #define IWHEEL_SIM_PAIR_H
 
@@ -23,10 +24,10 @@
 
 typedef struct {
     sim_wheel_config_t wheel[IW_SIDES];
-    uint64_t age_us;          ///< 0: power comes at init and the wheels boot. Else they have been running that long.
-    uint16_t track_mm;        ///< Between the wheels; not 0.
-    uint8_t battery_dV;       ///< Without load; it sags by 1 dV for each 500 mA drawn.
-    bool mirrored[IW_SIDES];  ///< Mounted so that positive speed of this wheel goes backwards. Matters to the pose only.
+    uint64_t age_us;         ///< 0: power comes at init and the wheels boot. Else they have been running that long.
+    uint16_t track_mm;       ///< Between the wheels; not 0.
+    uint8_t battery_dV;      ///< Without load; it sags by 1 dV for each 500 mA drawn.
+    bool mirrored[IW_SIDES]; ///< Mounted so that positive speed of this wheel goes backwards. Matters to the pose only.
 } sim_pair_config_t;
 
 typedef struct {
@@ -43,7 +44,8 @@ typedef struct {
     iw_side_t side;
 } sim_sent_t;
 
-/// Two healthy wheels as documented: left cN, right dN, boot 400 and 430 ms, sensor zeros 12.3 and 9.8 N, track 540 mm, 24.8 V.
+/// Two healthy wheels as documented: left cN, right dN, boot 400 and 430 ms, sensor zeros 12.3 and 9.8 N, track 540 mm,
+/// 24.8 V.
 void sim_pair_default(sim_pair_config_t *out_config);
 
 /// `config` may be NULL for the default.
@@ -55,14 +57,15 @@ bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent);
 /// When `step` has something to do next; IW_NEVER without power.
 iw_time_us_t sim_pair_next_us(const sim_pair_t *self);
 
-/// A frame was on the bus. All that is due before `now_us` must have been taken with `step`. Frames that mean nothing to the
-/// wheels are ignored: other ids, remote, extended, FD, error, too short.
+/// A frame was on the bus. All that is due before `now_us` must have been taken with `step`. Frames that mean nothing
+/// to the wheels are ignored: other ids, remote, extended, FD, error, too short.
 void sim_pair_hear(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
 
 /// True if a wheel is there to acknowledge frames.
 bool sim_pair_acknowledges(const sim_pair_t *self);
 
-/// Both wheels lose power, or get it back and boot. Their motion and odometry memory are as without power: coasting, ticks 0.
+/// Both wheels lose power, or get it back and boot. Their motion and odometry memory are as without power: coasting,
+/// ticks 0.
 void sim_pair_power(sim_pair_t *self, iw_time_us_t now_us, bool on);
 
 /// Firmware of one wheel starts anew: silent for its boot time, ticks 0, offset learnt again.

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// The pose that the right wheel computes: dead reckoning from its own way and from the left wheel's speed frames on the bus.
+/// The pose that the right wheel computes: dead reckoning from its own way and from the left wheel's speed frames on
+/// the bus.
 ///
-/// It believes what it hears: a left wheel that is silent for more than 50 ms counts as standing still, a forged or mirrored one leads
-/// it astray. Both wheels turn forward with positive speed unless told otherwise. X and Y saturate at +/-32.767 m,
-/// PSI wraps at 65.536 rad (choices of this model; the document gives only the fields).
+/// It believes what it hears: a left wheel that is silent for more than 50 ms counts as standing still, a forged or
+/// mirrored one leads it astray. Both wheels turn forward with positive speed unless told otherwise. X and Y saturate
+/// at +/-32.767 m, PSI wraps at 65.536 rad (choices of this model; the document gives only the fields).
 #ifndef IWHEEL_SIM_POSE_H
 #define IWHEEL_SIM_POSE_H
 
@@ -21,11 +22,12 @@ typedef struct {
     int64_t y_nm;
     int64_t psi_nrad;
     int32_t left_um_s;
-    uint16_t track_mm;        ///< Between the wheels, as the right wheel believes.
-    bool mirrored[IW_SIDES];  ///< Mounted so that its positive speed goes backwards.
+    uint16_t track_mm;       ///< Between the wheels, as the right wheel believes.
+    bool mirrored[IW_SIDES]; ///< Mounted so that its positive speed goes backwards.
 } sim_pose_t;
 
-/// Starts at 0, 0 with heading 0. `right_nm` is the right wheel's own way so far. Keeps no more than `track_mm` and `mirrored`.
+/// Starts at 0, 0 with heading 0. `right_nm` is the right wheel's own way so far. Keeps no more than `track_mm` and
+/// `mirrored`.
 void sim_pose_restart(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm);
 
 /// The left wheel's speed was heard.

@@ -5,11 +5,13 @@
 ///      ^                |                    |
 ///      +---- power off -+--------------------+
 ///
-/// OFF and BOOTING: silent, deaf, acknowledges nothing; the wheel coasts. RUNNING begins with ticks 0 and sends offset frames for
-/// 60 s. The first comes when the two seconds of learning are over (choice of this model; the document tells only the period).
+/// OFF and BOOTING: silent, deaf, acknowledges nothing; the wheel coasts. RUNNING begins with ticks 0 and sends offset
+/// frames for 60 s. The first comes when the two seconds of learning are over (choice of this model; the document tells
+/// only the period).
 /// "Muted" silences telemetry only: setpoints are still followed and acknowledged.
 ///
-/// Pure: no I/O, no clock, no heap. Used through pair.h; visible so that tests and tools can read it and plant faults in it.
+/// Pure: no I/O, no clock, no heap. Used through pair.h; visible so that tests and tools can read it and plant faults
+/// in it.
 #ifndef IWHEEL_SIM_WHEEL_H
 #define IWHEEL_SIM_WHEEL_H
 
@@ -43,15 +45,15 @@ typedef struct {
     iw_time_us_t phase_us;
     uint32_t boot_us;
     uint32_t sent[SIM_TELEMETRY_KINDS];
-    uint32_t lost;            ///< Frames and setpoints that the loss fault swallowed.
+    uint32_t lost; ///< Frames and setpoints that the loss fault swallowed.
     uint32_t boots;
-    uint32_t slow_permille;   ///< All periods are multiplied by this; 1000: as documented.
-    uint16_t loss_permille;   ///< Fault: this share of telemetry and of setpoints is lost.
-    int32_t heat_mdegC;       ///< Above ambient.
+    uint32_t slow_permille; ///< All periods are multiplied by this; 1000: as documented.
+    uint16_t loss_permille; ///< Fault: this share of telemetry and of setpoints is lost.
+    int32_t heat_mdegC;     ///< Above ambient.
     int32_t ambient_degC;
     iw_side_t side;
     sim_wheel_state_t state;
-    bool muted;               ///< Fault: no telemetry.
+    bool muted; ///< Fault: no telemetry.
 } sim_wheel_t;
 
 typedef struct {
@@ -79,8 +81,8 @@ void sim_wheel_slow(sim_wheel_t *self, uint32_t permille);
 /// A setpoint for this wheel was on the bus.
 void sim_wheel_hear(sim_wheel_t *self, iw_time_us_t now_us, const iw_proto_setpoint_t *setpoint);
 
-/// Does what is due first, which must be due by now (`self->next_us`): true with a telemetry frame in `*out_message`, or false if
-/// there is none to send. `battery_dV` is what the wheel measures, `pose` the pair's pose.
+/// Does what is due first, which must be due by now (`self->next_us`): true with a telemetry frame in `*out_message`,
+/// or false if there is none to send. `battery_dV` is what the wheel measures, `pose` the pair's pose.
 bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, iw_proto_message_t *out_message);
 
 #endif

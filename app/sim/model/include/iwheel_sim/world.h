@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: MIT
 /// The whole simulated world: a pair of wheels, the bus, other nodes, and ports for clients such as the gateway.
 ///
-/// Owner of the order of events: whatever happens first is done first, so the world is a pure function of seed, configuration, times,
-/// submitted frames and faults. No I/O, no clock, no heap; about 40 KiB, may be static and may be copied.
+/// Owner of the order of events: whatever happens first is done first, so the world is a pure function of seed,
+/// configuration, times, submitted frames and faults. No I/O, no clock, no heap; about 40 KiB, may be static and may be
+/// copied.
 ///
 ///     sim_world_init(&world, NULL, now_us, seed);
 ///     port = sim_world_connect(&world);
 ///     sim_world_submit(&world, now_us, port, &frame);
-///     while (sim_world_step(&world, now_us, &delivery)) { every client hears delivery.frame; delivery.port gets it as echo }
+///     while (sim_world_step(&world, now_us, &delivery)) {
+///         every client hears delivery.frame; delivery.port gets it as echo
+///     }
 ///     sleep until sim_world_next_us(&world)
 ///
-/// Before a fault is planted or a frame submitted at `now_us`, all that is due by then must have been taken with `step`.
+/// Before a fault is planted or a frame submitted at `now_us`, all that is due by then must have been taken with
+/// `step`.
 #ifndef IWHEEL_SIM_WORLD_H
 #define IWHEEL_SIM_WORLD_H
 
@@ -18,13 +22,13 @@
 #include "iwheel_sim/pair.h"
 
 /// Ports of the bus. Clients have the rest.
-#define SIM_PORT_LEFT      0U
-#define SIM_PORT_RIGHT     1U
-#define SIM_PORT_FOREIGN   2U
-#define SIM_PORT_BABBLE    3U
-#define SIM_PORT_INJECT    4U
-#define SIM_PORT_CLIENT    5U
-#define SIM_WORLD_CLIENTS  (SIM_BUS_PORTS - SIM_PORT_CLIENT)
+#define SIM_PORT_LEFT 0U
+#define SIM_PORT_RIGHT 1U
+#define SIM_PORT_FOREIGN 2U
+#define SIM_PORT_BABBLE 3U
+#define SIM_PORT_INJECT 4U
+#define SIM_PORT_CLIENT 5U
+#define SIM_WORLD_CLIENTS (SIM_BUS_PORTS - SIM_PORT_CLIENT)
 /// A client's adapter holds this many frames unless told otherwise: the controller's one and three behind it.
 #define SIM_QUEUE_DEFAULT 4U
 /// Another master sends a pair this often.
@@ -64,7 +68,8 @@ uint8_t sim_world_connect(sim_world_t *self);
 /// The adapter is unplugged: what it had queued is gone.
 void sim_world_disconnect(sim_world_t *self, iw_time_us_t now_us, uint8_t port);
 
-/// A client sends. Frames that its adapter cannot take are lost and counted: nobody tells the sender, but no echo comes.
+/// A client sends. Frames that its adapter cannot take are lost and counted: nobody tells the sender, but no echo
+/// comes.
 void sim_world_submit(sim_world_t *self, iw_time_us_t now_us, uint8_t port, const iw_can_frame_t *frame);
 
 /// True with the next frame that was on the bus. While clients are bus-off they must not hear it.
@@ -91,7 +96,8 @@ void sim_world_foreign_once(sim_world_t *self, iw_time_us_t now_us);
 /// One frame from another node.
 void sim_world_inject(sim_world_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
 
-/// Undoes every fault that the world, the bus or the wheels have; wheels without power get it back. Wheels keep running.
+/// Undoes every fault that the world, the bus or the wheels have; wheels without power get it back. Wheels keep
+/// running.
 void sim_world_heal(sim_world_t *self, iw_time_us_t now_us);
 
 #endif
