@@ -63,7 +63,7 @@ def render(builds):
 
 
 def numbers(text):
-    return {name: [int(cell) for cell in cells.split("|")] for name, cells in ROW.findall(text) if re.search(r"\d$", cells.strip())}
+    return {name: [int(cell) for cell in cells.split("|")] for name, cells in ROW.findall(text) if re.fullmatch(r"[\d |]+", cells)}
 
 
 def differences(old, new):

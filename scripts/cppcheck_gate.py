@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""cppcheck with its MISRA C:2012 addon on the core; what scripts/misra_deviations.txt does not allow fails.
+
+usage: cppcheck_gate.py SOURCE... [-- DEVIATIONS_FILE]
+"""
+import fnmatch
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+FINDING = re.compile(r"^(?P<file>[^:]+):(?P<line>\d+): (?P<id>[\w.-]+): (?P<message>.*)$")
+
+
+def read_deviations(path):
+    """[(number, finding, file pattern)]; a line without its reason is an error."""
+    rows = []
+    for line in path.read_text().splitlines():
+        if line.strip() and not line.startswith("#"):
+            fields = [field.strip() for field in line.split("|", 3)]
+            if len(fields) != 4 or not all(fields):
+                sys.exit(f"{path}: not \"number | finding | files | reason\": {line}")
+            rows.append(tuple(fields[:3]))
+    return rows
+
+
+def findings_of(sources):
+    command = ["cppcheck", "--std=c99", "--enable=warning,performance,portability,style", "--addon=misra", "--quiet",
+               "--template={file}:{line}: {id}: {message}", "-I", str(ROOT / "core/include"), *sources]
+    run = subprocess.run(command, capture_output=True, text=True)
+    if run.returncode != 0:
+        sys.exit(f"cppcheck failed:\n{run.stdout}{run.stderr}")
+    for line in run.stderr.splitlines():
+        match = FINDING.match(line)
+        if not match:
+            sys.exit(f"cppcheck says what this script does not understand: {line}")
+        yield match["file"].replace(f"{ROOT}/", ""), match["line"], match["id"], match["message"]
+
+
+def main(arguments):
+    sources, _, rest = " ".join(arguments[1:]).partition(" -- ")
+    deviations = read_deviations(Path(rest) if rest else ROOT / "scripts/misra_deviations.txt")
+    if not sources:
+        sys.exit(__doc__)
+    used, bad, total = set(), 0, 0
+    for file, line, finding, message in findings_of(sources.split()):
+        total += 1
+        row = next((row for row in deviations if row[1] == finding and fnmatch.fnmatch(file, row[2])), None)
+        if row:
+            used.add(row[0])
+        else:
+            bad += 1
+            print(f"{file}:{line}: {finding}: {message.removesuffix(' (use --rule-texts=<file> to get proper output)')}")
+    idle = [row for row in deviations if row[0] not in used] if not rest else []
+    for row in idle:
+        print(f"deviation {row[0]} ({row[1]}) is not needed any more: delete it")
+    print(f"{total} findings, {total - bad} allowed by {len(used)} deviations, {bad} not allowed")
+    return 1 if bad or idle else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))

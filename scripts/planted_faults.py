@@ -1,0 +1,191 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Plants a fault for every gate and demands that the gate sees it; and beside each fault a clean case that must pass.
+
+usage: planted_faults.py
+
+Works in a temporary folder. The last line is "N passed, N failed, N skipped"; a gate whose tool is missing is skipped.
+"""
+import importlib.util
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+SCRIPTS = ROOT / "scripts"
+ARM = ["arm-none-eabi-gcc", "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft", "-Os", "-std=c99", "-ffreestanding",
+       "-ffunction-sections", "-fstack-usage", "-fcallgraph-info=su"]
+CLEAN = "// SPDX-License-Identifier: MIT\nint iw_f(int a);\nint iw_f(int a)\n{\n    return a + 1;\n}\n"
+
+
+def run(*command, cwd=None):
+    """(status, everything it said)"""
+    done = subprocess.run([str(part) for part in command], cwd=cwd, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+def arm_library(folder, code):
+    """Compiles code as the core would be, into the folder's own little build tree; returns the library."""
+    objects = folder / "iwheel_core.dir"
+    objects.mkdir()
+    (folder / "core").mkdir()
+    source = folder / "core" / "planted.c"
+    source.write_text(code)
+    status, said = run(*ARM, "-c", source, "-o", objects / "planted.c.o")
+    if status != 0:
+        raise RuntimeError(said)
+    run("arm-none-eabi-ar", "rcs", folder / "libiwheel_core.a", objects / "planted.c.o")
+    return folder / "libiwheel_core.a"
+
+
+def purity(folder, code):
+    return run(SCRIPTS / "purity.py", arm_library(folder, code), folder / "core")
+
+
+def stack(folder, code):
+    arm_library(folder, code)
+    return run(SCRIPTS / "stack_usage.py", folder, 256)
+
+
+def coverage(folder, calls):
+    """A function with two branches and a main that makes the calls given."""
+    sources, objects = folder / "core" / "src", folder / "iwheel_core.dir"
+    sources.mkdir(parents=True)
+    objects.mkdir()
+    (sources / "planted.c").write_text("int f(int a, int b);\nint f(int a, int b)\n{\n    return (a && b) ? 1 : 2;\n}\n")
+    (folder / "main.c").write_text(f"int f(int, int);\nint main(void) {{ {calls} return 0; }}\n")
+    run("gcc", "-O0", "--coverage", "-c", sources / "planted.c", "-o", objects / "planted.o")
+    run("gcc", folder / "main.c", objects / "planted.o", "--coverage", "-o", folder / "main", cwd=folder)
+    run(folder / "main")
+    return run(SCRIPTS / "coverage_gate.py", folder)
+
+
+def warnings(folder, code, compiler="gcc"):
+    flags = re.search(r"INTERFACE\n([^)]*)\)", (ROOT / "cmake/iwheel_warnings.cmake").read_text())[1].split()
+    (folder / "planted.c").write_text(code)
+    return run(compiler, "-std=c99", *flags, "-c", folder / "planted.c", "-o", folder / "planted.o")
+
+
+def analyzer(folder, code):
+    (folder / "planted.c").write_text(code)
+    return run("gcc", "-std=c99", "-O2", "-fanalyzer", "-Werror", "-c", folder / "planted.c", "-o", folder / "planted.o")
+
+
+def tidy(folder, code):
+    (folder / "planted.c").write_text(code)
+    return run("clang-tidy", "--quiet", f"--config-file={ROOT / '.clang-tidy'}", folder / "planted.c", "--", "-std=c99")
+
+
+def cppcheck(folder, code, deviations="D1 | misra-c2012-8.4 | * | cppcheck 2.10 overlooks a declaration in the same file\n"):
+    (folder / "planted.c").write_text(code)
+    (folder / "deviations.txt").write_text(deviations)
+    return run(SCRIPTS / "cppcheck_gate.py", folder / "planted.c", "--", folder / "deviations.txt")
+
+
+def style(folder, code):
+    for part in ("core/src", "core/include", "port", "app", "test"):
+        (folder / part).mkdir(parents=True)
+    (folder / "core/src/planted.c").write_text(code)
+    (folder / "app/clean.c").write_text(CLEAN)
+    return run(sys.executable, SCRIPTS / "style_metrics.py", folder)
+
+
+def sizes(_, new):
+    spec = importlib.util.spec_from_file_location("size_table", SCRIPTS / "size_table.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    found = [*module.differences({"permit": [2000], "core": [9000]}, new)]
+    return len(found), "\n".join(found)
+
+
+def counting(folder, case):
+    (folder / "junit.xml").write_text(f"<testsuite>{case}</testsuite>")
+    status, said = run(SCRIPTS / "count_tests.py", folder / "junit.xml")
+    return status or int(said.split()[-2]), said
+
+
+def function(body, parameters="int a"):
+    return CLEAN + f"int iw_g({parameters});\nint iw_g({parameters})\n{{\n{body}}}\n"
+
+
+def junit(status, output):
+    return f'<testcase name="t" status="{status}"><system-out>{output}</system-out></testcase>'
+
+
+BIG = "void take(char *);\nvoid iw_g(void);\nvoid iw_g(void) { char buffer[300]; take(buffer); }\n"
+VARIABLE = "void take(char *);\nvoid iw_g(int n);\nvoid iw_g(int n) { char buffer[n]; take(buffer); }\n"
+RECURSION = "int take(int);\nint iw_g(int n);\nint iw_g(int n) { return n > 1 ? take(n) + iw_g(n - 1) * iw_g(n - 2) : 1; }\n"
+SOME_FOUR = "f(0, 0); f(1, 0); f(1, 1);"
+
+# gate, its tool, what is planted, argument, must it be caught
+CASES = [
+    (purity, "arm-none-eabi-gcc", "clean", CLEAN, False),
+    (purity, "arm-none-eabi-gcc", "counter at file scope", "int iw_count(void);\nstatic int n;\nint iw_count(void) { return ++n; }\n", True),
+    (purity, "arm-none-eabi-gcc", "initialised variable", "int iw_n = 7;\n", True),
+    (purity, "arm-none-eabi-gcc", "call of puts", "int puts(const char *);\nint iw_g(void) { return puts(\"\"); }\n", True),
+    (purity, "arm-none-eabi-gcc", "floating point", "float iw_g(float a) { return a * 2; }\n", True),
+    (purity, "arm-none-eabi-gcc", "constant folded floating point", "int iw_g(void) { return (int)(double)2; }\n", True),
+    (purity, "arm-none-eabi-gcc", "header of libc", "#include <stdlib.h>\n" + CLEAN, True),
+    (stack, "arm-none-eabi-gcc", "clean", CLEAN, False),
+    (stack, "arm-none-eabi-gcc", "300 bytes", BIG, True),
+    (stack, "arm-none-eabi-gcc", "variable length", VARIABLE, True),
+    (stack, "arm-none-eabi-gcc", "recursion", RECURSION, True),
+    (coverage, "gcov", "clean", SOME_FOUR, False),
+    (coverage, "gcov", "a branch never taken", "f(0, 0); f(1, 1);", True),
+    (coverage, "gcov", "a function never called", "", True),
+    (warnings, "gcc", "clean", CLEAN, False),
+    (warnings, "gcc", "lost bits", "short f(long a);\nshort f(long a) { return a; }\n", True),
+    (warnings, "gcc", "sign", "unsigned f(int a);\nunsigned f(int a) { return a; }\n", True),
+    (analyzer, "gcc", "clean", CLEAN, False),
+    (analyzer, "gcc", "second free", "#include <stdlib.h>\nvoid f(void *p);\nvoid f(void *p)\n{\n    free(p);\n    free(p);\n}\n", True),
+    (tidy, "clang-tidy", "clean", CLEAN, False),
+    (tidy, "clang-tidy", "size of the pointer", "#include <string.h>\nvoid f(int *p);\nvoid f(int *p) { memset(p, 0, sizeof(p)); }\n", True),
+    (cppcheck, "cppcheck", "clean", CLEAN, False),
+    (cppcheck, "cppcheck", "index out of bounds", "int f(void);\nint f(void)\n{\n    int a[2] = {1, 2};\n    return a[2];\n}\n", True),
+    (cppcheck, "cppcheck", "MISRA 15.1, goto", "int f(int a)\n{\n    if (a > 0) {\n        goto out;\n    }\nout:\n    return a;\n}\n", True),
+    (style, "lizard", "clean", CLEAN, False),
+    (style, "lizard", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), True),
+    (style, "lizard", "complexity 12", function("    if (a == 1) {\n        a++;\n    }\n" * 11 + "    return a;\n"), True),
+    (style, "lizard", "6 parameters", function("    return a;\n", "int a, int b, int c, int d, int e, int f"), True),
+    (style, "lizard", "401 lines", CLEAN + "\n" * 395, True),
+    (style, "lizard", "no licence line", CLEAN.split("\n", 1)[1], True),
+    (style, "lizard", "unfinished", CLEAN + "// " + "TO" + "DO\n", True),
+    (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
+    (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
+    (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),
+    (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),
+    (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
+    (counting, "python3", "a crash before the sum", junit("fail", "test.c:1:test_a:PASS"), True),
+    (counting, "python3", "a crash after the sum", junit("fail", "3 Tests 0 Failures 0 Ignored"), True),
+]
+
+
+def has(tool):
+    if tool == "lizard":
+        return importlib.util.find_spec("lizard") is not None
+    return shutil.which(tool) is not None
+
+
+def main():
+    passed = failed = skipped = 0
+    for gate, tool, name, argument, must_catch in CASES:
+        if not has(tool):
+            skipped += 1
+            print(f"skip: {gate.__name__}: {name}: {tool} is missing")
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            status, said = gate(Path(folder), argument)
+        if (status != 0) == must_catch and "Traceback" not in said:
+            passed += 1
+        else:
+            failed += 1
+            print(f"failed: {gate.__name__}: {name}: {'not caught' if must_catch else 'caught although clean'}\n{said}")
+    print(f"{passed} passed, {failed} failed, {skipped} skipped")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
