@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+#include "client.h"
+
+#include "json_out.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+
+void gw_client_read(gw_client_t *self) {
+    const size_t room = sizeof self->in - self->in_length;
+    if (room == 0U || self->closing || self->ended) {
+        return;
+    }
+    const ssize_t count = recv(self->fd, &self->in[self->in_length], room, MSG_DONTWAIT);
+    if (count > 0) {
+        self->in_length += (size_t)count;
+    } else if (count == 0) {
+        self->ended = true;
+    } else if (errno != EAGAIN && errno != EINTR) {
+        self->failed = true;
+    }
+}
+
+const char *gw_client_line(const gw_client_t *self, size_t *out_length) {
+    const char *end = (const char *)memchr(self->in, '\n', self->in_length);
+    if (end == NULL) {
+        return NULL;
+    }
+    *out_length = (size_t)(end - self->in);
+    return self->in;
+}
+
+void gw_client_drop_line(gw_client_t *self, size_t length) {
+    self->in_length -= length + 1U;
+    (void)memmove(self->in, &self->in[length + 1U], self->in_length);
+}
+
+bool gw_client_line_too_long(const gw_client_t *self) {
+    return self->in_length == sizeof self->in && memchr(self->in, '\n', sizeof self->in) == NULL;
+}
+
+static bool queue(gw_client_t *self, const char *line, size_t length, size_t reserve) {
+    const size_t waiting = self->out_end - self->out_start;
+    if (length + reserve > sizeof self->out - waiting) {
+        return false;
+    }
+    if (length > sizeof self->out - self->out_end) {
+        (void)memmove(self->out, &self->out[self->out_start], waiting);
+        self->out_start = 0;
+        self->out_end = waiting;
+    }
+    (void)memcpy(&self->out[self->out_end], line, length);
+    self->out_end += length;
+    return true;
+}
+
+void gw_client_reply(gw_client_t *self, const char *line, size_t length) {
+    if (!self->failed && !queue(self, line, length, 0U)) {
+        self->failed = true;
+    }
+}
+
+static bool tell_lost(gw_client_t *self) {
+    char line[64];
+    json_out_t json;
+    json_out_init(&json, line, sizeof line);
+    json_out_open(&json, NULL, '{');
+    json_out_text(&json, "event", "lost");
+    json_out_int(&json, "count", self->lost);
+    json_out_close(&json, '}');
+    return queue(self, line, json_out_finish(&json), GW_REPLY_MAX);
+}
+
+void gw_client_event(gw_client_t *self, const char *line, size_t length) {
+    if (self->closing || self->failed || self->ended) {
+        return;
+    }
+    if (self->lost > 0U && tell_lost(self)) {
+        self->lost = 0;
+    }
+    if (self->lost > 0U || !queue(self, line, length, GW_REPLY_MAX)) {
+        ++self->lost;
+    }
+}
+
+void gw_client_flush(gw_client_t *self) {
+    if (self->failed || self->out_start == self->out_end) {
+        return;
+    }
+    const ssize_t count =
+        send(self->fd, &self->out[self->out_start], self->out_end - self->out_start, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (count > 0) {
+        self->out_start += (size_t)count;
+    } else if (count < 0 && errno != EAGAIN && errno != EINTR) {
+        self->failed = true;
+    }
+    if (self->out_start == self->out_end) {
+        self->out_start = 0;
+        self->out_end = 0;
+    }
+}
+
+bool gw_client_flushed(const gw_client_t *self) {
+    return self->failed || self->out_start == self->out_end;
+}
+
+void gw_client_finish(gw_client_t *self, iw_time_us_t now_us) {
+    if (!self->closing) {
+        self->closing = true;
+        self->close_us = now_us + GW_CLOSING_US;
+    }
+}
+
+void gw_client_describe(const gw_client_t *self, char *out_text, size_t size) {
+    if (self->name[0] != '\0') {
+        (void)snprintf(out_text, size, "\"%s\" (client %u, pid %d)", self->name, (unsigned)self->id, self->pid);
+    } else {
+        (void)snprintf(out_text, size, "client %u (pid %d)", (unsigned)self->id, self->pid);
+    }
+}

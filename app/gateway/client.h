@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+/// One connection of the northbound socket: bytes in, lines out; and the table of all of them.
+///
+/// Buffers are fixed. A full output buffer costs the client events (counted, and told by a `lost` event as soon as there is room again);
+/// half of it is kept for replies, and a client that does not take even those is dropped. Nothing here waits.
+///
+///     FREE --accept--> OPEN --end of file, error, line too long--> CLOSING (flush, at most GW_CLOSING_US) --> FREE
+#ifndef GATEWAY_CLIENT_H
+#define GATEWAY_CLIENT_H
+
+#include "request.h"
+
+#include "iwheel/permit.h"
+
+/// The longest reply or event with its newline.
+#define GW_REPLY_MAX 65537U
+/// Holds the longest reply behind the longest event.
+#define GW_OUT_SIZE (2U * GW_REPLY_MAX)
+/// A connection that is being closed gets this long to take what is left for it.
+#define GW_CLOSING_US 1000000U
+
+typedef struct {
+    iw_client_t id; ///< Never used again for another connection; IW_CLIENT_NONE: the slot is free.
+    int fd;
+    int pid;           ///< Of the process that connected; 0 if unknown.
+    uint32_t interest; ///< What epoll was told to watch.
+    bool readable;     ///< epoll says so, in this cycle.
+    bool leaving; ///< The other side will send nothing more, though lines of it may be waiting: it can hold no lease.
+    bool hung_up; ///< It reads nothing more either.
+    bool ended;   ///< End of file: complete lines before it still count.
+    bool closing; ///< Nothing more is read.
+    bool failed;  ///< Cannot be written to any more.
+    bool arming;  ///< An arm waits for its reply; later lines wait behind it.
+    gw_id_t arm_id;
+    uint8_t topics;
+    uint32_t lost; ///< Events that did not fit since the last `lost` event.
+    uint32_t rate_hz;
+    iw_time_us_t next_us;  ///< When the next periodic event is due.
+    iw_time_us_t close_us; ///< While closing: no later than this.
+    size_t in_length;
+    size_t out_start;
+    size_t out_end;
+    char name[GW_NAME_MAX + 1U]; ///< As given with arm; empty: none.
+    char in[GW_LINE_MAX + 1U];
+    char out[GW_OUT_SIZE];
+} gw_client_t;
+
+/// Reads what is there, as far as the buffer has room. One system call.
+void gw_client_read(gw_client_t *self);
+
+/// The next complete line, without its newline. NULL: there is none. Valid until `gw_client_drop_line`.
+const char *gw_client_line(const gw_client_t *self, size_t *out_length);
+void gw_client_drop_line(gw_client_t *self, size_t length);
+
+/// True if the buffer is full without a newline.
+bool gw_client_line_too_long(const gw_client_t *self);
+
+/// Queues a whole line. One that does not fit drops the client.
+void gw_client_reply(gw_client_t *self, const char *line, size_t length);
+
+/// Queues a whole line if half of the buffer is free, else counts it as lost.
+void gw_client_event(gw_client_t *self, const char *line, size_t length);
+
+/// Sends what is queued, as far as it goes. One system call.
+void gw_client_flush(gw_client_t *self);
+bool gw_client_flushed(const gw_client_t *self);
+
+/// Nothing more is read; it is closed when it has taken what is queued.
+void gw_client_finish(gw_client_t *self, iw_time_us_t now_us);
+
+/// "joystick" (client 3, pid 4711), for messages.
+void gw_client_describe(const gw_client_t *self, char *out_text, size_t size);
+#define GW_CLIENT_TEXT_SIZE 112U
+
+#endif

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+/// Everything the gateway is made of, in one place, allocated once at start.
+///
+/// One cycle of the loop (loop.c), always in this order:
+///
+///     wait -> signals -> bus and e-stop (core step) -> what changed (observe.c) -> clients (dispatch.c) -> step again if they
+///     asked for something -> new clients -> flush -> watchdog
+///
+/// so that the wheels come before everybody who talks about them. Work per cycle is bounded in each of these places.
+#ifndef GATEWAY_DAEMON_H
+#define GATEWAY_DAEMON_H
+
+#include "client.h"
+#include "gateway_config.h"
+#include "listener.h"
+#include "log.h"
+#include "notify.h"
+#include "runtime.h"
+#include "why.h"
+
+#include "iwheel/gateway.h"
+#include "iwheel_linux/linux_hal.h"
+
+#define GW_CLIENTS_MAX 64U
+/// Frames of one step, for the watchers of the topic `frame`.
+#define GW_FRAMES IW_GATEWAY_DRAIN_MAX
+#define GW_WARNINGS 4U
+#define GW_WARNING_SIZE 200U
+
+/// What was last told to the log and to watchers, so that only changes are told.
+typedef struct {
+    iw_state_t state;
+    iw_bus_state_t bus;
+    iw_client_t holder;
+    uint32_t present; ///< Latching causes, as a bit each.
+    uint32_t stop_number;
+    uint32_t ledger_changes;
+    uint32_t still_moving;
+    int estop;
+    bool started; ///< The first observation only takes notes.
+    char holder_name[GW_NAME_MAX + 1U];
+    char holder_text[GW_CLIENT_TEXT_SIZE];
+} gw_observed_t;
+
+typedef struct {
+    iw_time_us_t at_us;
+    iw_can_frame_t frame;
+} gw_tapped_t;
+
+typedef struct gw_daemon {
+    gateway_config_t config;
+    gw_log_t log;
+    gw_notify_t notify;
+    gw_runtime_t runtime;
+    gw_listener_t listener;
+    iw_linux_hal_t hal;
+    iw_gateway_t gateway;
+    gw_observed_t observed;
+    gw_stop_note_t last_stop;
+    iw_time_us_t now_us;         ///< Of the present cycle.
+    iw_time_us_t step_next_us;   ///< As the last step wished.
+    iw_time_us_t listen_from_us; ///< Nobody is accepted before.
+    iw_client_t last_client;
+    uint32_t clients;
+    int epoll_fd;
+    int timer_fd;
+    int signal_fd;
+    bool shutting_down;
+    bool requested; ///< A request has changed something since the last step.
+    uint32_t warnings;
+    char warning[GW_WARNINGS][GW_WARNING_SIZE];
+    char estop_reason[GW_REASON_MAX + 1U]; ///< Of the last software e-stop.
+    uint32_t tapped;                       ///< Frames in `tap`. A step takes no more than there is room for.
+    gw_tapped_t tap[GW_FRAMES];
+    char line[GW_REPLY_MAX]; ///< Where replies and events are written.
+    gw_client_t client[GW_CLIENTS_MAX];
+} gw_daemon_t;
+
+/// The open connection with this number; NULL if it is gone.
+gw_client_t *gw_daemon_client(gw_daemon_t *self, iw_client_t id);
+
+/// True while setpoints are sent, or about to be.
+bool gw_daemon_is_sending(const gw_daemon_t *self);
+
+#endif

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: MIT
+#include "dispatch.h"
+
+#include "observe.h"
+#include "refuse.h"
+#include "snapshot.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/// One request being carried out.
+typedef struct {
+    gw_daemon_t *daemon;
+    gw_client_t *client;
+    const gw_request_t *request;
+} call_t;
+
+static void write_id(json_out_t *json, const gw_id_t *id) {
+    if (id->kind == GW_ID_NUMBER) {
+        json_out_int(json, "id", id->number);
+    } else {
+        json_out_text(json, "id", id->kind == GW_ID_TEXT ? id->text : NULL);
+    }
+}
+
+static json_out_t begin_reply(gw_daemon_t *daemon, const gw_id_t *id) {
+    json_out_t json;
+    json_out_init(&json, daemon->line, sizeof daemon->line);
+    json_out_open(&json, NULL, '{');
+    write_id(&json, id);
+    json_out_bool(&json, "ok", true);
+    return json;
+}
+
+static void send_reply(gw_client_t *client, json_out_t *json) {
+    json_out_close(json, '}');
+    gw_client_reply(client, json->data, json_out_finish(json));
+}
+
+size_t gw_dispatch_write_refusal(gw_daemon_t *daemon, const gw_id_t *id, const gw_refusal_t *refusal) {
+    json_out_t json;
+    json_out_init(&json, daemon->line, sizeof daemon->line);
+    json_out_open(&json, NULL, '{');
+    write_id(&json, id);
+    json_out_bool(&json, "ok", false);
+    json_out_text(&json, "error", gw_error_name(refusal->error));
+    json_out_text(&json, "message", refusal->message);
+    json_out_close(&json, '}');
+    return json_out_finish(&json);
+}
+
+static void send_refusal(gw_daemon_t *daemon, gw_client_t *client, const gw_id_t *id, const gw_refusal_t *refusal) {
+    gw_client_reply(client, daemon->line, gw_dispatch_write_refusal(daemon, id, refusal));
+}
+
+static void refuse(const call_t *call, iw_refusal_t refusal) {
+    gw_refusal_t words;
+    gw_refuse_describe(call->daemon, call->request, refusal, &words);
+    send_refusal(call->daemon, call->client, &call->request->id, &words);
+}
+
+static void reply_state(const call_t *call) {
+    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    json_out_text(&json, "state", gw_state_name(iw_gateway_state(&call->daemon->gateway)));
+    send_reply(call->client, &json);
+}
+
+static void do_hello(const call_t *call) {
+    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    gw_observe_write_hello(call->daemon, call->client, &json);
+    send_reply(call->client, &json);
+}
+
+static void do_status(const call_t *call) {
+    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    gw_snapshot_write(call->daemon, &json);
+    send_reply(call->client, &json);
+}
+
+static void do_watch(const call_t *call) {
+    gw_client_t *client = call->client;
+    const bool limited = call->request->rate_hz > GW_RATE_MAX_HZ;
+    client->topics = call->request->topics;
+    client->rate_hz = limited ? GW_RATE_MAX_HZ : (uint32_t)call->request->rate_hz;
+    client->next_us = call->daemon->now_us;
+    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    json_out_open(&json, "topics", '[');
+    for (unsigned topic = 0; topic < GW_TOPICS; ++topic) {
+        if ((client->topics & (1U << topic)) != 0U) {
+            json_out_text(&json, NULL, gw_topic_name((gw_topic_t)topic));
+        }
+    }
+    json_out_close(&json, ']');
+    json_out_int(&json, "rate_hz", client->rate_hz);
+    json_out_bool(&json, "limited", limited);
+    send_reply(client, &json);
+}
+
+static void reply_armed(gw_daemon_t *daemon, gw_client_t *client, const gw_id_t *id) {
+    const iw_stop_budget_t budget = iw_config_stop_budget(&daemon->gateway.config);
+    json_out_t json = begin_reply(daemon, id);
+    json_out_text(&json, "state", gw_state_name(iw_gateway_state(&daemon->gateway)));
+    json_out_int(&json, "lease_ms", daemon->gateway.config.lease_ms);
+    json_out_int(&json, "first_lease_ms", IW_PERMIT_FIRST_LEASE_US / IW_US_PER_MS);
+    json_out_int(&json, "stop_budget_ms", budget.client_lost_ms);
+    json_out_int(&json, "stop_budget_mm", budget.client_lost_mm);
+    json_out_open(&json, "warnings", '[');
+    for (uint32_t i = 0; i < daemon->warnings; ++i) {
+        json_out_text(&json, NULL, daemon->warning[i]);
+    }
+    json_out_close(&json, ']');
+    send_reply(client, &json);
+}
+
+static void do_arm(const call_t *call) {
+    gw_daemon_t *daemon = call->daemon;
+    gw_client_t *client = call->client;
+    if (daemon->shutting_down) {
+        const gw_refusal_t refusal = {GW_DENIED, "the gateway is shutting down; wait until it is started again"};
+        send_refusal(daemon, client, &call->request->id, &refusal);
+        return;
+    }
+    const iw_refusal_t refusal = iw_gateway_arm(&daemon->gateway, daemon->now_us, client->id, call->request->takeover);
+    if (refusal != IW_REFUSE_NONE) {
+        refuse(call, refusal);
+        return;
+    }
+    if (call->request->name[0] != '\0') {
+        (void)memcpy(client->name, call->request->name, sizeof client->name);
+    }
+    client->arming = true;
+    client->arm_id = call->request->id;
+    daemon->requested = true;
+}
+
+void gw_dispatch_arming(gw_daemon_t *daemon) {
+    const iw_permit_t *permit = &daemon->gateway.permit;
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+        gw_client_t *client = &daemon->client[i];
+        const bool holds = permit->holder == client->id;
+        if (client->id == IW_CLIENT_NONE || !client->arming || (holds && iw_gateway_arming(&daemon->gateway))) {
+            continue;
+        }
+        client->arming = false;
+        if (holds && iw_gateway_state(&daemon->gateway) == IW_STATE_ARMED) {
+            reply_armed(daemon, client, &client->arm_id);
+            continue;
+        }
+        const gw_request_t request = {.cmd = GW_CMD_ARM};
+        const iw_refusal_t refusal = iw_gateway_arm_refusal(&daemon->gateway);
+        gw_refusal_t words;
+        gw_refuse_describe(daemon, &request, refusal == IW_REFUSE_NONE ? IW_REFUSE_NOT_ARMED : refusal, &words);
+        send_refusal(daemon, client, &client->arm_id, &words);
+    }
+}
+
+/// A number too large for the core is too large for the wheels: the core refuses it by its range.
+static int32_t saturate(int64_t value) {
+    return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
+}
+
+static void drive(const call_t *call, const iw_drive_t *wanted) {
+    iw_applied_t applied;
+    const iw_refusal_t refusal =
+        iw_gateway_drive(&call->daemon->gateway, call->daemon->now_us, call->client->id, wanted, &applied);
+    if (refusal != IW_REFUSE_NONE) {
+        refuse(call, refusal);
+        return;
+    }
+    call->daemon->requested = true;
+    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    json_out_int(&json, "left_mm_s", applied.pair.wheel[IW_LEFT].speed_mm_s);
+    json_out_int(&json, "right_mm_s", applied.pair.wheel[IW_RIGHT].speed_mm_s);
+    json_out_int(&json, "left_mA", applied.pair.wheel[IW_LEFT].current_mA);
+    json_out_int(&json, "right_mA", applied.pair.wheel[IW_RIGHT].current_mA);
+    json_out_bool(&json, "limited", applied.limited);
+    send_reply(call->client, &json);
+}
+
+static void do_drive(const call_t *call) {
+    const gw_request_t *request = call->request;
+    const iw_drive_t wanted = {
+        .speed_mm_s = {saturate(request->left_mm_s), saturate(request->right_mm_s)},
+        .current_mA = {saturate(request->left_mA), saturate(request->right_mA)},
+        .has_current = request->has_current,
+    };
+    drive(call, &wanted);
+}
+
+static void do_twist(const call_t *call) {
+    const int64_t limit = 1000000; // Far outside, and no product of it overflows.
+    const int64_t v = call->request->v_mm_s;
+    const int64_t yaw = call->request->yaw_mrad_s;
+    const int64_t v_mm_s = v > limit ? limit : v < -limit ? -limit : v;
+    const int64_t yaw_mrad_s = yaw > limit ? limit : yaw < -limit ? -limit : yaw;
+    const int64_t rim_mm_s = yaw_mrad_s * call->daemon->config.track_mm / 2000;
+    const iw_drive_t wanted = {.speed_mm_s = {saturate(v_mm_s - rim_mm_s), saturate(v_mm_s + rim_mm_s)}};
+    drive(call, &wanted);
+}
+
+static void do_stop(const call_t *call) {
+    iw_gateway_stop(&call->daemon->gateway, call->daemon->now_us, call->client->id, IW_CAUSE_CLIENT_STOP);
+    call->daemon->requested = true;
+    reply_state(call);
+}
+
+static void do_estop(const call_t *call) {
+    gw_daemon_t *daemon = call->daemon;
+    if (iw_gateway_state(&daemon->gateway) != IW_STATE_LATCHED) {
+        (void)memcpy(daemon->estop_reason, call->request->reason, sizeof daemon->estop_reason);
+    }
+    iw_gateway_estop(&daemon->gateway, daemon->now_us, call->client->id);
+    daemon->requested = true;
+    reply_state(call);
+}
+
+static void do_reset(const call_t *call) {
+    const iw_refusal_t refusal = iw_gateway_reset(&call->daemon->gateway, call->daemon->now_us);
+    if (refusal != IW_REFUSE_NONE) {
+        refuse(call, refusal);
+        return;
+    }
+    call->daemon->requested = true;
+    reply_state(call);
+}
+
+/// Both wheels or none: tried on copies first.
+static void do_tare(const call_t *call) {
+    gw_daemon_t *daemon = call->daemon;
+    for (unsigned side = 0; side < IW_SIDES; ++side) {
+        iw_force_t trial = daemon->gateway.force[side];
+        const bool wanted = (call->request->sides & (1U << side)) != 0U;
+        const iw_tare_t result = wanted ? iw_force_tare(&trial, daemon->now_us) : IW_TARE_OK;
+        if (result != IW_TARE_OK) {
+            gw_refusal_t words;
+            gw_refuse_describe_tare((iw_side_t)side, result, &words);
+            send_refusal(daemon, call->client, &call->request->id, &words);
+            return;
+        }
+    }
+    for (unsigned side = 0; side < IW_SIDES; ++side) {
+        if ((call->request->sides & (1U << side)) != 0U) {
+            (void)iw_gateway_tare(&daemon->gateway, daemon->now_us, (iw_side_t)side);
+        }
+    }
+    reply_state(call);
+}
+
+static void do_why(const call_t *call) {
+    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    gw_snapshot_write_stop(call->daemon, &json);
+    send_reply(call->client, &json);
+}
+
+void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line, size_t length) {
+    static void (*const handlers[GW_CMDS])(const call_t *call) = {
+        [GW_CMD_HELLO] = do_hello, [GW_CMD_STATUS] = do_status, [GW_CMD_WATCH] = do_watch, [GW_CMD_ARM] = do_arm,
+        [GW_CMD_DRIVE] = do_drive, [GW_CMD_TWIST] = do_twist,   [GW_CMD_STOP] = do_stop,   [GW_CMD_DISARM] = do_stop,
+        [GW_CMD_ESTOP] = do_estop, [GW_CMD_RESET] = do_reset,   [GW_CMD_TARE] = do_tare,   [GW_CMD_WHY] = do_why,
+    };
+    gw_request_t request;
+    gw_refusal_t refusal;
+    if (!gw_request_parse(line, length, &request, &refusal)) {
+        send_refusal(daemon, client, &request.id, &refusal);
+        return;
+    }
+    daemon->now_us = iw_clock_now_us();
+    const call_t call = {daemon, client, &request};
+    handlers[request.cmd](&call);
+    gw_observe(daemon); // While it is still known who asked.
+}

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: MIT
+/// Carries out a client's requests and answers them.
+#ifndef GATEWAY_DISPATCH_H
+#define GATEWAY_DISPATCH_H
+
+#include "daemon.h"
+
+/// Lines of one client that are carried out in one cycle.
+#define GW_LINES_PER_CYCLE 4U
+
+/// Carries out one line. It is applied whole or not at all, and answered; the reply to `arm` may come later.
+void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line, size_t length);
+
+/// Answers the arms that have been decided by the last step.
+void gw_dispatch_arming(gw_daemon_t *daemon);
+
+/// Refuses without a request: `line_too_long` and `too_many_clients`. Writes the line, returns its length.
+size_t gw_dispatch_write_refusal(gw_daemon_t *daemon, const gw_id_t *id, const gw_refusal_t *refusal);
+
+#endif

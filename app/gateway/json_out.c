@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "json_out.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+static void put(json_out_t *self, const char *text, size_t length) {
+    if (self->overflow || length >= self->size - self->length) {
+        self->overflow = true;
+        return;
+    }
+    (void)memcpy(&self->data[self->length], text, length);
+    self->length += length;
+}
+
+static void put_text(json_out_t *self, const char *text) {
+    put(self, text, strlen(text));
+}
+
+static void put_escaped(json_out_t *self, const char *text) {
+    put(self, "\"", 1U);
+    for (; *text != '\0'; ++text) {
+        const unsigned char byte = (unsigned char)*text;
+        char escape[8];
+        if (byte == '"' || byte == '\\') {
+            escape[0] = '\\';
+            escape[1] = *text;
+            put(self, escape, 2U);
+        } else if (byte < 0x20U || byte == 0x7FU) {
+            (void)snprintf(escape, sizeof escape, "\\u%04X", (unsigned)byte);
+            put_text(self, escape);
+        } else {
+            put(self, text, 1U);
+        }
+    }
+    put(self, "\"", 1U);
+}
+
+static void begin(json_out_t *self, const char *name) {
+    if (self->comma) {
+        put(self, ",", 1U);
+    }
+    self->comma = true;
+    if (name != NULL) {
+        put_escaped(self, name);
+        put(self, ":", 1U);
+    }
+}
+
+void json_out_init(json_out_t *self, char *data, size_t size) {
+    *self = (json_out_t){.data = data, .size = size};
+}
+
+void json_out_open(json_out_t *self, const char *name, char bracket) {
+    begin(self, name);
+    put(self, &bracket, 1U);
+    self->comma = false;
+}
+
+void json_out_close(json_out_t *self, char bracket) {
+    put(self, &bracket, 1U);
+    self->comma = true;
+}
+
+void json_out_int(json_out_t *self, const char *name, int64_t value) {
+    char digits[24];
+    (void)snprintf(digits, sizeof digits, "%" PRId64, value);
+    begin(self, name);
+    put_text(self, digits);
+}
+
+void json_out_bool(json_out_t *self, const char *name, bool value) {
+    begin(self, name);
+    put_text(self, value ? "true" : "false");
+}
+
+void json_out_null(json_out_t *self, const char *name) {
+    begin(self, name);
+    put_text(self, "null");
+}
+
+void json_out_known(json_out_t *self, const char *name, bool known, int64_t value) {
+    if (known) {
+        json_out_int(self, name, value);
+    } else {
+        json_out_null(self, name);
+    }
+}
+
+void json_out_text(json_out_t *self, const char *name, const char *text) {
+    if (text == NULL) {
+        json_out_null(self, name);
+        return;
+    }
+    begin(self, name);
+    put_escaped(self, text);
+}
+
+size_t json_out_finish(json_out_t *self) {
+    put(self, "\n", 1U);
+    return self->overflow ? 0U : self->length;
+}

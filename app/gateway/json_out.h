@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+/// Writes one JSON object as one line into a buffer of fixed size.
+///
+/// Commas are placed by the writer. A name of NULL is for array elements. What does not fit sets `overflow` and the line must not be
+/// used. Texts are escaped; they must be valid UTF-8 (ours, or read by the request parser, which checks). No heap.
+#ifndef GATEWAY_JSON_OUT_H
+#define GATEWAY_JSON_OUT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct {
+    char *data;
+    size_t size;
+    size_t length;
+    bool comma; ///< The next element needs one before it.
+    bool overflow;
+} json_out_t;
+
+void json_out_init(json_out_t *self, char *data, size_t size);
+
+/// `bracket` is '{' or '['; close with the matching '}' or ']'.
+void json_out_open(json_out_t *self, const char *name, char bracket);
+void json_out_close(json_out_t *self, char bracket);
+
+void json_out_int(json_out_t *self, const char *name, int64_t value);
+void json_out_bool(json_out_t *self, const char *name, bool value);
+void json_out_null(json_out_t *self, const char *name);
+
+/// `null` unless known.
+void json_out_known(json_out_t *self, const char *name, bool known, int64_t value);
+
+/// A NULL text is `null`.
+void json_out_text(json_out_t *self, const char *name, const char *text);
+
+/// Ends the line. Its length with the newline; 0 if it did not fit.
+size_t json_out_finish(json_out_t *self);
+
+#endif

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+#include "loop.h"
+
+#include "dispatch.h"
+#include "observe.h"
+#include "service.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <sys/signalfd.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#define EVENTS_PER_WAIT 32
+
+static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
+    struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
+    return fd < 0 || epoll_ctl(daemon->epoll_fd, EPOLL_CTL_ADD, fd, &interest) == 0 ? 0 : errno;
+}
+
+static int open_signals(void) {
+    sigset_t set;
+    (void)sigemptyset(&set);
+    (void)sigaddset(&set, SIGTERM);
+    (void)sigaddset(&set, SIGINT);
+    (void)sigaddset(&set, SIGHUP);
+    (void)sigprocmask(SIG_BLOCK, &set, NULL);
+    (void)signal(SIGPIPE, SIG_IGN);
+    return signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
+}
+
+int gw_loop_open(gw_daemon_t *daemon) {
+    daemon->epoll_fd = epoll_create1(EPOLL_CLOEXEC);
+    daemon->timer_fd = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
+    daemon->signal_fd = open_signals();
+    if (daemon->epoll_fd < 0 || daemon->timer_fd < 0 || daemon->signal_fd < 0) {
+        return errno;
+    }
+    const int fds[] = {daemon->timer_fd, daemon->signal_fd, daemon->listener.fd, iw_linux_hal_bus_fd(&daemon->hal),
+                       iw_linux_hal_estop_fd(&daemon->hal)};
+    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_HAL, GW_TAG_HAL};
+    int error = 0;
+    for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; ++i) {
+        error = watch(daemon, fds[i], tags[i]);
+    }
+    return error;
+}
+
+void gw_loop_close(gw_daemon_t *daemon) {
+    (void)close(daemon->signal_fd);
+    (void)close(daemon->timer_fd);
+    (void)close(daemon->epoll_fd);
+}
+
+static void take_signal(gw_daemon_t *daemon) {
+    struct signalfd_siginfo info;
+    if (read(daemon->signal_fd, &info, sizeof info) != (ssize_t)sizeof info || daemon->shutting_down) {
+        return;
+    }
+    daemon->shutting_down = true;
+    gw_log(&daemon->log, GW_LOG_INFO, "%s: stopping the wheels, then ending", strsignal((int)info.ssi_signo));
+    gw_notify_stopping(&daemon->notify);
+    iw_gateway_stop(&daemon->gateway, daemon->now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
+}
+
+static void mark_if_sending(gw_daemon_t *daemon) {
+    if (!daemon->gateway.config.listen_only && !gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon))) {
+        gw_log(&daemon->log, GW_LOG_WARNING,
+               "cannot change the crash marker %s: %s; after a crash the wheels would keep their last command for a "
+               "second",
+               daemon->runtime.marker_path, strerror(errno));
+    }
+}
+
+/// The core's cycle, and what follows from it at once.
+static void step(gw_daemon_t *daemon) {
+    daemon->now_us = iw_clock_now_us();
+    iw_linux_hal_tend(&daemon->hal, daemon->now_us);
+    mark_if_sending(daemon); // Before the first frame that it warns of.
+    daemon->step_next_us = iw_gateway_step(&daemon->gateway, daemon->now_us);
+    daemon->requested = false;
+    mark_if_sending(daemon);
+    gw_observe(daemon);
+    gw_dispatch_arming(daemon);
+}
+
+static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
+    return a_us < b_us ? a_us : b_us;
+}
+
+static void arm_timer(const gw_daemon_t *daemon) {
+    iw_time_us_t next_us = earlier(daemon->step_next_us, iw_linux_hal_next_us(&daemon->hal));
+    next_us = earlier(next_us, gw_observe_next_us(daemon));
+    next_us = earlier(next_us, gw_service_next_us(daemon));
+    next_us = next_us == 0U ? 1U : next_us; // 0 would disarm it.
+    const struct itimerspec when = {
+        .it_value = {.tv_sec = (time_t)(next_us / 1000000U), .tv_nsec = (long)(next_us % 1000000U) * 1000L}};
+    (void)timerfd_settime(daemon->timer_fd, TFD_TIMER_ABSTIME, &when, NULL);
+}
+
+/// Notes what the wait has found; nothing is done about it yet but emptying the timer.
+static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
+    uint64_t expirations;
+    switch (event->data.u64) {
+    case GW_TAG_TIMER:
+        (void)!read(daemon->timer_fd, &expirations, sizeof expirations);
+        return false;
+    case GW_TAG_SIGNAL:
+        take_signal(daemon);
+        return false;
+    case GW_TAG_LISTENER:
+        return true;
+    case GW_TAG_HAL:
+        return false;
+    default: {
+        gw_client_t *client = &daemon->client[event->data.u64 - GW_TAG_CLIENT];
+        client->readable = (event->events & (EPOLLIN | EPOLLRDHUP)) != 0U;
+        client->leaving = client->leaving || (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0U;
+        client->hung_up = (event->events & (EPOLLHUP | EPOLLERR)) != 0U;
+        return false;
+    }
+    }
+}
+
+static bool has_come_to_rest(const gw_daemon_t *daemon) {
+    return daemon->shutting_down && !gw_daemon_is_sending(daemon);
+}
+
+static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
+    step(daemon);
+    gw_service_clients(daemon);
+    if (daemon->requested) {
+        step(daemon); // A new command leaves at once.
+    }
+    if (somebody_knocks) {
+        gw_service_accept(daemon);
+    }
+    gw_observe_frames(daemon);
+    gw_observe_periodic(daemon);
+    gw_service_flush(daemon);
+    gw_notify_cycle(&daemon->notify, daemon->now_us);
+}
+
+int gw_loop_run(gw_daemon_t *daemon) {
+    bool ready = false;
+    while (!has_come_to_rest(daemon)) {
+        struct epoll_event events[EVENTS_PER_WAIT];
+        arm_timer(daemon);
+        const int count = epoll_wait(daemon->epoll_fd, events, EVENTS_PER_WAIT, gw_service_is_busy(daemon) ? 0 : -1);
+        if (count < 0 && errno != EINTR) {
+            return errno;
+        }
+        bool somebody_knocks = false;
+        daemon->now_us = iw_clock_now_us();
+        for (int i = 0; i < count; ++i) {
+            somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
+        }
+        cycle(daemon, somebody_knocks);
+        if (!ready) {
+            ready = true;
+            gw_notify_ready(&daemon->notify);
+        }
+    }
+    return 0;
+}

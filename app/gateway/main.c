@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+#include "json_arena.h"
+#include "loop.h"
+#include "observe.h"
+#include "options.h"
+#include "report.h"
+#include "service.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+/// 0, 1 and 2 must be open, or a socket of ours would take the place of one and be written to.
+static void secure_standard_streams(void) {
+    int fd = open("/dev/null", O_RDWR);
+    while (fd >= 0 && fd <= STDERR_FILENO) {
+        fd = open("/dev/null", O_RDWR);
+    }
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+}
+
+static int open_hal(gw_daemon_t *daemon) {
+    const char *culprit;
+    const int error =
+        iw_linux_hal_open(&daemon->hal, daemon->config.bus.interface, daemon->config.estop.line, &culprit);
+    if (error != 0) {
+        gw_report_unopened(&daemon->config, culprit, error, stderr);
+        return EX_UNAVAILABLE;
+    }
+    daemon->hal.tap = gw_observe_tap;
+    daemon->hal.tap_context = daemon;
+    return 0;
+}
+
+static int start_core(gw_daemon_t *daemon) {
+    const iw_hal_t hal = iw_linux_hal_functions(&daemon->hal);
+    const iw_bus_facts_t facts = {.echo_proven = daemon->hal.bus_ops->echo_proven};
+    const bool restarted = gw_runtime_crashed(&daemon->runtime) && !daemon->config.core.listen_only;
+    daemon->now_us = iw_clock_now_us();
+    if (iw_gateway_init(&daemon->gateway, &daemon->config.core, &hal, daemon->now_us, restarted) != IW_CONFIG_OK) {
+        (void)fputs("iwheel-gateway: the configuration contradicts itself; see iwheel-gateway --check\n", stderr);
+        return EX_CONFIG;
+    }
+    iw_gateway_bus_facts(&daemon->gateway, &facts);
+    if (restarted) {
+        gw_log(&daemon->log, GW_LOG_WARNING,
+               "the gateway before this one died while the wheels were armed: sending zeros for %u ms",
+               daemon->config.core.zero_hold_ms);
+    }
+    return 0;
+}
+
+/// Everything between the start of the core and the loop, in the reverse order at the end.
+static int serve(gw_daemon_t *daemon) {
+    int result = gw_listener_open(&daemon->listener, &daemon->config, &daemon->log, stderr);
+    if (result != 0) {
+        return result;
+    }
+    result = start_core(daemon);
+    if (result == 0 && gw_loop_open(daemon) != 0) {
+        (void)fputs("iwheel-gateway: cannot make the descriptors for the event loop; raise the limit of open files\n",
+                    stderr);
+        result = EX_UNAVAILABLE;
+    }
+    if (result == 0) {
+        gw_notify_open(&daemon->notify);
+        gw_report_warnings(daemon);
+        gw_report_start(daemon);
+        const int error = gw_loop_run(daemon);
+        if (error != 0) {
+            gw_log(&daemon->log, GW_LOG_ERROR, "waiting for events failed: %s", strerror(error));
+            result = EX_SOFTWARE;
+        }
+        gw_service_close_all(daemon);
+        gw_loop_close(daemon);
+        gw_notify_close(&daemon->notify);
+    }
+    gw_listener_close(&daemon->listener);
+    return result;
+}
+
+static int run(gw_daemon_t *daemon) {
+    int result = gw_listener_prepare(&daemon->config, stderr);
+    result = result != 0 ? result : gw_runtime_open(&daemon->runtime, &daemon->config, stderr);
+    if (result != 0) {
+        return result;
+    }
+    result = open_hal(daemon);
+    if (result == 0) {
+        result = serve(daemon);
+        iw_linux_hal_close(&daemon->hal);
+    }
+    gw_runtime_close(&daemon->runtime);
+    return result;
+}
+
+static int check(gw_daemon_t *daemon) {
+    int result = open_hal(daemon);
+    if (result == 0) {
+        result = gw_report_check(daemon, stdout);
+        iw_linux_hal_close(&daemon->hal);
+    }
+    return result;
+}
+
+static int act(const gw_options_t *options, gw_daemon_t *daemon) {
+    const int result = gw_options_configure(options, &daemon->config, stderr);
+    if (result != 0) {
+        return result;
+    }
+    if (options->action == GW_PRINT_CONFIG) {
+        gateway_config_print(&daemon->config, stdout);
+        return 0;
+    }
+    json_arena_install();
+    gw_log_open(&daemon->log, options->log_level);
+    const int code = options->action == GW_CHECK ? check(daemon) : run(daemon);
+    gw_log_close(&daemon->log);
+    return code;
+}
+
+int main(int argc, char **argv) {
+    gw_options_t options;
+    secure_standard_streams();
+    const int result = gw_options_parse(argc, argv, &options, stderr);
+    if (result != 0) {
+        return result;
+    }
+    if (options.action == GW_VERSION) {
+        (void)puts("iwheel-gateway " IWHEEL_VERSION);
+        return 0;
+    }
+    if (options.action == GW_HELP) {
+        gw_options_help(stdout);
+        return 0;
+    }
+    gw_daemon_t *daemon = (gw_daemon_t *)calloc(1, sizeof *daemon);
+    if (daemon == NULL) {
+        (void)fputs("iwheel-gateway: not enough memory to start\n", stderr);
+        return EX_UNAVAILABLE;
+    }
+    const int code = act(&options, daemon);
+    free(daemon);
+    return code;
+}

@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: MIT
+#include "observe.h"
+
+#include "snapshot.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define API_VERSION 1
+#define EXTENDED_ID_MASK 0x1FFFFFFFU
+
+static json_out_t begin_event(gw_daemon_t *daemon, const char *name) {
+    json_out_t json;
+    json_out_init(&json, daemon->line, sizeof daemon->line);
+    json_out_open(&json, NULL, '{');
+    json_out_text(&json, "event", name);
+    return json;
+}
+
+static void send_event(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic) {
+    json_out_close(json, '}');
+    const size_t length = json_out_finish(json);
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX && length > 0U; ++i) {
+        gw_client_t *client = &daemon->client[i];
+        if (client->id != IW_CLIENT_NONE && (client->topics & (1U << topic)) != 0U) {
+            gw_client_event(client, json->data, length);
+        }
+    }
+}
+
+static void tell_state(gw_daemon_t *daemon) {
+    json_out_t json = begin_event(daemon, "state");
+    gw_snapshot_write(daemon, &json);
+    send_event(daemon, &json, GW_TOPIC_STATE);
+}
+
+static void observe_state(gw_daemon_t *daemon, bool first) {
+    const iw_state_t state = iw_gateway_state(&daemon->gateway);
+    if (state == daemon->observed.state && !first) {
+        return;
+    }
+    gw_log(&daemon->log, GW_LOG_INFO, "state: %s", gw_state_name(state));
+    daemon->observed.state = state;
+    tell_state(daemon);
+}
+
+/// Who asked for it or held the lease, while that is still known.
+static void note_client(gw_daemon_t *daemon, gw_stop_note_t *note, char *out_text, size_t size) {
+    const gw_observed_t *observed = &daemon->observed;
+    if (note->stop.cause == IW_CAUSE_ESTOP_SOFTWARE) {
+        note->stop.client = note->stop.detail;
+    }
+    const gw_client_t *client = gw_daemon_client(daemon, note->stop.client);
+    if (client != NULL) {
+        gw_client_describe(client, out_text, size);
+        (void)memcpy(note->client_name, client->name, sizeof client->name);
+    } else if (note->stop.client == observed->holder && observed->holder != IW_CLIENT_NONE) {
+        (void)snprintf(out_text, size, "%s", observed->holder_text);
+        (void)memcpy(note->client_name, observed->holder_name, sizeof observed->holder_name);
+    } else {
+        (void)snprintf(out_text, size, "a client");
+    }
+}
+
+static void observe_stop(gw_daemon_t *daemon) {
+    const iw_stop_t *stop = &daemon->gateway.permit.stop;
+    if (stop->number == daemon->observed.stop_number) {
+        return;
+    }
+    daemon->observed.stop_number = stop->number;
+    char who[GW_CLIENT_TEXT_SIZE];
+    gw_stop_note_t *note = &daemon->last_stop;
+    *note = (gw_stop_note_t){.stop = *stop, .wall_us = iw_clock_wall_us()};
+    note_client(daemon, note, who, sizeof who);
+    const gw_why_context_t context = {.client = who,
+                                      .reason = daemon->estop_reason,
+                                      .estop = daemon->config.estop.line,
+                                      .bus = daemon->config.bus.interface};
+    gw_why_sentence(&note->stop, &context, note->sentence, sizeof note->sentence);
+    gw_log(&daemon->log, GW_LOG_WARNING, "stop %u: %s", (unsigned)stop->number, note->sentence);
+    json_out_t json = begin_event(daemon, "stop");
+    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    gw_snapshot_write_stop(daemon, &json);
+    send_event(daemon, &json, GW_TOPIC_STOP);
+}
+
+static void observe_lease(gw_daemon_t *daemon) {
+    gw_observed_t *observed = &daemon->observed;
+    const iw_permit_t *permit = &daemon->gateway.permit;
+    const iw_client_t holder = permit->state == IW_STATE_ARMED ? permit->holder : IW_CLIENT_NONE;
+    if (holder == observed->holder) {
+        return;
+    }
+    const iw_client_t former = observed->holder;
+    const gw_client_t *client = gw_daemon_client(daemon, holder);
+    const char *change = holder == IW_CLIENT_NONE ? "lost" : former == IW_CLIENT_NONE ? "gained" : "moved";
+    observed->holder = holder;
+    if (client != NULL) {
+        gw_client_describe(client, observed->holder_text, sizeof observed->holder_text);
+        (void)memcpy(observed->holder_name, client->name, sizeof client->name);
+    }
+    gw_log(&daemon->log, GW_LOG_INFO, "lease %s: %s", change,
+           holder == IW_CLIENT_NONE ? "nobody" : observed->holder_text);
+    json_out_t json = begin_event(daemon, "lease");
+    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    json_out_text(&json, "change", change);
+    json_out_known(&json, "holder", holder != IW_CLIENT_NONE, holder);
+    json_out_text(&json, "name", client != NULL && client->name[0] != '\0' ? client->name : NULL);
+    json_out_known(&json, "former", former != IW_CLIENT_NONE, former);
+    send_event(daemon, &json, GW_TOPIC_LEASE);
+}
+
+static void observe_bus(gw_daemon_t *daemon, bool first) {
+    const iw_bus_state_t bus = daemon->gateway.bus;
+    if (bus == daemon->observed.bus && !first) {
+        return;
+    }
+    daemon->observed.bus = bus;
+    gw_log(&daemon->log, bus == IW_BUS_ACTIVE ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s",
+           daemon->config.bus.interface, gw_bus_state_name(bus));
+    json_out_t json = begin_event(daemon, "bus");
+    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    json_out_text(&json, "state", gw_bus_state_name(bus));
+    send_event(daemon, &json, GW_TOPIC_BUS);
+}
+
+static void observe_estop(gw_daemon_t *daemon, bool first) {
+    const int answer = daemon->hal.estop_last;
+    if (answer == daemon->observed.estop && !first) {
+        return;
+    }
+    daemon->observed.estop = answer;
+    const char *name = gw_estop_name(answer, daemon->hal.estop_ops->present);
+    gw_log(&daemon->log, answer == 0 ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s", daemon->config.estop.line, name);
+    json_out_t json = begin_event(daemon, "estop");
+    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    json_out_text(&json, "state", name);
+    send_event(daemon, &json, GW_TOPIC_ESTOP);
+}
+
+static void tell_fault(gw_daemon_t *daemon, const char *cause, bool present) {
+    gw_log(&daemon->log, present ? GW_LOG_WARNING : GW_LOG_INFO, "%s: %s", present ? "fault" : "fault gone", cause);
+    json_out_t json = begin_event(daemon, "fault");
+    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    json_out_text(&json, "cause", cause);
+    json_out_bool(&json, "present", present);
+    send_event(daemon, &json, GW_TOPIC_STOP);
+}
+
+/// While armed or stopping a cause makes a stop, which is told as such; here are the others.
+static void observe_faults(gw_daemon_t *daemon) {
+    gw_observed_t *observed = &daemon->observed;
+    const iw_permit_t *permit = &daemon->gateway.permit;
+    const uint32_t present = iw_permit_present(permit, daemon->now_us);
+    const uint32_t changed = present ^ observed->present;
+    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL && changed != 0U; ++cause) {
+        if ((changed & (1U << cause)) != 0U) {
+            tell_fault(daemon, gw_cause_name((iw_cause_t)cause), (present & (1U << cause)) != 0U);
+        }
+    }
+    observed->present = present;
+    if (permit->still_moving != observed->still_moving) {
+        observed->still_moving = permit->still_moving;
+        tell_fault(daemon, "still_moving", true);
+    }
+}
+
+static void observe_ledger(gw_daemon_t *daemon) {
+    const iw_ledger_t *ledger = &daemon->gateway.ledger;
+    if (ledger->changes == daemon->observed.ledger_changes) {
+        return;
+    }
+    daemon->observed.ledger_changes = ledger->changes;
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        const iw_ledger_entry_t *entry = iw_ledger_entry(ledger, (iw_ledger_item_t)item);
+        if (entry->state == IW_LEDGER_CONTRADICTED) {
+            gw_log(&daemon->log, GW_LOG_WARNING, "assumption %s is contradicted by the %s (figure %d)",
+                   gw_ledger_item_name((iw_ledger_item_t)item), gw_evidence_name(entry->evidence), (int)entry->figure);
+        }
+    }
+}
+
+void gw_observe(gw_daemon_t *daemon) {
+    const bool first = !daemon->observed.started;
+    daemon->observed.started = true;
+    observe_bus(daemon, first);
+    observe_estop(daemon, first);
+    observe_faults(daemon);
+    observe_stop(daemon);
+    observe_lease(daemon);
+    observe_state(daemon, first);
+    observe_ledger(daemon);
+}
+
+static bool wants_periodic(const gw_client_t *client) {
+    return client->id != IW_CLIENT_NONE && !client->closing && !client->ended &&
+           (client->topics & ((1U << GW_TOPIC_STATE) | (1U << GW_TOPIC_FORCE))) != 0U;
+}
+
+static void send_periodic(gw_daemon_t *daemon, gw_client_t *client) {
+    if ((client->topics & (1U << GW_TOPIC_STATE)) != 0U) {
+        json_out_t json = begin_event(daemon, "state");
+        gw_snapshot_write(daemon, &json);
+        json_out_close(&json, '}');
+        gw_client_event(client, daemon->line, json_out_finish(&json));
+    }
+    if ((client->topics & (1U << GW_TOPIC_FORCE)) != 0U) {
+        json_out_t json = begin_event(daemon, "force");
+        gw_snapshot_write_force(daemon, &json);
+        json_out_close(&json, '}');
+        gw_client_event(client, daemon->line, json_out_finish(&json));
+    }
+}
+
+void gw_observe_periodic(gw_daemon_t *daemon) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+        gw_client_t *client = &daemon->client[i];
+        if (wants_periodic(client) && daemon->now_us >= client->next_us) {
+            const iw_time_us_t period_us = 1000000U / client->rate_hz;
+            client->next_us += period_us;
+            if (client->next_us <= daemon->now_us) {
+                client->next_us = daemon->now_us + period_us; // After a stall: no burst.
+            }
+            send_periodic(daemon, client);
+        }
+    }
+}
+
+iw_time_us_t gw_observe_next_us(const gw_daemon_t *daemon) {
+    iw_time_us_t next_us = IW_NEVER;
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+        const gw_client_t *client = &daemon->client[i];
+        if (wants_periodic(client) && client->next_us < next_us) {
+            next_us = client->next_us;
+        }
+    }
+    return next_us;
+}
+
+static bool anybody_watches(const gw_daemon_t *daemon, gw_topic_t topic) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+        if (daemon->client[i].id != IW_CLIENT_NONE && (daemon->client[i].topics & (1U << topic)) != 0U) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void gw_observe_tap(void *context, const iw_can_frame_t *frame) {
+    gw_daemon_t *daemon = (gw_daemon_t *)context;
+    if (daemon->tapped < GW_FRAMES) {
+        daemon->tap[daemon->tapped++] = (gw_tapped_t){.at_us = daemon->now_us, .frame = *frame};
+    }
+}
+
+static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
+    const iw_can_frame_t *frame = &tapped->frame;
+    char data[2U * IW_CAN_DATA_MAX + 1U] = "";
+    json_out_t json = begin_event(daemon, "frame");
+    for (unsigned i = 0; i < frame->dlc && i < IW_CAN_DATA_MAX; ++i) {
+        (void)snprintf(&data[2U * i], 3U, "%02X", frame->data[i]);
+    }
+    json_out_int(&json, "t_us", (int64_t)tapped->at_us);
+    json_out_int(&json, "id", frame->id & ((frame->id & IW_CAN_EXTENDED) != 0U ? EXTENDED_ID_MASK : IW_CAN_ID_MASK));
+    json_out_int(&json, "dlc", frame->dlc);
+    json_out_text(&json, "data", data);
+    json_out_text(&json, "kind", frame->kind == (uint8_t)IW_CAN_ECHO ? "echo" : "received");
+    json_out_open(&json, "flags", '[');
+    if ((frame->id & IW_CAN_EXTENDED) != 0U) {
+        json_out_text(&json, NULL, "extended");
+    }
+    if ((frame->id & IW_CAN_REMOTE) != 0U) {
+        json_out_text(&json, NULL, "remote");
+    }
+    if ((frame->id & IW_CAN_FD) != 0U) {
+        json_out_text(&json, NULL, "fd");
+    }
+    json_out_close(&json, ']');
+    send_event(daemon, &json, GW_TOPIC_FRAME);
+}
+
+void gw_observe_frames(gw_daemon_t *daemon) {
+    if (anybody_watches(daemon, GW_TOPIC_FRAME)) {
+        for (uint32_t i = 0; i < daemon->tapped; ++i) {
+            tell_frame(daemon, &daemon->tap[i]);
+        }
+    }
+    daemon->tapped = 0;
+}
+
+void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, json_out_t *json) {
+    json_out_text(json, "name", "iwheel-gateway");
+    json_out_text(json, "version", IWHEEL_VERSION);
+    json_out_int(json, "api", API_VERSION);
+    json_out_text(json, "bus", daemon->config.bus.interface);
+    json_out_text(json, "state", gw_state_name(iw_gateway_state(&daemon->gateway)));
+    json_out_int(json, "client", client->id);
+}
+
+void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client) {
+    json_out_t json = begin_event(daemon, "hello");
+    gw_observe_write_hello(daemon, client, &json);
+    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    json_out_close(&json, '}');
+    gw_client_event(client, daemon->line, json_out_finish(&json));
+}

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: MIT
+#include "refuse.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+/// Where a message is being written.
+typedef struct {
+    gw_daemon_t *daemon;
+    const gw_request_t *request;
+    char *text;
+    size_t size;
+} wording_t;
+
+#define SAY(self, ...) (void)snprintf((self)->text, (self)->size, __VA_ARGS__)
+
+static uint64_t ms_since(const gw_daemon_t *daemon, iw_time_us_t then_us) {
+    return then_us < daemon->now_us ? (daemon->now_us - then_us) / IW_US_PER_MS : 0U;
+}
+
+static void name_client(gw_daemon_t *daemon, iw_client_t id, char *out_text, size_t size) {
+    const gw_client_t *client = gw_daemon_client(daemon, id);
+    if (client != NULL) {
+        gw_client_describe(client, out_text, size);
+    } else {
+        (void)snprintf(out_text, size, "client %u (gone)", (unsigned)id);
+    }
+}
+
+static void say_holder(const wording_t *self) {
+    const iw_permit_t *permit = &self->daemon->gateway.permit;
+    char holder[GW_CLIENT_TEXT_SIZE];
+    name_client(self->daemon, permit->holder, holder, sizeof holder);
+    const uint64_t left_ms = permit->arming || permit->lease_until_us <= self->daemon->now_us
+                                 ? 0U
+                                 : (permit->lease_until_us - self->daemon->now_us) / IW_US_PER_MS;
+    SAY(self,
+        "%s holds the lease for another %" PRIu64
+        " ms at least; let it stop first, or, with the wheels at rest, arm with takeover",
+        holder, left_ms);
+}
+
+static void say_not_armed(const wording_t *self) {
+    const gw_daemon_t *daemon = self->daemon;
+    const iw_stop_t *stop = &daemon->gateway.permit.stop;
+    const char *state = gw_state_name(iw_gateway_state(&daemon->gateway));
+    if (daemon->shutting_down) {
+        SAY(self, "not armed: the gateway is shutting down");
+    } else if (stop->number > 0U) {
+        SAY(self, "not armed (%s); the last stop was %" PRIu64 " ms ago: %s. Arm first", state,
+            ms_since(daemon, stop->at_us), gw_cause_name(stop->cause));
+    } else {
+        SAY(self, "not armed (%s); arm first", state);
+    }
+}
+
+static void say_estop(const wording_t *self) {
+    const gw_daemon_t *daemon = self->daemon;
+    if (daemon->hal.estop_last < 0) {
+        SAY(self, "the e-stop %s cannot be read, which counts as pressed; check its wire, then: iwheelctl reset",
+            daemon->config.estop.line);
+    } else {
+        SAY(self, "the e-stop %s is pressed; release the button, then: iwheelctl reset", daemon->config.estop.line);
+    }
+}
+
+static void say_lost(const wording_t *self) {
+    const gw_daemon_t *daemon = self->daemon;
+    size_t length = 0;
+    for (unsigned side = 0; side < IW_SIDES; ++side) {
+        const iw_wheel_t *wheel = &daemon->gateway.wheel[side];
+        if (iw_wheel_heard(wheel, daemon->now_us) || length >= self->size) {
+            continue;
+        }
+        char *end = &self->text[length];
+        const size_t room = self->size - length;
+        const char *name = side == IW_LEFT ? "left" : "right";
+        if (wheel->speed_us == IW_NEVER) {
+            (void)snprintf(end, room, "the %s wheel was never heard; ", name);
+        } else {
+            (void)snprintf(end, room, "the %s wheel was last heard %" PRIu64 " ms ago; ", name,
+                           ms_since(daemon, wheel->speed_us));
+        }
+        length += strlen(end);
+    }
+    (void)snprintf(&self->text[length], self->size - length, "check its power, cable and termination");
+}
+
+static void say_not_at_rest(const wording_t *self) {
+    const iw_gateway_t *gateway = &self->daemon->gateway;
+    const iw_pair_t applied = iw_setpoint_applied(&gateway->setpoint);
+    SAY(self,
+        "the wheels turn or are told to: left %d rpm, told %d mm/s; right %d rpm, told %d mm/s; wait until both stand "
+        "for %u ms",
+        gateway->wheel[IW_LEFT].speed.speed_rpm, applied.wheel[IW_LEFT].speed_mm_s,
+        gateway->wheel[IW_RIGHT].speed.speed_rpm, applied.wheel[IW_RIGHT].speed_mm_s, gateway->config.rest_ms);
+}
+
+static void say_stalled(const wording_t *self) {
+    const iw_time_us_t waiting_us = iw_outbox_waiting_us(&self->daemon->gateway.sender.outbox);
+    if (waiting_us != IW_NEVER) {
+        SAY(self,
+            "a setpoint has been waiting for %" PRIu64
+            " ms to be acknowledged on the bus; check that the wheels have power and the bus is terminated",
+            ms_since(self->daemon, waiting_us));
+    } else {
+        SAY(self,
+            "the zero setpoints were not acknowledged on the bus within %u ms; check that the wheels have power and "
+            "the bus is terminated",
+            self->daemon->gateway.config.echo_ms);
+    }
+}
+
+static void say_stale(const wording_t *self) {
+    const iw_permit_t *permit = &self->daemon->gateway.permit;
+    char client[GW_CLIENT_TEXT_SIZE];
+    name_client(self->daemon, permit->stale_client, client, sizeof client);
+    SAY(self, "%s sent a nonzero drive command %" PRIu64 " ms ago; let go of the stick, wait %u ms, try again", client,
+        ms_since(self->daemon, permit->stale_us), IW_PERMIT_STALE_US / IW_US_PER_MS);
+}
+
+static void say_second_master(const wording_t *self) {
+    const iw_time_us_t seen_us = self->daemon->gateway.permit.seen_us[IW_CAUSE_SECOND_MASTER];
+    SAY(self,
+        "somebody else sent a setpoint (id 266 = 0x10A or 298 = 0x12A) %" PRIu64
+        " ms ago; switch the other sender off, wait a second",
+        ms_since(self->daemon, seen_us));
+}
+
+static void say_present(const wording_t *self) {
+    const iw_permit_t *permit = &self->daemon->gateway.permit;
+    const uint32_t present = iw_permit_present(permit, self->daemon->now_us);
+    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL; ++cause) {
+        if ((present & (1U << cause)) != 0U) {
+            SAY(self, "%s was seen %" PRIu64 " ms ago; %s, and wait a second", gw_cause_name((iw_cause_t)cause),
+                ms_since(self->daemon, permit->seen_us[cause]), gw_why_cure((iw_cause_t)cause));
+            return;
+        }
+    }
+    SAY(self, "zeros are still being sent because the gateway died while armed; wait %u ms",
+        self->daemon->gateway.config.zero_hold_ms);
+}
+
+static void say_out_of_range(const wording_t *self) {
+    const gw_request_t *request = self->request;
+    const bool setpoint = self->daemon->gateway.config.current_role == IW_ROLE_SETPOINT;
+    if (request->cmd == GW_CMD_TWIST) {
+        SAY(self, "%" PRId64 " mm/s with %" PRId64 " mrad/s makes a wheel faster than 32767 mm/s; nothing was applied",
+            request->v_mm_s, request->yaw_mrad_s);
+        return;
+    }
+    SAY(self,
+        "left %" PRId64 " mm/s, right %" PRId64 " mm/s: allowed are -32768..32767 mm/s and %s mA; nothing was applied",
+        request->left_mm_s, request->right_mm_s, setpoint ? "-2000..2000" : "0..2000");
+}
+
+static void say_type(const wording_t *self) {
+    const iw_config_t *config = &self->daemon->gateway.config;
+    const bool both = !config->setpoint_type_set && config->current_role == IW_ROLE_UNSET;
+    SAY(self,
+        "%s%s%s not configured, and the wheels' document leaves %s open; set %s under [wheels] in the configuration",
+        config->setpoint_type_set ? "" : "setpoint_type", both ? " and " : "",
+        config->current_role == IW_ROLE_UNSET ? "current_role" : "", both ? "them" : "it", both ? "them" : "it");
+}
+
+static void say_latched(const wording_t *self) {
+    SAY(self, "latched: %s", self->daemon->last_stop.sentence);
+}
+
+static void say_bus_down(const wording_t *self) {
+    const gw_daemon_t *daemon = self->daemon;
+    SAY(self, "bus %s is %s; bring it up (simulated: iwheel-sim --can %s)", daemon->config.bus.interface,
+        gw_bus_state_name(daemon->gateway.bus), daemon->config.bus.interface);
+}
+
+static void say_timing(const wording_t *self) {
+    SAY(self, "the bit timing of %s is not %u bit/s with sample point %u permille; set it, or on_mismatch = warn",
+        self->daemon->config.bus.interface, (unsigned)self->daemon->config.bus.bitrate,
+        self->daemon->config.bus.sample_point_permille);
+}
+
+static void say_missing(const wording_t *self) {
+    SAY(self, "%s needs currents because current_role is setpoint: use drive with left_mA and right_mA",
+        self->request->cmd == GW_CMD_TWIST ? "twist" : "drive");
+}
+
+static void say_blocked(const wording_t *self) {
+    SAY(self, "stopped: %s", self->daemon->last_stop.sentence);
+}
+
+static void say_listen_only(const wording_t *self) {
+    SAY(self, "the gateway runs with --listen-only and never sends; start it without");
+}
+
+void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_refusal_t refusal,
+                        gw_refusal_t *out_refusal) {
+    static void (*const say[])(const wording_t *self) = {
+        [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range, [IW_REFUSE_MISSING_FIELD] = say_missing,
+        [IW_REFUSE_NOT_HOLDER] = say_holder,         [IW_REFUSE_BUSY] = say_holder,
+        [IW_REFUSE_NOT_ARMED] = say_not_armed,       [IW_REFUSE_LATCHED] = say_latched,
+        [IW_REFUSE_ESTOP_PRESSED] = say_estop,       [IW_REFUSE_BUS_DOWN] = say_bus_down,
+        [IW_REFUSE_TIMING_MISMATCH] = say_timing,    [IW_REFUSE_WHEEL_LOST] = say_lost,
+        [IW_REFUSE_WHEEL_BLOCKED] = say_blocked,     [IW_REFUSE_NOT_AT_REST] = say_not_at_rest,
+        [IW_REFUSE_SEND_STALLED] = say_stalled,      [IW_REFUSE_SECOND_MASTER] = say_second_master,
+        [IW_REFUSE_CAUSE_PRESENT] = say_present,     [IW_REFUSE_TYPE_NOT_SET] = say_type,
+        [IW_REFUSE_STALE_COMMAND] = say_stale,       [IW_REFUSE_LISTEN_ONLY] = say_listen_only,
+    };
+    const wording_t wording = {daemon, request, out_refusal->message, sizeof out_refusal->message};
+    out_refusal->error = gw_error_of(refusal);
+    if ((size_t)refusal < sizeof say / sizeof say[0] && say[refusal] != NULL) {
+        say[refusal](&wording);
+    } else {
+        SAY(&wording, "refused for a reason that has no name (%d); report this", (int)refusal);
+    }
+}
+
+void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, gw_refusal_t *out_refusal) {
+    static const struct {
+        gw_error_t error;
+        const char *why;
+    } reasons[] = {
+        [IW_TARE_OK] = {GW_OK, ""},
+        [IW_TARE_NO_FORCE] =
+            {GW_WHEEL_LOST,
+             "has not sent force for two seconds without a gap; check its power and cable, wait two seconds"},
+        [IW_TARE_MOVING] = {GW_NOT_AT_REST, "turned within the last two seconds; let it stand, wait two seconds"},
+        [IW_TARE_NOISY] = {GW_DENIED, "has an unsteady force; let go of the machine, wait two seconds"},
+        [IW_TARE_LOADED] = {GW_DENIED,
+                            "carries a load far from its earlier zero; let go of the machine, wait two seconds"},
+        [IW_TARE_SATURATED] = {GW_DENIED, "shows a force at the end of its range; check the sensor"},
+    };
+    const size_t known = sizeof reasons / sizeof reasons[0];
+    out_refusal->error = (size_t)result < known ? reasons[result].error : GW_INTERNAL;
+    (void)snprintf(out_refusal->message, sizeof out_refusal->message, "the %s wheel %s; nothing was changed",
+                   side == IW_LEFT ? "left" : "right",
+                   (size_t)result < known ? reasons[result].why : "cannot be tared");
+}

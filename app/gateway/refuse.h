@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+/// A refusal of the core in words: cause and cure, with the numbers of this moment.
+#ifndef GATEWAY_REFUSE_H
+#define GATEWAY_REFUSE_H
+
+#include "daemon.h"
+
+/// `request` is the one refused.
+void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_refusal_t refusal,
+                        gw_refusal_t *out_refusal);
+
+/// The same for a tare of that wheel.
+void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, gw_refusal_t *out_refusal);
+
+#endif

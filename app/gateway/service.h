@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+/// Serving the clients: accept, read, carry out, flush, close. Bounded work for each of them in each cycle.
+#ifndef GATEWAY_SERVICE_H
+#define GATEWAY_SERVICE_H
+
+#include "daemon.h"
+
+/// What a descriptor in the epoll set stands for; a client's tag is GW_TAG_CLIENT plus its slot.
+enum { GW_TAG_TIMER = 0, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_HAL, GW_TAG_CLIENT };
+
+/// Connections accepted in one cycle.
+#define GW_ACCEPTS_PER_CYCLE 4U
+
+/// Takes newcomers, or tells them that there is no room.
+void gw_service_accept(gw_daemon_t *daemon);
+
+/// Reads from every client that has something to say and carries out its next lines.
+void gw_service_clients(gw_daemon_t *daemon);
+
+/// Sends what is queued, closes what is finished, and tells epoll what to watch next.
+void gw_service_flush(gw_daemon_t *daemon);
+
+/// True if complete lines are waiting: the next wait must not sleep.
+bool gw_service_is_busy(const gw_daemon_t *daemon);
+
+/// When something is due although nobody says anything: a connection to be closed, accepting to be taken up again.
+iw_time_us_t gw_service_next_us(const gw_daemon_t *daemon);
+
+/// Closes every connection, at the end.
+void gw_service_close_all(gw_daemon_t *daemon);
+
+#endif

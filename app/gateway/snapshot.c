@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: MIT
+#include "snapshot.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <string.h>
+
+static void write_age(json_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us) {
+    const bool known = then_us != IW_NEVER && then_us <= now_us;
+    json_out_known(json, name, known, known ? (int64_t)((now_us - then_us) / IW_US_PER_MS) : 0);
+}
+
+static bool is_fresh(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us) {
+    return then_us != IW_NEVER && now_us - then_us < span_us;
+}
+
+static void write_motion(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
+    const iw_gateway_t *gateway = &daemon->gateway;
+    const iw_wheel_t *wheel = &gateway->wheel[side];
+    const bool heard = iw_wheel_heard(wheel, daemon->now_us);
+    const bool following = gateway->setpoint.demand == IW_DEMAND_FOLLOW;
+    const bool sending = gateway->setpoint.demand != IW_DEMAND_SILENCE;
+    const iw_command_t applied = iw_setpoint_applied(&gateway->setpoint).wheel[side];
+    const iw_command_t wanted = gateway->setpoint.target.wheel[side];
+    json_out_bool(json, "heard", heard);
+    if (heard) {
+        json_out_bool(json, "at_rest",
+                      iw_wheel_at_rest(wheel, daemon->now_us, (uint32_t)gateway->config.rest_ms * IW_US_PER_MS));
+    } else {
+        json_out_null(json, "at_rest");
+    }
+    json_out_known(json, "speed_rpm", heard, wheel->speed.speed_rpm);
+    json_out_known(json, "speed_mm_s", heard, iw_wheel_speed_mm_s(wheel));
+    json_out_known(json, "acceleration_raw", heard, wheel->speed.acceleration_raw);
+    json_out_known(json, "commanded_mm_s", following, wanted.speed_mm_s);
+    json_out_known(json, "commanded_mA", following, wanted.current_mA);
+    json_out_known(json, "applied_mm_s", sending, applied.speed_mm_s);
+    json_out_known(json, "applied_mA", sending, applied.current_mA);
+    write_age(json, "speed_age_ms", daemon->now_us, wheel->speed_us);
+}
+
+static void write_condition(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
+    const iw_wheel_t *wheel = &daemon->gateway.wheel[side];
+    const iw_force_t *force = &daemon->gateway.force[side];
+    const bool ever = wheel->status_us != IW_NEVER;
+    const bool fresh = is_fresh(daemon->now_us, wheel->status_us, GW_STATUS_STALE_US);
+    const bool warm = fresh && wheel->status.temperature_degC <= IW_WHEEL_TEMPERATURE_MAX_degC;
+    const bool cpu = fresh && wheel->status.cpu_percent <= 100U;
+    json_out_known(json, "battery_dV", fresh, wheel->status.battery_dV);
+    json_out_known(json, "temperature_degC", warm, wheel->status.temperature_degC);
+    json_out_known(json, "cpu_percent", cpu, wheel->status.cpu_percent);
+    json_out_known(json, "ticks", ever, wheel->ticks);
+    json_out_known(json, "distance_mm", ever, iw_wheel_distance_nm(wheel) / 1000000);
+    write_age(json, "status_age_ms", daemon->now_us, wheel->status_us);
+    json_out_int(json, "reboots", wheel->reboots);
+    json_out_open(json, "valid", '{');
+    json_out_bool(json, "speed", iw_wheel_heard(wheel, daemon->now_us));
+    json_out_bool(json, "status", fresh);
+    json_out_bool(json, "temperature", warm);
+    json_out_bool(json, "cpu", cpu);
+    json_out_bool(json, "force", iw_force_validity(force, daemon->now_us) == IW_FORCE_VALID);
+    json_out_close(json, '}');
+    json_out_open(json, "saturated", '{');
+    json_out_bool(json, "battery", fresh && wheel->status.battery_dV == IW_BATTERY_SATURATED_dV);
+    json_out_bool(json, "force", iw_force_validity(force, daemon->now_us) == IW_FORCE_SATURATED);
+    json_out_close(json, '}');
+}
+
+static void write_force(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
+    const iw_force_t *force = &daemon->gateway.force[side];
+    const iw_force_validity_t validity = iw_force_validity(force, daemon->now_us);
+    const bool heard = is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
+    const bool offset = force->provenance != IW_OFFSET_NONE;
+    json_out_known(json, "force_raw", heard, force->raw);
+    json_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
+    json_out_known(json, "force_offset_mN", offset, force->offset_mN);
+    json_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+    json_out_text(json, "force_validity", gw_force_validity_name(validity));
+    write_age(json, "force_age_ms", daemon->now_us, force->raw_us);
+    json_out_text(json, "offset_provenance", gw_provenance_name(force->provenance));
+    write_age(json, "offset_age_ms", daemon->now_us, offset ? force->offset_us : IW_NEVER);
+    const bool judged = force->quality.window != IW_WINDOW_OPEN;
+    json_out_text(json, "offset_window", gw_window_name(force->quality.window));
+    json_out_known(json, "offset_samples", judged, force->quality.samples);
+    json_out_known(json, "offset_deviation_mN", judged, force->quality.deviation_mN);
+    json_out_known(json, "offset_drift_mN", judged, force->quality.drift_mN);
+    json_out_text(json, "unit_evidence", gw_unit_evidence_name(force->evidence));
+}
+
+static void write_wheel(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
+    json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
+    write_motion(daemon, side, json);
+    write_condition(daemon, side, json);
+    write_force(daemon, side, json);
+    json_out_close(json, '}');
+}
+
+static bool at_limit(int16_t value) {
+    return value == INT16_MIN || value == INT16_MAX;
+}
+
+static void write_pose(const gw_daemon_t *daemon, json_out_t *json) {
+    const iw_gateway_t *gateway = &daemon->gateway;
+    const iw_proto_pose_t *pose = &gateway->pose;
+    const bool fresh = is_fresh(daemon->now_us, gateway->pose_us, GW_STATUS_STALE_US);
+    json_out_open(json, "pose", '{');
+    json_out_known(json, "x_mm", fresh, pose->x_mm);
+    json_out_known(json, "y_mm", fresh, pose->y_mm);
+    json_out_known(json, "z_mm", fresh, pose->z_mm);
+    json_out_known(json, "psi_mrad", fresh, pose->psi_mrad);
+    json_out_bool(json, "limited", fresh && (at_limit(pose->x_mm) || at_limit(pose->y_mm) || at_limit(pose->z_mm)));
+    write_age(json, "age_ms", daemon->now_us, gateway->pose_us);
+    json_out_close(json, '}');
+}
+
+static void write_lease(gw_daemon_t *daemon, json_out_t *json) {
+    const iw_permit_t *permit = &daemon->gateway.permit;
+    const gw_client_t *holder = gw_daemon_client(daemon, permit->holder);
+    const bool running = holder != NULL && !permit->arming && permit->lease_until_us > daemon->now_us;
+    json_out_open(json, "lease", '{');
+    json_out_known(json, "holder", holder != NULL, permit->holder);
+    json_out_text(json, "name", holder != NULL && holder->name[0] != '\0' ? holder->name : NULL);
+    json_out_known(json, "pid", holder != NULL && holder->pid > 0, holder != NULL ? holder->pid : 0);
+    json_out_known(json, "remaining_ms", running,
+                   running ? (int64_t)((permit->lease_until_us - daemon->now_us) / IW_US_PER_MS) : 0);
+    json_out_int(json, "lease_ms", daemon->gateway.config.lease_ms);
+    json_out_close(json, '}');
+}
+
+static void write_surroundings(const gw_daemon_t *daemon, json_out_t *json) {
+    const iw_gateway_t *gateway = &daemon->gateway;
+    json_out_open(json, "bus", '{');
+    json_out_text(json, "name", daemon->config.bus.interface);
+    json_out_text(json, "state", gw_bus_state_name(gateway->bus));
+    json_out_text(json, "timing", gateway->facts.timing_contradicted ? "contradicted" : "unproven");
+    json_out_text(json, "echo", gateway->facts.echo_proven ? "proven" : "unproven");
+    json_out_close(json, '}');
+    json_out_open(json, "estop", '{');
+    json_out_text(json, "line", daemon->config.estop.line);
+    json_out_text(json, "state", gw_estop_name(daemon->hal.estop_last, daemon->hal.estop_ops->present));
+    json_out_bool(json, "simulated", daemon->hal.estop_ops->simulated);
+    json_out_close(json, '}');
+}
+
+static void write_ledger(const gw_daemon_t *daemon, json_out_t *json) {
+    json_out_open(json, "ledger", '{');
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, (iw_ledger_item_t)item);
+        json_out_open(json, gw_ledger_item_name((iw_ledger_item_t)item), '{');
+        json_out_text(json, "state", gw_ledger_state_name(entry->state));
+        json_out_text(json, "evidence", gw_evidence_name(entry->evidence));
+        json_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
+        json_out_close(json, '}');
+    }
+    json_out_close(json, '}');
+}
+
+static void write_budget(const gw_daemon_t *daemon, json_out_t *json) {
+    const iw_stop_budget_t budget = iw_config_stop_budget(&daemon->gateway.config);
+    json_out_open(json, "budget", '{');
+    json_out_int(json, "client_lost_ms", budget.client_lost_ms);
+    json_out_int(json, "client_lost_mm", budget.client_lost_mm);
+    json_out_int(json, "killed_ms", budget.killed_ms);
+    json_out_int(json, "killed_mm", budget.killed_mm);
+    json_out_close(json, '}');
+}
+
+static void write_counters(const gw_daemon_t *daemon, json_out_t *json) {
+    const iw_counters_t *counters = &daemon->gateway.counters;
+    const iw_sender_t *sender = &daemon->gateway.sender;
+    json_out_open(json, "counters", '{');
+    json_out_int(json, "received", counters->received);
+    json_out_int(json, "echoes", counters->echoes);
+    json_out_int(json, "bad_format", counters->bad_format);
+    json_out_int(json, "bad_length", counters->bad_length);
+    json_out_int(json, "unknown", counters->unknown);
+    json_out_int(json, "foreign", counters->foreign);
+    json_out_int(json, "late_steps", counters->late_steps);
+    json_out_int(json, "out_of_range", counters->out_of_range);
+    json_out_int(json, "purges", counters->purges);
+    json_out_int(json, "pairs", sender->pairs);
+    json_out_int(json, "send_later", sender->later);
+    json_out_int(json, "clamped", sender->clamped);
+    json_out_int(json, "gate_stopped", sender->gate.stopped);
+    json_out_int(json, "stray_echoes", sender->outbox.stray);
+    json_out_int(json, "gap_max_us", sender->gap_max_us);
+    json_out_int(json, "still_moving", daemon->gateway.permit.still_moving);
+    json_out_close(json, '}');
+}
+
+void gw_snapshot_write_causes(json_out_t *json, const char *name, uint32_t causes) {
+    json_out_open(json, name, '[');
+    for (unsigned cause = 0; cause < IW_CAUSES; ++cause) {
+        if ((causes & (1U << cause)) != 0U) {
+            json_out_text(json, NULL, gw_cause_name((iw_cause_t)cause));
+        }
+    }
+    json_out_close(json, ']');
+}
+
+void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json) {
+    const iw_permit_t *permit = &daemon->gateway.permit;
+    const bool stopped = permit->state == IW_STATE_STOPPING || permit->state == IW_STATE_LATCHED;
+    json_out_int(json, "t_us", (int64_t)daemon->now_us);
+    json_out_int(json, "wall_us", iw_clock_wall_us());
+    json_out_text(json, "version", IWHEEL_VERSION);
+    json_out_text(json, "state", gw_state_name(permit->state));
+    json_out_bool(json, "arming", permit->arming);
+    json_out_text(json, "cause", stopped ? gw_cause_name(permit->stop.cause) : NULL);
+    gw_snapshot_write_causes(json, "present", iw_permit_present(permit, daemon->now_us));
+    write_lease(daemon, json);
+    write_surroundings(daemon, json);
+    write_wheel(daemon, IW_LEFT, json);
+    write_wheel(daemon, IW_RIGHT, json);
+    write_pose(daemon, json);
+    write_ledger(daemon, json);
+    write_budget(daemon, json);
+    write_counters(daemon, json);
+    json_out_int(json, "clients", daemon->clients);
+    json_out_bool(json, "listen_only", daemon->gateway.config.listen_only);
+    json_out_bool(json, "shutting_down", daemon->shutting_down);
+    json_out_open(json, "warnings", '[');
+    for (uint32_t i = 0; i < daemon->warnings; ++i) {
+        json_out_text(json, NULL, daemon->warning[i]);
+    }
+    json_out_close(json, ']');
+}
+
+void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json) {
+    json_out_int(json, "t_us", (int64_t)daemon->now_us);
+    for (unsigned side = 0; side < IW_SIDES; ++side) {
+        const iw_force_t *force = &daemon->gateway.force[side];
+        const iw_force_validity_t validity = iw_force_validity(force, daemon->now_us);
+        json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
+        json_out_known(json, "raw_mN", is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US),
+                       iw_force_raw_mN(force));
+        json_out_known(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
+        json_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+        json_out_text(json, "validity", gw_force_validity_name(validity));
+        json_out_close(json, '}');
+    }
+}
+
+void gw_snapshot_write_stop(const gw_daemon_t *daemon, json_out_t *json) {
+    const gw_stop_note_t *note = &daemon->last_stop;
+    const iw_stop_t *stop = &note->stop;
+    const bool any = stop->number > 0U;
+    json_out_int(json, "number", stop->number);
+    json_out_text(json, "cause", any ? gw_cause_name(stop->cause) : NULL);
+    json_out_text(json, "side", any ? gw_sides_name(stop->sides) : NULL);
+    json_out_known(json, "detail", any, stop->detail);
+    json_out_text(json, "from", any ? gw_state_name(stop->from) : NULL);
+    json_out_bool(json, "latched", any && stop->latched);
+    json_out_known(json, "client", stop->client != IW_CLIENT_NONE, stop->client);
+    json_out_text(json, "client_name", note->client_name[0] != '\0' ? note->client_name : NULL);
+    json_out_known(json, "applied_left_mm_s", any, stop->applied.wheel[IW_LEFT].speed_mm_s);
+    json_out_known(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
+    json_out_known(json, "at_us", any, (int64_t)stop->at_us);
+    json_out_known(json, "wall_us", any, note->wall_us);
+    write_age(json, "age_ms", daemon->now_us, any ? stop->at_us : IW_NEVER);
+    json_out_text(json, "sentence", note->sentence);
+}
