@@ -27,7 +27,7 @@ static int take_option(arguments_t *self, int left, char **argument) {
         self->version = true;
     } else if (strncmp(argument[0], socket, length) == 0 && argument[0][length] == '=') {
         self->ctl->socket = argument[0] + length + 1U;
-    } else if (strcmp(argument[0], socket) == 0 && left > 1) {
+    } else if (strcmp(argument[0], socket) == 0 && left > 1 && argument[1][0] != '-') {
         self->ctl->socket = argument[1];
         return 2;
     } else if (strcmp(argument[0], socket) == 0) {

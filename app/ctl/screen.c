@@ -28,9 +28,9 @@ static void draw_state(const paper_t *paper, const json_t *status, const json_t 
     advice_t advice;
     advice_collect(status, &advice);
     paper_label(paper, "STATE");
-    paper_say(paper, state_tone(state), "%s", json_is_true(get(status, "arming")) ? "arming" : state);
+    paper_say(paper, state_tone(state), "%.32s", json_is_true(get(status, "arming")) ? "arming" : state);
     if (json_is_string(get(status, "cause"))) {
-        paper_say(paper, state_tone(state), " (%s)", text_word(status, "cause"));
+        paper_say(paper, state_tone(state), " (%.32s)", text_word(status, "cause"));
     }
     paper_end(paper);
     for (unsigned i = 0; i < advice.lines; i++) {
@@ -42,38 +42,36 @@ static void draw_state(const paper_t *paper, const json_t *status, const json_t 
 }
 
 static void draw_lease(const paper_t *paper, const json_t *lease) {
-    char number[TEXT_CELL];
-    paper_label(paper, "LEASE");
-    if (json_is_integer(get(lease, "holder"))) {
-        text_integer(get(lease, "holder"), "", number);
-        paper_say(paper, TONE_CARE, "%s (client %s", text_word(lease, "name"), number);
-        text_integer(get(lease, "pid"), "", number);
-        paper_say(paper, TONE_CARE, ", pid %s)", number);
-        text_integer(get(lease, "remaining_ms"), "ms", number);
-        paper_say(paper, TONE_PLAIN, ", %s left", number);
+    char text[512];
+    char client[TEXT_CELL];
+    char pid[TEXT_CELL];
+    char left[TEXT_CELL];
+    char whole[TEXT_CELL];
+    const bool held = json_is_integer(get(lease, "holder"));
+    text_integer(get(lease, "holder"), "", client);
+    text_integer(get(lease, "pid"), "", pid);
+    text_integer(get(lease, "remaining_ms"), "ms", left);
+    text_integer(get(lease, "lease_ms"), "ms", whole);
+    if (held) {
+        (void)snprintf(text, sizeof(text), "%.128s (client %s, pid %s), %s left; a command holds for %s",
+                       text_word(lease, "name"), client, pid, left, whole);
     } else {
-        paper_say(paper, TONE_PLAIN, "nobody drives");
+        (void)snprintf(text, sizeof(text), "nobody drives; a command holds for %s", whole);
     }
-    text_integer(get(lease, "lease_ms"), "ms", number);
-    paper_say(paper, TONE_PLAIN, "; a command holds for %s", number);
-    paper_end(paper);
+    paper_wrap(paper, "LEASE", held ? TONE_CARE : TONE_PLAIN, text);
 }
 
 static void draw_surroundings(const paper_t *paper, const json_t *status) {
+    char text[512];
     const json_t *bus = get(status, "bus");
     const json_t *estop = get(status, "estop");
     const char *button = text_word(estop, "state");
-    paper_label(paper, "BUS");
-    paper_say(paper, TONE_PLAIN, "%s ", text_word(bus, "name"));
-    paper_say(paper, is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, "%s", text_word(bus, "state"));
-    paper_say(paper, TONE_PLAIN, ", timing %s, echo %s", text_word(bus, "timing"), text_word(bus, "echo"));
-    paper_end(paper);
-    paper_label(paper, "E-STOP");
-    paper_say(paper, is(button, "released") ? TONE_GOOD : TONE_BAD, "%s",
-              is(button, "none") ? "NONE CONFIGURED" : button);
-    paper_say(paper, TONE_PLAIN, ", line %s", text_word(estop, "line"));
-    paper_say(paper, TONE_CARE, "%s", json_is_true(get(estop, "simulated")) ? " SIMULATED" : "");
-    paper_end(paper);
+    (void)snprintf(text, sizeof(text), "%.128s %.32s, timing %.32s, echo %.32s", text_word(bus, "name"),
+                   text_word(bus, "state"), text_word(bus, "timing"), text_word(bus, "echo"));
+    paper_wrap(paper, "BUS", is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, text);
+    (void)snprintf(text, sizeof(text), "%.32s%s, line %.128s", is(button, "none") ? "NONE" : button,
+                   json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "", text_word(estop, "line"));
+    paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
 
 /// One quantity of both wheels side by side.
@@ -107,9 +105,9 @@ static const row_t rows[] = {
     {"reboots", "reboots", "seen", 0, NULL, NULL},
 };
 
-static void draw_cell(const paper_t *paper, const row_t *row, const json_t *wheel) {
+static void draw_cell(const paper_t *paper, const row_t *row, unsigned width, const json_t *wheel) {
     char number[TEXT_CELL] = "";
-    char cell[2U * TEXT_CELL];
+    char cell[PAPER_CELL];
     const char *remark = row->remark != NULL ? text_word(wheel, row->remark) : "";
     const bool bound = row->prefix_if != NULL && json_is_true(get(get(wheel, "saturated"), row->prefix_if));
     if (row->field != NULL) {
@@ -118,28 +116,28 @@ static void draw_cell(const paper_t *paper, const row_t *row, const json_t *whee
     if (is(remark, "valid")) {
         remark = "";
     }
-    (void)snprintf(cell, sizeof(cell), "%s%s%s%.40s", bound ? ">= " : "", number,
+    (void)snprintf(cell, sizeof(cell), "%s%s%s%s", bound ? ">= " : "", number,
                    number[0] != '\0' && remark[0] != '\0' ? " " : "", remark);
-    paper_text(paper, is(number, "--") ? TONE_FAINT : TONE_PLAIN, PAPER_CELL, cell);
+    paper_text(paper, is(number, "--") ? TONE_FAINT : TONE_PLAIN, width, cell);
 }
 
-static void draw_head(const paper_t *paper, const char *name, const json_t *wheel) {
+static void draw_head(const paper_t *paper, const char *name, unsigned width, const json_t *wheel) {
     const json_t *heard = get(wheel, "heard");
     const char *rest = json_is_true(get(wheel, "at_rest")) ? "at rest" : "turning";
     char head[TEXT_CELL];
     (void)snprintf(head, sizeof(head), "%s %s", name, json_is_true(heard) ? rest : "NOT HEARD");
-    paper_text(paper, json_is_true(heard) ? TONE_TITLE : TONE_BAD, PAPER_CELL, head);
+    paper_text(paper, json_is_true(heard) ? TONE_TITLE : TONE_BAD, width, head);
 }
 
 static void draw_wheels(const paper_t *paper, const json_t *left, const json_t *right) {
     paper_label(paper, "WHEELS");
-    draw_head(paper, "LEFT", left);
-    draw_head(paper, "RIGHT", right);
+    draw_head(paper, "LEFT", PAPER_CELL, left);
+    draw_head(paper, "RIGHT", 0, right);
     paper_end(paper);
     for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
         paper_label(paper, rows[i].label);
-        draw_cell(paper, &rows[i], left);
-        draw_cell(paper, &rows[i], right);
+        draw_cell(paper, &rows[i], PAPER_CELL, left);
+        draw_cell(paper, &rows[i], 0, right);
         paper_end(paper);
     }
 }

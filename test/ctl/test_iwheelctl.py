@@ -1,0 +1,570 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""iwheelctl against a gateway that only talks: what it sends, when, what it shows, and how it fails.
+
+Usage: test_iwheelctl.py PROGRAM [unittest's arguments]
+"""
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from fake_gateway import FakeGateway, snapshot, wheel
+
+PROGRAM = ""
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def clean_environment(**more):
+    environment = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
+    environment.update(more)
+    return environment
+
+
+def run(*words, **more):
+    """(exit code, stdout, stderr, seconds)"""
+    begin = time.monotonic()
+    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=30,
+                          env=clean_environment(**more.pop("env", {})), **more)
+    return done.returncode, done.stdout, done.stderr, time.monotonic() - begin
+
+
+def start(*words, **more):
+    return subprocess.Popen([PROGRAM, *words], stdout=more.pop("stdout", subprocess.PIPE), stderr=subprocess.PIPE, text=True,
+                            env=clean_environment(), **more)
+
+
+def wait_until(condition, seconds=5.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError("did not happen in time")
+        time.sleep(0.005)
+
+
+class WithGateway(unittest.TestCase):
+    gateway_class = FakeGateway
+
+    def setUp(self):
+        self.gateway = self.serve(FakeGateway)
+
+    def serve(self, kind):
+        gateway = kind()
+        self.addCleanup(gateway.close)
+        return gateway
+
+    def ctl(self, *words, gateway=None, **more):
+        return run("--socket", (gateway or self.gateway).path, *words, **more)
+
+
+class Connecting(WithGateway):
+    def test_missing_socket_asks_whether_the_gateway_runs(self):
+        code, _, err, _ = run("--socket", "/nonexistent/x.sock", "status")
+        self.assertEqual(69, code)
+        self.assertIn("/nonexistent/x.sock does not exist; is the gateway running?", err)
+
+    def test_stale_socket_is_unavailable(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "s")
+            with socket.socket(socket.AF_UNIX) as stale:
+                stale.bind(path)
+            code, _, err, _ = run("--socket", path, "status")
+        self.assertEqual(69, code)
+        self.assertIn("nobody answers", err)
+
+    def test_path_too_long_is_usage(self):
+        code, _, err, _ = run("--socket", "/" + "a" * 107, "status")
+        self.assertEqual(64, code)
+        self.assertIn("too long", err)
+
+    def test_environment_names_the_socket_and_the_option_wins(self):
+        self.assertEqual(0, run("status", env={"IWHEEL_SOCKET": self.gateway.path})[0])
+        self.assertEqual(0, self.ctl("status", env={"IWHEEL_SOCKET": "/nonexistent"})[0])
+        self.assertEqual(69, run("status", env={"IWHEEL_SOCKET": "/nonexistent"})[0])
+
+    @unittest.skipUnless(os.geteuid() == 0, "needs root to become somebody else")
+    def test_permission_names_the_group_and_the_command(self):
+        # The program itself must be reachable for that somebody, so it is started from an open descriptor.
+        os.chmod(self.gateway.folder.name, 0o755)
+        os.chmod(self.gateway.path, 0o660)
+        descriptor = os.open(PROGRAM, os.O_RDONLY)
+        self.addCleanup(os.close, descriptor)
+        done = subprocess.run([f"/proc/self/fd/{descriptor}", "--socket", self.gateway.path, "status"], capture_output=True,
+                              text=True, pass_fds=(descriptor,), user=65534, group=65534, extra_groups=[], check=False)
+        self.assertEqual(77, done.returncode, done.stderr)
+        self.assertIn("sudo usermod -aG root", done.stderr)
+
+    def test_silence_after_connecting_times_out_in_two_seconds(self):
+        class Silent(FakeGateway):
+            def greet(self, connection):
+                time.sleep(4)
+        code, _, err, seconds = self.ctl("status", gateway=self.serve(Silent))
+        self.assertEqual(75, code)
+        self.assertIn("no answer within 2 s", err)
+        self.assertTrue(1.9 < seconds < 3.5, seconds)
+
+    def test_full_queue_of_callers_times_out(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "s")
+            with socket.socket(socket.AF_UNIX) as listener:
+                listener.bind(path)
+                listener.listen(0)
+                callers = []
+                try:
+                    while True:
+                        caller = socket.socket(socket.AF_UNIX)
+                        callers.append(caller)
+                        caller.setblocking(False)
+                        caller.connect(path)
+                except BlockingIOError:
+                    pass
+                code, _, err, seconds = run("--socket", path, "status")
+                for caller in callers:
+                    caller.close()
+        self.assertEqual(75, code)
+        self.assertIn("takes no connection", err)
+        self.assertTrue(1.9 < seconds < 3.5, seconds)
+
+    def test_closed_at_once_is_unavailable(self):
+        class Rude(FakeGateway):
+            def greet(self, connection):
+                connection.close()
+        code, _, err, _ = self.ctl("status", gateway=self.serve(Rude))
+        self.assertEqual(69, code)
+        self.assertIn("ended the connection", err)
+
+    def test_refused_connection_tells_the_reason(self):
+        class Full(FakeGateway):
+            def greet(self, connection):
+                self.say(connection, {"id": None, "ok": False, "error": "too_many_clients", "message": "16 of 16; close one"})
+        code, _, err, _ = self.ctl("status", gateway=self.serve(Full))
+        self.assertEqual(1, code)
+        self.assertIn("refused (too_many_clients): 16 of 16; close one", err)
+
+    def test_another_service_on_the_socket_is_told(self):
+        for first in (b"ok iwheel-sim\n", b"[1,2]\n", b"{\"event\":\"hi\"}\n", b"{\"a\":1,\"a\":1}\n", b"x" * 70000, b"\0\n"):
+            class Other(FakeGateway):
+                def greet(self, connection, first=first):
+                    connection.sendall(first)
+            code, _, err, _ = self.ctl("status", gateway=self.serve(Other))
+            self.assertEqual(70, code, first[:20])
+            self.assertIn("not the gateway's language", err)
+
+    def test_reply_in_single_bytes_between_events_is_understood(self):
+        class Slow(FakeGateway):
+            def on_why(self, connection, request):
+                self.say(connection, {"event": "lost", "count": 3})
+                self.say(connection, {"id": 99, "ok": False, "error": "internal", "message": "not yours"})
+                text = json.dumps({"id": request["id"], "ok": True, "number": 1, "sentence": "it stopped", "latched": True})
+                for byte in text.encode() + b"\n":
+                    connection.sendall(bytes([byte]))
+        code, out, _, _ = self.ctl("why", gateway=self.serve(Slow))
+        self.assertEqual(0, code)
+        self.assertTrue(out.startswith("it stopped\n"), out)
+
+    def test_no_reply_times_out_in_two_seconds(self):
+        class Mute(FakeGateway):
+            def on_reset(self, connection, request):
+                return None
+        code, _, err, seconds = self.ctl("reset", gateway=self.serve(Mute))
+        self.assertEqual(75, code)
+        self.assertTrue(1.9 < seconds < 3.5, (seconds, err))
+
+
+class Showing(WithGateway):
+    def show(self, values, why=None, **more):
+        class Fixed(FakeGateway):
+            def on_status(self, _connection, _request):
+                return {"ok": True, **values}
+
+            def on_why(self, connection, request):
+                return why or super().on_why(connection, request)
+        code, out, err, _ = self.ctl("status", gateway=self.serve(Fixed), **more)
+        self.assertEqual(0, code, err)
+        for line in out.splitlines():
+            self.assertLessEqual(len(line), 80, line)
+            self.assertNotRegex(line, r"[\x00-\x08\x0b-\x1f\x7f]")
+        return out
+
+    def test_units_and_values_side_by_side(self):
+        out = self.show(snapshot("armed", left=wheel(298, 300), right=wheel(-301, -300)))
+        self.assertRegex(out, r"measured +298 mm/s +-301 mm/s")
+        self.assertRegex(out, r"applied +300 mm/s +-300 mm/s")
+        self.assertRegex(out, r"distance +12\.345 m +12\.345 m")
+        self.assertRegex(out, r"net force +-0\.120 N +-0\.120 N")
+        self.assertRegex(out, r"offset +8\.000 N wheel +8\.000 N wheel")
+        self.assertRegex(out, r"ticks +5000000000 ticks")
+        self.assertRegex(out, r"battery +24\.3 V")
+        self.assertIn("client lost: at most 887 ms, 0.554 m", out)
+        self.assertIn("gateway dies: at most 1000 ms, 1.000 m, then unknown", out)
+
+    def test_full_battery_is_a_lower_bound(self):
+        out = self.show(snapshot(left=wheel(battery_dV=255, saturated={"battery": True})))
+        self.assertRegex(out, r"battery +>= 25\.5 V +24\.3 V")
+
+    def test_unknown_is_never_a_number(self):
+        nothing = {key: None for key in wheel()}
+        out = self.show(snapshot(left={**nothing, "heard": False}, right={**nothing, "heard": False}))
+        below = out[out.index("WHEELS"):out.index("POSE")]
+        self.assertNotRegex(below, r"\d")
+        self.assertIn("LEFT NOT HEARD", below)
+        self.assertGreaterEqual(below.count("--"), 30)
+
+    def test_missing_and_wrong_fields_do_no_harm(self):
+        self.assertIn("--", self.show({}))
+        self.show({key: 7 for key in snapshot()})
+        self.show({key: "x" for key in snapshot()})
+        self.show({key: [] for key in snapshot()})
+        self.show({key: {} for key in snapshot()})
+        self.show(snapshot(left={key: "x" * 300 for key in wheel()}, present=[1, None], warnings=[{}, "w" * 500]))
+
+    def test_names_cannot_command_the_terminal(self):
+        lease = {"holder": 3, "name": "\u001b[2J\u0007\u009bevil\n", "pid": 1, "remaining_ms": 5, "lease_ms": 200}
+        out = self.show(snapshot("armed", lease=lease, cause="\u001b]0;x"))
+        self.assertIn("evil", out)
+
+    def test_latched_names_cause_sentence_and_cure(self):
+        out = self.show(snapshot("latched", cause="wheel_lost"),
+                        why={"ok": True, "number": 1, "sentence": "left wheel not heard for 53 ms", "latched": True})
+        self.assertIn("latched (wheel_lost)", out)
+        self.assertRegex(out, r"next +switch the wheels on")
+        self.assertIn("iwheelctl reset", out)
+        self.assertIn("left wheel not heard for 53 ms", out)
+
+    def test_listening_names_what_keeps_it_from_arming(self):
+        unset = {"setpoint_type": {"state": "assumed", "evidence": "none"}, "wheel_radius": {"state": "contradicted"}}
+        out = self.show(snapshot(ledger=unset, present=["bus_down"]))
+        self.assertIn("set setpoint_type", out)
+        self.assertNotIn("current_role", out)
+        self.assertIn("bus_down: bring the bus up", out)
+        self.assertIn("CONTRADICTED  wheel_radius", out)
+        self.assertRegex(out, r"UNVERIFIED +setpoint_type")
+
+    def test_json_is_the_gateways_own_line(self):
+        code, out, _, _ = self.ctl("--json", "status")
+        self.assertEqual(0, code)
+        self.assertEqual({"id": 1, "ok": True, **snapshot()}, json.loads(out))
+        self.assertEqual(["status"], [request["cmd"] for _, request in self.gateway.requests])
+        code, out, err, _ = self.ctl("reset", "--json")
+        self.assertEqual((1, "estop_pressed", ""), (code, json.loads(out)["error"], err))
+
+    def test_colours_only_on_a_terminal_without_no_color(self):
+        import pty
+        for term, no_color, wanted in (("xterm", None, True), ("dumb", None, False), ("xterm", "1", False)):
+            parent, child = pty.openpty()
+            more = {"TERM": term, **({"NO_COLOR": no_color} if no_color else {})}
+            done = subprocess.run([PROGRAM, "--socket", self.gateway.path, "status"], stdout=child,
+                                  env=clean_environment(**more), check=False)
+            os.close(child)
+            shown = b""
+            try:
+                while chunk := os.read(parent, 65536):
+                    shown += chunk
+            except OSError:
+                pass
+            os.close(parent)
+            self.assertEqual(0, done.returncode)
+            self.assertEqual(wanted, b"\033[" in shown, (term, no_color))
+
+    def test_why_without_a_stop_says_so(self):
+        code, out, _, _ = self.ctl("why")
+        self.assertEqual((0, "no stop since the gateway's start\n"), (code, out))
+
+    def test_output_that_cannot_be_written_is_no_success(self):
+        with open("/dev/full", "w", encoding="ascii") as full:
+            done = subprocess.run([PROGRAM, "--socket", self.gateway.path, "status"], stdout=full, stderr=subprocess.PIPE,
+                                  check=False)
+        self.assertEqual(69, done.returncode)
+
+
+class Asking(WithGateway):
+    def test_reading_verbs_send_nothing_that_moves(self):
+        for words in (["status"], ["why"], ["status", "--json"]):
+            self.ctl(*words)
+        watch = start("--socket", self.gateway.path, "watch")
+        wait_until(lambda: self.gateway.count("watch"))
+        watch.send_signal(signal.SIGINT)
+        self.assertEqual(0, watch.wait(5))
+        watch.communicate()
+        self.assertLessEqual({request["cmd"] for _, request in self.gateway.requests}, {"status", "why", "watch"})
+
+    def test_simple_verbs_send_one_request(self):
+        for words, wanted in ((["stop"], {"cmd": "stop"}), (["disarm"], {"cmd": "stop"}), (["estop"], {"cmd": "estop"}),
+                              (["estop", "dog", "in", "the way"], {"cmd": "estop", "reason": "dog in the way"}),
+                              (["estop", "x" * 300], {"cmd": "estop", "reason": "x" * 200})):
+            self.gateway.requests.clear()
+            self.assertEqual(0, self.ctl(*words)[0])
+            self.assertEqual([{**wanted, "id": 1}], [request for _, request in self.gateway.requests])
+
+    def test_reason_that_is_no_text_still_stops(self):
+        done = subprocess.run([PROGRAM.encode(), b"--socket", self.gateway.path.encode(), b"estop", b"\xff\xfe"],
+                              capture_output=True, check=False)
+        self.assertEqual(0, done.returncode)
+        self.assertEqual([{"cmd": "estop", "id": 1}], [request for _, request in self.gateway.requests])
+
+    def test_tare_shows_the_new_offset_of_the_side(self):
+        code, out, _, _ = self.ctl("tare", "left")
+        self.assertEqual((0, "left: the present force is zero now; offset 8.000 N\n"), (code, out))
+        self.assertEqual("left", self.gateway.requests[0][1]["side"])
+        self.assertEqual(2, self.ctl("tare")[1].count("offset 8.000 N"))
+
+    def test_refusal_prints_name_and_message_and_exits_1(self):
+        code, out, err, _ = self.ctl("reset")
+        self.assertEqual((1, ""), (code, out))
+        self.assertEqual("iwheelctl: refused (estop_pressed): the e-stop is pressed; release the button\n", err)
+
+    def test_wrong_words_are_usage_and_reach_nobody(self):
+        for words in ([], ["top"], ["-x"], ["status", "x"], ["status", "--all"], ["stop", "now"], ["reset", "1"], ["why", "me"],
+                      ["tare", "middle"], ["tare", "left", "right"], ["watch", "speed"], ["watch", "--rate"],
+                      ["watch", "--rate", "0"], ["watch", "--rate", "101"], ["watch", "--rate", "1x"], ["drive"],
+                      ["drive", "1"], ["drive", "1", "2", "3"], ["drive", "1.5", "2"], ["drive", "a", "b"],
+                      ["drive", "40000", "0"], ["drive", "32768", "0"], ["drive", "0", "-32769"], ["drive", "--", "1"],
+                      ["drive", "1", "2", "--for"], ["drive", "1", "2", "--for", "2"], ["drive", "1", "2", "--for", "0s"],
+                      ["drive", "1", "2", "--for", "-1s"], ["drive", "1", "2", "--for", "601s"],
+                      ["drive", "1", "2", "--for", "1.5ms"], ["drive", "1", "2", "--for", "2h"],
+                      ["drive", "1", "2", "--for", "99999999999s"], ["drive", "1", "2", "--current", "1"],
+                      ["drive", "1", "2", "--current", "2001", "0"], ["drive", "1", "2", "--fast"], ["drive", "99999999999", "1"],
+                      ["drive", "", ""], ["drive", "-", "1"], ["drive", "1mm", "2"]):
+            code, out, err, _ = self.ctl(*words)
+            self.assertEqual((64, ""), (code, out), words)
+            self.assertTrue(err.startswith("iwheelctl: "), words)
+        self.assertEqual([], self.gateway.requests)
+
+    def test_unknown_verb_lists_the_known(self):
+        err = self.ctl("top")[2]
+        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "tare", "why"):
+            self.assertIn(verb, err)
+
+    def test_help_of_every_verb_needs_no_gateway(self):
+        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "tare", "why"):
+            code, out, _, _ = run(verb, "--help")
+            self.assertEqual(0, code)
+            self.assertTrue(out.startswith("Usage: iwheelctl "), verb)
+        self.assertEqual(0, run("--help")[0])
+        self.assertRegex(run("--version")[1], r"^iwheelctl \d+\.\d+\.\d+\n$")
+
+
+class Driving(WithGateway):
+    def drive(self, *words, gateway=None):
+        return self.ctl("drive", *words, gateway=gateway)
+
+    def assert_stopped_once(self, gateway, drives_after=0):
+        self.assertEqual(1, gateway.count("arm"))
+        self.assertEqual(1, gateway.count("stop"))
+        after = [at for at in gateway.times("drive") if at > gateway.times("stop")[0]]
+        self.assertEqual(drives_after, len(after))
+
+    def test_arms_drives_at_a_third_of_the_lease_and_stops(self):
+        code, out, err, seconds = self.drive("-300", "250", "--for", "1s")
+        self.assertEqual((0, ""), (code, err))
+        self.assertRegex(out, r"^drove -300/250 mm/s for 1\.0 s and stopped: left 0\.000 m, right 0\.000 m\n$")
+        self.assertTrue(1.2 < seconds < 3, seconds)
+        self.assert_stopped_once(self.gateway)
+        self.assertTrue(45 <= self.gateway.count("drive") <= 52, self.gateway.count("drive"))  # 20 ms apart
+        times = self.gateway.times("drive")
+        self.assertTrue(0.97 < self.gateway.times("stop")[0] - times[0] < 1.1)
+        arm = next(request for _, request in self.gateway.requests if request["cmd"] == "arm")
+        self.assertEqual({"cmd": "arm", "name": "iwheelctl", "id": arm["id"]}, arm)
+        first = next(request for _, request in self.gateway.requests if request["cmd"] == "drive")
+        self.assertEqual({"cmd": "drive", "left_mm_s": -300, "right_mm_s": 250, "id": first["id"]}, first)
+
+    def test_takeover_and_currents_are_passed_on(self):
+        self.assertEqual(0, self.drive("1", "2", "--takeover", "--current", "-5", "6", "--for", "100ms")[0])
+        arm = next(request for _, request in self.gateway.requests if request["cmd"] == "arm")
+        first = next(request for _, request in self.gateway.requests if request["cmd"] == "drive")
+        self.assertIs(True, arm["takeover"])
+        self.assertEqual((-5, 6), (first["left_mA"], first["right_mA"]))
+
+    def test_refused_arm_drives_nothing(self):
+        class Busy(FakeGateway):
+            def on_arm(self, _connection, _request):
+                return {"ok": False, "error": "busy", "message": "\"joystick\" drives"}
+        gateway = self.serve(Busy)
+        code, _, err, _ = self.drive("1", "2", gateway=gateway)
+        self.assertEqual(1, code)
+        self.assertIn("refused (busy): \"joystick\" drives", err)
+        self.assertEqual(0, gateway.count("drive"))
+
+    def test_every_signal_stops_at_once_and_waits_for_rest(self):
+        for number in SIGNALS:
+            gateway = self.serve(FakeGateway)
+            process = start("--socket", gateway.path, "drive", "200", "200", "--for", "60s")
+            wait_until(lambda g=gateway: g.count("drive") > 5)
+            sent = time.monotonic()
+            process.send_signal(number)
+            _, err = process.communicate(timeout=10)
+            self.assertEqual(1, process.returncode, number)
+            self.assertIn("interrupted after", err)
+            self.assertLess(gateway.times("stop")[0] - sent, 0.1)
+            self.assert_stopped_once(gateway)
+            self.assertGreater(gateway.count("status"), 2)
+
+    def test_signal_before_the_first_answer_counts_no_time(self):
+        class NoAnswer(FakeGateway):
+            def on_drive(self, _connection, _request):
+                return None
+        gateway = self.serve(NoAnswer)
+        process = start("--socket", gateway.path, "drive", "200", "200")
+        wait_until(lambda: gateway.count("drive") > 2)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=10)
+        self.assertIn("interrupted after 0.0 s of 2.0 s", err)
+
+    def test_refusal_in_motion_stops_and_never_arms_again(self):
+        class Latching(FakeGateway):
+            def on_drive(self, connection, request):
+                if self.driving < 10:
+                    return super().on_drive(connection, request)
+                return {"ok": False, "error": "latched", "message": "the e-stop was pressed"}
+        gateway = self.serve(Latching)
+        code, _, err, _ = self.drive("200", "200", gateway=gateway)
+        self.assertEqual(1, code)
+        self.assertIn("refused (latched): the e-stop was pressed", err)
+        self.assert_stopped_once(gateway)
+
+    def test_silent_gateway_gets_a_stop_after_one_second(self):
+        class Deaf(FakeGateway):
+            def on_drive(self, connection, request):
+                return super().on_drive(connection, request) if self.driving < 5 else None
+        gateway = self.serve(Deaf)
+        code, _, err, _ = self.drive("200", "200", "--for", "10s", gateway=gateway)
+        self.assertEqual(75, code)
+        self.assertIn("did not answer a drive command for 1 s", err)
+        self.assert_stopped_once(gateway)
+        self.assertTrue(0.9 < gateway.times("stop")[0] - gateway.times("drive")[4] < 1.3)
+
+    def test_lost_gateway_is_told(self):
+        class Dying(FakeGateway):
+            def on_drive(self, connection, request):
+                if self.driving > 5:
+                    connection.shutdown(socket.SHUT_RDWR)
+                return super().on_drive(connection, request)
+        code, _, err, seconds = self.drive("200", "200", "--for", "10s", gateway=self.serve(Dying))
+        self.assertEqual(69, code)
+        self.assertIn("watchdog", err)
+        self.assertLess(seconds, 2)
+
+    def test_stalled_client_sends_no_burst(self):
+        process = start("--socket", self.gateway.path, "drive", "200", "200", "--for", "1s")
+        wait_until(lambda: self.gateway.count("drive") > 5)
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(0.4)
+        process.send_signal(signal.SIGCONT)
+        process.communicate(timeout=10)
+        self.assertLess(self.gateway.count("drive"), 36)  # 50 without the stall of 20 periods
+
+    def test_lost_wheel_after_the_stop_is_told_not_waited_for(self):
+        class Unheard(FakeGateway):
+            def on_status(self, connection, request):
+                if self.stopped_at is None:
+                    return super().on_status(connection, request)
+                return {"ok": True, **snapshot("latched", left=wheel(heard=False, at_rest=None))}
+        code, out, err, seconds = self.drive("1", "2", "--for", "100ms", gateway=self.serve(Unheard))
+        self.assertEqual((1, ""), (code, out))
+        self.assertIn("nobody knows whether it turns", err)
+        self.assertLess(seconds, 4)
+
+    def test_warnings_of_arm_are_shown(self):
+        class Warning(FakeGateway):
+            def on_arm(self, connection, request):
+                return {**super().on_arm(connection, request), "warnings": ["no e-stop is configured"]}
+        err = self.drive("1", "2", "--for", "100ms", gateway=self.serve(Warning))[2]
+        self.assertIn("warning: no e-stop is configured", err)
+
+    def test_nonsense_lease_counts_as_the_shortest(self):
+        for lease in (0, -5, 10**12, None, "200"):
+            class Odd(FakeGateway):
+                def on_arm(self, connection, request, lease=lease):
+                    return {**super().on_arm(connection, request), "lease_ms": lease}
+            gateway = self.serve(Odd)
+            self.assertEqual(0, self.drive("1", "2", "--for", "200ms", gateway=gateway)[0])
+            self.assertTrue(20 <= gateway.count("drive") <= 35, gateway.count("drive"))  # 6.7 ms apart
+
+    def test_json_prints_the_replies_to_arm_drive_and_stop(self):
+        _, out, _, _ = self.ctl("--json", "drive", "1", "2", "--for", "100ms")
+        replies = [json.loads(line) for line in out.splitlines()]
+        self.assertEqual(3, len(replies))
+        self.assertEqual((60, 1, "stopping"), (replies[0]["lease_ms"], replies[1]["left_mm_s"], replies[2]["state"]))
+
+
+class Watching(WithGateway):
+    class Talkative(FakeGateway):
+        size = 10
+
+        def on_watch(self, connection, request):
+            self.say(connection, {"id": request["id"], **super().on_watch(connection, request)})
+            for number in range(100000):
+                self.say(connection, {"event": "state", "number": number, "filling": "x" * self.size})
+
+    def test_events_are_passed_on_line_by_line_until_a_signal(self):
+        for number in SIGNALS:
+            gateway = self.serve(self.Talkative)
+            process = start("--socket", gateway.path, "watch", "state", "stop", "--rate", "50")
+            lines = [json.loads(process.stdout.readline()) for _ in range(100)]
+            process.send_signal(number)
+            process.communicate(timeout=10)
+            self.assertEqual(0, process.returncode)
+            self.assertEqual(list(range(100)), [line["number"] for line in lines])
+            request = gateway.requests[0][1]
+            self.assertEqual((["state", "stop"], 50), (request["topics"], request["rate_hz"]))
+
+    def test_without_words_the_usual_topics(self):
+        process = start("--socket", self.gateway.path, "watch")
+        wait_until(lambda: self.gateway.count("watch"))
+        process.terminate()
+        process.communicate(timeout=10)
+        self.assertEqual(["state", "bus", "estop", "lease", "stop"], self.gateway.requests[0][1]["topics"])
+
+    def test_reader_that_leaves_ends_it_with_0(self):
+        process = start("--socket", self.serve(self.Talkative).path, "watch")
+        process.stdout.readline()
+        process.stdout.close()
+        self.assertEqual(0, process.wait(5))
+        self.assertEqual("", process.stderr.read())
+        process.stderr.close()
+
+    def test_reader_that_leaves_is_noticed_without_events(self):
+        process = start("--socket", self.gateway.path, "watch")
+        wait_until(lambda: self.gateway.count("watch"))
+        process.stdout.close()
+        self.assertEqual(0, process.wait(5))
+        process.stderr.close()
+
+    def test_reader_that_never_reads_does_not_hold_off_a_signal(self):
+        class Fat(self.Talkative):
+            size = 60000
+        process = start("--socket", self.serve(Fat).path, "watch")
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(0, process.wait(5))
+        process.communicate()
+
+    def test_gateway_that_ends_is_unavailable(self):
+        class Ending(FakeGateway):
+            def on_watch(self, connection, request):
+                self.say(connection, {"id": request["id"], **super().on_watch(connection, request)})
+                connection.shutdown(socket.SHUT_RDWR)
+        process = start("--socket", self.serve(Ending).path, "watch")
+        _, err = process.communicate(timeout=10)
+        self.assertEqual(69, process.returncode)
+        self.assertIn("ended the connection", err)
+
+    def test_full_disk_is_told(self):
+        with open("/dev/full", "w", encoding="ascii") as full:
+            process = start("--socket", self.serve(self.Talkative).path, "watch", stdout=full)
+            _, err = process.communicate(timeout=10)
+        self.assertEqual(69, process.returncode)
+        self.assertTrue(re.search("cannot write: No space", err), err)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    PROGRAM = os.path.abspath(sys.argv.pop(1))
+    unittest.main()
