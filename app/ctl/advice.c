@@ -59,7 +59,9 @@ static void add_present(const json_t *status, advice_t *self) {
     json_array_foreach(json_object_get(status, "present"), index, present) {
         const char *cause = json_is_string(present) ? json_string_value(present) : "--";
         const char *cure = cure_of(cause);
-        add(self, "%s: %s", cause, cure != NULL ? cure : "iwheelctl why");
+        if (strcmp(cause, text_word(status, "cause")) != 0) {
+            add(self, "%s: %s", cause, cure != NULL ? cure : "see: iwheelctl why");
+        }
     }
 }
 

@@ -10,7 +10,7 @@
 /// Labels stand before this column.
 #define PAPER_LABEL 14U
 /// Width of one wheel's column.
-#define PAPER_CELL 25U
+#define PAPER_CELL 33U
 
 typedef enum { TONE_PLAIN = 0, TONE_TITLE, TONE_GOOD, TONE_CARE, TONE_BAD, TONE_FAINT } tone_t;
 

@@ -36,7 +36,7 @@ static void draw_state(const paper_t *paper, const json_t *status, const json_t 
     for (unsigned i = 0; i < advice.lines; i++) {
         paper_wrap(paper, i == 0 ? "next" : "", TONE_TITLE, advice.line[i]);
     }
-    if (json_is_string(sentence)) {
+    if (json_is_string(sentence) && json_string_length(sentence) > 0) {
         paper_wrap(paper, "last stop", TONE_PLAIN, json_string_value(sentence));
     }
 }
@@ -74,51 +74,57 @@ static void draw_surroundings(const paper_t *paper, const json_t *status) {
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
 
-/// One quantity of both wheels side by side.
 typedef struct {
-    const char *label;
-    const char *field;
+    const char *field; ///< Null: no such value.
     const char *unit;
     unsigned digits;
-    const char *remark;    ///< A field with a word that explains the value; may be null.
-    const char *prefix_if; ///< A flag of `saturated` that makes the value a lower bound; may be null.
+} value_t;
+
+/// One line with the values of both wheels side by side.
+typedef struct {
+    const char *label;
+    value_t values[2];
+    const char *remark; ///< A field with a word that explains the values, or null.
 } row_t;
 
 static const row_t rows[] = {
-    {"measured", "speed_mm_s", "mm/s", 0, NULL, NULL},
-    {"", "speed_rpm", "rpm", 0, NULL, NULL},
-    {"commanded", "commanded_mm_s", "mm/s", 0, NULL, NULL},
-    {"applied", "applied_mm_s", "mm/s", 0, NULL, NULL},
-    {"", "applied_mA", "mA", 0, NULL, NULL},
-    {"distance", "distance_mm", "m", 3, NULL, NULL},
-    {"ticks", "ticks", "ticks", 0, NULL, NULL},
-    {"net force", "force_net_mN", "N", 3, "force_validity", NULL},
-    {"raw force", "force_raw_mN", "N", 3, NULL, NULL},
-    {"offset", "force_offset_mN", "N", 3, "offset_provenance", NULL},
-    {"force unit", NULL, NULL, 0, "unit_evidence", NULL},
-    {"battery", "battery_dV", "V", 1, NULL, "battery"},
-    {"temperature", "temperature_degC", "degC", 0, NULL, NULL},
-    {"CPU", "cpu_percent", "%", 0, NULL, NULL},
-    {"speed age", "speed_age_ms", "ms", 0, NULL, NULL},
-    {"status age", "status_age_ms", "ms", 0, NULL, NULL},
-    {"force age", "force_age_ms", "ms", 0, NULL, NULL},
-    {"reboots", "reboots", "seen", 0, NULL, NULL},
+    {"measured", {{"speed_mm_s", "mm/s", 0}, {"speed_rpm", "rpm", 0}}, NULL},
+    {"commanded", {{"commanded_mm_s", "mm/s", 0}, {"commanded_mA", "mA", 0}}, NULL},
+    {"applied", {{"applied_mm_s", "mm/s", 0}, {"applied_mA", "mA", 0}}, NULL},
+    {"speed age", {{"speed_age_ms", "ms", 0}}, NULL},
+    {"distance", {{"distance_mm", "m", 3}, {"ticks", "ticks", 0}}, NULL},
+    {"net force", {{"force_net_mN", "N", 3}}, "force_validity"},
+    {"raw force", {{"force_raw_mN", "N", 3}, {"force_age_ms", "ms ago", 0}}, NULL},
+    {"offset", {{"force_offset_mN", "N", 3}}, "offset_provenance"},
+    {"unit evidence", {{NULL, NULL, 0}}, "unit_evidence"},
+    {"battery", {{"battery_dV", "V", 1}, {"status_age_ms", "ms ago", 0}}, NULL},
+    {"controller", {{"temperature_degC", "degC", 0}, {"cpu_percent", "% CPU", 0}}, NULL},
+    {"reboots", {{"reboots", "seen", 0}}, NULL},
 };
 
+/// A full byte of battery voltage means at least that much.
+static bool is_lower_bound(const value_t *value, const json_t *wheel) {
+    return is(value->field, "battery_dV") && json_is_true(get(get(wheel, "saturated"), "battery"));
+}
+
 static void draw_cell(const paper_t *paper, const row_t *row, unsigned width, const json_t *wheel) {
-    char number[TEXT_CELL] = "";
-    char cell[PAPER_CELL];
+    char cell[PAPER_CELL] = "";
+    char number[TEXT_CELL];
+    size_t used = 0;
+    bool known = false;
+    for (size_t i = 0; i < 2 && row->values[i].field != NULL; i++) {
+        const value_t *value = &row->values[i];
+        text_decimal(get(wheel, value->field), value->digits, value->unit, number);
+        known = known || !is(number, "--");
+        const int n = snprintf(cell + used, sizeof(cell) - used, "%s%s%s", used > 0 ? ", " : "",
+                               is_lower_bound(value, wheel) ? ">= " : "", number);
+        used += n > 0 && (size_t)n < sizeof(cell) - used ? (size_t)n : 0U;
+    }
     const char *remark = row->remark != NULL ? text_word(wheel, row->remark) : "";
-    const bool bound = row->prefix_if != NULL && json_is_true(get(get(wheel, "saturated"), row->prefix_if));
-    if (row->field != NULL) {
-        text_decimal(get(wheel, row->field), row->digits, row->unit, number);
+    if (!is(remark, "valid")) {
+        (void)snprintf(cell + used, sizeof(cell) - used, "%s%s", used > 0 && remark[0] != '\0' ? " " : "", remark);
     }
-    if (is(remark, "valid")) {
-        remark = "";
-    }
-    (void)snprintf(cell, sizeof(cell), "%s%s%s%s", bound ? ">= " : "", number,
-                   number[0] != '\0' && remark[0] != '\0' ? " " : "", remark);
-    paper_text(paper, is(number, "--") ? TONE_FAINT : TONE_PLAIN, width, cell);
+    paper_text(paper, known ? TONE_PLAIN : TONE_FAINT, width, cell);
 }
 
 static void draw_head(const paper_t *paper, const char *name, unsigned width, const json_t *wheel) {
@@ -149,9 +155,9 @@ static void draw_pose(const paper_t *paper, const json_t *pose) {
     paper_label(paper, "POSE");
     for (size_t i = 0; i < 4; i++) {
         text_integer(get(pose, fields[i]), i < 3 ? "mm" : "mrad", number);
-        paper_say(paper, TONE_PLAIN, "%s %s  ", names[i], number);
+        paper_say(paper, TONE_PLAIN, "%s%s %s", i > 0 ? ", " : "", names[i], number);
     }
-    paper_say(paper, TONE_CARE, "%s", json_is_true(get(pose, "limited")) ? "AT THE END OF ITS RANGE" : "");
+    paper_say(paper, TONE_CARE, "%s", json_is_true(get(pose, "limited")) ? ", AT THE END OF ITS RANGE" : "");
     paper_end(paper);
 }
 

@@ -242,17 +242,35 @@ static void sum_up(const drive_t *self, int64_t stop_us) {
            self->limited ? " (limited)" : "", driven_s(self, stop_us), left, right);
 }
 
-/// Stops, whatever happened before, and tells how it ended.
+/// How it ended, told once both wheels stand. The exit code.
+static int judge(const drive_t *self, end_t end, int64_t stop_us) {
+    if (!self->ctl->json) {
+        sum_up(self, stop_us);
+    }
+    if (end == END_SILENT) {
+        return ctl_fail(CTL_TIMEOUT, "the gateway did not answer a drive command for 1 s; see its log");
+    }
+    if (end == END_SIGNAL) {
+        return ctl_fail(CTL_NO, "interrupted after %.1f s of %.1f s", driven_s(self, stop_us),
+                        (double)self->words.time_ms / 1e3);
+    }
+    if (end == END_TIME && strcmp(text_word(self->latest, "state"), "latched") == 0) {
+        return ctl_fail(CTL_NO, "while stopping the gateway latched (%s); see: iwheelctl why",
+                        text_word(self->latest, "cause"));
+    }
+    return end == END_TIME ? CTL_OK : CTL_NO;
+}
+
+/// Stops, whatever happened before.
 static int finish(drive_t *self, end_t end) {
     json_t *reply = NULL;
     const int64_t stop_us = client_now_us();
     self->ctl->client.seen_signals = signals_count();
     clear_progress(self);
     if (end == END_LOST) {
-        (void)ctl_fail(CTL_UNAVAILABLE,
-                       "the lease ended with the connection: the gateway, or else the wheels' own watchdog (1 s), "
-                       "stops them");
-        return CTL_UNAVAILABLE;
+        return ctl_fail(CTL_UNAVAILABLE,
+                        "the lease ended with the connection: the gateway, or else the wheels' own watchdog "
+                        "(1 s), stops them");
     }
     if (self->ctl->json && self->last_line[0] != '\0') {
         puts(self->last_line);
@@ -260,17 +278,7 @@ static int finish(drive_t *self, end_t end) {
     int code = ctl_ask(self->ctl, json_pack("{s:s}", "cmd", "stop"), &reply);
     json_decref(reply);
     code = code == CTL_OK ? wait_for_rest(self) : code;
-    if (code == CTL_OK && !self->ctl->json) {
-        sum_up(self, stop_us);
-    }
-    if (code == CTL_OK && end == END_SILENT) {
-        return ctl_fail(CTL_TIMEOUT, "the gateway did not answer a drive command for 1 s; see its log");
-    }
-    if (code == CTL_OK && end == END_SIGNAL) {
-        return ctl_fail(CTL_NO, "interrupted after %.1f s of %.1f s", driven_s(self, stop_us),
-                        (double)self->words.time_ms / 1e3);
-    }
-    return code == CTL_OK && end != END_TIME ? CTL_NO : code;
+    return code == CTL_OK ? judge(self, end, stop_us) : code;
 }
 
 /// Subscribes to the wheels' state and arms. An exit code.

@@ -128,7 +128,7 @@ int verb_why(ctl_t *self, int count, char **words) {
     const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "why"), &reply);
     if (code == CTL_OK && !self->json) {
         const char *sentence = json_string_value(json_object_get(reply, "sentence"));
-        if (sentence == NULL) {
+        if (sentence == NULL || sentence[0] == '\0') {
             puts("no stop since the gateway's start");
         } else {
             print_line(sentence);

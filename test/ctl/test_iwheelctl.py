@@ -194,19 +194,18 @@ class Showing(WithGateway):
 
     def test_units_and_values_side_by_side(self):
         out = self.show(snapshot("armed", left=wheel(298, 300), right=wheel(-301, -300)))
-        self.assertRegex(out, r"measured +298 mm/s +-301 mm/s")
-        self.assertRegex(out, r"applied +300 mm/s +-300 mm/s")
-        self.assertRegex(out, r"distance +12\.345 m +12\.345 m")
+        self.assertRegex(out, r"measured +298 mm/s, 14 rpm +-301 mm/s, -16 rpm")
+        self.assertRegex(out, r"applied +300 mm/s, -- +-300 mm/s, --")
+        self.assertRegex(out, r"distance +12\.345 m, 5000000000 ticks +12\.345 m")
         self.assertRegex(out, r"net force +-0\.120 N +-0\.120 N")
         self.assertRegex(out, r"offset +8\.000 N wheel +8\.000 N wheel")
-        self.assertRegex(out, r"ticks +5000000000 ticks")
-        self.assertRegex(out, r"battery +24\.3 V")
+        self.assertRegex(out, r"battery +24\.3 V, 17 ms ago +24\.3 V")
         self.assertIn("client lost: at most 887 ms, 0.554 m", out)
         self.assertIn("gateway dies: at most 1000 ms, 1.000 m, then unknown", out)
 
     def test_full_battery_is_a_lower_bound(self):
         out = self.show(snapshot(left=wheel(battery_dV=255, saturated={"battery": True})))
-        self.assertRegex(out, r"battery +>= 25\.5 V +24\.3 V")
+        self.assertRegex(out, r"battery +>= 25\.5 V, 17 ms ago +24\.3 V")
 
     def test_unknown_is_never_a_number(self):
         nothing = {key: None for key in wheel()}
@@ -214,7 +213,7 @@ class Showing(WithGateway):
         below = out[out.index("WHEELS"):out.index("POSE")]
         self.assertNotRegex(below, r"\d")
         self.assertIn("LEFT NOT HEARD", below)
-        self.assertGreaterEqual(below.count("--"), 30)
+        self.assertGreaterEqual(below.count("--"), 40)
 
     def test_missing_and_wrong_fields_do_no_harm(self):
         self.assertIn("--", self.show({}))
@@ -271,6 +270,12 @@ class Showing(WithGateway):
             os.close(parent)
             self.assertEqual(0, done.returncode)
             self.assertEqual(wanted, b"\033[" in shown, (term, no_color))
+
+    def test_why_with_an_empty_sentence_is_no_stop(self):
+        class Empty(FakeGateway):
+            def on_why(self, _connection, _request):
+                return {"ok": True, "number": 0, "sentence": ""}
+        self.assertEqual("no stop since the gateway's start\n", self.ctl("why", gateway=self.serve(Empty))[1])
 
     def test_why_without_a_stop_says_so(self):
         code, out, _, _ = self.ctl("why")
@@ -458,6 +463,17 @@ class Driving(WithGateway):
         process.send_signal(signal.SIGCONT)
         process.communicate(timeout=10)
         self.assertLess(self.gateway.count("drive"), 36)  # 50 without the stall of 20 periods
+
+    def test_latch_while_stopping_is_no_success(self):
+        class LatchesAtStop(FakeGateway):
+            def on_status(self, connection, request):
+                if self.stopped_at is None:
+                    return super().on_status(connection, request)
+                return {"ok": True, **snapshot("latched", cause="wheel_rebooted")}
+        code, out, err, _ = self.drive("1", "2", "--for", "100ms", gateway=self.serve(LatchesAtStop))
+        self.assertEqual(1, code)
+        self.assertIn("drove 1/2 mm/s", out)
+        self.assertIn("while stopping the gateway latched (wheel_rebooted)", err)
 
     def test_lost_wheel_after_the_stop_is_told_not_waited_for(self):
         class Unheard(FakeGateway):
