@@ -4,10 +4,13 @@
 #include "unix_link.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <sys/socket.h>
 
 /// Longer bursts of presses are read in the next step; the link is level-triggered.
 #define BURST_MAX 64
+/// At the start the button is given this long to tell its level; asked sooner it would seem unreadable, and latch.
+#define FIRST_LEVEL_MS 100
 
 typedef struct {
     iw_unix_link_t link;
@@ -22,7 +25,12 @@ IW_STATIC_ASSERT(sizeof(unix_estop_t) <= sizeof(iw_backend_store_t), unix_estop_
 static int button_open(void *self, const char *name) {
     unix_estop_t *button = (unix_estop_t *)self;
     *button = (unix_estop_t){.level = true};
-    return iw_unix_link_open(&button->link, name, SOCK_STREAM);
+    const int error = iw_unix_link_open(&button->link, name, SOCK_STREAM);
+    if (error == 0 && iw_unix_link_is_up(&button->link)) {
+        struct pollfd level = {.fd = button->link.fd, .events = POLLIN};
+        (void)poll(&level, 1, FIRST_LEVEL_MS);
+    }
+    return error;
 }
 
 static void button_close(void *self) {
