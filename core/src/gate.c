@@ -18,7 +18,8 @@ static uint32_t magnitude(int32_t value)
 static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us)
 {
     const uint32_t elapsed = (elapsed_us < IW_GATE_ELAPSED_MAX_US) ? (uint32_t)elapsed_us : IW_GATE_ELAPSED_MAX_US;
-    return 1U + slope_mm_s2 * (elapsed / 1000U) / 1000U + slope_mm_s2 * (elapsed % 1000U) / 1000000U;
+    const uint32_t change_um_s = slope_mm_s2 * (elapsed / 1000U) + slope_mm_s2 * (elapsed % 1000U) / 1000U;
+    return 1U + change_um_s / 1000U;
 }
 
 static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s)

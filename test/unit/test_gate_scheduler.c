@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+/// The gate and the scheduler know nothing of each other: whatever the scheduler makes of commands and times, the gate must pass it.
+#include <string.h>
+
+#include "iwheel/gate.h"
+#include "iwheel/setpoint.h"
+#include "unity.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static uint32_t seed;
+
+static uint32_t draw(uint32_t below) {
+    seed = seed * 1664525U + 1013904223U;
+    return (seed >> 8) % below;
+}
+
+static iw_config_t any_config(void) {
+    static const uint16_t slopes[] = {100, 137, 800, 1500, 1501, 7919, 20000};
+    iw_config_t config;
+    iw_config_default(&config);
+    config.setpoint_type_set = true;
+    config.current_role = (draw(2) == 0U) ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
+    config.accel_mm_s2 = slopes[draw(7)];
+    config.decel_mm_s2 = slopes[draw(7)];
+    config.max_speed_mm_s = (uint16_t)(10U + draw(4991));
+    return config;
+}
+
+static iw_command_t any_command(const iw_config_t *config) {
+    const int32_t speed = config->max_speed_mm_s;
+    const iw_command_t command = {(int16_t)((int32_t)draw((uint32_t)(2 * speed + 1)) - speed), 700};
+    return command;
+}
+
+static void send_through_gate(iw_gate_t *gate, const iw_config_t *config, iw_time_us_t now_us, const iw_pair_t *pair) {
+    for (int side = IW_LEFT; side <= IW_RIGHT; side++) {
+        const iw_command_t *const command = &pair->wheel[side];
+        const iw_proto_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
+        iw_can_frame_t frame;
+        TEST_ASSERT_FALSE(iw_proto_encode_setpoint((iw_side_t)side, &setpoint, (uint8_t)config->setpoint_dlc, &frame));
+        TEST_ASSERT_EQUAL(IW_GATE_PASS, iw_gate_check(gate, now_us, &frame));
+    }
+}
+
+static void run_once(void) {
+    const iw_config_t config = any_config();
+    iw_setpoint_t setpoint;
+    iw_gate_t gate;
+    iw_time_us_t now_us = 1000000U + draw(1000000U);
+    iw_setpoint_init(&setpoint, &config);
+    iw_gate_init(&gate, &config);
+    iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_ZERO);
+    for (uint32_t i = 0; i < 400U; i++) {
+        iw_pair_t pair;
+        if (draw(20) == 0U) {
+            const iw_pair_t command = {{any_command(&config), any_command(&config)}};
+            iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_FOLLOW);
+            iw_setpoint_command(&setpoint, now_us, &command);
+        }
+        if (draw(100) == 0U) {
+            iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_BRAKE);
+        }
+        now_us = iw_setpoint_next_us(&setpoint) + draw(30000U);
+        iw_setpoint_take(&setpoint, now_us, &pair);
+        send_through_gate(&gate, &config, now_us, &pair);
+    }
+}
+
+static void test_gate_whatever_the_scheduler_takes_passes(void) {
+    for (seed = 1; seed < 3000U; seed++) {
+        const uint32_t run = seed;
+        run_once();
+        seed = run;
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gate_whatever_the_scheduler_takes_passes);
+    return UNITY_END();
+}
