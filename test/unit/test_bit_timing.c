@@ -98,6 +98,35 @@ static void test_solve_other_rates_and_sample_points_finds_what_a_search_finds(v
     }
 }
 
+/// Sample points are told in permille, so one that is no more than a permille further than the nearest is as near.
+static void assert_nearest_to_the_permille(uint32_t clock_hz, const iw_bit_timing_achieved_t *wanted) {
+    distance_t best = {0, 0};
+    iw_bit_timing_t timing = {0, 0, 0};
+    TEST_ASSERT_TRUE(best_of_all(clock_hz, wanted, &best));
+    TEST_ASSERT_EQUAL_INT(IW_OK, iw_bit_timing_solve(&limits, clock_hz, wanted, &timing));
+    const distance_t distance = distance_of(timing.tseg1, timing.tseg2, wanted->sample_point_permille);
+    TEST_ASSERT_TRUE(distance.numerator * best.quanta <= (best.numerator + best.quanta) * distance.quanta);
+}
+
+static void test_solve_every_sample_point_finds_the_nearest(void) {
+    static const uint32_t clocks[] = {8, 10, 12, 16, 36, 42};
+    for (size_t i = 0; i < sizeof clocks / sizeof clocks[0]; i++) {
+        for (uint16_t permille = 1; permille <= 1000; permille++) {
+            const iw_bit_timing_achieved_t wanted = {1000000, permille};
+            limits.prescaler_max = 16;
+            assert_nearest_to_the_permille(clocks[i] * MHZ, &wanted);
+        }
+    }
+}
+
+static void test_solve_eight_quanta_takes_the_nearer_eighth(void) {
+    for (uint16_t permille = 1; permille <= 1000; permille++) {
+        const iw_bit_timing_achieved_t wanted = {1000000, permille};
+        limits.prescaler_max = 1;
+        compare_with_search(8 * MHZ, &wanted);
+    }
+}
+
 static void test_solve_narrow_limits_are_kept(void) {
     limits = (iw_bit_timing_limits_t){4, 3, 5, 2, 3};
     for (uint32_t clock_hz = 4 * MHZ; clock_hz <= 40 * MHZ; clock_hz += MHZ) {
@@ -227,6 +256,8 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_solve_every_clock_from_8_to_80_MHz_finds_what_a_search_finds);
     RUN_TEST(test_solve_other_rates_and_sample_points_finds_what_a_search_finds);
+    RUN_TEST(test_solve_every_sample_point_finds_the_nearest);
+    RUN_TEST(test_solve_eight_quanta_takes_the_nearer_eighth);
     RUN_TEST(test_solve_narrow_limits_are_kept);
     RUN_TEST(test_solve_one_possible_setting_is_found);
     RUN_TEST(test_solve_multiples_of_8_MHz_reach_the_bus_exactly);
