@@ -36,6 +36,7 @@ static void clear(iw_setpoint_t *self)
 {
     memset(self->speed_um_s, 0, sizeof self->speed_um_s);
     memset(self->current_uA, 0, sizeof self->current_uA);
+    self->from_zero = true;
     self->target.wheel[IW_LEFT] = zero_command(self->config);
     self->target.wheel[IW_RIGHT] = zero_command(self->config);
 }
@@ -196,7 +197,10 @@ static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us)
 
 void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_pair)
 {
-    advance(self, (self->last_us == IW_NEVER) ? 0U : now_us - self->last_us);
+    if (!self->from_zero) {
+        advance(self, now_us - self->last_us);
+    }
+    self->from_zero = false;
     self->due_us = next_on_grid(self, now_us);
     self->last_us = now_us;
     *out_pair = iw_setpoint_applied(self);
@@ -231,7 +235,7 @@ bool iw_setpoint_next_is_zero(const iw_setpoint_t *self)
     const bool limit = self->config->current_role == IW_ROLE_LIMIT;
     const bool speeds = left->speed_mm_s == 0 && right->speed_mm_s == 0;
     const bool currents = limit || (left->current_mA == 0 && right->current_mA == 0);
-    return iw_setpoint_is_zero(self) && speeds && currents;
+    return iw_setpoint_is_zero(self) && (self->from_zero || (speeds && currents));
 }
 
 iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self)

@@ -37,6 +37,7 @@ typedef struct {
     int32_t speed_um_s[IW_SIDES];       ///< Where the ramp is.
     int32_t current_uA[IW_SIDES];       ///< Ramped only with IW_ROLE_SETPOINT.
     iw_demand_t demand;
+    bool from_zero; ///< The next pair is zero whatever the command: the first after silence, ZERO or a collapse.
 } iw_setpoint_t;
 
 /// `config` must be checked and outlive it. Begins in silence.
@@ -52,7 +53,7 @@ void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair
 void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us);
 
 /// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole. The zero is due
-/// IW_SETPOINT_SPACING_US from now; under FOLLOW the ramp to the next command starts from it.
+/// IW_SETPOINT_SPACING_US from now; under FOLLOW the ramp to the next command starts from it, also if the command comes before it.
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us);
 
 /// True if a pair must leave now.
