@@ -233,6 +233,17 @@ static void test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_comman
     TEST_ASSERT_TRUE(pair.wheel[IW_LEFT].speed_mm_s > 0);
 }
 
+static void test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero(void) {
+    cruise(1000, 500, 2000);
+    iw_setpoint_collapse(&setpoint, now_us);
+    command(-700, 1000, 2000);
+    TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&setpoint));
+    (void)take_after(IW_SETPOINT_SPACING_US);
+    TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
+    TEST_ASSERT_FALSE(iw_setpoint_next_is_zero(&setpoint));
+    TEST_ASSERT_TRUE(take_next().wheel[IW_LEFT].speed_mm_s < 0);
+}
+
 static void test_setpoint_collapse_while_braking_leaves_no_tail(void) {
     cruise(1000, 1000, 2000);
     demand(IW_DEMAND_BRAKE);
@@ -488,6 +499,7 @@ int main(void) {
     RUN_TEST(test_setpoint_sign_change_passes_through_zero);
     RUN_TEST(test_setpoint_sign_change_in_a_late_call_does_not_jump_over_zero);
     RUN_TEST(test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_command);
+    RUN_TEST(test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero);
     RUN_TEST(test_setpoint_collapse_while_braking_leaves_no_tail);
     RUN_TEST(test_setpoint_command_counts_under_follow_only);
     RUN_TEST(test_setpoint_command_is_forgotten_when_follow_ends);
