@@ -16,6 +16,14 @@ def now_us():
     return time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
 
 
+def realtime_ahead_us():
+    """CLOCK_REALTIME minus CLOCK_MONOTONIC, read without being interrupted in between."""
+    while True:
+        before, real, after = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        if after - before < 20_000:
+            return (real - before) // 1000
+
+
 class Bus:
     """The stamp is taken by the kernel when the hub hands the frame over, so this process may be slow without harm."""
 
@@ -39,8 +47,8 @@ class Bus:
                 break
             if not data:
                 break
-            if number % 64 == 0:
-                ahead_us = time.time_ns() // 1000 - now_us()
+            if number % 4096 == 0:
+                ahead_us = realtime_ahead_us()
             stamp = struct.unpack("qq", ancillary[0][2]) if ancillary else None
             t_us = stamp[0] * 1_000_000 + stamp[1] // 1000 - ahead_us if stamp else now_us()
             can_id, length, _, echo, payload = FRAME.unpack(data)

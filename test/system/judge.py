@@ -87,6 +87,8 @@ class Judge(Reading):
             self._say("beyond_command", setpoint.t_us, f"{setpoint.speed} mm/s, commanded {wanted[-1]} mm/s")
 
     def _ramp_us(self, speed):
+        """With the current as a setpoint it ramps too, and may take as long as the speed from its maximum would."""
+        speed = speed if self.config.role == "limit" else self.config.max_speed_mm_s
         return int(abs(speed) * 1_000_000 / self.config.decel_mm_s2)
 
     def _lease_rule(self, setpoint, name, drives):
@@ -198,10 +200,12 @@ class Judge(Reading):
         return min((end[0] for end in session.ends if end[1] == "killed"), default=None)
 
     def _first_zero_us(self, session, side):
-        """When the zeros of the final hold began."""
+        """When the zeros of the final hold began; on a dead bus they begin unseen."""
         end_us = session.end_us()
         if end_us is None:
             return None
+        if any(begin <= end_us + GAP_US and end_us < alive for begin, alive in self.dead):
+            return end_us
         last = None
         for setpoint in self.setpoints:
             if setpoint.side == side and setpoint.t_us >= end_us and self._session_at(setpoint.t_us) is session:

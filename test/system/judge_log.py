@@ -119,7 +119,13 @@ class Reading:
             if event.kind == "alive" and since is not None:
                 windows.append((since, event.done_us or event.t_us))
                 since = None
+        windows = [(begin, self._first_out_us(end)) for begin, end in windows]
         return windows + ([(since, 1 << 62)] if since is not None else [])
+
+    def _first_out_us(self, alive_us):
+        """The bus takes frames again when one comes out: a wheel that has power first starts, then acknowledges."""
+        return next((frame.t_us for frame in self.frames
+                     if frame.id in (LEFT, RIGHT) and not frame.own and alive_us <= frame.t_us < alive_us + RESIDUAL_US), alive_us)
 
     def _is_dead(self, from_us, to_us):
         return any(begin < to_us + GAP_US and from_us < end + GAP_US for begin, end in self.dead)
@@ -174,7 +180,7 @@ class Reading:
 
     def _take(self, session, event):
         if event.kind == "drive" and event.ok:
-            if session.ends and event.t_us > session.end_us() + ECHO_US:
+            if event.t_us > min((at + within for at, _, within in session.ends), default=event.t_us) + ECHO_US:
                 self._say("drive_after_end", event.t_us, "a drive was accepted although the session had ended")
             session.drives.append(event)
         kinds = {"stop": "ramp", "gone": "ramp", "ramp": "ramp", "press": "press", "estop": "press", "cut": "cut", "end": "killed"}

@@ -12,9 +12,10 @@ from scenario import scenario
 
 
 def connect(path):
+    """Waits while the backlog is full."""
     sock = socket.socket(socket.AF_UNIX)
-    sock.settimeout(2)
     sock.connect(path)
+    sock.settimeout(2)
     return sock
 
 
