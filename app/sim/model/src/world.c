@@ -11,7 +11,7 @@ void sim_world_init(sim_world_t *self, const sim_pair_config_t *config, iw_time_
     sim_bus_open(&self->bus, SIM_PORT_LEFT, WHEEL_QUEUE, false);
     sim_bus_open(&self->bus, SIM_PORT_RIGHT, WHEEL_QUEUE, false);
     sim_bus_open(&self->bus, SIM_PORT_FOREIGN, 2U, true);
-    sim_bus_open(&self->bus, SIM_PORT_BABBLE, 1U, false);
+    sim_bus_open(&self->bus, SIM_PORT_BABBLE, 2U, false);
     sim_bus_open(&self->bus, SIM_PORT_INJECT, SIM_BUS_QUEUE_MAX, false);
     self->foreign = (sim_foreign_t){IW_NEVER, {300, 1000, 1U}};
     self->babble.due_us = IW_NEVER;

@@ -1,0 +1,343 @@
+// SPDX-License-Identifier: MIT
+// The simulated wheel's motion and the pieces it stands on: chance, sine, watchdog, torque, ticks.
+#include "iwheel_sim/motion.h"
+#include "iwheel_sim/trig.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+#define START_US 5000000U
+#define MS 1000U
+
+static sim_motion_config_t config;
+static sim_motion_t motion;
+
+void setUp(void) {
+    sim_motion_default(&config);
+    memset(&motion, 0xA5, sizeof motion);
+    sim_motion_init(&motion, &config, START_US);
+}
+
+void tearDown(void) {}
+
+static void restart(void) {
+    sim_motion_init(&motion, &config, START_US);
+}
+
+static bool tell(iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
+    iw_proto_setpoint_t const setpoint = {speed_mm_s, current_mA, 1U};
+    return sim_motion_hear(&motion, now_us, &setpoint);
+}
+
+/// Tells the same every 20 ms for `ms`; the time reached.
+static iw_time_us_t drive(iw_time_us_t from_us, uint32_t ms, int16_t speed_mm_s, int16_t current_mA) {
+    iw_time_us_t now_us = from_us;
+    for (; now_us < from_us + (iw_time_us_t)ms * MS; now_us += 20U * MS) {
+        TEST_ASSERT_TRUE(tell(now_us, speed_mm_s, current_mA));
+    }
+    sim_motion_advance(&motion, now_us);
+    return now_us;
+}
+
+static void test_random_same_seed_gives_same_numbers_and_another_seed_others(void) {
+    sim_random_t one;
+    sim_random_t same;
+    sim_random_t other;
+    unsigned differ = 0U;
+    sim_random_init(&one, 7U);
+    sim_random_init(&same, 7U);
+    sim_random_init(&other, 8U);
+    for (unsigned i = 0U; i < 1000U; ++i) {
+        uint32_t const number = sim_random_next(&one);
+        TEST_ASSERT_EQUAL_UINT32(number, sim_random_next(&same));
+        differ += (number != sim_random_next(&other)) ? 1U : 0U;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(990U, differ);
+}
+
+static void test_random_noise_stays_within_and_reaches_its_amplitude_around_zero(void) {
+    sim_random_t random;
+    int64_t sum = 0;
+    int32_t low = 0;
+    int32_t high = 0;
+    sim_random_init(&random, 1U);
+    for (unsigned i = 0U; i < 20000U; ++i) {
+        int32_t const value = sim_random_noise(&random, 10);
+        sum += value;
+        low = (value < low) ? value : low;
+        high = (value > high) ? value : high;
+    }
+    TEST_ASSERT_EQUAL_INT32(-10, low);
+    TEST_ASSERT_EQUAL_INT32(10, high);
+    TEST_ASSERT_INT64_WITHIN(2000, 0, sum);
+    TEST_ASSERT_EQUAL_INT32(0, sim_random_noise(&random, 0));
+    TEST_ASSERT_EQUAL_UINT32(0U, sim_random_below(&random, 0U));
+}
+
+static void test_trig_known_angles_give_known_values(void) {
+    static const struct {
+        int64_t angle_nrad;
+        int64_t sine_ppm;
+        int64_t cosine_ppm;
+    } known[] = {
+        {0, 0, 1000000},
+        {523598776, 500000, 866025},
+        {1570796327, 1000000, 0},
+        {2356194490, 707107, -707107},
+        {3141592654, 0, -1000000},
+        {4712388980, -1000000, 0},
+        {-523598776, -500000, 866025},
+        {10 * SIM_TRIG_TURN_nrad + 523598776, 500000, 866025},
+        {-10 * SIM_TRIG_TURN_nrad - 523598776, -500000, 866025},
+    };
+    for (size_t i = 0U; i < sizeof known / sizeof known[0]; ++i) {
+        int64_t const sine = sim_trig_sin(known[i].angle_nrad) * 1000000 / SIM_TRIG_ONE;
+        int64_t const cosine = sim_trig_cos(known[i].angle_nrad) * 1000000 / SIM_TRIG_ONE;
+        TEST_ASSERT_INT64_WITHIN(10, known[i].sine_ppm, sine);
+        TEST_ASSERT_INT64_WITHIN(10, known[i].cosine_ppm, cosine);
+    }
+}
+
+static void test_motion_told_nothing_stays_at_rest(void) {
+    sim_motion_advance(&motion, START_US + 3600U * 1000000ULL);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+    TEST_ASSERT_EQUAL_INT64(0, motion.position_nm);
+    TEST_ASSERT_FALSE(motion.driven);
+}
+
+static void test_motion_reaches_the_speed_it_is_told_without_overshoot(void) {
+    iw_time_us_t now_us = START_US;
+    for (; now_us < START_US + 1500U * MS; now_us += 20U * MS) {
+        (void)tell(now_us, 500, 2000);
+        TEST_ASSERT_LESS_OR_EQUAL_INT32(500000, motion.speed_um_s);
+    }
+    TEST_ASSERT_INT32_WITHIN(500, 500000, motion.speed_um_s);
+    TEST_ASSERT_EQUAL_INT32(499, sim_motion_true_mm_s(&motion));
+}
+
+static void test_motion_acceleration_is_bound_by_the_current(void) {
+    static const int16_t current_mA[] = {2000, 1000, -1000, 250};
+    static const int32_t most_um_s[] = {400000, 200000, 200000, 50000};
+    for (size_t i = 0U; i < 4U; ++i) {
+        restart();
+        (void)drive(START_US, 100U, 5000, current_mA[i]);
+        TEST_ASSERT_INT32_WITHIN(2000, most_um_s[i], motion.speed_um_s);
+    }
+}
+
+static void test_motion_current_beyond_the_range_gives_no_more_than_its_limit(void) {
+    (void)drive(START_US, 100U, 5000, 32767);
+    TEST_ASSERT_INT32_WITHIN(2000, 400000, motion.speed_um_s);
+}
+
+static void test_motion_limit_of_zero_current_lets_it_coast(void) {
+    iw_time_us_t const now_us = drive(START_US, 1500U, 1000, 2000);
+    (void)drive(now_us, 200U, 1000, 0);
+    TEST_ASSERT_INT32_WITHIN(2000, 1000000 - 140000, motion.speed_um_s);
+}
+
+static void test_motion_setpoint_holds_until_one_second_and_not_longer(void) {
+    iw_time_us_t const last_us = drive(START_US, 1500U, 1000, 2000);
+    TEST_ASSERT_TRUE(tell(last_us, 1000, 2000));
+    sim_motion_advance(&motion, last_us + 999999U);
+    TEST_ASSERT_TRUE(motion.driven);
+    TEST_ASSERT_INT32_WITHIN(500, 1000000, motion.speed_um_s);
+    sim_motion_advance(&motion, last_us + 1000000U);
+    TEST_ASSERT_FALSE(motion.driven);
+    TEST_ASSERT_INT32_WITHIN(500, 1000000, motion.speed_um_s);
+}
+
+static void test_motion_after_the_watchdog_coasts_to_rest(void) {
+    iw_time_us_t const last_us = drive(START_US, 1500U, 700, 2000);
+    sim_motion_advance(&motion, last_us + 980U * MS + 500U * MS);
+    TEST_ASSERT_INT32_WITHIN(2000, 350000, motion.speed_um_s);
+    sim_motion_advance(&motion, last_us + 980U * MS + 1001U * MS);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+}
+
+static void test_motion_fresh_setpoint_after_the_watchdog_drives_again(void) {
+    iw_time_us_t const last_us = drive(START_US, 500U, 300, 2000);
+    (void)drive(last_us + 3000U * MS, 500U, -300, 2000);
+    TEST_ASSERT_INT32_WITHIN(1000, -300000, motion.speed_um_s);
+}
+
+static void test_motion_coasts_the_same_in_one_step_or_many(void) {
+    sim_motion_t many;
+    iw_time_us_t const last_us = drive(START_US, 500U, 800, 2000);
+    many = motion;
+    sim_motion_advance(&motion, last_us + 3000U * MS);
+    for (unsigned ms = 1U; ms <= 3000U; ++ms) {
+        sim_motion_advance(&many, last_us + ms * MS);
+    }
+    TEST_ASSERT_EQUAL_INT32(motion.speed_um_s, many.speed_um_s);
+    TEST_ASSERT_INT64_WITHIN(2000000, motion.position_nm, many.position_nm);
+}
+
+static void test_motion_time_going_back_changes_nothing(void) {
+    (void)drive(START_US, 200U, 800, 2000);
+    sim_motion_t const before = motion;
+    sim_motion_advance(&motion, START_US);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &motion, sizeof motion);
+}
+
+static void test_motion_type_set_ignores_other_types(void) {
+    config.accepted_type = 7;
+    restart();
+    iw_proto_setpoint_t setpoint = {500, 2000, 6U};
+    TEST_ASSERT_FALSE(sim_motion_hear(&motion, START_US, &setpoint));
+    TEST_ASSERT_FALSE(motion.driven);
+    TEST_ASSERT_EQUAL_UINT32(0U, motion.setpoints);
+    setpoint.type = 7U;
+    TEST_ASSERT_TRUE(sim_motion_hear(&motion, START_US, &setpoint));
+    TEST_ASSERT_TRUE(motion.driven);
+}
+
+static void test_motion_current_as_setpoint_speed_zero_is_torque(void) {
+    config.current_is_setpoint = true;
+    restart();
+    (void)drive(START_US, 200U, 0, 1000);
+    TEST_ASSERT_INT32_WITHIN(2000, 400000, motion.speed_um_s);
+    (void)drive(START_US + 200U * MS, 400U, 0, -1000);
+    TEST_ASSERT_INT32_WITHIN(3000, -400000, motion.speed_um_s);
+}
+
+static void test_motion_current_as_limit_speed_zero_holds_still(void) {
+    (void)drive(START_US, 200U, 0, 2000);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+}
+
+static void test_motion_current_as_setpoint_zero_pair_comes_to_rest(void) {
+    config.current_is_setpoint = true;
+    restart();
+    iw_time_us_t const now_us = drive(START_US, 1000U, 300, 1000);
+    TEST_ASSERT_INT32_WITHIN(1000, 300000, motion.speed_um_s);
+    (void)drive(now_us, 600U, 0, 0);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+}
+
+static void test_motion_zero_setpoint_brakes_to_an_exact_stop(void) {
+    iw_time_us_t const now_us = drive(START_US, 1000U, 1000, 2000);
+    (void)drive(now_us, 1000U, 0, 2000);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+    TEST_ASSERT_EQUAL_INT64(0, sim_motion_milli_rpm(&motion));
+}
+
+static void test_motion_blocked_stands_still_and_draws_current_until_unblocked(void) {
+    motion.blocked = true;
+    iw_time_us_t const now_us = drive(START_US, 500U, 500, 1500);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+    TEST_ASSERT_EQUAL_INT64(0, motion.position_nm);
+    TEST_ASSERT_EQUAL_UINT32(1500U, sim_motion_draw_mA(&motion));
+    motion.blocked = false;
+    (void)drive(now_us, 500U, 500, 1500);
+    TEST_ASSERT_INT32_WITHIN(1000, 500000, motion.speed_um_s);
+}
+
+static void test_motion_runaway_goes_faster_than_told_in_its_direction_while_driven(void) {
+    motion.runaway_mm_s = 1000;
+    iw_time_us_t now_us = drive(START_US, 1500U, -300, 2000);
+    TEST_ASSERT_INT32_WITHIN(2000, -1300000, motion.speed_um_s);
+    now_us = drive(now_us, 2000U, 0, 2000);
+    TEST_ASSERT_INT32_WITHIN(2000, 1000000, motion.speed_um_s);
+    sim_motion_advance(&motion, now_us + 4000U * MS);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+}
+
+static void test_motion_one_metre_per_second_is_49_74_rpm(void) {
+    motion.speed_um_s = 1000000;
+    TEST_ASSERT_INT64_WITHIN(2, 49736, sim_motion_milli_rpm(&motion));
+    TEST_ASSERT_INT32_WITHIN(50, 1000000, sim_motion_um_s_of_milli_rpm(&motion.config, 49736));
+}
+
+static void test_motion_rpm_of_the_rotor_has_the_gear_in_it(void) {
+    config.gear_turns = 15U;
+    config.gear_per = 2U;
+    config.rpm_of_rotor = true;
+    restart();
+    motion.speed_um_s = -1000000;
+    TEST_ASSERT_INT64_WITHIN(20, -373020, sim_motion_milli_rpm(&motion));
+    TEST_ASSERT_INT32_WITHIN(100, -1000000, sim_motion_um_s_of_milli_rpm(&motion.config, -373020));
+}
+
+static void test_motion_sixty_ticks_per_turn_both_ways(void) {
+    iw_time_us_t now_us = drive(START_US, 4000U, 1000, 2000);
+    int64_t const expected = motion.position_nm * 60 / 1206371579;
+    TEST_ASSERT_GREATER_THAN_INT64(150, expected);
+    TEST_ASSERT_EQUAL_INT64(expected, (int32_t)motion.ticks);
+    now_us = drive(now_us, 8000U, -1000, 2000);
+    TEST_ASSERT_LESS_THAN_INT64(0, motion.position_nm);
+    TEST_ASSERT_EQUAL_INT64(motion.position_nm * 60 / 1206371579 - 1, (int32_t)motion.ticks);
+}
+
+static void test_motion_ticks_count_rotor_turns(void) {
+    config.gear_turns = 20U;
+    restart();
+    (void)drive(START_US, 3000U, 500, 2000);
+    TEST_ASSERT_EQUAL_INT64(motion.position_nm * 1200 / 1206371579, (int32_t)motion.ticks);
+}
+
+static void test_motion_swapped_sign_reports_the_opposite_of_what_it_does(void) {
+    motion.swapped = true;
+    (void)drive(START_US, 2000U, 500, 2000);
+    TEST_ASSERT_GREATER_THAN_INT64(0, motion.position_nm);
+    TEST_ASSERT_LESS_THAN_INT64(0, sim_motion_milli_rpm(&motion));
+    TEST_ASSERT_LESS_THAN_INT32(-30, (int32_t)motion.ticks);
+}
+
+static void test_motion_larger_wheel_really_goes_faster(void) {
+    config.radius_mm = 384U;
+    restart();
+    (void)drive(START_US, 2000U, 500, 2000);
+    TEST_ASSERT_INT32_WITHIN(1, 999, sim_motion_true_mm_s(&motion));
+    TEST_ASSERT_INT64_WITHIN(1, motion.position_nm / 500000, sim_motion_true_mm(&motion));
+}
+
+static void test_motion_release_forgets_the_setpoint(void) {
+    iw_time_us_t const now_us = drive(START_US, 1000U, 500, 2000);
+    sim_motion_release(&motion, now_us);
+    TEST_ASSERT_FALSE(motion.driven);
+    TEST_ASSERT_EQUAL_UINT32(0U, sim_motion_draw_mA(&motion));
+    sim_motion_advance(&motion, now_us + 800U * MS);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+}
+
+static void test_motion_draws_more_while_it_accelerates(void) {
+    (void)drive(START_US, 60U, 2000, 2000);
+    TEST_ASSERT_UINT32_WITHIN(160U, 2000U, sim_motion_draw_mA(&motion));
+    (void)drive(START_US + 60U * MS, 2000U, 500, 2000);
+    TEST_ASSERT_EQUAL_UINT32(150U, sim_motion_draw_mA(&motion));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_random_same_seed_gives_same_numbers_and_another_seed_others);
+    RUN_TEST(test_random_noise_stays_within_and_reaches_its_amplitude_around_zero);
+    RUN_TEST(test_trig_known_angles_give_known_values);
+    RUN_TEST(test_motion_told_nothing_stays_at_rest);
+    RUN_TEST(test_motion_reaches_the_speed_it_is_told_without_overshoot);
+    RUN_TEST(test_motion_acceleration_is_bound_by_the_current);
+    RUN_TEST(test_motion_current_beyond_the_range_gives_no_more_than_its_limit);
+    RUN_TEST(test_motion_limit_of_zero_current_lets_it_coast);
+    RUN_TEST(test_motion_setpoint_holds_until_one_second_and_not_longer);
+    RUN_TEST(test_motion_after_the_watchdog_coasts_to_rest);
+    RUN_TEST(test_motion_fresh_setpoint_after_the_watchdog_drives_again);
+    RUN_TEST(test_motion_coasts_the_same_in_one_step_or_many);
+    RUN_TEST(test_motion_time_going_back_changes_nothing);
+    RUN_TEST(test_motion_type_set_ignores_other_types);
+    RUN_TEST(test_motion_current_as_setpoint_speed_zero_is_torque);
+    RUN_TEST(test_motion_current_as_limit_speed_zero_holds_still);
+    RUN_TEST(test_motion_current_as_setpoint_zero_pair_comes_to_rest);
+    RUN_TEST(test_motion_zero_setpoint_brakes_to_an_exact_stop);
+    RUN_TEST(test_motion_blocked_stands_still_and_draws_current_until_unblocked);
+    RUN_TEST(test_motion_runaway_goes_faster_than_told_in_its_direction_while_driven);
+    RUN_TEST(test_motion_one_metre_per_second_is_49_74_rpm);
+    RUN_TEST(test_motion_rpm_of_the_rotor_has_the_gear_in_it);
+    RUN_TEST(test_motion_sixty_ticks_per_turn_both_ways);
+    RUN_TEST(test_motion_ticks_count_rotor_turns);
+    RUN_TEST(test_motion_swapped_sign_reports_the_opposite_of_what_it_does);
+    RUN_TEST(test_motion_larger_wheel_really_goes_faster);
+    RUN_TEST(test_motion_release_forgets_the_setpoint);
+    RUN_TEST(test_motion_draws_more_while_it_accelerates);
+    return UNITY_END();
+}

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: MIT
+// The pair of simulated wheels: when which frame leaves; its life from power to reboot; determinism.
+#include "test_sim_rig.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+void setUp(void) {
+    rig_init();
+}
+
+void tearDown(void) {}
+
+static void test_pair_every_id_keeps_its_period_exactly_for_ten_seconds(void) {
+    static const struct {
+        uint32_t id;
+        uint32_t period_us;
+    } due[] = {{256U, 4000U},  {288U, 4000U},  {257U, 40000U},   {289U, 40000U},  {290U, 40000U},
+               {512U, 50000U}, {544U, 50000U}, {513U, 1000000U}, {545U, 1000000U}};
+    rig_run(START_US, START_US + 4U * SECOND);
+    rig_forget();
+    rig_run(START_US + 4U * SECOND, START_US + 14U * SECOND);
+    for (size_t i = 0U; i < sizeof due / sizeof due[0]; ++i) {
+        seen_t const *const of = &seen[due[i].id];
+        TEST_ASSERT_EQUAL_UINT32(10000000U / due[i].period_us, of->count);
+        TEST_ASSERT_EQUAL_UINT32(due[i].period_us, of->shortest_us);
+        TEST_ASSERT_EQUAL_UINT32(due[i].period_us, of->longest_us);
+    }
+}
+
+static void test_pair_sends_its_nine_ids_and_nothing_else(void) {
+    uint32_t total = 0U;
+    uint32_t known = 0U;
+    rig_run(START_US, START_US + 10U * SECOND);
+    for (uint32_t id = 0U; id < sizeof seen / sizeof seen[0]; ++id) {
+        total += seen[id].count;
+    }
+    for (size_t i = 0U; i < 9U; ++i) {
+        static const uint32_t ids[] = {256U, 257U, 288U, 289U, 290U, 512U, 513U, 544U, 545U};
+        known += seen[ids[i]].count;
+        TEST_ASSERT_GREATER_THAN_UINT32(0U, seen[ids[i]].count);
+    }
+    TEST_ASSERT_EQUAL_UINT32(known, total);
+}
+
+static void test_pair_is_silent_and_deaf_while_it_boots(void) {
+    TEST_ASSERT_FALSE(sim_pair_acknowledges(&pair));
+    rig_drive(500, 500);
+    rig_run(START_US, START_US + 399U * MS);
+    TEST_ASSERT_EQUAL_UINT32(0U, pair.wheel[IW_LEFT].motion.setpoints);
+    TEST_ASSERT_EQUAL_UINT32(0U, seen[256].count);
+    rig_run(START_US + 399U * MS, START_US + 410U * MS);
+    TEST_ASSERT_GREATER_THAN_UINT32(0U, seen[256].count);
+    TEST_ASSERT_EQUAL_UINT32(0U, seen[288].count);
+    TEST_ASSERT_TRUE(sim_pair_acknowledges(&pair));
+}
+
+static void test_pair_offset_frames_end_sixty_seconds_after_the_start(void) {
+    rig_run(START_US, START_US + 100U * SECOND);
+    TEST_ASSERT_EQUAL_UINT32(58U, seen[513].count);
+    TEST_ASSERT_EQUAL_UINT32(58U, seen[545].count);
+    TEST_ASSERT_LESS_THAN_UINT64(START_US + 400U * MS + 60U * SECOND, seen[513].last_us);
+    TEST_ASSERT_GREATER_THAN_UINT64(START_US + 400U * MS + 59U * SECOND, seen[513].last_us);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(START_US + 400U * MS + 2U * SECOND, seen[513].first_us);
+}
+
+static void test_pair_reboot_silences_one_wheel_zeroes_its_ticks_and_brings_offsets_back(void) {
+    rig_drive(500, 500);
+    rig_run(START_US, START_US + 70U * SECOND);
+    TEST_ASSERT_GREATER_THAN_INT32(1000, rig_last(257U).as.status.odometry_ticks);
+    rig_forget();
+    sim_pair_reboot(&pair, START_US + 70U * SECOND, IW_LEFT);
+    rig_run(START_US + 70U * SECOND, START_US + 70U * SECOND + 390U * MS);
+    TEST_ASSERT_EQUAL_UINT32(0U, seen[256].count + seen[257].count + seen[512].count + seen[513].count);
+    TEST_ASSERT_GREATER_THAN_UINT32(90U, seen[288].count);
+    rig_let_go();
+    rig_run(START_US + 70U * SECOND + 390U * MS, START_US + 140U * SECOND);
+    TEST_ASSERT_INT32_WITHIN(5, 0, rig_last(257U).as.status.odometry_ticks);
+    TEST_ASSERT_EQUAL_UINT32(58U, seen[513].count);
+    TEST_ASSERT_EQUAL_UINT32(0U, seen[545].count);
+    TEST_ASSERT_EQUAL_UINT32(2U, pair.wheel[IW_LEFT].boots);
+}
+
+static void test_pair_without_power_is_silent_coasts_and_starts_anew(void) {
+    rig_drive(700, 700);
+    rig_run(START_US, START_US + 3U * SECOND);
+    sim_pair_power(&pair, START_US + 3U * SECOND, false);
+    rig_forget();
+    TEST_ASSERT_FALSE(sim_pair_acknowledges(&pair));
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, sim_pair_next_us(&pair));
+    rig_run(START_US + 3U * SECOND, START_US + 6U * SECOND);
+    TEST_ASSERT_EQUAL_UINT32(0U, seen[256].count + seen[288].count);
+    rig_let_go();
+    sim_pair_power(&pair, START_US + 6U * SECOND, true);
+    TEST_ASSERT_EQUAL_INT32(0, pair.wheel[IW_LEFT].motion.speed_um_s);
+    rig_run(START_US + 6U * SECOND, START_US + 7U * SECOND);
+    TEST_ASSERT_EQUAL_INT32(0, rig_last(257U).as.status.odometry_ticks);
+    TEST_ASSERT_EQUAL_INT(0, rig_last(256U).as.speed.speed_rpm);
+}
+
+static void test_pair_power_told_twice_changes_nothing(void) {
+    rig_run(START_US, BOOTED);
+    sim_pair_t const before = pair;
+    sim_pair_power(&pair, BOOTED, true);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &pair, sizeof pair);
+    sim_pair_power(&pair, BOOTED, false);
+    sim_pair_reboot(&pair, BOOTED + 1U, IW_LEFT);
+    TEST_ASSERT_EQUAL_INT(SIM_WHEEL_OFF, pair.wheel[IW_LEFT].state);
+}
+
+static void test_pair_muted_wheel_is_silent_but_follows_and_acknowledges(void) {
+    pair.wheel[IW_LEFT].muted = true;
+    rig_drive(500, 500);
+    rig_run(START_US, START_US + 3U * SECOND);
+    TEST_ASSERT_EQUAL_UINT32(0U, seen[256].count + seen[257].count + seen[512].count + seen[513].count);
+    TEST_ASSERT_INT32_WITHIN(1000, 500000, pair.wheel[IW_LEFT].motion.speed_um_s);
+    TEST_ASSERT_TRUE(sim_pair_acknowledges(&pair));
+    pair.wheel[IW_LEFT].muted = false;
+    rig_run(START_US + 3U * SECOND, START_US + 4U * SECOND);
+    TEST_ASSERT_EQUAL_UINT32(250U, seen[256].count);
+}
+
+static void test_pair_that_is_old_already_sends_no_offset_but_knows_it(void) {
+    config.age_us = 61U * SECOND;
+    sim_pair_init(&pair, &config, START_US, 1U);
+    rig_run(START_US, START_US + 5U * SECOND);
+    TEST_ASSERT_EQUAL_UINT32(1251U, seen[256].count);
+    TEST_ASSERT_EQUAL_UINT32(0U, seen[513].count + seen[545].count);
+    TEST_ASSERT_EQUAL_INT(123, pair.wheel[IW_LEFT].force.learnt_dN);
+}
+
+static void test_pair_aged_half_a_minute_sends_offsets_for_the_rest_only(void) {
+    config.age_us = 30U * SECOND;
+    sim_pair_init(&pair, &config, START_US, 1U);
+    rig_run(START_US, START_US + 100U * SECOND);
+    TEST_ASSERT_EQUAL_UINT32(30U, seen[513].count);
+}
+
+static void test_pair_loss_swallows_its_share_of_telemetry_and_setpoints(void) {
+    rig_run(START_US, BOOTED);
+    rig_forget();
+    pair.wheel[IW_LEFT].loss_permille = 250U;
+    rig_drive(100, 100);
+    rig_run(BOOTED, BOOTED + 40U * SECOND);
+    TEST_ASSERT_UINT32_WITHIN(200U, 7500U, seen[256].count);
+    TEST_ASSERT_UINT32_WITHIN(80U, 1500U, pair.wheel[IW_LEFT].motion.setpoints);
+    TEST_ASSERT_EQUAL_UINT32(10000U, seen[288].count);
+    pair.wheel[IW_LEFT].loss_permille = 1000U;
+    rig_forget();
+    rig_run(BOOTED + 40U * SECOND, BOOTED + 45U * SECOND);
+    TEST_ASSERT_EQUAL_UINT32(0U, seen[256].count);
+}
+
+static void test_pair_slow_stretches_every_period_and_back(void) {
+    sim_wheel_slow(&pair.wheel[IW_LEFT], 2500U);
+    rig_run(START_US, START_US + 3U * SECOND);
+    rig_forget();
+    rig_run(START_US + 3U * SECOND, START_US + 13U * SECOND);
+    TEST_ASSERT_EQUAL_UINT32(1000U, seen[256].count);
+    TEST_ASSERT_EQUAL_UINT32(10000U, seen[256].shortest_us);
+    TEST_ASSERT_EQUAL_UINT32(100000U, seen[257].longest_us);
+    TEST_ASSERT_EQUAL_UINT32(2500U, seen[288].count);
+    sim_wheel_slow(&pair.wheel[IW_LEFT], 1000U);
+    rig_forget();
+    rig_run(START_US + 14U * SECOND, START_US + 24U * SECOND);
+    TEST_ASSERT_UINT32_WITHIN(260U, 2500U, seen[256].count);
+}
+
+static void test_pair_ignores_frames_that_are_no_setpoint_of_the_table(void) {
+    rig_run(START_US, BOOTED);
+    sim_pair_t const before = pair;
+    static const iw_can_frame_t strange[] = {
+        {.id = 266U | IW_CAN_REMOTE, .dlc = 5U},
+        {.id = 266U | IW_CAN_EXTENDED, .dlc = 5U},
+        {.id = 266U | IW_CAN_FD, .dlc = 8U},
+        {.id = 266U | IW_CAN_ERROR, .dlc = 8U},
+        {.id = 266U, .dlc = 4U},
+        {.id = 267U, .dlc = 5U},
+        {.id = 288U, .dlc = 4U, .data = {1, 44}},
+        {.id = 513U, .dlc = 2U},
+    };
+    for (size_t i = 0U; i < sizeof strange / sizeof strange[0]; ++i) {
+        sim_pair_hear(&pair, BOOTED, &strange[i]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&before, &pair, sizeof pair);
+}
+
+static void test_pair_same_seed_same_bytes_however_often_it_is_stepped(void) {
+    static sim_pair_t fine;
+    iw_time_us_t fine_us = START_US;
+    sim_sent_t one;
+    sim_sent_t other;
+    uint32_t frames = 0U;
+    sim_pair_init(&fine, &config, START_US, 1U);
+    memset(&one, 0, sizeof one);
+    memset(&other, 0, sizeof other);
+    while (sim_pair_step(&pair, START_US + 20U * SECOND, &one)) {
+        while (!sim_pair_step(&fine, fine_us, &other)) {
+            fine_us += 137U;
+        }
+        TEST_ASSERT_EQUAL_MEMORY(&one.frame, &other.frame, sizeof one.frame);
+        TEST_ASSERT_EQUAL_UINT64(one.due_us, other.due_us);
+        frames += 1U;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(12000U, frames);
+}
+
+static void test_pair_another_seed_gives_other_noise(void) {
+    static sim_pair_t other;
+    sim_sent_t sent;
+    uint32_t differ = 0U;
+    sim_pair_init(&other, &config, START_US, 2U);
+    rig_run(START_US + 5U * SECOND, START_US + 5U * SECOND);
+    iw_can_frame_t const mine = seen[512].frame;
+    while (sim_pair_step(&other, START_US + 5U * SECOND, &sent)) {
+        differ += (sent.frame.id == 512U && memcmp(&mine, &sent.frame, sizeof mine) != 0) ? 1U : 0U;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(50U, differ);
+}
+
+static void test_pair_null_configuration_is_the_default(void) {
+    static sim_pair_t standard;
+    sim_pair_init(&standard, NULL, START_US, 1U);
+    TEST_ASSERT_EQUAL_MEMORY(&pair, &standard, sizeof pair);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_pair_every_id_keeps_its_period_exactly_for_ten_seconds);
+    RUN_TEST(test_pair_sends_its_nine_ids_and_nothing_else);
+    RUN_TEST(test_pair_is_silent_and_deaf_while_it_boots);
+    RUN_TEST(test_pair_offset_frames_end_sixty_seconds_after_the_start);
+    RUN_TEST(test_pair_reboot_silences_one_wheel_zeroes_its_ticks_and_brings_offsets_back);
+    RUN_TEST(test_pair_without_power_is_silent_coasts_and_starts_anew);
+    RUN_TEST(test_pair_power_told_twice_changes_nothing);
+    RUN_TEST(test_pair_muted_wheel_is_silent_but_follows_and_acknowledges);
+    RUN_TEST(test_pair_that_is_old_already_sends_no_offset_but_knows_it);
+    RUN_TEST(test_pair_aged_half_a_minute_sends_offsets_for_the_rest_only);
+    RUN_TEST(test_pair_loss_swallows_its_share_of_telemetry_and_setpoints);
+    RUN_TEST(test_pair_slow_stretches_every_period_and_back);
+    RUN_TEST(test_pair_ignores_frames_that_are_no_setpoint_of_the_table);
+    RUN_TEST(test_pair_same_seed_same_bytes_however_often_it_is_stepped);
+    RUN_TEST(test_pair_another_seed_gives_other_noise);
+    RUN_TEST(test_pair_null_configuration_is_the_default);
+    return UNITY_END();
+}

@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: MIT
+// The simulator's commands: what is understood, what is refused, and that a refusal changes nothing.
+#include "panel.h"
+
+#include "unity.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define START_US UINT64_C(1000000)
+#define NOW_US UINT64_C(2000000)
+
+static sim_world_t world;
+static sim_panel_t panel;
+static char marked[SIM_LINE_BYTES];
+static unsigned quits;
+
+static void mark(void *context, const char *text) {
+    (void)context;
+    (void)snprintf(marked, sizeof marked, "%s", text);
+}
+
+static void quit(void *context) {
+    (void)context;
+    quits += 1U;
+}
+
+static void run_until(iw_time_us_t until_us) {
+    sim_delivery_t delivery;
+    while (sim_world_step(&world, until_us, &delivery)) {
+    }
+}
+
+void setUp(void) {
+    memset(&panel, 0xA5, sizeof panel);
+    sim_world_init(&world, NULL, START_US, 1U);
+    panel.world = &world;
+    panel.hooks = (sim_hooks_t){NULL, NULL, mark, quit, NULL};
+    marked[0] = '\0';
+    quits = 0U;
+    run_until(NOW_US);
+}
+
+void tearDown(void) {}
+
+static void expect_done(const char *line) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(SIM_CHANGED, sim_panel_execute(&panel, NOW_US, line), line);
+    TEST_ASSERT_EQUAL_STRING("ok\n", panel.answer);
+}
+
+static void expect_refused(const char *line) {
+    static sim_world_t before;
+    before = world;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(SIM_REFUSED, sim_panel_execute(&panel, NOW_US, line), line);
+    TEST_ASSERT_EQUAL_STRING_LEN("error ", panel.answer, 6);
+    TEST_ASSERT_EQUAL_CHAR('\n', panel.answer[strlen(panel.answer) - 1U]);
+    TEST_ASSERT_EQUAL_PTR(&panel.answer[strlen(panel.answer) - 1U], strchr(panel.answer, '\n'));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, memcmp(&before, &world, sizeof world), line);
+}
+
+static sim_wheel_t *wheel(iw_side_t side) {
+    return &world.pair.wheel[side];
+}
+
+static void test_panel_every_command_with_right_arguments_is_done(void) {
+    static const char *const right[] = {
+        "power off",
+        "power on",
+        "reboot left",
+        "reboot both",
+        "mute right",
+        "unmute right",
+        "block left",
+        "unblock both",
+        "runaway left on",
+        "runaway right on 500",
+        "runaway both off",
+        "sign left swapped",
+        "sign left normal",
+        "load left 50",
+        "load both -12.345",
+        "unit left dN",
+        "unit right cN",
+        "removed left on",
+        "removed both off",
+        "zero left 3.5",
+        "raw left -32768",
+        "raw left auto",
+        "ticks right -2147483648",
+        "gear both 20",
+        "gear left 15 2",
+        "rpm left rotor",
+        "rpm both wheel",
+        "radius left 200",
+        "mirror right on",
+        "mirror right off",
+        "role setpoint",
+        "role limit",
+        "type 7",
+        "type any",
+        "battery 255",
+        "ambient -40",
+        "loss 12.5",
+        "loss 0",
+        "slow 0.1",
+        "slow 1000",
+        "ack off",
+        "ack on",
+        "stall on",
+        "stall off",
+        "busoff on",
+        "busoff off",
+        "passive on",
+        "passive off",
+        "bus down",
+        "bus up",
+        "queue 1",
+        "queue 64",
+        "foreign on",
+        "foreign on 300",
+        "foreign off",
+        "foreign once",
+        "foreign once -50",
+        "frame 10A#0101F407D0",
+        "frame 10A#R",
+        "frame 12345678#",
+        "babble 7FF 120 on",
+        "babble 7FF 120 off",
+        "estop press",
+        "estop release",
+        "estop pulse 20",
+        "estop pulse 0.5",
+        "estop unplug",
+        "estop plug",
+        "normal",
+    };
+    for (size_t i = 0U; i < sizeof right / sizeof right[0]; ++i) {
+        expect_done(right[i]);
+    }
+}
+
+static void test_panel_wrong_commands_are_refused_and_change_nothing(void) {
+    static const char *const wrong[] = {
+        "",
+        "   ",
+        "#",
+        "power",
+        "power of",
+        "power ON",
+        "power on now",
+        "POWER on",
+        "pow on",
+        "reboot",
+        "reboot up",
+        "reboot left right",
+        "mute",
+        "mute all",
+        "load left",
+        "load left x",
+        "load left 4000.001",
+        "load left -4001",
+        "load left 1.2345",
+        "load left 1.",
+        "load left .5",
+        "load left 1e3",
+        "load left 0x10",
+        "load left --1",
+        "load left +1",
+        "load left 1.2.3",
+        "load left 99999999999999999999",
+        "load middle 5",
+        "unit left cn",
+        "unit left",
+        "sign left",
+        "sign left up",
+        "runaway left",
+        "runaway left on 0",
+        "runaway left on 3001",
+        "runaway left off 5",
+        "raw left 32768",
+        "raw left -32769",
+        "raw left 1.5",
+        "zero left 4001",
+        "ticks left 2147483648",
+        "gear left 0",
+        "gear left 5 0",
+        "gear left 1001",
+        "rpm left x",
+        "radius left 19",
+        "radius left 501",
+        "mirror left",
+        "role both",
+        "type 256",
+        "type -1",
+        "type",
+        "battery 256",
+        "battery -1",
+        "ambient 256",
+        "loss 100.001",
+        "loss -1",
+        "slow 0.099",
+        "slow 1001",
+        "slow 0",
+        "ack",
+        "ack maybe",
+        "stall 1",
+        "busoff",
+        "passive x",
+        "bus off",
+        "queue 0",
+        "queue 65",
+        "foreign",
+        "foreign maybe",
+        "foreign off 5",
+        "foreign on 32768",
+        "foreign on x",
+        "frame",
+        "frame 10A",
+        "frame #00",
+        "frame 10#00",
+        "frame 800#00",
+        "frame 10A#0",
+        "frame 10A#GG",
+        "frame 10A#000102030405060708",
+        "frame 20000000#00",
+        "frame 10A#R1",
+        "frame 010A#00",
+        "babble",
+        "babble 7FF on",
+        "babble 7FF 99 on",
+        "babble 7FF 100 maybe",
+        "babble FFF 100 on",
+        "estop",
+        "estop push",
+        "estop press 5",
+        "estop pulse",
+        "estop pulse 0",
+        "estop pulse 60001",
+        "estop unplug 1",
+        "log",
+        "log mark",
+        "log it please",
+        "status now",
+        "normal now",
+        "quit now",
+        "power\ton\x01",
+        "\x80",
+    };
+    for (size_t i = 0U; i < sizeof wrong / sizeof wrong[0]; ++i) {
+        expect_refused(wrong[i]);
+    }
+    TEST_ASSERT_EQUAL_UINT(0U, quits);
+    TEST_ASSERT_EQUAL_STRING("", marked);
+}
+
+static void test_panel_line_too_long_is_refused(void) {
+    char line[400];
+    memset(line, 'x', sizeof line);
+    line[sizeof line - 1U] = '\0';
+    expect_refused(line);
+    memset(line, ' ', sizeof line - 1U);
+    memcpy(line, "power on", 8U);
+    expect_refused(line);
+}
+
+static void test_panel_refusal_tells_the_usage(void) {
+    expect_refused("load left");
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "usage: load left|right|both NEWTON"));
+    expect_refused("lod left 5");
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "help"));
+}
+
+static void test_panel_reboot_without_power_is_refused_with_the_cure(void) {
+    expect_done("power off");
+    expect_refused("reboot left");
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "power on"));
+}
+
+static void test_panel_help_lists_commands_and_ends_in_a_dot(void) {
+    TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "help"));
+    static const char *const name[] = {"power", "reboot", "load", "sign", "foreign", "estop", "status", "help"};
+    for (size_t i = 0U; i < sizeof name / sizeof name[0]; ++i) {
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(panel.answer, name[i]), name[i]);
+    }
+    TEST_ASSERT_EQUAL_STRING("\n.\n", &panel.answer[strlen(panel.answer) - 3U]);
+}
+
+static void test_panel_status_is_one_line_that_tells_the_truth(void) {
+    expect_done("load left 50");
+    expect_done("power off");
+    TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "status"));
+    TEST_ASSERT_EQUAL_STRING_LEN("ok {\"t_us\":2000000,\"power\":false,", panel.answer, 32);
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"load_mN\":50000"));
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"setpoint\":null,\"setpoint_age_ms\":null"));
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"ack\":false"));
+    TEST_ASSERT_EQUAL_PTR(&panel.answer[strlen(panel.answer) - 1U], strchr(panel.answer, '\n'));
+}
+
+static void test_panel_status_tells_the_last_setpoint_and_its_age(void) {
+    expect_done("frame 10A#0101F407D0");
+    run_until(NOW_US + 500000U);
+    (void)sim_panel_execute(&panel, NOW_US + 500000U, "status");
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"setpoint\":{\"type\":1,\"speed_mm_s\":500,\"current_mA\":2000}"));
+    TEST_ASSERT_NOT_NULL(strstr(panel.answer, "\"setpoint_age_ms\":499,\"driven\":true"));
+}
+
+static void test_panel_status_that_does_not_fit_is_cut_and_ended(void) {
+    char small[40];
+    memset(small, 0x5A, sizeof small);
+    TEST_ASSERT_EQUAL_size_t(sizeof small - 1U, sim_panel_status(&panel, NOW_US, small, sizeof small));
+    TEST_ASSERT_EQUAL_CHAR('\0', small[sizeof small - 1U]);
+}
+
+static void test_panel_commands_reach_the_side_they_name(void) {
+    expect_done("block left");
+    expect_done("mute right");
+    expect_done("sign both swapped");
+    expect_done("load right 12.5");
+    TEST_ASSERT_TRUE(wheel(IW_LEFT)->motion.blocked);
+    TEST_ASSERT_FALSE(wheel(IW_RIGHT)->motion.blocked);
+    TEST_ASSERT_FALSE(wheel(IW_LEFT)->muted);
+    TEST_ASSERT_TRUE(wheel(IW_RIGHT)->muted);
+    TEST_ASSERT_TRUE(wheel(IW_LEFT)->motion.swapped && wheel(IW_RIGHT)->motion.swapped);
+    TEST_ASSERT_EQUAL_INT32(0, wheel(IW_LEFT)->force.load_mN);
+    TEST_ASSERT_EQUAL_INT32(12500, wheel(IW_RIGHT)->force.load_mN);
+}
+
+static void test_panel_mark_and_quit_reach_the_hooks(void) {
+    TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "log mark  the   judge looks here"));
+    TEST_ASSERT_EQUAL_STRING("the judge looks here", marked);
+    expect_done("quit");
+    TEST_ASSERT_EQUAL_UINT(1U, quits);
+}
+
+static void test_words_frame_reads_what_candump_writes(void) {
+    iw_can_frame_t frame;
+    TEST_ASSERT_TRUE(sim_words_frame("10a#DEADbeef", &frame));
+    TEST_ASSERT_EQUAL_HEX32(0x10AU, frame.id);
+    TEST_ASSERT_EQUAL_UINT8(4U, frame.dlc);
+    TEST_ASSERT_EQUAL_HEX8(0xDEU, frame.data[0]);
+    TEST_ASSERT_EQUAL_HEX8(0xEFU, frame.data[3]);
+    TEST_ASSERT_TRUE(sim_words_frame("0000010A#", &frame));
+    TEST_ASSERT_EQUAL_HEX32(0x10AU | IW_CAN_EXTENDED, frame.id);
+    TEST_ASSERT_TRUE(sim_words_frame("7FF#R", &frame));
+    TEST_ASSERT_EQUAL_HEX32(0x7FFU | IW_CAN_REMOTE, frame.id);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_panel_every_command_with_right_arguments_is_done);
+    RUN_TEST(test_panel_wrong_commands_are_refused_and_change_nothing);
+    RUN_TEST(test_panel_line_too_long_is_refused);
+    RUN_TEST(test_panel_refusal_tells_the_usage);
+    RUN_TEST(test_panel_reboot_without_power_is_refused_with_the_cure);
+    RUN_TEST(test_panel_help_lists_commands_and_ends_in_a_dot);
+    RUN_TEST(test_panel_status_is_one_line_that_tells_the_truth);
+    RUN_TEST(test_panel_status_tells_the_last_setpoint_and_its_age);
+    RUN_TEST(test_panel_status_that_does_not_fit_is_cut_and_ended);
+    RUN_TEST(test_panel_commands_reach_the_side_they_name);
+    RUN_TEST(test_panel_mark_and_quit_reach_the_hooks);
+    RUN_TEST(test_words_frame_reads_what_candump_writes);
+    return UNITY_END();
+}
