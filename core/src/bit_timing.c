@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/bit_timing.h"
 
-static uint32_t divide_rounded(uint32_t numerator, uint32_t denominator)
-{
+static uint32_t divide_rounded(uint32_t numerator, uint32_t denominator) {
     const uint32_t quotient = numerator / denominator;
     return quotient + ((numerator % denominator >= denominator - denominator / 2U) ? 1U : 0U);
 }
 
-iw_bit_timing_achieved_t iw_bit_timing_achieved(uint32_t clock_hz, const iw_bit_timing_t *timing)
-{
+iw_bit_timing_achieved_t iw_bit_timing_achieved(uint32_t clock_hz, const iw_bit_timing_t *timing) {
     iw_bit_timing_achieved_t achieved = {0, 0};
     const uint32_t quanta = 1U + timing->tseg1 + timing->tseg2;
     if (timing->prescaler > 0U && quanta <= UINT32_MAX / timing->prescaler) {
@@ -19,8 +17,8 @@ iw_bit_timing_achieved_t iw_bit_timing_achieved(uint32_t clock_hz, const iw_bit_
 }
 
 /// The split of `quanta` nearest to the wanted sample point; returns its error in permille, UINT32_MAX if there is none.
-static uint32_t split(const iw_bit_timing_limits_t *limits, uint32_t quanta, uint32_t permille, iw_bit_timing_t *out_timing)
-{
+static uint32_t split(const iw_bit_timing_limits_t *limits, uint32_t quanta, uint32_t permille,
+                      iw_bit_timing_t *out_timing) {
     uint32_t best = UINT32_MAX;
     for (uint32_t tseg2 = limits->tseg2_min; tseg2 <= limits->tseg2_max && tseg2 + 1U < quanta; tseg2++) {
         const uint32_t tseg1 = quanta - 1U - tseg2;
@@ -36,8 +34,7 @@ static uint32_t split(const iw_bit_timing_limits_t *limits, uint32_t quanta, uin
 }
 
 iw_status_t iw_bit_timing_solve(const iw_bit_timing_limits_t *limits, uint32_t clock_hz,
-                                const iw_bit_timing_achieved_t *wanted, iw_bit_timing_t *out_timing)
-{
+                                const iw_bit_timing_achieved_t *wanted, iw_bit_timing_t *out_timing) {
     const uint32_t rate = wanted->bitrate_hz;
     uint32_t best = UINT32_MAX;
     if (rate == 0U || wanted->sample_point_permille == 0U || clock_hz % rate != 0U) {

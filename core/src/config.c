@@ -11,47 +11,40 @@ typedef struct {
     iw_config_range_t range;
 } field_t;
 
-#define FIELD(name, standard, min, max) {(uint16_t)offsetof(iw_config_t, name), standard, {min, max}}
+#define FIELD(name, standard, min, max)                                                                                \
+    {                                                                                                                  \
+        (uint16_t) offsetof(iw_config_t, name), standard, {                                                            \
+            min, max                                                                                                   \
+        }                                                                                                              \
+    }
 
 /// Indexed by iw_config_fault_t - IW_CONFIG_PERIOD.
 static const field_t fields[] = {
-    FIELD(period_ms, 20, 5, 50),
-    FIELD(lease_ms, 200, 20, 500),
-    FIELD(accel_mm_s2, 800, 50, 20000),
-    FIELD(decel_mm_s2, 1500, 100, 20000),
-    FIELD(max_speed_mm_s, 1000, 10, 5000),
-    FIELD(max_current_mA, IW_CURRENT_LIMIT_mA, 0, IW_CURRENT_LIMIT_mA),
-    FIELD(zero_hold_ms, 1500, 1100, 5000),
-    FIELD(wheel_silent_ms, 50, 20, 200),
-    FIELD(echo_ms, 50, 20, 200),
-    FIELD(rest_rpm, 2, 0, 20),
-    FIELD(rest_ms, 200, 50, 2000),
-    FIELD(follow_mm_s, 300, 50, 5000),
-    FIELD(follow_ms, 500, 100, 5000),
-    FIELD(blocked_ms, 1000, 200, 10000),
-    FIELD(radius_mm, 192, 20, 500),
-    FIELD(gear_turns, 1, 1, 1000),
-    FIELD(gear_per, 1, 1, 1000),
-    FIELD(setpoint_dlc, IW_DLC_SETPOINT, IW_DLC_SETPOINT, IW_CAN_DATA_MAX),
+    FIELD(period_ms, 20, 5, 50),           FIELD(lease_ms, 200, 20, 500),
+    FIELD(accel_mm_s2, 800, 50, 20000),    FIELD(decel_mm_s2, 1500, 100, 20000),
+    FIELD(max_speed_mm_s, 1000, 10, 5000), FIELD(max_current_mA, IW_CURRENT_LIMIT_mA, 0, IW_CURRENT_LIMIT_mA),
+    FIELD(zero_hold_ms, 1500, 1100, 5000), FIELD(wheel_silent_ms, 50, 20, 200),
+    FIELD(echo_ms, 50, 20, 200),           FIELD(rest_rpm, 2, 0, 20),
+    FIELD(rest_ms, 200, 50, 2000),         FIELD(follow_mm_s, 300, 50, 5000),
+    FIELD(follow_ms, 500, 100, 5000),      FIELD(blocked_ms, 1000, 200, 10000),
+    FIELD(radius_mm, 192, 20, 500),        FIELD(gear_turns, 1, 1, 1000),
+    FIELD(gear_per, 1, 1, 1000),           FIELD(setpoint_dlc, IW_DLC_SETPOINT, IW_DLC_SETPOINT, IW_CAN_DATA_MAX),
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 IW_STATIC_ASSERT(FIELDS == IW_CONFIG_SETPOINT_DLC - IW_CONFIG_PERIOD + 1, one_row_per_field);
 
 #define WATCHDOG_MS (IW_WHEEL_WATCHDOG_US / IW_US_PER_MS)
-#define GEAR_MAX 100U
+#define GEAR_MAX    100U
 
-static uint32_t divide_up(uint32_t numerator, uint32_t denominator)
-{
+static uint32_t divide_up(uint32_t numerator, uint32_t denominator) {
     return (numerator + denominator - 1U) / denominator;
 }
 
-iw_config_range_t iw_config_range(iw_config_fault_t field)
-{
+iw_config_range_t iw_config_range(iw_config_fault_t field) {
     return fields[field - IW_CONFIG_PERIOD].range;
 }
 
-void iw_config_default(iw_config_t *out_config)
-{
+void iw_config_default(iw_config_t *out_config) {
     memset(out_config, 0, sizeof *out_config);
     for (size_t i = 0; i < FIELDS; i++) {
         memcpy((uint8_t *)out_config + fields[i].offset, &fields[i].standard, sizeof fields[i].standard);
@@ -60,8 +53,7 @@ void iw_config_default(iw_config_t *out_config)
     out_config->force_unit[IW_RIGHT] = IW_FORCE_DN;
 }
 
-static iw_config_fault_t check_relations(const iw_config_t *config)
-{
+static iw_config_fault_t check_relations(const iw_config_t *config) {
     const iw_stop_budget_t budget = iw_config_stop_budget(config);
     if (config->current_role > IW_ROLE_SETPOINT) {
         return IW_CONFIG_CURRENT_ROLE;
@@ -75,8 +67,7 @@ static iw_config_fault_t check_relations(const iw_config_t *config)
     return (budget.client_lost_ms > WATCHDOG_MS) ? IW_CONFIG_STOP_BUDGET : IW_CONFIG_OK;
 }
 
-iw_config_fault_t iw_config_check(const iw_config_t *config)
-{
+iw_config_fault_t iw_config_check(const iw_config_t *config) {
     for (size_t i = 0; i < FIELDS; i++) {
         uint16_t value;
         memcpy(&value, (const uint8_t *)config + fields[i].offset, sizeof value);
@@ -87,8 +78,7 @@ iw_config_fault_t iw_config_check(const iw_config_t *config)
     return check_relations(config);
 }
 
-iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config)
-{
+iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config) {
     const uint32_t speed = config->max_speed_mm_s;
     const uint32_t wait_ms = (uint32_t)config->lease_ms + config->period_ms;
     const uint32_t ramp_ms = divide_up(speed * 1000U, config->decel_mm_s2);

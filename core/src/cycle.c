@@ -1,21 +1,18 @@
 // SPDX-License-Identifier: MIT
 #include "cycle.h"
 
-#define ESTOP_PRESSED 1U
+#define ESTOP_PRESSED    1U
 #define ESTOP_UNREADABLE 2U
 
-static uint32_t whole_ms(iw_time_us_t span_us)
-{
+static uint32_t whole_ms(iw_time_us_t span_us) {
     return (span_us < UINT32_MAX) ? (uint32_t)span_us / IW_US_PER_MS : UINT32_MAX / IW_US_PER_MS;
 }
 
-static uint8_t side_bit(size_t side)
-{
+static uint8_t side_bit(size_t side) {
     return (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT;
 }
 
-static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us)
-{
+static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t late_us = (now_us > self->promised_us) ? now_us - self->promised_us : 0U;
     const bool late = late_us > IW_GATEWAY_LATE_US;
     self->stalled = late || (self->stalled && self->backlog);
@@ -34,11 +31,11 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us)
     }
 }
 
-void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us)
-{
+void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us) {
     const int pressed = self->hal.estop_pressed(self->hal.context);
     if (pressed != 0) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE, (pressed > 0) ? ESTOP_PRESSED : ESTOP_UNREADABLE);
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE,
+                        (pressed > 0) ? ESTOP_PRESSED : ESTOP_UNREADABLE);
     }
     watch_loop(self, now_us);
     self->bus = self->hal.bus_state(self->hal.context);
@@ -49,8 +46,7 @@ void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us)
 }
 
 /// What the force module found out about units, as entries of the ledger.
-static void note_force_evidence(iw_gateway_t *self, iw_side_t side)
-{
+static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
     const iw_force_t *const force = &self->force[side];
     const iw_ledger_item_t unit = (side == IW_LEFT) ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
     const iw_unit_evidence_t configured = (self->config.force_unit[side] == IW_FORCE_CN) ? IW_UNIT_CN : IW_UNIT_DN;
@@ -64,8 +60,7 @@ static void note_force_evidence(iw_gateway_t *self, iw_side_t side)
     }
 }
 
-static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, const iw_proto_message_t *message)
-{
+static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, const iw_proto_message_t *message) {
     const iw_wheel_t *const wheel = &self->wheel[message->side];
     iw_force_t *const force = &self->force[message->side];
     const iw_unit_evidence_t before = force->evidence;
@@ -80,8 +75,7 @@ static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, const iw_proto_m
     }
 }
 
-static void note_length(iw_gateway_t *self, const iw_can_frame_t *frame)
-{
+static void note_length(iw_gateway_t *self, const iw_can_frame_t *frame) {
     if (frame->dlc == IW_DLC_STATUS) {
         iw_ledger_confirm(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, frame->dlc);
     } else {
@@ -90,8 +84,8 @@ static void note_length(iw_gateway_t *self, const iw_can_frame_t *frame)
 }
 
 /// Telemetry. A reboot is acted upon before the frame that revealed it is used any further.
-static void hear(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame, const iw_proto_message_t *message)
-{
+static void hear(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame,
+                 const iw_proto_message_t *message) {
     iw_wheel_t *const wheel = &self->wheel[message->side];
     const bool first = wheel->first_us == IW_NEVER;
     self->counters.received++;
@@ -113,19 +107,17 @@ static void hear(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *
     }
 }
 
-static void hear_foreign(iw_gateway_t *self, iw_time_us_t now_us, uint32_t id)
-{
+static void hear_foreign(iw_gateway_t *self, iw_time_us_t now_us, uint32_t id) {
     self->counters.foreign++;
-    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SECOND_MASTER, (id == IW_ID_LEFT_SETPOINT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, id);
+    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SECOND_MASTER,
+                    (id == IW_ID_LEFT_SETPOINT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, id);
 }
 
-static bool is_setpoint_id(uint32_t id)
-{
+static bool is_setpoint_id(uint32_t id) {
     return id == IW_ID_LEFT_SETPOINT || id == IW_ID_RIGHT_SETPOINT;
 }
 
-static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame)
-{
+static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     iw_proto_message_t message;
     if (is_setpoint_id(frame->id)) {
         if (frame->kind == IW_CAN_ECHO) {
@@ -152,8 +144,7 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
     }
 }
 
-void iw_cycle_receive(iw_gateway_t *self, iw_time_us_t now_us)
-{
+void iw_cycle_receive(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
     while (taken < IW_GATEWAY_DRAIN_MAX && self->hal.receive(self->hal.context, &frame) > 0) {
@@ -163,8 +154,7 @@ void iw_cycle_receive(iw_gateway_t *self, iw_time_us_t now_us)
     self->backlog = taken == IW_GATEWAY_DRAIN_MAX;
 }
 
-static void watch_silence(iw_gateway_t *self, iw_time_us_t now_us)
-{
+static void watch_silence(iw_gateway_t *self, iw_time_us_t now_us) {
     uint8_t sides = IW_SIDES_NONE;
     uint32_t silent_ms = 0;
     for (size_t side = 0; side < IW_SIDES; side++) {
@@ -179,8 +169,7 @@ static void watch_silence(iw_gateway_t *self, iw_time_us_t now_us)
     }
 }
 
-static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us)
-{
+static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t waiting_us = iw_outbox_waiting_us(&self->sender.outbox);
     if (waiting_us == IW_NEVER || now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
         return;
@@ -192,13 +181,11 @@ static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us)
     }
 }
 
-static iw_ledger_item_t sign_item(size_t side)
-{
+static iw_ledger_item_t sign_item(size_t side) {
     return (side == IW_LEFT) ? IW_LEDGER_FEEDBACK_SIGN_LEFT : IW_LEDGER_FEEDBACK_SIGN_RIGHT;
 }
 
-static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s)
-{
+static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s) {
     iw_follow_t *const follow = &self->follow[side];
     const int32_t measured_mm_s = iw_wheel_speed_mm_s(&self->wheel[side]);
     const uint32_t detail = (uint32_t)((measured_mm_s < 0) ? -measured_mm_s : measured_mm_s);
@@ -222,8 +209,7 @@ static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, i
     }
 }
 
-static void watch_wheels(iw_gateway_t *self, iw_time_us_t now_us)
-{
+static void watch_wheels(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
     const bool ours = self->permit.state == IW_STATE_ARMED || self->permit.state == IW_STATE_STOPPING;
     for (size_t side = 0; side < IW_SIDES; side++) {
@@ -235,13 +221,12 @@ static void watch_wheels(iw_gateway_t *self, iw_time_us_t now_us)
     }
 }
 
-static bool both_at_rest(const iw_gateway_t *self, iw_time_us_t now_us, uint32_t for_us)
-{
-    return iw_wheel_at_rest(&self->wheel[IW_LEFT], now_us, for_us) && iw_wheel_at_rest(&self->wheel[IW_RIGHT], now_us, for_us);
+static bool both_at_rest(const iw_gateway_t *self, iw_time_us_t now_us, uint32_t for_us) {
+    return iw_wheel_at_rest(&self->wheel[IW_LEFT], now_us, for_us) &&
+           iw_wheel_at_rest(&self->wheel[IW_RIGHT], now_us, for_us);
 }
 
-void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us)
-{
+void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_permit_view_t view;
     if (!self->stalled) {
         watch_echo(self, now_us);
@@ -260,8 +245,7 @@ void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us)
 }
 
 /// Takes the pair that is due and sends it. What the port does not take whole is followed by zero.
-static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us)
-{
+static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
     const bool zero = iw_setpoint_next_is_zero(&self->setpoint);
     iw_pair_t pair;
     if (!iw_setpoint_due(&self->setpoint, now_us) || !iw_sender_ready(&self->sender, zero)) {
@@ -275,8 +259,7 @@ static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us)
     return result;
 }
 
-void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us)
-{
+void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_demand_t demand = iw_permit_demand(&self->permit);
     iw_setpoint_demand(&self->setpoint, now_us, demand);
     if (demand == IW_DEMAND_SILENCE) {
@@ -293,15 +276,14 @@ void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us)
     }
 }
 
-static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b)
-{
+static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {
     return (a < b) ? a : b;
 }
 
-iw_time_us_t iw_cycle_next_us(const iw_gateway_t *self, iw_time_us_t now_us)
-{
+iw_time_us_t iw_cycle_next_us(const iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t due_us = iw_setpoint_next_us(&self->setpoint);
-    iw_time_us_t next_us = sooner(now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));
+    iw_time_us_t next_us =
+        sooner(now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));
     if (self->backlog) {
         return now_us;
     }

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/follow.h"
 
-void iw_follow_init(iw_follow_t *self, const iw_config_t *config)
-{
+void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
     self->config = config;
     iw_follow_restart(self);
 }
 
-void iw_follow_restart(iw_follow_t *self)
-{
+void iw_follow_restart(iw_follow_t *self) {
     self->sign_since_us = IW_NEVER;
     self->over_since_us = IW_NEVER;
     self->blocked_since_us = IW_NEVER;
@@ -16,8 +14,7 @@ void iw_follow_restart(iw_follow_t *self)
 }
 
 /// Keeps the start of a condition; true once it has held without a break for `for_us`.
-static bool lasts(iw_time_us_t *since_us, iw_time_us_t now_us, bool holds, uint32_t for_us)
-{
+static bool lasts(iw_time_us_t *since_us, iw_time_us_t now_us, bool holds, uint32_t for_us) {
     if (!holds) {
         *since_us = IW_NEVER;
         return false;
@@ -28,16 +25,16 @@ static bool lasts(iw_time_us_t *since_us, iw_time_us_t now_us, bool holds, uint3
     return now_us - *since_us >= for_us;
 }
 
-iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32_t applied_mm_s, int32_t measured_mm_s)
-{
+iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32_t applied_mm_s,
+                                   int32_t measured_mm_s) {
     const iw_config_t *const config = self->config;
     const int32_t applied = (applied_mm_s < 0) ? -applied_mm_s : applied_mm_s;
     const int32_t measured = (measured_mm_s < 0) ? -measured_mm_s : measured_mm_s;
     const bool clear = applied > IW_FOLLOW_SIGN_MM_S && measured > IW_FOLLOW_SIGN_MM_S;
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);
     const int32_t progress = same ? measured : 0;
-    const bool stuck = applied >= IW_FOLLOW_BLOCKED_MIN_MM_S &&
-                       (int64_t)progress * 100 < (int64_t)applied * IW_FOLLOW_BLOCKED_PERCENT;
+    const bool stuck =
+        applied >= IW_FOLLOW_BLOCKED_MIN_MM_S && (int64_t)progress * 100 < (int64_t)applied * IW_FOLLOW_BLOCKED_PERCENT;
     const bool sign = lasts(&self->sign_since_us, now_us, clear && !same, IW_FOLLOW_SIGN_US);
     const bool over = lasts(&self->over_since_us, now_us, measured > applied + (int32_t)config->follow_mm_s,
                             (uint32_t)config->follow_ms * IW_US_PER_MS);
@@ -52,7 +49,6 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
     return blocked ? IW_FOLLOW_BLOCKED : IW_FOLLOW_OK;
 }
 
-bool iw_follow_sign_confirmed(const iw_follow_t *self, iw_time_us_t now_us)
-{
+bool iw_follow_sign_confirmed(const iw_follow_t *self, iw_time_us_t now_us) {
     return self->agree_since_us != IW_NEVER && now_us - self->agree_since_us >= IW_FOLLOW_SIGN_US;
 }

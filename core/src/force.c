@@ -14,25 +14,21 @@
 #define REMOVED_PERCENT 30
 
 IW_STATIC_ASSERT(IW_FORCE_WINDOW_SAMPLES <= UINT8_MAX, ring_index_fits);
-IW_STATIC_ASSERT((uint64_t)SPREAD_MAX * SPREAD_MAX * IW_FORCE_WINDOW_SAMPLES <= UINT32_MAX, spread_fits);
+IW_STATIC_ASSERT((uint64_t)SPREAD_MAX *SPREAD_MAX *IW_FORCE_WINDOW_SAMPLES <= UINT32_MAX, spread_fits);
 
-static int32_t scale_mN(const iw_force_t *self)
-{
+static int32_t scale_mN(const iw_force_t *self) {
     return (self->config->force_unit[self->side] == IW_FORCE_CN) ? 10 : 100;
 }
 
-static bool saturated(int16_t raw)
-{
+static bool saturated(int16_t raw) {
     return raw == INT16_MIN || raw == INT16_MAX;
 }
 
-static int32_t magnitude(int32_t value)
-{
+static int32_t magnitude(int32_t value) {
     return (value < 0) ? -value : value;
 }
 
-void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side)
-{
+void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side) {
     memset(self, 0, sizeof *self);
     self->config = config;
     self->side = side;
@@ -40,8 +36,7 @@ void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side)
     self->offset_us = IW_NEVER;
 }
 
-void iw_force_reopen(iw_force_t *self, bool boot_seen)
-{
+void iw_force_reopen(iw_force_t *self, bool boot_seen) {
     self->boot_seen = boot_seen;
     self->count = 0;
     self->still = 0;
@@ -54,8 +49,7 @@ void iw_force_reopen(iw_force_t *self, bool boot_seen)
     }
 }
 
-void iw_force_restore(iw_force_t *self, int32_t offset_mN)
-{
+void iw_force_restore(iw_force_t *self, int32_t offset_mN) {
     if (self->provenance <= IW_OFFSET_STORED) {
         self->provenance = IW_OFFSET_STORED;
         self->offset_mN = offset_mN;
@@ -63,15 +57,13 @@ void iw_force_restore(iw_force_t *self, int32_t offset_mN)
     }
 }
 
-static void adopt(iw_force_t *self, iw_time_us_t now_us, iw_offset_provenance_t provenance, int32_t offset_mN)
-{
+static void adopt(iw_force_t *self, iw_time_us_t now_us, iw_offset_provenance_t provenance, int32_t offset_mN) {
     self->provenance = provenance;
     self->offset_mN = offset_mN;
     self->offset_us = now_us;
 }
 
-static uint32_t square_root(uint32_t value)
-{
+static uint32_t square_root(uint32_t value) {
     uint32_t root = 0;
     for (uint32_t bit = 1U << 15; bit != 0U; bit >>= 1) {
         if ((root | bit) * (root | bit) <= value) {
@@ -81,8 +73,7 @@ static uint32_t square_root(uint32_t value)
     return root;
 }
 
-static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw)
-{
+static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
     const uint32_t scale = (uint32_t)scale_mN(self);
     uint32_t sum = 0;
     for (size_t i = 0; i < self->count; i++) {
@@ -95,8 +86,7 @@ static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw)
 }
 
 /// What the full ring holds. The oldest sample stands at `next`.
-static iw_force_quality_t measure(const iw_force_t *self)
-{
+static iw_force_quality_t measure(const iw_force_t *self) {
     const int32_t scale = scale_mN(self);
     iw_force_quality_t quality = {0, 0, 0, self->count, IW_WINDOW_GOOD};
     int32_t sum[2] = {0, 0};
@@ -121,14 +111,12 @@ static iw_force_quality_t measure(const iw_force_t *self)
     return quality;
 }
 
-static bool far_from_offset(const iw_force_t *self, int32_t mean_mN)
-{
+static bool far_from_offset(const iw_force_t *self, int32_t mean_mN) {
     return magnitude(mean_mN - self->offset_mN) > (int32_t)IW_FORCE_LOADED_mN;
 }
 
 /// Raw over offset at rest is 10, 1 or 0: exactly one of them must fit.
-static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN)
-{
+static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN) {
     const int32_t offset = magnitude(offset_dN);
     const bool fits_cn = magnitude(mean_raw - 10 * offset_dN) * 100 <= 10 * offset * EVIDENCE_PERCENT;
     const bool fits_dn = magnitude(mean_raw - offset_dN) * 100 <= offset * EVIDENCE_PERCENT;
@@ -143,8 +131,7 @@ static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN)
 }
 
 /// Compares our own mean with the wheel's offset, once there are both and the window was good.
-static void judge_evidence(iw_force_t *self)
-{
+static void judge_evidence(iw_force_t *self) {
     const int32_t offset_dN = self->wheel_offset_dN;
     const int32_t mean_raw = self->quality.mean_mN / scale_mN(self);
     if (!self->wheel_offset_heard || self->quality.window != IW_WINDOW_GOOD) {
@@ -159,8 +146,7 @@ static void judge_evidence(iw_force_t *self)
 }
 
 /// Puts the wheel's own offset in force, unless we saw it being measured under load.
-static void settle(iw_force_t *self, iw_time_us_t now_us)
-{
+static void settle(iw_force_t *self, iw_time_us_t now_us) {
     const bool trusted = !self->boot_seen || self->quality.window == IW_WINDOW_GOOD;
     judge_evidence(self);
     if (self->wheel_offset_heard && trusted && self->provenance < IW_OFFSET_OPERATOR) {
@@ -168,8 +154,7 @@ static void settle(iw_force_t *self, iw_time_us_t now_us)
     }
 }
 
-static void judge_window(iw_force_t *self, iw_time_us_t now_us)
-{
+static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
     self->quality = measure(self);
     const bool known = self->provenance == IW_OFFSET_STORED || self->provenance == IW_OFFSET_OPERATOR;
     if (self->quality.window == IW_WINDOW_GOOD && known && far_from_offset(self, self->quality.mean_mN)) {
@@ -181,8 +166,7 @@ static void judge_window(iw_force_t *self, iw_time_us_t now_us)
     settle(self, now_us);
 }
 
-void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still)
-{
+void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still) {
     if (self->raw_us == IW_NEVER || now_us - self->raw_us >= IW_FORCE_STALE_US) {
         self->count = 0;
         self->still = 0;
@@ -201,15 +185,13 @@ void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool stil
     }
 }
 
-void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN)
-{
+void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN) {
     self->wheel_offset_dN = offset_dN;
     self->wheel_offset_heard = true;
     settle(self, now_us);
 }
 
-iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us)
-{
+iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
     if (self->count < IW_FORCE_WINDOW_SAMPLES || now_us - self->raw_us >= IW_FORCE_STALE_US) {
         return IW_TARE_NO_FORCE;
     }
@@ -228,15 +210,12 @@ iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us)
     return IW_TARE_OK;
 }
 
-static bool unit_contradicted(const iw_force_t *self)
-{
-    const iw_unit_evidence_t other =
-        (self->config->force_unit[self->side] == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
+static bool unit_contradicted(const iw_force_t *self) {
+    const iw_unit_evidence_t other = (self->config->force_unit[self->side] == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
     return self->evidence == other;
 }
 
-iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_us)
-{
+iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_us) {
     if (self->raw_us == IW_NEVER || now_us - self->raw_us >= IW_FORCE_STALE_US) {
         return IW_FORCE_NOT_HEARD;
     }
@@ -258,12 +237,10 @@ iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_u
     return IW_FORCE_VALID;
 }
 
-int32_t iw_force_raw_mN(const iw_force_t *self)
-{
+int32_t iw_force_raw_mN(const iw_force_t *self) {
     return self->raw * scale_mN(self);
 }
 
-int32_t iw_force_net_mN(const iw_force_t *self)
-{
+int32_t iw_force_net_mN(const iw_force_t *self) {
     return iw_force_raw_mN(self) - self->offset_mN;
 }

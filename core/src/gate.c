@@ -3,27 +3,23 @@
 
 #include <string.h>
 
-void iw_gate_init(iw_gate_t *self, const iw_config_t *config)
-{
+void iw_gate_init(iw_gate_t *self, const iw_config_t *config) {
     memset(self, 0, sizeof *self);
     self->config = config;
 }
 
-static uint32_t magnitude(int32_t value)
-{
+static uint32_t magnitude(int32_t value) {
     return (uint32_t)((value < 0) ? -value : value);
 }
 
 /// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
-static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us)
-{
+static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us) {
     const uint32_t elapsed = (elapsed_us < IW_GATE_ELAPSED_MAX_US) ? (uint32_t)elapsed_us : IW_GATE_ELAPSED_MAX_US;
     const uint32_t change_um_s = slope_mm_s2 * (elapsed / 1000U) + slope_mm_s2 * (elapsed % 1000U) / 1000U;
     return 1U + change_um_s / 1000U;
 }
 
-static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s)
-{
+static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s) {
     const int32_t last_mm_s = self->last_mm_s[side];
     const uint32_t from = magnitude(last_mm_s);
     const uint32_t to = magnitude(speed_mm_s);
@@ -34,21 +30,20 @@ static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_
                        : from - to <= allowance(self->config->decel_mm_s2, elapsed_us);
 }
 
-static bool is_zero(const iw_config_t *config, const iw_proto_setpoint_t *setpoint)
-{
+static bool is_zero(const iw_config_t *config, const iw_proto_setpoint_t *setpoint) {
     return setpoint->speed_mm_s == 0 && (config->current_role == IW_ROLE_LIMIT || setpoint->current_mA == 0);
 }
 
 static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame,
-                               const iw_proto_message_t *message)
-{
+                               const iw_proto_message_t *message) {
     const iw_config_t *const config = self->config;
     const iw_proto_setpoint_t *const setpoint = &message->as.setpoint;
     const iw_time_us_t elapsed_us = now_us - self->last_us[message->side];
     if (message->kind != IW_PROTO_SETPOINT || frame->dlc != config->setpoint_dlc) {
         return IW_GATE_NOT_A_SETPOINT;
     }
-    if (!config->setpoint_type_set || config->current_role == IW_ROLE_UNSET || setpoint->type != config->setpoint_type) {
+    if (!config->setpoint_type_set || config->current_role == IW_ROLE_UNSET ||
+        setpoint->type != config->setpoint_type) {
         return IW_GATE_TYPE;
     }
     if (magnitude(setpoint->current_mA) > config->max_current_mA ||
@@ -64,8 +59,7 @@ static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, const
     return IW_GATE_PASS;
 }
 
-iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame)
-{
+iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     iw_proto_message_t message;
     iw_gate_verdict_t verdict = IW_GATE_NOT_A_SETPOINT;
     if (iw_proto_decode(frame, &message) == IW_OK) {

@@ -6,8 +6,7 @@
 #include <string.h>
 
 /// Where each assumption comes from before anything is measured.
-static void assume(iw_gateway_t *self)
-{
+static void assume(iw_gateway_t *self) {
     const iw_config_t *const config = &self->config;
     iw_ledger_t *const ledger = &self->ledger;
     iw_ledger_init(ledger);
@@ -25,8 +24,8 @@ static void assume(iw_gateway_t *self)
     }
 }
 
-iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal, iw_time_us_t now_us, bool restarted)
-{
+iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal,
+                                  iw_time_us_t now_us, bool restarted) {
     const iw_config_fault_t fault = iw_config_check(config);
     if (fault != IW_CONFIG_OK) {
         return fault;
@@ -48,8 +47,7 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     return IW_CONFIG_OK;
 }
 
-iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us)
-{
+iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_cycle_begin(self, now_us);
     iw_cycle_receive(self, now_us);
     iw_cycle_judge(self, now_us);
@@ -58,13 +56,11 @@ iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us)
     return self->promised_us;
 }
 
-void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts)
-{
+void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts) {
     self->facts = *facts;
 }
 
-iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover)
-{
+iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     const iw_refusal_t refusal = iw_permit_arm(&self->permit, now_us, client, takeover);
     if (self->permit.arming) {
         iw_setpoint_hasten(&self->setpoint, now_us);
@@ -72,24 +68,20 @@ iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t
     return refusal;
 }
 
-bool iw_gateway_arming(const iw_gateway_t *self)
-{
+bool iw_gateway_arming(const iw_gateway_t *self) {
     return self->permit.arming;
 }
 
-iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self)
-{
+iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self) {
     return self->permit.arm_refusal;
 }
 
-static int32_t magnitude(int32_t value)
-{
+static int32_t magnitude(int32_t value) {
     return (value < 0) ? -value : value;
 }
 
 /// Both values by one factor, so that the larger is `limit`. True if they had to be.
-static bool scale_pair(int32_t values[IW_SIDES], int32_t limit)
-{
+static bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
     const int32_t left = magnitude(values[IW_LEFT]);
     const int32_t right = magnitude(values[IW_RIGHT]);
     const int32_t largest = (left > right) ? left : right;
@@ -101,29 +93,28 @@ static bool scale_pair(int32_t values[IW_SIDES], int32_t limit)
     return true;
 }
 
-static bool drive_in_range(const iw_config_t *config, const iw_drive_t *request)
-{
+static bool drive_in_range(const iw_config_t *config, const iw_drive_t *request) {
     const int32_t lowest_mA = (config->current_role == IW_ROLE_SETPOINT) ? -IW_CURRENT_LIMIT_mA : 0;
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (request->speed_mm_s[side] < INT16_MIN || request->speed_mm_s[side] > INT16_MAX) {
             return false;
         }
-        if (request->has_current && (request->current_mA[side] < lowest_mA || request->current_mA[side] > IW_CURRENT_LIMIT_mA)) {
+        if (request->has_current &&
+            (request->current_mA[side] < lowest_mA || request->current_mA[side] > IW_CURRENT_LIMIT_mA)) {
             return false;
         }
     }
     return true;
 }
 
-static bool drive_nonzero(const iw_config_t *config, const iw_drive_t *request)
-{
+static bool drive_nonzero(const iw_config_t *config, const iw_drive_t *request) {
     const bool speed = request->speed_mm_s[IW_LEFT] != 0 || request->speed_mm_s[IW_RIGHT] != 0;
-    const bool current = request->has_current && (request->current_mA[IW_LEFT] != 0 || request->current_mA[IW_RIGHT] != 0);
+    const bool current =
+        request->has_current && (request->current_mA[IW_LEFT] != 0 || request->current_mA[IW_RIGHT] != 0);
     return speed || (current && config->current_role == IW_ROLE_SETPOINT);
 }
 
-static iw_applied_t limit_drive(const iw_config_t *config, const iw_drive_t *request)
-{
+static iw_applied_t limit_drive(const iw_config_t *config, const iw_drive_t *request) {
     iw_drive_t drive = *request;
     iw_applied_t applied;
     if (!drive.has_current) {
@@ -140,8 +131,7 @@ static iw_applied_t limit_drive(const iw_config_t *config, const iw_drive_t *req
 }
 
 iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, const iw_drive_t *request,
-                              iw_applied_t *out_applied)
-{
+                              iw_applied_t *out_applied) {
     const iw_config_t *const config = &self->config;
     const bool nonzero = drive_nonzero(config, request);
     const bool in_range = drive_in_range(config, request);
@@ -160,32 +150,26 @@ iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t now_us, iw_client
     return refusal;
 }
 
-void iw_gateway_stop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause)
-{
+void iw_gateway_stop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause) {
     iw_permit_stop(&self->permit, now_us, client, cause);
 }
 
-void iw_gateway_estop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client)
-{
+void iw_gateway_estop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client) {
     iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_SOFTWARE, IW_SIDES_NONE, client);
 }
 
-iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us)
-{
+iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us) {
     return iw_permit_reset(&self->permit, now_us);
 }
 
-void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client)
-{
+void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client) {
     iw_permit_disconnect(&self->permit, now_us, client);
 }
 
-iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side)
-{
+iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
     return iw_force_tare(&self->force[side], now_us);
 }
 
-iw_state_t iw_gateway_state(const iw_gateway_t *self)
-{
+iw_state_t iw_gateway_state(const iw_gateway_t *self) {
     return self->permit.state;
 }

@@ -4,20 +4,20 @@
 #include <string.h>
 
 static const iw_ledger_item_t documented[] = {
-    IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_OFFSET_INCLUDED,
-    IW_LEDGER_WHEEL_RADIUS,    IW_LEDGER_DLC,
+    IW_LEDGER_FORCE_UNIT_LEFT,
+    IW_LEDGER_FORCE_UNIT_RIGHT,
+    IW_LEDGER_OFFSET_INCLUDED,
+    IW_LEDGER_WHEEL_RADIUS,
 };
 
-void iw_ledger_init(iw_ledger_t *self)
-{
+void iw_ledger_init(iw_ledger_t *self) {
     memset(self, 0, sizeof *self);
     for (size_t i = 0; i < sizeof documented / sizeof documented[0]; i++) {
         self->entry[documented[i]].evidence = IW_EVIDENCE_DOCUMENT;
     }
 }
 
-static void change(iw_ledger_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *next)
-{
+static void change(iw_ledger_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *next) {
     iw_ledger_entry_t *const entry = &self->entry[item];
     if (entry->state != next->state || entry->evidence != next->evidence || entry->figure != next->figure) {
         *entry = *next;
@@ -25,16 +25,14 @@ static void change(iw_ledger_t *self, iw_ledger_item_t item, const iw_ledger_ent
     }
 }
 
-void iw_ledger_assume(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence)
-{
+void iw_ledger_assume(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence) {
     if (self->entry[item].state == IW_LEDGER_ASSUMED) {
         const iw_ledger_entry_t next = {IW_LEDGER_ASSUMED, evidence, 0};
         change(self, item, &next);
     }
 }
 
-void iw_ledger_confirm(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure)
-{
+void iw_ledger_confirm(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure) {
     const iw_ledger_entry_t next = {IW_LEDGER_CONFIRMED, evidence, figure};
     const iw_ledger_entry_t *const entry = &self->entry[item];
     const bool settled = entry->state == IW_LEDGER_CONTRADICTED || entry->evidence == IW_EVIDENCE_OPERATOR;
@@ -43,13 +41,11 @@ void iw_ledger_confirm(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t e
     }
 }
 
-void iw_ledger_contradict(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure)
-{
+void iw_ledger_contradict(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure) {
     const iw_ledger_entry_t next = {IW_LEDGER_CONTRADICTED, evidence, figure};
     change(self, item, &next);
 }
 
-const iw_ledger_entry_t *iw_ledger_entry(const iw_ledger_t *self, iw_ledger_item_t item)
-{
+const iw_ledger_entry_t *iw_ledger_entry(const iw_ledger_t *self, iw_ledger_item_t item) {
     return &self->entry[item];
 }

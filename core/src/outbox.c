@@ -3,14 +3,12 @@
 
 #include <string.h>
 
-void iw_outbox_init(iw_outbox_t *self)
-{
+void iw_outbox_init(iw_outbox_t *self) {
     memset(self, 0, sizeof *self);
     iw_outbox_clear(self);
 }
 
-void iw_outbox_clear(iw_outbox_t *self)
-{
+void iw_outbox_clear(iw_outbox_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->pending[side] = 0;
         self->waiting_us[side] = IW_NEVER;
@@ -18,13 +16,11 @@ void iw_outbox_clear(iw_outbox_t *self)
     }
 }
 
-bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero)
-{
+bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero) {
     return self->pending[side] < (zero ? 2U : 1U);
 }
 
-void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, bool accepted)
-{
+void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, bool accepted) {
     if (self->waiting_us[side] == IW_NEVER) {
         self->waiting_us[side] = now_us;
     }
@@ -34,8 +30,7 @@ void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, bool
     }
 }
 
-void iw_outbox_echo(iw_outbox_t *self, iw_side_t side)
-{
+void iw_outbox_echo(iw_outbox_t *self, iw_side_t side) {
     if (self->pending[side] == 0U) {
         self->stray++;
         return;
@@ -46,13 +41,11 @@ void iw_outbox_echo(iw_outbox_t *self, iw_side_t side)
     self->waiting_us[side] = (self->pending[side] > 0U) ? self->sent_us[side][0] : IW_NEVER;
 }
 
-bool iw_outbox_proven_since(const iw_outbox_t *self, iw_time_us_t since_us)
-{
+bool iw_outbox_proven_since(const iw_outbox_t *self, iw_time_us_t since_us) {
     return self->proven_us[IW_LEFT] >= since_us && self->proven_us[IW_RIGHT] >= since_us;
 }
 
-iw_time_us_t iw_outbox_waiting_us(const iw_outbox_t *self)
-{
+iw_time_us_t iw_outbox_waiting_us(const iw_outbox_t *self) {
     const iw_time_us_t left = self->waiting_us[IW_LEFT];
     const iw_time_us_t right = self->waiting_us[IW_RIGHT];
     return (left < right) ? left : right;

@@ -12,13 +12,11 @@
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
 
 /// True if the configuration allows sending at all.
-static bool may_send(const iw_config_t *config)
-{
+static bool may_send(const iw_config_t *config) {
     return !config->listen_only && config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
-void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted)
-{
+void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted) {
     memset(self, 0, sizeof *self);
     self->config = config;
     self->stale_us = IW_NEVER;
@@ -38,23 +36,19 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
 }
 
 /// Sending zeros for a process that died: nothing but those is ours yet, so faults are remembered only.
-static bool restarting(const iw_permit_t *self)
-{
+static bool restarting(const iw_permit_t *self) {
     return self->state == IW_STATE_STOPPING && self->stop.cause == IW_CAUSE_RESTART;
 }
 
-static bool within(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us)
-{
+static bool within(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us) {
     return then_us != IW_NEVER && now_us - then_us < span_us;
 }
 
-static iw_time_us_t lease_us(const iw_permit_t *self)
-{
+static iw_time_us_t lease_us(const iw_permit_t *self) {
     return (iw_time_us_t)self->config->lease_ms * IW_US_PER_MS;
 }
 
-static iw_refusal_t refusal_for(iw_cause_t cause)
-{
+static iw_refusal_t refusal_for(iw_cause_t cause) {
     switch (cause) {
     case IW_CAUSE_ESTOP_LINE:
         return IW_REFUSE_ESTOP_PRESSED;
@@ -71,8 +65,7 @@ static iw_refusal_t refusal_for(iw_cause_t cause)
     }
 }
 
-uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us)
-{
+uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us) {
     uint32_t present = (self->present | self->raised) & LEVELS;
     for (uint32_t cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL; cause++) {
         if ((BIT(cause) & LEVELS) == 0U && within(now_us, self->seen_us[cause], IW_PERMIT_EVENT_US)) {
@@ -83,8 +76,7 @@ uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us)
 }
 
 /// The most telling of the causes present, as a refusal.
-static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us)
-{
+static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us) {
     const uint32_t present = iw_permit_present(self, now_us);
     for (uint32_t cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL; cause++) {
         if ((present & BIT(cause)) != 0U) {
@@ -94,13 +86,11 @@ static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us)
     return IW_REFUSE_NONE;
 }
 
-static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us)
-{
+static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
     return within(now_us, self->stale_us, IW_PERMIT_STALE_US);
 }
 
-static void end_arming(iw_permit_t *self, iw_refusal_t refusal)
-{
+static void end_arming(iw_permit_t *self, iw_refusal_t refusal) {
     if (self->arming) {
         self->arming = false;
         self->arm_refusal = refusal;
@@ -109,8 +99,7 @@ static void end_arming(iw_permit_t *self, iw_refusal_t refusal)
 }
 
 /// Writes down why the wheels stop, as long as it is still known what they were told.
-static void record_stop(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail)
-{
+static void record_stop(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     iw_stop_t *const stop = &self->stop;
     stop->at_us = now_us;
     stop->number++;
@@ -123,8 +112,7 @@ static void record_stop(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause
     stop->latched = false;
 }
 
-static void enter_stopping(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail)
-{
+static void enter_stopping(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     record_stop(self, now_us, cause, sides, detail);
     self->state = IW_STATE_STOPPING;
     self->cut = cause == IW_CAUSE_LOOP_LATE;
@@ -132,8 +120,7 @@ static void enter_stopping(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t ca
     self->holder = IW_CLIENT_NONE;
 }
 
-static void enter_latched(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail)
-{
+static void enter_latched(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     const bool was_sending = self->state != IW_STATE_LISTENING || self->arming;
     record_stop(self, now_us, cause, sides, detail);
     self->stop.latched = true;
@@ -144,16 +131,14 @@ static void enter_latched(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cau
     self->holder = IW_CLIENT_NONE;
 }
 
-static bool latches(const iw_permit_t *self, iw_cause_t cause)
-{
+static bool latches(const iw_permit_t *self, iw_cause_t cause) {
     if ((BIT(cause) & LATCHING_ALWAYS) != 0U) {
         return true;
     }
     return cause < IW_CAUSE_LOOP_LATE && self->state != IW_STATE_LISTENING && !restarting(self);
 }
 
-void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail)
-{
+void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     self->raised |= BIT(cause);
     if (cause < IW_CAUSE_LOOP_LATE) {
         self->seen_us[cause] = now_us;
@@ -173,8 +158,7 @@ void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, u
     }
 }
 
-static void step_arming(iw_permit_t *self, iw_time_us_t now_us)
-{
+static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     const iw_time_us_t limit_us = (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
     const iw_time_us_t waited_us = now_us - self->arming_us;
     if (self->view.proven && waited_us <= limit_us) {
@@ -188,8 +172,7 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us)
 }
 
 /// True once zeros have been held for long enough and the wheels stand, or for as long as it makes sense.
-static bool hold_done(iw_permit_t *self, iw_time_us_t now_us)
-{
+static bool hold_done(iw_permit_t *self, iw_time_us_t now_us) {
     const iw_time_us_t zero_hold_us = (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS;
     if (self->hold_us == IW_NEVER) {
         if (!self->cut && !self->view.output_zero) {
@@ -205,8 +188,7 @@ static bool hold_done(iw_permit_t *self, iw_time_us_t now_us)
     return held_us >= zero_hold_us && (self->view.settled || restarting(self));
 }
 
-void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view_t *view)
-{
+void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view_t *view) {
     self->view = *view;
     self->present = self->raised;
     self->raised = 0;
@@ -222,8 +204,7 @@ void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view
     }
 }
 
-iw_demand_t iw_permit_demand(const iw_permit_t *self)
-{
+iw_demand_t iw_permit_demand(const iw_permit_t *self) {
     switch (self->state) {
     case IW_STATE_ARMED:
         return IW_DEMAND_FOLLOW;
@@ -238,8 +219,7 @@ iw_demand_t iw_permit_demand(const iw_permit_t *self)
 }
 
 /// What speaks against sending at all.
-static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
-{
+static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us) {
     const iw_refusal_t present = refuse_present(self, now_us);
     if (self->config->listen_only) {
         return IW_REFUSE_LISTEN_ONLY;
@@ -263,8 +243,7 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
 }
 
 /// What speaks against moving the lease to this client now.
-static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, bool takeover)
-{
+static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
     if (self->holder != IW_CLIENT_NONE && (!takeover || self->arming)) {
         return IW_REFUSE_BUSY;
     }
@@ -280,8 +259,7 @@ static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, b
     return IW_REFUSE_NONE;
 }
 
-iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover)
-{
+iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     if (self->holder == client) {
         return IW_REFUSE_NONE;
     }
@@ -303,8 +281,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
     return IW_REFUSE_NONE;
 }
 
-static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client)
-{
+static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
     const bool blocked = self->stop.cause == IW_CAUSE_WHEEL_BLOCKED && self->stop.client == client;
     switch (self->state) {
     case IW_STATE_LATCHED:
@@ -322,14 +299,12 @@ static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t now_us, i
     }
 }
 
-void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client)
-{
+void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
     self->stale_us = now_us;
     self->stale_client = client;
 }
 
-iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool nonzero)
-{
+iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool nonzero) {
     const iw_refusal_t refusal = refuse_drive(self, now_us, client);
     if (nonzero) {
         iw_permit_remember(self, now_us, client);
@@ -340,8 +315,7 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t
     return refusal;
 }
 
-void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause)
-{
+void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause) {
     if (self->state == IW_STATE_ARMED) {
         enter_stopping(self, now_us, cause, IW_SIDES_NONE, 0);
         self->stop.client = client;
@@ -349,8 +323,7 @@ void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, 
     end_arming(self, IW_REFUSE_NOT_ARMED);
 }
 
-void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client)
-{
+void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
     if (client != self->holder) {
         return;
     }
@@ -360,8 +333,7 @@ void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t cl
     end_arming(self, IW_REFUSE_NOT_ARMED);
 }
 
-iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us)
-{
+iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
     const iw_refusal_t present = refuse_present(self, now_us);
     if (self->state != IW_STATE_LATCHED) {
         return IW_REFUSE_NONE;
@@ -383,15 +355,15 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us)
     return IW_REFUSE_NONE;
 }
 
-iw_time_us_t iw_permit_next_us(const iw_permit_t *self)
-{
+iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {
     iw_time_us_t next_us = IW_NEVER;
     const bool held = (self->state == IW_STATE_STOPPING && !self->arming) || self->holding;
     if (self->state == IW_STATE_ARMED) {
         next_us = self->lease_until_us;
     } else if (held && self->hold_us != IW_NEVER) {
         const bool first = self->view.settled || restarting(self);
-        const iw_time_us_t span_us = first ? (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS : IW_PERMIT_HOLD_MAX_US;
+        const iw_time_us_t span_us =
+            first ? (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS : IW_PERMIT_HOLD_MAX_US;
         next_us = self->hold_us + span_us;
     }
     if (self->arming) {

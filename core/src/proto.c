@@ -6,10 +6,10 @@
 #include <string.h>
 
 #define FORMAT_BITS (IW_CAN_EXTENDED | IW_CAN_REMOTE | IW_CAN_ERROR | IW_CAN_FD)
-#define BATTERY 0
+#define BATTERY     0
 #define TEMPERATURE 1
-#define ODOMETRY 2
-#define CPU 6
+#define ODOMETRY    2
+#define CPU         6
 
 typedef struct {
     uint16_t id;
@@ -34,8 +34,7 @@ static const layout_t layouts[] = {
 };
 #define LAYOUTS (sizeof layouts / sizeof layouts[0])
 
-static const layout_t *find_id(uint32_t id)
-{
+static const layout_t *find_id(uint32_t id) {
     for (size_t i = 0; i < LAYOUTS; i++) {
         if (layouts[i].id == id) {
             return &layouts[i];
@@ -44,8 +43,7 @@ static const layout_t *find_id(uint32_t id)
     return NULL;
 }
 
-static const layout_t *find_message(iw_proto_kind_t kind, iw_side_t side)
-{
+static const layout_t *find_message(iw_proto_kind_t kind, iw_side_t side) {
     for (size_t i = 0; i < LAYOUTS; i++) {
         if (layouts[i].kind == (uint8_t)kind && layouts[i].side == (uint8_t)side) {
             return &layouts[i];
@@ -54,24 +52,21 @@ static const layout_t *find_message(iw_proto_kind_t kind, iw_side_t side)
     return NULL;
 }
 
-static void get_status(const uint8_t *data, iw_proto_status_t *out_status)
-{
+static void get_status(const uint8_t *data, iw_proto_status_t *out_status) {
     out_status->battery_dV = data[BATTERY];
     out_status->temperature_degC = data[TEMPERATURE];
     out_status->odometry_ticks = iw_be_get_i32(&data[ODOMETRY]);
     out_status->cpu_percent = data[CPU];
 }
 
-static void get_pose(const uint8_t *data, iw_proto_pose_t *out_pose)
-{
+static void get_pose(const uint8_t *data, iw_proto_pose_t *out_pose) {
     out_pose->x_mm = iw_be_get_i16(&data[0]);
     out_pose->y_mm = iw_be_get_i16(&data[2]);
     out_pose->z_mm = iw_be_get_i16(&data[4]);
     out_pose->psi_mrad = iw_be_get_i16(&data[6]);
 }
 
-iw_status_t iw_proto_decode(const iw_can_frame_t *frame, iw_proto_message_t *out_message)
-{
+iw_status_t iw_proto_decode(const iw_can_frame_t *frame, iw_proto_message_t *out_message) {
     const uint8_t *const data = frame->data;
     const layout_t *const layout = find_id(frame->id & ~FORMAT_BITS);
     if (layout == NULL) {
@@ -113,15 +108,14 @@ iw_status_t iw_proto_decode(const iw_can_frame_t *frame, iw_proto_message_t *out
     return IW_OK;
 }
 
-static void start_frame(iw_can_frame_t *out_frame, uint32_t id, uint8_t dlc)
-{
+static void start_frame(iw_can_frame_t *out_frame, uint32_t id, uint8_t dlc) {
     memset(out_frame, 0, sizeof *out_frame);
     out_frame->id = id;
     out_frame->dlc = dlc;
 }
 
-bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoint, uint8_t dlc, iw_can_frame_t *out_frame)
-{
+bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoint, uint8_t dlc,
+                              iw_can_frame_t *out_frame) {
     int16_t current_mA = setpoint->current_mA;
     if (current_mA > IW_CURRENT_LIMIT_mA) {
         current_mA = IW_CURRENT_LIMIT_mA;
@@ -136,24 +130,21 @@ bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoin
     return current_mA != setpoint->current_mA;
 }
 
-static void put_status(uint8_t *data, const iw_proto_status_t *status)
-{
+static void put_status(uint8_t *data, const iw_proto_status_t *status) {
     data[BATTERY] = status->battery_dV;
     data[TEMPERATURE] = status->temperature_degC;
     iw_be_put_i32(&data[ODOMETRY], status->odometry_ticks);
     data[CPU] = status->cpu_percent;
 }
 
-static void put_pose(uint8_t *data, const iw_proto_pose_t *pose)
-{
+static void put_pose(uint8_t *data, const iw_proto_pose_t *pose) {
     iw_be_put_i16(&data[0], pose->x_mm);
     iw_be_put_i16(&data[2], pose->y_mm);
     iw_be_put_i16(&data[4], pose->z_mm);
     iw_be_put_i16(&data[6], pose->psi_mrad);
 }
 
-iw_status_t iw_proto_encode(const iw_proto_message_t *message, iw_can_frame_t *out_frame)
-{
+iw_status_t iw_proto_encode(const iw_proto_message_t *message, iw_can_frame_t *out_frame) {
     uint8_t *const data = out_frame->data;
     const layout_t *const layout = find_message(message->kind, message->side);
     if (layout == NULL) {

@@ -3,8 +3,7 @@
 
 #include <string.h>
 
-void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t *hal)
-{
+void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t *hal) {
     memset(self, 0, sizeof *self);
     self->config = config;
     self->hal = hal;
@@ -13,16 +12,15 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
     iw_gate_init(&self->gate, config);
 }
 
-bool iw_sender_ready(const iw_sender_t *self, bool zero)
-{
+bool iw_sender_ready(const iw_sender_t *self, bool zero) {
     const bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
     const bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
     return zero ? left || right : left && right;
 }
 
 /// The frame for one wheel, in its own frame of reference. False, with the reason in `verdict`, if the gate stops it.
-static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_command_t *command, iw_can_frame_t *out_frame)
-{
+static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_command_t *command,
+                    iw_can_frame_t *out_frame) {
     const iw_config_t *const config = self->config;
     const bool invert = config->invert[side];
     iw_proto_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
@@ -38,16 +36,14 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
     return verdict == IW_GATE_PASS;
 }
 
-static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_can_frame_t *frame)
-{
+static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_can_frame_t *frame) {
     const bool accepted = self->hal->send(self->hal->context, frame) > 0;
     iw_outbox_sent(&self->outbox, side, now_us, accepted);
     self->later += accepted ? 0U : 1U;
     return accepted;
 }
 
-static void measure_gap(iw_sender_t *self, iw_time_us_t now_us)
-{
+static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
     const bool first = self->pair_us == IW_NEVER;
     self->gap_us = first ? 0U : (uint32_t)(now_us - self->pair_us);
     self->gap_max_us = (first || self->gap_us > self->gap_max_us) ? self->gap_us : self->gap_max_us;
@@ -55,8 +51,7 @@ static void measure_gap(iw_sender_t *self, iw_time_us_t now_us)
     self->pairs++;
 }
 
-iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero)
-{
+iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero) {
     iw_can_frame_t frame[IW_SIDES];
     bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
     bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
@@ -77,13 +72,11 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw
     return IW_SEND_DONE;
 }
 
-void iw_sender_rest(iw_sender_t *self)
-{
+void iw_sender_rest(iw_sender_t *self) {
     self->pair_us = IW_NEVER;
 }
 
-bool iw_sender_purge(iw_sender_t *self)
-{
+bool iw_sender_purge(iw_sender_t *self) {
     if (self->hal->purge(self->hal->context) <= 0) {
         return false;
     }

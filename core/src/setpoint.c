@@ -7,33 +7,30 @@
 
 /// Fractions are in 1/2^24: three digits of 8 bits each, so that 32-bit divisions suffice.
 #define FRACTION_BITS 24U
-#define FRACTION_ONE (1U << FRACTION_BITS)
+#define FRACTION_ONE  (1U << FRACTION_BITS)
 
 /// One of the quantities that ramp: where it is going in this step, and how far it may go.
 typedef struct {
     int32_t *value;
     uint32_t way;
-    bool forward;  ///< The way leads up.
-    bool braking;  ///< Towards zero.
+    bool forward; ///< The way leads up.
+    bool braking; ///< Towards zero.
     uint32_t fraction;
 } axis_t;
 
 #define AXES (2U * IW_SIDES)
 
-static uint32_t magnitude(int32_t value)
-{
+static uint32_t magnitude(int32_t value) {
     return (uint32_t)((value < 0) ? -value : value);
 }
 
-static iw_command_t zero_command(const iw_config_t *config)
-{
+static iw_command_t zero_command(const iw_config_t *config) {
     const int16_t full_mA = (int16_t)config->max_current_mA;
     const iw_command_t zero = {0, (config->current_role == IW_ROLE_LIMIT) ? full_mA : (int16_t)0};
     return zero;
 }
 
-static void clear(iw_setpoint_t *self)
-{
+static void clear(iw_setpoint_t *self) {
     memset(self->speed_um_s, 0, sizeof self->speed_um_s);
     memset(self->current_uA, 0, sizeof self->current_uA);
     self->from_zero = true;
@@ -41,8 +38,7 @@ static void clear(iw_setpoint_t *self)
     self->target.wheel[IW_RIGHT] = zero_command(self->config);
 }
 
-void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config)
-{
+void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config) {
     memset(self, 0, sizeof *self);
     self->config = config;
     self->last_us = IW_NEVER;
@@ -50,8 +46,7 @@ void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config)
     clear(self);
 }
 
-void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us)
-{
+void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us) {
     iw_time_us_t due_us = now_us;
     if (self->demand == IW_DEMAND_SILENCE) {
         return;
@@ -64,8 +59,7 @@ void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us)
     }
 }
 
-void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t demand)
-{
+void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t demand) {
     if (demand == self->demand) {
         return;
     }
@@ -84,13 +78,11 @@ void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t de
     }
 }
 
-static bool same_command(const iw_command_t *a, const iw_command_t *b)
-{
+static bool same_command(const iw_command_t *a, const iw_command_t *b) {
     return a->speed_mm_s == b->speed_mm_s && a->current_mA == b->current_mA;
 }
 
-void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair_t *target)
-{
+void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair_t *target) {
     const bool same = same_command(&self->target.wheel[IW_LEFT], &target->wheel[IW_LEFT]) &&
                       same_command(&self->target.wheel[IW_RIGHT], &target->wheel[IW_RIGHT]);
     if (self->demand == IW_DEMAND_FOLLOW && !same) {
@@ -99,22 +91,19 @@ void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair
     }
 }
 
-void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us)
-{
+void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us) {
     clear(self);
     if (self->demand != IW_DEMAND_SILENCE) {
         self->due_us = now_us + IW_SETPOINT_SPACING_US;
     }
 }
 
-bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us)
-{
+bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us) {
     return now_us >= self->due_us;
 }
 
 /// part / whole for part < whole < 2^24.
-static uint32_t fraction_of(uint32_t part, uint32_t whole)
-{
+static uint32_t fraction_of(uint32_t part, uint32_t whole) {
     uint32_t fraction = 0;
     uint32_t rest = part;
     for (uint32_t digit = 0; digit < FRACTION_BITS / 8U; digit++) {
@@ -126,15 +115,13 @@ static uint32_t fraction_of(uint32_t part, uint32_t whole)
 }
 
 /// slope x time in thousandths of the slope's unit. The time is at most a second: then every ramp has ended.
-static uint32_t ramp_step(uint32_t slope, iw_time_us_t elapsed_us)
-{
+static uint32_t ramp_step(uint32_t slope, iw_time_us_t elapsed_us) {
     const uint32_t us = (elapsed_us < IW_WHEEL_WATCHDOG_US) ? (uint32_t)elapsed_us : IW_WHEEL_WATCHDOG_US;
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
 }
 
 /// Where a quantity may go now: not past zero in one step.
-static axis_t plan(int32_t *value, int32_t target, uint32_t away, uint32_t towards)
-{
+static axis_t plan(int32_t *value, int32_t target, uint32_t away, uint32_t towards) {
     const bool through_zero = *value != 0 && (target > 0) != (*value > 0);
     const int32_t aim = through_zero ? 0 : target;
     axis_t axis = {value, magnitude(aim - *value), aim > *value, magnitude(aim) < magnitude(*value), FRACTION_ONE};
@@ -146,16 +133,14 @@ static axis_t plan(int32_t *value, int32_t target, uint32_t away, uint32_t towar
 }
 
 /// A speed step as the same share of the maximum current. `step` is at most the maximum speed in um/s.
-static uint32_t current_step(const iw_config_t *config, uint32_t step)
-{
+static uint32_t current_step(const iw_config_t *config, uint32_t step) {
     const uint32_t speed = config->max_speed_mm_s;
     const uint32_t capped = (step < speed * 1000U) ? step : speed * 1000U;
     return capped / speed * config->max_current_mA + capped % speed * config->max_current_mA / speed;
 }
 
 /// Moves all quantities by one common share of their ways; braking ones do not wait for accelerating ones.
-static void advance_together(const axis_t *axes)
-{
+static void advance_together(const axis_t *axes) {
     uint32_t braking = FRACTION_ONE;
     uint32_t all = FRACTION_ONE;
     for (size_t i = 0; i < AXES; i++) {
@@ -169,8 +154,7 @@ static void advance_together(const axis_t *axes)
     }
 }
 
-static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us)
-{
+static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us) {
     const iw_config_t *const config = self->config;
     const iw_time_us_t granted_us = 2U * (iw_time_us_t)config->period_ms * IW_US_PER_MS;
     const uint32_t away = ramp_step(config->accel_mm_s2, (elapsed_us < granted_us) ? elapsed_us : granted_us);
@@ -182,21 +166,19 @@ static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us)
     for (size_t side = 0; side < IW_SIDES; side++) {
         const iw_command_t *const target = &self->target.wheel[side];
         axes[2U * side] = plan(&self->speed_um_s[side], target->speed_mm_s * 1000, away, towards);
-        axes[2U * side + 1U] = plan(&self->current_uA[side], ramps_current ? target->current_mA * 1000 : 0,
-                                    current_away, current_towards);
+        axes[2U * side + 1U] =
+            plan(&self->current_uA[side], ramps_current ? target->current_mA * 1000 : 0, current_away, current_towards);
     }
     advance_together(axes);
 }
 
-static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us)
-{
+static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {
     const iw_time_us_t period_us = (iw_time_us_t)self->config->period_ms * IW_US_PER_MS;
     const iw_time_us_t next_us = self->due_us + period_us;
     return (next_us >= now_us + IW_SETPOINT_SPACING_US) ? next_us : now_us + period_us;
 }
 
-void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_pair)
-{
+void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_pair) {
     if (!self->from_zero) {
         advance(self, now_us - self->last_us);
     }
@@ -206,8 +188,7 @@ void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_p
     *out_pair = iw_setpoint_applied(self);
 }
 
-iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self)
-{
+iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self) {
     iw_pair_t pair;
     for (size_t side = 0; side < IW_SIDES; side++) {
         pair.wheel[side].speed_mm_s = (int16_t)(self->speed_um_s[side] / 1000);
@@ -218,18 +199,15 @@ iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self)
     return pair;
 }
 
-static bool all_zero(const int32_t *values)
-{
+static bool all_zero(const int32_t *values) {
     return values[IW_LEFT] == 0 && values[IW_RIGHT] == 0;
 }
 
-bool iw_setpoint_is_zero(const iw_setpoint_t *self)
-{
+bool iw_setpoint_is_zero(const iw_setpoint_t *self) {
     return all_zero(self->speed_um_s) && all_zero(self->current_uA);
 }
 
-bool iw_setpoint_next_is_zero(const iw_setpoint_t *self)
-{
+bool iw_setpoint_next_is_zero(const iw_setpoint_t *self) {
     const iw_command_t *const left = &self->target.wheel[IW_LEFT];
     const iw_command_t *const right = &self->target.wheel[IW_RIGHT];
     const bool limit = self->config->current_role == IW_ROLE_LIMIT;
@@ -238,7 +216,6 @@ bool iw_setpoint_next_is_zero(const iw_setpoint_t *self)
     return iw_setpoint_is_zero(self) && (self->from_zero || (speeds && currents));
 }
 
-iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self)
-{
+iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self) {
     return self->due_us;
 }

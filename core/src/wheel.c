@@ -5,18 +5,16 @@
 
 /// 2 pi / 60 in millionths: nanometres of circumference per tick (or of speed per rpm) and millimetre of radius.
 #define NM_PER_TICK_AND_MM 104720U
-#define FASTEST_NM_PER_US (IW_WHEEL_FASTEST_MM_S)
+#define FASTEST_NM_PER_US  (IW_WHEEL_FASTEST_MM_S)
 
 /// mm/s are nm/us.
 IW_STATIC_ASSERT(FASTEST_NM_PER_US == 10000U, one_mm_per_s_is_one_nm_per_us);
 
-static uint32_t silent_us(const iw_wheel_t *self)
-{
+static uint32_t silent_us(const iw_wheel_t *self) {
     return (uint32_t)self->config->wheel_silent_ms * IW_US_PER_MS;
 }
 
-void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us)
-{
+void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us) {
     const uint32_t nm_per_rpm = NM_PER_TICK_AND_MM * config->radius_mm;
     memset(self, 0, sizeof *self);
     self->config = config;
@@ -33,8 +31,7 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
     self->us_per_tick_min = self->nm_per_tick / FASTEST_NM_PER_US;
 }
 
-static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence)
-{
+static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence) {
     self->pending_reboot = evidence;
     self->reboots++;
     self->first_us = now_us;
@@ -43,8 +40,7 @@ static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence
 }
 
 /// Any frame of the wheel: was it away for so long that it may have been without power?
-static void note_presence(iw_wheel_t *self, iw_time_us_t now_us)
-{
+static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
     const bool was_away = now_us - self->any_us >= IW_WHEEL_REBOOT_SILENCE_US;
     self->any_us = now_us;
     if (self->first_us == IW_NEVER) {
@@ -55,8 +51,7 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us)
     }
 }
 
-static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_speed_t *speed, bool fresh)
-{
+static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
     const bool gap = !iw_wheel_heard(self, now_us);
     self->speed = *speed;
@@ -71,16 +66,14 @@ static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_spe
     }
 }
 
-static bool tick_jump(const iw_wheel_t *self, uint32_t delta, iw_time_us_t elapsed_us)
-{
+static bool tick_jump(const iw_wheel_t *self, uint32_t delta, iw_time_us_t elapsed_us) {
     const uint32_t elapsed = (elapsed_us < UINT32_MAX) ? (uint32_t)elapsed_us : UINT32_MAX;
     const uint32_t limit = elapsed / self->us_per_tick_min;
     const uint32_t moved = (delta > INT32_MAX) ? 0U - delta : delta;
     return moved > IW_WHEEL_TICK_SLACK && moved - IW_WHEEL_TICK_SLACK > limit;
 }
 
-static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_status_t *status)
-{
+static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_status_t *status) {
     if (self->status_us != IW_NEVER) {
         const uint32_t delta = (uint32_t)status->odometry_ticks - (uint32_t)self->status.odometry_ticks;
         if (tick_jump(self, delta, now_us - self->status_us)) {
@@ -93,8 +86,7 @@ static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_st
     self->status_us = now_us;
 }
 
-void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message_t *message, bool fresh)
-{
+void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message_t *message, bool fresh) {
     note_presence(self, now_us);
     if (message->kind == IW_PROTO_SPEED) {
         hear_speed(self, now_us, &message->as.speed, fresh);
@@ -105,44 +97,37 @@ void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message
     }
 }
 
-void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us)
-{
+void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
     if (self->heard_us != IW_NEVER && self->heard_us >= self->excused_us) {
         self->excused_us = now_us;
         self->any_us = now_us;
     }
 }
 
-bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us)
-{
+bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us) {
     return self->heard_us != IW_NEVER && now_us - self->heard_us < silent_us(self);
 }
 
-bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us)
-{
+bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us) {
     const iw_time_us_t since_us = (self->heard_us > self->excused_us) ? self->heard_us : self->excused_us;
     return self->heard_us == IW_NEVER || now_us - since_us >= silent_us(self);
 }
 
-bool iw_wheel_at_rest(const iw_wheel_t *self, iw_time_us_t now_us, uint32_t for_us)
-{
+bool iw_wheel_at_rest(const iw_wheel_t *self, iw_time_us_t now_us, uint32_t for_us) {
     return iw_wheel_heard(self, now_us) && self->rest_since_us != IW_NEVER && now_us - self->rest_since_us >= for_us;
 }
 
-int32_t iw_wheel_speed_mm_s(const iw_wheel_t *self)
-{
+int32_t iw_wheel_speed_mm_s(const iw_wheel_t *self) {
     const int32_t speed_um_s = self->speed.speed_rpm * (int32_t)self->um_s_per_rpm;
     return (self->config->invert[self->side] ? -speed_um_s : speed_um_s) / 1000;
 }
 
-int64_t iw_wheel_distance_nm(const iw_wheel_t *self)
-{
+int64_t iw_wheel_distance_nm(const iw_wheel_t *self) {
     const int64_t distance_nm = self->ticks * (int64_t)self->nm_per_tick;
     return self->config->invert[self->side] ? -distance_nm : distance_nm;
 }
 
-iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self)
-{
+iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self) {
     const iw_reboot_t reboot = self->pending_reboot;
     self->pending_reboot = IW_REBOOT_NONE;
     return reboot;

@@ -31,7 +31,7 @@ typedef struct {
 } iw_bit_timing_t;
 
 typedef struct {
-    uint32_t bitrate_hz;           ///< Rounded to the nearest.
+    uint32_t bitrate_hz;            ///< Rounded to the nearest.
     uint16_t sample_point_permille; ///< Rounded to the nearest.
 } iw_bit_timing_achieved_t;
 

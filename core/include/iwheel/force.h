@@ -72,7 +72,7 @@ typedef enum {
 typedef enum {
     IW_FORCE_VALID = 0,
     IW_FORCE_NOT_HEARD,
-    IW_FORCE_SATURATED,     ///< Raw is -32768 or 32767.
+    IW_FORCE_SATURATED, ///< Raw is -32768 or 32767.
     IW_FORCE_NO_OFFSET,
     IW_FORCE_UNIT_CONTRADICTED,
     IW_FORCE_OFFSET_REMOVED, ///< The wheel seems to subtract the offset itself.
@@ -90,9 +90,9 @@ typedef struct {
 typedef struct {
     const iw_config_t *config;
     iw_time_us_t raw_us;
-    iw_time_us_t offset_us;    ///< When the offset in force was taken; IW_NEVER: none, or STORED by an earlier run.
-    int32_t offset_mN;         ///< The offset in force; 0 with IW_OFFSET_NONE.
-    int16_t wheel_offset_dN;   ///< The wheel's own, as sent.
+    iw_time_us_t offset_us;  ///< When the offset in force was taken; IW_NEVER: none, or STORED by an earlier run.
+    int32_t offset_mN;       ///< The offset in force; 0 with IW_OFFSET_NONE.
+    int16_t wheel_offset_dN; ///< The wheel's own, as sent.
     int16_t sample[IW_FORCE_WINDOW_SAMPLES]; ///< Ring of raw values, the last two seconds.
     int16_t raw;
     uint8_t count; ///< Samples in the ring.
@@ -101,7 +101,7 @@ typedef struct {
     iw_side_t side;
     iw_offset_provenance_t provenance;
     iw_unit_evidence_t evidence;
-    int32_t evidence_permille; ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
+    int32_t evidence_permille;  ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
     iw_force_quality_t quality; ///< Of the start-up window.
     bool wheel_offset_heard;
     bool boot_seen;

@@ -39,13 +39,13 @@ typedef struct {
 
 /// Beside these: `iw_sender_t` counts what was sent, `iw_gate_t::stopped`, `iw_outbox_t::stray`, `iw_wheel_t::reboots`.
 typedef struct {
-    uint32_t received;    ///< Frames of the nine telemetry ids that were read.
-    uint32_t echoes;      ///< Echoes of our setpoints.
-    uint32_t bad_format;  ///< Known id on a remote, extended, error or FD frame: ignored.
-    uint32_t bad_length;  ///< Known id, shorter than the table: ignored.
-    uint32_t unknown;     ///< Any other id.
-    uint32_t foreign;     ///< Setpoints that are not ours.
-    uint32_t late_steps;  ///< Steps later than IW_GATEWAY_LATE_US.
+    uint32_t received;     ///< Frames of the nine telemetry ids that were read.
+    uint32_t echoes;       ///< Echoes of our setpoints.
+    uint32_t bad_format;   ///< Known id on a remote, extended, error or FD frame: ignored.
+    uint32_t bad_length;   ///< Known id, shorter than the table: ignored.
+    uint32_t unknown;      ///< Any other id.
+    uint32_t foreign;      ///< Setpoints that are not ours.
+    uint32_t late_steps;   ///< Steps later than IW_GATEWAY_LATE_US.
     uint32_t out_of_range; ///< Drive requests refused for their values.
     uint32_t purges;       ///< Purges the port confirmed.
 } iw_counters_t;
@@ -73,21 +73,22 @@ typedef struct {
     iw_sender_t sender;
     iw_ledger_t ledger;
     iw_counters_t counters;
-    iw_time_us_t promised_us;  ///< When the last step asked to be called again.
-    iw_time_us_t pose_us;      ///< IW_NEVER: none.
-    uint32_t purged_stop;      ///< Number of the stop for which a purge was tried.
-    uint32_t step_late_us;     ///< How late this step is.
+    iw_time_us_t promised_us; ///< When the last step asked to be called again.
+    iw_time_us_t pose_us;     ///< IW_NEVER: none.
+    uint32_t purged_stop;     ///< Number of the stop for which a purge was tried.
+    uint32_t step_late_us;    ///< How late this step is.
     iw_proto_pose_t pose;
     iw_bus_state_t bus;
     iw_bus_facts_t facts;
-    bool backlog;              ///< The last step left frames behind.
-    bool stalled;              ///< This step cannot tell when its frames came.
+    bool backlog; ///< The last step left frames behind.
+    bool stalled; ///< This step cannot tell when its frames came.
 } iw_gateway_t;
 
 /// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros: the process
 /// before us died while armed. On a fault the gateway is left untouched and must not be used. The gateway must not be moved or
 /// copied afterwards: its parts point to its configuration.
-iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal, iw_time_us_t now_us, bool restarted);
+iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal,
+                                  iw_time_us_t now_us, bool restarted);
 
 /// One complete cycle: e-stop, bus, everything received, judgement, and what is due is sent. Returns when to call again at the
 /// latest (never later than one period from now). `now_us` must not go back.

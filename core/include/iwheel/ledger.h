@@ -11,19 +11,19 @@
 #include "iwheel/types.h"
 
 typedef enum {
-    IW_LEDGER_SETPOINT_TYPE,       ///< Byte 0 of a setpoint.
-    IW_LEDGER_CURRENT_ROLE,        ///< Limit or setpoint.
-    IW_LEDGER_FORCE_UNIT_LEFT,     ///< cN, as documented.
-    IW_LEDGER_FORCE_UNIT_RIGHT,    ///< dN, as documented.
-    IW_LEDGER_OFFSET_INCLUDED,     ///< The raw force still contains the offset, as documented.
-    IW_LEDGER_FEEDBACK_SIGN_LEFT,  ///< A positive command is measured as a positive speed.
+    IW_LEDGER_SETPOINT_TYPE,      ///< Byte 0 of a setpoint.
+    IW_LEDGER_CURRENT_ROLE,       ///< Limit or setpoint.
+    IW_LEDGER_FORCE_UNIT_LEFT,    ///< cN, as documented.
+    IW_LEDGER_FORCE_UNIT_RIGHT,   ///< dN, as documented.
+    IW_LEDGER_OFFSET_INCLUDED,    ///< The raw force still contains the offset, as documented.
+    IW_LEDGER_FEEDBACK_SIGN_LEFT, ///< A positive command is measured as a positive speed.
     IW_LEDGER_FEEDBACK_SIGN_RIGHT,
-    IW_LEDGER_MOUNT_SIGN_LEFT,     ///< A positive command moves the machine forward. Only the operator can know.
+    IW_LEDGER_MOUNT_SIGN_LEFT, ///< A positive command moves the machine forward. Only the operator can know.
     IW_LEDGER_MOUNT_SIGN_RIGHT,
-    IW_LEDGER_WHEEL_RADIUS,        ///< "Approximately 192 mm".
-    IW_LEDGER_GEAR_RATIO,          ///< Rotor turns per wheel turn, and which of them the rpm count.
-    IW_LEDGER_POSE_BYTE_ORDER,     ///< Most significant byte first: the table does not say it for the pose.
-    IW_LEDGER_DLC,                 ///< Frames are as long as the table: the document does not state it.
+    IW_LEDGER_WHEEL_RADIUS,    ///< "Approximately 192 mm".
+    IW_LEDGER_GEAR_RATIO,      ///< Rotor turns per wheel turn, and which of them the rpm count.
+    IW_LEDGER_POSE_BYTE_ORDER, ///< Most significant byte first: the table does not say it for the pose.
+    IW_LEDGER_DLC,             ///< Frames are as long as the table: the document does not state it.
     IW_LEDGER_ITEMS,
 } iw_ledger_item_t;
 

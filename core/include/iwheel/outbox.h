@@ -20,19 +20,20 @@ typedef struct {
 
 void iw_outbox_init(iw_outbox_t *self);
 
-/// Forgets what is un-echoed: it was purged, or the bus went away with it.
+/// Forgets what is un-echoed and what was proven: it was purged, or the bus went away with it.
 void iw_outbox_clear(iw_outbox_t *self);
 
 /// True if this wheel may be sent a setpoint now; `zero` tells whether it is a zero.
 bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero);
 
-/// A frame was handed over (`accepted`) or refused by the port. A refused one waits to be proven all the same.
+/// A frame was handed over (`accepted`; only where `iw_outbox_may_send`) or refused by the port. A refused one starts the waiting
+/// too, so that a port that takes nothing is found out; the next echo of that wheel settles it.
 void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, bool accepted);
 
 /// An echo came.
 void iw_outbox_echo(iw_outbox_t *self, iw_side_t side);
 
-/// True if, for both wheels, a frame that was sent at `since_us` or later has been echoed.
+/// True if, for both wheels, a frame that was sent at `since_us` or later has been echoed. `since_us` > 0.
 bool iw_outbox_proven_since(const iw_outbox_t *self, iw_time_us_t since_us);
 
 /// Since when the longest-waiting setpoint waits; IW_NEVER if none does.

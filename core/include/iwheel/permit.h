@@ -94,8 +94,8 @@ typedef enum {
 /// The last stop, for `why`.
 typedef struct {
     iw_time_us_t at_us;
-    uint32_t number; ///< Counts stops; 0: there was none.
-    uint32_t detail; ///< See iw_cause_t.
+    uint32_t number;    ///< Counts stops; 0: there was none.
+    uint32_t detail;    ///< See iw_cause_t.
     iw_client_t client; ///< Who held the lease, or asked for the stop.
     iw_pair_t applied;  ///< What the wheels were told right before it, in the machine's frame.
     iw_cause_t cause;
@@ -118,16 +118,16 @@ typedef struct {
 
 typedef struct {
     const iw_config_t *config;
-    iw_permit_view_t view;              ///< Of the last step: requests are judged by it.
+    iw_permit_view_t view;                    ///< Of the last step: requests are judged by it.
     iw_time_us_t seen_us[IW_CAUSE_LOOP_LATE]; ///< When each latching cause was last seen; IW_NEVER: never.
     iw_time_us_t lease_until_us;
-    iw_time_us_t arming_us;  ///< When arming began.
-    iw_time_us_t hold_us;    ///< When the zeros began; IW_NEVER: not yet.
-    iw_time_us_t stale_us;   ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
+    iw_time_us_t arming_us; ///< When arming began.
+    iw_time_us_t hold_us;   ///< When the zeros began; IW_NEVER: not yet.
+    iw_time_us_t stale_us;  ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
     iw_client_t stale_client;
     iw_client_t holder;
-    uint32_t raised;  ///< Bit per cause: told since the last step.
-    uint32_t present; ///< Bit per cause: told in the last step.
+    uint32_t raised;       ///< Bit per cause: told since the last step.
+    uint32_t present;      ///< Bit per cause: told in the last step.
     uint32_t still_moving; ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
     iw_stop_t stop;
     iw_state_t state;

@@ -118,6 +118,7 @@ iw_status_t iw_proto_encode(const iw_proto_message_t *message, iw_can_frame_t *o
 
 /// Writes a setpoint of `dlc` 5..8 bytes, zero padded. The last line of defence for the current: it is clamped to
 /// +/- IW_CURRENT_LIMIT_mA. Returns true if it had to be, which the caller counts.
-bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoint, uint8_t dlc, iw_can_frame_t *out_frame);
+bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoint, uint8_t dlc,
+                              iw_can_frame_t *out_frame);
 
 #endif

@@ -31,11 +31,11 @@ typedef enum {
 
 typedef struct {
     const iw_config_t *config;
-    iw_time_us_t last_us;               ///< When the last pair was taken.
-    iw_time_us_t due_us;                ///< When the next one is due; IW_NEVER in silence.
-    iw_pair_t target;                   ///< The client's command, cleared whenever the demand is not FOLLOW.
-    int32_t speed_um_s[IW_SIDES];       ///< Where the ramp is.
-    int32_t current_uA[IW_SIDES];       ///< Ramped only with IW_ROLE_SETPOINT.
+    iw_time_us_t last_us;         ///< When the last pair was taken.
+    iw_time_us_t due_us;          ///< When the next one is due; IW_NEVER in silence.
+    iw_pair_t target;             ///< The client's command, cleared whenever the demand is not FOLLOW.
+    int32_t speed_um_s[IW_SIDES]; ///< Where the ramp is.
+    int32_t current_uA[IW_SIDES]; ///< Ramped only with IW_ROLE_SETPOINT.
     iw_demand_t demand;
     bool from_zero; ///< The next pair is zero whatever the command: the first after silence, ZERO or a collapse.
 } iw_setpoint_t;
