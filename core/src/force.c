@@ -4,7 +4,8 @@
 #include <string.h>
 
 #define HALF (IW_FORCE_WINDOW_SAMPLES / 2U)
-/// Deviations of one sample are capped here (raw), so that the sum of their squares fits 32 bits. Far beyond quiet in either unit.
+/// Deviations of one sample are capped here (raw), so that the sum of their squares fits 32 bits. Far beyond quiet in
+/// either unit.
 #define SPREAD_MAX 8191
 /// A variance up to this (raw) can be scaled to mN before the root without leaving 32 bits.
 #define VARIANCE_FINE 400000U

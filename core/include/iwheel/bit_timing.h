@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// Bit timing of a CAN controller: from clock, bit rate and sample point to segments, and back.
 ///
-/// A bit is 1 + tseg1 + tseg2 quanta of `prescaler` clock periods; it is sampled after 1 + tseg1 of them. tseg1 is the propagation
-/// segment and phase segment 1 together (bxCAN: BS1; Linux: prop_seg + phase_seg1), tseg2 is phase segment 2 (BS2). Pure functions.
+/// A bit is 1 + tseg1 + tseg2 quanta of `prescaler` clock periods; it is sampled after 1 + tseg1 of them. tseg1 is
+/// the propagation segment and phase segment 1 together (bxCAN: BS1; Linux: prop_seg + phase_seg1), tseg2 is phase
+/// segment 2 (BS2). Pure functions.
 #ifndef IW_BIT_TIMING_H
 #define IW_BIT_TIMING_H
 
@@ -35,9 +36,9 @@ typedef struct {
     uint16_t sample_point_permille; ///< Rounded to the nearest.
 } iw_bit_timing_achieved_t;
 
-/// Finds segments that give `bitrate_hz` exactly and the sample point nearest to the wanted one; of equals, the one with the most
-/// quanta. IW_ERR_RANGE, `*out_timing` untouched, if no setting gives that rate exactly or an argument is 0.
-/// The caller judges the sample point with `iw_bit_timing_achieved`.
+/// Finds segments that give `bitrate_hz` exactly and the sample point nearest to the wanted one; of equals, the one
+/// with the most quanta. IW_ERR_RANGE, `*out_timing` untouched, if no setting gives that rate exactly or an argument
+/// is 0. The caller judges the sample point with `iw_bit_timing_achieved`.
 iw_status_t iw_bit_timing_solve(const iw_bit_timing_limits_t *limits, uint32_t clock_hz,
                                 const iw_bit_timing_achieved_t *wanted, iw_bit_timing_t *out_timing);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// Does a wheel do what it is told? Nothing acknowledges a setpoint, so commanded and measured speed are compared.
 ///
-/// Three ways not to: turning the other way, turning faster than told, not turning. Each must last before it counts; the time runs
-/// only while the condition holds without a break.
+/// Three ways not to: turning the other way, turning faster than told, not turning. Each must last before it counts;
+/// the time runs only while the condition holds without a break.
 #ifndef IW_FOLLOW_H
 #define IW_FOLLOW_H
 

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 /// The normal force on one wheel, and where its zero comes from.
 ///
-/// The document: force on the shaft = normal force - offset, where the offset is the mean normal force at start-up and "only has
-/// sense if you don't apply any force to the shaft during the first two seconds". The wheel sends its own offset only in its first
-/// 60 s. So the offset carries its provenance, and a bad one is not a value.
+/// The document: force on the shaft = normal force - offset, where the offset is the mean normal force at start-up
+/// and "only has sense if you don't apply any force to the shaft during the first two seconds". The wheel sends its
+/// own offset only in its first 60 s. So the offset carries its provenance, and a bad one is not a value.
 ///
 ///     OPEN --40 samples without a gap--> judged: good  -> ESTIMATED (or a cross-check, if there is something better)
 ///       ^                                     bad   -> CONTAMINATED: no value from it
 ///       +--- wheel rebooted
 ///
-/// Order of trust: OPERATOR (tare) > WHEEL > ESTIMATED > STORED > NONE. After a reboot WHEEL and ESTIMATED become STORED.
-/// WHEEL is not taken if we saw the wheel start and its first two seconds were contaminated.
+/// Order of trust: OPERATOR (tare) > WHEEL > ESTIMATED > STORED > NONE. After a reboot WHEEL and ESTIMATED become
+/// STORED. WHEEL is not taken if we saw the wheel start and its first two seconds were contaminated.
 ///
 /// Unit evidence: at rest the raw value divided by the wheel's offset in dN is about 10 (cN), 1 (dN) or 0 (offset
 /// already removed). Evidence against the configuration makes force invalid; nothing is ever rescaled.
@@ -110,8 +110,8 @@ typedef struct {
 /// `config` must be checked and outlive it.
 void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side);
 
-/// The wheel (re)started or was heard for the first time: the window opens. `boot_seen`: its start was observed, so that our
-/// window covers the wheel's own first two seconds.
+/// The wheel (re)started or was heard for the first time: the window opens. `boot_seen`: its start was observed, so
+/// that our window covers the wheel's own first two seconds.
 void iw_force_reopen(iw_force_t *self, bool boot_seen);
 
 /// Puts an offset of an earlier run in force, as STORED, if there is nothing better.
@@ -123,8 +123,8 @@ void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool stil
 /// Takes an offset frame.
 void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_dN);
 
-/// Makes the mean of the last two seconds the offset, as OPERATOR. Refused, changing nothing, with the reason. LOADED is not judged
-/// where the offset in force is itself in doubt.
+/// Makes the mean of the last two seconds the offset, as OPERATOR. Refused, changing nothing, with the reason. LOADED
+/// is not judged where the offset in force is itself in doubt.
 iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us);
 
 /// Whether the net force means anything now, and if not, why.

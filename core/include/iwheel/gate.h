@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 /// The one gate that every outgoing frame passes, right before it is handed to the port.
 ///
-/// It knows nothing of why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a setpoint of one of the
-/// two ids, with the configured type and length, current and speed within the configured maxima, and a speed no further from the last
-/// one that passed than the configured slopes allow for the time between; a change of sign must pass through a zero that was sent.
-/// A zero of the right type and current passes whatever its slew. A negative current is refused where the current is a limit; while
-/// setpoint type or current role are unset nothing passes.
+/// It knows nothing of why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a
+/// setpoint of one of the two ids, with the configured type and length, current and speed within the configured
+/// maxima, and a speed no further from the last one that passed than the configured slopes allow for the time
+/// between; a change of sign must pass through a zero that was sent. A zero of the right type and current passes
+/// whatever its slew. A negative current is refused where the current is a limit; while setpoint type or current role
+/// are unset nothing passes.
 ///
 /// Written independently of the scheduler, so that an error in one is caught by the other.
 #ifndef IW_GATE_H

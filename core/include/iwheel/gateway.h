@@ -3,9 +3,10 @@
 ///
 ///     bus -> receive -> decode -> wheel state -> permission -> scheduler -> encode -> gate -> send -> bus
 ///
-/// The owner calls `iw_gateway_step` when a frame, an e-stop edge or the time it returned is there, and as often as it likes.
-/// Requests may come between steps, from the same thread of execution; a step right after one sends what follows from it. What the wheels do is a pure function of configuration,
-/// times, frames and requests: the same recording gives the same bytes on every port.
+/// The owner calls `iw_gateway_step` when a frame, an e-stop edge or the time it returned is there, and as often as
+/// it likes. Requests may come between steps, from the same thread of execution; a step right after one sends what
+/// follows from it. What the wheels do is a pure function of configuration, times, frames and requests: the same
+/// recording gives the same bytes on every port.
 ///
 /// Size: see the README's table. No heap, no floating point, no file-scope state.
 #ifndef IW_GATEWAY_H
@@ -84,21 +85,21 @@ typedef struct {
     bool stalled; ///< This step cannot tell when its frames came.
 } iw_gateway_t;
 
-/// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros: the process
-/// before us died while armed. On a fault the gateway is left untouched and must not be used. The gateway must not be moved or
-/// copied afterwards: its parts point to its configuration.
+/// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros:
+/// the process before us died while armed. On a fault the gateway is left untouched and must not be used. The gateway
+/// must not be moved or copied afterwards: its parts point to its configuration.
 iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal,
                                   iw_time_us_t now_us, bool restarted);
 
-/// One complete cycle: e-stop, bus, everything received, judgement, and what is due is sent. Returns when to call again at the
-/// latest (never later than one period from now). `now_us` must not go back.
+/// One complete cycle: e-stop, bus, everything received, judgement, and what is due is sent. Returns when to call
+/// again at the latest (never later than one period from now). `now_us` must not go back.
 iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us);
 
 /// What the port knows of the bus, whenever it changes.
 void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts);
 
-/// Asks to be armed. IW_REFUSE_NONE: poll `iw_gateway_arming` after each step; when false, the state is ARMED with this client
-/// as holder, or `iw_gateway_arm_refusal` tells why not.
+/// Asks to be armed. IW_REFUSE_NONE: poll `iw_gateway_arming` after each step; when false, the state is ARMED with
+/// this client as holder, or `iw_gateway_arm_refusal` tells why not.
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 bool iw_gateway_arming(const iw_gateway_t *self);
 iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self);

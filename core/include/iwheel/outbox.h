@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// Which setpoints are on their way? The account of sent and echoed frames.
 ///
-/// Per wheel at most one setpoint is un-echoed, and behind it at most one zero: so a queue of old setpoints cannot form, and a zero
-/// never waits for an echo. Echoes of one id come in the order sent.
+/// Per wheel at most one setpoint is un-echoed, and behind it at most one zero: so a queue of old setpoints cannot
+/// form, and a zero never waits for an echo. Echoes of one id come in the order sent.
 ///
 ///     FREE --sent--> ONE --zero sent--> TWO;  each echo goes one back;  clear: FREE
 #ifndef IW_OUTBOX_H
@@ -26,8 +26,8 @@ void iw_outbox_clear(iw_outbox_t *self);
 /// True if this wheel may be sent a setpoint now; `zero` tells whether it is a zero.
 bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero);
 
-/// A frame was handed over (`accepted`; only where `iw_outbox_may_send`) or refused by the port. A refused one starts the waiting
-/// too, so that a port that takes nothing is found out; the next echo of that wheel settles it.
+/// A frame was handed over (`accepted`; only where `iw_outbox_may_send`) or refused by the port. A refused one starts
+/// the waiting too, so that a port that takes nothing is found out; the next echo of that wheel settles it.
 void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, bool accepted);
 
 /// An echo came.

@@ -6,12 +6,14 @@
 ///         |                +------------- latching cause --------+--> LATCHED
 ///         +------------------------------- reset ------------------------'
 ///
-/// LISTENING sends nothing, with one exception: `arm` sends one zero pair, and ARMED begins when it is echoed ("arming").
-/// Pure state machine: no I/O, no clock. In every step the owner first tells the faults it sees (`iw_permit_raise`), then
-/// calls `iw_permit_step`, then reads `iw_permit_demand`, which tells what the scheduler must aim at.
+/// LISTENING sends nothing, with one exception: `arm` sends one zero pair, and ARMED begins when it is echoed
+/// ("arming"). Pure state machine: no I/O, no clock. In every step the owner first tells the faults it sees
+/// (`iw_permit_raise`), then calls `iw_permit_step`, then reads `iw_permit_demand`, which tells what the scheduler
+/// must aim at.
 ///
-/// Latch in every state: ESTOP_LINE, ESTOP_SOFTWARE, INTERNAL. Latch in ARMED and STOPPING: the other causes up to INTERNAL. In
-/// LISTENING those are only remembered: they refuse arm while present. Causes after INTERNAL stop without a latch.
+/// Latch in every state: ESTOP_LINE, ESTOP_SOFTWARE, INTERNAL. Latch in ARMED and STOPPING: the other causes up to
+/// INTERNAL. In LISTENING those are only remembered: they refuse arm while present. Causes after INTERNAL stop
+/// without a latch.
 ///
 /// The lease is fed by accepted drive commands and by nothing else.
 #ifndef IW_PERMIT_H
@@ -37,8 +39,8 @@ typedef uint32_t iw_client_t;
 
 typedef enum { IW_STATE_LISTENING = 0, IW_STATE_ARMED, IW_STATE_STOPPING, IW_STATE_LATCHED } iw_state_t;
 
-/// Why the wheels were stopped, the most telling first: of several present at once, the first is reported. `iw_stop_t::detail` is
-/// given with each.
+/// Why the wheels were stopped, the most telling first: of several present at once, the first is reported.
+/// `iw_stop_t::detail` is given with each.
 typedef enum {
     IW_CAUSE_NONE = 0,
     IW_CAUSE_ESTOP_LINE,     ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
@@ -141,7 +143,8 @@ typedef struct {
 /// process before us died while armed.
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted);
 
-/// Tells that a cause is present or has just happened. It takes effect at once; the first cause of a latch stays the cause.
+/// Tells that a cause is present or has just happened. It takes effect at once; the first cause of a latch stays the
+/// cause.
 void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail);
 
 /// Everything that follows from time and from what the owner sees: end of lease, of arming and of the hold.
@@ -150,14 +153,16 @@ void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view
 /// What the scheduler must aim at now.
 iw_demand_t iw_permit_demand(const iw_permit_t *self);
 
-/// Asks to be armed. IW_REFUSE_NONE: arming has begun, or the client holds the lease already (which feeds nothing). With `takeover`
-/// the lease of another client moves over, when outputs are zero and both wheels at rest.
+/// Asks to be armed. IW_REFUSE_NONE: arming has begun, or the client holds the lease already (which feeds nothing).
+/// With `takeover` the lease of another client moves over, when outputs are zero and both wheels at rest.
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
-/// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted or not.
+/// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted
+/// or not.
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool nonzero);
 
-/// Somebody sent a nonzero drive command that was not even judged (out of range): it refuses arm and reset like any other.
+/// Somebody sent a nonzero drive command that was not even judged (out of range): it refuses arm and reset like any
+/// other.
 void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client);
 
 /// Somebody wants a stop without a latch: IW_CAUSE_CLIENT_STOP, IW_CAUSE_SHUTDOWN. Needs no lease. Ends arming.
@@ -169,7 +174,8 @@ void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t cl
 /// Leaves LATCHED for LISTENING if nothing speaks against it; not latched, it changes nothing and is not refused.
 iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us);
 
-/// Bit per latching cause that keeps reset from succeeding now (present, or event-like and seen less than IW_PERMIT_EVENT_US ago).
+/// Bit per latching cause that keeps reset from succeeding now (present, or event-like and seen less than
+/// IW_PERMIT_EVENT_US ago).
 uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us);
 
 /// When `iw_permit_step` has something to do although nothing happened; IW_NEVER if it has not.

@@ -3,8 +3,8 @@
 ///
 ///     pair -> invert -> encode -> gate (both frames) -> port (left, then right) -> outbox
 ///
-/// Both frames are judged before one of them leaves. If the port takes the left and not the right, the caller is told and the next
-/// pair must be zero.
+/// Both frames are judged before one of them leaves. If the port takes the left and not the right, the caller is told
+/// and the next pair must be zero.
 #ifndef IW_SENDER_H
 #define IW_SENDER_H
 

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: MIT
 /// Which setpoint pair is due now, and when is the next one?
 ///
-/// Pure state machine: no I/O and no clock. What to aim at is told by the motion permission as a demand; what the client wants by
-/// `iw_setpoint_command`.
+/// Pure state machine: no I/O and no clock. What to aim at is told by the motion permission as a demand; what the
+/// client wants by `iw_setpoint_command`.
 ///
 ///     SILENCE --any other demand--> (first pair: zero) --FOLLOW--> ramps to the command
 ///                                                      --BRAKE --> ramps to zero
 ///                                                      --ZERO  --> zero at once
 ///
-/// Ramps follow elapsed time, not calls. Both wheels ramp together: the one with the longest way sets the pace, so a machine in a
-/// curve stays in it while it stops. But an accelerating wheel never holds up one that brakes. A sign change passes through zero. Away from zero a late call is granted two periods at the most
-/// (no burst); towards zero the whole time.
+/// Ramps follow elapsed time, not calls. Both wheels ramp together: the one with the longest way sets the pace, so a
+/// machine in a curve stays in it while it stops. But an accelerating wheel never holds up one that brakes. A sign
+/// change passes through zero. Away from zero a late call is granted two periods at the most (no burst); towards zero
+/// the whole time.
 ///
-/// Pairs lie on a grid of `period_ms`. A changed command or demand moves the next pair forward, at least IW_SETPOINT_SPACING_US after
-/// the last one; ZERO is due at once.
+/// Pairs lie on a grid of `period_ms`. A changed command or demand moves the next pair forward, at least
+/// IW_SETPOINT_SPACING_US after the last one; ZERO is due at once.
 #ifndef IW_SETPOINT_H
 #define IW_SETPOINT_H
 
@@ -52,8 +53,9 @@ void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair
 /// Moves the next pair forward, but not closer than IW_SETPOINT_SPACING_US to the last one. Nothing in silence.
 void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us);
 
-/// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole. The zero is due
-/// IW_SETPOINT_SPACING_US from now; under FOLLOW the ramp to the next command starts from it, also if the command comes before it.
+/// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole. The zero
+/// is due IW_SETPOINT_SPACING_US from now; under FOLLOW the ramp to the next command starts from it, also if the
+/// command comes before it.
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us);
 
 /// True if a pair must leave now.

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 /// What is known of one wheel: its last values, how old they are, whether it is there, at rest, or has rebooted.
 ///
-/// "Heard" means its speed frame (4 ms): that is the one the safety rules judge; other frames do not keep a wheel alive.
+/// "Heard" means its speed frame (4 ms): that is the one the safety rules judge; other frames do not keep a wheel
+/// alive.
 ///
-/// Two frames of reference: `speed_rpm` and `ticks` are the wheel's own, as on the bus; mm/s and distance are the machine's, with
-/// `invert` applied, so that they can be compared with commands.
+/// Two frames of reference: `speed_rpm` and `ticks` are the wheel's own, as on the bus; mm/s and distance are the
+/// machine's, with `invert` applied, so that they can be compared with commands.
 ///
-/// A reboot is recognised by: silence of IW_WHEEL_REBOOT_SILENCE_US; odometry that jumps further than any wheel can turn; offset
-/// frames, which a wheel sends only in its first 60 s, from a wheel that has been heard for longer than that.
+/// A reboot is recognised by: silence of IW_WHEEL_REBOOT_SILENCE_US; odometry that jumps further than any wheel can
+/// turn; offset frames, which a wheel sends only in its first 60 s, from a wheel that has been heard for longer than
+/// that.
 #ifndef IW_WHEEL_H
 #define IW_WHEEL_H
 
@@ -56,8 +58,8 @@ typedef struct {
 /// `config` must be checked and outlive the wheel.
 void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us);
 
-/// Takes a message from this wheel. `fresh` is false in a late step, when the time of reception is unknown: values are then taken,
-/// but the wheel's silence does not end and no run of rest begins.
+/// Takes a message from this wheel. `fresh` is false in a late step, when the time of reception is unknown: values
+/// are then taken, but the wheel's silence does not end and no run of rest begins.
 void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message_t *message, bool fresh);
 
 /// Our loop was late: until `wheel_silent_ms` from now silence is not held against the wheel. Repeated without
