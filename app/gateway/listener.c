@@ -11,7 +11,7 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-#define BACKLOG 16
+#define BACKLOG 128
 
 static int complain(FILE *err, const char *path, const char *what, const char *cure) {
     (void)fprintf(err, "iwheel-gateway: socket %s: %s; %s\n", path, what, cure);

@@ -23,8 +23,8 @@ static const struct option long_options[] = {
 };
 
 void gw_options_help(FILE *out) {
-    (void)fputs("iwheel-gateway: drives a pair of iWheels on a CAN bus for clients of its socket. It sends nothing "
-                "until a client arms.\n"
+    (void)fputs("iwheel-gateway: drives a pair of iWheels on a CAN bus for the clients of its socket.\n"
+                "It sends nothing until a client arms.\n"
                 "\n"
                 "usage: iwheel-gateway [options]\n"
                 "  -c, --config FILE   configuration (" GATEWAY_CONFIG_PATH ", if it exists)\n"
@@ -37,9 +37,8 @@ void gw_options_help(FILE *out) {
                 "      --log-level L   error, warning, info (default) or debug\n"
                 "      --version, --help\n"
                 "\n"
-                "exit codes: 0 ok, 1 a check failed, 64 usage, 69 bus, socket or e-stop unavailable, 70 internal, 77 "
-                "permission,\n"
-                "78 configuration\n",
+                "exit codes: 0 ok, 1 a check failed, 64 usage, 69 bus, socket or e-stop unavailable,\n"
+                "70 internal, 77 permission, 78 configuration\n",
                 out);
 }
 
@@ -126,9 +125,10 @@ int gw_options_configure(const gw_options_t *options, gateway_config_t *out_conf
         result = gateway_config_load(path, out_config, err);
     }
     for (size_t i = 0; i < sizeof overrides / sizeof overrides[0] && result == 0; ++i) {
-        if (overrides[i].value != NULL) {
-            result =
-                gateway_config_override(out_config, overrides[i].name, overrides[i].value, overrides[i].origin, err);
+        const char *value = overrides[i].value;
+        if (value != NULL &&
+            gateway_config_override(out_config, overrides[i].name, value, overrides[i].origin, err) != 0) {
+            result = EX_USAGE;
         }
     }
     out_config->core.listen_only = options->listen_only;

@@ -197,7 +197,10 @@ static bool read_cmd(const json_t *root, gw_cmd_t *out_cmd, gw_refusal_t *out_re
     if (value == NULL) {
         return refuse(out_refusal, GW_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
     }
-    for (unsigned i = 0; name != NULL && i < GW_CMDS; ++i) {
+    if (name == NULL) {
+        return refuse(out_refusal, GW_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
+    }
+    for (unsigned i = 0; i < GW_CMDS; ++i) {
         if (strcmp(name, cmd_names[i]) == 0) {
             *out_cmd = (gw_cmd_t)i;
             return true;

@@ -22,17 +22,6 @@ typedef struct {
 
 IW_STATIC_ASSERT(sizeof(unix_estop_t) <= sizeof(iw_backend_store_t), unix_estop_fits);
 
-static int button_open(void *self, const char *name) {
-    unix_estop_t *button = (unix_estop_t *)self;
-    *button = (unix_estop_t){.level = true};
-    const int error = iw_unix_link_open(&button->link, name, SOCK_STREAM);
-    if (error == 0 && iw_unix_link_is_up(&button->link)) {
-        struct pollfd level = {.fd = button->link.fd, .events = POLLIN};
-        (void)poll(&level, 1, FIRST_LEVEL_MS);
-    }
-    return error;
-}
-
 static void button_close(void *self) {
     iw_unix_link_close(&((unix_estop_t *)self)->link);
 }
@@ -71,6 +60,18 @@ static void listen_to(unix_estop_t *button) {
         button->known = false;
         button->was_lost = true;
     }
+}
+
+static int button_open(void *self, const char *name) {
+    unix_estop_t *button = (unix_estop_t *)self;
+    *button = (unix_estop_t){.level = true};
+    const int error = iw_unix_link_open(&button->link, name, SOCK_STREAM);
+    if (error == 0 && iw_unix_link_is_up(&button->link)) {
+        struct pollfd level = {.fd = button->link.fd, .events = POLLIN};
+        (void)poll(&level, 1, FIRST_LEVEL_MS);
+        listen_to(button);
+    }
+    return error;
 }
 
 static int button_pressed(void *self) {

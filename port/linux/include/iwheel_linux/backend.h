@@ -5,7 +5,7 @@
 /// through its state and comes back by itself from `tend`. It owns one descriptor that never changes (an epoll set of its own, if what
 /// it really reads is reopened): the owner watches it for reading and then runs a step.
 ///
-/// Nothing here blocks or allocates after open. One thread of execution.
+/// Nothing here blocks or allocates after open; open itself may wait for half a second. One thread of execution.
 #ifndef IWHEEL_LINUX_BACKEND_H
 #define IWHEEL_LINUX_BACKEND_H
 
