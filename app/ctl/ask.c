@@ -19,9 +19,9 @@ int ctl_fail(int code, const char *format, ...) {
     va_start(list, format);
     (void)vsnprintf(text, sizeof(text), format, list);
     va_end(list);
-    fputs("iwheelctl: ", stderr);
+    (void)fputs("iwheelctl: ", stderr);
     text_safe(text, stderr);
-    fputc('\n', stderr);
+    (void)fputc('\n', stderr);
     return code;
 }
 
@@ -161,7 +161,7 @@ int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
         return ctl_lost(self, result);
     }
     if (self->json) {
-        puts(self->client.line);
+        (void)puts(self->client.line);
     }
     if (json_is_true(json_object_get(*out_reply, "ok"))) {
         return CTL_OK;

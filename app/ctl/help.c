@@ -40,13 +40,13 @@ const verb_t *help_find(const char *name) {
 }
 
 void help_print(FILE *out) {
-    fputs("iwheelctl - talk to the iWheel gateway\n\n"
-          "Usage: iwheelctl [--socket PATH] [--json] VERB ...\n\n",
-          out);
+    (void)fputs("iwheelctl - talk to the iWheel gateway\n\n"
+                "Usage: iwheelctl [--socket PATH] [--json] VERB ...\n\n",
+                out);
     for (size_t i = 0; i < VERBS; i++) {
-        fprintf(out, "  %-9s%s\n", verbs[i].name, verbs[i].summary);
+        (void)fprintf(out, "  %-9s%s\n", verbs[i].name, verbs[i].summary);
     }
-    fputs(
+    (void)fputs(
         "\n"
         "  --socket PATH   the gateway's socket; else $IWHEEL_SOCKET, else the only one under /run/iwheel\n"
         "  --json          print the gateway's own reply lines\n"
@@ -58,8 +58,8 @@ void help_print(FILE *out) {
 }
 
 void help_print_verb(const verb_t *verb, FILE *out) {
-    fprintf(out, "Usage: iwheelctl [--socket PATH] [--json] %s%s%s\n\n%s: %s\n%s", verb->name,
-            verb->words[0] != '\0' ? " " : "", verb->words, verb->name, verb->summary, verb->details);
+    (void)fprintf(out, "Usage: iwheelctl [--socket PATH] [--json] %s%s%s\n\n%s: %s\n%s", verb->name,
+                  verb->words[0] != '\0' ? " " : "", verb->words, verb->name, verb->summary, verb->details);
 }
 
 void help_names(char *out, size_t size) {

@@ -70,7 +70,7 @@ static int dispatch(const arguments_t *arguments) {
     const verb_t *verb = arguments->verb != NULL ? help_find(arguments->verb) : NULL;
     help_names(names, sizeof(names));
     if (arguments->version) {
-        puts("iwheelctl " IWHEEL_VERSION);
+        (void)puts("iwheelctl " IWHEEL_VERSION);
         return CTL_OK;
     }
     if (arguments->help && arguments->verb == NULL) {

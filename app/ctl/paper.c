@@ -14,11 +14,11 @@ void paper_text(const paper_t *self, tone_t tone, unsigned width, const char *te
         [TONE_CARE] = "\033[33m", [TONE_BAD] = "\033[1;31m", [TONE_FAINT] = "\033[2m",
     };
     const bool coloured = self->colour && tone != TONE_PLAIN;
-    fputs(coloured ? codes[tone] : "", self->out);
+    (void)fputs(coloured ? codes[tone] : "", self->out);
     text_safe(text, self->out);
-    fputs(coloured ? "\033[0m" : "", self->out);
+    (void)fputs(coloured ? "\033[0m" : "", self->out);
     for (size_t used = strlen(text); used < width; used++) {
-        fputc(' ', self->out);
+        (void)fputc(' ', self->out);
     }
 }
 
@@ -57,5 +57,5 @@ void paper_wrap(const paper_t *self, const char *label, tone_t tone, const char 
 }
 
 void paper_end(const paper_t *self) {
-    fputc('\n', self->out);
+    (void)fputc('\n', self->out);
 }

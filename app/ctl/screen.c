@@ -111,7 +111,7 @@ static void draw_cell(const paper_t *paper, const row_t *row, unsigned width, co
     char cell[PAPER_CELL] = "";
     char number[TEXT_CELL];
     size_t used = 0;
-    bool known = false;
+    bool known = row->values[0].field == NULL;
     for (size_t i = 0; i < 2 && row->values[i].field != NULL; i++) {
         const value_t *value = &row->values[i];
         text_decimal(get(wheel, value->field), value->digits, value->unit, number);

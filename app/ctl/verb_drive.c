@@ -64,16 +64,16 @@ static void show_progress(const drive_t *self, int64_t now_us) {
     char left[TEXT_CELL];
     char right[TEXT_CELL];
     if (self->live) {
-        printf("\r\033[Kdriving %lld/%lld mm/s%s   measured %s/%s mm/s   %.1f s of %.1f s", self->applied[0],
-               self->applied[1], self->limited ? " (limited)" : "", speed_of(self->latest, "left", left),
-               speed_of(self->latest, "right", right), driven_s(self, now_us), (double)self->words.time_ms / 1e3);
+        (void)printf("\r\033[Kdriving %lld/%lld mm/s%s   measured %s/%s mm/s   %.1f s of %.1f s", self->applied[0],
+                     self->applied[1], self->limited ? " (limited)" : "", speed_of(self->latest, "left", left),
+                     speed_of(self->latest, "right", right), driven_s(self, now_us), (double)self->words.time_ms / 1e3);
         (void)fflush(stdout);
     }
 }
 
 static void clear_progress(const drive_t *self) {
     if (self->live) {
-        fputs("\r\033[K", stdout);
+        (void)fputs("\r\033[K", stdout);
         (void)fflush(stdout);
     }
 }
@@ -238,14 +238,26 @@ static void sum_up(const drive_t *self, int64_t stop_us) {
     char right[TEXT_CELL];
     way_of(self, "left", left);
     way_of(self, "right", right);
-    printf("drove %lld/%lld mm/s%s for %.1f s and stopped: left %s, right %s\n", self->applied[0], self->applied[1],
-           self->limited ? " (limited)" : "", driven_s(self, stop_us), left, right);
+    (void)printf("drove %lld/%lld mm/s%s for %.1f s and stopped: left %s, right %s\n", self->applied[0],
+                 self->applied[1], self->limited ? " (limited)" : "", driven_s(self, stop_us), left, right);
+}
+
+/// A refusal in motion only tells what came of the stop; this tells what stopped the wheels.
+static void tell_why(const drive_t *self) {
+    json_t *reply = NULL;
+    if (ask_quietly(self, json_pack("{s:s}", "cmd", "why"), &reply) == CTL_OK) {
+        (void)ctl_fail(CTL_NO, "the last stop: %s", text_word(reply, "sentence"));
+    }
+    json_decref(reply);
 }
 
 /// How it ended, told once both wheels stand. The exit code.
 static int judge(const drive_t *self, end_t end, int64_t stop_us) {
     if (!self->ctl->json) {
         sum_up(self, stop_us);
+    }
+    if (end == END_REFUSED && self->begin_us > 0) {
+        tell_why(self);
     }
     if (end == END_SILENT) {
         return ctl_fail(CTL_TIMEOUT, "the gateway did not answer a drive command for 1 s; see its log");
@@ -273,7 +285,7 @@ static int finish(drive_t *self, end_t end) {
                         "(1 s), stops them");
     }
     if (self->ctl->json && self->last_line[0] != '\0') {
-        puts(self->last_line);
+        (void)puts(self->last_line);
     }
     int code = ctl_ask(self->ctl, json_pack("{s:s}", "cmd", "stop"), &reply);
     json_decref(reply);

@@ -9,7 +9,7 @@
 
 static void print_line(const char *text) {
     text_safe(text, stdout);
-    putchar('\n');
+    (void)putchar('\n');
 }
 
 /// Asks; unless --json is given, prints the state the gateway is in now and what it means.
@@ -71,7 +71,7 @@ static void print_offset(const json_t *status, const char *side) {
     char offset[TEXT_CELL];
     const json_t *wheel = json_object_get(status, side);
     text_decimal(json_object_get(wheel, "force_offset_mN"), 3, "N", offset);
-    printf("%s: the present force is zero now; offset %s\n", side, offset);
+    (void)printf("%s: the present force is zero now; offset %s\n", side, offset);
 }
 
 int verb_tare(ctl_t *self, int count, char **words) {
@@ -116,8 +116,8 @@ static void print_when(const json_t *reply) {
         }
     }
     text_decimal(json_object_get(reply, "age_ms"), 3, "s", age);
-    printf("at %s, %s ago; ", wall, age);
-    printf("%s\n", json_is_true(json_object_get(reply, "latched")) ? "it latched" : "it did not latch");
+    (void)printf("at %s, %s ago; ", wall, age);
+    (void)printf("%s\n", json_is_true(json_object_get(reply, "latched")) ? "it latched" : "it did not latch");
 }
 
 int verb_why(ctl_t *self, int count, char **words) {
@@ -129,7 +129,7 @@ int verb_why(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && !self->json) {
         const char *sentence = json_string_value(json_object_get(reply, "sentence"));
         if (sentence == NULL || sentence[0] == '\0') {
-            puts("no stop since the gateway's start");
+            (void)puts("no stop since the gateway's start");
         } else {
             print_line(sentence);
             print_when(reply);

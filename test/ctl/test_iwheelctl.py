@@ -427,9 +427,13 @@ class Driving(WithGateway):
                 if self.driving < 10:
                     return super().on_drive(connection, request)
                 return {"ok": False, "error": "latched", "message": "the e-stop was pressed"}
+
+            def on_why(self, _connection, _request):
+                return {"ok": True, "number": 1, "sentence": "e-stop pressed while driving 200/200 mm/s"}
         gateway = self.serve(Latching)
         code, _, err, _ = self.drive("200", "200", gateway=gateway)
         self.assertEqual(1, code)
+        self.assertIn("the last stop: e-stop pressed while driving 200/200 mm/s", err)
         self.assertIn("refused (latched): the e-stop was pressed", err)
         self.assert_stopped_once(gateway)
 

@@ -93,14 +93,8 @@ static void check_section(loader_t *loader, const char *line, size_t length) {
     }
 }
 
-/// fgets for inih: the next line without leading blanks, since inih would take an indented line for the last value's
-/// continuation. A line that was refused here is handed on as an empty one.
-static char *next_line(char *out, int size, void *context) {
-    loader_t *loader = context;
-    settle_pending(loader);
-    if (loader->at >= loader->size) {
-        return NULL;
-    }
+/// The next line of the text without what surrounds it; moves on.
+static const char *cut_line(loader_t *loader, size_t *out_length) {
     const char *line = loader->text + loader->at;
     const char *newline = memchr(line, '\n', loader->size - loader->at);
     size_t length = newline != NULL ? (size_t)(newline - line) : loader->size - loader->at;
@@ -117,6 +111,20 @@ static char *next_line(char *out, int size, void *context) {
     while (length > 0 && is_blank(line[length - 1U])) {
         length--;
     }
+    *out_length = length;
+    return line;
+}
+
+/// fgets for inih: the next line without leading blanks, since inih would take an indented line for the last value's
+/// continuation. A line that was refused here is handed on as an empty one.
+static char *next_line(char *out, int size, void *context) {
+    loader_t *loader = context;
+    size_t length = 0;
+    settle_pending(loader);
+    if (loader->at >= loader->size) {
+        return NULL;
+    }
+    const char *line = cut_line(loader, &length);
     if (!fit_line(loader, line, length) || length + 2U > (size_t)size) {
         length = 0;
     }

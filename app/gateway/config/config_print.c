@@ -10,33 +10,34 @@ static void print_key(const config_key_t *row, const gateway_config_t *config, c
                       FILE *out) {
     char choices[64];
     char value[CONFIG_MESSAGE_SIZE];
-    fputs("; ", out);
+    (void)fputs("; ", out);
     for (const char *c = row->help; *c != '\0'; c++) {
-        fputs(*c == '\n' ? "\n; " : (char[2]){*c, '\0'}, out);
+        (void)fputs(*c == '\n' ? "\n; " : (char[2]){*c, '\0'}, out);
     }
     const bool set = config_value_format(row, config, value);
     const int width = fprintf(out, "\n%s%s = %s", set ? "" : ";", row->key, set ? value : "?") - 1;
     config_value_choices(row, choices, sizeof(choices));
     const bool has_default = config_value_format(row, defaults, value);
-    fprintf(out, "%*s ; %s%s%s%s\n", width < REMARK_COLUMN ? REMARK_COLUMN - width : 0, "", choices,
-            choices[0] != '\0' ? ", " : "", has_default ? "default " : "no default", value);
+    (void)fprintf(out, "%*s ; %s%s%s%s\n", width < REMARK_COLUMN ? REMARK_COLUMN - width : 0, "", choices,
+                  choices[0] != '\0' ? ", " : "", has_default ? "default " : "no default", value);
 }
 
 void gateway_config_print(const gateway_config_t *config, FILE *out) {
     gateway_config_t defaults;
     const char *section = "";
     gateway_config_default(&defaults);
-    fputs("; Configuration of the iWheel gateway. A key left out has its default; an unknown one is an error. Two have "
-          "no\n"
-          "; default and must be set before the wheels may move: setpoint_type and current_role.\n",
-          out);
+    (void)fputs(
+        "; Configuration of the iWheel gateway. A key left out has its default; an unknown one is an error. Two have "
+        "no\n"
+        "; default and must be set before the wheels may move: setpoint_type and current_role.\n",
+        out);
     if (config->core.listen_only) {
-        fputs("; In force from the command line: --listen-only, nothing is ever sent.\n", out);
+        (void)fputs("; In force from the command line: --listen-only, nothing is ever sent.\n", out);
     }
     for (size_t i = 0; i < config_key_count; i++) {
         if (strcmp(config_keys[i].section, section) != 0) {
             section = config_keys[i].section;
-            fprintf(out, "\n[%s]\n", section);
+            (void)fprintf(out, "\n[%s]\n", section);
         }
         print_key(&config_keys[i], config, &defaults, out);
     }

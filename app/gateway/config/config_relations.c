@@ -12,21 +12,21 @@ void config_complain(config_report_t *report, unsigned line, const char *format,
     if (report->errors > CONFIG_ERRORS_SHOWN) {
         return;
     }
-    fputs(report->name, report->err);
+    (void)fputs(report->name, report->err);
     if (line > 0) {
-        fprintf(report->err, ":%u", line);
+        (void)fprintf(report->err, ":%u", line);
     }
-    fputs(": ", report->err);
+    (void)fputs(": ", report->err);
     va_start(list, format);
     (void)vfprintf(report->err, format, list);
     va_end(list);
-    fputc('\n', report->err);
+    (void)fputc('\n', report->err);
 }
 
 void config_complain_end(config_report_t *report) {
     if (report->errors > CONFIG_ERRORS_SHOWN) {
-        fprintf(report->err, "%s: %u more errors are not shown; mend these first\n", report->name,
-                report->errors - CONFIG_ERRORS_SHOWN);
+        (void)fprintf(report->err, "%s: %u more errors are not shown; mend these first\n", report->name,
+                      report->errors - CONFIG_ERRORS_SHOWN);
     }
 }
 

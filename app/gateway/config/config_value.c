@@ -207,7 +207,7 @@ static bool parse_text(const config_key_t *row, const char *text, gateway_config
     }
     char *field = (char *)config + row->offset;
     memset(field, 0, row->size);
-    memcpy(field, text, strlen(text));
+    memcpy(field, text, strlen(text) + 1U);
     return true;
 }
 
