@@ -1,46 +1,37 @@
 // SPDX-License-Identifier: MIT
 #include "bxcan.h"
-#include "board.h"
-#include "iwheel/bit_timing.h"
-#include "registers.h"
 
-#define POLLS_MAX 20000U // More than the longest frame; a running transmission is not aborted before its end.
+#include "bxcan_filters.h"
 
-IW_STATIC_ASSERT(IW_STM32_APB1_HZ % (8U * IW_BUS_BITRATE_HZ) == 0U, sample_point_is_exact);
+#include <string.h>
 
-static uint32_t completed(uint32_t mailbox) {
-    return 1U << (8U * mailbox); // RQCPx; TXOKx is the next bit, ABRQx the seventh after it.
+#define INTERRUPTS (IW_IER_TMEIE | IW_IER_FMPIE0 | IW_IER_EPVIE | IW_IER_BOFIE | IW_IER_ERRIE)
+#define COMPLETED  (IW_TSR_RQCP(0) | IW_TSR_RQCP(1) | IW_TSR_RQCP(2))
+#define ABORT      (IW_TSR_ABRQ(0) | IW_TSR_ABRQ(1) | IW_TSR_ABRQ(2))
+#define EMPTY      (IW_TSR_TME(0) | IW_TSR_TME(1) | IW_TSR_TME(2))
+
+/// MCR, bxCAN 9.2. Zero are NART (unacknowledged frames are repeated until aborted), TXFP (the lowest id first, so left before
+/// right), RFLM (a full FIFO keeps the newest), ABOM (bus-off is left by us) and SLEEP.
+static void write_mcr(const iw_bxcan_t *self, uint32_t request) {
+    iw_register_write(&self->config.registers->MCR, IW_MCR_DBF | request);
 }
 
-bool iw_bxcan_init(iw_bxcan_t *self) {
-    const iw_bit_timing_limits_t limits = IW_BIT_TIMING_BXCAN;
-    const iw_bit_timing_achieved_t wanted = {IW_BUS_BITRATE_HZ, IW_BUS_SAMPLE_POINT_PERMILLE};
-    iw_bit_timing_t timing = {0, 0, 0};
-    *self = (iw_bxcan_t){0};
-    if (iw_bit_timing_solve(&limits, IW_STM32_APB1_HZ, &wanted, &timing) != IW_OK) {
-        return false;
-    }
-    IW_STM32_RCC->APB1ENR |= 1U << 25;
-    IW_STM32_CAN->MCR = 1U; // INRQ, not SLEEP.
-    uint32_t poll = 0;
-    while ((IW_STM32_CAN->MSR & 1U) == 0U && poll < POLLS_MAX) {
-        poll++;
-    }
-    if (poll == POLLS_MAX) {
-        return false;
-    }
-    IW_STM32_CAN->BTR = ((timing.tseg2 - 1UL) << 20) | ((timing.tseg1 - 1UL) << 16) | (timing.prescaler - 1UL);
-    IW_STM32_CAN->FMR |= 1U; // Bank 0: every frame into FIFO 0.
-    IW_STM32_CAN->FA1R = 0;
-    IW_STM32_CAN->FM1R = 0;
-    IW_STM32_CAN->FS1R = 1U;
-    IW_STM32_CAN->FFA1R = 0;
-    IW_STM32_CAN->filter[0][0] = 0;
-    IW_STM32_CAN->filter[0][1] = 0;
-    IW_STM32_CAN->FA1R = 1U;
-    IW_STM32_CAN->FMR &= ~1U;
-    IW_STM32_CAN->MCR = 1U << 2; // TXFP: left before right. INRQ cleared.
-    return true;
+void iw_bxcan_init(iw_bxcan_t *self, const iw_bxcan_config_t *config) {
+    (void)memset(self, 0, sizeof *self);
+    self->config = *config;
+    write_mcr(self, IW_MCR_INRQ);
+}
+
+/// In initialisation mode only, bxCAN 4.1 and 9.1.
+static void configure(iw_bxcan_t *self) {
+    iw_bxcan_registers_t *const registers = self->config.registers;
+    iw_register_write(&registers->BTR, self->config.bit_timing | (self->config.silent ? IW_BTR_SILM : 0U));
+    iw_bxcan_filters_write(self->config.filters, self->config.first_bank);
+    iw_register_write(&registers->IER, INTERRUPTS);
+}
+
+static bool is_bus_off(const iw_bxcan_t *self) {
+    return (iw_register_read(&self->config.registers->ESR) & IW_ESR_BOFF) != 0U;
 }
 
 static uint32_t word_of(const uint8_t *bytes) {
@@ -53,92 +44,228 @@ static void bytes_of(uint32_t word, uint8_t *out_bytes) {
     }
 }
 
-int iw_bxcan_send(void *context, const iw_can_frame_t *frame) {
-    iw_bxcan_t *const self = context;
-    if (((IW_STM32_CAN->MSR | IW_STM32_CAN->MCR) & 1U) != 0U) {
+/// While masked, `on_transmit` does not run. Reading back makes sure that the write has arrived.
+static void mask_transmit(const iw_bxcan_t *self) {
+    iw_register_t *const ier = &self->config.registers->IER;
+    iw_register_write(ier, INTERRUPTS & ~IW_IER_TMEIE);
+    (void)iw_register_read(ier);
+    atomic_signal_fence(memory_order_seq_cst);
+}
+
+static void unmask_transmit(const iw_bxcan_t *self) {
+    atomic_signal_fence(memory_order_seq_cst);
+    iw_register_write(&self->config.registers->IER, INTERRUPTS);
+}
+
+static bool poll_tsr(const iw_bxcan_t *self, uint32_t flags) {
+    for (uint32_t poll = 0; poll < self->config.poll_limit; poll++) {
+        if ((iw_register_read(&self->config.registers->TSR) & flags) == flags) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Aborts the mailbox, bxCAN 7.1. Returns how many echoes its successor owes beside its own, or -1 if it does not end. If it was sent
+/// after all its echo is left to `on_transmit`, and the mailbox with it.
+static int withdraw(iw_bxcan_t *self, uint32_t mailbox) {
+    iw_bxcan_outgoing_t *const outgoing = &self->outgoing[mailbox];
+    iw_register_t *const tsr = &self->config.registers->TSR;
+    iw_register_write(tsr, IW_TSR_ABRQ(mailbox));
+    if (!poll_tsr(self, IW_TSR_RQCP(mailbox) | IW_TSR_TME(mailbox))) {
         return -1;
     }
+    if ((iw_register_read(tsr) & IW_TSR_TXOK(mailbox)) != 0U) {
+        return 0;
+    }
+    const int owed = outgoing->owed;
+    outgoing->owed = 0;
+    iw_register_write(tsr, IW_TSR_RQCP(mailbox));
+    return owed;
+}
+
+/// The echoes owed by what waits with this id, which is withdrawn; 0 if nothing does; -1 if it cannot be withdrawn.
+static int withdraw_id(iw_bxcan_t *self, uint32_t id) {
+    int owed = 0;
+    for (uint32_t mailbox = 0; mailbox < IW_BXCAN_MAILBOXES && owed >= 0; mailbox++) {
+        if (self->outgoing[mailbox].owed > 0U && self->outgoing[mailbox].frame.id == id) {
+            const int more = withdraw(self, mailbox);
+            owed = (more < 0) ? more : owed + more;
+        }
+    }
+    return owed;
+}
+
+/// Transmit mailbox registers, bxCAN 9.3: TIR last, as it makes the request.
+static int load_free_mailbox(iw_bxcan_t *self, const iw_can_frame_t *frame, int owed) {
     for (uint32_t i = 0; i < IW_BXCAN_MAILBOXES; i++) {
-        iw_stm32_can_mailbox_t *const mailbox = &IW_STM32_CAN->tx[i];
-        if (!self->awaiting[i] && (IW_STM32_CAN->TSR & (1UL << (26U + i))) != 0U) {
-            self->sent[i] = *frame;
-            self->awaiting[i] = true;
-            mailbox->TDTR = frame->dlc;
-            mailbox->TDLR = word_of(&frame->data[0]);
-            mailbox->TDHR = word_of(&frame->data[4]);
-            mailbox->TIR = ((frame->id & IW_CAN_ID_MASK) << 21) | 1U;
+        if (self->outgoing[i].owed == 0U) {
+            iw_bxcan_mailbox_t *const mailbox = &self->config.registers->tx[i];
+            self->outgoing[i].frame = *frame;
+            self->outgoing[i].owed = (uint8_t)(owed + 1);
+            iw_register_write(&mailbox->TDTR, frame->dlc);
+            iw_register_write(&mailbox->TDLR, word_of(&frame->data[0]));
+            iw_register_write(&mailbox->TDHR, word_of(&frame->data[4]));
+            iw_register_write(&mailbox->TIR, (frame->id << IW_IR_STID_SHIFT) | IW_TIR_TXRQ);
             return 1;
         }
     }
     return 0;
 }
 
-static bool take_echo(iw_bxcan_t *self, iw_can_frame_t *out_frame) {
-    for (uint32_t i = 0; i < IW_BXCAN_MAILBOXES; i++) {
-        const uint32_t status = IW_STM32_CAN->TSR;
-        if (self->awaiting[i] && (status & completed(i)) != 0U) {
-            self->awaiting[i] = false;
-            IW_STM32_CAN->TSR = completed(i);
-            if ((status & (completed(i) << 1)) != 0U) {
-                *out_frame = self->sent[i];
-                out_frame->kind = IW_CAN_ECHO;
-                return true;
-            }
-        }
+int iw_bxcan_send(void *context, const iw_can_frame_t *frame) {
+    iw_bxcan_t *const self = context;
+    if (self->phase != IW_BXCAN_RUNNING || self->config.silent || frame->id > IW_CAN_ID_MASK ||
+        frame->dlc > IW_CAN_DATA_MAX || is_bus_off(self)) {
+        return -1;
     }
-    return false;
+    mask_transmit(self);
+    const int owed = withdraw_id(self, frame->id);
+    const int result = (owed < 0) ? 0 : load_free_mailbox(self, frame, owed);
+    unmask_transmit(self);
+    return result;
 }
 
 int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame) {
-    if (take_echo(context, out_frame)) {
-        return 1;
-    }
-    if ((IW_STM32_CAN->RF0R & 3U) == 0U) {
-        return 0;
-    }
-    const iw_stm32_can_fifo_t *const fifo = &IW_STM32_CAN->rx[0];
-    const uint32_t id = fifo->RIR;
-    const uint32_t dlc = fifo->RDTR & 0xFU;
-    out_frame->id = ((id & 4U) != 0U) ? ((id >> 3) | IW_CAN_EXTENDED) : (id >> 21);
-    out_frame->id |= ((id & 2U) != 0U) ? IW_CAN_REMOTE : 0U;
-    out_frame->dlc = (uint8_t)((dlc > IW_CAN_DATA_MAX) ? IW_CAN_DATA_MAX : dlc);
-    out_frame->kind = IW_CAN_RECEIVED;
-    bytes_of(fifo->RDLR, &out_frame->data[0]);
-    bytes_of(fifo->RDHR, &out_frame->data[4]);
-    IW_STM32_CAN->RF0R = 1U << 5;
-    return 1;
-}
-
-iw_bus_state_t iw_bxcan_bus_state(void *context) {
     iw_bxcan_t *const self = context;
-    const uint32_t errors = IW_STM32_CAN->ESR;
-    if ((IW_STM32_CAN->MSR & 1U) != 0U) {
-        IW_STM32_CAN->MCR &= ~1U; // Left as soon as the bus has been recessive for 11 bits.
-        return self->is_recovering ? IW_BUS_OFF : IW_BUS_DOWN;
-    }
-    if ((errors & 4U) != 0U) {
-        if (!self->is_recovering) {
-            self->is_recovering = true;
-            (void)iw_bxcan_purge(self);
-            IW_STM32_CAN->MCR |= 1U;
+    iw_can_frame_t frame;
+    uint8_t epoch;
+    while (iw_frame_ring_take(&self->ring, &frame, &epoch)) {
+        if (frame.kind == IW_CAN_RECEIVED || epoch == self->epoch) {
+            *out_frame = frame;
+            return 1;
         }
-        return IW_BUS_OFF;
     }
-    self->is_recovering = false;
-    return ((errors & 2U) != 0U) ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
+    return (self->phase == IW_BXCAN_RUNNING) ? 0 : -1;
 }
 
 int iw_bxcan_purge(void *context) {
     iw_bxcan_t *const self = context;
-    const uint32_t all_empty = 7UL << 26;
-    IW_STM32_CAN->TSR = (1U << 7) | (1U << 15) | (1U << 23);
-    uint32_t poll = 0;
-    while ((IW_STM32_CAN->TSR & all_empty) != all_empty && poll < POLLS_MAX) {
-        poll++;
+    iw_bxcan_registers_t *const registers = self->config.registers;
+    mask_transmit(self);
+    iw_register_write(&registers->TSR, ABORT);
+    const bool done = poll_tsr(self, EMPTY);
+    if (done) {
+        iw_register_write(&registers->TSR, COMPLETED);
+        (void)memset(self->outgoing, 0, sizeof self->outgoing);
+        self->epoch++;
     }
-    for (uint32_t i = 0; i < IW_BXCAN_MAILBOXES; i++) {
-        const bool is_on_bus = (IW_STM32_CAN->TSR & (completed(i) << 1)) != 0U;
-        self->awaiting[i] = self->awaiting[i] && (is_on_bus || poll == POLLS_MAX);
+    unmask_transmit(self);
+    return done ? 1 : 0;
+}
+
+/// Both lead through initialisation mode: bus-off is left by entering and leaving it (bxCAN 7.6), and a device that somebody
+/// has reset or put to sleep begins anew. What waits to be sent must not survive either.
+static void begin(iw_bxcan_t *self, iw_bxcan_phase_t phase) {
+    self->phase = phase;
+    (void)iw_bxcan_purge(self);
+    write_mcr(self, IW_MCR_INRQ);
+}
+
+static void leave_init(iw_bxcan_t *self) {
+    if (iw_bxcan_purge(self) <= 0) {
+        return;
     }
-    return (poll < POLLS_MAX) ? 1 : 0;
+    if (self->phase == IW_BXCAN_STARTING) {
+        configure(self);
+    }
+    self->phase = (self->phase == IW_BXCAN_STARTING) ? IW_BXCAN_JOINING : IW_BXCAN_REJOINING;
+    write_mcr(self, 0);
+}
+
+/// Takes the step that the hardware is ready for, bxCAN 4.1 and 4.2.
+static void advance(iw_bxcan_t *self, uint32_t msr) {
+    const bool in_init = (msr & IW_MSR_INAK) != 0U;
+    if (self->phase == IW_BXCAN_STARTING || self->phase == IW_BXCAN_RECOVERING) {
+        if (in_init) {
+            leave_init(self);
+        } else {
+            write_mcr(self, IW_MCR_INRQ);
+        }
+    } else if ((msr & IW_MSR_SLAK) != 0U) {
+        begin(self, IW_BXCAN_STARTING);
+    } else if (!in_init && !is_bus_off(self)) {
+        self->phase = IW_BXCAN_RUNNING;
+    }
+}
+
+static iw_bus_state_t judge(iw_bxcan_t *self, uint32_t msr) {
+    if (is_bus_off(self)) {
+        self->bus_offs++;
+        begin(self, IW_BXCAN_RECOVERING);
+        return IW_BUS_OFF;
+    }
+    if ((msr & (IW_MSR_INAK | IW_MSR_SLAK)) != 0U) {
+        begin(self, IW_BXCAN_STARTING);
+        return IW_BUS_DOWN;
+    }
+    const bool passive = (iw_register_read(&self->config.registers->ESR) & IW_ESR_EPVF) != 0U;
+    return passive ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
+}
+
+iw_bus_state_t iw_bxcan_bus_state(void *context) {
+    iw_bxcan_t *const self = context;
+    const uint32_t msr = iw_register_read(&self->config.registers->MSR);
+    if (self->phase != IW_BXCAN_RUNNING) {
+        advance(self, msr);
+    }
+    if (self->phase == IW_BXCAN_RUNNING) {
+        return judge(self, msr);
+    }
+    return (self->phase < IW_BXCAN_RUNNING) ? IW_BUS_DOWN : IW_BUS_OFF;
+}
+
+iw_bxcan_errors_t iw_bxcan_errors(const iw_bxcan_t *self) {
+    const uint32_t esr = iw_register_read(&self->config.registers->ESR);
+    return (iw_bxcan_errors_t){(uint8_t)IW_ESR_TEC(esr), (uint8_t)IW_ESR_REC(esr), (uint8_t)IW_ESR_LEC(esr)};
+}
+
+static void put(iw_bxcan_t *self, const iw_can_frame_t *frame) {
+    if (!iw_frame_ring_put(&self->ring, frame, self->epoch)) {
+        self->lost++;
+    }
+}
+
+void iw_bxcan_on_transmit(iw_bxcan_t *self) {
+    iw_register_t *const tsr = &self->config.registers->TSR;
+    const uint32_t flags = iw_register_read(tsr);
+    for (uint32_t mailbox = 0; mailbox < IW_BXCAN_MAILBOXES; mailbox++) {
+        iw_bxcan_outgoing_t *const outgoing = &self->outgoing[mailbox];
+        if ((flags & IW_TSR_RQCP(mailbox)) != 0U) {
+            iw_register_write(tsr, IW_TSR_RQCP(mailbox));
+            outgoing->frame.kind = IW_CAN_ECHO;
+            for (; outgoing->owed > 0U && (flags & IW_TSR_TXOK(mailbox)) != 0U; outgoing->owed--) {
+                put(self, &outgoing->frame);
+            }
+            outgoing->owed = 0;
+        }
+    }
+}
+
+/// One frame of FIFO 0, bxCAN 7.3 and 9.3. The interrupt comes again while there are more; a release still under way shows the old
+/// frame, so it is left for the next time.
+void iw_bxcan_on_receive(iw_bxcan_t *self) {
+    iw_bxcan_registers_t *const registers = self->config.registers;
+    const uint32_t status = iw_register_read(&registers->RF0R);
+    if ((status & IW_RF0R_FOVR0) != 0U) {
+        self->overruns++;
+        iw_register_write(&registers->RF0R, IW_RF0R_FOVR0);
+    }
+    if ((status & IW_RF0R_RFOM0) != 0U || (status & IW_RF0R_FMP0) == 0U) {
+        return;
+    }
+    const uint32_t identifier = iw_register_read(&registers->rx[0].RIR);
+    const uint32_t dlc = iw_register_read(&registers->rx[0].RDTR) & IW_DTR_DLC;
+    const bool extended = (identifier & IW_IR_IDE) != 0U;
+    iw_can_frame_t frame = {.kind = IW_CAN_RECEIVED, .dlc = (uint8_t)((dlc < IW_CAN_DATA_MAX) ? dlc : IW_CAN_DATA_MAX)};
+    frame.id = extended ? ((identifier >> IW_IR_EXID_SHIFT) | IW_CAN_EXTENDED) : (identifier >> IW_IR_STID_SHIFT);
+    frame.id |= ((identifier & IW_IR_RTR) != 0U) ? IW_CAN_REMOTE : 0U;
+    bytes_of(iw_register_read(&registers->rx[0].RDLR), &frame.data[0]);
+    bytes_of(iw_register_read(&registers->rx[0].RDHR), &frame.data[4]);
+    iw_register_write(&registers->RF0R, IW_RF0R_RFOM0);
+    put(self, &frame);
+}
+
+void iw_bxcan_on_error(iw_bxcan_t *self) {
+    iw_register_write(&self->config.registers->MSR, IW_MSR_ERRI);
 }

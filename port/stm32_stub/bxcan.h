@@ -1,28 +1,90 @@
 // SPDX-License-Identifier: MIT
-/// bxCAN as the HAL's bus: send, receive, bus_state, purge. See iwheel/hal.h for their contracts.
+/// bxCAN as the HAL's bus: send, receive, bus_state, purge. See iwheel/hal.h for their contracts; the context is the `iw_bxcan_t`.
 ///
-/// The completion of a mailbox is the echo: the controller reports it only after another node has acknowledged the frame.
-/// Automatic recovery from bus-off is off, so that no loss of the bus goes unreported; `bus_state` recovers step by step.
+///     STARTING --INAK--> JOINING --11 recessive bits--> RUNNING --bus-off--> RECOVERING --INAK--> REJOINING --128 x 11--> RUNNING
+///
+/// Each call of `bus_state` takes the step that the hardware is ready for and never waits: a bus held dominant, a missing transceiver
+/// or a controller that does not answer leave it where it is (`bus_state` then says IW_BUS_DOWN or IW_BUS_OFF), and it goes on
+/// when the cause is gone. Automatic recovery from bus-off is left off, so that no loss of the bus goes unreported.
+///
+/// **Echo.** The completion of a mailbox is the echo: the controller reports it only after another node has acknowledged the frame.
+/// A frame that is handed over while one with the same id waits takes its place: the old mailbox is aborted and its end awaited first,
+/// since equal ids leave by mailbox number and the old one could come last. The replaced frame never reaches the bus; when
+/// its successor does, one echo comes for each, so that the core's account stays whole and no echo comes without an acknowledgement.
+///
+/// **Filters** pass exactly the eleven ids of the iWheel in every format of classic CAN (remote and 29-bit frames with such a number are
+/// counted by the core). Setpoints among them are always somebody else's: bxCAN does not receive what it sends.
+///
+/// Instances share nothing. The handlers of one device must have equal priority; everything else is called from the main loop.
 #ifndef IW_STM32_BXCAN_H
 #define IW_STM32_BXCAN_H
 
+#include "bxcan_registers.h"
+#include "frame_ring.h"
 #include "iwheel/hal.h"
 
-#define IW_BXCAN_MAILBOXES 3U
+/// Filter banks in use, from `first_bank` on.
+#define IW_BXCAN_BANKS 6U
 
 typedef struct {
-    iw_can_frame_t sent[IW_BXCAN_MAILBOXES];
-    bool awaiting[IW_BXCAN_MAILBOXES]; ///< Handed to the controller, echo not delivered yet.
-    bool is_recovering;                ///< The loss was reported and recovery has been asked for.
+    iw_bxcan_registers_t *registers; ///< Clocked, pins set.
+    iw_bxcan_registers_t *filters;   ///< The device that holds the filter banks: of CAN1 and CAN2 always CAN1.
+    uint32_t first_bank;             ///< 0; for CAN2 what FMR.CAN2SB says, 14 after reset.
+    uint32_t bit_timing;             ///< BTR without mode bits: IW_BIT_BTR of bit_rate.h.
+    uint32_t poll_limit;             ///< Reads of a register that take longer than the longest frame, 160 us.
+    bool silent;                     ///< Listen without acknowledging. `send` then always fails.
+} iw_bxcan_config_t;
+
+typedef enum {
+    IW_BXCAN_STARTING = 0, ///< Initialisation mode was asked for.
+    IW_BXCAN_JOINING,      ///< Configured, waiting for 11 recessive bits.
+    IW_BXCAN_RUNNING,
+    IW_BXCAN_RECOVERING, ///< Bus-off, initialisation mode was asked for.
+    IW_BXCAN_REJOINING,  ///< Bus-off, waiting for 128 times 11 recessive bits.
+} iw_bxcan_phase_t;
+
+/// A mailbox and what was put into it.
+typedef struct {
+    iw_can_frame_t frame;
+    uint8_t owed; ///< Echoes that its completion must bring; 0: it is free.
+} iw_bxcan_outgoing_t;
+
+typedef struct {
+    iw_bxcan_config_t config;
+    iw_frame_ring_t ring;
+    iw_bxcan_outgoing_t
+        outgoing[IW_BXCAN_MAILBOXES]; ///< Shared with `on_transmit`: that is masked while others write it.
+    iw_bxcan_phase_t phase;
+    volatile uint32_t overruns; ///< Times that a frame came while the controller's FIFO was full.
+    volatile uint32_t lost;     ///< Frames and echoes that found the ring full.
+    uint32_t bus_offs;          ///< Since the start.
+    uint8_t epoch;              ///< Counts purges: echoes from before one are not delivered.
 } iw_bxcan_t;
 
-/// Configures 1 Mbit/s at 62.5 % and leaves initialisation without waiting for the bus, which may be dead for ever: until it is
-/// there `bus_state` says IW_BUS_DOWN. False if the controller does not answer.
-bool iw_bxcan_init(iw_bxcan_t *self);
+/// What the controller counts. Transmit errors above 255 are bus-off.
+typedef struct {
+    uint8_t transmit_errors;
+    uint8_t receive_errors;
+    uint8_t last_error; ///< 0 none, 1 stuff, 2 form, 3 acknowledgement, 4 recessive bit, 5 dominant bit, 6 CRC.
+} iw_bxcan_errors_t;
 
+/// Takes the device out of sleep and asks for initialisation mode. Configuration follows in `bus_state`. Does not wait. Two devices
+/// that share filter banks must both be initialised before either is RUNNING: filters cannot change while frames come in.
+void iw_bxcan_init(iw_bxcan_t *self, const iw_bxcan_config_t *config);
+
+/// > 0: in a mailbox. 0: no mailbox is free. < 0: not RUNNING, silent, or not a data frame with an 11-bit id. May wait for the end
+/// of a frame on the bus (160 us) when it replaces one.
 int iw_bxcan_send(void *context, const iw_can_frame_t *frame);
 int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame);
 iw_bus_state_t iw_bxcan_bus_state(void *context);
+/// Aborts all mailboxes and waits for their end, 160 us at the most. Echoes that were not delivered yet never come.
 int iw_bxcan_purge(void *context);
+
+/// The device's interrupts: transmit, FIFO 0, and status change and error. The last only wakes the CPU.
+void iw_bxcan_on_transmit(iw_bxcan_t *self);
+void iw_bxcan_on_receive(iw_bxcan_t *self);
+void iw_bxcan_on_error(iw_bxcan_t *self);
+
+iw_bxcan_errors_t iw_bxcan_errors(const iw_bxcan_t *self);
 
 #endif

@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: MIT
-#include <stdint.h>
+#include "cortex_m.h"
 
 int main(void);
-void iw_systick_handler(void);
 void iw_reset_handler(void);
+void iw_systick_handler(void);
+void iw_exti0_handler(void);
+void iw_can_transmit_handler(void);
+void iw_can_receive_handler(void);
+void iw_can_error_handler(void);
 
 extern uint32_t iw_link_stack_top[], iw_link_data_load[], iw_link_data_start[], iw_link_data_end[];
 extern uint32_t iw_link_bss_start[], iw_link_bss_end[];
 
-/// Any fault, and the failure of the crystal (NMI): the watchdog ends it, and the next start sends zeros.
-static void wait_for_watchdog(void) {
-    for (;;) {
-    }
+/// Any fault, the failure of the crystal (NMI) and whatever nobody asked for: begin anew. If setpoints were being sent
+/// the next run begins with zeros; see marker.h.
+static void fault_handler(void) {
+    iw_system_reset();
 }
 
 void iw_reset_handler(void) {
@@ -23,7 +27,7 @@ void iw_reset_handler(void) {
         *to = 0;
     }
     (void)main();
-    wait_for_watchdog();
+    iw_system_reset();
 }
 
 typedef union {
@@ -31,11 +35,23 @@ typedef union {
     uint32_t *stack_top;
 } iw_vector_t;
 
-/// The sixteen vectors of the core. No interrupt of a peripheral is enabled, so their vectors do not exist.
-__attribute__((section(".vectors"), used)) static const iw_vector_t vectors[16] = {
-    {.stack_top = iw_link_stack_top},      {.handler = iw_reset_handler},
-    {.handler = wait_for_watchdog},        {.handler = wait_for_watchdog},
-    {.handler = wait_for_watchdog},        {.handler = wait_for_watchdog},
-    {.handler = wait_for_watchdog},        [11] = {.handler = wait_for_watchdog},
-    [14] = {.handler = wait_for_watchdog}, [15] = {.handler = iw_systick_handler},
+#define EXCEPTIONS 16
+#define VECTORS    (EXCEPTIONS + IW_IRQ_CAN_ERROR + 1)
+
+/// The vectors up to the last interrupt that is enabled. Empty ones cannot come.
+__attribute__((section(".vectors"), used)) static const iw_vector_t vectors[VECTORS] = {
+    [0] = {.stack_top = iw_link_stack_top},
+    [1] = {.handler = iw_reset_handler},
+    [2] = {.handler = fault_handler},
+    [3] = {.handler = fault_handler},
+    [4] = {.handler = fault_handler},
+    [5] = {.handler = fault_handler},
+    [6] = {.handler = fault_handler},
+    [11] = {.handler = fault_handler},
+    [14] = {.handler = fault_handler},
+    [15] = {.handler = iw_systick_handler},
+    [EXCEPTIONS + IW_IRQ_EXTI0] = {.handler = iw_exti0_handler},
+    [EXCEPTIONS + IW_IRQ_CAN_TRANSMIT] = {.handler = iw_can_transmit_handler},
+    [EXCEPTIONS + IW_IRQ_CAN_RECEIVE] = {.handler = iw_can_receive_handler},
+    [EXCEPTIONS + IW_IRQ_CAN_ERROR] = {.handler = iw_can_error_handler},
 };

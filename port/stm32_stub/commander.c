@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+#include "commander.h"
+
+#define CLIENT   1U
+#define RETRY_US 100000U
+
+bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
+    const iw_state_t state = iw_gateway_state(gateway);
+    if (state == IW_STATE_ARMED) {
+        return true;
+    }
+    if (state != IW_STATE_LATCHED && !iw_gateway_arming(gateway) && now_us - self->tried_us >= RETRY_US) {
+        self->tried_us = now_us;
+        (void)iw_gateway_arm(gateway, now_us, CLIENT, false);
+    }
+    return false;
+}
+
+iw_refusal_t iw_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s) {
+    const iw_drive_t drive = {
+        .speed_mm_s = {speed_mm_s, speed_mm_s},
+        .current_mA = {0, 0},
+        .has_current = gateway->config.current_role == IW_ROLE_SETPOINT,
+    };
+    iw_applied_t applied;
+    return iw_gateway_drive(gateway, now_us, CLIENT, &drive, &applied);
+}

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+/// Where the commands come from. **This is the place for a product's own command source**: a joystick, a serial line, a planner.
+///
+/// A source is one file with one function. CMakeLists.txt chooses one of three that come with this port:
+///
+/// | file             | chosen by                                      | does                                              |
+/// |------------------|------------------------------------------------|---------------------------------------------------|
+/// | commander_none.c | nothing configured                             | nothing: the image listens, silently              |
+/// | commander_zero.c | IWHEEL_SETPOINT_TYPE and IWHEEL_CURRENT_ROLE   | arms as soon as it may, holds both wheels at 0/0  |
+/// | commander_demo.c | these and IWHEEL_DEMO                          | as zero; a press of PA1 starts a slow profile     |
+///
+/// Rules for one's own: call `iw_gateway_drive` only with a value that somebody wants *now*, since each accepted call feeds the lease
+/// and the lease is what stops the wheels when nobody is there any more. Do not repeat an old value, do not answer a refusal by
+/// trying again with a nonzero value, never wait in here.
+#ifndef IW_STM32_COMMANDER_H
+#define IW_STM32_COMMANDER_H
+
+#include "iwheel/gateway.h"
+
+/// All state of a command source. All zero before the first call.
+typedef struct {
+    iw_time_us_t tried_us;   ///< When arming was last asked for.
+    iw_time_us_t change_us;  ///< When the button's level last changed.
+    iw_time_us_t profile_us; ///< When the profile began.
+    bool level;              ///< The button's last level: pressed.
+    bool settled;            ///< ... and the one that lasted long enough.
+    bool seen_released;      ///< A button that is held from the start on counts only after it was released.
+    bool running;            ///< The profile.
+} iw_commander_t;
+
+/// True if this source may command: the controller then takes part in the bus. False: it is silent and does not acknowledge.
+bool iw_commander_sends(void);
+
+/// Called once in every cycle, right before `iw_gateway_step`, at least every 20 ms: what it commands leaves in the same cycle. Must
+/// return within a millisecond.
+void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
+
+/// For sources: asks to be armed when that makes sense, and not more often than every 100 ms. True while armed and holder.
+bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
+
+/// For sources: one drive command for both wheels, with the configured maximum current if that is a limit, else with none.
+iw_refusal_t iw_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s);
+
+#endif

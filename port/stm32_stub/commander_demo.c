@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+#include "commander.h"
+#include "pins.h"
+
+#define STABLE_US 20000U
+
+/// Both wheels slowly forward, rest, back, and rest: where it began.
+typedef struct {
+    uint32_t until_us;
+    int32_t speed_mm_s;
+} leg_t;
+
+static const leg_t profile[] = {{2000000U, 100}, {3000000U, 0}, {5000000U, -100}, {6000000U, 0}};
+
+#define LEGS (sizeof profile / sizeof profile[0])
+
+bool iw_commander_sends(void) {
+    return true;
+}
+
+/// True once for each press: low for STABLE_US after it was high for STABLE_US. A held button repeats nothing.
+static bool was_pressed(iw_commander_t *self, iw_time_us_t now_us) {
+    const bool level = iw_pins_button_low();
+    if (level != self->level) {
+        self->level = level;
+        self->change_us = now_us;
+    }
+    if (level == self->settled && self->seen_released) {
+        return false;
+    }
+    if (now_us - self->change_us < STABLE_US) {
+        return false;
+    }
+    self->settled = level;
+    const bool press = level && self->seen_released;
+    self->seen_released = self->seen_released || !level;
+    return press;
+}
+
+static int32_t profile_speed_mm_s(iw_commander_t *self, iw_time_us_t now_us) {
+    for (size_t leg = 0; leg < LEGS && self->running; leg++) {
+        if (now_us - self->profile_us < profile[leg].until_us) {
+            return profile[leg].speed_mm_s;
+        }
+    }
+    self->running = false;
+    return 0;
+}
+
+/// One button: resets a latch; starts the profile; stops it. A press never does two of these.
+void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
+    const bool press = was_pressed(self, now_us);
+    if (!iw_commander_arm(self, gateway, now_us)) {
+        self->running = false;
+        if (press) {
+            (void)iw_gateway_reset(gateway, now_us);
+        }
+        return;
+    }
+    if (press) {
+        self->running = !self->running;
+        self->profile_us = now_us;
+    }
+    (void)iw_commander_drive(gateway, now_us, profile_speed_mm_s(self, now_us));
+}

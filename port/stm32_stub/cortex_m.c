@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#include "cortex_m.h"
+
+#include <stdatomic.h>
+
+#define SYST_CSR  (*(volatile uint32_t *)0xE000E010U) // 4.5.1: enable, interrupt, core clock.
+#define SYST_RVR  (*(volatile uint32_t *)0xE000E014U)
+#define SYST_CVR  (*(volatile uint32_t *)0xE000E018U)
+#define NVIC_ISER (*(volatile uint32_t *)0xE000E100U) // 4.3.2
+#define SCB_AIRCR (*(volatile uint32_t *)0xE000ED0CU) // 4.4.5: key and SYSRESETREQ.
+
+void iw_systick_handler(void);
+
+// Counted by interrupts; there is no other place for them.
+static volatile uint64_t ticks_ms;
+static volatile uint32_t ticks_slept; // The lower half once more, read in one access.
+static atomic_bool is_woken;
+static uint32_t cycles_per_us = 1;
+
+void iw_systick_handler(void) {
+    ticks_ms++;
+    ticks_slept++;
+}
+
+void iw_irq_enable(iw_irq_t irq) {
+    NVIC_ISER = 1UL << (uint32_t)irq;
+}
+
+void iw_time_start(uint32_t core_hz) {
+    cycles_per_us = core_hz / 1000000U;
+    SYST_RVR = core_hz / 1000U - 1U;
+    SYST_CVR = 0;
+    SYST_CSR = 7U;
+}
+
+iw_time_us_t iw_time_now_us(void) {
+    uint64_t now_ms;
+    uint32_t left;
+    do {
+        now_ms = ticks_ms;
+        left = SYST_CVR;
+    } while (now_ms != ticks_ms); // A tick came between the halves or after them.
+    return now_ms * IW_US_PER_MS + (SYST_RVR - left) / cycles_per_us;
+}
+
+void iw_wake(void) {
+    atomic_store_explicit(&is_woken, true, memory_order_relaxed);
+}
+
+/// WFI returns for an interrupt that is pending although held off, so none is missed between the look and the sleep.
+static void sleep_unless_woken(uint32_t tick) {
+    __asm volatile("cpsid i" ::: "memory");
+    if (!atomic_load_explicit(&is_woken, memory_order_relaxed) && ticks_slept == tick) {
+        __asm volatile("dsb\n wfi" ::: "memory");
+    }
+    __asm volatile("cpsie i\n isb" ::: "memory");
+}
+
+void iw_sleep_until(iw_time_us_t until_us) {
+    for (;;) {
+        const uint32_t tick = ticks_slept;
+        if (atomic_load_explicit(&is_woken, memory_order_relaxed) || iw_time_now_us() >= until_us) {
+            break;
+        }
+        sleep_unless_woken(tick);
+    }
+    atomic_store_explicit(&is_woken, false, memory_order_relaxed);
+}
+
+void iw_system_reset(void) {
+    __asm volatile("dsb" ::: "memory");
+    SCB_AIRCR = 0x05FA0004U;
+    __asm volatile("dsb" ::: "memory");
+    for (;;) {
+    }
+}

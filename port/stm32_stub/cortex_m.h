@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+/// What every Cortex-M has inside: time, interrupts, sleep, reset.
+///
+/// Sections are those of PM0056 (Cortex-M3) and PM0214 (Cortex-M4): 4.3 NVIC, 4.4 system control, 4.5 SysTick.
+#ifndef IW_STM32_CORTEX_M_H
+#define IW_STM32_CORTEX_M_H
+
+#include "iwheel/types.h"
+
+/// The interrupts of this port. The numbers are the same on every STM32F1 and F4.
+typedef enum {
+    IW_IRQ_EXTI0 = 6,
+    IW_IRQ_CAN_TRANSMIT = 19,
+    IW_IRQ_CAN_RECEIVE = 20,
+    IW_IRQ_CAN_ERROR = 22,
+} iw_irq_t;
+
+/// Interrupts and exceptions may come from here on, all with the same priority: none interrupts another.
+void iw_irq_enable(iw_irq_t irq);
+
+/// Starts the tick of 1 ms that time is counted with. `core_hz` is a multiple of 1 MHz.
+void iw_time_start(uint32_t core_hz);
+
+/// Microseconds since `iw_time_start`, monotonic. Not from an interrupt, and not while interrupts are held off.
+iw_time_us_t iw_time_now_us(void);
+
+/// Makes the next `iw_sleep_until` return at once. From an interrupt that the main loop must act upon.
+void iw_wake(void);
+
+/// Sleeps until that time, to the next tick, or until `iw_wake` was called since the last return.
+void iw_sleep_until(iw_time_us_t until_us);
+
+/// Does not return. RAM keeps its contents.
+_Noreturn void iw_system_reset(void);
+
+#endif

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+#include "lamp.h"
+
+uint16_t iw_lamp_pattern(const iw_gateway_t *gateway, bool estop_pressed) {
+    if (estop_pressed) {
+        return IW_LAMP_ESTOP;
+    }
+    switch (iw_gateway_state(gateway)) {
+    case IW_STATE_ARMED:
+        return IW_LAMP_ARMED;
+    case IW_STATE_STOPPING:
+        return IW_LAMP_STOPPING;
+    case IW_STATE_LATCHED:
+        return IW_LAMP_LATCHED;
+    case IW_STATE_LISTENING:
+    default:
+        return (gateway->bus < IW_BUS_PASSIVE) ? IW_LAMP_NO_BUS : IW_LAMP_LISTENING;
+    }
+}
+
+bool iw_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us) {
+    return ((pattern >> (now_us / IW_LAMP_SLOT_US % 16U)) & 1U) != 0U;
+}

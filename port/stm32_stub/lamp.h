@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+/// One lamp tells the state: a pattern of 16 slots of 62.5 ms, repeated every second.
+///
+/// | lamp                  | state                                                        |
+/// |-----------------------|--------------------------------------------------------------|
+/// | one short flash       | listening                                                    |
+/// | two short flashes     | listening, and the bus is down, off, or not there yet        |
+/// | three short flashes   | no crystal: the bus is left alone                            |
+/// | steady                | armed                                                        |
+/// | fast, 8 Hz            | stopping                                                     |
+/// | half on, half off     | e-stop pressed                                               |
+/// | 2 Hz                  | latched, e-stop released: waits for reset                    |
+/// | dark, or other        | no power, or no program                                      |
+#ifndef IW_STM32_LAMP_H
+#define IW_STM32_LAMP_H
+
+#include "iwheel/gateway.h"
+
+#define IW_LAMP_SLOT_US 62500U
+
+#define IW_LAMP_LISTENING  0x0001U
+#define IW_LAMP_NO_BUS     0x0005U
+#define IW_LAMP_NO_CRYSTAL 0x0015U
+#define IW_LAMP_ARMED      0xFFFFU
+#define IW_LAMP_STOPPING   0x5555U
+#define IW_LAMP_ESTOP      0x00FFU
+#define IW_LAMP_LATCHED    0x0F0FU
+
+/// The pattern for what the gateway is doing; `estop_pressed` is the contact's level.
+uint16_t iw_lamp_pattern(const iw_gateway_t *gateway, bool estop_pressed);
+
+/// Whether a pattern's lamp is lit at that time.
+bool iw_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us);
+
+#endif

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+/// The independent watchdog: its own oscillator, never to be stopped again. Fed by a complete cycle of the main loop and by nothing
+/// else.
+#ifndef IW_STM32_WATCHDOG_H
+#define IW_STM32_WATCHDOG_H
+
+/// It resets the chip unless fed at least every this many milliseconds, however fast its oscillator.
+#define IW_WATCHDOG_MS 60U
+
+void iw_watchdog_start(void);
+void iw_watchdog_feed(void);
+
+#endif
