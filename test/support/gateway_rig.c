@@ -3,8 +3,10 @@
 
 #include <string.h>
 
-#define SPEED_PERIOD_US 4000U
+#define SPEED_PERIOD_US  4000U
 #define STATUS_PERIOD_US 40000U
+/// Of a longer stall, what the wheels sent before is left out: it would not fit the queue.
+#define STALL_SENDING_US 1000000U
 /// 1 rpm of a wheel of 192 mm.
 #define UM_S_PER_RPM 20106
 
@@ -102,6 +104,11 @@ void gateway_rig_run(gateway_rig_t *self, iw_time_us_t for_us) {
 
 void gateway_rig_stall(gateway_rig_t *self, iw_time_us_t for_us) {
     const iw_time_us_t until_us = self->now_us + for_us;
+    if (for_us > STALL_SENDING_US) {
+        self->now_us = until_us - STALL_SENDING_US;
+        self->wheel[IW_LEFT].speed_us = self->wheel[IW_RIGHT].speed_us = self->now_us;
+        self->wheel[IW_LEFT].status_us = self->wheel[IW_RIGHT].status_us = self->now_us;
+    }
     while (self->now_us < until_us) {
         self->now_us = sooner(self->now_us + 1000U, until_us);
         advance(self);

@@ -6,7 +6,7 @@
 #include "gateway_judge.h"
 
 #define HOLDER ((iw_client_t)7)
-#define OTHER ((iw_client_t)8)
+#define OTHER  ((iw_client_t)8)
 
 typedef struct {
     bool mute;      ///< Sends nothing.

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: MIT
+// What goes wrong while wheels move: button, second master, silent or strange wheels, our own lateness.
+#include "gateway_rig.h"
+#include "unity.h"
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static iw_state_t state(void) {
+    return iw_gateway_state(&rig.gateway);
+}
+
+static const iw_stop_t *stop(void) {
+    return &rig.gateway.permit.stop;
+}
+
+static void drive_on(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
+}
+
+static void assert_latched(iw_cause_t cause) {
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_INT(cause, stop()->cause);
+    TEST_ASSERT_TRUE(stop()->latched);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void assert_no_motion_until_armed_anew(void) {
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(300));
+    gateway_rig_run(&rig, MS(1100));
+    (void)gateway_rig_reset(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_phase(void) {
+    for (uint32_t phase_us = 0; phase_us <= 20000; phase_us += 500) {
+        setUp();
+        drive_on();
+        (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+        gateway_rig_run(&rig, phase_us);
+        gateway_rig_press(&rig, true);
+        gateway_rig_step(&rig);
+        assert_latched(IW_CAUSE_ESTOP_LINE);
+        TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_LEFT]);
+        TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_RIGHT]);
+        TEST_ASSERT_EQUAL_UINT32(1, stop()->detail);
+        tearDown();
+    }
+}
+
+static void test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing(void) {
+    drive_on();
+    rig.bus.echo_delay_us = MS(15);
+    gateway_rig_run(&rig, MS(20));
+    while (rig.bus.unechoed[IW_LEFT] == 0) {
+        gateway_rig_run(&rig, 100);
+    }
+    gateway_rig_press(&rig, true);
+    gateway_rig_step(&rig);
+    assert_latched(IW_CAUSE_ESTOP_LINE);
+    TEST_ASSERT_EQUAL_UINT8(2, rig.bus.unechoed[IW_LEFT]);
+    TEST_ASSERT_EQUAL_UINT8(2, rig.bus.unechoed[IW_RIGHT]);
+}
+
+static void test_gateway_estop_edge_alone_latches(void) {
+    drive_on();
+    rig.bus.estop_edge = true;
+    gateway_rig_step(&rig);
+    assert_latched(IW_CAUSE_ESTOP_LINE);
+    assert_no_motion_until_armed_anew();
+}
+
+static void test_gateway_estop_unreadable_latches_in_every_state(void) {
+    rig.bus.estop_level = -1;
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_UINT32(2, stop()->detail);
+    gateway_rig_run(&rig, MS(2000));
+    TEST_ASSERT_EQUAL_UINT32(0, rig.bus.sent);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, gateway_rig_reset(&rig));
+    rig.bus.estop_level = 0;
+    gateway_rig_run(&rig, MS(1));
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_reset(&rig));
+}
+
+static void test_gateway_estop_held_stays_latched_whoever_asks(void) {
+    drive_on();
+    gateway_rig_press(&rig, true);
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, gateway_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, gateway_rig_drive(&rig, HOLDER, 1, 1));
+    gateway_rig_press(&rig, false);
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_UINT32(1, stop()->number);
+}
+
+static void test_gateway_software_estop_latches_from_anybody(void) {
+    drive_on();
+    iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
+    gateway_rig_step(&rig);
+    assert_latched(IW_CAUSE_ESTOP_SOFTWARE);
+    TEST_ASSERT_EQUAL_UINT32(OTHER, stop()->detail);
+    TEST_ASSERT_EQUAL_INT(400, stop()->applied.wheel[IW_LEFT].speed_mm_s);
+    assert_no_motion_until_armed_anew();
+}
+
+static void test_gateway_reset_while_a_client_still_drives_is_stale(void) {
+    drive_on();
+    iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(2000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, gateway_rig_reset(&rig));
+}
+
+static void test_gateway_second_master_latches_armed_and_stopping(void) {
+    static const uint32_t ids[] = {IW_ID_LEFT_SETPOINT, IW_ID_RIGHT_SETPOINT};
+    for (uint32_t i = 0; i < 4; i++) {
+        setUp();
+        drive_on();
+        if (i >= 2) {
+            gateway_rig_stop(&rig);
+        }
+        gateway_rig_foreign(&rig, ids[i % 2U]);
+        gateway_rig_step(&rig);
+        assert_latched(IW_CAUSE_SECOND_MASTER);
+        TEST_ASSERT_EQUAL_UINT32(ids[i % 2U], stop()->detail);
+        TEST_ASSERT_EQUAL_UINT8(i % 2U == 0 ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
+        tearDown();
+    }
+}
+
+static void test_gateway_second_master_while_listening_is_counted_and_refuses_arm(void) {
+    gateway_rig_run(&rig, MS(1000));
+    gateway_rig_foreign(&rig, 266);
+    fake_bus_put_empty(&rig.bus, 298, 0);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_UINT32(2, rig.gateway.counters.foreign);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SECOND_MASTER, gateway_rig_request_arm(&rig, HOLDER, false));
+    gateway_rig_run(&rig, MS(999));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SECOND_MASTER, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_EQUAL_UINT32(0, rig.bus.sent);
+    gateway_rig_run(&rig, MS(2));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+}
+
+static void test_gateway_second_master_while_arming_ends_it(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.bus.echo_delay_us = MS(10);
+    (void)gateway_rig_request_arm(&rig, HOLDER, false);
+    gateway_rig_foreign(&rig, 266);
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SECOND_MASTER, iw_gateway_arm_refusal(&rig.gateway));
+}
+
+static void test_gateway_silent_wheel_latches_within_its_limit_and_a_period(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        setUp();
+        drive_on();
+        rig.wheel[side].mute = true;
+        (void)gateway_rig_cruise(&rig, 400, 400, MS(45));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+        (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
+        assert_latched(IW_CAUSE_WHEEL_LOST);
+        TEST_ASSERT_EQUAL_UINT8(side == IW_LEFT ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
+        TEST_ASSERT_UINT32_WITHIN(20, 60, stop()->detail);
+        gateway_rig_run(&rig, MS(1100));
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_reset(&rig));
+        tearDown();
+    }
+}
+
+static void test_gateway_both_wheels_silent_are_both_named(void) {
+    drive_on();
+    rig.wheel[IW_LEFT].mute = true;
+    rig.wheel[IW_RIGHT].mute = true;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(80));
+    assert_latched(IW_CAUSE_WHEEL_LOST);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, stop()->sides);
+}
+
+static void test_gateway_never_heard_wheels_refuse_arm(void) {
+    rig.wheel[IW_RIGHT].mute = true;
+    gateway_rig_run(&rig, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_UINT32(0, stop()->number);
+}
+
+static void test_gateway_rebooted_wheel_latches(void) {
+    drive_on();
+    rig.wheel[IW_LEFT].ticks = -40000;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
+    assert_latched(IW_CAUSE_WHEEL_REBOOTED);
+    TEST_ASSERT_EQUAL_UINT32(IW_REBOOT_ODOMETRY, stop()->detail);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
+}
+
+static void test_gateway_wheel_against_its_command_latches(void) {
+    drive_on();
+    rig.wheel[IW_RIGHT].rpm_fixed = true;
+    rig.wheel[IW_RIGHT].rpm = -10;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(295));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
+    assert_latched(IW_CAUSE_FEEDBACK_SIGN);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_RIGHT, stop()->sides);
+    TEST_ASSERT_EQUAL_UINT32(201, stop()->detail);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, rig.gateway.ledger.entry[IW_LEDGER_FEEDBACK_SIGN_RIGHT].state);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, rig.gateway.ledger.entry[IW_LEDGER_FEEDBACK_SIGN_LEFT].state);
+}
+
+static void test_gateway_overspeeding_wheel_latches(void) {
+    drive_on();
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = 36;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(495));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
+    assert_latched(IW_CAUSE_OVERSPEED);
+}
+
+static void test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch(void) {
+    drive_on();
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = 3;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(995));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    const iw_refusal_t refusal = gateway_rig_cruise(&rig, 400, 400, MS(60));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_BLOCKED, refusal);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_BLOCKED, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT32(60, stop()->detail);
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_pushed_wheel_is_no_fault_while_listening(void) {
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = 60;
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
+}
+
+/// A step that much later than the gateway asked to be called, while driving.
+static void stall_in_motion(iw_time_us_t late_us) {
+    setUp();
+    drive_on();
+    (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + late_us);
+}
+
+static void test_gateway_late_step_is_counted_above_20_ms(void) {
+    stall_in_motion(MS(20));
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.late_steps);
+    stall_in_motion(MS(20) + 1U);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.late_steps);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+static void test_gateway_late_by_100_ms_stops_without_ramp_or_tail(void) {
+    stall_in_motion(MS(100) - 1U);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    stall_in_motion(MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT32(100, stop()->detail);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_LEFT]);
+}
+
+static void test_gateway_late_by_more_than_500_ms_latches(void) {
+    stall_in_motion(MS(500));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    stall_in_motion(MS(500) + 1U);
+    assert_latched(IW_CAUSE_LOOP_HUNG);
+    TEST_ASSERT_EQUAL_UINT32(500, stop()->detail);
+    stall_in_motion(MS(5000000));
+    assert_latched(IW_CAUSE_LOOP_HUNG);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX / 1000U, stop()->detail);
+}
+
+static void test_gateway_late_step_in_mid_ramp_leaves_no_tail(void) {
+    drive_on();
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(60));
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(150));
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_late_step_neither_fails_nor_refreshes_a_wheel(void) {
+    drive_on();
+    (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+    rig.wheel[IW_LEFT].mute = true;
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    gateway_rig_run(&rig, MS(45));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
+    assert_latched(IW_CAUSE_WHEEL_LOST);
+}
+
+static void test_gateway_backlog_after_a_late_step_is_still_of_unknown_age(void) {
+    drive_on();
+    (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+    rig.bus.flood = 900;
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
+    TEST_ASSERT_TRUE(rig.gateway.backlog);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.wake_us);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_FALSE(rig.gateway.backlog);
+    TEST_ASSERT_FALSE(iw_wheel_heard(&rig.gateway.wheel[IW_LEFT], rig.now_us));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_TRUE(iw_wheel_heard(&rig.gateway.wheel[IW_LEFT], rig.now_us));
+}
+
+static void test_gateway_what_the_gate_stops_is_an_internal_fault(void) {
+    drive_on();
+    rig.gateway.config.max_speed_mm_s = 100;
+    gateway_rig_run(&rig, MS(20));
+    assert_latched(IW_CAUSE_INTERNAL);
+    TEST_ASSERT_EQUAL_UINT32(IW_GATE_SPEED, stop()->detail);
+    TEST_ASSERT_TRUE(rig.gateway.sender.gate.stopped > 0);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_estop_in_motion_zeroes_both_in_the_same_step_at_any_phase);
+    RUN_TEST(test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing);
+    RUN_TEST(test_gateway_estop_edge_alone_latches);
+    RUN_TEST(test_gateway_estop_unreadable_latches_in_every_state);
+    RUN_TEST(test_gateway_estop_held_stays_latched_whoever_asks);
+    RUN_TEST(test_gateway_software_estop_latches_from_anybody);
+    RUN_TEST(test_gateway_reset_while_a_client_still_drives_is_stale);
+    RUN_TEST(test_gateway_second_master_latches_armed_and_stopping);
+    RUN_TEST(test_gateway_second_master_while_listening_is_counted_and_refuses_arm);
+    RUN_TEST(test_gateway_second_master_while_arming_ends_it);
+    RUN_TEST(test_gateway_silent_wheel_latches_within_its_limit_and_a_period);
+    RUN_TEST(test_gateway_both_wheels_silent_are_both_named);
+    RUN_TEST(test_gateway_never_heard_wheels_refuse_arm);
+    RUN_TEST(test_gateway_rebooted_wheel_latches);
+    RUN_TEST(test_gateway_wheel_against_its_command_latches);
+    RUN_TEST(test_gateway_overspeeding_wheel_latches);
+    RUN_TEST(test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch);
+    RUN_TEST(test_gateway_pushed_wheel_is_no_fault_while_listening);
+    RUN_TEST(test_gateway_late_step_is_counted_above_20_ms);
+    RUN_TEST(test_gateway_late_by_100_ms_stops_without_ramp_or_tail);
+    RUN_TEST(test_gateway_late_by_more_than_500_ms_latches);
+    RUN_TEST(test_gateway_late_step_in_mid_ramp_leaves_no_tail);
+    RUN_TEST(test_gateway_late_step_neither_fails_nor_refreshes_a_wheel);
+    RUN_TEST(test_gateway_backlog_after_a_late_step_is_still_of_unknown_age);
+    RUN_TEST(test_gateway_what_the_gate_stops_is_an_internal_fault);
+    return UNITY_END();
+}

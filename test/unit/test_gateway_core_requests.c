@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: MIT
+// What clients ask for, and what odd frames on the bus do not do.
+#include "gateway_rig.h"
+#include "unity.h"
+#include <string.h>
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static iw_state_t state(void) {
+    return iw_gateway_state(&rig.gateway);
+}
+
+/// Asks without a step; `*out_applied` is poisoned before.
+static iw_refusal_t ask(const iw_drive_t *request, iw_applied_t *out_applied) {
+    memset(out_applied, FIXTURE_POISON, sizeof *out_applied);
+    const iw_refusal_t refusal = iw_gateway_drive(&rig.gateway, rig.now_us, HOLDER, request, out_applied);
+    if (refusal == IW_REFUSE_NONE) {
+        gateway_judge_drive(&rig.judge, true);
+    }
+    return refusal;
+}
+
+static void assert_refused(const iw_drive_t *request, iw_refusal_t expected) {
+    const iw_time_us_t lease_us = rig.gateway.permit.lease_until_us;
+    const iw_pair_t target = rig.gateway.setpoint.target;
+    iw_applied_t applied;
+    iw_applied_t poison;
+    memset(&poison, FIXTURE_POISON, sizeof poison);
+    rig.now_us += 1;
+    TEST_ASSERT_EQUAL_INT(expected, ask(request, &applied));
+    TEST_ASSERT_EQUAL_MEMORY(&poison, &applied, sizeof poison);
+    TEST_ASSERT_EQUAL_UINT64(lease_us, rig.gateway.permit.lease_until_us);
+    TEST_ASSERT_EQUAL_MEMORY(&target, &rig.gateway.setpoint.target, sizeof target);
+}
+
+static void test_gateway_drive_out_of_range_is_refused_whole(void) {
+    static const iw_drive_t requests[] = {{{32768, 0}, {0, 0}, false},        {{0, -32769}, {0, 0}, false},
+                                          {{100, INT32_MAX}, {0, 0}, false},  {{INT32_MIN, 100}, {0, 0}, false},
+                                          {{100, 100}, {2001, 0}, true},      {{100, 100}, {0, 2001}, true},
+                                          {{100, 100}, {-1, 0}, true},        {{100, 100}, {0, -2001}, true},
+                                          {{100, 100}, {INT32_MIN, 0}, true}, {{-32769, 32768}, {2001, 2001}, true}};
+    gateway_rig_arm(&rig);
+    for (size_t i = 0; i < sizeof requests / sizeof requests[0]; i++) {
+        assert_refused(&requests[i], IW_REFUSE_OUT_OF_RANGE);
+        TEST_ASSERT_EQUAL_UINT32(i + 1U, rig.gateway.counters.out_of_range);
+    }
+}
+
+static void test_gateway_drive_out_of_range_counts_as_a_command_that_is_stale(void) {
+    gateway_rig_run(&rig, MS(1000));
+    (void)gateway_rig_drive(&rig, OTHER, 99999, 0);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_EQUAL_INT(OTHER, rig.gateway.permit.stale_client);
+    gateway_rig_run(&rig, MS(600));
+    const iw_drive_t still = {{0, 0}, {2001, 0}, true};
+    assert_refused(&still, IW_REFUSE_OUT_OF_RANGE);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+}
+
+static void test_gateway_drive_without_current_needs_the_role_limit(void) {
+    const iw_drive_t request = {{100, -50}, {0, 0}, false};
+    iw_applied_t applied;
+    rig.config.max_current_mA = 1234;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_arm(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&request, &applied));
+    TEST_ASSERT_EQUAL_INT(1234, applied.pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(1234, applied.pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_EQUAL_INT(100, applied.pair.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT(-50, applied.pair.wheel[IW_RIGHT].speed_mm_s);
+    TEST_ASSERT_FALSE(applied.limited);
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_arm(&rig);
+    assert_refused(&request, IW_REFUSE_MISSING_FIELD);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.out_of_range);
+    TEST_ASSERT_EQUAL_INT(HOLDER, rig.gateway.permit.stale_client);
+}
+
+static void test_gateway_drive_with_a_negative_current_needs_the_role_setpoint(void) {
+    const iw_drive_t request = {{100, 100}, {-2000, 2000}, true};
+    iw_applied_t applied;
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_arm(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&request, &applied));
+    TEST_ASSERT_EQUAL_INT(-2000, applied.pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(2000, applied.pair.wheel[IW_RIGHT].current_mA);
+}
+
+static void test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor(void) {
+    static const struct {
+        iw_drive_t request;
+        iw_command_t left;
+        iw_command_t right;
+        bool limited;
+    } cases[] = {
+        {{{1000, -1000}, {2000, 2000}, true}, {1000, 1000}, {-1000, 1000}, true},
+        {{{1000, 500}, {1000, 900}, true}, {1000, 1000}, {500, 900}, false},
+        {{{2000, 500}, {1000, 900}, true}, {1000, 1000}, {250, 900}, true},
+        {{{-400, 4000}, {1000, 900}, true}, {-100, 1000}, {1000, 900}, true},
+        {{{32767, -32768}, {0, 0}, true}, {999, 0}, {-1000, 0}, true},
+        {{{100, 100}, {500, 2000}, true}, {100, 250}, {100, 1000}, true},
+    };
+    rig.config.max_current_mA = 1000;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_arm(&rig);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        iw_applied_t applied;
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, ask(&cases[i].request, &applied));
+        TEST_ASSERT_EQUAL_INT16(cases[i].left.speed_mm_s, applied.pair.wheel[IW_LEFT].speed_mm_s);
+        TEST_ASSERT_EQUAL_INT16(cases[i].right.speed_mm_s, applied.pair.wheel[IW_RIGHT].speed_mm_s);
+        TEST_ASSERT_EQUAL_INT16(cases[i].left.current_mA, applied.pair.wheel[IW_LEFT].current_mA);
+        TEST_ASSERT_EQUAL_INT16(cases[i].right.current_mA, applied.pair.wheel[IW_RIGHT].current_mA);
+        TEST_ASSERT_EQUAL_INT(cases[i].limited, applied.limited);
+    }
+}
+
+static void test_gateway_current_alone_is_a_command_with_the_role_setpoint_only(void) {
+    const iw_drive_t left = {{0, 0}, {5, 0}, true};
+    const iw_drive_t right = {{0, 0}, {0, 5}, true};
+    const iw_drive_t neither = {{0, 0}, {0, 0}, true};
+    iw_applied_t applied;
+    (void)ask(&left, &applied);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.gateway.permit.stale_us);
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    gateway_rig_begin(&rig, false);
+    (void)ask(&neither, &applied);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.gateway.permit.stale_us);
+    (void)ask(&left, &applied);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.permit.stale_us);
+    rig.now_us += 1;
+    (void)ask(&right, &applied);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.permit.stale_us);
+}
+
+static void test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    gateway_rig_run(&rig, MS(160));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.gateway.permit.stop.cause);
+    setUp();
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    iw_gateway_disconnect(&rig.gateway, rig.now_us, HOLDER);
+    gateway_rig_run(&rig, MS(60));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_TRUE(rig.bus.told_mm_s[IW_LEFT] < 400 && rig.bus.told_mm_s[IW_LEFT] > 250);
+}
+
+static void test_gateway_takeover_happens_at_rest_only(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(500));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, gateway_rig_request_arm(&rig, OTHER, false));
+    TEST_ASSERT_TRUE(gateway_rig_request_arm(&rig, OTHER, true) != IW_REFUSE_NONE);
+    (void)gateway_rig_cruise(&rig, 0, 0, MS(1500));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, OTHER, true));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_HOLDER, gateway_rig_drive(&rig, HOLDER, 100, 100));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_drive(&rig, OTHER, 100, 100));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+static void test_gateway_contradicted_timing_refuses_arm(void) {
+    const iw_bus_facts_t bad = {true, true};
+    const iw_bus_facts_t good = {false, true};
+    iw_gateway_bus_facts(&rig.gateway, &bad);
+    gateway_rig_run(&rig, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_TIMING_MISMATCH, gateway_rig_request_arm(&rig, HOLDER, false));
+    iw_gateway_bus_facts(&rig.gateway, &good);
+    gateway_rig_run(&rig, MS(20));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_TRUE(rig.gateway.facts.echo_proven);
+}
+
+static void test_gateway_arm_in_the_zero_hold_goes_on_without_silence(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 200, 200, MS(500));
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(900));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, OTHER, false));
+    gateway_rig_run(&rig, MS(10));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_remote_extended_error_and_fd_frames_are_counted_and_refresh_nothing(void) {
+    static const uint32_t flags[] = {IW_CAN_REMOTE, IW_CAN_EXTENDED, IW_CAN_ERROR, IW_CAN_FD};
+    gateway_rig_arm(&rig);
+    rig.wheel[IW_LEFT].mute = true;
+    for (uint32_t n = 0; n < 20; n++) {
+        fake_bus_put_empty(&rig.bus, IW_ID_LEFT_SPEED | flags[n % 4U], 4);
+        fake_bus_put_empty(&rig.bus, IW_ID_LEFT_SETPOINT | flags[n % 4U], 5);
+        gateway_rig_run(&rig, MS(4));
+    }
+    TEST_ASSERT_EQUAL_UINT32(40, rig.gateway.counters.bad_format);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.foreign);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.gateway.permit.stop.cause);
+}
+
+static void test_gateway_short_frames_refresh_nothing_and_long_ones_do(void) {
+    gateway_rig_arm(&rig);
+    rig.wheel[IW_LEFT].mute = true;
+    for (uint32_t n = 0; n < 50; n++) {
+        fake_bus_put_empty(&rig.bus, IW_ID_LEFT_SPEED, 8);
+        gateway_rig_run(&rig, MS(4));
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    for (uint32_t n = 0; n < 20; n++) {
+        fake_bus_put_empty(&rig.bus, IW_ID_LEFT_SPEED, 3);
+        fake_bus_put_empty(&rig.bus, IW_ID_LEFT_SPEED, 9);
+        gateway_rig_run(&rig, MS(4));
+    }
+    TEST_ASSERT_EQUAL_UINT32(40, rig.gateway.counters.bad_length);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, rig.gateway.permit.stop.cause);
+}
+
+static void test_gateway_unknown_ids_are_counted_and_do_nothing(void) {
+    gateway_rig_arm(&rig);
+    const uint32_t received = rig.gateway.counters.received;
+    fake_bus_put_empty(&rig.bus, 0x266, 5);
+    fake_bus_put_empty(&rig.bus, 0x7FF, 8);
+    fake_bus_put_empty(&rig.bus, 0, 0);
+    fake_bus_put_empty(&rig.bus, 0x1FFFFFFFU | IW_CAN_EXTENDED, 8);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_UINT32(4, rig.gateway.counters.unknown);
+    TEST_ASSERT_UINT32_WITHIN(2, received, rig.gateway.counters.received);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+static void test_gateway_echo_that_nobody_waits_for_proves_nothing(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.bus.acknowledged = false;
+    iw_can_frame_t echo = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_ECHO};
+    fake_bus_put(&rig.bus, &echo);
+    echo.id = IW_ID_RIGHT_SETPOINT;
+    fake_bus_put(&rig.bus, &echo);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_UINT32(2, rig.gateway.sender.outbox.stray);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.foreign);
+    (void)gateway_rig_request_arm(&rig, HOLDER, false);
+    gateway_rig_run(&rig, MS(60));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+}
+
+static void test_gateway_shutdown_ramps(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    iw_gateway_stop(&rig.gateway, rig.now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SHUTDOWN, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_drive_out_of_range_is_refused_whole);
+    RUN_TEST(test_gateway_drive_out_of_range_counts_as_a_command_that_is_stale);
+    RUN_TEST(test_gateway_drive_without_current_needs_the_role_limit);
+    RUN_TEST(test_gateway_drive_with_a_negative_current_needs_the_role_setpoint);
+    RUN_TEST(test_gateway_drive_above_the_maximum_scales_both_wheels_by_one_factor);
+    RUN_TEST(test_gateway_current_alone_is_a_command_with_the_role_setpoint_only);
+    RUN_TEST(test_gateway_lost_lease_ramps_and_disconnect_does_so_at_once);
+    RUN_TEST(test_gateway_takeover_happens_at_rest_only);
+    RUN_TEST(test_gateway_contradicted_timing_refuses_arm);
+    RUN_TEST(test_gateway_arm_in_the_zero_hold_goes_on_without_silence);
+    RUN_TEST(test_gateway_remote_extended_error_and_fd_frames_are_counted_and_refresh_nothing);
+    RUN_TEST(test_gateway_short_frames_refresh_nothing_and_long_ones_do);
+    RUN_TEST(test_gateway_unknown_ids_are_counted_and_do_nothing);
+    RUN_TEST(test_gateway_echo_that_nobody_waits_for_proves_nothing);
+    RUN_TEST(test_gateway_shutdown_ramps);
+    return UNITY_END();
+}

@@ -1,0 +1,351 @@
+// SPDX-License-Identifier: MIT
+// What leaves, when, and what happens if it cannot.
+#include "gateway_rig.h"
+#include "unity.h"
+#include <string.h>
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static iw_state_t state(void) {
+    return iw_gateway_state(&rig.gateway);
+}
+
+/// Armed and driving straight on at 400 mm/s.
+static void drive_on(void) {
+    gateway_rig_arm(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_RIGHT]);
+}
+
+static void test_gateway_init_refuses_a_bad_configuration_and_leaves_all_untouched(void) {
+    static uint8_t poison[sizeof(iw_gateway_t)];
+    const iw_hal_t hal = fake_bus_hal(&rig.bus);
+    memset(&rig.gateway, FIXTURE_POISON, sizeof rig.gateway);
+    memset(poison, FIXTURE_POISON, sizeof poison);
+    rig.config.lease_ms = 0;
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_LEASE, iw_gateway_init(&rig.gateway, &rig.config, &hal, rig.now_us, false));
+    TEST_ASSERT_EQUAL_MEMORY(poison, &rig.gateway, sizeof poison);
+}
+
+static void test_gateway_listening_sends_nothing(void) {
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_UINT32(0, rig.bus.sent + rig.bus.refused);
+    TEST_ASSERT_TRUE(rig.gateway.counters.received > 1400);
+}
+
+static void test_gateway_copies_its_configuration(void) {
+    rig.config.listen_only = true;
+    rig.config.max_speed_mm_s = 10;
+    drive_on();
+}
+
+static void test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo(void) {
+    gateway_rig_run(&rig, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_EQUAL_UINT32(2, rig.bus.sent);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_EQUAL_INT16(2000, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
+    TEST_ASSERT_TRUE(iw_gateway_arming(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    gateway_rig_run(&rig, 400);
+    TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_EQUAL_UINT32(2, rig.gateway.counters.echoes);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_arm_needs_both_echoes(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.bus.send_result[IW_RIGHT] = 0;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    gateway_rig_run(&rig, MS(60));
+    TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, iw_gateway_arm_refusal(&rig.gateway));
+}
+
+static void test_gateway_arm_without_echo_is_send_stalled_and_silent_again(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.bus.acknowledged = false;
+    (void)gateway_rig_request_arm(&rig, HOLDER, false);
+    gateway_rig_run(&rig, MS(60));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, iw_gateway_arm_refusal(&rig.gateway));
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    const uint32_t sent = rig.bus.sent;
+    gateway_rig_run(&rig, MS(2000));
+    TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, gateway_rig_request_arm(&rig, HOLDER, false));
+    rig.bus.acknowledged = true;
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+}
+
+static void test_gateway_armed_sends_zero_pairs_until_the_first_drive(void) {
+    gateway_rig_arm(&rig);
+    gateway_rig_run(&rig, MS(900));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_EQUAL_UINT32(0, rig.judge.moving_frames);
+    TEST_ASSERT_UINT32_WITHIN(4, 2 * 46, rig.bus.sent);
+}
+
+static void test_gateway_period_is_exact_and_both_frames_leave_together(void) {
+    drive_on();
+    iw_time_us_t last_us = rig.bus.last_us[IW_LEFT];
+    for (uint32_t n = 0; n < 40; n++) {
+        (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+        while (rig.bus.last_us[IW_LEFT] == last_us) {
+            gateway_rig_run(&rig, 100);
+        }
+        TEST_ASSERT_EQUAL_UINT64(last_us + MS(20), rig.bus.last_us[IW_LEFT]);
+        TEST_ASSERT_EQUAL_UINT64(rig.bus.last_us[IW_LEFT], rig.bus.last_us[IW_RIGHT]);
+        last_us = rig.bus.last_us[IW_LEFT];
+    }
+    TEST_ASSERT_EQUAL_UINT32(20000, rig.gateway.sender.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(20000, rig.gateway.sender.gap_max_us);
+}
+
+static void test_gateway_changed_command_leaves_in_the_same_step(void) {
+    drive_on();
+    (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+    gateway_rig_run(&rig, rig.bus.last_us[IW_LEFT] + MS(27) - rig.now_us);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_drive(&rig, HOLDER, 100, 100));
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_LEFT]);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_RIGHT]);
+}
+
+static void test_gateway_inverted_wheel_is_told_the_negated_speed(void) {
+    rig.config.invert[IW_RIGHT] = true;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_EQUAL_INT(300, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(-300, rig.bus.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
+}
+
+static void test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negated_current(void) {
+    rig.config.invert[IW_LEFT] = true;
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(1000));
+    TEST_ASSERT_EQUAL_INT(-300, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(-150, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
+    TEST_ASSERT_EQUAL_INT(150, fake_bus_command(&rig.bus.last[IW_RIGHT]).current_mA);
+}
+
+static void test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        setUp();
+        drive_on();
+        rig.bus.send_result[side] = side == IW_LEFT ? 0 : -1;
+        (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+        const uint32_t refused = rig.bus.refused;
+        while (rig.bus.refused == refused) {
+            gateway_rig_run(&rig, 100);
+        }
+        rig.bus.send_result[side] = 1;
+        gateway_rig_run(&rig, MS(6));
+        TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+        TEST_ASSERT_TRUE(rig.gateway.sender.later > 0);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+        (void)gateway_rig_cruise(&rig, 100, 100, MS(300));
+        TEST_ASSERT_EQUAL_INT(100, rig.bus.told_mm_s[side]);
+        tearDown();
+    }
+}
+
+static void test_gateway_pair_that_never_leaves_is_a_stalled_send(void) {
+    drive_on();
+    rig.bus.send_result[IW_RIGHT] = 0;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(120));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_INT(0, fake_bus_command(&rig.bus.last[IW_LEFT]).speed_mm_s);
+}
+
+static void test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge(void) {
+    drive_on();
+    gateway_rig_run(&rig, MS(1));
+    const uint32_t sent = rig.bus.sent;
+    rig.bus.acknowledged = false;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_EQUAL_UINT32(sent + 2U, rig.bus.sent);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_UINT32_WITHIN(20, 60, rig.gateway.permit.stop.detail);
+    gateway_rig_run(&rig, MS(12000));
+    TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.purges);
+    TEST_ASSERT_EQUAL_UINT32(sent + 4U, rig.bus.sent);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_purged_frames_never_come_out(void) {
+    drive_on();
+    gateway_rig_run(&rig, MS(1));
+    rig.bus.acknowledged = false;
+    rig.bus.purge_result = 1;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.purges);
+    for (uint32_t i = 0; i < rig.bus.flights; i++) {
+        TEST_ASSERT_EQUAL_INT(0, fake_bus_command(&rig.bus.flight[i].frame).speed_mm_s);
+    }
+    rig.bus.told_mm_s[IW_LEFT] = 0;
+    rig.bus.told_mm_s[IW_RIGHT] = 0;
+    rig.bus.acknowledged = true;
+    gateway_rig_run(&rig, MS(2000));
+    TEST_ASSERT_EQUAL_INT(0, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(0, rig.bus.told_mm_s[IW_RIGHT]);
+}
+
+static void test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop(void) {
+    rig.bus.echo_delay_us = MS(30);
+    gateway_rig_arm(&rig);
+    gateway_rig_run(&rig, MS(60));
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.gate.stopped);
+}
+
+static void test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first(void) {
+    static const iw_bus_state_t states[] = {IW_BUS_DOWN, IW_BUS_OFF};
+    for (size_t i = 0; i < 2; i++) {
+        setUp();
+        drive_on();
+        const uint32_t sent = rig.bus.sent;
+        fake_bus_break(&rig.bus, states[i]);
+        gateway_rig_step(&rig);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+        TEST_ASSERT_EQUAL_INT(IW_CAUSE_BUS_DOWN, rig.gateway.permit.stop.cause);
+        TEST_ASSERT_EQUAL_UINT32(states[i], rig.gateway.permit.stop.detail);
+        gateway_rig_run(&rig, MS(300));
+        TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUS_DOWN, gateway_rig_reset(&rig));
+        rig.bus.state = IW_BUS_ACTIVE;
+        gateway_rig_step(&rig);
+        TEST_ASSERT_EQUAL_UINT32(sent + 2U, rig.bus.sent);
+        TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+        gateway_rig_run(&rig, MS(3000));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+        tearDown();
+    }
+}
+
+static void test_gateway_error_passive_bus_still_carries_motion(void) {
+    rig.bus.state = IW_BUS_PASSIVE;
+    drive_on();
+    TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, rig.gateway.bus);
+}
+
+static void test_gateway_stop_ramps_holds_zeros_and_falls_silent(void) {
+    drive_on();
+    gateway_rig_stop(&rig);
+    const iw_time_us_t stop_us = rig.now_us;
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    gateway_rig_run(&rig, MS(150));
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    gateway_rig_run(&rig, MS(150));
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    gateway_rig_run(&rig, MS(1400));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    gateway_rig_run(&rig, MS(400));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    const iw_time_us_t zeros_us = rig.bus.last_us[IW_LEFT] - stop_us;
+    TEST_ASSERT_TRUE(zeros_us > MS(1700) && zeros_us < MS(1840));
+    const uint32_t sent = rig.bus.sent;
+    gateway_rig_run(&rig, MS(5000));
+    TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
+}
+
+static void test_gateway_listen_only_never_sends(void) {
+    rig.config.listen_only = true;
+    for (int restarted = 0; restarted < 2; restarted++) {
+        gateway_rig_begin(&rig, restarted != 0);
+        gateway_rig_run(&rig, MS(1100));
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_LISTEN_ONLY, gateway_rig_request_arm(&rig, HOLDER, false));
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_LISTEN_ONLY, gateway_rig_drive(&rig, HOLDER, 100, 100));
+        gateway_rig_foreign(&rig, 266);
+        gateway_rig_press(&rig, true);
+        gateway_rig_run(&rig, MS(2000));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+        TEST_ASSERT_EQUAL_UINT32(0, rig.bus.sent + rig.bus.refused);
+    }
+}
+
+static void test_gateway_restarted_sends_zeros_then_listens(void) {
+    gateway_rig_begin(&rig, true);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_UINT32(2, rig.bus.sent);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    gateway_rig_run(&rig, MS(1499));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    gateway_rig_run(&rig, MS(2));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_UINT32_WITHIN(4, 150, rig.bus.sent);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.judge.moving_frames);
+}
+
+static void test_gateway_restarted_gives_way_to_another_master(void) {
+    gateway_rig_begin(&rig, true);
+    gateway_rig_run(&rig, MS(10));
+    const uint32_t sent = rig.bus.sent;
+    gateway_rig_foreign(&rig, 298);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    gateway_rig_run(&rig, MS(2000));
+    TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
+}
+
+static void test_gateway_restarted_without_type_sends_nothing(void) {
+    rig.config.setpoint_type_set = false;
+    gateway_rig_begin(&rig, true);
+    gateway_rig_run(&rig, MS(2000));
+    TEST_ASSERT_EQUAL_UINT32(0, rig.bus.sent + rig.bus.refused);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_init_refuses_a_bad_configuration_and_leaves_all_untouched);
+    RUN_TEST(test_gateway_listening_sends_nothing);
+    RUN_TEST(test_gateway_copies_its_configuration);
+    RUN_TEST(test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo);
+    RUN_TEST(test_gateway_arm_needs_both_echoes);
+    RUN_TEST(test_gateway_arm_without_echo_is_send_stalled_and_silent_again);
+    RUN_TEST(test_gateway_armed_sends_zero_pairs_until_the_first_drive);
+    RUN_TEST(test_gateway_period_is_exact_and_both_frames_leave_together);
+    RUN_TEST(test_gateway_changed_command_leaves_in_the_same_step);
+    RUN_TEST(test_gateway_inverted_wheel_is_told_the_negated_speed);
+    RUN_TEST(test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negated_current);
+    RUN_TEST(test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros);
+    RUN_TEST(test_gateway_pair_that_never_leaves_is_a_stalled_send);
+    RUN_TEST(test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge);
+    RUN_TEST(test_gateway_purged_frames_never_come_out);
+    RUN_TEST(test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop);
+    RUN_TEST(test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first);
+    RUN_TEST(test_gateway_error_passive_bus_still_carries_motion);
+    RUN_TEST(test_gateway_stop_ramps_holds_zeros_and_falls_silent);
+    RUN_TEST(test_gateway_listen_only_never_sends);
+    RUN_TEST(test_gateway_restarted_sends_zeros_then_listens);
+    RUN_TEST(test_gateway_restarted_gives_way_to_another_master);
+    RUN_TEST(test_gateway_restarted_without_type_sends_nothing);
+    return UNITY_END();
+}
