@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: MIT
+// The Linux port against a hub and a button played by the test: frames, echoes, losses, edges. Time is an argument; nothing sleeps.
+#include "iwheel_linux/linux_hal.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+static char folder[] = "/tmp/iwheel-linux-XXXXXX";
+static char bus_name[64];
+static char estop_name[64];
+static iw_linux_hal_t hal;
+static iw_hal_t functions;
+static int bus_listener;
+static int estop_listener;
+static int hub;
+static int button;
+static iw_time_us_t now_us;
+
+static int listen_at(const char *name, int type) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", name + 5);
+    (void)unlink(address.sun_path);
+    const int fd = socket(AF_UNIX, type | SOCK_NONBLOCK, 0);
+    TEST_ASSERT_EQUAL_INT(0, bind(fd, (const struct sockaddr *)&address, sizeof address));
+    TEST_ASSERT_EQUAL_INT(0, listen(fd, 4));
+    return fd;
+}
+
+static void press(const char *levels) {
+    TEST_ASSERT_EQUAL_INT((int)strlen(levels), (int)send(button, levels, strlen(levels), MSG_NOSIGNAL));
+}
+
+static int estop(void) {
+    return functions.estop_pressed(functions.context);
+}
+
+static iw_bus_state_t bus(void) {
+    return functions.bus_state(functions.context);
+}
+
+static int receive(iw_can_frame_t *out_frame) {
+    return functions.receive(functions.context, out_frame);
+}
+
+static void tell(uint32_t id, uint8_t dlc, uint8_t mark, uint8_t fill) {
+    struct can_frame raw = {.can_id = id, .len = dlc};
+    raw.__res0 = mark;
+    memset(raw.data, fill, sizeof raw.data);
+    TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)send(hub, &raw, sizeof raw, MSG_NOSIGNAL));
+}
+
+static bool wakes(int fd) {
+    struct pollfd wait = {.fd = fd, .events = POLLIN};
+    return poll(&wait, 1, 0) == 1;
+}
+
+void setUp(void) {
+    const char *culprit = NULL;
+    bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
+    now_us = 1000000;
+    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&hal, bus_name, estop_name, &culprit));
+    functions = iw_linux_hal_functions(&hal);
+    hub = accept(bus_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(hub >= 0);
+    TEST_ASSERT_EQUAL_INT(-1, estop());
+    estop_listener = listen_at(estop_name, SOCK_STREAM); // Only now: the port would wait for its first word at start.
+    iw_linux_hal_tend(&hal, now_us);
+    button = accept(estop_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(button >= 0);
+}
+
+void tearDown(void) {
+    iw_linux_hal_close(&hal);
+    (void)close(hub);
+    (void)close(button);
+    (void)close(bus_listener);
+    (void)close(estop_listener);
+}
+
+static void test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark(void) {
+    const iw_can_frame_t frame = {.id = 266, .dlc = 5, .data = {1, 2, 3, 4, 5}};
+    struct can_frame raw;
+    iw_can_frame_t heard;
+    TEST_ASSERT_TRUE(functions.send(functions.context, &frame) > 0);
+    TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
+    TEST_ASSERT_EQUAL_HEX32(266, raw.can_id);
+    TEST_ASSERT_EQUAL_UINT8(5, raw.len);
+    TEST_ASSERT_EQUAL_UINT8(0, raw.__res0);
+    TEST_ASSERT_EQUAL_MEMORY(frame.data, raw.data, 8);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    tell(266, 5, 1, 9);
+    tell(266, 5, 0, 9);
+    TEST_ASSERT_TRUE(wakes(iw_linux_hal_bus_fd(&hal)));
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
+    TEST_ASSERT_EQUAL_UINT8(IW_CAN_ECHO, heard.kind);
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
+    TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, heard.kind);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_FALSE(wakes(iw_linux_hal_bus_fd(&hal)));
+}
+
+static void test_local_every_frame_of_several_batches_comes_in_order(void) {
+    iw_can_frame_t heard;
+    unsigned expected = 0;
+    for (unsigned i = 0; i < 100; i++) {
+        tell(i, 8, 0, (uint8_t)i);
+    }
+    for (unsigned tries = 0; tries < 300 && expected < 100; tries++) {
+        if (receive(&heard) > 0) {
+            TEST_ASSERT_EQUAL_HEX32(expected, heard.id);
+            expected++;
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT(100, expected);
+}
+
+static void test_local_formats_are_kept_apart(void) {
+    iw_can_frame_t heard;
+    tell(256U | CAN_RTR_FLAG, 4, 0, 0);
+    tell(256U | CAN_EFF_FLAG, 4, 0, 0);
+    tell(0x1ABCDEFU | CAN_EFF_FLAG | CAN_RTR_FLAG, 4, 0, 0);
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
+    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_REMOTE, heard.id);
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
+    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_EXTENDED, heard.id);
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
+    TEST_ASSERT_EQUAL_HEX32(0x1ABCDEFU | IW_CAN_EXTENDED | IW_CAN_REMOTE, heard.id);
+}
+
+static void test_local_messages_of_another_size_are_left_out(void) {
+    iw_can_frame_t heard;
+    char junk[40] = {0};
+    TEST_ASSERT_EQUAL_INT(15, (int)send(hub, junk, 15, 0));
+    TEST_ASSERT_EQUAL_INT(17, (int)send(hub, junk, 17, 0));
+    TEST_ASSERT_EQUAL_INT(40, (int)send(hub, junk, 40, 0));
+    tell(257, 7, 0, 0);
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
+    TEST_ASSERT_EQUAL_HEX32(257, heard.id);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+}
+
+static void test_local_hub_gone_and_back_before_anybody_asked_is_reported_once(void) {
+    iw_can_frame_t heard;
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+    tell(256, 4, 0, 0);
+    (void)close(hub);
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard)); // What came before the end still counts.
+    TEST_ASSERT_TRUE(receive(&heard) < 0);
+    iw_linux_hal_tend(&hal, now_us); // Back at once.
+    hub = accept(bus_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(hub >= 0);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+}
+
+static void test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_off(void) {
+    iw_can_frame_t heard;
+    const iw_can_frame_t frame = {.id = 266, .dlc = 5};
+    (void)close(bus_listener);
+    (void)close(hub);
+    TEST_ASSERT_TRUE(receive(&heard) < 0);
+    unsigned attempts = 0;
+    for (unsigned i = 0; i < 1000; i++) { // A second, asked every millisecond.
+        const iw_time_us_t before_us = iw_linux_hal_next_us(&hal);
+        iw_linux_hal_tend(&hal, now_us);
+        attempts += iw_linux_hal_next_us(&hal) != before_us ? 1U : 0U;
+        TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) > now_us);
+        TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) <= now_us + 200000U);
+        TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
+        TEST_ASSERT_TRUE(functions.send(functions.context, &frame) < 0);
+        TEST_ASSERT_TRUE(receive(&heard) < 0);
+        now_us += 1000;
+    }
+    TEST_ASSERT_TRUE(attempts >= 5 && attempts <= 10);
+    TEST_ASSERT_FALSE(wakes(iw_linux_hal_bus_fd(&hal)));
+    bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
+    now_us += 200000;
+    iw_linux_hal_tend(&hal, now_us);
+    hub = accept(bus_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(hub >= 0);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+}
+
+static void test_local_error_frames_change_the_state_and_are_no_frames(void) {
+    iw_can_frame_t heard;
+    struct can_frame passive = {.can_id = CAN_ERR_FLAG | CAN_ERR_CRTL, .len = 8};
+    passive.data[1] = CAN_ERR_CRTL_TX_PASSIVE;
+    TEST_ASSERT_EQUAL_INT(16, (int)send(hub, &passive, sizeof passive, 0));
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, bus());
+    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
+    tell(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus()); // However short.
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
+}
+
+static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void) {
+    const iw_can_frame_t frame = {.id = 266, .dlc = 5};
+    unsigned sent = 0;
+    int result = 1;
+    while (result > 0) {
+        result = functions.send(functions.context, &frame);
+        sent += result > 0 ? 1U : 0U;
+        TEST_ASSERT_LESS_THAN_UINT(100000, sent);
+    }
+    TEST_ASSERT_EQUAL_INT(0, result);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+    TEST_ASSERT_EQUAL_INT(0, functions.purge(functions.context));
+}
+
+static void test_estop_is_unreadable_until_the_button_has_spoken(void) {
+    TEST_ASSERT_EQUAL_INT(-1, estop());
+    press("0");
+    TEST_ASSERT_TRUE(wakes(iw_linux_hal_estop_fd(&hal)));
+    TEST_ASSERT_EQUAL_INT(0, estop());
+    TEST_ASSERT_EQUAL_INT(0, estop());
+}
+
+static void test_estop_pulse_between_two_looks_is_an_edge(void) {
+    press("0");
+    TEST_ASSERT_EQUAL_INT(0, estop());
+    press("10");
+    TEST_ASSERT_TRUE(estop() > 0);
+    TEST_ASSERT_EQUAL_INT(0, estop());
+    press("1");
+    TEST_ASSERT_TRUE(estop() > 0);
+    TEST_ASSERT_TRUE(estop() > 0);
+    press("0");
+    TEST_ASSERT_TRUE(estop() > 0); // The release is an edge too.
+    TEST_ASSERT_EQUAL_INT(0, estop());
+}
+
+static void test_estop_any_byte_but_zero_is_pressed(void) {
+    press("0");
+    TEST_ASSERT_EQUAL_INT(0, estop());
+    press("?");
+    TEST_ASSERT_TRUE(estop() > 0);
+    TEST_ASSERT_TRUE(estop() > 0);
+}
+
+static void test_estop_connection_lost_and_back_released_was_unreadable_once(void) {
+    press("0");
+    TEST_ASSERT_EQUAL_INT(0, estop());
+    (void)close(button);
+    TEST_ASSERT_EQUAL_INT(-1, estop());
+    iw_linux_hal_tend(&hal, now_us);
+    button = accept(estop_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(button >= 0);
+    TEST_ASSERT_EQUAL_INT(-1, estop());
+    press("0");
+    TEST_ASSERT_EQUAL_INT(0, estop());
+    TEST_ASSERT_EQUAL_INT(0, hal.estop_last);
+}
+
+static void test_hal_refuses_names_without_a_backend_and_keeps_nothing_open(void) {
+    static iw_linux_hal_t other;
+    const char *culprit = NULL;
+    const int before = dup(0);
+    (void)close(before);
+    TEST_ASSERT_EQUAL_INT(ENOTSUP, iw_linux_hal_open(&other, "can0", "none", &culprit));
+    TEST_ASSERT_EQUAL_STRING("can0", culprit);
+    TEST_ASSERT_EQUAL_INT(ENOTSUP, iw_linux_hal_open(&other, bus_name, "gpiochip0:4", &culprit));
+    TEST_ASSERT_EQUAL_STRING("gpiochip0:4", culprit);
+    TEST_ASSERT_EQUAL_INT(ENOENT, iw_linux_hal_open(&other, bus_name, "unix:", &culprit));
+    TEST_ASSERT_EQUAL_STRING("unix:", culprit);
+    char longest[200] = "unix:";
+    memset(&longest[5], 'x', 150);
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_linux_hal_open(&other, longest, "none", &culprit));
+    const int after = dup(0);
+    (void)close(after);
+    TEST_ASSERT_EQUAL_INT(before, after);
+}
+
+static void test_hal_without_an_estop_is_released_and_watches_nothing(void) {
+    static iw_linux_hal_t other;
+    const char *culprit = NULL;
+    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&other, bus_name, "none", &culprit));
+    const iw_hal_t none = iw_linux_hal_functions(&other);
+    TEST_ASSERT_EQUAL_INT(0, none.estop_pressed(none.context));
+    TEST_ASSERT_EQUAL_INT(-1, iw_linux_hal_estop_fd(&other));
+    TEST_ASSERT_FALSE(other.estop_ops->present);
+    iw_linux_hal_close(&other);
+}
+
+int main(void) {
+    if (mkdtemp(folder) == NULL) {
+        return 1;
+    }
+    (void)snprintf(bus_name, sizeof bus_name, "unix:%s/bus", folder);
+    (void)snprintf(estop_name, sizeof estop_name, "unix:%s/estop", folder);
+    UNITY_BEGIN();
+    RUN_TEST(test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark);
+    RUN_TEST(test_local_every_frame_of_several_batches_comes_in_order);
+    RUN_TEST(test_local_formats_are_kept_apart);
+    RUN_TEST(test_local_messages_of_another_size_are_left_out);
+    RUN_TEST(test_local_hub_gone_and_back_before_anybody_asked_is_reported_once);
+    RUN_TEST(test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_off);
+    RUN_TEST(test_local_error_frames_change_the_state_and_are_no_frames);
+    RUN_TEST(test_local_full_hub_means_later_and_nothing_is_lost_or_blocked);
+    RUN_TEST(test_estop_is_unreadable_until_the_button_has_spoken);
+    RUN_TEST(test_estop_pulse_between_two_looks_is_an_edge);
+    RUN_TEST(test_estop_any_byte_but_zero_is_pressed);
+    RUN_TEST(test_estop_connection_lost_and_back_released_was_unreadable_once);
+    RUN_TEST(test_hal_refuses_names_without_a_backend_and_keeps_nothing_open);
+    RUN_TEST(test_hal_without_an_estop_is_released_and_watches_nothing);
+    const int failed = UNITY_END();
+    (void)unlink(bus_name + 5);
+    (void)unlink(estop_name + 5);
+    (void)rmdir(folder);
+    return failed;
+}

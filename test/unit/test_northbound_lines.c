@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+// A connection of the northbound socket (bytes in, lines out), the JSON writer, and the sentence of `why`.
+#include "client.h"
+#include "json_out.h"
+#include "why.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+static gw_client_t client;
+static int peer;
+static char big[GW_REPLY_MAX];
+
+void setUp(void) {
+    int pair[2];
+    TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair));
+    memset(&client, 0, sizeof client);
+    client.id = 7;
+    client.pid = 42;
+    client.fd = pair[0];
+    peer = pair[1];
+    memset(big, 'x', sizeof big);
+}
+
+void tearDown(void) {
+    (void)close(client.fd);
+    (void)close(peer);
+}
+
+static void say(const char *text) {
+    TEST_ASSERT_EQUAL_INT((int)strlen(text), (int)send(peer, text, strlen(text), MSG_NOSIGNAL));
+    gw_client_read(&client);
+}
+
+static void expect_line(const char *text) {
+    size_t length = 0;
+    const char *line = gw_client_line(&client, &length);
+    TEST_ASSERT_NOT_NULL(line);
+    TEST_ASSERT_EQUAL_UINT(strlen(text), length);
+    TEST_ASSERT_EQUAL_INT(0, memcmp(text, line, length));
+    gw_client_drop_line(&client, length);
+}
+
+static void expect_no_line(void) {
+    size_t length = 0;
+    TEST_ASSERT_NULL(gw_client_line(&client, &length));
+}
+
+/// Everything that the other side can read now.
+static size_t drain(char *text, size_t size) {
+    size_t total = 0;
+    ssize_t count = 1;
+    while (count > 0) {
+        gw_client_flush(&client);
+        count = recv(peer, text == NULL ? big : &text[total], text == NULL ? sizeof big : size - total, 0);
+        total += count > 0 ? (size_t)count : 0U;
+    }
+    return total;
+}
+
+static void test_client_byte_by_byte_makes_one_line_only_at_the_newline(void) {
+    const char *text = "{\"cmd\":\"stop\"}";
+    for (const char *c = text; *c != '\0'; c++) {
+        const char byte[2] = {*c, '\0'};
+        say(byte);
+        expect_no_line();
+    }
+    say("\n");
+    expect_line(text);
+    expect_no_line();
+}
+
+static void test_client_several_lines_in_one_read_come_in_order_and_half_a_line_waits(void) {
+    say("one\n\ntwo\nhal");
+    expect_line("one");
+    expect_line("");
+    expect_line("two");
+    expect_no_line();
+    say("f\n");
+    expect_line("half");
+}
+
+static void test_client_half_a_line_at_the_end_is_never_a_line(void) {
+    say("stop");
+    (void)shutdown(peer, SHUT_WR);
+    gw_client_read(&client);
+    TEST_ASSERT_TRUE(client.ended);
+    expect_no_line();
+}
+
+static void test_client_line_of_4096_bytes_fits_and_4097_are_too_long(void) {
+    TEST_ASSERT_EQUAL_INT(GW_LINE_MAX, (int)send(peer, big, GW_LINE_MAX, 0));
+    gw_client_read(&client);
+    TEST_ASSERT_FALSE(gw_client_line_too_long(&client));
+    say("\n");
+    TEST_ASSERT_FALSE(gw_client_line_too_long(&client));
+    gw_client_drop_line(&client, GW_LINE_MAX);
+    TEST_ASSERT_EQUAL_UINT(0, client.in_length);
+    TEST_ASSERT_EQUAL_INT(GW_LINE_MAX + 1, (int)send(peer, big, GW_LINE_MAX + 1U, 0));
+    gw_client_read(&client);
+    TEST_ASSERT_TRUE(gw_client_line_too_long(&client));
+}
+
+static void test_client_reply_goes_out_whole(void) {
+    char text[64] = "";
+    gw_client_reply(&client, "hello\n", 6);
+    TEST_ASSERT_FALSE(gw_client_flushed(&client));
+    TEST_ASSERT_EQUAL_UINT(6, drain(text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING("hello\n", text);
+    TEST_ASSERT_TRUE(gw_client_flushed(&client));
+}
+
+static void test_client_that_does_not_read_loses_events_and_is_told_how_many(void) {
+    unsigned sent = 0;
+    while (client.lost < 5U) { // Socket full, then our half full.
+        gw_client_event(&client, big, 1000);
+        gw_client_flush(&client);
+        TEST_ASSERT_LESS_THAN_UINT(10000, sent++);
+    }
+    TEST_ASSERT_FALSE(client.failed);
+    (void)drain(NULL, 0);
+    gw_client_event(&client, "after\n", 6);
+    char text[128] = "";
+    (void)drain(text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("{\"event\":\"lost\",\"count\":5}\nafter\n", text);
+    TEST_ASSERT_EQUAL_UINT32(0, client.lost);
+}
+
+static void test_client_room_for_the_longest_reply_is_kept_free_of_events(void) {
+    while (client.lost == 0U) {
+        gw_client_event(&client, big, 1000);
+    }
+    gw_client_reply(&client, big, GW_REPLY_MAX);
+    TEST_ASSERT_FALSE(client.failed);
+    gw_client_reply(&client, big, GW_REPLY_MAX);
+    TEST_ASSERT_TRUE(client.failed);
+}
+
+static void test_client_event_to_one_that_is_leaving_is_dropped(void) {
+    gw_client_finish(&client, 1000);
+    gw_client_event(&client, "x\n", 2);
+    TEST_ASSERT_TRUE(gw_client_flushed(&client));
+    TEST_ASSERT_EQUAL_UINT64(1000U + GW_CLOSING_US, client.close_us);
+    gw_client_finish(&client, 5000); // Only the first time counts.
+    TEST_ASSERT_EQUAL_UINT64(1000U + GW_CLOSING_US, client.close_us);
+}
+
+static void test_client_gone_is_noticed_when_written_to(void) {
+    (void)close(peer);
+    gw_client_reply(&client, "x\n", 2);
+    gw_client_flush(&client);
+    TEST_ASSERT_TRUE(client.failed);
+    peer = -1;
+}
+
+static void test_json_escapes_and_separates(void) {
+    char line[256];
+    json_out_t json;
+    json_out_init(&json, line, sizeof line);
+    json_out_open(&json, NULL, '{');
+    json_out_int(&json, "low", INT64_MIN);
+    json_out_text(&json, "t", "a\"b\\c\n\x7f\xE2\x82\xAC");
+    json_out_open(&json, "list", '[');
+    json_out_bool(&json, NULL, true);
+    json_out_null(&json, NULL);
+    json_out_close(&json, ']');
+    json_out_open(&json, "empty", '{');
+    json_out_close(&json, '}');
+    json_out_known(&json, "k", false, 5);
+    json_out_known(&json, "l", true, 5);
+    json_out_text(&json, "n", NULL);
+    json_out_close(&json, '}');
+    const size_t length = json_out_finish(&json);
+    line[length] = '\0';
+    TEST_ASSERT_EQUAL_STRING(
+        "{\"low\":-9223372036854775808,\"t\":\"a\\\"b\\\\c\\u000A\\u007F\xE2\x82\xAC\",\"list\":[true,null],"
+        "\"empty\":{},\"k\":null,\"l\":5,\"n\":null}\n",
+        line);
+}
+
+static void test_json_that_does_not_fit_is_no_line_at_any_size(void) {
+    char line[64];
+    for (size_t size = 1; size <= sizeof line; size++) {
+        json_out_t json;
+        memset(line, 0x5A, sizeof line);
+        json_out_init(&json, line, size);
+        json_out_open(&json, NULL, '{');
+        json_out_text(&json, "event", "lost");
+        json_out_close(&json, '}');
+        const size_t whole = strlen("{\"event\":\"lost\"}\n");
+        TEST_ASSERT_EQUAL_UINT(size > whole ? whole : 0U, json_out_finish(&json));
+        for (size_t i = size; i < sizeof line; i++) {
+            TEST_ASSERT_EQUAL_HEX8(0x5A, line[i]);
+        }
+    }
+}
+
+static const gw_why_context_t context = {"\"joystick\" (client 3, pid 9)", "kerb", "unix:/e", "unix:/b"};
+
+static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
+    static char text[GW_SENTENCE_SIZE];
+    iw_stop_t stop;
+    memset(&stop, 0, sizeof stop);
+    stop.number = 1;
+    stop.cause = cause;
+    stop.sides = sides;
+    stop.detail = detail;
+    stop.from = IW_STATE_ARMED;
+    stop.at_us = 12345678;
+    stop.latched = cause < IW_CAUSE_LOOP_LATE;
+    stop.applied.wheel[IW_LEFT].speed_mm_s = 300;
+    stop.applied.wheel[IW_RIGHT].speed_mm_s = -299;
+    gw_why_sentence(&stop, &context, text, sizeof text);
+    return text;
+}
+
+static void test_why_names_cause_numbers_time_and_cure(void) {
+    TEST_ASSERT_EQUAL_STRING(
+        "left wheel not heard for 53 ms while driving 300/-299 mm/s; zero at once, latched at 12.345 s; "
+        "check the wheel's power and cable, then: iwheelctl reset",
+        sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 53));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_BOTH, UINT32_MAX), "both wheels never heard"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_SECOND_MASTER, 0, 266), "id 266 (0x10A)"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_SOFTWARE, 0, 3), "\"joystick\" (client 3, pid 9) (\"kerb\")"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_LINE, 0, 1), "e-stop unix:/e pressed"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_LINE, 0, 2), "unreadable"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_BUS_DOWN, 0, IW_BUS_OFF), "bus unix:/b is bus-off"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LEASE_LOST, 0, 200), "no drive command for 200 ms"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LEASE_LOST, 0, 200), "ramped to zero at 12.345 s"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LOOP_LATE, 0, 130), "held up for 130 ms"));
+    TEST_ASSERT_NOT_NULL(
+        strstr(sentence(IW_CAUSE_WHEEL_BLOCKED, IW_SIDES_RIGHT, 12), "right wheel blocked: only 12 mm/s"));
+}
+
+static void test_why_has_a_sentence_and_a_name_for_every_cause(void) {
+    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause < IW_CAUSES; cause++) {
+        const char *text = sentence((iw_cause_t)cause, IW_SIDES_LEFT, 1);
+        TEST_ASSERT_TRUE(strlen(text) > 60U);
+        TEST_ASSERT_NOT_NULL(strstr(text, "12.345 s"));
+        TEST_ASSERT_NULL_MESSAGE(strstr(text, "(null)"), text);
+        TEST_ASSERT_TRUE(strcmp("unknown", gw_cause_name((iw_cause_t)cause)) != 0);
+        for (unsigned other = 0; other < cause; other++) {
+            TEST_ASSERT_TRUE(strcmp(gw_cause_name((iw_cause_t)other), gw_cause_name((iw_cause_t)cause)) != 0);
+        }
+    }
+    TEST_ASSERT_EQUAL_STRING("unknown", gw_cause_name((iw_cause_t)IW_CAUSES));
+}
+
+static void test_why_without_a_stop_says_so(void) {
+    char text[GW_SENTENCE_SIZE];
+    iw_stop_t stop;
+    memset(&stop, 0, sizeof stop);
+    gw_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("no stop since the gateway started", text);
+}
+
+static void test_names_of_all_refusals_are_errors_of_the_closed_list(void) {
+    for (unsigned refusal = IW_REFUSE_OUT_OF_RANGE; refusal <= IW_REFUSE_LISTEN_ONLY; refusal++) {
+        const gw_error_t error = gw_error_of((iw_refusal_t)refusal);
+        TEST_ASSERT_TRUE(error > GW_OK && error < GW_INTERNAL);
+    }
+    TEST_ASSERT_EQUAL_INT(GW_OK, gw_error_of(IW_REFUSE_NONE));
+    TEST_ASSERT_EQUAL_INT(GW_INTERNAL, gw_error_of((iw_refusal_t)999));
+    for (unsigned error = 0; error < GW_ERRORS; error++) {
+        TEST_ASSERT_TRUE(strcmp("unknown", gw_error_name((gw_error_t)error)) != 0);
+    }
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        TEST_ASSERT_TRUE(strcmp("unknown", gw_ledger_item_name((iw_ledger_item_t)item)) != 0);
+    }
+    TEST_ASSERT_EQUAL_STRING("offset_doubted", gw_force_validity_name(IW_FORCE_OFFSET_DOUBTED));
+    TEST_ASSERT_EQUAL_STRING("unreadable", gw_estop_name(-1, true));
+    TEST_ASSERT_EQUAL_STRING("none", gw_estop_name(0, false));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_client_byte_by_byte_makes_one_line_only_at_the_newline);
+    RUN_TEST(test_client_several_lines_in_one_read_come_in_order_and_half_a_line_waits);
+    RUN_TEST(test_client_half_a_line_at_the_end_is_never_a_line);
+    RUN_TEST(test_client_line_of_4096_bytes_fits_and_4097_are_too_long);
+    RUN_TEST(test_client_reply_goes_out_whole);
+    RUN_TEST(test_client_that_does_not_read_loses_events_and_is_told_how_many);
+    RUN_TEST(test_client_room_for_the_longest_reply_is_kept_free_of_events);
+    RUN_TEST(test_client_event_to_one_that_is_leaving_is_dropped);
+    RUN_TEST(test_client_gone_is_noticed_when_written_to);
+    RUN_TEST(test_json_escapes_and_separates);
+    RUN_TEST(test_json_that_does_not_fit_is_no_line_at_any_size);
+    RUN_TEST(test_why_names_cause_numbers_time_and_cure);
+    RUN_TEST(test_why_has_a_sentence_and_a_name_for_every_cause);
+    RUN_TEST(test_why_without_a_stop_says_so);
+    RUN_TEST(test_names_of_all_refusals_are_errors_of_the_closed_list);
+    return UNITY_END();
+}
