@@ -148,7 +148,7 @@ class Connecting(WithGateway):
         self.assertIn("refused (too_many_clients): 16 of 16; close one", err)
 
     def test_another_service_on_the_socket_is_told(self):
-        for first in (b"ok iwheel-sim\n", b"[1,2]\n", b"{\"event\":\"hi\"}\n", b"{\"a\":1,\"a\":1}\n", b"x" * 70000, b"\0\n"):
+        for first in (b"ok iwheel-sim\n", b"[1,2]\n", b"{\"event\":\"hi\"}\n", b'{"event":"hello","event":"hello"}\n', b"x" * 70000, b"\0\n"):
             class Other(FakeGateway):
                 def greet(self, connection, first=first):
                     connection.sendall(first)
@@ -374,6 +374,9 @@ class Driving(WithGateway):
         self.assertTrue(45 <= self.gateway.count("drive") <= 52, self.gateway.count("drive"))  # 20 ms apart
         times = self.gateway.times("drive")
         self.assertTrue(0.97 < self.gateway.times("stop")[0] - times[0] < 1.1)
+        # The next drive must not be refused as stale because of this one.
+        wait_until(lambda: self.gateway.closed_at is not None)
+        self.assertGreater(self.gateway.closed_at - times[-1], 0.5)
         arm = next(request for _, request in self.gateway.requests if request["cmd"] == "arm")
         self.assertEqual({"cmd": "arm", "name": "iwheelctl", "id": arm["id"]}, arm)
         first = next(request for _, request in self.gateway.requests if request["cmd"] == "drive")
@@ -408,7 +411,8 @@ class Driving(WithGateway):
             self.assertIn("interrupted after", err)
             self.assertLess(gateway.times("stop")[0] - sent, 0.1)
             self.assert_stopped_once(gateway)
-            self.assertGreater(gateway.count("status"), 2)
+            # One status before arming; then until 0.2 s after the stop, when the wheels stand.
+            self.assertGreater(gateway.times("status")[-1] - gateway.times("stop")[0], 0.2)
 
     def test_signal_before_the_first_answer_counts_no_time(self):
         class NoAnswer(FakeGateway):

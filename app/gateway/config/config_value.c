@@ -4,10 +4,10 @@
 #include <stdarg.h>
 #include <string.h>
 
-#define GEAR_TERM_MAX 1000U
+#define GEAR_TERM_MAX      1000U
 #define INTERFACE_NAME_MAX 15U
-#define GROUP_NAME_MAX 32U
-#define OWNER_READ_WRITE 0600U
+#define GROUP_NAME_MAX     32U
+#define OWNER_READ_WRITE   0600U
 
 __attribute__((format(printf, 2, 3))) static bool wrong(char *out_why, const char *format, ...) {
     va_list list;
@@ -215,7 +215,7 @@ bool config_value_parse(const config_key_t *row, const char *text, gateway_confi
     uint32_t number = 0;
     bool good = false;
     if (text[0] == '\0') {
-        return wrong(out_why, "%s has no value; write one, or delete the line to have the default", row->key);
+        return wrong(out_why, "%s has no value; write one, or leave the key out to have its default", row->key);
     }
     switch (row->kind) {
     case CONFIG_NUMBER:
