@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: MIT
+// Which offset is in force, where it comes from, and whether the net force means anything.
+#include "force_rig.h"
+#include "unity.h"
+
+static force_rig_t rig;
+
+void setUp(void) {
+    force_rig_init(&rig);
+}
+
+void tearDown(void) {}
+
+static void begin(iw_side_t side, bool boot_seen) {
+    force_rig_begin(&rig, side, boot_seen);
+}
+
+static void assert_offset(iw_offset_provenance_t provenance, int32_t offset_mN) {
+    TEST_ASSERT_EQUAL_INT(provenance, rig.force.provenance);
+    TEST_ASSERT_EQUAL_INT32(offset_mN, rig.force.offset_mN);
+}
+
+static void test_force_late_join_takes_the_wheels_offset_at_once(void) {
+    force_rig_hear(&rig, 1000, true);
+    force_rig_offset(&rig, 100);
+    assert_offset(IW_OFFSET_WHEEL, 10000);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.force.offset_us);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+}
+
+static void test_force_late_join_without_offset_frames_lives_on_its_estimate(void) {
+    force_rig_quiet(&rig, 400, 500);
+    assert_offset(IW_OFFSET_ESTIMATED, 5000);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+}
+
+static void test_force_wheels_offset_replaces_the_estimate(void) {
+    force_rig_quiet(&rig, 40, 1010);
+    assert_offset(IW_OFFSET_ESTIMATED, 10100);
+    force_rig_offset(&rig, 100);
+    assert_offset(IW_OFFSET_WHEEL, 10000);
+    force_rig_offset(&rig, 101);
+    assert_offset(IW_OFFSET_WHEEL, 10100);
+}
+
+static void test_force_estimate_does_not_replace_the_wheels_offset(void) {
+    force_rig_offset(&rig, 100);
+    force_rig_quiet(&rig, 40, 1010);
+    assert_offset(IW_OFFSET_WHEEL, 10000);
+    TEST_ASSERT_EQUAL_INT32(10100, rig.force.quality.mean_mN);
+}
+
+static void test_force_wheels_offset_of_a_loaded_start_is_never_taken(void) {
+    begin(IW_LEFT, true);
+    force_rig_quiet(&rig, 20, 100);
+    force_rig_offset(&rig, 100);
+    assert_offset(IW_OFFSET_NONE, 0);
+    force_rig_quiet(&rig, 20, 9000);
+    assert_offset(IW_OFFSET_NONE, 0);
+    for (uint32_t n = 0; n < 60; n++) {
+        force_rig_quiet(&rig, 20, 100);
+        force_rig_offset(&rig, 100);
+        assert_offset(IW_OFFSET_NONE, 0);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
+}
+
+static void test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known(void) {
+    begin(IW_LEFT, true);
+    force_rig_quiet(&rig, 39, 1000);
+    force_rig_offset(&rig, 100);
+    assert_offset(IW_OFFSET_NONE, 0);
+    force_rig_quiet(&rig, 1, 1000);
+    assert_offset(IW_OFFSET_WHEEL, 10000);
+}
+
+static void test_force_restore_fills_nothing_but_a_void(void) {
+    iw_force_restore(&rig.force, -1234);
+    assert_offset(IW_OFFSET_STORED, -1234);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
+    iw_force_restore(&rig.force, 77);
+    assert_offset(IW_OFFSET_STORED, 77);
+    force_rig_hear(&rig, 0, true);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+    force_rig_offset(&rig, 1);
+    iw_force_restore(&rig.force, 5);
+    assert_offset(IW_OFFSET_WHEEL, 100);
+    setUp();
+    force_rig_quiet(&rig, 40, 10);
+    iw_force_restore(&rig.force, 5);
+    assert_offset(IW_OFFSET_ESTIMATED, 100);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    iw_force_restore(&rig.force, 5);
+    assert_offset(IW_OFFSET_OPERATOR, 100);
+}
+
+static void test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators(void) {
+    force_rig_quiet(&rig, 40, 10);
+    iw_force_reopen(&rig.force, true);
+    assert_offset(IW_OFFSET_STORED, 100);
+    setUp();
+    force_rig_offset(&rig, 50);
+    iw_force_reopen(&rig.force, true);
+    assert_offset(IW_OFFSET_STORED, 5000);
+    force_rig_quiet(&rig, 40, 510);
+    assert_offset(IW_OFFSET_ESTIMATED, 5100);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    iw_force_reopen(&rig.force, true);
+    assert_offset(IW_OFFSET_OPERATOR, 5100);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_OPEN, rig.force.quality.window);
+}
+
+static void test_force_reboot_forgets_the_evidence_and_the_wheels_offset(void) {
+    force_rig_quiet(&rig, 40, 100);
+    force_rig_offset(&rig, 100);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.evidence);
+    iw_force_reopen(&rig.force, false);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    force_rig_quiet(&rig, 40, 900);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    assert_offset(IW_OFFSET_ESTIMATED, 9000);
+}
+
+static void test_force_tare_takes_the_mean_of_the_last_two_seconds(void) {
+    force_rig_quiet(&rig, 40, 0);
+    force_rig_quiet(&rig, 39, 200);
+    force_rig_quiet(&rig, 1, 240);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    assert_offset(IW_OFFSET_OPERATOR, 2010);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.force.offset_us);
+}
+
+static void test_force_tare_outlives_what_the_wheel_says(void) {
+    force_rig_quiet(&rig, 40, 200);
+    (void)force_rig_tare(&rig);
+    force_rig_offset(&rig, 99);
+    assert_offset(IW_OFFSET_OPERATOR, 2000);
+}
+
+static void assert_tare_refused(iw_tare_t expected) {
+    const iw_force_t before = rig.force;
+    TEST_ASSERT_EQUAL_INT(expected, force_rig_tare(&rig));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rig.force, sizeof before);
+}
+
+static void test_force_tare_without_two_fresh_seconds_is_refused(void) {
+    assert_tare_refused(IW_TARE_NO_FORCE);
+    force_rig_quiet(&rig, 39, 100);
+    assert_tare_refused(IW_TARE_NO_FORCE);
+    force_rig_quiet(&rig, 1, 100);
+    rig.now_us += MS(250);
+    assert_tare_refused(IW_TARE_NO_FORCE);
+    rig.now_us -= 1;
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    rig.now_us += MS(300);
+    force_rig_quiet(&rig, 1, 100);
+    assert_tare_refused(IW_TARE_NO_FORCE);
+}
+
+static void test_force_tare_while_moving_noisy_drifting_or_saturated_is_refused(void) {
+    force_rig_quiet(&rig, 40, 100);
+    force_rig_hear(&rig, 100, false);
+    force_rig_quiet(&rig, 39, 100);
+    assert_tare_refused(IW_TARE_MOVING);
+    force_rig_quiet(&rig, 1, 100);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    force_rig_alternate(&rig, 0, 300);
+    assert_tare_refused(IW_TARE_NOISY);
+    force_rig_quiet(&rig, 20, 100);
+    force_rig_quiet(&rig, 20, 220);
+    assert_tare_refused(IW_TARE_NOISY);
+    force_rig_quiet(&rig, 39, 100);
+    force_rig_hear(&rig, 32767, true);
+    assert_tare_refused(IW_TARE_SATURATED);
+}
+
+static void test_force_tare_under_load_is_refused(void) {
+    force_rig_quiet(&rig, 40, 100);
+    force_rig_quiet(&rig, 40, 2101);
+    assert_tare_refused(IW_TARE_LOADED);
+    force_rig_quiet(&rig, 40, -1901);
+    assert_tare_refused(IW_TARE_LOADED);
+    force_rig_quiet(&rig, 40, 2100);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+}
+
+static void test_force_tare_without_any_offset_cannot_know_of_a_load(void) {
+    force_rig_alternate(&rig, 0, 3000);
+    force_rig_quiet(&rig, 40, 9000);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.force.provenance);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    assert_offset(IW_OFFSET_OPERATOR, 90000);
+}
+
+static void test_force_tare_settles_a_doubted_offset(void) {
+    force_rig_quiet(&rig, 40, 9000);
+    force_rig_offset(&rig, 100);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
+    force_rig_quiet(&rig, 40, 1000);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+}
+
+static void test_force_contradicted_unit_is_invalid_and_never_rescaled(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        const int16_t wrong = side == IW_LEFT ? 100 : 1000;
+        const int16_t right = side == IW_LEFT ? 1000 : 100;
+        begin((iw_side_t)side, false);
+        force_rig_quiet(&rig, 40, wrong);
+        force_rig_offset(&rig, 100);
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_rig_validity(&rig));
+        TEST_ASSERT_EQUAL_INT32(side == IW_LEFT ? 1000 : 100000, iw_force_raw_mN(&rig.force));
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_rig_validity(&rig));
+        begin((iw_side_t)side, false);
+        force_rig_quiet(&rig, 40, right);
+        force_rig_offset(&rig, 100);
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+    }
+}
+
+static void test_force_removed_offset_is_invalid(void) {
+    force_rig_quiet(&rig, 40, 0);
+    force_rig_offset(&rig, 100);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_REMOVED, force_rig_validity(&rig));
+}
+
+static void test_force_is_stale_after_five_periods(void) {
+    force_rig_quiet(&rig, 40, 0);
+    rig.now_us += MS(250) - 1U;
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+    rig.now_us += 1;
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, force_rig_validity(&rig));
+}
+
+static void test_force_saturated_sample_is_invalid_only_while_it_lasts(void) {
+    force_rig_quiet(&rig, 40, 0);
+    force_rig_hear(&rig, 32767, true);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_SATURATED, force_rig_validity(&rig));
+    force_rig_hear(&rig, -32768, true);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_SATURATED, force_rig_validity(&rig));
+    force_rig_hear(&rig, -32767, true);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+}
+
+static void test_force_extremes_do_not_overflow(void) {
+    begin(IW_RIGHT, false);
+    force_rig_offset(&rig, -32768);
+    force_rig_hear(&rig, 32767, true);
+    TEST_ASSERT_EQUAL_INT32(3276700, iw_force_raw_mN(&rig.force));
+    TEST_ASSERT_EQUAL_INT32(6553500, iw_force_net_mN(&rig.force));
+    begin(IW_RIGHT, false);
+    force_rig_offset(&rig, 32767);
+    force_rig_hear(&rig, -32768, true);
+    TEST_ASSERT_EQUAL_INT32(-6553500, iw_force_net_mN(&rig.force));
+    begin(IW_LEFT, false);
+    force_rig_quiet(&rig, 40, -32767);
+    force_rig_offset(&rig, -32768);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.evidence);
+    begin(IW_LEFT, false);
+    force_rig_quiet(&rig, 40, 32766);
+    force_rig_offset(&rig, -32768);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.evidence);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_force_late_join_takes_the_wheels_offset_at_once);
+    RUN_TEST(test_force_late_join_without_offset_frames_lives_on_its_estimate);
+    RUN_TEST(test_force_wheels_offset_replaces_the_estimate);
+    RUN_TEST(test_force_estimate_does_not_replace_the_wheels_offset);
+    RUN_TEST(test_force_wheels_offset_of_a_loaded_start_is_never_taken);
+    RUN_TEST(test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known);
+    RUN_TEST(test_force_restore_fills_nothing_but_a_void);
+    RUN_TEST(test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators);
+    RUN_TEST(test_force_reboot_forgets_the_evidence_and_the_wheels_offset);
+    RUN_TEST(test_force_tare_takes_the_mean_of_the_last_two_seconds);
+    RUN_TEST(test_force_tare_outlives_what_the_wheel_says);
+    RUN_TEST(test_force_tare_without_two_fresh_seconds_is_refused);
+    RUN_TEST(test_force_tare_while_moving_noisy_drifting_or_saturated_is_refused);
+    RUN_TEST(test_force_tare_under_load_is_refused);
+    RUN_TEST(test_force_tare_without_any_offset_cannot_know_of_a_load);
+    RUN_TEST(test_force_tare_settles_a_doubted_offset);
+    RUN_TEST(test_force_contradicted_unit_is_invalid_and_never_rescaled);
+    RUN_TEST(test_force_removed_offset_is_invalid);
+    RUN_TEST(test_force_is_stale_after_five_periods);
+    RUN_TEST(test_force_saturated_sample_is_invalid_only_while_it_lasts);
+    RUN_TEST(test_force_extremes_do_not_overflow);
+    return UNITY_END();
+}

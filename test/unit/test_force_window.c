@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: MIT
+// The two seconds in which the offset is estimated: what contaminates them, and what they say about the unit.
+#include "force_rig.h"
+#include "unity.h"
+
+static force_rig_t rig;
+
+void setUp(void) {
+    force_rig_init(&rig);
+}
+
+void tearDown(void) {}
+
+static void begin(iw_side_t side, bool boot_seen) {
+    force_rig_begin(&rig, side, boot_seen);
+}
+
+static void assert_window(iw_window_t expected) {
+    TEST_ASSERT_EQUAL_INT(expected, rig.force.quality.window);
+    TEST_ASSERT_EQUAL_INT(expected == IW_WINDOW_GOOD ? IW_OFFSET_ESTIMATED : IW_OFFSET_NONE, rig.force.provenance);
+}
+
+static void test_force_begins_open_and_knows_nothing(void) {
+    assert_window(IW_WINDOW_OPEN);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, force_rig_validity(&rig));
+    TEST_ASSERT_EQUAL_INT32(0, rig.force.offset_mN);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+}
+
+static void test_force_quiet_window_estimates_the_offset_with_its_last_sample(void) {
+    force_rig_quiet(&rig, 39, 1234);
+    assert_window(IW_WINDOW_OPEN);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
+    force_rig_quiet(&rig, 1, 1234);
+    assert_window(IW_WINDOW_GOOD);
+    TEST_ASSERT_EQUAL_INT32(12340, rig.force.offset_mN);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.force.offset_us);
+    TEST_ASSERT_EQUAL_UINT8(40, rig.force.quality.samples);
+    TEST_ASSERT_EQUAL_INT32(12340, rig.force.quality.mean_mN);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.force.quality.deviation_mN);
+    TEST_ASSERT_EQUAL_INT32(0, rig.force.quality.drift_mN);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+    TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.force));
+}
+
+static void test_force_units_are_per_side_as_documented_or_configured(void) {
+    begin(IW_RIGHT, false);
+    force_rig_quiet(&rig, 40, -77);
+    TEST_ASSERT_EQUAL_INT32(-7700, rig.force.offset_mN);
+    force_rig_hear(&rig, 100, true);
+    TEST_ASSERT_EQUAL_INT32(10000, iw_force_raw_mN(&rig.force));
+    TEST_ASSERT_EQUAL_INT32(17700, iw_force_net_mN(&rig.force));
+    rig.config.force_unit[IW_LEFT] = IW_FORCE_DN;
+    rig.config.force_unit[IW_RIGHT] = IW_FORCE_CN;
+    begin(IW_RIGHT, false);
+    force_rig_hear(&rig, 100, true);
+    TEST_ASSERT_EQUAL_INT32(1000, iw_force_raw_mN(&rig.force));
+    begin(IW_LEFT, false);
+    force_rig_hear(&rig, 100, true);
+    TEST_ASSERT_EQUAL_INT32(10000, iw_force_raw_mN(&rig.force));
+}
+
+static void test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy(void) {
+    force_rig_alternate(&rig, 500, 700);
+    assert_window(IW_WINDOW_GOOD);
+    TEST_ASSERT_EQUAL_UINT32(1000, rig.force.quality.deviation_mN);
+    TEST_ASSERT_EQUAL_INT32(6000, rig.force.offset_mN);
+    begin(IW_LEFT, false);
+    force_rig_alternate(&rig, 500, 702);
+    assert_window(IW_WINDOW_NOISY);
+    TEST_ASSERT_EQUAL_UINT32(1010, rig.force.quality.deviation_mN);
+    begin(IW_RIGHT, false);
+    force_rig_alternate(&rig, -10, 10);
+    assert_window(IW_WINDOW_GOOD);
+    TEST_ASSERT_EQUAL_UINT32(1000, rig.force.quality.deviation_mN);
+    begin(IW_RIGHT, false);
+    force_rig_alternate(&rig, -11, 11);
+    assert_window(IW_WINDOW_NOISY);
+}
+
+static void test_force_wildest_noise_does_not_overflow(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        begin((iw_side_t)side, false);
+        force_rig_alternate(&rig, 32766, -32767);
+        assert_window(IW_WINDOW_NOISY);
+        TEST_ASSERT_TRUE(rig.force.quality.deviation_mN > 50000);
+        begin((iw_side_t)side, false);
+        force_rig_alternate(&rig, 0, 1400);
+        assert_window(IW_WINDOW_NOISY);
+        TEST_ASSERT_UINT32_WITHIN(100, side == IW_LEFT ? 7000 : 70000, rig.force.quality.deviation_mN);
+    }
+}
+
+/// First second at one value, the next second at another.
+static void step_at_half(int16_t first, int16_t second) {
+    force_rig_quiet(&rig, 20, first);
+    force_rig_quiet(&rig, 20, second);
+}
+
+static void test_force_drift_up_to_1_N_is_quiet_and_more_is_drift(void) {
+    step_at_half(1000, 1100);
+    assert_window(IW_WINDOW_GOOD);
+    TEST_ASSERT_EQUAL_INT32(1000, rig.force.quality.drift_mN);
+    begin(IW_LEFT, false);
+    step_at_half(1000, 1101);
+    assert_window(IW_WINDOW_DRIFT);
+    begin(IW_LEFT, false);
+    step_at_half(1000, 900);
+    assert_window(IW_WINDOW_GOOD);
+    begin(IW_LEFT, false);
+    step_at_half(1000, 899);
+    assert_window(IW_WINDOW_DRIFT);
+    TEST_ASSERT_EQUAL_INT32(-1010, rig.force.quality.drift_mN);
+}
+
+static void test_force_moving_at_any_sample_contaminates(void) {
+    static const uint32_t moments[] = {0, 1, 20, 38, 39};
+    for (size_t i = 0; i < 5; i++) {
+        begin(IW_LEFT, false);
+        for (uint32_t n = 0; n < 40; n++) {
+            force_rig_hear(&rig, 100, n != moments[i]);
+        }
+        assert_window(IW_WINDOW_MOVING);
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
+    }
+}
+
+static void test_force_saturated_sample_contaminates(void) {
+    static const int16_t limits[] = {32767, -32768};
+    for (size_t i = 0; i < 2; i++) {
+        begin(IW_LEFT, false);
+        force_rig_quiet(&rig, 39, limits[i]);
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_SATURATED, force_rig_validity(&rig));
+        force_rig_quiet(&rig, 1, limits[i]);
+        assert_window(IW_WINDOW_SATURATED);
+    }
+    begin(IW_RIGHT, false);
+    force_rig_hear(&rig, 32767, false);
+    force_rig_quiet(&rig, 39, 0);
+    assert_window(IW_WINDOW_SATURATED);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, force_rig_validity(&rig));
+}
+
+static void test_force_far_from_an_offset_trusted_before_is_a_load(void) {
+    static const int32_t stored_mN[] = {-20000, 20000, -20001, 20001};
+    for (size_t i = 0; i < 4; i++) {
+        begin(IW_LEFT, false);
+        iw_force_restore(&rig.force, stored_mN[i]);
+        force_rig_quiet(&rig, 40, 0);
+        const bool loaded = i >= 2;
+        TEST_ASSERT_EQUAL_INT(loaded ? IW_WINDOW_LOADED : IW_WINDOW_GOOD, rig.force.quality.window);
+        TEST_ASSERT_EQUAL_INT(loaded ? IW_OFFSET_STORED : IW_OFFSET_ESTIMATED, rig.force.provenance);
+        TEST_ASSERT_EQUAL_INT32(loaded ? stored_mN[i] : 0, rig.force.offset_mN);
+    }
+}
+
+static void test_force_gap_starts_the_window_anew(void) {
+    force_rig_quiet(&rig, 39, 100);
+    rig.now_us += MS(200) - 1U;
+    force_rig_hear(&rig, 100, true);
+    assert_window(IW_WINDOW_GOOD);
+    begin(IW_LEFT, false);
+    force_rig_quiet(&rig, 39, 30000);
+    rig.now_us += MS(200);
+    force_rig_hear(&rig, 100, true);
+    assert_window(IW_WINDOW_OPEN);
+    force_rig_quiet(&rig, 38, 100);
+    assert_window(IW_WINDOW_OPEN);
+    force_rig_quiet(&rig, 1, 100);
+    assert_window(IW_WINDOW_GOOD);
+    TEST_ASSERT_EQUAL_INT32(1000, rig.force.offset_mN);
+}
+
+static void test_force_contaminated_window_stays_so_until_a_reboot(void) {
+    force_rig_alternate(&rig, 0, 30000);
+    force_rig_quiet(&rig, 200, 100);
+    assert_window(IW_WINDOW_NOISY);
+    iw_force_reopen(&rig.force, true);
+    assert_window(IW_WINDOW_OPEN);
+    force_rig_quiet(&rig, 40, 100);
+    assert_window(IW_WINDOW_GOOD);
+}
+
+static void test_force_estimate_is_made_once(void) {
+    force_rig_quiet(&rig, 40, 100);
+    const iw_time_us_t offset_us = rig.force.offset_us;
+    force_rig_quiet(&rig, 100, 5000);
+    TEST_ASSERT_EQUAL_INT32(1000, rig.force.offset_mN);
+    TEST_ASSERT_EQUAL_UINT64(offset_us, rig.force.offset_us);
+    TEST_ASSERT_EQUAL_INT32(49000, iw_force_net_mN(&rig.force));
+}
+
+static iw_unit_evidence_t evidence_of(iw_side_t side, int16_t raw, int16_t offset_dN) {
+    begin(side, false);
+    force_rig_quiet(&rig, 40, raw);
+    force_rig_offset(&rig, offset_dN);
+    return rig.force.evidence;
+}
+
+static void test_force_unit_is_told_from_raw_over_offset(void) {
+    static const int16_t offsets_dN[] = {20, 100, 1000, -20, -100, -1000};
+    for (int side = 0; side < IW_SIDES; side++) {
+        for (size_t i = 0; i < 6; i++) {
+            const int16_t offset = offsets_dN[i];
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(10 * offset), offset));
+            TEST_ASSERT_EQUAL_INT32(10000, rig.force.evidence_permille);
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(9 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of((iw_side_t)side, (int16_t)(11 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, evidence_of((iw_side_t)side, offset, offset));
+            TEST_ASSERT_EQUAL_INT32(1000, rig.force.evidence_permille);
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, evidence_of((iw_side_t)side, 0, offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(4 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(offset / 2), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(-offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(-10 * offset), offset));
+            TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of((iw_side_t)side, (int16_t)(14 * offset), offset));
+        }
+    }
+}
+
+static void test_force_unit_evidence_has_fifteen_percent(void) {
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of(IW_LEFT, 8500, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 8499, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, evidence_of(IW_LEFT, 11500, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 11501, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, evidence_of(IW_LEFT, 850, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 849, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, evidence_of(IW_LEFT, 1150, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 1151, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, evidence_of(IW_LEFT, 300, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_OFFSET_REMOVED, evidence_of(IW_LEFT, -300, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 301, 1000));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, -301, 1000));
+}
+
+static void test_force_small_offset_is_no_evidence_unless_it_is_far_off(void) {
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 190, 19));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 0, -19));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 2000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 2001, 0));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, -2001, 0));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
+}
+
+static void test_force_unit_evidence_waits_for_both_and_survives_either_order(void) {
+    force_rig_offset(&rig, 100);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    force_rig_quiet(&rig, 39, 1000);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    force_rig_quiet(&rig, 1, 1000);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_CN, rig.force.evidence);
+}
+
+static void test_force_contaminated_window_is_no_evidence(void) {
+    force_rig_alternate(&rig, 0, 2000);
+    force_rig_offset(&rig, 100);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_force_begins_open_and_knows_nothing);
+    RUN_TEST(test_force_quiet_window_estimates_the_offset_with_its_last_sample);
+    RUN_TEST(test_force_units_are_per_side_as_documented_or_configured);
+    RUN_TEST(test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy);
+    RUN_TEST(test_force_wildest_noise_does_not_overflow);
+    RUN_TEST(test_force_drift_up_to_1_N_is_quiet_and_more_is_drift);
+    RUN_TEST(test_force_moving_at_any_sample_contaminates);
+    RUN_TEST(test_force_saturated_sample_contaminates);
+    RUN_TEST(test_force_far_from_an_offset_trusted_before_is_a_load);
+    RUN_TEST(test_force_gap_starts_the_window_anew);
+    RUN_TEST(test_force_contaminated_window_stays_so_until_a_reboot);
+    RUN_TEST(test_force_estimate_is_made_once);
+    RUN_TEST(test_force_unit_is_told_from_raw_over_offset);
+    RUN_TEST(test_force_unit_evidence_has_fifteen_percent);
+    RUN_TEST(test_force_small_offset_is_no_evidence_unless_it_is_far_off);
+    RUN_TEST(test_force_unit_evidence_waits_for_both_and_survives_either_order);
+    RUN_TEST(test_force_contaminated_window_is_no_evidence);
+    return UNITY_END();
+}

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+// How far and how fast? Unwrapping, jumps, geometry, mirrored wheels.
+#include "fixture.h"
+#include "iwheel/wheel.h"
+#include "unity.h"
+#include <string.h>
+
+static iw_config_t config;
+static iw_wheel_t wheel;
+static iw_time_us_t now_us;
+
+static void begin_side(iw_side_t side) {
+    now_us = FIXTURE_START_US;
+    memset(&wheel, FIXTURE_POISON, sizeof wheel);
+    iw_wheel_init(&wheel, &config, side, now_us);
+}
+
+void setUp(void) {
+    fixture_config(&config);
+    begin_side(IW_LEFT);
+}
+
+void tearDown(void) {}
+
+static void hear_ticks(int32_t ticks) {
+    const iw_proto_message_t message = {IW_PROTO_STATUS, wheel.side, {.status = {ticks, 255, 30, 20}}};
+    now_us += MS(40);
+    iw_wheel_hear(&wheel, now_us, &message, true);
+}
+
+static void hear_speed(int16_t rpm) {
+    const iw_proto_message_t message = {IW_PROTO_SPEED, wheel.side, {.speed = {rpm, -1}}};
+    iw_wheel_hear(&wheel, now_us, &message, true);
+}
+
+/// A jump of that many ticks, so long after the status frame before it.
+static iw_reboot_t jump(int32_t ticks, iw_time_us_t after_us) {
+    begin_side(IW_LEFT);
+    hear_ticks(5000);
+    const iw_time_us_t until_us = now_us + after_us;
+    while (now_us + MS(500) < until_us) {
+        now_us += MS(500);
+        hear_speed(0);
+    }
+    now_us = until_us - MS(40);
+    hear_ticks(5000 + ticks);
+    return iw_wheel_take_reboot(&wheel);
+}
+
+static void test_wheel_first_status_frame_is_no_distance(void) {
+    hear_ticks(INT32_MIN);
+    TEST_ASSERT_EQUAL_INT64(0, wheel.ticks);
+    TEST_ASSERT_EQUAL_INT64(0, iw_wheel_distance_nm(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(255, wheel.status.battery_dV);
+}
+
+static void test_wheel_ticks_add_up_in_both_directions(void) {
+    hear_ticks(100);
+    hear_ticks(110);
+    TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
+    hear_ticks(85);
+    TEST_ASSERT_EQUAL_INT64(-15, wheel.ticks);
+}
+
+static void test_wheel_ticks_unwrap_in_both_directions(void) {
+    hear_ticks(INT32_MAX - 4);
+    hear_ticks(INT32_MIN + 5);
+    TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
+    hear_ticks(INT32_MAX);
+    TEST_ASSERT_EQUAL_INT64(4, wheel.ticks);
+    hear_ticks(INT32_MIN);
+    TEST_ASSERT_EQUAL_INT64(5, wheel.ticks);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+}
+
+static void test_wheel_ticks_go_on_beyond_32_bits(void) {
+    config.radius_mm = 20;
+    config.gear_turns = 100;
+    begin_side(IW_LEFT);
+    wheel.ticks = INT32_MAX;
+    hear_ticks(-20);
+    hear_ticks(0);
+    hear_ticks(20);
+    TEST_ASSERT_EQUAL_INT64((int64_t)INT32_MAX + 40, wheel.ticks);
+    TEST_ASSERT_TRUE(iw_wheel_distance_nm(&wheel) == ((int64_t)INT32_MAX + 40) * (int64_t)wheel.nm_per_tick);
+}
+
+static void test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance(void) {
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(1000, MS(40)));
+    TEST_ASSERT_EQUAL_INT64(0, wheel.ticks);
+    TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(-1000, MS(40)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(INT32_MAX - 5000, MS(40)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(INT32_MIN, MS(40)));
+    hear_ticks(5001 + INT32_MIN);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_TRUE(wheel.ticks <= 1);
+}
+
+/// 10 m/s are 0.4973 ticks in a millisecond.
+static void test_wheel_jump_is_judged_by_the_time_it_took(void) {
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(30, MS(40)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(-30, MS(40)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(49, MS(40)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(51, MS(40)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(-51, MS(40)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(4970, MS(10000)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(-4970, MS(10000)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(5050, MS(10000)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(-5050, MS(10000)));
+}
+
+static void test_wheel_small_jump_is_believed_whatever_the_time(void) {
+    const iw_proto_message_t first = {IW_PROTO_STATUS, IW_LEFT, {.status = {0, 0, 0, 0}}};
+    const iw_proto_message_t second = {IW_PROTO_STATUS, IW_LEFT, {.status = {30, 0, 0, 0}}};
+    const iw_proto_message_t third = {IW_PROTO_STATUS, IW_LEFT, {.status = {61, 0, 0, 0}}};
+    iw_wheel_hear(&wheel, now_us, &first, true);
+    iw_wheel_hear(&wheel, now_us, &second, true);
+    TEST_ASSERT_EQUAL_INT64(30, wheel.ticks);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    iw_wheel_hear(&wheel, now_us, &third, true);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
+}
+
+static void test_wheel_jump_after_hours_without_status_is_still_judged(void) {
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(INT32_MAX - 5000, MS(4294967 + 100000)));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(2000000, MS(4294967 + 100000)));
+}
+
+/// One tick of a wheel of 192 mm is 20.10619 mm, 1 rpm is 20.10619 mm/s.
+static void test_wheel_distance_and_speed_of_the_documented_wheel(void) {
+    hear_ticks(0);
+    hear_ticks(10);
+    TEST_ASSERT_INT64_WITHIN(1000, 201061930, iw_wheel_distance_nm(&wheel));
+    hear_speed(100);
+    TEST_ASSERT_EQUAL_INT(2010, iw_wheel_speed_mm_s(&wheel));
+    hear_speed(-100);
+    TEST_ASSERT_EQUAL_INT(-2010, iw_wheel_speed_mm_s(&wheel));
+    hear_speed(1);
+    TEST_ASSERT_EQUAL_INT(20, iw_wheel_speed_mm_s(&wheel));
+    hear_speed(-1);
+    TEST_ASSERT_EQUAL_INT(-20, iw_wheel_speed_mm_s(&wheel));
+    hear_speed(0);
+    TEST_ASSERT_EQUAL_INT(0, iw_wheel_speed_mm_s(&wheel));
+}
+
+static void test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only(void) {
+    config.gear_turns = 25;
+    config.gear_per = 2;
+    begin_side(IW_LEFT);
+    hear_ticks(0);
+    hear_ticks(25);
+    TEST_ASSERT_INT64_WITHIN(1000, 40212386, iw_wheel_distance_nm(&wheel));
+    hear_speed(100);
+    TEST_ASSERT_EQUAL_INT(2010, iw_wheel_speed_mm_s(&wheel));
+    config.rpm_of_rotor = true;
+    begin_side(IW_LEFT);
+    hear_speed(1000);
+    TEST_ASSERT_INT_WITHIN(1, 1608, iw_wheel_speed_mm_s(&wheel));
+}
+
+/// 2 pi r / 60 in whole nanometres, by the rational 355/113 (wrong by 1e-7).
+static int64_t nm_per_turn_60th(uint32_t radius_mm) {
+    return (int64_t)radius_mm * 1000000 * 355 / (113 * 30);
+}
+
+static void test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere(void) {
+    static const uint16_t radii_mm[] = {20, 33, 192, 499, 500};
+    static const uint16_t gears[][2] = {{1, 1}, {3, 2}, {7, 3}, {100, 1}, {1000, 10}, {999, 998}};
+    for (size_t r = 0; r < 5; r++) {
+        for (size_t g = 0; g < 6; g++) {
+            config.radius_mm = radii_mm[r];
+            config.gear_turns = gears[g][0];
+            config.gear_per = gears[g][1];
+            begin_side(IW_LEFT);
+            hear_ticks(0);
+            hear_ticks(10);
+            const int64_t expected_nm = nm_per_turn_60th(radii_mm[r]) * 10 * gears[g][1] / gears[g][0];
+            const uint64_t margin_nm = (uint64_t)expected_nm / 100000U + 100U;
+            TEST_ASSERT_INT64_WITHIN(margin_nm, expected_nm, iw_wheel_distance_nm(&wheel));
+        }
+    }
+}
+
+static void test_wheel_speed_extremes_do_not_overflow(void) {
+    static const int16_t extremes[] = {32767, -32768};
+    for (int rotor = 0; rotor < 2; rotor++) {
+        config.radius_mm = 500;
+        config.rpm_of_rotor = rotor != 0;
+        begin_side(IW_LEFT);
+        for (size_t i = 0; i < 2; i++) {
+            hear_speed(extremes[i]);
+            const int64_t expected_mm_s = nm_per_turn_60th(500) * extremes[i] / 1000000;
+            TEST_ASSERT_INT64_WITHIN(40, expected_mm_s, iw_wheel_speed_mm_s(&wheel));
+            TEST_ASSERT_EQUAL_INT(extremes[i], wheel.speed.speed_rpm);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(-1, wheel.speed.acceleration_raw);
+}
+
+static void test_wheel_inverted_negates_what_the_machine_sees_only(void) {
+    config.invert[IW_RIGHT] = true;
+    begin_side(IW_RIGHT);
+    hear_ticks(0);
+    hear_ticks(10);
+    hear_speed(100);
+    TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
+    TEST_ASSERT_EQUAL_INT(100, wheel.speed.speed_rpm);
+    TEST_ASSERT_INT64_WITHIN(1000, -201061930, iw_wheel_distance_nm(&wheel));
+    TEST_ASSERT_EQUAL_INT(-2010, iw_wheel_speed_mm_s(&wheel));
+    begin_side(IW_LEFT);
+    hear_speed(100);
+    TEST_ASSERT_EQUAL_INT(2010, iw_wheel_speed_mm_s(&wheel));
+}
+
+static void test_wheel_distance_survives_reboots(void) {
+    hear_ticks(1000);
+    hear_ticks(1010);
+    hear_ticks(0);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
+    hear_ticks(7);
+    TEST_ASSERT_EQUAL_INT64(17, wheel.ticks);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_wheel_first_status_frame_is_no_distance);
+    RUN_TEST(test_wheel_ticks_add_up_in_both_directions);
+    RUN_TEST(test_wheel_ticks_unwrap_in_both_directions);
+    RUN_TEST(test_wheel_ticks_go_on_beyond_32_bits);
+    RUN_TEST(test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance);
+    RUN_TEST(test_wheel_jump_is_judged_by_the_time_it_took);
+    RUN_TEST(test_wheel_small_jump_is_believed_whatever_the_time);
+    RUN_TEST(test_wheel_jump_after_hours_without_status_is_still_judged);
+    RUN_TEST(test_wheel_distance_and_speed_of_the_documented_wheel);
+    RUN_TEST(test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only);
+    RUN_TEST(test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere);
+    RUN_TEST(test_wheel_speed_extremes_do_not_overflow);
+    RUN_TEST(test_wheel_inverted_negates_what_the_machine_sees_only);
+    RUN_TEST(test_wheel_distance_survives_reboots);
+    return UNITY_END();
+}

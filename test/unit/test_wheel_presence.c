@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: MIT
+// Is a wheel there, at rest, or back from a reboot?
+#include "fixture.h"
+#include "iwheel/wheel.h"
+#include "unity.h"
+#include <string.h>
+
+#define SILENT_US MS(50)
+
+static iw_config_t config;
+static iw_wheel_t wheel;
+static iw_time_us_t now_us;
+
+static void begin(void) {
+    now_us = FIXTURE_START_US;
+    memset(&wheel, FIXTURE_POISON, sizeof wheel);
+    iw_wheel_init(&wheel, &config, IW_LEFT, now_us);
+}
+
+void setUp(void) {
+    fixture_config(&config);
+    begin();
+}
+
+void tearDown(void) {}
+
+static void hear_as(int16_t rpm, bool fresh) {
+    const iw_proto_message_t message = {IW_PROTO_SPEED, IW_LEFT, {.speed = {rpm, 0}}};
+    iw_wheel_hear(&wheel, now_us, &message, fresh);
+}
+
+static void hear(int16_t rpm) {
+    hear_as(rpm, true);
+}
+
+static void hear_status(int32_t ticks) {
+    const iw_proto_message_t message = {IW_PROTO_STATUS, IW_LEFT, {.status = {ticks, 240, 30, 20}}};
+    iw_wheel_hear(&wheel, now_us, &message, true);
+}
+
+static void hear_other(iw_proto_kind_t kind) {
+    iw_proto_message_t message;
+    memset(&message, 0, sizeof message);
+    message.kind = kind;
+    iw_wheel_hear(&wheel, now_us, &message, true);
+}
+
+/// Speed frames every 4 ms for so long.
+static void hear_for(iw_time_us_t for_us, int16_t rpm) {
+    const iw_time_us_t until_us = now_us + for_us;
+    while (now_us + MS(4) <= until_us) {
+        now_us += MS(4);
+        hear(rpm);
+    }
+    now_us = until_us;
+}
+
+static void test_wheel_never_heard_is_lost_and_not_at_rest(void) {
+    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
+    TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    iw_wheel_excuse(&wheel, now_us + MS(100));
+    TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(100)));
+}
+
+static void test_wheel_is_heard_for_exactly_its_silence_limit(void) {
+    static const uint16_t limits_ms[] = {20, 50, 200};
+    for (size_t i = 0; i < 3; i++) {
+        config.wheel_silent_ms = limits_ms[i];
+        begin();
+        hear(5);
+        TEST_ASSERT_TRUE(iw_wheel_heard(&wheel, now_us));
+        TEST_ASSERT_TRUE(iw_wheel_heard(&wheel, now_us + MS(limits_ms[i]) - 1U));
+        TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us + MS(limits_ms[i]) - 1U));
+        TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us + MS(limits_ms[i])));
+        TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(limits_ms[i])));
+        TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(limits_ms[i]) + 4294967296ULL));
+    }
+}
+
+static void test_wheel_is_kept_alive_by_speed_frames_only(void) {
+    static const iw_proto_kind_t others[] = {IW_PROTO_STATUS, IW_PROTO_FORCE, IW_PROTO_OFFSET, IW_PROTO_POSE};
+    hear(0);
+    for (uint32_t n = 0; n < 40; n++) {
+        now_us += MS(2);
+        hear_other(others[n % 4U]);
+    }
+    TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
+    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
+}
+
+static void test_wheel_is_not_found_by_frames_of_unknown_age(void) {
+    hear_as(7, false);
+    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
+    TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
+    TEST_ASSERT_EQUAL_INT(7, wheel.speed.speed_rpm);
+    hear(0);
+    now_us += SILENT_US - 1U;
+    hear_as(0, false);
+    TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + 1U));
+    hear(0);
+    TEST_ASSERT_TRUE(iw_wheel_heard(&wheel, now_us + 1U));
+}
+
+static void test_wheel_silence_during_our_stall_is_excused_once(void) {
+    hear(0);
+    now_us += MS(300);
+    iw_wheel_excuse(&wheel, now_us);
+    TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us));
+    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
+    TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us + SILENT_US - 1U));
+    TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + SILENT_US));
+    iw_wheel_excuse(&wheel, now_us + MS(40));
+    hear_as(0, false);
+    iw_wheel_excuse(&wheel, now_us + MS(41));
+    TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + SILENT_US));
+}
+
+static void test_wheel_is_excused_again_after_a_fresh_frame(void) {
+    hear(0);
+    now_us += MS(300);
+    iw_wheel_excuse(&wheel, now_us);
+    hear(0);
+    now_us += MS(300);
+    iw_wheel_excuse(&wheel, now_us);
+    TEST_ASSERT_FALSE(iw_wheel_lost(&wheel, now_us));
+}
+
+static void test_wheel_at_rest_counts_an_unbroken_run(void) {
+    hear(0);
+    const iw_time_us_t start_us = now_us;
+    hear_for(MS(200), 0);
+    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, start_us + MS(200), 200000));
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, start_us + MS(200) - 1U, 200000));
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, start_us + MS(200), 500000));
+    now_us += MS(4);
+    hear(3);
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    now_us += MS(4);
+    hear(0);
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 1));
+    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us + 1U, 1));
+}
+
+static void test_wheel_at_rest_has_its_limit_in_both_directions(void) {
+    static const struct {
+        int16_t rpm;
+        bool rest;
+    } cases[] = {{0, true},   {2, true},      {-2, true},      {3, false},
+                 {-3, false}, {32767, false}, {-32768, false}, {-32767, false}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        begin();
+        hear(cases[i].rpm);
+        TEST_ASSERT_EQUAL_INT(cases[i].rest, iw_wheel_at_rest(&wheel, now_us, 0));
+    }
+    config.rest_rpm = 0;
+    begin();
+    hear(1);
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+}
+
+static void test_wheel_rest_is_broken_by_a_gap(void) {
+    hear(0);
+    hear_for(MS(400), 0);
+    now_us += SILENT_US - 4000U;
+    hear(0);
+    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us, 400000));
+    now_us += SILENT_US;
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    hear(0);
+    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 1));
+}
+
+static void test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_age(void) {
+    hear_as(0, false);
+    hear(5);
+    hear_as(0, false);
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    hear(0);
+    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us, 0));
+    hear_as(30, false);
+    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+}
+
+static void test_wheel_silent_for_a_second_has_rebooted(void) {
+    hear(0);
+    now_us += MS(1000) - 1U;
+    hear(0);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    now_us += MS(1000);
+    hear(0);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
+    TEST_ASSERT_TRUE(wheel.boot_seen);
+}
+
+static void test_wheel_that_sends_anything_is_not_silent(void) {
+    hear(0);
+    for (uint32_t n = 0; n < 30; n++) {
+        now_us += MS(40);
+        hear_status(0);
+    }
+    hear(0);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+}
+
+static void test_wheel_silence_of_our_own_stall_is_no_reboot(void) {
+    hear(0);
+    now_us += MS(5000);
+    iw_wheel_excuse(&wheel, now_us);
+    hear_as(0, false);
+    now_us += MS(4);
+    hear(0);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+}
+
+static void test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen(void) {
+    now_us += MS(1000) - 1U;
+    hear(0);
+    TEST_ASSERT_FALSE(wheel.boot_seen);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    begin();
+    now_us += MS(1000);
+    hear(0);
+    TEST_ASSERT_TRUE(wheel.boot_seen);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
+}
+
+static void test_wheel_offset_frames_after_their_time_tell_of_a_reboot(void) {
+    hear(0);
+    hear_for(MS(61000), 0);
+    hear_other(IW_PROTO_OFFSET);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    now_us += 1;
+    hear_other(IW_PROTO_OFFSET);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
+    for (uint32_t n = 0; n < 60; n++) {
+        hear_for(MS(1000), 0);
+        hear_other(IW_PROTO_OFFSET);
+        TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    }
+    TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
+}
+
+static void test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew(void) {
+    hear(0);
+    hear_status(1000000);
+    now_us += MS(10000);
+    hear_status(0);
+    hear(0);
+    now_us += MS(40);
+    hear_status(1);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
+    TEST_ASSERT_TRUE(wheel.ticks == 1);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_wheel_never_heard_is_lost_and_not_at_rest);
+    RUN_TEST(test_wheel_is_heard_for_exactly_its_silence_limit);
+    RUN_TEST(test_wheel_is_kept_alive_by_speed_frames_only);
+    RUN_TEST(test_wheel_is_not_found_by_frames_of_unknown_age);
+    RUN_TEST(test_wheel_silence_during_our_stall_is_excused_once);
+    RUN_TEST(test_wheel_is_excused_again_after_a_fresh_frame);
+    RUN_TEST(test_wheel_at_rest_counts_an_unbroken_run);
+    RUN_TEST(test_wheel_at_rest_has_its_limit_in_both_directions);
+    RUN_TEST(test_wheel_rest_is_broken_by_a_gap);
+    RUN_TEST(test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_age);
+    RUN_TEST(test_wheel_silent_for_a_second_has_rebooted);
+    RUN_TEST(test_wheel_that_sends_anything_is_not_silent);
+    RUN_TEST(test_wheel_silence_of_our_own_stall_is_no_reboot);
+    RUN_TEST(test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen);
+    RUN_TEST(test_wheel_offset_frames_after_their_time_tell_of_a_reboot);
+    RUN_TEST(test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew);
+    return UNITY_END();
+}
