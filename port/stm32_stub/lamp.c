@@ -19,5 +19,5 @@ uint16_t iw_lamp_pattern(const iw_gateway_t *gateway, bool estop_pressed) {
 }
 
 bool iw_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us) {
-    return ((pattern >> (now_us / IW_LAMP_SLOT_US % 16U)) & 1U) != 0U;
+    return (((uint32_t)pattern >> (now_us / IW_LAMP_SLOT_US % 16U)) & 1U) != 0U;
 }

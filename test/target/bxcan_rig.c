@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+#include "bxcan_rig.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+#define STORM 100000
+
+rig_device_t rig[RIG_DEVICES];
+static bool is_serving;
+
+static rig_device_t *device_at(const iw_register_t *address, uint32_t *out_offset) {
+    for (int i = 0; i < RIG_DEVICES; i++) {
+        const uintptr_t base = (uintptr_t)&rig[i].window;
+        const uintptr_t at = (uintptr_t)address;
+        if (at >= base && at < base + sizeof rig[i].window) {
+            *out_offset = (uint32_t)(at - base);
+            return &rig[i];
+        }
+    }
+    TEST_FAIL_MESSAGE("an address was accessed that is no register");
+    return NULL;
+}
+
+static void serve(rig_device_t *device) {
+    if (is_serving) {
+        return;
+    }
+    is_serving = true;
+    for (int storm = 0;; storm++) {
+        if (bxcan_model_irq_transmit(&device->model)) {
+            iw_bxcan_on_transmit(&device->driver);
+        } else if (bxcan_model_irq_fifo0(&device->model)) {
+            iw_bxcan_on_receive(&device->driver);
+        } else if (bxcan_model_irq_error(&device->model)) {
+            iw_bxcan_on_error(&device->driver);
+        } else {
+            break;
+        }
+        device->interrupts++;
+        TEST_ASSERT_TRUE_MESSAGE(storm < STORM, "an interrupt never ends");
+    }
+    is_serving = false;
+}
+
+uint32_t iw_register_read(const iw_register_t *address) {
+    uint32_t offset = 0;
+    rig_device_t *const device = device_at(address, &offset);
+    const uint32_t value = bxcan_model_read(&device->model, offset);
+    if (device->on_read != NULL && !is_serving && !device->on_read(offset)) {
+        device->on_read = NULL;
+    }
+    serve(device);
+    return value;
+}
+
+void iw_register_write(iw_register_t *address, uint32_t value) {
+    uint32_t offset = 0;
+    rig_device_t *const device = device_at(address, &offset);
+    bxcan_model_write(&device->model, offset, value);
+    serve(device);
+}
+
+void rig_reset(void) {
+    is_serving = false;
+    for (int i = 0; i < RIG_DEVICES; i++) {
+        (void)memset(&rig[i], 0xA5, sizeof rig[i]);
+        rig[i].on_read = NULL;
+        rig[i].interrupts = 0;
+        bxcan_model_reset(&rig[i].model, 28);
+    }
+}
+
+void rig_init(int device, bool silent) {
+    const iw_bxcan_config_t config = {
+        .registers = &rig[device].window,
+        .filters = &rig[0].window,
+        .first_bank = (device == 0) ? 0U : 14U,
+        .bit_timing = 0x03590001U,
+        .poll_limit = 1000,
+        .silent = silent,
+    };
+    iw_bxcan_init(&rig[device].driver, &config);
+}
+
+void rig_start(int device) {
+    rig_init(device, false);
+    (void)iw_bxcan_bus_state(&rig[device].driver);
+    bxcan_model_recessive(&rig[device].model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(&rig[device].driver));
+}
+
+bool rig_send_next(int device, model_frame_t *out_frame) {
+    bxcan_model_t *const model = &rig[device].model;
+    const int mailbox = bxcan_model_offer(model, out_frame);
+    if (mailbox == MODEL_NONE) {
+        return false;
+    }
+    bxcan_model_begin(model, mailbox);
+    bxcan_model_end(model, mailbox, MODEL_SENT);
+    serve(&rig[device]);
+    return true;
+}
+
+bool rig_hear(int device, uint32_t id, uint8_t dlc) {
+    const model_frame_t frame = {.id = id, .dlc = dlc, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
+    const bool acknowledged = bxcan_model_hear(&rig[device].model, &frame);
+    serve(&rig[device]);
+    return acknowledged;
+}
+
+iw_can_frame_t rig_frame(uint32_t id, uint8_t mark) {
+    return (iw_can_frame_t){.id = id, .dlc = 5, .data = {mark, 0x11, 0x22, 0x33, 0x44}};
+}
+
+void rig_assert_no_violation(void) {
+    for (int i = 0; i < RIG_DEVICES; i++) {
+        TEST_ASSERT_EQUAL_STRING("", bxcan_model_violation(&rig[i].model));
+    }
+}

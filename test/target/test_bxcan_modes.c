@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: MIT
+// Initialisation, joining the bus, silence, bus-off: the handshakes of chapter 4 and section 7.6.
+#include "bxcan_rig.h"
+#include "unity.h"
+
+#define REJOIN_BITS (128U * 11U)
+
+static iw_bxcan_t *const driver = &rig[0].driver;
+static bxcan_model_t *const model = &rig[0].model;
+
+void setUp(void);
+void tearDown(void);
+
+void setUp(void) {
+    rig_reset();
+}
+
+void tearDown(void) {
+    rig_assert_no_violation();
+}
+
+static iw_bus_state_t state(void) {
+    return iw_bxcan_bus_state(driver);
+}
+
+static void test_bus_is_down_until_11_recessive_bits(void) {
+    rig_init(0, false);
+    TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
+    bxcan_model_recessive(model, 10);
+    TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
+    bxcan_model_recessive(model, 1);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_TRUE(bxcan_model_is_on(model));
+}
+
+static void test_bit_timing_is_written_as_configured(void) {
+    rig_start(0);
+    TEST_ASSERT_EQUAL_HEX32(0x03590001U, model->btr);
+    TEST_ASSERT_EQUAL_HEX32(0x00010000U, model->mcr);
+}
+
+static void test_bus_held_dominant_at_start_is_waited_for_without_waiting(void) {
+    rig_init(0, false);
+    for (int i = 0; i < 1000; i++) {
+        bxcan_model_dominant(model);
+        TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
+    }
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+}
+
+static void test_controller_that_does_not_answer_is_down_and_recovers(void) {
+    model->deaf = true;
+    rig_init(0, false);
+    for (int i = 0; i < 100; i++) {
+        TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
+    }
+    model->deaf = false;
+    (void)state();
+    bxcan_model_recessive(model, 11);
+    (void)state();
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+}
+
+static void test_reset_of_the_controller_behind_our_back_is_reported_and_mended(void) {
+    rig_start(0);
+    bxcan_model_reset(model, 28);
+    TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
+    (void)state();
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_EQUAL_HEX32(0x03590001U, model->btr);
+}
+
+static void test_reset_of_the_controller_while_joining_is_mended(void) {
+    rig_init(0, false);
+    (void)state();
+    bxcan_model_reset(model, 28);
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
+    }
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+}
+
+static void test_initialisation_asked_for_by_somebody_else_is_left(void) {
+    rig_start(0);
+    bxcan_model_write(model, 0x00, 0x00010001U);
+    TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
+    (void)state();
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+}
+
+static void test_silent_device_hears_but_neither_acknowledges_nor_sends(void) {
+    const iw_can_frame_t frame = rig_frame(266, 1);
+    iw_can_frame_t heard;
+    rig_init(0, true);
+    (void)state();
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_FALSE(rig_hear(0, 256, 4));
+    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &heard));
+    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &frame));
+}
+
+static void test_device_that_is_not_silent_acknowledges(void) {
+    rig_start(0);
+    TEST_ASSERT_TRUE(rig_hear(0, 256, 4));
+}
+
+static void fail_until_bus_off(void) {
+    model_frame_t frame;
+    int tries = 0;
+    for (int mailbox = bxcan_model_offer(model, &frame); mailbox != MODEL_NONE;
+         mailbox = bxcan_model_offer(model, &frame)) {
+        bxcan_model_begin(model, mailbox);
+        bxcan_model_end(model, mailbox, MODEL_BIT_ERROR);
+        TEST_ASSERT_LESS_THAN(33, tries++);
+    }
+    TEST_ASSERT_TRUE(model->bus_off);
+}
+
+static void test_bus_off_is_reported_and_left_after_128_times_11_bits(void) {
+    const iw_can_frame_t frame = rig_frame(266, 1);
+    rig_start(0);
+    (void)iw_bxcan_send(driver, &frame);
+    fail_until_bus_off();
+    TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &frame));
+    TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    bxcan_model_recessive(model, REJOIN_BITS - 1U);
+    TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    bxcan_model_recessive(model, 1);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_EQUAL(1, driver->bus_offs);
+}
+
+static void test_bus_off_is_not_left_by_the_controller_alone(void) {
+    const iw_can_frame_t frame = rig_frame(266, 1);
+    rig_start(0);
+    (void)iw_bxcan_send(driver, &frame);
+    fail_until_bus_off();
+    bxcan_model_recessive(model, 100U * REJOIN_BITS);
+    TEST_ASSERT_TRUE(model->bus_off);
+    TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+}
+
+static void test_send_fails_in_bus_off_that_nobody_has_reported_yet(void) {
+    const iw_can_frame_t frame = rig_frame(266, 1);
+    rig_start(0);
+    (void)iw_bxcan_send(driver, &frame);
+    fail_until_bus_off();
+    TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &frame));
+}
+
+static void test_nothing_from_before_bus_off_is_sent_after_it(void) {
+    const iw_can_frame_t left = rig_frame(266, 1);
+    const iw_can_frame_t right = rig_frame(298, 1);
+    model_frame_t frame;
+    iw_can_frame_t echo;
+    rig_start(0);
+    (void)iw_bxcan_send(driver, &left);
+    (void)iw_bxcan_send(driver, &right);
+    fail_until_bus_off();
+    for (int i = 0; i < 3; i++) {
+        (void)state();
+    }
+    bxcan_model_recessive(model, REJOIN_BITS);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_FALSE(rig_send_next(0, &frame));
+    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &echo));
+}
+
+static void test_recovery_waits_until_what_waits_is_taken_back(void) {
+    const iw_can_frame_t frame = rig_frame(266, 1);
+    rig_start(0);
+    (void)iw_bxcan_send(driver, &frame);
+    fail_until_bus_off();
+    model->abort_reads = 5000;
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    }
+    bxcan_model_recessive(model, 2U * REJOIN_BITS);
+    TEST_ASSERT_TRUE(model->bus_off);
+    for (int i = 0; i < 4; i++) {
+        TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    }
+    bxcan_model_recessive(model, REJOIN_BITS);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+}
+
+static void test_error_passive_is_told_apart(void) {
+    const iw_can_frame_t frame = rig_frame(266, 1);
+    model_frame_t on_bus;
+    rig_start(0);
+    (void)iw_bxcan_send(driver, &frame);
+    for (int i = 0; i < 100; i++) { // Nobody acknowledges: passive, but never bus-off.
+        const int mailbox = bxcan_model_offer(model, &on_bus);
+        TEST_ASSERT_NOT_EQUAL(MODEL_NONE, mailbox);
+        bxcan_model_begin(model, mailbox);
+        bxcan_model_end(model, mailbox, MODEL_NO_ACKNOWLEDGEMENT);
+    }
+    TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
+    TEST_ASSERT_EQUAL(128, iw_bxcan_errors(driver).transmit_errors);
+    TEST_ASSERT_EQUAL(3, iw_bxcan_errors(driver).last_error);
+}
+
+static void test_receive_errors_are_told(void) {
+    rig_start(0);
+    for (int i = 0; i < 130; i++) {
+        bxcan_model_hear_error(model);
+    }
+    TEST_ASSERT_EQUAL(130, iw_bxcan_errors(driver).receive_errors);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_errors(driver).last_error);
+    TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
+}
+
+static void test_error_interrupt_wakes_and_ends(void) {
+    rig_start(0);
+    for (int i = 0; i < 128; i++) {
+        bxcan_model_hear_error(model);
+    }
+    TEST_ASSERT_TRUE(bxcan_model_irq_error(model));
+    (void)state();
+    TEST_ASSERT_FALSE(bxcan_model_irq_error(model));
+    TEST_ASSERT_EQUAL(1, rig[0].interrupts);
+}
+
+static void test_two_devices_share_filters_and_nothing_else(void) {
+    const iw_can_frame_t frame = rig_frame(266, 7);
+    model_frame_t on_bus;
+    iw_can_frame_t heard;
+    rig_start(0);
+    rig_start(1);
+    TEST_ASSERT_EQUAL_HEX32(0x3FU | (0x3FU << 14), model->fa1r);
+    TEST_ASSERT_EQUAL(0, rig[1].model.fa1r);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_send(&rig[1].driver, &frame));
+    TEST_ASSERT_FALSE(rig_send_next(0, &on_bus));
+    TEST_ASSERT_TRUE(rig_send_next(1, &on_bus));
+    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(&rig[0].driver, &heard));
+    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(&rig[1].driver, &heard));
+    TEST_ASSERT_EQUAL(IW_CAN_ECHO, heard.kind);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_bus_is_down_until_11_recessive_bits);
+    RUN_TEST(test_bit_timing_is_written_as_configured);
+    RUN_TEST(test_bus_held_dominant_at_start_is_waited_for_without_waiting);
+    RUN_TEST(test_controller_that_does_not_answer_is_down_and_recovers);
+    RUN_TEST(test_reset_of_the_controller_behind_our_back_is_reported_and_mended);
+    RUN_TEST(test_reset_of_the_controller_while_joining_is_mended);
+    RUN_TEST(test_initialisation_asked_for_by_somebody_else_is_left);
+    RUN_TEST(test_silent_device_hears_but_neither_acknowledges_nor_sends);
+    RUN_TEST(test_device_that_is_not_silent_acknowledges);
+    RUN_TEST(test_bus_off_is_reported_and_left_after_128_times_11_bits);
+    RUN_TEST(test_bus_off_is_not_left_by_the_controller_alone);
+    RUN_TEST(test_send_fails_in_bus_off_that_nobody_has_reported_yet);
+    RUN_TEST(test_nothing_from_before_bus_off_is_sent_after_it);
+    RUN_TEST(test_recovery_waits_until_what_waits_is_taken_back);
+    RUN_TEST(test_error_passive_is_told_apart);
+    RUN_TEST(test_receive_errors_are_told);
+    RUN_TEST(test_error_interrupt_wakes_and_ends);
+    RUN_TEST(test_two_devices_share_filters_and_nothing_else);
+    return UNITY_END();
+}

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+// Filters, FIFO and ring: sections 7.3 and 7.4.
+#include "bxcan_rig.h"
+#include "unity.h"
+
+#include <string.h>
+
+static iw_bxcan_t *const driver = &rig[0].driver;
+static bxcan_model_t *const model = &rig[0].model;
+static const uint32_t ours[] = {256, 257, 266, 288, 289, 290, 298, 512, 513, 544, 545};
+
+void setUp(void);
+void tearDown(void);
+
+void setUp(void) {
+    rig_reset();
+    rig_start(0);
+}
+
+void tearDown(void) {
+    rig_assert_no_violation();
+}
+
+static bool is_ours(uint32_t id) {
+    for (size_t i = 0; i < sizeof ours / sizeof ours[0]; i++) {
+        if (ours[i] == id) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// 1 if the frame comes through, with what was taken in `*out_frame`.
+static int pass(const model_frame_t *frame, iw_can_frame_t *out_frame) {
+    (void)bxcan_model_hear(model, frame);
+    (void)iw_register_read(&rig[0].window.MSR); // Lets the interrupt strike.
+    return iw_bxcan_receive(driver, out_frame);
+}
+
+static void test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote(void) {
+    for (uint32_t id = 0; id < 2048U; id++) {
+        for (uint8_t remote = 0; remote <= 1; remote++) {
+            const model_frame_t frame = {.id = id, .remote = remote, .dlc = 4};
+            iw_can_frame_t taken;
+            TEST_ASSERT_EQUAL_MESSAGE(is_ours(id) ? 1 : 0, pass(&frame, &taken), "an id is filtered wrongly");
+            if (is_ours(id)) {
+                TEST_ASSERT_EQUAL_HEX32(id | (remote != 0U ? IW_CAN_REMOTE : 0U), taken.id);
+            }
+        }
+    }
+}
+
+static void test_of_29_bit_ids_only_those_with_the_same_number_pass(void) {
+    for (uint32_t bit = 0; bit < 29U; bit++) {
+        for (uint32_t id = 0; id < 2048U; id++) {
+            const model_frame_t frame = {.id = id ^ (1U << bit), .extended = 1, .dlc = 4};
+            iw_can_frame_t taken;
+            TEST_ASSERT_EQUAL(is_ours(frame.id) ? 1 : 0, pass(&frame, &taken));
+            if (is_ours(frame.id)) {
+                TEST_ASSERT_EQUAL_HEX32(frame.id | IW_CAN_EXTENDED, taken.id);
+            }
+        }
+    }
+}
+
+static void test_29_bit_id_that_begins_like_ours_does_not_pass(void) {
+    for (size_t i = 0; i < sizeof ours / sizeof ours[0]; i++) {
+        const model_frame_t frame = {.id = ours[i] << 18, .extended = 1, .dlc = 4};
+        iw_can_frame_t taken;
+        TEST_ASSERT_EQUAL(0, pass(&frame, &taken));
+    }
+}
+
+static void test_frame_is_taken_byte_for_byte(void) {
+    const model_frame_t frame = {.id = 290, .dlc = 8, .data = {0x81, 0x02, 0xF3, 0x04, 0x95, 0x06, 0xA7, 0x08}};
+    iw_can_frame_t taken;
+    (void)memset(&taken, 0xA5, sizeof taken);
+    TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
+    TEST_ASSERT_EQUAL(290, taken.id);
+    TEST_ASSERT_EQUAL(8, taken.dlc);
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(frame.data, taken.data, 8);
+}
+
+static void test_dlc_above_8_means_8_bytes(void) {
+    const model_frame_t frame = {.id = 256, .dlc = 15};
+    iw_can_frame_t taken;
+    TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
+    TEST_ASSERT_EQUAL(8, taken.dlc);
+}
+
+static void test_frames_come_in_the_order_of_the_bus_with_echoes_between(void) {
+    const iw_can_frame_t left = rig_frame(266, 9);
+    const uint32_t expected[] = {256, 266, 512, 288};
+    model_frame_t on_bus;
+    iw_can_frame_t taken;
+    (void)iw_bxcan_send(driver, &left);
+    (void)rig_hear(0, 256, 4);
+    (void)rig_send_next(0, &on_bus);
+    (void)rig_hear(0, 512, 4);
+    (void)rig_hear(0, 288, 4);
+    for (size_t i = 0; i < 4; i++) {
+        TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+        TEST_ASSERT_EQUAL(expected[i], taken.id);
+    }
+    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
+}
+
+static void test_foreign_setpoint_is_received_and_no_echo(void) {
+    iw_can_frame_t taken;
+    (void)rig_hear(0, 266, 5);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
+}
+
+static void test_slow_release_shows_no_frame_twice(void) {
+    iw_can_frame_t taken;
+    model->release_slow = 4;
+    for (uint8_t i = 0; i < 3; i++) {
+        const model_frame_t frame = {.id = 256, .dlc = 1, .data = {i}};
+        (void)bxcan_model_hear(model, &frame);
+    }
+    (void)iw_register_read(&rig[0].window.MSR);
+    for (uint8_t i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+        TEST_ASSERT_EQUAL(i, taken.data[0]);
+    }
+    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
+}
+
+static void test_overrun_of_the_controller_is_counted_once(void) {
+    const model_frame_t frame = {.id = 256, .dlc = 4};
+    for (int i = 0; i < 5; i++) { // Interrupts held off for five frames.
+        (void)bxcan_model_hear(model, &frame);
+    }
+    (void)iw_register_read(&rig[0].window.MSR);
+    TEST_ASSERT_EQUAL(1, driver->overruns);
+    (void)rig_hear(0, 256, 4);
+    TEST_ASSERT_EQUAL(1, driver->overruns);
+}
+
+static void test_full_ring_loses_the_newest_and_counts(void) {
+    iw_can_frame_t taken;
+    for (uint32_t i = 0; i < IW_FRAME_RING_LENGTH + 5U; i++) {
+        const model_frame_t frame = {.id = 256, .dlc = 1, .data = {(uint8_t)i}};
+        (void)bxcan_model_hear(model, &frame);
+        (void)iw_register_read(&rig[0].window.MSR);
+    }
+    TEST_ASSERT_EQUAL(5, driver->lost);
+    for (uint32_t i = 0; i < IW_FRAME_RING_LENGTH; i++) {
+        TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+        TEST_ASSERT_EQUAL(i, taken.data[0]);
+    }
+    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
+    (void)rig_hear(0, 257, 7);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+}
+
+static void test_ring_goes_on_for_ever(void) {
+    iw_can_frame_t taken;
+    atomic_store(&driver->ring.head, UINT32_MAX - 20U);
+    atomic_store(&driver->ring.tail, UINT32_MAX - 20U);
+    for (uint32_t i = 0; i < 100U; i++) {
+        const model_frame_t frame = {.id = 256, .dlc = 1, .data = {(uint8_t)i}};
+        TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
+        TEST_ASSERT_EQUAL(i, taken.data[0]);
+    }
+    TEST_ASSERT_EQUAL(0, driver->lost);
+}
+
+static void test_filters_leave_the_banks_of_others_alone(void) {
+    rig_reset();
+    model->fa1r = 1U << 20;
+    model->bank[20][0] = 0x12345678U;
+    rig_start(0);
+    TEST_ASSERT_EQUAL_HEX32(0x3FU | (1U << 20), model->fa1r);
+    TEST_ASSERT_EQUAL_HEX32(0x12345678U, model->bank[20][0]);
+}
+
+static void test_filters_fit_a_controller_with_14_banks(void) {
+    rig_reset();
+    bxcan_model_reset(model, 14);
+    rig_start(0);
+    TEST_ASSERT_EQUAL_HEX32(0x3FU, model->fa1r);
+    TEST_ASSERT_EQUAL_HEX32(0, model->fmr & 1U);
+}
+
+static void test_receive_error_counter_goes_down_again(void) {
+    for (int i = 0; i < 10; i++) {
+        bxcan_model_hear_error(model);
+    }
+    for (int i = 0; i < 4; i++) {
+        (void)rig_hear(0, 256, 4);
+    }
+    TEST_ASSERT_EQUAL(6, iw_bxcan_errors(driver).receive_errors);
+    TEST_ASSERT_EQUAL(0, iw_bxcan_errors(driver).last_error);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote);
+    RUN_TEST(test_of_29_bit_ids_only_those_with_the_same_number_pass);
+    RUN_TEST(test_29_bit_id_that_begins_like_ours_does_not_pass);
+    RUN_TEST(test_frame_is_taken_byte_for_byte);
+    RUN_TEST(test_dlc_above_8_means_8_bytes);
+    RUN_TEST(test_frames_come_in_the_order_of_the_bus_with_echoes_between);
+    RUN_TEST(test_foreign_setpoint_is_received_and_no_echo);
+    RUN_TEST(test_slow_release_shows_no_frame_twice);
+    RUN_TEST(test_overrun_of_the_controller_is_counted_once);
+    RUN_TEST(test_full_ring_loses_the_newest_and_counts);
+    RUN_TEST(test_ring_goes_on_for_ever);
+    RUN_TEST(test_filters_leave_the_banks_of_others_alone);
+    RUN_TEST(test_filters_fit_a_controller_with_14_banks);
+    RUN_TEST(test_receive_error_counter_goes_down_again);
+    return UNITY_END();
+}

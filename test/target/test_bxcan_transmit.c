@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: MIT
+// Mailboxes, echoes, replacing and taking back: section 7.1, and the port's contract in iwheel/hal.h.
+#include "bxcan_rig.h"
+#include "unity.h"
+
+static iw_bxcan_t *const driver = &rig[0].driver;
+static bxcan_model_t *const model = &rig[0].model;
+
+void setUp(void);
+void tearDown(void);
+
+void setUp(void) {
+    rig_reset();
+    rig_start(0);
+}
+
+void tearDown(void) {
+    rig_assert_no_violation();
+}
+
+static int send(uint32_t id, uint8_t mark) {
+    const iw_can_frame_t frame = rig_frame(id, mark);
+    return iw_bxcan_send(driver, &frame);
+}
+
+static void assert_on_bus(uint32_t id, uint8_t mark) {
+    model_frame_t frame;
+    TEST_ASSERT_TRUE_MESSAGE(rig_send_next(0, &frame), "nothing waits to be sent");
+    TEST_ASSERT_EQUAL(id, frame.id);
+    TEST_ASSERT_EQUAL(mark, frame.data[0]);
+}
+
+static void assert_nothing_waits(void) {
+    model_frame_t frame;
+    TEST_ASSERT_FALSE(rig_send_next(0, &frame));
+}
+
+static void assert_echo(uint32_t id, uint8_t mark) {
+    iw_can_frame_t echo;
+    TEST_ASSERT_EQUAL_MESSAGE(1, iw_bxcan_receive(driver, &echo), "no echo");
+    TEST_ASSERT_EQUAL(IW_CAN_ECHO, echo.kind);
+    TEST_ASSERT_EQUAL(id, echo.id);
+    TEST_ASSERT_EQUAL(mark, echo.data[0]);
+}
+
+static void assert_no_echo(void) {
+    iw_can_frame_t echo;
+    TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &echo));
+}
+
+static void test_frame_arrives_byte_for_byte(void) {
+    const uint8_t bytes[8] = {0x81, 0x02, 0xF3, 0x04, 0x95, 0x06, 0xA7, 0x08};
+    iw_can_frame_t frame = {.id = 0x7FF, .dlc = 8};
+    model_frame_t on_bus;
+    for (size_t i = 0; i < 8; i++) {
+        frame.data[i] = bytes[i];
+    }
+    TEST_ASSERT_EQUAL(1, iw_bxcan_send(driver, &frame));
+    TEST_ASSERT_TRUE(rig_send_next(0, &on_bus));
+    TEST_ASSERT_EQUAL(0x7FF, on_bus.id);
+    TEST_ASSERT_EQUAL(0, on_bus.extended);
+    TEST_ASSERT_EQUAL(0, on_bus.remote);
+    TEST_ASSERT_EQUAL(8, on_bus.dlc);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(bytes, on_bus.data, 8);
+}
+
+static void test_every_dlc_is_sent(void) {
+    for (uint8_t dlc = 0; dlc <= 8; dlc++) {
+        const iw_can_frame_t frame = {.id = 266, .dlc = dlc};
+        model_frame_t on_bus;
+        TEST_ASSERT_EQUAL(1, iw_bxcan_send(driver, &frame));
+        TEST_ASSERT_TRUE(rig_send_next(0, &on_bus));
+        TEST_ASSERT_EQUAL(dlc, on_bus.dlc);
+    }
+}
+
+static void test_what_is_no_plain_data_frame_is_refused(void) {
+    const iw_can_frame_t wrong[] = {
+        {.id = 266U | IW_CAN_EXTENDED, .dlc = 5},
+        {.id = 266U | IW_CAN_REMOTE, .dlc = 5},
+        {.id = 266U | IW_CAN_ERROR, .dlc = 5},
+        {.id = 0x800, .dlc = 5},
+        {.id = 266, .dlc = 9},
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        TEST_ASSERT_LESS_THAN(0, iw_bxcan_send(driver, &wrong[i]));
+    }
+    assert_nothing_waits();
+}
+
+static void test_echo_comes_only_with_the_acknowledgement(void) {
+    model_frame_t frame;
+    TEST_ASSERT_EQUAL(1, send(266, 1));
+    assert_no_echo();
+    for (int i = 0; i < 50; i++) {
+        const int mailbox = bxcan_model_offer(model, &frame);
+        bxcan_model_begin(model, mailbox);
+        bxcan_model_end(model, mailbox, (i % 2 == 0) ? MODEL_NO_ACKNOWLEDGEMENT : MODEL_LOST_ARBITRATION);
+        assert_no_echo();
+    }
+    assert_on_bus(266, 1);
+    assert_echo(266, 1);
+    assert_no_echo();
+}
+
+static void test_left_leaves_before_right_whatever_the_order(void) {
+    (void)send(298, 2);
+    (void)send(266, 1);
+    assert_on_bus(266, 1);
+    assert_on_bus(298, 2);
+    assert_echo(266, 1);
+    assert_echo(298, 2);
+}
+
+static void test_newer_frame_takes_the_place_of_the_waiting_one(void) {
+    (void)send(266, 1);
+    (void)send(298, 1);
+    TEST_ASSERT_EQUAL(1, send(266, 2));
+    assert_on_bus(266, 2);
+    assert_on_bus(298, 1);
+    assert_nothing_waits();
+    assert_echo(266, 2); // One for each that was handed over ...
+    assert_echo(266, 2); // ... once the newer is acknowledged.
+    assert_echo(298, 1);
+    assert_no_echo();
+}
+
+static void test_three_in_a_row_leave_one_frame_and_three_echoes(void) {
+    (void)send(298, 1);
+    (void)send(298, 2);
+    (void)send(298, 3);
+    assert_on_bus(298, 3);
+    assert_nothing_waits();
+    for (int i = 0; i < 3; i++) {
+        assert_echo(298, 3);
+    }
+    assert_no_echo();
+}
+
+static bool end_frame_on_bus(uint32_t offset) {
+    (void)offset;
+    for (int i = 0; i < MODEL_MAILBOXES; i++) {
+        if (model->mailbox[i].on_bus) {
+            bxcan_model_end(model, i, MODEL_SENT);
+        }
+    }
+    return false;
+}
+
+static bool lose_frame_on_bus(uint32_t offset) {
+    (void)offset;
+    for (int i = 0; i < MODEL_MAILBOXES; i++) {
+        if (model->mailbox[i].on_bus) {
+            bxcan_model_end(model, i, MODEL_BIT_ERROR);
+        }
+    }
+    return false;
+}
+
+static void begin_first(void) {
+    model_frame_t frame;
+    bxcan_model_begin(model, bxcan_model_offer(model, &frame));
+}
+
+static void test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo(void) {
+    (void)send(266, 1);
+    begin_first();
+    rig[0].on_read = end_frame_on_bus;
+    TEST_ASSERT_EQUAL(1, send(266, 2));
+    assert_echo(266, 1);
+    assert_no_echo();
+    assert_on_bus(266, 2);
+    assert_echo(266, 2);
+    assert_no_echo();
+}
+
+static void test_old_frame_that_fails_while_being_replaced_never_comes(void) {
+    (void)send(266, 1);
+    begin_first();
+    rig[0].on_read = lose_frame_on_bus;
+    TEST_ASSERT_EQUAL(1, send(266, 2));
+    assert_no_echo();
+    assert_on_bus(266, 2);
+    assert_nothing_waits();
+    assert_echo(266, 2);
+    assert_echo(266, 2);
+    assert_no_echo();
+}
+
+static void test_frame_that_never_ends_is_waited_for_with_a_bound(void) {
+    (void)send(266, 1);
+    begin_first();
+    TEST_ASSERT_EQUAL(0, send(266, 2));
+    TEST_ASSERT_EQUAL(0, iw_bxcan_purge(driver));
+    lose_frame_on_bus(0);
+    assert_nothing_waits();
+}
+
+static void test_slow_abort_is_awaited(void) {
+    model->abort_reads = 20;
+    (void)send(266, 1);
+    TEST_ASSERT_EQUAL(1, send(266, 2));
+    assert_on_bus(266, 2);
+    assert_nothing_waits();
+}
+
+static void test_fourth_frame_waits_for_a_free_mailbox(void) {
+    (void)send(266, 1);
+    (void)send(298, 1);
+    TEST_ASSERT_EQUAL(1, send(300, 1));
+    TEST_ASSERT_EQUAL(0, send(301, 1));
+    assert_on_bus(266, 1);
+    TEST_ASSERT_EQUAL(1, send(301, 1));
+}
+
+static void test_purge_takes_everything_back(void) {
+    (void)send(266, 1);
+    (void)send(298, 1);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    assert_nothing_waits();
+    assert_no_echo();
+    TEST_ASSERT_EQUAL(1, send(266, 2));
+    assert_on_bus(266, 2);
+    assert_echo(266, 2);
+    assert_no_echo();
+}
+
+static void test_echo_from_before_a_purge_never_comes(void) {
+    (void)send(266, 1);
+    assert_on_bus(266, 1);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    assert_no_echo();
+}
+
+static void test_purge_keeps_what_was_received(void) {
+    iw_can_frame_t frame;
+    (void)rig_hear(0, 256, 4);
+    (void)iw_bxcan_purge(driver);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &frame));
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, frame.kind);
+}
+
+static void test_frame_that_completes_during_a_purge_has_no_echo_afterwards(void) {
+    (void)send(266, 1);
+    begin_first();
+    rig[0].on_read = end_frame_on_bus;
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    assert_no_echo();
+    assert_nothing_waits();
+    (void)send(266, 2);
+    assert_on_bus(266, 2);
+    assert_echo(266, 2);
+    assert_no_echo();
+}
+
+static void test_purge_of_an_idle_device_succeeds(void) {
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+}
+
+static void test_receive_of_a_stopped_device_is_broken(void) {
+    iw_can_frame_t frame;
+    rig_init(0, false);
+    TEST_ASSERT_LESS_THAN(0, iw_bxcan_receive(driver, &frame));
+    TEST_ASSERT_LESS_THAN(0, send(266, 1));
+}
+
+/// Random hands-over, transmissions, failures, purges: an echo for each frame handed over, none without acknowledgement, and never
+/// an older mark after a newer one.
+static void test_random_traffic_keeps_the_account(void) {
+    uint32_t chance = 12345;
+    uint8_t mark = 0;
+    uint8_t newest_sent[2] = {0, 0};
+    int open[2] = {0, 0};
+    for (int i = 0; i < 200000; i++) {
+        model_frame_t frame;
+        iw_can_frame_t echo;
+        chance = chance * 1664525U + 1013904223U;
+        const uint32_t side = (chance >> 8) & 1U;
+        switch ((chance >> 16) % 6U) {
+        case 0:
+        case 1:
+            mark = (uint8_t)(mark % 100U + 1U);
+            open[side] += send(side == 0U ? 266U : 298U, mark) > 0 ? 1 : 0;
+            newest_sent[side] = mark;
+            break;
+        case 2:
+        case 3:
+            if (rig_send_next(0, &frame)) {
+                TEST_ASSERT_EQUAL(newest_sent[frame.id == 298U], frame.data[0]);
+            }
+            break;
+        case 4:
+            if (bxcan_model_offer(model, &frame) != MODEL_NONE) {
+                begin_first();
+                (void)lose_frame_on_bus(0);
+                model->tec = 0;
+            }
+            break;
+        default:
+            if ((chance >> 24) % 16U == 0U) {
+                TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+                open[0] = 0;
+                open[1] = 0;
+            }
+            break;
+        }
+        while (iw_bxcan_receive(driver, &echo) > 0) {
+            open[echo.id == 298U]--;
+        }
+        TEST_ASSERT_GREATER_OR_EQUAL(0, open[0]);
+        TEST_ASSERT_GREATER_OR_EQUAL(0, open[1]);
+        if (bxcan_model_offer(model, &frame) == MODEL_NONE) {
+            TEST_ASSERT_EQUAL(0, open[0] + open[1]);
+        }
+        if (open[side] > 200) {
+            (void)iw_bxcan_purge(driver);
+            open[0] = 0;
+            open[1] = 0;
+        }
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_frame_arrives_byte_for_byte);
+    RUN_TEST(test_every_dlc_is_sent);
+    RUN_TEST(test_what_is_no_plain_data_frame_is_refused);
+    RUN_TEST(test_echo_comes_only_with_the_acknowledgement);
+    RUN_TEST(test_left_leaves_before_right_whatever_the_order);
+    RUN_TEST(test_newer_frame_takes_the_place_of_the_waiting_one);
+    RUN_TEST(test_three_in_a_row_leave_one_frame_and_three_echoes);
+    RUN_TEST(test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo);
+    RUN_TEST(test_old_frame_that_fails_while_being_replaced_never_comes);
+    RUN_TEST(test_frame_that_never_ends_is_waited_for_with_a_bound);
+    RUN_TEST(test_slow_abort_is_awaited);
+    RUN_TEST(test_fourth_frame_waits_for_a_free_mailbox);
+    RUN_TEST(test_purge_takes_everything_back);
+    RUN_TEST(test_echo_from_before_a_purge_never_comes);
+    RUN_TEST(test_purge_keeps_what_was_received);
+    RUN_TEST(test_frame_that_completes_during_a_purge_has_no_echo_afterwards);
+    RUN_TEST(test_purge_of_an_idle_device_succeeds);
+    RUN_TEST(test_receive_of_a_stopped_device_is_broken);
+    RUN_TEST(test_random_traffic_keeps_the_account);
+    return UNITY_END();
+}

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include "lamp.h"
+#include "unity.h"
+
+#include <string.h>
+
+static iw_gateway_t gateway;
+
+void setUp(void);
+void tearDown(void);
+
+void setUp(void) {
+    (void)memset(&gateway, 0, sizeof gateway);
+    gateway.bus = IW_BUS_ACTIVE;
+}
+
+void tearDown(void) {}
+
+static uint16_t pattern_in(iw_state_t state) {
+    gateway.permit.state = state;
+    return iw_lamp_pattern(&gateway, false);
+}
+
+static void test_each_state_has_its_own_pattern(void) {
+    const uint16_t patterns[] = {pattern_in(IW_STATE_LISTENING),
+                                 pattern_in(IW_STATE_ARMED),
+                                 pattern_in(IW_STATE_STOPPING),
+                                 pattern_in(IW_STATE_LATCHED),
+                                 iw_lamp_pattern(&gateway, true),
+                                 IW_LAMP_NO_BUS,
+                                 IW_LAMP_NO_CRYSTAL};
+    for (size_t a = 0; a < 7; a++) {
+        TEST_ASSERT_NOT_EQUAL(0, patterns[a]);
+        for (size_t b = 0; b < a; b++) {
+            TEST_ASSERT_NOT_EQUAL(patterns[a], patterns[b]);
+        }
+    }
+}
+
+static void test_pressed_contact_shows_before_any_state(void) {
+    for (int state = IW_STATE_LISTENING; state <= IW_STATE_LATCHED; state++) {
+        gateway.permit.state = (iw_state_t)state;
+        TEST_ASSERT_EQUAL_HEX16(IW_LAMP_ESTOP, iw_lamp_pattern(&gateway, true));
+    }
+}
+
+static void test_listening_tells_whether_the_bus_is_there(void) {
+    for (int bus = IW_BUS_DOWN; bus <= IW_BUS_ACTIVE; bus++) {
+        gateway.bus = (iw_bus_state_t)bus;
+        TEST_ASSERT_EQUAL_HEX16(bus < IW_BUS_PASSIVE ? IW_LAMP_NO_BUS : IW_LAMP_LISTENING,
+                                pattern_in(IW_STATE_LISTENING));
+    }
+}
+
+static void test_pattern_is_shown_from_its_lowest_bit_and_repeats_every_second(void) {
+    for (uint32_t slot = 0; slot < 16; slot++) {
+        for (uint32_t second = 0; second < 3; second++) {
+            const iw_time_us_t at_us = second * 1000000U + slot * IW_LAMP_SLOT_US;
+            TEST_ASSERT_EQUAL((0x1234U >> slot) & 1U, iw_lamp_is_lit(0x1234U, at_us));
+            TEST_ASSERT_EQUAL((0x1234U >> slot) & 1U, iw_lamp_is_lit(0x1234U, at_us + IW_LAMP_SLOT_US - 1U));
+        }
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_each_state_has_its_own_pattern);
+    RUN_TEST(test_pressed_contact_shows_before_any_state);
+    RUN_TEST(test_listening_tells_whether_the_bus_is_there);
+    RUN_TEST(test_pattern_is_shown_from_its_lowest_bit_and_repeats_every_second);
+    return UNITY_END();
+}
