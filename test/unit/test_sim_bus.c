@@ -7,8 +7,8 @@
 #include <string.h>
 
 #define START_US UINT64_C(1000000)
-#define MS UINT64_C(1000)
-#define SECOND UINT64_C(1000000)
+#define MS       UINT64_C(1000)
+#define SECOND   UINT64_C(1000000)
 
 static sim_bus_t bus;
 

@@ -241,6 +241,9 @@ static void test_button_tells_its_state_on_connect_and_at_every_change(void) {
     TEST_ASSERT_EQUAL_size_t(1U, receive(fd, &state, 1U));
     TEST_ASSERT_EQUAL_CHAR('0', state);
     TEST_ASSERT_EQUAL_STRING("ok\n", tell("estop press"));
+    TEST_ASSERT_EQUAL_STRING("ok\n", tell("estop press"));
+    TEST_ASSERT_EQUAL_size_t(1U, receive(fd, &state, 1U));
+    TEST_ASSERT_EQUAL_INT(-1, recv(fd, &state, 1U, MSG_DONTWAIT));
     TEST_ASSERT_EQUAL_STRING_LEN("error ", tell("estop pulse 5"), 6);
     int const late = open_socket(options.estop_path, SOCK_STREAM);
     TEST_ASSERT_EQUAL_size_t(1U, receive(late, &state, 1U));

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define START_US 5000000U
-#define MS 1000U
+#define MS       1000U
 
 static sim_motion_config_t config;
 static sim_motion_t motion;

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define START_US UINT64_C(1000000)
-#define NOW_US UINT64_C(2000000)
+#define NOW_US   UINT64_C(2000000)
 
 static sim_world_t world;
 static sim_panel_t panel;
@@ -191,6 +191,7 @@ static void test_panel_wrong_commands_are_refused_and_change_nothing(void) {
         "mirror left",
         "role both",
         "type 256",
+        "type 18446744073709551623",
         "type -1",
         "type",
         "battery 256",

@@ -6,8 +6,8 @@
 #include "iwheel_sim/pair.h"
 
 #define START_US UINT64_C(1000000)
-#define MS UINT64_C(1000)
-#define SECOND UINT64_C(1000000)
+#define MS       UINT64_C(1000)
+#define SECOND   UINT64_C(1000000)
 /// Both wheels are there.
 #define BOOTED (START_US + 500U * MS)
 

@@ -198,6 +198,32 @@ static void test_pair_battery_sags_under_load_and_temperature_rises(void) {
     TEST_ASSERT_UINT8_WITHIN(8U, 60U, rig_last(257U).as.status.temperature_degC);
 }
 
+static void test_pair_reboot_learns_the_offset_anew(void) {
+    rig_run(START_US, START_US + 4U * SECOND);
+    pair.wheel[IW_LEFT].force.sensor_zero_mN = -50000;
+    sim_pair_reboot(&pair, START_US + 4U * SECOND, IW_LEFT);
+    rig_run(START_US + 4U * SECOND, START_US + 8U * SECOND);
+    TEST_ASSERT_INT_WITHIN(1, -500, rig_last(513U).as.offset.offset_dN);
+}
+
+static void test_pair_offset_is_the_mean_of_the_two_seconds_not_a_single_sample(void) {
+    pair.wheel[IW_LEFT].force.noise_mN = 0;
+    rig_run(START_US, BOOTED + 900U * MS);
+    pair.wheel[IW_LEFT].force.sensor_zero_mN = 52300;
+    rig_run(BOOTED + 900U * MS, START_US + 4U * SECOND);
+    TEST_ASSERT_INT_WITHIN(12, 323, rig_last(513U).as.offset.offset_dN);
+}
+
+static void test_pair_left_wheel_that_falls_silent_counts_as_standing_still(void) {
+    rig_run(START_US, BOOTED);
+    rig_drive(300, 300);
+    rig_run(BOOTED, BOOTED + 2U * SECOND);
+    pair.wheel[IW_LEFT].muted = true;
+    int16_t const before_mrad = rig_last(290U).as.pose.psi_mrad;
+    rig_run(BOOTED + 2U * SECOND, BOOTED + 3U * SECOND);
+    TEST_ASSERT_INT_WITHIN(40, 300 * 950 / 540, rig_last(290U).as.pose.psi_mrad - before_mrad);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_pair_learns_its_sensor_zero_when_nobody_presses);
@@ -218,5 +244,8 @@ int main(void) {
     RUN_TEST(test_pair_mirrored_wheel_counts_the_other_way_in_the_pose);
     RUN_TEST(test_pair_pose_saturates_in_x_and_wraps_in_psi);
     RUN_TEST(test_pair_battery_sags_under_load_and_temperature_rises);
+    RUN_TEST(test_pair_reboot_learns_the_offset_anew);
+    RUN_TEST(test_pair_offset_is_the_mean_of_the_two_seconds_not_a_single_sample);
+    RUN_TEST(test_pair_left_wheel_that_falls_silent_counts_as_standing_still);
     return UNITY_END();
 }
