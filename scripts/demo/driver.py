@@ -4,6 +4,7 @@
 Usage: driver.py SOCKET      ends when it is refused, printing the reason
 Prints one line per answered command: the events of test/system/judge_log.py.
 """
+
 import os
 import select
 import sys

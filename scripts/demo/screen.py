@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Two ways to show the demonstration: drawn on a terminal of 80 by 24, or as plain lines."""
+
 import math
 import shutil
 import sys
 import textwrap
 
 FULL_SCALE_MM_S = 600
-BAR = 33             # cells, the middle one is zero
+BAR = 33  # cells, the middle one is zero
 MAP_WIDTH, MAP_HEIGHT = 25, 11
 MIN_SPAN_MM = 1600
 
@@ -34,8 +35,11 @@ class Lines:
             return
         self.printed_s = elapsed_s
         word = {"armed": "drive", "stopping": "stop", "latched": "latched"}.get(status["state"], status["state"])
-        self._print(elapsed_s, f"{word:<7} {left['applied_mm_s']}/{right['applied_mm_s']} mm/s   "
-                    f"left {number(left['speed_mm_s'])} right {number(right['speed_mm_s'])} mm/s")
+        self._print(
+            elapsed_s,
+            f"{word:<7} {left['applied_mm_s']}/{right['applied_mm_s']} mm/s   "
+            f"left {number(left['speed_mm_s'])} right {number(right['speed_mm_s'])} mm/s",
+        )
 
     def close(self):
         pass
@@ -114,7 +118,10 @@ class Screen:
         return [f" {mark} {tint(line, 2) if old else line}" for mark, line in zip(marks, lines)]
 
     def _head(self):
-        left, right = " iWheel: the real gateway, two simulated wheels", f"{self.number} of {self.total}   {self.elapsed_s:5.1f} s "
+        left, right = (
+            " iWheel: the real gateway, two simulated wheels",
+            f"{self.number} of {self.total}   {self.elapsed_s:5.1f} s ",
+        )
         return tint(left + " " * (80 - len(left) - len(right)) + right, 7)
 
     def _state(self):
@@ -122,16 +129,29 @@ class Screen:
             return " starting"
         state, lease, estop = self.status["state"], self.status["lease"], self.status["estop"]["state"]
         colour = {"listening": 36, "armed": 32, "stopping": 33, "latched": 31}[state]
-        remaining = "nobody may drive" if lease["holder"] is None else f"{lease['name']} may drive for {number(lease['remaining_ms']):>4} ms"
-        lamp = tint(f"{self.glyphs.lamp} e-stop released", 32) if estop == "released" else tint(f" {self.glyphs.lamp} E-STOP {estop.upper()} ", 41, 97, 1)
+        remaining = (
+            "nobody may drive"
+            if lease["holder"] is None
+            else f"{lease['name']} may drive for {number(lease['remaining_ms']):>4} ms"
+        )
+        lamp = (
+            tint(f"{self.glyphs.lamp} e-stop released", 32)
+            if estop == "released"
+            else tint(f" {self.glyphs.lamp} E-STOP {estop.upper()} ", 41, 97, 1)
+        )
         return f" state {tint(f'{state.upper():<10}', colour, 1)}  {remaining:<32}  " + lamp
 
     def _wheels(self):
         rows = []
         for side in ("left", "right"):
             wheel = (self.status or {}).get(side)
-            rows += [tint(f" {side} wheel", 1) + " " * (53 - 7 - len(side)), self._bar("told", wheel and wheel["applied_mm_s"], 36),
-                     self._bar("does", wheel and wheel["speed_mm_s"], 32), self._values(wheel), " " * 53]
+            rows += [
+                tint(f" {side} wheel", 1) + " " * (53 - 7 - len(side)),
+                self._bar("told", wheel and wheel["applied_mm_s"], 36),
+                self._bar("does", wheel and wheel["speed_mm_s"], 32),
+                self._values(wheel),
+                " " * 53,
+            ]
         return rows[:-1] + [" " * 53, f" {'':5} {'-600':<{BAR // 2}}0{'+600 mm/s':>{BAR // 2}}".ljust(53)]
 
     def _bar(self, label, value, colour):
@@ -139,8 +159,12 @@ class Screen:
         cells = [self.glyphs.empty] * BAR
         filled = 0 if value is None else round(min(1, abs(value) / FULL_SCALE_MM_S) * half)
         low, high = (half - filled, half) if (value or 0) < 0 else (half + 1, half + 1 + filled)
-        body = tint("".join(cells[:low]), 2) + tint(self.glyphs.full * (min(high, half) - low), colour) if low < half else tint("".join(cells[:half]), 2)
-        tail = tint(self.glyphs.full * (high - half - 1), colour) + tint("".join(cells[max(high, half + 1):]), 2)
+        body = (
+            tint("".join(cells[:low]), 2) + tint(self.glyphs.full * (min(high, half) - low), colour)
+            if low < half
+            else tint("".join(cells[:half]), 2)
+        )
+        tail = tint(self.glyphs.full * (high - half - 1), colour) + tint("".join(cells[max(high, half + 1) :]), 2)
         return f"  {label} {body}{self.glyphs.middle}{tail} {number(value):>5} mm/s "[:400] + " "
 
     def _values(self, wheel):
@@ -158,7 +182,9 @@ class Screen:
         middle = [(max(p[axis] for p in points) + min(p[axis] for p in points)) / 2 for axis in (0, 1)]
         across, down = MAP_WIDTH * 2, MAP_HEIGHT * 4
         scale = min(across, down) / span
-        dots = {(int(across / 2 + (px - middle[0]) * scale), int(down / 2 - (py - middle[1]) * scale)) for px, py in points}
+        dots = {
+            (int(across / 2 + (px - middle[0]) * scale), int(down / 2 - (py - middle[1]) * scale)) for px, py in points
+        }
         grid = [[" "] * MAP_WIDTH for _ in range(MAP_HEIGHT)]
         bits = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
         cells = {}
@@ -168,7 +194,10 @@ class Screen:
             if 0 <= row < MAP_HEIGHT and 0 <= column < MAP_WIDTH:
                 grid[row][column] = chr(0x2800 + sum(parts)) if self.glyphs.braille else "."
         if self.path:
-            row, column = int(down / 2 - (points[-1][1] - middle[1]) * scale) // 4, int(across / 2 + (points[-1][0] - middle[0]) * scale) // 2
+            row, column = (
+                int(down / 2 - (points[-1][1] - middle[1]) * scale) // 4,
+                int(across / 2 + (points[-1][0] - middle[0]) * scale) // 2,
+            )
             arrow = self.glyphs.arrows[round(self.path[-1][2] / (math.pi / 4)) % 8]
             if 0 <= row < MAP_HEIGHT and 0 <= column < MAP_WIDTH:
                 grid[row][column] = tint(arrow, 33, 1)
@@ -184,7 +213,10 @@ def choose(out, plain):
     if plain or not out.isatty():
         return Lines(out)
     if size.columns < 80 or size.lines < 24:
-        print(f"this terminal has {size.columns} x {size.lines} characters; drawn from 80 x 24 on, so here come plain lines", file=out)
+        print(
+            f"this terminal has {size.columns} x {size.lines} characters; drawn from 80 x 24 on, so here come plain lines",
+            file=out,
+        )
         return Lines(out)
     return Screen(out)
 

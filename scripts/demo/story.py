@@ -1,69 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""The demonstration: the real gateway drives two simulated wheels, and everything told is checked. See ./demo --help."""
-import argparse
-import os
-import signal
+"""The steps of the demonstration. Each tells what will be seen, does it, and requires that it happened."""
+
 import subprocess
-import sys
-import threading
 import time
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-sys.path.insert(0, os.path.join(HERE, "..", "..", "test", "system"))
-from harness import Rig, die_with_parent, find_program, now_us  # noqa: E402
-from judge_log import Event  # noqa: E402
-from screen import choose  # noqa: E402
+from cast import Driver
+from harness import find_program, now_us
+from judge_log import Event
 
 TOTAL = 9
-# For any machine, however busy: the wheels are simulated by a process that may have to wait for its turn.
-CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 300}}
-STALL_S = 0.1
 
 
 class Failed(Exception):
     """Something did not happen as told."""
 
 
-class Sleeper(threading.Thread):
-    """Sleeps 5 ms over and over: how late it is woken tells how busy the machine is."""
-
-    def __init__(self):
-        super().__init__(daemon=True)
-        self.worst_s = 0.0
-        self.start()
-
-    def run(self):
-        while True:
-            before = time.monotonic()
-            time.sleep(0.005)
-            self.worst_s = max(self.worst_s, time.monotonic() - before - 0.005)
-
-
-class Driver:
-    """The joystick program, a process of its own."""
-
-    def __init__(self, rig, number):
-        self.output = rig.path(f"driver{number}.out")
-        with open(self.output, "wb") as file:
-            self.child = subprocess.Popen([sys.executable, os.path.join(HERE, "driver.py"), rig.path("gateway.sock")],
-                                          stdin=subprocess.PIPE, stdout=file, stderr=file, preexec_fn=die_with_parent)
-
-    def want(self, left, right):
-        self.child.stdin.write(f"{left} {right}\n".encode())
-        self.child.stdin.flush()
-
-    def text(self):
-        with open(self.output, encoding="utf-8") as file:
-            return file.read()
-
-    def end(self):
-        if self.child.poll() is None:
-            self.child.kill()
-        self.child.wait()
-
-
 class Story:
-    """The steps, in order. Each tells what will be seen, does it, and requires that it happened."""
+    """The steps, in order."""
 
     def __init__(self, rig, view):
         self.rig, self.view = rig, view
@@ -131,80 +84,134 @@ class Story:
         self.why()
 
     def find_wheels(self):
-        self.step("Finding the wheels", "Simulator and gateway start. The gateway only listens: it sends nothing until somebody arms it.")
+        self.step(
+            "Finding the wheels",
+            "Simulator and gateway start. The gateway only listens: it sends nothing until somebody arms it.",
+        )
         answered_ms = self.rig.start_gateway(wheels=False)
         self.client = self.rig.client("demo")
         self.client.request("watch", topics=["state"], rate_hz=20)
-        heard = self.watch(5, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["estop"]["state"] == "released")
+        heard = self.watch(
+            5, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["estop"]["state"] == "released"
+        )
         self.require(answered_ms < 3000, f"the gateway answers {answered_ms:.0f} ms after its start")
         self.require(heard, "both wheels are heard and stand still, the e-stop is released")
         self.watch(1.2)
         self.require(not self.rig.bus.setpoints(), "nothing was sent to the wheels")
 
     def learn_offsets(self):
-        self.step("Learning the force sensors' zero", "Each wheel takes the mean force of its first two seconds as its zero and sends it "
-                  "for a minute. Nobody leans on the handles, so it is a good one.")
-        known = self.watch(6, lambda s: all(s[side]["offset_provenance"] == "wheel" and s[side]["force_net_mN"] is not None for side in ("left", "right")))
+        self.step(
+            "Learning the force sensors' zero",
+            "Each wheel takes the mean force of its first two seconds as its zero and sends it "
+            "for a minute. Nobody leans on the handles, so it is a good one.",
+        )
+        known = self.watch(
+            6,
+            lambda s: all(
+                s[side]["offset_provenance"] == "wheel" and s[side]["force_net_mN"] is not None
+                for side in ("left", "right")
+            ),
+        )
         offsets = [self.status[side]["force_offset_mN"] for side in ("left", "right")]
-        self.require(known, f"offsets: left {(offsets[0] or 0) / 1000:.1f} N, right {(offsets[1] or 0) / 1000:.1f} N, sent by the wheels")
+        self.require(
+            known,
+            f"offsets: left {(offsets[0] or 0) / 1000:.1f} N, right {(offsets[1] or 0) / 1000:.1f} N, sent by the wheels",
+        )
         self.rig.sim.ask("load both 60")
         self.watch(1.2)
         net = [self.status[side]["force_net_mN"] for side in ("left", "right")]
-        self.require(all(value is not None and 50_000 < value < 70_000 for value in net),
-                     f"somebody leans on it with 60 N per side: {net[0] / 1000:.1f} N and {net[1] / 1000:.1f} N measured", f"60 N measured as {net} mN")
+        self.require(
+            all(value is not None and 50_000 < value < 70_000 for value in net),
+            f"somebody leans on it with 60 N per side: {net[0] / 1000:.1f} N and {net[1] / 1000:.1f} N measured",
+            f"60 N measured as {net} mN",
+        )
         self.rig.sim.ask("load both 0")
         self.watch(0.8)
 
     def arm(self):
-        self.step("Arming", "A joystick program asks for the right to drive. From now on both wheels hear a setpoint every 20 ms; zero, so far.")
+        self.step(
+            "Arming",
+            "A joystick program asks for the right to drive. From now on both wheels hear a setpoint every 20 ms; zero, so far.",
+        )
         driver = self.driver()
         self.require(True, f"armed; {self.status['lease']['name']} holds the lease")
         budget = self.status["budget"]
-        self.require(budget["client_lost_ms"] <= 1000, f"if it falls silent, the machine stands within {budget['client_lost_ms']} ms "
-                     f"and {budget['client_lost_mm'] / 1000:.2f} m")
+        self.require(
+            budget["client_lost_ms"] <= 1000,
+            f"if it falls silent, the machine stands within {budget['client_lost_ms']} ms "
+            f"and {budget['client_lost_mm'] / 1000:.2f} m",
+        )
         driver.want(0, 0)
         self.watch(2.0)
-        self.require(len(self.rig.bus.setpoints()) > 40 and not any(speed for _, _, speed in self.rig.bus.setpoints()),
-                     f"{len(self.rig.bus.setpoints())} setpoints on the bus, all zero")
+        self.require(
+            len(self.rig.bus.setpoints()) > 40 and not any(speed for _, _, speed in self.rig.bus.setpoints()),
+            f"{len(self.rig.bus.setpoints())} setpoints on the bus, all zero",
+        )
         return driver
 
     def forward(self, driver):
-        self.step("Driving forward", "400 mm/s for both wheels. The gateway ramps at 800 mm/s2; the lower bar is what the wheels measure.")
+        self.step(
+            "Driving forward",
+            "400 mm/s for both wheels. The gateway ramps at 800 mm/s2; the lower bar is what the wheels measure.",
+        )
         driver.want(400, 400)
         self.watch(3.0)
         left, right = self.measured()
-        self.require(self.near(400, 400), f"left {left} and right {right} mm/s measured", f"400/400 mm/s, measured {left}/{right}")
+        self.require(
+            self.near(400, 400),
+            f"left {left} and right {right} mm/s measured",
+            f"400/400 mm/s, measured {left}/{right}",
+        )
 
     def turn(self, driver):
-        self.step("A turn to the left", "The right wheel is told to run faster than the left one. Both change together, so the curve is smooth.")
+        self.step(
+            "A turn to the left",
+            "The right wheel is told to run faster than the left one. Both change together, so the curve is smooth.",
+        )
         driver.want(180, 480)
         before = self.status["pose"]["psi_mrad"]
         self.watch(3.2)
         left, right = self.measured()
         turned = self.status["pose"]["psi_mrad"] - before
-        self.require(self.near(180, 480), f"left {left} and right {right} mm/s measured", f"180/480 mm/s, measured {left}/{right}")
+        self.require(
+            self.near(180, 480),
+            f"left {left} and right {right} mm/s measured",
+            f"180/480 mm/s, measured {left}/{right}",
+        )
         self.require(abs(turned) > 500, f"the machine has turned by {abs(turned) * 180 / 3141.6:.0f} degrees")
         driver.want(400, 400)
         self.watch(1.4)
 
     def client_dies(self, driver):
-        self.step("The joystick program dies", "kill -9 in the middle of it. Nobody feeds the lease any more: the gateway ramps down, "
-                  "holds zero for 1.5 s, then falls silent.")
+        self.step(
+            "The joystick program dies",
+            "kill -9 in the middle of it. Nobody feeds the lease any more: the gateway ramps down, "
+            "holds zero for 1.5 s, then falls silent.",
+        )
         killed_us = now_us()
         self.rig.timeline.append(Event(killed_us, "gone"))
         driver.end()
-        stopped = self.watch(2, lambda s: s["state"] == "stopping" and s["left"]["applied_mm_s"] == 0 and s["right"]["applied_mm_s"] == 0)
+        stopped = self.watch(
+            2, lambda s: s["state"] == "stopping" and s["left"]["applied_mm_s"] == 0 and s["right"]["applied_mm_s"] == 0
+        )
         setpoints = self.rig.bus.setpoints(killed_us)
         slower_ms = next(((t - killed_us) / 1000 for t, _, speed in setpoints if speed < 395), 9999)
         zero_ms = next(((t - killed_us) / 1000 for t, _, speed in setpoints if speed == 0), 9999)
-        self.require(stopped and slower_ms < 100, f"the first slower setpoint was on the bus after {slower_ms:.0f} ms", f"ramp after {slower_ms:.0f} ms")
+        self.require(
+            stopped and slower_ms < 100,
+            f"the first slower setpoint was on the bus after {slower_ms:.0f} ms",
+            f"ramp after {slower_ms:.0f} ms",
+        )
         self.require(zero_ms < 900, f"zero after {zero_ms:.0f} ms, without a jerk", f"zero after {zero_ms:.0f} ms")
         silent = self.watch(4, lambda s: s["state"] == "listening")
         self.require(silent and self.near(0, 0), "the wheels stand, the gateway is silent")
         self.watch(1.0)
 
     def press(self):
-        self.step("E-stop", "Another drive at 500 mm/s, and somebody presses the button. Now there is no ramp: zero at once, and it stays.")
+        self.step(
+            "E-stop",
+            "Another drive at 500 mm/s, and somebody presses the button. Now there is no ramp: zero at once, and it stays.",
+        )
         driver = self.driver()
         driver.want(500, 500)
         if not self.watch(4, lambda s: self.near(500, 500, s)):
@@ -212,19 +219,42 @@ class Story:
         self.watch(0.5)
         pressed_us = self.rig.press()
         latched = self.watch(1, lambda s: s["state"] == "latched")
-        zeros = [next(((t - pressed_us) / 1000 for t, name, speed in self.rig.bus.setpoints(pressed_us) if name == wanted and speed == 0), 9999)
-                 for wanted in (266, 298)]
-        self.require(latched and max(zeros) < 50, f"both wheels were told zero {max(zeros):.1f} ms after the press", f"zero after {max(zeros):.1f} ms")
+        zeros = [
+            next(
+                (
+                    (t - pressed_us) / 1000
+                    for t, name, speed in self.rig.bus.setpoints(pressed_us)
+                    if name == wanted and speed == 0
+                ),
+                9999,
+            )
+            for wanted in (266, 298)
+        ]
+        self.require(
+            latched and max(zeros) < 50,
+            f"both wheels were told zero {max(zeros):.1f} ms after the press",
+            f"zero after {max(zeros):.1f} ms",
+        )
         self.watch(0.4)
-        self.require("refused: latched" in driver.text() or "refused: estop_pressed" in driver.text(), "the joystick program is refused from then on")
+        self.require(
+            "refused: latched" in driver.text() or "refused: estop_pressed" in driver.text(),
+            "the joystick program is refused from then on",
+        )
         stands = self.watch(3, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"])
         self.require(stands, "the wheels stand")
         self.watch(1.0)
 
     def reset(self):
-        self.step("Reset, too early and in time", "A reset leads back to listening, not to motion. It is refused as long as something speaks against it.")
+        self.step(
+            "Reset, too early and in time",
+            "A reset leads back to listening, not to motion. It is refused as long as something speaks against it.",
+        )
         reply = self.client.request("reset")
-        self.require(not reply["ok"] and reply["error"] == "estop_pressed", f"refused: {reply.get('message')}", f"reset while pressed: {reply}")
+        self.require(
+            not reply["ok"] and reply["error"] == "estop_pressed",
+            f"refused: {reply.get('message')}",
+            f"reset while pressed: {reply}",
+        )
         self.watch(2.2)
         self.rig.release()
         self.watch(1.0)
@@ -241,9 +271,19 @@ class Story:
 
     def why(self):
         self.step("Why did it stop?", "The gateway remembers. `iwheelctl why` asks it.")
-        tool = subprocess.run([find_program(self.rig.build, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "why"],
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=5, check=False)
-        self.require(tool.returncode == 0 and "500" in tool.stdout.split("\n")[0], tool.stdout.splitlines()[0], f"why: {tool.stdout}")
+        tool = subprocess.run(
+            [find_program(self.rig.build, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "why"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=5,
+            check=False,
+        )
+        self.require(
+            tool.returncode == 0 and "500" in tool.stdout.split("\n")[0],
+            tool.stdout.splitlines()[0],
+            f"why: {tool.stdout}",
+        )
         self.watch(2.5)
 
     def judge(self):
@@ -252,93 +292,13 @@ class Story:
             for line in driver.text().splitlines():
                 words = line.split()
                 if len(words) == len(Event._fields):
-                    self.rig.timeline.append(Event(*(int(w) if w.lstrip("-").isdigit() else w for w in words))._replace(ok=words[3] == "True"))
+                    self.rig.timeline.append(
+                        Event(*(int(w) if w.lstrip("-").isdigit() else w for w in words))._replace(
+                            ok=words[3] == "True"
+                        )
+                    )
         judge = self.rig.judge(estop_limit_us=50_000)
         broken = [found for found in judge.found if not found.timing]
         if broken:
             raise Failed(f"the judge of the bus log: {broken[0].rule}: {broken[0].text}")
         return judge
-
-
-def keep(rig):
-    """Leaves everything running and says what to try."""
-    tool = os.path.relpath(find_program(rig.build, "iwheelctl"))
-    sim = os.path.relpath(find_program(rig.build, "iwheel-sim"))
-    print(f"""
-Gateway and simulator go on running. In another terminal, in this folder:
-
-    export IWHEEL_SOCKET={rig.path('gateway.sock')}
-    {tool} status
-    {tool} drive 300 300 --for 3s
-    {tool} watch state stop
-    {tool} why
-
-    {sim} --control {rig.path('control')} estop press
-    {sim} --control {rig.path('control')} estop release
-    {tool} reset
-    {sim} --control {rig.path('control')} help
-
-Configuration: {rig.path('gateway.conf')}   Gateway's messages: {rig.path('gateway.out')}
-""")
-    if sys.stdin.isatty():
-        print("Enter or Ctrl-C ends both.", flush=True)
-        sys.stdin.readline()
-    else:
-        print("Ctrl-C or SIGTERM ends both.", flush=True)
-        signal.pause()
-
-
-def parse():
-    parser = argparse.ArgumentParser(prog="./demo")
-    parser.add_argument("--build", required=True)
-    parser.add_argument("--keep", action="store_true")
-    parser.add_argument("--plain", action="store_true")
-    return parser.parse_args()
-
-
-def run(options):
-    rig, sleeper = Rig(options.build, CONFIG), Sleeper()
-    code = 0
-    try:
-        view = choose(sys.stdout, options.plain)
-        story = Story(rig, view)
-        try:
-            story.tell()
-        finally:
-            view.close()
-            for driver in story.drivers:
-                driver.end()
-        if options.keep:
-            print(f"\nEverything happened as told, in {story.elapsed_s():.0f} s.")
-            keep(rig)
-        else:
-            judge = story.judge()
-            print(f"\nEverything happened as told, in {story.elapsed_s():.0f} s. {len(judge.frames)} frames were on the bus, {len(judge.setpoints)} of them\n"
-                  f"setpoints, judged one by one: no rule was broken; longest gap {judge.gap_max_us / 1000:.0f} ms.\nTry it yourself: ./demo --keep")
-    except Failed as failure:
-        said = rig.gateway.text().splitlines()[-12:] if rig.gateway else []
-        print("\nThe gateway's last words:\n" + "\n".join(said) + f"\n\nFAILED: {failure}", file=sys.stderr)
-        if sleeper.worst_s > STALL_S:
-            print(f"This machine was stalled for {sleeper.worst_s * 1000:.0f} ms meanwhile; try again when it is less busy.", file=sys.stderr)
-        code = 1
-    finally:
-        rig.close()
-    return code
-
-
-def main():
-    options = parse()
-
-    def interrupt(_number, _frame):
-        raise KeyboardInterrupt
-    signal.signal(signal.SIGTERM, interrupt)
-    signal.signal(signal.SIGHUP, interrupt)
-    try:
-        return run(options)
-    except KeyboardInterrupt:
-        print("ended")
-        return 0 if options.keep else 130
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A passive listener on the local bus: records every frame with the kernel's time stamp, and can send frames as a node of its own."""
+
 import socket
 import struct
 import threading
@@ -7,7 +8,7 @@ import time
 
 from judge_log import Frame, signed
 
-FRAME = struct.Struct("=IBBB x8s")   # struct can_frame: id, length, pad, res0 (1: echo of our own frame), data
+FRAME = struct.Struct("=IBBB x8s")  # struct can_frame: id, length, pad, res0 (1: echo of our own frame), data
 SO_TIMESTAMPNS = 35
 EXTENDED, REMOTE, ERROR = 0x80000000, 0x40000000, 0x20000000
 
@@ -61,8 +62,11 @@ class Bus:
 
     def setpoints(self, since_us=0):
         """The gateway's setpoints as (t_us, id, mm/s)."""
-        return [(f.t_us, f.id, signed(f.data, 1)) for f in list(self.frames)
-                if f.id in (266, 298) and not f.own and f.t_us >= since_us and len(f.data) >= 3]
+        return [
+            (f.t_us, f.id, signed(f.data, 1))
+            for f in list(self.frames)
+            if f.id in (266, 298) and not f.own and f.t_us >= since_us and len(f.data) >= 3
+        ]
 
     def speed_rpm(self, side):
         """The wheel's last speed frame."""

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A northbound client that writes down what it did and when."""
+
 import json
 import select
 import socket

@@ -3,6 +3,7 @@
 
 Usage: drive_client.py SOCKET LEFT RIGHT [noarm]
 """
+
 import sys
 import time
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Starts simulator and gateway in a private folder, keeps the timeline, and ends what it started, by process id."""
+
 import ctypes
 import grp
 import os
@@ -39,9 +40,16 @@ class Process:
             die_with_parent()
             if setup:
                 setup()
+
         with open(output, "ab") as file:
-            self.child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=options.pop("stdout", file), stderr=file,
-                                          preexec_fn=prepare, **options)
+            self.child = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=options.pop("stdout", file),
+                stderr=file,
+                preexec_fn=prepare,
+                **options,
+            )
 
     def signal(self, number):
         if self.child.poll() is None:
@@ -82,8 +90,18 @@ class Sim:
 
     def __init__(self, rig, extra=()):
         self.rig = rig
-        command = [rig.program("iwheel-sim"), "--can", f"unix:{rig.path('bus')}", "--estop", rig.path("button"),
-                   "--control", rig.path("control"), "--seed", "1", *extra]
+        command = [
+            rig.program("iwheel-sim"),
+            "--can",
+            f"unix:{rig.path('bus')}",
+            "--estop",
+            rig.path("button"),
+            "--control",
+            rig.path("control"),
+            "--seed",
+            "1",
+            *extra,
+        ]
         self.process = Process(command, rig.path("sim.out"))
         self.control = wait_connect(rig.path("control"), self.process)
         self.lines = self.control.makefile("r")
@@ -115,7 +133,9 @@ def wait_connect(path, process, seconds=5.0):
         except OSError as error:
             sock.close()
             if process.child.poll() is not None:
-                raise RuntimeError(f"{process.child.args[0]} ended with {process.child.returncode}: {process.text()[-600:]}") from error
+                raise RuntimeError(
+                    f"{process.child.args[0]} ended with {process.child.returncode}: {process.text()[-600:]}"
+                ) from error
             if time.monotonic() > deadline:
                 raise
             time.sleep(0.005)
@@ -153,15 +173,30 @@ class Rig:
     def judge_config(self):
         wheels, drive = self.settings["wheels"], self.settings["drive"]
         values = {key: drive[key] for key in drive if key in Config._fields}
-        return Config(setpoint_type=wheels["setpoint_type"], role=wheels["current_role"], dlc=wheels.get("setpoint_dlc", 5),
-                      invert=tuple(self.settings.get(side, {}).get("invert") == "yes" for side in ("left", "right")), **values)
+        return Config(
+            setpoint_type=wheels["setpoint_type"],
+            role=wheels["current_role"],
+            dlc=wheels.get("setpoint_dlc", 5),
+            invert=tuple(self.settings.get(side, {}).get("invert") == "yes" for side in ("left", "right")),
+            **values,
+        )
 
     # The gateway ------------------------------------------------------------------------------------------------------
 
     def gateway_command(self, *extra):
         estop = f"unix:{self.path(self.button)}" if self.estop else "none"
-        return [self.program("iwheel-gateway"), "-c", self.path("gateway.conf"), "--can", f"unix:{self.path('bus')}",
-                "--socket", self.path("gateway.sock"), "--estop", estop, *extra]
+        return [
+            self.program("iwheel-gateway"),
+            "-c",
+            self.path("gateway.conf"),
+            "--can",
+            f"unix:{self.path('bus')}",
+            "--socket",
+            self.path("gateway.sock"),
+            "--estop",
+            estop,
+            *extra,
+        ]
 
     def start_gateway(self, *extra, setup=None, wheels=True, restart_hold=False):
         """Starts it and waits until it answers, and with `wheels` until both are heard. Returns the milliseconds to the answer."""
@@ -176,8 +211,13 @@ class Rig:
         client.request("hello")
         answered_ms = (now_us() - begin_us) / 1000
         if wheels:
-            self.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active"
-                             and s["estop"]["state"] in ("released", "none"))
+            self.wait_status(
+                client,
+                lambda s: s["left"]["at_rest"]
+                and s["right"]["at_rest"]
+                and s["bus"]["state"] == "active"
+                and s["estop"]["state"] in ("released", "none"),
+            )
         client.close()
         return answered_ms
 

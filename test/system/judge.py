@@ -4,12 +4,26 @@
 Written from the rules of motion permission, not from the gateway's code. The bus log is the only witness of what the gateway
 did; the timeline tells what was done to it. Times are integer microseconds of CLOCK_MONOTONIC; see judge_log.py for the timeline.
 """
-from judge_log import (ECHO_US, GAP_US, HOLD_MAX_US, JITTER_US, PAIR_US, RESIDUAL_US, RESIDUAL_ZERO_US, REST_RPM,
-                       SETTLED_US, SPEED_IDS, Reading, percentile, signed)
+
+from judge_log import (
+    ECHO_US,
+    GAP_US,
+    HOLD_MAX_US,
+    JITTER_US,
+    PAIR_US,
+    RESIDUAL_US,
+    RESIDUAL_ZERO_US,
+    REST_RPM,
+    SETTLED_US,
+    SPEED_IDS,
+    Reading,
+    percentile,
+    signed,
+)
 
 
 class Judge(Reading):
-    """`judge()` returns the violations; the figures are in `estop_latencies_us`, `gap_max_us`, `pair_max_us`."""
+    """`judge()` returns the violations; the figures are in `estop_latencies` (when, how long), `gap_max_us`, `pair_max_us`."""
 
     def judge(self):
         self._read()
@@ -73,14 +87,21 @@ class Judge(Reading):
             if later and later[0] is setpoint and setpoint.t_us < end + RESIDUAL_US:
                 self.residual += 1
                 if len(later) < 2 or not later[1].zero or later[1].t_us - setpoint.t_us > RESIDUAL_ZERO_US:
-                    self._say("old_frame", setpoint.t_us, f"an old frame of {setpoint.speed} mm/s without a zero right behind it")
+                    self._say(
+                        "old_frame",
+                        setpoint.t_us,
+                        f"an old frame of {setpoint.speed} mm/s without a zero right behind it",
+                    )
                 return True
         return False
 
     def _within_command(self, setpoint, previous, drives):
         """Between what it was, zero and what was commanded lately; never beyond."""
-        recent = [drive for number, drive in enumerate(drives)
-                  if number + 1 == len(drives) or drives[number + 1].done_us >= setpoint.t_us - GAP_US]
+        recent = [
+            drive
+            for number, drive in enumerate(drives)
+            if number + 1 == len(drives) or drives[number + 1].done_us >= setpoint.t_us - GAP_US
+        ]
         wanted = [(drive.left, drive.right)[setpoint.side] for drive in recent]
         hull = wanted + [0, previous.speed if previous else 0]
         if not min(hull) - 1 <= setpoint.speed <= max(hull) + 1:
@@ -93,10 +114,20 @@ class Judge(Reading):
 
     def _lease_rule(self, setpoint, name, drives):
         config, last = self.config, drives[-1]
-        limit_us = last.done_us + (config.lease_ms + config.period_ms) * 1000 + self._ramp_us(config.max_speed_mm_s) + JITTER_US
+        limit_us = (
+            last.done_us
+            + (config.lease_ms + config.period_ms) * 1000
+            + self._ramp_us(config.max_speed_mm_s)
+            + JITTER_US
+        )
         if setpoint.t_us > limit_us:
             excess_us = setpoint.t_us - limit_us
-            self._say("lease", setpoint.t_us, f"{name} later than lease, period and ramp by {excess_us / 1000:.0f} ms", excess_us)
+            self._say(
+                "lease",
+                setpoint.t_us,
+                f"{name} later than lease, period and ramp by {excess_us / 1000:.0f} ms",
+                excess_us,
+            )
 
     def _speed_at(self, t_us):
         before = [abs(s.speed) for s in self.setpoints if t_us - GAP_US <= s.t_us <= t_us + JITTER_US]
@@ -110,8 +141,11 @@ class Judge(Reading):
             count = after_press.setdefault(end_us, [])
             count.append(setpoint)
             if len(count) > 1:
-                self._say("nonzero_after_estop", setpoint.t_us,
-                          f"{name}, {(setpoint.t_us - end_us) / 1000:.1f} ms after the e-stop, the {len(count)}. such frame of this wheel")
+                self._say(
+                    "nonzero_after_estop",
+                    setpoint.t_us,
+                    f"{name}, {(setpoint.t_us - end_us) / 1000:.1f} ms after the e-stop, the {len(count)}. such frame of this wheel",
+                )
             return
         if kind == "killed":
             limit_us = end_us + JITTER_US
@@ -122,33 +156,47 @@ class Judge(Reading):
             limit_us = start_us + self._ramp_us(self._speed_at(end_us)) + self.config.period_ms * 1000 + JITTER_US
         if setpoint.t_us > limit_us:
             excess_us = setpoint.t_us - limit_us
-            self._say("nonzero_after_" + kind, setpoint.t_us,
-                      f"{name}, {(setpoint.t_us - end_us) / 1000:.0f} ms after the stop, {excess_us / 1000:.0f} ms too late", excess_us)
+            self._say(
+                "nonzero_after_" + kind,
+                setpoint.t_us,
+                f"{name}, {(setpoint.t_us - end_us) / 1000:.0f} ms after the stop, {excess_us / 1000:.0f} ms too late",
+                excess_us,
+            )
 
     def _slew(self, setpoints):
-        """Invariant 8: no step steeper than the configured slopes; a jump to zero only where the rules want one."""
+        """Invariant 8: no step steeper than the configured slopes; a jump to zero only where the rules want one.
+
+        Compared with the frame before the last (the last one may have come late) and with the one ten frames ago (a slope
+        that is a little too steep all the time).
+        """
+        for number, after in enumerate(setpoints[1:], 1):
+            for back in (min(2, number), 10):
+                if back <= number and not (back == 10 and after.speed == 0):
+                    self._one_slew(setpoints[number - back], after)
+
+    def _one_slew(self, before, after):
         config = self.config
-        for before, after in zip(setpoints, setpoints[1:]):
-            elapsed_us = after.t_us - before.t_us
-            growing = abs(after.speed) > abs(before.speed) or before.speed * after.speed < 0
-            if growing:
-                granted_us = min(elapsed_us, 2000 * config.period_ms) + JITTER_US
-                slope = max(config.accel_mm_s2, config.decel_mm_s2 if before.speed * after.speed < 0 else 0)
-            else:
-                granted_us, slope = elapsed_us + JITTER_US, config.decel_mm_s2
-            step, allowed = abs(after.speed - before.speed), slope * granted_us / 1e6 + 2
-            if step <= allowed:
-                continue
-            if after.speed == 0:
-                if not self._cut_near(after.t_us):
-                    self._say("hard_stop", after.t_us, f"{before.speed} mm/s to zero without ramp and without a reason")
-            else:
-                self._say("slew", after.t_us, f"{before.speed} to {after.speed} mm/s in {elapsed_us / 1000:.1f} ms")
+        elapsed_us = after.t_us - before.t_us
+        reverses = before.speed * after.speed < 0
+        if abs(after.speed) > abs(before.speed) or reverses:
+            slope = max(config.accel_mm_s2, config.decel_mm_s2 if reverses else 0)
+        else:
+            slope = config.decel_mm_s2
+        step, allowed = abs(after.speed - before.speed), slope * (elapsed_us + JITTER_US) / 1e6 + 2
+        if step <= allowed:
+            return
+        if after.speed != 0:
+            text = f"{before.speed} to {after.speed} mm/s in {elapsed_us / 1000:.1f} ms"
+            self._say("slew", after.t_us, text, (step - allowed) * 1e6 / slope)
+        elif not self._cut_near(after.t_us):
+            text = f"{before.speed} mm/s to zero without ramp and without a reason"
+            self._say("hard_stop", after.t_us, text, 0)  # a stalled machine is a reason: its wheels fall silent
 
     def _cut_near(self, t_us):
         kinds = ("press", "estop", "cut", "restart_hold")
-        return any(event.kind in kinds and event.t_us <= t_us <= event.t_us + event.within_us + GAP_US for event in self.events) \
-            or self._is_dead(t_us, t_us)
+        return any(
+            event.kind in kinds and event.t_us <= t_us <= event.t_us + event.within_us + GAP_US for event in self.events
+        ) or self._is_dead(t_us, t_us)
 
     def _pairs(self):
         """Invariant 5: left and right leave together, left first."""
@@ -167,7 +215,12 @@ class Judge(Reading):
                 spread_us = setpoint.t_us - waiting.t_us
                 self.pair_max_us = max(self.pair_max_us, spread_us)
                 if spread_us > PAIR_US:
-                    self._say("pair_spread", setpoint.t_us, f"{spread_us / 1000:.1f} ms between left and right", spread_us - PAIR_US)
+                    self._say(
+                        "pair_spread",
+                        setpoint.t_us,
+                        f"{spread_us / 1000:.1f} ms between left and right",
+                        spread_us - PAIR_US,
+                    )
                 waiting = None
         if waiting is not None and self._alone(waiting):
             self._say("pair", waiting.t_us, "a left setpoint without its right one")
@@ -185,7 +238,9 @@ class Judge(Reading):
                 self._say("never_sent", session.begin_us, "armed, but no setpoint was sent to a wheel")
                 continue
             until_us = min(self._must_send_until(session, side), next_us, self.finished_us)
-            self._no_gap([max(session.armed_us - GAP_US // 2, times[0])] + [t for t in times if t <= until_us] + [until_us])
+            self._no_gap(
+                [max(session.armed_us - GAP_US // 2, times[0])] + [t for t in times if t <= until_us] + [until_us]
+            )
             self._silence(session, times, next_us)
 
     def _no_gap(self, times):
@@ -222,7 +277,9 @@ class Judge(Reading):
             until_us = session.end_us() or self.finished_us
         else:
             until_us = zero_us + (self.config.zero_hold_ms - self.config.period_ms) * 1000 - JITTER_US
-        resets = [event.t_us for event in self.events if event.kind == "reset" and event.ok and event.t_us > session.begin_us]
+        resets = [
+            event.t_us for event in self.events if event.kind == "reset" and event.ok and event.t_us > session.begin_us
+        ]
         return min([until_us] + ([killed_us] if killed_us else []) + resets[:1])
 
     def _rest_since_us(self, from_us):
@@ -243,10 +300,15 @@ class Judge(Reading):
         end_us = session.end_us()
         if end_us is None:
             return
-        zero_us = max((t for t in (self._first_zero_us(session, side) for side in (0, 1)) if t is not None), default=None)
+        zero_us = max(
+            (t for t in (self._first_zero_us(session, side) for side in (0, 1)) if t is not None), default=None
+        )
         if zero_us is None:
-            if end_us + self._ramp_us(self.config.max_speed_mm_s) + GAP_US * 2 < min(next_us, self.finished_us) \
-                    and self._killed_us(session) is None and not self._is_dead(end_us, end_us):
+            if (
+                end_us + self._ramp_us(self.config.max_speed_mm_s) + GAP_US * 2 < min(next_us, self.finished_us)
+                and self._killed_us(session) is None
+                and not self._is_dead(end_us, end_us)
+            ):
                 self._say("no_zero", end_us, "the session ended without a zero setpoint")
             return
         hold_us = zero_us + self.config.zero_hold_ms * 1000
@@ -255,7 +317,12 @@ class Judge(Reading):
         limit_us = min(limit_us, max(hold_us, zero_us + HOLD_MAX_US)) + GAP_US
         if times[-1] > limit_us and not self._is_dead(zero_us, times[-1]):
             late_us = times[-1] - limit_us
-            self._say("no_silence", times[-1], f"still sending {late_us / 1000:.0f} ms after the hold should have ended", late_us)
+            self._say(
+                "no_silence",
+                times[-1],
+                f"still sending {late_us / 1000:.0f} ms after the hold should have ended",
+                late_us,
+            )
 
     def _listening(self):
         """Nothing is sent before arm, and nothing while no gateway runs."""
@@ -266,8 +333,9 @@ class Judge(Reading):
         for reset in (event for event in self.events if event.kind == "reset" and event.ok):
             for setpoint in self.setpoints:
                 session = self._session_at(setpoint.t_us)
-                if setpoint.t_us > reset.done_us + JITTER_US and session is not None and session.begin_us < reset.t_us:
-                    self._say("sent_after_reset", setpoint.t_us, "a setpoint after reset and before arm")
+                late_us = setpoint.t_us - reset.done_us - JITTER_US
+                if late_us > 0 and session is not None and session.begin_us < reset.t_us:
+                    self._say("sent_after_reset", setpoint.t_us, "a setpoint after reset and before arm", late_us)
                     return
 
     def _estop(self):
@@ -275,16 +343,22 @@ class Judge(Reading):
         for event in self.events:
             if event.kind not in ("press", "estop") or not self._sending_at(event.t_us):
                 continue
-            zeros = [next((s.t_us for s in self.setpoints if s.side == side and s.t_us > event.t_us and s.zero), None) for side in (0, 1)]
+            zeros = [
+                next((s.t_us for s in self.setpoints if s.side == side and s.t_us > event.t_us and s.zero), None)
+                for side in (0, 1)
+            ]
             if None in zeros:
                 self._say("estop_no_zero", event.t_us, "no zero pair after the e-stop")
                 continue
-            self.estop_latencies_us.append(max(zeros) - event.t_us)
-        if self.estop_latencies_us:
-            p99_us = percentile(self.estop_latencies_us, 99)
+            self.estop_latencies.append((event.t_us, max(zeros) - event.t_us))
+        if self.estop_latencies:
+            count = len(self.estop_latencies)
+            p99_us = percentile([latency_us for _, latency_us in self.estop_latencies], 99)
+            worst_us = max(self.estop_latencies, key=lambda pair: pair[1])[0]
             if p99_us > self.estop_limit_us:
-                self._say("estop_latency", 0, f"first zero pair {p99_us / 1000:.1f} ms after the e-stop (p99 of "
-                          f"{len(self.estop_latencies_us)}), {self.estop_limit_us / 1000:.0f} ms allowed", p99_us - self.estop_limit_us)
+                text = f"first zero pair {p99_us / 1000:.1f} ms after the e-stop (p99 of {count}), "
+                text += f"{self.estop_limit_us / 1000:.0f} ms allowed"
+                self._say("estop_latency", worst_us, text, p99_us - self.estop_limit_us)
 
     def _sending_at(self, t_us):
         session = self._session_at(t_us)

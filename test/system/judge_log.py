@@ -10,6 +10,7 @@ Times are integer microseconds of CLOCK_MONOTONIC. Timeline events (Event.kind):
   cut, ramp         the scenario caused something that must stop the wheels within within_us, without or with ramp
   dead, alive       the bus takes no frames any more; takes them again
 """
+
 import bisect
 import math
 from typing import NamedTuple
@@ -17,25 +18,26 @@ from typing import NamedTuple
 LEFT, RIGHT = 266, 298
 SPEED_IDS = (256, 288)
 KNOWN = {LEFT, RIGHT, 256, 257, 288, 289, 290, 512, 513, 544, 545}
-GAP_US = 100_000          # invariant 4
-PAIR_US = 3_000           # invariant 5: left and right of one cycle; 0.88 ms on a full bus
-ESTOP_US = 5_000          # invariant 2
-JITTER_US = 10_000        # between the gateway's clock and the bus
+GAP_US = 100_000  # invariant 4
+PAIR_US = 3_000  # invariant 5: left and right of one cycle; 0.88 ms on a full bus
+ESTOP_US = 5_000  # invariant 2
+JITTER_US = 10_000  # between the gateway's clock and the bus
+BUS_STALL_US = 7_000  # no telemetry for so long: the simulator waited for the processor
 REST_RPM = 2
 SETTLED_US = 500_000
 HOLD_MAX_US = 10_000_000
 FIRST_LEASE_US = 1_000_000
-ALWAYS_US = 200_000       # a limit missed by more than this is no matter of a busy machine
+ALWAYS_US = 200_000  # a limit missed by more than this is no matter of a busy machine
 ECHO_US = 50_000
-RESIDUAL_US = 5_000_000   # an old frame comes out this soon after the bus lives again, if ever
+RESIDUAL_US = 5_000_000  # an old frame comes out this soon after the bus lives again, if ever
 RESIDUAL_ZERO_US = 2_000  # and its zero follows
 
 
 class Frame(NamedTuple):
     t_us: int
-    id: int               # with the flag bits of struct can_frame
+    id: int  # with the flag bits of struct can_frame
     data: bytes
-    own: bool = False     # sent by the scenario itself
+    own: bool = False  # sent by the scenario itself
 
 
 class Event(NamedTuple):
@@ -66,13 +68,13 @@ class Violation(NamedTuple):
     rule: str
     t_us: int
     text: str
-    timing: bool          # a stalled machine could have caused it
+    timing: bool  # a stalled machine could have caused it
 
 
 class Setpoint(NamedTuple):
     t_us: int
-    side: int             # 0 left, 1 right
-    speed: int            # mm/s in the machine's frame
+    side: int  # 0 left, 1 right
+    speed: int  # mm/s in the machine's frame
     current: int
     zero: bool
 
@@ -83,14 +85,14 @@ class Session:
     def __init__(self, begin_us, armed_us):
         self.begin_us, self.armed_us = begin_us, armed_us
         self.drives = []
-        self.ends = []    # (t_us, kind, within_us), kind: ramp, cut, press, killed
+        self.ends = []  # (t_us, kind, within_us), kind: ramp, cut, press, killed
 
     def end_us(self):
         return min((end[0] for end in self.ends), default=None)
 
 
 def signed(data, at):
-    return int.from_bytes(data[at:at + 2], "big", signed=True)
+    return int.from_bytes(data[at : at + 2], "big", signed=True)
 
 
 class Reading:
@@ -102,7 +104,7 @@ class Reading:
         self.events = sorted(events, key=lambda event: event.t_us)
         self.finished_us = finished_us or (self.frames[-1].t_us if self.frames else 0)
         self.found = []
-        self.estop_latencies_us = []
+        self.estop_latencies = []
         self.gap_max_us = self.pair_max_us = self.residual = 0
         self.setpoints = []
         self.dead = self._dead_windows()
@@ -124,8 +126,19 @@ class Reading:
 
     def _first_out_us(self, alive_us):
         """The bus takes frames again when one comes out: a wheel that has power first starts, then acknowledges."""
-        return next((frame.t_us for frame in self.frames
-                     if frame.id in (LEFT, RIGHT) and not frame.own and alive_us <= frame.t_us < alive_us + RESIDUAL_US), alive_us)
+        return next(
+            (
+                frame.t_us
+                for frame in self.frames
+                if frame.id in (LEFT, RIGHT) and not frame.own and alive_us <= frame.t_us < alive_us + RESIDUAL_US
+            ),
+            alive_us,
+        )
+
+    def bus_stalls(self):
+        """When the simulated bus itself stood still: two wheels send a frame every 4 ms each. [(from_us, to_us)]"""
+        times = [frame.t_us for frame in self.frames if frame.id in SPEED_IDS and not frame.own]
+        return [(a, b) for a, b in zip(times, times[1:]) if b - a > BUS_STALL_US]
 
     def _is_dead(self, from_us, to_us):
         return any(begin < to_us + GAP_US and from_us < end + GAP_US for begin, end in self.dead)
@@ -183,7 +196,15 @@ class Reading:
             if event.t_us > min((at + within for at, _, within in session.ends), default=event.t_us) + ECHO_US:
                 self._say("drive_after_end", event.t_us, "a drive was accepted although the session had ended")
             session.drives.append(event)
-        kinds = {"stop": "ramp", "gone": "ramp", "ramp": "ramp", "press": "press", "estop": "press", "cut": "cut", "end": "killed"}
+        kinds = {
+            "stop": "ramp",
+            "gone": "ramp",
+            "ramp": "ramp",
+            "press": "press",
+            "estop": "press",
+            "cut": "cut",
+            "end": "killed",
+        }
         if event.kind in kinds:
             session.ends.append((event.t_us, kinds[event.kind], event.within_us))
 
@@ -194,7 +215,11 @@ class Reading:
             if previous is not None and drive.kind == "drive":
                 late_us = drive.t_us - (previous.done_us + self._lease_us(previous)) - config.period_ms * 1000
                 if late_us > JITTER_US:
-                    self._say("late_drive", drive.t_us, f"a drive was accepted {late_us / 1000:.0f} ms after the lease had ended")
+                    self._say(
+                        "late_drive",
+                        drive.t_us,
+                        f"a drive was accepted {late_us / 1000:.0f} ms after the lease had ended",
+                    )
             previous = drive
         if previous is not None:
             end_us = previous.done_us + self._lease_us(previous)

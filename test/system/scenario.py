@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: MIT
 """What a scenario is given: a rig, checks, figures. Scenarios register themselves with @scenario."""
+
 import time
 
 from harness import Rig, percentile
 
 REGISTRY = {}
+# Refusals of arm that pass by themselves: the wheels roll out, or the last zero is still on its way.
+AWAITED = ("not_at_rest", "stale_command", "cause_present", "send_stalled")
 
 
 class Skip(Exception):
@@ -13,9 +16,11 @@ class Skip(Exception):
 
 def scenario(title, seconds=5):
     """`seconds`: roughly how long it takes; the longest start first."""
+
     def register(function):
         REGISTRY[function.__name__] = (title, seconds, function)
         return function
+
     return register
 
 
@@ -24,7 +29,7 @@ class Test:
 
     def __init__(self, build):
         self.build = build
-        self.failures, self.figures, self.latencies_us = [], [], []
+        self.failures, self.figures, self.latencies, self.bus_stalls = [], [], [], []
         self.rigs = []
 
     def rig(self, *arguments, **options):
@@ -54,7 +59,7 @@ class Test:
         """Arms; tries again for a while if the wheels are not at rest yet."""
         reply = client.arm(**fields)
         for _ in range(150):
-            if reply["ok"] or reply["error"] not in ("not_at_rest", "stale_command", "cause_present"):
+            if reply["ok"] or reply["error"] not in AWAITED:
                 break
             time.sleep(0.02)
             reply = client.arm(**fields)
@@ -68,7 +73,9 @@ class Test:
     def stopped_by(self, client, cause, state="latched"):
         """`why` names that cause, and the state is as told."""
         why, status = client.request("why"), client.request("status")
-        self.check(why.get("cause") == cause, f"cause {cause} expected, why says {why.get('cause')}: {why.get('sentence')}")
+        self.check(
+            why.get("cause") == cause, f"cause {cause} expected, why says {why.get('cause')}: {why.get('sentence')}"
+        )
         self.check(status["state"] == state, f"state {state} expected, it is {status['state']}")
         self.check(len(why.get("sentence") or "") > 20, f"why has no sentence: {why}")
         return why
@@ -92,10 +99,9 @@ class Test:
             self.failures.append([f"{found.rule}: {at}{found.text}", "timing" if found.timing else "rule", found.t_us])
         if judge.gap_max_us:
             self.figure(f"longest gap {judge.gap_max_us / 1000:.0f} ms")
-        if judge.estop_latencies_us:
-            self.latencies_us += judge.estop_latencies_us
-            if len(judge.estop_latencies_us) > 1:
-                self.figure(f"e-stop p99 {percentile(judge.estop_latencies_us, 99) / 1000:.2f} ms of {len(judge.estop_latencies_us)}")
-            else:
-                self.figure(f"e-stop to zero {judge.estop_latencies_us[0] / 1000:.2f} ms")
+        self.bus_stalls += judge.bus_stalls()
+        if judge.estop_latencies:
+            self.latencies += judge.estop_latencies
+            values = [latency_us for _, latency_us in judge.estop_latencies]
+            self.figure(f"e-stop to zero p99 {percentile(values, 99) / 1000:.2f} ms of {len(values)}")
         return judge

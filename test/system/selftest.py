@@ -3,6 +3,7 @@
 
 The logs come from a small ideal gateway written here, so that a judge that always says "good" or always "bad" fails.
 """
+
 import struct
 
 from judge import Judge
@@ -45,9 +46,15 @@ def script():
 def plan():
     """When the ideal gateway sends, and towards what: (from, to, target, how)."""
     return [
-        (1_501, 1_701, (0, 0), "ramp"), (1_701, 3_520, (300, 300), "ramp"), (3_521, 5_030, (0, 0), "cut"),
-        (5_601, 5_701, (0, 0), "ramp"), (5_701, 6_701, (200, 100), "ramp"), (6_701, 8_370, (0, 0), "ramp"),
-        (9_001, 9_101, (0, 0), "ramp"), (9_101, 9_621, (-200, 200), "ramp"), (9_621, 11_290, (0, 0), "ramp"),
+        (1_501, 1_701, (0, 0), "ramp"),
+        (1_701, 3_520, (300, 300), "ramp"),
+        (3_521, 5_030, (0, 0), "cut"),
+        (5_601, 5_701, (0, 0), "ramp"),
+        (5_701, 6_701, (200, 100), "ramp"),
+        (6_701, 8_370, (0, 0), "ramp"),
+        (9_001, 9_101, (0, 0), "ramp"),
+        (9_101, 9_621, (-200, 200), "ramp"),
+        (9_621, 11_290, (0, 0), "ramp"),
     ]
 
 
@@ -105,6 +112,7 @@ def with_data(at, value):
         data = bytearray(frame.data)
         struct.pack_into(">h" if at else ">B", data, at, value)
         return frame._replace(data=bytes(data))
+
     return change
 
 
@@ -164,15 +172,21 @@ def faults():
     yield "too fast backwards", between(f, 2_300, 2_320, with_data(1, -32768)), e, "speed"
     yield "too much current", between(f, 2_300, 2_320, with_data(3, 2001)), e, "current"
     yield "too much negative current", between(f, 2_300, 2_320, with_data(3, -2001)), e, "current"
+    steep = good(CONFIG._replace(accel_mm_s2=1000))
+    yield "a slope a quarter too steep", steep, e, "slew"
+    yield "a ramp down a quarter too steep", good(CONFIG._replace(decel_mm_s2=2000)), e, "slew"
     yield "full speed in one step", between(f, 1_720, 1_741, with_data(1, 300)), e, "slew"
     yield "faster than commanded", between(f, 2_500, 2_600, with_data(1, 310)), e, "beyond_command"
     yield "backwards when forwards was commanded", between(f, 1_760, 1_780, with_data(1, -5)), e, "beyond_command"
     yield "a hard stop although the client only left", between(f, 9_622, 9_900, with_data(1, 0)), e, "hard_stop"
     yield "e-stop answered after 9 ms", between(f, 3_521, 5_100, late(9)), e, "estop_latency"
-    yield "e-stop answered by a ramp", add(between(f, 3_515, 3_570, drop), *pair(3_521, 270, 270), *pair(3_541, 240, 240),
-                                           *pair(3_561, 210, 210)), e, "nonzero_after_estop"
+    yield "e-stop answered by a ramp", add(
+        between(f, 3_515, 3_570, drop), *pair(3_521, 270, 270), *pair(3_541, 240, 240), *pair(3_561, 210, 210)
+    ), e, "nonzero_after_estop"
     yield "e-stop ignored until the end", between(f, 3_515, 5_100, with_data(1, 300)), e, "nonzero_after_estop"
-    yield "an old pair after the e-stop's zeros", add(f, *pair(4_105, 300, 300), *pair(4_110, 300, 300)), e, "nonzero_after_estop"
+    yield "an old pair after the e-stop's zeros", add(
+        f, *pair(4_105, 300, 300), *pair(4_110, 300, 300)
+    ), e, "nonzero_after_estop"
     yield "no zero at all after the e-stop", between(f, 3_520, 99_999, drop), e, "estop_no_zero"
     yield "motion after release and reset", add(f, *pair(5_450, 100, 100)), e, "sent_after_reset"
     yield "zeros after reset", add(f, *pair(5_550, 0, 0)), e, "sent_after_reset"
@@ -180,40 +194,66 @@ def faults():
     yield "driving on after stop", between(f, 6_700, 7_600, with_data(1, 200)), e, "nonzero_after_ramp"
     yield "driving on after the lease", f, without(e, "drive", 2_000, 3_510), "lease"
     yield "a drive accepted after the lease", f, without(e, "drive", 2_000, 2_900), "late_drive"
-    yield "a drive accepted after the e-stop", f, e + [Event(3_900 * MS, "drive", 3_901 * MS, left=100, right=100)], "drive_after_end"
+    yield "a drive accepted after the e-stop", f, e + [
+        Event(3_900 * MS, "drive", 3_901 * MS, left=100, right=100)
+    ], "drive_after_end"
     yield "an unknown id", add(f, Frame(2_000 * MS, 267, bytes(5))), e, "unknown_id"
     yield "a remote setpoint", add(f, Frame(2_000 * MS, LEFT | 0x40000000, b"")), e, "unknown_id"
     yield "an extended setpoint", add(f, Frame(2_000 * MS, LEFT | 0x80000000, bytes(5))), e, "unknown_id"
     yield "sending after the process died", f, e + [Event(3_000 * MS, "end")], "nonzero_after_killed"
     yield "a latching fault answered late", f, e + [Event(3_000 * MS, "cut", within_us=100 * MS)], "nonzero_after_cut"
-    yield "old setpoints out of a queue", f, e + [Event(2_500 * MS, "dead"), Event(3_300 * MS, "alive", 3_300 * MS)], "motion_on_dead_bus"
-    off = [Event(9_500 * MS, "dead"), Event(9_500 * MS, "cut", within_us=50 * MS), Event(12_000 * MS, "alive", 12_000 * MS)]
+    yield "old setpoints out of a queue", f, e + [
+        Event(2_500 * MS, "dead"),
+        Event(3_300 * MS, "alive", 3_300 * MS),
+    ], "motion_on_dead_bus"
+    off = [
+        Event(9_500 * MS, "dead"),
+        Event(9_500 * MS, "cut", within_us=50 * MS),
+        Event(12_000 * MS, "alive", 12_000 * MS),
+    ]
     dark = between(f, 9_500, 99_999, drop)
-    yield "two old frames after the bus lives again", add(dark, *pair(12_001, -200, 200), *pair(12_002, -200, 200)), e + off, "old_frame"
+    yield "two old frames after the bus lives again", add(
+        dark, *pair(12_001, -200, 200), *pair(12_002, -200, 200)
+    ), e + off, "old_frame"
     yield "an old frame without its zero", add(dark, *pair(12_001, -200, 200)), e + off, "old_frame"
-    yield "an old frame, its zero 20 ms later", add(dark, *pair(12_001, -200, 200), *pair(12_021, 0, 0)), e + off, "old_frame"
-    yield "old frames again and again", add(dark, *pair(12_001, -200, 200), *pair(12_002, 0, 0), *pair(12_041, -200, 200)), e + off, \
-        "nonzero_after_cut"
-    yield "motion after a restart", add(f, *pair(12_120, 50, 50)), e + [Event(12_100 * MS, "restart_hold")], "motion_without_drive"
+    yield "an old frame, its zero 20 ms later", add(
+        dark, *pair(12_001, -200, 200), *pair(12_021, 0, 0)
+    ), e + off, "old_frame"
+    yield "old frames again and again", add(
+        dark, *pair(12_001, -200, 200), *pair(12_002, 0, 0), *pair(12_041, -200, 200)
+    ), e + off, "nonzero_after_cut"
+    yield "motion after a restart", add(f, *pair(12_120, 50, 50)), e + [
+        Event(12_100 * MS, "restart_hold")
+    ], "motion_without_drive"
     yield "no zeros after a crash while armed", f, e + [Event(12_100 * MS, "restart_hold")], "never_sent"
-    yield "nonzero current in a zero", between(good(CONFIG._replace(role="setpoint")), 7_200, 8_300, with_data(3, 2000)), e, \
-        "nonzero_after_ramp", {"config": CONFIG._replace(role="setpoint")}
-    yield "dirty padding", between(good(CONFIG._replace(dlc=8)), 2_000, 2_020, lambda x: x._replace(data=x.data[:7] + b"\1")), e, \
-        "padding", {"config": CONFIG._replace(dlc=8)}
+    yield "nonzero current in a zero", between(
+        good(CONFIG._replace(role="setpoint")), 7_200, 8_300, with_data(3, 2000)
+    ), e, "nonzero_after_ramp", {"config": CONFIG._replace(role="setpoint")}
+    yield "dirty padding", between(
+        good(CONFIG._replace(dlc=8)), 2_000, 2_020, lambda x: x._replace(data=x.data[:7] + b"\1")
+    ), e, "padding", {"config": CONFIG._replace(dlc=8)}
     yield "not inverted", good(), e, "beyond_command", {"config": CONFIG._replace(invert=(True, False))}
 
 
 def goods():
     f, e = good(), script()
     yield "the ideal gateway", f, e, {}
-    for name, config in (("setpoint role", CONFIG._replace(role="setpoint")), ("mirrored", CONFIG._replace(invert=(True, False))),
-                         ("eight bytes", CONFIG._replace(dlc=8, setpoint_type=7))):
+    for name, config in (
+        ("setpoint role", CONFIG._replace(role="setpoint")),
+        ("mirrored", CONFIG._replace(invert=(True, False))),
+        ("eight bytes", CONFIG._replace(dlc=8, setpoint_type=7)),
+    ):
         yield name, good(config), e, {"config": config}
     yield "foreign frames of the scenario's own", add(f, *(x._replace(own=True) for x in pair(12_000, 900, 900))), e, {}
     yield "one pair on its way at the e-stop", add(f, *pair(3_520.2, 300, 300)), e, {}
-    off = [Event(9_500 * MS, "dead"), Event(9_500 * MS, "cut", within_us=50 * MS), Event(12_000 * MS, "alive", 12_000 * MS)]
-    yield "one old frame per wheel and its zero", add(between(f, 9_500, 99_999, drop), *pair(12_001, -200, 200), *pair(12_001.5, 0, 0)), \
-        [x for x in e if x.t_us < 9_500 * MS] + off, {}
+    off = [
+        Event(9_500 * MS, "dead"),
+        Event(9_500 * MS, "cut", within_us=50 * MS),
+        Event(12_000 * MS, "alive", 12_000 * MS),
+    ]
+    yield "one old frame per wheel and its zero", add(
+        between(f, 9_500, 99_999, drop), *pair(12_001, -200, 200), *pair(12_001.5, 0, 0)
+    ), [x for x in e if x.t_us < 9_500 * MS] + off, {}
     yield "no motion wanted, none made", [x for x in f if not is_setpoint(x)], [e[0]], {"moves": False}
 
 
@@ -231,7 +271,9 @@ def run():
         options = dict(options[0]) if options else {}
         found = {v.rule for v in verdict(frames, events, options.pop("config", CONFIG), **options)}
         if rule not in found:
-            failures.append(f"planted fault '{name}' was not found as {rule} (found: {', '.join(sorted(found)) or 'nothing'})")
+            failures.append(
+                f"planted fault '{name}' was not found as {rule} (found: {', '.join(sorted(found)) or 'nothing'})"
+            )
     return count, failures
 
 

@@ -3,6 +3,7 @@
 
 Usage: sleeper.py FILE    appends lines "t_us late_us"
 """
+
 import sys
 import time
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Row 29 and bad arguments: refused with the right exit code, file, line and cure."""
+
 import os
 import subprocess
 
@@ -12,7 +13,15 @@ def call(rig, program, *arguments, seconds=5, **options):
     """(exit code, what it printed); None as code if it did not end."""
     command = [rig.program(program), *arguments]
     try:
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=seconds, check=False, **options)
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            timeout=seconds,
+            check=False,
+            **options,
+        )
     except subprocess.TimeoutExpired as late:
         return None, (late.stdout or b"").decode(errors="replace")
     return done.returncode, done.stdout.decode(errors="replace")
@@ -23,48 +32,96 @@ def arguments(t):
     rig = t.rig()
     for program in ("iwheel-gateway", "iwheelctl", "iwheel-sim"):
         code, text = call(rig, program, "--help")
-        t.check(code == 0 and program in text and len(text.splitlines()) >= 8, f"{program} --help: {code}, {text[:100]!r}")
+        t.check(
+            code == 0 and program in text and len(text.splitlines()) >= 8, f"{program} --help: {code}, {text[:100]!r}"
+        )
         t.check(max(map(len, text.splitlines())) <= 120, f"{program} --help has lines over 120 columns")
         code, text = call(rig, program, "--version")
-        t.check(code == 0 and program in text and any(c.isdigit() for c in text) and text.count("\n") == 1, f"{program} --version: {code}, {text!r}")
+        t.check(
+            code == 0 and program in text and any(c.isdigit() for c in text) and text.count("\n") == 1,
+            f"{program} --version: {code}, {text!r}",
+        )
         for bad in (("--nonsense",), ("-Z",)):
             code, text = call(rig, program, *bad)
             t.check(code == USAGE and bad[0].lstrip("-") in text, f"{program} {bad}: {code}, {text[:160]!r}")
             t.check("--help" in text, f"{program} {bad} tells where help is: {text[:160]!r}")
-    cases = [("iwheel-gateway", ("-c",), USAGE), ("iwheel-gateway", ("surplus",), USAGE), ("iwheel-gateway", ("--log-level", "loud"), USAGE),
-             ("iwheel-gateway", ("--can", "can0", "--socket", rig.path("x.sock"), "--estop", "none"), UNAVAILABLE),
-             ("iwheel-gateway", ("--can", "unix:" + "x" * 200, "--socket", rig.path("x.sock")), CONFIGURATION),
-             ("iwheel-gateway", ("--can", "unix:", "--socket", rig.path("x.sock")), CONFIGURATION),
-             ("iwheel-gateway", ("--socket", "/" + "x" * 200), CONFIGURATION),
-             ("iwheelctl", (), USAGE), ("iwheelctl", ("fly",), USAGE), ("iwheelctl", ("drive", "fast", "300"), USAGE),
-             ("iwheelctl", ("drive", "300"), USAGE), ("iwheelctl", ("drive", "300", "300", "--for", "long"), USAGE),
-             ("iwheelctl", ("drive", "300", "300", "--for", "-1s"), USAGE), ("iwheelctl", ("drive", "1.5", "300"), USAGE),
-             ("iwheelctl", ("--socket", rig.path("nobody.sock"), "status"), UNAVAILABLE), ("iwheelctl", ("status", "surplus"), USAGE),
-             ("iwheelctl", ("tare", "up"), USAGE), ("iwheelctl", ("watch", "weather"), USAGE),
-             ("iwheel-sim", ("--can", "vcan0"), UNAVAILABLE), ("iwheel-sim", ("--seed", "many"), USAGE), ("iwheel-sim", ("--control", rig.path("nobody"), "surplus"), UNAVAILABLE)]
+    cases = [
+        ("iwheel-gateway", ("-c",), USAGE),
+        ("iwheel-gateway", ("surplus",), USAGE),
+        ("iwheel-gateway", ("--log-level", "loud"), USAGE),
+        ("iwheel-gateway", ("--can", "can0", "--socket", rig.path("x.sock"), "--estop", "none"), UNAVAILABLE),
+        ("iwheel-gateway", ("--can", "unix:" + "x" * 200, "--socket", rig.path("x.sock")), USAGE),
+        ("iwheel-gateway", ("--can", "unix:", "--socket", rig.path("x.sock")), USAGE),
+        ("iwheel-gateway", ("--socket", "/" + "x" * 200), USAGE),
+        ("iwheelctl", (), USAGE),
+        ("iwheelctl", ("fly",), USAGE),
+        ("iwheelctl", ("drive", "fast", "300"), USAGE),
+        ("iwheelctl", ("drive", "300"), USAGE),
+        ("iwheelctl", ("drive", "300", "300", "--for", "long"), USAGE),
+        ("iwheelctl", ("drive", "300", "300", "--for", "-1s"), USAGE),
+        ("iwheelctl", ("drive", "1.5", "300"), USAGE),
+        ("iwheelctl", ("--socket", rig.path("nobody.sock"), "status"), UNAVAILABLE),
+        ("iwheelctl", ("status", "surplus"), USAGE),
+        ("iwheelctl", ("tare", "up"), USAGE),
+        ("iwheelctl", ("watch", "weather"), USAGE),
+        ("iwheel-sim", ("--can", "vcan0"), UNAVAILABLE),
+        ("iwheel-sim", ("--seed", "many"), USAGE),
+        ("iwheel-sim", ("--control", rig.path("nobody"), "surplus"), UNAVAILABLE),
+    ]
     for program, words, expected in cases:
         code, text = call(rig, program, *words)
-        t.check(code == expected, f"{program} {' '.join(words)[:60]}: exit code {code}, {expected} expected: {text[:160]!r}")
+        t.check(
+            code == expected, f"{program} {' '.join(words)[:60]}: exit code {code}, {expected} expected: {text[:160]!r}"
+        )
         t.check(len(text) > 15, f"{program} {words} says nothing")
-    code, text = call(rig, "iwheel-gateway", "-c", rig.path("gateway.conf"), "--can", "can0", "--socket", rig.path("x.sock"), "--estop", "none")
+    code, text = call(
+        rig,
+        "iwheel-gateway",
+        "-c",
+        rig.path("gateway.conf"),
+        "--can",
+        "can0",
+        "--socket",
+        rig.path("x.sock"),
+        "--estop",
+        "none",
+    )
     t.check("unix:" in text, f"SocketCAN is refused with the way out: {text[:200]!r}")
     t.figure(f"{len(cases) + 12} calls")
 
 
 # (text, line that must be named, words that must appear)
 BAD_CONFIGURATIONS = [
-    ("[wheels]\nsetpoint_typ = 1\n", 2, ["setpoint_typ"]), ("[whels]\nsetpoint_type = 1\n", None, ["whels"]),
-    ("[drive]\nlease_ms = 0\n", 2, ["lease_ms", "20"]), ("[drive]\nlease_ms = 5000\n", 2, ["lease_ms", "500"]),
-    ("[drive]\nperiod_ms = 20ms\n", 2, ["period_ms"]), ("[drive]\nperiod_ms = 20.5\n", 2, ["period_ms"]), ("[drive]\nperiod_ms =\n", 2, ["period_ms"]),
-    ("[drive]\naccel_mm_s2 = 100000\n", 2, ["accel_mm_s2", "20000"]), ("[drive]\nmax_current_mA = -1\n", 2, ["max_current_mA"]),
-    ("[drive]\nmax_current_mA = 2001\n", 2, ["max_current_mA", "2000"]), ("[drive]\nzero_hold_ms = 1000\n", 2, ["zero_hold_ms", "1100"]),
-    ("[drive]\nlease_ms = 500\nmax_speed_mm_s = 1000\n", None, ["1000 ms"]), ("[drive]\ndecel_mm_s2 = 100\n", 2, ["1000"]),
-    ("[wheels]\ncurrent_role = torque\n", 2, ["limit", "setpoint"]), ("[wheels]\nsetpoint_type = 256\n", 2, ["255"]),
-    ("[wheels]\nsetpoint_dlc = 4\n", 2, ["setpoint_dlc"]), ("[wheels]\ngear_ratio = 0\n", 2, ["gear_ratio"]), ("[left]\ninvert = perhaps\n", 2, ["yes", "no"]),
-    ("[left]\nforce_unit = N\n", 2, ["cN", "dN"]), ("[left]\nsetpoint_id = 298\n", 2, ["setpoint_id"]), ("[drive]\nlease_ms = 200\nlease_ms = 300\n", 3, ["lease_ms"]),
-    ("lease_ms = 200\n", 1, ["section"]), ("[drive\nlease_ms = 200\n", 1, []), ("[drive]\nlease_ms 200\n", 2, []), ("[estop]\nactive = sometimes\n", 2, ["high", "low"]),
-    ("[bus]\non_mismatch = hope\n", 2, ["refuse", "warn"]), ("[northbound]\nmode = 0999\n", 2, ["mode"]), ("[northbound]\nmax_clients = 0\n", 2, ["max_clients"]),
-    ("\x00[drive]\n", None, []), ("[drive]\n# " + "x" * 5000 + "\nlease_ms = 200\n", None, None),
+    ("[wheels]\nsetpoint_typ = 1\n", 2, ["setpoint_typ"]),
+    ("[whels]\nsetpoint_type = 1\n", None, ["whels"]),
+    ("[drive]\nlease_ms = 0\n", 2, ["lease_ms", "20"]),
+    ("[drive]\nlease_ms = 5000\n", 2, ["lease_ms", "500"]),
+    ("[drive]\nperiod_ms = 20ms\n", 2, ["period_ms"]),
+    ("[drive]\nperiod_ms = 20.5\n", 2, ["period_ms"]),
+    ("[drive]\nperiod_ms =\n", 2, ["period_ms"]),
+    ("[drive]\naccel_mm_s2 = 100000\n", 2, ["accel_mm_s2", "20000"]),
+    ("[drive]\nmax_current_mA = -1\n", 2, ["max_current_mA"]),
+    ("[drive]\nmax_current_mA = 2001\n", 2, ["max_current_mA", "2000"]),
+    ("[drive]\nzero_hold_ms = 1000\n", 2, ["zero_hold_ms", "1100"]),
+    ("[drive]\nlease_ms = 500\nmax_speed_mm_s = 1000\n", None, ["1000 ms"]),
+    ("[drive]\ndecel_mm_s2 = 100\n", 2, ["1000"]),
+    ("[wheels]\ncurrent_role = torque\n", 2, ["limit", "setpoint"]),
+    ("[wheels]\nsetpoint_type = 256\n", 2, ["255"]),
+    ("[wheels]\nsetpoint_dlc = 4\n", 2, ["setpoint_dlc"]),
+    ("[wheels]\ngear_ratio = 0\n", 2, ["gear_ratio"]),
+    ("[left]\ninvert = perhaps\n", 2, ["yes", "no"]),
+    ("[left]\nforce_unit = N\n", 2, ["cN", "dN"]),
+    ("[left]\nsetpoint_id = 298\n", 2, ["setpoint_id"]),
+    ("[drive]\nlease_ms = 200\nlease_ms = 300\n", 3, ["lease_ms"]),
+    ("lease_ms = 200\n", 1, ["section"]),
+    ("[drive\nlease_ms = 200\n", 1, []),
+    ("[drive]\nlease_ms 200\n", 2, []),
+    ("[estop]\nactive = sometimes\n", 2, ["high", "low"]),
+    ("[bus]\non_mismatch = hope\n", 2, ["refuse", "warn"]),
+    ("[northbound]\nmode = 0999\n", 2, ["mode"]),
+    ("[northbound]\nmax_clients = 0\n", 2, ["max_clients"]),
+    ("\x00[drive]\n", None, []),
+    ("[drive]\n# " + "x" * 5000 + "\nlease_ms = 200\n", None, None),
 ]
 
 
@@ -81,7 +138,10 @@ def row29_bad_configuration(t):
         code, printed = call(rig, "iwheel-gateway", "-c", path, *common, seconds=2)
         name = repr(text[:50])
         t.check(code == CONFIGURATION, f"{name}: exit code {code}: {printed[-200:]}")
-        t.check(path in printed and (line is None or f"{path}:{line}:" in printed), f"{name}: file and line {line}: {printed[:200]!r}")
+        t.check(
+            path in printed and (line is None or f"{path}:{line}:" in printed),
+            f"{name}: file and line {line}: {printed[:200]!r}",
+        )
         t.check(all(word in printed for word in words), f"{name}: {words} in {printed[:300]!r}")
     code, printed = call(rig, "iwheel-gateway", "-c", rig.path("missing.conf"), *common)
     t.check(code == CONFIGURATION and "missing.conf" in printed, f"missing file: {code}, {printed[:200]!r}")
@@ -100,7 +160,10 @@ def row29_type_not_set(t):
         client = rig.client()
         refusal = client.arm()
         t.expect(refusal, "type_not_set")
-        t.check("setpoint_type" in refusal["message"] or "current_role" in refusal["message"], f"the message names the key: {refusal['message']}")
+        t.check(
+            "setpoint_type" in refusal["message"] or "current_role" in refusal["message"],
+            f"the message names the key: {refusal['message']}",
+        )
         t.check(not rig.bus.setpoints(), "nothing was sent")
 
 
@@ -112,11 +175,25 @@ def print_config_and_check(t):
     with open(rig.path("again.conf"), "w", encoding="utf-8") as file:
         file.write(text)
     code, again = call(rig, "iwheel-gateway", "-c", rig.path("again.conf"), "--print-config")
-    t.check(code == 0 and again.replace("again.conf", "gateway.conf") == text, f"printed, read and printed again is the same: {code}")
-    common = ("-c", rig.path("gateway.conf"), "--can", f"unix:{rig.path('bus')}", "--socket", rig.path("gateway.sock"),
-              "--estop", f"unix:{rig.path('button')}")
+    t.check(
+        code == 0 and again.replace("again.conf", "gateway.conf") == text,
+        f"printed, read and printed again is the same: {code}",
+    )
+    common = (
+        "-c",
+        rig.path("gateway.conf"),
+        "--can",
+        f"unix:{rig.path('bus')}",
+        "--socket",
+        rig.path("gateway.sock"),
+        "--estop",
+        f"unix:{rig.path('button')}",
+    )
     code, text = call(rig, "iwheel-gateway", *common, "--check")
-    t.check(code == 0 and "ok" in text and "fail" not in text.lower().replace("0 fail", ""), f"--check with all there: {code}, {text[:400]!r}")
+    t.check(
+        code == 0 and "ok" in text and "fail" not in text.lower().replace("0 fail", ""),
+        f"--check with all there: {code}, {text[:400]!r}",
+    )
     rig.sim.ask("estop press")
     code, text = call(rig, "iwheel-gateway", *common, "--check")
     t.check("press" in text.lower(), f"--check tells that the button is pressed: {text[:400]!r}")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Rows 15 (local bus), 18, 19, 20: power lost, foreign masters, frames that are none."""
+
 import signal
 import struct
 import time
@@ -33,19 +34,28 @@ def power_cut(t, seconds, speed):
     rig.fault("power off", within_ms=70)
     time.sleep(0.3)
     stream.stop()
-    why = t.stopped_by(client, "wheel_lost") if client.request("why")["cause"] != "send_stalled" else t.stopped_by(client, "send_stalled")
+    why = (
+        t.stopped_by(client, "wheel_lost")
+        if client.request("why")["cause"] != "send_stalled"
+        else t.stopped_by(client, "send_stalled")
+    )
     refusal = client.request("reset")
     t.check(not refusal["ok"], "reset waits until the wheels are heard")
     time.sleep(seconds - 0.4)
     back_us = now_us()
     rig.sim.ask("power on")
     rig.timeline.append(Event(back_us, "alive", now_us()))
-    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10), "the wheels are heard again")
+    t.check(
+        rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10),
+        "the wheels are heard again",
+    )
     time.sleep(0.5)
     late = [(at, side, value) for at, side, value in rig.bus.setpoints(back_us)]
     moving = [entry for entry in late if entry[2]]
-    t.check(len([e for e in moving if e[1] == LEFT]) <= 1 and len([e for e in moving if e[1] == RIGHT]) <= 1,
-            f"at most one old frame per wheel came out: {[(at - back_us, side, value) for at, side, value in moving]}")
+    t.check(
+        len([e for e in moving if e[1] == LEFT]) <= 1 and len([e for e in moving if e[1] == RIGHT]) <= 1,
+        f"at most one old frame per wheel came out: {[(at - back_us, side, value) for at, side, value in moving]}",
+    )
     t.check(max((abs(rig.bus.speed_rpm(side)) for side in (0, 1))) <= 2, "the wheels stand")
     wait_reset(t, client)
     t.figure(f"{why['cause']}, {len(moving)} old and {len(late) - len(moving)} zero frames afterwards")
@@ -81,9 +91,15 @@ def row19_second_master_driving(t):
     ms = t.first_after(rig, foreign_us, lambda speed: speed == 0, "zero after the foreign frame", 30)
     t.figure(f"zero after {ms or 0:.1f} ms")
     why = t.stopped_by(client, "second_master")
-    t.check(why["detail"] == RIGHT and "298" in why["sentence"] and "0x12A" in why["sentence"], f"why names the id: {why['sentence']}")
+    t.check(
+        why["detail"] == RIGHT and "298" in why["sentence"] and "0x12A" in why["sentence"],
+        f"why names the id: {why['sentence']}",
+    )
     reasons = wait_reset(t, client)
-    t.check("cause_present" in reasons or "second_master" in reasons or "stale_command" in reasons, f"reset waits: {set(reasons)}")
+    t.check(
+        "cause_present" in reasons or "second_master" in reasons or "stale_command" in reasons,
+        f"reset waits: {set(reasons)}",
+    )
     t.judge(rig)
 
 
@@ -113,7 +129,9 @@ def row19_second_master_listening(t):
         if end - time.monotonic() < 0.9:  # after the first frames were surely seen
             t.expect(client.arm(), "second_master")
     t.check(client.request("status")["state"] == "listening", "it is an event, not a latch")
-    t.check(any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes")
+    t.check(
+        any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes"
+    )
     t.check(not rig.bus.setpoints(), "nothing is sent")
     time.sleep(1.1)
     t.arm(client)
@@ -163,8 +181,14 @@ def row20_odd_frames(t):
     t.figure(f"zero after {ms or 0:.0f} ms")
     t.stopped_by(client, "wheel_lost")
     after = client.request("status")["counters"]
-    t.check(after["bad_format"] - before["bad_format"] >= 50, f"counted as bad format: {after['bad_format'] - before['bad_format']}")
-    t.check(after["bad_length"] - before["bad_length"] >= 25, f"counted as bad length: {after['bad_length'] - before['bad_length']}")
+    t.check(
+        after["bad_format"] - before["bad_format"] >= 50,
+        f"counted as bad format: {after['bad_format'] - before['bad_format']}",
+    )
+    t.check(
+        after["bad_length"] - before["bad_length"] >= 25,
+        f"counted as bad length: {after['bad_length'] - before['bad_length']}",
+    )
     feed(rig, 0.3, 256, bytes(8))
     t.check(client.request("status")["left"]["heard"], "a longer frame is accepted")
     rig.sim.ask("unmute left")
@@ -185,12 +209,20 @@ def row15_bus_gone(t):
     time.sleep(0.3)
     stream.stop()
     status = client.request("status")
-    t.check(status["state"] == "latched" and status["cause"] in ("bus_down", "estop_line"), f"{status['state']}, {status['cause']}")
+    t.check(
+        status["state"] == "latched" and status["cause"] in ("bus_down", "estop_line"),
+        f"{status['state']}, {status['cause']}",
+    )
     first_bus.close()
     rig.restart_sim(first_bus.frames)
     back_us = now_us()
     rig.note("alive")
-    t.check(rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6), "found again")
+    t.check(
+        rig.wait_status(
+            client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 6
+        ),
+        "found again",
+    )
     wait_reset(t, client)
     time.sleep(0.3)
     late = rig.bus.setpoints(back_us)

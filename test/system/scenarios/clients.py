@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Rows 1 to 4, 6, 7: clients that die, freeze, stop reading, compete, come back."""
+
 import signal
 import socket
 import time
@@ -27,7 +28,9 @@ def row01_client_killed(t):
     killed_us = now_us()
     rig.timeline.append(Event(killed_us, "gone"))
     process.signal(signal.SIGKILL)
-    ms = t.first_after(rig, killed_us, lambda speed: speed < 300, "the ramp begins", 60) if not time.sleep(0.3) else None
+    ms = (
+        t.first_after(rig, killed_us, lambda speed: speed < 300, "the ramp begins", 60) if not time.sleep(0.3) else None
+    )
     t.figure(f"ramp after {ms or 0:.0f} ms")
     t.stopped_by(client, "client_gone", "stopping")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
@@ -94,18 +97,28 @@ def row04_two_clients(t):
     t.expect(refusal, "busy")
     t.check("first" in refusal.get("message", ""), f"busy tells who: {refusal.get('message')}")
     refusal = second.arm(takeover=True)
-    t.check(not refusal["ok"] and refusal["error"] in ("not_at_rest", "stale_command"), f"no hand-over in motion: {refusal}")
+    t.check(
+        not refusal["ok"] and refusal["error"] in ("not_at_rest", "stale_command"), f"no hand-over in motion: {refusal}"
+    )
     before = len([1 for _, _, speed in rig.bus.setpoints() if speed == 0])
     time.sleep(0.3)
     t.check(len([1 for _, _, speed in rig.bus.setpoints() if speed == 0]) == before, "the owner is undisturbed")
     stream.target = (0, 0)
-    t.check(rig.wait_status(second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4), "at rest")
+    t.check(
+        rig.wait_status(
+            second, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["left"]["applied_mm_s"] == 0, 4
+        ),
+        "at rest",
+    )
     time.sleep(0.6)
     t.arm(second, takeover=True)
     time.sleep(0.15)
     refusal = stream.stop()
     t.check(refusal and refusal["error"] == "not_holder", f"the former holder is refused: {refusal}")
-    t.check(any(e["event"] == "lease" and e.get("change") in ("lost", "moved") for e in first.collect(0.2)), "the former holder gets an event")
+    t.check(
+        any(e["event"] == "lease" and e.get("change") in ("lost", "moved") for e in first.collect(0.2)),
+        "the former holder gets an event",
+    )
     t.drive_for(second, 150, 150, 0.6)
     t.expect(first.request("stop"))
     time.sleep(0.5)
@@ -161,7 +174,10 @@ def row07_stale_command(t):
         refusal = client.arm()
         t.expect(refusal, "stale_command")
         time.sleep(0.02)
-    t.check("client" in refusal["message"] or "pusher" in refusal["message"], f"stale_command names the client: {refusal['message']}")
+    t.check(
+        "client" in refusal["message"] or "pusher" in refusal["message"],
+        f"stale_command names the client: {refusal['message']}",
+    )
     rig.press()
     rig.release()
     time.sleep(0.1)

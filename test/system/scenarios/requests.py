@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Rows 8 to 10: lines that are too long, too odd, or out of range."""
+
 import time
 
 from client import Closed
@@ -57,26 +58,50 @@ def row08_endless_lines(t):
 
 
 BAD_LINES = [
-    (b"", None), (b"hello", "bad_json"), (b"{", "bad_json"), (b"[]", "bad_json"), (b"null", "bad_json"), (b'"cmd"', "bad_json"), (b"{}", "missing_field"),
+    (b"", None),
+    (b"hello", "bad_json"),
+    (b"{", "bad_json"),
+    (b"[]", "bad_json"),
+    (b"null", "bad_json"),
+    (b'"cmd"', "bad_json"),
+    (b"{}", "missing_field"),
     (b'{"cmd":"drive","left_mm_s":100,"right_mm_s":100,}', "bad_json"),
     (b'{"cmd":"hello","id":1} {"cmd":"hello"}', "bad_json"),
-    (b'{"cmd":"hel\xfflo"}', "bad_json"), (b'{"cmd":"arm","name":"\xc3\x28"}', "bad_json"), (b'{"cmd":"hello\x00"}', "bad_json"),
-    (b'{"cmd":"hello"}\x00', "bad_json"), (b'{"cmd":"arm","name":"\\u0000"}', "bad_json"),
-    (b'{"cmd":"arm","name":' + b"[" * 1500 + b"]" * 1500 + b"}", "bad_json"), (b'{"a":' * 500 + b"1" + b"}" * 500, "bad_json"),
+    (b'{"cmd":"hel\xfflo"}', "bad_json"),
+    (b'{"cmd":"arm","name":"\xc3\x28"}', "bad_json"),
+    (b'{"cmd":"hello\x00"}', "bad_json"),
+    (b'{"cmd":"hello"}\x00', "bad_json"),
+    (b'{"cmd":"arm","name":"\\u0000"}', "bad_json"),
+    (b'{"cmd":"arm","name":' + b"[" * 1500 + b"]" * 1500 + b"}", "bad_json"),
+    (b'{"a":' * 500 + b"1" + b"}" * 500, "bad_json"),
     (b'{"cmd":"drive","left_mm_s":1e999,"right_mm_s":100}', ("bad_json", "bad_value")),
-    (b'{"cmd":"drive","left_mm_s":NaN,"right_mm_s":100}', "bad_json"), (b'{"cmd":"drive","left_mm_s":Infinity,"right_mm_s":100}', "bad_json"),
-    (b'{"cmd":"drive","left_mm_s":1.5,"right_mm_s":100}', "bad_value"), (b'{"cmd":"drive","left_mm_s":1.0,"right_mm_s":100}', "bad_value"),
-    (b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":100}', "bad_value"), (b'{"cmd":"drive","left_mm_s":"100","right_mm_s":100}', "bad_value"),
-    (b'{"cmd":"drive","left_mm_s":true,"right_mm_s":100}', "bad_value"), (b'{"cmd":"drive","left_mm_s":null,"right_mm_s":100}', "bad_value"),
-    (b'{"cmd":"drive","left_mm_s":0x64,"right_mm_s":100}', "bad_json"), (b'{"cmd":"drive","left_mm_s":0100,"right_mm_s":100}', "bad_json"),
+    (b'{"cmd":"drive","left_mm_s":NaN,"right_mm_s":100}', "bad_json"),
+    (b'{"cmd":"drive","left_mm_s":Infinity,"right_mm_s":100}', "bad_json"),
+    (b'{"cmd":"drive","left_mm_s":1.5,"right_mm_s":100}', "bad_value"),
+    (b'{"cmd":"drive","left_mm_s":1.0,"right_mm_s":100}', "bad_value"),
+    (b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":100}', "bad_value"),
+    (b'{"cmd":"drive","left_mm_s":"100","right_mm_s":100}', "bad_value"),
+    (b'{"cmd":"drive","left_mm_s":true,"right_mm_s":100}', "bad_value"),
+    (b'{"cmd":"drive","left_mm_s":null,"right_mm_s":100}', "bad_value"),
+    (b'{"cmd":"drive","left_mm_s":0x64,"right_mm_s":100}', "bad_json"),
+    (b'{"cmd":"drive","left_mm_s":0100,"right_mm_s":100}', "bad_json"),
     (b'{"cmd":"drive","left_mm_s":100,"left_mm_s":100,"right_mm_s":100}', "bad_json"),
-    (b'{"cmd":"drive","left_mm_s":100,"right_mm_s":100,"speed":3}', "unknown_field"), (b'{"cmd":"hello","extra":1}', "unknown_field"),
-    (b'{"cmd":"drive","left_mm_s":100}', "missing_field"), (b'{"cmd":"drive"}', "missing_field"),
+    (b'{"cmd":"drive","left_mm_s":100,"right_mm_s":100,"speed":3}', "unknown_field"),
+    (b'{"cmd":"hello","extra":1}', "unknown_field"),
+    (b'{"cmd":"drive","left_mm_s":100}', "missing_field"),
+    (b'{"cmd":"drive"}', "missing_field"),
     (b'{"cmd":"drive","left_mm_s":100,"right_mm_s":100,"left_mA":500}', "missing_field"),
-    (b'{"cmd":"fly"}', "unknown_cmd"), (b'{"cmd":"ARM"}', "unknown_cmd"), (b'{"cmd":7}', ("bad_value", "unknown_cmd")), (b'{"cmd":"arm","takeover":"yes"}', "bad_value"),
-    (b'{"cmd":"arm","name":5}', "bad_value"), (b'{"cmd":"watch"}', "missing_field"), (b'{"cmd":"watch","topics":["weather"]}', "bad_value"),
-    (b'{"cmd":"watch","topics":"state"}', "bad_value"), (b'{"cmd":"watch","topics":["state"],"rate_hz":0}', ("out_of_range", "bad_value")),
-    (b'{"cmd":"tare","side":"up"}', "bad_value"), (b'{"cmd":"hello","id":{}}', "bad_value"),
+    (b'{"cmd":"fly"}', "unknown_cmd"),
+    (b'{"cmd":"ARM"}', "unknown_cmd"),
+    (b'{"cmd":7}', ("bad_value", "unknown_cmd")),
+    (b'{"cmd":"arm","takeover":"yes"}', "bad_value"),
+    (b'{"cmd":"arm","name":5}', "bad_value"),
+    (b'{"cmd":"watch"}', "missing_field"),
+    (b'{"cmd":"watch","topics":["weather"]}', "bad_value"),
+    (b'{"cmd":"watch","topics":"state"}', "bad_value"),
+    (b'{"cmd":"watch","topics":["state"],"rate_hz":0}', ("out_of_range", "bad_value")),
+    (b'{"cmd":"tare","side":"up"}', "bad_value"),
+    (b'{"cmd":"hello","id":{}}', "bad_value"),
 ]
 
 
@@ -97,8 +122,10 @@ def row09_odd_json(t):
             reply = None
         wanted = error if isinstance(error, tuple) else (error,)
         if error is not None:
-            t.check(reply and not reply["ok"] and reply.get("error") in wanted and len(reply.get("message", "")) > 10,
-                    f"{line[:70]!r}: {error} expected, got {reply}")
+            t.check(
+                reply and not reply["ok"] and reply.get("error") in wanted and len(reply.get("message", "")) > 10,
+                f"{line[:70]!r}: {error} expected, got {reply}",
+            )
         client.close()
     t.figure(f"{len(BAD_LINES)} lines")
     t.check(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing moved")
@@ -111,14 +138,20 @@ def row10_out_of_range(t):
     rig, client = t.running()
     t.arm(client)
     begin = time.monotonic()
-    bad = [dict(left_mm_s=100, right_mm_s=40000), dict(left_mm_s=-32769, right_mm_s=100), dict(left_mm_s=100, right_mm_s=4294967396),
-           dict(left_mm_s=100, right_mm_s=10 ** 25), dict(left_mm_s=100, right_mm_s=100, left_mA=500, right_mA=2001),
-           dict(left_mm_s=100, right_mm_s=100, left_mA=-2001, right_mA=0), dict(left_mm_s=2 ** 63, right_mm_s=0)]
+    bad = [
+        dict(left_mm_s=100, right_mm_s=40000),
+        dict(left_mm_s=-32769, right_mm_s=100),
+        dict(left_mm_s=100, right_mm_s=4294967396),
+        dict(left_mm_s=100, right_mm_s=10**25),
+        dict(left_mm_s=100, right_mm_s=100, left_mA=500, right_mA=2001),
+        dict(left_mm_s=100, right_mm_s=100, left_mA=-2001, right_mA=0),
+        dict(left_mm_s=2**63, right_mm_s=0),
+    ]
     while time.monotonic() - begin < 1.4:
         for fields in bad:
             reply = client.request("drive", **fields)
             allowed = ("out_of_range", "not_armed") if time.monotonic() - begin > 0.9 else ("out_of_range",)
-            if abs(fields["right_mm_s"]) > 2 ** 62 or fields["left_mm_s"] > 2 ** 62:
+            if abs(fields["right_mm_s"]) > 2**62 or fields["left_mm_s"] > 2**62:
                 allowed += ("bad_json", "bad_value")
             t.check(not reply["ok"] and reply["error"] in allowed, f"{fields}: {reply}")
         time.sleep(0.03)
