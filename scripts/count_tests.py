@@ -4,8 +4,8 @@
 
 usage: count_tests.py JUNIT_FILE
 
-A program that sums up in the words of Unity ("12 Tests 0 Failures 0 Ignored") or of our own runners ("12 passed, 0 failed,
-0 skipped") counts as that many tests; any other as one. A program that failed counts at least one failure, whatever it said.
+A program that sums up in the words of Unity ("12 Tests 0 Failures 0 Ignored"), of our own runners ("12 passed, 0 failed,
+0 skipped") or of Python's unittest ("Ran 12 tests in 1.5s") counts as that many tests; any other as one. A program that failed counts at least one failure, whatever it said.
 """
 import re
 import sys
@@ -13,6 +13,15 @@ import xml.etree.ElementTree
 
 UNITY = re.compile(r"^(\d+) Tests (\d+) Failures (\d+) Ignored", re.MULTILINE)
 OURS = re.compile(r"^(\d+) passed, (\d+) failed(?:, (\d+) skipped)?$", re.MULTILINE)
+PYTHON = re.compile(r"^Ran (\d+) tests? in .*\n\n(?:OK|FAILED)(.*)$", re.MULTILINE)
+
+
+def of_python(total, details):
+    """From "Ran 12 tests" and " (failures=1, errors=1, skipped=2)"."""
+    numbers = {name: int(number) for name, number in re.findall(r"(\w+)=(\d+)", details)}
+    failed = sum(numbers.get(name, 0) for name in ("failures", "errors", "unexpectedSuccesses"))
+    skipped = numbers.get("skipped", 0)
+    return max(int(total) - failed - skipped, 0), failed, skipped
 
 
 def count(case):
@@ -25,12 +34,14 @@ def count(case):
         passed = total - failed - skipped
     elif ours:
         passed, failed, skipped = (int(number or 0) for number in ours[-1])
+    elif PYTHON.search(output):
+        passed, failed, skipped = of_python(*PYTHON.findall(output)[-1])
     elif case.get("status") == "notrun" or case.find("skipped") is not None:
         passed, failed, skipped = 0, 0, 1
     else:
         passed, failed, skipped = 1, 0, 0
     if case.get("status") == "fail" and failed == 0:
-        passed, failed = (0, 1) if not (unity or ours) else (passed, 1)
+        passed, failed = (0, 1) if passed == 1 else (passed, 1)
     return passed, failed, skipped
 
 

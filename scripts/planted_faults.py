@@ -158,6 +158,7 @@ CASES = [
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),
     (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),
     (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
+    (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),
     (counting, "python3", "a crash before the sum", junit("fail", "test.c:1:test_a:PASS"), True),
     (counting, "python3", "a crash after the sum", junit("fail", "3 Tests 0 Failures 0 Ignored"), True),
 ]
