@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "cycle.h"
 
+#include "magnitude.h"
+
 #define ESTOP_PRESSED    1U
 #define ESTOP_UNREADABLE 2U
 
@@ -188,7 +190,7 @@ static iw_ledger_item_t sign_item(size_t side) {
 static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s) {
     iw_follow_t *const follow = &self->follow[side];
     const int32_t measured_mm_s = iw_wheel_speed_mm_s(&self->wheel[side]);
-    const uint32_t detail = (uint32_t)((measured_mm_s < 0) ? -measured_mm_s : measured_mm_s);
+    const uint32_t detail = (uint32_t)iw_magnitude(measured_mm_s);
     switch (iw_follow_step(follow, now_us, applied_mm_s, measured_mm_s)) {
     case IW_FOLLOW_SIGN:
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_FEEDBACK_SIGN, side_bit(side), detail);

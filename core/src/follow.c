@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/follow.h"
 
+#include "magnitude.h"
+
 void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
     self->config = config;
     iw_follow_restart(self);
@@ -28,8 +30,8 @@ static bool lasts(iw_time_us_t *since_us, iw_time_us_t now_us, bool holds, uint3
 iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32_t applied_mm_s,
                                    int32_t measured_mm_s) {
     const iw_config_t *const config = self->config;
-    const int32_t applied = (applied_mm_s < 0) ? -applied_mm_s : applied_mm_s;
-    const int32_t measured = (measured_mm_s < 0) ? -measured_mm_s : measured_mm_s;
+    const int32_t applied = iw_magnitude(applied_mm_s);
+    const int32_t measured = iw_magnitude(measured_mm_s);
     const bool clear = applied > IW_FOLLOW_SIGN_MM_S && measured > IW_FOLLOW_SIGN_MM_S;
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);
     const int32_t progress = same ? measured : 0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/force.h"
 
+#include "magnitude.h"
+
 #include <string.h>
 
 #define HALF (IW_FORCE_WINDOW_SAMPLES / 2U)
@@ -23,10 +25,6 @@ static int32_t scale_mN(const iw_force_t *self) {
 
 static bool saturated(int16_t raw) {
     return raw == INT16_MIN || raw == INT16_MAX;
-}
-
-static int32_t magnitude(int32_t value) {
-    return (value < 0) ? -value : value;
 }
 
 void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side) {
@@ -78,7 +76,7 @@ static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
     const uint32_t scale = (uint32_t)scale_mN(self);
     uint32_t sum = 0;
     for (size_t i = 0; i < self->count; i++) {
-        const int32_t spread = magnitude(self->sample[i] - mean_raw);
+        const int32_t spread = iw_magnitude(self->sample[i] - mean_raw);
         const uint32_t capped = (uint32_t)((spread < SPREAD_MAX) ? spread : SPREAD_MAX);
         sum += capped * capped;
     }
@@ -106,22 +104,22 @@ static iw_force_quality_t measure(const iw_force_t *self) {
         quality.window = IW_WINDOW_MOVING;
     } else if (quality.deviation_mN > IW_FORCE_QUIET_mN) {
         quality.window = IW_WINDOW_NOISY;
-    } else if (magnitude(quality.drift_mN) > (int32_t)IW_FORCE_DRIFT_mN) {
+    } else if (iw_magnitude(quality.drift_mN) > (int32_t)IW_FORCE_DRIFT_mN) {
         quality.window = IW_WINDOW_DRIFT;
     }
     return quality;
 }
 
 static bool far_from_offset(const iw_force_t *self, int32_t mean_mN) {
-    return magnitude(mean_mN - self->offset_mN) > (int32_t)IW_FORCE_LOADED_mN;
+    return iw_magnitude(mean_mN - self->offset_mN) > (int32_t)IW_FORCE_LOADED_mN;
 }
 
 /// Raw over offset at rest is 10, 1 or 0: exactly one of them must fit.
 static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN) {
-    const int32_t offset = magnitude(offset_dN);
-    const bool fits_cn = magnitude(mean_raw - 10 * offset_dN) * 100 <= 10 * offset * EVIDENCE_PERCENT;
-    const bool fits_dn = magnitude(mean_raw - offset_dN) * 100 <= offset * EVIDENCE_PERCENT;
-    const bool fits_none = magnitude(mean_raw) * 100 <= offset * REMOVED_PERCENT;
+    const int32_t offset = iw_magnitude(offset_dN);
+    const bool fits_cn = iw_magnitude(mean_raw - 10 * offset_dN) * 100 <= 10 * offset * EVIDENCE_PERCENT;
+    const bool fits_dn = iw_magnitude(mean_raw - offset_dN) * 100 <= offset * EVIDENCE_PERCENT;
+    const bool fits_none = iw_magnitude(mean_raw) * 100 <= offset * REMOVED_PERCENT;
     if (fits_cn) {
         return IW_UNIT_CN;
     }
@@ -138,10 +136,10 @@ static void judge_evidence(iw_force_t *self) {
     if (!self->wheel_offset_heard || self->quality.window != IW_WINDOW_GOOD) {
         return;
     }
-    if (magnitude(offset_dN) >= IW_FORCE_EVIDENCE_MIN_dN) {
+    if (iw_magnitude(offset_dN) >= IW_FORCE_EVIDENCE_MIN_dN) {
         self->evidence = weigh(mean_raw, offset_dN);
         self->evidence_permille = mean_raw * 1000 / offset_dN;
-    } else if (magnitude(self->quality.mean_mN - offset_dN * 100) > (int32_t)IW_FORCE_LOADED_mN) {
+    } else if (iw_magnitude(self->quality.mean_mN - offset_dN * 100) > (int32_t)IW_FORCE_LOADED_mN) {
         self->evidence = IW_UNIT_UNCLEAR;
     }
 }

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gate.h"
 
+#include "magnitude.h"
+
 #include <string.h>
 
 void iw_gate_init(iw_gate_t *self, const iw_config_t *config) {
     memset(self, 0, sizeof *self);
     self->config = config;
-}
-
-static uint32_t magnitude(int32_t value) {
-    return (uint32_t)((value < 0) ? -value : value);
 }
 
 /// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
@@ -21,8 +19,8 @@ static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us) {
 
 static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s) {
     const int32_t last_mm_s = self->last_mm_s[side];
-    const uint32_t from = magnitude(last_mm_s);
-    const uint32_t to = magnitude(speed_mm_s);
+    const uint32_t from = (uint32_t)iw_magnitude(last_mm_s);
+    const uint32_t to = (uint32_t)iw_magnitude(speed_mm_s);
     if (speed_mm_s != 0 && last_mm_s != 0 && (speed_mm_s > 0) != (last_mm_s > 0)) {
         return false;
     }
@@ -34,6 +32,15 @@ static bool is_zero(const iw_config_t *config, const iw_proto_setpoint_t *setpoi
     return setpoint->speed_mm_s == 0 && (config->current_role == IW_ROLE_LIMIT || setpoint->current_mA == 0);
 }
 
+static bool type_ok(const iw_config_t *config, uint8_t type) {
+    return config->setpoint_type_set && config->current_role != IW_ROLE_UNSET && type == config->setpoint_type;
+}
+
+static bool current_ok(const iw_config_t *config, int32_t current_mA) {
+    const bool negative_limit = config->current_role == IW_ROLE_LIMIT && current_mA < 0;
+    return !negative_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
+}
+
 static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame,
                                const iw_proto_message_t *message) {
     const iw_config_t *const config = self->config;
@@ -42,15 +49,13 @@ static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, const
     if (message->kind != IW_PROTO_SETPOINT || frame->dlc != config->setpoint_dlc) {
         return IW_GATE_NOT_A_SETPOINT;
     }
-    if (!config->setpoint_type_set || config->current_role == IW_ROLE_UNSET ||
-        setpoint->type != config->setpoint_type) {
+    if (!type_ok(config, setpoint->type)) {
         return IW_GATE_TYPE;
     }
-    if (magnitude(setpoint->current_mA) > config->max_current_mA ||
-        (config->current_role == IW_ROLE_LIMIT && setpoint->current_mA < 0)) {
+    if (!current_ok(config, setpoint->current_mA)) {
         return IW_GATE_CURRENT;
     }
-    if (magnitude(setpoint->speed_mm_s) > config->max_speed_mm_s) {
+    if ((uint32_t)iw_magnitude(setpoint->speed_mm_s) > config->max_speed_mm_s) {
         return IW_GATE_SPEED;
     }
     if (!is_zero(config, setpoint) && !slew_ok(self, message->side, elapsed_us, setpoint->speed_mm_s)) {

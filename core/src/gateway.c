@@ -2,6 +2,7 @@
 #include "iwheel/gateway.h"
 
 #include "cycle.h"
+#include "magnitude.h"
 
 #include <string.h>
 
@@ -76,14 +77,10 @@ iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self) {
     return self->permit.arm_refusal;
 }
 
-static int32_t magnitude(int32_t value) {
-    return (value < 0) ? -value : value;
-}
-
 /// Both values by one factor, so that the larger is `limit`. True if they had to be.
 static bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
-    const int32_t left = magnitude(values[IW_LEFT]);
-    const int32_t right = magnitude(values[IW_RIGHT]);
+    const int32_t left = iw_magnitude(values[IW_LEFT]);
+    const int32_t right = iw_magnitude(values[IW_RIGHT]);
     const int32_t largest = (left > right) ? left : right;
     if (largest <= limit) {
         return false;

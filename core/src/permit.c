@@ -86,6 +86,11 @@ static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us)
     return IW_REFUSE_NONE;
 }
 
+static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us) {
+    const bool pressed = refuse_present(self, now_us) == IW_REFUSE_ESTOP_PRESSED;
+    return pressed ? IW_REFUSE_ESTOP_PRESSED : IW_REFUSE_LATCHED;
+}
+
 static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
     return within(now_us, self->stale_us, IW_PERMIT_STALE_US);
 }
@@ -225,7 +230,7 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
         return IW_REFUSE_LISTEN_ONLY;
     }
     if (self->state == IW_STATE_LATCHED) {
-        return (present == IW_REFUSE_ESTOP_PRESSED) ? present : IW_REFUSE_LATCHED;
+        return refuse_latched(self, now_us);
     }
     if (!may_send(self->config)) {
         return IW_REFUSE_TYPE_NOT_SET;
@@ -281,18 +286,23 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
     return IW_REFUSE_NONE;
 }
 
+/// ARMED: only the holder drives, and only while the lease lasts, even if no step has ended it yet.
+static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
+    if (self->holder != client) {
+        return IW_REFUSE_NOT_HOLDER;
+    }
+    return (now_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;
+}
+
 static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
     const bool blocked = self->stop.cause == IW_CAUSE_WHEEL_BLOCKED && self->stop.client == client;
     switch (self->state) {
     case IW_STATE_LATCHED:
-        return (refuse_present(self, now_us) == IW_REFUSE_ESTOP_PRESSED) ? IW_REFUSE_ESTOP_PRESSED : IW_REFUSE_LATCHED;
+        return refuse_latched(self, now_us);
     case IW_STATE_STOPPING:
         return blocked ? IW_REFUSE_WHEEL_BLOCKED : IW_REFUSE_NOT_ARMED;
     case IW_STATE_ARMED:
-        if (self->holder != client) {
-            return IW_REFUSE_NOT_HOLDER;
-        }
-        return (now_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;
+        return refuse_holder(self, now_us, client);
     case IW_STATE_LISTENING:
     default:
         return self->config->listen_only ? IW_REFUSE_LISTEN_ONLY : IW_REFUSE_NOT_ARMED;

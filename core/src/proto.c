@@ -66,20 +66,7 @@ static void get_pose(const uint8_t *data, iw_proto_pose_t *out_pose) {
     out_pose->psi_mrad = iw_be_get_i16(&data[6]);
 }
 
-iw_status_t iw_proto_decode(const iw_can_frame_t *frame, iw_proto_message_t *out_message) {
-    const uint8_t *const data = frame->data;
-    const layout_t *const layout = find_id(frame->id & ~FORMAT_BITS);
-    if (layout == NULL) {
-        return IW_ERR_ID;
-    }
-    if ((frame->id & FORMAT_BITS) != 0U) {
-        return IW_ERR_FORMAT;
-    }
-    if (frame->dlc < layout->dlc || frame->dlc > IW_CAN_DATA_MAX) {
-        return IW_ERR_LENGTH;
-    }
-    out_message->kind = (iw_proto_kind_t)layout->kind;
-    out_message->side = (iw_side_t)layout->side;
+static void get_message(const uint8_t *data, iw_proto_message_t *out_message) {
     switch (out_message->kind) {
     case IW_PROTO_SETPOINT:
         out_message->as.setpoint.type = data[0];
@@ -105,6 +92,22 @@ iw_status_t iw_proto_decode(const iw_can_frame_t *frame, iw_proto_message_t *out
         out_message->as.offset.offset_dN = iw_be_get_i16(&data[0]);
         break;
     }
+}
+
+iw_status_t iw_proto_decode(const iw_can_frame_t *frame, iw_proto_message_t *out_message) {
+    const layout_t *const layout = find_id(frame->id & ~FORMAT_BITS);
+    if (layout == NULL) {
+        return IW_ERR_ID;
+    }
+    if ((frame->id & FORMAT_BITS) != 0U) {
+        return IW_ERR_FORMAT;
+    }
+    if (frame->dlc < layout->dlc || frame->dlc > IW_CAN_DATA_MAX) {
+        return IW_ERR_LENGTH;
+    }
+    out_message->kind = (iw_proto_kind_t)layout->kind;
+    out_message->side = (iw_side_t)layout->side;
+    get_message(frame->data, out_message);
     return IW_OK;
 }
 

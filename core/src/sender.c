@@ -53,23 +53,23 @@ static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
 
 iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero) {
     iw_can_frame_t frame[IW_SIDES];
-    bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
-    bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
-    const bool whole = left && right;
+    const bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
+    const bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
+    bool taken = true;
     if (!prepare(self, now_us, IW_LEFT, &pair->wheel[IW_LEFT], &frame[IW_LEFT]) ||
         !prepare(self, now_us, IW_RIGHT, &pair->wheel[IW_RIGHT], &frame[IW_RIGHT])) {
         return IW_SEND_STOPPED;
     }
-    const bool left_done = !left || hand_over(self, now_us, IW_LEFT, &frame[IW_LEFT]);
-    right = right && (left_done || zero);
-    const bool right_done = right ? hand_over(self, now_us, IW_RIGHT, &frame[IW_RIGHT]) : !whole;
-    if (!left_done || !right_done) {
-        return IW_SEND_LATER;
+    if (left) {
+        taken = hand_over(self, now_us, IW_LEFT, &frame[IW_LEFT]);
     }
-    if (whole) {
+    if (right && (taken || zero)) {
+        taken = hand_over(self, now_us, IW_RIGHT, &frame[IW_RIGHT]) && taken;
+    }
+    if (taken && left && right) {
         measure_gap(self, now_us);
     }
-    return IW_SEND_DONE;
+    return taken ? IW_SEND_DONE : IW_SEND_LATER;
 }
 
 void iw_sender_rest(iw_sender_t *self) {

@@ -2,6 +2,7 @@
 #include "iwheel/setpoint.h"
 
 #include "iwheel/proto.h"
+#include "magnitude.h"
 
 #include <string.h>
 
@@ -19,10 +20,6 @@ typedef struct {
 } axis_t;
 
 #define AXES (2U * IW_SIDES)
-
-static uint32_t magnitude(int32_t value) {
-    return (uint32_t)((value < 0) ? -value : value);
-}
 
 static iw_command_t zero_command(const iw_config_t *config) {
     const int16_t full_mA = (int16_t)config->max_current_mA;
@@ -124,7 +121,8 @@ static uint32_t ramp_step(uint32_t slope, iw_time_us_t elapsed_us) {
 static axis_t plan(int32_t *value, int32_t target, uint32_t away, uint32_t towards) {
     const bool through_zero = *value != 0 && (target > 0) != (*value > 0);
     const int32_t aim = through_zero ? 0 : target;
-    axis_t axis = {value, magnitude(aim - *value), aim > *value, magnitude(aim) < magnitude(*value), FRACTION_ONE};
+    axis_t axis = {value, (uint32_t)iw_magnitude(aim - *value), aim > *value,
+                   (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value), FRACTION_ONE};
     const uint32_t allowed = axis.braking ? towards : away;
     if (allowed < axis.way) {
         axis.fraction = fraction_of(allowed, axis.way);
