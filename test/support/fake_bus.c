@@ -118,7 +118,11 @@ void fake_bus_put_empty(fake_bus_t *self, uint32_t id, uint8_t dlc) {
 
 iw_time_us_t fake_bus_next_us(const fake_bus_t *self) {
     const bool moves = self->flights > 0 && self->acknowledged && self->state >= IW_BUS_PASSIVE;
-    return moves ? self->flight[0].at_us + self->echo_delay_us : IW_NEVER;
+    if (!moves) {
+        return IW_NEVER;
+    }
+    const bool right = side_of(&self->flight[0].frame) == IW_RIGHT;
+    return self->flight[0].at_us + self->echo_delay_us + (right ? FAKE_BUS_FRAME_US : 0U);
 }
 
 void fake_bus_advance(fake_bus_t *self, iw_time_us_t now_us) {

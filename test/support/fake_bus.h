@@ -12,6 +12,8 @@
 
 /// Frames that can wait to be received; what comes beyond is lost and counted.
 #define FAKE_BUS_RX_MAX 400U
+/// The right setpoint's echo comes this much later than the left one's: a frame takes its time.
+#define FAKE_BUS_FRAME_US 130U
 /// More setpoints than a correct gateway can ever have under way.
 #define FAKE_BUS_FLIGHT_MAX 8U
 
@@ -26,7 +28,7 @@ typedef void (*fake_bus_listener_t)(void *context, const iw_can_frame_t *frame, 
 typedef struct {
     /// What a test sets.
     int send_result[IW_SIDES];  ///< What `send` answers for each wheel's setpoint; 1 at first.
-    iw_time_us_t echo_delay_us; ///< From `send` to the echo; 300 at first.
+    iw_time_us_t echo_delay_us; ///< From `send` to the left one's echo; 300 at first.
     bool acknowledged;          ///< False: nobody acknowledges, nothing gets onto the bus.
     iw_bus_state_t state;
     int purge_result;

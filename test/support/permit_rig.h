@@ -8,7 +8,7 @@
 
 /// The client that holds the lease in every prepared situation, and another one.
 #define HOLDER ((iw_client_t)7)
-#define OTHER ((iw_client_t)8)
+#define OTHER  ((iw_client_t)8)
 
 /// Where a test can begin. ARMING is LISTENING with a zero pair on its way.
 typedef enum {

@@ -110,6 +110,16 @@ static void test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators(v
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_OPEN, rig.force.quality.window);
 }
 
+static void test_force_reboot_under_load_is_seen_against_the_operators_offset(void) {
+    force_rig_quiet(&rig, 40, 10);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    iw_force_reopen(&rig.force, true);
+    force_rig_quiet(&rig, 40, 2020);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_LOADED, rig.force.quality.window);
+    force_rig_offset(&rig, 202);
+    assert_offset(IW_OFFSET_OPERATOR, 100);
+}
+
 static void test_force_reboot_forgets_the_evidence_and_the_wheels_offset(void) {
     force_rig_quiet(&rig, 40, 100);
     force_rig_offset(&rig, 100);
@@ -272,6 +282,7 @@ int main(void) {
     RUN_TEST(test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known);
     RUN_TEST(test_force_restore_fills_nothing_but_a_void);
     RUN_TEST(test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators);
+    RUN_TEST(test_force_reboot_under_load_is_seen_against_the_operators_offset);
     RUN_TEST(test_force_reboot_forgets_the_evidence_and_the_wheels_offset);
     RUN_TEST(test_force_tare_takes_the_mean_of_the_last_two_seconds);
     RUN_TEST(test_force_tare_outlives_what_the_wheel_says);

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+/// A setpoint scheduler at a virtual time.
+#ifndef TEST_SETPOINT_RIG_H
+#define TEST_SETPOINT_RIG_H
+
+#include "fixture.h"
+#include "iwheel/setpoint.h"
+
+typedef struct {
+    iw_config_t config;
+    iw_setpoint_t setpoint;
+    iw_time_us_t now_us;
+} setpoint_rig_t;
+
+/// In silence, with the configuration of the fixture.
+void setpoint_rig_init(setpoint_rig_t *self);
+
+/// Anew, with the configuration that is there.
+void setpoint_rig_begin(setpoint_rig_t *self);
+
+/// Commands both speeds now, with the same current for both wheels.
+void setpoint_rig_command(setpoint_rig_t *self, int16_t left_mm_s, int16_t right_mm_s, int16_t current_mA);
+
+/// Tells what to aim at now.
+void setpoint_rig_demand(setpoint_rig_t *self, iw_demand_t demand);
+
+/// Goes to when the next pair is due and takes it.
+iw_pair_t setpoint_rig_take_next(setpoint_rig_t *self);
+
+/// Lets time pass and takes the pair that must be due then.
+iw_pair_t setpoint_rig_take_after(setpoint_rig_t *self, iw_time_us_t for_us);
+
+/// From silence to FOLLOW, with the first pair taken.
+void setpoint_rig_follow(setpoint_rig_t *self);
+
+/// From silence to that speed since a long time.
+void setpoint_rig_cruise(setpoint_rig_t *self, int16_t left_mm_s, int16_t right_mm_s, int16_t current_mA);
+
+/// The pair last taken is zero.
+bool setpoint_rig_is_zero(const setpoint_rig_t *self);
+
+#endif

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: MIT
+// What the gateway finds out about the wheels without moving them: units, offsets, lengths, pose, reboots.
+#include "gateway_rig.h"
+#include "unity.h"
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static const iw_ledger_entry_t *entry(iw_ledger_item_t item) {
+    return iw_ledger_entry(&rig.gateway.ledger, item);
+}
+
+static void assert_entry(iw_ledger_item_t item, iw_ledger_state_t state, iw_evidence_t evidence) {
+    TEST_ASSERT_EQUAL_INT(state, entry(item)->state);
+    TEST_ASSERT_EQUAL_INT(evidence, entry(item)->evidence);
+}
+
+static void put(const iw_proto_message_t *message) {
+    iw_can_frame_t frame;
+    TEST_ASSERT_EQUAL_INT(IW_OK, iw_proto_encode(message, &frame));
+    fake_bus_put(&rig.bus, &frame);
+}
+
+static void put_offset(iw_side_t side, int16_t offset_dN) {
+    const iw_proto_message_t message = {IW_PROTO_OFFSET, side, {.offset = {offset_dN}}};
+    put(&message);
+}
+
+/// Force frames of that value every 50 ms for that long.
+static void press_for(iw_side_t side, int16_t raw, iw_time_us_t for_us) {
+    const iw_proto_message_t message = {IW_PROTO_FORCE, side, {.force = {raw, 0}}};
+    const iw_time_us_t until_us = rig.now_us + for_us;
+    while (rig.now_us < until_us) {
+        put(&message);
+        gateway_rig_run(&rig, MS(50));
+    }
+}
+
+/// A quiet start with that raw value, and an offset of 10 N from the wheel.
+static void start_with(iw_side_t side, int16_t raw) {
+    gateway_rig_run(&rig, MS(20));
+    press_for(side, raw, MS(2100));
+    put_offset(side, 100);
+    press_for(side, raw, MS(50));
+}
+
+static void test_gateway_ledger_begins_with_where_assumptions_come_from(void) {
+    assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
+    assert_entry(IW_LEDGER_CURRENT_ROLE, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
+    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+    rig.config.setpoint_type_set = false;
+    rig.config.current_role = IW_ROLE_UNSET;
+    rig.config.force_unit[IW_LEFT] = IW_FORCE_DN;
+    rig.config.force_unit[IW_RIGHT] = IW_FORCE_CN;
+    gateway_rig_begin(&rig, false);
+    assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
+    assert_entry(IW_LEDGER_CURRENT_ROLE, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
+    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
+    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_CONFIGURATION);
+}
+
+static void test_gateway_quiet_start_confirms_the_unit_of_each_side(void) {
+    start_with(IW_LEFT, 1000);
+    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
+    assert_entry(IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
+    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+    TEST_ASSERT_EQUAL_INT32(10000, entry(IW_LEDGER_FORCE_UNIT_LEFT)->figure);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, rig.gateway.force[IW_LEFT].provenance);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, iw_force_validity(&rig.gateway.force[IW_LEFT], rig.now_us));
+    start_with(IW_RIGHT, 100);
+    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
+    TEST_ASSERT_EQUAL_INT32(1000, entry(IW_LEDGER_FORCE_UNIT_RIGHT)->figure);
+}
+
+static void test_gateway_wrong_unit_is_contradicted_and_force_invalid(void) {
+    start_with(IW_LEFT, 100);
+    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, iw_force_validity(&rig.gateway.force[IW_LEFT], rig.now_us));
+    start_with(IW_RIGHT, 1000);
+    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS);
+    assert_entry(IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+}
+
+static void test_gateway_removed_offset_is_contradicted(void) {
+    start_with(IW_RIGHT, 0);
+    assert_entry(IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS);
+    assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+}
+
+static void test_gateway_unclear_evidence_changes_no_entry(void) {
+    start_with(IW_LEFT, 500);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.gateway.force[IW_LEFT].evidence);
+    assert_entry(IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+    assert_entry(IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT);
+}
+
+static void test_gateway_turning_wheel_contaminates_its_own_window_only(void) {
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = 3;
+    gateway_rig_run(&rig, MS(20));
+    press_for(IW_LEFT, 1000, MS(2100));
+    press_for(IW_RIGHT, 100, MS(2100));
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_MOVING, rig.gateway.force[IW_LEFT].quality.window);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_RIGHT].quality.window);
+}
+
+static void test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_still(void) {
+    rig.wheel[IW_LEFT].mute = true;
+    press_for(IW_LEFT, 1000, MS(2100));
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
+}
+
+static void test_gateway_tare_makes_the_present_force_zero(void) {
+    TEST_ASSERT_EQUAL_INT(IW_TARE_NO_FORCE, iw_gateway_tare(&rig.gateway, rig.now_us, IW_RIGHT));
+    gateway_rig_run(&rig, MS(20));
+    press_for(IW_RIGHT, 70, MS(2100));
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, iw_gateway_tare(&rig.gateway, rig.now_us, IW_RIGHT));
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, rig.gateway.force[IW_RIGHT].provenance);
+    TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.gateway.force[IW_RIGHT]));
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.gateway.force[IW_LEFT].provenance);
+}
+
+static void test_gateway_rebooted_wheel_opens_its_window_anew(void) {
+    start_with(IW_LEFT, 1000);
+    rig.wheel[IW_LEFT].mute = true;
+    gateway_rig_run(&rig, MS(1500));
+    rig.wheel[IW_LEFT].mute = false;
+    gateway_rig_run(&rig, MS(20));
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_STORED, rig.gateway.force[IW_LEFT].provenance);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_OPEN, rig.gateway.force[IW_LEFT].quality.window);
+    TEST_ASSERT_TRUE(rig.gateway.force[IW_LEFT].boot_seen);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_OPEN, rig.gateway.force[IW_RIGHT].quality.window);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_CAUSE_PRESENT, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_WHEEL_REBOOTED, iw_permit_present(&rig.gateway.permit, rig.now_us));
+}
+
+static void test_gateway_status_length_is_noted(void) {
+    assert_entry(IW_LEDGER_DLC, IW_LEDGER_ASSUMED, IW_EVIDENCE_NONE);
+    gateway_rig_run(&rig, MS(50));
+    assert_entry(IW_LEDGER_DLC, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
+    TEST_ASSERT_EQUAL_INT32(7, entry(IW_LEDGER_DLC)->figure);
+    fake_bus_put_empty(&rig.bus, IW_ID_RIGHT_STATUS, 8);
+    gateway_rig_step(&rig);
+    assert_entry(IW_LEDGER_DLC, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS);
+    TEST_ASSERT_EQUAL_INT32(8, entry(IW_LEDGER_DLC)->figure);
+}
+
+static void test_gateway_pose_is_kept_with_its_time(void) {
+    const iw_proto_message_t message = {IW_PROTO_POSE, IW_RIGHT, {.pose = {-1, 2, -3, 31415}}};
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.gateway.pose_us);
+    put(&message);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.pose_us);
+    TEST_ASSERT_EQUAL_INT(-1, rig.gateway.pose.x_mm);
+    TEST_ASSERT_EQUAL_INT(31415, rig.gateway.pose.psi_mrad);
+}
+
+static void test_gateway_driving_confirms_the_feedback_sign_once(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, -400, MS(1500));
+    assert_entry(IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
+    assert_entry(IW_LEDGER_FEEDBACK_SIGN_RIGHT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
+    assert_entry(IW_LEDGER_MOUNT_SIGN_LEFT, IW_LEDGER_ASSUMED, entry(IW_LEDGER_MOUNT_SIGN_LEFT)->evidence);
+    const uint32_t changes = rig.gateway.ledger.changes;
+    (void)gateway_rig_cruise(&rig, 500, -500, MS(1500));
+    TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.ledger.changes);
+}
+
+static void test_gateway_current_that_must_be_clamped_is_counted(void) {
+    gateway_rig_arm(&rig);
+    rig.gateway.config.max_current_mA = 3000;
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(30));
+    TEST_ASSERT_TRUE(rig.gateway.sender.clamped > 0);
+    TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
+}
+
+static void test_gateway_right_frame_that_the_gate_stops_keeps_the_left_back(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 100, 400, MS(1000));
+    rig.gateway.config.max_speed_mm_s = 200;
+    gateway_rig_run(&rig, MS(20));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_INTERNAL, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_ledger_begins_with_where_assumptions_come_from);
+    RUN_TEST(test_gateway_quiet_start_confirms_the_unit_of_each_side);
+    RUN_TEST(test_gateway_wrong_unit_is_contradicted_and_force_invalid);
+    RUN_TEST(test_gateway_removed_offset_is_contradicted);
+    RUN_TEST(test_gateway_unclear_evidence_changes_no_entry);
+    RUN_TEST(test_gateway_turning_wheel_contaminates_its_own_window_only);
+    RUN_TEST(test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_still);
+    RUN_TEST(test_gateway_tare_makes_the_present_force_zero);
+    RUN_TEST(test_gateway_rebooted_wheel_opens_its_window_anew);
+    RUN_TEST(test_gateway_status_length_is_noted);
+    RUN_TEST(test_gateway_pose_is_kept_with_its_time);
+    RUN_TEST(test_gateway_driving_confirms_the_feedback_sign_once);
+    RUN_TEST(test_gateway_current_that_must_be_clamped_is_counted);
+    RUN_TEST(test_gateway_right_frame_that_the_gate_stops_keeps_the_left_back);
+    return UNITY_END();
+}

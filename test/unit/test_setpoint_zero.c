@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: MIT
+// What zero is under either role of the current, how currents ramp, and what a collapse leaves.
+#include "setpoint_rig.h"
+#include "unity.h"
+#include <stdlib.h>
+
+static setpoint_rig_t rig;
+
+void setUp(void) {
+    setpoint_rig_init(&rig);
+}
+
+void tearDown(void) {}
+
+static void test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_command(void) {
+    setpoint_rig_cruise(&rig, 1000, 500, 2000);
+    rig.now_us += 1;
+    iw_setpoint_collapse(&rig.setpoint, rig.now_us);
+    TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&rig.setpoint));
+    TEST_ASSERT_FALSE(iw_setpoint_due(&rig.setpoint, rig.now_us + IW_SETPOINT_SPACING_US - 1U));
+    (void)setpoint_rig_take_after(&rig, IW_SETPOINT_SPACING_US);
+    TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
+    for (uint32_t n = 0; n < 100; n++) {
+        (void)setpoint_rig_take_next(&rig);
+        TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
+    }
+    const iw_time_us_t start_us = rig.now_us;
+    setpoint_rig_command(&rig, 1000, 1000, 2000);
+    const iw_pair_t pair = setpoint_rig_take_next(&rig);
+    TEST_ASSERT_INT_WITHIN(1, (int64_t)(rig.now_us - start_us) * 800 / 1000000, pair.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_TRUE(pair.wheel[IW_LEFT].speed_mm_s > 0);
+}
+
+static void test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero(void) {
+    setpoint_rig_cruise(&rig, 1000, 500, 2000);
+    iw_setpoint_collapse(&rig.setpoint, rig.now_us);
+    setpoint_rig_command(&rig, -700, 1000, 2000);
+    TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&rig.setpoint));
+    (void)setpoint_rig_take_after(&rig, IW_SETPOINT_SPACING_US);
+    TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
+    TEST_ASSERT_FALSE(iw_setpoint_next_is_zero(&rig.setpoint));
+    TEST_ASSERT_TRUE(setpoint_rig_take_next(&rig).wheel[IW_LEFT].speed_mm_s < 0);
+}
+
+static void test_setpoint_collapse_while_braking_leaves_no_tail(void) {
+    setpoint_rig_cruise(&rig, 1000, 1000, 2000);
+    setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
+    (void)setpoint_rig_take_next(&rig);
+    TEST_ASSERT_FALSE(setpoint_rig_is_zero(&rig));
+    iw_setpoint_collapse(&rig.setpoint, rig.now_us);
+    (void)setpoint_rig_take_after(&rig, IW_SETPOINT_SPACING_US);
+    TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
+}
+
+static void test_setpoint_zero_with_a_limit_carries_the_maximum_current(void) {
+    rig.config.max_current_mA = 1500;
+    setpoint_rig_follow(&rig);
+    iw_pair_t pair = iw_setpoint_applied(&rig.setpoint);
+    for (int side = 0; side < IW_SIDES; side++) {
+        TEST_ASSERT_EQUAL_INT(0, pair.wheel[side].speed_mm_s);
+        TEST_ASSERT_EQUAL_INT(1500, pair.wheel[side].current_mA);
+    }
+    setpoint_rig_cruise(&rig, 500, 500, 700);
+    setpoint_rig_demand(&rig, IW_DEMAND_ZERO);
+    pair = setpoint_rig_take_next(&rig);
+    TEST_ASSERT_EQUAL_INT(1500, pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(1500, pair.wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
+}
+
+static void test_setpoint_limit_current_is_not_ramped(void) {
+    setpoint_rig_follow(&rig);
+    const iw_pair_t target = {{{1000, 700}, {1000, 300}}};
+    iw_setpoint_command(&rig.setpoint, rig.now_us, &target);
+    const iw_pair_t pair = setpoint_rig_take_next(&rig);
+    TEST_ASSERT_EQUAL_INT(700, pair.wheel[IW_LEFT].current_mA);
+    TEST_ASSERT_EQUAL_INT(300, pair.wheel[IW_RIGHT].current_mA);
+}
+
+static void test_setpoint_zero_with_a_current_setpoint_carries_no_current(void) {
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    setpoint_rig_cruise(&rig, 500, -500, 1200);
+    TEST_ASSERT_EQUAL_INT(1200, iw_setpoint_applied(&rig.setpoint).wheel[IW_LEFT].current_mA);
+    setpoint_rig_demand(&rig, IW_DEMAND_ZERO);
+    const iw_pair_t pair = setpoint_rig_take_next(&rig);
+    for (int side = 0; side < IW_SIDES; side++) {
+        TEST_ASSERT_EQUAL_INT(0, pair.wheel[side].speed_mm_s);
+        TEST_ASSERT_EQUAL_INT(0, pair.wheel[side].current_mA);
+    }
+}
+
+static void test_setpoint_current_setpoint_scales_with_the_speed(void) {
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    setpoint_rig_follow(&rig);
+    setpoint_rig_command(&rig, 1000, -1000, 2000);
+    for (uint32_t n = 0; n < 100; n++) {
+        const iw_pair_t pair = setpoint_rig_take_next(&rig);
+        TEST_ASSERT_INT_WITHIN(4, abs(pair.wheel[IW_LEFT].speed_mm_s) * 2, pair.wheel[IW_LEFT].current_mA);
+    }
+    setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
+    for (uint32_t n = 0; n < 30; n++) {
+        const iw_pair_t pair = setpoint_rig_take_next(&rig);
+        TEST_ASSERT_INT_WITHIN(4, abs(pair.wheel[IW_LEFT].speed_mm_s) * 2, pair.wheel[IW_LEFT].current_mA);
+    }
+}
+
+static void test_setpoint_current_without_speed_is_no_zero_and_stops_in_time(void) {
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    setpoint_rig_follow(&rig);
+    setpoint_rig_command(&rig, 0, 0, 2000);
+    for (uint32_t n = 0; n < 400; n++) {
+        (void)setpoint_rig_take_next(&rig);
+    }
+    TEST_ASSERT_EQUAL_INT(2000, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].current_mA);
+    TEST_ASSERT_FALSE(setpoint_rig_is_zero(&rig));
+    setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
+    const iw_time_us_t until_us = rig.now_us + 666667U;
+    while (rig.now_us < until_us) {
+        (void)setpoint_rig_take_next(&rig);
+    }
+    TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
+    TEST_ASSERT_EQUAL_INT(0, iw_setpoint_applied(&rig.setpoint).wheel[IW_RIGHT].current_mA);
+}
+
+static void test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain(void) {
+    static const iw_current_role_t roles[] = {IW_ROLE_LIMIT, IW_ROLE_SETPOINT};
+    for (size_t i = 0; i < 2; i++) {
+        setUp();
+        rig.config.current_role = roles[i];
+        setpoint_rig_follow(&rig);
+        TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&rig.setpoint));
+        setpoint_rig_command(&rig, 1, 0, 0);
+        TEST_ASSERT_FALSE(iw_setpoint_next_is_zero(&rig.setpoint));
+        setpoint_rig_command(&rig, 0, -1, 0);
+        TEST_ASSERT_FALSE(iw_setpoint_next_is_zero(&rig.setpoint));
+        setpoint_rig_command(&rig, 0, 0, 1);
+        TEST_ASSERT_EQUAL_INT(roles[i] == IW_ROLE_LIMIT, iw_setpoint_next_is_zero(&rig.setpoint));
+        const iw_pair_t right_current = {{{0, 0}, {0, 5}}};
+        iw_setpoint_command(&rig.setpoint, rig.now_us, &right_current);
+        TEST_ASSERT_EQUAL_INT(roles[i] == IW_ROLE_LIMIT, iw_setpoint_next_is_zero(&rig.setpoint));
+        setpoint_rig_command(&rig, 0, 600, 0);
+        (void)setpoint_rig_take_next(&rig);
+        (void)setpoint_rig_take_next(&rig);
+        setpoint_rig_command(&rig, 0, 0, 0);
+        TEST_ASSERT_FALSE(iw_setpoint_next_is_zero(&rig.setpoint));
+        setpoint_rig_demand(&rig, IW_DEMAND_ZERO);
+        TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&rig.setpoint));
+    }
+}
+
+static void test_setpoint_current_setpoint_changes_sign_through_zero(void) {
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    setpoint_rig_cruise(&rig, 500, 500, 1500);
+    setpoint_rig_command(&rig, 500, 500, -1500);
+    int32_t before = 1500;
+    for (uint32_t n = 0; n < 400; n++) {
+        const int32_t current = setpoint_rig_take_next(&rig).wheel[IW_LEFT].current_mA;
+        TEST_ASSERT_TRUE(current <= before);
+        TEST_ASSERT_TRUE(before * current >= 0);
+        before = current;
+    }
+    TEST_ASSERT_EQUAL_INT(-1500, before);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_command);
+    RUN_TEST(test_setpoint_command_right_after_a_collapse_does_not_replace_its_zero);
+    RUN_TEST(test_setpoint_collapse_while_braking_leaves_no_tail);
+    RUN_TEST(test_setpoint_zero_with_a_limit_carries_the_maximum_current);
+    RUN_TEST(test_setpoint_limit_current_is_not_ramped);
+    RUN_TEST(test_setpoint_zero_with_a_current_setpoint_carries_no_current);
+    RUN_TEST(test_setpoint_current_setpoint_scales_with_the_speed);
+    RUN_TEST(test_setpoint_current_without_speed_is_no_zero_and_stops_in_time);
+    RUN_TEST(test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain);
+    RUN_TEST(test_setpoint_current_setpoint_changes_sign_through_zero);
+    return UNITY_END();
+}
