@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #define LINE_MAX_BYTES 320U
-#define US_PER_S 1000000U
+#define US_PER_S       1000000U
 
 bool sim_bus_log_open(sim_bus_log_t *self, const char *path, bool tell_direction) {
     self->oldest_us = IW_NEVER;
@@ -70,7 +70,7 @@ static size_t data_text(char *out, const iw_can_frame_t *frame) {
         out[2U * i] = digit[frame->data[i] >> 4];
         out[2U * i + 1U] = digit[frame->data[i] & 0x0FU];
     }
-    return 2U * frame->dlc;
+    return (size_t)frame->dlc * 2U;
 }
 
 void sim_bus_log_frame(sim_bus_log_t *self, iw_time_us_t at_us, const iw_can_frame_t *frame, bool from_client) {

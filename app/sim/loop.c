@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #define EVENTS_MAX 32
-#define US_PER_S 1000000U
+#define US_PER_S   1000000U
 
 iw_time_us_t sim_loop_clock_us(void) {
     struct timespec now;

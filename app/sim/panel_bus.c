@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define PULSE_MAX_MS 60000
-#define US_PER_MS 1000U
+#define PULSE_MAX_milli_ms 60000000
+#define STATUS_BYTES       4096U
 
 typedef const char *result_t;
 
@@ -155,7 +155,7 @@ static result_t set_estop(const sim_call_t *call) {
         return press(call);
     }
     if (call->words->count != 3U ||
-        !sim_words_milli(call->words->word[2], (sim_range_t){100, PULSE_MAX_MS * 1000}, &milli_ms)) {
+        !sim_words_milli(call->words->word[2], (sim_range_t){100, PULSE_MAX_milli_ms}, &milli_ms)) {
         return SIM_USAGE;
     }
     if (button != NULL && button->pressed) {
@@ -184,11 +184,9 @@ static result_t log_mark(const sim_call_t *call) {
 }
 
 static result_t status(const sim_call_t *call) {
-    char *const answer = call->panel->answer;
-    size_t const size = sizeof call->panel->answer;
-    (void)memcpy(answer, "ok ", 3U);
-    size_t const length = sim_panel_status(call->panel, call->now_us, &answer[3], size - 4U);
-    (void)memcpy(&answer[3U + length], "\n", 2U);
+    char json[STATUS_BYTES];
+    (void)sim_panel_status(call->panel, call->now_us, json, sizeof json);
+    (void)snprintf(call->panel->answer, sizeof call->panel->answer, "ok %s\n", json);
     return NULL;
 }
 

@@ -5,20 +5,33 @@
 #include <string.h>
 
 #define RUNAWAY_DEFAULT_MM_S 1000
+#define BOTH                 3U
 
 typedef const char *result_t;
 
-/// The wheel of this side, if the mask has it.
-static sim_wheel_t *wheel_of(const sim_call_t *call, unsigned mask, unsigned side) {
-    return ((mask >> side) & 1U) != 0U ? &call->world->pair.wheel[side] : NULL;
+typedef struct {
+    sim_wheel_t *wheel[IW_SIDES];
+    unsigned count;
+} chosen_t;
+
+static chosen_t choose(const sim_call_t *call, unsigned mask) {
+    chosen_t chosen = {{NULL, NULL}, 0U};
+    for (unsigned side = 0U; side < IW_SIDES; ++side) {
+        if (((mask >> side) & 1U) != 0U) {
+            chosen.wheel[chosen.count++] = &call->world->pair.wheel[side];
+        }
+    }
+    return chosen;
 }
 
-#define FOR_WHEELS(call, mask, wheel)                                                                                  \
-    for (unsigned side_ = 0U; side_ < IW_SIDES; ++side_)                                                               \
-        for (sim_wheel_t *wheel = wheel_of((call), (mask), side_); wheel != NULL; wheel = NULL)
-
-static bool sides(const sim_call_t *call, unsigned *out_mask) {
-    return sim_words_sides(call->words->word[1], out_mask);
+/// The wheels that the first argument names.
+static bool sides(const sim_call_t *call, chosen_t *out_chosen) {
+    unsigned mask = 0U;
+    if (!sim_words_sides(call->words->word[1], &mask)) {
+        return false;
+    }
+    *out_chosen = choose(call, mask);
+    return true;
 }
 
 static bool one_of(const sim_call_t *call, unsigned index, sim_choice_t choice, bool *out_one) {
@@ -37,198 +50,199 @@ static result_t set_power(const sim_call_t *call) {
 }
 
 static result_t reboot(const sim_call_t *call) {
-    unsigned mask = 0U;
-    if (!sides(call, &mask)) {
+    chosen_t chosen;
+    if (!sides(call, &chosen)) {
         return SIM_USAGE;
     }
     if (!call->world->pair.power) {
         return "the wheels have no power; first: power on";
     }
-    FOR_WHEELS(call, mask, wheel) {
-        sim_world_reboot(call->world, call->now_us, wheel->side);
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        sim_world_reboot(call->world, call->now_us, chosen.wheel[i]->side);
     }
     return NULL;
 }
 
 static result_t set_muted(const sim_call_t *call) {
-    unsigned mask = 0U;
-    if (!sides(call, &mask)) {
+    chosen_t chosen;
+    if (!sides(call, &chosen)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->muted = call->words->word[0][0] == 'm';
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->muted = call->words->word[0][0] == 'm';
     }
     return NULL;
 }
 
 static result_t set_blocked(const sim_call_t *call) {
-    unsigned mask = 0U;
-    if (!sides(call, &mask)) {
+    chosen_t chosen;
+    if (!sides(call, &chosen)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        sim_motion_advance(&wheel->motion, call->now_us);
-        wheel->motion.blocked = call->words->word[0][0] == 'b';
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
+        chosen.wheel[i]->motion.blocked = call->words->word[0][0] == 'b';
     }
     return NULL;
 }
 
 static result_t set_load(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     int64_t load_mN = 0;
-    if (!sides(call, &mask) || !sim_words_milli(call->words->word[2], (sim_range_t){-4000000, 4000000}, &load_mN)) {
+    if (!sides(call, &chosen) || !sim_words_milli(call->words->word[2], (sim_range_t){-4000000, 4000000}, &load_mN)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->force.load_mN = (int32_t)load_mN;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->force.load_mN = (int32_t)load_mN;
     }
     return NULL;
 }
 
 static result_t set_unit(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     bool centi = false;
-    if (!sides(call, &mask) || !one_of(call, 2U, (sim_choice_t){"cN", "dN"}, &centi)) {
+    if (!sides(call, &chosen) || !one_of(call, 2U, (sim_choice_t){"cN", "dN"}, &centi)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->force.unit = centi ? IW_FORCE_CN : IW_FORCE_DN;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->force.unit = centi ? IW_FORCE_CN : IW_FORCE_DN;
     }
     return NULL;
 }
 
 static result_t set_sign(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     bool swapped = false;
-    if (!sides(call, &mask) || !one_of(call, 2U, (sim_choice_t){"swapped", "normal"}, &swapped)) {
+    if (!sides(call, &chosen) || !one_of(call, 2U, (sim_choice_t){"swapped", "normal"}, &swapped)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        sim_motion_advance(&wheel->motion, call->now_us);
-        wheel->motion.swapped = swapped;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
+        chosen.wheel[i]->motion.swapped = swapped;
     }
     return NULL;
 }
 
 static result_t set_runaway(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     bool on = false;
     int64_t more = RUNAWAY_DEFAULT_MM_S;
-    if (!sides(call, &mask) || !one_of(call, 2U, on_off, &on)) {
+    if (!sides(call, &chosen) || !one_of(call, 2U, on_off, &on)) {
         return SIM_USAGE;
     }
     if (call->words->count == 4U && !(on && sim_words_integer(call->words->word[3], (sim_range_t){1, 3000}, &more))) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        sim_motion_advance(&wheel->motion, call->now_us);
-        wheel->motion.runaway_mm_s = on ? (int16_t)more : 0;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
+        chosen.wheel[i]->motion.runaway_mm_s = on ? (int16_t)more : 0;
     }
     return NULL;
 }
 
 static result_t set_removed(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     bool on = false;
-    if (!sides(call, &mask) || !one_of(call, 2U, on_off, &on)) {
+    if (!sides(call, &chosen) || !one_of(call, 2U, on_off, &on)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->force.zero_removed = on;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->force.zero_removed = on;
     }
     return NULL;
 }
 
 static result_t set_raw(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     int64_t raw = SIM_FORCE_AUTO;
     bool const automatic = strcmp(call->words->word[2], "auto") == 0;
-    if (!sides(call, &mask) ||
+    if (!sides(call, &chosen) ||
         !(automatic || sim_words_integer(call->words->word[2], (sim_range_t){INT16_MIN, INT16_MAX}, &raw))) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->force.forced_raw = (int32_t)raw;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->force.forced_raw = (int32_t)raw;
     }
     return NULL;
 }
 
 static result_t set_zero(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     int64_t zero_mN = 0;
-    if (!sides(call, &mask) || !sim_words_milli(call->words->word[2], (sim_range_t){-4000000, 4000000}, &zero_mN)) {
+    if (!sides(call, &chosen) || !sim_words_milli(call->words->word[2], (sim_range_t){-4000000, 4000000}, &zero_mN)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->force.sensor_zero_mN = (int32_t)zero_mN;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->force.sensor_zero_mN = (int32_t)zero_mN;
     }
     return NULL;
 }
 
 static result_t set_ticks(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     int64_t ticks = 0;
-    if (!sides(call, &mask) || !sim_words_integer(call->words->word[2], (sim_range_t){INT32_MIN, INT32_MAX}, &ticks)) {
+    if (!sides(call, &chosen) ||
+        !sim_words_integer(call->words->word[2], (sim_range_t){INT32_MIN, INT32_MAX}, &ticks)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->motion.ticks = (uint32_t)(uint64_t)ticks;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->motion.ticks = (uint32_t)(uint64_t)ticks;
     }
     return NULL;
 }
 
 static result_t set_radius(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     int64_t radius_mm = 0;
-    if (!sides(call, &mask) || !sim_words_integer(call->words->word[2], (sim_range_t){20, 500}, &radius_mm)) {
+    if (!sides(call, &chosen) || !sim_words_integer(call->words->word[2], (sim_range_t){20, 500}, &radius_mm)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->motion.config.radius_mm = (uint16_t)radius_mm;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->motion.config.radius_mm = (uint16_t)radius_mm;
     }
     return NULL;
 }
 
 static result_t set_gear(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     int64_t turns = 0;
     int64_t per = 1;
     sim_range_t const range = {1, 1000};
-    if (!sides(call, &mask) || !sim_words_integer(call->words->word[2], range, &turns)) {
+    if (!sides(call, &chosen) || !sim_words_integer(call->words->word[2], range, &turns)) {
         return SIM_USAGE;
     }
     if (call->words->count == 4U && !sim_words_integer(call->words->word[3], range, &per)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        sim_motion_advance(&wheel->motion, call->now_us);
-        wheel->motion.tick_rest = 0;
-        wheel->motion.config.gear_turns = (uint16_t)turns;
-        wheel->motion.config.gear_per = (uint16_t)per;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
+        chosen.wheel[i]->motion.tick_rest = 0;
+        chosen.wheel[i]->motion.config.gear_turns = (uint16_t)turns;
+        chosen.wheel[i]->motion.config.gear_per = (uint16_t)per;
     }
     return NULL;
 }
 
 static result_t set_rpm(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     bool rotor = false;
-    if (!sides(call, &mask) || !one_of(call, 2U, (sim_choice_t){"rotor", "wheel"}, &rotor)) {
+    if (!sides(call, &chosen) || !one_of(call, 2U, (sim_choice_t){"rotor", "wheel"}, &rotor)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        wheel->motion.config.rpm_of_rotor = rotor;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->motion.config.rpm_of_rotor = rotor;
     }
     return NULL;
 }
 
 static result_t set_mirror(const sim_call_t *call) {
-    unsigned mask = 0U;
+    chosen_t chosen;
     bool on = false;
-    if (!sides(call, &mask) || !one_of(call, 2U, on_off, &on)) {
+    if (!sides(call, &chosen) || !one_of(call, 2U, on_off, &on)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, mask, wheel) {
-        call->world->pair.pose.mirrored[wheel->side] = on;
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        call->world->pair.pose.mirrored[chosen.wheel[i]->side] = on;
     }
     return NULL;
 }
@@ -238,9 +252,10 @@ static result_t set_role(const sim_call_t *call) {
     if (!one_of(call, 1U, (sim_choice_t){"setpoint", "limit"}, &setpoint)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, 3U, wheel) {
-        sim_motion_advance(&wheel->motion, call->now_us);
-        wheel->motion.config.current_is_setpoint = setpoint;
+    chosen_t const chosen = choose(call, BOTH);
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
+        chosen.wheel[i]->motion.config.current_is_setpoint = setpoint;
     }
     return NULL;
 }
@@ -251,8 +266,9 @@ static result_t set_type(const sim_call_t *call) {
     if (!any && !sim_words_integer(call->words->word[1], (sim_range_t){0, 255}, &type)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, 3U, wheel) {
-        wheel->motion.config.accepted_type = (int16_t)type;
+    chosen_t const chosen = choose(call, BOTH);
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->motion.config.accepted_type = (int16_t)type;
     }
     if (!any) {
         call->world->foreign.setpoint.type = (uint8_t)type;
@@ -265,8 +281,9 @@ static result_t set_loss(const sim_call_t *call) {
     if (!sim_words_milli(call->words->word[1], (sim_range_t){0, 100000}, &milli_percent)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, 3U, wheel) {
-        wheel->loss_permille = (uint16_t)(milli_percent / 100);
+    chosen_t const chosen = choose(call, BOTH);
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->loss_permille = (uint16_t)(milli_percent / 100);
     }
     return NULL;
 }
@@ -276,8 +293,9 @@ static result_t set_slow(const sim_call_t *call) {
     if (!sim_words_milli(call->words->word[1], (sim_range_t){100, 1000000}, &permille)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, 3U, wheel) {
-        sim_wheel_slow(wheel, (uint32_t)permille);
+    chosen_t const chosen = choose(call, BOTH);
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        sim_wheel_slow(chosen.wheel[i], (uint32_t)permille);
     }
     return NULL;
 }
@@ -296,8 +314,9 @@ static result_t set_ambient(const sim_call_t *call) {
     if (!sim_words_integer(call->words->word[1], (sim_range_t){-40, 255}, &ambient)) {
         return SIM_USAGE;
     }
-    FOR_WHEELS(call, 3U, wheel) {
-        wheel->ambient_degC = (int32_t)ambient;
+    chosen_t const chosen = choose(call, BOTH);
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        chosen.wheel[i]->ambient_degC = (int32_t)ambient;
     }
     return NULL;
 }

@@ -56,27 +56,33 @@ static bool is_digit(char c) {
     return c >= '0' && c <= '9';
 }
 
-/// Digits with a sign and a point, scaled by 10^`places`. At most 12 digits, so that nothing overflows.
+/// Appends the digits at `*at`, at most `most`, to `*value`; how many there were.
+static unsigned read_digits(const char **at, unsigned most, int64_t *value) {
+    unsigned digits = 0U;
+    for (; digits < most && is_digit(**at); ++*at) {
+        *value = *value * 10 + (**at - '0');
+        digits += 1U;
+    }
+    return digits;
+}
+
+/// Digits with a sign and a point, scaled by 10^`places`. At most 12 before the point, so that nothing overflows.
 static bool read_scaled(const char *word, unsigned places, int64_t *out_value) {
     bool const negative = word[0] == '-';
     const char *at = negative ? word + 1 : word;
     int64_t value = 0;
-    unsigned digits = 0U;
     unsigned behind = 0U;
-    bool point = false;
-    for (; *at != '\0'; ++at) {
-        if (*at == '.' && !point && digits > 0U && places > 0U) {
-            point = true;
-            continue;
-        }
-        if (!is_digit(*at) || digits == 12U || behind == places + (point ? 0U : 1U)) {
+    if (read_digits(&at, 12U, &value) == 0U) {
+        return false;
+    }
+    if (*at == '.' && places > 0U) {
+        ++at;
+        behind = read_digits(&at, places, &value);
+        if (behind == 0U) {
             return false;
         }
-        value = value * 10 + (*at - '0');
-        digits += 1U;
-        behind += point ? 1U : 0U;
     }
-    if (digits == 0U || (point && behind == 0U)) {
+    if (*at != '\0') {
         return false;
     }
     for (; behind < places; ++behind) {

@@ -102,21 +102,29 @@ static iw_time_us_t start_us(const sim_bus_t *self) {
     return (earliest_us != IW_NEVER && earliest_us < self->free_us) ? self->free_us : earliest_us;
 }
 
-static bool begin(sim_bus_t *self, iw_time_us_t now_us) {
-    iw_time_us_t const at_us = start_us(self);
-    if (at_us > now_us || at_us == IW_NEVER) {
-        return false;
-    }
-    sim_queued_t const *winner = NULL;
+/// The port whose first frame wins, of those submitted by then.
+static uint8_t winner_at(const sim_bus_t *self, iw_time_us_t at_us) {
+    uint8_t winner = SIM_BUS_NONE;
+    uint64_t best = UINT64_MAX;
     for (uint8_t port = 0U; (self->waiting >> port) != 0U; ++port) {
         sim_queued_t const *const first = head(self, port);
-        if (first != NULL && first->submitted_us <= at_us &&
-            (winner == NULL || priority(&first->frame) < priority(&winner->frame))) {
-            winner = first;
-            self->sending = port;
+        if (first != NULL && first->submitted_us <= at_us && priority(&first->frame) < best) {
+            best = priority(&first->frame);
+            winner = port;
         }
     }
-    self->done_us = at_us + sim_bus_frame_bits(&winner->frame);
+    return winner;
+}
+
+static bool begin(sim_bus_t *self, iw_time_us_t now_us) {
+    iw_time_us_t const at_us = start_us(self);
+    uint8_t const winner = (at_us <= now_us) ? winner_at(self, at_us) : SIM_BUS_NONE;
+    if (winner == SIM_BUS_NONE) {
+        return false;
+    }
+    const sim_port_t *const from = &self->port[winner];
+    self->sending = winner;
+    self->done_us = at_us + sim_bus_frame_bits(&from->queue[from->first].frame);
     return true;
 }
 

@@ -3,11 +3,11 @@
 
 #include "iwheel_sim/trig.h"
 
-#define NOISE_mN 250
+#define NOISE_mN       250
 #define SWAY_PERIOD_US 1428571U
-#define SWAY_PERCENT 5
-#define MN_PER_CN 10
-#define MN_PER_DN 100
+#define SWAY_PERCENT   5
+#define MN_PER_CN      10
+#define MN_PER_DN      100
 
 static int16_t saturate(int64_t value) {
     if (value > INT16_MAX) {

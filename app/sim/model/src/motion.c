@@ -8,7 +8,7 @@
 /// Slower than this and told to stand still is standing still.
 #define STICTION_um_s 2000
 /// The motor's own losses, drawn while it turns.
-#define IDLE_DRAW_mA 150U
+#define IDLE_DRAW_mA   150U
 #define TOP_SPEED_um_s 6000000
 
 void sim_motion_default(sim_motion_config_t *out_config) {
@@ -114,7 +114,9 @@ void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us) {
             return;
         }
         iw_time_us_t const end_us = step_end_us(self, to_us);
-        integrate(self, (int64_t)(end_us - self->now_us));
+        if (end_us > self->now_us) {
+            integrate(self, (int64_t)(end_us - self->now_us));
+        }
         self->now_us = end_us;
         if (self->driven && end_us - self->heard_us >= IW_WHEEL_WATCHDOG_US) {
             self->driven = false;

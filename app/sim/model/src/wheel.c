@@ -3,12 +3,12 @@
 
 #define TEMPERATURE_AMBIENT_degC 28
 /// 2000 mA end 40 K above ambient, after some minutes of this time constant in status frames of 40 ms.
-#define HEAT_PER_mA_mdegC 20
+#define HEAT_PER_mA_mdegC    20
 #define HEAT_RESPONSE_FRAMES 5000
-#define CPU_PERCENT 22U
-#define CPU_NOISE_PERCENT 3
-#define CPU_DRIVEN_PERCENT 6U
-#define RPM_DITHER 1000U
+#define CPU_PERCENT          22U
+#define CPU_NOISE_PERCENT    3
+#define CPU_DRIVEN_PERCENT   6U
+#define RPM_DITHER           1000U
 /// Frames of one wheel, and the wheels, do not come at the same instant.
 #define PHASE_RIGHT_US 1300U
 
