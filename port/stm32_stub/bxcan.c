@@ -182,8 +182,6 @@ static void advance(iw_bxcan_t *self, uint32_t msr) {
         } else {
             write_mcr(self, IW_MCR_INRQ);
         }
-    } else if ((msr & IW_MSR_SLAK) != 0U) {
-        begin(self, IW_BXCAN_STARTING);
     } else if (!in_init && !is_bus_off(self)) {
         self->phase = IW_BXCAN_RUNNING;
     }

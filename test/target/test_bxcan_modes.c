@@ -84,6 +84,18 @@ static void test_reset_of_the_controller_while_joining_is_mended(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
+static void test_request_that_got_lost_is_repeated(void) {
+    model->deaf = true;
+    rig_init(0, false);
+    (void)state();
+    bxcan_model_reset(model, 28);
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL(IW_BUS_DOWN, state());
+    }
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+}
+
 static void test_initialisation_asked_for_by_somebody_else_is_left(void) {
     rig_start(0);
     bxcan_model_write(model, 0x00, 0x00010001U);
@@ -164,9 +176,12 @@ static void test_nothing_from_before_bus_off_is_sent_after_it(void) {
     (void)iw_bxcan_send(driver, &left);
     (void)iw_bxcan_send(driver, &right);
     fail_until_bus_off();
-    for (int i = 0; i < 3; i++) {
-        (void)state();
+    TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    for (int i = 0; i < MODEL_MAILBOXES; i++) {
+        TEST_ASSERT_FALSE(model->mailbox[i].pending);
     }
+    (void)state();
+    (void)state();
     bxcan_model_recessive(model, REJOIN_BITS);
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
     TEST_ASSERT_FALSE(rig_send_next(0, &frame));
@@ -252,6 +267,7 @@ int main(void) {
     RUN_TEST(test_controller_that_does_not_answer_is_down_and_recovers);
     RUN_TEST(test_reset_of_the_controller_behind_our_back_is_reported_and_mended);
     RUN_TEST(test_reset_of_the_controller_while_joining_is_mended);
+    RUN_TEST(test_request_that_got_lost_is_repeated);
     RUN_TEST(test_initialisation_asked_for_by_somebody_else_is_left);
     RUN_TEST(test_silent_device_hears_but_neither_acknowledges_nor_sends);
     RUN_TEST(test_device_that_is_not_silent_acknowledges);

@@ -168,6 +168,22 @@ static void test_ring_goes_on_for_ever(void) {
     TEST_ASSERT_EQUAL(0, driver->lost);
 }
 
+static void test_filters_do_not_depend_on_what_was_set_before(void) {
+    rig_reset();
+    model->fm1r = 0x0FFFFFFFU;
+    model->fs1r = 0x0FFFFFFFU;
+    model->ffa1r = 0x0FFFFFFFU;
+    rig_start(0);
+    for (size_t i = 0; i < sizeof ours / sizeof ours[0]; i++) {
+        const model_frame_t frame = {.id = ours[i], .dlc = 4};
+        iw_can_frame_t taken;
+        TEST_ASSERT_EQUAL(1, pass(&frame, &taken));
+    }
+    TEST_ASSERT_EQUAL_HEX32(0x0FFFFFC0U, model->fm1r);
+    TEST_ASSERT_EQUAL_HEX32(0x0FFFFFC0U, model->ffa1r);
+    TEST_ASSERT_EQUAL_HEX32(0x0FFFFFFCU, model->fs1r);
+}
+
 static void test_filters_leave_the_banks_of_others_alone(void) {
     rig_reset();
     model->fa1r = 1U << 20;
@@ -209,6 +225,7 @@ int main(void) {
     RUN_TEST(test_overrun_of_the_controller_is_counted_once);
     RUN_TEST(test_full_ring_loses_the_newest_and_counts);
     RUN_TEST(test_ring_goes_on_for_ever);
+    RUN_TEST(test_filters_do_not_depend_on_what_was_set_before);
     RUN_TEST(test_filters_leave_the_banks_of_others_alone);
     RUN_TEST(test_filters_fit_a_controller_with_14_banks);
     RUN_TEST(test_receive_error_counter_goes_down_again);
