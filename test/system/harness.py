@@ -227,6 +227,8 @@ class Rig:
         while True:
             status = client.request("status")
             if condition(status):
+                if status["state"] == "listening":
+                    self.note("silent")
                 return status
             if time.monotonic() > deadline:
                 return None

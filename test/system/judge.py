@@ -237,11 +237,18 @@ class Judge(Reading):
             if not times:
                 self._say("never_sent", session.begin_us, "armed, but no setpoint was sent to a wheel")
                 continue
-            until_us = min(self._must_send_until(session, side), next_us, self.finished_us)
+            until_us = min(self._must_send_until(session, side), next_us)
+            if not self._told_silent(session, next_us):
+                until_us = min(until_us, self.finished_us)
             self._no_gap(
                 [max(session.armed_us - GAP_US // 2, times[0])] + [t for t in times if t <= until_us] + [until_us]
             )
             self._silence(session, times, next_us)
+
+    def _told_silent(self, session, next_us):
+        """The gateway said so or has left: what is missing then will not come any more."""
+        begin_us = max((at for at, _, _ in session.ends), default=next_us)
+        return any(event.kind in ("silent", "exit") and begin_us < event.t_us <= next_us for event in self.events)
 
     def _no_gap(self, times):
         for before, after in zip(times, times[1:]):

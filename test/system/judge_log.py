@@ -8,6 +8,7 @@ Times are integer microseconds of CLOCK_MONOTONIC. Timeline events (Event.kind):
   stop, gone        somebody said stop; the holder of the lease disconnected: ramp
   press, estop      the button was pressed; a client said estop: zero at once
   cut, ramp         the scenario caused something that must stop the wheels within within_us, without or with ramp
+  silent, exit      the gateway says that it listens again; it ended by itself, after its hold
   dead, alive       the bus takes no frames any more; takes them again
 """
 

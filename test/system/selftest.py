@@ -89,7 +89,7 @@ def good(config=CONFIG):
 
 
 def verdict(frames, events, config=CONFIG, **options):
-    return Judge(config, frames, events, finished_us=END, **options).judge()
+    return Judge(config, frames, events, **{"finished_us": END, **options}).judge()
 
 
 def is_setpoint(frame):
@@ -161,6 +161,12 @@ def faults():
     yield "silence in the hold", between(f, 7_500, 7_700, drop), e, "gap"
     yield "hold 300 ms too short", between(f, 8_050, 8_400, drop), e, "gap"
     yield "no hold after an e-stop", between(f, 3_560, 5_100, drop), e, "gap"
+    yield "listening again 700 ms too early", between(f, 10_590, 99_999, drop), e + [Event(10_600 * MS, "silent")], "gap", {
+        "finished_us": 10_700 * MS
+    }
+    yield "ended 700 ms too early", between(f, 10_590, 99_999, drop), e + [Event(10_600 * MS, "exit")], "gap", {
+        "finished_us": 10_700 * MS
+    }
     yield "hold that never ends", add(f, *stream), e, "no_silence"
     yield "left without right", between(f, 2_000, 2_020, only(1, drop)), e, "pair"
     yield "right without left", between(f, 2_000, 2_020, only(0, drop)), e, "pair"

@@ -110,7 +110,7 @@ def ended_by(t, number):
     rig.gateway.signal(number)
     code = rig.gateway.wait(6)
     ended_us = now_us()
-    rig.timeline.append(Event(ended_us, "end"))
+    rig.timeline.append(Event(ended_us, "exit"))
     stream.stop()
     t.check(code == 0, f"exit code {code}")
     zeros = [at for at, _, speed in rig.bus.setpoints(t_us) if speed == 0]
