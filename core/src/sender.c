@@ -51,15 +51,11 @@ static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
     self->pairs++;
 }
 
-iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero) {
-    iw_can_frame_t frame[IW_SIDES];
+/// Left, then right. What the port refuses on the left does not leave on the right either, unless it is a zero.
+static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, const iw_can_frame_t frame[IW_SIDES], bool zero) {
     const bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
     const bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
     bool taken = true;
-    if (!prepare(self, now_us, IW_LEFT, &pair->wheel[IW_LEFT], &frame[IW_LEFT]) ||
-        !prepare(self, now_us, IW_RIGHT, &pair->wheel[IW_RIGHT], &frame[IW_RIGHT])) {
-        return IW_SEND_STOPPED;
-    }
     if (left) {
         taken = hand_over(self, now_us, IW_LEFT, &frame[IW_LEFT]);
     }
@@ -69,7 +65,17 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw
     if (taken && left && right) {
         measure_gap(self, now_us);
     }
-    return taken ? IW_SEND_DONE : IW_SEND_LATER;
+    return taken;
+}
+
+iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero) {
+    iw_can_frame_t frame[IW_SIDES];
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        if (!prepare(self, now_us, (iw_side_t)side, &pair->wheel[side], &frame[side])) {
+            return IW_SEND_STOPPED;
+        }
+    }
+    return hand_over_both(self, now_us, frame, zero) ? IW_SEND_DONE : IW_SEND_LATER;
 }
 
 void iw_sender_rest(iw_sender_t *self) {
