@@ -74,7 +74,7 @@ static int load_script(sim_simulator_t *self, const char *path) {
     }
     if (fault.line == 0U) {
         (void)fprintf(stderr, "iwheel-sim: %s: %s\n", path, fault.reason);
-        return EX_NOINPUT;
+        return EX_DATAERR;
     }
     (void)fprintf(stderr, "iwheel-sim: %s:%u: %s\n", path, fault.line, fault.reason);
     return EX_DATAERR;
