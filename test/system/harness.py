@@ -93,7 +93,7 @@ class Sim:
         command = [
             rig.program("iwheel-sim"),
             "--can",
-            f"unix:{rig.path('bus')}",
+            rig.wheels_bus(),
             "--estop",
             rig.path("button"),
             "--control",
@@ -156,8 +156,32 @@ class Rig:
         for section, keys in (config or {}).items():
             self.settings.setdefault(section, {}).update(keys)
         self.write_config()
+        self.prepare()
         self.sim = Sim(self, sim_args)
-        self.bus = Bus(self.path("bus"))
+        self.bus = self.listen()
+
+    # What a rig on another bus does in another way (test/kernel) ------------------------------------------------------
+
+    def prepare(self):
+        """Before anything is started."""
+
+    def listen(self, frames=None):
+        """The recorder of the bus; `frames` are what another one had recorded before."""
+        return Bus(self.path("bus"), frames)
+
+    def wheels_bus(self):
+        """What the simulator gets as --can."""
+        return f"unix:{self.path('bus')}"
+
+    def gateway_bus(self):
+        """What the gateway gets as --can."""
+        return self.wheels_bus()
+
+    def estop_line(self):
+        """What the gateway gets as --estop."""
+        return f"unix:{self.path(self.button)}" if self.estop else "none"
+
+    # Files and configuration ------------------------------------------------------------------------------------------
 
     def path(self, name):
         return os.path.join(self.folder, name)
@@ -184,17 +208,16 @@ class Rig:
     # The gateway ------------------------------------------------------------------------------------------------------
 
     def gateway_command(self, *extra):
-        estop = f"unix:{self.path(self.button)}" if self.estop else "none"
         return [
             self.program("iwheel-gateway"),
             "-c",
             self.path("gateway.conf"),
             "--can",
-            f"unix:{self.path('bus')}",
+            self.gateway_bus(),
             "--socket",
             self.path("gateway.sock"),
             "--estop",
-            estop,
+            self.estop_line(),
             *extra,
         ]
 
@@ -263,7 +286,7 @@ class Rig:
         """Another simulator after the first one died; `frames` are what the recorder had until then."""
         self.sim.end()
         self.sim = Sim(self)
-        self.bus = Bus(self.path("bus"), frames)
+        self.bus = self.listen(frames)
 
     # The timeline -----------------------------------------------------------------------------------------------------
 

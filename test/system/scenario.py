@@ -27,13 +27,15 @@ def scenario(title, seconds=5):
 class Test:
     """Collects failures as [text, kind, t_us]; kind: "rule" is always judged, "timing" and "check" not on a stalled machine."""
 
+    rig_type = Rig
+
     def __init__(self, build):
         self.build = build
         self.failures, self.figures, self.latencies, self.bus_stalls = [], [], [], []
         self.rigs = []
 
     def rig(self, *arguments, **options):
-        rig = Rig(self.build, *arguments, **options)
+        rig = self.rig_type(self.build, *arguments, **options)
         self.rigs.append(rig)
         return rig
 
