@@ -52,8 +52,9 @@ def main(arguments):
     for case in xml.etree.ElementTree.parse(arguments[1]).getroot().iter("testcase"):
         counts = count(case)
         sums = [total + one for total, one in zip(sums, counts)]
-        if counts[1]:
-            print(f"failed: {case.get('name')}: {counts[1]} of {sum(counts)}")
+        for word, number in (("failed", counts[1]), ("skipped", counts[2])):
+            if number:
+                print(f"{word}: {case.get('name')}: {number} of {sum(counts)}")
     print(*sums)
 
 
