@@ -19,6 +19,7 @@ from judge_log import Config, Event, percentile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PR_SET_PDEATHSIG = 1
+SERVICE_NICE = -10
 DEFAULTS = {
     "wheels": {"setpoint_type": 1, "current_role": "limit"},
     "drive": {},
@@ -30,6 +31,14 @@ def die_with_parent():
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
+def as_a_service():
+    """The priority that a service would have, where that is allowed: these processes must not wait for the scenarios."""
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, SERVICE_NICE)
+    except PermissionError:
+        pass
+
+
 class Process:
     """A child whose output goes to a file."""
 
@@ -38,6 +47,7 @@ class Process:
 
         def prepare():
             die_with_parent()
+            as_a_service()
             if setup:
                 setup()
 
@@ -336,4 +346,3 @@ def find_program(build, name):
     raise FileNotFoundError(f"{name} is not in {build}; build it first: cmake --build {build} --target {name}")
 
 
-__all__ = ["Closed", "Event", "Process", "Rig", "find_program", "now_us", "percentile", "wait_connect"]
