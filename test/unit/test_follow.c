@@ -78,6 +78,7 @@ static void test_follow_overspeed_uses_the_configuration(void) {
 }
 
 static void test_follow_slower_than_the_margin_is_no_overspeed(void) {
+    assert_never((speeds_t){0, 300});
     assert_never((speeds_t){0, 299});
     assert_never((speeds_t){0, -299});
     assert_never((speeds_t){500, 799});

@@ -32,6 +32,14 @@ static void test_permit_begins_listening_in_silence(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
 }
 
+static void test_permit_time_that_begins_at_zero_reminds_of_nothing(void) {
+    rig.now_us = 0;
+    iw_permit_init(&rig.permit, &rig.config, 0, false);
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_HEX32(0, iw_permit_present(&rig.permit, 0));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+}
+
 static void test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     TEST_ASSERT_TRUE(rig.permit.arming);
@@ -320,6 +328,7 @@ static void test_permit_arming_in_stopping_latches_on_a_cause(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_permit_begins_listening_in_silence);
+    RUN_TEST(test_permit_time_that_begins_at_zero_reminds_of_nothing);
     RUN_TEST(test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven);
     RUN_TEST(test_permit_arm_does_not_need_an_operator_to_have_reset_anything);
     RUN_TEST(test_permit_arm_without_echo_in_time_is_send_stalled);

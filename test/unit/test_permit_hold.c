@@ -212,12 +212,25 @@ static void test_permit_after_reset_the_old_holder_holds_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
 }
 
+static void test_permit_stop_after_a_reset_is_told_as_not_latched(void) {
+    latch_and_calm(IW_CAUSE_INTERNAL);
+    TEST_ASSERT_TRUE(rig.permit.stop.latched);
+    (void)permit_rig_reset(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
+    rig.view.proven = true;
+    permit_rig_step(&rig);
+    iw_permit_stop(&rig.permit, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    TEST_ASSERT_FALSE(rig.permit.stop.latched);
+}
+
 static void test_permit_restarted_sends_zeros_before_listening(void) {
     permit_rig_init_restarted(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_RESTART, rig.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.stop.number);
+    TEST_ASSERT_TRUE(rig.permit.stop.at_us == FIXTURE_START_US);
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
 }
 
@@ -359,6 +372,7 @@ int main(void) {
     RUN_TEST(test_permit_reset_needs_wheels_heard_and_at_rest);
     RUN_TEST(test_permit_reset_while_somebody_still_commands_is_refused);
     RUN_TEST(test_permit_after_reset_the_old_holder_holds_nothing);
+    RUN_TEST(test_permit_stop_after_a_reset_is_told_as_not_latched);
     RUN_TEST(test_permit_restarted_sends_zeros_before_listening);
     RUN_TEST(test_permit_restarted_without_any_wheel_ends_as_well);
     RUN_TEST(test_permit_restarted_gives_way_to_another_master_at_once);

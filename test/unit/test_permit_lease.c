@@ -209,6 +209,7 @@ static void test_permit_disconnect_of_the_holder_ends_the_lease_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, rig.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.detail);
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
@@ -246,6 +247,7 @@ static void test_permit_stop_needs_no_lease_and_ramps(void) {
         TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
         TEST_ASSERT_EQUAL_INT(causes[i], rig.permit.stop.cause);
+        TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.detail);
         TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stop.client);
         TEST_ASSERT_EQUAL_INT(123, rig.permit.stop.applied.wheel[IW_LEFT].speed_mm_s);
     }

@@ -55,6 +55,17 @@ static void test_setpoint_braking_follows_time_at_every_period(void) {
     }
 }
 
+static void test_setpoint_ramps_count_fractions_of_a_millisecond(void) {
+    setpoint_rig_follow(&rig);
+    const iw_time_us_t start_us = rig.now_us;
+    setpoint_rig_command(&rig, 1000, 1000, 2000);
+    for (uint32_t n = 0; n < 40; n++) {
+        const iw_pair_t pair = setpoint_rig_take_after(&rig, 20999);
+        const int64_t ideal = (int64_t)(rig.now_us - start_us) * 800 / 1000000;
+        TEST_ASSERT_INT_WITHIN(1, ideal, pair.wheel[IW_LEFT].speed_mm_s);
+    }
+}
+
 static void test_setpoint_slower_command_uses_the_slope_towards_zero(void) {
     setpoint_rig_cruise(&rig, 1000, 1000, 2000);
     setpoint_rig_command(&rig, 100, 100, 2000);
@@ -289,6 +300,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_setpoint_acceleration_follows_time_at_every_period);
     RUN_TEST(test_setpoint_braking_follows_time_at_every_period);
+    RUN_TEST(test_setpoint_ramps_count_fractions_of_a_millisecond);
     RUN_TEST(test_setpoint_slower_command_uses_the_slope_towards_zero);
     RUN_TEST(test_setpoint_late_call_away_from_zero_is_granted_two_periods);
     RUN_TEST(test_setpoint_late_call_towards_zero_counts_all_of_the_time);

@@ -67,6 +67,33 @@ static void test_setpoint_after_init_is_silent(void) {
     assert_silent(0);
     assert_silent(FIXTURE_START_US);
     TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
+    iw_setpoint_collapse(&setpoint, FIXTURE_START_US);
+    assert_silent(FIXTURE_START_US);
+    iw_setpoint_hasten(&setpoint, FIXTURE_START_US);
+    assert_silent(FIXTURE_START_US);
+}
+
+static void test_setpoint_first_pair_is_due_at_once_even_when_time_has_just_begun(void) {
+    iw_setpoint_demand(&setpoint, 1000, IW_DEMAND_FOLLOW);
+    assert_only_due_from(1000);
+}
+
+static void test_setpoint_hasten_moves_the_pair_forward_but_keeps_spacing(void) {
+    iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_BRAKE);
+    take_at(FIXTURE_START_US);
+    iw_setpoint_hasten(&setpoint, FIXTURE_START_US + MS(2));
+    assert_only_due_from(FIXTURE_START_US + IW_SETPOINT_SPACING_US);
+    iw_setpoint_hasten(&setpoint, FIXTURE_START_US + MS(9));
+    assert_only_due_from(FIXTURE_START_US + IW_SETPOINT_SPACING_US);
+}
+
+static void test_setpoint_pair_taken_late_goes_back_to_the_grid_if_spacing_allows(void) {
+    iw_setpoint_demand(&setpoint, FIXTURE_START_US, IW_DEMAND_ZERO);
+    take_at(FIXTURE_START_US);
+    take_at(FIXTURE_START_US + MS(35));
+    assert_only_due_from(FIXTURE_START_US + MS(40));
+    take_at(FIXTURE_START_US + MS(55) + 1U);
+    assert_only_due_from(FIXTURE_START_US + MS(75) + 1U);
 }
 
 static void test_setpoint_any_demand_from_silence_is_due_at_once_with_zero(void) {
@@ -256,6 +283,8 @@ static void test_setpoint_demand_silence_ends_everything_at_once(void) {
     const iw_time_us_t last_us = cruise(FIXTURE_START_US, 1000, 1000);
     iw_setpoint_demand(&setpoint, last_us + MS(1), IW_DEMAND_SILENCE);
     assert_silent(last_us + MS(1));
+    TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
+    TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&setpoint));
     command_at(last_us + MS(2), 700, 700);
     assert_silent(last_us + MS(2));
     iw_setpoint_collapse(&setpoint, last_us + MS(3));
@@ -285,6 +314,9 @@ static void test_setpoint_due_does_not_change_anything(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_setpoint_after_init_is_silent);
+    RUN_TEST(test_setpoint_first_pair_is_due_at_once_even_when_time_has_just_begun);
+    RUN_TEST(test_setpoint_hasten_moves_the_pair_forward_but_keeps_spacing);
+    RUN_TEST(test_setpoint_pair_taken_late_goes_back_to_the_grid_if_spacing_allows);
     RUN_TEST(test_setpoint_any_demand_from_silence_is_due_at_once_with_zero);
     RUN_TEST(test_setpoint_first_pair_taken_late_is_still_zero);
     RUN_TEST(test_setpoint_grid_does_not_drift_over_ten_thousand_late_pairs);

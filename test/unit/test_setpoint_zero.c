@@ -108,6 +108,7 @@ static void test_setpoint_current_without_speed_is_no_zero_and_stops_in_time(voi
     rig.config.current_role = IW_ROLE_SETPOINT;
     setpoint_rig_follow(&rig);
     setpoint_rig_command(&rig, 0, 0, 2000);
+    TEST_ASSERT_INT_WITHIN(1, 8, setpoint_rig_take_next(&rig).wheel[IW_LEFT].current_mA);
     for (uint32_t n = 0; n < 400; n++) {
         (void)setpoint_rig_take_next(&rig);
     }
