@@ -122,7 +122,8 @@ void gw_why_sentence(const iw_stop_t *stop, const gw_why_context_t *context, cha
         return;
     }
     clause(stop, context, what, sizeof what);
-    (void)snprintf(doing, sizeof doing, " while %s", gw_state_name(stop->from));
+    const bool ours = stop->cause != IW_CAUSE_RESTART; // Else nobody here knows what was going on.
+    (void)snprintf(doing, sizeof doing, "%s%s", ours ? " while " : "", ours ? gw_state_name(stop->from) : "");
     if (stop->from == IW_STATE_ARMED || stop->from == IW_STATE_STOPPING) {
         (void)snprintf(doing, sizeof doing, " while %s %d/%d mm/s",
                        stop->from == IW_STATE_ARMED ? "driving" : "stopping from",

@@ -236,6 +236,18 @@ static void test_why_names_cause_numbers_time_and_cure(void) {
         strstr(sentence(IW_CAUSE_WHEEL_BLOCKED, IW_SIDES_RIGHT, 12), "right wheel blocked: only 12 mm/s"));
 }
 
+static void test_why_after_a_crash_does_not_say_what_nobody_knows(void) {
+    iw_stop_t stop;
+    char text[GW_SENTENCE_SIZE];
+    memset(&stop, 0, sizeof stop);
+    stop.number = 1;
+    stop.cause = IW_CAUSE_RESTART;
+    gw_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("the gateway before this one died while the wheels were armed; zero at once at 0.000 s; "
+                             "look for the crash in the log, then arm again",
+                             text);
+}
+
 static void test_why_has_a_sentence_and_a_name_for_every_cause(void) {
     for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause < IW_CAUSES; cause++) {
         const char *text = sentence((iw_cause_t)cause, IW_SIDES_LEFT, 1);
@@ -290,6 +302,7 @@ int main(void) {
     RUN_TEST(test_json_escapes_and_separates);
     RUN_TEST(test_json_that_does_not_fit_is_no_line_at_any_size);
     RUN_TEST(test_why_names_cause_numbers_time_and_cure);
+    RUN_TEST(test_why_after_a_crash_does_not_say_what_nobody_knows);
     RUN_TEST(test_why_has_a_sentence_and_a_name_for_every_cause);
     RUN_TEST(test_why_without_a_stop_says_so);
     RUN_TEST(test_names_of_all_refusals_are_errors_of_the_closed_list);
