@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
+#include "bus_facts.h"
+
 #include "iwheel_linux/clock.h"
 
+#include <errno.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <string.h>
@@ -64,13 +67,36 @@ static void listen_to_bus(gw_daemon_t *daemon, heard_t *out_heard) {
     }
 }
 
+/// What the kernel tells of the interface; nothing for the local bus.
+static void judge_link(const gw_daemon_t *daemon, verdicts_t *verdicts) {
+    static const char *const words[] = {[GW_FACT_OK] = "ok", [GW_FACT_WARN] = "warn", [GW_FACT_FAIL] = "fail"};
+    gw_fact_verdict_t verdict;
+    char fact[GW_FACT_SIZE];
+    for (unsigned i = 0; gw_bus_facts_tell(daemon, i, &verdict, fact); ++i) {
+        if (fact[0] != '\0') {
+            say(verdicts, words[verdict], "%s", fact);
+        }
+    }
+}
+
 static void judge_bus(const gw_daemon_t *daemon, const heard_t *heard, verdicts_t *verdicts) {
     const char *bus = daemon->config.bus.interface;
-    if (!heard->was_up) {
+    const iw_link_presence_t presence = iw_linux_hal_link(&daemon->hal)->presence;
+    judge_link(daemon, verdicts);
+    if (!heard->was_up && presence == IW_LINK_LOCAL) {
         say(verdicts, "fail", "bus %s: nobody there; start the simulator: iwheel-sim --can %s", bus, bus);
+    } else if (!heard->was_up && presence == IW_LINK_UP) {
+        say(verdicts, "fail",
+            "bus %s: bus-off; check cable, termination and bit rate, then: ip link set %s down; ip "
+            "link set %s up",
+            bus, bus, bus);
+    }
+    if (!heard->was_up) {
         return;
     }
-    say(verdicts, "ok", "bus %s: up", bus);
+    if (presence == IW_LINK_LOCAL) {
+        say(verdicts, "ok", "bus %s: up", bus);
+    }
     for (unsigned side = 0; side < IW_SIDES; ++side) {
         const char *name = side == IW_LEFT ? "left" : "right";
         if (heard->speed[side] == 0U) {
@@ -93,13 +119,29 @@ static void judge_bus(const gw_daemon_t *daemon, const heard_t *heard, verdicts_
     }
 }
 
+/// What to do about a GPIO line that cannot be had.
+static const char *line_cure(int trouble) {
+    switch (trouble) {
+    case ENOENT:
+        return "there is no such line; gpioinfo lists them";
+    case EBUSY:
+        return "another program has it; gpioinfo names that program";
+    case EACCES:
+    case EPERM:
+        return "not allowed; add the gateway's user to the group that owns /dev/gpiochip*";
+    default:
+        return "its chip is gone or does not answer; gpiodetect lists the chips";
+    }
+}
+
 static void judge_estop(const gw_daemon_t *daemon, const heard_t *heard, verdicts_t *verdicts) {
     const char *line = daemon->config.estop.line;
     if (!daemon->hal.estop_ops->present) {
         say(verdicts, "warn", "e-stop: none; wire a button and set [estop] line");
     } else if (heard->estop < 0) {
-        say(verdicts, "fail", "e-stop %s: unreadable, which counts as pressed; start the simulator with --estop %s",
-            line, line);
+        say(verdicts, "fail", "e-stop %s: unreadable, which counts as pressed: %s", line,
+            daemon->hal.estop_ops->simulated ? "start the simulator with this --estop"
+                                             : line_cure(iw_linux_hal_estop_trouble(&daemon->hal)));
     } else {
         say(verdicts, daemon->hal.estop_ops->simulated ? "warn" : "ok", "e-stop %s: %s%s", line,
             heard->estop > 0 ? "pressed" : "released",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "loop.h"
 
+#include "bus_facts.h"
 #include "dispatch.h"
 #include "observe.h"
 #include "service.h"
@@ -80,6 +81,7 @@ static void mark_if_sending(gw_daemon_t *daemon) {
 static void step(gw_daemon_t *daemon) {
     daemon->now_us = iw_clock_now_us();
     iw_linux_hal_tend(&daemon->hal, daemon->now_us);
+    gw_bus_facts_follow(daemon);
     mark_if_sending(daemon); // Before the first frame that it warns of.
     daemon->step_next_us = iw_gateway_step(&daemon->gateway, daemon->now_us);
     daemon->requested = false;

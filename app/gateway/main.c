@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "bus_facts.h"
 #include "json_arena.h"
 #include "loop.h"
 #include "observe.h"
@@ -27,8 +28,10 @@ static void secure_standard_streams(void) {
 
 static int open_hal(gw_daemon_t *daemon) {
     const char *culprit;
-    const int error =
-        iw_linux_hal_open(&daemon->hal, daemon->config.bus.interface, daemon->config.estop.line, &culprit);
+    const iw_estop_wish_t estop = {.name = daemon->config.estop.line,
+                                   .active_high = daemon->config.estop.active_high,
+                                   .debounce_ms = daemon->config.estop.debounce_ms};
+    const int error = iw_linux_hal_open(&daemon->hal, daemon->config.bus.interface, &estop, &culprit);
     if (error != 0) {
         gw_report_unopened(&daemon->config, culprit, error, stderr);
         return EX_UNAVAILABLE;
@@ -40,14 +43,13 @@ static int open_hal(gw_daemon_t *daemon) {
 
 static int start_core(gw_daemon_t *daemon) {
     const iw_hal_t hal = iw_linux_hal_functions(&daemon->hal);
-    const iw_bus_facts_t facts = {.echo_proven = daemon->hal.bus_ops->echo_proven};
     const bool restarted = gw_runtime_crashed(&daemon->runtime) && !daemon->config.core.listen_only;
     daemon->now_us = iw_clock_now_us();
     if (iw_gateway_init(&daemon->gateway, &daemon->config.core, &hal, daemon->now_us, restarted) != IW_CONFIG_OK) {
         (void)fputs("iwheel-gateway: the configuration contradicts itself; see iwheel-gateway --check\n", stderr);
         return EX_CONFIG;
     }
-    iw_gateway_bus_facts(&daemon->gateway, &facts);
+    gw_bus_facts_follow(daemon);
     gw_why_sentence(&daemon->last_stop.stop, &(gw_why_context_t){0}, daemon->last_stop.sentence, GW_SENTENCE_SIZE);
     if (restarted) {
         gw_log(&daemon->log, GW_LOG_WARNING,
@@ -71,7 +73,6 @@ static int serve(gw_daemon_t *daemon) {
     }
     if (result == 0) {
         gw_notify_open(&daemon->notify);
-        gw_report_warnings(daemon);
         gw_report_start(daemon);
         const int error = gw_loop_run(daemon);
         if (error != 0) {

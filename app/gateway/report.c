@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
+#include "bus_facts.h"
+
 #include <errno.h>
 #include <inttypes.h>
 #include <stdarg.h>
@@ -26,9 +28,12 @@ void gw_report_warnings(gw_daemon_t *daemon) {
         warn(daemon, "the e-stop %s is SIMULATED: no button of this machine stops the wheels",
              daemon->config.estop.line);
     }
-    if (!hal->bus_ops->echo_proven) {
-        warn(daemon, "the echo of %s is unproven: whether a setpoint was on the bus cannot be known",
-             daemon->config.bus.interface);
+    gw_fact_verdict_t verdict;
+    char fact[GW_FACT_SIZE];
+    for (unsigned i = 0; gw_bus_facts_tell(daemon, i, &verdict, fact); ++i) {
+        if (verdict != GW_FACT_OK) {
+            warn(daemon, "%s", fact);
+        }
     }
 }
 
@@ -73,14 +78,20 @@ void gw_report_unopened(const gateway_config_t *config, const char *culprit, int
     const bool is_bus = culprit == config->bus.interface;
     if (error == ENOTSUP && is_bus) {
         (void)fprintf(err,
-                      "iwheel-gateway: bus %s: this build serves the simulator's bus only; use --can unix:PATH, with "
-                      "iwheel-sim --can unix:PATH\n",
+                      "iwheel-gateway: bus %s: libmnl was missing when this was built, so it serves the simulator's "
+                      "bus only (unix:PATH); apt-get install libmnl-dev, configure and build again\n",
                       culprit);
     } else if (error == ENOTSUP) {
         (void)fprintf(err,
-                      "iwheel-gateway: e-stop %s: this build reads the simulator's button only; use --estop unix:PATH, "
-                      "or --estop none and no wheels on the ground\n",
+                      "iwheel-gateway: e-stop %s: libgpiod was missing when this was built, so it reads the "
+                      "simulator's button only (unix:PATH); apt-get install libgpiod-dev, configure and build again\n",
                       culprit);
+    } else if (error == EAFNOSUPPORT && is_bus) {
+        (void)fprintf(
+            err,
+            "iwheel-gateway: bus %s: this kernel has no CAN sockets; modprobe can_raw, or use the simulator's "
+            "bus: --can unix:PATH\n",
+            culprit);
     } else {
         (void)fprintf(err, "iwheel-gateway: %s %s: %s; correct %s\n", is_bus ? "bus" : "e-stop", culprit,
                       strerror(error), is_bus ? "[bus] interface or --can" : "[estop] line or --estop");

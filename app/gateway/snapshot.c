@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "snapshot.h"
 
+#include "bus_facts.h"
+
 #include "iwheel_linux/clock.h"
 
 #include <string.h>
@@ -129,11 +131,16 @@ static void write_lease(gw_daemon_t *daemon, json_out_t *json) {
 
 static void write_surroundings(const gw_daemon_t *daemon, json_out_t *json) {
     const iw_gateway_t *gateway = &daemon->gateway;
+    const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
     json_out_open(json, "bus", '{');
     json_out_text(json, "name", daemon->config.bus.interface);
     json_out_text(json, "state", gw_bus_state_name(gateway->bus));
-    json_out_text(json, "timing", gateway->facts.timing_contradicted ? "contradicted" : "unproven");
+    json_out_text(json, "timing", gw_bus_facts_timing(daemon));
     json_out_text(json, "echo", gateway->facts.echo_proven ? "proven" : "unproven");
+    json_out_known(json, "bitrate", link->bitrate_hz != 0U, link->bitrate_hz);
+    json_out_known(json, "sample_point_permille", link->sample_point_permille != 0U, link->sample_point_permille);
+    json_out_known(json, "load_permille", link->presence == IW_LINK_UP, link->load_permille);
+    json_out_known(json, "lost_frames", link->presence == IW_LINK_UP, link->lost);
     json_out_close(json, '}');
     json_out_open(json, "estop", '{');
     json_out_text(json, "line", daemon->config.estop.line);

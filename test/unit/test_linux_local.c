@@ -69,7 +69,7 @@ void setUp(void) {
     const char *culprit = NULL;
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
     now_us = 1000000;
-    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&hal, bus_name, estop_name, &culprit));
+    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&hal, bus_name, &(iw_estop_wish_t){.name = estop_name}, &culprit));
     functions = iw_linux_hal_functions(&hal);
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
@@ -273,15 +273,18 @@ static void test_hal_refuses_names_without_a_backend_and_keeps_nothing_open(void
     const char *culprit = NULL;
     const int before = dup(0);
     (void)close(before);
-    TEST_ASSERT_EQUAL_INT(ENOTSUP, iw_linux_hal_open(&other, "can0", "none", &culprit));
-    TEST_ASSERT_EQUAL_STRING("can0", culprit);
-    TEST_ASSERT_EQUAL_INT(ENOTSUP, iw_linux_hal_open(&other, bus_name, "gpiochip0:4", &culprit));
-    TEST_ASSERT_EQUAL_STRING("gpiochip0:4", culprit);
-    TEST_ASSERT_EQUAL_INT(ENOENT, iw_linux_hal_open(&other, bus_name, "unix:", &culprit));
+    const iw_estop_wish_t none = {.name = "none"};
+    const iw_estop_wish_t no_line = {.name = "gpiochip0:x"};
+    const iw_estop_wish_t no_path = {.name = "unix:"};
+    TEST_ASSERT_EQUAL_INT(ENOTSUP, iw_linux_hal_open(&other, "can_of_16_letters", &none, &culprit));
+    TEST_ASSERT_EQUAL_STRING("can_of_16_letters", culprit);
+    TEST_ASSERT_NOT_EQUAL_INT(0, iw_linux_hal_open(&other, bus_name, &no_line, &culprit));
+    TEST_ASSERT_EQUAL_STRING("gpiochip0:x", culprit);
+    TEST_ASSERT_EQUAL_INT(ENOENT, iw_linux_hal_open(&other, bus_name, &no_path, &culprit));
     TEST_ASSERT_EQUAL_STRING("unix:", culprit);
     char longest[200] = "unix:";
     memset(&longest[5], 'x', 150);
-    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_linux_hal_open(&other, longest, "none", &culprit));
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_linux_hal_open(&other, longest, &none, &culprit));
     const int after = dup(0);
     (void)close(after);
     TEST_ASSERT_EQUAL_INT(before, after);
@@ -290,7 +293,7 @@ static void test_hal_refuses_names_without_a_backend_and_keeps_nothing_open(void
 static void test_hal_without_an_estop_is_released_and_watches_nothing(void) {
     static iw_linux_hal_t other;
     const char *culprit = NULL;
-    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&other, bus_name, "none", &culprit));
+    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&other, bus_name, &(iw_estop_wish_t){.name = "none"}, &culprit));
     const iw_hal_t none = iw_linux_hal_functions(&other);
     TEST_ASSERT_EQUAL_INT(0, none.estop_pressed(none.context));
     TEST_ASSERT_EQUAL_INT(-1, iw_linux_hal_estop_fd(&other));

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_linux/backend.h"
 
-static int none_open(void *self, const char *name) {
+static int none_open(void *self, const iw_estop_wish_t *wish) {
     (void)self;
-    (void)name;
+    (void)wish;
     return 0;
 }
 
@@ -31,6 +31,11 @@ static int none_pressed(void *self) {
     return 0;
 }
 
+static int none_trouble(const void *self) {
+    (void)self;
+    return 0;
+}
+
 const iw_estop_ops_t iw_no_estop_ops = {
     .open = none_open,
     .close = none_close,
@@ -38,6 +43,7 @@ const iw_estop_ops_t iw_no_estop_ops = {
     .tend = none_tend,
     .next_us = none_next_us,
     .pressed = none_pressed,
+    .trouble = none_trouble,
     .simulated = false,
     .present = false,
 };

@@ -62,10 +62,10 @@ static void listen_to(unix_estop_t *button) {
     }
 }
 
-static int button_open(void *self, const char *name) {
+static int button_open(void *self, const iw_estop_wish_t *wish) {
     unix_estop_t *button = (unix_estop_t *)self;
     *button = (unix_estop_t){.level = true};
-    const int error = iw_unix_link_open(&button->link, name, SOCK_STREAM);
+    const int error = iw_unix_link_open(&button->link, wish->name, SOCK_STREAM);
     if (error == 0 && iw_unix_link_is_up(&button->link)) {
         struct pollfd level = {.fd = button->link.fd, .events = POLLIN};
         (void)poll(&level, 1, FIRST_LEVEL_MS);
@@ -84,6 +84,10 @@ static int button_pressed(void *self) {
     return unreadable ? -1 : (int)pressed;
 }
 
+static int button_trouble(const void *self) {
+    return ((const unix_estop_t *)self)->known ? 0 : ENOTCONN;
+}
+
 const iw_estop_ops_t iw_unix_estop_ops = {
     .open = button_open,
     .close = button_close,
@@ -91,6 +95,7 @@ const iw_estop_ops_t iw_unix_estop_ops = {
     .tend = button_tend,
     .next_us = button_next_us,
     .pressed = button_pressed,
+    .trouble = button_trouble,
     .simulated = true,
     .present = true,
 };

@@ -3,24 +3,25 @@
 
 #include <errno.h>
 
-int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const char *estop_name, const char **out_culprit) {
+int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const iw_estop_wish_t *estop,
+                      const char **out_culprit) {
     *self = (iw_linux_hal_t){
-        .bus_ops = iw_bus_backend(bus_name), .estop_ops = iw_estop_backend(estop_name), .estop_last = -1};
+        .bus_ops = iw_bus_backend(bus_name), .estop_ops = iw_estop_backend(estop->name), .estop_last = -1};
     *out_culprit = bus_name;
     if (self->bus_ops == NULL) {
         return ENOTSUP;
     }
     if (self->estop_ops == NULL) {
-        *out_culprit = estop_name;
+        *out_culprit = estop->name;
         return ENOTSUP;
     }
     int error = self->bus_ops->open(&self->bus, bus_name);
     if (error != 0) {
         return error;
     }
-    error = self->estop_ops->open(&self->estop, estop_name);
+    error = self->estop_ops->open(&self->estop, estop);
     if (error != 0) {
-        *out_culprit = estop_name;
+        *out_culprit = estop->name;
         self->bus_ops->close(&self->bus);
     }
     return error;
@@ -89,4 +90,12 @@ iw_time_us_t iw_linux_hal_next_us(const iw_linux_hal_t *self) {
     const iw_time_us_t bus_us = self->bus_ops->next_us(&self->bus);
     const iw_time_us_t estop_us = self->estop_ops->next_us(&self->estop);
     return bus_us < estop_us ? bus_us : estop_us;
+}
+
+const iw_bus_link_t *iw_linux_hal_link(const iw_linux_hal_t *self) {
+    return self->bus_ops->link(&self->bus);
+}
+
+int iw_linux_hal_estop_trouble(const iw_linux_hal_t *self) {
+    return self->estop_ops->trouble(&self->estop);
 }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_linux/backend.h"
 
+#include "socketcan_frame.h"
 #include "unix_link.h"
 
 #include <errno.h>
-#include <linux/can.h>
-#include <linux/can/error.h>
 #include <string.h>
 #include <sys/socket.h>
 
@@ -24,7 +23,6 @@ typedef struct {
 } local_bus_t;
 
 IW_STATIC_ASSERT(sizeof(local_bus_t) <= sizeof(iw_backend_store_t), local_bus_fits);
-IW_STATIC_ASSERT(sizeof(struct can_frame) == 16, local_bus_frame_size);
 
 static int local_open(void *self, const char *name) {
     local_bus_t *bus = (local_bus_t *)self;
@@ -77,27 +75,21 @@ static int local_send(void *self, const iw_can_frame_t *frame) {
 }
 
 static void hear_error(local_bus_t *bus, const struct can_frame *raw) {
-    if ((raw->can_id & CAN_ERR_BUSOFF) != 0U) {
+    switch (iw_can_error_of(raw)) {
+    case IW_CAN_ERROR_BUS_OFF:
         bus->present = IW_BUS_OFF;
         bus->unheeded = IW_BUS_OFF;
-    } else if ((raw->can_id & CAN_ERR_RESTARTED) != 0U) {
+        break;
+    case IW_CAN_ERROR_PASSIVE:
+        bus->present = IW_BUS_PASSIVE;
+        break;
+    case IW_CAN_ERROR_RESTARTED:
+    case IW_CAN_ERROR_ACTIVE:
         bus->present = IW_BUS_ACTIVE;
-    } else if ((raw->can_id & CAN_ERR_CRTL) != 0U) {
-        const bool passive = (raw->data[1] & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0U;
-        bus->present = passive ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
+        break;
+    default:
+        break;
     }
-}
-
-static void translate(const struct can_frame *raw, iw_can_frame_t *out_frame) {
-    const bool extended = (raw->can_id & CAN_EFF_FLAG) != 0U;
-    *out_frame = (iw_can_frame_t){
-        .id = raw->can_id & (extended ? CAN_EFF_MASK : CAN_SFF_MASK),
-        .dlc = raw->len,
-        .kind = (uint8_t)((raw->__res0 == 1U) ? IW_CAN_ECHO : IW_CAN_RECEIVED),
-    };
-    out_frame->id |= extended ? IW_CAN_EXTENDED : 0U;
-    out_frame->id |= (raw->can_id & CAN_RTR_FLAG) != 0U ? IW_CAN_REMOTE : 0U;
-    (void)memcpy(out_frame->data, raw->data, sizeof out_frame->data);
 }
 
 static void fill_batch(local_bus_t *bus) {
@@ -136,7 +128,7 @@ static bool take_message(local_bus_t *bus, iw_can_frame_t *out_frame) {
         hear_error(bus, &bus->batch[i]);
         return false;
     }
-    translate(&bus->batch[i], out_frame);
+    *out_frame = iw_socketcan_translate(&bus->batch[i], bus->batch[i].__res0 == 1U ? MSG_CONFIRM : 0);
     return true;
 }
 
@@ -172,6 +164,12 @@ static int local_purge(void *self) {
     return 0; // What was sent is the hub's.
 }
 
+static const iw_bus_link_t *local_link(const void *self) {
+    static const iw_bus_link_t link = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
+    (void)self;
+    return &link;
+}
+
 const iw_bus_ops_t iw_local_bus_ops = {
     .open = local_open,
     .close = local_close,
@@ -182,5 +180,5 @@ const iw_bus_ops_t iw_local_bus_ops = {
     .receive = local_receive,
     .state = local_state,
     .purge = local_purge,
-    .echo_proven = true,
+    .link = local_link,
 };

@@ -10,11 +10,12 @@
 #define IWHEEL_LINUX_BACKEND_H
 
 #include "iwheel/hal.h"
+#include "iwheel_linux/bus_link.h"
 
 /// Storage for the state of any backend, so that the owner need not know its size.
 typedef union {
     uint64_t align;
-    uint8_t bytes[2048];
+    uint8_t bytes[4096];
 } iw_backend_store_t;
 
 /// A kind of bus. `self` is its state, of a type that only the backend knows.
@@ -33,18 +34,26 @@ typedef struct {
     int (*receive)(void *self, iw_can_frame_t *out_frame);
     iw_bus_state_t (*state)(void *self);
     int (*purge)(void *self);
-    /// An echo proves that the frame was on the bus.
-    bool echo_proven;
+    /// What is known of the link, always up to date.
+    const iw_bus_link_t *(*link)(const void *self);
 } iw_bus_ops_t;
+
+/// An e-stop input, as configured.
+typedef struct {
+    const char *name;     ///< Must outlive the input.
+    bool active_high;     ///< Pressed reads high. Only for real lines.
+    uint16_t debounce_ms; ///< A release must last this long. Only for real lines.
+} iw_estop_wish_t;
 
 /// A kind of e-stop input. The functions mean the same as those of a bus.
 typedef struct {
-    int (*open)(void *self, const char *name);
+    int (*open)(void *self, const iw_estop_wish_t *wish);
     void (*close)(void *self);
     int (*watch_fd)(const void *self); ///< -1: there is nothing to watch.
     void (*tend)(void *self, iw_time_us_t now_us);
     iw_time_us_t (*next_us)(const void *self);
     int (*pressed)(void *self); ///< As `estop_pressed` of iw_hal_t.
+    int (*trouble)(const void *self); ///< Why it cannot be read, as an errno; 0 while it can.
     bool simulated;             ///< Not a real button: announced wherever the e-stop is shown.
     bool present;               ///< False: there is no e-stop at all.
 } iw_estop_ops_t;
@@ -52,10 +61,16 @@ typedef struct {
 /// `unix:PATH`: the local bus. The echo comes from its hub when the simulated wheels have acknowledged, so it is a proof.
 extern const iw_bus_ops_t iw_local_bus_ops;
 
+/// SocketCAN, by the interface's name. NULL if this build has left it out.
+extern const iw_bus_ops_t *const iw_socketcan_ops;
+
 /// `unix:PATH`: the simulator's button.
 extern const iw_estop_ops_t iw_unix_estop_ops;
 /// `none`: always released.
 extern const iw_estop_ops_t iw_no_estop_ops;
+
+/// A line of a GPIO chip, by its name or as `gpiochipN:OFFSET`, through libgpiod. NULL if this build has left it out.
+extern const iw_estop_ops_t *const iw_gpio_estop_ops;
 
 /// The backend for a name as in the configuration; NULL if this build has none for it.
 const iw_bus_ops_t *iw_bus_backend(const char *name);

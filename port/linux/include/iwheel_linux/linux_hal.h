@@ -21,7 +21,8 @@ typedef struct {
 
 /// Opens both, by their names in the configuration. 0 or an errno; `*out_culprit` is then the name at fault. ENOTSUP: this build
 /// has no backend for it. Nothing stays open on failure. The names must outlive the HAL.
-int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const char *estop_name, const char **out_culprit);
+int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const iw_estop_wish_t *estop,
+                      const char **out_culprit);
 void iw_linux_hal_close(iw_linux_hal_t *self);
 
 /// What to hand to `iw_gateway_init`. `self` must not move afterwards.
@@ -36,5 +37,11 @@ void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us);
 
 /// When `tend` has something to do; IW_NEVER if it has not.
 iw_time_us_t iw_linux_hal_next_us(const iw_linux_hal_t *self);
+
+/// What is known of the link to the bus; valid until the HAL is closed.
+const iw_bus_link_t *iw_linux_hal_link(const iw_linux_hal_t *self);
+
+/// Why the e-stop cannot be read, as an errno; 0 while it can.
+int iw_linux_hal_estop_trouble(const iw_linux_hal_t *self);
 
 #endif

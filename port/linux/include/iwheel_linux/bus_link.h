@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+/// What the kernel tells of the link to the bus, and whether its timing is the wheels'.
+///
+/// The port reads and never sets any of this; the one exception is a purge (hal.h), which takes the link down and up.
+#ifndef IWHEEL_LINUX_BUS_LINK_H
+#define IWHEEL_LINUX_BUS_LINK_H
+
+#include "iwheel/types.h"
+
+typedef enum {
+    IW_LINK_LOCAL = 0, ///< Not an interface of the kernel: the rest of what is told here is void but `echo_proven`.
+    IW_LINK_ABSENT,    ///< No interface has this name now.
+    IW_LINK_NOT_CAN,   ///< An interface has it, but it is no CAN interface.
+    IW_LINK_DOWN,
+    IW_LINK_UP,
+} iw_link_presence_t;
+
+/// What became of the last purge.
+typedef enum {
+    IW_LINK_PURGE_NONE = 0,    ///< None was needed yet.
+    IW_LINK_PURGE_DONE,        ///< The link was taken down and up.
+    IW_LINK_PURGE_NOT_ALLOWED, ///< That needs CAP_NET_ADMIN.
+    IW_LINK_PURGE_FAILED,      ///< Down was done or not, up was not: see the presence.
+} iw_link_purge_t;
+
+/// Numbers that are 0 are not reported.
+typedef struct {
+    iw_link_presence_t presence;
+    iw_link_purge_t purge;
+    bool is_virtual;  ///< It has no bit timing at all (vcan, the local bus).
+    bool echo_proven; ///< An echo proves that the frame was on the bus (IFF_ECHO, and no mode that makes it a lie).
+    bool is_mute;     ///< The controller is in listen-only mode: nothing can be sent.
+    uint32_t bitrate_hz;
+    uint16_t sample_point_permille;
+    uint32_t restart_ms;    ///< After bus-off the controller tries again by itself; 0: never.
+    uint32_t queue_length;  ///< Frames that may wait in front of the controller.
+    uint32_t changes;       ///< Another number than before: something above has changed.
+    uint32_t lost;          ///< Frames that came faster than we took them, since the link was last opened.
+    uint32_t load_permille; ///< Of the last whole second, without stuff bits (up to a fifth more is possible).
+} iw_bus_link_t;
+
+/// Off by more than this: worth a warning. Interface of the gateway, [bus] sample_point_permille.
+#define IW_TIMING_NEAR_PERMILLE 5U
+/// Off by more than this: contradicted.
+#define IW_TIMING_WRONG_PERMILLE 25U
+/// More frames than this in front of the controller could be old setpoints when a dead bus revives.
+#define IW_LINK_QUEUE_MAX 4U
+
+typedef enum {
+    IW_TIMING_VIRTUAL = 0, ///< There is none.
+    IW_TIMING_UNKNOWN,     ///< The bit rate or the sample point is not reported; what is reported is right.
+    IW_TIMING_RIGHT,
+    IW_TIMING_NEAR,  ///< The sample point is off by more than IW_TIMING_NEAR_PERMILLE.
+    IW_TIMING_WRONG, ///< Another bit rate, or a sample point off by more than IW_TIMING_WRONG_PERMILLE.
+} iw_timing_t;
+
+/// Compares what the link reports with what the wheels need.
+iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint16_t sample_point_permille);
+
+/// True if both tell the same of the interface: purge, changes, lost and load aside.
+bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other);
+
+#endif

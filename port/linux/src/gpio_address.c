@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#include "gpio_address.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <string.h>
+
+#define OFFSET_MAX 65535U
+
+static const char chip_prefix[] = "gpiochip";
+
+/// Reads digits up to the end or to `end`. NULL if there are none or too many.
+static const char *read_number(const char *text, char end, unsigned *out_number) {
+    unsigned number = 0;
+    const char *digit = text;
+    for (; isdigit((unsigned char)*digit) != 0 && number <= OFFSET_MAX; ++digit) {
+        number = number * 10U + (unsigned)(*digit - '0');
+    }
+    if (digit == text || *digit != end || number > OFFSET_MAX) {
+        return NULL;
+    }
+    *out_number = number;
+    return digit;
+}
+
+int iw_gpio_address_parse(const char *text, iw_gpio_address_t *out_address) {
+    iw_gpio_address_t address = {.by_offset = strncmp(text, chip_prefix, sizeof chip_prefix - 1U) == 0 &&
+                                              strchr(text, ':') != NULL};
+    size_t length = strlen(text);
+    if (address.by_offset) {
+        unsigned chip;
+        const char *colon = read_number(text + sizeof chip_prefix - 1U, ':', &chip);
+        if (colon == NULL || read_number(colon + 1, '\0', &address.offset) == NULL) {
+            return EINVAL;
+        }
+        length = (size_t)(colon - text);
+    }
+    if (length == 0U) {
+        return EINVAL;
+    }
+    if (length >= sizeof address.name) {
+        return ENAMETOOLONG;
+    }
+    (void)memcpy(address.name, text, length);
+    *out_address = address;
+    return 0;
+}

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_linux/backend.h"
+
+#include "gpio_line.h"
+#include "gpio_release.h"
+
+#include <errno.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+
+/// A line that cannot be had is tried again this often.
+#define RETRY_US 200000U
+
+typedef struct {
+    iw_gpio_line_t line;
+    iw_gpio_address_t address;
+    iw_gpio_release_t release;
+    iw_time_us_t now_us;   ///< Of the last `tend`.
+    iw_time_us_t retry_us; ///< IW_NEVER while open.
+    uint32_t debounce_us;
+    int trouble; ///< Why it is closed.
+    int watch_fd;
+    bool active_high;
+    bool was_lost; ///< It went, and `pressed` has not told yet.
+} gpio_estop_t;
+
+IW_STATIC_ASSERT(sizeof(gpio_estop_t) <= sizeof(iw_backend_store_t), gpio_estop_fits);
+
+static bool is_open(const gpio_estop_t *estop) {
+    return estop->line.fd >= 0;
+}
+
+static void lose(gpio_estop_t *estop, int trouble) {
+    iw_gpio_line_close(&estop->line);
+    estop->trouble = trouble;
+    estop->was_lost = true;
+    estop->retry_us = estop->now_us + RETRY_US;
+}
+
+static void try_open(gpio_estop_t *estop) {
+    struct epoll_event interest = {.events = EPOLLIN};
+    int error = iw_gpio_line_open(&estop->line, &estop->address);
+    if (error == 0 && epoll_ctl(estop->watch_fd, EPOLL_CTL_ADD, estop->line.fd, &interest) != 0) {
+        error = errno;
+    }
+    if (error != 0) {
+        lose(estop, error);
+        return;
+    }
+    estop->trouble = 0;
+    estop->retry_us = IW_NEVER;
+    iw_gpio_release_init(&estop->release, estop->debounce_us);
+}
+
+static int gpio_open(void *self, const iw_estop_wish_t *wish) {
+    gpio_estop_t *estop = (gpio_estop_t *)self;
+    *estop = (gpio_estop_t){.line = {.fd = -1},
+                            .debounce_us = (uint32_t)wish->debounce_ms * IW_US_PER_MS,
+                            .active_high = wish->active_high};
+    const int error = iw_gpio_address_parse(wish->name, &estop->address);
+    if (error != 0) {
+        return error;
+    }
+    estop->watch_fd = epoll_create1(EPOLL_CLOEXEC);
+    if (estop->watch_fd < 0) {
+        return errno;
+    }
+    try_open(estop);
+    return 0;
+}
+
+static void gpio_close(void *self) {
+    gpio_estop_t *estop = (gpio_estop_t *)self;
+    iw_gpio_line_close(&estop->line);
+    (void)close(estop->watch_fd);
+}
+
+static int gpio_watch_fd(const void *self) {
+    return ((const gpio_estop_t *)self)->watch_fd;
+}
+
+static void gpio_tend(void *self, iw_time_us_t now_us) {
+    gpio_estop_t *estop = (gpio_estop_t *)self;
+    estop->now_us = now_us;
+    if (!is_open(estop) && now_us >= estop->retry_us) {
+        try_open(estop);
+    }
+}
+
+static iw_time_us_t gpio_next_us(const void *self) {
+    const gpio_estop_t *estop = (const gpio_estop_t *)self;
+    return is_open(estop) ? iw_gpio_release_next_us(&estop->release, estop->now_us) : estop->retry_us;
+}
+
+/// Edges first, then the level: an edge in between wakes us again.
+static void look(gpio_estop_t *estop) {
+    if (!is_open(estop)) {
+        return;
+    }
+    const int edges = iw_gpio_line_take_edges(&estop->line);
+    const int level = iw_gpio_line_level(&estop->line);
+    if (edges < 0 || level < 0) {
+        lose(estop, ENODEV);
+        return;
+    }
+    iw_gpio_release_see(&estop->release, estop->now_us, (level == 1) == estop->active_high, edges > 0);
+}
+
+static int gpio_pressed(void *self) {
+    gpio_estop_t *estop = (gpio_estop_t *)self;
+    look(estop);
+    const bool unreadable = estop->was_lost || !is_open(estop);
+    estop->was_lost = false;
+    if (unreadable) {
+        return -1;
+    }
+    return iw_gpio_release_take_pressed(&estop->release, estop->now_us) ? 1 : 0;
+}
+
+static int gpio_trouble(const void *self) {
+    return ((const gpio_estop_t *)self)->trouble;
+}
+
+static const iw_estop_ops_t ops = {
+    .open = gpio_open,
+    .close = gpio_close,
+    .watch_fd = gpio_watch_fd,
+    .tend = gpio_tend,
+    .next_us = gpio_next_us,
+    .pressed = gpio_pressed,
+    .trouble = gpio_trouble,
+    .simulated = false,
+    .present = true,
+};
+
+const iw_estop_ops_t *const iw_gpio_estop_ops = &ops;

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include "socketcan_frame.h"
+
+#include "iwheel/proto.h"
+
+#include <linux/can/error.h>
+#include <string.h>
+#include <sys/socket.h>
+
+/// Start, id, control, checksum, acknowledgement, end and gap of a classic frame (ISO 11898-1).
+#define BITS_STANDARD 47U
+#define BITS_EXTENDED 67U
+#define BITS_PER_BYTE 8U
+
+IW_STATIC_ASSERT(IW_CAN_EXTENDED == CAN_EFF_FLAG && IW_CAN_REMOTE == CAN_RTR_FLAG && IW_CAN_ERROR == CAN_ERR_FLAG,
+                 socketcan_flags_are_those_of_the_kernel);
+IW_STATIC_ASSERT(sizeof(struct can_frame) == 16, socketcan_frame_size);
+
+static const canid_t ids[IW_SOCKETCAN_IDS] = {
+    IW_ID_LEFT_SPEED,     IW_ID_LEFT_STATUS, IW_ID_LEFT_SETPOINT, IW_ID_LEFT_FORCE,
+    IW_ID_LEFT_OFFSET,    IW_ID_RIGHT_SPEED, IW_ID_RIGHT_STATUS,  IW_ID_RIGHT_POSE,
+    IW_ID_RIGHT_SETPOINT, IW_ID_RIGHT_FORCE, IW_ID_RIGHT_OFFSET,
+};
+
+void iw_socketcan_filters(iw_socketcan_share_t share, struct can_filter *out_filters) {
+    const canid_t invert = share == IW_SOCKETCAN_OTHERS ? CAN_INV_FILTER : 0U;
+    for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
+        out_filters[i] = (struct can_filter){.can_id = ids[i] | invert, .can_mask = CAN_EFF_MASK};
+    }
+}
+
+iw_can_frame_t iw_socketcan_translate(const struct can_frame *raw, int flags) {
+    const bool extended = (raw->can_id & CAN_EFF_FLAG) != 0U;
+    iw_can_frame_t frame = {
+        .id = raw->can_id & (extended ? CAN_EFF_MASK | CAN_EFF_FLAG : CAN_SFF_MASK),
+        .dlc = raw->len <= IW_CAN_DATA_MAX ? raw->len : (uint8_t)IW_CAN_DATA_MAX,
+        .kind = (uint8_t)((flags & MSG_CONFIRM) != 0 ? IW_CAN_ECHO : IW_CAN_RECEIVED),
+    };
+    frame.id |= raw->can_id & CAN_RTR_FLAG;
+    frame.id |= (flags & MSG_TRUNC) != 0 ? IW_CAN_FD : 0U;
+    (void)memcpy(frame.data, raw->data, sizeof frame.data);
+    return frame;
+}
+
+uint32_t iw_can_error_mask(void) {
+    return CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED;
+}
+
+iw_can_error_t iw_can_error_of(const struct can_frame *raw) {
+    const uint8_t controller = (raw->can_id & CAN_ERR_CRTL) != 0U ? raw->data[1] : 0U;
+    if ((raw->can_id & CAN_ERR_BUSOFF) != 0U) {
+        return IW_CAN_ERROR_BUS_OFF;
+    }
+    if ((raw->can_id & CAN_ERR_RESTARTED) != 0U) {
+        return IW_CAN_ERROR_RESTARTED;
+    }
+    if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0U) {
+        return IW_CAN_ERROR_PASSIVE;
+    }
+    if ((controller & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING | CAN_ERR_CRTL_ACTIVE)) != 0U) {
+        return IW_CAN_ERROR_ACTIVE;
+    }
+    return IW_CAN_ERROR_NOTHING;
+}
+
+uint32_t iw_socketcan_bits(const struct can_frame *raw) {
+    const uint32_t bytes = (raw->can_id & CAN_RTR_FLAG) != 0U ? 0U : raw->len;
+    return ((raw->can_id & CAN_EFF_FLAG) != 0U ? BITS_EXTENDED : BITS_STANDARD) + BITS_PER_BYTE * bytes;
+}

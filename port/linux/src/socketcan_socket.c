@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "socketcan_socket.h"
+
+#include <errno.h>
+#include <linux/can/raw.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#define DROPS_SPACE CMSG_SPACE(sizeof(uint32_t))
+
+void iw_socketcan_socket_init(iw_socketcan_socket_t *self) {
+    *self = (iw_socketcan_socket_t){.fd = -1};
+}
+
+static bool set(int fd, int level, int name, int value) {
+    return setsockopt(fd, level, name, &value, sizeof value) == 0;
+}
+
+static bool ask_for(int fd, iw_socketcan_share_t share) {
+    const can_err_mask_t errors = iw_can_error_mask();
+    struct can_filter filters[IW_SOCKETCAN_IDS];
+    iw_socketcan_filters(share, filters);
+    if (share == IW_SOCKETCAN_OTHERS && !set(fd, SOL_CAN_RAW, CAN_RAW_JOIN_FILTERS, 1)) {
+        return false;
+    }
+    if (setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters, sizeof filters) != 0) {
+        return false;
+    }
+    if (share == IW_SOCKETCAN_OTHERS) {
+        return true;
+    }
+    return setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) == 0 &&
+           set(fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, 1) && set(fd, SOL_SOCKET, SO_RXQ_OVFL, 1);
+}
+
+int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_socketcan_share_t share) {
+    const struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = interface};
+    iw_socketcan_socket_init(self);
+    const int fd = socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
+    if (fd < 0) {
+        return errno;
+    }
+    (void)set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1); // Without it FD frames are not seen, and so not counted.
+    if (!ask_for(fd, share) || bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        const int error = errno;
+        (void)close(fd);
+        return error;
+    }
+    self->fd = fd;
+    return 0;
+}
+
+void iw_socketcan_socket_close(iw_socketcan_socket_t *self) {
+    if (self->fd >= 0) {
+        (void)close(self->fd);
+    }
+    iw_socketcan_socket_init(self);
+}
+
+bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self) {
+    return self->next == self->count;
+}
+
+static void note_drops(iw_socketcan_socket_t *self, struct msghdr *message) {
+    const struct cmsghdr *part = CMSG_FIRSTHDR(message);
+    if (part != NULL && part->cmsg_level == SOL_SOCKET && part->cmsg_type == SO_RXQ_OVFL) {
+        (void)memcpy(&self->lost, CMSG_DATA(part), sizeof self->lost);
+    }
+}
+
+int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
+    struct mmsghdr message[IW_SOCKETCAN_BATCH];
+    struct iovec part[IW_SOCKETCAN_BATCH];
+    _Alignas(struct cmsghdr) uint8_t drops[IW_SOCKETCAN_BATCH][DROPS_SPACE];
+    (void)memset(message, 0, sizeof message);
+    for (uint32_t i = 0; i < IW_SOCKETCAN_BATCH; ++i) {
+        part[i] = (struct iovec){.iov_base = &self->frame[i], .iov_len = sizeof self->frame[i]};
+        message[i].msg_hdr.msg_iov = &part[i];
+        message[i].msg_hdr.msg_iovlen = 1;
+        message[i].msg_hdr.msg_control = drops[i];
+        message[i].msg_hdr.msg_controllen = sizeof drops[i];
+    }
+    const int count = recvmmsg(self->fd, message, IW_SOCKETCAN_BATCH, MSG_DONTWAIT, NULL);
+    const int error = count < 0 ? errno : 0;
+    self->next = 0;
+    self->count = count > 0 ? (uint32_t)count : 0U;
+    self->drained = self->count < IW_SOCKETCAN_BATCH;
+    for (uint32_t i = 0; i < self->count; ++i) {
+        self->flags[i] = message[i].msg_hdr.msg_flags;
+        note_drops(self, &message[i].msg_hdr);
+    }
+    return error == EAGAIN || error == EINTR ? 0 : error;
+}
+
+int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame) {
+    struct can_frame raw = {.can_id = frame->id & ~IW_CAN_FD, .len = frame->dlc};
+    (void)memcpy(raw.data, frame->data, sizeof raw.data);
+    if (send(self->fd, &raw, sizeof raw, MSG_DONTWAIT) == (ssize_t)sizeof raw) {
+        return 1;
+    }
+    return errno == EAGAIN || errno == ENOBUFS || errno == EINTR ? 0 : -1;
+}

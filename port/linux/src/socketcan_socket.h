@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+/// One CAN_RAW socket, and the frames taken from it in batches.
+#ifndef IW_SOCKETCAN_SOCKET_H
+#define IW_SOCKETCAN_SOCKET_H
+
+#include "socketcan_frame.h"
+
+/// Frames taken from the kernel in one call.
+#define IW_SOCKETCAN_BATCH 32U
+
+typedef struct {
+    struct can_frame frame[IW_SOCKETCAN_BATCH];
+    int flags[IW_SOCKETCAN_BATCH]; ///< Of the message: MSG_CONFIRM, MSG_DONTROUTE, MSG_TRUNC.
+    uint32_t count;
+    uint32_t next;
+    uint32_t lost; ///< Frames that the kernel dropped for want of room, since the socket was opened.
+    int fd;        ///< -1: closed.
+    bool drained;  ///< The last batch was short: there was nothing more.
+} iw_socketcan_socket_t;
+
+/// Closed, and empty. Not the same as `close`: whatever `fd` was is forgotten.
+void iw_socketcan_socket_init(iw_socketcan_socket_t *self);
+
+/// Opens it, not blocking, on the interface with this index. IW_SOCKETCAN_OURS: with error frames, FD frames and own
+/// echoes. 0, or an errno.
+int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_socketcan_share_t share);
+void iw_socketcan_socket_close(iw_socketcan_socket_t *self);
+
+/// True if all that was taken has been used.
+bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self);
+
+/// Takes the next batch; only when empty. 0 (there may be none), or the errno that tells why the bus is lost.
+int iw_socketcan_socket_fill(iw_socketcan_socket_t *self);
+
+/// > 0: handed over. 0: no room now. < 0: the bus is lost.
+int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame);
+
+#endif
