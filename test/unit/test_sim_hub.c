@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The running simulator through its sockets, as a child process: local bus, e-stop button, control. Real time, about a second.
+// The running simulator through its sockets, as a child process: local bus, e-stop button, control. Takes about a second.
 #include "simulator.h"
 
 #include "unity.h"
