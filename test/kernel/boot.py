@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Boots the kernel of build_kernel as an ordinary process, with the host's files as its root, and ends it for sure."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+PR_SET_PDEATHSIG = 1
+
+
+def find_kernel(install=True):
+    """Path of the kernel, built first if it is not there yet. Raises RuntimeError with what is missing."""
+    command = [os.path.join(HERE, "build_kernel")]
+    known = subprocess.run(command + ["--print"], stdout=subprocess.PIPE, text=True, check=False)
+    if known.returncode == 0:
+        return known.stdout.strip()
+    with subprocess.Popen(command + ([] if install else ["--no-install"]), stdout=subprocess.PIPE, text=True) as child:
+        last = ""
+        for line in child.stdout:
+            last = line.rstrip("\n")
+            print(f"  {last}", flush=True)
+    if child.returncode != 0:
+        raise RuntimeError("the kernel could not be built; test/kernel/build_kernel tells why")
+    return last
+
+
+class Boot:
+    """One boot that works off one plan.
+
+    The plan (see guest.py) and what comes of it lie in `folder`: NAME.json, NAME.results (one JSON object per line, as
+    the tests end), NAME.out (what the guest printed), NAME.console (what the kernel printed), NAME.status.
+    """
+
+    def __init__(self, kernel, folder, name, plan):
+        self.name, self.folder = name, folder
+        self.plan = plan
+        with open(self.path("json"), "w", encoding="utf-8") as file:
+            json.dump({**plan, "results": self.path("results")}, file)
+        open(self.path("results"), "w", encoding="utf-8").close()
+        self.began = time.monotonic()
+        with open(self.path("console"), "wb") as console:
+            # A session of its own: the kernel is a tree of processes, all of which must go with it.
+            self.child = subprocess.Popen(
+                self.command(kernel), stdin=subprocess.DEVNULL, stdout=console, stderr=console, start_new_session=True, cwd=folder
+            )
+        self.taken = 0
+
+    def command(self, kernel):
+        plan, folder, name = self.plan, self.folder, self.name
+        command = [kernel, f"mem={plan.get('memory_MB', 384)}M", "rootfstype=hostfs", "rootflags=/", "rw"]
+        command += [f"init={os.path.join(HERE, 'init')}", "con0=fd:0,fd:1", "con=null", "quiet", "random.trust_cpu=on"]
+        command += [f"uml_dir={folder}", f"umid={name}", "panic=-1"]
+        command += ["time-travel=inf-cpu"] if plan["virtual"] else []
+        command += plan.get("kernel_arguments", [])
+        command += [f"iwheel_guest={os.path.join(HERE, 'guest.py')}", f"iwheel_plan={self.path('json')}"]
+        return command
+
+    def path(self, ending):
+        return os.path.join(self.folder, f"{self.name}.{ending}")
+
+    def text(self, ending, last=4000):
+        try:
+            with open(self.path(ending), encoding="utf-8", errors="replace") as file:
+                return file.read()[-last:]
+        except FileNotFoundError:
+            return ""
+
+    def results(self):
+        """Results that came since the last call."""
+        with open(self.path("results"), encoding="utf-8") as file:
+            file.seek(self.taken)
+            lines = file.read()
+        whole = lines[: lines.rfind("\n") + 1]
+        self.taken += len(whole.encode())
+        return [json.loads(line) for line in whole.splitlines()]
+
+    def running(self):
+        return self.child.poll() is None
+
+    def seconds(self):
+        return time.monotonic() - self.began
+
+    def end(self):
+        """Kills what is left of it."""
+        try:
+            os.killpg(self.child.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        self.child.wait()
+
+    def complaint(self):
+        """Why it ended before its plan did."""
+        console = [line for line in self.text("console").splitlines() if line.strip()]
+        return "\n".join(["the guest's last words:", self.text("out", 1500), "the console's:", *console[-12:]])
+
+
+if __name__ == "__main__":
+    print(find_kernel("--no-install" not in sys.argv))

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: MIT
+"""Boots the groups of tests, two at a time, and tells what came of each test."""
+
+import argparse
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import kernel_scenarios  # noqa: F401  (registers them)
+import report
+from boot import HERE, Boot, find_kernel
+from catalogue import ENTRIES
+from groups import GROUPS
+from harness import find_program
+from native import why_not_native, NativeBoot
+
+POLL_S = 0.1
+LOG_LINES = 40
+
+
+class Campaign:
+    """All the boots of one call of test/kernel/run."""
+
+    def __init__(self, options, kernel):
+        self.options, self.kernel = options, kernel
+        self.folder = tempfile.mkdtemp(prefix="iwheel-kernel-")
+        self.lock = threading.Lock()
+        self.results = []
+
+    def plan(self, group):
+        """Which tests of the group are wanted; None if none is."""
+        options = self.options
+        names = [
+            entry.name
+            for entry in ENTRIES.values()
+            if group.name in entry.groups
+            and (not options.only or any(part in entry.name for part in options.only))
+            and (options.full or not entry.full_only)
+        ]
+        if not names or (options.real_time and group.virtual):
+            return None
+        return {
+            "build": os.path.abspath(options.build),
+            "tests": names,
+            "virtual": group.virtual,
+            "full": options.full,
+            "seed": options.seed,
+            "kernel_arguments": list(group.kernel_arguments),
+        }
+
+    def boot(self, group):
+        """Works off one group. A boot that hangs or dies fails the tests that it did not get to."""
+        plan = self.plan(group)
+        if plan is None:
+            return
+        boot = (NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan)
+        limit_s = group.full_limit_s if self.options.full else group.limit_s
+        done = set()
+        try:
+            while True:
+                running = boot.running()
+                for result in boot.results():
+                    done.add(result["name"])
+                    self.take(group, result)
+                if not running or boot.seconds() > limit_s:
+                    break
+                time.sleep(POLL_S)
+        finally:
+            hung = boot.running()
+            boot.end()
+        why = f"the boot was ended after {limit_s} s" if hung else "the kernel ended before this test did"
+        for number, name in enumerate(name for name in plan["tests"] if name not in done):
+            text = f"{why}\n{boot.complaint()}" if number == 0 else f"not reached: {why}"
+            self.take(group, {"name": name, "verdict": "failed", "failures": [[text, "rule", 0]]})
+
+    def take(self, group, result):
+        result = {"figures": [], "failures": [], "measures": {}, "latencies": [], "logs": [], "seconds": 0, **result}
+        result["group"] = group.name
+        with self.lock:
+            self.results.append(result)
+            self.tell(result)
+
+    def tell(self, result):
+        mark = {"passed": "ok  ", "failed": "FAIL", "skipped": "skip"}[result["verdict"]]
+        figures = f"  [{', '.join(result['figures'])}]" if result["figures"] else ""
+        title = ENTRIES[result["name"]].title
+        print(f"{mark} {result['group']}/{result['name']}: {title}{figures}  {result['seconds']:.1f} s", flush=True)
+        for text, kind, _ in result["failures"]:
+            print(f"       {kind}: " + text.replace("\n", "\n       | "), flush=True)
+        for path in result["logs"]:
+            self.tell_log(path)
+
+    def tell_log(self, path):
+        """The end of a log of a failed test; of a bus log only what the gateway sent last."""
+        with open(path, encoding="utf-8", errors="replace") as file:
+            lines = file.read().splitlines()
+        if path.endswith(".bus.log"):
+            lines = [line for line in lines if " 10A#" in line or " 12A#" in line]
+        print(f"       {path}, the end:")
+        for line in lines[-self.options.log_lines :]:
+            print(f"       | {line}")
+
+    def count(self, verdict):
+        return sum(result["verdict"] == verdict for result in self.results)
+
+    def close(self):
+        if self.options.keep or self.count("failed"):
+            print(f"logs are kept in {self.folder}")
+        else:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def parse(arguments):
+    parser = argparse.ArgumentParser(
+        prog="test/kernel/run",
+        description="Tests on a real Linux kernel that runs as an ordinary process, in virtual and in real time.",
+    )
+    root = os.path.dirname(os.path.dirname(HERE))
+    parser.add_argument("--build", default=os.path.join(root, "build", "default"), metavar="DIR", help="build directory")
+    parser.add_argument("--only", action="append", metavar="NAME", help="only tests whose name contains this")
+    parser.add_argument("--real-time", action="store_true", help="only what runs in real time")
+    parser.add_argument("--native", action="store_true", help="use this machine's own vcan and gpio-sim, in real time")
+    parser.add_argument("--full", action="store_true", help="1000 presses, a soak of 24 virtual hours")
+    parser.add_argument("--repeat", type=int, default=1, metavar="N", help="the whole campaign N times in a row")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="of random faults (default: 1)")
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="kernels at a time (default: 2)")
+    parser.add_argument("--log-lines", type=int, default=LOG_LINES, metavar="N", help="of each log of a failed test")
+    parser.add_argument("--no-install", action="store_true", help="install nothing to build the kernel")
+    parser.add_argument("--keep", action="store_true", help="keep results and logs")
+    parser.add_argument("--report", action="store_true", help="write docs/fault-catalogue.md from this run")
+    parser.add_argument("--list", action="store_true", help="list the tests and exit")
+    return parser.parse_args(arguments)
+
+
+def once(options, kernel):
+    """One campaign; returns the three counts."""
+    campaign = Campaign(options, kernel)
+    try:
+        with ThreadPoolExecutor(max(1, options.jobs)) as pool:
+            list(pool.map(campaign.boot, [group for group in GROUPS if not (options.native and group.virtual)]))
+        if options.report and not options.only:
+            report.write(campaign.results)
+    finally:
+        campaign.close()
+    return [campaign.count(verdict) for verdict in ("passed", "failed", "skipped")]
+
+
+def main(arguments):
+    options = parse(arguments)
+    if options.list:
+        for group in GROUPS:
+            for entry in ENTRIES.values():
+                if group.name in entry.groups:
+                    print(f"{group.name + '/' + entry.name:<50} {entry.title}")
+        return 0
+    try:
+        for program in ("iwheel-gateway", "iwheel-sim"):
+            find_program(options.build, program)
+    except FileNotFoundError as error:
+        print(error, file=sys.stderr)
+        return 69
+    kernel = None
+    if options.native:
+        reason = why_not_native()
+        if reason:
+            print(f"SKIPPED: {reason}\n0 passed, 0 failed, 1 skipped")
+            return 0
+    else:
+        try:
+            kernel = find_kernel(not options.no_install)
+        except RuntimeError as error:
+            print(f"SKIPPED: {error}\n0 passed, 0 failed, 1 skipped")
+            return 0
+    totals = [0, 0, 0]
+    for _ in range(options.repeat):
+        totals = [total + count for total, count in zip(totals, once(options, kernel))]
+    print("{} passed, {} failed, {} skipped".format(*totals))
+    return 1 if totals[1] or not totals[0] else 0

@@ -1,0 +1,159 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Inside the kernel: works off one plan, test by test, each in a process of its own.
+
+Usage: guest.py PLAN.json
+The plan: {"build": DIR, "tests": [NAME...], "virtual": BOOL, "full": BOOL, "results": FILE, "seed": N}. One JSON object per test
+is appended to the results as the tests end: name, verdict (passed, failed, skipped), figures, failures, measures, latencies
+(microseconds), seconds.
+"""
+
+import argparse
+import json
+import os
+import select
+import signal
+import sys
+import time
+import traceback
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
+
+import kernel_rig  # noqa: E402
+import kernel_scenarios  # noqa: E402,F401  (registers them)
+from catalogue import ENTRIES  # noqa: E402
+from harness import die_with_parent  # noqa: E402
+from runner import Run  # noqa: E402
+from scenario import Skip  # noqa: E402
+
+LIMIT_S = 600  # of one test, by the guest's clock; a soak has its own
+
+
+def run_one(entry, plan):
+    """In the worker: runs the test, returns its result."""
+    test, skip, begin_us = kernel_rig.KernelTest(plan["build"], entry.rig_type), None, kernel_rig.now_us()
+    test.plan = plan
+    try:
+        entry.function(test)
+    except Skip as reason:
+        skip = str(reason)
+    except Exception as error:  # pylint: disable=broad-except
+        where = [f"{os.path.basename(s.filename)}:{s.lineno}" for s in traceback.extract_tb(error.__traceback__)][-4:]
+        output = "".join(rig.gateway.text()[-600:] for rig in test.rigs if rig.gateway)
+        test.failures.append([f"{type(error).__name__}: {error} ({' > '.join(where)}) {output}", "check", 0])
+    logs = save_logs(test, plan, entry.name) if test.failures else []
+    for rig in test.rigs:
+        rig.close()
+    return {
+        "failures": test.failures,
+        "figures": test.figures,
+        "measures": test.measures,
+        "skip": skip,
+        "begin_us": begin_us,
+        "end_us": kernel_rig.now_us(),
+        "latencies": test.latencies,
+        "bus_stalls": test.bus_stalls if not plan["virtual"] else [],
+        "logs": logs,
+    }
+
+
+def save_logs(test, plan, name):
+    """The bus log and the gateway's words of a failed test, beside the results."""
+    paths = []
+    for number, rig in enumerate(test.rigs):
+        base = f"{plan['results'].rsplit('.', 1)[0]}.{name}.{number}"
+        with open(base + ".bus.log", "w", encoding="ascii") as file:
+            for frame in sorted(rig.bus.frames):
+                file.write(f"({frame.t_us / 1e6:.6f}) bus {frame.id & 0x1FFFFFFF:03X}#{frame.data.hex().upper()}\n")
+        with open(base + ".timeline", "w", encoding="utf-8") as file:
+            file.writelines(f"{event}\n" for event in sorted(rig.timeline))
+        with open(base + ".gateway.out", "w", encoding="utf-8") as file:
+            file.write(rig.gateway.text() if rig.gateway else "never started\n")
+        paths += [base + ".bus.log", base + ".timeline", base + ".gateway.out"]
+    return paths
+
+
+def died(text):
+    return {"failures": [[text, "rule", 0]], "figures": [], "measures": {}, "skip": None, "bus_stalls": [], "latencies": []}
+
+
+class GuestRun(Run):
+    """The runner of the system tests, with forked workers; in virtual time nothing excuses anything."""
+
+    def __init__(self, plan):
+        self.plan = plan
+        if not plan["virtual"]:
+            super().__init__(argparse.Namespace(build=plan["build"], keep=False))
+        self.latencies = []
+
+    def close(self):
+        if not self.plan["virtual"]:
+            super().close()
+
+    def excused(self, result, failure):
+        return not self.plan["virtual"] and super().excused(result, failure)
+
+    def take_latencies(self, name, result):
+        """They go into the results one by one."""
+
+    def once(self, name):
+        entry = ENTRIES[name]
+        read_end, write_end = os.pipe()
+        child = os.fork()
+        if child == 0:
+            os.setsid()
+            die_with_parent()
+            try:
+                answer = run_one(entry, self.plan)
+            except BaseException as error:  # pylint: disable=broad-except
+                answer = died(f"the worker failed: {''.join(traceback.format_exception(error))[-1500:]}")
+            with os.fdopen(write_end, "w", encoding="utf-8") as pipe:
+                json.dump(answer, pipe)
+            os._exit(0)
+        os.close(write_end)
+        text = read_all(read_end, self.plan.get("limit_s", LIMIT_S))
+        try:
+            os.killpg(child, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        os.waitpid(child, 0)
+        if text is None:
+            return died(f"did not end within {self.plan.get('limit_s', LIMIT_S)} s of the guest's clock")
+        self.last = json.loads(text) if text else died("the worker died")
+        return self.last
+
+
+def read_all(descriptor, seconds):
+    """What comes until the end of the pipe; None if that takes longer."""
+    text, deadline = b"", time.monotonic() + seconds
+    with os.fdopen(descriptor, "rb", buffering=0) as pipe:
+        while True:
+            if not select.select([pipe], [], [], max(0, deadline - time.monotonic()))[0]:
+                return None
+            part = pipe.read(65536)
+            if not part:
+                return text.decode()
+            text += part
+
+
+def main(path):
+    with open(path, encoding="utf-8") as file:
+        plan = json.load(file)
+    kernel_rig.CLOCK["virtual"] = plan["virtual"]
+    run = GuestRun(plan)
+    with open(plan["results"], "a", encoding="utf-8", buffering=1) as results:
+        for name in plan["tests"]:
+            begin, run.last = time.monotonic(), {}
+            verdict, figures, failures = run.test(name)
+            result = {"name": name, "verdict": verdict, "figures": figures, "failures": failures}
+            result["seconds"] = time.monotonic() - begin
+            result["latencies"] = [latency_us for _, latency_us in run.last.get("latencies", [])]
+            result["measures"], result["logs"] = run.last.get("measures", {}), run.last.get("logs", [])
+            results.write(json.dumps(result) + "\n")
+    run.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

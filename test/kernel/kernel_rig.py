@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""The rigs of test/system on interfaces and GPIO lines of a real kernel, and what a scenario here is given."""
+
+import itertools
+import os
+import time
+
+import netdev
+from can_bus import CanBus
+from fake_slcan import FakeSlcan
+from gpio_sim import GpioChip
+from harness import Rig, now_us
+from judge_log import Event
+from scenario import Test
+
+NUMBERS = itertools.count()
+CLOCK = {"virtual": False}  # set once, by guest.py, before the first scenario
+
+
+class GpioButton:
+    """The e-stop contact on a simulated line. Mixed into a rig; `active` is the level of a pressed button."""
+
+    active = "low"  # with "high" the bias that the gateway asks for outweighs the contact to ground: see release_bias
+
+    def make_button(self):
+        self.line = f"ESTOP{next(NUMBERS)}"
+        self.chip = GpioChip(f"iwheel{next(NUMBERS)}", self.line)
+        self.chip.pull(self.active == "low")
+        self.settings.setdefault("estop", {}).update({"line": self.line, "active": self.active})
+        self.write_config()
+
+    def estop_line(self):
+        return self.line if self.estop else "none"
+
+    def press(self):
+        t_us = now_us()
+        self.chip.pull(self.active == "high")
+        self.timeline.append(Event(t_us, "press", now_us()))
+        return t_us
+
+    def release(self):
+        self.chip.pull(self.active == "low")
+
+    def pulse(self, seconds):
+        """Presses and releases; returns when it began."""
+        t_us = self.press()
+        time.sleep(seconds)
+        self.release()
+        return t_us
+
+    def remove_button(self):
+        self.chip.remove()
+
+
+class VcanRig(GpioButton, Rig):
+    """Gateway, simulated wheels and recorder on one vcan interface; the e-stop is a GPIO line."""
+
+    ids = ()  # what the recorder hears; all
+
+    def prepare(self):
+        self.interface = f"vcan{next(NUMBERS)}"
+        netdev.add_vcan(self.interface)
+        self.make_button()
+
+    def listen(self, frames=None):
+        return CanBus(self.interface, frames, CLOCK["virtual"], self.ids)
+
+    def wheels_bus(self):
+        return self.interface
+
+    def relisten(self):
+        """After the interface was deleted and made again."""
+        self.bus.close()
+        self.bus = self.listen(self.bus.frames)
+
+    def close(self, keep=False):
+        super().close(keep)
+        self.remove_button()
+        netdev.remove_all([self.interface])
+
+
+class HighVcanRig(VcanRig):
+    """The contact as it should be wired: normally closed to ground, so that pressed or a cut wire is high.
+
+    gpio-sim knows one pull only: when the gateway asks for its pull-up, the line goes high although the contact is closed.
+    So the contact is closed again once the line is open, and the latch of that is reset.
+    """
+
+    active = "high"
+
+    def start_gateway(self, *extra, wheels=True, **options):
+        answered_ms = super().start_gateway(*extra, wheels=False, **options)
+        if wheels:
+            self.close_contact()
+        return answered_ms
+
+    def close_contact(self):
+        self.release()
+        client = self.client("starter")
+        self.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"])
+        for _ in range(100):
+            if client.request("reset")["ok"]:
+                break
+            time.sleep(0.05)
+        client.close()
+
+
+class SlcanRig(GpioButton, Rig):
+    """Gateway on the interface of a fake slcan adapter; wheels and recorder on the simulator's bus behind it.
+
+    The recorder is at the wheels' end: it sees what really was on the bus, not what the kernel took.
+    """
+
+    queue_length = 4
+
+    def prepare(self):
+        self.adapter = None
+        self.make_button()
+        # It has no bit timing to show; the gateway must live with that.
+
+    def __init__(self, *arguments, **options):
+        super().__init__(*arguments, **options)
+        self.adapter = FakeSlcan(self.path("bus"), self.queue_length)
+
+    def gateway_bus(self):
+        return self.adapter.interface
+
+    def close(self, keep=False):
+        self.adapter.stall(False)
+        super().close(keep)
+        self.adapter.end()
+        self.remove_button()
+
+
+class KernelTest(Test):
+    """A test on a rig of that type; `measures` are figures for the table of the fault catalogue."""
+
+    def __init__(self, build, rig_type):
+        super().__init__(build)
+        self.rig_type = rig_type
+        self.measures = {}
+
+    def measure(self, name, value):
+        """Keeps the worst value of that name, and shows it."""
+        self.measures[name] = max(value, self.measures.get(name, value))
+
+    def judge(self, rig, moves=True, **options):
+        judge = super().judge(rig, moves=moves, **options)
+        if judge.gap_max_us:
+            self.measure("gap_ms", judge.gap_max_us / 1000)
+        return judge
+
+    def first_after(self, rig, t_us, wanted, text, limit_ms):
+        elapsed_ms = super().first_after(rig, t_us, wanted, text, limit_ms)
+        if elapsed_ms is not None:
+            self.measure("stop_ms", elapsed_ms)
+        return elapsed_ms
+
+
+def virtual():
+    """Whether time stands still while somebody works."""
+    return CLOCK["virtual"]
+
+
+def program(name):
+    """Path of a program of the system, for scenarios that need one."""
+    for folder in os.environ["PATH"].split(":"):
+        if os.access(os.path.join(folder, name), os.X_OK):
+            return os.path.join(folder, name)
+    return None

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""Network interfaces, queueing disciplines and capabilities, by the programs an administrator would use."""
+
+import ctypes
+import os
+import socket
+import subprocess
+
+PR_CAPBSET_DROP = 24
+CAP_NET_ADMIN = 12
+IFF_UP, IFF_ECHO = 1, 1 << 18
+
+
+def command(*words):
+    """Runs it; raises RuntimeError with what it said if it fails."""
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(words)}: {done.stdout.strip()}")
+    return done.stdout
+
+
+def add_vcan(name):
+    command("ip", "link", "add", name, "type", "vcan")
+    command("ip", "link", "set", name, "mtu", "72")  # CAN FD too, so that FD frames can be sent on it
+    up(name)
+
+
+def up(name):
+    command("ip", "link", "set", name, "up")
+
+
+def down(name):
+    command("ip", "link", "set", name, "down")
+
+
+def delete(name):
+    command("ip", "link", "delete", name)
+
+
+def exists(name):
+    return name in [found for _, found in socket.if_nameindex()]
+
+
+def flags(name):
+    with open(f"/sys/class/net/{name}/flags", encoding="ascii") as file:
+        return int(file.read(), 16)
+
+
+def discipline(name, *words):
+    """Replaces the root queueing discipline; without words puts the default back."""
+    if words:
+        command("tc", "qdisc", "replace", "dev", name, "root", *words)
+    else:
+        subprocess.run(["tc", "qdisc", "delete", "dev", name, "root"], stderr=subprocess.DEVNULL, check=False)
+
+
+def without_net_admin():
+    """For the child between fork and exec: root, but not allowed to touch interfaces."""
+    if ctypes.CDLL(None, use_errno=True).prctl(PR_CAPBSET_DROP, CAP_NET_ADMIN, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "cannot drop CAP_NET_ADMIN")
+
+
+def remove_all(names):
+    for name in names:
+        if exists(name):
+            try:
+                delete(name)
+            except RuntimeError:
+                pass  # slcan goes with its tty
