@@ -9,7 +9,7 @@ import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "..", "..", "test", "system"))
-from harness import die_with_parent  # noqa: E402
+from harness import as_a_service, die_with_parent  # noqa: E402
 
 
 class Sleeper(threading.Thread):
@@ -27,6 +27,11 @@ class Sleeper(threading.Thread):
             self.worst_s = max(self.worst_s, time.monotonic() - before - 0.005)
 
 
+def prepare():
+    die_with_parent()
+    as_a_service()
+
+
 class Driver:
     """The joystick program, a process of its own."""
 
@@ -38,12 +43,17 @@ class Driver:
                 stdin=subprocess.PIPE,
                 stdout=file,
                 stderr=file,
-                preexec_fn=die_with_parent,
+                preexec_fn=prepare,
             )
 
     def want(self, left, right):
-        self.child.stdin.write(f"{left} {right}\n".encode())
-        self.child.stdin.flush()
+        try:
+            self.child.stdin.write(f"{left} {right}\n".encode())
+            self.child.stdin.flush()
+        except BrokenPipeError as error:
+            raise RuntimeError(
+                "the joystick program has ended: " + (self.text().splitlines() or ["without a word"])[-1]
+            ) from error
 
     def text(self):
         with open(self.output, encoding="utf-8") as file:

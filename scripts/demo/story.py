@@ -38,7 +38,7 @@ class Story:
     def require(self, condition, fact, otherwise=None):
         """Tells the fact if it is one; ends the story if not."""
         if not condition:
-            raise Failed(f"step {self.number}: this did not happen: {otherwise or fact}")
+            raise Failed(f"this did not happen: {otherwise or fact}")
         self.view.fact(self.elapsed_s(), fact.replace(f"unix:{self.rig.folder}/", ""))
 
     def watch(self, seconds, until=None):
@@ -67,7 +67,7 @@ class Story:
     def driver(self):
         self.drivers.append(Driver(self.rig, len(self.drivers)))
         if not self.watch(3, lambda s: s["state"] == "armed"):
-            raise Failed(f"step {self.number}: not armed: {self.drivers[-1].text()[-300:]}")
+            raise Failed(f"not armed: {self.drivers[-1].text()[-300:]}")
         return self.drivers[-1]
 
     # The steps ----------------------------------------------------------------------------------------------------------
@@ -215,7 +215,7 @@ class Story:
         driver = self.driver()
         driver.want(500, 500)
         if not self.watch(4, lambda s: self.near(500, 500, s)):
-            raise Failed(f"step {self.number}: no second drive: {driver.text()[-300:]}")
+            raise Failed(f"no second drive: {driver.text()[-300:]}")
         self.watch(0.5)
         pressed_us = self.rig.press()
         latched = self.watch(1, lambda s: s["state"] == "latched")
