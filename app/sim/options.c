@@ -15,6 +15,7 @@ static const char usage[] =
     "       iwheel-sim [--control PATH] COMMAND   tell a running one, for example: iwheel-sim power off\n"
     "\n"
     "  --can unix:PATH     the bus: a local socket that the gateway connects to\n"
+    "  --can IFACE         or a CAN interface, for example vcan0\n"
     "  --estop PATH        the e-stop button: a local socket\n"
     "  --control PATH      where commands come in, one a line; `iwheel-sim help` lists them\n"
     "  --script FILE       commands at given times: `at 2.5 power off`, `wait 1`, `estop press`, # comment\n"
@@ -79,14 +80,15 @@ static int set_path(char *out, const char *value) {
 }
 
 static int set_can(sim_options_t *options, const char *value) {
-    if (strncmp(value, "unix:", 5U) != 0) {
-        (void)fprintf(stderr,
-                      "iwheel-sim: --can %s: this version simulates wheels on the local bus only, not on SocketCAN.\n"
-                      "Use --can unix:PATH here and the same for iwheel-gateway.\n",
-                      value);
-        return EX_UNAVAILABLE;
+    if (strncmp(value, "unix:", 5U) == 0) {
+        options->can_interface[0] = '\0';
+        return set_path(options->can_path, value);
     }
-    return set_path(options->can_path, value);
+    if (value[0] == '\0' || strlen(value) >= sizeof options->can_interface || strchr(value, '/') != NULL) {
+        return complain("--can must be unix:PATH or a CAN interface such as vcan0, not ", value);
+    }
+    (void)snprintf(options->can_interface, sizeof options->can_interface, "%s", value);
+    return -1;
 }
 
 static int set_number(sim_options_t *options, int option, const char *value) {

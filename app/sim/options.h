@@ -8,7 +8,8 @@
 #define SIM_PATH_BYTES 512U
 
 typedef struct {
-    char can_path[SIM_PATH_BYTES];
+    char can_path[SIM_PATH_BYTES]; ///< Of the local bus.
+    char can_interface[16];        ///< SocketCAN instead of it; empty: none.
     char estop_path[SIM_PATH_BYTES];
     char control_path[SIM_PATH_BYTES];
     const char *script_path; ///< NULL: none.

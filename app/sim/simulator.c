@@ -48,8 +48,21 @@ static void quit(void *context) {
     self->ended = true;
 }
 
+/// Answers a command that the bus in use cannot obey. False: it can.
+static bool refuse(sim_panel_t *panel, const char *line) {
+    if (!sim_socketcan_refuses(line)) {
+        return false;
+    }
+    (void)snprintf(panel->answer, sizeof panel->answer,
+                   "error only on a local bus (--can unix:PATH); on an interface use ip link, or tc with netem\n");
+    return true;
+}
+
 static const char *execute(void *context, const char *line) {
     sim_simulator_t *const self = context;
+    if (self->can.ops != NULL && refuse(&self->panel, line)) {
+        return self->panel.answer;
+    }
     if (sim_panel_execute(&self->panel, self->now_us, line) == SIM_CHANGED) {
         mark(self, line);
         say(self, "%s", line);
@@ -58,8 +71,10 @@ static const char *execute(void *context, const char *line) {
 }
 
 static const char *check_command(void *context, const char *command) {
-    sim_panel_t *const scratch = context;
-    if (sim_panel_execute(scratch, scratch->world->bus.free_us, command) != SIM_REFUSED) {
+    sim_simulator_t *const self = context;
+    sim_panel_t *const scratch = &self->panel;
+    if (!(self->on_socketcan && refuse(scratch, command)) &&
+        sim_panel_execute(scratch, scratch->world->bus.free_us, command) != SIM_REFUSED) {
         return NULL;
     }
     scratch->answer[strcspn(scratch->answer, "\n")] = '\0';
@@ -69,7 +84,7 @@ static const char *check_command(void *context, const char *command) {
 static int load_script(sim_simulator_t *self, const char *path) {
     sim_script_fault_t fault;
     self->panel.world = &self->world;
-    if (sim_script_load(&self->script, path, check_command, &self->panel, &fault)) {
+    if (sim_script_load(&self->script, path, check_command, self, &fault)) {
         return -1;
     }
     if (fault.line == 0U) {
@@ -89,7 +104,16 @@ static void catch_up(sim_simulator_t *self) {
         if (!self->world.bus_off) {
             sim_hub_deliver(&self->hub, &delivery);
         }
+        sim_socketcan_deliver(&self->can, &delivery);
     }
+}
+
+static const char *interface_state(iw_bus_state_t state) {
+    static const char *const names[] = {[IW_BUS_DOWN] = "absent or down",
+                                        [IW_BUS_OFF] = "bus-off",
+                                        [IW_BUS_PASSIVE] = "passive",
+                                        [IW_BUS_ACTIVE] = "up"};
+    return names[state];
 }
 
 /// Called at every wake-up before anything that came in is looked at.
@@ -104,6 +128,9 @@ static void awake(void *context) {
     }
     self->now_us = now_us;
     catch_up(self);
+    if (sim_socketcan_step(&self->can, now_us)) {
+        say(self, "the interface is %s", interface_state(self->can.state));
+    }
     if (sim_button_step(&self->button, now_us)) {
         mark(self, "estop release");
         say(self, "estop release (end of the pulse)");
@@ -127,7 +154,8 @@ static iw_time_us_t earlier(iw_time_us_t one_us, iw_time_us_t other_us) {
 static iw_time_us_t next_us(const sim_simulator_t *self) {
     iw_time_us_t const script_us = sim_script_next_us(&self->script);
     iw_time_us_t const step_us = (script_us == IW_NEVER) ? IW_NEVER : self->start_us + script_us;
-    return earlier(earlier(step_us, sim_world_next_us(&self->world)), self->button.release_us);
+    iw_time_us_t const world_us = earlier(sim_world_next_us(&self->world), sim_socketcan_next_us(&self->can));
+    return earlier(earlier(step_us, world_us), self->button.release_us);
 }
 
 void sim_simulator_run(sim_simulator_t *self) {
@@ -158,6 +186,13 @@ static bool open_signals(sim_simulator_t *self) {
     return self->signals.fd >= 0 && sim_loop_add(&self->loop, &self->signals);
 }
 
+static bool open_bus(sim_simulator_t *self, const sim_options_t *options, sim_reason_t *out_reason) {
+    if (self->on_socketcan) {
+        return sim_socketcan_open(&self->can, options->can_interface, &self->loop, &self->world, out_reason);
+    }
+    return sim_hub_open(&self->hub, options->can_path, out_reason);
+}
+
 static int open_sockets(sim_simulator_t *self, const sim_options_t *options) {
     sim_reason_t reason = {""};
     self->hub = (sim_hub_t){.loop = &self->loop, .world = &self->world, .now_us = &self->now_us};
@@ -166,12 +201,12 @@ static int open_sockets(sim_simulator_t *self, const sim_options_t *options) {
     self->hub.listener.fd = -1;
     self->button.listener.fd = -1;
     self->control.listener.fd = -1;
-    if (sim_hub_open(&self->hub, options->can_path, &reason) &&
-        sim_button_open(&self->button, options->estop_path, &reason) &&
+    if (open_bus(self, options, &reason) && sim_button_open(&self->button, options->estop_path, &reason) &&
         sim_control_open(&self->control, options->control_path, &reason)) {
         return -1;
     }
     (void)fprintf(stderr, "iwheel-sim: %s\n", reason.text);
+    sim_socketcan_close(&self->can);
     sim_listener_close(&self->hub.listener);
     sim_listener_close(&self->button.listener);
     sim_listener_close(&self->control.listener);
@@ -185,7 +220,9 @@ static int system_refuses(const char *what) {
 
 static void greet(sim_simulator_t *self, const sim_options_t *options) {
     say(self, "two simulated wheels, seed %" PRIu64 "; end with Ctrl-C", options->seed);
-    say(self, "start the gateway with: --can unix:%s --estop unix:%s", options->can_path, options->estop_path);
+    say(self, "start the gateway with: --can %s%s --estop unix:%s",
+        self->on_socketcan ? "" : "unix:", self->on_socketcan ? options->can_interface : options->can_path,
+        options->estop_path);
     say(self, "commands: iwheel-sim --control %s help", options->control_path);
 }
 
@@ -194,6 +231,8 @@ int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {
     sim_pair_default(&pair);
     pair.age_us = options->age_us;
     self->quiet = options->quiet;
+    self->on_socketcan = options->can_interface[0] != '\0';
+    self->can.ops = NULL;
     self->now_us = sim_loop_clock_us();
     self->start_us = self->now_us;
     self->wake_us = IW_NEVER;
@@ -214,7 +253,7 @@ int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {
     int const result = open_sockets(self, options);
     if (result < 0) {
         self->panel.world = &self->world;
-        self->panel.hooks = (sim_hooks_t){&self->hub, &self->button, mark, quit, self};
+        self->panel.hooks = (sim_hooks_t){self->on_socketcan ? NULL : &self->hub, &self->button, mark, quit, self};
         greet(self, options);
     }
     return result;
@@ -223,6 +262,10 @@ int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {
 void sim_simulator_close(sim_simulator_t *self) {
     sim_control_close(&self->control);
     sim_button_close(&self->button);
-    sim_hub_close(&self->hub);
+    if (self->on_socketcan) {
+        sim_socketcan_close(&self->can);
+    } else {
+        sim_hub_close(&self->hub);
+    }
     sim_bus_log_flush(&self->log);
 }

@@ -14,6 +14,7 @@
 #include "options.h"
 #include "panel.h"
 #include "script.h"
+#include "socketcan.h"
 
 /// Later than this is a pause, not a delay to catch up with.
 #define SIM_PAUSE_US 500000U
@@ -22,6 +23,7 @@ typedef struct {
     sim_world_t world;
     sim_loop_t loop;
     sim_hub_t hub;
+    sim_socketcan_t can; ///< In place of the hub.
     sim_button_t button;
     sim_control_t control;
     sim_script_t script;
@@ -33,6 +35,7 @@ typedef struct {
     iw_time_us_t skipped_us; ///< CLOCK_MONOTONIC is ahead of simulated time by this.
     iw_time_us_t wake_us;    ///< When the world next needs us.
     bool quiet;
+    bool on_socketcan;
     bool ended;
 } sim_simulator_t;
 
