@@ -84,9 +84,14 @@ void gateway_judge_init(gateway_judge_t *self, const iw_gateway_t *gateway, fake
     self->gateway = gateway;
     self->bus = bus;
     self->drive_us = IW_NEVER;
+    self->asked_us = IW_NEVER;
     self->gap_us = bus->now_us;
     bus->listener = judge_frame;
     bus->listener_context = self;
+}
+
+void gateway_judge_asked(gateway_judge_t *self, bool nonzero) {
+    self->asked_us = nonzero ? self->bus->now_us : self->asked_us;
 }
 
 void gateway_judge_drive(gateway_judge_t *self, bool nonzero) {
@@ -98,6 +103,8 @@ void gateway_judge_drive(gateway_judge_t *self, bool nonzero) {
 }
 
 void gateway_judge_renew(gateway_judge_t *self) {
+    const iw_time_us_t ago_us = self->bus->now_us - self->asked_us;
+    blame(self, self->asked_us != IW_NEVER && ago_us < MS(500), "3: armed or reset with a stale command");
     self->fresh = false;
 }
 

@@ -14,6 +14,7 @@ typedef struct {
     const fake_bus_t *bus;
     const char *violation;           ///< NULL: none so far.
     iw_time_us_t frame_us[IW_SIDES]; ///< Last frame accepted for each wheel.
+    iw_time_us_t asked_us;           ///< Last nonzero drive that anybody asked for.
     iw_time_us_t drive_us;           ///< Last accepted drive.
     iw_time_us_t gap_us;             ///< Gaps between setpoints count from here at the earliest.
     int32_t speed_mm_s[IW_SIDES];    ///< Last accepted, as on the bus.
@@ -29,6 +30,9 @@ typedef struct {
 
 /// Also becomes the listener of the bus.
 void gateway_judge_init(gateway_judge_t *self, const iw_gateway_t *gateway, fake_bus_t *bus);
+
+/// Somebody asked to drive, whatever the answer will be.
+void gateway_judge_asked(gateway_judge_t *self, bool nonzero);
 
 /// A drive was accepted.
 void gateway_judge_drive(gateway_judge_t *self, bool nonzero);

@@ -92,7 +92,7 @@ void gateway_rig_run(gateway_rig_t *self, iw_time_us_t for_us) {
     while (true) {
         iw_time_us_t next_us = sooner(self->wake_us, fake_bus_next_us(&self->bus));
         next_us = sooner(next_us, sooner(self->wheel[IW_LEFT].speed_us, self->wheel[IW_RIGHT].speed_us));
-        if (next_us > until_us) {
+        if (next_us > until_us || self->judge.violation != NULL) {
             break;
         }
         self->now_us = next_us > self->now_us ? next_us : self->now_us;
@@ -137,6 +137,7 @@ iw_refusal_t gateway_rig_drive(gateway_rig_t *self, iw_client_t client, int32_t 
     const iw_drive_t request = {{left_mm_s, right_mm_s}, {left_mm_s / 2, right_mm_s / 2}, with_current};
     iw_applied_t applied;
     fake_bus_advance(&self->bus, self->now_us);
+    gateway_judge_asked(&self->judge, left_mm_s != 0 || right_mm_s != 0);
     const iw_refusal_t refusal = iw_gateway_drive(&self->gateway, self->now_us, client, &request, &applied);
     if (refusal == IW_REFUSE_NONE) {
         gateway_judge_drive(&self->judge, left_mm_s != 0 || right_mm_s != 0);
@@ -147,6 +148,7 @@ iw_refusal_t gateway_rig_drive(gateway_rig_t *self, iw_client_t client, int32_t 
 
 iw_refusal_t gateway_rig_request_arm(gateway_rig_t *self, iw_client_t client, bool takeover) {
     const iw_client_t before = self->gateway.permit.holder;
+    fake_bus_advance(&self->bus, self->now_us);
     const iw_refusal_t refusal = iw_gateway_arm(&self->gateway, self->now_us, client, takeover);
     if (refusal == IW_REFUSE_NONE && client != before) {
         gateway_judge_renew(&self->judge);
@@ -157,6 +159,7 @@ iw_refusal_t gateway_rig_request_arm(gateway_rig_t *self, iw_client_t client, bo
 
 iw_refusal_t gateway_rig_reset(gateway_rig_t *self) {
     const bool latched = iw_gateway_state(&self->gateway) == IW_STATE_LATCHED;
+    fake_bus_advance(&self->bus, self->now_us);
     const iw_refusal_t refusal = iw_gateway_reset(&self->gateway, self->now_us);
     if (refusal == IW_REFUSE_NONE && latched) {
         gateway_judge_renew(&self->judge);

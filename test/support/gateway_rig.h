@@ -38,7 +38,7 @@ void gateway_rig_begin(gateway_rig_t *self, bool restarted);
 /// One step now; lets the controller and the wheels do what is due before.
 void gateway_rig_step(gateway_rig_t *self);
 
-/// Lets time pass; steps whenever a frame comes or the gateway wants to be called.
+/// Lets time pass; steps whenever a frame comes or the gateway wants to be called. Makes no step after a violation.
 void gateway_rig_run(gateway_rig_t *self, iw_time_us_t for_us);
 
 /// Lets time pass without a step, then one step. Frames wait meanwhile.

@@ -102,6 +102,9 @@ static void test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators(v
     force_rig_offset(&rig, 50);
     iw_force_reopen(&rig.force, true);
     assert_offset(IW_OFFSET_STORED, 5000);
+    TEST_ASSERT_TRUE(rig.force.offset_us != IW_NEVER);
+    iw_force_restore(&rig.force, 5000);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
     force_rig_quiet(&rig, 40, 510);
     assert_offset(IW_OFFSET_ESTIMATED, 5100);
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
@@ -124,8 +127,10 @@ static void test_force_reboot_forgets_the_evidence_and_the_wheels_offset(void) {
     force_rig_quiet(&rig, 40, 100);
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_DN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT32(1000, rig.force.evidence_permille);
     iw_force_reopen(&rig.force, false);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
+    TEST_ASSERT_EQUAL_INT32(0, rig.force.evidence_permille);
     force_rig_quiet(&rig, 40, 900);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
     assert_offset(IW_OFFSET_ESTIMATED, 9000);

@@ -79,6 +79,20 @@ static void test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy(void) {
     assert_window(IW_WINDOW_NOISY);
 }
 
+static void test_force_never_heard_is_not_heard_when_time_has_just_begun(void) {
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_force_validity(&rig.force, 0));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_force_validity(&rig.force, 1000));
+}
+
+/// 30 of 40 samples are 2 cN off the mean: the root of 3 cN2 is 17.3 mN.
+static void test_force_deviation_is_told_to_a_millinewton(void) {
+    for (uint32_t n = 0; n < 40; n++) {
+        force_rig_hear(&rig, (int16_t)(n % 4U == 3U ? 100 : (n % 8U < 4U) == (n % 2U == 0U) ? 102 : 98), true);
+    }
+    TEST_ASSERT_EQUAL_INT32(1000, rig.force.quality.mean_mN);
+    TEST_ASSERT_EQUAL_UINT32(17, rig.force.quality.deviation_mN);
+}
+
 static void test_force_wildest_noise_does_not_overflow(void) {
     for (int side = 0; side < IW_SIDES; side++) {
         begin((iw_side_t)side, false);
@@ -264,6 +278,8 @@ int main(void) {
     RUN_TEST(test_force_quiet_window_estimates_the_offset_with_its_last_sample);
     RUN_TEST(test_force_units_are_per_side_as_documented_or_configured);
     RUN_TEST(test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy);
+    RUN_TEST(test_force_never_heard_is_not_heard_when_time_has_just_begun);
+    RUN_TEST(test_force_deviation_is_told_to_a_millinewton);
     RUN_TEST(test_force_wildest_noise_does_not_overflow);
     RUN_TEST(test_force_drift_up_to_1_N_is_quiet_and_more_is_drift);
     RUN_TEST(test_force_moving_at_any_sample_contaminates);
