@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// Which frames the port asks the kernel for, and what it makes of them.
+#include "socketcan_frame.h"
+
+#include "iwheel/proto.h"
+
+#include "unity.h"
+
+#include <linux/can/error.h>
+#include <string.h>
+#include <sys/socket.h>
+
+static const uint32_t ids[] = {256, 257, 266, 288, 289, 290, 298, 512, 513, 544, 545};
+static struct can_filter ours[IW_SOCKETCAN_IDS];
+static struct can_filter others[IW_SOCKETCAN_IDS];
+
+void setUp(void) {
+    iw_socketcan_filters(IW_SOCKETCAN_OURS, ours);
+    iw_socketcan_filters(IW_SOCKETCAN_OTHERS, others);
+}
+
+void tearDown(void) {}
+
+/// The kernel's rule (can/raw.h, af_can.c): one filter is enough; an inverted one passes what it does not match.
+static bool passes(const struct can_filter *filter, canid_t can_id) {
+    const bool inverted = (filter->can_id & CAN_INV_FILTER) != 0U;
+    const bool equal = (can_id & filter->can_mask) == (filter->can_id & ~CAN_INV_FILTER & filter->can_mask);
+    return equal != inverted;
+}
+
+static bool is_ours(canid_t can_id) {
+    bool any = false;
+    for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
+        any = any || passes(&ours[i], can_id);
+    }
+    return any;
+}
+
+static bool is_others(canid_t can_id) {
+    bool all = true; // Joined.
+    for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
+        all = all && passes(&others[i], can_id);
+    }
+    return all;
+}
+
+static bool is_known(uint32_t number) {
+    bool known = false;
+    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; ++i) {
+        known = known || ids[i] == number;
+    }
+    return known;
+}
+
+static void test_filters_every_standard_id_goes_to_exactly_one_socket(void) {
+    for (uint32_t id = 0; id <= CAN_SFF_MASK; ++id) {
+        TEST_ASSERT_EQUAL_MESSAGE(is_known(id), is_ours(id), "ours");
+        TEST_ASSERT_EQUAL_MESSAGE(is_known(id), is_ours(id | CAN_RTR_FLAG), "remote");
+        TEST_ASSERT_EQUAL_MESSAGE(!is_known(id), is_others(id), "others");
+        TEST_ASSERT_EQUAL_MESSAGE(!is_known(id), is_others(id | CAN_RTR_FLAG), "others, remote");
+    }
+}
+
+static void test_filters_an_extended_frame_counts_by_its_whole_number(void) {
+    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; ++i) {
+        TEST_ASSERT_TRUE(is_ours(ids[i] | CAN_EFF_FLAG));
+        TEST_ASSERT_FALSE(is_others(ids[i] | CAN_EFF_FLAG));
+        TEST_ASSERT_FALSE(is_ours(ids[i] | CAN_EFF_FLAG | 0x800U));
+        TEST_ASSERT_TRUE(is_others(ids[i] | CAN_EFF_FLAG | 0x10000000U));
+    }
+}
+
+static void test_filters_do_not_ask_for_error_frames(void) {
+    for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
+        TEST_ASSERT_EQUAL_HEX32(0, ours[i].can_mask & CAN_ERR_FLAG);
+        TEST_ASSERT_EQUAL_HEX32(0, others[i].can_mask & CAN_ERR_FLAG);
+    }
+}
+
+static iw_can_frame_t translate(canid_t can_id, uint8_t length, int flags) {
+    struct can_frame raw = {.can_id = can_id, .len = length};
+    memset(raw.data, 0x5A, sizeof raw.data);
+    return iw_socketcan_translate(&raw, flags);
+}
+
+static void test_translate_keeps_format_number_and_data(void) {
+    const iw_can_frame_t plain = translate(256, 4, 0);
+    TEST_ASSERT_EQUAL_HEX32(256, plain.id);
+    TEST_ASSERT_EQUAL(4, plain.dlc);
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, plain.kind);
+    TEST_ASSERT_EACH_EQUAL_HEX8(0x5A, plain.data, 8);
+    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_REMOTE, translate(256U | CAN_RTR_FLAG, 0, 0).id);
+    TEST_ASSERT_EQUAL_HEX32(0x1ABCDEFFU | IW_CAN_EXTENDED, translate(0x1ABCDEFFU | CAN_EFF_FLAG, 8, 0).id);
+    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_EXTENDED | IW_CAN_REMOTE,
+                            translate(256U | CAN_EFF_FLAG | CAN_RTR_FLAG, 0, 0).id);
+}
+
+static void test_translate_only_our_own_sockets_frame_is_an_echo(void) {
+    TEST_ASSERT_EQUAL(IW_CAN_ECHO, translate(266, 5, MSG_CONFIRM | MSG_DONTROUTE).kind);
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, translate(266, 5, MSG_DONTROUTE).kind);
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, translate(266, 5, 0).kind);
+}
+
+static void test_translate_a_frame_too_long_for_classic_can_is_fd_and_no_telemetry(void) {
+    iw_proto_message_t message;
+    const iw_can_frame_t frame = translate(256, 64, MSG_TRUNC);
+    TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_FD, frame.id);
+    TEST_ASSERT_EQUAL(8, frame.dlc);
+    TEST_ASSERT_EQUAL(IW_ERR_FORMAT, iw_proto_decode(&frame, &message));
+    const iw_can_frame_t short_fd = translate(256, 4, MSG_TRUNC);
+    TEST_ASSERT_EQUAL(IW_ERR_FORMAT, iw_proto_decode(&short_fd, &message));
+}
+
+static iw_can_error_t error_of(canid_t classes, uint8_t controller) {
+    struct can_frame raw = {.can_id = CAN_ERR_FLAG | classes, .len = CAN_ERR_DLC};
+    memset(raw.data, 0xFF, sizeof raw.data);
+    raw.data[1] = controller;
+    return iw_can_error_of(&raw);
+}
+
+static void test_error_frames_tell_the_state(void) {
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_BUS_OFF, error_of(CAN_ERR_BUSOFF, 0));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED, 0));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_PASSIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_WARNING));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_ACTIVE, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
+}
+
+static void test_error_frames_the_gravest_news_comes_first(void) {
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_BUS_OFF,
+                      error_of(CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_RESTARTED, error_of(CAN_ERR_RESTARTED | CAN_ERR_CRTL, CAN_ERR_CRTL_RX_PASSIVE));
+}
+
+static void test_error_frames_that_are_about_something_else_change_no_state(void) {
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_LOSTARB, 0xFF));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_PROT | CAN_ERR_ACK | CAN_ERR_BUSERROR, 0xFF));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, 0));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW));
+    TEST_ASSERT_EQUAL(IW_CAN_ERROR_NOTHING, error_of(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_OVERFLOW));
+}
+
+static void test_error_mask_asks_for_what_is_understood_and_no_lost_arbitration(void) {
+    TEST_ASSERT_EQUAL_HEX32(CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED, iw_can_error_mask());
+}
+
+static void test_bits_of_frames(void) {
+    struct can_frame raw = {.can_id = 266, .len = 5};
+    TEST_ASSERT_EQUAL_UINT32(47 + 40, iw_socketcan_bits(&raw));
+    raw.can_id = 266U | CAN_RTR_FLAG;
+    TEST_ASSERT_EQUAL_UINT32(47, iw_socketcan_bits(&raw));
+    raw = (struct can_frame){.can_id = CAN_EFF_FLAG, .len = 8};
+    TEST_ASSERT_EQUAL_UINT32(67 + 64, iw_socketcan_bits(&raw));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_filters_every_standard_id_goes_to_exactly_one_socket);
+    RUN_TEST(test_filters_an_extended_frame_counts_by_its_whole_number);
+    RUN_TEST(test_filters_do_not_ask_for_error_frames);
+    RUN_TEST(test_translate_keeps_format_number_and_data);
+    RUN_TEST(test_translate_only_our_own_sockets_frame_is_an_echo);
+    RUN_TEST(test_translate_a_frame_too_long_for_classic_can_is_fd_and_no_telemetry);
+    RUN_TEST(test_error_frames_tell_the_state);
+    RUN_TEST(test_error_frames_the_gravest_news_comes_first);
+    RUN_TEST(test_error_frames_that_are_about_something_else_change_no_state);
+    RUN_TEST(test_error_mask_asks_for_what_is_understood_and_no_lost_arbitration);
+    RUN_TEST(test_bits_of_frames);
+    return UNITY_END();
+}

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// How a GPIO line is named, and when its button counts as released.
+#include "gpio_address.h"
+#include "gpio_release.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <string.h>
+
+#define MS       1000U
+#define START_US UINT64_C(5000000)
+
+static iw_gpio_address_t address;
+static iw_gpio_release_t release;
+static iw_time_us_t now_us;
+
+void setUp(void) {
+    memset(&address, 0xA5, sizeof address);
+    memset(&release, 0xA5, sizeof release);
+    iw_gpio_release_init(&release, 5U * MS);
+    now_us = START_US;
+}
+
+void tearDown(void) {}
+
+static void test_address_by_chip_and_offset(void) {
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_address_parse("gpiochip0:4", &address));
+    TEST_ASSERT_TRUE(address.by_offset);
+    TEST_ASSERT_EQUAL_STRING("gpiochip0", address.name);
+    TEST_ASSERT_EQUAL_UINT(4, address.offset);
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_address_parse("gpiochip12:65535", &address));
+    TEST_ASSERT_EQUAL_STRING("gpiochip12", address.name);
+    TEST_ASSERT_EQUAL_UINT(65535, address.offset);
+}
+
+static void test_address_by_name(void) {
+    static const char *const names[] = {"ESTOP", "GPIO17", "gpiochip0", "a:4", "gpio:4", "none2", "a b", "x"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, iw_gpio_address_parse(names[i], &address), names[i]);
+        TEST_ASSERT_FALSE_MESSAGE(address.by_offset, names[i]);
+        TEST_ASSERT_EQUAL_STRING(names[i], address.name);
+    }
+}
+
+static void test_address_that_is_none_is_refused_and_changes_nothing(void) {
+    static const char *const wrong[] = {"",
+                                        "gpiochip:4",
+                                        "gpiochip0:",
+                                        "gpiochip0:x",
+                                        "gpiochip0:4x",
+                                        "gpiochip0:-1",
+                                        "gpiochip0: 4",
+                                        "gpiochip0:65536",
+                                        "gpiochip0:99999999999999999999",
+                                        "gpiochipx:4",
+                                        "gpiochip0:4:5",
+                                        "gpiochip99999999999999999999:1"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
+        TEST_ASSERT_EQUAL_INT_MESSAGE(EINVAL, iw_gpio_address_parse(wrong[i], &address), wrong[i]);
+    }
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_gpio_address_parse("a-line-name-of-thirty-two-letters", &address));
+    TEST_ASSERT_EACH_EQUAL_HEX8(0xA5, &address, sizeof address);
+}
+
+static void test_address_the_longest_name_fits(void) {
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_address_parse("a-line-name-of-31-letters-xxxxx", &address));
+    TEST_ASSERT_EQUAL_size_t(31, strlen(address.name));
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_gpio_address_parse("a-line-name-of-32-letters-xxxxxx", &address));
+}
+
+static void look(uint32_t after_us, bool active, bool edge) {
+    now_us += after_us;
+    iw_gpio_release_see(&release, now_us, active, edge);
+}
+
+static bool pressed(void) {
+    return iw_gpio_release_take_pressed(&release, now_us);
+}
+
+static void test_release_a_line_that_is_inactive_from_the_start_is_released_at_once(void) {
+    look(0, false, false);
+    TEST_ASSERT_FALSE(pressed());
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_release_next_us(&release, now_us));
+}
+
+static void test_release_a_press_counts_at_once(void) {
+    look(0, true, false);
+    TEST_ASSERT_TRUE(pressed());
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_release_next_us(&release, now_us));
+    setUp();
+    look(0, true, true);
+    TEST_ASSERT_TRUE(pressed());
+}
+
+static void test_release_counts_when_it_has_lasted(void) {
+    look(0, true, true);
+    (void)pressed();
+    look(1000U * MS, false, true);
+    TEST_ASSERT_TRUE(pressed());
+    TEST_ASSERT_EQUAL_UINT64(now_us + 5U * MS, iw_gpio_release_next_us(&release, now_us));
+    look(5U * MS - 1U, false, false);
+    TEST_ASSERT_TRUE(pressed());
+    look(1U, false, false);
+    TEST_ASSERT_FALSE(pressed());
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_release_next_us(&release, now_us));
+}
+
+static void test_release_is_put_off_by_every_bounce(void) {
+    look(0, true, true);
+    (void)pressed();
+    for (unsigned bounce = 0; bounce < 20U; ++bounce) {
+        look(4U * MS, (bounce & 1U) != 0U, true);
+        TEST_ASSERT_TRUE(pressed());
+    }
+    look(4U * MS, false, true);
+    look(4U * MS, false, true);
+    look(5U * MS - 1U, false, false);
+    TEST_ASSERT_TRUE(pressed());
+    look(1U, false, false);
+    TEST_ASSERT_FALSE(pressed());
+}
+
+static void test_release_a_pulse_between_two_looks_is_told(void) {
+    look(0, false, false);
+    (void)pressed();
+    look(20U * MS, false, true);
+    TEST_ASSERT_TRUE(pressed());
+    look(5U * MS, false, false);
+    TEST_ASSERT_FALSE(pressed());
+}
+
+static void test_release_an_edge_is_told_however_late_it_is_asked_for(void) {
+    look(0, false, true);
+    now_us += 1000U * MS;
+    TEST_ASSERT_TRUE(pressed());
+    TEST_ASSERT_FALSE(pressed());
+}
+
+static void test_release_a_level_seen_and_gone_again_is_told_without_any_edge(void) {
+    look(0, true, false);
+    look(10U * MS, false, false);
+    now_us += 1000U * MS;
+    TEST_ASSERT_TRUE(pressed());
+    TEST_ASSERT_FALSE(pressed());
+}
+
+static void test_release_without_debounce_follows_the_level(void) {
+    iw_gpio_release_init(&release, 0);
+    look(0, true, true);
+    TEST_ASSERT_TRUE(pressed());
+    look(1U, false, true);
+    TEST_ASSERT_TRUE(pressed());
+    TEST_ASSERT_FALSE(pressed());
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_release_next_us(&release, now_us));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_address_by_chip_and_offset);
+    RUN_TEST(test_address_by_name);
+    RUN_TEST(test_address_that_is_none_is_refused_and_changes_nothing);
+    RUN_TEST(test_address_the_longest_name_fits);
+    RUN_TEST(test_release_a_line_that_is_inactive_from_the_start_is_released_at_once);
+    RUN_TEST(test_release_a_press_counts_at_once);
+    RUN_TEST(test_release_counts_when_it_has_lasted);
+    RUN_TEST(test_release_is_put_off_by_every_bounce);
+    RUN_TEST(test_release_a_pulse_between_two_looks_is_told);
+    RUN_TEST(test_release_an_edge_is_told_however_late_it_is_asked_for);
+    RUN_TEST(test_release_a_level_seen_and_gone_again_is_told_without_any_edge);
+    RUN_TEST(test_release_without_debounce_follows_the_level);
+    return UNITY_END();
+}
