@@ -56,6 +56,7 @@ class Boot:
         command += [f"uml_dir={folder}", f"umid={name}", "panic=-1"]
         command += ["time-travel=inf-cpu"] if plan["virtual"] else []
         command += plan.get("kernel_arguments", [])
+        command += [f"iwheel_python={os.path.realpath(sys.executable)}"]
         command += [f"iwheel_guest={os.path.join(HERE, 'guest.py')}", f"iwheel_plan={self.path('json')}"]
         return command
 

@@ -45,6 +45,7 @@ class Campaign:
             return None
         return {
             "build": os.path.abspath(options.build),
+            "group": group.name,
             "tests": names,
             "virtual": group.virtual,
             "full": options.full,

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: MIT
+"""Rows 15 to 18 on a real `can` device: a fake slcan adapter with states, stalls, and a plug.
+
+The bus log is taken at the wheels' end. The echo of this kind of interface proves nothing, so a stalled adapter shows only by
+the wheels' silence or by a full queue; how many old frames come out afterwards is bounded by queue, driver and adapter.
+"""
+
+import time
+
+import netdev
+from catalogue import kernel_test
+from client import Streamer
+from fake_slcan import DEPTH
+from harness import now_us
+from judge_log import LEFT, RIGHT
+from kernel_rig import SlcanRig
+from scenarios.bus_faults import wait_reset
+
+from .interface import back_to_driving, driving, lose_interface, stale_after
+
+TTY_FRAMES = 40  # what a stalled pty, the driver and the queue hold at most, per measurement and with room
+
+
+@kernel_test("nominal drive through an adapter", "adapter realtime", 0, SlcanRig)
+def slcan_nominal(t):
+    rig, client, stream = driving(t, speed=400)
+    status = client.request("status")
+    t.check(abs(status["left"]["speed_mm_s"] - 400) < 40, f"left {status['left']['speed_mm_s']} mm/s")
+    t.check(status["bus"]["echo"] == "unproven", f"echo {status['bus']['echo']}")
+    t.check(stream.stop() is None, "the stream was not refused")
+    client.request("stop")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+    t.judge(rig)
+
+
+@kernel_test("bus-off in motion: stop, latched, reported; link restarted: reset, drives again", "adapter", 16, SlcanRig)
+def row16_bus_off(t):
+    rig, client, stream = driving(t)
+    observer = rig.client("observer")
+    observer.request("watch", topics=["bus", "stop"])
+    begin_us = now_us()
+    rig.note("cut", within_us=30_000)
+    rig.note("dead")
+    rig.adapter.tell("bus_off")
+    time.sleep(0.3)
+    stream.stop()
+    why = t.stopped_by(client, "bus_down")
+    t.check(why["detail"] == 1, f"detail 1 is bus-off, it is {why['detail']}")
+    t.measure("stop_ms", (why["at_us"] - begin_us) / 1000)
+    t.check(client.request("status")["bus"]["state"] == "bus_off", f"bus {client.request('status')['bus']}")
+    t.check(not client.request("reset")["ok"], "no reset while bus-off")
+    t.check(any(e["event"] == "bus" and e["state"] == "bus_off" for e in observer.collect(0.1)), "the event comes")
+    t.check("bus-off" in rig.gateway.text().lower(), f"the log says bus-off: {rig.gateway.text()[-300:]}")
+    netdev.down(rig.adapter.interface)
+    netdev.up(rig.adapter.interface)
+    back_us = now_us()
+    rig.note("alive")
+    back_to_driving(t, rig, client)
+    stale_after(t, rig, back_us)
+    t.judge(rig)
+
+
+@kernel_test("bus-off while listening: an event, arm refused, nothing sent", "adapter", 16, SlcanRig)
+def row16_bus_off_listening(t):
+    rig, client = t.running()
+    rig.adapter.tell("bus_off")
+    time.sleep(0.2)
+    t.expect(client.arm(), "bus_down")
+    t.check(client.request("status")["state"] == "listening", "not latched")
+    netdev.down(rig.adapter.interface)
+    netdev.up(rig.adapter.interface)
+    time.sleep(1.2)
+    t.check(not rig.bus.setpoints(), "nothing was sent")
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+@kernel_test("error passive in motion: shown, it drives on; active again: shown", "adapter", 16, SlcanRig)
+def row16_error_passive(t):
+    rig, client, stream = driving(t)
+    rig.adapter.tell("passive")
+    time.sleep(0.3)
+    t.check(client.request("status")["bus"]["state"] == "passive", f"bus {client.request('status')['bus']}")
+    t.check(client.request("status")["state"] == "armed", "it drives on")
+    rig.adapter.tell("active")
+    time.sleep(0.3)
+    t.check(client.request("status")["bus"]["state"] == "active", f"bus {client.request('status')['bus']}")
+    t.check(stream.stop() is None, "the stream was not refused")
+    client.request("stop")
+    time.sleep(0.4)
+    t.judge(rig)
+
+
+@kernel_test("a flood of error frames: it drives on, the log is rate-limited", "adapter", 16, SlcanRig)
+def row16_error_flood(t):
+    rig, client, stream = driving(t)
+    lines = len(rig.gateway.text().splitlines())
+    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
+    for number in range(400):
+        rig.adapter.errors(5, b"sc")
+        rig.adapter.tell("passive" if number % 2 else "warning")
+        time.sleep(0.005)
+    percent = 100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
+    rig.adapter.tell("active")
+    time.sleep(0.2)
+    more = len(rig.gateway.text().splitlines()) - lines
+    t.check(more <= 40, f"{more} lines of log for 2400 error frames in 2 s")
+    t.check(client.request("status")["state"] == "armed", f"it drives on: {client.request('why').get('sentence')}")
+    t.check(stream.stop() is None, "the stream was not refused")
+    t.figure(f"{more} lines of log, {percent:.0f} % CPU")
+    client.request("stop")
+    time.sleep(0.4)
+    t.judge(rig)
+
+
+def stalled(t, seconds, setup=None):
+    """The adapter takes nothing for that long; returns rig and what came out afterwards as [(t_us, id, mm/s)]."""
+    rig = t.rig({"drive": {"accel_mm_s2": 2000}})
+    rig.start_gateway(setup=setup)
+    client = rig.client()
+    t.arm(client)
+    stream = Streamer(client, 800, 800, 0.02)
+    time.sleep(0.8)
+    rig.note("dead")
+    rig.note("cut", within_us=150_000)
+    rig.adapter.stall(True)
+    time.sleep(seconds)
+    stream.stop()
+    if seconds > 0.5:
+        t.check(client.request("status")["state"] == "latched", "latched while it stalls")
+    rig.adapter.stall(False)
+    back_us = now_us()
+    rig.note("alive")
+    return rig, client, back_us
+
+
+def bounded_residue(t, rig, back_us):
+    """Without a proof by echo old frames cannot be ruled out: few, quickly gone, and behind them zeros."""
+    time.sleep(0.5)
+    late = rig.bus.setpoints(back_us)
+    moving = [at for at, _, speed in late if speed]
+    t.measure("stale_frames", len(moving))
+    t.check(len(moving) <= TTY_FRAMES, f"{len(moving)} old frames came out, {TTY_FRAMES} allowed")
+    t.check(not moving or moving[-1] - back_us < 100_000, "old frames are gone within 100 ms")
+    for side in (LEFT, RIGHT):
+        values = [speed for _, can_id, speed in late if can_id == side]
+        t.check(not values or values[-1] == 0, f"the last frame of {side} is a zero: {values[-5:]}")
+    t.figure(f"{len(moving)} old frames of {len(late)} after the stall")
+
+
+def judge_after_residue(t, rig, client, back_us):
+    """The old frames were judged already; the rest by the rules."""
+    wait_reset(t, client, 12)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    client.request("stop")
+    time.sleep(0.4)
+    rig.bus.frames[:] = [f for f in rig.bus.frames if not (f.id in (LEFT, RIGHT) and back_us <= f.t_us < back_us + 500_000)]
+    t.judge(rig)
+
+
+@kernel_test("a stalled adapter, with the right to restart the link: nothing old comes out", "adapter", 17, SlcanRig)
+def row17_stall(t):
+    rig, client, back_us = stalled(t, 2.0)
+    bounded_residue(t, rig, back_us)
+    judge_after_residue(t, rig, client, back_us)
+
+
+@kernel_test("a stalled adapter, without that right: what comes out is bounded and ends in zeros", "adapter", 17, SlcanRig)
+def row17_stall_no_rights(t):
+    rig, client, back_us = stalled(t, 2.0, netdev.without_net_admin)
+    bounded_residue(t, rig, back_us)
+    judge_after_residue(t, rig, client, back_us)
+
+
+@kernel_test("an adapter that stalls for 40 ms: nothing old piles up", "adapter", 17, SlcanRig)
+def row17_stall_short(t):
+    rig, client, back_us = stalled(t, 0.04)
+    time.sleep(0.3)
+    late = [at for at, _, _ in rig.bus.setpoints(back_us) if at < back_us + 5_000]
+    t.check(len(late) <= 2 * DEPTH + 6, f"{len(late)} setpoints in the first 5 ms")
+    t.figure(f"{len(late)} setpoints in the first 5 ms, {client.request('status')['state']}")
+
+
+def power_cut(t, seconds, setup):
+    rig = t.rig({"drive": {"accel_mm_s2": 2000}})
+    rig.start_gateway(setup=setup)
+    client = rig.client()
+    t.arm(client)
+    stream = Streamer(client, 800, 800, 0.02)
+    time.sleep(1.0)
+    rig.note("dead")
+    rig.fault("power off", within_ms=120)
+    time.sleep(0.3)
+    stream.stop()
+    t.check(client.request("status")["state"] == "latched", "latched")
+    t.check(not client.request("reset")["ok"], "reset waits until the wheels are heard")
+    time.sleep(seconds)
+    back_us = now_us()
+    rig.sim.ask("power on")
+    rig.note("alive")
+    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 10)
+    t.check(heard, "the wheels are heard again")
+    time.sleep(0.5)
+    late = rig.bus.setpoints(back_us)
+    moving = [(at, side) for at, side, speed in late if speed]
+    t.measure("stale_frames", len(moving))
+    t.figure(f"{len(moving)} old of {len(late)} frames after the power came back")
+    return rig, client, back_us, late, moving
+
+
+@kernel_test("wheel power cut for 10 s at full command, with the right to restart the link: no old frame", "adapter", 18, SlcanRig)
+def row18_power_cut(t):
+    rig, client, back_us, late, moving = power_cut(t, 10, None)
+    t.check(not moving, f"no old frame with purge: {[(at - back_us, side) for at, side in moving]}")
+    judge_after_residue(t, rig, client, back_us)
+
+
+@kernel_test("wheel power cut for 10 s at full command, without that right: bounded, ends in zeros", "adapter", 18, SlcanRig)
+def row18_power_cut_no_rights(t):
+    rig, client, back_us, late, moving = power_cut(t, 10, netdev.without_net_admin)
+    t.check(not late or all(speed == 0 for _, _, speed in late[-2:]), f"ends in zeros: {late[-3:]}")
+    first = [at for at, _, _ in late][:1]
+    spread_us = moving[-1][0] - first[0] if moving else 0
+    t.check(spread_us < 20_000, f"old frames are through within {spread_us / 1000:.1f} ms of the first, 20 ms allowed")
+    judge_after_residue(t, rig, client, back_us)
+
+
+@kernel_test("adapter unplugged in motion and plugged in again: stop, found by name, no backlog", "adapter realtime", 15, SlcanRig)
+def row15_unplugged(t):
+    rig, client, stream = driving(t)
+    lose_interface(t, rig, client, stream, rig.adapter.unplug)
+    t.check(not rig.adapter.is_there(), "the interface is gone")
+    time.sleep(1.0)
+    rig.adapter.plug()
+    rig.adapter.link_up()
+    back_us = now_us()
+    rig.note("alive")
+    back_to_driving(t, rig, client)
+    stale_after(t, rig, back_us)
+    t.judge(rig)

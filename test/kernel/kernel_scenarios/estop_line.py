@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: MIT
+"""Rows 11 to 14: the e-stop on a GPIO line."""
+
+import random
+import subprocess
+import time
+
+import netdev
+from catalogue import kernel_test
+from client import Streamer
+from harness import now_us
+from judge_log import Event
+from kernel_rig import HighVcanRig, SlcanRig
+from scenarios.estop import reset
+
+PRESSES, PRESSES_REAL_TIME, PRESSES_FULL = 100, 25, 1000
+PULSES_MS = (1, 2, 3, 5, 7, 10, 15, 20)
+WORST_US = 20_000  # of one press; the percentiles are judged by the campaign
+
+
+def one_press(t, rig, driver, other, chance):
+    """Arms, drives, presses at a random moment of the ramp or the steady part, releases, resets."""
+    t.arm(driver)
+    stream = Streamer(driver, chance.randrange(-600, 600), chance.randrange(-600, 600), 0.02)
+    time.sleep(chance.uniform(0.05, 0.6))
+    pressed_us = rig.press()
+    time.sleep(chance.uniform(0.01, 0.05))
+    status = other.request("status")
+    latched = status["state"] == "latched" and status["cause"] == "estop_line"
+    t.check(latched, f"{status['state']}, {status['cause']} after a press", at_us=pressed_us)
+    stream.stop()
+    t.expect(other.request("reset"), "estop_pressed")
+    rig.release()
+    time.sleep(chance.uniform(0, 0.05))
+    t.check(other.request("status")["state"] == "latched", "release alone must not unlatch", at_us=pressed_us)
+    reset(t, other, 6.0)
+    return not t.failures
+
+
+def presses(t, count, seed):
+    chance = random.Random(seed)
+    rig, driver = t.running()
+    other = rig.client("other")
+    for _ in range(count):
+        if not one_press(t, rig, driver, other, chance):
+            break
+    judge = t.judge(rig, estop_limit_us=WORST_US)
+    t.check(len(judge.estop_latencies) >= 0.9 * count, f"{len(judge.estop_latencies)} of {count} presses met a running setpoint")
+
+
+@kernel_test("presses in motion at random phase", "estop", 11)
+def row11_presses_low(t):
+    presses(t, PRESSES_FULL if t.plan["full"] else PRESSES, t.plan["seed"])
+
+
+@kernel_test("presses in motion at random phase, contact normally closed", "estop", 11, HighVcanRig)
+def row11_presses_high(t):
+    presses(t, PRESSES, t.plan["seed"] + 1)
+
+
+@kernel_test("presses in motion at random phase, through an adapter", "estop", 11, SlcanRig)
+def row11_presses_adapter(t):
+    presses(t, PRESSES // 4, t.plan["seed"] + 2)
+
+
+@kernel_test("presses in motion at random phase, by the clock on the wall", "realtime", 11)
+def row11_presses_real_time(t):
+    presses(t, PRESSES_FULL if t.plan["full"] else PRESSES_REAL_TIME, t.plan["seed"] + 3)
+
+
+def pulses(t):
+    chance = random.Random(t.plan["seed"])
+    rig, client = t.running()
+    for pulse_ms in PULSES_MS:
+        t.arm(client)
+        stream = Streamer(client, 300, 300)
+        time.sleep(chance.uniform(0.2, 0.3))
+        rig.pulse(pulse_ms / 1000)
+        time.sleep(0.05)
+        stream.stop()
+        t.stopped_by(client, "estop_line")
+        reset(t, client, 6.0)
+    t.figure(f"{len(PULSES_MS)} pulses of {PULSES_MS[0]} to {PULSES_MS[-1]} ms")
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+@kernel_test("pulses of 1 to 20 ms latch", "estop", 12)
+def row12_pulses_low(t):
+    pulses(t)
+
+
+@kernel_test("pulses of 1 to 20 ms latch, contact normally closed", "estop realtime", 12, HighVcanRig)
+def row12_pulses_high(t):
+    pulses(t)
+
+
+@kernel_test("a pulse in the same instant as its end latches: the edge counts, not the level", "estop", 12)
+def row12_glitch(t):
+    rig, client = t.running()
+    t.arm(client)
+    stream = Streamer(client, 300, 300)
+    time.sleep(0.4)
+    rig.pulse(0)
+    time.sleep(0.05)
+    stream.stop()
+    t.stopped_by(client, "estop_line")
+    reset(t, client, 6.0)
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+@kernel_test("a chattering contact on release: reset waits for a quiet line", "estop", 13)
+def row13_chatter(t):
+    rig, client = t.running()
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    rig.press()
+    time.sleep(1.5)
+    for _ in range(400):
+        rig.release()
+        time.sleep(0.002)
+        rig.chip.pull(rig.active == "high")
+        time.sleep(0.002)
+        refusal = client.request("reset")
+        t.check(not refusal["ok"], "reset must be refused while the contact chatters")
+        if t.failures:
+            break
+    rig.release()
+    reset(t, client, 6.0)
+    time.sleep(0.3)
+    t.check(client.request("status")["state"] == "listening", "then it is accepted")
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+@kernel_test("pressed at start: latched; reset refused while pressed; release alone moves nothing", "estop realtime", 13)
+def row13_pressed_at_start(t):
+    rig = t.rig()
+    rig.chip.pull(rig.active == "high")
+    rig.start_gateway(wheels=False)
+    client = rig.client()
+    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
+    t.check(heard and heard["state"] == "latched", f"latched from the start: {heard and heard['state']}")
+    t.stopped_by(client, "estop_line")
+    for _ in range(5):
+        t.expect(client.request("reset"), "estop_pressed")
+    rig.release()
+    time.sleep(1.5)
+    t.check(client.request("status")["state"] == "latched", "release does not unlatch")
+    reset(t, client)
+    for _ in range(5):
+        reply = client.request("reset")
+        t.check(reply["ok"] and reply["state"] == "listening", f"repeated reset: {reply}")
+    t.expect(client.drive(200, 200), "not_armed")
+    time.sleep(0.7)
+    t.check(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+def lost_line(t, rig, client, lose, find):
+    """Loses the line in motion, looks for a busy loop, finds it again, resets, drives."""
+    t.arm(client)
+    stream = Streamer(client, 300, 300)
+    time.sleep(0.6)
+    t_us = now_us()
+    lose()
+    rig.timeline.append(Event(t_us, "press", now_us()))
+    time.sleep(0.2)
+    stream.stop()
+    t.stopped_by(client, "estop_line")
+    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
+    time.sleep(2.0)
+    share = (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
+    t.check(share < 0.5, f"{100 * share:.0f} % CPU while the line is gone", True)
+    refusal = client.request("reset")
+    t.check(not refusal["ok"], "no reset without a line")
+    find()
+    t.check(rig.wait_status(client, lambda s: s["estop"]["state"] == "released", 3), "found again")
+    t.check(client.request("status")["state"] == "latched", "its return alone does not unlatch")
+    reset(t, client, 6.0)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+
+
+@kernel_test("the GPIO chip vanishes in motion, and comes back", "estop realtime", 14)
+def row14_chip_vanishes(t):
+    rig, client = t.running()
+
+    def find():
+        rig.chip.appear()
+        rig.release()
+
+    lost_line(t, rig, client, rig.chip.vanish, find)
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+@kernel_test("no GPIO chip at start: latched; it appears: reset", "estop", 14)
+def row14_no_chip_at_start(t):
+    rig = t.rig()
+    rig.chip.vanish()
+    rig.start_gateway(wheels=False)
+    client = rig.client()
+    rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
+    status = client.request("status")
+    t.check(status["state"] == "latched", f"{status['state']}")
+    t.check(status["estop"]["state"] == "unreadable", f"e-stop {status['estop']['state']}")
+    t.check(rig.line in rig.gateway.text(), f"the log names the line: {rig.gateway.text()[-300:]}")
+    t.expect(client.request("reset"), "estop_pressed")
+    rig.chip.appear()
+    rig.release()
+    reset(t, client, 6.0)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+@kernel_test("the line is busy at start: pressed; it is freed: reset", "estop", 14)
+def row14_line_busy(t):
+    rig = t.rig()
+    holder = subprocess.Popen(["gpiomon", rig.chip.chip, str(rig.chip.OFFSET)], stdout=subprocess.DEVNULL)
+    time.sleep(0.3)
+    rig.start_gateway(wheels=False)
+    client = rig.client()
+    rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
+    status = client.request("status")
+    t.check(status["state"] == "latched" and status["estop"]["state"] == "unreadable", f"{status['state']}, {status['estop']}")
+    text = rig.gateway.text()
+    t.check("busy" in text.lower() or "gpiomon" in text, f"the log says that it is busy: {text[-300:]}")
+    t.expect(client.request("reset"), "estop_pressed")
+    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
+    time.sleep(2.0)
+    t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop", True)
+    lines = len(rig.gateway.text().splitlines()) - len(text.splitlines())
+    t.check(lines <= 3, f"{lines} lines of log in 2 s of a busy line")
+    holder.kill()
+    holder.wait()
+    rig.release()
+    reset(t, client, 6.0)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+@kernel_test("the line by chip and offset, and a name that does not exist", "estop", 14)
+def row14_line_names(t):
+    rig = t.rig()
+    rig.line = f"{rig.chip.chip}:{rig.chip.OFFSET}"
+    rig.start_gateway()
+    client = rig.client()
+    t.check(client.request("status")["estop"]["state"] == "released", "read by chip and offset")
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.4)
+    rig.press()
+    time.sleep(0.1)
+    t.stopped_by(client, "estop_line")
+    t.judge(rig, estop_limit_us=WORST_US)
+
+
+@kernel_test("an adapter without rights over the interface drives and stops as well", "estop", 11, SlcanRig)
+def row11_without_rights(t):
+    rig = t.rig()
+    rig.start_gateway(setup=netdev.without_net_admin)
+    client = rig.client()
+    chance = random.Random(t.plan["seed"])
+    for _ in range(5):
+        if not one_press(t, rig, client, client, chance):
+            break
+    t.judge(rig, estop_limit_us=WORST_US)
+
+

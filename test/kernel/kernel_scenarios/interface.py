@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: MIT
+"""Rows 15 and 17 on vcan: interfaces that go down, vanish, refuse frames, echo late or never."""
+
+import time
+
+import netdev
+from catalogue import kernel_test
+from client import Streamer
+from harness import now_us
+from judge_log import Event
+from scenario import Skip
+from scenarios.bus_faults import wait_reset
+
+STALE_US = 20_000  # frames later than this after a bus came back were not on their way any more
+
+
+def driving(t, config=None, speed=300, **options):
+    """A rig that drives: rig, client, stream."""
+    rig, client = t.running(config, **options)
+    t.arm(client)
+    stream = Streamer(client, speed, speed, 0.02)
+    time.sleep(0.7)
+    return rig, client, stream
+
+
+def back_to_driving(t, rig, client):
+    """Both wheels are heard, reset is accepted, nothing moved by itself, and it drives again."""
+    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", 8)
+    if not t.check(heard, f"heard again: {client.request('status')['bus']}"):
+        return
+    wait_reset(t, client)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    client.request("stop")
+    time.sleep(0.3)
+
+
+def stale_after(t, rig, back_us, until_us=None):
+    """Checks that after the bus came back nothing but zeros was sent until the next arm; measures old frames."""
+    armed = [event.t_us for event in rig.timeline if event.kind == "arm" and event.ok and event.t_us > back_us]
+    until_us = until_us or min(armed, default=now_us())
+    late = [(at, value) for at, _, value in rig.bus.setpoints(back_us) if at < until_us]
+    moving = [(at - back_us, value) for at, value in late if value]
+    t.measure("stale_frames", len(moving))
+    t.check(not moving, f"old frames after the bus came back: {moving[:6]}")
+    t.figure(f"{len(late)} zero frames after it came back")
+
+
+def lose_interface(t, rig, client, stream, lose):
+    """The interface goes in motion; the rest of the catalogue's row is checked by the caller."""
+    lost_us = now_us()
+    rig.note("dead")
+    rig.note("cut", within_us=60_000)
+    lose()
+    time.sleep(0.3)
+    stream.stop()
+    t.stopped_by(client, "bus_down")
+    refusal = client.request("reset")
+    t.check(not refusal["ok"], "no reset while the bus is down")
+    t.expect(client.arm(), "latched")
+    return lost_us
+
+
+@kernel_test("interface down in motion, and up again: stop, no backlog", "bus realtime", 15)
+def row15_down_and_up(t):
+    rig, client, stream = driving(t)
+    lose_interface(t, rig, client, stream, lambda: netdev.down(rig.interface))
+    time.sleep(1.0)
+    netdev.up(rig.interface)
+    back_us = now_us()
+    rig.note("alive")
+    back_to_driving(t, rig, client)
+    stale_after(t, rig, back_us)
+    t.judge(rig)
+
+
+@kernel_test("interface down and up within a moment: stop all the same", "bus", 15)
+def row15_blink(t):
+    rig, client, stream = driving(t)
+    t_us = now_us()
+    rig.note("cut", within_us=60_000)
+    netdev.down(rig.interface)
+    netdev.up(rig.interface)
+    back_us = now_us()
+    time.sleep(0.3)
+    stream.stop()
+    t.first_after(rig, t_us, lambda speed: speed == 0, "zero after the blink", 60)
+    t.stopped_by(client, "bus_down")
+    moving = [(at - back_us, value) for at, _, value in rig.bus.setpoints(back_us + 1) if value]
+    t.check(not moving, f"motion after the interface came back: {moving[:4]}")
+    back_to_driving(t, rig, client)
+    t.judge(rig)
+
+
+@kernel_test("interface deleted in motion and made again: reopened by name, zero first", "bus realtime", 15)
+def row15_deleted_and_made_again(t):
+    rig, client, stream = driving(t)
+    lose_interface(t, rig, client, stream, lambda: netdev.delete(rig.interface))
+    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
+    time.sleep(2.0)
+    t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop without an interface", True)
+    netdev.add_vcan(rig.interface)
+    back_us = now_us()
+    rig.relisten()
+    rig.sim.end()
+    rig.sim = type(rig.sim)(rig)
+    rig.note("alive")
+    back_to_driving(t, rig, client)
+    stale_after(t, rig, back_us)
+    t.judge(rig)
+
+
+@kernel_test("no interface at start: it waits, and finds it when it comes", "bus", 15)
+def row15_absent_at_start(t):
+    rig = t.rig()
+    rig.sim.end()
+    netdev.delete(rig.interface)
+    rig.start_gateway(wheels=False)
+    client = rig.client()
+    status = client.request("status")
+    t.check(status["bus"]["state"] == "down", f"bus {status['bus']}")
+    t.expect(client.arm(), "bus_down")
+    text = rig.gateway.text()
+    t.check(rig.interface in text, f"the log names the interface: {text[-300:]}")
+    time.sleep(2.0)
+    lines = len(rig.gateway.text().splitlines()) - len(text.splitlines())
+    t.check(lines <= 3, f"{lines} lines of log in 2 s without an interface")
+    netdev.add_vcan(rig.interface)
+    rig.relisten()
+    rig.sim = type(rig.sim)(rig)
+    rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 5)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+@kernel_test("down while listening: an event, nothing sent, arm refused", "bus", 15)
+def row15_down_while_listening(t):
+    rig, client = t.running()
+    client.request("watch", topics=["bus", "stop"])
+    netdev.down(rig.interface)
+    time.sleep(0.3)
+    t.expect(client.arm(), "bus_down")
+    t.check(client.request("status")["state"] == "listening", "not latched")
+    states = [event["state"] for event in client.collect(0.1) if event["event"] == "bus"]
+    t.check("down" in states, f"the event comes: {states}")
+    netdev.up(rig.interface)
+    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active")
+    t.check(heard, "back without reset")
+    t.check(not rig.bus.setpoints(), "nothing was sent")
+    time.sleep(1.1)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+@kernel_test("ENOBUFS for 300 ms in motion: stop, nothing old afterwards", "bus realtime", 17)
+def row17_no_buffers(t):
+    rig, client, stream = driving(t)
+    rig.note("dead")
+    rig.fault_us = now_us()
+    rig.note("cut", within_us=120_000)
+    netdev.discipline(rig.interface, "pfifo", "limit", "0")
+    time.sleep(0.3)
+    netdev.discipline(rig.interface)
+    back_us = now_us()
+    rig.note("alive")
+    time.sleep(0.3)
+    stream.stop()
+    why = client.request("why")
+    t.check(why["cause"] in ("send_stalled", "wheel_lost"), f"cause {why['cause']}: {why.get('sentence')}")
+    t.check(client.request("status")["state"] == "latched", "latched")
+    stale_after(t, rig, back_us)
+    back_to_driving(t, rig, client)
+    t.figure(f"stopped by {why['cause']}")
+    t.judge(rig)
+
+
+@kernel_test("ENOBUFS for 30 ms in motion: no old frame, and it drives on or stops from zero", "bus", 17)
+def row17_no_buffers_short(t):
+    rig, client, stream = driving(t, {"limits": {"wheel_silent_ms": 200}})
+    begin_us = now_us()
+    rig.note("dead")
+    netdev.discipline(rig.interface, "pfifo", "limit", "0")
+    time.sleep(0.03)
+    netdev.discipline(rig.interface)
+    rig.note("alive")
+    time.sleep(0.4)
+    first = [value for at, _, value in rig.bus.setpoints(begin_us + 1)][:2]
+    t.figure(f"first pair afterwards {first}, {client.request('status')['state']}")
+    stream.stop()
+    rig.timeline.append(Event(begin_us, "cut", within_us=150_000))
+    t.judge(rig)
+
+
+# With vcan.echo=1 the echo comes through the queueing discipline: late or never.
+
+
+def needs_echo(rig):
+    if not netdev.flags(rig.interface) & netdev.IFF_ECHO:
+        raise Skip("needs a boot with vcan.echo=1")
+
+
+@kernel_test("nominal drive; the echo is reported as proven", "echo", 17)
+def row17_echo_proven(t):
+    rig, client = t.running()
+    needs_echo(rig)
+    t.check(client.request("status")["bus"]["echo"] == "proven", "status: echo proven")
+    t.arm(client)
+    t.drive_for(client, 300, 300, 1.0)
+    client.request("stop")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+    t.judge(rig)
+
+
+@kernel_test("without IFF_ECHO: reported as unproven", "bus", 17)
+def row17_echo_unproven(t):
+    rig, client = t.running()
+    t.check(client.request("status")["bus"]["echo"] == "unproven", "status: echo unproven")
+    t.arm(client)
+    t.drive_for(client, 300, 300, 0.5)
+    t.judge(rig)
+
+
+LATE = {"limits": {"wheel_silent_ms": 200}}  # netem delays the wheels' frames on the same interface too
+
+
+@kernel_test("echo 30 ms late: within the limit, it drives on", "echo", 17)
+def row17_echo_late_enough(t):
+    rig, client = t.running(LATE)
+    needs_echo(rig)
+    netdev.discipline(rig.interface, "netem", "delay", "30ms")
+    time.sleep(0.5)
+    t.arm(client)
+    t.drive_for(client, 300, 300, 1.0)
+    t.check(client.request("status")["state"] == "armed", "still armed")
+    client.request("stop")
+    time.sleep(0.6)
+    t.judge(rig)
+
+
+@kernel_test("echo 200 ms late at arm: refused, nothing but zeros", "echo", 17)
+def row17_echo_too_late_at_arm(t):
+    rig, client = t.running(LATE)
+    needs_echo(rig)
+    netdev.discipline(rig.interface, "netem", "delay", "200ms")
+    time.sleep(0.6)
+    reply = client.arm()
+    time.sleep(0.5)
+    state = client.request("status")["state"]
+    t.check(not reply["ok"] or state == "latched", f"arm without an echo in time: {reply}, {state}")
+    t.check(client.request("why")["cause"] == "send_stalled" or reply.get("error") == "send_stalled", "and says why")
+    t.check(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing but zeros")
+    netdev.discipline(rig.interface)
+    back_to_driving_if_latched(t, rig, client)
+
+
+def back_to_driving_if_latched(t, rig, client):
+    time.sleep(1.2)
+    heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 5)
+    t.check(heard, "the wheels are heard")
+    wait_reset(t, client)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+
+
+def echo_fault(t, *netem):
+    rig, client, stream = driving(t, LATE)
+    needs_echo(rig)
+    rig.note("dead")
+    fault_us = now_us()
+    rig.note("cut", within_us=120_000)
+    netdev.discipline(rig.interface, "netem", *netem)
+    time.sleep(0.12)
+    state = client.request("status")
+    latched = t.check(state["state"] == "latched" and state["cause"] == "send_stalled", f"{state['state']}, {state['cause']}")
+    t.measure("stop_ms", (client.request("why")["at_us"] - fault_us) / 1000 if latched else 0)
+    time.sleep(0.5)
+    stream.stop()
+    netdev.discipline(rig.interface)
+    back_us = now_us()
+    rig.note("alive")
+    time.sleep(0.2)
+    stale_after(t, rig, back_us + STALE_US)
+    back_to_driving_if_latched(t, rig, client)
+    client.request("stop")
+    time.sleep(0.3)
+    t.judge(rig)
+
+
+@kernel_test("echo 150 ms late in motion: stop within echo_ms, latched", "echo", 17)
+def row17_echo_late(t):
+    echo_fault(t, "delay", "150ms")
+
+
+@kernel_test("no echo in motion: stop within echo_ms, latched", "echo", 17)
+def row17_echo_missing(t):
+    echo_fault(t, "loss", "100%")
