@@ -259,7 +259,7 @@ static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
     const iw_can_frame_t *frame = &tapped->frame;
     char data[2U * IW_CAN_DATA_MAX + 1U] = "";
     json_out_t json = begin_event(daemon, "frame");
-    for (unsigned i = 0; i < frame->dlc && i < IW_CAN_DATA_MAX; ++i) {
+    for (size_t i = 0; i < frame->dlc && i < IW_CAN_DATA_MAX; ++i) {
         (void)snprintf(&data[2U * i], 3U, "%02X", frame->data[i]);
     }
     json_out_int(&json, "t_us", (int64_t)tapped->at_us);
