@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define API_VERSION 1
+#define API_VERSION      1
 #define EXTENDED_ID_MASK 0x1FFFFFFFU
 
 static json_out_t begin_event(gw_daemon_t *daemon, const char *name) {
