@@ -23,8 +23,8 @@
 
 #define GW_CLIENTS_MAX 64U
 /// Frames of one step, for the watchers of the topic `frame`.
-#define GW_FRAMES IW_GATEWAY_DRAIN_MAX
-#define GW_WARNINGS 8U
+#define GW_FRAMES       IW_GATEWAY_DRAIN_MAX
+#define GW_WARNINGS     8U
 #define GW_WARNING_SIZE 400U
 
 /// What was last told to the log and to watchers, so that only changes are told.
@@ -66,8 +66,8 @@ typedef struct gw_daemon {
     int timer_fd;
     int signal_fd;
     bool shutting_down;
-    bool requested; ///< A request has changed something since the last step.
-    uint32_t link_changes;      ///< What of the link was last passed on.
+    bool requested;        ///< A request has changed something since the last step.
+    uint32_t link_changes; ///< What of the link was last passed on.
     iw_link_purge_t purge_told;
     bool link_known;
     uint32_t warnings;

@@ -13,8 +13,8 @@
 #include <unistd.h>
 
 #define BURST_LINES 20U
-#define LINE_US 200000U
-#define LINE_SIZE 1024U
+#define LINE_US     200000U
+#define LINE_SIZE   1024U
 
 static const char *const level_names[GW_LOG_LEVELS] = {"error", "warning", "info", "debug"};
 

@@ -20,7 +20,7 @@ typedef struct {
     field_kind_t kind;
 } field_t;
 
-#define BIT(cmd) ((uint16_t)(1U << (cmd)))
+#define BIT(cmd)   ((uint16_t)(1U << (cmd)))
 #define IN(member) offsetof(gw_request_t, member)
 
 static const field_t fields[] = {

@@ -11,11 +11,11 @@
 /// Bytes of a request without its newline.
 #define GW_LINE_MAX 4096U
 /// Deepest nesting that is parsed at all; requests need 2.
-#define GW_DEPTH_MAX 8U
-#define GW_ID_TEXT_MAX 64U
-#define GW_NAME_MAX 64U
-#define GW_REASON_MAX 200U
-#define GW_RATE_MAX_HZ 100
+#define GW_DEPTH_MAX       8U
+#define GW_ID_TEXT_MAX     64U
+#define GW_NAME_MAX        64U
+#define GW_REASON_MAX      200U
+#define GW_RATE_MAX_HZ     100
 #define GW_RATE_DEFAULT_HZ 10
 
 typedef enum {

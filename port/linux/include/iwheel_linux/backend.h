@@ -52,10 +52,10 @@ typedef struct {
     int (*watch_fd)(const void *self); ///< -1: there is nothing to watch.
     void (*tend)(void *self, iw_time_us_t now_us);
     iw_time_us_t (*next_us)(const void *self);
-    int (*pressed)(void *self); ///< As `estop_pressed` of iw_hal_t.
+    int (*pressed)(void *self);       ///< As `estop_pressed` of iw_hal_t.
     int (*trouble)(const void *self); ///< Why it cannot be read, as an errno; 0 while it can.
-    bool simulated;             ///< Not a real button: announced wherever the e-stop is shown.
-    bool present;               ///< False: there is no e-stop at all.
+    bool simulated;                   ///< Not a real button: announced wherever the e-stop is shown.
+    bool present;                     ///< False: there is no e-stop at all.
 } iw_estop_ops_t;
 
 /// `unix:PATH`: the local bus. The echo comes from its hub when the simulated wheels have acknowledged, so it is a proof.
