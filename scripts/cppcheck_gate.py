@@ -39,7 +39,7 @@ def findings_of(sources):
         match = FINDING.match(line)
         if not match:
             sys.exit(f"cppcheck says what this script does not understand: {line}")
-        yield match["file"].replace(f"{ROOT}/", ""), match["line"], match["id"], match["message"]
+        yield match["file"].removeprefix(f"{ROOT}/"), match["line"], match["id"], match["message"]
 
 
 def main(arguments):

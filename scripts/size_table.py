@@ -88,8 +88,11 @@ def main(arguments):
         committed = TABLE.read_text() if TABLE.exists() else ""
         if committed and f"arm-none-eabi-gcc {compiler()} " not in committed:
             print(f"skip: {TABLE.relative_to(ROOT)} was made by another compiler than {compiler()}")
-            return 77
-        changed = [*differences(numbers(committed), numbers(text))]
+            print(*findings, sep="\n")
+            return 1 if findings else 77
+        if not committed:
+            findings.append(f"{TABLE.relative_to(ROOT)} is missing: ./check --update-sizes writes it")
+        changed = [*differences(numbers(committed), numbers(text))] if committed else []
         findings += changed
         if changed:
             findings.append("the sizes changed: look at the reason, then ./check --update-sizes and commit docs/sizes.md")
