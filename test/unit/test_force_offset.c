@@ -145,6 +145,13 @@ static void test_force_tare_takes_the_mean_of_the_last_two_seconds(void) {
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.force.offset_us);
 }
 
+static void test_force_tare_after_long_rest_is_accepted(void) {
+    for (uint32_t n = 0; n < 300; n++) {
+        force_rig_quiet(&rig, 1, 100);
+        TEST_ASSERT_EQUAL_INT(n < 39 ? IW_TARE_NO_FORCE : IW_TARE_OK, force_rig_tare(&rig));
+    }
+}
+
 static void test_force_tare_outlives_what_the_wheel_says(void) {
     force_rig_quiet(&rig, 40, 200);
     (void)force_rig_tare(&rig);
@@ -290,6 +297,7 @@ int main(void) {
     RUN_TEST(test_force_reboot_under_load_is_seen_against_the_operators_offset);
     RUN_TEST(test_force_reboot_forgets_the_evidence_and_the_wheels_offset);
     RUN_TEST(test_force_tare_takes_the_mean_of_the_last_two_seconds);
+    RUN_TEST(test_force_tare_after_long_rest_is_accepted);
     RUN_TEST(test_force_tare_outlives_what_the_wheel_says);
     RUN_TEST(test_force_tare_without_two_fresh_seconds_is_refused);
     RUN_TEST(test_force_tare_while_moving_noisy_drifting_or_saturated_is_refused);

@@ -252,6 +252,8 @@ static void test_force_small_offset_is_no_evidence_unless_it_is_far_off(void) {
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 190, 19));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 0, -19));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 2000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, evidence_of(IW_LEFT, 2100, 10));
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 2101, 10));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, 2001, 0));
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, evidence_of(IW_LEFT, -2001, 0));
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));

@@ -48,7 +48,7 @@ static void start_with(iw_side_t side, int16_t raw) {
     gateway_rig_run(&rig, MS(20));
     press_for(side, raw, MS(2100));
     put_offset(side, 100);
-    press_for(side, raw, MS(50));
+    gateway_rig_step(&rig);
 }
 
 static void test_gateway_ledger_begins_with_where_assumptions_come_from(void) {
@@ -78,6 +78,9 @@ static void test_gateway_quiet_start_confirms_the_unit_of_each_side(void) {
     start_with(IW_RIGHT, 100);
     assert_entry(IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
     TEST_ASSERT_EQUAL_INT32(1000, entry(IW_LEDGER_FORCE_UNIT_RIGHT)->figure);
+    const uint32_t changes = rig.gateway.ledger.changes;
+    press_for(IW_RIGHT, 100, MS(500));
+    TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.ledger.changes);
 }
 
 static void test_gateway_wrong_unit_is_contradicted_and_force_invalid(void) {
@@ -178,9 +181,11 @@ static void test_gateway_driving_confirms_the_feedback_sign_once(void) {
 static void test_gateway_current_that_must_be_clamped_is_counted(void) {
     gateway_rig_arm(&rig);
     rig.gateway.config.max_current_mA = 3000;
+    const uint32_t sent = rig.bus.sent;
     gateway_rig_stop(&rig);
-    gateway_rig_run(&rig, MS(30));
-    TEST_ASSERT_TRUE(rig.gateway.sender.clamped > 0);
+    gateway_rig_run(&rig, MS(50));
+    TEST_ASSERT_TRUE(rig.bus.sent > sent);
+    TEST_ASSERT_EQUAL_UINT32(rig.bus.sent - sent, rig.gateway.sender.clamped);
     TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
 }
 

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+// Limits to the microsecond and accounts to the frame.
+#include "gateway_rig.h"
+#include "unity.h"
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static iw_state_t state(void) {
+    return iw_gateway_state(&rig.gateway);
+}
+
+static void drive_on(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+/// Runs until the next pair leaves.
+static void run_to_next_pair(void) {
+    const iw_time_us_t last_us = rig.bus.last_us[IW_LEFT];
+    while (rig.bus.last_us[IW_LEFT] == last_us) {
+        gateway_rig_run(&rig, 100);
+    }
+}
+
+static void turn(int16_t rpm) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        rig.wheel[side].rpm_fixed = true;
+        rig.wheel[side].rpm = rpm;
+    }
+}
+
+static void test_gateway_counts_what_it_sent_and_what_it_could_not(void) {
+    gateway_rig_arm(&rig);
+    const iw_sender_t *const sender = &rig.gateway.sender;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(500));
+    TEST_ASSERT_EQUAL_UINT32(rig.bus.sent, 2U * sender->pairs);
+    TEST_ASSERT_EQUAL_UINT32(0, sender->later);
+    TEST_ASSERT_EQUAL_UINT32(0, sender->clamped);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, sender->verdict);
+    const uint32_t pairs = sender->pairs;
+    rig.bus.send_result[IW_RIGHT] = 0;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
+    TEST_ASSERT_EQUAL_UINT32(pairs, sender->pairs);
+    TEST_ASSERT_EQUAL_UINT32(rig.bus.refused, sender->later);
+    TEST_ASSERT_TRUE(sender->later > 0);
+}
+
+static void test_gateway_counts_telemetry(void) {
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_UINT32_WITHIN(6, 1650, rig.gateway.counters.received);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.unknown);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.late_steps);
+}
+
+static void test_gateway_gap_is_measured_anew_after_silence(void) {
+    gateway_rig_run(&rig, MS(1000));
+    (void)gateway_rig_request_arm(&rig, HOLDER, false);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.gap_us);
+    gateway_rig_run(&rig, MS(50));
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(5000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    gateway_rig_arm(&rig);
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_TRUE(rig.gateway.sender.gap_max_us <= 20000U);
+    TEST_ASSERT_TRUE(rig.gateway.sender.gap_us > 0);
+}
+
+static void test_gateway_echo_is_overdue_at_its_limit_exactly(void) {
+    drive_on();
+    run_to_next_pair();
+    (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+    rig.bus.acknowledged = false;
+    const iw_time_us_t overdue_us = rig.bus.last_us[IW_LEFT] + MS(50);
+    gateway_rig_run(&rig, overdue_us - 1U - rig.now_us);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    gateway_rig_run(&rig, 1);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT32(50, rig.gateway.permit.stop.detail);
+}
+
+static void test_gateway_zero_held_back_leaves_with_the_first_echo(void) {
+    drive_on();
+    rig.bus.echo_delay_us = MS(45);
+    run_to_next_pair();
+    const iw_time_us_t echo_us = rig.bus.last_us[IW_LEFT] + MS(45);
+    gateway_rig_press(&rig, true);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_UINT8(2, rig.bus.unechoed[IW_LEFT]);
+    gateway_rig_run(&rig, echo_us - rig.now_us);
+    TEST_ASSERT_EQUAL_UINT64(echo_us, rig.bus.last_us[IW_LEFT]);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_zero_to_one_wheel_keeps_the_period(void) {
+    drive_on();
+    gateway_rig_run(&rig, MS(1));
+    rig.bus.acknowledged = false;
+    rig.bus.send_result[IW_RIGHT] = 0;
+    gateway_rig_press(&rig, true);
+    gateway_rig_run(&rig, MS(40));
+    const uint32_t pairs = rig.gateway.sender.pairs;
+    rig.bus.send_result[IW_RIGHT] = 1;
+    gateway_rig_run(&rig, MS(15));
+    TEST_ASSERT_EQUAL_UINT8(1, rig.bus.unechoed[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_UINT32(pairs, rig.gateway.sender.pairs);
+}
+
+static void test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once(void) {
+    drive_on();
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(1200));
+    run_to_next_pair();
+    gateway_rig_run(&rig, rig.bus.last_us[IW_LEFT] + MS(7) - rig.now_us);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, OTHER, false));
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.bus.last_us[IW_LEFT]);
+    gateway_rig_run(&rig, MS(1));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+static void test_gateway_rest_counts_after_its_time_only(void) {
+    turn(30);
+    gateway_rig_run(&rig, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
+    turn(2);
+    gateway_rig_run(&rig, MS(198));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
+    gateway_rig_run(&rig, MS(8));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+}
+
+static void test_gateway_one_moving_wheel_is_enough_to_refuse(void) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        setUp();
+        rig.wheel[side].rpm_fixed = true;
+        rig.wheel[side].rpm = 3;
+        gateway_rig_run(&rig, MS(1000));
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, gateway_rig_request_arm(&rig, HOLDER, false));
+        tearDown();
+    }
+}
+
+static void test_gateway_hold_lasts_until_half_a_second_of_rest(void) {
+    drive_on();
+    gateway_rig_stop(&rig);
+    turn(5);
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    turn(0);
+    gateway_rig_run(&rig, MS(495));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    gateway_rig_run(&rig, MS(15));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.permit.still_moving);
+}
+
+static void test_gateway_hold_ends_after_ten_seconds_with_a_rolling_wheel(void) {
+    drive_on();
+    gateway_rig_stop(&rig);
+    turn(5);
+    gateway_rig_run(&rig, MS(10200));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    gateway_rig_run(&rig, MS(150));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.permit.still_moving);
+}
+
+static void test_gateway_late_step_starts_the_comparison_of_speeds_anew(void) {
+    drive_on();
+    rig.wheel[IW_RIGHT].rpm_fixed = true;
+    rig.wheel[IW_RIGHT].rpm = -10;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(250));
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(30));
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(280));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(60));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
+}
+
+static void test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet(void) {
+    gateway_rig_run(&rig, MS(1000));
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(60));
+    rig.wheel[IW_RIGHT].mute = true;
+    gateway_rig_run(&rig, MS(10));
+    TEST_ASSERT_TRUE(iw_wheel_heard(&rig.gateway.wheel[IW_LEFT], rig.now_us));
+    TEST_ASSERT_FALSE(iw_wheel_lost(&rig.gateway.wheel[IW_RIGHT], rig.now_us));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_request_arm(&rig, HOLDER, false));
+}
+
+static void test_gateway_takes_no_more_than_its_share_in_one_step(void) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        rig.wheel[side].mute = true;
+    }
+    gateway_rig_step(&rig);
+    rig.bus.flood = IW_GATEWAY_DRAIN_MAX - 1U;
+    gateway_rig_step(&rig);
+    TEST_ASSERT_FALSE(rig.gateway.backlog);
+    rig.bus.flood = IW_GATEWAY_DRAIN_MAX + 3U;
+    gateway_rig_step(&rig);
+    TEST_ASSERT_TRUE(rig.gateway.backlog);
+    TEST_ASSERT_EQUAL_UINT32(3, rig.bus.flood);
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.wake_us);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_FALSE(rig.gateway.backlog);
+    TEST_ASSERT_EQUAL_UINT32(2U * IW_GATEWAY_DRAIN_MAX + 2U, rig.gateway.counters.unknown);
+}
+
+static void test_gateway_time_standing_still_sends_nothing_twice(void) {
+    drive_on();
+    run_to_next_pair();
+    const uint32_t sent = rig.bus.sent;
+    for (uint32_t n = 0; n < 100; n++) {
+        gateway_rig_step(&rig);
+    }
+    TEST_ASSERT_EQUAL_UINT32(sent, rig.bus.sent);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_counts_what_it_sent_and_what_it_could_not);
+    RUN_TEST(test_gateway_counts_telemetry);
+    RUN_TEST(test_gateway_gap_is_measured_anew_after_silence);
+    RUN_TEST(test_gateway_echo_is_overdue_at_its_limit_exactly);
+    RUN_TEST(test_gateway_zero_held_back_leaves_with_the_first_echo);
+    RUN_TEST(test_gateway_zero_to_one_wheel_keeps_the_period);
+    RUN_TEST(test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once);
+    RUN_TEST(test_gateway_rest_counts_after_its_time_only);
+    RUN_TEST(test_gateway_one_moving_wheel_is_enough_to_refuse);
+    RUN_TEST(test_gateway_hold_lasts_until_half_a_second_of_rest);
+    RUN_TEST(test_gateway_hold_ends_after_ten_seconds_with_a_rolling_wheel);
+    RUN_TEST(test_gateway_late_step_starts_the_comparison_of_speeds_anew);
+    RUN_TEST(test_gateway_wheel_excused_by_our_lateness_is_not_heard_yet);
+    RUN_TEST(test_gateway_takes_no_more_than_its_share_in_one_step);
+    RUN_TEST(test_gateway_time_standing_still_sends_nothing_twice);
+    return UNITY_END();
+}
