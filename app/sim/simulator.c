@@ -101,10 +101,11 @@ static void catch_up(sim_simulator_t *self) {
     while (sim_world_step(&self->world, self->now_us, &delivery)) {
         bool const from_client = delivery.port >= SIM_PORT_CLIENT;
         sim_bus_log_frame(&self->log, real_us(self, delivery.end_us), &delivery.frame, from_client);
-        if (!self->world.bus_off) {
+        if (self->on_socketcan) {
+            sim_socketcan_deliver(&self->can, &delivery);
+        } else if (!self->world.bus_off) {
             sim_hub_deliver(&self->hub, &delivery);
         }
-        sim_socketcan_deliver(&self->can, &delivery);
     }
 }
 
