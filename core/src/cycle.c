@@ -23,7 +23,9 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
     }
     self->counters.late_steps++;
     for (size_t side = 0; side < IW_SIDES; side++) {
-        iw_wheel_excuse(&self->wheel[side], now_us);
+        if (!iw_wheel_lost(&self->wheel[side], self->promised_us)) {
+            iw_wheel_excuse(&self->wheel[side], now_us);
+        }
         iw_follow_restart(&self->follow[side]);
     }
     if (late_us > IW_GATEWAY_HUNG_US) {
@@ -230,7 +232,9 @@ static bool both_at_rest(const iw_gateway_t *self, iw_time_us_t now_us, uint32_t
 
 void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_permit_view_t view;
-    if (!self->stalled) {
+    if (self->stalled) {
+        iw_permit_keep_present(&self->permit);
+    } else {
         watch_echo(self, now_us);
         watch_silence(self, now_us);
         watch_wheels(self, now_us);
@@ -240,7 +244,8 @@ void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     view.settled = both_at_rest(self, now_us, IW_PERMIT_SETTLED_US);
     view.output_zero = iw_setpoint_is_zero(&self->setpoint);
     view.timing_ok = !self->facts.timing_contradicted;
-    view.can_send = iw_outbox_waiting_us(&self->sender.outbox) == IW_NEVER;
+    view.can_send = iw_outbox_may_send(&self->sender.outbox, IW_LEFT, true) &&
+                    iw_outbox_may_send(&self->sender.outbox, IW_RIGHT, true);
     view.proven = iw_outbox_proven_since(&self->sender.outbox, self->permit.arming_us);
     view.applied = iw_setpoint_applied(&self->setpoint);
     iw_permit_step(&self->permit, now_us, &view);

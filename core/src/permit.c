@@ -48,6 +48,16 @@ static iw_time_us_t lease_us(const iw_permit_t *self) {
     return (iw_time_us_t)self->config->lease_ms * IW_US_PER_MS;
 }
 
+static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, iw_time_us_t span_us) {
+    self->lease_from_us = now_us;
+    self->lease_until_us = now_us + span_us;
+}
+
+static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
+    const iw_time_us_t unfed_us = now_us - self->lease_from_us;
+    return ((unfed_us < UINT32_MAX) ? (uint32_t)unfed_us : UINT32_MAX) / IW_US_PER_MS;
+}
+
 static iw_refusal_t refusal_for(iw_cause_t cause) {
     switch (cause) {
     case IW_CAUSE_ESTOP_LINE:
@@ -163,6 +173,10 @@ void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, u
     }
 }
 
+void iw_permit_keep_present(iw_permit_t *self) {
+    self->raised |= self->present & (BIT(IW_CAUSE_SEND_STALLED) | BIT(IW_CAUSE_WHEEL_LOST));
+}
+
 static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     const iw_time_us_t limit_us = (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
     const iw_time_us_t waited_us = now_us - self->arming_us;
@@ -170,7 +184,7 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
         self->arming = false;
         self->state = IW_STATE_ARMED;
         self->cut = false;
-        self->lease_until_us = now_us + IW_PERMIT_FIRST_LEASE_US;
+        grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
     } else if (waited_us >= limit_us) {
         end_arming(self, IW_REFUSE_SEND_STALLED);
     }
@@ -201,7 +215,7 @@ void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view
         step_arming(self, now_us);
     }
     if (self->state == IW_STATE_ARMED && now_us >= self->lease_until_us) {
-        enter_stopping(self, now_us, IW_CAUSE_LEASE_LOST, IW_SIDES_NONE, self->config->lease_ms);
+        enter_stopping(self, now_us, IW_CAUSE_LEASE_LOST, IW_SIDES_NONE, unfed_ms(self, now_us));
     } else if (self->state == IW_STATE_STOPPING && !self->arming && hold_done(self, now_us)) {
         self->state = IW_STATE_LISTENING;
     } else if (self->state == IW_STATE_LATCHED && self->holding && hold_done(self, now_us)) {
@@ -277,7 +291,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
     }
     self->holder = client;
     if (self->state == IW_STATE_ARMED) {
-        self->lease_until_us = now_us + IW_PERMIT_FIRST_LEASE_US;
+        grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
     } else {
         self->arming = true;
         self->arming_us = now_us;
@@ -320,7 +334,7 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t
         iw_permit_remember(self, now_us, client);
     }
     if (refusal == IW_REFUSE_NONE) {
-        self->lease_until_us = now_us + lease_us(self);
+        grant_lease(self, now_us, lease_us(self));
     }
     return refusal;
 }

@@ -34,7 +34,7 @@ static void test_permit_lease_after_arm_lasts_a_second(void) {
     arm();
     assert_lost_after(MS(1000), IW_CAUSE_LEASE_LOST);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
-    TEST_ASSERT_EQUAL_UINT32(200, rig.permit.stop.detail);
+    TEST_ASSERT_EQUAL_UINT32(1000, rig.permit.stop.detail);
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.stop.from);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.stop.number);

@@ -56,7 +56,7 @@ typedef enum {
     IW_CAUSE_INTERNAL,       ///< An internal check failed. Detail: an iw_gate_verdict_t.
     IW_CAUSE_LOOP_LATE,      ///< Late by 100 to 500 ms: zero without ramp. Detail: ms.
     IW_CAUSE_WHEEL_BLOCKED,  ///< Below 20 % of its command. Detail: |measured| mm/s.
-    IW_CAUSE_LEASE_LOST,     ///< The holder sent no drive command in time. Detail: the lease in ms.
+    IW_CAUSE_LEASE_LOST,     ///< The holder sent no drive command in time. Detail: ms since its last one, or since arm.
     IW_CAUSE_CLIENT_GONE,    ///< The holder disconnected. Detail: 0.
     IW_CAUSE_CLIENT_STOP,    ///< A client said stop or disarm. Detail: 0.
     IW_CAUSE_SHUTDOWN,       ///< The gateway is ending. Detail: 0.
@@ -113,7 +113,7 @@ typedef struct {
     bool settled;     ///< Both at rest for IW_PERMIT_SETTLED_US.
     bool output_zero; ///< The pair last sent was zero, or none was sent since the last silence.
     bool timing_ok;   ///< The bus timing is not contradicted.
-    bool can_send;    ///< No setpoint is waiting to be proven.
+    bool can_send;    ///< A zero could be handed over for both wheels now.
     bool proven;      ///< Both frames of the arming pair have been echoed.
     iw_pair_t applied;
 } iw_permit_view_t;
@@ -122,10 +122,11 @@ typedef struct {
     const iw_config_t *config;
     iw_permit_view_t view;                    ///< Of the last step: requests are judged by it.
     iw_time_us_t seen_us[IW_CAUSE_LOOP_LATE]; ///< When each latching cause was last seen; IW_NEVER: never.
-    iw_time_us_t lease_until_us;
-    iw_time_us_t arming_us; ///< When arming began.
-    iw_time_us_t hold_us;   ///< When the zeros began; IW_NEVER: not yet.
-    iw_time_us_t stale_us;  ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
+    iw_time_us_t lease_from_us;               ///< The last accepted drive command, or arm.
+    iw_time_us_t lease_until_us;              ///< Without another one the lease ends here.
+    iw_time_us_t arming_us;                   ///< When arming began.
+    iw_time_us_t hold_us;                     ///< When the zeros began; IW_NEVER: not yet.
+    iw_time_us_t stale_us;                    ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
     iw_client_t stale_client;
     iw_client_t holder;
     uint32_t raised;       ///< Bit per cause: told since the last step.
@@ -146,6 +147,9 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
 /// Tells that a cause is present or has just happened. It takes effect at once; the first cause of a latch stays the
 /// cause.
 void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail);
+
+/// This step cannot judge what was received: SEND_STALLED and WHEEL_LOST stay present if they were.
+void iw_permit_keep_present(iw_permit_t *self);
 
 /// Everything that follows from time and from what the owner sees: end of lease, of arming and of the hold.
 void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view_t *view);

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// What a late step leaves as it was, and arming while the last zero is still on its way.
+#include "gateway_rig.h"
+#include "unity.h"
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static bool told_lost(void) {
+    return (rig.gateway.permit.present & (1U << IW_CAUSE_WHEEL_LOST)) != 0U;
+}
+
+static void stall_by(iw_time_us_t late_us) {
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + late_us);
+}
+
+static void test_gateway_late_step_leaves_a_lost_wheel_lost(void) {
+    gateway_rig_run(&rig, MS(500));
+    rig.wheel[IW_LEFT].mute = true;
+    gateway_rig_run(&rig, MS(200));
+    TEST_ASSERT_TRUE(told_lost());
+    for (uint32_t i = 0; i < 5U; i++) {
+        stall_by(MS(60));
+        TEST_ASSERT_TRUE(told_lost());
+        gateway_rig_step(&rig);
+        TEST_ASSERT_TRUE(told_lost());
+    }
+}
+
+static void test_gateway_late_step_leaves_a_wheel_that_is_there_alone(void) {
+    gateway_rig_run(&rig, MS(500));
+    for (uint32_t i = 0; i < 5U; i++) {
+        stall_by(MS(60));
+        TEST_ASSERT_FALSE(told_lost());
+        gateway_rig_run(&rig, MS(10));
+        TEST_ASSERT_FALSE(told_lost());
+    }
+}
+
+static void test_gateway_arm_behind_a_zero_on_its_way_is_not_refused(void) {
+    gateway_rig_arm(&rig);
+    gateway_rig_stop(&rig);
+    while (rig.gateway.sender.outbox.pending[IW_LEFT] == 0U) {
+        gateway_rig_run(&rig, MS(1) / 10U);
+    }
+    iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
+    gateway_rig_run(&rig, MS(1100));
+    while (rig.gateway.sender.outbox.pending[IW_LEFT] == 0U) {
+        gateway_rig_run(&rig, MS(1) / 10U);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_reset(&rig.gateway, rig.now_us));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
+    gateway_rig_run(&rig, MS(30));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_late_step_leaves_a_lost_wheel_lost);
+    RUN_TEST(test_gateway_late_step_leaves_a_wheel_that_is_there_alone);
+    RUN_TEST(test_gateway_arm_behind_a_zero_on_its_way_is_not_refused);
+    return UNITY_END();
+}
