@@ -8,6 +8,7 @@ import threading
 from bus import ERROR, EXTENDED, FRAME, SO_TIMESTAMPNS, Bus, now_us, realtime_ahead_us
 from judge_log import Frame
 
+CAN_RAW_ERR_FILTER = 2  # Python does not know it
 MSG_CONFIRM = 0x800  # the frame is our own
 FD_FRAME = struct.Struct("=IBB2x64s")
 RECHECK_S = 0.2
@@ -34,7 +35,7 @@ class CanBus(Bus):
         self.interface, self.exact = interface, exact
         self.socket = open_raw(interface, *ids)
         self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
-        self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_ERR_FILTER, 0x1FFFFFFF)
+        self.socket.setsockopt(socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, 0x1FFFFFFF)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
         self.socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", 0, int(RECHECK_S * 1e6)))

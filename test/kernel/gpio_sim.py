@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""One simulated GPIO chip with one line, by configfs."""
+"""One simulated GPIO chip with two lines, by configfs, and a reader of edges, by the kernel's own interface."""
 
+import fcntl
 import os
+import select
+import struct
 
 ROOT = "/sys/kernel/config/gpio-sim"
+GET_LINE_REQUEST = struct.Struct("=64I32sQI5x15x240xIII16xi")  # struct gpio_v2_line_request
+GET_LINE = (3 << 30) | (GET_LINE_REQUEST.size << 16) | (0xB4 << 8) | 0x07
+INPUT, RISING, FALLING = 1 << 2, 1 << 4, 1 << 5
+EVENT = struct.Struct("=QI36x")  # struct gpio_v2_line_event
 
 
 def write(path, text):
@@ -17,39 +24,62 @@ def read(path):
 
 
 class GpioChip:
-    """The line `line_name`, offset 4 of 8. `pull` is what the contact and its resistor do to it."""
+    """The line `name` at OFFSET, and one without a name at WITNESS. `pull` is what contact and resistor do to a line."""
 
-    OFFSET = 4
+    OFFSET, WITNESS, LINES = 4, 3, 8
 
-    def __init__(self, name, line_name):
-        self.folder = os.path.join(ROOT, name)
-        self.line_name = line_name
+    def __init__(self, folder, name):
+        self.folder = os.path.join(ROOT, folder)
         os.mkdir(self.folder)
         os.mkdir(f"{self.folder}/bank")
-        write(f"{self.folder}/bank/num_lines", "8")
+        write(f"{self.folder}/bank/num_lines", str(self.LINES))
         os.mkdir(f"{self.folder}/bank/line{self.OFFSET}")
-        write(f"{self.folder}/bank/line{self.OFFSET}/name", line_name)
+        write(f"{self.folder}/bank/line{self.OFFSET}/name", name)
         self.appear()
 
     def appear(self):
         write(f"{self.folder}/live", "1")
         self.chip = read(f"{self.folder}/bank/chip_name")
-        self.attributes = f"/sys/devices/platform/{read(f'{self.folder}/dev_name')}/{self.chip}/sim_gpio{self.OFFSET}"
+        self.attributes = f"/sys/devices/platform/{read(f'{self.folder}/dev_name')}/{self.chip}"
 
     def vanish(self):
         write(f"{self.folder}/live", "0")
 
-    def pull(self, high):
-        write(f"{self.attributes}/pull", "pull-up" if high else "pull-down")
+    def is_there(self):
+        return read(f"{self.folder}/live") == "1"
 
-    def level(self):
-        return read(f"{self.attributes}/value") == "1"
+    def pull(self, high, offset=OFFSET):
+        write(f"{self.attributes}/sim_gpio{offset}/pull", "pull-up" if high else "pull-down")
+
+    def level(self, offset=OFFSET):
+        return read(f"{self.attributes}/sim_gpio{offset}/value") == "1"
 
     def remove(self):
-        try:
+        if self.is_there():
             self.vanish()
-        except OSError:
-            pass  # not live any more
         os.rmdir(f"{self.folder}/bank/line{self.OFFSET}")
         os.rmdir(f"{self.folder}/bank")
         os.rmdir(self.folder)
+
+
+class Edges:
+    """Holds a line and reads its edges with the kernel's stamps."""
+
+    def __init__(self, chip, offset, flags=RISING | FALLING):
+        request = GET_LINE_REQUEST.pack(offset, *[0] * 63, b"test", INPUT | flags, 0, 1, 0, 0, 0)
+        device = os.open(f"/dev/{chip}", os.O_RDWR | os.O_CLOEXEC)
+        answer = fcntl.ioctl(device, GET_LINE, request)
+        os.close(device)
+        self.line = GET_LINE_REQUEST.unpack(answer)[-1]
+
+    def next(self, seconds):
+        """(t_us, rising) of the next edge; None if none comes."""
+        if not select.select([self.line], [], [], seconds)[0]:
+            return None
+        nanoseconds, kind = EVENT.unpack(os.read(self.line, EVENT.size))
+        return nanoseconds // 1000, kind == 1
+
+    def close(self):
+        if self.line is not None:
+            os.close(self.line)
+            self.line = None

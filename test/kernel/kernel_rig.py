@@ -2,53 +2,85 @@
 """The rigs of test/system on interfaces and GPIO lines of a real kernel, and what a scenario here is given."""
 
 import itertools
-import os
 import time
 
 import netdev
 from can_bus import CanBus
 from fake_slcan import FakeSlcan
-from gpio_sim import GpioChip
+from gpio_sim import RISING, Edges, GpioChip
 from harness import Rig, now_us
 from judge_log import Event
 from scenario import Test
 
 NUMBERS = itertools.count()
+EDGE_S = 1.0
 CLOCK = {"virtual": False}  # set once, by guest.py, before the first scenario
 
 
 class GpioButton:
-    """The e-stop contact on a simulated line. Mixed into a rig; `active` is the level of a pressed button."""
+    """The e-stop contact on a simulated line. Mixed into a rig; `active` is the level of a pressed button.
 
-    active = "low"  # with "high" the bias that the gateway asks for outweighs the contact to ground: see release_bias
+    The simulated chip delivers edges at the kernel's next timer tick. So a second line, the witness, is pulled in the same
+    instant, and the kernel's stamp of its edge is when the button was pressed.
+    """
+
+    active = "low"  # with "high" the bias that the gateway asks for outweighs the contact to ground: see HighVcanRig
 
     def make_button(self):
         self.line = f"ESTOP{next(NUMBERS)}"
         self.chip = GpioChip(f"iwheel{next(NUMBERS)}", self.line)
         self.chip.pull(self.active == "low")
+        self.chip.pull(False, self.chip.WITNESS)
+        self.witness = Edges(self.chip.chip, self.chip.WITNESS, RISING)
         self.settings.setdefault("estop", {}).update({"line": self.line, "active": self.active})
         self.write_config()
 
     def estop_line(self):
         return self.line if self.estop else "none"
 
+    def _contact(self, pressed):
+        self.chip.pull(pressed, self.chip.WITNESS)
+        self.chip.pull(pressed == (self.active == "high"))
+
+    def _pressed_at(self):
+        edge = self.witness.next(EDGE_S)
+        if edge is None:
+            raise RuntimeError("the simulated GPIO chip delivered no edge")
+        self.timeline.append(Event(edge[0], "press", now_us()))
+        return edge[0]
+
     def press(self):
-        t_us = now_us()
-        self.chip.pull(self.active == "high")
-        self.timeline.append(Event(t_us, "press", now_us()))
-        return t_us
+        self._contact(True)
+        return self._pressed_at()
 
     def release(self):
-        self.chip.pull(self.active == "low")
+        self._contact(False)
 
     def pulse(self, seconds):
         """Presses and releases; returns when it began."""
-        t_us = self.press()
-        time.sleep(seconds)
+        self._contact(True)
+        if seconds:
+            time.sleep(seconds)
+        self.chip.pull(self.active == "low")
+        t_us = self._pressed_at()
         self.release()
         return t_us
 
+    def lose_chip(self):
+        """The chip goes while it is held. A press, as far as the rules are concerned."""
+        self.witness.close()
+        t_us = now_us()
+        self.chip.vanish()
+        self.timeline.append(Event(t_us, "press", now_us()))
+
+    def find_chip(self):
+        self.chip.appear()
+        self.chip.pull(False, self.chip.WITNESS)
+        self.witness = Edges(self.chip.chip, self.chip.WITNESS, RISING)
+        self.release()
+
     def remove_button(self):
+        self.witness.close()
         self.chip.remove()
 
 
@@ -160,11 +192,3 @@ class KernelTest(Test):
 def virtual():
     """Whether time stands still while somebody works."""
     return CLOCK["virtual"]
-
-
-def program(name):
-    """Path of a program of the system, for scenarios that need one."""
-    for folder in os.environ["PATH"].split(":"):
-        if os.access(os.path.join(folder, name), os.X_OK):
-            return os.path.join(folder, name)
-    return None

@@ -2,14 +2,12 @@
 """Rows 11 to 14: the e-stop on a GPIO line."""
 
 import random
-import subprocess
 import time
 
 import netdev
 from catalogue import kernel_test
 from client import Streamer
-from harness import now_us
-from judge_log import Event
+from gpio_sim import Edges
 from kernel_rig import HighVcanRig, SlcanRig
 from scenarios.estop import reset
 
@@ -157,14 +155,12 @@ def row13_pressed_at_start(t):
     t.judge(rig)
 
 
-def lost_line(t, rig, client, lose, find):
+def lost_chip(t, rig, client):
     """Loses the line in motion, looks for a busy loop, finds it again, resets, drives."""
     t.arm(client)
     stream = Streamer(client, 300, 300)
     time.sleep(0.6)
-    t_us = now_us()
-    lose()
-    rig.timeline.append(Event(t_us, "press", now_us()))
+    rig.lose_chip()
     time.sleep(0.2)
     stream.stop()
     t.stopped_by(client, "estop_line")
@@ -174,7 +170,7 @@ def lost_line(t, rig, client, lose, find):
     t.check(share < 0.5, f"{100 * share:.0f} % CPU while the line is gone", True)
     refusal = client.request("reset")
     t.check(not refusal["ok"], "no reset without a line")
-    find()
+    rig.find_chip()
     t.check(rig.wait_status(client, lambda s: s["estop"]["state"] == "released", 3), "found again")
     t.check(client.request("status")["state"] == "latched", "its return alone does not unlatch")
     reset(t, client, 6.0)
@@ -185,19 +181,14 @@ def lost_line(t, rig, client, lose, find):
 @kernel_test("the GPIO chip vanishes in motion, and comes back", "estop realtime", 14)
 def row14_chip_vanishes(t):
     rig, client = t.running()
-
-    def find():
-        rig.chip.appear()
-        rig.release()
-
-    lost_line(t, rig, client, rig.chip.vanish, find)
+    lost_chip(t, rig, client)
     t.judge(rig, estop_limit_us=WORST_US)
 
 
 @kernel_test("no GPIO chip at start: latched; it appears: reset", "estop", 14)
 def row14_no_chip_at_start(t):
     rig = t.rig()
-    rig.chip.vanish()
+    rig.lose_chip()
     rig.start_gateway(wheels=False)
     client = rig.client()
     rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
@@ -206,8 +197,7 @@ def row14_no_chip_at_start(t):
     t.check(status["estop"]["state"] == "unreadable", f"e-stop {status['estop']['state']}")
     t.check(rig.line in rig.gateway.text(), f"the log names the line: {rig.gateway.text()[-300:]}")
     t.expect(client.request("reset"), "estop_pressed")
-    rig.chip.appear()
-    rig.release()
+    rig.find_chip()
     reset(t, client, 6.0)
     t.arm(client)
     t.drive_for(client, 200, 200, 0.5)
@@ -217,23 +207,21 @@ def row14_no_chip_at_start(t):
 @kernel_test("the line is busy at start: pressed; it is freed: reset", "estop", 14)
 def row14_line_busy(t):
     rig = t.rig()
-    holder = subprocess.Popen(["gpiomon", rig.chip.chip, str(rig.chip.OFFSET)], stdout=subprocess.DEVNULL)
-    time.sleep(0.3)
+    holder = Edges(rig.chip.chip, rig.chip.OFFSET)
     rig.start_gateway(wheels=False)
     client = rig.client()
     rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"], 3)
     status = client.request("status")
     t.check(status["state"] == "latched" and status["estop"]["state"] == "unreadable", f"{status['state']}, {status['estop']}")
     text = rig.gateway.text()
-    t.check("busy" in text.lower() or "gpiomon" in text, f"the log says that it is busy: {text[-300:]}")
+    t.check("busy" in text.lower(), f"the log says that it is busy: {text[-300:]}")
     t.expect(client.request("reset"), "estop_pressed")
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     time.sleep(2.0)
     t.check((rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin) < 0.5, "no busy loop", True)
     lines = len(rig.gateway.text().splitlines()) - len(text.splitlines())
     t.check(lines <= 3, f"{lines} lines of log in 2 s of a busy line")
-    holder.kill()
-    holder.wait()
+    holder.close()
     rig.release()
     reset(t, client, 6.0)
     t.arm(client)

@@ -11,7 +11,7 @@ from catalogue import kernel_test
 from client import Client
 from harness import now_us
 from judge import Judge
-from judge_log import LEFT, RIGHT, Event
+from judge_log import LEFT, RIGHT
 
 HOURS, HOURS_FULL = 1, 24
 SETTLE_EPISODES = 40  # memory is compared from here on: every kind of fault has been seen, every page touched
@@ -93,12 +93,9 @@ class Soak:
         self.presses += 1
 
     def fault_chip_vanishes(self):
-        t_us = now_us()
-        self.rig.chip.vanish()
-        self.rig.timeline.append(Event(t_us, "press", now_us()))
+        self.rig.lose_chip()
         self.wait(0.05, 1.0)
-        self.rig.chip.appear()
-        self.rig.release()
+        self.rig.find_chip()
 
     def fault_mute(self):
         side = self.chance.choice(("left", "right", "both"))
