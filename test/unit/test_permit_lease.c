@@ -42,6 +42,16 @@ static void test_permit_lease_after_arm_lasts_a_second(void) {
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
+static void test_permit_lease_lost_in_a_stall_of_hours_tells_the_longest_time(void) {
+    arm();
+    permit_rig_wait(&rig, MS(4294967) + 295U);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT32(4294967, rig.permit.stop.detail);
+    arm();
+    permit_rig_wait(&rig, MS(3600000) * 24U);
+    TEST_ASSERT_EQUAL_UINT32(4294967, rig.permit.stop.detail);
+}
+
 static void test_permit_lease_is_shortened_by_the_first_drive(void) {
     arm();
     permit_rig_wait(&rig, MS(10));
@@ -273,6 +283,7 @@ static void test_permit_moving_again_after_stop_needs_arm_and_pause(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_permit_lease_after_arm_lasts_a_second);
+    RUN_TEST(test_permit_lease_lost_in_a_stall_of_hours_tells_the_longest_time);
     RUN_TEST(test_permit_lease_is_shortened_by_the_first_drive);
     RUN_TEST(test_permit_lease_follows_the_configuration);
     RUN_TEST(test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one);
