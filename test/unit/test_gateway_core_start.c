@@ -94,6 +94,19 @@ static void test_gateway_arm_without_echo_is_send_stalled_and_silent_again(void)
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
 }
 
+static void test_gateway_arm_while_one_wheel_can_take_no_zero_is_refused(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.bus.acknowledged = false;
+    rig.bus.send_result[IW_RIGHT] = 0;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    gateway_rig_run(&rig, MS(25));
+    TEST_ASSERT_EQUAL_UINT8(2, rig.bus.unechoed[IW_LEFT]);
+    TEST_ASSERT_EQUAL_UINT8(0, rig.bus.unechoed[IW_RIGHT]);
+    gateway_rig_stop(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
+}
+
 static void test_gateway_listen_only_never_sends(void) {
     rig.config.listen_only = true;
     for (int restarted = 0; restarted < 2; restarted++) {
@@ -149,6 +162,7 @@ int main(void) {
     RUN_TEST(test_gateway_arm_sends_a_zero_pair_at_once_and_is_armed_by_its_echo);
     RUN_TEST(test_gateway_arm_needs_both_echoes);
     RUN_TEST(test_gateway_arm_without_echo_is_send_stalled_and_silent_again);
+    RUN_TEST(test_gateway_arm_while_one_wheel_can_take_no_zero_is_refused);
     RUN_TEST(test_gateway_listen_only_never_sends);
     RUN_TEST(test_gateway_restarted_sends_zeros_then_listens);
     RUN_TEST(test_gateway_restarted_gives_way_to_another_master);

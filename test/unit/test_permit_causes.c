@@ -207,6 +207,20 @@ static void test_permit_present_tells_levels_while_told_and_events_for_a_second(
     }
 }
 
+static void test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_told(void) {
+    permit_rig_begin(&rig, PERMIT_LATCHED);
+    permit_rig_wait(&rig, MS(1000));
+    permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
+    permit_rig_raise(&rig, IW_CAUSE_BUS_DOWN);
+    permit_rig_step(&rig);
+    permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
+    iw_permit_keep_present(&rig.permit);
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_ESTOP_LINE | 1U << IW_CAUSE_WHEEL_LOST,
+                            iw_permit_present(&rig.permit, rig.now_us));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, permit_rig_reset(&rig));
+}
+
 static void test_permit_present_does_not_tell_what_does_not_latch(void) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
@@ -225,6 +239,7 @@ int main(void) {
     RUN_TEST(test_permit_stop_after_a_cut_one_ramps_again);
     RUN_TEST(test_permit_cause_of_no_wheel_is_told_as_such);
     RUN_TEST(test_permit_present_tells_levels_while_told_and_events_for_a_second);
+    RUN_TEST(test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_told);
     RUN_TEST(test_permit_present_does_not_tell_what_does_not_latch);
     return UNITY_END();
 }
