@@ -6,7 +6,7 @@
 #include "iwheel/types.h"
 
 /// Tries to run the core from the crystal: IW_BOARD_CORE_HZ and IW_BOARD_APB1_HZ. False if crystal or PLL did not come up within
-/// about 20 ms; everything is then back on the internal oscillator, and the call may be repeated. Once true, a failure of the
+/// about 20 ms each; everything is then back on the internal oscillator, and the call may be repeated. Once true, a failure of the
 /// crystal raises the NMI.
 bool iw_clock_start(void);
 

@@ -29,8 +29,8 @@ typedef struct {
 #define RMVF           (1U << 24) // 7.3.10 RCC_CSR
 #define PORRSTF        (1U << 27)
 
-// A poll takes 8 cycles at the least, at 8 MHz: 20 ms. A crystal needs 2 ms.
-#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 50U)
+// A poll takes 8 cycles at the least, at 8 MHz: 10 ms. A crystal needs 2 ms.
+#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 100U)
 
 static_assert(IW_BOARD_CRYSTAL_HZ * IW_BOARD_PLL_MULTIPLIER == IW_BOARD_CORE_HZ, "the PLL multiplies the crystal");
 static_assert(IW_BOARD_PLL_MULTIPLIER >= 2U && IW_BOARD_PLL_MULTIPLIER <= 9U, "7.3.2, and 72 MHz are the limit");

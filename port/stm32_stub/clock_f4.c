@@ -34,8 +34,8 @@ typedef struct {
 #define RMVF          (1U << 24) // 7.3.21 RCC_CSR
 #define PORRSTF       (1U << 27)
 
-// A poll takes 8 cycles at the least, at 16 MHz: 20 ms. A crystal needs 2 ms.
-#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 50U)
+// A poll takes 8 cycles at the least, at 16 MHz: 10 ms. A crystal needs 2 ms.
+#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 100U)
 
 static_assert(IW_BOARD_CRYSTAL_HZ / IW_BOARD_PLL_M == 2000000U, "7.3.2 recommends 2 MHz into the PLL");
 static_assert(IW_BOARD_CRYSTAL_HZ / IW_BOARD_PLL_M * IW_BOARD_PLL_N / IW_BOARD_PLL_P == IW_BOARD_CORE_HZ,

@@ -41,14 +41,14 @@ void iw_can_error_handler(void) {
     iw_wake();
 }
 
-/// Tries until the crystal runs; meanwhile the lamp tells. An attempt takes 20 ms, a third of a slot of the lamp.
+/// Tries until the crystal runs; meanwhile time is counted on the internal oscillator, and the lamp tells.
 static void wait_for_crystal(void) {
-    iw_time_us_t about_us = 0;
+    iw_time_start(IW_BOARD_INTERNAL_HZ);
     while (!iw_clock_start()) {
-        about_us += IW_LAMP_SLOT_US / 3U;
-        iw_pins_lamp(iw_lamp_is_lit(IW_LAMP_NO_CRYSTAL, about_us));
+        iw_pins_lamp(iw_lamp_is_lit(IW_LAMP_NO_CRYSTAL, iw_time_now_us()));
         iw_watchdog_feed();
     }
+    iw_time_start(IW_BOARD_CORE_HZ);
 }
 
 static void start_bus(void) {
@@ -99,7 +99,6 @@ int main(void) {
     iw_watchdog_start();
     iw_pins_init();
     wait_for_crystal();
-    iw_time_start(IW_BOARD_CORE_HZ);
     iw_estop_init();
     iw_irq_enable(IW_IRQ_EXTI0);
     start_bus();

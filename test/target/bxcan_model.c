@@ -358,6 +358,15 @@ bool bxcan_model_irq_error(const bxcan_model_t *self) {
     return (self->ier & IER_ERRIE) != 0U && (self->msr & MSR_ERRI) != 0U;
 }
 
+uint32_t bxcan_model_lines(const bxcan_model_t *self) {
+    return (bxcan_model_irq_transmit(self) ? 1U : 0U) | (bxcan_model_irq_fifo0(self) ? 2U : 0U) |
+           (bxcan_model_irq_error(self) ? 4U : 0U);
+}
+
 const char *bxcan_model_violation(const bxcan_model_t *self) {
     return self->violation;
+}
+
+uint32_t bxcan_model_overruns(const bxcan_model_t *self) {
+    return self->overruns;
 }

@@ -67,6 +67,7 @@ typedef struct {
     bool deaf;             ///< Test: the controller does not answer requests for a mode.
     uint32_t abort_reads;  ///< Test: TSR must be read this often until an abort takes effect.
     uint32_t release_slow; ///< Test: RFxR must be read this often until a release takes effect.
+    uint32_t overruns;     ///< Frames that found their FIFO full.
     uint32_t violations;
     char violation[160]; ///< The first.
 } bxcan_model_t;
@@ -101,10 +102,14 @@ bool bxcan_model_hear(bxcan_model_t *self, const model_frame_t *frame);
 /// Another node's frame was destroyed.
 void bxcan_model_hear_error(bxcan_model_t *self);
 
-/// Interrupt lines, as levels.
+/// Interrupt lines, as levels; `lines` has all three: bit 0 transmit, 1 FIFO 0, 2 status change and error.
 bool bxcan_model_irq_transmit(const bxcan_model_t *self);
 bool bxcan_model_irq_fifo0(const bxcan_model_t *self);
 bool bxcan_model_irq_error(const bxcan_model_t *self);
+uint32_t bxcan_model_lines(const bxcan_model_t *self);
+
+/// Frames that found their FIFO full since the reset.
+uint32_t bxcan_model_overruns(const bxcan_model_t *self);
 
 /// The first violation, or an empty text.
 const char *bxcan_model_violation(const bxcan_model_t *self);

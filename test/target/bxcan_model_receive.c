@@ -96,7 +96,7 @@ static bool bank_passes(const bxcan_model_t *self, uint32_t index, const model_f
     return ((narrow ^ one) & (one >> 16)) == 0U || ((narrow ^ two) & (two >> 16)) == 0U;
 }
 
-static void store(const bxcan_model_t *self, model_fifo_t *fifo, const model_frame_t *frame) {
+static void store(bxcan_model_t *self, model_fifo_t *fifo, const model_frame_t *frame) {
     model_received_t entry = {wide_of(frame), frame->dlc, 0, 0};
     for (uint32_t i = 0; i < 4U; i++) {
         entry.rdlr |= (uint32_t)frame->data[i] << (8U * i);
@@ -108,6 +108,7 @@ static void store(const bxcan_model_t *self, model_fifo_t *fifo, const model_fra
         return;
     }
     fifo->overrun = true;
+    self->overruns++;
     if ((self->mcr & MCR_RFLM) == 0U) { // 7.3: the last one stored is overwritten; with RFLM the new one is lost.
         fifo->entry[MODEL_DEPTH - 1] = entry;
     }

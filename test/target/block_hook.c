@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// The emulated CPU's clock: called by Unicorn before each block of code, half a million times in a second of virtual time.
+#include <stdbool.h>
+#include <stdint.h>
+
+#define CYCLES_PER_HALFWORD 2
+
+typedef struct {
+    int64_t left;  ///< Cycles until the emulation must stop.
+    int64_t spent; ///< Cycles since the user set it to 0.
+    int32_t is_asked_to_stop;
+    int32_t has_stopped;
+    int (*stop)(void *engine); ///< uc_emu_stop.
+} block_clock_t;
+
+void block_hook(void *engine, uint64_t address, uint32_t size, void *clock);
+
+void block_hook(void *engine, uint64_t address, uint32_t size, void *clock) {
+    block_clock_t *const self = clock;
+    const int64_t cycles = (int64_t)(size / 2U) * CYCLES_PER_HALFWORD;
+    (void)address;
+    if (self->left <= 0 || self->is_asked_to_stop != 0) {
+        self->has_stopped = 1;
+        (void)self->stop(engine);
+        return;
+    }
+    self->left -= cycles;
+    self->spent += cycles;
+}

@@ -1,0 +1,98 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Runs the STM32 image on an emulated Cortex-M and judges what it does.
+
+usage: emulate.py MODEL_LIBRARY BUILDS [BOARD[.SCENARIO]]...
+
+BUILDS holds BOARD-IMAGE.elf for the boards stm32f103 and stm32f407 and the images listen, zero and demo; test/target/run makes
+them. Needs the Python package unicorn. The last line is "N passed, N failed, N skipped".
+"""
+import subprocess
+import sys
+import time
+import traceback
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.dont_write_bytecode = True
+
+import scenarios
+import symbols
+from emulator.boards import BOARDS
+from emulator.can import Controller, load_model
+from emulator.machine import Machine
+
+
+class Rig:
+    """An image running on a board, and what a scenario may ask of it."""
+
+    def __init__(self, board_name, elf, oscillator=None):
+        image = subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", str(elf), "/dev/stdout"], capture_output=True, check=True)
+        self.machine = Machine(BOARDS[board_name](), image.stdout)
+        if oscillator is not None:
+            self.machine.watchdog.lsi_hz = self.machine.board.lsi_limits_hz[oscillator]
+        self.addresses, self.notes, self.expected_resets = symbols.addresses(elf), [], []
+
+    def run(self, span_ns):
+        self.machine.run(span_ns)
+
+    def setpoints(self, since_ns=0, until_ns=None):
+        return self.machine.bus.setpoints(since_ns, until_ns)
+
+    def counter(self, name):
+        return int.from_bytes(self.machine.cpu.mem_read(self.addresses[name], 4), "little")
+
+    def note(self, text):
+        self.notes.append(text)
+
+    def expect_resets(self, *causes):
+        self.expected_resets = list(causes)
+
+    def judge(self):
+        """What holds in every scenario."""
+        assert not self.machine.violations, "; ".join(self.machine.violations)
+        violation = self.machine.can.violation().decode()
+        assert not violation, f"bus controller: {violation}"
+        causes = [cause for _, cause in self.machine.resets]
+        assert causes == self.expected_resets, f"resets: {causes}, expected: {self.expected_resets}"
+        foreign = {frame.id for frame in self.setpoints()} - {scenarios.LEFT, scenarios.RIGHT}
+        assert not foreign, f"ids sent that are not ours: {foreign}"
+
+
+def play(task):
+    """(name, error or None, notes, seconds)"""
+    library, folder, board, image, scenario = task
+    Machine.library = Controller.library = load_model(library)
+    started, name = time.time(), f"{board}.{scenario.__name__}"
+    try:
+        rig = Rig(board, Path(folder) / f"{board}-{image}.elf", scenarios.OSCILLATOR.get(scenario))
+        scenario(rig)
+        rig.judge()
+        return name, None, rig.notes, time.time() - started
+    except AssertionError as error:
+        line = traceback.extract_tb(error.__traceback__)[-1]
+        return name, f"{error or line.line} (line {line.lineno} of {Path(line.filename).name})", [], time.time() - started
+    except Exception:
+        return name, traceback.format_exc(), [], time.time() - started
+
+
+def main(arguments):
+    if len(arguments) < 3:
+        sys.exit(__doc__)
+    library, folder, chosen = Path(arguments[1]).resolve(), arguments[2], arguments[3:]
+    tasks = [(library, folder, board, image, scenario)
+             for board in BOARDS for image, several in scenarios.SCENARIOS.items() for scenario in several
+             if not chosen or board in chosen or f"{board}.{scenario.__name__}" in chosen]
+    failed = 0
+    with ProcessPoolExecutor(2) as pool:
+        for name, error, notes, seconds in pool.map(play, tasks):
+            failed += error is not None
+            told = f"FAIL: {error}" if error else "ok" + "".join(f", {note}" for note in notes)
+            print(f"{name:<36} {seconds:5.1f} s  {told}", flush=True)
+    print(f"{len(tasks) - failed} passed, {failed} failed, 0 skipped")
+    return 1 if failed or not tasks else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))

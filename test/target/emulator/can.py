@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: MIT
+"""A bus at 1 Mbit/s with arbitration, acknowledgements and errors; the chip's controller on it; two wheels."""
+import ctypes
+import math
+from dataclasses import dataclass, field
+from functools import partial
+from random import Random
+
+from .chip import MS, US
+
+BIT_NS = US
+SENT, LOST, NO_ACKNOWLEDGEMENT, BIT_ERROR = range(4)
+LEFT, RIGHT = 266, 298
+
+
+class RawFrame(ctypes.Structure):
+    _fields_ = [("id", ctypes.c_uint32), ("extended", ctypes.c_uint8), ("remote", ctypes.c_uint8), ("dlc", ctypes.c_uint8),
+                ("data", ctypes.c_uint8 * 8)]
+
+
+def load_model(path):
+    library = ctypes.CDLL(str(path))
+    pointer, number, frame = ctypes.c_void_p, ctypes.c_uint32, ctypes.POINTER(RawFrame)
+    for name, result, arguments in (
+            ("create", pointer, [number]), ("reset", None, [pointer, number]), ("read", number, [pointer, number]),
+            ("write", None, [pointer, number, number]), ("is_on", ctypes.c_bool, [pointer]), ("recessive", None, [pointer, number]),
+            ("dominant", None, [pointer]), ("offer", ctypes.c_int, [pointer, frame]), ("begin", None, [pointer, ctypes.c_int]),
+            ("end", None, [pointer, ctypes.c_int, ctypes.c_int]), ("hear", ctypes.c_bool, [pointer, frame]),
+            ("hear_error", None, [pointer]), ("lines", number, [pointer]), ("violation", ctypes.c_char_p, [pointer]),
+            ("overruns", number, [pointer])):
+        function = getattr(library, f"bxcan_model_{name}")
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+@dataclass
+class Frame:
+    id: int
+    data: bytes
+    time_ns: int = 0
+    sender: str = ""
+    remote_dlc: int = None # A remote frame with this length, and no data.
+
+    def bits(self):
+        """Length on the bus from start of frame to the end of the interframe space, with the stuff bits of its contents."""
+        dlc = len(self.data) if self.remote_dlc is None else self.remote_dlc
+        header = [0] + [self.id >> bit & 1 for bit in range(10, -1, -1)] + [int(self.remote_dlc is not None), 0, 0]
+        header += [dlc >> bit & 1 for bit in range(3, -1, -1)]
+        body = header + [byte >> bit & 1 for byte in self.data for bit in range(7, -1, -1)]
+        crc = 0
+        for bit in body:
+            crc = (crc << 1 ^ (0x4599 if bit ^ crc >> 14 & 1 else 0)) & 0x7FFF
+        body += [crc >> bit & 1 for bit in range(14, -1, -1)]
+        stuffed, run, last = 0, 0, None
+        for bit in body:
+            run = run + 1 if bit == last else 1
+            last = bit
+            if run == 5:
+                stuffed, run, last = stuffed + 1, 1, 1 - bit
+        return len(body) + stuffed + 3 + 7 + 3 # Delimiters and acknowledgement, end of frame, space.
+
+    def setpoint(self):
+        """(speed in mm/s, current in mA) of a setpoint."""
+        return tuple(int.from_bytes(self.data[at:at + 2], "big", signed=True) for at in (1, 3))
+
+
+class Controller:
+    """The chip's bxCAN: the model of the driver's host tests, and what BTR makes of the chip's clock."""
+
+    library = None # Set by the runner, see load_model.
+
+    def __init__(self, machine):
+        self.machine, self.model = machine, self.library.bxcan_model_create(machine.board.banks)
+        for name in ("read", "write", "is_on", "recessive", "dominant", "offer", "begin", "end", "hear", "hear_error", "lines",
+                     "violation", "overruns"):
+            setattr(self, name, partial(getattr(self.library, f"bxcan_model_{name}"), self.model))
+
+    def reset(self):
+        self.library.bxcan_model_reset(self.model, self.machine.board.banks)
+
+    def timing(self):
+        """(bit rate in Hz, sample point in permille), decoded from BTR and the clock tree."""
+        btr = self.read(0x1C)
+        before, after = (btr >> 16 & 0xF) + 1, (btr >> 20 & 7) + 1
+        quanta = 1 + before + after
+        return self.machine.clocks.apb1_hz() / ((btr & 0x3FF) + 1) / quanta, 1000 * (1 + before) / quanta
+
+    def understands(self):
+        """Crystal-exact 1 Mbit/s."""
+        from_crystal = self.machine.clocks.cfgr >> 2 & 3 and self.machine.clocks.pll_from_hse()
+        return bool(from_crystal) and self.timing()[0] == 1_000_000
+
+    def offered(self):
+        raw = RawFrame()
+        mailbox = self.offer(ctypes.byref(raw))
+        if mailbox < 0:
+            return None, None
+        self.machine.expect(not raw.extended and not raw.remote, "an extended or remote frame was sent")
+        return mailbox, Frame(raw.id, bytes(raw.data[:raw.dlc]), sender="chip")
+
+    def deliver(self, frame):
+        remote = frame.remote_dlc is not None
+        raw = RawFrame(id=frame.id, remote=remote, dlc=frame.remote_dlc if remote else len(frame.data))
+        for at, byte in enumerate(frame.data):
+            raw.data[at] = byte
+        return self.hear(ctypes.byref(raw))
+
+
+@dataclass
+class Wheel:
+    """One wheel: telemetry at the document's periods, speed following its setpoint, its own watchdog of 1 s."""
+
+    side: int # 0 left, 1 right
+    phase_ns: int
+    powered: bool = True
+    speed_mm_s: float = 0.0
+    target_mm_s: int = 0
+    heard_ns: int = -10**12
+    ticks: float = 0.0
+    queue: list = field(default_factory=list)
+    due: dict = field(default_factory=dict)
+    next_ns: int = None
+
+    def power(self, on, now_ns):
+        self.powered, self.queue, self.target_mm_s, self.speed_mm_s = on, [], 0, 0.0
+        self.due = {kind: now_ns + self.phase_ns for kind in ("speed", "status", "force")} if on else {}
+        self.next_ns = now_ns + self.phase_ns if on else None
+
+    def hear(self, frame):
+        if self.powered and frame.id == (LEFT, RIGHT)[self.side]:
+            self.target_mm_s, self.heard_ns = frame.setpoint()[0], frame.time_ns
+
+    def produce(self, now_ns):
+        if self.next_ns is None or now_ns < self.next_ns:
+            return
+        for kind, period_ms in (("speed", 4), ("status", 40), ("force", 50)):
+            while kind in self.due and self.due[kind] <= now_ns:
+                self.due[kind] += period_ms * MS
+                self.queue.append(getattr(self, kind)(now_ns))
+        self.next_ns = min(self.due.values())
+
+    def speed(self, now_ns):
+        target = self.target_mm_s if now_ns - self.heard_ns < 1000 * MS else 0
+        step = 8.0 # 2000 mm/s2 in 4 ms
+        self.speed_mm_s += max(-step, min(step, target - self.speed_mm_s))
+        self.ticks += self.speed_mm_s * 0.004 / (2 * math.pi * 0.192 * 1000 / 60)
+        rpm = round(self.speed_mm_s / (2 * math.pi * 192 / 60))
+        return Frame((256, 288)[self.side], rpm.to_bytes(2, "big", signed=True) + bytes(2), now_ns, f"wheel{self.side}")
+
+    def status(self, now_ns):
+        data = bytes([240, 25]) + int(self.ticks).to_bytes(4, "big", signed=True) + bytes([10])
+        return Frame((257, 289)[self.side], data, now_ns, f"wheel{self.side}")
+
+    def force(self, now_ns):
+        return Frame((512, 544)[self.side], bytes([0, 100, 0, 0]), now_ns, f"wheel{self.side}")
+
+
+class Bus:
+    def __init__(self, machine, seed):
+        chance = Random(seed)
+        self.machine, self.log, self.attempts = machine, [], 0
+        self.wheels = [Wheel(side, chance.randrange(4 * MS)) for side in (0, 1)]
+        for wheel in self.wheels:
+            wheel.power(True, 0)
+        self.extra = []            # Frames of somebody else, sent once each.
+        self.flood = None          # A frame that somebody sends without end.
+        self.flooded = 0
+        self.stuck = False         # Held dominant.
+        self.corrupt_chip = False  # What the chip sends is destroyed.
+        self.acknowledge_chip = True
+        self.current = None        # (frame, mailbox or None, end)
+        self.idle_ns = 0
+
+    def next_event_ns(self, now_ns):
+        times = [wheel.next_ns for wheel in self.wheels]
+        if self.current:
+            times.append(self.current[2])
+        elif not self.stuck:
+            waiting = self.extra or self.flood or any(wheel.queue for wheel in self.wheels)
+            times.append(max(self.idle_ns, now_ns) if waiting else None)
+            times.append(self.idle_ns if self.idle_ns > now_ns else None)
+            times.append(now_ns + 11 * BIT_NS if not self.machine.can.is_on() else None)
+        return min((time for time in times if time is not None), default=None)
+
+    def hold_dominant(self, on):
+        self.stuck = on
+        if on:
+            if self.current and self.current[1] is not None:
+                self.machine.can.end(self.current[1], BIT_ERROR)
+            self.current = None
+            self.machine.can.dominant()
+        else:
+            self.idle_ns = self.machine.now_ns
+
+    def advance(self, now_ns):
+        for wheel in self.wheels:
+            wheel.produce(now_ns)
+        if self.stuck:
+            return
+        if self.current and now_ns >= self.current[2]:
+            self.finish()
+        if not self.current:
+            bits = (now_ns - self.idle_ns) // BIT_NS
+            if bits > 0 and not self.machine.can.is_on() and self.machine.can_listens:
+                self.machine.can.recessive(bits)
+            if bits >= 0:
+                self.idle_ns += bits * BIT_NS
+                self.arbitrate(now_ns)
+
+    def arbitrate(self, now_ns):
+        mailbox, frame = self.machine.can.offered() if self.machine.can_listens else (None, None)
+        candidates = [(frame.id, 0, frame, mailbox)] if frame else []
+        candidates += [(offer.id, 1, offer, None) for offer in self.offers()]
+        if not candidates:
+            return
+        _, _, frame, mailbox = min(candidates, key=lambda candidate: candidate[:2])
+        if mailbox is not None:
+            self.machine.can.begin(mailbox)
+            self.attempts += 1
+        frame.time_ns = now_ns
+        self.current = (frame, mailbox, now_ns + frame.bits() * BIT_NS)
+
+    def offers(self):
+        for wheel in self.wheels:
+            if wheel.queue:
+                yield min(wheel.queue, key=lambda frame: frame.id)
+        if self.extra:
+            yield self.extra[0]
+        if self.flood:
+            yield self.flood
+
+    def finish(self):
+        frame, mailbox, end_ns = self.current
+        self.current, self.idle_ns = None, end_ns
+        if mailbox is not None:
+            done = self.finish_ours(frame, mailbox)
+        else:
+            done = self.finish_theirs(frame)
+        if done:
+            frame.time_ns = end_ns - 10 * BIT_NS # Valid at the end of the frame's last-but-one bit, before the space.
+            self.log.append(Frame(frame.id, frame.data, frame.time_ns, frame.sender))
+            for wheel in self.wheels:
+                wheel.hear(frame)
+        if self.machine.can_listens and not self.machine.can.is_on():
+            self.machine.can.dominant()
+            self.machine.can.recessive(11)
+
+    def finish_ours(self, frame, mailbox):
+        understood = self.machine.can.understands() and not self.corrupt_chip
+        heard = any(wheel.powered for wheel in self.wheels) and self.acknowledge_chip
+        self.machine.can.end(mailbox, BIT_ERROR if not understood else SENT if heard else NO_ACKNOWLEDGEMENT)
+        return understood and heard
+
+    def finish_theirs(self, frame):
+        listens = self.machine.can_listens
+        if listens and not self.machine.can.understands():
+            self.machine.can.hear_error()
+            listens = False
+        acknowledged = self.machine.can.deliver(frame) if listens else False
+        others = sum(1 for wheel in self.wheels if wheel.powered and frame.sender != f"wheel{wheel.side}")
+        if not acknowledged and others == 0:
+            return False
+        if frame.sender == "flood":
+            self.flooded += 1
+        elif frame in self.extra:
+            self.extra.remove(frame)
+        else:
+            self.wheels[int(frame.sender[-1])].queue.remove(frame)
+        return True
+
+    def setpoints(self, since_ns=0, until_ns=None):
+        """What the chip has put on the bus."""
+        return [frame for frame in self.log
+                if frame.sender == "chip" and frame.time_ns >= since_ns and (until_ns is None or frame.time_ns <= until_ns)]

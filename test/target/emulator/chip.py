@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: MIT
+"""Peripherals of STM32F103 and STM32F405/407/446, as far as the port touches them: clocks, flash, ports, EXTI, watchdog.
+
+What the reference manual forbids is written into `violations`: access to a block whose clock is off, a PLL changed while it runs,
+a bus clock beyond its limit, too few wait states. What is not modelled cannot be accessed.
+"""
+
+US = 1000 # Times are nanoseconds.
+MS = 1000 * US
+
+HSION, HSIRDY, HSEON, HSERDY, CSSON, PLLON, PLLRDY = (1 << bit for bit in (0, 1, 16, 17, 19, 24, 25))
+PORRSTF, PINRSTF, SFTRSTF, IWDGRSTF, RMVF = (1 << bit for bit in (27, 26, 28, 29, 24))
+
+
+class Clocks:
+    """RCC and FLASH_ACR. A crystal needs `start_ns` after HSEON, the PLL 200 us."""
+
+    crystal_hz = 8_000_000
+    start_ns = 2 * MS
+
+    def __init__(self, chip):
+        self.chip, self.flags, self.crystal_present = chip, PORRSTF | PINRSTF, True
+        self.reset()
+
+    def reset(self):
+        self.cr, self.cfgr, self.acr = 0x83, 0, self.acr_reset
+        self.pllcfgr = 0x24003010
+        self.enable = {}
+        self.hse_ready_ns = self.pll_ready_ns = None
+        self.core_hz, self.settled = self.internal_hz, False
+
+    def set_crystal(self, present):
+        self.crystal_present, self.settled = present, False
+
+    def update(self, now_ns):
+        """What has become ready, and whether the crystal has failed (which the clock security system reports by NMI)."""
+        crystal = self.crystal_present
+        if self.cr & HSEON and crystal and self.hse_ready_ns is None:
+            self.hse_ready_ns = now_ns + self.start_ns
+        if not self.cr & HSEON or not crystal:
+            self.hse_ready_ns = None
+        hse = self.hse_ready_ns is not None and now_ns >= self.hse_ready_ns
+        if self.cr & HSERDY and not hse and self.cr & CSSON:
+            self.chip.nmi = True
+            self.cr &= ~(HSEON | CSSON | PLLON)
+        source_ready = hse if self.pll_from_hse() else True
+        if self.cr & PLLON and source_ready and self.pll_ready_ns is None:
+            self.pll_ready_ns = now_ns + 200 * US
+        if not self.cr & PLLON or not source_ready:
+            self.pll_ready_ns = None
+        pll = self.pll_ready_ns is not None and now_ns >= self.pll_ready_ns
+        self.cr = self.cr & ~(HSERDY | PLLRDY) | (HSERDY if hse else 0) | (PLLRDY if pll else 0)
+        self.settled = all(ready_ns is None or now_ns >= ready_ns for ready_ns in (self.hse_ready_ns, self.pll_ready_ns))
+        switched = self.cfgr & 3
+        if switched == 2 and not pll or switched == 1 and not hse:
+            switched = 0
+        self.cfgr = self.cfgr & ~0xC | switched << 2
+        self.core_hz = (self.internal_hz, self.crystal_hz, self.pll_hz() if switched == 2 else 0)[switched]
+
+    def read(self, offset, now_ns):
+        self.update(now_ns)
+        if offset == 0:
+            return self.cr
+        if offset == self.csr_offset:
+            return self.flags
+        return {**self.enable, self.cfgr_offset: self.cfgr, self.pllcfgr_offset: self.pllcfgr}.get(offset, 0)
+
+    def write(self, offset, value, now_ns):
+        if offset == 0:
+            self.cr = self.cr & (HSERDY | PLLRDY | HSIRDY) | value & ~(HSERDY | PLLRDY)
+        elif offset == self.csr_offset:
+            self.flags = 0 if value & RMVF else self.flags
+        elif offset == self.cfgr_offset:
+            self.write_cfgr(value)
+        elif offset == self.pllcfgr_offset:
+            self.expect(not self.cr & PLLON, "the PLL was changed while it runs")
+            self.pllcfgr = value
+        else:
+            self.enable[offset] = value
+        self.update(now_ns)
+        if self.cfgr & 3 == 2:
+            self.check_limits()
+
+    def write_cfgr(self, value):
+        if (value ^ self.cfgr) & self.pll_bits:
+            self.expect(not self.cr & PLLON, "the PLL was changed while it runs")
+        self.cfgr = self.cfgr & 0xC | value & ~0xC
+
+    def expect(self, condition, text):
+        self.chip.expect(condition, text)
+
+    def is_enabled(self, offset, bit):
+        return bool(self.enable.get(offset, 0) >> bit & 1)
+
+
+class ClocksF1(Clocks):
+    internal_hz, csr_offset, cfgr_offset, pllcfgr_offset, acr_reset = 8_000_000, 0x24, 0x04, None, 0x30
+    pll_bits = 0x3F0000
+
+    def pll_from_hse(self):
+        return bool(self.cfgr >> 16 & 1)
+
+    def pll_hz(self):
+        source = self.crystal_hz // (2 if self.cfgr >> 17 & 1 else 1) if self.pll_from_hse() else self.internal_hz // 2
+        return source * min((self.cfgr >> 18 & 0xF) + 2, 16)
+
+    def apb1_hz(self):
+        return self.core_hz // (1, 1, 1, 1, 2, 4, 8, 16)[self.cfgr >> 8 & 7]
+
+    def check_limits(self):
+        self.expect(self.core_hz <= 72_000_000, f"the core runs at {self.core_hz} Hz")
+        self.expect(self.apb1_hz() <= 36_000_000, f"APB1 runs at {self.apb1_hz()} Hz")
+        self.expect((self.acr & 7) >= (self.core_hz - 1) // 24_000_000, "too few wait states of the flash")
+
+
+class ClocksF4(Clocks):
+    internal_hz, csr_offset, cfgr_offset, pllcfgr_offset, acr_reset = 16_000_000, 0x74, 0x08, 0x04, 0
+    pll_bits = 0
+
+    def pll_from_hse(self):
+        return bool(self.pllcfgr >> 22 & 1)
+
+    def pll_hz(self):
+        m, n, p = self.pllcfgr & 0x3F, self.pllcfgr >> 6 & 0x1FF, (self.pllcfgr >> 16 & 3) * 2 + 2
+        source = self.crystal_hz if self.pll_from_hse() else self.internal_hz
+        self.expect(1_000_000 <= source / m <= 2_000_000, "the PLL's input is not 1 to 2 MHz")
+        self.expect(192_000_000 <= source / m * n <= 432_000_000, "the PLL runs outside its limits")
+        self.expect(source / m * n / (self.pllcfgr >> 24 & 0xF) <= 48_000_000, "the PLL's 48 MHz output is too fast")
+        self.expect((self.pllcfgr >> 28 & 7) >= 2, "PLLR below 2 is not allowed on an STM32F446")
+        return source // m * n // p
+
+    def apb1_hz(self):
+        return self.core_hz // (1, 1, 1, 1, 2, 4, 8, 16)[self.cfgr >> 10 & 7]
+
+    def apb2_hz(self):
+        return self.core_hz // (1, 1, 1, 1, 2, 4, 8, 16)[self.cfgr >> 13 & 7]
+
+    def check_limits(self):
+        self.expect(self.core_hz <= 168_000_000, f"the core runs at {self.core_hz} Hz")
+        self.expect(self.apb1_hz() <= 42_000_000, f"APB1 runs at {self.apb1_hz()} Hz")
+        self.expect(self.apb2_hz() <= 84_000_000, f"APB2 runs at {self.apb2_hz()} Hz")
+        self.expect((self.acr & 0xF) >= (self.core_hz - 1) // 30_000_000, "too few wait states of the flash")
+
+
+class Port:
+    """`outside` maps a pin to the level that drives it; a pin without is open."""
+
+    def __init__(self):
+        self.outside, self.changed = {}, True
+        self.reset()
+
+    def drive(self, pin, level):
+        self.outside[pin], self.changed = level, True
+
+    def release(self, pin):
+        self.outside.pop(pin, None)
+        self.changed = True
+
+
+class PortF1(Port):
+    def reset(self):
+        self.changed = True
+        self.cr, self.odr = [0x44444444, 0x44444444], 0
+
+    def field(self, pin):
+        return self.cr[pin // 8] >> 4 * (pin % 8) & 0xF
+
+    def level(self, pin):
+        """An open pin without a pull-up is read as low: the worst for a contact to ground."""
+        if self.field(pin) & 3:
+            return self.odr >> pin & 1
+        if pin in self.outside:
+            return self.outside[pin]
+        return self.odr >> pin & 1 if self.field(pin) == 8 else 0
+
+    def is_output(self, pin):
+        return self.field(pin) in (1, 2, 3)
+
+    def is_can_pair(self, rx, tx):
+        return self.field(rx) in (4, 8) and self.field(tx) in (9, 10, 11)
+
+    def read(self, offset):
+        if offset in (0, 4):
+            return self.cr[offset // 4]
+        return {8: sum(self.level(pin) << pin for pin in range(16)), 0xC: self.odr}.get(offset, 0)
+
+    def write(self, offset, value):
+        if offset in (0, 4):
+            self.cr[offset // 4] = value
+        elif offset == 0x10:
+            self.odr = self.odr & ~(value >> 16) | value & 0xFFFF
+        elif offset == 0xC:
+            self.odr = value & 0xFFFF
+        else:
+            raise KeyError(offset)
+
+
+class PortF4(Port):
+    def reset(self):
+        self.changed = True
+        self.registers = dict.fromkeys(range(0, 0x28, 4), 0)
+        self.registers[0] = 0xA8000000
+
+    def two(self, offset, pin):
+        return self.registers[offset] >> 2 * pin & 3
+
+    def level(self, pin):
+        if self.two(0, pin) == 1:
+            return self.registers[0x14] >> pin & 1
+        if pin in self.outside:
+            return self.outside[pin]
+        return 1 if self.two(0xC, pin) == 1 else 0
+
+    def is_output(self, pin):
+        return self.two(0, pin) == 1
+
+    def is_can_pair(self, rx, tx):
+        function = [self.registers[0x20 + 4 * (pin // 8)] >> 4 * (pin % 8) & 0xF for pin in (rx, tx)]
+        return self.two(0, rx) == 2 and self.two(0, tx) == 2 and function == [9, 9]
+
+    def read(self, offset):
+        if offset == 0x10:
+            return sum(self.level(pin) << pin for pin in range(16))
+        return self.registers[offset]
+
+    def write(self, offset, value):
+        if offset == 0x18:
+            self.registers[0x14] = self.registers[0x14] & ~(value >> 16) | value & 0xFFFF
+        else:
+            self.registers[offset] = value
+
+
+class Exti:
+    """Line 0 only. The selection (AFIO or SYSCFG) must name port A, which is what it names after reset."""
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        self.registers = dict.fromkeys((0, 4, 8, 0xC, 0x10, 0x14), 0)
+        self.selection, self.last = 0, None
+
+    def look(self, level):
+        if self.last is not None and level != self.last and not self.selection & 0xF:
+            if self.registers[0x8 if level else 0xC] & 1:
+                self.registers[0x14] |= 1
+        self.last = level
+
+    def line(self):
+        return bool(self.registers[0x14] & self.registers[0] & 1)
+
+    def write(self, offset, value):
+        if offset == 0x14:
+            self.registers[offset] &= ~value
+        else:
+            self.registers[offset] = value
+
+
+class Watchdog:
+    """IWDG. Prescaler and reload take 5 cycles of its oscillator; SR tells."""
+
+    def __init__(self, lsi_hz):
+        self.lsi_hz = lsi_hz
+        self.reset()
+
+    def reset(self):
+        self.prescaler, self.reload, self.unlocked, self.deadline_ns, self.busy_until_ns = 0, 0xFFF, False, None, 0
+
+    def timeout_ns(self):
+        return (self.reload + 1) * (4 << self.prescaler) * 10**9 // self.lsi_hz
+
+    def read(self, offset, now_ns):
+        return {4: self.prescaler, 8: self.reload, 0xC: 3 if now_ns < self.busy_until_ns else 0}.get(offset, 0)
+
+    def write(self, offset, value, now_ns):
+        if offset == 0:
+            self.unlocked = value == 0x5555
+            if value == 0xCCCC or value == 0xAAAA and self.deadline_ns is not None:
+                self.deadline_ns = now_ns + self.timeout_ns()
+        elif self.unlocked:
+            self.busy_until_ns = now_ns + 5 * 10**9 // self.lsi_hz
+            if offset == 4:
+                self.prescaler = value & 7
+            elif offset == 8:
+                self.reload = value & 0xFFF

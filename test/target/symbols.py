@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+"""Where a field of a structure is in the image's RAM, asked of the compiler and of the linker."""
+import re
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+FIELDS = {
+    "overruns": ("bus", "iw_bxcan_t", "overruns"),
+    "lost": ("bus", "iw_bxcan_t", "lost"),
+    "bus_offs": ("bus", "iw_bxcan_t", "bus_offs"),
+    "received": ("gateway", "iw_gateway_t", "counters.received"),
+    "bad_format": ("gateway", "iw_gateway_t", "counters.bad_format"),
+    "purges": ("gateway", "iw_gateway_t", "counters.purges"),
+    "late_steps": ("gateway", "iw_gateway_t", "counters.late_steps"),
+}
+
+
+def offsets():
+    """{name: offset in its structure}; every one is an uint32_t."""
+    probe = '#include "bxcan.h"\n#include "iwheel/gateway.h"\n'
+    probe += "".join(f"char offset_of_{name}[1 + offsetof({kind}, {field})];\n" for name, (_, kind, field) in FIELDS.items())
+    command = ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-S", "-xc", "-", "-o", "-"]
+    command += [f"-I{ROOT / folder}" for folder in ("core/include", "port/stm32_stub", "port/stm32_stub/access")]
+    run = subprocess.run(command, input=probe, capture_output=True, text=True, check=True)
+    return {name: int(size) - 1 for name, size in re.findall(r"\.size\s+offset_of_(\w+), (\d+)", run.stdout)}
+
+
+def addresses(elf):
+    """{name: address} of the fields in this image."""
+    run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
+    objects = {}
+    for line in run.stdout.splitlines():
+        address, kind, name = line.rsplit(" ", 2)
+        if kind in "bBdD":
+            objects[name.split(".")[0]] = int(address, 16)
+    return {name: objects[FIELDS[name][0]] + offset for name, offset in offsets().items()}
