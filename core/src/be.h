@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Big-endian integers by shifts, private to the codec.
+/// Big-endian integers by shifts, private to the core.
 #ifndef IW_BE_H
 #define IW_BE_H
 

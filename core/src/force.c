@@ -75,19 +75,19 @@ static uint32_t square_root(uint32_t value) {
 static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
     const uint32_t scale = (uint32_t)scale_mN(self);
     uint32_t sum = 0;
-    for (size_t i = 0; i < self->count; i++) {
+    for (size_t i = 0; i < IW_FORCE_WINDOW_SAMPLES; i++) {
         const int32_t spread = iw_magnitude(self->sample[i] - mean_raw);
         const uint32_t capped = (uint32_t)((spread < SPREAD_MAX) ? spread : SPREAD_MAX);
         sum += capped * capped;
     }
-    const uint32_t variance = sum / self->count;
+    const uint32_t variance = sum / IW_FORCE_WINDOW_SAMPLES;
     return (variance <= VARIANCE_FINE) ? square_root(variance * scale * scale) : square_root(variance) * scale;
 }
 
 /// What the full ring holds. The oldest sample stands at `next`.
 static iw_force_quality_t measure(const iw_force_t *self) {
     const int32_t scale = scale_mN(self);
-    iw_force_quality_t quality = {0, 0, 0, self->count, IW_WINDOW_GOOD};
+    iw_force_quality_t quality = {0, 0, 0, IW_FORCE_WINDOW_SAMPLES, IW_WINDOW_GOOD};
     int32_t sum[2] = {0, 0};
     for (size_t i = 0; i < IW_FORCE_WINDOW_SAMPLES; i++) {
         const int16_t raw = self->sample[(self->next + i) % IW_FORCE_WINDOW_SAMPLES];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gate.h"
 
+#include "be.h"
 #include "magnitude.h"
 
 #include <string.h>
@@ -41,14 +42,9 @@ static bool current_ok(const iw_config_t *config, int32_t current_mA) {
     return !negative_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
 }
 
-static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame,
-                               const iw_proto_message_t *message) {
+static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, iw_side_t side,
+                               const iw_proto_setpoint_t *setpoint) {
     const iw_config_t *const config = self->config;
-    const iw_proto_setpoint_t *const setpoint = &message->as.setpoint;
-    const iw_time_us_t elapsed_us = now_us - self->last_us[message->side];
-    if (message->kind != IW_PROTO_SETPOINT || frame->dlc != config->setpoint_dlc) {
-        return IW_GATE_NOT_A_SETPOINT;
-    }
     if (!type_ok(config, setpoint->type)) {
         return IW_GATE_TYPE;
     }
@@ -58,21 +54,24 @@ static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, const
     if ((uint32_t)iw_magnitude(setpoint->speed_mm_s) > config->max_speed_mm_s) {
         return IW_GATE_SPEED;
     }
-    if (!is_zero(config, setpoint) && !slew_ok(self, message->side, elapsed_us, setpoint->speed_mm_s)) {
+    if (!is_zero(config, setpoint) && !slew_ok(self, side, now_us - self->last_us[side], setpoint->speed_mm_s)) {
         return IW_GATE_SLEW;
     }
     return IW_GATE_PASS;
 }
 
 iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
-    iw_proto_message_t message;
+    const bool left = frame->id == IW_ID_LEFT_SETPOINT;
+    const iw_side_t side = left ? IW_LEFT : IW_RIGHT;
+    const uint8_t *const data = frame->data;
+    const iw_proto_setpoint_t setpoint = {iw_be_get_i16(&data[1]), iw_be_get_i16(&data[3]), data[0]};
     iw_gate_verdict_t verdict = IW_GATE_NOT_A_SETPOINT;
-    if (iw_proto_decode(frame, &message) == IW_OK) {
-        verdict = judge(self, now_us, frame, &message);
+    if ((left || frame->id == IW_ID_RIGHT_SETPOINT) && frame->dlc == self->config->setpoint_dlc) {
+        verdict = judge(self, now_us, side, &setpoint);
     }
     if (verdict == IW_GATE_PASS) {
-        self->last_us[message.side] = now_us;
-        self->last_mm_s[message.side] = message.as.setpoint.speed_mm_s;
+        self->last_us[side] = now_us;
+        self->last_mm_s[side] = setpoint.speed_mm_s;
     } else {
         self->stopped++;
     }

@@ -19,7 +19,8 @@ typedef struct {
     uint32_t fraction;
 } axis_t;
 
-#define AXES (2U * IW_SIDES)
+/// A speed and a current for each wheel.
+#define AXES ((size_t)2 * IW_SIDES)
 
 static iw_command_t zero_command(const iw_config_t *config) {
     const int16_t full_mA = (int16_t)config->max_current_mA;
