@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Sizes of the core on Cortex-M: writes docs/sizes.md, or fails if the committed one is not true any more.
+"""Sizes of the core on Cortex-M and of the STM32 images: writes docs/sizes.md, or fails if the committed one is not true any more.
 
 usage: size_table.py --update|--check M0PLUS_BUILD_DIR M3_BUILD_DIR M4_BUILD_DIR
 
@@ -11,6 +11,8 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+
+import board_sizes
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "docs" / "sizes.md"
@@ -60,6 +62,7 @@ def render(builds):
     lines += ["", "RAM in bytes: `iw_gateway_t` holds everything, once per pair of wheels; the others are its parts.", "",
               "| type              |     RAM    |", "|-------------------|-----------:|"]
     lines += [f"| {f'`{name}`':<17} | {size:>10} |" for name, size in kinds]
+    lines += board_sizes.lines(builds)
     return "\n".join(lines) + "\n", rows[-1][1][2]
 
 

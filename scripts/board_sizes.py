@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Sizes of the STM32 images, and the worst stack of core and images by call graph, as lines for docs/sizes.md.
+
+The images are those of the presets arm-m3 and arm: they listen. An interrupt may come anywhere, and none interrupts another: the
+worst handler and the registers that the CPU saves are on top of the main loop's deepest path. Calls through the HAL go to each of
+its functions.
+"""
+import subprocess
+from pathlib import Path
+
+from stack_usage import INDIRECT, Depth, add_runtime_calls, read_graph
+
+BOARDS = {"STM32F103": ("iwheel_stm32f103", 1), "STM32F407": ("iwheel_stm32f407", 2)} # Image and which build it is in.
+HAL = ("iw_bxcan_send", "iw_bxcan_receive", "iw_bxcan_bus_state", "iw_bxcan_purge", "iw_estop_pressed")
+HANDLERS = ("iw_systick_handler", "iw_exti0_handler", "iw_can_transmit_handler", "iw_can_receive_handler", "iw_can_error_handler")
+SAVED_BY_CPU = 36 # Eight registers and four bytes to align them.
+
+
+def objects_of(build, *folders):
+    return sorted(path for path in Path(build).rglob("*.c.o*") if path.suffix in (".o", ".obj")
+                  and any(f"{folder}.dir" in path.parts for folder in folders))
+
+
+def depth_of(objects, indirect=()):
+    size, calls, findings = read_graph(objects)
+    add_runtime_calls(objects, size, calls)
+    calls[INDIRECT] = set(indirect)
+    if findings:
+        raise SystemExit("\n".join(findings))
+    return size, Depth(size, calls)
+
+
+def core_stack(build):
+    size, depth = depth_of(objects_of(build, "iwheel_core"))
+    return max(depth.of(name)[0] for name in size)
+
+
+def image_stack(build, image):
+    size, depth = depth_of(objects_of(build, "iwheel_core", "iwheel_stm32_driver", image), HAL)
+    missing = [name for name in (*HAL, *HANDLERS) if name not in size]
+    if missing:
+        raise SystemExit(f"not in the call graph of {image}: {', '.join(missing)}")
+    total = depth.of("main")[0] + SAVED_BY_CPU + max(depth.of(name)[0] for name in HANDLERS)
+    if depth.cycles:
+        raise SystemExit(f"recursion in {image}: {depth.cycles[0]}")
+    return total
+
+
+def image_sizes(build, image):
+    """(flash, RAM without stack)"""
+    elf = next(Path(build).rglob(f"{image}.elf"))
+    run = subprocess.run(["arm-none-eabi-size", str(elf)], capture_output=True, text=True, check=True)
+    text, data, bss = map(int, run.stdout.splitlines()[1].split()[:3])
+    return text + data, data + bss
+
+
+def lines(builds):
+    """`builds`: those of Cortex-M0+, M3, M4."""
+    rows = ["", "Worst stack of any of the core's functions in bytes, by call graph, without what the port's HAL functions need below it.", "",
+            "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |", "|-----------------|-----------:|-----------:|-----------:|",
+            "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |", "",
+            "The image that listens, per board, in bytes. RAM is without the stack; the stack is the worst of main loop and interrupt.", "",
+            "| board           |    flash   |     RAM    |    stack   |", "|-----------------|-----------:|-----------:|-----------:|"]
+    for board, (image, which) in BOARDS.items():
+        numbers = (*image_sizes(builds[which], image), image_stack(builds[which], image))
+        rows.append(f"| {board:<15} | " + " | ".join(f"{number:>10}" for number in numbers) + " |")
+    return rows
