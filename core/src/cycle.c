@@ -14,24 +14,36 @@ static uint8_t side_bit(size_t side) {
     return (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT;
 }
 
-static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t late_us = (now_us > self->promised_us) ? now_us - self->promised_us : 0U;
-    const bool late = late_us > IW_GATEWAY_LATE_US;
-    self->stalled = late || (self->stalled && self->backlog);
-    if (!late) {
-        return;
-    }
-    self->counters.late_steps++;
+static void excuse_wheels(iw_gateway_t *self, iw_time_us_t now_us) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (!iw_wheel_lost(&self->wheel[side], self->promised_us)) {
             iw_wheel_excuse(&self->wheel[side], now_us);
         }
         iw_follow_restart(&self->follow[side]);
     }
+}
+
+/// One long stall, or step after step too late to judge anything: both are told by how long nothing was judged.
+static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
+    const iw_time_us_t late_us = (now_us > self->promised_us) ? now_us - self->promised_us : 0U;
+    const bool late = late_us > IW_GATEWAY_LATE_US;
+    const bool was_stalled = self->stalled;
+    self->stalled = late || (was_stalled && self->backlog);
+    if (!self->stalled) {
+        return;
+    }
+    if (!was_stalled) {
+        self->stalled_since_us = self->promised_us;
+    }
+    if (late) {
+        self->counters.late_steps++;
+        excuse_wheels(self, now_us);
+    }
+    const iw_time_us_t blind_us = now_us - self->stalled_since_us;
     if (late_us > IW_GATEWAY_HUNG_US) {
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_LOOP_HUNG, IW_SIDES_NONE, whole_ms(late_us));
-    } else if (late_us >= IW_GATEWAY_STOP_US) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_LOOP_LATE, IW_SIDES_NONE, whole_ms(late_us));
+    } else if (blind_us >= IW_GATEWAY_STOP_US) {
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_LOOP_LATE, IW_SIDES_NONE, whole_ms(blind_us));
     }
 }
 

@@ -195,7 +195,8 @@ iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
         return IW_TARE_NO_FORCE;
     }
     const iw_force_quality_t quality = measure(self);
-    const bool known = self->provenance != IW_OFFSET_NONE && self->evidence != IW_UNIT_UNCLEAR;
+    const bool doubted = self->evidence == IW_UNIT_UNCLEAR || self->evidence == IW_UNIT_OFFSET_REMOVED;
+    const bool known = self->provenance != IW_OFFSET_NONE && !doubted;
     if (quality.window == IW_WINDOW_SATURATED) {
         return IW_TARE_SATURATED;
     }
@@ -227,13 +228,13 @@ iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_u
     if (unit_contradicted(self)) {
         return IW_FORCE_UNIT_CONTRADICTED;
     }
+    if (self->provenance == IW_OFFSET_OPERATOR) {
+        return IW_FORCE_VALID; // Measured on what the wheel sends, whatever it subtracts.
+    }
     if (self->evidence == IW_UNIT_OFFSET_REMOVED) {
         return IW_FORCE_OFFSET_REMOVED;
     }
-    if (self->evidence == IW_UNIT_UNCLEAR && self->provenance < IW_OFFSET_OPERATOR) {
-        return IW_FORCE_OFFSET_DOUBTED;
-    }
-    return IW_FORCE_VALID;
+    return (self->evidence == IW_UNIT_UNCLEAR) ? IW_FORCE_OFFSET_DOUBTED : IW_FORCE_VALID;
 }
 
 int32_t iw_force_raw_mN(const iw_force_t *self) {

@@ -246,6 +246,14 @@ static void test_force_removed_offset_is_invalid(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_REMOVED, force_rig_validity(&rig));
 }
 
+static void test_force_removed_offset_is_cured_by_a_tare(void) {
+    force_rig_quiet(&rig, 40, 0);
+    force_rig_offset(&rig, 500);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, iw_force_tare(&rig.force, rig.now_us));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
+    TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.force));
+}
+
 static void test_force_is_stale_after_five_periods(void) {
     force_rig_quiet(&rig, 40, 0);
     rig.now_us += MS(250) - 1U;
@@ -306,6 +314,7 @@ int main(void) {
     RUN_TEST(test_force_tare_settles_a_doubted_offset);
     RUN_TEST(test_force_contradicted_unit_is_invalid_and_never_rescaled);
     RUN_TEST(test_force_removed_offset_is_invalid);
+    RUN_TEST(test_force_removed_offset_is_cured_by_a_tare);
     RUN_TEST(test_force_is_stale_after_five_periods);
     RUN_TEST(test_force_saturated_sample_is_invalid_only_while_it_lasts);
     RUN_TEST(test_force_extremes_do_not_overflow);

@@ -62,10 +62,33 @@ static void test_gateway_arm_behind_a_zero_on_its_way_is_not_refused(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
+/// Steps that are each 30 ms late, while the holder goes on commanding.
+static void crawl_for(iw_time_us_t for_us) {
+    const iw_time_us_t until_us = rig.now_us + for_us;
+    const iw_drive_t drive = {{300, 300}, {0, 0}, false};
+    iw_applied_t applied;
+    while (rig.now_us < until_us) {
+        stall_by(MS(30));
+        (void)iw_gateway_drive(&rig.gateway, rig.now_us, HOLDER, &drive, &applied);
+    }
+}
+
+static void test_gateway_late_step_after_step_stops_like_one_long_stall(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    crawl_for(MS(60));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    crawl_for(MS(200));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_gateway_late_step_leaves_a_lost_wheel_lost);
     RUN_TEST(test_gateway_late_step_leaves_a_wheel_that_is_there_alone);
+    RUN_TEST(test_gateway_late_step_after_step_stops_like_one_long_stall);
     RUN_TEST(test_gateway_arm_behind_a_zero_on_its_way_is_not_refused);
     return UNITY_END();
 }

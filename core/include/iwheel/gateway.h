@@ -25,7 +25,7 @@
 
 /// A step later than this cannot tell when its frames came: they neither refresh nor fail a wheel's liveness.
 #define IW_GATEWAY_LATE_US 20000U
-/// Later than this: STOPPING without ramp.
+/// Later than this, or in one late step after another for this long: STOPPING without ramp.
 #define IW_GATEWAY_STOP_US 100000U
 /// Later than this: LATCHED.
 #define IW_GATEWAY_HUNG_US 500000U
@@ -74,10 +74,11 @@ typedef struct {
     iw_sender_t sender;
     iw_ledger_t ledger;
     iw_counters_t counters;
-    iw_time_us_t promised_us; ///< When the last step asked to be called again.
-    iw_time_us_t pose_us;     ///< IW_NEVER: none.
-    uint32_t purged_stop;     ///< Number of the stop for which a purge was tried.
-    uint32_t step_late_us;    ///< How late this step is.
+    iw_time_us_t stalled_since_us; ///< When the first of the steps in a row that judge nothing was wanted.
+    iw_time_us_t promised_us;      ///< When the last step asked to be called again.
+    iw_time_us_t pose_us;          ///< IW_NEVER: none.
+    uint32_t purged_stop;          ///< Number of the stop for which a purge was tried.
+    uint32_t step_late_us;         ///< How late this step is.
     iw_proto_pose_t pose;
     iw_bus_state_t bus;
     iw_bus_facts_t facts;
