@@ -7,7 +7,7 @@
 
 /// How many lines of advice there may be.
 #define ADVICE_LINES 6U
-#define ADVICE_SIZE 160U
+#define ADVICE_SIZE  160U
 
 typedef struct {
     char line[ADVICE_LINES][ADVICE_SIZE];

@@ -7,10 +7,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define DRIVE_TIME_MIN_MS 20
-#define DRIVE_TIME_MAX_MS 600000
+#define DRIVE_TIME_MIN_MS     20
+#define DRIVE_TIME_MAX_MS     600000
 #define DRIVE_TIME_DEFAULT_MS 2000
-#define DRIVE_CURRENT_MAX_mA 2000
+#define DRIVE_CURRENT_MAX_mA  2000
 
 typedef struct {
     int speed_mm_s[2];

@@ -16,7 +16,7 @@
 
 /// The first TOPICS_USUAL are watched when none is named.
 static const char *const topics[] = {"state", "bus", "estop", "lease", "stop", "force", "frame"};
-#define TOPICS (sizeof(topics) / sizeof(topics[0]))
+#define TOPICS       (sizeof(topics) / sizeof(topics[0]))
 #define TOPICS_USUAL 5U
 
 static bool is_topic(const char *word) {

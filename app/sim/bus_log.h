@@ -11,7 +11,7 @@
 
 /// Nothing waits longer than this to be written.
 #define SIM_LOG_HOLD_US 20000U
-#define SIM_LOG_BUFFER 65536U
+#define SIM_LOG_BUFFER  65536U
 
 typedef struct {
     iw_time_us_t oldest_us; ///< IW_NEVER: nothing waits.

@@ -7,7 +7,7 @@
 
 #include "iwheel/can_frame.h"
 
-#define SIM_WORDS_MAX 64U
+#define SIM_WORDS_MAX  64U
 #define SIM_LINE_BYTES 256U
 
 typedef struct {

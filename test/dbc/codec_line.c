@@ -13,7 +13,7 @@
 #include "iwheel/proto.h"
 
 #define LINE_MAX_BYTES 160
-#define VALUES_MAX 4
+#define VALUES_MAX     4
 
 typedef struct {
     uint32_t id;

@@ -6,7 +6,7 @@
 #include "unity.h"
 
 #define POISON 0xA5
-#define MHZ 1000000U
+#define MHZ    1000000U
 
 static const iw_bit_timing_achieved_t bus = {1000000, 625};
 static iw_bit_timing_limits_t limits;

@@ -5,9 +5,9 @@
 #include "iwheel/gate.h"
 #include "unity.h"
 
-#define POISON 0xA5
+#define POISON   0xA5
 #define START_US 5000000123ULL
-#define AGES_US 3600000000ULL
+#define AGES_US  3600000000ULL
 
 static iw_config_t config;
 static iw_gate_t gate;

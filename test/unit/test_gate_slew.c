@@ -5,9 +5,9 @@
 #include "iwheel/gate.h"
 #include "unity.h"
 
-#define POISON 0xA5
+#define POISON   0xA5
 #define START_US 5000000123ULL
-#define AGES_US 3600000000ULL
+#define AGES_US  3600000000ULL
 /// A ramp in whole mm/s may be this much ahead of its slope; a verdict is demanded outside this band only.
 #define ROUNDING_MM_S 1
 

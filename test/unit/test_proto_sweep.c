@@ -6,8 +6,8 @@
 #include "iwheel/proto.h"
 #include "unity.h"
 
-#define POISON 0xA5
-#define FIELDS_MAX 4
+#define POISON      0xA5
+#define FIELDS_MAX  4
 #define FORMAT_BITS 4
 
 /// A field as the document's table has it, and where the codec's struct keeps it.

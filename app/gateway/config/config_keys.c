@@ -3,10 +3,10 @@
 
 #include <string.h>
 
-#define FIELD(member) .offset = offsetof(gateway_config_t, member), .size = sizeof(((gateway_config_t *)0)->member)
-#define CORE(member, fault) .kind = CONFIG_NUMBER, .range_of = (fault), FIELD(core.member)
+#define FIELD(member)             .offset = offsetof(gateway_config_t, member), .size = sizeof(((gateway_config_t *)0)->member)
+#define CORE(member, fault)       .kind = CONFIG_NUMBER, .range_of = (fault), FIELD(core.member)
 #define NUMBER(member, low, high) .kind = CONFIG_NUMBER, .min = (low), .max = (high), FIELD(member)
-#define WORD(member, list) .kind = CONFIG_WORD, .words = (list), FIELD(member)
+#define WORD(member, list)        .kind = CONFIG_WORD, .words = (list), FIELD(member)
 
 static const config_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
 static const config_word_t wheel_rotor[] = {{"wheel", 0}, {"rotor", 1}, {NULL, 0}};

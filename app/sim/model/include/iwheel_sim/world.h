@@ -22,12 +22,12 @@
 #include "iwheel_sim/pair.h"
 
 /// Ports of the bus. Clients have the rest.
-#define SIM_PORT_LEFT 0U
-#define SIM_PORT_RIGHT 1U
-#define SIM_PORT_FOREIGN 2U
-#define SIM_PORT_BABBLE 3U
-#define SIM_PORT_INJECT 4U
-#define SIM_PORT_CLIENT 5U
+#define SIM_PORT_LEFT     0U
+#define SIM_PORT_RIGHT    1U
+#define SIM_PORT_FOREIGN  2U
+#define SIM_PORT_BABBLE   3U
+#define SIM_PORT_INJECT   4U
+#define SIM_PORT_CLIENT   5U
 #define SIM_WORLD_CLIENTS (SIM_BUS_PORTS - SIM_PORT_CLIENT)
 /// A client's adapter holds this many frames unless told otherwise: the controller's one and three behind it.
 #define SIM_QUEUE_DEFAULT 4U
