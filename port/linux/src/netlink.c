@@ -11,20 +11,46 @@
 
 /// Replies read for one request at the most: what came before is an answer to an earlier one.
 #define REPLIES_MAX 8
+/// News taken in one call at the most; more are taken by the next.
+#define EVENTS_MAX 64
 /// A CAN interface with everything that kernels tell of it takes about 2 KiB.
 #define REPLY_SIZE 16384U
 
-int iw_netlink_open(iw_netlink_t *self) {
+static int open_for(iw_netlink_t *self, unsigned groups) {
     *self = (iw_netlink_t){.socket = mnl_socket_open2(NETLINK_ROUTE, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (self->socket == NULL) {
         return errno;
     }
-    if (mnl_socket_bind(self->socket, 0, MNL_SOCKET_AUTOPID) != 0) {
+    if (mnl_socket_bind(self->socket, groups, MNL_SOCKET_AUTOPID) != 0) {
         const int error = errno;
         iw_netlink_close(self);
         return error;
     }
     return 0;
+}
+
+int iw_netlink_open(iw_netlink_t *self) {
+    return open_for(self, 0);
+}
+
+int iw_netlink_open_events(iw_netlink_t *self) {
+    return open_for(self, RTMGRP_LINK);
+}
+
+int iw_netlink_fd(const iw_netlink_t *self) {
+    return mnl_socket_get_fd(self->socket);
+}
+
+bool iw_netlink_take_events(iw_netlink_t *self) {
+    char first[64]; // Only that there is one counts; the rest of the message is dropped.
+    bool any = false;
+    for (int i = 0; i < EVENTS_MAX; ++i) {
+        if (recv(iw_netlink_fd(self), first, sizeof first, 0) < 0 && errno != ENOBUFS) {
+            break;
+        }
+        any = true;
+    }
+    return any;
 }
 
 void iw_netlink_close(iw_netlink_t *self) {

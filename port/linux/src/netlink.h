@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// The kernel's view of a network interface, through netlink (libmnl).
 ///
-/// A request is answered within the call. It may have to wait for whoever configures a network interface just now, so
-/// it is made only when the bus has changed.
+/// A request is answered within the call. It may have to wait for whoever configures a network interface just now
+/// (see netdev.h), so it is made only when an interface has come up.
 #ifndef IW_NETLINK_H
 #define IW_NETLINK_H
 
@@ -23,9 +23,16 @@ typedef struct {
     iw_bus_state_t state; ///< IW_BUS_ACTIVE too if the interface has no error states.
 } iw_netlink_reading_t;
 
-/// 0, or an errno. The only call that allocates.
+/// 0, or an errno. This and `open_events` are the only calls that allocate.
 int iw_netlink_open(iw_netlink_t *self);
 void iw_netlink_close(iw_netlink_t *self);
+
+/// The same for news: `self` then becomes readable whenever some interface has changed, and is not for requests.
+int iw_netlink_open_events(iw_netlink_t *self);
+int iw_netlink_fd(const iw_netlink_t *self);
+
+/// Takes all news. True if there were any; whose is not told.
+bool iw_netlink_take_events(iw_netlink_t *self);
 
 /// 0 also for an interface that does not exist (IW_LINK_ABSENT); else an errno, `*out_reading` then is absent.
 int iw_netlink_read(iw_netlink_t *self, const char *name, iw_netlink_reading_t *out_reading);

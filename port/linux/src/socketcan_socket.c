@@ -7,7 +7,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#define DROPS_SPACE CMSG_SPACE(sizeof(uint32_t))
+/// A socket's queue holds some hundred frames.
+#define DROP_BATCHES_MAX 64
+#define DROPS_SPACE      CMSG_SPACE(sizeof(uint32_t))
 
 void iw_socketcan_socket_init(iw_socketcan_socket_t *self) {
     *self = (iw_socketcan_socket_t){.fd = -1};
@@ -91,6 +93,25 @@ int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
         note_drops(self, &message[i].msg_hdr);
     }
     return error == EAGAIN || error == EINTR ? 0 : error;
+}
+
+void iw_socketcan_socket_forget(iw_socketcan_socket_t *self) {
+    self->count = 0;
+    self->next = 0;
+    self->drained = false;
+}
+
+int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
+    int last = 0;
+    for (int i = 0; i < DROP_BATCHES_MAX; ++i) {
+        const int error = iw_socketcan_socket_fill(self);
+        last = error != 0 ? error : last;
+        if (error == 0 && self->drained) {
+            break;
+        }
+    }
+    iw_socketcan_socket_forget(self);
+    return last;
 }
 
 int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame) {

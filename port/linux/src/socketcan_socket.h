@@ -29,6 +29,12 @@ void iw_socketcan_socket_close(iw_socketcan_socket_t *self);
 /// True if all that was taken has been used.
 bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self);
 
+/// What was taken and not used is forgotten.
+void iw_socketcan_socket_forget(iw_socketcan_socket_t *self);
+
+/// Takes and forgets everything that waits in the kernel, errors too. 0, or the errno met last.
+int iw_socketcan_socket_drop(iw_socketcan_socket_t *self);
+
 /// Takes the next batch; only when empty. 0 (there may be none), or the errno that tells why the bus is lost.
 int iw_socketcan_socket_fill(iw_socketcan_socket_t *self);
 
