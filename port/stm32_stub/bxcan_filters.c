@@ -52,8 +52,8 @@ static void clear_bits(iw_register_t *address, uint32_t bits) {
 }
 
 void iw_bxcan_filters_write(iw_bxcan_registers_t *device, uint32_t first_bank) {
-    const uint32_t ours = ((1UL << IW_BXCAN_BANKS) - 1U) << first_bank;
-    const uint32_t wide = ((1UL << WIDE_BANKS) - 1U) << (first_bank + NARROW_BANKS);
+    const uint32_t ours = ((UINT32_C(1) << IW_BXCAN_BANKS) - 1U) << first_bank;
+    const uint32_t wide = ((UINT32_C(1) << WIDE_BANKS) - 1U) << (first_bank + NARROW_BANKS);
     set_bits(&device->FMR, IW_FMR_FINIT); // What follows may be changed only now, bxCAN 9.4.
     clear_bits(&device->FM1R, ours);      // Masks, not lists.
     clear_bits(&device->FFA1R, ours);     // FIFO 0.

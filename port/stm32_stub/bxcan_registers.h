@@ -56,10 +56,13 @@ static_assert(offsetof(iw_bxcan_registers_t, filter) == 0x240, "F0R1 is at 0x240
 #define IW_MSR_SLAK 0x00000002U ///< In sleep mode: so after reset.
 #define IW_MSR_ERRI 0x00000004U ///< An enabled error condition came up. Written 1: cleared.
 
-#define IW_TSR_RQCP(mailbox) (0x01UL << (8U * (mailbox))) ///< Request completed: sent or aborted. Written 1: cleared.
-#define IW_TSR_TXOK(mailbox) (0x02UL << (8U * (mailbox))) ///< ... and it was sent and acknowledged. Cleared with RQCP.
-#define IW_TSR_ABRQ(mailbox) (0x80UL << (8U * (mailbox))) ///< Written 1: abort. Stays until the mailbox is empty.
-#define IW_TSR_TME(mailbox)  (0x04000000UL << (mailbox))  ///< Mailbox empty.
+#define IW_TSR_RQCP(mailbox)                                                                                           \
+    (UINT32_C(0x01) << (8U * (mailbox))) ///< Request completed: sent or aborted. Written 1: cleared.
+#define IW_TSR_TXOK(mailbox)                                                                                           \
+    (UINT32_C(0x02) << (8U * (mailbox))) ///< ... and it was sent and acknowledged. Cleared with RQCP.
+#define IW_TSR_ABRQ(mailbox)                                                                                           \
+    (UINT32_C(0x80) << (8U * (mailbox)))                        ///< Written 1: abort. Stays until the mailbox is empty.
+#define IW_TSR_TME(mailbox) (UINT32_C(0x04000000) << (mailbox)) ///< Mailbox empty.
 
 #define IW_RF0R_FMP0  0x00000003U ///< Frames waiting, 0..3.
 #define IW_RF0R_FOVR0 0x00000010U ///< A frame came while three were waiting. Written 1: cleared.
