@@ -30,6 +30,14 @@ void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, bool
     }
 }
 
+void iw_outbox_rest(iw_outbox_t *self) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        if (self->pending[side] == 0U) {
+            self->waiting_us[side] = IW_NEVER;
+        }
+    }
+}
+
 void iw_outbox_echo(iw_outbox_t *self, iw_side_t side) {
     if (self->pending[side] == 0U) {
         self->stray++;

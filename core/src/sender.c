@@ -80,6 +80,7 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw
 
 void iw_sender_rest(iw_sender_t *self) {
     self->pair_us = IW_NEVER;
+    iw_outbox_rest(&self->outbox);
 }
 
 bool iw_sender_purge(iw_sender_t *self) {

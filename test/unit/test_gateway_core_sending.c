@@ -151,6 +151,21 @@ static void test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros(vo
     }
 }
 
+static void test_gateway_drives_again_after_a_port_that_took_nothing_until_silence(void) {
+    drive_on();
+    rig.bus.send_result[IW_LEFT] = 0;
+    rig.bus.send_result[IW_RIGHT] = 0;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(120));
+    gateway_rig_run(&rig, MS(12000)); // Longer than the longest hold.
+    TEST_ASSERT_FALSE(rig.gateway.permit.holding);
+    rig.bus.send_result[IW_LEFT] = 1;
+    rig.bus.send_result[IW_RIGHT] = 1;
+    gateway_rig_run(&rig, MS(1100));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_reset(&rig));
+    gateway_rig_arm(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
 static void test_gateway_pair_that_never_leaves_is_a_stalled_send(void) {
     drive_on();
     rig.bus.send_result[IW_RIGHT] = 0;
@@ -269,6 +284,7 @@ int main(void) {
     RUN_TEST(test_gateway_inverted_wheel_is_told_the_negated_speed);
     RUN_TEST(test_gateway_inverted_wheel_with_current_setpoint_is_told_the_negated_current);
     RUN_TEST(test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros);
+    RUN_TEST(test_gateway_drives_again_after_a_port_that_took_nothing_until_silence);
     RUN_TEST(test_gateway_pair_that_never_leaves_is_a_stalled_send);
     RUN_TEST(test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge);
     RUN_TEST(test_gateway_purged_frames_never_come_out);

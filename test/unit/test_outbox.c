@@ -162,6 +162,29 @@ static void test_waiting_refused_frame_waits_from_the_first_refusal(void) {
     TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
 }
 
+static void test_rest_ends_the_waiting_of_what_was_only_refused(void) {
+    iw_outbox_sent(&outbox, IW_LEFT, 1000, false);
+    iw_outbox_sent(&outbox, IW_RIGHT, 1000, false);
+    iw_outbox_rest(&outbox);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
+    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+}
+
+static void test_rest_forgets_nothing_that_was_handed_over(void) {
+    iw_outbox_sent(&outbox, IW_LEFT, 1000, false);
+    iw_outbox_sent(&outbox, IW_LEFT, 2000, true);
+    iw_outbox_sent(&outbox, IW_RIGHT, 500, false);
+    iw_outbox_rest(&outbox);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
+    TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+    iw_outbox_echo(&outbox, IW_LEFT);
+    TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 1) == false);
+    iw_outbox_sent(&outbox, IW_RIGHT, 3000, true);
+    iw_outbox_rest(&outbox);
+    iw_outbox_echo(&outbox, IW_RIGHT);
+    TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 2000));
+}
+
 static void test_waiting_is_that_of_the_wheel_that_waits_longest(void) {
     iw_outbox_sent(&outbox, IW_LEFT, 2000, true);
     iw_outbox_sent(&outbox, IW_RIGHT, 1000, true);
@@ -207,6 +230,8 @@ int main(void) {
     RUN_TEST(test_init_owes_nothing);
     RUN_TEST(test_may_send_zero_never_waits_for_an_echo);
     RUN_TEST(test_waiting_refused_frame_waits_from_the_first_refusal);
+    RUN_TEST(test_rest_ends_the_waiting_of_what_was_only_refused);
+    RUN_TEST(test_rest_forgets_nothing_that_was_handed_over);
     RUN_TEST(test_waiting_is_that_of_the_wheel_that_waits_longest);
     RUN_TEST(test_proven_since_needs_both_wheels);
     RUN_TEST(test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer);

@@ -5,6 +5,7 @@
 /// form, and a zero never waits for an echo. Echoes of one id come in the order sent.
 ///
 ///     FREE --sent--> ONE --zero sent--> TWO;  each echo goes one back;  clear: FREE
+///     (a refused frame only waits; an echo or the end of sending ends that)
 #ifndef IW_OUTBOX_H
 #define IW_OUTBOX_H
 
@@ -27,8 +28,12 @@ void iw_outbox_clear(iw_outbox_t *self);
 bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero);
 
 /// A frame was handed over (`accepted`; only where `iw_outbox_may_send`) or refused by the port. A refused one starts
-/// the waiting too, so that a port that takes nothing is found out; the next echo of that wheel settles it.
+/// the waiting too, so that a port that takes nothing is found out; the next echo of that wheel settles it, or `rest`.
 void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, bool accepted);
+
+/// Nothing is being sent any more. What was only refused waits no longer: nobody would ever settle it. What was handed
+/// over still does.
+void iw_outbox_rest(iw_outbox_t *self);
 
 /// An echo came.
 void iw_outbox_echo(iw_outbox_t *self, iw_side_t side);

@@ -41,7 +41,7 @@ bool iw_sender_ready(const iw_sender_t *self, bool zero);
 /// Sends the pair, given in the machine's frame, to the wheels that may have it.
 iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero);
 
-/// Nothing is being sent: gaps are measured anew from the next pair.
+/// Nothing is being sent: gaps are measured anew from the next pair, and what was refused is forgotten.
 void iw_sender_rest(iw_sender_t *self);
 
 /// Asks the port to take back what is not on the bus; if it surely could, the account is cleared. True if so.
