@@ -98,17 +98,21 @@ static void say_not_at_rest(const wording_t *self) {
 }
 
 static void say_stalled(const wording_t *self) {
-    const iw_time_us_t waiting_us = iw_outbox_waiting_us(&self->daemon->gateway.sender.outbox);
-    if (waiting_us != IW_NEVER) {
-        SAY(self,
-            "a setpoint has been waiting for %" PRIu64
-            " ms to be acknowledged on the bus; check that the wheels have power and the bus is terminated",
-            ms_since(self->daemon, waiting_us));
+    static const char cure[] = "check that the wheels have power and the bus is terminated";
+    const gw_daemon_t *daemon = self->daemon;
+    const iw_time_us_t waiting_us = iw_outbox_waiting_us(&daemon->gateway.sender.outbox);
+    const char *bus = daemon->config.bus.interface;
+    if (waiting_us == IW_NEVER) {
+        SAY(self, "the zero setpoints were not acknowledged on the bus within %u ms; %s",
+            daemon->gateway.config.echo_ms, cure);
+    } else if (iw_linux_hal_link(&daemon->hal)->presence == IW_LINK_LOCAL) {
+        SAY(self, "a setpoint has been waiting for %" PRIu64 " ms to be acknowledged on the bus; %s",
+            ms_since(daemon, waiting_us), cure);
     } else {
         SAY(self,
-            "the zero setpoints were not acknowledged on the bus within %u ms; check that the wheels have power and "
-            "the bus is terminated",
-            self->daemon->gateway.config.echo_ms);
+            "a setpoint has been waiting for %" PRIu64 " ms to be acknowledged on the bus; %s; if so, it was lost: ip "
+            "link set %s down; ip link set %s up",
+            ms_since(daemon, waiting_us), cure, bus, bus);
     }
 }
 

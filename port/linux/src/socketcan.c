@@ -361,10 +361,12 @@ static iw_bus_state_t can_state(void *self) {
 }
 
 /// Has the link taken down and up: that empties the queue and the controller. It takes its time, so nothing can be
-/// promised here; that it is done is told by the loss of the bus.
+/// promised here; that it is done is told by the loss of the bus. Not where the echo is unproven: an slcan adapter keeps
+/// what it has of old frames, and only the zeros in the queue behind them would be lost.
 static int can_purge(void *self) {
     socketcan_t *bus = (socketcan_t *)self;
-    if (bus->restarting == 0 && bus->up && iw_netlink_restart_start(bus->interface, &bus->restarting) != 0) {
+    if (bus->restarting == 0 && bus->up && bus->link.echo_proven &&
+        iw_netlink_restart_start(bus->interface, &bus->restarting) != 0) {
         bus->restarting = 0;
         bus->link.purge = IW_LINK_PURGE_FAILED;
         ++bus->link.changes;
