@@ -128,10 +128,10 @@ class FakeSlcan(threading.Thread):
     def run(self):
         while not self.quit:
             with self.lock:
+                self._take_lines()
                 reads = [self.wake_read] + ([self.hub] if self.hub else [])
                 if self.master is not None and not self.stalled and self.waiting < DEPTH:
                     reads.append(self.master)
-                self._take_lines()
             ready = select.select(reads, [], [], 1.0)[0]
             with self.lock:
                 if self.wake_read in ready:

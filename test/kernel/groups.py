@@ -11,12 +11,12 @@ class Group(NamedTuple):
     what: str
     virtual: bool = True
     kernel_arguments: tuple = ()
-    limit_s: int = 240
+    limit_s: int = 600
     full_limit_s: int = 1200
 
 
 GROUPS = (
-    Group("soak", "an hour of random faults", limit_s=600, full_limit_s=4 * 3600),
+    Group("soak", "an hour of random faults", limit_s=900, full_limit_s=4 * 3600),
     Group("realtime", "the same rules by the clock on the wall", virtual=False, full_limit_s=1800),
     Group("estop", "the e-stop on a GPIO line", full_limit_s=1800),
     Group("adapter", "a CAN adapter with states, stalls and a plug", full_limit_s=1200),

@@ -9,19 +9,23 @@ from can_bus import CanBus
 from fake_slcan import FakeSlcan
 from gpio_sim import RISING, Edges, GpioChip
 from harness import Rig, now_us
-from judge_log import Event
+from judge_log import Event, percentile
 from scenario import Test
 
 NUMBERS = itertools.count()
 EDGE_S = 1.0
+TICK_US, BEFORE_TICK_US = 10_000, 200
+RAW_ESTOP_US = 1_000_000  # the judge's own limit; what counts is the time from the edge
+ESTOP_US = 5_000  # invariant 2, 99th percentile
 CLOCK = {"virtual": False}  # set once, by guest.py, before the first scenario
 
 
 class GpioButton:
     """The e-stop contact on a simulated line. Mixed into a rig; `active` is the level of a pressed button.
 
-    The simulated chip delivers edges at the kernel's next timer tick. So a second line, the witness, is pulled in the same
-    instant, and the kernel's stamp of its edge is when the button was pressed.
+    The simulated chip changes the level at once but delivers edges at the kernel's next timer tick, up to 10 ms later. So the
+    contact is moved right before a tick, and a second line, the witness, is pulled in the same instant: the kernel's stamp of
+    its edge is when the edge happened. `edges` lists (level changed, edge happened).
     """
 
     active = "low"  # with "high" the bias that the gateway asks for outweighs the contact to ground: see HighVcanRig
@@ -32,39 +36,61 @@ class GpioButton:
         self.chip.pull(self.active == "low")
         self.chip.pull(False, self.chip.WITNESS)
         self.witness = Edges(self.chip.chip, self.chip.WITNESS, RISING)
+        self.edges = []
+        self.tick_us = self._learn_tick()
         self.settings.setdefault("estop", {}).update({"line": self.line, "active": self.active})
         self.write_config()
 
     def estop_line(self):
         return self.line if self.estop else "none"
 
+    def _learn_tick(self):
+        self.chip.pull(True, self.chip.WITNESS)
+        edge = self.witness.next(EDGE_S)
+        self.chip.pull(False, self.chip.WITNESS)
+        if edge is None:
+            raise RuntimeError("the simulated GPIO chip delivered no edge")
+        return edge[0]
+
     def _contact(self, pressed):
         self.chip.pull(pressed, self.chip.WITNESS)
         self.chip.pull(pressed == (self.active == "high"))
 
-    def _pressed_at(self):
+    def _press(self):
+        """Moves the contact right before the next tick. Returns when that began and was done."""
+        left_us = TICK_US - (now_us() + BEFORE_TICK_US - self.tick_us) % TICK_US
+        time.sleep(left_us / 1e6)
+        t_us = now_us()
+        self._contact(True)
+        return t_us, now_us()
+
+    def _pressed(self, moved):
+        """Waits for the edge and writes both into the timeline: from the level on a stop has its reason."""
+        level_us, done_us = moved
         edge = self.witness.next(EDGE_S)
         if edge is None:
             raise RuntimeError("the simulated GPIO chip delivered no edge")
-        self.timeline.append(Event(edge[0], "press", now_us()))
-        return edge[0]
+        edge_us = max(edge[0], done_us)  # a slow machine may stand still between the two lines
+        self.edges.append((level_us, edge_us))
+        self.timeline.append(Event(level_us, "cut", within_us=edge_us - level_us))
+        self.timeline.append(Event(edge_us, "press", now_us()))
+        return edge_us
 
     def press(self):
-        self._contact(True)
-        return self._pressed_at()
+        return self._pressed(self._press())
 
     def release(self):
         self._contact(False)
 
     def pulse(self, seconds):
         """Presses and releases; returns when it began."""
-        self._contact(True)
+        moved = self._press()
         if seconds:
             time.sleep(seconds)
         self.chip.pull(self.active == "low")
-        t_us = self._pressed_at()
+        edge_us = self._pressed(moved)
         self.release()
-        return t_us
+        return edge_us
 
     def lose_chip(self):
         """The chip goes while it is held. A press, as far as the rules are concerned."""
@@ -177,10 +203,26 @@ class KernelTest(Test):
         self.measures[name] = max(value, self.measures.get(name, value))
 
     def judge(self, rig, moves=True, **options):
-        judge = super().judge(rig, moves=moves, **options)
+        known = len(self.latencies)
+        judge = super().judge(rig, moves=moves, **{"estop_limit_us": RAW_ESTOP_US, **options})
         if judge.gap_max_us:
             self.measure("gap_ms", judge.gap_max_us / 1000)
+        self.latencies[known:] = [self.after_edge(rig, judge, *pair) for pair in self.latencies[known:]]
+        values = [latency_us for _, latency_us in self.latencies[known:]]
+        if values:
+            p99_ms = percentile(values, 99) / 1000
+            self.check(p99_ms <= ESTOP_US / 1000, f"e-stop to zero pair, p99 {p99_ms:.2f} ms of {len(values)}", True)
+            self.figures[-1] = f"e-stop to zero p50 {percentile(values, 50) / 1000:.2f} ms, p99 {p99_ms:.2f} ms of {len(values)}"
         return judge
+
+    @staticmethod
+    def after_edge(rig, judge, edge_us, latency_us):
+        """A gateway that saw the level sent its zeros before the edge came."""
+        for level_us, at_us in rig.edges:
+            early = [s for s in judge.setpoints if level_us < s.t_us <= at_us and s.zero]
+            if at_us == edge_us and len(early) >= 2:
+                return edge_us, 0
+        return edge_us, latency_us
 
     def first_after(self, rig, t_us, wanted, text, limit_ms):
         elapsed_ms = super().first_after(rig, t_us, wanted, text, limit_ms)

@@ -16,12 +16,12 @@ from judge_log import LEFT, RIGHT
 from kernel_rig import SlcanRig
 from scenarios.bus_faults import wait_reset
 
-from .interface import back_to_driving, driving, lose_interface, stale_after
+from .interface import back_to_driving, driving, fault, lose_interface, stale_after
 
 TTY_FRAMES = 40  # what a stalled pty, the driver and the queue hold at most, per measurement and with room
 
 
-@kernel_test("nominal drive through an adapter", "adapter realtime", 0, SlcanRig)
+@kernel_test("nominal drive through an adapter", "adapter", 0, SlcanRig)
 def slcan_nominal(t):
     rig, client, stream = driving(t, speed=400)
     status = client.request("status")
@@ -38,10 +38,7 @@ def row16_bus_off(t):
     rig, client, stream = driving(t)
     observer = rig.client("observer")
     observer.request("watch", topics=["bus", "stop"])
-    begin_us = now_us()
-    rig.note("cut", within_us=30_000)
-    rig.note("dead")
-    rig.adapter.tell("bus_off")
+    begin_us = fault(rig, lambda: rig.adapter.tell("bus_off"), 30)
     time.sleep(0.3)
     stream.stop()
     why = t.stopped_by(client, "bus_down")
@@ -227,10 +224,11 @@ def row18_power_cut_no_rights(t):
     judge_after_residue(t, rig, client, back_us)
 
 
-@kernel_test("adapter unplugged in motion and plugged in again: stop, found by name, no backlog", "adapter realtime", 15, SlcanRig)
+@kernel_test("adapter unplugged in motion and plugged in again: stop, found by name, no backlog", "adapter", 15, SlcanRig)
 def row15_unplugged(t):
     rig, client, stream = driving(t)
-    lose_interface(t, rig, client, stream, rig.adapter.unplug)
+    # The frame on its way to the adapter and its wheels' silence may be noticed before the kernel says that it is gone.
+    lose_interface(t, rig, client, stream, rig.adapter.unplug, ("bus_down", "send_stalled", "wheel_lost"))
     t.check(not rig.adapter.is_there(), "the interface is gone")
     time.sleep(1.0)
     rig.adapter.plug()

@@ -155,7 +155,7 @@ def row27_disk_full(t):
             time.sleep(0.5)
         t.arm(client)
         t.drive_for(client, 200, 200, 0.5)
-        t.judge(rig, estop_limit_us=20_000)
+        t.judge(rig)
     finally:
         rig.gateway.end()
         subprocess.run(["umount", "-l", folder], check=True)
@@ -186,7 +186,7 @@ def row27_stderr_blocked(t):
         wait_reset(t, client)
     t.arm(client)
     t.drive_for(client, 200, 200, 0.5)
-    t.judge(rig, estop_limit_us=20_000)
+    t.judge(rig)
     os.close(read_end)
     os.close(write_end)
 

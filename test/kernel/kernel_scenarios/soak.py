@@ -11,7 +11,8 @@ from catalogue import kernel_test
 from client import Client
 from harness import now_us
 from judge import Judge
-from judge_log import LEFT, RIGHT
+from judge_log import LEFT, RIGHT, percentile
+from kernel_rig import ESTOP_US, RAW_ESTOP_US
 
 HOURS, HOURS_FULL = 1, 24
 SETTLE_EPISODES = 40  # memory is compared from here on: every kind of fault has been seen, every page touched
@@ -189,11 +190,12 @@ class Soak:
 
     def verdict(self):
         frames, events = self.rig.bus.frames[:], self.rig.timeline[:]
-        judge = Judge(self.rig.judge_config(), frames, events, finished_us=now_us(), estop_limit_us=20_000)
+        judge = Judge(self.rig.judge_config(), frames, events, finished_us=now_us(), estop_limit_us=RAW_ESTOP_US)
         for found in judge.judge()[:5]:
             self.t.failures.append([f"{self.where()}: {found.rule}: {found.text}", "rule", found.t_us])
         self.gap_us = max(self.gap_us, judge.gap_max_us)
-        self.latencies += judge.estop_latencies
+        self.latencies += [self.t.after_edge(self.rig, judge, *pair) for pair in judge.estop_latencies]
+        self.rig.edges.clear()
         if not self.t.failures:  # else they are shown
             del self.rig.bus.frames[: len(frames)]
             del self.rig.timeline[: len(events)]
@@ -221,6 +223,8 @@ def soak(t):
     t.check(t.failures or len(run.counts) == len(run.faults), f"faults that never happened: {set(run.faults) - set(run.counts)}")
     t.check(t.failures or run.baseline, "too short to compare memory")
     t.latencies += run.latencies
+    p99_us = percentile([latency_us for _, latency_us in run.latencies] or [0], 99)
+    t.check(p99_us <= ESTOP_US, f"e-stop to zero pair, p99 {p99_us / 1000:.2f} ms")
     t.measure("gap_ms", run.gap_us / 1000)
     memory_kB, descriptors = rig.gateway.resident_kB(), rig.gateway.descriptors()
     t.figure(f"{lived_h:.1f} h, {run.episode} episodes, {run.presses} presses, longest gap {run.gap_us / 1000:.0f} ms")
