@@ -23,8 +23,7 @@ typedef struct {
     iw_time_us_t change_us;  ///< When the button's level last changed.
     iw_time_us_t profile_us; ///< When the profile began.
     bool level;              ///< The button's last level: pressed.
-    bool settled;            ///< ... and the one that lasted long enough.
-    bool seen_released;      ///< A button that is held from the start on counts only after it was released.
+    bool released;           ///< ... and whether it was let go for long enough before.
     bool running;            ///< The profile.
 } iw_commander_t;
 

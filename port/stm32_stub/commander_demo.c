@@ -18,22 +18,19 @@ bool iw_commander_sends(void) {
     return true;
 }
 
-/// True once for each press: low for STABLE_US after it was high for STABLE_US. A held button repeats nothing.
+/// True once for each press: low for STABLE_US after it was high for STABLE_US. A held button repeats nothing, and one that is down
+/// from the start counts only after it was let go.
 static bool was_pressed(iw_commander_t *self, iw_time_us_t now_us) {
     const bool level = iw_pins_button_low();
     if (level != self->level) {
         self->level = level;
         self->change_us = now_us;
     }
-    if (level == self->settled && self->seen_released) {
-        return false;
-    }
     if (now_us - self->change_us < STABLE_US) {
         return false;
     }
-    self->settled = level;
-    const bool press = level && self->seen_released;
-    self->seen_released = self->seen_released || !level;
+    const bool press = level && self->released;
+    self->released = !level;
     return press;
 }
 

@@ -32,7 +32,8 @@ class Rig:
         self.machine = Machine(BOARDS[board_name](), image.stdout)
         if oscillator is not None:
             self.machine.watchdog.lsi_hz = self.machine.board.lsi_limits_hz[oscillator]
-        self.addresses, self.notes, self.expected_resets = symbols.addresses(elf), [], []
+        self.addresses, self.stack_area = symbols.addresses(elf), symbols.stack_area(elf)
+        self.notes, self.expected_resets = [], []
 
     def run(self, span_ns):
         self.machine.run(span_ns)
@@ -42,6 +43,12 @@ class Rig:
 
     def counter(self, name):
         return int.from_bytes(self.machine.cpu.mem_read(self.addresses[name], 4), "little")
+
+    def stack_used(self):
+        """Bytes of stack that were ever written: RAM begins with a pattern."""
+        lowest, highest = self.stack_area
+        memory = bytes(self.machine.cpu.mem_read(lowest, highest - lowest))
+        return len(memory) - next((at for at, byte in enumerate(memory) if byte != self.machine.POISON), len(memory))
 
     def note(self, text):
         self.notes.append(text)
@@ -54,6 +61,7 @@ class Rig:
         assert not self.machine.violations, "; ".join(self.machine.violations)
         violation = self.machine.can.violation().decode()
         assert not violation, f"bus controller: {violation}"
+        assert self.stack_used() <= 1024, f"{self.stack_used()} bytes of stack were used"
         causes = [cause for _, cause in self.machine.resets]
         assert causes == self.expected_resets, f"resets: {causes}, expected: {self.expected_resets}"
         foreign = {frame.id for frame in self.setpoints()} - {scenarios.LEFT, scenarios.RIGHT}

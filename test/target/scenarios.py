@@ -86,7 +86,7 @@ def nominal(rig):
     assert 49 <= len(frames) / 4 <= 51, f"{len(frames)} setpoints in 2 s, not 200"
     assert rig.machine.can.timing() == (1_000_000, 625), rig.machine.can.timing()
     assert_lamp(rig, ARMED)
-    rig.note(f"CPU {rig.machine.busy_ns * 100 / rig.machine.now_ns:.1f} % busy")
+    rig.note(f"CPU {rig.machine.busy_ns * 100 / rig.machine.now_ns:.1f} % busy, {rig.stack_used()} B of stack used")
 
 
 def listening(rig):
@@ -100,7 +100,12 @@ def listening(rig):
 
 
 def fast_watchdog(rig):
-    """The watchdog's oscillator at its fastest: still no reset."""
+    """The watchdog's oscillator at its fastest: still no reset, also while no frame wakes the loop."""
+    for wheel in rig.machine.bus.wheels:
+        wheel.power(False, 0)
+    rig.run(500 * MS)
+    for wheel in rig.machine.bus.wheels:
+        wheel.power(True, rig.machine.now_ns)
     arm(rig)
 
 
@@ -314,6 +319,7 @@ def hang(rig):
     rig.machine.frozen = True
     rig.run(300 * MS)
     rig.expect_resets("watchdog")
+    assert rig.machine.resets, "the watchdog did not bite"
     assert rig.machine.resets[0][0] - hung_ns < 200 * MS, "the watchdog took too long"
     rig.run(3 * SECOND)
     reset_ns = rig.machine.resets[0][0]

@@ -35,3 +35,10 @@ def addresses(elf):
         if kind in "bBdD":
             objects[name.split(".")[0]] = int(address, 16)
     return {name: objects[FIELDS[name][0]] + offset for name, offset in offsets().items()}
+
+
+def stack_area(elf):
+    """(lowest, highest) address of what is left for the stack."""
+    run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
+    found = dict(reversed(line.split()[0::2]) for line in run.stdout.splitlines() if " iw_link_" in line)
+    return int(found["iw_link_ram_end"], 16), int(found["iw_link_stack_top"], 16)

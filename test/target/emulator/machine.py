@@ -32,6 +32,7 @@ class BlockClock(ctypes.Structure):
 
 class Machine:
     library = None # Holds block_hook; set by the runner.
+    POISON = 0xA5  # What RAM is full of after power-on: anything but zero.
 
     def __init__(self, board, image, seed=1):
         self.board, self.image, self.now_ns = board, image, 0
@@ -48,7 +49,7 @@ class Machine:
         cpu.mem_map(0x08000000, 0x100000)
         cpu.mem_map(0x20000000, 0x20000)
         cpu.mem_write(0x08000000, self.image)
-        cpu.mem_write(0x20000000, bytes([0xA5]) * 0x20000) # RAM after power-on is anything but zero.
+        cpu.mem_write(0x20000000, bytes([self.POISON]) * 0x20000)
         cpu.mmio_map(0x40000000, 0x30000, self.on_read, 0x40000000, self.on_write, 0x40000000)
         cpu.mmio_map(0xE000E000, 0x1000, self.on_read, 0xE000E000, self.on_write, 0xE000E000)
         self.clock = BlockClock(stop=ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p).value)
@@ -158,7 +159,6 @@ class Machine:
         values = list(self.cpu.reg_read_batch(FRAME))
         values[7] = values[7] & ~0x200 | (0x200 if aligned else 0)
         self.cpu.mem_write(stack, struct.pack("<8I", *values))
-        self.lowest_stack = min(self.lowest_stack, stack)
         self.cpu.reg_write(arm.UC_ARM_REG_SP, stack)
         self.cpu.reg_write(arm.UC_ARM_REG_XPSR, values[7] & ~IT_STATE) # A handler does not begin within an IT block.
         self.cpu.reg_write(arm.UC_ARM_REG_LR, EXC_RETURN)
@@ -181,7 +181,6 @@ class Machine:
         self.cpu.reg_write(arm.UC_ARM_REG_PRIMASK, 0)
         self.cpu.reg_write(arm.UC_ARM_REG_SP, stack)
         self.cpu.reg_write(arm.UC_ARM_REG_PC, start | 1)
-        self.lowest_stack = stack
         self.pending, self.active, self.enabled, self.sleeping, self.reset_requested = set(), None, 0, False, False
         self.look_at_pins()
         self.tick_ns, self.syst = None, {0x10: 0, 0x14: 0, 0x18: 0}
