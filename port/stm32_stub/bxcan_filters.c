@@ -59,11 +59,11 @@ void iw_bxcan_filters_write(iw_bxcan_registers_t *device, uint32_t first_bank) {
     clear_bits(&device->FFA1R, ours);     // FIFO 0.
     clear_bits(&device->FS1R, ours);
     set_bits(&device->FS1R, wide);
-    for (uint32_t i = 0; i < NARROW_BANKS; i++) {
-        iw_register_write(&device->filter[first_bank + i][0], narrow(&groups[2U * i]));
-        iw_register_write(&device->filter[first_bank + i][1], narrow(&groups[2U * i + 1U]));
+    for (size_t i = 0; i < NARROW_BANKS; i++) {
+        iw_register_write(&device->filter[first_bank + i][0], narrow(&groups[(size_t)2 * i]));
+        iw_register_write(&device->filter[first_bank + i][1], narrow(&groups[(size_t)2 * i + 1U]));
     }
-    for (uint32_t i = 0; i < WIDE_BANKS; i++) {
+    for (size_t i = 0; i < WIDE_BANKS; i++) {
         write_wide(device->filter[first_bank + NARROW_BANKS + i], &groups[i]);
     }
     set_bits(&device->FA1R, ours);
