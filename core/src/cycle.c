@@ -23,9 +23,15 @@ static void excuse_wheels(iw_gateway_t *self, iw_time_us_t now_us) {
     }
 }
 
+static iw_time_us_t take_lateness(iw_gateway_t *self, iw_time_us_t now_us) {
+    const iw_time_us_t suspended_us = self->suspended_us;
+    self->suspended_us = 0;
+    return suspended_us + ((now_us > self->promised_us) ? now_us - self->promised_us : 0U);
+}
+
 /// One long stall, or step after step too late to judge anything: both are told by how long nothing was judged.
 static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t late_us = (now_us > self->promised_us) ? now_us - self->promised_us : 0U;
+    const iw_time_us_t late_us = take_lateness(self, now_us);
     const bool late = late_us > IW_GATEWAY_LATE_US;
     const bool was_stalled = self->stalled;
     self->stalled = late || (was_stalled && self->backlog);
@@ -39,7 +45,8 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
         self->counters.late_steps++;
         excuse_wheels(self, now_us);
     }
-    const iw_time_us_t blind_us = now_us - self->stalled_since_us;
+    const iw_time_us_t run_us = now_us - self->stalled_since_us;
+    const iw_time_us_t blind_us = (run_us > late_us) ? run_us : late_us;
     if (late_us > IW_GATEWAY_HUNG_US) {
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_LOOP_HUNG, IW_SIDES_NONE, whole_ms(late_us));
     } else if (blind_us >= IW_GATEWAY_STOP_US) {
@@ -185,13 +192,25 @@ static void watch_silence(iw_gateway_t *self, iw_time_us_t now_us) {
     }
 }
 
+/// Once per stop while zeros are held; in silence for an echo that will never come, though wheels could acknowledge. (A
+/// stalled send has ended everything else.)
+static bool wants_purge(const iw_gateway_t *self, iw_time_us_t now_us, iw_time_us_t waiting_us) {
+    if (self->permit.holding) {
+        return self->purged_stop != self->permit.stop.number;
+    }
+    const iw_time_us_t since_us = (self->purged_us > waiting_us) ? self->purged_us : waiting_us;
+    return now_us - since_us >= IW_GATEWAY_LOST_ECHO_US && iw_wheel_heard(&self->wheel[IW_LEFT], now_us) &&
+           iw_wheel_heard(&self->wheel[IW_RIGHT], now_us);
+}
+
 static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t waiting_us = iw_outbox_waiting_us(&self->sender.outbox);
     if (waiting_us == IW_NEVER || now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
         return;
     }
     iw_permit_raise(&self->permit, now_us, IW_CAUSE_SEND_STALLED, IW_SIDES_NONE, whole_ms(now_us - waiting_us));
-    if (self->permit.holding && self->purged_stop != self->permit.stop.number) {
+    if (wants_purge(self, now_us, waiting_us)) {
+        self->purged_us = now_us;
         self->purged_stop = self->permit.stop.number;
         self->counters.purges += iw_sender_purge(&self->sender) ? 1U : 0U;
     }

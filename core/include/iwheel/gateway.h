@@ -29,6 +29,9 @@
 #define IW_GATEWAY_STOP_US 100000U
 /// Later than this: LATCHED.
 #define IW_GATEWAY_HUNG_US 500000U
+/// A setpoint un-echoed for this long while nothing is sent and both wheels are heard was lost, not held up: the port
+/// is asked again to purge, not more often than this.
+#define IW_GATEWAY_LOST_ECHO_US 1000000U
 /// Frames taken in one step at the most. A full bus brings 21 in a millisecond.
 #define IW_GATEWAY_DRAIN_MAX 512U
 
@@ -75,10 +78,11 @@ typedef struct {
     iw_ledger_t ledger;
     iw_counters_t counters;
     iw_time_us_t stalled_since_us; ///< When the first of the steps in a row that judge nothing was wanted.
+    iw_time_us_t suspended_us;     ///< Told since the last step.
     iw_time_us_t promised_us;      ///< When the last step asked to be called again.
     iw_time_us_t pose_us;          ///< IW_NEVER: none.
+    iw_time_us_t purged_us;        ///< When a purge was last tried.
     uint32_t purged_stop;          ///< Number of the stop for which a purge was tried.
-    uint32_t step_late_us;         ///< How late this step is.
     iw_proto_pose_t pose;
     iw_bus_state_t bus;
     iw_bus_facts_t facts;
@@ -96,6 +100,10 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
 /// again at the latest (never later than one period from now). `now_us` must not go back.
 iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us);
 
+/// The whole system was suspended for that long, which the clock of `now_us` did not count: the next step counts it as
+/// its own lateness.
+void iw_gateway_suspended(iw_gateway_t *self, iw_time_us_t for_us);
+
 /// What the port knows of the bus, whenever it changes.
 void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts);
 
@@ -105,8 +113,9 @@ iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t
 bool iw_gateway_arming(const iw_gateway_t *self);
 iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self);
 
-/// Commands both wheels, whole or not at all. `*out_applied` is written only if IW_REFUSE_NONE.
-iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, const iw_drive_t *request,
+/// Commands both wheels, whole or not at all. `*out_applied` is written only if IW_REFUSE_NONE. `sent_us`: when the
+/// command was sent, as far as is known, not later than now; the lease runs from then (see `iw_permit_drive`).
+iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_client_t client, const iw_drive_t *request,
                               iw_applied_t *out_applied);
 
 /// Ramps down. Needs no lease. `cause`: IW_CAUSE_CLIENT_STOP or IW_CAUSE_SHUTDOWN.

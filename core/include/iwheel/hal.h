@@ -29,7 +29,7 @@ typedef struct {
     iw_bus_state_t (*bus_state)(void *context);
 
     /// Takes back every setpoint that was handed over and is not on the bus yet. > 0: surely none is left; their
-    /// echoes never come. 0: cannot do that here.
+    /// echoes never come. 0: cannot do that here, or not within the call: that it is done is told by a loss of the bus.
     int (*purge)(void *context);
 
     /// 0: released, and was so without interruption since the last call. > 0: pressed, or any edge since the last
