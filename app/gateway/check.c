@@ -5,7 +5,6 @@
 
 #include "iwheel_linux/clock.h"
 
-#include <errno.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <string.h>
@@ -119,29 +118,13 @@ static void judge_bus(const gw_daemon_t *daemon, const heard_t *heard, verdicts_
     }
 }
 
-/// What to do about a GPIO line that cannot be had.
-static const char *line_cure(int trouble) {
-    switch (trouble) {
-    case ENOENT:
-        return "there is no such line; gpioinfo lists them";
-    case EBUSY:
-        return "another program has it; gpioinfo names that program";
-    case EACCES:
-    case EPERM:
-        return "not allowed; add the gateway's user to the group that owns /dev/gpiochip*";
-    default:
-        return "its chip is gone or does not answer; gpiodetect lists the chips";
-    }
-}
-
 static void judge_estop(const gw_daemon_t *daemon, const heard_t *heard, verdicts_t *verdicts) {
     const char *line = daemon->config.estop.line;
     if (!daemon->hal.estop_ops->present) {
         say(verdicts, "warn", "e-stop: none; wire a button and set [estop] line");
     } else if (heard->estop < 0) {
         say(verdicts, "fail", "e-stop %s: unreadable, which counts as pressed: %s", line,
-            daemon->hal.estop_ops->simulated ? "start the simulator with this --estop"
-                                             : line_cure(iw_linux_hal_estop_trouble(&daemon->hal)));
+            gw_report_estop_trouble(daemon));
     } else {
         say(verdicts, daemon->hal.estop_ops->simulated ? "warn" : "ok", "e-stop %s: %s%s", line,
             heard->estop > 0 ? "pressed" : "released",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "observe.h"
 
+#include "report.h"
 #include "snapshot.h"
 
 #include "iwheel_linux/clock.h"
@@ -133,7 +134,9 @@ static void observe_estop(gw_daemon_t *daemon, bool first) {
     }
     daemon->observed.estop = answer;
     const char *name = gw_estop_name(answer, daemon->hal.estop_ops->present);
-    gw_log(&daemon->log, answer == 0 ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s", daemon->config.estop.line, name);
+    const char *trouble = gw_report_estop_trouble(daemon);
+    gw_log(&daemon->log, answer == 0 ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s", daemon->config.estop.line,
+           name, trouble[0] == '\0' ? "" : ": ", trouble);
     json_out_t json = begin_event(daemon, "estop");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "state", name);

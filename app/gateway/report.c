@@ -97,3 +97,24 @@ void gw_report_unopened(const gateway_config_t *config, const char *culprit, int
                       strerror(error), is_bus ? "[bus] interface or --can" : "[estop] line or --estop");
     }
 }
+
+const char *gw_report_estop_trouble(const gw_daemon_t *daemon) {
+    const int trouble = iw_linux_hal_estop_trouble(&daemon->hal);
+    if (trouble == 0) {
+        return "";
+    }
+    if (daemon->hal.estop_ops->simulated) {
+        return "the simulator is not there; start it with this --estop";
+    }
+    switch (trouble) {
+    case ENOENT:
+        return "there is no such line; gpioinfo lists them";
+    case EBUSY:
+        return "the line is busy: another program has it; gpioinfo names that program";
+    case EACCES:
+    case EPERM:
+        return "not allowed; add the gateway's user to the group that owns /dev/gpiochip*";
+    default:
+        return "its chip is gone or does not answer; gpiodetect lists the chips";
+    }
+}

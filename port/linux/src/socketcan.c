@@ -365,7 +365,8 @@ static iw_bus_state_t can_state(void *self) {
 /// what it has of old frames, and only the zeros in the queue behind them would be lost.
 static int can_purge(void *self) {
     socketcan_t *bus = (socketcan_t *)self;
-    if (bus->restarting == 0 && bus->up && bus->link.echo_proven &&
+    const bool allowed = bus->link.purge != IW_LINK_PURGE_NOT_ALLOWED; // That does not change.
+    if (allowed && bus->restarting == 0 && bus->up && bus->link.echo_proven &&
         iw_netlink_restart_start(bus->interface, &bus->restarting) != 0) {
         bus->restarting = 0;
         bus->link.purge = IW_LINK_PURGE_FAILED;
