@@ -57,13 +57,17 @@ iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
     return self->promised_us;
 }
 
+void iw_gateway_suspended(iw_gateway_t *self, iw_time_us_t for_us) {
+    self->suspended_us += for_us;
+}
+
 void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts) {
     self->facts = *facts;
 }
 
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     const iw_refusal_t refusal = iw_permit_arm(&self->permit, now_us, client, takeover);
-    if (self->permit.arming) {
+    if (refusal == IW_REFUSE_NONE && self->permit.arming) {
         iw_setpoint_hasten(&self->setpoint, now_us);
     }
     return refusal;
@@ -127,22 +131,22 @@ static iw_applied_t limit_drive(const iw_config_t *config, const iw_drive_t *req
     return applied;
 }
 
-iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, const iw_drive_t *request,
+iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_client_t client, const iw_drive_t *request,
                               iw_applied_t *out_applied) {
     const iw_config_t *const config = &self->config;
     const bool nonzero = drive_nonzero(config, request);
     const bool in_range = drive_in_range(config, request);
     if (!in_range || (!request->has_current && config->current_role == IW_ROLE_SETPOINT)) {
         if (nonzero) {
-            iw_permit_remember(&self->permit, now_us, client);
+            iw_permit_remember(&self->permit, sent_us, client);
         }
         self->counters.out_of_range += in_range ? 0U : 1U;
         return in_range ? IW_REFUSE_MISSING_FIELD : IW_REFUSE_OUT_OF_RANGE;
     }
-    const iw_refusal_t refusal = iw_permit_drive(&self->permit, now_us, client, nonzero);
+    const iw_refusal_t refusal = iw_permit_drive(&self->permit, sent_us, client, nonzero);
     if (refusal == IW_REFUSE_NONE) {
         *out_applied = limit_drive(config, request);
-        iw_setpoint_command(&self->setpoint, now_us, &out_applied->pair);
+        iw_setpoint_command(&self->setpoint, sent_us, &out_applied->pair);
     }
     return refusal;
 }

@@ -252,6 +252,18 @@ static void test_gateway_echo_that_nobody_waits_for_proves_nothing(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
 }
 
+static void test_gateway_refused_arm_does_not_hasten_the_arming_of_another(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.bus.acknowledged = false;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    gateway_rig_run(&rig, MS(7));
+    TEST_ASSERT_TRUE(iw_gateway_arming(&rig.gateway));
+    const iw_time_us_t due_us = iw_setpoint_next_us(&rig.gateway.setpoint);
+    TEST_ASSERT_TRUE(due_us > rig.now_us);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_BUSY, iw_gateway_arm(&rig.gateway, rig.now_us, OTHER, true));
+    TEST_ASSERT_EQUAL_UINT64(due_us, iw_setpoint_next_us(&rig.gateway.setpoint));
+}
+
 static void test_gateway_shutdown_ramps(void) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
@@ -278,6 +290,7 @@ int main(void) {
     RUN_TEST(test_gateway_short_frames_refresh_nothing_and_long_ones_do);
     RUN_TEST(test_gateway_unknown_ids_are_counted_and_do_nothing);
     RUN_TEST(test_gateway_echo_that_nobody_waits_for_proves_nothing);
+    RUN_TEST(test_gateway_refused_arm_does_not_hasten_the_arming_of_another);
     RUN_TEST(test_gateway_shutdown_ramps);
     return UNITY_END();
 }
