@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 void gw_client_read(gw_client_t *self) {
@@ -14,6 +15,7 @@ void gw_client_read(gw_client_t *self) {
         return;
     }
     const ssize_t count = recv(self->fd, &self->in[self->in_length], room, MSG_DONTWAIT);
+    self->drained = count < (ssize_t)room;
     if (count > 0) {
         self->in_length += (size_t)count;
     } else if (count == 0) {
@@ -35,6 +37,26 @@ const char *gw_client_line(const gw_client_t *self, size_t *out_length) {
 void gw_client_drop_line(gw_client_t *self, size_t length) {
     self->in_length -= length + 1U;
     (void)memmove(self->in, &self->in[length + 1U], self->in_length);
+}
+
+void gw_client_note_caught_up(gw_client_t *self, iw_time_us_t then_us) {
+    size_t length;
+    if (self->drained && gw_client_line(self, &length) == NULL) {
+        self->caught_up_us = then_us;
+    }
+}
+
+void gw_client_check_caught_up(gw_client_t *self, iw_time_us_t now_us) {
+    int waiting = 0;
+    if (ioctl(self->fd, FIONREAD, &waiting) == 0 && waiting == 0) {
+        self->drained = true;
+        gw_client_note_caught_up(self, now_us);
+    }
+}
+
+iw_time_us_t gw_client_sent_us(const gw_client_t *self, iw_time_us_t now_us, iw_time_us_t since_us) {
+    const bool prompt = now_us - self->caught_up_us <= GW_PROMPT_US && self->caught_up_us >= since_us;
+    return prompt ? now_us : self->caught_up_us;
 }
 
 bool gw_client_line_too_long(const gw_client_t *self) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// One connection of the northbound socket: bytes in, lines out; and the table of all of them.
 ///
-/// Buffers are fixed. A full output buffer costs the client events (counted, and told by a `lost` event as soon as there is room again);
-/// half of it is kept for replies, and a client that does not take even those is dropped. Nothing here waits.
+/// Buffers are fixed. A full output buffer costs the client events (counted, and told by a `lost` event as soon as
+/// there is room again); half of it is kept for replies, and a client that does not take even those is dropped.
+/// Nothing here waits.
 ///
 ///     FREE --accept--> OPEN --end of file, error, line too long--> CLOSING (flush, at most GW_CLOSING_US) --> FREE
 #ifndef GATEWAY_CLIENT_H
@@ -18,6 +19,8 @@
 #define GW_OUT_SIZE (2U * GW_REPLY_MAX)
 /// A connection that is being closed gets this long to take what is left for it.
 #define GW_CLOSING_US 1000000U
+/// A request carried out this soon after its client had nothing waiting counts as sent when it is carried out.
+#define GW_PROMPT_US 25000U
 
 typedef struct {
     iw_client_t id; ///< Never used again for another connection; IW_CLIENT_NONE: the slot is free.
@@ -35,8 +38,10 @@ typedef struct {
     uint8_t topics;
     uint32_t lost; ///< Events that did not fit since the last `lost` event.
     uint32_t rate_hz;
-    iw_time_us_t next_us;  ///< When the next periodic event is due.
-    iw_time_us_t close_us; ///< While closing: no later than this.
+    bool drained;              ///< The last read took all there was.
+    iw_time_us_t caught_up_us; ///< Nothing of it was waiting then: what is there now was sent later.
+    iw_time_us_t next_us;      ///< When the next periodic event is due.
+    iw_time_us_t close_us;     ///< While closing: no later than this.
     size_t in_length;
     size_t out_start;
     size_t out_end;
@@ -51,6 +56,16 @@ void gw_client_read(gw_client_t *self);
 /// The next complete line, without its newline. NULL: there is none. Valid until `gw_client_drop_line`.
 const char *gw_client_line(const gw_client_t *self, size_t *out_length);
 void gw_client_drop_line(gw_client_t *self, size_t length);
+
+/// Notes that nothing of it was waiting at `then_us`, if the last read took all there was and no complete line is left.
+void gw_client_note_caught_up(gw_client_t *self, iw_time_us_t then_us);
+
+/// The same for now, asking the socket.
+void gw_client_check_caught_up(gw_client_t *self, iw_time_us_t now_us);
+
+/// When a request of it that is carried out now was sent, as far as can be told: now, unless it may have waited for
+/// more than GW_PROMPT_US or since before `since_us`.
+iw_time_us_t gw_client_sent_us(const gw_client_t *self, iw_time_us_t now_us, iw_time_us_t since_us);
 
 /// True if the buffer is full without a newline.
 bool gw_client_line_too_long(const gw_client_t *self);

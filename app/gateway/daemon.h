@@ -58,6 +58,8 @@ typedef struct gw_daemon {
     gw_observed_t observed;
     gw_stop_note_t last_stop;
     iw_time_us_t now_us;         ///< Of the present cycle.
+    iw_time_us_t woken_us;       ///< When the wait ended: what a client sends later than this was not waiting then.
+    iw_time_us_t suspended_us;   ///< Of the machine, as last looked at.
     iw_time_us_t step_next_us;   ///< As the last step wished.
     iw_time_us_t listen_from_us; ///< Nobody is accepted before.
     iw_client_t last_client;

@@ -144,6 +144,7 @@ void gw_dispatch_arming(gw_daemon_t *daemon) {
             continue;
         }
         client->arming = false;
+        gw_client_check_caught_up(client, daemon->now_us);
         if (holds && iw_gateway_state(&daemon->gateway) == IW_STATE_ARMED) {
             reply_armed(daemon, client, &client->arm_id);
             continue;
@@ -162,9 +163,11 @@ static int32_t saturate(int64_t value) {
 }
 
 static void drive(const call_t *call, const iw_drive_t *wanted) {
+    iw_gateway_t *gateway = &call->daemon->gateway;
+    const iw_time_us_t sent_us =
+        gw_client_sent_us(call->client, call->daemon->now_us, gateway->permit.armed_us); // It may have waited for us.
     iw_applied_t applied;
-    const iw_refusal_t refusal =
-        iw_gateway_drive(&call->daemon->gateway, call->daemon->now_us, call->client->id, wanted, &applied);
+    const iw_refusal_t refusal = iw_gateway_drive(gateway, sent_us, call->client->id, wanted, &applied);
     if (refusal != IW_REFUSE_NONE) {
         refuse(call, refusal);
         return;

@@ -16,7 +16,8 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
-#define EVENTS_PER_WAIT 32
+/// Every descriptor at once, so that one that is not told of has nothing to tell.
+#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 5)
 
 static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
@@ -77,9 +78,21 @@ static void mark_if_sending(gw_daemon_t *daemon) {
     }
 }
 
+/// While the machine was suspended, the monotonic clock stood still and the wheels did not wait.
+static void note_suspend(gw_daemon_t *daemon) {
+    const iw_time_us_t suspended_us = iw_clock_suspended_us();
+    if (suspended_us > daemon->suspended_us + IW_GATEWAY_LATE_US) {
+        iw_gateway_suspended(&daemon->gateway, suspended_us - daemon->suspended_us);
+        gw_log(&daemon->log, GW_LOG_WARNING, "the machine was suspended for %llu ms",
+               (unsigned long long)((suspended_us - daemon->suspended_us) / IW_US_PER_MS));
+    }
+    daemon->suspended_us = suspended_us;
+}
+
 /// The core's cycle, and what follows from it at once.
 static void step(gw_daemon_t *daemon) {
     daemon->now_us = iw_clock_now_us();
+    note_suspend(daemon);
     iw_linux_hal_tend(&daemon->hal, daemon->now_us);
     gw_bus_facts_follow(daemon);
     mark_if_sending(daemon); // Before the first frame that it warns of.
@@ -158,6 +171,7 @@ int gw_loop_run(gw_daemon_t *daemon) {
         }
         bool somebody_knocks = false;
         daemon->now_us = iw_clock_now_us();
+        daemon->woken_us = daemon->now_us;
         for (int i = 0; i < count; ++i) {
             somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
         }

@@ -45,6 +45,7 @@ static int start_core(gw_daemon_t *daemon) {
     const iw_hal_t hal = iw_linux_hal_functions(&daemon->hal);
     const bool restarted = gw_runtime_crashed(&daemon->runtime) && !daemon->config.core.listen_only;
     daemon->now_us = iw_clock_now_us();
+    daemon->suspended_us = iw_clock_suspended_us();
     if (iw_gateway_init(&daemon->gateway, &daemon->config.core, &hal, daemon->now_us, restarted) != IW_CONFIG_OK) {
         (void)fputs("iwheel-gateway: the configuration contradicts itself; see iwheel-gateway --check\n", stderr);
         return EX_CONFIG;

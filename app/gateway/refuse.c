@@ -120,6 +120,10 @@ static void say_stale(const wording_t *self) {
     const iw_permit_t *permit = &self->daemon->gateway.permit;
     char client[GW_CLIENT_TEXT_SIZE];
     name_client(self->daemon, permit->stale_client, client, sizeof client);
+    if (self->request->cmd == GW_CMD_DRIVE || self->request->cmd == GW_CMD_TWIST) {
+        SAY(self, "this command was sent before arm was answered; wait for that answer, then command anew");
+        return;
+    }
     SAY(self, "%s sent a nonzero drive command %" PRIu64 " ms ago; let go of the stick, wait %u ms, try again", client,
         ms_since(self->daemon, permit->stale_us), IW_PERMIT_STALE_US / IW_US_PER_MS);
 }

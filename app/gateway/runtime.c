@@ -43,7 +43,7 @@ int gw_runtime_open(gw_runtime_t *self, const gateway_config_t *config, FILE *er
     *self = (gw_runtime_t){.lock_fd = -1};
     (void)snprintf(self->lock_path, sizeof self->lock_path, "%s.gateway-lock", stem);
     (void)snprintf(self->marker_path, sizeof self->marker_path, "%s.armed", stem);
-    self->lock_fd = open(self->lock_path, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
+    self->lock_fd = open(self->lock_path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0600);
     if (self->lock_fd < 0) {
         return explain(self, errno, err);
     }
@@ -76,6 +76,6 @@ bool gw_runtime_mark(gw_runtime_t *self, bool sending) {
     if (!sending) {
         return unlink(self->marker_path) == 0 || errno == ENOENT;
     }
-    const int fd = open(self->marker_path, O_WRONLY | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
+    const int fd = open(self->marker_path, O_WRONLY | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0600);
     return fd >= 0 && close(fd) == 0;
 }

@@ -43,6 +43,8 @@ static void welcome(gw_daemon_t *daemon, gw_client_t *client, int fd) {
     client->pid = (int)peer.pid;
     client->interest = interest.events;
     client->rate_hz = GW_RATE_DEFAULT_HZ;
+    client->drained = true;
+    client->caught_up_us = daemon->now_us;
     ++daemon->clients;
     gw_log(&daemon->log, GW_LOG_DEBUG, "client %u (pid %d) connected", (unsigned)client->id, client->pid);
     gw_observe_hello(daemon, client);
@@ -171,6 +173,9 @@ void gw_service_clients(gw_daemon_t *daemon) {
         gw_client_t *client = &daemon->client[i];
         if (client->id != IW_CLIENT_NONE && (client->readable || client->hung_up || has_line(client))) {
             serve(daemon, client);
+        }
+        if (client->id != IW_CLIENT_NONE) {
+            gw_client_note_caught_up(client, daemon->woken_us);
         }
     }
     if (daemon->listen_from_us != 0U && daemon->now_us >= daemon->listen_from_us) {

@@ -53,6 +53,11 @@ static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, iw_time_us_t spa
     self->lease_until_us = now_us + span_us;
 }
 
+static void begin_lease(iw_permit_t *self, iw_time_us_t now_us) {
+    self->armed_us = now_us;
+    grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
+}
+
 static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
     const iw_time_us_t unfed_us = now_us - self->lease_from_us;
     return ((unfed_us < UINT32_MAX) ? (uint32_t)unfed_us : UINT32_MAX) / IW_US_PER_MS;
@@ -184,7 +189,7 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
         self->arming = false;
         self->state = IW_STATE_ARMED;
         self->cut = false;
-        grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
+        begin_lease(self, now_us);
     } else if (waited_us >= limit_us) {
         end_arming(self, IW_REFUSE_SEND_STALLED);
     }
@@ -291,7 +296,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
     }
     self->holder = client;
     if (self->state == IW_STATE_ARMED) {
-        grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
+        begin_lease(self, now_us);
     } else {
         self->arming = true;
         self->arming_us = now_us;
@@ -301,22 +306,25 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
 }
 
 /// ARMED: only the holder drives, and only while the lease lasts, even if no step has ended it yet.
-static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
+static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
     if (self->holder != client) {
         return IW_REFUSE_NOT_HOLDER;
     }
-    return (now_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;
+    if (sent_us < self->armed_us) {
+        return IW_REFUSE_STALE_COMMAND;
+    }
+    return (sent_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;
 }
 
-static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
+static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
     const bool blocked = self->stop.cause == IW_CAUSE_WHEEL_BLOCKED && self->stop.client == client;
     switch (self->state) {
     case IW_STATE_LATCHED:
-        return refuse_latched(self, now_us);
+        return refuse_latched(self, sent_us);
     case IW_STATE_STOPPING:
         return blocked ? IW_REFUSE_WHEEL_BLOCKED : IW_REFUSE_NOT_ARMED;
     case IW_STATE_ARMED:
-        return refuse_holder(self, now_us, client);
+        return refuse_holder(self, sent_us, client);
     case IW_STATE_LISTENING:
     default:
         return self->config->listen_only ? IW_REFUSE_LISTEN_ONLY : IW_REFUSE_NOT_ARMED;
@@ -328,13 +336,13 @@ void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t clie
     self->stale_client = client;
 }
 
-iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool nonzero) {
-    const iw_refusal_t refusal = refuse_drive(self, now_us, client);
+iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero) {
+    const iw_refusal_t refusal = refuse_drive(self, sent_us, client);
     if (nonzero) {
-        iw_permit_remember(self, now_us, client);
+        iw_permit_remember(self, sent_us, client);
     }
     if (refusal == IW_REFUSE_NONE) {
-        grant_lease(self, now_us, lease_us(self));
+        grant_lease(self, sent_us, lease_us(self));
     }
     return refusal;
 }

@@ -49,7 +49,7 @@ void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us) {
     if (self->demand == IW_DEMAND_SILENCE) {
         return;
     }
-    if (self->last_us != IW_NEVER && now_us - self->last_us < IW_SETPOINT_SPACING_US) {
+    if (self->last_us != IW_NEVER && now_us < self->last_us + IW_SETPOINT_SPACING_US) {
         due_us = self->last_us + IW_SETPOINT_SPACING_US;
     }
     if (due_us < self->due_us) {

@@ -84,11 +84,64 @@ static void test_gateway_late_step_after_step_stops_like_one_long_stall(void) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
+static void test_gateway_suspended_in_motion_latches_and_begins_with_zero(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    iw_gateway_suspended(&rig.gateway, MS(5000));
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_HUNG, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT32(5000, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.late_steps);
+}
+
+static void test_gateway_suspended_for_200_ms_stops(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    iw_gateway_suspended(&rig.gateway, MS(200));
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+/// What HOLDER sent at that time and the gateway sees only now.
+static iw_refusal_t drive_sent(iw_time_us_t sent_us) {
+    const iw_drive_t drive = {{300, 300}, {0, 0}, false};
+    iw_applied_t applied;
+    return iw_gateway_drive(&rig.gateway, sent_us, HOLDER, &drive, &applied);
+}
+
+static void test_gateway_drive_from_before_arm_is_stale(void) {
+    gateway_rig_arm(&rig);
+    const iw_time_us_t armed_us = rig.gateway.permit.armed_us;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, drive_sent(armed_us - 1U));
+    TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&rig.gateway.setpoint));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, drive_sent(armed_us));
+}
+
+static void test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    const iw_time_us_t sent_us = rig.now_us - MS(150);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, drive_sent(sent_us));
+    gateway_rig_run(&rig, MS(49));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    gateway_rig_run(&rig, MS(2));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.gateway.permit.stop.cause);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_gateway_late_step_leaves_a_lost_wheel_lost);
     RUN_TEST(test_gateway_late_step_leaves_a_wheel_that_is_there_alone);
     RUN_TEST(test_gateway_late_step_after_step_stops_like_one_long_stall);
     RUN_TEST(test_gateway_arm_behind_a_zero_on_its_way_is_not_refused);
+    RUN_TEST(test_gateway_suspended_in_motion_latches_and_begins_with_zero);
+    RUN_TEST(test_gateway_suspended_for_200_ms_stops);
+    RUN_TEST(test_gateway_drive_from_before_arm_is_stale);
+    RUN_TEST(test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent);
     return UNITY_END();
 }

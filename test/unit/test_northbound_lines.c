@@ -288,6 +288,44 @@ static void test_names_of_all_refusals_are_errors_of_the_closed_list(void) {
     TEST_ASSERT_EQUAL_STRING("none", gw_estop_name(0, false));
 }
 
+static void test_client_request_right_after_calm_was_sent_now(void) {
+    say("{}\n");
+    client.caught_up_us = 1000000;
+    TEST_ASSERT_EQUAL_UINT64(1025000, gw_client_sent_us(&client, 1025000, 0));
+    TEST_ASSERT_EQUAL_UINT64(1000000, gw_client_sent_us(&client, 1025001, 0));
+    TEST_ASSERT_EQUAL_UINT64(1000000, gw_client_sent_us(&client, 1000001, 1000001));
+}
+
+static void test_client_with_a_line_left_is_not_caught_up(void) {
+    say("{}\n{}\n");
+    gw_client_note_caught_up(&client, 5);
+    expect_line("{}");
+    gw_client_note_caught_up(&client, 6);
+    TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
+    expect_line("{}");
+    gw_client_note_caught_up(&client, 7);
+    TEST_ASSERT_EQUAL_UINT64(7, client.caught_up_us);
+}
+
+static void test_client_with_bytes_left_in_its_socket_is_not_caught_up(void) {
+    TEST_ASSERT_EQUAL_INT(3, (int)send(peer, "{}\n", 3, MSG_NOSIGNAL));
+    gw_client_check_caught_up(&client, 5);
+    TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
+    gw_client_read(&client);
+    expect_line("{}");
+    gw_client_check_caught_up(&client, 6);
+    TEST_ASSERT_EQUAL_UINT64(6, client.caught_up_us);
+}
+
+static void test_client_that_filled_the_buffer_is_not_caught_up(void) {
+    for (int i = 0; i < 3; ++i) {
+        TEST_ASSERT_EQUAL_INT(4000, (int)send(peer, big, 4000, MSG_NOSIGNAL));
+    }
+    gw_client_read(&client);
+    gw_client_note_caught_up(&client, 5);
+    TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_client_byte_by_byte_makes_one_line_only_at_the_newline);
@@ -306,5 +344,9 @@ int main(void) {
     RUN_TEST(test_why_has_a_sentence_and_a_name_for_every_cause);
     RUN_TEST(test_why_without_a_stop_says_so);
     RUN_TEST(test_names_of_all_refusals_are_errors_of_the_closed_list);
+    RUN_TEST(test_client_request_right_after_calm_was_sent_now);
+    RUN_TEST(test_client_with_a_line_left_is_not_caught_up);
+    RUN_TEST(test_client_with_bytes_left_in_its_socket_is_not_caught_up);
+    RUN_TEST(test_client_that_filled_the_buffer_is_not_caught_up);
     return UNITY_END();
 }

@@ -122,11 +122,12 @@ typedef struct {
     const iw_config_t *config;
     iw_permit_view_t view;                    ///< Of the last step: requests are judged by it.
     iw_time_us_t seen_us[IW_CAUSE_LOOP_LATE]; ///< When each latching cause was last seen; IW_NEVER: never.
-    iw_time_us_t lease_from_us;               ///< The last accepted drive command, or arm.
-    iw_time_us_t lease_until_us;              ///< Without another one the lease ends here.
-    iw_time_us_t arming_us;                   ///< When arming began.
-    iw_time_us_t hold_us;                     ///< When the zeros began; IW_NEVER: not yet.
-    iw_time_us_t stale_us;                    ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
+    iw_time_us_t armed_us;       ///< When ARMED began or the lease was taken over: only later commands are fresh.
+    iw_time_us_t lease_from_us;  ///< The last accepted drive command, or arm.
+    iw_time_us_t lease_until_us; ///< Without another one the lease ends here.
+    iw_time_us_t arming_us;      ///< When arming began.
+    iw_time_us_t hold_us;        ///< When the zeros began; IW_NEVER: not yet.
+    iw_time_us_t stale_us;       ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
     iw_client_t stale_client;
     iw_client_t holder;
     uint32_t raised;       ///< Bit per cause: told since the last step.
@@ -161,9 +162,10 @@ iw_demand_t iw_permit_demand(const iw_permit_t *self);
 /// With `takeover` the lease of another client moves over, when outputs are zero and both wheels at rest.
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
-/// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted
-/// or not.
-iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool nonzero);
+/// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted or
+/// not. `sent_us` is when it was sent, as far as the owner can tell, not later than now: a command that waited in a
+/// queue feeds the lease from then, and one from before ARMED began is refused as IW_REFUSE_STALE_COMMAND.
+iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero);
 
 /// Somebody sent a nonzero drive command that was not even judged (out of range): it refuses arm and reset like any
 /// other.

@@ -3,10 +3,20 @@
 
 #include <time.h>
 
-iw_time_us_t iw_clock_now_us(void) {
+static iw_time_us_t read_us(clockid_t clock) {
     struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    (void)clock_gettime(clock, &now);
     return (uint64_t)now.tv_sec * 1000000U + (uint64_t)now.tv_nsec / 1000U;
+}
+
+iw_time_us_t iw_clock_now_us(void) {
+    return read_us(CLOCK_MONOTONIC);
+}
+
+iw_time_us_t iw_clock_suspended_us(void) {
+    const iw_time_us_t running_us = read_us(CLOCK_MONOTONIC);
+    const iw_time_us_t total_us = read_us(CLOCK_BOOTTIME);
+    return total_us > running_us ? total_us - running_us : 0U;
 }
 
 int64_t iw_clock_wall_us(void) {

@@ -8,6 +8,9 @@
 /// CLOCK_MONOTONIC in microseconds. Never steps, does not run while the machine is suspended.
 iw_time_us_t iw_clock_now_us(void);
 
+/// For how long the machine has been suspended since it was started: what CLOCK_MONOTONIC did not count.
+iw_time_us_t iw_clock_suspended_us(void);
+
 /// CLOCK_REALTIME in microseconds since 1970. May step in either direction.
 int64_t iw_clock_wall_us(void);
 
