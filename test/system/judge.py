@@ -16,6 +16,7 @@ from judge_log import (
     REST_RPM,
     SETTLED_US,
     SPEED_IDS,
+    UNHEARD_US,
     Reading,
     percentile,
     signed,
@@ -204,17 +205,18 @@ class Judge(Reading):
         After a stall of the bus two pairs may come out sorted by id (left, left, right, right); that is no fault of the
         gateway, and excused where a stall was seen.
         """
-        waiting = None
+        waiting, excused = None, False  # excused: the left one of this pair was still within the time of a dead bus
         for setpoint in self.setpoints:
             if self._is_dead(setpoint.t_us, setpoint.t_us):
-                waiting = None
+                waiting, excused = None, setpoint.side == 0
             elif setpoint.side == 0:
                 if waiting is not None and self._alone(waiting):
                     self._say("pair", waiting.t_us, "a left setpoint without its right one", 0)
-                waiting = setpoint
+                waiting, excused = setpoint, False
             elif waiting is None:
-                if self._alone(setpoint):
+                if not excused and self._alone(setpoint):
                     self._say("pair", setpoint.t_us, "a right setpoint without its left one", 0)
+                excused = False
             else:
                 spread_us = setpoint.t_us - waiting.t_us
                 self.pair_max_us = max(self.pair_max_us, spread_us)
@@ -294,16 +296,21 @@ class Judge(Reading):
         return min([until_us] + ([killed_us] if killed_us else []) + resets[:1])
 
     def _rest_since_us(self, from_us):
-        """When both wheels have been at rest for the settling time, at from_us or later."""
+        """When both wheels have been at rest for the settling time, at from_us or later. Unheard is not at rest."""
         since = {SPEED_IDS[0]: None, SPEED_IDS[1]: None}
+        heard = dict(since)
         for frame in self.frames:
             if frame.id not in since or frame.own or len(frame.data) < 2:
                 continue
+            before, heard[frame.id] = heard[frame.id], frame.t_us
+            if before is not None and frame.t_us - before > UNHEARD_US:
+                since[frame.id] = None
             if abs(signed(frame.data, 0)) > REST_RPM:
                 since[frame.id] = None
             elif since[frame.id] is None:
                 since[frame.id] = frame.t_us
-            if frame.t_us >= from_us and all(t is not None and frame.t_us - t >= SETTLED_US for t in since.values()):
+            settled = all(t is not None and frame.t_us - t >= SETTLED_US for t in since.values())
+            if settled and frame.t_us >= from_us and all(frame.t_us - t <= UNHEARD_US for t in heard.values()):
                 return frame.t_us
         return None
 

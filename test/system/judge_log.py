@@ -26,6 +26,7 @@ JITTER_US = 10_000  # between the gateway's clock and the bus
 BUS_STALL_US = 5_500  # no telemetry for so long: the simulator waited for the processor
 REST_RPM = 2
 SETTLED_US = 500_000
+UNHEARD_US = 50_000  # a wheel is lost after this
 HOLD_MAX_US = 10_000_000
 FIRST_LEASE_US = 1_000_000
 ALWAYS_US = 200_000  # a limit missed by more than this is no matter of a busy machine

@@ -260,6 +260,11 @@ def goods():
     yield "one old frame per wheel and its zero", add(
         between(f, 9_500, 99_999, drop), *pair(12_001, -200, 200), *pair(12_001.5, 0, 0)
     ), [x for x in e if x.t_us < 9_500 * MS] + off, {}
+    muted = [x for x in f if x.id != 256 or not 6_900 * MS <= x.t_us < 8_300 * MS]
+    more = [frame for ms in range(8_370, 8_800, 20) for frame in pair(ms, 0, 0)]
+    yield "a hold that waits for a wheel that was not heard in it", add(muted, *more), e, {}
+    seam = [Event(7_000 * MS, "dead"), Event(7_201_100, "alive", 7_201_100)]  # over between left and right
+    yield "a pair on the seam of a dead bus", f, e + seam, {}
     yield "no motion wanted, none made", [x for x in f if not is_setpoint(x)], [e[0]], {"moves": False}
 
 
