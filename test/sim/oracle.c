@@ -1,37 +1,32 @@
 // SPDX-License-Identifier: MIT
-#include "oracle.h"
+#include "oracle_parts.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define MS      1000U
 #define LATE_US (20U * MS)
 #define STOP_US (100U * MS)
 #define HUNG_US (500U * MS)
 #define GAP_US  (100U * MS)
 /// An echo that takes longer than this shows that the bus does not take frames as it should.
-#define SLOW_ECHO_US   (20U * MS)
-#define SETTLED_US     (500U * MS)
-#define HOLD_MAX_US    (10000U * MS)
-#define EVENT_US       (1000U * MS)
-#define STALE_US       (500U * MS)
-#define FIRST_LEASE_US (1000U * MS)
-#define DRAIN          512U
+#define SLOW_ECHO_US (20U * MS)
+#define SETTLED_US   (500U * MS)
+#define HOLD_MAX_US  (10000U * MS)
+#define DRAIN        512U
 /// A condition that must last is judged with this much more, for the time between steps.
 #define MARGIN_US (70U * MS)
 
-static bool elapsed(iw_time_us_t now_us, iw_time_us_t since_us, iw_time_us_t span_us) {
+bool oracle_elapsed(iw_time_us_t now_us, iw_time_us_t since_us, iw_time_us_t span_us) {
     return since_us != IW_NEVER && now_us - since_us >= span_us;
 }
 
-static iw_time_us_t us(uint32_t ms) {
+iw_time_us_t oracle_us(uint32_t ms) {
     return (iw_time_us_t)ms * MS;
 }
 
-__attribute__((format(printf, 4, 5))) static void fail(oracle_t *self, iw_time_us_t now_us, uint32_t rule,
-                                                       const char *format, ...) {
+void oracle_break(oracle_t *self, iw_time_us_t now_us, uint32_t rule, const char *format, ...) {
     va_list arguments;
     if (self->rule != ORACLE_NO_RULE) {
         return;
@@ -41,10 +36,6 @@ __attribute__((format(printf, 4, 5))) static void fail(oracle_t *self, iw_time_u
     va_start(arguments, format);
     (void)vsnprintf(self->text, sizeof self->text, format, arguments);
     va_end(arguments);
-}
-
-void oracle_fail(oracle_t *self, iw_time_us_t now_us, uint32_t rule, const char *text) {
-    fail(self, now_us, rule, "%s", text);
 }
 
 void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_us, bool restarted) {
@@ -79,13 +70,13 @@ static void lose_permission(oracle_t *self) {
     self->pending_arm = IW_CLIENT_NONE;
 }
 
-static void hard_stop(oracle_t *self) {
+void oracle_hard_stop(oracle_t *self) {
     lose_permission(self);
     self->hard = true;
     self->ramp_us = IW_NEVER;
 }
 
-static void soft_stop(oracle_t *self, iw_time_us_t at_us) {
+void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us) {
     if (self->armed && self->ramp_us == IW_NEVER) {
         self->ramp_us = at_us;
     }
@@ -118,14 +109,14 @@ void oracle_step_begin(oracle_t *self, iw_time_us_t now_us, iw_time_us_t promise
         self->late_us = now_us;
     }
     if (self->late_stop) {
-        hard_stop(self);
+        oracle_hard_stop(self);
     }
 }
 
 void oracle_estop(oracle_t *self, int result) {
     self->estop = result;
     if (result != 0) {
-        hard_stop(self);
+        oracle_hard_stop(self);
     }
 }
 
@@ -135,7 +126,7 @@ void oracle_bus(oracle_t *self, iw_time_us_t now_us, iw_bus_state_t state) {
         return;
     }
     self->bus_bad_us = now_us;
-    hard_stop(self);
+    oracle_hard_stop(self);
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->wheel[side].pending = 0;
         self->wheel[side].proven_us = 0;
@@ -153,7 +144,7 @@ static int32_t word(const uint8_t *bytes) {
 }
 
 static void hear_speed(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *wheel, int32_t rpm) {
-    const bool gap = elapsed(now_us, wheel->fresh_us, us(self->config->wheel_silent_ms));
+    const bool gap = oracle_elapsed(now_us, wheel->fresh_us, oracle_us(self->config->wheel_silent_ms));
     wheel->rpm = rpm;
     if (abs(rpm) > self->config->rest_rpm) {
         wheel->rest_us = IW_NEVER;
@@ -198,7 +189,7 @@ void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *
         }
         self->foreign_us = now_us;
         self->foreign_now = true;
-        hard_stop(self);
+        oracle_hard_stop(self);
     } else if ((frame->id == 256U || frame->id == 288U) && frame->dlc >= 4U && frame->dlc <= 8U) {
         hear_speed(self, now_us, wheel, word(frame->data));
     } else if ((frame->id == 257U || frame->id == 289U) && frame->dlc >= 7U && frame->dlc <= 8U) {
@@ -211,28 +202,28 @@ void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *
 static void judge_form(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     const iw_config_t *const config = self->config;
     if ((frame->id != 266U && frame->id != 298U) || frame->dlc != config->setpoint_dlc) {
-        fail(self, now_us, 801, "frame 0x%X with %u bytes was sent", frame->id, frame->dlc);
+        oracle_break(self, now_us, 801, "frame 0x%X with %u bytes was sent", frame->id, frame->dlc);
     }
     if (!config->setpoint_type_set || frame->data[0] != config->setpoint_type || config->listen_only) {
-        fail(self, now_us, 802, "type %u was sent", frame->data[0]);
+        oracle_break(self, now_us, 802, "type %u was sent", frame->data[0]);
     }
     for (unsigned i = 5; i < frame->dlc; i++) {
         if (frame->data[i] != 0U) {
-            fail(self, now_us, 803, "padding is not zero");
+            oracle_break(self, now_us, 803, "padding is not zero");
         }
     }
     if (abs(word(&frame->data[1])) > config->max_speed_mm_s || abs(word(&frame->data[3])) > config->max_current_mA) {
-        fail(self, now_us, 804, "beyond the configured maximum: %d mm/s %d mA", word(&frame->data[1]),
-             word(&frame->data[3]));
+        oracle_break(self, now_us, 804, "beyond the configured maximum: %d mm/s %d mA", word(&frame->data[1]),
+                     word(&frame->data[3]));
     }
     if (config->current_role == IW_ROLE_LIMIT && word(&frame->data[3]) < 0) {
-        fail(self, now_us, 805, "a negative current limit");
+        oracle_break(self, now_us, 805, "a negative current limit");
     }
 }
 
 static int64_t slope_allows(const oracle_t *self, iw_time_us_t span_us, bool towards_zero) {
     const iw_config_t *const config = self->config;
-    const iw_time_us_t granted_us = us(2U * config->period_ms);
+    const iw_time_us_t granted_us = oracle_us(2U * config->period_ms);
     const iw_time_us_t span = (!towards_zero && span_us > granted_us) ? granted_us : span_us;
     const iw_time_us_t capped = (span > 1000000U) ? 1000000U : span;
     return (int64_t)(towards_zero ? config->decel_mm_s2 : config->accel_mm_s2) * (int64_t)capped;
@@ -244,11 +235,11 @@ static void judge_change(oracle_t *self, iw_time_us_t now_us, const oracle_wheel
     const bool braking = abs(speed) < abs(wheel->speed);
     const int64_t way = llabs((int64_t)abs(speed) - abs(wheel->speed));
     if ((speed < 0) != (wheel->speed < 0) && speed != 0 && wheel->speed != 0) {
-        fail(self, now_us, 806, "sign changed without a zero: %d to %d mm/s", wheel->speed, speed);
+        oracle_break(self, now_us, 806, "sign changed without a zero: %d to %d mm/s", wheel->speed, speed);
     }
     if (way > slope_allows(self, span_us, braking) / 1000000 + 1) {
-        fail(self, now_us, 807, "too steep: %d to %d mm/s within %llu us", wheel->speed, speed,
-             (unsigned long long)span_us);
+        oracle_break(self, now_us, 807, "too steep: %d to %d mm/s within %llu us", wheel->speed, speed,
+                     (unsigned long long)span_us);
     }
     if (self->config->current_role == IW_ROLE_SETPOINT) {
         const bool less = abs(current) < abs(wheel->current);
@@ -256,25 +247,26 @@ static void judge_change(oracle_t *self, iw_time_us_t now_us, const oracle_wheel
         const int64_t share =
             slope_allows(self, span_us, less) * self->config->max_current_mA / self->config->max_speed_mm_s / 1000000;
         if (change > share + 2 || ((current < 0) != (wheel->current < 0) && current != 0 && wheel->current != 0)) {
-            fail(self, now_us, 808, "current too steep: %d to %d mA", wheel->current, current);
+            oracle_break(self, now_us, 808, "current too steep: %d to %d mA", wheel->current, current);
         }
     }
     // Late is what comes 100 ms after it was due: at most a period after the last pair, and the wait for an echo.
-    if (span_us >= GAP_US + us(self->config->period_ms) + us(self->config->echo_ms)) {
-        fail(self, now_us, 401, "not zero after a gap of %llu us", (unsigned long long)span_us);
+    if (span_us >= GAP_US + oracle_us(self->config->period_ms) + oracle_us(self->config->echo_ms)) {
+        oracle_break(self, now_us, 401, "not zero after a gap of %llu us", (unsigned long long)span_us);
     }
 }
 
 static iw_time_us_t ramp_span_us(const oracle_t *self) {
     const iw_config_t *const config = self->config;
-    return (iw_time_us_t)config->max_speed_mm_s * 1000000U / config->decel_mm_s2 + us(config->period_ms) + MS;
+    return (iw_time_us_t)config->max_speed_mm_s * 1000000U / config->decel_mm_s2 + oracle_us(config->period_ms) + MS;
 }
 
 /// May a nonzero setpoint leave at all, and this one?
 static void judge_permission(oracle_t *self, iw_time_us_t now_us, size_t side, int32_t speed, int32_t current) {
     const oracle_wheel_t *const wheel = &self->wheel[side];
     if (self->hard) {
-        fail(self, now_us, 201, "%d mm/s %d mA after a stop without ramp, not armed anew since", speed, current);
+        oracle_break(self, now_us, 201, "%d mm/s %d mA after a stop without ramp, not armed anew since", speed,
+                     current);
         return;
     }
     if (self->armed && now_us >= self->lease_until_us && self->ramp_us == IW_NEVER) {
@@ -282,27 +274,28 @@ static void judge_permission(oracle_t *self, iw_time_us_t now_us, size_t side, i
     }
     if (self->ramp_us != IW_NEVER) {
         if (now_us > self->ramp_us + ramp_span_us(self)) {
-            fail(self, now_us, 101, "%d mm/s %d mA %llu us after the permission ended", speed, current,
-                 (unsigned long long)(now_us - self->ramp_us));
+            oracle_break(self, now_us, 101, "%d mm/s %d mA %llu us after the permission ended", speed, current,
+                         (unsigned long long)(now_us - self->ramp_us));
         }
         if (abs(speed) > abs(wheel->speed) ||
             (self->config->current_role == IW_ROLE_SETPOINT && abs(current) > abs(wheel->current))) {
-            fail(self, now_us, 102, "faster although the permission ended: %d to %d mm/s", wheel->speed, speed);
+            oracle_break(self, now_us, 102, "faster although the permission ended: %d to %d mm/s", wheel->speed, speed);
         }
         return;
     }
     if (!self->armed || !self->fresh) {
-        fail(self, now_us, 301, "%d mm/s %d mA without a fresh command", speed, current);
+        oracle_break(self, now_us, 301, "%d mm/s %d mA without a fresh command", speed, current);
         return;
     }
     const int32_t sign = self->config->invert[side] ? -1 : 1;
     const int32_t wanted = self->target.wheel[side].speed_mm_s * sign;
     const int32_t highest = (abs(wheel->speed) > abs(wanted)) ? abs(wheel->speed) : abs(wanted);
     if (abs(speed) > highest || (speed != 0 && wheel->speed == 0 && (speed > 0) != (wanted > 0))) {
-        fail(self, now_us, 302, "%d mm/s although %d mm/s were wanted", speed, wanted);
+        oracle_break(self, now_us, 302, "%d mm/s although %d mm/s were wanted", speed, wanted);
     }
     if (self->config->current_role == IW_ROLE_LIMIT && current != self->target.wheel[side].current_mA) {
-        fail(self, now_us, 303, "limit %d mA although %d mA were wanted", current, self->target.wheel[side].current_mA);
+        oracle_break(self, now_us, 303, "limit %d mA although %d mA were wanted", current,
+                     self->target.wheel[side].current_mA);
     }
 }
 
@@ -310,21 +303,21 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
     const iw_state_t state = iw_gateway_state(self->gateway);
     const bool limit = self->config->current_role == IW_ROLE_LIMIT;
     if (state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway)) {
-        fail(self, now_us, 501, "sent while LISTENING");
+        oracle_break(self, now_us, 501, "sent while LISTENING");
     }
     if (state == IW_STATE_LATCHED && self->state != IW_STATE_LATCHED && self->state == IW_STATE_LISTENING &&
         !self->was_arming) {
-        fail(self, now_us, 502, "sent on latching from LISTENING");
+        oracle_break(self, now_us, 502, "sent on latching from LISTENING");
     }
     if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED &&
-        (self->latched_silent || elapsed(now_us, self->latched_us, HOLD_MAX_US + us(100)))) {
-        fail(self, now_us, 503, "sent while LATCHED and silent");
+        (self->latched_silent || oracle_elapsed(now_us, self->latched_us, HOLD_MAX_US + oracle_us(100)))) {
+        oracle_break(self, now_us, 503, "sent while LATCHED and silent");
     }
     if (self->hard && zero && limit && current != self->config->max_current_mA) {
-        fail(self, now_us, 203, "a stop with a limit of %d mA", current);
+        oracle_break(self, now_us, 203, "a stop with a limit of %d mA", current);
     }
     if (self->bus < IW_BUS_PASSIVE) {
-        fail(self, now_us, 504, "sent while the bus is down or off");
+        oracle_break(self, now_us, 504, "sent while the bus is down or off");
     }
 }
 
@@ -340,14 +333,14 @@ void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fram
         judge_permission(self, now_us, side, speed, current);
         judge_change(self, now_us, wheel, speed, current);
         if (self->broken_pair) {
-            fail(self, now_us, 601, "%d mm/s although the last pair did not leave whole", speed);
+            oracle_break(self, now_us, 601, "%d mm/s although the last pair did not leave whole", speed);
         }
         if (wheel->pending >= 1U) {
-            fail(self, now_us, 602, "%d mm/s behind a frame that was not echoed", speed);
+            oracle_break(self, now_us, 602, "%d mm/s behind a frame that was not echoed", speed);
         }
     }
     if (wheel->pending >= 2U) {
-        fail(self, now_us, 603, "a third frame behind two that were not echoed");
+        oracle_break(self, now_us, 603, "a third frame behind two that were not echoed");
     }
     wheel->tried_us = now_us;
     wheel->tried_now = true;
@@ -364,11 +357,6 @@ void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fram
     }
 }
 
-void oracle_edge(oracle_t *self, iw_time_us_t now_us) {
-    self->edge_us = now_us;
-    self->wheel[IW_LEFT].old_on_bus = self->wheel[IW_RIGHT].old_on_bus = 0;
-}
-
 void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame, iw_time_us_t handed_us) {
     oracle_wheel_t *const wheel = &self->wheel[(frame->id == 298U) ? IW_RIGHT : IW_LEFT];
     const int32_t speed = word(&frame->data[1]);
@@ -377,17 +365,17 @@ void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fr
         return;
     }
     if (!zero && wheel->after_stale) {
-        fail(self, now_us, 604, "%d mm/s right behind an old frame", speed);
+        oracle_break(self, now_us, 604, "%d mm/s right behind an old frame", speed);
     }
     wheel->after_stale = false;
     if (!zero && !self->armed && self->edge_us != 0U && self->hard && ++wheel->old_on_bus > 1U) {
-        fail(self, now_us, 202, "a second nonzero frame on the bus after the e-stop");
+        oracle_break(self, now_us, 202, "a second nonzero frame on the bus after the e-stop");
     }
-    if (!zero && now_us - handed_us > us(300) && now_us - self->late_us > us(300)) {
+    if (!zero && now_us - handed_us > oracle_us(300) && now_us - self->late_us > oracle_us(300)) {
         wheel->after_stale = true;
         if (self->purges) {
-            fail(self, now_us, 605, "a frame of %llu us ago came out although the port purges",
-                 (unsigned long long)(now_us - handed_us));
+            oracle_break(self, now_us, 605, "a frame of %llu us ago came out although the port purges",
+                         (unsigned long long)(now_us - handed_us));
         }
     }
 }
@@ -397,16 +385,16 @@ void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fr
 static void judge_armed(oracle_t *self, iw_time_us_t now_us) {
     if (self->armed) {
         if (self->ramp_us != IW_NEVER) {
-            fail(self, now_us, 103, "still ARMED after the permission ended");
+            oracle_break(self, now_us, 103, "still ARMED after the permission ended");
         }
         return;
     }
     if (self->pending_arm == IW_CLIENT_NONE) {
-        fail(self, now_us, 304, "ARMED although nobody may be");
+        oracle_break(self, now_us, 304, "ARMED although nobody may be");
         return;
     }
     if (self->wheel[IW_LEFT].proven_us < self->arm_us || self->wheel[IW_RIGHT].proven_us < self->arm_us) {
-        fail(self, now_us, 305, "ARMED before both zeros were echoed");
+        oracle_break(self, now_us, 305, "ARMED before both zeros were echoed");
     }
     self->armed = true;
     self->fresh = false;
@@ -422,8 +410,9 @@ static void judge_armed(oracle_t *self, iw_time_us_t now_us) {
 static bool rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_us) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         const oracle_wheel_t *const wheel = &self->wheel[side];
-        if (wheel->fresh_us == IW_NEVER || elapsed(now_us, wheel->fresh_us, us(self->config->wheel_silent_ms)) ||
-            !elapsed(now_us, wheel->rest_us, span_us)) {
+        if (wheel->fresh_us == IW_NEVER ||
+            oracle_elapsed(now_us, wheel->fresh_us, oracle_us(self->config->wheel_silent_ms)) ||
+            !oracle_elapsed(now_us, wheel->rest_us, span_us)) {
             return false;
         }
     }
@@ -431,34 +420,34 @@ static bool rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_
 }
 
 /// The public state changed, or may have: after every step and every request.
-static void observe(oracle_t *self, iw_time_us_t now_us) {
+void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(self->gateway);
     if (state == IW_STATE_ARMED) {
         judge_armed(self, now_us);
     } else if (self->armed) {
-        soft_stop(self, now_us);
+        oracle_soft_stop(self, now_us);
     }
     if (state == IW_STATE_LATCHED && self->state != IW_STATE_LATCHED) {
         self->latched_us = now_us;
         self->latched_silent = self->state == IW_STATE_LISTENING && !self->was_arming;
-        hard_stop(self);
+        oracle_hard_stop(self);
     }
     if (state == IW_STATE_STOPPING && self->state != IW_STATE_STOPPING) {
         self->stopped_us = now_us;
     }
     if (state == IW_STATE_LISTENING && self->state == IW_STATE_ARMED) {
-        fail(self, now_us, 505, "from ARMED to LISTENING without STOPPING");
+        oracle_break(self, now_us, 505, "from ARMED to LISTENING without STOPPING");
     }
     if (state == IW_STATE_LISTENING && self->state == IW_STATE_STOPPING && !self->restarting) {
-        if (!elapsed(now_us, self->stopped_us, us(self->config->zero_hold_ms)) ||
-            (!rested(self, now_us, SETTLED_US) && !elapsed(now_us, self->stopped_us, HOLD_MAX_US))) {
-            fail(self, now_us, 506, "silent too early, %llu us after the stop",
-                 (unsigned long long)(now_us - self->stopped_us));
+        if (!oracle_elapsed(now_us, self->stopped_us, oracle_us(self->config->zero_hold_ms)) ||
+            (!rested(self, now_us, SETTLED_US) && !oracle_elapsed(now_us, self->stopped_us, HOLD_MAX_US))) {
+            oracle_break(self, now_us, 506, "silent too early, %llu us after the stop",
+                         (unsigned long long)(now_us - self->stopped_us));
         }
     }
-    if (state == IW_STATE_STOPPING && elapsed(now_us, self->stopped_us, HOLD_MAX_US + us(1300)) &&
-        now_us - self->late_us > us(1000)) {
-        fail(self, now_us, 507, "STOPPING without end");
+    if (state == IW_STATE_STOPPING && oracle_elapsed(now_us, self->stopped_us, HOLD_MAX_US + oracle_us(1300)) &&
+        now_us - self->late_us > oracle_us(1000)) {
+        oracle_break(self, now_us, 507, "STOPPING without end");
     }
     if (state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway)) {
         self->wheel[IW_LEFT].sent_us = self->wheel[IW_RIGHT].sent_us = IW_NEVER;
@@ -475,25 +464,25 @@ static void judge_latches(oracle_t *self, iw_time_us_t now_us, iw_state_t before
     const iw_state_t state = iw_gateway_state(self->gateway);
     const bool sending = sending_state(before) && !self->restarting;
     if (self->estop != 0 && state != IW_STATE_LATCHED) {
-        fail(self, now_us, 204, "not LATCHED although the e-stop is pressed");
+        oracle_break(self, now_us, 204, "not LATCHED although the e-stop is pressed");
     }
     if (self->estop != 0 && before != IW_STATE_LATCHED && self->gateway->permit.stop.cause != IW_CAUSE_ESTOP_LINE) {
-        fail(self, now_us, 205, "the e-stop is not told as the cause");
+        oracle_break(self, now_us, 205, "the e-stop is not told as the cause");
     }
     if (sending && self->bus < IW_BUS_PASSIVE && state != IW_STATE_LATCHED) {
-        fail(self, now_us, 701, "not LATCHED although the bus is down or off");
+        oracle_break(self, now_us, 701, "not LATCHED although the bus is down or off");
     }
     if (sending && self->foreign_now && state != IW_STATE_LATCHED) {
-        fail(self, now_us, 702, "not LATCHED although there is a second master");
+        oracle_break(self, now_us, 702, "not LATCHED although there is a second master");
     }
     if (sending && self->hung && state != IW_STATE_LATCHED) {
-        fail(self, now_us, 703, "not LATCHED although the loop hung");
+        oracle_break(self, now_us, 703, "not LATCHED although the loop hung");
     }
     if (sending && self->late_stop && state == IW_STATE_ARMED) {
-        fail(self, now_us, 704, "still ARMED although the loop was late");
+        oracle_break(self, now_us, 704, "still ARMED although the loop was late");
     }
     if (sending && self->jump_now && state != IW_STATE_LATCHED) {
-        fail(self, now_us, 705, "not LATCHED although the odometry jumped");
+        oracle_break(self, now_us, 705, "not LATCHED although the odometry jumped");
     }
 }
 
@@ -503,7 +492,7 @@ static bool since(iw_time_us_t *since_us, iw_time_us_t now_us, bool condition, u
     } else if (*since_us == IW_NEVER) {
         *since_us = now_us;
     }
-    return elapsed(now_us, *since_us, us(span_ms) + MARGIN_US);
+    return oracle_elapsed(now_us, *since_us, oracle_us(span_ms) + MARGIN_US);
 }
 
 static void judge_following(oracle_t *self, iw_time_us_t now_us, size_t side, bool comparable) {
@@ -515,13 +504,14 @@ static void judge_following(oracle_t *self, iw_time_us_t now_us, size_t side, bo
     const bool blocked = comparable && abs(told) >= 100 && abs(measured) * 5 + 100 < abs(told) &&
                          iw_gateway_state(self->gateway) == IW_STATE_ARMED;
     if (since(&wheel->against_us, now_us, against, 300)) {
-        fail(self, now_us, 706, "not LATCHED although a wheel turns against its command");
+        oracle_break(self, now_us, 706, "not LATCHED although a wheel turns against its command");
     }
     if (since(&wheel->faster_us, now_us, faster, self->config->follow_ms)) {
-        fail(self, now_us, 707, "not LATCHED although a wheel is too fast: %d instead of %d mm/s", measured, told);
+        oracle_break(self, now_us, 707, "not LATCHED although a wheel is too fast: %d instead of %d mm/s", measured,
+                     told);
     }
     if (since(&wheel->blocked_us, now_us, blocked, self->config->blocked_ms)) {
-        fail(self, now_us, 708, "still ARMED although a wheel is blocked");
+        oracle_break(self, now_us, 708, "still ARMED although a wheel is blocked");
     }
 }
 
@@ -531,18 +521,18 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
         oracle_wheel_t *const wheel = &self->wheel[side];
         const iw_time_us_t heard_us =
             (wheel->fresh_us == IW_NEVER || wheel->fresh_us < wheel->excused_us) ? wheel->excused_us : wheel->fresh_us;
-        const bool silent = now_us - heard_us >= us(self->config->wheel_silent_ms);
+        const bool silent = now_us - heard_us >= oracle_us(self->config->wheel_silent_ms);
         judge_following(self, now_us, side, ours && !silent && !self->stalled);
         if (!ours || self->stalled) {
             continue;
         }
         if (silent) {
-            fail(self, now_us, 709, "not LATCHED although a wheel was silent for %llu us",
-                 (unsigned long long)(now_us - heard_us));
+            oracle_break(self, now_us, 709, "not LATCHED although a wheel was silent for %llu us",
+                         (unsigned long long)(now_us - heard_us));
         }
-        if (wheel->pending > 0U && now_us - wheel->waiting[0] >= us(self->config->echo_ms)) {
-            fail(self, now_us, 710, "not LATCHED although a frame was not echoed for %llu us",
-                 (unsigned long long)(now_us - wheel->waiting[0]));
+        if (wheel->pending > 0U && now_us - wheel->waiting[0] >= oracle_us(self->config->echo_ms)) {
+            oracle_break(self, now_us, 710, "not LATCHED although a frame was not echoed for %llu us",
+                         (unsigned long long)(now_us - wheel->waiting[0]));
         }
     }
 }
@@ -551,7 +541,7 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
 static void judge_gaps(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(self->gateway);
     const bool holding = state == IW_STATE_LATCHED && !self->latched_silent &&
-                         now_us - self->latched_us < us(self->config->zero_hold_ms);
+                         now_us - self->latched_us < oracle_us(self->config->zero_hold_ms);
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (self->wheel[side].pending > 0U && now_us - self->wheel[side].waiting[0] >= SLOW_ECHO_US) {
             self->refused_us = now_us;
@@ -563,7 +553,7 @@ static void judge_gaps(oracle_t *self, iw_time_us_t now_us) {
         const oracle_wheel_t *const wheel = &self->wheel[side];
         const bool must = sending_state(state) || holding;
         if (must && !excused && (wheel->sent_us == IW_NEVER || now_us - wheel->sent_us >= GAP_US)) {
-            fail(self, now_us, 402, "no setpoint for 100 ms");
+            oracle_break(self, now_us, 402, "no setpoint for 100 ms");
         }
     }
 }
@@ -573,7 +563,7 @@ static void judge_pair(oracle_t *self, iw_time_us_t now_us) {
     const oracle_wheel_t *const right = &self->wheel[IW_RIGHT];
     const bool moving = (left->accepted_now && !left->accepted_zero) || (right->accepted_now && !right->accepted_zero);
     if (moving && (!left->tried_now || !right->tried_now)) {
-        fail(self, now_us, 606, "one setpoint without the other");
+        oracle_break(self, now_us, 606, "one setpoint without the other");
     }
     if (moving && left->accepted_now != right->accepted_now) {
         self->broken_pair = true;
@@ -588,7 +578,7 @@ static void judge_estop_zero(oracle_t *self, iw_time_us_t now_us, iw_state_t bef
         const oracle_wheel_t *const wheel = &self->wheel[side];
         const bool first = self->estop != 0 && (before == IW_STATE_ARMED || !wheel->accepted_zero);
         if (first && sending_state(before) && self->bus >= IW_BUS_PASSIVE && !wheel->tried_now && wheel->pending < 2U) {
-            fail(self, now_us, 206, "no zero at once after the e-stop");
+            oracle_break(self, now_us, 206, "no zero at once after the e-stop");
         }
     }
 }
@@ -597,135 +587,13 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t before = self->state;
     judge_latches(self, now_us, before);
     if (self->armed && now_us >= self->lease_until_us) {
-        soft_stop(self, self->lease_until_us);
+        oracle_soft_stop(self, self->lease_until_us);
     }
-    observe(self, now_us);
+    oracle_observe(self, now_us);
     judge_wheels(self, now_us);
     judge_gaps(self, now_us);
     judge_pair(self, now_us);
     judge_estop_zero(self, now_us, before);
     self->step_us = now_us;
     self->timing_bad = self->gateway->facts.timing_contradicted;
-}
-
-// ---- requests --------------------------------------------------------------------------------------------------
-
-static void judge_start(oracle_t *self, iw_time_us_t now_us, uint32_t rule, const char *what) {
-    if (self->estop != 0) {
-        fail(self, now_us, rule, "%s although the e-stop was pressed", what);
-    }
-    if (self->bus < IW_BUS_PASSIVE) {
-        fail(self, now_us, rule + 1U, "%s although the bus was down or off", what);
-    }
-    if (self->foreign_us != IW_NEVER && !elapsed(now_us, self->foreign_us, EVENT_US)) {
-        fail(self, now_us, rule + 2U, "%s although there was a second master", what);
-    }
-    if (self->nonzero_drive_us != IW_NEVER && !elapsed(now_us, self->nonzero_drive_us, STALE_US)) {
-        fail(self, now_us, rule + 3U, "%s although somebody was sending commands", what);
-    }
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        const oracle_wheel_t *const wheel = &self->wheel[side];
-        // What the last step saw: a request may come before the next one.
-        const iw_time_us_t seen_us = self->step_us;
-        if (wheel->fresh_us == IW_NEVER || elapsed(seen_us, wheel->fresh_us, us(self->config->wheel_silent_ms))) {
-            fail(self, now_us, rule + 4U, "%s although a wheel was not heard", what);
-        }
-        if (!elapsed(seen_us, wheel->rest_us, us(self->config->rest_ms))) {
-            fail(self, now_us, rule + 5U, "%s although a wheel was not at rest", what);
-        }
-    }
-}
-
-void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover, iw_refusal_t result) {
-    const bool already = client == self->holder || client == self->pending_arm;
-    if (result == IW_REFUSE_NONE && !already) {
-        judge_start(self, now_us, 310, "armed");
-        if (self->state == IW_STATE_LATCHED) {
-            fail(self, now_us, 320, "armed although LATCHED");
-        }
-        if ((self->holder != IW_CLIENT_NONE || self->pending_arm != IW_CLIENT_NONE) && !takeover) {
-            fail(self, now_us, 321, "armed although somebody else holds the lease");
-        }
-        if (self->wheel[IW_LEFT].speed != 0 || self->wheel[IW_RIGHT].speed != 0) {
-            fail(self, now_us, 322, "armed although the outputs are not zero");
-        }
-        if (self->timing_bad) {
-            fail(self, now_us, 323, "armed although the bus timing is contradicted");
-        }
-        if (self->armed) {
-            self->holder = client;
-            self->fresh = false;
-            self->lease_until_us = now_us + FIRST_LEASE_US;
-        } else {
-            self->pending_arm = client;
-            self->arm_us = now_us;
-        }
-    }
-    observe(self, now_us);
-}
-
-static void judge_applied(oracle_t *self, iw_time_us_t now_us, const iw_drive_t *request, const iw_applied_t *applied) {
-    const int32_t left = applied->pair.wheel[IW_LEFT].speed_mm_s;
-    const int32_t right = applied->pair.wheel[IW_RIGHT].speed_mm_s;
-    const int32_t *const asked = request->speed_mm_s;
-    const int64_t largest = (abs(asked[0]) > abs(asked[1])) ? abs(asked[0]) : abs(asked[1]);
-    const int64_t skew = (int64_t)left * asked[1] - (int64_t)right * asked[0];
-    const bool within = largest <= self->config->max_speed_mm_s;
-    if (abs(left) > self->config->max_speed_mm_s || abs(right) > self->config->max_speed_mm_s ||
-        llabs(skew) > 2 * largest || (within && (left != asked[0] || right != asked[1]))) {
-        fail(self, now_us, 330, "asked for %d %d mm/s, applied %d %d", asked[0], asked[1], left, right);
-    }
-}
-
-void oracle_drive(oracle_t *self, iw_time_us_t now_us, iw_client_t client, const iw_drive_t *request,
-                  iw_refusal_t result, const iw_applied_t *applied) {
-    const int32_t *const speed = request->speed_mm_s;
-    const bool in_range = abs(speed[0]) <= INT16_MAX + 1 && abs(speed[1]) <= INT16_MAX + 1;
-    const bool current = self->config->current_role == IW_ROLE_SETPOINT && request->has_current &&
-                         (request->current_mA[0] != 0 || request->current_mA[1] != 0);
-    if (result == IW_REFUSE_NONE) {
-        if (!self->armed || client != self->holder || self->ramp_us != IW_NEVER || now_us >= self->lease_until_us) {
-            fail(self, now_us, 331, "a drive was accepted without a lease");
-        }
-        if (!in_range) {
-            fail(self, now_us, 332, "a drive out of range was accepted");
-        }
-        judge_applied(self, now_us, request, applied);
-        self->fresh = true;
-        self->drive_us = now_us;
-        self->lease_until_us = now_us + us(self->config->lease_ms);
-        self->target = applied->pair;
-    }
-    if (speed[0] != 0 || speed[1] != 0 || current) {
-        self->nonzero_drive_us = now_us;
-    }
-    observe(self, now_us);
-}
-
-void oracle_stop(oracle_t *self, iw_time_us_t now_us, bool matters) {
-    if (matters) {
-        soft_stop(self, now_us);
-    }
-    observe(self, now_us);
-}
-
-void oracle_soft_estop(oracle_t *self, iw_time_us_t now_us) {
-    hard_stop(self);
-    if (iw_gateway_state(self->gateway) != IW_STATE_LATCHED) {
-        fail(self, now_us, 207, "not LATCHED after a software e-stop");
-    }
-    observe(self, now_us);
-}
-
-void oracle_reset(oracle_t *self, iw_time_us_t now_us, iw_state_t before, const iw_stop_t *stop) {
-    if (before == IW_STATE_LATCHED && iw_gateway_state(self->gateway) != IW_STATE_LATCHED) {
-        const bool event = stop->cause == IW_CAUSE_ESTOP_SOFTWARE || stop->cause == IW_CAUSE_WHEEL_REBOOTED ||
-                           stop->cause == IW_CAUSE_FEEDBACK_SIGN || stop->cause == IW_CAUSE_OVERSPEED ||
-                           stop->cause == IW_CAUSE_LOOP_HUNG;
-        judge_start(self, now_us, 340, "reset");
-        if (event && !elapsed(now_us, self->latched_us, EVENT_US)) {
-            fail(self, now_us, 350, "reset although the cause was seen less than a second ago");
-        }
-    }
-    observe(self, now_us);
 }

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+/// What the parts of the oracle share: what it sees and what follows (oracle.c), requests (oracle_requests.c).
+#ifndef SIM_TEST_ORACLE_PARTS_H
+#define SIM_TEST_ORACLE_PARTS_H
+
+#include "oracle.h"
+
+#define MS 1000U
+/// An event-like cause is gone when not seen for this long.
+#define EVENT_US (1000U * MS)
+/// A nonzero command this recent refuses arm and reset.
+#define STALE_US (500U * MS)
+/// What arm gives: longer than any lease.
+#define FIRST_LEASE_US (1000U * MS)
+
+/// A rule is broken; the first one is kept.
+__attribute__((format(printf, 4, 5))) void oracle_break(oracle_t *self, iw_time_us_t now_us, uint32_t rule,
+                                                        const char *format, ...);
+
+/// True if it happened at all, and that long ago.
+bool oracle_elapsed(iw_time_us_t now_us, iw_time_us_t since_us, iw_time_us_t span_us);
+
+iw_time_us_t oracle_us(uint32_t ms);
+
+/// Permission is over: zero at once, or by a ramp from then on.
+void oracle_hard_stop(oracle_t *self);
+void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us);
+
+/// The public state changed, or may have.
+void oracle_observe(oracle_t *self, iw_time_us_t now_us);
+
+#endif
