@@ -20,8 +20,6 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     memset(self, 0, sizeof *self);
     self->config = config;
     self->stale_us = IW_NEVER;
-    self->hold_us = IW_NEVER;
-    self->view.output_zero = true;
     for (size_t cause = 0; cause < IW_CAUSE_LOOP_LATE; cause++) {
         self->seen_us[cause] = IW_NEVER;
     }
@@ -51,11 +49,6 @@ static iw_time_us_t lease_us(const iw_permit_t *self) {
 static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, iw_time_us_t span_us) {
     self->lease_from_us = now_us;
     self->lease_until_us = now_us + span_us;
-}
-
-static void begin_lease(iw_permit_t *self, iw_time_us_t now_us) {
-    self->armed_us = now_us;
-    grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
 }
 
 static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
@@ -188,8 +181,8 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     if (self->view.proven && waited_us <= limit_us) {
         self->arming = false;
         self->state = IW_STATE_ARMED;
-        self->cut = false;
-        begin_lease(self, now_us);
+        self->armed_us = now_us;
+        grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
     } else if (waited_us >= limit_us) {
         end_arming(self, IW_REFUSE_SEND_STALLED);
     }
@@ -287,16 +280,15 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
     if (self->holder == client) {
         return IW_REFUSE_NONE;
     }
-    iw_refusal_t refusal = refuse_sending(self, now_us);
-    if (refusal == IW_REFUSE_NONE) {
-        refusal = refuse_lease(self, now_us, takeover);
-    }
+    const iw_refusal_t sending = refuse_sending(self, now_us);
+    const iw_refusal_t refusal = (sending != IW_REFUSE_NONE) ? sending : refuse_lease(self, now_us, takeover);
     if (refusal != IW_REFUSE_NONE) {
         return refusal;
     }
     self->holder = client;
     if (self->state == IW_STATE_ARMED) {
-        begin_lease(self, now_us);
+        self->armed_us = now_us;
+        grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
     } else {
         self->arming = true;
         self->arming_us = now_us;
