@@ -3,6 +3,9 @@
 
 #include <stdlib.h>
 
+/// A step this late stops the wheels before anything else.
+#define US_LATE (100U * MS)
+
 static void judge_start(oracle_t *self, iw_time_us_t now_us, uint32_t rule, const char *what) {
     if (self->estop != 0) {
         oracle_break(self, now_us, rule, "%s although the e-stop was pressed", what);
@@ -40,7 +43,8 @@ void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool ta
         if ((self->holder != IW_CLIENT_NONE || self->pending_arm != IW_CLIENT_NONE) && !takeover) {
             oracle_break(self, now_us, 321, "armed although somebody else holds the lease");
         }
-        if (self->wheel[IW_LEFT].speed != 0 || self->wheel[IW_RIGHT].speed != 0) {
+        // Asked before the first step after a stall, what counts is that the late stop comes first.
+        if (now_us - self->step_us < US_LATE && (self->wheel[IW_LEFT].speed != 0 || self->wheel[IW_RIGHT].speed != 0)) {
             oracle_break(self, now_us, 322, "armed although the outputs are not zero");
         }
         if (self->timing_bad) {
