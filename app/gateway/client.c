@@ -41,7 +41,7 @@ void gw_client_drop_line(gw_client_t *self, size_t length) {
 
 void gw_client_note_caught_up(gw_client_t *self, iw_time_us_t then_us) {
     size_t length;
-    if (self->drained && gw_client_line(self, &length) == NULL) {
+    if (then_us > self->caught_up_us && self->drained && gw_client_line(self, &length) == NULL) {
         self->caught_up_us = then_us;
     }
 }

@@ -58,6 +58,7 @@ const char *gw_client_line(const gw_client_t *self, size_t *out_length);
 void gw_client_drop_line(gw_client_t *self, size_t length);
 
 /// Notes that nothing of it was waiting at `then_us`, if the last read took all there was and no complete line is left.
+/// What is known of a later time stays.
 void gw_client_note_caught_up(gw_client_t *self, iw_time_us_t then_us);
 
 /// The same for now, asking the socket.

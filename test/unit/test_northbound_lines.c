@@ -307,6 +307,12 @@ static void test_client_with_a_line_left_is_not_caught_up(void) {
     TEST_ASSERT_EQUAL_UINT64(7, client.caught_up_us);
 }
 
+static void test_client_caught_up_later_is_not_forgotten_for_an_earlier_time(void) {
+    gw_client_check_caught_up(&client, 9);
+    gw_client_note_caught_up(&client, 8);
+    TEST_ASSERT_EQUAL_UINT64(9, client.caught_up_us);
+}
+
 static void test_client_with_bytes_left_in_its_socket_is_not_caught_up(void) {
     TEST_ASSERT_EQUAL_INT(3, (int)send(peer, "{}\n", 3, MSG_NOSIGNAL));
     gw_client_check_caught_up(&client, 5);
@@ -346,6 +352,7 @@ int main(void) {
     RUN_TEST(test_names_of_all_refusals_are_errors_of_the_closed_list);
     RUN_TEST(test_client_request_right_after_calm_was_sent_now);
     RUN_TEST(test_client_with_a_line_left_is_not_caught_up);
+    RUN_TEST(test_client_caught_up_later_is_not_forgotten_for_an_earlier_time);
     RUN_TEST(test_client_with_bytes_left_in_its_socket_is_not_caught_up);
     RUN_TEST(test_client_that_filled_the_buffer_is_not_caught_up);
     return UNITY_END();
