@@ -373,7 +373,7 @@ void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fr
     }
     if (!zero && now_us - handed_us > oracle_us(300) && now_us - self->late_us > oracle_us(300)) {
         wheel->after_stale = true;
-        if (self->purges) {
+        if (self->purges && now_us - self->step_us < GAP_US) {
             oracle_break(self, now_us, 605, "a frame of %llu us ago came out although the port purges",
                          (unsigned long long)(now_us - handed_us));
         }

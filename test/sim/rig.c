@@ -9,7 +9,6 @@
 #define RULE_UNUSABLE 903U ///< Everything is healed and it cannot be driven.
 #define RULE_RESTLESS 904U ///< Nobody drives and it does not come to rest and silence.
 #define RULE_INTERNAL 905U ///< The gate had to stop the scheduler, or the encoder had to clamp.
-#define START_US      ((iw_time_us_t)S)
 #define QUIET_US      (1500U * MS)
 #define USABLE_US     (20U * S)
 #define DRIVEN_US     (1U * S)
@@ -423,7 +422,7 @@ static void begin(rig_t *rig, const scenario_t *scenario) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         pair.wheel[side].motion.current_is_setpoint = setpoint;
     }
-    rig->now_us = START_US;
+    rig->now_us = SCENARIO_START_US;
     rig->fault_end_us = IW_NEVER;
     sim_random_init(&rig->random, scenario->seed ^ UINT64_C(0x5EED));
     sim_world_init(&rig->world, &pair, rig->now_us, scenario->seed);
@@ -448,11 +447,11 @@ void rig_play(const scenario_t *scenario, iw_time_us_t trace_from_us, rig_result
     out_result->hash = UINT64_C(14695981039346656037);
     begin(&rig, scenario);
     for (size_t i = 0; i < scenario->count && rig.oracle.rule == ORACLE_NO_RULE; i++) {
-        run_until(&rig, START_US + scenario->event[i].at_us);
+        run_until(&rig, SCENARIO_START_US + scenario->event[i].at_us);
         judge_internal(&rig);
         begin_event(&rig, &scenario->event[i]);
     }
-    run_until(&rig, START_US + scenario->chaos_us);
+    run_until(&rig, SCENARIO_START_US + scenario->chaos_us);
     judge_internal(&rig);
     heal(&rig);
     run_until(&rig, rig.now_us + QUIET_US);
@@ -462,7 +461,7 @@ void rig_play(const scenario_t *scenario, iw_time_us_t trace_from_us, rig_result
     out_result->rule = rig.oracle.rule;
     out_result->broken_us = rig.oracle.broken_us;
     memcpy(out_result->text, rig.oracle.text, sizeof out_result->text);
-    out_result->stats.simulated_us = rig.now_us - START_US;
+    out_result->stats.simulated_us = rig.now_us - SCENARIO_START_US;
 }
 
 void rig_stats_add(rig_stats_t *sum, const rig_stats_t *stats) {

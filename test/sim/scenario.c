@@ -191,7 +191,7 @@ void scenario_print(const scenario_t *self, FILE *out) {
             self->echo_early ? ", echo unproven" : "", self->requests_first ? ", requests before step" : "");
     for (size_t i = 0; i < self->count; i++) {
         const event_t *const e = &self->event[i];
-        fprintf(out, "  %11.6f s  %-34s", (double)e->at_us / 1e6, draws[e->kind].name);
+        fprintf(out, "  %11.6f s  %-34s", (double)(SCENARIO_START_US + e->at_us) / 1e6, draws[e->kind].name);
         if (draws[e->kind].who > 1U) {
             fprintf(out, " #%u", e->who);
         }

@@ -12,6 +12,8 @@
 
 #define SCENARIO_EVENTS  512U
 #define SCENARIO_CLIENTS 4U
+/// The virtual time at which a run begins; events tell their time from there.
+#define SCENARIO_START_US ((iw_time_us_t)1000000U)
 
 typedef enum {
     EV_ESTOP = 0,   ///< Button pressed for `span`.
