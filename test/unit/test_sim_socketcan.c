@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Which commands the simulator refuses when it is a node on a CAN interface.
+#include "socketcan.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+void setUp(void) {}
+
+void tearDown(void) {}
+
+static void test_commands_that_need_the_hub_are_refused_with_any_arguments(void) {
+    static const char *const refused[] = {"ack off", "stall on", "busoff", "passive\ton", "bus down", "queue 4"};
+    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; ++i) {
+        TEST_ASSERT_TRUE_MESSAGE(sim_socketcan_refuses(refused[i]), refused[i]);
+    }
+}
+
+static void test_commands_of_the_wheels_and_other_nodes_are_not(void) {
+    static const char *const allowed[] = {"power off",   "mute left", "foreign once", "frame 100#", "babble 1 100 on",
+                                          "estop press", "status",    "normal",       "busy",       "",
+                                          "acknowledge", "b"};
+    for (size_t i = 0; i < sizeof allowed / sizeof allowed[0]; ++i) {
+        TEST_ASSERT_FALSE_MESSAGE(sim_socketcan_refuses(allowed[i]), allowed[i]);
+    }
+}
+
+static void test_open_of_a_name_that_no_interface_can_have_tells_why(void) {
+    static sim_socketcan_t can;
+    static sim_world_t world;
+    static sim_loop_t loop;
+    sim_reason_t reason = {""};
+    TEST_ASSERT_FALSE(sim_socketcan_open(&can, "an_interface_of_17", &loop, &world, &reason));
+    TEST_ASSERT_NOT_NULL(strstr(reason.text, "an_interface_of_17"));
+    TEST_ASSERT_NOT_NULL(strstr(reason.text, "unix:PATH"));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_commands_that_need_the_hub_are_refused_with_any_arguments);
+    RUN_TEST(test_commands_of_the_wheels_and_other_nodes_are_not);
+    RUN_TEST(test_open_of_a_name_that_no_interface_can_have_tells_why);
+    return UNITY_END();
+}
