@@ -324,8 +324,10 @@ static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, 
 }
 
 void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
-    self->stale_us = now_us;
-    self->stale_client = client;
+    if (self->stale_us == IW_NEVER || now_us >= self->stale_us) {
+        self->stale_us = now_us;
+        self->stale_client = client;
+    }
 }
 
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero) {

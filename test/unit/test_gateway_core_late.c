@@ -133,6 +133,14 @@ static void test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.gateway.permit.stop.cause);
 }
 
+static void test_gateway_drive_that_waited_does_not_hide_a_later_one(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    const iw_time_us_t last_us = rig.gateway.permit.stale_us;
+    (void)drive_sent(last_us - MS(100));
+    TEST_ASSERT_EQUAL_UINT64(last_us, rig.gateway.permit.stale_us);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_gateway_late_step_leaves_a_lost_wheel_lost);
@@ -143,5 +151,6 @@ int main(void) {
     RUN_TEST(test_gateway_suspended_for_200_ms_stops);
     RUN_TEST(test_gateway_drive_from_before_arm_is_stale);
     RUN_TEST(test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent);
+    RUN_TEST(test_gateway_drive_that_waited_does_not_hide_a_later_one);
     return UNITY_END();
 }
