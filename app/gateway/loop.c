@@ -86,7 +86,7 @@ static void note_suspend(gw_daemon_t *daemon) {
         gw_log(&daemon->log, GW_LOG_WARNING, "the machine was suspended for %llu ms",
                (unsigned long long)((suspended_us - daemon->suspended_us) / IW_US_PER_MS));
     }
-    daemon->suspended_us = suspended_us;
+    daemon->suspended_us = suspended_us > daemon->suspended_us ? suspended_us : daemon->suspended_us;
 }
 
 /// The core's cycle, and what follows from it at once.

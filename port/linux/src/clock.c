@@ -14,8 +14,9 @@ iw_time_us_t iw_clock_now_us(void) {
 }
 
 iw_time_us_t iw_clock_suspended_us(void) {
+    const iw_time_us_t total_us =
+        read_us(CLOCK_BOOTTIME); // First: what passes between the two makes it less, never more.
     const iw_time_us_t running_us = read_us(CLOCK_MONOTONIC);
-    const iw_time_us_t total_us = read_us(CLOCK_BOOTTIME);
     return total_us > running_us ? total_us - running_us : 0U;
 }
 

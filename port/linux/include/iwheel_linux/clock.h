@@ -9,6 +9,7 @@
 iw_time_us_t iw_clock_now_us(void);
 
 /// For how long the machine has been suspended since it was started: what CLOCK_MONOTONIC did not count.
+/// Never too much; too little by as long as this call was interrupted.
 iw_time_us_t iw_clock_suspended_us(void);
 
 /// CLOCK_REALTIME in microseconds since 1970. May step in either direction.
