@@ -8,8 +8,9 @@ import subprocess
 import sys
 import time
 
+from harness import die_with_parent
+
 HERE = os.path.dirname(os.path.abspath(__file__))
-PR_SET_PDEATHSIG = 1
 
 
 def find_kernel(install=True):
@@ -45,7 +46,13 @@ class Boot:
         with open(self.path("console"), "wb") as console:
             # A session of its own: the kernel is a tree of processes, all of which must go with it.
             self.child = subprocess.Popen(
-                self.command(kernel), stdin=subprocess.DEVNULL, stdout=console, stderr=console, start_new_session=True, cwd=folder
+                self.command(kernel),
+                stdin=subprocess.DEVNULL,
+                stdout=console,
+                stderr=console,
+                start_new_session=True,
+                preexec_fn=die_with_parent,
+                cwd=folder,
             )
         self.taken = 0
 
@@ -85,12 +92,16 @@ class Boot:
     def seconds(self):
         return time.monotonic() - self.began
 
-    def end(self):
-        """Kills what is left of it."""
+    def kill(self):
+        """All its processes, by their group."""
         try:
             os.killpg(self.child.pid, signal.SIGKILL)
         except ProcessLookupError:
             pass
+
+    def end(self):
+        """Kills what is left of it."""
+        self.kill()
         self.child.wait()
 
     def complaint(self):

@@ -4,6 +4,7 @@
 import argparse
 import os
 import shutil
+import signal
 import sys
 import tempfile
 import threading
@@ -30,6 +31,10 @@ class Campaign:
         self.folder = tempfile.mkdtemp(prefix="iwheel-kernel-")
         self.lock = threading.Lock()
         self.results = []
+        self.boots = []
+        self.interrupted = False
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self.interrupt)
 
     def plan(self, group):
         """Which tests of the group are wanted; None if none is."""
@@ -56,9 +61,10 @@ class Campaign:
     def boot(self, group):
         """Works off one group. A boot that hangs or dies fails the tests that it did not get to."""
         plan = self.plan(group)
-        if plan is None:
+        if plan is None or self.interrupted:
             return
         boot = (NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan)
+        self.boots.append(boot)
         limit_s = group.full_limit_s if self.options.full else group.limit_s
         done = set()
         try:
@@ -108,6 +114,12 @@ class Campaign:
     def count(self, verdict):
         return sum(result["verdict"] == verdict for result in self.results)
 
+    def interrupt(self, *_):
+        """Ends every kernel; the threads that wait for them see it."""
+        self.interrupted = True
+        for boot in self.boots:
+            boot.kill()
+
     def close(self):
         if self.options.keep or self.count("failed"):
             print(f"logs are kept in {self.folder}")
@@ -150,6 +162,8 @@ def once(options, kernel):
             report.write(campaign.results)
     finally:
         campaign.close()
+    if campaign.interrupted:
+        sys.exit(143)
     return [campaign.count(verdict) for verdict in ("passed", "failed", "skipped")]
 
 

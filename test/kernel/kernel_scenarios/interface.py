@@ -7,7 +7,7 @@ import netdev
 from catalogue import kernel_test
 from client import Streamer
 from harness import now_us
-from judge_log import Event
+from judge_log import LEFT, RIGHT, Event
 from scenario import Skip
 from scenarios.bus_faults import wait_reset
 
@@ -304,3 +304,60 @@ def row17_echo_late(t):
 @kernel_test("no echo in motion: stop within echo_ms, latched", "echo", 17)
 def row17_echo_missing(t):
     echo_fault(t, "loss", "100%")
+
+
+def power_cut(t, setup):
+    """Nobody acknowledges for 10 s at full command: frames are held back where the controller would retry them."""
+    rig = t.rig({"drive": {"accel_mm_s2": 2000}})
+    needs_echo(rig)
+    netdev.discipline(rig.interface, "plug")
+    netdev.command("tc", "qdisc", "change", "dev", rig.interface, "root", "plug", "release_indefinite")
+    rig.start_gateway(setup=setup)
+    client = rig.client()
+    t.arm(client)
+    stream = Streamer(client, 800, 800, 0.02)
+    time.sleep(1.0)
+    fault_us = fault(rig, lambda: (netdev.command("tc", "qdisc", "change", "dev", rig.interface, "root", "plug", "block"),
+                                   rig.sim.ask("power off")), 120)
+    time.sleep(0.3)
+    stream.stop()
+    why = client.request("why")
+    t.check(client.request("status")["state"] == "latched", "latched")
+    t.measure("stop_ms", (why["at_us"] - fault_us) / 1000 if why["at_us"] else 0)
+    t.check(not client.request("reset")["ok"], "reset waits until the wheels are heard")
+    time.sleep(10)
+    held_us = now_us()
+    if "plug" in netdev.command("tc", "qdisc", "show", "dev", rig.interface):
+        netdev.command("tc", "qdisc", "change", "dev", rig.interface, "root", "plug", "release_indefinite")
+    time.sleep(0.01)
+    back_us = now_us()
+    rig.sim.ask("power on")
+    rig.timeline.append(Event(held_us, "alive", held_us))
+    time.sleep(1.0)
+    late = [(at - held_us, side, speed) for at, side, speed in rig.bus.setpoints(held_us)]
+    moving = [entry for entry in late if entry[2]]
+    t.measure("stale_frames", len(moving))
+    t.figure(f"{len(moving)} old and {len(late) - len(moving)} zero frames came out")
+    return rig, client, late, moving
+
+
+@kernel_test("wheel power cut for 10 s at full command, link may be restarted: no old frame", "echo", 18)
+def row18_power_cut_purged(t):
+    rig, client, late, moving = power_cut(t, None)
+    t.check(not moving, f"no old frame after a purge: {late[:6]}")
+    back_to_driving_if_latched(t, rig, client)
+    t.judge(rig)
+
+
+@kernel_test("wheel power cut for 10 s at full command, link may not be restarted: one old frame, its zero behind it", "echo", 18)
+def row18_power_cut_no_rights(t):
+    rig, client, late, moving = power_cut(t, netdev.without_net_admin)
+    for side in (LEFT, RIGHT):
+        here = [(at, speed) for at, can_id, speed in late if can_id == side]
+        old = [number for number, (_, speed) in enumerate(here) if speed]
+        t.check(len(old) <= 1, f"at most one old frame of {side}: {here[:6]}")
+        if old:
+            then = here[old[0] + 1 : old[0] + 2]
+            t.check(then and then[0][1] == 0 and then[0][0] - here[old[0]][0] <= 2000, f"its zero within 2 ms: {here[:4]}")
+    back_to_driving_if_latched(t, rig, client)
+    t.judge(rig)
