@@ -39,7 +39,7 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
         return;
     }
     if (!was_stalled) {
-        self->stalled_since_us = self->promised_us;
+        self->stalled_since_us = now_us - late_us;
     }
     if (late) {
         self->counters.late_steps++;
@@ -88,7 +88,8 @@ static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, const iw_proto_m
     iw_force_t *const force = &self->force[message->side];
     const iw_unit_evidence_t before = force->evidence;
     if (message->kind == IW_PROTO_FORCE) {
-        const bool still = wheel->speed_us == IW_NEVER || iw_wheel_at_rest(wheel, now_us, 0);
+        // By its last speed, however old: a stall of ours is no motion of the wheel's.
+        const bool still = iw_magnitude(wheel->speed.speed_rpm) <= self->config.rest_rpm;
         iw_force_hear(force, now_us, message->as.force.force_raw, still);
     } else {
         iw_force_hear_offset(force, now_us, message->as.offset.offset_dN);
@@ -145,7 +146,7 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
     if (is_setpoint_id(frame->id)) {
         if (frame->kind == IW_CAN_ECHO) {
             self->counters.echoes++;
-            iw_outbox_echo(&self->sender.outbox, (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT);
+            iw_outbox_echo(&self->sender.outbox, (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT, frame);
         } else {
             hear_foreign(self, now_us, frame->id);
         }
@@ -223,11 +224,12 @@ static iw_ledger_item_t sign_item(size_t side) {
 static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s) {
     iw_follow_t *const follow = &self->follow[side];
     const int32_t measured_mm_s = iw_wheel_speed_mm_s(&self->wheel[side]);
+    const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s;
     const uint32_t detail = (uint32_t)iw_magnitude(measured_mm_s);
     switch (iw_follow_step(follow, now_us, applied_mm_s, measured_mm_s)) {
     case IW_FOLLOW_SIGN:
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_FEEDBACK_SIGN, side_bit(side), detail);
-        iw_ledger_contradict(&self->ledger, sign_item(side), IW_EVIDENCE_BUS, measured_mm_s);
+        iw_ledger_contradict(&self->ledger, sign_item(side), IW_EVIDENCE_BUS, along_mm_s);
         break;
     case IW_FOLLOW_OVERSPEED:
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_OVERSPEED, side_bit(side), detail);
@@ -240,7 +242,7 @@ static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, i
         break;
     }
     if (iw_follow_sign_confirmed(follow, now_us) && self->ledger.entry[sign_item(side)].state == IW_LEDGER_ASSUMED) {
-        iw_ledger_confirm(&self->ledger, sign_item(side), IW_EVIDENCE_BUS, measured_mm_s);
+        iw_ledger_confirm(&self->ledger, sign_item(side), IW_EVIDENCE_BUS, along_mm_s);
     }
 }
 

@@ -48,18 +48,16 @@ void iw_force_reopen(iw_force_t *self, bool boot_seen) {
     }
 }
 
-void iw_force_restore(iw_force_t *self, int32_t offset_mN) {
-    if (self->provenance <= IW_OFFSET_STORED) {
-        self->provenance = IW_OFFSET_STORED;
-        self->offset_mN = offset_mN;
-        self->offset_us = IW_NEVER;
-    }
-}
-
 static void adopt(iw_force_t *self, iw_time_us_t now_us, iw_offset_provenance_t provenance, int32_t offset_mN) {
     self->provenance = provenance;
     self->offset_mN = offset_mN;
     self->offset_us = now_us;
+}
+
+void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN) {
+    if (self->provenance < provenance || self->provenance == IW_OFFSET_STORED) {
+        adopt(self, IW_NEVER, provenance, offset_mN);
+    }
 }
 
 static uint32_t square_root(uint32_t value) {
@@ -84,8 +82,8 @@ static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
     return (variance <= VARIANCE_FINE) ? square_root(variance * scale * scale) : square_root(variance) * scale;
 }
 
-/// What the full ring holds. The oldest sample stands at `next`.
-static iw_force_quality_t measure(const iw_force_t *self) {
+/// The oldest sample stands at `next`.
+iw_force_quality_t iw_force_measure(const iw_force_t *self) {
     const int32_t scale = scale_mN(self);
     iw_force_quality_t quality = {0, 0, 0, IW_FORCE_WINDOW_SAMPLES, IW_WINDOW_GOOD};
     int32_t sum[2] = {0, 0};
@@ -110,8 +108,8 @@ static iw_force_quality_t measure(const iw_force_t *self) {
     return quality;
 }
 
-static bool far_from_offset(const iw_force_t *self, int32_t mean_mN) {
-    return iw_magnitude(mean_mN - self->offset_mN) > (int32_t)IW_FORCE_LOADED_mN;
+static bool far_from_offset(const iw_force_t *self, int32_t mean_mN, uint32_t limit_mN) {
+    return iw_magnitude(mean_mN - self->offset_mN) > (int32_t)limit_mN;
 }
 
 /// Raw over offset at rest is 10, 1 or 0: exactly one of them must fit.
@@ -154,9 +152,10 @@ static void settle(iw_force_t *self, iw_time_us_t now_us) {
 }
 
 static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
-    self->quality = measure(self);
+    self->quality = iw_force_measure(self);
     const bool known = self->provenance == IW_OFFSET_STORED || self->provenance == IW_OFFSET_OPERATOR;
-    if (self->quality.window == IW_WINDOW_GOOD && known && far_from_offset(self, self->quality.mean_mN)) {
+    if (self->quality.window == IW_WINDOW_GOOD && known &&
+        far_from_offset(self, self->quality.mean_mN, IW_FORCE_SHIFT_mN)) {
         self->quality.window = IW_WINDOW_LOADED;
     }
     if (self->quality.window == IW_WINDOW_GOOD && self->provenance < IW_OFFSET_ESTIMATED) {
@@ -194,7 +193,7 @@ iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
     if (self->count < IW_FORCE_WINDOW_SAMPLES || now_us - self->raw_us >= IW_FORCE_STALE_US) {
         return IW_TARE_NO_FORCE;
     }
-    const iw_force_quality_t quality = measure(self);
+    const iw_force_quality_t quality = iw_force_measure(self);
     const bool doubted = self->evidence == IW_UNIT_UNCLEAR || self->evidence == IW_UNIT_OFFSET_REMOVED;
     const bool known = self->provenance != IW_OFFSET_NONE && !doubted;
     if (quality.window == IW_WINDOW_SATURATED) {
@@ -203,7 +202,7 @@ iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
     if (quality.window != IW_WINDOW_GOOD) {
         return (quality.window == IW_WINDOW_MOVING) ? IW_TARE_MOVING : IW_TARE_NOISY;
     }
-    if (known && far_from_offset(self, quality.mean_mN)) {
+    if (known && far_from_offset(self, quality.mean_mN, IW_FORCE_LOADED_mN)) {
         return IW_TARE_LOADED;
     }
     adopt(self, now_us, IW_OFFSET_OPERATOR, quality.mean_mN);

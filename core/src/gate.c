@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gate.h"
 
-#include "be.h"
 #include "magnitude.h"
 
 #include <string.h>
@@ -63,9 +62,9 @@ static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, iw_si
 iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     const bool left = frame->id == IW_ID_LEFT_SETPOINT;
     const iw_side_t side = left ? IW_LEFT : IW_RIGHT;
-    const uint8_t *const data = frame->data;
-    const iw_proto_setpoint_t setpoint = {iw_be_get_i16(&data[1]), iw_be_get_i16(&data[3]), data[0]};
+    iw_proto_setpoint_t setpoint;
     iw_gate_verdict_t verdict = IW_GATE_NOT_A_SETPOINT;
+    iw_proto_get_setpoint(frame, &setpoint);
     if ((left || frame->id == IW_ID_RIGHT_SETPOINT) && frame->dlc == self->config->setpoint_dlc) {
         verdict = judge(self, now_us, side, &setpoint);
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/outbox.h"
 
+#include "iwheel/be.h"
+
 #include <string.h>
 
 void iw_outbox_init(iw_outbox_t *self) {
@@ -20,12 +22,19 @@ bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero) {
     return self->pending[side] < (zero ? 2U : 1U);
 }
 
-void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, bool accepted) {
+/// The four bytes behind the setpoint's type.
+static int32_t value_of(const iw_can_frame_t *frame) {
+    return iw_be_get_i32(&frame->data[1]);
+}
+
+void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, const iw_can_frame_t *frame,
+                    bool accepted) {
     if (self->waiting_us[side] == IW_NEVER) {
         self->waiting_us[side] = now_us;
     }
     if (accepted) {
         self->sent_us[side][self->pending[side]] = now_us;
+        self->value[side][self->pending[side]] = value_of(frame);
         self->pending[side]++;
     }
 }
@@ -38,13 +47,14 @@ void iw_outbox_rest(iw_outbox_t *self) {
     }
 }
 
-void iw_outbox_echo(iw_outbox_t *self, iw_side_t side) {
-    if (self->pending[side] == 0U) {
+void iw_outbox_echo(iw_outbox_t *self, iw_side_t side, const iw_can_frame_t *echo) {
+    if (self->pending[side] == 0U || self->value[side][0] != value_of(echo)) {
         self->stray++;
         return;
     }
     self->proven_us[side] = self->sent_us[side][0];
     self->sent_us[side][0] = self->sent_us[side][1];
+    self->value[side][0] = self->value[side][1];
     self->pending[side]--;
     self->waiting_us[side] = (self->pending[side] > 0U) ? self->sent_us[side][0] : IW_NEVER;
 }

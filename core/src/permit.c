@@ -11,6 +11,9 @@
 
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
 
+/// So many setpoints can be un-echoed when a process dies: two of each wheel (see outbox.h).
+#define LEFT_BEHIND_MAX 4U
+
 /// True if the configuration allows sending at all.
 static bool may_send(const iw_config_t *config) {
     return !config->listen_only && config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
@@ -40,10 +43,6 @@ static bool restarting(const iw_permit_t *self) {
 
 static bool within(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us) {
     return then_us != IW_NEVER && now_us - then_us < span_us;
-}
-
-static iw_time_us_t lease_us(const iw_permit_t *self) {
-    return (iw_time_us_t)self->config->lease_ms * IW_US_PER_MS;
 }
 
 static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, iw_time_us_t span_us) {
@@ -164,7 +163,8 @@ void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, u
     } else if (self->state == IW_STATE_ARMED) {
         enter_stopping(self, now_us, cause, sides, detail);
     } else if (restarting(self) && cause == IW_CAUSE_SECOND_MASTER) {
-        self->state = IW_STATE_LISTENING;
+        self->strangers++;
+        self->state = (self->strangers > LEFT_BEHIND_MAX) ? IW_STATE_LISTENING : self->state;
     } else {
         end_arming(self, refusal_for(cause));
         self->cut = self->cut || cause == IW_CAUSE_LOOP_LATE;
@@ -336,7 +336,7 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_
         iw_permit_remember(self, sent_us, client);
     }
     if (refusal == IW_REFUSE_NONE) {
-        grant_lease(self, sent_us, lease_us(self));
+        grant_lease(self, sent_us, (iw_time_us_t)self->config->lease_ms * IW_US_PER_MS);
     }
     return refusal;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/proto.h"
 
-#include "be.h"
+#include "iwheel/be.h"
 
 #include <string.h>
 
@@ -11,46 +11,18 @@
 #define ODOMETRY    2
 #define CPU         6
 
-typedef struct {
-    uint16_t id;
-    uint8_t dlc;
-    uint8_t kind;
-    uint8_t side;
-} layout_t;
+IW_STATIC_ASSERT(IW_ID_RIGHT_SETPOINT == (IW_ID_LEFT_SETPOINT | IW_PROTO_SIDE_BIT), setpoint_side);
+IW_STATIC_ASSERT(IW_ID_RIGHT_SPEED == (IW_ID_LEFT_SPEED | IW_PROTO_SIDE_BIT), speed_side);
+IW_STATIC_ASSERT(IW_ID_RIGHT_STATUS == (IW_ID_LEFT_STATUS | IW_PROTO_SIDE_BIT), status_side);
+IW_STATIC_ASSERT(IW_ID_RIGHT_FORCE == (IW_ID_LEFT_FORCE | IW_PROTO_SIDE_BIT), force_side);
+IW_STATIC_ASSERT(IW_ID_RIGHT_OFFSET == (IW_ID_LEFT_OFFSET | IW_PROTO_SIDE_BIT), offset_side);
 
-/// In the order in which a nominal bus brings them.
-static const layout_t layouts[] = {
-    {IW_ID_LEFT_SPEED, IW_DLC_SPEED, IW_PROTO_SPEED, IW_LEFT},
-    {IW_ID_RIGHT_SPEED, IW_DLC_SPEED, IW_PROTO_SPEED, IW_RIGHT},
-    {IW_ID_LEFT_SETPOINT, IW_DLC_SETPOINT, IW_PROTO_SETPOINT, IW_LEFT},
-    {IW_ID_RIGHT_SETPOINT, IW_DLC_SETPOINT, IW_PROTO_SETPOINT, IW_RIGHT},
-    {IW_ID_LEFT_STATUS, IW_DLC_STATUS, IW_PROTO_STATUS, IW_LEFT},
-    {IW_ID_RIGHT_STATUS, IW_DLC_STATUS, IW_PROTO_STATUS, IW_RIGHT},
-    {IW_ID_RIGHT_POSE, IW_DLC_POSE, IW_PROTO_POSE, IW_RIGHT},
-    {IW_ID_LEFT_FORCE, IW_DLC_FORCE, IW_PROTO_FORCE, IW_LEFT},
-    {IW_ID_RIGHT_FORCE, IW_DLC_FORCE, IW_PROTO_FORCE, IW_RIGHT},
-    {IW_ID_LEFT_OFFSET, IW_DLC_OFFSET, IW_PROTO_OFFSET, IW_LEFT},
-    {IW_ID_RIGHT_OFFSET, IW_DLC_OFFSET, IW_PROTO_OFFSET, IW_RIGHT},
-};
-#define LAYOUTS (sizeof layouts / sizeof layouts[0])
-
-static const layout_t *find_id(uint32_t id) {
-    for (size_t i = 0; i < LAYOUTS; i++) {
-        if (layouts[i].id == id) {
-            return &layouts[i];
-        }
-    }
-    return NULL;
-}
-
-static const layout_t *find_message(iw_proto_kind_t kind, iw_side_t side) {
-    for (size_t i = 0; i < LAYOUTS; i++) {
-        if (layouts[i].kind == (uint8_t)kind && layouts[i].side == (uint8_t)side) {
-            return &layouts[i];
-        }
-    }
-    return NULL;
-}
+/// Indexed by iw_proto_kind_t: the left wheel's ids, and how long each message is at least.
+static const uint16_t left_ids[] = {IW_ID_LEFT_SPEED, IW_ID_LEFT_STATUS, IW_ID_LEFT_FORCE,
+                                    IW_ID_NO_POSE,    IW_ID_LEFT_OFFSET, IW_ID_LEFT_SETPOINT};
+static const uint8_t lengths[] = {IW_DLC_SPEED, IW_DLC_STATUS, IW_DLC_FORCE,
+                                  IW_DLC_POSE,  IW_DLC_OFFSET, IW_DLC_SETPOINT};
+#define KINDS (sizeof left_ids / sizeof left_ids[0])
 
 static void get_status(const uint8_t *data, iw_proto_status_t *out_status) {
     out_status->battery_dV = data[BATTERY];
@@ -66,48 +38,50 @@ static void get_pose(const uint8_t *data, iw_proto_pose_t *out_pose) {
     out_pose->psi_mrad = iw_be_get_i16(&data[6]);
 }
 
-static void get_message(const uint8_t *data, iw_proto_message_t *out_message) {
-    switch (out_message->kind) {
-    case IW_PROTO_SETPOINT:
-        out_message->as.setpoint.type = data[0];
-        out_message->as.setpoint.speed_mm_s = iw_be_get_i16(&data[1]);
-        out_message->as.setpoint.current_mA = iw_be_get_i16(&data[3]);
-        break;
-    case IW_PROTO_SPEED:
-        out_message->as.speed.speed_rpm = iw_be_get_i16(&data[0]);
-        out_message->as.speed.acceleration_raw = iw_be_get_i16(&data[2]);
-        break;
+static void get_other(const iw_can_frame_t *frame, size_t kind, iw_proto_message_t *out_message) {
+    const uint8_t *const data = frame->data;
+    switch (kind) {
     case IW_PROTO_STATUS:
         get_status(data, &out_message->as.status);
-        break;
-    case IW_PROTO_POSE:
-        get_pose(data, &out_message->as.pose);
         break;
     case IW_PROTO_FORCE:
         out_message->as.force.force_raw = iw_be_get_i16(&data[0]);
         out_message->as.force.debug_raw = iw_be_get_i16(&data[2]);
         break;
+    case IW_PROTO_POSE:
+        get_pose(data, &out_message->as.pose);
+        break;
     case IW_PROTO_OFFSET:
-    default:
         out_message->as.offset.offset_dN = iw_be_get_i16(&data[0]);
+        break;
+    case IW_PROTO_SETPOINT:
+    default:
+        iw_proto_get_setpoint(frame, &out_message->as.setpoint);
         break;
     }
 }
 
-iw_status_t iw_proto_decode(const iw_can_frame_t *frame, iw_proto_message_t *out_message) {
-    const layout_t *const layout = find_id(frame->id & ~FORMAT_BITS);
-    if (layout == NULL) {
+iw_status_t iw_proto_decode_other(const iw_can_frame_t *frame, iw_proto_message_t *out_message) {
+    const uint32_t number = frame->id & ~FORMAT_BITS;
+    size_t kind = 0;
+    while (left_ids[kind] != (number & ~IW_PROTO_SIDE_BIT)) {
+        kind++;
+        if (kind == KINDS) {
+            return IW_ERR_ID;
+        }
+    }
+    if (number == IW_ID_NO_POSE) {
         return IW_ERR_ID;
     }
-    if ((frame->id & FORMAT_BITS) != 0U) {
+    if (number != frame->id) {
         return IW_ERR_FORMAT;
     }
-    if (frame->dlc < layout->dlc || frame->dlc > IW_CAN_DATA_MAX) {
+    if (frame->dlc < lengths[kind] || frame->dlc > IW_CAN_DATA_MAX) {
         return IW_ERR_LENGTH;
     }
-    out_message->kind = (iw_proto_kind_t)layout->kind;
-    out_message->side = (iw_side_t)layout->side;
-    get_message(frame->data, out_message);
+    out_message->kind = (iw_proto_kind_t)kind;
+    out_message->side = (iw_side_t)((number >> IW_PROTO_SIDE_SHIFT) & 1U);
+    get_other(frame, kind, out_message);
     return IW_OK;
 }
 
@@ -119,18 +93,21 @@ static void start_frame(iw_can_frame_t *out_frame, uint32_t id, uint8_t dlc) {
 
 bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoint, uint8_t dlc,
                               iw_can_frame_t *out_frame) {
-    int16_t current_mA = setpoint->current_mA;
-    if (current_mA > IW_CURRENT_LIMIT_mA) {
-        current_mA = IW_CURRENT_LIMIT_mA;
+    int32_t current_mA = setpoint->current_mA;
+    const bool clamped = (uint32_t)(current_mA + IW_CURRENT_LIMIT_mA) > 2U * IW_CURRENT_LIMIT_mA;
+    if (clamped) {
+        current_mA = (current_mA < 0) ? -IW_CURRENT_LIMIT_mA : IW_CURRENT_LIMIT_mA;
     }
-    if (current_mA < -IW_CURRENT_LIMIT_mA) {
-        current_mA = -IW_CURRENT_LIMIT_mA;
-    }
-    start_frame(out_frame, (side == IW_LEFT) ? IW_ID_LEFT_SETPOINT : IW_ID_RIGHT_SETPOINT, dlc);
+    out_frame->id = IW_ID_LEFT_SETPOINT + ((uint32_t)side << IW_PROTO_SIDE_SHIFT);
     out_frame->data[0] = setpoint->type;
     iw_be_put_i16(&out_frame->data[1], setpoint->speed_mm_s);
-    iw_be_put_i16(&out_frame->data[3], current_mA);
-    return current_mA != setpoint->current_mA;
+    iw_be_put_i16(&out_frame->data[3], (int16_t)current_mA);
+    out_frame->data[5] = 0;
+    out_frame->data[6] = 0;
+    out_frame->data[7] = 0;
+    out_frame->dlc = dlc;
+    out_frame->kind = IW_CAN_RECEIVED;
+    return clamped;
 }
 
 static void put_status(uint8_t *data, const iw_proto_status_t *status) {
@@ -149,11 +126,11 @@ static void put_pose(uint8_t *data, const iw_proto_pose_t *pose) {
 
 iw_status_t iw_proto_encode(const iw_proto_message_t *message, iw_can_frame_t *out_frame) {
     uint8_t *const data = out_frame->data;
-    const layout_t *const layout = find_message(message->kind, message->side);
-    if (layout == NULL) {
+    const uint32_t id = left_ids[message->kind] + ((uint32_t)message->side << IW_PROTO_SIDE_SHIFT);
+    if (id == IW_ID_NO_POSE) {
         return IW_ERR_ID;
     }
-    start_frame(out_frame, layout->id, layout->dlc);
+    start_frame(out_frame, id, lengths[message->kind]);
     switch (message->kind) {
     case IW_PROTO_SETPOINT:
         (void)iw_proto_encode_setpoint(message->side, &message->as.setpoint, IW_DLC_SETPOINT, out_frame);

@@ -26,7 +26,10 @@
 /// A quiet sensor: standard deviation, and difference of the means of both halves of the window, below these.
 #define IW_FORCE_QUIET_mN 1000U
 #define IW_FORCE_DRIFT_mN 1000U
-/// An offset further than this from one that was trusted before is taken for a load.
+/// A mean further than this from an offset that was trusted before is taken for a load: nobody who leans on the machine
+/// while it starts moves its zero by more ...
+#define IW_FORCE_SHIFT_mN 5000U
+/// ... but an operator who tares it may, up to here.
 #define IW_FORCE_LOADED_mN 20000U
 /// Unit evidence needs a wheel offset of at least this.
 #define IW_FORCE_EVIDENCE_MIN_dN 20
@@ -90,7 +93,7 @@ typedef struct {
 typedef struct {
     const iw_config_t *config;
     iw_time_us_t raw_us;
-    iw_time_us_t offset_us;  ///< When the offset in force was taken; IW_NEVER: none, or STORED by an earlier run.
+    iw_time_us_t offset_us;  ///< When the offset in force was taken; IW_NEVER: none, or by an earlier run.
     int32_t offset_mN;       ///< The offset in force; 0 with IW_OFFSET_NONE.
     int16_t wheel_offset_dN; ///< The wheel's own, as sent.
     int16_t sample[IW_FORCE_WINDOW_SAMPLES]; ///< Ring of raw values, the last two seconds.
@@ -114,8 +117,9 @@ void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side);
 /// that our window covers the wheel's own first two seconds.
 void iw_force_reopen(iw_force_t *self, bool boot_seen);
 
-/// Puts an offset of an earlier run in force, as STORED, if there is nothing better.
-void iw_force_restore(iw_force_t *self, int32_t offset_mN);
+/// Puts an offset of an earlier run in force, unless this run has a better one: as IW_OFFSET_STORED, which anything
+/// replaces, or, if it was tared, as IW_OFFSET_OPERATOR, which only the next tare does. `offset_us` is IW_NEVER then.
+void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN);
 
 /// Takes a force frame. `still`: the wheel is at rest.
 void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still);
@@ -126,6 +130,10 @@ void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_
 /// Makes the mean of the last two seconds the offset, as OPERATOR. Refused, changing nothing, with the reason. LOADED
 /// is not judged where the offset in force is itself in doubt.
 iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us);
+
+/// What the last two seconds show: the window that a tare would take. Means something only with a full ring
+/// (`count` is IW_FORCE_WINDOW_SAMPLES).
+iw_force_quality_t iw_force_measure(const iw_force_t *self);
 
 /// Whether the net force means anything now, and if not, why.
 iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_us);

@@ -20,8 +20,9 @@ typedef struct {
     /// Hands one frame to the controller or its queue. A success proves nothing: only the echo does.
     int (*send)(void *context, const iw_can_frame_t *frame);
 
-    /// Takes the oldest frame received, or the echo of one of ours, in the order of the bus. Frames that are not for
+    /// Takes the oldest frame received, or the echo of one of ours with its bytes, in the order of the bus. Frames that are not for
     /// us may be left out, but the eleven ids come in every format (remote, extended, FD), so that they are counted.
+    /// Frames that were lost on the way may be told by one frame with the id IW_CAN_ERROR: it is counted as unknown.
     int (*receive)(void *context, iw_can_frame_t *out_frame);
 
     /// The state of the bus. A loss of the bus, however short, is reported by at least one call after it. When that

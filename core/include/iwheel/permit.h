@@ -136,13 +136,15 @@ typedef struct {
     iw_stop_t stop;
     iw_state_t state;
     iw_refusal_t arm_refusal; ///< Why the last arming failed.
+    uint8_t strangers;        ///< Foreign setpoints while sending zeros for a process that died.
     bool arming;
     bool holding; ///< LATCHED: zeros are still being sent.
     bool cut;     ///< STOPPING: zero at once instead of a ramp.
 } iw_permit_t;
 
 /// `config` must be checked and outlive it. `restarted`: begin with zeros (STOPPING, cause RESTART) because the
-/// process before us died while armed.
+/// process before us died while armed. That hold gives way to another master, but not to what the dead process itself
+/// may have left in its controller: two setpoints of each wheel.
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted);
 
 /// Tells that a cause is present or has just happened. It takes effect at once; the first cause of a latch stays the

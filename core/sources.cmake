@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: MIT
+# The core's sources, for core/CMakeLists.txt and the Zephyr module.
+set(IWHEEL_CORE_SOURCES
+    src/bit_timing.c
+    src/config.c
+    src/cycle.c
+    src/follow.c
+    src/force.c
+    src/gate.c
+    src/gateway.c
+    src/ledger.c
+    src/outbox.c
+    src/permit.c
+    src/proto.c
+    src/sender.c
+    src/setpoint.c
+    src/wheel.c)
