@@ -13,11 +13,18 @@ iw_time_us_t iw_clock_now_us(void) {
     return read_us(CLOCK_MONOTONIC);
 }
 
-iw_time_us_t iw_clock_suspended_us(void) {
+iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us) {
     const iw_time_us_t total_us =
         read_us(CLOCK_BOOTTIME); // First: what passes between the two makes it less, never more.
     const iw_time_us_t running_us = read_us(CLOCK_MONOTONIC);
-    return total_us > running_us ? total_us - running_us : 0U;
+    *out_suspended_us = total_us > running_us ? total_us - running_us : 0U;
+    return running_us;
+}
+
+iw_time_us_t iw_clock_suspended_us(void) {
+    iw_time_us_t suspended_us;
+    (void)iw_clock_read(&suspended_us);
+    return suspended_us;
 }
 
 int64_t iw_clock_wall_us(void) {

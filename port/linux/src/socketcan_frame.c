@@ -2,15 +2,11 @@
 #include "socketcan_frame.h"
 
 #include "iwheel/proto.h"
+#include "iwheel_linux/bus_link.h"
 
 #include <linux/can/error.h>
 #include <string.h>
 #include <sys/socket.h>
-
-/// Start, id, control, checksum, acknowledgement, end and gap of a classic frame (ISO 11898-1).
-#define BITS_STANDARD 47U
-#define BITS_EXTENDED 67U
-#define BITS_PER_BYTE 8U
 
 IW_STATIC_ASSERT(IW_CAN_EXTENDED == CAN_EFF_FLAG && IW_CAN_REMOTE == CAN_RTR_FLAG && IW_CAN_ERROR == CAN_ERR_FLAG,
                  socketcan_flags_are_those_of_the_kernel);
@@ -64,6 +60,6 @@ iw_can_error_t iw_can_error_of(const struct can_frame *raw) {
 }
 
 uint32_t iw_socketcan_bits(const struct can_frame *raw) {
-    const uint32_t bytes = (raw->can_id & CAN_RTR_FLAG) != 0U ? 0U : raw->len;
-    return ((raw->can_id & CAN_EFF_FLAG) != 0U ? BITS_EXTENDED : BITS_STANDARD) + BITS_PER_BYTE * bytes;
+    const iw_can_frame_t frame = {.id = raw->can_id, .dlc = raw->len};
+    return iw_bus_frame_bits(&frame);
 }

@@ -5,7 +5,7 @@
 #ifndef IWHEEL_LINUX_BUS_LINK_H
 #define IWHEEL_LINUX_BUS_LINK_H
 
-#include "iwheel/types.h"
+#include "iwheel/can_frame.h"
 
 typedef enum {
     IW_LINK_LOCAL = 0, ///< Not an interface of the kernel: the rest of what is told here is void but `echo_proven`.
@@ -56,6 +56,9 @@ typedef enum {
 
 /// Compares what the link reports with what the wheels need.
 iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint16_t sample_point_permille);
+
+/// Bits that the frame occupies on the bus, with the gap behind it, without stuff bits.
+uint32_t iw_bus_frame_bits(const iw_can_frame_t *frame);
 
 /// True if both tell the same of the interface: purge, changes, lost and load aside.
 bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other);

@@ -12,6 +12,9 @@ iw_time_us_t iw_clock_now_us(void);
 /// Never too much; too little by as long as this call was interrupted.
 iw_time_us_t iw_clock_suspended_us(void);
 
+/// Both at once.
+iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us);
+
 /// CLOCK_REALTIME in microseconds since 1970. May step in either direction.
 int64_t iw_clock_wall_us(void);
 
