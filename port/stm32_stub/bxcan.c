@@ -66,43 +66,43 @@ static bool poll_tsr(const iw_bxcan_t *self, uint32_t flags) {
     return false;
 }
 
-/// Aborts the mailbox, bxCAN 7.1. Returns how many echoes its successor owes beside its own, or -1 if it does not end. If it was sent
-/// after all its echo is left to `on_transmit`, and the mailbox with it.
-static int withdraw(iw_bxcan_t *self, uint32_t mailbox) {
-    iw_bxcan_outgoing_t *const outgoing = &self->outgoing[mailbox];
+/// Aborts the mailbox, bxCAN 7.1, and hands the echoes it owes on to its heir. False if it does not end. If it was sent after all its
+/// echoes are left to `on_transmit`, and the mailbox with them.
+static bool withdraw(iw_bxcan_t *self, uint32_t mailbox, iw_bxcan_outgoing_t *heir) {
     iw_register_t *const tsr = &self->config.registers->TSR;
     iw_register_write(tsr, IW_TSR_ABRQ(mailbox));
     if (!poll_tsr(self, IW_TSR_RQCP(mailbox) | IW_TSR_TME(mailbox))) {
-        return -1;
+        return false;
     }
-    if ((iw_register_read(tsr) & IW_TSR_TXOK(mailbox)) != 0U) {
-        return 0;
+    if ((iw_register_read(tsr) & IW_TSR_TXOK(mailbox)) == 0U) {
+        *heir = self->outgoing[mailbox];
+        self->outgoing[mailbox].owed = 0;
+        iw_register_write(tsr, IW_TSR_RQCP(mailbox));
     }
-    const int owed = outgoing->owed;
-    outgoing->owed = 0;
-    iw_register_write(tsr, IW_TSR_RQCP(mailbox));
-    return owed;
+    return true;
 }
 
-/// The echoes owed by what waits with this id, which is withdrawn; 0 if nothing does; -1 if it cannot be withdrawn.
-static int withdraw_id(iw_bxcan_t *self, uint32_t id) {
-    int owed = 0;
-    for (uint32_t mailbox = 0; mailbox < IW_BXCAN_MAILBOXES && owed >= 0; mailbox++) {
-        if (self->outgoing[mailbox].owed > 0U && self->outgoing[mailbox].frame.id == id) {
-            const int more = withdraw(self, mailbox);
-            owed = (more < 0) ? more : owed + more;
+/// What waits with this id is withdrawn; at most one does. False if it cannot be, or owes as many echoes as can be kept.
+static bool withdraw_id(iw_bxcan_t *self, uint32_t id, iw_bxcan_outgoing_t *heir) {
+    bool done = true;
+    for (uint32_t mailbox = 0; mailbox < IW_BXCAN_MAILBOXES && done; mailbox++) {
+        const iw_bxcan_outgoing_t *const outgoing = &self->outgoing[mailbox];
+        if (outgoing->owed > 0U && outgoing->frame[0].id == id) {
+            done = outgoing->owed < IW_BXCAN_ECHOES && withdraw(self, mailbox, heir);
         }
     }
-    return owed;
+    return done;
 }
 
 /// Transmit mailbox registers, bxCAN 9.3: TIR last, as it makes the request.
-static int load_free_mailbox(iw_bxcan_t *self, const iw_can_frame_t *frame, int owed) {
+static int load_free_mailbox(iw_bxcan_t *self, const iw_can_frame_t *frame, iw_bxcan_outgoing_t *heir) {
     for (uint32_t i = 0; i < IW_BXCAN_MAILBOXES; i++) {
         if (self->outgoing[i].owed == 0U) {
             iw_bxcan_mailbox_t *const mailbox = &self->config.registers->tx[i];
-            self->outgoing[i].frame = *frame;
-            self->outgoing[i].owed = (uint8_t)(owed + 1);
+            heir->frame[heir->owed] = *frame;
+            heir->frame[heir->owed].kind = IW_CAN_ECHO;
+            heir->owed++;
+            self->outgoing[i] = *heir;
             iw_register_write(&mailbox->TDTR, frame->dlc);
             iw_register_write(&mailbox->TDLR, word_of(&frame->data[0]));
             iw_register_write(&mailbox->TDHR, word_of(&frame->data[4]));
@@ -119,17 +119,32 @@ int iw_bxcan_send(void *context, const iw_can_frame_t *frame) {
         frame->dlc > IW_CAN_DATA_MAX || is_bus_off(self)) {
         return -1;
     }
+    iw_bxcan_outgoing_t heir;
+    heir.owed = 0;
     mask_transmit(self);
-    const int owed = withdraw_id(self, frame->id);
-    const int result = (owed < 0) ? 0 : load_free_mailbox(self, frame, owed);
+    const int result = withdraw_id(self, frame->id, &heir) ? load_free_mailbox(self, frame, &heir) : 0;
     unmask_transmit(self);
     return result;
+}
+
+/// True once after frames were lost: the controller's report of it, which the core counts.
+static bool tell_loss(iw_bxcan_t *self, iw_can_frame_t *out_frame) {
+    const uint32_t losses = self->overruns + self->lost;
+    if (losses == self->losses_told) {
+        return false;
+    }
+    self->losses_told = losses;
+    *out_frame = (iw_can_frame_t){.id = IW_CAN_ERROR, .kind = IW_CAN_RECEIVED};
+    return true;
 }
 
 int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame) {
     iw_bxcan_t *const self = context;
     iw_can_frame_t frame;
     uint8_t epoch;
+    if (tell_loss(self, out_frame)) {
+        return 1;
+    }
     while (iw_frame_ring_take(&self->ring, &frame, &epoch)) {
         if (frame.kind == IW_CAN_RECEIVED || epoch == self->epoch) {
             *out_frame = frame;
@@ -231,9 +246,8 @@ void iw_bxcan_on_transmit(iw_bxcan_t *self) {
         iw_bxcan_outgoing_t *const outgoing = &self->outgoing[mailbox];
         if ((flags & IW_TSR_RQCP(mailbox)) != 0U) {
             iw_register_write(tsr, IW_TSR_RQCP(mailbox));
-            outgoing->frame.kind = IW_CAN_ECHO;
-            for (; outgoing->owed > 0U && (flags & IW_TSR_TXOK(mailbox)) != 0U; outgoing->owed--) {
-                put(self, &outgoing->frame);
+            for (uint32_t i = 0; i < outgoing->owed && (flags & IW_TSR_TXOK(mailbox)) != 0U; i++) {
+                put(self, &outgoing->frame[i]);
             }
             outgoing->owed = 0;
         }

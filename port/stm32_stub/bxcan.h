@@ -10,10 +10,14 @@
 /// **Echo.** The completion of a mailbox is the echo: the controller reports it only after another node has acknowledged the frame.
 /// A frame that is handed over while one with the same id waits takes its place: the old mailbox is aborted and its end awaited first,
 /// since equal ids leave by mailbox number and the old one could come last. The replaced frame never reaches the bus; when
-/// its successor does, one echo comes for each, so that the core's account stays whole and no echo comes without an acknowledgement.
+/// its successor does, one echo comes for each, the older one's first and each with its own bytes, so that the core's account stays whole
+/// and no echo comes without an acknowledgement. More than two frames that wait for one echo are not kept: `send` then says later.
 ///
 /// **Filters** pass exactly the eleven ids of the iWheel in every format of classic CAN (remote and 29-bit frames with such a number are
 /// counted by the core). Setpoints among them are always somebody else's: bxCAN does not receive what it sends.
+///
+/// **Losses.** A frame that finds the controller's FIFO or the ring full is counted, and `receive` gives one report of it before the
+/// next frames: a frame with the id IW_CAN_ERROR, which the core counts as unknown. A lost echo ends in `send_stalled` by itself.
 ///
 /// Instances share nothing. The handlers of one device must have equal priority; everything else is called from the main loop.
 #ifndef IW_STM32_BXCAN_H
@@ -43,10 +47,13 @@ typedef enum {
     IW_BXCAN_REJOINING,  ///< Bus-off, waiting for 128 times 11 recessive bits.
 } iw_bxcan_phase_t;
 
-/// A mailbox and what was put into it.
+/// Echoes that one mailbox can owe. The core never has more than two frames of one id on their way.
+#define IW_BXCAN_ECHOES 2U
+
+/// What a mailbox's completion must bring: the echoes of the frames that were replaced, then that of the frame in it.
 typedef struct {
-    iw_can_frame_t frame;
-    uint8_t owed; ///< Echoes that its completion must bring; 0: it is free.
+    iw_can_frame_t frame[IW_BXCAN_ECHOES];
+    uint8_t owed; ///< 0: it is free.
 } iw_bxcan_outgoing_t;
 
 typedef struct {
@@ -57,6 +64,7 @@ typedef struct {
     iw_bxcan_phase_t phase;
     volatile uint32_t overruns; ///< Times that a frame came while the controller's FIFO was full.
     volatile uint32_t lost;     ///< Frames and echoes that found the ring full.
+    uint32_t losses_told;       ///< Of both, those that `receive` has reported.
     uint32_t bus_offs;          ///< Since the start.
     uint8_t epoch;              ///< Counts purges: echoes from before one are not delivered.
 } iw_bxcan_t;
@@ -72,7 +80,7 @@ typedef struct {
 /// that share filter banks must both be initialised before either is RUNNING: filters cannot change while frames come in.
 void iw_bxcan_init(iw_bxcan_t *self, const iw_bxcan_config_t *config);
 
-/// > 0: in a mailbox. 0: no mailbox is free. < 0: not RUNNING, silent, or not a data frame with an 11-bit id. May wait for the end
+/// > 0: in a mailbox. 0: no mailbox is free, or two frames of this id are waiting. < 0: not RUNNING, silent, or not a data frame with an 11-bit id. May wait for the end
 /// of a frame on the bus (160 us) when it replaces one.
 int iw_bxcan_send(void *context, const iw_can_frame_t *frame);
 int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame);

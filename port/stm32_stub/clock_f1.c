@@ -15,6 +15,7 @@ typedef struct {
 
 #define HSEON          (1U << 16) // 7.3.1 RCC_CR
 #define HSERDY         (1U << 17)
+#define HSEBYP         (1U << 18)
 #define CSSON          (1U << 19)
 #define PLLON          (1U << 24)
 #define PLLRDY         (1U << 25)
@@ -28,6 +29,8 @@ typedef struct {
 #define PRFTBE         (1U << 4)  // FLASH_ACR: prefetch buffer.
 #define RMVF           (1U << 24) // 7.3.10 RCC_CSR
 #define PORRSTF        (1U << 27)
+
+#define CRYSTAL_INPUT (IW_BOARD_CRYSTAL_IS_CLOCK != 0 ? HSEBYP : 0U)
 
 // A poll takes 8 cycles at the least, at 8 MHz: 10 ms. A crystal needs 2 ms.
 #define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 100U)
@@ -46,6 +49,7 @@ static bool wait_for(const volatile uint32_t *flags, uint32_t mask, uint32_t val
 }
 
 static bool try_start(void) {
+    RCC->CR |= CRYSTAL_INPUT; // 7.2.1: the input's kind only while it is off.
     RCC->CR |= HSEON;
     if (!wait_for(&RCC->CR, HSERDY, HSERDY)) {
         return false;

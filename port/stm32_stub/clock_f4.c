@@ -16,11 +16,12 @@ typedef struct {
 
 #define HSEON         (1U << 16) // 7.3.1 RCC_CR
 #define HSERDY        (1U << 17)
+#define HSEBYP        (1U << 18)
 #define CSSON         (1U << 19)
 #define PLLON         (1U << 24)
 #define PLLRDY        (1U << 25)
 #define PLLSRC_HSE    (1U << 22) // 7.3.2 RCC_PLLCFGR
-#define PLLR_LEAST    (2U << 28) // F446 only: not used, but 0 is not allowed.
+#define PLLR_LEAST    (2U << 28) // F446: not used, but 0 is not allowed. Others: reserved, as after reset.
 #define SW            3U         // 7.3.3 RCC_CFGR
 #define SW_PLL        2U
 #define SWS           (3U << 2)
@@ -33,6 +34,8 @@ typedef struct {
 #define DCEN          (1U << 10)
 #define RMVF          (1U << 24) // 7.3.21 RCC_CSR
 #define PORRSTF       (1U << 27)
+
+#define CRYSTAL_INPUT (IW_BOARD_CRYSTAL_IS_CLOCK != 0 ? HSEBYP : 0U)
 
 // A poll takes 8 cycles at the least, at 16 MHz: 10 ms. A crystal needs 2 ms.
 #define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 100U)
@@ -54,6 +57,7 @@ static bool wait_for(const volatile uint32_t *flags, uint32_t mask, uint32_t val
 
 // The voltage scale stays as it is after reset: 1, good for 168 MHz (5.4.1).
 static bool try_start(void) {
+    RCC->CR |= CRYSTAL_INPUT; // 7.2.1: the input's kind only while it is off.
     RCC->CR |= HSEON;
     if (!wait_for(&RCC->CR, HSERDY, HSERDY)) {
         return false;

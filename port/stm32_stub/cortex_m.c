@@ -7,7 +7,9 @@
 #define SYST_RVR  (*(volatile uint32_t *)0xE000E014U)
 #define SYST_CVR  (*(volatile uint32_t *)0xE000E018U)
 #define NVIC_ISER (*(volatile uint32_t *)0xE000E100U) // 4.3.2
+#define SCB_ICSR  (*(volatile uint32_t *)0xE000ED04U) // 4.4.3: PENDSTSET.
 #define SCB_AIRCR (*(volatile uint32_t *)0xE000ED0CU) // 4.4.5: key and SYSRESETREQ.
+#define PENDSTSET (1U << 26)
 
 void iw_systick_handler(void);
 
@@ -33,13 +35,14 @@ void iw_time_start(uint32_t core_hz) {
     SYST_CSR = 7U;
 }
 
+/// A tick that came between the halves has either been counted meanwhile or is still pending.
 iw_time_us_t iw_time_now_us(void) {
     uint64_t now_ms;
     uint32_t left;
     do {
         now_ms = ticks_ms;
         left = SYST_CVR;
-    } while (now_ms != ticks_ms); // A tick came between the halves or after them.
+    } while ((SCB_ICSR & PENDSTSET) != 0U || now_ms != ticks_ms);
     return now_ms * IW_US_PER_MS + (SYST_RVR - left) / cycles_per_us;
 }
 

@@ -15,7 +15,7 @@ typedef struct {
 #define EXTI ((exti_t *)IW_BOARD_EXTI_ADDRESS)
 #define LINE (1U << 0)
 
-static atomic_uint edges; // Counted by the interrupt.
+static atomic_bool had_edge; // Set by the interrupt.
 
 void iw_estop_init(void) {
     EXTI->RTSR |= LINE;
@@ -26,15 +26,16 @@ void iw_estop_init(void) {
 
 void iw_estop_on_edge(void) {
     EXTI->PR = LINE;
-    atomic_store_explicit(&edges, atomic_load_explicit(&edges, memory_order_relaxed) + 1U, memory_order_relaxed);
+    atomic_store_explicit(&had_edge, true, memory_order_relaxed);
     iw_wake();
 }
 
+/// An edge between the look and the clearing is told by this call too, so none is lost.
 int iw_estop_pressed(void *context) {
-    static unsigned edges_told;
     (void)context;
-    const unsigned now = atomic_load_explicit(&edges, memory_order_relaxed);
-    const bool edge = now != edges_told;
-    edges_told = now;
-    return (edge || iw_pins_estop_high()) ? 1 : 0;
+    if (atomic_load_explicit(&had_edge, memory_order_relaxed)) {
+        atomic_store_explicit(&had_edge, false, memory_order_relaxed);
+        return 1;
+    }
+    return iw_pins_estop_high() ? 1 : 0;
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// An STM32F103x8 or xB with a crystal of 8 MHz ("Blue Pill" and its relatives).
 ///
-/// A board is this header, `memory.ld` beside it, and the two files for its family that CMakeLists.txt names. To make another board of
-/// the same family copy this folder and change what differs; bit_rate.h refuses a clock that cannot give the bus exactly.
+/// A board is this header and `memory.ld` beside it; the family's files do the rest. To make another board of the same family copy
+/// this folder, change what differs, and name it with -DIWHEEL_BOARD; a clock that cannot give the bus exactly does not compile.
 ///
 /// | pin  | is                                                             |
 /// |------|----------------------------------------------------------------|
@@ -14,6 +14,9 @@
 #ifndef IW_STM32_BOARD_H
 #define IW_STM32_BOARD_H
 
+#ifndef IW_BOARD_CRYSTAL_IS_CLOCK
+#define IW_BOARD_CRYSTAL_IS_CLOCK 0 ///< 1: no crystal, but a clock signal on its input pin.
+#endif
 #define IW_BOARD_CRYSTAL_HZ     8000000U
 #define IW_BOARD_INTERNAL_HZ    8000000U ///< The oscillator that runs after reset. Too inaccurate for the bus.
 #define IW_BOARD_PLL_MULTIPLIER 8U       ///< 2..9. The usual 9 gives 72 and 36 MHz, and 36 cannot give the bus exactly.
