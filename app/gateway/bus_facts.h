@@ -4,9 +4,7 @@
 #define GATEWAY_BUS_FACTS_H
 
 #include "daemon.h"
-
-/// Room for a sentence of this module.
-#define GW_FACT_SIZE 400U
+#include "inspect.h"
 
 /// Passes on what has changed since the last call: to the core, to the warnings, to the log. Call it before a step.
 void gw_bus_facts_follow(gw_daemon_t *daemon);
@@ -14,11 +12,10 @@ void gw_bus_facts_follow(gw_daemon_t *daemon);
 /// The word for `status`: what is known of the bit timing.
 const char *gw_bus_facts_timing(const gw_daemon_t *daemon);
 
-typedef enum { GW_FACT_OK, GW_FACT_WARN, GW_FACT_FAIL } gw_fact_verdict_t;
+/// What the configuration wants the bus to be.
+inspect_wish_t gw_bus_facts_wish(const gw_daemon_t *daemon);
 
-/// Hands out, one after the other, what is to be said of the link, each with the command that mends it: index 0, 1, ...
-/// until it returns false. Writes an empty sentence where there is nothing to say.
-bool gw_bus_facts_tell(const gw_daemon_t *daemon, unsigned index, gw_fact_verdict_t *out_verdict,
-                       char out_text[GW_FACT_SIZE]);
+/// What is to be said of the link, each with the command that mends it.
+void gw_bus_facts_judge(const gw_daemon_t *daemon, inspect_findings_t *findings);
 
 #endif

@@ -3,19 +3,24 @@
 ///
 /// One cycle of the loop (loop.c), always in this order:
 ///
-///     wait -> signals -> bus and e-stop (core step) -> what changed (observe.c) -> clients (dispatch.c) -> step again if they
-///     asked for something -> new clients -> flush -> watchdog
+///     wait -> signals -> bus and e-stop (core step) -> what changed (observe.c) -> clients (dispatch.c)
+///          -> step again if they asked for something -> new clients -> flush -> what is kept (knowledge.c) -> watchdog
 ///
 /// so that the wheels come before everybody who talks about them. Work per cycle is bounded in each of these places.
 #ifndef GATEWAY_DAEMON_H
 #define GATEWAY_DAEMON_H
 
+#include "box.h"
 #include "client.h"
+#include "evidence.h"
+#include "gaps.h"
 #include "gateway_config.h"
+#include "knowledge.h"
 #include "listener.h"
 #include "log.h"
 #include "notify.h"
 #include "runtime.h"
+#include "tape.h"
 #include "why.h"
 
 #include "iwheel/gateway.h"
@@ -34,7 +39,6 @@ typedef struct {
     iw_client_t holder;
     uint32_t present; ///< Latching causes, as a bit each.
     uint32_t stop_number;
-    uint32_t ledger_changes;
     uint32_t still_moving;
     int estop;
     bool started; ///< The first observation only takes notes.
@@ -53,21 +57,31 @@ typedef struct gw_daemon {
     gw_notify_t notify;
     gw_runtime_t runtime;
     gw_listener_t listener;
+    gw_box_t box;
+    gw_tape_t tape;
     iw_linux_hal_t hal;
     iw_gateway_t gateway;
     gw_observed_t observed;
+    gw_gaps_t gaps;
+    gw_knowledge_t knowledge;
+    gw_evidence_t evidence;
     gw_stop_note_t last_stop;
     iw_time_us_t now_us;         ///< Of the present cycle.
     iw_time_us_t woken_us;       ///< When the wait ended: what a client sends later than this was not waiting then.
     iw_time_us_t suspended_us;   ///< Of the machine, as last looked at.
     iw_time_us_t step_next_us;   ///< As the last step wished.
+    iw_time_us_t box_look_us;    ///< When the black box's writer is listened to next.
     iw_time_us_t listen_from_us; ///< Nobody is accepted before.
     iw_client_t last_client;
     uint32_t clients;
+    uint32_t next_served;  ///< Slot where the next round begins.
+    uint32_t next_flushed; ///< The same of sending.
     int epoll_fd;
     int timer_fd;
     int signal_fd;
     bool shutting_down;
+    bool clients_waiting;  ///< The last round did not reach everybody.
+    bool lines_waiting;    ///< The same of sending.
     bool requested;        ///< A request has changed something since the last step.
     uint32_t link_changes; ///< What of the link was last passed on.
     iw_link_purge_t purge_told;

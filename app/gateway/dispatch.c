@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "dispatch.h"
 
+#include "assumption.h"
 #include "observe.h"
+#include "record.h"
 #include "refuse.h"
 #include "snapshot.h"
 
@@ -67,6 +69,14 @@ static void reply_state(const call_t *call) {
     send_reply(call->client, &json);
 }
 
+/// What was asked of the core, for the black box.
+static void note(const call_t *call, const blackbox_entry_t *entry) {
+    blackbox_entry_t whole = *entry;
+    whole.at_us = call->daemon->now_us;
+    whole.number = call->client->id;
+    gw_tape_put(&call->daemon->tape, &whole);
+}
+
 static void do_hello(const call_t *call) {
     json_out_t json = begin_reply(call->daemon, &call->request->id);
     gw_observe_write_hello(call->daemon, call->client, &json);
@@ -114,15 +124,41 @@ static void reply_armed(gw_daemon_t *daemon, gw_client_t *client, const gw_id_t 
     send_reply(client, &json);
 }
 
+/// The first contradicted item that motion depends on; IW_LEDGER_ITEMS if there is none.
+static iw_ledger_item_t contradicted_motion(const iw_ledger_t *ledger) {
+    unsigned item = 0;
+    while (item < IW_LEDGER_ITEMS &&
+           !(gw_assumption_moves((iw_ledger_item_t)item) && ledger->entry[item].state == IW_LEDGER_CONTRADICTED)) {
+        ++item;
+    }
+    return (iw_ledger_item_t)item;
+}
+
+static void refuse_contradicted(const call_t *call, iw_ledger_item_t item) {
+    char evidence[GW_EVIDENCE_SIZE];
+    gw_refusal_t words = {.error = GW_DENIED};
+    gw_assumption_evidence(item, iw_ledger_entry(&call->daemon->gateway.ledger, item),
+                           call->daemon->knowledge.known.item[item].found, evidence);
+    (void)snprintf(words.message, sizeof words.message, "%s is contradicted: %s; %s", gw_ledger_item_name(item),
+                   evidence, gw_assumption_cost(item));
+    send_refusal(call->daemon, call->client, &call->request->id, &words);
+}
+
 static void do_arm(const call_t *call) {
     gw_daemon_t *daemon = call->daemon;
     gw_client_t *client = call->client;
+    const iw_ledger_item_t doubt = contradicted_motion(&daemon->gateway.ledger);
     if (daemon->shutting_down) {
         const gw_refusal_t refusal = {GW_DENIED, "the gateway is shutting down; wait until it is started again"};
         send_refusal(daemon, client, &call->request->id, &refusal);
         return;
     }
+    if (doubt != IW_LEDGER_ITEMS && iw_gateway_state(&daemon->gateway) != IW_STATE_LATCHED) {
+        refuse_contradicted(call, doubt); // A latch is told first: it must be left first.
+        return;
+    }
     const iw_refusal_t refusal = iw_gateway_arm(&daemon->gateway, daemon->now_us, client->id, call->request->takeover);
+    note(call, &(blackbox_entry_t){.kind = BLACKBOX_ARM, .a = call->request->takeover, .b = (uint8_t)refusal});
     if (refusal != IW_REFUSE_NONE) {
         refuse(call, refusal);
         return;
@@ -168,6 +204,8 @@ static void drive(const call_t *call, const iw_drive_t *wanted) {
         gw_client_sent_us(call->client, call->daemon->now_us, gateway->permit.armed_us); // It may have waited for us.
     iw_applied_t applied;
     const iw_refusal_t refusal = iw_gateway_drive(gateway, sent_us, call->client->id, wanted, &applied);
+    const blackbox_entry_t entry = {.at_us = call->daemon->now_us, .number = call->client->id, .b = (uint8_t)refusal};
+    gw_tape_drive(&call->daemon->tape, &entry, wanted, sent_us);
     if (refusal != IW_REFUSE_NONE) {
         refuse(call, refusal);
         return;
@@ -205,6 +243,7 @@ static void do_twist(const call_t *call) {
 
 static void do_stop(const call_t *call) {
     iw_gateway_stop(&call->daemon->gateway, call->daemon->now_us, call->client->id, IW_CAUSE_CLIENT_STOP);
+    note(call, &(blackbox_entry_t){.kind = BLACKBOX_STOP, .a = IW_CAUSE_CLIENT_STOP});
     call->daemon->requested = true;
     reply_state(call);
 }
@@ -215,18 +254,34 @@ static void do_estop(const call_t *call) {
         (void)memcpy(daemon->estop_reason, call->request->reason, sizeof daemon->estop_reason);
     }
     iw_gateway_estop(&daemon->gateway, daemon->now_us, call->client->id);
+    note(call, &(blackbox_entry_t){.kind = BLACKBOX_ESTOPPED});
     daemon->requested = true;
     reply_state(call);
 }
 
 static void do_reset(const call_t *call) {
     const iw_refusal_t refusal = iw_gateway_reset(&call->daemon->gateway, call->daemon->now_us);
+    note(call, &(blackbox_entry_t){.kind = BLACKBOX_RESET, .b = (uint8_t)refusal});
     if (refusal != IW_REFUSE_NONE) {
         refuse(call, refusal);
         return;
     }
     call->daemon->requested = true;
     reply_state(call);
+}
+
+/// The zero of one wheel after a tare, and before.
+static void write_tare(const gw_daemon_t *daemon, iw_side_t side, const iw_force_t *before, json_out_t *json) {
+    const iw_force_quality_t *quality = &daemon->knowledge.tare[side];
+    const bool knew = before->provenance != IW_OFFSET_NONE;
+    json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
+    json_out_int(json, "offset_mN", daemon->gateway.force[side].offset_mN);
+    json_out_int(json, "samples", quality->samples);
+    json_out_int(json, "deviation_mN", quality->deviation_mN);
+    json_out_int(json, "drift_mN", quality->drift_mN);
+    json_out_known(json, "before_mN", knew, before->offset_mN);
+    json_out_text(json, "before_provenance", gw_offset_word(before->provenance, before->offset_us));
+    json_out_close(json, '}');
 }
 
 /// Both wheels or none: tried on copies first.
@@ -243,25 +298,67 @@ static void do_tare(const call_t *call) {
             return;
         }
     }
+    const iw_force_t before[IW_SIDES] = {daemon->gateway.force[IW_LEFT], daemon->gateway.force[IW_RIGHT]};
+    json_out_t json = begin_reply(daemon, &call->request->id);
+    json_out_text(&json, "state", gw_state_name(iw_gateway_state(&daemon->gateway)));
     for (unsigned side = 0; side < IW_SIDES; ++side) {
         if ((call->request->sides & (1U << side)) != 0U) {
-            (void)iw_gateway_tare(&daemon->gateway, daemon->now_us, (iw_side_t)side);
+            const iw_tare_t result = gw_knowledge_tare(daemon, (iw_side_t)side);
+            note(call, &(blackbox_entry_t){.kind = BLACKBOX_TARE, .a = (uint8_t)side, .b = (uint8_t)result});
+            write_tare(daemon, (iw_side_t)side, &before[side], &json);
         }
     }
-    reply_state(call);
+    send_reply(call->client, &json);
+}
+
+static void reply_item(const call_t *call) {
+    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    json_out_text(&json, "item", gw_ledger_item_name(call->request->item));
+    gw_snapshot_write_item(call->daemon, call->request->item, &json);
+    send_reply(call->client, &json);
+}
+
+/// The operator's word. Moves nothing; what it contradicts is disabled from now on.
+static void do_confirm(const call_t *call) {
+    const gw_request_t *request = call->request;
+    const char *name = gw_ledger_item_name(request->item);
+    gw_refusal_t words;
+    switch (gw_knowledge_confirm(call->daemon, request->item, request->value)) {
+    case GW_FOUND_SAME:
+    case GW_FOUND_DIFFERENT:
+        gw_knowledge_observe(call->daemon); // So that the reply has it all.
+        reply_item(call);
+        return;
+    case GW_FOUND_UNSET:
+        words.error = GW_TYPE_NOT_SET;
+        (void)snprintf(words.message, sizeof words.message,
+                       "%s is not configured, so there is nothing to confirm; set it under [wheels] first", name);
+        break;
+    case GW_FOUND_IMPOSSIBLE:
+    default:
+        words.error = GW_BAD_VALUE;
+        (void)snprintf(words.message, sizeof words.message,
+                       "value of %s must be %s; leave it out to confirm what is configured", name,
+                       gw_assumption_values(request->item));
+        break;
+    }
+    send_refusal(call->daemon, call->client, &request->id, &words);
 }
 
 static void do_why(const call_t *call) {
     json_out_t json = begin_reply(call->daemon, &call->request->id);
     gw_snapshot_write_stop(call->daemon, &json);
+    gw_record_write(call->daemon, &json);
     send_reply(call->client, &json);
 }
 
 void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line, size_t length) {
     static void (*const handlers[GW_CMDS])(const call_t *call) = {
-        [GW_CMD_HELLO] = do_hello, [GW_CMD_STATUS] = do_status, [GW_CMD_WATCH] = do_watch, [GW_CMD_ARM] = do_arm,
-        [GW_CMD_DRIVE] = do_drive, [GW_CMD_TWIST] = do_twist,   [GW_CMD_STOP] = do_stop,   [GW_CMD_DISARM] = do_stop,
-        [GW_CMD_ESTOP] = do_estop, [GW_CMD_RESET] = do_reset,   [GW_CMD_TARE] = do_tare,   [GW_CMD_WHY] = do_why,
+        [GW_CMD_HELLO] = do_hello,     [GW_CMD_STATUS] = do_status, [GW_CMD_WATCH] = do_watch,
+        [GW_CMD_ARM] = do_arm,         [GW_CMD_DRIVE] = do_drive,   [GW_CMD_TWIST] = do_twist,
+        [GW_CMD_STOP] = do_stop,       [GW_CMD_DISARM] = do_stop,   [GW_CMD_ESTOP] = do_estop,
+        [GW_CMD_RESET] = do_reset,     [GW_CMD_TARE] = do_tare,     [GW_CMD_WHY] = do_why,
+        [GW_CMD_CONFIRM] = do_confirm,
     };
     gw_request_t request;
     gw_refusal_t refusal;

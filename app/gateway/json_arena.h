@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// The memory in which jansson parses a request: one fixed arena, emptied before each.
 ///
-/// jansson knows one pair of allocation functions for the whole process, without a context, so the arena is the one piece of file-scope
-/// state of the gateway. When it is full, parsing fails and the request is refused.
+/// jansson knows one pair of allocation functions for the whole process, without a context, so the arena is the one
+/// piece of file-scope state of the gateway. When it is full, parsing fails and the request is refused.
 #ifndef GATEWAY_JSON_ARENA_H
 #define GATEWAY_JSON_ARENA_H
 

@@ -87,7 +87,11 @@ static void give_to_group(const gw_listener_t *self, const gateway_config_t *con
     if (strcmp(name, "none") == 0) {
         return;
     }
+    struct stat status;
     const struct group *group = getgrnam(name);
+    if (group != NULL && lstat(self->path, &status) == 0 && status.st_gid == group->gr_gid) {
+        return; // As a service, which may not call chown.
+    }
     if (group == NULL) {
         gw_log(log, GW_LOG_WARNING, "there is no group %s; the socket keeps our own group (groupadd --system %s)", name,
                name);

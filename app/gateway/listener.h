@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// The northbound socket: made safely, accepted from without ever spinning, removed at the end.
 ///
-/// A path that is taken is replaced only if it is a socket on which nobody answers. Accepting needs a descriptor: one is kept in
-/// reserve, so that with none left a newcomer can still be taken, told and closed instead of waking the loop for ever.
+/// A path that is taken is replaced only if it is a socket on which nobody answers. Accepting needs a descriptor: one
+/// is kept in reserve, so that with none left a newcomer can still be taken, told and closed instead of waking the
+/// loop for ever.
 #ifndef GATEWAY_LISTENER_H
 #define GATEWAY_LISTENER_H
 
@@ -17,8 +18,8 @@
 typedef enum {
     GW_ACCEPT_NONE = 0, ///< Nobody waits.
     GW_ACCEPT_ONE,      ///< `*out_fd` is the connection.
-    GW_ACCEPT_CROWDED, ///< `*out_fd` is a connection for which there is no room: tell it, close it, call gw_listener_restore.
-    GW_ACCEPT_PAUSE, ///< Out of resources: call again after GW_LISTENER_PAUSE_US.
+    GW_ACCEPT_CROWDED,  ///< `*out_fd` is one too many: tell it, close it, call gw_listener_restore.
+    GW_ACCEPT_PAUSE,    ///< Out of resources: call again after GW_LISTENER_PAUSE_US.
 } gw_accept_t;
 
 typedef struct {
@@ -29,12 +30,12 @@ typedef struct {
     int reserve_fd;
 } gw_listener_t;
 
-/// Makes the socket's directory if only that is missing, and refuses one in which anybody could put another socket in our place. 0, or
-/// a sysexits code after cause and cure have been printed on `err`.
+/// Makes the socket's directory if only that is missing, and refuses one in which anybody could put another socket in
+/// our place. 0, or a sysexits code after cause and cure have been printed on `err`.
 int gw_listener_prepare(const gateway_config_t *config, FILE *err);
 
-/// In a prepared directory. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does not exist or may not be given is a warning
-/// in the log: the socket is then stricter than asked for.
+/// In a prepared directory. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does
+/// not exist or may not be given is a warning in the log: the socket is then stricter than asked for.
 int gw_listener_open(gw_listener_t *self, const gateway_config_t *config, gw_log_t *log, FILE *err);
 
 /// Closes the socket and removes its file, if it is still ours.

@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define BURST_LINES 20U
+#define BURST_LINES 40U
 #define LINE_US     200000U
 #define LINE_SIZE   1024U
 

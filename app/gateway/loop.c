@@ -4,6 +4,7 @@
 #include "bus_facts.h"
 #include "dispatch.h"
 #include "observe.h"
+#include "record.h"
 #include "service.h"
 
 #include "iwheel_linux/clock.h"
@@ -17,7 +18,11 @@
 #include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
-#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 5)
+#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 6)
+
+/// While setpoints leave, the e-stop is looked at this often even if nothing else wakes us: a GPIO chip that goes wakes nobody.
+#define ESTOP_LOOK_US 4000U
+#define BOX_LOOK_US   100000U
 
 static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
@@ -42,9 +47,13 @@ int gw_loop_open(gw_daemon_t *daemon) {
     if (daemon->epoll_fd < 0 || daemon->timer_fd < 0 || daemon->signal_fd < 0) {
         return errno;
     }
-    const int fds[] = {daemon->timer_fd, daemon->signal_fd, daemon->listener.fd, iw_linux_hal_bus_fd(&daemon->hal),
-                       iw_linux_hal_estop_fd(&daemon->hal)};
-    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_HAL, GW_TAG_HAL};
+    const int fds[] = {daemon->timer_fd,
+                       daemon->signal_fd,
+                       daemon->listener.fd,
+                       iw_linux_hal_bus_fd(&daemon->hal),
+                       iw_linux_hal_estop_fd(&daemon->hal),
+                       daemon->box.fd};
+    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_HAL, GW_TAG_HAL, GW_TAG_BOX};
     int error = 0;
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; ++i) {
         error = watch(daemon, fds[i], tags[i]);
@@ -67,6 +76,8 @@ static void take_signal(gw_daemon_t *daemon) {
     gw_log(&daemon->log, GW_LOG_INFO, "%s: stopping the wheels, then ending", strsignal((int)info.ssi_signo));
     gw_notify_stopping(&daemon->notify);
     iw_gateway_stop(&daemon->gateway, daemon->now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
+    gw_tape_put(&daemon->tape,
+                &(blackbox_entry_t){.at_us = daemon->now_us, .kind = BLACKBOX_STOP, .a = IW_CAUSE_SHUTDOWN});
 }
 
 static void mark_if_sending(gw_daemon_t *daemon) {
@@ -79,10 +90,13 @@ static void mark_if_sending(gw_daemon_t *daemon) {
 }
 
 /// While the machine was suspended, the monotonic clock stood still and the wheels did not wait.
-static void note_suspend(gw_daemon_t *daemon) {
-    const iw_time_us_t suspended_us = iw_clock_suspended_us();
+static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
     if (suspended_us > daemon->suspended_us + IW_GATEWAY_LATE_US) {
         iw_gateway_suspended(&daemon->gateway, suspended_us - daemon->suspended_us);
+        gw_tape_put(&daemon->tape,
+                    &(blackbox_entry_t){.at_us = daemon->now_us,
+                                        .kind = BLACKBOX_SUSPENDED,
+                                        .as = {.value = (int64_t)(suspended_us - daemon->suspended_us)}});
         gw_log(&daemon->log, GW_LOG_WARNING, "the machine was suspended for %llu ms",
                (unsigned long long)((suspended_us - daemon->suspended_us) / IW_US_PER_MS));
     }
@@ -91,14 +105,19 @@ static void note_suspend(gw_daemon_t *daemon) {
 
 /// The core's cycle, and what follows from it at once.
 static void step(gw_daemon_t *daemon) {
-    daemon->now_us = iw_clock_now_us();
-    note_suspend(daemon);
+    iw_time_us_t suspended_us;
+    daemon->now_us = iw_clock_read(&suspended_us);
+    note_suspend(daemon, suspended_us);
     iw_linux_hal_tend(&daemon->hal, daemon->now_us);
     gw_bus_facts_follow(daemon);
     mark_if_sending(daemon); // Before the first frame that it warns of.
+    gw_tape_step_begin(&daemon->tape, daemon->now_us);
     daemon->step_next_us = iw_gateway_step(&daemon->gateway, daemon->now_us);
+    gw_tape_step_end(&daemon->tape);
     daemon->requested = false;
+    gw_gaps_note(&daemon->gaps, &daemon->gateway.sender);
     mark_if_sending(daemon);
+    gw_evidence_look(&daemon->evidence, &daemon->gateway, daemon->now_us);
     gw_observe(daemon);
     gw_dispatch_arming(daemon);
 }
@@ -107,10 +126,16 @@ static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
     return a_us < b_us ? a_us : b_us;
 }
 
+static iw_time_us_t look_us(const gw_daemon_t *daemon) {
+    const bool wanted = daemon->hal.estop_ops->present && gw_daemon_is_sending(daemon);
+    return wanted ? daemon->now_us + ESTOP_LOOK_US : IW_NEVER;
+}
+
 static void arm_timer(const gw_daemon_t *daemon) {
     iw_time_us_t next_us = earlier(daemon->step_next_us, iw_linux_hal_next_us(&daemon->hal));
     next_us = earlier(next_us, gw_observe_next_us(daemon));
     next_us = earlier(next_us, gw_service_next_us(daemon));
+    next_us = earlier(next_us, look_us(daemon));
     next_us = next_us == 0U ? 1U : next_us; // 0 would disarm it.
     const struct itimerspec when = {
         .it_value = {.tv_sec = (time_t)(next_us / 1000000U), .tv_nsec = (long)(next_us % 1000000U) * 1000L}};
@@ -129,7 +154,10 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
         return false;
     case GW_TAG_LISTENER:
         return true;
-    case GW_TAG_HAL:
+    case GW_TAG_BOX:
+        daemon->box_look_us = 0;
+        return false;
+    case GW_TAG_HAL: // Looked at in every cycle.
         return false;
     default: {
         gw_client_t *client = &daemon->client[event->data.u64 - GW_TAG_CLIENT];
@@ -145,6 +173,14 @@ static bool has_come_to_rest(const gw_daemon_t *daemon) {
     return daemon->shutting_down && !gw_daemon_is_sending(daemon);
 }
 
+/// Told of by the wait, unless the writer had to be started anew: then by a look now and then.
+static void listen_to_writer(gw_daemon_t *daemon) {
+    if (daemon->now_us >= daemon->box_look_us) {
+        daemon->box_look_us = daemon->now_us + BOX_LOOK_US;
+        gw_record_take(daemon);
+    }
+}
+
 static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     step(daemon);
     gw_service_clients(daemon);
@@ -154,9 +190,11 @@ static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     if (somebody_knocks) {
         gw_service_accept(daemon);
     }
+    listen_to_writer(daemon);
     gw_observe_frames(daemon);
     gw_observe_periodic(daemon);
     gw_service_flush(daemon);
+    gw_knowledge_tend(daemon);
     gw_notify_cycle(&daemon->notify, daemon->now_us);
 }
 

@@ -42,7 +42,8 @@ static int open_hal(gw_daemon_t *daemon) {
 }
 
 static int start_core(gw_daemon_t *daemon) {
-    const iw_hal_t hal = iw_linux_hal_functions(&daemon->hal);
+    const iw_hal_t port = iw_linux_hal_functions(&daemon->hal);
+    const iw_hal_t hal = gw_tape_hal(&daemon->tape, &port);
     const bool restarted = gw_runtime_crashed(&daemon->runtime) && !daemon->config.core.listen_only;
     daemon->now_us = iw_clock_now_us();
     daemon->suspended_us = iw_clock_suspended_us();
@@ -50,6 +51,11 @@ static int start_core(gw_daemon_t *daemon) {
         (void)fputs("iwheel-gateway: the configuration contradicts itself; see iwheel-gateway --check\n", stderr);
         return EX_CONFIG;
     }
+    gw_tape_put(&daemon->tape, &(blackbox_entry_t){.at_us = daemon->now_us,
+                                                   .kind = BLACKBOX_START,
+                                                   .a = restarted,
+                                                   .b = daemon->config.core.listen_only});
+    gw_evidence_init(&daemon->evidence);
     gw_bus_facts_follow(daemon);
     gw_why_sentence(&daemon->last_stop.stop, &(gw_why_context_t){0}, daemon->last_stop.sentence, GW_SENTENCE_SIZE);
     if (restarted) {
@@ -81,6 +87,7 @@ static int serve(gw_daemon_t *daemon) {
             result = EX_SOFTWARE;
         }
         gw_service_close_all(daemon);
+        gw_knowledge_close(&daemon->knowledge, daemon->config.bus.interface);
         gw_loop_close(daemon);
         gw_notify_close(&daemon->notify);
     }
@@ -89,16 +96,23 @@ static int serve(gw_daemon_t *daemon) {
 }
 
 static int run(gw_daemon_t *daemon) {
+    gw_knowledge_open(&daemon->knowledge, &daemon->config);
     int result = gw_listener_prepare(&daemon->config, stderr);
-    result = result != 0 ? result : gw_runtime_open(&daemon->runtime, &daemon->config, stderr);
+    result = result != 0 ? result : gw_runtime_open(&daemon->runtime, &daemon->config, GW_RUNTIME_DIRECTORY, stderr);
     if (result != 0) {
         return result;
     }
-    result = open_hal(daemon);
+    if (gw_box_open(&daemon->box, &daemon->config) != 0) {
+        (void)fputs("iwheel-gateway: not enough memory for the black box; lower [record] blackbox_s\n", stderr);
+        result = EX_UNAVAILABLE;
+    }
+    gw_tape_init(&daemon->tape, daemon->box.ring);
+    result = result == 0 ? open_hal(daemon) : result;
     if (result == 0) {
         result = serve(daemon);
         iw_linux_hal_close(&daemon->hal);
     }
+    gw_box_close(&daemon->box);
     gw_runtime_close(&daemon->runtime);
     return result;
 }

@@ -132,6 +132,11 @@ const char *gw_provenance_name(iw_offset_provenance_t provenance) {
     return PICK(names, provenance);
 }
 
+const char *gw_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offset_us) {
+    const bool stored = provenance != IW_OFFSET_NONE && offset_us == IW_NEVER;
+    return gw_provenance_name(stored ? IW_OFFSET_STORED : provenance);
+}
+
 const char *gw_window_name(iw_window_t window) {
     static const char *const names[] = {
         [IW_WINDOW_OPEN] = "open",           [IW_WINDOW_GOOD] = "good",   [IW_WINDOW_MOVING] = "moving",

@@ -62,6 +62,8 @@ const char *gw_estop_name(int answer, bool present);
 /// "left", "right", "both"; NULL for none.
 const char *gw_sides_name(uint8_t sides);
 const char *gw_provenance_name(iw_offset_provenance_t provenance);
+/// The same of an offset in force: one of an earlier run (`offset_us` is IW_NEVER) is "stored", whoever took it.
+const char *gw_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offset_us);
 const char *gw_window_name(iw_window_t window);
 const char *gw_unit_evidence_name(iw_unit_evidence_t evidence);
 const char *gw_force_validity_name(iw_force_validity_t validity);

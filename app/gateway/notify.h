@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// What the service manager is told: ready, stopping, and that the loop is alive. One datagram each to the socket it names in
-/// NOTIFY_SOCKET; without one nothing happens. Never waits.
+/// What the service manager is told: ready, stopping, and that the loop is alive. One datagram each to the socket it
+/// names in NOTIFY_SOCKET; without one nothing happens. Never waits.
 #ifndef GATEWAY_NOTIFY_H
 #define GATEWAY_NOTIFY_H
 
@@ -24,7 +24,8 @@ void gw_notify_close(gw_notify_t *self);
 void gw_notify_ready(const gw_notify_t *self);
 void gw_notify_stopping(const gw_notify_t *self);
 
-/// Feeds the watchdog at half its time. Call it at the end of a complete cycle (bus, e-stop and clients served), and nowhere else.
+/// Feeds the watchdog at half its time. Call it at the end of a complete cycle (bus, e-stop and clients served), and
+/// nowhere else.
 void gw_notify_cycle(gw_notify_t *self, iw_time_us_t now_us);
 
 #endif

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "observe.h"
 
-#include "report.h"
+#include "inspect.h"
+#include "record.h"
 #include "snapshot.h"
 
 #include "iwheel_linux/clock.h"
@@ -9,10 +10,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#define API_VERSION      1
-#define EXTENDED_ID_MASK 0x1FFFFFFFU
+#define API_VERSION 1
 
-static json_out_t begin_event(gw_daemon_t *daemon, const char *name) {
+IW_STATIC_ASSERT(GW_CLIENTS_MAX <= 64U, a_bit_per_client);
+
+json_out_t gw_observe_begin_event(gw_daemon_t *daemon, const char *name) {
     json_out_t json;
     json_out_init(&json, daemon->line, sizeof daemon->line);
     json_out_open(&json, NULL, '{');
@@ -20,7 +22,7 @@ static json_out_t begin_event(gw_daemon_t *daemon, const char *name) {
     return json;
 }
 
-static void send_event(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic) {
+void gw_observe_send_event(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic) {
     json_out_close(json, '}');
     const size_t length = json_out_finish(json);
     for (uint32_t i = 0; i < GW_CLIENTS_MAX && length > 0U; ++i) {
@@ -32,9 +34,9 @@ static void send_event(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic) 
 }
 
 static void tell_state(gw_daemon_t *daemon) {
-    json_out_t json = begin_event(daemon, "state");
+    json_out_t json = gw_observe_begin_event(daemon, "state");
     gw_snapshot_write(daemon, &json);
-    send_event(daemon, &json, GW_TOPIC_STATE);
+    gw_observe_send_event(daemon, &json, GW_TOPIC_STATE);
 }
 
 static void observe_state(gw_daemon_t *daemon, bool first) {
@@ -43,6 +45,7 @@ static void observe_state(gw_daemon_t *daemon, bool first) {
         return;
     }
     gw_log(&daemon->log, GW_LOG_INFO, "state: %s", gw_state_name(state));
+    gw_record_state(daemon, first ? state : daemon->observed.state);
     daemon->observed.state = state;
     tell_state(daemon);
 }
@@ -81,10 +84,11 @@ static void observe_stop(gw_daemon_t *daemon) {
                                       .bus = daemon->config.bus.interface};
     gw_why_sentence(&note->stop, &context, note->sentence, sizeof note->sentence);
     gw_log(&daemon->log, GW_LOG_WARNING, "stop %u: %s", (unsigned)stop->number, note->sentence);
-    json_out_t json = begin_event(daemon, "stop");
+    gw_record_stop(daemon);
+    json_out_t json = gw_observe_begin_event(daemon, "stop");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     gw_snapshot_write_stop(daemon, &json);
-    send_event(daemon, &json, GW_TOPIC_STOP);
+    gw_observe_send_event(daemon, &json, GW_TOPIC_STOP);
 }
 
 static void observe_lease(gw_daemon_t *daemon) {
@@ -104,13 +108,13 @@ static void observe_lease(gw_daemon_t *daemon) {
     }
     gw_log(&daemon->log, GW_LOG_INFO, "lease %s: %s", change,
            holder == IW_CLIENT_NONE ? "nobody" : observed->holder_text);
-    json_out_t json = begin_event(daemon, "lease");
+    json_out_t json = gw_observe_begin_event(daemon, "lease");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "change", change);
     json_out_known(&json, "holder", holder != IW_CLIENT_NONE, holder);
     json_out_text(&json, "name", client != NULL && client->name[0] != '\0' ? client->name : NULL);
     json_out_known(&json, "former", former != IW_CLIENT_NONE, former);
-    send_event(daemon, &json, GW_TOPIC_LEASE);
+    gw_observe_send_event(daemon, &json, GW_TOPIC_LEASE);
 }
 
 static void observe_bus(gw_daemon_t *daemon, bool first) {
@@ -121,10 +125,10 @@ static void observe_bus(gw_daemon_t *daemon, bool first) {
     daemon->observed.bus = bus;
     gw_log(&daemon->log, bus == IW_BUS_ACTIVE ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s",
            daemon->config.bus.interface, gw_bus_state_name(bus));
-    json_out_t json = begin_event(daemon, "bus");
+    json_out_t json = gw_observe_begin_event(daemon, "bus");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "state", gw_bus_state_name(bus));
-    send_event(daemon, &json, GW_TOPIC_BUS);
+    gw_observe_send_event(daemon, &json, GW_TOPIC_BUS);
 }
 
 static void observe_estop(gw_daemon_t *daemon, bool first) {
@@ -134,22 +138,22 @@ static void observe_estop(gw_daemon_t *daemon, bool first) {
     }
     daemon->observed.estop = answer;
     const char *name = gw_estop_name(answer, daemon->hal.estop_ops->present);
-    const char *trouble = gw_report_estop_trouble(daemon);
+    const char *trouble = inspect_estop_trouble(&daemon->hal);
     gw_log(&daemon->log, answer == 0 ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s", daemon->config.estop.line,
            name, trouble[0] == '\0' ? "" : ": ", trouble);
-    json_out_t json = begin_event(daemon, "estop");
+    json_out_t json = gw_observe_begin_event(daemon, "estop");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "state", name);
-    send_event(daemon, &json, GW_TOPIC_ESTOP);
+    gw_observe_send_event(daemon, &json, GW_TOPIC_ESTOP);
 }
 
 static void tell_fault(gw_daemon_t *daemon, const char *cause, bool present) {
     gw_log(&daemon->log, present ? GW_LOG_WARNING : GW_LOG_INFO, "%s: %s", present ? "fault" : "fault gone", cause);
-    json_out_t json = begin_event(daemon, "fault");
+    json_out_t json = gw_observe_begin_event(daemon, "fault");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "cause", cause);
     json_out_bool(&json, "present", present);
-    send_event(daemon, &json, GW_TOPIC_STOP);
+    gw_observe_send_event(daemon, &json, GW_TOPIC_STOP);
 }
 
 /// While armed or stopping a cause makes a stop, which is told as such; here are the others.
@@ -170,21 +174,6 @@ static void observe_faults(gw_daemon_t *daemon) {
     }
 }
 
-static void observe_ledger(gw_daemon_t *daemon) {
-    const iw_ledger_t *ledger = &daemon->gateway.ledger;
-    if (ledger->changes == daemon->observed.ledger_changes) {
-        return;
-    }
-    daemon->observed.ledger_changes = ledger->changes;
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
-        const iw_ledger_entry_t *entry = iw_ledger_entry(ledger, (iw_ledger_item_t)item);
-        if (entry->state == IW_LEDGER_CONTRADICTED) {
-            gw_log(&daemon->log, GW_LOG_WARNING, "assumption %s is contradicted by the %s (figure %d)",
-                   gw_ledger_item_name((iw_ledger_item_t)item), gw_evidence_name(entry->evidence), (int)entry->figure);
-        }
-    }
-}
-
 void gw_observe(gw_daemon_t *daemon) {
     const bool first = !daemon->observed.started;
     daemon->observed.started = true;
@@ -194,7 +183,9 @@ void gw_observe(gw_daemon_t *daemon) {
     observe_stop(daemon);
     observe_lease(daemon);
     observe_state(daemon, first);
-    observe_ledger(daemon);
+    gw_knowledge_observe(daemon);
+    gw_record_again(daemon);
+    atomic_store(&daemon->box.ring->sending, gw_daemon_is_sending(daemon));
 }
 
 static bool wants_periodic(const gw_client_t *client) {
@@ -202,22 +193,29 @@ static bool wants_periodic(const gw_client_t *client) {
            (client->topics & ((1U << GW_TOPIC_STATE) | (1U << GW_TOPIC_FORCE))) != 0U;
 }
 
-static void send_periodic(gw_daemon_t *daemon, gw_client_t *client) {
-    if ((client->topics & (1U << GW_TOPIC_STATE)) != 0U) {
-        json_out_t json = begin_event(daemon, "state");
-        gw_snapshot_write(daemon, &json);
-        json_out_close(&json, '}');
-        gw_client_event(client, daemon->line, json_out_finish(&json));
-    }
-    if ((client->topics & (1U << GW_TOPIC_FORCE)) != 0U) {
-        json_out_t json = begin_event(daemon, "force");
-        gw_snapshot_write_force(daemon, &json);
-        json_out_close(&json, '}');
-        gw_client_event(client, daemon->line, json_out_finish(&json));
+/// Written once, for all in `due` (a bit per slot) who watch the topic.
+static void send_periodic(gw_daemon_t *daemon, gw_topic_t topic, uint64_t due) {
+    size_t length = 0;
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+        if ((due >> i & 1U) == 0U || (daemon->client[i].topics & (1U << topic)) == 0U) {
+            continue;
+        }
+        if (length == 0U) {
+            json_out_t json = gw_observe_begin_event(daemon, gw_topic_name(topic));
+            if (topic == GW_TOPIC_STATE) {
+                gw_snapshot_write(daemon, &json);
+            } else {
+                gw_snapshot_write_force(daemon, &json);
+            }
+            json_out_close(&json, '}');
+            length = json_out_finish(&json);
+        }
+        gw_client_event(&daemon->client[i], daemon->line, length);
     }
 }
 
 void gw_observe_periodic(gw_daemon_t *daemon) {
+    uint64_t due = 0;
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
         gw_client_t *client = &daemon->client[i];
         if (wants_periodic(client) && daemon->now_us >= client->next_us) {
@@ -226,8 +224,12 @@ void gw_observe_periodic(gw_daemon_t *daemon) {
             if (client->next_us <= daemon->now_us) {
                 client->next_us = daemon->now_us + period_us; // After a stall: no burst.
             }
-            send_periodic(daemon, client);
+            due |= 1ULL << i;
         }
+    }
+    if (due != 0U) {
+        send_periodic(daemon, GW_TOPIC_STATE, due);
+        send_periodic(daemon, GW_TOPIC_FORCE, due);
     }
 }
 
@@ -253,35 +255,16 @@ static bool anybody_watches(const gw_daemon_t *daemon, gw_topic_t topic) {
 
 void gw_observe_tap(void *context, const iw_can_frame_t *frame) {
     gw_daemon_t *daemon = (gw_daemon_t *)context;
+    gw_evidence_frame(&daemon->gateway, frame);
     if (daemon->tapped < GW_FRAMES) {
         daemon->tap[daemon->tapped++] = (gw_tapped_t){.at_us = daemon->now_us, .frame = *frame};
     }
 }
 
 static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
-    const iw_can_frame_t *frame = &tapped->frame;
-    char data[2U * IW_CAN_DATA_MAX + 1U] = "";
-    json_out_t json = begin_event(daemon, "frame");
-    for (size_t i = 0; i < frame->dlc && i < IW_CAN_DATA_MAX; ++i) {
-        (void)snprintf(&data[2U * i], 3U, "%02X", frame->data[i]);
-    }
-    json_out_int(&json, "t_us", (int64_t)tapped->at_us);
-    json_out_int(&json, "id", frame->id & ((frame->id & IW_CAN_EXTENDED) != 0U ? EXTENDED_ID_MASK : IW_CAN_ID_MASK));
-    json_out_int(&json, "dlc", frame->dlc);
-    json_out_text(&json, "data", data);
-    json_out_text(&json, "kind", frame->kind == (uint8_t)IW_CAN_ECHO ? "echo" : "received");
-    json_out_open(&json, "flags", '[');
-    if ((frame->id & IW_CAN_EXTENDED) != 0U) {
-        json_out_text(&json, NULL, "extended");
-    }
-    if ((frame->id & IW_CAN_REMOTE) != 0U) {
-        json_out_text(&json, NULL, "remote");
-    }
-    if ((frame->id & IW_CAN_FD) != 0U) {
-        json_out_text(&json, NULL, "fd");
-    }
-    json_out_close(&json, ']');
-    send_event(daemon, &json, GW_TOPIC_FRAME);
+    json_out_t json = gw_observe_begin_event(daemon, "frame");
+    gw_snapshot_write_frame(&tapped->frame, tapped->at_us, &json);
+    gw_observe_send_event(daemon, &json, GW_TOPIC_FRAME);
 }
 
 void gw_observe_frames(gw_daemon_t *daemon) {
@@ -303,7 +286,7 @@ void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client
 }
 
 void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client) {
-    json_out_t json = begin_event(daemon, "hello");
+    json_out_t json = gw_observe_begin_event(daemon, "hello");
     gw_observe_write_hello(daemon, client, &json);
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_close(&json, '}');

@@ -20,7 +20,7 @@ iw_time_us_t gw_observe_next_us(const gw_daemon_t *daemon);
 /// Sends the frames tapped since the last call to the watchers of the topic `frame`.
 void gw_observe_frames(gw_daemon_t *daemon);
 
-/// Remembers a frame for `gw_observe_frames`, if anybody watches. The HAL's tap; `context` is the daemon.
+/// Remembers a frame for `gw_observe_frames`, and looks at its length. The HAL's tap; `context` is the daemon.
 void gw_observe_tap(void *context, const iw_can_frame_t *frame);
 
 /// The event `hello`, to a new client.
@@ -28,5 +28,9 @@ void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client);
 
 /// Name, version and so on, into an object that is open: event and reply of `hello`.
 void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, json_out_t *json);
+
+/// An event of other parts: begun in the daemon's line buffer, with its name; closed and sent to the topic's watchers.
+json_out_t gw_observe_begin_event(gw_daemon_t *daemon, const char *name);
+void gw_observe_send_event(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic);
 
 #endif

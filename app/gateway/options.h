@@ -22,8 +22,8 @@ typedef struct {
 /// 0, or EX_USAGE after cause and cure have been printed on `err`.
 int gw_options_parse(int count, char **arguments, gw_options_t *out_options, FILE *err);
 
-/// The configuration in force: file (the default one only if it exists), then command line. 0, or a sysexits code after cause and cure
-/// have been printed on `err`.
+/// The configuration in force: file (the default one only if it exists), then command line. 0, or a sysexits code
+/// after cause and cure have been printed on `err`.
 int gw_options_configure(const gw_options_t *options, gateway_config_t *out_config, FILE *err);
 
 void gw_options_help(FILE *out);

@@ -14,11 +14,8 @@ void gw_report_start(gw_daemon_t *daemon);
 /// A bus or e-stop that cannot be opened: cause and cure.
 void gw_report_unopened(const gateway_config_t *config, const char *culprit, int error, FILE *err);
 
-/// Why the e-stop cannot be read, and what to do about it; empty while it can.
-const char *gw_report_estop_trouble(const gw_daemon_t *daemon);
-
-/// Lines "ok", "warn" or "fail" on `out`, each with what mends it; listens to the bus for half a second, sends nothing. 0, or 1 if
-/// something failed.
+/// Lines "ok", "warn" or "fail" on `out`, each with what mends it; listens to the bus for half a second, sends
+/// nothing. 0, or 1 if something failed.
 int gw_report_check(gw_daemon_t *daemon, FILE *out);
 
 #endif

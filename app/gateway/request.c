@@ -3,12 +3,22 @@
 
 #include "json_arena.h"
 
+#include <inttypes.h>
 #include <jansson.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-typedef enum { FIELD_INTEGER, FIELD_RATE, FIELD_TEXT, FIELD_FLAG, FIELD_TOPICS, FIELD_SIDE } field_kind_t;
+typedef enum {
+    FIELD_INTEGER,
+    FIELD_RATE,
+    FIELD_TEXT,
+    FIELD_FLAG,
+    FIELD_TOPICS,
+    FIELD_SIDE,
+    FIELD_ITEM,
+    FIELD_VALUE
+} field_kind_t;
 
 /// A field that some commands have. `cmd` and `id` are common to all and treated apart.
 typedef struct {
@@ -36,11 +46,13 @@ static const field_t fields[] = {
     {"takeover", IN(takeover), 0, BIT(GW_CMD_ARM), false, FIELD_FLAG},
     {"reason", IN(reason), GW_REASON_MAX, BIT(GW_CMD_ESTOP), false, FIELD_TEXT},
     {"side", IN(sides), 0, BIT(GW_CMD_TARE), false, FIELD_SIDE},
+    {"item", IN(item), 0, BIT(GW_CMD_CONFIRM), true, FIELD_ITEM},
+    {"value", IN(value), GW_VALUE_SIZE - 1U, BIT(GW_CMD_CONFIRM), false, FIELD_VALUE},
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 
-static const char *const cmd_names[GW_CMDS] = {"hello", "status", "watch", "arm",   "drive", "twist",
-                                               "stop",  "disarm", "estop", "reset", "tare",  "why"};
+static const char *const cmd_names[GW_CMDS] = {"hello",  "status", "watch", "arm",  "drive", "twist",  "stop",
+                                               "disarm", "estop",  "reset", "tare", "why",   "confirm"};
 
 __attribute__((format(printf, 3, 4))) static bool refuse(gw_refusal_t *out_refusal, gw_error_t error,
                                                          const char *format, ...) {
@@ -150,6 +162,24 @@ static bool read_side(const json_t *value, uint8_t *target, gw_refusal_t *out_re
     return true;
 }
 
+static bool read_item(const json_t *value, iw_ledger_item_t *target, gw_refusal_t *out_refusal) {
+    const char *name = json_string_value(value);
+    if (name == NULL || !gw_assumption_of(name, target)) {
+        return refuse(out_refusal, GW_BAD_VALUE,
+                      "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
+    }
+    return true;
+}
+
+/// A number becomes its digits, so that 192 and "192" are the same.
+static bool read_value(const field_t *field, const json_t *value, char *target, gw_refusal_t *out_refusal) {
+    if (json_is_integer(value)) {
+        (void)snprintf(target, GW_VALUE_SIZE, "%" PRId64, (int64_t)json_integer_value(value));
+        return true;
+    }
+    return read_text(field, value, target, out_refusal);
+}
+
 static bool read_flag(const field_t *field, const json_t *value, bool *target, gw_refusal_t *out_refusal) {
     if (!json_is_boolean(value)) {
         return refuse(out_refusal, GW_BAD_VALUE, "%s must be true or false", field->name);
@@ -169,6 +199,10 @@ static bool read_field(const field_t *field, const json_t *value, gw_request_t *
         return read_topics(value, (uint8_t *)target, out_refusal);
     case FIELD_SIDE:
         return read_side(value, (uint8_t *)target, out_refusal);
+    case FIELD_ITEM:
+        return read_item(value, (iw_ledger_item_t *)target, out_refusal);
+    case FIELD_VALUE:
+        return read_value(field, value, (char *)target, out_refusal);
     case FIELD_INTEGER:
     case FIELD_RATE:
     default:
@@ -207,7 +241,7 @@ static bool read_cmd(const json_t *root, gw_cmd_t *out_cmd, gw_refusal_t *out_re
         }
     }
     return refuse(out_refusal, GW_UNKNOWN_CMD,
-                  "cmd must be one of hello status watch arm drive twist stop disarm estop reset tare why");
+                  "cmd must be one of hello status watch arm drive twist stop disarm estop reset tare why confirm");
 }
 
 static const field_t *find_field(const char *name, gw_cmd_t cmd) {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 /// One line of a client, read and judged: a request that is right in form, or a refusal.
 ///
-/// A pure function of the bytes, so that it can be tested and fuzzed alone. What depends on the state of the wheels is judged later, by
-/// the core.
+/// A pure function of the bytes, so that it can be tested and fuzzed alone. What depends on the state of the wheels
+/// is judged later, by the core.
 #ifndef GATEWAY_REQUEST_H
 #define GATEWAY_REQUEST_H
 
+#include "assumption.h"
 #include "names.h"
 
 /// Bytes of a request without its newline.
@@ -31,6 +32,7 @@ typedef enum {
     GW_CMD_RESET,
     GW_CMD_TARE,
     GW_CMD_WHY,
+    GW_CMD_CONFIRM,
     GW_CMDS,
 } gw_cmd_t;
 
@@ -58,6 +60,8 @@ typedef struct {
     bool takeover;
     uint8_t topics;                  ///< Bit per gw_topic_t.
     uint8_t sides;                   ///< IW_SIDES_..., of tare.
+    iw_ledger_item_t item;           ///< Of confirm.
+    char value[GW_VALUE_SIZE];       ///< Of confirm, a number in decimal digits; empty: not given.
     char name[GW_NAME_MAX + 1U];     ///< Empty: not given.
     char reason[GW_REASON_MAX + 1U]; ///< Empty: not given.
 } gw_request_t;

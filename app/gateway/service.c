@@ -106,6 +106,8 @@ void gw_service_accept(gw_daemon_t *daemon) {
 static void end_lease(gw_daemon_t *daemon, gw_client_t *client) {
     daemon->now_us = iw_clock_now_us();
     iw_gateway_disconnect(&daemon->gateway, daemon->now_us, client->id);
+    gw_tape_put(&daemon->tape,
+                &(blackbox_entry_t){.at_us = daemon->now_us, .kind = BLACKBOX_GONE, .number = client->id});
     client->arming = false;
     daemon->requested = true;
     gw_observe(daemon);
@@ -168,13 +170,45 @@ static void serve(gw_daemon_t *daemon, gw_client_t *client) {
     client->readable = false;
 }
 
+/// Somebody served in a round, and whether there was anything to do.
+typedef bool (*service_t)(gw_daemon_t *daemon, gw_client_t *client);
+
+/// The holder of the lease first, then the others, from where the last round ended, until the time is up. At least one
+/// of them is served. True if all were.
+static bool go_round(gw_daemon_t *daemon, service_t service, uint32_t *next) {
+    iw_time_us_t end_us = 0; // Of the time for all but the first.
+    gw_client_t *holder = gw_daemon_client(daemon, daemon->gateway.permit.holder);
+    const uint32_t first = *next;
+    bool worked = false;
+    if (holder != NULL) {
+        (void)service(daemon, holder);
+    }
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+        gw_client_t *client = &daemon->client[(first + i) % GW_CLIENTS_MAX];
+        const iw_time_us_t now_us = worked ? iw_clock_now_us() : 0U;
+        end_us = end_us == 0U && worked ? now_us + GW_ROUND_US : end_us;
+        if (worked && now_us >= end_us) {
+            *next = (first + i) % GW_CLIENTS_MAX;
+            return false;
+        }
+        worked = (client->id != IW_CLIENT_NONE && client != holder && service(daemon, client)) || worked;
+    }
+    return true;
+}
+
+static bool serve_if_wanted(gw_daemon_t *daemon, gw_client_t *client) {
+    const bool wanted = client->readable || client->hung_up || has_line(client);
+    if (wanted) {
+        serve(daemon, client);
+    }
+    return wanted;
+}
+
 void gw_service_clients(gw_daemon_t *daemon) {
+    daemon->clients_waiting = !go_round(daemon, serve_if_wanted, &daemon->next_served);
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
         gw_client_t *client = &daemon->client[i];
-        if (client->id != IW_CLIENT_NONE && (client->readable || client->hung_up || has_line(client))) {
-            serve(daemon, client);
-        }
-        if (client->id != IW_CLIENT_NONE) {
+        if (client->id != IW_CLIENT_NONE && !client->readable) {
             gw_client_note_caught_up(client, daemon->woken_us);
         }
     }
@@ -198,23 +232,23 @@ static void update_interest(gw_daemon_t *daemon, gw_client_t *client) {
     (void)epoll_ctl(daemon->epoll_fd, EPOLL_CTL_MOD, client->fd, &interest);
 }
 
-void gw_service_flush(gw_daemon_t *daemon) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
-        gw_client_t *client = &daemon->client[i];
-        if (client->id == IW_CLIENT_NONE) {
-            continue;
-        }
-        gw_client_flush(client);
-        if (client->failed && !client->closing) {
-            end_lease(daemon, client);
-            gw_client_finish(client, daemon->now_us);
-        }
-        if (client->closing && (gw_client_flushed(client) || daemon->now_us >= client->close_us)) {
-            release(daemon, client);
-        } else {
-            update_interest(daemon, client);
-        }
+static bool flush(gw_daemon_t *daemon, gw_client_t *client) {
+    const bool waiting = !gw_client_flushed(client);
+    gw_client_flush(client);
+    if (client->failed && !client->closing) {
+        end_lease(daemon, client);
+        gw_client_finish(client, daemon->now_us);
     }
+    if (client->closing && (gw_client_flushed(client) || daemon->now_us >= client->close_us)) {
+        release(daemon, client);
+    } else {
+        update_interest(daemon, client);
+    }
+    return waiting;
+}
+
+void gw_service_flush(gw_daemon_t *daemon) {
+    daemon->lines_waiting = !go_round(daemon, flush, &daemon->next_flushed);
 }
 
 bool gw_service_is_busy(const gw_daemon_t *daemon) {
@@ -223,7 +257,7 @@ bool gw_service_is_busy(const gw_daemon_t *daemon) {
             return true;
         }
     }
-    return daemon->requested;
+    return daemon->requested || daemon->clients_waiting || daemon->lines_waiting;
 }
 
 iw_time_us_t gw_service_next_us(const gw_daemon_t *daemon) {

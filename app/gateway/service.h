@@ -6,21 +6,27 @@
 #include "daemon.h"
 
 /// What a descriptor in the epoll set stands for; a client's tag is GW_TAG_CLIENT plus its slot.
-enum { GW_TAG_TIMER = 0, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_HAL, GW_TAG_CLIENT };
+enum { GW_TAG_TIMER = 0, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_HAL, GW_TAG_BOX, GW_TAG_CLIENT };
 
 /// Connections accepted in one cycle.
 #define GW_ACCEPTS_PER_CYCLE 4U
 
+/// Reading and carrying out, and then sending, take no longer than this each (and one client's turn) in one cycle: the
+/// wheels and the e-stop wait for no number of clients.
+#define GW_ROUND_US 500U
+
 /// Takes newcomers, or tells them that there is no room.
 void gw_service_accept(gw_daemon_t *daemon);
 
-/// Reads from every client that has something to say and carries out its next lines.
+/// Reads from the clients that have something to say and carries out their next lines: the holder of the lease first,
+/// then the others, as many as the time allows, the rest in the next cycle.
 void gw_service_clients(gw_daemon_t *daemon);
 
-/// Sends what is queued, closes what is finished, and tells epoll what to watch next.
+/// Sends what is queued, closes what is finished, and tells epoll what to watch next. In the same order, within the
+/// same time.
 void gw_service_flush(gw_daemon_t *daemon);
 
-/// True if complete lines are waiting: the next wait must not sleep.
+/// True if somebody waits for us: the next wait must not sleep.
 bool gw_service_is_busy(const gw_daemon_t *daemon);
 
 /// When something is due although nobody says anything: a connection to be closed, accepting to be taken up again.

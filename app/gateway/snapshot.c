@@ -1,19 +1,37 @@
 // SPDX-License-Identifier: MIT
 #include "snapshot.h"
 
+#include "assumption.h"
 #include "bus_facts.h"
 
 #include "iwheel_linux/clock.h"
 
+#include <stdio.h>
 #include <string.h>
 
-static void write_age(json_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us) {
+#define EXTENDED_ID_MASK 0x1FFFFFFFU
+
+void gw_snapshot_write_age(json_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us) {
     const bool known = then_us != IW_NEVER && then_us <= now_us;
     json_out_known(json, name, known, known ? (int64_t)((now_us - then_us) / IW_US_PER_MS) : 0);
 }
 
-static bool is_fresh(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us) {
+bool gw_snapshot_is_fresh(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us) {
     return then_us != IW_NEVER && now_us - then_us < span_us;
+}
+
+static bool contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item) {
+    return iw_ledger_entry(&daemon->gateway.ledger, item)->state == IW_LEDGER_CONTRADICTED;
+}
+
+/// Whether speeds in mm/s, or distances, mean anything: they rest on radius and gear ratio.
+static bool is_speed_known(const gw_daemon_t *daemon) {
+    return !contradicted(daemon, IW_LEDGER_WHEEL_RADIUS) &&
+           !(daemon->gateway.config.rpm_of_rotor && contradicted(daemon, IW_LEDGER_GEAR_RATIO));
+}
+
+static bool is_distance_known(const gw_daemon_t *daemon) {
+    return !contradicted(daemon, IW_LEDGER_WHEEL_RADIUS) && !contradicted(daemon, IW_LEDGER_GEAR_RATIO);
 }
 
 static void write_motion(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
@@ -32,68 +50,47 @@ static void write_motion(const gw_daemon_t *daemon, iw_side_t side, json_out_t *
         json_out_null(json, "at_rest");
     }
     json_out_known(json, "speed_rpm", heard, wheel->speed.speed_rpm);
-    json_out_known(json, "speed_mm_s", heard, iw_wheel_speed_mm_s(wheel));
+    json_out_known(json, "speed_mm_s", heard && is_speed_known(daemon), iw_wheel_speed_mm_s(wheel));
     json_out_known(json, "acceleration_raw", heard, wheel->speed.acceleration_raw);
     json_out_known(json, "commanded_mm_s", following, wanted.speed_mm_s);
     json_out_known(json, "commanded_mA", following, wanted.current_mA);
     json_out_known(json, "applied_mm_s", sending, applied.speed_mm_s);
     json_out_known(json, "applied_mA", sending, applied.current_mA);
-    write_age(json, "speed_age_ms", daemon->now_us, wheel->speed_us);
+    gw_snapshot_write_age(json, "speed_age_ms", daemon->now_us, wheel->speed_us);
 }
 
 static void write_condition(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
     const iw_wheel_t *wheel = &daemon->gateway.wheel[side];
-    const iw_force_t *force = &daemon->gateway.force[side];
+    const iw_force_validity_t force = gw_snapshot_force_validity(daemon, side);
     const bool ever = wheel->status_us != IW_NEVER;
-    const bool fresh = is_fresh(daemon->now_us, wheel->status_us, GW_STATUS_STALE_US);
+    const bool fresh = gw_snapshot_is_fresh(daemon->now_us, wheel->status_us, GW_STATUS_STALE_US);
     const bool warm = fresh && wheel->status.temperature_degC <= IW_WHEEL_TEMPERATURE_MAX_degC;
     const bool cpu = fresh && wheel->status.cpu_percent <= 100U;
     json_out_known(json, "battery_dV", fresh, wheel->status.battery_dV);
     json_out_known(json, "temperature_degC", warm, wheel->status.temperature_degC);
     json_out_known(json, "cpu_percent", cpu, wheel->status.cpu_percent);
     json_out_known(json, "ticks", ever, wheel->ticks);
-    json_out_known(json, "distance_mm", ever, iw_wheel_distance_nm(wheel) / 1000000);
-    write_age(json, "status_age_ms", daemon->now_us, wheel->status_us);
+    json_out_known(json, "distance_mm", ever && is_distance_known(daemon), iw_wheel_distance_nm(wheel) / 1000000);
+    gw_snapshot_write_age(json, "status_age_ms", daemon->now_us, wheel->status_us);
     json_out_int(json, "reboots", wheel->reboots);
     json_out_open(json, "valid", '{');
     json_out_bool(json, "speed", iw_wheel_heard(wheel, daemon->now_us));
     json_out_bool(json, "status", fresh);
     json_out_bool(json, "temperature", warm);
     json_out_bool(json, "cpu", cpu);
-    json_out_bool(json, "force", iw_force_validity(force, daemon->now_us) == IW_FORCE_VALID);
+    json_out_bool(json, "force", force == IW_FORCE_VALID);
     json_out_close(json, '}');
     json_out_open(json, "saturated", '{');
     json_out_bool(json, "battery", fresh && wheel->status.battery_dV == IW_BATTERY_SATURATED_dV);
-    json_out_bool(json, "force", iw_force_validity(force, daemon->now_us) == IW_FORCE_SATURATED);
+    json_out_bool(json, "force", force == IW_FORCE_SATURATED);
     json_out_close(json, '}');
-}
-
-static void write_force(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
-    const iw_force_t *force = &daemon->gateway.force[side];
-    const iw_force_validity_t validity = iw_force_validity(force, daemon->now_us);
-    const bool heard = is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
-    const bool offset = force->provenance != IW_OFFSET_NONE;
-    json_out_known(json, "force_raw", heard, force->raw);
-    json_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
-    json_out_known(json, "force_offset_mN", offset, force->offset_mN);
-    json_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
-    json_out_text(json, "force_validity", gw_force_validity_name(validity));
-    write_age(json, "force_age_ms", daemon->now_us, force->raw_us);
-    json_out_text(json, "offset_provenance", gw_provenance_name(force->provenance));
-    write_age(json, "offset_age_ms", daemon->now_us, offset ? force->offset_us : IW_NEVER);
-    const bool judged = force->quality.window != IW_WINDOW_OPEN;
-    json_out_text(json, "offset_window", gw_window_name(force->quality.window));
-    json_out_known(json, "offset_samples", judged, force->quality.samples);
-    json_out_known(json, "offset_deviation_mN", judged, force->quality.deviation_mN);
-    json_out_known(json, "offset_drift_mN", judged, force->quality.drift_mN);
-    json_out_text(json, "unit_evidence", gw_unit_evidence_name(force->evidence));
 }
 
 static void write_wheel(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
     json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
     write_motion(daemon, side, json);
     write_condition(daemon, side, json);
-    write_force(daemon, side, json);
+    gw_snapshot_write_wheel_force(daemon, side, json);
     json_out_close(json, '}');
 }
 
@@ -104,14 +101,15 @@ static bool at_limit(int16_t value) {
 static void write_pose(const gw_daemon_t *daemon, json_out_t *json) {
     const iw_gateway_t *gateway = &daemon->gateway;
     const iw_proto_pose_t *pose = &gateway->pose;
-    const bool fresh = is_fresh(daemon->now_us, gateway->pose_us, GW_STATUS_STALE_US);
+    const bool fresh = gw_snapshot_is_fresh(daemon->now_us, gateway->pose_us, GW_STATUS_STALE_US) &&
+                       !contradicted(daemon, IW_LEDGER_POSE_BYTE_ORDER);
     json_out_open(json, "pose", '{');
     json_out_known(json, "x_mm", fresh, pose->x_mm);
     json_out_known(json, "y_mm", fresh, pose->y_mm);
     json_out_known(json, "z_mm", fresh, pose->z_mm);
     json_out_known(json, "psi_mrad", fresh, pose->psi_mrad);
     json_out_bool(json, "limited", fresh && (at_limit(pose->x_mm) || at_limit(pose->y_mm) || at_limit(pose->z_mm)));
-    write_age(json, "age_ms", daemon->now_us, gateway->pose_us);
+    gw_snapshot_write_age(json, "age_ms", daemon->now_us, gateway->pose_us);
     json_out_close(json, '}');
 }
 
@@ -149,16 +147,43 @@ static void write_surroundings(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_close(json, '}');
 }
 
+void gw_snapshot_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, json_out_t *json) {
+    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
+    const gw_known_item_t *known = &daemon->knowledge.known.item[item];
+    const bool noted = entry->state != IW_LEDGER_ASSUMED && known->entry.state == entry->state;
+    char value[GW_VALUE_SIZE];
+    char reason[GW_EVIDENCE_SIZE];
+    gw_assumption_value(&daemon->gateway.config, item, value);
+    gw_assumption_evidence(item, entry, known->found, reason);
+    json_out_text(json, "state", gw_ledger_state_name(entry->state));
+    json_out_text(json, "evidence", gw_evidence_name(entry->evidence));
+    json_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
+    json_out_text(json, "value", value[0] != '\0' ? value : NULL);
+    json_out_text(json, "found", noted && known->found[0] != '\0' ? known->found : NULL);
+    json_out_known(json, "since_wall_us", noted, known->since_wall_us);
+    json_out_text(json, "reason", reason);
+    json_out_text(json, "disabled", entry->state == IW_LEDGER_CONTRADICTED ? gw_assumption_cost(item) : NULL);
+}
+
 static void write_ledger(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_open(json, "ledger", '{');
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
-        const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, (iw_ledger_item_t)item);
         json_out_open(json, gw_ledger_item_name((iw_ledger_item_t)item), '{');
-        json_out_text(json, "state", gw_ledger_state_name(entry->state));
-        json_out_text(json, "evidence", gw_evidence_name(entry->evidence));
-        json_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
+        gw_snapshot_write_item(daemon, (iw_ledger_item_t)item, json);
         json_out_close(json, '}');
     }
+    json_out_close(json, '}');
+}
+
+static void write_memory(const gw_daemon_t *daemon, json_out_t *json) {
+    json_out_open(json, "memory", '{');
+    gw_knowledge_write_memory(&daemon->knowledge, json);
+    json_out_close(json, '}');
+}
+
+static void write_gaps(const gw_daemon_t *daemon, json_out_t *json) {
+    json_out_open(json, "gaps", '{');
+    gw_gaps_write(&daemon->gaps, json);
     json_out_close(json, '}');
 }
 
@@ -221,6 +246,8 @@ void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json) {
     write_wheel(daemon, IW_RIGHT, json);
     write_pose(daemon, json);
     write_ledger(daemon, json);
+    write_memory(daemon, json);
+    write_gaps(daemon, json);
     write_budget(daemon, json);
     write_counters(daemon, json);
     json_out_int(json, "clients", daemon->clients);
@@ -231,21 +258,6 @@ void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json) {
         json_out_text(json, NULL, daemon->warning[i]);
     }
     json_out_close(json, ']');
-}
-
-void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json) {
-    json_out_int(json, "t_us", (int64_t)daemon->now_us);
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
-        const iw_force_t *force = &daemon->gateway.force[side];
-        const iw_force_validity_t validity = iw_force_validity(force, daemon->now_us);
-        json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
-        json_out_known(json, "raw_mN", is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US),
-                       iw_force_raw_mN(force));
-        json_out_known(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
-        json_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
-        json_out_text(json, "validity", gw_force_validity_name(validity));
-        json_out_close(json, '}');
-    }
 }
 
 void gw_snapshot_write_stop(const gw_daemon_t *daemon, json_out_t *json) {
@@ -264,6 +276,30 @@ void gw_snapshot_write_stop(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_known(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
     json_out_known(json, "at_us", any, (int64_t)stop->at_us);
     json_out_known(json, "wall_us", any, note->wall_us);
-    write_age(json, "age_ms", daemon->now_us, any ? stop->at_us : IW_NEVER);
+    gw_snapshot_write_age(json, "age_ms", daemon->now_us, any ? stop->at_us : IW_NEVER);
     json_out_text(json, "sentence", note->sentence);
+}
+
+void gw_snapshot_write_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, json_out_t *json) {
+    const bool extended = (frame->id & IW_CAN_EXTENDED) != 0U;
+    char data[2U * IW_CAN_DATA_MAX + 1U] = "";
+    for (size_t i = 0; i < frame->dlc && i < IW_CAN_DATA_MAX; ++i) {
+        (void)snprintf(&data[2U * i], 3U, "%02X", frame->data[i]);
+    }
+    json_out_int(json, "t_us", (int64_t)at_us);
+    json_out_int(json, "id", frame->id & (extended ? EXTENDED_ID_MASK : IW_CAN_ID_MASK));
+    json_out_int(json, "dlc", frame->dlc);
+    json_out_text(json, "data", data);
+    json_out_text(json, "kind", frame->kind == (uint8_t)IW_CAN_ECHO ? "echo" : "received");
+    json_out_open(json, "flags", '[');
+    if (extended) {
+        json_out_text(json, NULL, "extended");
+    }
+    if ((frame->id & IW_CAN_REMOTE) != 0U) {
+        json_out_text(json, NULL, "remote");
+    }
+    if (!extended && (frame->id & IW_CAN_FD) != 0U) {
+        json_out_text(json, NULL, "fd");
+    }
+    json_out_close(json, ']');
 }

@@ -15,8 +15,26 @@ void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json);
 /// Force of both wheels, for the event `force`.
 void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json);
 
+/// The fields about force of one wheel's object in a snapshot.
+void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json);
+
+/// Whether a wheel's net force means anything, and if not, why: the core's view and the ledger's.
+iw_force_validity_t gw_snapshot_force_validity(const gw_daemon_t *daemon, iw_side_t side);
+
+/// The age in ms of something that happened then; null if it never did.
+void gw_snapshot_write_age(json_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us);
+
+/// True if it happened, less than `span_us` ago.
+bool gw_snapshot_is_fresh(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us);
+
 /// The last stop, for `why` and the event `stop`.
 void gw_snapshot_write_stop(const gw_daemon_t *daemon, json_out_t *json);
+
+/// One item of the ledger: its state and what it rests on.
+void gw_snapshot_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, json_out_t *json);
+
+/// A frame, for `why` and the event `frame`.
+void gw_snapshot_write_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, json_out_t *json);
 
 /// A list of the names of the causes whose bits are set.
 void gw_snapshot_write_causes(json_out_t *json, const char *name, uint32_t causes);

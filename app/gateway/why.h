@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Why did the wheels stop? One sentence with cause, time and numbers, made when it happened: later the client may be gone and the
-/// wheels elsewhere.
+/// Why did the wheels stop? One sentence with cause, time and numbers, made when it happened: later the client may be
+/// gone and the wheels elsewhere.
 #ifndef GATEWAY_WHY_H
 #define GATEWAY_WHY_H
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// The table of keys: everything the configuration file may say, in the order in which it is printed.
 ///
-/// Private to the configuration reader. A row tells where a value lives in `gateway_config_t`, so that reading, range checks,
-/// messages and printing need no code per key.
+/// Private to the configuration reader. A row tells where a value lives in `gateway_config_t`, so that reading, range
+/// checks, messages and printing need no code per key.
 #ifndef CONFIG_KEYS_H
 #define CONFIG_KEYS_H
 

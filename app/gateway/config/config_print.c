@@ -22,7 +22,25 @@ static void print_key(const config_key_t *row, const gateway_config_t *config, c
                   choices[0] != '\0' ? ", " : "", has_default ? "default " : "no default", value);
 }
 
+static void print_note(const char *note, FILE *out) {
+    if (note != NULL) {
+        (void)fprintf(out, "; %s\n", note);
+    }
+}
+
+static const char *no_note(const void *context, const char *section, const char *key) {
+    (void)context;
+    (void)section;
+    (void)key;
+    return NULL;
+}
+
 void gateway_config_print(const gateway_config_t *config, FILE *out) {
+    gateway_config_print_noted(config, no_note, NULL, out);
+}
+
+void gateway_config_print_noted(const gateway_config_t *config, gateway_config_note_t note, const void *context,
+                                FILE *out) {
     gateway_config_t defaults;
     const char *section = "";
     gateway_config_default(&defaults);
@@ -39,6 +57,7 @@ void gateway_config_print(const gateway_config_t *config, FILE *out) {
             section = config_keys[i].section;
             (void)fprintf(out, "\n[%s]\n", section);
         }
+        print_note(note(context, config_keys[i].section, config_keys[i].key), out);
         print_key(&config_keys[i], config, &defaults, out);
     }
 }

@@ -23,8 +23,8 @@ __attribute__((format(printf, 3, 4))) void config_complain(config_report_t *repo
 /// Tells how many errors were not shown, if any.
 void config_complain_end(config_report_t *report);
 
-/// Complains if the values do not fit together, at the line of the last key involved. `seen` has the line of every key, 0 if it
-/// was not given.
+/// Complains if the values do not fit together, at the line of the last key involved. `seen` has the line of every
+/// key, 0 if it was not given.
 void config_relations_check(config_report_t *report, const gateway_config_t *config, const unsigned *seen);
 
 #endif

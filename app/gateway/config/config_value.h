@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// One value of the configuration: from text to its field and back.
 ///
-/// Private to the configuration reader. Nothing is guessed: trailing characters, signs, units and other bases are refused.
+/// Private to the configuration reader. Nothing is guessed: trailing characters, signs, units and other bases are
+/// refused.
 #ifndef CONFIG_VALUE_H
 #define CONFIG_VALUE_H
 

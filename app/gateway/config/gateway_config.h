@@ -69,6 +69,13 @@ int gateway_config_parse(const char *name, const char *text, size_t size, gatewa
 int gateway_config_override(gateway_config_t *config, const char *name, const char *value, const char *origin,
                             FILE *err);
 
+/// What is to be written above a key besides its help, in one line; null: nothing.
+typedef const char *(*gateway_config_note_t)(const void *context, const char *section, const char *key);
+
+/// As `gateway_config_print`, with notes.
+void gateway_config_print_noted(const gateway_config_t *config, gateway_config_note_t note, const void *context,
+                                FILE *out);
+
 /// Writes everything in force as a commented file. Loading that file gives the same configuration and prints the same bytes
 /// (`listen_only` excepted, which is printed as a comment).
 void gateway_config_print(const gateway_config_t *config, FILE *out);

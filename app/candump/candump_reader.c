@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+#include "candump_reader.h"
+
+#include <errno.h>
+#include <string.h>
+#include <unistd.h>
+
+IW_STATIC_ASSERT(sizeof(((candump_reader_t *)0)->buffer) > CANDUMP_READ_MAX, a_line_fits);
+
+void candump_reader_init(candump_reader_t *self, int fd) {
+    self->fd = fd;
+    self->line = 0;
+    self->why = "";
+    self->begin = 0;
+    self->end = 0;
+    self->ended = false;
+    self->failed = false;
+}
+
+static void fill(candump_reader_t *self) {
+    (void)memmove(self->buffer, &self->buffer[self->begin], self->end - self->begin);
+    self->end -= self->begin;
+    self->begin = 0;
+    ssize_t got;
+    do {
+        got = read(self->fd, &self->buffer[self->end], sizeof(self->buffer) - self->end);
+    } while (got < 0 && errno == EINTR);
+    self->end += got > 0 ? (size_t)got : 0U;
+    self->ended = got <= 0;
+    self->failed = got < 0;
+}
+
+/// Where the newline of the next line is, at most CANDUMP_READ_MAX ahead; NULL: there is none in what can be had.
+static const char *find_newline(candump_reader_t *self) {
+    for (;;) {
+        const size_t there = self->end - self->begin;
+        const size_t looked = there < CANDUMP_READ_MAX ? there : CANDUMP_READ_MAX;
+        const char *newline = memchr(&self->buffer[self->begin], '\n', looked);
+        if (newline != NULL || self->ended || looked == CANDUMP_READ_MAX) {
+            return newline;
+        }
+        fill(self);
+    }
+}
+
+static void skip_line(candump_reader_t *self) {
+    const char *newline = NULL;
+    while (newline == NULL && (self->begin < self->end || !self->ended)) {
+        newline = memchr(&self->buffer[self->begin], '\n', self->end - self->begin);
+        self->begin = newline != NULL ? (size_t)(newline - self->buffer) + 1U : self->end;
+        if (newline == NULL) {
+            fill(self);
+        }
+    }
+}
+
+static candump_read_t tell_bad(candump_reader_t *self, const char *why) {
+    self->why = why;
+    return CANDUMP_READ_BAD;
+}
+
+/// What is left has no newline: too long, cut, or the end.
+static candump_read_t read_rest(candump_reader_t *self, candump_t *frame) {
+    const size_t there = self->end - self->begin;
+    if (self->failed || there == 0U) {
+        return self->failed ? CANDUMP_READ_FAILED : CANDUMP_READ_END;
+    }
+    self->line++;
+    if (there >= CANDUMP_READ_MAX) {
+        skip_line(self);
+        return tell_bad(self, "longer than any frame; is this a recording in candump's log form?");
+    }
+    const char *why = "";
+    const candump_result_t result = candump_parse(&self->buffer[self->begin], there, frame, &why);
+    self->begin = self->end;
+    return result == CANDUMP_EMPTY ? CANDUMP_READ_END
+                                   : tell_bad(self, "the last line has no line end, so it may be cut and is left out; "
+                                                    "if it is whole, add the line end");
+}
+
+candump_read_t candump_reader_next(candump_reader_t *self, candump_t *out_frame) {
+    for (;;) {
+        const char *newline = find_newline(self);
+        if (newline == NULL) {
+            return read_rest(self, out_frame);
+        }
+        const char *line = &self->buffer[self->begin];
+        const size_t length = (size_t)(newline - line);
+        self->begin += length + 1U;
+        self->line++;
+        const candump_result_t result = candump_parse(line, length, out_frame, &self->why);
+        if (result != CANDUMP_EMPTY) {
+            return result == CANDUMP_FRAME ? CANDUMP_READ_FRAME : CANDUMP_READ_BAD;
+        }
+    }
+}

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: MIT
+#include "assumption.h"
+
+#include "names.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+bool gw_assumption_of(const char *name, iw_ledger_item_t *out_item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        if (strcmp(name, gw_ledger_item_name((iw_ledger_item_t)item)) == 0) {
+            *out_item = (iw_ledger_item_t)item;
+            return true;
+        }
+    }
+    return false;
+}
+
+static const char *yes_or_no(bool yes) {
+    return yes ? "yes" : "no";
+}
+
+static const char *unit_word(iw_force_unit_t unit) {
+    return unit == IW_FORCE_CN ? "cN" : "dN";
+}
+
+static const char *role_word(iw_current_role_t role) {
+    return role == IW_ROLE_LIMIT ? "limit" : role == IW_ROLE_SETPOINT ? "setpoint" : "";
+}
+
+static void write_gear(const iw_config_t *config, char out_value[GW_VALUE_SIZE]) {
+    char per[8] = "";
+    if (config->gear_per != 1U) {
+        (void)snprintf(per, sizeof per, "/%u", config->gear_per);
+    }
+    (void)snprintf(out_value, GW_VALUE_SIZE, "%u%s, rpm of the %s", config->gear_turns, per,
+                   config->rpm_of_rotor ? "rotor" : "wheel");
+}
+
+void gw_assumption_value(const iw_config_t *config, iw_ledger_item_t item, char out_value[GW_VALUE_SIZE]) {
+    const char *word = "yes";
+    out_value[0] = '\0';
+    switch (item) {
+    case IW_LEDGER_SETPOINT_TYPE:
+        if (config->setpoint_type_set) {
+            (void)snprintf(out_value, GW_VALUE_SIZE, "%u", config->setpoint_type);
+        }
+        return;
+    case IW_LEDGER_WHEEL_RADIUS:
+        (void)snprintf(out_value, GW_VALUE_SIZE, "%u", config->radius_mm);
+        return;
+    case IW_LEDGER_GEAR_RATIO:
+        write_gear(config, out_value);
+        return;
+    case IW_LEDGER_CURRENT_ROLE:
+        word = role_word(config->current_role);
+        break;
+    case IW_LEDGER_FORCE_UNIT_LEFT:
+    case IW_LEDGER_FORCE_UNIT_RIGHT:
+        word = unit_word(config->force_unit[item == IW_LEDGER_FORCE_UNIT_LEFT ? IW_LEFT : IW_RIGHT]);
+        break;
+    case IW_LEDGER_MOUNT_SIGN_LEFT:
+    case IW_LEDGER_MOUNT_SIGN_RIGHT:
+        word = yes_or_no(config->invert[item == IW_LEDGER_MOUNT_SIGN_LEFT ? IW_LEFT : IW_RIGHT]);
+        break;
+    default:
+        break;
+    }
+    (void)snprintf(out_value, GW_VALUE_SIZE, "%s", word);
+}
+
+const char *gw_assumption_values(iw_ledger_item_t item) {
+    switch (item) {
+    case IW_LEDGER_SETPOINT_TYPE:
+        return "0 to 255";
+    case IW_LEDGER_CURRENT_ROLE:
+        return "limit or setpoint";
+    case IW_LEDGER_FORCE_UNIT_LEFT:
+    case IW_LEDGER_FORCE_UNIT_RIGHT:
+        return "cN or dN";
+    case IW_LEDGER_MOUNT_SIGN_LEFT:
+    case IW_LEDGER_MOUNT_SIGN_RIGHT:
+        return "yes or no, as invert in the configuration";
+    case IW_LEDGER_WHEEL_RADIUS:
+        return "20 to 500 (mm)";
+    case IW_LEDGER_GEAR_RATIO:
+        return "N or N/M, as gear_ratio in the configuration";
+    default:
+        return "yes or no";
+    }
+}
+
+/// Decimal digits only, with nothing behind them but what `*out_rest` points to. At most five of them.
+static bool read_number(const char *text, unsigned *out_number, const char **out_rest) {
+    unsigned number = 0;
+    unsigned digits = 0;
+    for (; *text >= '0' && *text <= '9' && digits < 5U; ++text, ++digits) {
+        number = number * 10U + (unsigned)(*text - '0');
+    }
+    *out_number = number;
+    *out_rest = text;
+    return digits > 0U;
+}
+
+static gw_found_t compare_number(const char *found, unsigned wanted, unsigned low, unsigned high, unsigned percent) {
+    unsigned number;
+    const char *rest;
+    if (!read_number(found, &number, &rest) || *rest != '\0' || number < low || number > high) {
+        return GW_FOUND_IMPOSSIBLE;
+    }
+    const unsigned off = number > wanted ? number - wanted : wanted - number;
+    return off * 100U <= wanted * percent ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+}
+
+static gw_found_t compare_gear(const char *found, const iw_config_t *config) {
+    unsigned turns;
+    unsigned per = 1;
+    const char *rest;
+    bool good = read_number(found, &turns, &rest);
+    if (good && *rest == '/') {
+        good = read_number(rest + 1, &per, &rest);
+    }
+    if (!good || *rest != '\0' || turns < 1U || turns > 1000U || per < 1U || per > 1000U) {
+        return GW_FOUND_IMPOSSIBLE;
+    }
+    return turns * config->gear_per == per * config->gear_turns ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+}
+
+/// One of two words.
+static gw_found_t compare_word(const char *found, const char *wanted, const char *one, const char *other) {
+    if (strcmp(found, one) != 0 && strcmp(found, other) != 0) {
+        return GW_FOUND_IMPOSSIBLE;
+    }
+    return strcmp(found, wanted) == 0 ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+}
+
+gw_found_t gw_assumption_compare(const iw_config_t *config, iw_ledger_item_t item, const char *found) {
+    char wanted[GW_VALUE_SIZE];
+    gw_assumption_value(config, item, wanted);
+    if (wanted[0] == '\0') {
+        return GW_FOUND_UNSET;
+    }
+    if (found[0] == '\0') {
+        return GW_FOUND_SAME;
+    }
+    switch (item) {
+    case IW_LEDGER_SETPOINT_TYPE:
+        return compare_number(found, config->setpoint_type, 0U, UINT8_MAX, 0U);
+    case IW_LEDGER_WHEEL_RADIUS:
+        return compare_number(found, config->radius_mm, 20U, 500U, GW_RADIUS_PERCENT);
+    case IW_LEDGER_GEAR_RATIO:
+        return compare_gear(found, config);
+    case IW_LEDGER_CURRENT_ROLE:
+        return compare_word(found, wanted, "limit", "setpoint");
+    case IW_LEDGER_FORCE_UNIT_LEFT:
+    case IW_LEDGER_FORCE_UNIT_RIGHT:
+        return compare_word(found, wanted, "cN", "dN");
+    default:
+        return compare_word(found, wanted, "yes", "no");
+    }
+}
+
+/// What was measured.
+static void write_figure(iw_ledger_item_t item, const iw_ledger_entry_t *entry, char out_text[GW_EVIDENCE_SIZE]) {
+    const int figure = (int)entry->figure;
+    const char *sign = figure < 0 ? "-" : "";
+    const int whole = abs(figure / 1000);
+    const int part = abs(figure % 1000);
+    switch (item) {
+    case IW_LEDGER_FORCE_UNIT_LEFT:
+    case IW_LEDGER_FORCE_UNIT_RIGHT:
+    case IW_LEDGER_OFFSET_INCLUDED:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE,
+                       "at rest, raw / offset is %s%d.%03d (about 10 is cN, 1 is dN, 0 is a raw force without offset)",
+                       sign, whole, part);
+        break;
+    case IW_LEDGER_FEEDBACK_SIGN_LEFT:
+    case IW_LEDGER_FEEDBACK_SIGN_RIGHT:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "measured %d mm/s while told to go forward", figure);
+        break;
+    case IW_LEDGER_SETPOINT_TYPE:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the wheels ran at %s%d.%03d of the speed they were told", sign,
+                       whole, part);
+        break;
+    case IW_LEDGER_GEAR_RATIO:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the ticks moved %s%d.%03d times as far as the rpm say", sign, whole,
+                       part);
+        break;
+    case IW_LEDGER_POSE_BYTE_ORDER:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "read the other way round, the pose moves %s%d.%03d times as far",
+                       sign, whole, part);
+        break;
+    case IW_LEDGER_DLC:
+    default:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "a frame of %d bytes was heard%s", figure,
+                       entry->state == IW_LEDGER_CONTRADICTED ? "; the table has another length" : ", as in the table");
+        break;
+    }
+}
+
+void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entry, const char *found,
+                            char out_text[GW_EVIDENCE_SIZE]) {
+    const bool denied = entry->state == IW_LEDGER_CONTRADICTED;
+    switch (entry->evidence) {
+    case IW_EVIDENCE_BUS:
+        write_figure(item, entry, out_text);
+        break;
+    case IW_EVIDENCE_OPERATOR:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the operator %s%s", denied ? "found " : "says so",
+                       !denied            ? ""
+                       : found[0] != '\0' ? found
+                                          : "something else");
+        break;
+    case IW_EVIDENCE_CONFIGURATION:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "configured, not verified");
+        break;
+    case IW_EVIDENCE_DOCUMENT:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "as documented, not verified");
+        break;
+    case IW_EVIDENCE_NONE:
+    default:
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "not documented, not verified");
+        break;
+    }
+}
+
+const char *gw_assumption_cost(iw_ledger_item_t item) {
+    static const char *const costs[IW_LEDGER_ITEMS] = {
+        [IW_LEDGER_SETPOINT_TYPE] = "arm is refused; correct setpoint_type under [wheels]",
+        [IW_LEDGER_CURRENT_ROLE] = "arm is refused; correct current_role under [wheels]",
+        [IW_LEDGER_FORCE_UNIT_LEFT] = "no net force of the left wheel; correct force_unit under [left]",
+        [IW_LEDGER_FORCE_UNIT_RIGHT] = "no net force of the right wheel; correct force_unit under [right]",
+        [IW_LEDGER_OFFSET_INCLUDED] = "no net force until both wheels are unloaded and tared: iwheelctl tare",
+        [IW_LEDGER_FEEDBACK_SIGN_LEFT] =
+            "arm is refused; see why the left wheel turned against its command, then: iwheelctl confirm "
+            "feedback_sign_left",
+        [IW_LEDGER_FEEDBACK_SIGN_RIGHT] =
+            "arm is refused; see why the right wheel turned against its command, then: iwheelctl confirm "
+            "feedback_sign_right",
+        [IW_LEDGER_MOUNT_SIGN_LEFT] = "arm is refused; correct invert under [left]",
+        [IW_LEDGER_MOUNT_SIGN_RIGHT] = "arm is refused; correct invert under [right]",
+        [IW_LEDGER_WHEEL_RADIUS] = "no speed in mm/s and no distance; correct radius_mm under [wheels]",
+        [IW_LEDGER_GEAR_RATIO] = "no distance, and no speed in mm/s if the rpm are the rotor's; correct gear_ratio or "
+                                 "rpm_of under [wheels]",
+        [IW_LEDGER_POSE_BYTE_ORDER] = "no pose; this version reads it most significant byte first only",
+        [IW_LEDGER_DLC] = "nothing: longer frames are read, shorter ones are ignored and counted as bad_length",
+    };
+    return (unsigned)item < IW_LEDGER_ITEMS ? costs[item] : "unknown";
+}
+
+bool gw_assumption_moves(iw_ledger_item_t item) {
+    return item == IW_LEDGER_SETPOINT_TYPE || item == IW_LEDGER_CURRENT_ROLE || item == IW_LEDGER_FEEDBACK_SIGN_LEFT ||
+           item == IW_LEDGER_FEEDBACK_SIGN_RIGHT || item == IW_LEDGER_MOUNT_SIGN_LEFT ||
+           item == IW_LEDGER_MOUNT_SIGN_RIGHT;
+}

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+/// The items of the assumption ledger in words: which value is in force, what speaks for it, what a contradiction
+/// costs.
+///
+/// Pure functions of configuration and entry. The value of an item is written as the configuration file writes it; an
+/// item without a key there ("the raw force still contains the offset") is "yes".
+#ifndef GATEWAY_ASSUMPTION_H
+#define GATEWAY_ASSUMPTION_H
+
+#include "iwheel/config.h"
+#include "iwheel/ledger.h"
+
+/// The longest value with its terminator.
+#define GW_VALUE_SIZE 40U
+/// The longest sentence with its terminator.
+#define GW_EVIDENCE_SIZE 256U
+/// A radius within this share of the configured one is the configured one: nobody measures a tyre better.
+#define GW_RADIUS_PERCENT 2
+
+/// What somebody found, beside what is in force.
+typedef enum {
+    GW_FOUND_SAME = 0,
+    GW_FOUND_DIFFERENT,
+    GW_FOUND_IMPOSSIBLE, ///< Not a value of this item.
+    GW_FOUND_UNSET,      ///< Nothing is configured that could be confirmed.
+} gw_found_t;
+
+/// False if no item has that name.
+bool gw_assumption_of(const char *name, iw_ledger_item_t *out_item);
+
+/// The value in force; empty if none is configured.
+void gw_assumption_value(const iw_config_t *config, iw_ledger_item_t item, char out_value[GW_VALUE_SIZE]);
+
+/// Compares `found` with the value in force. `found` may be empty: the operator confirms what is in force.
+gw_found_t gw_assumption_compare(const iw_config_t *config, iw_ledger_item_t item, const char *found);
+
+/// The values that `found` may have, for messages.
+const char *gw_assumption_values(iw_ledger_item_t item);
+
+/// What the entry rests on, as a clause: "measured -392 mm/s while told to go forward". `found` is what the operator
+/// found instead of what is configured; empty if that was not told.
+void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entry, const char *found,
+                            char out_text[GW_EVIDENCE_SIZE]);
+
+/// What a contradiction of it disables, and what mends it.
+const char *gw_assumption_cost(iw_ledger_item_t item);
+
+/// True if the wheels must not be moved while it is contradicted.
+bool gw_assumption_moves(iw_ledger_item_t item);
+
+#endif

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+/// The black box: the ring in memory shared with a process of its own, which writes it to disk when told, so that the loop
+/// never waits for a disk.
+///
+///     gateway --order, through a socket that never blocks--> writer --result--> gateway
+///        \----------- ring in shared memory ------------------^
+///
+/// The writer holds nothing of the gateway's. It outlives it by the time it needs to finish: a gateway that dies while
+/// setpoints are being sent is a stop worth a recording too. If the writer dies, another is started with the next order.
+#ifndef GATEWAY_BOX_H
+#define GATEWAY_BOX_H
+
+#include "blackbox_ring.h"
+#include "gateway_config.h"
+#include "why.h"
+
+#include <sys/types.h>
+
+/// Recordings on disk are never more, and together never larger, except that the newest is always kept.
+#define GW_BOX_RECORDINGS_MAX 32U
+#define GW_BOX_BYTES_MAX      ((uint64_t)128U * 1024U * 1024U)
+/// The recording goes on for this long after the stop.
+#define GW_BOX_AFTER_US   2000000U
+#define GW_BOX_CAUSE_SIZE 32U
+/// Directory, '/', "stop-000001-", cause, ".jsonl".
+#define GW_BOX_PATH_SIZE (GATEWAY_PATH_SIZE + GW_BOX_CAUSE_SIZE + 48U)
+
+/// What the gateway tells the writer.
+typedef struct {
+    bool last; ///< Nothing is to be written: the gateway ends as it should.
+    gw_stop_note_t note;
+    char cause[GW_BOX_CAUSE_SIZE];
+    char side[8];          ///< "left", "right", "both", or empty.
+    char from[16];         ///< Name of the state.
+    int64_t wall_minus_us; ///< Wall clock minus monotonic clock.
+    uint64_t mark;         ///< Entries written when it stopped.
+} gw_box_order_t;
+
+/// What the writer tells the gateway. An order without a stop (number 0): the directory cannot be used.
+typedef struct {
+    uint32_t number; ///< Of the stop.
+    int error;       ///< An errno, 0: written.
+    uint32_t frames;
+    uint32_t ms; ///< From the first entry to the stop.
+    char path[GW_BOX_PATH_SIZE];
+} gw_box_result_t;
+
+typedef struct {
+    blackbox_ring_t *ring;
+    size_t ring_size;
+    const gateway_config_t *config;
+    int fd;    ///< To the writer; -1: there is none.
+    pid_t pid; ///< Of the writer.
+    iw_time_us_t started_us;
+    gw_box_result_t last; ///< The last result; number 0: none.
+} gw_box_t;
+
+/// Makes the ring, and the writer unless blackbox_s is 0. 0, or an errno: not enough memory. Call it while nothing is sent and few
+/// descriptors are open. `config` must outlive it.
+int gw_box_open(gw_box_t *self, const gateway_config_t *config);
+
+/// Lets the writer finish and end by itself.
+void gw_box_close(gw_box_t *self);
+
+/// Orders a recording. False if it cannot be: the writer is gone and was started again only just now, or it is too far
+/// behind.
+bool gw_box_write(gw_box_t *self, const gw_box_order_t *order);
+
+typedef enum { GW_BOX_NOTHING = 0, GW_BOX_RESULT, GW_BOX_WRITER_ENDED } gw_box_news_t;
+
+/// The next news of the writer; GW_BOX_RESULT is in `last`. Never waits.
+gw_box_news_t gw_box_take(gw_box_t *self);
+
+#endif

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+/// Evidence for the assumption ledger that the wheels' own motion gives, beside what the core finds itself (force units,
+/// offset, feedback signs, length of the status frame).
+///
+/// It lives in the daemon and not in the core because no safety rule needs it: a controller without it drives as well.
+///
+/// - gear ratio: ticks moved against the turns that the rpm say, while a wheel turns one way, not too slowly
+/// - byte order of the pose: read the right way round it moves in small steps, the other way round in large ones
+/// - setpoint type: a wheel runs at the speed it was told, steadily
+/// - lengths: every frame of the wheels, not only status
+///
+/// Looks at the core after each step; reads no clock, keeps no frame. Thresholds are ours.
+#ifndef GATEWAY_EVIDENCE_H
+#define GATEWAY_EVIDENCE_H
+
+#include "iwheel/gateway.h"
+
+/// A wheel slower than this says too little about its ratio: 1 rpm of resolution is 10 %.
+#define GW_EVIDENCE_RPM 10
+/// One rotor turn.
+#define GW_EVIDENCE_TICKS 60
+/// Ticks within this share of what the rpm say: the ratio fits. Further off than the other: it does not; between: nothing.
+#define GW_EVIDENCE_FITS_PERMILLE  120
+#define GW_EVIDENCE_FAILS_PERMILLE 250
+/// That often in a row it must not fit: a frame may be lost.
+#define GW_EVIDENCE_MISSES 3U
+/// A gap longer than this between two frames begins anew.
+#define GW_EVIDENCE_GAP_US 100000U
+/// Steps of the pose in which it moved.
+#define GW_EVIDENCE_POSE_STEPS 25U
+/// So many times as far it must move, read the wrong way round.
+#define GW_EVIDENCE_POSE_FACTOR 8
+/// At least so fast, and for so long within 15 % of it (and 1 rpm), a wheel must run to speak for the setpoint type.
+#define GW_EVIDENCE_TYPE_MM_S 150
+#define GW_EVIDENCE_TYPE_US   1000000U
+
+/// One wheel.
+typedef struct {
+    iw_time_us_t speed_us;  ///< Of the last speed frame that was added.
+    iw_time_us_t status_us; ///< Of the last status frame that was looked at.
+    iw_time_us_t steady_us; ///< Since when it has run as told; IW_NEVER: it does not.
+    int64_t turned;         ///< rpm x us since the window began.
+    int64_t ticks;          ///< Where it began.
+    uint32_t reboots;
+    uint32_t misses;
+    int16_t rpm;          ///< Of the last speed frame.
+    int16_t applied_mm_s; ///< When the wheel began to run as told.
+    bool open;            ///< A window has begun.
+} gw_evidence_wheel_t;
+
+typedef struct {
+    gw_evidence_wheel_t wheel[IW_SIDES];
+    iw_time_us_t pose_us;
+    iw_proto_pose_t pose;
+    uint32_t pose_steps;
+    int64_t moved;    ///< As it is read.
+    int64_t reversed; ///< Read the other way round.
+} gw_evidence_t;
+
+void gw_evidence_init(gw_evidence_t *self);
+
+/// What the last step has brought, into the gateway's ledger.
+void gw_evidence_look(gw_evidence_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
+
+/// A frame, before the core has judged it: is it as long as the table says?
+void gw_evidence_frame(iw_gateway_t *gateway, const iw_can_frame_t *frame);
+
+#endif

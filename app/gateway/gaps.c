@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+#include "gaps.h"
+
+const uint16_t gw_gap_limits_ms[GW_GAP_BUCKETS - 1U] = {5, 10, 15, 20, 25, 30, 40, 50, 100};
+
+void gw_gaps_note(gw_gaps_t *self, const iw_sender_t *sender) {
+    if (sender->pairs == self->pairs) {
+        return;
+    }
+    self->pairs = sender->pairs;
+    const uint32_t gap_us = sender->gap_us;
+    if (gap_us == 0U) {
+        return; // The first pair after silence.
+    }
+    uint32_t bucket = 0;
+    while (bucket < GW_GAP_BUCKETS - 1U && gap_us > gw_gap_limits_ms[bucket] * IW_US_PER_MS) {
+        ++bucket;
+    }
+    ++self->count[bucket];
+    self->worst_us = gap_us > self->worst_us ? gap_us : self->worst_us;
+}
+
+void gw_gaps_write(const gw_gaps_t *self, json_out_t *json) {
+    json_out_open(json, "limits_ms", '[');
+    for (uint32_t i = 0; i < GW_GAP_BUCKETS - 1U; ++i) {
+        json_out_int(json, NULL, gw_gap_limits_ms[i]);
+    }
+    json_out_close(json, ']');
+    json_out_open(json, "count", '[');
+    for (uint32_t i = 0; i < GW_GAP_BUCKETS; ++i) {
+        json_out_int(json, NULL, self->count[i]);
+    }
+    json_out_close(json, ']');
+    json_out_known(json, "worst_us", self->worst_us > 0U, self->worst_us);
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+/// How regularly setpoint pairs leave: a histogram of the gaps between them, and the worst, since the gateway's start.
+///
+/// The wheels stop by themselves after 1000 ms without a setpoint, and 100 ms are the most that safety allows. Gaps are
+/// counted while pairs are being sent; silence is none.
+#ifndef GATEWAY_GAPS_H
+#define GATEWAY_GAPS_H
+
+#include "iwheel/sender.h"
+#include "json_out.h"
+
+#define GW_GAP_BUCKETS 10U
+
+typedef struct {
+    uint32_t count[GW_GAP_BUCKETS]; ///< Gaps up to `gw_gap_limits_ms` of the bucket; the last bucket has no limit.
+    uint32_t worst_us;
+    uint32_t pairs; ///< Of the sender, when last looked at.
+} gw_gaps_t;
+
+/// Upper bounds, inclusive, of all buckets but the last.
+extern const uint16_t gw_gap_limits_ms[GW_GAP_BUCKETS - 1U];
+
+/// Looks at the sender after a step, which sends one pair at the most.
+void gw_gaps_note(gw_gaps_t *self, const iw_sender_t *sender);
+
+/// Writes the object's fields.
+void gw_gaps_write(const gw_gaps_t *self, json_out_t *json);
+
+#endif

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: MIT
+#include "knowledge.h"
+
+#include "daemon.h"
+#include "knowledge_told.h"
+#include "names.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+void gw_knowledge_open(gw_knowledge_t *self, const gateway_config_t *config) {
+    char name[GATEWAY_ADDRESS_SIZE + 8U];
+    gw_memory_name(config->bus.interface, name, sizeof name);
+    (void)snprintf(self->path, sizeof self->path, "%s/%s", config->record.directory, name);
+    self->start_us = iw_clock_now_us();
+    self->error = gw_keeper_open(&self->keeper, config->record.directory, name);
+    if (self->error != 0) {
+        self->state = GW_MEMORY_FAILED;
+    }
+}
+
+/// Notes an entry that is not as it was. Another figure for the same finding is no news.
+static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
+    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
+    gw_known_item_t *known = &daemon->knowledge.known.item[item];
+    const bool news = entry->state != known->entry.state || entry->evidence != known->entry.evidence;
+    if (entry->state == IW_LEDGER_ASSUMED || (!news && entry->figure == known->entry.figure)) {
+        return;
+    }
+    known->entry = *entry;
+    daemon->knowledge.changed = true;
+    if (!news) {
+        return;
+    }
+    known->since_wall_us = iw_clock_wall_us();
+    gw_assumption_value(&daemon->gateway.config, item, known->value);
+    if (known->entry.evidence != IW_EVIDENCE_OPERATOR) {
+        known->found[0] = '\0';
+    }
+    gw_knowledge_tell_item(daemon, item);
+}
+
+/// The offset in force is one of this run: notes where it comes from and how good it is.
+static void note_offset(gw_daemon_t *daemon, iw_side_t side) {
+    const iw_force_t *force = &daemon->gateway.force[side];
+    iw_force_quality_t quality = {0};
+    if (force->provenance == IW_OFFSET_OPERATOR) {
+        quality = daemon->knowledge.tare[side];
+    } else if (force->provenance == IW_OFFSET_ESTIMATED) {
+        quality = force->quality;
+    }
+    daemon->knowledge.known.offset[side] = (gw_known_offset_t){.from = force->provenance,
+                                                               .unit = daemon->gateway.config.force_unit[side],
+                                                               .offset_mN = force->offset_mN,
+                                                               .drift_mN = quality.drift_mN,
+                                                               .deviation_mN = quality.deviation_mN,
+                                                               .samples = quality.samples,
+                                                               .wall_us = iw_clock_wall_us()};
+    daemon->knowledge.changed = true;
+}
+
+static void observe_offset(gw_daemon_t *daemon, iw_side_t side) {
+    const iw_force_t *force = &daemon->gateway.force[side];
+    gw_told_offset_t *told = &daemon->knowledge.told[side];
+    gw_told_offset_t now = {
+        .offset_us = force->offset_us, .offset_mN = force->offset_mN, .provenance = force->provenance};
+    const bool tared = now.provenance == IW_OFFSET_OPERATOR && now.offset_us != told->offset_us;
+    if (now.provenance == told->provenance && now.offset_mN == told->offset_mN && !tared) {
+        return;
+    }
+    if (now.provenance > IW_OFFSET_STORED && now.offset_us != IW_NEVER) {
+        note_offset(daemon, side);
+    }
+    now.from = daemon->knowledge.known.offset[side].from;
+    gw_knowledge_tell_offset(daemon, side, &now, told);
+    *told = now;
+}
+
+void gw_knowledge_observe(gw_daemon_t *daemon) {
+    if (!daemon->knowledge.answered) {
+        return;
+    }
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        observe_item(daemon, (iw_ledger_item_t)item);
+    }
+    observe_offset(daemon, IW_LEFT);
+    observe_offset(daemon, IW_RIGHT);
+}
+
+/// What an earlier run found is put beside what this one has found already, which is fresher.
+static void merge_item(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_known_item_t *stored) {
+    iw_ledger_t *ledger = &daemon->gateway.ledger;
+    const iw_ledger_entry_t *present = iw_ledger_entry(ledger, item);
+    char value[GW_VALUE_SIZE];
+    gw_assumption_value(&daemon->gateway.config, item, value);
+    if (stored->entry.state == IW_LEDGER_ASSUMED || present->state == IW_LEDGER_CONTRADICTED) {
+        return;
+    }
+    if (strcmp(value, stored->value) != 0) {
+        gw_log(&daemon->log, GW_LOG_INFO, "%s: what was found before was for %s, and %s is configured now: forgotten",
+               gw_ledger_item_name(item), stored->value, value[0] != '\0' ? value : "nothing");
+        daemon->knowledge.changed = true;
+        return;
+    }
+    if (stored->entry.state == IW_LEDGER_CONTRADICTED) {
+        iw_ledger_contradict(ledger, item, stored->entry.evidence, stored->entry.figure);
+    } else if (present->state == IW_LEDGER_ASSUMED || stored->entry.evidence == IW_EVIDENCE_OPERATOR) {
+        iw_ledger_confirm(ledger, item, stored->entry.evidence, stored->entry.figure);
+    }
+    daemon->knowledge.known.item[item] = *stored;
+    daemon->knowledge.known.item[item].entry = *present;
+}
+
+static void merge_offset(gw_daemon_t *daemon, iw_side_t side, const gw_known_offset_t *stored) {
+    iw_force_t *force = &daemon->gateway.force[side];
+    if (stored->from == IW_OFFSET_NONE) {
+        return;
+    }
+    if (stored->unit != daemon->gateway.config.force_unit[side]) {
+        gw_log(&daemon->log, GW_LOG_WARNING,
+               "the %s wheel's stored force offset was taken in another force_unit: forgotten; unload both wheels, "
+               "then: iwheelctl tare",
+               side == IW_LEFT ? "left" : "right");
+        daemon->knowledge.changed = true;
+        return;
+    }
+    daemon->knowledge.known.offset[side] = *stored;
+    iw_force_restore(force, stored->from == IW_OFFSET_OPERATOR ? IW_OFFSET_OPERATOR : IW_OFFSET_STORED,
+                     stored->offset_mN);
+}
+
+static void merge(gw_daemon_t *daemon, const gw_known_t *stored) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        merge_item(daemon, (iw_ledger_item_t)item, &stored->item[item]);
+    }
+    merge_offset(daemon, IW_LEFT, &stored->offset[IW_LEFT]);
+    merge_offset(daemon, IW_RIGHT, &stored->offset[IW_RIGHT]);
+}
+
+/// The first news: the file, or why there is none.
+static void take_file(gw_daemon_t *daemon, gw_keeper_news_t news, const char *text, size_t length) {
+    gw_knowledge_t *self = &daemon->knowledge;
+    gw_known_t stored;
+    if (news == GW_KEEPER_ABSENT) {
+        self->state = GW_MEMORY_NEW;
+    } else if (news == GW_KEEPER_READ &&
+               gw_memory_read(text, length, daemon->config.bus.interface, &stored, self->reason)) {
+        self->state = GW_MEMORY_KEPT;
+        self->kept_length = length <= sizeof self->kept ? length : 0U;
+        (void)memcpy(self->kept, text, self->kept_length);
+        merge(daemon, &stored);
+    } else {
+        self->state = GW_MEMORY_IGNORED;
+        if (news == GW_KEEPER_BAD) {
+            (void)snprintf(self->reason, sizeof self->reason, "it cannot be read: %s", strerror(self->error));
+        }
+        gw_keeper_set_aside(&self->keeper);
+    }
+    gw_knowledge_tell_memory(daemon);
+}
+
+static void take_result(gw_daemon_t *daemon, gw_keeper_news_t news, int error) {
+    gw_knowledge_t *self = &daemon->knowledge;
+    const bool failed = news != GW_KEEPER_WRITTEN;
+    const bool told = failed && self->state == GW_MEMORY_FAILED && self->error == error;
+    const bool mended = !failed && self->state == GW_MEMORY_FAILED;
+    self->state = failed ? GW_MEMORY_FAILED : GW_MEMORY_KEPT;
+    self->error = error;
+    if (failed) {
+        self->changed = true;
+        self->kept_length = 0;
+        self->write_us = daemon->now_us + GW_KNOWLEDGE_RETRY_US;
+    }
+    if ((failed && !told) || mended) {
+        gw_knowledge_tell_memory(daemon);
+    }
+}
+
+static void hear_keeper(gw_daemon_t *daemon) {
+    gw_knowledge_t *self = &daemon->knowledge;
+    char text[GW_KEEPER_TEXT_MAX];
+    size_t length = 0;
+    int error = 0;
+    const gw_keeper_news_t news = gw_keeper_hear(&self->keeper, text, &length, &error);
+    if (news == GW_KEEPER_READ || news == GW_KEEPER_ABSENT || news == GW_KEEPER_BAD) {
+        self->error = error;
+        take_file(daemon, news, text, length);
+    } else if (news != GW_KEEPER_NO_NEWS) {
+        take_result(daemon, news, news == GW_KEEPER_GONE ? ECHILD : error);
+    }
+    const bool waited = daemon->now_us - self->start_us > GW_KNOWLEDGE_PATIENCE_US;
+    if (!self->answered && (self->state != GW_MEMORY_LOADING || waited)) {
+        self->answered = true;
+        gw_knowledge_tell_ledger(daemon);
+    }
+}
+
+static void hand_over(gw_knowledge_t *self, const char *bus) {
+    char text[GW_MEMORY_SIZE];
+    const size_t length = gw_memory_write(&self->known, bus, text, sizeof text);
+    const bool same = length == self->kept_length && memcmp(text, self->kept, length) == 0;
+    if (same || gw_keeper_write(&self->keeper, text, length)) {
+        (void)memcpy(self->kept, text, length);
+        self->kept_length = length;
+        self->changed = false;
+    }
+}
+
+void gw_knowledge_tend(gw_daemon_t *daemon) {
+    gw_knowledge_t *self = &daemon->knowledge;
+    if (!self->answered || self->keeper.waits) {
+        hear_keeper(daemon);
+    }
+    if (self->answered && self->changed && !self->keeper.waits && daemon->now_us >= self->write_us) {
+        self->write_us = daemon->now_us + GW_KNOWLEDGE_WRITE_US;
+        hand_over(self, daemon->config.bus.interface);
+    }
+}
+
+gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, const char *found) {
+    iw_gateway_t *gateway = &daemon->gateway;
+    const gw_found_t verdict = gw_assumption_compare(&gateway->config, item, found);
+    if (verdict == GW_FOUND_SAME) {
+        iw_ledger_confirm(&gateway->ledger, item, IW_EVIDENCE_OPERATOR, 0);
+    } else if (verdict == GW_FOUND_DIFFERENT) {
+        iw_ledger_contradict(&gateway->ledger, item, IW_EVIDENCE_OPERATOR, 0);
+    } else {
+        return verdict;
+    }
+    (void)snprintf(daemon->knowledge.known.item[item].found, GW_VALUE_SIZE, "%s", found);
+    daemon->knowledge.changed = true;
+    return verdict;
+}
+
+iw_tare_t gw_knowledge_tare(gw_daemon_t *daemon, iw_side_t side) {
+    const iw_force_quality_t quality = iw_force_measure(&daemon->gateway.force[side]);
+    const iw_tare_t result = iw_gateway_tare(&daemon->gateway, daemon->now_us, side);
+    if (result == IW_TARE_OK) {
+        daemon->knowledge.tare[side] = quality;
+    }
+    return result;
+}
+
+void gw_knowledge_close(gw_knowledge_t *self, const char *bus) {
+    if (self->answered && self->changed) {
+        self->keeper.waits = false; // What it owes us no longer matters.
+        hand_over(self, bus);
+    }
+    gw_keeper_close(&self->keeper);
+}
+
+void gw_knowledge_write_memory(const gw_knowledge_t *self, json_out_t *json) {
+    static const char *const names[] = {
+        [GW_MEMORY_LOADING] = "loading", [GW_MEMORY_NEW] = "new",       [GW_MEMORY_KEPT] = "kept",
+        [GW_MEMORY_IGNORED] = "ignored", [GW_MEMORY_FAILED] = "failed",
+    };
+    json_out_text(json, "file", self->path);
+    json_out_text(json, "state", names[self->state]);
+    json_out_text(json, "reason",
+                  self->state == GW_MEMORY_IGNORED  ? self->reason
+                  : self->state == GW_MEMORY_FAILED ? strerror(self->error)
+                                                    : NULL);
+}

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+/// What the gateway learns about its wheels: noted as it comes, told to the log and to watchers, kept over restarts.
+///
+///     start: keeper reads --> merged into the core: what was found for other configured values is forgotten, and told
+///     run:   every change of the ledger and of the force offsets --> note, log line, event --> keeper writes
+///
+/// Nothing here waits. As long as the keeper has not answered (1 s at the most), changes are not told yet.
+#ifndef GATEWAY_KNOWLEDGE_H
+#define GATEWAY_KNOWLEDGE_H
+
+#include "gateway_config.h"
+#include "json_out.h"
+#include "keeper.h"
+#include "memory.h"
+
+#include "iwheel/gateway.h"
+
+/// Nothing is told before the keeper has answered, but not for longer than this.
+#define GW_KNOWLEDGE_PATIENCE_US 1000000U
+/// Two writes are at least this far apart ...
+#define GW_KNOWLEDGE_WRITE_US 1000000U
+/// ... and after one that failed, this far.
+#define GW_KNOWLEDGE_RETRY_US 10000000U
+
+typedef enum {
+    GW_MEMORY_LOADING = 0,
+    GW_MEMORY_NEW,     ///< There was no file.
+    GW_MEMORY_KEPT,    ///< The file was read, or written.
+    GW_MEMORY_IGNORED, ///< The file is not to be trusted; it will be set aside.
+    GW_MEMORY_FAILED,  ///< Nothing is kept: the reason tells why.
+} gw_memory_state_t;
+
+/// An offset in force, as last told.
+typedef struct {
+    iw_time_us_t offset_us;
+    int32_t offset_mN;
+    iw_offset_provenance_t provenance;
+    iw_offset_provenance_t from; ///< Of a stored one: where it came from first.
+} gw_told_offset_t;
+
+typedef struct {
+    gw_known_t known;
+    gw_told_offset_t told[IW_SIDES];
+    iw_force_quality_t tare[IW_SIDES]; ///< Of the window of the last tare.
+    gw_keeper_t keeper;
+    gw_memory_state_t state;
+    iw_time_us_t start_us;
+    iw_time_us_t write_us; ///< Nothing is written before.
+    size_t kept_length;
+    int error;                          ///< Of GW_MEMORY_FAILED.
+    bool answered;                      ///< The keeper has, or our patience has ended: changes are told.
+    bool changed;                       ///< Since the last write.
+    char reason[GW_MEMORY_REASON_SIZE]; ///< Why the file is ignored.
+    char path[GATEWAY_PATH_SIZE + 128U];
+    char kept[GW_MEMORY_SIZE]; ///< The text handed over last.
+} gw_knowledge_t;
+
+struct gw_daemon;
+
+/// Starts the keeper. Call it before anything is opened. `config` must outlive it.
+void gw_knowledge_open(gw_knowledge_t *self, const gateway_config_t *config);
+
+/// Notes and tells what has changed.
+void gw_knowledge_observe(struct gw_daemon *daemon);
+
+/// Hears the keeper and hands over what has changed. Once per cycle.
+void gw_knowledge_tend(struct gw_daemon *daemon);
+
+/// The operator's word: `found` as in gw_assumption_compare.
+gw_found_t gw_knowledge_confirm(struct gw_daemon *daemon, iw_ledger_item_t item, const char *found);
+
+/// Tares a wheel and remembers the window it was measured in.
+iw_tare_t gw_knowledge_tare(struct gw_daemon *daemon, iw_side_t side);
+
+/// Hands over the rest. The keeper ends when it is on the disk.
+void gw_knowledge_close(gw_knowledge_t *self, const char *bus);
+
+/// File, state and reason, into an object that is open.
+void gw_knowledge_write_memory(const gw_knowledge_t *self, json_out_t *json);
+
+#endif

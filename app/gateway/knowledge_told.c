@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+#include "knowledge_told.h"
+
+#include "names.h"
+#include "observe.h"
+#include "snapshot.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/// An offset that moves further than this in one step is worth a warning: somebody pressed, then or now.
+#define MOVED_mN ((int32_t)IW_FORCE_QUIET_mN)
+
+static const char *side_name(iw_side_t side) {
+    return side == IW_LEFT ? "left" : "right";
+}
+
+void gw_knowledge_tell_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
+    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
+    const bool bad = entry->state == IW_LEDGER_CONTRADICTED;
+    char value[GW_VALUE_SIZE];
+    char evidence[GW_EVIDENCE_SIZE];
+    gw_assumption_value(&daemon->gateway.config, item, value);
+    gw_assumption_evidence(item, entry, daemon->knowledge.known.item[item].found, evidence);
+    gw_log(&daemon->log, bad ? GW_LOG_WARNING : GW_LOG_INFO, "assumption %s = %s is %s by the %s: %s%s%s",
+           gw_ledger_item_name(item), value, gw_ledger_state_name(entry->state), gw_evidence_name(entry->evidence),
+           evidence, bad ? "; disabled: " : "", bad ? gw_assumption_cost(item) : "");
+    json_out_t json = gw_observe_begin_event(daemon, "ledger");
+    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    json_out_text(&json, "item", gw_ledger_item_name(item));
+    gw_snapshot_write_item(daemon, item, &json);
+    gw_observe_send_event(daemon, &json, GW_TOPIC_STATE);
+}
+
+/// "12.300 N, stored (wheel)", or "none".
+static void describe(const gw_told_offset_t *offset, char *out_text, size_t size) {
+    const char *word = gw_offset_word(offset->provenance, offset->offset_us);
+    const bool stored = strcmp(word, gw_provenance_name(IW_OFFSET_STORED)) == 0;
+    if (offset->provenance == IW_OFFSET_NONE) {
+        (void)snprintf(out_text, size, "none");
+        return;
+    }
+    (void)snprintf(out_text, size, "%s%d.%03d N, %s%s%s%s", offset->offset_mN < 0 ? "-" : "",
+                   abs(offset->offset_mN / 1000), abs(offset->offset_mN % 1000), word, stored ? " (" : "",
+                   stored ? gw_provenance_name(offset->from) : "", stored ? ")" : "");
+}
+
+void gw_knowledge_tell_offset(gw_daemon_t *daemon, iw_side_t side, const gw_told_offset_t *now,
+                              const gw_told_offset_t *before) {
+    const bool known = now->provenance != IW_OFFSET_NONE;
+    const bool knew = before->provenance != IW_OFFSET_NONE;
+    const bool moved = knew && abs(now->offset_mN - before->offset_mN) > MOVED_mN;
+    char is[64];
+    char was[64];
+    describe(now, is, sizeof is);
+    describe(before, was, sizeof was);
+    gw_log(&daemon->log, moved ? GW_LOG_WARNING : GW_LOG_INFO, "%s force offset: %s; before: %s", side_name(side), is,
+           was);
+    json_out_t json = gw_observe_begin_event(daemon, "offset");
+    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    json_out_text(&json, "side", side_name(side));
+    json_out_known(&json, "offset_mN", known, now->offset_mN);
+    json_out_text(&json, "provenance", gw_offset_word(now->provenance, now->offset_us));
+    json_out_known(&json, "before_mN", knew, before->offset_mN);
+    json_out_text(&json, "before_provenance", gw_offset_word(before->provenance, before->offset_us));
+    gw_observe_send_event(daemon, &json, GW_TOPIC_FORCE);
+}
+
+void gw_knowledge_tell_memory(gw_daemon_t *daemon) {
+    const gw_knowledge_t *self = &daemon->knowledge;
+    gw_log_t *log = &daemon->log;
+    switch (self->state) {
+    case GW_MEMORY_KEPT:
+        gw_log(log, GW_LOG_INFO, "what is known of the wheels is kept in %s", self->path);
+        break;
+    case GW_MEMORY_NEW:
+        gw_log(log, GW_LOG_INFO, "nothing is known of these wheels yet; it will be kept in %s", self->path);
+        break;
+    case GW_MEMORY_IGNORED:
+        gw_log(log, GW_LOG_WARNING, "%s is ignored: %s; it is set aside as %s.damaged", self->path, self->reason,
+               self->path);
+        break;
+    case GW_MEMORY_FAILED:
+    case GW_MEMORY_LOADING:
+    default:
+        gw_log(log, GW_LOG_WARNING, "what is learnt about the wheels is not kept in %s: %s; %s", self->path,
+               strerror(self->error),
+               self->keeper.fd < 0 ? "start the gateway again"
+                                   : "make the directory and room in it, or set [record] directory; tried again");
+        break;
+    }
+}
+
+/// Names of the items in one state, as one text.
+static void list_items(const iw_ledger_t *ledger, iw_ledger_state_t state, char *out_text, size_t size) {
+    out_text[0] = '\0';
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        if (iw_ledger_entry(ledger, (iw_ledger_item_t)item)->state == state) {
+            const size_t length = strlen(out_text);
+            (void)snprintf(&out_text[length], size - length, "%s%s", length > 0U ? ", " : "",
+                           gw_ledger_item_name((iw_ledger_item_t)item));
+        }
+    }
+}
+
+void gw_knowledge_tell_ledger(gw_daemon_t *daemon) {
+    const iw_ledger_t *ledger = &daemon->gateway.ledger;
+    char items[512];
+    list_items(ledger, IW_LEDGER_CONFIRMED, items, sizeof items);
+    if (items[0] != '\0') {
+        gw_log(&daemon->log, GW_LOG_INFO, "confirmed before: %s", items);
+    }
+    list_items(ledger, IW_LEDGER_ASSUMED, items, sizeof items);
+    if (items[0] != '\0') {
+        gw_log(&daemon->log, GW_LOG_INFO, "assumed, never verified: %s", items);
+    }
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        const iw_ledger_entry_t *entry = iw_ledger_entry(ledger, (iw_ledger_item_t)item);
+        if (entry->state == IW_LEDGER_CONTRADICTED) {
+            gw_knowledge_tell_item(daemon, (iw_ledger_item_t)item);
+        }
+    }
+}

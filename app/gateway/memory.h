@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+/// What is known of the wheels, as it is kept from one run of the gateway to the next: evidence of the ledger and force
+/// offsets, as text.
+///
+/// The text is one line of JSON and one with its checksum. It names the bus it speaks of, and beside each piece of
+/// evidence the configured value for which it was found: evidence for another value is worth nothing. Whatever is not
+/// exactly as this program writes it is refused as a whole. Pure functions.
+#ifndef GATEWAY_MEMORY_H
+#define GATEWAY_MEMORY_H
+
+#include "assumption.h"
+
+#include "iwheel/force.h"
+
+/// The longest text that is written.
+#define GW_MEMORY_SIZE 8192U
+/// The longest reason for a refusal.
+#define GW_MEMORY_REASON_SIZE 128U
+
+/// Evidence for or against one item.
+typedef struct {
+    iw_ledger_entry_t entry; ///< IW_LEDGER_ASSUMED: there is none.
+    int64_t since_wall_us;
+    char value[GW_VALUE_SIZE]; ///< What was configured when it was found.
+    char found[GW_VALUE_SIZE]; ///< What the operator found instead; empty: nothing, or not told.
+} gw_known_item_t;
+
+/// The force offset of one wheel.
+typedef struct {
+    iw_offset_provenance_t from; ///< WHEEL, ESTIMATED or OPERATOR; IW_OFFSET_NONE: there is none.
+    iw_force_unit_t unit;        ///< Configured when it was taken.
+    int32_t offset_mN;
+    int32_t drift_mN;      ///< Of its window, with ESTIMATED and OPERATOR.
+    uint32_t deviation_mN; ///< The same.
+    uint32_t samples;      ///< The same.
+    int64_t wall_us;       ///< When it was taken.
+} gw_known_offset_t;
+
+typedef struct {
+    gw_known_item_t item[IW_LEDGER_ITEMS];
+    gw_known_offset_t offset[IW_SIDES];
+} gw_known_t;
+
+/// Writes the text. Its length; 0 if it does not fit.
+size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text, size_t size);
+
+/// Reads a text. False, with the reason in words and `*out_known` untouched, unless it was written by gw_memory_write
+/// for this bus. Uses the arena of json_arena.h, which it resets.
+bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t *out_known,
+                    char out_reason[GW_MEMORY_REASON_SIZE]);
+
+/// The name of the file for this bus.
+void gw_memory_name(const char *bus, char *out_name, size_t size);
+
+#endif

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+// Forces, with where their zero comes from and how good it is.
+#include "snapshot.h"
+
+#include "iwheel_linux/clock.h"
+
+static iw_ledger_item_t unit_item(iw_side_t side) {
+    return side == IW_LEFT ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
+}
+
+iw_force_validity_t gw_snapshot_force_validity(const gw_daemon_t *daemon, iw_side_t side) {
+    const iw_ledger_entry_t *unit = iw_ledger_entry(&daemon->gateway.ledger, unit_item(side));
+    const iw_ledger_entry_t *included = iw_ledger_entry(&daemon->gateway.ledger, IW_LEDGER_OFFSET_INCLUDED);
+    iw_force_t view = daemon->gateway.force[side];
+    const bool settled = view.evidence == IW_UNIT_OFFSET_REMOVED ? included->evidence == IW_EVIDENCE_OPERATOR
+                                                                 : unit->evidence == IW_EVIDENCE_OPERATOR;
+    if (settled && view.evidence != IW_UNIT_UNKNOWN && iw_force_validity(&view, daemon->now_us) != IW_FORCE_VALID) {
+        view.evidence =
+            IW_UNIT_UNCLEAR; // The operator's word against the wheel's offset: only a tare is to be trusted.
+    }
+    const iw_force_validity_t validity = iw_force_validity(&view, daemon->now_us);
+    if (validity == IW_FORCE_VALID && unit->state == IW_LEDGER_CONTRADICTED) {
+        return IW_FORCE_UNIT_CONTRADICTED;
+    }
+    if (validity == IW_FORCE_VALID && included->state == IW_LEDGER_CONTRADICTED &&
+        view.provenance != IW_OFFSET_OPERATOR) {
+        return IW_FORCE_OFFSET_REMOVED;
+    }
+    return validity;
+}
+
+/// Where the zero comes from, and how good it is.
+typedef struct {
+    const gw_known_offset_t *known; ///< As noted when it was taken.
+    const char *word;
+    int64_t age_ms; ///< -1: unknown.
+    uint32_t samples;
+    uint32_t deviation_mN;
+    int32_t drift_mN;
+    bool measured;     ///< The three before mean something.
+    bool judged;       ///< The next means something.
+    bool contaminated; ///< Taken while the wheel turned, or under load or unrest.
+} zero_t;
+
+static int64_t age_ms(const gw_daemon_t *daemon, const iw_force_t *force, const gw_known_offset_t *known) {
+    const int64_t wall_us = iw_clock_wall_us();
+    if (force->provenance == IW_OFFSET_NONE) {
+        return -1;
+    }
+    if (force->offset_us != IW_NEVER) {
+        return (int64_t)((daemon->now_us - force->offset_us) / IW_US_PER_MS);
+    }
+    return known->wall_us > 0 && known->wall_us <= wall_us ? (wall_us - known->wall_us) / 1000 : -1;
+}
+
+static zero_t describe_zero(const gw_daemon_t *daemon, iw_side_t side) {
+    const iw_force_t *force = &daemon->gateway.force[side];
+    const gw_known_offset_t *known = &daemon->knowledge.known.offset[side];
+    const bool ours = force->provenance != IW_OFFSET_NONE && force->provenance != IW_OFFSET_WHEEL &&
+                      (known->from == IW_OFFSET_ESTIMATED || known->from == IW_OFFSET_OPERATOR);
+    const bool window = force->quality.window != IW_WINDOW_OPEN;
+    const bool bad = window && force->quality.window != IW_WINDOW_GOOD;
+    zero_t zero = {.known = known,
+                   .word = gw_offset_word(force->provenance, force->offset_us),
+                   .age_ms = age_ms(daemon, force, known),
+                   .samples = force->quality.samples,
+                   .deviation_mN = force->quality.deviation_mN,
+                   .drift_mN = force->quality.drift_mN,
+                   .measured = window,
+                   .judged = bad,
+                   .contaminated = bad};
+    if (ours) {
+        zero.samples = known->samples;
+        zero.deviation_mN = known->deviation_mN;
+        zero.drift_mN = known->drift_mN;
+        zero.measured = true;
+        zero.judged = true;
+        zero.contaminated = false;
+    } else if (force->provenance == IW_OFFSET_WHEEL) { // We judge what we saw: its first two seconds, or its rest now.
+        const bool doubted = force->evidence == IW_UNIT_UNCLEAR;
+        zero.judged = doubted || force->evidence != IW_UNIT_UNKNOWN || (force->boot_seen && window);
+        zero.contaminated = doubted;
+    }
+    return zero;
+}
+
+static void write_known_bool(json_out_t *json, const char *name, bool known, bool value) {
+    if (known) {
+        json_out_bool(json, name, value);
+    } else {
+        json_out_null(json, name);
+    }
+}
+
+void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
+    const iw_force_t *force = &daemon->gateway.force[side];
+    const iw_force_validity_t validity = gw_snapshot_force_validity(daemon, side);
+    const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
+    const bool offset = force->provenance != IW_OFFSET_NONE;
+    const zero_t zero = describe_zero(daemon, side);
+    json_out_known(json, "force_raw", heard, force->raw);
+    json_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
+    json_out_known(json, "force_offset_mN", offset, force->offset_mN);
+    json_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+    json_out_text(json, "force_validity", gw_force_validity_name(validity));
+    gw_snapshot_write_age(json, "force_age_ms", daemon->now_us, force->raw_us);
+    json_out_text(json, "offset_provenance", zero.word);
+    json_out_text(json, "offset_origin",
+                  zero.known->from != IW_OFFSET_NONE ? gw_provenance_name(zero.known->from) : NULL);
+    json_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
+    write_known_bool(json, "offset_contaminated", zero.judged, zero.contaminated);
+    json_out_text(json, "offset_window", gw_window_name(force->quality.window));
+    json_out_known(json, "offset_samples", zero.measured, zero.samples);
+    json_out_known(json, "offset_deviation_mN", zero.measured, zero.deviation_mN);
+    json_out_known(json, "offset_drift_mN", zero.measured, zero.drift_mN);
+    json_out_known(json, "wheel_offset_mN", force->wheel_offset_heard, (int64_t)force->wheel_offset_dN * 100);
+    json_out_text(json, "unit_evidence", gw_unit_evidence_name(force->evidence));
+}
+
+void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json) {
+    json_out_int(json, "t_us", (int64_t)daemon->now_us);
+    for (unsigned i = 0; i < IW_SIDES; ++i) {
+        const iw_side_t side = (iw_side_t)i;
+        const iw_force_t *force = &daemon->gateway.force[side];
+        const iw_force_validity_t validity = gw_snapshot_force_validity(daemon, side);
+        const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
+        const zero_t zero = describe_zero(daemon, side);
+        json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
+        json_out_known(json, "raw", heard, force->raw);
+        json_out_known(json, "raw_mN", heard, iw_force_raw_mN(force));
+        json_out_known(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
+        json_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+        json_out_text(json, "validity", gw_force_validity_name(validity));
+        json_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
+        gw_snapshot_write_age(json, "age_ms", daemon->now_us, force->raw_us);
+        json_out_text(json, "provenance", zero.word);
+        json_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
+        write_known_bool(json, "contaminated", zero.judged, zero.contaminated);
+        json_out_known(json, "samples", zero.measured, zero.samples);
+        json_out_known(json, "deviation_mN", zero.measured, zero.deviation_mN);
+        json_out_close(json, '}');
+    }
+}

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+#include "heard.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <poll.h>
+
+/// How often the bus is looked at although nothing wakes us: unknown ids come through a socket that is not watched.
+#define LOOK_MS 10
+
+const inspect_message_t inspect_messages[INSPECT_MESSAGES] = {
+    {"speed", IW_LEFT, IW_PROTO_SPEED, 250000U, IW_ID_LEFT_SPEED, true},
+    {"status", IW_LEFT, IW_PROTO_STATUS, 25000U, IW_ID_LEFT_STATUS, true},
+    {"force", IW_LEFT, IW_PROTO_FORCE, 20000U, IW_ID_LEFT_FORCE, true},
+    {"offset", IW_LEFT, IW_PROTO_OFFSET, 1000U, IW_ID_LEFT_OFFSET, false},
+    {"speed", IW_RIGHT, IW_PROTO_SPEED, 250000U, IW_ID_RIGHT_SPEED, true},
+    {"status", IW_RIGHT, IW_PROTO_STATUS, 25000U, IW_ID_RIGHT_STATUS, true},
+    {"pose", IW_RIGHT, IW_PROTO_POSE, 25000U, IW_ID_RIGHT_POSE, true},
+    {"force", IW_RIGHT, IW_PROTO_FORCE, 20000U, IW_ID_RIGHT_FORCE, true},
+    {"offset", IW_RIGHT, IW_PROTO_OFFSET, 1000U, IW_ID_RIGHT_OFFSET, false},
+    {"setpoint", IW_LEFT, IW_PROTO_SETPOINT, 0U, IW_ID_LEFT_SETPOINT, false},
+    {"setpoint", IW_RIGHT, IW_PROTO_SETPOINT, 0U, IW_ID_RIGHT_SETPOINT, false},
+};
+
+unsigned inspect_message_of(uint32_t id) {
+    unsigned i = 0;
+    while (i < INSPECT_MESSAGES && inspect_messages[i].id != id) {
+        ++i;
+    }
+    return i;
+}
+
+void inspect_heard_begin(inspect_heard_t *self) {
+    *self = (inspect_heard_t){.estop = -1, .worst = IW_BUS_ACTIVE};
+}
+
+static void note_stranger(inspect_heard_t *self, uint32_t id) {
+    ++self->strange;
+    for (uint32_t i = 0; i < self->strange_ids; ++i) {
+        if (self->strange_id[i] == id) {
+            return;
+        }
+    }
+    if (self->strange_ids < INSPECT_STRANGERS) {
+        self->strange_id[self->strange_ids++] = id;
+    }
+}
+
+void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame) {
+    iw_proto_message_t message;
+    self->bits += iw_bus_frame_bits(frame);
+    if (frame->kind == (uint8_t)IW_CAN_ECHO) {
+        return;
+    }
+    switch (iw_proto_decode(frame, &message)) {
+    case IW_OK:
+        ++self->count[inspect_message_of(frame->id)];
+        break;
+    case IW_ERR_LENGTH:
+        ++self->bad_length;
+        break;
+    case IW_ERR_FORMAT:
+        ++self->bad_format;
+        break;
+    default:
+        note_stranger(self, frame->id);
+        break;
+    }
+}
+
+static void look(iw_linux_hal_t *hal, iw_time_us_t now_us, bool counting, inspect_heard_t *heard) {
+    const iw_hal_t functions = iw_linux_hal_functions(hal);
+    iw_can_frame_t frame;
+    iw_linux_hal_tend(hal, now_us);
+    const iw_bus_state_t state = functions.bus_state(functions.context);
+    heard->was_up = heard->was_up || state >= IW_BUS_PASSIVE;
+    heard->worst = state < heard->worst ? state : heard->worst;
+    heard->estop = functions.estop_pressed(functions.context);
+    while (functions.receive(functions.context, &frame) > 0) {
+        if (counting) {
+            inspect_heard_take(heard, &frame);
+        }
+    }
+}
+
+void inspect_listen(iw_linux_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard) {
+    inspect_heard_begin(out_heard);
+    struct pollfd wait = {.fd = iw_linux_hal_bus_fd(hal), .events = POLLIN};
+    look(hal, iw_clock_now_us(), false, out_heard); // What waited since the bus was opened has no time.
+    const iw_time_us_t begin_us = iw_clock_now_us();
+    for (iw_time_us_t now_us = begin_us; now_us < begin_us + for_us; now_us = iw_clock_now_us()) {
+        look(hal, now_us, true, out_heard);
+        (void)poll(&wait, 1, LOOK_MS);
+    }
+    out_heard->span_us = iw_clock_now_us() - begin_us;
+}
+
+uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message) {
+    return self->span_us == 0U ? 0U : (uint32_t)((uint64_t)self->count[message] * 1000U * 1000000U / self->span_us);
+}
+
+uint32_t inspect_load_permille(const inspect_heard_t *self, uint32_t bitrate_hz) {
+    if (self->span_us == 0U || bitrate_hz == 0U) {
+        return 0U;
+    }
+    return (uint32_t)(self->bits * 1000000U / bitrate_hz * 1000U / self->span_us);
+}

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+/// Everything that was heard on a bus while listening for a while: how many frames of each message, how much of the bus
+/// they took, and what does not belong there. Nothing is ever sent.
+#ifndef INSPECT_HEARD_H
+#define INSPECT_HEARD_H
+
+#include "iwheel/proto.h"
+#include "iwheel_linux/linux_hal.h"
+
+/// Other ids that are kept by number.
+#define INSPECT_STRANGERS 8U
+#define INSPECT_MESSAGES  11U
+
+/// A message of the document.
+typedef struct {
+    const char *name; ///< "speed", "status", ...
+    iw_side_t side;
+    iw_proto_kind_t kind;
+    uint32_t nominal_mHz; ///< Frames in 1000 s ...
+    uint16_t id;
+    bool always; ///< ... as long as the wheel has power; else only in its first minute, or from us.
+} inspect_message_t;
+
+/// The eleven messages with their nominal rates.
+extern const inspect_message_t inspect_messages[INSPECT_MESSAGES];
+
+typedef struct {
+    uint32_t count[INSPECT_MESSAGES]; ///< Good frames, in the order of `inspect_messages`; our own echoes are none.
+    uint32_t bad_length;              ///< Known id, shorter than the table.
+    uint32_t bad_format;              ///< Known id on a remote, extended or FD frame.
+    uint32_t strange;                 ///< Frames of any other id.
+    uint32_t strange_id[INSPECT_STRANGERS]; ///< Their id words, as in iw_can_frame_t.
+    uint32_t strange_ids;                   ///< How many of these.
+    uint64_t bits;                          ///< Of all frames, without stuff bits.
+    iw_time_us_t span_us;                   ///< How long was listened.
+    bool was_up;                            ///< The bus took part in life at least for a moment.
+    iw_bus_state_t worst;                   ///< The worst state of the bus seen.
+    int estop;                              ///< The last answer of the e-stop, as in iw_hal_t.
+} inspect_heard_t;
+
+void inspect_heard_begin(inspect_heard_t *self);
+
+/// Takes one frame.
+void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame);
+
+/// Listens for so long; blocks. The HAL must be open.
+void inspect_listen(iw_linux_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard);
+
+/// Frames per 1000 s of the message with that index.
+uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message);
+
+/// Index of the message with this id; INSPECT_MESSAGES if there is none.
+unsigned inspect_message_of(uint32_t id);
+
+/// Share of the bus that all frames took.
+uint32_t inspect_load_permille(const inspect_heard_t *self, uint32_t bitrate_hz);
+
+#endif

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+#include "inspect.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+/// A rate this far from the nominal one is worth a warning; and a frame or two may lie outside the time listened.
+#define RATE_OFF_PERMILLE 100U
+#define RATE_OFF_FRAMES   2U
+/// More of the bus than this delays setpoints (their ids lose arbitration to the wheels' speeds and to all lower ids).
+#define LOAD_HIGH_PERMILLE 500U
+
+#define MESSAGE_FORMAT "%s %s %u (0x%03X)"
+
+static const char *side_of(const inspect_message_t *message) {
+    return message->side == IW_LEFT ? "left" : "right";
+}
+
+static const char *wheel_check(iw_side_t side) {
+    return side == IW_LEFT ? "left_wheel" : "right_wheel";
+}
+
+/// "250.0"
+static void write_rate(uint32_t rate_mHz, char out_text[16]) {
+    (void)snprintf(out_text, 16, "%" PRIu32 ".%" PRIu32, rate_mHz / 1000U, rate_mHz % 1000U / 100U);
+}
+
+/// True if the message does not come as often as it should.
+static bool rate_is_off(const inspect_heard_t *heard, unsigned index) {
+    const inspect_message_t *message = &inspect_messages[index];
+    const uint64_t wanted = (uint64_t)message->nominal_mHz * heard->span_us / 1000000U / 1000U;
+    const uint64_t got = heard->count[index];
+    const uint64_t off = got > wanted ? got - wanted : wanted - got;
+    return message->always && off > wanted * RATE_OFF_PERMILLE / 1000U + RATE_OFF_FRAMES;
+}
+
+static void judge_rate(const inspect_heard_t *heard, unsigned index, inspect_findings_t *findings) {
+    const inspect_message_t *message = &inspect_messages[index];
+    char rate[16];
+    char nominal[16];
+    if (!rate_is_off(heard, index)) {
+        return;
+    }
+    write_rate(inspect_rate_mHz(heard, index), rate);
+    write_rate(message->nominal_mHz, nominal);
+    if (heard->count[index] == 0U) {
+        inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": not heard; the document has %s a second",
+                    side_of(message), message->name, message->id, message->id, nominal);
+    } else {
+        inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": %s a second; the document has %s",
+                    side_of(message), message->name, message->id, message->id, rate, nominal);
+    }
+    inspect_cure(findings, "frames get lost: check termination (60 ohm between CAN-H and CAN-L), cable and adapter; or "
+                           "this wheel's firmware is another");
+}
+
+/// Whether a wheel is there, and what it sends how often.
+static void judge_wheel(const inspect_heard_t *heard, iw_side_t side, inspect_findings_t *findings) {
+    const char *name = side == IW_LEFT ? "left" : "right";
+    const uint64_t span_ms = heard->span_us / IW_US_PER_MS;
+    char list[INSPECT_TEXT_SIZE] = "";
+    uint32_t speeds = 0;
+    for (unsigned i = 0; i < INSPECT_MESSAGES; ++i) {
+        const inspect_message_t *message = &inspect_messages[i];
+        if (message->side != side || message->nominal_mHz == 0U) {
+            continue;
+        }
+        speeds += message->kind == IW_PROTO_SPEED ? heard->count[i] : 0U;
+        if (heard->count[i] > 0U) {
+            const size_t length = strlen(list);
+            char rate[16];
+            write_rate(inspect_rate_mHz(heard, i), rate);
+            (void)snprintf(&list[length], sizeof list - length, "%s%s %s/s", length > 0U ? ", " : "", message->name,
+                           rate);
+        }
+    }
+    if (speeds == 0U) {
+        inspect_say(findings, wheel_check(side), INSPECT_FAIL, "%s wheel: not heard for %" PRIu64 " ms", name, span_ms);
+        inspect_cure(findings, "check its power, cable and termination");
+        return;
+    }
+    inspect_say(findings, wheel_check(side), INSPECT_OK, "%s wheel: %s", name, list);
+    for (unsigned i = 0; i < INSPECT_MESSAGES; ++i) {
+        if (inspect_messages[i].side == side) {
+            judge_rate(heard, i, findings);
+        }
+    }
+}
+
+static void judge_others(const inspect_heard_t *heard, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    const uint32_t setpoints =
+        heard->count[inspect_message_of(IW_ID_LEFT_SETPOINT)] + heard->count[inspect_message_of(IW_ID_RIGHT_SETPOINT)];
+    if (setpoints > 0U && !wish->others_may_send) {
+        inspect_say(findings, "second_master", INSPECT_FAIL,
+                    "somebody sends setpoints: %" PRIu32 " frames with id 266 (0x10A) or 298 (0x12A)", setpoints);
+        inspect_cure(findings, "switch it off, or stop the gateway that does");
+    }
+}
+
+static void judge_strangers(const inspect_heard_t *heard, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    char list[160] = "";
+    if (heard->strange == 0U) {
+        return;
+    }
+    for (uint32_t i = 0; i < heard->strange_ids; ++i) {
+        const uint32_t id = heard->strange_id[i];
+        const bool extended = (id & IW_CAN_EXTENDED) != 0U;
+        const uint32_t number = id & (extended ? 0x1FFFFFFFU : IW_CAN_ID_MASK);
+        const size_t length = strlen(list);
+        (void)snprintf(&list[length], sizeof list - length, extended ? "%s0x%08" PRIX32 : "%s0x%03" PRIX32,
+                       i > 0U ? " " : "", number);
+    }
+    inspect_say(findings, "unknown_ids", INSPECT_WARN, "%" PRIu32 " frames are none of the wheels': %s%s",
+                heard->strange, list, heard->strange_ids == INSPECT_STRANGERS ? " ..." : "");
+    if (strncmp(wish->name, "unix:", 5U) == 0) {
+        inspect_cure(findings, "look at them with: iwheelctl watch frame");
+    } else {
+        inspect_cure(findings, "find out who sends them: candump %s", wish->name);
+    }
+}
+
+static void judge_damage(const inspect_heard_t *heard, inspect_findings_t *findings) {
+    if (heard->bad_length > 0U) {
+        inspect_say(findings, "lengths", INSPECT_WARN,
+                    "%" PRIu32 " frames of the wheels' ids are shorter than the document's table, and are ignored",
+                    heard->bad_length);
+        inspect_cure(findings, "another device uses these ids, or this wheel's firmware is another");
+    }
+    if (heard->bad_format > 0U) {
+        inspect_say(findings, "lengths", INSPECT_WARN,
+                    "%" PRIu32 " remote, extended or FD frames bear the wheels' ids, and are ignored",
+                    heard->bad_format);
+        inspect_cure(findings, "find the device that sends them and give it other ids");
+    }
+}
+
+static void judge_load(const inspect_heard_t *heard, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    const uint32_t load = inspect_load_permille(heard, wish->bitrate_hz);
+    const bool high = load > LOAD_HIGH_PERMILLE;
+    inspect_say(findings, "load", high ? INSPECT_WARN : INSPECT_OK,
+                "bus load: %" PRIu32 ".%" PRIu32 " %% without stuff bits; both wheels alone make about 6 %%",
+                load / 10U, load % 10U);
+    if (high) {
+        inspect_cure(findings, "setpoints have to wait for lower ids: take other devices off this bus");
+    }
+}
+
+/// False if nothing more can be said of the bus.
+static bool judge_life(const iw_bus_link_t *link, const inspect_heard_t *heard, const inspect_wish_t *wish,
+                       inspect_findings_t *findings) {
+    const char *bus = wish->name;
+    if (heard->was_up) {
+        if (link->presence == IW_LINK_LOCAL) {
+            inspect_say(findings, "interface", INSPECT_OK, "bus %s: up", bus);
+        }
+        if (heard->worst == IW_BUS_PASSIVE) {
+            inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: error passive: most frames go wrong", bus);
+            inspect_cure(findings, "check bit rate, sample point, termination; a wheel without power acknowledges "
+                                   "nothing");
+        }
+        return true;
+    }
+    if (link->presence == IW_LINK_LOCAL) {
+        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: nobody there", bus);
+        inspect_cure(findings, "start the simulator: iwheel-sim --can %s", bus);
+    } else if (link->presence == IW_LINK_UP) {
+        inspect_say(findings, "bus_state", INSPECT_FAIL, "bus %s: bus-off", bus);
+        inspect_cure(findings, "check cable, termination and bit rate, then: ip link set %s down; ip link set %s up",
+                     bus, bus);
+    }
+    return false;
+}
+
+void inspect_bus(const iw_bus_link_t *link, const inspect_heard_t *heard, const inspect_wish_t *wish,
+                 inspect_findings_t *findings) {
+    if (!judge_life(link, heard, wish, findings)) {
+        return;
+    }
+    judge_wheel(heard, IW_LEFT, findings);
+    judge_wheel(heard, IW_RIGHT, findings);
+    judge_load(heard, wish, findings);
+    judge_others(heard, wish, findings);
+    judge_strangers(heard, wish, findings);
+    judge_damage(heard, findings);
+}

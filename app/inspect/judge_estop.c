@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#include "inspect.h"
+
+#include <errno.h>
+#include <string.h>
+
+const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
+    const int trouble = iw_linux_hal_estop_trouble(hal);
+    if (trouble == 0) {
+        return "";
+    }
+    if (hal->estop_ops->simulated) {
+        return "the simulator is not there; start it with this --estop";
+    }
+    switch (trouble) {
+    case ENOENT:
+        return "there is no such line; gpioinfo lists them";
+    case EBUSY:
+        return "the line is busy: another program has it; gpioinfo names that program";
+    case EACCES:
+    case EPERM:
+        return "not allowed; add the gateway's user to the group that owns /dev/gpiochip*";
+    default:
+        return "its chip is gone or does not answer; gpiodetect lists the chips";
+    }
+}
+
+inspect_estop_t inspect_estop_of(const iw_linux_hal_t *hal, const char *line) {
+    return (inspect_estop_t){
+        .line = line,
+        .present = hal->estop_ops->present,
+        .simulated = hal->estop_ops->simulated,
+        .level = hal->estop_last,
+        .trouble = inspect_estop_trouble(hal),
+    };
+}
+
+void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings) {
+    if (!estop->present) {
+        inspect_say(findings, "estop", INSPECT_WARN, "e-stop: none");
+        inspect_cure(findings, "wire a button and set [estop] line");
+    } else if (estop->level < 0) {
+        inspect_say(findings, "estop", INSPECT_FAIL, "e-stop %s: unreadable, which counts as pressed", estop->line);
+        inspect_cure(findings, "%s", estop->trouble);
+    } else {
+        inspect_say(findings, "estop", estop->simulated ? INSPECT_WARN : INSPECT_OK, "e-stop %s: %s%s", estop->line,
+                    estop->level > 0 ? "pressed" : "released", estop->simulated ? ", SIMULATED" : "");
+        if (estop->simulated) {
+            inspect_cure(findings, "wire a button before real wheels turn");
+        }
+    }
+}
+
+void inspect_unopened(const char *culprit, bool is_bus, int error, inspect_findings_t *findings) {
+    const char *check = is_bus ? "interface" : "estop";
+    const char *what = is_bus ? "bus" : "e-stop";
+    if (error == ENOTSUP) {
+        inspect_say(findings, check, INSPECT_FAIL,
+                    "%s %s: %s was missing when this was built, so it %s only (unix:PATH)", what, culprit,
+                    is_bus ? "libmnl" : "libgpiod",
+                    is_bus ? "serves the simulator's bus" : "reads the simulator's button");
+        inspect_cure(findings, "apt-get install %s, configure and build again", is_bus ? "libmnl-dev" : "libgpiod-dev");
+    } else if (error == EAFNOSUPPORT && is_bus) {
+        inspect_say(findings, check, INSPECT_FAIL, "bus %s: this kernel has no CAN sockets", culprit);
+        inspect_cure(findings, "modprobe can_raw, or use the simulator's bus: --can unix:PATH");
+    } else {
+        inspect_say(findings, check, INSPECT_FAIL, "%s %s: %s", what, culprit, strerror(error));
+        inspect_cure(findings, "correct %s", is_bus ? "[bus] interface or --can" : "[estop] line or --estop");
+    }
+}

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+#include "inspect.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+/// The commands that set an interface as the wheels need it.
+static void cure_timing(const inspect_wish_t *wish, inspect_findings_t *findings) {
+    const char *bus = wish->name;
+    inspect_cure(findings,
+                 "set it: ip link set %s down; ip link set %s type can bitrate %" PRIu32
+                 " sample-point 0.%03u restart-ms 100; ip link set %s txqueuelen %u; ip link set %s up",
+                 bus, bus, wish->bitrate_hz, wish->sample_point_permille, bus, IW_LINK_QUEUE_MAX, bus);
+}
+
+static void judge_presence(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    const char *bus = wish->name;
+    switch (link->presence) {
+    case IW_LINK_ABSENT:
+        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: there is no such interface", bus);
+        inspect_cure(findings, "plug the adapter in, or name the right one in [bus] interface: ip -brief link show "
+                               "type can");
+        break;
+    case IW_LINK_NOT_CAN:
+        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: not a CAN interface", bus);
+        inspect_cure(findings, "name the right one in [bus] interface: ip -brief link show type can");
+        break;
+    case IW_LINK_DOWN:
+        inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: the interface is down", bus);
+        if (link->is_virtual) {
+            inspect_cure(findings, "ip link set %s up", bus);
+        } else {
+            cure_timing(wish, findings);
+        }
+        break;
+    default:
+        inspect_say(findings, "interface", INSPECT_OK, "bus %s: the interface is up", bus);
+        break;
+    }
+}
+
+static void judge_mode(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    const char *bus = wish->name;
+    if (link->is_mute) {
+        inspect_say(findings, "mode", INSPECT_FAIL, "%s is in listen-only mode and cannot send", bus);
+        inspect_cure(findings, "ip link set %s down; ip link set %s type can listen-only off; ip link set %s up", bus,
+                     bus, bus);
+    }
+}
+
+static void judge_timing(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    static const inspect_verdict_t verdicts[] = {
+        [IW_TIMING_VIRTUAL] = INSPECT_OK, [IW_TIMING_UNKNOWN] = INSPECT_WARN, [IW_TIMING_RIGHT] = INSPECT_OK,
+        [IW_TIMING_NEAR] = INSPECT_WARN,  [IW_TIMING_WRONG] = INSPECT_FAIL,
+    };
+    const iw_timing_t timing = iw_timing_judge(link, wish->bitrate_hz, wish->sample_point_permille);
+    char bitrate[24] = "--";
+    char sample_point[24] = "--";
+    if (timing == IW_TIMING_VIRTUAL || link->presence < IW_LINK_DOWN) {
+        return;
+    }
+    if (link->bitrate_hz != 0U) {
+        (void)snprintf(bitrate, sizeof bitrate, "%" PRIu32 " bit/s", link->bitrate_hz);
+    }
+    if (link->sample_point_permille != 0U) {
+        (void)snprintf(sample_point, sizeof sample_point, "%u.%u %%", link->sample_point_permille / 10U,
+                       link->sample_point_permille % 10U);
+    }
+    inspect_say(findings, "bit_timing", timing == IW_TIMING_WRONG && !wish->refuses ? INSPECT_WARN : verdicts[timing],
+                "bit timing: %s, sample point %s; wanted %" PRIu32 " bit/s, %u.%u %%", bitrate, sample_point,
+                wish->bitrate_hz, wish->sample_point_permille / 10U, wish->sample_point_permille % 10U);
+    if (timing != IW_TIMING_RIGHT) {
+        cure_timing(wish, findings);
+    }
+}
+
+static void judge_queue(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    if (link->presence < IW_LINK_DOWN || link->is_virtual || link->queue_length <= IW_LINK_QUEUE_MAX) {
+        return;
+    }
+    inspect_say(findings, "queue", INSPECT_WARN,
+                "queue of %s: %" PRIu32 " frames may wait in it, and be old when a dead bus revives", wish->name,
+                link->queue_length);
+    inspect_cure(findings, "ip link set %s txqueuelen %u", wish->name, IW_LINK_QUEUE_MAX);
+}
+
+static void judge_restart(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    const char *bus = wish->name;
+    if (link->presence < IW_LINK_DOWN || link->is_virtual || link->restart_ms != 0U) {
+        return;
+    }
+    inspect_say(findings, "restart", INSPECT_WARN, "after bus-off %s stays off until somebody restarts it", bus);
+    inspect_cure(findings, "ip link set %s down; ip link set %s type can restart-ms 100; ip link set %s up", bus, bus,
+                 bus);
+}
+
+static void judge_echo(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    if (link->presence == IW_LINK_ABSENT || link->presence == IW_LINK_NOT_CAN || link->echo_proven) {
+        return;
+    }
+    inspect_say(findings, "echo", INSPECT_WARN,
+                "the echo of %s is unproven: whether a setpoint was on the bus cannot be known", wish->name);
+    inspect_cure(findings, "use an adapter whose driver has IFF_ECHO (most have; vcan and slcan have not)");
+}
+
+void inspect_link(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {
+    if (link->presence == IW_LINK_LOCAL) {
+        return;
+    }
+    judge_presence(link, wish, findings);
+    judge_mode(link, wish, findings);
+    judge_timing(link, wish, findings);
+    judge_queue(link, wish, findings);
+    judge_restart(link, wish, findings);
+    judge_echo(link, wish, findings);
+}
