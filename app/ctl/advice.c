@@ -53,6 +53,19 @@ static bool is_unset(const json_t *status, const char *item) {
     return strcmp(text_word(entry, "evidence"), "none") == 0;
 }
 
+/// Contradictions that refuse arm: the gateway says so by how it tells the cost.
+static void add_contradictions(const json_t *status, advice_t *self) {
+    static const char refuses[] = "arm is refused; ";
+    const char *name = NULL;
+    json_t *entry = NULL;
+    json_object_foreach(json_object_get(status, "ledger"), name, entry) {
+        const char *cost = text_word(entry, "disabled");
+        if (strncmp(cost, refuses, sizeof(refuses) - 1U) == 0) {
+            add(self, "cannot arm, %.32s is contradicted: %.96s", name, cost + sizeof(refuses) - 1U);
+        }
+    }
+}
+
 static void add_present(const json_t *status, advice_t *self) {
     size_t index = 0;
     const json_t *present = NULL;
@@ -77,6 +90,7 @@ static void advise_listening(const json_t *status, advice_t *self) {
     if (is_unset(status, "current_role")) {
         add(self, "cannot arm: set current_role (limit or setpoint) under [wheels]");
     }
+    add_contradictions(status, self);
     if (self->lines == 0) {
         add(self, "ready: iwheelctl drive LEFT RIGHT (mm/s) arms and MOVES the wheels");
     }

@@ -13,10 +13,12 @@ enum {
     CTL_OK = 0,
     CTL_NO = 1, ///< The gateway answered "no", or a drive did not run to its end.
     CTL_USAGE = 64,
+    CTL_DATA = 65, ///< A recording that cannot be understood, or not wholly.
     CTL_UNAVAILABLE = 69,
     CTL_INTERNAL = 70,
     CTL_TIMEOUT = 75,
     CTL_PERMISSION = 77,
+    CTL_CONFIG = 78,
 };
 
 /// What the options say, for every verb.
@@ -36,6 +38,15 @@ int verb_estop(ctl_t *self, int count, char **words);
 int verb_reset(ctl_t *self, int count, char **words);
 int verb_tare(ctl_t *self, int count, char **words);
 int verb_why(ctl_t *self, int count, char **words);
+int verb_ledger(ctl_t *self, int count, char **words);
+int verb_confirm(ctl_t *self, int count, char **words);
+int verb_doctor(ctl_t *self, int count, char **words);
+int verb_learn(ctl_t *self, int count, char **words);
+int verb_record(ctl_t *self, int count, char **words);
+int verb_replay(ctl_t *self, int count, char **words);
+int verb_decode(ctl_t *self, int count, char **words);
+int verb_bringup(ctl_t *self, int count, char **words);
+int verb_top(ctl_t *self, int count, char **words);
 
 /// Prints "iwheelctl: ..." on stderr and returns `code`.
 __attribute__((format(printf, 2, 3))) int ctl_fail(int code, const char *format, ...);

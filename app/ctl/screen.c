@@ -74,6 +74,9 @@ static void draw_surroundings(const paper_t *paper, const json_t *status) {
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
 
+/// Instead of a number of digits: an age.
+#define AGE 99U
+
 typedef struct {
     const char *field; ///< Null: no such value.
     const char *unit;
@@ -95,7 +98,8 @@ static const row_t rows[] = {
     {"distance", {{"distance_mm", "m", 3}, {"ticks", "ticks", 0}}, NULL},
     {"net force", {{"force_net_mN", "N", 3}}, "force_validity"},
     {"raw force", {{"force_raw_mN", "N", 3}, {"force_age_ms", "ms ago", 0}}, NULL},
-    {"offset", {{"force_offset_mN", "N", 3}}, "offset_provenance"},
+    {"its zero", {{"force_offset_mN", "N", 3}}, "offset_provenance"},
+    {"taken", {{"offset_age_ms", "ago", AGE}, {"offset_deviation_mN", "N noise", 3}}, NULL},
     {"unit evidence", {{NULL, NULL, 0}}, "unit_evidence"},
     {"battery", {{"battery_dV", "V", 1}, {"status_age_ms", "ms ago", 0}}, NULL},
     {"controller", {{"temperature_degC", "degC", 0}, {"cpu_percent", "% CPU", 0}}, NULL},
@@ -107,23 +111,42 @@ static bool is_lower_bound(const value_t *value, const json_t *wheel) {
     return is(value->field, "battery_dV") && json_is_true(get(get(wheel, "saturated"), "battery"));
 }
 
+static void write_value(const value_t *value, const json_t *wheel, char number[TEXT_CELL]) {
+    char age[TEXT_CELL];
+    if (value->digits != AGE) {
+        text_decimal(get(wheel, value->field), value->digits, value->unit, number);
+        return;
+    }
+    text_age(get(wheel, value->field), age);
+    (void)snprintf(number, TEXT_CELL, "%.32s%s%s", age, is(age, "--") ? "" : " ", is(age, "--") ? "" : value->unit);
+}
+
+/// The word that explains the values; of a zero also where a stored one came from, and whether it was taken under load.
+static void write_remark(const row_t *row, const json_t *wheel, char remark[TEXT_CELL]) {
+    const char *word = row->remark != NULL ? text_word(wheel, row->remark) : "";
+    const bool zero = row->remark != NULL && is(row->remark, "offset_provenance");
+    const bool stored = zero && is(word, "stored") && json_is_string(get(wheel, "offset_origin"));
+    const bool spoilt = zero && json_is_true(get(wheel, "offset_contaminated"));
+    (void)snprintf(remark, TEXT_CELL, "%.16s%s%.16s%s%s", is(word, "valid") ? "" : word, stored ? " (" : "",
+                   stored ? text_word(wheel, "offset_origin") : "", stored ? ")" : "", spoilt ? " IN DOUBT" : "");
+}
+
 static void draw_cell(const paper_t *paper, const row_t *row, unsigned width, const json_t *wheel) {
     char cell[PAPER_CELL] = "";
     char number[TEXT_CELL];
+    char remark[TEXT_CELL];
     size_t used = 0;
     bool known = row->values[0].field == NULL;
     for (size_t i = 0; i < 2 && row->values[i].field != NULL; i++) {
         const value_t *value = &row->values[i];
-        text_decimal(get(wheel, value->field), value->digits, value->unit, number);
+        write_value(value, wheel, number);
         known = known || !is(number, "--");
         const int n = snprintf(cell + used, sizeof(cell) - used, "%s%s%s", used > 0 ? ", " : "",
                                is_lower_bound(value, wheel) ? ">= " : "", number);
         used += n > 0 && (size_t)n < sizeof(cell) - used ? (size_t)n : 0U;
     }
-    const char *remark = row->remark != NULL ? text_word(wheel, row->remark) : "";
-    if (!is(remark, "valid")) {
-        (void)snprintf(cell + used, sizeof(cell) - used, "%s%s", used > 0 && remark[0] != '\0' ? " " : "", remark);
-    }
+    write_remark(row, wheel, remark);
+    (void)snprintf(cell + used, sizeof(cell) - used, "%s%s", used > 0 && remark[0] != '\0' ? " " : "", remark);
     paper_text(paper, known ? TONE_PLAIN : TONE_FAINT, width, cell);
 }
 
@@ -175,8 +198,34 @@ static void draw_ledger(const paper_t *paper, json_t *ledger, const char *state,
         used += n > 0 && (size_t)n < sizeof(text) - used ? (size_t)n : 0U;
     }
     if (used > 0) {
-        (void)snprintf(title, sizeof(title), "%s", is(state, "assumed") ? "UNVERIFIED" : "CONTRADICTED");
+        (void)snprintf(title, sizeof(title), "%s", is(state, "assumed") ? "UNVERIFIED" : "CONFIRMED");
         paper_wrap(paper, title, tone, text);
+    }
+}
+
+/// Every contradiction with its evidence and its cost.
+static void draw_contradictions(const paper_t *paper, json_t *ledger) {
+    char text[640];
+    const char *label = "CONTRADICTED";
+    const char *name = NULL;
+    json_t *entry = NULL;
+    json_object_foreach(ledger, name, entry) {
+        if (is(text_word(entry, "state"), "contradicted")) {
+            (void)snprintf(text, sizeof(text), "%.64s = %.64s: %.240s; disabled: %.240s", name,
+                           text_word(entry, "value"), text_word(entry, "reason"), text_word(entry, "disabled"));
+            paper_wrap(paper, label, TONE_BAD, text);
+            label = "";
+        }
+    }
+}
+
+/// Nothing, as long as what is learnt is kept.
+static void draw_memory(const paper_t *paper, const json_t *memory) {
+    char text[512];
+    const char *state = text_word(memory, "state");
+    if (is(state, "ignored") || is(state, "failed")) {
+        (void)snprintf(text, sizeof(text), "%.256s: %.160s", text_word(memory, "file"), text_word(memory, "reason"));
+        paper_wrap(paper, is(state, "failed") ? "NOT KEPT" : "NOT TRUSTED", TONE_CARE, text);
     }
 }
 
@@ -215,7 +264,9 @@ void screen_status(const json_t *status, const json_t *why, bool colour, FILE *o
     paper_end(&paper);
     draw_pose(&paper, get(status, "pose"));
     draw_budget(&paper, get(status, "budget"));
-    draw_ledger(&paper, json_object_get(status, "ledger"), "contradicted", TONE_BAD);
+    draw_contradictions(&paper, json_object_get(status, "ledger"));
+    draw_ledger(&paper, json_object_get(status, "ledger"), "confirmed", TONE_GOOD);
     draw_ledger(&paper, json_object_get(status, "ledger"), "assumed", TONE_PLAIN);
+    draw_memory(&paper, get(status, "memory"));
     draw_warnings(&paper, get(status, "warnings"));
 }

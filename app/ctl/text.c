@@ -20,6 +20,15 @@ void text_safe(const char *text, FILE *out) {
     }
 }
 
+void text_clean(const char *text, char *out, size_t size) {
+    size_t used = 0;
+    for (const unsigned char *c = (const unsigned char *)text; *c != '\0' && used + 1U < size; c++) {
+        out[used++] = is_control(c) ? '?' : (char)*c;
+        c += is_control(c) && *c == 0xC2U ? 1 : 0;
+    }
+    out[used] = '\0';
+}
+
 bool text_wants_colour(FILE *out) {
     const char *no_color = getenv("NO_COLOR");
     const char *term = getenv("TERM");
@@ -48,6 +57,23 @@ void text_decimal(const json_t *value, unsigned digits, const char *unit, char o
         (void)snprintf(out, TEXT_CELL, "%s%llu%s%s", sign, size, gap, unit);
     } else {
         (void)snprintf(out, TEXT_CELL, "%s%llu.%0*llu%s%s", sign, size / scale, (int)digits, size % scale, gap, unit);
+    }
+}
+
+void text_age(const json_t *age_ms, char out[TEXT_CELL]) {
+    const long long ms = json_integer_value(age_ms);
+    if (!json_is_integer(age_ms) || ms < 0) {
+        (void)snprintf(out, TEXT_CELL, "--");
+    } else if (ms < 1000) {
+        (void)snprintf(out, TEXT_CELL, "%lld ms", ms);
+    } else if (ms < 120000) {
+        (void)snprintf(out, TEXT_CELL, "%lld.%lld s", ms / 1000, ms % 1000 / 100);
+    } else if (ms < 7200000) {
+        (void)snprintf(out, TEXT_CELL, "%lld min", ms / 60000);
+    } else if (ms < 172800000) {
+        (void)snprintf(out, TEXT_CELL, "%lld h", ms / 3600000);
+    } else {
+        (void)snprintf(out, TEXT_CELL, "%lld days", ms / 86400000);
     }
 }
 

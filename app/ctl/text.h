@@ -13,6 +13,9 @@
 /// Writes `text` without what could command a terminal: names and reasons come from other people's programs.
 void text_safe(const char *text, FILE *out);
 
+/// The same into a buffer; what does not fit is left out.
+void text_clean(const char *text, char *out, size_t size);
+
 /// True if `out` is a terminal that wants colours (NO_COLOR and TERM=dumb say no).
 bool text_wants_colour(FILE *out);
 
@@ -21,6 +24,9 @@ void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]);
 
 /// The integer divided by 10 to the power of `digits`, with that many decimals and the unit; "--" if it is none.
 void text_decimal(const json_t *value, unsigned digits, const char *unit, char out[TEXT_CELL]);
+
+/// An age in ms in the unit that suits it: "12 ms", "3.4 s", "5 min", "7 h", "2 days"; "--" if it is none.
+void text_age(const json_t *age_ms, char out[TEXT_CELL]);
 
 /// The string of that field, or "--".
 const char *text_word(const json_t *object, const char *field);

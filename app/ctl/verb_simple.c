@@ -5,7 +5,6 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 static void print_line(const char *text) {
     text_safe(text, stdout);
@@ -67,16 +66,27 @@ int verb_reset(ctl_t *self, int count, char **words) {
     return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "reset"));
 }
 
-static void print_offset(const json_t *status, const char *side) {
+/// "left: zero is 12.318 N now (40 samples, 0.110 N noise); it was 12.300 N (wheel)".
+static void print_tare(const json_t *reply, const char *side) {
     char offset[TEXT_CELL];
-    const json_t *wheel = json_object_get(status, side);
-    text_decimal(json_object_get(wheel, "force_offset_mN"), 3, "N", offset);
-    (void)printf("%s: the present force is zero now; offset %s\n", side, offset);
+    char noise[TEXT_CELL];
+    char samples[TEXT_CELL];
+    char before[TEXT_CELL];
+    const json_t *tare = json_object_get(reply, side);
+    if (tare == NULL) {
+        return;
+    }
+    text_decimal(json_object_get(tare, "offset_mN"), 3, "N", offset);
+    text_decimal(json_object_get(tare, "deviation_mN"), 3, "N noise", noise);
+    text_integer(json_object_get(tare, "samples"), "samples", samples);
+    text_decimal(json_object_get(tare, "before_mN"), 3, "N", before);
+    (void)printf("%s: the present force is zero now, %s (%s, %s); it was %s (", side, offset, samples, noise, before);
+    text_safe(text_word(tare, "before_provenance"), stdout);
+    (void)puts(")");
 }
 
 int verb_tare(ctl_t *self, int count, char **words) {
     json_t *reply = NULL;
-    json_t *status = NULL;
     const char *side = count > 0 ? words[0] : NULL;
     if (!ctl_words_at_most("tare", count, 1, words)) {
         return CTL_USAGE;
@@ -86,54 +96,10 @@ int verb_tare(ctl_t *self, int count, char **words) {
     }
     json_t *request =
         side != NULL ? json_pack("{s:s,s:s}", "cmd", "tare", "side", side) : json_pack("{s:s}", "cmd", "tare");
-    int code = ctl_ask(self, request, &reply);
-    json_decref(reply);
-    if (code != CTL_OK || self->json) {
-        return code;
-    }
-    code = ctl_ask(self, json_pack("{s:s}", "cmd", "status"), &status);
-    if (code == CTL_OK) {
-        for (size_t i = 0; i < 2; i++) {
-            const char *each = i == 0 ? "left" : "right";
-            if (side == NULL || strcmp(side, each) == 0) {
-                print_offset(status, each);
-            }
-        }
-    }
-    json_decref(status);
-    return code;
-}
-
-static void print_when(const json_t *reply) {
-    char wall[TEXT_CELL] = "--";
-    char age[TEXT_CELL];
-    struct tm local;
-    const json_t *wall_us = json_object_get(reply, "wall_us");
-    if (json_is_integer(wall_us)) {
-        const time_t seconds = (time_t)(json_integer_value(wall_us) / 1000000);
-        if (localtime_r(&seconds, &local) != NULL) {
-            (void)strftime(wall, sizeof(wall), "%Y-%m-%d %H:%M:%S", &local);
-        }
-    }
-    text_decimal(json_object_get(reply, "age_ms"), 3, "s", age);
-    (void)printf("at %s, %s ago; ", wall, age);
-    (void)printf("%s\n", json_is_true(json_object_get(reply, "latched")) ? "it latched" : "it did not latch");
-}
-
-int verb_why(ctl_t *self, int count, char **words) {
-    json_t *reply = NULL;
-    if (!ctl_words_at_most("why", count, 0, words)) {
-        return CTL_USAGE;
-    }
-    const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "why"), &reply);
+    const int code = ctl_ask(self, request, &reply);
     if (code == CTL_OK && !self->json) {
-        const char *sentence = json_string_value(json_object_get(reply, "sentence"));
-        if (sentence == NULL || sentence[0] == '\0') {
-            (void)puts("no stop since the gateway's start");
-        } else {
-            print_line(sentence);
-            print_when(reply);
-        }
+        print_tare(reply, "left");
+        print_tare(reply, "right");
     }
     json_decref(reply);
     return code;

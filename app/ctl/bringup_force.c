@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+// The unit of the normal force, which the document gives as cN on the left and dN on the right, and its sign.
+//
+// Only a known mass tells a unit. Without one the unit stays assumed.
+#include "bringup.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#define LOOK_NS     50000000L
+#define LOOKS       40
+#define G_N_PER_kg  9.8 // The document's own figure.
+#define MASS_MIN_kg 0.5
+#define MASS_MAX_kg 100.0
+/// Counts per newton, and by how much a hand-held weight may be off.
+#define CN_PER_N 100.0
+#define DN_PER_N 10.0
+#define SLACK    2.0
+/// Less than this is noise.
+#define COUNTS_MIN 3.0
+
+static const char *const names[IW_SIDES] = {[IW_LEFT] = "left", [IW_RIGHT] = "right"};
+
+/// Mean of the raw force over two seconds. False if it is not heard.
+static bool mean_raw(bringup_t *self, iw_side_t side, double *out_mean) {
+    const struct timespec pause = {0, LOOK_NS};
+    double sum = 0.0;
+    int count = 0;
+    (void)fputs("  ... measuring for 2 s\n", stdout);
+    (void)fflush(stdout);
+    for (int i = 0; i < LOOKS; i++) {
+        json_t *status = trial_status(self);
+        const json_t *raw = json_object_get(json_object_get(status, names[side]), "force_raw");
+        if (json_is_integer(raw)) {
+            sum += (double)json_integer_value(raw);
+            count++;
+        }
+        json_decref(status);
+        (void)nanosleep(&pause, NULL);
+    }
+    *out_mean = count > 0 ? sum / count : 0.0;
+    return count > LOOKS / 2;
+}
+
+static bool is_about(double value, double wanted) {
+    return value >= wanted / SLACK && value <= wanted * SLACK;
+}
+
+static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mass_kg) {
+    const double per_N = fabs(counts) / (mass_kg * G_N_PER_kg);
+    const bool cn = is_about(per_N, CN_PER_N);
+    const bool dn = is_about(per_N, DN_PER_N);
+    const char *word = cn ? "cN" : "dN";
+    const iw_force_unit_t before = self->config.core.force_unit[side];
+    if (!cn && !dn) {
+        talk_say("  %.1f counts per newton are neither cN (100) nor dN (10): the unit stays assumed. Was the whole "
+                 "mass on this handle?",
+                 per_N);
+        bringup_note(self, names[side], "force_unit", NULL, "assumed: %.1f counts per N fit neither cN nor dN", per_N);
+        return;
+    }
+    self->config.core.force_unit[side] = cn ? IW_FORCE_CN : IW_FORCE_DN;
+    talk_say("  %.0f counts for %.1f N: the unit is %s%s.%s", fabs(counts), mass_kg * G_N_PER_kg, word,
+             self->config.core.force_unit[side] == before ? "" : ", other than configured until now",
+             counts < 0.0 ? " The force counts downwards: pressing is negative." : "");
+    bringup_note(self, names[side], "force_unit", side == IW_LEFT ? "force_unit_left" : "force_unit_right",
+                 "%.2f kg changed the raw force by %.0f counts%s", mass_kg, counts,
+                 counts < 0.0 ? "; pressing makes it smaller" : "");
+}
+
+/// Without a mass: only whether the handle is this wheel's, and which way it counts.
+static void tell_press(bringup_t *self, iw_side_t side, double counts) {
+    if (fabs(counts) < COUNTS_MIN) {
+        talk_say("  Nothing changed on the %s wheel. Is this its handle?", names[side]);
+        bringup_note(self, names[side], "force_unit", NULL, "assumed: pressing the handle changed nothing");
+        return;
+    }
+    talk_say("  Pressing changed the raw force by %.0f counts. Its unit stays assumed: only a known mass tells it.",
+             counts);
+    bringup_note(self, names[side], "force_unit", NULL, "assumed; pressing changed the raw force by %.0f counts",
+                 counts);
+}
+
+static bringup_result_t measure(bringup_t *self, iw_side_t side) {
+    char question[112];
+    char answer[BRINGUP_ANSWER_SIZE];
+    double mass_kg = 0.0;
+    double free = 0.0;
+    double loaded = 0.0;
+    bool weighed = false;
+    (void)snprintf(question, sizeof(question), "Mass in kg that you will put on the %s handle (Enter: press by hand)",
+                   names[side]);
+    if (!talk_number(question, MASS_MIN_kg, MASS_MAX_kg, &mass_kg, &weighed) ||
+        !talk_ask("Hands and weights off both handles, then Enter", "go", answer)) {
+        return BRINGUP_QUIT;
+    }
+    if (!mean_raw(self, side, &free)) {
+        talk_say("  The %s wheel sends no force; its unit stays assumed.", names[side]);
+        bringup_note(self, names[side], "force_unit", NULL, "assumed: no force was heard");
+        return BRINGUP_ON;
+    }
+    (void)snprintf(question, sizeof(question), "Now %s the %s handle and leave it so, then Enter",
+                   weighed ? "put the mass on" : "press", names[side]);
+    if (!talk_ask(question, "go", answer)) {
+        return BRINGUP_QUIT;
+    }
+    (void)mean_raw(self, side, &loaded);
+    if (weighed) {
+        keep_unit(self, side, loaded - free, mass_kg);
+    } else {
+        tell_press(self, side, loaded - free);
+    }
+    return BRINGUP_ON;
+}
+
+bringup_result_t bringup_force(bringup_t *self) {
+    bool wanted = false;
+    talk_step(7, "the force (nothing turns)");
+    talk_say("The document gives cN for the left and dN for the right handle, a factor of ten. A mass that you know "
+             "(a bag of %.1f kg or more) settles it.",
+             MASS_MIN_kg);
+    if (!trial_start(self, &self->config, false)) {
+        return BRINGUP_FAILED;
+    }
+    if (!talk_yes("Measure the force?", true, &wanted)) {
+        return BRINGUP_QUIT;
+    }
+    for (unsigned side = 0; side < IW_SIDES && wanted; side++) {
+        const bringup_result_t result = measure(self, (iw_side_t)side);
+        if (result != BRINGUP_ON) {
+            return result;
+        }
+    }
+    return BRINGUP_ON;
+}

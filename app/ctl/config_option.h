@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: MIT
+/// The option --config FILE of the verbs that read recordings.
+#ifndef CONFIG_OPTION_H
+#define CONFIG_OPTION_H
+
+#include "iwheel/config.h"
+
+/// Reads the gateway's configuration at `path` (NULL: the option had no word behind it). An exit code; what is wrong
+/// has been told.
+int config_option_load(const char *verb, const char *path, iw_config_t *out_config);
+
+#endif

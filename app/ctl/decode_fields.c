@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#include "decode_fields.h"
+
+#include "iwheel/wheel.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+
+#define PERCENT_MAX     100
+#define MN_PER_CN       10
+#define MN_PER_DN       100
+#define BATTERY_NOTE    "battery at least 25.5 V: the byte ends there"
+#define IMPOSSIBLE_NOTE "a temperature above 200 degC or a load above 100 % is left out: impossible"
+#define SATURATED_NOTE  "force at the end of its range: it may be larger"
+
+typedef struct {
+    const char *column; ///< For CSV, in the bus's unit.
+    const char *label;  ///< For people.
+    const char *unit;
+    unsigned digits; ///< Decimals for people.
+} field_words_t;
+
+static const field_words_t words[FIELDS] = {
+    [FIELD_SETPOINT_TYPE] = {"setpoint_type", "type", "", 0},
+    [FIELD_SETPOINT_SPEED] = {"setpoint_speed_mm_s", "speed", "mm/s", 0},
+    [FIELD_SETPOINT_CURRENT] = {"setpoint_current_mA", "current", "mA", 0},
+    [FIELD_SPEED] = {"speed_rpm", "", "rpm", 0},
+    [FIELD_ACCELERATION] = {"acceleration_raw", "acceleration", "(unit unknown)", 0},
+    [FIELD_BATTERY] = {"battery_dV", "battery", "V", 1},
+    [FIELD_TEMPERATURE] = {"temperature_degC", "temperature", "degC", 0},
+    [FIELD_ODOMETRY] = {"odometry_ticks", "odometry", "ticks", 0},
+    [FIELD_CPU] = {"cpu_percent", "CPU", "%", 0},
+    [FIELD_POSE_X] = {"pose_x_mm", "x", "mm", 0},
+    [FIELD_POSE_Y] = {"pose_y_mm", "y", "mm", 0},
+    [FIELD_POSE_Z] = {"pose_z_mm", "z", "mm", 0},
+    [FIELD_POSE_PSI] = {"pose_psi_mrad", "psi", "mrad", 0},
+    [FIELD_FORCE_RAW] = {"force_raw", "raw", "", 0},
+    [FIELD_FORCE] = {"force_with_offset_mN", "force with offset", "N", 3},
+    [FIELD_FORCE_DEBUG] = {"force_debug_raw", "debug", "", 0},
+    [FIELD_OFFSET] = {"force_offset_dN", "force offset", "N", 1},
+};
+
+static void put(decoded_t *out, field_t field, int32_t value) {
+    out->present |= 1U << field;
+    out->value[field] = value;
+}
+
+static void put_status(const iw_proto_status_t *status, decoded_t *out) {
+    const bool hot = status->temperature_degC > IW_WHEEL_TEMPERATURE_MAX_degC;
+    const bool busy = status->cpu_percent > PERCENT_MAX;
+    put(out, FIELD_BATTERY, status->battery_dV);
+    put(out, FIELD_ODOMETRY, status->odometry_ticks);
+    if (!hot) {
+        put(out, FIELD_TEMPERATURE, status->temperature_degC);
+    }
+    if (!busy) {
+        put(out, FIELD_CPU, status->cpu_percent);
+    }
+    out->note = hot || busy ? IMPOSSIBLE_NOTE : status->battery_dV == IW_BATTERY_SATURATED_dV ? BATTERY_NOTE : "";
+}
+
+static void put_force(const iw_proto_force_t *force, iw_force_unit_t unit, decoded_t *out) {
+    put(out, FIELD_FORCE_RAW, force->force_raw);
+    put(out, FIELD_FORCE, force->force_raw * (unit == IW_FORCE_CN ? MN_PER_CN : MN_PER_DN));
+    put(out, FIELD_FORCE_DEBUG, force->debug_raw);
+    out->note = force->force_raw == INT16_MIN || force->force_raw == INT16_MAX ? SATURATED_NOTE : "";
+}
+
+static void put_message(const iw_proto_message_t *message, const iw_config_t *config, decoded_t *out) {
+    static const char *const names[] = {
+        [IW_PROTO_SETPOINT] = "setpoint", [IW_PROTO_SPEED] = "speed", [IW_PROTO_STATUS] = "status",
+        [IW_PROTO_POSE] = "pose",         [IW_PROTO_FORCE] = "force", [IW_PROTO_OFFSET] = "offset",
+    };
+    out->message = names[message->kind];
+    out->wheel = message->side == IW_LEFT ? "left" : "right";
+    switch (message->kind) {
+    case IW_PROTO_SETPOINT:
+        put(out, FIELD_SETPOINT_TYPE, message->as.setpoint.type);
+        put(out, FIELD_SETPOINT_SPEED, message->as.setpoint.speed_mm_s);
+        put(out, FIELD_SETPOINT_CURRENT, message->as.setpoint.current_mA);
+        break;
+    case IW_PROTO_SPEED:
+        put(out, FIELD_SPEED, message->as.speed.speed_rpm);
+        put(out, FIELD_ACCELERATION, message->as.speed.acceleration_raw);
+        break;
+    case IW_PROTO_STATUS:
+        put_status(&message->as.status, out);
+        break;
+    case IW_PROTO_POSE:
+        put(out, FIELD_POSE_X, message->as.pose.x_mm);
+        put(out, FIELD_POSE_Y, message->as.pose.y_mm);
+        put(out, FIELD_POSE_Z, message->as.pose.z_mm);
+        put(out, FIELD_POSE_PSI, message->as.pose.psi_mrad);
+        break;
+    case IW_PROTO_FORCE:
+        put_force(&message->as.force, config->force_unit[message->side], out);
+        break;
+    case IW_PROTO_OFFSET:
+    default:
+        put(out, FIELD_OFFSET, message->as.offset.offset_dN);
+        break;
+    }
+}
+
+void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decoded_t *out) {
+    iw_proto_message_t message;
+    *out = (decoded_t){.message = "unknown", .wheel = "", .note = ""};
+    switch (iw_proto_decode(frame, &message)) {
+    case IW_OK:
+        put_message(&message, config, out);
+        break;
+    case IW_ERR_FORMAT:
+        out->message = "ignored";
+        out->note = "the wheels use only classic data frames with 11-bit ids: the gateway ignores this one";
+        break;
+    case IW_ERR_LENGTH:
+        out->message = "ignored";
+        out->note = "shorter than the wheels' document says: the gateway ignores it";
+        break;
+    default:
+        break;
+    }
+    if ((frame->id & IW_CAN_ERROR) != 0U) {
+        out->message = "error";
+        out->note = "the controller's report of an error on the bus, not a frame";
+    }
+}
+
+const char *field_column(field_t field) {
+    return words[field].column;
+}
+
+static void print_value(const decoded_t *decoded, field_t field, FILE *out) {
+    const field_words_t *word = &words[field];
+    const long value = decoded->value[field];
+    const char *gap = word->unit[0] == '\0' ? "" : " ";
+    const char *label_gap = word->label[0] == '\0' ? "" : " ";
+    long scale = 1;
+    for (unsigned i = 0; i < word->digits; i++) {
+        scale *= 10;
+    }
+    if (scale == 1) {
+        (void)fprintf(out, "%s%s%ld%s%s", word->label, label_gap, value, gap, word->unit);
+    } else {
+        (void)fprintf(out, "%s%s%s%ld.%0*ld%s%s", word->label, label_gap, value < 0 ? "-" : "", labs(value) / scale,
+                      (int)word->digits, labs(value) % scale, gap, word->unit);
+    }
+}
+
+void field_print_all(const decoded_t *decoded, FILE *out) {
+    const char *gap = "";
+    for (unsigned field = 0; field < FIELDS; field++) {
+        if ((decoded->present & (1U << field)) != 0U) {
+            (void)fputs(gap, out);
+            print_value(decoded, (field_t)field, out);
+            gap = ", ";
+        }
+    }
+}

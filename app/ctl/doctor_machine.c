@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: MIT
+// What can be said of the machine before the bus is opened.
+#include "doctor.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <grp.h>
+#include <linux/can.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/timex.h>
+#include <sys/utsname.h>
+#include <time.h>
+#include <unistd.h>
+
+/// ARPHRD_CAN, as the kernel writes it.
+#define TYPE_CAN "280"
+/// No release of this program is older.
+#define WALL_MIN_S 1735689600
+/// Sleeps of a millisecond that are measured, and the lateness that the gateway begins to notice.
+#define NAPS         200
+#define NAP_NS       1000000L
+#define LATE_CARE_us 20000
+
+static bool is_local(const char *bus) {
+    return strncmp(bus, "unix:", 5U) == 0;
+}
+
+/// Reads the first word of a file of sysfs.
+static bool read_word(const char *path, char *out_word, size_t size) {
+    FILE *file = fopen(path, "re");
+    if (file == NULL) {
+        return false;
+    }
+    const bool got = fgets(out_word, (int)size, file) != NULL;
+    (void)fclose(file);
+    out_word[strcspn(out_word, "\n")] = '\0';
+    return got;
+}
+
+unsigned doctor_interfaces(char *out_names, size_t size) {
+    unsigned found = 0;
+    DIR *folder = opendir("/sys/class/net");
+    out_names[0] = '\0';
+    if (folder == NULL) {
+        return 0;
+    }
+    for (const struct dirent *entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
+        char path[512];
+        char type[16] = "";
+        (void)snprintf(path, sizeof(path), "/sys/class/net/%s/type", entry->d_name);
+        if (entry->d_name[0] != '.' && read_word(path, type, sizeof(type)) && strcmp(type, TYPE_CAN) == 0) {
+            const size_t used = strlen(out_names);
+            (void)snprintf(&out_names[used], size - used, "%s%s", found > 0 ? " " : "", entry->d_name);
+            ++found;
+        }
+    }
+    (void)closedir(folder);
+    return found;
+}
+
+/// The name of the interface's driver, "" if it has no device of its own.
+static void read_driver(const char *bus, char *out_name, size_t size) {
+    char path[128];
+    char target[256];
+    out_name[0] = '\0';
+    (void)snprintf(path, sizeof(path), "/sys/class/net/%.20s/device/driver", bus);
+    const ssize_t length = readlink(path, target, sizeof(target) - 1U);
+    if (length > 0) {
+        target[length] = '\0';
+        const char *slash = strrchr(target, '/');
+        (void)snprintf(out_name, size, "%.63s", slash != NULL ? slash + 1 : target);
+    }
+}
+
+static void say_no_can(doctor_t *self) {
+    struct utsname kernel;
+    char path[512];
+    (void)uname(&kernel);
+    (void)snprintf(path, sizeof(path), "/lib/modules/%s", kernel.release);
+    inspect_say(&self->findings, "kernel", INSPECT_FAIL, "kernel %s: no CAN sockets", kernel.release);
+    if (access(path, F_OK) == 0) {
+        inspect_cure(&self->findings, "modprobe can_raw (and for ever: echo can_raw > /etc/modules-load.d/can.conf)");
+    } else {
+        inspect_cure(&self->findings,
+                     "its modules are not installed (%s is missing): boot a kernel with CAN; without "
+                     "hardware, try the simulator: iwheel-sim --can unix:/tmp/bus",
+                     path);
+    }
+}
+
+static bool look_at_kernel(doctor_t *self) {
+    char driver[64];
+    const int probe = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
+    if (probe < 0) {
+        say_no_can(self);
+        return false;
+    }
+    (void)close(probe);
+    read_driver(self->bus != NULL ? self->bus : "", driver, sizeof(driver));
+    if (driver[0] != '\0') {
+        inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are there; %s is driven by %s",
+                    self->bus, driver);
+    } else {
+        inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are there");
+    }
+    return true;
+}
+
+static int64_t now_us(void) {
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+/// How much too late the worst of many short sleeps ended.
+static int64_t worst_lateness_us(void) {
+    int64_t worst_us = 0;
+    for (unsigned i = 0; i < NAPS; i++) {
+        const struct timespec nap = {0, NAP_NS};
+        const int64_t begin_us = now_us();
+        (void)nanosleep(&nap, NULL);
+        const int64_t late_us = now_us() - begin_us - NAP_NS / 1000;
+        worst_us = late_us > worst_us ? late_us : worst_us;
+    }
+    return worst_us;
+}
+
+static void look_at_clock(doctor_t *self) {
+    struct timespec resolution = {0, 0};
+    struct timex state = {.modes = 0};
+    inspect_findings_t *findings = &self->findings;
+    (void)clock_getres(CLOCK_MONOTONIC, &resolution);
+    const int64_t late_us = worst_lateness_us();
+    if (resolution.tv_nsec > NAP_NS || late_us > LATE_CARE_us) {
+        inspect_say(findings, "clock", INSPECT_WARN, "clock: a sleep of 1 ms ended up to %.1f ms late",
+                    (double)late_us / 1e3);
+        inspect_cure(findings, "the gateway stops the wheels when it is 100 ms late: lighten this machine's load, or "
+                               "run it with priority: chrt -f 10 iwheel-gateway ...");
+    } else {
+        inspect_say(findings, "clock", INSPECT_OK, "clock: a sleep of 1 ms ends at most %.1f ms late",
+                    (double)late_us / 1e3);
+    }
+    if (time(NULL) < WALL_MIN_S) {
+        inspect_say(findings, "clock", INSPECT_WARN, "wall clock: it is not set; only dates in logs are wrong");
+        inspect_cure(findings, "timedatectl set-ntp true");
+    } else if (adjtimex(&state) == TIME_ERROR || ((unsigned)state.status & (unsigned)STA_UNSYNC) != 0U) {
+        inspect_say(findings, "clock", INSPECT_OK,
+                    "wall clock: set, not synchronised; nothing but dates in logs "
+                    "depends on it");
+    }
+}
+
+/// Whether this user may use the gateway's socket, by the group that the service has.
+static void look_at_rights(doctor_t *self) {
+    static const char group_name[] = "iwheel";
+    gid_t groups[256];
+    const struct group *group = getgrnam(group_name);
+    if (group == NULL || geteuid() == 0) {
+        return;
+    }
+    const int count = getgroups((int)(sizeof(groups) / sizeof(groups[0])), groups);
+    bool member = getegid() == group->gr_gid;
+    for (int i = 0; i < count; i++) {
+        member = member || groups[i] == group->gr_gid;
+    }
+    if (member) {
+        inspect_say(&self->findings, "rights", INSPECT_OK, "rights: you are in group %s", group_name);
+    } else {
+        inspect_say(&self->findings, "rights", INSPECT_WARN,
+                    "rights: you are not in group %s, whose members may talk "
+                    "to the gateway",
+                    group_name);
+        inspect_cure(&self->findings, "sudo usermod -aG %s $USER, then log in again", group_name);
+    }
+}
+
+bool doctor_look_at_machine(doctor_t *self) {
+    const bool able = (self->bus != NULL && is_local(self->bus)) || look_at_kernel(self);
+    look_at_clock(self);
+    look_at_rights(self);
+    return able;
+}

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: MIT
+#include "learn.h"
+
+#include <string.h>
+
+/// A speed told for this long has been reached.
+#define STEADY_US 1000000
+/// Slower commands say too little: 1 rpm is 20 mm/s.
+#define STEADY_MM_S 100
+/// At rest, for as long as this.
+#define REST_RPM 2
+#define REST_US  500000
+/// No odometry step is larger between two status frames: beyond it is a reboot.
+#define TICKS_MAX 10000U
+/// Between speed frames; longer is a gap of the recording.
+#define RPM_GAP_MS 100
+
+static const uint32_t ids[LEARN_IDS] = {IW_ID_LEFT_SETPOINT, IW_ID_RIGHT_SETPOINT, IW_ID_LEFT_SPEED,  IW_ID_RIGHT_SPEED,
+                                        IW_ID_LEFT_STATUS,   IW_ID_RIGHT_STATUS,   IW_ID_RIGHT_POSE,  IW_ID_LEFT_FORCE,
+                                        IW_ID_RIGHT_FORCE,   IW_ID_LEFT_OFFSET,    IW_ID_RIGHT_OFFSET};
+
+static const learn_range_t nothing = {INT32_MAX, INT32_MIN};
+
+static void widen(learn_range_t *range, int32_t value) {
+    range->low = value < range->low ? value : range->low;
+    range->high = value > range->high ? value : range->high;
+}
+
+static int32_t size_of(int32_t value) {
+    return value < 0 ? -value : value;
+}
+
+void learn_init(learn_t *self) {
+    (void)memset(self, 0, sizeof *self);
+    for (size_t i = 0; i < LEARN_IDS; i++) {
+        self->known[i] = (learn_id_t){.id = ids[i], .length = nothing, .period = {.last_us = -1}};
+    }
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        learn_setpoint_t *setpoint = &self->setpoint[side];
+        learn_wheel_t *wheel = &self->wheel[side];
+        setpoint->speed_mm_s = nothing;
+        setpoint->current_mA = nothing;
+        setpoint->current_at_rest_mA = nothing;
+        setpoint->current_forward_mA = nothing;
+        setpoint->current_backward_mA = nothing;
+        wheel->rpm_us = -1;
+        wheel->rest_since_us = -1;
+        wheel->rest_force = nothing;
+        wheel->force = nothing;
+    }
+}
+
+static void note_period(learn_period_t *period, int64_t at_us) {
+    const int64_t gap_us = at_us - period->last_us;
+    if (period->last_us >= 0 && gap_us >= 0) {
+        const int64_t ms = (gap_us + 500) / 1000;
+        period->histogram[ms < (int64_t)LEARN_PERIOD_MAX_MS ? (size_t)ms : LEARN_PERIOD_MAX_MS]++;
+        period->counted++;
+        period->longest_us = gap_us > period->longest_us ? gap_us : period->longest_us;
+    }
+    period->last_us = at_us;
+}
+
+uint32_t learn_period_ms(const learn_period_t *period) {
+    uint64_t below = 0;
+    if (period->counted < 2U) {
+        return 0;
+    }
+    for (uint32_t ms = 0; ms <= LEARN_PERIOD_MAX_MS; ms++) {
+        below += period->histogram[ms];
+        if (2U * below > period->counted) {
+            return ms;
+        }
+    }
+    return LEARN_PERIOD_MAX_MS;
+}
+
+/// LEARN_IDS if it is none of them.
+static size_t index_of(uint32_t id) {
+    size_t i = 0;
+    while (i < LEARN_IDS && ids[i] != id) {
+        i++;
+    }
+    return i;
+}
+
+const learn_id_t *learn_known(const learn_t *self, uint32_t id) {
+    const size_t i = index_of(id);
+    return i < LEARN_IDS ? &self->known[i] : NULL;
+}
+
+static learn_id_t *find_other(learn_t *self, const candump_t *frame) {
+    for (uint32_t i = 0; i < self->others; i++) {
+        if (self->other[i].id == frame->id && self->other[i].extended == frame->extended) {
+            return &self->other[i];
+        }
+    }
+    if (self->others == LEARN_OTHERS_MAX) {
+        self->more_others++;
+        return NULL;
+    }
+    learn_id_t *other = &self->other[self->others++];
+    *other = (learn_id_t){.id = frame->id, .extended = frame->extended, .length = nothing, .period = {.last_us = -1}};
+    return other;
+}
+
+static void note_id(learn_id_t *id, const candump_t *frame) {
+    id->count++;
+    widen(&id->length, frame->length);
+    note_period(&id->period, frame->time_us);
+}
+
+static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const iw_proto_setpoint_t *now) {
+    const bool first = self->count == 0U;
+    learn_range_t *current = now->speed_mm_s > 0   ? &self->current_forward_mA
+                             : now->speed_mm_s < 0 ? &self->current_backward_mA
+                                                   : &self->current_at_rest_mA;
+    self->count++;
+    self->sent += frame->mark == CANDUMP_SENT ? 1U : 0U;
+    self->type[now->type]++;
+    self->type_moving[now->type] += now->speed_mm_s != 0 ? 1U : 0U;
+    self->changes_of_type += !first && now->type != self->last.type ? 1U : 0U;
+    self->over_limit += size_of(now->current_mA) > IW_CURRENT_LIMIT_mA ? 1U : 0U;
+    widen(&self->speed_mm_s, now->speed_mm_s);
+    widen(&self->current_mA, now->current_mA);
+    widen(current, now->current_mA);
+    for (size_t i = IW_DLC_SETPOINT; i < frame->length && i < IW_CAN_DATA_MAX; i++) {
+        if (frame->data[i] != 0U) {
+            self->padding++;
+            break;
+        }
+    }
+    if (first || now->speed_mm_s != self->last.speed_mm_s) {
+        self->steady_since_us = frame->time_us;
+    }
+    self->last = *now;
+}
+
+static void note_speed(learn_wheel_t *self, const learn_setpoint_t *setpoint, int64_t at_us, int32_t rpm) {
+    const int32_t told_mm_s = setpoint->last.speed_mm_s;
+    const bool fresh = setpoint->count > 0U && at_us - setpoint->steady_since_us >= STEADY_US;
+    const int64_t gap_ms = self->rpm_us >= 0 ? (at_us - self->rpm_us) / 1000 : 0;
+    if (fresh && size_of(told_mm_s) >= STEADY_MM_S && rpm != 0) {
+        self->steady++;
+        self->steady_mm_s += size_of(told_mm_s);
+        self->steady_rpm += size_of(rpm);
+        self->with_sign += (told_mm_s > 0) == (rpm > 0) ? 1U : 0U;
+        self->against_sign += (told_mm_s > 0) == (rpm > 0) ? 0U : 1U;
+    }
+    self->pending_rpm_ms += gap_ms > 0 && gap_ms < RPM_GAP_MS ? size_of(self->rpm) * gap_ms : 0;
+    self->rpm = rpm;
+    self->rpm_us = at_us;
+    if (size_of(rpm) > REST_RPM) {
+        self->rest_since_us = -1;
+    } else if (self->rest_since_us < 0) {
+        self->rest_since_us = at_us;
+    }
+}
+
+static void note_ticks(learn_wheel_t *self, int32_t ticks) {
+    const uint32_t forward = (uint32_t)ticks - (uint32_t)self->last_ticks;
+    const uint32_t step = forward > INT32_MAX ? 0U - forward : forward;
+    if (self->has_ticks && step < TICKS_MAX) {
+        self->ticks += step;
+        self->rpm_ms += self->pending_rpm_ms;
+    }
+    self->pending_rpm_ms = 0;
+    self->last_ticks = ticks;
+    self->has_ticks = true;
+}
+
+static void note_force(learn_wheel_t *self, int64_t at_us, int16_t raw) {
+    widen(&self->force, raw);
+    if (self->rest_since_us >= 0 && at_us - self->rest_since_us >= REST_US) {
+        self->rest_force_count++;
+        self->rest_force_sum += raw;
+        widen(&self->rest_force, raw);
+    }
+}
+
+static uint64_t way(const uint8_t *now, const uint8_t *before, size_t high, size_t low) {
+    uint64_t sum = 0;
+    for (size_t i = 0; i < IW_DLC_POSE; i += 2U) {
+        const uint16_t a = (uint16_t)((unsigned)now[i + high] << 8U | now[i + low]);
+        const uint16_t b = (uint16_t)((unsigned)before[i + high] << 8U | before[i + low]);
+        const uint16_t step = (uint16_t)(a - b);
+        sum += step > INT16_MAX ? 65536U - step : step; // It may wrap.
+    }
+    return sum;
+}
+
+static void note_pose(learn_pose_t *self, const uint8_t *data) {
+    if (self->count > 0U) {
+        self->way_big += way(data, self->last, 0, 1);
+        self->way_little += way(data, self->last, 1, 0);
+    }
+    self->count++;
+    (void)memcpy(self->last, data, sizeof self->last);
+}
+
+static void note_message(learn_t *self, const candump_t *frame, const iw_proto_message_t *message) {
+    learn_wheel_t *wheel = &self->wheel[message->side];
+    learn_setpoint_t *setpoint = &self->setpoint[message->side];
+    switch (message->kind) {
+    case IW_PROTO_SETPOINT:
+        note_setpoint(setpoint, frame, &message->as.setpoint);
+        break;
+    case IW_PROTO_SPEED:
+        note_speed(wheel, setpoint, frame->time_us, message->as.speed.speed_rpm);
+        break;
+    case IW_PROTO_STATUS:
+        note_ticks(wheel, message->as.status.odometry_ticks);
+        break;
+    case IW_PROTO_POSE:
+        note_pose(&self->pose, frame->data);
+        break;
+    case IW_PROTO_FORCE:
+        note_force(wheel, frame->time_us, message->as.force.force_raw);
+        break;
+    case IW_PROTO_OFFSET:
+    default:
+        wheel->offsets++;
+        wheel->offset_dN = message->as.offset.offset_dN;
+        break;
+    }
+}
+
+void learn_frame(learn_t *self, const candump_t *frame) {
+    iw_proto_message_t message;
+    const iw_can_frame_t core = candump_to_core(frame);
+    self->first_us = self->frames == 0U ? frame->time_us : self->first_us;
+    self->backwards += self->frames > 0U && frame->time_us < self->last_us ? 1U : 0U;
+    self->last_us = frame->time_us;
+    self->frames++;
+    if (frame->error) {
+        self->errors++;
+        return;
+    }
+    const iw_status_t status = iw_proto_decode(&core, &message);
+    const size_t known = status == IW_OK || status == IW_ERR_LENGTH ? index_of(frame->id) : LEARN_IDS;
+    learn_id_t *id = known < LEARN_IDS ? &self->known[known] : NULL;
+    self->strange += status == IW_ERR_FORMAT ? 1U : 0U;
+    self->too_short += status == IW_ERR_LENGTH ? 1U : 0U;
+    id = status == IW_ERR_ID ? find_other(self, frame) : id;
+    if (id != NULL) {
+        note_id(id, frame);
+    }
+    if (status == IW_OK) {
+        note_message(self, frame, &message);
+    }
+}

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: MIT
+#include "replay.h"
+
+#include "replay_tell.h"
+
+#include <string.h>
+
+static int side_of(const iw_can_frame_t *frame) {
+    return frame->id == IW_ID_LEFT_SETPOINT ? IW_LEFT : frame->id == IW_ID_RIGHT_SETPOINT ? IW_RIGHT : -1;
+}
+
+/// The next noted answer of that kind; `otherwise` if none is left.
+static int take_answer(replay_t *self, blackbox_kind_t kind, uint32_t number, int otherwise) {
+    if (self->answered < self->answers) {
+        const blackbox_entry_t *answer = &self->answer[self->answered];
+        if (answer->kind == (uint8_t)kind && answer->number == number) {
+            self->answered++;
+            return (int)answer->as.value;
+        }
+    }
+    return otherwise;
+}
+
+static int port_send(void *context, const iw_can_frame_t *frame) {
+    replay_t *self = (replay_t *)context;
+    const int answer = take_answer(self, BLACKBOX_NOT_SENT, frame->id, 1);
+    const int side = side_of(frame);
+    if (answer <= 0 || side < 0) {
+        return answer;
+    }
+    self->total_sent++;
+    if (self->sent_count[side] == REPLAY_SENT) { // The oldest will have no echo any more.
+        (void)memmove(&self->sent[side][0], &self->sent[side][1], sizeof self->sent[side] - sizeof self->sent[side][0]);
+        self->sent_count[side]--;
+    }
+    self->sent[side][self->sent_count[side]++] = *frame;
+    return answer;
+}
+
+/// An echo as it was recorded, against the setpoint that we sent.
+static void compare_echo(replay_t *self, const iw_can_frame_t *frame) {
+    const int side = side_of(frame);
+    if (side < 0 || frame->kind != (uint8_t)IW_CAN_ECHO || !self->compares) {
+        return;
+    }
+    const iw_can_frame_t *sent = &self->sent[side][0];
+    const bool same = self->sent_count[side] > 0U && sent->dlc == frame->dlc &&
+                      memcmp(sent->data, frame->data, sizeof frame->data) == 0;
+    self->setpoints.same += same ? 1U : 0U;
+    self->setpoints.different += same ? 0U : 1U;
+    if (self->sent_count[side] > 0U) {
+        self->sent_count[side]--;
+        (void)memmove(&self->sent[side][0], &self->sent[side][1], self->sent_count[side] * sizeof self->sent[side][0]);
+    }
+}
+
+static int port_receive(void *context, iw_can_frame_t *out_frame) {
+    replay_t *self = (replay_t *)context;
+    if (self->received == self->frames) {
+        return 0;
+    }
+    *out_frame = self->frame[self->received++];
+    compare_echo(self, out_frame);
+    return 1;
+}
+
+static iw_bus_state_t port_bus_state(void *context) {
+    return ((const replay_t *)context)->bus;
+}
+
+static int port_purge(void *context) {
+    return take_answer((replay_t *)context, BLACKBOX_PURGE, 0, 0);
+}
+
+static int port_estop(void *context) {
+    return ((const replay_t *)context)->estop;
+}
+
+static void begin_core(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, bool restarted) {
+    const iw_hal_t hal = {.send = port_send,
+                          .receive = port_receive,
+                          .bus_state = port_bus_state,
+                          .purge = port_purge,
+                          .estop_pressed = port_estop,
+                          .context = self};
+    (void)iw_gateway_init(&self->gateway, config, &hal, at_us, restarted);
+    self->now_us = at_us;
+    self->next_us = at_us;
+    self->state = iw_gateway_state(&self->gateway);
+    (void)memcpy(self->ledger, self->gateway.ledger.entry, sizeof self->ledger);
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        self->force[side] = iw_force_validity(&self->gateway.force[side], at_us);
+    }
+}
+
+void replay_init(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, FILE *out) {
+    (void)memset(self, 0, sizeof *self);
+    self->out = out;
+    self->zero_us = at_us;
+    self->bus = IW_BUS_ACTIVE;
+    self->estop_name = "line";
+    self->bus_name = "";
+    begin_core(self, config, at_us, false);
+}
+
+void replay_start(replay_t *self, const iw_config_t *config, const blackbox_entry_t *entry) {
+    iw_config_t begun = *config;
+    begun.listen_only = entry->b != 0U;
+    begin_core(self, &begun, entry->at_us, entry->a != 0U);
+}
+
+bool replay_frame(replay_t *self, const iw_can_frame_t *frame) {
+    if (self->frames == IW_GATEWAY_DRAIN_MAX) {
+        return false;
+    }
+    self->frame[self->frames++] = *frame;
+    self->total_frames++;
+    return true;
+}
+
+/// Where the recording has no echoes, the bus acknowledges at once.
+static void echo_what_was_sent(replay_t *self) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        for (uint32_t i = 0; i < self->sent_count[side] && self->frames < IW_GATEWAY_DRAIN_MAX; i++) {
+            self->frame[self->frames] = self->sent[side][i];
+            self->frame[self->frames++].kind = IW_CAN_ECHO;
+        }
+        self->sent_count[side] = 0;
+    }
+}
+
+void replay_step(replay_t *self, iw_time_us_t at_us) {
+    self->now_us = at_us > self->now_us ? at_us : self->now_us;
+    self->next_us = iw_gateway_step(&self->gateway, self->now_us);
+    self->frames = 0;
+    self->received = 0;
+    self->answers = 0;
+    self->answered = 0;
+    if (self->echoes) {
+        echo_what_was_sent(self);
+    }
+    replay_tell_step(self);
+}
+
+static void count(replay_score_t *score, bool same) {
+    score->same += same ? 1U : 0U;
+    score->different += same ? 0U : 1U;
+}
+
+static void request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal) {
+    count(&self->requests, (uint8_t)refusal == entry->b);
+    replay_tell_request(self, entry, refusal);
+}
+
+static iw_refusal_t drive(replay_t *self, const blackbox_entry_t *entry) {
+    const blackbox_drive_t *recorded = &entry->as.drive;
+    iw_drive_t wanted = {.has_current = entry->a != 0U};
+    iw_applied_t applied;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        wanted.speed_mm_s[side] = recorded->speed_mm_s[side];
+        wanted.current_mA[side] = recorded->current_mA[side];
+    }
+    const iw_time_us_t sent_us = entry->at_us > recorded->age_us ? entry->at_us - recorded->age_us : 0U;
+    return iw_gateway_drive(&self->gateway, sent_us, entry->number, &wanted, &applied);
+}
+
+/// What was decided then, beside what is decided now.
+static void compare(replay_t *self, const blackbox_entry_t *entry) {
+    const iw_stop_t *stop = &self->gateway.permit.stop;
+    const bool is_state = entry->kind == (uint8_t)BLACKBOX_STATE;
+    const bool same = is_state ? (uint8_t)iw_gateway_state(&self->gateway) == entry->a
+                               : (uint8_t)stop->cause == entry->a && stop->sides == entry->b &&
+                                     (int64_t)stop->detail == entry->as.value;
+    if (is_state && entry->a == entry->b && same) {
+        return; // Only noted again.
+    }
+    count(is_state ? &self->states : &self->stops, same);
+    if (!same) {
+        replay_tell_difference(self, entry);
+    }
+}
+
+static void answer(replay_t *self, const blackbox_entry_t *entry) {
+    const iw_bus_facts_t facts = {.timing_contradicted = entry->a != 0U, .echo_proven = entry->b != 0U};
+    switch (entry->kind) {
+    case BLACKBOX_ESTOP:
+        replay_tell_answer(self, entry);
+        self->estop = (int)entry->as.value;
+        break;
+    case BLACKBOX_BUS:
+        replay_tell_answer(self, entry);
+        self->bus = (iw_bus_state_t)entry->a;
+        break;
+    case BLACKBOX_FACTS:
+        iw_gateway_bus_facts(&self->gateway, &facts);
+        break;
+    case BLACKBOX_SUSPENDED:
+        iw_gateway_suspended(&self->gateway, entry->as.value > 0 ? (iw_time_us_t)entry->as.value : 0U);
+        replay_tell_answer(self, entry);
+        break;
+    default:
+        if (self->answers < REPLAY_ANSWERS) {
+            self->answer[self->answers++] = *entry;
+        }
+        break;
+    }
+}
+
+void replay_event(replay_t *self, const blackbox_entry_t *entry) {
+    iw_gateway_t *gateway = &self->gateway;
+    switch (entry->kind) {
+    case BLACKBOX_ARM:
+        request(self, entry, iw_gateway_arm(gateway, entry->at_us, entry->number, entry->a != 0U));
+        break;
+    case BLACKBOX_DRIVE:
+        request(self, entry, drive(self, entry));
+        break;
+    case BLACKBOX_RESET:
+        request(self, entry, iw_gateway_reset(gateway, entry->at_us));
+        break;
+    case BLACKBOX_STOP:
+        replay_tell_request(self, entry, IW_REFUSE_NONE);
+        iw_gateway_stop(gateway, entry->at_us, entry->number, (iw_cause_t)entry->a);
+        break;
+    case BLACKBOX_ESTOPPED:
+        replay_tell_request(self, entry, IW_REFUSE_NONE);
+        iw_gateway_estop(gateway, entry->at_us, entry->number);
+        break;
+    case BLACKBOX_GONE:
+        iw_gateway_disconnect(gateway, entry->at_us, entry->number);
+        break;
+    case BLACKBOX_TARE:
+        (void)iw_gateway_tare(gateway, entry->at_us, entry->a == (uint8_t)IW_RIGHT ? IW_RIGHT : IW_LEFT);
+        replay_tell_request(self, entry, IW_REFUSE_NONE);
+        break;
+    case BLACKBOX_STATE:
+    case BLACKBOX_STOPPED:
+        compare(self, entry);
+        break;
+    default:
+        answer(self, entry);
+        break;
+    }
+}

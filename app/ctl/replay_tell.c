@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+#include "replay_tell.h"
+
+#include "names.h"
+#include "why.h"
+
+#include <inttypes.h>
+#include <stdarg.h>
+#include <string.h>
+
+__attribute__((format(printf, 4, 5))) static void tell(const replay_t *self, iw_time_us_t at_us, const char *what,
+                                                       const char *format, ...) {
+    va_list list;
+    if (self->quiet) {
+        return;
+    }
+    const iw_time_us_t since_us = at_us > self->zero_us ? at_us - self->zero_us : 0U;
+    (void)fprintf(self->out, "%6" PRIu64 ".%06" PRIu64 "  %-10s ", since_us / 1000000U, since_us % 1000000U, what);
+    va_start(list, format);
+    (void)vfprintf(self->out, format, list);
+    va_end(list);
+    (void)fputc('\n', self->out);
+}
+
+static const char *side_name(size_t side) {
+    return side == IW_LEFT ? "left" : "right";
+}
+
+static void tell_wheels(replay_t *self) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        const bool heard = iw_wheel_heard(&self->gateway.wheel[side], self->now_us);
+        const iw_force_validity_t force = iw_force_validity(&self->gateway.force[side], self->now_us);
+        if (heard != self->heard[side]) {
+            tell(self, self->now_us, "wheel", "%s %s", side_name(side), heard ? "heard" : "not heard any more");
+            self->heard[side] = heard;
+        }
+        if (force != self->force[side]) {
+            tell(self, self->now_us, "force", "%s: %s", side_name(side), gw_force_validity_name(force));
+            self->force[side] = force;
+        }
+    }
+}
+
+static void tell_ledger(replay_t *self) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        const iw_ledger_entry_t *entry = &self->gateway.ledger.entry[item];
+        if (entry->state != self->ledger[item].state) {
+            tell(self, self->now_us, "assumption", "%s: %s by the %s (figure %" PRId32 ")",
+                 gw_ledger_item_name((iw_ledger_item_t)item), gw_ledger_state_name(entry->state),
+                 gw_evidence_name(entry->evidence), entry->figure);
+        }
+        self->ledger[item] = *entry;
+    }
+}
+
+static void tell_causes(replay_t *self) {
+    const uint32_t present = iw_permit_present(&self->gateway.permit, self->now_us);
+    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL; cause++) {
+        if (((present ^ self->present) & (1U << cause)) != 0U) {
+            tell(self, self->now_us, "fault", "%s%s", gw_cause_name((iw_cause_t)cause),
+                 (present & (1U << cause)) != 0U ? "" : " is gone");
+        }
+    }
+    self->present = present;
+}
+
+static void tell_stop(replay_t *self) {
+    const iw_stop_t *stop = &self->gateway.permit.stop;
+    char sentence[GW_SENTENCE_SIZE];
+    char client[32];
+    if (stop->number == self->stop_number) {
+        return;
+    }
+    const iw_client_t who = stop->cause == IW_CAUSE_ESTOP_SOFTWARE ? stop->detail : stop->client;
+    (void)snprintf(client, sizeof client, "client %u", (unsigned)who);
+    const gw_why_context_t context = {.client = client, .estop = self->estop_name, .bus = self->bus_name};
+    gw_why_sentence(stop, &context, sentence, sizeof sentence);
+    tell(self, self->now_us, "stop", "%u: %s: %s", (unsigned)stop->number, gw_cause_name(stop->cause), sentence);
+    self->stop_number = stop->number;
+    self->drive_client = IW_CLIENT_NONE;
+}
+
+static void tell_arming(replay_t *self) {
+    const bool arming = iw_gateway_arming(&self->gateway);
+    if (self->arming && !arming && iw_gateway_state(&self->gateway) != IW_STATE_ARMED) {
+        tell(self, self->now_us, "arm", "refused: %s",
+             gw_error_name(gw_error_of(iw_gateway_arm_refusal(&self->gateway))));
+    }
+    self->arming = arming;
+}
+
+static void tell_state(replay_t *self) {
+    const iw_state_t state = iw_gateway_state(&self->gateway);
+    if (state != self->state) {
+        tell(self, self->now_us, "state", "%s", gw_state_name(state));
+        self->state = state;
+        self->drive_client = IW_CLIENT_NONE;
+    }
+}
+
+void replay_tell_step(replay_t *self) {
+    tell_wheels(self);
+    tell_ledger(self);
+    tell_causes(self);
+    tell_stop(self);
+    tell_arming(self);
+    tell_state(self);
+}
+
+static void tell_drive(replay_t *self, const blackbox_entry_t *entry, const char *result) {
+    const blackbox_drive_t *drive = &entry->as.drive;
+    const bool same = self->drive_client == entry->number && self->drive_refusal == entry->b &&
+                      memcmp(self->drive.speed_mm_s, drive->speed_mm_s, sizeof drive->speed_mm_s) == 0 &&
+                      memcmp(self->drive.current_mA, drive->current_mA, sizeof drive->current_mA) == 0;
+    if (same) {
+        return;
+    }
+    tell(self, entry->at_us, "drive", "client %u: left %" PRId32 " mm/s, right %" PRId32 " mm/s: %s",
+         (unsigned)entry->number, drive->speed_mm_s[IW_LEFT], drive->speed_mm_s[IW_RIGHT], result);
+    self->drive = *drive;
+    self->drive_client = entry->number;
+    self->drive_refusal = entry->b;
+}
+
+void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal) {
+    char result[96];
+    const char *name = refusal == IW_REFUSE_NONE ? "accepted" : gw_error_name(gw_error_of(refusal));
+    const bool same = (uint8_t)refusal == entry->b || entry->kind == (uint8_t)BLACKBOX_TARE;
+    (void)snprintf(result, sizeof result, "%s%s%s%s", name, same ? "" : " (when it was recorded: ",
+                   same                                  ? ""
+                   : entry->b == (uint8_t)IW_REFUSE_NONE ? "accepted"
+                                                         : gw_error_name(gw_error_of((iw_refusal_t)entry->b)),
+                   same ? "" : ")");
+    switch (entry->kind) {
+    case BLACKBOX_DRIVE:
+        tell_drive(self, entry, result);
+        break;
+    case BLACKBOX_ARM:
+        tell(self, entry->at_us, "arm", "client %u%s: %s", (unsigned)entry->number, entry->a != 0U ? ", takeover" : "",
+             result);
+        break;
+    case BLACKBOX_RESET:
+        tell(self, entry->at_us, "reset", "client %u: %s", (unsigned)entry->number, result);
+        break;
+    case BLACKBOX_STOP:
+        tell(self, entry->at_us, "stop asked", "%s", gw_cause_name((iw_cause_t)entry->a));
+        break;
+    case BLACKBOX_TARE:
+        tell(self, entry->at_us, "tare", "%s", side_name(entry->a == (uint8_t)IW_RIGHT ? IW_RIGHT : IW_LEFT));
+        break;
+    default:
+        tell(self, entry->at_us, "estop", "client %u", (unsigned)entry->number);
+        break;
+    }
+}
+
+void replay_tell_answer(const replay_t *self, const blackbox_entry_t *entry) {
+    switch (entry->kind) {
+    case BLACKBOX_ESTOP:
+        if ((int)entry->as.value != self->estop) {
+            tell(self, entry->at_us, "e-stop", "%s", gw_estop_name((int)entry->as.value, true));
+        }
+        break;
+    case BLACKBOX_BUS:
+        if ((iw_bus_state_t)entry->a != self->bus) {
+            tell(self, entry->at_us, "bus", "%s", gw_bus_state_name((iw_bus_state_t)entry->a));
+        }
+        break;
+    default:
+        tell(self, entry->at_us, "machine", "was suspended for %" PRId64 " ms", entry->as.value / 1000);
+        break;
+    }
+}
+
+void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry) {
+    if (entry->kind == (uint8_t)BLACKBOX_STATE) {
+        tell(self, entry->at_us, "DIFFERENT", "state %s, when it was recorded %s",
+             gw_state_name(iw_gateway_state(&self->gateway)), gw_state_name((iw_state_t)entry->a));
+    } else {
+        const iw_stop_t *stop = &self->gateway.permit.stop;
+        tell(self, entry->at_us, "DIFFERENT", "last stop %s (%u), when it was recorded %s (%" PRId64 ")",
+             gw_cause_name(stop->cause), (unsigned)stop->detail, gw_cause_name((iw_cause_t)entry->a), entry->as.value);
+    }
+}
+
+static void tell_score(const replay_t *self, const char *what, const replay_score_t *score) {
+    if (score->same + score->different > 0U) {
+        (void)fprintf(self->out, "# %s: %" PRIu64 " of %" PRIu64 " as recorded\n", what, score->same,
+                      score->same + score->different);
+    }
+}
+
+void replay_finish(const replay_t *self) {
+    (void)fprintf(self->out, "# end: %s, %u stop%s, %" PRIu64 " frames in, %" PRIu64 " setpoint frames out\n",
+                  gw_state_name(iw_gateway_state(&self->gateway)), (unsigned)self->gateway.permit.stop.number,
+                  self->gateway.permit.stop.number == 1U ? "" : "s", self->total_frames, self->total_sent);
+    tell_score(self, "setpoints on the bus", &self->setpoints);
+    tell_score(self, "answers to requests", &self->requests);
+    tell_score(self, "changes of state", &self->states);
+    tell_score(self, "stops", &self->stops);
+}
