@@ -191,6 +191,18 @@ static result_t set_ticks(const sim_call_t *call) {
     return NULL;
 }
 
+static result_t push(const sim_call_t *call) {
+    chosen_t chosen;
+    int64_t way_mm = 0;
+    if (!sides(call, &chosen) || !sim_words_milli(call->words->word[2], (sim_range_t){-100000, 100000}, &way_mm)) {
+        return SIM_USAGE;
+    }
+    for (unsigned i = 0U; i < chosen.count; ++i) {
+        sim_motion_push(&chosen.wheel[i]->motion, call->now_us, (int32_t)way_mm);
+    }
+    return NULL;
+}
+
 static result_t set_radius(const sim_call_t *call) {
     chosen_t chosen;
     int64_t radius_mm = 0;
@@ -258,6 +270,14 @@ static result_t set_role(const sim_call_t *call) {
         chosen.wheel[i]->motion.config.current_is_setpoint = setpoint;
     }
     return NULL;
+}
+
+static result_t set_pose(const sim_call_t *call) {
+    return one_of(call, 1U, (sim_choice_t){"reversed", "normal"}, &call->world->pair.pose_reversed) ? NULL : SIM_USAGE;
+}
+
+static result_t set_padding(const sim_call_t *call) {
+    return one_of(call, 1U, on_off, &call->world->pair.padded) ? NULL : SIM_USAGE;
 }
 
 static result_t set_type(const sim_call_t *call) {
@@ -341,7 +361,10 @@ const sim_command_t sim_wheel_commands[] = {
     {"gear", SIDE " TURNS [PER]", "rotor turns in PER (1) wheel turns", set_gear, 3U, 4U, SIM_CHANGED},
     {"rpm", SIDE " wheel|rotor", "whose rpm telemetry tells", set_rpm, 3U, 3U, SIM_CHANGED},
     {"radius", SIDE " MM", "the real one; the firmware believes 192", set_radius, 3U, 3U, SIM_CHANGED},
+    {"push", SIDE " METRES", "a hand turns the wheel that far, in its own sense; -100..100", push, 3U, 3U, SIM_CHANGED},
     {"mirror", SIDE " on|off", "mounted mirrored; matters to the pose only", set_mirror, 3U, 3U, SIM_CHANGED},
+    {"pose", "normal|reversed", "the pose comes least significant byte first", set_pose, 2U, 2U, SIM_CHANGED},
+    {"padding", "on|off", "all telemetry is 8 bytes long", set_padding, 2U, 2U, SIM_CHANGED},
     {"role", "limit|setpoint", "what the current beside the speed means", set_role, 2U, 2U, SIM_CHANGED},
     {"type", "any|N", "setpoints of other types are ignored", set_type, 2U, 2U, SIM_CHANGED},
     {"battery", "DECIVOLT", "supply without load, 0..255 (248)", set_battery, 2U, 2U, SIM_CHANGED},

@@ -155,7 +155,7 @@ static iw_time_us_t earlier(iw_time_us_t one_us, iw_time_us_t other_us) {
 static iw_time_us_t next_us(const sim_simulator_t *self) {
     iw_time_us_t const script_us = sim_script_next_us(&self->script);
     iw_time_us_t const step_us = (script_us == IW_NEVER) ? IW_NEVER : self->start_us + script_us;
-    iw_time_us_t const world_us = earlier(sim_world_next_us(&self->world), sim_socketcan_next_us(&self->can));
+    iw_time_us_t const world_us = earlier(sim_world_wake_us(&self->world), sim_socketcan_next_us(&self->can));
     return earlier(earlier(step_us, world_us), self->button.release_us);
 }
 

@@ -10,6 +10,8 @@
 /// The motor's own losses, drawn while it turns.
 #define IDLE_DRAW_mA   150U
 #define TOP_SPEED_um_s 6000000
+/// As fast as a hand turns a wheel.
+#define PUSH_um_s 1500000
 
 void sim_motion_default(sim_motion_config_t *out_config) {
     *out_config = (sim_motion_config_t){
@@ -84,7 +86,21 @@ static void count_ticks(sim_motion_t *self, int64_t way_nm) {
     self->ticks += (uint32_t)(uint64_t)ticks;
 }
 
+/// The hand is stronger than the motor, and lets go at rest.
+static void follow_hand(sim_motion_t *self, int64_t dt_us) {
+    int64_t const way_nm = clamp(self->push_nm, PUSH_um_s * dt_us / 1000);
+    self->push_nm -= way_nm;
+    self->accel_mm_s2 = 0;
+    self->speed_um_s = (self->push_nm == 0) ? 0 : (self->push_nm > 0) ? PUSH_um_s : -PUSH_um_s;
+    self->position_nm += way_nm;
+    count_ticks(self, way_nm);
+}
+
 static void integrate(sim_motion_t *self, int64_t dt_us) {
+    if (self->push_nm != 0) {
+        follow_hand(self, dt_us);
+        return;
+    }
     int64_t const before = self->speed_um_s;
     int64_t after = 0;
     if (!self->blocked) {
@@ -108,7 +124,7 @@ static iw_time_us_t step_end_us(const sim_motion_t *self, iw_time_us_t to_us) {
 
 void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us) {
     while (self->now_us < to_us) {
-        if (!self->driven && self->speed_um_s == 0) {
+        if (!self->driven && self->speed_um_s == 0 && self->push_nm == 0) {
             self->accel_mm_s2 = 0;
             self->now_us = to_us;
             return;
@@ -139,6 +155,11 @@ bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_proto_set
 void sim_motion_release(sim_motion_t *self, iw_time_us_t now_us) {
     sim_motion_advance(self, now_us);
     self->driven = false;
+}
+
+void sim_motion_push(sim_motion_t *self, iw_time_us_t now_us, int32_t way_mm) {
+    sim_motion_advance(self, now_us);
+    self->push_nm += (int64_t)way_mm * 1000000 * SIM_FIRMWARE_RADIUS_MM / self->config.radius_mm;
 }
 
 int64_t sim_motion_milli_rpm(const sim_motion_t *self) {

@@ -38,6 +38,24 @@ iw_time_us_t sim_pair_next_us(const sim_pair_t *self) {
     return (left_us <= right_us) ? left_us : right_us;
 }
 
+static void swap_pairs_of_bytes(iw_can_frame_t *frame) {
+    for (size_t i = 0U; i + 1U < frame->dlc; i += 2U) {
+        uint8_t const first = frame->data[i];
+        frame->data[i] = frame->data[i + 1U];
+        frame->data[i + 1U] = first;
+    }
+}
+
+static void encode(const sim_pair_t *self, const iw_proto_message_t *message, iw_can_frame_t *out_frame) {
+    (void)iw_proto_encode(message, out_frame);
+    if (self->pose_reversed && message->kind == IW_PROTO_POSE) {
+        swap_pairs_of_bytes(out_frame);
+    }
+    if (self->padded) {
+        out_frame->dlc = IW_CAN_DATA_MAX;
+    }
+}
+
 bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent) {
     for (;;) {
         iw_time_us_t const due_us = sim_pair_next_us(self);
@@ -49,7 +67,7 @@ bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent) 
         if (sim_wheel_step(&self->wheel[side], sim_pair_battery_dV(self), &self->pose, &message)) {
             out_sent->due_us = due_us;
             out_sent->side = side;
-            (void)iw_proto_encode(&message, &out_sent->frame);
+            encode(self, &message, &out_sent->frame);
             return true;
         }
     }

@@ -60,9 +60,18 @@ static iw_time_us_t earlier(iw_time_us_t one_us, iw_time_us_t other_us) {
     return (one_us < other_us) ? one_us : other_us;
 }
 
+static iw_time_us_t senders_us(const sim_world_t *self) {
+    return earlier(sim_pair_next_us(&self->pair), earlier(self->foreign.due_us, self->babble.due_us));
+}
+
 iw_time_us_t sim_world_next_us(const sim_world_t *self) {
-    iw_time_us_t const nodes_us = earlier(self->foreign.due_us, self->babble.due_us);
-    return earlier(earlier(sim_pair_next_us(&self->pair), sim_bus_next_us(&self->bus)), nodes_us);
+    return earlier(senders_us(self), sim_bus_next_us(&self->bus));
+}
+
+iw_time_us_t sim_world_wake_us(const sim_world_t *self) {
+    iw_time_us_t const due_us = senders_us(self);
+    iw_time_us_t const ended_us = (due_us == IW_NEVER) ? IW_NEVER : due_us + SIM_WORLD_FRAME_US;
+    return earlier(ended_us, sim_bus_next_us(&self->bus));
 }
 
 static void update_ack(sim_world_t *self, iw_time_us_t now_us) {
@@ -152,6 +161,8 @@ static void heal_wheel(sim_wheel_t *wheel) {
 void sim_world_heal(sim_world_t *self, iw_time_us_t now_us) {
     heal_wheel(&self->pair.wheel[IW_LEFT]);
     heal_wheel(&self->pair.wheel[IW_RIGHT]);
+    self->pair.pose_reversed = false;
+    self->pair.padded = false;
     self->pair.wheel[IW_LEFT].force.unit = IW_FORCE_CN;
     self->pair.wheel[IW_RIGHT].force.unit = IW_FORCE_DN;
     sim_world_power(self, now_us, true);

@@ -42,6 +42,7 @@ typedef struct {
     iw_time_us_t heard_us; ///< When the last setpoint was taken; IW_NEVER: never.
     int64_t position_nm;   ///< At the firmware's radius, since the start of the simulation.
     int64_t tick_rest;     ///< Way not yet counted as a tick.
+    int64_t push_nm;       ///< Way that a hand still turns the wheel, whatever it is told; at the firmware's radius.
     int32_t speed_um_s;    ///< At the firmware's radius, in the wheel's own sense of rotation.
     int32_t accel_mm_s2;
     uint32_t ticks;
@@ -66,6 +67,9 @@ bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_proto_set
 
 /// Forgets the setpoint: no power, or the firmware starts anew. The wheel coasts.
 void sim_motion_release(sim_motion_t *self, iw_time_us_t now_us);
+
+/// A hand turns the wheel over that way at the real radius, in the wheel's own sense; more is added to what is left.
+void sim_motion_push(sim_motion_t *self, iw_time_us_t now_us, int32_t way_mm);
 
 /// Speed in thousandths of rpm as telemetry means it: of wheel or rotor, sign as reported.
 int64_t sim_motion_milli_rpm(const sim_motion_t *self);

@@ -35,6 +35,8 @@ typedef struct {
     sim_pose_t pose;
     uint8_t battery_dV;
     bool power;
+    bool pose_reversed; ///< Fault: the pose comes least significant byte first.
+    bool padded;        ///< Fault: all telemetry is 8 bytes long, zeros behind what the table has.
 } sim_pair_t;
 
 /// A telemetry frame and when it was due.

@@ -11,7 +11,7 @@
 ///     while (sim_world_step(&world, now_us, &delivery)) {
 ///         every client hears delivery.frame; delivery.port gets it as echo
 ///     }
-///     sleep until sim_world_next_us(&world)
+///     sleep until sim_world_wake_us(&world)
 ///
 /// Before a fault is planted or a frame submitted at `now_us`, all that is due by then must have been taken with
 /// `step`.
@@ -31,6 +31,8 @@
 #define SIM_WORLD_CLIENTS (SIM_BUS_PORTS - SIM_PORT_CLIENT)
 /// A client's adapter holds this many frames unless told otherwise: the controller's one and three behind it.
 #define SIM_QUEUE_DEFAULT 4U
+/// Most frames are of this length or longer: a wheel's speed, at 1 Mbit/s.
+#define SIM_WORLD_FRAME_US 85U
 /// Another master sends a pair this often.
 #define SIM_FOREIGN_PERIOD_US 20000U
 
@@ -76,6 +78,10 @@ void sim_world_submit(sim_world_t *self, iw_time_us_t now_us, uint8_t port, cons
 bool sim_world_step(sim_world_t *self, iw_time_us_t now_us, sim_delivery_t *out_delivery);
 
 iw_time_us_t sim_world_next_us(const sim_world_t *self);
+
+/// When to wake up to take it: as `next_us`, but not for a frame that only begins. One shorter than SIM_WORLD_FRAME_US is then taken
+/// that much later than it ended; what `step` tells of it is the same.
+iw_time_us_t sim_world_wake_us(const sim_world_t *self);
 
 /// Power of both wheels; what they had queued is lost. One wheel's firmware starts anew.
 void sim_world_power(sim_world_t *self, iw_time_us_t now_us, bool on);
