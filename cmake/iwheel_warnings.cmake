@@ -3,4 +3,9 @@
 add_library(iwheel_warnings INTERFACE)
 target_compile_options(iwheel_warnings INTERFACE
     -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wcast-qual -Wstrict-prototypes
-    -Wmissing-prototypes -Wundef -Werror)
+    -Wmissing-prototypes -Wundef)
+# A newer compiler's new warning must not stop somebody else's build, nor a distribution's.
+option(IWHEEL_WERROR "Warnings are errors" ${PROJECT_IS_TOP_LEVEL})
+if(IWHEEL_WERROR)
+    target_compile_options(iwheel_warnings INTERFACE -Werror)
+endif()

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#include "first_drive.h"
+
+#define CLIENT     1U
+#define ARM_AT_us  500000U
+#define STOP_AT_us 1500000U
+
+bool first_drive_init(iw_gateway_t *gateway, const iw_hal_t *hal, iw_time_us_t now_us, bool restarted) {
+    iw_config_t config;
+    iw_config_default(&config);
+    config.setpoint_type = 1U; // Yours comes from the wheels' vendor: the document lists no values.
+    config.setpoint_type_set = true;
+    config.current_role = IW_ROLE_LIMIT; // The same.
+    config.max_speed_mm_s = 500U;
+    return iw_gateway_init(gateway, &config, hal, now_us, restarted) == IW_CONFIG_OK;
+}
+
+void first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us) {
+    const iw_drive_t forward = {.speed_mm_s = {200, 200}};
+    iw_applied_t applied;
+    if (now_us < ARM_AT_us) {
+        return;
+    }
+    if (now_us >= STOP_AT_us) {
+        if (iw_gateway_state(gateway) == IW_STATE_ARMED) {
+            iw_gateway_stop(gateway, now_us, CLIENT, IW_CAUSE_CLIENT_STOP);
+        }
+    } else if (iw_gateway_state(gateway) == IW_STATE_LISTENING && !iw_gateway_arming(gateway)) {
+        (void)iw_gateway_arm(gateway, now_us, CLIENT, false); // Refused: asked again in the next step.
+    } else if (iw_gateway_state(gateway) == IW_STATE_ARMED) {
+        (void)iw_gateway_drive(gateway, now_us, CLIENT, &forward, &applied); // Feeds the lease.
+    }
+}

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+#include "pretend_wheels.h"
+
+#include "iwheel/proto.h"
+
+#define UM_PER_TURN 1206372 // A wheel of 192 mm radius.
+
+static void put(pretend_wheels_t *self, const iw_can_frame_t *frame) {
+    if (self->count < sizeof self->queue / sizeof self->queue[0]) {
+        self->queue[self->count++] = *frame;
+    }
+}
+
+void pretend_wheels_run(pretend_wheels_t *self) {
+    for (unsigned side = 0; side < IW_SIDES; ++side) {
+        iw_proto_message_t message = {.kind = IW_PROTO_SPEED, .side = (iw_side_t)side};
+        iw_can_frame_t frame;
+        message.as.speed.speed_rpm = (int16_t)(self->speed_mm_s[side] * 60 * 1000 / UM_PER_TURN);
+        if (iw_proto_encode(&message, &frame) == IW_OK) {
+            put(self, &frame);
+        }
+    }
+}
+
+static int send(void *context, const iw_can_frame_t *frame) {
+    pretend_wheels_t *self = (pretend_wheels_t *)context;
+    iw_can_frame_t echo = *frame;
+    iw_proto_message_t message;
+    if (iw_proto_decode(frame, &message) == IW_OK && message.kind == IW_PROTO_SETPOINT) {
+        self->speed_mm_s[message.side] = message.as.setpoint.speed_mm_s;
+        if (message.as.setpoint.speed_mm_s > self->fastest_mm_s) {
+            self->fastest_mm_s = message.as.setpoint.speed_mm_s;
+        }
+    }
+    echo.kind = IW_CAN_ECHO;
+    put(self, &echo);
+    return 1;
+}
+
+static int receive(void *context, iw_can_frame_t *out_frame) {
+    pretend_wheels_t *self = (pretend_wheels_t *)context;
+    if (self->count == 0U) {
+        return 0;
+    }
+    *out_frame = self->queue[0];
+    --self->count;
+    for (unsigned i = 0; i < self->count; ++i) {
+        self->queue[i] = self->queue[i + 1U];
+    }
+    return 1;
+}
+
+static iw_bus_state_t bus_state(void *context) {
+    (void)context;
+    return IW_BUS_ACTIVE;
+}
+
+static int purge(void *context) {
+    (void)context; // What was sent is on the bus already.
+    return 1;
+}
+
+static int estop_pressed(void *context) {
+    (void)context;
+    return 0;
+}
+
+iw_hal_t pretend_wheels_hal(pretend_wheels_t *self) {
+    return (iw_hal_t){.send = send,
+                      .receive = receive,
+                      .bus_state = bus_state,
+                      .purge = purge,
+                      .estop_pressed = estop_pressed,
+                      .context = self};
+}

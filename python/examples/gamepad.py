@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Drives with a gamepad while its dead man's button is held. MOVES THE WHEELS.
+
+usage: gamepad.py [--socket PATH] [--device /dev/input/js0] [--speed MM_S] [--yaw MRAD_S] [--button N]
+
+The left stick gives speed and turning rate, but only while the button (4: usually the left shoulder) is held. Let go, unplugged or
+out of battery (the device then goes away), the wheels stop.
+"""
+
+import argparse
+import os
+import select
+import struct
+import sys
+
+from iwheel import Gateway, IWheelError
+
+EVENT = struct.Struct("=IhBB")  # struct js_event of linux/joystick.h: time, value, type, number
+BUTTON, AXIS, INITIAL = 0x01, 0x02, 0x80
+FULL = 32767
+CENTRE = 3000
+"""Sticks rest not quite in the middle."""
+
+
+class Gamepad:
+    """What is pressed. OSError or EOFError when the gamepad is gone."""
+
+    def __init__(self, device: str) -> None:
+        self.file = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
+        self.axes = {0: 0, 1: 0}
+        self.buttons: set[int] = set()
+        self.pending = b""
+
+    def update(self, seconds: float) -> None:
+        if not select.select([self.file], [], [], seconds)[0]:
+            return
+        data = os.read(self.file, 64 * EVENT.size)
+        if not data:
+            raise EOFError("the gamepad is gone")
+        self.pending += data
+        while len(self.pending) >= EVENT.size:
+            _, value, kind, number = EVENT.unpack(self.pending[: EVENT.size])
+            self.pending = self.pending[EVENT.size :]
+            if kind & ~INITIAL == AXIS:
+                self.axes[number] = value if abs(value) > CENTRE else 0
+            elif value:
+                self.buttons.add(number)
+            else:
+                self.buttons.discard(number)
+
+
+def steer(options: argparse.Namespace) -> None:
+    gamepad = Gamepad(options.device)
+    gamepad.update(0.2)
+    if options.button in gamepad.buttons:
+        raise EOFError("the dead man's button is held already; let go of it, then start again")
+    with Gateway(options.socket) as gateway, gateway.arm("gamepad") as wheels:
+        print(f"armed: hold button {options.button} and steer with the left stick; Ctrl-C ends")
+        while True:
+            gamepad.update(wheels.terms.lease_ms / 3000)
+            if options.button in gamepad.buttons:
+                wheels.twist(-gamepad.axes[1] * options.speed // FULL, -gamepad.axes[0] * options.yaw // FULL)
+            else:
+                wheels.twist(0, 0)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Drives the wheels with a gamepad. MOVES THE WHEELS.")
+    parser.add_argument("--socket", help="of the gateway; else $IWHEEL_SOCKET, else the only one in /run/iwheel")
+    parser.add_argument("--device", default="/dev/input/js0", help="joystick device (/dev/input/js0)")
+    parser.add_argument("--speed", type=int, default=400, help="mm/s with the stick fully forward (400)")
+    parser.add_argument("--yaw", type=int, default=1000, help="mrad/s with the stick fully to the side (1000)")
+    parser.add_argument("--button", type=int, default=4, help="number of the dead man's button (4)")
+    try:
+        steer(parser.parse_args())
+    except KeyboardInterrupt:
+        return 0
+    except (IWheelError, EOFError, OSError) as error:
+        print(f"gamepad.py: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

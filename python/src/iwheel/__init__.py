@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+"""Drive a pair of iWheels through iwheel-gateway.
+
+    from iwheel import Gateway
+
+    with Gateway().arm("example") as wheels:
+        wheels.drive_for(2.0, 200, 200)          # mm/s, left and right
+
+However that block is left, the wheels are stopped: at its end, by an exception, by Ctrl-C. If the program hangs, is killed or
+loses its connection, the gateway stops them a lease (200 ms) after the last command. Nothing in this package repeats a command
+behind the program's back: no thread, no task, no timer.
+
+`AsyncGateway` is the same for asyncio. Speeds are mm/s, currents mA, integers as on the bus. None means unknown, never 0.
+"""
+
+from ._aio import AsyncArmed, AsyncGateway
+from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
+from ._gateway import Armed, Gateway
+from ._types import Applied, Event, Status, Stop, Terms, WheelStatus
+from ._version import __version__
+from ._wire import default_socket
+
+__all__ = [
+    "Applied",
+    "Armed",
+    "AsyncArmed",
+    "AsyncGateway",
+    "Event",
+    "Gateway",
+    "GatewayUnavailable",
+    "IWheelError",
+    "LeaseEnded",
+    "NoAnswer",
+    "ProtocolError",
+    "Refused",
+    "Status",
+    "Stop",
+    "Terms",
+    "WheelStatus",
+    "__version__",
+    "default_socket",
+]

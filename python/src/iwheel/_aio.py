@@ -1,0 +1,404 @@
+# SPDX-License-Identifier: MIT
+"""The client for asyncio. Contract: as `Gateway` and `Armed`, with `await` before every request.
+
+Its one task only reads. No task repeats a command: when the program's own task hangs, the lease ends.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+import warnings
+from collections import deque
+from types import TracebackType
+from typing import Any, AsyncIterator, Deque, Dict, Generator, List, Mapping, Optional, Type, cast
+
+from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
+from ._gateway import REPEATABLE, REST_S
+from ._types import Applied, Event, Status, Stop, Terms
+from ._wire import (
+    HARMLESS,
+    Message,
+    Wire,
+    applied_of,
+    cannot_connect,
+    default_socket,
+    drive_fields,
+    lost_event,
+    result_of,
+    stands,
+    terms_of,
+    without_envelope,
+)
+
+EVENTS_KEPT = 1000
+
+
+class _Stream:
+    """One connection: a task sorts what comes into replies and events."""
+
+    def __init__(self, path: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.path = path
+        self.client: Optional[int] = None
+        self.arms = 0
+        self.told = False
+        """That it ended, to whoever reads the events."""
+        self.came = asyncio.Event()
+        self.events: Deque[Event] = deque()
+        self.error: Optional[GatewayUnavailable] = None
+        self._lost = 0
+        self._wire = Wire()
+        self._waiting: Dict[int, "asyncio.Future[Message]"] = {}
+        self._reader, self._writer, self._pid = reader, writer, os.getpid()
+        self._task = asyncio.ensure_future(self._read())
+
+    @classmethod
+    async def connect(cls, path: str) -> _Stream:
+        try:
+            return cls(path, *await asyncio.open_unix_connection(path))
+        except OSError as error:
+            raise cannot_connect(path, error) from None
+
+    @property
+    def open(self) -> bool:
+        return self.error is None
+
+    def close(self, reason: str = "the connection is closed") -> None:
+        self._fail(GatewayUnavailable(f"{self.path}: {reason}"))
+        self._task.cancel()
+
+    def post(self, cmd: str, fields: Mapping[str, Any]) -> "asyncio.Future[Message]":
+        """Hands the request over at once; its reply comes with the future."""
+        if self.error is not None:
+            raise self.error
+        if self._pid != os.getpid():
+            raise GatewayUnavailable(f"{self.path}: the connection belongs to the parent process")
+        number, line = self._wire.request(cmd, fields)
+        future: "asyncio.Future[Message]" = asyncio.get_running_loop().create_future()
+        self._waiting[number] = future
+        future.add_done_callback(lambda _: self._waiting.pop(number, None))
+        self._writer.write(line)
+        return future
+
+    async def ask(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:
+        future = self.post(cmd, fields)
+        try:
+            return await asyncio.wait_for(future, timeout)
+        except asyncio.TimeoutError:
+            self.close()
+            raise NoAnswer(
+                f"{self.path}: no answer to {cmd} within {timeout:g} s; the connection was closed"
+            ) from None
+
+    def take_event(self) -> Optional[Event]:
+        if self._lost > 0:
+            count, self._lost = self._lost, 0
+            return lost_event(count)
+        return self.events.popleft() if self.events else None
+
+    async def _read(self) -> None:
+        try:
+            while True:
+                data = await self._reader.read(65536)
+                if not data:
+                    raise GatewayUnavailable(f"{self.path}: the gateway closed the connection")
+                for message in self._wire.feed(data):
+                    self._sort(message)
+        except (GatewayUnavailable, ProtocolError) as error:
+            self._fail(error)
+        except OSError as error:
+            self._fail(GatewayUnavailable(f"{self.path}: the connection broke ({error})"))
+
+    def _sort(self, message: Message) -> None:
+        if "ok" in message:
+            number = message.get("id")
+            if number is None:
+                raise GatewayUnavailable(f"{self.path}: {message.get('error')}: {message.get('message')}")
+            future = self._waiting.get(number)
+            if future is not None and not future.done():
+                future.set_result(message)
+            return
+        if message["event"] == "hello":
+            self.client = message.get("client")
+            return
+        if len(self.events) >= EVENTS_KEPT:
+            self.events.popleft()
+            self._lost += 1
+        self.events.append(message)
+        self.came.set()
+
+    def _fail(self, error: GatewayUnavailable) -> None:
+        if self.error is not None:
+            return
+        self.error = error
+        self._writer.close()
+        waiting: List["asyncio.Future[Message]"] = list(self._waiting.values())
+        for future in waiting:
+            if not future.done():
+                future.set_exception(error)
+        self.came.set()
+
+
+class AsyncGateway:
+    """As `Gateway`. Any number of tasks of one event loop may use it; each watcher of events should have its own."""
+
+    def __init__(self, socket: Optional[str] = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
+        self._path = socket
+        self._timeout = timeout
+        self._wait = wait
+        self._stream: Optional[_Stream] = None
+        self._subscription: Optional[Message] = None
+        self._connecting = asyncio.Lock()
+        self._kept = False
+
+    async def __aenter__(self) -> AsyncGateway:
+        self._kept = True
+        return self
+
+    async def __aexit__(
+        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+    ) -> None:
+        self._kept = False
+        self.close()
+
+    def close(self) -> None:
+        """Ends the connection, and with it the lease, if it was ours. The next request makes a new one."""
+        stream, self._stream = self._stream, None
+        if stream is not None:
+            stream.close()
+
+    async def hello(self) -> Message:
+        return cast(Message, without_envelope(await self._ask("hello")))
+
+    async def status(self) -> Status:
+        return cast(Status, without_envelope(await self._ask("status")))
+
+    async def why(self) -> Stop:
+        return cast(Stop, without_envelope(await self._ask("why")))
+
+    async def watch(self, *topics: str, rate_hz: Optional[int] = None) -> None:
+        fields = {"topics": list(topics), "rate_hz": rate_hz}
+        await self._ask("watch", **fields)
+        self._subscription = fields if topics else None
+
+    async def events(self, timeout: Optional[float] = None) -> AsyncIterator[Event]:
+        """As `Gateway.events`, with `disconnected`, `reconnected` and `lost`."""
+        while True:
+            event = await self._next_event(timeout)
+            if event is None:
+                return
+            yield event
+
+    async def stop(self) -> None:
+        await self._ask("stop")
+
+    async def estop(self, reason: Optional[str] = None) -> None:
+        await self._ask("estop", reason=reason)
+
+    async def reset(self) -> None:
+        await self._ask("reset")
+
+    async def tare(self, side: Optional[str] = None) -> None:
+        await self._ask("tare", side=side)
+
+    def arm(self, name: Optional[str] = None, *, takeover: bool = False) -> _Arming:
+        """`async with gateway.arm("name") as wheels:`, or `wheels = await gateway.arm("name")`."""
+        return _Arming(self, name, takeover)
+
+    # The inside ------------------------------------------------------------------------------------------------------
+
+    async def _connected(self, deadline: Optional[float]) -> _Stream:
+        async with self._connecting:
+            if self._stream is not None and self._stream.open:
+                return self._stream
+            pause = 0.02
+            while True:
+                try:
+                    stream = await _Stream.connect(self._path or default_socket())
+                    break
+                except GatewayUnavailable:
+                    if deadline is None or time.monotonic() + pause > deadline:
+                        raise
+                    await asyncio.sleep(pause)
+                    pause = min(1.0, pause * 2)
+            self._stream = stream
+            if self._subscription is not None:
+                result_of("watch", await stream.ask("watch", self._subscription, self._timeout))
+            return stream
+
+    async def _ask(self, cmd: str, **fields: Any) -> Message:
+        deadline = time.monotonic() + self._wait if self._wait > 0 else None
+        stream = await self._connected(deadline)
+        try:
+            return result_of(cmd, await stream.ask(cmd, fields, self._timeout))
+        except GatewayUnavailable:
+            if cmd not in REPEATABLE:
+                raise
+        return result_of(cmd, await (await self._connected(deadline)).ask(cmd, fields, self._timeout))
+
+    async def _arm(self, name: Optional[str], takeover: bool) -> AsyncArmed:
+        stream = await self._connected(time.monotonic() + self._wait if self._wait > 0 else None)
+        fields = {"name": name, "takeover": takeover or None}
+        try:
+            terms = terms_of(result_of("arm", await stream.ask("arm", fields, self._timeout)))
+        except asyncio.CancelledError:
+            stream.close("a task was cancelled while arming")
+            raise
+        return AsyncArmed(self, stream, terms)
+
+    async def _next_event(self, timeout: Optional[float]) -> Optional[Event]:
+        deadline = time.monotonic() + (timeout if timeout is not None else float("inf"))
+        if self._stream is None:
+            await self._connected(None)
+        stream = self._stream
+        while stream is not None:
+            event = stream.take_event()
+            if event is not None:
+                return event
+            if not stream.open:
+                return await self._gone(stream, deadline)
+            stream.came.clear()
+            left = deadline - time.monotonic()
+            try:
+                await asyncio.wait_for(stream.came.wait(), max(0.0, left) if timeout is not None else None)
+            except asyncio.TimeoutError:
+                return None
+        return None
+
+    async def _gone(self, stream: _Stream, deadline: float) -> Optional[Event]:
+        if not stream.told:
+            stream.told = True
+            return {"event": "disconnected", "message": str(stream.error)}
+        try:
+            await self._connected(deadline)
+        except GatewayUnavailable:
+            return None
+        return {"event": "reconnected"}
+
+    async def _wait_for_rest(self, seconds: float) -> bool:
+        deadline = time.monotonic() + seconds
+        while True:
+            if stands(cast(Message, await self.status())):
+                return True
+            if time.monotonic() > deadline:
+                return False
+            await asyncio.sleep(0.02)
+
+
+class _Arming:
+    """What `AsyncGateway.arm` returns: to be awaited, or entered with `async with`."""
+
+    def __init__(self, gateway: AsyncGateway, name: Optional[str], takeover: bool) -> None:
+        self._gateway, self._name, self._takeover = gateway, name, takeover
+        self._armed: Optional[AsyncArmed] = None
+
+    def __await__(self) -> Generator[Any, None, AsyncArmed]:
+        return self._gateway._arm(self._name, self._takeover).__await__()
+
+    async def __aenter__(self) -> AsyncArmed:
+        self._armed = await self
+        return self._armed
+
+    async def __aexit__(
+        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+    ) -> None:
+        assert self._armed is not None
+        await self._armed.__aexit__(kind, error, trace)
+
+
+class AsyncArmed:
+    """As `Armed`. A cancelled task stops the wheels too."""
+
+    def __init__(self, gateway: AsyncGateway, stream: _Stream, terms: Terms) -> None:
+        self.terms = terms
+        self._gateway = gateway
+        self._stream = stream
+        self._ended: Optional[str] = None
+        self._fed = time.monotonic() + (terms.first_lease_ms - terms.lease_ms) / 1000
+        stream.arms += 1
+        self._number = stream.arms
+
+    async def drive(
+        self, left_mm_s: int, right_mm_s: int, left_mA: Optional[int] = None, right_mA: Optional[int] = None
+    ) -> Applied:
+        return await self._command("drive", drive_fields(left_mm_s, right_mm_s, left_mA, right_mA))
+
+    async def twist(self, v_mm_s: int, yaw_mrad_s: int) -> Applied:
+        return await self._command("twist", {"v_mm_s": v_mm_s, "yaw_mrad_s": yaw_mrad_s})
+
+    async def drive_for(
+        self,
+        seconds: float,
+        left_mm_s: int,
+        right_mm_s: int,
+        left_mA: Optional[int] = None,
+        right_mA: Optional[int] = None,
+    ) -> Applied:
+        end = time.monotonic() + seconds
+        while True:
+            applied = await self.drive(left_mm_s, right_mm_s, left_mA, right_mA)
+            left = end - time.monotonic()
+            if left <= 0:
+                return applied
+            await asyncio.sleep(min(left, self.terms.lease_ms / 3000))
+
+    async def stop(self, wait: float = REST_S) -> bool:
+        self._end("it was stopped")
+        if self._stream.open:
+            await self._stream.ask("stop", {}, self._gateway._timeout)  # Its first step hands the line over.
+        else:
+            await self._gateway.stop()
+        return await self._gateway._wait_for_rest(wait)
+
+    async def __aenter__(self) -> AsyncArmed:
+        return self
+
+    async def __aexit__(
+        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+    ) -> None:
+        trouble = "one of them still turns"
+        at_rest = False
+        try:
+            at_rest = await self._leave()
+        except IWheelError as problem:
+            trouble = str(problem)
+        finally:
+            self._end("its block was left")
+            if not at_rest:
+                self._stream.close()
+            if not self._gateway._kept:
+                self._gateway.close()
+        if not at_rest:
+            warnings.warn(f"the wheels were told to stop but are not known to stand: {trouble}", RuntimeWarning, stacklevel=2)
+
+    def _end(self, reason: str) -> None:
+        self._ended = self._ended or reason
+
+    async def _command(self, cmd: str, fields: Message) -> Applied:
+        if not self._stream.open:
+            self._end("the connection was lost")
+        if self._number != self._stream.arms:
+            self._end("the same AsyncGateway was armed anew")
+        if self._ended is not None:
+            raise LeaseEnded(f"this permission to drive is over ({self._ended}); arm again")
+        asked = time.monotonic()
+        try:
+            reply = result_of(cmd, await self._stream.ask(cmd, fields, self._gateway._timeout))
+        except Refused as refusal:
+            if refusal.error not in HARMLESS:
+                self._end(refusal.message)
+            raise
+        except GatewayUnavailable as lost:
+            self._end(str(lost))
+            raise
+        self._fed = asked
+        return applied_of(reply)
+
+    async def _leave(self) -> bool:
+        surely_ours = self._ended is None and time.monotonic() - self._fed < self.terms.lease_ms / 1000
+        if not surely_ours:
+            holder = (await self._gateway.status())["lease"]["holder"]
+            if holder is not None and holder != self._stream.client:
+                return True
+        return await self.stop()

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: MIT
+"""One connection to the gateway's socket, used from one thread."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import time
+import weakref
+from collections import deque
+from typing import Any, Deque, Dict, Mapping, Optional, Set
+
+from ._errors import GatewayUnavailable, IWheelError, NoAnswer, ProtocolError
+from ._types import Event
+from ._wire import Message, Wire, cannot_connect, lost_event
+
+EVENTS_KEPT = 1000
+SLICE_S = 0.05
+"""A signal handler may have taken what is waited for: look again this often."""
+
+
+class Connection:
+    """Replies are matched by number; events are kept until they are taken, the oldest are lost first and counted."""
+
+    def __init__(self, path: str, timeout: float) -> None:
+        self.path = path
+        self.client: Optional[int] = None
+        """Our number in the gateway, as `lease.holder` in the status."""
+        self.arms = 0
+        """How often this connection was armed: only the last one counts."""
+        self.events: Deque[Event] = deque()
+        self._lost = 0
+        self._wire = Wire()
+        self._replies: Dict[int, Message] = {}
+        self._wanted: Set[int] = set()
+        self._sending = False
+        self._socket: Optional[socket.socket] = socket.socket(socket.AF_UNIX)
+        self._socket.settimeout(timeout)
+        try:
+            self._socket.connect(path)
+            self._socket.setblocking(False)
+        except OSError as error:
+            self.close()
+            raise cannot_connect(path, error) from None
+        _alive.add(self)
+
+    def close(self) -> None:
+        """The end of the connection ends the lease, if it was ours. Works at any time."""
+        gone, self._socket = self._socket, None
+        if gone is not None:
+            try:
+                gone.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+            gone.close()
+
+    def leave(self) -> None:
+        """In a forked child: lets go of what belongs to the parent, without ending it."""
+        gone, self._socket = self._socket, None
+        if gone is not None:
+            gone.close()
+
+    @property
+    def open(self) -> bool:
+        return self._socket is not None
+
+    def alive(self) -> bool:
+        """Takes what has come; False if the gateway has closed the connection."""
+        try:
+            while self._readable(0.0):
+                self._read()
+        except GatewayUnavailable:
+            pass
+        return self.open
+
+    def ask(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:
+        """The reply. GatewayUnavailable, with the connection closed, if there is none within that time."""
+        number, line = self._wire.request(cmd, fields)
+        deadline = time.monotonic() + timeout
+        self._wanted.add(number)
+        try:
+            self._send(line, deadline, cmd)
+            while number not in self._replies:
+                self.wait(deadline)
+                if time.monotonic() > deadline and number not in self._replies:
+                    self.close()
+                    raise NoAnswer(f"{self.path}: no answer to {cmd} within {timeout:g} s; the connection was closed")
+            return self._replies[number]
+        finally:
+            self._wanted.discard(number)
+            self._replies.pop(number, None)
+
+    def wait(self, deadline: float) -> None:
+        """Until something came, or the deadline, or a short while."""
+        if self._readable(min(SLICE_S, max(0.0, deadline - time.monotonic()))):
+            self._read()
+
+    def take_event(self) -> Optional[Event]:
+        """The oldest event that came; None: none is there."""
+        if self._lost > 0:
+            count, self._lost = self._lost, 0
+            return lost_event(count)
+        return self.events.popleft() if self.events else None
+
+    def _fail(self, error: IWheelError) -> IWheelError:
+        self.close()
+        return error
+
+    def _require(self) -> socket.socket:
+        if self._socket is None:
+            raise GatewayUnavailable(f"{self.path}: the connection is closed")
+        return self._socket
+
+    def _readable(self, seconds: float) -> bool:
+        return bool(select.select([self._require()], [], [], seconds)[0])
+
+    def _send(self, line: bytes, deadline: float, cmd: str) -> None:
+        sock = self._require()
+        if self._sending:  # An interrupted request of ours is half sent; only the end of the connection undoes it.
+            raise self._fail(GatewayUnavailable(f"{self.path}: a request was interrupted; the connection was closed"))
+        self._sending = True
+        while line:
+            left = deadline - time.monotonic()
+            if left <= 0 or not select.select([], [sock], [], left)[1]:
+                raise self._fail(NoAnswer(f"{self.path}: the gateway does not take {cmd}; the connection was closed"))
+            try:
+                line = line[sock.send(line) :]
+            except BlockingIOError:
+                continue
+            except OSError as error:
+                raise self._fail(GatewayUnavailable(f"{self.path}: the gateway closed the connection ({error})")) from None
+        self._sending = False
+
+    def _read(self) -> None:
+        try:
+            data = self._require().recv(65536)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            raise self._fail(GatewayUnavailable(f"{self.path}: the connection broke ({error})")) from None
+        if not data:
+            raise self._fail(GatewayUnavailable(f"{self.path}: the gateway closed the connection"))
+        try:
+            for message in self._wire.feed(data):
+                self._sort(message)
+        except ProtocolError as error:
+            raise self._fail(error) from None
+
+    def _sort(self, message: Message) -> None:
+        if "ok" in message:
+            if message.get("id") in self._wanted:
+                self._replies[message["id"]] = message
+            elif message.get("id") is None:  # too_many_clients, line_too_long: the gateway closes after it.
+                raise self._fail(GatewayUnavailable(f"{self.path}: {message.get('error')}: {message.get('message')}"))
+            return
+        if message["event"] == "hello":
+            self.client = message.get("client")
+            return
+        if len(self.events) >= EVENTS_KEPT:
+            self.events.popleft()
+            self._lost += 1
+        self.events.append(message)
+
+
+_alive: "weakref.WeakSet[Connection]" = weakref.WeakSet()
+
+
+def _leave_all() -> None:
+    for connection in list(_alive):
+        connection.leave()
+
+
+# A child would keep the parent's connection, and with it the lease, after the parent's death.
+os.register_at_fork(after_in_child=_leave_all)

@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: MIT
+"""The client for ordinary programs. Contract: see `Gateway` and `Armed`."""
+
+from __future__ import annotations
+
+import threading
+import time
+import warnings
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Any, Iterator, Optional, Type, cast
+
+from ._connection import Connection
+from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, Refused
+from ._types import Applied, Event, Status, Stop, Terms
+from ._wire import (
+    HARMLESS,
+    Message,
+    applied_of,
+    default_socket,
+    drive_fields,
+    result_of,
+    stands,
+    terms_of,
+    without_envelope,
+)
+
+REPEATABLE = ("hello", "status", "why", "stop", "estop")
+"""Asked again on a new connection if the old one broke: they never start a motion."""
+REST_S = 3.0
+"""How long an end of driving waits at most for the wheels to stand."""
+
+
+class Gateway:
+    """A connection to the gateway, made when it is first needed and again when it broke. Driving is never resumed.
+
+    `socket`: else $IWHEEL_SOCKET, else the only one in /run/iwheel. `timeout`: for each answer, in seconds. `wait`: how long to
+    wait for a gateway that is not there (yet).
+
+    One thread at a time: give each thread its own Gateway. `with` closes the connection at its end.
+    """
+
+    def __init__(self, socket: Optional[str] = None, *, timeout: float = 1.0, wait: float = 0.0) -> None:
+        self._path = socket
+        self._timeout = timeout
+        self._wait = wait
+        self._connection: Optional[Connection] = None
+        self._subscription: Optional[Message] = None
+        self._busy = threading.RLock()
+        self._kept = False
+
+    def __enter__(self) -> Gateway:
+        self._kept = True
+        return self
+
+    def __exit__(
+        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+    ) -> None:
+        self._kept = False
+        self.close()
+
+    def close(self) -> None:
+        """Ends the connection, and with it the lease, if it was ours. The next request makes a new one."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            connection.close()
+
+    # Reading: moves nothing ------------------------------------------------------------------------------------------
+
+    def hello(self) -> Message:
+        """Who answers: `name version api bus state client`."""
+        return cast(Message, without_envelope(self._ask("hello")))
+
+    def status(self) -> Status:
+        """One complete snapshot."""
+        return cast(Status, without_envelope(self._ask("status")))
+
+    def why(self) -> Stop:
+        """The last stop; `sentence` tells it in plain English."""
+        return cast(Stop, without_envelope(self._ask("why")))
+
+    def watch(self, *topics: str, rate_hz: Optional[int] = None) -> None:
+        """Subscribes to `state bus estop lease stop force frame`; replaces what was subscribed. Then read `events`."""
+        fields = {"topics": list(topics), "rate_hz": rate_hz}
+        self._ask("watch", **fields)
+        self._subscription = fields if topics else None
+
+    def events(self, timeout: Optional[float] = None) -> Iterator[Event]:
+        """Events as they come; ends when none came for `timeout` seconds (None: never ends).
+
+        A lost connection is an event too: `disconnected`, then `reconnected` as soon as the gateway is back, with the same
+        subscription. `lost` tells how many events were not read in time.
+        """
+        while True:
+            event = self._next_event(timeout)
+            if event is None:
+                return
+            yield event
+
+    # Stopping: always allowed ----------------------------------------------------------------------------------------
+
+    def stop(self) -> None:
+        """Ramp to zero, whoever drives."""
+        self._ask("stop")
+
+    def estop(self, reason: Optional[str] = None) -> None:
+        """Zero without ramp, latched until `reset`. No substitute for the button that cuts power."""
+        self._ask("estop", reason=reason)
+
+    # What needs a decision -------------------------------------------------------------------------------------------
+
+    def reset(self) -> None:
+        """Leaves the latch, if its cause is gone. Moves nothing."""
+        self._ask("reset")
+
+    def tare(self, side: Optional[str] = None) -> None:
+        """Makes the present force the zero: of `left`, `right`, or both wheels. Moves nothing."""
+        self._ask("tare", side=side)
+
+    def arm(self, name: Optional[str] = None, *, takeover: bool = False) -> Armed:
+        """Asks for permission to drive; the wheels stay at zero until the first command. An older one of this Gateway ends.
+
+        `name` is shown to others. `takeover` takes the lease from somebody else, with the wheels at rest.
+        """
+        reply = self._ask("arm", name=name, takeover=takeover or None)
+        connection = self._connection
+        if connection is None:
+            raise GatewayUnavailable("the connection was closed while arming")
+        return Armed(self, connection, terms_of(reply))
+
+    # The inside ------------------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        if not self._busy.acquire(blocking=False):
+            raise RuntimeError("this Gateway is in use by another thread; give each thread its own")
+        try:
+            yield
+        finally:
+            self._busy.release()
+
+    def _connected(self, deadline: Optional[float]) -> Connection:
+        """The connection, made anew if it broke. Tries until the deadline (None: once)."""
+        if self._connection is not None and self._connection.alive():
+            return self._connection
+        pause = 0.02
+        while True:
+            try:
+                connection = Connection(self._path or default_socket(), self._timeout)
+                break
+            except GatewayUnavailable:
+                if deadline is None or time.monotonic() + pause > deadline:
+                    raise
+                time.sleep(pause)
+                pause = min(1.0, pause * 2)
+        self._connection = connection
+        if self._subscription is not None:
+            result_of("watch", connection.ask("watch", self._subscription, self._timeout))
+        return connection
+
+    def _ask(self, cmd: str, **fields: Any) -> Message:
+        with self._alone():
+            deadline = time.monotonic() + self._wait if self._wait > 0 else None
+            connection = self._connected(deadline)
+            try:
+                return result_of(cmd, connection.ask(cmd, fields, self._timeout))
+            except GatewayUnavailable:
+                if cmd not in REPEATABLE:
+                    raise
+            return result_of(cmd, self._connected(deadline).ask(cmd, fields, self._timeout))
+
+    def _ask_on(self, connection: Connection, cmd: str, fields: Message) -> Message:
+        """On this connection or not at all."""
+        with self._alone():
+            return result_of(cmd, connection.ask(cmd, fields, self._timeout))
+
+    def _next_event(self, timeout: Optional[float]) -> Optional[Event]:
+        with self._alone():
+            deadline = time.monotonic() + (timeout if timeout is not None else float("inf"))
+            if self._connection is not None and not self._connection.open:
+                return self._back_again(deadline)
+            connection = self._connection or self._connected(None)
+            while True:
+                event = connection.take_event()
+                if event is not None:
+                    return event
+                if time.monotonic() > deadline:
+                    return None
+                try:
+                    connection.wait(deadline)
+                except GatewayUnavailable as error:
+                    if not connection.events:
+                        return {"event": "disconnected", "message": str(error)}
+
+    def _back_again(self, deadline: float) -> Optional[Event]:
+        assert self._connection is not None
+        left = self._connection.take_event()
+        if left is not None:
+            return left
+        try:
+            self._connected(deadline)
+        except GatewayUnavailable:
+            return None
+        return {"event": "reconnected"}
+
+    def _wait_for_rest(self, seconds: float) -> bool:
+        deadline = time.monotonic() + seconds
+        while True:
+            if stands(cast(Message, self.status())):
+                return True
+            if time.monotonic() > deadline:
+                return False
+            time.sleep(0.02)
+
+
+class Armed:
+    """The permission to drive, from `Gateway.arm`. Use it in a `with`; its end stops the wheels and waits until they stand.
+
+    Each command holds `terms.lease_ms`; the next one must come sooner, or the wheels ramp to zero and this permission is over
+    (LeaseEnded). It also is over after a stop, a latch, a lost connection, or another `arm`; it never comes back by itself.
+    """
+
+    def __init__(self, gateway: Gateway, connection: Connection, terms: Terms) -> None:
+        self.terms = terms
+        self._gateway = gateway
+        self._connection = connection
+        self._ended: Optional[str] = None
+        self._fed = time.monotonic() + (terms.first_lease_ms - terms.lease_ms) / 1000
+        connection.arms += 1
+        self._number = connection.arms
+
+    def drive(
+        self, left_mm_s: int, right_mm_s: int, left_mA: Optional[int] = None, right_mA: Optional[int] = None
+    ) -> Applied:
+        """Sets both wheels' speed. The currents may be left out, both, unless the configuration says current_role = setpoint."""
+        return self._command("drive", drive_fields(left_mm_s, right_mm_s, left_mA, right_mA))
+
+    def twist(self, v_mm_s: int, yaw_mrad_s: int) -> Applied:
+        """Forward speed and turning rate, positive to the left."""
+        return self._command("twist", {"v_mm_s": v_mm_s, "yaw_mrad_s": yaw_mrad_s})
+
+    def drive_for(
+        self,
+        seconds: float,
+        left_mm_s: int,
+        right_mm_s: int,
+        left_mA: Optional[int] = None,
+        right_mA: Optional[int] = None,
+    ) -> Applied:
+        """Repeats the command for that long, three times per lease, and returns while it still holds."""
+        end = time.monotonic() + seconds
+        while True:
+            applied = self.drive(left_mm_s, right_mm_s, left_mA, right_mA)
+            left = end - time.monotonic()
+            if left <= 0:
+                return applied
+            time.sleep(min(left, self.terms.lease_ms / 3000))
+
+    def stop(self, wait: float = REST_S) -> bool:
+        """Ramps to zero and waits that many seconds at most until both wheels stand; True if they do. Ends the permission."""
+        self._end("it was stopped")
+        self._gateway.stop()
+        return self._gateway._wait_for_rest(wait)
+
+    def __enter__(self) -> Armed:
+        return self
+
+    def __exit__(
+        self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+    ) -> None:
+        trouble = "one of them still turns"
+        at_rest = False
+        try:
+            at_rest = self._leave()
+        except (IWheelError, RuntimeError) as problem:
+            trouble = str(problem)
+        finally:
+            self._end("its block was left")
+            if not at_rest:
+                self._connection.close()
+            if not self._gateway._kept:
+                self._gateway.close()
+        if not at_rest:
+            warnings.warn(f"the wheels were told to stop but are not known to stand: {trouble}", RuntimeWarning, stacklevel=2)
+
+    # The inside ------------------------------------------------------------------------------------------------------
+
+    def _end(self, reason: str) -> None:
+        self._ended = self._ended or reason
+
+    def _command(self, cmd: str, fields: Message) -> Applied:
+        if not self._connection.open:
+            self._end("the connection was lost")
+        if self._number != self._connection.arms:
+            self._end("the same Gateway was armed anew")
+        if self._ended is not None:
+            raise LeaseEnded(f"this permission to drive is over ({self._ended}); arm again")
+        asked = time.monotonic()
+        try:
+            reply = self._gateway._ask_on(self._connection, cmd, fields)
+        except Refused as refusal:
+            if refusal.error not in HARMLESS:
+                self._end(refusal.message)
+            raise
+        except GatewayUnavailable as lost:
+            self._end(str(lost))
+            raise
+        self._fed = asked  # The lease runs from when the command was sent, at the earliest.
+        return applied_of(reply)
+
+    def _leave(self) -> bool:
+        """Stops, unless it is somebody else who drives by now."""
+        surely_ours = self._ended is None and time.monotonic() - self._fed < self.terms.lease_ms / 1000
+        if not surely_ours and self._somebody_else_drives():
+            return True
+        return self.stop()
+
+    def _somebody_else_drives(self) -> bool:
+        holder = self._gateway.status()["lease"]["holder"]
+        return holder is not None and holder != self._connection.client

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""The real gateway with simulated wheels for one test, and what their bus says about it."""
+
+import os
+import sys
+import time
+import unittest
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(os.path.dirname(HERE))
+sys.path[:0] = [os.path.join(ROOT, "python", "src"), os.path.join(ROOT, "test", "system")]
+
+from bus import now_us  # noqa: E402
+from harness import Rig  # noqa: E402
+
+BUILD = os.environ.get("IWHEEL_BUILD", os.path.join(ROOT, "build", "default"))
+EXAMPLES = os.path.join(ROOT, "python", "examples")
+
+
+class RigCase(unittest.TestCase):
+    """`self.rig` runs; `self.socket` is the gateway's."""
+
+    # A busy machine may be late; how late the gateway may be is not what these tests ask.
+    config: dict = {"drive": {"lease_ms": 300}, "limits": {"echo_ms": 200, "wheel_silent_ms": 200}}
+
+    def setUp(self):
+        self.rig = Rig(BUILD, self.config)
+        self.addCleanup(self.rig.close)
+        self.rig.start_gateway()
+        self.socket = self.rig.path("gateway.sock")
+
+    def last_motion_us(self):
+        """When the last nonzero setpoint was on the bus; 0: never."""
+        return max((t for t, _, speed in self.rig.bus.setpoints() if speed != 0), default=0)
+
+    def assert_stood_by(self, t_us, within_ms):
+        """No nonzero setpoint later than that, and zeros came after the last one."""
+        last = self.last_motion_us()
+        self.assertGreater(last, 0, "the wheels never moved: this test would prove nothing")
+        self.assertLess((last - t_us) / 1000, within_ms)
+        self.assertTrue([1 for t, _, speed in self.rig.bus.setpoints(last) if speed == 0], "no zeros after the motion")
+
+    def wait_until(self, condition, seconds=3.0):
+        deadline = time.monotonic() + seconds
+        while not condition():
+            self.assertLess(time.monotonic(), deadline, "did not come about")
+            time.sleep(0.01)
+
+
+__all__ = ["BUILD", "EXAMPLES", "HERE", "ROOT", "RigCase", "now_us"]

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""AsyncGateway and AsyncArmed against the real daemon."""
+
+import asyncio
+import signal
+import time
+import unittest
+import warnings
+
+from rig import RigCase, now_us
+
+from iwheel import AsyncGateway, GatewayUnavailable, LeaseEnded, Refused
+
+
+class Async(RigCase):
+    def run_async(self, coroutine, seconds=20):
+        return asyncio.run(asyncio.wait_for(coroutine, seconds))
+
+    def test_drives_and_stands_at_the_end_of_the_block(self):
+        async def story():
+            async with AsyncGateway(self.socket).arm("example") as wheels:
+                return await wheels.drive_for(0.5, 200, 200)
+
+        self.assertEqual(self.run_async(story()).left_mm_s, 200)
+        self.assert_stood_by(now_us(), 0)
+
+    def test_a_cancelled_task_stops_the_wheels(self):
+        async def drive():
+            async with AsyncGateway(self.socket).arm() as wheels:
+                await wheels.drive_for(60, 300, 300)
+
+        async def story():
+            task = asyncio.ensure_future(drive())
+            await asyncio.sleep(0.6)
+            task.cancel()
+            cancelled_us = now_us()
+            with self.assertRaises(asyncio.CancelledError):
+                await task
+            return cancelled_us
+
+        self.assert_stood_by(self.run_async(story()), 500)
+
+    def test_a_task_cancelled_twice_leaves_at_once_and_the_wheels_stop(self):
+        async def drive():
+            async with AsyncGateway(self.socket).arm() as wheels:
+                await wheels.drive_for(60, 300, 300)
+
+        async def story():
+            task = asyncio.ensure_future(drive())
+            await asyncio.sleep(0.6)
+            begin_us = now_us()
+            task.cancel()
+            await asyncio.sleep(0.005)
+            task.cancel()
+            with self.assertRaises(asyncio.CancelledError):
+                await task
+            return begin_us
+
+        begin_us = self.run_async(story())
+        time.sleep(1)
+        self.assert_stood_by(begin_us, 500)
+
+    def test_a_blocked_event_loop_loses_the_lease(self):
+        async def story():
+            async with AsyncGateway(self.socket) as gateway:
+                wheels = await gateway.arm()
+                await wheels.drive_for(0.4, 300, 300)
+                blocked_us = now_us()
+                time.sleep(1.4)
+                self.assert_stood_by(blocked_us, 1087)
+                with self.assertRaises(Refused):
+                    await wheels.drive(300, 300)
+                with self.assertRaises(LeaseEnded):
+                    await wheels.drive(300, 300)
+                return (await gateway.why())["cause"]
+
+        self.assertEqual(self.run_async(story()), "lease_lost")
+
+    def test_a_killed_gateway_ends_the_permission_and_is_found_again(self):
+        async def story():
+            async with AsyncGateway(self.socket, wait=5) as gateway:
+                with warnings.catch_warnings(record=True):
+                    warnings.simplefilter("always")
+                    async with gateway.arm() as wheels:
+                        await wheels.drive_for(0.3, 300, 300)
+                        self.rig.kill_gateway(signal.SIGKILL)
+                        killed_us = now_us()
+                        with self.assertRaises(GatewayUnavailable):
+                            await wheels.drive_for(1, 300, 300)
+                        self.rig.start_gateway(restart_hold=True)
+                        with self.assertRaises(LeaseEnded):
+                            await wheels.drive(300, 300)
+                await asyncio.sleep(0.5)
+                self.assert_stood_by(killed_us, 90)
+                return (await gateway.status())["state"]
+
+        self.assertIn(self.run_async(story()), ("listening", "stopping"))
+
+    def test_watching_and_driving_side_by_side(self):
+        async def watch(speeds):
+            async with AsyncGateway(self.socket) as gateway:
+                await gateway.watch("state", rate_hz=20)
+                async for event in gateway.events():
+                    speeds.append(event["left"]["speed_mm_s"])
+
+        async def story():
+            speeds = []
+            watcher = asyncio.ensure_future(watch(speeds))
+            async with AsyncGateway(self.socket).arm() as wheels:
+                await wheels.drive_for(0.8, 200, 200)
+            watcher.cancel()
+            return speeds
+
+        self.assertGreater(max(self.run_async(story())), 150)
+
+    def test_events_tell_of_a_restart(self):
+        async def story():
+            seen = []
+            async with AsyncGateway(self.socket, wait=5) as gateway:
+                await gateway.watch("state", rate_hz=20)
+                async for event in gateway.events(timeout=5):
+                    seen.append(event["event"])
+                    if len(seen) == 3:
+                        self.rig.kill_gateway(signal.SIGTERM)
+                        self.rig.start_gateway(wheels=False)
+                    if seen[-1] == "state" and "reconnected" in seen:
+                        break
+            return seen
+
+        self.assertEqual([n for n in self.run_async(story()) if n != "state"], ["disconnected", "reconnected"])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""The examples, used as a person would."""
+
+import csv
+import os
+import pty
+import signal
+import struct
+import subprocess
+import sys
+import time
+import unittest
+
+from rig import EXAMPLES, ROOT, RigCase, now_us
+
+from iwheel import Gateway
+
+ENVIRONMENT = {**os.environ, "PYTHONPATH": os.path.join(ROOT, "python", "src")}
+
+
+class Examples(RigCase):
+    def start(self, name, *arguments, **options):
+        command = [sys.executable, os.path.join(EXAMPLES, name), *arguments]
+        child = subprocess.Popen(command, env=ENVIRONMENT, **options)
+        self.addCleanup(child.wait)
+        self.addCleanup(child.kill)
+        return child
+
+    def cause(self):
+        with Gateway(self.socket) as gateway:
+            return gateway.why()["cause"]
+
+    def holder(self):
+        with Gateway(self.socket) as gateway:
+            return gateway.status()["lease"]["name"]
+
+    def test_keys_drive_while_they_repeat_and_q_ends(self):
+        master, slave = pty.openpty()
+        self.addCleanup(os.close, master)
+        child = self.start("keys.py", "--socket", self.socket, stdin=slave, stdout=subprocess.DEVNULL)
+        os.close(slave)
+        self.wait_until(lambda: self.holder() == "keys")
+        for _ in range(10):
+            os.write(master, b"w")
+            time.sleep(0.05)
+        let_go_us = now_us()
+        self.assertGreater(self.last_motion_us(), let_go_us - 300_000)
+        time.sleep(1.2)
+        self.assert_stood_by(let_go_us, 1200)
+        os.write(master, b"q")
+        self.assertEqual(child.wait(5), 0)
+        self.assertEqual(self.cause(), "client_stop")
+
+    def test_a_terminal_that_goes_away_stops(self):
+        master, slave = pty.openpty()
+        child = self.start("keys.py", "--socket", self.socket, stdin=slave, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(slave)
+        self.wait_until(lambda: self.holder() == "keys")
+        os.write(master, b"w")
+        time.sleep(0.3)
+        os.close(master)
+        closed_us = now_us()
+        child.wait(5)
+        self.assert_stood_by(closed_us, 700)
+
+    def gamepad(self, events=()):
+        device = self.rig.path("js0")
+        os.mkfifo(device)
+        pad = os.open(device, os.O_RDWR)
+        for event in events:
+            os.write(pad, event)
+        child = self.start("gamepad.py", "--socket", self.socket, "--device", device, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL)
+        self.addCleanup(child.stderr.close)
+        return pad, child
+
+    @staticmethod
+    def event(value, kind, number):
+        return struct.pack("=IhBB", 0, value, kind, number)
+
+    def test_a_gamepad_drives_only_while_its_button_is_held(self):
+        pad, child = self.gamepad()
+        self.wait_until(lambda: self.holder() == "gamepad", 5)
+        os.write(pad, self.event(-32767, 2, 1))
+        time.sleep(0.4)
+        self.assertEqual(self.last_motion_us(), 0, "it moved without the dead man's button")
+        os.write(pad, self.event(1, 1, 4))
+        time.sleep(0.5)
+        self.assertGreater(self.last_motion_us(), 0)
+        os.write(pad, self.event(0, 1, 4))
+        let_go_us = now_us()
+        time.sleep(0.8)
+        self.assert_stood_by(let_go_us, 700)
+        os.write(pad, self.event(1, 1, 4))
+        time.sleep(0.4)
+        child.send_signal(signal.SIGINT)
+        self.assertEqual(child.wait(5), 0)
+        os.close(pad)
+        self.assert_stood_by(now_us(), 0)
+
+    def test_an_unplugged_gamepad_stops(self):
+        pad, child = self.gamepad()
+        self.wait_until(lambda: self.holder() == "gamepad", 5)
+        os.write(pad, self.event(-32767, 2, 1) + self.event(1, 1, 4))
+        time.sleep(0.5)
+        os.close(pad)
+        gone_us = now_us()
+        self.assertEqual(child.wait(5), 1)
+        self.assertIn("the gamepad is gone", child.stderr.read().decode())
+        self.assert_stood_by(gone_us, 700)
+
+    def test_a_button_held_at_the_start_does_not_arm(self):
+        pad, child = self.gamepad([self.event(1, 0x81, 4)])
+        self.assertEqual(child.wait(5), 1)
+        self.assertIn("let go of it", child.stderr.read().decode())
+        os.close(pad)
+
+    def test_a_recording_is_complete_and_is_drawn(self):
+        file = self.rig.path("drive.csv")
+        child = self.start("record_csv.py", "--socket", self.socket, "--for", "2.5", file)
+        with Gateway(self.socket, wait=2).arm() as wheels:
+            wheels.drive_for(0.8, 250, 250)
+        self.assertEqual(child.wait(6), 0)
+        with open(file, newline="", encoding="utf-8") as source:
+            rows = list(csv.DictReader(source))
+        self.assertGreater(len(rows), 30)
+        self.assertEqual(rows[-1]["left_commanded_mm_s"], "")
+        self.assertGreater(max(int(row["left_speed_mm_s"]) for row in rows), 150)
+        try:
+            import matplotlib  # noqa: F401
+        except ImportError:
+            self.skipTest("matplotlib is missing in .venv: the picture is not drawn")
+        picture = self.rig.path("drive.png")
+        subprocess.run([sys.executable, os.path.join(EXAMPLES, "plot_csv.py"), file, picture], env=ENVIRONMENT, check=True)
+        with open(picture, "rb") as png:
+            self.assertEqual(png.read(8), b"\x89PNG\r\n\x1a\n")
+
+
+if __name__ == "__main__":
+    unittest.main()

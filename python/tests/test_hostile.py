@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Both clients against something that is no gateway, or a torn one."""
+
+import asyncio
+import json
+import os
+import socket
+import tempfile
+import threading
+import unittest
+
+import rig  # noqa: F401  The path to the package.
+
+from iwheel import AsyncGateway, Gateway, GatewayUnavailable, NoAnswer, ProtocolError, default_socket
+
+HELLO = b'{"event":"hello","client":1}\n'
+
+
+class Impostor:
+    """Accepts one connection after another and says what it was told to, after the first request of each."""
+
+    def __init__(self, says, close=False):
+        self.folder = tempfile.TemporaryDirectory()
+        self.path = os.path.join(self.folder.name, "socket")
+        self.says, self.close, self.heard = says, close, []
+        self.listener = socket.socket(socket.AF_UNIX)
+        self.listener.bind(self.path)
+        self.listener.listen()
+        self.kept = []
+        threading.Thread(target=self.run, daemon=True).start()
+
+    def run(self):
+        while True:
+            try:
+                connection, _ = self.listener.accept()
+            except OSError:
+                return
+            connection.sendall(HELLO)
+            self.heard.append(connection.recv(5000))
+            connection.sendall(self.says)
+            self.kept.append(connection)
+            if self.close:
+                connection.close()
+
+    def end(self):
+        for connection in self.kept:
+            connection.close()
+        self.listener.close()
+        self.folder.cleanup()
+
+
+def as_nobody(call):
+    """The text of what it raises in a child without root's rights."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            if os.geteuid() == 0:
+                os.setgroups([])
+                os.setgid(65534)
+                os.setuid(65534)
+            call()
+        except Exception as error:
+            os.write(writing, str(error).encode())
+        os._exit(0)
+    os.close(writing)
+    os.waitpid(child, 0)
+    with open(reading, encoding="utf-8") as pipe:
+        return pipe.read()
+
+
+class Hostile(unittest.TestCase):
+    def both(self, says, error, close=False, ask="status"):
+        impostor = Impostor(says, close)
+        self.addCleanup(impostor.end)
+
+        async def ask_async():
+            async with AsyncGateway(impostor.path, timeout=0.2) as gateway:
+                await getattr(gateway, ask)()
+
+        with self.assertRaises(error):
+            asyncio.run(asyncio.wait_for(ask_async(), 5))
+        with self.assertRaises(error):
+            with Gateway(impostor.path, timeout=0.2) as gateway:
+                getattr(gateway, ask)()
+        return impostor
+
+    def test_silence_is_no_answer(self):
+        self.both(b"", NoAnswer)
+
+    def test_half_an_answer_is_no_answer(self):
+        self.both(b'{"id":1,"ok":true', NoAnswer)
+
+    def test_an_answer_to_something_else_is_no_answer(self):
+        self.both(b'{"id":77,"ok":true}\n', NoAnswer)
+
+    def test_garbage_is_a_protocol_error(self):
+        for says in (b"SSH-2.0-x\r\n", b"[]\n", b'{"a":1}\n', b"\xff\xfe\n", b'{"ok":true,"event":"x"}\n', b"\n"):
+            with self.subTest(says):
+                self.both(says, ProtocolError)
+
+    def test_an_endless_line_is_a_protocol_error(self):
+        self.both(b"x" * 70000, ProtocolError)
+
+    def test_a_closed_connection_is_unavailable(self):
+        self.both(b"", GatewayUnavailable, close=True)
+
+    def test_too_many_clients_is_told(self):
+        says = b'{"id":null,"ok":false,"error":"too_many_clients","message":"close another one"}\n'
+        self.both(says, GatewayUnavailable, close=True)
+
+    def test_arm_is_never_asked_twice(self):
+        impostor = Impostor(b"", close=True)
+        self.addCleanup(impostor.end)
+        with self.assertRaises(GatewayUnavailable):
+            Gateway(impostor.path).arm()
+        self.assertEqual([json.loads(line)["cmd"] for line in impostor.heard], ["arm"])
+
+    def test_nobody_there_and_no_rights_tell_the_cure(self):
+        with self.assertRaisesRegex(GatewayUnavailable, "no gateway listens there; start it"):
+            Gateway("/nonexistent/socket").status()
+        impostor = Impostor(b"")
+        self.addCleanup(impostor.end)
+        os.chmod(impostor.path, 0)
+        self.assertIn("you may not use it; join its group", as_nobody(Gateway(impostor.path).status))
+
+    def test_the_socket_of_the_environment_is_taken(self):
+        before = os.environ.get("IWHEEL_SOCKET")
+        os.environ["IWHEEL_SOCKET"] = "/tmp/somewhere.sock"
+        self.addCleanup(lambda: os.environ.pop("IWHEEL_SOCKET") if before is None else None)
+        self.assertEqual(default_socket(), "/tmp/somewhere.sock")
+
+
+if __name__ == "__main__":
+    unittest.main()
