@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Sizes of the STM32 images, and the worst stack of core and images by call graph, as lines for docs/sizes.md.
 
-The images are those of the presets arm-m3 and arm: they listen. An interrupt may come anywhere, and none interrupts another: the
+The images are those of the presets arm-m3 and arm, which listen, and of the builds beside them that end in -demo. An interrupt may come anywhere, and none interrupts another: the
 worst handler and the registers that the CPU saves are on top of the main loop's deepest path. Calls through the HAL go to each of
 its functions.
 """
@@ -59,9 +59,12 @@ def lines(builds):
     rows = ["", "Worst stack of any of the core's functions in bytes, by call graph, without what the port's HAL functions need below it.", "",
             "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |", "|-----------------|-----------:|-----------:|-----------:|",
             "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |", "",
-            "The image that listens, per board, in bytes. RAM is without the stack; the stack is the worst of main loop and interrupt.", "",
-            "| board           |    flash   |     RAM    |    stack   |", "|-----------------|-----------:|-----------:|-----------:|"]
+            "The images per board, in bytes: the one that listens, and the one with the demonstration profile. RAM is without the stack; the stack "
+            "is the worst of main loop and interrupt.", "",
+            "| image            |    flash   |     RAM    |    stack   |", "|------------------|-----------:|-----------:|-----------:|"]
     for board, (image, which) in BOARDS.items():
-        numbers = (*image_sizes(builds[which], image), image_stack(builds[which], image))
-        rows.append(f"| {board:<15} | " + " | ".join(f"{number:>10}" for number in numbers) + " |")
+        for kind in ("listen", "demo"):
+            build = str(builds[which]).rstrip("/") + {"listen": "", "demo": "-demo"}[kind]
+            numbers = (*image_sizes(build, image), image_stack(build, image))
+            rows.append(f"| {f'{board} {kind}':<16} | " + " | ".join(f"{number:>10}" for number in numbers) + " |")
     return rows

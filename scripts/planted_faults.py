@@ -64,7 +64,8 @@ def coverage(folder, calls):
 
 
 def warnings(folder, code, compiler="gcc"):
-    flags = re.search(r"INTERFACE\n([^)]*)\)", (ROOT / "cmake/iwheel_warnings.cmake").read_text())[1].split()
+    text = (ROOT / "cmake/iwheel_warnings.cmake").read_text()
+    flags = " ".join(re.findall(r"target_compile_options\(iwheel_warnings INTERFACE\s+([^)]*)\)", text)).split()
     (folder / "planted.c").write_text(code)
     return run(compiler, "-std=c99", *flags, "-c", folder / "planted.c", "-o", folder / "planted.o")
 

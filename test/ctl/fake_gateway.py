@@ -18,7 +18,7 @@ def wheel(speed=0, applied=None, **more):
         "commanded_mm_s": applied, "commanded_mA": None, "applied_mm_s": applied, "applied_mA": None,
         "battery_dV": 243, "temperature_degC": 31, "cpu_percent": 12, "ticks": 5000000000, "distance_mm": 12345,
         "force_raw": 812, "force_raw_mN": 8120, "force_offset_mN": 8000, "force_net_mN": -120, "force_validity": "valid",
-        "offset_provenance": "wheel", "offset_window": "good", "offset_samples": 40, "offset_deviation_mN": 10,
+        "offset_provenance": "wheel", "offset_origin": "wheel", "offset_contaminated": False, "offset_window": "good", "offset_samples": 40, "offset_deviation_mN": 10,
         "offset_drift_mN": 1, "unit_evidence": "cN", "speed_age_ms": 3, "status_age_ms": 17, "force_age_ms": 29,
         "offset_age_ms": 1000, "valid": {}, "saturated": {"battery": False, "force": False}, "reboots": 0}
     values.update(more)
@@ -133,8 +133,16 @@ class FakeGateway:
     def on_reset(self, _connection, _request):
         return {"ok": False, "error": "estop_pressed", "message": "the e-stop is pressed; release the button"}
 
-    def on_tare(self, _connection, _request):
-        return {"ok": True, "state": "listening"}
+    def on_tare(self, _connection, request):
+        zero = {"offset_mN": 8000, "samples": 40, "deviation_mN": 110, "drift_mN": 3, "before_mN": None,
+                "before_provenance": "none"}
+        return {"ok": True, "state": "listening", **{side: zero for side in ("left", "right") if request.get("side", side) == side}}
+
+    def on_confirm(self, _connection, request):
+        wrong = request.get("value") == "181"
+        return {"ok": True, "item": request["item"], "state": "contradicted" if wrong else "confirmed", "evidence": "operator",
+                "figure": None, "value": "192", "reason": "the operator \x1b says so",
+                "disabled": "no distance; correct radius_mm" if wrong else None}
 
     def count(self, cmd):
         return sum(1 for _, request in self.requests if request["cmd"] == cmd)

@@ -199,10 +199,34 @@ class Showing(WithGateway):
         self.assertRegex(out, r"applied +300 mm/s, -- +-300 mm/s, --")
         self.assertRegex(out, r"distance +12\.345 m, 5000000000 ticks +12\.345 m")
         self.assertRegex(out, r"net force +-0\.120 N +-0\.120 N")
-        self.assertRegex(out, r"offset +8\.000 N wheel +8\.000 N wheel")
+        self.assertRegex(out, r"its zero +8\.000 N wheel +8\.000 N wheel")
+        self.assertRegex(out, r"taken +1\.0 s ago, 0\.010 N noise +1\.0 s ago")
         self.assertRegex(out, r"battery +24\.3 V, 17 ms ago +24\.3 V")
         self.assertIn("client lost: at most 887 ms, 0.554 m", out)
         self.assertIn("gateway dies: at most 1000 ms, 1.000 m, then unknown", out)
+
+    def test_zero_of_an_earlier_run_tells_who_took_it_and_when(self):
+        stored = {"offset_provenance": "stored", "offset_origin": "operator"}
+        out = self.show(snapshot(left=wheel(**stored, offset_age_ms=3 * 86400000), right=wheel(**stored, offset_age_ms=7200000)))
+        self.assertRegex(out, r"its zero +8\.000 N stored \(operator\) +8\.000 N stored \(operator\)")
+        self.assertRegex(out, r"taken +3 days ago, 0\.010 N noise +2 h ago")
+
+    def test_zero_taken_under_load_is_in_doubt(self):
+        none = wheel(force_offset_mN=None, offset_provenance="none", offset_origin=None, offset_contaminated=True)
+        self.assertRegex(self.show(snapshot(left=none)), r"its zero +-- none IN DOUBT +8\.000 N wheel")
+
+    def test_contradiction_tells_evidence_and_cost_and_what_to_do_next(self):
+        entry = {"state": "contradicted", "evidence": "operator", "figure": None, "value": "no", "reason": "the operator found yes",
+                 "disabled": "arm is refused; correct invert under [left]"}
+        out = self.show(snapshot(ledger={"mount_sign_left": entry}))
+        self.assertIn("next          cannot arm, mount_sign_left is contradicted: correct invert", out)
+        self.assertIn("CONTRADICTED  mount_sign_left = no: the operator found yes; disabled: arm is", out)
+        self.assertNotIn("ready:", out)
+
+    def test_memory_is_shown_when_it_does_not_work(self):
+        self.assertNotIn("KEPT", self.show(snapshot(memory={"file": "/x/ledger-can0", "state": "kept", "reason": None})))
+        out = self.show(snapshot(memory={"file": "/x/ledger-can0", "state": "failed", "reason": "No space left on device"}))
+        self.assertIn("NOT KEPT      /x/ledger-can0: No space left on device", out)
 
     def test_full_battery_is_a_lower_bound(self):
         out = self.show(snapshot(left=wheel(battery_dV=255, saturated={"battery": True})))
@@ -316,9 +340,26 @@ class Asking(WithGateway):
 
     def test_tare_shows_the_new_offset_of_the_side(self):
         code, out, _, _ = self.ctl("tare", "left")
-        self.assertEqual((0, "left: the present force is zero now; offset 8.000 N\n"), (code, out))
+        self.assertEqual((0, "left: the present force is zero now, 8.000 N (40 samples, 0.110 N noise); it was -- (none)\n"), (code, out))
         self.assertEqual("left", self.gateway.requests[0][1]["side"])
-        self.assertEqual(2, self.ctl("tare")[1].count("offset 8.000 N"))
+        self.assertEqual(2, self.ctl("tare")[1].count("zero now, 8.000 N"))
+
+    def test_confirm_sends_item_and_value_and_tells_what_that_makes_of_it(self):
+        code, out, _, _ = self.ctl("confirm", "wheel_radius")
+        self.assertEqual((0, "CONFIRMED     wheel_radius = 192: the operator ? says so\n"), (code, out))
+        code, out, _, _ = self.ctl("confirm", "wheel_radius", "181")
+        self.assertEqual(0, code)
+        self.assertTrue(out.startswith("CONTRADICTED  wheel_radius = 192: "), out)
+        self.assertIn("disabled: no distance; correct radius_mm", out)
+        self.assertEqual([{"cmd": "confirm", "item": "wheel_radius", "id": 1},
+                          {"cmd": "confirm", "item": "wheel_radius", "value": "181", "id": 1}],
+                         [request for _, request in self.gateway.requests])
+
+    def test_ledger_prints_every_item_once_under_its_state(self):
+        code, out, _, _ = self.ctl("ledger")
+        self.assertEqual(0, code)
+        self.assertEqual(1, out.count("setpoint_type"))
+        self.assertTrue(out.startswith("ASSUMED"), out)
 
     def test_refusal_prints_name_and_message_and_exits_1(self):
         code, out, err, _ = self.ctl("reset")
@@ -326,8 +367,8 @@ class Asking(WithGateway):
         self.assertEqual("iwheelctl: refused (estop_pressed): the e-stop is pressed; release the button\n", err)
 
     def test_wrong_words_are_usage_and_reach_nobody(self):
-        for words in ([], ["top"], ["-x"], ["status", "x"], ["status", "--all"], ["stop", "now"], ["reset", "1"], ["why", "me"],
-                      ["tare", "middle"], ["tare", "left", "right"], ["watch", "speed"], ["watch", "--rate"],
+        for words in ([], ["fly"], ["-x"], ["status", "x"], ["status", "--all"], ["stop", "now"], ["reset", "1"], ["why", "me"],
+                      ["tare", "middle"], ["tare", "left", "right"], ["confirm"], ["confirm", "dlc", "yes", "x"], ["ledger", "x"], ["watch", "speed"], ["watch", "--rate"],
                       ["watch", "--rate", "0"], ["watch", "--rate", "101"], ["watch", "--rate", "1x"], ["drive"],
                       ["drive", "1"], ["drive", "1", "2", "3"], ["drive", "1.5", "2"], ["drive", "a", "b"],
                       ["drive", "40000", "0"], ["drive", "32768", "0"], ["drive", "0", "-32769"], ["drive", "--", "1"],
@@ -343,12 +384,14 @@ class Asking(WithGateway):
         self.assertEqual([], self.gateway.requests)
 
     def test_unknown_verb_lists_the_known(self):
-        err = self.ctl("top")[2]
-        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "tare", "why"):
+        err = self.ctl("fly")[2]
+        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "tare", "why", "ledger",
+                     "confirm", "doctor", "bringup", "top"):
             self.assertIn(verb, err)
 
     def test_help_of_every_verb_needs_no_gateway(self):
-        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "tare", "why"):
+        for verb in ("status", "watch", "drive", "stop", "disarm", "estop", "reset", "tare", "why", "ledger",
+                     "confirm", "doctor", "bringup", "top"):
             code, out, _, _ = run(verb, "--help")
             self.assertEqual(0, code)
             self.assertTrue(out.startswith("Usage: iwheelctl "), verb)

@@ -11,6 +11,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import gpiod2
 import kernel_scenarios  # noqa: F401  (registers them)
 import report
 from boot import HERE, Boot, find_kernel
@@ -20,6 +21,7 @@ from harness import find_program
 from native import why_not_native, NativeBoot
 
 POLL_S = 0.1
+HOURS, HOURS_FULL = 0.5, 24  # of the soak: half an hour costs as much as a third of all other tests
 LOG_LINES = 40
 
 
@@ -42,11 +44,10 @@ class Campaign:
         names = [
             entry.name
             for entry in ENTRIES.values()
-            if group.name in entry.groups
+            if group.runs(entry.groups)
             and (not options.only or any(part in entry.name for part in options.only))
-            and (options.full or not entry.full_only)
         ]
-        if not names or (options.real_time and group.virtual):
+        if not names or (options.real_time and group.virtual) or (group.full_only and not options.full):
             return None
         return {
             "build": os.path.abspath(options.build),
@@ -55,6 +56,7 @@ class Campaign:
             "virtual": group.virtual,
             "full": options.full,
             "seed": options.seed,
+            "hours": options.hours or (HOURS_FULL if options.full else HOURS),
             "kernel_arguments": list(group.kernel_arguments),
         }
 
@@ -62,6 +64,11 @@ class Campaign:
         """Works off one group. A boot that hangs or dies fails the tests that it did not get to."""
         plan = self.plan(group)
         if plan is None or self.interrupted:
+            return
+        reason = self.why_skipped(group, plan)
+        if reason:
+            for name in plan["tests"]:
+                self.take(group, {"name": name, "verdict": "skipped", "figures": [reason]})
             return
         boot = (NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan)
         self.boots.append(boot)
@@ -83,6 +90,18 @@ class Campaign:
         for number, name in enumerate(name for name in plan["tests"] if name not in done):
             text = f"{why}\n{boot.complaint()}" if number == 0 else f"not reached: {why}"
             self.take(group, {"name": name, "verdict": "failed", "failures": [[text, "rule", 0]]})
+
+    def why_skipped(self, group, plan):
+        """What is missing for a group that wants another build; else that build is in the plan, and the answer None."""
+        if group.gpiod == 0:
+            return None
+        if gpiod2.generation(plan["build"]) == group.gpiod:
+            return f"this system has libgpiod {group.gpiod} only, and that was tested"
+        try:
+            plan["build"] = gpiod2.find_build(plan["build"], not self.options.no_install)
+        except RuntimeError as error:
+            return f"no gateway with libgpiod {group.gpiod}: {error}"
+        return None
 
     def take(self, group, result):
         result = {"figures": [], "failures": [], "measures": {}, "latencies": [], "logs": [], "seconds": 0, **result}
@@ -137,9 +156,10 @@ def parse(arguments):
     parser.add_argument("--only", action="append", metavar="NAME", help="only tests whose name contains this")
     parser.add_argument("--real-time", action="store_true", help="only what runs in real time")
     parser.add_argument("--native", action="store_true", help="use this machine's own vcan and gpio-sim, in real time")
-    parser.add_argument("--full", action="store_true", help="1000 presses, a soak of 24 virtual hours")
+    parser.add_argument("--full", action="store_true", help=f"1000 presses, a soak of {HOURS_FULL} virtual hours")
     parser.add_argument("--repeat", type=int, default=1, metavar="N", help="the whole campaign N times in a row")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of random faults (default: 1)")
+    parser.add_argument("--hours", type=float, metavar="H", help=f"of the soak (default: {HOURS}, with --full {HOURS_FULL})")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="kernels at a time (default: 2)")
     parser.add_argument("--log-lines", type=int, default=LOG_LINES, metavar="N", help="of each log of a failed test")
     parser.add_argument("--no-install", action="store_true", help="install nothing to build the kernel")
@@ -172,7 +192,7 @@ def main(arguments):
     if options.list:
         for group in GROUPS:
             for entry in ENTRIES.values():
-                if group.name in entry.groups:
+                if group.runs(entry.groups):
                     print(f"{group.name + '/' + entry.name:<50} {entry.title}")
         return 0
     try:

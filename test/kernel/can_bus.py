@@ -5,13 +5,15 @@ import socket
 import struct
 import threading
 
-from bus import ERROR, EXTENDED, FRAME, SO_TIMESTAMPNS, Bus, now_us, realtime_ahead_us
+from bus import ERROR, EXTENDED, FRAME, SO_TIMESTAMPNS, Bus, realtime_ahead_ns
 from judge_log import Frame
 
 CAN_RAW_ERR_FILTER = 2  # Python does not know it
 MSG_CONFIRM = 0x800  # the frame is our own
 FD_FRAME = struct.Struct("=IBB2x64s")
+SO_RCVBUFFORCE = 33  # nor this
 RECHECK_S = 0.2
+FETCH_S = 0.05
 
 
 def open_raw(interface, *ids):
@@ -25,9 +27,10 @@ def open_raw(interface, *ids):
 
 
 class CanBus(Bus):
-    """`exact`: the clock stands still while this thread works (virtual time), so the time of reading is the frame's.
+    """Records with the kernel's stamps, which are of the wall clock: who steps that calls `before_step` first.
 
-    Otherwise the kernel's stamp counts, and stepping the wall clock spoils it.
+    `exact`: virtual time. The stamps are exact then, and frames are fetched only now and then, or when somebody asks for `frames`:
+    to wake up for each of them would cost more than gateway and wheels together.
     """
 
     def __init__(self, interface, frames=None, exact=False, ids=()):
@@ -36,34 +39,65 @@ class CanBus(Bus):
         self.socket = open_raw(interface, *ids)
         self.socket.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
         self.socket.setsockopt(socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, 0x1FFFFFFF)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)
+        self.socket.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, 4 << 20)
         self.socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", 0, int(RECHECK_S * 1e6)))
-        self.frames = frames if frames is not None else []
-        self.errors = []
+        self.recorded = frames if frames is not None else []
+        self.recorded_errors = []
         self.closed = False
-        self.thread = threading.Thread(target=self._record, daemon=True)
+        self.ahead_ns = realtime_ahead_ns()
+        self.lock = threading.Lock()
+        self.wake = threading.Event()
+        self.thread = threading.Thread(target=self._fetch if exact else self._record, daemon=True)
         self.thread.start()
 
+    @property
+    def frames(self):
+        self._drain()
+        return self.recorded
+
+    @property
+    def errors(self):
+        self._drain()
+        return self.recorded_errors
+
+    def before_step(self):
+        """The wall clock will be stepped: what came until now has the old time. Afterwards `after_step`."""
+        self._drain()
+
+    def after_step(self):
+        self.ahead_ns = realtime_ahead_ns()
+
+    def _take(self, flags=0):
+        """One frame; False if there is none, or the interface went down, or it is gone."""
+        try:
+            data, ancillary, message_flags, _ = self.socket.recvmsg(FRAME.size, 64, flags)
+        except OSError:
+            return False
+        seconds, nanoseconds = struct.unpack("qq", ancillary[0][2])
+        t_us = -(-(seconds * 1_000_000_000 + nanoseconds - self.ahead_ns) // 1000)  # rounded up: never before its cause
+        can_id, length, _, _, payload = FRAME.unpack(data)
+        frame = Frame(t_us, can_id, payload[:length], bool(message_flags & MSG_CONFIRM))
+        (self.recorded_errors if can_id & ERROR else self.recorded).append(frame)
+        return True
+
+    def _drain(self):
+        if self.exact and not self.closed:
+            with self.lock:
+                while self._take(socket.MSG_DONTWAIT) or self._take(socket.MSG_DONTWAIT):
+                    pass  # twice: one error, that the interface went down, may stand before frames
+
+    def _fetch(self):
+        while not self.wake.wait(FETCH_S):
+            self._drain()
+
     def _record(self):
-        ahead_us = realtime_ahead_us() if not self.exact else 0
         number = 0
         while not self.closed:
-            try:
-                data, ancillary, message_flags, _ = self.socket.recvmsg(FRAME.size, 64)
-            except OSError:  # nothing for a while, or the interface went down, or it is gone
-                continue
-            if self.exact:
-                t_us = now_us()
-            else:
-                number += 1
-                if number % 4096 == 0:
-                    ahead_us = realtime_ahead_us()
-                seconds, nanoseconds = struct.unpack("qq", ancillary[0][2])
-                t_us = seconds * 1_000_000 + nanoseconds // 1000 - ahead_us
-            can_id, length, _, _, payload = FRAME.unpack(data)
-            frame = Frame(t_us, can_id, payload[:length], bool(message_flags & MSG_CONFIRM))
-            (self.errors if can_id & ERROR else self.frames).append(frame)
+            number += 1
+            if number % 4096 == 0:
+                self.ahead_ns = realtime_ahead_ns()
+            self._take()
 
     def send_fd(self, can_id, data):
         """A CAN FD frame, from a socket that may."""
@@ -73,6 +107,9 @@ class CanBus(Bus):
             sock.send(FD_FRAME.pack(can_id, len(data), 0, data.ljust(64, b"\0")))
 
     def close(self):
-        self.closed = True
-        self.thread.join(5)
-        self.socket.close()
+        if not self.closed:
+            self._drain()
+            self.closed = True
+            self.wake.set()
+            self.thread.join(5)
+            self.socket.close()

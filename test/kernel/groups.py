@@ -5,21 +5,30 @@ from typing import NamedTuple
 
 
 class Group(NamedTuple):
-    """`limit_s`: of the whole boot, by the host's clock."""
+    """`limit_s`: of the whole boot, by the host's clock. `same_as`: it runs the tests of that group, with `gpiod` another build."""
 
     name: str
     what: str
     virtual: bool = True
     kernel_arguments: tuple = ()
-    limit_s: int = 600
-    full_limit_s: int = 1200
+    limit_s: int = 1800
+    full_limit_s: int = 3600
+    full_only: bool = False
+    same_as: str = ""
+    gpiod: int = 0  # the generation of libgpiod; 0: that of --build
+
+    def runs(self, groups):
+        """Whether a test of those groups is one of this group's."""
+        return (self.same_as or self.name) in groups
 
 
 GROUPS = (
-    Group("soak", "an hour of random faults", limit_s=900, full_limit_s=4 * 3600),
-    Group("realtime", "the same rules by the clock on the wall", virtual=False, full_limit_s=1800),
-    Group("estop", "the e-stop on a GPIO line", full_limit_s=1800),
-    Group("adapter", "a CAN adapter with states, stalls and a plug", full_limit_s=1200),
+    Group("soak", "half an hour of random faults, with --full a day", limit_s=3600, full_limit_s=24 * 3600),
+    Group("realtime", "the same rules by the clock on the wall", virtual=False),
+    Group("realtime-full", "more of them", virtual=False, full_only=True),
+    Group("estop", "the e-stop on a GPIO line"),
+    Group("estop-gpiod2", "the same through libgpiod 2", same_as="estop", gpiod=2),
+    Group("adapter", "a CAN adapter with states, stalls and a plug"),
     Group("bus", "interfaces that go, foreign and odd frames, a full bus"),
     Group("echo", "an interface with a proven echo, late or missing", kernel_arguments=("vcan.echo=1",)),
     Group("host", "clocks, processes, disks, a second gateway"),

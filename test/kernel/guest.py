@@ -36,6 +36,7 @@ def run_one(entry, plan):
     """In the worker: runs the test, returns its result."""
     test, skip, begin_us = kernel_rig.KernelTest(plan["build"], entry.rig_type), None, kernel_rig.now_us()
     test.plan = plan
+    kernel_rig.PACE["slow"] = entry.pace if plan["virtual"] else 1
     try:
         entry.function(test)
     except Skip as reason:

@@ -2,6 +2,7 @@
 """The rigs of test/system on interfaces and GPIO lines of a real kernel, and what a scenario here is given."""
 
 import itertools
+import os
 import time
 
 import netdev
@@ -14,10 +15,12 @@ from scenario import Test
 
 NUMBERS = itertools.count()
 EDGE_S = 1.0
+MARKERS = "/run/iwheel"
 TICK_US, BEFORE_TICK_US = 10_000, 200
 RAW_ESTOP_US = 1_000_000  # the judge's own limit; what counts is the time from the edge
 ESTOP_US = 5_000  # invariant 2, 99th percentile
 CLOCK = {"virtual": False}  # set once, by guest.py, before the first scenario
+PACE = {"slow": 1}  # of telemetry, by guest.py before each test: see catalogue.Entry
 
 
 class GpioButton:
@@ -43,6 +46,11 @@ class GpioButton:
 
     def estop_line(self):
         return self.line if self.estop else "none"
+
+    def sim_arguments(self):
+        with open(self.path("pace"), "w", encoding="ascii") as file:
+            file.write(f"at 0 slow {PACE['slow']}\n")
+        return ("--script", self.path("pace"))
 
     def _learn_tick(self):
         self.chip.pull(True, self.chip.WITNESS)
@@ -110,6 +118,14 @@ class GpioButton:
         self.chip.remove()
 
 
+def remove_marker(interface):
+    """What a gateway that was killed left for the next one on this interface: the next test's has another past."""
+    try:
+        os.unlink(f"{MARKERS}/{interface}.armed")
+    except FileNotFoundError:
+        pass
+
+
 class VcanRig(GpioButton, Rig):
     """Gateway, simulated wheels and recorder on one vcan interface; the e-stop is a GPIO line."""
 
@@ -135,6 +151,7 @@ class VcanRig(GpioButton, Rig):
         super().close(keep)
         self.remove_button()
         netdev.remove_all([self.interface])
+        remove_marker(self.interface)
 
 
 class HighVcanRig(VcanRig):
@@ -188,6 +205,7 @@ class SlcanRig(GpioButton, Rig):
         super().close(keep)
         self.adapter.end()
         self.remove_button()
+        remove_marker(self.adapter.interface)
 
 
 class KernelTest(Test):
@@ -217,11 +235,11 @@ class KernelTest(Test):
 
     @staticmethod
     def after_edge(rig, judge, edge_us, latency_us):
-        """A gateway that saw the level sent its zeros before the edge came."""
+        """A gateway that saw the level began with its zeros before the edge came: its pair is the first one after the level."""
         for level_us, at_us in rig.edges:
-            early = [s for s in judge.setpoints if level_us < s.t_us <= at_us and s.zero]
-            if at_us == edge_us and len(early) >= 2:
-                return edge_us, 0
+            zeros = [next((s.t_us for s in judge.setpoints if s.side == side and s.t_us > level_us and s.zero), None) for side in (0, 1)]
+            if at_us == edge_us and None not in zeros and min(zeros) <= at_us:
+                return edge_us, max(max(zeros) - edge_us, 0)
         return edge_us, latency_us
 
     def first_after(self, rig, t_us, wanted, text, limit_ms):

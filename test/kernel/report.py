@@ -59,16 +59,20 @@ the kernel runs on the machine of this run; its timer ticks every 10 ms.
 LEGEND = """
 *Longest gap*: between setpoints of one wheel while the bus took frames (100 ms allowed). *Stop begins within*: from the fault to the
 first setpoint that is slower, the worst of all tests of the row. *Old frames*: nonzero setpoints that came out on the bus after a
-stall, an outage or a stop was over, the most of all tests of the row. `--`: not measured by any test of the row.
+stall, an outage or a stop was over, the most of all tests of the row; on an adapter whose echo proves nothing they cannot be ruled
+out (see below). `--`: not measured by any test of the row. Tests in real time beside which the machine stalled three times are not
+judged, and not counted.
 """
 
 
 def number(values, unit):
+    if values and unit and max(values) < 0.5:
+        return f"< 1 {unit}"
     return f"{max(values):.0f} {unit}" if values else "--"
 
 
 def row_line(row, results, real_time):
-    here = [r for r in results if ENTRIES[r["name"]].row == row]
+    here = [r for r in results if ENTRIES[r["name"]].row == row and r["verdict"] != "skipped"]
     passed = [r for r in here if r["verdict"] == "passed"]
     ours = f"{len(passed)} of {len(here)}" if here else "--"
     local = len([name for name in REGISTRY if name.startswith(f"row{row:02d}_")]) or "--"
@@ -93,13 +97,15 @@ def estop_lines(results, real_time):
         if values:
             p50, p99 = percentile(values, 50), percentile(values, 99)
             lines.append(f"| {name} | {len(values)} | {p50:.2f} ms | {p99:.2f} ms | {max(values):.2f} ms |")
+        else:
+            lines.append(f"| {name} | none judged: the machine stalled | -- | -- | -- |")
     return lines
 
 
 def figure_lines(results, title, names):
     lines = ["", f"## {title}", ""]
     for r in results:
-        if any(r["name"].startswith(name) for name in names) and r["figures"]:
+        if any(r["name"].startswith(name) for name in names) and r["figures"] and r["verdict"] != "skipped":
             lines.append(f"- {ENTRIES[r['name']].title} ({r['group']}): {', '.join(r['figures'])}")
     return lines
 

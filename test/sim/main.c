@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "directed.h"
 #include "rig.h"
 
 #include <stdlib.h>
@@ -11,10 +12,15 @@
 #define REPLAY_EACH 25U ///< Every so manieth seed is played twice.
 
 static void usage(FILE *out) {
-    fputs("usage: test_sim [--seed N [--trace] [--events]] | [--first N] [--count N | --hours H]\n"
+    fputs("usage: test_sim [--seed N [--trace] [--events]] | [--first N] [--count N | --hours H | --hashes] | "
+          "--directed\n"
           "Plays seeds through the real core in virtual time and judges each by the rules of motion permission.\n"
           "A seed that fails is made small and told as a timeline. --seed N plays one, and tells the hash of all that "
           "was sent.\n"
+          "--hashes plays --count seeds and tells only their hashes, for comparison between machines. --directed plays "
+          "a\n"
+          "node that babbles with lower and with higher ids. --quick ends at the first seed that fails, which is not "
+          "made small.\n"
           "The line `summary ...` adds up what happened; the last line is `N passed, N failed, N skipped`.\n",
           out);
 }
@@ -44,11 +50,15 @@ static void shrink(scenario_t *scenario, uint32_t rule) {
     }
 }
 
+static void tell_broken(const scenario_t *scenario, const rig_result_t *failed) {
+    printf("FAILED seed %llu at %.6f s, rule %u: %s\n", (unsigned long long)scenario->seed,
+           (double)failed->broken_us / 1e6, failed->rule, failed->text);
+}
+
 static void tell_failure(scenario_t *scenario, const rig_result_t *failed) {
     static rig_result_t result;
     const size_t drawn = scenario->count;
-    printf("FAILED seed %llu at %.6f s, rule %u: %s\n", (unsigned long long)scenario->seed,
-           (double)failed->broken_us / 1e6, failed->rule, failed->text);
+    tell_broken(scenario, failed);
     shrink(scenario, failed->rule);
     rig_play(scenario, IW_NEVER, &result);
     printf("made small: %zu of %zu events; rule %u at %.6f s: %s\n", scenario->count, drawn, result.rule,
@@ -91,6 +101,17 @@ static int play_one(uint64_t seed, bool trace, bool events) {
     return (result.rule == ORACLE_NO_RULE) ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
+static int tell_hashes(uint64_t first, uint64_t count) {
+    static scenario_t scenario;
+    static rig_result_t result;
+    for (uint64_t seed = first; seed < first + count; seed++) {
+        scenario_draw(&scenario, seed);
+        rig_play(&scenario, IW_NEVER, &result);
+        printf("seed %llu hash %016llx\n", (unsigned long long)seed, (unsigned long long)result.hash);
+    }
+    return EXIT_SUCCESS;
+}
+
 /// The same seed must give the same bytes again.
 static bool replays(const scenario_t *scenario, const rig_result_t *result) {
     static rig_result_t again;
@@ -101,7 +122,9 @@ static bool replays(const scenario_t *scenario, const rig_result_t *result) {
     return again.hash == result->hash;
 }
 
-static int play_many(uint64_t first, uint64_t count, double hours, unsigned tolerate) {
+/// Until the hours or the count are full, or some seeds have failed; `quick`: until the first, which is not made small.
+static int play_many(uint64_t first, uint64_t count, double hours, bool quick) {
+    const unsigned tolerate = quick ? 1U : 3U;
     static scenario_t scenario;
     static rig_result_t result;
     static rig_stats_t sum;
@@ -115,7 +138,9 @@ static int play_many(uint64_t first, uint64_t count, double hours, unsigned tole
         rig_play(&scenario, IW_NEVER, &result);
         rig_stats_add(&sum, &result.stats);
         bool good = result.rule == ORACLE_NO_RULE;
-        if (!good) {
+        if (!good && quick) {
+            tell_broken(&scenario, &result);
+        } else if (!good) {
             tell_failure(&scenario, &result);
         } else if (seed % REPLAY_EACH == 0U) {
             good = replays(&scenario, &result);
@@ -128,42 +153,80 @@ static int play_many(uint64_t first, uint64_t count, double hours, unsigned tole
     return (failed == 0U && passed > 0U) ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
+#define MANY (UINT64_MAX / 2U)
+
+typedef struct {
+    uint64_t seed;
+    uint64_t first;
+    uint64_t count;
+    double hours;
+    bool one;
+    bool trace;
+    bool events;
+    bool hashes;
+    bool directed;
+    bool quick;
+} options_t;
+
+/// True if the word is a switch without a value.
+static bool take_switch(options_t *options, const char *word) {
+    const struct {
+        const char *name;
+        bool *value;
+    } switches[] = {{"--trace", &options->trace},
+                    {"--events", &options->events},
+                    {"--hashes", &options->hashes},
+                    {"--directed", &options->directed},
+                    {"--quick", &options->quick}};
+    for (size_t i = 0; i < sizeof switches / sizeof switches[0]; i++) {
+        if (strcmp(word, switches[i].name) == 0) {
+            *switches[i].value = true;
+            return true;
+        }
+    }
+    return false;
+}
+
+static int play(const options_t *options) {
+    if (options->directed) {
+        return directed_play();
+    }
+    if (options->one) {
+        return play_one(options->seed, options->trace, options->events);
+    }
+    if (options->hashes) {
+        return tell_hashes(options->first, (options->count == MANY) ? 10U : options->count);
+    }
+    const bool bounded = options->hours > 0.0 || options->count != MANY;
+    return play_many(options->first, options->count, bounded ? options->hours : 1.0, options->quick);
+}
+
 int main(int argc, char **argv) {
-    uint64_t seed = 0;
-    uint64_t first = 1;
-    uint64_t count = UINT64_MAX / 2U;
-    double hours = 0.0;
-    bool one = false;
-    bool trace = false;
-    bool events = false;
+    options_t options = {.first = 1, .count = MANY};
     for (int i = 1; i < argc; i++) {
         const char *const value = (i + 1 < argc) ? argv[i + 1] : NULL;
-        if (strcmp(argv[i], "--trace") == 0) {
-            trace = true;
-        } else if (strcmp(argv[i], "--events") == 0) {
-            events = true;
-        } else if (strcmp(argv[i], "--help") == 0) {
+        if (take_switch(&options, argv[i])) {
+            continue;
+        }
+        if (strcmp(argv[i], "--help") == 0) {
             usage(stdout);
             return EXIT_SUCCESS;
         } else if (value == NULL) {
             usage(stderr);
             return EXIT_USAGE;
         } else if (strcmp(argv[i], "--seed") == 0) {
-            one = true;
-            seed = strtoull(argv[++i], NULL, 10);
+            options.one = true;
+            options.seed = strtoull(argv[++i], NULL, 10);
         } else if (strcmp(argv[i], "--first") == 0) {
-            first = strtoull(argv[++i], NULL, 10);
+            options.first = strtoull(argv[++i], NULL, 10);
         } else if (strcmp(argv[i], "--count") == 0) {
-            count = strtoull(argv[++i], NULL, 10);
+            options.count = strtoull(argv[++i], NULL, 10);
         } else if (strcmp(argv[i], "--hours") == 0) {
-            hours = strtod(argv[++i], NULL);
+            options.hours = strtod(argv[++i], NULL);
         } else {
             usage(stderr);
             return EXIT_USAGE;
         }
     }
-    if (!one && hours <= 0.0 && count == UINT64_MAX / 2U) {
-        hours = 1.0;
-    }
-    return one ? play_one(seed, trace, events) : play_many(first, count, hours, 3U);
+    return play(&options);
 }

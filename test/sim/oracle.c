@@ -6,17 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LATE_US (20U * MS)
-#define STOP_US (100U * MS)
-#define HUNG_US (500U * MS)
-#define GAP_US  (100U * MS)
-/// An echo that takes longer than this shows that the bus does not take frames as it should.
-#define SLOW_ECHO_US (20U * MS)
-#define SETTLED_US   (500U * MS)
-#define HOLD_MAX_US  (10000U * MS)
-#define DRAIN        512U
-/// A condition that must last is judged with this much more, for the time between steps.
-#define MARGIN_US (70U * MS)
+#define LATE_US     (20U * MS)
+#define STOP_US     (100U * MS)
+#define HUNG_US     (500U * MS)
+#define SETTLED_US  (500U * MS)
+#define HOLD_MAX_US (10000U * MS)
+#define DRAIN       512U
 
 bool oracle_elapsed(iw_time_us_t now_us, iw_time_us_t since_us, iw_time_us_t span_us) {
     return since_us != IW_NEVER && now_us - since_us >= span_us;
@@ -52,6 +47,9 @@ void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_
     self->hard = true;
     self->state = iw_gateway_state(gateway);
     self->stopped_us = now_us;
+    if (restarted && self->state != IW_STATE_STOPPING) {
+        oracle_break(self, now_us, 509, "no zeros for a process that died while it was sending");
+    }
     self->late_us = now_us;
     self->ramp_us = self->foreign_us = self->nonzero_drive_us = self->refused_us = IW_NEVER;
     self->bus_bad_us = now_us;
@@ -81,10 +79,6 @@ void oracle_soft_stop(oracle_t *self, iw_time_us_t at_us) {
         self->ramp_us = at_us;
     }
     lose_permission(self);
-}
-
-static bool sending_state(iw_state_t state) {
-    return state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
 }
 
 // ---- what the gateway saw --------------------------------------------------------------------------------------
@@ -188,6 +182,7 @@ void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *
             return;
         }
         self->foreign_us = now_us;
+        self->foreign++;
         self->foreign_now = true;
         oracle_hard_stop(self);
     } else if ((frame->id == 256U || frame->id == 288U) && frame->dlc >= 4U && frame->dlc <= 8U) {
@@ -289,9 +284,14 @@ static void judge_permission(oracle_t *self, iw_time_us_t now_us, size_t side, i
     }
     const int32_t sign = self->config->invert[side] ? -1 : 1;
     const int32_t wanted = self->target.wheel[side].speed_mm_s * sign;
+    const int32_t current_wanted = self->target.wheel[side].current_mA * sign;
     const int32_t highest = (abs(wheel->speed) > abs(wanted)) ? abs(wheel->speed) : abs(wanted);
     if (abs(speed) > highest || (speed != 0 && wheel->speed == 0 && (speed > 0) != (wanted > 0))) {
         oracle_break(self, now_us, 302, "%d mm/s although %d mm/s were wanted", speed, wanted);
+    }
+    if (self->config->current_role == IW_ROLE_SETPOINT && current != 0 && wheel->current == 0 &&
+        (current > 0) != (current_wanted > 0)) {
+        oracle_break(self, now_us, 306, "%d mA although %d mA were wanted", current, current_wanted);
     }
     if (self->config->current_role == IW_ROLE_LIMIT && current != self->target.wheel[side].current_mA) {
         oracle_break(self, now_us, 303, "limit %d mA although %d mA were wanted", current,
@@ -452,148 +452,16 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     if (state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway)) {
         self->wheel[IW_LEFT].sent_us = self->wheel[IW_RIGHT].sent_us = IW_NEVER;
     }
+    // The dead process may have left two of each wheel in its controller.
+    const bool other = self->foreign > 4U;
+    if (self->restarting && state == IW_STATE_LISTENING && !other &&
+        !oracle_elapsed(now_us, self->stopped_us, oracle_us(self->config->zero_hold_ms))) {
+        oracle_break(self, now_us, 510, "silent too early after a restart");
+    }
     self->restarting = self->restarting && state == IW_STATE_STOPPING;
     self->state = state;
     self->was_arming = iw_gateway_arming(self->gateway);
     if (!self->was_arming) {
         self->pending_arm = IW_CLIENT_NONE;
     }
-}
-
-static void judge_latches(oracle_t *self, iw_time_us_t now_us, iw_state_t before) {
-    const iw_state_t state = iw_gateway_state(self->gateway);
-    const bool sending = sending_state(before) && !self->restarting;
-    if (self->estop != 0 && state != IW_STATE_LATCHED) {
-        oracle_break(self, now_us, 204, "not LATCHED although the e-stop is pressed");
-    }
-    if (self->estop != 0 && before != IW_STATE_LATCHED && self->gateway->permit.stop.cause != IW_CAUSE_ESTOP_LINE) {
-        oracle_break(self, now_us, 205, "the e-stop is not told as the cause");
-    }
-    if (sending && self->bus < IW_BUS_PASSIVE && state != IW_STATE_LATCHED) {
-        oracle_break(self, now_us, 701, "not LATCHED although the bus is down or off");
-    }
-    if (sending && self->foreign_now && state != IW_STATE_LATCHED) {
-        oracle_break(self, now_us, 702, "not LATCHED although there is a second master");
-    }
-    if (sending && self->hung && state != IW_STATE_LATCHED) {
-        oracle_break(self, now_us, 703, "not LATCHED although the loop hung");
-    }
-    if (sending && self->late_stop && state == IW_STATE_ARMED) {
-        oracle_break(self, now_us, 704, "still ARMED although the loop was late");
-    }
-    if (sending && self->jump_now && state != IW_STATE_LATCHED) {
-        oracle_break(self, now_us, 705, "not LATCHED although the odometry jumped");
-    }
-}
-
-static bool since(iw_time_us_t *since_us, iw_time_us_t now_us, bool condition, uint32_t span_ms) {
-    if (!condition) {
-        *since_us = IW_NEVER;
-    } else if (*since_us == IW_NEVER) {
-        *since_us = now_us;
-    }
-    return oracle_elapsed(now_us, *since_us, oracle_us(span_ms) + MARGIN_US);
-}
-
-static void judge_following(oracle_t *self, iw_time_us_t now_us, size_t side, bool comparable) {
-    oracle_wheel_t *const wheel = &self->wheel[side];
-    const int32_t told = wheel->speed;
-    const int32_t measured = (int32_t)((int64_t)wheel->rpm * 20106 / 1000);
-    const bool against = comparable && abs(told) > 105 && abs(measured) > 105 && (told > 0) != (measured > 0);
-    const bool faster = comparable && abs(measured) - abs(told) > self->config->follow_mm_s + 25;
-    const bool blocked = comparable && abs(told) >= 100 && abs(measured) * 5 + 100 < abs(told) &&
-                         iw_gateway_state(self->gateway) == IW_STATE_ARMED;
-    if (since(&wheel->against_us, now_us, against, 300)) {
-        oracle_break(self, now_us, 706, "not LATCHED although a wheel turns against its command");
-    }
-    if (since(&wheel->faster_us, now_us, faster, self->config->follow_ms)) {
-        oracle_break(self, now_us, 707, "not LATCHED although a wheel is too fast: %d instead of %d mm/s", measured,
-                     told);
-    }
-    if (since(&wheel->blocked_us, now_us, blocked, self->config->blocked_ms)) {
-        oracle_break(self, now_us, 708, "still ARMED although a wheel is blocked");
-    }
-}
-
-static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
-    const bool ours = sending_state(iw_gateway_state(self->gateway)) && !self->restarting;
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        oracle_wheel_t *const wheel = &self->wheel[side];
-        const iw_time_us_t heard_us =
-            (wheel->fresh_us == IW_NEVER || wheel->fresh_us < wheel->excused_us) ? wheel->excused_us : wheel->fresh_us;
-        const bool silent = now_us - heard_us >= oracle_us(self->config->wheel_silent_ms);
-        judge_following(self, now_us, side, ours && !silent && !self->stalled);
-        if (!ours || self->stalled) {
-            continue;
-        }
-        if (silent) {
-            oracle_break(self, now_us, 709, "not LATCHED although a wheel was silent for %llu us",
-                         (unsigned long long)(now_us - heard_us));
-        }
-        if (wheel->pending > 0U && now_us - wheel->waiting[0] >= oracle_us(self->config->echo_ms)) {
-            oracle_break(self, now_us, 710, "not LATCHED although a frame was not echoed for %llu us",
-                         (unsigned long long)(now_us - wheel->waiting[0]));
-        }
-    }
-}
-
-/// While the process runs and the bus takes frames, setpoints come without a gap.
-static void judge_gaps(oracle_t *self, iw_time_us_t now_us) {
-    const iw_state_t state = iw_gateway_state(self->gateway);
-    const bool holding = state == IW_STATE_LATCHED && !self->latched_silent &&
-                         now_us - self->latched_us < oracle_us(self->config->zero_hold_ms);
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        if (self->wheel[side].pending > 0U && now_us - self->wheel[side].waiting[0] >= SLOW_ECHO_US) {
-            self->refused_us = now_us;
-        }
-    }
-    const bool excused = now_us - self->late_us < GAP_US || now_us - self->bus_bad_us < GAP_US ||
-                         (self->refused_us != IW_NEVER && now_us - self->refused_us < GAP_US);
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        const oracle_wheel_t *const wheel = &self->wheel[side];
-        const bool must = sending_state(state) || holding;
-        if (must && !excused && (wheel->sent_us == IW_NEVER || now_us - wheel->sent_us >= GAP_US)) {
-            oracle_break(self, now_us, 402, "no setpoint for 100 ms");
-        }
-    }
-}
-
-static void judge_pair(oracle_t *self, iw_time_us_t now_us) {
-    const oracle_wheel_t *const left = &self->wheel[IW_LEFT];
-    const oracle_wheel_t *const right = &self->wheel[IW_RIGHT];
-    const bool moving = (left->accepted_now && !left->accepted_zero) || (right->accepted_now && !right->accepted_zero);
-    if (moving && (!left->tried_now || !right->tried_now)) {
-        oracle_break(self, now_us, 606, "one setpoint without the other");
-    }
-    if (moving && left->accepted_now != right->accepted_now) {
-        self->broken_pair = true;
-    } else if (left->accepted_zero && right->accepted_zero) {
-        self->broken_pair = false;
-    }
-}
-
-/// After the e-stop the first zero leaves in the very step that sees it.
-static void judge_estop_zero(oracle_t *self, iw_time_us_t now_us, iw_state_t before) {
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        const oracle_wheel_t *const wheel = &self->wheel[side];
-        const bool first = self->estop != 0 && (before == IW_STATE_ARMED || !wheel->accepted_zero);
-        if (first && sending_state(before) && self->bus >= IW_BUS_PASSIVE && !wheel->tried_now && wheel->pending < 2U) {
-            oracle_break(self, now_us, 206, "no zero at once after the e-stop");
-        }
-    }
-}
-
-void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
-    const iw_state_t before = self->state;
-    judge_latches(self, now_us, before);
-    if (self->armed && now_us >= self->lease_until_us) {
-        oracle_soft_stop(self, self->lease_until_us);
-    }
-    oracle_observe(self, now_us);
-    judge_wheels(self, now_us);
-    judge_gaps(self, now_us);
-    judge_pair(self, now_us);
-    judge_estop_zero(self, now_us, before);
-    self->step_us = now_us;
-    self->timing_bad = self->gateway->facts.timing_contradicted;
 }

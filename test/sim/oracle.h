@@ -69,6 +69,7 @@ typedef struct {
     int estop;
     iw_bus_state_t bus;
     iw_time_us_t foreign_us;
+    uint32_t foreign;     ///< Setpoints since the start.
     iw_time_us_t edge_us; ///< Of the line itself.
     iw_time_us_t late_us;
     iw_time_us_t refused_us;

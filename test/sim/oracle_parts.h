@@ -6,6 +6,8 @@
 #include "oracle.h"
 
 #define MS 1000U
+/// While the bus takes frames, setpoints come closer than this.
+#define GAP_US (100U * MS)
 /// An event-like cause is gone when not seen for this long.
 #define EVENT_US (1000U * MS)
 /// A nonzero command this recent refuses arm and reset.

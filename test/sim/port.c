@@ -58,7 +58,9 @@ static int port_send(void *context, const iw_can_frame_t *frame) {
     rig_t *const rig = context;
     const int result = hand(rig, frame);
     uint64_t bytes = 0;
-    memcpy(&bytes, frame->data, sizeof bytes);
+    for (unsigned i = 0; i < IW_CAN_DATA_MAX; i++) {
+        bytes = bytes << 8 | frame->data[i];
+    }
     rig_hash(rig, rig->now_us);
     rig_hash(rig, ((uint64_t)frame->id << 8) | (uint64_t)(result > 0));
     rig_hash(rig, bytes);

@@ -63,7 +63,8 @@ static void set_wheel(rig_t *rig, const event_t *event, bool on) {
         wheel->motion.runaway_mm_s = on ? (int16_t)event->a : 0;
         break;
     default:
-        wheel->force.forced_raw = on ? event->a : SIM_FORCE_AUTO;
+        wheel->force.forced_raw = (on && event->b >= 0) ? event->a : SIM_FORCE_AUTO;
+        wheel->force.unit = (on == (event->who == IW_LEFT)) ? IW_FORCE_DN : IW_FORCE_CN;
         break;
     }
 }

@@ -42,7 +42,7 @@ static const draw_t draws[EV_KINDS] = {
     [EV_LOSS] = {"wheel loses frames", 100 * MS, 5 * S, 10, 950, 2},
     [EV_SWAP] = {"wheel reports the wrong sign", 100 * MS, 5 * S, 0, 0, 2},
     [EV_BLOCK] = {"wheel blocked", 100 * MS, 5 * S, 0, 0, 2},
-    [EV_RUNAWAY] = {"wheel too fast", 100 * MS, 3 * S, 100, 2500, 2},
+    [EV_RUNAWAY] = {"wheel too fast", 100 * MS, 14 * S, 100, 2500, 2},
     [EV_FORCE] = {"force absurd", 100 * MS, 5 * S, -32768, 32767, 2},
     [EV_LOOP_STALL] = {"loop stalls", 10 * MS, 3 * S, 0, 0, 1},
     [EV_LOOP_SLOW] = {"loop slow", 50 * MS, 2 * S, 500, 150 * MS, 1},
@@ -129,7 +129,7 @@ static void draw_event(event_t *event, unsigned kind, sim_random_t *random) {
         event->span_us = 0;
     } else if (kind == EV_BABBLE) {
         event->a = chance(random, 50) ? (int32_t)sim_random_below(random, 250) : 600 + event->a % 1400;
-        event->b = (int32_t)between(random, 110, 2000);
+        event->b = (int32_t)(chance(random, 40) ? between(random, 80, 119) : between(random, 120, 2000));
     } else if (kind == EV_ONE_DRIVE && chance(random, 20)) {
         event->b *= 40000;
     }
@@ -145,13 +145,25 @@ static void draw_kind(scenario_t *self, unsigned kind, uint32_t number, sim_rand
     }
 }
 
+/// A total order, so that every library sorts alike.
 static int by_time(const void *a, const void *b) {
     const event_t *const one = a;
     const event_t *const other = b;
-    if (one->at_us != other->at_us) {
-        return (one->at_us < other->at_us) ? -1 : 1;
+    const int64_t order[] = {
+        (one->at_us == other->at_us) ? 0 : ((one->at_us < other->at_us) ? -1 : 1),
+        (int64_t)one->kind - other->kind,
+        (int64_t)one->who - other->who,
+        (int64_t)one->span_us - other->span_us,
+        (int64_t)one->a - other->a,
+        (int64_t)one->b - other->b,
+        (int64_t)one->style - other->style,
+    };
+    for (size_t i = 0; i < sizeof order / sizeof order[0]; i++) {
+        if (order[i] != 0) {
+            return (order[i] < 0) ? -1 : 1;
+        }
     }
-    return (int)one->kind - (int)other->kind;
+    return 0;
 }
 
 void scenario_draw(scenario_t *self, uint64_t seed) {

@@ -39,7 +39,7 @@ typedef enum {
     EV_SWAP,        ///< Wheel `who` reports the wrong sign for `span`.
     EV_BLOCK,       ///< Wheel `who` cannot turn for `span`.
     EV_RUNAWAY,     ///< Wheel `who` is faster than told by `a` mm/s for `span`.
-    EV_FORCE,       ///< Wheel `who` sends force `a` raw, in the other unit, for `span`.
+    EV_FORCE,       ///< Wheel `who` sends its force in the other unit, or just `a` raw, for `span`.
     EV_LOOP_STALL,  ///< The gateway's process does not run for `span`.
     EV_LOOP_SLOW,   ///< Each wake-up comes up to `a` us late, for `span`.
     EV_CRASH,       ///< The gateway's process dies and runs again after `span`.

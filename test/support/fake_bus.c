@@ -68,8 +68,12 @@ static int fake_receive(void *context, iw_can_frame_t *out_frame) {
     return 1;
 }
 
+/// A loss that is over is told once.
 static iw_bus_state_t fake_state(void *context) {
-    return ((const fake_bus_t *)context)->state;
+    fake_bus_t *const self = context;
+    const iw_bus_state_t told = (self->loss_untold && self->state >= IW_BUS_PASSIVE) ? IW_BUS_DOWN : self->state;
+    self->loss_untold = false;
+    return told;
 }
 
 static void forget_flights(fake_bus_t *self) {
@@ -140,5 +144,6 @@ void fake_bus_advance(fake_bus_t *self, iw_time_us_t now_us) {
 
 void fake_bus_break(fake_bus_t *self, iw_bus_state_t state) {
     self->state = state;
+    self->loss_untold = true;
     forget_flights(self);
 }

@@ -30,6 +30,7 @@ typedef struct {
     int send_result[IW_SIDES];  ///< What `send` answers for each wheel's setpoint; 1 at first.
     iw_time_us_t echo_delay_us; ///< From `send` to the left one's echo; 300 at first.
     bool acknowledged;          ///< False: nobody acknowledges, nothing gets onto the bus.
+    bool loss_untold;           ///< It broke and `bus_state` has not told yet.
     iw_bus_state_t state;
     int purge_result;
     int estop_level; ///< What `estop_pressed` answers.

@@ -48,7 +48,7 @@ static int16_t rpm_of(const gateway_rig_t *self, size_t side) {
 
 static void wheel_send(gateway_rig_t *self, size_t side) {
     rig_wheel_t *const wheel = &self->wheel[side];
-    iw_proto_message_t message = {IW_PROTO_SPEED, (iw_side_t)side, {.speed = {rpm_of(self, side), 0}}};
+    iw_proto_message_t message = {IW_PROTO_SPEED, (iw_side_t)side, {.speed = {.speed_rpm = rpm_of(self, side)}}};
     iw_can_frame_t frame;
     while (wheel->speed_us <= self->now_us) {
         wheel->speed_us += self->speed_period_us;

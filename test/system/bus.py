@@ -17,7 +17,7 @@ def now_us():
     return time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
 
 
-def realtime_ahead_us():
+def realtime_ahead_ns():
     """CLOCK_REALTIME minus CLOCK_MONOTONIC, by the least interrupted of several readings."""
     readings = []
     for _ in range(10):
@@ -25,7 +25,7 @@ def realtime_ahead_us():
         readings.append((after - before, real - before))
         if after - before < 20_000:
             break
-    return min(readings)[1] // 1000
+    return min(readings)[1]
 
 
 class Bus:
@@ -52,7 +52,7 @@ class Bus:
             if not data:
                 break
             if number % 4096 == 0:
-                ahead_us = realtime_ahead_us()
+                ahead_us = realtime_ahead_ns() // 1000
             stamp = struct.unpack("qq", ancillary[0][2]) if ancillary else None
             t_us = stamp[0] * 1_000_000 + stamp[1] // 1000 - ahead_us if stamp else now_us()
             can_id, length, _, echo, payload = FRAME.unpack(data)

@@ -110,6 +110,7 @@ class Sim:
             rig.path("control"),
             "--seed",
             "1",
+            *rig.sim_arguments(),
             *extra,
         ]
         self.process = Process(command, rig.path("sim.out"))
@@ -161,8 +162,10 @@ class Rig:
         self.processes, self.clients = [], []
         self.gateway = None
         self.estop, self.button = estop, "button"
+        self.socket_name = "gateway.sock"
         self.settings = {section: dict(keys) for section, keys in DEFAULTS.items()}
         self.settings["northbound"]["group"] = grp.getgrgid(os.getgid()).gr_name
+        self.settings["record"] = {"directory": self.folder}
         for section, keys in (config or {}).items():
             self.settings.setdefault(section, {}).update(keys)
         self.write_config()
@@ -174,6 +177,10 @@ class Rig:
 
     def prepare(self):
         """Before anything is started."""
+
+    def sim_arguments(self):
+        """More arguments of the simulator."""
+        return ()
 
     def listen(self, frames=None):
         """The recorder of the bus; `frames` are what another one had recorded before."""
@@ -225,7 +232,7 @@ class Rig:
             "--can",
             self.gateway_bus(),
             "--socket",
-            self.path("gateway.sock"),
+            self.path(self.socket_name),
             "--estop",
             self.estop_line(),
             *extra,
@@ -239,7 +246,7 @@ class Rig:
         self.timeline.append(Event(begin_us, "start"))
         if restart_hold:
             self.timeline.append(Event(begin_us, "restart_hold"))
-        wait_connect(self.path("gateway.sock"), self.gateway).close()
+        wait_connect(self.path(self.socket_name), self.gateway).close()
         client = self.client(name="starter")
         client.request("hello")
         answered_ms = (now_us() - begin_us) / 1000
@@ -274,7 +281,7 @@ class Rig:
         return self.gateway.wait(3)
 
     def client(self, name="test"):
-        client = Client(self.path("gateway.sock"), self.timeline, name)
+        client = Client(self.path(self.socket_name), self.timeline, name)
         self.clients.append(client)
         return client
 

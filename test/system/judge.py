@@ -87,12 +87,11 @@ class Judge(Reading):
             later = [s for s in self.setpoints if s.side == setpoint.side and s.t_us >= max(end, begin + 2 * ECHO_US)]
             if later and later[0] is setpoint and setpoint.t_us < end + RESIDUAL_US:
                 self.residual += 1
-                if len(later) < 2 or not later[1].zero or later[1].t_us - setpoint.t_us > RESIDUAL_ZERO_US:
-                    self._say(
-                        "old_frame",
-                        setpoint.t_us,
-                        f"an old frame of {setpoint.speed} mm/s without a zero right behind it",
-                    )
+                followed = len(later) > 1 and later[1].zero
+                excess_us = later[1].t_us - setpoint.t_us - RESIDUAL_ZERO_US if followed else None
+                if not followed or excess_us > 0:
+                    text = f"an old frame of {setpoint.speed} mm/s without a zero right behind it"
+                    self._say("old_frame", setpoint.t_us, text, excess_us)
                 return True
         return False
 

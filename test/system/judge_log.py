@@ -120,7 +120,9 @@ class Reading:
         for event in self.events:
             if event.kind == "dead" and since is None:
                 since = event.t_us
-            if event.kind == "alive" and since is not None:
+            if event.kind == "alive" and since is None:
+                self._say("timeline", event.t_us, "the bus lives again, but was never dead: the scenario wrote it down wrongly")
+            elif event.kind == "alive":
                 windows.append((since, event.done_us or event.t_us))
                 since = None
         windows = [(begin, self._first_out_us(end)) for begin, end in windows]

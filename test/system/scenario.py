@@ -82,6 +82,9 @@ class Test:
         self.check(len(why.get("sentence") or "") > 20, f"why has no sentence: {why}")
         return why
 
+    def measure(self, name, value):
+        """A figure for the table of the fault catalogue, where there is one."""
+
     def figure(self, text):
         self.figures.append(text)
 

@@ -212,6 +212,10 @@ def faults():
         Event(2_500 * MS, "dead"),
         Event(3_300 * MS, "alive", 3_300 * MS),
     ], "motion_on_dead_bus"
+    yield "a bus that lives again before it died", f, e + [
+        Event(2_500 * MS, "alive", 2_500 * MS),
+        Event(2_501 * MS, "dead"),
+    ], "timeline"
     off = [
         Event(9_500 * MS, "dead"),
         Event(9_500 * MS, "cut", within_us=50 * MS),

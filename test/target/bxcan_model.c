@@ -77,6 +77,11 @@ static void complete(bxcan_model_t *self, int mailbox, uint32_t flags) {
     self->tsr = (self->tsr & ~(0xFU << (8U * (uint32_t)mailbox))) | ((TSR_RQCP | flags) << (8U * (uint32_t)mailbox));
 }
 
+/// An abort of a scheduled mailbox: what the last attempt came to stays readable.
+static void complete_abort(bxcan_model_t *self, int mailbox) {
+    complete(self, mailbox, (self->tsr >> (8U * (uint32_t)mailbox)) & (TSR_ALST | TSR_TERR));
+}
+
 static void write_tsr(bxcan_model_t *self, uint32_t value) {
     for (int i = 0; i < MODEL_MAILBOXES; i++) {
         const uint32_t ours = value >> (8U * (uint32_t)i);
@@ -87,7 +92,7 @@ static void write_tsr(bxcan_model_t *self, uint32_t value) {
             self->mailbox[i].aborting = true;
             self->mailbox[i].delayed = self->abort_reads;
             if (!self->mailbox[i].on_bus && self->abort_reads == 0U) {
-                complete(self, i, 0);
+                complete_abort(self, i);
             }
         }
     }
@@ -99,7 +104,7 @@ static uint32_t read_tsr(bxcan_model_t *self) {
     for (int i = MODEL_MAILBOXES - 1; i >= 0; i--) {
         model_mailbox_t *const box = &self->mailbox[i];
         if (box->aborting && !box->on_bus && (box->delayed == 0U || --box->delayed == 0U)) {
-            complete(self, i, 0);
+            complete_abort(self, i);
             value = self->tsr;
         }
     }
@@ -263,6 +268,7 @@ void bxcan_model_recessive(bxcan_model_t *self, uint32_t bits) {
         return;
     }
     settle_mode(self);
+    self->held_bits = 0;
     for (; bits > 0U; bits--) {
         if (++self->recessive_bits >= 11U) {
             self->recessive_bits = 0;
@@ -324,22 +330,28 @@ static void count_transmit_error(bxcan_model_t *self, model_end_t end) {
     model_note_errors(self);
 }
 
+/// 7.1 and 9.2: ALST and TERR tell about the last attempt, also while the mailbox is scheduled again; RQCP comes with the end of the
+/// request, and TXOK only with a success.
+static void note_failure(bxcan_model_t *self, int mailbox, model_end_t end) {
+    const uint32_t flag = (end == MODEL_LOST_ARBITRATION) ? TSR_ALST : TSR_TERR;
+    if (end != MODEL_LOST_ARBITRATION) {
+        count_transmit_error(self, end);
+    }
+    if (self->mailbox[mailbox].aborting || (self->mcr & MCR_NART) != 0U) {
+        complete(self, mailbox, flag);
+    } else {
+        self->tsr = (self->tsr & ~(0xFU << (8U * (uint32_t)mailbox))) | (flag << (8U * (uint32_t)mailbox));
+    }
+}
+
 void bxcan_model_end(bxcan_model_t *self, int mailbox, model_end_t end) {
-    model_mailbox_t *const box = &self->mailbox[mailbox];
-    box->on_bus = false;
+    self->mailbox[mailbox].on_bus = false;
     if (end == MODEL_SENT) {
         self->lec = 0;
         self->tec -= (self->tec > 0U) ? 1U : 0U;
         complete(self, mailbox, TSR_TXOK);
     } else {
-        if (end != MODEL_LOST_ARBITRATION) {
-            count_transmit_error(self, end);
-        }
-        if (box->aborting) {
-            complete(self, mailbox, 0);
-        } else if ((self->mcr & MCR_NART) != 0U) {
-            complete(self, mailbox, (end == MODEL_LOST_ARBITRATION) ? TSR_ALST : TSR_TERR);
-        }
+        note_failure(self, mailbox, end);
     }
     settle_mode(self);
 }

@@ -58,6 +58,7 @@ typedef struct {
     model_mailbox_t mailbox[MODEL_MAILBOXES];
     model_fifo_t fifo[MODEL_FIFOS];
     uint32_t requests;
+    uint32_t held_bits;      ///< Dominant bits without a recessive one among them.
     uint32_t recessive_bits; ///< Unbroken run while joining.
     uint32_t recovered;      ///< Runs of 11 since bus-off recovery began.
     uint32_t banks;          ///< 14 or 28.
@@ -88,6 +89,10 @@ bool bxcan_model_is_on(const bxcan_model_t *self);
 /// The bus was recessive for that many bits; a dominant bit breaks the run.
 void bxcan_model_recessive(bxcan_model_t *self, uint32_t bits);
 void bxcan_model_dominant(bxcan_model_t *self);
+
+/// The bus is held dominant for that many bits, and was right before unless recessive bits were told. `transmitting`: it began within a
+/// frame of this node.
+void bxcan_model_hold(bxcan_model_t *self, uint32_t bits, bool transmitting);
 
 /// The mailbox that it would send next, with its frame; MODEL_NONE: none, or it may not.
 int bxcan_model_offer(const bxcan_model_t *self, model_frame_t *out_frame);

@@ -141,6 +141,24 @@ void model_note_errors(bxcan_model_t *self) {
     }
 }
 
+/// The bus's rule, not the controller's: after the error flag every 8 dominant bits cost 8, the first time after 14. A receiver
+/// becomes passive by that, a transmitter bus-off.
+void bxcan_model_hold(bxcan_model_t *self, uint32_t bits, bool transmitting) {
+    bxcan_model_dominant(self);
+    for (; bits > 0U && bxcan_model_is_on(self); bits--) {
+        self->held_bits++;
+        if (self->held_bits < 14U || (self->held_bits - 14U) % 8U != 0U) {
+            continue;
+        }
+        if (transmitting) {
+            self->tec += 8U;
+        } else {
+            self->rec = (self->rec < 247U) ? self->rec + 8U : 255U;
+        }
+        model_note_errors(self);
+    }
+}
+
 void bxcan_model_hear_error(bxcan_model_t *self) {
     bxcan_model_dominant(self);
     if (bxcan_model_is_on(self)) {

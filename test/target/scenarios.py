@@ -38,6 +38,11 @@ def assert_lamp(rig, pattern):
     assert seen == pattern, f"the lamp shows {seen}, not {pattern}"
 
 
+def assert_lamp_steady_since(rig, span_ns):
+    changes = rig.machine.lamp.changes
+    assert changes[-1][1] and rig.machine.now_ns - changes[-1][0] >= span_ns, "not armed any more"
+
+
 def arm(rig, within_ns=SECOND):
     rig.run(within_ns)
     frames = rig.setpoints()
@@ -99,6 +104,27 @@ def listening(rig):
     assert_lamp(rig, LISTENING)
 
 
+def setpoint_role(rig):
+    """Where the current is a setpoint: zero is 0/0, with the configured type."""
+    rig.run(2 * SECOND)
+    frames = rig.setpoints(SECOND)
+    assert_gaps(frames, 22 * MS)
+    assert {frame.data for frame in rig.setpoints()} == {bytes([255, 0, 0, 0, 0])}, "not 255 0 0"
+    assert_lamp(rig, ARMED)
+
+
+def clock_input(rig):
+    """A clock signal instead of a crystal: runs from it, exactly; without it the lamp tells, and it arms when it comes."""
+    clocks = rig.machine.clocks
+    clocks.is_clock = True
+    clocks.set_crystal(False)
+    rig.run(1200 * MS)
+    assert_lamp(rig, NO_CRYSTAL)
+    clocks.set_crystal(True)
+    arm(rig)
+    assert rig.machine.can.timing() == (1_000_000, 625), rig.machine.can.timing()
+
+
 def fast_watchdog(rig):
     """The watchdog's oscillator at its fastest: still no reset, also while no frame wakes the loop."""
     for wheel in rig.machine.bus.wheels:
@@ -107,6 +133,21 @@ def fast_watchdog(rig):
     for wheel in rig.machine.bus.wheels:
         wheel.power(True, rig.machine.now_ns)
     arm(rig)
+
+
+def time_never_goes_back(rig):
+    """Asked at every cycle around a tick, the time only grows, and by as much as has passed."""
+    arm(rig)
+    machine, now_us = rig.machine, rig.function("iw_time_now_us")
+    last_us, offset_us = 0, None
+    for early_ns in range(0, 1500, 10):
+        machine.run(machine.tick_ns - machine.now_ns - early_ns)
+        for _ in range(3):
+            before_us, told_us = machine.now_ns / US, machine.call(now_us)
+            assert told_us >= last_us, f"{told_us} us after {last_us} us"
+            offset_us = offset_us or told_us - before_us
+            assert -2 <= told_us - before_us - offset_us <= 5, f"{told_us} us, {before_us + offset_us} us have passed"
+            last_us = told_us
 
 
 def estop(rig):
@@ -127,14 +168,29 @@ def estop(rig):
 
 
 def estop_pulse(rig):
-    """Open for 20 us: latched."""
+    """Open for 1 us, over before anybody can read the level: latched."""
     arm(rig)
     pressed_ns = rig.machine.now_ns
     open_estop(rig)
-    rig.run(20 * US)
+    rig.run(1 * US)
     close_estop(rig)
     rig.run(2500 * MS)
     assert_held_then_silent(rig, pressed_ns)
+    assert_lamp(rig, LATCHED)
+
+
+def estop_chatters(rig):
+    """The contact opens and closes every 50 us for 100 ms: latched, and neither the bus nor the watchdog notices."""
+    arm(rig)
+    since_ns = rig.machine.now_ns
+    for _ in range(1000):
+        open_estop(rig)
+        rig.run(50 * US)
+        close_estop(rig)
+        rig.run(50 * US)
+    assert_gaps(rig.setpoints(since_ns - 30 * MS), 25 * MS)
+    rig.run(2500 * MS)
+    assert_held_then_silent(rig, since_ns)
     assert_lamp(rig, LATCHED)
 
 
@@ -233,12 +289,57 @@ def stuck_at_start(rig):
     arm(rig, 1500 * MS)
 
 
-def stuck_in_motion(rig):
-    """The bus is held dominant for 300 ms while moving: latched, nothing stale afterwards."""
+def open_at_start(rig):
+    """The bus is not connected when power comes, wherever it is open: no hang, nothing is sent; connected later, it arms."""
+    for where in ("cable", "receiver"):
+        rig.machine.bus.cut_off(where)
+        rig.run(1200 * MS)
+        assert rig.machine.bus.attempts == 0, "it sent"
+        assert_lamp(rig, LISTENING)
+    rig.machine.bus.cut_off(None)
+    arm(rig)
+
+
+def torn(rig, where, bus_offs):
     start_demo(rig)
+    torn_ns = rig.machine.now_ns
+    rig.machine.bus.cut_off(where)
+    rig.run(500 * MS)
+    assert not rig.setpoints(torn_ns + MS), "setpoints through a cut"
+    assert rig.counter("bus_offs") >= bus_offs, "no bus-off"
+    rig.machine.bus.cut_off(None)
+    rig.run(2500 * MS)
+    assert rig.machine.can.is_on(), "not recovered"
+    assert_zero(rig.setpoints(torn_ns + MS))
+    assert_lamp(rig, LATCHED)
+    press_button(rig)
+    rig.run(SECOND)
+    assert_zero(rig.setpoints(torn_ns + MS))
+    press_button(rig)
+    rig.run(500 * MS)
+    assert rig.setpoints()[-1].setpoint()[0] == 100, "no motion after reset, arming and a new press"
+
+
+def cable_torn(rig):
+    """In motion the cable is torn off beyond the transceiver: latched, nothing old afterwards, and no motion by itself."""
+    torn(rig, "cable", 0)
+
+
+def receiver_open(rig):
+    """In motion the wire of the received signal breaks: bus-off again and again, zeros when it is whole, and no motion by itself."""
+    torn(rig, "receiver", 2)
+
+
+def stuck_in_motion(rig):
+    """The bus is held dominant for 300 ms in the middle of a setpoint: bus-off, latched, nothing stale afterwards."""
+    start_demo(rig)
+    bus = rig.machine.bus
+    while bus.current is None or bus.current[1] is None:
+        rig.run(20 * US)
     stuck_ns = rig.machine.now_ns
-    rig.machine.bus.hold_dominant(True)
+    bus.hold_dominant(True)
     rig.run(300 * MS)
+    assert rig.counter("bus_offs") >= 1, "no bus-off"
     rig.machine.bus.hold_dominant(False)
     rig.run(2500 * MS)
     assert_zero(rig.setpoints(stuck_ns))
@@ -251,18 +352,35 @@ def full_bus(rig):
     bus, start_ns, flooded = rig.machine.bus, rig.machine.now_ns, rig.machine.bus.flooded
     before = rig.counter("bad_format")
     bus.flood = Frame(545, b"", sender="flood", remote_dlc=3) # 47 bits with the space: none is shorter.
-    rig.run(SECOND)
+    rig.run(500 * MS)
     bus.flood = None
     rig.run(50 * MS)
     frames = bus.flooded - flooded
-    total = sum(1 for frame in bus.log if start_ns <= frame.time_ns < start_ns + SECOND)
-    assert total >= 20_500, f"the bus was not full: {total} frames"
+    total = 2 * sum(1 for frame in bus.log if start_ns <= frame.time_ns < start_ns + 500 * MS)
+    assert total >= 20_500, f"the bus was not full: {total} frames/s"
     assert rig.machine.can.overruns() == 0 and rig.counter("overruns") == 0, "the controller's FIFO overran"
     assert rig.counter("lost") == 0, f"{rig.counter('lost')} frames were lost"
     assert rig.counter("bad_format") - before == frames, f"{rig.counter('bad_format') - before} of {frames} frames were taken"
     assert_gaps(rig.setpoints(start_ns), 25 * MS)
     assert_zero(rig.setpoints(start_ns))
     rig.note(f"{total} frames/s")
+
+
+def overrun(rig):
+    """The CPU is held up for 2 ms on a full bus: the controller overruns, the core is told, and nothing else happens."""
+    arm(rig)
+    rig.machine.bus.flood = Frame(545, b"", sender="flood", remote_dlc=3)
+    rig.run(20 * MS)
+    before = rig.counter("unknown")
+    rig.machine.frozen = True
+    rig.run(2 * MS)
+    rig.machine.frozen = False
+    rig.run(20 * MS)
+    rig.machine.bus.flood = None
+    assert rig.machine.can.overruns() >= 30, "the emulated controller did not overrun"
+    assert rig.counter("overruns") >= 1 and rig.counter("unknown") == before + 1, "the core was not told, or too often"
+    rig.run(300 * MS)
+    assert_lamp_steady_since(rig, 250 * MS)
 
 
 def babbling(rig):
@@ -325,6 +443,51 @@ def hang(rig):
     reset_ns = rig.machine.resets[0][0]
     assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
     assert_zero(rig.setpoints(reset_ns))
+
+
+def loop_stuck(rig):
+    """In motion the main loop goes round on one spot while interrupts are served as ever: the watchdog bites."""
+    start_demo(rig)
+    stuck_ns = rig.machine.now_ns
+    rig.machine.divert()
+    rig.run(300 * MS)
+    rig.expect_resets("watchdog")
+    assert rig.machine.resets and rig.machine.resets[0][0] - stuck_ns < 200 * MS, "the watchdog did not bite"
+    rig.run(2 * SECOND)
+    reset_ns = rig.machine.resets[0][0]
+    assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
+    assert_zero(rig.setpoints(stuck_ns + MS))
+
+
+def stuck_while_listening(rig):
+    """The same before anything was sent: it begins anew, in silence."""
+    rig.machine.bus.wheels[1].power(False, 0)
+    rig.run(500 * MS)
+    rig.machine.divert()
+    rig.run(SECOND)
+    rig.expect_resets("watchdog")
+    assert rig.machine.bus.attempts == 0, "it sent"
+    rig.machine.bus.wheels[1].power(True, rig.machine.now_ns)
+    arm(rig)
+
+
+def demo_button_held_through_reset(rig):
+    """The button that started the profile stays down while the watchdog bites: no motion until it is let go and pressed again."""
+    arm(rig)
+    rig.machine.port_a.drive(1, 0)
+    rig.run(600 * MS)
+    assert rig.setpoints()[-1].setpoint()[0] == 100, "the profile did not start"
+    rig.machine.divert()
+    rig.run(4 * SECOND)
+    rig.expect_resets("watchdog")
+    reset_ns = rig.machine.resets[0][0]
+    assert_lamp(rig, ARMED)
+    rig.machine.port_a.release(1)
+    rig.run(300 * MS)
+    assert_zero(rig.setpoints(reset_ns))
+    press_button(rig)
+    rig.run(300 * MS)
+    assert rig.setpoints()[-1].setpoint()[0] > 0, "no motion after a new press"
 
 
 def demo_profile(rig):
@@ -392,9 +555,17 @@ def demo_estop(rig):
 # image -> scenarios; the watchdog's oscillator is nominal, slowest (0) or fastest (1) where given.
 SCENARIOS = {
     "listen": (listening,),
-    "zero": (nominal, fast_watchdog, estop, estop_pulse, estop_at_start, wheel_missing, wheel_lost, no_acknowledgement,
-             stuck_at_start, full_bus, second_master, no_crystal),
-    "demo": (demo_profile, demo_second_press_stops, demo_button_held, demo_estop, acknowledgement_lost, bus_off, stuck_in_motion,
-             babbling, crystal_dies, hang),
+    "zero": (nominal, time_never_goes_back, fast_watchdog, estop, estop_pulse, estop_chatters, estop_at_start, wheel_missing,
+             wheel_lost, no_acknowledgement, stuck_at_start, open_at_start, full_bus, overrun, second_master, no_crystal,
+             stuck_while_listening),
+    "setpoint": (setpoint_role,),
+    "demo": (demo_profile, demo_second_press_stops, demo_button_held, demo_button_held_through_reset, demo_estop, acknowledgement_lost,
+             cable_torn, receiver_open, bus_off, stuck_in_motion, babbling, crystal_dies, hang, loop_stuck),
 }
-OSCILLATOR = {fast_watchdog: 1, hang: 0, no_crystal: 1}
+# The STM32F446 has the files of the STM32F407: what may differ is its clock.
+BY_BOARD = {"stm32f103": SCENARIOS, "stm32f407": SCENARIOS,
+            "stm32f446": {"zero": (nominal,), "clock": (clock_input,), "demo": (crystal_dies,)}}
+# Long, and what they ask does not depend on the chip's family: on the second board only in ./check --full.
+LONG = (wheel_lost, estop_chatters, demo_profile, demo_second_press_stops, demo_button_held, second_master, babbling, overrun, cable_torn,
+        stuck_while_listening)
+OSCILLATOR = {fast_watchdog: 1, hang: 0, loop_stuck: 0, stuck_while_listening: 0, no_crystal: 1, clock_input: 1}

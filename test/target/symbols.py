@@ -11,6 +11,7 @@ FIELDS = {
     "bus_offs": ("bus", "iw_bxcan_t", "bus_offs"),
     "received": ("gateway", "iw_gateway_t", "counters.received"),
     "bad_format": ("gateway", "iw_gateway_t", "counters.bad_format"),
+    "unknown": ("gateway", "iw_gateway_t", "counters.unknown"),
     "purges": ("gateway", "iw_gateway_t", "counters.purges"),
     "late_steps": ("gateway", "iw_gateway_t", "counters.late_steps"),
 }
@@ -42,3 +43,9 @@ def stack_area(elf):
     run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
     found = dict(reversed(line.split()[0::2]) for line in run.stdout.splitlines() if " iw_link_" in line)
     return int(found["iw_link_ram_end"], 16), int(found["iw_link_stack_top"], 16)
+
+
+def function(elf, name):
+    """Its address."""
+    run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
+    return next(int(line.split()[0], 16) & ~1 for line in run.stdout.splitlines() if line.split()[1:] in (["T", name], ["t", name]))

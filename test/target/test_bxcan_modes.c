@@ -259,6 +259,67 @@ static void test_two_devices_share_filters_and_nothing_else(void) {
     TEST_ASSERT_EQUAL(IW_CAN_ECHO, heard.kind);
 }
 
+static bool in_use_reads_back(uint32_t id) {
+    const iw_can_frame_t frame = rig_frame(id, 5);
+    model_frame_t on_bus;
+    iw_can_frame_t echo;
+    return iw_bxcan_send(driver, &frame) > 0 && rig_send_next(0, &on_bus) && iw_bxcan_receive(driver, &echo) > 0 &&
+           echo.id == id && echo.kind == IW_CAN_ECHO;
+}
+
+static void test_trouble_of_one_device_is_not_the_other_ones(void) {
+    iw_bxcan_t *const other = &rig[1].driver;
+    const iw_can_frame_t frame = rig_frame(298, 7);
+    model_frame_t on_bus;
+    iw_can_frame_t taken;
+    rig_start(0);
+    rig_start(1);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_send(other, &frame));
+    while (bxcan_model_is_on(&rig[1].model)) {
+        const int mailbox = bxcan_model_offer(&rig[1].model, &on_bus);
+        bxcan_model_begin(&rig[1].model, mailbox);
+        bxcan_model_end(&rig[1].model, mailbox, MODEL_BIT_ERROR);
+    }
+    TEST_ASSERT_EQUAL(IW_BUS_OFF, iw_bxcan_bus_state(other));
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_TRUE(in_use_reads_back(266));
+    TEST_ASSERT_TRUE(rig_hear(0, 256, 4));
+    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL(0, driver->bus_offs);
+    TEST_ASSERT_EQUAL(1, other->bus_offs);
+    (void)iw_bxcan_bus_state(other);
+    (void)iw_bxcan_bus_state(other);
+    bxcan_model_recessive(&rig[1].model, REJOIN_BITS);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(other));
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(other));
+    TEST_ASSERT_TRUE(in_use_reads_back(298));
+}
+
+static void test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers(void) {
+    const iw_can_frame_t frame = rig_frame(266, 1);
+    model_frame_t on_bus;
+    rig_start(0);
+    (void)iw_bxcan_send(driver, &frame);
+    bxcan_model_begin(model, bxcan_model_offer(model, &on_bus));
+    bxcan_model_end(model, 0, MODEL_BIT_ERROR);
+    bxcan_model_hold(model, 300, true);
+    TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    for (int i = 0; i < 100; i++) {
+        bxcan_model_hold(model, 1000, true);
+        TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    }
+    bxcan_model_recessive(model, REJOIN_BITS);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_EQUAL(MODEL_NONE, bxcan_model_offer(model, &on_bus));
+}
+
+static void test_bus_held_dominant_while_listening_is_passive_only(void) {
+    rig_start(0);
+    bxcan_model_hold(model, 1000000, false);
+    TEST_ASSERT_EQUAL(IW_BUS_PASSIVE, state());
+    TEST_ASSERT_GREATER_THAN(127, iw_bxcan_errors(driver).receive_errors);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_bus_is_down_until_11_recessive_bits);
@@ -280,5 +341,8 @@ int main(void) {
     RUN_TEST(test_receive_errors_are_told);
     RUN_TEST(test_error_interrupt_wakes_and_ends);
     RUN_TEST(test_two_devices_share_filters_and_nothing_else);
+    RUN_TEST(test_trouble_of_one_device_is_not_the_other_ones);
+    RUN_TEST(test_bus_held_dominant_within_our_frame_is_bus_off_and_recovers);
+    RUN_TEST(test_bus_held_dominant_while_listening_is_passive_only);
     return UNITY_END();
 }

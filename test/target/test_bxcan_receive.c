@@ -128,15 +128,42 @@ static void test_slow_release_shows_no_frame_twice(void) {
     TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
 }
 
-static void test_overrun_of_the_controller_is_counted_once(void) {
+static void assert_loss_is_told(void) {
+    iw_can_frame_t taken;
+    (void)memset(&taken, 0xA5, sizeof taken);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+    TEST_ASSERT_EQUAL_HEX32(IW_CAN_ERROR, taken.id);
+    TEST_ASSERT_EQUAL(IW_CAN_RECEIVED, taken.kind);
+    TEST_ASSERT_EQUAL(0, taken.dlc);
+}
+
+/// Interrupts are held off for five frames.
+static void overrun(void) {
     const model_frame_t frame = {.id = 256, .dlc = 4};
-    for (int i = 0; i < 5; i++) { // Interrupts held off for five frames.
+    for (int i = 0; i < 5; i++) {
         (void)bxcan_model_hear(model, &frame);
     }
     (void)iw_register_read(&rig[0].window.MSR);
+}
+
+static void test_overrun_of_the_controller_is_counted_once(void) {
+    overrun();
     TEST_ASSERT_EQUAL(1, driver->overruns);
     (void)rig_hear(0, 256, 4);
     TEST_ASSERT_EQUAL(1, driver->overruns);
+}
+
+static void test_overrun_is_told_once_and_before_what_came_with_it(void) {
+    iw_can_frame_t taken;
+    for (int round = 0; round < 2; round++) {
+        overrun();
+        assert_loss_is_told();
+        for (int i = 0; i < 3; i++) {
+            TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
+            TEST_ASSERT_EQUAL(256, taken.id);
+        }
+        TEST_ASSERT_EQUAL(0, iw_bxcan_receive(driver, &taken));
+    }
 }
 
 static void test_full_ring_loses_the_newest_and_counts(void) {
@@ -147,6 +174,7 @@ static void test_full_ring_loses_the_newest_and_counts(void) {
         (void)iw_register_read(&rig[0].window.MSR);
     }
     TEST_ASSERT_EQUAL(5, driver->lost);
+    assert_loss_is_told();
     for (uint32_t i = 0; i < IW_FRAME_RING_LENGTH; i++) {
         TEST_ASSERT_EQUAL(1, iw_bxcan_receive(driver, &taken));
         TEST_ASSERT_EQUAL(i, taken.data[0]);
@@ -223,6 +251,7 @@ int main(void) {
     RUN_TEST(test_foreign_setpoint_is_received_and_no_echo);
     RUN_TEST(test_slow_release_shows_no_frame_twice);
     RUN_TEST(test_overrun_of_the_controller_is_counted_once);
+    RUN_TEST(test_overrun_is_told_once_and_before_what_came_with_it);
     RUN_TEST(test_full_ring_loses_the_newest_and_counts);
     RUN_TEST(test_ring_goes_on_for_ever);
     RUN_TEST(test_filters_do_not_depend_on_what_was_set_before);

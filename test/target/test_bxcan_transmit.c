@@ -119,22 +119,22 @@ static void test_newer_frame_takes_the_place_of_the_waiting_one(void) {
     assert_on_bus(266, 2);
     assert_on_bus(298, 1);
     assert_nothing_waits();
-    assert_echo(266, 2); // One for each that was handed over ...
+    assert_echo(266, 1); // One for each that was handed over, with its own bytes ...
     assert_echo(266, 2); // ... once the newer is acknowledged.
     assert_echo(298, 1);
     assert_no_echo();
 }
 
-static void test_three_in_a_row_leave_one_frame_and_three_echoes(void) {
+static void test_third_frame_of_an_id_must_wait_and_changes_nothing(void) {
     (void)send(298, 1);
     (void)send(298, 2);
-    (void)send(298, 3);
-    assert_on_bus(298, 3);
+    TEST_ASSERT_EQUAL(0, send(298, 3));
+    assert_on_bus(298, 2);
     assert_nothing_waits();
-    for (int i = 0; i < 3; i++) {
-        assert_echo(298, 3);
-    }
+    assert_echo(298, 1);
+    assert_echo(298, 2);
     assert_no_echo();
+    TEST_ASSERT_EQUAL(1, send(298, 3));
 }
 
 /// The frame under way ends while the driver polls TSR.
@@ -187,7 +187,7 @@ static void test_old_frame_that_fails_while_being_replaced_never_comes(void) {
     assert_no_echo();
     assert_on_bus(266, 2);
     assert_nothing_waits();
-    assert_echo(266, 2);
+    assert_echo(266, 1);
     assert_echo(266, 2);
     assert_no_echo();
 }
@@ -205,6 +205,25 @@ static void test_frame_that_never_ends_is_waited_for_with_a_bound(void) {
     assert_on_bus(266, 3);
     assert_echo(266, 3);
     assert_no_echo();
+}
+
+/// ALST and TERR of an attempt stay readable after the abort of the mailbox: they are no echo, and no obstacle to the next frame.
+static void test_failed_attempts_before_an_abort_are_no_echo(void) {
+    const model_end_t ends[] = {MODEL_LOST_ARBITRATION, MODEL_BIT_ERROR, MODEL_NO_ACKNOWLEDGEMENT};
+    for (size_t i = 0; i < 3; i++) {
+        model_frame_t frame;
+        (void)send(266, 1);
+        const int mailbox = bxcan_model_offer(model, &frame);
+        bxcan_model_begin(model, mailbox);
+        bxcan_model_end(model, mailbox, ends[i]);
+        TEST_ASSERT_NOT_EQUAL(0, model->tsr & (0x0C0C0CU));
+        TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+        assert_no_echo();
+        TEST_ASSERT_EQUAL(1, send(266, 2));
+        assert_on_bus(266, 2);
+        assert_echo(266, 2);
+        assert_no_echo();
+    }
 }
 
 static void test_slow_abort_is_awaited(void) {
@@ -276,12 +295,13 @@ static void test_receive_of_a_stopped_device_is_broken(void) {
     TEST_ASSERT_LESS_THAN(0, send(266, 1));
 }
 
-/// Random hands-over, transmissions, failures, purges: an echo for each frame handed over, none without acknowledgement, and never
-/// an older mark after a newer one.
+/// Random hands-over, transmissions, failures, purges: an echo with the bytes of each frame handed over, none without acknowledgement, and
+/// never an older frame after a newer one.
 static void test_random_traffic_keeps_the_account(void) {
     uint32_t chance = 12345;
     uint8_t mark = 0;
     uint8_t newest_sent[2] = {0, 0};
+    uint8_t marks[2][2] = {{0, 0}, {0, 0}};
     int open[2] = {0, 0};
     for (int i = 0; i < 200000; i++) {
         model_frame_t frame;
@@ -292,8 +312,11 @@ static void test_random_traffic_keeps_the_account(void) {
         case 0:
         case 1:
             mark = (uint8_t)(mark % 100U + 1U);
-            open[side] += send(side == 0U ? 266U : 298U, mark) > 0 ? 1 : 0;
-            newest_sent[side] = mark;
+            if (send(side == 0U ? 266U : 298U, mark) > 0) {
+                TEST_ASSERT_LESS_THAN_MESSAGE(2, open[side], "a third frame is on its way");
+                marks[side][open[side]++] = mark;
+                newest_sent[side] = mark;
+            }
             break;
         case 2:
         case 3:
@@ -317,17 +340,14 @@ static void test_random_traffic_keeps_the_account(void) {
             break;
         }
         while (iw_bxcan_receive(driver, &echo) > 0) {
-            open[echo.id == 298U]--;
+            const bool right = echo.id == 298U;
+            TEST_ASSERT_GREATER_THAN_MESSAGE(0, open[right], "an echo too many");
+            TEST_ASSERT_EQUAL(marks[right][0], echo.data[0]);
+            marks[right][0] = marks[right][1];
+            open[right]--;
         }
-        TEST_ASSERT_GREATER_OR_EQUAL(0, open[0]);
-        TEST_ASSERT_GREATER_OR_EQUAL(0, open[1]);
         if (bxcan_model_offer(model, &frame) == MODEL_NONE) {
             TEST_ASSERT_EQUAL(0, open[0] + open[1]);
-        }
-        if (open[side] > 200) {
-            (void)iw_bxcan_purge(driver);
-            open[0] = 0;
-            open[1] = 0;
         }
     }
 }
@@ -340,10 +360,11 @@ int main(void) {
     RUN_TEST(test_echo_comes_only_with_the_acknowledgement);
     RUN_TEST(test_left_leaves_before_right_whatever_the_order);
     RUN_TEST(test_newer_frame_takes_the_place_of_the_waiting_one);
-    RUN_TEST(test_three_in_a_row_leave_one_frame_and_three_echoes);
+    RUN_TEST(test_third_frame_of_an_id_must_wait_and_changes_nothing);
     RUN_TEST(test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo);
     RUN_TEST(test_old_frame_that_fails_while_being_replaced_never_comes);
     RUN_TEST(test_frame_that_never_ends_is_waited_for_with_a_bound);
+    RUN_TEST(test_failed_attempts_before_an_abort_are_no_echo);
     RUN_TEST(test_slow_abort_is_awaited);
     RUN_TEST(test_fourth_frame_waits_for_a_free_mailbox);
     RUN_TEST(test_purge_takes_everything_back);

@@ -75,23 +75,44 @@ static void test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known
 }
 
 static void test_force_restore_fills_nothing_but_a_void(void) {
-    iw_force_restore(&rig.force, -1234);
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, -1234);
     assert_offset(IW_OFFSET_STORED, -1234);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
-    iw_force_restore(&rig.force, 77);
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 77);
     assert_offset(IW_OFFSET_STORED, 77);
     force_rig_hear(&rig, 0, true);
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
     force_rig_offset(&rig, 1);
-    iw_force_restore(&rig.force, 5);
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 5);
     assert_offset(IW_OFFSET_WHEEL, 100);
     setUp();
     force_rig_quiet(&rig, 40, 10);
-    iw_force_restore(&rig.force, 5);
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 5);
     assert_offset(IW_OFFSET_ESTIMATED, 100);
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
-    iw_force_restore(&rig.force, 5);
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 5);
     assert_offset(IW_OFFSET_OPERATOR, 100);
+}
+
+static void test_force_tare_of_an_earlier_run_yields_to_nothing_but_the_next(void) {
+    iw_force_restore(&rig.force, IW_OFFSET_OPERATOR, 5000);
+    assert_offset(IW_OFFSET_OPERATOR, 5000);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
+    force_rig_quiet(&rig, 40, 600);
+    force_rig_offset(&rig, 60);
+    iw_force_reopen(&rig.force, true);
+    force_rig_quiet(&rig, 40, 600);
+    assert_offset(IW_OFFSET_OPERATOR, 5000);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    assert_offset(IW_OFFSET_OPERATOR, 6000);
+    iw_force_restore(&rig.force, IW_OFFSET_OPERATOR, 5000);
+    assert_offset(IW_OFFSET_OPERATOR, 6000);
+}
+
+static void test_force_tare_of_an_earlier_run_replaces_what_this_run_has_found(void) {
+    force_rig_offset(&rig, 60);
+    iw_force_restore(&rig.force, IW_OFFSET_OPERATOR, 5000);
+    assert_offset(IW_OFFSET_OPERATOR, 5000);
 }
 
 static void test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators(void) {
@@ -103,7 +124,7 @@ static void test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators(v
     iw_force_reopen(&rig.force, true);
     assert_offset(IW_OFFSET_STORED, 5000);
     TEST_ASSERT_TRUE(rig.force.offset_us != IW_NEVER);
-    iw_force_restore(&rig.force, 5000);
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 5000);
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.force.offset_us);
     force_rig_quiet(&rig, 40, 510);
     assert_offset(IW_OFFSET_ESTIMATED, 5100);
@@ -301,6 +322,8 @@ int main(void) {
     RUN_TEST(test_force_wheels_offset_of_a_loaded_start_is_never_taken);
     RUN_TEST(test_force_wheels_offset_of_a_good_start_is_taken_when_that_is_known);
     RUN_TEST(test_force_restore_fills_nothing_but_a_void);
+    RUN_TEST(test_force_tare_of_an_earlier_run_yields_to_nothing_but_the_next);
+    RUN_TEST(test_force_tare_of_an_earlier_run_replaces_what_this_run_has_found);
     RUN_TEST(test_force_reboot_makes_old_offsets_stored_but_keeps_the_operators);
     RUN_TEST(test_force_reboot_under_load_is_seen_against_the_operators_offset);
     RUN_TEST(test_force_reboot_forgets_the_evidence_and_the_wheels_offset);

@@ -157,10 +157,10 @@ static void test_force_saturated_sample_contaminates(void) {
 }
 
 static void test_force_far_from_an_offset_trusted_before_is_a_load(void) {
-    static const int32_t stored_mN[] = {-20000, 20000, -20001, 20001};
+    static const int32_t stored_mN[] = {-5000, 5000, -5001, 5001};
     for (size_t i = 0; i < 4; i++) {
         begin(IW_LEFT, false);
-        iw_force_restore(&rig.force, stored_mN[i]);
+        iw_force_restore(&rig.force, IW_OFFSET_STORED, stored_mN[i]);
         force_rig_quiet(&rig, 40, 0);
         const bool loaded = i >= 2;
         TEST_ASSERT_EQUAL_INT(loaded ? IW_WINDOW_LOADED : IW_WINDOW_GOOD, rig.force.quality.window);

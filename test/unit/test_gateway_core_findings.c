@@ -35,7 +35,7 @@ static void put_offset(iw_side_t side, int16_t offset_dN) {
 
 /// Force frames of that value every 50 ms for that long.
 static void press_for(iw_side_t side, int16_t raw, iw_time_us_t for_us) {
-    const iw_proto_message_t message = {IW_PROTO_FORCE, side, {.force = {raw, 0}}};
+    const iw_proto_message_t message = {IW_PROTO_FORCE, side, {.force = {.force_raw = raw}}};
     const iw_time_us_t until_us = rig.now_us + for_us;
     while (rig.now_us < until_us) {
         put(&message);
@@ -121,6 +121,14 @@ static void test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_stil
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
 }
 
+static void test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels(void) {
+    gateway_rig_run(&rig, MS(20));
+    press_for(IW_LEFT, 1000, MS(1000));
+    gateway_rig_stall(&rig, MS(90));
+    press_for(IW_LEFT, 1000, MS(1200));
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
+}
+
 static void test_gateway_tare_makes_the_present_force_zero(void) {
     TEST_ASSERT_EQUAL_INT(IW_TARE_NO_FORCE, iw_gateway_tare(&rig.gateway, rig.now_us, IW_RIGHT));
     gateway_rig_run(&rig, MS(20));
@@ -173,6 +181,8 @@ static void test_gateway_driving_confirms_the_feedback_sign_once(void) {
     assert_entry(IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
     assert_entry(IW_LEDGER_FEEDBACK_SIGN_RIGHT, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
     assert_entry(IW_LEDGER_MOUNT_SIGN_LEFT, IW_LEDGER_ASSUMED, entry(IW_LEDGER_MOUNT_SIGN_LEFT)->evidence);
+    TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_LEDGER_FEEDBACK_SIGN_LEFT)->figure);
+    TEST_ASSERT_GREATER_THAN_INT32(100, entry(IW_LEDGER_FEEDBACK_SIGN_RIGHT)->figure); // As at a positive command.
     const uint32_t changes = rig.gateway.ledger.changes;
     (void)gateway_rig_cruise(&rig, 500, -500, MS(1500));
     TEST_ASSERT_EQUAL_UINT32(changes, rig.gateway.ledger.changes);
@@ -208,6 +218,7 @@ int main(void) {
     RUN_TEST(test_gateway_unclear_evidence_changes_no_entry);
     RUN_TEST(test_gateway_turning_wheel_contaminates_its_own_window_only);
     RUN_TEST(test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_still);
+    RUN_TEST(test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels);
     RUN_TEST(test_gateway_tare_makes_the_present_force_zero);
     RUN_TEST(test_gateway_rebooted_wheel_opens_its_window_anew);
     RUN_TEST(test_gateway_status_length_is_noted);

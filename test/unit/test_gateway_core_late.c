@@ -103,7 +103,89 @@ static void test_gateway_suspended_for_200_ms_stops(void) {
     iw_gateway_suspended(&rig.gateway, MS(200));
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT32(200, rig.gateway.permit.stop.detail);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_suspended_for_less_than_100_ms_drives_on(void) {
+    static const struct {
+        uint32_t for_us;
+        uint32_t late_steps;
+    } cases[] = {{20000, 0}, {20001, 1}, {99000, 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        gateway_rig_init(&rig);
+        gateway_rig_arm(&rig);
+        (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+        TEST_ASSERT_TRUE(rig.now_us < rig.wake_us); // The clock says that nothing is late.
+        iw_gateway_suspended(&rig.gateway, cases[i].for_us);
+        gateway_rig_step(&rig);
+        TEST_ASSERT_EQUAL_UINT32(cases[i].late_steps, rig.gateway.counters.late_steps);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    }
+}
+
+static void test_gateway_full_step_that_was_on_time_knows_when_its_frames_came(void) {
+    gateway_rig_run(&rig, MS(500));
+    rig.bus.flood = IW_GATEWAY_DRAIN_MAX + 10U;
+    gateway_rig_step(&rig);
+    TEST_ASSERT_TRUE(rig.gateway.backlog);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_FALSE(rig.gateway.stalled);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.late_steps);
+}
+
+static void test_gateway_backlog_of_a_late_step_is_no_second_late_step(void) {
+    gateway_rig_run(&rig, MS(500));
+    rig.bus.flood = 2U * IW_GATEWAY_DRAIN_MAX;
+    stall_by(MS(60));
+    gateway_rig_step(&rig);
+    TEST_ASSERT_TRUE(rig.gateway.stalled);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.late_steps);
+}
+
+static void expect_no_side(iw_cause_t cause) {
+    TEST_ASSERT_EQUAL_INT(cause, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
+}
+
+static void test_gateway_causes_that_are_not_a_wheels_name_none(void) {
+    gateway_rig_arm(&rig);
+    gateway_rig_press(&rig, true);
+    gateway_rig_step(&rig);
+    expect_no_side(IW_CAUSE_ESTOP_LINE);
+    gateway_rig_init(&rig);
+    gateway_rig_arm(&rig);
+    fake_bus_break(&rig.bus, IW_BUS_OFF);
+    gateway_rig_step(&rig);
+    expect_no_side(IW_CAUSE_BUS_DOWN);
+    gateway_rig_init(&rig);
+    gateway_rig_arm(&rig);
+    rig.bus.acknowledged = false;
+    gateway_rig_run(&rig, MS(200));
+    expect_no_side(IW_CAUSE_SEND_STALLED);
+    gateway_rig_init(&rig);
+    gateway_rig_arm(&rig);
+    stall_by(MS(600));
+    expect_no_side(IW_CAUSE_LOOP_HUNG);
+}
+
+static void test_gateway_lost_echo_is_purged_only_while_both_wheels_are_heard(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        gateway_rig_init(&rig);
+        gateway_rig_arm(&rig);
+        rig.bus.acknowledged = false;
+        rig.bus.purge_result = 0;
+        gateway_rig_run(&rig, MS(3000));
+        rig.wheel[side].mute = true;
+        gateway_rig_run(&rig, MS(200));
+        const uint32_t before = rig.bus.purges;
+        gateway_rig_run(&rig, MS(15000));
+        TEST_ASSERT_EQUAL_UINT32(before, rig.bus.purges);
+        rig.wheel[side].mute = false;
+        gateway_rig_run(&rig, MS(3000));
+        TEST_ASSERT_TRUE(rig.bus.purges > before);
+    }
 }
 
 /// What HOLDER sent at that time and the gateway sees only now.
@@ -149,6 +231,11 @@ int main(void) {
     RUN_TEST(test_gateway_arm_behind_a_zero_on_its_way_is_not_refused);
     RUN_TEST(test_gateway_suspended_in_motion_latches_and_begins_with_zero);
     RUN_TEST(test_gateway_suspended_for_200_ms_stops);
+    RUN_TEST(test_gateway_suspended_for_less_than_100_ms_drives_on);
+    RUN_TEST(test_gateway_full_step_that_was_on_time_knows_when_its_frames_came);
+    RUN_TEST(test_gateway_backlog_of_a_late_step_is_no_second_late_step);
+    RUN_TEST(test_gateway_causes_that_are_not_a_wheels_name_none);
+    RUN_TEST(test_gateway_lost_echo_is_purged_only_while_both_wheels_are_heard);
     RUN_TEST(test_gateway_drive_from_before_arm_is_stale);
     RUN_TEST(test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent);
     RUN_TEST(test_gateway_drive_that_waited_does_not_hide_a_later_one);

@@ -138,6 +138,11 @@ static void test_gateway_restarted_sends_zeros_then_listens(void) {
 static void test_gateway_restarted_gives_way_to_another_master(void) {
     gateway_rig_begin(&rig, true);
     gateway_rig_run(&rig, MS(10));
+    for (unsigned i = 0; i < 4; i++) {
+        gateway_rig_foreign(&rig, 298);
+        gateway_rig_step(&rig);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    }
     const uint32_t sent = rig.bus.sent;
     gateway_rig_foreign(&rig, 298);
     gateway_rig_step(&rig);

@@ -84,7 +84,8 @@ static void hurt(void) {
 static void random_request(void) {
     const int32_t choice = fixture_random_in(&chance, 0, 99);
     if (choice < 30) {
-        (void)gateway_rig_request_arm(&rig, any_client(), fixture_random_in(&chance, 0, 3) == 0);
+        const iw_client_t client = any_client(); // One after the other: the order of arguments is the compiler's.
+        (void)gateway_rig_request_arm(&rig, client, fixture_random_in(&chance, 0, 3) == 0);
     } else if (choice < 50) {
         (void)gateway_rig_reset(&rig);
     } else if (choice < 60) {
@@ -94,7 +95,9 @@ static void random_request(void) {
     } else if (choice < 66) {
         iw_gateway_estop(&rig.gateway, rig.now_us, any_client());
     } else {
-        (void)gateway_rig_drive(&rig, any_client(), any_speed(), any_speed());
+        const iw_client_t client = any_client();
+        const int32_t left_mm_s = any_speed();
+        (void)gateway_rig_drive(&rig, client, left_mm_s, any_speed());
     }
 }
 

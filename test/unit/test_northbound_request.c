@@ -90,6 +90,27 @@ static void test_request_id_of_another_kind_is_refused(void) {
             "{\"id\":\"aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa\",\"cmd\":\"why\"}");
 }
 
+static void test_request_confirm_takes_an_item_and_a_value_as_text_or_integer(void) {
+    accepted("{\"cmd\":\"confirm\",\"item\":\"wheel_radius\",\"value\":192}", GW_CMD_CONFIRM);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_WHEEL_RADIUS, request.item);
+    TEST_ASSERT_EQUAL_STRING("192", request.value);
+    accepted("{\"cmd\":\"confirm\",\"item\":\"gear_ratio\",\"value\":\"10/3\"}", GW_CMD_CONFIRM);
+    TEST_ASSERT_EQUAL_STRING("10/3", request.value);
+    accepted("{\"cmd\":\"confirm\",\"item\":\"dlc\"}", GW_CMD_CONFIRM);
+    TEST_ASSERT_EQUAL_STRING("", request.value);
+    accepted("{\"cmd\":\"confirm\",\"item\":\"dlc\",\"value\":-9223372036854775808}", GW_CMD_CONFIRM);
+    TEST_ASSERT_EQUAL_STRING("-9223372036854775808", request.value);
+    refused(GW_MISSING_FIELD, "{\"cmd\":\"confirm\"}");
+    refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"speed\"}");
+    refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":3}");
+    refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"value\":1.5}");
+    refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"value\":true}");
+    refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"value\":\"\"}");
+    refused(GW_BAD_VALUE,
+            "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"value\":\"1234567890123456789012345678901234567890\"}");
+    refused(GW_UNKNOWN_FIELD, "{\"cmd\":\"tare\",\"item\":\"dlc\"}");
+}
+
 static void test_request_not_one_object_is_bad_json(void) {
     static const char *const lines[] = {
         "",
@@ -281,6 +302,7 @@ int main(void) {
     RUN_TEST(test_request_drive_takes_numbers_as_sent);
     RUN_TEST(test_request_id_is_repeated_whatever_else_is_wrong);
     RUN_TEST(test_request_id_of_another_kind_is_refused);
+    RUN_TEST(test_request_confirm_takes_an_item_and_a_value_as_text_or_integer);
     RUN_TEST(test_request_not_one_object_is_bad_json);
     RUN_TEST(test_request_nul_byte_anywhere_is_bad_json);
     RUN_TEST(test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_texts_do_not_nest);

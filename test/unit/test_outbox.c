@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "iwheel/outbox.h"
+#include "iwheel/proto.h"
 #include "unity.h"
 
 #define POISON 0xA5
@@ -15,6 +16,33 @@ void setUp(void) {
 }
 
 void tearDown(void) {}
+
+static iw_can_frame_t setpoint(iw_side_t side, int16_t speed_mm_s, int16_t current_mA) {
+    const iw_proto_setpoint_t value = {speed_mm_s, current_mA, 7};
+    iw_can_frame_t frame;
+    (void)iw_proto_encode_setpoint(side, &value, IW_DLC_SETPOINT, &frame);
+    return frame;
+}
+
+static void sent_value(iw_side_t side, iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
+    const iw_can_frame_t frame = setpoint(side, speed_mm_s, current_mA);
+    iw_outbox_sent(&outbox, side, now_us, &frame, true);
+}
+
+static void echo_value(iw_side_t side, int16_t speed_mm_s, int16_t current_mA) {
+    const iw_can_frame_t frame = setpoint(side, speed_mm_s, current_mA);
+    iw_outbox_echo(&outbox, side, &frame);
+}
+
+/// The same bytes every time.
+static void sent(iw_side_t side, iw_time_us_t now_us, bool accepted) {
+    const iw_can_frame_t frame = setpoint(side, 0, 0);
+    iw_outbox_sent(&outbox, side, now_us, &frame, accepted);
+}
+
+static void echo(iw_side_t side) {
+    echo_value(side, 0, 0);
+}
 
 /// One wheel as the header describes it. Times are those of the walk, from 1; 0: none.
 typedef struct {
@@ -61,10 +89,10 @@ static void apply(iw_side_t side, event_t event, uint32_t now, model_t *models) 
     model_t *model = &models[side];
     const bool sends = event <= REFUSED;
     if (sends && model_may_send(model, event != SEND_NONZERO)) {
-        iw_outbox_sent(&outbox, side, now, event != REFUSED);
+        sent(side, now, event != REFUSED);
         model_sent(model, now, event != REFUSED);
     } else if (event == ECHO) {
-        iw_outbox_echo(&outbox, side);
+        echo(side);
         model_echo(model);
     } else if (event == CLEAR) {
         iw_outbox_clear(&outbox);
@@ -144,85 +172,120 @@ static void test_init_owes_nothing(void) {
 }
 
 static void test_may_send_zero_never_waits_for_an_echo(void) {
-    iw_outbox_sent(&outbox, IW_LEFT, 100, true);
+    sent(IW_LEFT, 100, true);
     TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, false));
     TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, true));
-    iw_outbox_sent(&outbox, IW_LEFT, 200, true);
+    sent(IW_LEFT, 200, true);
     TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, true));
     TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_RIGHT, false));
 }
 
 static void test_waiting_refused_frame_waits_from_the_first_refusal(void) {
-    iw_outbox_sent(&outbox, IW_RIGHT, 1000, false);
-    iw_outbox_sent(&outbox, IW_RIGHT, 2000, false);
+    sent(IW_RIGHT, 1000, false);
+    sent(IW_RIGHT, 2000, false);
     TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
-    iw_outbox_sent(&outbox, IW_RIGHT, 3000, true);
+    sent(IW_RIGHT, 3000, true);
     TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
-    iw_outbox_echo(&outbox, IW_RIGHT);
+    echo(IW_RIGHT);
     TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
 }
 
 static void test_rest_ends_the_waiting_of_what_was_only_refused(void) {
-    iw_outbox_sent(&outbox, IW_LEFT, 1000, false);
-    iw_outbox_sent(&outbox, IW_RIGHT, 1000, false);
+    sent(IW_LEFT, 1000, false);
+    sent(IW_RIGHT, 1000, false);
     iw_outbox_rest(&outbox);
     TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
     TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
 }
 
 static void test_rest_forgets_nothing_that_was_handed_over(void) {
-    iw_outbox_sent(&outbox, IW_LEFT, 1000, false);
-    iw_outbox_sent(&outbox, IW_LEFT, 2000, true);
-    iw_outbox_sent(&outbox, IW_RIGHT, 500, false);
+    sent(IW_LEFT, 1000, false);
+    sent(IW_LEFT, 2000, true);
+    sent(IW_RIGHT, 500, false);
     iw_outbox_rest(&outbox);
     TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
     TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, false));
-    iw_outbox_echo(&outbox, IW_LEFT);
+    echo(IW_LEFT);
     TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 1) == false);
-    iw_outbox_sent(&outbox, IW_RIGHT, 3000, true);
+    sent(IW_RIGHT, 3000, true);
     iw_outbox_rest(&outbox);
-    iw_outbox_echo(&outbox, IW_RIGHT);
+    echo(IW_RIGHT);
     TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 2000));
 }
 
 static void test_waiting_is_that_of_the_wheel_that_waits_longest(void) {
-    iw_outbox_sent(&outbox, IW_LEFT, 2000, true);
-    iw_outbox_sent(&outbox, IW_RIGHT, 1000, true);
+    sent(IW_LEFT, 2000, true);
+    sent(IW_RIGHT, 1000, true);
     TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
-    iw_outbox_echo(&outbox, IW_RIGHT);
+    echo(IW_RIGHT);
     TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 2000);
 }
 
 static void test_proven_since_needs_both_wheels(void) {
-    iw_outbox_sent(&outbox, IW_LEFT, 5000, true);
-    iw_outbox_sent(&outbox, IW_RIGHT, 5001, true);
-    iw_outbox_echo(&outbox, IW_LEFT);
+    sent(IW_LEFT, 5000, true);
+    sent(IW_RIGHT, 5001, true);
+    echo(IW_LEFT);
     TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 5000));
-    iw_outbox_echo(&outbox, IW_RIGHT);
+    echo(IW_RIGHT);
     TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 5000));
     TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 5001));
 }
 
 static void test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer(void) {
-    iw_outbox_sent(&outbox, IW_LEFT, 1000, true);
-    iw_outbox_sent(&outbox, IW_LEFT, 9000, true);
-    iw_outbox_sent(&outbox, IW_RIGHT, 9000, true);
-    iw_outbox_echo(&outbox, IW_RIGHT);
-    iw_outbox_echo(&outbox, IW_LEFT);
+    sent(IW_LEFT, 1000, true);
+    sent(IW_LEFT, 9000, true);
+    sent(IW_RIGHT, 9000, true);
+    echo(IW_RIGHT);
+    echo(IW_LEFT);
     TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 1001));
-    iw_outbox_echo(&outbox, IW_LEFT);
+    echo(IW_LEFT);
     TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 9000));
 }
 
 static void test_echo_after_clear_is_stray_and_proves_nothing(void) {
-    iw_outbox_sent(&outbox, IW_LEFT, 1000, true);
-    iw_outbox_sent(&outbox, IW_RIGHT, 1000, true);
+    sent(IW_LEFT, 1000, true);
+    sent(IW_RIGHT, 1000, true);
     iw_outbox_clear(&outbox);
-    iw_outbox_echo(&outbox, IW_LEFT);
-    iw_outbox_echo(&outbox, IW_RIGHT);
+    echo(IW_LEFT);
+    echo(IW_RIGHT);
     TEST_ASSERT_EQUAL_UINT32(2, outbox.stray);
     TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 1000));
     TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+}
+
+static void test_echo_from_before_a_clear_does_not_settle_what_was_sent_after_it(void) {
+    sent_value(IW_LEFT, 1000, 0, 2000);
+    iw_outbox_clear(&outbox);
+    sent_value(IW_LEFT, 2000, 300, 2000);
+    echo_value(IW_LEFT, 0, 2000);
+    TEST_ASSERT_EQUAL_UINT32(1, outbox.stray);
+    TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 2000);
+    echo_value(IW_LEFT, 300, 2000);
+    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+}
+
+static void test_echo_that_differs_in_one_byte_is_stray(void) {
+    const int16_t others[][2] = {
+        {0x0201, 0x0304}, {0x0102, 0x0304}, {0x0203, 0x0304}, {0x0202, 0x0305}, {0x0202, 0x0404}};
+    sent_value(IW_RIGHT, 1000, 0x0202, 0x0304);
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        echo_value(IW_RIGHT, others[i][0], others[i][1]);
+        TEST_ASSERT_EQUAL_UINT32(i + 1U, outbox.stray);
+    }
+    echo_value(IW_RIGHT, 0x0202, 0x0304);
+    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_RIGHT, false));
+}
+
+static void test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo(void) {
+    sent_value(IW_LEFT, 1000, 300, 2000);
+    sent_value(IW_LEFT, 2000, 0, 2000);
+    echo_value(IW_LEFT, 300, 2000);
+    echo_value(IW_LEFT, 300, 2000);
+    TEST_ASSERT_EQUAL_UINT32(1, outbox.stray);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 2000);
+    echo_value(IW_LEFT, 0, 2000);
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
 }
 
 int main(void) {
@@ -236,6 +299,9 @@ int main(void) {
     RUN_TEST(test_proven_since_needs_both_wheels);
     RUN_TEST(test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer);
     RUN_TEST(test_echo_after_clear_is_stray_and_proves_nothing);
+    RUN_TEST(test_echo_from_before_a_clear_does_not_settle_what_was_sent_after_it);
+    RUN_TEST(test_echo_that_differs_in_one_byte_is_stray);
+    RUN_TEST(test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo);
     RUN_TEST(test_every_sequence_of_eight_events_of_one_wheel_agrees_with_the_model);
     RUN_TEST(test_every_sequence_of_six_events_of_both_wheels_agrees_with_the_model);
     return UNITY_END();

@@ -233,7 +233,8 @@ static void test_setpoint_gap_stays_within_a_period_whatever_is_commanded(void) 
         const iw_time_us_t input_us = now_us + (iw_time_us_t)fixture_random_in(&random, 1, 30000);
         if (input_us < next_us) {
             now_us = input_us;
-            command_at(now_us, (int16_t)fixture_random_in(&random, -9, 9), (int16_t)fixture_random_in(&random, -9, 9));
+            const int16_t left_mm_s = (int16_t)fixture_random_in(&random, -9, 9);
+            command_at(now_us, left_mm_s, (int16_t)fixture_random_in(&random, -9, 9));
             continue;
         }
         now_us = next_us;

@@ -309,6 +309,30 @@ static void test_motion_draws_more_while_it_accelerates(void) {
     TEST_ASSERT_EQUAL_UINT32(150U, sim_motion_draw_mA(&motion));
 }
 
+static void test_motion_hand_turns_the_wheel_over_exactly_that_way_at_its_real_radius(void) {
+    config.radius_mm = 160U;
+    restart();
+    sim_motion_push(&motion, START_US, 3000);
+    sim_motion_advance(&motion, START_US + 1000U * MS);
+    TEST_ASSERT_EQUAL_INT32(1500000, motion.speed_um_s);
+    sim_motion_advance(&motion, START_US + 10000U * MS);
+    TEST_ASSERT_EQUAL_INT32(0, motion.speed_um_s);
+    TEST_ASSERT_EQUAL_INT64(3000, sim_motion_true_mm(&motion));
+    TEST_ASSERT_EQUAL_UINT32(179U, motion.ticks); // 3 m are 2.984 turns of a wheel of 160 mm.
+    sim_motion_push(&motion, START_US + 10000U * MS, -3000);
+    sim_motion_advance(&motion, START_US + 20000U * MS);
+    TEST_ASSERT_EQUAL_INT64(0, sim_motion_true_mm(&motion));
+}
+
+static void test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest(void) {
+    TEST_ASSERT_TRUE(tell(START_US, 500, 2000));
+    sim_motion_push(&motion, START_US, -100);
+    sim_motion_advance(&motion, START_US + 40U * MS);
+    TEST_ASSERT_EQUAL_INT32(-1500000, motion.speed_um_s);
+    (void)drive(START_US + 200U * MS, 1000U, 500, 2000);
+    TEST_ASSERT_INT32_WITHIN(5000, 500000, motion.speed_um_s);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_random_same_seed_gives_same_numbers_and_another_seed_others);
@@ -339,5 +363,7 @@ int main(void) {
     RUN_TEST(test_motion_larger_wheel_really_goes_faster);
     RUN_TEST(test_motion_release_forgets_the_setpoint);
     RUN_TEST(test_motion_draws_more_while_it_accelerates);
+    RUN_TEST(test_motion_hand_turns_the_wheel_over_exactly_that_way_at_its_real_radius);
+    RUN_TEST(test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest);
     return UNITY_END();
 }

@@ -76,6 +76,38 @@ static void test_world_load_of_telemetry_alone_is_five_to_six_percent(void) {
     TEST_ASSERT_UINT64_WITHIN(50000U, 560000U, world.bus.busy_us - before_us);
 }
 
+/// Sleeps and steps like a program would; how often it woke up. Keeps every delivery in `history`.
+static uint32_t sleep_until(iw_time_us_t until_us, iw_time_us_t (*wake_us)(const sim_world_t *)) {
+    uint32_t wakes = 0U;
+    for (iw_time_us_t now_us = wake_us(&world); now_us <= until_us; now_us = wake_us(&world)) {
+        sim_delivery_t delivery;
+        wakes += 1U;
+        while (sim_world_step(&world, now_us, &delivery)) {
+            TEST_ASSERT_LESS_THAN_UINT32(HISTORY, count);
+            TEST_ASSERT_TRUE(delivery.end_us <= now_us && now_us - delivery.end_us <= SIM_WORLD_FRAME_US);
+            history[count++] = delivery;
+        }
+    }
+    return wakes;
+}
+
+static void test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_wakes(void) {
+    static sim_delivery_t every_step[HISTORY];
+    uint32_t const wakes = sleep_until(START_US + 3U * SECOND, sim_world_next_us);
+    uint32_t const told = count;
+    memcpy(every_step, history, sizeof history);
+    setUp();
+    uint32_t const fewer = sleep_until(START_US + 3U * SECOND + SIM_WORLD_FRAME_US, sim_world_wake_us);
+    TEST_ASSERT_GREATER_THAN_UINT32(1000U, told);
+    TEST_ASSERT_UINT32_WITHIN(2U, told, count);
+    for (uint32_t i = 0U; i < told; ++i) {
+        TEST_ASSERT_EQUAL_UINT64(every_step[i].end_us, history[i].end_us);
+        TEST_ASSERT_EQUAL_UINT32(every_step[i].frame.id, history[i].frame.id);
+        TEST_ASSERT_EQUAL_UINT8_ARRAY(every_step[i].frame.data, history[i].frame.data, IW_CAN_DATA_MAX);
+    }
+    TEST_ASSERT_LESS_THAN_UINT32(wakes * 6U / 10U, fewer);
+}
+
 static void test_world_client_gets_its_frames_back_within_a_millisecond(void) {
     uint8_t const port = sim_world_connect(&world);
     (void)drive(port, START_US + SECOND, START_US + 2U * SECOND, 300);
@@ -324,6 +356,7 @@ static void test_world_same_seed_and_times_give_the_same_bytes(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_world_load_of_telemetry_alone_is_five_to_six_percent);
+    RUN_TEST(test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_wakes);
     RUN_TEST(test_world_client_gets_its_frames_back_within_a_millisecond);
     RUN_TEST(test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_returns);
     RUN_TEST(test_world_queue_of_one_keeps_only_the_controllers_frame);

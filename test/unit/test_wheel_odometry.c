@@ -29,7 +29,8 @@ static void hear_ticks(int32_t ticks) {
 }
 
 static void hear_speed(int16_t rpm) {
-    const iw_proto_message_t message = {IW_PROTO_SPEED, wheel.side, {.speed = {rpm, -1}}};
+    const iw_proto_message_t message = {
+        IW_PROTO_SPEED, wheel.side, {.speed = {.speed_rpm = rpm, .acceleration_raw = -1}}};
     iw_wheel_hear(&wheel, now_us, &message, true);
 }
 

@@ -25,7 +25,7 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void hear_as(int16_t rpm, bool fresh) {
-    const iw_proto_message_t message = {IW_PROTO_SPEED, IW_LEFT, {.speed = {rpm, 0}}};
+    const iw_proto_message_t message = {IW_PROTO_SPEED, IW_LEFT, {.speed = {.speed_rpm = rpm}}};
     iw_wheel_hear(&wheel, now_us, &message, fresh);
 }
 

@@ -8,20 +8,23 @@ the wheels' silence or by a full queue; how many old frames come out afterwards 
 import time
 
 import netdev
-from catalogue import kernel_test
+from catalogue import add, kernel_test
 from client import Streamer
 from fake_slcan import DEPTH
 from harness import now_us
 from judge_log import LEFT, RIGHT
 from kernel_rig import SlcanRig
+from scenario import REGISTRY
+from scenarios import bus_states
 from scenarios.bus_faults import wait_reset
+from scenarios.process import driving
 
-from .interface import back_to_driving, driving, fault, lose_interface, stale_after
+from .interface import back_to_driving, fault, lose_interface, stale_after
 
 TTY_FRAMES = 40  # what a stalled pty, the driver and the queue hold at most, per measurement and with room
 
 
-@kernel_test("nominal drive through an adapter", "adapter", 0, SlcanRig)
+@kernel_test("nominal drive through an adapter", "adapter", 0, SlcanRig, pace=1)
 def slcan_nominal(t):
     rig, client, stream = driving(t, speed=400)
     status = client.request("status")
@@ -33,82 +36,28 @@ def slcan_nominal(t):
     t.judge(rig)
 
 
-@kernel_test("bus-off in motion: stop, latched, reported; link restarted: reset, drives again", "adapter", 16, SlcanRig)
-def row16_bus_off(t):
-    rig, client, stream = driving(t)
-    observer = rig.client("observer")
-    observer.request("watch", topics=["bus", "stop"])
-    begin_us = fault(rig, lambda: rig.adapter.tell("bus_off"), 30)
-    time.sleep(0.3)
-    stream.stop()
-    why = t.stopped_by(client, "bus_down")
-    t.check(why["detail"] == 1, f"detail 1 is bus-off, it is {why['detail']}")
-    t.measure("stop_ms", (why["at_us"] - begin_us) / 1000)
-    t.check(client.request("status")["bus"]["state"] == "bus_off", f"bus {client.request('status')['bus']}")
-    t.check(not client.request("reset")["ok"], "no reset while bus-off")
-    t.check(any(e["event"] == "bus" and e["state"] == "bus_off" for e in observer.collect(0.1)), "the event comes")
-    t.check("bus-off" in rig.gateway.text().lower(), f"the log says bus-off: {rig.gateway.text()[-300:]}")
+def restart(rig):
     netdev.down(rig.adapter.interface)
     netdev.up(rig.adapter.interface)
-    back_us = now_us()
-    rig.note("alive")
-    back_to_driving(t, rig, client)
-    stale_after(t, rig, back_us)
-    t.judge(rig)
 
 
-@kernel_test("bus-off while listening: an event, arm refused, nothing sent", "adapter", 16, SlcanRig)
-def row16_bus_off_listening(t):
-    rig, client = t.running()
-    rig.adapter.tell("bus_off")
-    time.sleep(0.2)
-    t.expect(client.arm(), "bus_down")
-    t.check(client.request("status")["state"] == "listening", "not latched")
-    netdev.down(rig.adapter.interface)
-    netdev.up(rig.adapter.interface)
-    time.sleep(1.2)
-    t.check(not rig.bus.setpoints(), "nothing was sent")
-    t.arm(client)
-    t.drive_for(client, 200, 200, 0.5)
-    t.judge(rig)
+def tell(state):
+    return lambda rig: rig.adapter.tell(state)
 
 
-@kernel_test("error passive in motion: shown, it drives on; active again: shown", "adapter", 16, SlcanRig)
-def row16_error_passive(t):
-    rig, client, stream = driving(t)
-    rig.adapter.tell("passive")
-    time.sleep(0.3)
-    t.check(client.request("status")["bus"]["state"] == "passive", f"bus {client.request('status')['bus']}")
-    t.check(client.request("status")["state"] == "armed", "it drives on")
-    rig.adapter.tell("active")
-    time.sleep(0.3)
-    t.check(client.request("status")["bus"]["state"] == "active", f"bus {client.request('status')['bus']}")
-    t.check(stream.stop() is None, "the stream was not refused")
-    client.request("stop")
-    time.sleep(0.4)
-    t.judge(rig)
+def burst(rig, number):
+    rig.adapter.errors(5, b"sc")
+    rig.adapter.tell("passive" if number % 2 else "warning")
 
 
-@kernel_test("a flood of error frames: it drives on, the log is rate-limited", "adapter", 16, SlcanRig)
-def row16_error_flood(t):
-    rig, client, stream = driving(t)
-    lines = len(rig.gateway.text().splitlines())
-    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
-    for number in range(400):
-        rig.adapter.errors(5, b"sc")
-        rig.adapter.tell("passive" if number % 2 else "warning")
-        time.sleep(0.005)
-    percent = 100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
-    rig.adapter.tell("active")
-    time.sleep(0.2)
-    more = len(rig.gateway.text().splitlines()) - lines
-    t.check(more <= 40, f"{more} lines of log for 2400 error frames in 2 s")
-    t.check(client.request("status")["state"] == "armed", f"it drives on: {client.request('why').get('sentence')}")
-    t.check(stream.stop() is None, "the stream was not refused")
-    t.figure(f"{more} lines of log, {percent:.0f} % CPU")
-    client.request("stop")
-    time.sleep(0.4)
-    t.judge(rig)
+ADAPTER_STATES = (
+    (bus_states.row16_bus_off, lambda t: bus_states.bus_off(t, tell("bus_off"), restart)),
+    (bus_states.row16_bus_off_listening, lambda t: bus_states.bus_off_listening(t, tell("bus_off"), restart)),
+    (bus_states.row16_error_passive, lambda t: bus_states.error_passive(t, tell("passive"), tell("active"))),
+    (bus_states.row16_error_flood, lambda t: bus_states.error_flood(t, burst, tell("active"))),
+)
+for there, here in ADAPTER_STATES:  # what the local bus's simulator does, done by the adapter
+    add(there.__name__, REGISTRY[there.__name__][0], here, groups="adapter", row=16, rig=SlcanRig)
 
 
 def stalled(t, seconds, setup=None):

@@ -18,11 +18,14 @@ ON_VCAN = (
     "force_offset_and_tare",
     "row01_client_killed",
     "row02_client_frozen",
+    "row03_client_never_reads",
     "row04_two_clients",
     "takeover_at_rest",
     "row06_reconnect_moves_nothing",
     "row07_stale_command",
     "lease_is_exact",
+    "row08_endless_lines",
+    "row09_odd_json",
     "row10_out_of_range",
     "software_estop",
     "reset_refusals",
@@ -36,30 +39,58 @@ ON_VCAN = (
     "row22_overspeed",
     "row22_blocked",
     "row23_wrong_unit",
+    "row23_extremes",
+    "row23_late_start",
+    "row23_loaded_start",
+    "row23_loaded_start_unseen",
+    "row24_stopped_70_ms",
+    "row24_stopped_150_ms",
+    "row24_stopped_250_ms",
+    "row24_stopped_450_ms",
+    "row24_stopped_700_ms",
+    "row24_stopped_1500_ms",
+    "row24_stopped_3000_ms",
+    "row24_suspended",
+    "trap12_odometry_jump",
     "trap07_reboot_while_driving",
     "row25_killed",
     "row25_aborted",
     "row25_restart_beside_other_master",
     "row25_sigterm",
     "row25_sigint",
+    "row26_stuck_clients",
+    "row26_stuck_frames",
+    "row27_stderr_blocked",
+    "row28_socket_path",
+    "row29_type_not_set",
+    "no_estop_line",
     "listen_only",
 )
 ON_ADAPTER = ("nominal_drive_and_turn", "row01_client_killed", "row22_left_silent", "row25_killed", "row25_sigterm")
-REAL_TIME = ("nominal_drive_and_turn", "row01_client_killed", "row02_client_frozen", "row25_killed", "row25_sigterm")
+REAL_TIME = ("nominal_drive_and_turn", "row01_client_killed", "row25_killed")
+REAL_TIME_FULL = ("row02_client_frozen", "row24_stopped_250_ms", "row24_stopped_700_ms", "row25_sigterm", "row27_stderr_blocked")
+AS_DOCUMENTED = ("nominal_drive_and_turn", "force_offset_and_tare", "row23_")  # telemetry at its full rate
+NEVER_WAIT = ("row05_many_observers", "row05_out_of_descriptors")  # in virtual time these would never end
 
 
 def row_of(name):
     return int(name[3:5]) if name.startswith("row") else 0
 
 
+def register_one(prefix, name, groups, rig, more=""):
+    title, _, function = REGISTRY[name]
+    fields = {"pace": 1} if name.startswith(AS_DOCUMENTED) else {}
+    add(prefix + name, title + more, function, groups=groups, row=row_of(name), rig=rig, **fields)
+
+
 def register():
     for name in ON_VCAN:
-        title, _, function = REGISTRY[name]
-        groups = "alike realtime" if name in REAL_TIME else "alike"
-        add(f"vcan_{name}", title, function, groups=groups, row=row_of(name), rig=VcanRig)
+        extra = " realtime" if name in REAL_TIME else " realtime-full" if name in REAL_TIME_FULL else ""
+        register_one("vcan_", name, "alike" + extra, VcanRig)
+    for name in NEVER_WAIT:
+        register_one("vcan_", name, "realtime", VcanRig)
     for name in ON_ADAPTER:
-        title, _, function = REGISTRY[name]
-        add(f"slcan_{name}", f"{title}, through an adapter", function, groups="alike", row=row_of(name), rig=SlcanRig)
+        register_one("slcan_", name, "alike", SlcanRig, ", through an adapter")
 
 
 register()

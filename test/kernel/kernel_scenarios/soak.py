@@ -14,7 +14,8 @@ from judge import Judge
 from judge_log import LEFT, RIGHT, percentile
 from kernel_rig import ESTOP_US, RAW_ESTOP_US
 
-HOURS, HOURS_FULL = 1, 24
+from .host import step_clock
+
 SETTLE_EPISODES = 40  # memory is compared from here on: every kind of fault has been seen, every page touched
 MEMORY_kB = 64
 SLOW = "10"  # speed frames every 40 ms instead of 4, while idle and in nine episodes of ten; as documented in the tenth
@@ -152,8 +153,7 @@ class Soak:
         self.rig.note("alive")
 
     def fault_wall_clock(self):
-        step_ns = self.chance.randrange(-3600, 3600) * 10**9
-        time.clock_settime_ns(time.CLOCK_REALTIME, time.clock_gettime_ns(time.CLOCK_REALTIME) + step_ns)
+        step_clock(self.rig, self.chance.randrange(-3600, 3600) * 10**9)
         self.drive(0.5)
         self.client.request("stop")
 
@@ -207,7 +207,11 @@ class Soak:
         for found in judge.judge()[:5]:
             self.t.failures.append([f"{self.where()}: {found.rule}: {found.text}", "rule", found.t_us])
         self.gap_us = max(self.gap_us, judge.gap_max_us)
-        self.latencies += [self.t.after_edge(self.rig, judge, *pair) for pair in judge.estop_latencies]
+        latencies = [self.t.after_edge(self.rig, judge, *pair) for pair in judge.estop_latencies]
+        for at_us, latency_us in latencies:
+            text = f"{self.where()}: {latency_us / 1000:.2f} ms from the e-stop to the zero pair"
+            self.t.check(latency_us <= ESTOP_US, text, at_us=at_us)
+        self.latencies += latencies
         self.rig.edges.clear()
         if not self.t.failures:  # else they are shown
             del self.rig.bus.frames[: len(frames)]
@@ -227,7 +231,7 @@ class Soak:
 def soak(t):
     rig, first = t.running()
     first.close()
-    hours = HOURS_FULL if t.plan["full"] else HOURS
+    hours = t.plan["hours"]
     run = Soak(t, rig, t.plan["seed"])
     begin = time.monotonic()
     while time.monotonic() - begin < hours * 3600 and run.one():

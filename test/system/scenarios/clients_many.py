@@ -11,6 +11,8 @@ import time
 from client import Streamer
 from scenario import scenario
 
+from .bus_faults import wait_reset
+
 
 def connect(path):
     """Waits while the backlog is full."""
@@ -117,4 +119,49 @@ def row05_out_of_descriptors(t):
     t.expect(late.request("hello"))
     t.check(os.path.exists(rig.path("gateway.sock")), "the socket is still there")
     time.sleep(0.4)
+    t.judge(rig)
+
+
+@scenario("sixty observers that ask and watch without end: the e-stop does not wait for them", 14)
+def row05_sixty_observers(t):
+    rig = t.rig({"northbound": {"max_clients": 64}})
+    rig.start_gateway()
+    owner = rig.client("owner")
+    crowd = [connect(rig.path("gateway.sock")) for _ in range(60)]
+    over = threading.Event()
+
+    def observe():
+        for sock in crowd:
+            sock.setblocking(False)
+            sock.sendall(b'{"cmd":"watch","topics":["state","force"],"rate_hz":100}\n')
+        while not over.is_set():
+            readable, writable, _ = select.select(crowd, crowd, [], 0.1)
+            for sock in writable[::7]:
+                try:
+                    sock.send(b'{"cmd":"status"}\n')
+                except OSError:
+                    pass
+            for sock in readable:
+                try:
+                    sock.recv(1 << 20)
+                except OSError:
+                    pass
+
+    thread = threading.Thread(target=observe)
+    thread.start()
+    try:
+        for _ in range(6):
+            t.arm(owner)
+            stream = Streamer(owner, 300, 300)
+            time.sleep(0.5)
+            rig.press()
+            time.sleep(0.3)
+            stream.stop()
+            rig.release()
+            wait_reset(t, owner)
+    finally:
+        over.set()
+        thread.join()
+    for sock in crowd:
+        sock.close()
     t.judge(rig)

@@ -120,3 +120,78 @@ def row23_wrong_unit(t):
     t.arm(client)
     t.drive_for(client, 100, 100, 0.5)
     t.judge(rig)
+
+
+def force_of(client, side):
+    return client.request("status")[side]
+
+
+@scenario("force at its extremes: saturated, no value; valid again afterwards", 8)
+def row23_extremes(t):
+    rig, client = t.running()
+    ready = rig.wait_status(client, lambda s: all(s[side]["force_validity"] == "valid" for side in ("left", "right")), 6)
+    t.check(ready, "valid at first")
+    for raw in (-32768, 32767):
+        rig.sim.ask(f"raw both {raw}")
+        time.sleep(0.3)
+        for side in ("left", "right"):
+            force = force_of(client, side)
+            t.check(
+                force["force_validity"] == "saturated" and force["saturated"]["force"] and force["force_net_mN"] is None,
+                f"{side} {raw}: {force['force_validity']}, net {force['force_net_mN']} mN",
+            )
+            t.check(force["force_raw"] == raw, f"{side}: the raw count is shown, {force['force_raw']}")
+    rig.sim.ask("raw both auto")
+    time.sleep(0.3)
+    t.check(all(force_of(client, side)["force_validity"] == "valid" for side in ("left", "right")), "valid again")
+    t.arm(client)
+    t.drive_for(client, 100, 100, 0.5)
+    t.judge(rig)
+
+
+@scenario("gateway started when the wheels no longer tell their offset: own estimate, and said so", 9)
+def row23_late_start(t):
+    rig = t.rig(sim_args=("--uptime", "100"))
+    rig.start_gateway()
+    client = rig.client()
+    status = rig.wait_status(client, lambda s: s["left"]["offset_provenance"] != "none", 6)
+    t.check(status, f"not waiting for ever: {force_of(client, 'left')['offset_provenance']}")
+    for side in ("left", "right"):
+        force = force_of(client, side)
+        t.check(force["offset_provenance"] == "estimated", f"{side}: offset {force['offset_provenance']}")
+        t.check(abs(force["force_net_mN"]) < 3000, f"{side} without load: {force['force_net_mN']} mN")
+    t.arm(client)  # speed control never waits for an offset
+    t.drive_for(client, 100, 100, 0.5)
+    t.judge(rig)
+
+
+def loaded_start(t, ticks):
+    """The left wheel restarts with 100 N on its shaft, and learns a wrong offset. Net force, or None."""
+    rig, client = t.running()
+    ready = rig.wait_status(client, lambda s: s["left"]["offset_provenance"] == "wheel", 6)
+    t.check(ready and abs(ready["left"]["force_net_mN"]) < 3000, "a good offset at first")
+    rig.sim.ask(f"ticks left {ticks}")
+    time.sleep(0.2)
+    rig.sim.ask("load left 100")
+    time.sleep(0.3)
+    rig.sim.ask("reboot left")
+    time.sleep(4.5)
+    force = force_of(client, "left")
+    t.figure(f"{force['offset_provenance']}, window {force['offset_window']}, {force['force_validity']}")
+    net = force["force_net_mN"]
+    t.check(net is None or 90_000 <= net <= 110_000, f"100 N on the shaft show as {net} mN")
+    t.judge(rig, moves=False)
+    return force
+
+
+@scenario("a wheel restarts under load, seen by its odometry: its new offset is not taken", 9)
+def row23_loaded_start(t):
+    force = loaded_start(t, 1000)
+    t.check(force["offset_window"] in ("loaded", "noisy", "drift"), f"the window is contaminated: {force['offset_window']}")
+    t.check(force["offset_provenance"] != "wheel", f"the wheel's new offset is not taken: {force['offset_provenance']}")
+
+
+@scenario("a wheel restarts under load in a blink that nothing shows: its new offset contradicts, no value", 9)
+def row23_loaded_start_unseen(t):
+    force = loaded_start(t, 0)
+    t.check(force["force_validity"] != "valid", f"flagged: {force['force_validity']}, net {force['force_net_mN']} mN")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The two boards: which peripheral is where, and what is wired to the pins."""
+"""The boards: which peripheral is where, and what is wired to the pins."""
 from unicorn import arm_const as arm
 
 from . import chip
@@ -11,7 +11,7 @@ IRQ_EXTI0, IRQ_TRANSMIT, IRQ_RECEIVE, IRQ_ERROR = 6, 19, 20, 22
 
 
 class Board:
-    """What both have in common. `blocks`: address of a block -> (name, its clock: offset in RCC and bit, or None)."""
+    """What all have in common. `blocks`: address of a block -> (name, its clock: offset in RCC and bit, or None)."""
 
     can_address = 0x40006400
 
@@ -24,6 +24,8 @@ class Board:
         machine.can_listens = False # Clocked and on its pins.
         machine.lamp = Lamp(self.lamp_port, self.lamp_pin, self.lamp_lit)
         machine.port_a.drive(0, 0) # The e-stop's contact is closed.
+        self.machine = machine
+        self.devices = {block: (name, clock, *self.accessors(name)) for block, (name, clock) in self.blocks.items()}
 
     def reset(self, machine):
         for part in (machine.clocks, machine.port_a, machine.port_c, machine.exti, machine.watchdog, machine.can):
@@ -40,61 +42,66 @@ class Board:
                 if lines >> bit & 1:
                     yield irq
 
-    def connect_can(self, machine):
+    def connect_can(self):
+        machine = self.machine
         machine.can_listens = machine.port_a.is_can_pair(11, 12) and machine.clocks.is_enabled(*self.blocks[self.can_address][1])
 
-    def find(self, machine, block, offset):
-        name, clock = self.blocks.get(block, (None, None))
-        machine.expect(name is not None, f"0x{block + offset:08X} was accessed, which is not modelled")
-        if clock is not None and not machine.clocks.is_enabled(*clock):
-            machine.expect(False, f"{name} was accessed without its clock")
-            return None
-        return name
-
-    def read(self, machine, block, offset):
-        name = self.find(machine, block, offset)
-        if name == "rcc":
-            return machine.clocks.read(offset, machine.now_ns)
-        if name == "flash":
-            return machine.clocks.acr
+    def accessors(self, name):
+        """How a device is read and written, each a function of the offset (and the value)."""
+        machine = self.machine
+        clocks, watchdog = machine.clocks, machine.watchdog
         if name in ("port_a", "port_c"):
-            return getattr(machine, name).read(offset)
-        if name == "exti":
-            return machine.exti.registers[offset]
-        if name == "selection":
-            return machine.exti.selection
-        if name == "watchdog":
-            return machine.watchdog.read(offset, machine.now_ns)
-        return machine.can.read(offset) if name == "can" else 0
+            port = getattr(machine, name)
+            return port.read, lambda offset, value: self.write_port(port, offset, value)
+        return {
+            "rcc": (lambda offset: clocks.read(offset, machine.now_ns), self.write_clocks),
+            "flash": (lambda offset: clocks.acr, lambda offset, value: setattr(clocks, "acr", value)),
+            "exti": (lambda offset: machine.exti.registers[offset], machine.exti.write),
+            "selection": (lambda offset: machine.exti.selection, self.write_selection),
+            "watchdog": (lambda offset: watchdog.read(offset, machine.now_ns),
+                         lambda offset, value: watchdog.write(offset, value, machine.now_ns)),
+            "can": (machine.can.read, machine.can.write),
+        }[name]
 
-    def write(self, machine, block, offset, value):
-        name = self.find(machine, block, offset)
-        if name == "rcc":
-            machine.clocks.write(offset, value, machine.now_ns)
-        elif name == "flash":
-            machine.clocks.acr = value
-        elif name in ("port_a", "port_c"):
-            getattr(machine, name).write(offset, value)
-        elif name == "exti":
-            machine.exti.write(offset, value)
-        elif name == "selection":
-            machine.expect(offset == 0x8, "another EXTI selection than the first was written")
-            machine.exti.selection = value
-        elif name == "watchdog":
-            machine.watchdog.write(offset, value, machine.now_ns)
-        elif name == "can":
-            machine.can.write(offset, value)
-        if name in ("rcc", "port_a"):
-            self.connect_can(machine)
-        if name in ("port_a", "port_c"):
-            machine.look_at_pins()
-        elif name != "watchdog":
-            machine.clock.is_asked_to_stop = 1 # Other interrupts may come now.
+    def write_port(self, port, offset, value):
+        if port.write(offset, value):
+            self.connect_can()
+            self.machine.look_at_pins()
+
+    def write_clocks(self, offset, value):
+        self.machine.clocks.write(offset, value, self.machine.now_ns)
+        self.connect_can()
+
+    def write_selection(self, offset, value):
+        self.machine.expect(offset == 0x8, "another EXTI selection than the first was written")
+        self.machine.exti.selection = value
+
+    def find(self, block, offset):
+        """(name, read, write) of the device there, or Nones."""
+        name, clock, read, write = self.devices.get(block, (None, None, None, None))
+        if name is None:
+            self.machine.expect(False, f"0x{block + offset:08X} was accessed, which is not modelled")
+        elif clock is not None and not self.machine.clocks.is_enabled(*clock):
+            self.machine.expect(False, f"{name} was accessed without its clock")
+            return None, None, None
+        return name, read, write
+
+    def read(self, block, offset):
+        name, read, _ = self.find(block, offset)
+        return read(offset) if name else 0
+
+    def write(self, block, offset, value):
+        name, _, write = self.find(block, offset)
+        if name:
+            write(offset, value)
+        if name not in ("port_a", "port_c", "watchdog"):
+            self.machine.clock.is_asked_to_stop = 1 # Other interrupts may come now.
 
 
 class Stm32f103(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32f103", arm.UC_CPU_ARM_CORTEX_M3, 14, 40_000, (30_000, 60_000)
     clocks, port, lamp_port, lamp_pin, lamp_lit = chip.ClocksF1, chip.PortF1, "port_c", 13, 0
+    ram_size = 20 * 1024
     blocks = {
         0x40021000: ("rcc", None), 0x40022000: ("flash", None), 0x40003000: ("watchdog", None),
         0x40010000: ("selection", (0x18, 0)), 0x40010400: ("exti", None), 0x40010800: ("port_a", (0x18, 2)),
@@ -105,6 +112,7 @@ class Stm32f103(Board):
 class Stm32f407(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32f407", arm.UC_CPU_ARM_CORTEX_M4, 28, 32_000, (17_000, 47_000)
     clocks, port, lamp_port, lamp_pin, lamp_lit = chip.ClocksF4, chip.PortF4, "port_a", 5, 1
+    ram_size = 128 * 1024
     blocks = {
         0x40023800: ("rcc", None), 0x40023C00: ("flash", None), 0x40003000: ("watchdog", None),
         0x40013800: ("selection", (0x44, 14)), 0x40013C00: ("exti", None), 0x40020000: ("port_a", (0x30, 0)),
@@ -112,4 +120,10 @@ class Stm32f407(Board):
     }
 
 
-BOARDS = {board.name: board for board in (Stm32f103, Stm32f407)}
+class Stm32f446(Stm32f407):
+    """Other limits of the clock tree, and a clock instead of a crystal where the board has it from its debugger."""
+
+    name, clocks = "stm32f446", chip.ClocksF446
+
+
+BOARDS = {board.name: board for board in (Stm32f103, Stm32f407, Stm32f446)}

@@ -24,7 +24,7 @@ def load_model(path):
     for name, result, arguments in (
             ("create", pointer, [number]), ("reset", None, [pointer, number]), ("read", number, [pointer, number]),
             ("write", None, [pointer, number, number]), ("is_on", ctypes.c_bool, [pointer]), ("recessive", None, [pointer, number]),
-            ("dominant", None, [pointer]), ("offer", ctypes.c_int, [pointer, frame]), ("begin", None, [pointer, ctypes.c_int]),
+            ("dominant", None, [pointer]), ("hold", None, [pointer, number, ctypes.c_bool]), ("offer", ctypes.c_int, [pointer, frame]), ("begin", None, [pointer, ctypes.c_int]),
             ("end", None, [pointer, ctypes.c_int, ctypes.c_int]), ("hear", ctypes.c_bool, [pointer, frame]),
             ("hear_error", None, [pointer]), ("lines", number, [pointer]), ("violation", ctypes.c_char_p, [pointer]),
             ("overruns", number, [pointer])):
@@ -71,7 +71,7 @@ class Controller:
 
     def __init__(self, machine):
         self.machine, self.model = machine, self.library.bxcan_model_create(machine.board.banks)
-        for name in ("read", "write", "is_on", "recessive", "dominant", "offer", "begin", "end", "hear", "hear_error", "lines",
+        for name in ("read", "write", "is_on", "recessive", "dominant", "hold", "offer", "begin", "end", "hear", "hear_error", "lines",
                      "violation", "overruns"):
             setattr(self, name, partial(getattr(self.library, f"bxcan_model_{name}"), self.model))
 
@@ -166,6 +166,8 @@ class Bus:
         self.flood = None          # A frame that somebody sends without end.
         self.flooded = 0
         self.stuck = False         # Held dominant.
+        self.stuck_in_ours = False # ... since the middle of a frame of the chip.
+        self.cut = None            # Where the chip is cut off: "cable" (it still hears itself) or "receiver" (always recessive).
         self.corrupt_chip = False  # What the chip sends is destroyed.
         self.acknowledge_chip = True
         self.current = None        # (frame, mailbox or None, end)
@@ -184,18 +186,36 @@ class Bus:
 
     def hold_dominant(self, on):
         self.stuck = on
+        self.idle_ns = self.machine.now_ns
         if on:
-            if self.current and self.current[1] is not None:
-                self.machine.can.end(self.current[1], BIT_ERROR)
-            self.current = None
+            self.stuck_in_ours = self.current is not None and self.current[1] is not None
+            self.break_off(BIT_ERROR)
             self.machine.can.dominant()
-        else:
-            self.idle_ns = self.machine.now_ns
+
+    def cut_off(self, where):
+        """None: whole again."""
+        self.cut = where
+        self.break_off(BIT_ERROR if where == "receiver" else NO_ACKNOWLEDGEMENT)
+        self.idle_ns = self.machine.now_ns
+
+    def break_off(self, end):
+        """What happens to a frame under way."""
+        if self.current and self.current[1] is not None:
+            self.machine.can.end(self.current[1], end)
+        elif self.current and self.machine.can_listens:
+            self.machine.can.hear_error()
+        self.current = None
 
     def advance(self, now_ns):
         for wheel in self.wheels:
             wheel.produce(now_ns)
+            if self.cut:
+                wheel.queue.clear() # They go on among themselves.
         if self.stuck:
+            bits = (now_ns - self.idle_ns) // BIT_NS
+            self.idle_ns += bits * BIT_NS
+            if self.machine.can_listens:
+                self.machine.can.hold(bits, self.stuck_in_ours)
             return
         if self.current and now_ns >= self.current[2]:
             self.finish()
@@ -221,6 +241,8 @@ class Bus:
         self.current = (frame, mailbox, now_ns + frame.bits() * BIT_NS)
 
     def offers(self):
+        if self.cut:
+            return
         for wheel in self.wheels:
             if wheel.queue:
                 yield min(wheel.queue, key=lambda frame: frame.id)
@@ -246,8 +268,8 @@ class Bus:
             self.machine.can.recessive(11)
 
     def finish_ours(self, frame, mailbox):
-        understood = self.machine.can.understands() and not self.corrupt_chip
-        heard = any(wheel.powered for wheel in self.wheels) and self.acknowledge_chip
+        understood = self.machine.can.understands() and not self.corrupt_chip and self.cut != "receiver"
+        heard = any(wheel.powered for wheel in self.wheels) and self.acknowledge_chip and not self.cut
         self.machine.can.end(mailbox, BIT_ERROR if not understood else SENT if heard else NO_ACKNOWLEDGEMENT)
         return understood and heard
 

@@ -8,15 +8,17 @@ a bus clock beyond its limit, too few wait states. What is not modelled cannot b
 US = 1000 # Times are nanoseconds.
 MS = 1000 * US
 
-HSION, HSIRDY, HSEON, HSERDY, CSSON, PLLON, PLLRDY = (1 << bit for bit in (0, 1, 16, 17, 19, 24, 25))
+HSION, HSIRDY, HSEON, HSERDY, HSEBYP, CSSON, PLLON, PLLRDY = (1 << bit for bit in (0, 1, 16, 17, 18, 19, 24, 25))
 PORRSTF, PINRSTF, SFTRSTF, IWDGRSTF, RMVF = (1 << bit for bit in (27, 26, 28, 29, 24))
 
 
 class Clocks:
-    """RCC and FLASH_ACR. A crystal needs `start_ns` after HSEON, the PLL 200 us."""
+    """RCC and FLASH_ACR. A crystal needs `start_ns` after HSEON, the PLL 200 us. `is_clock`: no crystal but a clock is on the
+    oscillator's input, which asks for HSEBYP; a crystal does not run with it."""
 
     crystal_hz = 8_000_000
     start_ns = 2 * MS
+    is_clock = False
 
     def __init__(self, chip):
         self.chip, self.flags, self.crystal_present = chip, PORRSTF | PINRSTF, True
@@ -34,7 +36,7 @@ class Clocks:
 
     def update(self, now_ns):
         """What has become ready, and whether the crystal has failed (which the clock security system reports by NMI)."""
-        crystal = self.crystal_present
+        crystal = self.crystal_present and self.is_clock == bool(self.cr & HSEBYP)
         if self.cr & HSEON and crystal and self.hse_ready_ns is None:
             self.hse_ready_ns = now_ns + self.start_ns
         if not self.cr & HSEON or not crystal:
@@ -58,7 +60,8 @@ class Clocks:
         self.core_hz = (self.internal_hz, self.crystal_hz, self.pll_hz() if switched == 2 else 0)[switched]
 
     def read(self, offset, now_ns):
-        self.update(now_ns)
+        if not self.settled:
+            self.update(now_ns)
         if offset == 0:
             return self.cr
         if offset == self.csr_offset:
@@ -67,6 +70,7 @@ class Clocks:
 
     def write(self, offset, value, now_ns):
         if offset == 0:
+            self.expect(not (value ^ self.cr) & HSEBYP or not self.cr & HSEON, "HSEBYP was changed while HSE is on")
             self.cr = self.cr & (HSERDY | PLLRDY | HSIRDY) | value & ~(HSERDY | PLLRDY)
         elif offset == self.csr_offset:
             self.flags = 0 if value & RMVF else self.flags
@@ -116,6 +120,8 @@ class ClocksF1(Clocks):
 class ClocksF4(Clocks):
     internal_hz, csr_offset, cfgr_offset, pllcfgr_offset, acr_reset = 16_000_000, 0x74, 0x08, 0x04, 0
     pll_bits = 0
+    core_max_hz, apb1_max_hz, apb2_max_hz = 168_000_000, 42_000_000, 84_000_000
+    reserved, reserved_value = 0xF << 28, 2 << 28 # Of PLLCFGR, kept as after reset.
 
     def pll_from_hse(self):
         return bool(self.pllcfgr >> 22 & 1)
@@ -126,7 +132,8 @@ class ClocksF4(Clocks):
         self.expect(1_000_000 <= source / m <= 2_000_000, "the PLL's input is not 1 to 2 MHz")
         self.expect(192_000_000 <= source / m * n <= 432_000_000, "the PLL runs outside its limits")
         self.expect(source / m * n / (self.pllcfgr >> 24 & 0xF) <= 48_000_000, "the PLL's 48 MHz output is too fast")
-        self.expect((self.pllcfgr >> 28 & 7) >= 2, "PLLR below 2 is not allowed on an STM32F446")
+        self.expect(self.pllcfgr & self.reserved == self.reserved_value, "reserved bits of PLLCFGR were changed")
+        self.expect((self.pllcfgr >> 28 & 7) >= 2, "PLLR below 2 is not allowed")
         return source // m * n // p
 
     def apb1_hz(self):
@@ -136,10 +143,17 @@ class ClocksF4(Clocks):
         return self.core_hz // (1, 1, 1, 1, 2, 4, 8, 16)[self.cfgr >> 13 & 7]
 
     def check_limits(self):
-        self.expect(self.core_hz <= 168_000_000, f"the core runs at {self.core_hz} Hz")
-        self.expect(self.apb1_hz() <= 42_000_000, f"APB1 runs at {self.apb1_hz()} Hz")
-        self.expect(self.apb2_hz() <= 84_000_000, f"APB2 runs at {self.apb2_hz()} Hz")
+        self.expect(self.core_hz <= self.core_max_hz, f"the core runs at {self.core_hz} Hz")
+        self.expect(self.apb1_hz() <= self.apb1_max_hz, f"APB1 runs at {self.apb1_hz()} Hz")
+        self.expect(self.apb2_hz() <= self.apb2_max_hz, f"APB2 runs at {self.apb2_hz()} Hz")
         self.expect((self.acr & 0xF) >= (self.core_hz - 1) // 30_000_000, "too few wait states of the flash")
+
+
+class ClocksF446(ClocksF4):
+    """Without overdrive. PLLR is bits 28 to 30 here."""
+
+    core_max_hz, apb1_max_hz, apb2_max_hz = 168_000_000, 45_000_000, 90_000_000
+    reserved, reserved_value = 1 << 31, 0
 
 
 class Port:
@@ -185,6 +199,9 @@ class PortF1(Port):
         return {8: sum(self.level(pin) << pin for pin in range(16)), 0xC: self.odr}.get(offset, 0)
 
     def write(self, offset, value):
+        """True if that may have changed a level."""
+        if offset == 0x10 and (self.odr & ~(value >> 16) | value & 0xFFFF) == self.odr:
+            return False
         if offset in (0, 4):
             self.cr[offset // 4] = value
         elif offset == 0x10:
@@ -193,6 +210,7 @@ class PortF1(Port):
             self.odr = value & 0xFFFF
         else:
             raise KeyError(offset)
+        return True
 
 
 class PortF4(Port):
@@ -224,10 +242,12 @@ class PortF4(Port):
         return self.registers[offset]
 
     def write(self, offset, value):
+        """True if that may have changed a level."""
         if offset == 0x18:
-            self.registers[0x14] = self.registers[0x14] & ~(value >> 16) | value & 0xFFFF
-        else:
-            self.registers[offset] = value
+            offset, value = 0x14, self.registers[0x14] & ~(value >> 16) | value & 0xFFFF
+        changed = self.registers[offset] != value
+        self.registers[offset] = value
+        return changed
 
 
 class Exti:

@@ -7,19 +7,21 @@ are on the slow side, so that a verdict about time is too. Interrupts all have o
 import ctypes
 import struct
 
-from unicorn import UC_ARCH_ARM, UC_HOOK_BLOCK, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
+from unicorn import UC_ARCH_ARM, UC_ERR_OK, UC_HOOK_BLOCK, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
 from unicorn import arm_const as arm
-from unicorn.unicorn_py3.unicorn import uclib
+from unicorn.unicorn_py3.unicorn import MMIO_READ_CFUNC, MMIO_WRITE_CFUNC, uclib
 
 from .boards import BLOCK_SIZE
-from .chip import SFTRSTF, IWDGRSTF
+from .chip import IWDGRSTF, SFTRSTF, US
+from .registers import Registers
 
 ACCESS_CYCLES = 12
 EXC_RETURN = 0xFFFFFFF9
 EXCEPTION_EXIT = 8 # Unicorn's number for a return from an exception.
 NOWHERE = 0xFFFFFFFE
-FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, arm.UC_ARM_REG_LR,
-         arm.UC_ARM_REG_PC, arm.UC_ARM_REG_XPSR)
+BACK, ENDLESS = 0x080F0000, 0x080F0100 # In the flash, beyond every image; ENDLESS is an instruction that jumps to itself.
+SP, LR, PC, XPSR, PRIMASK = (getattr(arm, f"UC_ARM_REG_{name}") for name in ("SP", "LR", "PC", "XPSR", "PRIMASK"))
+FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, LR, PC, XPSR)
 IT_STATE = 0x0600FC00
 NMI, SYSTICK, IRQ = 2, 15, 16
 
@@ -47,11 +49,16 @@ class Machine:
         cpu = self.cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         cpu.ctl_set_cpu_model(self.board.cpu_model)
         cpu.mem_map(0x08000000, 0x100000)
-        cpu.mem_map(0x20000000, 0x20000)
+        cpu.mem_map(0x20000000, self.board.ram_size)
         cpu.mem_write(0x08000000, self.image)
-        cpu.mem_write(0x20000000, bytes([self.POISON]) * 0x20000)
-        cpu.mmio_map(0x40000000, 0x30000, self.on_read, 0x40000000, self.on_write, 0x40000000)
-        cpu.mmio_map(0xE000E000, 0x1000, self.on_read, 0xE000E000, self.on_write, 0xE000E000)
+        cpu.mem_write(ENDLESS, bytes((0xFE, 0xE7)))
+        cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
+        self.frame, self.after_entry = Registers(cpu, *FRAME, SP, PRIMASK), Registers(cpu, SP, XPSR, LR, PC)
+        self.after_exit, self.pc = Registers(cpu, SP, *FRAME), Registers(cpu, PC)
+        self.stack, self.result = Registers(cpu, SP), Registers(cpu, *FRAME[:2])
+        self.error, self.callbacks, self.until = None, [], NOWHERE
+        self.map_registers(0x40000000, 0x30000, self.board.read, self.board.write)
+        self.map_registers(0xE000E000, 0x1000, self.read_system, self.write_system)
         self.clock = BlockClock(stop=ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p).value)
         hook, function = ctypes.c_size_t(), ctypes.cast(self.library.block_hook, ctypes.c_void_p)
         uclib.uc_hook_add(cpu._uch, ctypes.byref(hook), ctypes.c_int(UC_HOOK_BLOCK), function, ctypes.byref(self.clock),
@@ -81,16 +88,15 @@ class Machine:
         clock, self.trap = self.clock, None
         clock.left = max((until_ns - self.now_ns) * self.clocks.core_hz // 10**9, 1)
         clock.is_asked_to_stop = clock.has_stopped = 0
-        pc = self.cpu.reg_read(arm.UC_ARM_REG_PC)
-        try:
-            self.cpu.emu_start(pc | 1, NOWHERE)
-        except UcError as error:
-            raise RuntimeError(f"the CPU faulted at 0x{pc:08X}: {error}") from error
+        pc, = self.pc.read()
+        status = uclib.uc_emu_start(self.cpu._uch, pc | 1, self.until, 0, 0)
+        if status != UC_ERR_OK or self.error is not None:
+            raise RuntimeError(f"the CPU faulted at 0x{pc:08X}: {self.error or UcError(status)}") from self.error
         self.spend()
         if self.trap == EXCEPTION_EXIT:
             self.leave_exception()
         elif self.trap is not None:
-            raise RuntimeError(f"trap {self.trap} at 0x{self.cpu.reg_read(arm.UC_ARM_REG_PC):08X}")
+            raise RuntimeError(f"trap {self.trap} at 0x{self.pc.read()[0]:08X}")
         elif not clock.has_stopped:
             self.sleeping = True
 
@@ -112,6 +118,30 @@ class Machine:
                 continue
             self.execute(self.now_ns + 1 if self.pending else next_ns)
 
+    def divert(self):
+        """The main loop goes round on one spot from now on, while interrupts come and are served."""
+        while self.active:
+            self.run(US)
+        self.cpu.reg_write(PRIMASK, 0)
+        self.cpu.reg_write(PC, ENDLESS | 1)
+        self.sleeping = False
+
+    def call(self, address):
+        """The 64-bit result of a function of the image without arguments, called now, with interrupts as in the main loop."""
+        saved, asleep = self.cpu.context_save(), self.sleeping
+        self.cpu.reg_write(PRIMASK, 0)
+        self.cpu.reg_write(LR, BACK | 1)
+        self.cpu.reg_write(PC, address | 1)
+        self.until = BACK
+        while self.pc.read()[0] != BACK:
+            self.attend()
+            if not self.enter_exception():
+                self.execute(self.now_ns + 1 if self.pending else self.next_event_ns())
+        low, high = self.result.read()
+        self.cpu.context_restore(saved)
+        self.sleeping, self.until = asleep, NOWHERE
+        return high << 32 | low
+
     def next_event_ns(self):
         times = [self.tick_ns, self.watchdog.deadline_ns, self.bus.next_event_ns(self.now_ns)]
         times += [self.alarms[0][0]] if self.alarms else []
@@ -124,9 +154,7 @@ class Machine:
         if not self.clocks.settled:
             self.clocks.update(self.now_ns)
         self.bus.advance(self.now_ns)
-        if self.tick_ns is not None and self.now_ns >= self.tick_ns:
-            self.pending.add(SYSTICK)
-            self.tick_ns += self.tick_span_ns()
+        self.count_tick()
         if self.port_a.changed:
             self.look_at_pins()
         if self.watchdog.deadline_ns is not None and self.now_ns >= self.watchdog.deadline_ns:
@@ -148,39 +176,37 @@ class Machine:
     # ---- exceptions and reset -------------------------------------------------------------------------------------
 
     def enter_exception(self):
-        if not self.pending or self.active or self.cpu.reg_read(arm.UC_ARM_REG_PRIMASK) and NMI not in self.pending:
+        if not self.pending or self.active:
+            return False
+        *values, stack, masked = self.frame.read()
+        if masked and NMI not in self.pending:
             return False
         number = min(self.pending)
         self.pending.discard(number)
         self.active = number
-        stack = self.cpu.reg_read(arm.UC_ARM_REG_SP)
         aligned = stack & 4
         stack -= 32 + aligned
-        values = list(self.cpu.reg_read_batch(FRAME))
         values[7] = values[7] & ~0x200 | (0x200 if aligned else 0)
         self.cpu.mem_write(stack, struct.pack("<8I", *values))
-        self.cpu.reg_write(arm.UC_ARM_REG_SP, stack)
-        self.cpu.reg_write(arm.UC_ARM_REG_XPSR, values[7] & ~IT_STATE) # A handler does not begin within an IT block.
-        self.cpu.reg_write(arm.UC_ARM_REG_LR, EXC_RETURN)
-        vector = struct.unpack("<I", self.cpu.mem_read(0x08000000 + 4 * number, 4))[0]
-        self.cpu.reg_write(arm.UC_ARM_REG_PC, vector)
+        vector, = struct.unpack_from("<I", self.image, 4 * number)
+        self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, vector) # A handler does not begin within an IT block.
         self.spend(12)
         return True
 
     def leave_exception(self):
-        stack = self.cpu.reg_read(arm.UC_ARM_REG_SP)
-        values = struct.unpack("<8I", self.cpu.mem_read(stack, 32))
-        self.cpu.reg_write(arm.UC_ARM_REG_SP, stack + 32 + (4 if values[7] & 0x200 else 0))
-        for register, value in zip(FRAME, values):
-            self.cpu.reg_write(register, value & ~0x200 if register == arm.UC_ARM_REG_XPSR else value)
+        stack, = self.stack.read()
+        values = list(struct.unpack("<8I", self.cpu.mem_read(stack, 32)))
+        stack += 32 + (4 if values[7] & 0x200 else 0)
+        values[7] &= ~0x200
+        self.after_exit.write(stack, *values)
         self.active = None
         self.spend(12)
 
     def reset_cpu(self):
-        stack, start = struct.unpack("<II", self.cpu.mem_read(0x08000000, 8))
-        self.cpu.reg_write(arm.UC_ARM_REG_PRIMASK, 0)
-        self.cpu.reg_write(arm.UC_ARM_REG_SP, stack)
-        self.cpu.reg_write(arm.UC_ARM_REG_PC, start | 1)
+        stack, start = struct.unpack_from("<II", self.image)
+        self.cpu.reg_write(PRIMASK, 0)
+        self.cpu.reg_write(SP, stack)
+        self.cpu.reg_write(PC, start | 1)
         self.pending, self.active, self.enabled, self.sleeping, self.reset_requested = set(), None, 0, False, False
         self.look_at_pins()
         self.tick_ns, self.syst = None, {0x10: 0, 0x14: 0, 0x18: 0}
@@ -195,39 +221,49 @@ class Machine:
 
     # ---- registers ------------------------------------------------------------------------------------------------
 
-    def on_read(self, _, offset, size, base):
-        self.spend(ACCESS_CYCLES)
-        address = base + offset
-        self.expect(size == 4, f"0x{address:08X} was read with {size} bytes")
-        if base == 0xE000E000:
-            return self.read_system(offset)
-        return self.board.read(self, address & ~(BLOCK_SIZE - 1), address & (BLOCK_SIZE - 1)) & 0xFFFFFFFF
+    def map_registers(self, base, size, read, write):
+        """`read` and `write` get the address of the block and the offset in it. What they raise ends the emulation."""
+        def guard(function, address, size, *value):
+            try:
+                self.spend(ACCESS_CYCLES)
+                if size != 4:
+                    self.expect(False, f"0x{address:08X} was accessed with {size} bytes")
+                return function(address & ~(BLOCK_SIZE - 1), address & (BLOCK_SIZE - 1), *value)
+            except Exception as error:
+                self.error = self.error or error
+                uclib.uc_emu_stop(self.cpu._uch)
+                return 0
 
-    def on_write(self, _, offset, size, value, base):
-        self.spend(ACCESS_CYCLES)
-        address = base + offset
-        self.expect(size == 4, f"0x{address:08X} was written with {size} bytes")
-        if base == 0xE000E000:
-            self.write_system(offset, value)
-        else:
-            self.board.write(self, address & ~(BLOCK_SIZE - 1), address & (BLOCK_SIZE - 1), value)
+        callbacks = (MMIO_READ_CFUNC(lambda _, offset, size, __: guard(read, base + offset, size) & 0xFFFFFFFF),
+                     MMIO_WRITE_CFUNC(lambda _, offset, size, value, __: guard(write, base + offset, size, value)))
+        self.callbacks += callbacks
+        status = uclib.uc_mmio_map(self.cpu._uch, base, size, *(pair for function in callbacks
+                                                                for pair in (ctypes.cast(function, ctypes.c_void_p), 0)))
+        if status != UC_ERR_OK:
+            raise UcError(status)
 
     def tick_span_ns(self):
         return (self.syst[0x14] + 1) * 10**9 // self.clocks.core_hz
 
-    def read_system(self, offset):
+    def count_tick(self):
+        """The tick that is due; code has not been told yet."""
+        if self.tick_ns is not None and self.now_ns >= self.tick_ns:
+            self.clock.is_asked_to_stop = 1
+            self.pending.add(SYSTICK)
+            self.tick_ns += self.tick_span_ns()
+
+    def read_system(self, block, offset):
+        offset += block - 0xE000E000
+        self.count_tick()
         if offset == 0x18 and self.tick_ns is not None:
-            left = (self.tick_ns - self.now_ns) * self.clocks.core_hz // 10**9
-            if left < 0: # The tick is due; code has not been told yet.
-                self.clock.is_asked_to_stop = 1
-                self.pending.add(SYSTICK)
-                self.tick_ns += self.tick_span_ns()
-                left = self.syst[0x14]
-            return min(left, self.syst[0x14])
+            return min((self.tick_ns - self.now_ns) * self.clocks.core_hz // 10**9, self.syst[0x14])
+        if offset == 0xD04: # ICSR: PENDSTSET.
+            return (SYSTICK in self.pending) << 26
         self.expect(offset in self.syst, f"0x{0xE000E000 + offset:08X} was read, which is not modelled")
         return self.syst.get(offset, 0)
 
-    def write_system(self, offset, value):
+    def write_system(self, block, offset, value):
+        offset += block - 0xE000E000
         self.clock.is_asked_to_stop = 1
         if offset in self.syst:
             self.syst[offset] = value

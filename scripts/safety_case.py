@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Is docs/safety-case.md true? No name that does not exist, no rule without code and test, no planted bug without a rule.
+
+usage: safety_case.py [--update]
+
+--update writes the lists of planted bugs and of the fault catalogue's tests anew; both follow from the sources.
+The last line is "N passed, N failed, N skipped".
+"""
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs/safety-case.md"
+sys.path.insert(0, str(ROOT / "test/planted"))
+FAULTS = {
+    1: "client killed", 2: "client frozen, its socket open", 3: "client sends and never reads", 4: "two clients command",
+    5: "observers die, flood, connect in crowds, no descriptors left", 6: "reconnection with an old intention",
+    7: "a nonzero command is there already at arm and reset", 8: "endless and broken lines", 9: "odd JSON",
+    10: "a value out of range, left good and right bad", 11: "e-stop in motion, at random phase", 12: "e-stop pulses of 1 to 20 ms",
+    13: "e-stop released, held, repeated, pressed at start", 14: "GPIO chip gone, line busy, cannot be opened",
+    15: "interface down, deleted, unplugged", 16: "bus-off, error passive, error flood", 17: "no buffers, stalled adapter, late or missing echo",
+    18: "wheel power cut at full command, then back", 19: "foreign setpoints, forged error frames",
+    20: "remote, extended, FD, short and long frames on known ids", 21: "babbling node, full bus", 22: "wheel silent, feedback contradicts",
+    23: "force extremes, wrong unit, loaded or late start", 24: "wall clock set, process stopped, CPU starved", 25: "gateway killed, aborted, told to end",
+    27: "disk full or read-only, stderr blocked", 28: "socket file exists, is a link, has wrong rights", 29: "bad configuration", 30: "two gateways on one interface",
+}
+# Tested elsewhere under other names.
+OTHER_TESTS = {21: ("sim.directed",), 26: ("hang",)}
+FAULTS[26] = "loop alive but stuck"
+
+
+def defined_tests():
+    """Every test's name, in C and in Python."""
+    names = set()
+    for path in (ROOT / "test").rglob("*.c"):
+        names.update(re.findall(r"^static void (test_\w+)\(void\)", path.read_text(), re.M))
+    for path in (ROOT / "test").rglob("*.py"):
+        names.update(re.findall(r"^def (\w+)\(", path.read_text(), re.M))
+    return names
+
+
+def oracle_rules():
+    """The numbers of all rules that the oracle and the rigs can find broken."""
+    numbers = set()
+    for folder in ("sim", "orders"):
+        for path in (ROOT / "test" / folder).glob("*.c"):
+            text = path.read_text()
+            numbers.update(re.findall(r"oracle_break\(self, now_us, (\d+)", text))
+            numbers.update(re.findall(r"judge_start\(self, now_us, (\d+)", text))
+            numbers.update(re.findall(r"#define RULE_\w+\s+(\d+)U", text))
+    return numbers
+
+
+def sections(text):
+    """{rule: {what: the rest of that line}}"""
+    found = {}
+    for rule, body in re.findall(r"^### (R\d+) .*?\n(.*?)(?=^##)", text, re.M | re.S):
+        found[rule] = dict(re.findall(r"^- (code|oracle|tests|planted): (.+)$", body, re.M))
+    return found
+
+
+def bugs_of(rule, bugs):
+    return [bug.name for bug in bugs if bug.rule == rule]
+
+
+def has_function(file, name):
+    path = ROOT / "core/src" / file
+    return path.exists() and re.search(rf"^[\w \*]*\b{name}\(", path.read_text(), re.M) is not None
+
+
+def rule_findings(rule, entry, tests, bugs):
+    for what in ("code", "oracle", "tests", "planted"):
+        if what not in entry:
+            yield f"{rule}: no line '- {what}: ...'"
+            return
+    for file, name in re.findall(r"`(\w+\.c): (\w+)`", entry["code"]):
+        if not has_function(file, name):
+            yield f"{rule}: core/src/{file} has no function {name}"
+    named = re.findall(r"`(\w+)`", entry["tests"])
+    for name in named:
+        if name not in tests:
+            yield f"{rule}: there is no test {name}"
+    if not named or "`" not in entry["code"]:
+        yield f"{rule}: without code or test"
+    if not re.match(r"none, ", entry["planted"]) and set(re.findall(r"`([\w-]+)`", entry["planted"])) != set(bugs_of(rule, bugs)):
+        yield f"{rule}: its planted bugs are others in test/planted/bugs.py; scripts/safety_case.py --update writes them"
+    if re.match(r"none, ", entry["planted"]) and bugs_of(rule, bugs):
+        yield f"{rule}: says that no bug is planted, but there are some"
+
+
+def findings(text, tests, bugs, rules):
+    found = sections(text)
+    for rule, entry in found.items():
+        yield from rule_findings(rule, entry, tests, bugs)
+    for bug in bugs:
+        if bug.rule not in found:
+            yield f"planted bug {bug.name} belongs to {bug.rule}, which is not here"
+    told = set(re.findall(r"\d+", " ".join(entry.get("oracle", "") for entry in found.values())))
+    yield from (f"rule {number} of the oracle belongs to no rule here" for number in sorted(rules - told))
+    yield from (f"the oracle has no rule {number}" for number in sorted(told - rules))
+    answered = re.findall(r"^\| (H\d+) .*\| (R\d+(?:, R\d+)*) \|$", text, re.M)
+    for hazard, by in answered:
+        yield from (f"{hazard}: {rule} is not here" for rule in by.split(", ") if rule not in found)
+    yield from (f"{rule} answers no hazard" for rule in found if not any(rule in by.split(", ") for _, by in answered))
+    for number in range(1, 31):
+        row = re.search(rf"^\| {number} \|[^|]*\|([^|]*)\|$", text, re.M)
+        names = re.findall(r"`([^`]+)`", row[1]) if row else []
+        if not names:
+            yield f"fault {number}: no test"
+        yield from (f"fault {number}: there is no test {name}; scripts/safety_case.py --update writes the list"
+                    for name in names if "." not in name and name not in tests)
+
+
+def catalogue(tests):
+    rows = ["| fault | what happens | tests |", "|---|---|---|"]
+    for number in range(1, 31):
+        names = [name for name in sorted(tests) if name.startswith(f"row{number:02d}_")] + [*OTHER_TESTS.get(number, ())]
+        rows.append(f"| {number} | {FAULTS[number]} | {', '.join(f'`{name}`' for name in names)} |")
+    return "\n".join(rows)
+
+
+def update(text, tests, bugs):
+    def planted(match):
+        names = bugs_of(match[2], bugs)
+        return match[1] + (", ".join(f"`{name}`" for name in names) if names else match[3])
+
+    text = re.sub(r"(^### (R\d+) (?:(?!^###).)*?^- planted: )([^\n]*)", planted, text, flags=re.M | re.S)
+    return re.sub(r"CATALOGUE|^\| fault \| what happens.*?(?=\n\n)", lambda _: catalogue(tests), text, flags=re.M | re.S)
+
+
+def self_test(text, tests, bugs, rules):
+    """Planted in the page: each must be found."""
+    faults = [
+        text.replace("`cycle.c: watch_loop`", "`cycle.c: watch_nothing`"),
+        text.replace("`row01_client_killed`", "`row01_client_kissed`"),
+        text.replace("- oracle: 101, ", "- oracle: "),
+        text.replace("- oracle: 101, ", "- oracle: 101, 999, "),
+        text.replace("`lease-endless`, ", ""),
+        text.replace("| R13 |", "| R12 |"),
+        text.replace("| R13 |", "| R14 |"),
+        re.sub(r"^- tests: .*\n", "", text, count=1, flags=re.M),
+        re.sub(r"^\| 18 \|.*\n", "", text, flags=re.M),
+    ]
+    return sum(fault == text or not list(findings(fault, tests, bugs, rules)) for fault in faults), len(faults)
+
+
+def main(arguments):
+    from bugs import BUGS
+    if any(word != "--update" for word in arguments[1:]):
+        sys.exit(__doc__)
+    text, tests, rules = PAGE.read_text(), defined_tests(), oracle_rules()
+    if "--update" in arguments:
+        text = update(text, tests, BUGS)
+        PAGE.write_text(text)
+    found = list(findings(text, tests, BUGS, rules))
+    missed, planted = self_test(text, tests, BUGS, rules)
+    print(*(f"failed: {finding}" for finding in found), sep="\n", end="\n" if found else "")
+    if missed:
+        print(f"failed: {missed} of {planted} faults planted in the page are not found")
+    print(f"{len(sections(text))} rules, {len(BUGS)} planted bugs, {len(rules)} rules of the oracle")
+    print(f"{len(sections(text)) + planted - missed - (1 if found else 0)} passed, {len(found) + missed} failed, 0 skipped")
+    return 1 if found or missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))

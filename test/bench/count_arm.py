@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""Counts the instructions of functions of a bare Cortex-M program, on an emulated CPU."""
+import subprocess
+
+from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
+from unicorn import arm_const as arm
+
+BASE = 0x10000
+MEMORY = 0x40000
+STACK = BASE + MEMORY - 16
+HOME = BASE + MEMORY - 4  # Where the outermost function returns to.
+MODELS = {"cortex-m0plus": arm.UC_CPU_ARM_CORTEX_M0, "cortex-m4": arm.UC_CPU_ARM_CORTEX_M4}
+FLAGS = ["-mthumb", "-mfloat-abi=soft", "-Os", "-std=c99", "-ffunction-sections", "-fdata-sections", "-ffreestanding", "-fno-common"]
+
+
+def build(out, cpu, sources, includes, entries):
+    """Links a program without start-up code; `entries` are kept."""
+    keep = [f"-Wl,-u,{entry}" for entry in entries]
+    command = ["arm-none-eabi-gcc", f"-mcpu={cpu}", *FLAGS, *[f"-I{path}" for path in includes], *map(str, sources), "-nostartfiles",
+               "--specs=nano.specs", f"-Wl,-Ttext={BASE:#x}", "-Wl,-N", "-Wl,--gc-sections", f"-Wl,-e,{entries[0]}", *keep, "-o", str(out)]
+    subprocess.run(command, check=True)
+    return out
+
+
+def text_size(elf, prefixes=("iw_", "bench_linked_", "left_ids", "lengths", "iwheel_")):
+    """Bytes of code and constants of the linked functions whose names begin so."""
+    run = subprocess.run(["arm-none-eabi-nm", "-S", str(elf)], capture_output=True, text=True, check=True)
+    rows = [line.split() for line in run.stdout.splitlines()]
+    return sum(int(row[1], 16) for row in rows if len(row) == 4 and row[2] in "tTrR" and row[3].startswith(prefixes))
+
+
+class Program:
+    def __init__(self, elf, cpu):
+        binary = elf.with_suffix(".bin")
+        subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", str(elf), str(binary)], check=True)
+        nm = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
+        self.address = {line.split()[-1]: int(line.split()[0], 16) for line in nm.stdout.splitlines() if len(line.split()) == 3}
+        self.cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
+        self.cpu.ctl_set_cpu_model(MODELS[cpu])
+        self.cpu.mem_map(BASE, MEMORY)
+        self.cpu.mem_write(BASE, binary.read_bytes())
+        self.executed = 0
+        self.counting = False
+        self.cpu.hook_add(UC_HOOK_CODE, self._count)
+
+    def _count(self, *_):
+        self.executed += 1
+
+    def call(self, name, argument=0):
+        """(what it returned, how many instructions it took)"""
+        self.cpu.reg_write(arm.UC_ARM_REG_SP, STACK)
+        self.cpu.reg_write(arm.UC_ARM_REG_R0, argument)
+        self.cpu.reg_write(arm.UC_ARM_REG_LR, HOME | 1)
+        before = self.executed
+        self.cpu.emu_start(self.address[name] | 1, HOME)
+        return self.cpu.reg_read(arm.UC_ARM_REG_R0), self.executed - before

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""What can be counted rather than timed: instructions and bytes. The same on every machine with the same compiler."""
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import count_arm
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+CORE = ROOT / "core"
+INCLUDES = [CORE / "include", HERE / "codec"]
+FRAMES = 617
+ARM_CPUS = ("cortex-m4", "cortex-m0plus")
+
+
+def codecs(work):
+    """{name: (sources, include folders)}; cantools' C source is made here, from the DBC file."""
+    generated = work / "cantools"
+    generated.mkdir(parents=True, exist_ok=True)
+    subprocess.run([sys.executable, "-m", "cantools", "generate_c_source", "--no-floating-point-numbers", "--no-strict",
+                    str(ROOT / "share/iwheel.dbc")], cwd=generated, check=True, capture_output=True)
+    return {
+        "floor": ([HERE / "codec/floor.c"], INCLUDES),
+        "iwheel": ([HERE / "codec/iwheel.c", CORE / "src/proto.c"], INCLUDES),
+        "cantools": ([HERE / "codec/cantools.c", generated / "iwheel.c"], [*INCLUDES, generated]),
+    }
+
+
+def host_instructions(program, what, rounds):
+    run = subprocess.run(["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", str(program), what, str(rounds)],
+                         capture_output=True, text=True, check=True)
+    return int(re.search(r"Collected : (\d+)", run.stderr)[1])
+
+
+def host_codec(work, name, sources, includes):
+    """Instructions per frame on this machine: (decode, encode). The difference of two runs, so without start and end."""
+    program = work / f"codec-{name}"
+    subprocess.run(["gcc", "-O2", "-std=c99", *[f"-I{path}" for path in includes], *map(str, sources), str(HERE / "codec/mix.c"),
+                    str(HERE / "codec/main.c"), "-o", str(program)], check=True)
+    per_frame = []
+    for what, frames in (("decode", FRAMES), ("encode", 1)):
+        few, many = (20, 120) if what == "decode" else (1000, 11000)
+        spent = host_instructions(program, what, many) - host_instructions(program, what, few)
+        per_frame.append(spent / ((many - few) * frames))
+    return per_frame
+
+
+def arm_codec(work, name, cpu, sources, includes):
+    elf = count_arm.build(work / f"codec-{name}-{cpu}.elf", cpu, [*sources, HERE / "codec/mix.c"], includes,
+                          ["bench_decode", "bench_encode", "bench_fill"])
+    program = count_arm.Program(elf, cpu)
+    program.call("bench_fill")
+    per_frame = []
+    for function, few, many, frames in (("bench_decode", 1, 3, FRAMES), ("bench_encode", 100, 300, 1)):
+        counts = [program.call(function, rounds) for rounds in (few, many)]
+        if any(refused for refused, _ in counts):
+            raise SystemExit(f"{name} on {cpu}: a frame was refused")
+        per_frame.append((counts[1][1] - counts[0][1]) / ((many - few) * frames))
+    return per_frame
+
+
+def arm_linked(work, cpu):
+    elf = count_arm.build(work / f"linked-{cpu}.elf", cpu, [HERE / "codec/linked.c", CORE / "src/proto.c"], INCLUDES,
+                          ["bench_linked_decode", "bench_linked_encode"])
+    return count_arm.text_size(elf)
+
+
+def arm_steps(work, cpu):
+    """{what is done in one step: instructions}"""
+    elf = count_arm.build(work / f"step-{cpu}.elf", cpu, [HERE / "step/step.c", *sorted((CORE / "src").glob("*.c"))], INCLUDES,
+                          ["bench_prepare", "bench_idle", "bench_frame_in", "bench_pair"])
+    program = count_arm.Program(elf, cpu)
+    if program.call("bench_prepare")[0] != 1:
+        raise SystemExit("the gateway of test/bench/step does not drive")
+    idle_sent, idle = program.call("bench_idle")
+    received, frame = program.call("bench_frame_in")
+    pair_sent, pair = program.call("bench_pair")
+    if (idle_sent, received, pair_sent) != (0, 1, 1):
+        raise SystemExit(f"the steps of test/bench/step did something else: {idle_sent} {received} {pair_sent}")
+    return {"nothing due": idle, "a frame in": frame, "a pair due": pair}
+
+
+def everything(work):
+    """Rows of (metric, {column: figure})."""
+    rows = []
+    for name, (sources, includes) in codecs(work).items():
+        figures = dict(zip(("x86-64 decode", "x86-64 encode"), host_codec(work, name, sources, includes)))
+        for cpu in ARM_CPUS:
+            decode, encode = arm_codec(work, name, cpu, sources, includes)
+            figures |= {f"{cpu} decode": decode, f"{cpu} encode": encode}
+        rows.append((name, figures))
+    return rows
+
+
+if __name__ == "__main__":
+    work = Path(sys.argv[1])
+    work.mkdir(parents=True, exist_ok=True)
+    for name, figures in everything(work):
+        print(name, {key: round(value, 1) for key, value in figures.items()})
+    for cpu in ARM_CPUS:
+        print(cpu, arm_linked(work, cpu), arm_steps(work, cpu))

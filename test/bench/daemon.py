@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""The gateway as a process, over the local bus: system calls for a frame, memory, threads, allocations, and how soon it is back after a kill.
+
+Figures of this machine at this moment, so they are shown and not checked; the counts (threads, allocations) do not depend on the load.
+"""
+import grp
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+WATCH_S = 4.0
+START_S = 10.0
+
+
+class Client:
+    def __init__(self, path, within_s=START_S):
+        deadline = time.monotonic() + within_s
+        while True:
+            self.socket = socket.socket(socket.AF_UNIX)
+            try:
+                self.socket.connect(str(path))
+                break
+            except OSError:
+                self.socket.close()
+                if time.monotonic() > deadline:
+                    raise
+                time.sleep(0.0005)
+        self.lines = self.socket.makefile("r")
+
+    def ask(self, **request):
+        self.socket.sendall((json.dumps({"id": 1, **request}) + "\n").encode())
+        while True:
+            reply = json.loads(self.lines.readline())
+            if "ok" in reply:
+                return reply
+
+    def close(self):
+        self.lines.close()
+        self.socket.close()
+
+
+class Pair:
+    """A simulator and a gateway in a folder of their own."""
+
+    def __init__(self, build, folder):
+        self.folder = Path(folder)
+        self.build = Path(build)
+        self.northbound = self.folder / "gateway.sock"
+        self.allocations = self.folder / "allocations"
+        self.preload = self.folder / "count_allocations.so"
+        subprocess.run(["gcc", "-shared", "-fPIC", "-O1", "-o", self.preload, HERE / "daemon/count_allocations.c"], check=True)
+        (self.folder / "gateway.conf").write_text(
+            f"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\n[northbound]\nmode = 0600\ngroup = {grp.getgrgid(os.getgid()).gr_name}\n[record]\n"
+            f"directory = {self.folder}\n")
+        self.simulator = subprocess.Popen([self.build / "app/sim/iwheel-sim", "--quiet", "--uptime", "120", "--can",
+                                           f"unix:{self.folder}/bus", "--estop", f"{self.folder}/estop"])
+        self.gateway = self.start()
+
+    def start(self):
+        environment = dict(os.environ, LD_PRELOAD=str(self.preload), BENCH_ALLOCATIONS=str(self.allocations))
+        return subprocess.Popen([self.build / "app/gateway/iwheel-gateway", "-c", self.folder / "gateway.conf", "--can",
+                                 f"unix:{self.folder}/bus", "--estop", f"unix:{self.folder}/estop", "--socket", self.northbound,
+                                 "--log-level", "error"], env=environment, stderr=subprocess.DEVNULL)
+
+    def allocated(self):
+        return struct.unpack("=Q", self.allocations.read_bytes())[0]
+
+    def end(self):
+        for process in (self.gateway, self.simulator):
+            process.send_signal(signal.SIGTERM)
+            process.wait(10)
+
+
+def received(client):
+    counters = client.ask(cmd="status")
+    return int(re.search(r'"received": (\d+)', json.dumps(counters))[1])
+
+
+def calls_per_frame(pair):
+    """System calls of the gateway for each telemetry frame, with nobody connected; None without strace's rights."""
+    if shutil.which("strace") is None:
+        return None
+    client = Client(pair.northbound)
+    before = received(client)
+    client.close()
+    trace = subprocess.Popen(["strace", "-c", "-q", "-p", str(pair.gateway.pid)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    time.sleep(WATCH_S)
+    trace.send_signal(signal.SIGINT)
+    total = re.search(r"^\s*100\.00\s+\S+\s+\S+\s+(\d+).*total$", trace.communicate()[1], re.MULTILINE)
+    client = Client(pair.northbound)
+    frames = received(client) - before
+    client.close()
+    return int(total[1]) / frames if total and frames else None
+
+
+def kilobytes(pid, what):
+    return int(re.search(rf"^{what}:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text(), re.MULTILINE)[1])
+
+
+def allocations_in_use(pair):
+    """Allocations while a client asks, arms, drives and leaves."""
+    before = pair.allocated()
+    client = Client(pair.northbound)
+    for request in [{"cmd": "status"}, {"cmd": "watch", "topics": ["state", "force", "frame"], "rate_hz": 50}, {"cmd": "arm", "name": "bench"},
+                    *[{"cmd": "drive", "left_mm_s": 50, "right_mm_s": 50}] * 20, {"cmd": "stop"}, {"cmd": "why"}, {"cmd": "nonsense"}]:
+        client.ask(**request)
+        time.sleep(0.01)
+    client.close()
+    time.sleep(0.5)
+    return pair.allocated() - before
+
+
+def back_after_kill(pair):
+    """Seconds from SIGKILL to the first answer, with a supervisor that restarts at once."""
+    killed = time.monotonic()
+    pair.gateway.kill()
+    pair.gateway.wait()
+    pair.gateway = pair.start()
+    client = Client(pair.northbound)
+    client.ask(cmd="hello")
+    took = time.monotonic() - killed
+    client.close()
+    return took
+
+
+def measure(build):
+    """Rows of (metric, figure, goal)."""
+    with tempfile.TemporaryDirectory(prefix="iwheel-bench-") as folder:
+        pair = Pair(build, folder)
+        try:
+            Client(pair.northbound).close()
+            time.sleep(1.0)
+            calls = calls_per_frame(pair)
+            allocations = allocations_in_use(pair)
+            resident = kilobytes(pair.gateway.pid, "VmRSS")
+            own = kilobytes(pair.gateway.pid, "RssAnon")
+            threads = len(list(Path(f"/proc/{pair.gateway.pid}/task").iterdir()))
+            back = sorted(back_after_kill(pair) for _ in range(5))[2]
+        finally:
+            pair.end()
+    return [
+        ("system calls per frame received, no client", "not measured: no strace" if calls is None else f"{calls:.2f}", "≤ 2.5"),
+        ("resident memory", f"{resident / 1024:.1f} MiB, of it {own / 1024:.1f} MiB its own", "≤ 3 MiB"),
+        ("threads", str(threads), "1"),
+        ("allocations while a client watches, arms, drives, stops", str(allocations), "0"),
+        ("SIGKILL to first answer, median of 5", f"{back * 1000:.0f} ms", "≤ 300 ms"),
+    ]
+
+
+if __name__ == "__main__":
+    import sys
+    for row in measure(sys.argv[1]):
+        print(row)

@@ -1,0 +1,394 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""iwheelctl bringup from start to end against simulated wheels that are not as assumed, and its ways out.
+
+Usage: test_bringup.py BUILD [unittest's arguments]
+
+Without further arguments several tests run at a time, each in a process of its own: they wait more than they work.
+"""
+import concurrent.futures
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from operator_at_terminal import Operator
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
+from harness import Rig, find_program  # noqa: E402
+
+BUILD = ""
+GRAVITY = 9.8
+FULL_TURN_M_PER_MM = 2 * 3.14159265 / 1000
+
+
+def environment():
+    clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
+    return {**clean, "TERM": "dumb"}
+
+
+class Patient(Operator):
+    """Tries once more when the machine was too busy, as a person would."""
+
+    BUSY = ("held up for", "hardly in force")
+
+    def pump(self, seconds):
+        alive = super().pump(seconds)
+        at = self.text.find("Once more? [n] ", self.seen)
+        if at >= 0 and any(word in self.text[self.seen:at] for word in self.BUSY):
+            self.seen = at + len("Once more? [n] ")
+            time.sleep(0.02)
+            self.type("y\n")
+        return alive
+
+
+class Bringup(unittest.TestCase):
+    def setUp(self):
+        self.rig = Rig(BUILD)
+        self.addCleanup(self.rig.close)
+        self.folder = tempfile.TemporaryDirectory(prefix="iwheel-bringup-test-")
+        self.addCleanup(self.folder.cleanup)
+        self.out = os.path.join(self.folder.name, "mine.conf")
+        self.records = os.path.join(self.folder.name, "records")
+        with open(self.out + ".from", "w", encoding="utf-8") as file:
+            file.write(f"[record]\ndirectory = {self.records}\n")
+        time.sleep(0.5)
+
+    def start(self, *words):
+        operator = Patient([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--can",
+                             f"unix:{self.rig.path('bus')}", "--estop", f"unix:{self.rig.path('button')}", "--from",
+                             self.out + ".from", *words],
+                            environment())
+        self.addCleanup(operator.close)
+        return operator
+
+    def begin(self, *words, gear=False):
+        """Through the checks and the e-stop, and past the gear."""
+        operator = self.start(*words)
+        operator.answer("finger on the e-stop?", "y")
+        operator.expect("Press the e-stop button now")
+        self.rig.sim.ask("estop press")
+        operator.expect("Release it")
+        self.rig.sim.ask("estop release")
+        if not gear:
+            operator.answer("Turn the left wheel by hand?", "n")
+        return operator
+
+    def moving(self):
+        """Setpoints on the bus that are no zeros."""
+        time.sleep(0.05)
+        return [frame for frame in self.rig.bus.setpoints() if frame[2] != 0]
+
+    def value(self, section, key):
+        here = None
+        with open(self.out, encoding="utf-8") as file:
+            for line in file:
+                if line.startswith("["):
+                    here = line.strip()
+                elif here == f"[{section}]" and line.startswith(f"{key} "):
+                    return line.split("=", 1)[1].split(";")[0].strip()
+        raise AssertionError(f"no {section}.{key} in {self.out}")
+
+    def look_at_signs(self, operator, mirrored):
+        for side in ("left", "right"):
+            operator.answer(f"Look at the {side} wheel", "")
+            operator.answer("r: again)", "b" if side in mirrored else "f")
+        operator.answer("Now both", "")
+        operator.answer("straight ahead?", "y")
+
+    def weigh(self, operator, side, mass_kg):
+        operator.answer(f"put on the {side} handle", str(mass_kg))
+        operator.answer("off both handles", "")
+        operator.expect("measuring")
+        operator.expect("put the mass on")
+        self.rig.sim.ask(f"load {side} {mass_kg * GRAVITY:.2f}")
+        operator.type("\n")
+        operator.expect("the unit is")
+        self.rig.sim.ask(f"load {side} 0")
+
+    def turn_by_hand(self, operator, radius_mm, turns=3):
+        operator.answer("Turn the left wheel by hand?", "y")
+        operator.expect("press Enter ...")
+        self.rig.sim.ask(f"push left {turns * radius_mm * FULL_TURN_M_PER_MM:.3f}")
+        self.wait_until_stands()
+        operator.type("\n")
+        operator.answer("Take that?", "y")
+
+    def push(self, operator, distance_m, mirrored):
+        operator.answer("Distance in m", str(distance_m))
+        operator.answer("Stand at the start", "")
+        operator.expect("press Enter ...")
+        for side in ("left", "right"):
+            self.rig.sim.ask(f"push {side} {-distance_m if side in mirrored else distance_m}")
+        self.wait_until_stands()
+        operator.type("\n")
+
+    def wait_until_stands(self):
+        import json
+        time.sleep(0.2)
+        while any(json.loads(self.rig.sim.ask("status"))[side]["speed_mm_s"] for side in ("left", "right")):
+            time.sleep(0.05)
+        time.sleep(0.15)
+
+    def test_wheels_that_are_mirrored_in_other_units_and_of_another_radius(self):
+        for command in ("type 3", "role limit", "unit left dN", "unit right cN", "radius both 160", "mirror left on",
+                        "gear both 4", "rpm both rotor"):
+            self.rig.sim.ask(command)
+        os.mkdir(self.records)
+        operator = self.begin(gear=True)
+        self.turn_by_hand(operator, 160)
+        operator.answer("types to try", "0-7")
+        operator.answer("Did both wheels turn", "y")
+        operator.answer("current_role", "")
+        self.look_at_signs(operator, mirrored=("left",))
+        operator.answer("Measure the force?", "y")
+        self.weigh(operator, "left", 5)
+        self.weigh(operator, "right", 5)
+        self.push(operator, 5, mirrored=("left",))
+        operator.answer("Take the mean?", "y")
+        operator.answer("Write it to", "")
+        self.assertEqual(0, operator.wait(), operator.text[-2000:])
+        found = {(section, key): self.value(section, key) for section, key in (
+            ("wheels", "setpoint_type"), ("wheels", "current_role"), ("left", "invert"), ("right", "invert"),
+            ("left", "force_unit"), ("right", "force_unit"), ("wheels", "gear_ratio"), ("wheels", "rpm_of"),
+            ("drive", "max_speed_mm_s"), ("drive", "lease_ms"))}
+        self.assertEqual({("wheels", "setpoint_type"): "3", ("wheels", "current_role"): "limit",
+                          ("left", "invert"): "yes", ("right", "invert"): "no", ("left", "force_unit"): "dN",
+                          ("right", "force_unit"): "cN", ("wheels", "gear_ratio"): "4", ("wheels", "rpm_of"): "rotor",
+                          ("drive", "max_speed_mm_s"): "1000", ("drive", "lease_ms"): "200"}, found)
+        self.assertAlmostEqual(160, int(self.value("wheels", "radius_mm")), delta=2)
+        with open(self.out, encoding="utf-8") as file:
+            text = file.read()
+        self.assertEqual(8, text.count(", confirmed: "), text)
+        self.assertIn(f"The ledger in {self.records}", operator.text)
+        self.assertEqual(["mine.conf", "mine.conf.from", "records"], sorted(os.listdir(self.folder.name)))
+        self.gateway_takes_it()
+        self.ledger_knows_it()
+
+    def gateway_takes_it(self):
+        """The real gateway starts with the file, and its wheels go where they are told."""
+        done = subprocess.run([find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket",
+                               self.rig.path("gateway.sock"), "--check"], capture_output=True, text=True, check=False)
+        self.assertEqual(0, done.returncode, done.stdout + done.stderr)
+
+    def ledger_knows_it(self):
+        """A gateway that starts with the file finds the operator's word."""
+        self.rig.gateway_command = lambda *extra: [find_program(BUILD, "iwheel-gateway"), "-c", self.out, "--socket",
+                                                   self.rig.path("gateway.sock"), *extra]
+        self.rig.start_gateway()
+        client = self.rig.client()
+        entries = self.rig.wait_status(client, lambda s: s["memory"]["state"] == "kept")["ledger"]
+        for item in ("setpoint_type", "current_role", "mount_sign_left", "mount_sign_right", "wheel_radius", "gear_ratio",
+                     "force_unit_left", "force_unit_right"):
+            self.assertEqual("confirmed", entries[item]["state"], (item, entries[item]))
+
+    def test_current_that_is_a_setpoint_is_found_out(self):
+        self.rig.sim.ask("role setpoint")
+        operator = self.begin()
+        operator.answer("types to try", "7")
+        operator.answer("Did both wheels turn", "y")
+        operator.expect("it is a setpoint")
+        operator.answer("current_role", "")
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "q")
+        self.assertEqual(1, operator.wait())
+        self.assertIn("Nothing was written", operator.text)
+        self.assertFalse(os.path.exists(self.out))
+
+    def test_wheel_that_could_not_turn_by_current_alone_is_found_out_by_a_zero_that_turns_it(self):
+        self.rig.sim.ask("role setpoint")
+        operator = self.begin()
+        operator.answer("types to try", "7")
+        operator.expect("Did both wheels turn")
+        self.rig.sim.ask("block both")  # Held by somebody during both tries.
+        operator.seen -= len("Did both wheels turn")
+        operator.answer("Did both wheels turn", "y")
+        operator.expect("seems to be a limit")
+        self.rig.sim.ask("unblock both")
+        operator.expect("It TURNED")
+        self.assertEqual("setpoint", self.offered(operator, "current_role"))
+
+    def offered(self, operator, question):
+        operator.expect(question)
+        operator.expect("[")
+        return operator.expect("] ")
+
+    def test_silence_of_a_wheel_during_a_try_is_no_finding(self):
+        self.rig.sim.ask("role setpoint")
+        operator = self.begin()
+        operator.answer("types to try", "7")
+        operator.answer("Did both wheels turn", "y")
+        operator.expect("any key stops it")
+        self.rig.sim.ask("mute left")
+        self.assertRegex(operator.expect("Once more?"), "left wheel (is )?not heard")
+        self.rig.sim.ask("unmute left")
+        operator.type("y\n")
+        operator.expect("it is a setpoint")
+
+    def test_recording_of_another_controller_suggests_type_and_length(self):
+        recording = os.path.join(self.folder.name, "old.log")
+        with open(recording, "w", encoding="utf-8") as file:
+            for at in range(50):
+                file.write(f"({at * 0.02:.6f}) can0 10A#0300{at:02X}07D0000000\n({at * 0.02 + 0.001:.6f}) can0 "
+                           f"12A#0300{at:02X}07D0000000\n")
+        self.rig.sim.ask("type 3")
+        operator = self.begin("--learn", recording)
+        operator.expect("98 setpoints with a speed")
+        operator.expect("have 8 bytes")
+        operator.answer("types to try", "")
+        operator.answer("Did both wheels turn", "q")
+        self.assertEqual(1, operator.wait())
+        self.assertEqual({8}, {len(frame.data) for frame in self.rig.bus.frames if frame.id in (266, 298)})
+
+    def test_any_key_stops_the_wheels_at_once(self):
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.expect("any key stops it")
+        deadline = time.monotonic() + 5
+        while not self.moving() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        self.assertTrue(self.moving())
+        pressed_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
+        operator.type(" ")
+        operator.expect("STOPPED: a key was pressed")
+        late = [frame for frame in self.moving() if frame[0] > pressed_us + 150_000]
+        self.assertFalse(late, "nonzero setpoints after the key")
+        operator.answer("Once more?", "q")
+        self.assertEqual(1, operator.wait())
+
+    def test_no_type_that_moves_asks_again_and_takes_none(self):
+        self.rig.sim.ask("type 200")
+        operator = self.begin()
+        operator.answer("types to try", "nonsense")
+        operator.expect("Types are numbers")
+        operator.answer("types to try", "0-1")
+        operator.expect("None of these moved both wheels")
+        operator.answer("types to try", "q")
+        self.assertEqual(1, operator.wait())
+        self.assertFalse(os.path.exists(self.out))
+
+    def test_exchanged_wheels_end_it_with_the_cure(self):
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.answer("Did both wheels turn", "y")
+        operator.answer("current_role", "limit")
+        operator.answer("Look at the left wheel", "")
+        operator.answer("r: again)", "o")
+        operator.expect("exchange the wheels")
+        self.assertEqual(1, operator.wait())
+
+    def test_feedback_of_the_wrong_sign_is_no_matter_of_configuration(self):
+        self.rig.sim.ask("sign right swapped")
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.answer("Did both wheels turn", "y")
+        operator.answer("current_role", "limit")
+        operator.answer("Look at the left wheel", "")
+        operator.answer("r: again)", "f")
+        operator.answer("Look at the right wheel", "")
+        operator.expect("measures the opposite")
+        self.assertEqual(1, operator.wait())
+
+    def test_interrupt_while_wheels_turn_stops_them_and_leaves_nothing_behind(self):
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.expect("any key stops it")
+        time.sleep(0.5)
+        operator.type("\x03")
+        operator.answer("Once more?", "q")
+        self.assertEqual(1, operator.wait())
+        self.assertIn("STOPPED", operator.text)
+        time.sleep(0.3)
+        quiet = len(self.rig.bus.setpoints())
+        time.sleep(0.5)
+        self.assertEqual(quiet, len(self.rig.bus.setpoints()), "nobody sends any more")
+
+    def test_killed_bringup_takes_its_gateway_with_it(self):
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.expect("any key stops it")
+        time.sleep(0.5)
+        operator.process.kill()
+        killed_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
+        time.sleep(4.5)
+        self.assertFalse([frame for frame in self.moving() if frame[0] > killed_us + 1_000_000])
+        last = max(frame[0] for frame in self.rig.bus.setpoints())
+        self.assertLess(last, killed_us + 4_000_000, "its gateway ended")
+
+    def test_nothing_goes_without_the_checks_or_the_press(self):
+        self.rig.sim.ask("mute right")
+        operator = self.start()
+        operator.answer("finger on the e-stop?", "y")
+        operator.expect("Mend what failed")
+        self.assertEqual(1, operator.wait())
+        self.assertFalse(self.rig.bus.setpoints())
+
+    def test_existing_file_is_replaced_only_when_asked_and_kept(self):
+        with open(self.out, "w", encoding="utf-8") as file:
+            file.write("; precious\n")
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.answer("Did both wheels turn", "y")
+        operator.answer("current_role", "limit")
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "n")
+        operator.answer("Distance in m", "")
+        operator.answer("Write it to", "")
+        operator.answer("Replace it?", "")
+        operator.answer("Write it to", "")
+        operator.answer("Replace it?", "y")
+        self.assertEqual(0, operator.wait(), operator.text[-1500:])
+        with open(self.out + ".old", encoding="utf-8") as file:
+            self.assertEqual("; precious\n", file.read())
+        self.assertEqual("192", self.value("wheels", "radius_mm"))
+        self.assertIn("iwheelctl confirm mount_sign_left no", operator.text)
+
+    def test_a_running_gateway_is_not_driven_past(self):
+        self.rig.start_gateway()
+        operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "bringup",
+                             self.out, "--can", f"unix:{self.rig.path('bus')}"], environment())
+        self.addCleanup(operator.close)
+        operator.answer("finger on the e-stop?", "y")
+        operator.expect("A gateway already runs on this bus")
+        self.assertEqual(1, operator.wait())
+
+    def test_end_of_input_ends_it_and_wrong_words_are_usage(self):
+        program = find_program(BUILD, "iwheelctl")
+        done = subprocess.run([program, "bringup", "--can", f"unix:{self.rig.path('bus')}", "--estop", "none"],
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, env=environment(), check=False)
+        self.assertEqual(1, done.returncode)
+        self.assertIn("Nothing was written", done.stdout)
+        for words in (("--current", "5"), ("--learn", "/nonexistent"), ("--can",), ("a", "b"), ("--wheel",), ("--can", "a/b")):
+            done = subprocess.run([program, "bringup", *words], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                  env=environment(), check=False)
+            self.assertEqual(64, done.returncode, (words, done.stderr))
+
+
+def run_one(name):
+    """(name, exit code, output)"""
+    done = subprocess.run([sys.executable, os.path.abspath(__file__), BUILD, f"Bringup.{name}"], capture_output=True,
+                          text=True, check=False)
+    return name, done.returncode, done.stderr
+
+
+def run_all(at_a_time=3):
+    """What fails among others is judged once more, alone: these tests run in real time."""
+    names = unittest.TestLoader().getTestCaseNames(Bringup)
+    with concurrent.futures.ThreadPoolExecutor(at_a_time) as pool:
+        again = [name for name, code, _ in pool.map(run_one, names) if code]
+    failed = 0
+    for name in again:
+        _, code, output = run_one(name)
+        print(f"{'ok, alone' if code == 0 else 'FAIL'} {name}", output if code else "", flush=True)
+        failed += code != 0
+    print(f"{len(names) - failed} passed, {failed} failed, 0 skipped")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    BUILD = sys.argv.pop(1)
+    if len(sys.argv) > 1:
+        unittest.main()
+    sys.exit(run_all())

@@ -1,0 +1,170 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""iwheelctl doctor on the simulator's bus, with and without a gateway, as its user meets it.
+
+Usage: test_doctor.py BUILD [unittest's arguments]
+"""
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
+from harness import Rig, find_program  # noqa: E402
+
+BUILD = ""
+
+
+def environment():
+    clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
+    return {**clean, "TERM": "dumb"}
+
+
+class Doctor(unittest.TestCase):
+    def setUp(self):
+        self.rig = Rig(BUILD)
+        self.addCleanup(self.rig.close)
+        time.sleep(0.5)  # The simulated wheels boot.
+
+    def doctor(self, *words):
+        """(exit code, {check: [finding]}, the whole object)"""
+        done = subprocess.run([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "--json",
+                               "doctor", f"unix:{self.rig.path('bus')}", "--listen", "0.6s", *words],
+                              capture_output=True, text=True, timeout=30, env=environment(), check=False)
+        whole = json.loads(done.stdout)
+        checks = {}
+        for finding in whole["findings"]:
+            checks.setdefault(finding["check"], []).append(finding)
+            self.assertTrue(finding["verdict"] == "ok" or finding["cure"], f"no cure: {finding}")
+        return done.returncode, checks, whole
+
+    def verdict(self, checks, check):
+        return [finding["verdict"] for finding in checks.get(check, [])]
+
+    def button(self):
+        return ("--estop", f"unix:{self.rig.path('button')}")
+
+    def setpoints(self):
+        time.sleep(0.05)
+        return self.rig.bus.setpoints()
+
+    def test_healthy_pair_without_a_gateway_is_well_and_nothing_is_sent(self):
+        code, checks, whole = self.doctor(*self.button())
+        self.assertEqual((0, True, False), (code, whole["ok"], whole["gateway"]), whole)
+        self.assertEqual(["ok"], self.verdict(checks, "left_wheel"))
+        self.assertIn("none is running", checks["gateway"][0]["text"])
+        rates = {rate["id"]: rate["measured_mHz"] for rate in whole["rates"]}
+        self.assertAlmostEqual(250000, rates[256], delta=25000)
+        self.assertAlmostEqual(25000, rates[290], delta=5000)
+        self.assertIn("released, SIMULATED", checks["estop"][0]["text"])
+        self.assertFalse(self.setpoints())
+
+    def test_silent_wheel_is_named_with_exit_code_1(self):
+        self.rig.sim.ask("mute left")
+        code, checks, _ = self.doctor(*self.button())
+        self.assertEqual(1, code)
+        self.assertEqual(["fail"], self.verdict(checks, "left_wheel"))
+        self.assertEqual(["ok"], self.verdict(checks, "right_wheel"))
+
+    def test_lost_frames_show_in_the_rates(self):
+        self.rig.sim.ask("loss 40")
+        _, checks, _ = self.doctor(*self.button())
+        self.assertIn("warn", self.verdict(checks, "rates"))
+
+    def test_second_master_and_unknown_ids(self):
+        self.rig.sim.ask("foreign on")
+        self.rig.sim.ask("babble 333 20000 on")
+        code, checks, _ = self.doctor(*self.button())
+        self.assertEqual(1, code)
+        self.assertEqual(["fail"], self.verdict(checks, "second_master"))
+        self.assertIn("0x333", checks["unknown_ids"][0]["text"])
+
+    def test_bus_without_wheels_and_no_bus(self):
+        self.rig.sim.ask("power off")
+        code, checks, _ = self.doctor(*self.button())
+        self.assertEqual((1, ["fail"], ["fail"]),
+                         (code, self.verdict(checks, "left_wheel"), self.verdict(checks, "right_wheel")))
+        self.rig.sim.end()
+        code, checks, _ = self.doctor(*self.button())
+        self.assertEqual(1, code)
+        self.assertIn("nobody there", checks["interface"][0]["text"])
+        self.assertEqual(["fail"], self.verdict(checks, "estop"))
+
+    def test_beside_a_driving_gateway_its_setpoints_are_no_second_master(self):
+        self.rig.start_gateway()
+        client = self.rig.client()
+        client.request("arm")
+        code, checks, whole = self.doctor()
+        self.assertTrue(whole["gateway"])
+        self.assertEqual(0, code, whole)
+        self.assertNotIn("second_master", checks)
+        self.assertIn("serves unix:", checks["gateway"][0]["text"])
+        self.assertIn("ledger", checks)
+
+    def test_second_master_beside_a_gateway(self):
+        self.rig.start_gateway()
+        self.rig.sim.ask("foreign on")
+        time.sleep(0.1)
+        code, checks, _ = self.doctor()
+        self.assertEqual((1, ["fail"]), (code, self.verdict(checks, "second_master")))
+
+    def test_latched_gateway_names_the_way_out(self):
+        self.rig.start_gateway()
+        self.rig.sim.ask("estop press")
+        time.sleep(0.1)
+        _, checks, _ = self.doctor()
+        self.assertIn("iwheelctl reset", checks["gateway"][0]["cure"])
+        self.assertIn("pressed", checks["estop"][0]["text"])
+
+    def test_guided_press_on_a_terminal(self):
+        parent, child = pty.openpty()
+        process = subprocess.Popen([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"),
+                                    "doctor", f"unix:{self.rig.path('bus')}", "--listen", "0.3s", *self.button()],
+                                   stdin=child, stdout=child, stderr=child, env=environment(), close_fds=True)
+        os.close(child)
+        text, pressed, released = "", False, False
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            if select.select([parent], [], [], 0.1)[0]:
+                try:
+                    text += os.read(parent, 4096).decode()
+                except OSError:
+                    break
+            if "Press the e-stop button now" in text and not pressed:
+                pressed = True
+                self.rig.sim.ask("estop press")
+            if "Release it" in text and not released:
+                released = True
+                self.rig.sim.ask("estop release")
+        self.assertEqual(0, process.wait(5), text)
+        os.close(parent)
+        self.assertIn("press and release were seen", text)
+
+    def test_gateway_that_does_not_answer_is_told_and_its_estop_line_left_alone(self):
+        self.rig.start_gateway()
+        self.rig.gateway.signal(signal.SIGSTOP)
+        code, checks, _ = self.doctor()
+        self.rig.gateway.signal(signal.SIGCONT)
+        self.assertEqual(1, code)
+        self.assertIn("does not answer", checks["gateway"][0]["text"])
+        self.assertNotIn("estop", checks)
+        self.assertEqual(["ok"], self.verdict(checks, "left_wheel"))
+
+    def test_wrong_words(self):
+        for words, about in ((("--listen",), "--listen wants"), (("--listen", "0"), "0.2s to 60s"),
+                             (("--estop",), "wants a value"), (("a", "b"), "does not understand"),
+                             (("--frobnicate",), "does not understand"), (("eth0/..",), "IFACE")):
+            done = subprocess.run([find_program(BUILD, "iwheelctl"), "doctor", *words], capture_output=True, text=True,
+                                  timeout=30, env=environment(), check=False)
+            self.assertEqual(64, done.returncode, (words, done.stdout, done.stderr))
+            self.assertIn(about, done.stderr)
+
+
+if __name__ == "__main__":
+    BUILD = sys.argv.pop(1)
+    unittest.main()

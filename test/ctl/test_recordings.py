@@ -1,0 +1,404 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""iwheelctl decode, learn and replay: what they make of recordings, good ones and bad ones. Needs no gateway.
+
+Usage: test_recordings.py PROGRAM [unittest's arguments]
+"""
+import csv
+import io
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = ""
+GOLDEN = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "recordings")
+SECOND = "(1760000000.{:06d}) can0 {}\n"
+
+
+def run(*words, text="", **more):
+    """(exit code, stdout, stderr)"""
+    done = subprocess.run([PROGRAM, *words], input=text, capture_output=True, text=True, timeout=60,
+                          env=dict(os.environ, TZ="UTC"), **more)
+    return done.returncode, done.stdout, done.stderr
+
+
+def lines(*frames):
+    """A recording of these frames, a millisecond apart."""
+    return "".join(SECOND.format(1000 * i, frame) for i, frame in enumerate(frames))
+
+
+class Decode(unittest.TestCase):
+    def decode(self, text, *words):
+        return run("decode", *words, text=text)
+
+    def rows(self, text, *words):
+        code, out, err = self.decode(text, "--csv", *words)
+        self.assertEqual((0, ""), (code, err))
+        return list(csv.DictReader(io.StringIO(out)))
+
+    def test_every_message_is_shown_with_units(self):
+        code, out, err = self.decode(lines(
+            "10A#01012C07D0 T", "12A#01FED407D0 T", "100#000F0001", "120#FFF10001", "101#F81CFFFFFFFF1E",
+            "122#0097FFF80000FF92", "200#04D90007", "220#FF9D003E", "201#007C", "221#FF9C"))
+        self.assertEqual((0, ""), (code, err))
+        for part in (
+                "from 2025-10-09 08:53:20.000000 local time",
+                "0.000000   266 (0x10A) T left  setpoint  type 1, speed 300 mm/s, current 2000 mA",
+                "0.001000   298 (0x12A) T right setpoint  type 1, speed -300 mm/s, current 2000 mA",
+                "256 (0x100)   left  speed     15 rpm, acceleration 1 (unit unknown)",
+                "288 (0x120)   right speed     -15 rpm",
+                "left  status    battery 24.8 V, temperature 28 degC, odometry -1 ticks, CPU 30 %",
+                "right pose      x 151 mm, y -8 mm, z 0 mm, psi -110 mrad",
+                "left  force     raw 1241, force with offset 12.410 N, debug 7",
+                "right force     raw -99, force with offset -9.900 N, debug 62",
+                "left  offset    force offset 12.4 N",
+                "right offset    force offset -10.0 N"):
+            self.assertIn(part, out)
+
+    def test_csv_has_units_in_its_header_and_empty_cells_for_what_is_not_there(self):
+        row, other = self.rows(lines("10A#01012C07D0", "101#FFFF000000641E"))
+        self.assertEqual(("1760000000.000000", "266", "0x10A", "5", "left", "setpoint"), tuple(
+            row[name] for name in ("time_s", "id", "id_hex", "dlc_bytes", "wheel", "message")))
+        self.assertEqual(("1", "300", "2000", ""), tuple(row[name] for name in (
+            "setpoint_type", "setpoint_speed_mm_s", "setpoint_current_mA", "speed_rpm")))
+        self.assertEqual(("255", "", "100", "30"), tuple(other[name] for name in (
+            "battery_dV", "temperature_degC", "odometry_ticks", "cpu_percent")))
+        self.assertIn("impossible", other["note"])
+
+    def test_unknown_bad_and_strange_frames_are_shown_as_bytes_with_the_reason(self):
+        rows = self.rows(lines("123#0102", "10A#0101", "0000010A#0101F40064", "10A#R5", "10A##0" + "AB" * 64, "20000004#00"))
+        self.assertEqual(["unknown", "ignored", "ignored", "ignored", "ignored", "error"], [row["message"] for row in rows])
+        self.assertEqual("0102", rows[0]["data_hex"])
+        self.assertEqual("AB" * 64, rows[4]["data_hex"])
+        self.assertIn("shorter", rows[1]["note"])
+        self.assertIn("11-bit", rows[2]["note"])
+
+    def test_bad_lines_are_told_with_number_and_cure_and_lose_nothing_else(self):
+        code, out, err = self.decode(lines("100#00000000") + "garbage\r\n" + lines("100#00000001").replace("\n", "\r\n")
+                                     + "(1760000001.0) can0 100#0000")
+        self.assertEqual(65, code)
+        self.assertEqual(2, out.count("left  speed"))
+        self.assertIn("standard input:2: does not begin with a time in parentheses; record with candump -L", err)
+        self.assertIn("standard input:4: the last line has no line end", err)
+        self.assertIn("2 of 4 lines", err)
+
+    def test_thousand_bad_lines_are_counted_not_told(self):
+        code, _, err = self.decode("x\n" * 1000)
+        self.assertEqual(65, code)
+        self.assertLess(len(err.splitlines()), 15)
+        self.assertIn("1000 of 1000", err)
+
+    def test_screen_form_of_candump_is_recognised(self):
+        code, _, err = self.decode(" (1760000000.000000)  can0  10A   [5]  01 01 2C 07 D0\n")
+        self.assertEqual(65, code)
+        self.assertIn("screen form; record with candump -L", err)
+
+    def test_config_gives_the_unit_of_force(self):
+        with tempfile.NamedTemporaryFile("w", suffix=".conf") as file:
+            file.write("[left]\nforce_unit = dN\n")
+            file.flush()
+            row, = self.rows(lines("200#04D90000"), "--config", file.name)
+        self.assertEqual("124100", row["force_with_offset_mN"])
+
+    def test_interface_with_a_comma_stays_one_column(self):
+        row, = self.rows("(1.0) a,\"b 100#00000000\n")
+        self.assertEqual("a__b", row["interface"])
+
+    def test_time_that_goes_back_is_shown_as_it_is(self):
+        code, out, _ = self.decode("(10.5) can0 100#00000000\n(9.25) can0 100#00000000\n")
+        self.assertEqual(0, code)
+        self.assertIn("-1.250000", out)
+
+    def test_wrong_words_and_files_are_told(self):
+        for words, code, part in ((("--nonsense",), 64, "does not understand"), (("a", "b"), 64, '"b"'),
+                                  (("--config",), 64, "--config wants"), (("/nonexistent",), 65, "no such file"),
+                                  (("--config", "/nonexistent"), 78, "cannot be opened"), (("/",), 65, "directory")):
+            got, out, err = run("decode", *words)
+            self.assertEqual((code, ""), (got, out), words)
+            self.assertIn(part, err)
+
+    def test_empty_recording_is_told(self):
+        code, _, err = self.decode("")
+        self.assertEqual(65, code)
+        self.assertIn("there is no frame in it", err)
+
+    def test_huge_recording_is_streamed_in_constant_memory(self):
+        def resident_kB(blocks):
+            with tempfile.NamedTemporaryFile("w", suffix=".log") as file, tempfile.TemporaryFile("w+") as out:
+                for _ in range(blocks):
+                    file.write(block)
+                file.flush()
+                child = subprocess.Popen([PROGRAM, "decode", file.name, "--csv"], stdout=out)
+                _, status, usage = os.wait4(child.pid, 0)
+                child.returncode = os.waitstatus_to_exitcode(status)
+                out.seek(0)
+                self.assertEqual((0, 1000 * blocks + 1), (child.returncode, sum(1 for _ in out)))
+                return usage.ru_maxrss
+
+        block = lines(*["100#000F0001"] * 1000)
+        self.assertLess(resident_kB(300) - resident_kB(1), 3000)  # Of 11 MB.
+
+    def test_live_input_is_decoded_line_by_line(self):
+        child = subprocess.Popen([PROGRAM, "decode"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        try:
+            child.stdin.write(lines("100#000F0001"))
+            child.stdin.flush()
+            self.assertIn("standard input", child.stdout.readline())
+            self.assertIn("15 rpm", child.stdout.readline())
+        finally:
+            child.stdin.close()
+            child.stdout.close()
+            child.wait(5)
+
+
+class Replay(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+        for ending in ("log", "jsonl", "conf"):
+            shutil.copy(os.path.join(GOLDEN, f"estop.{ending}"), self.folder)
+
+    def replay(self, *words, name="estop.log"):
+        return run("replay", name, *words, cwd=self.folder)
+
+    def change(self, ending, change):
+        path = os.path.join(self.folder, f"estop.{ending}")
+        with open(path, encoding="utf-8") as file:
+            text = change(file.read())
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+
+    def test_golden_recording_decides_the_same_bytes_each_time(self):
+        with open(os.path.join(GOLDEN, "estop.replay"), encoding="utf-8") as file:
+            expected = file.read()
+        for _ in range(3):
+            self.assertEqual((0, expected, ""), self.replay())
+        self.assertRegex(expected, r"setpoints on the bus: (\d+) of \1 as recorded")
+
+    def test_other_configuration_shows_as_other_setpoints(self):
+        self.change("conf", lambda text: text.replace("accel_mm_s2 = 800", "accel_mm_s2 = 400"))
+        code, out, _ = self.replay()
+        self.assertEqual(0, code)
+        same, of = (int(out.split("setpoints on the bus: ")[1].split()[i]) for i in (0, 2))
+        self.assertLess(same, of)
+
+    def test_another_decision_than_recorded_is_told(self):
+        self.change("jsonl", lambda text: text.replace('"type":"stopped"', '"type":"stopped"').replace(
+            '"cause":"estop_line","side":null,"detail":1}', '"cause":"wheel_lost","side":null,"detail":51}'))
+        _, out, _ = self.replay()
+        self.assertIn("DIFFERENT  last stop estop_line (1), when it was recorded wheel_lost (51)", out)
+        self.assertIn("stops: 0 of 1 as recorded", out)
+
+    def test_a_press_that_is_left_out_changes_what_is_decided(self):
+        self.change("jsonl", lambda text: "".join(
+            line for line in text.splitlines(True) if '"type":"estop_line"' not in line or '"answer":0' in line))
+        _, out, _ = self.replay()
+        self.assertNotIn("estop_line: e-stop", out)
+        self.assertIn("DIFFERENT  state armed, when it was recorded latched", out)
+
+    def test_frames_alone_are_listened_to_with_a_configuration(self):
+        os.remove(os.path.join(self.folder, "estop.jsonl"))
+        code, out, _ = self.replay()
+        self.assertEqual(0, code)
+        self.assertIn("frames only: nobody arms", out)
+        self.assertIn("listening, 0 stops", out)
+        self.assertIn("left heard", out)
+        os.remove(os.path.join(self.folder, "estop.conf"))
+        code, _, err = self.replay()
+        self.assertEqual(64, code)
+        self.assertIn("--config FILE", err)
+
+    def test_setpoints_of_another_controller_are_a_second_master(self):
+        with open(os.path.join(self.folder, "other.log"), "w", encoding="utf-8") as file:
+            file.write(lines("100#00000000", "120#00000000", "10A#0101F40064"))
+        code, out, _ = self.replay("--config", "estop.conf", name="other.log")
+        self.assertEqual(0, code)
+        self.assertIn("fault      second_master", out)
+
+    def test_cut_files_are_replayed_as_far_as_they_go_and_told(self):
+        self.change("jsonl", lambda text: text[:len(text) // 2])
+        self.change("log", lambda text: text[:len(text) * 2 // 3])
+        code, out, err = self.replay()
+        self.assertEqual(65, code)
+        self.assertIn("not whole", out)
+        self.assertIn("not a JSON object", err)
+        self.assertIn("may be cut", err)
+
+    def test_hostile_events_end_nothing(self):
+        numbers = ("-1", "1e999", "99999999999999999999", "9223372036854775807", "null", '"x"', "[]")
+        for number in numbers:
+            with self.subTest(number):
+                self.setUp()
+                self.change("jsonl", lambda text, number=number: "".join(
+                    line.replace('"answer":0', f'"answer":{number}').replace('"left_mm_s":300', f'"left_mm_s":{number}')
+                    .replace('"age_us":', f'"age_us":{number},"was":') for line in text.splitlines(True)))
+                code, out, _ = self.replay()
+                self.assertIn(code, (0, 65))
+                self.assertIn("# end:", out)
+
+    def test_long_silence_is_cut(self):
+        with open(os.path.join(self.folder, "gap.log"), "w", encoding="utf-8") as file:
+            file.write("(1.0) can0 100#00000000\n(900000000000.0) can0 100#00000000\n(5.0) can0 100#00000000\n")
+        code, out, _ = self.replay("--config", "estop.conf", name="gap.log")
+        self.assertEqual(0, code)
+        self.assertIn("cut to 60 s", out)
+        self.assertIn("time goes back 1 times", out)
+
+    def test_wrong_words_are_told(self):
+        for words, code, part in (((), 64, "wants a recording"), (("--x",), 64, "does not understand"),
+                                  (("/nonexistent.log",), 65, "no such file"), (("a", "b"), 64, '"b"')):
+            got, out, err = run("replay", *words)
+            self.assertEqual((code, ""), (got, out))
+            self.assertIn(part, err)
+
+
+class Why(unittest.TestCase):
+    def test_recorded_stop_is_told_without_a_gateway(self):
+        code, out, err = run("why", "estop.jsonl", "--frames", "3", cwd=GOLDEN)
+        self.assertEqual((0, ""), (code, err))
+        shown = out.splitlines()
+        self.assertIn("pressed while driving 300/-100 mm/s", shown[0])
+        self.assertIn("iwheelctl replay estop.log", shown[2])
+        moment = next(i for i, line in enumerate(shown) if line.startswith("------ stop"))
+        self.assertEqual(4, moment - 3)
+        self.assertEqual(3, len(shown) - moment - 1)
+        self.assertIn("speed 0 mm/s", shown[moment + 1])
+
+    def test_list_of_a_directory(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for number, cause in ((2, "estop_line"), (11, "wheel_lost")):
+                for ending in ("log", "jsonl", "conf"):
+                    shutil.copy(os.path.join(GOLDEN, f"estop.{ending}"),
+                                os.path.join(folder, f"stop-{number:06d}-{cause}.{ending}"))
+            with open(os.path.join(folder, "stop-000012-x.jsonl"), "w", encoding="utf-8") as file:
+                file.write('{"type":"blackbox"}\n')
+            with open(os.path.join(folder, "stop-000013-x.jsonl"), "w", encoding="utf-8") as file:
+                file.write("rubbish")
+            code, out, err = run("why", "--list", "--directory", folder)
+            self.assertEqual(0, code)
+            self.assertEqual(["2", "11", "12"], [line.split()[0] for line in out.splitlines() if line[:6].strip()][:3])
+            self.assertIn("-- (the recording is cut)", out)
+            self.assertIn("stop-000013-x.jsonl", err)
+            code, out, _ = run("why", "11", "--directory", folder)
+            self.assertEqual(0, code)
+            self.assertIn("stop-000011-wheel_lost.log", out)
+            code, _, err = run("why", "5", "--directory", folder)
+            self.assertEqual(65, code)
+            self.assertIn("why --list", err)
+
+    def test_directory_that_is_not_there(self):
+        code, _, err = run("why", "--list", "--directory", "/nonexistent")
+        self.assertEqual(69, code)
+        self.assertIn("--directory DIR", err)
+
+
+class Learn(unittest.TestCase):
+    """Drives of made-up controllers, a frame every 20 ms for each wheel, telemetry as told."""
+
+    def story(self, types=(3, 3), current=lambda speed: 1500, sign=(1, 1), raw=(200, 20), offset=(20, 20), gear=1.0,
+              extra=b"", mark=""):
+        text = []
+        ticks = [0.0, 0.0]
+
+        def put(at_ms, frame):
+            text.append((at_ms, f"(1760000{at_ms // 1000:03d}.{at_ms % 1000:03d}000) can0 {frame}{mark if frame[:3] in ('10A', '12A') else ''}\n"))
+
+        for at_ms in range(0, 12000, 20):
+            speed = 0 if at_ms < 2000 else 400 if at_ms < 7000 else -400
+            rpm = 0 if at_ms < 2200 else round(speed / 20.106 * gear)
+            for side, (setpoint, measured, status, force, zero) in enumerate((
+                    ("10A", "100", "101", "200", "201"), ("12A", "120", "121", "220", "221"))):
+                put(at_ms, f"{setpoint}#{struct.pack('>Bhh', types[side], speed, current(speed)).hex()}{extra.hex()}")
+                put(at_ms + 1, f"{measured}#{struct.pack('>hh', rpm * sign[side], 0).hex()}")
+                ticks[side] += abs(rpm) / 60000 * 20 * 60
+                if at_ms % 40 == 0:
+                    put(at_ms + 2, f"{status}#F81C{struct.pack('>i', int(ticks[side])).hex()}1E")
+                put(at_ms + 3, f"{force}#{struct.pack('>hh', raw[side], 0).hex()}")
+                if at_ms % 1000 == 0 and offset[side] is not None:
+                    put(at_ms + 4, f"{zero}#{struct.pack('>h', offset[side]).hex()}")
+        return "".join(line for _, line in sorted(text, key=lambda item: item[0])).upper().replace("CAN0", "can0")
+
+    def learn(self, **how):
+        code, out, err = run("learn", "-", text=self.story(**how))
+        self.assertEqual((0, ""), (code, err))
+        return out
+
+    def test_type_ranges_length_and_period_are_told_and_suggested(self):
+        out = self.learn(types=(7, 7), extra=b"\0\0\0")
+        for part in ("type       7 (100 %)", "speed      -400 to 400 mm/s", "current    always 1500 mA",
+                     "length     always 8 bytes", "period     20 ms", "+ setpoint type 7 moves the wheels",
+                     "+ current_role = limit", "+ left: a positive setpoint is measured as a positive speed",
+                     "setpoint_type = 7", "current_role = limit", "setpoint_dlc = 8"):
+            self.assertIn(part, out)
+
+    def test_current_with_the_sign_of_the_speed_is_a_setpoint(self):
+        out = self.learn(current=lambda speed: speed * 2)
+        self.assertIn("+ current_role = setpoint", out)
+        self.assertIn("current_role = setpoint\n", out)
+
+    def test_current_that_fits_neither_is_not_suggested(self):
+        out = self.learn(current=lambda speed: 100 if speed else 50)
+        self.assertIn("? current role: the currents fit neither", out)
+        self.assertNotIn("current_role =", out.split("For the configuration")[1])
+
+    def test_different_types_left_and_right_are_counter_evidence(self):
+        out = self.learn(types=(1, 2))
+        self.assertIn("- setpoint type: several, or different ones", out)
+        self.assertNotIn("setpoint_type =", out)
+
+    def test_wheel_that_turns_against_its_command_is_told(self):
+        out = self.learn(sign=(1, -1))
+        self.assertIn("- right: a positive setpoint is measured as a NEGATIVE speed", out)
+        self.assertIn("+ left: a positive", out)
+
+    def test_units_of_force_are_weighed_against_the_document(self):
+        out = self.learn(raw=(20, 200), offset=(20, 20))
+        self.assertIn("- left force at rest / offset = 1.00: dN per count (the document says cN)", out)
+        self.assertIn("- right force at rest / offset = 10.00: cN per count (the document says dN)", out)
+        self.assertIn("[left]\nforce_unit = dN\n[right]\nforce_unit = cN", out)
+        out = self.learn(raw=(0, 80), offset=(20, 20))
+        self.assertIn("- left force at rest / offset = 0.00: the wheel subtracts the offset itself", out)
+        self.assertIn("- right force at rest / offset = 4.00: neither", out)
+        self.assertNotIn("force_unit =", out)
+        self.assertIn("? left force unit: needs", self.learn(offset=(None, 5)))
+
+    def test_gear_shows_against_the_setpoint_and_against_the_ticks(self):
+        out = self.learn(gear=3.0)
+        self.assertRegex(out, r"- left: 6\.\d+ mm/s of setpoint per measured rpm")
+        self.assertRegex(out, r"\+ left: (59|60)\.\d ticks per turn")
+        self.assertRegex(self.learn(), r"\+ left: 20\.\d+ mm/s of setpoint per measured rpm")
+
+    def test_setpoints_sent_by_the_recorder_prove_nothing(self):
+        self.assertIn("- all setpoints are marked as sent by the program", self.learn(mark=" T"))
+
+    def test_two_controllers_show(self):
+        text = lines(*(f"10A#{1 + i % 2:02X}012C07D0" for i in range(100)))
+        _, out, _ = run("learn", "-", text=text)
+        self.assertIn("- left: the type changes with every other setpoint: two controllers", out)
+
+    def test_oddities_are_told(self):
+        text = lines("10A#0101F4FFFF07", "10A#0101F40BB8", "10A#R5", "0000010A#00", "10A#01", "20000004#00", "333#00")
+        code, out, _ = run("learn", "-", text=text + lines("100#00000000"))
+        self.assertEqual(0, code)
+        for part in ("2 remote, extended or FD frames", "1 frames are shorter", "1 reports of errors", "time goes back 1 times",
+                     "1 setpoints with a current beyond", "1 setpoints have something behind", "819 (0x333)"):
+            self.assertIn(part, out)
+
+    def test_without_setpoints_the_answer_is_no(self):
+        code, out, _ = run("learn", "-", text=lines("100#00000000"))
+        self.assertEqual(1, code)
+        self.assertIn("? setpoint type and current role: no setpoint", out)
+
+    def test_wrong_words_are_told(self):
+        for words, code in (((), 64), (("--x",), 64), (("a", "b"), 64), (("/nonexistent",), 65)):
+            self.assertEqual((code, ""), run("learn", *words)[:2])
+
+
+if __name__ == "__main__":
+    PROGRAM = os.path.abspath(sys.argv.pop(1))
+    unittest.main(verbosity=2)

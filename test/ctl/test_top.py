@@ -1,0 +1,275 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""iwheelctl top on terminals of many sizes, seen through a terminal emulator (pyte, from PyPI).
+
+Usage: test_top.py BUILD [unittest's arguments]
+Exit code 77: pyte is not there.
+"""
+import glob
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import unittest
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+sys.path += [os.path.join(ROOT, "test", "system"), *glob.glob(os.path.join(ROOT, ".venv", "lib", "python3*", "site-packages"))]
+try:
+    import pyte
+except ImportError:
+    print("skip: pyte is missing (pip install -r scripts/requirements.txt into .venv; ./check does it)")
+    sys.exit(77)
+from fake_gateway import FakeGateway, snapshot  # noqa: E402
+from harness import Rig, find_program  # noqa: E402
+from operator_at_terminal import Operator  # noqa: E402
+
+BUILD = ""
+
+
+def environment(**more):
+    clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR", "LC_ALL")}
+    return {**clean, "TERM": "xterm-256color", "LANG": "C.UTF-8", **more}
+
+
+class Top:
+    """The program on an emulated terminal."""
+
+    def __init__(self, path, columns=80, rows=24, **more):
+        self.operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", path, "top"], environment(**more),
+                                 columns, rows)
+        self.screen = pyte.Screen(columns, rows)
+        self.stream = pyte.ByteStream(self.screen)
+        self.fed = 0
+
+    def look(self, seconds=0.0):
+        """The rows of the screen."""
+        end = time.monotonic() + seconds
+        while True:
+            self.operator.pump(0.05)
+            self.stream.feed(self.operator.raw[self.fed:])
+            self.fed = len(self.operator.raw)
+            if time.monotonic() >= end:
+                return list(self.screen.display)
+
+    def wait_for(self, text, seconds=8.0):
+        """The screen once the text is on it, and all that was drawn with it."""
+        end = time.monotonic() + seconds
+        while True:
+            rows = self.look()
+            if any(text in row for row in rows):
+                return self.look(0.2)
+            if time.monotonic() > end:
+                raise AssertionError(f"{text!r} is not on the screen:\n" + "\n".join(rows))
+
+    def blocks(self, row):
+        """The big letters: which cells of a row are painted."""
+        return "".join("#" if self.screen.buffer[row][x].reverse else " " for x in range(self.screen.columns)).rstrip()
+
+    def resize(self, columns, rows):
+        self.screen.resize(rows, columns)
+        self.operator.resize(columns, rows)
+
+    def press(self, key):
+        self.operator.type(key)
+
+    def end(self):
+        self.operator.type("q")
+        code = self.operator.wait()
+        self.operator.close()
+        return code
+
+
+class WithWheels(unittest.TestCase):
+    def setUp(self):
+        self.rig = Rig(BUILD)
+        self.addCleanup(self.rig.close)
+        self.rig.start_gateway()
+
+    def top(self, *size, **more):
+        top = Top(self.rig.path("gateway.sock"), *size, **more)
+        self.addCleanup(top.operator.close)
+        return top
+
+    def drive(self, left, right):
+        process = subprocess.Popen([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), "drive",
+                                    str(left), str(right), "--for", "20s"], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.terminate)
+        return process
+
+    def see_driving(self, top):
+        """The screen while it drives; a drive that a busy machine ended is begun again."""
+        for _ in range(5):
+            process = self.drive(300, -150)
+            while process.poll() is None:
+                rows = top.look()
+                if any("does" in row and "│███" in row for row in rows) and any("300 mm/s" in row for row in rows):
+                    return top.look(0.5)
+        raise AssertionError("it never drove:\n" + "\n".join(rows))
+
+    def test_one_screen_shows_everything_and_the_state_in_big_letters(self):
+        top = self.top()
+        rows = top.wait_for("LEDGER")
+        self.assertEqual(24, len(rows))
+        for text in ("e-stop released (SIMULATED)", "LEFT   told", "RIGHT  told", "force", "24.8 V", "BUS     active",
+                     "GAPS", "worst --", "STOP    at most", "SPACE stop   E e-stop   R reset   Q quit", "1 warning"):
+            self.assertTrue(any(text in row for row in rows), (text, rows))
+        self.assertEqual(" #      ###   #### #####", top.blocks(1)[:24])  # L I S T
+        self.assertEqual(" #####  ###  ####    #", top.blocks(5)[:22].rstrip())
+        self.assertEqual(0, top.end())
+
+    def test_bars_follow_the_wheels_and_space_stops_them(self):
+        top = self.top()
+        top.wait_for("LEDGER")
+        rows = self.see_driving(top)
+        left, right = (next(row for row in rows if row.startswith(f" {name}")) for name in ("LEFT", "RIGHT"))
+        self.assertIn("│███", left, rows)
+        self.assertIn("███│", right)
+        self.assertNotIn("███│", left)
+        self.assertTrue(any("iwheelctl drives (pid" in row for row in rows), rows)
+        self.assertTrue(any("worst" in row and "--" not in row for row in rows), rows)
+        top.press(" ")
+        top.wait_for("stop: done, now stopping")
+        rows = top.wait_for("last stop: ")
+        self.assertTrue(any("client stop" in row for row in rows), rows)
+        self.assertEqual(0, top.end())
+
+    def test_keys_latch_and_reset(self):
+        top = self.top()
+        top.wait_for("LEDGER")
+        top.press("E")
+        rows = top.wait_for("estop software")
+        self.assertEqual(" #      ###  ##### ", top.blocks(1)[:19])  # L A T
+        self.assertTrue(any("then: iwheelctl reset" in row for row in rows))
+        top.look(1.2)  # The cause must not have been seen for a second.
+        top.press("r")
+        top.wait_for("reset: done")
+        top.wait_for("ready: iwheelctl drive")
+        self.rig.sim.ask("estop press")
+        top.wait_for("e-stop pressed")
+        top.wait_for("estop line")
+        top.press("r")
+        top.wait_for("reset refused")
+        self.assertEqual(0, top.end())
+
+    def test_every_size_shows_the_state_and_resizing_does_no_harm(self):
+        top = self.top()
+        top.wait_for("LEDGER")
+        for columns, rows in ((60, 24), (40, 12), (20, 4), (10, 2), (200, 60), (30, 24), (80, 10), (80, 24)):
+            top.resize(columns, rows)
+            screen = top.look(0.5)
+            self.assertEqual((rows, columns), (len(screen), len(screen[0])))
+            big = rows >= 20 and columns >= 55
+            self.assertTrue(big and "#" in top.blocks(1) or any("LISTENING" in row for row in screen),
+                            (columns, rows, screen))
+            if columns >= 40 and rows >= 10:
+                self.assertTrue(any("mm/s" in row for row in screen), (columns, rows, screen))
+            if columns >= 20 and rows >= 4:
+                self.assertTrue(any("SPACE stop" in row for row in screen), (columns, rows, screen))
+        self.assertEqual(0, top.end())
+
+    def test_it_waits_for_a_gateway_that_went_and_comes(self):
+        top = self.top()
+        top.wait_for("LEDGER")
+        self.rig.kill_gateway(signal.SIGKILL)
+        top.wait_for("waiting for it to come back")
+        rows = top.look(0.3)
+        self.assertFalse(any("mm/s" in row for row in rows), "no old speeds")
+        self.assertEqual(" #   #  ###", top.blocks(1)[:11])  # N O
+        self.rig.start_gateway()
+        top.wait_for("LEDGER")
+        self.assertEqual(0, top.end())
+
+    def test_gateway_that_hangs_is_told(self):
+        top = self.top(40, 12)  # Small, so that the word is written in plain letters.
+        top.wait_for("LISTENING")
+        self.rig.gateway.signal(signal.SIGSTOP)
+        top.wait_for("NO ANSWER")
+        self.rig.gateway.signal(signal.SIGCONT)
+        top.wait_for("LISTENING")
+        self.assertEqual(0, top.end())
+
+    def test_lost_wheel_is_marked_and_unknown_values_are_dashes(self):
+        top = self.top()
+        top.wait_for("LEDGER")
+        self.rig.sim.ask("mute right")
+        top.wait_for("LOST")
+        rows = top.look(0.5)
+        does = next(row for row in rows if "LOST" in row)
+        self.assertTrue(does.rstrip().endswith("--"), does)
+        self.assertEqual(0, top.end())
+
+    def test_without_colours_there_are_none_but_emphasis(self):
+        for more in ({"NO_COLOR": "1"}, {"TERM": "vt100"}):
+            top = self.top(**more)
+            top.wait_for("LEDGER")
+            raw = top.operator.raw
+            self.assertNotRegex(raw, rb"\x1b\[[0-9;]*3[0-7]m", more)
+            self.assertIn("#", top.blocks(1))
+            self.assertEqual(0, top.end())
+
+    def test_without_utf8_bars_are_of_ascii(self):
+        top = self.top(LANG="C")
+        rows = top.wait_for("LEDGER")
+        self.assertTrue(all(ord(c) < 128 for row in rows for c in row), rows)
+        self.assertEqual(0, top.end())
+
+    def test_signal_leaves_the_terminal_in_order(self):
+        top = self.top()
+        top.wait_for("LEDGER")
+        top.operator.process.send_signal(signal.SIGTERM)
+        self.assertEqual(0, top.operator.wait())
+        self.assertIn(b"\x1b[?1049l", top.operator.raw)
+
+
+class WithoutWheels(unittest.TestCase):
+    def test_no_gateway_is_waited_for_with_the_reason(self):
+        top = Top("/nonexistent/gateway.sock")
+        self.addCleanup(top.operator.close)
+        top.wait_for("no gateway answers; start it")
+        self.assertEqual(0, top.end())
+
+    def test_hostile_names_cannot_command_the_terminal(self):
+        evil = "\x1b]0;owned\x07\x1b[2Jevil\u009b31m" + "x" * 200
+
+        class Hostile(FakeGateway):
+            def on_watch(self, connection, request):
+                def stream():
+                    try:
+                        for _ in range(20):
+                            self.say(connection, {"event": "state", **snapshot(
+                                "armed", lease={"holder": 7, "name": evil, "pid": 1, "remaining_ms": 5, "lease_ms": 200},
+                                warnings=[evil], ledger={evil: {"state": "contradicted"}})})
+                            time.sleep(0.1)
+                    except OSError:
+                        pass
+                threading.Timer(0.2, stream).start()
+                return super().on_watch(connection, request)
+
+        gateway = Hostile()
+        self.addCleanup(gateway.close)
+        top = Top(gateway.path)
+        self.addCleanup(top.operator.close)
+        top.wait_for("evil")
+        self.assertNotIn(b"\x1b]0;owned", top.operator.raw)
+        self.assertNotIn("\u009b".encode(), top.operator.raw)
+        self.assertEqual("", top.screen.title)
+        self.assertEqual(0, top.end())
+
+    def test_not_a_terminal_and_an_unknown_one_are_usage(self):
+        done = subprocess.run([find_program(BUILD, "iwheelctl"), "top"], stdin=subprocess.DEVNULL, capture_output=True,
+                              text=True, env=environment(), check=False)
+        self.assertEqual(64, done.returncode)
+        self.assertIn("iwheelctl status", done.stderr)
+        operator = Operator([find_program(BUILD, "iwheelctl"), "top"], environment(TERM="no-such-thing"))
+        self.addCleanup(operator.close)
+        operator.expect("is not known here")
+        self.assertEqual(64, operator.wait())
+
+
+if __name__ == "__main__":
+    BUILD = sys.argv.pop(1)
+    unittest.main()

@@ -1,0 +1,94 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Other people's programs read a recording of the black box as it is, and cantools with share/iwheel.dbc sees in it what
+`iwheelctl decode` sees. Usage: test_readers.py IWHEELCTL"""
+import csv
+import io
+import shutil
+import subprocess
+import sys
+import unittest
+from decimal import Decimal
+from pathlib import Path
+
+import can
+import cantools
+from cantools import logreader
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORDING = ROOT / "test/recordings/estop.log"
+LINES = RECORDING.read_text(encoding="ascii").splitlines()
+PROGRAM = []
+# The decoder's columns beside the DBC's names.
+COLUMN = {"speed_mm_s": "setpoint_speed_mm_s", "current_mA": "setpoint_current_mA", "x_mm": "pose_x_mm", "y_mm": "pose_y_mm",
+          "z_mm": "pose_z_mm", "psi_mrad": "pose_psi_mrad", "normal_force_cN": "force_raw", "normal_force_dN": "force_raw",
+          "debug_raw": "force_debug_raw"}
+
+
+def rows():
+    done = subprocess.run([*PROGRAM, "decode", "--csv", str(RECORDING)], capture_output=True, text=True, check=True)
+    return list(csv.DictReader(io.StringIO(done.stdout)))
+
+
+class Readers(unittest.TestCase):
+    def test_python_can_reads_every_frame_with_time_and_direction(self):
+        with can.CanutilsLogReader(str(RECORDING)) as reader:
+            messages = list(reader)
+        self.assertEqual(len(LINES), len(messages))
+        for line, message in zip(LINES, messages):
+            self.assertEqual(line.endswith("R"), message.is_rx)
+            self.assertAlmostEqual(float(line[1:line.index(")")]), message.timestamp, places=5)
+            self.assertEqual(line.split()[2], f"{message.arbitration_id:03X}#{message.data.hex().upper()}")
+
+    def test_cantools_reads_every_line_and_decodes_the_same_values(self):
+        database = cantools.database.load_file(ROOT / "share/iwheel.dbc")
+        with open(RECORDING, encoding="ascii") as file:
+            frames = [frame for _, frame in logreader.Parser(file).iterlines() if frame is not None]
+        decoded = rows()
+        self.assertEqual((len(LINES), len(LINES)), (len(frames), len(decoded)))
+        compared = 0
+        for frame, row in zip(frames, decoded):
+            self.assertEqual(frame.frame_id, int(row["id"]))
+            for name, value in database.decode_message(frame.frame_id, frame.data).items():
+                self.assertEqual(Decimal(value), Decimal(row[COLUMN.get(name, name)]), (row, name))
+                compared += 1
+        self.assertGreater(compared, 2 * len(LINES))
+
+    def test_what_python_can_writes_is_read_back(self):
+        path = Path(self.id().replace("/", "_") + ".log").name
+        folder = Path(subprocess.run(["mktemp", "-d"], capture_output=True, text=True, check=True).stdout.strip())
+        self.addCleanup(shutil.rmtree, folder)
+        with can.CanutilsLogWriter(str(folder / path), channel="vcan0") as writer:
+            for i, more in enumerate(({}, {"is_extended_id": True}, {"is_remote_frame": True, "dlc": 5},
+                                      {"is_fd": True, "data": bytes(12)}, {"is_rx": False})):
+                message = {"arbitration_id": 266, "data": b"\1\1\x2c\7\xd0", "is_extended_id": False, "timestamp": 1e9 + i, **more}
+                if message.get("is_remote_frame"):
+                    message["data"] = b""
+                writer(can.Message(**message))
+        done = subprocess.run([*PROGRAM, "decode", "--csv", str(folder / path)], capture_output=True, text=True, check=False)
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.assertEqual(["setpoint", "ignored", "ignored", "ignored", "setpoint"],
+                         [row["message"] for row in csv.DictReader(io.StringIO(done.stdout))])
+
+    @unittest.skipUnless(shutil.which("log2long"), "can-utils is not installed (apt-get install can-utils)")
+    def test_can_utils_read_every_frame(self):
+        with open(RECORDING, encoding="ascii") as file:
+            done = subprocess.run(["log2long"], stdin=file, capture_output=True, text=True, check=True)
+        self.assertEqual(len(LINES), len([line for line in done.stdout.splitlines() if line.startswith("(")]))
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    PROGRAM.append(sys.argv[1])
+    suite = unittest.defaultTestLoader.loadTestsFromModule(sys.modules[__name__])
+    result = unittest.TextTestRunner(verbosity=2, stream=sys.stdout).run(suite)
+    failed = len(result.failures + result.errors)
+    for case, reason in result.skipped:
+        print(f"skip: {case}: {reason}")
+    print(f"{result.testsRun - failed - len(result.skipped)} passed, {failed} failed, {len(result.skipped)} skipped")
+    return 0 if result.wasSuccessful() and result.testsRun > 0 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

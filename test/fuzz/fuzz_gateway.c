@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: MIT
+// A gateway in a world that does whatever the bytes say: times, frames, echoes that lie, bus, button, requests. Whatever
+// happens, only setpoints within the limits leave, and none but zero after a cut until arm and a drive were accepted.
+#include "fuzz.h"
+
+#include "iwheel/gateway.h"
+
+#define RX_MAX 16U
+
+typedef struct {
+    iw_gateway_t gateway;
+    iw_config_t config;
+    iw_time_us_t now_us;
+    iw_can_frame_t rx[RX_MAX];
+    uint32_t received;
+    iw_bus_state_t bus;
+    int estop;
+    bool takes;
+    bool purges;
+    bool cut;
+    bool arm_after_cut;
+} world_t;
+
+static int32_t word_at(const uint8_t *bytes) {
+    return (int16_t)(bytes[0] << 8 | bytes[1]);
+}
+
+static int world_send(void *context, const iw_can_frame_t *frame) {
+    const world_t *const world = context;
+    const iw_config_t *const config = &world->config;
+    const int32_t speed = word_at(&frame->data[1]);
+    const int32_t current = word_at(&frame->data[3]);
+    const bool zero = speed == 0 && (config->current_role == IW_ROLE_LIMIT || current == 0);
+    fuzz_require(frame->id == IW_ID_LEFT_SETPOINT || frame->id == IW_ID_RIGHT_SETPOINT, "only setpoints leave");
+    fuzz_require(frame->dlc == config->setpoint_dlc && frame->data[0] == config->setpoint_type, "as configured");
+    fuzz_require(abs(speed) <= config->max_speed_mm_s && abs(current) <= config->max_current_mA, "within the limits");
+    fuzz_require(zero || !world->cut, "nothing but zero until armed and commanded anew");
+    fuzz_require(world->bus >= IW_BUS_PASSIVE, "nothing leaves while the bus is down");
+    fuzz_require(!config->listen_only, "nothing leaves in listen-only");
+    return world->takes ? 1 : 0;
+}
+
+static void cut(world_t *world) {
+    world->cut = true;
+    world->arm_after_cut = false;
+}
+
+static int world_receive(void *context, iw_can_frame_t *out_frame) {
+    world_t *const world = context;
+    if (world->received == 0U) {
+        return 0;
+    }
+    *out_frame = world->rx[0];
+    world->received--;
+    memmove(&world->rx[0], &world->rx[1], world->received * sizeof world->rx[0]);
+    if ((out_frame->id == 266U || out_frame->id == 298U) && out_frame->kind != IW_CAN_ECHO) {
+        cut(world);
+    }
+    return 1;
+}
+
+static iw_bus_state_t world_bus(void *context) {
+    world_t *const world = context;
+    if (world->bus < IW_BUS_PASSIVE) {
+        cut(world);
+    }
+    return world->bus;
+}
+
+static int world_purge(void *context) {
+    const world_t *const world = context;
+    return world->purges ? 1 : 0;
+}
+
+static int world_estop(void *context) {
+    world_t *const world = context;
+    if (world->estop != 0) {
+        cut(world);
+    }
+    return world->estop;
+}
+
+static void begin(world_t *world, fuzz_bytes_t *bytes) {
+    const iw_hal_t hal = {world_send, world_receive, world_bus, world_purge, world_estop, world};
+    const uint8_t flags = fuzz_byte(bytes);
+    memset(world, 0, sizeof *world);
+    iw_config_default(&world->config);
+    world->config.setpoint_type_set = (flags & 1U) == 0U;
+    world->config.setpoint_type = fuzz_byte(bytes);
+    world->config.current_role = (flags & 2U) ? IW_ROLE_SETPOINT : IW_ROLE_LIMIT;
+    world->config.invert[IW_RIGHT] = (flags & 4U) != 0U;
+    world->config.listen_only = (flags & 0x18U) == 0x18U;
+    world->config.period_ms = (uint16_t)(5U + fuzz_byte(bytes) % 60U);
+    world->config.rest_ms = 50;
+    world->bus = IW_BUS_ACTIVE;
+    world->takes = true;
+    world->cut = true;
+    world->now_us = 1000;
+    if (iw_gateway_init(&world->gateway, &world->config, &hal, world->now_us, (flags & 0x20U) != 0U) != IW_CONFIG_OK) {
+        world->config.period_ms = 20;
+        (void)iw_gateway_init(&world->gateway, &world->config, &hal, world->now_us, false);
+    }
+}
+
+static void put(world_t *world, const iw_can_frame_t *frame) {
+    if (world->received < RX_MAX) {
+        world->rx[world->received++] = *frame;
+    }
+}
+
+/// Speeds of both wheels, as good wheels send them.
+static void put_telemetry(world_t *world, int16_t rpm) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        const iw_proto_message_t message = {IW_PROTO_SPEED, (iw_side_t)side, {.speed = {rpm, 0}}};
+        iw_can_frame_t frame;
+        (void)iw_proto_encode(&message, &frame);
+        put(world, &frame);
+    }
+}
+
+/// What the account waits for, or the same with a wrong byte.
+static void put_echo(world_t *world, iw_side_t side, uint8_t wrong) {
+    const int32_t value = world->gateway.sender.outbox.value[side][0];
+    iw_can_frame_t frame = {.id = (side == IW_LEFT) ? 266U : 298U, .dlc = 5, .kind = IW_CAN_ECHO};
+    for (unsigned i = 0; i < 4U; i++) {
+        frame.data[1U + i] = (uint8_t)((uint32_t)value >> (24U - 8U * i));
+    }
+    frame.data[4] ^= wrong;
+    put(world, &frame);
+}
+
+static void put_any(world_t *world, fuzz_bytes_t *bytes) {
+    static const uint16_t ids[] = {266, 298, 257, 289, 290, 512, 544, 513, 545, 600, 256};
+    iw_can_frame_t frame = {.id = ids[fuzz_byte(bytes) % 11U]};
+    const uint8_t format = fuzz_byte(bytes);
+    frame.id |= (format & 0xF0U) == 0xF0U ? (uint32_t)format << 28 : 0U;
+    frame.dlc = format % 9U;
+    for (size_t i = 0; i < IW_CAN_DATA_MAX; i++) {
+        frame.data[i] = fuzz_byte(bytes);
+    }
+    put(world, &frame);
+}
+
+static void drive(world_t *world, fuzz_bytes_t *bytes, iw_client_t client) {
+    iw_drive_t request = {.has_current = world->config.current_role == IW_ROLE_SETPOINT};
+    iw_applied_t applied;
+    const uint8_t scale = fuzz_byte(bytes);
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        request.speed_mm_s[side] = (int16_t)fuzz_word(bytes) * ((scale > 250U) ? 60000 : 1) / ((scale < 200U) ? 30 : 1);
+        request.current_mA[side] = (int8_t)fuzz_byte(bytes) * 16;
+    }
+    const iw_time_us_t sent_us = world->now_us - ((scale & 1U) ? world->now_us % 1000U : 0U);
+    if (iw_gateway_drive(&world->gateway, sent_us, client, &request, &applied) == IW_REFUSE_NONE) {
+        fuzz_require(abs(applied.pair.wheel[0].speed_mm_s) <= world->config.max_speed_mm_s,
+                     "applied is within the limits");
+        world->cut = world->cut && !world->arm_after_cut;
+    }
+}
+
+static void ask(world_t *world, fuzz_bytes_t *bytes, uint8_t what) {
+    const iw_client_t client = 1U + what % 2U;
+    const bool latched = iw_gateway_state(&world->gateway) == IW_STATE_LATCHED;
+    switch (what / 2U % 7U) {
+    case 0:
+    case 1:
+        drive(world, bytes, client);
+        break;
+    case 2:
+        world->arm_after_cut =
+            iw_gateway_arm(&world->gateway, world->now_us, client, (what & 0x80U) != 0U) == IW_REFUSE_NONE ||
+            world->arm_after_cut;
+        break;
+    case 3:
+        if (iw_gateway_reset(&world->gateway, world->now_us) == IW_REFUSE_NONE && latched) {
+            world->arm_after_cut = false;
+        }
+        break;
+    case 4:
+        iw_gateway_stop(&world->gateway, world->now_us, client, IW_CAUSE_CLIENT_STOP);
+        break;
+    case 5:
+        iw_gateway_estop(&world->gateway, world->now_us, client);
+        cut(world);
+        break;
+    default:
+        iw_gateway_disconnect(&world->gateway, world->now_us, client);
+        break;
+    }
+}
+
+static void step(world_t *world, uint32_t after_us) {
+    world->now_us += after_us;
+    const iw_time_us_t next_us = iw_gateway_step(&world->gateway, world->now_us);
+    fuzz_require(next_us >= world->now_us && next_us <= world->now_us + 60000U, "it wants to be called in time");
+    fuzz_require(world->gateway.sender.gate.stopped == 0U && world->gateway.sender.clamped == 0U,
+                 "the gate has nothing to stop");
+}
+
+/// Some good milliseconds, so that a few bytes lead to motion.
+static void calm(world_t *world, uint8_t steps) {
+    for (unsigned i = 0; i < steps % 64U; i++) {
+        put_telemetry(world, 0);
+        for (int side = 0; side < IW_SIDES; side++) {
+            for (uint8_t pending = world->gateway.sender.outbox.pending[side]; pending > 0U; pending--) {
+                put_echo(world, (iw_side_t)side, 0);
+            }
+        }
+        step(world, 5000);
+    }
+}
+
+static void act(world_t *world, fuzz_bytes_t *bytes) {
+    const uint8_t what = fuzz_byte(bytes);
+    const uint8_t value = fuzz_byte(bytes);
+    switch (what % 12U) {
+    case 0:
+    case 1:
+        calm(world, value);
+        break;
+    case 2:
+        step(world, value * 100U);
+        break;
+    case 3:
+        step(world, (uint32_t)value * value * 20U);
+        break;
+    case 4:
+        put_telemetry(world, (int16_t)((int8_t)value));
+        break;
+    case 5:
+        put_echo(world, (iw_side_t)(value & 1U), value & 0x10U);
+        break;
+    case 6:
+        put_any(world, bytes);
+        break;
+    case 7:
+        world->bus = (value > 200U) ? (iw_bus_state_t)(value % 4U) : IW_BUS_ACTIVE;
+        world->takes = (value & 7U) != 7U;
+        world->purges = (value & 8U) != 0U;
+        break;
+    case 8:
+        world->estop = (value > 128U) ? 0 : (int)(value % 3U) - 1;
+        break;
+    case 9:
+        iw_gateway_suspended(&world->gateway, value * 10000U);
+        break;
+    default:
+        ask(world, bytes, value);
+        break;
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    static world_t world;
+    fuzz_bytes_t bytes = {data, size, 0};
+    begin(&world, &bytes);
+    while (bytes.at < bytes.size) {
+        act(&world, &bytes);
+    }
+    calm(&world, 20);
+    return 0;
+}

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""The gateway built with libgpiod 2, where the system has libgpiod 1: both generations must read the same line alike."""
+
+import os
+import re
+import subprocess
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(os.path.dirname(HERE))
+
+
+def generation(build):
+    """Of the libgpiod that a build directory was configured with; None if it has none."""
+    try:
+        with open(os.path.join(build, "CMakeCache.txt"), encoding="utf-8") as file:
+            found = re.search(r"^LIBGPIOD_VERSION:INTERNAL=(\d+)", file.read(), re.MULTILINE)
+    except FileNotFoundError:
+        return None
+    return int(found.group(1)) if found else None
+
+
+def last_line(command, **variables):
+    """Runs it; its last line of output. Raises RuntimeError with what it said if it fails."""
+    done = subprocess.run(
+        command, cwd=ROOT, env={**os.environ, **variables}, text=True, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    lines = done.stdout.strip().splitlines() or [""]
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)}: {lines[-1]}")
+    return lines[-1]
+
+
+def find_build(build, download=True):
+    """A build directory like `build`, beside it, whose gateway uses libgpiod 2. Made if it is not there. RuntimeError: it cannot be."""
+    if generation(build) == 2:
+        return build
+    beside = os.path.join(os.path.dirname(os.path.abspath(build)), "gpiod2")
+    library = [os.path.join(ROOT, "scripts", "build_libgpiod2")] + ([] if download else ["--no-download"])
+    configure = ["cmake", "-S", ROOT, "-B", beside, "-DCMAKE_BUILD_TYPE=RelWithDebInfo"]
+    last_line(configure, PKG_CONFIG_PATH=last_line(library))
+    last_line(["cmake", "--build", beside, "--target", "iwheel-gateway", "iwheel-sim", "-j", str(os.cpu_count())])
+    if generation(beside) != 2:
+        raise RuntimeError(f"{beside} was configured with libgpiod {generation(beside)}; remove it and try again")
+    return beside

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: MIT
+#include "orders_world.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MS           1000U
+#define START_US     (1000U * MS)
+#define TELEMETRY_US (40U * MS)
+#define STREAM_US    (50U * MS)
+#define FRAME_US     120U
+#define RESTART_US   100U ///< Sooner than any real one: what the dead process sent is still on its way.
+#define RULE_CUT     911U ///< Of our own.
+#define RULE_FULL    912U ///< The world itself is at its end.
+#define PERIOD_MS    40U
+#define SILENT_MS    200U
+#define LEFT_mm_s    400
+#define RIGHT_mm_s   300
+/// The wheels' own: they follow at this pace, and coast at that one when they were told nothing for a second.
+#define FOLLOW_UM_S_PER_MS 4000
+#define COAST_UM_S_PER_MS  700
+#define UM_S_PER_RPM       20106
+
+static void wake(world_t *self) {
+    self->wake_us = self->now_us;
+}
+
+// ---- the port ----------------------------------------------------------------------------------------------------
+
+static int32_t speed_of(const iw_can_frame_t *frame) {
+    return (int16_t)(frame->data[1] << 8 | frame->data[2]);
+}
+
+static int world_send(void *context, const iw_can_frame_t *frame) {
+    world_t *const self = context;
+    const bool taken = self->flights < WORLD_FLIGHT && !self->down;
+    self->stats->frames++;
+    self->stats->nonzero += (speed_of(frame) != 0) ? 1U : 0U;
+    if (self->traces) {
+        printf("  %9.3f ms    sends %u (0x%X) %d mm/s\n", (double)self->now_us / 1e3, frame->id, frame->id,
+               speed_of(frame));
+    }
+    if (self->cut && speed_of(frame) != 0) {
+        oracle_fail(&self->oracle, self->now_us, RULE_CUT, "motion that nobody has asked for since it was cut");
+    }
+    if (taken) {
+        world_flight_t *const flight = &self->flight[self->flights];
+        const iw_time_us_t free_us = (self->flights > 0U) ? flight[-1].done_us : self->now_us;
+        *flight = (world_flight_t){*frame, self->now_us, free_us + FRAME_US, true};
+        self->flights++;
+    }
+    oracle_sent(&self->oracle, self->now_us, frame, taken);
+    return taken ? 1 : 0;
+}
+
+static int world_receive(void *context, iw_can_frame_t *out_frame) {
+    world_t *const self = context;
+    if (self->received == 0U) {
+        return 0;
+    }
+    *out_frame = self->rx[0];
+    self->received--;
+    memmove(&self->rx[0], &self->rx[1], self->received * sizeof self->rx[0]);
+    oracle_received(&self->oracle, self->now_us, out_frame);
+    return 1;
+}
+
+static iw_bus_state_t world_bus_state(void *context) {
+    world_t *const self = context;
+    const iw_bus_state_t state = (self->down || self->lost) ? IW_BUS_DOWN : IW_BUS_ACTIVE;
+    self->lost = false;
+    oracle_bus(&self->oracle, self->now_us, state);
+    return state;
+}
+
+static int world_purge(void *context) {
+    (void)context;
+    return 0;
+}
+
+static int world_estop(void *context) {
+    world_t *const self = context;
+    const int result = (self->pressed || self->edge) ? 1 : 0;
+    self->edge = false;
+    oracle_estop(&self->oracle, result);
+    return result;
+}
+
+// ---- the gateway -------------------------------------------------------------------------------------------------
+
+static void note_state(world_t *self) {
+    static const char *const names[] = {"LISTENING", "ARMED", "STOPPING", "LATCHED"};
+    const iw_state_t state = iw_gateway_state(&self->gateway);
+    if (state == self->state) {
+        return;
+    }
+    self->stats->armed += (state == IW_STATE_ARMED) ? 1U : 0U;
+    self->stats->latched += (state == IW_STATE_LATCHED) ? 1U : 0U;
+    self->stats->stops += (state == IW_STATE_STOPPING) ? 1U : 0U;
+    self->state = state;
+    if (self->traces) {
+        printf("  %9.3f ms    %s\n", (double)self->now_us / 1e3, names[state]);
+    }
+}
+
+static void step_gateway(world_t *self) {
+    oracle_step_begin(&self->oracle, self->now_us, self->promised_us);
+    self->promised_us = iw_gateway_step(&self->gateway, self->now_us);
+    self->wake_us = self->promised_us;
+    oracle_step_end(&self->oracle, self->now_us);
+    self->stats->steps++;
+    note_state(self);
+}
+
+static void start_gateway(world_t *self, bool restarted) {
+    const iw_hal_t hal = {world_send, world_receive, world_bus_state, world_purge, world_estop, self};
+    iw_config_t config;
+    iw_config_default(&config);
+    config.setpoint_type = 1;
+    config.setpoint_type_set = true;
+    config.current_role = IW_ROLE_LIMIT;
+    config.period_ms = PERIOD_MS;
+    config.wheel_silent_ms = SILENT_MS;
+    config.invert[IW_RIGHT] = true;
+    if (iw_gateway_init(&self->gateway, &config, &hal, self->now_us, restarted) != IW_CONFIG_OK) {
+        abort();
+    }
+    self->oracle.proven = true;
+    oracle_start(&self->oracle, &self->gateway, self->now_us, restarted);
+    self->promised_us = self->now_us;
+    self->state = iw_gateway_state(&self->gateway);
+    wake(self);
+}
+
+void world_init(world_t *self, world_mode_t mode, world_stats_t *stats) {
+    memset(self, 0, sizeof *self);
+    self->stats = stats;
+    self->mode = mode;
+    self->now_us = START_US;
+    self->telemetry_us = START_US;
+    self->drive_us = IW_NEVER;
+    self->client = 1;
+    self->cut = true;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        self->wheel[side].heard_us = IW_NEVER;
+        self->wheel[side].moved_us = START_US;
+    }
+    start_gateway(self, false);
+}
+
+// ---- requests ----------------------------------------------------------------------------------------------------
+
+static void tell(const world_t *self, const char *what, int result) {
+    if (self->traces) {
+        printf("  %9.3f ms    %s: %s\n", (double)self->now_us / 1e3, what, (result == 0) ? "accepted" : "refused");
+    }
+}
+
+static bool drive(world_t *self) {
+    const iw_drive_t request = {{LEFT_mm_s, RIGHT_mm_s}, {0, 0}, false};
+    iw_applied_t applied = {0};
+    const iw_refusal_t result = iw_gateway_drive(&self->gateway, self->now_us, self->client, &request, &applied);
+    tell(self, "drive", (int)result);
+    oracle_drive(&self->oracle, self->now_us, self->client, &request, result, &applied);
+    if (result == IW_REFUSE_NONE) {
+        self->stats->drives++;
+        self->cut = self->cut && !self->arm_after_cut;
+    }
+    wake(self);
+    return result == IW_REFUSE_NONE;
+}
+
+static void command(world_t *self) {
+    const bool taken = drive(self);
+    const bool goes_on = self->mode == MODE_BLIND || (self->mode == MODE_STREAM && taken);
+    self->drive_us = goes_on ? self->now_us + STREAM_US : IW_NEVER;
+}
+
+static void arm(world_t *self) {
+    const iw_refusal_t result = iw_gateway_arm(&self->gateway, self->now_us, self->client, false);
+    tell(self, "arm", (int)result);
+    oracle_arm(&self->oracle, self->now_us, self->client, false, result);
+    self->arm_after_cut = self->arm_after_cut || result == IW_REFUSE_NONE;
+    wake(self);
+}
+
+static void reset(world_t *self) {
+    const iw_state_t before = iw_gateway_state(&self->gateway);
+    const iw_stop_t stop = self->gateway.permit.stop;
+    const iw_refusal_t result = iw_gateway_reset(&self->gateway, self->now_us);
+    tell(self, "reset", (int)result);
+    oracle_reset(&self->oracle, self->now_us, before, &stop);
+    if (before == IW_STATE_LATCHED && result == IW_REFUSE_NONE) {
+        self->stats->resets++;
+        self->arm_after_cut = false;
+    }
+    wake(self);
+}
+
+static void cut(world_t *self) {
+    self->cut = true;
+    self->arm_after_cut = false;
+}
+
+static void press(world_t *self, bool pressed) {
+    if (pressed != self->pressed) {
+        self->pressed = pressed;
+        self->edge = true;
+        oracle_edge(&self->oracle, self->now_us);
+        cut(self);
+        wake(self);
+    }
+}
+
+static void kill_client(world_t *self) {
+    const bool matters = self->client == self->oracle.holder || self->client == self->oracle.pending_arm;
+    iw_gateway_disconnect(&self->gateway, self->now_us, self->client);
+    oracle_stop(&self->oracle, self->now_us, matters);
+    self->client++;
+    self->drive_us = IW_NEVER;
+    wake(self);
+}
+
+/// What the dead process had handed over is still on its way, and a stranger's to the new one.
+static void restart(world_t *self) {
+    const iw_permit_t *const permit = &self->gateway.permit;
+    const bool silent = (permit->state == IW_STATE_LISTENING && !permit->arming) ||
+                        (permit->state == IW_STATE_LATCHED && !permit->holding);
+    for (uint32_t i = 0; i < self->flights; i++) {
+        self->flight[i].own = false;
+    }
+    self->client++;
+    self->drive_us = IW_NEVER;
+    self->received = 0;
+    self->wake_us = IW_NEVER;
+    world_run(self, RESTART_US);
+    self->received = 0;
+    self->stats->restarts++;
+    cut(self);
+    start_gateway(self, !silent);
+}
+
+static void toggle_bus(world_t *self) {
+    self->down = !self->down;
+    self->lost = true;
+    self->flights = 0;
+    self->received = 0;
+    cut(self);
+    wake(self);
+}
+
+void world_do(world_t *self, world_step_t step) {
+    if (self->traces) {
+        printf("  %9.3f ms  %s\n", (double)self->now_us / 1e3, world_step_name(step));
+    }
+    switch (step) {
+    case STEP_PRESS:
+    case STEP_RELEASE:
+        press(self, step == STEP_PRESS);
+        break;
+    case STEP_RESET:
+        reset(self);
+        break;
+    case STEP_ARM:
+        arm(self);
+        break;
+    case STEP_COMMAND:
+        command(self);
+        break;
+    case STEP_KILL:
+        kill_client(self);
+        break;
+    case STEP_RESTART:
+        restart(self);
+        break;
+    case STEP_BUS:
+    default:
+        toggle_bus(self);
+        break;
+    }
+    note_state(self);
+}
+
+// ---- bus and wheels ----------------------------------------------------------------------------------------------
+
+static void put(world_t *self, const iw_can_frame_t *frame, uint8_t kind) {
+    if (self->down) {
+        return;
+    }
+    if (self->received >= WORLD_RX) {
+        oracle_fail(&self->oracle, self->now_us, RULE_FULL, "the gateway does not read");
+        return;
+    }
+    self->rx[self->received] = *frame;
+    self->rx[self->received++].kind = kind;
+    if (self->wake_us != IW_NEVER) {
+        wake(self);
+    }
+}
+
+static void move_wheel(world_wheel_t *wheel, iw_time_us_t now_us) {
+    const int64_t span_us = (int64_t)(now_us - wheel->moved_us);
+    const bool told = wheel->heard_us != IW_NEVER && now_us - wheel->heard_us < IW_WHEEL_WATCHDOG_US;
+    const int64_t pace = (told ? FOLLOW_UM_S_PER_MS : COAST_UM_S_PER_MS) * span_us / MS;
+    const int64_t way = (told ? (int64_t)wheel->told_mm_s * 1000 : 0) - wheel->speed_um_s;
+    const int64_t capped = (way > pace) ? pace : ((way < -pace) ? -pace : way);
+    wheel->speed_um_s += (int32_t)capped;
+    wheel->moved_us = now_us;
+}
+
+static void land(world_t *self) {
+    const world_flight_t flight = self->flight[0];
+    world_wheel_t *const wheel = &self->wheel[(flight.frame.id == IW_ID_RIGHT_SETPOINT) ? IW_RIGHT : IW_LEFT];
+    self->flights--;
+    memmove(&self->flight[0], &self->flight[1], self->flights * sizeof self->flight[0]);
+    move_wheel(wheel, self->now_us);
+    wheel->told_mm_s = speed_of(&flight.frame);
+    wheel->heard_us = self->now_us;
+    if (flight.own) {
+        oracle_on_bus(&self->oracle, self->now_us, &flight.frame, flight.handed_us);
+    }
+    put(self, &flight.frame, flight.own ? IW_CAN_ECHO : IW_CAN_RECEIVED);
+}
+
+static void send_telemetry(world_t *self) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        iw_proto_message_t message = {.kind = IW_PROTO_SPEED, .side = (iw_side_t)side};
+        iw_can_frame_t frame;
+        move_wheel(&self->wheel[side], self->now_us);
+        message.as.speed.speed_rpm = (int16_t)(self->wheel[side].speed_um_s / UM_S_PER_RPM);
+        (void)iw_proto_encode(&message, &frame);
+        put(self, &frame, IW_CAN_RECEIVED);
+    }
+    self->telemetry_us += TELEMETRY_US;
+}
+
+static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {
+    return (a < b) ? a : b;
+}
+
+void world_run(world_t *self, iw_time_us_t for_us) {
+    const iw_time_us_t until_us = self->now_us + for_us;
+    while (!world_broken(self)) {
+        const iw_time_us_t landed_us = (self->flights > 0U) ? self->flight[0].done_us : IW_NEVER;
+        const iw_time_us_t next_us =
+            sooner(sooner(landed_us, self->telemetry_us), sooner(self->drive_us, self->wake_us));
+        if (next_us > until_us) {
+            break;
+        }
+        self->now_us = (next_us > self->now_us) ? next_us : self->now_us;
+        if (landed_us <= self->now_us) {
+            land(self);
+        } else if (self->telemetry_us <= self->now_us) {
+            send_telemetry(self);
+        } else if (self->drive_us <= self->now_us) {
+            command(self);
+        } else {
+            step_gateway(self);
+        }
+    }
+    self->now_us = until_us;
+}
+
+bool world_broken(const world_t *self) {
+    return self->oracle.rule != ORACLE_NO_RULE;
+}
+
+const char *world_step_name(unsigned step) {
+    static const char *const names[STEP_KINDS] = {"press",   "release", "reset",   "arm",
+                                                  "command", "kill",    "restart", "bus"};
+    return names[step];
+}

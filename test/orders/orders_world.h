@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+/// A gateway with two obedient wheels, a client, a button and a bus, small enough to be copied and put back: what the
+/// enumeration of all orders of events plays on. Judged by the oracle of the simulation, and by a second, simpler rule
+/// of its own: after a cut nothing but zero leaves until arm and then a drive were accepted.
+#ifndef ORDERS_WORLD_H
+#define ORDERS_WORLD_H
+
+#include "../sim/oracle.h"
+
+#define WORLD_FLIGHT 8U
+#define WORLD_RX     64U
+
+/// The alphabet.
+typedef enum {
+    STEP_PRESS = 0,
+    STEP_RELEASE,
+    STEP_RESET,
+    STEP_ARM,
+    STEP_COMMAND,
+    STEP_KILL,    ///< The client's connection ends; another one comes.
+    STEP_RESTART, ///< The gateway's process dies and runs again.
+    STEP_BUS,     ///< The bus goes down, or up again.
+    STEP_KINDS,
+} world_step_t;
+
+/// What a command is.
+typedef enum {
+    MODE_ONCE = 0, ///< One drive.
+    MODE_STREAM,   ///< A drive every 50 ms until one is refused.
+    MODE_BLIND,    ///< A drive every 50 ms, whatever the answers, until the client is killed.
+    MODES,
+} world_mode_t;
+
+/// What all the sequences consisted of; not put back.
+typedef struct {
+    uint64_t steps, frames, nonzero, armed, drives, resets, latched, restarts, stops;
+} world_stats_t;
+
+typedef struct {
+    iw_can_frame_t frame;
+    iw_time_us_t handed_us;
+    iw_time_us_t done_us;
+    bool own; ///< Sent by the process that runs now.
+} world_flight_t;
+
+typedef struct {
+    iw_time_us_t heard_us;
+    iw_time_us_t moved_us;
+    int32_t told_mm_s;
+    int32_t speed_um_s;
+} world_wheel_t;
+
+typedef struct {
+    iw_gateway_t gateway;
+    oracle_t oracle;
+    world_stats_t *stats;
+    iw_time_us_t now_us, wake_us, promised_us, telemetry_us, drive_us;
+    world_wheel_t wheel[IW_SIDES];
+    world_flight_t flight[WORLD_FLIGHT];
+    iw_can_frame_t rx[WORLD_RX];
+    uint32_t flights, received;
+    iw_client_t client;
+    world_mode_t mode;
+    bool pressed, edge, down, lost, traces;
+    bool cut, arm_after_cut; ///< The simpler rule's memory.
+    iw_state_t state;
+} world_t;
+
+/// The gateway starts in front of standing wheels. There is one world at a time: it must not be moved.
+void world_init(world_t *self, world_mode_t mode, world_stats_t *stats);
+
+/// Does what the letter says, now.
+void world_do(world_t *self, world_step_t step);
+
+/// Lets time pass.
+void world_run(world_t *self, iw_time_us_t for_us);
+
+/// A rule is broken, and which.
+bool world_broken(const world_t *self);
+
+const char *world_step_name(unsigned step);
+
+#endif

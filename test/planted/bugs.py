@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Safety bugs to be planted in copies of the core. Each names the rule that it breaks, as docs/safety-case.md counts them.
+
+What stands in the core is told by a few words of code; blanks and line ends between them do not matter, and they must
+occur exactly once in the file.
+"""
+from typing import NamedTuple
+
+
+class Bug(NamedTuple):
+    name: str
+    rule: str   # Of docs/safety-case.md.
+    file: str   # In core/src.
+    before: str
+    after: str
+
+
+BUGS = [
+    Bug("lease-endless", "R1", "permit.c", "now_us >= self->lease_until_us) { enter_stopping", "now_us >= self->lease_until_us + 5000000U) { enter_stopping"),
+    Bug("lease-fed-by-refused", "R1", "permit.c", "if (refusal == IW_REFUSE_NONE) { grant_lease(self,", "{ grant_lease(self,"),
+    Bug("disconnect-ignored", "R1", "permit.c", "if (client != self->holder) { return; } if (self->state == IW_STATE_ARMED) {", "if (client != self->holder) { return; } if (self->state == IW_STATE_LATCHED) {"),
+    Bug("client-stop-ignored", "R1", "permit.c", "enter_stopping(self, now_us, cause, IW_SIDES_NONE, 0); self->stop.client = client;", "self->stop.client = client;"),
+    Bug("ramp-by-calls", "R1", "setpoint.c", "ramp_step(config->decel_mm_s2, elapsed_us)", "ramp_step(config->decel_mm_s2, (elapsed_us < 8000U) ? elapsed_us : 8000U)"),
+    Bug("estop-only-stops", "R2", "permit.c", "(BIT(IW_CAUSE_ESTOP_LINE) | BIT(IW_CAUSE_ESTOP_SOFTWARE)", "(BIT(IW_CAUSE_ESTOP_SOFTWARE)"),
+    Bug("estop-unreadable-released", "R2", "cycle.c", "if (pressed != 0) {", "if (pressed > 0) {"),
+    Bug("estop-ramps", "R2", "permit.c", "return self->holding ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE;", "return self->holding ? IW_DEMAND_BRAKE : IW_DEMAND_SILENCE;"),
+    Bug("soft-estop-only-stops", "R2", "permit.c", "BIT(IW_CAUSE_ESTOP_SOFTWARE) | BIT(IW_CAUSE_INTERNAL)", "BIT(IW_CAUSE_INTERNAL)"),
+    Bug("latch-lets-go", "R2", "permit.c", "self->present = self->raised;", "self->present = self->raised; if (self->state == IW_STATE_LATCHED && self->present == 0U && self->holding) { self->state = IW_STATE_LISTENING; }"),
+    Bug("zero-waits-for-echo", "R6", "outbox.c", "(zero ? 2U : 1U)", "(zero ? 1U : 1U)"),
+    Bug("reset-arms", "R3", "permit.c", "self->state = IW_STATE_LISTENING; self->holding = false; return IW_REFUSE_NONE;", "self->state = IW_STATE_ARMED; self->holding = false; return IW_REFUSE_NONE;"),
+    Bug("reset-while-moving", "R3", "permit.c", "if (!self->view.at_rest) { return IW_REFUSE_NOT_AT_REST; }", ""),
+    Bug("reset-while-pressed", "R3", "permit.c", "if (self->state != IW_STATE_LATCHED) { return IW_REFUSE_NONE; } if (present != IW_REFUSE_NONE) {", "if (self->state != IW_STATE_LATCHED) { return IW_REFUSE_NONE; } if (present == IW_REFUSE_LATCHED) {"),
+    Bug("event-gone-at-once", "R3", "permit.c", "within(now_us, self->seen_us[cause], IW_PERMIT_EVENT_US)", "within(now_us, self->seen_us[cause], 20000U)"),
+    Bug("arm-with-stale-command", "R3", "permit.c", "if (stale_command(self, now_us)) { return IW_REFUSE_STALE_COMMAND; } if (!self->view.at_rest ||", "if (!self->view.at_rest ||"),
+    Bug("reset-with-stale-command", "R3", "permit.c", "if (stale_command(self, now_us)) { return IW_REFUSE_STALE_COMMAND; } self->state", "self->state"),
+    Bug("arm-while-moving", "R3", "permit.c", "if (!self->view.at_rest || !self->view.output_zero) {", "if (!self->view.output_zero) {"),
+    Bug("arm-while-latched", "R3", "permit.c", "if (self->state == IW_STATE_LATCHED) { return refuse_latched(self, now_us); } if (!may_send", "if (!may_send"),
+    Bug("arm-while-cause-present", "R3", "permit.c", "if (present != IW_REFUSE_NONE) { return present; } if (!self->view.timing_ok)", "if (!self->view.timing_ok)"),
+    Bug("arm-without-echo", "R3", "permit.c", "if (self->view.proven && waited_us <= limit_us) {", "if (waited_us <= limit_us) {"),
+    Bug("takeover-unasked", "R3", "permit.c", "(!takeover || self->arming)", "(self->arming)"),
+    Bug("anybody-drives", "R3", "permit.c", "if (self->holder != client) { return IW_REFUSE_NOT_HOLDER; }", "if (client == IW_CLIENT_NONE) { return IW_REFUSE_NOT_HOLDER; }"),
+    Bug("target-survives-stop", "R3", "setpoint.c", "self->demand = demand; self->target.wheel[IW_LEFT] = zero_command(self->config); self->target.wheel[IW_RIGHT] = zero_command(self->config);", "self->demand = demand;"),
+    Bug("rest-by-one-frame", "R3", "wheel.c", "now_us - self->rest_since_us >= for_us", "now_us >= self->rest_since_us"),
+    Bug("restart-without-zeros", "R3", "permit.c", "if (restarted && may_send(config)) {", "if (restarted && config->listen_only) {"),
+    Bug("restart-yields-at-once", "R3", "permit.c", "self->strangers > LEFT_BEHIND_MAX", "self->strangers > 0U"),
+    Bug("no-hold", "R4", "permit.c", "return held_us >= zero_hold_us && (", "return held_us >= 1000U && ("),
+    Bug("hold-ignores-motion", "R4", "permit.c", "(self->view.settled || restarting(self));", "(true || restarting(self));"),
+    Bug("hold-for-ever", "R4", "permit.c", "if (held_us >= IW_PERMIT_HOLD_MAX_US) {", "if (held_us >= 100U * IW_PERMIT_HOLD_MAX_US) {"),
+    Bug("sent-while-listening", "R4", "permit.c", "return self->arming ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE;", "return IW_DEMAND_ZERO;"),
+    Bug("one-wheel-goes-on", "R5", "cycle.c", "if (result == IW_SEND_LATER) { iw_setpoint_collapse(&self->setpoint, now_us); }", ""),
+    Bug("left-only", "R5", "sender.c", "if (right && (taken || zero)) {", "if (right && zero) {"),
+    Bug("queue-of-two", "R6", "outbox.c", "(zero ? 2U : 1U)", "(zero ? 3U : 2U)"),
+    Bug("purge-forgotten", "R6", "sender.c", "if (self->hal->purge(self->hal->context) <= 0) {", "if (self != NULL) {"),
+    Bug("echo-never-missed", "R6", "cycle.c", "if (waiting_us == IW_NEVER ||", "if (waiting_us != IW_NEVER ||"),
+    Bug("echo-account-kept", "R6", "cycle.c", "if (self->bus < IW_BUS_PASSIVE) { iw_outbox_clear(&self->sender.outbox);", "if (self->bus < IW_BUS_PASSIVE) {"),
+    Bug("hang-forgiven", "R7", "cycle.c", "if (late_us > IW_GATEWAY_HUNG_US) {", "if (late_us > 100U * IW_GATEWAY_HUNG_US) {"),
+    Bug("lateness-forgiven", "R7", "cycle.c", "} else if (blind_us >= IW_GATEWAY_STOP_US) {", "} else if (blind_us >= 100U * IW_GATEWAY_STOP_US) {"),
+    Bug("late-ramps", "R7", "permit.c", "self->cut = cause == IW_CAUSE_LOOP_LATE;", "self->cut = false;"),
+    Bug("burst-after-stall", "R7", "setpoint.c", "(elapsed_us < granted_us) ? elapsed_us : granted_us)", "elapsed_us)"),
+    Bug("excused-again-and-again", "R7", "wheel.c", "if (self->heard_us != IW_NEVER && self->heard_us >= self->excused_us) {", "if (self->heard_us != IW_NEVER) {"),
+    Bug("late-frames-count", "R7", "cycle.c", "iw_wheel_hear(wheel, now_us, message, !self->stalled);", "iw_wheel_hear(wheel, now_us, message, true);"),
+    Bug("steep", "R12", "setpoint.c", "ramp_step(config->accel_mm_s2,", "ramp_step(3U * config->accel_mm_s2,"),
+    Bug("sign-not-through-zero", "R8", "setpoint.c", "const bool through_zero = *value != 0 && (target > 0) != (*value > 0);", "const bool through_zero = false;"),
+    Bug("speed-not-limited", "R8", "gateway.c", "applied.limited = scale_pair(drive.speed_mm_s, config->max_speed_mm_s);", "applied.limited = false;"),
+    Bug("scaled-apart", "R8", "gateway.c", "values[IW_RIGHT] = values[IW_RIGHT] * limit / largest;", "values[IW_RIGHT] = (values[IW_RIGHT] > limit) ? limit : values[IW_RIGHT];"),
+    Bug("invert-forgotten-right", "R8", "sender.c", "const bool invert = config->invert[side];", "const bool invert = config->invert[side] && side == IW_LEFT;"),
+    Bug("current-not-inverted", "R8", "sender.c", "setpoint.current_mA = (int16_t)-setpoint.current_mA;", ""),
+    Bug("wrong-type", "R12", "sender.c", "command->current_mA, config->setpoint_type}", "command->current_mA, (uint8_t)(config->setpoint_type + 1U)}"),
+    Bug("refused-answers", "R9", "gateway.c", "if (refusal == IW_REFUSE_NONE) { *out_applied", "{ *out_applied"),
+    Bug("foreign-ignored", "R13", "cycle.c", "} else { hear_foreign(self, now_us, frame->id); }", "}"),
+    Bug("bus-down-ignored", "R13", "cycle.c", "if (self->bus < IW_BUS_PASSIVE) { iw_outbox_clear", "if (self->bus < IW_BUS_DOWN) { iw_outbox_clear"),
+    Bug("silence-of-left-ignored", "R13", "cycle.c", "if (iw_wheel_lost(wheel, now_us)) {", "if (side == IW_RIGHT && iw_wheel_lost(wheel, now_us)) {"),
+    Bug("only-armed-latches", "R13", "permit.c", "self->state != IW_STATE_LISTENING && !restarting(self)", "self->state == IW_STATE_ARMED && !restarting(self)"),
+    Bug("sign-fault-ignored", "R13", "cycle.c", "iw_permit_raise(&self->permit, now_us, IW_CAUSE_FEEDBACK_SIGN, side_bit(side), detail);", ""),
+    Bug("overspeed-ignored", "R13", "cycle.c", "iw_permit_raise(&self->permit, now_us, IW_CAUSE_OVERSPEED, side_bit(side), detail);", ""),
+    Bug("blocked-ignored", "R13", "cycle.c", "iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_BLOCKED, side_bit(side), detail);", ""),
+    Bug("reboot-ignored", "R13", "wheel.c", "rebooted(self, now_us, IW_REBOOT_ODOMETRY);", "self->ticks = 0;"),
+]

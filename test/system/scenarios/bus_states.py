@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: MIT
+"""Rows 16, 17 and 21 on the local bus: states of the controller, frames that wait, a full bus.
+
+What is done to the bus is an argument where the same scenario also runs on a `can` device of a real kernel (test/kernel).
+"""
+
+import time
+
+from client import Streamer
+from harness import now_us
+from judge_log import LEFT, RIGHT, Event
+from scenario import scenario
+
+from .bus_faults import wait_reset
+from .clients import driving_process
+from .process import driving
+
+
+def drive_again(t, rig, client, seconds=8):
+    """Both wheels are heard, reset is accepted, nothing moves by itself, and it drives."""
+    heard = rig.wait_status(
+        client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active", seconds
+    )
+    if not t.check(heard, f"heard again: {client.request('status')['bus']}"):
+        return
+    wait_reset(t, client)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    client.request("stop")
+    time.sleep(0.3)
+
+
+def only_zeros(t, rig, since_us):
+    """Nothing but zeros from then until the next arm."""
+    armed = [event.t_us for event in rig.timeline if event.kind == "arm" and event.ok and event.t_us > since_us]
+    until_us = min(armed, default=now_us())
+    moving = [(at - since_us, speed) for at, _, speed in rig.bus.setpoints(since_us) if speed and at < until_us]
+    t.measure("stale_frames", len(moving))
+    t.check(not moving, f"old frames after the bus came back: {moving[:6]}")
+
+
+def bus_off(t, off, on):
+    """`off` and `on` take the controller off the bus and put it back."""
+    rig, client, stream = driving(t)
+    observer = rig.client("observer")
+    observer.request("watch", topics=["bus", "stop"])
+    begin_us = now_us()
+    off(rig)
+    done_us = now_us()
+    rig.timeline.append(Event(done_us, "dead"))
+    rig.timeline.append(Event(begin_us, "cut", within_us=done_us - begin_us + 30_000))
+    time.sleep(0.3)
+    stream.stop()
+    why = t.stopped_by(client, "bus_down")
+    t.check(why["detail"] == 1, f"detail 1 is bus-off, it is {why['detail']}")
+    t.measure("stop_ms", (why["at_us"] - begin_us) / 1000)
+    t.check(client.request("status")["bus"]["state"] == "bus_off", f"bus {client.request('status')['bus']}")
+    t.check(not client.request("reset")["ok"], "no reset while bus-off")
+    t.check(any(e["event"] == "bus" and e["state"] == "bus_off" for e in observer.collect(0.1)), "the event comes")
+    t.check("bus-off" in rig.gateway.text().lower(), f"the log says bus-off: {rig.gateway.text()[-300:]}")
+    on(rig)
+    back_us = now_us()
+    rig.note("alive")
+    drive_again(t, rig, client)
+    only_zeros(t, rig, back_us)
+    t.judge(rig)
+
+
+def bus_off_listening(t, off, on):
+    rig, client = t.running()
+    off(rig)
+    time.sleep(0.2)
+    t.expect(client.arm(), "bus_down")
+    t.check(client.request("status")["state"] == "listening", "not latched")
+    on(rig)
+    time.sleep(1.2)
+    t.check(not rig.bus.setpoints(), "nothing was sent")
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+def error_passive(t, passive, active):
+    rig, client, stream = driving(t)
+    passive(rig)
+    time.sleep(0.3)
+    t.check(client.request("status")["bus"]["state"] == "passive", f"bus {client.request('status')['bus']}")
+    t.check(client.request("status")["state"] == "armed", "it drives on")
+    active(rig)
+    time.sleep(0.3)
+    t.check(client.request("status")["bus"]["state"] == "active", f"bus {client.request('status')['bus']}")
+    t.check(stream.stop() is None, "the stream was not refused")
+    client.request("stop")
+    time.sleep(0.4)
+    t.judge(rig)
+
+
+def error_flood(t, errors, active):
+    """`errors(rig, n)` makes the n-th part of the flood."""
+    rig, client, stream = driving(t)
+    lines = len(rig.gateway.text().splitlines())
+    cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
+    for number in range(400):
+        errors(rig, number)
+        time.sleep(0.005)
+    percent = 100 * (rig.gateway.cpu_seconds() - cpu) / (time.monotonic() - begin)
+    active(rig)
+    time.sleep(0.2)
+    more = len(rig.gateway.text().splitlines()) - lines
+    t.check(more <= 40, f"{more} lines of log for 400 bursts of error frames in 2 s")
+    t.check(client.request("status")["state"] == "armed", f"it drives on: {client.request('why').get('sentence')}")
+    t.check(stream.stop() is None, "the stream was not refused")
+    t.figure(f"{more} lines of log, {percent:.0f} % CPU")
+    client.request("stop")
+    time.sleep(0.4)
+    t.judge(rig)
+
+
+def tell(words):
+    return lambda rig: rig.sim.ask(words)
+
+
+@scenario("bus-off in motion: stop, latched, reported; restarted: reset, drives again", 8)
+def row16_bus_off(t):
+    bus_off(t, tell("busoff on"), tell("busoff off"))
+
+
+@scenario("bus-off while listening: an event, arm refused, nothing sent", 5)
+def row16_bus_off_listening(t):
+    bus_off_listening(t, tell("busoff on"), tell("busoff off"))
+
+
+@scenario("error passive in motion: shown, it drives on; active again: shown", 5)
+def row16_error_passive(t):
+    error_passive(t, tell("passive on"), tell("passive off"))
+
+
+@scenario("a flood of error frames: it drives on, the log is rate-limited", 6)
+def row16_error_flood(t):
+    error_flood(t, lambda rig, number: rig.sim.ask(f"passive {'off' if number % 2 else 'on'}"), tell("passive off"))
+
+
+# Row 17: nobody acknowledges, or the bus takes nothing -------------------------------------------------------------------
+
+
+def held_up(t, words, seconds, causes):
+    """The bus holds our frames for that long; what was held comes out as one old frame per wheel at most, its zero behind it."""
+    rig = t.rig({"drive": {"accel_mm_s2": 2000}})
+    rig.start_gateway()
+    client = rig.client()
+    t.arm(client)
+    stream = Streamer(client, 600, 600, 0.02)
+    time.sleep(0.8)
+    rig.note("dead")
+    rig.fault(f"{words} on" if words == "stall" else f"{words} off", within_ms=70)
+    time.sleep(seconds)
+    stream.stop()
+    why = client.request("why")
+    t.check(why["cause"] in causes, f"cause {why['cause']}, one of {causes} expected")
+    t.check(client.request("status")["state"] == "latched", "latched")
+    back_us = now_us()
+    rig.sim.ask(f"{words} off" if words == "stall" else f"{words} on")
+    rig.timeline.append(Event(back_us, "alive", back_us))  # What was held comes out before the simulator answers.
+    time.sleep(0.3)
+    for side in (LEFT, RIGHT):
+        speeds = [speed for _, can_id, speed in rig.bus.setpoints(back_us) if can_id == side]
+        moving = [speed for speed in speeds if speed]
+        t.measure("stale_frames", len(moving))
+        t.check(len(moving) <= 1 and not any(speeds[1:]), f"{side}: one old frame at most, then zeros: {speeds[:6]}")
+    t.figure(f"stopped by {why['cause']}")
+    drive_again(t, rig, client)
+    t.judge(rig)
+
+
+@scenario("no echo for 300 ms in motion: stop, latched; nothing stale drains afterwards", 7)
+def row17_no_acknowledge(t):
+    held_up(t, "ack", 0.3, ("send_stalled",))
+
+
+@scenario("the bus takes no frame for 2 s in motion: stop, latched; nothing stale drains afterwards", 8)
+def row17_stall(t):
+    held_up(t, "stall", 2.0, ("send_stalled", "wheel_lost"))
+
+
+# Row 21 ------------------------------------------------------------------------------------------------------------------
+
+
+def forget(rig, can_id):
+    """The babbling node's frames are not the gateway's, and not judged."""
+    rig.bus.frames[:] = [frame for frame in rig.bus.frames if frame.id != can_id]
+
+
+@scenario("a babbling node with an id above 545 on a full bus: invariant 4 holds", 7)
+def row21_babble_high(t):
+    rig, client = t.running()
+    driver = driving_process(t, rig)  # A process of its own: this one has 9000 frames a second to write down.
+    rig.sim.ask("babble 600 100 on")
+    time.sleep(3.0)
+    load = client.request("status")["bus"]["load_permille"]
+    rig.sim.ask("babble 600 100 off")
+    t.check(client.request("status")["state"] == "armed", f"it drives on: {client.request('why').get('sentence')}")
+    t.figure(f"{len([1 for frame in rig.bus.frames if frame.id == 0x600]) / 3:.0f} foreign frames/s, load {load} permille")
+    time.sleep(0.1)
+    client.request("stop")
+    time.sleep(0.6)
+    rig.take_events(driver)
+    forget(rig, 0x600)
+    t.judge(rig)
+
+
+@scenario("a babbling node with the lowest id on a full bus: send_stalled, latched; from zero afterwards", 7)
+def row21_babble_low(t):
+    rig, client, stream = driving(t)
+    rig.note("dead")
+    rig.fault("babble 001 100 on", within_ms=70)
+    time.sleep(0.5)
+    stream.stop()
+    why = client.request("why")
+    t.check(why["cause"] in ("send_stalled", "wheel_lost"), f"cause {why['cause']}")
+    t.check(client.request("status")["state"] == "latched", "latched")
+    rig.sim.ask("babble 001 100 off")
+    rig.note("alive")
+    t.figure(f"stopped by {why['cause']}")
+    drive_again(t, rig, client)
+    forget(rig, 0x001)
+    t.judge(rig)

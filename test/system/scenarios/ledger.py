@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""The assumption ledger: what the bus shows, what the operator says, what a contradiction disables."""
+
+import time
+
+from scenario import scenario
+
+from .bus_faults import wait_reset
+from .wheels import fault_while_driving
+
+
+@scenario("confirm: the operator's word confirms, contradicts, and moves nothing", 4)
+def confirm_by_the_operator(t):
+    rig, client = t.running()
+    reply = client.request("confirm", item="wheel_radius", value=192)
+    t.expect(reply)
+    t.check((reply["state"], reply["evidence"]) == ("confirmed", "operator"), f"radius confirmed: {reply}")
+    t.expect(client.request("confirm", item="wheel_radius", value="soft"), "bad_value")
+    t.expect(client.request("confirm", item="speed"), "bad_value")
+    reply = client.request("confirm", item="mount_sign_left", value="yes")
+    t.check(reply["state"] == "contradicted" and "invert" in reply["disabled"], f"mount sign contradicted: {reply}")
+    refusal = client.arm()
+    t.expect(refusal, "denied")
+    t.check("mount_sign_left" in refusal["message"], f"the refusal names the item: {refusal['message']}")
+    t.expect(client.request("confirm", item="mount_sign_left"))
+    ledger = client.request("status")["ledger"]
+    t.check(ledger["wheel_radius"]["state"] == "confirmed", "the radius stays confirmed after a refused value")
+    t.check(not rig.bus.setpoints(), "nothing of that sends anything")
+    t.arm(client)
+    t.drive_for(client, 150, 150, 0.3)
+    t.judge(rig)
+
+
+@scenario("a wheel against its command: contradicted, and no arm until the operator says so", 7)
+def contradicted_sign_refuses_arm(t):
+    rig, client, _ = fault_while_driving(t, "sign right swapped", "feedback_sign", 420, side="right")
+    rig.sim.ask("sign right normal")
+    wait_reset(t, client)
+    entry = client.request("status")["ledger"]["feedback_sign_right"]
+    t.check(
+        entry["state"] == "contradicted" and entry["figure"] < 0 and "measured -" in entry["reason"],
+        f"contradicted by the bus: {entry}",
+    )
+    t.expect(client.arm(), "denied")
+    t.expect(client.request("confirm", item="feedback_sign_right"))
+    t.arm(client)
+    t.drive_for(client, 150, 150, 0.3)
+    t.judge(rig)
+
+
+@scenario("driving shows gear ratio, byte order, type and signs; nothing but the operator shows the rest", 12)
+def ledger_by_driving(t):
+    rig, client = t.running()
+    client.request("watch", topics=["state"], rate_hz=1)
+    time.sleep(2.6)  # Two seconds at rest first: units and offset.
+    t.arm(client)
+    t.drive_for(client, 500, 400, 4.5)
+    status = client.request("status")
+    states = {name: (entry["state"], entry["evidence"]) for name, entry in status["ledger"].items()}
+    for item in (
+        "setpoint_type",
+        "force_unit_left",
+        "force_unit_right",
+        "offset_included",
+        "feedback_sign_left",
+        "feedback_sign_right",
+        "gear_ratio",
+        "pose_byte_order",
+        "dlc",
+    ):
+        t.check(states[item] == ("confirmed", "bus"), f"{item}: {status['ledger'][item]}")
+    for item in ("current_role", "mount_sign_left", "mount_sign_right", "wheel_radius"):
+        t.check(states[item][0] == "assumed", f"{item}: {status['ledger'][item]}")
+    t.check(client.wait_event("ledger", item="gear_ratio", state="confirmed"), "watchers of state are told")
+    client.request("stop")
+    t.judge(rig)
+
+
+@scenario("another gear, another byte order, other lengths: contradicted, and what rests on it is not told", 22)
+def ledger_contradicted_by_driving(t):
+    rig = t.rig()
+    for command in ("gear both 3", "pose reversed", "padding on"):
+        rig.sim.ask(command)
+    rig.start_gateway()
+    client = rig.client()
+    t.arm(client)
+    t.drive_for(client, 600, 500, 9)
+    status = client.request("status")
+    for item in ("gear_ratio", "pose_byte_order", "dlc"):
+        entry = status["ledger"][item]
+        t.check(entry["state"] == "contradicted" and entry["disabled"], f"{item}: {entry}")
+        t.check(f"assumption {item} = " in rig.gateway.text(), f"{item} is in the log")
+    for side in ("left", "right"):
+        t.check(status[side]["distance_mm"] is None, f"no {side} distance: {status[side]['distance_mm']}")
+        t.check(status[side]["speed_mm_s"] is not None, "the speed does not rest on the gear: rpm are the wheel's")
+        t.check(status[side]["ticks"] is not None, "ticks are what they are")
+    t.check(status["pose"]["x_mm"] is None, f"no pose: {status['pose']}")
+    t.check(status["state"] == "armed", "driving goes on")
+    time.sleep(0.1)
+    client.request("stop")
+    t.judge(rig)
+
+
+@scenario("tare: refused while nothing is known, under unrest, under load and in motion, each with its reason", 24)
+def tare_refused_with_the_reason(t):
+    rig = t.rig(sim_args=("--uptime", "100"))
+    rig.sim.ask("load both 60")
+    rig.start_gateway()
+    client = rig.client()
+
+    def refused(error, words):
+        reply = client.request("tare", side="left")
+        t.expect(reply, error)
+        t.check(words in reply.get("message", ""), f"'{words}' expected: {reply.get('message')}")
+
+    time.sleep(2.6)
+    refused("denied", "unsteady")
+    left = client.request("status")["left"]
+    zero = (left["offset_provenance"], left["offset_contaminated"], left["force_net_mN"], left["force_validity"])
+    t.check(zero == ("none", True, None, "no_offset"), f"a load at the start is no zero: {zero}")
+    rig.sim.ask("load both 0")
+    time.sleep(2.6)
+    reply = client.request("tare")
+    t.expect(reply)
+    t.check(abs(reply["left"]["offset_mN"] - 12300) < 500 and reply["left"]["samples"] == 40, f"left {reply.get('left')}")
+    t.check(abs(reply["right"]["offset_mN"] - 9800) < 500, f"right {reply.get('right')}")
+    rig.sim.ask("zero left 45")  # A weight that does not sway.
+    time.sleep(2.6)
+    refused("denied", "far from its earlier zero")
+    rig.sim.ask("raw left 32767")
+    time.sleep(2.6)
+    refused("denied", "end of its range")
+    t.check(client.request("status")["left"]["force_validity"] == "saturated", "saturated is told")
+    rig.sim.ask("raw left auto")
+    rig.sim.ask("zero left 12.3")
+    time.sleep(2.6)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 1)
+    refused("not_at_rest", "turned within the last two seconds")
+    client.request("stop")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "silence")
+    rig.sim.ask("mute left")
+    time.sleep(0.6)
+    refused("wheel_lost", "has not sent force")
+    t.judge(rig)

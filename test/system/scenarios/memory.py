@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: MIT
+"""What is known of the wheels is kept over restarts; a file that is not to be trusted is told and ignored."""
+
+import glob
+import os
+import signal
+import time
+
+from client import Streamer
+from scenario import scenario
+
+QUIET_S = 2.6  # A window of forty force frames and some.
+
+
+def memory_file(rig):
+    found = [name for name in glob.glob(os.path.join(rig.settings["record"]["directory"], "ledger-*")) if "." not in name[-9:]]
+    return found[0] if found else None
+
+
+def written(rig, needle, seconds=4.0):
+    """Waits until the file holds that text."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        name = memory_file(rig)
+        if name:
+            with open(name, encoding="utf-8") as file:
+                if needle in file.read():
+                    return True
+        time.sleep(0.05)
+    return False
+
+
+def restart(rig, number=signal.SIGTERM, **options):
+    rig.kill_gateway(number)
+    rig.start_gateway(**options)
+    return rig.client()
+
+
+def answered(rig, client):
+    return rig.wait_status(client, lambda s: s["memory"]["state"] != "loading", 2)
+
+
+def keeper_of(gateway):
+    with open(f"/proc/{gateway.child.pid}/task/{gateway.child.pid}/children", encoding="ascii") as file:
+        children = file.read().split()
+    for child in children:
+        with open(f"/proc/{child}/comm", encoding="ascii") as file:
+            if file.read().strip() == "iwheel-keeper":
+                return int(child)
+    raise RuntimeError("the gateway has no keeper")
+
+
+@scenario("a tare and the operator's word survive kill -9, and nothing moves the zero afterwards", 16)
+def memory_survives_a_crash(t):
+    rig, client = t.running()
+    time.sleep(QUIET_S)
+    t.expect(client.request("confirm", item="wheel_radius", value=192))
+    t.expect(client.request("confirm", item="mount_sign_left"))
+    t.expect(client.request("tare"))
+    before = client.request("status")
+    t.check(before["left"]["offset_samples"] == 40 and before["left"]["offset_contaminated"] is False, "quality of the tare")
+    t.check(written(rig, '"operator"') and written(rig, '"left"'), "it is on the disk")
+    time.sleep(1.3)
+    rig.sim.ask("load left 15")  # As heavy as an estimate would swallow.
+    client = restart(rig, signal.SIGKILL)
+    status = answered(rig, client)
+    if not t.check(status, "the memory is read"):
+        return
+    t.check(status["memory"]["state"] == "kept", f"memory {status['memory']}")
+    for item in ("wheel_radius", "mount_sign_left"):
+        entry = status["ledger"][item]
+        t.check((entry["state"], entry["evidence"]) == ("confirmed", "operator"), f"{item}: {entry}")
+    t.check(status["ledger"]["mount_sign_right"]["state"] == "assumed", "nobody confirmed the other wheel")
+    time.sleep(QUIET_S)
+    left = client.request("status")["left"]
+    t.check(left["force_offset_mN"] == before["left"]["force_offset_mN"], f"the zero did not move: {left['force_offset_mN']} mN")
+    t.check((left["offset_provenance"], left["offset_origin"]) == ("stored", "operator"), "and says where it comes from")
+    t.check(left["offset_age_ms"] is not None and 2000 < left["offset_age_ms"] < 60000, f"and how old it is: {left['offset_age_ms']}")
+    t.check(12_000 < (left["force_net_mN"] or 0) < 18_000, f"15 N show as {left['force_net_mN']} mN")
+    rig.sim.ask("reboot left")
+    rig.wait_status(client, lambda s: s["left"]["reboots"] == 1 and s["left"]["at_rest"], 4)
+    time.sleep(QUIET_S)
+    left = client.request("status")["left"]
+    t.check(left["force_offset_mN"] == before["left"]["force_offset_mN"], "nor when the wheel reboots under load")
+    rig.sim.ask("load left 0")
+    time.sleep(QUIET_S)
+    client.request("watch", topics=["force"], rate_hz=1)
+    t.expect(client.request("tare", side="left"))
+    t.check(client.wait_event("offset", side="left", provenance="operator"), "a new tare is told by an event")
+    t.check("left force offset: " in rig.gateway.text() and "before: " in rig.gateway.text(), "and in the log")
+    t.check(not rig.bus.setpoints(), "nothing of that sends anything")
+    t.judge(rig, moves=False)
+
+
+@scenario("evidence for another configuration is forgotten, and that is told", 14)
+def memory_of_another_configuration(t):
+    rig, client = t.running()
+    time.sleep(QUIET_S)
+    t.expect(client.request("confirm", item="wheel_radius"))
+    t.expect(client.request("tare", side="left"))
+    t.check(written(rig, '"wheel_radius"'), "written")
+    time.sleep(1.3)
+    rig.settings["wheels"]["radius_mm"] = 180
+    rig.settings["left"] = {"force_unit": "dN"}
+    rig.write_config()
+    client = restart(rig)
+    status = answered(rig, client)
+    t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "the radius is open again")
+    t.check(status["left"]["offset_origin"] != "operator", "a tare in another unit is no zero")
+    log = rig.gateway.text()
+    t.check("wheel_radius: what was found before was for 192, and 180 is configured now: forgotten" in log, "told: radius")
+    t.check("stored force offset was taken in another force_unit: forgotten" in log, "told: offset")
+    t.judge(rig, moves=False)
+
+
+@scenario("a contradiction stays over a restart, until the operator settles it", 16)
+def memory_of_a_contradiction(t):
+    rig = t.rig()
+    rig.sim.ask("unit left dN")
+    rig.start_gateway()
+    client = rig.client()
+    status = rig.wait_status(client, lambda s: s["left"]["force_validity"] == "unit_contradicted", 6)
+    t.check(status and status["ledger"]["force_unit_left"]["disabled"], "the unit is contradicted")
+    t.check(written(rig, '"contradicted"'), "written")
+    rig.kill_gateway(signal.SIGTERM)
+    rig.sim.end()
+    rig.sim = type(rig.sim)(rig, ("--uptime", "100"))  # No offset frames any more: nothing to find it out by again.
+    rig.bus = rig.listen(rig.bus.frames)
+    rig.sim.ask("unit left dN")
+    rig.start_gateway()
+    client = rig.client()
+    time.sleep(QUIET_S)
+    status = client.request("status")
+    left = status["left"]
+    t.check((left["force_validity"], left["force_net_mN"]) == ("unit_contradicted", None), f"still no net force: {left['force_validity']}")
+    t.check("raw / offset is" in status["ledger"]["force_unit_left"]["reason"], "with the evidence")
+    t.check("force_unit_left = cN is contradicted by the bus" in rig.gateway.text(), "told at start")
+    t.expect(client.request("confirm", item="force_unit_left"))
+    left = client.request("status")["left"]
+    t.check(left["force_validity"] == "valid" and left["force_net_mN"] is not None, f"settled: {left['force_validity']}")
+    t.judge(rig, moves=False)
+
+
+def damage(path):
+    with open(path, "r+b") as file:
+        data = bytearray(file.read())
+        data[len(data) // 2] ^= 1
+        file.seek(0)
+        file.write(data)
+
+
+def replace(path):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write('{"format":"somebody else\'s"}\n')
+
+
+def settled(path):
+    """Waits for the process that keeps the file: it outlives the gateway by its last write."""
+    seen = None
+    while seen != (seen := os.stat(path).st_mtime_ns):
+        time.sleep(0.5)
+
+
+@scenario("a damaged or foreign file is told, ignored and set aside", 16)
+def memory_that_is_not_to_be_trusted(t):
+    rig, client = t.running()
+    for spoil in (damage, replace):
+        t.expect(client.request("confirm", item="wheel_radius"))
+        t.check(written(rig, '"wheel_radius"'), "written")
+        time.sleep(1.3)
+        rig.kill_gateway(signal.SIGTERM)
+        path = memory_file(rig)
+        settled(path)
+        spoil(path)
+        with open(path, "rb") as file:
+            spoilt = file.read()
+        rig.start_gateway()
+        client = rig.client()
+        answered(rig, client)
+        status = client.request("status")
+        t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "nothing of it is believed")
+        t.check(f"{path} is ignored: it is damaged" in rig.gateway.text(), "the log tells")
+        with open(path + ".damaged", "rb") as file:
+            t.check(file.read() == spoilt, "the file is set aside as it was")
+        t.check(rig.wait_status(client, lambda s: s["memory"]["state"] == "kept", 4), "and a new one is kept")
+    t.judge(rig, moves=False)
+
+
+@scenario("nowhere to keep it: told once, and taken up when there is; a dead keeper holds up nothing", 14)
+def memory_without_a_place(t):
+    rig = t.rig()
+    place = rig.path("place")
+    folder = os.path.join(place, "records")
+    with open(place, "w", encoding="ascii"):
+        pass  # A file where a directory should be: nobody can make the other one in it.
+    rig.settings["record"] = {"directory": folder}
+    rig.write_config()
+    rig.start_gateway()
+    client = rig.client()
+    status = answered(rig, client)
+    t.check(status["memory"]["state"] == "failed" and status["memory"]["reason"], f"memory {status['memory']}")
+    t.check("set [record] directory" in rig.gateway.text(), "the log tells cause and cure")
+    t.expect(client.request("confirm", item="wheel_radius"))
+    os.remove(place)
+    os.makedirs(folder)
+    t.check(written(rig, '"wheel_radius"', 13), "kept as soon as there is a place")
+    t.arm(client)
+    stream = Streamer(client, 300, 300, 0.02)
+    time.sleep(0.5)
+    os.kill(keeper_of(rig.gateway), signal.SIGKILL)
+    client.request("confirm", item="mount_sign_left")
+    time.sleep(1.5)
+    stream.stop()
+    status = client.request("status")
+    t.check(status["memory"]["state"] == "failed", f"a dead keeper is told: {status['memory']}")
+    t.check(status["ledger"]["mount_sign_left"]["state"] == "confirmed", "what is known stays known in this run")
+    t.check(rig.gateway.text().count("is not kept in") == 2, "each once")
+    client.request("stop")
+    t.judge(rig)

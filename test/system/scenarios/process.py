@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: MIT
+"""Rows 24, 26 and 27: a gateway whose process stands still, sleeps, is stuck, or cannot write its log."""
+
+import fcntl
+import os
+import re
+import signal
+import socket
+import time
+
+from client import Streamer
+from harness import now_us
+from judge_log import Event
+from scenario import scenario
+
+from .bus_faults import wait_reset
+
+STOPS_S = (0.15, 0.25, 0.45, 0.7, 1.5, 3.0)
+F_SETPIPE_SZ = 1031
+WATCHDOG_MS = 400
+SEEN_US = 40_000  # an order to the hook is seen with the next command, 20 ms later
+
+
+def driving(t, config=None, speed=300, **options):
+    """A rig that drives: rig, client, stream."""
+    rig, client = t.running(config, **options)
+    t.arm(client)
+    stream = Streamer(client, speed, speed, 0.02)
+    time.sleep(0.7)
+    return rig, client, stream
+
+
+# Row 24: the process is stopped ------------------------------------------------------------------------------------------
+
+
+def from_zero(t, rig, back_us, what):
+    """Checks what left after the process came back: zeros, without a burst."""
+    sent = [(at, value) for at, _, value in rig.bus.setpoints(back_us) if at < back_us + 300_000]
+    first = [value for _, value in sent[:2]]
+    t.check(first and not any(first), f"{what}, its first pair is zero: {first}")
+    burst = len([at for at, _ in sent if at < back_us + 10_000])
+    t.check(burst <= 4, f"{burst} setpoints in the first 10 ms")
+    t.measure("stale_frames", len([value for _, value in sent if value]))
+    t.check(not any(value for _, value in sent), f"nothing but zeros afterwards: {sent[:6]}")
+
+
+def stop_process(t, seconds):
+    """The gateway's process stands still in motion for that long (SIGSTOP), while its client drives on."""
+    rig, client, stream = driving(t, {"drive": {"lease_ms": 500, "accel_mm_s2": 2000, "decel_mm_s2": 5000}}, speed=500)
+    rig.note("cut", within_us=int(seconds * 1e6) + 60_000)
+    rig.note("dead")
+    rig.gateway.signal(signal.SIGSTOP)
+    time.sleep(seconds)
+    back_us = now_us()
+    rig.gateway.signal(signal.SIGCONT)
+    rig.note("alive")
+    time.sleep(0.4)
+    stream.stop()
+    from_zero(t, rig, back_us, f"stopped for {seconds} s")
+    state, cause = client.request("status")["state"], client.request("why")["cause"]
+    t.check(cause in ("loop_late", "loop_hung", "lease_lost", "wheel_lost"), f"cause {cause}")
+    if seconds > 0.5:
+        t.check(state == "latched" and cause == "loop_hung", f"{state}, {cause} after {seconds} s")
+    t.figure(f"{seconds} s: {cause}")
+    t.judge(rig)
+
+
+for duration in STOPS_S:
+
+    def stopped(t, duration=duration):
+        stop_process(t, duration)
+
+    stopped.__name__ = f"row24_stopped_{int(duration * 1000)}_ms"
+    scenario(f"the gateway's process stands still for {duration} s: from zero, with a fresh command", 6)(stopped)
+
+
+@scenario("the gateway's process stands still for 70 ms: it drives on without a burst", 4)
+def row24_stopped_70_ms(t):
+    rig, client, stream = driving(t)
+    rig.gateway.signal(signal.SIGSTOP)
+    time.sleep(0.07)
+    back_us = now_us()
+    rig.gateway.signal(signal.SIGCONT)
+    time.sleep(0.4)
+    t.check(stream.stop() is None, f"it drives on: {stream.refusal}")
+    burst = len([at for at, _, _ in rig.bus.setpoints(back_us) if at < back_us + 10_000])
+    t.check(burst <= 4, f"{burst} setpoints in the first 10 ms")
+    client.request("stop")
+    time.sleep(0.4)
+    t.judge(rig)
+
+
+# Row 26 and suspend: faults inside the process, by the preloaded hook (hook.c) -------------------------------------------
+
+
+class Watchdog:
+    """What a service manager hears from the gateway."""
+
+    def __init__(self, path):
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind(path)
+        self.path = path
+
+    def hear(self, seconds):
+        """The words of that time, as [(t_us, word)]."""
+        heard, deadline = [], time.monotonic() + seconds
+        while True:
+            self.socket.settimeout(max(0.001, deadline - time.monotonic()))
+            try:
+                heard.append((now_us(), self.socket.recv(100).decode()))
+            except TimeoutError:
+                pass
+            if time.monotonic() >= deadline:
+                return heard
+
+
+def hooked(rig, watchdog=None):
+    """What to do in the child before it becomes the gateway."""
+
+    def prepare():
+        os.environ["LD_PRELOAD"] = os.path.join(rig.build, "test", "system", "libiwheel_hook.so")
+        os.environ["IWHEEL_HOOK"] = rig.path("hook")
+        if watchdog:
+            os.environ.update(NOTIFY_SOCKET=watchdog.path, WATCHDOG_USEC=str(WATCHDOG_MS * 1000))
+
+    return prepare
+
+
+def order(rig, words):
+    """Has the hook do that, from its next look on."""
+    with open(rig.path("hook.new"), "w", encoding="ascii") as file:
+        file.write(words)
+    os.replace(rig.path("hook.new"), rig.path("hook"))
+
+
+def stuck(t, where):
+    """One part of the cycle never returns; the manager hears nothing more and kills, as it was told to."""
+    rig = t.rig()
+    watchdog = Watchdog(rig.path("notify"))
+    rig.start_gateway(setup=hooked(rig, watchdog))
+    client = rig.client()
+    t.arm(client)
+    stream = Streamer(client, 400, 400, 0.02)
+    words = watchdog.hear(1.2)
+    t.check(any(word == "READY=1" for _, word in words), f"it says that it is ready: {words[:3]}")
+    fed = [at for at, word in words if word == "WATCHDOG=1"]
+    gap_ms = max((b - a for a, b in zip(fed, fed[1:])), default=10**9) / 1000
+    t.check(gap_ms < WATCHDOG_MS, f"while all is well the watchdog is fed every {gap_ms:.0f} ms", True)
+    order(rig, where)
+    stuck_us = now_us()
+    rig.timeline.append(Event(stuck_us + SEEN_US, "end"))
+    late = [at for at, word in watchdog.hear(WATCHDOG_MS * 2.5 / 1000) if at > stuck_us + SEEN_US]
+    t.check(not late, f"stuck, it feeds the watchdog no more: {len(late)} times")
+    t.check(rig.gateway.child.poll() is None, "its process is alive all the same")
+    rig.gateway.signal(signal.SIGABRT)
+    rig.gateway.wait(3)
+    stream.stop()
+    os.unlink(rig.path("hook"))
+    killed_us = now_us()
+    rig.start_gateway(wheels=False, restart_hold=True)
+    observer = rig.client("observer")
+    time.sleep(0.3)
+    again = rig.bus.setpoints(killed_us)
+    t.check(again and not any(speed for _, _, speed in again), f"restarted, zeros and nothing else: {again[:3]}")
+    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "listening after the hold")
+    t.figure(f"fed every {gap_ms:.0f} ms of {WATCHDOG_MS} ms")
+    t.judge(rig)
+
+
+@scenario("stuck with a client: the watchdog is fed no more; killed and restarted: zeros first", 8)
+def row26_stuck_clients(t):
+    stuck(t, "clients")
+
+
+@scenario("stuck with the bus: the watchdog is fed no more", 8)
+def row26_stuck_frames(t):
+    stuck(t, "frames")
+
+
+@scenario("stuck with the e-stop: the watchdog is fed no more", 8)
+def row26_stuck_button(t):
+    stuck(t, "button")
+
+
+@scenario("the machine was suspended for 2 s in motion: latched, from zero, with a fresh command", 5)
+def row24_suspended(t):
+    rig = t.rig()
+    rig.start_gateway(setup=hooked(rig))
+    client = rig.client()
+    t.arm(client)
+    stream = Streamer(client, 300, 300, 0.02)
+    time.sleep(0.7)
+    rig.note("cut", within_us=60_000)
+    order(rig, "asleep 2")
+    back_us = now_us() + 60_000
+    time.sleep(0.4)
+    stream.stop()
+    from_zero(t, rig, back_us, "suspended for 2 s")
+    t.stopped_by(client, "loop_hung")
+    t.check(re.search("suspended for (1999|2000) ms", rig.gateway.text()), f"the log says so: {rig.gateway.text()[-300:]}")
+    wait_reset(t, client)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+
+
+# Row 27 ------------------------------------------------------------------------------------------------------------------
+
+
+def full_pipe():
+    """Both ends of a pipe that takes nothing more; who writes waits."""
+    read_end, write_end = os.pipe()
+    fcntl.fcntl(write_end, F_SETPIPE_SZ, 4096)
+    os.set_blocking(write_end, False)
+    try:
+        while True:
+            os.write(write_end, b"x")
+    except BlockingIOError:
+        os.set_blocking(write_end, True)
+    return read_end, write_end
+
+
+@scenario("stderr is a full pipe that nobody reads: motion unaffected", 8)
+def row27_stderr_blocked(t):
+    rig = t.rig()
+    read_end, write_end = full_pipe()
+    rig.start_gateway("--log-level", "debug", setup=lambda: os.dup2(write_end, 2))
+    client = rig.client()
+    for _ in range(3):
+        t.arm(client)
+        stream = Streamer(client, 300, 300, 0.02)
+        time.sleep(0.5)
+        rig.press()
+        time.sleep(0.1)
+        stream.stop()
+        t.stopped_by(client, "estop_line")
+        rig.release()
+        wait_reset(t, client)
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.5)
+    t.judge(rig)
+    os.close(read_end)
+    os.close(write_end)

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: MIT
+"""Several registers of the CPU at once, without the cost of one wrapped call for each: that is a third of the emulation's time."""
+import ctypes
+
+from unicorn.unicorn_py3.unicorn import uclib
+
+
+class Registers:
+    def __init__(self, cpu, *ids):
+        self.engine, self.count = cpu._uch, len(ids)
+        self.ids = (ctypes.c_int * self.count)(*ids)
+        self.slots = (ctypes.c_uint64 * self.count)()
+        first, size = ctypes.addressof(self.slots), ctypes.sizeof(ctypes.c_uint64)
+        self.pointers = (ctypes.c_void_p * self.count)(*(first + size * at for at in range(self.count)))
+
+    def read(self):
+        for at in range(self.count):
+            self.slots[at] = 0
+        uclib.uc_reg_read_batch(self.engine, self.ids, self.pointers, self.count)
+        return self.slots[:]
+
+    def write(self, *values):
+        self.slots[:] = values
+        uclib.uc_reg_write_batch(self.engine, self.ids, self.pointers, self.count)

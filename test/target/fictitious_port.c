@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// Somebody follows docs/porting.md: its code is included here as it stands there, on a controller with two transmit slots that exists
+// nowhere. The time is virtual. Ends with 0 if the wheels are told what was wished, and 1 if they are not within 3 s.
+#include "iwheel/bit_timing.h"
+#include "iwheel/gateway.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define SLOTS     2
+#define QUEUE_MAX 64U
+
+typedef struct {
+    iw_can_frame_t slot[SLOTS];
+    bool is_full[SLOTS];
+    iw_can_frame_t queue[QUEUE_MAX];
+    uint32_t first, count;
+} my_can_t;
+
+static my_can_t my_can;
+static iw_time_us_t time_us = 1000;
+static iw_time_us_t telemetry_us = 1000;
+static int16_t told_mm_s[IW_SIDES];
+static uint32_t feeds;
+
+static void put(const iw_can_frame_t *frame) {
+    if (my_can.count < QUEUE_MAX) {
+        my_can.queue[(my_can.first + my_can.count++) % QUEUE_MAX] = *frame;
+    }
+}
+
+static int my_send(void *context, const iw_can_frame_t *frame) {
+    my_can_t *const can = context;
+    for (size_t i = 0; i < SLOTS; i++) {
+        if (!can->is_full[i]) {
+            can->slot[i] = *frame;
+            can->is_full[i] = true;
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static int my_receive(void *context, iw_can_frame_t *out_frame) {
+    my_can_t *const can = context;
+    if (can->count == 0U) {
+        return 0;
+    }
+    *out_frame = can->queue[can->first];
+    can->first = (can->first + 1U) % QUEUE_MAX;
+    can->count--;
+    return 1;
+}
+
+static iw_bus_state_t my_bus_state(void *context) {
+    (void)context;
+    return IW_BUS_ACTIVE;
+}
+
+static int my_purge(void *context) {
+    (void)memset(((my_can_t *)context)->is_full, 0, sizeof my_can.is_full);
+    return 1;
+}
+
+static int my_estop_pressed(void *context) {
+    (void)context;
+    return 0;
+}
+
+static iw_time_us_t my_time_us(void) {
+    return time_us;
+}
+
+static void my_watchdog_feed(void) {
+    feeds++;
+}
+
+static int32_t my_wish_left(void) {
+    return 120;
+}
+
+static int32_t my_wish_right(void) {
+    return -80;
+}
+
+static bool my_wish_to_arm(void) {
+    return true;
+}
+
+static void my_sleep_until(iw_time_us_t until_us);
+
+#include "porting_page.inc"
+
+/// Everything in the slots is sent and acknowledged.
+static void send_slots(void) {
+    for (size_t i = 0; i < SLOTS; i++) {
+        if (my_can.is_full[i]) {
+            iw_can_frame_t *const frame = &my_can.slot[i];
+            const iw_side_t side = (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT;
+            told_mm_s[side] = (int16_t)(((uint32_t)frame->data[1] << 8) | frame->data[2]);
+            frame->kind = IW_CAN_ECHO;
+            put(frame);
+            my_can.is_full[i] = false;
+        }
+    }
+}
+
+/// Both wheels do as told.
+static void send_telemetry(void) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        const iw_proto_message_t message = {
+            .kind = IW_PROTO_SPEED, .side = (iw_side_t)side, .as.speed = {(int16_t)(told_mm_s[side] / 20), 0}};
+        iw_can_frame_t frame;
+        (void)iw_proto_encode(&message, &frame);
+        put(&frame);
+    }
+    telemetry_us += 4000U;
+}
+
+static void my_sleep_until(iw_time_us_t until_us) {
+    if (told_mm_s[IW_LEFT] == 120 && told_mm_s[IW_RIGHT] == -80 && feeds > 100U) {
+        exit(0);
+    }
+    if (time_us > 3000000U) {
+        exit(1);
+    }
+    send_slots();
+    time_us = (until_us < telemetry_us) ? until_us : telemetry_us;
+    if (time_us >= telemetry_us) {
+        send_telemetry();
+    }
+}
+
+int main(void) {
+    if (!my_clock_can(40000000U) || my_clock_can(42000000U) || !start(false)) {
+        return 2;
+    }
+    run();
+}

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""Bugs that somebody could write into the port: file, text, what it becomes, and who must notice.
+
+The tests of the driver against the model notice those of DRIVER, a scenario on the emulated STM32F103 those of IMAGE.
+"""
+
+DRIVER = {
+    "an echo for a frame that was not sent": (
+        "bxcan.c", "i < outgoing->owed && (flags & IW_TSR_TXOK(mailbox)) != 0U;", "i < outgoing->owed;", "transmit"),
+    "a frame that left while it was being replaced is forgotten": (
+        "bxcan.c", "if ((iw_register_read(tsr) & IW_TSR_TXOK(mailbox)) == 0U) {", "{", "transmit"),
+    "the end of an abort is not awaited": (
+        "bxcan.c", "if (!poll_tsr(self, IW_TSR_RQCP(mailbox) | IW_TSR_TME(mailbox))) {", "if (false) {", "transmit"),
+    "the old frame stays beside the new one": ("bxcan.c", "outgoing->frame[0].id == id)", "outgoing->frame[0].id == id + 1U)", "transmit"),
+    "a wait without a bound": ("bxcan.c", "poll < self->config.poll_limit;", "true;", "transmit"),
+    "a purge that claims success": ("bxcan.c", "const bool done = poll_tsr(self, EMPTY);", "const bool done = true;", "transmit"),
+    "echoes from before a purge": ("bxcan.c", "        self->epoch++;\n", "", "transmit"),
+    "the echo of a replaced frame bears other bytes": ("bxcan.c", "put(self, &outgoing->frame[i])", "put(self, &outgoing->frame[0])", "transmit"),
+    "mailboxes in the order of the requests (TXFP)": ("bxcan.c", "IW_MCR_DBF | request", "IW_MCR_DBF | 0x04U | request", "transmit"),
+    "no second attempt (NART)": ("bxcan.c", "IW_MCR_DBF | request", "IW_MCR_DBF | 0x10U | request", "transmit"),
+    "bus-off left by the controller alone (ABOM)": ("bxcan.c", "IW_MCR_DBF | request", "IW_MCR_DBF | 0x40U | request", "modes"),
+    "sending in bus-off": ("bxcan.c", "frame->dlc > IW_CAN_DATA_MAX || is_bus_off(self))", "frame->dlc > IW_CAN_DATA_MAX)", "modes"),
+    "what waits survives bus-off": ("bxcan.c", "    (void)iw_bxcan_purge(self);\n    write_mcr", "    write_mcr", "modes"),
+    "not silent": ("bxcan.c", "(self->config.silent ? IW_BTR_SILM : 0U)", "0U", "modes"),
+    "an error interrupt that never ends": (
+        "bxcan.c", "iw_register_write(&self->config.registers->MSR, IW_MSR_ERRI);", "(void)self;", "modes"),
+    "configured outside initialisation mode": ("bxcan.c", "        if (in_init) {\n", "        if (true) {\n", "modes"),
+    "a release under way shows the old frame again": ("bxcan.c", "(status & IW_RF0R_RFOM0) != 0U || ", "", "receive"),
+    "one overrun counted for ever": ("bxcan.c", "iw_register_write(&registers->RF0R, IW_RF0R_FOVR0);", "", "receive"),
+    "losses that are not told": ("bxcan.c", "    if (tell_loss(self, out_frame)) {", "    if (false && tell_loss(self, out_frame)) {", "receive"),
+    "29-bit frames taken for ours": ("bxcan.c", "| IW_CAN_EXTENDED)", ")", "receive"),
+    "15 bytes copied out of 8": ("bxcan.c", "(uint8_t)((dlc < IW_CAN_DATA_MAX) ? dlc : IW_CAN_DATA_MAX)", "(uint8_t)dlc", "receive"),
+    "a mask too wide": ("bxcan_filters.c", "{IW_ID_LEFT_SPEED, 0x21U}", "{IW_ID_LEFT_SPEED, 0x23U}", "receive"),
+    "remote frames filtered out": ("bxcan_filters.c", "<< 5) | 0x08U", "<< 5) | 0x18U", "receive"),
+    "filters changed while in force": ("bxcan_filters.c", "    set_bits(&device->FMR, IW_FMR_FINIT);", "    //", "modes"),
+    "a ring that overwrites": ("frame_ring.c", "head - tail >= IW_FRAME_RING_LENGTH", "head - tail > IW_FRAME_RING_LENGTH", "receive"),
+}
+
+IMAGE = {
+    "the bus at half its rate": ("main.c", "IW_BIT_BTR,", "IW_BIT_BTR + 1U,", "zero", "nominal"),
+    "no wait states of the flash": ("clock_f1.c", "PRFTBE | IW_BOARD_FLASH_WAIT_STATES", "PRFTBE", "zero", "nominal"),
+    "time goes back at a tick": ("cortex_m.c", "(SCB_ICSR & PENDSTSET) != 0U || ", "", "zero", "time_never_goes_back"),
+    "edges of the e-stop are not latched": (
+        "estop.c", "store_explicit(&had_edge, true,", "store_explicit(&had_edge, false,", "zero", "estop_pulse"),
+    "no pull-up at the e-stop's pin": ("pins_f1.c", "PORT_A->BSRR = ESTOP | BUTTON", "PORT_A->BSRR = BUTTON", "zero", "estop"),
+    "the crystal is waited for without a bound": ("clock_f1.c", "poll < POLLS_MAX;", "true;", "zero", "no_crystal"),
+    "the crystal's failure goes unnoticed": ("clock_f1.c", "RCC->CR |= CSSON;", ";", "demo", "crystal_dies"),
+    "an interrupt feeds the watchdog": (
+        "main.c", "    iw_bxcan_on_receive(&bus);\n", "    iw_bxcan_on_receive(&bus);\n    iw_watchdog_feed();\n", "demo", "loop_stuck"),
+    "no watchdog": ("main.c", "    iw_watchdog_start();\n", "", "demo", "hang"),
+    "nobody remembers that setpoints were being sent": ("main.c", "start_gateway(&gateway, restarted)", "start_gateway(&gateway, false)",
+                                                        "demo", "hang"),
+    "a button that is down counts as a press": (
+        "commander_demo.c", "const bool press = level && self->released;", "const bool press = level;", "demo", "demo_button_held_through_reset"),
+    "the profile goes on after a stop": ("commander_demo.c", "        self->running = false;\n        if (press)", "        if (press)",
+                                         "demo", "bus_off"),
+    "it acknowledges although it only listens": ("main.c", ".silent = !iw_commander_sends()", ".silent = false", "listen", "listening"),
+    "echoes do not wake the loop, nor frames": ("main.c", "    iw_wake();\n", "", "zero", "full_bus"),
+}

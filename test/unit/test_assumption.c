@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+// The ledger's items in words: the value in force, what somebody found beside it, what a contradiction costs.
+#include "assumption.h"
+#include "names.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+static iw_config_t config;
+static char text[GW_EVIDENCE_SIZE];
+
+void setUp(void) {
+    iw_config_default(&config);
+    config.setpoint_type_set = true;
+    config.setpoint_type = 7;
+    config.current_role = IW_ROLE_SETPOINT;
+    config.invert[IW_RIGHT] = true;
+    config.gear_turns = 10;
+    config.gear_per = 3;
+    config.rpm_of_rotor = true;
+}
+
+void tearDown(void) {}
+
+static void assert_value(iw_ledger_item_t item, const char *expected) {
+    char value[GW_VALUE_SIZE];
+    memset(value, 0x5A, sizeof value);
+    gw_assumption_value(&config, item, value);
+    TEST_ASSERT_EQUAL_STRING(expected, value);
+}
+
+static void assert_found(gw_found_t expected, iw_ledger_item_t item, const char *found) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected, gw_assumption_compare(&config, item, found), found);
+}
+
+static void test_assumption_values_are_those_of_the_configuration(void) {
+    assert_value(IW_LEDGER_SETPOINT_TYPE, "7");
+    assert_value(IW_LEDGER_CURRENT_ROLE, "setpoint");
+    assert_value(IW_LEDGER_FORCE_UNIT_LEFT, "cN");
+    assert_value(IW_LEDGER_FORCE_UNIT_RIGHT, "dN");
+    assert_value(IW_LEDGER_MOUNT_SIGN_LEFT, "no");
+    assert_value(IW_LEDGER_MOUNT_SIGN_RIGHT, "yes");
+    assert_value(IW_LEDGER_WHEEL_RADIUS, "192");
+    assert_value(IW_LEDGER_GEAR_RATIO, "10/3, rpm of the rotor");
+    assert_value(IW_LEDGER_OFFSET_INCLUDED, "yes");
+    assert_value(IW_LEDGER_DLC, "yes");
+    iw_config_default(&config);
+    assert_value(IW_LEDGER_SETPOINT_TYPE, "");
+    assert_value(IW_LEDGER_CURRENT_ROLE, "");
+    assert_value(IW_LEDGER_GEAR_RATIO, "1, rpm of the wheel");
+}
+
+static void test_assumption_longest_values_fit(void) {
+    config.gear_turns = 1000;
+    config.gear_per = 999;
+    assert_value(IW_LEDGER_GEAR_RATIO, "1000/999, rpm of the rotor");
+}
+
+static void test_assumption_every_item_is_found_by_its_name_and_nothing_else_is(void) {
+    for (unsigned n = 0; n < IW_LEDGER_ITEMS; n++) {
+        iw_ledger_item_t item = IW_LEDGER_ITEMS;
+        TEST_ASSERT_TRUE(gw_assumption_of(gw_ledger_item_name((iw_ledger_item_t)n), &item));
+        TEST_ASSERT_EQUAL_UINT(n, item);
+    }
+    iw_ledger_item_t item = IW_LEDGER_ITEMS;
+    TEST_ASSERT_FALSE(gw_assumption_of("", &item));
+    TEST_ASSERT_FALSE(gw_assumption_of("unknown", &item));
+    TEST_ASSERT_FALSE(gw_assumption_of("wheel_radius ", &item));
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, item);
+}
+
+static void test_assumption_without_a_value_the_configured_one_is_meant(void) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        assert_found(GW_FOUND_SAME, (iw_ledger_item_t)item, "");
+    }
+}
+
+static void test_assumption_what_is_not_configured_cannot_be_confirmed(void) {
+    iw_config_default(&config);
+    assert_found(GW_FOUND_UNSET, IW_LEDGER_SETPOINT_TYPE, "");
+    assert_found(GW_FOUND_UNSET, IW_LEDGER_SETPOINT_TYPE, "7");
+    assert_found(GW_FOUND_UNSET, IW_LEDGER_CURRENT_ROLE, "limit");
+}
+
+static void test_assumption_numbers_are_compared_as_numbers(void) {
+    assert_found(GW_FOUND_SAME, IW_LEDGER_SETPOINT_TYPE, "7");
+    assert_found(GW_FOUND_SAME, IW_LEDGER_SETPOINT_TYPE, "007");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_SETPOINT_TYPE, "0");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_SETPOINT_TYPE, "255");
+    static const char *const impossible[] = {"256", "-1", "7 ", "0x7", "99999", "4294967303", "seven"};
+    for (size_t i = 0; i < sizeof impossible / sizeof impossible[0]; i++) {
+        assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_SETPOINT_TYPE, impossible[i]);
+    }
+}
+
+static void test_assumption_a_radius_within_two_percent_is_the_same(void) {
+    assert_found(GW_FOUND_SAME, IW_LEDGER_WHEEL_RADIUS, "192");
+    assert_found(GW_FOUND_SAME, IW_LEDGER_WHEEL_RADIUS, "195");
+    assert_found(GW_FOUND_SAME, IW_LEDGER_WHEEL_RADIUS, "189");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_WHEEL_RADIUS, "196");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_WHEEL_RADIUS, "188");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_WHEEL_RADIUS, "500");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_WHEEL_RADIUS, "501");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_WHEEL_RADIUS, "19");
+}
+
+static void test_assumption_gear_ratios_are_compared_as_ratios(void) {
+    assert_found(GW_FOUND_SAME, IW_LEDGER_GEAR_RATIO, "10/3");
+    assert_found(GW_FOUND_SAME, IW_LEDGER_GEAR_RATIO, "20/6");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_GEAR_RATIO, "10");
+    static const char *const impossible[] = {"0", "1/0", "/3", "10/", "1001", "1/1001", "10/3, rpm of the rotor"};
+    for (size_t i = 0; i < sizeof impossible / sizeof impossible[0]; i++) {
+        assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_GEAR_RATIO, impossible[i]);
+    }
+}
+
+static void test_assumption_words_are_compared_as_words(void) {
+    assert_found(GW_FOUND_SAME, IW_LEDGER_FORCE_UNIT_RIGHT, "dN");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_FORCE_UNIT_RIGHT, "cN");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_FORCE_UNIT_RIGHT, "DN");
+    assert_found(GW_FOUND_SAME, IW_LEDGER_MOUNT_SIGN_RIGHT, "yes");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_MOUNT_SIGN_LEFT, "yes");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_MOUNT_SIGN_LEFT, "true");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_CURRENT_ROLE, "limit");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_CURRENT_ROLE, "torque");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_OFFSET_INCLUDED, "no");
+}
+
+static void test_assumption_evidence_tells_the_figure(void) {
+    iw_ledger_entry_t entry = {IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS, -1010};
+    gw_assumption_evidence(IW_LEDGER_FORCE_UNIT_LEFT, &entry, "", text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "-1.010"));
+    entry.figure = INT32_MIN;
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        for (unsigned evidence = IW_EVIDENCE_NONE; evidence <= IW_EVIDENCE_OPERATOR; evidence++) {
+            entry.evidence = (iw_evidence_t)evidence;
+            gw_assumption_evidence((iw_ledger_item_t)item, &entry, "", text);
+            TEST_ASSERT_GREATER_THAN_UINT(8, strlen(text));
+            TEST_ASSERT_LESS_THAN_UINT(GW_EVIDENCE_SIZE - 1U, strlen(text));
+        }
+    }
+}
+
+static void test_assumption_evidence_tells_what_the_operator_found(void) {
+    iw_ledger_entry_t entry = {IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, 0};
+    gw_assumption_evidence(IW_LEDGER_WHEEL_RADIUS, &entry, "181", text);
+    TEST_ASSERT_EQUAL_STRING("the operator found 181", text);
+    gw_assumption_evidence(IW_LEDGER_WHEEL_RADIUS, &entry, "", text);
+    TEST_ASSERT_EQUAL_STRING("the operator found something else", text);
+    entry.state = IW_LEDGER_CONFIRMED;
+    gw_assumption_evidence(IW_LEDGER_WHEEL_RADIUS, &entry, "192", text);
+    TEST_ASSERT_EQUAL_STRING("the operator says so", text);
+}
+
+static void test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm(void) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        const char *cost = gw_assumption_cost((iw_ledger_item_t)item);
+        const bool refuses = strncmp(cost, "arm is refused; ", 16) == 0;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(refuses, gw_assumption_moves((iw_ledger_item_t)item), cost);
+        TEST_ASSERT_NOT_EQUAL(0, strcmp(cost, "unknown"));
+    }
+    TEST_ASSERT_TRUE(gw_assumption_moves(IW_LEDGER_MOUNT_SIGN_LEFT));
+    TEST_ASSERT_FALSE(gw_assumption_moves(IW_LEDGER_DLC));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_assumption_values_are_those_of_the_configuration);
+    RUN_TEST(test_assumption_longest_values_fit);
+    RUN_TEST(test_assumption_every_item_is_found_by_its_name_and_nothing_else_is);
+    RUN_TEST(test_assumption_without_a_value_the_configured_one_is_meant);
+    RUN_TEST(test_assumption_what_is_not_configured_cannot_be_confirmed);
+    RUN_TEST(test_assumption_numbers_are_compared_as_numbers);
+    RUN_TEST(test_assumption_a_radius_within_two_percent_is_the_same);
+    RUN_TEST(test_assumption_gear_ratios_are_compared_as_ratios);
+    RUN_TEST(test_assumption_words_are_compared_as_words);
+    RUN_TEST(test_assumption_evidence_tells_the_figure);
+    RUN_TEST(test_assumption_evidence_tells_what_the_operator_found);
+    RUN_TEST(test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm);
+    return UNITY_END();
+}

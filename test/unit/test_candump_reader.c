@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include "candump_reader.h"
+
+#include <string.h>
+#include <unistd.h>
+#include <unity.h>
+
+static candump_reader_t reader;
+static int ends[2];
+
+void setUp(void) {
+    TEST_ASSERT_EQUAL(0, pipe(ends));
+    candump_reader_init(&reader, ends[0]);
+}
+
+void tearDown(void) {
+    (void)close(ends[0]);
+    if (ends[1] >= 0) {
+        (void)close(ends[1]);
+    }
+}
+
+static void give_bytes(const char *text, size_t length) {
+    TEST_ASSERT_EQUAL(length, write(ends[1], text, length));
+}
+
+static void give(const char *text) {
+    give_bytes(text, strlen(text));
+}
+
+static void end_input(void) {
+    (void)close(ends[1]);
+    ends[1] = -1;
+}
+
+static void expect_frame(uint32_t id, uint64_t line) {
+    candump_t frame;
+    TEST_ASSERT_EQUAL(CANDUMP_READ_FRAME, candump_reader_next(&reader, &frame));
+    TEST_ASSERT_EQUAL_HEX32(id, frame.id);
+    TEST_ASSERT_EQUAL_UINT64(line, reader.line);
+}
+
+static void expect_bad(uint64_t line, const char *why) {
+    candump_t frame;
+    TEST_ASSERT_EQUAL(CANDUMP_READ_BAD, candump_reader_next(&reader, &frame));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reader.why, why), reader.why);
+    TEST_ASSERT_EQUAL_UINT64(line, reader.line);
+}
+
+static void expect_end(void) {
+    candump_t frame;
+    TEST_ASSERT_EQUAL(CANDUMP_READ_END, candump_reader_next(&reader, &frame));
+    TEST_ASSERT_EQUAL(CANDUMP_READ_END, candump_reader_next(&reader, &frame));
+}
+
+static void test_lines_come_in_order_with_their_numbers(void) {
+    give("(1.0) can0 100#00\r\n\n# comment\n(1.1) can0 120#00\nrubbish\n(1.2) can0 200#\n");
+    end_input();
+    expect_frame(0x100, 1);
+    expect_frame(0x120, 4);
+    expect_bad(5, "time in parentheses");
+    expect_frame(0x200, 6);
+    expect_end();
+}
+
+static void test_empty_input_ends(void) {
+    end_input();
+    expect_end();
+}
+
+static void test_line_is_handed_out_while_the_writer_goes_on(void) {
+    give("(1.0) can0 100#00\n(1.1) can");
+    expect_frame(0x100, 1);
+    give("0 101#00\n");
+    expect_frame(0x101, 2);
+    end_input();
+    expect_end();
+}
+
+static void test_last_line_without_end_is_left_out_and_told(void) {
+    give("(1.0) can0 100#0011\n(1.1) can0 100#00");
+    end_input();
+    expect_frame(0x100, 1);
+    expect_bad(2, "may be cut");
+    expect_end();
+}
+
+static void test_blank_rest_is_no_line(void) {
+    give("(1.0) can0 100#0011\n \t");
+    end_input();
+    expect_frame(0x100, 1);
+    expect_end();
+}
+
+static void test_endless_line_is_told_once_and_the_next_is_read(void) {
+    char long_line[5000];
+    (void)memset(long_line, '(', sizeof long_line);
+    long_line[sizeof long_line - 1U] = '\n';
+    give("(1.0) can0 100#00\n");
+    give_bytes(long_line, sizeof long_line);
+    give_bytes(long_line, sizeof long_line);
+    give("(1.1) can0 101#00\n");
+    end_input();
+    expect_frame(0x100, 1);
+    expect_bad(2, "longer than any frame");
+    expect_bad(3, "longer than any frame");
+    expect_frame(0x101, 4);
+    expect_end();
+}
+
+static void test_zero_bytes_are_told_as_bad_and_lose_nothing_else(void) {
+    static const char text[] = "(1.0) can0 100#00\n\0\0\0\n(1.1) can0 101#00\n";
+    give_bytes(text, sizeof text - 1U);
+    end_input();
+    expect_frame(0x100, 1);
+    expect_bad(2, "time in parentheses");
+    expect_frame(0x101, 3);
+    expect_end();
+}
+
+static void test_what_cannot_be_read_is_no_end_of_file(void) {
+    candump_t frame;
+    candump_reader_init(&reader, -1);
+    TEST_ASSERT_EQUAL(CANDUMP_READ_FAILED, candump_reader_next(&reader, &frame));
+}
+
+static void test_more_than_the_buffer_holds_comes_whole(void) {
+    uint64_t line = 0;
+    for (unsigned round = 0; round < 30U; ++round) {
+        for (unsigned i = 0; i < 200U; ++i) {
+            give("(1.0) can0 100#0011223344556677\n");
+        }
+        for (unsigned i = 0; i < 200U; ++i) {
+            expect_frame(0x100, ++line);
+        }
+    }
+    end_input();
+    expect_end();
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_lines_come_in_order_with_their_numbers);
+    RUN_TEST(test_empty_input_ends);
+    RUN_TEST(test_line_is_handed_out_while_the_writer_goes_on);
+    RUN_TEST(test_last_line_without_end_is_left_out_and_told);
+    RUN_TEST(test_blank_rest_is_no_line);
+    RUN_TEST(test_endless_line_is_told_once_and_the_next_is_read);
+    RUN_TEST(test_zero_bytes_are_told_as_bad_and_lose_nothing_else);
+    RUN_TEST(test_what_cannot_be_read_is_no_end_of_file);
+    RUN_TEST(test_more_than_the_buffer_holds_comes_whole);
+    return UNITY_END();
+}

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+// Where the zero of a force comes from, with simulated wheels: late join, loaded start, reboot, restart of the gateway, tare.
+#include "world_rig.h"
+
+#include "unity.h"
+
+#define SECOND 1000U
+/// The simulated sensors' zeros, as the wheels tell them.
+#define LEFT_ZERO_mN  12300
+#define RIGHT_ZERO_mN 9800
+
+static world_rig_t rig;
+
+void setUp(void) {
+    fixture_config(&rig.config);
+}
+
+void tearDown(void) {}
+
+static const iw_force_t *force(iw_side_t side) {
+    return &rig.gateway.force[side];
+}
+
+static sim_force_t *sensor(iw_side_t side) {
+    return &rig.world.pair.wheel[side].force;
+}
+
+static iw_force_validity_t validity(iw_side_t side) {
+    return iw_force_validity(force(side), rig.now_us);
+}
+
+static void load_both(int32_t load_mN) {
+    sensor(IW_LEFT)->load_mN = load_mN;
+    sensor(IW_RIGHT)->load_mN = load_mN;
+}
+
+static void assert_zero(iw_side_t side, iw_offset_provenance_t provenance, int32_t about_mN) {
+    TEST_ASSERT_EQUAL_INT(provenance, force(side)->provenance);
+    TEST_ASSERT_INT32_WITHIN(300, about_mN, force(side)->offset_mN);
+}
+
+static void assert_tare(iw_tare_t expected, iw_side_t side) {
+    const iw_force_t before = *force(side);
+    const iw_tare_t result = iw_gateway_tare(&rig.gateway, rig.now_us, side);
+    TEST_ASSERT_EQUAL_INT(expected, result);
+    if (expected != IW_TARE_OK) {
+        TEST_ASSERT_EQUAL_MEMORY(&before, force(side), sizeof before);
+    }
+}
+
+static void test_wheels_that_start_unloaded_give_their_own_zero(void) {
+    world_rig_begin(&rig, 0);
+    world_rig_run(&rig, 4U * SECOND);
+    assert_zero(IW_LEFT, IW_OFFSET_WHEEL, LEFT_ZERO_mN);
+    assert_zero(IW_RIGHT, IW_OFFSET_WHEEL, RIGHT_ZERO_mN);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
+    load_both(50000);
+    world_rig_run(&rig, SECOND);
+    TEST_ASSERT_INT32_WITHIN(3500, 50000, iw_force_net_mN(force(IW_LEFT)));
+    TEST_ASSERT_INT32_WITHIN(3500, 50000, iw_force_net_mN(force(IW_RIGHT)));
+}
+
+static void test_joining_late_without_offset_frames_takes_two_quiet_seconds(void) {
+    world_rig_begin(&rig, 100000000U);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, validity(IW_LEFT));
+    world_rig_run(&rig, 2U * SECOND);
+    assert_zero(IW_LEFT, IW_OFFSET_ESTIMATED, LEFT_ZERO_mN);
+    assert_zero(IW_RIGHT, IW_OFFSET_ESTIMATED, RIGHT_ZERO_mN);
+    world_rig_run(&rig, 60U * SECOND);
+    assert_zero(IW_LEFT, IW_OFFSET_ESTIMATED, LEFT_ZERO_mN);
+}
+
+static void test_joining_late_under_load_gives_no_zero_until_a_tare(void) {
+    world_rig_begin(&rig, 100000000U);
+    load_both(80000);
+    world_rig_restart(&rig);
+    world_rig_run(&rig, 5U * SECOND);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, force(IW_LEFT)->provenance);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_NOISY, force(IW_LEFT)->quality.window);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, validity(IW_LEFT));
+    assert_tare(IW_TARE_NOISY, IW_LEFT);
+    load_both(0);
+    world_rig_run(&rig, 3U * SECOND);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, validity(IW_LEFT));
+    assert_tare(IW_TARE_OK, IW_LEFT);
+    assert_zero(IW_LEFT, IW_OFFSET_OPERATOR, LEFT_ZERO_mN);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
+}
+
+/// The listener was there first, saw the wheels start, and the person who leaned on them.
+static void start_loaded_in_sight(void) {
+    world_rig_begin(&rig, 0);
+    world_rig_run(&rig, 4U * SECOND);
+    sim_world_power(&rig.world, rig.now_us, false);
+    world_rig_run(&rig, 2U * SECOND);
+    world_rig_restart(&rig); // Knows nothing of before.
+    world_rig_run(&rig, 2U * SECOND);
+    load_both(100000);
+    sim_world_power(&rig.world, rig.now_us, true);
+    world_rig_run(&rig, 4U * SECOND);
+}
+
+static void test_loaded_start_in_sight_gives_neither_the_wheels_zero_nor_ours(void) {
+    start_loaded_in_sight();
+    TEST_ASSERT_TRUE(force(IW_LEFT)->boot_seen && force(IW_LEFT)->wheel_offset_heard);
+    TEST_ASSERT_INT32_WITHIN(120, 1123, force(IW_LEFT)->wheel_offset_dN); // It has taken the person for its zero.
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, force(IW_LEFT)->provenance);
+    load_both(0);
+    world_rig_run(&rig, 90U * SECOND);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, force(IW_LEFT)->provenance);
+    assert_tare(IW_TARE_OK, IW_LEFT);
+    assert_zero(IW_LEFT, IW_OFFSET_OPERATOR, LEFT_ZERO_mN);
+}
+
+static void test_loaded_start_out_of_sight_is_doubted_when_the_load_is_gone(void) {
+    world_rig_begin(&rig, 0);
+    load_both(50000);
+    sim_world_reboot(&rig.world, rig.now_us, IW_LEFT);
+    world_rig_run(&rig, 4U * SECOND);
+    load_both(0);
+    world_rig_restart(&rig);
+    world_rig_run(&rig, 4U * SECOND);
+    TEST_ASSERT_FALSE(force(IW_LEFT)->boot_seen);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, validity(IW_LEFT));
+    assert_tare(IW_TARE_OK, IW_LEFT);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
+}
+
+static void test_reboot_makes_the_zero_stored_and_then_the_wheels_again(void) {
+    world_rig_begin(&rig, 0);
+    world_rig_run(&rig, 90U * SECOND);
+    sim_world_power(&rig.world, rig.now_us, false);
+    world_rig_run(&rig, 2U * SECOND);
+    sim_world_power(&rig.world, rig.now_us, true);
+    world_rig_run(&rig, SECOND);
+    assert_zero(IW_LEFT, IW_OFFSET_STORED, LEFT_ZERO_mN);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
+    world_rig_run(&rig, 4U * SECOND);
+    assert_zero(IW_LEFT, IW_OFFSET_WHEEL, LEFT_ZERO_mN);
+}
+
+static void test_reboot_under_load_keeps_the_zero_of_before(void) {
+    world_rig_begin(&rig, 0);
+    world_rig_run(&rig, 90U * SECOND);
+    sim_world_power(&rig.world, rig.now_us, false);
+    world_rig_run(&rig, 2U * SECOND);
+    load_both(10000); // Quiet enough to pass for a zero, if there were none to compare it with.
+    sim_world_power(&rig.world, rig.now_us, true);
+    world_rig_run(&rig, 20U * SECOND);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_LOADED, force(IW_LEFT)->quality.window);
+    assert_zero(IW_LEFT, IW_OFFSET_STORED, LEFT_ZERO_mN);
+    TEST_ASSERT_INT32_WITHIN(1000, 10000, iw_force_net_mN(force(IW_LEFT)));
+}
+
+static void test_tare_survives_reboot_and_restart(void) {
+    world_rig_begin(&rig, 0);
+    world_rig_run(&rig, 4U * SECOND);
+    assert_tare(IW_TARE_OK, IW_LEFT);
+    const int32_t tared_mN = force(IW_LEFT)->offset_mN;
+    sim_world_reboot(&rig.world, rig.now_us, IW_LEFT);
+    world_rig_run(&rig, 10U * SECOND);
+    TEST_ASSERT_EQUAL_INT32(tared_mN, force(IW_LEFT)->offset_mN);
+    world_rig_restart(&rig);
+    iw_force_restore(&rig.gateway.force[IW_LEFT], IW_OFFSET_OPERATOR, tared_mN);
+    load_both(10000);
+    world_rig_run(&rig, 10U * SECOND);
+    assert_zero(IW_LEFT, IW_OFFSET_OPERATOR, tared_mN);
+    TEST_ASSERT_EQUAL_INT32(tared_mN, force(IW_LEFT)->offset_mN);
+}
+
+static void test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent(void) {
+    world_rig_begin(&rig, 0);
+    assert_tare(IW_TARE_NO_FORCE, IW_LEFT);
+    world_rig_run(&rig, 4U * SECOND);
+    load_both(50000); // A person sways.
+    world_rig_run(&rig, 3U * SECOND);
+    assert_tare(IW_TARE_NOISY, IW_LEFT);
+    load_both(0);
+    sensor(IW_LEFT)->sensor_zero_mN += 25000; // A quiet weight.
+    world_rig_run(&rig, 3U * SECOND);
+    assert_tare(IW_TARE_LOADED, IW_LEFT);
+    assert_tare(IW_TARE_OK, IW_RIGHT);
+    sensor(IW_LEFT)->forced_raw = INT16_MAX;
+    world_rig_run(&rig, 3U * SECOND);
+    assert_tare(IW_TARE_SATURATED, IW_LEFT);
+    sensor(IW_LEFT)->forced_raw = SIM_FORCE_AUTO;
+    sensor(IW_LEFT)->sensor_zero_mN -= 25000;
+    world_rig_run(&rig, 3U * SECOND);
+    world_rig_drive(&rig, 200, 0, SECOND);
+    assert_tare(IW_TARE_MOVING, IW_LEFT);
+    world_rig_run(&rig, 5U * SECOND);
+    assert_tare(IW_TARE_OK, IW_LEFT);
+    rig.world.pair.wheel[IW_LEFT].muted = true;
+    world_rig_run(&rig, SECOND);
+    assert_tare(IW_TARE_NO_FORCE, IW_LEFT);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, validity(IW_LEFT));
+}
+
+static void test_wheel_that_takes_its_offset_out_itself_is_found_out_and_a_tare_mends_it(void) {
+    world_rig_begin(&rig, 0);
+    sensor(IW_LEFT)->zero_removed = true;
+    world_rig_restart(&rig);
+    world_rig_run(&rig, 4U * SECOND);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_REMOVED, validity(IW_LEFT));
+    assert_tare(IW_TARE_OK, IW_LEFT);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, validity(IW_LEFT));
+    TEST_ASSERT_INT32_WITHIN(1000, 0, iw_force_net_mN(force(IW_LEFT)));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_wheels_that_start_unloaded_give_their_own_zero);
+    RUN_TEST(test_joining_late_without_offset_frames_takes_two_quiet_seconds);
+    RUN_TEST(test_joining_late_under_load_gives_no_zero_until_a_tare);
+    RUN_TEST(test_loaded_start_in_sight_gives_neither_the_wheels_zero_nor_ours);
+    RUN_TEST(test_loaded_start_out_of_sight_is_doubted_when_the_load_is_gone);
+    RUN_TEST(test_reboot_makes_the_zero_stored_and_then_the_wheels_again);
+    RUN_TEST(test_reboot_under_load_keeps_the_zero_of_before);
+    RUN_TEST(test_tare_survives_reboot_and_restart);
+    RUN_TEST(test_tare_is_refused_while_moving_loaded_noisy_saturated_or_silent);
+    RUN_TEST(test_wheel_that_takes_its_offset_out_itself_is_found_out_and_a_tare_mends_it);
+    return UNITY_END();
+}

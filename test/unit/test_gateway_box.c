@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: MIT
+#include "box.h"
+#include "box_files.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <unity.h>
+
+static gateway_config_t config;
+static gw_box_t box;
+static char folder[64];
+static bool open_box;
+
+void setUp(void) {
+    gateway_config_default(&config);
+    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-box-XXXXXX");
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/records", folder);
+    config.record.blackbox_s = 2;
+}
+
+void tearDown(void) {
+    char command[128];
+    if (open_box) {
+        gw_box_close(&box);
+        open_box = false;
+    }
+    (void)snprintf(command, sizeof command, "rm -rf %s", folder);
+    TEST_ASSERT_EQUAL(0, system(command));
+}
+
+static void start(void) {
+    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &config));
+    open_box = true;
+}
+
+static gw_box_news_t wait_news(void) {
+    struct pollfd entry = {.fd = box.fd, .events = POLLIN};
+    TEST_ASSERT_EQUAL(1, poll(&entry, 1, 10000));
+    return gw_box_take(&box);
+}
+
+/// Ten frames and ten steps in the last second, then a stop that is over.
+static gw_box_order_t stopped(const char *cause) {
+    const iw_time_us_t now_us = iw_clock_now_us();
+    const iw_time_us_t stop_us = now_us - GW_BOX_AFTER_US;
+    for (unsigned i = 0; i < 10U; ++i) {
+        const blackbox_entry_t frame = {.at_us = stop_us - 1000U + i,
+                                        .kind = BLACKBOX_FRAME,
+                                        .number = 256,
+                                        .a = 4,
+                                        .as = {.data = {0, (uint8_t)i}}};
+        const blackbox_entry_t step = {.at_us = stop_us - 1000U + i, .kind = BLACKBOX_STEP};
+        blackbox_ring_put(box.ring, &frame);
+        blackbox_ring_put(box.ring, &step);
+    }
+    gw_box_order_t order = {.note = {.stop = {.number = 3, .at_us = stop_us, .cause = IW_CAUSE_ESTOP_LINE}},
+                            .from = "armed",
+                            .wall_minus_us = 1000,
+                            .mark = blackbox_ring_written(box.ring)};
+    (void)snprintf(order.cause, sizeof order.cause, "%s", cause);
+    (void)snprintf(order.note.sentence, sizeof order.note.sentence, "because of \"this\"");
+    return order;
+}
+
+static void record(const char *cause, int error) {
+    const gw_box_order_t order = stopped(cause);
+    TEST_ASSERT_TRUE(gw_box_write(&box, &order));
+    TEST_ASSERT_EQUAL(GW_BOX_RESULT, wait_news());
+    TEST_ASSERT_EQUAL(3, box.last.number);
+    TEST_ASSERT_EQUAL(error, box.last.error);
+}
+
+static unsigned count_files(void) {
+    unsigned files = 0;
+    DIR *list = opendir(config.record.directory);
+    TEST_ASSERT_NOT_NULL(list);
+    for (const struct dirent *entry = readdir(list); entry != NULL; entry = readdir(list)) {
+        files += strncmp(entry->d_name, "stop-", 5) == 0 ? 1U : 0U;
+    }
+    (void)closedir(list);
+    return files;
+}
+
+static void read_file(const char *name, char *out, size_t size) {
+    char path[256];
+    (void)snprintf(path, sizeof path, "%s/%s", config.record.directory, name);
+    FILE *file = fopen(path, "r");
+    TEST_ASSERT_NOT_NULL_MESSAGE(file, path);
+    out[fread(out, 1, size - 1U, file)] = '\0';
+    (void)fclose(file);
+}
+
+static void test_stop_is_written_as_frames_events_and_configuration(void) {
+    char text[8192];
+    start();
+    record("estop_line", 0);
+    TEST_ASSERT_EQUAL(10, box.last.frames);
+    TEST_ASSERT_NOT_NULL(strstr(box.last.path, "/records/stop-000001-estop_line.log"));
+    TEST_ASSERT_EQUAL(3, count_files());
+    read_file("stop-000001-estop_line.log", text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, ") can0 100#00000000 R\n"));
+    TEST_ASSERT_NOT_NULL(strstr(text, ") can0 100#00090000 R\n"));
+    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "{\"type\":\"blackbox\",\"format\":1,"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"sentence\":\"because of \\\"this\\\"\""));
+    TEST_ASSERT_NOT_NULL(strstr(text, "{\"type\":\"step\",\"frames\":10,"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "{\"type\":\"end\",\"frames\":10}\n"));
+    TEST_ASSERT_NULL(strstr(text, "lost"));
+    read_file("stop-000001-estop_line.conf", text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "blackbox_s"));
+}
+
+static void test_what_is_older_than_blackbox_s_is_left_out(void) {
+    start();
+    const blackbox_entry_t old = {.at_us = 1, .kind = BLACKBOX_FRAME, .number = 0x7FF};
+    blackbox_ring_put(box.ring, &old);
+    record("estop_line", 0);
+    TEST_ASSERT_EQUAL(10, box.last.frames);
+}
+
+static void test_next_recording_has_the_next_number_also_after_a_restart(void) {
+    start();
+    record("wheel_lost", 0);
+    gw_box_close(&box);
+    start();
+    record("bus_down", 0);
+    TEST_ASSERT_NOT_NULL(strstr(box.last.path, "stop-000002-bus_down.log"));
+}
+
+static void test_many_stops_keep_the_newest_and_touch_nothing_else(void) {
+    char path[192];
+    start();
+    record("estop_line", 0);
+    (void)snprintf(path, sizeof path, "%s/stop-me.txt", config.record.directory);
+    FILE *mine = fopen(path, "w");
+    TEST_ASSERT_NOT_NULL(mine);
+    (void)fclose(mine);
+    for (unsigned i = 0; i < GW_BOX_RECORDINGS_MAX + 2U; ++i) {
+        record("estop_line", 0);
+    }
+    TEST_ASSERT_EQUAL(3U * GW_BOX_RECORDINGS_MAX + 1U, count_files());
+    TEST_ASSERT_EQUAL(0, access(path, F_OK));
+    (void)snprintf(path, sizeof path, "%s/stop-000003-estop_line.log", config.record.directory);
+    TEST_ASSERT_NOT_EQUAL(0, access(path, F_OK));
+    (void)snprintf(path, sizeof path, "%s/stop-000004-estop_line.log", config.record.directory);
+    TEST_ASSERT_EQUAL(0, access(path, F_OK));
+}
+
+static void test_directory_that_cannot_be_is_told_at_once_and_with_each_stop(void) {
+    (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
+    start();
+    TEST_ASSERT_EQUAL(GW_BOX_RESULT, wait_news());
+    TEST_ASSERT_EQUAL(0, box.last.number);
+    TEST_ASSERT_EQUAL(ENOENT, box.last.error);
+    record("estop_line", ENOENT);
+}
+
+static void test_directory_that_appears_later_is_used(void) {
+    char command[160];
+    (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/folder", folder);
+    start();
+    TEST_ASSERT_EQUAL(GW_BOX_RESULT, wait_news());
+    (void)snprintf(command, sizeof command, "mkdir %s/no", folder);
+    TEST_ASSERT_EQUAL(0, system(command));
+    record("estop_line", 0);
+}
+
+static void test_oldest_is_dropped_only_below_the_number(void) {
+    start();
+    record("a", 0);
+    record("b", 0);
+    const int directory = gw_box_files_open(config.record.directory);
+    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, 2));
+    TEST_ASSERT_FALSE(gw_box_files_drop_oldest(directory, 2));
+    TEST_ASSERT_EQUAL(3, count_files());
+    TEST_ASSERT_EQUAL(3, gw_box_files_next(directory));
+    gw_box_files_rotate(directory, 0, 0); // The newest always stays.
+    TEST_ASSERT_EQUAL(3, count_files());
+    (void)close(directory);
+}
+
+static void test_frozen_writer_never_blocks_the_gateway(void) {
+    start();
+    TEST_ASSERT_EQUAL(0, kill(box.pid, SIGSTOP));
+    const gw_box_order_t order = stopped("estop_line");
+    const iw_time_us_t begin_us = iw_clock_now_us();
+    unsigned taken = 0;
+    while (taken < 100000U && gw_box_write(&box, &order)) {
+        ++taken;
+    }
+    TEST_ASSERT_LESS_THAN(100000U, taken);
+    TEST_ASSERT_LESS_THAN(1000000U, iw_clock_now_us() - begin_us);
+    TEST_ASSERT_EQUAL(GW_BOX_NOTHING, gw_box_take(&box));
+    TEST_ASSERT_EQUAL(0, kill(box.pid, SIGKILL));
+}
+
+static void test_killed_writer_is_noticed_and_started_again_later(void) {
+    start();
+    TEST_ASSERT_EQUAL(0, kill(box.pid, SIGKILL));
+    TEST_ASSERT_EQUAL(GW_BOX_WRITER_ENDED, wait_news());
+    TEST_ASSERT_EQUAL(-1, box.fd);
+    TEST_ASSERT_EQUAL(GW_BOX_NOTHING, gw_box_take(&box));
+    const gw_box_order_t order = stopped("estop_line");
+    TEST_ASSERT_FALSE(gw_box_write(&box, &order)); // Too soon.
+    box.started_us -= 10000000U;
+    record("estop_line", 0);
+}
+
+static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not(void) {
+    char text[8192];
+    for (int sending = 0; sending < 2; ++sending) {
+        start();
+        (void)stopped("");
+        const blackbox_entry_t setpoint = {.at_us = iw_clock_now_us(),
+                                           .kind = BLACKBOX_FRAME,
+                                           .number = 266,
+                                           .a = 5,
+                                           .b = IW_CAN_ECHO,
+                                           .as = {.data = {1, 1, 0x2C, 7, 0xD0}}};
+        blackbox_ring_put(box.ring, &setpoint);
+        atomic_store(&box.ring->sending, sending != 0);
+        (void)close(box.fd); // As a kill would.
+        box.fd = -1;
+        gw_box_close(&box);
+        open_box = false;
+        for (unsigned i = 0; i < 100U && kill(box.pid, 0) == 0; ++i) {
+            (void)usleep(50000);
+            (void)waitpid(box.pid, NULL, WNOHANG);
+        }
+    }
+    TEST_ASSERT_EQUAL(3, count_files());
+    read_file("stop-000001-gateway_died.jsonl", text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "the last ones left 300 mm/s and right 0 mm/s"));
+}
+
+static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {
+    config.record.blackbox_s = 0;
+    start();
+    TEST_ASSERT_EQUAL(-1, box.fd);
+    TEST_ASSERT_NOT_NULL(box.ring);
+    const gw_box_order_t order = stopped("estop_line");
+    TEST_ASSERT_EQUAL(-1, access(config.record.directory, F_OK));
+    (void)order;
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_stop_is_written_as_frames_events_and_configuration);
+    RUN_TEST(test_what_is_older_than_blackbox_s_is_left_out);
+    RUN_TEST(test_next_recording_has_the_next_number_also_after_a_restart);
+    RUN_TEST(test_many_stops_keep_the_newest_and_touch_nothing_else);
+    RUN_TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop);
+    RUN_TEST(test_directory_that_appears_later_is_used);
+    RUN_TEST(test_oldest_is_dropped_only_below_the_number);
+    RUN_TEST(test_frozen_writer_never_blocks_the_gateway);
+    RUN_TEST(test_killed_writer_is_noticed_and_started_again_later);
+    RUN_TEST(test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not);
+    RUN_TEST(test_without_seconds_there_is_no_writer_but_a_small_ring);
+    return UNITY_END();
+}

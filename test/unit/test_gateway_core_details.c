@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+// Rules that only a mutant of the core pointed out: each test here has killed one that lived.
+#include "gateway_rig.h"
+#include "unity.h"
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static void test_gateway_arm_while_the_right_wheel_can_take_no_zero_is_refused(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.bus.acknowledged = false;
+    rig.bus.send_result[IW_LEFT] = 0;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    gateway_rig_run(&rig, MS(25));
+    TEST_ASSERT_EQUAL_UINT8(2, rig.bus.unechoed[IW_RIGHT]);
+    gateway_rig_stop(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, gateway_rig_request_arm(&rig, HOLDER, false));
+    TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
+}
+
+static void test_gateway_wheel_that_is_only_excused_refuses_arm_as_lost_on_either_side(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        gateway_rig_init(&rig);
+        gateway_rig_run(&rig, MS(1000));
+        rig.wheel[side].mute = true;
+        gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(80));
+        rig.now_us += MS(5); // Long enough for the other one to be heard.
+        gateway_rig_step(&rig);
+        TEST_ASSERT_FALSE((rig.gateway.permit.present & (1U << IW_CAUSE_WHEEL_LOST)) != 0U);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
+    }
+}
+
+static void test_gateway_setpoints_are_no_telemetry(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.wheel[IW_LEFT].mute = true;
+    rig.wheel[IW_RIGHT].mute = true;
+    gateway_rig_run(&rig, MS(100));
+    const uint32_t received = rig.gateway.counters.received;
+    for (unsigned i = 0; i < 30; i++) { // For longer than a second: silence of the wheels all the same.
+        gateway_rig_foreign(&rig, IW_ID_LEFT_SETPOINT);
+        gateway_rig_foreign(&rig, IW_ID_RIGHT_SETPOINT);
+        gateway_rig_run(&rig, MS(40));
+    }
+    TEST_ASSERT_EQUAL_UINT32(received, rig.gateway.counters.received);
+    TEST_ASSERT_EQUAL_UINT32(60, rig.gateway.counters.foreign);
+    rig.wheel[IW_LEFT].mute = false;
+    rig.wheel[IW_RIGHT].mute = false;
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.wheel[IW_LEFT].reboots);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.wheel[IW_RIGHT].reboots);
+}
+
+static void test_gateway_echo_is_no_telemetry(void) {
+    gateway_rig_arm(&rig);
+    rig.wheel[IW_LEFT].mute = true;
+    rig.wheel[IW_RIGHT].mute = true;
+    const uint32_t received = rig.gateway.counters.received;
+    const uint32_t echoes = rig.gateway.counters.echoes;
+    gateway_rig_run(&rig, MS(45));
+    TEST_ASSERT_TRUE(rig.gateway.counters.echoes > echoes);
+    TEST_ASSERT_EQUAL_UINT32(received, rig.gateway.counters.received);
+}
+
+static void test_gateway_each_odd_frame_is_counted_once_under_one_name(void) {
+    gateway_rig_run(&rig, MS(1000));
+    rig.wheel[IW_LEFT].mute = true;
+    rig.wheel[IW_RIGHT].mute = true;
+    gateway_rig_run(&rig, MS(10));
+    const iw_counters_t before = rig.gateway.counters;
+    fake_bus_put_empty(&rig.bus, IW_ID_LEFT_FORCE, 4);
+    for (unsigned i = 0; i < 2; i++) {
+        fake_bus_put_empty(&rig.bus, IW_ID_LEFT_FORCE | IW_CAN_REMOTE, 4);
+    }
+    for (unsigned i = 0; i < 3; i++) {
+        fake_bus_put_empty(&rig.bus, IW_ID_LEFT_FORCE, 3);
+    }
+    for (unsigned i = 0; i < 4; i++) {
+        fake_bus_put_empty(&rig.bus, 600, 4);
+    }
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_UINT32(before.received + 1U, rig.gateway.counters.received);
+    TEST_ASSERT_EQUAL_UINT32(before.bad_format + 2U, rig.gateway.counters.bad_format);
+    TEST_ASSERT_EQUAL_UINT32(before.bad_length + 3U, rig.gateway.counters.bad_length);
+    TEST_ASSERT_EQUAL_UINT32(before.unknown + 4U, rig.gateway.counters.unknown);
+}
+
+static void test_gateway_sign_fault_is_evidence_from_the_bus(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(600));
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = -15;
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
+    const iw_ledger_entry_t *const entry = iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_FEEDBACK_SIGN_LEFT);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry->state);
+    TEST_ASSERT_EQUAL_INT(IW_EVIDENCE_BUS, entry->evidence);
+}
+
+static void test_gateway_software_estop_names_no_wheel(void) {
+    gateway_rig_arm(&rig);
+    iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_ESTOP_SOFTWARE, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.gateway.permit.stop.sides);
+    TEST_ASSERT_EQUAL_UINT32(OTHER, rig.gateway.permit.stop.detail);
+    gateway_rig_step(&rig);
+}
+
+static void test_gateway_arm_repeated_by_the_holder_moves_no_pair(void) {
+    gateway_rig_arm(&rig);
+    gateway_rig_run(&rig, MS(7));
+    const iw_time_us_t next_us = iw_setpoint_next_us(&rig.gateway.setpoint);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
+    TEST_ASSERT_EQUAL_UINT64(next_us, iw_setpoint_next_us(&rig.gateway.setpoint));
+}
+
+static void test_gateway_currents_that_were_not_given_are_no_wish_to_move(void) {
+    const iw_drive_t drive = {{0, 0}, {500, 500}, false};
+    iw_applied_t applied;
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_run(&rig, MS(1100));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_MISSING_FIELD, iw_gateway_drive(&rig.gateway, rig.now_us, OTHER, &drive, &applied));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+}
+
+static void test_gateway_lowest_current_is_the_documented_one(void) {
+    static const int32_t currents[] = {-2000, -2001};
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    gateway_rig_begin(&rig, false);
+    for (size_t i = 0; i < 2; i++) {
+        const iw_drive_t drive = {{0, 0}, {currents[i], 0}, true};
+        iw_applied_t applied;
+        const iw_refusal_t refusal = iw_gateway_drive(&rig.gateway, rig.now_us, HOLDER, &drive, &applied);
+        TEST_ASSERT_EQUAL_INT((i == 0U) ? IW_REFUSE_NOT_ARMED : IW_REFUSE_OUT_OF_RANGE, refusal);
+    }
+}
+
+static void test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_right(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    gateway_rig_run(&rig, MS(5));
+    const iw_time_us_t right_us = rig.bus.last_us[IW_RIGHT];
+    rig.bus.send_result[IW_LEFT] = 0;
+    while (rig.bus.refused == 0U) {
+        gateway_rig_run(&rig, MS(1));
+    }
+    TEST_ASSERT_EQUAL_UINT64(right_us, rig.bus.last_us[IW_RIGHT]);
+    gateway_rig_run(&rig, MS(10));
+    TEST_ASSERT_EQUAL_INT16(0, fake_bus_command(&rig.bus.last[IW_RIGHT]).speed_mm_s);
+    TEST_ASSERT_TRUE(rig.bus.last_us[IW_RIGHT] > right_us);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_arm_while_the_right_wheel_can_take_no_zero_is_refused);
+    RUN_TEST(test_gateway_wheel_that_is_only_excused_refuses_arm_as_lost_on_either_side);
+    RUN_TEST(test_gateway_setpoints_are_no_telemetry);
+    RUN_TEST(test_gateway_echo_is_no_telemetry);
+    RUN_TEST(test_gateway_each_odd_frame_is_counted_once_under_one_name);
+    RUN_TEST(test_gateway_sign_fault_is_evidence_from_the_bus);
+    RUN_TEST(test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_right);
+    RUN_TEST(test_gateway_lowest_current_is_the_documented_one);
+    RUN_TEST(test_gateway_software_estop_names_no_wheel);
+    RUN_TEST(test_gateway_arm_repeated_by_the_holder_moves_no_pair);
+    RUN_TEST(test_gateway_currents_that_were_not_given_are_no_wish_to_move);
+    return UNITY_END();
+}

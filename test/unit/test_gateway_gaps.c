@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#include "gaps.h"
+
+#include <string.h>
+#include <unity.h>
+
+static gw_gaps_t gaps;
+static iw_sender_t sender;
+
+void setUp(void) {
+    memset(&gaps, 0, sizeof gaps);
+    memset(&sender, 0, sizeof sender);
+}
+
+void tearDown(void) {}
+
+static void pair_after(uint32_t gap_us) {
+    ++sender.pairs;
+    sender.gap_us = gap_us;
+    gw_gaps_note(&gaps, &sender);
+}
+
+static void test_first_pair_after_silence_is_no_gap(void) {
+    pair_after(0U);
+    TEST_ASSERT_EACH_EQUAL_UINT32(0U, gaps.count, GW_GAP_BUCKETS);
+    TEST_ASSERT_EQUAL_UINT32(0U, gaps.worst_us);
+}
+
+static void test_step_that_sends_nothing_counts_nothing_twice(void) {
+    pair_after(20000U);
+    gw_gaps_note(&gaps, &sender);
+    gw_gaps_note(&gaps, &sender);
+    TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[3]);
+}
+
+static void test_gap_goes_into_the_bucket_whose_limit_it_does_not_pass(void) {
+    pair_after(1U);
+    pair_after(5000U);
+    pair_after(5001U);
+    pair_after(100000U);
+    pair_after(100001U);
+    TEST_ASSERT_EQUAL_UINT32(2U, gaps.count[0]);
+    TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[1]);
+    TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[GW_GAP_BUCKETS - 2U]);
+    TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[GW_GAP_BUCKETS - 1U]);
+}
+
+static void test_worst_is_kept_over_silence(void) {
+    pair_after(61000U);
+    pair_after(0U);
+    pair_after(20000U);
+    TEST_ASSERT_EQUAL_UINT32(61000U, gaps.worst_us);
+}
+
+static void test_written_as_limits_counts_and_worst(void) {
+    char line[256];
+    json_out_t json;
+    json_out_init(&json, line, sizeof line);
+    json_out_open(&json, NULL, '{');
+    pair_after(20000U);
+    gw_gaps_write(&gaps, &json);
+    json_out_close(&json, '}');
+    (void)json_out_finish(&json);
+    TEST_ASSERT_NOT_NULL(strstr(line, "\"limits_ms\":[5,10,15,20,25,30,40,50,100],\"count\":[0,0,0,1,0,0,0,0,0,0],"
+                                      "\"worst_us\":20000"));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_first_pair_after_silence_is_no_gap);
+    RUN_TEST(test_step_that_sends_nothing_counts_nothing_twice);
+    RUN_TEST(test_gap_goes_into_the_bucket_whose_limit_it_does_not_pass);
+    RUN_TEST(test_worst_is_kept_over_silence);
+    RUN_TEST(test_written_as_limits_counts_and_worst);
+    return UNITY_END();
+}

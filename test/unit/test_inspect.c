@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: MIT
+#include "inspect.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+static inspect_findings_t findings;
+static inspect_heard_t heard;
+static const iw_bus_link_t local = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
+static const inspect_wish_t wish = {
+    .name = "can0", .bitrate_hz = 1000000, .sample_point_permille = 625, .refuses = true};
+
+void setUp(void) {
+    inspect_begin(&findings);
+    inspect_heard_begin(&heard);
+}
+
+void tearDown(void) {}
+
+/// Two seconds of a healthy pair.
+static void hear_healthy(void) {
+    heard.was_up = true;
+    heard.span_us = 2000000U;
+    for (unsigned i = 0; i < INSPECT_MESSAGES; ++i) {
+        heard.count[i] = inspect_messages[i].always ? inspect_messages[i].nominal_mHz * 2U / 1000U : 0U;
+    }
+    heard.bits = 120000U;
+}
+
+static const inspect_finding_t *find(const char *check) {
+    for (unsigned i = 0; i < findings.count; ++i) {
+        if (strcmp(findings.finding[i].check, check) == 0) {
+            return &findings.finding[i];
+        }
+    }
+    return NULL;
+}
+
+static void expect(const char *check, inspect_verdict_t verdict, const char *text, const char *cure) {
+    const inspect_finding_t *finding = find(check);
+    TEST_ASSERT_NOT_NULL_MESSAGE(finding, check);
+    TEST_ASSERT_EQUAL_MESSAGE(verdict, finding->verdict, finding->text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->text, text), finding->text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(finding->cure, cure), finding->cure);
+    TEST_ASSERT_EQUAL_MESSAGE(verdict == INSPECT_OK, finding->cure[0] == '\0', "every trouble has a cure");
+}
+
+static void test_healthy_bus_finds_nothing_to_mend(void) {
+    hear_healthy();
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("left_wheel", INSPECT_OK, "speed 250.0/s, status 25.0/s, force 20.0/s", "");
+    expect("right_wheel", INSPECT_OK, "pose 25.0/s", "");
+    expect("load", INSPECT_OK, "6.0 %", "");
+    TEST_ASSERT_EQUAL(findings.count, findings.total[INSPECT_OK]);
+}
+
+static void test_silent_wheel_fails_and_its_other_messages_are_not_asked_for(void) {
+    hear_healthy();
+    for (unsigned i = 0; i < INSPECT_MESSAGES; ++i) {
+        heard.count[i] = inspect_messages[i].side == IW_RIGHT ? 0U : heard.count[i];
+    }
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("right_wheel", INSPECT_FAIL, "right wheel: not heard for 2000 ms", "power, cable");
+    TEST_ASSERT_NULL(find("rates"));
+    expect("left_wheel", INSPECT_OK, "left wheel", "");
+}
+
+static void test_rate_off_by_more_than_a_tenth_warns_with_both_numbers(void) {
+    hear_healthy();
+    heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 236U;
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("rates", INSPECT_WARN, "left speed 256 (0x100): 118.0 a second; the document has 250.0", "termination");
+    TEST_ASSERT_EQUAL_UINT(1U, findings.total[INSPECT_WARN]);
+}
+
+static void test_rate_within_a_tenth_or_two_frames_is_right(void) {
+    hear_healthy();
+    heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 450U;
+    heard.count[inspect_message_of(IW_ID_RIGHT_FORCE)] = 34U;
+    inspect_bus(&local, &heard, &wish, &findings);
+    TEST_ASSERT_NULL(find("rates"));
+    heard.count[inspect_message_of(IW_ID_LEFT_SPEED)] = 447U;
+    inspect_bus(&local, &heard, &wish, &findings);
+    TEST_ASSERT_NOT_NULL(find("rates"));
+}
+
+static void test_message_that_never_comes_is_named(void) {
+    hear_healthy();
+    heard.count[inspect_message_of(IW_ID_RIGHT_POSE)] = 0U;
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("rates", INSPECT_WARN, "right pose 290 (0x122): not heard", "firmware");
+}
+
+static void test_offsets_may_be_missing_after_the_first_minute(void) {
+    hear_healthy();
+    TEST_ASSERT_EQUAL_UINT32(0U, heard.count[inspect_message_of(IW_ID_LEFT_OFFSET)]);
+    inspect_bus(&local, &heard, &wish, &findings);
+    TEST_ASSERT_NULL(find("rates"));
+}
+
+static void test_setpoints_of_others_fail_unless_a_gateway_judges_them(void) {
+    inspect_wish_t beside_gateway = wish;
+    beside_gateway.others_may_send = true;
+    hear_healthy();
+    heard.count[inspect_message_of(IW_ID_RIGHT_SETPOINT)] = 3U;
+    inspect_bus(&local, &heard, &beside_gateway, &findings);
+    TEST_ASSERT_NULL(find("second_master"));
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("second_master", INSPECT_FAIL, "3 frames with id 266 (0x10A) or 298 (0x12A)", "switch it off");
+}
+
+static void test_unknown_ids_are_listed_and_the_list_is_bounded(void) {
+    iw_can_frame_t frame = {.id = 0x266U};
+    hear_healthy();
+    inspect_heard_take(&heard, &frame);
+    inspect_heard_take(&heard, &frame);
+    frame.id = 0x1ABCDEF0U | IW_CAN_EXTENDED;
+    inspect_heard_take(&heard, &frame);
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("unknown_ids", INSPECT_WARN, "3 frames are none of the wheels': 0x266 0x1ABCDEF0", "candump can0");
+    for (uint32_t id = 1; id <= 20U; ++id) {
+        frame.id = id;
+        inspect_heard_take(&heard, &frame);
+    }
+    inspect_begin(&findings);
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("unknown_ids", INSPECT_WARN, "23 frames", "");
+    TEST_ASSERT_NOT_NULL(strstr(find("unknown_ids")->text, " ..."));
+}
+
+static void test_damaged_frames_are_counted_apart(void) {
+    const iw_can_frame_t brief = {.id = IW_ID_LEFT_SPEED, .dlc = 3};
+    const iw_can_frame_t remote = {.id = IW_ID_LEFT_SPEED | IW_CAN_REMOTE, .dlc = 4};
+    const iw_can_frame_t echo = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_ECHO};
+    inspect_heard_take(&heard, &brief);
+    inspect_heard_take(&heard, &remote);
+    inspect_heard_take(&heard, &echo);
+    TEST_ASSERT_EQUAL_UINT32(1U, heard.bad_length);
+    TEST_ASSERT_EQUAL_UINT32(1U, heard.bad_format);
+    TEST_ASSERT_EQUAL_UINT32(0U, heard.count[inspect_message_of(IW_ID_LEFT_SETPOINT)]);
+    TEST_ASSERT_EQUAL_UINT64(47U + 24U + 47U + 47U + 40U, heard.bits);
+}
+
+static void test_full_bus_warns(void) {
+    hear_healthy();
+    heard.bits = 1100000U;
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("load", INSPECT_WARN, "55.0 %", "lower ids");
+}
+
+static void test_bus_that_never_lived_says_nothing_of_wheels(void) {
+    iw_bus_link_t link = {.presence = IW_LINK_UP};
+    inspect_bus(&link, &heard, &wish, &findings);
+    expect("bus_state", INSPECT_FAIL, "bus-off", "ip link set can0 down; ip link set can0 up");
+    TEST_ASSERT_NULL(find("left_wheel"));
+    inspect_begin(&findings);
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("interface", INSPECT_FAIL, "nobody there", "iwheel-sim --can");
+}
+
+static void test_error_passive_bus_warns(void) {
+    hear_healthy();
+    heard.worst = IW_BUS_PASSIVE;
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("bus_state", INSPECT_WARN, "error passive", "termination");
+}
+
+static void test_right_link_has_nothing_to_mend(void) {
+    const iw_bus_link_t link = {.presence = IW_LINK_UP,
+                                .echo_proven = true,
+                                .bitrate_hz = 1000000,
+                                .sample_point_permille = 625,
+                                .restart_ms = 100,
+                                .queue_length = 4};
+    inspect_link(&link, &wish, &findings);
+    TEST_ASSERT_EQUAL_UINT(2U, findings.count);
+    expect("bit_timing", INSPECT_OK, "1000000 bit/s, sample point 62.5 %", "");
+}
+
+static void test_each_fault_of_the_link_has_its_command(void) {
+    const iw_bus_link_t link = {.presence = IW_LINK_UP,
+                                .is_mute = true,
+                                .bitrate_hz = 500000,
+                                .sample_point_permille = 875,
+                                .queue_length = 10};
+    inspect_link(&link, &wish, &findings);
+    expect("mode", INSPECT_FAIL, "listen-only", "type can listen-only off");
+    expect("bit_timing", INSPECT_FAIL, "500000 bit/s, sample point 87.5 %; wanted 1000000 bit/s, 62.5 %",
+           "type can bitrate 1000000 sample-point 0.625 restart-ms 100; ip link set can0 txqueuelen 4");
+    expect("queue", INSPECT_WARN, "10 frames", "ip link set can0 txqueuelen 4");
+    expect("restart", INSPECT_WARN, "bus-off", "restart-ms 100");
+    expect("echo", INSPECT_WARN, "unproven", "IFF_ECHO");
+}
+
+static void test_wrong_timing_only_warns_where_it_is_configured_so(void) {
+    const iw_bus_link_t link = {.presence = IW_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .restart_ms = 1};
+    inspect_wish_t lenient = wish;
+    lenient.refuses = false;
+    inspect_link(&link, &lenient, &findings);
+    expect("bit_timing", INSPECT_WARN, "500000", "bitrate 1000000");
+}
+
+static void test_absent_and_foreign_interfaces_are_told_apart(void) {
+    iw_bus_link_t link = {.presence = IW_LINK_ABSENT};
+    inspect_link(&link, &wish, &findings);
+    expect("interface", INSPECT_FAIL, "no such interface", "ip -brief link show type can");
+    TEST_ASSERT_EQUAL_UINT(1U, findings.count);
+    inspect_begin(&findings);
+    link.presence = IW_LINK_NOT_CAN;
+    inspect_link(&link, &wish, &findings);
+    expect("interface", INSPECT_FAIL, "not a CAN interface", "ip -brief");
+    inspect_begin(&findings);
+    link.presence = IW_LINK_DOWN;
+    link.is_virtual = true;
+    inspect_link(&link, &wish, &findings);
+    expect("interface", INSPECT_FAIL, "is down", "ip link set can0 up");
+}
+
+static void test_estop_levels(void) {
+    inspect_estop_t estop = {.line = "ESTOP", .present = true, .level = -1, .trouble = "gpioinfo lists them"};
+    inspect_estop(&estop, &findings);
+    expect("estop", INSPECT_FAIL, "unreadable, which counts as pressed", "gpioinfo");
+    inspect_begin(&findings);
+    estop.level = 1;
+    inspect_estop(&estop, &findings);
+    expect("estop", INSPECT_OK, "ESTOP: pressed", "");
+    inspect_begin(&findings);
+    estop = (inspect_estop_t){.line = "unix:/b", .present = true, .simulated = true};
+    inspect_estop(&estop, &findings);
+    expect("estop", INSPECT_WARN, "released, SIMULATED", "wire a button");
+    inspect_begin(&findings);
+    estop = (inspect_estop_t){.line = "none"};
+    inspect_estop(&estop, &findings);
+    expect("estop", INSPECT_WARN, "none", "[estop] line");
+}
+
+static void test_full_list_counts_on_and_loses_no_failure(void) {
+    for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; ++i) {
+        inspect_say(&findings, "rates", INSPECT_FAIL, "%u", i);
+        inspect_cure(&findings, "cure %u", i);
+    }
+    TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX, findings.count);
+    TEST_ASSERT_EQUAL_UINT(INSPECT_FINDINGS_MAX + 3U, findings.total[INSPECT_FAIL]);
+    TEST_ASSERT_EQUAL_STRING("cure 39", findings.finding[INSPECT_FINDINGS_MAX - 1U].cure);
+    TEST_ASSERT_TRUE(inspect_has_failed(&findings, "rates"));
+    TEST_ASSERT_FALSE(inspect_has_failed(&findings, "load"));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_healthy_bus_finds_nothing_to_mend);
+    RUN_TEST(test_silent_wheel_fails_and_its_other_messages_are_not_asked_for);
+    RUN_TEST(test_rate_off_by_more_than_a_tenth_warns_with_both_numbers);
+    RUN_TEST(test_rate_within_a_tenth_or_two_frames_is_right);
+    RUN_TEST(test_message_that_never_comes_is_named);
+    RUN_TEST(test_offsets_may_be_missing_after_the_first_minute);
+    RUN_TEST(test_setpoints_of_others_fail_unless_a_gateway_judges_them);
+    RUN_TEST(test_unknown_ids_are_listed_and_the_list_is_bounded);
+    RUN_TEST(test_damaged_frames_are_counted_apart);
+    RUN_TEST(test_full_bus_warns);
+    RUN_TEST(test_bus_that_never_lived_says_nothing_of_wheels);
+    RUN_TEST(test_error_passive_bus_warns);
+    RUN_TEST(test_right_link_has_nothing_to_mend);
+    RUN_TEST(test_each_fault_of_the_link_has_its_command);
+    RUN_TEST(test_wrong_timing_only_warns_where_it_is_configured_so);
+    RUN_TEST(test_absent_and_foreign_interfaces_are_told_apart);
+    RUN_TEST(test_estop_levels);
+    RUN_TEST(test_full_list_counts_on_and_loses_no_failure);
+    return UNITY_END();
+}
