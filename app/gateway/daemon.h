@@ -3,24 +3,24 @@
 ///
 /// One cycle of the loop (loop.c), always in this order:
 ///
-///     wait -> signals -> bus and e-stop (core step) -> what changed (observe.c) -> clients (dispatch.c)
-///          -> step again if they asked for something -> new clients -> flush -> what is kept (knowledge.c) -> watchdog
+///     wait -> signals -> bus and e-stop (core step) -> what changed (status/) -> clients (answers/)
+///          -> step again if they asked for something -> new clients -> flush -> what is kept (ledger/) -> watchdog
 ///
 /// so that the wheels come before everybody who talks about them. Work per cycle is bounded in each of these places.
 #ifndef GATEWAY_DAEMON_H
 #define GATEWAY_DAEMON_H
 
-#include "box.h"
-#include "client.h"
-#include "evidence.h"
-#include "gaps.h"
+#include "box/box.h"
+#include "box/tape.h"
+#include "bus/gaps.h"
+#include "clients/client.h"
+#include "clients/listener.h"
 #include "gateway_config.h"
-#include "knowledge.h"
-#include "listener.h"
-#include "log.h"
-#include "notify.h"
-#include "runtime.h"
-#include "tape.h"
+#include "ledger/evidence.h"
+#include "ledger/knowledge.h"
+#include "process/log.h"
+#include "process/notify.h"
+#include "process/runtime.h"
 #include "why.h"
 
 #include "iwheel/gateway.h"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "loop.h"
 
-#include "bus_facts.h"
-#include "dispatch.h"
-#include "observe.h"
-#include "record.h"
-#include "service.h"
+#include "answers/dispatch.h"
+#include "answers/service.h"
+#include "box/record.h"
+#include "bus/bus_facts.h"
+#include "status/observe.h"
 
 #include "iwheel_linux/clock.h"
 

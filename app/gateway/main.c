@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "bus_facts.h"
-#include "json_arena.h"
+#include "answers/service.h"
+#include "bus/bus_facts.h"
 #include "loop.h"
-#include "observe.h"
-#include "options.h"
-#include "report.h"
-#include "service.h"
+#include "start/options.h"
+#include "start/report.h"
+#include "status/observe.h"
+#include "json/json_arena.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -2,8 +2,8 @@
 // Any bytes as a client's line: a request in which every field is what it should be, or a refusal that can be printed.
 #include "fuzz.h"
 
-#include "json_arena.h"
-#include "request.h"
+#include "clients/request.h"
+#include "json/json_arena.h"
 
 static bool terminated(const char *text, size_t size) {
     return memchr(text, '\0', size) != NULL;

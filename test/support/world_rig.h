@@ -3,9 +3,9 @@
 #ifndef TEST_WORLD_RIG_H
 #define TEST_WORLD_RIG_H
 
-#include "evidence.h"
 #include "fixture.h"
 #include "iwheel_sim/world.h"
+#include "ledger/evidence.h"
 
 #define WORLD_RX_MAX 256U
 #define WORLD_CLIENT ((iw_client_t)1)

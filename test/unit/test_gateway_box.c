@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "box.h"
-#include "box_files.h"
+#include "box/box.h"
+#include "box/box_files.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "gaps.h"
+#include "bus/gaps.h"
 
 #include <string.h>
 #include <unity.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // One gateway per bus, and the marker of a crash, wherever the gateways' sockets lie.
-#include "runtime.h"
+#include "process/runtime.h"
 
 #include "unity.h"
 

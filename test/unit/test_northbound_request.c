@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // One line of a client: what is a request, and what is refused as a whole, with which name.
-#include "json_arena.h"
-#include "request.h"
+#include "clients/request.h"
+#include "json/json_arena.h"
 
 #include "unity.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Many clients at once: each gets its turn, the holder of the lease gets the first, and none of them gets all the time.
+#include "answers/service.h"
 #include "daemon.h"
-#include "json_arena.h"
-#include "service.h"
+#include "json/json_arena.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -2,10 +2,10 @@
 #include "dispatch.h"
 
 #include "assumption.h"
-#include "observe.h"
-#include "record.h"
+#include "box/record.h"
 #include "refuse.h"
-#include "snapshot.h"
+#include "status/observe.h"
+#include "status/snapshot.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -9,9 +9,9 @@
 #define GATEWAY_KNOWLEDGE_H
 
 #include "gateway_config.h"
-#include "json_out.h"
 #include "keeper.h"
 #include "memory.h"
+#include "json/json_out.h"
 
 #include "iwheel/gateway.h"
 

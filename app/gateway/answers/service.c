@@ -2,7 +2,7 @@
 #include "service.h"
 
 #include "dispatch.h"
-#include "observe.h"
+#include "status/observe.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "bus_facts.h"
 
-#include "report.h"
+#include "start/report.h"
 
 static iw_timing_t judge(const gw_daemon_t *daemon) {
     return iw_timing_judge(iw_linux_hal_link(&daemon->hal), daemon->config.bus.bitrate,

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "observe.h"
 
+#include "box/record.h"
 #include "inspect.h"
-#include "record.h"
 #include "snapshot.h"
 
 #include "iwheel_linux/clock.h"

@@ -2,7 +2,7 @@
 #include "snapshot.h"
 
 #include "assumption.h"
-#include "bus_facts.h"
+#include "bus/bus_facts.h"
 
 #include "iwheel_linux/clock.h"
 

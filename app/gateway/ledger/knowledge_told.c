@@ -2,8 +2,8 @@
 #include "knowledge_told.h"
 
 #include "names.h"
-#include "observe.h"
-#include "snapshot.h"
+#include "status/observe.h"
+#include "status/snapshot.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 #include "record.h"
 
 #include "names.h"
-#include "snapshot.h"
+#include "status/snapshot.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -7,7 +7,7 @@
 #define GATEWAY_GAPS_H
 
 #include "iwheel/sender.h"
-#include "json_out.h"
+#include "json/json_out.h"
 
 #define GW_GAP_BUCKETS 10U
 

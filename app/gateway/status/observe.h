@@ -6,7 +6,7 @@
 #define GATEWAY_OBSERVE_H
 
 #include "daemon.h"
-#include "json_out.h"
+#include "json/json_out.h"
 
 /// Looks at the core and tells what is new. After every step, and before a client's slot is freed.
 void gw_observe(gw_daemon_t *daemon);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
-#include "bus_facts.h"
+#include "bus/bus_facts.h"
 
 #include <string.h>
 #include <unistd.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "client.h"
 
-#include "json_out.h"
+#include "json/json_out.h"
 
 #include <errno.h>
 #include <stdio.h>

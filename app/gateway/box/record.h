@@ -4,7 +4,7 @@
 #define GATEWAY_RECORD_H
 
 #include "daemon.h"
-#include "json_out.h"
+#include "json/json_out.h"
 
 /// The stop in `daemon->last_stop` has just been seen: notes it, keeps the frames around it and, if it latched, orders a
 /// recording.

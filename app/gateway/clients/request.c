@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "request.h"
 
-#include "json_arena.h"
+#include "json/json_arena.h"
 
 #include <inttypes.h>
 #include <jansson.h>

@@ -8,7 +8,7 @@
 #define GATEWAY_LISTENER_H
 
 #include "gateway_config.h"
-#include "log.h"
+#include "process/log.h"
 
 #include <sys/types.h>
 

@@ -4,7 +4,7 @@
 #define GATEWAY_SNAPSHOT_H
 
 #include "daemon.h"
-#include "json_out.h"
+#include "json/json_out.h"
 
 /// Telemetry other than speed is worth nothing after this: five periods of the status and pose frames.
 #define GW_STATUS_STALE_US 200000U
