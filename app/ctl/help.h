@@ -3,7 +3,7 @@
 #ifndef HELP_H
 #define HELP_H
 
-#include "ctl.h"
+#include "talk/ctl.h"
 
 #include <stdio.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // iwheelctl's search for the only gateway.
-#include "find_socket.h"
+#include "talk/find_socket.h"
 
 #include "unity.h"
 

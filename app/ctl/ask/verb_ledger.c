@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// What is assumed about the wheels, what is known, and the operator's word on it.
+#include "talk/ctl.h"
+#include "text/paper.h"
+#include "text/text.h"
+
+#include <ctype.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LINE 512U
+
+/// "force_unit_left = cN: at rest, raw / offset is ...", and what a contradiction costs.
+static void print_item(const paper_t *paper, const char *label, tone_t tone, const char *name, const json_t *entry) {
+    char line[LINE];
+    const char *disabled = json_string_value(json_object_get(entry, "disabled"));
+    (void)snprintf(line, sizeof line, "%.64s = %.64s: %.256s", name, text_word(entry, "value"),
+                   text_word(entry, "reason"));
+    paper_wrap(paper, label, tone, line);
+    if (disabled != NULL) {
+        (void)snprintf(line, sizeof line, "disabled: %.256s", disabled);
+        paper_wrap(paper, "", TONE_CARE, line);
+    }
+}
+
+static void print_state(const paper_t *paper, json_t *ledger, const char *state, tone_t tone) {
+    char label[PAPER_LABEL + 1U];
+    const char *name = NULL;
+    json_t *entry = NULL;
+    size_t length = 0;
+    for (; state[length] != '\0' && length < sizeof label - 1U; length++) {
+        label[length] = (char)toupper((unsigned char)state[length]);
+    }
+    label[length] = '\0';
+    json_object_foreach(ledger, name, entry) {
+        if (strcmp(text_word(entry, "state"), state) == 0) {
+            print_item(paper, label, tone, name, entry);
+            label[0] = '\0';
+        }
+    }
+}
+
+int verb_ledger(ctl_t *self, int count, char **words) {
+    json_t *status = NULL;
+    if (!ctl_words_at_most("ledger", count, 0, words)) {
+        return CTL_USAGE;
+    }
+    const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "status"), &status);
+    if (code == CTL_OK && !self->json) {
+        const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
+        json_t *ledger = json_object_get(status, "ledger");
+        print_state(&paper, ledger, "contradicted", TONE_BAD);
+        print_state(&paper, ledger, "confirmed", TONE_GOOD);
+        print_state(&paper, ledger, "assumed", TONE_PLAIN);
+    }
+    json_decref(status);
+    return code;
+}
+
+int verb_confirm(ctl_t *self, int count, char **words) {
+    json_t *reply = NULL;
+    if (!ctl_words_at_most("confirm", count, 2, words)) {
+        return CTL_USAGE;
+    }
+    if (count == 0) {
+        return ctl_fail(CTL_USAGE, "confirm needs the name of an item; see them: iwheelctl ledger");
+    }
+    json_t *request = count == 2 ? json_pack("{s:s,s:s,s:s}", "cmd", "confirm", "item", words[0], "value", words[1])
+                                 : json_pack("{s:s,s:s}", "cmd", "confirm", "item", words[0]);
+    if (request == NULL) {
+        return ctl_fail(CTL_USAGE, "confirm: item and value must be readable text (UTF-8)");
+    }
+    const int code = ctl_ask(self, request, &reply);
+    if (code == CTL_OK && !self->json) {
+        const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
+        const bool good = strcmp(text_word(reply, "state"), "confirmed") == 0;
+        print_item(&paper, good ? "CONFIRMED" : "CONTRADICTED", good ? TONE_GOOD : TONE_BAD, text_word(reply, "item"),
+                   reply);
+    }
+    json_decref(reply);
+    return code;
+}

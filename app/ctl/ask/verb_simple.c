@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// Verbs that are one request and one answer.
+#include "talk/ctl.h"
+#include "text/text.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static void print_line(const char *text) {
+    text_safe(text, stdout);
+    (void)putchar('\n');
+}
+
+/// Asks; unless --json is given, prints the state the gateway is in now and what it means.
+static int ask_and_tell_state(ctl_t *self, json_t *request) {
+    static const struct {
+        const char *state;
+        const char *meaning;
+    } meanings[] = {
+        {"listening", "listening: nothing is sent; in silence the wheels may roll"},
+        {"armed", "armed: somebody drives"},
+        {"stopping", "stopping: ramp to zero, zeros until both wheels are at rest, then silence"},
+        {"latched", "latched: zero; only a reset leaves this state (see: iwheelctl status)"},
+    };
+    json_t *reply = NULL;
+    const int code = ctl_ask(self, request, &reply);
+    if (code == CTL_OK && !self->json) {
+        const char *state = text_word(reply, "state");
+        const char *text = state;
+        for (size_t i = 0; i < sizeof(meanings) / sizeof(meanings[0]); i++) {
+            text = strcmp(meanings[i].state, state) == 0 ? meanings[i].meaning : text;
+        }
+        print_line(text);
+    }
+    json_decref(reply);
+    return code;
+}
+
+int verb_stop(ctl_t *self, int count, char **words) {
+    if (!ctl_words_at_most("stop", count, 0, words)) {
+        return CTL_USAGE;
+    }
+    return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "stop"));
+}
+
+int verb_estop(ctl_t *self, int count, char **words) {
+    char reason[201] = "";
+    size_t used = 0;
+    for (int i = 0; i < count; i++) {
+        const int n = snprintf(reason + used, sizeof(reason) - used, "%s%s", i > 0 ? " " : "", words[i]);
+        used += n > 0 && (size_t)n < sizeof(reason) - used ? (size_t)n : sizeof(reason) - used - 1U;
+    }
+    json_t *request = json_pack("{s:s}", "cmd", "estop");
+    json_t *text = json_string(reason);
+    if (used > 0 && text != NULL) {
+        (void)json_object_set(request, "reason", text);
+    }
+    json_decref(text);
+    return ask_and_tell_state(self, request);
+}
+
+int verb_reset(ctl_t *self, int count, char **words) {
+    if (!ctl_words_at_most("reset", count, 0, words)) {
+        return CTL_USAGE;
+    }
+    return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "reset"));
+}
+
+/// "left: zero is 12.318 N now (40 samples, 0.110 N noise); it was 12.300 N (wheel)".
+static void print_tare(const json_t *reply, const char *side) {
+    char offset[TEXT_CELL];
+    char noise[TEXT_CELL];
+    char samples[TEXT_CELL];
+    char before[TEXT_CELL];
+    const json_t *tare = json_object_get(reply, side);
+    if (tare == NULL) {
+        return;
+    }
+    text_decimal(json_object_get(tare, "offset_mN"), 3, "N", offset);
+    text_decimal(json_object_get(tare, "deviation_mN"), 3, "N noise", noise);
+    text_integer(json_object_get(tare, "samples"), "samples", samples);
+    text_decimal(json_object_get(tare, "before_mN"), 3, "N", before);
+    (void)printf("%s: the present force is zero now, %s (%s, %s); it was %s (", side, offset, samples, noise, before);
+    text_safe(text_word(tare, "before_provenance"), stdout);
+    (void)puts(")");
+}
+
+int verb_tare(ctl_t *self, int count, char **words) {
+    json_t *reply = NULL;
+    const char *side = count > 0 ? words[0] : NULL;
+    if (!ctl_words_at_most("tare", count, 1, words)) {
+        return CTL_USAGE;
+    }
+    if (side != NULL && strcmp(side, "left") != 0 && strcmp(side, "right") != 0) {
+        return ctl_fail(CTL_USAGE, "tare \"%s\": no such wheel; write left, right, or nothing for both", side);
+    }
+    json_t *request =
+        side != NULL ? json_pack("{s:s,s:s}", "cmd", "tare", "side", side) : json_pack("{s:s}", "cmd", "tare");
+    const int code = ctl_ask(self, request, &reply);
+    if (code == CTL_OK && !self->json) {
+        print_tare(reply, "left");
+        print_tare(reply, "right");
+    }
+    json_decref(reply);
+    return code;
+}

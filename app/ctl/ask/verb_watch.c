@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+#include "talk/ctl.h"
+#include "talk/signals.h"
+
+#include <errno.h>
+#include <limits.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define RATE_MAX_HZ 100
+/// How often a watch without events looks whether somebody still reads it.
+#define LOOK_US 500000
+
+/// The first TOPICS_USUAL are watched when none is named.
+static const char *const topics[] = {"state", "bus", "estop", "lease", "stop", "force", "frame"};
+#define TOPICS       (sizeof(topics) / sizeof(topics[0]))
+#define TOPICS_USUAL 5U
+
+static bool is_topic(const char *word) {
+    for (size_t i = 0; i < TOPICS; i++) {
+        if (strcmp(topics[i], word) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool parse_rate(const char *text, int *out_rate_hz) {
+    char *end = NULL;
+    if (text == NULL || strspn(text, "0123456789") == 0) {
+        return false;
+    }
+    const long rate = strtol(text, &end, 10);
+    if ((*end != '\0' && strcmp(end, "Hz") != 0) || rate < 1 || rate > RATE_MAX_HZ) {
+        return false;
+    }
+    *out_rate_hz = (int)rate;
+    return true;
+}
+
+/// Reads the words into the list and the rate; false after telling what is wrong.
+static bool parse_words(int count, char **words, json_t *list, int *out_rate_hz) {
+    for (int i = 0; i < count; i++) {
+        if (strcmp(words[i], "--rate") == 0) {
+            i++;
+            if (!parse_rate(i < count ? words[i] : NULL, out_rate_hz)) {
+                (void)ctl_fail(CTL_USAGE, "--rate wants a number of events per second, 1..%d", RATE_MAX_HZ);
+                return false;
+            }
+        } else if (is_topic(words[i])) {
+            (void)json_array_append_new(list, json_string(words[i]));
+        } else {
+            (void)ctl_fail(CTL_USAGE, "no topic \"%s\"; known are: state bus estop lease stop force frame", words[i]);
+            return false;
+        }
+    }
+    return true;
+}
+
+/// The request, or null after telling what is wrong with the words.
+static json_t *compose(int count, char **words) {
+    json_t *list = json_array();
+    int rate_hz = 10;
+    if (!parse_words(count, words, list, &rate_hz)) {
+        json_decref(list);
+        return NULL;
+    }
+    const bool usual = json_array_size(list) == 0;
+    for (size_t i = 0; usual && i < TOPICS_USUAL; i++) {
+        (void)json_array_append_new(list, json_string(topics[i]));
+    }
+    return json_pack("{s:s,s:o,s:i}", "cmd", "watch", "topics", list, "rate_hz", rate_hz);
+}
+
+typedef enum { OUTPUT_OPEN = 0, OUTPUT_SIGNAL, OUTPUT_CLOSED, OUTPUT_BROKEN } output_t;
+
+/// Waits until stdout takes `events` (0: looks only whether it is still there).
+static output_t await_output(const client_t *client, short events) {
+    const struct timespec none = {0, 0};
+    struct pollfd entry = {.fd = STDOUT_FILENO, .events = events};
+    const int ready = ppoll(&entry, 1, events != 0 ? NULL : &none, signals_let_in());
+    if (signals_count() != client->seen_signals) {
+        return OUTPUT_SIGNAL;
+    }
+    return ready > 0 && (entry.revents & (POLLERR | POLLNVAL)) != 0 ? OUTPUT_CLOSED : OUTPUT_OPEN;
+}
+
+/// Writes a text in pieces that a ready pipe takes without blocking, so that a signal is seen although nobody reads.
+static output_t write_text(const client_t *client, const char *text, size_t size) {
+    while (size > 0) {
+        const output_t state = await_output(client, POLLOUT);
+        if (state != OUTPUT_OPEN) {
+            return state;
+        }
+        const ssize_t written = write(STDOUT_FILENO, text, size < PIPE_BUF ? size : PIPE_BUF);
+        if (written < 0 && errno != EINTR && errno != EAGAIN) {
+            return errno == EPIPE ? OUTPUT_CLOSED : OUTPUT_BROKEN;
+        }
+        text += written > 0 ? written : 0;
+        size -= written > 0 ? (size_t)written : 0U;
+    }
+    return OUTPUT_OPEN;
+}
+
+static output_t write_line(const client_t *client) {
+    const output_t state = write_text(client, client->line, strlen(client->line));
+    return state == OUTPUT_OPEN ? write_text(client, "\n", 1) : state;
+}
+
+/// Prints events until a signal, the end of the reader or of the gateway.
+static int pump(ctl_t *self) {
+    output_t output = OUTPUT_OPEN;
+    while (output == OUTPUT_OPEN) {
+        json_t *line = NULL;
+        const client_result_t result = client_receive(&self->client, client_now_us() + LOOK_US, &line);
+        if (result == CLIENT_INTERRUPTED) {
+            return CTL_OK;
+        }
+        if (result != CLIENT_OK && result != CLIENT_TIMEOUT) {
+            return ctl_lost(self, result);
+        }
+        const bool event = json_object_get(line, "event") != NULL;
+        json_decref(line);
+        output = event ? write_line(&self->client) : await_output(&self->client, 0);
+    }
+    return output == OUTPUT_BROKEN ? ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno)) : CTL_OK;
+}
+
+int verb_watch(ctl_t *self, int count, char **words) {
+    json_t *request = compose(count, words);
+    json_t *reply = NULL;
+    if (request == NULL) {
+        return CTL_USAGE;
+    }
+    const bool json = self->json;
+    self->json = false;
+    signals_catch();
+    const int code = ctl_ask(self, request, &reply);
+    self->json = json;
+    json_decref(reply);
+    return code == CTL_OK ? pump(self) : code;
+}

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+/// Guides from unknown wheels to a configuration that somebody has seen to be right.
+///
+///     checks -> e-stop -> gear -> setpoint type -> current role -> signs -> force -> radius -> file
+///
+/// Everything that moves goes through a gateway of its own, started for the session with a trial configuration (slow,
+/// little current), so that the core's limits, lease and e-stop hold here as they do later. Each step puts what it found
+/// into `config`, and how it was found into a note. Whatever is not found out stays as it was and is said to be assumed.
+#ifndef BRINGUP_H
+#define BRINGUP_H
+
+#include "doctor/doctor.h"
+
+/// Wheels in the air: as slow as a sign can be seen from, and no longer than a look takes.
+#define BRINGUP_SPEED_MM_S  100
+#define BRINGUP_CURRENT_mA  500
+#define BRINGUP_NOTE_SIZE   160U
+#define BRINGUP_NOTES       12U
+#define BRINGUP_ANSWER_SIZE 160U
+
+typedef enum {
+    BRINGUP_ON = 0, ///< The step is done.
+    BRINGUP_QUIT,   ///< The operator wants to end, or nobody answers any more.
+    BRINGUP_FAILED, ///< It cannot go on; the reason was told.
+} bringup_result_t;
+
+/// How a value was found.
+typedef struct {
+    const char *section;
+    const char *key;
+    const char *item; ///< Of the ledger, if it is confirmed; null: assumed still.
+    char text[BRINGUP_NOTE_SIZE];
+} bringup_note_t;
+
+/// A gateway of our own.
+typedef struct {
+    char folder[64]; ///< Empty: none was made.
+    char program[512];
+    int pid; ///< 0: none runs.
+} trial_t;
+
+typedef struct {
+    ctl_t *ctl;
+    gateway_config_t config; ///< What will be written.
+    bringup_note_t note[BRINGUP_NOTES];
+    unsigned notes;
+    const char *recording; ///< Of another controller, to learn from; null: none.
+    const char *out_path;
+    int current_mA;
+    trial_t trial;
+} bringup_t;
+
+/// The two wheels turn so for a moment.
+typedef struct {
+    int speed_mm_s[IW_SIDES];
+    int current_mA[IW_SIDES];
+    bool has_current;
+    unsigned for_ms;
+    int enough_mm_s; ///< Ends as soon as a wheel turns that fast; 0: never.
+} burst_t;
+
+typedef enum { BURST_DONE = 0, BURST_ABORTED, BURST_STOPPED, BURST_REFUSED, BURST_LOST } burst_end_t;
+
+/// What the wheels did, in the machine's sense.
+typedef struct {
+    burst_end_t end;
+    int mean_mm_s[IW_SIDES]; ///< Of the second half; the peak, if that was enough.
+    int peak_mm_s[IW_SIDES]; ///< The largest, with its sign.
+    char why[256];           ///< Unless BURST_DONE.
+} outcome_t;
+
+// --- talking (bringup_talk.c) ------------------------------------------------------------------------------------
+
+/// A paragraph, broken into lines.
+__attribute__((format(printf, 1, 2))) void talk_say(const char *format, ...);
+
+/// A heading.
+void talk_step(unsigned number, const char *title);
+
+/// Asks and reads a line; what was typed before the question is thrown away. An empty line stands for `otherwise`. False
+/// if the operator wants to quit (q, end of input, Ctrl-C).
+bool talk_ask(const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]);
+
+/// The same for yes or no.
+bool talk_yes(const char *question, bool otherwise, bool *out_yes);
+
+/// A number within the bounds, asked for until it is one; `*out_given` is false after an empty line.
+bool talk_number(const char *question, double low, double high, double *out_number, bool *out_given);
+
+/// Keys are seen at once, without Enter, from begin to end.
+void talk_keys_begin(void);
+void talk_keys_end(void);
+/// True if one was pressed (or the input ended).
+bool talk_key_pressed(void);
+
+// --- the trial gateway (bringup_trial.c, bringup_burst.c) --------------------------------------------------------
+
+/// Starts one with `config` on the bus, made slow; the former one ends. Without `with_records` it keeps and finds nothing
+/// of the real gateway's. False after telling why not.
+bool trial_start(bringup_t *self, const gateway_config_t *config, bool with_records);
+void trial_stop(bringup_t *self);
+/// Ends it and removes its folder.
+void trial_close(bringup_t *self);
+/// A new reference to its status, or null.
+json_t *trial_status(bringup_t *self);
+/// Waits until both wheels are heard and stand, and no e-stop is pressed. False after telling.
+bool trial_wait_ready(bringup_t *self);
+
+/// Arms, drives, stops and waits until both stand. Any key stops at once.
+void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
+/// The same, told to the operator before and after, and offered again when it went wrong. BRINGUP_ON: it was done;
+/// BRINGUP_FAILED: it was not, and the operator wants no more of it.
+bringup_result_t burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
+
+// --- the steps ---------------------------------------------------------------------------------------------------
+
+bringup_result_t bringup_checks(bringup_t *self);
+bringup_result_t bringup_estop(bringup_t *self);
+bringup_result_t bringup_gear(bringup_t *self);
+bringup_result_t bringup_type(bringup_t *self);
+/// The setpoint types in the recording, such as "3,1"; and takes over its length. False, after telling, if there is none.
+bool bringup_learn(bringup_t *self, char *out_types, size_t size);
+bringup_result_t bringup_role(bringup_t *self);
+bringup_result_t bringup_signs(bringup_t *self);
+bringup_result_t bringup_force(bringup_t *self);
+bringup_result_t bringup_radius(bringup_t *self);
+bringup_result_t bringup_write(bringup_t *self);
+
+/// Notes how a key's value was found; a later note replaces the former. `item`: the ledger's, if that confirms it.
+__attribute__((format(printf, 5, 6))) void bringup_note(bringup_t *self, const char *section, const char *key,
+                                                        const char *item, const char *format, ...);
+
+#endif

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: MIT
+// A short, slow turn of the wheels, which any key ends.
+#include "bringup.h"
+#include "talk/signals.h"
+#include "text/text.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/// A third of the trial gateway's lease.
+#define SPACING_US 60000
+#define REST_US    8000000
+#define SILENT_US  1000000
+/// Snapshots at 50 Hz with the whole command in force, without which nothing was tried.
+#define IN_FORCE_MIN 4
+
+typedef struct {
+    bringup_t *bringup;
+    const burst_t *burst;
+    outcome_t *outcome;
+    int64_t begin_us;
+    int64_t end_us;
+    int64_t next_us;
+    int64_t heard_us;
+    int64_t sum_mm_s[IW_SIDES];
+    int samples;
+    int in_force;     ///< Snapshots in which the wheels were told what was commanded, ramps over.
+    json_int_t stops; ///< Of the gateway, before this one.
+    bool enough;
+} run_t;
+
+static burst_end_t fail(run_t *run, burst_end_t end, const char *why) {
+    (void)snprintf(run->outcome->why, sizeof(run->outcome->why), "%s", why);
+    return end;
+}
+
+static json_t *compose(const burst_t *burst) {
+    json_t *request = json_pack("{s:s,s:i,s:i}", "cmd", "drive", "left_mm_s", burst->speed_mm_s[IW_LEFT], "right_mm_s",
+                                burst->speed_mm_s[IW_RIGHT]);
+    if (burst->has_current) {
+        (void)json_object_set_new(request, "left_mA", json_integer(burst->current_mA[IW_LEFT]));
+        (void)json_object_set_new(request, "right_mA", json_integer(burst->current_mA[IW_RIGHT]));
+    }
+    return request;
+}
+
+static bool is_told(const json_t *wheel, const char *field, int wanted) {
+    const json_t *value = json_object_get(wheel, field);
+    return json_is_integer(value) && json_integer_value(value) == wanted;
+}
+
+static bool is_in_force(const burst_t *burst, const json_t *state) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const json_t *wheel = json_object_get(state, side == IW_LEFT ? "left" : "right");
+        if (!is_told(wheel, "applied_mm_s", burst->speed_mm_s[side]) ||
+            (burst->has_current && !is_told(wheel, "applied_mA", burst->current_mA[side]))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void take_speeds(run_t *run, const json_t *state, int64_t now_us) {
+    const bool late = now_us > (run->begin_us + run->end_us) / 2;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const json_t *wheel = json_object_get(state, side == IW_LEFT ? "left" : "right");
+        const int speed = (int)json_integer_value(json_object_get(wheel, "speed_mm_s"));
+        int *peak = &run->outcome->peak_mm_s[side];
+        *peak = abs(speed) > abs(*peak) ? speed : *peak;
+        run->sum_mm_s[side] += late ? speed : 0;
+        run->enough = run->enough || (run->burst->enough_mm_s > 0 && abs(speed) >= run->burst->enough_mm_s);
+    }
+    run->samples += late ? 1 : 0;
+    run->in_force += is_in_force(run->burst, state) ? 1 : 0;
+}
+
+static burst_end_t take_line(run_t *run, const json_t *line, int64_t now_us) {
+    const json_t *ok = json_object_get(line, "ok");
+    if (ok == NULL) {
+        if (strcmp(text_word(line, "event"), "state") == 0) {
+            take_speeds(run, line, now_us);
+        }
+        return BURST_DONE;
+    }
+    run->heard_us = now_us;
+    return json_is_true(ok) ? BURST_DONE : fail(run, BURST_STOPPED, text_word(line, "message"));
+}
+
+/// Drives until the time is over, it is enough, or something ends it.
+static burst_end_t drive(run_t *run) {
+    client_t *client = &run->bringup->ctl->client;
+    burst_end_t end = BURST_DONE;
+    while (end == BURST_DONE && !run->enough) {
+        const int64_t now_us = client_now_us();
+        json_t *line = NULL;
+        int64_t id = 0;
+        if (talk_key_pressed()) {
+            return fail(run, BURST_ABORTED, "a key was pressed");
+        }
+        if (now_us >= run->end_us) {
+            return BURST_DONE;
+        }
+        if (now_us - run->heard_us > SILENT_US) {
+            return fail(run, BURST_LOST, "the gateway does not answer");
+        }
+        if (now_us >= run->next_us) {
+            run->next_us = now_us + SPACING_US;
+            if (client_send(client, compose(run->burst), now_us + SILENT_US, &id) != CLIENT_OK) {
+                return fail(run, BURST_LOST, "the gateway is gone");
+            }
+        }
+        const client_result_t result = client_receive(client, now_us + SPACING_US / 3, &line);
+        if (result == CLIENT_INTERRUPTED) {
+            client->seen_signals = signals_count();
+            end = fail(run, BURST_ABORTED, "interrupted");
+        } else if (result != CLIENT_OK && result != CLIENT_TIMEOUT) {
+            end = fail(run, BURST_LOST, "the gateway is gone");
+        } else if (line != NULL) {
+            end = take_line(run, line, client_now_us());
+        }
+        json_decref(line);
+    }
+    return end;
+}
+
+/// Whether it was our own stop that ended it, and whether there was something to end: that a wheel did not turn means
+/// nothing unless it was told to.
+static burst_end_t judge(run_t *run, burst_end_t end) {
+    json_t *why = near_ask(run->bringup->ctl, json_pack("{s:s}", "cmd", "why"));
+    const bool ours = json_integer_value(json_object_get(why, "number")) == run->stops + 1 &&
+                      strcmp(text_word(why, "cause"), "client_stop") == 0;
+    if (end == BURST_STOPPED || (end == BURST_DONE && !ours)) {
+        end = fail(run, BURST_STOPPED, text_word(why, "sentence"));
+    } else if (end == BURST_DONE && !run->enough && run->in_force < IN_FORCE_MIN) {
+        end = fail(run, BURST_STOPPED, "the command was hardly in force; this machine is too busy");
+    }
+    json_decref(why);
+    return end;
+}
+
+/// Zero at once after a key or trouble, else a ramp; then until both wheels stand.
+static void stop(run_t *run, burst_end_t end) {
+    ctl_t *ctl = run->bringup->ctl;
+    const int64_t rest_us = client_now_us() + REST_US;
+    json_t *request = end == BURST_ABORTED ? json_pack("{s:s,s:s}", "cmd", "estop", "reason", "a key in bringup")
+                                           : json_pack("{s:s}", "cmd", "stop");
+    json_decref(near_ask(ctl, request));
+    json_decref(near_ask(ctl, json_pack("{s:s,s:[]}", "cmd", "watch", "topics")));
+    for (bool resting = false; !resting && client_now_us() < rest_us;) {
+        json_t *line = NULL;
+        json_t *status = trial_status(run->bringup);
+        resting = json_is_true(json_object_get(json_object_get(status, "left"), "at_rest")) &&
+                  json_is_true(json_object_get(json_object_get(status, "right"), "at_rest"));
+        json_decref(status);
+        (void)client_receive(&ctl->client, client_now_us() + SPACING_US, &line);
+        json_decref(line);
+    }
+}
+
+void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
+    run_t run = {.bringup = self, .burst = burst, .outcome = out_outcome};
+    memset(out_outcome, 0, sizeof(*out_outcome));
+    if (!trial_wait_ready(self)) {
+        out_outcome->end = fail(&run, BURST_REFUSED, "the wheels are not ready");
+        return;
+    }
+    json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
+    run.stops = json_integer_value(json_object_get(why, "number"));
+    json_decref(why);
+    json_decref(near_ask(self->ctl, json_pack("{s:s,s:[s],s:i}", "cmd", "watch", "topics", "state", "rate_hz", 50)));
+    json_t *armed = near_ask(self->ctl, json_pack("{s:s,s:s}", "cmd", "arm", "name", "bringup"));
+    if (!json_is_true(json_object_get(armed, "ok"))) {
+        out_outcome->end = fail(&run, BURST_REFUSED, text_word(armed, "message"));
+        json_decref(armed);
+        return;
+    }
+    json_decref(armed);
+    talk_keys_begin();
+    run.begin_us = client_now_us();
+    run.heard_us = run.begin_us;
+    run.end_us = run.begin_us + (int64_t)burst->for_ms * 1000;
+    const burst_end_t end = drive(&run);
+    stop(&run, end);
+    talk_keys_end();
+    out_outcome->end = judge(&run, end);
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        out_outcome->mean_mm_s[side] =
+            run.enough || run.samples == 0 ? out_outcome->peak_mm_s[side] : (int)(run.sum_mm_s[side] / run.samples);
+    }
+}
+
+bringup_result_t burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
+    for (bool again = true; again;) {
+        (void)fputs("  ... turning; any key stops it\n", stdout);
+        (void)fflush(stdout);
+        burst_run(self, burst, out_outcome);
+        if (out_outcome->end == BURST_DONE) {
+            talk_say("  left %d mm/s, right %d mm/s measured", out_outcome->mean_mm_s[IW_LEFT],
+                     out_outcome->mean_mm_s[IW_RIGHT]);
+            return BRINGUP_ON;
+        }
+        talk_say("  %s: %s", out_outcome->end == BURST_REFUSED ? "It did not begin" : "STOPPED", out_outcome->why);
+        if (!talk_yes("Once more?", false, &again)) {
+            return BRINGUP_QUIT;
+        }
+    }
+    return BRINGUP_FAILED;
+}

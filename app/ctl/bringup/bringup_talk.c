@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: MIT
+// Questions and answers at the terminal.
+#include "bringup.h"
+#include "talk/signals.h"
+#include "text/paper.h"
+#include "text/text.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <termios.h>
+#include <unistd.h>
+
+// The terminal has one state for all; it must be put back.
+static struct termios normal_keys;
+static bool keys_are_raw;
+
+void talk_say(const char *format, ...) {
+    char text[1024];
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(text, sizeof(text), format, arguments);
+    va_end(arguments);
+    const char *rest = text;
+    while (*rest != '\0') {
+        size_t cut = strlen(rest);
+        if (cut > PAPER_WIDTH) {
+            for (cut = PAPER_WIDTH; cut > 0 && rest[cut] != ' '; cut--) {
+            }
+            cut = cut == 0 ? PAPER_WIDTH : cut;
+        }
+        (void)printf("%.*s\n", (int)cut, rest);
+        rest += cut;
+        rest += strspn(rest, " ");
+    }
+    (void)fflush(stdout);
+}
+
+void talk_step(unsigned number, const char *title) {
+    const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
+    paper_say(&paper, TONE_PLAIN, "%s", "");
+    paper_end(&paper);
+    paper_say(&paper, TONE_TITLE, "Step %u of 9: %s", number, title);
+    paper_end(&paper);
+}
+
+/// Reads a line byte by byte, so that nothing of the next one is taken. False at the end of the input or on a signal.
+static bool read_line(char *out_line, size_t size) {
+    size_t used = 0;
+    const unsigned before = signals_count();
+    for (;;) {
+        struct pollfd entry = {.fd = STDIN_FILENO, .events = POLLIN};
+        char byte = '\0';
+        const int ready = ppoll(&entry, 1, NULL, signals_let_in());
+        if (signals_count() != before) {
+            return false;
+        }
+        if (ready < 0 && errno == EINTR) {
+            continue;
+        }
+        if (read(STDIN_FILENO, &byte, 1) != 1) {
+            return false;
+        }
+        if (byte == '\n') {
+            out_line[used] = '\0';
+            return true;
+        }
+        if (used + 1U < size && byte != '\r') {
+            out_line[used++] = byte;
+        }
+    }
+}
+
+static void trim(char *text) {
+    const size_t lead = strspn(text, " \t");
+    memmove(text, text + lead, strlen(text + lead) + 1U);
+    for (size_t length = strlen(text); length > 0 && strchr(" \t", text[length - 1U]) != NULL; length--) {
+        text[length - 1U] = '\0';
+    }
+}
+
+bool talk_ask(const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]) {
+    (void)tcflush(STDIN_FILENO, TCIFLUSH); // An answer to a question that nobody had read yet is none.
+    (void)printf("%s [%s] ", question, otherwise);
+    (void)fflush(stdout);
+    if (!read_line(out_answer, BRINGUP_ANSWER_SIZE)) {
+        (void)puts("");
+        return false;
+    }
+    trim(out_answer);
+    if (out_answer[0] == '\0') {
+        (void)snprintf(out_answer, BRINGUP_ANSWER_SIZE, "%s", otherwise);
+    }
+    return strcmp(out_answer, "q") != 0;
+}
+
+bool talk_yes(const char *question, bool otherwise, bool *out_yes) {
+    char answer[BRINGUP_ANSWER_SIZE];
+    for (;;) {
+        if (!talk_ask(question, otherwise ? "y" : "n", answer)) {
+            return false;
+        }
+        *out_yes = strcmp(answer, "y") == 0 || strcmp(answer, "yes") == 0;
+        if (*out_yes || strcmp(answer, "n") == 0 || strcmp(answer, "no") == 0) {
+            return true;
+        }
+        talk_say("Please write y or n (q ends bringup).");
+    }
+}
+
+bool talk_number(const char *question, double low, double high, double *out_number, bool *out_given) {
+    char answer[BRINGUP_ANSWER_SIZE];
+    for (;;) {
+        if (!talk_ask(question, "skip", answer)) {
+            return false;
+        }
+        *out_given = strcmp(answer, "skip") != 0;
+        if (!*out_given) {
+            return true;
+        }
+        char *end = NULL;
+        for (char *comma = strchr(answer, ','); comma != NULL; comma = strchr(comma, ',')) {
+            *comma = '.';
+        }
+        *out_number = strtod(answer, &end);
+        if (end != answer && *end == '\0' && *out_number >= low && *out_number <= high) {
+            return true;
+        }
+        talk_say("A number from %g to %g, please, without its unit.", low, high);
+    }
+}
+
+void talk_keys_begin(void) {
+    struct termios raw;
+    if (keys_are_raw || tcgetattr(STDIN_FILENO, &normal_keys) != 0) {
+        return;
+    }
+    raw = normal_keys;
+    raw.c_lflag &= ~(tcflag_t)(ICANON | ECHO);
+    raw.c_cc[VMIN] = 1;
+    raw.c_cc[VTIME] = 0;
+    keys_are_raw = tcsetattr(STDIN_FILENO, TCSAFLUSH, &raw) == 0;
+}
+
+void talk_keys_end(void) {
+    if (keys_are_raw) {
+        (void)tcsetattr(STDIN_FILENO, TCSAFLUSH, &normal_keys);
+    }
+    keys_are_raw = false;
+}
+
+bool talk_key_pressed(void) {
+    struct pollfd entry = {.fd = STDIN_FILENO, .events = POLLIN};
+    return poll(&entry, 1, 0) > 0;
+}

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: MIT
+// The gateway of the session: started with a trial configuration in a folder of its own, ended with us whatever happens.
+#include "bringup.h"
+#include "text/text.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#define START_US 5000000
+#define READY_US 8000000
+#define END_US   4000000
+#define LOOK_NS  20000000L
+
+static void nap(void) {
+    const struct timespec pause = {0, LOOK_NS};
+    (void)nanosleep(&pause, NULL);
+}
+
+static void path_of(const trial_t *trial, const char *name, char *out_path, size_t size) {
+    (void)snprintf(out_path, size, "%s/%s", trial->folder, name);
+}
+
+static bool make_folder(trial_t *trial) {
+    const char *runtime = getenv("XDG_RUNTIME_DIR");
+    if (trial->folder[0] != '\0') {
+        return true;
+    }
+    (void)snprintf(trial->folder, sizeof(trial->folder), "%.30s/iwheel-bringup-XXXXXX",
+                   runtime != NULL && runtime[0] == '/' && strlen(runtime) <= 30U ? runtime : "/tmp");
+    if (mkdtemp(trial->folder) == NULL) {
+        (void)ctl_fail(CTL_UNAVAILABLE, "cannot make a folder like %s: %s", trial->folder, strerror(errno));
+        trial->folder[0] = '\0';
+        return false;
+    }
+    return true;
+}
+
+/// The configuration to be tried, slowed down, with everything that belongs to a real gateway turned to our folder.
+static void slow_down(const bringup_t *self, const gateway_config_t *config, bool with_records,
+                      gateway_config_t *out_trial) {
+    *out_trial = *config;
+    out_trial->core.max_speed_mm_s = 2 * BRINGUP_SPEED_MM_S;
+    out_trial->core.max_current_mA = (uint16_t)self->current_mA;
+    out_trial->core.accel_mm_s2 = 800;
+    out_trial->core.decel_mm_s2 = 1500;
+    out_trial->core.lease_ms = 200;
+    out_trial->core.period_ms = 20;
+    out_trial->core.zero_hold_ms = 1100;
+    out_trial->core.blocked_ms = 5000;     // A wheel that does not turn is a result here, and no burst lasts that long.
+    out_trial->core.wheel_silent_ms = 150; // Nobody leans on wheels in the air: rather patient than cut short.
+    out_trial->core.echo_ms = 150;
+    out_trial->northbound.mode = 0600;
+    out_trial->northbound.max_clients = 4;
+    (void)snprintf(out_trial->northbound.group, sizeof(out_trial->northbound.group), "none");
+    path_of(&self->trial, "gateway.sock", out_trial->northbound.socket, sizeof(out_trial->northbound.socket));
+    if (!with_records) {
+        (void)snprintf(out_trial->record.directory, sizeof(out_trial->record.directory), "%s", self->trial.folder);
+    }
+}
+
+static bool write_config(const bringup_t *self, const gateway_config_t *config, bool with_records) {
+    gateway_config_t trial;
+    char path[128];
+    slow_down(self, config, with_records, &trial);
+    path_of(&self->trial, "gateway.conf", path, sizeof(path));
+    FILE *file = fopen(path, "we");
+    if (file == NULL) {
+        (void)ctl_fail(CTL_UNAVAILABLE, "cannot write %s: %s", path, strerror(errno));
+        return false;
+    }
+    gateway_config_print(&trial, file);
+    return fclose(file) == 0;
+}
+
+/// Where the gateway's program is: as told, beside this program, where the build puts it, or in the path.
+static void find_program(trial_t *trial) {
+    char self[400];
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof(self) - 1U);
+    if (trial->program[0] != '\0') {
+        return;
+    }
+    self[length > 0 ? length : 0] = '\0';
+    char *slash = strrchr(self, '/');
+    if (slash != NULL) {
+        static const char *const places[] = {"", "/../gateway"};
+        *slash = '\0';
+        for (size_t i = 0; i < sizeof(places) / sizeof(places[0]); i++) {
+            (void)snprintf(trial->program, sizeof(trial->program), "%s%s/iwheel-gateway", self, places[i]);
+            if (access(trial->program, X_OK) == 0) {
+                return;
+            }
+        }
+    }
+    (void)snprintf(trial->program, sizeof(trial->program), "iwheel-gateway");
+}
+
+_Noreturn static void become_gateway(const trial_t *trial) {
+    char config[128];
+    char log[128];
+    sigset_t none;
+    path_of(trial, "gateway.conf", config, sizeof(config));
+    path_of(trial, "gateway.log", log, sizeof(log));
+    const int fd = open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+    (void)dup2(fd, STDOUT_FILENO);
+    (void)dup2(fd, STDERR_FILENO);
+    (void)sigemptyset(&none);
+    (void)sigprocmask(SIG_SETMASK, &none, NULL);
+    (void)setpgid(0, 0); // Ctrl-C is for us: we end it in order.
+    (void)prctl(PR_SET_PDEATHSIG, SIGTERM);
+    (void)execlp(trial->program, trial->program, "-c", config, (char *)NULL);
+    (void)fprintf(stderr, "%s: %s; name it with --gateway PROGRAM\n", trial->program, strerror(errno));
+    _exit(CTL_UNAVAILABLE);
+}
+
+/// The last line that the gateway wrote.
+static void tell_log(const trial_t *trial) {
+    char path[128];
+    char line[512];
+    char last[512] = "it wrote nothing";
+    path_of(trial, "gateway.log", path, sizeof(path));
+    FILE *file = fopen(path, "re");
+    while (file != NULL && fgets(line, sizeof(line), file) != NULL) {
+        line[strcspn(line, "\n")] = '\0';
+        memcpy(last, line, sizeof(last));
+    }
+    if (file != NULL) {
+        (void)fclose(file);
+    }
+    (void)ctl_fail(CTL_UNAVAILABLE, "the gateway for this session does not run: %s", last);
+}
+
+static bool connect_to(bringup_t *self) {
+    near_gateway_t gateway;
+    char path[128];
+    const char *const named = self->ctl->socket;
+    const int64_t end_us = client_now_us() + START_US;
+    path_of(&self->trial, "gateway.sock", path, sizeof(path));
+    self->ctl->socket = path;
+    do {
+        near_look(self->ctl, NULL, &gateway);
+        json_decref(gateway.status);
+        if (gateway.result == NEAR_FOUND) {
+            break;
+        }
+        nap();
+    } while (client_now_us() < end_us && waitpid(self->trial.pid, NULL, WNOHANG) == 0);
+    self->ctl->socket = named;
+    return gateway.result == NEAR_FOUND;
+}
+
+bool trial_start(bringup_t *self, const gateway_config_t *config, bool with_records) {
+    trial_t *trial = &self->trial;
+    trial_stop(self);
+    if (!make_folder(trial) || !write_config(self, config, with_records)) {
+        return false;
+    }
+    find_program(trial);
+    trial->pid = fork();
+    if (trial->pid == 0) {
+        become_gateway(trial);
+    }
+    if (trial->pid < 0 || !connect_to(self)) {
+        tell_log(trial);
+        trial_stop(self);
+        return false;
+    }
+    return true;
+}
+
+void trial_stop(bringup_t *self) {
+    const int64_t end_us = client_now_us() + END_US;
+    client_close(&self->ctl->client);
+    client_init(&self->ctl->client);
+    if (self->trial.pid <= 0) {
+        return;
+    }
+    (void)kill(self->trial.pid, SIGTERM);
+    while (waitpid(self->trial.pid, NULL, WNOHANG) == 0) {
+        if (client_now_us() > end_us) {
+            (void)kill(self->trial.pid, SIGKILL);
+        }
+        nap();
+    }
+    self->trial.pid = 0;
+}
+
+void trial_close(bringup_t *self) {
+    static const char *const names[] = {"gateway.conf", "gateway.log", "gateway.sock"};
+    char path[128];
+    trial_stop(self);
+    for (size_t i = 0; i < sizeof(names) / sizeof(names[0]) && self->trial.folder[0] != '\0'; i++) {
+        path_of(&self->trial, names[i], path, sizeof(path));
+        (void)unlink(path);
+    }
+    if (self->trial.folder[0] != '\0') {
+        (void)rmdir(self->trial.folder);
+    }
+    self->trial.folder[0] = '\0';
+}
+
+json_t *trial_status(bringup_t *self) {
+    return near_ask(self->ctl, json_pack("{s:s}", "cmd", "status"));
+}
+
+/// Null if the wheels may be armed as far as can be seen, else what is missing.
+static const char *missing(const json_t *status) {
+    const json_t *left = json_object_get(status, "left");
+    const json_t *right = json_object_get(status, "right");
+    const char *estop = text_word(json_object_get(status, "estop"), "state");
+    if (status == NULL) {
+        return "the session's gateway does not answer";
+    }
+    if (!json_is_true(json_object_get(left, "heard")) || !json_is_true(json_object_get(right, "heard"))) {
+        return !json_is_true(json_object_get(left, "heard")) ? "the left wheel is not heard (power, cable)"
+                                                             : "the right wheel is not heard (power, cable)";
+    }
+    if (!json_is_true(json_object_get(left, "at_rest")) || !json_is_true(json_object_get(right, "at_rest"))) {
+        return "a wheel turns";
+    }
+    if (strcmp(estop, "released") != 0 && strcmp(estop, "none") != 0) {
+        return "the e-stop is pressed or cannot be read";
+    }
+    if (json_array_size(json_object_get(status, "present")) > 0) {
+        return "a fault that was seen just now stays";
+    }
+    return strcmp(text_word(status, "state"), "listening") == 0 ? NULL : "the gateway does not come to rest";
+}
+
+bool trial_wait_ready(bringup_t *self) {
+    const int64_t end_us = client_now_us() + READY_US;
+    for (;;) {
+        json_t *status = trial_status(self);
+        const char *what = missing(status);
+        const bool latched = strcmp(text_word(status, "state"), "latched") == 0;
+        const bool lost = status == NULL;
+        json_decref(status);
+        if (what == NULL) {
+            return true;
+        }
+        if (latched) {
+            json_decref(near_ask(self->ctl, json_pack("{s:s}", "cmd", "reset"))); // Refused until the cause is gone.
+        }
+        if (client_now_us() > end_us || lost) {
+            talk_say("  Not ready: %s.", what);
+            return false;
+        }
+        nap();
+    }
+}

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: MIT
+// The configuration that came of it: written whole or not at all, and over an older one only after asking.
+#include "bringup.h"
+#include "text/text.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+void bringup_note(bringup_t *self, const char *section, const char *key, const char *item, const char *format, ...) {
+    unsigned at = 0;
+    while (at < self->notes && (strcmp(self->note[at].section, section) != 0 || strcmp(self->note[at].key, key) != 0)) {
+        at++;
+    }
+    if (at == BRINGUP_NOTES) {
+        return;
+    }
+    bringup_note_t *note = &self->note[at];
+    self->notes = at == self->notes ? at + 1U : self->notes;
+    note->section = section;
+    note->key = key;
+    note->item = item;
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(note->text, sizeof(note->text), format, arguments);
+    va_end(arguments);
+}
+
+static const bringup_note_t *find_note(const bringup_t *self, const char *section, const char *key) {
+    for (unsigned i = 0; i < self->notes; i++) {
+        if (strcmp(self->note[i].section, section) == 0 && strcmp(self->note[i].key, key) == 0) {
+            return &self->note[i];
+        }
+    }
+    return NULL;
+}
+
+/// A note as a comment in the file.
+typedef struct {
+    const bringup_t *bringup;
+    char date[16];
+    char text[BRINGUP_NOTE_SIZE + 40U];
+} commenter_t;
+
+static const char *comment(const void *context, const char *section, const char *key) {
+    // The text is this module's own; the configuration's printer only hands the pointer through.
+    commenter_t *self = *(commenter_t *const *)context;
+    const bringup_note_t *note = find_note(self->bringup, section, key);
+    if (note == NULL) {
+        return NULL;
+    }
+    (void)snprintf(self->text, sizeof(self->text), "BRINGUP %s, %s: %s", self->date,
+                   note->item != NULL ? "confirmed" : "noted", note->text);
+    return self->text;
+}
+
+static void print_head(const char *date, FILE *out) {
+    (void)fprintf(
+        out, "; Written by iwheelctl bringup on %s. Lines that begin with BRINGUP tell how a value was found.\n", date);
+}
+
+/// Puts the new file in its place; an old one there is kept.
+static bool put_in_place(const char *beside, const char *path) {
+    char old[512];
+    if (access(path, F_OK) == 0) {
+        (void)snprintf(old, sizeof(old), "%.500s.old", path);
+        if (rename(path, old) != 0) {
+            return false;
+        }
+        talk_say("The old one is kept as %s.", old);
+    }
+    return rename(beside, path) == 0;
+}
+
+/// Into a file beside it, which then takes its place.
+static bool write_file(bringup_t *self, const char *path) {
+    commenter_t commenter = {.bringup = self};
+    commenter_t *const context = &commenter;
+    char beside[512];
+    struct tm local;
+    const time_t now = time(NULL);
+    (void)snprintf(beside, sizeof(beside), "%.500s.new", path);
+    if (localtime_r(&now, &local) != NULL) {
+        (void)strftime(commenter.date, sizeof(commenter.date), "%Y-%m-%d", &local);
+    }
+    FILE *file = fopen(beside, "we");
+    if (file == NULL) {
+        talk_say("Cannot write %s: %s. Name another one.", beside, strerror(errno));
+        return false;
+    }
+    print_head(commenter.date, file);
+    gateway_config_print_noted(&self->config, comment, &context, file);
+    const bool written = fflush(file) == 0 && ferror(file) == 0 && fsync(fileno(file)) == 0;
+    if (fclose(file) != 0 || !written || !put_in_place(beside, path)) {
+        talk_say("Cannot write %s: %s. Name another one.", path, strerror(errno));
+        (void)unlink(beside);
+        return false;
+    }
+    return true;
+}
+
+static const char *value_of(const bringup_t *self, const bringup_note_t *note, char out_value[32]) {
+    const iw_config_t *core = &self->config.core;
+    const iw_side_t side = strcmp(note->section, "left") == 0 ? IW_LEFT : IW_RIGHT;
+    if (strcmp(note->key, "setpoint_type") == 0) {
+        (void)snprintf(out_value, 32, "%u", core->setpoint_type);
+    } else if (strcmp(note->key, "current_role") == 0) {
+        (void)snprintf(out_value, 32, "%s", core->current_role == IW_ROLE_LIMIT ? "limit" : "setpoint");
+    } else if (strcmp(note->key, "invert") == 0) {
+        (void)snprintf(out_value, 32, "%s", core->invert[side] ? "yes" : "no");
+    } else if (strcmp(note->key, "force_unit") == 0) {
+        (void)snprintf(out_value, 32, "%s", core->force_unit[side] == IW_FORCE_CN ? "cN" : "dN");
+    } else if (strcmp(note->key, "gear_ratio") == 0) {
+        (void)snprintf(out_value, 32, core->gear_per == 1U ? "%u" : "%u/%u", core->gear_turns, core->gear_per);
+    } else if (strcmp(note->key, "radius_mm") == 0) {
+        (void)snprintf(out_value, 32, "%u", core->radius_mm);
+    } else {
+        out_value[0] = '\0';
+    }
+    return out_value;
+}
+
+static void tell_findings(const bringup_t *self) {
+    char value[32];
+    talk_say("What was found:");
+    for (unsigned i = 0; i < self->notes; i++) {
+        const bringup_note_t *note = &self->note[i];
+        (void)printf("  %s [%s] %s%s%s\n      %s\n", note->item != NULL ? "confirmed" : "noted    ", note->section,
+                     note->key, value_of(self, note, value)[0] != '\0' ? " = " : "", value, note->text);
+    }
+}
+
+/// Tells the ledger what was confirmed, through a gateway that keeps it where the real one will look. False if anything
+/// was not taken.
+static bool confirm_all(bringup_t *self) {
+    char value[32];
+    bool taken = trial_start(self, &self->config, true);
+    for (unsigned i = 0; i < self->notes && taken; i++) {
+        const bringup_note_t *note = &self->note[i];
+        if (note->item != NULL) {
+            json_t *reply = near_ask(self->ctl, json_pack("{s:s,s:s,s:s}", "cmd", "confirm", "item", note->item,
+                                                          "value", value_of(self, note, value)));
+            taken = strcmp(text_word(reply, "state"), "confirmed") == 0;
+            json_decref(reply);
+        }
+    }
+    trial_stop(self);
+    return taken;
+}
+
+/// Only where what we write will be the gateway's own: a file of somebody else's it could not replace.
+static bool may_keep(const bringup_t *self) {
+    struct stat status;
+    const char *directory = self->config.record.directory;
+    return stat(directory, &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == geteuid() &&
+           access(directory, W_OK | X_OK) == 0;
+}
+
+/// What remains to be done with the file.
+static void tell_next(bringup_t *self, const char *path) {
+    char value[32];
+    if (may_keep(self) && confirm_all(self)) {
+        talk_say("The ledger in %s knows what was confirmed. Next: iwheel-gateway -c %s", self->config.record.directory,
+                 path);
+        return;
+    }
+    talk_say("Next: iwheel-gateway -c %s, and when it runs, tell its ledger what you saw:", path);
+    for (unsigned i = 0; i < self->notes; i++) {
+        const bringup_note_t *note = &self->note[i];
+        if (note->item != NULL) {
+            (void)printf("  iwheelctl confirm %s %s\n", note->item, value_of(self, note, value));
+        }
+    }
+}
+
+bringup_result_t bringup_write(bringup_t *self) {
+    char path[BRINGUP_ANSWER_SIZE];
+    talk_step(9, "the configuration");
+    trial_stop(self);
+    tell_findings(self);
+    for (;;) {
+        bool yes = true;
+        if (!talk_ask("Write it to", self->out_path, path)) {
+            return BRINGUP_QUIT;
+        }
+        if (access(path, F_OK) == 0 && !talk_yes("That file exists. Replace it?", false, &yes)) {
+            return BRINGUP_QUIT;
+        }
+        if (yes && write_file(self, path)) {
+            break;
+        }
+    }
+    talk_say("Written to %s.", path);
+    tell_next(self, path);
+    return BRINGUP_ON;
+}

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+#include "decode_fields.h"
+#include "frame_line.h"
+#include "recordings/config_option.h"
+#include "recordings/recording.h"
+#include "talk/ctl.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+/// A time before this is not one since 1970.
+#define CALENDAR_US 1000000000000000
+
+typedef struct {
+    const char *path;
+    bool csv;
+    iw_config_t config;
+    int64_t begin_us; ///< Of the first frame.
+    recording_t recording;
+} decode_t;
+
+/// An exit code.
+static int parse_words(decode_t *self, int count, char **words) {
+    self->path = NULL;
+    for (int i = 0; i < count; i++) {
+        if (strcmp(words[i], "--csv") == 0) {
+            self->csv = true;
+        } else if (strcmp(words[i], "--config") == 0) {
+            const int code = config_option_load("decode", i + 1 < count ? words[++i] : NULL, &self->config);
+            if (code != CTL_OK) {
+                return code;
+            }
+        } else if ((words[i][0] == '-' && words[i][1] != '\0') || self->path != NULL) {
+            return ctl_fail(CTL_USAGE, "decode does not understand \"%s\"; see: iwheelctl decode --help", words[i]);
+        } else {
+            self->path = words[i];
+        }
+    }
+    self->path = self->path != NULL ? self->path : "-";
+    return CTL_OK;
+}
+
+static void write_begin(const decode_t *self, const candump_t *frame) {
+    char text[64];
+    struct tm local;
+    const time_t seconds = (time_t)(frame->time_us / 1000000);
+    if (frame->time_us >= CALENDAR_US && localtime_r(&seconds, &local) != NULL &&
+        strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &local) > 0U) {
+        (void)printf("# %s, from %s.%06" PRId64 " local time; times in seconds from there\n", self->recording.name,
+                     text, frame->time_us % 1000000);
+    } else {
+        (void)printf("# %s, from %" PRId64 ".%06" PRId64 " s; times in seconds from there\n", self->recording.name,
+                     frame->time_us / 1000000, frame->time_us % 1000000);
+    }
+}
+
+static void write_text(decode_t *self, const candump_t *frame, const decoded_t *decoded) {
+    if (self->recording.frames == 1U) {
+        self->begin_us = frame->time_us;
+        write_begin(self, frame);
+    }
+    const int64_t since_us = frame->time_us - self->begin_us;
+    const int64_t size_us = since_us < 0 ? -since_us : since_us;
+    char time_text[32];
+    (void)snprintf(time_text, sizeof time_text, "%s%" PRId64 ".%06" PRId64, since_us < 0 ? "-" : "", size_us / 1000000,
+                   size_us % 1000000);
+    frame_print(time_text, frame, decoded);
+}
+
+static void write_csv_header(void) {
+    (void)fputs("time_s,interface,direction,id,id_hex,dlc_bytes,data_hex,wheel,message", stdout);
+    for (unsigned field = 0; field < FIELDS; field++) {
+        (void)printf(",%s", field_column((field_t)field));
+    }
+    (void)puts(",note");
+}
+
+static void write_csv(const candump_t *frame, const decoded_t *decoded) {
+    char name[CANDUMP_INTERFACE_SIZE];
+    for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would be another column.
+        const char c = frame->interface[i];
+        name[i] = c == ',' || c == '"' || c == '\'' ? '_' : c;
+    }
+    (void)printf("%" PRId64 ".%06" PRId64 ",%s,%s,%" PRIu32 ",0x%0*" PRIX32 ",%u,", frame->time_us / 1000000,
+                 frame->time_us % 1000000, name, frame_direction(frame), frame->id, frame->extended ? 8 : 3, frame->id,
+                 frame->length);
+    frame_print_bytes(frame, "");
+    (void)printf(",%s,%s", decoded->wheel, decoded->message);
+    for (unsigned field = 0; field < FIELDS; field++) {
+        if ((decoded->present & (1U << field)) != 0U) {
+            (void)printf(",%" PRId32, decoded->value[field]);
+        } else {
+            (void)putchar(',');
+        }
+    }
+    (void)printf(",\"%s\"\n", decoded->note);
+}
+
+int verb_decode(ctl_t *self, int count, char **words) {
+    static decode_t decode;
+    candump_t frame;
+    decoded_t decoded;
+    iw_config_default(&decode.config);
+    int code = parse_words(&decode, count, words);
+    code = code == CTL_OK ? recording_open(&decode.recording, decode.path) : code;
+    (void)self;
+    if (code != CTL_OK) {
+        return code;
+    }
+    if (decode.csv) {
+        write_csv_header();
+    }
+    while (ferror(stdout) == 0 && recording_next(&decode.recording, &frame)) {
+        const iw_can_frame_t core = candump_to_core(&frame);
+        decode_fields(&core, &decode.config, &decoded);
+        if (decode.csv) {
+            write_csv(&frame, &decoded);
+        } else {
+            write_text(&decode, &frame, &decoded);
+        }
+        if (recording_is_drained(&decode.recording)) {
+            (void)fflush(stdout); // Live: nobody waits for the next line to see this one.
+        }
+    }
+    return recording_close(&decode.recording);
+}

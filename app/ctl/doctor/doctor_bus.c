@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// What the gateway tells, and what is heard on the bus.
+#include "doctor.h"
+#include "text/text.h"
+
+#include <grp.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static void list_contradicted(doctor_t *self, json_t *ledger) {
+    const char *name = NULL;
+    json_t *entry = NULL;
+    unsigned assumed = 0;
+    unsigned confirmed = 0;
+    json_object_foreach(ledger, name, entry) {
+        const char *state = text_word(entry, "state");
+        assumed += strcmp(state, "assumed") == 0 ? 1U : 0U;
+        confirmed += strcmp(state, "confirmed") == 0 ? 1U : 0U;
+        if (strcmp(state, "contradicted") == 0) {
+            inspect_say(&self->findings, "ledger", INSPECT_FAIL, "assumption %s is contradicted by the %s", name,
+                        text_word(entry, "evidence"));
+            inspect_cure(&self->findings, "see: iwheelctl status; settle it with: iwheelctl bringup");
+        }
+    }
+    if (assumed + confirmed > 0U) {
+        inspect_say(&self->findings, "ledger", INSPECT_OK,
+                    "assumptions about the wheels: %u confirmed, %u never verified (iwheelctl status lists them)",
+                    confirmed, assumed);
+    }
+}
+
+static bool is_present(const json_t *status, const char *cause) {
+    size_t index = 0;
+    const json_t *present = NULL;
+    json_array_foreach(json_object_get(status, "present"), index, present) {
+        if (json_is_string(present) && strcmp(json_string_value(present), cause) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void look_at_status(doctor_t *self) {
+    inspect_findings_t *findings = &self->findings;
+    const json_t *status = self->gateway.status;
+    const char *state = text_word(status, "state");
+    const bool latched = strcmp(state, "latched") == 0;
+    inspect_say(findings, "gateway", latched ? INSPECT_WARN : INSPECT_OK, "gateway %s at %s serves %s: %s%s%s",
+                text_word(status, "version"), self->gateway.path, self->gateway.bus, state, latched ? ", " : "",
+                latched ? text_word(status, "cause") : "");
+    if (latched) {
+        inspect_cure(findings, "iwheelctl why tells the cause; when it is gone: iwheelctl reset");
+    }
+    if (is_present(status, "second_master")) {
+        inspect_say(findings, "second_master", INSPECT_FAIL,
+                    "the gateway hears setpoints that are not its own, id 266 (0x10A) or 298 (0x12A)");
+        inspect_cure(findings, "switch off the other program or device that sends them");
+    }
+    list_contradicted(self, json_object_get(status, "ledger"));
+}
+
+/// The group whose members may use the socket (or its directory).
+static void cure_denied(doctor_t *self) {
+    struct stat status;
+    const struct group *group = stat(self->gateway.path, &status) == 0 ? getgrgid(status.st_gid) : NULL;
+    inspect_cure(&self->findings, "sudo usermod -aG %s $USER, then log in again",
+                 group != NULL ? group->gr_name : "iwheel");
+}
+
+void doctor_look_at_gateway(doctor_t *self) {
+    inspect_findings_t *findings = &self->findings;
+    const char *path = self->gateway.path;
+    switch (self->gateway.result) {
+    case NEAR_FOUND:
+        look_at_status(self);
+        break;
+    case NEAR_OTHER:
+        inspect_say(findings, "gateway", INSPECT_OK, "gateway at %s: it serves %s, not this bus", path,
+                    self->gateway.bus);
+        break;
+    case NEAR_DENIED:
+        inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: you may not talk to it", path);
+        cure_denied(self);
+        break;
+    case NEAR_MUTE:
+        inspect_say(findings, "gateway", INSPECT_FAIL, "gateway at %s: it takes the connection and does not answer",
+                    path);
+        inspect_cure(findings, "see its log: journalctl -u iwheel-gateway; then: systemctl restart iwheel-gateway");
+        break;
+    case NEAR_SEVERAL:
+        inspect_say(findings, "gateway", INSPECT_OK, "several gateways are running: %s", path);
+        break;
+    case NEAR_NONE:
+        inspect_say(findings, "gateway", INSPECT_OK, "gateway: none is running; doctor looks by itself");
+        break;
+    }
+}
+
+static bool has_gateway(const doctor_t *self) {
+    return self->gateway.result == NEAR_FOUND;
+}
+
+/// A gateway that we may not ask still holds the e-stop's line and may send.
+static bool is_occupied(const doctor_t *self) {
+    const near_t result = self->gateway.result;
+    return result == NEAR_FOUND || result == NEAR_DENIED || result == NEAR_MUTE;
+}
+
+static bool open_hal(doctor_t *self) {
+    const iw_estop_wish_t line = {.name = is_occupied(self) ? "none" : self->config.estop.line,
+                                  .active_high = self->config.estop.active_high,
+                                  .debounce_ms = self->config.estop.debounce_ms};
+    const iw_estop_wish_t none = {.name = "none"};
+    const char *culprit = NULL;
+    int error = iw_linux_hal_open(&self->hal, self->bus, &line, &culprit);
+    if (error != 0) {
+        inspect_unopened(culprit, culprit == self->bus, error, &self->findings);
+        // Without the e-stop there is still the bus to be looked at.
+        error = culprit == self->bus ? error : iw_linux_hal_open(&self->hal, self->bus, &none, &culprit);
+    }
+    self->open = error == 0;
+    return self->open;
+}
+
+inspect_estop_t doctor_estop(doctor_t *self) {
+    if (!has_gateway(self)) {
+        const iw_hal_t functions = iw_linux_hal_functions(&self->hal);
+        iw_linux_hal_tend(&self->hal, (iw_time_us_t)client_now_us());
+        (void)functions.estop_pressed(functions.context);
+        return inspect_estop_of(&self->hal, self->config.estop.line);
+    }
+    const json_t *estop = json_object_get(self->gateway.status, "estop");
+    const char *state = text_word(estop, "state");
+    return (inspect_estop_t){
+        .line = text_word(estop, "line"),
+        .present = strcmp(state, "none") != 0,
+        .simulated = json_is_true(json_object_get(estop, "simulated")),
+        .level = strcmp(state, "released") == 0  ? 0
+                 : strcmp(state, "pressed") == 0 ? 1
+                                                 : -1,
+        .trouble = "the gateway's log tells why: journalctl -u iwheel-gateway",
+    };
+}
+
+void doctor_look_at_bus(doctor_t *self) {
+    const inspect_wish_t wish = {
+        .name = self->bus,
+        .bitrate_hz = self->config.bus.bitrate,
+        .sample_point_permille = self->config.bus.sample_point_permille,
+        .refuses = self->config.bus.on_mismatch == GATEWAY_MISMATCH_REFUSE,
+        .others_may_send = is_occupied(self),
+    };
+    if (!open_hal(self)) {
+        return;
+    }
+    inspect_listen(&self->hal, (iw_time_us_t)self->listen_ms * IW_US_PER_MS, &self->heard);
+    inspect_link(iw_linux_hal_link(&self->hal), &wish, &self->findings);
+    inspect_bus(iw_linux_hal_link(&self->hal), &self->heard, &wish, &self->findings);
+    if (has_gateway(self) ||
+        (!is_occupied(self) && (strcmp(self->config.estop.line, "none") == 0 || self->hal.estop_ops->present))) {
+        const inspect_estop_t estop = doctor_estop(self);
+        inspect_estop(&estop, &self->findings);
+    }
+}
+
+void doctor_close(doctor_t *self) {
+    if (self->open) {
+        iw_linux_hal_close(&self->hal);
+    }
+    self->open = false;
+    json_decref(self->gateway.status);
+    self->gateway.status = NULL;
+}

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+#include "doctor.h"
+#include "text/paper.h"
+#include "text/text.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define INDENT        6U
+#define LISTEN_MIN_MS 200U
+#define LISTEN_MAX_MS 60000U
+
+typedef struct {
+    const char *bus;
+    const char *config;
+    const char *estop;
+    unsigned listen_ms;
+    bool press;
+} words_t;
+
+static bool parse_listen(const char *text, unsigned *out_ms) {
+    char *end = NULL;
+    const double seconds = text != NULL ? strtod(text, &end) : -1.0;
+    if (text == NULL || end == text || (*end != '\0' && strcmp(end, "s") != 0) ||
+        !(seconds * 1000.0 >= LISTEN_MIN_MS && seconds * 1000.0 <= LISTEN_MAX_MS)) {
+        (void)ctl_fail(CTL_USAGE, "--listen wants a time in seconds, 0.2s to 60s");
+        return false;
+    }
+    *out_ms = (unsigned)(seconds * 1000.0);
+    return true;
+}
+
+static bool parse_words(int count, char **words, words_t *out_words) {
+    *out_words = (words_t){.listen_ms = DOCTOR_LISTEN_MS, .press = true};
+    for (int i = 0; i < count; i++) {
+        const char *value = i + 1 < count ? words[i + 1] : NULL;
+        const char **text = strcmp(words[i], "--config") == 0  ? &out_words->config
+                            : strcmp(words[i], "--estop") == 0 ? &out_words->estop
+                                                               : NULL;
+        if (text != NULL && value == NULL) {
+            (void)ctl_fail(CTL_USAGE, "%s wants a value; see: iwheelctl doctor --help", words[i]);
+            return false;
+        }
+        if (text != NULL) {
+            *text = value;
+            i++;
+        } else if (strcmp(words[i], "--no-press") == 0) {
+            out_words->press = false;
+        } else if (strcmp(words[i], "--listen") == 0) {
+            if (!parse_listen(value, &out_words->listen_ms)) {
+                return false;
+            }
+            i++;
+        } else if (words[i][0] != '-' && out_words->bus == NULL) {
+            out_words->bus = words[i];
+        } else {
+            return ctl_words_at_most("doctor", count - i, 0, &words[i]);
+        }
+    }
+    return true;
+}
+
+/// The configuration in force: the file if there is one, then the words. An exit code.
+static int configure(doctor_t *self, const words_t *words) {
+    gateway_config_t *config = &self->config;
+    const char *path = words->config != NULL ? words->config : GATEWAY_CONFIG_PATH;
+    gateway_config_default(config);
+    if ((words->config != NULL || access(path, F_OK) == 0) && gateway_config_load(path, config, stderr) != 0) {
+        return GATEWAY_CONFIG_ERROR;
+    }
+    if (words->bus != NULL && gateway_config_override(config, "bus.interface", words->bus, "IFACE", stderr) != 0) {
+        return CTL_USAGE;
+    }
+    if (words->estop != NULL && gateway_config_override(config, "estop.line", words->estop, "--estop", stderr) != 0) {
+        return CTL_USAGE;
+    }
+    return CTL_OK;
+}
+
+/// Which bus is meant: the one named, the gateway's, the configured one, the only one there is.
+static void choose_bus(doctor_t *self, const words_t *words) {
+    char names[256];
+    if (words->bus != NULL) {
+        self->bus = self->config.bus.interface;
+        return;
+    }
+    if (self->gateway.result == NEAR_FOUND) {
+        self->bus = self->gateway.bus;
+        return;
+    }
+    if (words->config != NULL || access(GATEWAY_CONFIG_PATH, F_OK) == 0) {
+        self->bus = self->config.bus.interface;
+        return;
+    }
+    if (doctor_interfaces(names, sizeof(names)) == 1U) {
+        (void)snprintf(self->found_bus, sizeof(self->found_bus), "%.112s", names);
+        self->bus = self->found_bus;
+    }
+}
+
+static void say_no_bus(doctor_t *self) {
+    char names[256];
+    if (doctor_interfaces(names, sizeof(names)) > 0U) {
+        inspect_say(&self->findings, "interface", INSPECT_FAIL, "bus: there are several CAN interfaces: %s", names);
+        inspect_cure(&self->findings, "name one: iwheelctl doctor IFACE");
+    } else {
+        inspect_say(&self->findings, "interface", INSPECT_FAIL, "bus: this machine has no CAN interface");
+        inspect_cure(&self->findings, "plug the adapter in and load its driver (ip -brief link show type can); without "
+                                      "hardware: iwheel-sim --can unix:/tmp/bus, then: iwheelctl doctor unix:/tmp/bus");
+    }
+}
+
+static void print_text(const paper_t *paper, tone_t tone, const char *text) {
+    const size_t room = PAPER_WIDTH - INDENT;
+    for (bool first = true; *text != '\0' || first; first = false) {
+        size_t cut = strlen(text);
+        if (cut > room) {
+            for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
+            }
+            cut = cut == 0 ? room : cut;
+        }
+        paper_say(paper, tone, "%s%.*s", first ? "" : "      ", (int)cut, text);
+        paper_end(paper);
+        text += cut;
+        text += strspn(text, " ");
+    }
+}
+
+void doctor_print(const doctor_t *self, unsigned first) {
+    static const tone_t tones[] = {TONE_GOOD, TONE_CARE, TONE_BAD};
+    const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
+    for (unsigned i = first; i < self->findings.count; i++) {
+        const inspect_finding_t *finding = &self->findings.finding[i];
+        paper_text(&paper, tones[finding->verdict], INDENT, inspect_verdict_word(finding->verdict));
+        print_text(&paper, TONE_PLAIN, finding->text);
+        if (finding->cure[0] != '\0') {
+            // Not broken into lines: it is made to be copied.
+            paper_say(&paper, TONE_TITLE, "      -> %s", finding->cure);
+            paper_end(&paper);
+        }
+    }
+}
+
+static void print_sum(const doctor_t *self) {
+    const unsigned *total = self->findings.total;
+    (void)printf("%u ok, %u to be looked at, %u wrong%s\n", total[INSPECT_OK], total[INSPECT_WARN], total[INSPECT_FAIL],
+                 total[INSPECT_FAIL] > 0U ? ": begin with the first" : "");
+}
+
+static json_t *rates_of(const doctor_t *self) {
+    json_t *rates = json_array();
+    for (unsigned i = 0; i < INSPECT_MESSAGES && self->heard.span_us > 0U; i++) {
+        const inspect_message_t *message = &inspect_messages[i];
+        (void)json_array_append_new(rates, json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)message->id, "name",
+                                                     message->name, "side", message->side == IW_LEFT ? "left" : "right",
+                                                     "nominal_mHz", (json_int_t)message->nominal_mHz, "measured_mHz",
+                                                     (json_int_t)inspect_rate_mHz(&self->heard, i)));
+    }
+    return rates;
+}
+
+static void print_json(const doctor_t *self) {
+    json_t *list = json_array();
+    const bool listened = self->heard.span_us > 0U;
+    for (unsigned i = 0; i < self->findings.count; i++) {
+        const inspect_finding_t *finding = &self->findings.finding[i];
+        (void)json_array_append_new(list, json_pack("{s:s,s:s,s:s,s:s?}", "check", finding->check, "verdict",
+                                                    inspect_verdict_word(finding->verdict), "text", finding->text,
+                                                    "cure", finding->cure[0] != '\0' ? finding->cure : NULL));
+    }
+    json_t *load = listened ? json_integer(inspect_load_permille(&self->heard, self->config.bus.bitrate)) : json_null();
+    json_t *root = json_pack("{s:b,s:s?,s:b,s:o,s:o,s:o}", "ok", self->findings.total[INSPECT_FAIL] == 0U, "bus",
+                             self->bus, "gateway", self->gateway.result == NEAR_FOUND, "findings", list, "rates",
+                             rates_of(self), "load_permille", load);
+    (void)json_dumpf(root, stdout, JSON_COMPACT);
+    (void)putchar('\n');
+    json_decref(root);
+}
+
+static void look(doctor_t *self, const words_t *words) {
+    inspect_begin(&self->findings);
+    near_look(self->ctl, words->bus, &self->gateway);
+    choose_bus(self, words);
+    doctor_look_at_gateway(self);
+    const bool able = doctor_look_at_machine(self);
+    if (self->bus == NULL) {
+        say_no_bus(self);
+    } else if (able) {
+        if (!self->ctl->json && isatty(STDERR_FILENO) == 1) {
+            (void)fprintf(stderr, "listening to %s for %.1f s ...\r", self->bus, self->listen_ms / 1e3);
+        }
+        doctor_look_at_bus(self);
+    }
+}
+
+int verb_doctor(ctl_t *self, int count, char **words) {
+    words_t parsed;
+    static doctor_t doctor;
+    if (!parse_words(count, words, &parsed)) {
+        return CTL_USAGE;
+    }
+    doctor = (doctor_t){.ctl = self, .listen_ms = parsed.listen_ms};
+    const int code = configure(&doctor, &parsed);
+    if (code != CTL_OK) {
+        return code;
+    }
+    look(&doctor, &parsed);
+    if (self->json) {
+        print_json(&doctor);
+    } else {
+        doctor_print(&doctor, 0);
+        const unsigned printed = doctor.findings.count;
+        if (parsed.press && doctor.open && isatty(STDIN_FILENO) == 1 && isatty(STDOUT_FILENO) == 1) {
+            doctor_press(&doctor);
+            doctor_print(&doctor, printed);
+        }
+        print_sum(&doctor);
+    }
+    const bool failed = doctor.findings.total[INSPECT_FAIL] > 0U;
+    doctor_close(&doctor);
+    return failed ? CTL_NO : CTL_OK;
+}

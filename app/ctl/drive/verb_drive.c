@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: MIT
+// The only verb that moves wheels.
+//
+//     arm --> drive every lease_ms / 3 --> stop --> wait until zero and at rest
+//                |  time over, signal, refusal, gateway silent or gone
+//                '-------------------------------------------^
+//
+// It arms once and never again: whatever ends the lease ends the program.
+#include "drive_words.h"
+#include "talk/ctl.h"
+#include "talk/signals.h"
+#include "text/text.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/// A drive command without reply for this long: the gateway hangs.
+#define SILENT_US 1000000
+/// The wheels must be at rest this long after the stop at the latest: the gateway's own longest hold.
+#define REST_US 10000000
+#define POLL_US 50000
+/// Until then the gateway refuses the next arm (stale_command).
+#define FRESH_US 520000
+/// What the gateway may grant; anything else counts as the shortest.
+#define LEASE_MIN_MS 20
+#define LEASE_MAX_MS 500
+/// A wheel that is not heard cannot be seen to stand; it is waited for this long.
+#define UNHEARD_US 2000000
+
+typedef enum { END_NONE = 0, END_TIME, END_SIGNAL, END_REFUSED, END_SILENT, END_LOST } end_t;
+
+typedef struct {
+    ctl_t *ctl;
+    drive_words_t words;
+    json_t *first; ///< Snapshots: when driving began, and the last one.
+    json_t *latest;
+    int64_t lease_us;
+    int64_t begin_us; ///< The first drive command was accepted; 0: not yet.
+    int64_t next_us;
+    int64_t sent_us;     ///< The last drive command left.
+    int64_t answered_us; ///< The last reply came.
+    long long applied[2];
+    bool limited;
+    bool live;           ///< Show progress: stdout is a terminal and --json was not given.
+    char last_line[512]; ///< With --json: the last reply to a drive command.
+} drive_t;
+
+static void keep(json_t **slot, json_t *snapshot) {
+    json_decref(*slot);
+    *slot = json_incref(snapshot);
+}
+
+static const char *speed_of(const json_t *snapshot, const char *side, char out[TEXT_CELL]) {
+    text_integer(json_object_get(json_object_get(snapshot, side), "speed_mm_s"), "", out);
+    return out;
+}
+
+static double driven_s(const drive_t *self, int64_t now_us) {
+    return self->begin_us > 0 ? (double)(now_us - self->begin_us) / 1e6 : 0.0;
+}
+
+static void show_progress(const drive_t *self, int64_t now_us) {
+    char left[TEXT_CELL];
+    char right[TEXT_CELL];
+    if (self->live) {
+        (void)printf("\r\033[Kdriving %lld/%lld mm/s%s   measured %s/%s mm/s   %.1f s of %.1f s", self->applied[0],
+                     self->applied[1], self->limited ? " (limited)" : "", speed_of(self->latest, "left", left),
+                     speed_of(self->latest, "right", right), driven_s(self, now_us), (double)self->words.time_ms / 1e3);
+        (void)fflush(stdout);
+    }
+}
+
+static void clear_progress(const drive_t *self) {
+    if (self->live) {
+        (void)fputs("\r\033[K", stdout);
+        (void)fflush(stdout);
+    }
+}
+
+static client_result_t send_drive(drive_t *self, int64_t now_us) {
+    int64_t id = 0;
+    const drive_words_t *words = &self->words;
+    json_t *request = json_pack("{s:s,s:i,s:i}", "cmd", "drive", "left_mm_s", words->speed_mm_s[0], "right_mm_s",
+                                words->speed_mm_s[1]);
+    if (words->has_current) {
+        (void)json_object_set_new(request, "left_mA", json_integer(words->current_mA[0]));
+        (void)json_object_set_new(request, "right_mA", json_integer(words->current_mA[1]));
+    }
+    const int64_t period_us = self->lease_us / 3;
+    self->next_us += period_us;
+    if (self->next_us <= now_us) {
+        self->next_us = now_us + period_us; // Late: what was missed is not sent in a burst.
+    }
+    self->sent_us = now_us;
+    return client_send(&self->ctl->client, request, now_us + SILENT_US, &id);
+}
+
+/// What a line from the gateway means for the drive.
+static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
+    const json_t *ok = json_object_get(line, "ok");
+    if (ok == NULL) {
+        if (strcmp(text_word(line, "event"), "state") == 0) {
+            keep(&self->latest, line);
+            show_progress(self, now_us);
+        }
+        return END_NONE;
+    }
+    (void)snprintf(self->last_line, sizeof(self->last_line), "%s", self->ctl->client.line);
+    if (!json_is_true(ok)) {
+        clear_progress(self);
+        (void)ctl_refused(line);
+        return END_REFUSED;
+    }
+    if (self->begin_us == 0) {
+        self->begin_us = now_us;
+        keep(&self->first, self->latest);
+    }
+    self->answered_us = now_us;
+    self->limited = self->limited || json_is_true(json_object_get(line, "limited"));
+    self->applied[0] = json_integer_value(json_object_get(line, "left_mm_s"));
+    self->applied[1] = json_integer_value(json_object_get(line, "right_mm_s"));
+    return END_NONE;
+}
+
+static end_t end_of(const drive_t *self, client_result_t result) {
+    if (result == CLIENT_INTERRUPTED) {
+        return END_SIGNAL;
+    }
+    if (result != CLIENT_OK && result != CLIENT_TIMEOUT) {
+        clear_progress(self);
+        (void)ctl_lost(self->ctl, result);
+        return END_LOST;
+    }
+    return END_NONE;
+}
+
+/// Sends the command until something ends it.
+static end_t run(drive_t *self) {
+    end_t end = END_NONE;
+    self->next_us = client_now_us();
+    self->answered_us = self->next_us;
+    while (end == END_NONE) {
+        const int64_t now_us = client_now_us();
+        const int64_t end_us = self->begin_us > 0 ? self->begin_us + (int64_t)self->words.time_ms * 1000 : INT64_MAX;
+        client_result_t result = CLIENT_OK;
+        json_t *line = NULL;
+        if (now_us >= end_us) {
+            return END_TIME;
+        }
+        if (now_us - self->answered_us > SILENT_US) {
+            return END_SILENT;
+        }
+        if (now_us >= self->next_us) {
+            result = send_drive(self, now_us);
+        }
+        if (result == CLIENT_OK) {
+            result = client_receive(&self->ctl->client, self->next_us < end_us ? self->next_us : end_us, &line);
+        }
+        end = line != NULL ? take_line(self, line, client_now_us()) : end_of(self, result);
+        json_decref(line);
+    }
+    return end;
+}
+
+static bool wheel_stands(const json_t *wheel) {
+    const json_t *applied = json_object_get(wheel, "applied_mm_s");
+    const bool zero = json_is_null(applied) || (json_is_integer(applied) && json_integer_value(applied) == 0);
+    return zero && json_is_true(json_object_get(wheel, "at_rest"));
+}
+
+static bool both_heard(const json_t *status) {
+    return json_is_true(json_object_get(json_object_get(status, "left"), "heard")) &&
+           json_is_true(json_object_get(json_object_get(status, "right"), "heard"));
+}
+
+static bool both_stand(const json_t *status) {
+    const char *state = text_word(status, "state");
+    return strcmp(state, "armed") != 0 && wheel_stands(json_object_get(status, "left")) &&
+           wheel_stands(json_object_get(status, "right"));
+}
+
+/// As ctl_ask, without printing the reply's line.
+static int ask_quietly(const drive_t *self, json_t *request, json_t **out_reply) {
+    const bool json = self->ctl->json;
+    self->ctl->json = false;
+    const int code = ctl_ask(self->ctl, request, out_reply);
+    self->ctl->json = json;
+    return code;
+}
+
+/// Waits until both wheels stand and the next drive would not be refused for this one. A further signal ends the wait.
+static int wait_for_rest(drive_t *self) {
+    const int64_t begin_us = client_now_us();
+    const int64_t fresh_us = self->sent_us + (self->lease_us > FRESH_US ? self->lease_us : FRESH_US);
+    for (;;) {
+        json_t *status = NULL;
+        json_t *event = NULL;
+        const int code = ask_quietly(self, json_pack("{s:s}", "cmd", "status"), &status);
+        if (code != CTL_OK) {
+            return code;
+        }
+        keep(&self->latest, status);
+        json_decref(status);
+        const int64_t now_us = client_now_us();
+        if (both_stand(self->latest) && now_us >= fresh_us) {
+            return CTL_OK;
+        }
+        if (!both_heard(self->latest) && now_us >= begin_us + UNHEARD_US) {
+            return ctl_fail(
+                CTL_NO, "stopped, but a wheel is not heard, so nobody knows whether it turns; see: iwheelctl status");
+        }
+        if (now_us >= begin_us + REST_US) {
+            return ctl_fail(CTL_TIMEOUT, "a wheel still turns 10 s after the stop; see: iwheelctl status");
+        }
+        while (client_receive(&self->ctl->client, now_us + POLL_US, &event) == CLIENT_OK) {
+            json_decref(event);
+        }
+        if (signals_count() != self->ctl->client.seen_signals) {
+            return ctl_fail(CTL_NO, "interrupted before both wheels were at rest; the gateway goes on stopping them");
+        }
+    }
+}
+
+/// Metres a wheel went between both snapshots.
+static void way_of(const drive_t *self, const char *side, char out[TEXT_CELL]) {
+    const json_t *from = json_object_get(json_object_get(self->first, side), "distance_mm");
+    const json_t *to = json_object_get(json_object_get(self->latest, side), "distance_mm");
+    json_t *way = json_is_integer(from) && json_is_integer(to)
+                      ? json_integer(json_integer_value(to) - json_integer_value(from))
+                      : json_null();
+    text_decimal(way, 3, "m", out);
+    json_decref(way);
+}
+
+static void sum_up(const drive_t *self, int64_t stop_us) {
+    char left[TEXT_CELL];
+    char right[TEXT_CELL];
+    way_of(self, "left", left);
+    way_of(self, "right", right);
+    (void)printf("drove %lld/%lld mm/s%s for %.1f s and stopped: left %s, right %s\n", self->applied[0],
+                 self->applied[1], self->limited ? " (limited)" : "", driven_s(self, stop_us), left, right);
+}
+
+/// A refusal in motion only tells what came of the stop; this tells what stopped the wheels.
+static void tell_why(const drive_t *self) {
+    json_t *reply = NULL;
+    if (ask_quietly(self, json_pack("{s:s}", "cmd", "why"), &reply) == CTL_OK) {
+        (void)ctl_fail(CTL_NO, "the last stop: %s", text_word(reply, "sentence"));
+    }
+    json_decref(reply);
+}
+
+/// How it ended, told once both wheels stand. The exit code.
+static int judge(const drive_t *self, end_t end, int64_t stop_us) {
+    if (!self->ctl->json) {
+        sum_up(self, stop_us);
+    }
+    if (end == END_REFUSED && self->begin_us > 0) {
+        tell_why(self);
+    }
+    if (end == END_SILENT) {
+        return ctl_fail(CTL_TIMEOUT, "the gateway did not answer a drive command for 1 s; see its log");
+    }
+    if (end == END_SIGNAL) {
+        return ctl_fail(CTL_NO, "interrupted after %.1f s of %.1f s", driven_s(self, stop_us),
+                        (double)self->words.time_ms / 1e3);
+    }
+    if (end == END_TIME && strcmp(text_word(self->latest, "state"), "latched") == 0) {
+        return ctl_fail(CTL_NO, "while stopping the gateway latched (%s); see: iwheelctl why",
+                        text_word(self->latest, "cause"));
+    }
+    return end == END_TIME ? CTL_OK : CTL_NO;
+}
+
+/// Stops, whatever happened before.
+static int finish(drive_t *self, end_t end) {
+    json_t *reply = NULL;
+    const int64_t stop_us = client_now_us();
+    self->ctl->client.seen_signals = signals_count();
+    clear_progress(self);
+    if (end == END_LOST) {
+        return ctl_fail(CTL_UNAVAILABLE,
+                        "the lease ended with the connection: the gateway, or else the wheels' own watchdog "
+                        "(1 s), stops them");
+    }
+    if (self->ctl->json && self->last_line[0] != '\0') {
+        (void)puts(self->last_line);
+    }
+    int code = ctl_ask(self->ctl, json_pack("{s:s}", "cmd", "stop"), &reply);
+    json_decref(reply);
+    code = code == CTL_OK ? wait_for_rest(self) : code;
+    return code == CTL_OK ? judge(self, end, stop_us) : code;
+}
+
+/// Subscribes to the wheels' state and arms. An exit code.
+static int arm(drive_t *self) {
+    json_t *reply = NULL;
+    size_t index = 0;
+    const json_t *warning = NULL;
+    int code =
+        ask_quietly(self, json_pack("{s:s,s:[s],s:i}", "cmd", "watch", "topics", "state", "rate_hz", 10), &reply);
+    json_decref(reply);
+    if (code == CTL_OK) {
+        code = ask_quietly(self, json_pack("{s:s}", "cmd", "status"), &self->latest);
+    }
+    if (code != CTL_OK) {
+        return code;
+    }
+    json_t *request = json_pack("{s:s,s:s}", "cmd", "arm", "name", "iwheelctl");
+    if (self->words.takeover) {
+        (void)json_object_set_new(request, "takeover", json_true());
+    }
+    code = ctl_ask(self->ctl, request, &reply);
+    json_array_foreach(json_object_get(reply, "warnings"), index, warning) {
+        (void)ctl_fail(CTL_OK, "warning: %s", json_is_string(warning) ? json_string_value(warning) : "--");
+    }
+    const json_int_t lease_ms = json_integer_value(json_object_get(reply, "lease_ms"));
+    self->lease_us = (lease_ms >= LEASE_MIN_MS && lease_ms <= LEASE_MAX_MS ? lease_ms : LEASE_MIN_MS) * 1000;
+    json_decref(reply);
+    return code;
+}
+
+int verb_drive(ctl_t *self, int count, char **words) {
+    char why[DRIVE_WHY_SIZE];
+    drive_t drive = {.ctl = self, .live = !self->json && isatty(STDOUT_FILENO) == 1};
+    if (!drive_words_parse(count, words, &drive.words, why)) {
+        return ctl_fail(CTL_USAGE, "%s", why);
+    }
+    signals_catch();
+    int code = arm(&drive);
+    if (code == CTL_OK) {
+        code = finish(&drive, run(&drive));
+    }
+    json_decref(drive.first);
+    json_decref(drive.latest);
+    return code;
+}

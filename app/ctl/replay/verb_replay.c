@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: MIT
+#include "recordings/config_option.h"
+#include "recordings/events.h"
+#include "recordings/recording.h"
+#include "replay.h"
+#include "replay_warm.h"
+#include "talk/ctl.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+/// A longer silence in a recording is cut to this.
+#define GAP_US     60000000U
+#define PATH_SIZE  1024U
+#define FRAMES_END ".log"
+
+typedef struct {
+    const char *path;
+    iw_config_t config;
+    bool configured;
+    recording_t recording;
+    events_t events;
+    replay_t replay;
+    // The next of each, not used yet.
+    candump_t frame;
+    bool has_frame;
+    blackbox_entry_t entry;
+    uint64_t entry_frames;
+    bool has_entry;
+    uint64_t fed; ///< Frames used.
+    int64_t wall_minus_us;
+    uint64_t cut_us; ///< By which later times are earlier.
+    iw_time_us_t group_us;
+    bool group; ///< Frames wait for their step.
+    uint64_t backwards;
+} verb_replay_t;
+
+/// FILE.log -> FILE + ending. False if it has another ending or is too long.
+static bool beside(const char *path, const char *ending, char out[PATH_SIZE]) {
+    const size_t length = strlen(path);
+    const size_t cut = sizeof FRAMES_END - 1U;
+    if (length <= cut || strcmp(path + length - cut, FRAMES_END) != 0) {
+        return false;
+    }
+    const int n = snprintf(out, PATH_SIZE, "%.*s%s", (int)(length - cut), path, ending);
+    return n > 0 && (size_t)n < PATH_SIZE;
+}
+
+static int parse_words(verb_replay_t *self, int count, char **words) {
+    for (int i = 0; i < count; i++) {
+        if (strcmp(words[i], "--config") == 0) {
+            const int code = config_option_load("replay", i + 1 < count ? words[++i] : NULL, &self->config);
+            if (code != CTL_OK) {
+                return code;
+            }
+            self->configured = true;
+        } else if ((words[i][0] == '-' && words[i][1] != '\0') || self->path != NULL) {
+            return ctl_fail(CTL_USAGE, "replay does not understand \"%s\"; see: iwheelctl replay --help", words[i]);
+        } else {
+            self->path = words[i];
+        }
+    }
+    return self->path != NULL ? CTL_OK : ctl_fail(CTL_USAGE, "replay wants a recording; see: iwheelctl replay --help");
+}
+
+/// The configuration that was in force lies beside the gateway's own recordings.
+static int find_config(verb_replay_t *self) {
+    char path[PATH_SIZE];
+    if (self->configured) {
+        return CTL_OK;
+    }
+    if (!beside(self->path, ".conf", path) || access(path, F_OK) != 0) {
+        return ctl_fail(CTL_USAGE, "%s: no configuration lies beside it; tell one: iwheelctl replay FILE --config FILE",
+                        self->path);
+    }
+    return config_option_load("replay", path, &self->config);
+}
+
+/// 0 also without such a file.
+static int find_events(verb_replay_t *self) {
+    static char path[PATH_SIZE];
+    if (!beside(self->path, ".jsonl", path) || access(path, F_OK) != 0) {
+        return CTL_OK;
+    }
+    if (!events_open(&self->events, path)) {
+        return errno == EPROTO ? CTL_DATA : ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
+    }
+    self->wall_minus_us = json_integer_value(json_object_get(self->events.head, "wall_minus_monotonic_us"));
+    return CTL_OK;
+}
+
+static void flush_group(verb_replay_t *self) {
+    if (self->group) {
+        self->group = false;
+        replay_step(&self->replay, self->group_us);
+    }
+}
+
+static bool peek_frame(verb_replay_t *self) {
+    self->has_frame = self->has_frame || recording_next(&self->recording, &self->frame);
+    return self->has_frame;
+}
+
+static bool peek_entry(verb_replay_t *self) {
+    self->has_entry = self->has_entry || events_next(&self->events, &self->entry, &self->entry_frames);
+    return self->has_entry;
+}
+
+static iw_time_us_t time_of(const verb_replay_t *self, const candump_t *frame) {
+    const int64_t at_us = frame->time_us - self->wall_minus_us - (int64_t)self->cut_us;
+    return at_us > 0 ? (iw_time_us_t)at_us : 0U;
+}
+
+/// The frame joins those of the same time; others step first.
+static void use_frame(verb_replay_t *self, iw_time_us_t at_us) {
+    const iw_can_frame_t core = candump_to_core(&self->frame);
+    if (self->group && at_us != self->group_us) {
+        flush_group(self);
+    }
+    if (!replay_frame(&self->replay, &core)) {
+        flush_group(self);
+        (void)replay_frame(&self->replay, &core);
+    }
+    self->group = true;
+    self->group_us = at_us;
+    self->has_frame = false;
+    self->fed++;
+}
+
+static void use_entry(verb_replay_t *self) {
+    const uint8_t kind = self->entry.kind;
+    self->has_entry = false;
+    if (kind == (uint8_t)BLACKBOX_NOT_SENT || kind == (uint8_t)BLACKBOX_PURGE) {
+        replay_event(&self->replay, &self->entry); // An answer within the step that is to come.
+        return;
+    }
+    flush_group(self);
+    if (self->entry.at_us < self->replay.now_us) {
+        self->entry.at_us = self->replay.now_us;
+    }
+    if (kind == (uint8_t)BLACKBOX_STEP) {
+        replay_step(&self->replay, self->entry.at_us);
+    } else if (kind == (uint8_t)BLACKBOX_START) {
+        replay_start(&self->replay, &self->config, &self->entry);
+    } else {
+        replay_event(&self->replay, &self->entry);
+    }
+}
+
+/// Goes to where the state is told and begins there.
+static void begin_within(verb_replay_t *self) {
+    while (peek_entry(self)) {
+        while (self->fed < self->entry_frames && peek_frame(self)) {
+            self->has_frame = false;
+            self->fed++;
+        }
+        if (self->entry.kind == (uint8_t)BLACKBOX_STATE || self->entry.kind == (uint8_t)BLACKBOX_START) {
+            break;
+        }
+        if (self->entry.kind == (uint8_t)BLACKBOX_ESTOP || self->entry.kind == (uint8_t)BLACKBOX_BUS) {
+            replay_event(&self->replay, &self->entry);
+        }
+        self->has_entry = false;
+    }
+    if (self->has_entry && self->entry.kind == (uint8_t)BLACKBOX_STATE) {
+        const bool reached = replay_warm(&self->replay, &self->config, &self->entry);
+        (void)printf(
+            "# begins while the gateway was running: its state %s; force offsets and assumptions of before are "
+            "unknown\n",
+            reached ? "is taken over" : "could not be taken over, so decisions differ");
+        self->has_entry = false;
+    }
+}
+
+static void name_things(verb_replay_t *self) {
+    const char *estop = json_string_value(json_object_get(self->events.head, "estop"));
+    const char *bus = json_string_value(json_object_get(self->events.head, "bus"));
+    self->replay.estop_name = estop != NULL ? estop : "line";
+    self->replay.bus_name = bus != NULL ? bus : "";
+}
+
+/// As it was: steps, requests and answers where they were.
+static void replay_exactly(verb_replay_t *self) {
+    (void)printf("# %s, with its requests and the port's answers; times in seconds from its first entry\n", self->path);
+    if (peek_entry(self)) {
+        replay_init(&self->replay, &self->config, self->entry.at_us, stdout);
+        name_things(self);
+        self->replay.compares = true;
+        if (self->entry.kind != (uint8_t)BLACKBOX_START) {
+            self->replay.quiet = true;
+            begin_within(self);
+            self->replay.quiet = false;
+        }
+    }
+    for (;;) {
+        const bool entry = peek_entry(self);
+        if (entry && (self->entry_frames <= self->fed || !peek_frame(self))) {
+            use_entry(self);
+        } else if (peek_frame(self)) {
+            use_frame(self, time_of(self, &self->frame));
+        } else {
+            break;
+        }
+    }
+    flush_group(self);
+}
+
+/// Steps as the core wishes until that time; a long silence is cut.
+static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
+    replay_t *replay = &self->replay;
+    if (at_us < replay->now_us) {
+        self->backwards++;
+        return replay->now_us;
+    }
+    if (at_us - replay->now_us > GAP_US) {
+        const iw_time_us_t cut_us = at_us - replay->now_us - GAP_US;
+        (void)printf("# nothing for %" PRIu64 " s; cut to %u s\n", (at_us - replay->now_us) / 1000000U,
+                     GAP_US / 1000000U);
+        self->cut_us += cut_us;
+        at_us -= cut_us;
+    }
+    while (replay->next_us < at_us) {
+        replay_step(replay, replay->next_us);
+    }
+    return at_us;
+}
+
+/// Frames are all there is: nobody asks for anything, the bus is up, the e-stop released.
+static void replay_frames(verb_replay_t *self) {
+    (void)printf(
+        "# %s, frames only: nobody arms. Setpoints marked T are the gateway's own, others another controller's\n",
+        self->path);
+    if (peek_frame(self)) {
+        replay_init(&self->replay, &self->config, time_of(self, &self->frame), stdout);
+    }
+    while (peek_frame(self)) {
+        iw_time_us_t at_us = time_of(self, &self->frame);
+        if (!self->group || at_us != self->group_us) {
+            flush_group(self);
+            at_us = pass_time(self, at_us);
+        }
+        use_frame(self, at_us);
+    }
+    flush_group(self);
+    if (self->backwards > 0U) {
+        (void)printf("# time goes back %" PRIu64 " times; those frames were taken as of then\n", self->backwards);
+    }
+}
+
+static int finish(verb_replay_t *self) {
+    const int code = recording_close(&self->recording);
+    if (self->fed > 0U) {
+        replay_finish(&self->replay);
+    }
+    if (self->events.lost > 0U || (self->events.file != NULL && !self->events.whole)) {
+        (void)printf("# the recording is not whole: %" PRIu64 " entries are missing%s\n", self->events.lost,
+                     self->events.whole ? "" : ", and so is its end");
+    }
+    const bool bad = self->events.bad > 0U;
+    events_close(&self->events);
+    return code == CTL_OK && bad ? CTL_DATA : code;
+}
+
+int verb_replay(ctl_t *self, int count, char **words) {
+    static verb_replay_t replay;
+    int code = parse_words(&replay, count, words);
+    (void)self;
+    code = code == CTL_OK ? recording_open(&replay.recording, replay.path) : code;
+    if (code != CTL_OK) {
+        return code;
+    }
+    code = find_config(&replay);
+    code = code == CTL_OK ? find_events(&replay) : code;
+    if (code != CTL_OK) {
+        return code;
+    }
+    if (replay.events.file != NULL) {
+        replay_exactly(&replay);
+    } else {
+        replay_frames(&replay);
+    }
+    return finish(&replay);
+}

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+#include "advice.h"
+
+#include "text/text.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+typedef struct {
+    const char *cause;
+    const char *cure;
+} cure_t;
+
+static const cure_t cures[] = {
+    {"estop_line", "release the e-stop button (or mend its wire)"},
+    {"estop_software", "see that nobody is in the way"},
+    {"wheel_lost", "switch the wheels on; check their cable and the termination"},
+    {"wheel_rebooted", "find out why a wheel lost power; wait until both are heard"},
+    {"send_stalled", "nobody takes our frames: check the wheels' power and the cable"},
+    {"bus_down", "bring the bus up (or start the simulator)"},
+    {"second_master", "switch off the other program or device that sends setpoints"},
+    {"feedback_sign", "check `invert` and the wheels' wiring before anything else"},
+    {"overspeed", "check the wheel: it ran faster than it was told"},
+    {"loop_hung", "the gateway did not get the processor; lighten the machine's load"},
+    {"internal", "a fault of the gateway itself: keep its log and report it"},
+    {"loop_late", "the gateway got the processor late; lighten the machine's load"},
+    {"wheel_blocked", "free the wheel, then arm again"},
+    {"lease_lost", "the client must send drive commands more often, or raise lease_ms"},
+};
+
+static const char *cure_of(const char *cause) {
+    for (size_t i = 0; i < sizeof(cures) / sizeof(cures[0]); i++) {
+        if (strcmp(cures[i].cause, cause) == 0) {
+            return cures[i].cure;
+        }
+    }
+    return NULL;
+}
+
+__attribute__((format(printf, 2, 3))) static void add(advice_t *self, const char *format, ...) {
+    va_list list;
+    if (self->lines < ADVICE_LINES) {
+        va_start(list, format);
+        (void)vsnprintf(self->line[self->lines], ADVICE_SIZE, format, list);
+        va_end(list);
+        self->lines++;
+    }
+}
+
+static bool is_unset(const json_t *status, const char *item) {
+    const json_t *entry = json_object_get(json_object_get(status, "ledger"), item);
+    return strcmp(text_word(entry, "evidence"), "none") == 0;
+}
+
+/// Contradictions that refuse arm: the gateway says so by how it tells the cost.
+static void add_contradictions(const json_t *status, advice_t *self) {
+    static const char refuses[] = "arm is refused; ";
+    const char *name = NULL;
+    json_t *entry = NULL;
+    json_object_foreach(json_object_get(status, "ledger"), name, entry) {
+        const char *cost = text_word(entry, "disabled");
+        if (strncmp(cost, refuses, sizeof(refuses) - 1U) == 0) {
+            add(self, "cannot arm, %.32s is contradicted: %.96s", name, cost + sizeof(refuses) - 1U);
+        }
+    }
+}
+
+static void add_present(const json_t *status, advice_t *self) {
+    size_t index = 0;
+    const json_t *present = NULL;
+    json_array_foreach(json_object_get(status, "present"), index, present) {
+        const char *cause = json_is_string(present) ? json_string_value(present) : "--";
+        const char *cure = cure_of(cause);
+        if (strcmp(cause, text_word(status, "cause")) != 0) {
+            add(self, "%s: %s", cause, cure != NULL ? cure : "see: iwheelctl why");
+        }
+    }
+}
+
+static void advise_listening(const json_t *status, advice_t *self) {
+    add_present(status, self);
+    if (json_is_true(json_object_get(status, "listen_only"))) {
+        add(self, "this gateway only listens; to drive, start it without --listen-only");
+        return;
+    }
+    if (is_unset(status, "setpoint_type")) {
+        add(self, "cannot arm: set setpoint_type under [wheels] in the configuration");
+    }
+    if (is_unset(status, "current_role")) {
+        add(self, "cannot arm: set current_role (limit or setpoint) under [wheels]");
+    }
+    add_contradictions(status, self);
+    if (self->lines == 0) {
+        add(self, "ready: iwheelctl drive LEFT RIGHT (mm/s) arms and MOVES the wheels");
+    }
+}
+
+void advice_collect(const json_t *status, advice_t *out_advice) {
+    const char *state = text_word(status, "state");
+    const char *cause = text_word(status, "cause");
+    memset(out_advice, 0, sizeof(*out_advice));
+    if (strcmp(state, "listening") == 0) {
+        advise_listening(status, out_advice);
+    } else if (strcmp(state, "armed") == 0) {
+        add(out_advice, "the wheels obey the holder of the lease; iwheelctl stop ends that");
+    } else if (strcmp(state, "stopping") == 0) {
+        const char *cure = cure_of(cause);
+        add(out_advice, "%s", cure != NULL ? cure : "wait until both wheels are at rest, then arm again");
+    } else if (strcmp(state, "latched") == 0) {
+        const char *cure = cure_of(cause);
+        add(out_advice, "%s, then: iwheelctl reset", cure != NULL ? cure : "remove the cause");
+        add_present(status, out_advice);
+    } else {
+        add(out_advice, "this gateway speaks of a state unknown here; use the iwheelctl of its version");
+    }
+}

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+#include "ctl.h"
+#include "find_socket.h"
+#include "text/text.h"
+
+#include <errno.h>
+#include <grp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#define START_HINT "is the gateway running? Start it (systemctl start iwheel-gateway), or give --socket PATH"
+
+int ctl_fail(int code, const char *format, ...) {
+    char text[2048];
+    va_list list;
+    va_start(list, format);
+    (void)vsnprintf(text, sizeof(text), format, list);
+    va_end(list);
+    (void)fputs("iwheelctl: ", stderr);
+    text_safe(text, stderr);
+    (void)fputc('\n', stderr);
+    return code;
+}
+
+bool ctl_words_at_most(const char *verb, int count, int most, char **words) {
+    if (count > most) {
+        (void)ctl_fail(CTL_USAGE, "%s does not understand \"%s\"; see: iwheelctl %s --help", verb, words[most], verb);
+        return false;
+    }
+    return true;
+}
+
+/// The path to use, in `found` if it was looked for; null after telling why there is none, with the exit code.
+static const char *choose_socket(const ctl_t *self, char *found, size_t size, int *out_code) {
+    const char *environment = getenv("IWHEEL_SOCKET");
+    if (self->socket != NULL) {
+        return self->socket;
+    }
+    if (environment != NULL && environment[0] != '\0') {
+        return environment;
+    }
+    switch (find_socket(FIND_SOCKET_DIRECTORY, found, size)) {
+    case FIND_SOCKET_ONE:
+        return found;
+    case FIND_SOCKET_SEVERAL:
+        *out_code = ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", found);
+        break;
+    case FIND_SOCKET_DENIED:
+        *out_code =
+            ctl_fail(CTL_PERMISSION, "%s may not be read by you; sudo usermod -aG iwheel $USER, then log in again",
+                     FIND_SOCKET_DIRECTORY);
+        break;
+    case FIND_SOCKET_NONE:
+        *out_code = ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", FIND_SOCKET_DIRECTORY, START_HINT);
+        break;
+    }
+    return NULL;
+}
+
+static int tell_denied(const char *path) {
+    struct stat status;
+    const struct group *group = stat(path, &status) == 0 ? getgrgid(status.st_gid) : NULL;
+    if (group == NULL) {
+        return ctl_fail(CTL_PERMISSION, "%s: permission denied; ask its owner, or use sudo", path);
+    }
+    return ctl_fail(CTL_PERMISSION,
+                    "%s: permission denied, it belongs to group %s; sudo usermod -aG %s $USER, then log in again", path,
+                    group->gr_name, group->gr_name);
+}
+
+static int tell_unopened(const char *path, int error) {
+    switch (error) {
+    case EACCES:
+    case EPERM:
+        return tell_denied(path);
+    case ENOENT:
+        return ctl_fail(CTL_UNAVAILABLE, "%s does not exist; %s", path, START_HINT);
+    case ECONNREFUSED:
+        return ctl_fail(CTL_UNAVAILABLE, "nobody answers on %s; %s", path, START_HINT);
+    case ETIMEDOUT:
+        return ctl_fail(CTL_TIMEOUT, "%s takes no connection for 2 s; the gateway hangs or is flooded, see its log",
+                        path);
+    case ENAMETOOLONG:
+        return ctl_fail(CTL_USAGE, "--socket %s is too long for a socket (107 characters); use a shorter path", path);
+    default:
+        return ctl_fail(CTL_UNAVAILABLE, "%s cannot be opened (%s); %s", path, strerror(error), START_HINT);
+    }
+}
+
+int ctl_lost(const ctl_t *self, client_result_t result) {
+    (void)self;
+    switch (result) {
+    case CLIENT_TIMEOUT:
+        return ctl_fail(CTL_TIMEOUT, "no answer within 2 s; the gateway hangs or this is not its socket, see its log");
+    case CLIENT_CLOSED:
+        return ctl_fail(CTL_UNAVAILABLE, "the gateway ended the connection; see its log, or: iwheelctl status");
+    case CLIENT_GARBLED:
+        return ctl_fail(CTL_INTERNAL,
+                        "not the gateway's language on this socket; check --socket, or versions that differ");
+    case CLIENT_INTERRUPTED:
+        return ctl_fail(CTL_NO, "interrupted");
+    case CLIENT_OK:
+        break;
+    }
+    return CTL_OK;
+}
+
+int ctl_refused(const json_t *reply) {
+    const char *error = json_string_value(json_object_get(reply, "error"));
+    const char *message = json_string_value(json_object_get(reply, "message"));
+    return ctl_fail(CTL_NO, "refused (%s): %s", error != NULL ? error : "no reason given",
+                    message != NULL ? message : "no message");
+}
+
+/// The first line tells who is there: the event hello, or the refusal of one client too many.
+static int greet(ctl_t *self) {
+    json_t *line = NULL;
+    const client_result_t result = client_receive(&self->client, client_now_us() + CLIENT_REPLY_US, &line);
+    if (result != CLIENT_OK) {
+        return ctl_lost(self, result);
+    }
+    const char *event = json_string_value(json_object_get(line, "event"));
+    int code = CTL_OK;
+    if (json_is_false(json_object_get(line, "ok"))) {
+        code = ctl_refused(line);
+    } else if (event == NULL || strcmp(event, "hello") != 0) {
+        code = ctl_lost(self, CLIENT_GARBLED);
+    }
+    json_decref(line);
+    return code;
+}
+
+int ctl_connect(ctl_t *self) {
+    char found[512];
+    int code = CTL_OK;
+    const char *path = choose_socket(self, found, sizeof(found), &code);
+    if (path == NULL) {
+        return code;
+    }
+    const int error = client_open(&self->client, path, client_now_us() + CLIENT_REPLY_US);
+    return error != 0 ? tell_unopened(path, error) : greet(self);
+}
+
+int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
+    int64_t id = 0;
+    const int64_t deadline_us = client_now_us() + CLIENT_REPLY_US;
+    *out_reply = NULL;
+    const int code = self->client.socket < 0 ? ctl_connect(self) : CTL_OK;
+    if (code != CTL_OK) {
+        json_decref(request);
+        return code;
+    }
+    client_result_t result = client_send(&self->client, request, deadline_us, &id);
+    if (result == CLIENT_OK) {
+        result = client_wait(&self->client, id, deadline_us, out_reply);
+    }
+    if (result != CLIENT_OK) {
+        return ctl_lost(self, result);
+    }
+    if (self->json) {
+        (void)puts(self->client.line);
+    }
+    if (json_is_true(json_object_get(*out_reply, "ok"))) {
+        return CTL_OK;
+    }
+    const int refused = self->json ? CTL_NO : ctl_refused(*out_reply);
+    json_decref(*out_reply);
+    *out_reply = NULL;
+    return refused;
+}

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+// Stands for `top` where ncurses was missing when this was built.
+#include "talk/ctl.h"
+
+int verb_top(ctl_t *self, int count, char **words) {
+    (void)self;
+    (void)count;
+    (void)words;
+    return ctl_fail(CTL_UNAVAILABLE, "ncurses was missing when this was built, so there is no top; apt-get install "
+                                     "libncurses-dev, configure and build again; until then: iwheelctl status");
+}

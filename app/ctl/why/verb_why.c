@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+#include "talk/ctl.h"
+#include "talk/near.h"
+#include "text/text.h"
+#include "why_disk.h"
+#include "why_print.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/// Frames shown on either side if nobody says how many.
+#define FRAMES_USUAL 12U
+
+typedef struct {
+    const char *directory; ///< NULL: not told.
+    const char *name;      ///< Of a recording; NULL: none.
+    size_t frames;
+    bool list;
+} words_t;
+
+static int parse_frames(const char *text, size_t *out) {
+    char *end = NULL;
+    const unsigned long number = text != NULL && text[0] >= '0' && text[0] <= '9' ? strtoul(text, &end, 10) : 0UL;
+    if (end == NULL || *end != '\0' || number > WHY_FRAMES_MAX) {
+        return ctl_fail(CTL_USAGE, "--frames wants a number of frames before and after the stop, 0 to %u",
+                        WHY_FRAMES_MAX);
+    }
+    *out = number;
+    return CTL_OK;
+}
+
+/// A number, or the path of a file.
+static bool names_recording(const char *word) {
+    return word[0] != '-' && (strspn(word, "0123456789") == strlen(word) || strpbrk(word, "./") != NULL);
+}
+
+static int parse(words_t *self, int count, char **words) {
+    for (int i = 0; i < count; i++) {
+        const char *next = i + 1 < count ? words[i + 1] : NULL;
+        int code = CTL_OK;
+        if (strcmp(words[i], "--list") == 0) {
+            self->list = true;
+        } else if (strcmp(words[i], "--frames") == 0) {
+            code = parse_frames(next, &self->frames);
+            i++;
+        } else if (strcmp(words[i], "--directory") == 0 && i + 1 < count) {
+            self->directory = next;
+            i++;
+        } else if (!names_recording(words[i]) || self->name != NULL) {
+            code = ctl_fail(CTL_USAGE, "why does not understand \"%s\"; see: iwheelctl why --help", words[i]);
+        } else {
+            self->name = words[i];
+        }
+        if (code != CTL_OK) {
+            return code;
+        }
+    }
+    return CTL_OK;
+}
+
+static void print_recording(const json_t *reply) {
+    const char *path = json_string_value(json_object_get(reply, "recording"));
+    const char *error = json_string_value(json_object_get(reply, "recording_error"));
+    if (path != NULL) {
+        (void)printf("recorded in %s; decide it again: iwheelctl replay %s\n", path, path);
+    } else if (error != NULL) {
+        (void)printf("not recorded on disk: %s; the gateway's log tells the cure\n", error);
+    }
+}
+
+static int ask(ctl_t *self, size_t frames) {
+    json_t *reply = NULL;
+    const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "why"), &reply);
+    if (code == CTL_OK && !self->json && why_print_stop(reply)) {
+        print_recording(reply);
+        why_print_told(reply, frames);
+    }
+    json_decref(reply);
+    return code;
+}
+
+/// Where the gateway records: it knows best, if it is there.
+static const char *find_directory(ctl_t *self, const words_t *words, json_t **out_owner) {
+    if (words->directory != NULL) {
+        return words->directory;
+    }
+    near_gateway_t gateway = {0};
+    near_look(self, NULL, &gateway);
+    json_decref(gateway.status);
+    *out_owner = gateway.result == NEAR_FOUND ? near_ask(self, json_pack("{s:s}", "cmd", "why")) : NULL;
+    const char *told = json_string_value(json_object_get(*out_owner, "directory"));
+    return told != NULL ? told : WHY_DISK_DIRECTORY;
+}
+
+int verb_why(ctl_t *self, int count, char **words) {
+    words_t parsed = {.frames = FRAMES_USUAL};
+    json_t *owner = NULL;
+    int code = parse(&parsed, count, words);
+    if (code != CTL_OK) {
+        return code;
+    }
+    if (!parsed.list && parsed.name == NULL) {
+        return ask(self, parsed.frames);
+    }
+    const char *directory = find_directory(self, &parsed, &owner);
+    code = parsed.list ? why_disk_list(directory, self->json)
+                       : why_disk_show(directory, parsed.name, parsed.frames, self->json);
+    json_decref(owner);
+    return code;
+}
