@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "answers/service.h"
 #include "bus/bus_facts.h"
+#include "json/json_arena.h"
 #include "loop.h"
 #include "start/options.h"
 #include "start/report.h"
 #include "status/observe.h"
-#include "json/json_arena.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What is kept from one run to the next: the text, everything that is wrong with a text, and the process that keeps it.
+#include "json/json_arena.h"
 #include "ledger/keeper.h"
 #include "ledger/memory.h"
-#include "json/json_arena.h"
 
 #include "unity.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A connection of the northbound socket (bytes in, lines out), the JSON writer, and the sentence of `why`.
 #include "clients/client.h"
-#include "why.h"
 #include "json/json_out.h"
+#include "why.h"
 
 #include "unity.h"
 

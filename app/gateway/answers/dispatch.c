@@ -3,6 +3,7 @@
 
 #include "assumption.h"
 #include "box/record.h"
+#include "ledger/knowledge_json.h"
 #include "refuse.h"
 #include "status/observe.h"
 #include "status/snapshot.h"
@@ -314,7 +315,7 @@ static void do_tare(const call_t *call) {
 static void reply_item(const call_t *call) {
     json_out_t json = begin_reply(call->daemon, &call->request->id);
     json_out_text(&json, "item", gw_ledger_item_name(call->request->item));
-    gw_snapshot_write_item(call->daemon, call->request->item, &json);
+    gw_knowledge_write_item(call->daemon, call->request->item, &json);
     send_reply(call->client, &json);
 }
 

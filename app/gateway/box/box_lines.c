@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "box_lines.h"
 
-#include "names.h"
 #include "json/json_out.h"
+#include "names.h"
 
 #define FORMAT_VERSION 1
 

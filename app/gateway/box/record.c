@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "record.h"
 
+#include "json/json_frame.h"
 #include "names.h"
-#include "status/snapshot.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -115,7 +115,7 @@ static void write_frames(json_out_t *json, const char *name, const blackbox_entr
         iw_can_frame_t frame = {.id = frames[i].number, .dlc = frames[i].a, .kind = frames[i].b};
         (void)memcpy(frame.data, frames[i].as.data, sizeof frame.data);
         json_out_open(json, NULL, '{');
-        gw_snapshot_write_frame(&frame, frames[i].at_us, json);
+        json_frame_write(&frame, frames[i].at_us, json);
         json_out_close(json, '}');
     }
     json_out_close(json, ']');

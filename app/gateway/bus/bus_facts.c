@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "bus_facts.h"
 
-#include "start/report.h"
+#include <stdarg.h>
 
 static iw_timing_t judge(const gw_daemon_t *daemon) {
     return iw_timing_judge(iw_linux_hal_link(&daemon->hal), daemon->config.bus.bitrate,
@@ -45,6 +45,40 @@ static void log_purge(gw_daemon_t *daemon, iw_link_purge_t purge) {
     }
 }
 
+__attribute__((format(printf, 2, 3))) static void warn(gw_daemon_t *daemon, const char *format, ...) {
+    if (daemon->warnings < GW_WARNINGS) {
+        va_list arguments;
+        va_start(arguments, format);
+        (void)vsnprintf(daemon->warning[daemon->warnings], GW_WARNING_SIZE, format, arguments);
+        va_end(arguments);
+        ++daemon->warnings;
+    }
+}
+
+/// What is wrong enough to be said at start, in `status` and with every arm.
+static void note_warnings(gw_daemon_t *daemon) {
+    const iw_linux_hal_t *hal = &daemon->hal;
+    daemon->warnings = 0;
+    if (!hal->estop_ops->present) {
+        warn(daemon, "there is no e-stop line: only software and the wheels' own 1 s watchdog can stop the wheels; "
+                     "configure [estop] line");
+    } else if (hal->estop_ops->simulated) {
+        warn(daemon, "the e-stop %s is SIMULATED: no button of this machine stops the wheels",
+             daemon->config.estop.line);
+    }
+    inspect_findings_t findings;
+    inspect_begin(&findings);
+    const inspect_wish_t wish = gw_bus_facts_wish(daemon);
+    inspect_link(iw_linux_hal_link(hal), &wish, &findings);
+    for (unsigned i = 0; i < findings.count; ++i) {
+        if (findings.finding[i].verdict != INSPECT_OK) {
+            char sentence[GW_WARNING_SIZE];
+            inspect_sentence(&findings.finding[i], sentence, sizeof sentence);
+            warn(daemon, "%s", sentence);
+        }
+    }
+}
+
 void gw_bus_facts_follow(gw_daemon_t *daemon) {
     const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
     if (daemon->link_known && link->changes == daemon->link_changes) {
@@ -55,13 +89,8 @@ void gw_bus_facts_follow(gw_daemon_t *daemon) {
     daemon->link_changes = link->changes;
     iw_gateway_bus_facts(&daemon->gateway, &facts);
     gw_tape_facts(&daemon->tape, daemon->now_us, &facts);
-    gw_report_warnings(daemon);
+    note_warnings(daemon);
     log_purge(daemon, link->purge);
-}
-
-void gw_bus_facts_judge(const gw_daemon_t *daemon, inspect_findings_t *findings) {
-    const inspect_wish_t wish = gw_bus_facts_wish(daemon);
-    inspect_link(iw_linux_hal_link(&daemon->hal), &wish, findings);
 }
 
 inspect_wish_t gw_bus_facts_wish(const gw_daemon_t *daemon) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What the kernel reports of the bus, put to the core, into the warnings and into `--check`.
+/// What the kernel reports of the bus, put to the core and into the daemon's warnings.
 #ifndef GATEWAY_BUS_FACTS_H
 #define GATEWAY_BUS_FACTS_H
 
@@ -14,8 +14,5 @@ const char *gw_bus_facts_timing(const gw_daemon_t *daemon);
 
 /// What the configuration wants the bus to be.
 inspect_wish_t gw_bus_facts_wish(const gw_daemon_t *daemon);
-
-/// What is to be said of the link, each with the command that mends it.
-void gw_bus_facts_judge(const gw_daemon_t *daemon, inspect_findings_t *findings);
 
 #endif

@@ -251,16 +251,3 @@ void gw_knowledge_close(gw_knowledge_t *self, const char *bus) {
     }
     gw_keeper_close(&self->keeper);
 }
-
-void gw_knowledge_write_memory(const gw_knowledge_t *self, json_out_t *json) {
-    static const char *const names[] = {
-        [GW_MEMORY_LOADING] = "loading", [GW_MEMORY_NEW] = "new",       [GW_MEMORY_KEPT] = "kept",
-        [GW_MEMORY_IGNORED] = "ignored", [GW_MEMORY_FAILED] = "failed",
-    };
-    json_out_text(json, "file", self->path);
-    json_out_text(json, "state", names[self->state]);
-    json_out_text(json, "reason",
-                  self->state == GW_MEMORY_IGNORED  ? self->reason
-                  : self->state == GW_MEMORY_FAILED ? strerror(self->error)
-                                                    : NULL);
-}

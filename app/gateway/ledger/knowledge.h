@@ -11,7 +11,6 @@
 #include "gateway_config.h"
 #include "keeper.h"
 #include "memory.h"
-#include "json/json_out.h"
 
 #include "iwheel/gateway.h"
 
@@ -74,8 +73,5 @@ iw_tare_t gw_knowledge_tare(struct gw_daemon *daemon, iw_side_t side);
 
 /// Hands over the rest. The keeper ends when it is on the disk.
 void gw_knowledge_close(gw_knowledge_t *self, const char *bus);
-
-/// File, state and reason, into an object that is open.
-void gw_knowledge_write_memory(const gw_knowledge_t *self, json_out_t *json);
 
 #endif

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge_told.h"
 
+#include "clients/event.h"
+#include "knowledge_json.h"
 #include "names.h"
-#include "status/observe.h"
-#include "status/snapshot.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,11 +26,11 @@ void gw_knowledge_tell_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
     gw_log(&daemon->log, bad ? GW_LOG_WARNING : GW_LOG_INFO, "assumption %s = %s is %s by the %s: %s%s%s",
            gw_ledger_item_name(item), value, gw_ledger_state_name(entry->state), gw_evidence_name(entry->evidence),
            evidence, bad ? "; disabled: " : "", bad ? gw_assumption_cost(item) : "");
-    json_out_t json = gw_observe_begin_event(daemon, "ledger");
+    json_out_t json = gw_event_begin(daemon, "ledger");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "item", gw_ledger_item_name(item));
-    gw_snapshot_write_item(daemon, item, &json);
-    gw_observe_send_event(daemon, &json, GW_TOPIC_STATE);
+    gw_knowledge_write_item(daemon, item, &json);
+    gw_event_send(daemon, &json, GW_TOPIC_STATE);
 }
 
 /// "12.300 N, stored (wheel)", or "none".
@@ -57,14 +57,14 @@ void gw_knowledge_tell_offset(gw_daemon_t *daemon, iw_side_t side, const gw_told
     describe(before, was, sizeof was);
     gw_log(&daemon->log, moved ? GW_LOG_WARNING : GW_LOG_INFO, "%s force offset: %s; before: %s", side_name(side), is,
            was);
-    json_out_t json = gw_observe_begin_event(daemon, "offset");
+    json_out_t json = gw_event_begin(daemon, "offset");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "side", side_name(side));
     json_out_known(&json, "offset_mN", known, now->offset_mN);
     json_out_text(&json, "provenance", gw_offset_word(now->provenance, now->offset_us));
     json_out_known(&json, "before_mN", knew, before->offset_mN);
     json_out_text(&json, "before_provenance", gw_offset_word(before->provenance, before->offset_us));
-    gw_observe_send_event(daemon, &json, GW_TOPIC_FORCE);
+    gw_event_send(daemon, &json, GW_TOPIC_FORCE);
 }
 
 void gw_knowledge_tell_memory(gw_daemon_t *daemon) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "memory.h"
 
-#include "names.h"
 #include "json/json_arena.h"
 #include "json/json_out.h"
+#include "names.h"
 
 #include <ctype.h>
 #include <inttypes.h>

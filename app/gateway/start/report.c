@@ -1,42 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
-#include "bus/bus_facts.h"
+#include "inspect.h"
 
 #include <inttypes.h>
-#include <stdarg.h>
-
-__attribute__((format(printf, 2, 3))) static void warn(gw_daemon_t *daemon, const char *format, ...) {
-    if (daemon->warnings < GW_WARNINGS) {
-        va_list arguments;
-        va_start(arguments, format);
-        (void)vsnprintf(daemon->warning[daemon->warnings], GW_WARNING_SIZE, format, arguments);
-        va_end(arguments);
-        ++daemon->warnings;
-    }
-}
-
-void gw_report_warnings(gw_daemon_t *daemon) {
-    const iw_linux_hal_t *hal = &daemon->hal;
-    daemon->warnings = 0;
-    if (!hal->estop_ops->present) {
-        warn(daemon, "there is no e-stop line: only software and the wheels' own 1 s watchdog can stop the wheels; "
-                     "configure [estop] line");
-    } else if (hal->estop_ops->simulated) {
-        warn(daemon, "the e-stop %s is SIMULATED: no button of this machine stops the wheels",
-             daemon->config.estop.line);
-    }
-    inspect_findings_t findings;
-    inspect_begin(&findings);
-    gw_bus_facts_judge(daemon, &findings);
-    for (unsigned i = 0; i < findings.count; ++i) {
-        if (findings.finding[i].verdict != INSPECT_OK) {
-            char sentence[GW_WARNING_SIZE];
-            inspect_sentence(&findings.finding[i], sentence, sizeof sentence);
-            warn(daemon, "%s", sentence);
-        }
-    }
-}
 
 void gw_report_start(gw_daemon_t *daemon) {
     const gateway_config_t *config = &daemon->config;

@@ -5,9 +5,6 @@
 
 #include "daemon.h"
 
-/// Fills the daemon's warnings: what is wrong enough to be said at start, in `status` and with every arm.
-void gw_report_warnings(gw_daemon_t *daemon);
-
 /// Version, bus, e-stop, stop budget, what was never verified, warnings: to the log.
 void gw_report_start(gw_daemon_t *daemon);
 

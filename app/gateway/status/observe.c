@@ -2,7 +2,9 @@
 #include "observe.h"
 
 #include "box/record.h"
+#include "clients/event.h"
 #include "inspect.h"
+#include "json/json_frame.h"
 #include "snapshot.h"
 
 #include "iwheel_linux/clock.h"
@@ -14,29 +16,10 @@
 
 IW_STATIC_ASSERT(GW_CLIENTS_MAX <= 64U, a_bit_per_client);
 
-json_out_t gw_observe_begin_event(gw_daemon_t *daemon, const char *name) {
-    json_out_t json;
-    json_out_init(&json, daemon->line, sizeof daemon->line);
-    json_out_open(&json, NULL, '{');
-    json_out_text(&json, "event", name);
-    return json;
-}
-
-void gw_observe_send_event(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic) {
-    json_out_close(json, '}');
-    const size_t length = json_out_finish(json);
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX && length > 0U; ++i) {
-        gw_client_t *client = &daemon->client[i];
-        if (client->id != IW_CLIENT_NONE && (client->topics & (1U << topic)) != 0U) {
-            gw_client_event(client, json->data, length);
-        }
-    }
-}
-
 static void tell_state(gw_daemon_t *daemon) {
-    json_out_t json = gw_observe_begin_event(daemon, "state");
+    json_out_t json = gw_event_begin(daemon, "state");
     gw_snapshot_write(daemon, &json);
-    gw_observe_send_event(daemon, &json, GW_TOPIC_STATE);
+    gw_event_send(daemon, &json, GW_TOPIC_STATE);
 }
 
 static void observe_state(gw_daemon_t *daemon, bool first) {
@@ -85,10 +68,10 @@ static void observe_stop(gw_daemon_t *daemon) {
     gw_why_sentence(&note->stop, &context, note->sentence, sizeof note->sentence);
     gw_log(&daemon->log, GW_LOG_WARNING, "stop %u: %s", (unsigned)stop->number, note->sentence);
     gw_record_stop(daemon);
-    json_out_t json = gw_observe_begin_event(daemon, "stop");
+    json_out_t json = gw_event_begin(daemon, "stop");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     gw_snapshot_write_stop(daemon, &json);
-    gw_observe_send_event(daemon, &json, GW_TOPIC_STOP);
+    gw_event_send(daemon, &json, GW_TOPIC_STOP);
 }
 
 static void observe_lease(gw_daemon_t *daemon) {
@@ -108,13 +91,13 @@ static void observe_lease(gw_daemon_t *daemon) {
     }
     gw_log(&daemon->log, GW_LOG_INFO, "lease %s: %s", change,
            holder == IW_CLIENT_NONE ? "nobody" : observed->holder_text);
-    json_out_t json = gw_observe_begin_event(daemon, "lease");
+    json_out_t json = gw_event_begin(daemon, "lease");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "change", change);
     json_out_known(&json, "holder", holder != IW_CLIENT_NONE, holder);
     json_out_text(&json, "name", client != NULL && client->name[0] != '\0' ? client->name : NULL);
     json_out_known(&json, "former", former != IW_CLIENT_NONE, former);
-    gw_observe_send_event(daemon, &json, GW_TOPIC_LEASE);
+    gw_event_send(daemon, &json, GW_TOPIC_LEASE);
 }
 
 static void observe_bus(gw_daemon_t *daemon, bool first) {
@@ -125,10 +108,10 @@ static void observe_bus(gw_daemon_t *daemon, bool first) {
     daemon->observed.bus = bus;
     gw_log(&daemon->log, bus == IW_BUS_ACTIVE ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s",
            daemon->config.bus.interface, gw_bus_state_name(bus));
-    json_out_t json = gw_observe_begin_event(daemon, "bus");
+    json_out_t json = gw_event_begin(daemon, "bus");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "state", gw_bus_state_name(bus));
-    gw_observe_send_event(daemon, &json, GW_TOPIC_BUS);
+    gw_event_send(daemon, &json, GW_TOPIC_BUS);
 }
 
 static void observe_estop(gw_daemon_t *daemon, bool first) {
@@ -141,19 +124,19 @@ static void observe_estop(gw_daemon_t *daemon, bool first) {
     const char *trouble = inspect_estop_trouble(&daemon->hal);
     gw_log(&daemon->log, answer == 0 ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s", daemon->config.estop.line,
            name, trouble[0] == '\0' ? "" : ": ", trouble);
-    json_out_t json = gw_observe_begin_event(daemon, "estop");
+    json_out_t json = gw_event_begin(daemon, "estop");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "state", name);
-    gw_observe_send_event(daemon, &json, GW_TOPIC_ESTOP);
+    gw_event_send(daemon, &json, GW_TOPIC_ESTOP);
 }
 
 static void tell_fault(gw_daemon_t *daemon, const char *cause, bool present) {
     gw_log(&daemon->log, present ? GW_LOG_WARNING : GW_LOG_INFO, "%s: %s", present ? "fault" : "fault gone", cause);
-    json_out_t json = gw_observe_begin_event(daemon, "fault");
+    json_out_t json = gw_event_begin(daemon, "fault");
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_text(&json, "cause", cause);
     json_out_bool(&json, "present", present);
-    gw_observe_send_event(daemon, &json, GW_TOPIC_STOP);
+    gw_event_send(daemon, &json, GW_TOPIC_STOP);
 }
 
 /// While armed or stopping a cause makes a stop, which is told as such; here are the others.
@@ -201,7 +184,7 @@ static void send_periodic(gw_daemon_t *daemon, gw_topic_t topic, uint64_t due) {
             continue;
         }
         if (length == 0U) {
-            json_out_t json = gw_observe_begin_event(daemon, gw_topic_name(topic));
+            json_out_t json = gw_event_begin(daemon, gw_topic_name(topic));
             if (topic == GW_TOPIC_STATE) {
                 gw_snapshot_write(daemon, &json);
             } else {
@@ -262,9 +245,9 @@ void gw_observe_tap(void *context, const iw_can_frame_t *frame) {
 }
 
 static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
-    json_out_t json = gw_observe_begin_event(daemon, "frame");
-    gw_snapshot_write_frame(&tapped->frame, tapped->at_us, &json);
-    gw_observe_send_event(daemon, &json, GW_TOPIC_FRAME);
+    json_out_t json = gw_event_begin(daemon, "frame");
+    json_frame_write(&tapped->frame, tapped->at_us, &json);
+    gw_event_send(daemon, &json, GW_TOPIC_FRAME);
 }
 
 void gw_observe_frames(gw_daemon_t *daemon) {
@@ -286,7 +269,7 @@ void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client
 }
 
 void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client) {
-    json_out_t json = gw_observe_begin_event(daemon, "hello");
+    json_out_t json = gw_event_begin(daemon, "hello");
     gw_observe_write_hello(daemon, client, &json);
     json_out_int(&json, "t_us", (int64_t)daemon->now_us);
     json_out_close(&json, '}');

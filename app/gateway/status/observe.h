@@ -29,8 +29,4 @@ void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client);
 /// Name, version and so on, into an object that is open: event and reply of `hello`.
 void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, json_out_t *json);
 
-/// An event of other parts: begun in the daemon's line buffer, with its name; closed and sent to the topic's watchers.
-json_out_t gw_observe_begin_event(gw_daemon_t *daemon, const char *name);
-void gw_observe_send_event(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic);
-
 #endif

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "snapshot.h"
 
-#include "assumption.h"
 #include "bus/bus_facts.h"
+#include "ledger/knowledge_json.h"
 
 #include "iwheel_linux/clock.h"
 
 #include <stdio.h>
 #include <string.h>
-
-#define EXTENDED_ID_MASK 0x1FFFFFFFU
 
 void gw_snapshot_write_age(json_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us) {
     const bool known = then_us != IW_NEVER && then_us <= now_us;
@@ -147,40 +145,6 @@ static void write_surroundings(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_close(json, '}');
 }
 
-void gw_snapshot_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, json_out_t *json) {
-    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
-    const gw_known_item_t *known = &daemon->knowledge.known.item[item];
-    const bool noted = entry->state != IW_LEDGER_ASSUMED && known->entry.state == entry->state;
-    char value[GW_VALUE_SIZE];
-    char reason[GW_EVIDENCE_SIZE];
-    gw_assumption_value(&daemon->gateway.config, item, value);
-    gw_assumption_evidence(item, entry, known->found, reason);
-    json_out_text(json, "state", gw_ledger_state_name(entry->state));
-    json_out_text(json, "evidence", gw_evidence_name(entry->evidence));
-    json_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
-    json_out_text(json, "value", value[0] != '\0' ? value : NULL);
-    json_out_text(json, "found", noted && known->found[0] != '\0' ? known->found : NULL);
-    json_out_known(json, "since_wall_us", noted, known->since_wall_us);
-    json_out_text(json, "reason", reason);
-    json_out_text(json, "disabled", entry->state == IW_LEDGER_CONTRADICTED ? gw_assumption_cost(item) : NULL);
-}
-
-static void write_ledger(const gw_daemon_t *daemon, json_out_t *json) {
-    json_out_open(json, "ledger", '{');
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
-        json_out_open(json, gw_ledger_item_name((iw_ledger_item_t)item), '{');
-        gw_snapshot_write_item(daemon, (iw_ledger_item_t)item, json);
-        json_out_close(json, '}');
-    }
-    json_out_close(json, '}');
-}
-
-static void write_memory(const gw_daemon_t *daemon, json_out_t *json) {
-    json_out_open(json, "memory", '{');
-    gw_knowledge_write_memory(&daemon->knowledge, json);
-    json_out_close(json, '}');
-}
-
 static void write_gaps(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_open(json, "gaps", '{');
     gw_gaps_write(&daemon->gaps, json);
@@ -245,8 +209,7 @@ void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json) {
     write_wheel(daemon, IW_LEFT, json);
     write_wheel(daemon, IW_RIGHT, json);
     write_pose(daemon, json);
-    write_ledger(daemon, json);
-    write_memory(daemon, json);
+    gw_knowledge_write(daemon, json);
     write_gaps(daemon, json);
     write_budget(daemon, json);
     write_counters(daemon, json);
@@ -278,28 +241,4 @@ void gw_snapshot_write_stop(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_known(json, "wall_us", any, note->wall_us);
     gw_snapshot_write_age(json, "age_ms", daemon->now_us, any ? stop->at_us : IW_NEVER);
     json_out_text(json, "sentence", note->sentence);
-}
-
-void gw_snapshot_write_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, json_out_t *json) {
-    const bool extended = (frame->id & IW_CAN_EXTENDED) != 0U;
-    char data[2U * IW_CAN_DATA_MAX + 1U] = "";
-    for (size_t i = 0; i < frame->dlc && i < IW_CAN_DATA_MAX; ++i) {
-        (void)snprintf(&data[2U * i], 3U, "%02X", frame->data[i]);
-    }
-    json_out_int(json, "t_us", (int64_t)at_us);
-    json_out_int(json, "id", frame->id & (extended ? EXTENDED_ID_MASK : IW_CAN_ID_MASK));
-    json_out_int(json, "dlc", frame->dlc);
-    json_out_text(json, "data", data);
-    json_out_text(json, "kind", frame->kind == (uint8_t)IW_CAN_ECHO ? "echo" : "received");
-    json_out_open(json, "flags", '[');
-    if (extended) {
-        json_out_text(json, NULL, "extended");
-    }
-    if ((frame->id & IW_CAN_REMOTE) != 0U) {
-        json_out_text(json, NULL, "remote");
-    }
-    if (!extended && (frame->id & IW_CAN_FD) != 0U) {
-        json_out_text(json, NULL, "fd");
-    }
-    json_out_close(json, ']');
 }

@@ -30,12 +30,6 @@ bool gw_snapshot_is_fresh(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_
 /// The last stop, for `why` and the event `stop`.
 void gw_snapshot_write_stop(const gw_daemon_t *daemon, json_out_t *json);
 
-/// One item of the ledger: its state and what it rests on.
-void gw_snapshot_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, json_out_t *json);
-
-/// A frame, for `why` and the event `frame`.
-void gw_snapshot_write_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, json_out_t *json);
-
 /// A list of the names of the causes whose bits are set.
 void gw_snapshot_write_causes(json_out_t *json, const char *name, uint32_t causes);
 

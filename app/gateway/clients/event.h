@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+/// An event to all who watch its topic.
+#ifndef GATEWAY_EVENT_H
+#define GATEWAY_EVENT_H
+
+#include "daemon.h"
+#include "json/json_out.h"
+
+/// Begun in the daemon's line buffer, with its name. One at a time.
+json_out_t gw_event_begin(gw_daemon_t *daemon, const char *name);
+
+/// Closed and sent. Whoever reads too slowly loses it; one that does not fit the buffer is sent to nobody.
+void gw_event_send(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic);
+
+#endif

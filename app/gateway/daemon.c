@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+#include "daemon.h"
+
+gw_client_t *gw_daemon_client(gw_daemon_t *self, iw_client_t id) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX && id != IW_CLIENT_NONE; ++i) {
+        if (self->client[i].id == id) {
+            return &self->client[i];
+        }
+    }
+    return NULL;
+}
+
+bool gw_daemon_is_sending(const gw_daemon_t *self) {
+    const iw_permit_t *permit = &self->gateway.permit;
+    return permit->arming || permit->state == IW_STATE_ARMED || permit->state == IW_STATE_STOPPING ||
+           (permit->state == IW_STATE_LATCHED && permit->holding);
+}
