@@ -21,7 +21,7 @@ static const verb_t verbs[] = {
     {"drive", verb_drive, "LEFT RIGHT [--for TIME] [--takeover] [--current LEFT RIGHT]", "MOVES THE WHEELS, then stops",
      "Arms, drives both wheels at LEFT and RIGHT mm/s (negative: backwards), and stops them: after TIME, on Ctrl-C, "
      "on\n"
-     "any error. Then it waits until both are at rest.\n"
+     "any error. Then it waits until both are at rest. Before, if they do not stand yet, for a second at the most.\n"
      "--for TIME       2s if not told; 20ms to 600s, with its unit\n"
      "--takeover       takes the lease from another client, if the wheels stand\n"
      "--current L R    mA per wheel; needed if the configuration says current_role = setpoint\n"

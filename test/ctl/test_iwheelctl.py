@@ -450,6 +450,45 @@ class Driving(WithGateway):
         self.assertIn("refused (busy): \"joystick\" drives", err)
         self.assertEqual(0, gateway.count("drive"))
 
+    def test_arm_refused_because_the_wheels_do_not_stand_yet_is_asked_again(self):
+        class ComingToRest(FakeGateway):
+            def on_arm(self, connection, request):
+                if self.count("arm") < 4:
+                    return {"ok": False, "error": "not_at_rest", "message": "the wheels turn: wait until both stand"}
+                return super().on_arm(connection, request)
+        gateway = self.serve(ComingToRest)
+        code, out, err, _ = self.drive("200", "200", "--for", "100ms", gateway=gateway)
+        self.assertEqual((0, "iwheelctl: waiting for a second at the most, because the wheels turn: wait until both stand\n"), (code, err))
+        self.assertIn("drove 200/200 mm/s", out)
+        self.assertEqual(4, gateway.count("arm"))
+        self.assertGreater(gateway.times("drive")[0], gateway.times("arm")[-1])
+
+    def test_wheels_that_go_on_turning_are_waited_for_a_second_and_no_longer(self):
+        class Pushed(FakeGateway):
+            def on_arm(self, _connection, _request):
+                return {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
+        for words in ([], ["--json"]):
+            gateway = self.serve(Pushed)
+            code, out, err, _ = run("--socket", gateway.path, *words, "drive", "200", "200")
+            times = gateway.times("arm")
+            self.assertEqual((1, 0), (code, gateway.count("drive")))
+            self.assertEqual(1, err.count("waiting for a second"))
+            self.assertEqual((0, 1) if words else (1, 0), (err.count("refused (not_at_rest)"), out.count("not_at_rest")))
+            self.assertTrue(1.0 <= times[-1] - times[0] < 3, times[-1] - times[0])
+            self.assertTrue(2 < len(times) <= 22, len(times))
+
+    def test_signal_while_the_wheels_are_waited_for_ends_it(self):
+        class Pushed(FakeGateway):
+            def on_arm(self, _connection, _request):
+                return {"ok": False, "error": "not_at_rest", "message": "the wheels turn"}
+        gateway = self.serve(Pushed)
+        process = start("--socket", gateway.path, "drive", "200", "200")
+        wait_until(lambda: gateway.count("arm") > 1)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=10)
+        self.assertEqual((1, 0), (process.returncode, gateway.count("drive")))
+        self.assertIn("interrupted", err)
+
     def test_every_signal_stops_at_once_and_waits_for_rest(self):
         for number in SIGNALS:
             gateway = self.serve(FakeGateway)

@@ -5,7 +5,8 @@
 //                |  time over, signal, refusal, gateway silent or gone
 //                '-------------------------------------------^
 //
-// It arms once and never again: whatever ends the lease ends the program.
+// It is armed once and never again: whatever ends the lease ends the program. Only a refusal because the wheels do not stand yet is
+// waited for, a second at the most.
 #include "drive_words.h"
 #include "talk/ctl.h"
 #include "talk/signals.h"
@@ -22,6 +23,8 @@
 #define POLL_US 50000
 /// Until then the gateway refuses the next arm (stale_command).
 #define FRESH_US 520000
+/// A stop that has only just ended, or a machine that stood still for a moment: the wheels may count as turning this long.
+#define ARM_PATIENCE_US 1000000
 /// What the gateway may grant; anything else counts as the shortest.
 #define LEASE_MIN_MS 20
 #define LEASE_MAX_MS 500
@@ -293,6 +296,39 @@ static int finish(drive_t *self, end_t end) {
     return code == CTL_OK ? judge(self, end, stop_us) : code;
 }
 
+/// Lets time pass and drops what the gateway tells meanwhile. An exit code.
+static int wait_a_moment(const drive_t *self) {
+    const int64_t until_us = client_now_us() + POLL_US;
+    client_result_t result = CLIENT_OK;
+    while (result == CLIENT_OK) {
+        json_t *event = NULL;
+        result = client_receive(&self->ctl->client, until_us, &event);
+        json_decref(event);
+    }
+    return result == CLIENT_TIMEOUT ? CTL_OK : ctl_lost(self->ctl, result);
+}
+
+static bool passes(const json_t *reply) {
+    return json_is_false(json_object_get(reply, "ok")) && strcmp(text_word(reply, "error"), "not_at_rest") == 0;
+}
+
+/// Arms, again while the wheels do not stand yet. As ctl_ask.
+static int ask_to_arm(const drive_t *self, json_t *request, json_t **out_reply) {
+    const int64_t end_us = client_now_us() + ARM_PATIENCE_US;
+    int code = ctl_exchange(self->ctl, json_incref(request), out_reply);
+    if (code == CTL_OK && passes(*out_reply)) {
+        (void)ctl_fail(CTL_OK, "waiting for a second at the most, because %s", text_word(*out_reply, "message"));
+    }
+    while (code == CTL_OK && passes(*out_reply) && client_now_us() < end_us) {
+        json_decref(*out_reply);
+        *out_reply = NULL;
+        code = wait_a_moment(self);
+        code = code == CTL_OK ? ctl_exchange(self->ctl, json_incref(request), out_reply) : code;
+    }
+    json_decref(request);
+    return code == CTL_OK ? ctl_accept(self->ctl, out_reply) : code;
+}
+
 /// Subscribes to the wheels' state and arms. An exit code.
 static int arm(drive_t *self) {
     json_t *reply = NULL;
@@ -311,7 +347,7 @@ static int arm(drive_t *self) {
     if (self->words.takeover) {
         (void)json_object_set_new(request, "takeover", json_true());
     }
-    code = ctl_ask(self->ctl, request, &reply);
+    code = ask_to_arm(self, request, &reply);
     json_array_foreach(json_object_get(reply, "warnings"), index, warning) {
         (void)ctl_fail(CTL_OK, "warning: %s", json_is_string(warning) ? json_string_value(warning) : "--");
     }

@@ -144,7 +144,7 @@ int ctl_connect(ctl_t *self) {
     return error != 0 ? tell_unopened(path, error) : greet(self);
 }
 
-int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
+int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {
     int64_t id = 0;
     const int64_t deadline_us = client_now_us() + CLIENT_REPLY_US;
     *out_reply = NULL;
@@ -157,17 +157,23 @@ int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
     if (result == CLIENT_OK) {
         result = client_wait(&self->client, id, deadline_us, out_reply);
     }
-    if (result != CLIENT_OK) {
-        return ctl_lost(self, result);
-    }
+    return result == CLIENT_OK ? CTL_OK : ctl_lost(self, result);
+}
+
+int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
+    const int code = ctl_exchange(self, request, out_reply);
+    return code == CTL_OK ? ctl_accept(self, out_reply) : code;
+}
+
+int ctl_accept(const ctl_t *self, json_t **reply) {
     if (self->json) {
         (void)puts(self->client.line);
     }
-    if (json_is_true(json_object_get(*out_reply, "ok"))) {
+    if (json_is_true(json_object_get(*reply, "ok"))) {
         return CTL_OK;
     }
-    const int refused = self->json ? CTL_NO : ctl_refused(*out_reply);
-    json_decref(*out_reply);
-    *out_reply = NULL;
+    const int refused = self->json ? CTL_NO : ctl_refused(*reply);
+    json_decref(*reply);
+    *reply = NULL;
     return refused;
 }

@@ -59,6 +59,13 @@ int ctl_connect(ctl_t *self);
 /// printed, whatever it says.
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply);
 
+/// The first half of `ctl_ask`: 0 with the reply, whatever it says, in `*out_reply`; nothing is printed but what went wrong on the way.
+int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply);
+
+/// The second half, for the reply that came last: tells a refusal, with --json prints the reply's line. A reply that is not agreed to
+/// is released and `*reply` null.
+int ctl_accept(const ctl_t *self, json_t **reply);
+
 /// Tells that the gateway said no: its error name and message. Returns CTL_NO.
 int ctl_refused(const json_t *reply);
 
