@@ -7,6 +7,7 @@ import subprocess
 from scenario import scenario
 
 USAGE, UNAVAILABLE, CONFIGURATION = 64, 69, 78
+DEFAULT_DIRECTORY = "/var/lib/iwheel"  # Where a gateway records whom nobody told otherwise.
 
 
 def call(rig, program, *arguments, seconds=5, **options):
@@ -30,6 +31,7 @@ def call(rig, program, *arguments, seconds=5, **options):
 @scenario("arguments: help, version, unknown, missing, surplus", 4)
 def arguments(t):
     rig = t.rig()
+    recorded = os.path.isdir(DEFAULT_DIRECTORY)
     for program in ("iwheel-gateway", "iwheelctl", "iwheel-sim"):
         code, text = call(rig, program, "--help")
         t.check(
@@ -45,11 +47,12 @@ def arguments(t):
             code, text = call(rig, program, *bad)
             t.check(code == USAGE and bad[0].lstrip("-") in text, f"{program} {bad}: {code}, {text[:160]!r}")
             t.check("--help" in text, f"{program} {bad} tells where help is: {text[:160]!r}")
+    config = rig.path("gateway.conf")
     cases = [
         ("iwheel-gateway", ("-c",), USAGE),
         ("iwheel-gateway", ("surplus",), USAGE),
         ("iwheel-gateway", ("--log-level", "loud"), USAGE),
-        ("iwheel-gateway", ("--can", "can0", "--socket", rig.path("x.sock"), "--estop", "none"), UNAVAILABLE),
+        ("iwheel-gateway", ("-c", config, "--can", "can0", "--socket", rig.path("x.sock"), "--estop", "none"), UNAVAILABLE),
         ("iwheel-gateway", ("--can", "unix:" + "x" * 200, "--socket", rig.path("x.sock")), USAGE),
         ("iwheel-gateway", ("--can", "unix:", "--socket", rig.path("x.sock")), USAGE),
         ("iwheel-gateway", ("--socket", "/" + "x" * 200), USAGE),
@@ -87,6 +90,7 @@ def arguments(t):
         "none",
     )
     t.check("unix:" in text, f"SocketCAN is refused with the way out: {text[:200]!r}")
+    t.check(os.path.isdir(DEFAULT_DIRECTORY) == recorded, f"nothing was made outside of the test: {DEFAULT_DIRECTORY}")
     t.figure(f"{len(cases) + 12} calls")
 
 
