@@ -79,6 +79,9 @@ static const verb_t verbs[] = {
      "also\n"
      "live: candump -L can0 | iwheelctl decode. T behind the id: sent by the program that recorded it.\n"
      "--csv          one row per frame, units in the header, empty cells for what a frame does not carry\n"
+     "With --json one object per frame and line: t_us, interface, direction, id, extended, remote, fd, dlc, data, "
+     "wheel,\n"
+     "message, values {what it carries, named as in the CSV}, note.\n"
      "--config FILE  the gateway's configuration, for the units of force; else as documented: left cN, right dN\n"
      "Lines that cannot be understood are told with their number and left out; then the exit code is 65.\n"},
     {"learn", verb_learn, "FILE", "what a recording of another controller tells about the wheels",

@@ -6,6 +6,7 @@ Usage: test_recordings.py PROGRAM [unittest's arguments]
 """
 import csv
 import io
+import json
 import os
 import shutil
 import struct
@@ -141,6 +142,30 @@ class Decode(unittest.TestCase):
 
         block = lines(*["100#000F0001"] * 1000)
         self.assertLess(resident_kB(300) - resident_kB(1), 3000)  # Of 11 MB.
+
+    def test_json_carries_what_the_csv_carries(self):
+        text = lines("10A#01012C07D0 T", "100#000F0001", "101#F81CFFFFFFFF1E", "122#0097FFF80000FF92", "220#FF9D003E", "221#FF9C",
+                     "00000123#11", "100#R4", "100#00", "7FF#")
+        code, out, err = run("--json", "decode", text=text)
+        self.assertEqual((0, ""), (code, err))
+        objects = [json.loads(line) for line in out.splitlines()]
+        rows = self.rows(text)
+        self.assertEqual(len(rows), len(objects))
+        for row, got in zip(rows, objects):
+            self.assertEqual(row["time_s"], f"{got['t_us'] // 1000000}.{got['t_us'] % 1000000:06d}")
+            self.assertEqual((row["interface"], row["direction"], row["id"], row["dlc_bytes"], row["data_hex"], row["wheel"], row["message"],
+                              row["note"]),
+                             (got["interface"], got["direction"] or "", str(got["id"]), str(got["dlc"]), got["data"], got["wheel"] or "",
+                              got["message"], got["note"] or ""))
+            columns = list(row)[list(row).index("message") + 1:-1]
+            self.assertEqual({name: int(row[name]) for name in columns if row[name]}, got["values"])
+        self.assertEqual([True, False], [objects[6]["extended"], objects[0]["extended"]])
+        self.assertTrue(objects[7]["remote"])
+
+    def test_csv_and_json_at_once_are_refused(self):
+        code, out, err = run("--json", "decode", "--csv", text=lines("100#000F0001"))
+        self.assertEqual((64, ""), (code, out))
+        self.assertIn("not both", err)
 
     def test_live_input_is_decoded_line_by_line(self):
         child = subprocess.Popen([PROGRAM, "decode"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
+#include "decode_json.h"
 #include "frame_line.h"
 #include "recordings/config_option.h"
 #include "recordings/recording.h"
@@ -98,31 +99,43 @@ static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     (void)printf(",\"%s\"\n", decoded->note);
 }
 
+/// An exit code.
+static int write_frame(decode_t *self, const candump_t *frame, bool json) {
+    decoded_t decoded;
+    const iw_can_frame_t core = candump_to_core(frame);
+    decode_fields(&core, &self->config, &decoded);
+    if (json) {
+        return decode_print_json(frame, &decoded) ? CTL_OK : ctl_fail(CTL_INTERNAL, "not enough memory for a line");
+    }
+    if (self->csv) {
+        write_csv(frame, &decoded);
+    } else {
+        write_text(self, frame, &decoded);
+    }
+    return CTL_OK;
+}
+
 int verb_decode(ctl_t *self, int count, char **words) {
     static decode_t decode;
     candump_t frame;
-    decoded_t decoded;
     iw_config_default(&decode.config);
     int code = parse_words(&decode, count, words);
+    if (code == CTL_OK && decode.csv && self->json) {
+        return ctl_fail(CTL_USAGE, "decode writes --csv or --json, not both");
+    }
     code = code == CTL_OK ? recording_open(&decode.recording, decode.path) : code;
-    (void)self;
     if (code != CTL_OK) {
         return code;
     }
     if (decode.csv) {
         write_csv_header();
     }
-    while (ferror(stdout) == 0 && recording_next(&decode.recording, &frame)) {
-        const iw_can_frame_t core = candump_to_core(&frame);
-        decode_fields(&core, &decode.config, &decoded);
-        if (decode.csv) {
-            write_csv(&frame, &decoded);
-        } else {
-            write_text(&decode, &frame, &decoded);
-        }
+    while (code == CTL_OK && ferror(stdout) == 0 && recording_next(&decode.recording, &frame)) {
+        code = write_frame(&decode, &frame, self->json);
         if (recording_is_drained(&decode.recording)) {
             (void)fflush(stdout); // Live: nobody waits for the next line to see this one.
         }
     }
-    return recording_close(&decode.recording);
+    const int read = recording_close(&decode.recording);
+    return code == CTL_OK ? read : code;
 }
