@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+/// What boards with an STM32F405, F407 or F446 and a crystal of 8 MHz have in common: the clocks and where things are.
+///
+/// For the `board.h` of such a board. One with another crystal or clock has these lines in its own `board.h`, changed, instead of
+/// the include; nobody else includes this file.
+#ifndef IW_STM32_BOARD_F4_H
+#define IW_STM32_BOARD_F4_H
+
+#ifndef IW_BOARD_CRYSTAL_IS_CLOCK
+#define IW_BOARD_CRYSTAL_IS_CLOCK 0 ///< 1: no crystal, but a clock signal on its input pin.
+#endif
+#define IW_BOARD_CRYSTAL_HZ  8000000U
+#define IW_BOARD_INTERNAL_HZ 16000000U ///< The oscillator that runs after reset. Too inaccurate for the bus.
+#define IW_BOARD_PLL_M       4U        ///< 2 MHz into the PLL, the best for little jitter.
+#define IW_BOARD_PLL_N       160U      ///< 320 MHz in the PLL.
+#define IW_BOARD_PLL_P       2U        ///< 160 MHz out. The usual 168 and 180 cannot give the bus exactly.
+#define IW_BOARD_PLL_Q       7U        ///< 45.7 MHz for USB, which is not used: at most 48.
+#define IW_BOARD_CORE_HZ     160000000U
+#ifndef IW_BOARD_APB1_HZ
+#define IW_BOARD_APB1_HZ 40000000U ///< A quarter of the core's, at most 42 MHz (F446: 45). A multiple of 8 MHz.
+#endif
+
+#define IW_BOARD_FLASH_WAIT_STATES 5U ///< Above 150 MHz at 2.7 to 3.6 V.
+
+/// The watchdog's oscillator: nominal and fastest.
+#define IW_BOARD_LSI_HZ     32000U
+#define IW_BOARD_LSI_MAX_HZ 47000U
+
+#define IW_BOARD_BXCAN_ADDRESS 0x40006400U ///< CAN1
+#define IW_BOARD_EXTI_ADDRESS  0x40013C00U
+
+#endif
