@@ -42,8 +42,8 @@ iw_status_t iw_bit_timing_solve(const iw_bit_timing_limits_t *limits, uint32_t c
         return IW_ERR_RANGE;
     }
     const uint32_t clocks = clock_hz / rate;
-    for (uint32_t prescaler = 1; prescaler <= limits->prescaler_max && prescaler <= clocks; prescaler++) {
-        iw_bit_timing_t candidate = {(uint16_t)prescaler, 0, 0};
+    for (uint32_t prescaler = 1; prescaler <= limits->prescaler_max; prescaler++) {
+        iw_bit_timing_t candidate = {.prescaler = (uint16_t)prescaler};
         const uint32_t quanta = (clocks % prescaler == 0U) ? clocks / prescaler : 0U;
         const uint32_t error = split(limits, quanta, wanted->sample_point_permille, &candidate);
         if (error < best) {

@@ -38,7 +38,6 @@ void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side) 
 void iw_force_reopen(iw_force_t *self, bool boot_seen) {
     self->boot_seen = boot_seen;
     self->count = 0;
-    self->still = 0;
     self->wheel_offset_heard = false;
     self->evidence = IW_UNIT_UNKNOWN;
     self->evidence_permille = 0;
@@ -167,10 +166,6 @@ static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
 void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still) {
     if (self->raw_us == IW_NEVER || now_us - self->raw_us >= IW_FORCE_STALE_US) {
         self->count = 0;
-        self->still = 0;
-    }
-    if (self->count == 0U) {
-        self->next = 0;
     }
     self->raw = raw;
     self->raw_us = now_us;

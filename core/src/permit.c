@@ -216,7 +216,7 @@ void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view
         enter_stopping(self, now_us, IW_CAUSE_LEASE_LOST, IW_SIDES_NONE, unfed_ms(self, now_us));
     } else if (self->state == IW_STATE_STOPPING && !self->arming && hold_done(self, now_us)) {
         self->state = IW_STATE_LISTENING;
-    } else if (self->state == IW_STATE_LATCHED && self->holding && hold_done(self, now_us)) {
+    } else if (self->holding && hold_done(self, now_us)) {
         self->holding = false;
     }
 }
@@ -383,18 +383,16 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
 
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {
     iw_time_us_t next_us = IW_NEVER;
-    const bool held = (self->state == IW_STATE_STOPPING && !self->arming) || self->holding;
-    if (self->state == IW_STATE_ARMED) {
+    const bool held = self->state == IW_STATE_STOPPING || self->holding;
+    if (self->arming) {
+        next_us = self->arming_us + (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
+    } else if (self->state == IW_STATE_ARMED) {
         next_us = self->lease_until_us;
     } else if (held && self->hold_us != IW_NEVER) {
         const bool first = self->view.settled || restarting(self);
         const iw_time_us_t span_us =
             first ? (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS : IW_PERMIT_HOLD_MAX_US;
         next_us = self->hold_us + span_us;
-    }
-    if (self->arming) {
-        const iw_time_us_t give_up_us = self->arming_us + (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
-        next_us = (give_up_us < next_us) ? give_up_us : next_us;
     }
     return next_us;
 }

@@ -131,11 +131,11 @@ static axis_t plan(int32_t *value, int32_t target, uint32_t away, uint32_t towar
     return axis;
 }
 
-/// A speed step as the same share of the maximum current. `step` is at most the maximum speed in um/s.
+/// A speed step as the same share of the maximum current. `step` is at most 20 m/s, the steepest slope for a second: 32
+/// bits suffice.
 static uint32_t current_step(const iw_config_t *config, uint32_t step) {
     const uint32_t speed = config->max_speed_mm_s;
-    const uint32_t capped = (step < speed * 1000U) ? step : speed * 1000U;
-    return capped / speed * config->max_current_mA + capped % speed * config->max_current_mA / speed;
+    return step / speed * config->max_current_mA + step % speed * config->max_current_mA / speed;
 }
 
 /// Moves all quantities by one common share of their ways; braking ones do not wait for accelerating ones.

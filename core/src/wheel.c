@@ -98,7 +98,7 @@ void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message
 }
 
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
-    if (self->heard_us != IW_NEVER && self->heard_us >= self->excused_us) {
+    if (self->heard_us >= self->excused_us) {
         self->excused_us = now_us;
         self->any_us = now_us;
     }

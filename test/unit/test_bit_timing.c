@@ -176,6 +176,22 @@ static void test_solve_f103_with_32_MHz_takes_sixteen_quanta(void) {
     TEST_ASSERT_EQUAL_UINT16(6, timing.tseg2);
 }
 
+static void test_solve_of_two_sample_points_as_near_takes_the_later(void) {
+    static const iw_bit_timing_achieved_t wanted = {1000000, 650};
+    iw_bit_timing_t timing;
+    limits.prescaler_max = 1;
+    TEST_ASSERT_EQUAL_INT(IW_OK, iw_bit_timing_solve(&limits, 10 * MHZ, &wanted, &timing));
+    TEST_ASSERT_EQUAL_UINT16(700, iw_bit_timing_achieved(10 * MHZ, &timing).sample_point_permille);
+}
+
+static void test_solve_never_leaves_the_first_segment_empty(void) {
+    iw_bit_timing_t timing;
+    limits.tseg1_min = 0;
+    TEST_ASSERT_EQUAL_INT(IW_ERR_RANGE, iw_bit_timing_solve(&limits, 2 * MHZ, &bus, &timing));
+    TEST_ASSERT_EQUAL_INT(IW_OK, iw_bit_timing_solve(&limits, 3 * MHZ, &bus, &timing));
+    TEST_ASSERT_EQUAL_UINT16(1, timing.tseg1);
+}
+
 static void test_solve_zero_argument_is_refused_and_leaves_output_alone(void) {
     static const iw_bit_timing_achieved_t no_rate = {0, 625};
     static const iw_bit_timing_achieved_t no_point = {1000000, 0};
@@ -216,6 +232,7 @@ static void test_achieved_rounds_to_the_nearest(void) {
         {UINT32_MAX, {1, 1, 0}, {UINT32_MAX / 2 + 1, 1000}}, // 2 147 483 647.5
         {UINT32_MAX, {65535, 65535, 0}, {1, 1000}},          // 1.00002
         {UINT32_MAX, {65535, 0, 65535}, {1, 0}},             // 0.015 permille
+        {UINT32_MAX, {65535, 65535, 1}, {1, 1000}},          // As long as a bit can be.
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(cases[i].clock_hz, &cases[i].timing);
@@ -240,9 +257,11 @@ static void test_achieved_every_bxcan_setting_is_within_half_a_unit(void) {
     }
 }
 
-static void test_achieved_slower_than_any_number_gives_no_rate(void) {
+static void test_achieved_slower_than_any_number_gives_zeros(void) {
     const iw_bit_timing_t timing = {65535, 65535, 65535};
-    TEST_ASSERT_EQUAL_UINT32(0, iw_bit_timing_achieved(32 * MHZ, &timing).bitrate_hz);
+    const iw_bit_timing_achieved_t achieved = iw_bit_timing_achieved(32 * MHZ, &timing);
+    TEST_ASSERT_EQUAL_UINT32(0, achieved.bitrate_hz);
+    TEST_ASSERT_EQUAL_UINT16(0, achieved.sample_point_permille);
 }
 
 static void test_achieved_prescaler_zero_gives_zeros(void) {
@@ -263,11 +282,13 @@ int main(void) {
     RUN_TEST(test_solve_multiples_of_8_MHz_reach_the_bus_exactly);
     RUN_TEST(test_solve_usual_stm32_clocks_cannot_reach_the_sample_point);
     RUN_TEST(test_solve_f103_with_32_MHz_takes_sixteen_quanta);
+    RUN_TEST(test_solve_of_two_sample_points_as_near_takes_the_later);
+    RUN_TEST(test_solve_never_leaves_the_first_segment_empty);
     RUN_TEST(test_solve_zero_argument_is_refused_and_leaves_output_alone);
     RUN_TEST(test_solve_largest_numbers_do_not_overflow);
     RUN_TEST(test_achieved_rounds_to_the_nearest);
     RUN_TEST(test_achieved_every_bxcan_setting_is_within_half_a_unit);
-    RUN_TEST(test_achieved_slower_than_any_number_gives_no_rate);
+    RUN_TEST(test_achieved_slower_than_any_number_gives_zeros);
     RUN_TEST(test_achieved_prescaler_zero_gives_zeros);
     return UNITY_END();
 }

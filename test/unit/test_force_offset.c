@@ -244,6 +244,23 @@ static void test_force_tare_settles_a_doubted_offset(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_rig_validity(&rig));
 }
 
+static void test_force_tare_against_a_doubted_offset_does_not_judge_the_load(void) {
+    force_rig_quiet(&rig, 40, 9000);
+    force_rig_offset(&rig, 100);
+    force_rig_quiet(&rig, 40, 4000);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+    assert_offset(IW_OFFSET_OPERATOR, 40000);
+}
+
+static void test_force_tare_a_millinewton_beyond_20_N_is_a_load(void) {
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, -1);
+    force_rig_quiet(&rig, 40, 2000);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_LOADED, force_rig_tare(&rig));
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 0);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, force_rig_tare(&rig));
+}
+
 static void test_force_contradicted_unit_is_invalid_and_never_rescaled(void) {
     for (int side = 0; side < IW_SIDES; side++) {
         const int16_t wrong = side == IW_LEFT ? 100 : 1000;
@@ -335,6 +352,8 @@ int main(void) {
     RUN_TEST(test_force_tare_under_load_is_refused);
     RUN_TEST(test_force_tare_without_any_offset_cannot_know_of_a_load);
     RUN_TEST(test_force_tare_settles_a_doubted_offset);
+    RUN_TEST(test_force_tare_against_a_doubted_offset_does_not_judge_the_load);
+    RUN_TEST(test_force_tare_a_millinewton_beyond_20_N_is_a_load);
     RUN_TEST(test_force_contradicted_unit_is_invalid_and_never_rescaled);
     RUN_TEST(test_force_removed_offset_is_invalid);
     RUN_TEST(test_force_removed_offset_is_cured_by_a_tare);

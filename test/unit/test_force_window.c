@@ -93,12 +93,47 @@ static void test_force_deviation_is_told_to_a_millinewton(void) {
     TEST_ASSERT_EQUAL_UINT32(17, rig.force.quality.deviation_mN);
 }
 
+/// A window whose samples lie above and below zero in pairs: so many by `far`, the others by `near`.
+static void spread_pairs(uint32_t far_pairs, int16_t far, int16_t near) {
+    begin(IW_LEFT, false);
+    for (uint32_t pair = 0; pair < IW_FORCE_WINDOW_SAMPLES / 2U; pair++) {
+        const int16_t by = pair < far_pairs ? far : near;
+        force_rig_hear(&rig, by, true);
+        force_rig_hear(&rig, (int16_t)-by, true);
+    }
+}
+
+static void test_force_wide_deviation_is_told_exactly(void) {
+    begin(IW_RIGHT, false);
+    force_rig_alternate(&rig, 0, 800);
+    TEST_ASSERT_EQUAL_UINT32(40000, rig.force.quality.deviation_mN);
+}
+
+static void test_force_deviation_is_told_finer_up_to_a_variance_of_400000(void) {
+    spread_pairs(2, 2000, 0); // The root is 632.4.
+    TEST_ASSERT_EQUAL_UINT32(6324, rig.force.quality.deviation_mN);
+    spread_pairs(2, 2000, 2);
+    TEST_ASSERT_EQUAL_UINT32(6320, rig.force.quality.deviation_mN);
+}
+
+static void test_force_deviation_is_rounded_down(void) {
+    force_rig_quiet(&rig, 39, 1);
+    force_rig_quiet(&rig, 1, 0);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.force.quality.deviation_mN);
+}
+
+static void test_force_noise_a_millinewton_beyond_1_N_is_noisy(void) {
+    spread_pairs(2, 102, 100);
+    TEST_ASSERT_EQUAL_UINT32(1001, rig.force.quality.deviation_mN);
+    assert_window(IW_WINDOW_NOISY);
+}
+
 static void test_force_wildest_noise_does_not_overflow(void) {
     for (int side = 0; side < IW_SIDES; side++) {
         begin((iw_side_t)side, false);
         force_rig_alternate(&rig, 32766, -32767);
         assert_window(IW_WINDOW_NOISY);
-        TEST_ASSERT_TRUE(rig.force.quality.deviation_mN > 50000);
+        TEST_ASSERT_EQUAL_UINT32(side == IW_LEFT ? 81910 : 819100, rig.force.quality.deviation_mN); // Capped.
         begin((iw_side_t)side, false);
         force_rig_alternate(&rig, 0, 1400);
         assert_window(IW_WINDOW_NOISY);
@@ -116,6 +151,7 @@ static void test_force_drift_up_to_1_N_is_quiet_and_more_is_drift(void) {
     step_at_half(1000, 1100);
     assert_window(IW_WINDOW_GOOD);
     TEST_ASSERT_EQUAL_INT32(1000, rig.force.quality.drift_mN);
+    TEST_ASSERT_EQUAL_UINT32(500, rig.force.quality.deviation_mN); // From the mean of the whole window.
     begin(IW_LEFT, false);
     step_at_half(1000, 1101);
     assert_window(IW_WINDOW_DRIFT);
@@ -126,6 +162,14 @@ static void test_force_drift_up_to_1_N_is_quiet_and_more_is_drift(void) {
     step_at_half(1000, 899);
     assert_window(IW_WINDOW_DRIFT);
     TEST_ASSERT_EQUAL_INT32(-1010, rig.force.quality.drift_mN);
+}
+
+static void test_force_drift_a_millinewton_beyond_1_N_is_drift(void) {
+    force_rig_quiet(&rig, 20, 0);
+    force_rig_quiet(&rig, 18, 100);
+    force_rig_quiet(&rig, 2, 101);
+    TEST_ASSERT_EQUAL_INT32(1001, rig.force.quality.drift_mN);
+    assert_window(IW_WINDOW_DRIFT);
 }
 
 static void test_force_moving_at_any_sample_contaminates(void) {
@@ -167,6 +211,18 @@ static void test_force_far_from_an_offset_trusted_before_is_a_load(void) {
         TEST_ASSERT_EQUAL_INT(loaded ? IW_OFFSET_STORED : IW_OFFSET_ESTIMATED, rig.force.provenance);
         TEST_ASSERT_EQUAL_INT32(loaded ? stored_mN[i] : 0, rig.force.offset_mN);
     }
+}
+
+static void test_force_noise_far_from_a_trusted_offset_is_told_as_noise(void) {
+    iw_force_restore(&rig.force, IW_OFFSET_STORED, 90000);
+    force_rig_alternate(&rig, 0, 2000);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_NOISY, rig.force.quality.window);
+}
+
+static void test_force_ring_counts_no_more_than_it_holds(void) {
+    force_rig_quiet(&rig, 3U * IW_FORCE_WINDOW_SAMPLES, 100);
+    TEST_ASSERT_EQUAL_UINT8(IW_FORCE_WINDOW_SAMPLES, rig.force.count);
+    TEST_ASSERT_EQUAL_UINT8(IW_FORCE_WINDOW_SAMPLES, rig.force.still);
 }
 
 static void test_force_gap_starts_the_window_anew(void) {
@@ -259,6 +315,14 @@ static void test_force_small_offset_is_no_evidence_unless_it_is_far_off(void) {
     TEST_ASSERT_EQUAL_INT(IW_FORCE_OFFSET_DOUBTED, force_rig_validity(&rig));
 }
 
+static void test_force_small_offset_is_far_off_beyond_20_N(void) {
+    force_rig_quiet(&rig, 36, 2000);
+    force_rig_quiet(&rig, 4, 2001);
+    TEST_ASSERT_EQUAL_INT32(20001, rig.force.quality.mean_mN);
+    force_rig_offset(&rig, 0);
+    TEST_ASSERT_EQUAL_INT(IW_UNIT_UNCLEAR, rig.force.evidence);
+}
+
 static void test_force_unit_evidence_waits_for_both_and_survives_either_order(void) {
     force_rig_offset(&rig, 100);
     TEST_ASSERT_EQUAL_INT(IW_UNIT_UNKNOWN, rig.force.evidence);
@@ -282,17 +346,25 @@ int main(void) {
     RUN_TEST(test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy);
     RUN_TEST(test_force_never_heard_is_not_heard_when_time_has_just_begun);
     RUN_TEST(test_force_deviation_is_told_to_a_millinewton);
+    RUN_TEST(test_force_wide_deviation_is_told_exactly);
+    RUN_TEST(test_force_deviation_is_told_finer_up_to_a_variance_of_400000);
+    RUN_TEST(test_force_deviation_is_rounded_down);
+    RUN_TEST(test_force_noise_a_millinewton_beyond_1_N_is_noisy);
     RUN_TEST(test_force_wildest_noise_does_not_overflow);
     RUN_TEST(test_force_drift_up_to_1_N_is_quiet_and_more_is_drift);
+    RUN_TEST(test_force_drift_a_millinewton_beyond_1_N_is_drift);
     RUN_TEST(test_force_moving_at_any_sample_contaminates);
     RUN_TEST(test_force_saturated_sample_contaminates);
     RUN_TEST(test_force_far_from_an_offset_trusted_before_is_a_load);
+    RUN_TEST(test_force_noise_far_from_a_trusted_offset_is_told_as_noise);
+    RUN_TEST(test_force_ring_counts_no_more_than_it_holds);
     RUN_TEST(test_force_gap_starts_the_window_anew);
     RUN_TEST(test_force_contaminated_window_stays_so_until_a_reboot);
     RUN_TEST(test_force_estimate_is_made_once);
     RUN_TEST(test_force_unit_is_told_from_raw_over_offset);
     RUN_TEST(test_force_unit_evidence_has_fifteen_percent);
     RUN_TEST(test_force_small_offset_is_no_evidence_unless_it_is_far_off);
+    RUN_TEST(test_force_small_offset_is_far_off_beyond_20_N);
     RUN_TEST(test_force_unit_evidence_waits_for_both_and_survives_either_order);
     RUN_TEST(test_force_contaminated_window_is_no_evidence);
     return UNITY_END();

@@ -259,6 +259,7 @@ static void test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect(vo
     permit_rig_begin(&rig, PERMIT_ARMING);
     iw_permit_stop(&rig.permit, rig.now_us, OTHER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_FALSE(rig.permit.arming);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, rig.permit.arm_refusal);
     rig.view.proven = true;
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
@@ -268,7 +269,7 @@ static void test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect(vo
     TEST_ASSERT_TRUE(rig.permit.arming);
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
     TEST_ASSERT_FALSE(rig.permit.arming);
-    TEST_ASSERT_TRUE(IW_REFUSE_NONE != rig.permit.arm_refusal);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, rig.permit.arm_refusal);
     rig.view.proven = true;
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
@@ -282,6 +283,7 @@ static void test_permit_arm_in_stopping_waits_for_zero_and_rest(void) {
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_AT_REST, permit_rig_arm(&rig, OTHER));
     rig.view.at_rest = true;
+    rig.view.can_send = false; // A zero of the hold is on its way: arm need not wait for its echo.
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, OTHER));
     rig.view.proven = true;
@@ -306,6 +308,7 @@ static void test_permit_arming_that_fails_in_stopping_goes_on_with_the_hold(void
     permit_rig_wait(&rig, MS(1460));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, OTHER));
     permit_rig_wait(&rig, MS(40));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state); // The hold is over, but arming is not.
     TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == rig.now_us + MS(10));
     permit_rig_wait(&rig, MS(10));
     TEST_ASSERT_FALSE(rig.permit.arming);

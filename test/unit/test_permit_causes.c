@@ -173,6 +173,14 @@ static void test_permit_stop_after_a_cut_one_ramps_again(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
 }
 
+static void test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows(void) {
+    permit_rig_begin(&rig, PERMIT_ARMED);
+    permit_rig_raise(&rig, IW_CAUSE_LOOP_LATE);
+    permit_rig_raise(&rig, IW_CAUSE_WHEEL_BLOCKED);
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+}
+
 static void test_permit_cause_of_no_wheel_is_told_as_such(void) {
     permit_rig_begin(&rig, PERMIT_ARMED);
     iw_permit_raise(&rig.permit, rig.now_us, IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, UINT32_MAX);
@@ -237,6 +245,7 @@ int main(void) {
     RUN_TEST(test_permit_latched_while_listening_sends_nothing_however_long);
     RUN_TEST(test_permit_late_loop_leaves_no_ramp_tail);
     RUN_TEST(test_permit_stop_after_a_cut_one_ramps_again);
+    RUN_TEST(test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows);
     RUN_TEST(test_permit_cause_of_no_wheel_is_told_as_such);
     RUN_TEST(test_permit_present_tells_levels_while_told_and_events_for_a_second);
     RUN_TEST(test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_told);

@@ -242,6 +242,8 @@ static void test_permit_restarted_without_any_wheel_ends_as_well(void) {
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
     permit_rig_step(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
+    TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == rig.now_us + MS(1500));
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
 }
 
@@ -278,7 +280,7 @@ static void test_permit_restarted_latches_on_estop(void) {
 static void test_permit_restarted_cannot_be_armed_before_the_hold_is_over(void) {
     permit_rig_init_restarted(&rig);
     permit_rig_wait(&rig, MS(1000));
-    TEST_ASSERT_TRUE(permit_rig_arm(&rig, HOLDER) != IW_REFUSE_NONE);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_CAUSE_PRESENT, permit_rig_arm(&rig, HOLDER));
     permit_rig_wait(&rig, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
 }

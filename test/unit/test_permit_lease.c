@@ -38,6 +38,7 @@ static void test_permit_lease_after_arm_lasts_a_second(void) {
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.stop.from);
     TEST_ASSERT_EQUAL_UINT32(1, rig.permit.stop.number);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.permit.stop.sides);
     TEST_ASSERT_TRUE(rig.permit.stop.at_us == rig.now_us);
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
@@ -102,7 +103,7 @@ static void test_permit_drive_at_or_after_the_end_does_not_revive_the_lease(void
         arm();
         (void)permit_rig_drive(&rig, HOLDER, true);
         rig.now_us += MS(200) + late_us[i];
-        TEST_ASSERT_TRUE(IW_REFUSE_NONE != permit_rig_drive(&rig, HOLDER, true));
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
         permit_rig_step(&rig);
         TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
@@ -178,6 +179,21 @@ static void test_permit_takeover_at_rest_moves_the_lease(void) {
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stop.client);
 }
 
+static void test_permit_takeover_makes_only_later_commands_fresh(void) {
+    arm();
+    permit_rig_wait(&rig, MS(100));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_STALE_COMMAND, iw_permit_drive(&rig.permit, rig.now_us - 1U, OTHER, true));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_permit_drive(&rig.permit, rig.now_us, OTHER, true));
+}
+
+static void test_permit_takeover_while_armed_does_not_wait_for_room_to_send(void) {
+    arm();
+    rig.view.can_send = false; // A pair of ours is on its way, as in every other step.
+    permit_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
+}
+
 static void test_permit_takeover_in_motion_is_refused(void) {
     arm();
     rig.view.at_rest = false;
@@ -220,6 +236,7 @@ static void test_permit_disconnect_of_the_holder_ends_the_lease_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, rig.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.detail);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.permit.stop.sides);
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
@@ -258,6 +275,7 @@ static void test_permit_stop_needs_no_lease_and_ramps(void) {
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
         TEST_ASSERT_EQUAL_INT(causes[i], rig.permit.stop.cause);
         TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.detail);
+        TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, rig.permit.stop.sides);
         TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stop.client);
         TEST_ASSERT_EQUAL_INT(123, rig.permit.stop.applied.wheel[IW_LEFT].speed_mm_s);
     }
@@ -295,6 +313,8 @@ int main(void) {
     RUN_TEST(test_permit_refused_drive_changes_nothing_but_the_memory_of_it);
     RUN_TEST(test_permit_arm_of_another_client_is_busy);
     RUN_TEST(test_permit_takeover_at_rest_moves_the_lease);
+    RUN_TEST(test_permit_takeover_makes_only_later_commands_fresh);
+    RUN_TEST(test_permit_takeover_while_armed_does_not_wait_for_room_to_send);
     RUN_TEST(test_permit_takeover_in_motion_is_refused);
     RUN_TEST(test_permit_takeover_from_a_holder_who_wants_to_move_is_stale);
     RUN_TEST(test_permit_takeover_of_nothing_is_an_ordinary_arm);

@@ -51,6 +51,7 @@ static void test_setpoint_braking_follows_time_at_every_period(void) {
             const iw_pair_t pair = setpoint_rig_take_next(&rig);
             const int64_t ideal = 1000 - (int64_t)(rig.now_us - start_us) * rig.config.decel_mm_s2 / 1000000;
             TEST_ASSERT_INT_WITHIN(1, ideal < 0 ? 0 : ideal, pair.wheel[IW_LEFT].speed_mm_s);
+            TEST_ASSERT_TRUE_MESSAGE(rig.now_us <= start_us + MS(1000), "does not come to zero");
         } while (!setpoint_rig_is_zero(&rig));
     }
 }
@@ -64,6 +65,33 @@ static void test_setpoint_ramps_count_fractions_of_a_millisecond(void) {
         const int64_t ideal = (int64_t)(rig.now_us - start_us) * 800 / 1000000;
         TEST_ASSERT_INT_WITHIN(1, ideal, pair.wheel[IW_LEFT].speed_mm_s);
     }
+}
+
+static void test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond(void) {
+    static const struct {
+        uint16_t after_us;
+        int16_t target_mm_s;
+        int16_t expected_mm_s;
+    } cases[] = {{20500, 410, 410}, {20999, 420, 419}, {21000, 420, 420}}; // 20 mm/s per ms.
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        setUp();
+        rig.config.accel_mm_s2 = 20000;
+        setpoint_rig_follow(&rig);
+        setpoint_rig_command(&rig, cases[i].target_mm_s, cases[i].target_mm_s, 2000);
+        const iw_pair_t pair = setpoint_rig_take_after(&rig, cases[i].after_us);
+        TEST_ASSERT_EQUAL_INT16(cases[i].expected_mm_s, pair.wheel[IW_LEFT].speed_mm_s);
+    }
+}
+
+static void test_setpoint_ramp_that_has_hardly_begun_goes_on(void) {
+    iw_pair_t pair;
+    rig.config.accel_mm_s2 = 2000;
+    setpoint_rig_follow(&rig);
+    setpoint_rig_command(&rig, 1, 1, 2000);
+    iw_setpoint_take(&rig.setpoint, rig.now_us + 1U, &pair);
+    TEST_ASSERT_FALSE(setpoint_rig_is_zero(&rig)); // A thousandth of a mm/s.
+    pair = setpoint_rig_take_next(&rig);
+    TEST_ASSERT_EQUAL_INT16(1, pair.wheel[IW_LEFT].speed_mm_s);
 }
 
 static void test_setpoint_slower_command_uses_the_slope_towards_zero(void) {
@@ -85,6 +113,16 @@ static void test_setpoint_late_call_away_from_zero_is_granted_two_periods(void) 
         TEST_ASSERT_TRUE(between(31, pair.wheel[IW_LEFT].speed_mm_s, 32));
         TEST_ASSERT_TRUE(between(31, pair.wheel[IW_RIGHT].speed_mm_s, 32));
     }
+}
+
+static void test_setpoint_late_call_is_granted_not_a_microsecond_more(void) {
+    rig.config.period_ms = 50;
+    rig.config.accel_mm_s2 = 20000;
+    rig.config.max_speed_mm_s = 5000;
+    setpoint_rig_follow(&rig);
+    setpoint_rig_command(&rig, 5000, 5000, 2000);
+    const iw_pair_t pair = setpoint_rig_take_after(&rig, MS(300));
+    TEST_ASSERT_TRUE(between(1999, pair.wheel[IW_LEFT].speed_mm_s, 2000));
 }
 
 static void test_setpoint_late_call_towards_zero_counts_all_of_the_time(void) {
@@ -178,6 +216,10 @@ static void test_setpoint_command_counts_under_follow_only(void) {
         setUp();
         setpoint_rig_demand(&rig, deaf[i]);
         setpoint_rig_command(&rig, 1000, 1000, 2000);
+        for (uint32_t n = 0; n < 50 && deaf[i] != IW_DEMAND_SILENCE; n++) {
+            (void)setpoint_rig_take_next(&rig);
+            TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
+        }
         setpoint_rig_demand(&rig, IW_DEMAND_FOLLOW);
         for (uint32_t n = 0; n < 50; n++) {
             (void)setpoint_rig_take_next(&rig);
@@ -301,8 +343,11 @@ int main(void) {
     RUN_TEST(test_setpoint_acceleration_follows_time_at_every_period);
     RUN_TEST(test_setpoint_braking_follows_time_at_every_period);
     RUN_TEST(test_setpoint_ramps_count_fractions_of_a_millisecond);
+    RUN_TEST(test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond);
+    RUN_TEST(test_setpoint_ramp_that_has_hardly_begun_goes_on);
     RUN_TEST(test_setpoint_slower_command_uses_the_slope_towards_zero);
     RUN_TEST(test_setpoint_late_call_away_from_zero_is_granted_two_periods);
+    RUN_TEST(test_setpoint_late_call_is_granted_not_a_microsecond_more);
     RUN_TEST(test_setpoint_late_call_towards_zero_counts_all_of_the_time);
     RUN_TEST(test_setpoint_braking_after_huge_gaps_is_zero);
     RUN_TEST(test_setpoint_small_slopes_accumulate);

@@ -302,6 +302,14 @@ static void test_setpoint_after_silence_starts_from_zero_without_the_old_command
     TEST_ASSERT_TRUE(iw_setpoint_is_zero(&setpoint));
 }
 
+static void test_setpoint_first_pair_after_a_short_silence_is_due_at_once(void) {
+    iw_setpoint_demand(&setpoint, 1000, IW_DEMAND_FOLLOW);
+    take_at(1000);
+    iw_setpoint_demand(&setpoint, 2000, IW_DEMAND_SILENCE);
+    iw_setpoint_demand(&setpoint, 3000, IW_DEMAND_FOLLOW);
+    assert_only_due_from(3000);
+}
+
 static void test_setpoint_due_does_not_change_anything(void) {
     cruise(FIXTURE_START_US, 400, 400);
     const iw_setpoint_t before = setpoint;
@@ -334,6 +342,7 @@ int main(void) {
     RUN_TEST(test_setpoint_demand_zero_is_due_at_once_even_right_after_a_pair);
     RUN_TEST(test_setpoint_demand_silence_ends_everything_at_once);
     RUN_TEST(test_setpoint_after_silence_starts_from_zero_without_the_old_command);
+    RUN_TEST(test_setpoint_first_pair_after_a_short_silence_is_due_at_once);
     RUN_TEST(test_setpoint_due_does_not_change_anything);
     return UNITY_END();
 }

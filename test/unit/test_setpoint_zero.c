@@ -104,6 +104,16 @@ static void test_setpoint_current_setpoint_scales_with_the_speed(void) {
     }
 }
 
+static void test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the_current(void) {
+    rig.config.current_role = IW_ROLE_SETPOINT;
+    rig.config.max_speed_mm_s = 10;
+    rig.config.decel_mm_s2 = 20000;
+    setpoint_rig_cruise(&rig, 10, 10, 2000);
+    setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
+    (void)setpoint_rig_take_after(&rig, MS(2000));
+    TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
+}
+
 static void test_setpoint_current_without_speed_is_no_zero_and_stops_in_time(void) {
     rig.config.current_role = IW_ROLE_SETPOINT;
     setpoint_rig_follow(&rig);
@@ -139,6 +149,9 @@ static void test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain(v
         const iw_pair_t right_current = {{{0, 0}, {0, 5}}};
         iw_setpoint_command(&rig.setpoint, rig.now_us, &right_current);
         TEST_ASSERT_EQUAL_INT(roles[i] == IW_ROLE_LIMIT, iw_setpoint_next_is_zero(&rig.setpoint));
+        const iw_pair_t left_current = {{{0, 5}, {0, 0}}};
+        iw_setpoint_command(&rig.setpoint, rig.now_us, &left_current);
+        TEST_ASSERT_EQUAL_INT(roles[i] == IW_ROLE_LIMIT, iw_setpoint_next_is_zero(&rig.setpoint));
         setpoint_rig_command(&rig, 0, 600, 0);
         (void)setpoint_rig_take_next(&rig);
         (void)setpoint_rig_take_next(&rig);
@@ -172,6 +185,7 @@ int main(void) {
     RUN_TEST(test_setpoint_limit_current_is_not_ramped);
     RUN_TEST(test_setpoint_zero_with_a_current_setpoint_carries_no_current);
     RUN_TEST(test_setpoint_current_setpoint_scales_with_the_speed);
+    RUN_TEST(test_setpoint_steepest_slope_and_slowest_machine_do_not_overflow_the_current);
     RUN_TEST(test_setpoint_current_without_speed_is_no_zero_and_stops_in_time);
     RUN_TEST(test_setpoint_next_is_zero_only_if_neither_ramp_nor_command_remain);
     RUN_TEST(test_setpoint_current_setpoint_changes_sign_through_zero);

@@ -34,18 +34,23 @@ static void hear_speed(int16_t rpm) {
     iw_wheel_hear(&wheel, now_us, &message, true);
 }
 
-/// A jump of that many ticks, so long after the status frame before it.
-static iw_reboot_t jump(int32_t ticks, iw_time_us_t after_us) {
+/// From one reading to another, so long after it.
+static iw_reboot_t jump_from(int32_t from, int32_t to, iw_time_us_t after_us) {
     begin_side(IW_LEFT);
-    hear_ticks(5000);
+    hear_ticks(from);
     const iw_time_us_t until_us = now_us + after_us;
     while (now_us + MS(500) < until_us) {
         now_us += MS(500);
         hear_speed(0);
     }
     now_us = until_us - MS(40);
-    hear_ticks(5000 + ticks);
+    hear_ticks(to);
     return iw_wheel_take_reboot(&wheel);
+}
+
+/// A jump of that many ticks, so long after the status frame before it.
+static iw_reboot_t jump(int32_t ticks, iw_time_us_t after_us) {
+    return jump_from(5000, 5000 + ticks, after_us);
 }
 
 static void test_wheel_first_status_frame_is_no_distance(void) {
@@ -131,6 +136,22 @@ static void test_wheel_jump_after_hours_without_status_is_still_judged(void) {
 }
 
 /// One tick of a wheel of 192 mm is 20.10619 mm, 1 rpm is 20.10619 mm/s.
+static void test_wheel_jump_is_judged_to_the_microsecond(void) {
+    config.radius_mm = 500; // 5236 us per tick at 10 m/s.
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump(40, 52360));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(40, 52359));
+}
+
+static void test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick(void) {
+    config.radius_mm = 20;
+    config.gear_turns = 100; // 2 us per tick at 10 m/s: in 71 minutes as far as the counter reaches.
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump_from(0, INT32_MAX, 4294967233U));
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump_from(0, INT32_MAX, 4294967234U));
+    TEST_ASSERT_EQUAL_INT64(INT32_MAX, wheel.ticks);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, jump_from(0, INT32_MIN, UINT32_MAX));
+    TEST_ASSERT_EQUAL_INT64(INT32_MIN, wheel.ticks);
+}
+
 static void test_wheel_distance_and_speed_of_the_documented_wheel(void) {
     hear_ticks(0);
     hear_ticks(10);
@@ -235,6 +256,8 @@ int main(void) {
     RUN_TEST(test_wheel_jump_is_judged_by_the_time_it_took);
     RUN_TEST(test_wheel_small_jump_is_believed_whatever_the_time);
     RUN_TEST(test_wheel_jump_after_hours_without_status_is_still_judged);
+    RUN_TEST(test_wheel_jump_is_judged_to_the_microsecond);
+    RUN_TEST(test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick);
     RUN_TEST(test_wheel_distance_and_speed_of_the_documented_wheel);
     RUN_TEST(test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only);
     RUN_TEST(test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere);

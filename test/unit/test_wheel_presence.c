@@ -59,9 +59,18 @@ static void test_wheel_never_heard_is_lost_and_not_at_rest(void) {
     TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_TRUE(wheel.speed_us == IW_NEVER);
+    TEST_ASSERT_TRUE(wheel.rest_since_us == IW_NEVER);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     iw_wheel_excuse(&wheel, now_us + MS(100));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us + MS(100)));
+}
+
+static void test_wheel_never_heard_is_not_heard_when_time_has_just_begun(void) {
+    iw_wheel_init(&wheel, &config, IW_LEFT, 0);
+    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, 0));
+    TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, 1000));
+    TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, 1000));
 }
 
 static void test_wheel_is_heard_for_exactly_its_silence_limit(void) {
@@ -95,6 +104,7 @@ static void test_wheel_is_not_found_by_frames_of_unknown_age(void) {
     TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
     TEST_ASSERT_EQUAL_INT(7, wheel.speed.speed_rpm);
+    TEST_ASSERT_TRUE(wheel.speed_us == now_us);
     hear(0);
     now_us += SILENT_US - 1U;
     hear_as(0, false);
@@ -247,6 +257,15 @@ static void test_wheel_offset_frames_after_their_time_tell_of_a_reboot(void) {
     TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
 }
 
+static void test_wheel_other_frames_tell_of_no_reboot_however_late(void) {
+    static const iw_proto_kind_t others[] = {IW_PROTO_SPEED, IW_PROTO_STATUS, IW_PROTO_FORCE, IW_PROTO_POSE};
+    hear_for(MS(70000), 0);
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        hear_other(others[i]);
+        TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    }
+}
+
 static void test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew(void) {
     hear(0);
     hear_status(1000000);
@@ -263,6 +282,7 @@ static void test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew(voi
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_wheel_never_heard_is_lost_and_not_at_rest);
+    RUN_TEST(test_wheel_never_heard_is_not_heard_when_time_has_just_begun);
     RUN_TEST(test_wheel_is_heard_for_exactly_its_silence_limit);
     RUN_TEST(test_wheel_is_kept_alive_by_speed_frames_only);
     RUN_TEST(test_wheel_is_not_found_by_frames_of_unknown_age);
@@ -277,6 +297,7 @@ int main(void) {
     RUN_TEST(test_wheel_silence_of_our_own_stall_is_no_reboot);
     RUN_TEST(test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen);
     RUN_TEST(test_wheel_offset_frames_after_their_time_tell_of_a_reboot);
+    RUN_TEST(test_wheel_other_frames_tell_of_no_reboot_however_late);
     RUN_TEST(test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew);
     return UNITY_END();
 }

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+// The sender alone: whole pairs, both or none, what it counts and how it begins.
+#include "fake_bus.h"
+#include "iwheel/sender.h"
+#include "unity.h"
+#include <string.h>
+
+static const iw_pair_t zero_pair = {{{0, 2000}, {0, 2000}}};
+
+static iw_config_t config;
+static fake_bus_t bus;
+static iw_hal_t hal;
+static iw_sender_t sender;
+static iw_time_us_t now_us;
+
+void setUp(void) {
+    fixture_config(&config);
+    now_us = FIXTURE_START_US;
+    fake_bus_init(&bus, now_us);
+    hal = fake_bus_hal(&bus);
+    memset(&sender, FIXTURE_POISON, sizeof sender);
+    iw_sender_init(&sender, &config, &hal);
+}
+
+void tearDown(void) {}
+
+static iw_send_result_t send(int16_t left_mm_s, int16_t right_mm_s) {
+    iw_pair_t pair = zero_pair;
+    pair.wheel[IW_LEFT].speed_mm_s = left_mm_s;
+    pair.wheel[IW_RIGHT].speed_mm_s = right_mm_s;
+    return iw_sender_send(&sender, now_us, &pair, left_mm_s == 0 && right_mm_s == 0);
+}
+
+static void echo(iw_side_t side) {
+    iw_outbox_echo(&sender.outbox, side, &bus.last[side]);
+}
+
+/// A whole pair of zeros, echoed.
+static void send_whole(iw_time_us_t after_us) {
+    now_us += after_us;
+    TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+    echo(IW_LEFT);
+    echo(IW_RIGHT);
+}
+
+static void test_sender_begins_with_nothing_sent_and_nothing_under_way(void) {
+    TEST_ASSERT_TRUE(iw_sender_ready(&sender, false));
+    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&sender.outbox) == IW_NEVER);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.outbox.stray);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.gate.stopped);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_max_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.pairs);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.later);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.clamped);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, sender.verdict);
+}
+
+static void test_sender_first_pair_ends_no_gap(void) {
+    send_whole(0);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_max_us);
+    TEST_ASSERT_EQUAL_UINT32(1, sender.pairs);
+}
+
+static void test_sender_keeps_the_largest_gap_until_the_next_silence(void) {
+    send_whole(0);
+    send_whole(MS(20));
+    send_whole(MS(10));
+    TEST_ASSERT_EQUAL_UINT32(10000, sender.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(20000, sender.gap_max_us);
+    iw_sender_rest(&sender);
+    send_whole(MS(5000));
+    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_max_us);
+}
+
+static void test_sender_zero_to_one_wheel_only_is_no_whole_pair(void) {
+    static const iw_side_t blocked[] = {IW_LEFT, IW_RIGHT};
+    for (size_t i = 0; i < 2; i++) {
+        setUp();
+        const iw_side_t free = (blocked[i] == IW_LEFT) ? IW_RIGHT : IW_LEFT;
+        TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+        TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0)); // Behind the un-echoed ones: no third may follow.
+        echo(free);
+        TEST_ASSERT_TRUE(iw_sender_ready(&sender, true));
+        TEST_ASSERT_FALSE(iw_sender_ready(&sender, false));
+        TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
+        TEST_ASSERT_EQUAL_UINT32(5, bus.sent);
+        TEST_ASSERT_EQUAL_UINT32(2, sender.pairs);
+    }
+}
+
+static void test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the_left(void) {
+    bus.send_result[IW_LEFT] = 0;
+    TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(0, 0));
+    TEST_ASSERT_EQUAL_UINT32(1, bus.sent);
+    TEST_ASSERT_EQUAL_UINT32(1, sender.later);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.pairs);
+}
+
+static void test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused_left_one(void) {
+    bus.send_result[IW_LEFT] = 0;
+    TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(1, 1));
+    TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
+    TEST_ASSERT_EQUAL_UINT32(1, sender.later);
+}
+
+static void test_sender_remembers_why_the_gate_stopped_a_pair(void) {
+    TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, (int16_t)(config.max_speed_mm_s + 1)));
+    TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
+    send_whole(0);
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SPEED, sender.verdict);
+    TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, 100));
+    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, sender.verdict);
+}
+
+static void test_sender_purge_clears_the_account_only_if_the_port_surely_did(void) {
+    static const int results[] = {-1, 0, 1};
+    for (size_t i = 0; i < 3; i++) {
+        setUp();
+        (void)send(0, 0);
+        bus.purge_result = results[i];
+        TEST_ASSERT_EQUAL_INT(results[i] > 0, iw_sender_purge(&sender));
+        TEST_ASSERT_EQUAL_INT(results[i] > 0, iw_sender_ready(&sender, false));
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_sender_begins_with_nothing_sent_and_nothing_under_way);
+    RUN_TEST(test_sender_first_pair_ends_no_gap);
+    RUN_TEST(test_sender_keeps_the_largest_gap_until_the_next_silence);
+    RUN_TEST(test_sender_zero_to_one_wheel_only_is_no_whole_pair);
+    RUN_TEST(test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the_left);
+    RUN_TEST(test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused_left_one);
+    RUN_TEST(test_sender_remembers_why_the_gate_stopped_a_pair);
+    RUN_TEST(test_sender_purge_clears_the_account_only_if_the_port_surely_did);
+    return UNITY_END();
+}
