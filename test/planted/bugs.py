@@ -57,7 +57,7 @@ BUGS = [
     Bug("lateness-forgiven", "R7", "cycle.c", "} else if (blind_us >= IW_GATEWAY_STOP_US) {", "} else if (blind_us >= 100U * IW_GATEWAY_STOP_US) {"),
     Bug("late-ramps", "R7", "permit.c", "self->cut = cause == IW_CAUSE_LOOP_LATE;", "self->cut = false;"),
     Bug("burst-after-stall", "R7", "setpoint.c", "(elapsed_us < granted_us) ? elapsed_us : granted_us)", "elapsed_us)"),
-    Bug("excused-again-and-again", "R7", "wheel.c", "if (self->heard_us != IW_NEVER && self->heard_us >= self->excused_us) {", "if (self->heard_us != IW_NEVER) {"),
+    Bug("excused-again-and-again", "R7", "wheel.c", "if (self->heard_us >= self->excused_us) {", "if (self->heard_us != IW_NEVER) {"),
     Bug("late-frames-count", "R7", "cycle.c", "iw_wheel_hear(wheel, now_us, message, !self->stalled);", "iw_wheel_hear(wheel, now_us, message, true);"),
     Bug("steep", "R12", "setpoint.c", "ramp_step(config->accel_mm_s2,", "ramp_step(3U * config->accel_mm_s2,"),
     Bug("sign-not-through-zero", "R8", "setpoint.c", "const bool through_zero = *value != 0 && (target > 0) != (*value > 0);", "const bool through_zero = false;"),
