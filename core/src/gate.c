@@ -64,7 +64,7 @@ iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_c
     const iw_side_t side = left ? IW_LEFT : IW_RIGHT;
     iw_proto_setpoint_t setpoint;
     iw_gate_verdict_t verdict = IW_GATE_NOT_A_SETPOINT;
-    iw_proto_get_setpoint(frame, &setpoint);
+    iw_proto_read_setpoint(frame, &setpoint);
     if ((left || frame->id == IW_ID_RIGHT_SETPOINT) && frame->dlc == self->config->setpoint_dlc) {
         verdict = judge(self, now_us, side, &setpoint);
     }

@@ -5,12 +5,6 @@
 
 #include <string.h>
 
-#define FORMAT_BITS (IW_CAN_EXTENDED | IW_CAN_REMOTE | IW_CAN_ERROR | IW_CAN_FD)
-#define BATTERY     0
-#define TEMPERATURE 1
-#define ODOMETRY    2
-#define CPU         6
-
 IW_STATIC_ASSERT(IW_ID_RIGHT_SETPOINT == (IW_ID_LEFT_SETPOINT | IW_PROTO_SIDE_BIT), setpoint_side);
 IW_STATIC_ASSERT(IW_ID_RIGHT_SPEED == (IW_ID_LEFT_SPEED | IW_PROTO_SIDE_BIT), speed_side);
 IW_STATIC_ASSERT(IW_ID_RIGHT_STATUS == (IW_ID_LEFT_STATUS | IW_PROTO_SIDE_BIT), status_side);
@@ -22,67 +16,9 @@ static const uint16_t left_ids[] = {IW_ID_LEFT_SPEED, IW_ID_LEFT_STATUS, IW_ID_L
                                     IW_ID_NO_POSE,    IW_ID_LEFT_OFFSET, IW_ID_LEFT_SETPOINT};
 static const uint8_t lengths[] = {IW_DLC_SPEED, IW_DLC_STATUS, IW_DLC_FORCE,
                                   IW_DLC_POSE,  IW_DLC_OFFSET, IW_DLC_SETPOINT};
-#define KINDS (sizeof left_ids / sizeof left_ids[0])
-
-static void get_status(const uint8_t *data, iw_proto_status_t *out_status) {
-    out_status->battery_dV = data[BATTERY];
-    out_status->temperature_degC = data[TEMPERATURE];
-    out_status->odometry_ticks = iw_be_get_i32(&data[ODOMETRY]);
-    out_status->cpu_percent = data[CPU];
-}
-
-static void get_pose(const uint8_t *data, iw_proto_pose_t *out_pose) {
-    out_pose->x_mm = iw_be_get_i16(&data[0]);
-    out_pose->y_mm = iw_be_get_i16(&data[2]);
-    out_pose->z_mm = iw_be_get_i16(&data[4]);
-    out_pose->psi_mrad = iw_be_get_i16(&data[6]);
-}
-
-static void get_other(const iw_can_frame_t *frame, size_t kind, iw_proto_message_t *out_message) {
-    const uint8_t *const data = frame->data;
-    switch (kind) {
-    case IW_PROTO_STATUS:
-        get_status(data, &out_message->as.status);
-        break;
-    case IW_PROTO_FORCE:
-        out_message->as.force.force_raw = iw_be_get_i16(&data[0]);
-        out_message->as.force.debug_raw = iw_be_get_i16(&data[2]);
-        break;
-    case IW_PROTO_POSE:
-        get_pose(data, &out_message->as.pose);
-        break;
-    case IW_PROTO_OFFSET:
-        out_message->as.offset.offset_dN = iw_be_get_i16(&data[0]);
-        break;
-    case IW_PROTO_SETPOINT:
-    default:
-        iw_proto_get_setpoint(frame, &out_message->as.setpoint);
-        break;
-    }
-}
 
 iw_status_t iw_proto_decode_other(const iw_can_frame_t *frame, iw_proto_message_t *out_message) {
-    const uint32_t number = frame->id & ~FORMAT_BITS;
-    size_t kind = 0;
-    while (left_ids[kind] != (number & ~IW_PROTO_SIDE_BIT)) {
-        kind++;
-        if (kind == KINDS) {
-            return IW_ERR_ID;
-        }
-    }
-    if (number == IW_ID_NO_POSE) {
-        return IW_ERR_ID;
-    }
-    if (number != frame->id) {
-        return IW_ERR_FORMAT;
-    }
-    if (frame->dlc < lengths[kind] || frame->dlc > IW_CAN_DATA_MAX) {
-        return IW_ERR_LENGTH;
-    }
-    out_message->kind = (iw_proto_kind_t)kind;
-    out_message->side = (iw_side_t)((number >> IW_PROTO_SIDE_SHIFT) & 1U);
-    get_other(frame, kind, out_message);
-    return IW_OK;
+    return iw_proto_read_other(frame, out_message);
 }
 
 static void start_frame(iw_can_frame_t *out_frame, uint32_t id, uint8_t dlc) {
@@ -91,30 +27,11 @@ static void start_frame(iw_can_frame_t *out_frame, uint32_t id, uint8_t dlc) {
     out_frame->dlc = dlc;
 }
 
-bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoint, uint8_t dlc,
-                              iw_can_frame_t *out_frame) {
-    int32_t current_mA = setpoint->current_mA;
-    const bool clamped = (uint32_t)(current_mA + IW_CURRENT_LIMIT_mA) > 2U * IW_CURRENT_LIMIT_mA;
-    if (clamped) {
-        current_mA = (current_mA < 0) ? -IW_CURRENT_LIMIT_mA : IW_CURRENT_LIMIT_mA;
-    }
-    out_frame->id = IW_ID_LEFT_SETPOINT + ((uint32_t)side << IW_PROTO_SIDE_SHIFT);
-    out_frame->data[0] = setpoint->type;
-    iw_be_put_i16(&out_frame->data[1], setpoint->speed_mm_s);
-    iw_be_put_i16(&out_frame->data[3], (int16_t)current_mA);
-    out_frame->data[5] = 0;
-    out_frame->data[6] = 0;
-    out_frame->data[7] = 0;
-    out_frame->dlc = dlc;
-    out_frame->kind = IW_CAN_RECEIVED;
-    return clamped;
-}
-
 static void put_status(uint8_t *data, const iw_proto_status_t *status) {
-    data[BATTERY] = status->battery_dV;
-    data[TEMPERATURE] = status->temperature_degC;
-    iw_be_put_i32(&data[ODOMETRY], status->odometry_ticks);
-    data[CPU] = status->cpu_percent;
+    data[IW_PROTO_AT_BATTERY] = status->battery_dV;
+    data[IW_PROTO_AT_TEMPERATURE] = status->temperature_degC;
+    iw_be_put_i32(&data[IW_PROTO_AT_ODOMETRY], status->odometry_ticks);
+    data[IW_PROTO_AT_CPU] = status->cpu_percent;
 }
 
 static void put_pose(uint8_t *data, const iw_proto_pose_t *pose) {

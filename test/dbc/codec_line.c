@@ -100,7 +100,7 @@ static void set_values(iw_proto_message_t *message, const long *values) {
 }
 
 static void decode_line(uint32_t id, const char *hex) {
-    iw_can_frame_t frame = {id, 0, IW_CAN_RECEIVED, {0}};
+    iw_can_frame_t frame = {.id = id};
     iw_proto_message_t message;
     long values[VALUES_MAX];
     for (; frame.dlc < IW_CAN_DATA_MAX && strlen(hex) >= 2; hex += 2) {
@@ -121,7 +121,7 @@ static void decode_line(uint32_t id, const char *hex) {
 }
 
 static void encode_line(uint32_t id, const char *text) {
-    iw_can_frame_t frame = {0, 0, IW_CAN_RECEIVED, {0}};
+    iw_can_frame_t frame = {0};
     iw_proto_message_t message = {IW_PROTO_POSE, IW_LEFT, {.pose = {0, 0, 0, 0}}};
     long values[VALUES_MAX];
     char *rest = NULL;

@@ -16,7 +16,7 @@ DOCUMENT = ROOT / "docs/protocol.md"
 BEGIN = "<!-- golden vectors: begin (test/dbc/golden_table.py --update) -->\n"
 END = "<!-- golden vectors: end -->\n"
 
-ROW = re.compile(r'\{"([^"]+)",\s*\{(\d+)U, (\d+)U, IW_CAN_RECEIVED, \{([^}]*)\}\},\s*'
+ROW = re.compile(r'\{"([^"]+)",\s*\{\.id = (\d+)U, \.dlc = (\d+)U, \.data = \{([^}]*)\}\},\s*'
                  r"\{IW_PROTO_(\w+), IW_(\w+), \{\.\w+ = \{([^}]*)\}\}\}\}")
 
 

@@ -33,11 +33,10 @@ void tearDown(void) {}
 static iw_gate_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     const uint32_t speed = (uint32_t)speed_mm_s;
     const uint32_t current = (uint32_t)current_mA;
-    const iw_can_frame_t frame = {side == IW_LEFT ? 266U : 298U,
-                                  5,
-                                  IW_CAN_RECEIVED,
-                                  {7, (uint8_t)(speed >> 8 & 0xFFU), (uint8_t)(speed & 0xFFU),
-                                   (uint8_t)(current >> 8 & 0xFFU), (uint8_t)(current & 0xFFU)}};
+    const iw_can_frame_t frame = {.id = side == IW_LEFT ? 266U : 298U,
+                                  .dlc = 5,
+                                  .data = {7, (uint8_t)(speed >> 8 & 0xFFU), (uint8_t)(speed & 0xFFU),
+                                           (uint8_t)(current >> 8 & 0xFFU), (uint8_t)(current & 0xFFU)}};
     return iw_gate_check(&gate, now_us, &frame);
 }
 

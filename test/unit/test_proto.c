@@ -137,7 +137,7 @@ static void test_decode_own_echo_gives_the_same_values(void) {
 }
 
 static void test_decode_does_not_clamp_what_others_send(void) {
-    const iw_can_frame_t frame = {IW_ID_LEFT_SETPOINT, 5, IW_CAN_RECEIVED, {0xEE, 0x80, 0x00, 0x7F, 0xFF}};
+    const iw_can_frame_t frame = {.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .data = {0xEE, 0x80, 0x00, 0x7F, 0xFF}};
     iw_proto_message_t message;
     memset(&message, POISON, sizeof message);
     TEST_ASSERT_EQUAL_INT(IW_OK, iw_proto_decode(&frame, &message));

@@ -36,12 +36,15 @@ static inline void iw_be_put_i16(uint8_t *bytes, int16_t value) {
     bytes[1] = (uint8_t)(word & 0xFFU);
 }
 
-static inline void iw_be_put_i32(uint8_t *bytes, int32_t value) {
-    const uint32_t word = (uint32_t)value;
+static inline void iw_be_put_u32(uint8_t *bytes, uint32_t word) {
     bytes[0] = (uint8_t)(word >> 24);
     bytes[1] = (uint8_t)((word >> 16) & 0xFFU);
     bytes[2] = (uint8_t)((word >> 8) & 0xFFU);
     bytes[3] = (uint8_t)(word & 0xFFU);
+}
+
+static inline void iw_be_put_i32(uint8_t *bytes, int32_t value) {
+    iw_be_put_u32(bytes, (uint32_t)value);
 }
 
 #endif

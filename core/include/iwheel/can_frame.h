@@ -22,10 +22,10 @@ typedef enum {
 } iw_can_kind_t;
 
 typedef struct {
-    uint32_t id;  ///< 11-bit id, or'ed with IW_CAN_EXTENDED, IW_CAN_REMOTE, IW_CAN_ERROR, IW_CAN_FD.
-    uint8_t dlc;  ///< Number of bytes in `data`, 0..8.
-    uint8_t kind; ///< An iw_can_kind_t. Ignored when sending.
-    uint8_t data[IW_CAN_DATA_MAX];
+    uint32_t id;                   ///< 11-bit id, or'ed with IW_CAN_EXTENDED, IW_CAN_REMOTE, IW_CAN_ERROR, IW_CAN_FD.
+    uint8_t data[IW_CAN_DATA_MAX]; ///< At a multiple of four bytes: read and written a word at a time.
+    uint8_t dlc;                   ///< Number of bytes in `data`, 0..8.
+    uint8_t kind;                  ///< An iw_can_kind_t. Ignored when sending.
 } iw_can_frame_t;
 
 #endif

@@ -29,7 +29,21 @@ iw_status_t iw_proto_encode(const iw_proto_message_t *message, iw_can_frame_t *o
 
 /// Writes a setpoint of `dlc` 5..8 bytes, zero padded. The last line of defence for the current: it is clamped to
 /// +/- IW_CURRENT_LIMIT_mA. Returns true if it had to be, which the caller counts.
-bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoint, uint8_t dlc,
-                              iw_can_frame_t *out_frame);
+static inline bool iw_proto_encode_setpoint(iw_side_t side, const iw_proto_setpoint_t *setpoint, uint8_t dlc,
+                                            iw_can_frame_t *out_frame) {
+    int32_t current_mA = setpoint->current_mA;
+    const bool clamped = (uint32_t)(current_mA + IW_CURRENT_LIMIT_mA) > 2U * IW_CURRENT_LIMIT_mA;
+    if (clamped) {
+        current_mA = (current_mA < 0) ? -IW_CURRENT_LIMIT_mA : IW_CURRENT_LIMIT_mA;
+    }
+    const uint32_t current = (uint16_t)current_mA;
+    out_frame->id = IW_ID_LEFT_SETPOINT + ((uint32_t)side << IW_PROTO_SIDE_SHIFT);
+    iw_be_put_u32(&out_frame->data[0],
+                  ((uint32_t)setpoint->type << 24) | ((uint32_t)(uint16_t)setpoint->speed_mm_s << 8) | (current >> 8));
+    iw_be_put_u32(&out_frame->data[4], current << 24);
+    out_frame->dlc = dlc;
+    out_frame->kind = IW_CAN_RECEIVED;
+    return clamped;
+}
 
 #endif

@@ -22,9 +22,11 @@ __attribute__((always_inline)) static inline int16_t word(const uint8_t *bytes) 
     return (int16_t)(uint16_t)(((uint32_t)bytes[0] << 8) | bytes[1]);
 }
 
-__attribute__((always_inline)) static inline void put_word(uint8_t *bytes, int16_t value) {
-    bytes[0] = (uint8_t)((uint16_t)value >> 8);
-    bytes[1] = (uint8_t)((uint16_t)value & 0xFFU);
+__attribute__((always_inline)) static inline void put_long(uint8_t *bytes, uint32_t value) {
+    bytes[0] = (uint8_t)(value >> 24);
+    bytes[1] = (uint8_t)((value >> 16) & 0xFFU);
+    bytes[2] = (uint8_t)((value >> 8) & 0xFFU);
+    bytes[3] = (uint8_t)(value & 0xFFU);
 }
 
 __attribute__((always_inline)) static inline void two(const iw_can_frame_t *frame, two_t *out_two) {
@@ -82,9 +84,10 @@ uint32_t bench_encode(uint32_t rounds) {
         const bench_setpoint_t setpoint = {bench_setpoint.speed_mm_s, bench_setpoint.current_mA, bench_setpoint.type};
         encoded.id = ((i & 1U) == 0U) ? 0x10AU : 0x12AU;
         encoded.dlc = 5;
-        encoded.data[0] = setpoint.type;
-        put_word(&encoded.data[1], setpoint.speed_mm_s);
-        put_word(&encoded.data[3], setpoint.current_mA);
+        const uint16_t current = (uint16_t)setpoint.current_mA;
+        put_long(&encoded.data[0], ((uint32_t)setpoint.type << 24) | ((uint32_t)(uint16_t)setpoint.speed_mm_s << 8) |
+                                       ((uint32_t)current >> 8));
+        encoded.data[4] = (uint8_t)(current & 0xFFU);
         BENCH_STORED(&encoded);
     }
     return 0;
