@@ -66,6 +66,11 @@ static void keep_sentence(top_t *self, const json_t *stop) {
     (void)snprintf(self->model.last_stop, sizeof(self->model.last_stop), "%s%s",
                    json_integer_value(json_object_get(stop, "number")) > 0 ? "last stop: " : "",
                    sentence != NULL ? sentence : "");
+    // What to do about a latch stands in the line above it, and two lines hold no more than the rest.
+    char *const cure = strrchr(self->model.last_stop, ';');
+    if (cure != NULL && json_is_true(json_object_get(stop, "latched"))) {
+        *cure = '\0';
+    }
 }
 
 static void try_connect(top_t *self) {
