@@ -6,7 +6,11 @@ usage: planted_faults.py
 
 Works in a temporary folder. The last line is "N passed, N failed, N skipped"; a gate whose tool is missing is skipped.
 """
+import argparse
+import contextlib
+import importlib.machinery
 import importlib.util
+import io
 import re
 import shutil
 import subprocess
@@ -108,6 +112,19 @@ def counting(folder, case):
     return status or int(said.split()[-2]), said
 
 
+def mutation(_, kind):
+    """The gate's word on the ledger's mutants when one of them is judged anew like that."""
+    sys.path[:0] = [str(ROOT / "test/mutation"), str(ROOT / "test/planted")]
+    loader = importlib.machinery.SourceFileLoader("mutation_run", str(ROOT / "test/mutation/run"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("mutation_run", loader))
+    loader.exec_module(module)
+    record = module.Record({}, ["ledger.c"], {})
+    campaign = module.Campaign(None, record, {}, argparse.Namespace(jobs=1, update=False))
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        campaign.enter(next(key for key, mutant in record.mutants.items() if mutant.file == "ledger.c"), module.Verdict(kind))
+        return module.verdict_on(campaign, argparse.Namespace(update=False)), said.getvalue()
+
+
 def function(body, parameters="int a"):
     return CLEAN + f"int iw_g({parameters});\nint iw_g({parameters})\n{{\n{body}}}\n"
 
@@ -157,6 +174,8 @@ CASES = [
     (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
     (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),
+    (mutation, "clang", "seen", "killed", False),
+    (mutation, "clang", "lives", "lives", True),
     (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),
     (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
     (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),

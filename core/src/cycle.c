@@ -14,13 +14,11 @@ static uint8_t side_bit(size_t side) {
     return (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT;
 }
 
-static void excuse_wheels(iw_gateway_t *self, iw_time_us_t now_us) {
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        if (!iw_wheel_lost(&self->wheel[side], self->promised_us)) {
-            iw_wheel_excuse(&self->wheel[side], now_us);
-        }
-        iw_follow_restart(&self->follow[side]);
+static void excuse_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
+    if (!iw_wheel_lost(&self->wheel[side], self->promised_us)) {
+        iw_wheel_excuse(&self->wheel[side], now_us);
     }
+    iw_follow_restart(&self->follow[side]);
 }
 
 static iw_time_us_t take_lateness(iw_gateway_t *self, iw_time_us_t now_us) {
@@ -43,7 +41,8 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
     }
     if (late) {
         self->counters.late_steps++;
-        excuse_wheels(self, now_us);
+        excuse_wheel(self, now_us, IW_LEFT);
+        excuse_wheel(self, now_us, IW_RIGHT);
     }
     const iw_time_us_t run_us = now_us - self->stalled_since_us;
     const iw_time_us_t blind_us = (run_us > late_us) ? run_us : late_us;
@@ -246,16 +245,19 @@ static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, i
     }
 }
 
+static void watch_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side, int32_t applied_mm_s) {
+    const bool ours = self->permit.state == IW_STATE_ARMED || self->permit.state == IW_STATE_STOPPING;
+    if (ours && iw_wheel_heard(&self->wheel[side], now_us)) {
+        watch_follow(self, now_us, side, applied_mm_s);
+    } else {
+        iw_follow_restart(&self->follow[side]);
+    }
+}
+
 static void watch_wheels(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
-    const bool ours = self->permit.state == IW_STATE_ARMED || self->permit.state == IW_STATE_STOPPING;
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        if (ours && iw_wheel_heard(&self->wheel[side], now_us)) {
-            watch_follow(self, now_us, side, applied.wheel[side].speed_mm_s);
-        } else {
-            iw_follow_restart(&self->follow[side]);
-        }
-    }
+    watch_wheel(self, now_us, IW_LEFT, applied.wheel[IW_LEFT].speed_mm_s);
+    watch_wheel(self, now_us, IW_RIGHT, applied.wheel[IW_RIGHT].speed_mm_s);
 }
 
 static bool both_at_rest(const iw_gateway_t *self, iw_time_us_t now_us, uint32_t for_us) {
@@ -304,12 +306,7 @@ void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_setpoint_demand(&self->setpoint, now_us, demand);
     if (demand == IW_DEMAND_SILENCE) {
         iw_sender_rest(&self->sender);
-        return;
-    }
-    if (self->bus < IW_BUS_PASSIVE) {
-        return;
-    }
-    if (send_pair(self, now_us) == IW_SEND_STOPPED) {
+    } else if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
         iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
         (void)send_pair(self, now_us);

@@ -59,7 +59,7 @@ class Finder:
                     self.visit(body[0], None)
 
     def add(self, kind, span, text):
-        if self.source[span[0]:span[1]] != text:
+        if span and self.source[span[0]:span[1]] != text:
             self.found.append(Mutant(self.path.name, self.function, kind, *span, text))
 
     def span(self, node):
@@ -78,6 +78,8 @@ class Finder:
         handler = getattr(self, f"visit_{kind}", None)
         if handler:
             handler(node)
+        if kind == "CallExpr" and parent["kind"] not in ("CompoundStmt", "CStyleCastExpr") and node["type"]["qualType"] != "void":
+            self.add("call", self.span(node), "0")
         if kind == "CaseStmt":
             node = {**node, "inner": node["inner"][1:]}
         for child in node.get("inner", ()):
@@ -103,7 +105,7 @@ class Finder:
         span, operator = self.span(node), node["opcode"]
         if not span:
             return
-        if operator in ("!", "-", "~"):
+        if operator in ("!", "-", "~") and self.source[span[0]] == operator:
             self.add("operator", (span[0], span[0] + 1), "")
         elif operator in ("++", "--"):
             at = self.source.find(operator, *span)
@@ -161,15 +163,17 @@ class Finder:
                 self.add("statement", self.span(child), "")
 
 
+def function_spans(source):
+    """{function: (begin, end)}"""
+    return {match[1]: match.span() for match in re.finditer(r"^[\w \*]*?\b(\w+)\([^;{}]*\) \{$.*?^\}$", source, re.M | re.S)}
+
+
 def functions(path):
     """{function: its text}, for telling whether it changed."""
     source = Path(path).read_text()
-    found = {}
-    for match in re.finditer(r"^[\w \*]*?\b(\w+)\([^;{}]*\) \{$.*?^\}$", source, re.M | re.S):
-        found[match[1]] = match[0]
-    return found
+    return {name: source[begin:end] for name, (begin, end) in function_spans(source).items()}
 
 
 def mutants(path):
     """Each change once."""
-    return list(dict.fromkeys(Finder(path).found))
+    return list({(mutant.begin, mutant.end, mutant.text): mutant for mutant in reversed(Finder(path).found)}.values())[::-1]

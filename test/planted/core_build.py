@@ -8,10 +8,14 @@ import os
 import re
 import resource
 import shutil
+import signal
 import subprocess
 import sys
+import tempfile
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test/support"))
@@ -19,18 +23,64 @@ from core_tests import core_tests
 
 CORE = ROOT / "core/src"
 INCLUDE = [f"-I{ROOT / path}" for path in ("core/include", "core/src", "app/sim/model/include", "test/sim", "test/support")]
-# Seconds of processor time, not of the clock: a busy machine must not look like an endless loop.
-CPU_LIMIT_S = {"unit": 2, "slow": 8, "sim": 30, "orders": 20}
+# A judge is stopped when it has used so many times the processor time it needs with the core as it is, and so many seconds more:
+# far beyond what a busy machine can add, so that only what does not end is taken for an endless loop.
+TIMES, MORE_S, UNMEASURED_S = 10, 3, 600
+OUTPUT_MAX = 64 << 20
 GCC = ["ccache", "gcc"] if shutil.which("ccache") else ["gcc"]
 # A change that reads or writes beyond an array must not pass unseen: it ends the program.
 BOUNDS = ("-fsanitize=bounds-strict,shift,signed-integer-overflow", "-fsanitize-undefined-trap-on-error")
+# What is read without having been written is the same in every run.
+PATTERN = ("-ftrivial-auto-var-init=pattern",)
+# By these signals a program ends because of what the core did; any other is somebody else's doing and proves nothing.
+CRASHES = {signal.SIGILL, signal.SIGTRAP, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT}
+NUMBER = "IWHEEL_MUTANT"
+ENDLESS = {signal.SIGXCPU, signal.SIGXFSZ}
 # Unit tests that sweep every value come last: most changes are caught long before them.
 SLOW = ("outbox", "gateway_core_walk", "bit_timing", "proto_sweep", "gate_scheduler")
 
 
-def limit_cpu(seconds):
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+class Run(NamedTuple):
+    """How a judge ended."""
+    status: int
+    output: str
+    cpu_s: float
+
+    @property
+    def endless(self):
+        return -self.status in ENDLESS
+
+    @property
+    def how(self):
+        """Without its own words: how it ended."""
+        if self.endless:
+            return "does not end"
+        return f"ends by {signal.Signals(-self.status).name}" if self.status < 0 else f"ends with status {self.status}"
+
+
+class Core(NamedTuple):
+    """A changed core: where its library is, and which of the changes that are in it is in force (test/mutation/schemata.py)."""
+    folder: Path
+    number: int = 0
+
+
+def play(command, core, limit_s):
+    """Runs a program with that core. Raises if it was ended from outside."""
+    def limit():
+        resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 5))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (OUTPUT_MAX, OUTPUT_MAX))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+    with tempfile.TemporaryFile() as said:
+        child = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.DEVNULL, cwd=core.folder,
+                                 env={**os.environ, "LD_LIBRARY_PATH": str(core.folder), NUMBER: str(core.number)}, preexec_fn=limit)
+        _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        said.seek(0)
+        run = Run(child.returncode, said.read().decode(errors="replace"), usage.ru_utime + usage.ru_stime)
+    if run.status < 0 and -run.status not in CRASHES | ENDLESS:
+        raise RuntimeError(f"{command[0]} was ended from outside: {run.how}")
+    return run
 
 
 def compile_file(source, out, *flags, gcc=("gcc",)):
@@ -44,88 +94,97 @@ class Judges:
 
     def __init__(self, work, unity, jobs):
         self.work, self.jobs = Path(work), jobs
-        self.folder = self.work / "clean"
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self.objects = {}
+        self.clean = Core(self.work / "clean")
+        self.clean.folder.mkdir(parents=True, exist_ok=True)
+        self.objects, self.limits, self.lock = {}, {}, threading.Lock()
         self.tests = core_tests()
         sim = sorted((ROOT / "test/sim").glob("*.c"))
         programs = {f"unit_{name}": [*map(Path, sources), Path(unity) / "unity.c"] for name, sources in self.tests.items()}
         programs["test_sim"] = [*(path for path in sim if path.name != "hashes.c"), *sorted((ROOT / "app/sim/model/src").glob("*.c"))]
         programs["test_orders"] = [*sorted((ROOT / "test/orders").glob("*.c")), *(path for path in sim if path.name.startswith("oracle"))]
+        self.programs = programs
         others = sorted({path for sources in programs.values() for path in sources})
         with ThreadPoolExecutor(jobs) as pool:
             list(pool.map(self.compile_core, sorted(CORE.glob("*.c"))))
             objects = dict(zip(others, pool.map(lambda path: self.compile_other(path, unity), others)))
-            self.link(self.folder, {})
+            self.link(self.clean.folder, {})
             list(pool.map(lambda name: self.build(name, [objects[path] for path in programs[name]]), programs))
 
     def compile_core(self, source):
-        self.objects[source.name] = self.folder / (source.stem + ".o")
+        self.objects[source.name] = self.clean.folder / (source.stem + ".o")
         said = compile_file(source, self.objects[source.name], "-O1", "-fPIC", gcc=GCC)
         if said:
             raise RuntimeError(said)
 
     def compile_other(self, source, unity):
         out = self.work / f"{source.parent.name}_{source.stem}.o"
-        said = compile_file(source, out, "-O2", f"-I{unity}", "-DUNITY_SUPPORT_64", gcc=GCC)
+        said = compile_file(source, out, "-O2", *PATTERN, f"-I{unity}", "-DUNITY_SUPPORT_64", gcc=GCC)
         if said:
             raise RuntimeError(said)
         return out
 
     def build(self, name, objects):
-        subprocess.run(["gcc", *objects, f"-L{self.folder}", "-liwheel", "-o", self.work / name], check=True)
+        subprocess.run(["gcc", *objects, f"-L{self.clean.folder}", "-liwheel", "-o", self.work / name], check=True)
 
     def link(self, folder, replaced):
         objects = [replaced.get(name, path) for name, path in sorted(self.objects.items())]
         subprocess.run(["ld", "-shared", *objects, "-o", folder / "libiwheel.so"], check=True)
 
     def change(self, name, file, text):
-        """The folder of a core in which `file` has that text; None if it does not compile."""
+        """(a core in which `file` has that text, None), or (None, what the compiler said)."""
         folder = self.work / "changed" / name
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         (folder / file).write_text(text)
-        if compile_file(folder / file, folder / "changed.o", "-O0", "-fPIC", *BOUNDS):
-            shutil.rmtree(folder)
-            return None
+        said = compile_file(folder / file, folder / "changed.o", "-O0", "-fPIC", *BOUNDS, *PATTERN)
+        if said and "error:" not in said:
+            raise RuntimeError(said)
+        if said:
+            return None, said
         self.link(folder, {file: folder / "changed.o"})
-        return folder
+        return Core(folder), None
 
-    def run(self, folder, kind, *command):
-        environment = {**os.environ, "LD_LIBRARY_PATH": str(folder)}
-        return subprocess.run([str(word) for word in command], capture_output=True, text=True, errors="replace", cwd=folder,
-                              env=environment, stdin=subprocess.DEVNULL, preexec_fn=lambda: limit_cpu(CPU_LIMIT_S[kind]))
+    def limit_s(self, command):
+        """Seconds of processor time for it: measured once, with the core as it is."""
+        with self.lock:
+            if command not in self.limits:
+                self.limits[command] = int(TIMES * play(command, self.clean, UNMEASURED_S).cpu_s) + MORE_S
+            return self.limits[command]
 
-    def failing(self, folder, names):
-        """(the first of these programs that fails, its first failing test), or None."""
+    def run(self, core, program, *arguments):
+        command = (self.work / program, *arguments)
+        return play(command, core, self.limit_s(command))
+
+    def failing(self, core, names):
+        """(the first of these programs that fails, its first failing test, how it ended), or None."""
         for name in names:
-            done = self.run(folder, "slow" if name in SLOW else "unit", self.work / f"unit_{name}")
-            if done.returncode != 0:
-                found = re.search(r":(test_\w+):FAIL", done.stdout)
-                return name, found[1] if found else f"unit_{name} ends with status {done.returncode}"
+            done = self.run(core, f"unit_{name}")
+            if done.status != 0:
+                found = re.search(r":(test_\w+):FAIL", done.output)
+                return name, None if done.endless or not found else found[1], done
         return None
 
-    def unit(self, folder, first=()):
+    def unit(self, core, first=()):
         """The first unit test that fails, or None. `first`: what to begin with."""
-        found = self.failing(folder, sorted(self.tests, key=lambda name: (name in SLOW, not any(part in name for part in first), name)))
-        return found and found[1]
+        found = self.failing(core, sorted(self.tests, key=lambda name: (name in SLOW, not any(part in name for part in first), name)))
+        return found and (found[1] or f"unit_{found[0]} {found[2].how}")
 
-    def sim(self, folder, hours=4):
+    def sim(self, core, hours=4):
         """What the swarm finds, or None."""
-        done = self.run(folder, "sim", self.work / "test_sim", "--quick", "--hours", hours)
-        if done.returncode == 0:
+        done = self.run(core, "test_sim", "--quick", "--hours", hours)
+        if done.status == 0:
             return None
-        found = re.search(r"^FAILED seed (\d+) at .*?, rule (\d+): (.*)$", done.stdout, re.M)
-        return f"rule {found[2]}, seed {found[1]}: {found[3]}" if found else f"ends with status {done.returncode}"
+        found = re.search(r"^FAILED seed (\d+) at .*?, rule (\d+): (.*)$", done.output, re.M)
+        return f"rule {found[2]}, seed {found[1]}: {found[3]}" if found else done.how
 
-    def orders(self, folder, length=3):
+    def orders(self, core, length=3):
         """What the enumeration of all orders finds, or None."""
-        done = self.run(folder, "orders", self.work / "test_orders", "--length", length)
-        if done.returncode == 0:
+        done = self.run(core, "test_orders", "--length", length)
+        if done.status == 0:
             return None
-        rule = re.search(r"^rule (\d+) at .*?: (.*)$", done.stdout, re.M)
-        small = re.search(r"^made small: --sequence (.*)$", done.stdout, re.M)
-        return f"rule {rule[1]}, {small[1]}: {rule[2]}" if rule and small else f"ends with status {done.returncode}"
+        rule = re.search(r"^rule (\d+) at .*?: (.*)$", done.output, re.M)
+        small = re.search(r"^made small: --sequence (.*)$", done.output, re.M)
+        return f"rule {rule[1]}, {small[1]}: {rule[2]}" if rule and small else done.how
 
 
 def find_unity(build):

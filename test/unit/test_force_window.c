@@ -93,11 +93,9 @@ static void test_force_deviation_is_told_to_a_millinewton(void) {
     TEST_ASSERT_EQUAL_UINT32(17, rig.force.quality.deviation_mN);
 }
 
-/// A window whose samples lie above and below zero in pairs: so many by `far`, the others by `near`.
-static void spread_pairs(uint32_t far_pairs, int16_t far, int16_t near) {
-    begin(IW_LEFT, false);
-    for (uint32_t pair = 0; pair < IW_FORCE_WINDOW_SAMPLES / 2U; pair++) {
-        const int16_t by = pair < far_pairs ? far : near;
+/// Pairs of samples that far above and below zero.
+static void hear_pairs(uint32_t pairs, int16_t by) {
+    for (uint32_t pair = 0; pair < pairs; pair++) {
         force_rig_hear(&rig, by, true);
         force_rig_hear(&rig, (int16_t)-by, true);
     }
@@ -110,10 +108,14 @@ static void test_force_wide_deviation_is_told_exactly(void) {
 }
 
 static void test_force_deviation_is_told_finer_up_to_a_variance_of_400000(void) {
-    spread_pairs(2, 2000, 0); // The root is 632.4.
-    TEST_ASSERT_EQUAL_UINT32(6324, rig.force.quality.deviation_mN);
-    spread_pairs(2, 2000, 2);
-    TEST_ASSERT_EQUAL_UINT32(6320, rig.force.quality.deviation_mN);
+    hear_pairs(2, 2000);
+    hear_pairs(18, 0);
+    TEST_ASSERT_EQUAL_UINT32(6324, rig.force.quality.deviation_mN); // The root of 400 000 is 632.4.
+    begin(IW_LEFT, false);
+    hear_pairs(2, 2000);
+    hear_pairs(1, 2);
+    hear_pairs(17, 1);
+    TEST_ASSERT_EQUAL_UINT32(6320, rig.force.quality.deviation_mN); // Of 400 001.
 }
 
 static void test_force_deviation_is_rounded_down(void) {
@@ -123,7 +125,8 @@ static void test_force_deviation_is_rounded_down(void) {
 }
 
 static void test_force_noise_a_millinewton_beyond_1_N_is_noisy(void) {
-    spread_pairs(2, 102, 100);
+    hear_pairs(2, 102);
+    hear_pairs(18, 100);
     TEST_ASSERT_EQUAL_UINT32(1001, rig.force.quality.deviation_mN);
     assert_window(IW_WINDOW_NOISY);
 }

@@ -99,6 +99,7 @@ static void test_gateway_sign_fault_is_evidence_from_the_bus(void) {
     rig.wheel[IW_LEFT].rpm = -15;
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_OVERSPEED] == IW_NEVER); // And nothing else.
     const iw_ledger_entry_t *const entry = iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_FEEDBACK_SIGN_LEFT);
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry->state);
     TEST_ASSERT_EQUAL_INT(IW_EVIDENCE_BUS, entry->evidence);
@@ -149,13 +150,108 @@ static void test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_righ
     gateway_rig_run(&rig, MS(5));
     const iw_time_us_t right_us = rig.bus.last_us[IW_RIGHT];
     rig.bus.send_result[IW_LEFT] = 0;
-    while (rig.bus.refused == 0U) {
+    for (unsigned i = 0; i < 25U && rig.bus.refused == 0U; i++) {
         gateway_rig_run(&rig, MS(1));
     }
+    TEST_ASSERT_EQUAL_UINT32(1, rig.bus.refused);
     TEST_ASSERT_EQUAL_UINT64(right_us, rig.bus.last_us[IW_RIGHT]);
     gateway_rig_run(&rig, MS(10));
     TEST_ASSERT_EQUAL_INT16(0, fake_bus_command(&rig.bus.last[IW_RIGHT]).speed_mm_s);
     TEST_ASSERT_TRUE(rig.bus.last_us[IW_RIGHT] > right_us);
+}
+
+static void test_gateway_lost_echo_is_given_a_second_before_it_is_asked_back(void) {
+    gateway_rig_run(&rig, MS(1100));
+    rig.bus.acknowledged = false;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    const iw_time_us_t second_us = iw_outbox_waiting_us(&rig.gateway.sender.outbox) + IW_GATEWAY_LOST_ECHO_US;
+    gateway_rig_run(&rig, second_us - 1U - rig.now_us);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_UINT32(0, rig.bus.purges);
+    gateway_rig_run(&rig, 1);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
+}
+
+/// Two seconds and a bit of force frames of the left wheel, turning at that speed.
+static void hear_force(int16_t raw, int16_t rpm) {
+    const iw_proto_message_t message = {IW_PROTO_FORCE, IW_LEFT, {.force = {.force_raw = raw}}};
+    iw_can_frame_t frame;
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = rpm;
+    for (unsigned i = 0; i < IW_FORCE_WINDOW_SAMPLES + 1U; i++) {
+        gateway_rig_run(&rig, MS(50));
+        (void)iw_proto_encode(&message, &frame);
+        fake_bus_put(&rig.bus, &frame);
+    }
+    gateway_rig_run(&rig, MS(10));
+}
+
+static void test_gateway_force_is_measured_at_rest_up_to_rest_rpm(void) {
+    const int16_t rest_rpm = (int16_t)rig.config.rest_rpm;
+    hear_force(100, rest_rpm);
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
+    gateway_rig_init(&rig);
+    hear_force(100, (int16_t)(rest_rpm + 1));
+    TEST_ASSERT_EQUAL_INT(IW_WINDOW_MOVING, rig.gateway.force[IW_LEFT].quality.window);
+}
+
+static void test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator(void) {
+    const iw_proto_message_t message = {IW_PROTO_OFFSET, IW_LEFT, {.offset = {.offset_dN = 100}}};
+    const iw_ledger_entry_t *const entry = iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_FORCE_UNIT_LEFT);
+    iw_can_frame_t frame;
+    gateway_rig_run(&rig, MS(500));
+    (void)iw_proto_encode(&message, &frame);
+    fake_bus_put(&rig.bus, &frame);
+    hear_force(100, 0);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry->state);
+    iw_ledger_confirm(&rig.gateway.ledger, IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_OPERATOR, 0);
+    hear_force(100, 0);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, entry->state);
+}
+
+static void test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starting(void) {
+    rig.wheel[IW_LEFT].mute = true;
+    gateway_rig_run(&rig, MS(2000));
+    rig.wheel[IW_LEFT].mute = false;
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_TRUE(rig.gateway.force[IW_LEFT].boot_seen);
+    TEST_ASSERT_FALSE(rig.gateway.force[IW_RIGHT].boot_seen);
+}
+
+static void test_gateway_silent_wheel_is_not_judged_by_its_old_speed(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(600));
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = -15;
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(100));
+    rig.wheel[IW_LEFT].mute = true;
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(80)); // Excuses the wheel for a moment.
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(40));
+    rig.wheel[IW_LEFT].mute = false;
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(280));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(50));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
+}
+
+/// One step just before that time, one at it.
+static void step_around(iw_time_us_t at_us, const bool *flag) {
+    gateway_rig_run(&rig, at_us - 1U - rig.now_us);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_FALSE(*flag);
+    gateway_rig_run(&rig, 1);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_TRUE(*flag);
+}
+
+static void test_gateway_wheels_are_at_rest_and_settled_to_the_microsecond(void) {
+    gateway_rig_run(&rig, MS(100));
+    const iw_time_us_t left_us = rig.gateway.wheel[IW_LEFT].rest_since_us;
+    const iw_time_us_t right_us = rig.gateway.wheel[IW_RIGHT].rest_since_us;
+    const iw_time_us_t since_us = (left_us > right_us) ? left_us : right_us;
+    step_around(since_us + MS(rig.config.rest_ms), &rig.gateway.permit.view.at_rest);
+    step_around(since_us + IW_PERMIT_SETTLED_US, &rig.gateway.permit.view.settled);
 }
 
 int main(void) {
@@ -171,5 +267,11 @@ int main(void) {
     RUN_TEST(test_gateway_software_estop_names_no_wheel);
     RUN_TEST(test_gateway_arm_repeated_by_the_holder_moves_no_pair);
     RUN_TEST(test_gateway_currents_that_were_not_given_are_no_wish_to_move);
+    RUN_TEST(test_gateway_lost_echo_is_given_a_second_before_it_is_asked_back);
+    RUN_TEST(test_gateway_force_is_measured_at_rest_up_to_rest_rpm);
+    RUN_TEST(test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator);
+    RUN_TEST(test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starting);
+    RUN_TEST(test_gateway_silent_wheel_is_not_judged_by_its_old_speed);
+    RUN_TEST(test_gateway_wheels_are_at_rest_and_settled_to_the_microsecond);
     return UNITY_END();
 }

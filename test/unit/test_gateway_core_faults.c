@@ -64,9 +64,10 @@ static void test_gateway_estop_behind_an_unechoed_pair_waits_for_nothing(void) {
     drive_on();
     rig.bus.echo_delay_us = MS(15);
     gateway_rig_run(&rig, MS(20));
-    while (rig.bus.unechoed[IW_LEFT] == 0) {
+    for (unsigned i = 0; i < 300U && rig.bus.unechoed[IW_LEFT] == 0; i++) {
         gateway_rig_run(&rig, 100);
     }
+    TEST_ASSERT_TRUE(rig.bus.unechoed[IW_LEFT] > 0);
     gateway_rig_press(&rig, true);
     gateway_rig_step(&rig);
     assert_latched(IW_CAUSE_ESTOP_LINE);
@@ -233,6 +234,7 @@ static void test_gateway_overspeeding_wheel_latches(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
     assert_latched(IW_CAUSE_OVERSPEED);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
 }
 
 static void test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch(void) {
@@ -245,6 +247,7 @@ static void test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_BLOCKED, refusal);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_BLOCKED, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
     TEST_ASSERT_EQUAL_UINT32(60, stop()->detail);
     TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
 }
@@ -338,6 +341,7 @@ static void test_gateway_what_the_gate_stops_is_an_internal_fault(void) {
     rig.gateway.config.max_speed_mm_s = 100;
     gateway_rig_run(&rig, MS(20));
     assert_latched(IW_CAUSE_INTERNAL);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, stop()->sides);
     TEST_ASSERT_EQUAL_UINT32(IW_GATE_SPEED, stop()->detail);
     TEST_ASSERT_TRUE(rig.gateway.sender.gate.stopped > 0);
 }

@@ -44,17 +44,20 @@ static void test_gateway_late_step_leaves_a_wheel_that_is_there_alone(void) {
     }
 }
 
+static void run_until_a_pair_is_on_its_way(void) {
+    for (unsigned i = 0; i < 300U && rig.gateway.sender.outbox.pending[IW_LEFT] == 0U; i++) {
+        gateway_rig_run(&rig, MS(1) / 10U);
+    }
+    TEST_ASSERT_TRUE(rig.gateway.sender.outbox.pending[IW_LEFT] > 0U);
+}
+
 static void test_gateway_arm_behind_a_zero_on_its_way_is_not_refused(void) {
     gateway_rig_arm(&rig);
     gateway_rig_stop(&rig);
-    while (rig.gateway.sender.outbox.pending[IW_LEFT] == 0U) {
-        gateway_rig_run(&rig, MS(1) / 10U);
-    }
+    run_until_a_pair_is_on_its_way();
     iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
     gateway_rig_run(&rig, MS(1100));
-    while (rig.gateway.sender.outbox.pending[IW_LEFT] == 0U) {
-        gateway_rig_run(&rig, MS(1) / 10U);
-    }
+    run_until_a_pair_is_on_its_way();
     gateway_rig_step(&rig); // The zero is not echoed yet, and the gateway has looked.
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_reset(&rig.gateway, rig.now_us));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
@@ -112,7 +115,7 @@ static void test_gateway_suspended_for_less_than_100_ms_drives_on(void) {
     static const struct {
         uint32_t for_us;
         uint32_t late_steps;
-    } cases[] = {{20000, 0}, {20001, 1}, {99000, 1}};
+    } cases[] = {{20000, 0}, {20001, 1}, {99999, 1}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         gateway_rig_init(&rig);
         gateway_rig_arm(&rig);
@@ -122,7 +125,21 @@ static void test_gateway_suspended_for_less_than_100_ms_drives_on(void) {
         gateway_rig_step(&rig);
         TEST_ASSERT_EQUAL_UINT32(cases[i].late_steps, rig.gateway.counters.late_steps);
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+        gateway_rig_run(&rig, MS(5)); // One step on time, and the time without judgement is over.
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
     }
+}
+
+static void test_gateway_suspended_again_right_after_a_late_step_stops(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    iw_gateway_suspended(&rig.gateway, MS(30));
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    iw_gateway_suspended(&rig.gateway, MS(200));
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, rig.gateway.permit.stop.cause);
+    TEST_ASSERT_EQUAL_UINT32(200, rig.gateway.permit.stop.detail);
 }
 
 static void test_gateway_full_step_that_was_on_time_knows_when_its_frames_came(void) {
@@ -232,6 +249,7 @@ int main(void) {
     RUN_TEST(test_gateway_suspended_in_motion_latches_and_begins_with_zero);
     RUN_TEST(test_gateway_suspended_for_200_ms_stops);
     RUN_TEST(test_gateway_suspended_for_less_than_100_ms_drives_on);
+    RUN_TEST(test_gateway_suspended_again_right_after_a_late_step_stops);
     RUN_TEST(test_gateway_full_step_that_was_on_time_knows_when_its_frames_came);
     RUN_TEST(test_gateway_backlog_of_a_late_step_is_no_second_late_step);
     RUN_TEST(test_gateway_causes_that_are_not_a_wheels_name_none);

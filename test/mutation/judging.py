@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""The judgement of one mutant: who sees it, or which compiler proves that there is nothing to see."""
+import collections
+import hashlib
+import re
+import subprocess
+import threading
+from typing import NamedTuple
+
+from core_build import CORE, INCLUDE, ROOT, SLOW
+
+KILLED, ENDLESS, SAME, LIVES, INVALID = "killed", "does not end", "same code", "lives", "does not compile"
+# If one of them makes the same object of it as of the core as it is, it is the same program.
+COMPILERS = (("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2"))
+WHOLE_CORE = (("orders", "test_orders", lambda judges, core: judges.orders(core)),
+              ("simulation", "test_sim", lambda judges, core: judges.sim(core, 1)))
+
+
+class Verdict(NamedTuple):
+    kind: str
+    program: str = "" # Who sees it.
+    test: str = ""    # Which of its tests, if it is a unit test that fails and not one that crashes.
+
+
+def digest(text):
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def versions():
+    """The compilers that prove what is the same code."""
+    return [subprocess.run([name, "-dumpfullversion" if name == "gcc" else "-dumpversion"], capture_output=True, text=True,
+                           check=True).stdout.strip() for name in ("gcc", "clang")]
+
+
+def reach(sources):
+    """The files of the core that these can call into: those whose headers they include, and so on."""
+    todo, seen = list(sources), set()
+    while todo:
+        path = todo.pop()
+        if path not in seen and path.exists():
+            seen.add(path)
+            folders = [path.parent, CORE, *(ROOT / folder for folder in ("core/include", "app/sim/model/include", "test/sim", "test/support"))]
+            todo += [folder / name for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.M) for folder in folders]
+            todo.append(CORE / f"{path.stem}.c")
+    return {path.name for path in seen if path.parent == CORE}
+
+
+class Judge:
+    """Judges mutants; learns which test kills the mutants of which file."""
+
+    def __init__(self, judges):
+        self.judges, self.kills, self.lock = judges, collections.defaultdict(collections.Counter), threading.Lock()
+        self.sources = {path.name: path.read_text() for path in CORE.glob("*.c")}
+        self.reach = {name: reach(sources) for name, sources in judges.programs.items()}
+        self.optimised = {}
+
+    def clean(self):
+        """What the judges have against the core as it is; they are worth nothing then."""
+        found = self.judges.failing(self.judges.clean, sorted(self.judges.tests))
+        wrong = [found[1] or f"unit_{found[0]} {found[2].how}"] if found else []
+        return wrong + [said for _, _, hears in WHOLE_CORE if (said := hears(self.judges, self.judges.clean))]
+
+    def order(self, mutant):
+        """Unit tests that sweep every value come after the others; those that killed most of the function's mutants come first."""
+        kills, stem = self.kills[mutant.file, mutant.function], mutant.file.removesuffix(".c")
+        found = sorted((name for name in self.judges.tests if mutant.file in self.reach[f"unit_{name}"]), key=lambda name: (-kills[name], stem not in name, name))
+        return [name for name in found if name not in SLOW], [name for name in found if name in SLOW]
+
+    def objects_of(self, folder, file):
+        """What optimising compilers make of it, one after the other."""
+        for at, (compiler, level) in enumerate(COMPILERS):
+            out = folder / f"optimised{at}.o"
+            subprocess.run([compiler, "-std=c99", "-ffreestanding", level, "-w", *INCLUDE, "-c", file, "-o", out.name], check=True, cwd=folder)
+            yield subprocess.run(["objdump", "-s", "-r", out.name], capture_output=True, check=True, cwd=folder).stdout
+
+    def same_code(self, folder, file):
+        with self.lock:
+            if file not in self.optimised:
+                clean = self.judges.work / "clean_text" / file.removesuffix(".c")
+                clean.mkdir(parents=True, exist_ok=True)
+                (clean / file).write_text(self.sources[file])
+                self.optimised[file] = list(self.objects_of(clean, file))
+        return any(changed == clean for changed, clean in zip(self.objects_of(folder, file), self.optimised[file]))
+
+    def killed(self, core, mutant, names):
+        found = self.judges.failing(core, names)
+        if not found:
+            return None
+        program, test, run = found
+        with self.lock:
+            self.kills[mutant.file, mutant.function][program] += 1
+        return Verdict(ENDLESS if run.endless else KILLED, program, test or "")
+
+    def changed_source(self, mutant):
+        """The folder of the file with this mutant alone."""
+        folder = self.judges.work / "alone" / digest(f"{mutant.file}{mutant.begin}{mutant.text}{mutant.end}")
+        folder.mkdir(parents=True)
+        (folder / mutant.file).write_text(mutant.apply(self.sources[mutant.file]))
+        return folder
+
+    def judge(self, mutant, core):
+        """`core` has the mutant in force; None if it does not compile."""
+        if core is None:
+            return Verdict(INVALID)
+        quick, slow = self.order(mutant)
+        verdict = self.killed(core, mutant, quick)
+        if verdict is None and self.same_code(self.changed_source(mutant), mutant.file):
+            verdict = Verdict(SAME)
+        verdict = verdict or self.killed(core, mutant, slow)
+        if verdict:
+            return verdict
+        return next((Verdict(KILLED, means) for means, program, hears in WHOLE_CORE
+                     if mutant.file in self.reach[program] and hears(self.judges, core)), Verdict(LIVES))
