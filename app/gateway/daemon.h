@@ -70,6 +70,7 @@ typedef struct gw_daemon {
     iw_time_us_t woken_us;       ///< When the wait ended: what a client sends later than this was not waiting then.
     iw_time_us_t suspended_us;   ///< Of the machine, as last looked at.
     iw_time_us_t step_next_us;   ///< As the last step wished.
+    iw_time_us_t timer_us;       ///< What the timer is set to; IW_NEVER: it has fired, or was never set.
     iw_time_us_t box_look_us;    ///< When the black box's writer is listened to next.
     iw_time_us_t listen_from_us; ///< Nobody is accepted before.
     iw_client_t last_client;

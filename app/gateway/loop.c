@@ -43,6 +43,7 @@ static int open_signals(void) {
 int gw_loop_open(gw_daemon_t *daemon) {
     daemon->epoll_fd = epoll_create1(EPOLL_CLOEXEC);
     daemon->timer_fd = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
+    daemon->timer_us = IW_NEVER;
     daemon->signal_fd = open_signals();
     if (daemon->epoll_fd < 0 || daemon->timer_fd < 0 || daemon->signal_fd < 0) {
         return errno;
@@ -131,23 +132,28 @@ static iw_time_us_t look_us(const gw_daemon_t *daemon) {
     return wanted ? daemon->now_us + ESTOP_LOOK_US : IW_NEVER;
 }
 
-static void arm_timer(const gw_daemon_t *daemon) {
+/// Set anew only if it would wake us too late, or has woken us: too early costs one look, setting it in every cycle one
+/// call for each frame. Setting it also takes what is to be read of it.
+static void arm_timer(gw_daemon_t *daemon) {
     iw_time_us_t next_us = earlier(daemon->step_next_us, iw_linux_hal_next_us(&daemon->hal));
     next_us = earlier(next_us, gw_observe_next_us(daemon));
     next_us = earlier(next_us, gw_service_next_us(daemon));
     next_us = earlier(next_us, look_us(daemon));
     next_us = next_us == 0U ? 1U : next_us; // 0 would disarm it.
+    if (daemon->timer_us != IW_NEVER && daemon->timer_us <= next_us) {
+        return;
+    }
+    daemon->timer_us = next_us;
     const struct itimerspec when = {
         .it_value = {.tv_sec = (time_t)(next_us / 1000000U), .tv_nsec = (long)(next_us % 1000000U) * 1000L}};
     (void)timerfd_settime(daemon->timer_fd, TFD_TIMER_ABSTIME, &when, NULL);
 }
 
-/// Notes what the wait has found; nothing is done about it yet but emptying the timer.
+/// Notes what the wait has found; nothing is done about it yet.
 static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
-    uint64_t expirations;
     switch (event->data.u64) {
     case GW_TAG_TIMER:
-        (void)!read(daemon->timer_fd, &expirations, sizeof expirations);
+        daemon->timer_us = IW_NEVER;
         return false;
     case GW_TAG_SIGNAL:
         take_signal(daemon);

@@ -64,7 +64,7 @@ class Boot:
         command += ["time-travel=inf-cpu"] if plan["virtual"] else []
         command += plan.get("kernel_arguments", [])
         command += [f"iwheel_python={os.path.realpath(sys.executable)}"]
-        command += [f"iwheel_guest={os.path.join(HERE, 'guest.py')}", f"iwheel_plan={self.path('json')}"]
+        command += [f"iwheel_guest={plan.get('guest', os.path.join(HERE, 'guest.py'))}", f"iwheel_plan={self.path('json')}"]
         return command
 
     def path(self, ending):

@@ -13,8 +13,9 @@
 
 /// An interface that is gone or down, and a controller that is bus-off, are looked at at least this often.
 #define RETRY_US 200000U
-/// Frames of unknown ids taken in one step; those of known ids go first.
-#define OTHERS_PER_STEP 128U
+/// Frames of unknown ids taken at once, after those of known ids, and how often: a full bus brings fewer in that time.
+#define OTHERS_AT_ONCE  128U
+#define OTHERS_EVERY_US 5000U
 /// Batches of nothing but error frames taken in one step: a flood of them must not hold up the loop.
 #define ERROR_BATCHES_PER_STEP 8U
 #define LOAD_WINDOW_US         1000000U
@@ -30,11 +31,12 @@ typedef struct {
     iw_socketcan_socket_t others; ///< Everything else, drained last. Not watched: any step will do.
     iw_time_us_t now_us;          ///< Of the last `tend`.
     iw_time_us_t look_us;         ///< When to look at the interface or its carrier again; IW_NEVER: no need.
+    iw_time_us_t others_us;       ///< When to look at `others` again.
     iw_time_us_t load_since_us;
     uint64_t load_bits;
     iw_bus_state_t present;  ///< While up.
     iw_bus_state_t unheeded; ///< A loss that `state` has not told yet: IW_BUS_DOWN or IW_BUS_OFF; else IW_BUS_ACTIVE.
-    uint32_t others_left;    ///< Of this step.
+    uint32_t others_left;    ///< Until `others_us`.
     uint32_t errors_left;
     pid_t restarting; ///< The process that purges; 0: none.
     int probe_fd;     ///< For looking at interfaces.
@@ -178,8 +180,10 @@ static void fill_ours(socketcan_t *bus) {
             bus->load_bits += iw_socketcan_bits(raw);
         }
     }
-    if (errors == ours->count && errors > 0U) {
-        bus->errors_left -= bus->errors_left > 0U ? 1U : 0U;
+    if (ours->count == 0U) {
+        (void)iw_netlink_take_events(&bus->events); // No news while up, but unread they would wake us for ever.
+    } else if (errors == ours->count && bus->errors_left > 0U) {
+        --bus->errors_left;
     }
     if (ours->lost != lost) {
         bus->link.lost = ours->lost;
@@ -268,15 +272,17 @@ static void follow_restart(socketcan_t *bus) {
 static void can_tend(void *self, iw_time_us_t now_us) {
     socketcan_t *bus = (socketcan_t *)self;
     bus->now_us = now_us;
-    bus->others_left = OTHERS_PER_STEP;
     bus->errors_left = ERROR_BATCHES_PER_STEP;
-    const bool news = iw_netlink_take_events(&bus->events);
+    if (now_us >= bus->others_us) {
+        bus->others_us = now_us + OTHERS_EVERY_US;
+        bus->others_left = OTHERS_AT_ONCE;
+    }
     if (bus->restarting > 0) {
         follow_restart(bus);
     }
     if (!bus->up) {
         drop_old(bus);
-        if (news || now_us >= bus->look_us) {
+        if (iw_netlink_take_events(&bus->events) || now_us >= bus->look_us) {
             try_up(bus);
         }
     }
@@ -335,6 +341,7 @@ static bool take_others(socketcan_t *bus, iw_can_frame_t *out_frame) {
     }
     if (!take(others, out_frame)) {
         others->drained = false;
+        bus->others_left = 0;
         return false;
     }
     bus->load_bits += iw_socketcan_bits(&others->frame[others->next - 1U]);
@@ -353,11 +360,9 @@ static int can_receive(void *self, iw_can_frame_t *out_frame) {
 static iw_bus_state_t can_state(void *self) {
     socketcan_t *bus = (socketcan_t *)self;
     const iw_bus_state_t unheeded = bus->unheeded;
+    const iw_bus_state_t now = bus->up ? bus->present : IW_BUS_DOWN;
     bus->unheeded = IW_BUS_ACTIVE;
-    if (unheeded != IW_BUS_ACTIVE) {
-        return unheeded;
-    }
-    return bus->up ? bus->present : IW_BUS_DOWN;
+    return unheeded != IW_BUS_ACTIVE ? unheeded : now;
 }
 
 /// Has the link taken down and up: that empties the queue and the controller. It takes its time, so nothing can be

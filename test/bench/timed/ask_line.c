@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+/// Sends one of two lines after the other, each in the pause after a pair, and prints how long it took until a frame followed, in nanoseconds.
+/// usage: ask_line INTERFACE SOCKET COUNT LINE_A LINE_B [FIRST_LINE]   FIRST_LINE: to be answered with ok before the others
+#include "timed.h"
+
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+/// Later than the shortest spacing of pairs, well before the next one of a period is due.
+#define PAUSE_NS   8000000
+#define PERIOD_ms  19
+#define LINE_BYTES 512
+#define REPLY_ms   3000
+
+static void say(int client, const char *words) {
+    char line[LINE_BYTES];
+    const int length = snprintf(line, sizeof line, "%s\n", words);
+    (void)timed_need((int)send(client, line, (size_t)length, MSG_NOSIGNAL), "send");
+}
+
+static void hear_ok(int client) {
+    char answer[65536];
+    size_t length = 0;
+    struct pollfd ready = {.fd = client, .events = POLLIN};
+    do {
+        const ssize_t more =
+            poll(&ready, 1, REPLY_ms) > 0 ? read(client, &answer[length], sizeof answer - 1U - length) : 0;
+        length += more > 0 ? (size_t)more : 0U;
+        answer[length] = '\0';
+        if (more <= 0 || strstr(answer, "\"ok\":false") != NULL) {
+            (void)fprintf(stderr, "no ok: %s\n", answer);
+            exit(1);
+        }
+    } while (strstr(answer, "\"ok\":true") == NULL);
+}
+
+static void forget(int can, int client) {
+    char waste[65536];
+    struct can_frame frame;
+    while (recv(client, waste, sizeof waste, MSG_DONTWAIT) > 0) {
+    }
+    while (recv(can, &frame, sizeof frame, MSG_DONTWAIT) > 0) {
+    }
+}
+
+/// After the next pair, or a period without one, and a pause.
+static void wait_for_pause(int can, int client) {
+    struct can_frame frame;
+    int64_t at_ns;
+    (void)timed_receive(can, TIMED_LEFT, &frame, &at_ns, PERIOD_ms);
+    timed_sleep_until_ns(timed_now_ns(CLOCK_MONOTONIC) + PAUSE_NS);
+    forget(can, client);
+}
+
+int main(int argc, char **argv) {
+    const int can = timed_can(argc >= 6 ? argv[1] : "", TIMED_LEFT);
+    const int client = timed_connect(argv[2]);
+    timed_ask_for_stamps(can);
+    if (argc > 6) {
+        say(client, argv[6]);
+        hear_ok(client);
+    }
+    for (long i = atol(argv[3]); i > 0; --i) {
+        struct can_frame frame;
+        int64_t at_ns;
+        wait_for_pause(can, client);
+        const int64_t asked_ns = timed_now_ns(CLOCK_REALTIME);
+        say(client, argv[4 + i % 2]);
+        if (!timed_receive(can, TIMED_LEFT, &frame, &at_ns, REPLY_ms)) {
+            timed_fail("no frame followed");
+        }
+        (void)printf("%lld\n", (long long)(at_ns - asked_ns));
+    }
+    return 0;
+}

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: MIT
+"""The timed benchmark from outside: builds its programs, gets the peers, boots the kernel, and makes rows of what comes back."""
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent.parent
+sys.path[:0] = [str(ROOT / "test/kernel"), str(ROOT / "test/system"), str(HERE)]
+
+from boot import Boot, find_kernel  # noqa: E402
+
+CODEC = HERE.parent / "codec"
+INCLUDES = [f"-I{CODEC}", f"-I{ROOT / 'core/include'}"]
+MORE = {"floor_receive": [CODEC / "floor.c"], "flood": [CODEC / "mix.c"]}
+PACKAGES = {"candump": "can-utils", "gpiomon": "gpiod", "strace": "strace"}
+ALL = ("period_idle", "period_loaded", "flood", "calls", "line", "told", "estop")
+FULL = {"rounds": 3, "period_s": 4.0, "flood_s": 3.0, "calls_s": 3.0, "count": 150, "presses": 12}
+SHORT = {"rounds": 1, "period_s": 0.6, "flood_s": 0.3, "calls_s": 0.5, "count": 10, "presses": 1, "stall_us": 1_000_000}
+# Of the smoke test: wrong by orders of magnitude, whatever else the machine does.
+ABSURD = {"ppm": 20_000, "lost": 0, "per_frame": 20, "p50": 100_000}
+LIMIT_S = 1800
+SMOKE_LIMIT_S = 60
+
+
+def build_tools(folder):
+    for source in sorted(HERE.glob("*.c")):
+        if source.stem != "timed":
+            more = MORE.get(source.stem, [])
+            subprocess.run(["gcc", "-O2", "-std=gnu11", *INCLUDES, source, HERE / "timed.c", *more, "-o", folder / source.stem], check=True)
+
+
+def have(program):
+    return any(os.access(os.path.join(path, program), os.X_OK) for path in os.environ["PATH"].split(":"))
+
+
+def get_packages():
+    """Debian's packages of peers that are missing, if this is root on Debian. What cannot be had is left out, loudly."""
+    missing = sorted({package for program, package in PACKAGES.items() if not have(program)})
+    if missing and os.geteuid() == 0 and have("apt-get"):
+        print(f"installing: apt-get install -y --no-install-recommends {' '.join(missing)}")
+        subprocess.run(["apt-get", "-qq", "install", "-y", "--no-install-recommends", *missing], stdout=subprocess.DEVNULL, check=False,
+                       env={**os.environ, "DEBIAN_FRONTEND": "noninteractive"})
+    for program, package in PACKAGES.items():
+        if not have(program):
+            print(f"left out: {program} ({package} is not installed)")
+
+
+def get_python_can(folder):
+    """Path of python-can in a folder of its own, from PyPI; empty if it cannot be had."""
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--target", str(folder), "python-can>=4,<5"]
+    if subprocess.run(pip, check=False).returncode == 0:
+        return str(folder)
+    print("left out: python-can (pip could not install it)")
+    return ""
+
+
+def be_prompt():
+    """What is timed goes before what else the machine does, as far as this process may decide that."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+    except PermissionError:
+        print("without real-time priority: other programs of this machine disturb what is timed")
+
+
+def boot_and_wait(kernel, folder, plan, limit_s):
+    """Results, turn by turn, as they come."""
+    boot = Boot(kernel, str(folder), "timed", plan)
+    try:
+        while boot.running() and boot.seconds() < limit_s:
+            yield from boot.results()
+            time.sleep(0.2)
+        yield from boot.results()
+        if not boot.running() and boot.text("status").strip() != "0":
+            raise RuntimeError(boot.complaint())
+    finally:
+        boot.end()
+
+
+def measure(build, wish, measures=ALL, candidates=None, limit_s=LIMIT_S, show=print):
+    """{measure: {candidate: [figures of each round]}}, and what failed. RuntimeError if there is no kernel."""
+    kernel = find_kernel()
+    be_prompt()
+    taken, failures = {}, []
+    with tempfile.TemporaryDirectory(prefix="iwheel-timed-") as name:
+        folder = Path(name)
+        build_tools(folder)
+        peers = get_python_can(folder / "peers") if candidates is None else ""
+        plan = {**wish, "virtual": False, "guest": str(HERE / "guest.py"), "build": str(Path(build).resolve()), "tools": name, "peers": peers,
+                "measures": list(measures)}
+        plan |= {"candidates": list(candidates)} if candidates else {}
+        for result in boot_and_wait(kernel, folder, plan, limit_s):
+            show(result)
+            if "failed" in result:
+                failures.append(f"{result['measure']}, {result['candidate']}: {result['failed']}")
+            else:
+                taken.setdefault(result["measure"], {}).setdefault(result["candidate"], []).append(result["figures"])
+    return taken, failures
+
+
+# ---- rows ---------------------------------------------------------------------------------------------------------
+
+NAMES = {"bcm": "CAN_BCM", "python_can": "python-can", "gpiomon": "gpiomon and cansend"}
+
+
+def whole(taken, name):
+    """Both the floor's figures and the gateway's are there."""
+    return {"gateway", "floor"} <= set(taken.get(name, {})) or (name == "calls" and "gateway" in taken.get(name, {}))
+
+
+def middle(rounds, key):
+    return statistics.median(figures[key] for figures in rounds)
+
+
+def ratio(of, candidate, key):
+    """Of the same round, so that a slow minute hits both."""
+    return statistics.median(mine[key] / max(floor[key], 0.001) for mine, floor in zip(of[candidate], of["floor"]))
+
+
+def times(value):
+    return f"{value:.0f} ×" if value >= 20 else f"{value:.1f} ×"
+
+
+def peers_of(of, text):
+    return ", ".join(f"{NAMES.get(name, name)} {text(name)}" for name in of if name not in ("floor", "gateway", "nobody")) or "--"
+
+
+def us(value):
+    return f"{value:.0f} µs" if value >= 10 else f"{value:.1f} µs"
+
+
+def row(what, floor, mine, peers, goal):
+    return [what, floor, mine, peers, goal]
+
+
+def period_rows(taken):
+    for name, words in (("period_idle", "a quiet bus"), ("period_loaded", "617 frames/s of telemetry")):
+        if whole(taken, name):
+            of = taken[name]
+            yield row(f"setpoint period, deviation p50, {words}", us(middle(of["floor"], "p50")), times(ratio(of, "gateway", "p50")),
+                      peers_of(of, lambda c, of=of: times(ratio(of, c, "p50"))), "≤ 1.4 ×")
+            yield row(f"its mean error, {words}", f"{middle(of['floor'], 'ppm'):.0f} ppm", f"{middle(of['gateway'], 'ppm'):.0f} ppm",
+                      peers_of(of, lambda c, of=of: f"{middle(of[c], 'ppm'):.0f} ppm"), "≤ 100 ppm")
+
+
+def flood_rows(taken):
+    if not whole(taken, "flood") or "nobody" not in taken["flood"]:
+        return
+    of = taken["flood"]
+    spent = {c: [{"cpu": (nobody["left"] - figures["left"])} for nobody, figures in zip(of["nobody"], of[c])] for c in of}
+    lost = {c: sum(figures["lost"] for figures in of[c]) / sum(figures["sent"] for figures in of[c]) for c in of}
+    yield row("21 000 frames/s: lost", f"{lost['floor']:.1%}", f"{lost['gateway']:.1%}", peers_of(of, lambda c: f"{lost[c]:.1%}"), "0")
+    yield row("21 000 frames/s: processor", "1 ×", times(ratio(spent, "gateway", "cpu")), peers_of(of, lambda c: times(ratio(spent, c, "cpu"))),
+              "≤ 1.8 ×")
+
+
+def call_rows(taken):
+    if whole(taken, "calls"):
+        of = taken["calls"]
+        yield row("617 frames/s: system calls for a frame, no client", "--", f"{middle(of['gateway'], 'per_frame'):.2f}",
+                  peers_of(of, lambda c: f"{middle(of[c], 'per_frame'):.2f}"), "≤ 2.5")
+
+
+def latency_rows(taken):
+    wanted = (
+        ("line", "client's line to frame on the bus", (("p50", "≤ 1.2 ×"), ("p90", "≤ 1.4 ×"))),
+        ("told", "frame on the bus to client's line", (("p50", "≤ 1.1 ×"),)),
+        ("estop", "edge of the e-stop to both zeros", (("p50", "≤ 1.3 ×"), ("p90", "≤ 1.8 ×"))),
+    )
+    for name, words, parts in wanted:
+        for key, goal in parts if whole(taken, name) else ():
+            of = taken[name]
+            yield row(f"{words}, {key}", us(middle(of["floor"], key)), times(ratio(of, "gateway", key)),
+                      peers_of(of, lambda c, of=of, key=key: times(ratio(of, c, key))), goal)
+
+
+def rows(taken):
+    return [*period_rows(taken), *flood_rows(taken), *call_rows(taken), *latency_rows(taken)]
+
+
+def smoke(build):
+    """What is wrong with the short turns of floor and gateway; empty: nothing."""
+    taken, faults = measure(build, SHORT, candidates=("nobody", "floor", "gateway"), limit_s=SMOKE_LIMIT_S, show=lambda result: None)
+    faults += [f"{name}: no figures" for name in ALL if "gateway" not in taken.get(name, {}) and not any(f.startswith(name) for f in faults)]
+    for name, of in taken.items():
+        for figures in of.get("gateway", []):
+            faults += [f"{name}: {figures}" for key, limit in ABSURD.items() if abs(figures.get(key, 0)) > limit]
+    return faults

@@ -1,0 +1,402 @@
+# SPDX-License-Identifier: MIT
+"""Inside the kernel: what is measured. Each measure has candidates, and each candidate is one turn: it returns figures."""
+
+import os
+import re
+import subprocess
+import threading
+import time
+
+from can_bus import CanBus
+from gpio_sim import FALLING, Edges
+from surroundings import PERIOD_US, START_S
+
+
+def percentile(values, percent):
+    ordered = sorted(values)
+    if not ordered:
+        raise RuntimeError("nothing was measured")
+    return ordered[min(len(ordered) - 1, int(len(ordered) * percent / 100))]
+
+
+def numbers(text):
+    return [int(line) for line in text.split()]
+
+
+class Renewal(threading.Thread):
+    """Keeps the lease with the same command, so that nothing but the period sends setpoints."""
+
+    def __init__(self, client):
+        super().__init__(daemon=True)
+        self.client, self.quit = client, threading.Event()
+        self.start()
+
+    def run(self):
+        while not self.quit.wait(0.1):
+            self.client.drive(100, 100)
+
+    def end(self):
+        self.quit.set()
+        self.join()
+
+
+class Measure:
+    """`turn(candidate)` is called for one after the other, round after round."""
+
+    candidates = ()
+
+    def __init__(self, around):
+        self.around, self.plan = around, around.plan
+
+    def begin(self):
+        """Before the first turn."""
+
+    def end(self):
+        self.around.end_gateway()
+        self.around.end_wheels()
+
+    def turn(self, candidate):
+        return getattr(self, candidate)()
+
+
+class Period(Measure):
+    """Deviation of the period of setpoint pairs, and its mean error."""
+
+    candidates = ("floor", "gateway", "bcm", "cangen", "python_can")
+    slow = 10
+
+    def begin(self):
+        self.around.start_wheels(self.slow)
+
+    def judge(self, process=None):
+        """The kernel's stamps of the left setpoint, then the deviations of their distances, in microseconds."""
+        stamps = numbers(self.around.tool("stamps", self.around.interface, "10A", self.plan["period_s"], piped=True).text(60))
+        if process is not None:
+            process.end()
+        gaps = [(b - a) / 1000 for a, b in zip(stamps, stamps[1:])]
+        if len(gaps) < self.plan["period_s"] * 1e6 / PERIOD_US * 0.8:
+            raise RuntimeError(f"{len(gaps)} pairs in {self.plan['period_s']} s")
+        off = [abs(gap - PERIOD_US) for gap in gaps]
+        mean_us = (stamps[-1] - stamps[0]) / 1000 / len(gaps)
+        return {"p50": percentile(off, 50), "p99": percentile(off, 99), "ppm": (mean_us / PERIOD_US - 1) * 1e6}
+
+    def floor(self):
+        return self.judge(self.around.tool("floor_period", self.around.interface, PERIOD_US))
+
+    def bcm(self):
+        return self.judge(self.around.tool("bcm_period", self.around.interface, PERIOD_US))
+
+    def cangen(self):
+        return self.judge(self.around.peer("cangen", self.around.interface, "-g", "20", "-I", "10A", "-L", "5", "-D", "0100640000"))
+
+    def python_can(self):
+        return self.judge(self.around.python_can("period", self.around.interface, PERIOD_US))
+
+    def gateway(self):
+        self.around.start_gateway()
+        client = self.around.client()
+        self.around.arm(client)
+        client.drive(100, 100)
+        renewal = Renewal(client)
+        try:
+            time.sleep(0.7)
+            return self.judge()
+        finally:
+            renewal.end()
+            client.request("stop")
+            client.close()
+            self.around.end_gateway()
+
+
+class PeriodLoaded(Period):
+    """The same beside the telemetry of both wheels at its nominal rate."""
+
+    slow = 1
+
+
+class Flood(Measure):
+    """A full bus of shortest frames: what is lost, and what a receiver takes of the processor."""
+
+    candidates = ("nobody", "floor", "gateway", "candump")
+    rate = 21000
+
+    def send(self):
+        """Sends, and tells what the processor had left meanwhile."""
+        seconds = self.plan["flood_s"]
+        soak = self.around.tool("soak", seconds + 0.2, piped=True)
+        sent = int(self.around.tool("flood", self.around.interface, self.rate, seconds, piped=True).text(60))
+        left = int(soak.text(60))
+        time.sleep(0.2)
+        return sent, left / (seconds + 0.2)
+
+    def nobody(self):
+        sent, left = self.send()
+        return {"left": left, "sent": sent, "lost": 0}
+
+    def floor(self):
+        receiver = self.around.tool("floor_receive", self.around.interface, piped=True)
+        time.sleep(0.3)
+        sent, left = self.send()
+        return {"left": left, "sent": sent, "lost": sent - int(receiver.end())}
+
+    def gateway(self):
+        self.around.start_gateway()
+        client = self.around.client()
+        before = client.request("status")["counters"]["received"]
+        client.close()
+        time.sleep(0.3)
+        sent, left = self.send()
+        client = self.around.client()
+        received = client.request("status")["counters"]["received"] - before
+        client.close()
+        self.around.end_gateway()
+        return {"left": left, "sent": sent, "lost": sent - received}
+
+    def candump(self):
+        with open("candump.log", "wb") as log:
+            receiver = subprocess.Popen(["candump", "-L", self.around.interface], stdout=log, stderr=subprocess.DEVNULL)
+            time.sleep(0.3)
+            sent, left = self.send()
+            receiver.terminate()
+            receiver.wait()
+        with open("candump.log", "rb") as log:
+            lines = sum(block.count(b"\n") for block in iter(lambda: log.read(1 << 20), b""))
+        return {"left": left, "sent": sent, "lost": sent - lines}
+
+
+class Calls(Measure):
+    """System calls for each frame of the wheels' telemetry; reading a clock is none where the kernel maps it."""
+
+    candidates = ("gateway", "candump", "python_can")
+
+    def begin(self):
+        self.around.start_wheels()
+        time.sleep(0.5)
+
+    def trace(self, pid):
+        seconds = self.plan["calls_s"]
+        trace = subprocess.Popen(["strace", "-f", "-c", "-q", "-p", str(pid)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        time.sleep(0.3)
+        counter = self.around.tool("floor_receive", self.around.interface, piped=True)
+        time.sleep(seconds)
+        trace.send_signal(2)
+        frames = int(counter.end())
+        calls = {name: int(count) for count, name in re.findall(r"^\s*[\d.]+\s+[\d.]+\s+\d+\s+(\d+)\s+(?:\d+\s+)?(\w+)$", trace.communicate()[1], re.M)}
+        calls.pop("total", None)
+        calls.pop("clock_gettime", None)
+        return {"per_frame": sum(calls.values()) / frames * (seconds / (seconds + 0.3)), "frames": frames, "calls": calls}
+
+    def of(self, process):
+        time.sleep(0.5)
+        try:
+            return self.trace(process.child.pid)
+        finally:
+            process.end()
+
+    def gateway(self):
+        self.around.start_gateway()
+        time.sleep(1.0)
+        try:
+            return self.trace(self.around.gateway.child.pid)
+        finally:
+            self.around.end_gateway()
+
+    def candump(self):
+        return self.of(self.around.peer("candump", self.around.interface))
+
+    def python_can(self):
+        process = self.around.python_can("receive", self.around.interface)
+        process.child.stdout.readline()
+        return self.of(process)
+
+
+class Line(Measure):
+    """From a client's line to the frame on the bus."""
+
+    candidates = ("floor", "gateway", "python_can", "cansend")
+    lines = ("50 50", "60 60")
+
+    def begin(self):
+        self.around.start_wheels(10)
+        time.sleep(0.5)
+
+    def ask(self, path, *first, lines=lines):
+        asked = self.around.tool("ask_line", self.around.interface, path, self.plan["count"], *lines, *first, piped=True)
+        return self.judge(asked.text(120))
+
+    def judge(self, text):
+        values = [value / 1000 for value in numbers(text)]
+        return {"p50": percentile(values, 50), "p90": percentile(values, 90), "count": len(values)}
+
+    def at_socket(self, start):
+        path = f"{self.around.folder}/line.{time.monotonic_ns()}"
+        process = start(path)
+        deadline = time.monotonic() + START_S
+        while not os.path.exists(path) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        time.sleep(0.1)
+        try:
+            return self.ask(path)
+        finally:
+            process.end()
+
+    def floor(self):
+        return self.at_socket(lambda path: self.around.tool("floor_line", self.around.interface, path))
+
+    def python_can(self):
+        return self.at_socket(lambda path: self.around.python_can("line", self.around.interface, path))
+
+    def cansend(self):
+        count = max(self.plan["count"] // 5, 5)
+        return self.judge(self.around.tool("ask_program", self.around.interface, count, "cansend", self.around.interface, "10A#0100640000", piped=True).text(120))
+
+    def gateway(self):
+        self.around.start_gateway()
+        time.sleep(0.7)
+        try:
+            drive = '{"id":1,"cmd":"drive","left_mm_s":%d,"right_mm_s":%d}'
+            return self.ask(self.around.socket, '{"id":1,"cmd":"arm","name":"bench"}', lines=[drive % (v, v) for v in (50, 60)])
+        finally:
+            self.around.end_gateway()
+
+
+class Told(Line):
+    """From a frame on the bus to the line at a client."""
+
+    candidates = ("floor", "gateway", "candump")
+
+    def begin(self):
+        """No wheels: the frame that is waited for is the only one."""
+
+    def piped(self, process):
+        time.sleep(0.2)
+        asking = self.around.tool("ask_frame", self.around.interface, self.plan["count"], standard_input=process.child.stdout, piped=True)
+        text = asking.text(120)
+        process.child.stdout.close()
+        process.child.stdout = None
+        process.end()
+        return self.judge(text)
+
+    def floor(self):
+        return self.piped(self.around.tool("floor_print", self.around.interface, piped=True))
+
+    def candump(self):
+        return self.piped(self.around.peer("candump", self.around.interface, piped=True))
+
+    def gateway(self):
+        self.around.start_gateway()
+        try:
+            watch = '{"id":1,"cmd":"watch","topics":["frame"]}'
+            return self.judge(
+                self.around.tool("ask_frame", self.around.interface, self.plan["count"], self.around.socket, watch, piped=True).text(120)
+            )
+        finally:
+            self.around.end_gateway()
+
+
+class Estop(Measure):
+    """From the kernel's stamp of the edge to the second of both zeros. The simulated line tells of edges at the kernel's next tick."""
+
+    candidates = ("floor", "gateway", "gpiomon")
+    TICK_US, BEFORE_US, SPIN_US = 10_000, 200, 3_000
+
+    def begin(self):
+        self.around.start_wheels()
+        self.chip = self.around.chip
+        self.chip.pull(True, self.chip.WITNESS)
+        self.witness = Edges(self.chip.chip, self.chip.WITNESS, FALLING)
+        self.tick_us = self.press_now()
+        self.release()
+        time.sleep(0.5)
+
+    def end(self):
+        self.witness.close()
+        super().end()
+
+    def press_now(self):
+        self.chip.pull(False, self.chip.WITNESS)
+        self.chip.pull(False)
+        edge = self.witness.next(1.0)
+        if edge is None:
+            raise RuntimeError("the line told of no edge")
+        return edge[0]
+
+    def release(self):
+        self.chip.pull(True)
+        self.chip.pull(True, self.chip.WITNESS)
+
+    def press(self):
+        """Right before a tick, so that the time between level and edge is short for those who look at levels."""
+        now_us = time.monotonic_ns() // 1000
+        due_us = now_us + self.TICK_US - (now_us + self.BEFORE_US - self.tick_us) % self.TICK_US
+        time.sleep(max(due_us - now_us - self.SPIN_US, 0) / 1e6)
+        while time.monotonic_ns() // 1000 < due_us:
+            pass  # Sleeping would end too late, and the edge be told a whole tick after the level.
+        return time.monotonic_ns() // 1000, self.press_now()
+
+    def once(self, bus, settle_s=0.0):
+        """Microseconds from the edge to the later one of the first zeros after it; None if the level was seen before the edge."""
+        level_us, edge_us = self.press()
+        time.sleep(0.03 + settle_s)
+        zeros = [[f.t_us for f in bus.frames if f.id == can_id and f.t_us > level_us and not any(f.data[1:3])] for can_id in (0x10A, 0x12A)]
+        self.release()
+        if not all(zeros):
+            raise RuntimeError("no zeros after an edge")
+        first = [times[0] for times in zeros]
+        return max(first) - edge_us if min(first) >= edge_us else None
+
+    def presses(self, before, settle_s=0.0):
+        bus = CanBus(self.around.interface, ids=(0x10A, 0x12A))
+        values = []
+        try:
+            for _ in range(self.plan["presses"]):
+                before()
+                values.append(self.once(bus, settle_s))
+        finally:
+            bus.close()
+        told = [value for value in values if value is not None]
+        return {"p50": percentile(told, 50), "p90": percentile(told, 90), "count": len(told), "sooner": len(values) - len(told)}
+
+    def floor(self):
+        process = self.around.tool("floor_estop", self.around.interface, f"/dev/{self.chip.chip}", self.chip.OFFSET)
+        time.sleep(0.2)
+        try:
+            return self.presses(lambda: time.sleep(0.05))
+        finally:
+            process.end()
+
+    def gpiomon(self):
+        frames = " && ".join(f"cansend {self.around.interface} {can_id}#0100000000" for can_id in ("10A", "12A"))
+        script = f"gpiomon -b -f -B pull-up {self.chip.chip} {self.chip.OFFSET} | while read -r _; do {frames}; done"
+        process = self.around.peer("setsid", "sh", "-c", script)
+        time.sleep(0.5)
+        try:
+            return self.presses(lambda: time.sleep(0.1), 0.15)
+        finally:
+            subprocess.run(["kill", "--", f"-{process.child.pid}"], check=False)
+            process.end()
+
+    def gateway(self):
+        self.around.start_gateway()
+        client = self.around.client()
+        renewal = None
+
+        def drive():
+            nonlocal renewal
+            if renewal:
+                renewal.end()
+            self.around.arm(client)
+            client.drive(100, 100)
+            renewal = Renewal(client)
+            time.sleep(0.25)
+
+        try:
+            return self.presses(drive)
+        finally:
+            if renewal:
+                renewal.end()
+            client.close()
+            self.around.end_gateway()
+
+
+MEASURES = {"period_idle": Period, "period_loaded": PeriodLoaded, "flood": Flood, "calls": Calls, "line": Line, "told": Told, "estop": Estop}
