@@ -9,8 +9,9 @@ static uint32_t divide_rounded(uint32_t numerator, uint32_t denominator) {
 iw_bit_timing_achieved_t iw_bit_timing_achieved(uint32_t clock_hz, const iw_bit_timing_t *timing) {
     iw_bit_timing_achieved_t achieved = {0, 0};
     const uint32_t quanta = 1U + timing->tseg1 + timing->tseg2;
-    if (timing->prescaler > 0U && quanta <= UINT32_MAX / timing->prescaler) {
-        achieved.bitrate_hz = divide_rounded(clock_hz, timing->prescaler * quanta);
+    const uint32_t clocks = timing->prescaler * quanta;
+    if (clocks > 0U && clocks / quanta == timing->prescaler) {
+        achieved.bitrate_hz = divide_rounded(clock_hz, clocks);
         achieved.sample_point_permille = (uint16_t)divide_rounded(1000U * (1U + timing->tseg1), quanta);
     }
     return achieved;

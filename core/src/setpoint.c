@@ -10,11 +10,10 @@
 #define FRACTION_BITS 24U
 #define FRACTION_ONE  (1U << FRACTION_BITS)
 
-/// One of the quantities that ramp: where it is going in this step, and how far it may go.
+/// One of the quantities that ramp: where it is going in this step, and which share of the way it may go.
 typedef struct {
     int32_t *value;
-    uint32_t way;
-    bool forward; ///< The way leads up.
+    int32_t aim;
     bool braking; ///< Towards zero.
     uint32_t fraction;
 } axis_t;
@@ -122,11 +121,11 @@ static uint32_t ramp_step(uint32_t slope, iw_time_us_t elapsed_us) {
 static axis_t plan(int32_t *value, int32_t target, uint32_t away, uint32_t towards) {
     const bool through_zero = *value != 0 && (target > 0) != (*value > 0);
     const int32_t aim = through_zero ? 0 : target;
-    axis_t axis = {value, (uint32_t)iw_magnitude(aim - *value), aim > *value,
-                   (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value), FRACTION_ONE};
+    const uint32_t way = (uint32_t)iw_magnitude(aim - *value);
+    axis_t axis = {value, aim, (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value), FRACTION_ONE};
     const uint32_t allowed = axis.braking ? towards : away;
-    if (allowed < axis.way) {
-        axis.fraction = fraction_of(allowed, axis.way);
+    if (allowed < way) {
+        axis.fraction = fraction_of(allowed, way);
     }
     return axis;
 }
@@ -147,9 +146,9 @@ static void advance_together(const axis_t *axes) {
         braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
     }
     for (size_t i = 0; i < AXES; i++) {
-        const uint64_t share = axes[i].braking ? braking : all;
-        const int32_t move = (int32_t)((share * axes[i].way) >> FRACTION_BITS);
-        *axes[i].value += axes[i].forward ? move : -move;
+        const int64_t share = axes[i].braking ? braking : all;
+        const int32_t way = axes[i].aim - *axes[i].value;
+        *axes[i].value += (int32_t)(share * way / (int64_t)FRACTION_ONE);
     }
 }
 

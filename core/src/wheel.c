@@ -78,7 +78,7 @@ static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_st
         const uint32_t delta = (uint32_t)status->odometry_ticks - (uint32_t)self->status.odometry_ticks;
         if (tick_jump(self, delta, now_us - self->status_us)) {
             rebooted(self, now_us, IW_REBOOT_ODOMETRY);
-        } else {
+        } else if (self->ticks >= -IW_WHEEL_TICKS_MAX && self->ticks <= IW_WHEEL_TICKS_MAX) {
             self->ticks += (delta > INT32_MAX) ? -(int64_t)(0U - delta) : (int64_t)delta;
         }
     }

@@ -92,6 +92,27 @@ static void test_wheel_ticks_go_on_beyond_32_bits(void) {
     TEST_ASSERT_TRUE(iw_wheel_distance_nm(&wheel) == ((int64_t)INT32_MAX + 40) * (int64_t)wheel.nm_per_tick);
 }
 
+static void test_wheel_ticks_end_at_their_limit_in_both_directions(void) {
+    hear_ticks(0);
+    wheel.ticks = IW_WHEEL_TICKS_MAX;
+    hear_ticks(1);
+    TEST_ASSERT_EQUAL_INT64(IW_WHEEL_TICKS_MAX + 1, wheel.ticks);
+    hear_ticks(2);
+    TEST_ASSERT_EQUAL_INT64(IW_WHEEL_TICKS_MAX + 1, wheel.ticks);
+    wheel.ticks = -IW_WHEEL_TICKS_MAX;
+    hear_ticks(1);
+    TEST_ASSERT_EQUAL_INT64(-IW_WHEEL_TICKS_MAX - 1, wheel.ticks);
+    hear_ticks(0);
+    TEST_ASSERT_EQUAL_INT64(-IW_WHEEL_TICKS_MAX - 1, wheel.ticks);
+}
+
+static void test_wheel_distance_fits_at_the_limit_of_ticks_and_the_largest_wheel(void) {
+    config.radius_mm = 500;
+    begin_side(IW_LEFT);
+    wheel.ticks = IW_WHEEL_TICKS_MAX;
+    TEST_ASSERT_EQUAL_INT64(5236000000000000000, iw_wheel_distance_nm(&wheel));
+}
+
 static void test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance(void) {
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, jump(1000, MS(40)));
     TEST_ASSERT_EQUAL_INT64(0, wheel.ticks);
@@ -252,6 +273,8 @@ int main(void) {
     RUN_TEST(test_wheel_ticks_add_up_in_both_directions);
     RUN_TEST(test_wheel_ticks_unwrap_in_both_directions);
     RUN_TEST(test_wheel_ticks_go_on_beyond_32_bits);
+    RUN_TEST(test_wheel_ticks_end_at_their_limit_in_both_directions);
+    RUN_TEST(test_wheel_distance_fits_at_the_limit_of_ticks_and_the_largest_wheel);
     RUN_TEST(test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance);
     RUN_TEST(test_wheel_jump_is_judged_by_the_time_it_took);
     RUN_TEST(test_wheel_small_jump_is_believed_whatever_the_time);

@@ -16,7 +16,6 @@
 /// Eight hexadecimal digits and a newline.
 #define SUM_LENGTH 9U
 /// Further off no sensor can be: the largest raw value in the coarser unit.
-#define OFFSET_MAX_mN 3276800
 
 /// CRC-32 as everybody computes it (zip, Ethernet).
 static uint32_t checksum(const char *text, size_t length) {
@@ -157,7 +156,7 @@ static bool read_offset(const json_t *object, gw_known_offset_t *out_known) {
     int64_t samples;
     const char *unit = json_string_value(json_object_get(object, "unit"));
     if (unit == NULL || json_object_size(object) != 7U || !read_provenance(object, &out_known->from) ||
-        !read_number(object, "offset_mN", -OFFSET_MAX_mN, OFFSET_MAX_mN, &offset) ||
+        !read_number(object, "offset_mN", -IW_FORCE_OFFSET_MAX_mN, IW_FORCE_OFFSET_MAX_mN, &offset) ||
         !read_number(object, "drift_mN", INT32_MIN, INT32_MAX, &drift) ||
         !read_number(object, "deviation_mN", 0, UINT32_MAX, &deviation) ||
         !read_number(object, "samples", 0, UINT8_MAX, &samples) ||

@@ -31,6 +31,8 @@
 #define IW_FORCE_SHIFT_mN 5000U
 /// ... but an operator who tares it may, up to here.
 #define IW_FORCE_LOADED_mN 20000U
+/// No offset is larger: 16 bits of dN.
+#define IW_FORCE_OFFSET_MAX_mN 3276800
 /// Unit evidence needs a wheel offset of at least this.
 #define IW_FORCE_EVIDENCE_MIN_dN 20
 /// Older than this (five periods), the force is not valid, and a window with such a gap starts again.
@@ -119,6 +121,7 @@ void iw_force_reopen(iw_force_t *self, bool boot_seen);
 
 /// Puts an offset of an earlier run in force, unless this run has a better one: as IW_OFFSET_STORED, which anything
 /// replaces, or, if it was tared, as IW_OFFSET_OPERATOR, which only the next tare does. `offset_us` is IW_NEVER then.
+/// `offset_mN` lies within +/- IW_FORCE_OFFSET_MAX_mN.
 void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32_t offset_mN);
 
 /// Takes a force frame. `still`: the wheel is at rest.

@@ -24,6 +24,9 @@
 #define IW_WHEEL_FASTEST_MM_S 10000U
 /// Odometry steps up to this many ticks are believed whatever the time between them. Ours.
 #define IW_WHEEL_TICK_SLACK 30U
+/// Beyond this, either way, ticks are counted no more: so a distance in nanometres fits 64 bits whatever a wheel says. At
+/// the 20 mm of a tick without gear that is two million kilometres. Ours.
+#define IW_WHEEL_TICKS_MAX 100000000000
 /// Temperatures above this are not believed (trap 14: a byte cannot show below 0 degC).
 #define IW_WHEEL_TEMPERATURE_MAX_degC 200U
 
@@ -78,7 +81,7 @@ bool iw_wheel_at_rest(const iw_wheel_t *self, iw_time_us_t now_us, uint32_t for_
 /// Measured speed in the machine's frame, rounded towards zero. Meaningless while not heard.
 int32_t iw_wheel_speed_mm_s(const iw_wheel_t *self);
 
-/// Distance in the machine's frame in nanometres. 64 bits last for nine million kilometres.
+/// Distance in the machine's frame in nanometres. It stands still beyond IW_WHEEL_TICKS_MAX.
 int64_t iw_wheel_distance_nm(const iw_wheel_t *self);
 
 /// The evidence of a reboot since the last call, then IW_REBOOT_NONE.
