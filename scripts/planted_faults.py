@@ -90,6 +90,29 @@ def cppcheck(folder, code, deviations="D1 | misra-c2012-8.4 | * | cppcheck 2.10 
     return run(SCRIPTS / "cppcheck_gate.py", folder / "planted.c", "--", folder / "deviations.txt")
 
 
+def eva(folder, code):
+    (folder / "planted.c").write_text("#include <__fc_builtin.h>\n" + code)
+    return run(ROOT / "test/eva/run", "--work", folder / "work", "--program", folder / "planted.c")
+
+
+def eva_core(folder, fault):
+    """A fault in the core itself: that the events of test/eva/main.c reach it, and that it is an alarm."""
+    status, said = run(ROOT / "test/eva/run", "--work", folder / "work", "--plant", fault)
+    return (status if status == 77 else int("failed: no alarm" in said)), said
+
+
+def mcdc(folder, calls):
+    """A function with a decision of two conditions and a main that makes the calls given."""
+    (folder / "core").mkdir()
+    (folder / "profiles").mkdir()
+    (folder / "core/planted.c").write_text("int f(int a, int b);\nint f(int a, int b)\n{\n    return (a && b) ? 1 : 2;\n}\n")
+    (folder / "main.c").write_text(f"int f(int, int);\nint main(void) {{ {calls} return 0; }}\n")
+    run("clang-19", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc", folder / "main.c",
+        folder / "core/planted.c", "-o", folder / "unit_planted")
+    run("env", f"LLVM_PROFILE_FILE={folder}/profiles/a.profraw", folder / "unit_planted")
+    return run(SCRIPTS / "mcdc_gate.py", folder, folder / "core")
+
+
 def style(folder, code):
     for part in ("core/src", "core/include", "port", "app", "test"):
         (folder / part).mkdir(parents=True)
@@ -136,6 +159,7 @@ def junit(status, output):
 BIG = "void take(char *);\nvoid iw_g(void);\nvoid iw_g(void) { char buffer[300]; take(buffer); }\n"
 VARIABLE = "void take(char *);\nvoid iw_g(int n);\nvoid iw_g(int n) { char buffer[n]; take(buffer); }\n"
 RECURSION = "int take(int);\nint iw_g(int n);\nint iw_g(int n) { return n > 1 ? take(n) + iw_g(n - 1) * iw_g(n - 2) : 1; }\n"
+SOME_INDEX = "int main(void) {{ int a[2] = {{1, 2}}; return a[Frama_C_interval(0, {})]; }}\n"
 SOME_FOUR = "f(0, 0); f(1, 0); f(1, 1);"
 
 # gate, its tool, what is planted, argument, must it be caught
@@ -159,6 +183,15 @@ CASES = [
     (warnings, "gcc", "sign", "unsigned f(int a);\nunsigned f(int a) { return a; }\n", True),
     (analyzer, "gcc", "clean", CLEAN, False),
     (analyzer, "gcc", "second free", "#include <stdlib.h>\nvoid f(void *p);\nvoid f(void *p)\n{\n    free(p);\n    free(p);\n}\n", True),
+    (mcdc, "llvm-cov-19", "clean", SOME_FOUR, False),
+    (mcdc, "llvm-cov-19", "a condition that never decides alone", "f(0, 0); f(1, 1);", True),
+    (eva, "frama-c", "clean", SOME_INDEX.format(1), False),
+    (eva, "frama-c", "index off by one", SOME_INDEX.format(2), True),
+    (eva, "frama-c", "signed overflow", "int main(void) { int a = Frama_C_interval(0, 2147483647); return a + 1; }\n", True),
+    (eva, "frama-c", "an assertion that does not hold", "int main(void) { int a = Frama_C_interval(0, 1);\n//@ assert a == 0;\nreturn a; }\n", True),
+    (eva_core, "frama-c", "the core: ring index off by one", "force.c | 1U) % IW_FORCE_WINDOW_SAMPLES); | 1U) % (IW_FORCE_WINDOW_SAMPLES + 1U));", True),
+    (eva_core, "frama-c", "the core: a queue of three in room for two", "outbox.c | (zero ? 2U : 1U) | (zero ? 3U : 1U)", True),
+    (eva_core, "frama-c", "the core: negation of any number", "gateway.c | request->speed_mm_s[side] < INT16_MIN | false", True),
     (tidy, "clang-tidy", "clean", CLEAN, False),
     (tidy, "clang-tidy", "size of the pointer", "#include <string.h>\nvoid f(int *p);\nvoid f(int *p) { memset(p, 0, sizeof(p)); }\n", True),
     (cppcheck, "cppcheck", "clean", CLEAN, False),

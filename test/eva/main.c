@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: MIT
+/// The core among strangers, for Frama-C's Eva (`./check eva`): any configuration that `iw_config_check` lets pass, then,
+/// without end and in any order, steps and requests with any argument that their contracts allow, over a HAL whose functions
+/// return anything and whose frames are any bytes.
+///
+/// Eva computes a superset of all values that every object can have at every statement of every such run. What it cannot
+/// exclude of undefined behaviour is an alarm, and no alarm may stay: docs/static.md.
+#include "iwheel/bit_timing.h"
+#include "iwheel/gateway.h"
+
+#include <__fc_builtin.h>
+
+#define GEAR_MAX 100U
+
+static iw_gateway_t gateway;
+static iw_time_us_t now_us;
+
+static bool any_bool(void) {
+    return Frama_C_interval(0, 1) != 0;
+}
+
+static uint32_t any_u32(void) {
+    return Frama_C_unsigned_int_interval(0U, UINT32_MAX);
+}
+
+static int32_t any_i32(void) {
+    return Frama_C_interval(INT32_MIN, INT32_MAX);
+}
+
+static uint8_t any_u8(void) {
+    return (uint8_t)Frama_C_interval(0, UINT8_MAX);
+}
+
+static uint16_t any_u16(void) {
+    return (uint16_t)Frama_C_interval(0, UINT16_MAX);
+}
+
+static uint16_t any_within(iw_config_fault_t field) {
+    const iw_config_range_t range = iw_config_range(field);
+    return (uint16_t)Frama_C_interval(range.min, range.max);
+}
+
+static iw_time_us_t any_time(void) {
+    return Frama_C_unsigned_long_long_interval(0U, UINT64_MAX);
+}
+
+// ---- the HAL ----
+
+static int send_frame(void *context, const iw_can_frame_t *frame) {
+    (void)context;
+    uint32_t read = frame->id + frame->dlc + frame->kind;
+    for (size_t i = 0; i < IW_CAN_DATA_MAX; i++) {
+        read += frame->data[i];
+    }
+    (void)read;
+    return any_i32();
+}
+
+static int receive_frame(void *context, iw_can_frame_t *out_frame) {
+    (void)context;
+    out_frame->id = any_u32();
+    out_frame->dlc = any_u8();
+    out_frame->kind = any_u8();
+    for (size_t i = 0; i < IW_CAN_DATA_MAX; i++) {
+        out_frame->data[i] = any_u8();
+    }
+    return any_i32();
+}
+
+static iw_bus_state_t bus_state(void *context) {
+    (void)context;
+    return (iw_bus_state_t)Frama_C_interval(IW_BUS_DOWN, IW_BUS_ACTIVE);
+}
+
+static int purge(void *context) {
+    (void)context;
+    return any_i32();
+}
+
+static int estop_pressed(void *context) {
+    (void)context;
+    return any_i32();
+}
+
+static const iw_hal_t hal = {send_frame, receive_frame, bus_state, purge, estop_pressed, NULL};
+
+// ---- the configuration ----
+
+/// The ratio lies within 1..100. Eva does not relate two variables: so class after class of `gear_per`, each with the
+/// `gear_turns` that go with it.
+static void any_gear(iw_config_t *out_config) {
+    const iw_config_range_t per = iw_config_range(IW_CONFIG_GEAR_PER);
+    const iw_config_range_t turns = iw_config_range(IW_CONFIG_GEAR_TURNS);
+    uint32_t from = per.min;
+    //@ loop unroll 100;
+    while (from + from / 8U < per.max && any_bool()) {
+        from += 1U + from / 8U;
+    }
+    const uint32_t to = from + from / 8U;
+    const uint32_t most = GEAR_MAX * to;
+    out_config->gear_per = (uint16_t)Frama_C_unsigned_int_interval(from, (to < per.max) ? to : per.max);
+    out_config->gear_turns = (uint16_t)Frama_C_unsigned_int_interval(from, (most < turns.max) ? most : turns.max);
+}
+
+static void any_config(iw_config_t *out_config) {
+    iw_config_default(out_config);
+    out_config->period_ms = any_within(IW_CONFIG_PERIOD);
+    out_config->lease_ms = any_within(IW_CONFIG_LEASE);
+    out_config->accel_mm_s2 = any_within(IW_CONFIG_ACCEL);
+    out_config->decel_mm_s2 = any_within(IW_CONFIG_DECEL);
+    out_config->max_speed_mm_s = any_within(IW_CONFIG_MAX_SPEED);
+    out_config->max_current_mA = any_within(IW_CONFIG_MAX_CURRENT);
+    out_config->zero_hold_ms = any_within(IW_CONFIG_ZERO_HOLD);
+    out_config->wheel_silent_ms = any_within(IW_CONFIG_WHEEL_SILENT);
+    out_config->echo_ms = any_within(IW_CONFIG_ECHO);
+    out_config->rest_rpm = any_within(IW_CONFIG_REST_RPM);
+    out_config->rest_ms = any_within(IW_CONFIG_REST);
+    out_config->follow_mm_s = any_within(IW_CONFIG_FOLLOW_SPEED);
+    out_config->follow_ms = any_within(IW_CONFIG_FOLLOW);
+    out_config->blocked_ms = any_within(IW_CONFIG_BLOCKED);
+    out_config->radius_mm = any_within(IW_CONFIG_RADIUS);
+    any_gear(out_config);
+    out_config->setpoint_dlc = any_within(IW_CONFIG_SETPOINT_DLC);
+    out_config->setpoint_type = any_u8();
+    out_config->setpoint_type_set = any_bool();
+    out_config->rpm_of_rotor = any_bool();
+    out_config->listen_only = any_bool();
+    out_config->current_role = (iw_current_role_t)Frama_C_interval(IW_ROLE_UNSET, IW_ROLE_SETPOINT);
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        out_config->invert[side] = any_bool();
+        out_config->force_unit[side] = (iw_force_unit_t)Frama_C_interval(IW_FORCE_CN, IW_FORCE_DN);
+    }
+}
+
+// ---- the world ----
+
+static iw_time_us_t later(void) {
+    return Frama_C_unsigned_long_long_interval(now_us, UINT64_MAX);
+}
+
+static void drive(bool has_current) {
+    iw_drive_t request;
+    iw_applied_t applied;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        request.speed_mm_s[side] = any_i32();
+        request.current_mA[side] = any_i32();
+    }
+    request.has_current = has_current;
+    (void)iw_gateway_drive(&gateway, any_time(), any_u32(), &request, &applied);
+}
+
+static void request(void) {
+    switch (Frama_C_interval(0, 8)) {
+    case 0:
+        (void)iw_gateway_arm(&gateway, now_us, any_u32(), any_bool());
+        break;
+    case 1:
+        drive(any_bool() ? true : false);
+        break;
+    case 2:
+        iw_gateway_stop(&gateway, now_us, any_u32(), any_bool() ? IW_CAUSE_CLIENT_STOP : IW_CAUSE_SHUTDOWN);
+        break;
+    case 3:
+        iw_gateway_estop(&gateway, now_us, any_u32());
+        break;
+    case 4:
+        (void)iw_gateway_reset(&gateway, now_us);
+        break;
+    case 5:
+        iw_gateway_disconnect(&gateway, now_us, any_u32());
+        break;
+    case 6:
+        (void)iw_gateway_tare(&gateway, now_us, any_bool() ? IW_LEFT : IW_RIGHT);
+        break;
+    case 7:
+        iw_gateway_suspended(&gateway, any_time());
+        break;
+    default: {
+        const iw_bus_facts_t facts = {any_bool(), any_bool()};
+        iw_gateway_bus_facts(&gateway, &facts);
+        break;
+    }
+    }
+}
+
+static void operate(iw_side_t side) {
+    const iw_ledger_item_t item = (iw_ledger_item_t)Frama_C_interval(0, IW_LEDGER_ITEMS - 1);
+    const iw_evidence_t evidence = (iw_evidence_t)Frama_C_interval(IW_EVIDENCE_NONE, IW_EVIDENCE_OPERATOR);
+    switch (Frama_C_interval(0, 3)) {
+    case 0:
+        iw_ledger_assume(&gateway.ledger, item, evidence);
+        break;
+    case 1:
+        iw_ledger_confirm(&gateway.ledger, item, evidence, any_i32());
+        break;
+    case 2:
+        iw_ledger_contradict(&gateway.ledger, item, evidence, any_i32());
+        break;
+    default:
+        iw_force_restore(&gateway.force[side], any_bool() ? IW_OFFSET_STORED : IW_OFFSET_OPERATOR,
+                         Frama_C_interval(-IW_FORCE_OFFSET_MAX_mN, IW_FORCE_OFFSET_MAX_mN));
+        break;
+    }
+}
+
+/// What a program shows of the wheels.
+static void look(iw_side_t side) {
+    (void)iw_wheel_speed_mm_s(&gateway.wheel[side]);
+    (void)iw_wheel_distance_nm(&gateway.wheel[side]);
+    (void)iw_force_validity(&gateway.force[side], now_us);
+    (void)iw_force_raw_mN(&gateway.force[side]);
+    (void)iw_force_net_mN(&gateway.force[side]);
+    (void)iw_force_measure(&gateway.force[side]);
+    (void)iw_gateway_state(&gateway);
+    (void)iw_gateway_arming(&gateway);
+    (void)iw_gateway_arm_refusal(&gateway);
+    (void)iw_permit_present(&gateway.permit, now_us);
+    (void)iw_ledger_entry(&gateway.ledger, IW_LEDGER_DLC);
+}
+
+/// What does not belong to the loop of a gateway: the codec's other direction, the bit timing.
+static void calculate(void) {
+    iw_proto_message_t message = {0};
+    iw_can_frame_t frame;
+    iw_bit_timing_t timing = {any_u16(), any_u16(), any_u16()};
+    const iw_bit_timing_limits_t limits = {any_u16(), any_u16(), any_u16(), any_u16(), any_u16()};
+    const iw_bit_timing_achieved_t wanted = {any_u32(), any_u16()};
+    (void)iw_bit_timing_achieved(any_u32(), &timing);
+    (void)iw_bit_timing_solve(&limits, any_u32(), &wanted, &timing);
+    message.kind = (iw_proto_kind_t)Frama_C_interval(IW_PROTO_SPEED, IW_PROTO_SETPOINT);
+    message.side = (iw_side_t)Frama_C_interval(IW_LEFT, IW_RIGHT);
+    Frama_C_make_unknown((char *)&message.as, sizeof message.as);
+    (void)iw_proto_encode(&message, &frame);
+    (void)receive_frame(NULL, &frame);
+    (void)iw_proto_decode_other(&frame, &message);
+}
+
+static void event(void) {
+    now_us = later();
+    switch (Frama_C_interval(0, 3)) {
+    case 0:
+        (void)iw_gateway_step(&gateway, now_us);
+        break;
+    case 1:
+        request();
+        break;
+    case 2:
+        operate(any_bool() ? IW_LEFT : IW_RIGHT);
+        break;
+    default:
+        look(any_bool() ? IW_LEFT : IW_RIGHT);
+        break;
+    }
+}
+
+/// Without end. States are joined here, after every event: see `-eva-slevel-function` in test/eva/run.
+static void live(void) {
+    //@ loop widen_hints HINTS;
+    while (any_bool()) {
+        event();
+    }
+}
+
+int main(void) {
+    iw_config_t config;
+    calculate();
+    any_config(&config);
+    now_us = any_time();
+    if (iw_gateway_init(&gateway, &config, &hal, now_us, any_bool()) != IW_CONFIG_OK) {
+        return 1;
+    }
+    //@ slevel merge;
+    live();
+    return 0;
+}
