@@ -11,6 +11,7 @@ import time
 from harness import die_with_parent
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+VIRTUAL_NICE = 5
 
 
 def find_kernel(install=True):
@@ -32,12 +33,12 @@ def find_kernel(install=True):
 class Boot:
     """One boot that works off one plan.
 
-    The plan (see guest.py) and what comes of it lie in `folder`: NAME.json, NAME.results (one JSON object per line, as
+    It runs on `processors`. The plan (see guest.py) and what comes of it lie in `folder`: NAME.json, NAME.results (one JSON object per line, as
     the tests end), NAME.out (what the guest printed), NAME.console (what the kernel printed), NAME.status.
     """
 
-    def __init__(self, kernel, folder, name, plan):
-        self.name, self.folder = name, folder
+    def __init__(self, kernel, folder, name, plan, processors):
+        self.name, self.folder, self.processors = name, folder, processors
         self.plan = plan
         with open(self.path("json"), "w", encoding="utf-8") as file:
             json.dump({**plan, "results": self.path("results")}, file)
@@ -51,10 +52,17 @@ class Boot:
                 stdout=console,
                 stderr=console,
                 start_new_session=True,
-                preexec_fn=die_with_parent,
+                preexec_fn=self.prepare,
                 cwd=folder,
             )
-        self.taken = 0
+        self.taken, self.cpu_s = 0, 0
+
+    def prepare(self):
+        """In the child: where it may run. What runs in virtual time makes way for everything else."""
+        die_with_parent()
+        os.sched_setaffinity(0, self.processors)
+        if self.plan["virtual"]:
+            os.nice(VIRTUAL_NICE)
 
     def command(self, kernel):
         plan, folder, name = self.plan, self.folder, self.name
@@ -87,7 +95,8 @@ class Boot:
         return [json.loads(line) for line in whole.splitlines()]
 
     def running(self):
-        return self.child.poll() is None
+        """Without reaping it: `end` wants to know what it cost."""
+        return os.waitid(os.P_PID, self.child.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
 
     def seconds(self):
         return time.monotonic() - self.began
@@ -100,9 +109,11 @@ class Boot:
             pass
 
     def end(self):
-        """Kills what is left of it."""
+        """Kills what is left of it; keeps the seconds of processor time that it and its processes took."""
         self.kill()
-        self.child.wait()
+        _, status, usage = os.wait4(self.child.pid, 0)
+        self.child.returncode = os.waitstatus_to_exitcode(status)
+        self.cpu_s = usage.ru_utime + usage.ru_stime
 
     def complaint(self):
         """Why it ended before its plan did."""

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Boots the groups of tests, two at a time, and tells what came of each test."""
+"""Boots the groups of tests, two at a time, and tells what came of each test.
+
+Virtual time does not care how busy the machine is, real time does: while something runs in real time it has a processor to itself.
+"""
 
 import argparse
 import os
@@ -21,7 +24,7 @@ from harness import find_program
 from native import why_not_native, NativeBoot
 
 POLL_S = 0.1
-HOURS, HOURS_FULL = 0.5, 24  # of the soak: half an hour costs as much as a third of all other tests
+HOURS, HOURS_FULL = 1, 24  # of the soak
 LOG_LINES = 40
 
 
@@ -35,6 +38,8 @@ class Campaign:
         self.results = []
         self.boots = []
         self.interrupted = False
+        self.processors = sorted(os.sched_getaffinity(0))
+        self.reserved = set()  # of those, while something runs in real time
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self.interrupt)
 
@@ -44,7 +49,7 @@ class Campaign:
         names = [
             entry.name
             for entry in ENTRIES.values()
-            if group.runs(entry.groups)
+            if group.runs(entry.name, entry.groups, options.full)
             and (not options.only or any(part in entry.name for part in options.only))
         ]
         if not names or (options.real_time and group.virtual) or (group.full_only and not options.full):
@@ -70,15 +75,17 @@ class Campaign:
             for name in plan["tests"]:
                 self.take(group, {"name": name, "verdict": "skipped", "figures": [reason]})
             return
-        boot = (NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan)
+        processors = set(self.processors) - self.reserved if group.virtual else self.reserved or set(self.processors)
+        boot = (NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan, processors)
         self.boots.append(boot)
         limit_s = group.full_limit_s if self.options.full else group.limit_s
-        done = set()
+        done, since = set(), 0
         try:
             while True:
                 running = boot.running()
                 for result in boot.results():
                     done.add(result["name"])
+                    result["host_s"], since = boot.seconds() - since, boot.seconds()
                     self.take(group, result)
                 if not running or boot.seconds() > limit_s:
                     break
@@ -86,10 +93,32 @@ class Campaign:
         finally:
             hung = boot.running()
             boot.end()
+        with self.lock:
+            print(f"     {group.name}: {boot.seconds():.0f} s, {boot.cpu_s:.0f} s of processor time", flush=True)
         why = f"the boot was ended after {limit_s} s" if hung else "the kernel ended before this test did"
         for number, name in enumerate(name for name in plan["tests"] if name not in done):
             text = f"{why}\n{boot.complaint()}" if number == 0 else f"not reached: {why}"
             self.take(group, {"name": name, "verdict": "failed", "failures": [[text, "rule", 0]]})
+
+    def real_time(self):
+        """All of it, one group at a time: they must not slow each other."""
+        for group in GROUPS:
+            if not group.virtual:
+                self.boot(group)
+        self.reserved = set()
+
+    def work(self):
+        """The soak is the longest: it is started first, with what runs in real time beside it."""
+        jobs, virtual = max(1, self.options.jobs), [group for group in GROUPS if group.virtual and not self.options.native]
+        if jobs == 1 or len(self.processors) == 1:
+            for group in virtual:
+                self.boot(group)
+            self.real_time()
+            return
+        self.reserved = set(self.processors[-1:])
+        with ThreadPoolExecutor(jobs) as pool:
+            for done in [pool.submit(self.real_time)] + [pool.submit(self.boot, group) for group in virtual]:
+                done.result()
 
     def why_skipped(self, group, plan):
         """What is missing for a group that wants another build; else that build is in the plan, and the answer None."""
@@ -104,7 +133,7 @@ class Campaign:
         return None
 
     def take(self, group, result):
-        result = {"figures": [], "failures": [], "measures": {}, "latencies": [], "logs": [], "seconds": 0, **result}
+        result = {"figures": [], "failures": [], "measures": {}, "latencies": [], "logs": [], "seconds": 0, "host_s": 0, **result}
         result["group"] = group.name
         with self.lock:
             self.results.append(result)
@@ -114,7 +143,8 @@ class Campaign:
         mark = {"passed": "ok  ", "failed": "FAIL", "skipped": "skip"}[result["verdict"]]
         figures = f"  [{', '.join(result['figures'])}]" if result["figures"] else ""
         title = ENTRIES[result["name"]].title
-        print(f"{mark} {result['group']}/{result['name']}: {title}{figures}  {result['seconds']:.1f} s", flush=True)
+        times = f"{result['seconds']:.1f} s in {result['host_s']:.1f} s"
+        print(f"{mark} {result['group']}/{result['name']}: {title}{figures}  {times}", flush=True)
         for text, kind, _ in result["failures"]:
             print(f"       {kind}: " + text.replace("\n", "\n       | "), flush=True)
         for path in result["logs"]:
@@ -166,20 +196,21 @@ def parse(arguments):
     parser.add_argument("--keep", action="store_true", help="keep results and logs")
     parser.add_argument("--report", action="store_true", help="write docs/fault-catalogue.md from this run")
     parser.add_argument("--list", action="store_true", help="list the tests and exit")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if min(options.repeat, options.jobs) < 1 or (options.hours is not None and options.hours <= 0):
+        parser.error("--repeat, --jobs and --hours want something above 0")
+    if options.native and options.report:
+        parser.error("--report describes the kernel that is built here, not this machine's own: leave out --native")
+    return options
 
 
 def once(options, kernel):
     """One campaign; returns the three counts."""
     campaign = Campaign(options, kernel)
     try:
-        with ThreadPoolExecutor(max(1, options.jobs)) as pool:
-            list(pool.map(campaign.boot, [group for group in GROUPS if group.virtual and not options.native]))
-        for group in GROUPS:  # one at a time: they must not slow each other
-            if not group.virtual:
-                campaign.boot(group)
+        campaign.work()
         if options.report and not options.only:
-            report.write(campaign.results)
+            report.write(campaign.results, options)
     finally:
         campaign.close()
     if campaign.interrupted:
@@ -192,7 +223,7 @@ def main(arguments):
     if options.list:
         for group in GROUPS:
             for entry in ENTRIES.values():
-                if group.runs(entry.groups):
+                if group.runs(entry.name, entry.groups, options.full):
                     print(f"{group.name + '/' + entry.name:<50} {entry.title}")
         return 0
     try:

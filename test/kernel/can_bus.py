@@ -12,8 +12,8 @@ CAN_RAW_ERR_FILTER = 2  # Python does not know it
 MSG_CONFIRM = 0x800  # the frame is our own
 FD_FRAME = struct.Struct("=IBB2x64s")
 SO_RCVBUFFORCE = 33  # nor this
-RECHECK_S = 0.2
-FETCH_S = 0.05
+FETCH_S = 0.2
+CLOCKS_EVERY = 25  # fetches
 
 
 def open_raw(interface, *ids):
@@ -29,8 +29,8 @@ def open_raw(interface, *ids):
 class CanBus(Bus):
     """Records with the kernel's stamps, which are of the wall clock: who steps that calls `before_step` first.
 
-    `exact`: virtual time. The stamps are exact then, and frames are fetched only now and then, or when somebody asks for `frames`:
-    to wake up for each of them would cost more than gateway and wheels together.
+    Frames are fetched only now and then, or when somebody asks for `frames`: to wake up for each of them would cost more than
+    gateway and wheels together. `exact`: virtual time, in which the two clocks never drift apart.
     """
 
     def __init__(self, interface, frames=None, exact=False, ids=()):
@@ -41,14 +41,13 @@ class CanBus(Bus):
         self.socket.setsockopt(socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, 0x1FFFFFFF)
         self.socket.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, 4 << 20)
         self.socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", 0, int(RECHECK_S * 1e6)))
         self.recorded = frames if frames is not None else []
         self.recorded_errors = []
         self.closed = False
         self.ahead_ns = realtime_ahead_ns()
         self.lock = threading.Lock()
         self.wake = threading.Event()
-        self.thread = threading.Thread(target=self._fetch if exact else self._record, daemon=True)
+        self.thread = threading.Thread(target=self._fetch, daemon=True)
         self.thread.start()
 
     @property
@@ -68,10 +67,10 @@ class CanBus(Bus):
     def after_step(self):
         self.ahead_ns = realtime_ahead_ns()
 
-    def _take(self, flags=0):
+    def _take(self):
         """One frame; False if there is none, or the interface went down, or it is gone."""
         try:
-            data, ancillary, message_flags, _ = self.socket.recvmsg(FRAME.size, 64, flags)
+            data, ancillary, message_flags, _ = self.socket.recvmsg(FRAME.size, 64, socket.MSG_DONTWAIT)
         except OSError:
             return False
         seconds, nanoseconds = struct.unpack("qq", ancillary[0][2])
@@ -82,22 +81,18 @@ class CanBus(Bus):
         return True
 
     def _drain(self):
-        if self.exact and not self.closed:
+        if not self.closed:
             with self.lock:
-                while self._take(socket.MSG_DONTWAIT) or self._take(socket.MSG_DONTWAIT):
+                while self._take() or self._take():
                     pass  # twice: one error, that the interface went down, may stand before frames
 
     def _fetch(self):
-        while not self.wake.wait(FETCH_S):
-            self._drain()
-
-    def _record(self):
         number = 0
-        while not self.closed:
+        while not self.wake.wait(FETCH_S):
             number += 1
-            if number % 4096 == 0:
+            if number % CLOCKS_EVERY == 0 and not self.exact:
                 self.ahead_ns = realtime_ahead_ns()
-            self._take()
+            self._drain()
 
     def send_fd(self, can_id, data):
         """A CAN FD frame, from a socket that may."""

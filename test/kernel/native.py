@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The same tests on the machine's own kernel, where it has vcan and gpio-sim and lets us use them."""
+"""The same tests on the machine's own kernel, where it has vcan and gpio-sim and lets us use them. In real time, all of them.
+
+What it asks for, what it answers where something is missing, and how it starts the tests is tested (test_native.py). Whether the
+tests themselves pass on a kernel that is no process depends on that kernel; docs/fault-catalogue.md says where they were run.
+"""
 
 import os
 import shutil
@@ -9,18 +13,25 @@ import sys
 from boot import HERE, Boot
 
 
+GPIO_SIM = "/sys/kernel/config/gpio-sim"
+PROGRAMS = {"unshare": "util-linux", "ip": "iproute2", "tc": "iproute2"}
+
+
 def why_not_native():
-    """What keeps this machine's kernel from being used; None if nothing does."""
+    """What keeps this machine's kernel from being used, and the cure; None if nothing does."""
     if os.geteuid() != 0:
-        return "--native needs root: it makes CAN interfaces and GPIO chips"
+        return "--native needs root: it makes CAN interfaces and GPIO chips; run it with sudo, or without --native"
+    missing = sorted({package for program, package in PROGRAMS.items() if not shutil.which(program)})
+    if missing:
+        return f"--native needs programs that are missing here: apt-get install {' '.join(missing)}"
     if shutil.which("modprobe"):
         for module in ("vcan", "slcan", "gpio-sim"):
             subprocess.run(["modprobe", "-q", module], stderr=subprocess.DEVNULL, check=False)
-    if not os.path.isdir("/sys/kernel/config/gpio-sim"):
-        return "no /sys/kernel/config/gpio-sim here: it needs Linux 5.17 or later, modprobe gpio-sim, and configfs mounted"
+    if not os.path.isdir(GPIO_SIM):
+        return f"no {GPIO_SIM} here: it needs Linux 5.17 or later, modprobe gpio-sim, and configfs mounted; or run without --native"
     command = ["unshare", "--net", "ip", "link", "add", "vcan0", "type", "vcan"]
     made = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
-    return None if made.returncode == 0 else f"this kernel makes no vcan interface: {made.stdout.strip()}"
+    return None if made.returncode == 0 else f"this kernel makes no vcan interface (modprobe vcan, or run without --native): {made.stdout.strip()}"
 
 
 class NativeBoot(Boot):

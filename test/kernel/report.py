@@ -63,6 +63,11 @@ stall, an outage or a stop was over, the most of all tests of the row; on an ada
 out (see below). `--`: not measured by any test of the row. Tests in real time beside which the machine stalled three times are not
 judged, and not counted.
 """
+NATIVE = """
+`test/kernel/run --native`, the same tests on a machine's own kernel with its modules vcan, slcan and gpio-sim, has not been run: no
+machine at hand has those modules. Tested of it is what it asks for, what it answers where that is missing, and that it works off a
+plan without tests (`test/kernel/test_native.py`).
+"""
 
 
 def number(values, unit):
@@ -110,7 +115,22 @@ def figure_lines(results, title, names):
     return lines
 
 
-def write(results):
+def run_lines(results, options):
+    """What this run was, and what it was not: a longer one counts only where it was made."""
+    count = {verdict: sum(r["verdict"] == verdict for r in results) for verdict in ("passed", "failed", "skipped")}
+    text = f"One campaign with seed {options.seed}: {count['passed']} tests passed, {count['failed']} failed, {count['skipped']} were not judged."
+    if options.full:
+        text += " With `--full`: 1000 presses, a soak of 24 virtual hours."
+    else:
+        text += f"\nA soak of {options.hours or 1:g} virtual h, 100 presses in motion (and 25 for each other way of wiring). Not run for this page: `--full` with a"
+        text += "\nsoak of 24 virtual hours and 1000 presses, and twenty campaigns in a row."
+    skipped = [f"{r['group']}/{r['name']}" for r in results if r["verdict"] == "skipped"]
+    if skipped:
+        text += f"\nNot judged, because the machine was late each time: {', '.join(skipped)}."
+    return ["", "## What was run", "", text]
+
+
+def write(results, options):
     """Replaces the page."""
     real_time = {group.name for group in GROUPS if not group.virtual}
     lines = [row_line(row, results, real_time) for row in ROWS]
@@ -118,6 +138,7 @@ def write(results):
     text += "\n".join(estop_lines(results, real_time)) + "\n"
     text += "\n".join(figure_lines(results, "What comes out after a stall", ("row17_", "row18_"))) + "\n"
     text += "\n".join(figure_lines(results, "Soak", ("soak",))) + "\n"
+    text += "\n".join(run_lines(results, options)) + "\n" + NATIVE
     with open(PATH, "w", encoding="utf-8") as file:
         file.write(text)
     print(f"wrote {os.path.relpath(PATH)}")

@@ -272,7 +272,7 @@ class Rig:
                 return status
             if time.monotonic() > deadline:
                 return None
-            time.sleep(0.02)
+            time.sleep(0.05)
 
     def kill_gateway(self, number):
         """Ends it by a signal that it cannot or does not handle."""

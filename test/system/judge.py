@@ -5,6 +5,9 @@ Written from the rules of motion permission, not from the gateway's code. The bu
 did; the timeline tells what was done to it. Times are integer microseconds of CLOCK_MONOTONIC; see judge_log.py for the timeline.
 """
 
+import bisect
+import itertools
+
 from judge_log import (
     ECHO_US,
     GAP_US,
@@ -84,8 +87,11 @@ class Judge(Reading):
     def _is_residual(self, setpoint):
         """The one old frame per wheel that a controller had in hand when the bus died; its zero follows within 2 ms."""
         for begin, end in self.dead:
-            later = [s for s in self.setpoints if s.side == setpoint.side and s.t_us >= max(end, begin + 2 * ECHO_US)]
-            if later and later[0] is setpoint and setpoint.t_us < end + RESIDUAL_US:
+            from_us = max(end, begin + 2 * ECHO_US)
+            if not from_us <= setpoint.t_us < end + RESIDUAL_US:
+                continue
+            later = [s for s in self._setpoints_between(from_us) if s.side == setpoint.side]
+            if later[0] is setpoint:
                 self.residual += 1
                 followed = len(later) > 1 and later[1].zero
                 excess_us = later[1].t_us - setpoint.t_us - RESIDUAL_ZERO_US if followed else None
@@ -130,7 +136,7 @@ class Judge(Reading):
             )
 
     def _speed_at(self, t_us):
-        before = [abs(s.speed) for s in self.setpoints if t_us - GAP_US <= s.t_us <= t_us + JITTER_US]
+        before = [abs(s.speed) for s in self._setpoints_between(t_us - GAP_US, t_us + JITTER_US + 1)]
         return max(before, default=self.config.max_speed_mm_s)
 
     def _after_end(self, setpoint, name, session, end, after_press):
@@ -238,7 +244,7 @@ class Judge(Reading):
     def _presence(self, session, next_us):
         """Invariant 4: no gap while armed, stopping or holding; and the hold ends neither early nor late."""
         for side in (0, 1):
-            times = [s.t_us for s in self.setpoints if s.side == side and session.begin_us <= s.t_us < next_us]
+            times = [s.t_us for s in self._setpoints_between(session.begin_us, next_us) if s.side == side]
             if not times:
                 self._say("never_sent", session.begin_us, "armed, but no setpoint was sent to a wheel")
                 continue
@@ -274,8 +280,10 @@ class Judge(Reading):
         if any(begin <= end_us + GAP_US and end_us < alive for begin, alive in self.dead):
             return end_us
         last = None
-        for setpoint in self.setpoints:
-            if setpoint.side == side and setpoint.t_us >= end_us and self._session_at(setpoint.t_us) is session:
+        index = bisect.bisect_right(self._begins, session.begin_us)
+        next_us = self._begins[index] if index < len(self._begins) else 1 << 62
+        for setpoint in self._setpoints_between(end_us, next_us):
+            if setpoint.side == side:
                 if not setpoint.zero:
                     last = None
                 elif last is None:
@@ -298,7 +306,9 @@ class Judge(Reading):
         """When both wheels have been at rest for the settling time, at from_us or later. Unheard is not at rest."""
         since = {SPEED_IDS[0]: None, SPEED_IDS[1]: None}
         heard = dict(since)
-        for frame in self.frames:
+        # What was before the settling time does not matter: a wheel at rest is heard again within UNHEARD_US.
+        first = bisect.bisect_left(self._frame_times, from_us - SETTLED_US - 2 * UNHEARD_US)
+        for frame in itertools.islice(self.frames, first, None):
             if frame.id not in since or frame.own or len(frame.data) < 2:
                 continue
             before, heard[frame.id] = heard[frame.id], frame.t_us
@@ -348,10 +358,12 @@ class Judge(Reading):
                 self._say("sent_in_listening", setpoint.t_us, "a setpoint although nobody had asked to arm")
                 return
         for reset in (event for event in self.events if event.kind == "reset" and event.ok):
-            for setpoint in self.setpoints:
+            index = bisect.bisect_left(self._begins, reset.t_us)
+            next_us = self._begins[index] if index < len(self._begins) else 1 << 62
+            for setpoint in self._setpoints_between(reset.done_us + JITTER_US + 1, next_us):
                 session = self._session_at(setpoint.t_us)
                 late_us = setpoint.t_us - reset.done_us - JITTER_US
-                if late_us > 0 and session is not None and session.begin_us < reset.t_us:
+                if session is not None:
                     self._say("sent_after_reset", setpoint.t_us, "a setpoint after reset and before arm", late_us)
                     return
 
@@ -360,10 +372,7 @@ class Judge(Reading):
         for event in self.events:
             if event.kind not in ("press", "estop") or not self._sending_at(event.t_us):
                 continue
-            zeros = [
-                next((s.t_us for s in self.setpoints if s.side == side and s.t_us > event.t_us and s.zero), None)
-                for side in (0, 1)
-            ]
+            zeros = [self.next_zero_us(side, event.t_us) for side in (0, 1)]
             if None in zeros:
                 self._say("estop_no_zero", event.t_us, "no zero pair after the e-stop")
                 continue
@@ -380,5 +389,5 @@ class Judge(Reading):
     def _sending_at(self, t_us):
         session = self._session_at(t_us)
         ended = session is None or any(end[0] < t_us for end in session.ends)
-        recent = [s for s in self.setpoints if t_us - GAP_US < s.t_us <= t_us]
+        recent = self._setpoints_between(t_us - GAP_US + 1, t_us + 1)
         return (not ended and bool(recent)) or any(not s.zero for s in recent[-2:])

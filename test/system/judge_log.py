@@ -158,6 +158,20 @@ class Reading:
                 continue
             if frame.id in (LEFT, RIGHT):
                 self._read_setpoint(frame)
+        self._setpoint_times = [setpoint.t_us for setpoint in self.setpoints]
+        self._frame_times = [frame.t_us for frame in self.frames]
+
+    def _setpoints_between(self, from_us, to_us=1 << 62):
+        """Those at from_us or later and before to_us: long logs are not looked through from their beginning each time."""
+        times = self._setpoint_times
+        return self.setpoints[bisect.bisect_left(times, from_us) : bisect.bisect_left(times, to_us)]
+
+    def next_zero_us(self, side, after_us):
+        """When the first zero of that wheel after a moment was sent; None if none was."""
+        for number in range(bisect.bisect_right(self._setpoint_times, after_us), len(self.setpoints)):
+            if self.setpoints[number].side == side and self.setpoints[number].zero:
+                return self._setpoint_times[number]
+        return None
 
     def _read_setpoint(self, frame):
         config, side = self.config, 0 if frame.id == LEFT else 1

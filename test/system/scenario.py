@@ -60,10 +60,10 @@ class Test:
     def arm(self, client, **fields):
         """Arms; tries again for a while if the wheels are not at rest yet."""
         reply = client.arm(**fields)
-        for _ in range(150):
+        for _ in range(60):
             if reply["ok"] or reply["error"] not in AWAITED:
                 break
-            time.sleep(0.02)
+            time.sleep(0.05)
             reply = client.arm(**fields)
         self.expect(reply)
         return reply

@@ -69,7 +69,7 @@ ON_VCAN = (
 ON_ADAPTER = ("nominal_drive_and_turn", "row01_client_killed", "row22_left_silent", "row25_killed", "row25_sigterm")
 REAL_TIME = ("nominal_drive_and_turn", "row01_client_killed", "row25_killed")
 REAL_TIME_FULL = ("row02_client_frozen", "row24_stopped_250_ms", "row24_stopped_700_ms", "row25_sigterm", "row27_stderr_blocked")
-AS_DOCUMENTED = ("nominal_drive_and_turn", "force_offset_and_tare", "row23_")  # telemetry at its full rate
+AS_DOCUMENTED = ("nominal_drive_and_turn", "force_offset_and_tare", "row23_", "trap12_")  # telemetry at its full rate
 NEVER_WAIT = ("row05_many_observers", "row05_out_of_descriptors")  # in virtual time these would never end
 
 

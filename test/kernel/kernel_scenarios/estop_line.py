@@ -9,9 +9,11 @@ from catalogue import kernel_test
 from client import Streamer
 from gpio_sim import Edges
 from kernel_rig import HighVcanRig, SlcanRig
+from scenario import Skip
 from scenarios.estop import reset
 
 PRESSES, PRESSES_HIGH, PRESSES_REAL_TIME, PRESSES_FULL = 100, 25, 15, 1000
+TRIES = 3
 SLOW = {"limits": {"wheel_silent_ms": 200}}
 PULSES_MS = (1, 2, 3, 5, 7, 10, 15, 20)
 
@@ -19,7 +21,7 @@ PULSES_MS = (1, 2, 3, 5, 7, 10, 15, 20)
 def one_press(t, rig, driver, other, chance):
     """Arms, drives, presses at a random moment of the ramp or the steady part, releases, resets."""
     t.arm(driver)
-    stream = Streamer(driver, chance.randrange(-600, 600), chance.randrange(-600, 600), 0.02)
+    stream = Streamer(driver, chance.randrange(-600, 600), chance.randrange(-600, 600))
     time.sleep(chance.uniform(0.05, 0.6))
     pressed_us = rig.press()
     time.sleep(chance.uniform(0.01, 0.05))
@@ -47,13 +49,17 @@ def stopped_before_edge(t, rig, judge):
 
 
 def presses(t, count, seed):
+    """In real time as many more as were disturbed by the machine: they are judged, but not timed."""
     chance = random.Random(seed)
     rig, driver = t.running()
     other = rig.client("other")
-    for _ in range(count):
-        if not one_press(t, rig, driver, other, chance):
-            break
+    disturbed = 0
+    while len(rig.edges) < count + disturbed and one_press(t, rig, driver, other, chance):
+        disturbed += t.press_disturbed(rig.edges[-1][1])
+        if disturbed > TRIES * count:
+            raise Skip(f"the machine was late beside {disturbed} of {len(rig.edges)} presses; needs a quieter one")
     judge = t.judge(rig)
+    t.figure(f"{disturbed} more presses were not timed: the machine was late") if disturbed else None
     met = len(t.latencies) + stopped_before_edge(t, rig, judge)
     t.check(met >= 0.9 * count, f"{met} of {count} presses met a running setpoint")
 

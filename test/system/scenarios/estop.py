@@ -25,7 +25,7 @@ def reset(t, client, seconds=4.0):
             t.expect(reply)
             return reasons
         reasons.append(reply["error"])
-        time.sleep(0.03)
+        time.sleep(0.1)
 
 
 def presses(t, seed):
