@@ -30,6 +30,7 @@ READS_THE_LINE = ("row11_presses_low", "row12_pulses_low", "row12_glitch", "row1
 GROUPS = (
     Group("soak", "an hour of random faults, with --full a day", limit_s=3600, full_limit_s=24 * 3600),
     Group("realtime", "the same rules by the clock on the wall", virtual=False),
+    Group("starved", "a processor that is fought over", virtual=False),
     Group("realtime-full", "more of them", virtual=False, full_only=True),
     Group("estop", "the e-stop on a GPIO line"),
     Group("estop-gpiod2", "the same through libgpiod 2", same_as="estop", gpiod=2, few=READS_THE_LINE),

@@ -107,7 +107,9 @@ class GuestRun(Run):
             return False
         if text.startswith("pair_spread"):  # the strictest of all, and over in a moment
             return kernel_rig.machine_late(at_us - kernel_rig.TICK_US, at_us + kernel_rig.TICK_US, kernel_rig.PRESS_LATE_US)
-        near = (at_us - BEFORE_US, at_us + AFTER_US) if at_us else (result["begin_us"], result["end_us"])
+        near = (at_us - BEFORE_US, at_us + AFTER_US)
+        if not at_us or text.startswith("no_silence"):  # the end of a hold depends on all that was heard before
+            near = result["begin_us"], result["end_us"]
         return kernel_rig.machine_late(*near, kernel_rig.STALL_US)
 
     def softened(self, result):

@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 from boot import HERE, Boot
+from harness import die_with_parent
 
 
 GPIO_SIM = "/sys/kernel/config/gpio-sim"
@@ -36,6 +37,9 @@ def why_not_native():
 
 class NativeBoot(Boot):
     """No boot at all: the guest's program in a network of its own on this kernel."""
+
+    def prepare(self):
+        die_with_parent()
 
     def command(self, kernel):
         return ["unshare", "--net", sys.executable, os.path.join(HERE, "guest.py"), self.path("json")]

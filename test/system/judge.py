@@ -277,7 +277,8 @@ class Judge(Reading):
         end_us = session.end_us()
         if end_us is None:
             return None
-        if any(begin <= end_us + GAP_US and end_us < alive for begin, alive in self.dead):
+        within_us = max(within for at, _, within in session.ends if at == end_us)  # what cuts the bus may take its time
+        if any(begin <= end_us + within_us + GAP_US and end_us < alive for begin, alive in self.dead):
             return end_us
         last = None
         index = bisect.bisect_right(self._begins, session.begin_us)

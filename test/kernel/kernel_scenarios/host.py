@@ -48,7 +48,7 @@ def row24_client_stopped(t):
     REGISTRY["row02_client_frozen"][2](t)
 
 
-@kernel_test("CPU starved: six hogs beside it; the gap holds or it stops from zero", "realtime", 24)
+@kernel_test("CPU starved: six hogs beside it; the gap holds or it stops from zero", "starved", 24)
 def row24_starved(t):
     rig, client, stream = driving(t)
     hogs = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(6)]

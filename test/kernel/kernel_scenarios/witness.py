@@ -66,8 +66,8 @@ def seize_processor(_rig):
     return lambda: os.waitpid(child, 0)
 
 
-@kernel_test("a machine that stands still for 30 ms at a press: the witness tells, and the press is not timed", "plumbing-realtime", 0)
+@kernel_test("a machine that stands still for 30 ms at a press: the witness tells", "plumbing-realtime", 0)
 def plumbing_late_machine(t):
-    edge_us, _, disturbed = late_press(t, seize_processor)
-    t.check(disturbed and t.press_disturbed(edge_us, LATE_S * 1e6), "the witness saw nothing of a machine that stood still", True)
-    t.check(machine_late(edge_us - TICK_US, edge_us + LATE_S * 2e6, STALL_US), "nor did it see a stall")
+    edge_us, _, _ = late_press(t, seize_processor)
+    near = (edge_us - LATE_S * 2e6, edge_us + LATE_S * 2e6)  # the press itself may have had to wait
+    t.check(machine_late(*near, STALL_US), "the witness saw nothing of a machine that stood still")
