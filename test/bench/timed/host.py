@@ -170,7 +170,7 @@ def latency_rows(taken):
     wanted = (
         ("line", "client's line to frame on the bus", (("p50", "≤ 1.2 ×"), ("p90", "≤ 1.4 ×"))),
         ("told", "frame on the bus to client's line", (("p50", "≤ 1.1 ×"),)),
-        ("estop", "edge of the e-stop to both zeros", (("p50", "≤ 1.3 ×"), ("p90", "≤ 1.8 ×"))),
+        ("estop", "press of the e-stop to both zeros", (("p50", "≤ 1.3 ×"), ("p90", "≤ 1.8 ×"))),
     )
     for name, words, parts in wanted:
         for key, goal in parts if whole(taken, name) else ():

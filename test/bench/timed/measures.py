@@ -295,7 +295,9 @@ class Told(Line):
 
 
 class Estop(Measure):
-    """From the kernel's stamp of the edge to the second of both zeros. The simulated line tells of edges at the kernel's next tick."""
+    """From the press to the second of both zeros. The simulated line shows the level at once and tells of the edge at the kernel's
+    next tick, right before which we press: who looks at the level may be sooner than who waits for the edge.
+    """
 
     candidates = ("floor", "gateway", "gpiomon")
     TICK_US, BEFORE_US, SPIN_US = 10_000, 200, 3_000
@@ -335,15 +337,14 @@ class Estop(Measure):
         return time.monotonic_ns() // 1000, self.press_now()
 
     def once(self, bus, settle_s=0.0):
-        """Microseconds from the edge to the later one of the first zeros after it; None if the level was seen before the edge."""
-        level_us, edge_us = self.press()
+        """Microseconds from the press to the later one of the first zeros after it."""
+        level_us, _ = self.press()
         time.sleep(0.03 + settle_s)
         zeros = [[f.t_us for f in bus.frames if f.id == can_id and f.t_us > level_us and not any(f.data[1:3])] for can_id in (0x10A, 0x12A)]
         self.release()
         if not all(zeros):
-            raise RuntimeError("no zeros after an edge")
-        first = [times[0] for times in zeros]
-        return max(first) - edge_us if min(first) >= edge_us else None
+            raise RuntimeError("no zeros after a press")
+        return max(times[0] for times in zeros) - level_us
 
     def presses(self, before, settle_s=0.0):
         bus = CanBus(self.around.interface, ids=(0x10A, 0x12A))
@@ -354,8 +355,7 @@ class Estop(Measure):
                 values.append(self.once(bus, settle_s))
         finally:
             bus.close()
-        told = [value for value in values if value is not None]
-        return {"p50": percentile(told, 50), "p90": percentile(told, 90), "count": len(told), "sooner": len(values) - len(told)}
+        return {"p50": percentile(values, 50), "p90": percentile(values, 90), "count": len(values)}
 
     def floor(self):
         process = self.around.tool("floor_estop", self.around.interface, f"/dev/{self.chip.chip}", self.chip.OFFSET)

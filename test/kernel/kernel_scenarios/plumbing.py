@@ -123,6 +123,9 @@ def hear_errors(interface):
 @kernel_test("fake slcan adapter: frames both ways, states, stall, ENOBUFS, unplugging", EVERY_BOOT, 0)
 def plumbing_slcan(t):
     adapter = FakeSlcan()
+    until = time.monotonic() + 1.0
+    while not adapter.open and time.monotonic() < until:  # it has a thread of its own
+        time.sleep(0.01)
     t.check(b"S8" in adapter.commands and adapter.open, f"set up with {adapter.commands}")
     with hear_errors(adapter.interface) as sock:
         sock.send(FRAME_512)
