@@ -84,7 +84,12 @@ class WithRig(unittest.TestCase):
         self.rig.press()
         time.sleep(0.3)
         stream.stop()
-        return self.wait_whole(1)
+        stem = self.wait_whole(1)
+        # The writer tells the gateway only after that.
+        end = time.monotonic() + 5
+        while f"is recorded in {stem}.log" not in self.rig.gateway.text() and time.monotonic() < end:
+            time.sleep(0.02)
+        return stem
 
 
 class BlackBox(WithRig):

@@ -139,11 +139,12 @@ static inline iw_status_t iw_proto_decode(const iw_can_frame_t *frame, iw_proto_
         iw_proto_read_speed(frame, &out_message->as.speed);
         return IW_OK;
     }
-#ifdef __OPTIMIZE_SIZE__
-    return iw_proto_decode_other(frame, out_message);
-#else
-    return iw_proto_read_other(frame, out_message);
+#ifndef __OPTIMIZE_SIZE__
+    if (iw_proto_read_other(frame, out_message) == IW_OK) {
+        return IW_OK;
+    }
 #endif
+    return iw_proto_decode_other(frame, out_message); // Why it is refused need not be in line as well.
 }
 
 #endif
