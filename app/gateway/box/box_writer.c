@@ -243,7 +243,7 @@ static void find_last_setpoints(writer_t *self, uint64_t written, iw_pair_t *out
     size_t count = 0;
     (void)blackbox_ring_copy(self->ring, 0, written, self->copy, &count);
     for (size_t i = 0; i < count; i++) {
-        iw_proto_message_t message;
+        iw_proto_message_t message = {.kind = IW_PROTO_SPEED}; // Its kind is never read of a refused frame.
         iw_can_frame_t frame = {.id = self->copy[i].number, .dlc = self->copy[i].a};
         (void)memcpy(frame.data, self->copy[i].as.data, sizeof frame.data);
         if (self->copy[i].kind == (uint8_t)BLACKBOX_FRAME && iw_proto_decode(&frame, &message) == IW_OK &&
