@@ -21,6 +21,7 @@
 #include "process/log.h"
 #include "process/notify.h"
 #include "process/runtime.h"
+#include "process/wakeup.h"
 #include "why.h"
 
 #include "iwheel/gateway.h"
@@ -56,6 +57,7 @@ typedef struct gw_daemon {
     gw_log_t log;
     gw_notify_t notify;
     gw_runtime_t runtime;
+    gw_wakeup_t wakeup;
     gw_listener_t listener;
     gw_box_t box;
     gw_tape_t tape;
@@ -70,7 +72,6 @@ typedef struct gw_daemon {
     iw_time_us_t woken_us;       ///< When the wait ended: what a client sends later than this was not waiting then.
     iw_time_us_t suspended_us;   ///< Of the machine, as last looked at.
     iw_time_us_t step_next_us;   ///< As the last step wished.
-    iw_time_us_t timer_us;       ///< What the timer is set to; IW_NEVER: it has fired, or was never set.
     iw_time_us_t box_look_us;    ///< When the black box's writer is listened to next.
     iw_time_us_t listen_from_us; ///< Nobody is accepted before.
     iw_client_t last_client;
@@ -78,7 +79,6 @@ typedef struct gw_daemon {
     uint32_t next_served;  ///< Slot where the next round begins.
     uint32_t next_flushed; ///< The same of sending.
     int epoll_fd;
-    int timer_fd;
     int signal_fd;
     bool shutting_down;
     bool clients_waiting;  ///< The last round did not reach everybody.

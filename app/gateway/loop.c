@@ -14,7 +14,6 @@
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
-#include <sys/timerfd.h>
 #include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
@@ -42,20 +41,18 @@ static int open_signals(void) {
 
 int gw_loop_open(gw_daemon_t *daemon) {
     daemon->epoll_fd = epoll_create1(EPOLL_CLOEXEC);
-    daemon->timer_fd = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
-    daemon->timer_us = IW_NEVER;
     daemon->signal_fd = open_signals();
-    if (daemon->epoll_fd < 0 || daemon->timer_fd < 0 || daemon->signal_fd < 0) {
+    if (daemon->epoll_fd < 0 || daemon->signal_fd < 0) {
         return errno;
     }
-    const int fds[] = {daemon->timer_fd,
+    int error = gw_wakeup_open(&daemon->wakeup);
+    const int fds[] = {daemon->wakeup.fd,
                        daemon->signal_fd,
                        daemon->listener.fd,
                        iw_linux_hal_bus_fd(&daemon->hal),
                        iw_linux_hal_estop_fd(&daemon->hal),
                        daemon->box.fd};
-    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_HAL, GW_TAG_HAL, GW_TAG_BOX};
-    int error = 0;
+    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS, GW_TAG_ESTOP, GW_TAG_BOX};
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; ++i) {
         error = watch(daemon, fds[i], tags[i]);
     }
@@ -64,7 +61,7 @@ int gw_loop_open(gw_daemon_t *daemon) {
 
 void gw_loop_close(gw_daemon_t *daemon) {
     (void)close(daemon->signal_fd);
-    (void)close(daemon->timer_fd);
+    gw_wakeup_close(&daemon->wakeup);
     (void)close(daemon->epoll_fd);
 }
 
@@ -132,28 +129,18 @@ static iw_time_us_t look_us(const gw_daemon_t *daemon) {
     return wanted ? daemon->now_us + ESTOP_LOOK_US : IW_NEVER;
 }
 
-/// Set anew only if it would wake us too late, or has woken us: too early costs one look, setting it in every cycle one
-/// call for each frame. Setting it also takes what is to be read of it.
 static void arm_timer(gw_daemon_t *daemon) {
     iw_time_us_t next_us = earlier(daemon->step_next_us, iw_linux_hal_next_us(&daemon->hal));
     next_us = earlier(next_us, gw_observe_next_us(daemon));
     next_us = earlier(next_us, gw_service_next_us(daemon));
-    next_us = earlier(next_us, look_us(daemon));
-    next_us = next_us == 0U ? 1U : next_us; // 0 would disarm it.
-    if (daemon->timer_us != IW_NEVER && daemon->timer_us <= next_us) {
-        return;
-    }
-    daemon->timer_us = next_us;
-    const struct itimerspec when = {
-        .it_value = {.tv_sec = (time_t)(next_us / 1000000U), .tv_nsec = (long)(next_us % 1000000U) * 1000L}};
-    (void)timerfd_settime(daemon->timer_fd, TFD_TIMER_ABSTIME, &when, NULL);
+    (void)gw_wakeup_by(&daemon->wakeup, earlier(next_us, look_us(daemon)));
 }
 
 /// Notes what the wait has found; nothing is done about it yet.
 static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     switch (event->data.u64) {
     case GW_TAG_TIMER:
-        daemon->timer_us = IW_NEVER;
+        gw_wakeup_came(&daemon->wakeup);
         return false;
     case GW_TAG_SIGNAL:
         take_signal(daemon);
@@ -163,7 +150,10 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     case GW_TAG_BOX:
         daemon->box_look_us = 0;
         return false;
-    case GW_TAG_HAL: // Looked at in every cycle.
+    case GW_TAG_BUS: // Looked at in every cycle.
+        return false;
+    case GW_TAG_ESTOP:
+        iw_linux_hal_waited(&daemon->hal, true);
         return false;
     default: {
         gw_client_t *client = &daemon->client[event->data.u64 - GW_TAG_CLIENT];
@@ -214,6 +204,7 @@ int gw_loop_run(gw_daemon_t *daemon) {
             return errno;
         }
         bool somebody_knocks = false;
+        iw_linux_hal_waited(&daemon->hal, count < 0); // Interrupted, it has found nothing out.
         daemon->now_us = iw_clock_now_us();
         daemon->woken_us = daemon->now_us;
         for (int i = 0; i < count; ++i) {

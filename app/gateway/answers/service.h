@@ -6,7 +6,7 @@
 #include "daemon.h"
 
 /// What a descriptor in the epoll set stands for; a client's tag is GW_TAG_CLIENT plus its slot.
-enum { GW_TAG_TIMER = 0, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_HAL, GW_TAG_BOX, GW_TAG_CLIENT };
+enum { GW_TAG_TIMER = 0, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS, GW_TAG_ESTOP, GW_TAG_BOX, GW_TAG_CLIENT };
 
 /// Connections accepted in one cycle.
 #define GW_ACCEPTS_PER_CYCLE 4U

@@ -167,6 +167,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
 /// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted or
 /// not. `sent_us` is when it was sent, as far as the owner can tell, not later than now: a command that waited in a
 /// queue feeds the lease from then, and one from before ARMED began is refused as IW_REFUSE_STALE_COMMAND.
+/// One that was sent before another that has been accepted is accepted too, and shortens the lease: an owner passes them on in order.
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero);
 
 /// Somebody sent a nonzero drive command that was not even judged (out of range): it refuses arm and reset like any

@@ -26,8 +26,9 @@ static iw_time_us_t none_next_us(const void *self) {
     return IW_NEVER;
 }
 
-static int none_pressed(void *self) {
+static int none_pressed(void *self, bool quiet) {
     (void)self;
+    (void)quiet;
     return 0;
 }
 

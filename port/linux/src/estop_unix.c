@@ -74,8 +74,9 @@ static int button_open(void *self, const iw_estop_wish_t *wish) {
     return error;
 }
 
-static int button_pressed(void *self) {
+static int button_pressed(void *self, bool quiet) {
     unix_estop_t *button = (unix_estop_t *)self;
+    (void)quiet; // Its level is told like its edges, so it is always listened to.
     listen_to(button);
     const bool unreadable = button->was_lost || !button->known;
     const bool pressed = button->edge || button->level;

@@ -93,11 +93,11 @@ static iw_time_us_t gpio_next_us(const void *self) {
 }
 
 /// Edges first, then the level: an edge in between wakes us again.
-static void look(gpio_estop_t *estop) {
+static void look(gpio_estop_t *estop, bool quiet) {
     if (!is_open(estop)) {
         return;
     }
-    const int edges = iw_gpio_line_take_edges(&estop->line);
+    const int edges = quiet ? 0 : iw_gpio_line_take_edges(&estop->line);
     const int level = iw_gpio_line_level(&estop->line);
     if (edges < 0 || level < 0) {
         lose(estop, ENODEV);
@@ -106,9 +106,9 @@ static void look(gpio_estop_t *estop) {
     iw_gpio_release_see(&estop->release, estop->now_us, (level == 1) == estop->active_high, edges > 0);
 }
 
-static int gpio_pressed(void *self) {
+static int gpio_pressed(void *self, bool quiet) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
-    look(estop);
+    look(estop, quiet);
     const bool unreadable = estop->was_lost || !is_open(estop);
     estop->was_lost = false;
     if (unreadable) {

@@ -58,7 +58,8 @@ static int hal_purge(void *context) {
 
 static int hal_estop_pressed(void *context) {
     iw_linux_hal_t *self = (iw_linux_hal_t *)context;
-    self->estop_last = self->estop_ops->pressed(&self->estop);
+    self->estop_last = self->estop_ops->pressed(&self->estop, self->estop_quiet);
+    self->estop_quiet = false;
     return self->estop_last;
 }
 
@@ -79,6 +80,10 @@ int iw_linux_hal_bus_fd(const iw_linux_hal_t *self) {
 
 int iw_linux_hal_estop_fd(const iw_linux_hal_t *self) {
     return self->estop_ops->watch_fd(&self->estop);
+}
+
+void iw_linux_hal_waited(iw_linux_hal_t *self, bool estop_told) {
+    self->estop_quiet = !estop_told;
 }
 
 void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us) {

@@ -7,7 +7,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// A socket's queue holds some hundred frames.
+/// Asked for. The kernel gives no more than net.core.rmem_max, and counts twice; as a rule that is twice of what a socket has
+/// anyway, and a full bus fills it in 26 ms.
+#define QUEUE_BYTES (400 * 1024)
+/// More than fits into that queue, at half a kilobyte for each frame.
 #define DROP_BATCHES_MAX 64
 #define DROPS_SPACE      CMSG_SPACE(sizeof(uint32_t))
 
@@ -44,6 +47,7 @@ int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_sock
         return errno;
     }
     (void)set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1); // Without it FD frames are not seen, and so not counted.
+    (void)set(fd, SOL_SOCKET, SO_RCVBUF, QUEUE_BYTES);
     if (!ask_for(fd, share) || bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
         const int error = errno;
         (void)close(fd);

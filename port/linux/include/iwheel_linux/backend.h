@@ -52,7 +52,9 @@ typedef struct {
     int (*watch_fd)(const void *self); ///< -1: there is nothing to watch.
     void (*tend)(void *self, iw_time_us_t now_us);
     iw_time_us_t (*next_us)(const void *self);
-    int (*pressed)(void *self);       ///< As `estop_pressed` of iw_hal_t.
+    /// As `estop_pressed` of iw_hal_t. `quiet`: the wait that has just ended found nothing at the descriptor, so that there are no edges
+    /// to be read; the level always is.
+    int (*pressed)(void *self, bool quiet);
     int (*trouble)(const void *self); ///< Why it cannot be read, as an errno; 0 while it can.
     bool simulated;                   ///< Not a real button: announced wherever the e-stop is shown.
     bool present;                     ///< False: there is no e-stop at all.

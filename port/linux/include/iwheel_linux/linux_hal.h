@@ -14,7 +14,8 @@ typedef struct {
     /// Called with each frame the core receives, before the core sees it. May be NULL. Must not block or call back into the core.
     void (*tap)(void *context, const iw_can_frame_t *frame);
     void *tap_context;
-    int estop_last; ///< The last answer given to the core; -1 before the first.
+    int estop_last;   ///< The last answer given to the core; -1 before the first.
+    bool estop_quiet; ///< The wait has ended without a word of the e-stop, and nobody has looked at it since.
     iw_backend_store_t bus;
     iw_backend_store_t estop;
 } iw_linux_hal_t;
@@ -31,6 +32,10 @@ iw_hal_t iw_linux_hal_functions(iw_linux_hal_t *self);
 /// Descriptors to watch for reading; the e-stop's is -1 if there is nothing to watch.
 int iw_linux_hal_bus_fd(const iw_linux_hal_t *self);
 int iw_linux_hal_estop_fd(const iw_linux_hal_t *self);
+
+/// May be called right after a wait for both descriptors, which saves reading of one that has nothing to tell: was the e-stop's found
+/// readable? It counts for one look.
+void iw_linux_hal_waited(iw_linux_hal_t *self, bool estop_told);
 
 /// Call before every step.
 void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us);

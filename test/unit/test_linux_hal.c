@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_linux/linux_hal.h"
+
+#include <unity.h>
+
+static iw_linux_hal_t hal;
+static bool was_quiet;
+static int answer;
+
+static int fake_pressed(void *self, bool quiet) {
+    (void)self;
+    was_quiet = quiet;
+    return answer;
+}
+
+static const iw_estop_ops_t fake_ops = {.pressed = fake_pressed, .present = true};
+
+void setUp(void) {
+    hal = (iw_linux_hal_t){.estop_ops = &fake_ops, .estop_last = -1};
+    answer = 0;
+}
+
+void tearDown(void) {}
+
+static int look(void) {
+    const iw_hal_t functions = iw_linux_hal_functions(&hal);
+    return functions.estop_pressed(functions.context);
+}
+
+static void test_estop_is_read_whole_by_whoever_does_not_wait(void) {
+    (void)look();
+    TEST_ASSERT_FALSE(was_quiet);
+}
+
+static void test_estop_that_was_not_told_of_has_no_edges(void) {
+    iw_linux_hal_waited(&hal, false);
+    (void)look();
+    TEST_ASSERT_TRUE(was_quiet);
+}
+
+static void test_estop_that_was_told_of_is_read_whole(void) {
+    iw_linux_hal_waited(&hal, false);
+    iw_linux_hal_waited(&hal, true);
+    (void)look();
+    TEST_ASSERT_FALSE(was_quiet);
+}
+
+static void test_wait_counts_for_one_look(void) {
+    iw_linux_hal_waited(&hal, false);
+    (void)look();
+    (void)look();
+    TEST_ASSERT_FALSE(was_quiet);
+}
+
+static void test_last_answer_is_kept(void) {
+    answer = 1;
+    TEST_ASSERT_EQUAL_INT(1, look());
+    TEST_ASSERT_EQUAL_INT(1, hal.estop_last);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_estop_is_read_whole_by_whoever_does_not_wait);
+    RUN_TEST(test_estop_that_was_not_told_of_has_no_edges);
+    RUN_TEST(test_estop_that_was_told_of_is_read_whole);
+    RUN_TEST(test_wait_counts_for_one_look);
+    RUN_TEST(test_last_answer_is_kept);
+    return UNITY_END();
+}
