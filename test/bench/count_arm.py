@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Counts the instructions of functions of a bare Cortex-M program, on an emulated CPU."""
+import bisect
 import subprocess
+from collections import Counter
 
 from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
 from unicorn import arm_const as arm
@@ -39,12 +41,14 @@ class Program:
         self.cpu.ctl_set_cpu_model(MODELS[cpu])
         self.cpu.mem_map(BASE, MEMORY)
         self.cpu.mem_write(BASE, binary.read_bytes())
+        self.functions = sorted((address & ~1, name) for name, address in self.address.items() if not name.startswith("$"))
         self.executed = 0
-        self.counting = False
+        self.at = Counter()  # instructions executed, by address
         self.cpu.hook_add(UC_HOOK_CODE, self._count)
 
-    def _count(self, *_):
+    def _count(self, _, address, *__):
         self.executed += 1
+        self.at[address] += 1
 
     def call(self, name, argument=0):
         """(what it returned, how many instructions it took)"""
@@ -54,3 +58,12 @@ class Program:
         before = self.executed
         self.cpu.emu_start(self.address[name] | 1, HOME)
         return self.cpu.reg_read(arm.UC_ARM_REG_R0), self.executed - before
+
+    def profile(self, name):
+        """{function: instructions of its own} of one call."""
+        self.at.clear()
+        self.call(name)
+        own = Counter()
+        for address, count in self.at.items():
+            own[self.functions[bisect.bisect_right(self.functions, (address, "\x7f")) - 1][1]] += count
+        return own

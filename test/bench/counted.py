@@ -13,6 +13,7 @@ CORE = ROOT / "core"
 INCLUDES = [CORE / "include", HERE / "codec"]
 FRAMES = 617
 ARM_CPUS = ("cortex-m4", "cortex-m0plus")
+PROFILE_FROM = 40  # instructions of a function in a step
 
 
 def codecs(work):
@@ -68,13 +69,28 @@ def arm_linked(work, cpu):
     return count_arm.text_size(elf)
 
 
-def arm_steps(work, cpu):
-    """{what is done in one step: instructions}"""
+def driving(work, cpu):
+    """The program of test/bench/step, with its gateway driving."""
     elf = count_arm.build(work / f"step-{cpu}.elf", cpu, [HERE / "step/step.c", *sorted((CORE / "src").glob("*.c"))], INCLUDES,
                           ["bench_prepare", "bench_idle", "bench_frame_in", "bench_pair"])
     program = count_arm.Program(elf, cpu)
     if program.call("bench_prepare")[0] != 1:
         raise SystemExit("the gateway of test/bench/step does not drive")
+    return program
+
+
+def arm_profile(work, cpu):
+    """Rows of (function, instructions of its own with nothing due, the same with a pair due), the costliest first, and the rest in one row."""
+    program = driving(work, cpu)
+    idle, pair = program.profile("bench_idle"), program.profile("bench_pair")
+    shown = sorted({name for name, count in [*idle.items(), *pair.items()] if count >= PROFILE_FROM}, key=lambda name: (-idle[name], -pair[name]))
+    rest = [sum(count for name, count in of.items() if name not in shown) for of in (idle, pair)]
+    return [*[(name, idle[name], pair[name]) for name in shown], ("all others together", *rest)]
+
+
+def arm_steps(work, cpu):
+    """{what is done in one step: instructions}"""
+    program = driving(work, cpu)
     idle_sent, idle = program.call("bench_idle")
     received, frame = program.call("bench_frame_in")
     pair_sent, pair = program.call("bench_pair")

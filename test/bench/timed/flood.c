@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Sends the frames of a nominal bus, faster: so many a second, evenly in bursts of a millisecond. Prints how many it sent.
+/// Sends the frames of a nominal bus, faster: so many a second, evenly in bursts of a millisecond. What it was too late to send is never
+/// sent, as no bus brings more than fits into the time. Prints how many it sent.
 /// usage: flood INTERFACE FRAMES_PER_S SECONDS
 #define _GNU_SOURCE
 #include "timed.h"
@@ -36,17 +37,19 @@ static long burst(int can, long count, long sent) {
 }
 
 int main(int argc, char **argv) {
-    const int can = timed_can(argc == 4 ? argv[1] : "", CAN_INV_FILTER);
+    const int can = timed_can(argc == 4 && atol(argv[2]) <= (long)BURST_MAX * PER_S ? argv[1] : "", CAN_INV_FILTER);
     const long rate = atol(argv[2]);
-    const long bursts = (long)(atof(argv[3]) * PER_S);
+    const int64_t slot_ns = TIMED_NS_PER_S / PER_S;
+    const int64_t end_ns = timed_now_ns(CLOCK_MONOTONIC) + (int64_t)(atof(argv[3]) * (double)TIMED_NS_PER_S);
     int64_t due_ns = timed_now_ns(CLOCK_MONOTONIC);
     long sent = 0;
     prepare();
-    for (long i = 1; i <= bursts; ++i) {
-        const long owed = rate * i / PER_S - sent;
-        due_ns += TIMED_NS_PER_S / PER_S;
+    while (due_ns < end_ns) {
+        const int64_t now_ns = timed_now_ns(CLOCK_MONOTONIC);
+        due_ns = now_ns > due_ns + slot_ns ? now_ns : due_ns;
+        due_ns += slot_ns;
         timed_sleep_until_ns(due_ns);
-        sent += owed > 0 ? burst(can, owed < BURST_MAX ? owed : BURST_MAX, sent) : 0;
+        sent += burst(can, rate / PER_S, sent);
     }
     (void)printf("%ld\n", sent);
     return 0;

@@ -33,18 +33,35 @@ def connect(path):
 def watch(path, count):
     """In a process of its own: reads whatever comes."""
     selector = selectors.DefaultSelector()
-    for _ in range(count):
+
+    def begin():
         sock = connect(path)
         sock.sendall(WATCH.encode())
         selector.register(sock, selectors.EVENT_READ)
+
+    for _ in range(count):
+        begin()
     while True:
         for key, _ in selector.select():
-            key.fileobj.recv(1 << 20)
+            try:
+                gone = not key.fileobj.recv(1 << 20)
+            except ConnectionResetError:
+                gone = True
+            if gone:  # Too slow for the gateway: it comes back, as watchers do.
+                selector.unregister(key.fileobj)
+                begin()
 
 
 def flood(path):
     """In a process of its own: asks as fast as it can and hardly ever reads."""
-    sock = connect(path)
+    while True:
+        try:
+            flood_until_sent_away(connect(path))
+        except ConnectionError:
+            pass
+
+
+def flood_until_sent_away(sock):
     sock.setblocking(False)
     while True:
         try:

@@ -23,9 +23,9 @@ ALL = ("period_idle", "period_loaded", "flood", "calls", "line", "told", "estop"
 FULL = {"rounds": 3, "period_s": 4.0, "flood_s": 3.0, "calls_s": 3.0, "count": 150, "presses": 12}
 SHORT = {"rounds": 1, "period_s": 0.6, "flood_s": 0.3, "calls_s": 0.5, "count": 10, "presses": 1, "stall_us": 1_000_000}
 # Of the smoke test: wrong by orders of magnitude, whatever else the machine does.
-ABSURD = {"ppm": 20_000, "lost": 0, "per_frame": 20, "p50": 100_000}
+ABSURD = {"ppm": 20_000, "lost": 3_000, "per_frame": 20, "p50": 100_000}
 LIMIT_S = 1800
-SMOKE_LIMIT_S = 60
+SMOKE_LIMIT_S = 120
 
 
 def build_tools(folder):
@@ -70,7 +70,7 @@ def be_prompt():
 
 def boot_and_wait(kernel, folder, plan, limit_s):
     """Results, turn by turn, as they come."""
-    boot = Boot(kernel, str(folder), "timed", plan)
+    boot = Boot(kernel, str(folder), "timed", {"group": "timed", **plan}, os.sched_getaffinity(0))
     try:
         while boot.running() and boot.seconds() < limit_s:
             yield from boot.results()
@@ -85,6 +85,8 @@ def boot_and_wait(kernel, folder, plan, limit_s):
 def measure(build, wish, measures=ALL, candidates=None, limit_s=LIMIT_S, show=print):
     """{measure: {candidate: [figures of each round]}}, and what failed. RuntimeError if there is no kernel."""
     kernel = find_kernel()
+    if candidates is None:
+        get_packages()
     be_prompt()
     taken, failures = {}, []
     with tempfile.TemporaryDirectory(prefix="iwheel-timed-") as name:
@@ -127,7 +129,7 @@ def times(value):
 
 
 def peers_of(of, text):
-    return ", ".join(f"{NAMES.get(name, name)} {text(name)}" for name in of if name not in ("floor", "gateway", "nobody")) or "--"
+    return ", ".join(f"{NAMES.get(name, name)} {text(name)}" for name in of if name not in ("floor", "gateway")) or "--"
 
 
 def us(value):
@@ -149,13 +151,12 @@ def period_rows(taken):
 
 
 def flood_rows(taken):
-    if not whole(taken, "flood") or "nobody" not in taken["flood"]:
+    if not whole(taken, "flood"):
         return
     of = taken["flood"]
-    spent = {c: [{"cpu": (nobody["left"] - figures["left"])} for nobody, figures in zip(of["nobody"], of[c])] for c in of}
     lost = {c: sum(figures["lost"] for figures in of[c]) / sum(figures["sent"] for figures in of[c]) for c in of}
     yield row("21 000 frames/s: lost", f"{lost['floor']:.1%}", f"{lost['gateway']:.1%}", peers_of(of, lambda c: f"{lost[c]:.1%}"), "0")
-    yield row("21 000 frames/s: processor", "1 ×", times(ratio(spent, "gateway", "cpu")), peers_of(of, lambda c: times(ratio(spent, c, "cpu"))),
+    yield row("21 000 frames/s: processor time", "1 ×", times(ratio(of, "gateway", "ticks")), peers_of(of, lambda c: times(ratio(of, c, "ticks"))),
               "≤ 1.8 ×")
 
 
@@ -185,8 +186,11 @@ def rows(taken):
 
 def smoke(build):
     """What is wrong with the short turns of floor and gateway; empty: nothing."""
-    taken, faults = measure(build, SHORT, candidates=("nobody", "floor", "gateway"), limit_s=SMOKE_LIMIT_S, show=lambda result: None)
-    faults += [f"{name}: no figures" for name in ALL if "gateway" not in taken.get(name, {}) and not any(f.startswith(name) for f in faults)]
+    wanted = [name for name in ALL if name != "calls" or have("strace")]
+    if len(wanted) < len(ALL):
+        print("left out: calls (strace is not installed)")
+    taken, faults = measure(build, SHORT, wanted, ("floor", "gateway"), SMOKE_LIMIT_S, show=lambda result: None)
+    faults += [f"{name}: no figures" for name in wanted if "gateway" not in taken.get(name, {}) and not any(f.startswith(name) for f in faults)]
     for name, of in taken.items():
         for figures in of.get("gateway", []):
             faults += [f"{name}: {figures}" for key, limit in ABSURD.items() if abs(figures.get(key, 0)) > limit]

@@ -9,6 +9,7 @@ import time
 
 from can_bus import CanBus
 from gpio_sim import FALLING, Edges
+from harness import as_a_service
 from surroundings import PERIOD_US, START_S
 
 
@@ -81,10 +82,10 @@ class Period(Measure):
         return {"p50": percentile(off, 50), "p99": percentile(off, 99), "ppm": (mean_us / PERIOD_US - 1) * 1e6}
 
     def floor(self):
-        return self.judge(self.around.tool("floor_period", self.around.interface, PERIOD_US))
+        return self.judge(self.around.floor("period", self.around.interface, PERIOD_US))
 
     def bcm(self):
-        return self.judge(self.around.tool("bcm_period", self.around.interface, PERIOD_US))
+        return self.judge(self.around.tool("bcm_period", self.around.interface, PERIOD_US, served=True))
 
     def cangen(self):
         return self.judge(self.around.peer("cangen", self.around.interface, "-g", "20", "-I", "10A", "-L", "5", "-D", "0100640000"))
@@ -114,54 +115,54 @@ class PeriodLoaded(Period):
     slow = 1
 
 
+def ticks(pid):
+    """Of processor time that a process has used."""
+    with open(f"/proc/{pid}/stat", encoding="ascii") as file:
+        return sum(map(int, file.read().rsplit(")", 1)[1].split()[11:13]))
+
+
 class Flood(Measure):
     """A full bus of shortest frames: what is lost, and what a receiver takes of the processor."""
 
-    candidates = ("nobody", "floor", "gateway", "candump")
+    candidates = ("floor", "gateway", "candump")
     rate = 21000
 
-    def send(self):
-        """Sends, and tells what the processor had left meanwhile."""
-        seconds = self.plan["flood_s"]
-        soak = self.around.tool("soak", seconds + 0.2, piped=True)
-        sent = int(self.around.tool("flood", self.around.interface, self.rate, seconds, piped=True).text(60))
-        left = int(soak.text(60))
+    def send(self, pid):
+        """What was sent, and the processor time of a receiver meanwhile."""
+        time.sleep(0.3)
+        before = ticks(pid)
+        sent = int(self.around.tool("flood", self.around.interface, self.rate, self.plan["flood_s"], piped=True).text(60))
         time.sleep(0.2)
-        return sent, left / (seconds + 0.2)
-
-    def nobody(self):
-        sent, left = self.send()
-        return {"left": left, "sent": sent, "lost": 0}
+        return sent, ticks(pid) - before
 
     def floor(self):
-        receiver = self.around.tool("floor_receive", self.around.interface, piped=True)
-        time.sleep(0.3)
-        sent, left = self.send()
-        return {"left": left, "sent": sent, "lost": sent - int(receiver.end())}
+        receiver = self.around.floor("receive", self.around.interface, piped=True)
+        sent, used = self.send(receiver.child.pid)
+        return {"ticks": used, "sent": sent, "lost": sent - int(receiver.end())}
+
+    def received(self):
+        client = self.around.client()
+        count = client.request("status")["counters"]["received"]
+        client.close()
+        return count
 
     def gateway(self):
         self.around.start_gateway()
-        client = self.around.client()
-        before = client.request("status")["counters"]["received"]
-        client.close()
-        time.sleep(0.3)
-        sent, left = self.send()
-        client = self.around.client()
-        received = client.request("status")["counters"]["received"] - before
-        client.close()
+        before = self.received()
+        sent, used = self.send(self.around.gateway.child.pid)
+        lost = sent - (self.received() - before)
         self.around.end_gateway()
-        return {"left": left, "sent": sent, "lost": sent - received}
+        return {"ticks": used, "sent": sent, "lost": lost}
 
     def candump(self):
         with open("candump.log", "wb") as log:
-            receiver = subprocess.Popen(["candump", "-L", self.around.interface], stdout=log, stderr=subprocess.DEVNULL)
-            time.sleep(0.3)
-            sent, left = self.send()
+            receiver = subprocess.Popen(["candump", "-L", self.around.interface], stdout=log, stderr=subprocess.DEVNULL, preexec_fn=as_a_service)
+            sent, used = self.send(receiver.pid)
             receiver.terminate()
             receiver.wait()
         with open("candump.log", "rb") as log:
             lines = sum(block.count(b"\n") for block in iter(lambda: log.read(1 << 20), b""))
-        return {"left": left, "sent": sent, "lost": sent - lines}
+        return {"ticks": used, "sent": sent, "lost": sent - lines}
 
 
 class Calls(Measure):
@@ -241,7 +242,7 @@ class Line(Measure):
             process.end()
 
     def floor(self):
-        return self.at_socket(lambda path: self.around.tool("floor_line", self.around.interface, path))
+        return self.at_socket(lambda path: self.around.floor("line", self.around.interface, path))
 
     def python_can(self):
         return self.at_socket(lambda path: self.around.python_can("line", self.around.interface, path))
@@ -278,7 +279,7 @@ class Told(Line):
         return self.judge(text)
 
     def floor(self):
-        return self.piped(self.around.tool("floor_print", self.around.interface, piped=True))
+        return self.piped(self.around.floor("print", self.around.interface, piped=True))
 
     def candump(self):
         return self.piped(self.around.peer("candump", self.around.interface, piped=True))
@@ -358,7 +359,7 @@ class Estop(Measure):
         return {"p50": percentile(values, 50), "p90": percentile(values, 90), "count": len(values)}
 
     def floor(self):
-        process = self.around.tool("floor_estop", self.around.interface, f"/dev/{self.chip.chip}", self.chip.OFFSET)
+        process = self.around.floor("estop", self.around.interface, f"/dev/{self.chip.chip}", self.chip.OFFSET)
         time.sleep(0.2)
         try:
             return self.presses(lambda: time.sleep(0.05))

@@ -11,6 +11,7 @@ import time
 import netdev
 from client import Client
 from gpio_sim import GpioChip
+from harness import as_a_service
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PERIOD_US = 20_000
@@ -21,14 +22,14 @@ AWAITED = ("not_at_rest", "stale_command", "cause_present", "send_stalled", "est
 
 
 class Started:
-    """A program that is ended by its process id, and what it printed."""
+    """A program that is ended by its process id, and what it printed. `served`: at the priority that the gateway's service has."""
 
-    def __init__(self, command, folder, standard_input=None, environment=None, piped=False):
+    def __init__(self, command, folder, standard_input=None, environment=None, piped=False, served=False):
         self.words = list(map(str, command))
         self.errors = open(os.path.join(folder, f"{os.path.basename(self.words[0])}.err"), "ab")
         self.child = subprocess.Popen(
             self.words, stdin=standard_input or subprocess.DEVNULL, stdout=subprocess.PIPE if piped else subprocess.DEVNULL,
-            stderr=self.errors, env=environment
+            stderr=self.errors, env=environment, preexec_fn=as_a_service if served else None
         )
 
     def text(self, within_s):
@@ -70,18 +71,23 @@ class Surroundings:
             )
 
     def tool(self, name, *arguments, **options):
-        """One of the small programs of this benchmark."""
+        """One of the small programs that measure."""
         return Started([os.path.join(self.plan["tools"], name), *arguments], self.folder, **options)
 
+    def floor(self, name, *arguments, **options):
+        """One of the small programs that are measured."""
+        return self.tool(f"floor_{name}", *arguments, served=True, **options)
+
     def peer(self, *command, **options):
-        return Started(command, self.folder, **options)
+        return Started(command, self.folder, served=True, **options)
 
     def python_can(self, *arguments):
         environment = {**os.environ, "PYTHONPATH": self.plan["peers"]}
-        return Started([sys.executable, os.path.join(HERE, "python_can_peer.py"), *arguments], self.folder, environment=environment, piped=True)
+        return Started([sys.executable, os.path.join(HERE, "python_can_peer.py"), *arguments], self.folder, environment=environment, piped=True,
+                       served=True)
 
-    def built(self, folder, name, *arguments):
-        return Started([os.path.join(self.plan["build"], "app", folder, name), *arguments], self.folder)
+    def built(self, folder, name, *arguments, **options):
+        return Started([os.path.join(self.plan["build"], "app", folder, name), *arguments], self.folder, **options)
 
     def start_wheels(self, slow=1):
         """Telemetry of both wheels, 617 frames a second divided by `slow`."""
@@ -100,7 +106,7 @@ class Surroundings:
     def start_gateway(self):
         self.gateway = self.built(
             "gateway", "iwheel-gateway", "-c", f"{self.folder}/gateway.conf", "--can", self.interface, "--socket", self.socket,
-            "--log-level", "error"
+            "--log-level", "error", served=True
         )
         client = self.client()
         client.request("hello")
