@@ -107,6 +107,18 @@ class Boot:
     def seconds(self):
         return time.monotonic() - self.began
 
+    def stall_as_asked(self):
+        """A test may ask for a stalled machine, by NAME.stall with the seconds in it: the kernel's process stands still so long."""
+        try:
+            with open(self.path("stall"), encoding="ascii") as file:
+                seconds = float(file.read())
+        except (FileNotFoundError, ValueError):  # none, or not written yet
+            return
+        os.kill(self.child.pid, signal.SIGSTOP)
+        time.sleep(seconds)
+        os.kill(self.child.pid, signal.SIGCONT)
+        os.unlink(self.path("stall"))
+
     def kill(self):
         """All its processes, by their group."""
         try:

@@ -5,6 +5,7 @@ Virtual time does not care how busy the machine is, real time does: while someth
 """
 
 import argparse
+import copy
 import os
 import shutil
 import signal
@@ -16,6 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import gpiod2
 import kernel_scenarios  # noqa: F401  (registers them)
+import repeated
 import report
 from boot import HERE, Boot, find_kernel
 from catalogue import ENTRIES
@@ -26,6 +28,7 @@ from native import why_not_native, NativeBoot
 POLL_S = 0.1
 HOURS, HOURS_FULL = 1, 24  # of the soak
 LOG_LINES = 40
+INTERRUPTED = 143
 
 
 class Campaign:
@@ -40,6 +43,7 @@ class Campaign:
         self.interrupted = False
         self.processors = sorted(os.sched_getaffinity(0))
         self.reserved = set()  # of those, while something runs in real time
+        self.used = {processor: 0 for processor in self.processors}  # how many kernels run on it
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self.interrupt)
 
@@ -54,14 +58,17 @@ class Campaign:
         ]
         if not names or (options.real_time and group.virtual) or (group.full_only and not options.full):
             return None
+        if group.name == "soak" and options.hours == 0:
+            return None
         return {
             "build": os.path.abspath(options.build),
             "group": group.name,
             "tests": names,
             "virtual": group.virtual,
+            "native": self.options.native,
             "full": options.full,
             "seed": options.seed,
-            "hours": options.hours or (HOURS_FULL if options.full else HOURS),
+            "hours": options.hours,
             "kernel_arguments": list(group.kernel_arguments),
         }
 
@@ -75,8 +82,8 @@ class Campaign:
             for name in plan["tests"]:
                 self.take(group, {"name": name, "verdict": "skipped", "figures": [reason]})
             return
-        processors = set(self.processors) - self.reserved if group.virtual else self.reserved or set(self.processors)
-        boot = (NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan, processors)
+        processor = self.take_processor(group)
+        boot = (NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan, {processor})
         self.boots.append(boot)
         limit_s = group.full_limit_s if self.options.full else group.limit_s
         done, since = set(), 0
@@ -89,16 +96,27 @@ class Campaign:
                     self.take(group, result)
                 if not running or boot.seconds() > limit_s:
                     break
+                boot.stall_as_asked()
                 time.sleep(POLL_S)
         finally:
             hung = boot.running()
             boot.end()
+            with self.lock:
+                self.used[processor] -= 1
         with self.lock:
             print(f"     {group.name}: {boot.seconds():.0f} s, {boot.cpu_s:.0f} s of processor time", flush=True)
         why = f"the boot was ended after {limit_s} s" if hung else "the kernel ended before this test did"
         for number, name in enumerate(name for name in plan["tests"] if name not in done):
             text = f"{why}\n{boot.complaint()}" if number == 0 else f"not reached: {why}"
             self.take(group, {"name": name, "verdict": "failed", "failures": [[text, "rule", 0]]})
+
+    def take_processor(self, group):
+        """The one with the fewest kernels. One, because a kernel that wanders between two takes half as long again."""
+        with self.lock:
+            wanted = set(self.processors) - self.reserved if group.virtual else self.reserved or set(self.processors)
+            processor = min(wanted, key=lambda number: (self.used[number], number))
+            self.used[processor] += 1
+            return processor
 
     def real_time(self):
         """All of it, one group at a time: they must not slow each other."""
@@ -133,7 +151,7 @@ class Campaign:
         return None
 
     def take(self, group, result):
-        result = {"figures": [], "failures": [], "measures": {}, "latencies": [], "logs": [], "seconds": 0, "host_s": 0, **result}
+        result = {"figures": [], "failures": [], "measures": {}, "latencies": [], "from_level": [], "logs": [], "seconds": 0, "host_s": 0, **result}
         result["group"] = group.name
         with self.lock:
             self.results.append(result)
@@ -157,7 +175,7 @@ class Campaign:
         if path.endswith(".bus.log"):
             lines = [line for line in lines if " 10A#" in line or " 12A#" in line]
         print(f"       {path}, the end:")
-        for line in lines[-self.options.log_lines :]:
+        for line in lines[max(len(lines) - self.options.log_lines, 0) :]:
             print(f"       | {line}")
 
     def count(self, verdict):
@@ -187,9 +205,10 @@ def parse(arguments):
     parser.add_argument("--real-time", action="store_true", help="only what runs in real time")
     parser.add_argument("--native", action="store_true", help="use this machine's own vcan and gpio-sim, in real time")
     parser.add_argument("--full", action="store_true", help=f"1000 presses, a soak of {HOURS_FULL} virtual hours")
-    parser.add_argument("--repeat", type=int, default=1, metavar="N", help="the whole campaign N times in a row")
+    parser.add_argument("--repeat", type=int, default=1, metavar="N", help="N campaigns in a row, each with the next seed")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of random faults (default: 1)")
-    parser.add_argument("--hours", type=float, metavar="H", help=f"of the soak (default: {HOURS}, with --full {HOURS_FULL})")
+    soak = f"of the soak; 0: none (default: {HOURS}, with --full {HOURS_FULL}); a short one says what it cannot judge"
+    parser.add_argument("--hours", type=float, metavar="H", help=soak)
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="kernels at a time (default: 2)")
     parser.add_argument("--log-lines", type=int, default=LOG_LINES, metavar="N", help="of each log of a failed test")
     parser.add_argument("--no-install", action="store_true", help="install nothing to build the kernel")
@@ -197,25 +216,42 @@ def parse(arguments):
     parser.add_argument("--report", action="store_true", help="write docs/fault-catalogue.md from this run")
     parser.add_argument("--list", action="store_true", help="list the tests and exit")
     options = parser.parse_args(arguments)
-    if min(options.repeat, options.jobs) < 1 or (options.hours is not None and options.hours <= 0):
-        parser.error("--repeat, --jobs and --hours want something above 0")
+    if options.hours is None:
+        options.hours = HOURS_FULL if options.full else HOURS
+    if min(options.repeat, options.jobs) < 1 or options.hours < 0:
+        parser.error("--repeat and --jobs want something above 0, --hours nothing below")
     if options.native and options.report:
         parser.error("--report describes the kernel that is built here, not this machine's own: leave out --native")
     return options
 
 
 def once(options, kernel):
-    """One campaign; returns the three counts."""
+    """One campaign; returns it."""
     campaign = Campaign(options, kernel)
     try:
         campaign.work()
-        if options.report and not options.only:
-            report.write(campaign.results, options)
     finally:
         campaign.close()
-    if campaign.interrupted:
-        sys.exit(143)
-    return [campaign.count(verdict) for verdict in ("passed", "failed", "skipped")]
+    return campaign
+
+
+def campaigns(options, kernel):
+    """All of them in a row, each told as it ends; returns their outcomes. Ctrl-C ends the row: what was whole is told."""
+    outcomes = []
+    for number in range(options.repeat):
+        now, began = copy.copy(options), time.monotonic()
+        now.seed += number
+        campaign = once(now, kernel)
+        if campaign.interrupted:
+            break
+        outcomes.append(repeated.Outcome(now.seed, time.monotonic() - began, campaign.results))
+        if options.repeat > 1:
+            print(repeated.one_line(number + 1, options.repeat, outcomes[-1]), flush=True)
+        if options.report and not options.only:
+            report.write(outcomes, options)
+    if options.repeat > 1 and outcomes:
+        print("\n".join(repeated.summary(outcomes, options.repeat)))
+    return outcomes
 
 
 def main(arguments):
@@ -244,8 +280,11 @@ def main(arguments):
         except RuntimeError as error:
             print(f"SKIPPED: {error}\n0 passed, 0 failed, 1 skipped")
             return 0
-    totals = [0, 0, 0]
-    for _ in range(options.repeat):
-        totals = [total + count for total, count in zip(totals, once(options, kernel))]
+    outcomes = campaigns(options, kernel)
+    totals = [sum(counts) for counts in zip([0, 0, 0], *(outcome.counts() for outcome in outcomes))]
+    if len(outcomes) < options.repeat:
+        print(f"interrupted: {len(outcomes)} of {options.repeat} campaigns came to their end, and only those are counted")
     print("{} passed, {} failed, {} skipped".format(*totals))
+    if len(outcomes) < options.repeat:
+        return INTERRUPTED
     return 1 if totals[1] or not totals[0] else 0

@@ -16,7 +16,7 @@ import threading
 import tty
 
 from bus import EXTENDED, FRAME, REMOTE
-from netdev import command, exists, up
+from netdev import command, exists, fetch, up
 
 TIOCSETD, SIOCGIFNAME, N_SLCAN = 0x5423, 0x8910, 17
 DEPTH = 3  # frames the adapter holds: one in its controller, two behind it
@@ -69,6 +69,7 @@ class FakeSlcan(threading.Thread):
             fcntl.ioctl(self.slave, TIOCSETD, array.array("i", [N_SLCAN]))
             name = fcntl.ioctl(self.slave, SIOCGIFNAME, bytes(40))
             self.interface = name.split(b"\0")[0].decode()
+            fetch(self.interface)
         self._wake()
 
     def link_up(self):

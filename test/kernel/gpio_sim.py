@@ -14,8 +14,12 @@ EVENT = struct.Struct("=QI36x")  # struct gpio_v2_line_event
 
 
 def write(path, text):
-    with open(path, "w", encoding="ascii") as file:
-        file.write(text)
+    """By three system calls and no more: a press is timed."""
+    file = os.open(path, os.O_WRONLY | os.O_CLOEXEC)
+    try:
+        os.write(file, text.encode())
+    finally:
+        os.close(file)
 
 
 def read(path):

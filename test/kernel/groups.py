@@ -27,18 +27,19 @@ class Group(NamedTuple):
 
 # What differs between the generations of libgpiod is how a line is opened, read, lost and found again.
 READS_THE_LINE = ("row11_presses_low", "row12_pulses_low", "row12_glitch", "row13_pressed", "row14_")
+# The longest come first, so that no processor waits for one of them at the end.
 GROUPS = (
     Group("soak", "an hour of random faults, with --full a day", limit_s=3600, full_limit_s=24 * 3600),
     Group("realtime", "the same rules by the clock on the wall", virtual=False),
     Group("starved", "a processor that is fought over", virtual=False),
-    Group("realtime-full", "more of them", virtual=False, full_only=True),
+    Group("realtime-full", "more of them", virtual=False, full_only=True, full_limit_s=3 * 3600),
+    Group("alike", "what the local bus passed, on SocketCAN"),
     Group("estop", "the e-stop on a GPIO line"),
     Group("estop-gpiod2", "the same through libgpiod 2", same_as="estop", gpiod=2, few=READS_THE_LINE),
     Group("adapter", "a CAN adapter with states, stalls and a plug"),
     Group("bus", "interfaces that go, foreign and odd frames, a full bus"),
     Group("echo", "an interface with a proven echo, late or missing", kernel_arguments=("vcan.echo=1",)),
     Group("host", "clocks, processes, disks, a second gateway"),
-    Group("alike", "what the local bus passed, on SocketCAN"),
     Group("plumbing", "the rig's own tests"),
     Group("plumbing-echo", "the rig's own tests, with a proven echo", kernel_arguments=("vcan.echo=1",)),
     Group("plumbing-realtime", "the rig's own tests in real time", virtual=False),

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The same tests on the machine's own kernel, where it has vcan and gpio-sim and lets us use them. In real time, all of them.
 
-What it asks for, what it answers where something is missing, and how it starts the tests is tested (test_native.py). Whether the
-tests themselves pass on a kernel that is no process depends on that kernel; docs/fault-catalogue.md says where they were run.
+What it asks for, what it answers where something is missing, and how it starts the tests is tested (test_native.py), and some of the
+tests are run by it inside the kernel of the tests (kernel_scenarios/native_inside.py). Whether they pass on a kernel that is no process
+depends on that kernel; docs/fault-catalogue.md says where they were run.
 """
 
 import os
@@ -15,7 +16,17 @@ from harness import die_with_parent
 
 
 GPIO_SIM = "/sys/kernel/config/gpio-sim"
-PROGRAMS = {"unshare": "util-linux", "ip": "iproute2", "tc": "iproute2"}
+PROGRAMS = {"unshare": "util-linux", "nsenter": "util-linux", "mount": "mount", "ip": "iproute2", "tc": "iproute2"}
+# A network of its own, /sys that shows it, and a place for the marks of armed gateways, away from those of real ones.
+ALONE = ["unshare", "--net", "--mount", "sh", "-e", "-c"]
+SURROUNDINGS = """
+mount -t sysfs sysfs /sys
+[ ! -d /sys/kernel/config ] || mount -t configfs configfs /sys/kernel/config
+mkdir -p /run/iwheel
+mount -t tmpfs tmpfs /run/iwheel
+ip link set lo up
+exec "$@"
+"""
 
 
 def why_not_native():
@@ -36,10 +47,10 @@ def why_not_native():
 
 
 class NativeBoot(Boot):
-    """No boot at all: the guest's program in a network of its own on this kernel."""
+    """No boot at all: the guest's program in surroundings of its own on this kernel."""
 
     def prepare(self):
         die_with_parent()
 
     def command(self, kernel):
-        return ["unshare", "--net", sys.executable, os.path.join(HERE, "guest.py"), self.path("json")]
+        return [*ALONE, SURROUNDINGS, "native", sys.executable, os.path.join(HERE, "guest.py"), self.path("json")]

@@ -65,7 +65,7 @@ class Native(unittest.TestCase):
         self.assertEqual(["SKIPPED: REASON", "0 passed, 0 failed, 1 skipped"], out.getvalue().splitlines())
 
     def test_arguments_that_make_no_sense_are_refused(self):
-        for words in (["--native", "--report"], ["--repeat", "0"], ["--jobs", "0"], ["--hours", "0"]):
+        for words in (["--native", "--report"], ["--repeat", "0"], ["--jobs", "0"], ["--hours", "-1"]):
             with self.subTest(words), contextlib.redirect_stderr(io.StringIO()), self.assertRaises(SystemExit) as refused:
                 campaign.parse(words)
             self.assertEqual(2, refused.exception.code)

@@ -225,13 +225,9 @@ class Judge(Reading):
             else:
                 spread_us = setpoint.t_us - waiting.t_us
                 self.pair_max_us = max(self.pair_max_us, spread_us)
-                if spread_us > PAIR_US:
-                    self._say(
-                        "pair_spread",
-                        setpoint.t_us,
-                        f"{spread_us / 1000:.1f} ms between left and right",
-                        spread_us - PAIR_US,
-                    )
+                if spread_us > self.pair_limit_us:
+                    text = f"{spread_us / 1000:.1f} ms between left and right"
+                    self._say("pair_spread", setpoint.t_us, text, spread_us - self.pair_limit_us)
                 waiting = None
         if waiting is not None and self._alone(waiting):
             self._say("pair", waiting.t_us, "a left setpoint without its right one", 0)
@@ -387,8 +383,12 @@ class Judge(Reading):
                 text += f"{self.estop_limit_us / 1000:.0f} ms allowed"
                 self._say("estop_latency", worst_us, text, p99_us - self.estop_limit_us)
 
+    def moving_at(self, t_us):
+        """Whether one of the last two setpoints was none of zero, and lately."""
+        return any(not setpoint.zero for setpoint in self._setpoints_between(t_us - GAP_US + 1, t_us + 1)[-2:])
+
     def _sending_at(self, t_us):
         session = self._session_at(t_us)
         ended = session is None or any(end[0] < t_us for end in session.ends)
         recent = self._setpoints_between(t_us - GAP_US + 1, t_us + 1)
-        return (not ended and bool(recent)) or any(not s.zero for s in recent[-2:])
+        return (not ended and bool(recent)) or self.moving_at(t_us)

@@ -100,8 +100,8 @@ def signed(data, at):
 class Reading:
     """Setpoints, sessions and windows of a dead bus, and what is wrong with their form. `found` collects violations."""
 
-    def __init__(self, config, frames, events, moves=True, finished_us=None, estop_limit_us=ESTOP_US):
-        self.config, self.moves, self.estop_limit_us = config, moves, estop_limit_us
+    def __init__(self, config, frames, events, moves=True, finished_us=None, estop_limit_us=ESTOP_US, pair_limit_us=PAIR_US):
+        self.config, self.moves, self.estop_limit_us, self.pair_limit_us = config, moves, estop_limit_us, pair_limit_us
         self.frames = sorted(frames, key=lambda frame: frame.t_us)
         self.events = sorted(events, key=lambda event: event.t_us)
         self.finished_us = finished_us or (self.frames[-1].t_us if self.frames else 0)

@@ -171,6 +171,8 @@ def faults():
     yield "left without right", between(f, 2_000, 2_020, only(1, drop)), e, "pair"
     yield "right without left", between(f, 2_000, 2_020, only(0, drop)), e, "pair"
     yield "right 10 ms after left", between(f, 2_000, 2_020, only(1, late(10))), e, "pair_spread"
+    tick = {"pair_limit_us": 15 * MS}
+    yield "right 16 ms after left, a tick allowed", between(f, 2_000, 2_020, only(1, late(16))), e, "pair_spread", tick
     yield "wrong setpoint type", between(f, 2_000, 2_020, with_data(0, 2)), e, "type"
     yield "four bytes", between(f, 2_000, 2_020, lambda x: x._replace(data=x.data[:4])), e, "dlc"
     yield "eight bytes", between(f, 2_000, 2_020, lambda x: x._replace(data=x.data.ljust(8, b"\0"))), e, "dlc"
@@ -269,6 +271,7 @@ def goods():
     yield "a hold that waits for a wheel that was not heard in it", add(muted, *more), e, {}
     seam = [Event(7_000 * MS, "dead"), Event(7_201_100, "alive", 7_201_100)]  # over between left and right
     yield "a pair on the seam of a dead bus", f, e + seam, {}
+    yield "right 10 ms after left, a tick allowed", between(f, 2_000, 2_020, only(1, late(10))), e, {"pair_limit_us": 15 * MS}
     yield "no motion wanted, none made", [x for x in f if not is_setpoint(x)], [e[0]], {"moves": False}
 
 

@@ -20,6 +20,11 @@ SETTLE_EPISODES = 40  # memory is compared from here on: every kind of fault has
 MEMORY_kB = 64
 SLOW = "10"  # speed frames every 40 ms instead of 4, while idle and in nine episodes of ten; as documented in the tenth
 STUCK_S = 20.0
+PAUSE_S, PAUSE_OF_A_DAY_S, DAY_H = 20.0, 80.0, 4.0  # of wheels that sleep; a soak longer than DAY_H has some hundred episodes of each kind anyway
+TURNING_mm_s = 100  # the left wheel is told to do more than that, so that every episode turns a wheel
+WHOLE_H = 0.5  # a soak of so long must have met every kind of fault, and have settled
+# Linux 6.1 has 512 line numbers, and never gives back those of a chip that went while one of its lines was held.
+CHIPS_LOST_MAX = 50
 
 
 class Soak:
@@ -39,7 +44,8 @@ class Soak:
         """Drives like a person who changes their mind; ends early when refused."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            left, right = self.chance.randrange(-700, 700), self.chance.randrange(-700, 700)
+            left = self.chance.choice((-1, 1)) * self.chance.randrange(TURNING_mm_s, 700)
+            right = self.chance.randrange(-700, 700)
             for _ in range(self.chance.randrange(2, 12)):
                 if not self.client.drive(left, right)["ok"]:
                     return
@@ -98,6 +104,8 @@ class Soak:
         self.rig.lose_chip()
         self.wait(0.05, 1.0)
         self.rig.find_chip()
+        if self.counts[self.kind] == CHIPS_LOST_MAX:
+            self.faults.remove(self.kind)
 
     def fault_mute(self):
         side = self.chance.choice(("left", "right", "both"))
@@ -176,7 +184,7 @@ class Soak:
         asleep = self.chance.random() < 0.75
         if asleep:
             self.rig.sim.ask("mute both")
-        self.wait(0.1, 20.0)
+        self.wait(0.1, PAUSE_OF_A_DAY_S if asleep and self.t.plan["hours"] > DAY_H else PAUSE_S)
         if asleep:
             self.rig.sim.ask("unmute both")
             time.sleep(0.5)
@@ -212,7 +220,7 @@ class Soak:
             text = f"{self.where()}: {latency_us / 1000:.2f} ms from the e-stop to the zero pair"
             self.t.check(latency_us <= ESTOP_US, text, at_us=at_us)
         self.latencies += latencies
-        self.rig.edges.clear()
+        self.rig.presses.clear()
         if not self.t.failures:  # else they are shown
             del self.rig.bus.frames[: len(frames)]
             del self.rig.timeline[: len(events)]
@@ -237,12 +245,26 @@ def soak(t):
     while time.monotonic() - begin < hours * 3600 and run.one():
         pass
     lived_h = (time.monotonic() - begin) / 3600
-    t.check(t.failures or len(run.counts) == len(run.faults), f"faults that never happened: {set(run.faults) - set(run.counts)}")
-    t.check(t.failures or run.baseline, "too short to compare memory")
+    thorough(t, run, hours)
     t.latencies += run.latencies
     p99_us = percentile([latency_us for _, latency_us in run.latencies] or [0], 99)
     t.check(p99_us <= ESTOP_US, f"e-stop to zero pair, p99 {p99_us / 1000:.2f} ms")
     t.measure("gap_ms", run.gap_us / 1000)
     memory_kB, descriptors = rig.gateway.resident_kB(), rig.gateway.descriptors()
-    t.figure(f"{lived_h:.1f} h, {run.episode} episodes, {run.presses} presses, longest gap {run.gap_us / 1000:.0f} ms")
-    t.figure(f"memory {run.baseline and run.baseline[0]} to {memory_kB} kB, {descriptors} descriptors")
+    t.figure(f"{lived_h:.2g} h, {run.episode} episodes, {run.presses} presses, longest gap {run.gap_us / 1000:.0f} ms")
+    t.figure(f"memory {run.baseline[0]} to {memory_kB} kB, {descriptors} descriptors" if run.baseline else f"memory {memory_kB} kB")
+
+
+def thorough(t, run, hours):
+    """It met every kind of fault, and long enough to compare memory; a shorter one than that says what it cannot judge."""
+    missing = sorted(name[len("fault_") :] for name in set(run.faults) - set(run.counts))
+    if t.failures:
+        return
+    if hours >= WHOLE_H:
+        t.check(not missing, f"faults that never happened: {missing}")
+        t.check(run.baseline, "too short to compare memory")
+        return
+    if missing:
+        t.figure(f"too short for {len(missing)} of {len(run.faults)} kinds of fault: {', '.join(missing)}")
+    if not run.baseline:
+        t.figure(f"too short to compare memory, which takes {SETTLE_EPISODES} episodes")

@@ -1,20 +1,136 @@
 # SPDX-License-Identifier: MIT
-"""The verdicts of real time can fail: a late gateway is found, and the machine is not blamed for it."""
+"""The verdicts of real time can fail: a late gateway is found, a stalled machine is not taken for one, and excuses no motion."""
 
+import os
 import signal
+import tempfile
 import time
 
-from catalogue import kernel_test
+from can_bus import FRAME, open_raw
+from catalogue import Entry, kernel_test
 from client import Streamer
-from kernel_rig import ESTOP_US, PRESS_LATE_US, TICK_US, machine_late
+from guest_run import GuestRun, run_one
+from judge_log import LEFT, RIGHT
+from kernel_rig import ESTOP_US, LEVEL_US, PRESS_LATE_US, TICK_US, VcanRig, machine_late
+from runner import TRIES
 from scenario import Skip
 
 LATE_S = 0.03
-TRIES = 3
+HALT_S, HALT_LIMIT_S = 0.2, 5.0
+
+
+class Rehearsal(GuestRun):
+    """The runner's verdict on a test of which nobody is told: it is planted. Run in this process, `attempts` times."""
+
+    def __init__(self, t, function):
+        folder = tempfile.mkdtemp(prefix="iwheel-rehearsal-")
+        super().__init__({**t.plan, "results": os.path.join(folder, "planted.results")})
+        self.entry = Entry("planted", "planted", function, (), 0, VcanRig, 1)
+        self.attempts = 0
+
+    def once(self, name):
+        self.attempts += 1
+        self.last = self.softened(run_one(self.entry, self.plan))
+        return self.last
+
+    def disturbed(self):
+        """Whether the machine was late in the last attempt."""
+        return machine_late(self.last["begin_us"], self.last["end_us"], PRESS_LATE_US)
+
+
+def drive_while(halt, afterwards=None):
+    """A test that drives straight on while something stands still."""
+
+    def planted(t):
+        rig, client = t.running()
+        t.arm(client)
+        stream = Streamer(client, 300, 300)
+        time.sleep(0.4)
+        halt(t, rig)
+        time.sleep(0.3)
+        refusal = stream.stop()
+        t.check(refusal is None, f"drive was refused: {refusal}")
+        if afterwards:
+            afterwards(rig)
+        t.judge(rig)
+
+    return planted
+
+
+def halt_gateway(_, rig):
+    rig.gateway.signal(signal.SIGSTOP)
+    time.sleep(HALT_S)
+    rig.gateway.signal(signal.SIGCONT)
+
+
+def halt_machine(t, _):
+    """The host makes this whole kernel stand still: see Boot.stall_as_asked."""
+    path = f"{t.plan['asks']}.stall"
+    with open(path, "w", encoding="ascii") as file:
+        file.write(str(HALT_S))
+    end = time.monotonic() + HALT_LIMIT_S
+    while os.path.exists(path):
+        if time.monotonic() > end:
+            raise RuntimeError("the host did not make this kernel stand still")
+        time.sleep(0.02)
+
+
+def need_a_machine(t):
+    if t.plan["native"]:
+        raise Skip("a machine's own kernel is not made to stand still; without --native this is tested")
+
+
+def motion_after_estop(rig):
+    """What a gateway would send that does not stop: two pairs, written by somebody whom the judge takes for it."""
+    rig.press()
+    time.sleep(0.1)
+    with open_raw(rig.interface) as other:
+        for can_id in (LEFT, RIGHT, LEFT, RIGHT):
+            other.send(FRAME.pack(can_id, 5, 0, 0, b"\1\1\x2c\7\xd0" + bytes(3)))
+    time.sleep(0.1)
+
+
+def verdict_on(t, halt, afterwards=None):
+    """(verdict, rehearsal, failures) of the runner."""
+    t.plan["asks"] = t.plan["results"].rsplit(".", 1)[0]
+    rehearsal = Rehearsal(t, drive_while(halt, afterwards))
+    verdict, _, failures = rehearsal.test("planted")
+    return verdict, rehearsal, [text for text, _, _ in failures]
+
+
+@kernel_test("a gateway that stands still for 200 ms in motion fails the test at once, and the machine is not blamed", "plumbing-realtime", 0)
+def plumbing_gateway_halted(t):
+    for _ in range(TRIES):
+        verdict, rehearsal, failures = verdict_on(t, halt_gateway)
+        if verdict == "failed" or not rehearsal.disturbed():
+            t.check(verdict == "failed", f"{verdict} after {rehearsal.attempts} attempts: {failures}")
+            t.figure(f"{verdict}: {len(failures)} failures")
+            return
+    raise Skip("the machine was late beside each attempt; needs a quieter one")
+
+
+@kernel_test("a machine that stands still for 200 ms is not taken for a late gateway: repeated, then not judged", "plumbing-realtime", 0)
+def plumbing_machine_halted(t):
+    need_a_machine(t)
+    verdict, rehearsal, failures = verdict_on(t, halt_machine)
+    t.check(rehearsal.disturbed(), "the witness saw the machine stand still")
+    t.check(failures, "a machine that stood still left its traces")
+    t.check(verdict == "skipped" and rehearsal.attempts == TRIES, f"{verdict} after {rehearsal.attempts} attempts: {failures}")
+    t.figure(f"{verdict} after {rehearsal.attempts} attempts, {len(failures)} failures in the last")
+
+
+@kernel_test("a machine that stood still excuses no motion after the e-stop", "plumbing-realtime", 0)
+def plumbing_machine_no_excuse(t):
+    need_a_machine(t)
+    verdict, rehearsal, failures = verdict_on(t, halt_machine, motion_after_estop)
+    t.check(rehearsal.disturbed(), "the witness saw the machine stand still")
+    t.check(verdict == "failed" and rehearsal.attempts == 1, f"{verdict} after {rehearsal.attempts} attempts")
+    t.check(any(text.startswith("nonzero_after_estop") for text in failures), f"it is named: {failures}")
+    t.figure(f"{verdict} although the machine stood still")
 
 
 def late_press(t, delay):
-    """A press in motion while `delay(rig)` keeps something from working for LATE_S. Returns (edge, latency, the machine was late)."""
+    """A press in motion while `delay(rig)` keeps something from working for LATE_S. Returns (latencies from edge and level, whether the machine was late)."""
     rig, client = t.running()
     t.arm(client)
     stream = Streamer(client, 300, 300)
@@ -25,8 +141,13 @@ def late_press(t, delay):
     time.sleep(0.3)
     stream.stop()
     judge = rig.judge(estop_limit_us=1 << 62)
-    latency_us = max((t.after_edge(rig, judge, *pair)[1] for pair in judge.estop_latencies), default=0)
-    return edge_us, latency_us, machine_late(edge_us - TICK_US, edge_us + LATE_S * 1e6, PRESS_LATE_US)
+    found = [t.after_edge(rig, judge, *pair) for pair in judge.estop_latencies]
+    found = [us for at_us, us in found if not t.excused(at_us, us)]
+    t.take_levels(rig, judge)
+    levels = [us for _, us in t.from_level]
+    t.from_level.clear()
+    late = machine_late(edge_us - TICK_US, edge_us + LEVEL_US, PRESS_LATE_US)
+    return max(found, default=0), max(levels, default=0), late or not levels  # or the contact itself moved too slowly to tell
 
 
 def stop_gateway(rig):
@@ -42,9 +163,10 @@ def stop_gateway(rig):
 @kernel_test("a gateway that stands still for 30 ms at a press is found out, and the machine is not blamed", "plumbing-realtime", 0)
 def plumbing_late_gateway(t):
     for _ in range(TRIES):
-        _, latency_us, disturbed = late_press(t, stop_gateway)
+        latency_us, level_us, disturbed = late_press(t, stop_gateway)
         if not disturbed:
             t.check(latency_us > ESTOP_US, f"{latency_us / 1000:.2f} ms measured although the gateway stood still for 30 ms")
-            t.figure(f"{latency_us / 1000:.0f} ms measured")
+            t.check(level_us > LEVEL_US, f"{level_us / 1000:.2f} ms from the level although the gateway stood still for 30 ms")
+            t.figure(f"{latency_us / 1000:.0f} ms measured, {level_us / 1000:.0f} ms from the level")
             return
     raise Skip(f"the machine was late beside each of {TRIES} presses; needs a quieter one")

@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""What a late machine excuses in real time, and what it does not, by a witness's file that is made up. Needs no kernel.
+
+Usage: test/kernel/test_verdicts.py
+"""
+
+import os
+import sys
+import tempfile
+import unittest
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
+import kernel_rig  # noqa: E402
+from guest_run import GuestRun  # noqa: E402
+from runner import TRIES  # noqa: E402
+
+BEGIN_US, FAULT_US, END_US = 1_000_000, 3_000_000, 5_000_000
+GAP = ["gap: at 2.000 s: 180 ms without a setpoint", "timing", FAULT_US]
+REFUSED = ["drive was refused: loop_late", "check", 0]
+MOTION = ["nonzero_after_estop: at 2.000 s: left 300 mm/s", "rule", FAULT_US]
+UNLATCHED = ["latched expected after a press, it is armed, None", "check", FAULT_US]
+FAST = ["speed: at 2.000 s: 1200 mm/s, 1000 allowed", "rule", FAULT_US]
+PAIR = ["pair_spread: at 2.000 s: 17.0 ms between left and right", "timing", FAULT_US]
+
+
+def plan(virtual=False):
+    return {"group": "realtime", "virtual": virtual, "full": False, "build": "/nowhere"}
+
+
+class Scripted(GuestRun):
+    """Each attempt ends with those failures."""
+
+    def __init__(self, *failures, virtual=False):
+        super().__init__(plan(virtual))
+        self.failures, self.attempts = failures, 0
+
+    def once(self, name):
+        self.attempts += 1
+        failures = [list(failure) for failure in self.failures]
+        result = {"failures": failures, "figures": [], "skip": None, "begin_us": BEGIN_US, "end_us": END_US, "latencies": [], "from_level": []}
+        self.last = self.softened(result)
+        return self.last
+
+
+class Witnessed(unittest.TestCase):
+    def setUp(self):
+        self.file = self.enterContext(tempfile.NamedTemporaryFile("w", suffix=".late"))
+        kernel_rig.WITNESS["file"] = self.file.name
+        self.addCleanup(kernel_rig.WITNESS.update, file=None)
+
+    def late(self, at_us, by_us):
+        """The witness was woken at that time, so much too late."""
+        self.file.write(f"{at_us} {by_us}\n")
+        self.file.flush()
+
+    def outcome(self, *failures, **options):
+        run = Scripted(*failures, **options)
+        return run.test("made up")[0], run.attempts
+
+
+class Verdicts(Witnessed):
+    def test_late_gateway_on_a_quiet_machine_fails_at_once(self):
+        for failures in ([GAP], [REFUSED], [GAP, REFUSED], [PAIR]):
+            with self.subTest(failures):
+                self.assertEqual(("failed", 1), self.outcome(*failures))
+
+    def test_stalled_machine_is_repeated_then_not_judged(self):
+        self.late(FAULT_US, 200_000)
+        for failures in ([GAP], [REFUSED], [GAP, REFUSED], [PAIR]):
+            with self.subTest(failures):
+                self.assertEqual(("skipped", TRIES), self.outcome(*failures))
+
+    def test_stalled_machine_excuses_no_motion_no_latch_and_no_form(self):
+        self.late(FAULT_US, 200_000)
+        for failures in ([MOTION], [UNLATCHED], [FAST], [GAP, MOTION], [REFUSED, UNLATCHED]):
+            with self.subTest(failures):
+                self.assertEqual(("failed", 1), self.outcome(*failures))
+
+    def test_stall_of_another_test_excuses_nothing(self):
+        self.late(END_US + 1_000_000, 200_000)
+        self.late(BEGIN_US - 1_000_000, 200_000)
+        self.assertEqual(("failed", 1), self.outcome(GAP, REFUSED))
+
+    def test_stall_far_from_a_gap_does_not_excuse_it(self):
+        self.late(FAULT_US + 1_000_000, 200_000)
+        self.assertEqual(("failed", 1), self.outcome(GAP))
+
+    def test_delay_too_short_to_matter_excuses_nothing(self):
+        self.late(FAULT_US, kernel_rig.STALL_US - 1)
+        self.assertEqual(("failed", 1), self.outcome(GAP, REFUSED))
+
+    def test_virtual_time_excuses_nothing(self):
+        self.late(FAULT_US, 200_000)
+        self.assertEqual(("failed", 1), self.outcome(GAP, virtual=True))
+
+
+class Presses(Witnessed):
+    """Which presses count for nothing because the machine was late beside them."""
+
+    def excused(self, latency_us, *limit):
+        return kernel_rig.KernelTest.excused(FAULT_US, latency_us, *limit)
+
+    def test_late_stop_on_a_quiet_machine_counts(self):
+        self.assertFalse(self.excused(30_000))
+        self.assertFalse(self.excused(30_000, kernel_rig.LEVEL_US))
+
+    def test_late_stop_beside_a_late_machine_does_not(self):
+        self.late(FAULT_US + 12_000, 10_000)
+        self.assertTrue(self.excused(30_000))
+        self.assertTrue(self.excused(30_000, kernel_rig.LEVEL_US))
+
+    def test_stop_in_time_counts_whatever_was_beside_it(self):
+        self.late(FAULT_US + 4_000, 10_000)
+        self.assertFalse(self.excused(kernel_rig.ESTOP_US))
+        self.assertFalse(self.excused(kernel_rig.LEVEL_US, kernel_rig.LEVEL_US))
+
+    def test_machine_late_after_the_limit_excuses_nothing(self):
+        self.late(FAULT_US + 30_000, 10_000)
+        self.assertFalse(self.excused(30_000))
+        self.assertFalse(self.excused(30_000, kernel_rig.LEVEL_US))
+
+
+if __name__ == "__main__":
+    unittest.main()
