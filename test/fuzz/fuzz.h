@@ -36,4 +36,15 @@ static inline void fuzz_require(bool holds, const char *what) {
     }
 }
 
+/// Says what became of the input where IWHEEL_FUZZ_TELL is set: test/fuzz/run learns so whether a seed is taken.
+static inline void fuzz_tell(const char *what) {
+    static int tells = -1;
+    if (tells < 0) {
+        tells = (getenv("IWHEEL_FUZZ_TELL") != NULL) ? 1 : 0;
+    }
+    if (tells == 1) {
+        (void)fprintf(stderr, "told: %s\n", what);
+    }
+}
+
 #endif

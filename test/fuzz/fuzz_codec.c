@@ -54,7 +54,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         const iw_can_frame_t frame = take_frame(&bytes);
         iw_proto_message_t message;
         if (iw_proto_decode(&frame, &message) == IW_OK) {
+            fuzz_tell("taken");
             judge(&frame, &message);
+        } else {
+            fuzz_tell("refused");
         }
     }
     return 0;

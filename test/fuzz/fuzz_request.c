@@ -45,8 +45,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     memset(&request, 0xA5, sizeof request);
     memset(&refusal, 0xA5, sizeof refusal);
     if (gw_request_parse(line, size, &request, &refusal)) {
+        fuzz_tell("taken");
         judge_request(&request);
     } else {
+        fuzz_tell("refused");
         judge_refusal(&refusal);
     }
     fuzz_require(request.id.kind <= GW_ID_TEXT, "the id is known, or known to be unknown");

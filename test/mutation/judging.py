@@ -8,10 +8,13 @@ import threading
 from typing import NamedTuple
 
 from core_build import CORE, INCLUDE, ROOT, SLOW
+from mutants import files, functions
 
 KILLED, ENDLESS, SAME, LIVES, INVALID = "killed", "does not end", "same code", "lives", "does not compile"
 # If one of them makes the same object of it as of the core as it is, it is the same program.
 COMPILERS = (("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2"))
+SMALL = "-Os" # Leaves out parts of functions in headers (__OPTIMIZE_SIZE__): it proves nothing there.
+PROBE = "probe.c"
 WHOLE_CORE = (("orders", "test_orders", lambda judges, core: judges.orders(core)),
               ("simulation", "test_sim", lambda judges, core: judges.sim(core, 1)))
 
@@ -42,7 +45,7 @@ def reach(sources):
             folders = [path.parent, CORE, *(ROOT / folder for folder in ("core/include", "app/sim/model/include", "test/sim", "test/support"))]
             todo += [folder / name for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.M) for folder in folders]
             todo.append(CORE / f"{path.stem}.c")
-    return {path.name for path in seen if path.parent == CORE}
+    return {path.name for path in seen.intersection(files())}
 
 
 class Judge:
@@ -50,9 +53,16 @@ class Judge:
 
     def __init__(self, judges):
         self.judges, self.kills, self.lock = judges, collections.defaultdict(collections.Counter), threading.Lock()
-        self.sources = {path.name: path.read_text() for path in CORE.glob("*.c")}
+        self.paths = {path.name: path for path in files()}
+        self.sources = {name: path.read_text() for name, path in self.paths.items()}
         self.reach = {name: reach(sources) for name, sources in judges.programs.items()}
         self.optimised = {}
+
+    def expect(self, record):
+        """Those that saw a function's mutants before are asked first."""
+        for key, verdict in record.before.items():
+            if verdict.program in self.judges.tests:
+                self.kills[record.mutants[key].file, record.mutants[key].function][verdict.program] += 1
 
     def clean(self):
         """What the judges have against the core as it is; they are worth nothing then."""
@@ -62,13 +72,19 @@ class Judge:
 
     def order(self, mutant):
         """Unit tests that sweep every value come after the others; those that killed most of the function's mutants come first."""
-        kills, stem = self.kills[mutant.file, mutant.function], mutant.file.removesuffix(".c")
+        kills, stem = self.kills[mutant.file, mutant.function], mutant.file.rpartition(".")[0]
         found = sorted((name for name in self.judges.tests if mutant.file in self.reach[f"unit_{name}"]), key=lambda name: (-kills[name], stem not in name, name))
         return [name for name in found if name not in SLOW], [name for name in found if name in SLOW]
 
     def objects_of(self, folder, file):
-        """What optimising compilers make of it, one after the other."""
-        for at, (compiler, level) in enumerate(COMPILERS):
+        """What optimising compilers make of it, one after the other; of a header, of each of its functions by itself."""
+        compilers = COMPILERS
+        if file.endswith(".h"):
+            compilers = [row for row in COMPILERS if SMALL not in row]
+            names = ", ".join(f"(void (*)(void)){name}" for name in functions(self.paths[file]))
+            (folder / PROBE).write_text(f'#include "{file}"\nvoid (*const probes[])(void) = {{{names}}};\n')
+            file = PROBE
+        for at, (compiler, level) in enumerate(compilers):
             out = folder / f"optimised{at}.o"
             subprocess.run([compiler, "-std=c99", "-ffreestanding", level, "-w", *INCLUDE, "-c", file, "-o", out.name], check=True, cwd=folder)
             yield subprocess.run(["objdump", "-s", "-r", out.name], capture_output=True, check=True, cwd=folder).stdout
@@ -76,7 +92,7 @@ class Judge:
     def same_code(self, folder, file):
         with self.lock:
             if file not in self.optimised:
-                clean = self.judges.work / "clean_text" / file.removesuffix(".c")
+                clean = self.judges.work / "clean_text" / file
                 clean.mkdir(parents=True, exist_ok=True)
                 (clean / file).write_text(self.sources[file])
                 self.optimised[file] = list(self.objects_of(clean, file))

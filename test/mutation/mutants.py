@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+CORE, PUBLIC = ROOT / "core/src", ROOT / "core/include/iwheel"
+# Macros that only hint: what they are given is looked at as if they were not there.
+HINTS = ("IW_PROTO_LIKELY",)
 OPERATORS = {
     "<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"), "==": ("!=",), "!=": ("==",), "&&": ("||",),
     "||": ("&&",), "+": ("-",), "-": ("+",), "*": ("/",), "/": ("*",), "%": ("/",), "&": ("|",), "|": ("&",), "^": ("|",),
@@ -47,8 +50,9 @@ class Finder:
 
     def __init__(self, path):
         self.path, self.source, self.found = Path(path), Path(path).read_text(), []
-        tree = subprocess.run(["clang", "-Xclang", "-ast-dump=json", "-fsyntax-only", "-std=c99", "-w", f"-I{ROOT / 'core/include'}",
-                               f"-I{ROOT / 'core/src'}", str(path)], capture_output=True, text=True, check=True).stdout
+        plain = re.sub(rf"(?<!#define )\b({'|'.join(HINTS)})(?=\()", lambda match: " " * len(match[1]), self.source)
+        tree = subprocess.run(["clang", "-Xclang", "-ast-dump=json", "-fsyntax-only", "-std=c99", "-w", f"-I{PUBLIC.parent}", f"-I{CORE}", "-xc", "-"],
+                              input=plain, capture_output=True, text=True, check=True).stdout
         names = set(re.findall(r"^[\w \*]*?\b(\w+)\([^;{}]*\) \{$", self.source, re.M))
         self.function = None
         for node in json.loads(tree)["inner"]:
@@ -59,6 +63,8 @@ class Finder:
                     self.visit(body[0], None)
 
     def add(self, kind, span, text):
+        if span and re.search(rf"\b({'|'.join(HINTS)})$", self.source[:span[0]]):
+            text = f"({text})"
         if span and self.source[span[0]:span[1]] != text:
             self.found.append(Mutant(self.path.name, self.function, kind, *span, text))
 
@@ -172,6 +178,12 @@ def functions(path):
     """{function: its text}, for telling whether it changed."""
     source = Path(path).read_text()
     return {name: source[begin:end] for name, (begin, end) in function_spans(source).items()}
+
+
+def files():
+    """The core's sources, and those of its headers that have functions."""
+    headers = [path for folder in (PUBLIC, CORE) for path in sorted(folder.glob("*.h"))]
+    return sorted(CORE.glob("*.c")) + [path for path in headers if functions(path)]
 
 
 def mutants(path):

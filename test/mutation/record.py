@@ -9,8 +9,9 @@ import json
 import re
 from pathlib import Path
 
-from core_build import CORE, ROOT
+from core_build import ROOT
 from judging import ENDLESS, INVALID, KILLED, LIVES, SAME, WHOLE_CORE, Verdict, digest
+from mutants import files as core_files
 from mutants import functions, mutants
 
 HERE = Path(__file__).resolve().parent
@@ -85,7 +86,7 @@ class Record:
         self.tests, self.mutants, self.verdicts, self.before, self.texts = Tests(programs), {}, {}, {}, {}
         stored = json.loads(CAMPAIGN.read_text()) if CAMPAIGN.exists() else {}
         self.compilers = stored.get("compilers", [])
-        for path in sorted(CORE.glob("*.c")):
+        for path in core_files():
             found = keyed(path)
             self.texts.update({(path.name, name): text for name, text in essences(path).items()})
             self.mutants.update(found)
@@ -157,14 +158,14 @@ def cell(verdict, named):
 
 HEAD = """# Mutants of the core
 
-Written by `test/mutation/run --full --update`. Each operator, constant, condition, call, returned value and statement of `core/src` is changed, one at
+Written by `test/mutation/run --full --update`. Each operator, constant, condition, call, returned value and statement of the core is changed, one at
 a time, and somebody must see it: a unit test (of those that need only the core), else every order of three events, else an hour of simulation. What an
 optimising compiler (gcc -O2, -O3, -Os, clang -O2) makes the same object of is the same program: there is nothing to see. A mutant counts as *endless* if a
 test that ends with the core as it is uses more than ten times its processor time and three seconds more.
 
 `./check mutation` judges every mutant of a function that has changed since, or that was seen by a test that has changed since, and a sample of the others; it
-fails if one lives that [equivalent.txt](../test/mutation/equivalent.txt) does not name. Functions that stand in headers (reading and writing of frames) are not
-changed: they are compared with every value instead (`test/unit/test_proto_sweep.c`).
+fails if one lives that [equivalent.txt](../test/mutation/equivalent.txt) does not name. Functions that stand in headers (reading and writing of frames) are
+changed in whoever includes them, in the tests too; of these gcc -Os, which leaves parts of them out, proves nothing.
 """
 COLUMNS = ["unit tests", *MEANS, "endless", "same code", "equivalent", "alive"]
 

@@ -2,18 +2,20 @@
 """All mutants of a file of the core in one library, so that judging one costs no compilation.
 
 Of each function there is one copy per mutant beside the one as it is; under the function's own name stands a switch. Which
-mutant is in force is told by the environment when the library is loaded.
+mutant is in force is told by the environment when the library is loaded. Mutants of functions that stand in headers are in
+force in whoever includes them, judges too.
 """
 import re
 
-from core_build import NUMBER, Core
+from core_build import NUMBER
 from mutants import function_spans
 
-HEAD = """extern char *getenv(const char *);
+WHICH = """extern char *getenv(const char *);
 extern int atoi(const char *);
-static int iw_mutant;
+int iw_mutant;
 __attribute__((constructor)) static void iw_choose_mutant(void) { const char *text = getenv("%s"); iw_mutant = text ? atoi(text) : 0; }
 """ % NUMBER
+TOLD = "extern int iw_mutant;\n"
 
 
 def argument_names(signature):
@@ -27,7 +29,7 @@ def copies(source, name, span, numbered):
     signature = " ".join(source[span[0]:at].split())
     own = signature if signature.startswith("static ") else f"static {signature}"
     call = f"({', '.join(argument_names(signature))});"
-    back = "" if re.match(r"(static )?void \w", signature) else "return "
+    back = "" if re.match(r"(static )?(inline )?void \w", signature) else "return "
     found = [(0, f"{own.replace(f'{name}(', f'{name}__0(', 1)} {source[at:span[1]]}\n")]
     for number, mutant in numbered:
         body = source[at:mutant.begin] + mutant.text + source[mutant.end:span[1]]
@@ -36,9 +38,9 @@ def copies(source, name, span, numbered):
     return found, f"{signature} {{ switch (iw_mutant) {{{cases} default: {back}{name}__0{call} }} }}"
 
 
-def compose(source, numbered):
+def compose(source, numbered, head):
     """(the text of the file with all of them, [(first line, last line, number)] of the copies)"""
-    text, lines, last = HEAD, [], 0
+    text, lines, last = head, [], 0
     for name, span in sorted(function_spans(source).items(), key=lambda item: item[1]):
         mine = [(number, mutant) for number, mutant in numbered if mutant.function == name]
         if not mine:
@@ -53,17 +55,23 @@ def compose(source, numbered):
     return text + source[last:], lines
 
 
-def build(judges, name, path, mutants):
-    """{mutant: its core, or None if it does not compile}"""
-    source, invalid = path.read_text(), set()
+def build(judges, name, paths, mutants):
+    """{mutant: its core, or None if it does not compile}; of one source, or of headers."""
+    headers, invalid = paths[0].suffix == ".h", set()
     while True:
-        numbered = [(number, mutant) for number, mutant in enumerate(mutants, 1) if number not in invalid]
-        text, lines = compose(source, numbered)
-        core, said = judges.change(name, path.name, text)
+        composed, lines = {}, []
+        for path in paths:
+            mine = [(number, mutant) for number, mutant in enumerate(mutants, 1) if number not in invalid and mutant.file == path.name]
+            composed[path], own = compose(path.read_text(), mine, TOLD if headers else WHICH)
+            lines += [(path.name, *line) for line in own]
+        if headers:
+            core, said = judges.change_headers(name, composed, WHICH)
+        else:
+            core, said = judges.change(name, paths[0].name, composed[paths[0]])
         if core:
-            return {mutant: None if number in invalid else Core(core.folder, number) for number, mutant in enumerate(mutants, 1)}
-        wrong = {int(line) for line in re.findall(rf"{re.escape(path.name)}:(\d+):\d+: error:", said)}
-        found = {number for begin, end, number in lines if number and any(begin <= line <= end for line in wrong)}
+            return {mutant: None if number in invalid else core._replace(number=number) for number, mutant in enumerate(mutants, 1)}
+        wrong = {(file, int(line)) for file, line in re.findall(r"^\S*?([^\s/]+):(\d+):\d+: error:", said, re.M)}
+        found = {number for file, begin, end, number in lines if number and any(file == other and begin <= line <= end for other, line in wrong)}
         if not found:
             raise RuntimeError(said)
         invalid |= found

@@ -23,9 +23,13 @@ typedef enum { START_REST = 0, START_DRIVING, STARTS } start_t;
 typedef struct {
     start_t start;
     world_mode_t mode;
-    unsigned spacing; ///< Below UNIFORM: that one. From there on: mixed.
+    unsigned spacing; ///< Below UNIFORM: that one. From there on: mixed, and in every third of these drives come late.
     unsigned length;
 } combination_t;
+
+static bool is_late(const combination_t *combination) {
+    return combination->spacing >= UNIFORM && (combination->spacing - UNIFORM) % 3U == 2U;
+}
 
 static const char *const start_names[STARTS] = {"rest", "driving"};
 static const char *const mode_names[MODES] = {"once", "stream", "blind"};
@@ -35,7 +39,8 @@ static void usage(FILE *out) {
           "       test_orders --sequence rest|driving once|stream|blind SPACING LETTER,LETTER,...\n"
           "Plays every sequence of press, release, reset, arm, command, kill, restart and bus (down or up), with "
           "several\n"
-          "spacings, from standing and from driving wheels, and judges each by the rules of motion permission.\n"
+          "spacings, from standing and from driving wheels, with drives that come at once or have waited, and judges\n"
+          "each by the rules of motion permission.\n"
           "--length: of the sequences, 6 if not told; --part 0/2 and 1/2 are the halves; --full: more spacings.\n"
           "--sequence plays one and tells what happens; SPACING is the number that a failure told. A failing sequence "
           "is\n"
@@ -74,6 +79,7 @@ static void begin(world_t *world, const combination_t *combination, world_stats_
         world->mode = combination->mode;
         world->drive_us = (combination->mode == MODE_ONCE) ? IW_NEVER : world->drive_us;
     }
+    world->late = is_late(combination);
 }
 
 typedef struct {
@@ -160,7 +166,9 @@ static bool happened(const world_stats_t *stats, const combination_t *combinatio
     const bool drove = combination->start == START_DRIVING ||
                        (stats->armed > 0U && stats->drives > 0U && stats->nonzero > 0U) ||
                        combination->spacing < 2U; // Nothing can be armed that fast.
-    return drove && stats->restarts > 0U && stats->latched > 0U;
+    const bool enough = combination->length > 3U; // To arm, and to be late in both ways.
+    const bool waited = !is_late(combination) || !enough || (stats->aged > 0U && stats->stale > 0U);
+    return drove && waited && stats->restarts > 0U && stats->latched > 0U;
 }
 
 static bool play_combination(const combination_t *combination, uint64_t *out_sequences) {
@@ -175,18 +183,19 @@ static bool play_combination(const combination_t *combination, uint64_t *out_seq
     }
     const bool seen = happened(&stats, combination);
     printf("%-6s from %s, %s, spacing %u: %llu sequences, %llu frames of which %llu nonzero, %llu times armed, "
-           "%llu drives, %llu resets, %llu latches\n",
+           "%llu drives (%llu that had waited; %llu refused as older than the arm), %llu resets, %llu latches\n",
            (good && seen) ? "ok" : "FAILED", start_names[combination->start], mode_names[combination->mode],
            combination->spacing, (unsigned long long)play.sequences, (unsigned long long)stats.frames,
            (unsigned long long)stats.nonzero, (unsigned long long)stats.armed, (unsigned long long)stats.drives,
-           (unsigned long long)stats.resets, (unsigned long long)stats.latched);
+           (unsigned long long)stats.aged, (unsigned long long)stats.stale, (unsigned long long)stats.resets,
+           (unsigned long long)stats.latched);
     fflush(stdout);
     *out_sequences += play.sequences;
     return good && seen;
 }
 
 static int play_everything(unsigned length, bool full, unsigned part, unsigned parts) {
-    const unsigned spacings = UNIFORM + (full ? 12U : 2U);
+    const unsigned spacings = UNIFORM + (full ? 12U : 3U);
     unsigned index = 0;
     unsigned passed = 0;
     unsigned failed = 0;

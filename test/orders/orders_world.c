@@ -15,6 +15,7 @@
 #define RULE_FULL    912U ///< The world itself is at its end.
 #define PERIOD_MS    40U
 #define SILENT_MS    200U
+#define LEASE_MS     200U
 #define LEFT_mm_s    400
 #define RIGHT_mm_s   300
 /// The wheels' own: they follow at this pace, and coast at that one when they were told nothing for a second.
@@ -122,6 +123,7 @@ static void start_gateway(world_t *self, bool restarted) {
     config.current_role = IW_ROLE_LIMIT;
     config.period_ms = PERIOD_MS;
     config.wheel_silent_ms = SILENT_MS;
+    config.lease_ms = LEASE_MS;
     config.invert[IW_RIGHT] = true;
     if (iw_gateway_init(&self->gateway, &config, &hal, self->now_us, restarted) != IW_CONFIG_OK) {
         abort();
@@ -157,16 +159,38 @@ static void tell(const world_t *self, const char *what, int result) {
     }
 }
 
+/// When the drive that comes now was sent: a time that depends on nothing but now, so that every replay is the same.
+static iw_time_us_t sent_us(const world_t *self) {
+    static const uint32_t ages_us[] = {0, 1 * MS, LEASE_MS * MS / 2U, LEASE_MS * MS - 1U, LEASE_MS * MS, 520 * MS};
+    const iw_time_us_t armed_us = self->gateway.permit.armed_us;
+    const uint32_t choice = ((uint32_t)(self->now_us / 10U) * 0x9E3779B1U) >> 29;
+    if (!self->late) {
+        return self->now_us;
+    }
+    if (choice < sizeof ages_us / sizeof ages_us[0]) {
+        return self->now_us - ages_us[choice];
+    }
+    // The first moment that may count, and the last one that must not.
+    return (armed_us > START_US && armed_us <= self->now_us) ? armed_us - (choice & 1U) : self->now_us;
+}
+
 static bool drive(world_t *self) {
     const iw_drive_t request = {{LEFT_mm_s, RIGHT_mm_s}, {0, 0}, false};
+    const oracle_asked_t asked = {self->now_us, sent_us(self), self->client};
+    const bool aged = asked.sent_us < self->now_us;
     iw_applied_t applied = {0};
-    const iw_refusal_t result = iw_gateway_drive(&self->gateway, self->now_us, self->client, &request, &applied);
+    const iw_refusal_t result = iw_gateway_drive(&self->gateway, asked.sent_us, self->client, &request, &applied);
+    if (self->traces && aged) {
+        printf("  %9.3f ms    sent at %.3f ms\n", (double)self->now_us / 1e3, (double)asked.sent_us / 1e3);
+    }
     tell(self, "drive", (int)result);
-    oracle_drive(&self->oracle, self->now_us, self->client, &request, result, &applied);
+    oracle_drive(&self->oracle, &asked, &request, result, &applied);
     if (result == IW_REFUSE_NONE) {
         self->stats->drives++;
-        self->cut = self->cut && !self->arm_after_cut;
+        self->stats->aged += aged ? 1U : 0U;
+        self->cut = self->cut && !(self->arm_after_cut && asked.sent_us >= self->arm_us);
     }
+    self->stats->stale += (aged && result == IW_REFUSE_STALE_COMMAND) ? 1U : 0U;
     wake(self);
     return result == IW_REFUSE_NONE;
 }
@@ -181,7 +205,10 @@ static void arm(world_t *self) {
     const iw_refusal_t result = iw_gateway_arm(&self->gateway, self->now_us, self->client, false);
     tell(self, "arm", (int)result);
     oracle_arm(&self->oracle, self->now_us, self->client, false, result);
-    self->arm_after_cut = self->arm_after_cut || result == IW_REFUSE_NONE;
+    if (result == IW_REFUSE_NONE && !self->arm_after_cut) {
+        self->arm_after_cut = true;
+        self->arm_us = self->now_us;
+    }
     wake(self);
 }
 

@@ -34,6 +34,7 @@ typedef enum {
 /// What all the sequences consisted of; not put back.
 typedef struct {
     uint64_t steps, frames, nonzero, armed, drives, resets, latched, restarts, stops;
+    uint64_t aged, stale; ///< Drives that had waited: accepted; refused because they were sent before the arm.
 } world_stats_t;
 
 typedef struct {
@@ -62,7 +63,9 @@ typedef struct {
     iw_client_t client;
     world_mode_t mode;
     bool pressed, edge, down, lost, traces;
-    bool cut, arm_after_cut; ///< The simpler rule's memory.
+    bool late;               ///< Drives have waited somewhere on their way, each for another time.
+    bool cut, arm_after_cut; ///< The simpler rule's memory, and since when the latter.
+    iw_time_us_t arm_us;
     iw_state_t state;
 } world_t;
 

@@ -23,6 +23,7 @@ from core_tests import core_tests
 
 CORE = ROOT / "core/src"
 INCLUDE = [f"-I{ROOT / path}" for path in ("core/include", "core/src", "app/sim/model/include", "test/sim", "test/support")]
+WHICH = "which.c"
 # A judge is stopped when it has used so many times the processor time it needs with the core as it is, and so many seconds more:
 # far beyond what a busy machine can add, so that only what does not end is taken for an endless loop.
 TIMES, MORE_S, UNMEASURED_S = 10, 3, 600
@@ -62,6 +63,7 @@ class Core(NamedTuple):
     """A changed core: where its library is, and which of the changes that are in it is in force (test/mutation/schemata.py)."""
     folder: Path
     number: int = 0
+    has_judges: bool = False # Its headers are changed, so that who includes them must be built for it, into its folder.
 
 
 def play(command, core, limit_s):
@@ -83,9 +85,9 @@ def play(command, core, limit_s):
     return run
 
 
-def compile_file(source, out, *flags, gcc=("gcc",)):
+def compile_file(source, out, *flags, gcc=("gcc",), include=tuple(INCLUDE)):
     """None, or what the compiler said."""
-    done = subprocess.run([*gcc, "-std=gnu11", "-w", *flags, *INCLUDE, "-c", source, "-o", out], capture_output=True, text=True)
+    done = subprocess.run([*gcc, "-std=gnu11", "-w", *flags, *include, "-c", source, "-o", out], capture_output=True, text=True)
     return None if done.returncode == 0 else done.stderr
 
 
@@ -96,7 +98,7 @@ class Judges:
         self.work, self.jobs = Path(work), jobs
         self.clean = Core(self.work / "clean")
         self.clean.folder.mkdir(parents=True, exist_ok=True)
-        self.objects, self.limits, self.lock = {}, {}, threading.Lock()
+        self.unity, self.objects, self.limits, self.lock = unity, {}, {}, threading.Lock()
         self.tests = core_tests()
         sim = sorted((ROOT / "test/sim").glob("*.c"))
         programs = {f"unit_{name}": [*map(Path, sources), Path(unity) / "unity.c"] for name, sources in self.tests.items()}
@@ -106,7 +108,7 @@ class Judges:
         others = sorted({path for sources in programs.values() for path in sources})
         with ThreadPoolExecutor(jobs) as pool:
             list(pool.map(self.compile_core, sorted(CORE.glob("*.c"))))
-            objects = dict(zip(others, pool.map(lambda path: self.compile_other(path, unity), others)))
+            objects = dict(zip(others, pool.map(self.compile_other, others)))
             self.link(self.clean.folder, {})
             list(pool.map(lambda name: self.build(name, [objects[path] for path in programs[name]]), programs))
 
@@ -116,18 +118,19 @@ class Judges:
         if said:
             raise RuntimeError(said)
 
-    def compile_other(self, source, unity):
-        out = self.work / f"{source.parent.name}_{source.stem}.o"
-        said = compile_file(source, out, "-O2", *PATTERN, f"-I{unity}", "-DUNITY_SUPPORT_64", gcc=GCC)
+    def compile_other(self, source, folder=None, flags=("-O2",), include=tuple(INCLUDE)):
+        out = (folder or self.work) / f"{source.parent.name}_{source.stem}.o"
+        said = compile_file(source, out, *flags, *PATTERN, f"-I{self.unity}", "-DUNITY_SUPPORT_64", gcc=GCC, include=include)
         if said:
             raise RuntimeError(said)
         return out
 
-    def build(self, name, objects):
-        subprocess.run(["gcc", *objects, f"-L{self.clean.folder}", "-liwheel", "-o", self.work / name], check=True)
+    def build(self, name, objects, folder=None):
+        """The judge of that name; in `folder` for the library that is there, else for the core as it is."""
+        subprocess.run(["gcc", *objects, f"-L{folder or self.clean.folder}", "-liwheel", "-o", (folder or self.work) / name], check=True)
 
     def link(self, folder, replaced):
-        objects = [replaced.get(name, path) for name, path in sorted(self.objects.items())]
+        objects = sorted((self.objects | replaced).values())
         subprocess.run(["ld", "-shared", *objects, "-o", folder / "libiwheel.so"], check=True)
 
     def change(self, name, file, text):
@@ -144,16 +147,56 @@ class Judges:
         self.link(folder, {file: folder / "changed.o"})
         return Core(folder), None
 
-    def limit_s(self, command):
-        """Seconds of processor time for it: measured once, with the core as it is."""
-        with self.lock:
-            if command not in self.limits:
-                self.limits[command] = int(TIMES * play(command, self.clean, UNMEASURED_S).cpu_s) + MORE_S
-            return self.limits[command]
+    def change_headers(self, name, texts, which):
+        """As `change`, but headers of the core, {path: text}; `which` is a source of its own in the library."""
+        folder = self.work / "changed" / name
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(ROOT / "core", folder / "core")
+        for path, text in texts.items():
+            (folder / path.relative_to(ROOT)).write_text(text)
+        (folder / WHICH).write_text(which)
+        (folder / "all.c").write_text("".join(f'#include "{path.name}"\n' for path in texts))
+        folders = {folder / path.relative_to(ROOT).parent for path in texts}
+        said = compile_file(folder / "all.c", folder / "all.o", include=[*(f"-I{path}" for path in folders), *self.include(folder)])
+        if said:
+            return None, said
+        replaced = {}
+        for source in [*sorted((folder / "core/src").glob("*.c")), folder / WHICH]:
+            replaced[source.name] = folder / f"{source.stem}.o"
+            said = compile_file(source, replaced[source.name], "-O1", "-fPIC", *BOUNDS, *PATTERN, include=self.include(folder))
+            if said:
+                raise RuntimeError(said)
+        self.link(folder, replaced)
+        return Core(folder, has_judges=True), None
+
+    @staticmethod
+    def include(folder):
+        """What is included where the core's headers are changed."""
+        return [word.replace(f"-I{ROOT}/core/", f"-I{folder}/core/") for word in INCLUDE]
+
+    def judge_of(self, core, program):
+        """Where it is; with changed headers it is built when it is first asked for. Held: the lock."""
+        folder = core.folder if core.has_judges else self.work
+        if not (folder / program).exists():
+            objects = [self.compile_other(path, folder, ("-O1", *BOUNDS), self.include(folder)) for path in self.programs[program]]
+            self.build(program, objects, folder)
+        return folder / program
+
+    def limit_s(self, command, core):
+        """Seconds of processor time for it: measured once, with the core as it is. Held: the lock."""
+        if command not in self.limits:
+            clean = core._replace(number=0) if core.has_judges else self.clean
+            done = play(command, clean, UNMEASURED_S)
+            if done.status != 0 and core.has_judges:
+                raise RuntimeError(f"{command[0].name}, built for changed headers of which none is in force, {done.how}")
+            self.limits[command] = int(TIMES * done.cpu_s) + MORE_S
+        return self.limits[command]
 
     def run(self, core, program, *arguments):
-        command = (self.work / program, *arguments)
-        return play(command, core, self.limit_s(command))
+        with self.lock:
+            command = (self.judge_of(core, program), *arguments)
+            limit_s = self.limit_s(command, core)
+        return play(command, core, limit_s)
 
     def failing(self, core, names):
         """(the first of these programs that fails, its first failing test, how it ended), or None."""

@@ -65,7 +65,8 @@ static void request_drive(rig_t *rig, const request_t *request, const iw_gateway
     } else {
         rig->result->stats.drives++;
     }
-    oracle_drive(&rig->oracle, rig->now_us, request->id, &drive, result, &applied);
+    const oracle_asked_t asked = {rig->now_us, rig->now_us, request->id};
+    oracle_drive(&rig->oracle, &asked, &drive, result, &applied);
 }
 
 static void request_arm(rig_t *rig, const request_t *request, const iw_gateway_t *before) {

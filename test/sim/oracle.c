@@ -404,6 +404,7 @@ static void judge_armed(oracle_t *self, iw_time_us_t now_us) {
     self->ramp_us = IW_NEVER;
     self->holder = self->pending_arm;
     self->pending_arm = IW_CLIENT_NONE;
+    self->armed_us = now_us;
     self->lease_until_us = now_us + FIRST_LEASE_US;
 }
 
@@ -417,6 +418,15 @@ static bool rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_
         }
     }
     return true;
+}
+
+/// What is armed from here on sends anew. A pair of this very microsecond may be its first: proof counts by when it was sent.
+static void forget_sent(oracle_t *self, iw_time_us_t now_us) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        if (self->wheel[side].sent_us < now_us) {
+            self->wheel[side].sent_us = IW_NEVER;
+        }
+    }
 }
 
 /// The public state changed, or may have: after every step and every request.
@@ -445,12 +455,13 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
                          (unsigned long long)(now_us - self->stopped_us));
         }
     }
+    // A request before the first step after a stall finds the state of before it.
     if (state == IW_STATE_STOPPING && oracle_elapsed(now_us, self->stopped_us, HOLD_MAX_US + oracle_us(1300)) &&
-        now_us - self->late_us > oracle_us(1000)) {
+        now_us - self->late_us > oracle_us(1000) && now_us - self->step_us < GAP_US) {
         oracle_break(self, now_us, 507, "STOPPING without end");
     }
     if (state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway)) {
-        self->wheel[IW_LEFT].sent_us = self->wheel[IW_RIGHT].sent_us = IW_NEVER;
+        forget_sent(self, now_us);
     }
     // The dead process may have left two of each wheel in its controller.
     const bool other = self->foreign > 4U;

@@ -54,7 +54,7 @@ typedef struct {
     iw_client_t holder;
     iw_client_t pending_arm;
     iw_time_us_t arm_us;
-    iw_time_us_t drive_us;
+    iw_time_us_t armed_us;
     iw_time_us_t lease_until_us;
     iw_time_us_t ramp_us; ///< Since when the permission is over; IW_NEVER: it is not.
     iw_time_us_t nonzero_drive_us;
@@ -84,6 +84,13 @@ typedef struct {
     bool jump_now;
 } oracle_t;
 
+/// Whose request it is, when it was sent and when it came to the gateway.
+typedef struct {
+    iw_time_us_t now_us;
+    iw_time_us_t sent_us;
+    iw_client_t client;
+} oracle_asked_t;
+
 void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_us, bool restarted);
 
 void oracle_step_begin(oracle_t *self, iw_time_us_t now_us, iw_time_us_t promised_us);
@@ -102,8 +109,8 @@ void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fr
 
 /// Requests and their answers, right after them.
 void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover, iw_refusal_t result);
-void oracle_drive(oracle_t *self, iw_time_us_t now_us, iw_client_t client, const iw_drive_t *request,
-                  iw_refusal_t result, const iw_applied_t *applied);
+void oracle_drive(oracle_t *self, const oracle_asked_t *asked, const iw_drive_t *request, iw_refusal_t result,
+                  const iw_applied_t *applied);
 void oracle_stop(oracle_t *self, iw_time_us_t now_us, bool matters);
 void oracle_soft_estop(oracle_t *self, iw_time_us_t now_us);
 void oracle_reset(oracle_t *self, iw_time_us_t now_us, iw_state_t before, const iw_stop_t *stop);

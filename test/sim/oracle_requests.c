@@ -53,6 +53,7 @@ void oracle_arm(oracle_t *self, iw_time_us_t now_us, iw_client_t client, bool ta
         if (self->armed) {
             self->holder = client;
             self->fresh = false;
+            self->armed_us = now_us;
             self->lease_until_us = now_us + FIRST_LEASE_US;
         } else {
             self->pending_arm = client;
@@ -75,27 +76,35 @@ static void judge_applied(oracle_t *self, iw_time_us_t now_us, const iw_drive_t 
     }
 }
 
-void oracle_drive(oracle_t *self, iw_time_us_t now_us, iw_client_t client, const iw_drive_t *request,
-                  iw_refusal_t result, const iw_applied_t *applied) {
+void oracle_drive(oracle_t *self, const oracle_asked_t *asked, const iw_drive_t *request, iw_refusal_t result,
+                  const iw_applied_t *applied) {
+    const iw_time_us_t now_us = asked->now_us;
+    const iw_time_us_t sent_us = asked->sent_us;
     const int32_t *const speed = request->speed_mm_s;
     const bool in_range = abs(speed[0]) <= INT16_MAX + 1 && abs(speed[1]) <= INT16_MAX + 1;
     const bool current = self->config->current_role == IW_ROLE_SETPOINT && request->has_current &&
                          (request->current_mA[0] != 0 || request->current_mA[1] != 0);
     if (result == IW_REFUSE_NONE) {
-        if (!self->armed || client != self->holder || self->ramp_us != IW_NEVER || now_us >= self->lease_until_us) {
+        if (!self->armed || asked->client != self->holder || self->ramp_us != IW_NEVER ||
+            sent_us >= self->lease_until_us) {
             oracle_break(self, now_us, 331, "a drive was accepted without a lease");
+        }
+        if (sent_us < self->armed_us) {
+            oracle_break(self, now_us, 333, "a drive from before the arm was accepted");
         }
         if (!in_range) {
             oracle_break(self, now_us, 332, "a drive out of range was accepted");
         }
         judge_applied(self, now_us, request, applied);
+        // What was overtaken by a newer one takes nothing from it; the first one replaces what the arm granted.
+        const iw_time_us_t until_us = sent_us + oracle_us(self->config->lease_ms);
+        self->lease_until_us = (self->fresh && self->lease_until_us > until_us) ? self->lease_until_us : until_us;
         self->fresh = true;
-        self->drive_us = now_us;
-        self->lease_until_us = now_us + oracle_us(self->config->lease_ms);
         self->target = applied->pair;
     }
-    if (speed[0] != 0 || speed[1] != 0 || current) {
-        self->nonzero_drive_us = now_us;
+    const bool newer = self->nonzero_drive_us == IW_NEVER || sent_us > self->nonzero_drive_us;
+    if (newer && (speed[0] != 0 || speed[1] != 0 || current)) {
+        self->nonzero_drive_us = sent_us;
     }
     oracle_observe(self, now_us);
 }

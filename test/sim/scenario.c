@@ -139,8 +139,9 @@ static void draw_event(event_t *event, unsigned kind, sim_random_t *random) {
 static void draw_kind(scenario_t *self, unsigned kind, uint32_t number, sim_random_t *random) {
     for (uint32_t i = 0; i < number && self->count < SCENARIO_EVENTS; i++) {
         event_t *const event = &self->event[self->count++];
-        event->at_us =
-            sim_random_below(random, (uint32_t)(self->chaos_us / MS)) * (iw_time_us_t)MS + sim_random_below(random, MS);
+        // One draw a statement: C leaves open which part of an expression comes first.
+        event->at_us = sim_random_below(random, (uint32_t)(self->chaos_us / MS)) * (iw_time_us_t)MS;
+        event->at_us += sim_random_below(random, MS);
         draw_event(event, kind, random);
     }
 }

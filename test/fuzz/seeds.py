@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""What the fuzz targets begin with: by hand, and from what the product itself recorded (test/recordings)."""
+import collections
+import json
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+RECORDED = ROOT / "test/recordings/estop"
+IDS = (266, 298, 256, 288, 257, 289, 290, 512, 544, 513, 545)
+GATEWAY_IDS = (266, 298, 257, 289, 290, 512, 544, 513, 545, 600, 256, 288)
+ECHO = 1
+LINE = re.compile(r"\(([\d.]+)\) \S+ ([0-9A-F]+)#([0-9A-F]*)(?: ([RT]))?$")
+ODD_LINES = """(1760000000.000001) can0 100#00100000
+(1760000000.000120) can0 10A#010064 07D0 T
+(1760000000.000240) can0 10A#01006407D0 T
+(1.5) vcan0 1FFFFFFF#R8
+(1760000000.123456) can0 20000080#0000000000000000
+(1760000000.123456) can0 123##1112233 R
+# a comment
+"""
+
+
+def by_hand():
+    """{target: [bytes]}: also what a target must refuse."""
+    said = [line for path in (ROOT / "docs/northbound.md", ROOT / "README.md") for line in re.findall(r"\{\"[^`\n]*\}", path.read_text())]
+    drives = bytes([0, 1, 15, 1, 60, 1, 60, 11, 4, 0, 10, 11, 0, 10, 3, 232, 5, 3, 232, 5, 0, 40, 2, 200, 10, 0, 11, 2, 88, 9, 2, 88, 9, 0, 60])
+    return {
+        "codec": [bytes([n, 8, 0, *range(8)]) for n in range(len(IDS))] + [b"\xff\x80\x00\x01\x0a\x08\x00" + bytes(8)],
+        "gateway": [drives, drives + bytes([8, 0, 2, 1]) + drives, bytes([2]) + drives[1:]],
+        "request": [line.encode() for line in said] + [b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":-1,"id":"x"}'],
+        "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ngear_ratio = 3/2\n"],
+        "candump": [ODD_LINES.encode()],
+    }
+
+
+def frames():
+    """[(line, id, data, whether the gateway sent it)]"""
+    found = [(line, LINE.match(line)) for line in RECORDED.with_suffix(".log").read_text().splitlines()]
+    return [(line, int(match[2], 16), bytes.fromhex(match[3]), match[4] == "T") for line, match in found]
+
+
+def rows():
+    return [json.loads(line) for line in RECORDED.with_suffix(".jsonl").read_text().splitlines()]
+
+
+def some_of_each(number):
+    """Of each id the first frames that differ."""
+    seen = collections.defaultdict(dict)
+    for frame in frames():
+        if len(seen[frame[1]]) < number:
+            seen[frame[1]].setdefault(frame[2], frame)
+    return [frame for of_id in seen.values() for frame in of_id.values()]
+
+
+def codec():
+    """As take_frame() of fuzz_codec.c reads them: one by one, and a drive in its order."""
+    told = [bytes([IDS.index(number), len(data), ECHO if own else 0]) + data.ljust(8, b"\0") for _, number, data, own in some_of_each(6)]
+    return told + [b"".join(told)]
+
+
+def candump():
+    """The log in parts: where the gateway is silent, where it drives, where it stops."""
+    lines = [line for line, *_ in frames()]
+    first = next(at for at, frame in enumerate(frames()) if frame[3])
+    return ["\n".join(part).encode() for part in (lines[:20], lines[first - 5:first + 25], lines[-20:], [line for line, *_ in some_of_each(3)])]
+
+
+def request():
+    """What iwheelctl and the Python client say to a gateway."""
+    return [line.encode() for line in (RECORDED.parent / "requests.jsonl").read_text().splitlines()]
+
+
+def config():
+    return [RECORDED.with_suffix(".conf").read_bytes()]
+
+
+def put(number, data, own):
+    """A frame in the world of fuzz_gateway.c: an echo of what was sent, or one from the bus."""
+    if own:
+        return bytes([5, number == 298])
+    return bytes([6, 0, GATEWAY_IDS.index(number), len(data)]) + data.ljust(8, b"\0")
+
+
+def do(row):
+    """A request, or what the button says, in the world of fuzz_gateway.c."""
+    if row["type"] == "arm":
+        return bytes([10, 4])
+    if row["type"] == "drive":
+        return bytes([10, 0, 200]) + b"".join(row[side].to_bytes(2, "big", signed=True) + bytes([125]) for side in ("left_mm_s", "right_mm_s"))
+    if row["type"] == "estop_line":
+        return bytes([8, 2 if row["answer"] else 255])
+    return b""
+
+
+def windows():
+    """The parts of the recording in which something is decided, [(from, to)]: before arm until it drives, and about the stop."""
+    armed_us = next(row["t_us"] for row in rows() if row["type"] == "arm")
+    latched_us = next(row["t_us"] for row in rows() if row["type"] == "state" and row["state"] == "latched")
+    return (armed_us - 100_000, armed_us + 80_000), (latched_us - 40_000, latched_us + 10_000)
+
+
+def gateway():
+    """The recording as fuzz_gateway.c is told it: until it drives; and from there on to the stop."""
+    told, taken, done_us, seen, parts = bytes([0, 1, 15]), 0, None, frames(), []
+    for begin_us, end_us in windows():
+        for row in rows():
+            new = seen[taken:row.get("frames", 0)]
+            taken = max(taken, row.get("frames", 0))
+            if not begin_us <= row.get("t_us", 0) <= end_us:
+                done_us = None
+                continue
+            told += b"".join(put(number, data, own) for _, number, data, own in new[-16:]) + do(row)
+            if row["type"] == "step":
+                units = (row["t_us"] - (done_us or row["t_us"])) // 100
+                done_us = (done_us or row["t_us"]) + units * 100
+                told += bytes([2, min(units, 255)])
+        parts.append(told)
+        taken = 0
+    return parts
+
+
+def recorded():
+    """{target: [bytes]}: a target that does not take them has lost what it was for."""
+    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump()}
