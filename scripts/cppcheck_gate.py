@@ -1,32 +1,21 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""cppcheck with its MISRA C:2012 addon on the core; what scripts/misra_deviations.txt does not allow fails.
+"""cppcheck with its MISRA C:2012 addon on the core; what docs/static.md does not allow fails.
 
-usage: cppcheck_gate.py SOURCE... [-- DEVIATIONS_FILE]
+usage: cppcheck_gate.py SOURCE... [-- PAGE]
 
 Exit status 77 (skipped) with a cppcheck other than VERSION: each version of the addon finds and overlooks other things.
 """
-import fnmatch
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+from deviations import PAGE, rows_of
+
 ROOT = Path(__file__).resolve().parent.parent
 VERSION = "2.10"
 FINDING = re.compile(r"^(?P<file>[^:]+):(?P<line>\d+): (?P<id>[\w.-]+): (?P<message>.*)$")
-
-
-def read_deviations(path):
-    """[(number, finding, file pattern)]; a line without its reason is an error."""
-    rows = []
-    for line in path.read_text().splitlines():
-        if line.strip() and not line.startswith("#"):
-            fields = [field.strip() for field in line.split("|", 3)]
-            if len(fields) != 4 or not all(fields):
-                sys.exit(f"{path}: not \"number | finding | files | reason\": {line}")
-            rows.append(tuple(fields[:3]))
-    return rows
 
 
 def findings_of(sources):
@@ -44,7 +33,7 @@ def findings_of(sources):
 
 def main(arguments):
     sources, _, rest = " ".join(arguments[1:]).partition(" -- ")
-    deviations = read_deviations(Path(rest) if rest else ROOT / "scripts/misra_deviations.txt")
+    deviations = [row for row in rows_of(rest or ROOT / PAGE) if row.tool == "cppcheck"]
     if not sources:
         sys.exit(__doc__)
     version = subprocess.run(["cppcheck", "--version"], capture_output=True, text=True, check=True).stdout.split()[1]
@@ -54,15 +43,15 @@ def main(arguments):
     used, bad, total = set(), 0, 0
     for file, line, finding, message in findings_of(sources.split()):
         total += 1
-        row = next((row for row in deviations if row[1] == finding and fnmatch.fnmatch(file, row[2])), None)
+        row = next((row for row in deviations if row.covers("cppcheck", finding, file)), None)
         if row:
-            used.add(row[0])
+            used.add(row.number)
         else:
             bad += 1
             print(f"{file}:{line}: {finding}: {message.removesuffix(' (use --rule-texts=<file> to get proper output)')}")
-    idle = [row for row in deviations if row[0] not in used] if not rest else []
+    idle = [row for row in deviations if row.number not in used] if not rest else []
     for row in idle:
-        print(f"deviation {row[0]} ({row[1]}) is not needed any more: delete it")
+        print(f"deviation {row.number} ({row.what}) is not needed any more: delete it")
     print(f"{total} findings, {total - bad} allowed by {len(used)} deviations, {bad} not allowed")
     return 1 if bad or idle else 0
 

@@ -11,6 +11,7 @@ import contextlib
 import importlib.machinery
 import importlib.util
 import io
+import json
 import re
 import shutil
 import subprocess
@@ -75,8 +76,12 @@ def warnings(folder, code, compiler="gcc"):
 
 
 def analyzer(folder, code):
-    (folder / "planted.c").write_text(code)
-    return run("gcc", "-std=c99", "-O2", "-fanalyzer", "-Werror", "-c", folder / "planted.c", "-o", folder / "planted.o")
+    """A build that compiles one file of an application."""
+    (folder / "app").mkdir()
+    (folder / "app/planted.c").write_text(code)
+    command = f"gcc -std=c99 -O2 -o planted.o -c {folder / 'app/planted.c'}"
+    (folder / "compile_commands.json").write_text(json.dumps([{"file": str(folder / "app/planted.c"), "command": command}]))
+    return run(SCRIPTS / "analyzer_gate.py", "--root", folder, folder)
 
 
 def tidy(folder, code):
@@ -84,10 +89,18 @@ def tidy(folder, code):
     return run("clang-tidy", "--quiet", f"--config-file={ROOT / '.clang-tidy'}", folder / "planted.c", "--", "-std=c99")
 
 
-def cppcheck(folder, code, deviations="D1 | misra-c2012-8.4 | * | cppcheck 2.10 overlooks a declaration in the same file\n"):
+def cppcheck(folder, code):
     (folder / "planted.c").write_text(code)
-    (folder / "deviations.txt").write_text(deviations)
-    return run(SCRIPTS / "cppcheck_gate.py", folder / "planted.c", "--", folder / "deviations.txt")
+    (folder / "page.md").write_text("| D1 | cppcheck | `misra-c2012-8.4` | `*` | cppcheck 2.10 overlooks a declaration in the same file |\n")
+    return run(SCRIPTS / "cppcheck_gate.py", folder / "planted.c", "--", folder / "page.md")
+
+
+def deviations(folder, fault):
+    """A tree whose page is true, and one change of it: file, what stands there, what stands there then."""
+    for name, text in DEVIATING.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text.replace(*fault[1:]) if name == fault[0] else text)
+    return run(SCRIPTS / "deviations.py", folder)
 
 
 def eva(folder, code):
@@ -162,6 +175,12 @@ RECURSION = "int take(int);\nint iw_g(int n);\nint iw_g(int n) { return n > 1 ? 
 SOME_INDEX = "int main(void) {{ int a[2] = {{1, 2}}; return a[Frama_C_interval(0, {})]; }}\n"
 SOME_FOUR = "f(0, 0); f(1, 0); f(1, 1);"
 
+DEVIATING = {
+    "docs/static.md": "| D1 | cppcheck | `zero` | `*` | for cppcheck to judge |\n| D2 | clang-tidy | `cert-x` | `.clang-tidy` | a reason |\n",
+    ".clang-tidy": "Checks: >\n  -*,\n  cert-*,\n  -cert-x,\n",
+    "core/a.c": CLEAN,
+}
+
 # gate, its tool, what is planted, argument, must it be caught
 CASES = [
     (purity, "arm-none-eabi-gcc", "clean", CLEAN, False),
@@ -197,6 +216,13 @@ CASES = [
     (cppcheck, "cppcheck", "clean", CLEAN, False),
     (cppcheck, "cppcheck", "index out of bounds", "int f(void);\nint f(void)\n{\n    int a[2] = {1, 2};\n    return a[2];\n}\n", True),
     (cppcheck, "cppcheck", "MISRA 15.1, goto", "int f(int a)\n{\n    if (a > 0) {\n        goto out;\n    }\nout:\n    return a;\n}\n", True),
+    (deviations, "python3", "clean", ("", "", ""), False),
+    (deviations, "python3", "a switch-off without a number", (".clang-tidy", "-cert-x,", "-cert-x,\n  -cert-y,"), True),
+    (deviations, "python3", "a number without use", (".clang-tidy", "  -cert-x,\n", ""), True),
+    (deviations, "python3", "a comment that silences a tool", ("core/a.c", "a + 1;", "a + 1; // NOLINT"), True),
+    (deviations, "python3", "a compiler told to be silent", ("core/a.c", "int iw_f", '#pragma GCC diagnostic ignored "-Wall"\nint iw_f'), True),
+    (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
+    (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
     (style, "lizard", "clean", CLEAN, False),
     (style, "lizard", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), True),
     (style, "lizard", "complexity 12", function("    if (a == 1) {\n        a++;\n    }\n" * 11 + "    return a;\n"), True),
