@@ -84,6 +84,7 @@ typedef struct gw_daemon {
     bool clients_waiting;  ///< The last round did not reach everybody.
     bool lines_waiting;    ///< The same of sending.
     bool requested;        ///< A request has changed something since the last step.
+    bool frames_wait;      ///< The bus wakes nobody for now: its frames are taken together.
     uint32_t link_changes; ///< What of the link was last passed on.
     iw_link_purge_t purge_told;
     bool link_known;

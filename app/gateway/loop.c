@@ -22,6 +22,8 @@
 /// While setpoints leave, the e-stop is looked at this often even if nothing else wakes us: a GPIO chip that goes wakes nobody.
 #define ESTOP_LOOK_US 4000U
 #define BOX_LOOK_US   100000U
+/// While nobody is told of frames and nothing is sent, they may wait this long and be taken together.
+#define FRAMES_WAIT_MS 5
 
 static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
@@ -136,6 +138,29 @@ static void arm_timer(gw_daemon_t *daemon) {
     (void)gw_wakeup_by(&daemon->wakeup, earlier(next_us, look_us(daemon)));
 }
 
+/// Frames are worth waking for, unless they keep coming and nobody has any use for them at once: no client is there, and no
+/// setpoint or stop is under way. The e-stop and whoever connects wake us as ever, and then the bus is read first.
+static bool frames_may_wait(const gw_daemon_t *daemon) {
+    const bool all_taken = daemon->tapped < GW_FRAMES;
+    return daemon->tapped > 0U && all_taken && daemon->clients == 0U && !gw_daemon_is_sending(daemon);
+}
+
+static void heed_bus(gw_daemon_t *daemon) {
+    const bool may_wait = frames_may_wait(daemon);
+    struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
+    if (may_wait != daemon->frames_wait &&
+        epoll_ctl(daemon->epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->hal), &interest) == 0) {
+        daemon->frames_wait = may_wait;
+    }
+}
+
+static int wait_ms(const gw_daemon_t *daemon) {
+    if (gw_service_is_busy(daemon)) {
+        return 0;
+    }
+    return daemon->frames_wait ? FRAMES_WAIT_MS : -1;
+}
+
 /// Notes what the wait has found; nothing is done about it yet.
 static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     switch (event->data.u64) {
@@ -187,6 +212,7 @@ static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
         gw_service_accept(daemon);
     }
     listen_to_writer(daemon);
+    heed_bus(daemon);
     gw_observe_frames(daemon);
     gw_observe_periodic(daemon);
     gw_service_flush(daemon);
@@ -199,7 +225,7 @@ int gw_loop_run(gw_daemon_t *daemon) {
     while (!has_come_to_rest(daemon)) {
         struct epoll_event events[EVENTS_PER_WAIT];
         arm_timer(daemon);
-        const int count = epoll_wait(daemon->epoll_fd, events, EVENTS_PER_WAIT, gw_service_is_busy(daemon) ? 0 : -1);
+        const int count = epoll_wait(daemon->epoll_fd, events, EVENTS_PER_WAIT, wait_ms(daemon));
         if (count < 0 && errno != EINTR) {
             return errno;
         }

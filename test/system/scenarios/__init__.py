@@ -15,5 +15,6 @@ from . import (
     tool,
     wheels,
     ledger,
+    frames_together,
     memory,
 )  # noqa: F401

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""Frames that nobody waits for are taken together; as soon as somebody does, each wakes the gateway."""
+
+import time
+
+from harness import now_us
+from scenario import scenario
+
+WATCHED_S = 1.5
+TOGETHER = 0.6  # wakes for a frame, at most: three frames of the wheels fall into 5 ms
+APART = 1.5  # times as many as that with a client, at least
+
+
+def wakes(gateway):
+    with open(f"/proc/{gateway.child.pid}/status", encoding="ascii") as file:
+        return next(int(line.split()[1]) for line in file if line.startswith("voluntary_ctxt_switches"))
+
+
+def wakes_per_frame(rig):
+    since_us, before = now_us(), wakes(rig.gateway)
+    time.sleep(WATCHED_S)
+    slept, frames = wakes(rig.gateway) - before, sum(f.t_us >= since_us for f in list(rig.bus.frames))
+    return slept / max(frames, 1), frames
+
+
+@scenario("without a client frames are taken together; for a client each wakes the gateway, and it drives as ever", 8)
+def frames_taken_together(t):
+    rig, client = t.running()
+    client.close()
+    time.sleep(0.3)
+    alone, frames = wakes_per_frame(rig)
+    t.check(frames > 300 * WATCHED_S, f"{frames} frames of telemetry in {WATCHED_S} s")
+    t.check(alone <= TOGETHER, f"{alone:.2f} wakes for a frame that nobody waits for")
+    client = rig.client()
+    received = client.request("status")["counters"]["received"]
+    t.check(received > frames, f"{received} frames received, {frames} were on the bus")
+    watched, _ = wakes_per_frame(rig)
+    t.check(watched >= APART * alone, f"{watched:.2f} wakes for a frame beside a client, {alone:.2f} without", timing=True)
+    t.figure(f"{alone:.2f} wakes for a frame, {watched:.2f} beside a client")
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.8)
+    client.request("stop")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
+    t.judge(rig)
+
+
+@scenario("without a client and with a silent bus the gateway sleeps", 4)
+def frames_none(t):
+    rig, client = t.running()
+    client.close()
+    rig.sim.ask("mute both")
+    time.sleep(0.5)
+    before = wakes(rig.gateway)
+    time.sleep(1.0)
+    slept = wakes(rig.gateway) - before
+    t.check(slept <= 60, f"{slept} wakes in a second in which nothing happened")
+    t.figure(f"{slept} wakes in a second")
