@@ -129,7 +129,7 @@ def one(pair, client, watchers, hostile, seconds):
     return {"gap_p99": percentile([b - a for a, b in zip(at, at[1:])], 99), "cpu": share}
 
 
-def measure(pair, client_type, rounds=3, seconds=2.0):
+def measure(pair, client_type, rounds=3, seconds=6.0):
     """{(watchers, hostile): [figures of each round]}, in turns."""
     taken = {}
     client = client_type(pair.northbound)
