@@ -17,7 +17,7 @@ README_ROWS = {  # Of the page, and how the README says it.
     "its mean error, 617 frames/s": "mean error of the setpoint period, 617 frames/s of telemetry",
     "setpoint period, deviation p50, 617": "deviation of the setpoint period, p50, × leanest program",
     "21 000 frames/s: lost": "lost of a full bus, 21 000 frames/s",
-    "617 frames/s: system calls": "system calls for a frame, 617 frames/s",
+    "617 frames/s: system calls": "system calls for a frame, 617 frames/s, no client",
     "client's line to frame on the bus, p50": "client's line to frame on the bus, p50, × leanest program",
 }
 
@@ -60,8 +60,24 @@ def put_timed(rows):
         "ordinary process, with one processor, vcan and gpio-sim. There a system call costs much more than on bare metal, "
         "so that whoever calls less is further ahead; absolute times are worth nothing, ratios to the floor more. The floor is the leanest program that "
         "does only this (`test/bench/timed/floor_*.c`). Medians of three rounds; a turn beside which somebody who sleeps a millisecond was woken "
-        "10 ms late is repeated.",
+        "10 ms late is repeated. System calls are counted in virtual time, where each frame comes alone, however slowly they are traced.",
         "", *table(["", "floor", "gateway", "peers", "goal"], rows)])
+    put_readme()
+
+
+def put_timed_rows(rows):
+    """Of a part of the measures: each row takes the place of the one of its name, or stands at the end."""
+    before, section = PAGE.read_text().split(TIMED, 1)
+    body, _, after = section.partition("\n## ")
+    lines = body.rstrip().splitlines()
+    for row in rows:
+        new, head = table([], [row])[-1], f"| {row[0]} |"
+        at = next((number for number, line in enumerate(lines) if line.startswith(head)), None)
+        if at is None:
+            lines.append(new)
+        else:
+            lines[at] = new
+    PAGE.write_text(before + TIMED + "\n".join(lines) + "\n\n## " + after)
     put_readme()
 
 

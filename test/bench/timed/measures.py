@@ -168,7 +168,7 @@ class Flood(Measure):
 class Calls(Measure):
     """System calls for each frame of the wheels' telemetry; reading a clock is none where the kernel maps it."""
 
-    candidates = ("gateway", "candump", "python_can")
+    candidates = ("gateway", "attended", "candump", "python_can")
 
     def begin(self):
         self.around.start_wheels()
@@ -200,6 +200,17 @@ class Calls(Measure):
         try:
             return self.trace(self.around.gateway.child.pid)
         finally:
+            self.around.end_gateway()
+
+    def attended(self):
+        """The gateway while a client is connected, so that each frame is taken at once."""
+        self.around.start_gateway()
+        client = self.around.client()
+        time.sleep(1.0)
+        try:
+            return self.trace(self.around.gateway.child.pid)
+        finally:
+            client.close()
             self.around.end_gateway()
 
     def candump(self):
