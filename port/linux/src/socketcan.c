@@ -14,8 +14,10 @@
 /// An interface that is gone or down, and a controller that is bus-off, are looked at at least this often.
 #define RETRY_US 200000U
 /// Frames of unknown ids taken at once, after those of known ids, and how often: a full bus brings fewer in that time.
-#define OTHERS_AT_ONCE  128U
-#define OTHERS_EVERY_US 5000U
+#define OTHERS_AT_ONCE  256U
+#define OTHERS_EVERY_US 10000U
+/// So soon after a setpoint, and thus not right before the next one, which would come later than the one before.
+#define OTHERS_AFTER_SEND_US 3000U
 /// Batches of nothing but error frames taken in one step: a flood of them must not hold up the loop.
 #define ERROR_BATCHES_PER_STEP 8U
 #define LOAD_WINDOW_US         1000000U
@@ -304,6 +306,9 @@ static int can_send(void *self, const iw_can_frame_t *frame) {
     const int result = bus->up ? iw_socketcan_socket_send(&bus->ours, frame) : -1;
     if (result < 0 && bus->up) {
         lose(bus, ENETDOWN);
+    }
+    if (bus->others_us > bus->now_us + OTHERS_AFTER_SEND_US) {
+        bus->others_us = bus->now_us + OTHERS_AFTER_SEND_US;
     }
     return result;
 }
