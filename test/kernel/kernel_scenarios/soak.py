@@ -20,7 +20,8 @@ SETTLE_EPISODES = 40  # memory is compared from here on: every kind of fault has
 MEMORY_kB = 64
 SLOW = "10"  # speed frames every 40 ms instead of 4, while idle and in nine episodes of ten; as documented in the tenth
 STUCK_S = 20.0
-PAUSE_S, PAUSE_OF_A_DAY_S, DAY_H = 20.0, 80.0, 4.0  # of wheels that sleep; a soak longer than DAY_H has some hundred episodes of each kind anyway
+PAUSE_S, ASLEEP_S = 20.0, 40.0  # the longest, between two episodes; wheels that sleep cost hardly anything, and some nine episodes of each kind are left
+ASLEEP_OF_A_DAY_S, DAY_H = 80.0, 4.0  # a soak longer than DAY_H has some hundred of each kind anyway
 TURNING_mm_s = 100  # the left wheel is told to do more than that, so that every episode turns a wheel
 WHOLE_H = 0.5  # a soak of so long must have met every kind of fault, and have settled
 # Linux 6.1 has 512 line numbers, and never gives back those of a chip that went while one of its lines was held.
@@ -184,7 +185,8 @@ class Soak:
         asleep = self.chance.random() < 0.75
         if asleep:
             self.rig.sim.ask("mute both")
-        self.wait(0.1, PAUSE_OF_A_DAY_S if asleep and self.t.plan["hours"] > DAY_H else PAUSE_S)
+        longest_asleep_s = ASLEEP_OF_A_DAY_S if self.t.plan["hours"] > DAY_H else ASLEEP_S
+        self.wait(0.1, longest_asleep_s if asleep else PAUSE_S)
         if asleep:
             self.rig.sim.ask("unmute both")
             time.sleep(0.5)
