@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_linux/backend.h"
 
+#include "bus_load.h"
 #include "netdev.h"
 #include "netlink.h"
 #include "netlink_restart.h"
@@ -20,9 +21,6 @@
 #define OTHERS_AFTER_SEND_US 3000U
 /// Batches of nothing but error frames taken in one step: a flood of them must not hold up the loop.
 #define ERROR_BATCHES_PER_STEP 8U
-#define LOAD_WINDOW_US         1000000U
-/// Where the kernel does not report the bit rate, load is told as if it were the wheels'.
-#define BITRATE_ASSUMED_HZ 1000000U
 
 typedef struct {
     const char *name;
@@ -34,8 +32,7 @@ typedef struct {
     iw_time_us_t now_us;          ///< Of the last `tend`.
     iw_time_us_t look_us;         ///< When to look at the interface or its carrier again; IW_NEVER: no need.
     iw_time_us_t others_us;       ///< When to look at `others` again.
-    iw_time_us_t load_since_us;
-    uint64_t load_bits;
+    iw_bus_load_t load;
     iw_bus_state_t present;  ///< While up.
     iw_bus_state_t unheeded; ///< A loss that `state` has not told yet: IW_BUS_DOWN or IW_BUS_OFF; else IW_BUS_ACTIVE.
     uint32_t others_left;    ///< Until `others_us`.
@@ -132,8 +129,7 @@ static void try_up(socketcan_t *bus) {
     }
     bus->up = true;
     bus->link.lost = bus->ours.lost;
-    bus->load_bits = 0;
-    bus->load_since_us = bus->now_us;
+    iw_bus_load_begin(&bus->load, bus->now_us);
     note_state(bus, read_link(bus));
 }
 
@@ -179,7 +175,7 @@ static void fill_ours(socketcan_t *bus) {
             hear_error(bus, iw_can_error_of(raw), (ours->flags[i] & MSG_DONTROUTE) != 0);
             ++errors;
         } else {
-            bus->load_bits += iw_socketcan_bits(raw);
+            bus->load.bits += iw_socketcan_bits(raw);
         }
     }
     if (ours->count == 0U) {
@@ -190,16 +186,6 @@ static void fill_ours(socketcan_t *bus) {
     if (ours->lost != lost) {
         bus->link.lost = ours->lost;
         bus->look_us = bus->now_us; // An error frame may be among them.
-    }
-}
-
-static void measure_load(socketcan_t *bus) {
-    const iw_time_us_t span_us = bus->now_us - bus->load_since_us;
-    if (span_us >= LOAD_WINDOW_US) {
-        const uint64_t rate_hz = bus->link.bitrate_hz != 0U ? bus->link.bitrate_hz : BITRATE_ASSUMED_HZ;
-        bus->link.load_permille = (uint32_t)(bus->load_bits * 1000000U / rate_hz * 1000U / span_us);
-        bus->load_bits = 0;
-        bus->load_since_us = bus->now_us;
     }
 }
 
@@ -294,7 +280,7 @@ static void can_tend(void *self, iw_time_us_t now_us) {
     if (bus->up && now_us >= bus->look_us) {
         look_at_carrier(bus);
     }
-    measure_load(bus);
+    (void)iw_bus_load_take(&bus->load, now_us, bus->link.bitrate_hz, &bus->link.load_permille);
 }
 
 static iw_time_us_t can_next_us(const void *self) {
@@ -349,7 +335,7 @@ static bool take_others(socketcan_t *bus, iw_can_frame_t *out_frame) {
         bus->others_left = 0;
         return false;
     }
-    bus->load_bits += iw_socketcan_bits(&others->frame[others->next - 1U]);
+    bus->load.bits += iw_socketcan_bits(&others->frame[others->next - 1U]);
     --bus->others_left;
     return true;
 }
