@@ -370,6 +370,6 @@ const sim_command_t sim_wheel_commands[] = {
     {"battery", "DECIVOLT", "supply without load, 0..255 (248)", set_battery, 2U, 2U, SIM_CHANGED},
     {"ambient", "DEGC", "temperature around, -40..255 (28)", set_ambient, 2U, 2U, SIM_CHANGED},
     {"loss", "PERCENT", "of telemetry and setpoints is lost", set_loss, 2U, 2U, SIM_CHANGED},
-    {"slow", "FACTOR", "all telemetry periods times 0.1..1000", set_slow, 2U, 2U, SIM_CHANGED},
+    {"slow", "FACTOR", "telemetry periods (not offset frames) times 0.1..1000", set_slow, 2U, 2U, SIM_CHANGED},
 };
 const unsigned sim_wheel_command_count = sizeof sim_wheel_commands / sizeof sim_wheel_commands[0];

@@ -192,27 +192,31 @@ static void watch_silence(iw_gateway_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// Once per stop while zeros are held; in silence for an echo that will never come, though wheels could acknowledge. (A
-/// stalled send has ended everything else.)
-static bool wants_purge(const iw_gateway_t *self, iw_time_us_t now_us, iw_time_us_t waiting_us) {
-    if (self->permit.holding) {
-        return self->purged_stop != self->permit.stop.number;
-    }
-    const iw_time_us_t since_us = (self->purged_us > waiting_us) ? self->purged_us : waiting_us;
-    return now_us - since_us >= IW_GATEWAY_LOST_ECHO_US && iw_wheel_heard(&self->wheel[IW_LEFT], now_us) &&
-           iw_wheel_heard(&self->wheel[IW_RIGHT], now_us);
-}
-
-static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us) {
+/// How long a setpoint has waited for its echo, if too long; else 0.
+static iw_time_us_t overdue_us(const iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t waiting_us = iw_outbox_waiting_us(&self->sender.outbox);
     if (waiting_us == IW_NEVER || now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
+        return 0;
+    }
+    return now_us - waiting_us;
+}
+
+static int ask_back(iw_gateway_t *self) {
+    const int answer = iw_sender_purge(&self->sender);
+    self->counters.purges += (answer > 0) ? 1U : 0U;
+    return answer;
+}
+
+/// Once per stop the port is asked for what its zeros would wait behind. (A stalled send has ended everything else.)
+static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us) {
+    const iw_time_us_t waited_us = overdue_us(self, now_us);
+    if (waited_us == 0U) {
         return;
     }
-    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SEND_STALLED, IW_SIDES_NONE, whole_ms(now_us - waiting_us));
-    if (wants_purge(self, now_us, waiting_us)) {
-        self->purged_us = now_us;
+    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SEND_STALLED, IW_SIDES_NONE, whole_ms(waited_us));
+    if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE && self->purged_stop != self->permit.stop.number) {
         self->purged_stop = self->permit.stop.number;
-        self->counters.purges += iw_sender_purge(&self->sender) ? 1U : 0U;
+        (void)ask_back(self);
     }
 }
 
@@ -301,12 +305,36 @@ static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
     return result;
 }
 
+/// Silence must be silent: what is still in a controller is repeated until a wheel has power to acknowledge it. Whether
+/// one is heard is no argument: without acknowledgement none is. An echo that is only late by the bus is given its time,
+/// and one that was received may stand in the backlog.
+static void keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
+    iw_sender_rest(&self->sender);
+    if (overdue_us(self, now_us) == 0U) {
+        self->left_behind = false;
+        return;
+    }
+    const bool again = self->purged_us != IW_NEVER;
+    if (self->backlog || (again && now_us - self->purged_us < IW_GATEWAY_LOST_ECHO_US)) {
+        return;
+    }
+    const bool was_left = self->left_behind;
+    const int answer = ask_back(self);
+    self->purged_us = now_us;
+    self->left_behind = answer < 0 || (answer == 0 && again);
+    self->counters.left_behind += (self->left_behind && !was_left) ? 1U : 0U;
+}
+
 void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_demand_t demand = iw_permit_demand(&self->permit);
     iw_setpoint_demand(&self->setpoint, now_us, demand);
     if (demand == IW_DEMAND_SILENCE) {
-        iw_sender_rest(&self->sender);
-    } else if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
+        keep_silent(self, now_us);
+        return;
+    }
+    self->purged_us = IW_NEVER;
+    self->left_behind = false;
+    if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
         iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
         (void)send_pair(self, now_us);

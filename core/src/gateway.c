@@ -36,6 +36,7 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     self->hal = *hal;
     self->promised_us = now_us;
     self->pose_us = IW_NEVER;
+    self->purged_us = IW_NEVER;
     for (size_t side = 0; side < IW_SIDES; side++) {
         iw_wheel_init(&self->wheel[side], &self->config, (iw_side_t)side, now_us);
         iw_force_init(&self->force[side], &self->config, (iw_side_t)side);

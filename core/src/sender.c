@@ -83,10 +83,10 @@ void iw_sender_rest(iw_sender_t *self) {
     iw_outbox_rest(&self->outbox);
 }
 
-bool iw_sender_purge(iw_sender_t *self) {
-    if (self->hal->purge(self->hal->context) <= 0) {
-        return false;
+int iw_sender_purge(iw_sender_t *self) {
+    const int answer = self->hal->purge(self->hal->context);
+    if (answer > 0) {
+        iw_outbox_clear(&self->outbox);
     }
-    iw_outbox_clear(&self->outbox);
-    return true;
+    return answer;
 }

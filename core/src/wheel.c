@@ -9,6 +9,9 @@
 
 /// mm/s are nm/us.
 IW_STATIC_ASSERT(FASTEST_NM_PER_US == 10000U, one_mm_per_s_is_one_nm_per_us);
+IW_STATIC_ASSERT(IW_WHEEL_OFFSET_BACK_US > IW_WHEEL_OFFSET_LEARN_US + 2U * IW_WHEEL_OFFSET_PERIOD_US,
+                 a_start_is_no_reboot);
+IW_STATIC_ASSERT(IW_WHEEL_OFFSET_BACK_US >= 5U * IW_WHEEL_OFFSET_PERIOD_US, four_frames_may_be_lost);
 
 static uint32_t silent_us(const iw_wheel_t *self) {
     return (uint32_t)self->config->wheel_silent_ms * IW_US_PER_MS;
@@ -35,6 +38,7 @@ static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence
     self->pending_reboot = evidence;
     self->reboots++;
     self->first_us = now_us;
+    self->offset_us = now_us;
     self->boot_seen = true;
     self->status_us = IW_NEVER;
 }
@@ -45,6 +49,7 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
     self->any_us = now_us;
     if (self->first_us == IW_NEVER) {
         self->first_us = now_us;
+        self->offset_us = now_us;
         self->boot_seen = was_away;
     } else if (was_away) {
         rebooted(self, now_us, IW_REBOOT_SILENCE);
@@ -86,14 +91,22 @@ static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_st
     self->status_us = now_us;
 }
 
+/// Not excused by a stall of ours: what started anew behind our back has only this to tell of it.
+static void hear_offset(iw_wheel_t *self, iw_time_us_t now_us) {
+    if (now_us - self->offset_us >= IW_WHEEL_OFFSET_BACK_US) {
+        rebooted(self, now_us, IW_REBOOT_OFFSET_FRAMES);
+    }
+    self->offset_us = now_us;
+}
+
 void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message_t *message, bool fresh) {
     note_presence(self, now_us);
     if (message->kind == IW_PROTO_SPEED) {
         hear_speed(self, now_us, &message->as.speed, fresh);
     } else if (message->kind == IW_PROTO_STATUS) {
         hear_status(self, now_us, &message->as.status);
-    } else if (message->kind == IW_PROTO_OFFSET && now_us - self->first_us > IW_WHEEL_OFFSET_WINDOW_US) {
-        rebooted(self, now_us, IW_REBOOT_OFFSET_FRAMES);
+    } else if (message->kind == IW_PROTO_OFFSET) {
+        hear_offset(self, now_us);
     }
 }
 

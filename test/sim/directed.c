@@ -31,6 +31,7 @@ static void write_scenario(scenario_t *scenario, const babble_t *babble) {
     scenario->chaos_us = 8U * S;
     scenario->age_us = 100U * S;
     scenario->slow_permille = 1000;
+    scenario->offset_us = 60U * S;
     scenario->rx_depth = 2000;
     iw_config_default(&scenario->config);
     scenario->config.setpoint_type = 1;

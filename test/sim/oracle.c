@@ -6,12 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LATE_US     (20U * MS)
-#define STOP_US     (100U * MS)
-#define HUNG_US     (500U * MS)
-#define SETTLED_US  (500U * MS)
-#define HOLD_MAX_US (10000U * MS)
-#define DRAIN       512U
+#define LATE_US (20U * MS)
+#define STOP_US (100U * MS)
+#define HUNG_US (500U * MS)
+#define DRAIN   512U
+/// A pause of offset frames that tells of a reboot, and one that may.
+#define BACK_US       (6000U * MS)
+#define BACK_MAYBE_US (4900U * MS)
 
 bool oracle_elapsed(iw_time_us_t now_us, iw_time_us_t since_us, iw_time_us_t span_us) {
     return since_us != IW_NEVER && now_us - since_us >= span_us;
@@ -51,12 +52,13 @@ void oracle_start(oracle_t *self, const iw_gateway_t *gateway, iw_time_us_t now_
         oracle_break(self, now_us, 509, "no zeros for a process that died while it was sending");
     }
     self->late_us = now_us;
-    self->ramp_us = self->foreign_us = self->nonzero_drive_us = self->refused_us = IW_NEVER;
+    self->ramp_us = self->foreign_us = self->nonzero_drive_us = self->refused_us = self->silent_us = IW_NEVER;
+    self->stops = gateway->permit.stop.number;
     self->bus_bad_us = now_us;
     for (size_t side = 0; side < IW_SIDES; side++) {
         oracle_wheel_t *const wheel = &self->wheel[side];
         wheel->fresh_us = wheel->rest_us = wheel->sent_us = wheel->tried_us = IW_NEVER;
-        wheel->against_us = wheel->faster_us = wheel->blocked_us = wheel->ticks_us = IW_NEVER;
+        wheel->against_us = wheel->faster_us = wheel->blocked_us = wheel->ticks_us = wheel->offset_us = IW_NEVER;
         wheel->accepted_zero = true;
     }
 }
@@ -90,7 +92,7 @@ void oracle_step_begin(oracle_t *self, iw_time_us_t now_us, iw_time_us_t promise
     self->late_stop = late_us >= STOP_US;
     self->hung = late_us > HUNG_US;
     self->taken = 0;
-    self->foreign_now = self->jump_now = false;
+    self->foreign_now = self->jump_now = self->back_now = self->may_be_back = false;
     self->was_arming = iw_gateway_arming(self->gateway);
     for (size_t side = 0; side < IW_SIDES; side++) {
         oracle_wheel_t *const wheel = &self->wheel[side];
@@ -162,6 +164,20 @@ static void hear_ticks(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *whee
     wheel->ticks_us = now_us;
 }
 
+/// Any telemetry of a wheel.
+static void hear_wheel(oracle_t *self, iw_time_us_t now_us, size_t side, bool offset) {
+    oracle_wheel_t *const wheel = &self->wheel[side];
+    if (wheel->offset_us == IW_NEVER || wheel->reboots != self->gateway->wheel[side].reboots) {
+        wheel->offset_us = now_us;
+        wheel->reboots = self->gateway->wheel[side].reboots;
+    }
+    if (offset) {
+        self->back_now = self->back_now || now_us - wheel->offset_us >= BACK_US;
+        self->may_be_back = self->may_be_back || now_us - wheel->offset_us >= BACK_MAYBE_US;
+        wheel->offset_us = now_us;
+    }
+}
+
 static void hear_echo(oracle_t *self, oracle_wheel_t *wheel) {
     (void)self;
     if (wheel->pending == 0U) {
@@ -187,8 +203,11 @@ void oracle_received(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *
         oracle_hard_stop(self);
     } else if ((frame->id == 256U || frame->id == 288U) && frame->dlc >= 4U && frame->dlc <= 8U) {
         hear_speed(self, now_us, wheel, word(frame->data));
+        hear_wheel(self, now_us, right ? IW_RIGHT : IW_LEFT, false);
     } else if ((frame->id == 257U || frame->id == 289U) && frame->dlc >= 7U && frame->dlc <= 8U) {
         hear_ticks(self, now_us, wheel, &frame->data[2]);
+    } else if ((frame->id == 513U || frame->id == 545U) && frame->dlc >= 2U && frame->dlc <= 8U) {
+        hear_wheel(self, now_us, right ? IW_RIGHT : IW_LEFT, true);
     }
 }
 
@@ -357,6 +376,17 @@ void oracle_sent(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fram
     }
 }
 
+/// Silence is silent: once the zeros have ended, what is not echoed in time is taken back in the next step.
+static void judge_silence(oracle_t *self, iw_time_us_t now_us, iw_time_us_t handed_us) {
+    const iw_time_us_t given_us = oracle_us(self->config->echo_ms) + oracle_us(self->config->period_ms) + 10U * MS;
+    const bool runs = now_us - self->step_us < oracle_us(self->config->period_ms) + 10U * MS &&
+                      now_us - self->late_us > given_us && self->taken < DRAIN;
+    if (self->purges && runs && oracle_elapsed(now_us, self->silent_us, given_us)) {
+        oracle_break(self, now_us, 607, "a setpoint of %llu us ago came out in silence although the port purges",
+                     (unsigned long long)(now_us - handed_us));
+    }
+}
+
 void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame, iw_time_us_t handed_us) {
     oracle_wheel_t *const wheel = &self->wheel[(frame->id == 298U) ? IW_RIGHT : IW_LEFT];
     const int32_t speed = word(&frame->data[1]);
@@ -364,6 +394,7 @@ void oracle_on_bus(oracle_t *self, iw_time_us_t now_us, const iw_can_frame_t *fr
     if (!self->proven) {
         return;
     }
+    judge_silence(self, now_us, handed_us);
     if (!zero && wheel->after_stale) {
         oracle_break(self, now_us, 604, "%d mm/s right behind an old frame", speed);
     }
@@ -408,7 +439,7 @@ static void judge_armed(oracle_t *self, iw_time_us_t now_us) {
     self->lease_until_us = now_us + FIRST_LEASE_US;
 }
 
-static bool rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_us) {
+bool oracle_rested(const oracle_t *self, iw_time_us_t now_us, iw_time_us_t span_us) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         const oracle_wheel_t *const wheel = &self->wheel[side];
         if (wheel->fresh_us == IW_NEVER ||
@@ -450,7 +481,7 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     }
     if (state == IW_STATE_LISTENING && self->state == IW_STATE_STOPPING && !self->restarting) {
         if (!oracle_elapsed(now_us, self->stopped_us, oracle_us(self->config->zero_hold_ms)) ||
-            (!rested(self, now_us, SETTLED_US) && !oracle_elapsed(now_us, self->stopped_us, HOLD_MAX_US))) {
+            (!oracle_rested(self, now_us, SETTLED_US) && !oracle_elapsed(now_us, self->stopped_us, HOLD_MAX_US))) {
             oracle_break(self, now_us, 506, "silent too early, %llu us after the stop",
                          (unsigned long long)(now_us - self->stopped_us));
         }

@@ -24,6 +24,8 @@ typedef struct {
     iw_time_us_t faster_us;
     iw_time_us_t blocked_us;
     iw_time_us_t ticks_us;
+    iw_time_us_t offset_us; ///< Last offset frame since it was found or is known to have rebooted, or that itself.
+    uint32_t reboots;       ///< That the gateway knows of.
     int32_t ticks;
     int32_t rpm;
     int32_t speed; ///< Last handed over, as on the bus.
@@ -65,6 +67,8 @@ typedef struct {
     bool latched_silent; ///< Latched while nothing was being sent.
     iw_time_us_t stopped_us;
     iw_time_us_t latched_us;
+    iw_time_us_t silent_us; ///< Since when zeros are no longer held; IW_NEVER: they are, or it drives.
+    uint32_t stops;
 
     int estop;
     iw_bus_state_t bus;
@@ -82,6 +86,8 @@ typedef struct {
     bool hung;
     bool foreign_now;
     bool jump_now;
+    bool back_now;    ///< Offset frames came back after a long pause,
+    bool may_be_back; ///< or after one of which nothing need follow.
 } oracle_t;
 
 /// Whose request it is, when it was sent and when it came to the gateway.

@@ -37,6 +37,19 @@ static void judge_latches(oracle_t *self, iw_time_us_t now_us, iw_state_t before
     if (sending && self->jump_now && state != IW_STATE_LATCHED) {
         oracle_break(self, now_us, 705, "not LATCHED although the odometry jumped");
     }
+    if (sending && self->back_now && state != IW_STATE_LATCHED) {
+        oracle_break(self, now_us, 711, "not LATCHED although offset frames came back");
+    }
+}
+
+/// Offset frames that never stopped are no reboot, however long they have been coming.
+static void judge_reboot(oracle_t *self, iw_time_us_t now_us) {
+    const iw_stop_t *const stop = &self->gateway->permit.stop;
+    if (stop->number != self->stops && stop->cause == IW_CAUSE_WHEEL_REBOOTED &&
+        stop->detail == IW_REBOOT_OFFSET_FRAMES && !self->may_be_back) {
+        oracle_break(self, now_us, 712, "stopped for offset frames that had never stopped");
+    }
+    self->stops = stop->number;
 }
 
 static bool since(iw_time_us_t *since_us, iw_time_us_t now_us, bool condition, uint32_t span_ms) {
@@ -139,9 +152,25 @@ static void judge_estop_zero(oracle_t *self, iw_time_us_t now_us, iw_state_t bef
     }
 }
 
+/// Zeros end as the rules say; in LATCHED the state does not tell. As in the step itself: between two the wheels may be lost.
+static void watch_silence(oracle_t *self, iw_time_us_t now_us) {
+    const iw_state_t state = iw_gateway_state(self->gateway);
+    const bool listening = state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway);
+    const bool silent = self->silent_us != IW_NEVER && self->silent_us > self->latched_us;
+    const bool held = oracle_elapsed(now_us, self->latched_us, oracle_us(self->config->zero_hold_ms));
+    const bool ended = (held && oracle_rested(self, now_us, SETTLED_US)) ||
+                       oracle_elapsed(now_us, self->latched_us, HOLD_MAX_US + oracle_us(100));
+    if (listening || (state == IW_STATE_LATCHED && (self->latched_silent || ended || silent))) {
+        self->silent_us = (self->silent_us == IW_NEVER) ? now_us : self->silent_us;
+    } else {
+        self->silent_us = IW_NEVER;
+    }
+}
+
 void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t before = self->state;
     judge_latches(self, now_us, before);
+    judge_reboot(self, now_us);
     if (self->armed && now_us >= self->lease_until_us) {
         oracle_soft_stop(self, self->lease_until_us);
     }
@@ -149,6 +178,7 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
         oracle_break(self, now_us, 508, "no longer LATCHED although nobody asked for a reset");
     }
     oracle_observe(self, now_us);
+    watch_silence(self, now_us);
     judge_wheels(self, now_us);
     judge_gaps(self, now_us);
     judge_pair(self, now_us);

@@ -422,6 +422,7 @@ static void begin(rig_t *rig, const scenario_t *scenario) {
     pair.age_us = scenario->age_us;
     for (size_t side = 0; side < IW_SIDES; side++) {
         pair.wheel[side].motion.current_is_setpoint = setpoint;
+        pair.wheel[side].offset_us = scenario->offset_us;
     }
     rig->now_us = SCENARIO_START_US;
     rig->fault_end_us = IW_NEVER;

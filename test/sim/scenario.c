@@ -25,7 +25,7 @@ static const draw_t draws[EV_KINDS] = {
     [EV_BUS_DOWN] = {"bus down", 1 * MS, 2 * S, 0, 0, 1},
     [EV_BUS_OFF] = {"bus-off", 1 * MS, 2 * S, 0, 0, 1},
     [EV_PASSIVE] = {"error passive", 1 * MS, 2 * S, 0, 0, 1},
-    [EV_NO_ACK] = {"nobody acknowledges", 1 * MS, 3 * S, 0, 0, 1},
+    [EV_NO_ACK] = {"nobody acknowledges", 1 * MS, 14 * S, 0, 0, 1},
     [EV_BUS_STALL] = {"bus takes no frame", 1 * MS, 1 * S, 0, 0, 1},
     [EV_TX_FULL] = {"port takes no frame", 1 * MS, 1 * S, 0, 0, 1},
     [EV_TX_RIGHT] = {"port takes no frame for the right", 1 * MS, 1 * S, 0, 0, 1},
@@ -38,7 +38,7 @@ static const draw_t draws[EV_KINDS] = {
     [EV_ODD_FRAMES] = {"odd frames", 0, 0, 1, 20, 1},
     [EV_MUTE] = {"wheel silent", 5 * MS, 2 * S, 0, 0, 2},
     [EV_REBOOT] = {"wheel reboots", 0, 0, 3 * MS, 800 * MS, 2},
-    [EV_POWER] = {"wheels without power", 20 * MS, 4 * S, 0, 0, 1},
+    [EV_POWER] = {"wheels without power", 20 * MS, 14 * S, 0, 0, 1},
     [EV_LOSS] = {"wheel loses frames", 100 * MS, 5 * S, 10, 950, 2},
     [EV_SWAP] = {"wheel reports the wrong sign", 100 * MS, 5 * S, 0, 0, 2},
     [EV_BLOCK] = {"wheel blocked", 100 * MS, 5 * S, 0, 0, 2},
@@ -180,6 +180,10 @@ void scenario_draw(scenario_t *self, uint64_t seed) {
     self->can_purge = chance(&random, 50);
     self->echo_early = chance(&random, 10);
     self->requests_first = chance(&random, 50);
+    self->offset_us = 60U * (iw_time_us_t)S;
+    if (chance(&random, 40)) {
+        self->offset_us = chance(&random, 50) ? IW_NEVER : between(&random, 50, 120) * (iw_time_us_t)S;
+    }
     draw_config(self, &random);
     const uint32_t minutes4 = (uint32_t)(self->chaos_us / (15U * S)) + 1U;
     const uint32_t rate = between(&random, 1, 3);
@@ -194,14 +198,17 @@ void scenario_draw(scenario_t *self, uint64_t seed) {
 
 void scenario_print(const scenario_t *self, FILE *out) {
     const iw_config_t *const c = &self->config;
-    fprintf(out,
-            "seed %llu: period %u ms, lease %u ms, accel %u mm/s2, decel %u mm/s2, max %u mm/s %u mA, hold %u ms, "
-            "silent %u ms, echo %u ms, current %s, invert %d %d, telemetry x%u, wake-up within %u us%s%s%s\n",
-            (unsigned long long)self->seed, c->period_ms, c->lease_ms, c->accel_mm_s2, c->decel_mm_s2,
-            c->max_speed_mm_s, c->max_current_mA, c->zero_hold_ms, c->wheel_silent_ms, c->echo_ms,
-            (c->current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint", c->invert[0], c->invert[1],
-            self->slow_permille / 1000U, self->wake_latency_us, self->can_purge ? ", purges" : "",
-            self->echo_early ? ", echo unproven" : "", self->requests_first ? ", requests before step" : "");
+    fprintf(
+        out,
+        "seed %llu: period %u ms, lease %u ms, accel %u mm/s2, decel %u mm/s2, max %u mm/s %u mA, hold %u ms, "
+        "silent %u ms, echo %u ms, current %s, invert %d %d, telemetry x%u, offset frames for %d s, wake-up within %u "
+        "us%s%s%s\n",
+        (unsigned long long)self->seed, c->period_ms, c->lease_ms, c->accel_mm_s2, c->decel_mm_s2, c->max_speed_mm_s,
+        c->max_current_mA, c->zero_hold_ms, c->wheel_silent_ms, c->echo_ms,
+        (c->current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint", c->invert[0], c->invert[1],
+        self->slow_permille / 1000U, (self->offset_us == IW_NEVER) ? -1 : (int)(self->offset_us / S),
+        self->wake_latency_us, self->can_purge ? ", purges" : "", self->echo_early ? ", echo unproven" : "",
+        self->requests_first ? ", requests before step" : "");
     for (size_t i = 0; i < self->count; i++) {
         const event_t *const e = &self->event[i];
         fprintf(out, "  %11.6f s  %-34s", (double)(SCENARIO_START_US + e->at_us) / 1e6, draws[e->kind].name);

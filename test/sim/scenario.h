@@ -74,6 +74,7 @@ typedef struct {
     iw_time_us_t chaos_us;    ///< Events lie before this; then all is healed.
     uint64_t age_us;          ///< How long the wheels have been running already.
     uint32_t slow_permille;   ///< Factor of the telemetry's periods; 1000: as documented.
+    iw_time_us_t offset_us;   ///< How long wheels send offset frames; IW_NEVER: for ever.
     uint32_t wake_latency_us; ///< How late each wake-up may be.
     uint32_t rx_depth;        ///< Frames that the port's receive queue holds.
     bool can_purge;

@@ -160,19 +160,6 @@ static void test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_righ
     TEST_ASSERT_TRUE(rig.bus.last_us[IW_RIGHT] > right_us);
 }
 
-static void test_gateway_lost_echo_is_given_a_second_before_it_is_asked_back(void) {
-    gateway_rig_run(&rig, MS(1100));
-    rig.bus.acknowledged = false;
-    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
-    const iw_time_us_t second_us = iw_outbox_waiting_us(&rig.gateway.sender.outbox) + IW_GATEWAY_LOST_ECHO_US;
-    gateway_rig_run(&rig, second_us - 1U - rig.now_us);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
-    TEST_ASSERT_EQUAL_UINT32(0, rig.bus.purges);
-    gateway_rig_run(&rig, 1);
-    gateway_rig_step(&rig);
-    TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
-}
-
 /// Two seconds and a bit of force frames of the left wheel, turning at that speed.
 static void hear_force(int16_t raw, int16_t rpm) {
     const iw_proto_message_t message = {IW_PROTO_FORCE, IW_LEFT, {.force = {.force_raw = raw}}};
@@ -267,7 +254,6 @@ int main(void) {
     RUN_TEST(test_gateway_software_estop_names_no_wheel);
     RUN_TEST(test_gateway_arm_repeated_by_the_holder_moves_no_pair);
     RUN_TEST(test_gateway_currents_that_were_not_given_are_no_wish_to_move);
-    RUN_TEST(test_gateway_lost_echo_is_given_a_second_before_it_is_asked_back);
     RUN_TEST(test_gateway_force_is_measured_at_rest_up_to_rest_rpm);
     RUN_TEST(test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator);
     RUN_TEST(test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen_starting);

@@ -241,20 +241,96 @@ static void test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen
     TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
 }
 
-static void test_wheel_offset_frames_after_their_time_tell_of_a_reboot(void) {
-    hear(0);
-    hear_for(MS(61000), 0);
-    hear_other(IW_PROTO_OFFSET);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
-    now_us += 1;
-    hear_other(IW_PROTO_OFFSET);
-    TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
-    for (uint32_t n = 0; n < 60; n++) {
-        hear_for(MS(1000), 0);
+/// Offset frames every `period_us`, so many of them, with speed frames between; none may tell of a reboot.
+static void hear_offsets(uint32_t number, iw_time_us_t period_us) {
+    for (uint32_t n = 0; n < number; n++) {
+        hear_for(period_us, 0);
         hear_other(IW_PROTO_OFFSET);
         TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     }
-    TEST_ASSERT_EQUAL_UINT32(1, wheel.reboots);
+}
+
+static void test_wheel_offset_frames_that_never_stop_tell_of_no_reboot(void) {
+    hear(0);
+    hear_for(IW_WHEEL_OFFSET_LEARN_US, 0);
+    hear_offsets(200, IW_WHEEL_OFFSET_PERIOD_US);
+    TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
+}
+
+static void test_wheel_offset_frames_of_which_four_in_a_row_are_lost_tell_of_no_reboot(void) {
+    hear(0);
+    hear_offsets(30, 5U * IW_WHEEL_OFFSET_PERIOD_US - 1U);
+    TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
+}
+
+static void test_wheel_found_in_the_middle_of_its_offset_frames_has_not_rebooted(void) {
+    static const uint32_t ages_s[] = {3, 30, 59};
+    for (size_t i = 0; i < 3; i++) {
+        begin();
+        now_us += MS(10);
+        hear(0);
+        hear_offsets(60U - ages_s[i], IW_WHEEL_OFFSET_PERIOD_US);
+        hear_for(MS(120000), 0);
+        TEST_ASSERT_EQUAL_UINT32(0, wheel.reboots);
+    }
+}
+
+static void test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_microsecond(void) {
+    static const uint32_t heard_s[] = {1, 10, 58, 61,
+                                       300}; // Also long before a gateway that started late could know of 60 s.
+    for (size_t i = 0; i < 5; i++) {
+        for (iw_time_us_t early_us = 0; early_us < 2; early_us++) {
+            begin();
+            hear(0);
+            hear_offsets(heard_s[i], IW_WHEEL_OFFSET_PERIOD_US);
+            hear_for(IW_WHEEL_OFFSET_BACK_US - early_us, 0);
+            hear_other(IW_PROTO_OFFSET);
+            TEST_ASSERT_EQUAL_INT(early_us ? IW_REBOOT_NONE : IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
+            hear_offsets(60, IW_WHEEL_OFFSET_PERIOD_US);
+            TEST_ASSERT_EQUAL_UINT32(early_us ? 0 : 1, wheel.reboots);
+        }
+    }
+}
+
+static void test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends_offset_frames(void) {
+    hear(0);
+    hear_for(IW_WHEEL_OFFSET_BACK_US - 1U, 0);
+    hear_other(IW_PROTO_OFFSET); // So soon it may just have started.
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
+    begin();
+    hear(0);
+    hear_for(IW_WHEEL_OFFSET_BACK_US, 0);
+    hear_other(IW_PROTO_OFFSET);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
+    TEST_ASSERT_TRUE(wheel.boot_seen);
+}
+
+/// What the offset frames of a reboot within the wheel's first minute no longer tell, its silence or its odometry do.
+static void test_wheel_reboot_among_its_offset_frames_is_told_by_silence_or_odometry(void) {
+    hear(0);
+    hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
+    now_us += IW_WHEEL_REBOOT_SILENCE_US;
+    hear(0);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_SILENCE, iw_wheel_take_reboot(&wheel));
+    hear_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
+    hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
+    hear_status(100000);
+    hear_for(MS(400), 0);
+    hear_status(0);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_ODOMETRY, iw_wheel_take_reboot(&wheel));
+    hear_for(IW_WHEEL_OFFSET_LEARN_US + IW_WHEEL_OFFSET_PERIOD_US, 0);
+    hear_offsets(20, IW_WHEEL_OFFSET_PERIOD_US);
+    TEST_ASSERT_EQUAL_UINT32(2, wheel.reboots);
+}
+
+/// Nothing else may tell of what started anew while we did not run: silence then is excused.
+static void test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot(void) {
+    hear(0);
+    hear_offsets(3, IW_WHEEL_OFFSET_PERIOD_US);
+    now_us += IW_WHEEL_OFFSET_BACK_US;
+    iw_wheel_excuse(&wheel, now_us);
+    hear_other(IW_PROTO_OFFSET);
+    TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
 }
 
 static void test_wheel_other_frames_tell_of_no_reboot_however_late(void) {
@@ -296,7 +372,13 @@ int main(void) {
     RUN_TEST(test_wheel_that_sends_anything_is_not_silent);
     RUN_TEST(test_wheel_silence_of_our_own_stall_is_no_reboot);
     RUN_TEST(test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen);
-    RUN_TEST(test_wheel_offset_frames_after_their_time_tell_of_a_reboot);
+    RUN_TEST(test_wheel_offset_frames_that_never_stop_tell_of_no_reboot);
+    RUN_TEST(test_wheel_offset_frames_of_which_four_in_a_row_are_lost_tell_of_no_reboot);
+    RUN_TEST(test_wheel_found_in_the_middle_of_its_offset_frames_has_not_rebooted);
+    RUN_TEST(test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_microsecond);
+    RUN_TEST(test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends_offset_frames);
+    RUN_TEST(test_wheel_reboot_among_its_offset_frames_is_told_by_silence_or_odometry);
+    RUN_TEST(test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot);
     RUN_TEST(test_wheel_other_frames_tell_of_no_reboot_however_late);
     RUN_TEST(test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew);
     return UNITY_END();

@@ -29,8 +29,7 @@
 #define IW_GATEWAY_STOP_US 100000U
 /// Later than this: LATCHED.
 #define IW_GATEWAY_HUNG_US 500000U
-/// A setpoint un-echoed for this long while nothing is sent and both wheels are heard was lost, not held up: the port
-/// is asked again to purge, not more often than this.
+/// While nothing is sent and a setpoint is overdue, the port is asked to purge at once, and then this often.
 #define IW_GATEWAY_LOST_ECHO_US 1000000U
 /// Frames taken in one step at the most. A full bus brings 21 in a millisecond.
 #define IW_GATEWAY_DRAIN_MAX 512U
@@ -52,6 +51,7 @@ typedef struct {
     uint32_t late_steps;   ///< Steps later than IW_GATEWAY_LATE_US.
     uint32_t out_of_range; ///< Drive requests refused for their values.
     uint32_t purges;       ///< Purges the port confirmed.
+    uint32_t left_behind;  ///< Times that a setpoint was left in a controller (see `iw_gateway_t`).
 } iw_counters_t;
 
 /// A drive request. Values are taken as they come: what does not fit is refused here.
@@ -81,13 +81,16 @@ typedef struct {
     iw_time_us_t suspended_us;     ///< Told since the last step.
     iw_time_us_t promised_us;      ///< When the last step asked to be called again.
     iw_time_us_t pose_us;          ///< IW_NEVER: none.
-    iw_time_us_t purged_us;        ///< When a purge was last tried.
-    uint32_t purged_stop;          ///< Number of the stop for which a purge was tried.
+    iw_time_us_t purged_us;        ///< When a purge was last tried in this silence; IW_NEVER: not yet.
+    uint32_t purged_stop;          ///< Number of the stop in whose zeros a purge was tried.
     iw_proto_pose_t pose;
     iw_bus_state_t bus;
     iw_bus_facts_t facts;
     bool backlog; ///< The last step left frames behind.
     bool stalled; ///< This step cannot tell when its frames came.
+    bool
+        left_behind; ///< Nothing is sent, but a setpoint is overdue and the port cannot take it back (it said so, or let
+                     ///< IW_GATEWAY_LOST_ECHO_US pass): it may leave when wheels get power.
 } iw_gateway_t;
 
 /// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros:

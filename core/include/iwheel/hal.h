@@ -29,8 +29,15 @@ typedef struct {
     /// call returns, no frame sent before the loss is queued any more.
     iw_bus_state_t (*bus_state)(void *context);
 
-    /// Takes back every setpoint that was handed over and is not on the bus yet. > 0: surely none is left; their
-    /// echoes never come. 0: cannot do that here, or not within the call: that it is done is told by a loss of the bus.
+    /// Takes back every setpoint that was handed over and is not on the bus yet, from every queue and mailbox that may
+    /// hold one: without acknowledgement a controller repeats it for ever, and sends it when wheels get power again.
+    /// > 0: surely none is left. None of them reaches the bus after the call, and no echo of any comes from `receive`
+    /// after it, also not of one that was sent while it was being taken back, or whose echo already waited.
+    /// 0: begun, or not done within the call (an abort that does not end in bounded time is left alone). What was taken
+    /// back then gives no echo, what was not still does. That the rest is gone is told by a loss of the bus, or by the
+    /// next call that returns > 0. < 0: cannot do that here.
+    /// Called once in the zeros of a stop, when a setpoint is not echoed in time; once when the zeros end and one still
+    /// is not; then every IW_GATEWAY_LOST_ECHO_US. Whether a wheel is heard does not matter.
     int (*purge)(void *context);
 
     /// 0: released, and was so without interruption since the last call. > 0: pressed, or any edge since the last

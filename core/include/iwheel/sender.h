@@ -44,7 +44,8 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw
 /// Nothing is being sent: gaps are measured anew from the next pair, and what was refused is forgotten.
 void iw_sender_rest(iw_sender_t *self);
 
-/// Asks the port to take back what is not on the bus; if it surely could, the account is cleared. True if so.
-bool iw_sender_purge(iw_sender_t *self);
+/// Asks the port to take back what is not on the bus; if it surely could, the account is cleared. The port's answer: see
+/// hal.h.
+int iw_sender_purge(iw_sender_t *self);
 
 #endif

@@ -8,8 +8,9 @@
 /// machine's, with `invert` applied, so that they can be compared with commands.
 ///
 /// A reboot is recognised by: silence of IW_WHEEL_REBOOT_SILENCE_US; odometry that jumps further than any wheel can
-/// turn; offset frames, which a wheel sends only in its first 60 s, from a wheel that has been heard for longer than
-/// that.
+/// turn; offset frames that come back. A wheel sends those from its start on for 60 s (document), so after a pause they
+/// tell of another start. How long they last is no evidence: a wheel may send them for longer, or for ever. Neither is
+/// our own first minute, since a gateway that starts late hears the rest of the wheel's.
 #ifndef IW_WHEEL_H
 #define IW_WHEEL_H
 
@@ -18,8 +19,12 @@
 
 /// Silent for this long, a wheel must be assumed to have been without power.
 #define IW_WHEEL_REBOOT_SILENCE_US 1000000U
-/// Offset frames end 60 s after the wheel's start (document); one period of slack.
-#define IW_WHEEL_OFFSET_WINDOW_US 61000000U
+/// Of the offset frames (document), and how long a wheel listens to its sensor before the first one.
+#define IW_WHEEL_OFFSET_PERIOD_US 1000000U
+#define IW_WHEEL_OFFSET_LEARN_US  2000000U
+/// Offset frames that come after this much of a run without any are back. Four may get lost in a row; and it is longer
+/// than a wheel needs for its first one, so that an ordinary start is none that begins twice. Ours.
+#define IW_WHEEL_OFFSET_BACK_US 5000000U
 /// No odometry step is faster than this: twice the highest configurable speed. Ours, not the document's.
 #define IW_WHEEL_FASTEST_MM_S 10000U
 /// Odometry steps up to this many ticks are believed whatever the time between them. Ours.
@@ -40,6 +45,7 @@ typedef enum {
 typedef struct {
     const iw_config_t *config;
     iw_time_us_t first_us;      ///< Heard without a reboot since; IW_NEVER: not heard yet.
+    iw_time_us_t offset_us;     ///< Last offset frame of this run, or its start.
     iw_time_us_t any_us;        ///< Last frame of any kind, or the end of our own stall, or the start.
     iw_time_us_t heard_us;      ///< Last speed frame that counted for liveness.
     iw_time_us_t speed_us;      ///< Last speed frame.

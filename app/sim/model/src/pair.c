@@ -7,8 +7,10 @@ void sim_pair_default(sim_pair_config_t *out_config) {
     *out_config = (sim_pair_config_t){.track_mm = 540U, .battery_dV = 248U};
     sim_wheel_config_t *const left = &out_config->wheel[IW_LEFT];
     sim_wheel_config_t *const right = &out_config->wheel[IW_RIGHT];
-    *left = (sim_wheel_config_t){.sensor_zero_mN = 12300, .boot_us = 400000U, .unit = IW_FORCE_CN};
-    *right = (sim_wheel_config_t){.sensor_zero_mN = 9800, .boot_us = 430000U, .unit = IW_FORCE_DN};
+    *left = (sim_wheel_config_t){
+        .sensor_zero_mN = 12300, .boot_us = 400000U, .offset_us = SIM_WHEEL_OFFSET_US, .unit = IW_FORCE_CN};
+    *right = (sim_wheel_config_t){
+        .sensor_zero_mN = 9800, .boot_us = 430000U, .offset_us = SIM_WHEEL_OFFSET_US, .unit = IW_FORCE_DN};
     sim_motion_default(&left->motion);
     sim_motion_default(&right->motion);
 }

@@ -33,6 +33,7 @@ static void silence(sim_wheel_t *self) {
 
 void sim_wheel_init(sim_wheel_t *self, const sim_wheel_config_t *config, iw_side_t side, uint64_t seed) {
     *self = (sim_wheel_t){.side = side, .boot_us = config->boot_us, .slow_permille = 1000U};
+    self->offset_us = config->offset_us;
     self->ambient_degC = TEMPERATURE_AMBIENT_degC;
     self->phase_us = (side == IW_RIGHT) ? PHASE_RIGHT_US : 0U;
     sim_random_init(&self->random, seed * 2U + (uint64_t)side);
@@ -54,7 +55,10 @@ static void run(sim_wheel_t *self, iw_time_us_t now_us, uint64_t age_us) {
     self->state = SIM_WHEEL_RUNNING;
     self->boots += 1U;
     self->learn_until_us = now_us + learn_us;
-    self->offset_until_us = now_us + ((age_us < SIM_WHEEL_OFFSET_US) ? SIM_WHEEL_OFFSET_US - age_us : 0U);
+    self->offset_until_us = now_us + ((age_us < self->offset_us) ? self->offset_us - age_us : 0U);
+    if (self->offset_us == IW_NEVER) {
+        self->offset_until_us = IW_NEVER;
+    }
     self->motion.ticks = 0U;
     self->motion.tick_rest = 0;
     sim_force_restart(&self->force);
@@ -148,8 +152,10 @@ static sim_telemetry_t take_due(sim_wheel_t *self) {
     while (self->due_us[kind] != self->next_us) {
         ++kind;
     }
-    iw_time_us_t const following = self->due_us[kind] + (uint64_t)period_us[kind] * self->slow_permille / 1000U;
-    bool const over = kind == SIM_TELEMETRY_OFFSET && following >= self->offset_until_us;
+    bool const offset = kind == SIM_TELEMETRY_OFFSET;
+    uint64_t const permille = offset ? 1000U : self->slow_permille;
+    iw_time_us_t const following = self->due_us[kind] + period_us[kind] * permille / 1000U;
+    bool const over = offset && following >= self->offset_until_us;
     self->due_us[kind] = over ? IW_NEVER : following;
     find_next(self);
     return kind;

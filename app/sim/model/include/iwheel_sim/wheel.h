@@ -6,7 +6,7 @@
 ///      +---- power off -+--------------------+
 ///
 /// OFF and BOOTING: silent, deaf, acknowledges nothing; the wheel coasts. RUNNING begins with ticks 0 and sends offset
-/// frames for 60 s. The first comes when the two seconds of learning are over (choice of this model; the document tells
+/// frames for 60 s, or as long as configured. The first comes when the two seconds of learning are over (choice of this model; the document tells
 /// only the period).
 /// "Muted" silences telemetry only: setpoints are still followed and acknowledged.
 ///
@@ -19,7 +19,7 @@
 #include "iwheel_sim/motion.h"
 #include "iwheel_sim/pose.h"
 
-/// A wheel sends offset frames this long.
+/// A wheel sends offset frames this long (document).
 #define SIM_WHEEL_OFFSET_US 60000000U
 
 typedef enum { SIM_WHEEL_OFF = 0, SIM_WHEEL_BOOTING, SIM_WHEEL_RUNNING } sim_wheel_state_t;
@@ -42,12 +42,13 @@ typedef struct {
     iw_time_us_t next_us;                     ///< The earliest of them, or the end of booting.
     iw_time_us_t learn_until_us;
     iw_time_us_t offset_until_us;
+    iw_time_us_t offset_us; ///< From RUNNING on; IW_NEVER: they never stop.
     iw_time_us_t phase_us;
     uint32_t boot_us;
     uint32_t sent[SIM_TELEMETRY_KINDS];
     uint32_t lost; ///< Frames and setpoints that the loss fault swallowed.
     uint32_t boots;
-    uint32_t slow_permille; ///< All periods are multiplied by this; 1000: as documented.
+    uint32_t slow_permille; ///< All periods but the offset frames' are multiplied by this; 1000: as documented.
     uint16_t loss_permille; ///< Fault: this share of telemetry and of setpoints is lost.
     int32_t heat_mdegC;     ///< Above ambient.
     int32_t ambient_degC;
@@ -60,6 +61,7 @@ typedef struct {
     sim_motion_config_t motion;
     int32_t sensor_zero_mN;
     uint32_t boot_us;
+    iw_time_us_t offset_us; ///< How long offset frames are sent; SIM_WHEEL_OFFSET_US as documented, IW_NEVER: for ever.
     iw_force_unit_t unit;
 } sim_wheel_config_t;
 
@@ -75,7 +77,8 @@ void sim_wheel_reboot(sim_wheel_t *self, iw_time_us_t now_us);
 /// As if it had been running for `age_us` already: the boot is skipped, the offset is known, offset frames may be over.
 void sim_wheel_age(sim_wheel_t *self, iw_time_us_t now_us, uint64_t age_us);
 
-/// New factor for all periods, 100..1000000 permille. Takes effect with each frame's next turn.
+/// New factor for all periods but the offset frames' (one a second, whose end and return mean something), 100..1000000
+/// permille. Takes effect with each frame's next turn.
 void sim_wheel_slow(sim_wheel_t *self, uint32_t permille);
 
 /// A setpoint for this wheel was on the bus.
