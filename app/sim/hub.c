@@ -10,6 +10,10 @@
 
 /// Messages taken from one client before the others have their turn.
 #define BATCH 32
+/// What `__res0` tells.
+#define MARK_NONE   0U
+#define MARK_ECHO   1U
+#define MARK_FORGED 2U
 
 _Static_assert(IW_CAN_EXTENDED == CAN_EFF_FLAG && IW_CAN_REMOTE == CAN_RTR_FLAG && IW_CAN_ERROR == CAN_ERR_FLAG,
                "the id word is that of <linux/can.h>");
@@ -38,8 +42,8 @@ static void drop(sim_client_t *client) {
     sim_world_disconnect(hub->world, *hub->now_us, client->port);
 }
 
-static void pass_on(sim_client_t *client, const iw_can_frame_t *frame, bool echo) {
-    struct can_frame message = {.can_id = frame->id, .can_dlc = frame->dlc, .__res0 = echo ? 1U : 0U};
+static void pass_on(sim_client_t *client, const iw_can_frame_t *frame, uint8_t mark) {
+    struct can_frame message = {.can_id = frame->id, .can_dlc = frame->dlc, .__res0 = mark};
     memcpy(message.data, frame->data, sizeof message.data);
     if (send(client->watch.fd, &message, sizeof message, MSG_DONTWAIT | MSG_NOSIGNAL) != (ssize_t)sizeof message) {
         client->lost += 1U;
@@ -50,7 +54,8 @@ static void pass_on(sim_client_t *client, const iw_can_frame_t *frame, bool echo
 void sim_hub_deliver(sim_hub_t *self, const sim_delivery_t *delivery) {
     for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
         if (self->client[i].watch.fd >= 0) {
-            pass_on(&self->client[i], &delivery->frame, self->client[i].port == delivery->port);
+            bool const own = self->client[i].port == delivery->port;
+            pass_on(&self->client[i], &delivery->frame, own ? MARK_ECHO : MARK_NONE);
         }
     }
 }
@@ -58,7 +63,7 @@ void sim_hub_deliver(sim_hub_t *self, const sim_delivery_t *delivery) {
 static void tell_others(sim_hub_t *self, const sim_client_t *from, const iw_can_frame_t *frame) {
     for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
         if (self->client[i].watch.fd >= 0 && &self->client[i] != from) {
-            pass_on(&self->client[i], frame, false);
+            pass_on(&self->client[i], frame, (from == NULL) ? MARK_NONE : MARK_FORGED);
         }
     }
 }
@@ -119,7 +124,7 @@ static bool admit(sim_hub_t *self, int fd) {
     self->clients += 1U;
     if (self->world->bus_off) {
         iw_can_frame_t const frame = sim_hub_error_frame(SIM_ERROR_BUS_OFF);
-        pass_on(client, &frame, false);
+        pass_on(client, &frame, MARK_NONE);
     }
     return true;
 }

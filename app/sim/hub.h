@@ -5,7 +5,8 @@
 /// Every client hears every frame that was on the simulated bus; the sender gets its own as echo, with `__res0` = 1. A
 /// client that does not read loses frames, the others none. A closed connection is a bus that went down with all that
 /// its adapter had queued.
-/// Error frames that a client sends go to the other clients at once, as on SocketCAN: any local user can forge them.
+/// Error frames that a client sends go to the other clients at once, as on SocketCAN: any local user can forge them. As
+/// there, they are marked: with `__res0` = 2.
 #ifndef SIM_HUB_H
 #define SIM_HUB_H
 

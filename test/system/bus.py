@@ -8,7 +8,7 @@ import time
 
 from judge_log import Frame, signed
 
-FRAME = struct.Struct("=IBBB x8s")  # struct can_frame: id, length, pad, res0 (1: echo of our own frame), data
+FRAME = struct.Struct("=IBBB x8s")  # struct can_frame: id, length, pad, res0 (1: echo of our own frame, 2: error frame of a client), data
 SO_TIMESTAMPNS = 35
 EXTENDED, REMOTE, ERROR = 0x80000000, 0x40000000, 0x20000000
 

@@ -210,6 +210,36 @@ static void test_local_error_frames_change_the_state_and_are_no_frames(void) {
     TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
 }
 
+static void test_local_good_news_of_another_client_are_not_believed_and_bad_news_are_told_once(void) {
+    static const uint32_t good[] = {CAN_ERR_FLAG | CAN_ERR_RESTARTED, CAN_ERR_FLAG | CAN_ERR_CRTL};
+    iw_can_frame_t heard;
+    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 2, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    for (size_t i = 0; i < 2; i++) {
+        tell(good[i], 8, 2, CAN_ERR_CRTL_ACTIVE);
+        tell(good[i], 8, 2, CAN_ERR_CRTL_TX_PASSIVE);
+        TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+        TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
+    }
+    tell(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0,
+         CAN_ERR_CRTL_ACTIVE); // The controller's own: it is no end of bus-off either.
+    tell(CAN_ERR_FLAG | CAN_ERR_CRTL, 8, 0, CAN_ERR_CRTL_TX_PASSIVE);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
+}
+
+static void test_local_restart_tells_of_a_loss_that_was_not_heard(void) {
+    iw_can_frame_t heard;
+    tell(CAN_ERR_FLAG | CAN_ERR_RESTARTED, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+}
+
 static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void) {
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     unsigned sent = 0;
@@ -221,7 +251,29 @@ static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void)
     }
     TEST_ASSERT_EQUAL_INT(0, result);
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+}
+
+static void test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_loss(void) {
+    const iw_can_frame_t frame = {.id = 266, .dlc = 5};
+    struct can_frame raw;
+    iw_can_frame_t heard;
+    TEST_ASSERT_TRUE(functions.send(functions.context, &frame) > 0);
+    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NONE, iw_linux_hal_link(&hal)->purge);
     TEST_ASSERT_EQUAL_INT(0, functions.purge(functions.context));
+    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, iw_linux_hal_link(&hal)->purge);
+    const uint32_t changes = iw_linux_hal_link(&hal)->changes;
+    TEST_ASSERT_EQUAL_INT(0, functions.purge(functions.context)); // There is nothing to leave.
+    TEST_ASSERT_EQUAL_UINT32(changes, iw_linux_hal_link(&hal)->changes);
+    TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
+    TEST_ASSERT_EQUAL_INT(0, (int)recv(hub, &raw, sizeof raw, 0)); // The end: the hub drops what it holds.
+    (void)close(hub);
+    iw_linux_hal_tend(&hal, now_us);
+    hub = accept(bus_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(hub >= 0);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard)); // No echo of before.
+    TEST_ASSERT_TRUE(functions.send(functions.context, &frame) > 0);
 }
 
 static void test_estop_is_unreadable_until_the_button_has_spoken(void) {
@@ -315,6 +367,9 @@ int main(void) {
     RUN_TEST(test_local_hub_gone_and_back_before_anybody_asked_is_reported_once);
     RUN_TEST(test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_off);
     RUN_TEST(test_local_error_frames_change_the_state_and_are_no_frames);
+    RUN_TEST(test_local_good_news_of_another_client_are_not_believed_and_bad_news_are_told_once);
+    RUN_TEST(test_local_restart_tells_of_a_loss_that_was_not_heard);
+    RUN_TEST(test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_loss);
     RUN_TEST(test_local_full_hub_means_later_and_nothing_is_lost_or_blocked);
     RUN_TEST(test_estop_is_unreadable_until_the_button_has_spoken);
     RUN_TEST(test_estop_pulse_between_two_looks_is_an_edge);

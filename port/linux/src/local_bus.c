@@ -10,9 +10,13 @@
 
 /// Frames taken from the kernel in one call.
 #define BATCH 32U
+/// What `__res0` of a frame tells: it is ours, or an error frame that another client made.
+#define MARK_ECHO   1U
+#define MARK_FORGED 2U
 
 typedef struct {
     iw_unix_link_t link;
+    iw_bus_link_t told;
     struct can_frame batch[BATCH];
     uint32_t size[BATCH];
     uint32_t count;
@@ -26,7 +30,9 @@ IW_STATIC_ASSERT(sizeof(local_bus_t) <= sizeof(iw_backend_store_t), local_bus_fi
 
 static int local_open(void *self, const char *name) {
     local_bus_t *bus = (local_bus_t *)self;
-    *bus = (local_bus_t){.present = IW_BUS_ACTIVE, .unheeded = IW_BUS_ACTIVE};
+    *bus = (local_bus_t){.told = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true},
+                         .present = IW_BUS_ACTIVE,
+                         .unheeded = IW_BUS_ACTIVE};
     return iw_unix_link_open(&bus->link, name, SOCK_SEQPACKET);
 }
 
@@ -74,21 +80,21 @@ static int local_send(void *self, const iw_can_frame_t *frame) {
     return -1;
 }
 
+/// As on SocketCAN, bad news of another client's stop the wheels, and good news of it are not believed. A restart, however
+/// short the loss before it and whether it was heard or not, has emptied the queue.
 static void hear_error(local_bus_t *bus, const struct can_frame *raw) {
-    switch (iw_can_error_of(raw)) {
-    case IW_CAN_ERROR_BUS_OFF:
-        bus->present = IW_BUS_OFF;
+    const bool forged = raw->__res0 == MARK_FORGED;
+    const iw_can_error_t error = iw_can_error_of(raw);
+    if (error == IW_CAN_ERROR_BUS_OFF) {
         bus->unheeded = IW_BUS_OFF;
-        break;
-    case IW_CAN_ERROR_PASSIVE:
-        bus->present = IW_BUS_PASSIVE;
-        break;
-    case IW_CAN_ERROR_RESTARTED:
-    case IW_CAN_ERROR_ACTIVE:
+        bus->present = forged ? bus->present : IW_BUS_OFF;
+    } else if (forged) {
+        return;
+    } else if (error == IW_CAN_ERROR_RESTARTED) {
+        bus->unheeded = IW_BUS_OFF;
         bus->present = IW_BUS_ACTIVE;
-        break;
-    default:
-        break;
+    } else if (bus->present >= IW_BUS_PASSIVE && (error == IW_CAN_ERROR_PASSIVE || error == IW_CAN_ERROR_ACTIVE)) {
+        bus->present = error == IW_CAN_ERROR_PASSIVE ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
     }
 }
 
@@ -128,7 +134,7 @@ static bool take_message(local_bus_t *bus, iw_can_frame_t *out_frame) {
         hear_error(bus, &bus->batch[i]);
         return false;
     }
-    *out_frame = iw_socketcan_translate(&bus->batch[i], bus->batch[i].__res0 == 1U ? MSG_CONFIRM : 0);
+    *out_frame = iw_socketcan_translate(&bus->batch[i], bus->batch[i].__res0 == MARK_ECHO ? MSG_CONFIRM : 0);
     return true;
 }
 
@@ -159,15 +165,19 @@ static iw_bus_state_t local_state(void *self) {
     return iw_unix_link_is_up(&bus->link) ? bus->present : IW_BUS_DOWN;
 }
 
+/// What was sent is the hub's; it drops that with the connection. The next `tend` connects anew.
 static int local_purge(void *self) {
-    (void)self;
-    return 0; // What was sent is the hub's.
+    local_bus_t *bus = (local_bus_t *)self;
+    if (iw_unix_link_is_up(&bus->link)) {
+        lose(bus);
+        bus->told.purge = IW_LINK_PURGE_DONE;
+        ++bus->told.changes;
+    }
+    return 0;
 }
 
 static const iw_bus_link_t *local_link(const void *self) {
-    static const iw_bus_link_t link = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
-    (void)self;
-    return &link;
+    return &((const local_bus_t *)self)->told;
 }
 
 const iw_bus_ops_t iw_local_bus_ops = {

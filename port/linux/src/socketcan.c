@@ -152,9 +152,12 @@ static void hear_error(socketcan_t *bus, iw_can_error_t error, bool forged) {
         bus->look_us = bus->now_us + (forged ? 0U : RETRY_US);
     } else if (forged) {
         return;
+    } else if (error == IW_CAN_ERROR_RESTARTED) {
+        bus->unheeded = IW_BUS_OFF; // Also if that was not heard: the restart has emptied the queue.
+        bus->present = IW_BUS_ACTIVE;
     } else if (error == IW_CAN_ERROR_PASSIVE) {
         bus->present = IW_BUS_PASSIVE;
-    } else if (error == IW_CAN_ERROR_RESTARTED || (error == IW_CAN_ERROR_ACTIVE && bus->present == IW_BUS_PASSIVE)) {
+    } else if (error == IW_CAN_ERROR_ACTIVE && bus->present == IW_BUS_PASSIVE) {
         bus->present = IW_BUS_ACTIVE;
     }
 }
@@ -361,9 +364,10 @@ static iw_bus_state_t can_state(void *self) {
 /// what it has of old frames, and only the zeros in the queue behind them would be lost.
 static int can_purge(void *self) {
     socketcan_t *bus = (socketcan_t *)self;
-    const bool allowed = bus->link.purge != IW_LINK_PURGE_NOT_ALLOWED; // That does not change.
-    if (allowed && bus->restarting == 0 && bus->up && bus->link.echo_proven &&
-        iw_netlink_restart_start(bus->interface, &bus->restarting) != 0) {
+    if (bus->link.purge == IW_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven) {
+        return -1;
+    }
+    if (bus->restarting == 0 && bus->up && iw_netlink_restart_start(bus->interface, &bus->restarting) != 0) {
         bus->restarting = 0;
         bus->link.purge = IW_LINK_PURGE_FAILED;
         ++bus->link.changes;

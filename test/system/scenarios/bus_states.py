@@ -6,6 +6,7 @@ What is done to the bus is an argument where the same scenario also runs on a `c
 
 import time
 
+from bus import ERROR
 from client import Streamer
 from harness import now_us
 from judge_log import LEFT, RIGHT, Event
@@ -128,6 +129,40 @@ def row16_bus_off(t):
 @scenario("bus-off while listening: an event, arm refused, nothing sent", 5)
 def row16_bus_off_listening(t):
     bus_off_listening(t, tell("busoff on"), tell("busoff off"))
+
+
+def forged_end(t, forge):
+    """While the controller is off the bus, somebody on it claims that it is not."""
+    rig, client, stream = driving(t)
+    begin_us = now_us()
+    rig.sim.ask("busoff on")
+    rig.timeline.append(Event(now_us(), "dead"))
+    rig.timeline.append(Event(begin_us, "cut", within_us=now_us() - begin_us + 30_000))
+    time.sleep(0.1)
+    forge(rig)
+    time.sleep(0.5)
+    stream.stop()
+    t.check(client.request("status")["bus"]["state"] == "bus_off", f"not believed: {client.request('status')['bus']}")
+    rig.sim.ask("busoff off")
+    back_us = now_us()
+    rig.note("alive")
+    drive_again(t, rig, client)
+    only_zeros(t, rig, back_us)
+    t.judge(rig)
+
+
+@scenario("bus-off, and forged error frames that tell of its end: not believed, and no send remains stalled", 10)
+def row16_bus_off_forged_end(t):
+    def forge(rig):
+        for can_id, data in ((0x100, bytes(8)), (0x04, bytes([0, 0x40, 0, 0, 0, 0, 0, 0])), (0x04, bytes([0, 0x30, 0, 0, 0, 0, 0, 0]))):
+            rig.bus.send(ERROR | can_id, data)
+
+    forged_end(t, forge)
+
+
+@scenario("bus-off, and a forged error frame that tells of another one: no send remains stalled", 10)
+def row16_bus_off_forged_twice(t):
+    forged_end(t, lambda rig: rig.bus.send(ERROR | 0x40, bytes(8)))
 
 
 @scenario("error passive in motion: shown, it drives on; active again: shown", 5)
