@@ -32,6 +32,7 @@ if(TARGET iwheel-gateway)
     set(IWHEEL_SYSTEMD_DIR lib/systemd/system CACHE STRING "Where the service units go")
     set(IWHEEL_UDEV_DIR lib/udev/rules.d CACHE STRING "Where the udev rules go")
     install(FILES share/systemd/iwheel-gateway.service share/systemd/iwheel-gateway@.service
+        share/systemd/iwheel-can-restart@.path share/systemd/iwheel-can-restart@.service
         DESTINATION ${IWHEEL_SYSTEMD_DIR} COMPONENT gateway)
     install(FILES share/sysusers.d/iwheel.conf DESTINATION lib/sysusers.d COMPONENT gateway)
     install(FILES share/tmpfiles.d/iwheel.conf DESTINATION lib/tmpfiles.d COMPONENT gateway)

@@ -41,6 +41,7 @@ typedef struct {
     uint32_t present; ///< Latching causes, as a bit each.
     uint32_t stop_number;
     uint32_t still_moving;
+    bool left_behind;
     int estop;
     bool started; ///< The first observation only takes notes.
     char holder_name[GW_NAME_MAX + 1U];
@@ -88,6 +89,7 @@ typedef struct gw_daemon {
     uint32_t link_changes; ///< What of the link was last passed on.
     iw_link_purge_t purge_told;
     bool link_known;
+    bool left_told; ///< That a setpoint was left in the controller.
     uint32_t warnings;
     char warning[GW_WARNINGS][GW_WARNING_SIZE];
     char estop_reason[GW_REASON_MAX + 1U]; ///< Of the last software e-stop.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "bus_facts.h"
 
+#include "bus_left.h"
+
 #include <stdarg.h>
 
 static iw_timing_t judge(const gw_daemon_t *daemon) {
@@ -37,8 +39,9 @@ static void log_purge(gw_daemon_t *daemon, iw_link_purge_t purge) {
     } else if (purge == IW_LINK_PURGE_NOT_ALLOWED) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "bus %s: an old setpoint may still wait in its queue, and this process may not empty it; do: ip link "
-               "set %s down; ip link set %s up (or give the gateway CAP_NET_ADMIN)",
-               bus, bus, bus);
+               "set %s down; ip link set %s up (or, once and for all: systemctl enable --now "
+               "iwheel-can-restart@%s.path)",
+               bus, bus, bus, bus);
     } else if (purge == IW_LINK_PURGE_FAILED) {
         gw_log(&daemon->log, GW_LOG_ERROR,
                "bus %s: its queue could not be emptied; look with: ip -details link show %s", bus, bus);
@@ -55,6 +58,14 @@ __attribute__((format(printf, 2, 3))) static void warn(gw_daemon_t *daemon, cons
     }
 }
 
+static void note_left_behind(gw_daemon_t *daemon) {
+    if (daemon->gateway.left_behind) {
+        char sentence[GW_WARNING_SIZE];
+        gw_bus_left_sentence(iw_linux_hal_link(&daemon->hal), daemon->config.bus.interface, sentence, sizeof sentence);
+        warn(daemon, "%s", sentence);
+    }
+}
+
 /// What is wrong enough to be said at start, in `status` and with every arm.
 static void note_warnings(gw_daemon_t *daemon) {
     const iw_linux_hal_t *hal = &daemon->hal;
@@ -66,6 +77,7 @@ static void note_warnings(gw_daemon_t *daemon) {
         warn(daemon, "the e-stop %s is SIMULATED: no button of this machine stops the wheels",
              daemon->config.estop.line);
     }
+    note_left_behind(daemon);
     inspect_findings_t findings;
     inspect_begin(&findings);
     const inspect_wish_t wish = gw_bus_facts_wish(daemon);
@@ -79,8 +91,28 @@ static void note_warnings(gw_daemon_t *daemon) {
     }
 }
 
+/// Once when it begins: who may empty the queue is asked to, as far as that is set up.
+static void tell_left_behind(gw_daemon_t *daemon) {
+    const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
+    const char *bus = daemon->config.bus.interface;
+    daemon->left_told = daemon->gateway.left_behind;
+    if (daemon->left_told) {
+        char sentence[GW_WARNING_SIZE];
+        gw_bus_left_sentence(link, bus, sentence, sizeof sentence);
+        gw_log(&daemon->log, GW_LOG_WARNING, "%s", sentence);
+        if (link->presence != IW_LINK_LOCAL) {
+            (void)gw_bus_left_ask(GW_RUNTIME_DIRECTORY,
+                                  bus); // Where nobody could be asked, the sentence says what to do.
+        }
+    }
+    note_warnings(daemon);
+}
+
 void gw_bus_facts_follow(gw_daemon_t *daemon) {
     const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
+    if (daemon->left_told != daemon->gateway.left_behind) {
+        tell_left_behind(daemon);
+    }
     if (daemon->link_known && link->changes == daemon->link_changes) {
         return;
     }

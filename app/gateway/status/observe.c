@@ -155,6 +155,10 @@ static void observe_faults(gw_daemon_t *daemon) {
         observed->still_moving = permit->still_moving;
         tell_fault(daemon, "still_moving", true);
     }
+    if (daemon->gateway.left_behind != observed->left_behind) {
+        observed->left_behind = daemon->gateway.left_behind;
+        tell_fault(daemon, "setpoint_left", observed->left_behind);
+    }
 }
 
 void gw_observe(gw_daemon_t *daemon) {

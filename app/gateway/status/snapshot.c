@@ -174,6 +174,7 @@ static void write_counters(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_int(json, "late_steps", counters->late_steps);
     json_out_int(json, "out_of_range", counters->out_of_range);
     json_out_int(json, "purges", counters->purges);
+    json_out_int(json, "left_behind", counters->left_behind);
     json_out_int(json, "pairs", sender->pairs);
     json_out_int(json, "send_later", sender->later);
     json_out_int(json, "clamped", sender->clamped);

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Rows 15 and 17 on vcan: interfaces that go down, vanish, refuse frames, echo late or never."""
 
+import os
+import re
 import time
 
 import netdev
@@ -12,6 +14,7 @@ from scenario import Skip
 from scenarios.bus_faults import wait_reset
 from scenarios.process import driving
 
+UNITS = os.path.join(os.path.dirname(os.path.abspath(__file__)), *[os.pardir] * 3, "share", "systemd")
 BLINKS_MS = (0, 2.5, 5.3, 9.9, 13.1, 16.7, 19.9)  # later than the last command; a period is 20 ms
 REOPENED_MS = 260  # an interface that was down is looked for every 200 ms
 STALE_US = 20_000  # frames later than this after a bus came back were not on their way any more
@@ -304,6 +307,66 @@ def row17_echo_late(t):
 @kernel_test("no echo in motion: stop within echo_ms, latched", "echo", 17)
 def row17_echo_missing(t):
     echo_fault(t, "loss", "100%")
+
+
+def restart_as_the_unit_does(t, interface):
+    """What systemd would do for iwheel-can-restart@.path: once the file has been written, the commands of the service."""
+    with open(os.path.join(UNITS, "iwheel-can-restart@.path"), encoding="utf-8") as unit:
+        wish = re.search(r"(?m)^PathChanged=(.*)$", unit.read())[1].replace("%I", interface)
+    if not t.check(os.path.exists(wish), f"the gateway asks with {wish}"):
+        return
+    with open(os.path.join(UNITS, "iwheel-can-restart@.service"), encoding="utf-8") as unit:
+        for command in re.findall(r"(?m)^ExecStart=(.*)$", unit.read()):
+            netdev.command(*command.replace("%I", interface).split())
+
+
+def lost_echo(t, cure):
+    """An echo gets lost while driving, and the gateway may not restart the link: told, and cured without starting it anew."""
+    rig = t.rig(LATE)
+    needs_echo(rig)
+    os.makedirs("/run/iwheel", exist_ok=True)
+    rig.start_gateway(setup=netdev.without_net_admin)
+    client, observer = rig.client(), rig.client("observer")
+    observer.request("watch", topics=["stop"])
+    t.arm(client)
+    stream = Streamer(client, 200, 200, 0.02)
+    time.sleep(1.0)
+    fault(rig, lambda: netdev.discipline(rig.interface, "netem", "loss", "100%"), 120)
+    time.sleep(0.3)
+    stream.stop()
+    time.sleep(0.3)
+    netdev.discipline(rig.interface)
+    rig.note("alive")
+    time.sleep(12)
+    t.expect(client.request("reset"), "send_stalled")
+    refused = client.request("reset")["message"]
+    said = " ".join(client.request("status")["warnings"])
+    for sentence in (refused, said):
+        t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in sentence, f"the cure is named: {sentence}")
+    t.check(f"iwheel-can-restart@{rig.interface}.path" in said, f"and the service's: {said}")
+    told = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
+    t.check(told == [True], f"the event comes: {told}")
+    silent_us = now_us()
+    cure(rig)
+    back_to_driving_if_latched(t, rig, client)
+    told = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
+    t.check(told == [True, False], f"and goes: {told}")
+    t.check("still in the controller" not in " ".join(client.request("status")["warnings"]), "no warning remains")
+    armed = [event.t_us for event in rig.timeline if event.kind == "arm" and event.ok and event.t_us > silent_us]
+    t.check(not [at for at, _, _ in rig.bus.setpoints(silent_us) if at < min(armed)], "nothing is sent before it is armed again")
+    client.request("stop")
+    time.sleep(0.3)
+    t.judge(rig)
+
+
+@kernel_test("a lost echo, link may not be restarted: told; cured by taking the link down and up", "echo", 17)
+def row17_echo_lost_no_rights(t):
+    lost_echo(t, lambda rig: [netdev.command("ip", "link", "set", rig.interface, state) for state in ("down", "up")])
+
+
+@kernel_test("a lost echo, link may not be restarted: the unit that may is asked, and cures it", "echo", 17)
+def row17_echo_lost_unit_restarts(t):
+    lost_echo(t, lambda rig: restart_as_the_unit_does(t, rig.interface))
 
 
 def power_cut(t, setup):

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+// What is said and asked for when a setpoint was left in the controller.
+#include "bus/bus_left.h"
+
+#include "unity.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/inotify.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static char folder[] = "/tmp/iwheel-left-XXXXXX";
+static char path[64];
+static char victim[64];
+
+void setUp(void) {
+    (void)snprintf(path, sizeof path, "%s/can0.restart", folder);
+    (void)snprintf(victim, sizeof victim, "%s/victim", folder);
+    FILE *file = fopen(victim, "w");
+    TEST_ASSERT_NOT_NULL(file);
+    (void)fputs("untouched", file);
+    (void)fclose(file);
+}
+
+void tearDown(void) {
+    (void)unlink(path);
+    (void)unlink(victim);
+}
+
+static void expect_untouched(void) {
+    char text[32] = "";
+    FILE *file = fopen(victim, "r");
+    TEST_ASSERT_NOT_NULL(file);
+    TEST_ASSERT_NOT_NULL(fgets(text, sizeof text, file));
+    (void)fclose(file);
+    TEST_ASSERT_EQUAL_STRING("untouched", text);
+}
+
+/// As a unit with PathChanged= sees it: a file was closed after it was written.
+static unsigned writings_seen(int watch) {
+    char events[4096] __attribute__((aligned(__alignof__(struct inotify_event))));
+    unsigned seen = 0;
+    const ssize_t length = read(watch, events, sizeof events);
+    for (ssize_t at = 0; at < length;) {
+        struct inotify_event event;
+        (void)memcpy(&event, &events[at], sizeof event);
+        at += (ssize_t)(sizeof event + event.len);
+        ++seen;
+    }
+    return seen;
+}
+
+static void test_left_each_request_is_seen_by_who_waits_for_it(void) {
+    const int watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    TEST_ASSERT_TRUE(inotify_add_watch(watch, folder, IN_CLOSE_WRITE) >= 0);
+    TEST_ASSERT_TRUE(gw_bus_left_ask(folder, "can0"));
+    TEST_ASSERT_EQUAL_UINT(1, writings_seen(watch));
+    TEST_ASSERT_TRUE(gw_bus_left_ask(folder, "can0"));
+    TEST_ASSERT_EQUAL_UINT(1, writings_seen(watch));
+    (void)close(watch);
+}
+
+static void test_left_nothing_is_written_through_a_link(void) {
+    struct stat what;
+    TEST_ASSERT_EQUAL_INT(0, symlink(victim, path));
+    TEST_ASSERT_TRUE(gw_bus_left_ask(folder, "can0"));
+    expect_untouched();
+    TEST_ASSERT_EQUAL_INT(0, lstat(path, &what));
+    TEST_ASSERT_TRUE(S_ISREG(what.st_mode));
+    (void)unlink(path);
+    TEST_ASSERT_EQUAL_INT(0, link(victim, path));
+    TEST_ASSERT_TRUE(gw_bus_left_ask(folder, "can0"));
+    expect_untouched();
+}
+
+static void test_left_nobody_can_be_asked_without_the_directory(void) {
+    char nowhere[300];
+    memset(nowhere, 'x', sizeof nowhere);
+    nowhere[sizeof nowhere - 1U] = '\0';
+    TEST_ASSERT_FALSE(gw_bus_left_ask("/nonexistent/iwheel", "can0"));
+    TEST_ASSERT_FALSE(gw_bus_left_ask(nowhere, "can0"));
+}
+
+static void test_left_sentence_names_the_cure_of_each_kind_of_bus(void) {
+    char sentence[400];
+    iw_bus_link_t link = {.presence = IW_LINK_UP, .echo_proven = true};
+    gw_bus_left_sentence(&link, "can0", sentence, sizeof sentence);
+    TEST_ASSERT_NOT_NULL(strstr(sentence, "ip link set can0 down; ip link set can0 up"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence, "systemctl enable --now iwheel-can-restart@can0.path"));
+    link.echo_proven = false;
+    gw_bus_left_sentence(&link, "can0", sentence, sizeof sentence);
+    TEST_ASSERT_NOT_NULL(strstr(sentence, "switch it off and on"));
+    link.presence = IW_LINK_LOCAL;
+    gw_bus_left_sentence(&link, "unix:/run/bus", sentence, sizeof sentence);
+    TEST_ASSERT_NOT_NULL(strstr(sentence, "start its hub (the simulator) again"));
+}
+
+int main(void) {
+    if (mkdtemp(folder) == NULL) {
+        return EXIT_FAILURE;
+    }
+    UNITY_BEGIN();
+    RUN_TEST(test_left_each_request_is_seen_by_who_waits_for_it);
+    RUN_TEST(test_left_nothing_is_written_through_a_link);
+    RUN_TEST(test_left_nobody_can_be_asked_without_the_directory);
+    RUN_TEST(test_left_sentence_names_the_cure_of_each_kind_of_bus);
+    const int result = UNITY_END();
+    (void)rmdir(folder);
+    return result;
+}
