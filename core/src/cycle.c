@@ -305,11 +305,26 @@ static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
     return result;
 }
 
-/// Silence must be silent: what is still in a controller is repeated until a wheel has power to acknowledge it. Whether
-/// one is heard is no argument: without acknowledgement none is. An echo that is only late by the bus is given its time,
-/// and one that was received may stand in the backlog.
-static void keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
-    iw_sender_rest(&self->sender);
+void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us) {
+    const iw_demand_t demand = iw_permit_demand(&self->permit);
+    iw_setpoint_demand(&self->setpoint, now_us, demand);
+    if (demand == IW_DEMAND_SILENCE) {
+        iw_sender_rest(&self->sender);
+    } else if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
+        iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
+        (void)send_pair(self, now_us);
+    }
+}
+
+/// Whether a wheel is heard is no argument: without acknowledgement none is. An echo that is only late by the bus is given
+/// its time, and one that was received may stand in the backlog.
+void iw_cycle_keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
+    if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE) {
+        self->purged_us = IW_NEVER;
+        self->left_behind = false;
+        return;
+    }
     if (overdue_us(self, now_us) == 0U) {
         self->left_behind = false;
         return;
@@ -323,22 +338,6 @@ static void keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
     self->purged_us = now_us;
     self->left_behind = answer < 0 || (answer == 0 && again);
     self->counters.left_behind += (self->left_behind && !was_left) ? 1U : 0U;
-}
-
-void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us) {
-    const iw_demand_t demand = iw_permit_demand(&self->permit);
-    iw_setpoint_demand(&self->setpoint, now_us, demand);
-    if (demand == IW_DEMAND_SILENCE) {
-        keep_silent(self, now_us);
-        return;
-    }
-    self->purged_us = IW_NEVER;
-    self->left_behind = false;
-    if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
-        iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
-        (void)send_pair(self, now_us);
-    }
 }
 
 static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {

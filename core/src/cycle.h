@@ -17,6 +17,10 @@ void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us);
 /// Sends what is due under the permission's demand.
 void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us);
 
+/// Silence is silent: what is still in a controller when nothing is sent any more would be repeated there until a wheel
+/// has power to acknowledge it. It is taken back, or told.
+void iw_cycle_keep_silent(iw_gateway_t *self, iw_time_us_t now_us);
+
 /// When to call again: not later than one period from now.
 iw_time_us_t iw_cycle_next_us(const iw_gateway_t *self, iw_time_us_t now_us);
 

@@ -54,6 +54,7 @@ iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_cycle_receive(self, now_us);
     iw_cycle_judge(self, now_us);
     iw_cycle_send(self, now_us);
+    iw_cycle_keep_silent(self, now_us);
     self->promised_us = iw_cycle_next_us(self, now_us);
     return self->promised_us;
 }

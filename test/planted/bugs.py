@@ -51,7 +51,7 @@ BUGS = [
     Bug("left-only", "R5", "sender.c", "if (right && (taken || zero)) {", "if (right && zero) {"),
     Bug("queue-of-two", "R6", "outbox.c", "(zero ? 2U : 1U)", "(zero ? 3U : 2U)"),
     Bug("purge-forgotten", "R6", "sender.c", "const int answer = self->hal->purge(self->hal->context);", "const int answer = 1;"),
-    Bug("silence-takes-nothing-back", "R6", "cycle.c", "if (demand == IW_DEMAND_SILENCE) { keep_silent(self, now_us);", "if (demand == IW_DEMAND_SILENCE) { iw_sender_rest(&self->sender);"),
+    Bug("silence-takes-nothing-back", "R6", "cycle.c", "const int answer = ask_back(self);", "const int answer = -1;"),
     Bug("taken-back-only-if-heard", "R6", "cycle.c", "if (self->backlog || (again &&", "if (self->backlog || !iw_wheel_heard(&self->wheel[IW_LEFT], now_us) || (again &&"),
     Bug("next-silence-waits", "R6", "cycle.c", "self->purged_us = IW_NEVER; self->left_behind = false;", "self->left_behind = false;"),
     Bug("echo-never-missed", "R6", "cycle.c", "if (waiting_us == IW_NEVER ||", "if (waiting_us != IW_NEVER ||"),

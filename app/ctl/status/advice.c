@@ -17,7 +17,7 @@ static const cure_t cures[] = {
     {"estop_software", "see that nobody is in the way"},
     {"wheel_lost", "switch the wheels on; check their cable and the termination"},
     {"wheel_rebooted", "find out why a wheel lost power; wait until both are heard"},
-    {"send_stalled", "nobody takes our frames: check the wheels' power and the cable"},
+    {"send_stalled", "nobody takes our frames: check the wheels' power and the cable; if both are good, take the link down and up"},
     {"bus_down", "bring the bus up (or start the simulator)"},
     {"second_master", "switch off the other program or device that sends setpoints"},
     {"feedback_sign", "check `invert` and the wheels' wiring before anything else"},
