@@ -156,8 +156,8 @@ static void hear_ticks(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *whee
     const uint32_t raw = (uint32_t)bytes[0] << 24 | (uint32_t)bytes[1] << 16 | (uint32_t)bytes[2] << 8 | bytes[3];
     const uint32_t moved = raw - (uint32_t)wheel->ticks;
     const int64_t way = (moved > INT32_MAX) ? (int64_t)moved - UINT32_MAX - 1 : (int64_t)moved;
-    // 20 m/s, and 100 ticks of slack: no wheel of this kind comes near.
-    if (wheel->ticks_us != IW_NEVER && llabs(way) > 100 + (int64_t)((now_us - wheel->ticks_us) / MS)) {
+    // 13 m/s, and 40 ticks of slack: no wheel of this kind comes near.
+    if (wheel->ticks_us != IW_NEVER && llabs(way) > 40 + (int64_t)((now_us - wheel->ticks_us) / (3U * MS / 2U))) {
         self->jump_now = true;
     }
     wheel->ticks = (int32_t)raw;
