@@ -321,8 +321,7 @@ void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us) {
 /// its time, and one that was received may stand in the backlog.
 void iw_cycle_keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
     if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE) {
-        self->purged_us = IW_NEVER;
-        self->left_behind = false;
+        self->purged_us = IW_NEVER; // Nothing is left behind either: arm was refused until it was gone.
         return;
     }
     if (overdue_us(self, now_us) == 0U) {

@@ -37,7 +37,6 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
 static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence) {
     self->pending_reboot = evidence;
     self->reboots++;
-    self->first_us = now_us;
     self->offset_us = now_us;
     self->boot_seen = true;
     self->status_us = IW_NEVER;

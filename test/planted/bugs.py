@@ -53,7 +53,7 @@ BUGS = [
     Bug("purge-forgotten", "R6", "sender.c", "const int answer = self->hal->purge(self->hal->context);", "const int answer = 1;"),
     Bug("silence-takes-nothing-back", "R6", "cycle.c", "const int answer = ask_back(self);", "const int answer = -1;"),
     Bug("taken-back-only-if-heard", "R6", "cycle.c", "if (self->backlog || (again &&", "if (self->backlog || !iw_wheel_heard(&self->wheel[IW_LEFT], now_us) || (again &&"),
-    Bug("next-silence-waits", "R6", "cycle.c", "self->purged_us = IW_NEVER; self->left_behind = false;", "self->left_behind = false;"),
+    Bug("next-silence-waits", "R6", "cycle.c", "if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE) { self->purged_us = IW_NEVER;", "if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE) {"),
     Bug("echo-never-missed", "R6", "cycle.c", "if (waiting_us == IW_NEVER ||", "if (waiting_us != IW_NEVER ||"),
     Bug("echo-account-kept", "R6", "cycle.c", "if (self->bus < IW_BUS_PASSIVE) { iw_outbox_clear(&self->sender.outbox);", "if (self->bus < IW_BUS_PASSIVE) {"),
     Bug("hang-forgiven", "R7", "cycle.c", "if (late_us > IW_GATEWAY_HUNG_US) {", "if (late_us > 100U * IW_GATEWAY_HUNG_US) {"),

@@ -269,6 +269,38 @@ static void test_gateway_setpoint_that_is_not_yet_taken_back_is_told_when_it_is_
     TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.left_behind);
 }
 
+static void test_gateway_setpoint_that_is_taken_back_when_asked_again_was_not_left(void) {
+    arm_in_vain(0);
+    rig.bus.purge_result = 1;
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_EQUAL_UINT32(1, rig.gateway.counters.purges);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.left_behind);
+}
+
+static void test_gateway_silence_after_a_stop_is_asked_once_too(void) {
+    gateway_rig_arm(&rig);
+    gateway_rig_stop(&rig);
+    run_to_silence();
+    TEST_ASSERT_NOT_EQUAL_UINT32(rig.gateway.purged_stop, rig.gateway.permit.stop.number);
+    arm_in_vain(0);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
+}
+
+static void test_gateway_setpoint_is_asked_back_within_the_first_second_of_time(void) {
+    const iw_hal_t hal = fake_bus_hal(&rig.bus);
+    rig.now_us = rig.wake_us = rig.wheel[IW_LEFT].speed_us = rig.wheel[IW_RIGHT].speed_us = 1;
+    rig.wheel[IW_LEFT].status_us = rig.wheel[IW_RIGHT].status_us = 1;
+    fake_bus_init(&rig.bus, rig.now_us);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_gateway_init(&rig.gateway, &rig.config, &hal, rig.now_us, false));
+    gateway_judge_init(&rig.judge, &rig.gateway, &rig.bus);
+    gateway_rig_run(&rig, MS(300));
+    rig.bus.acknowledged = false;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_TRUE(rig.now_us < IW_GATEWAY_LOST_ECHO_US);
+    TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
+}
+
 static void test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus_or_the_port(void) {
     for (unsigned n = 0; n < 3U; n++) {
         setUp();
@@ -338,6 +370,9 @@ int main(void) {
     RUN_TEST(test_gateway_what_the_port_has_not_done_is_asked_back_every_second_wheels_heard_or_not);
     RUN_TEST(test_gateway_setpoint_that_cannot_be_taken_back_is_told_at_once);
     RUN_TEST(test_gateway_setpoint_that_is_not_yet_taken_back_is_told_when_it_is_asked_for_again);
+    RUN_TEST(test_gateway_setpoint_that_is_taken_back_when_asked_again_was_not_left);
+    RUN_TEST(test_gateway_silence_after_a_stop_is_asked_once_too);
+    RUN_TEST(test_gateway_setpoint_is_asked_back_within_the_first_second_of_time);
     RUN_TEST(test_gateway_setpoint_left_behind_is_settled_by_echo_loss_of_the_bus_or_the_port);
     RUN_TEST(test_gateway_next_silence_is_given_its_own_second);
     RUN_TEST(test_gateway_what_was_only_refused_is_not_asked_back);

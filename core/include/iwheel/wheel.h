@@ -44,7 +44,7 @@ typedef enum {
 
 typedef struct {
     const iw_config_t *config;
-    iw_time_us_t first_us;      ///< Heard without a reboot since; IW_NEVER: not heard yet.
+    iw_time_us_t first_us;      ///< First heard; IW_NEVER: not yet.
     iw_time_us_t offset_us;     ///< Last offset frame of this run, or its start.
     iw_time_us_t any_us;        ///< Last frame of any kind, or the end of our own stall, or the start.
     iw_time_us_t heard_us;      ///< Last speed frame that counted for liveness.
