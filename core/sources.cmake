@@ -11,7 +11,7 @@ set(IWHEEL_CORE_SOURCES
     src/ledger.c
     src/outbox.c
     src/permit.c
-    src/proto.c
+    src/codec.c
     src/sender.c
     src/setpoint.c
     src/wheel.c)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "pretend_wheels.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 #define UM_PER_TURN 1206372 // A wheel of 192 mm radius.
 
@@ -13,10 +13,10 @@ static void put(pretend_wheels_t *self, const iw_can_frame_t *frame) {
 
 void pretend_wheels_run(pretend_wheels_t *self) {
     for (unsigned side = 0; side < IW_SIDES; ++side) {
-        iw_proto_message_t message = {.kind = IW_PROTO_SPEED, .side = (iw_side_t)side};
+        const int16_t rpm = (int16_t)(self->speed_mm_s[side] * 60 * 1000 / UM_PER_TURN);
+        const iw_codec_wheel_t told = {.speed = {.speed_rpm = rpm}};
         iw_can_frame_t frame;
-        message.as.speed.speed_rpm = (int16_t)(self->speed_mm_s[side] * 60 * 1000 / UM_PER_TURN);
-        if (iw_proto_encode(&message, &frame) == IW_OK) {
+        if (iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &told, &frame) == IW_OK) {
             put(self, &frame);
         }
     }
@@ -25,11 +25,12 @@ void pretend_wheels_run(pretend_wheels_t *self) {
 static int send(void *context, const iw_can_frame_t *frame) {
     pretend_wheels_t *self = (pretend_wheels_t *)context;
     iw_can_frame_t echo = *frame;
-    iw_proto_message_t message;
-    if (iw_proto_decode(frame, &message) == IW_OK && message.kind == IW_PROTO_SETPOINT) {
-        self->speed_mm_s[message.side] = message.as.setpoint.speed_mm_s;
-        if (message.as.setpoint.speed_mm_s > self->fastest_mm_s) {
-            self->fastest_mm_s = message.as.setpoint.speed_mm_s;
+    iw_codec_wheel_t told[IW_SIDES];
+    if (iw_codec_decode(frame, told) == IW_CODEC_SETPOINT) {
+        const iw_side_t side = iw_codec_side(frame->id);
+        self->speed_mm_s[side] = told[side].setpoint.speed_mm_s;
+        if (told[side].setpoint.speed_mm_s > self->fastest_mm_s) {
+            self->fastest_mm_s = told[side].setpoint.speed_mm_s;
         }
     }
     echo.kind = IW_CAN_ECHO;

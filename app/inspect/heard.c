@@ -8,26 +8,17 @@
 /// How often the bus is looked at although nothing wakes us: unknown ids come through a socket that is not watched.
 #define LOOK_MS 10
 
-const inspect_message_t inspect_messages[INSPECT_MESSAGES] = {
-    {"speed", IW_LEFT, IW_PROTO_SPEED, 250000U, IW_ID_LEFT_SPEED, true},
-    {"status", IW_LEFT, IW_PROTO_STATUS, 25000U, IW_ID_LEFT_STATUS, true},
-    {"force", IW_LEFT, IW_PROTO_FORCE, 20000U, IW_ID_LEFT_FORCE, true},
-    {"offset", IW_LEFT, IW_PROTO_OFFSET, 1000U, IW_ID_LEFT_OFFSET, false},
-    {"speed", IW_RIGHT, IW_PROTO_SPEED, 250000U, IW_ID_RIGHT_SPEED, true},
-    {"status", IW_RIGHT, IW_PROTO_STATUS, 25000U, IW_ID_RIGHT_STATUS, true},
-    {"pose", IW_RIGHT, IW_PROTO_POSE, 25000U, IW_ID_RIGHT_POSE, true},
-    {"force", IW_RIGHT, IW_PROTO_FORCE, 20000U, IW_ID_RIGHT_FORCE, true},
-    {"offset", IW_RIGHT, IW_PROTO_OFFSET, 1000U, IW_ID_RIGHT_OFFSET, false},
-    {"setpoint", IW_LEFT, IW_PROTO_SETPOINT, 0U, IW_ID_LEFT_SETPOINT, false},
-    {"setpoint", IW_RIGHT, IW_PROTO_SETPOINT, 0U, IW_ID_RIGHT_SETPOINT, false},
-};
+uint32_t inspect_nominal_mHz(const iw_codec_row_t *row) {
+    return row->kind == IW_CODEC_SETPOINT ? 0U : 1000000U / row->period_ms;
+}
+
+bool inspect_always(const iw_codec_row_t *row) {
+    return row->kind != IW_CODEC_SETPOINT && row->kind != IW_CODEC_OFFSET;
+}
 
 unsigned inspect_message_of(uint32_t id) {
-    unsigned i = 0;
-    while (i < INSPECT_MESSAGES && inspect_messages[i].id != id) {
-        ++i;
-    }
-    return i;
+    const iw_codec_row_t *row = iw_codec_find(id);
+    return row != NULL ? (unsigned)(row - iw_codec_rows) : IW_CODEC_ROWS;
 }
 
 void inspect_heard_begin(inspect_heard_t *self) {
@@ -47,23 +38,23 @@ static void note_stranger(inspect_heard_t *self, uint32_t id) {
 }
 
 void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame) {
-    iw_proto_message_t message;
+    iw_codec_wheel_t told[IW_SIDES];
     self->bits += iw_bus_frame_bits(frame);
     if (frame->kind == (uint8_t)IW_CAN_ECHO) {
         return;
     }
-    switch (iw_proto_decode(frame, &message)) {
-    case IW_OK:
-        ++self->count[inspect_message_of(frame->id)];
-        break;
-    case IW_ERR_LENGTH:
+    switch (iw_codec_decode(frame, told)) {
+    case IW_CODEC_BAD_LENGTH:
         ++self->bad_length;
         break;
-    case IW_ERR_FORMAT:
+    case IW_CODEC_BAD_FORMAT:
         ++self->bad_format;
         break;
-    default:
+    case IW_CODEC_UNKNOWN:
         note_stranger(self, frame->id);
+        break;
+    default:
+        ++self->count[inspect_message_of(frame->id)];
         break;
     }
 }

@@ -4,31 +4,23 @@
 #ifndef INSPECT_HEARD_H
 #define INSPECT_HEARD_H
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 #include "iwheel_linux/linux_hal.h"
 
 /// Other ids that are kept by number.
 #define INSPECT_STRANGERS 8U
-#define INSPECT_MESSAGES  11U
 
-/// A message of the document.
-typedef struct {
-    const char *name; ///< "speed", "status", ...
-    iw_side_t side;
-    iw_proto_kind_t kind;
-    uint32_t nominal_mHz; ///< Frames in 1000 s ...
-    uint16_t id;
-    bool always; ///< ... as long as the wheel has power; else only in its first minute, or from us.
-} inspect_message_t;
+/// Frames in 1000 s, as documented; 0 of a setpoint.
+uint32_t inspect_nominal_mHz(const iw_codec_row_t *row);
 
-/// The eleven messages with their nominal rates.
-extern const inspect_message_t inspect_messages[INSPECT_MESSAGES];
+/// A wheel with power sends it always, not only in its first minute.
+bool inspect_always(const iw_codec_row_t *row);
 
 typedef struct {
-    uint32_t count[INSPECT_MESSAGES]; ///< Good frames, in the order of `inspect_messages`; our own echoes are none.
-    uint32_t bad_length;              ///< Known id, shorter than the table.
-    uint32_t bad_format;              ///< Known id on a remote, extended or FD frame.
-    uint32_t strange;                 ///< Frames of any other id.
+    uint32_t count[IW_CODEC_ROWS];          ///< Good frames, in the order of `iw_codec_rows`; our own echoes are none.
+    uint32_t bad_length;                    ///< Known id, shorter than the table.
+    uint32_t bad_format;                    ///< Known id on a remote, extended or FD frame.
+    uint32_t strange;                       ///< Frames of any other id.
     uint32_t strange_id[INSPECT_STRANGERS]; ///< Their id words, as in iw_can_frame_t.
     uint32_t strange_ids;                   ///< How many of these.
     uint64_t bits;                          ///< Of all frames, without stuff bits.
@@ -49,7 +41,7 @@ void inspect_listen(iw_linux_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *o
 /// Frames per 1000 s of the message with that index.
 uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message);
 
-/// Index of the message with this id; INSPECT_MESSAGES if there is none.
+/// Index of the message with this id; IW_CODEC_ROWS if there is none.
 unsigned inspect_message_of(uint32_t id);
 
 /// Share of the bus that all frames took.

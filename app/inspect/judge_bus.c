@@ -13,8 +13,12 @@
 
 #define MESSAGE_FORMAT "%s %s %u (0x%03X)"
 
-static const char *side_of(const inspect_message_t *message) {
-    return message->side == IW_LEFT ? "left" : "right";
+static const char *side_of(const iw_codec_row_t *row) {
+    return row->side == IW_LEFT ? "left" : "right";
+}
+
+static const char *name_of(const iw_codec_row_t *row) {
+    return iw_codec_name((iw_codec_kind_t)row->kind);
 }
 
 static const char *wheel_check(iw_side_t side) {
@@ -28,28 +32,28 @@ static void write_rate(uint32_t rate_mHz, char out_text[16]) {
 
 /// True if the message does not come as often as it should.
 static bool rate_is_off(const inspect_heard_t *heard, unsigned index) {
-    const inspect_message_t *message = &inspect_messages[index];
-    const uint64_t wanted = (uint64_t)message->nominal_mHz * heard->span_us / 1000000U / 1000U;
+    const iw_codec_row_t *row = &iw_codec_rows[index];
+    const uint64_t wanted = (uint64_t)inspect_nominal_mHz(row) * heard->span_us / 1000000U / 1000U;
     const uint64_t got = heard->count[index];
     const uint64_t off = got > wanted ? got - wanted : wanted - got;
-    return message->always && off > wanted * RATE_OFF_PERMILLE / 1000U + RATE_OFF_FRAMES;
+    return inspect_always(row) && off > wanted * RATE_OFF_PERMILLE / 1000U + RATE_OFF_FRAMES;
 }
 
 static void judge_rate(const inspect_heard_t *heard, unsigned index, inspect_findings_t *findings) {
-    const inspect_message_t *message = &inspect_messages[index];
+    const iw_codec_row_t *row = &iw_codec_rows[index];
     char rate[16];
     char nominal[16];
     if (!rate_is_off(heard, index)) {
         return;
     }
     write_rate(inspect_rate_mHz(heard, index), rate);
-    write_rate(message->nominal_mHz, nominal);
+    write_rate(inspect_nominal_mHz(row), nominal);
     if (heard->count[index] == 0U) {
         inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": not heard; the document has %s a second",
-                    side_of(message), message->name, message->id, message->id, nominal);
+                    side_of(row), name_of(row), row->id, row->id, nominal);
     } else {
-        inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": %s a second; the document has %s",
-                    side_of(message), message->name, message->id, message->id, rate, nominal);
+        inspect_say(findings, "rates", INSPECT_WARN, MESSAGE_FORMAT ": %s a second; the document has %s", side_of(row),
+                    name_of(row), row->id, row->id, rate, nominal);
     }
     inspect_cure(findings, "frames get lost: check termination (60 ohm between CAN-H and CAN-L), cable and adapter; or "
                            "this wheel's firmware is another");
@@ -61,17 +65,17 @@ static void judge_wheel(const inspect_heard_t *heard, iw_side_t side, inspect_fi
     const uint64_t span_ms = heard->span_us / IW_US_PER_MS;
     char list[INSPECT_TEXT_SIZE] = "";
     uint32_t speeds = 0;
-    for (unsigned i = 0; i < INSPECT_MESSAGES; ++i) {
-        const inspect_message_t *message = &inspect_messages[i];
-        if (message->side != side || message->nominal_mHz == 0U) {
+    for (unsigned i = 0; i < IW_CODEC_ROWS; ++i) {
+        const iw_codec_row_t *row = &iw_codec_rows[i];
+        if (row->side != side || inspect_nominal_mHz(row) == 0U) {
             continue;
         }
-        speeds += message->kind == IW_PROTO_SPEED ? heard->count[i] : 0U;
+        speeds += row->kind == IW_CODEC_SPEED ? heard->count[i] : 0U;
         if (heard->count[i] > 0U) {
             const size_t length = strlen(list);
             char rate[16];
             write_rate(inspect_rate_mHz(heard, i), rate);
-            (void)snprintf(&list[length], sizeof list - length, "%s%s %s/s", length > 0U ? ", " : "", message->name,
+            (void)snprintf(&list[length], sizeof list - length, "%s%s %s/s", length > 0U ? ", " : "", name_of(row),
                            rate);
         }
     }
@@ -81,8 +85,8 @@ static void judge_wheel(const inspect_heard_t *heard, iw_side_t side, inspect_fi
         return;
     }
     inspect_say(findings, wheel_check(side), INSPECT_OK, "%s wheel: %s", name, list);
-    for (unsigned i = 0; i < INSPECT_MESSAGES; ++i) {
-        if (inspect_messages[i].side == side) {
+    for (unsigned i = 0; i < IW_CODEC_ROWS; ++i) {
+        if (iw_codec_rows[i].side == side) {
             judge_rate(heard, i, findings);
         }
     }

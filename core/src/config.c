@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/config.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 #include <string.h>
 

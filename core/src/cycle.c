@@ -82,50 +82,49 @@ static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
     }
 }
 
-static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, const iw_proto_message_t *message) {
-    const iw_wheel_t *const wheel = &self->wheel[message->side];
-    iw_force_t *const force = &self->force[message->side];
+static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side,
+                       const iw_codec_wheel_t *told) {
+    const iw_wheel_t *const wheel = &self->wheel[side];
+    iw_force_t *const force = &self->force[side];
     const iw_unit_evidence_t before = force->evidence;
-    if (message->kind == IW_PROTO_FORCE) {
+    if (kind == IW_CODEC_FORCE) {
         // By its last speed, however old: a stall of ours is no motion of the wheel's.
         const bool still = iw_magnitude(wheel->speed.speed_rpm) <= self->config.rest_rpm;
-        iw_force_hear(force, now_us, message->as.force.force_raw, still);
+        iw_force_hear(force, now_us, told->force.force_raw, still);
     } else {
-        iw_force_hear_offset(force, now_us, message->as.offset.offset_dN);
+        iw_force_hear_offset(force, now_us, told->offset.offset_dN);
     }
     if (force->evidence != before) {
-        note_force_evidence(self, message->side);
+        note_force_evidence(self, side);
     }
 }
 
-static void note_length(iw_gateway_t *self, const iw_can_frame_t *frame) {
-    if (frame->dlc == IW_DLC_STATUS) {
-        iw_ledger_confirm(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, frame->dlc);
+static void note_length(iw_gateway_t *self, uint8_t length) {
+    if (length == IW_DLC_STATUS) {
+        iw_ledger_confirm(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
     } else {
-        iw_ledger_contradict(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, frame->dlc);
+        iw_ledger_contradict(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
     }
 }
 
 /// Telemetry. A reboot is acted upon before the frame that revealed it is used any further.
-static void hear(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame,
-                 const iw_proto_message_t *message) {
-    iw_wheel_t *const wheel = &self->wheel[message->side];
+static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side,
+                 const iw_codec_wheel_t *told) {
+    iw_wheel_t *const wheel = &self->wheel[side];
     const bool first = wheel->first_us == IW_NEVER;
     self->counters.received++;
-    iw_wheel_hear(wheel, now_us, message, !self->stalled);
+    iw_wheel_hear(wheel, now_us, kind, told, !self->stalled);
     const iw_reboot_t reboot = iw_wheel_take_reboot(wheel);
     if (reboot != IW_REBOOT_NONE) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_REBOOTED, side_bit(message->side), (uint32_t)reboot);
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_REBOOTED, side_bit(side), (uint32_t)reboot);
     }
     if (first || reboot != IW_REBOOT_NONE) {
-        iw_force_reopen(&self->force[message->side], wheel->boot_seen);
+        iw_force_reopen(&self->force[side], wheel->boot_seen);
     }
-    if (message->kind == IW_PROTO_FORCE || message->kind == IW_PROTO_OFFSET) {
-        hear_force(self, now_us, message);
-    } else if (message->kind == IW_PROTO_STATUS) {
-        note_length(self, frame);
-    } else if (message->kind == IW_PROTO_POSE) {
-        self->pose = message->as.pose;
+    if (kind == IW_CODEC_FORCE || kind == IW_CODEC_OFFSET) {
+        hear_force(self, now_us, kind, side, told);
+    } else if (kind == IW_CODEC_POSE) {
+        self->pose = told->pose;
         self->pose_us = now_us;
     }
 }
@@ -140,29 +139,40 @@ static bool is_setpoint_id(uint32_t id) {
     return id == IW_ID_LEFT_SETPOINT || id == IW_ID_RIGHT_SETPOINT;
 }
 
+/// Our own, confirmed, or somebody else's.
+static void take_setpoint(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
+    if (frame->kind == IW_CAN_ECHO) {
+        self->counters.echoes++;
+        iw_outbox_echo(&self->sender.outbox, iw_codec_side(frame->id), frame);
+    } else {
+        hear_foreign(self, now_us, frame->id);
+    }
+}
+
 static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
-    iw_proto_message_t message;
+    iw_codec_wheel_t told[IW_SIDES]; // Of the message that is decoded, and of its wheel, nothing else is read.
     if (is_setpoint_id(frame->id)) {
-        if (frame->kind == IW_CAN_ECHO) {
-            self->counters.echoes++;
-            iw_outbox_echo(&self->sender.outbox, (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT, frame);
-        } else {
-            hear_foreign(self, now_us, frame->id);
-        }
+        take_setpoint(self, now_us, frame);
         return;
     }
-    switch (iw_proto_decode(frame, &message)) {
-    case IW_OK:
-        hear(self, now_us, frame, &message);
-        break;
-    case IW_ERR_FORMAT:
+    const iw_codec_kind_t kind = iw_codec_decode(frame, told);
+    const iw_side_t side = iw_codec_side(frame->id);
+    switch (kind) {
+    case IW_CODEC_BAD_FORMAT:
         self->counters.bad_format++;
         break;
-    case IW_ERR_LENGTH:
+    case IW_CODEC_BAD_LENGTH:
         self->counters.bad_length++;
         break;
-    default:
+    case IW_CODEC_UNKNOWN:
         self->counters.unknown++;
+        break;
+    case IW_CODEC_STATUS:
+        note_length(self, frame->dlc);
+        hear(self, now_us, kind, side, &told[side]);
+        break;
+    default:
+        hear(self, now_us, kind, side, &told[side]);
         break;
     }
 }

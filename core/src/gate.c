@@ -28,7 +28,17 @@ static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_
                        : from - to <= allowance(self->config->decel_mm_s2, elapsed_us);
 }
 
-static bool is_zero(const iw_config_t *config, const iw_proto_setpoint_t *setpoint) {
+/// As the wheel does it, byte by byte; not by the codec that wrote them.
+static iw_codec_setpoint_t read_setpoint(const uint8_t *data) {
+    const iw_codec_setpoint_t setpoint = {
+        .speed_mm_s = (int16_t)(uint16_t)(data[1] * 256U + data[2]),
+        .current_mA = (int16_t)(uint16_t)(data[3] * 256U + data[4]),
+        .type = data[0],
+    };
+    return setpoint;
+}
+
+static bool is_zero(const iw_config_t *config, const iw_codec_setpoint_t *setpoint) {
     return setpoint->speed_mm_s == 0 && (config->current_role == IW_ROLE_LIMIT || setpoint->current_mA == 0);
 }
 
@@ -42,7 +52,7 @@ static bool current_ok(const iw_config_t *config, int32_t current_mA) {
 }
 
 static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, iw_side_t side,
-                               const iw_proto_setpoint_t *setpoint) {
+                               const iw_codec_setpoint_t *setpoint) {
     const iw_config_t *const config = self->config;
     if (!type_ok(config, setpoint->type)) {
         return IW_GATE_TYPE;
@@ -62,9 +72,8 @@ static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, iw_si
 iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     const bool left = frame->id == IW_ID_LEFT_SETPOINT;
     const iw_side_t side = left ? IW_LEFT : IW_RIGHT;
-    iw_proto_setpoint_t setpoint;
+    const iw_codec_setpoint_t setpoint = read_setpoint(frame->data);
     iw_gate_verdict_t verdict = IW_GATE_NOT_A_SETPOINT;
-    iw_proto_read_setpoint(frame, &setpoint);
     if ((left || frame->id == IW_ID_RIGHT_SETPOINT) && frame->dlc == self->config->setpoint_dlc) {
         verdict = judge(self, now_us, side, &setpoint);
     }

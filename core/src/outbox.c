@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/outbox.h"
 
-#include "iwheel/be.h"
+#include "be.h"
 
 #include <string.h>
 
@@ -23,8 +23,8 @@ bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero) {
 }
 
 /// The four bytes behind the setpoint's type.
-static int32_t value_of(const iw_can_frame_t *frame) {
-    return iw_be_get_i32(&frame->data[1]);
+static uint32_t value_of(const iw_can_frame_t *frame) {
+    return (iw_be_word(frame, 0) << 8) | (iw_be_word(frame, 1) >> 24);
 }
 
 void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, const iw_can_frame_t *frame,

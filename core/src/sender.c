@@ -23,14 +23,14 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
                     iw_can_frame_t *out_frame) {
     const iw_config_t *const config = self->config;
     const bool invert = config->invert[side];
-    iw_proto_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
+    iw_codec_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
     if (invert) {
         setpoint.speed_mm_s = (int16_t)-setpoint.speed_mm_s;
     }
     if (invert && config->current_role == IW_ROLE_SETPOINT) {
         setpoint.current_mA = (int16_t)-setpoint.current_mA;
     }
-    self->clamped += iw_proto_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, out_frame) ? 1U : 0U;
+    self->clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, out_frame) ? 1U : 0U;
     const iw_gate_verdict_t verdict = iw_gate_check(&self->gate, now_us, out_frame);
     self->verdict = (verdict == IW_GATE_PASS) ? self->verdict : verdict;
     return verdict == IW_GATE_PASS;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/setpoint.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 #include "magnitude.h"
 
 #include <string.h>

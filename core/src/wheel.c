@@ -55,7 +55,7 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
     }
 }
 
-static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_speed_t *speed, bool fresh) {
+static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
     const bool gap = !iw_wheel_heard(self, now_us);
     self->speed = *speed;
@@ -77,7 +77,7 @@ static bool tick_jump(const iw_wheel_t *self, uint32_t delta, iw_time_us_t elaps
     return moved > IW_WHEEL_TICK_SLACK && moved - IW_WHEEL_TICK_SLACK > limit;
 }
 
-static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_status_t *status) {
+static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_status_t *status) {
     if (self->status_us != IW_NEVER) {
         const uint32_t delta = (uint32_t)status->odometry_ticks - (uint32_t)self->status.odometry_ticks;
         if (tick_jump(self, delta, now_us - self->status_us)) {
@@ -98,13 +98,14 @@ static void hear_offset(iw_wheel_t *self, iw_time_us_t now_us) {
     self->offset_us = now_us;
 }
 
-void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message_t *message, bool fresh) {
+void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
+                   bool fresh) {
     note_presence(self, now_us);
-    if (message->kind == IW_PROTO_SPEED) {
-        hear_speed(self, now_us, &message->as.speed, fresh);
-    } else if (message->kind == IW_PROTO_STATUS) {
-        hear_status(self, now_us, &message->as.status);
-    } else if (message->kind == IW_PROTO_OFFSET) {
+    if (kind == IW_CODEC_SPEED) {
+        hear_speed(self, now_us, &told->speed, fresh);
+    } else if (kind == IW_CODEC_STATUS) {
+        hear_status(self, now_us, &told->status);
+    } else if (kind == IW_CODEC_OFFSET) {
         hear_offset(self, now_us);
     }
 }

@@ -2,7 +2,7 @@
 #include "bxcan_filters.h"
 
 #include "bxcan.h"
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 #include <assert.h>
 

@@ -25,7 +25,7 @@ def codecs(work):
     return {
         "loop": ([HERE / "codec/loop.c"], INCLUDES),
         "floor": ([HERE / "codec/floor.c"], INCLUDES),
-        "iwheel": ([HERE / "codec/iwheel.c", CORE / "src/proto.c"], INCLUDES),
+        "iwheel": ([HERE / "codec/iwheel.c", CORE / "src/codec.c"], INCLUDES),
         "cantools": ([HERE / "codec/cantools.c", generated / "iwheel.c"], [*INCLUDES, generated]),
     }
 
@@ -64,7 +64,7 @@ def arm_codec(work, name, cpu, sources, includes):
 
 
 def arm_linked(work, cpu):
-    elf = count_arm.build(work / f"linked-{cpu}.elf", cpu, [HERE / "codec/linked.c", CORE / "src/proto.c"], INCLUDES,
+    elf = count_arm.build(work / f"linked-{cpu}.elf", cpu, [HERE / "codec/linked.c", CORE / "src/codec.c"], INCLUDES,
                           ["bench_linked_decode", "bench_linked_encode"])
     return count_arm.text_size(elf)
 

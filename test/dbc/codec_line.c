@@ -10,89 +10,90 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "iwheel/proto.h"
+#include "../support/message.h"
+#include "iwheel/codec.h"
 
 #define LINE_MAX_BYTES 160
 #define VALUES_MAX     4
 
 typedef struct {
     uint32_t id;
-    iw_proto_kind_t kind;
+    iw_codec_kind_t kind;
     iw_side_t side;
 } message_id_t;
 
 static const message_id_t message_ids[] = {
-    {IW_ID_LEFT_SETPOINT, IW_PROTO_SETPOINT, IW_LEFT}, {IW_ID_RIGHT_SETPOINT, IW_PROTO_SETPOINT, IW_RIGHT},
-    {IW_ID_LEFT_SPEED, IW_PROTO_SPEED, IW_LEFT},       {IW_ID_RIGHT_SPEED, IW_PROTO_SPEED, IW_RIGHT},
-    {IW_ID_LEFT_STATUS, IW_PROTO_STATUS, IW_LEFT},     {IW_ID_RIGHT_STATUS, IW_PROTO_STATUS, IW_RIGHT},
-    {IW_ID_RIGHT_POSE, IW_PROTO_POSE, IW_RIGHT},       {IW_ID_LEFT_FORCE, IW_PROTO_FORCE, IW_LEFT},
-    {IW_ID_RIGHT_FORCE, IW_PROTO_FORCE, IW_RIGHT},     {IW_ID_LEFT_OFFSET, IW_PROTO_OFFSET, IW_LEFT},
-    {IW_ID_RIGHT_OFFSET, IW_PROTO_OFFSET, IW_RIGHT},
+    {IW_ID_LEFT_SETPOINT, IW_CODEC_SETPOINT, IW_LEFT}, {IW_ID_RIGHT_SETPOINT, IW_CODEC_SETPOINT, IW_RIGHT},
+    {IW_ID_LEFT_SPEED, IW_CODEC_SPEED, IW_LEFT},       {IW_ID_RIGHT_SPEED, IW_CODEC_SPEED, IW_RIGHT},
+    {IW_ID_LEFT_STATUS, IW_CODEC_STATUS, IW_LEFT},     {IW_ID_RIGHT_STATUS, IW_CODEC_STATUS, IW_RIGHT},
+    {IW_ID_RIGHT_POSE, IW_CODEC_POSE, IW_RIGHT},       {IW_ID_LEFT_FORCE, IW_CODEC_FORCE, IW_LEFT},
+    {IW_ID_RIGHT_FORCE, IW_CODEC_FORCE, IW_RIGHT},     {IW_ID_LEFT_OFFSET, IW_CODEC_OFFSET, IW_LEFT},
+    {IW_ID_RIGHT_OFFSET, IW_CODEC_OFFSET, IW_RIGHT},
 };
 
 /// Writes the message's values in the order of its bytes; returns how many.
-static size_t values_of(const iw_proto_message_t *message, long *values) {
+static size_t values_of(const message_t *message, long *values) {
     switch (message->kind) {
-    case IW_PROTO_SETPOINT:
+    case IW_CODEC_SETPOINT:
         values[0] = message->as.setpoint.type;
         values[1] = message->as.setpoint.speed_mm_s;
         values[2] = message->as.setpoint.current_mA;
         return 3;
-    case IW_PROTO_SPEED:
+    case IW_CODEC_SPEED:
         values[0] = message->as.speed.speed_rpm;
         values[1] = message->as.speed.acceleration_raw;
         return 2;
-    case IW_PROTO_STATUS:
+    case IW_CODEC_STATUS:
         values[0] = message->as.status.battery_dV;
         values[1] = message->as.status.temperature_degC;
         values[2] = message->as.status.odometry_ticks;
         values[3] = message->as.status.cpu_percent;
         return 4;
-    case IW_PROTO_POSE:
+    case IW_CODEC_POSE:
         values[0] = message->as.pose.x_mm;
         values[1] = message->as.pose.y_mm;
         values[2] = message->as.pose.z_mm;
         values[3] = message->as.pose.psi_mrad;
         return 4;
-    case IW_PROTO_FORCE:
+    case IW_CODEC_FORCE:
         values[0] = message->as.force.force_raw;
         values[1] = message->as.force.debug_raw;
         return 2;
-    case IW_PROTO_OFFSET:
+    case IW_CODEC_OFFSET:
     default:
         values[0] = message->as.offset.offset_dN;
         return 1;
     }
 }
 
-static void set_values(iw_proto_message_t *message, const long *values) {
+static void set_values(message_t *message, const long *values) {
     switch (message->kind) {
-    case IW_PROTO_SETPOINT:
+    case IW_CODEC_SETPOINT:
         message->as.setpoint.type = (uint8_t)values[0];
         message->as.setpoint.speed_mm_s = (int16_t)values[1];
         message->as.setpoint.current_mA = (int16_t)values[2];
         break;
-    case IW_PROTO_SPEED:
+    case IW_CODEC_SPEED:
         message->as.speed.speed_rpm = (int16_t)values[0];
         message->as.speed.acceleration_raw = (int16_t)values[1];
         break;
-    case IW_PROTO_STATUS:
+    case IW_CODEC_STATUS:
         message->as.status.battery_dV = (uint8_t)values[0];
         message->as.status.temperature_degC = (uint8_t)values[1];
         message->as.status.odometry_ticks = (int32_t)values[2];
         message->as.status.cpu_percent = (uint8_t)values[3];
         break;
-    case IW_PROTO_POSE:
+    case IW_CODEC_POSE:
         message->as.pose.x_mm = (int16_t)values[0];
         message->as.pose.y_mm = (int16_t)values[1];
         message->as.pose.z_mm = (int16_t)values[2];
         message->as.pose.psi_mrad = (int16_t)values[3];
         break;
-    case IW_PROTO_FORCE:
+    case IW_CODEC_FORCE:
         message->as.force.force_raw = (int16_t)values[0];
         message->as.force.debug_raw = (int16_t)values[1];
         break;
-    case IW_PROTO_OFFSET:
+    case IW_CODEC_OFFSET:
     default:
         message->as.offset.offset_dN = (int16_t)values[0];
         break;
@@ -101,15 +102,14 @@ static void set_values(iw_proto_message_t *message, const long *values) {
 
 static void decode_line(uint32_t id, const char *hex) {
     iw_can_frame_t frame = {.id = id};
-    iw_proto_message_t message;
+    message_t message;
     long values[VALUES_MAX];
     for (; frame.dlc < IW_CAN_DATA_MAX && strlen(hex) >= 2; hex += 2) {
         const char digits[3] = {hex[0], hex[1], '\0'};
         frame.data[frame.dlc++] = (uint8_t)strtoul(digits, NULL, 16);
     }
-    const iw_status_t status = iw_proto_decode(&frame, &message);
-    if (status != IW_OK) {
-        printf("error %d\n", (int)status);
+    if (!message_decode(&frame, &message)) {
+        printf("error\n");
         return;
     }
     const size_t count = values_of(&message, values);
@@ -122,7 +122,7 @@ static void decode_line(uint32_t id, const char *hex) {
 
 static void encode_line(uint32_t id, const char *text) {
     iw_can_frame_t frame = {0};
-    iw_proto_message_t message = {IW_PROTO_POSE, IW_LEFT, {.pose = {0, 0, 0, 0}}};
+    message_t message = {IW_CODEC_POSE, IW_LEFT, {.pose = {0, 0, 0, 0}}};
     long values[VALUES_MAX];
     char *rest = NULL;
     for (size_t i = 0; i < VALUES_MAX; i++) {
@@ -136,9 +136,8 @@ static void encode_line(uint32_t id, const char *text) {
             set_values(&message, values);
         }
     }
-    const iw_status_t status = iw_proto_encode(&message, &frame);
-    if (status != IW_OK) {
-        printf("error %d\n", (int)status);
+    if (message_encode(&message, &frame) != IW_OK) {
+        printf("error\n");
         return;
     }
     printf("%" PRIu32 " ", frame.id);

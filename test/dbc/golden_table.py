@@ -17,7 +17,7 @@ BEGIN = "<!-- golden vectors: begin (test/dbc/golden_table.py --update) -->\n"
 END = "<!-- golden vectors: end -->\n"
 
 ROW = re.compile(r'\{"([^"]+)",\s*\{\.id = (\d+)U, \.dlc = (\d+)U, \.data = \{([^}]*)\}\},\s*'
-                 r"\{IW_PROTO_(\w+), IW_(\w+), \{\.\w+ = \{([^}]*)\}\}\}\}")
+                 r"\{IW_CODEC_(\w+), IW_(\w+), \{\.\w+ = \{([^}]*)\}\}\}\}")
 
 
 class Vector(NamedTuple):
@@ -41,7 +41,7 @@ def read_vectors():
             key, value = field.split(" = ")
             values.append((key[1:], -2**31 if value == "INT32_MIN" else int(value)))
         vectors.append(Vector(name, int(can_id), octets, values))
-    rows = text.count("{IW_PROTO_")
+    rows = text.count("{IW_CODEC_")
     if len(vectors) != rows:
         raise ValueError(f"{HEADER.name}: {rows} rows, but only {len(vectors)} in the form that golden_table.py reads")
     return vectors

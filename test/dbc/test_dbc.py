@@ -168,7 +168,7 @@ class TestAgainstTheCodec(unittest.TestCase):
     def test_shorter_frames_are_refused_by_both(self):
         frames = [(can_id, data[:length]) for can_id, data in random_frames(4, 1) for length in range(len(data))]
         for frame, ours in zip(frames, CODEC.decode(frames)):
-            self.assertEqual("error 4", ours, frame)
+            self.assertEqual("error", ours, frame)
             with self.assertRaises(cantools.database.DecodeError):
                 decoded_by_dbc(DATABASE, [frame])
 

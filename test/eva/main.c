@@ -220,19 +220,19 @@ static void look(iw_side_t side) {
 
 /// What does not belong to the loop of a gateway: the codec's other direction, the bit timing.
 static void calculate(void) {
-    iw_proto_message_t message = {0};
+    iw_codec_wheel_t told[IW_SIDES];
     iw_can_frame_t frame;
     iw_bit_timing_t timing = {any_u16(), any_u16(), any_u16()};
     const iw_bit_timing_limits_t limits = {any_u16(), any_u16(), any_u16(), any_u16(), any_u16()};
     const iw_bit_timing_achieved_t wanted = {any_u32(), any_u16()};
     (void)iw_bit_timing_achieved(any_u32(), &timing);
     (void)iw_bit_timing_solve(&limits, any_u32(), &wanted, &timing);
-    message.kind = (iw_proto_kind_t)Frama_C_interval(IW_PROTO_SPEED, IW_PROTO_SETPOINT);
-    message.side = (iw_side_t)Frama_C_interval(IW_LEFT, IW_RIGHT);
-    Frama_C_make_unknown((char *)&message.as, sizeof message.as);
-    (void)iw_proto_encode(&message, &frame);
+    const iw_codec_kind_t kind = (iw_codec_kind_t)Frama_C_interval(IW_CODEC_SPEED, IW_CODEC_SETPOINT);
+    const iw_side_t side = (iw_side_t)Frama_C_interval(IW_LEFT, IW_RIGHT);
+    Frama_C_make_unknown((char *)told, sizeof told);
+    (void)iw_codec_encode(kind, side, &told[side], &frame);
     (void)receive_frame(NULL, &frame);
-    (void)iw_proto_decode_other(&frame, &message);
+    (void)iw_codec_decode(&frame, told);
 }
 
 static void event(void) {

@@ -2,12 +2,13 @@
 // Any bytes as a frame: what is decoded says what its bytes say, and encoding it again gives them back.
 #include "fuzz.h"
 
-#include "iwheel/proto.h"
+#include "../support/message.h"
+#include "iwheel/codec.h"
 
-static uint8_t least_dlc(iw_proto_kind_t kind) {
+static uint8_t least_dlc(iw_codec_kind_t kind) {
     static const uint8_t table[] = {
-        [IW_PROTO_SETPOINT] = IW_DLC_SETPOINT, [IW_PROTO_SPEED] = IW_DLC_SPEED, [IW_PROTO_STATUS] = IW_DLC_STATUS,
-        [IW_PROTO_POSE] = IW_DLC_POSE,         [IW_PROTO_FORCE] = IW_DLC_FORCE, [IW_PROTO_OFFSET] = IW_DLC_OFFSET,
+        [IW_CODEC_SETPOINT] = IW_DLC_SETPOINT, [IW_CODEC_SPEED] = IW_DLC_SPEED, [IW_CODEC_STATUS] = IW_DLC_STATUS,
+        [IW_CODEC_POSE] = IW_DLC_POSE,         [IW_CODEC_FORCE] = IW_DLC_FORCE, [IW_CODEC_OFFSET] = IW_DLC_OFFSET,
     };
     return table[kind];
 }
@@ -30,20 +31,20 @@ static iw_can_frame_t take_frame(fuzz_bytes_t *bytes) {
     return frame;
 }
 
-static void judge(const iw_can_frame_t *frame, const iw_proto_message_t *message) {
+static void judge(const iw_can_frame_t *frame, const message_t *message) {
     iw_can_frame_t again;
     fuzz_require(frame->id <= IW_CAN_ID_MASK, "only 11-bit data frames are decoded");
     fuzz_require(frame->dlc >= least_dlc(message->kind) && frame->dlc <= IW_CAN_DATA_MAX, "short frames are refused");
-    fuzz_require(iw_proto_encode(message, &again) == IW_OK, "what was decoded can be encoded");
+    fuzz_require(message_encode(message, &again) == IW_OK, "what was decoded can be encoded");
     fuzz_require(again.id == frame->id && again.dlc == least_dlc(message->kind),
                  "to the same id, in the table's length");
-    if (message->kind == IW_PROTO_SETPOINT) {
+    if (message->kind == IW_CODEC_SETPOINT) {
         fuzz_require(memcmp(again.data, frame->data, 3) == 0, "type and speed of a setpoint survive");
         const int32_t current = message->as.setpoint.current_mA;
         const bool within = current >= -IW_CURRENT_LIMIT_mA && current <= IW_CURRENT_LIMIT_mA;
         fuzz_require((memcmp(again.data, frame->data, 5) == 0) == within, "the current too, unless it was clamped");
-    } else if (message->kind == IW_PROTO_FORCE || message->kind == IW_PROTO_SPEED || message->kind == IW_PROTO_STATUS ||
-               message->kind == IW_PROTO_POSE || message->kind == IW_PROTO_OFFSET) {
+    } else if (message->kind == IW_CODEC_FORCE || message->kind == IW_CODEC_SPEED || message->kind == IW_CODEC_STATUS ||
+               message->kind == IW_CODEC_POSE || message->kind == IW_CODEC_OFFSET) {
         fuzz_require(memcmp(again.data, frame->data, again.dlc) == 0, "the bytes survive");
     }
 }
@@ -52,8 +53,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_bytes_t bytes = {data, size, 0};
     while (bytes.at < bytes.size) {
         const iw_can_frame_t frame = take_frame(&bytes);
-        iw_proto_message_t message;
-        if (iw_proto_decode(&frame, &message) == IW_OK) {
+        message_t message;
+        if (message_decode(&frame, &message)) {
             fuzz_tell("taken");
             judge(&frame, &message);
         } else {

@@ -3,6 +3,7 @@
 // happens, only setpoints within the limits leave, and none but zero after a cut until arm and a drive were accepted.
 #include "fuzz.h"
 
+#include "../support/message.h"
 #include "iwheel/gateway.h"
 
 #define RX_MAX 16U
@@ -113,9 +114,9 @@ static void put(world_t *world, const iw_can_frame_t *frame) {
 /// Speeds of both wheels, as good wheels send them.
 static void put_telemetry(world_t *world, int16_t rpm) {
     for (int side = 0; side < IW_SIDES; side++) {
-        const iw_proto_message_t message = {IW_PROTO_SPEED, (iw_side_t)side, {.speed = {rpm, 0}}};
+        const message_t message = {IW_CODEC_SPEED, (iw_side_t)side, {.speed = {rpm, 0}}};
         iw_can_frame_t frame;
-        (void)iw_proto_encode(&message, &frame);
+        (void)message_encode(&message, &frame);
         put(world, &frame);
     }
 }

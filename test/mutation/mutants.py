@@ -9,7 +9,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parent.parent.parent
 CORE, PUBLIC = ROOT / "core/src", ROOT / "core/include/iwheel"
 # Macros that only hint: what they are given is looked at as if they were not there.
-HINTS = ("IW_PROTO_LIKELY",)
+HINTS = ("IW_CODEC_LIKELY",)
 OPERATORS = {
     "<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"), "==": ("!=",), "!=": ("==",), "&&": ("||",),
     "||": ("&&",), "+": ("-",), "-": ("+",), "*": ("/",), "/": ("*",), "%": ("/",), "&": ("|",), "|": ("&",), "^": ("|",),

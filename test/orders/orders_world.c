@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "orders_world.h"
+#include "../support/message.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -352,11 +353,11 @@ static void land(world_t *self) {
 
 static void send_telemetry(world_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
-        iw_proto_message_t message = {.kind = IW_PROTO_SPEED, .side = (iw_side_t)side};
+        message_t message = {.kind = IW_CODEC_SPEED, .side = (iw_side_t)side};
         iw_can_frame_t frame;
         move_wheel(&self->wheel[side], self->now_us);
         message.as.speed.speed_rpm = (int16_t)(self->wheel[side].speed_um_s / UM_S_PER_RPM);
-        (void)iw_proto_encode(&message, &frame);
+        (void)message_encode(&message, &frame);
         put(self, &frame, IW_CAN_RECEIVED);
     }
     self->telemetry_us += TELEMETRY_US;

@@ -7,8 +7,8 @@
 #define TEST_FAKE_BUS_H
 
 #include "fixture.h"
+#include "iwheel/codec.h"
 #include "iwheel/hal.h"
-#include "iwheel/proto.h"
 
 /// Frames that can wait to be received; what comes beyond is lost and counted.
 #define FAKE_BUS_RX_MAX 400U

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "gateway_rig.h"
+#include "message.h"
 
 #include <string.h>
 
@@ -50,21 +51,21 @@ static int16_t rpm_of(const gateway_rig_t *self, size_t side) {
 
 static void wheel_send(gateway_rig_t *self, size_t side) {
     rig_wheel_t *const wheel = &self->wheel[side];
-    iw_proto_message_t message = {IW_PROTO_SPEED, (iw_side_t)side, {.speed = {.speed_rpm = rpm_of(self, side)}}};
+    message_t message = {IW_CODEC_SPEED, (iw_side_t)side, {.speed = {.speed_rpm = rpm_of(self, side)}}};
     iw_can_frame_t frame;
     while (wheel->speed_us <= self->now_us) {
         wheel->speed_us += self->speed_period_us;
         if (!wheel->mute && self->bus.state >= IW_BUS_PASSIVE) {
-            (void)iw_proto_encode(&message, &frame);
+            (void)message_encode(&message, &frame);
             fake_bus_put(&self->bus, &frame);
         }
     }
     while (wheel->status_us <= self->now_us) {
         wheel->status_us += STATUS_PERIOD_US;
-        message.kind = IW_PROTO_STATUS;
-        message.as.status = (iw_proto_status_t){wheel->ticks, 240, 30, 20};
+        message.kind = IW_CODEC_STATUS;
+        message.as.status = (iw_codec_status_t){wheel->ticks, 240, 30, 20};
         if (!wheel->mute && self->bus.state >= IW_BUS_PASSIVE) {
-            (void)iw_proto_encode(&message, &frame);
+            (void)message_encode(&message, &frame);
             fake_bus_put(&self->bus, &frame);
         }
     }

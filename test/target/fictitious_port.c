@@ -108,10 +108,9 @@ static void send_slots(void) {
 /// Both wheels do as told.
 static void send_telemetry(void) {
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const iw_proto_message_t message = {
-            .kind = IW_PROTO_SPEED, .side = (iw_side_t)side, .as.speed = {(int16_t)(told_mm_s[side] / 20), 0}};
+        const iw_codec_wheel_t told = {.speed = {.speed_rpm = (int16_t)(told_mm_s[side] / 20)}};
         iw_can_frame_t frame;
-        (void)iw_proto_encode(&message, &frame);
+        (void)iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &told, &frame);
         put(&frame);
     }
     telemetry_us += 4000U;

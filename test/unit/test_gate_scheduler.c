@@ -37,9 +37,9 @@ static iw_command_t any_command(const iw_config_t *config) {
 static void send_through_gate(iw_gate_t *gate, const iw_config_t *config, iw_time_us_t now_us, const iw_pair_t *pair) {
     for (int side = IW_LEFT; side <= IW_RIGHT; side++) {
         const iw_command_t *const command = &pair->wheel[side];
-        const iw_proto_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
+        const iw_codec_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
         iw_can_frame_t frame;
-        TEST_ASSERT_FALSE(iw_proto_encode_setpoint((iw_side_t)side, &setpoint, (uint8_t)config->setpoint_dlc, &frame));
+        TEST_ASSERT_FALSE(iw_codec_encode_setpoint((iw_side_t)side, &setpoint, (uint8_t)config->setpoint_dlc, &frame));
         TEST_ASSERT_EQUAL(IW_GATE_PASS, iw_gate_check(gate, now_us, &frame));
     }
 }

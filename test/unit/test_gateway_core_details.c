@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Rules that only a mutant of the core pointed out: each test here has killed one that lived.
 #include "gateway_rig.h"
+#include "message.h"
 #include "unity.h"
 
 static gateway_rig_t rig;
@@ -162,13 +163,13 @@ static void test_gateway_setpoint_refused_on_the_left_does_not_leave_on_the_righ
 
 /// Two seconds and a bit of force frames of the left wheel, turning at that speed.
 static void hear_force(int16_t raw, int16_t rpm) {
-    const iw_proto_message_t message = {IW_PROTO_FORCE, IW_LEFT, {.force = {.force_raw = raw}}};
+    const message_t message = {IW_CODEC_FORCE, IW_LEFT, {.force = {.force_raw = raw}}};
     iw_can_frame_t frame;
     rig.wheel[IW_LEFT].rpm_fixed = true;
     rig.wheel[IW_LEFT].rpm = rpm;
     for (unsigned i = 0; i < IW_FORCE_WINDOW_SAMPLES + 1U; i++) {
         gateway_rig_run(&rig, MS(50));
-        (void)iw_proto_encode(&message, &frame);
+        (void)message_encode(&message, &frame);
         fake_bus_put(&rig.bus, &frame);
     }
     gateway_rig_run(&rig, MS(10));
@@ -184,11 +185,11 @@ static void test_gateway_force_is_measured_at_rest_up_to_rest_rpm(void) {
 }
 
 static void test_gateway_force_evidence_that_is_not_new_does_not_overrule_the_operator(void) {
-    const iw_proto_message_t message = {IW_PROTO_OFFSET, IW_LEFT, {.offset = {.offset_dN = 100}}};
+    const message_t message = {IW_CODEC_OFFSET, IW_LEFT, {.offset = {.offset_dN = 100}}};
     const iw_ledger_entry_t *const entry = iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_FORCE_UNIT_LEFT);
     iw_can_frame_t frame;
     gateway_rig_run(&rig, MS(500));
-    (void)iw_proto_encode(&message, &frame);
+    (void)message_encode(&message, &frame);
     fake_bus_put(&rig.bus, &frame);
     hear_force(100, 0);
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry->state);

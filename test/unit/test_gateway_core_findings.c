@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the gateway finds out about the wheels without moving them: units, offsets, lengths, pose, reboots.
 #include "gateway_rig.h"
+#include "message.h"
 #include "unity.h"
 
 static gateway_rig_t rig;
@@ -22,20 +23,20 @@ static void assert_entry(iw_ledger_item_t item, iw_ledger_state_t state, iw_evid
     TEST_ASSERT_EQUAL_INT(evidence, entry(item)->evidence);
 }
 
-static void put(const iw_proto_message_t *message) {
+static void put(const message_t *message) {
     iw_can_frame_t frame;
-    TEST_ASSERT_EQUAL_INT(IW_OK, iw_proto_encode(message, &frame));
+    TEST_ASSERT_EQUAL_INT(IW_OK, message_encode(message, &frame));
     fake_bus_put(&rig.bus, &frame);
 }
 
 static void put_offset(iw_side_t side, int16_t offset_dN) {
-    const iw_proto_message_t message = {IW_PROTO_OFFSET, side, {.offset = {offset_dN}}};
+    const message_t message = {IW_CODEC_OFFSET, side, {.offset = {offset_dN}}};
     put(&message);
 }
 
 /// Force frames of that value every 50 ms for that long.
 static void press_for(iw_side_t side, int16_t raw, iw_time_us_t for_us) {
-    const iw_proto_message_t message = {IW_PROTO_FORCE, side, {.force = {.force_raw = raw}}};
+    const message_t message = {IW_CODEC_FORCE, side, {.force = {.force_raw = raw}}};
     const iw_time_us_t until_us = rig.now_us + for_us;
     while (rig.now_us < until_us) {
         put(&message);
@@ -166,7 +167,7 @@ static void test_gateway_status_length_is_noted(void) {
 }
 
 static void test_gateway_pose_is_kept_with_its_time(void) {
-    const iw_proto_message_t message = {IW_PROTO_POSE, IW_RIGHT, {.pose = {-1, 2, -3, 31415}}};
+    const message_t message = {IW_CODEC_POSE, IW_RIGHT, {.pose = {-1, 2, -3, 31415}}};
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.gateway.pose_us);
     put(&message);
     gateway_rig_step(&rig);

@@ -22,8 +22,8 @@ void tearDown(void) {}
 static void hear_healthy(void) {
     heard.was_up = true;
     heard.span_us = 2000000U;
-    for (unsigned i = 0; i < INSPECT_MESSAGES; ++i) {
-        heard.count[i] = inspect_messages[i].always ? inspect_messages[i].nominal_mHz * 2U / 1000U : 0U;
+    for (unsigned i = 0; i < IW_CODEC_ROWS; ++i) {
+        heard.count[i] = inspect_always(&iw_codec_rows[i]) ? inspect_nominal_mHz(&iw_codec_rows[i]) * 2U / 1000U : 0U;
     }
     heard.bits = 120000U;
 }
@@ -57,8 +57,8 @@ static void test_healthy_bus_finds_nothing_to_mend(void) {
 
 static void test_silent_wheel_fails_and_its_other_messages_are_not_asked_for(void) {
     hear_healthy();
-    for (unsigned i = 0; i < INSPECT_MESSAGES; ++i) {
-        heard.count[i] = inspect_messages[i].side == IW_RIGHT ? 0U : heard.count[i];
+    for (unsigned i = 0; i < IW_CODEC_ROWS; ++i) {
+        heard.count[i] = iw_codec_rows[i].side == IW_RIGHT ? 0U : heard.count[i];
     }
     inspect_bus(&local, &heard, &wish, &findings);
     expect("right_wheel", INSPECT_FAIL, "right wheel: not heard for 2000 ms", "power, cable");

@@ -2,7 +2,7 @@
 // Which frames the port asks the kernel for, and what it makes of them.
 #include "socketcan_frame.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 #include "unity.h"
 
@@ -102,13 +102,13 @@ static void test_translate_only_our_own_sockets_frame_is_an_echo(void) {
 }
 
 static void test_translate_a_frame_too_long_for_classic_can_is_fd_and_no_telemetry(void) {
-    iw_proto_message_t message;
+    iw_codec_wheel_t told[IW_SIDES];
     const iw_can_frame_t frame = translate(256, 64, MSG_TRUNC);
     TEST_ASSERT_EQUAL_HEX32(256U | IW_CAN_FD, frame.id);
     TEST_ASSERT_EQUAL(8, frame.dlc);
-    TEST_ASSERT_EQUAL(IW_ERR_FORMAT, iw_proto_decode(&frame, &message));
+    TEST_ASSERT_EQUAL(IW_CODEC_BAD_FORMAT, iw_codec_decode(&frame, told));
     const iw_can_frame_t short_fd = translate(256, 4, MSG_TRUNC);
-    TEST_ASSERT_EQUAL(IW_ERR_FORMAT, iw_proto_decode(&short_fd, &message));
+    TEST_ASSERT_EQUAL(IW_CODEC_BAD_FORMAT, iw_codec_decode(&short_fd, told));
 }
 
 static iw_can_error_t error_of(canid_t classes, uint8_t controller) {

@@ -2,8 +2,8 @@
 // The account of sent and echoed frames, beside a model, through every sequence of events.
 #include <string.h>
 
+#include "iwheel/codec.h"
 #include "iwheel/outbox.h"
-#include "iwheel/proto.h"
 #include "unity.h"
 
 #define POISON 0xA5
@@ -18,9 +18,9 @@ void setUp(void) {
 void tearDown(void) {}
 
 static iw_can_frame_t setpoint(iw_side_t side, int16_t speed_mm_s, int16_t current_mA) {
-    const iw_proto_setpoint_t value = {speed_mm_s, current_mA, 7};
+    const iw_codec_setpoint_t value = {speed_mm_s, current_mA, 7};
     iw_can_frame_t frame;
-    (void)iw_proto_encode_setpoint(side, &value, IW_DLC_SETPOINT, &frame);
+    (void)iw_codec_encode_setpoint(side, &value, IW_DLC_SETPOINT, &frame);
     return frame;
 }
 

@@ -26,7 +26,7 @@ static void restart(void) {
 }
 
 static bool tell(iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
-    iw_proto_setpoint_t const setpoint = {speed_mm_s, current_mA, 1U};
+    iw_codec_setpoint_t const setpoint = {speed_mm_s, current_mA, 1U};
     return sim_motion_hear(&motion, now_us, &setpoint);
 }
 
@@ -184,7 +184,7 @@ static void test_motion_time_going_back_changes_nothing(void) {
 static void test_motion_type_set_ignores_other_types(void) {
     config.accepted_type = 7;
     restart();
-    iw_proto_setpoint_t setpoint = {500, 2000, 6U};
+    iw_codec_setpoint_t setpoint = {500, 2000, 6U};
     TEST_ASSERT_FALSE(sim_motion_hear(&motion, START_US, &setpoint));
     TEST_ASSERT_FALSE(motion.driven);
     TEST_ASSERT_EQUAL_UINT32(0U, motion.setpoints);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "test_sim_rig.h"
 
+#include "message.h"
 #include "unity.h"
 
 #include <string.h>
@@ -50,9 +51,9 @@ void rig_run(iw_time_us_t from_us, iw_time_us_t until_us) {
     for (iw_time_us_t now_us = from_us; driving && now_us < until_us; now_us += 20U * MS) {
         take_until(now_us);
         for (unsigned side = 0U; side < IW_SIDES; ++side) {
-            iw_proto_setpoint_t const setpoint = {command_mm_s[side], 2000, 1U};
+            iw_codec_setpoint_t const setpoint = {command_mm_s[side], 2000, 1U};
             iw_can_frame_t frame;
-            (void)iw_proto_encode_setpoint((iw_side_t)side, &setpoint, IW_DLC_SETPOINT, &frame);
+            (void)iw_codec_encode_setpoint((iw_side_t)side, &setpoint, IW_DLC_SETPOINT, &frame);
             sim_pair_hear(&pair, now_us, &frame);
         }
     }
@@ -69,9 +70,9 @@ void rig_let_go(void) {
     driving = false;
 }
 
-iw_proto_message_t rig_last(uint32_t id) {
-    iw_proto_message_t message;
+message_t rig_last(uint32_t id) {
+    message_t message;
     TEST_ASSERT_GREATER_THAN_UINT32(0U, seen[id].count);
-    TEST_ASSERT_EQUAL_INT(IW_OK, iw_proto_decode(&seen[id].frame, &message));
+    TEST_ASSERT_TRUE(message_decode(&seen[id].frame, &message));
     return message;
 }

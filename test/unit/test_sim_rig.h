@@ -4,6 +4,7 @@
 #define TEST_SIM_RIG_H
 
 #include "iwheel_sim/pair.h"
+#include "message.h"
 
 #define START_US UINT64_C(1000000)
 #define MS       UINT64_C(1000)
@@ -39,6 +40,6 @@ void rig_drive(int16_t left_mm_s, int16_t right_mm_s);
 void rig_let_go(void);
 
 /// The last frame of this id, decoded. Fails the test if there was none.
-iw_proto_message_t rig_last(uint32_t id);
+message_t rig_last(uint32_t id);
 
 #endif

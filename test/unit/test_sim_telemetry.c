@@ -131,7 +131,7 @@ static void test_pair_straight_drive_ends_straight_ahead(void) {
     rig_run(START_US, BOOTED);
     rig_drive(500, 500);
     rig_run(BOOTED, START_US + 10U * SECOND);
-    iw_proto_pose_t const pose = rig_last(290U).as.pose;
+    iw_codec_pose_t const pose = rig_last(290U).as.pose;
     int64_t const way_mm = pair.wheel[IW_RIGHT].motion.position_nm / 1000000;
     TEST_ASSERT_INT64_WITHIN(15, way_mm, pose.x_mm);
     TEST_ASSERT_INT_WITHIN(60, 0, pose.y_mm);
@@ -143,7 +143,7 @@ static void test_pair_turn_on_the_spot_turns_by_way_over_track(void) {
     rig_run(START_US, BOOTED);
     rig_drive(-200, 200);
     rig_run(BOOTED, START_US + 6U * SECOND);
-    iw_proto_pose_t const pose = rig_last(290U).as.pose;
+    iw_codec_pose_t const pose = rig_last(290U).as.pose;
     int64_t const way_um = (pair.wheel[IW_RIGHT].motion.position_nm - pair.wheel[IW_LEFT].motion.position_nm) / 1000;
     TEST_ASSERT_INT64_WITHIN(40, way_um / 540, pose.psi_mrad);
     TEST_ASSERT_INT_WITHIN(15, 0, pose.x_mm);

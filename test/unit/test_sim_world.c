@@ -2,6 +2,7 @@
 // The simulated world: wheels, bus, clients and other nodes together.
 #include "iwheel_sim/world.h"
 
+#include "message.h"
 #include "unity.h"
 
 #include <string.h>
@@ -30,18 +31,17 @@ static iw_can_frame_t frame_of(uint32_t id, uint8_t dlc) {
 }
 
 static iw_can_frame_t setpoint(iw_side_t side, int16_t speed_mm_s) {
-    iw_proto_setpoint_t const told = {speed_mm_s, 2000, 1U};
+    iw_codec_setpoint_t const told = {speed_mm_s, 2000, 1U};
     iw_can_frame_t frame;
-    (void)iw_proto_encode_setpoint(side, &told, IW_DLC_SETPOINT, &frame);
+    (void)iw_codec_encode_setpoint(side, &told, IW_DLC_SETPOINT, &frame);
     return frame;
 }
 
 static void run_until(iw_time_us_t until_us) {
     sim_delivery_t delivery;
     while (sim_world_step(&world, until_us, &delivery)) {
-        iw_proto_message_t message;
-        bool const known = iw_proto_decode(&delivery.frame, &message) == IW_OK;
-        if (known && message.kind != IW_PROTO_SETPOINT) {
+        message_t message;
+        if (message_decode(&delivery.frame, &message) && message.kind != IW_CODEC_SETPOINT) {
             telemetry += 1U;
         } else {
             TEST_ASSERT_LESS_THAN_UINT32(HISTORY, count);

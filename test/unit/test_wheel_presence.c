@@ -2,6 +2,7 @@
 // Is a wheel there, at rest, or back from a reboot?
 #include "fixture.h"
 #include "iwheel/wheel.h"
+#include "message.h"
 #include "unity.h"
 #include <string.h>
 
@@ -25,8 +26,8 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void hear_as(int16_t rpm, bool fresh) {
-    const iw_proto_message_t message = {IW_PROTO_SPEED, IW_LEFT, {.speed = {.speed_rpm = rpm}}};
-    iw_wheel_hear(&wheel, now_us, &message, fresh);
+    const message_t message = {IW_CODEC_SPEED, IW_LEFT, {.speed = {.speed_rpm = rpm}}};
+    iw_wheel_hear(&wheel, now_us, message.kind, &message.as, fresh);
 }
 
 static void hear(int16_t rpm) {
@@ -34,15 +35,15 @@ static void hear(int16_t rpm) {
 }
 
 static void hear_status(int32_t ticks) {
-    const iw_proto_message_t message = {IW_PROTO_STATUS, IW_LEFT, {.status = {ticks, 240, 30, 20}}};
-    iw_wheel_hear(&wheel, now_us, &message, true);
+    const message_t message = {IW_CODEC_STATUS, IW_LEFT, {.status = {ticks, 240, 30, 20}}};
+    iw_wheel_hear(&wheel, now_us, message.kind, &message.as, true);
 }
 
-static void hear_other(iw_proto_kind_t kind) {
-    iw_proto_message_t message;
+static void hear_other(iw_codec_kind_t kind) {
+    message_t message;
     memset(&message, 0, sizeof message);
     message.kind = kind;
-    iw_wheel_hear(&wheel, now_us, &message, true);
+    iw_wheel_hear(&wheel, now_us, message.kind, &message.as, true);
 }
 
 /// Speed frames every 4 ms for so long.
@@ -89,7 +90,7 @@ static void test_wheel_is_heard_for_exactly_its_silence_limit(void) {
 }
 
 static void test_wheel_is_kept_alive_by_speed_frames_only(void) {
-    static const iw_proto_kind_t others[] = {IW_PROTO_STATUS, IW_PROTO_FORCE, IW_PROTO_OFFSET, IW_PROTO_POSE};
+    static const iw_codec_kind_t others[] = {IW_CODEC_STATUS, IW_CODEC_FORCE, IW_CODEC_OFFSET, IW_CODEC_POSE};
     hear(0);
     for (uint32_t n = 0; n < 40; n++) {
         now_us += MS(2);
@@ -245,7 +246,7 @@ static void test_wheel_first_heard_is_no_reboot_but_its_start_may_have_been_seen
 static void hear_offsets(uint32_t number, iw_time_us_t period_us) {
     for (uint32_t n = 0; n < number; n++) {
         hear_for(period_us, 0);
-        hear_other(IW_PROTO_OFFSET);
+        hear_other(IW_CODEC_OFFSET);
         TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     }
 }
@@ -284,7 +285,7 @@ static void test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_micr
             hear(0);
             hear_offsets(heard_s[i], IW_WHEEL_OFFSET_PERIOD_US);
             hear_for(IW_WHEEL_OFFSET_BACK_US - early_us, 0);
-            hear_other(IW_PROTO_OFFSET);
+            hear_other(IW_CODEC_OFFSET);
             TEST_ASSERT_EQUAL_INT(early_us ? IW_REBOOT_NONE : IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
             hear_offsets(60, IW_WHEEL_OFFSET_PERIOD_US);
             TEST_ASSERT_EQUAL_UINT32(early_us ? 0 : 1, wheel.reboots);
@@ -295,12 +296,12 @@ static void test_wheel_offset_frames_that_come_back_tell_of_a_reboot_to_the_micr
 static void test_wheel_older_than_a_minute_when_found_has_rebooted_when_it_sends_offset_frames(void) {
     hear(0);
     hear_for(IW_WHEEL_OFFSET_BACK_US - 1U, 0);
-    hear_other(IW_PROTO_OFFSET); // So soon it may just have started.
+    hear_other(IW_CODEC_OFFSET); // So soon it may just have started.
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     begin();
     hear(0);
     hear_for(IW_WHEEL_OFFSET_BACK_US, 0);
-    hear_other(IW_PROTO_OFFSET);
+    hear_other(IW_CODEC_OFFSET);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
     TEST_ASSERT_TRUE(wheel.boot_seen);
 }
@@ -329,12 +330,12 @@ static void test_wheel_offset_frames_back_after_our_own_stall_tell_of_a_reboot(v
     hear_offsets(3, IW_WHEEL_OFFSET_PERIOD_US);
     now_us += IW_WHEEL_OFFSET_BACK_US;
     iw_wheel_excuse(&wheel, now_us);
-    hear_other(IW_PROTO_OFFSET);
+    hear_other(IW_CODEC_OFFSET);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_OFFSET_FRAMES, iw_wheel_take_reboot(&wheel));
 }
 
 static void test_wheel_other_frames_tell_of_no_reboot_however_late(void) {
-    static const iw_proto_kind_t others[] = {IW_PROTO_SPEED, IW_PROTO_STATUS, IW_PROTO_FORCE, IW_PROTO_POSE};
+    static const iw_codec_kind_t others[] = {IW_CODEC_SPEED, IW_CODEC_STATUS, IW_CODEC_FORCE, IW_CODEC_POSE};
     hear_for(MS(70000), 0);
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
         hear_other(others[i]);

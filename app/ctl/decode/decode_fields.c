@@ -45,7 +45,7 @@ static void put(decoded_t *out, field_t field, int32_t value) {
     out->value[field] = value;
 }
 
-static void put_status(const iw_proto_status_t *status, decoded_t *out) {
+static void put_status(const iw_codec_status_t *status, decoded_t *out) {
     const bool hot = status->temperature_degC > IW_WHEEL_TEMPERATURE_MAX_degC;
     const bool busy = status->cpu_percent > PERCENT_MAX;
     put(out, FIELD_BATTERY, status->battery_dV);
@@ -59,65 +59,63 @@ static void put_status(const iw_proto_status_t *status, decoded_t *out) {
     out->note = hot || busy ? IMPOSSIBLE_NOTE : status->battery_dV == IW_BATTERY_SATURATED_dV ? BATTERY_NOTE : "";
 }
 
-static void put_force(const iw_proto_force_t *force, iw_force_unit_t unit, decoded_t *out) {
+static void put_force(const iw_codec_force_t *force, iw_force_unit_t unit, decoded_t *out) {
     put(out, FIELD_FORCE_RAW, force->force_raw);
     put(out, FIELD_FORCE, force->force_raw * (unit == IW_FORCE_CN ? MN_PER_CN : MN_PER_DN));
     put(out, FIELD_FORCE_DEBUG, force->debug_raw);
     out->note = force->force_raw == INT16_MIN || force->force_raw == INT16_MAX ? SATURATED_NOTE : "";
 }
 
-static void put_message(const iw_proto_message_t *message, const iw_config_t *config, decoded_t *out) {
-    static const char *const names[] = {
-        [IW_PROTO_SETPOINT] = "setpoint", [IW_PROTO_SPEED] = "speed", [IW_PROTO_STATUS] = "status",
-        [IW_PROTO_POSE] = "pose",         [IW_PROTO_FORCE] = "force", [IW_PROTO_OFFSET] = "offset",
-    };
-    out->message = names[message->kind];
-    out->wheel = message->side == IW_LEFT ? "left" : "right";
-    switch (message->kind) {
-    case IW_PROTO_SETPOINT:
-        put(out, FIELD_SETPOINT_TYPE, message->as.setpoint.type);
-        put(out, FIELD_SETPOINT_SPEED, message->as.setpoint.speed_mm_s);
-        put(out, FIELD_SETPOINT_CURRENT, message->as.setpoint.current_mA);
+static void put_message(iw_codec_kind_t kind, const iw_codec_wheel_t *told, iw_force_unit_t unit, decoded_t *out) {
+    switch (kind) {
+    case IW_CODEC_SETPOINT:
+        put(out, FIELD_SETPOINT_TYPE, told->setpoint.type);
+        put(out, FIELD_SETPOINT_SPEED, told->setpoint.speed_mm_s);
+        put(out, FIELD_SETPOINT_CURRENT, told->setpoint.current_mA);
         break;
-    case IW_PROTO_SPEED:
-        put(out, FIELD_SPEED, message->as.speed.speed_rpm);
-        put(out, FIELD_ACCELERATION, message->as.speed.acceleration_raw);
+    case IW_CODEC_SPEED:
+        put(out, FIELD_SPEED, told->speed.speed_rpm);
+        put(out, FIELD_ACCELERATION, told->speed.acceleration_raw);
         break;
-    case IW_PROTO_STATUS:
-        put_status(&message->as.status, out);
+    case IW_CODEC_STATUS:
+        put_status(&told->status, out);
         break;
-    case IW_PROTO_POSE:
-        put(out, FIELD_POSE_X, message->as.pose.x_mm);
-        put(out, FIELD_POSE_Y, message->as.pose.y_mm);
-        put(out, FIELD_POSE_Z, message->as.pose.z_mm);
-        put(out, FIELD_POSE_PSI, message->as.pose.psi_mrad);
+    case IW_CODEC_POSE:
+        put(out, FIELD_POSE_X, told->pose.x_mm);
+        put(out, FIELD_POSE_Y, told->pose.y_mm);
+        put(out, FIELD_POSE_Z, told->pose.z_mm);
+        put(out, FIELD_POSE_PSI, told->pose.psi_mrad);
         break;
-    case IW_PROTO_FORCE:
-        put_force(&message->as.force, config->force_unit[message->side], out);
+    case IW_CODEC_FORCE:
+        put_force(&told->force, unit, out);
         break;
-    case IW_PROTO_OFFSET:
+    case IW_CODEC_OFFSET:
     default:
-        put(out, FIELD_OFFSET, message->as.offset.offset_dN);
+        put(out, FIELD_OFFSET, told->offset.offset_dN);
         break;
     }
 }
 
 void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decoded_t *out) {
-    iw_proto_message_t message;
+    iw_codec_wheel_t told[IW_SIDES];
+    const iw_side_t side = iw_codec_side(frame->id);
+    const iw_codec_kind_t kind = iw_codec_decode(frame, told);
     *out = (decoded_t){.message = "unknown", .wheel = "", .note = ""};
-    switch (iw_proto_decode(frame, &message)) {
-    case IW_OK:
-        put_message(&message, config, out);
+    switch (kind) {
+    case IW_CODEC_UNKNOWN:
         break;
-    case IW_ERR_FORMAT:
+    case IW_CODEC_BAD_FORMAT:
         out->message = "ignored";
         out->note = "the wheels use only classic data frames with 11-bit ids: the gateway ignores this one";
         break;
-    case IW_ERR_LENGTH:
+    case IW_CODEC_BAD_LENGTH:
         out->message = "ignored";
         out->note = "shorter than the wheels' document says: the gateway ignores it";
         break;
     default:
+        out->message = iw_codec_name(kind);
+        out->wheel = side == IW_LEFT ? "left" : "right";
+        put_message(kind, &told[side], config->force_unit[side], out);
         break;
     }
     if ((frame->id & IW_CAN_ERROR) != 0U) {

@@ -3,8 +3,8 @@
 #ifndef DECODE_FIELDS_H
 #define DECODE_FIELDS_H
 
+#include "iwheel/codec.h"
 #include "iwheel/config.h"
-#include "iwheel/proto.h"
 
 #include <stdio.h>
 

@@ -152,11 +152,12 @@ static void print_sum(const doctor_t *self) {
 
 static json_t *rates_of(const doctor_t *self) {
     json_t *rates = json_array();
-    for (unsigned i = 0; i < INSPECT_MESSAGES && self->heard.span_us > 0U; i++) {
-        const inspect_message_t *message = &inspect_messages[i];
-        (void)json_array_append_new(rates, json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)message->id, "name",
-                                                     message->name, "side", message->side == IW_LEFT ? "left" : "right",
-                                                     "nominal_mHz", (json_int_t)message->nominal_mHz, "measured_mHz",
+    for (unsigned i = 0; i < IW_CODEC_ROWS && self->heard.span_us > 0U; i++) {
+        const iw_codec_row_t *row = &iw_codec_rows[i];
+        (void)json_array_append_new(rates, json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)row->id, "name",
+                                                     iw_codec_name((iw_codec_kind_t)row->kind), "side",
+                                                     row->side == IW_LEFT ? "left" : "right", "nominal_mHz",
+                                                     (json_int_t)inspect_nominal_mHz(row), "measured_mHz",
                                                      (json_int_t)inspect_rate_mHz(&self->heard, i)));
     }
     return rates;

@@ -110,7 +110,7 @@ static void note_id(learn_id_t *id, const candump_t *frame) {
     note_period(&id->period, frame->time_us);
 }
 
-static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const iw_proto_setpoint_t *now) {
+static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const iw_codec_setpoint_t *now) {
     const bool first = self->count == 0U;
     learn_range_t *current = now->speed_mm_s > 0   ? &self->current_forward_mA
                              : now->speed_mm_s < 0 ? &self->current_backward_mA
@@ -198,35 +198,36 @@ static void note_pose(learn_pose_t *self, const uint8_t *data) {
     (void)memcpy(self->last, data, sizeof self->last);
 }
 
-static void note_message(learn_t *self, const candump_t *frame, const iw_proto_message_t *message) {
-    learn_wheel_t *wheel = &self->wheel[message->side];
-    learn_setpoint_t *setpoint = &self->setpoint[message->side];
-    switch (message->kind) {
-    case IW_PROTO_SETPOINT:
-        note_setpoint(setpoint, frame, &message->as.setpoint);
+static void note_message(learn_t *self, const candump_t *frame, iw_codec_kind_t kind, const iw_codec_wheel_t *told) {
+    const iw_side_t side = iw_codec_side(frame->id);
+    learn_wheel_t *wheel = &self->wheel[side];
+    learn_setpoint_t *setpoint = &self->setpoint[side];
+    switch (kind) {
+    case IW_CODEC_SETPOINT:
+        note_setpoint(setpoint, frame, &told->setpoint);
         break;
-    case IW_PROTO_SPEED:
-        note_speed(wheel, setpoint, frame->time_us, message->as.speed.speed_rpm);
+    case IW_CODEC_SPEED:
+        note_speed(wheel, setpoint, frame->time_us, told->speed.speed_rpm);
         break;
-    case IW_PROTO_STATUS:
-        note_ticks(wheel, message->as.status.odometry_ticks);
+    case IW_CODEC_STATUS:
+        note_ticks(wheel, told->status.odometry_ticks);
         break;
-    case IW_PROTO_POSE:
+    case IW_CODEC_POSE:
         note_pose(&self->pose, frame->data);
         break;
-    case IW_PROTO_FORCE:
-        note_force(wheel, frame->time_us, message->as.force.force_raw);
+    case IW_CODEC_FORCE:
+        note_force(wheel, frame->time_us, told->force.force_raw);
         break;
-    case IW_PROTO_OFFSET:
+    case IW_CODEC_OFFSET:
     default:
         wheel->offsets++;
-        wheel->offset_dN = message->as.offset.offset_dN;
+        wheel->offset_dN = told->offset.offset_dN;
         break;
     }
 }
 
 void learn_frame(learn_t *self, const candump_t *frame) {
-    iw_proto_message_t message;
+    iw_codec_wheel_t told[IW_SIDES];
     const iw_can_frame_t core = candump_to_core(frame);
     self->first_us = self->frames == 0U ? frame->time_us : self->first_us;
     self->backwards += self->frames > 0U && frame->time_us < self->last_us ? 1U : 0U;
@@ -236,16 +237,17 @@ void learn_frame(learn_t *self, const candump_t *frame) {
         self->errors++;
         return;
     }
-    const iw_status_t status = iw_proto_decode(&core, &message);
-    const size_t known = status == IW_OK || status == IW_ERR_LENGTH ? index_of(frame->id) : LEARN_IDS;
+    const iw_codec_kind_t kind = iw_codec_decode(&core, told);
+    const bool ours = kind <= IW_CODEC_SETPOINT;
+    const size_t known = ours || kind == IW_CODEC_BAD_LENGTH ? index_of(frame->id) : LEARN_IDS;
     learn_id_t *id = known < LEARN_IDS ? &self->known[known] : NULL;
-    self->strange += status == IW_ERR_FORMAT ? 1U : 0U;
-    self->too_short += status == IW_ERR_LENGTH ? 1U : 0U;
-    id = status == IW_ERR_ID ? find_other(self, frame) : id;
+    self->strange += kind == IW_CODEC_BAD_FORMAT ? 1U : 0U;
+    self->too_short += kind == IW_CODEC_BAD_LENGTH ? 1U : 0U;
+    id = kind == IW_CODEC_UNKNOWN ? find_other(self, frame) : id;
     if (id != NULL) {
         note_id(id, frame);
     }
-    if (status == IW_OK) {
-        note_message(self, frame, &message);
+    if (ours) {
+        note_message(self, frame, kind, &told[iw_codec_side(frame->id)]);
     }
 }

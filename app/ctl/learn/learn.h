@@ -8,7 +8,7 @@
 
 #include "candump.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 /// The eleven ids.
 #define LEARN_IDS 11U
@@ -53,7 +53,7 @@ typedef struct {
     uint64_t padding;                  ///< Frames with a byte behind the documented five that is not 0.
     uint64_t over_limit;               ///< Frames with a current outside the documented range.
     uint64_t changes_of_type;          ///< From one frame to the next.
-    iw_proto_setpoint_t last;
+    iw_codec_setpoint_t last;
     int64_t steady_since_us; ///< The speed is this since then.
 } learn_setpoint_t;
 

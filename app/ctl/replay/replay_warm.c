@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "replay_warm.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 #define PERIOD_US 4000U
 /// For the first frames, and for the arming to be proven.
@@ -11,26 +11,23 @@
 
 /// rpm that a wheel would show which does what it was told.
 static int16_t obedient_rpm(const replay_t *self, size_t side, const iw_can_frame_t *setpoint) {
-    iw_proto_message_t message;
-    if (setpoint == NULL || iw_proto_decode(setpoint, &message) != IW_OK) {
+    iw_codec_wheel_t told[IW_SIDES];
+    if (setpoint == NULL || iw_codec_decode(setpoint, told) != IW_CODEC_SETPOINT) {
         return 0;
     }
-    return (int16_t)(message.as.setpoint.speed_mm_s * 1000 / (int32_t)self->gateway.wheel[side].um_s_per_rpm);
+    return (int16_t)(told[side].setpoint.speed_mm_s * 1000 / (int32_t)self->gateway.wheel[side].um_s_per_rpm);
 }
 
 /// A cycle of the made-up bus: both wheels show what they were told last.
 static void turn(replay_t *self, iw_time_us_t at_us, iw_can_frame_t last[IW_SIDES]) {
     for (uint32_t i = 0; i < self->frames; i++) { // Echoes of the last step.
-        const size_t side = self->frame[i].id == IW_ID_LEFT_SETPOINT ? IW_LEFT : IW_RIGHT;
-        last[side] = self->frame[i];
+        last[iw_codec_side(self->frame[i].id)] = self->frame[i];
     }
     for (size_t side = 0; side < IW_SIDES; side++) {
         iw_can_frame_t frame;
-        const iw_proto_message_t message = {
-            .kind = IW_PROTO_SPEED,
-            .side = (iw_side_t)side,
-            .as = {.speed = {.speed_rpm = obedient_rpm(self, side, last[side].id != 0U ? &last[side] : NULL)}}};
-        if (iw_proto_encode(&message, &frame) == IW_OK) {
+        const iw_codec_wheel_t told = {
+            .speed = {.speed_rpm = obedient_rpm(self, side, last[side].id != 0U ? &last[side] : NULL)}};
+        if (iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &told, &frame) == IW_OK) {
             (void)replay_frame(self, &frame);
         }
     }

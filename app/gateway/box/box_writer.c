@@ -243,12 +243,12 @@ static void find_last_setpoints(writer_t *self, uint64_t written, iw_pair_t *out
     size_t count = 0;
     (void)blackbox_ring_copy(self->ring, 0, written, self->copy, &count);
     for (size_t i = 0; i < count; i++) {
-        iw_proto_message_t message = {.kind = IW_PROTO_SPEED}; // Its kind is never read of a refused frame.
+        iw_codec_wheel_t told[IW_SIDES];
         iw_can_frame_t frame = {.id = self->copy[i].number, .dlc = self->copy[i].a};
         (void)memcpy(frame.data, self->copy[i].as.data, sizeof frame.data);
-        if (self->copy[i].kind == (uint8_t)BLACKBOX_FRAME && iw_proto_decode(&frame, &message) == IW_OK &&
-            message.kind == IW_PROTO_SETPOINT) {
-            out_pair->wheel[message.side].speed_mm_s = message.as.setpoint.speed_mm_s;
+        const iw_side_t side = iw_codec_side(frame.id);
+        if (self->copy[i].kind == (uint8_t)BLACKBOX_FRAME && iw_codec_decode(&frame, told) == IW_CODEC_SETPOINT) {
+            out_pair->wheel[side].speed_mm_s = told[side].setpoint.speed_mm_s;
         }
     }
 }

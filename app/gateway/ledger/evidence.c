@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "evidence.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -106,8 +106,8 @@ static int64_t step_of(int16_t from, int16_t to) {
 }
 
 static void look_at_pose(gw_evidence_t *self, iw_gateway_t *gateway) {
-    const iw_proto_pose_t was = self->pose;
-    const iw_proto_pose_t is = gateway->pose;
+    const iw_codec_pose_t was = self->pose;
+    const iw_codec_pose_t is = gateway->pose;
     const bool gap =
         self->pose_us == IW_NEVER || gateway->pose_us - self->pose_us > (iw_time_us_t)2 * GW_EVIDENCE_GAP_US;
     if (gateway->pose_us == IW_NEVER || gateway->pose_us == self->pose_us) {
@@ -155,31 +155,9 @@ void gw_evidence_look(gw_evidence_t *self, iw_gateway_t *gateway, iw_time_us_t n
     look_at_pose(self, gateway);
 }
 
-/// What the table says; 0: not a frame of the wheels.
-static uint8_t table_length(uint32_t id) {
-    switch (id) {
-    case IW_ID_LEFT_SPEED:
-    case IW_ID_RIGHT_SPEED:
-        return IW_DLC_SPEED;
-    case IW_ID_LEFT_STATUS:
-    case IW_ID_RIGHT_STATUS:
-        return IW_DLC_STATUS;
-    case IW_ID_RIGHT_POSE:
-        return IW_DLC_POSE;
-    case IW_ID_LEFT_FORCE:
-    case IW_ID_RIGHT_FORCE:
-        return IW_DLC_FORCE;
-    case IW_ID_LEFT_OFFSET:
-    case IW_ID_RIGHT_OFFSET:
-        return IW_DLC_OFFSET;
-    default:
-        return 0;
-    }
-}
-
 void gw_evidence_frame(iw_gateway_t *gateway, const iw_can_frame_t *frame) {
-    const uint8_t length = table_length(frame->id);
-    if (length != 0U && frame->dlc != length &&
+    const iw_codec_row_t *row = iw_codec_find(frame->id);
+    if (row != NULL && row->kind != IW_CODEC_SETPOINT && frame->dlc != row->length &&
         iw_ledger_entry(&gateway->ledger, IW_LEDGER_DLC)->state != IW_LEDGER_CONTRADICTED) {
         iw_ledger_contradict(&gateway->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, frame->dlc);
     }

@@ -51,7 +51,7 @@ typedef struct {
 typedef struct {
     gw_evidence_wheel_t wheel[IW_SIDES];
     iw_time_us_t pose_us;
-    iw_proto_pose_t pose;
+    iw_codec_pose_t pose;
     uint32_t pose_steps;
     int64_t moved;    ///< As it is read.
     int64_t reversed; ///< Read the other way round.

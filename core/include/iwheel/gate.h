@@ -12,8 +12,8 @@
 #ifndef IW_GATE_H
 #define IW_GATE_H
 
+#include "iwheel/codec.h"
 #include "iwheel/config.h"
-#include "iwheel/proto.h"
 
 /// Time between two frames counts up to this. Longer silence is no permission to jump: after it comes a zero.
 #define IW_GATE_ELAPSED_MAX_US 300000U

@@ -12,13 +12,13 @@
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
+#include "iwheel/codec.h"
 #include "iwheel/config.h"
 #include "iwheel/follow.h"
 #include "iwheel/force.h"
 #include "iwheel/hal.h"
 #include "iwheel/ledger.h"
 #include "iwheel/permit.h"
-#include "iwheel/proto.h"
 #include "iwheel/sender.h"
 #include "iwheel/setpoint.h"
 #include "iwheel/wheel.h"
@@ -83,7 +83,7 @@ typedef struct {
     iw_time_us_t pose_us;          ///< IW_NEVER: none.
     iw_time_us_t purged_us;        ///< When a purge was last tried in this silence; IW_NEVER: not yet.
     uint32_t purged_stop;          ///< Number of the stop in whose zeros a purge was tried.
-    iw_proto_pose_t pose;
+    iw_codec_pose_t pose;
     iw_bus_state_t bus;
     iw_bus_facts_t facts;
     bool backlog; ///< The last step left frames behind.

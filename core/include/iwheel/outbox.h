@@ -18,7 +18,7 @@ typedef struct {
     iw_time_us_t sent_us[IW_SIDES][2]; ///< Of the un-echoed frames, oldest first.
     iw_time_us_t proven_us[IW_SIDES];  ///< When the last echoed frame had been sent; 0: none yet.
     uint32_t stray;                    ///< Echoes that nothing was waiting for.
-    int32_t value[IW_SIDES][2];        ///< What they bear: speed and current, as they stand in the frame.
+    uint32_t value[IW_SIDES][2];       ///< What they bear: speed and current, as they stand in the frame.
     uint8_t pending[IW_SIDES];         ///< Un-echoed frames, 0..2.
 } iw_outbox_t;
 

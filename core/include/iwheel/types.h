@@ -29,10 +29,8 @@ typedef enum { IW_LEFT = 0, IW_RIGHT = 1 } iw_side_t;
 /// What a function made of its arguments. Outputs are untouched unless the status is IW_OK.
 typedef enum {
     IW_OK = 0,
-    IW_ERR_RANGE,  ///< A value is outside its documented range.
-    IW_ERR_ID,     ///< Not one of the eleven ids.
-    IW_ERR_FORMAT, ///< Right number, wrong kind of frame: remote, extended, error or FD.
-    IW_ERR_LENGTH, ///< Shorter than the document's table, or longer than 8 bytes.
+    IW_ERR_RANGE, ///< A value is outside its documented range.
+    IW_ERR_ID,    ///< There is no such message.
 } iw_status_t;
 
 /// What one wheel is told: bytes 1-4 of its setpoint frame.

@@ -14,8 +14,8 @@
 #ifndef IW_WHEEL_H
 #define IW_WHEEL_H
 
+#include "iwheel/codec.h"
 #include "iwheel/config.h"
-#include "iwheel/proto.h"
 
 /// Silent for this long, a wheel must be assumed to have been without power.
 #define IW_WHEEL_REBOOT_SILENCE_US 1000000U
@@ -57,8 +57,8 @@ typedef struct {
     uint32_t um_s_per_rpm;
     uint32_t us_per_tick_min; ///< At IW_WHEEL_FASTEST_MM_S.
     uint32_t reboots;
-    iw_proto_speed_t speed;
-    iw_proto_status_t status;
+    iw_codec_speed_t speed;
+    iw_codec_status_t status;
     iw_side_t side;
     iw_reboot_t pending_reboot;
     bool boot_seen; ///< This run of the wheel began while we were listening, not before.
@@ -67,9 +67,10 @@ typedef struct {
 /// `config` must be checked and outlive the wheel.
 void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us);
 
-/// Takes a message from this wheel. `fresh` is false in a late step, when the time of reception is unknown: values
+/// Takes a message from this wheel: `told` has its values. `fresh` is false in a late step, when the time of reception is unknown: values
 /// are then taken, but the wheel's silence does not end and no run of rest begins.
-void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, const iw_proto_message_t *message, bool fresh);
+void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
+                   bool fresh);
 
 /// Our loop was late: until `wheel_silent_ms` from now silence is not held against the wheel. Repeated without
 /// a fresh speed frame in between it extends nothing.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "socketcan_frame.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 #include "iwheel_linux/bus_link.h"
 
 #include <linux/can/error.h>
@@ -12,16 +12,10 @@ IW_STATIC_ASSERT(IW_CAN_EXTENDED == CAN_EFF_FLAG && IW_CAN_REMOTE == CAN_RTR_FLA
                  socketcan_flags_are_those_of_the_kernel);
 IW_STATIC_ASSERT(sizeof(struct can_frame) == 16, socketcan_frame_size);
 
-static const canid_t ids[IW_SOCKETCAN_IDS] = {
-    IW_ID_LEFT_SPEED,     IW_ID_LEFT_STATUS, IW_ID_LEFT_SETPOINT, IW_ID_LEFT_FORCE,
-    IW_ID_LEFT_OFFSET,    IW_ID_RIGHT_SPEED, IW_ID_RIGHT_STATUS,  IW_ID_RIGHT_POSE,
-    IW_ID_RIGHT_SETPOINT, IW_ID_RIGHT_FORCE, IW_ID_RIGHT_OFFSET,
-};
-
 void iw_socketcan_filters(iw_socketcan_share_t share, struct can_filter *out_filters) {
     const canid_t invert = share == IW_SOCKETCAN_OTHERS ? CAN_INV_FILTER : 0U;
     for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
-        out_filters[i] = (struct can_filter){.can_id = ids[i] | invert, .can_mask = CAN_EFF_MASK};
+        out_filters[i] = (struct can_filter){.can_id = iw_codec_rows[i].id | invert, .can_mask = CAN_EFF_MASK};
     }
 }
 

@@ -3,12 +3,12 @@
 #ifndef IW_SOCKETCAN_FRAME_H
 #define IW_SOCKETCAN_FRAME_H
 
-#include "iwheel/can_frame.h"
+#include "iwheel/codec.h"
 
 #include <linux/can.h>
 
 /// The eleven ids of the document.
-#define IW_SOCKETCAN_IDS 11U
+#define IW_SOCKETCAN_IDS IW_CODEC_ROWS
 
 /// Which share of the bus a socket is to see.
 typedef enum {

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "codec.h"
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
-static iw_proto_message_t message;
+static iw_codec_wheel_t seen[IW_SIDES]; // The latest of each message, kept per wheel, as a program needs them.
 static iw_can_frame_t encoded;
 
 uint32_t bench_decode(uint32_t rounds) {
     uint32_t refused = 0;
     for (uint32_t round = 0; round < rounds; round++) {
         for (const iw_can_frame_t *frame = bench_frame; frame < &bench_frame[BENCH_FRAMES]; frame++) {
-            refused += (iw_proto_decode(frame, &message) == IW_OK) ? 0U : 1U;
-            BENCH_STORED(&message);
+            refused += (iw_codec_decode(frame, seen) <= IW_CODEC_SETPOINT) ? 0U : 1U;
+            BENCH_STORED(seen);
         }
     }
     return refused;
@@ -19,9 +19,9 @@ uint32_t bench_decode(uint32_t rounds) {
 uint32_t bench_encode(uint32_t rounds) {
     uint32_t clamped = 0;
     for (uint32_t i = 0; i < rounds; i++) {
-        const iw_proto_setpoint_t setpoint = {bench_setpoint.speed_mm_s, bench_setpoint.current_mA,
+        const iw_codec_setpoint_t setpoint = {bench_setpoint.speed_mm_s, bench_setpoint.current_mA,
                                               bench_setpoint.type};
-        clamped += iw_proto_encode_setpoint((iw_side_t)(i & 1U), &setpoint, IW_DLC_SETPOINT, &encoded) ? 1U : 0U;
+        clamped += iw_codec_encode_setpoint((iw_side_t)(i & 1U), &setpoint, IW_DLC_SETPOINT, &encoded) ? 1U : 0U;
         BENCH_STORED(&encoded);
     }
     return clamped;

@@ -47,9 +47,9 @@ static int nothing(void *context) {
 }
 
 static void wheel_speaks(iw_side_t side) {
-    const iw_proto_message_t message = {IW_PROTO_SPEED, side, {.speed = {.speed_rpm = rpm}}};
+    const iw_codec_wheel_t told = {.speed = {.speed_rpm = rpm}};
     iw_can_frame_t *const frame = &bus.frame[(bus.first + bus.count) % QUEUE];
-    (void)iw_proto_encode(&message, frame);
+    (void)iw_codec_encode(IW_CODEC_SPEED, side, &told, frame);
     bus.count++;
 }
 

@@ -140,7 +140,7 @@ void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us) {
     }
 }
 
-bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_proto_setpoint_t *setpoint) {
+bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint) {
     sim_motion_advance(self, now_us);
     if (self->config.accepted_type != SIM_TYPE_ANY && self->config.accepted_type != setpoint->type) {
         return false;

@@ -48,9 +48,9 @@ static void swap_pairs_of_bytes(iw_can_frame_t *frame) {
     }
 }
 
-static void encode(const sim_pair_t *self, const iw_proto_message_t *message, iw_can_frame_t *out_frame) {
-    (void)iw_proto_encode(message, out_frame);
-    if (self->pose_reversed && message->kind == IW_PROTO_POSE) {
+static void encode(const sim_pair_t *self, iw_side_t side, const sim_message_t *message, iw_can_frame_t *out_frame) {
+    (void)iw_codec_encode(message->kind, side, &message->told, out_frame);
+    if (self->pose_reversed && message->kind == IW_CODEC_POSE) {
         swap_pairs_of_bytes(out_frame);
     }
     if (self->padded) {
@@ -65,17 +65,17 @@ bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent) 
             return false;
         }
         iw_side_t const side = (self->wheel[IW_LEFT].next_us == due_us) ? IW_LEFT : IW_RIGHT;
-        iw_proto_message_t message;
+        sim_message_t message;
         if (sim_wheel_step(&self->wheel[side], sim_pair_battery_dV(self), &self->pose, &message)) {
             out_sent->due_us = due_us;
             out_sent->side = side;
-            encode(self, &message, &out_sent->frame);
+            encode(self, side, &message, &out_sent->frame);
             return true;
         }
     }
 }
 
-static void hear_left_speed(sim_pair_t *self, iw_time_us_t now_us, const iw_proto_speed_t *speed) {
+static void hear_left_speed(sim_pair_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed) {
     if (self->wheel[IW_RIGHT].state == SIM_WHEEL_RUNNING) {
         int64_t const milli_rpm = (int64_t)speed->speed_rpm * 1000;
         sim_motion_config_t const *const config = &self->wheel[IW_RIGHT].motion.config;
@@ -84,14 +84,13 @@ static void hear_left_speed(sim_pair_t *self, iw_time_us_t now_us, const iw_prot
 }
 
 void sim_pair_hear(sim_pair_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
-    iw_proto_message_t message;
-    if (iw_proto_decode(frame, &message) != IW_OK) {
-        return;
-    }
-    if (message.kind == IW_PROTO_SETPOINT) {
-        sim_wheel_hear(&self->wheel[message.side], now_us, &message.as.setpoint);
-    } else if (message.kind == IW_PROTO_SPEED && message.side == IW_LEFT) {
-        hear_left_speed(self, now_us, &message.as.speed);
+    iw_codec_wheel_t told[IW_SIDES];
+    iw_codec_kind_t const kind = iw_codec_decode(frame, told);
+    iw_side_t const side = iw_codec_side(frame->id);
+    if (kind == IW_CODEC_SETPOINT) {
+        sim_wheel_hear(&self->wheel[side], now_us, &told[side].setpoint);
+    } else if (kind == IW_CODEC_SPEED && side == IW_LEFT) {
+        hear_left_speed(self, now_us, &told[IW_LEFT].speed);
     }
 }
 

@@ -39,7 +39,7 @@ static int16_t wrapped_mrad(int64_t value_nrad) {
     return (int16_t)((counts > INT16_MAX) ? counts - 0x10000 : counts);
 }
 
-iw_proto_pose_t sim_pose_step(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm) {
+iw_codec_pose_t sim_pose_step(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm) {
     follow_left(self, now_us);
     int64_t const left = self->mirrored[IW_LEFT] ? -self->left_nm : self->left_nm;
     int64_t const right_way = right_nm - self->right_last_nm;
@@ -52,5 +52,5 @@ iw_proto_pose_t sim_pose_step(sim_pose_t *self, iw_time_us_t now_us, int64_t rig
     self->psi_nrad += turned_nrad;
     self->left_nm = 0;
     self->right_last_nm = right_nm;
-    return (iw_proto_pose_t){saturated_mm(self->x_nm), saturated_mm(self->y_nm), 0, wrapped_mrad(self->psi_nrad)};
+    return (iw_codec_pose_t){saturated_mm(self->x_nm), saturated_mm(self->y_nm), 0, wrapped_mrad(self->psi_nrad)};
 }

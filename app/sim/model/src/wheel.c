@@ -108,7 +108,7 @@ static bool lose(sim_wheel_t *self) {
     return true;
 }
 
-void sim_wheel_hear(sim_wheel_t *self, iw_time_us_t now_us, const iw_proto_setpoint_t *setpoint) {
+void sim_wheel_hear(sim_wheel_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint) {
     if (self->state == SIM_WHEEL_RUNNING && !lose(self)) {
         (void)sim_motion_hear(&self->motion, now_us, setpoint);
     }
@@ -122,7 +122,7 @@ static int16_t saturate(int64_t value) {
 }
 
 /// Rounds up or down by chance, so that the mean over many frames is exact. At rest there is nothing to round.
-static void fill_speed(sim_wheel_t *self, iw_proto_speed_t *out_speed) {
+static void fill_speed(sim_wheel_t *self, iw_codec_speed_t *out_speed) {
     int64_t const dithered = sim_motion_milli_rpm(&self->motion) + sim_random_below(&self->random, RPM_DITHER);
     int64_t const floored = (dithered >= 0) ? dithered / 1000 : -((-dithered + 999) / 1000);
     bool const at_rest = self->motion.speed_um_s == 0;
@@ -135,7 +135,7 @@ static int32_t wrapped(uint32_t ticks) {
     return (ticks <= (uint32_t)INT32_MAX) ? (int32_t)ticks : -(int32_t)(UINT32_MAX - ticks) - 1;
 }
 
-static void fill_status(sim_wheel_t *self, uint8_t battery_dV, iw_proto_status_t *out_status) {
+static void fill_status(sim_wheel_t *self, uint8_t battery_dV, iw_codec_status_t *out_status) {
     int32_t const target = (int32_t)sim_motion_draw_mA(&self->motion) * HEAT_PER_mA_mdegC;
     self->heat_mdegC += (target - self->heat_mdegC) / HEAT_RESPONSE_FRAMES;
     int32_t const temperature = self->ambient_degC + self->heat_mdegC / 1000;
@@ -161,23 +161,22 @@ static sim_telemetry_t take_due(sim_wheel_t *self) {
     return kind;
 }
 
-static void fill(sim_wheel_t *self, iw_time_us_t now_us, sim_telemetry_t kind, iw_proto_message_t *out) {
-    static const iw_proto_kind_t proto_kind[SIM_TELEMETRY_KINDS] = {IW_PROTO_SPEED, IW_PROTO_STATUS, IW_PROTO_POSE,
-                                                                    IW_PROTO_FORCE, IW_PROTO_OFFSET};
+static void fill(sim_wheel_t *self, iw_time_us_t now_us, sim_telemetry_t kind, sim_message_t *out) {
+    static const iw_codec_kind_t proto_kind[SIM_TELEMETRY_KINDS] = {IW_CODEC_SPEED, IW_CODEC_STATUS, IW_CODEC_POSE,
+                                                                    IW_CODEC_FORCE, IW_CODEC_OFFSET};
     out->kind = proto_kind[kind];
-    out->side = self->side;
     if (kind == SIM_TELEMETRY_SPEED) {
-        fill_speed(self, &out->as.speed);
+        fill_speed(self, &out->told.speed);
     } else if (kind == SIM_TELEMETRY_FORCE) {
         bool const learning = now_us < self->learn_until_us;
-        out->as.force.force_raw = sim_force_sample(&self->force, now_us, learning, &self->random);
-        out->as.force.debug_raw = (int16_t)(self->sent[kind] & 0x7FFFU);
+        out->told.force.force_raw = sim_force_sample(&self->force, now_us, learning, &self->random);
+        out->told.force.debug_raw = (int16_t)(self->sent[kind] & 0x7FFFU);
     } else if (kind == SIM_TELEMETRY_OFFSET) {
-        out->as.offset.offset_dN = self->force.learnt_dN;
+        out->told.offset.offset_dN = self->force.learnt_dN;
     }
 }
 
-bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, iw_proto_message_t *out_message) {
+bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, sim_message_t *out_message) {
     iw_time_us_t const now_us = self->next_us;
     sim_motion_advance(&self->motion, now_us);
     if (self->state == SIM_WHEEL_BOOTING) {
@@ -190,9 +189,9 @@ bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, iw_
     sim_telemetry_t const kind = take_due(self);
     fill(self, now_us, kind, out_message);
     if (kind == SIM_TELEMETRY_STATUS) {
-        fill_status(self, battery_dV, &out_message->as.status);
+        fill_status(self, battery_dV, &out_message->told.status);
     } else if (kind == SIM_TELEMETRY_POSE) {
-        out_message->as.pose = sim_pose_step(pose, now_us, self->motion.position_nm);
+        out_message->told.pose = sim_pose_step(pose, now_us, self->motion.position_nm);
     }
     if (self->muted || lose(self)) {
         return false;

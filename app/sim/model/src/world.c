@@ -43,7 +43,7 @@ void sim_world_submit(sim_world_t *self, iw_time_us_t now_us, uint8_t port, cons
 static void submit_pair(sim_world_t *self, iw_time_us_t now_us) {
     for (unsigned side = 0U; side < IW_SIDES; ++side) {
         iw_can_frame_t frame;
-        (void)iw_proto_encode_setpoint((iw_side_t)side, &self->foreign.setpoint, IW_DLC_SETPOINT, &frame);
+        (void)iw_codec_encode_setpoint((iw_side_t)side, &self->foreign.setpoint, IW_DLC_SETPOINT, &frame);
         (void)sim_bus_submit(&self->bus, now_us, SIM_PORT_FOREIGN, &frame);
     }
 }

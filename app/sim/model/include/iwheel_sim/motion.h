@@ -16,7 +16,7 @@
 #ifndef IWHEEL_SIM_MOTION_H
 #define IWHEEL_SIM_MOTION_H
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 #include "iwheel_sim/random.h"
 
 /// Every setpoint type is taken.
@@ -47,7 +47,7 @@ typedef struct {
     int32_t accel_mm_s2;
     uint32_t ticks;
     uint32_t setpoints; ///< How many were taken.
-    iw_proto_setpoint_t setpoint;
+    iw_codec_setpoint_t setpoint;
     int16_t runaway_mm_s; ///< Fault: this much faster than told, as long as it is told anything. 0: none.
     bool driven;          ///< The last setpoint still counts.
     bool blocked;         ///< Fault: cannot turn.
@@ -63,7 +63,7 @@ void sim_motion_init(sim_motion_t *self, const sim_motion_config_t *config, iw_t
 void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us);
 
 /// Takes a setpoint at `now_us`. False: not of the accepted type, ignored.
-bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_proto_setpoint_t *setpoint);
+bool sim_motion_hear(sim_motion_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint);
 
 /// Forgets the setpoint: no power, or the firmware starts anew. The wheel coasts.
 void sim_motion_release(sim_motion_t *self, iw_time_us_t now_us);

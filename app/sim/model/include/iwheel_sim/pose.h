@@ -8,7 +8,7 @@
 #ifndef IWHEEL_SIM_POSE_H
 #define IWHEEL_SIM_POSE_H
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 /// A left wheel not heard for this long stands still.
 #define SIM_POSE_SILENT_US 50000U
@@ -34,6 +34,6 @@ void sim_pose_restart(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm);
 void sim_pose_hear_left(sim_pose_t *self, iw_time_us_t now_us, int32_t speed_um_s);
 
 /// Brings the pose up to now and tells it.
-iw_proto_pose_t sim_pose_step(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm);
+iw_codec_pose_t sim_pose_step(sim_pose_t *self, iw_time_us_t now_us, int64_t right_nm);
 
 #endif

@@ -82,10 +82,16 @@ void sim_wheel_age(sim_wheel_t *self, iw_time_us_t now_us, uint64_t age_us);
 void sim_wheel_slow(sim_wheel_t *self, uint32_t permille);
 
 /// A setpoint for this wheel was on the bus.
-void sim_wheel_hear(sim_wheel_t *self, iw_time_us_t now_us, const iw_proto_setpoint_t *setpoint);
+void sim_wheel_hear(sim_wheel_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint);
+
+/// A message that a wheel sends: `told` has its values.
+typedef struct {
+    iw_codec_kind_t kind;
+    iw_codec_wheel_t told;
+} sim_message_t;
 
 /// Does what is due first, which must be due by now (`self->next_us`): true with a telemetry frame in `*out_message`,
 /// or false if there is none to send. `battery_dV` is what the wheel measures, `pose` the pair's pose.
-bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, iw_proto_message_t *out_message);
+bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, sim_message_t *out_message);
 
 #endif

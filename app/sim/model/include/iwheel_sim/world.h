@@ -39,7 +39,7 @@
 /// Another node that sends setpoints.
 typedef struct {
     iw_time_us_t due_us; ///< IW_NEVER: off.
-    iw_proto_setpoint_t setpoint;
+    iw_codec_setpoint_t setpoint;
 } sim_foreign_t;
 
 /// A node that sends one frame over and over.

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "iwheel/proto.h"
+#include "message.h"
 #include "unity.h"
 
 #define POISON      0xA5
@@ -21,12 +21,12 @@ typedef struct {
 typedef struct {
     uint32_t id;
     uint8_t dlc;
-    iw_proto_kind_t kind;
+    iw_codec_kind_t kind;
     iw_side_t side;
     field_t field[FIELDS_MAX];
 } layout_t;
 
-#define AT(member) offsetof(iw_proto_message_t, as.member)
+#define AT(member) offsetof(message_t, as.member)
 #define SETPOINT_FIELDS                                                                                                \
     {                                                                                                                  \
         {AT(setpoint.type), 0, 1, false}, {AT(setpoint.speed_mm_s), 1, 2, true},                                       \
@@ -67,12 +67,12 @@ typedef struct {
     }
 
 static const layout_t layouts[] = {
-    {266, 5, IW_PROTO_SETPOINT, IW_LEFT, SETPOINT_FIELDS}, {298, 5, IW_PROTO_SETPOINT, IW_RIGHT, SETPOINT_FIELDS},
-    {256, 4, IW_PROTO_SPEED, IW_LEFT, SPEED_FIELDS},       {288, 4, IW_PROTO_SPEED, IW_RIGHT, SPEED_FIELDS},
-    {257, 7, IW_PROTO_STATUS, IW_LEFT, STATUS_FIELDS},     {289, 7, IW_PROTO_STATUS, IW_RIGHT, STATUS_FIELDS},
-    {290, 8, IW_PROTO_POSE, IW_RIGHT, POSE_FIELDS},        {512, 4, IW_PROTO_FORCE, IW_LEFT, FORCE_FIELDS},
-    {544, 4, IW_PROTO_FORCE, IW_RIGHT, FORCE_FIELDS},      {513, 2, IW_PROTO_OFFSET, IW_LEFT, OFFSET_FIELDS},
-    {545, 2, IW_PROTO_OFFSET, IW_RIGHT, OFFSET_FIELDS},
+    {266, 5, IW_CODEC_SETPOINT, IW_LEFT, SETPOINT_FIELDS}, {298, 5, IW_CODEC_SETPOINT, IW_RIGHT, SETPOINT_FIELDS},
+    {256, 4, IW_CODEC_SPEED, IW_LEFT, SPEED_FIELDS},       {288, 4, IW_CODEC_SPEED, IW_RIGHT, SPEED_FIELDS},
+    {257, 7, IW_CODEC_STATUS, IW_LEFT, STATUS_FIELDS},     {289, 7, IW_CODEC_STATUS, IW_RIGHT, STATUS_FIELDS},
+    {290, 8, IW_CODEC_POSE, IW_RIGHT, POSE_FIELDS},        {512, 4, IW_CODEC_FORCE, IW_LEFT, FORCE_FIELDS},
+    {544, 4, IW_CODEC_FORCE, IW_RIGHT, FORCE_FIELDS},      {513, 2, IW_CODEC_OFFSET, IW_LEFT, OFFSET_FIELDS},
+    {545, 2, IW_CODEC_OFFSET, IW_RIGHT, OFFSET_FIELDS},
 };
 #define LAYOUTS (sizeof layouts / sizeof layouts[0])
 
@@ -107,7 +107,7 @@ static void write_bytes(const field_t *field, int64_t value, uint8_t *data) {
     }
 }
 
-static int64_t read_member(const field_t *field, const iw_proto_message_t *message) {
+static int64_t read_member(const field_t *field, const message_t *message) {
     const uint8_t *place = (const uint8_t *)message + field->member;
     int32_t wide;
     int16_t half;
@@ -122,7 +122,7 @@ static int64_t read_member(const field_t *field, const iw_proto_message_t *messa
     return *place;
 }
 
-static void write_member(const field_t *field, int64_t value, iw_proto_message_t *message) {
+static void write_member(const field_t *field, int64_t value, message_t *message) {
     uint8_t *place = (uint8_t *)message + field->member;
     const int32_t wide = (int32_t)value;
     const int16_t half = (int16_t)value;
@@ -136,9 +136,9 @@ static void write_member(const field_t *field, int64_t value, iw_proto_message_t
 }
 
 static bool decodes_to_the_table(const layout_t *layout, const iw_can_frame_t *frame) {
-    iw_proto_message_t message;
+    message_t message;
     memset(&message, POISON, sizeof message);
-    if (iw_proto_decode(frame, &message) != IW_OK || message.kind != layout->kind || message.side != layout->side) {
+    if (!message_decode(frame, &message) || message.kind != layout->kind || message.side != layout->side) {
         return false;
     }
     for (size_t f = 0; f < FIELDS_MAX && layout->field[f].width > 0; f++) {
@@ -150,7 +150,7 @@ static bool decodes_to_the_table(const layout_t *layout, const iw_can_frame_t *f
 }
 
 static bool encodes_to_the_table(const layout_t *layout, const iw_can_frame_t *frame) {
-    iw_proto_message_t message;
+    message_t message;
     iw_can_frame_t expected = *frame;
     iw_can_frame_t actual;
     memset(&message, POISON, sizeof message);
@@ -160,12 +160,12 @@ static bool encodes_to_the_table(const layout_t *layout, const iw_can_frame_t *f
     for (size_t f = 0; f < FIELDS_MAX && layout->field[f].width > 0; f++) {
         write_member(&layout->field[f], read_bytes(&layout->field[f], frame->data), &message);
     }
-    if (layout->kind == IW_PROTO_SETPOINT) {
+    if (layout->kind == IW_CODEC_SETPOINT) {
         const field_t *current = &layout->field[2];
         const int64_t wanted = read_bytes(current, frame->data);
         write_bytes(current, wanted > 2000 ? 2000 : wanted < -2000 ? -2000 : wanted, expected.data);
     }
-    return iw_proto_encode(&message, &actual) == IW_OK && actual.id == expected.id && actual.dlc == expected.dlc &&
+    return message_encode(&message, &actual) == IW_OK && actual.id == expected.id && actual.dlc == expected.dlc &&
            actual.kind == expected.kind && memcmp(actual.data, expected.data, IW_CAN_DATA_MAX) == 0;
 }
 
@@ -242,48 +242,35 @@ static void test_every_value_of_every_field_passes_both_ways(void) {
 }
 
 /// What the contract says about a frame with this number, format and length.
-static iw_status_t expected_status(uint32_t number, uint32_t format, uint8_t dlc) {
+static iw_codec_kind_t expected_kind(uint32_t number, uint32_t format, uint8_t dlc) {
     const layout_t *layout = layout_of(number);
     if (layout == NULL) {
-        return IW_ERR_ID;
+        return IW_CODEC_UNKNOWN;
     }
     if (format != 0) {
-        return IW_ERR_FORMAT;
+        return IW_CODEC_BAD_FORMAT;
     }
-    return dlc < layout->dlc || dlc > IW_CAN_DATA_MAX ? IW_ERR_LENGTH : IW_OK;
+    return dlc < layout->dlc || dlc > IW_CAN_DATA_MAX ? IW_CODEC_BAD_LENGTH : layout->kind;
 }
 
-static bool is_poison(const iw_proto_message_t *message) {
-    iw_proto_message_t poison;
-    memset(&poison, POISON, sizeof poison);
-    return memcmp(message, &poison, sizeof poison) == 0;
+static bool is_poison(const iw_codec_wheel_t told[IW_SIDES]) {
+    iw_codec_wheel_t poison[IW_SIDES];
+    memset(poison, POISON, sizeof poison);
+    return memcmp(told, poison, sizeof poison) == 0;
 }
 
-/// What a program built for size calls is what one built for speed has in line.
-static void check_once_in_a_program(const iw_can_frame_t *frame, iw_status_t expected,
-                                    const iw_proto_message_t *in_line) {
-    iw_proto_message_t message;
-    memset(&message, POISON, sizeof message);
-    if (iw_proto_decode_other(frame, &message) != expected || memcmp(&message, in_line, sizeof message) != 0) {
-        fail_for(frame, "in line and once in a program are not the same");
+static void check_kind(const iw_can_frame_t *frame, iw_codec_kind_t expected) {
+    iw_codec_wheel_t told[IW_SIDES];
+    memset(told, POISON, sizeof told);
+    if (iw_codec_decode(frame, told) != expected) {
+        fail_for(frame, "wrong kind");
     }
-}
-
-static void check_status(const iw_can_frame_t *frame, iw_status_t expected) {
-    iw_proto_message_t message;
-    memset(&message, POISON, sizeof message);
-    if (iw_proto_decode(frame, &message) != expected) {
-        fail_for(frame, "wrong status");
-    }
-    if (is_poison(&message) != (expected != IW_OK)) {
+    if (is_poison(told) != (expected > IW_CODEC_SETPOINT)) {
         fail_for(frame, "output must be written on success only");
     }
-    if (expected != IW_OK || message.kind != IW_PROTO_SPEED) {
-        check_once_in_a_program(frame, expected, &message);
-    }
 }
 
-static void test_decode_every_id_length_format_and_kind_gives_the_documented_status(void) {
+static void test_decode_every_id_length_format_and_kind_gives_the_documented_kind(void) {
     static const uint32_t formats[FORMAT_BITS] = {IW_CAN_EXTENDED, IW_CAN_REMOTE, IW_CAN_ERROR, IW_CAN_FD};
     for (uint32_t number = 0; number <= IW_CAN_ID_MASK; number++) {
         for (unsigned rest = 0; rest < 2U * 16U * 16U; rest++) {
@@ -294,7 +281,7 @@ static void test_decode_every_id_length_format_and_kind_gives_the_documented_sta
             iw_can_frame_t frame = {
                 .id = number | format, .dlc = (uint8_t)(rest / 16U % 16U), .kind = (uint8_t)(rest / 256U)};
             memset(frame.data, 0x5A, sizeof frame.data);
-            check_status(&frame, expected_status(number, format, frame.dlc));
+            check_kind(&frame, expected_kind(number, format, frame.dlc));
         }
     }
 }
@@ -304,7 +291,7 @@ static void test_decode_absurd_lengths_are_refused(void) {
         for (unsigned dlc = 9; dlc < 256; dlc++) {
             iw_can_frame_t frame = frame_of(&layouts[i], 0x11);
             frame.dlc = (uint8_t)dlc;
-            check_status(&frame, IW_ERR_LENGTH);
+            check_kind(&frame, IW_CODEC_BAD_LENGTH);
         }
     }
 }
@@ -316,9 +303,9 @@ static void test_decode_wider_number_with_our_low_bits_is_not_ours(void) {
             iw_can_frame_t frame = frame_of(&layouts[i], 0x11);
             frame.dlc = IW_CAN_DATA_MAX;
             frame.id = layouts[i].id | (uint32_t)1 << bit;
-            check_status(&frame, IW_ERR_ID);
+            check_kind(&frame, IW_CODEC_UNKNOWN);
             frame.id |= IW_CAN_EXTENDED;
-            check_status(&frame, IW_ERR_ID);
+            check_kind(&frame, IW_CODEC_UNKNOWN);
         }
     }
 }
@@ -326,7 +313,7 @@ static void test_decode_wider_number_with_our_low_bits_is_not_ours(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_every_value_of_every_field_passes_both_ways);
-    RUN_TEST(test_decode_every_id_length_format_and_kind_gives_the_documented_status);
+    RUN_TEST(test_decode_every_id_length_format_and_kind_gives_the_documented_kind);
     RUN_TEST(test_decode_absurd_lengths_are_refused);
     RUN_TEST(test_decode_wider_number_with_our_low_bits_is_not_ours);
     return UNITY_END();

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+/// Big-endian words by shifts: the compiler makes a load and a swap of it where the CPU can.
+#ifndef IW_BE_H
+#define IW_BE_H
+
+#include "iwheel/can_frame.h"
+
+/// A call would cost more than the load and swap that the shifts become; compilers that count before that do not see
+/// it, nor that the data of a frame lie at a multiple of four.
+#ifdef __GNUC__
+#define IW_BE_INLINE         __attribute__((always_inline)) static inline
+#define IW_BE_ALIGNED(bytes) (__builtin_assume_aligned((bytes), 4))
+#else
+#define IW_BE_INLINE         static inline
+#define IW_BE_ALIGNED(bytes) (bytes)
+#endif
+
+/// Bytes 0-3 of a frame's data, or 4-7 for `index` 1.
+IW_BE_INLINE uint32_t iw_be_word(const iw_can_frame_t *frame, uint32_t index) {
+    const uint8_t *const bytes = (const uint8_t *)IW_BE_ALIGNED(&frame->data[4U * index]);
+    return ((uint32_t)bytes[0] << 24) | ((uint32_t)bytes[1] << 16) | ((uint32_t)bytes[2] << 8) | bytes[3];
+}
+
+IW_BE_INLINE void iw_be_put_word(iw_can_frame_t *frame, uint32_t index, uint32_t word) {
+    uint8_t *const bytes = (uint8_t *)IW_BE_ALIGNED(&frame->data[4U * index]);
+    bytes[0] = (uint8_t)(word >> 24);
+    bytes[1] = (uint8_t)((word >> 16) & 0xFFU);
+    bytes[2] = (uint8_t)((word >> 8) & 0xFFU);
+    bytes[3] = (uint8_t)(word & 0xFFU);
+}
+
+/// The lower 16 bits as two's complement: what every compiler makes of this conversion, which C leaves to it.
+IW_BE_INLINE int16_t iw_be_low_i16(uint32_t word) {
+    return (int16_t)(uint16_t)(word & 0xFFFFU);
+}
+
+/// Two values of 16 bits, the first in the upper half.
+IW_BE_INLINE uint32_t iw_be_join(int16_t first, int16_t second) {
+    return ((uint32_t)(uint16_t)first << 16) | (uint16_t)second;
+}
+
+#endif
