@@ -16,22 +16,26 @@ const iw_codec_row_t iw_codec_rows[IW_CODEC_ROWS] = {
     {IW_ID_RIGHT_SPEED, 4, IW_DLC_SPEED, IW_CODEC_SPEED, IW_RIGHT},
     {IW_ID_LEFT_STATUS, 40, IW_DLC_STATUS, IW_CODEC_STATUS, IW_LEFT},
     {IW_ID_RIGHT_STATUS, 40, IW_DLC_STATUS, IW_CODEC_STATUS, IW_RIGHT},
-    {IW_ID_RIGHT_POSE, 40, IW_DLC_POSE, IW_CODEC_POSE, IW_RIGHT},
     {IW_ID_LEFT_FORCE, 50, IW_DLC_FORCE, IW_CODEC_FORCE, IW_LEFT},
     {IW_ID_RIGHT_FORCE, 50, IW_DLC_FORCE, IW_CODEC_FORCE, IW_RIGHT},
     {IW_ID_LEFT_OFFSET, 1000, IW_DLC_OFFSET, IW_CODEC_OFFSET, IW_LEFT},
     {IW_ID_RIGHT_OFFSET, 1000, IW_DLC_OFFSET, IW_CODEC_OFFSET, IW_RIGHT},
     {IW_ID_LEFT_SETPOINT, 1000, IW_DLC_SETPOINT, IW_CODEC_SETPOINT, IW_LEFT},
     {IW_ID_RIGHT_SETPOINT, 1000, IW_DLC_SETPOINT, IW_CODEC_SETPOINT, IW_RIGHT},
+    {IW_ID_RIGHT_POSE, 40, IW_DLC_POSE, IW_CODEC_POSE, IW_RIGHT},
 };
 
 const char *iw_codec_name(iw_codec_kind_t kind) {
-    static const char *const names[] = {"speed", "status", "force", "pose", "offset", "setpoint"};
+    static const char *const names[] = {"speed", "status", "force", "offset", "setpoint", "pose"};
     return names[kind];
 }
 
 iw_side_t iw_codec_side(uint32_t id) {
     return ((id & SIDE_BIT) == 0U) ? IW_LEFT : IW_RIGHT;
+}
+
+const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind) {
+    return &iw_codec_rows[2U * (uint32_t)kind];
 }
 
 const iw_codec_row_t *iw_codec_find(uint32_t id) {

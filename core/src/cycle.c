@@ -70,7 +70,7 @@ void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us) {
 /// What the force module found out about units, as entries of the ledger.
 static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
     const iw_force_t *const force = &self->force[side];
-    const iw_ledger_item_t unit = (side == IW_LEFT) ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
+    const iw_ledger_item_t unit = iw_ledger_force_unit(side);
     const iw_unit_evidence_t configured = (self->config.force_unit[side] == IW_FORCE_CN) ? IW_UNIT_CN : IW_UNIT_DN;
     if (force->evidence == IW_UNIT_OFFSET_REMOVED) {
         iw_ledger_contradict(&self->ledger, IW_LEDGER_OFFSET_INCLUDED, IW_EVIDENCE_BUS, force->evidence_permille);
@@ -99,11 +99,19 @@ static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t 
     }
 }
 
-static void note_length(iw_gateway_t *self, uint8_t length) {
-    if (length == IW_DLC_STATUS) {
-        iw_ledger_confirm(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
-    } else {
+/// Once is enough: what follows has nothing new to tell.
+static void contradict_length(iw_gateway_t *self, uint8_t length) {
+    if (iw_ledger_entry(&self->ledger, IW_LEDGER_DLC)->state != IW_LEDGER_CONTRADICTED) {
         iw_ledger_contradict(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
+    }
+}
+
+/// A status frame as long as the table has it speaks for its lengths, any message of another length against them.
+static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length) {
+    if (length != iw_codec_row(kind)->length) {
+        contradict_length(self, length);
+    } else if (kind == IW_CODEC_STATUS) {
+        iw_ledger_confirm(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
     }
 }
 
@@ -163,15 +171,13 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
         break;
     case IW_CODEC_BAD_LENGTH:
         self->counters.bad_length++;
+        contradict_length(self, frame->dlc);
         break;
     case IW_CODEC_UNKNOWN:
         self->counters.unknown++;
         break;
-    case IW_CODEC_STATUS:
-        note_length(self, frame->dlc);
-        hear(self, now_us, kind, side, &told[side]);
-        break;
     default:
+        note_length(self, kind, frame->dlc);
         hear(self, now_us, kind, side, &told[side]);
         break;
     }

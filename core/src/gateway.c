@@ -68,6 +68,10 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts) {
 }
 
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
+    // A latch is told first: it must be left first.
+    if (self->permit.state != IW_STATE_LATCHED && iw_ledger_doubt(&self->ledger) != IW_LEDGER_ITEMS) {
+        return IW_REFUSE_CONTRADICTED;
+    }
     const iw_refusal_t refusal = iw_permit_arm(&self->permit, now_us, client, takeover);
     if (refusal == IW_REFUSE_NONE && self->permit.arming) {
         iw_setpoint_hasten(&self->setpoint, now_us);
@@ -171,6 +175,34 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
 
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
     return iw_force_tare(&self->force[side], now_us);
+}
+
+/// The operator's word against what the wheel's offset says of the unit, or of the offset: only a tare is to be trusted.
+static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_t validity) {
+    const bool judged = validity == IW_FORCE_UNIT_CONTRADICTED || validity == IW_FORCE_OFFSET_REMOVED;
+    if (!judged) {
+        return validity;
+    }
+    return (force->provenance == IW_OFFSET_OPERATOR) ? IW_FORCE_VALID : IW_FORCE_OFFSET_DOUBTED;
+}
+
+iw_force_validity_t iw_gateway_force_validity(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
+    const iw_force_t *const force = &self->force[side];
+    const iw_ledger_entry_t *const unit = iw_ledger_entry(&self->ledger, iw_ledger_force_unit(side));
+    const iw_ledger_entry_t *const included = iw_ledger_entry(&self->ledger, IW_LEDGER_OFFSET_INCLUDED);
+    const iw_ledger_entry_t *const asked = (force->evidence == IW_UNIT_OFFSET_REMOVED) ? included : unit;
+    iw_force_validity_t validity = iw_force_validity(force, now_us);
+    if (asked->evidence == IW_EVIDENCE_OPERATOR) {
+        validity = overruled(force, validity);
+    }
+    if (validity == IW_FORCE_VALID && unit->state == IW_LEDGER_CONTRADICTED) {
+        return IW_FORCE_UNIT_CONTRADICTED;
+    }
+    if (validity == IW_FORCE_VALID && included->state == IW_LEDGER_CONTRADICTED &&
+        force->provenance != IW_OFFSET_OPERATOR) {
+        return IW_FORCE_OFFSET_REMOVED;
+    }
+    return validity;
 }
 
 iw_state_t iw_gateway_state(const iw_gateway_t *self) {

@@ -46,6 +46,33 @@ void iw_ledger_contradict(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_
     change(self, item, &next);
 }
 
+iw_ledger_item_t iw_ledger_force_unit(iw_side_t side) {
+    return (side == IW_LEFT) ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
+}
+
+bool iw_ledger_guards_motion(iw_ledger_item_t item) {
+    switch (item) {
+    case IW_LEDGER_SETPOINT_TYPE:
+    case IW_LEDGER_CURRENT_ROLE:
+    case IW_LEDGER_FEEDBACK_SIGN_LEFT:
+    case IW_LEDGER_FEEDBACK_SIGN_RIGHT:
+    case IW_LEDGER_MOUNT_SIGN_LEFT:
+    case IW_LEDGER_MOUNT_SIGN_RIGHT:
+        return true;
+    default:
+        return false;
+    }
+}
+
+iw_ledger_item_t iw_ledger_doubt(const iw_ledger_t *self) {
+    uint32_t item = 0;
+    while (item < IW_LEDGER_ITEMS &&
+           (self->entry[item].state != IW_LEDGER_CONTRADICTED || !iw_ledger_guards_motion((iw_ledger_item_t)item))) {
+        item++;
+    }
+    return (iw_ledger_item_t)item;
+}
+
 const iw_ledger_entry_t *iw_ledger_entry(const iw_ledger_t *self, iw_ledger_item_t item) {
     return &self->entry[item];
 }

@@ -227,7 +227,7 @@ static void calculate(void) {
     const iw_bit_timing_achieved_t wanted = {any_u32(), any_u16()};
     (void)iw_bit_timing_achieved(any_u32(), &timing);
     (void)iw_bit_timing_solve(&limits, any_u32(), &wanted, &timing);
-    const iw_codec_kind_t kind = (iw_codec_kind_t)Frama_C_interval(IW_CODEC_SPEED, IW_CODEC_SETPOINT);
+    const iw_codec_kind_t kind = (iw_codec_kind_t)Frama_C_interval(IW_CODEC_SPEED, IW_CODEC_POSE);
     const iw_side_t side = (iw_side_t)Frama_C_interval(IW_LEFT, IW_RIGHT);
     Frama_C_make_unknown((char *)told, sizeof told);
     (void)iw_codec_encode(kind, side, &told[side], &frame);

@@ -22,7 +22,7 @@ static inline bool message_decode(const iw_can_frame_t *frame, message_t *out_me
     iw_codec_wheel_t told[IW_SIDES] = {{{0, 0}, {0, 0, 0, 0}, {0, 0}, {0, 0, 0, 0}, {0, 0, 0}, {0}},
                                        {{0, 0}, {0, 0, 0, 0}, {0, 0}, {0, 0, 0, 0}, {0, 0, 0}, {0}}};
     const iw_codec_kind_t kind = iw_codec_decode(frame, told);
-    if (kind > IW_CODEC_SETPOINT) {
+    if (kind >= IW_CODEC_KINDS) {
         return false;
     }
     out_message->kind = kind;

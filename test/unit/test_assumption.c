@@ -157,11 +157,11 @@ static void test_assumption_every_contradiction_names_its_cost_and_those_of_moti
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         const char *cost = gw_assumption_cost((iw_ledger_item_t)item);
         const bool refuses = strncmp(cost, "arm is refused; ", 16) == 0;
-        TEST_ASSERT_EQUAL_INT_MESSAGE(refuses, gw_assumption_moves((iw_ledger_item_t)item), cost);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(refuses, iw_ledger_guards_motion((iw_ledger_item_t)item), cost);
         TEST_ASSERT_NOT_EQUAL(0, strcmp(cost, "unknown"));
     }
-    TEST_ASSERT_TRUE(gw_assumption_moves(IW_LEDGER_MOUNT_SIGN_LEFT));
-    TEST_ASSERT_FALSE(gw_assumption_moves(IW_LEDGER_DLC));
+    TEST_ASSERT_TRUE(iw_ledger_guards_motion(IW_LEDGER_MOUNT_SIGN_LEFT));
+    TEST_ASSERT_FALSE(iw_ledger_guards_motion(IW_LEDGER_DLC));
 }
 
 int main(void) {

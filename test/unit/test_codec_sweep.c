@@ -265,7 +265,7 @@ static void check_kind(const iw_can_frame_t *frame, iw_codec_kind_t expected) {
     if (iw_codec_decode(frame, told) != expected) {
         fail_for(frame, "wrong kind");
     }
-    if (is_poison(told) != (expected > IW_CODEC_SETPOINT)) {
+    if (is_poison(told) != (expected >= IW_CODEC_KINDS)) {
         fail_for(frame, "output must be written on success only");
     }
 }

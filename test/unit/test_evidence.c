@@ -135,38 +135,12 @@ static void test_evidence_a_type_that_the_wheels_do_not_obey_is_not_confirmed(vo
     assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED);
 }
 
-static void test_evidence_longer_frames_contradict_the_length_and_shorter_ones_too(void) {
-    assert_entry(IW_LEDGER_DLC, IW_LEDGER_CONFIRMED);
-    rig.world.pair.padded = true;
-    world_rig_run(&rig, 10);
-    assert_entry(IW_LEDGER_DLC, IW_LEDGER_CONTRADICTED);
-    TEST_ASSERT_EQUAL_INT32(8, figure(IW_LEDGER_DLC));
-    world_rig_begin(&rig, 0);
-    const iw_can_frame_t cut = {.id = IW_ID_LEFT_FORCE, .dlc = 2};
-    gw_evidence_frame(&rig.gateway, &cut);
-    assert_entry(IW_LEDGER_DLC, IW_LEDGER_CONTRADICTED);
-    TEST_ASSERT_EQUAL_INT32(2, figure(IW_LEDGER_DLC));
-}
-
-static void test_evidence_frames_that_are_no_telemetry_say_nothing_of_lengths(void) {
-    static const iw_can_frame_t others[] = {
-        {.id = IW_ID_LEFT_SETPOINT, .dlc = 8},
-        {.id = IW_ID_LEFT_SPEED | IW_CAN_REMOTE, .dlc = 0},
-        {.id = IW_ID_LEFT_SPEED | IW_CAN_EXTENDED, .dlc = 8},
-        {.id = 300, .dlc = 1},
-    };
-    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
-        gw_evidence_frame(&rig.gateway, &others[i]);
-    }
-    assert_entry(IW_LEDGER_DLC, IW_LEDGER_CONFIRMED);
-}
-
 static void test_evidence_the_operators_word_is_not_replaced_by_a_fit(void) {
     iw_ledger_confirm(&rig.gateway.ledger, IW_LEDGER_GEAR_RATIO, IW_EVIDENCE_OPERATOR, 0);
-    iw_ledger_contradict(&rig.gateway.ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    iw_ledger_contradict(&rig.gateway.ledger, IW_LEDGER_POSE_BYTE_ORDER, IW_EVIDENCE_OPERATOR, 0);
     world_rig_drive(&rig, 400, 400, 5000);
     TEST_ASSERT_EQUAL_INT(IW_EVIDENCE_OPERATOR, iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_GEAR_RATIO)->evidence);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_SETPOINT_TYPE)->state);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_POSE_BYTE_ORDER)->state);
 }
 
 int main(void) {
@@ -182,8 +156,6 @@ int main(void) {
     RUN_TEST(test_evidence_a_pose_the_other_way_round_contradicts_its_byte_order);
     RUN_TEST(test_evidence_a_pose_that_jumps_once_contradicts_nothing);
     RUN_TEST(test_evidence_a_type_that_the_wheels_do_not_obey_is_not_confirmed);
-    RUN_TEST(test_evidence_longer_frames_contradict_the_length_and_shorter_ones_too);
-    RUN_TEST(test_evidence_frames_that_are_no_telemetry_say_nothing_of_lengths);
     RUN_TEST(test_evidence_the_operators_word_is_not_replaced_by_a_fit);
     return UNITY_END();
 }

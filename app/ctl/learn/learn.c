@@ -238,7 +238,7 @@ void learn_frame(learn_t *self, const candump_t *frame) {
         return;
     }
     const iw_codec_kind_t kind = iw_codec_decode(&core, told);
-    const bool ours = kind <= IW_CODEC_SETPOINT;
+    const bool ours = kind < IW_CODEC_KINDS;
     const size_t known = ours || kind == IW_CODEC_BAD_LENGTH ? index_of(frame->id) : LEARN_IDS;
     learn_id_t *id = known < LEARN_IDS ? &self->known[known] : NULL;
     self->strange += kind == IW_CODEC_BAD_FORMAT ? 1U : 0U;

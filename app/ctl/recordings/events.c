@@ -62,7 +62,7 @@ static bool take_refusal(const json_t *line, uint8_t *out) {
         *out = IW_REFUSE_NONE;
         return true;
     }
-    return take_word(word_of(line, "refused", refusal_name, IW_REFUSE_LISTEN_ONLY + 1U), IW_REFUSE_LISTEN_ONLY + 1U,
+    return take_word(word_of(line, "refused", refusal_name, IW_REFUSALS), IW_REFUSALS,
                      out);
 }
 

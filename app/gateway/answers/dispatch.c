@@ -125,37 +125,12 @@ static void reply_armed(gw_daemon_t *daemon, gw_client_t *client, const gw_id_t 
     send_reply(client, &json);
 }
 
-/// The first contradicted item that motion depends on; IW_LEDGER_ITEMS if there is none.
-static iw_ledger_item_t contradicted_motion(const iw_ledger_t *ledger) {
-    unsigned item = 0;
-    while (item < IW_LEDGER_ITEMS &&
-           !(gw_assumption_moves((iw_ledger_item_t)item) && ledger->entry[item].state == IW_LEDGER_CONTRADICTED)) {
-        ++item;
-    }
-    return (iw_ledger_item_t)item;
-}
-
-static void refuse_contradicted(const call_t *call, iw_ledger_item_t item) {
-    char evidence[GW_EVIDENCE_SIZE];
-    gw_refusal_t words = {.error = GW_DENIED};
-    gw_assumption_evidence(item, iw_ledger_entry(&call->daemon->gateway.ledger, item),
-                           call->daemon->knowledge.known.item[item].found, evidence);
-    (void)snprintf(words.message, sizeof words.message, "%s is contradicted: %s; %s", gw_ledger_item_name(item),
-                   evidence, gw_assumption_cost(item));
-    send_refusal(call->daemon, call->client, &call->request->id, &words);
-}
-
 static void do_arm(const call_t *call) {
     gw_daemon_t *daemon = call->daemon;
     gw_client_t *client = call->client;
-    const iw_ledger_item_t doubt = contradicted_motion(&daemon->gateway.ledger);
     if (daemon->shutting_down) {
         const gw_refusal_t refusal = {GW_DENIED, "the gateway is shutting down; wait until it is started again"};
         send_refusal(daemon, client, &call->request->id, &refusal);
-        return;
-    }
-    if (doubt != IW_LEDGER_ITEMS && iw_gateway_state(&daemon->gateway) != IW_STATE_LATCHED) {
-        refuse_contradicted(call, doubt); // A latch is told first: it must be left first.
         return;
     }
     const iw_refusal_t refusal = iw_gateway_arm(&daemon->gateway, daemon->now_us, client->id, call->request->takeover);

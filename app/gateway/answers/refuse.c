@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "refuse.h"
 
+#include "assumption.h"
+
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -201,6 +203,15 @@ static void say_listen_only(const wording_t *self) {
     SAY(self, "the gateway runs with --listen-only and never sends; start it without");
 }
 
+static void say_contradicted(const wording_t *self) {
+    const iw_ledger_t *ledger = &self->daemon->gateway.ledger;
+    const iw_ledger_item_t item = iw_ledger_doubt(ledger);
+    char evidence[GW_EVIDENCE_SIZE];
+    gw_assumption_evidence(item, iw_ledger_entry(ledger, item), self->daemon->knowledge.known.item[item].found,
+                           evidence);
+    SAY(self, "%s is contradicted: %s; %s", gw_ledger_item_name(item), evidence, gw_assumption_cost(item));
+}
+
 void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_refusal_t refusal,
                         gw_refusal_t *out_refusal) {
     static void (*const say[])(const wording_t *self) = {
@@ -213,6 +224,7 @@ void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_ref
         [IW_REFUSE_SEND_STALLED] = say_stalled,      [IW_REFUSE_SECOND_MASTER] = say_second_master,
         [IW_REFUSE_CAUSE_PRESENT] = say_present,     [IW_REFUSE_TYPE_NOT_SET] = say_type,
         [IW_REFUSE_STALE_COMMAND] = say_stale,       [IW_REFUSE_LISTEN_ONLY] = say_listen_only,
+        [IW_REFUSE_CONTRADICTED] = say_contradicted,
     };
     const wording_t wording = {daemon, request, out_refusal->message, sizeof out_refusal->message};
     out_refusal->error = gw_error_of(refusal);

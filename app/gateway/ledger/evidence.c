@@ -154,11 +154,3 @@ void gw_evidence_look(gw_evidence_t *self, iw_gateway_t *gateway, iw_time_us_t n
     }
     look_at_pose(self, gateway);
 }
-
-void gw_evidence_frame(iw_gateway_t *gateway, const iw_can_frame_t *frame) {
-    const iw_codec_row_t *row = iw_codec_find(frame->id);
-    if (row != NULL && row->kind != IW_CODEC_SETPOINT && frame->dlc != row->length &&
-        iw_ledger_entry(&gateway->ledger, IW_LEDGER_DLC)->state != IW_LEDGER_CONTRADICTED) {
-        iw_ledger_contradict(&gateway->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, frame->dlc);
-    }
-}

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 /// Evidence for the assumption ledger that the wheels' own motion gives, beside what the core finds itself (force units,
-/// offset, feedback signs, length of the status frame).
+/// offset, feedback signs, lengths of frames).
 ///
 /// It lives in the daemon and not in the core because no safety rule needs it: a controller without it drives as well.
 ///
 /// - gear ratio: ticks moved against the turns that the rpm say, while a wheel turns one way, not too slowly
 /// - byte order of the pose: read the right way round it moves in small steps, the other way round in large ones
 /// - setpoint type: a wheel runs at the speed it was told, steadily
-/// - lengths: every frame of the wheels, not only status
 ///
 /// Looks at the core after each step; reads no clock, keeps no frame. Thresholds are ours.
 #ifndef GATEWAY_EVIDENCE_H
@@ -61,8 +60,5 @@ void gw_evidence_init(gw_evidence_t *self);
 
 /// What the last step has brought, into the gateway's ledger.
 void gw_evidence_look(gw_evidence_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
-
-/// A frame, before the core has judged it: is it as long as the table says?
-void gw_evidence_frame(iw_gateway_t *gateway, const iw_can_frame_t *frame);
 
 #endif

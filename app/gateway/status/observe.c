@@ -242,7 +242,6 @@ static bool anybody_watches(const gw_daemon_t *daemon, gw_topic_t topic) {
 
 void gw_observe_tap(void *context, const iw_can_frame_t *frame) {
     gw_daemon_t *daemon = (gw_daemon_t *)context;
-    gw_evidence_frame(&daemon->gateway, frame);
     if (daemon->tapped < GW_FRAMES) {
         daemon->tap[daemon->tapped++] = (gw_tapped_t){.at_us = daemon->now_us, .frame = *frame};
     }

@@ -59,7 +59,7 @@ static void write_motion(const gw_daemon_t *daemon, iw_side_t side, json_out_t *
 
 static void write_condition(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
     const iw_wheel_t *wheel = &daemon->gateway.wheel[side];
-    const iw_force_validity_t force = gw_snapshot_force_validity(daemon, side);
+    const iw_force_validity_t force = iw_gateway_force_validity(&daemon->gateway, daemon->now_us, side);
     const bool ever = wheel->status_us != IW_NEVER;
     const bool fresh = gw_snapshot_is_fresh(daemon->now_us, wheel->status_us, GW_STATUS_STALE_US);
     const bool warm = fresh && wheel->status.temperature_degC <= IW_WHEEL_TEMPERATURE_MAX_degC;

@@ -18,9 +18,6 @@ void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json);
 /// The fields about force of one wheel's object in a snapshot.
 void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json);
 
-/// Whether a wheel's net force means anything, and if not, why: the core's view and the ledger's.
-iw_force_validity_t gw_snapshot_force_validity(const gw_daemon_t *daemon, iw_side_t side);
-
 /// The age in ms of something that happened then; null if it never did.
 void gw_snapshot_write_age(json_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us);
 

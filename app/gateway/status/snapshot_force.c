@@ -4,31 +4,6 @@
 
 #include "iwheel_linux/clock.h"
 
-static iw_ledger_item_t unit_item(iw_side_t side) {
-    return side == IW_LEFT ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
-}
-
-iw_force_validity_t gw_snapshot_force_validity(const gw_daemon_t *daemon, iw_side_t side) {
-    const iw_ledger_entry_t *unit = iw_ledger_entry(&daemon->gateway.ledger, unit_item(side));
-    const iw_ledger_entry_t *included = iw_ledger_entry(&daemon->gateway.ledger, IW_LEDGER_OFFSET_INCLUDED);
-    iw_force_t view = daemon->gateway.force[side];
-    const bool settled = view.evidence == IW_UNIT_OFFSET_REMOVED ? included->evidence == IW_EVIDENCE_OPERATOR
-                                                                 : unit->evidence == IW_EVIDENCE_OPERATOR;
-    if (settled && view.evidence != IW_UNIT_UNKNOWN && iw_force_validity(&view, daemon->now_us) != IW_FORCE_VALID) {
-        view.evidence =
-            IW_UNIT_UNCLEAR; // The operator's word against the wheel's offset: only a tare is to be trusted.
-    }
-    const iw_force_validity_t validity = iw_force_validity(&view, daemon->now_us);
-    if (validity == IW_FORCE_VALID && unit->state == IW_LEDGER_CONTRADICTED) {
-        return IW_FORCE_UNIT_CONTRADICTED;
-    }
-    if (validity == IW_FORCE_VALID && included->state == IW_LEDGER_CONTRADICTED &&
-        view.provenance != IW_OFFSET_OPERATOR) {
-        return IW_FORCE_OFFSET_REMOVED;
-    }
-    return validity;
-}
-
 /// Where the zero comes from, and how good it is.
 typedef struct {
     const gw_known_offset_t *known; ///< As noted when it was taken.
@@ -94,7 +69,7 @@ static void write_known_bool(json_out_t *json, const char *name, bool known, boo
 
 void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
     const iw_force_t *force = &daemon->gateway.force[side];
-    const iw_force_validity_t validity = gw_snapshot_force_validity(daemon, side);
+    const iw_force_validity_t validity = iw_gateway_force_validity(&daemon->gateway, daemon->now_us, side);
     const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
     const bool offset = force->provenance != IW_OFFSET_NONE;
     const zero_t zero = describe_zero(daemon, side);
@@ -122,7 +97,7 @@ void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json) {
     for (unsigned i = 0; i < IW_SIDES; ++i) {
         const iw_side_t side = (iw_side_t)i;
         const iw_force_t *force = &daemon->gateway.force[side];
-        const iw_force_validity_t validity = gw_snapshot_force_validity(daemon, side);
+        const iw_force_validity_t validity = iw_gateway_force_validity(&daemon->gateway, daemon->now_us, side);
         const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
         const zero_t zero = describe_zero(daemon, side);
         json_out_open(json, side == IW_LEFT ? "left" : "right", '{');

@@ -249,9 +249,3 @@ const char *gw_assumption_cost(iw_ledger_item_t item) {
     };
     return (unsigned)item < IW_LEDGER_ITEMS ? costs[item] : "unknown";
 }
-
-bool gw_assumption_moves(iw_ledger_item_t item) {
-    return item == IW_LEDGER_SETPOINT_TYPE || item == IW_LEDGER_CURRENT_ROLE || item == IW_LEDGER_FEEDBACK_SIGN_LEFT ||
-           item == IW_LEDGER_FEEDBACK_SIGN_RIGHT || item == IW_LEDGER_MOUNT_SIGN_LEFT ||
-           item == IW_LEDGER_MOUNT_SIGN_RIGHT;
-}

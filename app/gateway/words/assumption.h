@@ -45,7 +45,4 @@ void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entr
 /// What a contradiction of it disables, and what mends it.
 const char *gw_assumption_cost(iw_ledger_item_t item);
 
-/// True if the wheels must not be moved while it is contradicted.
-bool gw_assumption_moves(iw_ledger_item_t item);
-
 #endif

@@ -58,6 +58,7 @@ gw_error_t gw_error_of(iw_refusal_t refusal) {
         [IW_REFUSE_TYPE_NOT_SET] = GW_TYPE_NOT_SET,
         [IW_REFUSE_STALE_COMMAND] = GW_STALE_COMMAND,
         [IW_REFUSE_LISTEN_ONLY] = GW_LISTEN_ONLY,
+        [IW_REFUSE_CONTRADICTED] = GW_DENIED,
     };
     return (size_t)refusal < sizeof errors / sizeof errors[0] ? errors[refusal] : GW_INTERNAL;
 }

@@ -58,10 +58,11 @@ typedef enum {
     IW_CODEC_SPEED,
     IW_CODEC_STATUS,
     IW_CODEC_FORCE,
-    IW_CODEC_POSE,
     IW_CODEC_OFFSET,
     IW_CODEC_SETPOINT,
-    IW_CODEC_UNKNOWN,    ///< No message: not one of the eleven numbers, whatever the format.
+    IW_CODEC_POSE,
+    IW_CODEC_KINDS,
+    IW_CODEC_UNKNOWN = IW_CODEC_KINDS, ///< No message: not one of the eleven numbers, whatever the format.
     IW_CODEC_BAD_FORMAT, ///< No message: one of the numbers on a remote, extended, error or FD frame.
     IW_CODEC_BAD_LENGTH, ///< No message: shorter than the table, or dlc > 8.
 } iw_codec_kind_t;
@@ -77,7 +78,7 @@ typedef struct {
 
 #define IW_CODEC_ROWS 11U
 
-/// All messages, in the order of how often they come; the two setpoints are last.
+/// All messages, by kind, the left wheel's before the right one's.
 extern const iw_codec_row_t iw_codec_rows[IW_CODEC_ROWS];
 
 typedef struct {
@@ -124,10 +125,13 @@ typedef struct {
     iw_codec_offset_t offset;
 } iw_codec_wheel_t;
 
+/// A row of that kind: what it says of length and period holds for both wheels.
+const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind);
+
 /// The row of a number of 11 bits; NULL if it is not one of the eleven.
 const iw_codec_row_t *iw_codec_find(uint32_t id);
 
-/// What the message is called: "speed", "status", "force", "pose", "offset", "setpoint". Not for a refusal.
+/// What the message is called: "speed", "status", "force", "offset", "setpoint", "pose". Not for a refusal.
 const char *iw_codec_name(iw_codec_kind_t kind);
 
 /// Which wheel one of the eleven numbers belongs to.

@@ -136,6 +136,10 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
 /// Makes the present force of a wheel its zero.
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side);
 
+/// Whether a wheel's net force means anything now, and if not, why: what the sensor shows, and what the ledger says of
+/// its unit and offset.
+iw_force_validity_t iw_gateway_force_validity(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side);
+
 iw_state_t iw_gateway_state(const iw_gateway_t *self);
 
 #endif

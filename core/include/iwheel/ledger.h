@@ -61,6 +61,15 @@ void iw_ledger_confirm(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t e
 /// Evidence against it.
 void iw_ledger_contradict(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure);
 
+/// The item of a wheel's force unit.
+iw_ledger_item_t iw_ledger_force_unit(iw_side_t side);
+
+/// True if the wheels must not be moved while this item is contradicted: type, role and the signs.
+bool iw_ledger_guards_motion(iw_ledger_item_t item);
+
+/// The first contradicted item that guards motion; IW_LEDGER_ITEMS if there is none.
+iw_ledger_item_t iw_ledger_doubt(const iw_ledger_t *self);
+
 /// The item's present entry.
 const iw_ledger_entry_t *iw_ledger_entry(const iw_ledger_t *self, iw_ledger_item_t item);
 

@@ -91,6 +91,8 @@ typedef enum {
     IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
     IW_REFUSE_STALE_COMMAND, ///< `iw_permit_t::stale_client` sent a nonzero drive too recently.
     IW_REFUSE_LISTEN_ONLY,
+    IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_ledger_doubt` tells which.
+    IW_REFUSALS,
 } iw_refusal_t;
 
 /// The last stop, for `why`.

@@ -9,7 +9,7 @@ uint32_t bench_decode(uint32_t rounds) {
     uint32_t refused = 0;
     for (uint32_t round = 0; round < rounds; round++) {
         for (const iw_can_frame_t *frame = bench_frame; frame < &bench_frame[BENCH_FRAMES]; frame++) {
-            refused += (iw_codec_decode(frame, seen) <= IW_CODEC_SETPOINT) ? 0U : 1U;
+            refused += (iw_codec_decode(frame, seen) < IW_CODEC_KINDS) ? 0U : 1U;
             BENCH_STORED(seen);
         }
     }

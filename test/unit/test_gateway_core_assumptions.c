@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+// What the core does with the assumption ledger: who may arm, whether a force means anything, what a frame's length tells.
+#include "gateway_rig.h"
+#include "message.h"
+
+#include "unity.h"
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+    gateway_rig_run(&rig, MS(500));
+}
+
+void tearDown(void) {}
+
+static iw_ledger_t *ledger(void) {
+    return &rig.gateway.ledger;
+}
+
+static void test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused(void) {
+    static const iw_ledger_item_t guards[] = {IW_LEDGER_SETPOINT_TYPE,      IW_LEDGER_CURRENT_ROLE,
+                                              IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_FEEDBACK_SIGN_RIGHT,
+                                              IW_LEDGER_MOUNT_SIGN_LEFT,    IW_LEDGER_MOUNT_SIGN_RIGHT};
+    for (size_t i = 0; i < sizeof guards / sizeof guards[0]; i++) {
+        iw_ledger_contradict(ledger(), guards[i], IW_EVIDENCE_OPERATOR, 0);
+        TEST_ASSERT_TRUE(iw_ledger_guards_motion(guards[i]));
+        TEST_ASSERT_EQUAL_INT(guards[i], iw_ledger_doubt(ledger()));
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER, false));
+        TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
+        iw_ledger_confirm(ledger(), guards[i], IW_EVIDENCE_OPERATOR, 0);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, iw_ledger_doubt(ledger()));
+    gateway_rig_arm(&rig);
+}
+
+static void test_arm_with_any_other_assumption_contradicted_is_granted(void) {
+    unsigned others = 0;
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        if (!iw_ledger_guards_motion((iw_ledger_item_t)item)) {
+            iw_ledger_contradict(ledger(), (iw_ledger_item_t)item, IW_EVIDENCE_OPERATOR, 0);
+            others++;
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT(IW_LEDGER_ITEMS - 6U, others);
+    gateway_rig_arm(&rig);
+}
+
+static void test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption(void) {
+    iw_ledger_contradict(ledger(), IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    iw_gateway_estop(&rig.gateway, rig.now_us, HOLDER);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, gateway_rig_request_arm(&rig, HOLDER, false));
+}
+
+static void test_takeover_while_an_assumption_is_contradicted_is_refused(void) {
+    gateway_rig_arm(&rig);
+    iw_ledger_contradict(ledger(), IW_LEDGER_MOUNT_SIGN_RIGHT, IW_EVIDENCE_OPERATOR, 0);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER + 1U, true));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+}
+
+/// The left wheel's force in a state of its own: what the sensor shows, what the ledger says of unit and offset.
+typedef struct {
+    iw_offset_provenance_t provenance;
+    iw_unit_evidence_t evidence;
+    iw_ledger_entry_t unit;
+    iw_ledger_entry_t included;
+    iw_force_validity_t expected;
+} force_case_t;
+
+#define ASSUMED                                                                                                        \
+    { IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT, 0 }
+#define CONTRADICTED                                                                                                   \
+    { IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS, 0 }
+#define SETTLED                                                                                                        \
+    { IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0 }
+
+static void test_force_validity_follows_sensor_and_ledger(void) {
+    static const force_case_t cases[] = {
+        {IW_OFFSET_WHEEL, IW_UNIT_CN, ASSUMED, ASSUMED, IW_FORCE_VALID},
+        {IW_OFFSET_WHEEL, IW_UNIT_DN, ASSUMED, ASSUMED, IW_FORCE_UNIT_CONTRADICTED},
+        {IW_OFFSET_WHEEL, IW_UNIT_DN, SETTLED, ASSUMED, IW_FORCE_OFFSET_DOUBTED},
+        {IW_OFFSET_WHEEL, IW_UNIT_DN, ASSUMED, SETTLED, IW_FORCE_UNIT_CONTRADICTED},
+        {IW_OFFSET_OPERATOR, IW_UNIT_DN, SETTLED, ASSUMED, IW_FORCE_VALID},
+        {IW_OFFSET_WHEEL, IW_UNIT_OFFSET_REMOVED, ASSUMED, ASSUMED, IW_FORCE_OFFSET_REMOVED},
+        {IW_OFFSET_WHEEL, IW_UNIT_OFFSET_REMOVED, ASSUMED, SETTLED, IW_FORCE_OFFSET_DOUBTED},
+        {IW_OFFSET_WHEEL, IW_UNIT_OFFSET_REMOVED, SETTLED, ASSUMED, IW_FORCE_OFFSET_REMOVED},
+        {IW_OFFSET_OPERATOR, IW_UNIT_OFFSET_REMOVED, ASSUMED, ASSUMED, IW_FORCE_VALID},
+        {IW_OFFSET_WHEEL, IW_UNIT_UNCLEAR, SETTLED, ASSUMED, IW_FORCE_OFFSET_DOUBTED},
+        {IW_OFFSET_WHEEL, IW_UNIT_CN, CONTRADICTED, ASSUMED, IW_FORCE_UNIT_CONTRADICTED},
+        {IW_OFFSET_OPERATOR, IW_UNIT_CN, CONTRADICTED, ASSUMED, IW_FORCE_UNIT_CONTRADICTED},
+        {IW_OFFSET_WHEEL, IW_UNIT_CN, ASSUMED, CONTRADICTED, IW_FORCE_OFFSET_REMOVED},
+        {IW_OFFSET_OPERATOR, IW_UNIT_CN, ASSUMED, CONTRADICTED, IW_FORCE_VALID},
+        {IW_OFFSET_NONE, IW_UNIT_CN, CONTRADICTED, CONTRADICTED, IW_FORCE_NO_OFFSET},
+        {IW_OFFSET_NONE, IW_UNIT_DN, SETTLED, SETTLED, IW_FORCE_NO_OFFSET},
+    };
+    iw_force_t *const force = &rig.gateway.force[IW_LEFT];
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        force->raw_us = rig.now_us;
+        force->raw = 100;
+        force->provenance = cases[i].provenance;
+        force->evidence = cases[i].evidence;
+        ledger()->entry[IW_LEDGER_FORCE_UNIT_LEFT] = cases[i].unit;
+        ledger()->entry[IW_LEDGER_OFFSET_INCLUDED] = cases[i].included;
+        TEST_ASSERT_EQUAL_INT(cases[i].expected, iw_gateway_force_validity(&rig.gateway, rig.now_us, IW_LEFT));
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_gateway_force_validity(&rig.gateway, rig.now_us, IW_RIGHT));
+    }
+}
+
+static void test_force_validity_of_the_right_wheel_asks_for_its_own_unit(void) {
+    iw_force_t *const force = &rig.gateway.force[IW_RIGHT];
+    force->raw_us = rig.now_us;
+    force->provenance = IW_OFFSET_WHEEL;
+    iw_ledger_contradict(ledger(), IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_BUS, 0);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, iw_gateway_force_validity(&rig.gateway, rig.now_us, IW_RIGHT));
+    iw_ledger_contradict(ledger(), IW_LEDGER_FORCE_UNIT_RIGHT, IW_EVIDENCE_BUS, 0);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, iw_gateway_force_validity(&rig.gateway, rig.now_us, IW_RIGHT));
+}
+
+static void hear_empty(uint32_t id, uint8_t length) {
+    fake_bus_put_empty(&rig.bus, id, length);
+    gateway_rig_step(&rig);
+}
+
+static void test_length_of_any_message_that_the_table_has_otherwise_contradicts_it(void) {
+    for (size_t i = 0; i < IW_CODEC_ROWS; i++) {
+        const iw_codec_row_t *row = &iw_codec_rows[i];
+        if (row->kind == IW_CODEC_SETPOINT) {
+            continue;
+        }
+        for (int off = -1; off <= 1; off += 2) {
+            const uint8_t length = (uint8_t)(row->length + off);
+            gateway_rig_init(&rig);
+            gateway_rig_run(&rig, MS(100));
+            TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+            hear_empty(row->id, length);
+            TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+            TEST_ASSERT_EQUAL_INT32(length, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->figure);
+        }
+    }
+}
+
+static void test_length_once_contradicted_is_told_once(void) {
+    hear_empty(IW_ID_LEFT_FORCE, 5);
+    const uint32_t changes = ledger()->changes;
+    hear_empty(IW_ID_LEFT_FORCE, 6);
+    hear_empty(IW_ID_LEFT_FORCE, 1);
+    gateway_rig_run(&rig, MS(100));
+    TEST_ASSERT_EQUAL_UINT32(changes, ledger()->changes);
+    TEST_ASSERT_EQUAL_INT32(5, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->figure);
+}
+
+static void test_length_of_frames_that_are_no_telemetry_says_nothing(void) {
+    hear_empty(IW_ID_LEFT_SPEED | IW_CAN_REMOTE, 0);
+    hear_empty(IW_ID_LEFT_SPEED | IW_CAN_EXTENDED, 8);
+    hear_empty(300, 1);
+    hear_empty(IW_ID_LEFT_SETPOINT, 8);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+}
+
+static void test_length_of_other_messages_as_in_the_table_confirms_nothing(void) {
+    gateway_rig_init(&rig);
+    rig.wheel[IW_LEFT].mute = true;
+    rig.wheel[IW_RIGHT].mute = true;
+    hear_empty(IW_ID_LEFT_SPEED, IW_DLC_SPEED);
+    hear_empty(IW_ID_RIGHT_POSE, IW_DLC_POSE);
+    hear_empty(IW_ID_LEFT_FORCE, IW_DLC_FORCE);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+    hear_empty(IW_ID_LEFT_STATUS, IW_DLC_STATUS);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused);
+    RUN_TEST(test_arm_with_any_other_assumption_contradicted_is_granted);
+    RUN_TEST(test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption);
+    RUN_TEST(test_takeover_while_an_assumption_is_contradicted_is_refused);
+    RUN_TEST(test_force_validity_follows_sensor_and_ledger);
+    RUN_TEST(test_force_validity_of_the_right_wheel_asks_for_its_own_unit);
+    RUN_TEST(test_length_of_any_message_that_the_table_has_otherwise_contradicts_it);
+    RUN_TEST(test_length_once_contradicted_is_told_once);
+    RUN_TEST(test_length_of_frames_that_are_no_telemetry_says_nothing);
+    RUN_TEST(test_length_of_other_messages_as_in_the_table_confirms_nothing);
+    return UNITY_END();
+}
