@@ -20,6 +20,7 @@ static const char *const names[BLACKBOX_KINDS] = {
     [BLACKBOX_RESET] = "reset",
     [BLACKBOX_GONE] = "gone",
     [BLACKBOX_TARE] = "tare",
+    [BLACKBOX_LEDGER] = "ledger",
     [BLACKBOX_STATE] = "state",
     [BLACKBOX_STOPPED] = "stopped",
 };

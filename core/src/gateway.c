@@ -177,6 +177,14 @@ iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t sid
     return iw_force_tare(&self->force[side], now_us);
 }
 
+void iw_gateway_know(iw_gateway_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry) {
+    if (entry->state == IW_LEDGER_CONTRADICTED) {
+        iw_ledger_contradict(&self->ledger, item, entry->evidence, entry->figure);
+    } else if (entry->state == IW_LEDGER_CONFIRMED) {
+        iw_ledger_confirm(&self->ledger, item, entry->evidence, entry->figure);
+    }
+}
+
 /// The operator's word against what the wheel's offset says of the unit, or of the offset: only a tare is to be trusted.
 static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_t validity) {
     const bool judged = validity == IW_FORCE_UNIT_CONTRADICTED || validity == IW_FORCE_OFFSET_REMOVED;

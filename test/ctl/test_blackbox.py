@@ -110,6 +110,21 @@ class BlackBox(WithRig):
         self.assertTrue(all(re.search(r" (10A|12A)#", line) for line in own))
         self.assertIn("is recorded in " + stem + ".log", self.rig.gateway.text())
 
+    def test_refused_arm_of_a_contradicted_assumption_is_decided_again(self):
+        self.assertTrue(self.client.request("confirm", item="mount_sign_left", value="yes")["ok"])
+        self.assertEqual("denied", self.client.request("arm", name="tester")["error"])
+        time.sleep(1.2)  # Told again, for a recording that begins in the middle.
+        self.assertTrue(self.client.request("confirm", item="mount_sign_left")["ok"])
+        stem = self.stop_by_button()
+        code, out, err = self.ctl("replay", stem + ".log")
+        self.assertEqual((0, ""), (code, err))
+        self.assertRegex(out, r"arm +client \d+: denied\n")
+        self.assertNotIn("DIFFERENT", out)
+        entries = [json.loads(line) for line in read(stem + ".jsonl").splitlines() if '"type":"ledger"' in line]
+        self.assertEqual("contradicted", entries[0]["state"])
+        self.assertEqual(("mount_sign_left", "confirmed", "operator"),
+                         tuple(entries[-1][name] for name in ("item", "state", "evidence")))
+
     def test_why_tells_the_recording_and_the_frames_around_the_stop(self):
         stem = self.stop_by_button()
         why = self.why()

@@ -62,8 +62,7 @@ static bool take_refusal(const json_t *line, uint8_t *out) {
         *out = IW_REFUSE_NONE;
         return true;
     }
-    return take_word(word_of(line, "refused", refusal_name, IW_REFUSALS), IW_REFUSALS,
-                     out);
+    return take_word(word_of(line, "refused", refusal_name, IW_REFUSALS), IW_REFUSALS, out);
 }
 
 static int32_t limited(int64_t value, int64_t limit) {
@@ -98,6 +97,28 @@ static bool take_decision(const json_t *line, blackbox_entry_t *out) {
     return take_word(word_of(line, "cause", cause_name, IW_CAUSES), IW_CAUSES, &out->a);
 }
 
+static const char *item_name(unsigned item) {
+    return gw_ledger_item_name((iw_ledger_item_t)item);
+}
+
+static const char *ledger_state_name(unsigned state) {
+    return gw_ledger_state_name((iw_ledger_state_t)state);
+}
+
+static const char *evidence_name(unsigned evidence) {
+    return gw_evidence_name((iw_evidence_t)evidence);
+}
+
+static bool take_assumption(const json_t *line, blackbox_entry_t *out) {
+    const unsigned evidence = word_of(line, "evidence", evidence_name, IW_EVIDENCE_OPERATOR + 1U);
+    const unsigned states = IW_LEDGER_CONTRADICTED + 1U;
+    out->number = evidence;
+    out->as.value = limited(integer(line, "figure"), INT32_MAX);
+    return evidence <= IW_EVIDENCE_OPERATOR &&
+           take_word(word_of(line, "item", item_name, IW_LEDGER_ITEMS), IW_LEDGER_ITEMS, &out->a) &&
+           take_word(word_of(line, "state", ledger_state_name, states), states, &out->b);
+}
+
 static bool take_fields(const json_t *line, blackbox_entry_t *out) {
     switch (out->kind) {
     case BLACKBOX_DRIVE:
@@ -127,6 +148,8 @@ static bool take_fields(const json_t *line, blackbox_entry_t *out) {
         return take_word(word_of(line, "cause", cause_name, IW_CAUSES), IW_CAUSES, &out->a);
     case BLACKBOX_TARE:
         return take_word(word_of(line, "side", side_name, IW_SIDES_BOTH + 1U) - 1U, IW_SIDES, &out->a);
+    case BLACKBOX_LEDGER:
+        return take_assumption(line, out);
     case BLACKBOX_NOT_SENT:
         out->number = (uint32_t)integer(line, "id");
         out->as.value = limited(integer(line, "answer"), INT32_MAX);

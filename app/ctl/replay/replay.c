@@ -206,6 +206,12 @@ static void answer(replay_t *self, const blackbox_entry_t *entry) {
     }
 }
 
+static void know(replay_t *self, const blackbox_entry_t *entry) {
+    const iw_ledger_entry_t known = {(iw_ledger_state_t)entry->b, (iw_evidence_t)entry->number,
+                                     (int32_t)entry->as.value};
+    iw_gateway_know(&self->gateway, (iw_ledger_item_t)entry->a, &known); // What it changes the next step tells.
+}
+
 void replay_event(replay_t *self, const blackbox_entry_t *entry) {
     iw_gateway_t *gateway = &self->gateway;
     switch (entry->kind) {
@@ -232,6 +238,9 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry) {
     case BLACKBOX_TARE:
         (void)iw_gateway_tare(gateway, entry->at_us, entry->a == (uint8_t)IW_RIGHT ? IW_RIGHT : IW_LEFT);
         replay_tell_request(self, entry, IW_REFUSE_NONE);
+        break;
+    case BLACKBOX_LEDGER:
+        know(self, entry);
         break;
     case BLACKBOX_STATE:
     case BLACKBOX_STOPPED:

@@ -121,6 +121,12 @@ static void put_request(json_out_t *json, const blackbox_entry_t *entry) {
     case BLACKBOX_RESET:
         put_refusal(json, entry->b);
         break;
+    case BLACKBOX_LEDGER:
+        json_out_text(json, "item", gw_ledger_item_name((iw_ledger_item_t)entry->a));
+        json_out_text(json, "state", gw_ledger_state_name((iw_ledger_state_t)entry->b));
+        json_out_text(json, "evidence", gw_evidence_name((iw_evidence_t)entry->number));
+        json_out_int(json, "figure", entry->as.value);
+        break;
     case BLACKBOX_TARE:
         json_out_text(json, "side", entry->a == (uint8_t)IW_LEFT ? "left" : "right");
         json_out_bool(json, "done", entry->b == (uint8_t)IW_TARE_OK);
@@ -151,6 +157,7 @@ size_t gw_box_line_entry(const blackbox_entry_t *entry, uint64_t frames, char ou
     case BLACKBOX_RESET:
     case BLACKBOX_GONE:
     case BLACKBOX_TARE:
+    case BLACKBOX_LEDGER:
         put_request(&json, entry);
         break;
     default:

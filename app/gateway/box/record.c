@@ -56,9 +56,23 @@ void gw_record_state(gw_daemon_t *daemon, iw_state_t before) {
     gw_tape_put(&daemon->tape, &entry);
 }
 
+void gw_record_assumption(gw_daemon_t *daemon, iw_ledger_item_t item) {
+    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
+    gw_tape_put(&daemon->tape, &(blackbox_entry_t){.at_us = daemon->now_us,
+                                                   .kind = BLACKBOX_LEDGER,
+                                                   .number = (uint32_t)entry->evidence,
+                                                   .a = (uint8_t)item,
+                                                   .b = (uint8_t)entry->state,
+                                                   .as = {.value = entry->figure}});
+}
+
 void gw_record_again(gw_daemon_t *daemon) {
     if (gw_tape_again(&daemon->tape, daemon->now_us)) {
         gw_record_state(daemon, iw_gateway_state(&daemon->gateway));
+        const iw_ledger_item_t doubt = iw_ledger_doubt(&daemon->gateway.ledger);
+        if (doubt != IW_LEDGER_ITEMS) {
+            gw_record_assumption(daemon, doubt);
+        }
     }
 }
 

@@ -13,7 +13,10 @@ void gw_record_stop(gw_daemon_t *daemon);
 /// Notes the state and what it was before.
 void gw_record_state(gw_daemon_t *daemon, iw_state_t before);
 
-/// Once a second: notes the port's answers and the state again.
+/// Notes what the core was told of an assumption: it may refuse to arm for it.
+void gw_record_assumption(gw_daemon_t *daemon, iw_ledger_item_t item);
+
+/// Once a second: notes the port's answers, the state and what keeps from arming again.
 void gw_record_again(gw_daemon_t *daemon);
 
 /// Takes what the writer tells, to the log.

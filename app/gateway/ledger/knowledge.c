@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
+#include "box/record.h"
 #include "daemon.h"
 #include "knowledge_told.h"
 #include "names.h"
@@ -105,10 +106,10 @@ static void merge_item(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_know
         daemon->knowledge.changed = true;
         return;
     }
-    if (stored->entry.state == IW_LEDGER_CONTRADICTED) {
-        iw_ledger_contradict(ledger, item, stored->entry.evidence, stored->entry.figure);
-    } else if (present->state == IW_LEDGER_ASSUMED || stored->entry.evidence == IW_EVIDENCE_OPERATOR) {
-        iw_ledger_confirm(ledger, item, stored->entry.evidence, stored->entry.figure);
+    if (stored->entry.state == IW_LEDGER_CONTRADICTED || present->state == IW_LEDGER_ASSUMED ||
+        stored->entry.evidence == IW_EVIDENCE_OPERATOR) {
+        iw_gateway_know(&daemon->gateway, item, &stored->entry);
+        gw_record_assumption(daemon, item);
     }
     daemon->knowledge.known.item[item] = *stored;
     daemon->knowledge.known.item[item].entry = *present;
@@ -223,13 +224,13 @@ void gw_knowledge_tend(gw_daemon_t *daemon) {
 gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, const char *found) {
     iw_gateway_t *gateway = &daemon->gateway;
     const gw_found_t verdict = gw_assumption_compare(&gateway->config, item, found);
-    if (verdict == GW_FOUND_SAME) {
-        iw_ledger_confirm(&gateway->ledger, item, IW_EVIDENCE_OPERATOR, 0);
-    } else if (verdict == GW_FOUND_DIFFERENT) {
-        iw_ledger_contradict(&gateway->ledger, item, IW_EVIDENCE_OPERATOR, 0);
-    } else {
+    if (verdict != GW_FOUND_SAME && verdict != GW_FOUND_DIFFERENT) {
         return verdict;
     }
+    const iw_ledger_entry_t word = {verdict == GW_FOUND_SAME ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED,
+                                    IW_EVIDENCE_OPERATOR, 0};
+    iw_gateway_know(gateway, item, &word);
+    gw_record_assumption(daemon, item);
     (void)snprintf(daemon->knowledge.known.item[item].found, GW_VALUE_SIZE, "%s", found);
     daemon->knowledge.changed = true;
     return verdict;

@@ -136,6 +136,10 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
 /// Makes the present force of a wheel its zero.
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side);
 
+/// Tells what is known of an assumption from elsewhere: the operator's word, or what an earlier run found. From the bus
+/// the core learns itself. An entry that is only ASSUMED says nothing.
+void iw_gateway_know(iw_gateway_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry);
+
 /// Whether a wheel's net force means anything now, and if not, why: what the sensor shows, and what the ledger says of
 /// its unit and offset.
 iw_force_validity_t iw_gateway_force_validity(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side);
