@@ -11,7 +11,5 @@ gw_client_t *gw_daemon_client(gw_daemon_t *self, iw_client_t id) {
 }
 
 bool gw_daemon_is_sending(const gw_daemon_t *self) {
-    const iw_permit_t *permit = &self->gateway.permit;
-    return permit->arming || permit->state == IW_STATE_ARMED || permit->state == IW_STATE_STOPPING ||
-           (permit->state == IW_STATE_LATCHED && permit->holding);
+    return iw_gateway_is_sending(&self->gateway);
 }

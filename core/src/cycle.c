@@ -266,7 +266,8 @@ static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, i
 }
 
 static void watch_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side, int32_t applied_mm_s) {
-    const bool ours = self->permit.state == IW_STATE_ARMED || self->permit.state == IW_STATE_STOPPING;
+    const iw_state_t state = iw_permit_state(&self->permit);
+    const bool ours = state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
     if (ours && iw_wheel_heard(&self->wheel[side], now_us)) {
         watch_follow(self, now_us, side, applied_mm_s);
     } else {

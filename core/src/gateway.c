@@ -69,18 +69,18 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts) {
 
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     // A latch is told first: it must be left first.
-    if (self->permit.state != IW_STATE_LATCHED && iw_ledger_doubt(&self->ledger) != IW_LEDGER_ITEMS) {
+    if (iw_permit_state(&self->permit) != IW_STATE_LATCHED && iw_ledger_doubt(&self->ledger) != IW_LEDGER_ITEMS) {
         return IW_REFUSE_CONTRADICTED;
     }
     const iw_refusal_t refusal = iw_permit_arm(&self->permit, now_us, client, takeover);
-    if (refusal == IW_REFUSE_NONE && self->permit.arming) {
+    if (refusal == IW_REFUSE_NONE && iw_permit_arming(&self->permit)) {
         iw_setpoint_hasten(&self->setpoint, now_us);
     }
     return refusal;
 }
 
 bool iw_gateway_arming(const iw_gateway_t *self) {
-    return self->permit.arming;
+    return iw_permit_arming(&self->permit);
 }
 
 iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self) {
@@ -214,5 +214,9 @@ iw_force_validity_t iw_gateway_force_validity(const iw_gateway_t *self, iw_time_
 }
 
 iw_state_t iw_gateway_state(const iw_gateway_t *self) {
-    return self->permit.state;
+    return iw_permit_state(&self->permit);
+}
+
+bool iw_gateway_is_sending(const iw_gateway_t *self) {
+    return iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE;
 }

@@ -4,12 +4,71 @@
 #include <string.h>
 
 #define BIT(cause) (1U << (uint32_t)(cause))
-/// Causes that are there as long as they are told in every step; the other latching ones are events.
-#define LEVELS                                                                                                         \
-    (BIT(IW_CAUSE_ESTOP_LINE) | BIT(IW_CAUSE_BUS_DOWN) | BIT(IW_CAUSE_SEND_STALLED) | BIT(IW_CAUSE_WHEEL_LOST))
-#define LATCHING_ALWAYS (BIT(IW_CAUSE_ESTOP_LINE) | BIT(IW_CAUSE_ESTOP_SOFTWARE) | BIT(IW_CAUSE_INTERNAL))
 
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
+
+/// What a cause does.
+typedef enum {
+    STOPS = 0,     ///< Stops what is ARMED.
+    LATCHES,       ///< Latches while setpoints are sent; else remembered, to refuse arm and reset while present.
+    ALWAYS_LATCHES ///< Latches whatever the state.
+} effect_t;
+
+typedef struct {
+    uint8_t effect; ///< An effect_t.
+    bool level;     ///< There as long as it is told in every step; else an event that is past after IW_PERMIT_EVENT_US.
+    bool at_once;   ///< Stops without a ramp.
+    uint8_t refusal; ///< An iw_refusal_t: how it refuses while it is present.
+} cause_row_t;
+
+static const cause_row_t rows[IW_CAUSES] = {
+    [IW_CAUSE_NONE] = {STOPS, false, false, IW_REFUSE_NONE},
+    [IW_CAUSE_ESTOP_LINE] = {ALWAYS_LATCHES, true, true, IW_REFUSE_ESTOP_PRESSED},
+    [IW_CAUSE_ESTOP_SOFTWARE] = {ALWAYS_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_BUS_DOWN] = {LATCHES, true, true, IW_REFUSE_BUS_DOWN},
+    [IW_CAUSE_SECOND_MASTER] = {LATCHES, false, true, IW_REFUSE_SECOND_MASTER},
+    [IW_CAUSE_SEND_STALLED] = {LATCHES, true, true, IW_REFUSE_SEND_STALLED},
+    [IW_CAUSE_WHEEL_REBOOTED] = {LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_WHEEL_LOST] = {LATCHES, true, true, IW_REFUSE_WHEEL_LOST},
+    [IW_CAUSE_FEEDBACK_SIGN] = {LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_OVERSPEED] = {LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_LOOP_HUNG] = {LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_INTERNAL] = {ALWAYS_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_LOOP_LATE] = {STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_WHEEL_BLOCKED] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_LEASE_LOST] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_CLIENT_GONE] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_CLIENT_STOP] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_SHUTDOWN] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_RESTART] = {STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
+};
+
+/// Of several latching causes at once, the one that is told: the most telling first.
+static const uint8_t telling[] = {
+    IW_CAUSE_ESTOP_LINE,   IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_BUS_DOWN,   IW_CAUSE_SECOND_MASTER,
+    IW_CAUSE_SEND_STALLED, IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_FEEDBACK_SIGN,
+    IW_CAUSE_OVERSPEED,    IW_CAUSE_LOOP_HUNG,      IW_CAUSE_INTERNAL,
+};
+#define TELLING (sizeof telling / sizeof telling[0])
+
+/// What a phase is called outside, and what it demands of the scheduler.
+typedef struct {
+    uint8_t state;   ///< An iw_state_t.
+    uint8_t demand;  ///< An iw_demand_t.
+    uint8_t at_once; ///< The same where zero is wanted without a ramp.
+} phase_row_t;
+
+static const phase_row_t phases[IW_PHASES] = {
+    [IW_PHASE_LISTENING] = {IW_STATE_LISTENING, IW_DEMAND_SILENCE, IW_DEMAND_SILENCE},
+    [IW_PHASE_ARMING] = {IW_STATE_LISTENING, IW_DEMAND_ZERO, IW_DEMAND_ZERO},
+    [IW_PHASE_ARMED] = {IW_STATE_ARMED, IW_DEMAND_FOLLOW, IW_DEMAND_FOLLOW},
+    [IW_PHASE_BRAKING] = {IW_STATE_STOPPING, IW_DEMAND_BRAKE, IW_DEMAND_ZERO},
+    [IW_PHASE_HOLDING] = {IW_STATE_STOPPING, IW_DEMAND_BRAKE, IW_DEMAND_ZERO},
+    [IW_PHASE_REARMING] = {IW_STATE_STOPPING, IW_DEMAND_BRAKE, IW_DEMAND_ZERO},
+    [IW_PHASE_RESTARTING] = {IW_STATE_STOPPING, IW_DEMAND_ZERO, IW_DEMAND_ZERO},
+    [IW_PHASE_CUT] = {IW_STATE_LATCHED, IW_DEMAND_ZERO, IW_DEMAND_ZERO},
+    [IW_PHASE_LATCHED] = {IW_STATE_LATCHED, IW_DEMAND_SILENCE, IW_DEMAND_SILENCE},
+};
 
 /// So many setpoints can be un-echoed when a process dies: two of each wheel (see outbox.h).
 #define LEFT_BEHIND_MAX 4U
@@ -19,26 +78,37 @@ static bool may_send(const iw_config_t *config) {
     return !config->listen_only && config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
+iw_state_t iw_permit_state(const iw_permit_t *self) {
+    return (iw_state_t)phases[self->phase].state;
+}
+
+iw_demand_t iw_permit_demand(const iw_permit_t *self) {
+    const phase_row_t *const row = &phases[self->phase];
+    return (iw_demand_t)(self->at_once ? row->at_once : row->demand);
+}
+
+bool iw_permit_arming(const iw_permit_t *self) {
+    return self->phase == IW_PHASE_ARMING || self->phase == IW_PHASE_REARMING;
+}
+
+bool iw_cause_latches(iw_cause_t cause) {
+    return rows[cause].effect != STOPS;
+}
+
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted) {
     memset(self, 0, sizeof *self);
     self->config = config;
     self->stale_us = IW_NEVER;
-    for (size_t cause = 0; cause < IW_CAUSE_LOOP_LATE; cause++) {
+    for (size_t cause = 0; cause < IW_CAUSES; cause++) {
         self->seen_us[cause] = IW_NEVER;
     }
     if (restarted && may_send(config)) {
-        self->state = IW_STATE_STOPPING;
-        self->cut = true;
+        self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
         self->stop.cause = IW_CAUSE_RESTART;
         self->stop.at_us = now_us;
         self->stop.number = 1;
     }
-}
-
-/// Sending zeros for a process that died: nothing but those is ours yet, so faults are remembered only.
-static bool restarting(const iw_permit_t *self) {
-    return self->state == IW_STATE_STOPPING && self->stop.cause == IW_CAUSE_RESTART;
 }
 
 static bool within(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us) {
@@ -55,29 +125,14 @@ static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
     return ((unfed_us < UINT32_MAX) ? (uint32_t)unfed_us : UINT32_MAX) / IW_US_PER_MS;
 }
 
-static iw_refusal_t refusal_for(iw_cause_t cause) {
-    switch (cause) {
-    case IW_CAUSE_ESTOP_LINE:
-        return IW_REFUSE_ESTOP_PRESSED;
-    case IW_CAUSE_BUS_DOWN:
-        return IW_REFUSE_BUS_DOWN;
-    case IW_CAUSE_SECOND_MASTER:
-        return IW_REFUSE_SECOND_MASTER;
-    case IW_CAUSE_SEND_STALLED:
-        return IW_REFUSE_SEND_STALLED;
-    case IW_CAUSE_WHEEL_LOST:
-        return IW_REFUSE_WHEEL_LOST;
-    default:
-        return IW_REFUSE_CAUSE_PRESENT;
-    }
-}
-
 uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us) {
-    uint32_t present = (self->present | self->raised) & LEVELS;
-    for (uint32_t cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL; cause++) {
-        if ((BIT(cause) & LEVELS) == 0U && within(now_us, self->seen_us[cause], IW_PERMIT_EVENT_US)) {
-            present |= BIT(cause);
-        }
+    const uint32_t told = self->present | self->raised;
+    uint32_t present = 0;
+    for (size_t i = 0; i < TELLING; i++) {
+        const uint8_t cause = telling[i];
+        const bool is =
+            rows[cause].level ? (told & BIT(cause)) != 0U : within(now_us, self->seen_us[cause], IW_PERMIT_EVENT_US);
+        present |= is ? BIT(cause) : 0U;
     }
     return present;
 }
@@ -85,9 +140,9 @@ uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us) {
 /// The most telling of the causes present, as a refusal.
 static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us) {
     const uint32_t present = iw_permit_present(self, now_us);
-    for (uint32_t cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL; cause++) {
-        if ((present & BIT(cause)) != 0U) {
-            return refusal_for((iw_cause_t)cause);
+    for (size_t i = 0; i < TELLING; i++) {
+        if ((present & BIT(telling[i])) != 0U) {
+            return (iw_refusal_t)rows[telling[i]].refusal;
         }
     }
     return IW_REFUSE_NONE;
@@ -102,9 +157,11 @@ static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
     return within(now_us, self->stale_us, IW_PERMIT_STALE_US);
 }
 
+/// The granted arm comes to nothing: back to where it was asked for.
 static void end_arming(iw_permit_t *self, iw_refusal_t refusal) {
-    if (self->arming) {
-        self->arming = false;
+    const iw_phase_t zeros = (self->hold_us == IW_NEVER) ? IW_PHASE_BRAKING : IW_PHASE_HOLDING;
+    if (iw_permit_arming(self)) {
+        self->phase = (self->phase == IW_PHASE_ARMING) ? IW_PHASE_LISTENING : zeros;
         self->arm_refusal = refusal;
         self->holder = IW_CLIENT_NONE;
     }
@@ -119,55 +176,62 @@ static void record_stop(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause
     stop->client = self->holder;
     stop->applied = self->view.applied;
     stop->cause = cause;
-    stop->from = self->state;
+    stop->from = iw_permit_state(self);
     stop->sides = sides;
     stop->latched = false;
 }
 
-static void enter_stopping(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
+static void brake(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     record_stop(self, now_us, cause, sides, detail);
-    self->state = IW_STATE_STOPPING;
-    self->cut = cause == IW_CAUSE_LOOP_LATE;
+    self->blocked = (cause == IW_CAUSE_WHEEL_BLOCKED) ? self->holder : IW_CLIENT_NONE;
+    self->phase = IW_PHASE_BRAKING;
+    self->at_once = rows[cause].at_once;
     self->hold_us = IW_NEVER;
     self->holder = IW_CLIENT_NONE;
 }
 
-static void enter_latched(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
-    const bool was_sending = self->state != IW_STATE_LISTENING || self->arming;
+static void latch(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     record_stop(self, now_us, cause, sides, detail);
     self->stop.latched = true;
-    end_arming(self, refusal_for(cause));
-    self->state = IW_STATE_LATCHED;
-    self->holding = was_sending;
+    const bool silent = self->phase == IW_PHASE_LISTENING;
+    end_arming(self, (iw_refusal_t)rows[cause].refusal);
+    self->phase = silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
     self->hold_us = now_us;
     self->holder = IW_CLIENT_NONE;
 }
 
 static bool latches(const iw_permit_t *self, iw_cause_t cause) {
-    if ((BIT(cause) & LATCHING_ALWAYS) != 0U) {
-        return true;
+    switch (self->phase) {
+    case IW_PHASE_LISTENING:
+    case IW_PHASE_ARMING:
+    case IW_PHASE_RESTARTING:
+        return rows[cause].effect == ALWAYS_LATCHES;
+    default:
+        return rows[cause].effect != STOPS;
     }
-    return cause < IW_CAUSE_LOOP_LATE && self->state != IW_STATE_LISTENING && !restarting(self);
+}
+
+/// A foreign setpoint in RESTARTING: the dead process's own, still in its controller, or somebody who drives.
+static void count_stranger(iw_permit_t *self) {
+    self->strangers++;
+    self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
 }
 
 void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     self->raised |= BIT(cause);
-    if (cause < IW_CAUSE_LOOP_LATE) {
-        self->seen_us[cause] = now_us;
-    }
-    if (self->state == IW_STATE_LATCHED) {
+    self->seen_us[cause] = now_us;
+    if (iw_permit_state(self) == IW_STATE_LATCHED) {
         return;
     }
     if (latches(self, cause)) {
-        enter_latched(self, now_us, cause, sides, detail);
-    } else if (self->state == IW_STATE_ARMED) {
-        enter_stopping(self, now_us, cause, sides, detail);
-    } else if (restarting(self) && cause == IW_CAUSE_SECOND_MASTER) {
-        self->strangers++;
-        self->state = (self->strangers > LEFT_BEHIND_MAX) ? IW_STATE_LISTENING : self->state;
+        latch(self, now_us, cause, sides, detail);
+    } else if (self->phase == IW_PHASE_ARMED) {
+        brake(self, now_us, cause, sides, detail);
+    } else if (self->phase == IW_PHASE_RESTARTING && cause == IW_CAUSE_SECOND_MASTER) {
+        count_stranger(self);
     } else {
-        end_arming(self, refusal_for(cause));
-        self->cut = self->cut || cause == IW_CAUSE_LOOP_LATE;
+        end_arming(self, (iw_refusal_t)rows[cause].refusal);
+        self->at_once = self->at_once || rows[cause].at_once;
     }
 }
 
@@ -179,8 +243,7 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     const iw_time_us_t limit_us = (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
     const iw_time_us_t waited_us = now_us - self->arming_us;
     if (self->view.proven && waited_us <= limit_us) {
-        self->arming = false;
-        self->state = IW_STATE_ARMED;
+        self->phase = IW_PHASE_ARMED;
         self->armed_us = now_us;
         grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
     } else if (waited_us >= limit_us) {
@@ -188,51 +251,55 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// True once zeros have been held for long enough and the wheels stand, or for as long as it makes sense.
-static bool hold_done(iw_permit_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t zero_hold_us = (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS;
-    if (self->hold_us == IW_NEVER) {
-        if (!self->cut && !self->view.output_zero) {
-            return false;
-        }
-        self->hold_us = now_us;
-    }
+/// Whether the wheels need not stand for the zeros to end. After a restart nobody knows whether they can be heard.
+static bool time_is_enough(const iw_permit_t *self) {
+    return self->view.settled || self->phase == IW_PHASE_RESTARTING;
+}
+
+/// Zeros are held for long enough and until the wheels stand, or for as long as it makes sense; then `phase` follows.
+static void step_hold(iw_permit_t *self, iw_time_us_t now_us, iw_phase_t phase) {
     const iw_time_us_t held_us = now_us - self->hold_us;
-    if (held_us >= IW_PERMIT_HOLD_MAX_US) {
-        self->still_moving += self->view.settled ? 0U : 1U;
-        return true;
+    const bool longest = held_us >= IW_PERMIT_HOLD_MAX_US;
+    const bool done = held_us >= (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self);
+    if (longest || done) {
+        self->still_moving += (longest && !self->view.settled) ? 1U : 0U;
+        self->phase = phase;
     }
-    return held_us >= zero_hold_us && (self->view.settled || restarting(self));
+}
+
+static void step_phase(iw_permit_t *self, iw_time_us_t now_us) {
+    switch (self->phase) {
+    case IW_PHASE_ARMED:
+        if (now_us >= self->lease_until_us) {
+            brake(self, now_us, IW_CAUSE_LEASE_LOST, IW_SIDES_NONE, unfed_ms(self, now_us));
+        }
+        break;
+    case IW_PHASE_BRAKING:
+        if (self->at_once || self->view.output_zero) {
+            self->phase = IW_PHASE_HOLDING;
+            self->hold_us = now_us;
+        }
+        break;
+    case IW_PHASE_HOLDING:
+    case IW_PHASE_RESTARTING:
+        step_hold(self, now_us, IW_PHASE_LISTENING);
+        break;
+    case IW_PHASE_CUT:
+        step_hold(self, now_us, IW_PHASE_LATCHED);
+        break;
+    default:
+        break;
+    }
 }
 
 void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view_t *view) {
     self->view = *view;
     self->present = self->raised;
     self->raised = 0;
-    if (self->arming) {
+    if (iw_permit_arming(self)) {
         step_arming(self, now_us);
     }
-    if (self->state == IW_STATE_ARMED && now_us >= self->lease_until_us) {
-        enter_stopping(self, now_us, IW_CAUSE_LEASE_LOST, IW_SIDES_NONE, unfed_ms(self, now_us));
-    } else if (self->state == IW_STATE_STOPPING && !self->arming && hold_done(self, now_us)) {
-        self->state = IW_STATE_LISTENING;
-    } else if (self->holding && hold_done(self, now_us)) {
-        self->holding = false;
-    }
-}
-
-iw_demand_t iw_permit_demand(const iw_permit_t *self) {
-    switch (self->state) {
-    case IW_STATE_ARMED:
-        return IW_DEMAND_FOLLOW;
-    case IW_STATE_STOPPING:
-        return self->cut ? IW_DEMAND_ZERO : IW_DEMAND_BRAKE;
-    case IW_STATE_LATCHED:
-        return self->holding ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE;
-    case IW_STATE_LISTENING:
-    default:
-        return self->arming ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE;
-    }
+    step_phase(self, now_us);
 }
 
 /// What speaks against sending at all.
@@ -241,7 +308,7 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     if (self->config->listen_only) {
         return IW_REFUSE_LISTEN_ONLY;
     }
-    if (self->state == IW_STATE_LATCHED) {
+    if (iw_permit_state(self) == IW_STATE_LATCHED) {
         return refuse_latched(self, now_us);
     }
     if (!may_send(self->config)) {
@@ -256,12 +323,12 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     if (!self->view.heard) {
         return IW_REFUSE_WHEEL_LOST;
     }
-    return restarting(self) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
+    return (self->phase == IW_PHASE_RESTARTING) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
 }
 
 /// What speaks against moving the lease to this client now.
 static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
-    if (self->holder != IW_CLIENT_NONE && (!takeover || self->arming)) {
+    if (self->holder != IW_CLIENT_NONE && (!takeover || iw_permit_arming(self))) {
         return IW_REFUSE_BUSY;
     }
     if (stale_command(self, now_us)) {
@@ -270,10 +337,16 @@ static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, b
     if (!self->view.at_rest || !self->view.output_zero) {
         return IW_REFUSE_NOT_AT_REST;
     }
-    if (self->state == IW_STATE_LISTENING && !self->view.can_send) {
+    if (self->phase == IW_PHASE_LISTENING && !self->view.can_send) {
         return IW_REFUSE_SEND_STALLED;
     }
     return IW_REFUSE_NONE;
+}
+
+static void begin_arming(iw_permit_t *self, iw_time_us_t now_us) {
+    self->phase = (self->phase == IW_PHASE_LISTENING) ? IW_PHASE_ARMING : IW_PHASE_REARMING;
+    self->arming_us = now_us;
+    self->arm_refusal = IW_REFUSE_NONE;
 }
 
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
@@ -286,13 +359,11 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
         return refusal;
     }
     self->holder = client;
-    if (self->state == IW_STATE_ARMED) {
+    if (self->phase == IW_PHASE_ARMED) {
         self->armed_us = now_us;
         grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
     } else {
-        self->arming = true;
-        self->arming_us = now_us;
-        self->arm_refusal = IW_REFUSE_NONE;
+        begin_arming(self, now_us);
     }
     return IW_REFUSE_NONE;
 }
@@ -309,8 +380,8 @@ static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us,
 }
 
 static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
-    const bool blocked = self->stop.cause == IW_CAUSE_WHEEL_BLOCKED && self->stop.client == client;
-    switch (self->state) {
+    const bool blocked = self->blocked != IW_CLIENT_NONE && self->blocked == client;
+    switch (iw_permit_state(self)) {
     case IW_STATE_LATCHED:
         return refuse_latched(self, sent_us);
     case IW_STATE_STOPPING:
@@ -342,8 +413,8 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_
 }
 
 void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause) {
-    if (self->state == IW_STATE_ARMED) {
-        enter_stopping(self, now_us, cause, IW_SIDES_NONE, 0);
+    if (self->phase == IW_PHASE_ARMED) {
+        brake(self, now_us, cause, IW_SIDES_NONE, 0);
         self->stop.client = client;
     }
     end_arming(self, IW_REFUSE_NOT_ARMED);
@@ -353,15 +424,15 @@ void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t cl
     if (client != self->holder) {
         return;
     }
-    if (self->state == IW_STATE_ARMED) {
-        enter_stopping(self, now_us, IW_CAUSE_CLIENT_GONE, IW_SIDES_NONE, 0);
+    if (self->phase == IW_PHASE_ARMED) {
+        brake(self, now_us, IW_CAUSE_CLIENT_GONE, IW_SIDES_NONE, 0);
     }
     end_arming(self, IW_REFUSE_NOT_ARMED);
 }
 
 iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
     const iw_refusal_t present = refuse_present(self, now_us);
-    if (self->state != IW_STATE_LATCHED) {
+    if (iw_permit_state(self) != IW_STATE_LATCHED) {
         return IW_REFUSE_NONE;
     }
     if (present != IW_REFUSE_NONE) {
@@ -376,23 +447,23 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
     if (stale_command(self, now_us)) {
         return IW_REFUSE_STALE_COMMAND;
     }
-    self->state = IW_STATE_LISTENING;
-    self->holding = false;
+    self->phase = IW_PHASE_LISTENING;
     return IW_REFUSE_NONE;
 }
 
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {
-    iw_time_us_t next_us = IW_NEVER;
-    const bool held = self->state == IW_STATE_STOPPING || self->holding;
-    if (self->arming) {
-        next_us = self->arming_us + (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
-    } else if (self->state == IW_STATE_ARMED) {
-        next_us = self->lease_until_us;
-    } else if (held && self->hold_us != IW_NEVER) {
-        const bool first = self->view.settled || restarting(self);
-        const iw_time_us_t span_us =
-            first ? (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS : IW_PERMIT_HOLD_MAX_US;
-        next_us = self->hold_us + span_us;
+    const iw_time_us_t zero_hold_us = (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS;
+    switch (self->phase) {
+    case IW_PHASE_ARMING:
+    case IW_PHASE_REARMING:
+        return self->arming_us + (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
+    case IW_PHASE_ARMED:
+        return self->lease_until_us;
+    case IW_PHASE_HOLDING:
+    case IW_PHASE_RESTARTING:
+    case IW_PHASE_CUT:
+        return self->hold_us + (time_is_enough(self) ? zero_hold_us : IW_PERMIT_HOLD_MAX_US);
+    default:
+        return IW_NEVER;
     }
-    return next_us;
 }

@@ -252,9 +252,7 @@ static void kill_client(world_t *self) {
 
 /// What the dead process had handed over is still on its way, and a stranger's to the new one.
 static void restart(world_t *self) {
-    const iw_permit_t *const permit = &self->gateway.permit;
-    const bool silent = (permit->state == IW_STATE_LISTENING && !permit->arming) ||
-                        (permit->state == IW_STATE_LATCHED && !permit->holding);
+    const bool silent = !iw_gateway_is_sending(&self->gateway);
     for (uint32_t i = 0; i < self->flights; i++) {
         self->flight[i].own = false;
     }

@@ -7,7 +7,9 @@
 #define MS 1000U
 /// Rules of this file: what a refused request may change.
 #define RULE_REFUSED 901U
-#define POISON       0x5A
+/// What motion depends on is in doubt.
+#define RULE_CONTRADICTED 324U
+#define POISON            0x5A
 
 static bool can_run(const rig_t *rig) {
     return rig->alive && !rig_active(rig, EV_LOOP_STALL);
@@ -69,11 +71,35 @@ static void request_drive(rig_t *rig, const request_t *request, const iw_gateway
     oracle_drive(&rig->oracle, &asked, &drive, result, &applied);
 }
 
+/// Of what motion depends on: type, role and the signs.
+static bool is_contradicted(const iw_gateway_t *gateway) {
+    static const iw_ledger_item_t guards[] = {IW_LEDGER_SETPOINT_TYPE,      IW_LEDGER_CURRENT_ROLE,
+                                              IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_FEEDBACK_SIGN_RIGHT,
+                                              IW_LEDGER_MOUNT_SIGN_LEFT,    IW_LEDGER_MOUNT_SIGN_RIGHT};
+    for (size_t i = 0; i < sizeof guards / sizeof guards[0]; i++) {
+        if (gateway->ledger.entry[guards[i]].state == IW_LEDGER_CONTRADICTED) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// The operator has looked at the machine and says that it is as configured.
+static void settle_assumption(rig_t *rig) {
+    const iw_ledger_entry_t word = {IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
+    iw_gateway_know(&rig->gateway, iw_ledger_doubt(&rig->gateway.ledger), &word);
+}
+
 static void request_arm(rig_t *rig, const request_t *request, const iw_gateway_t *before) {
     const iw_refusal_t result = iw_gateway_arm(&rig->gateway, rig->now_us, request->id, request->a != 0);
     tell(rig, request, result);
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
+    } else if (is_contradicted(before)) {
+        oracle_fail(&rig->oracle, rig->now_us, RULE_CONTRADICTED, "armed although an assumption is contradicted");
+    }
+    if (result == IW_REFUSE_CONTRADICTED) {
+        settle_assumption(rig);
     }
     oracle_arm(&rig->oracle, rig->now_us, request->id, request->a != 0, result);
 }
@@ -84,7 +110,7 @@ static void request_reset(rig_t *rig, const request_t *request, const iw_gateway
     if (result != IW_REFUSE_NONE) {
         judge_refused(rig, before);
     }
-    oracle_reset(&rig->oracle, rig->now_us, before->permit.state, &before->permit.stop);
+    oracle_reset(&rig->oracle, rig->now_us, iw_permit_state(&before->permit), &before->permit.stop);
 }
 
 static void run_request(rig_t *rig, const request_t *request) {

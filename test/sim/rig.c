@@ -70,11 +70,7 @@ static void set_wheel(rig_t *rig, const event_t *event, bool on) {
 }
 
 static void crash(rig_t *rig) {
-    const iw_permit_t *const permit = &rig->gateway.permit;
-    rig->state_seen = (permit->state == IW_STATE_LISTENING && !permit->arming) ||
-                              (permit->state == IW_STATE_LATCHED && !permit->holding)
-                          ? IW_STATE_LISTENING
-                          : IW_STATE_ARMED;
+    rig->state_seen = iw_gateway_is_sending(&rig->gateway) ? IW_STATE_ARMED : IW_STATE_LISTENING;
     rig->alive = false;
     rig->queued = 0;
     for (size_t i = 0; i < SCENARIO_CLIENTS; i++) {
@@ -489,7 +485,7 @@ const char *rig_refusal_name(unsigned refusal) {
         "ok",          "out of range",   "missing field", "not holder",      "busy",         "not armed",
         "latched",     "e-stop pressed", "bus down",      "timing mismatch", "wheel lost",   "wheel blocked",
         "not at rest", "send stalled",   "second master", "cause present",   "type not set", "stale command",
-        "listen only",
+        "listen only", "contradicted",
     };
     return names[refusal];
 }

@@ -7,7 +7,7 @@
 #include "oracle.h"
 #include "scenario.h"
 
-#define RIG_REFUSALS ((unsigned)IW_REFUSE_LISTEN_ONLY + 1U)
+#define RIG_REFUSALS ((unsigned)IW_REFUSALS)
 
 /// What a run, or a campaign of runs, consisted of.
 typedef struct {

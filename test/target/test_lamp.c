@@ -17,7 +17,8 @@ void setUp(void) {
 void tearDown(void) {}
 
 static uint16_t pattern_in(iw_state_t state) {
-    gateway.permit.state = state;
+    static const iw_phase_t phases[] = {IW_PHASE_LISTENING, IW_PHASE_ARMED, IW_PHASE_BRAKING, IW_PHASE_LATCHED};
+    gateway.permit.phase = phases[state];
     return iw_lamp_pattern(&gateway, false);
 }
 
@@ -39,7 +40,7 @@ static void test_each_state_has_its_own_pattern(void) {
 
 static void test_pressed_contact_shows_before_any_state(void) {
     for (int state = IW_STATE_LISTENING; state <= IW_STATE_LATCHED; state++) {
-        gateway.permit.state = (iw_state_t)state;
+        (void)pattern_in((iw_state_t)state);
         TEST_ASSERT_EQUAL_HEX16(IW_LAMP_ESTOP, iw_lamp_pattern(&gateway, true));
     }
 }

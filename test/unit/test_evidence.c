@@ -140,7 +140,8 @@ static void test_evidence_the_operators_word_is_not_replaced_by_a_fit(void) {
     iw_ledger_contradict(&rig.gateway.ledger, IW_LEDGER_POSE_BYTE_ORDER, IW_EVIDENCE_OPERATOR, 0);
     world_rig_drive(&rig, 400, 400, 5000);
     TEST_ASSERT_EQUAL_INT(IW_EVIDENCE_OPERATOR, iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_GEAR_RATIO)->evidence);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_POSE_BYTE_ORDER)->state);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED,
+                          iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_POSE_BYTE_ORDER)->state);
 }
 
 int main(void) {

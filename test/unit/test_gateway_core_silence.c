@@ -33,10 +33,11 @@ static void drive_on(void) {
 
 /// To the step that ends the zeros of a stop.
 static void run_to_silence(void) {
-    for (unsigned n = 0; n < 12000U && (rig.gateway.permit.holding || state() == IW_STATE_STOPPING); n++) {
+    for (unsigned n = 0; n < 12000U && (rig.gateway.permit.phase == IW_PHASE_CUT || state() == IW_STATE_STOPPING);
+         n++) {
         gateway_rig_run(&rig, 1000);
     }
-    TEST_ASSERT_FALSE(rig.gateway.permit.holding || state() == IW_STATE_STOPPING);
+    TEST_ASSERT_FALSE(rig.gateway.permit.phase == IW_PHASE_CUT || state() == IW_STATE_STOPPING);
 }
 
 /// Power is cut in motion; ends when the zeros do.
@@ -84,12 +85,12 @@ static void test_gateway_missing_echo_latches_with_one_zero_behind_and_a_purge(v
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_SEND_STALLED, rig.gateway.permit.stop.cause);
     TEST_ASSERT_UINT32_WITHIN(20, 60, rig.gateway.permit.stop.detail);
-    for (unsigned n = 0; n < 1100U && rig.gateway.permit.holding; n++) {
+    for (unsigned n = 0; n < 1100U && rig.gateway.permit.phase == IW_PHASE_CUT; n++) {
         TEST_ASSERT_EQUAL_UINT32(1, rig.bus.purges);
         TEST_ASSERT_FALSE(rig.gateway.left_behind);
         gateway_rig_run(&rig, MS(10));
     }
-    TEST_ASSERT_FALSE(rig.gateway.permit.holding);
+    TEST_ASSERT_FALSE(rig.gateway.permit.phase == IW_PHASE_CUT);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.purges);
     TEST_ASSERT_EQUAL_UINT32(sent + 4U, rig.bus.sent);
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));

@@ -13,23 +13,23 @@ void tearDown(void) {}
 
 static void assert_arm_refused(iw_refusal_t expected) {
     TEST_ASSERT_EQUAL_INT(expected, permit_rig_arm(&rig, HOLDER));
-    TEST_ASSERT_FALSE(rig.permit.arming);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
     rig.view.proven = true;
     permit_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
 static void test_permit_begins_listening_in_silence(void) {
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.number);
     TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == IW_NEVER);
     permit_rig_wait(&rig, MS(3600000));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
 static void test_permit_time_that_begins_at_zero_reminds_of_nothing(void) {
@@ -42,15 +42,15 @@ static void test_permit_time_that_begins_at_zero_reminds_of_nothing(void) {
 
 static void test_permit_arm_sends_zeros_and_is_armed_when_they_are_proven(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
-    TEST_ASSERT_TRUE(rig.permit.arming);
+    TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     permit_rig_wait(&rig, MS(10));
-    TEST_ASSERT_TRUE(rig.permit.arming);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(10));
-    TEST_ASSERT_FALSE(rig.permit.arming);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_FOLLOW, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.holder);
 }
@@ -63,27 +63,27 @@ static void test_permit_arm_does_not_need_an_operator_to_have_reset_anything(voi
 static void test_permit_arm_without_echo_in_time_is_send_stalled(void) {
     (void)permit_rig_arm(&rig, HOLDER);
     permit_rig_wait(&rig, MS(50) - 1U);
-    TEST_ASSERT_TRUE(rig.permit.arming);
+    TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
     permit_rig_wait(&rig, 1);
-    TEST_ASSERT_FALSE(rig.permit.arming);
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, rig.permit.arm_refusal);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
     rig.view.proven = true;
     permit_rig_wait(&rig, 1);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
 static void test_permit_arm_echoed_just_in_time_is_armed_and_later_is_not(void) {
     (void)permit_rig_arm(&rig, HOLDER);
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(50));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     setUp();
     (void)permit_rig_arm(&rig, HOLDER);
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(50) + 1U);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, rig.permit.arm_refusal);
 }
 
@@ -94,7 +94,7 @@ static void test_permit_arm_again_after_a_failure_clears_the_old_reason(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, rig.permit.arm_refusal);
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(1));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
 }
 
@@ -184,8 +184,8 @@ static void test_permit_arm_while_latched_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_LATCHED, permit_rig_arm(&rig, HOLDER));
     permit_rig_raise(&rig, IW_CAUSE_ESTOP_LINE);
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_ESTOP_PRESSED, permit_rig_arm(&rig, HOLDER));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
-    TEST_ASSERT_FALSE(rig.permit.arming);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
 }
 
 static void test_permit_arm_after_anybodys_nonzero_drive_is_a_stale_command(void) {
@@ -229,7 +229,7 @@ static void test_permit_arm_repeated_does_not_prolong_arming(void) {
     permit_rig_wait(&rig, MS(49));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     permit_rig_wait(&rig, MS(1));
-    TEST_ASSERT_FALSE(rig.permit.arming);
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
 }
 
 static void test_permit_arming_is_ended_by_whatever_would_have_refused_it(void) {
@@ -247,9 +247,9 @@ static void test_permit_arming_is_ended_by_whatever_would_have_refused_it(void) 
         rig.view.proven = true;
         permit_rig_raise(&rig, cases[i].cause);
         permit_rig_wait(&rig, MS(1));
-        TEST_ASSERT_FALSE(rig.permit.arming);
+        TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
         TEST_ASSERT_EQUAL_INT(cases[i].refusal, rig.permit.arm_refusal);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
         TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.number);
     }
@@ -258,21 +258,21 @@ static void test_permit_arming_is_ended_by_whatever_would_have_refused_it(void) 
 static void test_permit_arming_is_ended_by_stop_and_by_its_clients_disconnect(void) {
     permit_rig_begin(&rig, PERMIT_ARMING);
     iw_permit_stop(&rig.permit, rig.now_us, OTHER, IW_CAUSE_CLIENT_STOP);
-    TEST_ASSERT_FALSE(rig.permit.arming);
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, rig.permit.arm_refusal);
     rig.view.proven = true;
     permit_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 
     permit_rig_begin(&rig, PERMIT_ARMING);
     iw_permit_disconnect(&rig.permit, rig.now_us, OTHER);
-    TEST_ASSERT_TRUE(rig.permit.arming);
+    TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
-    TEST_ASSERT_FALSE(rig.permit.arming);
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, rig.permit.arm_refusal);
     rig.view.proven = true;
     permit_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
 static void test_permit_arm_in_stopping_waits_for_zero_and_rest(void) {
@@ -288,7 +288,7 @@ static void test_permit_arm_in_stopping_waits_for_zero_and_rest(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, OTHER));
     rig.view.proven = true;
     permit_rig_wait(&rig, MS(3));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_FOLLOW, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
 }
@@ -308,14 +308,14 @@ static void test_permit_arming_that_fails_in_stopping_goes_on_with_the_hold(void
     permit_rig_wait(&rig, MS(1460));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, OTHER));
     permit_rig_wait(&rig, MS(40));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state); // The hold is over, but arming is not.
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit)); // The hold is over, but arming is not.
     TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == rig.now_us + MS(10));
     permit_rig_wait(&rig, MS(10));
-    TEST_ASSERT_FALSE(rig.permit.arming);
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, rig.permit.arm_refusal);
     TEST_ASSERT_TRUE(rig.now_us >= zero_us + MS(1500));
     permit_rig_wait(&rig, MS(1));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
 static void test_permit_arming_in_stopping_latches_on_a_cause(void) {
@@ -323,8 +323,8 @@ static void test_permit_arming_in_stopping_latches_on_a_cause(void) {
     permit_rig_wait(&rig, MS(600));
     (void)permit_rig_arm(&rig, OTHER);
     permit_rig_raise(&rig, IW_CAUSE_WHEEL_LOST);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
-    TEST_ASSERT_FALSE(rig.permit.arming);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
+    TEST_ASSERT_FALSE(iw_permit_arming(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, rig.permit.arm_refusal);
 }
 

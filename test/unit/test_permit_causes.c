@@ -66,25 +66,25 @@ static void assert_stop_told(iw_cause_t cause, iw_state_t from, bool latched) {
 static void assert_effect(effect_t effect, const iw_permit_t *before, iw_cause_t cause) {
     const iw_demand_t demand = iw_permit_demand(&rig.permit);
     const bool stops = effect == LATCH || effect == LATCH_SILENT || effect == RAMP;
-    const bool cuts_armed = effect == CUT && before->state == IW_STATE_ARMED;
+    const bool cuts_armed = effect == CUT && iw_permit_state(before) == IW_STATE_ARMED;
     TEST_ASSERT_EQUAL_UINT32(before->stop.number + (stops || cuts_armed ? 1U : 0U), rig.permit.stop.number);
     if (effect == LATCH || effect == LATCH_SILENT) {
-        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(effect == LATCH ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE, demand);
-        assert_stop_told(cause, before->state, true);
+        assert_stop_told(cause, iw_permit_state(before), true);
     } else if (effect == RAMP) {
-        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, demand);
-        assert_stop_told(cause, before->state, false);
+        assert_stop_told(cause, iw_permit_state(before), false);
     } else if (effect == CUT) {
-        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, demand);
     } else if (effect == END_ARMING) {
-        TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, demand);
         TEST_ASSERT_TRUE(rig.permit.arm_refusal != IW_REFUSE_NONE);
     } else {
-        TEST_ASSERT_EQUAL_INT(before->state, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(iw_permit_state(before), iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(before->stop.cause, rig.permit.stop.cause);
     }
     TEST_ASSERT_TRUE(effect == NOTHING || rig.permit.holder == IW_CLIENT_NONE);
@@ -94,7 +94,7 @@ static void test_permit_every_cause_in_every_situation_takes_effect_at_once(void
     for (size_t i = 0; i < ROWS; i++) {
         for (int situation = 0; situation < PERMIT_SITUATIONS; situation++) {
             permit_rig_begin(&rig, (permit_situation_t)situation);
-            TEST_ASSERT_EQUAL_INT(state_of[situation], rig.permit.state);
+            TEST_ASSERT_EQUAL_INT(state_of[situation], iw_permit_state(&rig.permit));
             const iw_permit_t before = rig.permit;
             permit_rig_raise(&rig, rows[i].cause);
             assert_effect(rows[i].effect[situation], &before, rows[i].cause);
@@ -143,7 +143,7 @@ static void test_permit_latched_while_listening_sends_nothing_however_long(void)
     for (uint32_t n = 0; n < 20; n++) {
         permit_rig_wait(&rig, MS(700));
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, iw_permit_demand(&rig.permit));
-        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
         TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == IW_NEVER);
     }
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving);
@@ -168,7 +168,7 @@ static void test_permit_stop_after_a_cut_one_ramps_again(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_arm(&rig, HOLDER));
     rig.view.proven = true;
     permit_rig_step(&rig);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     iw_permit_stop(&rig.permit, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
 }

@@ -18,14 +18,14 @@ static void arm(void) {
     rig.view.proven = true;
     permit_rig_step(&rig);
     rig.view.proven = false;
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
 }
 
 static void assert_lost_after(iw_time_us_t for_us, iw_cause_t cause) {
     permit_rig_wait(&rig, for_us - 1U);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     permit_rig_wait(&rig, 1);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(cause, rig.permit.stop.cause);
     TEST_ASSERT_FALSE(rig.permit.stop.latched);
 }
@@ -76,10 +76,10 @@ static void test_permit_lease_is_fed_by_each_accepted_drive_also_a_zero_one(void
     for (uint32_t n = 0; n < 100; n++) {
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_drive(&rig, HOLDER, (n & 1U) != 0U));
         permit_rig_wait(&rig, MS(200) - 1U);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     }
     permit_rig_wait(&rig, 1);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
 }
 
 static void test_permit_lease_is_fed_by_nothing_else(void) {
@@ -105,10 +105,10 @@ static void test_permit_drive_at_or_after_the_end_does_not_revive_the_lease(void
         rig.now_us += MS(200) + late_us[i];
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
         permit_rig_step(&rig);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, HOLDER, true));
         permit_rig_step(&rig);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
     }
 }
 
@@ -118,7 +118,7 @@ static void test_permit_drive_just_before_the_end_keeps_the_lease(void) {
     rig.now_us += MS(200) - 1U;
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_drive(&rig, HOLDER, true));
     permit_rig_wait(&rig, MS(100));
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
 }
 
 static void test_permit_drive_is_refused_in_every_state_but_armed(void) {
@@ -173,7 +173,7 @@ static void test_permit_takeover_at_rest_moves_the_lease(void) {
     permit_rig_wait(&rig, MS(100));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.holder);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_HOLDER, permit_rig_drive(&rig, HOLDER, true));
     assert_lost_after(MS(1000), IW_CAUSE_LEASE_LOST);
     TEST_ASSERT_EQUAL_INT(OTHER, rig.permit.stop.client);
@@ -215,8 +215,8 @@ static void test_permit_takeover_from_a_holder_who_wants_to_move_is_stale(void) 
 
 static void test_permit_takeover_of_nothing_is_an_ordinary_arm(void) {
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, permit_rig_takeover(&rig, OTHER));
-    TEST_ASSERT_TRUE(rig.permit.arming);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, rig.permit.state);
+    TEST_ASSERT_TRUE(iw_permit_arming(&rig.permit));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_permit_state(&rig.permit));
 }
 
 static void test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion(void) {
@@ -232,7 +232,7 @@ static void test_permit_disconnect_of_the_holder_ends_the_lease_at_once(void) {
     arm();
     (void)permit_rig_drive(&rig, HOLDER, true);
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_GONE, rig.permit.stop.cause);
     TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.detail);
@@ -261,7 +261,7 @@ static void test_permit_disconnect_of_the_former_holder_changes_nothing(void) {
     arm();
     (void)permit_rig_takeover(&rig, OTHER);
     iw_permit_disconnect(&rig.permit, rig.now_us, HOLDER);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, rig.permit.state);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_permit_state(&rig.permit));
 }
 
 static void test_permit_stop_needs_no_lease_and_ramps(void) {
@@ -271,7 +271,7 @@ static void test_permit_stop_needs_no_lease_and_ramps(void) {
         rig.view.applied.wheel[IW_LEFT].speed_mm_s = 123;
         permit_rig_step(&rig);
         iw_permit_stop(&rig.permit, rig.now_us, OTHER, causes[i]);
-        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));
         TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, iw_permit_demand(&rig.permit));
         TEST_ASSERT_EQUAL_INT(causes[i], rig.permit.stop.cause);
         TEST_ASSERT_EQUAL_UINT32(0, rig.permit.stop.detail);

@@ -55,7 +55,7 @@ static void tell_ledger(replay_t *self) {
 
 static void tell_causes(replay_t *self) {
     const uint32_t present = iw_permit_present(&self->gateway.permit, self->now_us);
-    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL; cause++) {
+    for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if (((present ^ self->present) & (1U << cause)) != 0U) {
             tell(self, self->now_us, "fault", "%s%s", gw_cause_name((iw_cause_t)cause),
                  (present & (1U << cause)) != 0U ? "" : " is gone");

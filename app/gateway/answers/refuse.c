@@ -34,7 +34,7 @@ static void say_holder(const wording_t *self) {
     const iw_permit_t *permit = &self->daemon->gateway.permit;
     char holder[GW_CLIENT_TEXT_SIZE];
     name_client(self->daemon, permit->holder, holder, sizeof holder);
-    const uint64_t left_ms = permit->arming || permit->lease_until_us <= self->daemon->now_us
+    const uint64_t left_ms = iw_permit_arming(permit) || permit->lease_until_us <= self->daemon->now_us
                                  ? 0U
                                  : (permit->lease_until_us - self->daemon->now_us) / IW_US_PER_MS;
     SAY(self,
@@ -141,7 +141,7 @@ static void say_second_master(const wording_t *self) {
 static void say_present(const wording_t *self) {
     const iw_permit_t *permit = &self->daemon->gateway.permit;
     const uint32_t present = iw_permit_present(permit, self->daemon->now_us);
-    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL; ++cause) {
+    for (unsigned cause = 0; cause < IW_CAUSES; ++cause) {
         if ((present & (1U << cause)) != 0U) {
             SAY(self, "%s was seen %" PRIu64 " ms ago; %s, and wait a second", gw_cause_name((iw_cause_t)cause),
                 ms_since(self->daemon, permit->seen_us[cause]), gw_why_cure((iw_cause_t)cause));

@@ -77,7 +77,7 @@ static void observe_stop(gw_daemon_t *daemon) {
 static void observe_lease(gw_daemon_t *daemon) {
     gw_observed_t *observed = &daemon->observed;
     const iw_permit_t *permit = &daemon->gateway.permit;
-    const iw_client_t holder = permit->state == IW_STATE_ARMED ? permit->holder : IW_CLIENT_NONE;
+    const iw_client_t holder = iw_permit_state(permit) == IW_STATE_ARMED ? permit->holder : IW_CLIENT_NONE;
     if (holder == observed->holder) {
         return;
     }
@@ -145,7 +145,7 @@ static void observe_faults(gw_daemon_t *daemon) {
     const iw_permit_t *permit = &daemon->gateway.permit;
     const uint32_t present = iw_permit_present(permit, daemon->now_us);
     const uint32_t changed = present ^ observed->present;
-    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause <= IW_CAUSE_INTERNAL && changed != 0U; ++cause) {
+    for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; ++cause) {
         if ((changed & (1U << cause)) != 0U) {
             tell_fault(daemon, gw_cause_name((iw_cause_t)cause), (present & (1U << cause)) != 0U);
         }

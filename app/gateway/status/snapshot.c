@@ -114,7 +114,7 @@ static void write_pose(const gw_daemon_t *daemon, json_out_t *json) {
 static void write_lease(gw_daemon_t *daemon, json_out_t *json) {
     const iw_permit_t *permit = &daemon->gateway.permit;
     const gw_client_t *holder = gw_daemon_client(daemon, permit->holder);
-    const bool running = holder != NULL && !permit->arming && permit->lease_until_us > daemon->now_us;
+    const bool running = holder != NULL && !iw_permit_arming(permit) && permit->lease_until_us > daemon->now_us;
     json_out_open(json, "lease", '{');
     json_out_known(json, "holder", holder != NULL, permit->holder);
     json_out_text(json, "name", holder != NULL && holder->name[0] != '\0' ? holder->name : NULL);
@@ -197,12 +197,13 @@ void gw_snapshot_write_causes(json_out_t *json, const char *name, uint32_t cause
 
 void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json) {
     const iw_permit_t *permit = &daemon->gateway.permit;
-    const bool stopped = permit->state == IW_STATE_STOPPING || permit->state == IW_STATE_LATCHED;
+    const iw_state_t state = iw_permit_state(permit);
+    const bool stopped = state == IW_STATE_STOPPING || state == IW_STATE_LATCHED;
     json_out_int(json, "t_us", (int64_t)daemon->now_us);
     json_out_int(json, "wall_us", iw_clock_wall_us());
     json_out_text(json, "version", IWHEEL_VERSION);
-    json_out_text(json, "state", gw_state_name(permit->state));
-    json_out_bool(json, "arming", permit->arming);
+    json_out_text(json, "state", gw_state_name(state));
+    json_out_bool(json, "arming", iw_permit_arming(permit));
     json_out_text(json, "cause", stopped ? gw_cause_name(permit->stop.cause) : NULL);
     gw_snapshot_write_causes(json, "present", iw_permit_present(permit, daemon->now_us));
     write_lease(daemon, json);

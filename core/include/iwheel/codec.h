@@ -63,8 +63,8 @@ typedef enum {
     IW_CODEC_POSE,
     IW_CODEC_KINDS,
     IW_CODEC_UNKNOWN = IW_CODEC_KINDS, ///< No message: not one of the eleven numbers, whatever the format.
-    IW_CODEC_BAD_FORMAT, ///< No message: one of the numbers on a remote, extended, error or FD frame.
-    IW_CODEC_BAD_LENGTH, ///< No message: shorter than the table, or dlc > 8.
+    IW_CODEC_BAD_FORMAT,               ///< No message: one of the numbers on a remote, extended, error or FD frame.
+    IW_CODEC_BAD_LENGTH,               ///< No message: shorter than the table, or dlc > 8.
 } iw_codec_kind_t;
 
 /// One message of the table.

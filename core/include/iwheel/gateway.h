@@ -146,4 +146,7 @@ iw_force_validity_t iw_gateway_force_validity(const iw_gateway_t *self, iw_time_
 
 iw_state_t iw_gateway_state(const iw_gateway_t *self);
 
+/// True while setpoints are sent, or about to be.
+bool iw_gateway_is_sending(const iw_gateway_t *self);
+
 #endif

@@ -1,19 +1,27 @@
 // SPDX-License-Identifier: MIT
 /// May the wheels move, and if not, why?
 ///
-///     LISTENING --arm--> ARMED --lease lost | stop | disarm--> STOPPING --zeros held--> LISTENING
-///         ^                |                                      |
-///         |                +------------- latching cause --------+--> LATCHED
-///         +------------------------------- reset ------------------------'
+///     LISTENING --arm--> ARMING --TX confirmed--> ARMED --lease lost | stop | disarm--> BRAKING
+///         ^ ^              | not in time            ^                                      | output zero
+///         | |              v                        | TX confirmed                         v
+///         | +----------- LISTENING               REARMING <------------- arm ---------- HOLDING --held--> LISTENING
+///         |                                         | not in time                         ^
+///         |                                         +-------------------------------------+
+///         |   RESTARTING --held, or somebody else drives--> LISTENING
+///         |
+///         |   any of them --latching cause--> CUT --held--> LATCHED;  from LISTENING at once: LATCHED
+///         +------------------------------- reset ------------- CUT, LATCHED
 ///
-/// LISTENING sends nothing, with one exception: `arm` sends one zero pair, and ARMED begins when it is echoed
-/// ("arming"). Pure state machine: no I/O, no clock. In every step the owner first tells the faults it sees
-/// (`iw_permit_raise`), then calls `iw_permit_step`, then reads `iw_permit_demand`, which tells what the scheduler
-/// must aim at.
+/// A client sees four of them: LISTENING (and ARMING), ARMED, STOPPING (BRAKING, HOLDING, REARMING, RESTARTING) and
+/// LATCHED (and CUT). Nothing is sent in LISTENING and LATCHED; ARMING sends one zero pair, and ARMED begins when it is
+/// confirmed; REARMING is ARMING while zeros are held anyway. What each demands of the scheduler is a row of a table.
 ///
-/// Latch in every state: ESTOP_LINE, ESTOP_SOFTWARE, INTERNAL. Latch in ARMED and STOPPING: the other causes up to
-/// INTERNAL. In LISTENING those are only remembered: they refuse arm while present. Causes after INTERNAL stop
-/// without a latch.
+/// Pure state machine: no I/O, no clock. In every step the owner first tells the faults it sees (`iw_permit_raise`),
+/// then calls `iw_permit_step`, then reads `iw_permit_demand`, which tells what the scheduler must aim at.
+///
+/// What a cause does is its row: some latch in every state; some latch while setpoints are sent and are otherwise only
+/// remembered, to refuse arm and reset while present; some only stop. RESTARTING sends zeros for a process that died, and
+/// nothing but those is ours yet: there only what latches in every state latches.
 ///
 /// The lease is fed by accepted drive commands and by nothing else.
 #ifndef IW_PERMIT_H
@@ -37,10 +45,24 @@ typedef uint32_t iw_client_t;
 /// ... but at most this long.
 #define IW_PERMIT_HOLD_MAX_US 10000000U
 
+/// What a client is told.
 typedef enum { IW_STATE_LISTENING = 0, IW_STATE_ARMED, IW_STATE_STOPPING, IW_STATE_LATCHED } iw_state_t;
 
-/// Why the wheels were stopped, the most telling first: of several present at once, the first is reported.
-/// `iw_stop_t::detail` is given with each.
+/// The states of the diagram above.
+typedef enum {
+    IW_PHASE_LISTENING = 0, ///< Silent.
+    IW_PHASE_ARMING,        ///< A zero pair waits for its TX confirmation.
+    IW_PHASE_ARMED,         ///< The holder drives.
+    IW_PHASE_BRAKING,       ///< Ramp to zero, or zero at once.
+    IW_PHASE_HOLDING,       ///< Zeros are held until the wheels stand.
+    IW_PHASE_REARMING,      ///< As ARMING, while zeros are held.
+    IW_PHASE_RESTARTING,    ///< Zeros for a process that died.
+    IW_PHASE_CUT,           ///< Latched; zeros at once, held.
+    IW_PHASE_LATCHED,       ///< Latched; silent.
+    IW_PHASES,
+} iw_phase_t;
+
+/// Why the wheels were stopped. `iw_stop_t::detail` is given with each.
 typedef enum {
     IW_CAUSE_NONE = 0,
     IW_CAUSE_ESTOP_LINE,     ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
@@ -122,26 +144,25 @@ typedef struct {
 
 typedef struct {
     const iw_config_t *config;
-    iw_permit_view_t view;                    ///< Of the last step: requests are judged by it.
-    iw_time_us_t seen_us[IW_CAUSE_LOOP_LATE]; ///< When each latching cause was last seen; IW_NEVER: never.
-    iw_time_us_t armed_us;       ///< When ARMED began or the lease was taken over: only later commands are fresh.
-    iw_time_us_t lease_from_us;  ///< The last accepted drive command, or arm.
-    iw_time_us_t lease_until_us; ///< Without another one the lease ends here.
-    iw_time_us_t arming_us;      ///< When arming began.
-    iw_time_us_t hold_us;        ///< When the zeros began; IW_NEVER: not yet.
-    iw_time_us_t stale_us;       ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
+    iw_permit_view_t view;           ///< Of the last step: requests are judged by it.
+    iw_time_us_t seen_us[IW_CAUSES]; ///< When each cause was last seen; IW_NEVER: never.
+    iw_time_us_t armed_us;           ///< When ARMED began or the lease was taken over: only later commands are fresh.
+    iw_time_us_t lease_from_us;      ///< The last accepted drive command, or arm.
+    iw_time_us_t lease_until_us;     ///< Without another one the lease ends here.
+    iw_time_us_t arming_us;          ///< When ARMING or REARMING began.
+    iw_time_us_t hold_us;            ///< When the zeros that are held began; IW_NEVER: not since the last stop.
+    iw_time_us_t stale_us;           ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
     iw_client_t stale_client;
     iw_client_t holder;
+    iw_client_t blocked;   ///< Whose wheels were blocked when they stopped: told so until they stand.
     uint32_t raised;       ///< Bit per cause: told since the last step.
     uint32_t present;      ///< Bit per cause: told in the last step.
     uint32_t still_moving; ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
-    iw_stop_t stop;
-    iw_state_t state;
+    iw_stop_t stop;        ///< A record: nothing is decided by it.
+    iw_phase_t phase;
     iw_refusal_t arm_refusal; ///< Why the last arming failed.
-    uint8_t strangers;        ///< Foreign setpoints while sending zeros for a process that died.
-    bool arming;
-    bool holding; ///< LATCHED: zeros are still being sent.
-    bool cut;     ///< STOPPING: zero at once instead of a ramp.
+    uint8_t strangers;        ///< Foreign setpoints in RESTARTING.
+    bool at_once;             ///< BRAKING and what follows: zero without ramp.
 } iw_permit_t;
 
 /// `config` must be checked and outlive it. `restarted`: begin with zeros (STOPPING, cause RESTART) because the
@@ -158,6 +179,15 @@ void iw_permit_keep_present(iw_permit_t *self);
 
 /// Everything that follows from time and from what the owner sees: end of lease, of arming and of the hold.
 void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view_t *view);
+
+/// What a client is told of the phase.
+iw_state_t iw_permit_state(const iw_permit_t *self);
+
+/// An arm that was granted waits for its TX confirmation.
+bool iw_permit_arming(const iw_permit_t *self);
+
+/// True if this cause latches, at least while setpoints are sent.
+bool iw_cause_latches(iw_cause_t cause);
 
 /// What the scheduler must aim at now.
 iw_demand_t iw_permit_demand(const iw_permit_t *self);
