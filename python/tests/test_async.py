@@ -9,7 +9,7 @@ import warnings
 
 from rig import RigCase, now_us
 
-from iwheel import AsyncGateway, GatewayUnavailable, LeaseEnded, Refused
+from iwheel import AsyncGateway, ConnectionLost, GatewayUnavailable, LeaseEnded, Refused
 
 
 class Async(RigCase):
@@ -68,8 +68,9 @@ class Async(RigCase):
                 blocked_us = now_us()
                 time.sleep(1.4)
                 self.assert_stood_by(blocked_us, 1087)
-                with self.assertRaises(Refused):
+                with self.assertRaises(LeaseEnded) as caught:
                     await wheels.drive(300, 300)
+                self.assertEqual(caught.exception.error, "not_armed")
                 with self.assertRaises(LeaseEnded):
                     await wheels.drive(300, 300)
                 return (await gateway.why())["cause"]
@@ -95,6 +96,93 @@ class Async(RigCase):
                 return (await gateway.status())["state"]
 
         self.assertIn(self.run_async(story()), ("listening", "stopping"))
+
+    def test_a_lost_lease_is_told_while_its_events_are_still_unread(self):
+        async def story():
+            async with AsyncGateway(self.socket) as gateway:
+                await gateway.watch("lease", "stop")
+                wheels = await gateway.arm()
+                await wheels.drive(200, 200)
+                time.sleep(1.4)  # The loop does not run: what has come is still in the socket.
+                with self.assertRaises(LeaseEnded):
+                    await wheels.drive_for(1, 200, 200)
+                return [event.get("change", event.get("cause")) async for event in gateway.events(timeout=0.3)]
+
+        self.assertEqual(self.run_async(story()), ["gained", "lease_lost", "lost"])
+
+    def test_a_connection_whose_end_is_still_unread_is_an_ended_lease(self):
+        async def story():
+            async with AsyncGateway(self.socket) as gateway:
+                wheels = await gateway.arm()
+                await wheels.drive(100, 100)
+                self.rig.kill_gateway(signal.SIGKILL)
+                with self.assertRaises(ConnectionLost):
+                    await wheels.drive(100, 100)
+
+        self.run_async(story())
+
+    def test_arming_right_after_a_clean_stop_waits_it_out(self):
+        async def story():
+            for _ in range(2):
+                async with AsyncGateway(self.socket).arm("again") as wheels:
+                    await wheels.drive_for(0.3, 300, 300)
+            async with AsyncGateway(self.socket) as gateway:
+                with self.assertRaises(Refused) as caught:
+                    await gateway.arm(wait=0)
+                return caught.exception.error
+
+        self.assertEqual(self.run_async(story()), "stale_command")
+        self.assert_stood_by(now_us(), 0)
+
+    def test_a_task_cancelled_while_it_waits_to_arm_leaves_nothing_armed(self):
+        async def drive():
+            async with AsyncGateway(self.socket).arm(wait=30):
+                pass
+
+        async def story():
+            async with AsyncGateway(self.socket) as gateway:
+                await (await gateway.arm()).drive_for(0.3, 300, 300)
+                await gateway.stop()
+                task = asyncio.ensure_future(drive())
+                await asyncio.sleep(0.1)
+                task.cancel()
+                with self.assertRaises(asyncio.CancelledError):
+                    await task
+                await asyncio.sleep(1.5)
+                return (await gateway.status())["lease"]["holder"]
+
+        self.assertIsNone(self.run_async(story()))
+
+    def test_drive_for_tells_on_the_way_and_true_ends_it(self):
+        seen = []
+
+        def tell(status):
+            seen.append(status["left"]["speed_mm_s"])
+            return seen[-1] > 150
+
+        async def story():
+            async with AsyncGateway(self.socket).arm() as wheels:
+                return await wheels.drive_for(30, 300, 300, on_status=tell, rate_hz=40)
+
+        begin = time.monotonic()
+        self.assertEqual(self.run_async(story()).left_mm_s, 300)
+        self.assertLess(time.monotonic() - begin, 4)
+        self.assertGreater(len(seen), 3)
+        self.assert_stood_by(now_us(), 0)
+
+    def test_what_the_gateway_replies_is_handed_out(self):
+        async def story():
+            async with AsyncGateway(self.socket) as gateway:
+                self.assertEqual((await gateway.confirm("wheel_radius", 192.0))["state"], "confirmed")
+                self.assertTrue((await gateway.watch("state", rate_hz=500.0))["limited"])
+                await gateway.watch()
+                await asyncio.sleep(3)
+                self.assertEqual(set(await gateway.tare("right")), {"state", "right"})
+                self.assertEqual((await gateway.stop(), await gateway.estop()), ("listening", "latched"))
+                with self.assertRaises(ValueError):
+                    await gateway.watch("state", rate_hz=0.5)
+
+        self.run_async(story())
 
     def test_watching_and_driving_side_by_side(self):
         async def watch(speeds):

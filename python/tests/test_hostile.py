@@ -7,19 +7,22 @@ import os
 import socket
 import tempfile
 import threading
+import time
 import unittest
 
 import rig  # noqa: F401  The path to the package.
 
 from iwheel import AsyncGateway, Gateway, GatewayUnavailable, NoAnswer, ProtocolError, default_socket
 
-HELLO = b'{"event":"hello","client":1}\n'
+HELLO = b'{"event":"hello","api":1,"client":1}\n'
+NEWER = b'{"event":"hello","version":"9.1.0","api":2,"client":1}\n'
 
 
 class Impostor:
     """Accepts one connection after another and says what it was told to, after the first request of each."""
 
-    def __init__(self, says, close=False):
+    def __init__(self, says, close=False, hello=HELLO):
+        self.hello = hello
         self.folder = tempfile.TemporaryDirectory()
         self.path = os.path.join(self.folder.name, "socket")
         self.says, self.close, self.heard = says, close, []
@@ -35,10 +38,13 @@ class Impostor:
                 connection, _ = self.listener.accept()
             except OSError:
                 return
-            connection.sendall(HELLO)
-            self.heard.append(connection.recv(5000))
-            connection.sendall(self.says)
             self.kept.append(connection)
+            try:
+                connection.sendall(self.hello)
+                self.heard.append(connection.recv(5000))
+                connection.sendall(self.says)
+            except OSError:
+                pass
             if self.close:
                 connection.close()
 
@@ -70,20 +76,21 @@ def as_nobody(call):
 
 
 class Hostile(unittest.TestCase):
-    def both(self, says, error, close=False, ask="status"):
-        impostor = Impostor(says, close)
+    def both(self, says, error, close=False, ask="status", hello=HELLO):
+        impostor = Impostor(says, close, hello)
         self.addCleanup(impostor.end)
 
         async def ask_async():
             async with AsyncGateway(impostor.path, timeout=0.2) as gateway:
                 await getattr(gateway, ask)()
 
-        with self.assertRaises(error):
+        with self.assertRaises(error) as first:
             asyncio.run(asyncio.wait_for(ask_async(), 5))
-        with self.assertRaises(error):
+        with self.assertRaises(error) as second:
             with Gateway(impostor.path, timeout=0.2) as gateway:
                 getattr(gateway, ask)()
-        return impostor
+        self.assertEqual(str(first.exception), str(second.exception))
+        return impostor, str(first.exception)
 
     def test_silence_is_no_answer(self):
         self.both(b"", NoAnswer)
@@ -93,6 +100,46 @@ class Hostile(unittest.TestCase):
 
     def test_an_answer_to_something_else_is_no_answer(self):
         self.both(b'{"id":77,"ok":true}\n', NoAnswer)
+
+    def test_who_does_not_say_hello_is_no_answer_and_is_asked_nothing(self):
+        impostor, told = self.both(b"", NoAnswer, hello=b"")
+        self.assertIn("did not say hello", told)
+        self.wait_for_two(impostor)
+        self.assertEqual(impostor.heard, [b"", b""])
+
+    def wait_for_two(self, impostor):
+        deadline = time.monotonic() + 2
+        while len(impostor.heard) < 2 and time.monotonic() < deadline:
+            time.sleep(0.01)
+
+    def test_a_newer_protocol_is_refused_in_words_before_anything_is_asked(self):
+        for ask in ("status", "arm", "watch"):
+            with self.subTest(ask):
+                impostor, told = self.both(b"", ProtocolError, hello=NEWER, ask=ask)
+                self.assertRegex(told, r"\(version 9\.1\.0\) speaks the northbound protocol 2, this .* knows it up to 1; install")
+                self.wait_for_two(impostor)
+                self.assertEqual(impostor.heard, [b"", b""])
+
+    def test_a_newer_protocol_is_not_waited_for(self):
+        impostor = Impostor(b"", hello=NEWER)
+        self.addCleanup(impostor.end)
+        begin = time.monotonic()
+        with self.assertRaises(ProtocolError):
+            Gateway(impostor.path, wait=30).status()
+        with self.assertRaises(ProtocolError):
+            asyncio.run(AsyncGateway(impostor.path, wait=30).status())
+        self.assertLess(time.monotonic() - begin, 5)
+
+    def test_a_newer_protocol_is_still_told_to_stop(self):
+        for ask in ("stop", "estop"):
+            with self.subTest(ask):
+                impostor = Impostor(b'{"id":1,"ok":true,"state":"stopping"}\n', hello=NEWER)
+                self.addCleanup(impostor.end)
+                with Gateway(impostor.path, timeout=0.5) as gateway:
+                    self.assertEqual(getattr(gateway, ask)(), "stopping")
+                    with self.assertRaises(ProtocolError):
+                        gateway.status()
+                self.assertEqual(json.loads(impostor.heard[0])["cmd"], ask)
 
     def test_garbage_is_a_protocol_error(self):
         for says in (b"SSH-2.0-x\r\n", b"[]\n", b'{"a":1}\n', b"\xff\xfe\n", b'{"ok":true,"event":"x"}\n', b"\n"):

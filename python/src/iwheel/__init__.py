@@ -10,13 +10,15 @@ However that block is left, the wheels are stopped: at its end, by an exception,
 loses its connection, the gateway stops them a lease (200 ms) after the last command. Nothing in this package repeats a command
 behind the program's back: no thread, no task, no timer.
 
-`AsyncGateway` is the same for asyncio. Speeds are mm/s, currents mA, integers as on the bus. None means unknown, never 0.
+`AsyncGateway` is the same for asyncio. Speeds are mm/s, currents mA, integers as on the bus (numpy's too, and 200.0, but not 200.5).
+None means unknown, never 0.
 """
 
 from ._aio import AsyncArmed, AsyncGateway
-from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
+from ._errors import ConnectionLost, GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._gateway import Armed, Gateway
-from ._types import Applied, Event, Status, Stop, Terms, WheelStatus
+from ._protocol import Confirmed, Frame, Hello, LedgerEntry, Status, Stop, StopSummary, Tared, Watched, WheelStatus
+from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._version import __version__
 from ._wire import default_socket
 
@@ -25,18 +27,28 @@ __all__ = [
     "Armed",
     "AsyncArmed",
     "AsyncGateway",
+    "Confirmed",
+    "ConnectionLost",
     "Event",
+    "Frame",
     "Gateway",
     "GatewayUnavailable",
+    "Hello",
     "IWheelError",
     "LeaseEnded",
+    "LedgerEntry",
     "NoAnswer",
+    "OnStatus",
     "ProtocolError",
     "Refused",
     "Status",
     "Stop",
+    "StopSummary",
+    "Tared",
     "Terms",
+    "Watched",
     "WheelStatus",
+    "Whole",
     "__version__",
     "default_socket",
 ]

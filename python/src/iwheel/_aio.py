@@ -12,21 +12,33 @@ import time
 import warnings
 from collections import deque
 from types import TracebackType
-from typing import Any, AsyncIterator, Deque, Dict, Generator, List, Mapping, Optional, Type, cast
+from typing import Any, AsyncIterator, Deque, Dict, Generator, List, Mapping, Optional, Type, Union, cast
 
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
-from ._gateway import REPEATABLE, REST_S
-from ._types import Applied, Event, Status, Stop, Terms
+from ._protocol import Confirmed, Hello, State, Status, Stop, Tared, Watched
+from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
+    ALWAYS,
+    ARM_AGAIN_S,
+    ARM_S,
     HARMLESS,
+    PASSING,
+    REPEATABLE,
+    REST_S,
     Message,
     Wire,
     applied_of,
     cannot_connect,
+    check_api,
     default_socket,
-    drive_fields,
+    ended_by,
+    integer,
+    integers,
     lost_event,
+    lost_with,
+    period_of,
     result_of,
+    seconds_of,
     stands,
     terms_of,
     without_envelope,
@@ -40,7 +52,8 @@ class _Stream:
 
     def __init__(self, path: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.path = path
-        self.client: Optional[int] = None
+        self.hello: "asyncio.Future[Message]" = asyncio.get_running_loop().create_future()
+        """What the gateway says first. `client` in it is our number, as `lease.holder` in the status."""
         self.arms = 0
         self.told = False
         """That it ended, to whoever reads the events."""
@@ -54,11 +67,21 @@ class _Stream:
         self._task = asyncio.ensure_future(self._read())
 
     @classmethod
-    async def connect(cls, path: str) -> _Stream:
+    async def connect(cls, path: str, timeout: float) -> _Stream:
+        """Nothing is asked before it is known who answers."""
         try:
-            return cls(path, *await asyncio.open_unix_connection(path))
+            stream = cls(path, *await asyncio.open_unix_connection(path))
         except OSError as error:
             raise cannot_connect(path, error) from None
+        try:
+            await asyncio.wait_for(stream.hello, timeout)
+        except asyncio.TimeoutError:
+            stream.close()
+            raise NoAnswer(f"{path}: the gateway did not say hello within {timeout:g} s") from None
+        except BaseException:
+            stream.close()
+            raise
+        return stream
 
     @property
     def open(self) -> bool:
@@ -120,7 +143,8 @@ class _Stream:
                 future.set_result(message)
             return
         if message["event"] == "hello":
-            self.client = message.get("client")
+            if not self.hello.done():
+                self.hello.set_result(message)
             return
         if len(self.events) >= EVENTS_KEPT:
             self.events.popleft()
@@ -133,7 +157,7 @@ class _Stream:
             return
         self.error = error
         self._writer.close()
-        waiting: List["asyncio.Future[Message]"] = list(self._waiting.values())
+        waiting: List["asyncio.Future[Message]"] = [self.hello, *self._waiting.values()]
         for future in waiting:
             if not future.done():
                 future.set_exception(error)
@@ -168,8 +192,8 @@ class AsyncGateway:
         if stream is not None:
             stream.close()
 
-    async def hello(self) -> Message:
-        return cast(Message, without_envelope(await self._ask("hello")))
+    async def hello(self) -> Hello:
+        return cast(Hello, without_envelope(await self._ask("hello")))
 
     async def status(self) -> Status:
         return cast(Status, without_envelope(await self._ask("status")))
@@ -177,10 +201,11 @@ class AsyncGateway:
     async def why(self) -> Stop:
         return cast(Stop, without_envelope(await self._ask("why")))
 
-    async def watch(self, *topics: str, rate_hz: Optional[int] = None) -> None:
-        fields = {"topics": list(topics), "rate_hz": rate_hz}
-        await self._ask("watch", **fields)
+    async def watch(self, *topics: str, rate_hz: Optional[Whole] = None) -> Watched:
+        fields = {"topics": list(topics), **integers(rate_hz=rate_hz)}
+        granted = await self._ask("watch", **fields)
         self._subscription = fields if topics else None
+        return cast(Watched, without_envelope(granted))
 
     async def events(self, timeout: Optional[float] = None) -> AsyncIterator[Event]:
         """As `Gateway.events`, with `disconnected`, `reconnected` and `lost`."""
@@ -190,62 +215,83 @@ class AsyncGateway:
                 return
             yield event
 
-    async def stop(self) -> None:
-        await self._ask("stop")
+    async def stop(self) -> State:
+        return cast(State, (await self._ask("stop"))["state"])
 
-    async def estop(self, reason: Optional[str] = None) -> None:
-        await self._ask("estop", reason=reason)
+    async def estop(self, reason: Optional[str] = None) -> State:
+        return cast(State, (await self._ask("estop", reason=reason))["state"])
 
-    async def reset(self) -> None:
-        await self._ask("reset")
+    async def reset(self) -> State:
+        return cast(State, (await self._ask("reset"))["state"])
 
-    async def tare(self, side: Optional[str] = None) -> None:
-        await self._ask("tare", side=side)
+    async def tare(self, side: Optional[str] = None) -> Tared:
+        return cast(Tared, without_envelope(await self._ask("tare", side=side)))
 
-    def arm(self, name: Optional[str] = None, *, takeover: bool = False) -> _Arming:
-        """`async with gateway.arm("name") as wheels:`, or `wheels = await gateway.arm("name")`."""
-        return _Arming(self, name, takeover)
+    async def confirm(self, item: str, value: Union[str, Whole, None] = None) -> Confirmed:
+        found = value if value is None or isinstance(value, str) else integer("value", value)
+        return cast(Confirmed, without_envelope(await self._ask("confirm", item=item, value=found)))
+
+    def arm(self, name: Optional[str] = None, *, takeover: bool = False, wait: float = ARM_S) -> _Arming:
+        """`async with gateway.arm("name") as wheels:`, or `wheels = await gateway.arm("name")`. `wait` as in `Gateway.arm`."""
+        return _Arming(self, name, takeover, wait)
 
     # The inside ------------------------------------------------------------------------------------------------------
 
-    async def _connected(self, deadline: Optional[float]) -> _Stream:
+    async def _connected(self, deadline: Optional[float], any_api: bool = False) -> _Stream:
         async with self._connecting:
-            if self._stream is not None and self._stream.open:
-                return self._stream
-            pause = 0.02
-            while True:
+            stream = self._stream
+            if stream is None or not stream.open:
+                stream = await self._connect(deadline)
+            if not any_api:
                 try:
-                    stream = await _Stream.connect(self._path or default_socket())
-                    break
-                except GatewayUnavailable:
-                    if deadline is None or time.monotonic() + pause > deadline:
-                        raise
-                    await asyncio.sleep(pause)
-                    pause = min(1.0, pause * 2)
-            self._stream = stream
-            if self._subscription is not None:
-                result_of("watch", await stream.ask("watch", self._subscription, self._timeout))
+                    check_api(stream.path, stream.hello.result())
+                except ProtocolError:
+                    stream.close()
+                    raise
             return stream
+
+    async def _connect(self, deadline: Optional[float]) -> _Stream:
+        pause = 0.02
+        while True:
+            try:
+                stream = await _Stream.connect(self._path or default_socket(), self._timeout)
+                break
+            except ProtocolError:
+                raise
+            except GatewayUnavailable:
+                if deadline is None or time.monotonic() + pause > deadline:
+                    raise
+                await asyncio.sleep(pause)
+                pause = min(1.0, pause * 2)
+        self._stream = stream
+        if self._subscription is not None:
+            result_of("watch", await stream.ask("watch", self._subscription, self._timeout))
+        return stream
 
     async def _ask(self, cmd: str, **fields: Any) -> Message:
         deadline = time.monotonic() + self._wait if self._wait > 0 else None
-        stream = await self._connected(deadline)
+        stream = await self._connected(deadline, cmd in ALWAYS)
         try:
             return result_of(cmd, await stream.ask(cmd, fields, self._timeout))
         except GatewayUnavailable:
             if cmd not in REPEATABLE:
                 raise
-        return result_of(cmd, await (await self._connected(deadline)).ask(cmd, fields, self._timeout))
+        return result_of(cmd, await (await self._connected(deadline, cmd in ALWAYS)).ask(cmd, fields, self._timeout))
 
-    async def _arm(self, name: Optional[str], takeover: bool) -> AsyncArmed:
-        stream = await self._connected(time.monotonic() + self._wait if self._wait > 0 else None)
+    async def _arm(self, name: Optional[str], takeover: bool, wait: float) -> AsyncArmed:
+        until = time.monotonic() + wait
         fields = {"name": name, "takeover": takeover or None}
-        try:
-            terms = terms_of(result_of("arm", await stream.ask("arm", fields, self._timeout)))
-        except asyncio.CancelledError:
-            stream.close("a task was cancelled while arming")
-            raise
-        return AsyncArmed(self, stream, terms)
+        while True:
+            stream = await self._connected(time.monotonic() + self._wait if self._wait > 0 else None)
+            try:
+                return AsyncArmed(self, stream, terms_of(result_of("arm", await stream.ask("arm", fields, self._timeout))))
+            except Refused as refusal:
+                if refusal.error not in PASSING or not time.monotonic() < until:
+                    raise
+            except asyncio.CancelledError:
+                stream.close("a task was cancelled while arming")
+                raise
+            await asyncio.sleep(ARM_AGAIN_S)
 
     async def _next_event(self, timeout: Optional[float]) -> Optional[Event]:
         deadline = time.monotonic() + (timeout if timeout is not None else float("inf"))
@@ -289,12 +335,12 @@ class AsyncGateway:
 class _Arming:
     """What `AsyncGateway.arm` returns: to be awaited, or entered with `async with`."""
 
-    def __init__(self, gateway: AsyncGateway, name: Optional[str], takeover: bool) -> None:
-        self._gateway, self._name, self._takeover = gateway, name, takeover
+    def __init__(self, gateway: AsyncGateway, name: Optional[str], takeover: bool, wait: float) -> None:
+        self._gateway, self._name, self._takeover, self._wait = gateway, name, takeover, wait
         self._armed: Optional[AsyncArmed] = None
 
     def __await__(self) -> Generator[Any, None, AsyncArmed]:
-        return self._gateway._arm(self._name, self._takeover).__await__()
+        return self._gateway._arm(self._name, self._takeover, self._wait).__await__()
 
     async def __aenter__(self) -> AsyncArmed:
         self._armed = await self
@@ -320,28 +366,38 @@ class AsyncArmed:
         self._number = stream.arms
 
     async def drive(
-        self, left_mm_s: int, right_mm_s: int, left_mA: Optional[int] = None, right_mA: Optional[int] = None
+        self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Optional[Whole] = None, right_mA: Optional[Whole] = None
     ) -> Applied:
-        return await self._command("drive", drive_fields(left_mm_s, right_mm_s, left_mA, right_mA))
+        fields = integers(left_mm_s=left_mm_s, right_mm_s=right_mm_s, left_mA=left_mA, right_mA=right_mA)
+        return await self._command("drive", fields)
 
-    async def twist(self, v_mm_s: int, yaw_mrad_s: int) -> Applied:
-        return await self._command("twist", {"v_mm_s": v_mm_s, "yaw_mrad_s": yaw_mrad_s})
+    async def twist(self, v_mm_s: Whole, yaw_mrad_s: Whole) -> Applied:
+        return await self._command("twist", integers(v_mm_s=v_mm_s, yaw_mrad_s=yaw_mrad_s))
 
     async def drive_for(
         self,
         seconds: float,
-        left_mm_s: int,
-        right_mm_s: int,
-        left_mA: Optional[int] = None,
-        right_mA: Optional[int] = None,
+        left_mm_s: Whole,
+        right_mm_s: Whole,
+        left_mA: Optional[Whole] = None,
+        right_mA: Optional[Whole] = None,
+        *,
+        on_status: Optional[OnStatus] = None,
+        rate_hz: Optional[float] = None,
     ) -> Applied:
-        end = time.monotonic() + seconds
+        """As `Armed.drive_for`; `on_status` is an ordinary function here too."""
+        end = time.monotonic() + seconds_of(seconds)
+        period = period_of(self.terms, rate_hz)
+        due = time.monotonic()
         while True:
             applied = await self.drive(left_mm_s, right_mm_s, left_mA, right_mA)
-            left = end - time.monotonic()
-            if left <= 0:
+            if on_status is not None and on_status(await self._status()) is True:
                 return applied
-            await asyncio.sleep(min(left, self.terms.lease_ms / 3000))
+            now = time.monotonic()
+            if now >= end:
+                return applied
+            due = min(end, max(now, due + period))
+            await asyncio.sleep(due - now)
 
     async def stop(self, wait: float = REST_S) -> bool:
         self._end("it was stopped")
@@ -376,29 +432,38 @@ class AsyncArmed:
         self._ended = self._ended or reason
 
     async def _command(self, cmd: str, fields: Message) -> Applied:
-        if not self._stream.open:
-            self._end("the connection was lost")
         if self._number != self._stream.arms:
             self._end("the same AsyncGateway was armed anew")
         if self._ended is not None:
             raise LeaseEnded(f"this permission to drive is over ({self._ended}); arm again")
         asked = time.monotonic()
         try:
-            reply = result_of(cmd, await self._stream.ask(cmd, fields, self._gateway._timeout))
+            reply = await self._ask(cmd, fields)
         except Refused as refusal:
-            if refusal.error not in HARMLESS:
-                self._end(refusal.message)
+            if refusal.error in HARMLESS:
+                raise
+            self._end(refusal.message)
+            raise ended_by(refusal) from refusal
+        self._fed = asked
+        return applied_of(reply)
+
+    async def _ask(self, cmd: str, fields: Message) -> Message:
+        try:
+            return result_of(cmd, await self._stream.ask(cmd, fields, self._gateway._timeout))
+        except (NoAnswer, ProtocolError) as trouble:
+            self._end(str(trouble))
             raise
         except GatewayUnavailable as lost:
             self._end(str(lost))
-            raise
-        self._fed = asked
-        return applied_of(reply)
+            raise lost_with(lost) from lost
+
+    async def _status(self) -> Status:
+        return cast(Status, without_envelope(await self._ask("status", {})))
 
     async def _leave(self) -> bool:
         surely_ours = self._ended is None and time.monotonic() - self._fed < self.terms.lease_ms / 1000
         if not surely_ours:
             holder = (await self._gateway.status())["lease"]["holder"]
-            if holder is not None and holder != self._stream.client:
+            if holder is not None and holder != self._stream.hello.result().get("client"):
                 return True
         return await self.stop()

@@ -11,7 +11,7 @@ import weakref
 from collections import deque
 from typing import Any, Deque, Dict, Mapping, Optional, Set
 
-from ._errors import GatewayUnavailable, IWheelError, NoAnswer, ProtocolError
+from ._errors import GatewayUnavailable, NoAnswer, ProtocolError
 from ._types import Event
 from ._wire import Message, Wire, cannot_connect, lost_event
 
@@ -25,8 +25,8 @@ class Connection:
 
     def __init__(self, path: str, timeout: float) -> None:
         self.path = path
-        self.client: Optional[int] = None
-        """Our number in the gateway, as `lease.holder` in the status."""
+        self.hello: Optional[Message] = None
+        """What the gateway says first. `client` in it is our number, as `lease.holder` in the status."""
         self.arms = 0
         """How often this connection was armed: only the last one counts."""
         self.events: Deque[Event] = deque()
@@ -35,6 +35,8 @@ class Connection:
         self._replies: Dict[int, Message] = {}
         self._wanted: Set[int] = set()
         self._sending = False
+        self._error: Optional[GatewayUnavailable] = None
+        """What ended it, if it was not us."""
         self._socket: Optional[socket.socket] = socket.socket(socket.AF_UNIX)
         self._socket.settimeout(timeout)
         try:
@@ -44,6 +46,15 @@ class Connection:
             self.close()
             raise cannot_connect(path, error) from None
         _alive.add(self)
+        self._greet(timeout)
+
+    def _greet(self, timeout: float) -> None:
+        """Nothing is asked before it is known who answers."""
+        deadline = time.monotonic() + timeout
+        while self.hello is None:
+            self.wait(deadline)
+            if self.hello is None and time.monotonic() > deadline:
+                raise self._fail(NoAnswer(f"{self.path}: the gateway did not say hello within {timeout:g} s"))
 
     def close(self) -> None:
         """The end of the connection ends the lease, if it was ours. Works at any time."""
@@ -103,13 +114,15 @@ class Connection:
             return lost_event(count)
         return self.events.popleft() if self.events else None
 
-    def _fail(self, error: IWheelError) -> IWheelError:
+    def _fail(self, error: GatewayUnavailable) -> GatewayUnavailable:
+        self._error = self._error or error
         self.close()
         return error
 
     def _require(self) -> socket.socket:
         if self._socket is None:
-            raise GatewayUnavailable(f"{self.path}: the connection is closed")
+            told = f"{self.path}: the connection is closed" if self._error is None else str(self._error)
+            raise GatewayUnavailable(told)
         return self._socket
 
     def _readable(self, seconds: float) -> bool:
@@ -155,7 +168,7 @@ class Connection:
                 raise self._fail(GatewayUnavailable(f"{self.path}: {message.get('error')}: {message.get('message')}"))
             return
         if message["event"] == "hello":
-            self.client = message.get("client")
+            self.hello = message
             return
         if len(self.events) >= EVENTS_KEPT:
             self.events.popleft()

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Optional
+
 
 class IWheelError(Exception):
     """The base of everything this package raises, beside programming errors."""
@@ -17,11 +19,22 @@ class NoAnswer(GatewayUnavailable):
 
 
 class ProtocolError(GatewayUnavailable):
-    """What came is not the northbound protocol. The connection was closed, so the lease has ended."""
+    """What came is not the northbound protocol, or a newer one than this package speaks. The connection was closed."""
 
 
 class LeaseEnded(IWheelError):
-    """This permission to drive is over. Look why (`Gateway.why()`), then `arm()` again if that is what is wanted."""
+    """This permission to drive is over. Look why (`Gateway.why()`), then `arm()` again if that is what is wanted.
+
+    `error`: the name of the refusal by which the gateway told it (`not_armed`, `latched` ...); None if it was known without asking.
+    """
+
+    def __init__(self, message: str, error: Optional[str] = None) -> None:
+        super().__init__(message)
+        self.error = error
+
+
+class ConnectionLost(LeaseEnded, GatewayUnavailable):
+    """The gateway has closed the connection, and with it the permission to drive ended."""
 
 
 class Refused(IWheelError):

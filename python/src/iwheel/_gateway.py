@@ -8,27 +8,35 @@ import time
 import warnings
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Iterator, Optional, Type, cast
+from typing import Any, Iterator, Optional, Type, Union, cast
 
 from ._connection import Connection
-from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, Refused
-from ._types import Applied, Event, Status, Stop, Terms
+from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
+from ._protocol import Confirmed, Hello, State, Status, Stop, Tared, Watched
+from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
+    ALWAYS,
+    ARM_AGAIN_S,
+    ARM_S,
     HARMLESS,
+    PASSING,
+    REPEATABLE,
+    REST_S,
     Message,
     applied_of,
+    check_api,
     default_socket,
-    drive_fields,
+    ended_by,
+    integer,
+    integers,
+    lost_with,
+    period_of,
     result_of,
+    seconds_of,
     stands,
     terms_of,
     without_envelope,
 )
-
-REPEATABLE = ("hello", "status", "why", "stop", "estop")
-"""Asked again on a new connection if the old one broke: they never start a motion."""
-REST_S = 3.0
-"""How long an end of driving waits at most for the wheels to stand."""
 
 
 class Gateway:
@@ -67,9 +75,9 @@ class Gateway:
 
     # Reading: moves nothing ------------------------------------------------------------------------------------------
 
-    def hello(self) -> Message:
+    def hello(self) -> Hello:
         """Who answers: `name version api bus state client`."""
-        return cast(Message, without_envelope(self._ask("hello")))
+        return cast(Hello, without_envelope(self._ask("hello")))
 
     def status(self) -> Status:
         """One complete snapshot."""
@@ -79,11 +87,15 @@ class Gateway:
         """The last stop; `sentence` tells it in plain English."""
         return cast(Stop, without_envelope(self._ask("why")))
 
-    def watch(self, *topics: str, rate_hz: Optional[int] = None) -> None:
-        """Subscribes to `state bus estop lease stop force frame`; replaces what was subscribed. Then read `events`."""
-        fields = {"topics": list(topics), "rate_hz": rate_hz}
-        self._ask("watch", **fields)
+    def watch(self, *topics: str, rate_hz: Optional[Whole] = None) -> Watched:
+        """Subscribes to `state bus estop lease stop force frame`; replaces what was subscribed. Then read `events`.
+
+        Returns what was granted: `topics rate_hz limited`.
+        """
+        fields = {"topics": list(topics), **integers(rate_hz=rate_hz)}
+        granted = self._ask("watch", **fields)
         self._subscription = fields if topics else None
+        return cast(Watched, without_envelope(granted))
 
     def events(self, timeout: Optional[float] = None) -> Iterator[Event]:
         """Events as they come; ends when none came for `timeout` seconds (None: never ends).
@@ -99,30 +111,52 @@ class Gateway:
 
     # Stopping: always allowed ----------------------------------------------------------------------------------------
 
-    def stop(self) -> None:
-        """Ramp to zero, whoever drives."""
-        self._ask("stop")
+    def stop(self) -> State:
+        """Ramp to zero, whoever drives. The state after that."""
+        return cast(State, self._ask("stop")["state"])
 
-    def estop(self, reason: Optional[str] = None) -> None:
+    def estop(self, reason: Optional[str] = None) -> State:
         """Zero without ramp, latched until `reset`. No substitute for the button that cuts power."""
-        self._ask("estop", reason=reason)
+        return cast(State, self._ask("estop", reason=reason)["state"])
 
     # What needs a decision -------------------------------------------------------------------------------------------
 
-    def reset(self) -> None:
+    def reset(self) -> State:
         """Leaves the latch, if its cause is gone. Moves nothing."""
-        self._ask("reset")
+        return cast(State, self._ask("reset")["state"])
 
-    def tare(self, side: Optional[str] = None) -> None:
-        """Makes the present force the zero: of `left`, `right`, or both wheels. Moves nothing."""
-        self._ask("tare", side=side)
+    def tare(self, side: Optional[str] = None) -> Tared:
+        """Makes the present force the zero: of `left`, `right`, or both wheels. Moves nothing.
 
-    def arm(self, name: Optional[str] = None, *, takeover: bool = False) -> Armed:
+        Returns, for each of them, the new zero and how good it is, and the one before.
+        """
+        return cast(Tared, without_envelope(self._ask("tare", side=side)))
+
+    def confirm(self, item: str, value: Union[str, Whole, None] = None) -> Confirmed:
+        """The operator's word on an item of the assumption ledger (docs/ledger.md). Moves nothing.
+
+        `value` is what was found at the machine; without it what is configured is confirmed. Returns the item's entry: another value
+        than the configured one contradicts it, and `disabled` tells what that costs.
+        """
+        found = value if value is None or isinstance(value, str) else integer("value", value)
+        return cast(Confirmed, without_envelope(self._ask("confirm", item=item, value=found)))
+
+    def arm(self, name: Optional[str] = None, *, takeover: bool = False, wait: float = ARM_S) -> Armed:
         """Asks for permission to drive; the wheels stay at zero until the first command. An older one of this Gateway ends.
 
-        `name` is shown to others. `takeover` takes the lease from somebody else, with the wheels at rest.
+        `name` is shown to others. `takeover` takes the lease from somebody else, with the wheels at rest. `wait`: seconds in which a
+        stop that is only just over is waited out: wheels that do not count as standing yet (`not_at_rest`), a drive command of
+        half a second ago (`stale_command`). Every other refusal is raised at once.
         """
-        reply = self._ask("arm", name=name, takeover=takeover or None)
+        deadline = time.monotonic() + wait
+        while True:
+            try:
+                reply = self._ask("arm", name=name, takeover=takeover or None)
+                break
+            except Refused as refusal:
+                if refusal.error not in PASSING or not time.monotonic() < deadline:
+                    raise
+            time.sleep(ARM_AGAIN_S)
         connection = self._connection
         if connection is None:
             raise GatewayUnavailable("the connection was closed while arming")
@@ -139,15 +173,27 @@ class Gateway:
         finally:
             self._busy.release()
 
-    def _connected(self, deadline: Optional[float]) -> Connection:
+    def _connected(self, deadline: Optional[float], any_api: bool = False) -> Connection:
         """The connection, made anew if it broke. Tries until the deadline (None: once)."""
-        if self._connection is not None and self._connection.alive():
-            return self._connection
+        connection = self._connection
+        if connection is None or not connection.alive():
+            connection = self._connect(deadline)
+        if not any_api:
+            try:
+                check_api(connection.path, connection.hello or {})
+            except ProtocolError:
+                connection.close()
+                raise
+        return connection
+
+    def _connect(self, deadline: Optional[float]) -> Connection:
         pause = 0.02
         while True:
             try:
                 connection = Connection(self._path or default_socket(), self._timeout)
                 break
+            except ProtocolError:
+                raise
             except GatewayUnavailable:
                 if deadline is None or time.monotonic() + pause > deadline:
                     raise
@@ -161,17 +207,18 @@ class Gateway:
     def _ask(self, cmd: str, **fields: Any) -> Message:
         with self._alone():
             deadline = time.monotonic() + self._wait if self._wait > 0 else None
-            connection = self._connected(deadline)
+            connection = self._connected(deadline, cmd in ALWAYS)
             try:
                 return result_of(cmd, connection.ask(cmd, fields, self._timeout))
             except GatewayUnavailable:
                 if cmd not in REPEATABLE:
                     raise
-            return result_of(cmd, self._connected(deadline).ask(cmd, fields, self._timeout))
+            return result_of(cmd, self._connected(deadline, cmd in ALWAYS).ask(cmd, fields, self._timeout))
 
     def _ask_on(self, connection: Connection, cmd: str, fields: Message) -> Message:
-        """On this connection or not at all."""
+        """On this connection or not at all. What has come is taken first: the connection's end may be among it."""
         with self._alone():
+            connection.alive()
             return result_of(cmd, connection.ask(cmd, fields, self._timeout))
 
     def _next_event(self, timeout: Optional[float]) -> Optional[Event]:
@@ -230,31 +277,44 @@ class Armed:
         self._number = connection.arms
 
     def drive(
-        self, left_mm_s: int, right_mm_s: int, left_mA: Optional[int] = None, right_mA: Optional[int] = None
+        self, left_mm_s: Whole, right_mm_s: Whole, left_mA: Optional[Whole] = None, right_mA: Optional[Whole] = None
     ) -> Applied:
         """Sets both wheels' speed. The currents may be left out, both, unless the configuration says current_role = setpoint."""
-        return self._command("drive", drive_fields(left_mm_s, right_mm_s, left_mA, right_mA))
+        fields = integers(left_mm_s=left_mm_s, right_mm_s=right_mm_s, left_mA=left_mA, right_mA=right_mA)
+        return self._command("drive", fields)
 
-    def twist(self, v_mm_s: int, yaw_mrad_s: int) -> Applied:
+    def twist(self, v_mm_s: Whole, yaw_mrad_s: Whole) -> Applied:
         """Forward speed and turning rate, positive to the left."""
-        return self._command("twist", {"v_mm_s": v_mm_s, "yaw_mrad_s": yaw_mrad_s})
+        return self._command("twist", integers(v_mm_s=v_mm_s, yaw_mrad_s=yaw_mrad_s))
 
     def drive_for(
         self,
         seconds: float,
-        left_mm_s: int,
-        right_mm_s: int,
-        left_mA: Optional[int] = None,
-        right_mA: Optional[int] = None,
+        left_mm_s: Whole,
+        right_mm_s: Whole,
+        left_mA: Optional[Whole] = None,
+        right_mA: Optional[Whole] = None,
+        *,
+        on_status: Optional[OnStatus] = None,
+        rate_hz: Optional[float] = None,
     ) -> Applied:
-        """Repeats the command for that long, three times per lease, and returns while it still holds."""
-        end = time.monotonic() + seconds
+        """Repeats the command for that long, three times per lease or at `rate_hz`, and returns while it still holds.
+
+        `on_status` is called after each command with a snapshot taken then. If it returns True the drive ends; if it raises, that is
+        raised here. It is part of the loop that keeps the lease: what takes longer than a lease in there ends the permission.
+        """
+        end = time.monotonic() + seconds_of(seconds)
+        period = period_of(self.terms, rate_hz)
+        due = time.monotonic()
         while True:
             applied = self.drive(left_mm_s, right_mm_s, left_mA, right_mA)
-            left = end - time.monotonic()
-            if left <= 0:
+            if on_status is not None and on_status(self._status()) is True:
                 return applied
-            time.sleep(min(left, self.terms.lease_ms / 3000))
+            now = time.monotonic()
+            if now >= end:
+                return applied
+            due = min(end, max(now, due + period))
+            time.sleep(due - now)
 
     def stop(self, wait: float = REST_S) -> bool:
         """Ramps to zero and waits that many seconds at most until both wheels stand; True if they do. Ends the permission."""
@@ -289,24 +349,34 @@ class Armed:
         self._ended = self._ended or reason
 
     def _command(self, cmd: str, fields: Message) -> Applied:
-        if not self._connection.open:
-            self._end("the connection was lost")
         if self._number != self._connection.arms:
             self._end("the same Gateway was armed anew")
         if self._ended is not None:
             raise LeaseEnded(f"this permission to drive is over ({self._ended}); arm again")
         asked = time.monotonic()
         try:
-            reply = self._gateway._ask_on(self._connection, cmd, fields)
+            reply = self._ask(cmd, fields)
         except Refused as refusal:
-            if refusal.error not in HARMLESS:
-                self._end(refusal.message)
+            if refusal.error in HARMLESS:
+                raise
+            self._end(refusal.message)
+            raise ended_by(refusal) from refusal
+        self._fed = asked  # The lease runs from when the command was sent, at the earliest.
+        return applied_of(reply)
+
+    def _ask(self, cmd: str, fields: Message) -> Message:
+        """On the connection that was armed; what breaks it ends the permission."""
+        try:
+            return self._gateway._ask_on(self._connection, cmd, fields)
+        except (NoAnswer, ProtocolError) as trouble:
+            self._end(str(trouble))
             raise
         except GatewayUnavailable as lost:
             self._end(str(lost))
-            raise
-        self._fed = asked  # The lease runs from when the command was sent, at the earliest.
-        return applied_of(reply)
+            raise lost_with(lost) from lost
+
+    def _status(self) -> Status:
+        return cast(Status, without_envelope(self._ask("status", {})))
 
     def _leave(self) -> bool:
         """Stops, unless it is somebody else who drives by now."""
@@ -317,4 +387,4 @@ class Armed:
 
     def _somebody_else_drives(self) -> bool:
         holder = self._gateway.status()["lease"]["holder"]
-        return holder is not None and holder != self._connection.client
+        return holder is not None and holder != (self._connection.hello or {}).get("client")

@@ -4,17 +4,32 @@
 from __future__ import annotations
 
 import json
+import math
+import numbers
+import operator
 import os
 from typing import Any, Dict, List, Mapping, Optional, cast
 
-from ._errors import GatewayUnavailable, ProtocolError, Refused
+from ._errors import ConnectionLost, GatewayUnavailable, LeaseEnded, ProtocolError, Refused
+from ._protocol import API, LINE_MAX, REQUEST_MAX
 from ._types import Applied, Event, Terms
+from ._version import __version__
 
-REQUEST_MAX = 4096
-LINE_MAX = 65536
 DEFAULT_FOLDER = "/run/iwheel"
 HARMLESS = ("out_of_range", "bad_value", "missing_field", "unknown_field", "bad_json")
 """Refusals of a drive command that say nothing about the permission to drive."""
+PASSING = ("not_at_rest", "stale_command")
+"""Refusals of `arm` that end by themselves: the wheels come to rest, and a drive command of before is half a second old."""
+REPEATABLE = ("hello", "status", "why", "stop", "estop")
+"""Asked again on a new connection if the old one broke: they never start a motion."""
+ALWAYS = ("stop", "estop")
+"""Sent even to a gateway that speaks a newer protocol."""
+REST_S = 3.0
+"""How long an end of driving waits at most for the wheels to stand."""
+ARM_S = 2.0
+"""How long `arm` waits out a stop that is only just over."""
+ARM_AGAIN_S = 0.05
+RATE_MAX_HZ = 100
 
 Message = Dict[str, Any]
 
@@ -87,8 +102,60 @@ def result_of(cmd: str, reply: Message) -> Message:
     return reply
 
 
-def drive_fields(left_mm_s: int, right_mm_s: int, left_mA: Optional[int], right_mA: Optional[int]) -> Message:
-    return {"left_mm_s": left_mm_s, "right_mm_s": right_mm_s, "left_mA": left_mA, "right_mA": right_mA}
+def integer(name: str, value: object) -> int:
+    """An int, or what is one but for its type: numpy's integers, 200.0. ValueError or TypeError says what else it is."""
+    if isinstance(value, bool):
+        raise TypeError(f"{name} must be a whole number, not {value}")
+    number = cast(Any, value)
+    try:
+        return operator.index(number)
+    except TypeError:
+        pass
+    if not isinstance(value, numbers.Real):
+        raise TypeError(f"{name} must be a whole number, not {value!r} ({type(value).__name__})")
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be a whole number, not {value!s}; is something unknown where it comes from?")
+    whole = int(number)
+    if whole != number:
+        raise ValueError(f"{name} must be a whole number, as on the bus, not {value!s}; round it: round(x)")
+    return whole
+
+
+def integers(**values: object) -> Message:
+    """Fields of a request; None is left out later."""
+    return {name: None if value is None else integer(name, value) for name, value in values.items()}
+
+
+def seconds_of(value: float) -> float:
+    """A time to drive. Infinite means: until something ends it."""
+    if not value >= 0:
+        raise ValueError(f"seconds must be a number of at least 0, not {value}")
+    return value
+
+
+def period_of(terms: Terms, rate_hz: Optional[float]) -> float:
+    """Seconds between two commands: three per lease, or more if that is asked for."""
+    if rate_hz is not None and not 0 < rate_hz <= RATE_MAX_HZ:
+        raise ValueError(f"rate_hz must be a number above 0 and at most {RATE_MAX_HZ}, not {rate_hz}")
+    return min(terms.lease_ms / 3000, 1 / rate_hz if rate_hz is not None else math.inf)
+
+
+def ended_by(refusal: Refused) -> LeaseEnded:
+    return LeaseEnded(f"this permission to drive is over: {refusal.message}", refusal.error)
+
+
+def lost_with(error: GatewayUnavailable) -> ConnectionLost:
+    return ConnectionLost(f"{error}; this permission to drive is over, arm again")
+
+
+def check_api(path: str, hello: Message) -> None:
+    """A newer protocol may mean something else by the same words: nothing is driven by guessing."""
+    api = hello.get("api", API)
+    if not isinstance(api, int) or api > API:
+        raise ProtocolError(
+            f"{path}: this gateway (version {hello.get('version')}) speaks the northbound protocol {api}, this Python package "
+            f"iwheel {__version__} knows it up to {API}; install the package that belongs to the gateway"
+        )
 
 
 def applied_of(reply: Message) -> Applied:

@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: MIT
+"""What the gateway answers, as types. Written by scripts/northbound.py from share/northbound.json; None means unknown."""
+
+from __future__ import annotations
+
+from typing import Dict, List, Literal, Optional, TypedDict
+
+API = 1
+REQUEST_MAX = 4096
+LINE_MAX = 65536
+
+State = Literal["listening", "armed", "stopping", "latched"]
+
+
+class Hello(TypedDict):
+    """Who answers."""
+
+    name: str
+    """iwheel-gateway"""
+    version: str
+    """of the gateway"""
+    api: int
+    """of this protocol; grows when a client of before would be misled"""
+    bus: str
+    """the interface"""
+    state: State
+    client: int
+    """of this connection; no other one ever gets it"""
+
+
+Cause = Literal[
+    "estop_line",
+    "estop_software",
+    "wheel_lost",
+    "wheel_rebooted",
+    "send_stalled",
+    "bus_down",
+    "second_master",
+    "feedback_sign",
+    "overspeed",
+    "loop_hung",
+    "internal",
+    "loop_late",
+    "wheel_blocked",
+    "lease_lost",
+    "client_gone",
+    "client_stop",
+    "shutdown",
+    "restart",
+]
+
+
+class LeaseStatus(TypedDict):
+    """Who may drive. All None if nobody may, but lease_ms."""
+
+    holder: Optional[int]
+    """of the client"""
+    name: Optional[str]
+    """that it gave itself"""
+    pid: Optional[int]
+    """of its process"""
+    remaining_ms: Optional[int]
+    lease_ms: int
+    """as configured"""
+
+
+BusState = Literal["down", "bus_off", "passive", "active"]
+
+Timing = Literal["unproven", "confirmed", "near", "contradicted"]
+
+Echo = Literal["proven", "unproven"]
+
+
+class BusStatus(TypedDict):
+    name: str
+    state: BusState
+    timing: Timing
+    echo: Echo
+    bitrate: Optional[int]
+    sample_point_permille: Optional[int]
+    load_permille: Optional[int]
+    """of the last second, without stuff bits"""
+    lost_frames: Optional[int]
+    """that came faster than they were read"""
+
+
+EstopState = Literal["released", "pressed", "unreadable", "none"]
+
+
+class EstopStatus(TypedDict):
+    line: str
+    state: EstopState
+    simulated: bool
+
+
+class WheelValid(TypedDict):
+    speed: bool
+    status: bool
+    temperature: bool
+    cpu: bool
+    force: bool
+
+
+class WheelSaturated(TypedDict):
+    battery: bool
+    """255: at least 25.5 V"""
+    force: bool
+
+
+ForceValidity = Literal[
+    "valid",
+    "not_heard",
+    "saturated",
+    "no_offset",
+    "unit_contradicted",
+    "offset_removed",
+    "offset_doubted",
+]
+
+Provenance = Literal["none", "stored", "estimated", "wheel", "operator"]
+
+Origin = Literal["estimated", "wheel", "operator"]
+
+Window = Literal["open", "good", "moving", "noisy", "drift", "loaded", "saturated"]
+
+UnitEvidence = Literal["unknown", "cN", "dN", "offset_removed", "unclear"]
+
+
+class WheelStatus(TypedDict):
+    """One wheel. Speeds in mm/s are in the machine's sense, rpm and ticks in the wheel's own."""
+
+    heard: bool
+    """its speed, within wheel_silent_ms"""
+    at_rest: Optional[bool]
+    """for rest_ms; None while not heard"""
+    speed_rpm: Optional[int]
+    speed_mm_s: Optional[int]
+    acceleration_raw: Optional[int]
+    commanded_mm_s: Optional[int]
+    """what the client wants; None if nothing is wanted"""
+    commanded_mA: Optional[int]
+    applied_mm_s: Optional[int]
+    """what the wheel was told last; None in silence"""
+    applied_mA: Optional[int]
+    speed_age_ms: Optional[int]
+    """None: never"""
+    battery_dV: Optional[int]
+    temperature_degC: Optional[int]
+    cpu_percent: Optional[int]
+    ticks: Optional[int]
+    """64 bits, unwrapped"""
+    distance_mm: Optional[int]
+    status_age_ms: Optional[int]
+    reboots: int
+    """seen since the gateway started"""
+    valid: WheelValid
+    saturated: WheelSaturated
+    force_raw: Optional[int]
+    force_raw_mN: Optional[int]
+    force_offset_mN: Optional[int]
+    force_net_mN: Optional[int]
+    """None unless force_validity is valid"""
+    force_validity: ForceValidity
+    force_age_ms: Optional[int]
+    offset_provenance: Provenance
+    """where the zero in force comes from"""
+    offset_origin: Optional[Origin]
+    """what it was when it was taken, also if it is stored now"""
+    offset_age_ms: Optional[int]
+    offset_contaminated: Optional[bool]
+    """it, or the attempt at one, was taken while the wheel turned, or under load or unrest; None: nobody saw"""
+    offset_window: Window
+    """the two seconds after the wheel's start, or after ours"""
+    offset_samples: Optional[int]
+    offset_deviation_mN: Optional[int]
+    offset_drift_mN: Optional[int]
+    wheel_offset_mN: Optional[int]
+    """the wheel's own, in force or not; None: not heard since its start"""
+    unit_evidence: UnitEvidence
+
+
+class Pose(TypedDict):
+    """As the right wheel sends it."""
+
+    x_mm: Optional[int]
+    y_mm: Optional[int]
+    z_mm: Optional[int]
+    psi_mrad: Optional[int]
+    limited: bool
+    """a coordinate stands at the end of its range"""
+    age_ms: Optional[int]
+
+
+LedgerState = Literal["assumed", "confirmed", "contradicted"]
+
+Evidence = Literal["none", "document", "configuration", "bus", "operator"]
+
+
+class LedgerEntry(TypedDict):
+    """An assumption, and what is known of it."""
+
+    state: LedgerState
+    evidence: Evidence
+    figure: Optional[int]
+    """measured, by the bus only"""
+    value: Optional[str]
+    """in force"""
+    found: Optional[str]
+    """by the operator, if told"""
+    since_wall_us: Optional[int]
+    reason: str
+    """the evidence in words"""
+    disabled: Optional[str]
+    """by a contradiction: what, and the cure"""
+
+
+LedgerItem = Literal[
+    "setpoint_type",
+    "current_role",
+    "force_unit_left",
+    "force_unit_right",
+    "offset_included",
+    "feedback_sign_left",
+    "feedback_sign_right",
+    "mount_sign_left",
+    "mount_sign_right",
+    "wheel_radius",
+    "gear_ratio",
+    "pose_byte_order",
+    "dlc",
+]
+
+MemoryState = Literal["loading", "new", "kept", "ignored", "failed"]
+
+
+class Memory(TypedDict):
+    """Where what is known of the wheels is kept."""
+
+    file: str
+    state: MemoryState
+    reason: Optional[str]
+    """of ignored and failed"""
+
+
+class Gaps(TypedDict):
+    """Between setpoint pairs since the gateway's start, while they are sent."""
+
+    limits_ms: List[int]
+    """upper bounds of all buckets but the last"""
+    count: List[int]
+    """per bucket"""
+    worst_us: Optional[int]
+
+
+class Budget(TypedDict):
+    """How long and how far the machine goes on at most."""
+
+    client_lost_ms: int
+    client_lost_mm: int
+    killed_ms: int
+    killed_mm: int
+
+
+class Counters(TypedDict):
+    """Of the bus and the loop, since the gateway's start."""
+
+    received: int
+    echoes: int
+    bad_format: int
+    bad_length: int
+    unknown: int
+    foreign: int
+    late_steps: int
+    out_of_range: int
+    purges: int
+    pairs: int
+    send_later: int
+    clamped: int
+    gate_stopped: int
+    stray_echoes: int
+    gap_max_us: int
+    still_moving: int
+
+
+class Status(TypedDict):
+    """One complete snapshot: the reply to `status`, and the event `state`."""
+
+    t_us: int
+    """CLOCK_MONOTONIC; never steps"""
+    wall_us: int
+    """CLOCK_REALTIME since 1970; may step"""
+    version: str
+    state: State
+    arming: bool
+    """a zero pair was sent and is not proven yet"""
+    cause: Optional[Cause]
+    """why stopping or latched"""
+    present: List[Cause]
+    """what keeps arm or reset from succeeding now"""
+    lease: LeaseStatus
+    bus: BusStatus
+    estop: EstopStatus
+    left: WheelStatus
+    right: WheelStatus
+    pose: Pose
+    ledger: Dict[LedgerItem, LedgerEntry]
+    memory: Memory
+    gaps: Gaps
+    budget: Budget
+    counters: Counters
+    clients: int
+    listen_only: bool
+    shutting_down: bool
+    warnings: List[str]
+
+
+Topic = Literal["state", "bus", "estop", "lease", "stop", "force", "frame"]
+
+
+class Watched(TypedDict):
+    """What was granted."""
+
+    topics: List[Topic]
+    rate_hz: int
+    limited: bool
+    """it is slower than what was asked"""
+
+
+class TaredWheel(TypedDict):
+    """The zero of one wheel after a tare, and before."""
+
+    offset_mN: int
+    samples: int
+    deviation_mN: int
+    drift_mN: int
+    before_mN: Optional[int]
+    before_provenance: Provenance
+
+
+_TaredPartly = TypedDict("_TaredPartly", {"left": TaredWheel, "right": TaredWheel}, total=False)
+
+
+class Tared(_TaredPartly):
+    """The reply to `tare`; only the wheels that were asked for are there."""
+
+    state: State
+
+
+class Confirmed(LedgerEntry):
+    """The reply to `confirm`: the item and its entry. `value` is what is configured."""
+
+    item: LedgerItem
+
+
+Sides = Literal["left", "right", "both"]
+
+FrameKind = Literal["received", "echo"]
+
+FrameFlag = Literal["extended", "remote", "fd"]
+
+
+class Frame(TypedDict):
+    """A frame on the bus."""
+
+    t_us: int
+    id: int
+    dlc: int
+    data: str
+    """hexadecimal"""
+    kind: FrameKind
+    flags: List[FrameFlag]
+
+
+_StopSummaryNamed = TypedDict("_StopSummaryNamed", {"from": Optional[State]})
+
+
+class StopSummary(_StopSummaryNamed):
+    """A stop: the event `stop`, and part of the reply to `why`. `number` 0: there was none, and the others are None."""
+
+    number: int
+    """of the stop since the gateway's start"""
+    cause: Optional[Cause]
+    side: Optional[Sides]
+    detail: Optional[int]
+    latched: bool
+    client: Optional[int]
+    """who held the lease or asked for the stop"""
+    client_name: Optional[str]
+    applied_left_mm_s: Optional[int]
+    applied_right_mm_s: Optional[int]
+    at_us: Optional[int]
+    wall_us: Optional[int]
+    """when the stop was seen"""
+    age_ms: Optional[int]
+    sentence: str
+
+
+class Stop(StopSummary):
+    """The last stop: the reply to `why`."""
+
+    directory: str
+    """of the recordings"""
+    recording: Optional[str]
+    """the file of this stop; None: not latched, or not written yet"""
+    recording_error: Optional[str]
+    """why it could not be written"""
+    frames_before: List[Frame]
+    """up to 40"""
+    frames_after: List[Frame]
+    """up to 40"""
