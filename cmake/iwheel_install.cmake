@@ -41,7 +41,7 @@ if(TARGET iwheel-gateway)
         DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/iwheel-gateway/examples COMPONENT gateway)
     install(FILES share/gateway.conf DESTINATION ${CMAKE_INSTALL_SYSCONFDIR}/iwheel COMPONENT gateway)
     install(TARGETS iwheelctl iwheel-sim RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
-    install(FILES share/iwheel.dbc DESTINATION ${CMAKE_INSTALL_DATADIR}/iwheel COMPONENT tools)
+    install(FILES share/iwheel.dbc share/northbound.json DESTINATION ${CMAKE_INSTALL_DATADIR}/iwheel COMPONENT tools)
     install(FILES share/completions/iwheel.bash RENAME iwheelctl
         DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT tools)
     if(IWHEEL_SCDOC)

@@ -134,6 +134,38 @@ class Examples(RigCase):
         with open(picture, "rb") as png:
             self.assertEqual(png.read(8), b"\x89PNG\r\n\x1a\n")
 
+    def recorder(self, socket, *arguments):
+        child = self.start("record_csv.py", "--socket", socket, *arguments, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(child.stderr.close)
+        return child
+
+    def test_a_recording_says_what_it_waits_for_and_that_it_began(self):
+        self.rig.kill_gateway(signal.SIGTERM)
+        child = self.recorder(self.socket, self.rig.path("a.csv"))
+        told = child.stderr.readline()
+        self.assertIn("no gateway listens there; start it", told)
+        self.assertIn("Waiting for the gateway, 60 minutes at most", told)
+        self.rig.start_gateway()
+        self.assertIn("recording 20 lines a second into", child.stderr.readline())
+        self.rig.kill_gateway(signal.SIGKILL)
+        self.assertIn("Waiting until the gateway is back", child.stderr.readline())
+        self.rig.start_gateway(restart_hold=True)
+        self.assertIn("the gateway is back", child.stderr.readline())
+        child.send_signal(signal.SIGINT)
+        self.assertRegex(child.stderr.readline(), r"[0-9]+ lines in .*a\.csv")
+        self.assertEqual(child.wait(5), 0)
+
+    def test_a_recording_for_some_seconds_ends_although_the_gateway_is_away(self):
+        child = self.recorder(self.socket, "--for", "1.5", self.rig.path("a.csv"))
+        self.assertIn("recording", child.stderr.readline())
+        self.rig.kill_gateway(signal.SIGKILL)
+        self.assertEqual(child.wait(5), 0)
+
+    def test_a_recording_that_cannot_be_written_says_so_at_once(self):
+        child = self.recorder(self.socket, self.rig.path("no/such/folder.csv"))
+        self.assertEqual(child.wait(5), 1)
+        self.assertIn("No such file", child.stderr.read())
+
 
 if __name__ == "__main__":
     unittest.main()
