@@ -103,6 +103,19 @@ def deviations(folder, fault):
     return run(SCRIPTS / "deviations.py", folder)
 
 
+def northbound(folder, fault):
+    """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
+    sources = ("app/gateway/words/names.c", "app/gateway/bus/bus_facts.c")
+    for name in ("scripts/northbound.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        text = (ROOT / name).read_text()
+        if name == fault[0]:
+            assert fault[1] in text, f"{name} no longer has {fault[1]}"
+            text = text.replace(fault[1], fault[2], 1)
+        (folder / name).write_text(text)
+    return run(sys.executable, folder / "scripts/northbound.py", "--check")
+
+
 def eva(folder, code):
     (folder / "planted.c").write_text("#include <__fc_builtin.h>\n" + code)
     return run(ROOT / "test/eva/run", "--work", folder / "work", "--program", folder / "planted.c")
@@ -223,6 +236,15 @@ CASES = [
     (deviations, "python3", "a compiler told to be silent", ("core/a.c", "int iw_f", '#pragma GCC diagnostic ignored "-Wall"\nint iw_f'), True),
     (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
     (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
+    (northbound, "python3", "clean", ("", "", ""), False),
+    (northbound, "python3", "a word that only the gateway has", ("app/gateway/words/names.c", '"active"', '"awake"'), True),
+    (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),
+    (northbound, "python3", "a field that the client does not know", ("python/src/iwheel/_protocol.py", "    heard: bool\n", ""), True),
+    (northbound, "python3", "a field that is not documented", ("docs/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),
+    (northbound, "python3", "a field that is only documented", ("docs/northbound.md", "`heard`, `at_rest`", "`heard`, `seen`, `at_rest`"), True),
+    (northbound, "python3", "an example of another type", ("docs/northbound.md", '"rate_hz":20}', '"rate_hz":"20"}'), True),
+    (northbound, "python3", "an error that means something else", ("docs/northbound.md", "a wheel turns |", "a wheel stands |"), True),
+    (northbound, "python3", "an integer without a unit", ("share/northbound.json", '"reboots": {"type": "integer", "unit": "count"', '"reboots": {"type": "integer"'), True),
     (style, "lizard", "clean", CLEAN, False),
     (style, "lizard", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), True),
     (style, "lizard", "complexity 12", function("    if (a == 1) {\n        a++;\n    }\n" * 11 + "    return a;\n"), True),
