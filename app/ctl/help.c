@@ -85,12 +85,14 @@ static const verb_t verbs[] = {
      "--config FILE  the gateway's configuration, for the units of force; else as documented: left cN, right dN\n"
      "Lines that cannot be understood are told with their number and left out; then the exit code is 65.\n"},
     {"learn", verb_learn, "FILE", "what a recording of another controller tells about the wheels",
-     "Reads only; needs no gateway. Record while a controller that works drives both wheels, also backwards; best from "
-     "the\n"
-     "moment the wheels are switched on, unloaded. Tells setpoint types, ranges, lengths and periods, what speaks for "
-     "and\n"
-     "against the documented units and signs, and what no recording can tell.\n"
-     "Exit code 1: there is no setpoint in it.\n"},
+     "Reads only; needs no gateway. Record while a controller that works drives both\n"
+     "wheels: let it stand, go forwards and backwards for seconds each; best from the\n"
+     "moment the wheels are switched on, unloaded. Tells setpoint types, ranges,\n"
+     "lengths and periods, what speaks for (+) and against (-) the documented units\n"
+     "and signs, and what no recording can tell. What was not seen is not concluded:\n"
+     "such a line begins with ? and names what is missing. With --json: one object\n"
+     "with the figures, every sentence (item, side, verdict, value, text) and the\n"
+     "suggestions. Exit code 1: there is no setpoint in it.\n"},
     {"replay", verb_replay, "FILE [--config FILE]", "a recording through the gateway's core: what it decides",
      "Reads only; needs no gateway and no bus. The same recording gives the same bytes each time.\n"
      "Beside a recording of the black box lie the requests and answers of then (.jsonl) and the configuration "

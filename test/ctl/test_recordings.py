@@ -383,8 +383,8 @@ class Learn(unittest.TestCase):
 
     def test_units_of_force_are_weighed_against_the_document(self):
         out = self.learn(raw=(20, 200), offset=(20, 20))
-        self.assertIn("- left force at rest / offset = 1.00: dN per count (the document says cN)", out)
-        self.assertIn("- right force at rest / offset = 10.00: cN per count (the document says dN)", out)
+        self.assertIn("- left force at rest / offset = 1.00: dN per count, if nothing pressed it (the document says cN)", out)
+        self.assertIn("- right force at rest / offset = 10.00: cN per count, if nothing pressed it (the document says dN)", out)
         self.assertIn("[left]\nforce_unit = dN\n[right]\nforce_unit = cN", out)
         out = self.learn(raw=(0, 80), offset=(20, 20))
         self.assertIn("- left force at rest / offset = 0.00: the wheel subtracts the offset itself", out)
@@ -404,7 +404,7 @@ class Learn(unittest.TestCase):
     def test_two_controllers_show(self):
         text = lines(*(f"10A#{1 + i % 2:02X}012C07D0" for i in range(100)))
         _, out, _ = run("learn", "-", text=text)
-        self.assertIn("- left: the type changes with every other setpoint: two controllers", out)
+        self.assertIn("- left: the type changes 99 times in 100 setpoints: two controllers", out)
 
     def test_oddities_are_told(self):
         text = lines("10A#0101F4FFFF07", "10A#0101F40BB8", "10A#R5", "0000010A#00", "10A#01", "20000004#00", "333#00")

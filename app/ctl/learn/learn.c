@@ -5,6 +5,8 @@
 
 /// A speed told for this long has been reached.
 #define STEADY_US 1000000
+/// mm/s of one rpm with a radius of 192 mm, in um/s.
+#define UM_S_PER_RPM 20106
 /// Slower commands say too little: 1 rpm is 20 mm/s.
 #define STEADY_MM_S 100
 /// At rest, for as long as this.
@@ -12,8 +14,13 @@
 #define REST_US  500000
 /// No odometry step is larger between two status frames: beyond it is a reboot.
 #define TICKS_MAX 10000U
-/// Between speed frames; longer is a gap of the recording.
-#define RPM_GAP_MS 100
+/// Between speed frames, and between pose frames; longer is a gap of the recording.
+#define RPM_GAP_US  100000
+#define POSE_GAP_US 200000
+/// Slower than this, 1 rpm of resolution is too much.
+#define EXACT_RPM 10
+/// Time without speed frames from one status frame to the next.
+#define UNCOVERED_US 10000
 
 static const uint32_t ids[LEARN_IDS] = {IW_ID_LEFT_SETPOINT, IW_ID_RIGHT_SETPOINT, IW_ID_LEFT_SPEED,  IW_ID_RIGHT_SPEED,
                                         IW_ID_LEFT_STATUS,   IW_ID_RIGHT_STATUS,   IW_ID_RIGHT_POSE,  IW_ID_LEFT_FORCE,
@@ -45,6 +52,7 @@ void learn_init(learn_t *self) {
         setpoint->current_backward_mA = nothing;
         wheel->rpm_us = -1;
         wheel->rest_since_us = -1;
+        wheel->offset_dN = nothing;
         wheel->rest_force = nothing;
         wheel->force = nothing;
     }
@@ -110,68 +118,121 @@ static void note_id(learn_id_t *id, const candump_t *frame) {
     note_period(&id->period, frame->time_us);
 }
 
+/// Which way it is told to go, and with how much current.
+static void note_direction(learn_setpoint_t *self, const iw_codec_setpoint_t *now) {
+    if (now->speed_mm_s == 0) {
+        self->at_rest++;
+        widen(&self->current_at_rest_mA, now->current_mA);
+        return;
+    }
+    learn_range_t *current = now->speed_mm_s > 0 ? &self->current_forward_mA : &self->current_backward_mA;
+    *(now->speed_mm_s > 0 ? &self->forward : &self->backward) += 1U;
+    self->type_moving[now->type]++;
+    widen(current, now->current_mA);
+}
+
+static bool is_padded(const candump_t *frame) {
+    for (size_t i = IW_DLC_SETPOINT; i < frame->length && i < IW_CAN_DATA_MAX; i++) {
+        if (frame->data[i] != 0U) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const iw_codec_setpoint_t *now) {
     const bool first = self->count == 0U;
-    learn_range_t *current = now->speed_mm_s > 0   ? &self->current_forward_mA
-                             : now->speed_mm_s < 0 ? &self->current_backward_mA
-                                                   : &self->current_at_rest_mA;
+    const bool same = now->speed_mm_s == self->last.speed_mm_s && now->current_mA == self->last.current_mA;
+    const int64_t gap_us = frame->time_us - self->last_us;
     self->count++;
     self->sent += frame->mark == CANDUMP_SENT ? 1U : 0U;
     self->type[now->type]++;
-    self->type_moving[now->type] += now->speed_mm_s != 0 ? 1U : 0U;
     self->changes_of_type += !first && now->type != self->last.type ? 1U : 0U;
     self->over_limit += size_of(now->current_mA) > IW_CURRENT_LIMIT_mA ? 1U : 0U;
+    self->padding += is_padded(frame) ? 1U : 0U;
     widen(&self->speed_mm_s, now->speed_mm_s);
     widen(&self->current_mA, now->current_mA);
-    widen(current, now->current_mA);
-    for (size_t i = IW_DLC_SETPOINT; i < frame->length && i < IW_CAN_DATA_MAX; i++) {
-        if (frame->data[i] != 0U) {
-            self->padding++;
-            break;
-        }
-    }
-    if (first || now->speed_mm_s != self->last.speed_mm_s) {
+    note_direction(self, now);
+    if (first || !same || gap_us < 0 || gap_us > (int64_t)IW_WHEEL_WATCHDOG_US) {
         self->steady_since_us = frame->time_us;
     }
     self->last = *now;
+    self->last_us = frame->time_us;
+}
+
+/// The wheel's answer to a speed that it was told for long enough.
+static void note_answer(learn_wheel_t *self, const iw_codec_setpoint_t *told, int32_t rpm, int64_t for_us) {
+    const int32_t told_mm_s = told->speed_mm_s;
+    learn_answer_t *answer = told_mm_s > 0 ? &self->forward : &self->backward;
+    const bool turns = size_of(rpm) > REST_RPM;
+    if (told_mm_s == 0 && told->current_mA != 0) {
+        self->stood_us += turns ? 0 : for_us;
+        self->ran_us += turns ? for_us : 0;
+    }
+    if (size_of(told_mm_s) < STEADY_MM_S) {
+        return;
+    }
+    if (!turns) {
+        answer->still_us += for_us;
+        return;
+    }
+    const int64_t told_um_s = (int64_t)size_of(told_mm_s) * 1000;
+    const int64_t off_um_s = told_um_s - (int64_t)size_of(rpm) * UM_S_PER_RPM;
+    const int64_t slack_um_s = told_um_s / 10 > UM_S_PER_RPM ? told_um_s / 10 : UM_S_PER_RPM;
+    answer->with_us += (told_mm_s > 0) == (rpm > 0) ? for_us : 0;
+    answer->against_us += (told_mm_s > 0) == (rpm > 0) ? 0 : for_us;
+    self->steady_us += for_us;
+    self->steady_fit_us += off_um_s <= slack_um_s && off_um_s >= -slack_um_s ? for_us : 0;
+    self->steady_mm_s += size_of(told_mm_s);
+    self->steady_rpm += size_of(rpm);
 }
 
 static void note_speed(learn_wheel_t *self, const learn_setpoint_t *setpoint, int64_t at_us, int32_t rpm) {
-    const int32_t told_mm_s = setpoint->last.speed_mm_s;
-    const bool fresh = setpoint->count > 0U && at_us - setpoint->steady_since_us >= STEADY_US;
-    const int64_t gap_ms = self->rpm_us >= 0 ? (at_us - self->rpm_us) / 1000 : 0;
-    if (fresh && size_of(told_mm_s) >= STEADY_MM_S && rpm != 0) {
-        self->steady++;
-        self->steady_mm_s += size_of(told_mm_s);
-        self->steady_rpm += size_of(rpm);
-        self->with_sign += (told_mm_s > 0) == (rpm > 0) ? 1U : 0U;
-        self->against_sign += (told_mm_s > 0) == (rpm > 0) ? 0U : 1U;
+    const int64_t gap_us = self->rpm_us >= 0 ? at_us - self->rpm_us : 0;
+    const bool gap = gap_us <= 0 || gap_us >= RPM_GAP_US;
+    const bool told = setpoint->count > 0U && at_us - setpoint->last_us <= (int64_t)IW_WHEEL_WATCHDOG_US;
+    self->speeds++;
+    if (told && at_us - setpoint->steady_since_us >= STEADY_US) {
+        note_answer(self, &setpoint->last, rpm, gap ? 0 : gap_us);
     }
-    self->pending_rpm_ms += gap_ms > 0 && gap_ms < RPM_GAP_MS ? size_of(self->rpm) * gap_ms : 0;
+    if (!gap) {
+        self->pending_rpm_us += size_of(self->rpm) * gap_us;
+        self->pending_us += gap_us;
+    }
+    self->pending_slow = self->pending_slow || size_of(rpm) < EXACT_RPM || (rpm < 0) != (self->rpm < 0);
     self->rpm = rpm;
-    self->rpm_us = at_us;
     if (size_of(rpm) > REST_RPM) {
         self->rest_since_us = -1;
-    } else if (self->rest_since_us < 0) {
+    } else if (self->rest_since_us < 0 || gap) {
         self->rest_since_us = at_us;
     }
+    self->rpm_us = at_us;
 }
 
-static void note_ticks(learn_wheel_t *self, int32_t ticks) {
+/// Ticks and rpm are compared only from one status frame to the next, where speed frames came all the time.
+static void note_ticks(learn_wheel_t *self, int64_t at_us, int32_t ticks) {
     const uint32_t forward = (uint32_t)ticks - (uint32_t)self->last_ticks;
     const uint32_t step = forward > INT32_MAX ? 0U - forward : forward;
-    if (self->has_ticks && step < TICKS_MAX) {
+    const int64_t between_us = at_us - self->last_ticks_us;
+    const bool covered = !self->pending_slow && between_us > 0 && self->pending_us + UNCOVERED_US >= between_us;
+    if (self->statuses > 0U && covered && step < TICKS_MAX) {
         self->ticks += step;
-        self->rpm_ms += self->pending_rpm_ms;
+        self->turned_rpm_us += self->pending_rpm_us;
     }
-    self->pending_rpm_ms = 0;
+    self->statuses++;
+    self->pending_rpm_us = 0;
+    self->pending_us = 0;
+    self->pending_slow = size_of(self->rpm) < EXACT_RPM;
     self->last_ticks = ticks;
-    self->has_ticks = true;
+    self->last_ticks_us = at_us;
 }
 
+/// At rest is a wheel whose speed frames say so, now and for a while.
 static void note_force(learn_wheel_t *self, int64_t at_us, int16_t raw) {
+    const bool told = self->rpm_us >= 0 && at_us - self->rpm_us < RPM_GAP_US;
     widen(&self->force, raw);
-    if (self->rest_since_us >= 0 && at_us - self->rest_since_us >= REST_US) {
+    self->forces++;
+    if (told && self->rest_since_us >= 0 && at_us - self->rest_since_us >= REST_US) {
         self->rest_force_count++;
         self->rest_force_sum += raw;
         widen(&self->rest_force, raw);
@@ -189,12 +250,16 @@ static uint64_t way(const uint8_t *now, const uint8_t *before, size_t high, size
     return sum;
 }
 
-static void note_pose(learn_pose_t *self, const uint8_t *data) {
-    if (self->count > 0U) {
-        self->way_big += way(data, self->last, 0, 1);
+static void note_pose(learn_pose_t *self, int64_t at_us, const uint8_t *data) {
+    const int64_t gap_us = at_us - self->last_us;
+    if (self->count > 0U && gap_us >= 0 && gap_us <= POSE_GAP_US) {
+        const uint64_t big = way(data, self->last, 0, 1);
+        self->moves += big > 0U ? 1U : 0U;
+        self->way_big += big;
         self->way_little += way(data, self->last, 1, 0);
     }
     self->count++;
+    self->last_us = at_us;
     (void)memcpy(self->last, data, sizeof self->last);
 }
 
@@ -210,10 +275,10 @@ static void note_message(learn_t *self, const candump_t *frame, iw_codec_kind_t 
         note_speed(wheel, setpoint, frame->time_us, told->speed.speed_rpm);
         break;
     case IW_CODEC_STATUS:
-        note_ticks(wheel, told->status.odometry_ticks);
+        note_ticks(wheel, frame->time_us, told->status.odometry_ticks);
         break;
     case IW_CODEC_POSE:
-        note_pose(&self->pose, frame->data);
+        note_pose(&self->pose, frame->time_us, frame->data);
         break;
     case IW_CODEC_FORCE:
         note_force(wheel, frame->time_us, told->force.force_raw);
@@ -221,7 +286,7 @@ static void note_message(learn_t *self, const candump_t *frame, iw_codec_kind_t 
     case IW_CODEC_OFFSET:
     default:
         wheel->offsets++;
-        wheel->offset_dN = told->offset.offset_dN;
+        widen(&wheel->offset_dN, told->offset.offset_dN);
         break;
     }
 }

@@ -1,20 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include "learn_report.h"
+#include "learn_findings.h"
 
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #define CELL 26
 
-static const char *const sides[] = {"left", "right"};
-
-static bool is_empty(const learn_range_t *range) {
-    return range->low > range->high;
-}
-
 static void range_text(const learn_range_t *range, const char *unit, char *out) {
-    if (is_empty(range)) {
+    if (learn_is_empty(range)) {
         (void)snprintf(out, LEARN_TEXT, "--");
     } else if (range->low == range->high) {
         (void)snprintf(out, LEARN_TEXT, "always %" PRId32 "%s", range->low, unit);
@@ -121,66 +115,36 @@ static void print_telemetry(const learn_t *self) {
     }
 }
 
-void learn_say(char mark, const char *format, ...) {
-    va_list list;
-    (void)printf("  %c ", mark);
-    va_start(list, format);
-    (void)vprintf(format, list);
-    va_end(list);
-    (void)putchar('\n');
-}
-
-static void say_oddities(const learn_t *self) {
-    if (self->strange > 0U) {
-        learn_say('-',
-                  "%" PRIu64 " remote, extended or FD frames with one of the eleven numbers: the gateway ignores such",
-                  self->strange);
-    }
-    if (self->too_short > 0U) {
-        learn_say('-', "%" PRIu64 " frames are shorter than the document says: the gateway ignores such",
-                  self->too_short);
-    }
-    if (self->errors > 0U) {
-        learn_say('-', "%" PRIu64 " reports of errors on the bus: cable, termination, bit rate?", self->errors);
-    }
-    if (self->backwards > 0U) {
-        learn_say('-', "time goes back %" PRIu64 " times: several recordings in one file? periods are doubtful",
-                  self->backwards);
-    }
-    for (unsigned side = 0; side < IW_SIDES; side++) {
-        const learn_setpoint_t *setpoint = &self->setpoint[side];
-        if (setpoint->over_limit > 0U) {
-            learn_say('-', "%s: %" PRIu64 " setpoints with a current beyond the documented +/-2000 mA", sides[side],
-                      setpoint->over_limit);
-        }
-        if (setpoint->padding > 0U) {
-            learn_say('-', "%s: %" PRIu64 " setpoints have something behind the five documented bytes", sides[side],
-                      setpoint->padding);
-        }
-        if (self->known[side].period.longest_us > (int64_t)IW_WHEEL_WATCHDOG_US) {
-            learn_say('-', "%s: up to %" PRId64 " ms without a setpoint: the wheel stopped by itself after 1000 ms",
-                      sides[side], self->known[side].period.longest_us / 1000);
+static void suggest(const learn_findings_t *findings) {
+    const char *last = "";
+    for (unsigned i = 0; i < findings->count; i++) {
+        const char *section;
+        const char *key;
+        if (learn_suggests(findings, &findings->at[i], &section, &key)) {
+            if (last[0] == '\0') {
+                (void)puts(
+                    "\nFor the configuration, as far as it goes (evidence, no proof; then: iwheelctl bringup)\n");
+            }
+            if (strcmp(section, last) != 0) {
+                (void)printf("[%s]\n", section);
+            }
+            (void)printf("%s = %s\n", key, findings->at[i].value);
+            last = section;
         }
     }
 }
 
-bool learn_report(const learn_t *self, const char *name) {
+void learn_report(const learn_t *self, const char *name) {
+    static learn_findings_t findings;
     const int64_t ms = (self->last_us - self->first_us) / 1000;
-    const uint64_t setpoints = self->setpoint[IW_LEFT].count + self->setpoint[IW_RIGHT].count;
     (void)printf("%s: %" PRIu64 " frames in %" PRId64 ".%" PRId64 " s\n", name, self->frames, ms / 1000,
                  (ms < 0 ? -ms : ms) % 1000 / 100);
     print_setpoints(self);
     print_telemetry(self);
     (void)puts("\nWhat it tells (+ speaks for, - speaks against, ? says nothing about)");
-    say_oddities(self);
-    learn_say_type(self);
-    learn_say_role(self);
-    learn_say_signs(self);
-    learn_say_scale(self);
-    learn_say_force(self);
-    learn_say_pose(self);
-    learn_say('?', "whether a wheel is mounted mirrored, its radius, what byte 0 means: no recording tells; "
-                   "iwheelctl bringup");
-    learn_suggest(self);
-    return setpoints > 0U;
+    learn_weigh(self, &findings);
+    for (unsigned i = 0; i < findings.count; i++) {
+        (void)printf("  %c %s\n", findings.at[i].mark, findings.at[i].text);
+    }
+    suggest(&findings);
 }

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: MIT
+// What the wheels of the recording showed: signs, scale, ticks, units of force, byte order.
+#include "learn_findings.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+/// Less than this many turns says nothing of ticks.
+#define TURNS_MIN  2
+#define US_PER_MIN 60000000
+/// As in the gateway: an offset of at least this, and samples of a second at rest.
+#define OFFSET_MIN_dN 20
+#define REST_MIN      20U
+/// A force that sways further than this while the wheel rests is somebody's hand: counts, or the tenth part of it.
+#define QUIET_COUNTS 6
+/// Times that the pose must have moved, and how far.
+#define POSE_MOVES_MIN 25U
+#define POSE_WAY_MIN   1000U
+
+static bool nearly_all(int64_t part, int64_t all) {
+    return part * 10 >= all * 9;
+}
+
+static int64_t turned_us(const learn_answer_t *answer) {
+    return answer->with_us + answer->against_us;
+}
+
+bool learn_turned(const learn_wheel_t *wheel) {
+    const int64_t turned = turned_us(&wheel->forward) + turned_us(&wheel->backward);
+    return turned >= LEARN_SHOWN_MIN_US &&
+           nearly_all(turned, turned + wheel->forward.still_us + wheel->backward.still_us);
+}
+
+bool learn_stayed(const learn_wheel_t *wheel) {
+    const int64_t still = wheel->forward.still_us + wheel->backward.still_us;
+    return still >= LEARN_SHOWN_MIN_US &&
+           nearly_all(still, still + turned_us(&wheel->forward) + turned_us(&wheel->backward));
+}
+
+/// 1: with the sign that was told; -1: against it; 0: now so, now so. Only if the direction was seen.
+static int sign_of(const learn_answer_t *answer) {
+    const int64_t all = turned_us(answer);
+    return answer->against_us * 20 < all ? 1 : answer->with_us * 20 < all ? -1 : 0;
+}
+
+/// Why no sign can be told of that wheel.
+static const char *no_sign(const learn_t *self, unsigned side) {
+    const learn_wheel_t *wheel = &self->wheel[side];
+    if (self->setpoint[side].count == 0U) {
+        return "it was told nothing";
+    }
+    if (wheel->speeds == 0U) {
+        return "none of its speed frames is in it";
+    }
+    return learn_stayed(wheel) ? "it was told steady speeds and did not turn"
+                               : "it was not seen to turn for half a second by a steady speed of 100 mm/s or more";
+}
+
+/// "a positive setpoint is measured as a positive speed": a direction that was told, and the sign found for it.
+static void say_direction(bool forward, int sign, char *out_text, size_t size) {
+    const char *measured = sign > 0 ? (forward ? "positive" : "negative") : (forward ? "NEGATIVE" : "POSITIVE");
+    (void)snprintf(out_text, size, "a %s setpoint is measured as a %s speed", forward ? "positive" : "negative",
+                   measured);
+}
+
+static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out) {
+    const learn_wheel_t *wheel = &self->wheel[side];
+    const bool forward = turned_us(&wheel->forward) >= LEARN_SHOWN_MIN_US;
+    const bool backward = turned_us(&wheel->backward) >= LEARN_SHOWN_MIN_US;
+    const int first = forward ? sign_of(&wheel->forward) : sign_of(&wheel->backward);
+    const int second = backward ? sign_of(&wheel->backward) : first;
+    char ahead[80];
+    char back[80];
+    if (!forward && !backward) {
+        (void)learn_say(out, '?', "feedback_sign", side, "%s sign of the speed: %s", learn_side(side),
+                        no_sign(self, side));
+        return;
+    }
+    if (first == 0 || first != second) {
+        (void)learn_say(out, '-', "feedback_sign", side,
+                        "%s: the measured speed has now the sign of the setpoint, now the other", learn_side(side));
+        return;
+    }
+    say_direction(forward, first, ahead, sizeof ahead);
+    say_direction(false, first, back, sizeof back);
+    learn_finding_t *told =
+        learn_say(out, first > 0 ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s", learn_side(side), ahead,
+                  forward && backward ? ", " : "", forward && backward ? back : " (the other direction: not seen)",
+                  first > 0 ? "" : "; the gateway would latch feedback_sign");
+    (void)snprintf(told->value, sizeof told->value, "%s", first > 0 ? "yes" : "no");
+}
+
+/// Speed told against rpm shown.
+static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
+    if (!learn_turned(wheel) || wheel->steady_rpm == 0) {
+        (void)learn_say(out, '?', "speed_scale", side,
+                        "%s mm/s per rpm: not seen to turn for half a second by a steady speed of 100 mm/s or more",
+                        learn_side(side));
+        return;
+    }
+    const int64_t um_s = wheel->steady_mm_s * 1000 / wheel->steady_rpm;
+    const int64_t off_us = wheel->steady_us - wheel->steady_fit_us;
+    if (nearly_all(wheel->steady_fit_us, wheel->steady_us)) {
+        (void)learn_say(out, '+', "speed_scale", side,
+                        "%s: %" PRId64 ".%03" PRId64
+                        " mm/s of setpoint per measured rpm; 20.106 is expected of 192 mm and rpm of the wheel",
+                        learn_side(side), um_s / 1000, um_s % 1000);
+    } else if (nearly_all(off_us, wheel->steady_us)) {
+        (void)learn_say(out, '-', "speed_scale", side,
+                        "%s: %" PRId64 ".%03" PRId64
+                        " mm/s of setpoint per measured rpm, where 20.106 is expected of 192 mm and rpm of the wheel: "
+                        "another gear (rpm_of, gear_ratio), another radius, or it did not follow",
+                        learn_side(side), um_s / 1000, um_s % 1000);
+    } else {
+        (void)learn_say(out, '?', "speed_scale", side,
+                        "%s mm/s per rpm: the wheel was now at the speed that it was told, now not", learn_side(side));
+    }
+}
+
+static void weigh_ticks(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
+    if (wheel->turned_rpm_us < (int64_t)TURNS_MIN * US_PER_MIN) {
+        (void)learn_say(out, '?', "ticks_per_turn", side, "%s ticks per turn: %s", learn_side(side),
+                        wheel->statuses == 0U ? "none of its status frames is in it"
+                        : wheel->speeds == 0U ? "none of its speed frames is in it"
+                                              : "fewer than two turns at 10 rpm or more, without a gap, are in it");
+        return;
+    }
+    const uint64_t tenths = wheel->ticks * 10U * US_PER_MIN / (uint64_t)wheel->turned_rpm_us;
+    const bool same = tenths >= 540U && tenths <= 660U;
+    (void)learn_say(out, same ? '+' : '-', "ticks_per_turn", side,
+                    "%s: %" PRIu64 ".%" PRIu64 " ticks per turn of what the rpm count; %s", learn_side(side),
+                    tenths / 10U, tenths % 10U,
+                    same            ? "the rotor makes 60, so the rpm are the rotor's, or there is no gear"
+                    : tenths > 660U ? "the rotor makes 60, so there is a gear between: gear_ratio"
+                                    : "the rotor makes 60, and no gear makes fewer: were frames lost?");
+}
+
+/// What is missing for a ratio of force and offset; NULL: nothing.
+static const char *no_force(const learn_wheel_t *wheel) {
+    const learn_range_t *rest = &wheel->rest_force;
+    const learn_range_t *offset = &wheel->offset_dN;
+    if (wheel->forces == 0U) {
+        return "needs its force frames";
+    }
+    if (wheel->offsets == 0U) {
+        return "needs its offset frames; wheels send them in their first 60 s";
+    }
+    if (offset->low != offset->high) {
+        return "its offset frames differ";
+    }
+    if (offset->low < OFFSET_MIN_dN && offset->low > -OFFSET_MIN_dN) {
+        return "needs an offset of at least 2 N";
+    }
+    if (wheel->rest_force_count < REST_MIN) {
+        return "needs a second at rest, told by its speed frames";
+    }
+    const int32_t mean = (int32_t)(wheel->rest_force_sum / (int64_t)wheel->rest_force_count);
+    const int32_t slack = (mean < 0 ? -mean : mean) / 10 + QUIET_COUNTS;
+    return rest->high - rest->low > slack ? "the force sways while the wheel rests: somebody touched it" : NULL;
+}
+
+/// What the ratio (1000 x raw / offset) speaks for: "cN", "dN", "removed", or NULL.
+static const char *unit_of(int64_t permille) {
+    return permille >= 8000 && permille <= 12000 ? "cN"
+           : permille >= 800 && permille <= 1200 ? "dN"
+           : permille > -200 && permille < 200   ? "removed"
+                                                 : NULL;
+}
+
+static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
+    const char *documented = side == IW_LEFT ? "cN" : "dN";
+    const char *missing = no_force(wheel);
+    if (missing != NULL) {
+        (void)learn_say(out, '?', "force_unit", side, "%s force unit: %s", learn_side(side), missing);
+        return;
+    }
+    const int64_t permille =
+        wheel->rest_force_sum * 1000 / (int64_t)wheel->rest_force_count / (int64_t)wheel->offset_dN.low;
+    const int64_t size = permille < 0 ? -permille : permille;
+    const char *unit = unit_of(permille);
+    const bool is_unit = unit != NULL && unit[1] == 'N';
+    const bool dead = wheel->force.low == wheel->force.high;
+    learn_finding_t *told =
+        learn_say(out, is_unit && unit[0] == documented[0] ? '+' : '-', "force_unit", side,
+                  "%s force at rest / offset = %s%" PRId64 ".%02" PRId64 ": %s%s (the document says %s)",
+                  learn_side(side), permille < 0 ? "-" : "", size / 1000, size % 1000 / 10,
+                  unit == NULL ? "neither cN (10) nor dN (1) nor offset removed (0): pressed at the start?"
+                  : is_unit    ? unit
+                  : dead       ? "the wheel subtracts the offset itself, or its force never changes"
+                               : "the wheel subtracts the offset itself",
+                  is_unit ? " per count, if nothing pressed it" : "", documented);
+    (void)snprintf(told->value, sizeof told->value, "%s", is_unit ? unit : "");
+}
+
+static void weigh_pose(const learn_pose_t *pose, learn_findings_t *out) {
+    const bool enough = pose->moves >= POSE_MOVES_MIN && pose->way_big + pose->way_little >= POSE_WAY_MIN;
+    if (!enough) {
+        (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: %s",
+                        pose->count == 0U ? "no pose frame (290 = 0x122) is in it" : "it hardly changes");
+    } else if (pose->way_big * 4U < pose->way_little) {
+        learn_finding_t *told = learn_say(out, '+', "pose_byte_order", LEARN_BOTH,
+                                          "the pose is smooth with the most significant byte first");
+        (void)snprintf(told->value, sizeof told->value, "yes");
+    } else if (pose->way_little * 4U < pose->way_big) {
+        learn_finding_t *told =
+            learn_say(out, '-', "pose_byte_order", LEARN_BOTH,
+                      "the pose is smooth with the LEAST significant byte first: the gateway reads it the other way");
+        (void)snprintf(told->value, sizeof told->value, "no");
+    } else {
+        (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: smooth neither way");
+    }
+}
+
+void learn_weigh_wheels(const learn_t *self, learn_findings_t *out_findings) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        weigh_sign(self, side, out_findings);
+    }
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        weigh_scale(&self->wheel[side], side, out_findings);
+        weigh_ticks(&self->wheel[side], side, out_findings);
+    }
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        weigh_force(&self->wheel[side], side, out_findings);
+    }
+    weigh_pose(&self->pose, out_findings);
+}
