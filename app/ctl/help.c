@@ -36,11 +36,11 @@ static const verb_t verbs[] = {
      "Moves nothing. Refused while a wheel turns or its force is not quiet.\n"},
     {"ledger", verb_ledger, "", "what is assumed about the wheels, and what is known",
      "Reads only. Per item: the value in force, the evidence, and what a contradiction disables.\n"},
-    {"confirm", verb_confirm, "ITEM [VALUE]", "the operator's word on an item of the ledger",
-     "Moves nothing. VALUE is what was found at the machine, as the configuration file writes it; another one than "
-     "the\n"
-     "configured contradicts the item, and what depends on it is disabled. Without VALUE: what is configured is "
-     "right.\n"},
+    {"confirm", verb_confirm, "ITEM [VALUE] [--how TEXT]", "the operator's word on an item of the ledger",
+     "Moves nothing. VALUE is what was found at the machine, as the configuration\n"
+     "file writes it; another one than the configured contradicts the item, and what\n"
+     "depends on it is disabled. Without VALUE: what is configured is right.\n"
+     "--how TEXT       by what it was found, such as 'a tape'; kept as its evidence\n"},
     {"doctor", verb_doctor, "[IFACE] [--estop LINE] [--config FILE] [--listen 2s] [--no-press]",
      "what is wrong with bus, wheels and e-stop, and what mends it",
      "Sends nothing, moves nothing; works with and without a running gateway.\n"

@@ -355,6 +355,17 @@ class Asking(WithGateway):
                           {"cmd": "confirm", "item": "wheel_radius", "value": "181", "id": 1}],
                          [request for _, request in self.gateway.requests])
 
+    def test_confirm_sends_how_it_was_found(self):
+        for words in (("track", "545", "--how", "a tape"), ("--how", "a tape", "track", "545")):
+            self.gateway.requests.clear()
+            self.assertEqual(0, self.ctl("confirm", *words)[0])
+            self.assertEqual([{"cmd": "confirm", "item": "track", "value": "545", "how": "a tape", "id": 1}],
+                             [request for _, request in self.gateway.requests])
+        self.gateway.requests.clear()
+        for words in (("track", "545", "--how"), ("--how", "a tape"), ("track", "545", "600"), ("--how",)):
+            self.assertEqual(64, self.ctl("confirm", *words)[0], words)
+        self.assertFalse(self.gateway.requests)
+
     def test_ledger_prints_every_item_once_under_its_state(self):
         code, out, _, _ = self.ctl("ledger")
         self.assertEqual(0, code)

@@ -5,20 +5,21 @@
 
 #include "unity.h"
 
+#include <stdio.h>
 #include <string.h>
 
-static iw_config_t config;
+static gateway_config_t config;
 static char text[GW_EVIDENCE_SIZE];
 
 void setUp(void) {
-    iw_config_default(&config);
-    config.setpoint_type_set = true;
-    config.setpoint_type = 7;
-    config.current_role = IW_ROLE_SETPOINT;
-    config.invert[IW_RIGHT] = true;
-    config.gear_turns = 10;
-    config.gear_per = 3;
-    config.rpm_of_rotor = true;
+    gateway_config_default(&config);
+    config.core.setpoint_type_set = true;
+    config.core.setpoint_type = 7;
+    config.core.current_role = IW_ROLE_SETPOINT;
+    config.core.invert[IW_RIGHT] = true;
+    config.core.gear_turns = 10;
+    config.core.gear_per = 3;
+    config.core.rpm_of_rotor = true;
 }
 
 void tearDown(void) {}
@@ -42,18 +43,19 @@ static void test_assumption_values_are_those_of_the_configuration(void) {
     assert_value(IW_LEDGER_MOUNT_SIGN_LEFT, "no");
     assert_value(IW_LEDGER_MOUNT_SIGN_RIGHT, "yes");
     assert_value(IW_LEDGER_WHEEL_RADIUS, "192");
+    assert_value(IW_LEDGER_TRACK, "540");
     assert_value(IW_LEDGER_GEAR_RATIO, "10/3, rpm of the rotor");
     assert_value(IW_LEDGER_OFFSET_INCLUDED, "yes");
     assert_value(IW_LEDGER_DLC, "yes");
-    iw_config_default(&config);
+    gateway_config_default(&config);
     assert_value(IW_LEDGER_SETPOINT_TYPE, "");
     assert_value(IW_LEDGER_CURRENT_ROLE, "");
     assert_value(IW_LEDGER_GEAR_RATIO, "1, rpm of the wheel");
 }
 
 static void test_assumption_longest_values_fit(void) {
-    config.gear_turns = 1000;
-    config.gear_per = 999;
+    config.core.gear_turns = 1000;
+    config.core.gear_per = 999;
     assert_value(IW_LEDGER_GEAR_RATIO, "1000/999, rpm of the rotor");
 }
 
@@ -77,7 +79,7 @@ static void test_assumption_without_a_value_the_configured_one_is_meant(void) {
 }
 
 static void test_assumption_what_is_not_configured_cannot_be_confirmed(void) {
-    iw_config_default(&config);
+    gateway_config_default(&config);
     assert_found(GW_FOUND_UNSET, IW_LEDGER_SETPOINT_TYPE, "");
     assert_found(GW_FOUND_UNSET, IW_LEDGER_SETPOINT_TYPE, "7");
     assert_found(GW_FOUND_UNSET, IW_LEDGER_CURRENT_ROLE, "limit");
@@ -105,6 +107,19 @@ static void test_assumption_a_radius_within_two_percent_is_the_same(void) {
     assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_WHEEL_RADIUS, "19");
 }
 
+static void test_assumption_a_track_within_two_percent_is_the_same(void) {
+    config.track_mm = 600;
+    assert_value(IW_LEDGER_TRACK, "600");
+    assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "600");
+    assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "588");
+    assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "612");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "587");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "613");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_TRACK, "5000");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_TRACK, "5001");
+    assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_TRACK, "49");
+}
+
 static void test_assumption_gear_ratios_are_compared_as_ratios(void) {
     assert_found(GW_FOUND_SAME, IW_LEDGER_GEAR_RATIO, "10/3");
     assert_found(GW_FOUND_SAME, IW_LEDGER_GEAR_RATIO, "20/6");
@@ -128,29 +143,40 @@ static void test_assumption_words_are_compared_as_words(void) {
 }
 
 static void test_assumption_evidence_tells_the_figure(void) {
+    const gw_word_t word = {"", ""};
     iw_ledger_entry_t entry = {IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS, -1010};
-    gw_assumption_evidence(IW_LEDGER_FORCE_UNIT_LEFT, &entry, "", text);
+    gw_assumption_evidence(IW_LEDGER_FORCE_UNIT_LEFT, &entry, &word, text);
     TEST_ASSERT_NOT_NULL(strstr(text, "-1.010"));
     entry.figure = INT32_MIN;
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         for (unsigned evidence = IW_EVIDENCE_NONE; evidence <= IW_EVIDENCE_OPERATOR; evidence++) {
             entry.evidence = (iw_evidence_t)evidence;
-            gw_assumption_evidence((iw_ledger_item_t)item, &entry, "", text);
+            gw_assumption_evidence((iw_ledger_item_t)item, &entry, &word, text);
             TEST_ASSERT_GREATER_THAN_UINT(8, strlen(text));
             TEST_ASSERT_LESS_THAN_UINT(GW_EVIDENCE_SIZE - 1U, strlen(text));
         }
     }
 }
 
+static void assert_word(iw_ledger_state_t state, const char *found, const char *how, const char *expected) {
+    const iw_ledger_entry_t entry = {state, IW_EVIDENCE_OPERATOR, 0};
+    gw_word_t word;
+    (void)snprintf(word.found, sizeof word.found, "%s", found);
+    (void)snprintf(word.how, sizeof word.how, "%s", how);
+    gw_assumption_evidence(IW_LEDGER_WHEEL_RADIUS, &entry, &word, text);
+    TEST_ASSERT_EQUAL_STRING(expected, text);
+}
+
 static void test_assumption_evidence_tells_what_the_operator_found(void) {
-    iw_ledger_entry_t entry = {IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, 0};
-    gw_assumption_evidence(IW_LEDGER_WHEEL_RADIUS, &entry, "181", text);
-    TEST_ASSERT_EQUAL_STRING("the operator found 181", text);
-    gw_assumption_evidence(IW_LEDGER_WHEEL_RADIUS, &entry, "", text);
-    TEST_ASSERT_EQUAL_STRING("the operator found something else", text);
-    entry.state = IW_LEDGER_CONFIRMED;
-    gw_assumption_evidence(IW_LEDGER_WHEEL_RADIUS, &entry, "192", text);
-    TEST_ASSERT_EQUAL_STRING("the operator says so", text);
+    assert_word(IW_LEDGER_CONTRADICTED, "181", "", "the operator found 181");
+    assert_word(IW_LEDGER_CONTRADICTED, "", "", "the operator found something else");
+    assert_word(IW_LEDGER_CONFIRMED, "192", "", "the operator says so");
+}
+
+static void test_assumption_evidence_tells_how_the_operator_found_it(void) {
+    assert_word(IW_LEDGER_CONFIRMED, "192", "bringup: 5.00 m pushed", "found by bringup: 5.00 m pushed");
+    assert_word(IW_LEDGER_CONTRADICTED, "181", "a tape", "the operator found 181 by a tape");
+    assert_word(IW_LEDGER_CONTRADICTED, "", "a tape", "the operator found something else by a tape");
 }
 
 static void test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm(void) {
@@ -173,10 +199,12 @@ int main(void) {
     RUN_TEST(test_assumption_what_is_not_configured_cannot_be_confirmed);
     RUN_TEST(test_assumption_numbers_are_compared_as_numbers);
     RUN_TEST(test_assumption_a_radius_within_two_percent_is_the_same);
+    RUN_TEST(test_assumption_a_track_within_two_percent_is_the_same);
     RUN_TEST(test_assumption_gear_ratios_are_compared_as_ratios);
     RUN_TEST(test_assumption_words_are_compared_as_words);
     RUN_TEST(test_assumption_evidence_tells_the_figure);
     RUN_TEST(test_assumption_evidence_tells_what_the_operator_found);
+    RUN_TEST(test_assumption_evidence_tells_how_the_operator_found_it);
     RUN_TEST(test_assumption_every_contradiction_names_its_cost_and_those_of_motion_refuse_arm);
     return UNITY_END();
 }

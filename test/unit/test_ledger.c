@@ -39,8 +39,8 @@ static void test_init_assumes_everything_and_tells_what_the_document_says(void) 
     TEST_ASSERT_EQUAL_UINT32(0, ledger.changes);
 }
 
-static void test_there_are_thirteen_items(void) {
-    TEST_ASSERT_EQUAL_INT(13, IW_LEDGER_ITEMS);
+static void test_there_are_fourteen_items(void) {
+    TEST_ASSERT_EQUAL_INT(14, IW_LEDGER_ITEMS);
 }
 
 static void test_assume_tells_where_an_assumption_comes_from(void) {
@@ -181,7 +181,7 @@ static void test_every_sequence_of_six_operations_keeps_to_the_diagram(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_init_assumes_everything_and_tells_what_the_document_says);
-    RUN_TEST(test_there_are_thirteen_items);
+    RUN_TEST(test_there_are_fourteen_items);
     RUN_TEST(test_assume_tells_where_an_assumption_comes_from);
     RUN_TEST(test_confirm_from_bus_lifts_no_contradiction);
     RUN_TEST(test_confirm_by_operator_lifts_a_contradiction);

@@ -34,7 +34,8 @@ static void fill(void) {
         entry->entry.figure = item % 4U == 0U ? INT32_MIN : INT32_MAX;
         entry->since_wall_us = INT64_MIN + (int64_t)item;
         memset(entry->value, '"', GW_VALUE_SIZE - 1U);
-        memset(entry->found, '\\', GW_VALUE_SIZE - 1U);
+        memset(entry->word.found, '\\', GW_VALUE_SIZE - 1U);
+        memset(entry->word.how, '"', item % 4U == 0U ? GW_HOW_SIZE - 1U : 0U);
     }
     known.offset[IW_LEFT] = (gw_known_offset_t){.from = IW_OFFSET_OPERATOR,
                                                 .unit = IW_FORCE_DN,
@@ -68,7 +69,8 @@ static void assert_same(void) {
         TEST_ASSERT_EQUAL_INT32(known.item[item].entry.figure, got.item[item].entry.figure);
         TEST_ASSERT_EQUAL_INT64(known.item[item].since_wall_us, got.item[item].since_wall_us);
         TEST_ASSERT_EQUAL_STRING(known.item[item].value, got.item[item].value);
-        TEST_ASSERT_EQUAL_STRING(known.item[item].found, got.item[item].found);
+        TEST_ASSERT_EQUAL_STRING(known.item[item].word.found, got.item[item].word.found);
+        TEST_ASSERT_EQUAL_STRING(known.item[item].word.how, got.item[item].word.how);
     }
     for (unsigned side = 0; side < IW_SIDES; side++) {
         TEST_ASSERT_EQUAL_INT(known.offset[side].from, got.offset[side].from);
@@ -142,6 +144,7 @@ static void forge(const char *body) {
     length = (size_t)snprintf(text, sizeof text, "%s%08x\n", body, (unsigned)~sum);
 }
 
+#define LONG "123456789012345678901234567890123456789012345678901234567890"
 #define HEAD "{\"format\":\"iwheel-ledger\",\"version\":1,\"bus\":\"unix:/tmp/\\\"a\\\" b/bus\","
 
 static void test_memory_of_another_bus_version_or_program_is_refused(void) {
@@ -181,6 +184,12 @@ static void test_memory_that_holds_anything_strange_is_refused_as_a_whole(void) 
         HEAD
         "\"items\":{\"dlc\":{\"state\":\"confirmed\",\"evidence\":\"bus\",\"figure\":1,\"value\":\"\",\"found\":\"\","
         "\"since_wall_us\":1,\"more\":1}},\"offsets\":{}}\n",
+        HEAD
+        "\"items\":{\"dlc\":{\"state\":\"confirmed\",\"evidence\":\"bus\",\"figure\":1,\"value\":\"\",\"found\":\"\","
+        "\"since_wall_us\":1,\"how\":1}},\"offsets\":{}}\n",
+        HEAD
+        "\"items\":{\"dlc\":{\"state\":\"confirmed\",\"evidence\":\"bus\",\"figure\":1,\"value\":\"\",\"found\":\"\","
+        "\"since_wall_us\":1,\"how\":\"" LONG LONG "12345678\"}},\"offsets\":{}}\n",
         HEAD "\"items\":{},\"offsets\":{\"middle\":{}}}\n",
         HEAD "\"items\":{},\"offsets\":{\"left\":{\"from\":\"stored\",\"unit\":\"cN\",\"offset_mN\":1,\"drift_mN\":1,"
              "\"deviation_mN\":1,\"samples\":1,\"wall_us\":1}}}\n",
@@ -199,6 +208,30 @@ static void test_memory_that_holds_anything_strange_is_refused_as_a_whole(void) 
     forge(HEAD "\"items\":{},\"offsets\":{\"left\":{\"from\":\"wheel\",\"unit\":\"cN\",\"offset_mN\":1,\"drift_mN\":1,"
                "\"deviation_mN\":1,\"samples\":1,\"wall_us\":1}}}\n");
     TEST_ASSERT_TRUE_MESSAGE(gw_memory_read(text, length, BUS, &got, reason), reason);
+}
+
+/// As versions without the track and without a way of finding wrote it.
+static void test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open(void) {
+    forge(HEAD "\"items\":{\"wheel_radius\":{\"state\":\"confirmed\",\"evidence\":\"operator\",\"figure\":0,"
+               "\"value\":\"192\",\"found\":\"192\",\"since_wall_us\":1}},\"offsets\":{}}\n");
+    TEST_ASSERT_TRUE_MESSAGE(gw_memory_read(text, length, BUS, &got, reason), reason);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, got.item[IW_LEDGER_WHEEL_RADIUS].entry.state);
+    TEST_ASSERT_EQUAL_STRING("192", got.item[IW_LEDGER_WHEEL_RADIUS].word.found);
+    TEST_ASSERT_EQUAL_STRING("", got.item[IW_LEDGER_WHEEL_RADIUS].word.how);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, got.item[IW_LEDGER_TRACK].entry.state);
+}
+
+static void test_memory_tells_how_only_if_it_was_told(void) {
+    memset(&known, 0, sizeof known);
+    gw_known_item_t *entry = &known.item[IW_LEDGER_TRACK];
+    entry->entry = (iw_ledger_entry_t){IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
+    length = gw_memory_write(&known, BUS, text, sizeof text);
+    TEST_ASSERT_NULL(strstr(text, "\"how\""));
+    (void)snprintf(entry->word.how, sizeof entry->word.how, "bringup: 3 full turns by hand");
+    length = gw_memory_write(&known, BUS, text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"how\":\"bringup: 3 full turns by hand\""));
+    TEST_ASSERT_TRUE_MESSAGE(gw_memory_read(text, length, BUS, &got, reason), reason);
+    assert_same();
 }
 
 static void test_memory_file_name_is_one_plain_word(void) {
@@ -346,6 +379,8 @@ int main(void) {
     RUN_TEST(test_memory_every_shorter_or_longer_text_is_damage);
     RUN_TEST(test_memory_of_another_bus_version_or_program_is_refused);
     RUN_TEST(test_memory_that_holds_anything_strange_is_refused_as_a_whole);
+    RUN_TEST(test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open);
+    RUN_TEST(test_memory_tells_how_only_if_it_was_told);
     RUN_TEST(test_memory_file_name_is_one_plain_word);
     RUN_TEST(test_keeper_writes_reads_back_and_sets_aside);
     RUN_TEST(test_keeper_without_its_directory_fails_and_recovers_when_it_comes);

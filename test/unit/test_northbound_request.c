@@ -100,6 +100,15 @@ static void test_request_confirm_takes_an_item_and_a_value_as_text_or_integer(vo
     TEST_ASSERT_EQUAL_STRING("", request.value);
     accepted("{\"cmd\":\"confirm\",\"item\":\"dlc\",\"value\":-9223372036854775808}", GW_CMD_CONFIRM);
     TEST_ASSERT_EQUAL_STRING("-9223372036854775808", request.value);
+    TEST_ASSERT_EQUAL_STRING("", request.how);
+    accepted("{\"cmd\":\"confirm\",\"item\":\"track\",\"value\":540,\"how\":\"bringup: 3 full turns\"}",
+             GW_CMD_CONFIRM);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_TRACK, request.item);
+    TEST_ASSERT_EQUAL_STRING("bringup: 3 full turns", request.how);
+    refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"how\":\"\"}");
+    refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"how\":\"a\\nb\"}");
+    refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"how\":3}");
+    refused(GW_UNKNOWN_FIELD, "{\"cmd\":\"estop\",\"how\":\"a tape\"}");
     refused(GW_MISSING_FIELD, "{\"cmd\":\"confirm\"}");
     refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":\"speed\"}");
     refused(GW_BAD_VALUE, "{\"cmd\":\"confirm\",\"item\":3}");

@@ -57,18 +57,42 @@ int verb_ledger(ctl_t *self, int count, char **words) {
     return code;
 }
 
+/// ITEM [VALUE] [--how TEXT], in any order. NULL after telling what is wrong with the words.
+static json_t *compose(int count, char **words) {
+    char *plain[3] = {NULL, NULL, NULL};
+    const char *how = NULL;
+    int plains = 0;
+    for (int i = 0; i < count; i++) {
+        if (strcmp(words[i], "--how") == 0) {
+            if (i + 1 == count) {
+                (void)ctl_fail(CTL_USAGE, "--how wants a text; see: iwheelctl confirm --help");
+                return NULL;
+            }
+            how = words[++i];
+        } else if (plains < 3) {
+            plain[plains++] = words[i];
+        }
+    }
+    if (!ctl_words_at_most("confirm", plains, 2, plain)) {
+        return NULL;
+    }
+    if (plains == 0) {
+        (void)ctl_fail(CTL_USAGE, "confirm needs the name of an item; see them: iwheelctl ledger");
+        return NULL;
+    }
+    json_t *request =
+        json_pack("{s:s,s:s,s:s*,s:s*}", "cmd", "confirm", "item", plain[0], "value", plain[1], "how", how);
+    if (request == NULL) {
+        (void)ctl_fail(CTL_USAGE, "confirm: item, value and how must be readable text (UTF-8)");
+    }
+    return request;
+}
+
 int verb_confirm(ctl_t *self, int count, char **words) {
     json_t *reply = NULL;
-    if (!ctl_words_at_most("confirm", count, 2, words)) {
-        return CTL_USAGE;
-    }
-    if (count == 0) {
-        return ctl_fail(CTL_USAGE, "confirm needs the name of an item; see them: iwheelctl ledger");
-    }
-    json_t *request = count == 2 ? json_pack("{s:s,s:s,s:s}", "cmd", "confirm", "item", words[0], "value", words[1])
-                                 : json_pack("{s:s,s:s}", "cmd", "confirm", "item", words[0]);
+    json_t *request = compose(count, words);
     if (request == NULL) {
-        return ctl_fail(CTL_USAGE, "confirm: item and value must be readable text (UTF-8)");
+        return CTL_USAGE;
     }
     const int code = ctl_ask(self, request, &reply);
     if (code == CTL_OK && !self->json) {

@@ -174,14 +174,19 @@ static int32_t saturate(int64_t value) {
     return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
 }
 
-static void drive(const call_t *call, const iw_drive_t *wanted) {
+static iw_refusal_t judge_drive(const call_t *call, const iw_drive_t *wanted, iw_applied_t *out_applied) {
     iw_gateway_t *gateway = &call->daemon->gateway;
     const iw_time_us_t sent_us =
         gw_client_sent_us(call->client, call->daemon->now_us, gateway->permit.armed_us); // It may have waited for us.
-    iw_applied_t applied;
-    const iw_refusal_t refusal = iw_gateway_drive(gateway, sent_us, call->client->id, wanted, &applied);
+    const iw_refusal_t refusal = iw_gateway_drive(gateway, sent_us, call->client->id, wanted, out_applied);
     const blackbox_entry_t entry = {.at_us = call->daemon->now_us, .number = call->client->id, .b = (uint8_t)refusal};
     gw_tape_drive(&call->daemon->tape, &entry, wanted, sent_us);
+    return refusal;
+}
+
+static void drive(const call_t *call, const iw_drive_t *wanted) {
+    iw_applied_t applied;
+    const iw_refusal_t refusal = judge_drive(call, wanted, &applied);
     if (refusal != IW_REFUSE_NONE) {
         refuse(call, refusal);
         return;
@@ -206,12 +211,25 @@ static void do_drive(const call_t *call) {
     drive(call, &wanted);
 }
 
+/// A turn for which no speeds are known: to the core a command that is out of range, so that it is remembered as one
+/// that nobody may arm into.
+static void refuse_turn(const call_t *call) {
+    const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
+    iw_applied_t applied;
+    (void)judge_drive(call, &unknown, &applied);
+    refuse_contradicted(call, IW_LEDGER_TRACK);
+}
+
 static void do_twist(const call_t *call) {
     const int64_t limit = 1000000; // Far outside, and no product of it overflows.
     const int64_t v = call->request->v_mm_s;
     const int64_t yaw = call->request->yaw_mrad_s;
     const int64_t v_mm_s = v > limit ? limit : v < -limit ? -limit : v;
     const int64_t yaw_mrad_s = yaw > limit ? limit : yaw < -limit ? -limit : yaw;
+    if (yaw != 0 && iw_ledger_entry(&call->daemon->gateway.ledger, IW_LEDGER_TRACK)->state == IW_LEDGER_CONTRADICTED) {
+        refuse_turn(call);
+        return;
+    }
     const int64_t rim_mm_s = yaw_mrad_s * call->daemon->config.track_mm / 2000;
     const iw_drive_t wanted = {.speed_mm_s = {saturate(v_mm_s - rim_mm_s), saturate(v_mm_s + rim_mm_s)}};
     drive(call, &wanted);
@@ -299,7 +317,10 @@ static void do_confirm(const call_t *call) {
     const gw_request_t *request = call->request;
     const char *name = gw_ledger_item_name(request->item);
     gw_refusal_t words;
-    switch (gw_knowledge_confirm(call->daemon, request->item, request->value)) {
+    gw_word_t word;
+    (void)memcpy(word.found, request->value, sizeof word.found);
+    (void)memcpy(word.how, request->how, sizeof word.how);
+    switch (gw_knowledge_confirm(call->daemon, request->item, &word)) {
     case GW_FOUND_SAME:
     case GW_FOUND_DIFFERENT:
         gw_knowledge_observe(call->daemon); // So that the reply has it all.

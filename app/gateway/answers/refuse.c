@@ -207,7 +207,7 @@ static void say_contradicted(const wording_t *self) {
     const iw_ledger_t *ledger = &self->daemon->gateway.ledger;
     const iw_ledger_item_t item = iw_ledger_doubt(ledger);
     char evidence[GW_EVIDENCE_SIZE];
-    gw_assumption_evidence(item, iw_ledger_entry(ledger, item), self->daemon->knowledge.known.item[item].found,
+    gw_assumption_evidence(item, iw_ledger_entry(ledger, item), &self->daemon->knowledge.known.item[item].word,
                            evidence);
     SAY(self, "%s is contradicted: %s; %s", gw_ledger_item_name(item), evidence, gw_assumption_cost(item));
 }

@@ -48,6 +48,7 @@ static const field_t fields[] = {
     {"side", IN(sides), 0, BIT(GW_CMD_TARE), false, FIELD_SIDE},
     {"item", IN(item), 0, BIT(GW_CMD_CONFIRM), true, FIELD_ITEM},
     {"value", IN(value), GW_VALUE_SIZE - 1U, BIT(GW_CMD_CONFIRM), false, FIELD_VALUE},
+    {"how", IN(how), GW_HOW_SIZE - 1U, BIT(GW_CMD_CONFIRM), false, FIELD_TEXT},
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 

@@ -62,6 +62,7 @@ typedef struct {
     uint8_t sides;                   ///< IW_SIDES_..., of tare.
     iw_ledger_item_t item;           ///< Of confirm.
     char value[GW_VALUE_SIZE];       ///< Of confirm, a number in decimal digits; empty: not given.
+    char how[GW_HOW_SIZE];           ///< Of confirm; empty: not given.
     char name[GW_NAME_MAX + 1U];     ///< Empty: not given.
     char reason[GW_REASON_MAX + 1U]; ///< Empty: not given.
 } gw_request_t;

@@ -37,9 +37,9 @@ static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
         return;
     }
     known->since_wall_us = iw_clock_wall_us();
-    gw_assumption_value(&daemon->gateway.config, item, known->value);
+    gw_assumption_value(&daemon->config, item, known->value);
     if (known->entry.evidence != IW_EVIDENCE_OPERATOR) {
-        known->found[0] = '\0';
+        known->word = (gw_word_t){"", ""};
     }
     gw_knowledge_tell_item(daemon, item);
 }
@@ -96,7 +96,7 @@ static void merge_item(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_know
     iw_ledger_t *ledger = &daemon->gateway.ledger;
     const iw_ledger_entry_t *present = iw_ledger_entry(ledger, item);
     char value[GW_VALUE_SIZE];
-    gw_assumption_value(&daemon->gateway.config, item, value);
+    gw_assumption_value(&daemon->config, item, value);
     if (stored->entry.state == IW_LEDGER_ASSUMED || present->state == IW_LEDGER_CONTRADICTED) {
         return;
     }
@@ -221,17 +221,19 @@ void gw_knowledge_tend(gw_daemon_t *daemon) {
     }
 }
 
-gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, const char *found) {
+gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_word_t *word) {
     iw_gateway_t *gateway = &daemon->gateway;
-    const gw_found_t verdict = gw_assumption_compare(&gateway->config, item, found);
+    gw_known_item_t *known = &daemon->knowledge.known.item[item];
+    const gw_found_t verdict = gw_assumption_compare(&daemon->config, item, word->found);
     if (verdict != GW_FOUND_SAME && verdict != GW_FOUND_DIFFERENT) {
         return verdict;
     }
-    const iw_ledger_entry_t word = {verdict == GW_FOUND_SAME ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED,
-                                    IW_EVIDENCE_OPERATOR, 0};
-    iw_gateway_know(gateway, item, &word);
+    const iw_ledger_entry_t entry = {verdict == GW_FOUND_SAME ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED,
+                                     IW_EVIDENCE_OPERATOR, 0};
+    iw_gateway_know(gateway, item, &entry);
     gw_record_assumption(daemon, item);
-    (void)snprintf(daemon->knowledge.known.item[item].found, GW_VALUE_SIZE, "%s", found);
+    known->word = *word;
+    known->since_wall_us = iw_clock_wall_us();
     daemon->knowledge.changed = true;
     return verdict;
 }

@@ -65,8 +65,8 @@ void gw_knowledge_observe(struct gw_daemon *daemon);
 /// Hears the keeper and hands over what has changed. Once per cycle.
 void gw_knowledge_tend(struct gw_daemon *daemon);
 
-/// The operator's word: `found` as in gw_assumption_compare.
-gw_found_t gw_knowledge_confirm(struct gw_daemon *daemon, iw_ledger_item_t item, const char *found);
+/// The operator's word: `word->found` as in gw_assumption_compare.
+gw_found_t gw_knowledge_confirm(struct gw_daemon *daemon, iw_ledger_item_t item, const gw_word_t *word);
 
 /// Tares a wheel and remembers the window it was measured in.
 iw_tare_t gw_knowledge_tare(struct gw_daemon *daemon, iw_side_t side);

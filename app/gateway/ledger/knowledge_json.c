@@ -11,13 +11,14 @@ void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, j
     const bool noted = entry->state != IW_LEDGER_ASSUMED && known->entry.state == entry->state;
     char value[GW_VALUE_SIZE];
     char reason[GW_EVIDENCE_SIZE];
-    gw_assumption_value(&daemon->gateway.config, item, value);
-    gw_assumption_evidence(item, entry, known->found, reason);
+    gw_assumption_value(&daemon->config, item, value);
+    gw_assumption_evidence(item, entry, &known->word, reason);
     json_out_text(json, "state", gw_ledger_state_name(entry->state));
     json_out_text(json, "evidence", gw_evidence_name(entry->evidence));
     json_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
     json_out_text(json, "value", value[0] != '\0' ? value : NULL);
-    json_out_text(json, "found", noted && known->found[0] != '\0' ? known->found : NULL);
+    json_out_text(json, "found", noted && known->word.found[0] != '\0' ? known->word.found : NULL);
+    json_out_text(json, "how", noted && known->word.how[0] != '\0' ? known->word.how : NULL);
     json_out_known(json, "since_wall_us", noted, known->since_wall_us);
     json_out_text(json, "reason", reason);
     json_out_text(json, "disabled", entry->state == IW_LEDGER_CONTRADICTED ? gw_assumption_cost(item) : NULL);

@@ -21,8 +21,8 @@ void gw_knowledge_tell_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
     const bool bad = entry->state == IW_LEDGER_CONTRADICTED;
     char value[GW_VALUE_SIZE];
     char evidence[GW_EVIDENCE_SIZE];
-    gw_assumption_value(&daemon->gateway.config, item, value);
-    gw_assumption_evidence(item, entry, daemon->knowledge.known.item[item].found, evidence);
+    gw_assumption_value(&daemon->config, item, value);
+    gw_assumption_evidence(item, entry, &daemon->knowledge.known.item[item].word, evidence);
     gw_log(&daemon->log, bad ? GW_LOG_WARNING : GW_LOG_INFO, "assumption %s = %s is %s by the %s: %s%s%s",
            gw_ledger_item_name(item), value, gw_ledger_state_name(entry->state), gw_evidence_name(entry->evidence),
            evidence, bad ? "; disabled: " : "", bad ? gw_assumption_cost(item) : "");

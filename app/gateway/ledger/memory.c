@@ -42,8 +42,11 @@ static void write_item(const gw_known_item_t *known, const char *name, json_out_
     json_out_text(json, "evidence", gw_evidence_name(known->entry.evidence));
     json_out_int(json, "figure", known->entry.figure);
     json_out_text(json, "value", known->value);
-    json_out_text(json, "found", known->found);
+    json_out_text(json, "found", known->word.found);
     json_out_int(json, "since_wall_us", known->since_wall_us);
+    if (known->word.how[0] != '\0') {
+        json_out_text(json, "how", known->word.how); // Left out otherwise, so that earlier versions can read it.
+    }
     json_out_close(json, '}');
 }
 
@@ -96,10 +99,10 @@ static bool read_number(const json_t *object, const char *field, int64_t low, in
     return json_is_integer(value) && *out_number >= low && *out_number <= high;
 }
 
-static bool read_text(const json_t *object, const char *field, char out_text[GW_VALUE_SIZE]) {
+static bool read_text(const json_t *object, const char *field, char *out_text, size_t size) {
     const char *text = json_string_value(json_object_get(object, field));
-    const size_t length = text == NULL ? GW_VALUE_SIZE : strlen(text);
-    if (length >= GW_VALUE_SIZE) {
+    const size_t length = text == NULL ? size : strlen(text);
+    if (length >= size) {
         return false;
     }
     (void)memcpy(out_text, text, length + 1U);
@@ -111,10 +114,13 @@ static bool read_item(const json_t *object, gw_known_item_t *out_known) {
     int64_t since;
     const char *state = json_string_value(json_object_get(object, "state"));
     const char *evidence = json_string_value(json_object_get(object, "evidence"));
-    if (state == NULL || evidence == NULL || json_object_size(object) != 6U ||
+    const bool has_how = json_object_get(object, "how") != NULL; // Ledgers of before have none.
+    if (state == NULL || evidence == NULL || json_object_size(object) != (has_how ? 7U : 6U) ||
         !read_number(object, "figure", INT32_MIN, INT32_MAX, &figure) ||
         !read_number(object, "since_wall_us", INT64_MIN, INT64_MAX, &since) ||
-        !read_text(object, "value", out_known->value) || !read_text(object, "found", out_known->found)) {
+        !read_text(object, "value", out_known->value, sizeof out_known->value) ||
+        !read_text(object, "found", out_known->word.found, sizeof out_known->word.found) ||
+        (has_how && !read_text(object, "how", out_known->word.how, sizeof out_known->word.how))) {
         return false;
     }
     const bool confirmed = strcmp(state, "confirmed") == 0;

@@ -13,7 +13,7 @@
 #include "iwheel/force.h"
 
 /// The longest text that is written.
-#define GW_MEMORY_SIZE 8192U
+#define GW_MEMORY_SIZE 12288U
 /// The longest reason for a refusal.
 #define GW_MEMORY_REASON_SIZE 128U
 
@@ -22,7 +22,7 @@ typedef struct {
     iw_ledger_entry_t entry; ///< IW_LEDGER_ASSUMED: there is none.
     int64_t since_wall_us;
     char value[GW_VALUE_SIZE]; ///< What was configured when it was found.
-    char found[GW_VALUE_SIZE]; ///< What the operator found instead; empty: nothing, or not told.
+    gw_word_t word;            ///< What the operator found instead, and how it was found; empty: nothing, or not told.
 } gw_known_item_t;
 
 /// The force offset of one wheel.

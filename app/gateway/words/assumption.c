@@ -39,7 +39,8 @@ static void write_gear(const iw_config_t *config, char out_value[GW_VALUE_SIZE])
                    config->rpm_of_rotor ? "rotor" : "wheel");
 }
 
-void gw_assumption_value(const iw_config_t *config, iw_ledger_item_t item, char out_value[GW_VALUE_SIZE]) {
+void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t item, char out_value[GW_VALUE_SIZE]) {
+    const iw_config_t *config = &configured->core;
     const char *word = "yes";
     out_value[0] = '\0';
     switch (item) {
@@ -50,6 +51,9 @@ void gw_assumption_value(const iw_config_t *config, iw_ledger_item_t item, char 
         return;
     case IW_LEDGER_WHEEL_RADIUS:
         (void)snprintf(out_value, GW_VALUE_SIZE, "%u", config->radius_mm);
+        return;
+    case IW_LEDGER_TRACK:
+        (void)snprintf(out_value, GW_VALUE_SIZE, "%u", configured->track_mm);
         return;
     case IW_LEDGER_GEAR_RATIO:
         write_gear(config, out_value);
@@ -85,6 +89,8 @@ const char *gw_assumption_values(iw_ledger_item_t item) {
         return "yes or no, as invert in the configuration";
     case IW_LEDGER_WHEEL_RADIUS:
         return "20 to 500 (mm)";
+    case IW_LEDGER_TRACK:
+        return "50 to 5000 (mm)";
     case IW_LEDGER_GEAR_RATIO:
         return "N or N/M, as gear_ratio in the configuration";
     default:
@@ -136,9 +142,10 @@ static gw_found_t compare_word(const char *found, const char *wanted, const char
     return strcmp(found, wanted) == 0 ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
 }
 
-gw_found_t gw_assumption_compare(const iw_config_t *config, iw_ledger_item_t item, const char *found) {
+gw_found_t gw_assumption_compare(const gateway_config_t *configured, iw_ledger_item_t item, const char *found) {
+    const iw_config_t *config = &configured->core;
     char wanted[GW_VALUE_SIZE];
-    gw_assumption_value(config, item, wanted);
+    gw_assumption_value(configured, item, wanted);
     if (wanted[0] == '\0') {
         return GW_FOUND_UNSET;
     }
@@ -150,6 +157,8 @@ gw_found_t gw_assumption_compare(const iw_config_t *config, iw_ledger_item_t ite
         return compare_number(found, config->setpoint_type, 0U, UINT8_MAX, 0U);
     case IW_LEDGER_WHEEL_RADIUS:
         return compare_number(found, config->radius_mm, 20U, 500U, GW_RADIUS_PERCENT);
+    case IW_LEDGER_TRACK:
+        return compare_number(found, configured->track_mm, 50U, 5000U, GW_TRACK_PERCENT);
     case IW_LEDGER_GEAR_RATIO:
         return compare_gear(found, config);
     case IW_LEDGER_CURRENT_ROLE:
@@ -200,18 +209,27 @@ static void write_figure(iw_ledger_item_t item, const iw_ledger_entry_t *entry, 
     }
 }
 
-void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entry, const char *found,
+/// "the operator found 181 by a tape", "found by bringup: 5.00 m pushed ..."; without `how` only the operator's word.
+static void write_word(bool denied, const gw_word_t *word, char out_text[GW_EVIDENCE_SIZE]) {
+    const char *found = word->found[0] != '\0' ? word->found : "something else";
+    const char *by = word->how[0] != '\0' ? " by " : "";
+    if (denied) {
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the operator found %s%s%s", found, by, word->how);
+    } else if (word->how[0] != '\0') {
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "found by %s", word->how);
+    } else {
+        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the operator says so");
+    }
+}
+
+void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entry, const gw_word_t *word,
                             char out_text[GW_EVIDENCE_SIZE]) {
-    const bool denied = entry->state == IW_LEDGER_CONTRADICTED;
     switch (entry->evidence) {
     case IW_EVIDENCE_BUS:
         write_figure(item, entry, out_text);
         break;
     case IW_EVIDENCE_OPERATOR:
-        (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the operator %s%s", denied ? "found " : "says so",
-                       !denied            ? ""
-                       : found[0] != '\0' ? found
-                                          : "something else");
+        write_word(entry->state == IW_LEDGER_CONTRADICTED, word, out_text);
         break;
     case IW_EVIDENCE_CONFIGURATION:
         (void)snprintf(out_text, GW_EVIDENCE_SIZE, "configured, not verified");
@@ -242,6 +260,7 @@ const char *gw_assumption_cost(iw_ledger_item_t item) {
         [IW_LEDGER_MOUNT_SIGN_LEFT] = "arm is refused; correct invert under [left]",
         [IW_LEDGER_MOUNT_SIGN_RIGHT] = "arm is refused; correct invert under [right]",
         [IW_LEDGER_WHEEL_RADIUS] = "no speed in mm/s and no distance; correct radius_mm under [wheels]",
+        [IW_LEDGER_TRACK] = "no twist but straight ahead; correct track_mm under [wheels], or send drive",
         [IW_LEDGER_GEAR_RATIO] = "no distance, and no speed in mm/s if the rpm are the rotor's; correct gear_ratio or "
                                  "rpm_of under [wheels]",
         [IW_LEDGER_POSE_BYTE_ORDER] = "no pose; this version reads it most significant byte first only",

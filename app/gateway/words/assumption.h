@@ -7,7 +7,8 @@
 #ifndef GATEWAY_ASSUMPTION_H
 #define GATEWAY_ASSUMPTION_H
 
-#include "iwheel/config.h"
+#include "gateway_config.h"
+
 #include "iwheel/ledger.h"
 
 /// The longest value with its terminator.
@@ -16,6 +17,10 @@
 #define GW_EVIDENCE_SIZE 256U
 /// A radius within this share of the configured one is the configured one: nobody measures a tyre better.
 #define GW_RADIUS_PERCENT 2
+/// The same for the track: tyres are broad.
+#define GW_TRACK_PERCENT 2
+/// The longest text that tells how something was found, with its terminator.
+#define GW_HOW_SIZE 128U
 
 /// What somebody found, beside what is in force.
 typedef enum {
@@ -25,21 +30,27 @@ typedef enum {
     GW_FOUND_UNSET,      ///< Nothing is configured that could be confirmed.
 } gw_found_t;
 
+/// The operator's word on an item. Both texts may be empty: not told.
+typedef struct {
+    char found[GW_VALUE_SIZE]; ///< Which value.
+    char how[GW_HOW_SIZE];     ///< By what it was found: "bringup: 3 full turns by hand, ...".
+} gw_word_t;
+
 /// False if no item has that name.
 bool gw_assumption_of(const char *name, iw_ledger_item_t *out_item);
 
 /// The value in force; empty if none is configured.
-void gw_assumption_value(const iw_config_t *config, iw_ledger_item_t item, char out_value[GW_VALUE_SIZE]);
+void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t item, char out_value[GW_VALUE_SIZE]);
 
 /// Compares `found` with the value in force. `found` may be empty: the operator confirms what is in force.
-gw_found_t gw_assumption_compare(const iw_config_t *config, iw_ledger_item_t item, const char *found);
+gw_found_t gw_assumption_compare(const gateway_config_t *configured, iw_ledger_item_t item, const char *found);
 
 /// The values that `found` may have, for messages.
 const char *gw_assumption_values(iw_ledger_item_t item);
 
-/// What the entry rests on, as a clause: "measured -392 mm/s while told to go forward". `found` is what the operator
-/// found instead of what is configured; empty if that was not told.
-void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entry, const char *found,
+/// What the entry rests on, as a clause: "measured -392 mm/s while told to go forward". `word` matters only to what
+/// rests on the operator.
+void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entry, const gw_word_t *word,
                             char out_text[GW_EVIDENCE_SIZE]);
 
 /// What a contradiction of it disables, and what mends it.

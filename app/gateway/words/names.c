@@ -181,6 +181,7 @@ const char *gw_ledger_item_name(iw_ledger_item_t item) {
         [IW_LEDGER_MOUNT_SIGN_LEFT] = "mount_sign_left",
         [IW_LEDGER_MOUNT_SIGN_RIGHT] = "mount_sign_right",
         [IW_LEDGER_WHEEL_RADIUS] = "wheel_radius",
+        [IW_LEDGER_TRACK] = "track",
         [IW_LEDGER_GEAR_RATIO] = "gear_ratio",
         [IW_LEDGER_POSE_BYTE_ORDER] = "pose_byte_order",
         [IW_LEDGER_DLC] = "dlc",

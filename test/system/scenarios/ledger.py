@@ -31,6 +31,36 @@ def confirm_by_the_operator(t):
     t.judge(rig)
 
 
+@scenario("confirm: how it was found is told and kept; a contradicted track refuses turns, and nothing else", 6)
+def confirm_how_and_track(t):
+    rig, client = t.running({"wheels": {"track_mm": 540}})
+    entry = client.request("status")["ledger"]["track"]
+    t.check((entry["state"], entry["value"], entry["how"]) == ("assumed", "540", None), f"assumed at first: {entry}")
+    reply = client.request("confirm", item="track", value=545, how="bringup: 3 full turns by hand")
+    t.expect(reply)
+    t.check(
+        (reply["state"], reply["evidence"], reply["how"], reply["reason"])
+        == ("confirmed", "operator", "bringup: 3 full turns by hand", "found by bringup: 3 full turns by hand"),
+        f"it keeps its evidence: {reply}",
+    )
+    t.check("assumption track = 540 is confirmed by the operator: found by bringup" in rig.gateway.text(), "in the log")
+    reply = client.request("confirm", item="track", value=600, how="a tape")
+    t.check(reply["state"] == "contradicted" and "track_mm" in reply["disabled"], f"contradicted: {reply}")
+    t.arm(client)
+    reply = client.request("twist", v_mm_s=150, yaw_mrad_s=0)
+    t.check(reply["ok"] and reply["left_mm_s"] == reply["right_mm_s"] == 150, f"straight ahead needs no track: {reply}")
+    t.drive_for(client, 150, 150, 0.6)
+    turn = client.request("twist", v_mm_s=150, yaw_mrad_s=300)
+    t.expect(turn, "denied")
+    t.check("the operator found 600 by a tape" in turn["message"] and "track_mm" in turn["message"], f"why: {turn}")
+    client.request("stop")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 5), "at rest")
+    client.request("twist", v_mm_s=0, yaw_mrad_s=300)
+    t.expect(client.arm(), "stale_command")
+    t.expect(client.request("confirm", item="track"))
+    t.judge(rig)
+
+
 @scenario("a wheel against its command: contradicted, and no arm until the operator says so", 7)
 def contradicted_sign_refuses_arm(t):
     rig, client, _ = fault_while_driving(t, "sign right swapped", "feedback_sign", 420, side="right")
