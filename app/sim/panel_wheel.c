@@ -203,6 +203,30 @@ static result_t push(const sim_call_t *call) {
     return NULL;
 }
 
+/// On the spot: each wheel rolls along a circle as wide as the track, by 355 / 113 for pi.
+static result_t turn(const sim_call_t *call) {
+    sim_pair_t *pair = &call->world->pair;
+    int64_t milli_turns = 0;
+    if (!sim_words_milli(call->words->word[1], (sim_range_t){-20000, 20000}, &milli_turns)) {
+        return SIM_USAGE;
+    }
+    const int32_t way_mm = (int32_t)(milli_turns * 355 * pair->pose.track_mm / (113 * 1000));
+    for (unsigned side = 0U; side < IW_SIDES; ++side) {
+        const bool backwards = (side == IW_LEFT) != pair->pose.mirrored[side];
+        sim_motion_push(&pair->wheel[side].motion, call->now_us, backwards ? -way_mm : way_mm);
+    }
+    return NULL;
+}
+
+static result_t set_track(const sim_call_t *call) {
+    int64_t track_mm = 0;
+    if (!sim_words_integer(call->words->word[1], (sim_range_t){50, 5000}, &track_mm)) {
+        return SIM_USAGE;
+    }
+    call->world->pair.pose.track_mm = (uint16_t)track_mm;
+    return NULL;
+}
+
 static result_t set_radius(const sim_call_t *call) {
     chosen_t chosen;
     int64_t radius_mm = 0;
@@ -362,7 +386,9 @@ const sim_command_t sim_wheel_commands[] = {
     {"rpm", SIDE " wheel|rotor", "whose rpm telemetry tells", set_rpm, 3U, 3U, SIM_CHANGED},
     {"radius", SIDE " MM", "the real one; the firmware believes 192", set_radius, 3U, 3U, SIM_CHANGED},
     {"push", SIDE " METRES", "a hand turns the wheel that far, in its own sense; -100..100", push, 3U, 3U, SIM_CHANGED},
-    {"mirror", SIDE " on|off", "mounted mirrored; matters to the pose only", set_mirror, 3U, 3U, SIM_CHANGED},
+    {"turn", "TURNS", "hands turn the machine on the spot, to the left; -20..20", turn, 2U, 2U, SIM_CHANGED},
+    {"track", "MM", "the real distance between the wheels, 50..5000 (540)", set_track, 2U, 2U, SIM_CHANGED},
+    {"mirror", SIDE " on|off", "mounted mirrored; matters to pose and turn only", set_mirror, 3U, 3U, SIM_CHANGED},
     {"pose", "normal|reversed", "the pose comes least significant byte first", set_pose, 2U, 2U, SIM_CHANGED},
     {"padding", "on|off", "all telemetry is 8 bytes long", set_padding, 2U, 2U, SIM_CHANGED},
     {"role", "limit|setpoint", "what the current beside the speed means", set_role, 2U, 2U, SIM_CHANGED},

@@ -92,6 +92,10 @@ static void test_panel_every_command_with_right_arguments_is_done(void) {
         "rpm left rotor",
         "rpm both wheel",
         "radius left 200",
+        "push both -1.5",
+        "turn 3",
+        "turn -0.25",
+        "track 600",
         "mirror right on",
         "mirror right off",
         "role setpoint",
@@ -233,6 +237,14 @@ static void test_panel_wrong_commands_are_refused_and_change_nothing(void) {
         "babble FFF 100 on",
         "estop",
         "estop push",
+        "turn",
+        "turn left",
+        "turn 20.001",
+        "turn 1 2",
+        "track",
+        "track 49",
+        "track 5001",
+        "track 540.5",
         "estop press 5",
         "estop pulse",
         "estop pulse 0",
@@ -252,6 +264,22 @@ static void test_panel_wrong_commands_are_refused_and_change_nothing(void) {
     }
     TEST_ASSERT_EQUAL_UINT(0U, quits);
     TEST_ASSERT_EQUAL_STRING("", marked);
+}
+
+static int32_t pushed_mm(iw_side_t side) {
+    return (int32_t)(wheel(side)->motion.push_nm / 1000000);
+}
+
+static void test_panel_turn_rolls_each_wheel_along_its_circle_the_mirrored_one_in_its_own_sense(void) {
+    expect_done("track 600");
+    expect_done("turn 2");
+    TEST_ASSERT_INT32_WITHIN(1, -3770, pushed_mm(IW_LEFT)); // 2 x pi x 600 mm
+    TEST_ASSERT_INT32_WITHIN(1, 3770, pushed_mm(IW_RIGHT));
+    expect_done("turn -2");
+    expect_done("mirror left on");
+    expect_done("turn 1");
+    TEST_ASSERT_INT32_WITHIN(1, 1885, pushed_mm(IW_LEFT));
+    TEST_ASSERT_INT32_WITHIN(1, 1885, pushed_mm(IW_RIGHT));
 }
 
 static void test_panel_line_too_long_is_refused(void) {
@@ -350,6 +378,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_panel_every_command_with_right_arguments_is_done);
     RUN_TEST(test_panel_wrong_commands_are_refused_and_change_nothing);
+    RUN_TEST(test_panel_turn_rolls_each_wheel_along_its_circle_the_mirrored_one_in_its_own_sense);
     RUN_TEST(test_panel_line_too_long_is_refused);
     RUN_TEST(test_panel_refusal_tells_the_usage);
     RUN_TEST(test_panel_reboot_without_power_is_refused_with_the_cure);
