@@ -8,7 +8,6 @@
 #define BOTH                 3U
 
 typedef const char *result_t;
-
 typedef struct {
     sim_wheel_t *wheel[IW_SIDES];
     unsigned count;
@@ -203,17 +202,17 @@ static result_t push(const sim_call_t *call) {
     return NULL;
 }
 
-/// On the spot: each wheel rolls along a circle as wide as the track, by 355 / 113 for pi.
 static result_t turn(const sim_call_t *call) {
-    sim_pair_t *pair = &call->world->pair;
     int64_t milli_turns = 0;
+    sim_pair_t *pair = &call->world->pair;
     if (!sim_words_milli(call->words->word[1], (sim_range_t){-20000, 20000}, &milli_turns)) {
         return SIM_USAGE;
     }
-    const int32_t way_mm = (int32_t)(milli_turns * 355 * pair->pose.track_mm / (113 * 1000));
+    // On the spot: each wheel rolls along a circle as wide as the track; 355 / 113 is pi.
+    const int32_t way_mm = (int32_t)(milli_turns * 355 * pair->pose.track_mm / 113000);
     for (unsigned side = 0U; side < IW_SIDES; ++side) {
-        const bool backwards = (side == IW_LEFT) != pair->pose.mirrored[side];
-        sim_motion_push(&pair->wheel[side].motion, call->now_us, backwards ? -way_mm : way_mm);
+        const int32_t sign = (side == IW_LEFT) != pair->pose.mirrored[side] ? -1 : 1;
+        sim_motion_push(&pair->wheel[side].motion, call->now_us, sign * way_mm);
     }
     return NULL;
 }

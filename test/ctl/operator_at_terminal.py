@@ -3,6 +3,7 @@
 import fcntl
 import os
 import pty
+import re
 import select
 import signal
 import struct
@@ -49,11 +50,12 @@ class Operator:
     def expect(self, text, seconds=20.0):
         """What came before `text` and after the last one; raises if it does not come."""
         end = time.monotonic() + seconds
+        words = re.compile(re.escape(text).replace(r"\ ", r"[ \n]"))  # A paragraph may be broken anywhere.
         while True:
-            at = self.text.find(text, self.seen)
-            if at >= 0:
-                before = self.text[self.seen:at]
-                self.seen = at + len(text)
+            found = words.search(self.text, self.seen)
+            if found:
+                before = self.text[self.seen:found.start()]
+                self.seen = found.end()
                 return before
             if not self.pump(0.05) or time.monotonic() > end:
                 raise AssertionError(f"{text!r} did not come; after the last text came:\n{self.text[self.seen:]}\n"

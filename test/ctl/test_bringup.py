@@ -8,6 +8,8 @@ Without further arguments several tests run at a time, each in a process of its 
 """
 import concurrent.futures
 import os
+import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -24,9 +26,9 @@ GRAVITY = 9.8
 FULL_TURN_M_PER_MM = 2 * 3.14159265 / 1000
 
 
-def environment():
-    clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
-    return {**clean, "TERM": "dumb"}
+def environment(runtime=None):
+    clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR", "XDG_RUNTIME_DIR")}
+    return {**clean, "TERM": "dumb", **({"XDG_RUNTIME_DIR": runtime} if runtime else {})}
 
 
 class Patient(Operator):
@@ -54,15 +56,30 @@ class Bringup(unittest.TestCase):
         self.records = os.path.join(self.folder.name, "records")
         with open(self.out + ".from", "w", encoding="utf-8") as file:
             file.write(f"[record]\ndirectory = {self.records}\n")
+        self.runtime = tempfile.mkdtemp(prefix="iwbr-", dir="/tmp")  # Short: bringup's own folder must fit into it.
+        self.addCleanup(self.nothing_left_behind)
         time.sleep(0.5)
+
+    def nothing_left_behind(self):
+        """Whatever way out a test took."""
+        left = os.listdir(self.runtime)
+        shutil.rmtree(self.runtime)
+        if not self.killed:
+            self.assertEqual([], left, "bringup's folder is left behind")
+
+    killed = False
 
     def start(self, *words):
         operator = Patient([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--can",
                              f"unix:{self.rig.path('bus')}", "--estop", f"unix:{self.rig.path('button')}", "--from",
                              self.out + ".from", *words],
-                            environment())
-        self.addCleanup(operator.close)
+                            environment(self.runtime))
+        self.addCleanup(self.end, operator)
         return operator
+
+    def end(self, operator):
+        self.killed = self.killed or operator.process.poll() is None
+        operator.close()
 
     def begin(self, *words, gear=False):
         """Through the checks and the e-stop, and past the gear."""
@@ -73,7 +90,7 @@ class Bringup(unittest.TestCase):
         operator.expect("Release it")
         self.rig.sim.ask("estop release")
         if not gear:
-            operator.answer("Turn the left wheel by hand?", "n")
+            operator.answer("Turn the wheels by hand?", "n")
         return operator
 
     def moving(self):
@@ -108,13 +125,41 @@ class Bringup(unittest.TestCase):
         operator.expect("the unit is")
         self.rig.sim.ask(f"load {side} 0")
 
-    def turn_by_hand(self, operator, radius_mm, turns=3):
-        operator.answer("Turn the left wheel by hand?", "y")
+    def turn_by_hand(self, operator, radius_mm, turns=(3, 3), take="y"):
+        operator.answer("Turn the wheels by hand?", "y")
+        for side, turn in zip(("left", "right"), turns):
+            operator.expect("press Enter ...")
+            self.rig.sim.ask(f"push {side} {turn * radius_mm * FULL_TURN_M_PER_MM:.3f}")
+            self.wait_until_stands()
+            operator.type("\n")
+        if take:
+            operator.answer("Take that?", take)
+
+    def turn_around(self, operator, *commands, turns=3):
+        """The machine as a whole; by other commands, if it does not go as it should."""
+        operator.answer("How many full turns", str(turns))
+        operator.answer("Point it at the mark", "")
         operator.expect("press Enter ...")
-        self.rig.sim.ask(f"push left {turns * radius_mm * FULL_TURN_M_PER_MM:.3f}")
-        self.wait_until_stands()
+        for command in commands or (f"turn {turns}",):
+            self.rig.sim.ask(command)
+            self.wait_until_stands()
         operator.type("\n")
-        operator.answer("Take that?", "y")
+
+    def drive_through(self, operator, signs=True):
+        """Type, role and signs of wheels as documented."""
+        operator.answer("types to try", "1")
+        operator.answer("Did both wheels turn", "y")
+        operator.answer("current_role", "")
+        if signs:
+            self.look_at_signs(operator, mirrored=())
+            operator.answer("Measure the force?", "n")
+
+    def write(self, operator):
+        """Writes the file and ends; what it says of each key: "confirmed" or "noted"."""
+        operator.answer("Write it to", "")
+        self.assertEqual(0, operator.wait(), operator.text[-2000:])
+        with open(self.out, encoding="utf-8") as file:
+            return file.read()
 
     def push(self, operator, distance_m, mirrored):
         operator.answer("Distance in m", str(distance_m))
@@ -134,7 +179,7 @@ class Bringup(unittest.TestCase):
 
     def test_wheels_that_are_mirrored_in_other_units_and_of_another_radius(self):
         for command in ("type 3", "role limit", "unit left dN", "unit right cN", "radius both 160", "mirror left on",
-                        "gear both 4", "rpm both rotor"):
+                        "gear both 4", "rpm both rotor", "track 620"):
             self.rig.sim.ask(command)
         os.mkdir(self.records)
         operator = self.begin(gear=True)
@@ -148,6 +193,9 @@ class Bringup(unittest.TestCase):
         self.weigh(operator, "right", 5)
         self.push(operator, 5, mirrored=("left",))
         operator.answer("Take the mean?", "y")
+        self.turn_around(operator)
+        operator.expect("Configured were 540 mm")
+        operator.answer("Take that?", "y")
         operator.answer("Write it to", "")
         self.assertEqual(0, operator.wait(), operator.text[-2000:])
         found = {(section, key): self.value(section, key) for section, key in (
@@ -161,7 +209,8 @@ class Bringup(unittest.TestCase):
         self.assertAlmostEqual(160, int(self.value("wheels", "radius_mm")), delta=2)
         with open(self.out, encoding="utf-8") as file:
             text = file.read()
-        self.assertEqual(8, text.count(", confirmed: "), text)
+        self.assertAlmostEqual(620, int(self.value("wheels", "track_mm")), delta=8)
+        self.assertEqual(9, text.count(", confirmed: "), text)
         self.assertIn(f"The ledger in {self.records}", operator.text)
         self.assertEqual(["mine.conf", "mine.conf.from", "records"], sorted(os.listdir(self.folder.name)))
         self.gateway_takes_it()
@@ -181,8 +230,16 @@ class Bringup(unittest.TestCase):
         client = self.rig.client()
         entries = self.rig.wait_status(client, lambda s: s["memory"]["state"] == "kept")["ledger"]
         for item in ("setpoint_type", "current_role", "mount_sign_left", "mount_sign_right", "wheel_radius", "gear_ratio",
-                     "force_unit_left", "force_unit_right"):
+                     "force_unit_left", "force_unit_right", "track"):
             self.assertEqual("confirmed", entries[item]["state"], (item, entries[item]))
+            self.assertTrue(entries[item]["reason"].startswith("found by bringup: "), entries[item])
+        for item, number in (("track", r"3 full turns by hand: left -?\d+, right -?\d+ ticks"),
+                             ("wheel_radius", r"5\.00 m pushed: left -?\d+, right -?\d+ ticks"),
+                             ("gear_ratio", r"\d+ and \d+ ticks in 3 turns by hand"),
+                             ("setpoint_type", "told 100 mm/s, measured"), ("force_unit_left", r"5\.00 kg changed"),
+                             ("mount_sign_left", "saw it turn backwards with invert = no"),
+                             ("current_role", "500 mA without speed and 100 mm/s without current turned no wheel")):
+            self.assertRegex(entries[item]["reason"], number)
 
     def test_current_that_is_a_setpoint_is_found_out(self):
         self.rig.sim.ask("role setpoint")
@@ -205,7 +262,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("block both")  # Held by somebody during both tries.
         operator.seen -= len("Did both wheels turn")
         operator.answer("Did both wheels turn", "y")
-        operator.expect("seems to be a limit")
+        operator.expect("may be a limit")
         self.rig.sim.ask("unblock both")
         operator.expect("It TURNED")
         self.assertEqual("setpoint", self.offered(operator, "current_role"))
@@ -235,7 +292,7 @@ class Bringup(unittest.TestCase):
                            f"12A#0300{at:02X}07D0000000\n")
         self.rig.sim.ask("type 3")
         operator = self.begin("--learn", recording)
-        operator.expect("98 setpoints with a speed")
+        operator.expect("98 setpoints have a speed, with type 3")
         operator.expect("have 8 bytes")
         operator.answer("types to try", "")
         operator.answer("Did both wheels turn", "q")
@@ -310,6 +367,7 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "1")
         operator.expect("any key stops it")
         time.sleep(0.5)
+        self.killed = True  # Nothing can tidy up then.
         operator.process.kill()
         killed_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
         time.sleep(4.5)
@@ -335,6 +393,7 @@ class Bringup(unittest.TestCase):
         self.look_at_signs(operator, mirrored=())
         operator.answer("Measure the force?", "n")
         operator.answer("Distance in m", "")
+        operator.answer("How many full turns", "")
         operator.answer("Write it to", "")
         operator.answer("Replace it?", "")
         operator.answer("Write it to", "")
@@ -343,7 +402,284 @@ class Bringup(unittest.TestCase):
         with open(self.out + ".old", encoding="utf-8") as file:
             self.assertEqual("; precious\n", file.read())
         self.assertEqual("192", self.value("wheels", "radius_mm"))
-        self.assertIn("iwheelctl confirm mount_sign_left no", operator.text)
+        self.assertIn("iwheelctl confirm mount_sign_left no --how 'bringup: somebody saw it turn forwards with invert = no'",
+                      operator.text)
+
+    # --- what was not seen is not concluded -----------------------------------------------------------------------
+
+    def test_estop_that_is_pressed_from_the_start_is_no_press(self):
+        self.rig.sim.ask("estop press")
+        operator = self.start()
+        operator.answer("finger on the e-stop?", "y")
+        operator.expect("reads as pressed already")
+        self.assertNotIn("Press the e-stop button now", operator.text)
+        self.rig.sim.ask("estop release")
+        operator.expect("Press the e-stop button now")
+        self.rig.sim.ask("estop press")
+        operator.expect("Release it")
+        self.rig.sim.ask("estop release")
+        operator.answer("Turn the wheels by hand?", "q")
+        self.assertEqual(1, operator.wait())
+
+    def test_gear_is_not_concluded_from_the_other_wheel_from_back_and_forth_or_from_none(self):
+        operator = self.begin(gear=True)
+        operator.answer("Turn the wheels by hand?", "y")
+        for pushes, told in ((("push right 3.6",), "RIGHT"), ((), "make no gear"),
+                             (("push left 3.6", "push left -1.8", "push left 1.8"), "back and forth")):
+            operator.expect("press Enter ...")
+            for push in pushes:
+                self.rig.sim.ask(push)
+                self.wait_until_stands()
+            operator.type("\n")
+            operator.expect("The right wheel counted" if told == "RIGHT" else told)
+            operator.answer("Once more?", "y" if told != "back and forth" else "n")
+        operator.expect("The gear stays as it was")
+        operator.answer("types to try", "q")
+        self.assertEqual(1, operator.wait())
+
+    def test_gear_that_differs_from_wheel_to_wheel_is_none(self):
+        operator = self.begin(gear=True)
+        self.turn_by_hand(operator, 192, turns=(3, 4), take=None)
+        operator.expect("The gear stays as it was")
+        operator.answer("types to try", "q")
+        self.assertEqual(1, operator.wait())
+
+    def test_gear_without_seeing_whose_turns_the_rpm_count_is_not_confirmed(self):
+        for command in ("gear both 4", "rpm left rotor"):
+            self.rig.sim.ask(command)
+        operator = self.begin(gear=True)
+        self.turn_by_hand(operator, 192)
+        self.assertIn("whose turns the rpm count was not to be seen", operator.text.replace("\n", " "))
+        self.rig.sim.ask("rpm left wheel")
+        self.drive_through(operator)
+        operator.answer("Distance in m", "")
+        operator.answer("How many full turns", "")
+        text = self.write(operator)
+        self.assertRegex(text, "noted: .* ticks in 3 turns by hand; whose turns the rpm count was not seen")
+        self.assertEqual("4", self.value("wheels", "gear_ratio"))
+
+    def test_type_that_turns_the_wheels_at_another_speed_is_not_confirmed(self):
+        for command in ("gear both 2", "rpm both rotor"):
+            self.rig.sim.ask(command)
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.answer("Did both wheels turn", "y")
+        operator.expect("noted as not confirmed")
+        operator.answer("current_role", "q")
+        self.assertEqual(1, operator.wait())
+
+    def test_type_that_turns_one_wheel_only_is_not_taken(self):
+        self.rig.sim.ask("block right")
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.expect("Only the left wheel turned")
+        operator.expect("None of these moved both wheels")
+        operator.answer("types to try", "q")
+        self.assertEqual(1, operator.wait())
+
+    def test_wheels_that_cannot_turn_are_no_limit(self):
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.expect("Did both wheels turn")
+        self.rig.sim.ask("block both")
+        operator.seen -= len("Did both wheels turn")
+        operator.answer("Did both wheels turn", "y")
+        operator.expect("both wheels must turn, or nothing is known")
+        operator.expect("Now no wheel turned")
+        self.rig.sim.ask("unblock both")
+        self.assertEqual("?", self.offered(operator, "current_role"))
+        operator.type("limit\n")
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "n")
+        operator.answer("Distance in m", "")
+        operator.answer("How many full turns", "")
+        self.assertRegex(self.write(operator), "noted: typed in; the wheels did not show it\ncurrent_role")
+        self.assertNotIn("confirm current_role", operator.text)
+
+    def test_current_that_turns_one_wheel_is_a_setpoint_that_is_not_confirmed(self):
+        self.rig.sim.ask("role setpoint")
+        operator = self.begin()
+        operator.answer("types to try", "1")
+        operator.expect("Did both wheels turn")
+        self.rig.sim.ask("block right")
+        operator.seen -= len("Did both wheels turn")
+        operator.answer("Did both wheels turn", "y")
+        operator.expect("The current alone turned the left wheel")
+        operator.expect("not seen of both")
+        self.rig.sim.ask("unblock right")
+        operator.answer("current_role", "")
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "n")
+        operator.answer("Distance in m", "")
+        operator.answer("How many full turns", "")
+        self.assertRegex(self.write(operator), "noted: 250 mA without speed turned the left wheel\ncurrent_role = setpoint")
+
+    def test_straight_ahead_with_a_wheel_that_stands_is_not_asked(self):
+        operator = self.begin()
+        self.drive_through(operator, signs=False)
+        for side in ("left", "right"):
+            operator.answer(f"Look at the {side} wheel", "")
+            operator.answer("r: again)", "f")
+        operator.expect("Now both")
+        self.rig.sim.ask("block left")
+        operator.seen -= len("Now both")
+        operator.answer("Now both", "")
+        operator.expect("does not say that both went forwards")
+        self.rig.sim.ask("unblock left")
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "q")
+        self.assertEqual(1, operator.wait())
+
+    def test_wheel_that_turns_untold_ends_the_signs(self):
+        operator = self.begin()
+        self.drive_through(operator, signs=False)
+        operator.expect("Look at the left wheel")
+        self.rig.sim.ask("runaway right on 80")
+        operator.seen -= len("Look at the left wheel")
+        operator.answer("Look at the left wheel", "")
+        operator.expect("BOTH wheels turned")
+        self.assertEqual(1, operator.wait())
+
+    def test_force_that_ends_sways_or_saturates_is_no_unit(self):
+        operator = self.begin()
+        self.drive_through(operator, signs=False)
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "y")
+        operator.answer("put on the left handle", "5")
+        operator.answer("off both handles", "")
+        operator.expect("put the mass on")
+        self.rig.sim.ask("raw left 32767")
+        operator.type("\n")
+        operator.expect("at the end of its range")
+        operator.answer("put on the right handle", "5")
+        operator.answer("off both handles", "")
+        operator.expect("put the mass on")
+        self.rig.sim.ask("load right 49")
+        operator.type("\n")
+        operator.expect("measuring for 2 s")
+        time.sleep(0.7)
+        self.rig.sim.ask("load right 250")
+        operator.expect("The force swayed")
+        operator.answer("Distance in m", "q")
+        self.assertEqual(1, operator.wait())
+
+    def test_radius_and_track_rest_on_gear_and_distance_and_say_so(self):
+        operator = self.begin()
+        self.drive_through(operator)
+        self.push(operator, 3, mirrored=())
+        operator.expect("if the gear is as configured: it was not measured")
+        operator.answer("Take the mean?", "y")
+        self.turn_around(operator)
+        operator.answer("Take that?", "y")  # By the distance: whatever the gear is, a tick is so long.
+        text = self.write(operator)
+        self.assertRegex(text, r"noted: 3\.00 m pushed: .* ticks; the gear is assumed\nradius_mm")
+        self.assertRegex(text, r"confirmed: 3 full turns by hand: left -?\d+, right -?\d+ ticks\ntrack_mm")
+        self.assertAlmostEqual(540, int(self.value("wheels", "track_mm")), delta=8)
+
+    def test_radius_of_a_curve_and_track_without_a_distance_are_not_confirmed(self):
+        operator = self.begin(gear=True)
+        self.turn_by_hand(operator, 192)
+        self.drive_through(operator)
+        operator.answer("Distance in m", "3")
+        operator.answer("Stand at the start", "")
+        operator.expect("press Enter ...")
+        for command in ("push left 3", "push right 3.3"):
+            self.rig.sim.ask(command)
+        self.wait_until_stands()
+        operator.type("\n")
+        operator.expect("it was a curve")
+        operator.answer("Take the mean?", "y")
+        self.turn_around(operator)
+        operator.expect("if the radius is as configured: no distance was measured")
+        operator.answer("Take that?", "y")
+        text = self.write(operator)
+        self.assertRegex(text, "noted: .* ticks; not straight\nradius_mm")
+        self.assertRegex(text, "noted: 3 full turns by hand: .* ticks; the radius is assumed\ntrack_mm")
+        self.assertNotIn("confirm track", operator.text)
+
+    def test_track_is_not_concluded_from_what_is_no_turn_on_the_spot(self):
+        operator = self.begin()
+        self.drive_through(operator)
+        operator.answer("Distance in m", "")
+        for turns, commands, told in ((3, ("push both 2",), "rolled the same way"), (3, ("turn 0.5",), "Too few ticks"),
+                                      (3, ("turn 1", "turn -0.5", "turn 1"), "back and forth"),
+                                      (3, ("push right 4", "push left -1.5"), "wandered off"),
+                                      (20, ("turn 1",), "no track between 50 and 5000 mm")):
+            self.turn_around(operator, *commands, turns=turns)
+            operator.expect(told)
+        operator.answer("How many full turns", "2.5")
+        operator.expect("Full turns only")
+        self.turn_around(operator, "turn 3", turns=2)  # Counted wrongly.
+        operator.expect("Configured were 540 mm")
+        operator.answer("Take that?", "")
+        operator.answer("How many full turns", "")
+        text = self.write(operator)
+        self.assertEqual("540", self.value("wheels", "track_mm"))
+        self.assertNotIn("full turns by hand", text)
+        self.assertFalse([frame for frame in self.rig.bus.frames[-200:] if frame.id in (266, 298)], "nothing was sent")
+
+    # --- ways out, and nothing left behind (see nothing_left_behind) ----------------------------------------------
+
+    def ends_soon(self, operator, within_s=6):
+        begin = time.monotonic()
+        self.assertEqual(1, operator.wait(within_s + 4), operator.text[-1500:])
+        self.assertLess(time.monotonic() - begin, within_s)
+        self.assertIn("Nothing was written", operator.text)
+        self.assertFalse(os.path.exists(self.out))
+
+    def test_interrupt_while_it_waits_for_the_estop_ends_it(self):
+        operator = self.start()
+        operator.answer("finger on the e-stop?", "y")
+        operator.expect("Press the e-stop button now")
+        time.sleep(0.2)
+        operator.type("\x03")
+        self.ends_soon(operator)
+
+    def test_interrupt_while_hands_turn_a_wheel_ends_it(self):
+        operator = self.begin(gear=True)
+        operator.answer("Turn the wheels by hand?", "y")
+        operator.expect("press Enter ...")
+        time.sleep(0.2)
+        operator.type("\x03")
+        self.ends_soon(operator)
+
+    def test_interrupt_at_a_question_or_while_the_force_is_measured_ends_it(self):
+        operator = self.begin()
+        self.drive_through(operator, signs=False)
+        self.look_at_signs(operator, mirrored=())
+        operator.answer("Measure the force?", "y")
+        operator.answer("put on the left handle", "5")
+        operator.answer("off both handles", "")
+        operator.expect("measuring for 2 s")
+        operator.type("\x03")
+        self.ends_soon(operator)
+        self.assertNotIn("not heard", operator.text)
+
+    def test_signals_that_end_programs_end_it_in_order(self):
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            operator = self.begin()
+            operator.expect("types to try")
+            operator.process.send_signal(number)
+            self.ends_soon(operator)
+
+    def test_folder_in_tmp_is_removed_when_there_is_no_runtime_directory(self):
+        operator = Operator([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--can",
+                             f"unix:{self.rig.path('bus')}", "--estop", f"unix:{self.rig.path('button')}", "--from",
+                             self.out + ".from"], environment())
+        self.addCleanup(operator.close)
+        operator.answer("finger on the e-stop?", "y")
+        operator.expect("Press the e-stop button now")
+        with open(f"/proc/{operator.process.pid}/task/{operator.process.pid}/children", encoding="ascii") as file:
+            gateway = file.read().split()[0]
+        with open(f"/proc/{gateway}/cmdline", "rb") as file:
+            folder = os.path.dirname(file.read().split(b"\0")[2].decode())
+        self.assertRegex(folder, "^/tmp/iwheel-bringup-")
+        self.rig.sim.ask("estop press")  # A stop, of which the gateway keeps a recording.
+        operator.expect("Release it")
+        self.rig.sim.ask("estop release")
+        operator.answer("Turn the wheels by hand?", "q")
+        self.ends_soon(operator)
+        self.assertFalse(os.path.exists(folder))
 
     def test_a_running_gateway_is_not_driven_past(self):
         self.rig.start_gateway()

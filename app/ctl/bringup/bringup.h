@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 /// Guides from unknown wheels to a configuration that somebody has seen to be right.
 ///
-///     checks -> e-stop -> gear -> setpoint type -> current role -> signs -> force -> radius -> file
+///     checks -> e-stop -> gear -> setpoint type -> current role -> signs -> force -> radius -> track -> file
 ///
 /// Everything that moves goes through a gateway of its own, started for the session with a trial configuration (slow,
 /// little current), so that the core's limits, lease and e-stop hold here as they do later. Each step puts what it found
 /// into `config`, and how it was found into a note. Whatever is not found out stays as it was and is said to be assumed.
+/// A value is confirmed only if all that its sentence claims was seen, on both wheels where it speaks of both.
 #ifndef BRINGUP_H
 #define BRINGUP_H
 
@@ -14,8 +15,10 @@
 /// Wheels in the air: as slow as a sign can be seen from, and no longer than a look takes.
 #define BRINGUP_SPEED_MM_S  100
 #define BRINGUP_CURRENT_mA  500
+#define BRINGUP_PROBE_MS    1200U
 #define BRINGUP_NOTE_SIZE   160U
-#define BRINGUP_NOTES       12U
+#define BRINGUP_STEPS       10U
+#define BRINGUP_NOTES       16U
 #define BRINGUP_ANSWER_SIZE 160U
 
 typedef enum {
@@ -47,8 +50,17 @@ typedef struct {
     const char *recording; ///< Of another controller, to learn from; null: none.
     const char *out_path;
     int current_mA;
+    double mm_per_tick; ///< By a distance that was pushed; 0: none was.
     trial_t trial;
 } bringup_t;
+
+/// What the wheels counted while hands moved them, in their own sense.
+typedef struct {
+    long long ticks[IW_SIDES];
+    long long way[IW_SIDES];    ///< Back and forth, all added.
+    double rpm_turns[IW_SIDES]; ///< The rpm they told, summed up over time.
+    bool heard;                 ///< All the time.
+} hand_t;
 
 /// The two wheels turn so for a moment.
 typedef struct {
@@ -56,7 +68,7 @@ typedef struct {
     int current_mA[IW_SIDES];
     bool has_current;
     unsigned for_ms;
-    int enough_mm_s; ///< Ends as soon as a wheel turns that fast; 0: never.
+    int enough_mm_s; ///< Ends as soon as both wheels turn that fast, or one four times as fast; 0: never.
 } burst_t;
 
 typedef enum { BURST_DONE = 0, BURST_ABORTED, BURST_STOPPED, BURST_REFUSED, BURST_LOST } burst_end_t;
@@ -87,6 +99,9 @@ bool talk_yes(const char *question, bool otherwise, bool *out_yes);
 /// A number within the bounds, asked for until it is one; `*out_given` is false after an empty line.
 bool talk_number(const char *question, double low, double high, double *out_number, bool *out_given);
 
+/// Forgets what was typed before the question.
+void talk_forget(void);
+
 /// Keys are seen at once, without Enter, from begin to end.
 void talk_keys_begin(void);
 void talk_keys_end(void);
@@ -112,10 +127,22 @@ void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 /// BRINGUP_FAILED: it was not, and the operator wants no more of it.
 bringup_result_t burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 
+// --- by hand (bringup_hand.c) ------------------------------------------------------------------------------------
+
+/// Prompts, and adds up what the wheels count until Enter. False if the operator wants to quit.
+bool hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand);
+
+/// Hardly any of its way was back again.
+bool hand_went_one_way(const hand_t *hand, iw_side_t side);
+
 // --- the steps ---------------------------------------------------------------------------------------------------
 
 bringup_result_t bringup_checks(bringup_t *self);
 bringup_result_t bringup_estop(bringup_t *self);
+/// Both wheels forwards, with current, as a try of the type.
+burst_t bringup_ahead(const bringup_t *self, unsigned for_ms);
+/// A trial gateway that sends this type, with the role under which a zero surely is no torque.
+bool bringup_start_with(bringup_t *self, int type);
 bringup_result_t bringup_gear(bringup_t *self);
 bringup_result_t bringup_type(bringup_t *self);
 /// The setpoint types in the recording, such as "3,1"; and takes over its length. False, after telling, if there is none.
@@ -124,7 +151,14 @@ bringup_result_t bringup_role(bringup_t *self);
 bringup_result_t bringup_signs(bringup_t *self);
 bringup_result_t bringup_force(bringup_t *self);
 bringup_result_t bringup_radius(bringup_t *self);
+bringup_result_t bringup_track(bringup_t *self);
 bringup_result_t bringup_write(bringup_t *self);
+
+/// "left" or "right".
+const char *bringup_side(iw_side_t side);
+
+/// A note confirms that item of the ledger.
+bool bringup_is_confirmed(const bringup_t *self, const char *item);
 
 /// Notes how a key's value was found; a later note replaces the former. `item`: the ledger's, if that confirms it.
 __attribute__((format(printf, 5, 6))) void bringup_note(bringup_t *self, const char *section, const char *key,

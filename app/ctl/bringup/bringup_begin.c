@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 // Before anything turns: the checks of doctor, and the e-stop.
 #include "bringup.h"
+#include "talk/signals.h"
 #include "text/text.h"
 
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
-#define PRESS_US 60000000
-#define LOOK_NS  20000000L
+#define PRESS_US    60000000
+#define RELEASED_US 500000
+#define LOOK_NS     20000000L
 
 bringup_result_t bringup_checks(bringup_t *self) {
     doctor_t *doctor = calloc(1, sizeof(*doctor));
@@ -44,20 +47,22 @@ bringup_result_t bringup_checks(bringup_t *self) {
     return result;
 }
 
-/// Waits for the e-stop's state as the gateway sees it; false after a minute or at a key.
-static bool await_estop(bringup_t *self, const char *wanted) {
-    const int64_t end_us = client_now_us() + PRESS_US;
+/// Waits for the e-stop's state as the gateway sees it. BRINGUP_FAILED: it did not come in that time, or a key was
+/// pressed.
+static bringup_result_t await_estop(bringup_t *self, const char *wanted, int64_t for_us) {
+    const int64_t end_us = client_now_us() + for_us;
+    const unsigned signals = signals_count();
     const struct timespec pause = {0, LOOK_NS};
     bool there = false;
     talk_keys_begin();
-    while (!there && client_now_us() < end_us && !talk_key_pressed()) {
+    while (!there && client_now_us() < end_us && !talk_key_pressed() && signals_count() == signals) {
         json_t *status = trial_status(self);
         there = strcmp(text_word(json_object_get(status, "estop"), "state"), wanted) == 0;
         json_decref(status);
-        (void)nanosleep(&pause, NULL);
+        (void)ppoll(NULL, 0, &pause, signals_let_in());
     }
     talk_keys_end();
-    return there;
+    return signals_count() != signals ? BRINGUP_QUIT : there ? BRINGUP_ON : BRINGUP_FAILED;
 }
 
 static bringup_result_t go_without(bringup_t *self) {
@@ -71,6 +76,15 @@ static bringup_result_t go_without(bringup_t *self) {
     return BRINGUP_ON;
 }
 
+/// What was waited for did not come, or the operator wants to end.
+static bringup_result_t no_edge(const bringup_t *self, bringup_result_t seen, const char *edge, const char *also) {
+    if (seen == BRINGUP_FAILED) {
+        talk_say("No %s was seen on %s. Check its wire, %s[estop] active; then begin again.", edge,
+                 self->config.estop.line, also);
+    }
+    return seen;
+}
+
 bringup_result_t bringup_estop(bringup_t *self) {
     talk_step(2, "the e-stop (nothing is sent)");
     if (strcmp(self->config.estop.line, "none") == 0) {
@@ -79,17 +93,26 @@ bringup_result_t bringup_estop(bringup_t *self) {
     if (!trial_start(self, &self->config, false)) {
         return BRINGUP_FAILED;
     }
+    // A press is one only if it was not pressed before.
+    bringup_result_t seen = await_estop(self, "released", RELEASED_US);
+    if (seen == BRINGUP_FAILED) {
+        talk_say(
+            "The e-stop reads as pressed already. Release it now; if it is not pressed, its wire is cut or [estop] "
+            "active is the wrong way round ...");
+        seen = await_estop(self, "released", PRESS_US);
+    }
+    if (seen != BRINGUP_ON) {
+        return no_edge(self, seen, "release", "");
+    }
     talk_say("Press the e-stop button now ...");
-    if (!await_estop(self, "pressed")) {
-        talk_say("No press was seen on %s. Check its wire, [estop] line and [estop] active; then begin again.",
-                 self->config.estop.line);
-        return BRINGUP_FAILED;
+    seen = await_estop(self, "pressed", PRESS_US);
+    if (seen != BRINGUP_ON) {
+        return no_edge(self, seen, "press", "[estop] line and ");
     }
     talk_say("Seen. Release it ...");
-    if (!await_estop(self, "released")) {
-        talk_say("No release was seen on %s. Check its wire and [estop] active; then begin again.",
-                 self->config.estop.line);
-        return BRINGUP_FAILED;
+    seen = await_estop(self, "released", PRESS_US);
+    if (seen != BRINGUP_ON) {
+        return no_edge(self, seen, "release", "");
     }
     talk_say("Seen. It will stop the wheels in everything that follows, and so does any key.");
     bringup_note(self, "estop", "line", NULL, "press and release were seen%s",

@@ -14,6 +14,8 @@
 #define SILENT_US  1000000
 /// Snapshots at 50 Hz with the whole command in force, without which nothing was tried.
 #define IN_FORCE_MIN 4
+/// So many times as fast as would be enough of both, one alone is.
+#define ENOUGH_OF_ONE 4
 
 typedef struct {
     bringup_t *bringup;
@@ -27,6 +29,7 @@ typedef struct {
     int samples;
     int in_force;     ///< Snapshots in which the wheels were told what was commanded, ramps over.
     json_int_t stops; ///< Of the gateway, before this one.
+    int unknown;      ///< Snapshots without the speed of both wheels.
     bool enough;
 } run_t;
 
@@ -61,16 +64,39 @@ static bool is_in_force(const burst_t *burst, const json_t *state) {
     return true;
 }
 
+/// The speeds of both wheels in a snapshot. False if one is not known: an unknown speed is no standstill.
+static bool speeds_of(const json_t *state, int out_mm_s[IW_SIDES]) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const json_t *speed = json_object_get(json_object_get(state, bringup_side((iw_side_t)side)), "speed_mm_s");
+        if (!json_is_integer(speed)) {
+            return false;
+        }
+        out_mm_s[side] = (int)json_integer_value(speed);
+    }
+    return true;
+}
+
+static bool is_enough(const burst_t *burst, const outcome_t *outcome) {
+    const int left = abs(outcome->peak_mm_s[IW_LEFT]);
+    const int right = abs(outcome->peak_mm_s[IW_RIGHT]);
+    const int fast = left > right ? left : right;
+    const int slow = left > right ? right : left;
+    return burst->enough_mm_s > 0 && (slow >= burst->enough_mm_s || fast >= ENOUGH_OF_ONE * burst->enough_mm_s);
+}
+
 static void take_speeds(run_t *run, const json_t *state, int64_t now_us) {
     const bool late = now_us > (run->begin_us + run->end_us) / 2;
-    for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *wheel = json_object_get(state, side == IW_LEFT ? "left" : "right");
-        const int speed = (int)json_integer_value(json_object_get(wheel, "speed_mm_s"));
-        int *peak = &run->outcome->peak_mm_s[side];
-        *peak = abs(speed) > abs(*peak) ? speed : *peak;
-        run->sum_mm_s[side] += late ? speed : 0;
-        run->enough = run->enough || (run->burst->enough_mm_s > 0 && abs(speed) >= run->burst->enough_mm_s);
+    int speed[IW_SIDES];
+    if (!speeds_of(state, speed)) {
+        run->unknown++;
+        return;
     }
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        int *peak = &run->outcome->peak_mm_s[side];
+        *peak = abs(speed[side]) > abs(*peak) ? speed[side] : *peak;
+        run->sum_mm_s[side] += late ? speed[side] : 0;
+    }
+    run->enough = run->enough || is_enough(run->burst, run->outcome);
     run->samples += late ? 1 : 0;
     run->in_force += is_in_force(run->burst, state) ? 1 : 0;
 }
@@ -132,6 +158,8 @@ static burst_end_t judge(run_t *run, burst_end_t end) {
                       strcmp(text_word(why, "cause"), "client_stop") == 0;
     if (end == BURST_STOPPED || (end == BURST_DONE && !ours)) {
         end = fail(run, BURST_STOPPED, text_word(why, "sentence"));
+    } else if (end == BURST_DONE && run->unknown > 0) {
+        end = fail(run, BURST_STOPPED, "the speed of a wheel was not known");
     } else if (end == BURST_DONE && !run->enough && run->in_force < IN_FORCE_MIN) {
         end = fail(run, BURST_STOPPED, "the command was hardly in force; this machine is too busy");
     }

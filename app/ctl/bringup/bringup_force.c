@@ -3,6 +3,7 @@
 //
 // Only a known mass tells a unit. Without one the unit stays assumed.
 #include "bringup.h"
+#include "talk/signals.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -20,12 +21,22 @@
 #define SLACK    2.0
 /// Less than this is noise.
 #define COUNTS_MIN 3.0
+/// A sway of more than this share of the change is a hand.
+#define SWAY 0.5
 
 static const char *const names[IW_SIDES] = {[IW_LEFT] = "left", [IW_RIGHT] = "right"};
 
-/// Mean of the raw force over two seconds. False if it is not heard.
-static bool mean_raw(bringup_t *self, iw_side_t side, double *out_mean) {
+/// The raw force over two seconds.
+typedef struct {
+    double mean;
+    long long low;
+    long long high;
+    bool heard; ///< All the time, hardly a look without it.
+} force_t;
+
+static force_t look_at_force(bringup_t *self, iw_side_t side) {
     const struct timespec pause = {0, LOOK_NS};
+    force_t force = {.low = INT16_MAX, .high = INT16_MIN};
     double sum = 0.0;
     int count = 0;
     (void)fputs("  ... measuring for 2 s\n", stdout);
@@ -34,14 +45,27 @@ static bool mean_raw(bringup_t *self, iw_side_t side, double *out_mean) {
         json_t *status = trial_status(self);
         const json_t *raw = json_object_get(json_object_get(status, names[side]), "force_raw");
         if (json_is_integer(raw)) {
-            sum += (double)json_integer_value(raw);
+            const long long value = json_integer_value(raw);
+            sum += (double)value;
+            force.low = value < force.low ? value : force.low;
+            force.high = value > force.high ? value : force.high;
             count++;
         }
         json_decref(status);
         (void)nanosleep(&pause, NULL);
     }
-    *out_mean = count > 0 ? sum / count : 0.0;
-    return count > LOOKS / 2;
+    force.mean = count > 0 ? sum / count : 0.0;
+    force.heard = count >= LOOKS * 9 / 10;
+    return force;
+}
+
+/// Nobody held the handle or the mass meanwhile: the force swayed little beside what the mass changed.
+static bool is_steady(const force_t *force, double change) {
+    return (double)(force->high - force->low) <= fmax(COUNTS_MIN * 2.0, fabs(change) * SWAY);
+}
+
+static bool is_at_its_end(const force_t *force) {
+    return force->low <= INT16_MIN || force->high >= INT16_MAX;
 }
 
 static bool is_about(double value, double wanted) {
@@ -83,12 +107,38 @@ static void tell_press(bringup_t *self, iw_side_t side, double counts) {
                  counts);
 }
 
+static bringup_result_t tell_deaf(bringup_t *self, iw_side_t side) {
+    talk_say("  The %s wheel's force was not heard all the time; its unit stays assumed.", names[side]);
+    bringup_note(self, names[side], "force_unit", NULL, "assumed: no force was heard");
+    return BRINGUP_ON;
+}
+
+/// A mass tells the unit only of a force that stands still and is not at its end.
+static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, const force_t *loaded) {
+    if (is_at_its_end(free) || is_at_its_end(loaded)) {
+        talk_say("  The raw force is at the end of its range (%lld to %lld); the unit stays assumed. Take less mass.",
+                 loaded->low, loaded->high);
+        bringup_note(self, names[side], "force_unit", NULL, "assumed: the force was at the end of its range");
+        return false;
+    }
+    const double change = loaded->mean - free->mean;
+    if (!is_steady(free, change) || !is_steady(loaded, change)) {
+        talk_say("  The force swayed (free %lld to %lld, loaded %lld to %lld): was the handle or the mass touched "
+                 "meanwhile? The unit stays assumed.",
+                 free->low, free->high, loaded->low, loaded->high);
+        bringup_note(self, names[side], "force_unit", NULL, "assumed: the force swayed while it was weighed");
+        return false;
+    }
+    return true;
+}
+
 static bringup_result_t measure(bringup_t *self, iw_side_t side) {
     char question[112];
     char answer[BRINGUP_ANSWER_SIZE];
     double mass_kg = 0.0;
-    double free = 0.0;
-    double loaded = 0.0;
+    const unsigned signals = signals_count();
+    force_t free;
+    force_t loaded;
     bool weighed = false;
     (void)snprintf(question, sizeof(question), "Mass in kg that you will put on the %s handle (Enter: press by hand)",
                    names[side]);
@@ -96,21 +146,29 @@ static bringup_result_t measure(bringup_t *self, iw_side_t side) {
         !talk_ask("Hands and weights off both handles, then Enter", "go", answer)) {
         return BRINGUP_QUIT;
     }
-    if (!mean_raw(self, side, &free)) {
-        talk_say("  The %s wheel sends no force; its unit stays assumed.", names[side]);
-        bringup_note(self, names[side], "force_unit", NULL, "assumed: no force was heard");
-        return BRINGUP_ON;
+    free = look_at_force(self, side);
+    if (signals_count() != signals) {
+        return BRINGUP_QUIT;
+    }
+    if (!free.heard) {
+        return tell_deaf(self, side);
     }
     (void)snprintf(question, sizeof(question), "Now %s the %s handle and leave it so, then Enter",
                    weighed ? "put the mass on" : "press", names[side]);
     if (!talk_ask(question, "go", answer)) {
         return BRINGUP_QUIT;
     }
-    (void)mean_raw(self, side, &loaded);
-    if (weighed) {
-        keep_unit(self, side, loaded - free, mass_kg);
-    } else {
-        tell_press(self, side, loaded - free);
+    loaded = look_at_force(self, side);
+    if (signals_count() != signals) {
+        return BRINGUP_QUIT;
+    }
+    if (!loaded.heard) {
+        return tell_deaf(self, side);
+    }
+    if (!weighed) {
+        tell_press(self, side, loaded.mean - free.mean);
+    } else if (is_usable(self, side, &free, &loaded)) {
+        keep_unit(self, side, loaded.mean - free.mean, mass_kg);
     }
     return BRINGUP_ON;
 }

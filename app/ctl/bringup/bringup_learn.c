@@ -44,12 +44,18 @@ static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
 
 /// Setpoints longer than documented are sent so: the other controller had its reasons.
 static void take_length(bringup_t *self, const learn_t *learn) {
-    const learn_id_t *left = learn_known(learn, IW_ID_LEFT_SETPOINT);
-    if (left->count > 0U && left->length.low == left->length.high && left->length.low > DLC_MIN &&
-        left->length.low <= DLC_MAX) {
-        self->config.core.setpoint_dlc = (uint16_t)left->length.low;
-        bringup_note(self, "wheels", "setpoint_dlc", NULL, "the other controller sent %d bytes", left->length.low);
-        talk_say("Its setpoints have %d bytes, so ours get as many (setpoint_dlc).", left->length.low);
+    const learn_range_t *left = &learn_known(learn, IW_ID_LEFT_SETPOINT)->length;
+    const learn_range_t *right = &learn_known(learn, IW_ID_RIGHT_SETPOINT)->length;
+    const int low = left->low < right->low ? left->low : right->low;
+    const int high = left->high > right->high ? left->high : right->high;
+    const bool both = learn->setpoint[IW_LEFT].count > 0U && learn->setpoint[IW_RIGHT].count > 0U;
+    if (both && low == high && low > DLC_MIN && low <= DLC_MAX) {
+        self->config.core.setpoint_dlc = (uint16_t)low;
+        bringup_note(self, "wheels", "setpoint_dlc", NULL, "every setpoint of the recording has %d bytes", low);
+        talk_say("All of them have %d bytes, so ours get as many (setpoint_dlc).", low);
+    } else if (high > DLC_MIN) {
+        talk_say("They have %d to %d bytes, or only one wheel got any: the length stays %u (setpoint_dlc).", low, high,
+                 self->config.core.setpoint_dlc);
     }
 }
 
@@ -66,11 +72,16 @@ bool bringup_learn(bringup_t *self, char *out_types, size_t size) {
         const uint64_t frames = list_types(&study->learn, out_types, size);
         found = frames > 0U;
         if (found) {
-            talk_say("In %s another controller drove with type %s (%" PRIu64 " setpoints with a speed).",
-                     self->recording, out_types, frames);
+            talk_say("In %s %" PRIu64 " setpoints have a speed, with type %s. That is what was sent, no proof that the "
+                     "wheels turned by it (iwheelctl learn tells).",
+                     self->recording, frames, out_types);
+            if (study->learn.setpoint[IW_LEFT].sent + study->learn.setpoint[IW_RIGHT].sent > 0U) {
+                talk_say("Some are marked as sent by the program that recorded them: if that was this gateway, they "
+                         "repeat its configuration.");
+            }
             take_length(self, &study->learn);
         } else {
-            talk_say("In %s nobody drove: there is no setpoint with a speed in it.", self->recording);
+            talk_say("In %s there is no setpoint with a speed: it suggests nothing.", self->recording);
         }
     }
     free(study);

@@ -30,6 +30,13 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
                  "exchange the wheels (or their plugs), then begin again.");
         return false;
     }
+    if (abs(other) >= MOVES_MM_S) {
+        talk_say(
+            "The bus says that BOTH wheels turned (%d and %d mm/s), though only the %s one was told to: what turned "
+            "the other? Nothing can be said of a sign so.",
+            told, other, names[side]);
+        return false;
+    }
     if (told <= -MOVES_MM_S) {
         talk_say("The %s wheel measures the opposite of what it is told. No key mends that, and the gateway would stop "
                  "for it (feedback_sign): check the wiring between motor and sensor, or ask the maker.",
@@ -112,6 +119,12 @@ static bringup_result_t verify(bringup_t *self, bool *out_right) {
     const bringup_result_t shown = burst_show(self, &burst, &outcome);
     if (shown != BRINGUP_ON) {
         return shown;
+    }
+    if (outcome.mean_mm_s[IW_LEFT] < MOVES_MM_S || outcome.mean_mm_s[IW_RIGHT] < MOVES_MM_S) {
+        talk_say(
+            "The bus does not say that both went forwards. Something held a wheel, or a sign was not seen rightly: "
+            "each wheel once more.");
+        return BRINGUP_ON;
     }
     return talk_yes("Would the machine have gone straight ahead?", false, out_right) ? BRINGUP_ON : BRINGUP_QUIT;
 }

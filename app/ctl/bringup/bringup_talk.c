@@ -43,7 +43,7 @@ void talk_step(unsigned number, const char *title) {
     const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
     paper_say(&paper, TONE_PLAIN, "%s", "");
     paper_end(&paper);
-    paper_say(&paper, TONE_TITLE, "Step %u of 9: %s", number, title);
+    paper_say(&paper, TONE_TITLE, "Step %u of %u: %s", number, BRINGUP_STEPS, title);
     paper_end(&paper);
 }
 
@@ -82,8 +82,12 @@ static void trim(char *text) {
     }
 }
 
-bool talk_ask(const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]) {
+void talk_forget(void) {
     (void)tcflush(STDIN_FILENO, TCIFLUSH); // An answer to a question that nobody had read yet is none.
+}
+
+bool talk_ask(const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]) {
+    talk_forget();
     (void)printf("%s [%s] ", question, otherwise);
     (void)fflush(stdout);
     if (!read_line(out_answer, BRINGUP_ANSWER_SIZE)) {

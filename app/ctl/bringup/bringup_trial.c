@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 // The gateway of the session: started with a trial configuration in a folder of its own, ended with us whatever happens.
 #include "bringup.h"
+#include "talk/signals.h"
 #include "text/text.h"
 
 #include <errno.h>
 #include <fcntl.h>
+#include <ftw.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -192,16 +195,26 @@ void trial_stop(bringup_t *self) {
     self->trial.pid = 0;
 }
 
+static int remove_one(const char *path, const struct stat *status, int kind, struct FTW *place) {
+    (void)status;
+    (void)kind;
+    (void)place;
+    (void)remove(path); // What cannot be removed now is tried again.
+    return 0;
+}
+
+/// With all that is in it: the gateway leaves its ledger there, and recordings of stops. Its keeper and its writer end a
+/// little later than it does, and may still be at it.
 void trial_close(bringup_t *self) {
-    static const char *const names[] = {"gateway.conf", "gateway.log", "gateway.sock"};
-    char path[128];
+    const int64_t end_us = client_now_us() + END_US;
     trial_stop(self);
-    for (size_t i = 0; i < sizeof(names) / sizeof(names[0]) && self->trial.folder[0] != '\0'; i++) {
-        path_of(&self->trial, names[i], path, sizeof(path));
-        (void)unlink(path);
-    }
-    if (self->trial.folder[0] != '\0') {
-        (void)rmdir(self->trial.folder);
+    while (self->trial.folder[0] != '\0' && access(self->trial.folder, F_OK) == 0) {
+        (void)nftw(self->trial.folder, remove_one, 8, FTW_DEPTH | FTW_PHYS | FTW_MOUNT);
+        if (client_now_us() > end_us) {
+            talk_say("%s could not be removed; please do.", self->trial.folder);
+            break;
+        }
+        nap();
     }
     self->trial.folder[0] = '\0';
 }
@@ -236,6 +249,7 @@ static const char *missing(const json_t *status) {
 
 bool trial_wait_ready(bringup_t *self) {
     const int64_t end_us = client_now_us() + READY_US;
+    const unsigned signals = signals_count();
     for (;;) {
         json_t *status = trial_status(self);
         const char *what = missing(status);
@@ -249,7 +263,9 @@ bool trial_wait_ready(bringup_t *self) {
             json_decref(near_ask(self->ctl, json_pack("{s:s}", "cmd", "reset"))); // Refused until the cause is gone.
         }
         if (client_now_us() > end_us || lost) {
-            talk_say("  Not ready: %s.", what);
+            if (signals_count() == signals) {
+                talk_say("  Not ready: %s.", what);
+            }
             return false;
         }
         nap();

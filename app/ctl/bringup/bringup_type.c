@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Byte 0 of a setpoint, and what the current beside the speed means: the two things that the document leaves out and that
-// nothing can be driven without.
+// Byte 0 of a setpoint: the first of the two things that the document leaves out and that nothing can be driven without.
 //
-// While the role is unknown, wheels are driven as if the current were a setpoint: its zero is 0 mm/s with 0 mA, which is
+// While the role of the current is unknown, wheels are driven as if the current were a setpoint: its zero is 0 mm/s with 0 mA, which is
 // no torque whichever role is right. The other way round, a zero with full current could be full torque.
 #include "bringup.h"
 
@@ -10,19 +9,18 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TYPE_MAX      255
-#define PROBE_MS      1200U
-#define TORQUE_MS     400U
-#define ZERO_MS       1000U
-#define MOVES_MM_S    40
-#define TORQUE_MM_S   25
+#define TYPE_MAX   255
+#define MOVES_MM_S 40
+/// Measured speed in percent of what was told, between which it was followed: the radius may be another one.
+#define FOLLOWS_LOW   60
+#define FOLLOWS_HIGH  150
 #define PROBE_DEFAULT "0-7"
 
 static bool both_move(const outcome_t *outcome) {
     return abs(outcome->mean_mm_s[IW_LEFT]) >= MOVES_MM_S && abs(outcome->mean_mm_s[IW_RIGHT]) >= MOVES_MM_S;
 }
 
-static burst_t ahead(const bringup_t *self, unsigned for_ms) {
+burst_t bringup_ahead(const bringup_t *self, unsigned for_ms) {
     return (burst_t){.speed_mm_s = {BRINGUP_SPEED_MM_S, BRINGUP_SPEED_MM_S},
                      .current_mA = {self->current_mA, self->current_mA},
                      .has_current = true,
@@ -30,7 +28,7 @@ static burst_t ahead(const bringup_t *self, unsigned for_ms) {
 }
 
 /// A gateway that sends this type, with the role under which a zero surely is no torque.
-static bool start_with(bringup_t *self, int type) {
+bool bringup_start_with(bringup_t *self, int type) {
     gateway_config_t config = self->config;
     config.core.setpoint_type = (uint8_t)type;
     config.core.setpoint_type_set = true;
@@ -38,20 +36,39 @@ static bool start_with(bringup_t *self, int type) {
     return trial_start(self, &config, false);
 }
 
+/// A type that means speed turns a wheel about as fast as it is told, whatever else may turn it.
+static bool is_followed(const outcome_t *outcome) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const int speed = abs(outcome->mean_mm_s[side]);
+        if (speed < BRINGUP_SPEED_MM_S * FOLLOWS_LOW / 100 || speed > BRINGUP_SPEED_MM_S * FOLLOWS_HIGH / 100) {
+            return false;
+        }
+    }
+    return true;
+}
+
 static void keep_type(bringup_t *self, int type, const outcome_t *outcome) {
+    const bool followed = is_followed(outcome);
     self->config.core.setpoint_type = (uint8_t)type;
     self->config.core.setpoint_type_set = true;
-    bringup_note(self, "wheels", "setpoint_type", "setpoint_type",
-                 "both wheels turned with it: told %d mm/s, measured %d and %d", BRINGUP_SPEED_MM_S,
-                 outcome->mean_mm_s[IW_LEFT], outcome->mean_mm_s[IW_RIGHT]);
+    bringup_note(self, "wheels", "setpoint_type", followed ? "setpoint_type" : NULL,
+                 "both wheels turned with it%s: told %d mm/s, measured %d and %d",
+                 followed ? "" : ", but at another speed", BRINGUP_SPEED_MM_S, outcome->mean_mm_s[IW_LEFT],
+                 outcome->mean_mm_s[IW_RIGHT]);
+    if (!followed) {
+        talk_say(
+            "Told %d mm/s, measured %d and %d: a gear that was not measured, or this type means something else than "
+            "speed. It is taken, and noted as not confirmed.",
+            BRINGUP_SPEED_MM_S, outcome->mean_mm_s[IW_LEFT], outcome->mean_mm_s[IW_RIGHT]);
+    }
 }
 
 /// Tries one type. `*out_found`: both wheels turned and the operator saw it.
 static bringup_result_t try_type(bringup_t *self, int type, bool *out_found) {
     outcome_t outcome;
-    const burst_t burst = ahead(self, PROBE_MS);
+    const burst_t burst = bringup_ahead(self, BRINGUP_PROBE_MS);
     *out_found = false;
-    if (!start_with(self, type)) {
+    if (!bringup_start_with(self, type)) {
         return BRINGUP_FAILED;
     }
     (void)printf("type %d:\n", type);
@@ -59,7 +76,14 @@ static bringup_result_t try_type(bringup_t *self, int type, bool *out_found) {
     if (shown == BRINGUP_QUIT) {
         return BRINGUP_QUIT;
     }
-    if (shown == BRINGUP_FAILED || !both_move(&outcome)) {
+    if (shown == BRINGUP_FAILED) {
+        return BRINGUP_ON;
+    }
+    if (!both_move(&outcome)) {
+        const bool left = abs(outcome.mean_mm_s[IW_LEFT]) >= MOVES_MM_S;
+        if (left || abs(outcome.mean_mm_s[IW_RIGHT]) >= MOVES_MM_S) {
+            talk_say("  Only the %s wheel turned: is the other one held, or switched off?", left ? "left" : "right");
+        }
         return BRINGUP_ON;
     }
     if (!talk_yes("Did both wheels turn, slowly and evenly?", true, out_found)) {
@@ -133,7 +157,7 @@ bringup_result_t bringup_type(bringup_t *self) {
     talk_say("Byte 0 of every setpoint is a type whose values the wheels' document does not list. Write the one you "
              "know (from the maker, or from a recording: --learn FILE), or the ones to try, such as 0-7 or 1,4. Each "
              "is tried for %.1f s at %d mm/s with at most %d mA, until one moves both wheels.",
-             PROBE_MS / 1e3, BRINGUP_SPEED_MM_S, self->current_mA);
+             BRINGUP_PROBE_MS / 1e3, BRINGUP_SPEED_MM_S, self->current_mA);
     while (!found) {
         if (!talk_ask("Setpoint type, or types to try", suggestion, answer)) {
             return BRINGUP_QUIT;
@@ -148,83 +172,4 @@ bringup_result_t bringup_type(bringup_t *self) {
         }
     }
     return BRINGUP_ON;
-}
-
-/// Under the role limit a zero is speed 0 with current. If that turns a wheel, the role is the other one. `*out_turned`.
-static bringup_result_t try_zero(bringup_t *self, bool *out_turned) {
-    gateway_config_t config = self->config;
-    outcome_t outcome;
-    const burst_t zero = {.for_ms = ZERO_MS, .enough_mm_s = TORQUE_MM_S};
-    config.core.current_role = IW_ROLE_LIMIT;
-    *out_turned = false;
-    talk_say("Last, a zero as that role has it, speed 0 with %d mA. Nothing may turn.", self->current_mA);
-    if (!trial_start(self, &config, false)) {
-        return BRINGUP_FAILED;
-    }
-    const bringup_result_t shown = burst_show(self, &zero, &outcome);
-    *out_turned = abs(outcome.peak_mm_s[IW_LEFT]) >= TORQUE_MM_S || abs(outcome.peak_mm_s[IW_RIGHT]) >= TORQUE_MM_S;
-    return shown;
-}
-
-static const char *measured_role(bool torque, bool free) {
-    if (torque) {
-        return "setpoint";
-    }
-    return free ? "?" : "limit";
-}
-
-static bringup_result_t keep_role(bringup_t *self, const char *measured) {
-    char answer[BRINGUP_ANSWER_SIZE];
-    do {
-        if (!talk_ask("current_role (limit or setpoint)", measured, answer)) {
-            return BRINGUP_QUIT;
-        }
-    } while (strcmp(answer, "limit") != 0 && strcmp(answer, "setpoint") != 0);
-    const bool same = strcmp(answer, measured) == 0;
-    self->config.core.current_role = strcmp(answer, "limit") == 0 ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
-    bringup_note(self, "wheels", "current_role", same ? "current_role" : NULL,
-                 !same                          ? "typed in; the wheels' behaviour did not show it"
-                 : strcmp(answer, "limit") == 0 ? "a current without speed did not turn the wheels, a speed without "
-                                                  "current neither"
-                                                : "a current without speed turned the wheels");
-    return BRINGUP_ON;
-}
-
-bringup_result_t bringup_role(bringup_t *self) {
-    outcome_t torque;
-    outcome_t unfed;
-    const int current_mA = self->current_mA / 2;
-    const burst_t current_only = {
-        .current_mA = {current_mA, current_mA}, .has_current = true, .for_ms = TORQUE_MS, .enough_mm_s = TORQUE_MM_S};
-    const burst_t speed_only = {
-        .speed_mm_s = {BRINGUP_SPEED_MM_S, BRINGUP_SPEED_MM_S}, .has_current = true, .for_ms = PROBE_MS / 2U};
-    talk_step(5, "what the current means (WHEELS MAY TURN, in the air)");
-    talk_say("Beside the speed a setpoint has a current. Either it limits the motor's current, or it is a setpoint of "
-             "its own. Two short tries tell: %d mA without a speed, then %d mm/s without a current.",
-             current_mA, BRINGUP_SPEED_MM_S);
-    if (!start_with(self, self->config.core.setpoint_type)) {
-        return BRINGUP_FAILED;
-    }
-    bringup_result_t shown = burst_show(self, &current_only, &torque);
-    shown = shown == BRINGUP_ON ? burst_show(self, &speed_only, &unfed) : shown;
-    if (shown != BRINGUP_ON) {
-        return shown;
-    }
-    const bool by_current =
-        abs(torque.peak_mm_s[IW_LEFT]) >= TORQUE_MM_S || abs(torque.peak_mm_s[IW_RIGHT]) >= TORQUE_MM_S;
-    const bool without = both_move(&unfed);
-    bool turned = false;
-    talk_say(by_current ? "The current alone turned them: it is a setpoint."
-             : without  ? "They turn without current too, and not by current alone: it seems to mean nothing. Ask the "
-                          "maker; limit is the usual word for that."
-                        : "Neither turned them: the current seems to be a limit.");
-    if (!by_current && !without) {
-        shown = try_zero(self, &turned);
-        if (shown != BRINGUP_ON) {
-            return shown;
-        }
-        talk_say(turned ? "It TURNED: the current is a setpoint after all."
-                        : "Nothing turned: the current is a limit.");
-    }
-    return keep_role(self, measured_role(by_current || turned, without));
 }

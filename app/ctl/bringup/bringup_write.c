@@ -11,6 +11,9 @@
 #include <time.h>
 #include <unistd.h>
 
+/// Of a text that the ledger keeps, with its terminator.
+#define HOW_SIZE 128U
+
 void bringup_note(bringup_t *self, const char *section, const char *key, const char *item, const char *format, ...) {
     unsigned at = 0;
     while (at < self->notes && (strcmp(self->note[at].section, section) != 0 || strcmp(self->note[at].key, key) != 0)) {
@@ -28,6 +31,19 @@ void bringup_note(bringup_t *self, const char *section, const char *key, const c
     va_start(arguments, format);
     (void)vsnprintf(note->text, sizeof(note->text), format, arguments);
     va_end(arguments);
+}
+
+const char *bringup_side(iw_side_t side) {
+    return side == IW_LEFT ? "left" : "right";
+}
+
+bool bringup_is_confirmed(const bringup_t *self, const char *item) {
+    for (unsigned i = 0; i < self->notes; i++) {
+        if (self->note[i].item != NULL && strcmp(self->note[i].item, item) == 0) {
+            return true;
+        }
+    }
+    return false;
 }
 
 static const bringup_note_t *find_note(const bringup_t *self, const char *section, const char *key) {
@@ -118,6 +134,8 @@ static const char *value_of(const bringup_t *self, const bringup_note_t *note, c
         (void)snprintf(out_value, 32, core->gear_per == 1U ? "%u" : "%u/%u", core->gear_turns, core->gear_per);
     } else if (strcmp(note->key, "radius_mm") == 0) {
         (void)snprintf(out_value, 32, "%u", core->radius_mm);
+    } else if (strcmp(note->key, "track_mm") == 0) {
+        (void)snprintf(out_value, 32, "%u", self->config.track_mm);
     } else {
         out_value[0] = '\0';
     }
@@ -129,9 +147,16 @@ static void tell_findings(const bringup_t *self) {
     talk_say("What was found:");
     for (unsigned i = 0; i < self->notes; i++) {
         const bringup_note_t *note = &self->note[i];
-        (void)printf("  %s [%s] %s%s%s\n      %s\n", note->item != NULL ? "confirmed" : "noted    ", note->section,
-                     note->key, value_of(self, note, value)[0] != '\0' ? " = " : "", value, note->text);
+        (void)printf("  %s [%s] %s%s%s\n", note->item != NULL ? "confirmed" : "noted    ", note->section, note->key,
+                     value_of(self, note, value)[0] != '\0' ? " = " : "", value);
+        talk_say("    %s", note->text);
     }
+}
+
+/// How it was found, as the ledger keeps it.
+static const char *how_of(const bringup_note_t *note, char out_how[HOW_SIZE]) {
+    (void)snprintf(out_how, HOW_SIZE, "bringup: %.*s", (int)(HOW_SIZE - sizeof("bringup: ")), note->text);
+    return out_how;
 }
 
 /// Tells the ledger what was confirmed, through a gateway that keeps it where the real one will look. False if anything
@@ -142,8 +167,10 @@ static bool confirm_all(bringup_t *self) {
     for (unsigned i = 0; i < self->notes && taken; i++) {
         const bringup_note_t *note = &self->note[i];
         if (note->item != NULL) {
-            json_t *reply = near_ask(self->ctl, json_pack("{s:s,s:s,s:s}", "cmd", "confirm", "item", note->item,
-                                                          "value", value_of(self, note, value)));
+            char how[HOW_SIZE];
+            json_t *reply =
+                near_ask(self->ctl, json_pack("{s:s,s:s,s:s,s:s}", "cmd", "confirm", "item", note->item, "value",
+                                              value_of(self, note, value), "how", how_of(note, how)));
             taken = strcmp(text_word(reply, "state"), "confirmed") == 0;
             json_decref(reply);
         }
@@ -172,14 +199,16 @@ static void tell_next(bringup_t *self, const char *path) {
     for (unsigned i = 0; i < self->notes; i++) {
         const bringup_note_t *note = &self->note[i];
         if (note->item != NULL) {
-            (void)printf("  iwheelctl confirm %s %s\n", note->item, value_of(self, note, value));
+            char how[HOW_SIZE];
+            (void)printf("  iwheelctl confirm %s %s --how '%s'\n", note->item, value_of(self, note, value),
+                         how_of(note, how));
         }
     }
 }
 
 bringup_result_t bringup_write(bringup_t *self) {
     char path[BRINGUP_ANSWER_SIZE];
-    talk_step(9, "the configuration");
+    talk_step(BRINGUP_STEPS, "the configuration");
     trial_stop(self);
     tell_findings(self);
     for (;;) {

@@ -99,7 +99,7 @@ static bool introduce(const bringup_t *self) {
     bool ready = false;
     talk_say("iwheelctl bringup: from wheels that nobody knows to a configuration that somebody has seen to be right.");
     talk_say(" ");
-    talk_say("Bus %s, e-stop %s. Nine steps; in three of them WHEELS TURN. Both wheels must hang in the air, free to "
+    talk_say("Bus %s, e-stop %s. Ten steps; in three of them WHEELS TURN. Both wheels must hang in the air, free to "
              "turn, and nobody and nothing may touch them. Keep a finger on the e-stop. They turn only right after a "
              "question, with at most %d mm/s and %d mA, for two seconds at most; the e-stop and any key stop them at "
              "once.",
@@ -112,7 +112,7 @@ static bool introduce(const bringup_t *self) {
 static bringup_result_t guide(bringup_t *self) {
     static bringup_result_t (*const steps[])(bringup_t *) = {
         bringup_checks, bringup_estop, bringup_gear,   bringup_type,  bringup_role,
-        bringup_signs,  bringup_force, bringup_radius, bringup_write,
+        bringup_signs,  bringup_force, bringup_radius, bringup_track, bringup_write,
     };
     bringup_result_t result = BRINGUP_ON;
     for (size_t i = 0; i < sizeof(steps) / sizeof(steps[0]) && result == BRINGUP_ON; i++) {

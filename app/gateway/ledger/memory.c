@@ -109,18 +109,23 @@ static bool read_text(const json_t *object, const char *field, char *out_text, s
     return true;
 }
 
+/// What the operator found, and how: ledgers of before do not tell that.
+static bool read_word(const json_t *object, gw_word_t *out_word) {
+    const bool has_how = json_object_get(object, "how") != NULL;
+    return json_object_size(object) == (has_how ? 7U : 6U) &&
+           read_text(object, "found", out_word->found, sizeof out_word->found) &&
+           (!has_how || read_text(object, "how", out_word->how, sizeof out_word->how));
+}
+
 static bool read_item(const json_t *object, gw_known_item_t *out_known) {
     int64_t figure;
     int64_t since;
     const char *state = json_string_value(json_object_get(object, "state"));
     const char *evidence = json_string_value(json_object_get(object, "evidence"));
-    const bool has_how = json_object_get(object, "how") != NULL; // Ledgers of before have none.
-    if (state == NULL || evidence == NULL || json_object_size(object) != (has_how ? 7U : 6U) ||
-        !read_number(object, "figure", INT32_MIN, INT32_MAX, &figure) ||
+    if (state == NULL || evidence == NULL || !read_number(object, "figure", INT32_MIN, INT32_MAX, &figure) ||
         !read_number(object, "since_wall_us", INT64_MIN, INT64_MAX, &since) ||
         !read_text(object, "value", out_known->value, sizeof out_known->value) ||
-        !read_text(object, "found", out_known->word.found, sizeof out_known->word.found) ||
-        (has_how && !read_text(object, "how", out_known->word.how, sizeof out_known->word.how))) {
+        !read_word(object, &out_known->word)) {
         return false;
     }
     const bool confirmed = strcmp(state, "confirmed") == 0;

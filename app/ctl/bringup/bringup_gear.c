@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+// Gear, by hand: turns of each wheel that are counted. Nothing is sent.
+#include "bringup.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#define TURNS        3
+#define GEAR_MAX     100.0
+#define GEAR_PERCENT 4.0
+/// By how much the rpm, summed up from looks at the status, may be off.
+#define RPM_SLACK 0.3
+
+/// One wheel: rotor turns per turn of the wheel, and how much of them the rpm made.
+typedef struct {
+    long long ticks;
+    double gear;
+    double share;
+} turned_t;
+
+/// Whose turns the rpm count, as far as both wheels showed it.
+typedef enum { RPM_UNSEEN = 0, RPM_WHEEL, RPM_ROTOR } rpm_of_t;
+
+/// What is wrong with it, told; or false.
+static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turned) {
+    const iw_side_t other = side == IW_LEFT ? IW_RIGHT : IW_LEFT;
+    const char *name = bringup_side(side);
+    if (!hand->heard) {
+        talk_say("  The wheels were not heard all the time.");
+    } else if (hand->way[other] > hand->way[side]) {
+        talk_say("  The %s wheel counted %lld ticks and the %s one %lld: was the wrong one turned, or are they "
+                 "exchanged?",
+                 bringup_side(other), hand->ticks[other], name, hand->ticks[side]);
+    } else if (!hand_went_one_way(hand, side)) {
+        talk_say("  The %s wheel was turned back and forth: %lld ticks there, %lld in all.", name, hand->ticks[side],
+                 hand->way[side]);
+    } else if (turned->gear < 1.0 - GEAR_PERCENT / 100.0 || turned->gear > GEAR_MAX) {
+        talk_say("  %lld ticks of the %s wheel in %d turns make no gear between 1 and %.0f.", hand->ticks[side], name,
+                 TURNS, GEAR_MAX);
+    } else {
+        return false;
+    }
+    return true;
+}
+
+/// One wheel, until it is done or given up. `*out_done`: it was turned.
+static bringup_result_t turn(bringup_t *self, iw_side_t side, turned_t *out_turned, bool *out_done) {
+    char prompt[96];
+    bool again = true;
+    *out_done = false;
+    (void)snprintf(prompt, sizeof(prompt), "Turn the %s wheel exactly %d times in one direction, then press Enter ...",
+                   bringup_side(side), TURNS);
+    while (!*out_done && again) {
+        hand_t hand;
+        if (!trial_wait_ready(self)) {
+            return BRINGUP_FAILED;
+        }
+        if (!hand_follow(self, prompt, &hand)) {
+            return BRINGUP_QUIT;
+        }
+        const double rotor = (double)llabs(hand.ticks[side]) / IW_TICKS_PER_TURN;
+        *out_turned = (turned_t){.ticks = llabs(hand.ticks[side]),
+                                 .gear = rotor / TURNS,
+                                 .share = rotor > 0.0 ? hand.rpm_turns[side] / rotor : 0.0};
+        *out_done = !is_no_turn(&hand, side, out_turned);
+        if (!*out_done && !talk_yes("Once more?", true, &again)) {
+            return BRINGUP_QUIT;
+        }
+    }
+    return BRINGUP_ON;
+}
+
+/// A whole number if it is nearly one, else tenths: what the configuration can hold.
+static void keep_gear(iw_config_t *core, double gear) {
+    const double whole = round(gear);
+    const bool is_whole = fabs(gear - whole) <= gear * GEAR_PERCENT / 100.0;
+    core->gear_turns = (uint16_t)(is_whole ? whole : round(gear * 10.0));
+    core->gear_per = is_whole ? 1U : 10U;
+}
+
+static bool is_about(double value, double wanted) {
+    return fabs(value - wanted) <= wanted * RPM_SLACK;
+}
+
+/// Both wheels must say the same, and not both things at once.
+static rpm_of_t judge_rpm(const turned_t turned[IW_SIDES]) {
+    bool rotor = true;
+    bool wheel = true;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        rotor = rotor && is_about(turned[side].share, 1.0);
+        wheel = wheel && is_about(turned[side].share, 1.0 / turned[side].gear);
+    }
+    return rotor == wheel ? RPM_UNSEEN : rotor ? RPM_ROTOR : RPM_WHEEL;
+}
+
+static void note_gear(bringup_t *self, const turned_t turned[IW_SIDES], bool geared, rpm_of_t rpm) {
+    const bool whole = !geared || rpm != RPM_UNSEEN;
+    bringup_note(self, "wheels", "gear_ratio", whole ? "gear_ratio" : NULL, "%lld and %lld ticks in %d turns by hand%s",
+                 turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS,
+                 whole ? "" : "; whose turns the rpm count was not seen");
+    if (geared && rpm != RPM_UNSEEN) {
+        bringup_note(self, "wheels", "rpm_of", NULL, "rpm summed up over these turns make %.2f and %.2f of the rotor's",
+                     turned[IW_LEFT].share, turned[IW_RIGHT].share);
+    }
+}
+
+/// Both wheels were turned. `*out_taken`: the operator agrees.
+static bringup_result_t judge_gear(bringup_t *self, const turned_t turned[IW_SIDES], bool *out_taken) {
+    const double gear = (turned[IW_LEFT].gear + turned[IW_RIGHT].gear) / 2.0;
+    iw_config_t core = self->config.core;
+    *out_taken = false;
+    if (fabs(turned[IW_LEFT].gear - turned[IW_RIGHT].gear) > gear * 2.0 * GEAR_PERCENT / 100.0) {
+        talk_say(
+            "  The left wheel makes %.2f turns of its rotor per turn, the right one %.2f: were both turned exactly "
+            "%d times? The gear stays as it was.",
+            turned[IW_LEFT].gear, turned[IW_RIGHT].gear, TURNS);
+        return BRINGUP_ON;
+    }
+    keep_gear(&core, gear);
+    const bool geared = core.gear_turns > core.gear_per;
+    const rpm_of_t rpm = judge_rpm(turned);
+    // Without a gear the wheel's rpm and the rotor's are the same.
+    core.rpm_of_rotor = geared && (rpm == RPM_UNSEEN ? core.rpm_of_rotor : rpm == RPM_ROTOR);
+    talk_say("  %lld and %lld ticks in %d turns: %.2f turns of the rotor per turn of the wheel; %s.",
+             turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS, gear,
+             !geared             ? "no gear, so the rpm are both's"
+             : rpm == RPM_UNSEEN ? "whose turns the rpm count was not to be seen (turn faster to see it)"
+             : rpm == RPM_ROTOR  ? "the rpm count the rotor's turns"
+                                 : "the rpm count the wheel's turns");
+    if (!talk_yes("Take that?", true, out_taken)) {
+        return BRINGUP_QUIT;
+    }
+    if (*out_taken) {
+        self->config.core = core;
+        note_gear(self, turned, geared, rpm);
+    }
+    return BRINGUP_ON;
+}
+
+bringup_result_t bringup_gear(bringup_t *self) {
+    bool wanted = false;
+    bool done = true;
+    turned_t turned[IW_SIDES];
+    talk_step(3, "the gear (nothing is sent; you turn)");
+    talk_say("The wheels count %u ticks per turn of the rotor. Whether the rotor turns faster than the wheel, the "
+             "document does not say. Mark each tyre, so that a turn can be seen.",
+             IW_TICKS_PER_TURN);
+    if (!talk_yes("Turn the wheels by hand?", true, &wanted)) {
+        return BRINGUP_QUIT;
+    }
+    if (!wanted) {
+        return BRINGUP_ON;
+    }
+    if (!trial_start(self, &self->config, false)) {
+        return BRINGUP_FAILED;
+    }
+    for (unsigned side = 0; side < IW_SIDES && done; side++) {
+        const bringup_result_t result = turn(self, (iw_side_t)side, &turned[side], &done);
+        if (result != BRINGUP_ON) {
+            return result;
+        }
+    }
+    if (!done) {
+        talk_say("  The gear stays as it was.");
+        return BRINGUP_ON;
+    }
+    return judge_gear(self, turned, &wanted);
+}

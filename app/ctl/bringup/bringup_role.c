@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+// What the current beside the speed means: tries with one of the two, and a last one with both, without which wheels that
+// cannot turn at all would pass for a limit.
+//
+//     current alone turns both           -> setpoint
+//     neither alone, nor 0 with current,
+//         but both together turn both    -> limit
+//     anything else                      -> not seen; the operator may know
+#include "bringup.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define TORQUE_MS   400U
+#define ZERO_MS     1000U
+#define TORQUE_MM_S 25
+#define LEFT        (1U << IW_LEFT)
+#define RIGHT       (1U << IW_RIGHT)
+#define BOTH        (LEFT | RIGHT)
+
+/// What the tries showed.
+typedef struct {
+    const char *role; ///< "limit", "setpoint", or "?".
+    bool seen;        ///< All that it takes to say so, on both wheels.
+    char how[BRINGUP_NOTE_SIZE];
+} role_t;
+
+/// A bit per side that turned.
+static unsigned turned(const outcome_t *outcome) {
+    return (abs(outcome->peak_mm_s[IW_LEFT]) >= TORQUE_MM_S ? LEFT : 0U) |
+           (abs(outcome->peak_mm_s[IW_RIGHT]) >= TORQUE_MM_S ? RIGHT : 0U);
+}
+
+static const char *wheels(unsigned sides) {
+    return sides == BOTH    ? "both wheels"
+           : sides == LEFT  ? "the left wheel"
+           : sides == RIGHT ? "the right wheel"
+                            : "no wheel";
+}
+
+static bringup_result_t try_burst(bringup_t *self, const burst_t *burst, unsigned *out_turned) {
+    outcome_t outcome = {0};
+    const bringup_result_t shown = burst_show(self, burst, &outcome);
+    *out_turned = turned(&outcome);
+    return shown;
+}
+
+/// A current without a speed turned something.
+static void find_setpoint(role_t *found, unsigned sides, int current_mA) {
+    found->role = "setpoint";
+    found->seen = sides == BOTH;
+    (void)snprintf(found->how, sizeof(found->how), "%d mA without speed turned %s", current_mA, wheels(sides));
+    if (!found->seen) {
+        talk_say(
+            "Only %s: the other one may be held. A current that turns a wheel by itself is no limit, but it was not "
+            "seen of both.",
+            wheels(sides));
+    }
+}
+
+/// Under the role limit a zero is speed 0 with current. If that turns a wheel, the role is the other one.
+static bringup_result_t try_zero(bringup_t *self, unsigned *out_turned) {
+    gateway_config_t config = self->config;
+    const burst_t zero = {.for_ms = ZERO_MS, .enough_mm_s = TORQUE_MM_S};
+    config.core.current_role = IW_ROLE_LIMIT;
+    *out_turned = 0U;
+    talk_say("Now a zero as that role has it, speed 0 with %d mA. Nothing may turn.", self->current_mA);
+    if (!trial_start(self, &config, false)) {
+        return BRINGUP_FAILED;
+    }
+    return try_burst(self, &zero, out_turned);
+}
+
+/// Neither alone turned a wheel: that is a limit only if the two together still do.
+static bringup_result_t try_limit(bringup_t *self, role_t *found) {
+    const burst_t together = bringup_ahead(self, BRINGUP_PROBE_MS / 2U);
+    unsigned sides = 0U;
+    bringup_result_t shown = try_zero(self, &sides);
+    if (shown != BRINGUP_ON) {
+        return shown;
+    }
+    if (sides != 0U) {
+        talk_say("It TURNED %s: the current is a setpoint after all.", wheels(sides));
+        find_setpoint(found, sides, self->current_mA);
+        return BRINGUP_ON;
+    }
+    talk_say("Nothing turned. Last, speed and current together once more: both wheels must turn, or nothing is known.");
+    if (!bringup_start_with(self, self->config.core.setpoint_type)) {
+        return BRINGUP_FAILED;
+    }
+    shown = try_burst(self, &together, &sides);
+    if (shown != BRINGUP_ON) {
+        return shown;
+    }
+    found->seen = sides == BOTH;
+    if (found->seen) {
+        found->role = "limit";
+        (void)snprintf(found->how, sizeof(found->how),
+                       "%d mA without speed and %d mm/s without current turned no wheel, together both",
+                       self->current_mA, BRINGUP_SPEED_MM_S);
+        talk_say("They turn with both, and with neither alone: the current is a limit.");
+    } else {
+        talk_say(
+            "Now %s turned: something holds the wheels, so that they did not turn before means nothing. Let them turn "
+            "freely and begin again, or answer from what you know.",
+            wheels(sides));
+    }
+    return BRINGUP_ON;
+}
+
+static bringup_result_t find_role(bringup_t *self, role_t *found) {
+    const int current_mA = self->current_mA / 2;
+    const burst_t current_only = {
+        .current_mA = {current_mA, current_mA}, .has_current = true, .for_ms = TORQUE_MS, .enough_mm_s = TORQUE_MM_S};
+    const burst_t speed_only = {
+        .speed_mm_s = {BRINGUP_SPEED_MM_S, BRINGUP_SPEED_MM_S}, .has_current = true, .for_ms = BRINGUP_PROBE_MS / 2U};
+    unsigned by_current = 0U;
+    unsigned by_speed = 0U;
+    bringup_result_t shown = try_burst(self, &current_only, &by_current);
+    shown = shown == BRINGUP_ON ? try_burst(self, &speed_only, &by_speed) : shown;
+    if (shown != BRINGUP_ON) {
+        return shown;
+    }
+    if (by_current != 0U) {
+        talk_say("The current alone turned %s: it is a setpoint.", wheels(by_current));
+        find_setpoint(found, by_current, current_mA);
+        return BRINGUP_ON;
+    }
+    if (by_speed != 0U) {
+        talk_say(
+            "The speed without current turned %s, the current alone none: the current seems to mean nothing. Ask the "
+            "maker; limit is the usual word for that.",
+            wheels(by_speed));
+        return BRINGUP_ON;
+    }
+    talk_say("Neither turned a wheel: the current may be a limit.");
+    return try_limit(self, found);
+}
+
+static bringup_result_t keep_role(bringup_t *self, const role_t *found) {
+    char answer[BRINGUP_ANSWER_SIZE];
+    for (;;) {
+        if (!talk_ask("current_role (limit or setpoint)", found->role, answer)) {
+            return BRINGUP_QUIT;
+        }
+        if (strcmp(answer, "limit") == 0 || strcmp(answer, "setpoint") == 0) {
+            break;
+        }
+        talk_say("limit or setpoint, please: nothing can be driven without one of them (q ends bringup).");
+    }
+    const bool same = strcmp(answer, found->role) == 0;
+    self->config.core.current_role = strcmp(answer, "limit") == 0 ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
+    bringup_note(self, "wheels", "current_role", same && found->seen ? "current_role" : NULL, "%s",
+                 same ? found->how : "typed in; the wheels did not show it");
+    return BRINGUP_ON;
+}
+
+bringup_result_t bringup_role(bringup_t *self) {
+    role_t found = {.role = "?"};
+    talk_step(5, "what the current means (WHEELS MAY TURN, in the air)");
+    talk_say("Beside the speed a setpoint has a current. Either it limits the motor's current, or it is a setpoint of "
+             "its own. Two to four short tries tell: first %d mA without a speed, then %d mm/s without a current.",
+             self->current_mA / 2, BRINGUP_SPEED_MM_S);
+    if (!bringup_start_with(self, self->config.core.setpoint_type)) {
+        return BRINGUP_FAILED;
+    }
+    const bringup_result_t result = find_role(self, &found);
+    return result == BRINGUP_ON ? keep_role(self, &found) : result;
+}

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// Track, by full turns of the machine on the spot: it decides where a twist goes. Nothing is sent.
+//
+//     track = (way of the right wheel - way of the left wheel) / angle
+#include "bringup.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#define TURNS_MAX 20
+#define TICKS_MIN 60
+/// The bounds of the configuration's key.
+#define TRACK_MIN 50
+#define TRACK_MAX 5000
+/// The machine's middle may have wandered so far, as a share of what the wheels rolled.
+#define WANDER_PERCENT 20.0
+/// Further off what was configured, somebody may have counted wrongly.
+#define OFF_PERCENT 10.0
+
+/// What a wheel rolled forwards, in mm.
+static double rolled(const bringup_t *self, const hand_t *hand, iw_side_t side) {
+    const iw_config_t *core = &self->config.core;
+    const double assumed = 2.0 * M_PI * core->radius_mm / IW_TICKS_PER_TURN * core->gear_per / core->gear_turns;
+    const double way_mm = (double)hand->ticks[side] * (self->mm_per_tick > 0.0 ? self->mm_per_tick : assumed);
+    return core->invert[side] ? -way_mm : way_mm;
+}
+
+static bool is_turn(const bringup_t *self, const hand_t *hand) {
+    const double left = rolled(self, hand, IW_LEFT);
+    const double right = rolled(self, hand, IW_RIGHT);
+    if (!hand->heard) {
+        talk_say("  The wheels were not heard all the time.");
+    } else if (llabs(hand->ticks[IW_LEFT]) < TICKS_MIN || llabs(hand->ticks[IW_RIGHT]) < TICKS_MIN) {
+        talk_say("  Too few ticks (left %lld, right %lld): both wheels must stand on the ground and roll.",
+                 hand->ticks[IW_LEFT], hand->ticks[IW_RIGHT]);
+    } else if ((left > 0.0) == (right > 0.0)) {
+        talk_say("  Both wheels rolled the same way (left %.2f m, right %.2f m): that was no turn on the spot. If it "
+                 "was, a sign of step 6 is wrong: begin again.",
+                 left / 1e3, right / 1e3);
+    } else if (!hand_went_one_way(hand, IW_LEFT) || !hand_went_one_way(hand, IW_RIGHT)) {
+        talk_say("  It was turned back and forth (left %lld of %lld ticks, right %lld of %lld): only one way, please.",
+                 llabs(hand->ticks[IW_LEFT]), hand->way[IW_LEFT], llabs(hand->ticks[IW_RIGHT]), hand->way[IW_RIGHT]);
+    } else if (fabs(left + right) > (fabs(left) + fabs(right)) * WANDER_PERCENT / 100.0) {
+        talk_say("  Left rolled %.2f m, right %.2f m: the machine wandered off while it turned. Turn it on the spot, "
+                 "about the middle between its wheels.",
+                 left / 1e3, right / 1e3);
+    } else {
+        return true;
+    }
+    return false;
+}
+
+static void keep_track(bringup_t *self, const hand_t *hand, int turns, double track_mm) {
+    const bool rolled_distance = self->mm_per_tick > 0.0;
+    self->config.track_mm = (uint16_t)lround(track_mm);
+    bringup_note(self, "wheels", "track_mm", rolled_distance ? "track" : NULL,
+                 "%d full turns by hand: left %lld, right %lld ticks%s", turns, hand->ticks[IW_LEFT],
+                 hand->ticks[IW_RIGHT], rolled_distance ? "" : "; the radius is assumed");
+}
+
+static bringup_result_t judge_track(bringup_t *self, const hand_t *hand, int turns, bool *out_done) {
+    const double left = rolled(self, hand, IW_LEFT);
+    const double right = rolled(self, hand, IW_RIGHT);
+    const double track_mm = fabs(right - left) / (2.0 * M_PI * turns);
+    const double before_mm = self->config.track_mm;
+    const bool near = fabs(track_mm - before_mm) <= before_mm * OFF_PERCENT / 100.0;
+    *out_done = false;
+    if (!is_turn(self, hand)) {
+        return BRINGUP_ON;
+    }
+    if (track_mm < TRACK_MIN || track_mm > TRACK_MAX) {
+        talk_say(
+            "  Left rolled %.2f m, right %.2f m in %d turns: that is no track between %d and %d mm. Were the turns "
+            "counted rightly?",
+            left / 1e3, right / 1e3, turns, TRACK_MIN, TRACK_MAX);
+        return BRINGUP_ON;
+    }
+    talk_say("  Left rolled %.2f m, right %.2f m in %d turns: the track is %.0f mm%s.", left / 1e3, right / 1e3, turns,
+             track_mm, self->mm_per_tick > 0.0 ? "" : ", if the radius is as configured: no distance was measured");
+    if (!near) {
+        talk_say(
+            "  Configured were %.0f mm. A tape from the middle of one tyre to the middle of the other tells whether "
+            "the turns were counted rightly.",
+            before_mm);
+    }
+    if (!talk_yes("Take that?", near, out_done)) {
+        return BRINGUP_QUIT;
+    }
+    if (*out_done) {
+        keep_track(self, hand, turns, track_mm);
+    }
+    return BRINGUP_ON;
+}
+
+/// A whole number of turns. `*out_given` is false if the operator leaves it out.
+static bool ask_turns(int *out_turns, bool *out_given) {
+    double turns = 0.0;
+    for (;;) {
+        if (!talk_number("How many full turns will you make (3 is a good number; Enter: leave it out)", 1.0, TURNS_MAX,
+                         &turns, out_given)) {
+            return false;
+        }
+        if (!*out_given || turns == floor(turns)) {
+            *out_turns = (int)turns;
+            return true;
+        }
+        talk_say("Full turns only: 1, 2, 3 ...");
+    }
+}
+
+bringup_result_t bringup_track(bringup_t *self) {
+    char answer[BRINGUP_ANSWER_SIZE];
+    char prompt[128];
+    talk_step(9, "the track (nothing is sent; you turn the machine)");
+    talk_say(
+        "The track is the distance between the two wheels; it decides how far a twist turns the machine. Leave the "
+        "machine on the ground and mark on the floor which way it points. You will turn it on the spot, one way "
+        "only, until it has pointed at the mark so many times.");
+    if (!trial_start(self, &self->config, false)) {
+        return BRINGUP_FAILED;
+    }
+    for (bool done = false; !done;) {
+        bool given = false;
+        int turns = 0;
+        hand_t hand;
+        if (!ask_turns(&turns, &given)) {
+            return BRINGUP_QUIT;
+        }
+        if (!given) {
+            return BRINGUP_ON;
+        }
+        (void)snprintf(prompt, sizeof(prompt), "Turn it %d full turn%s, let it stand at the mark, then press Enter ...",
+                       turns, turns == 1 ? "" : "s");
+        if (!talk_ask("Point it at the mark, then Enter", "go", answer)) {
+            return BRINGUP_QUIT;
+        }
+        if (!trial_wait_ready(self)) {
+            return BRINGUP_FAILED;
+        }
+        if (!hand_follow(self, prompt, &hand)) {
+            return BRINGUP_QUIT;
+        }
+        const bringup_result_t result = judge_track(self, &hand, turns, &done);
+        if (result != BRINGUP_ON) {
+            return result;
+        }
+    }
+    return BRINGUP_ON;
+}
