@@ -34,7 +34,7 @@ def environment(runtime=None):
 class Patient(Operator):
     """Tries once more when the machine was too busy, as a person would."""
 
-    BUSY = ("held up for", "hardly in force")
+    BUSY = ("held up for", "hardly in force", "both wheels not heard")
 
     def pump(self, seconds):
         alive = super().pump(seconds)
@@ -155,11 +155,17 @@ class Bringup(unittest.TestCase):
             operator.answer("Measure the force?", "n")
 
     def write(self, operator):
-        """Writes the file and ends; what it says of each key: "confirmed" or "noted"."""
+        """Writes the file and ends. How each key was found, by the file: {key: "confirmed: ..." or "noted: ..."}."""
         operator.answer("Write it to", "")
         self.assertEqual(0, operator.wait(), operator.text[-2000:])
+        told, found = None, {}
         with open(self.out, encoding="utf-8") as file:
-            return file.read()
+            for line in file:
+                if line.startswith("; BRINGUP "):
+                    told = line.split(", ", 1)[1].strip()
+                elif "=" in line and not line.startswith(";"):
+                    found[line.split(" = ")[0]], told = told, None
+        return found
 
     def push(self, operator, distance_m, mirrored):
         operator.answer("Distance in m", str(distance_m))
@@ -454,8 +460,9 @@ class Bringup(unittest.TestCase):
         self.drive_through(operator)
         operator.answer("Distance in m", "")
         operator.answer("How many full turns", "")
-        text = self.write(operator)
-        self.assertRegex(text, "noted: .* ticks in 3 turns by hand; whose turns the rpm count was not seen")
+        found = self.write(operator)
+        self.assertRegex(found["gear_ratio"], "^noted: .* ticks in 3 turns by hand; whose turns the rpm count was not seen$")
+        self.assertIsNone(found["rpm_of"])
         self.assertEqual("4", self.value("wheels", "gear_ratio"))
 
     def test_type_that_turns_the_wheels_at_another_speed_is_not_confirmed(self):
@@ -493,7 +500,7 @@ class Bringup(unittest.TestCase):
         operator.answer("Measure the force?", "n")
         operator.answer("Distance in m", "")
         operator.answer("How many full turns", "")
-        self.assertRegex(self.write(operator), "noted: typed in; the wheels did not show it\ncurrent_role")
+        self.assertEqual("noted: typed in; the wheels did not show it", self.write(operator)["current_role"])
         self.assertNotIn("confirm current_role", operator.text)
 
     def test_current_that_turns_one_wheel_is_a_setpoint_that_is_not_confirmed(self):
@@ -512,7 +519,8 @@ class Bringup(unittest.TestCase):
         operator.answer("Measure the force?", "n")
         operator.answer("Distance in m", "")
         operator.answer("How many full turns", "")
-        self.assertRegex(self.write(operator), "noted: 250 mA without speed turned the left wheel\ncurrent_role = setpoint")
+        self.assertEqual("noted: 250 mA without speed turned the left wheel", self.write(operator)["current_role"])
+        self.assertEqual("setpoint", self.value("wheels", "current_role"))
 
     def test_straight_ahead_with_a_wheel_that_stands_is_not_asked(self):
         operator = self.begin()
@@ -551,6 +559,7 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("raw left 32767")
         operator.type("\n")
         operator.expect("at the end of its range")
+        operator.answer("Once more?", "n")
         operator.answer("put on the right handle", "5")
         operator.answer("off both handles", "")
         operator.expect("put the mass on")
@@ -560,6 +569,7 @@ class Bringup(unittest.TestCase):
         time.sleep(0.7)
         self.rig.sim.ask("load right 250")
         operator.expect("The force swayed")
+        operator.answer("Once more?", "n")
         operator.answer("Distance in m", "q")
         self.assertEqual(1, operator.wait())
 
@@ -571,9 +581,9 @@ class Bringup(unittest.TestCase):
         operator.answer("Take the mean?", "y")
         self.turn_around(operator)
         operator.answer("Take that?", "y")  # By the distance: whatever the gear is, a tick is so long.
-        text = self.write(operator)
-        self.assertRegex(text, r"noted: 3\.00 m pushed: .* ticks; the gear is assumed\nradius_mm")
-        self.assertRegex(text, r"confirmed: 3 full turns by hand: left -?\d+, right -?\d+ ticks\ntrack_mm")
+        found = self.write(operator)
+        self.assertRegex(found["radius_mm"], r"^noted: 3\.00 m pushed: .* ticks; the gear is assumed$")
+        self.assertRegex(found["track_mm"], r"^confirmed: 3 full turns by hand: left -?\d+, right -?\d+ ticks$")
         self.assertAlmostEqual(540, int(self.value("wheels", "track_mm")), delta=8)
 
     def test_radius_of_a_curve_and_track_without_a_distance_are_not_confirmed(self):
@@ -592,9 +602,9 @@ class Bringup(unittest.TestCase):
         self.turn_around(operator)
         operator.expect("if the radius is as configured: no distance was measured")
         operator.answer("Take that?", "y")
-        text = self.write(operator)
-        self.assertRegex(text, "noted: .* ticks; not straight\nradius_mm")
-        self.assertRegex(text, "noted: 3 full turns by hand: .* ticks; the radius is assumed\ntrack_mm")
+        found = self.write(operator)
+        self.assertRegex(found["radius_mm"], "^noted: .* ticks; not straight$")
+        self.assertRegex(found["track_mm"], "^noted: 3 full turns by hand: .* ticks; the radius is assumed$")
         self.assertNotIn("confirm track", operator.text)
 
     def test_track_is_not_concluded_from_what_is_no_turn_on_the_spot(self):
@@ -613,9 +623,8 @@ class Bringup(unittest.TestCase):
         operator.expect("Configured were 540 mm")
         operator.answer("Take that?", "")
         operator.answer("How many full turns", "")
-        text = self.write(operator)
+        self.assertIsNone(self.write(operator)["track_mm"])
         self.assertEqual("540", self.value("wheels", "track_mm"))
-        self.assertNotIn("full turns by hand", text)
         self.assertFalse([frame for frame in self.rig.bus.frames[-200:] if frame.id in (266, 298)], "nothing was sent")
 
     # --- ways out, and nothing left behind (see nothing_left_behind) ----------------------------------------------

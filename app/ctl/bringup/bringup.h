@@ -59,7 +59,7 @@ typedef struct {
     long long ticks[IW_SIDES];
     long long way[IW_SIDES];    ///< Back and forth, all added.
     double rpm_turns[IW_SIDES]; ///< The rpm they told, summed up over time.
-    bool heard;                 ///< All the time.
+    bool heard;                 ///< All the time, but for moments.
 } hand_t;
 
 /// The two wheels turn so for a moment.

@@ -220,7 +220,7 @@ void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
 
 bringup_result_t burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     for (bool again = true; again;) {
-        (void)fputs("  ... turning; any key stops it\n", stdout);
+        (void)fputs("  ... now; any key stops it\n", stdout);
         (void)fflush(stdout);
         burst_run(self, burst, out_outcome);
         if (out_outcome->end == BURST_DONE) {

@@ -12,7 +12,8 @@
 
 #define LOOK_NS     50000000L
 #define LOOKS       40
-#define G_N_PER_kg  9.8 // The document's own figure.
+#define SETTLE_NS   300000000L // Until the force frames tell what was put on.
+#define G_N_PER_kg  9.8        // The document's own figure.
 #define MASS_MIN_kg 0.5
 #define MASS_MAX_kg 100.0
 /// Counts per newton, and by how much a hand-held weight may be off.
@@ -36,11 +37,13 @@ typedef struct {
 
 static force_t look_at_force(bringup_t *self, iw_side_t side) {
     const struct timespec pause = {0, LOOK_NS};
+    const struct timespec settle = {0, SETTLE_NS};
     force_t force = {.low = INT16_MAX, .high = INT16_MIN};
     double sum = 0.0;
     int count = 0;
     (void)fputs("  ... measuring for 2 s\n", stdout);
     (void)fflush(stdout);
+    (void)nanosleep(&settle, NULL);
     for (int i = 0; i < LOOKS; i++) {
         json_t *status = trial_status(self);
         const json_t *raw = json_object_get(json_object_get(status, names[side]), "force_raw");
@@ -132,7 +135,8 @@ static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, cons
     return true;
 }
 
-static bringup_result_t measure(bringup_t *self, iw_side_t side) {
+/// One handle. `*out_again`: it told nothing, and the operator wants to try again.
+static bringup_result_t measure(bringup_t *self, iw_side_t side, bool *out_again) {
     char question[112];
     char answer[BRINGUP_ANSWER_SIZE];
     double mass_kg = 0.0;
@@ -140,6 +144,7 @@ static bringup_result_t measure(bringup_t *self, iw_side_t side) {
     force_t free;
     force_t loaded;
     bool weighed = false;
+    *out_again = false;
     (void)snprintf(question, sizeof(question), "Mass in kg that you will put on the %s handle (Enter: press by hand)",
                    names[side]);
     if (!talk_number(question, MASS_MIN_kg, MASS_MAX_kg, &mass_kg, &weighed) ||
@@ -169,6 +174,8 @@ static bringup_result_t measure(bringup_t *self, iw_side_t side) {
         tell_press(self, side, loaded.mean - free.mean);
     } else if (is_usable(self, side, &free, &loaded)) {
         keep_unit(self, side, loaded.mean - free.mean, mass_kg);
+    } else if (!talk_yes("Once more?", true, out_again)) {
+        return BRINGUP_QUIT;
     }
     return BRINGUP_ON;
 }
@@ -185,11 +192,13 @@ bringup_result_t bringup_force(bringup_t *self) {
     if (!talk_yes("Measure the force?", true, &wanted)) {
         return BRINGUP_QUIT;
     }
-    for (unsigned side = 0; side < IW_SIDES && wanted; side++) {
-        const bringup_result_t result = measure(self, (iw_side_t)side);
+    for (unsigned side = 0; side < IW_SIDES && wanted;) {
+        bool again = false;
+        const bringup_result_t result = measure(self, (iw_side_t)side, &again);
         if (result != BRINGUP_ON) {
             return result;
         }
+        side += again ? 0U : 1U;
     }
     return BRINGUP_ON;
 }

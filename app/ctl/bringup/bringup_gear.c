@@ -124,7 +124,7 @@ static bringup_result_t judge_gear(bringup_t *self, const turned_t turned[IW_SID
     core.rpm_of_rotor = geared && (rpm == RPM_UNSEEN ? core.rpm_of_rotor : rpm == RPM_ROTOR);
     talk_say("  %lld and %lld ticks in %d turns: %.2f turns of the rotor per turn of the wheel; %s.",
              turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS, gear,
-             !geared             ? "no gear, so the rpm are both's"
+             !geared             ? "no gear: rotor and wheel turn together"
              : rpm == RPM_UNSEEN ? "whose turns the rpm count was not to be seen (turn faster to see it)"
              : rpm == RPM_ROTOR  ? "the rpm count the rotor's turns"
                                  : "the rpm count the wheel's turns");

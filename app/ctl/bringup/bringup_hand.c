@@ -12,6 +12,8 @@
 #include <unistd.h>
 
 #define LOOK_NS 20000000L
+/// The ticks go on counting while a wheel is not heard; but for longer it may have been switched off.
+#define SILENT_US 500000
 /// So much back and forth is a hand that aims at a mark: ticks, or a share of the way.
 #define BACK_TICKS 6
 #define BACK_SHARE 20
@@ -37,9 +39,10 @@ static look_t look(bringup_t *self) {
     return seen;
 }
 
+/// From one look at which both were heard to the next.
 static void add(hand_t *hand, const look_t *before, const look_t *now, int64_t us) {
-    hand->heard = hand->heard && now->heard;
-    for (unsigned side = 0; side < IW_SIDES && hand->heard; side++) {
+    hand->heard = hand->heard && us <= SILENT_US;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         const long long step = now->ticks[side] - before->ticks[side];
         hand->ticks[side] += step;
         hand->way[side] += llabs(step);
@@ -57,14 +60,15 @@ static bool wait_for_line(bringup_t *self, const look_t *first, hand_t *hand) {
     int ready = 0;
     while (ready == 0 && signals_count() == before) {
         ready = ppoll(&input, 1, &pause, signals_let_in());
-        const int64_t now_us = client_now_us();
         const look_t now = look(self);
-        if (signals_count() == before) {
+        const int64_t now_us = client_now_us();
+        if (now.heard) {
             add(hand, &last, &now, now_us - last_us);
+            last = now;
+            last_us = now_us;
         }
-        last = now;
-        last_us = now_us;
     }
+    hand->heard = hand->heard && client_now_us() - last_us <= SILENT_US;
     return signals_count() == before;
 }
 

@@ -97,8 +97,7 @@ static bringup_result_t judge_track(bringup_t *self, const hand_t *hand, int tur
 static bool ask_turns(int *out_turns, bool *out_given) {
     double turns = 0.0;
     for (;;) {
-        if (!talk_number("How many full turns will you make (3 is a good number; Enter: leave it out)", 1.0, TURNS_MAX,
-                         &turns, out_given)) {
+        if (!talk_number("How many full turns (3 is good; Enter: leave it out)", 1.0, TURNS_MAX, &turns, out_given)) {
             return false;
         }
         if (!*out_given || turns == floor(turns)) {
