@@ -34,12 +34,12 @@ def environment(runtime=None):
 class Patient(Operator):
     """Tries once more when the machine was too busy, as a person would."""
 
-    BUSY = ("held up for", "hardly in force", "both wheels not heard")
+    BUSY = ("held up for", "hardly in force", "both wheels not heard", "not acknowledged on the bus")
 
     def pump(self, seconds):
         alive = super().pump(seconds)
         at = self.text.find("Once more? [n] ", self.seen)
-        if at >= 0 and any(word in self.text[self.seen:at] for word in self.BUSY):
+        if at >= 0 and any(word in " ".join(self.text[self.seen:at].split()) for word in self.BUSY):
             self.seen = at + len("Once more? [n] ")
             time.sleep(0.02)
             self.type("y\n")
@@ -244,7 +244,7 @@ class Bringup(unittest.TestCase):
                              ("gear_ratio", r"\d+ and \d+ ticks in 3 turns by hand"),
                              ("setpoint_type", "told 100 mm/s, measured"), ("force_unit_left", r"5\.00 kg changed"),
                              ("mount_sign_left", "saw it turn backwards with invert = no"),
-                             ("current_role", "500 mA without speed and 100 mm/s without current turned no wheel")):
+                             ("current_role", "500 mA alone and 100 mm/s alone turned no wheel, both together did")):
             self.assertRegex(entries[item]["reason"], number)
 
     def test_current_that_is_a_setpoint_is_found_out(self):

@@ -97,8 +97,8 @@ static bringup_result_t try_limit(bringup_t *self, role_t *found) {
     if (found->seen) {
         found->role = "limit";
         (void)snprintf(found->how, sizeof(found->how),
-                       "%d mA without speed and %d mm/s without current turned no wheel, together both",
-                       self->current_mA, BRINGUP_SPEED_MM_S);
+                       "%d mA alone and %d mm/s alone turned no wheel, both together did", self->current_mA,
+                       BRINGUP_SPEED_MM_S);
         talk_say("They turn with both, and with neither alone: the current is a limit.");
     } else {
         talk_say(

@@ -216,8 +216,10 @@ static void do_drive(const call_t *call) {
 static void refuse_turn(const call_t *call) {
     const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
     iw_applied_t applied;
+    gw_refusal_t refusal;
     (void)judge_drive(call, &unknown, &applied);
-    refuse_contradicted(call, IW_LEDGER_TRACK);
+    gw_refuse_describe_contradicted(call->daemon, IW_LEDGER_TRACK, &refusal);
+    send_refusal(call->daemon, call->client, &call->request->id, &refusal);
 }
 
 static void do_twist(const call_t *call) {

@@ -203,13 +203,16 @@ static void say_listen_only(const wording_t *self) {
     SAY(self, "the gateway runs with --listen-only and never sends; start it without");
 }
 
-static void say_contradicted(const wording_t *self) {
-    const iw_ledger_t *ledger = &self->daemon->gateway.ledger;
-    const iw_ledger_item_t item = iw_ledger_doubt(ledger);
+static void write_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, char *out_text, size_t size) {
     char evidence[GW_EVIDENCE_SIZE];
-    gw_assumption_evidence(item, iw_ledger_entry(ledger, item), &self->daemon->knowledge.known.item[item].word,
-                           evidence);
-    SAY(self, "%s is contradicted: %s; %s", gw_ledger_item_name(item), evidence, gw_assumption_cost(item));
+    gw_assumption_evidence(item, iw_ledger_entry(&daemon->gateway.ledger, item),
+                           &daemon->knowledge.known.item[item].word, evidence);
+    (void)snprintf(out_text, size, "%s is contradicted: %s; %s", gw_ledger_item_name(item), evidence,
+                   gw_assumption_cost(item));
+}
+
+static void say_contradicted(const wording_t *self) {
+    write_contradicted(self->daemon, iw_ledger_doubt(&self->daemon->gateway.ledger), self->text, self->size);
 }
 
 void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_refusal_t refusal,
@@ -233,6 +236,11 @@ void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_ref
     } else {
         SAY(&wording, "refused for a reason that has no name (%d); report this", (int)refusal);
     }
+}
+
+void gw_refuse_describe_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, gw_refusal_t *out_refusal) {
+    out_refusal->error = GW_DENIED;
+    write_contradicted(daemon, item, out_refusal->message, sizeof out_refusal->message);
 }
 
 void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, gw_refusal_t *out_refusal) {

@@ -225,6 +225,8 @@ gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, cons
     iw_gateway_t *gateway = &daemon->gateway;
     gw_known_item_t *known = &daemon->knowledge.known.item[item];
     const gw_found_t verdict = gw_assumption_compare(&daemon->config, item, word->found);
+    const bool stands = verdict == GW_FOUND_SAME && known->entry.state == IW_LEDGER_CONFIRMED &&
+                        known->entry.evidence == IW_EVIDENCE_OPERATOR && known->word.how[0] != '\0';
     if (verdict != GW_FOUND_SAME && verdict != GW_FOUND_DIFFERENT) {
         return verdict;
     }
@@ -232,8 +234,10 @@ gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, cons
                                      IW_EVIDENCE_OPERATOR, 0};
     iw_gateway_know(gateway, item, &entry);
     gw_record_assumption(daemon, item);
-    known->word = *word;
-    known->since_wall_us = iw_clock_wall_us();
+    if (!stands || word->how[0] != '\0') { // Saying so once more takes nothing from how it was found.
+        known->word = *word;
+        known->since_wall_us = iw_clock_wall_us();
+    }
     daemon->knowledge.changed = true;
     return verdict;
 }

@@ -44,6 +44,8 @@ def confirm_how_and_track(t):
         f"it keeps its evidence: {reply}",
     )
     t.check("assumption track = 540 is confirmed by the operator: found by bringup" in rig.gateway.text(), "in the log")
+    reply = client.request("confirm", item="track")
+    t.check(reply["how"] == "bringup: 3 full turns by hand", f"said once more, it keeps its evidence: {reply}")
     reply = client.request("confirm", item="track", value=600, how="a tape")
     t.check(reply["state"] == "contradicted" and "track_mm" in reply["disabled"], f"contradicted: {reply}")
     t.arm(client)
