@@ -82,6 +82,7 @@ typedef struct gw_daemon {
     int epoll_fd;
     int signal_fd;
     bool shutting_down;
+    bool gave_way;         ///< It shuts down because somebody else's gateway goes before it.
     bool clients_waiting;  ///< The last round did not reach everybody.
     bool lines_waiting;    ///< The same of sending.
     bool requested;        ///< A request has changed something since the last step.

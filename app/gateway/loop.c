@@ -67,17 +67,33 @@ void gw_loop_close(gw_daemon_t *daemon) {
     (void)close(daemon->epoll_fd);
 }
 
-static void take_signal(gw_daemon_t *daemon) {
-    struct signalfd_siginfo info;
-    if (read(daemon->signal_fd, &info, sizeof info) != (ssize_t)sizeof info || daemon->shutting_down) {
-        return;
-    }
+static void shut_down(gw_daemon_t *daemon) {
     daemon->shutting_down = true;
-    gw_log(&daemon->log, GW_LOG_INFO, "%s: stopping the wheels, then ending", strsignal((int)info.ssi_signo));
     gw_notify_stopping(&daemon->notify);
     iw_gateway_stop(&daemon->gateway, daemon->now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
     gw_tape_put(&daemon->tape,
                 &(blackbox_entry_t){.at_us = daemon->now_us, .kind = BLACKBOX_STOP, .a = IW_CAUSE_SHUTDOWN});
+}
+
+static void take_signal(gw_daemon_t *daemon) {
+    struct signalfd_siginfo info;
+    if (read(daemon->signal_fd, &info, sizeof info) == (ssize_t)sizeof info && !daemon->shutting_down) {
+        gw_log(&daemon->log, GW_LOG_INFO, "%s: stopping the wheels, then ending", strsignal((int)info.ssi_signo));
+        shut_down(daemon);
+    }
+}
+
+/// Root's and the service's gateways do not wait for one of another user's.
+static void give_way(gw_daemon_t *daemon) {
+    const gw_holder_t *holder = &daemon->runtime.lock.holder;
+    if (!daemon->shutting_down && gw_bus_lock_tend(&daemon->runtime.lock, daemon->now_us)) {
+        daemon->gave_way = true;
+        gw_log(&daemon->log, GW_LOG_WARNING,
+               "a gateway of user %u (process %ld) serves %s now and goes before this one: stopping the wheels, then "
+               "ending",
+               (unsigned)holder->uid, (long)holder->pid, daemon->config.bus.interface);
+        shut_down(daemon);
+    }
 }
 
 static void mark_if_sending(gw_daemon_t *daemon) {
@@ -217,6 +233,7 @@ static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     gw_observe_periodic(daemon);
     gw_service_flush(daemon);
     gw_knowledge_tend(daemon);
+    give_way(daemon);
     gw_notify_cycle(&daemon->notify, daemon->now_us);
 }
 

@@ -86,6 +86,7 @@ static int serve(gw_daemon_t *daemon) {
             gw_log(&daemon->log, GW_LOG_ERROR, "waiting for events failed: %s", strerror(error));
             result = EX_SOFTWARE;
         }
+        result = daemon->gave_way ? EX_UNAVAILABLE : result;
         gw_service_close_all(daemon);
         gw_knowledge_close(&daemon->knowledge, daemon->config.bus.interface);
         gw_loop_close(daemon);

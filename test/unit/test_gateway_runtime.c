@@ -4,9 +4,15 @@
 
 #include "unity.h"
 
+#include <fcntl.h>
+#include <signal.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <sysexits.h>
 #include <unistd.h>
@@ -17,7 +23,8 @@ static gateway_config_t one;
 static gateway_config_t other;
 static gw_runtime_t first;
 static gw_runtime_t second;
-static char said[512];
+static char said[2048];
+static pid_t child;
 
 static const char *under(const char *name) {
     static char path[128];
@@ -40,6 +47,12 @@ static int open_runtime(gw_runtime_t *runtime, const gateway_config_t *config) {
     return result;
 }
 
+static void assert_said_pid(pid_t pid) {
+    char text[32];
+    (void)snprintf(text, sizeof text, "process %ld ", (long)pid);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, text), said);
+}
+
 static bool exists(const char *path) {
     return access(path, F_OK) == 0;
 }
@@ -47,7 +60,9 @@ static bool exists(const char *path) {
 /// An interface's name that no other run of this test has.
 static const char *interface(void) {
     static char name[16];
-    (void)snprintf(name, sizeof name, "iwt%ld", (long)getpid());
+    if (name[0] == '\0') { // Before any process is made.
+        (void)snprintf(name, sizeof name, "iwt%ld", (long)getpid());
+    }
     return name;
 }
 
@@ -60,6 +75,14 @@ void setUp(void) {
     configure(&other, interface(), "other");
 }
 
+static void end_child(void) {
+    if (child > 0) {
+        (void)kill(child, SIGKILL);
+        (void)waitpid(child, NULL, 0);
+    }
+    child = 0;
+}
+
 static void remove_top(void) {
     char command[64];
     (void)snprintf(command, sizeof command, "rm -rf %s", top);
@@ -69,15 +92,14 @@ static void remove_top(void) {
 void tearDown(void) {
     gw_runtime_close(&first);
     gw_runtime_close(&second);
+    end_child();
     remove_top();
 }
 
 static void test_second_gateway_on_interface_with_socket_elsewhere_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
-    char pid[32];
-    (void)snprintf(pid, sizeof pid, "process %ld ", (long)getpid());
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, pid), said);
+    assert_said_pid(getpid());
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, interface()), said);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "sends nothing"), said);
 }
@@ -85,12 +107,12 @@ static void test_second_gateway_on_interface_with_socket_elsewhere_is_refused(vo
 static void test_lock_of_interface_is_free_after_close_and_after_death(void) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     gw_runtime_close(&first);
-    const pid_t child = fork();
-    if (child == 0) {
+    const pid_t process = fork();
+    if (process == 0) {
         _exit(open_runtime(&second, &other)); // Dies holding it.
     }
     int status = 0;
-    TEST_ASSERT_EQUAL_INT(child, waitpid(child, &status, 0));
+    TEST_ASSERT_EQUAL_INT(process, waitpid(process, &status, 0));
     TEST_ASSERT_EQUAL_INT(0, WEXITSTATUS(status));
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
 }
@@ -115,7 +137,7 @@ static void test_second_gateway_on_local_bus_is_refused(void) {
     configure(&other, bus, "other");
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "another program"), said);
+    assert_said_pid(getpid());
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, bus + 5), said);
     TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_TRUE(exists(under("bus.armed")));
@@ -156,13 +178,311 @@ static void test_marker_without_right_to_the_shared_directory_lies_beside_the_so
 static void test_marker_that_cannot_be_set_or_removed_is_told_with_its_path(void) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     // A directory can neither be opened for writing nor unlinked, not even by root.
-    TEST_ASSERT_EQUAL_INT(0, mkdir(shared, 0755));
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[0], 0755));
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[1], 0755));
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_STRING(first.place[1], first.marker_path);
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, false));
     TEST_ASSERT_EQUAL_STRING(first.place[0], first.marker_path);
+}
+
+// Strangers -----------------------------------------------------------------------------------------------------------
+
+#define STRANGER 65534
+#define SERVICE  2
+
+/// Runs `act` as that user in a process that stays until the test ends. Its result is what `act` returns.
+static int in_process_of(uid_t uid, int (*act)(void)) {
+    int result = -1;
+    int ends[2];
+    TEST_ASSERT_EQUAL_INT(0, pipe(ends));
+    TEST_ASSERT_EQUAL_INT(0, chmod(top, 0755));
+    child = fork();
+    if (child == 0) {
+        result = setgid(uid) == 0 && setuid(uid) == 0 ? act() : -2;
+        (void)!write(ends[1], &result, sizeof result);
+        for (;;) {
+            (void)pause();
+        }
+    }
+    (void)close(ends[1]);
+    (void)!read(ends[0], &result, sizeof result);
+    (void)close(ends[0]);
+    return result;
+}
+
+static int bind_abstract(const char *name, int backlog) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    (void)snprintf(address.sun_path + 1, sizeof address.sun_path - 1U, "%s", name);
+    const int result = bind(fd, (const struct sockaddr *)&address,
+                            (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1U + strlen(name)));
+    return result == 0 && backlog >= 0 ? listen(fd, backlog) : result;
+}
+
+/// The places of root's gateway.
+static int take_names(unsigned count, int backlog) {
+    char name[64];
+    int result = 0;
+    for (unsigned place = 0; place < count && result == 0; ++place) {
+        (void)snprintf(name, sizeof name, place == 0 ? "iwheel-gateway/%s" : "iwheel-gateway/%s/0/%u", interface(),
+                       place);
+        result = bind_abstract(name, backlog);
+    }
+    return result;
+}
+
+static int squat_listening(void) {
+    return take_names(1, 8);
+}
+
+static int squat_silently(void) {
+    return take_names(1, -1);
+}
+
+static int squat_everything(void) {
+    return take_names(GW_BUS_PLACES, 0);
+}
+
+static bool is_root(void) {
+    if (geteuid() != 0) {
+        TEST_MESSAGE("SKIPPED: becoming another user needs root");
+    }
+    return geteuid() == 0;
+}
+
+static void test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger_is_named(void) {
+    if (!is_root()) {
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_listening));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    assert_said_pid(child);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "of user 65534 holds @iwheel-gateway/"), said);
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
+}
+
+static void test_lock_with_its_name_held_silently_by_a_stranger_is_taken_and_told(void) {
+    if (!is_root()) {
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_silently));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "another program"),
+                                 said); // Its user too, where the kernel lists sockets.
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "holds @iwheel-gateway/"), said);
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
+}
+
+static void test_lock_with_every_name_held_by_a_stranger_excludes_by_its_file(void) {
+    if (!is_root()) {
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_everything));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
+    assert_said_pid(getpid());
+}
+
+/// Neither file nor directory can be made, not even by root.
+static void spoil_shared(void) {
+    FILE *in_the_way = fopen(shared, "w");
+    TEST_ASSERT_NOT_NULL(in_the_way);
+    (void)fclose(in_the_way);
+}
+
+static void test_lock_without_its_file_excludes_by_name_although_a_stranger_holds_the_first(void) {
+    if (!is_root()) {
+        return;
+    }
+    spoil_shared();
+    TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_listening));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    TEST_ASSERT_EQUAL_INT(1, first.lock.names.place);
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
+    assert_said_pid(getpid());
+}
+
+static void test_lock_taken_at_a_later_place_still_excludes_when_the_stranger_has_gone(void) {
+    if (!is_root()) {
+        return;
+    }
+    spoil_shared();
+    TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, squat_listening));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    end_child();
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE,
+                          open_runtime(&second, &other)); // Its place comes before: it waits, then gives in.
+}
+
+static int hold_file(void) {
+    const int fd = open(under("bus.gateway-lock"), O_RDWR | O_CREAT, 0666);
+    return fd >= 0 ? flock(fd, LOCK_EX | LOCK_NB) : -1;
+}
+
+static void test_lock_of_local_bus_with_its_file_held_by_a_stranger_is_taken_and_excludes(void) {
+    char bus[64];
+    if (!is_root()) {
+        return;
+    }
+    (void)snprintf(bus, sizeof bus, "unix:%s/bus", top);
+    configure(&one, bus, "one");
+    configure(&other, bus, "other");
+    TEST_ASSERT_EQUAL_INT(0, chown(top, STRANGER, 0));
+    TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, hold_file));
+    TEST_ASSERT_EQUAL_INT(0, chown(top, 0, 0));
+    TEST_ASSERT_EQUAL_INT(0, chmod(top, 01777));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "of user 65534 holds"), said);
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
+}
+
+// Those who may run one -----------------------------------------------------------------------------------------------
+
+static int open_second(void) {
+    return open_runtime(&second, &other);
+}
+
+static void test_lock_held_by_root_keeps_out_the_service_and_everybody_else(void) {
+    if (!is_root()) {
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, mkdir(shared, 0755));
+    TEST_ASSERT_EQUAL_INT(0, chown(shared, SERVICE, SERVICE));
+    TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, in_process_of(SERVICE, open_second));
+    end_child();
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, in_process_of(STRANGER, open_second));
+}
+
+static void test_lock_held_by_the_service_keeps_out_root_and_everybody_else(void) {
+    if (!is_root()) {
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, mkdir(shared, 0755));
+    TEST_ASSERT_EQUAL_INT(0, chown(shared, SERVICE, SERVICE));
+    TEST_ASSERT_EQUAL_INT(0, in_process_of(SERVICE, open_second));
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&first, &one));
+    assert_said_pid(child);
+    const pid_t service = child;
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, in_process_of(STRANGER, open_second));
+    (void)kill(service, SIGKILL);
+    (void)waitpid(service, NULL, 0);
+}
+
+static int go[2];
+static int told[2];
+
+/// A developer's gateway: looks who has come when it is told to, and says whom it gives way to.
+static int open_and_tend(void) {
+    const int result = open_second();
+    const pid_t process = fork();
+    if (process == 0) {
+        char byte;
+        const bool alone = !gw_bus_lock_tend(&second.lock, 0);
+        (void)!read(go[0], &byte, 1);
+        const bool gives_way = gw_bus_lock_tend(&second.lock, GW_BUS_LOCK_LOOK_US);
+        const gw_holder_t holder = alone && gives_way ? second.lock.holder : (gw_holder_t){.uid = (uid_t)-1};
+        (void)!write(told[1], &holder, sizeof holder);
+        _exit(0);
+    }
+    return result;
+}
+
+static void test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up(void) {
+    gw_holder_t holder = {0};
+    if (!is_root()) {
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, pipe(go));
+    TEST_ASSERT_EQUAL_INT(0, pipe(told));
+    TEST_ASSERT_EQUAL_INT(0, in_process_of(STRANGER, open_and_tend));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, open_runtime(&first, &one), said);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "of user 65534"), said);
+    TEST_ASSERT_EQUAL_INT(1, write(go[1], "", 1));
+    TEST_ASSERT_EQUAL_INT(sizeof holder, read(told[0], &holder, sizeof holder));
+    TEST_ASSERT_EQUAL_INT(0, holder.uid);
+    TEST_ASSERT_EQUAL_INT(getpid(), holder.pid);
+    TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_tend(&first.lock, GW_BUS_LOCK_LOOK_US), "root gives way to nobody");
+    for (size_t i = 0; i < 2U; ++i) {
+        (void)close(go[i]);
+        (void)close(told[i]);
+    }
+}
+
+/// One of several that start in the same moment: when the pipe is closed. Says what became of it, and keeps what it has.
+static void start_at_once(const gateway_config_t *config, const int start[2], const int done[2], int result_fd) {
+    char byte;
+    (void)close(start[1]);
+    (void)close(done[1]);
+    (void)!read(start[0], &byte, 1);
+    const int result = open_runtime(&second, config);
+    (void)!write(result_fd, &result, sizeof result);
+    (void)!read(done[0], &byte, 1);
+    _exit(0);
+}
+
+static int how_many_run(void) {
+    enum { STARTERS = 3 };
+    int start[2];
+    int done[2];
+    int results[2];
+    int running = 0;
+    TEST_ASSERT_EQUAL_INT(0, pipe(start));
+    TEST_ASSERT_EQUAL_INT(0, pipe(done));
+    TEST_ASSERT_EQUAL_INT(0, pipe(results));
+    for (int i = 0; i < STARTERS; ++i) {
+        if (fork() == 0) {
+            start_at_once(i == 0 ? &one : &other, start, done, results[1]);
+        }
+    }
+    (void)close(start[0]);
+    (void)close(start[1]);
+    for (int i = 0; i < STARTERS; ++i) {
+        int result = -1;
+        TEST_ASSERT_EQUAL_INT(sizeof result, read(results[0], &result, sizeof result));
+        running += result == 0 ? 1 : 0;
+    }
+    (void)close(done[0]);
+    (void)close(done[1]);
+    (void)close(results[0]);
+    (void)close(results[1]);
+    while (wait(NULL) > 0) {
+    }
+    return running;
+}
+
+static void test_lock_of_several_that_start_in_the_same_moment_goes_to_one(void) {
+    for (int round = 0; round < 3; ++round) {
+        TEST_ASSERT_EQUAL_INT(1, how_many_run());
+    }
+    remove_top();
+    TEST_ASSERT_EQUAL_INT(0, mkdir(top, 0755));
+    spoil_shared(); // By name alone.
+    for (int round = 0; round < 3; ++round) {
+        TEST_ASSERT_EQUAL_INT(1, how_many_run());
+    }
+}
+
+// Markers -------------------------------------------------------------------------------------------------------------
+
+static void test_marker_of_a_stranger_is_none_and_is_not_used(void) {
+    struct stat status;
+    if (!is_root()) {
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, mkdir(shared, 0755));
+    TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
+    gw_runtime_close(&first);
+    for (int i = 0; i < (int)GW_RUNTIME_PLACES; ++i) {
+        (void)close(open(first.place[i], O_WRONLY | O_CREAT, 0666));
+        TEST_ASSERT_EQUAL_INT(0, chown(first.place[i], STRANGER, STRANGER));
+    }
+    TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
+    TEST_ASSERT_FALSE(gw_runtime_crashed(&first));
+    TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
+    TEST_ASSERT_EQUAL_INT(0, lstat(first.marker_path, &status));
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, status.st_uid, "he could take his own away again");
 }
 
 int main(void) {
@@ -175,5 +495,16 @@ int main(void) {
     RUN_TEST(test_marker_of_interface_is_found_by_gateway_with_socket_elsewhere);
     RUN_TEST(test_marker_without_right_to_the_shared_directory_lies_beside_the_socket);
     RUN_TEST(test_marker_that_cannot_be_set_or_removed_is_told_with_its_path);
+    RUN_TEST(test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger_is_named);
+    RUN_TEST(test_lock_with_its_name_held_silently_by_a_stranger_is_taken_and_told);
+    RUN_TEST(test_lock_with_every_name_held_by_a_stranger_excludes_by_its_file);
+    RUN_TEST(test_lock_without_its_file_excludes_by_name_although_a_stranger_holds_the_first);
+    RUN_TEST(test_lock_taken_at_a_later_place_still_excludes_when_the_stranger_has_gone);
+    RUN_TEST(test_lock_of_local_bus_with_its_file_held_by_a_stranger_is_taken_and_excludes);
+    RUN_TEST(test_lock_held_by_root_keeps_out_the_service_and_everybody_else);
+    RUN_TEST(test_lock_held_by_the_service_keeps_out_root_and_everybody_else);
+    RUN_TEST(test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up);
+    RUN_TEST(test_lock_of_several_that_start_in_the_same_moment_goes_to_one);
+    RUN_TEST(test_marker_of_a_stranger_is_none_and_is_not_used);
     return UNITY_END();
 }

@@ -3,14 +3,14 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <stddef.h>
+#include <inttypes.h>
+#include <limits.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
-#define ASKERS_MAX 64
+#define KEY "@iwheel-gateway/"
 
 static const char local_prefix[] = "unix:";
 
@@ -19,69 +19,151 @@ const char *gw_bus_lock_local_path(const char *bus) {
     return strncmp(bus, local_prefix, length) == 0 ? bus + length : NULL;
 }
 
+void gw_bus_lock_folder(const char *path, char *out_folder, size_t size) {
+    const char *slash = strrchr(path, '/');
+    const int length = slash == NULL ? 1 : slash == path ? 1 : (int)(slash - path);
+    (void)snprintf(out_folder, size, "%.*s", length, slash == NULL ? "." : path);
+}
+
+/// A path of any length and spelling as 16 digits.
+static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
+    char folder[GATEWAY_ADDRESS_SIZE];
+    char real[PATH_MAX];
+    const char *slash = strrchr(path, '/');
+    uint64_t hash = 0xCBF29CE484222325U;
+    gw_bus_lock_folder(path, folder, sizeof folder);
+    const char *const parts[] = {realpath(folder, real) != NULL ? real : folder, "/", slash == NULL ? path : slash + 1};
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+        for (const char *c = parts[i]; *c != '\0'; ++c) {
+            hash = (hash ^ (unsigned char)*c) * 0x100000001B3U;
+        }
+    }
+    (void)snprintf(out_key, GW_BUS_KEY_SIZE, KEY "unix-%016" PRIx64, hash);
+}
+
+/// Interfaces of one name may be in several network namespaces, which share the directory.
+static unsigned long long network_namespace(void) {
+    struct stat status;
+    return stat("/proc/self/ns/net", &status) == 0 ? (unsigned long long)status.st_ino : 0U;
+}
+
+static int open_file(const char *path) {
+    const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
+    int fd = open(path, flags);
+    if (fd < 0 && errno == ENOENT) { // Asked for at once, a stranger's file in a folder like /tmp would be an error.
+        fd = open(path, flags | O_CREAT | O_EXCL, 0600);
+        fd = fd < 0 && errno == EEXIST ? open(path, flags) : fd;
+    }
+    return fd;
+}
+
+static void note_stranger(gw_bus_lock_t *self, const struct stat *status) {
+    self->stranger[0].uid = status->st_uid;
+    (void)snprintf(self->stranger[0].name, sizeof self->stranger[0].name, "%.*s", (int)GW_BUS_NAME_SIZE, self->path);
+}
+
+/// True if nobody but who may run a gateway can have opened it.
+static bool is_ours(gw_bus_lock_t *self, int fd) {
+    struct stat status;
+    if (fstat(fd, &status) != 0) {
+        return false;
+    }
+    const bool ours = gw_owners_wrote(&self->names.owners, &status) && (status.st_mode & 077U) == 0U;
+    if (!ours) {
+        note_stranger(self, &status);
+    }
+    return ours;
+}
+
+/// Who holds it has written its number into it.
+static void read_holder(gw_bus_lock_t *self, int fd) {
+    char digits[16] = "";
+    struct stat status = {.st_uid = (uid_t)-1};
+    (void)!pread(fd, digits, sizeof digits - 1U, 0);
+    (void)fstat(fd, &status);
+    self->holder = (gw_holder_t){.uid = (uid_t)-1, .pid = (pid_t)strtol(digits, NULL, 10)};
+    (void)snprintf(self->holder.name, sizeof self->holder.name, "%.*s", (int)GW_BUS_NAME_SIZE, self->path);
+}
+
+/// The service must be able to open what root has made.
+static void sign(const gw_bus_lock_t *self, int fd) {
+    char digits[16];
+    const int length = snprintf(digits, sizeof digits, "%ld\n", (long)getpid());
+    if (self->names.owners.own == 0U && self->names.owners.service != 0U) {
+        (void)!fchown(fd, self->names.owners.service, (gid_t)-1);
+    }
+    (void)!ftruncate(fd, 0);
+    (void)!pwrite(fd, digits, (size_t)length, 0);
+}
+
+/// EWOULDBLOCK, or 0: then we have it, or may not have it.
 static int lock_file(gw_bus_lock_t *self) {
-    const int fd = open(self->name, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0600);
+    struct stat status;
+    const int fd = open_file(self->path);
+    self->error = fd < 0 ? errno : 0;
+    if (fd < 0 && lstat(self->path, &status) == 0 && !gw_owners_have(&self->names.owners, status.st_uid)) {
+        note_stranger(self, &status);
+    }
     if (fd < 0) {
-        return errno;
+        return 0;
+    }
+    if (!is_ours(self, fd)) {
+        self->error = EPERM;
+        (void)close(fd);
+        return 0;
     }
     if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
         const int error = errno;
+        read_holder(self, fd);
         (void)close(fd);
         return error;
     }
+    sign(self, fd);
     self->fd = fd;
     return 0;
 }
 
-/// Whoever listens at the address, by the kernel's word.
-static pid_t ask_who(const struct sockaddr_un *address, socklen_t length) {
-    struct ucred peer = {0};
-    socklen_t size = sizeof peer;
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (fd < 0 || connect(fd, (const struct sockaddr *)address, length) != 0 ||
-        getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
-        peer.pid = 0;
-    }
-    if (fd >= 0) {
-        (void)close(fd);
-    }
-    return peer.pid;
+/// The directory is made if only that is missing: root by hand, on a machine without the service.
+static void name_interface(gw_bus_lock_t *self, const char *bus, const char *directory) {
+    (void)mkdir(directory, 0755);
+    (void)snprintf(self->path, sizeof self->path, "%.96s/%.16s-%llu.gateway-lock", directory, bus, network_namespace());
+    (void)snprintf(self->names.key, GW_BUS_KEY_SIZE, KEY "%.32s", bus);
 }
 
-static int lock_name(gw_bus_lock_t *self) {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    const size_t name_length = strlen(self->name);
-    const socklen_t length = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + name_length);
-    if (name_length > sizeof address.sun_path) {
-        return ENAMETOOLONG;
-    }
-    (void)memcpy(address.sun_path + 1, self->name + 1, name_length - 1U); // A zero byte stands for the `@`.
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (fd < 0) {
-        return errno;
-    }
-    if (bind(fd, (const struct sockaddr *)&address, length) != 0 || listen(fd, ASKERS_MAX) != 0) {
-        const int error = errno;
-        (void)close(fd);
-        self->holder = error == EADDRINUSE ? ask_who(&address, length) : 0;
-        return error == EADDRINUSE ? EWOULDBLOCK : error;
-    }
-    self->fd = fd;
-    return 0;
-}
-
-int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus) {
+int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory) {
     const char *path = gw_bus_lock_local_path(bus);
-    *self = (gw_bus_lock_t){.fd = -1};
+    char folder[GATEWAY_ADDRESS_SIZE];
+    *self = (gw_bus_lock_t){.fd = -1, .names = {.fd = -1}};
     if (path != NULL) {
-        (void)snprintf(self->name, sizeof self->name, "%s.gateway-lock", path);
-        return lock_file(self);
+        (void)snprintf(self->path, sizeof self->path, "%s.gateway-lock", path);
+        name_local(path, self->names.key);
+        gw_bus_lock_folder(path, folder, sizeof folder);
+    } else {
+        name_interface(self, bus, directory);
+        (void)snprintf(folder, sizeof folder, "%.96s", directory);
     }
-    (void)snprintf(self->name, sizeof self->name, "@iwheel-gateway/%s", bus);
-    return lock_name(self);
+    self->names.owners = gw_owners_of(folder);
+    int error = lock_file(self);
+    if (error == 0 && path != NULL && (self->error == ENOENT || self->error == ENOTDIR)) {
+        error = self->error; // No bus can be there.
+    }
+    error = error != 0 ? error : gw_bus_names_take(&self->names, &self->holder, &self->stranger[1]);
+    if (error != 0) {
+        gw_bus_lock_release(self);
+    }
+    return error;
+}
+
+bool gw_bus_lock_tend(gw_bus_lock_t *self, iw_time_us_t now_us) {
+    if (now_us < self->look_us) {
+        return false;
+    }
+    self->look_us = now_us + GW_BUS_LOCK_LOOK_US;
+    return gw_bus_names_tend(&self->names, &self->holder);
 }
 
 void gw_bus_lock_release(gw_bus_lock_t *self) {
+    gw_bus_names_release(&self->names);
     if (self->fd >= 0) {
         (void)close(self->fd); // The file stays: removing it would let two gateways lock two files of one name.
         self->fd = -1;

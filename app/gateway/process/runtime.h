@@ -4,7 +4,7 @@
 ///
 /// The marker is named after the bus, and every gateway on that bus must find it, wherever its socket lies. For an
 /// interface it is in a directory all gateways share or, for those who may not write there, beside their own socket:
-/// it is looked for in both. For `unix:PATH` it is beside PATH.
+/// it is looked for in both. For `unix:PATH` it is beside PATH. A file that a stranger has put there (owners.h) is none.
 #ifndef GATEWAY_RUNTIME_H
 #define GATEWAY_RUNTIME_H
 
@@ -13,9 +13,6 @@
 
 #define GW_RUNTIME_PATH_SIZE (GATEWAY_PATH_SIZE + GATEWAY_ADDRESS_SIZE + 16U)
 #define GW_RUNTIME_PLACES    2U
-
-/// Where markers of interfaces are. It vanishes when the machine is switched off, and the wheels with it.
-#define GW_RUNTIME_DIRECTORY "/run/iwheel"
 
 typedef struct {
     gw_bus_lock_t lock;
@@ -26,7 +23,8 @@ typedef struct {
 } gw_runtime_t;
 
 /// Takes the lock and looks for the marker. `directory` is GW_RUNTIME_DIRECTORY but in tests, and must outlive
-/// `self`. 0, or a sysexits code after the cause and the cure have been printed on `err`.
+/// `self`. 0, or a sysexits code after the cause and the cure have been printed on `err`; a stranger who holds what locks the
+/// bus is printed there too.
 int gw_runtime_open(gw_runtime_t *self, const gateway_config_t *config, const char *directory, FILE *err);
 
 /// Releases the lock. The marker stays as it is.

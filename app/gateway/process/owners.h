@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+/// Who may run a gateway on this machine, and folders in which nobody else can put one thing in another's place.
+///
+/// A gateway is run by root, by the service's user (to whom systemd gives the runtime directory) or by whoever runs this
+/// one. What belongs to anybody else is a stranger's: a lock, a marker, a socket, a folder.
+#ifndef GATEWAY_OWNERS_H
+#define GATEWAY_OWNERS_H
+
+#include <stdbool.h>
+#include <sys/stat.h>
+#include <sys/types.h>
+
+/// Where locks and markers of interfaces are. It vanishes when the machine is switched off, and the wheels with it.
+#define GW_RUNTIME_DIRECTORY "/run/iwheel"
+
+typedef struct {
+    uid_t own;
+    uid_t service; ///< Root's if there is no service.
+} gw_owners_t;
+
+/// Reasons why a folder is not used, beside an errno.
+enum { GW_FOLDER_FOREIGN = 0x10000, GW_FOLDER_SHARED };
+
+typedef struct {
+    int fd;      ///< O_PATH; -1: not open.
+    bool shared; ///< Anybody may put files there, but only their owners can take them away (sticky, like /tmp).
+} gw_folder_t;
+
+/// `runtime_directory` is GW_RUNTIME_DIRECTORY but in tests. Its owner counts only if nobody else may write there.
+gw_owners_t gw_owners_of(const char *runtime_directory);
+
+bool gw_owners_have(const gw_owners_t *self, uid_t uid);
+
+/// True of a plain file with one name that belongs to one of them.
+bool gw_owners_wrote(const gw_owners_t *self, const struct stat *status);
+
+/// Opens a folder, not through a symbolic link, and judges it: it belongs to one of the owners, and nobody else may write
+/// to it or it is sticky. 0, an errno, or one of the reasons above; then `fd` is -1. Files are reached from `fd` only.
+int gw_folder_open(gw_folder_t *self, const char *path, const gw_owners_t *owners);
+
+void gw_folder_close(gw_folder_t *self);
+
+/// What is wrong, and what mends it, of an errno or one of the reasons.
+const char *gw_folder_fault(int error);
+const char *gw_folder_cure(int error);
+
+#endif
