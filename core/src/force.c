@@ -11,10 +11,6 @@
 #define SPREAD_MAX 8191
 /// A variance up to this (raw) can be scaled to mN before the root without leaving 32 bits.
 #define VARIANCE_FINE 400000U
-/// Unit evidence: the mean must be within this share of the ratio's prediction.
-#define EVIDENCE_PERCENT 15
-/// Unit evidence for a removed offset: the mean is below this share of the offset, in whichever unit is finer.
-#define REMOVED_PERCENT 30
 
 IW_STATIC_ASSERT(IW_FORCE_WINDOW_SAMPLES <= UINT8_MAX, ring_index_fits);
 IW_STATIC_ASSERT((uint64_t)SPREAD_MAX *SPREAD_MAX *IW_FORCE_WINDOW_SAMPLES <= UINT32_MAX, spread_fits);
@@ -114,9 +110,9 @@ static bool far_from_offset(const iw_force_t *self, int32_t mean_mN, uint32_t li
 /// Raw over offset at rest is 10, 1 or 0: exactly one of them must fit.
 static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN) {
     const int32_t offset = iw_magnitude(offset_dN);
-    const bool fits_cn = iw_magnitude(mean_raw - 10 * offset_dN) * 100 <= 10 * offset * EVIDENCE_PERCENT;
-    const bool fits_dn = iw_magnitude(mean_raw - offset_dN) * 100 <= offset * EVIDENCE_PERCENT;
-    const bool fits_none = iw_magnitude(mean_raw) * 100 <= offset * REMOVED_PERCENT;
+    const bool fits_cn = iw_magnitude(mean_raw - 10 * offset_dN) * 100 <= 10 * offset * IW_FORCE_EVIDENCE_PERCENT;
+    const bool fits_dn = iw_magnitude(mean_raw - offset_dN) * 100 <= offset * IW_FORCE_EVIDENCE_PERCENT;
+    const bool fits_none = iw_magnitude(mean_raw) * 100 <= offset * IW_FORCE_REMOVED_PERCENT;
     if (fits_cn) {
         return IW_UNIT_CN;
     }

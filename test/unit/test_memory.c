@@ -3,6 +3,7 @@
 #include "json/json_arena.h"
 #include "ledger/keeper.h"
 #include "ledger/memory.h"
+#include "names.h"
 
 #include "unity.h"
 
@@ -25,25 +26,53 @@ static char reason[GW_MEMORY_REASON_SIZE];
 static size_t length;
 static char folder[] = "/tmp/iwheel-memory-XXXXXX";
 
+/// What the bus has shown of each item, at the edge of what it can show; state ASSUMED: only the operator can know.
+static const struct {
+    iw_ledger_state_t state;
+    int32_t figure;
+    const char *value;
+} shown[IW_LEDGER_ITEMS] = {
+    [IW_LEDGER_SETPOINT_TYPE] = {IW_LEDGER_CONFIRMED, 850, "255"},
+    [IW_LEDGER_FORCE_UNIT_LEFT] = {IW_LEDGER_CONFIRMED, 11500, "cN"},
+    [IW_LEDGER_FORCE_UNIT_RIGHT] = {IW_LEDGER_CONTRADICTED, 8500, "dN"},
+    [IW_LEDGER_OFFSET_INCLUDED] = {IW_LEDGER_CONTRADICTED, -300, "yes"},
+    [IW_LEDGER_FEEDBACK_SIGN_LEFT] = {IW_LEDGER_CONFIRMED, 101, "yes"},
+    [IW_LEDGER_FEEDBACK_SIGN_RIGHT] = {IW_LEDGER_CONTRADICTED, -101, "yes"},
+    [IW_LEDGER_GEAR_RATIO] = {IW_LEDGER_CONTRADICTED, 1251, "1000/999, rpm of the rotor"},
+    [IW_LEDGER_POSE_BYTE_ORDER] = {IW_LEDGER_CONFIRMED, 8000, "yes"},
+    [IW_LEDGER_DLC] = {IW_LEDGER_CONFIRMED, 7, "yes"},
+    [IW_LEDGER_CURRENT_ROLE] = {IW_LEDGER_ASSUMED, 0, "setpoint"},
+    [IW_LEDGER_MOUNT_SIGN_LEFT] = {IW_LEDGER_ASSUMED, 0, "yes"},
+    [IW_LEDGER_MOUNT_SIGN_RIGHT] = {IW_LEDGER_ASSUMED, 0, "no"},
+    [IW_LEDGER_WHEEL_RADIUS] = {IW_LEDGER_ASSUMED, 0, "500"},
+    [IW_LEDGER_TRACK] = {IW_LEDGER_ASSUMED, 0, "540"},
+};
+
+static void fill_item(unsigned item) {
+    gw_known_item_t *entry = &known.item[item];
+    const bool by_bus = shown[item].state != IW_LEDGER_ASSUMED;
+    *entry = (gw_known_item_t){
+        .entry = {.state = by_bus ? shown[item].state : IW_LEDGER_CONTRADICTED,
+                  .evidence = by_bus ? IW_EVIDENCE_BUS : IW_EVIDENCE_OPERATOR,
+                  .figure = shown[item].figure},
+        .since_wall_us = item % 2U == 0U ? 0 : INT64_C(253402300799000000),
+    };
+    (void)snprintf(entry->value, GW_VALUE_SIZE, "%s", shown[item].value);
+    (void)snprintf(entry->word.found, GW_VALUE_SIZE, "%s", by_bus ? "" : shown[item].value);
+}
+
 static void fill(void) {
     memset(&known, 0, sizeof known);
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item += 2) {
-        gw_known_item_t *entry = &known.item[item];
-        entry->entry.state = item % 4U == 0U ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED;
-        entry->entry.evidence = item % 3U == 0U ? IW_EVIDENCE_OPERATOR : IW_EVIDENCE_BUS;
-        entry->entry.figure = item % 4U == 0U ? INT32_MIN : INT32_MAX;
-        entry->since_wall_us = INT64_MIN + (int64_t)item;
-        memset(entry->value, '"', GW_VALUE_SIZE - 1U);
-        memset(entry->word.found, '\\', GW_VALUE_SIZE - 1U);
-        memset(entry->word.how, '"', item % 4U == 0U ? GW_HOW_SIZE - 1U : 0U);
+        fill_item(item);
     }
     known.offset[IW_LEFT] = (gw_known_offset_t){.from = IW_OFFSET_OPERATOR,
                                                 .unit = IW_FORCE_DN,
-                                                .offset_mN = -3276800,
-                                                .drift_mN = INT32_MIN,
-                                                .deviation_mN = UINT32_MAX,
-                                                .samples = 255,
-                                                .wall_us = INT64_MAX};
+                                                .offset_mN = -327660,
+                                                .drift_mN = -1000,
+                                                .deviation_mN = 1000,
+                                                .samples = IW_FORCE_WINDOW_SAMPLES,
+                                                .wall_us = 0};
 }
 
 void setUp(void) {
@@ -91,7 +120,7 @@ static void test_memory_what_is_written_is_read_back_even_at_its_extremes(void) 
 
 static void test_memory_with_every_item_at_its_longest_fits(void) {
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        known.item[item] = known.item[0];
+        fill_item(item);
     }
     known.offset[IW_RIGHT] = known.offset[IW_LEFT];
     length = gw_memory_write(&known, BUS, text, sizeof text);
@@ -203,10 +232,11 @@ static void test_memory_that_holds_anything_strange_is_refused_as_a_whole(void) 
     };
     for (size_t i = 0; i < sizeof bodies / sizeof bodies[0]; i++) {
         forge(bodies[i]);
-        refused("no gateway writes");
+        refused("no gateway has measured");
     }
-    forge(HEAD "\"items\":{},\"offsets\":{\"left\":{\"from\":\"wheel\",\"unit\":\"cN\",\"offset_mN\":1,\"drift_mN\":1,"
-               "\"deviation_mN\":1,\"samples\":1,\"wall_us\":1}}}\n");
+    forge(HEAD
+          "\"items\":{},\"offsets\":{\"left\":{\"from\":\"wheel\",\"unit\":\"cN\",\"offset_mN\":100,\"drift_mN\":0,"
+          "\"deviation_mN\":0,\"samples\":0,\"wall_us\":1}}}\n");
     TEST_ASSERT_TRUE_MESSAGE(gw_memory_read(text, length, BUS, &got, reason), reason);
 }
 
@@ -232,6 +262,129 @@ static void test_memory_tells_how_only_if_it_was_told(void) {
     TEST_ASSERT_NOT_NULL(strstr(text, "\"how\":\"bringup: 3 full turns by hand\""));
     TEST_ASSERT_TRUE_MESSAGE(gw_memory_read(text, length, BUS, &got, reason), reason);
     assert_same();
+}
+
+/// As the gateway would write it, and reads it again: true if it is believed.
+static bool believed(void) {
+    length = gw_memory_write(&known, BUS, text, sizeof text);
+    TEST_ASSERT_GREATER_THAN_UINT(0, length);
+    const bool taken = gw_memory_read(text, length, BUS, &got, reason);
+    if (!taken) {
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reason, "measured"), reason);
+    }
+    return taken;
+}
+
+static void test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed_and_beyond_is_not(void) {
+    static const struct {
+        iw_ledger_item_t item;
+        iw_ledger_state_t state;
+        const char *value;
+        int32_t low; ///< The least and the most that is believed.
+        int32_t high;
+    } rows[] = {
+        {IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_CONFIRMED, "cN", 8500, 11500},
+        {IW_LEDGER_FORCE_UNIT_LEFT, IW_LEDGER_CONTRADICTED, "cN", 850, 1150},
+        {IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_CONFIRMED, "dN", 850, 1150},
+        {IW_LEDGER_FORCE_UNIT_RIGHT, IW_LEDGER_CONTRADICTED, "dN", 8500, 11500},
+        {IW_LEDGER_OFFSET_INCLUDED, IW_LEDGER_CONTRADICTED, "yes", -300, 300},
+        {IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_CONFIRMED, "yes", 101, 32768 * 53},
+        {IW_LEDGER_FEEDBACK_SIGN_RIGHT, IW_LEDGER_CONTRADICTED, "yes", -32768 * 53, -101},
+        {IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_CONFIRMED, "1", 497, 1503},
+        {IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED, "1, rpm of the wheel", 880, 1120},
+        {IW_LEDGER_POSE_BYTE_ORDER, IW_LEDGER_CONFIRMED, "yes", 8000, 98304000},
+        {IW_LEDGER_POSE_BYTE_ORDER, IW_LEDGER_CONTRADICTED, "yes", 0, 125},
+        {IW_LEDGER_DLC, IW_LEDGER_CONFIRMED, "yes", 7, 7},
+        {IW_LEDGER_DLC, IW_LEDGER_CONTRADICTED, "yes", 0, 8},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const int32_t figures[] = {rows[i].low, rows[i].high, rows[i].low - 1, rows[i].high + 1, INT32_MIN, INT32_MAX};
+        memset(&known, 0, sizeof known);
+        gw_known_item_t *entry = &known.item[rows[i].item];
+        (void)snprintf(entry->value, GW_VALUE_SIZE, "%s", rows[i].value);
+        for (size_t j = 0; j < sizeof figures / sizeof figures[0]; j++) {
+            entry->entry = (iw_ledger_entry_t){rows[i].state, IW_EVIDENCE_BUS, figures[j]};
+            TEST_ASSERT_EQUAL_MESSAGE(j < 2, believed(), gw_ledger_item_name(rows[i].item));
+        }
+        entry->entry = (iw_ledger_entry_t){rows[i].state, IW_EVIDENCE_BUS, rows[i].low};
+        entry->since_wall_us = -1;
+        TEST_ASSERT_FALSE(believed());
+        entry->since_wall_us = INT64_C(253402300799000001);
+        TEST_ASSERT_FALSE(believed());
+    }
+}
+
+static void test_memory_of_what_only_the_operator_can_know_is_not_believed_of_the_bus(void) {
+    static const iw_ledger_item_t items[] = {IW_LEDGER_CURRENT_ROLE, IW_LEDGER_MOUNT_SIGN_LEFT,
+                                             IW_LEDGER_MOUNT_SIGN_RIGHT, IW_LEDGER_WHEEL_RADIUS};
+    for (size_t i = 0; i < sizeof items / sizeof items[0]; i++) {
+        memset(&known, 0, sizeof known);
+        fill_item(items[i]);
+        TEST_ASSERT_TRUE(believed());
+        known.item[items[i]].entry.figure = 1;
+        TEST_ASSERT_FALSE_MESSAGE(believed(), "the operator gives no figure");
+        known.item[items[i]].entry.figure = 0;
+        known.item[items[i]].entry.evidence = IW_EVIDENCE_BUS;
+        TEST_ASSERT_FALSE(believed());
+    }
+}
+
+static void test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_believed(void) {
+    static const struct {
+        iw_ledger_item_t item;
+        const char *value;
+    } rows[] = {
+        {IW_LEDGER_WHEEL_RADIUS, "19"},       {IW_LEDGER_WHEEL_RADIUS, "501"},
+        {IW_LEDGER_WHEEL_RADIUS, "192 mm"},   {IW_LEDGER_SETPOINT_TYPE, "256"},
+        {IW_LEDGER_CURRENT_ROLE, "neither"},  {IW_LEDGER_FORCE_UNIT_LEFT, "N"},
+        {IW_LEDGER_MOUNT_SIGN_LEFT, "maybe"}, {IW_LEDGER_GEAR_RATIO, "1001, rpm of the wheel"},
+        {IW_LEDGER_GEAR_RATIO, "1/0"},        {IW_LEDGER_GEAR_RATIO, "1, rpm of the moon"},
+        {IW_LEDGER_DLC, "\033[2J"},           {IW_LEDGER_DLC, "perhaps"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        memset(&known, 0, sizeof known);
+        gw_known_item_t *entry = &known.item[rows[i].item];
+        entry->entry = (iw_ledger_entry_t){IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
+        TEST_ASSERT_TRUE(believed());
+        (void)snprintf(entry->value, GW_VALUE_SIZE, "%s", rows[i].value);
+        TEST_ASSERT_FALSE_MESSAGE(believed(), rows[i].value);
+        entry->value[0] = '\0';
+        (void)snprintf(entry->word.found, GW_VALUE_SIZE, "%s", rows[i].value);
+        TEST_ASSERT_FALSE_MESSAGE(believed(), rows[i].value);
+    }
+}
+
+static void test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed(void) {
+    static const struct {
+        bool good;
+        gw_known_offset_t offset;
+    } rows[] = {
+        {true, {IW_OFFSET_OPERATOR, IW_FORCE_CN, 327660, 0, 0, 40, 1}},
+        {false, {IW_OFFSET_OPERATOR, IW_FORCE_CN, 327661, 0, 0, 40, 1}},
+        {false, {IW_OFFSET_OPERATOR, IW_FORCE_CN, 912000, 0, 0, 40, 1}},
+        {false, {IW_OFFSET_WHEEL, IW_FORCE_CN, -912000, 0, 0, 0, 1}},
+        {false, {IW_OFFSET_ESTIMATED, IW_FORCE_DN, 912000, 0, 0, 40, 1}},
+        {false, {IW_OFFSET_WHEEL, IW_FORCE_DN, 912000, 0, 0, 0, 1}},
+        {true, {IW_OFFSET_ESTIMATED, IW_FORCE_DN, -327660, -1000, 1000, 40, 1}},
+        {false, {IW_OFFSET_ESTIMATED, IW_FORCE_DN, 0, -1001, 0, 40, 1}},
+        {false, {IW_OFFSET_ESTIMATED, IW_FORCE_DN, 0, 1001, 0, 40, 1}},
+        {false, {IW_OFFSET_OPERATOR, IW_FORCE_DN, 0, 0, 1001, 40, 1}},
+        {false, {IW_OFFSET_OPERATOR, IW_FORCE_DN, 0, 0, 0, 39, 1}},
+        {false, {IW_OFFSET_OPERATOR, IW_FORCE_DN, 0, 0, 0, 41, 1}},
+        {false, {IW_OFFSET_OPERATOR, IW_FORCE_DN, 0, 0, 0, 40, -1}},
+        {true, {IW_OFFSET_WHEEL, IW_FORCE_DN, 12300, 0, 0, 0, 1}},
+        {false, {IW_OFFSET_WHEEL, IW_FORCE_DN, 12301, 0, 0, 0, 1}},
+        {false, {IW_OFFSET_WHEEL, IW_FORCE_DN, 12300, 1, 0, 0, 1}},
+        {false, {IW_OFFSET_WHEEL, IW_FORCE_DN, 12300, 0, 1, 0, 1}},
+        {false, {IW_OFFSET_WHEEL, IW_FORCE_DN, 12300, 0, 0, 40, 1}},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char row[32];
+        (void)snprintf(row, sizeof row, "row %zu", i);
+        memset(&known, 0, sizeof known);
+        known.offset[i % 2U == 0U ? IW_LEFT : IW_RIGHT] = rows[i].offset;
+        TEST_ASSERT_EQUAL_MESSAGE(rows[i].good, believed(), row);
+    }
 }
 
 static void test_memory_file_name_is_one_plain_word(void) {
@@ -381,6 +534,10 @@ int main(void) {
     RUN_TEST(test_memory_that_holds_anything_strange_is_refused_as_a_whole);
     RUN_TEST(test_memory_of_before_is_taken_over_and_what_it_lacks_stays_open);
     RUN_TEST(test_memory_tells_how_only_if_it_was_told);
+    RUN_TEST(test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed_and_beyond_is_not);
+    RUN_TEST(test_memory_of_what_only_the_operator_can_know_is_not_believed_of_the_bus);
+    RUN_TEST(test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_believed);
+    RUN_TEST(test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed);
     RUN_TEST(test_memory_file_name_is_one_plain_word);
     RUN_TEST(test_keeper_writes_reads_back_and_sets_aside);
     RUN_TEST(test_keeper_without_its_directory_fails_and_recovers_when_it_comes);

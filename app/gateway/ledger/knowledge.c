@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
+#include "bounds.h"
 #include "box/record.h"
 #include "daemon.h"
 #include "knowledge_told.h"
@@ -44,7 +45,8 @@ static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
     gw_knowledge_tell_item(daemon, item);
 }
 
-/// The offset in force is one of this run: notes where it comes from and how good it is.
+/// The offset in force is one of this run: notes where it comes from and how good it is. One that the wheel's force cannot
+/// reach is not kept.
 static void note_offset(gw_daemon_t *daemon, iw_side_t side) {
     const iw_force_t *force = &daemon->gateway.force[side];
     iw_force_quality_t quality = {0};
@@ -53,14 +55,17 @@ static void note_offset(gw_daemon_t *daemon, iw_side_t side) {
     } else if (force->provenance == IW_OFFSET_ESTIMATED) {
         quality = force->quality;
     }
-    daemon->knowledge.known.offset[side] = (gw_known_offset_t){.from = force->provenance,
-                                                               .unit = daemon->gateway.config.force_unit[side],
-                                                               .offset_mN = force->offset_mN,
-                                                               .drift_mN = quality.drift_mN,
-                                                               .deviation_mN = quality.deviation_mN,
-                                                               .samples = quality.samples,
-                                                               .wall_us = iw_clock_wall_us()};
-    daemon->knowledge.changed = true;
+    const gw_known_offset_t known = {.from = force->provenance,
+                                     .unit = daemon->gateway.config.force_unit[side],
+                                     .offset_mN = force->offset_mN,
+                                     .drift_mN = quality.drift_mN,
+                                     .deviation_mN = quality.deviation_mN,
+                                     .samples = quality.samples,
+                                     .wall_us = iw_clock_wall_us()};
+    if (gw_bounds_offset(&known)) {
+        daemon->knowledge.known.offset[side] = known;
+        daemon->knowledge.changed = true;
+    }
 }
 
 static void observe_offset(gw_daemon_t *daemon, iw_side_t side) {
@@ -168,7 +173,8 @@ static void take_result(gw_daemon_t *daemon, gw_keeper_news_t news, int error) {
     const bool failed = news != GW_KEEPER_WRITTEN;
     const bool told = failed && self->state == GW_MEMORY_FAILED && self->error == error;
     const bool mended = !failed && self->state == GW_MEMORY_FAILED;
-    self->state = failed ? GW_MEMORY_FAILED : GW_MEMORY_KEPT;
+    const bool set_aside = self->reason[0] != '\0'; // That must not be forgotten with the first write.
+    self->state = failed ? GW_MEMORY_FAILED : set_aside ? GW_MEMORY_IGNORED : GW_MEMORY_KEPT;
     self->error = error;
     if (failed) {
         self->changed = true;

@@ -23,10 +23,10 @@
 
 typedef enum {
     GW_MEMORY_LOADING = 0,
-    GW_MEMORY_NEW,     ///< There was no file.
-    GW_MEMORY_KEPT,    ///< The file was read, or written.
-    GW_MEMORY_IGNORED, ///< The file is not to be trusted; it will be set aside.
-    GW_MEMORY_FAILED,  ///< Nothing is kept: the reason tells why.
+    GW_MEMORY_NEW,  ///< There was no file.
+    GW_MEMORY_KEPT, ///< The file was read, or written.
+    GW_MEMORY_IGNORED, ///< The file found at the start was not to be trusted and is set aside; what is learnt since is kept.
+    GW_MEMORY_FAILED, ///< Nothing is kept: the reason tells why.
 } gw_memory_state_t;
 
 /// An offset in force, as last told.
@@ -49,7 +49,7 @@ typedef struct {
     int error;                          ///< Of GW_MEMORY_FAILED.
     bool answered;                      ///< The keeper has, or our patience has ended: changes are told.
     bool changed;                       ///< Since the last write.
-    char reason[GW_MEMORY_REASON_SIZE]; ///< Why the file is ignored.
+    char reason[GW_MEMORY_REASON_SIZE]; ///< Why the file found at the start is ignored; empty: it is not.
     char path[GATEWAY_PATH_SIZE + 128U];
     char kept[GW_MEMORY_SIZE]; ///< The text handed over last.
 } gw_knowledge_t;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "memory.h"
 
+#include "bounds.h"
 #include "json/json_arena.h"
 #include "json/json_out.h"
 #include "names.h"
@@ -15,7 +16,6 @@
 #define VERSION 1
 /// Eight hexadecimal digits and a newline.
 #define SUM_LENGTH 9U
-/// Further off no sensor can be: the largest raw value in the coarser unit.
 
 /// CRC-32 as everybody computes it (zip, Ethernet).
 static uint32_t checksum(const char *text, size_t length) {
@@ -142,7 +142,8 @@ static bool read_items(json_t *items, gw_known_t *known) {
     json_t *object;
     json_object_foreach(items, name, object) {
         iw_ledger_item_t item;
-        if (!gw_assumption_of(name, &item) || !read_item(object, &known->item[item])) {
+        if (!gw_assumption_of(name, &item) || !read_item(object, &known->item[item]) ||
+            !gw_bounds_item(item, &known->item[item])) {
             return false;
         }
     }
@@ -187,7 +188,8 @@ static bool read_offsets(json_t *offsets, gw_known_t *known) {
     json_t *object;
     json_object_foreach(offsets, name, object) {
         const bool left = strcmp(name, "left") == 0;
-        if ((!left && strcmp(name, "right") != 0) || !read_offset(object, &known->offset[left ? IW_LEFT : IW_RIGHT])) {
+        gw_known_offset_t *offset = &known->offset[left ? IW_LEFT : IW_RIGHT];
+        if ((!left && strcmp(name, "right") != 0) || !read_offset(object, offset) || !gw_bounds_offset(offset)) {
             return false;
         }
     }
@@ -209,7 +211,7 @@ static const char *read_line(const json_t *root, const char *bus, gw_known_t *kn
         return "it speaks of another bus";
     }
     if (!read_items(json_object_get(root, "items"), known) || !read_offsets(json_object_get(root, "offsets"), known)) {
-        return "it holds what no gateway writes";
+        return "it holds what no gateway has measured";
     }
     return NULL;
 }

@@ -35,6 +35,9 @@
 #define IW_FORCE_OFFSET_MAX_mN 3276800
 /// Unit evidence needs a wheel offset of at least this.
 #define IW_FORCE_EVIDENCE_MIN_dN 20
+/// ... and a mean within this share of the ratio's prediction; for a removed offset, below this share of the offset.
+#define IW_FORCE_EVIDENCE_PERCENT 15
+#define IW_FORCE_REMOVED_PERCENT  30
 /// Older than this (five periods), the force is not valid, and a window with such a gap starts again.
 #define IW_FORCE_STALE_US 250000U
 

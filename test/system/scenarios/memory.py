@@ -2,9 +2,11 @@
 """What is known of the wheels is kept over restarts; a file that is not to be trusted is told and ignored."""
 
 import glob
+import json
 import os
 import signal
 import time
+import zlib
 
 from client import Streamer
 from scenario import scenario
@@ -154,6 +156,17 @@ def replace(path):
         file.write('{"format":"somebody else\'s"}\n')
 
 
+def forge(path):
+    """A zero of 912 N, with the right checksum."""
+    with open(path, encoding="utf-8") as file:
+        known = json.loads(file.readline())
+    zero = {"from": "operator", "unit": "cN", "offset_mN": 912000, "drift_mN": 0, "deviation_mN": 0, "samples": 40, "wall_us": 1}
+    known["offsets"]["left"] = zero
+    line = json.dumps(known, separators=(",", ":")) + "\n"
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(f"{line}{zlib.crc32(line.encode()):08x}\n")
+
+
 def settled(path):
     """Waits for the process that keeps the file: it outlives the gateway by its last write."""
     seen = None
@@ -161,10 +174,14 @@ def settled(path):
         time.sleep(0.5)
 
 
-@scenario("a damaged or foreign file is told, ignored and set aside", 16)
+@scenario("a damaged, foreign or forged file is told, ignored and set aside", 24)
 def memory_that_is_not_to_be_trusted(t):
     rig, client = t.running()
-    for spoil in (damage, replace):
+    for spoil, fault in (
+        (damage, "it is damaged"),
+        (replace, "it is damaged"),
+        (forge, "it holds what no gateway has measured"),
+    ):
         t.expect(client.request("confirm", item="wheel_radius"))
         t.check(written(rig, '"wheel_radius"'), "written")
         time.sleep(1.3)
@@ -179,10 +196,14 @@ def memory_that_is_not_to_be_trusted(t):
         answered(rig, client)
         status = client.request("status")
         t.check(status["ledger"]["wheel_radius"]["state"] == "assumed", "nothing of it is believed")
-        t.check(f"{path} is ignored: it is damaged" in rig.gateway.text(), "the log tells")
+        t.check(f"{path} is ignored: {fault}" in rig.gateway.text(), "the log tells")
         with open(path + ".damaged", "rb") as file:
             t.check(file.read() == spoilt, "the file is set aside as it was")
-        t.check(rig.wait_status(client, lambda s: s["memory"]["state"] == "kept", 4), "and a new one is kept")
+        t.expect(client.request("confirm", item="mount_sign_left"))
+        t.check(written(rig, '"mount_sign_left"'), "and a new one is kept")
+        time.sleep(0.3)
+        memory = client.request("status")["memory"]
+        t.check(memory["state"] == "ignored" and fault in memory["reason"], f"which is not forgotten then: {memory}")
     t.judge(rig, moves=False)
 
 

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+#include "bounds.h"
+
+#include "evidence.h"
+
+#include "iwheel/follow.h"
+#include "iwheel/codec.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/// The end of the year 9999, after which no clock that is right will write anything.
+#define WALL_US_MAX INT64_C(253402300799000000)
+
+static bool within(int64_t value, int64_t low, int64_t high) {
+    return value >= low && value <= high;
+}
+
+/// Of 1000 x raw / offset in dN, where the unit predicts `ratio`.
+static bool near_ratio(int32_t figure, int32_t ratio) {
+    const int32_t share = ratio * 10 * IW_FORCE_EVIDENCE_PERCENT;
+    return within(figure, ratio * 1000 - share, ratio * 1000 + share);
+}
+
+static bool fits_unit(const gw_known_item_t *known, bool confirmed) {
+    const bool is_cn = strcmp(known->value, "cN") == 0;
+    return near_ratio(known->entry.figure, is_cn == confirmed ? 10 : 1);
+}
+
+/// Speed of the largest wheel at one rpm, in mm/s, and one more for what is cut off.
+static int32_t largest_rpm(void) {
+    return (int32_t)iw_config_range(IW_CONFIG_RADIUS).max * 105 / 1000 + 1;
+}
+
+static bool fits_sign(int32_t figure, bool confirmed) {
+    const int32_t along = confirmed ? figure : -figure;
+    return along > IW_FOLLOW_SIGN_MM_S && along <= -INT16_MIN * largest_rpm();
+}
+
+/// Within 15 % of the speed it was told, and 1 rpm.
+static bool fits_type(int32_t figure) {
+    const int32_t share = 150 + largest_rpm() * 1000 / GW_EVIDENCE_TYPE_MM_S;
+    return within(figure, 1000 - share, 1000 + share);
+}
+
+static bool fits_pose(int32_t figure, bool confirmed) {
+    const int32_t step = GW_EVIDENCE_POSE_FACTOR * 1000;
+    return confirmed ? within(figure, step, 3 * 1000 * -INT16_MIN) : within(figure, 0, 1000 / GW_EVIDENCE_POSE_FACTOR);
+}
+
+/// Measured: is it what this measurement gives?
+static bool fits_bus(iw_ledger_item_t item, const gw_known_item_t *known) {
+    const bool confirmed = known->entry.state == IW_LEDGER_CONFIRMED;
+    const int32_t figure = known->entry.figure;
+    switch (item) {
+    case IW_LEDGER_FORCE_UNIT_LEFT:
+    case IW_LEDGER_FORCE_UNIT_RIGHT:
+        return fits_unit(known, confirmed);
+    case IW_LEDGER_OFFSET_INCLUDED:
+        return confirmed ? near_ratio(figure, 10) || near_ratio(figure, 1)
+                         : within(figure, -10 * IW_FORCE_REMOVED_PERCENT, 10 * IW_FORCE_REMOVED_PERCENT);
+    case IW_LEDGER_FEEDBACK_SIGN_LEFT:
+    case IW_LEDGER_FEEDBACK_SIGN_RIGHT:
+        return figure != INT32_MIN && fits_sign(figure, confirmed);
+    case IW_LEDGER_SETPOINT_TYPE:
+        return confirmed && fits_type(figure);
+    case IW_LEDGER_GEAR_RATIO:
+        return confirmed ? within(figure, 1000 - GW_EVIDENCE_FITS_PERMILLE, 1000 + GW_EVIDENCE_FITS_PERMILLE)
+                         : !within(figure, 1000 - GW_EVIDENCE_FAILS_PERMILLE, 1000 + GW_EVIDENCE_FAILS_PERMILLE);
+    case IW_LEDGER_POSE_BYTE_ORDER:
+        return fits_pose(figure, confirmed);
+    case IW_LEDGER_DLC:
+        return confirmed ? figure == IW_DLC_STATUS : within(figure, 0, IW_CAN_DATA_MAX);
+    default:
+        return false; // Only the operator can know.
+    }
+}
+
+/// A value that can be configured, or that an operator may find.
+static bool can_be(iw_ledger_item_t item, const char *value) {
+    char bare[GW_VALUE_SIZE];
+    gateway_config_t config;
+    gateway_config_default(&config);
+    config.core.setpoint_type_set = true;
+    config.core.current_role = IW_ROLE_LIMIT;
+    (void)memcpy(bare, value, sizeof bare);
+    char *rest = item == IW_LEDGER_GEAR_RATIO ? strstr(bare, ", rpm of the ") : NULL;
+    if (rest != NULL && (strcmp(rest, ", rpm of the wheel") == 0 || strcmp(rest, ", rpm of the rotor") == 0)) {
+        *rest = '\0';
+    }
+    return gw_assumption_compare(&config, item, bare) != GW_FOUND_IMPOSSIBLE;
+}
+
+bool gw_bounds_item(iw_ledger_item_t item, const gw_known_item_t *known) {
+    const bool by_bus = known->entry.evidence == IW_EVIDENCE_BUS;
+    const bool fits = by_bus ? fits_bus(item, known) && known->word.found[0] == '\0' : known->entry.figure == 0;
+    return fits && can_be(item, known->value) && can_be(item, known->word.found) &&
+           within(known->since_wall_us, 0, WALL_US_MAX);
+}
+
+bool gw_bounds_offset(const gw_known_offset_t *known) {
+    const bool sent = known->from == IW_OFFSET_WHEEL;
+    const bool sent_whole =
+        known->offset_mN % 100 == 0 && known->drift_mN == 0 && known->deviation_mN == 0U && known->samples == 0U;
+    const bool quiet = within(known->drift_mN, -(int32_t)IW_FORCE_DRIFT_mN, (int32_t)IW_FORCE_DRIFT_mN) &&
+                       known->deviation_mN <= IW_FORCE_QUIET_mN && known->samples == IW_FORCE_WINDOW_SAMPLES;
+    return within(known->offset_mN, -GW_BOUNDS_ZERO_mN, GW_BOUNDS_ZERO_mN) && (sent ? sent_whole : quiet) &&
+           within(known->wall_us, 0, WALL_US_MAX);
+}
