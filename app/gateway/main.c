@@ -98,7 +98,7 @@ static int serve(gw_daemon_t *daemon) {
 
 static int run(gw_daemon_t *daemon) {
     gw_knowledge_open(&daemon->knowledge, &daemon->config);
-    int result = gw_listener_prepare(&daemon->config, stderr);
+    int result = gw_listener_prepare(&daemon->listener, &daemon->config, stderr);
     result = result != 0 ? result : gw_runtime_open(&daemon->runtime, &daemon->config, GW_RUNTIME_DIRECTORY, stderr);
     if (result != 0) {
         return result;

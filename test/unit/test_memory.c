@@ -4,6 +4,7 @@
 #include "ledger/keeper.h"
 #include "ledger/memory.h"
 #include "names.h"
+#include "process/owners.h"
 
 #include "unity.h"
 
@@ -400,6 +401,7 @@ static void test_memory_file_name_is_one_plain_word(void) {
 static gw_keeper_t keeper;
 static char heard[GW_KEEPER_TEXT_MAX];
 static int error;
+static char second[128];
 
 static gw_keeper_news_t next_news(void) {
     gw_keeper_news_t news = GW_KEEPER_NO_NEWS;
@@ -500,12 +502,78 @@ static void test_keeper_takes_no_link_pipe_or_giant_for_its_file(void) {
 
 static void test_keeper_that_cannot_write_keeps_the_old_file(void) {
     put_file("file", "old");
-    TEST_ASSERT_EQUAL_INT(0, symlink("/dev/full", in_folder("file.new")));
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file.new"), 0755));
     open_keeper(folder, GW_KEEPER_READ);
     TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_FAILED, next_news()); // It does not follow the link.
+    TEST_ASSERT_EQUAL_INT(GW_KEEPER_FAILED, next_news());
     assert_file("file", "old");
     gw_keeper_close(&keeper);
+    TEST_ASSERT_EQUAL_INT(0, rmdir(in_folder("file.new")));
+}
+
+static void test_keeper_never_writes_into_a_file_that_is_there_already(void) {
+    put_file("other", "precious");
+    TEST_ASSERT_EQUAL_INT(0, link(in_folder("other"), strcpy(second, in_folder("file.new"))));
+    open_keeper(folder, GW_KEEPER_READ);
+    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
+    assert_file("other", "precious");
+    assert_file("file", "new");
+    TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file.new")));
+    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "newer", 5));
+    TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
+    assert_file("other", "precious");
+    gw_keeper_close(&keeper);
+}
+
+static void assert_not_read(int why) {
+    open_keeper(folder, GW_KEEPER_BAD);
+    TEST_ASSERT_EQUAL_INT(why, error);
+    gw_keeper_close(&keeper);
+}
+
+static void test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger(void) {
+    put_file("file", "old");
+    TEST_ASSERT_EQUAL_INT(0, link(in_folder("file"), strcpy(second, in_folder("again"))));
+    assert_not_read(GW_FOLDER_FILE);
+    TEST_ASSERT_EQUAL_INT(0, unlink(second));
+    if (geteuid() != 0) {
+        TEST_MESSAGE("SKIPPED in part: giving a file away needs root");
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, chown(in_folder("file"), 65534, 65534));
+    assert_not_read(GW_FOLDER_FILE);
+    (void)unlink(in_folder("file"));
+}
+
+static void assert_no_folder(const char *path, int why) {
+    open_keeper(path, GW_KEEPER_FAILED);
+    TEST_ASSERT_EQUAL_INT(why, error);
+    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
+    TEST_ASSERT_EQUAL_INT(GW_KEEPER_FAILED, next_news());
+    TEST_ASSERT_EQUAL_INT(why, error);
+    gw_keeper_close(&keeper);
+}
+
+static void test_keeper_uses_no_folder_in_which_others_can_put_things(void) {
+    static const mode_t modes[] = {0777, 01777, 0775, 0757};
+    for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
+        TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
+        assert_no_folder(folder, GW_FOLDER_SHARED);
+    }
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0700));
+    TEST_ASSERT_EQUAL_INT(0, symlink(".", strcpy(second, in_folder("link"))));
+    assert_no_folder(second, ELOOP);
+    strcat(second, "/");
+    assert_no_folder(second, ELOOP);
+    TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("link")));
+    if (geteuid() != 0) {
+        TEST_MESSAGE("SKIPPED in part: giving a folder away needs root");
+        return;
+    }
+    TEST_ASSERT_EQUAL_INT(0, chown(folder, 65534, 65534));
+    assert_no_folder(folder, GW_FOLDER_FOREIGN);
+    TEST_ASSERT_EQUAL_INT(0, chown(folder, 0, 0));
 }
 
 static void test_keeper_that_died_is_noticed_and_nothing_waits_for_it(void) {
@@ -543,6 +611,9 @@ int main(void) {
     RUN_TEST(test_keeper_without_its_directory_fails_and_recovers_when_it_comes);
     RUN_TEST(test_keeper_takes_no_link_pipe_or_giant_for_its_file);
     RUN_TEST(test_keeper_that_cannot_write_keeps_the_old_file);
+    RUN_TEST(test_keeper_never_writes_into_a_file_that_is_there_already);
+    RUN_TEST(test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger);
+    RUN_TEST(test_keeper_uses_no_folder_in_which_others_can_put_things);
     RUN_TEST(test_keeper_that_died_is_noticed_and_nothing_waits_for_it);
     (void)unlink(in_folder("file"));
     (void)unlink(in_folder("file.new"));

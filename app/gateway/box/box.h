@@ -39,7 +39,7 @@ typedef struct {
 /// What the writer tells the gateway. An order without a stop (number 0): the directory cannot be used.
 typedef struct {
     uint32_t number; ///< Of the stop.
-    int error;       ///< An errno, 0: written.
+    int error;       ///< An errno or a reason of owners.h, 0: written.
     uint32_t frames;
     uint32_t ms; ///< From the first entry to the stop.
     char path[GW_BOX_PATH_SIZE];

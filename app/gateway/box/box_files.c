@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "box_files.h"
 
+#include "process/owners.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -23,7 +25,7 @@ int gw_box_files_open(const char *directory) {
     if (mkdir(directory, 0755) != 0 && errno != EEXIST) {
         return -1;
     }
-    return open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    return gw_folder_open_own(directory);
 }
 
 /// The number in a file's name; 0 if it is none of ours.

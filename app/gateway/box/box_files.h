@@ -10,7 +10,8 @@
 
 #define GW_BOX_STEM_SIZE 64U
 
-/// Opens the directory, made if only its last part is missing. A descriptor, or -1 with errno.
+/// Opens the directory, made if only its last part is missing. A descriptor, or -1 with errno
+/// or a reason of owners.h in it.
 int gw_box_files_open(const char *directory);
 
 /// The number after the highest there is.

@@ -3,10 +3,10 @@
 
 #include "json/json_frame.h"
 #include "names.h"
+#include "process/owners.h"
 
 #include "iwheel_linux/clock.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -76,32 +76,20 @@ void gw_record_again(gw_daemon_t *daemon) {
     }
 }
 
-static const char *cure(int error) {
-    switch (error) {
-    case ENOSPC:
-    case EDQUOT:
-        return "make room there";
-    case EROFS:
-        return "it is mounted read-only; name another place as [record] directory";
-    case EACCES:
-    case EPERM:
-        return "give it to the gateway's user, or name another place as [record] directory";
-    default:
-        return "make it, or name another place as [record] directory";
-    }
-}
-
 static void tell_result(gw_daemon_t *daemon, const gw_box_result_t *result) {
     const char *directory = daemon->config.record.directory;
     if (result->number == 0U && result->error == 0) {
         gw_log(&daemon->log, GW_LOG_INFO, "recorded in %s", result->path);
     } else if (result->number == 0U) {
         gw_log(&daemon->log, GW_LOG_WARNING,
-               "no recording can be written to %s: %s; %s. Until then a stop is kept in memory only: iwheelctl why",
-               directory, strerror(result->error), cure(result->error));
+               "no recording can be written to %s: %s; %s, or name another place as [record] directory. Until then a "
+               "stop is "
+               "kept in memory only: iwheelctl why",
+               directory, gw_folder_fault(result->error), gw_folder_cure(result->error));
     } else if (result->error != 0) {
-        gw_log(&daemon->log, GW_LOG_WARNING, "stop %u is not recorded in %s: %s; %s", (unsigned)result->number,
-               directory, strerror(result->error), cure(result->error));
+        gw_log(&daemon->log, GW_LOG_WARNING,
+               "stop %u is not recorded in %s: %s; %s, or name another place as [record] directory",
+               (unsigned)result->number, directory, gw_folder_fault(result->error), gw_folder_cure(result->error));
     } else {
         gw_log(&daemon->log, GW_LOG_INFO, "stop %u is recorded in %s (%u frames, %u.%u s before it)",
                (unsigned)result->number, result->path, (unsigned)result->frames, (unsigned)(result->ms / 1000U),
@@ -141,7 +129,7 @@ void gw_record_write(const gw_daemon_t *daemon, json_out_t *json) {
     const bool known = number != 0U && last->number == number;
     json_out_text(json, "directory", daemon->config.record.directory);
     json_out_text(json, "recording", known && last->error == 0 ? last->path : NULL);
-    json_out_text(json, "recording_error", known && last->error != 0 ? strerror(last->error) : NULL);
+    json_out_text(json, "recording_error", known && last->error != 0 ? gw_folder_fault(last->error) : NULL);
     write_frames(json, "frames_before", daemon->tape.before, daemon->tape.before_count);
     write_frames(json, "frames_after", daemon->tape.after, number != 0U ? daemon->tape.after_count : 0U);
 }

@@ -29,26 +29,52 @@ static int complain_errno(FILE *err, const char *path, int error) {
     return error == EACCES || error == EPERM ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
-int gw_listener_prepare(const gateway_config_t *config, FILE *err) {
+static int complain_folder(FILE *err, const char *path, int error) {
+    char cure[128];
+    (void)snprintf(cure, sizeof cure, "%s, or choose another with --socket", gw_folder_cure(error));
+    (void)complain(err, path, gw_folder_fault(error), cure);
+    return error == EACCES || error == EPERM || error >= GW_FOLDER_FOREIGN ? EX_NOPERM : EX_UNAVAILABLE;
+}
+
+int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, FILE *err) {
     const char *path = config->northbound.socket;
-    char directory[GATEWAY_PATH_SIZE];
-    struct stat status;
     const char *slash = strrchr(path, '/');
-    const int length = slash == NULL ? 0 : (int)(slash - path);
-    (void)snprintf(directory, sizeof directory, "%.*s", length, path);
-    const char *name = slash == NULL ? "." : length == 0 ? "/" : directory;
-    if (mkdir(name, 0755) != 0 && errno != EEXIST) {
+    char folder[GATEWAY_PATH_SIZE];
+    *self =
+        (gw_listener_t){.fd = -1, .reserve_fd = -1, .owners = gw_owners_of(GW_RUNTIME_DIRECTORY), .folder = {.fd = -1}};
+    (void)snprintf(self->path, sizeof self->path, "%s", path);
+    (void)snprintf(self->name, sizeof self->name, "%s", slash == NULL ? path : slash + 1);
+    gw_folder_of(path, folder, sizeof folder);
+    if (mkdir(folder, 0755) != 0 && errno != EEXIST) {
         return complain_errno(err, path, errno);
     }
-    if (stat(name, &status) != 0) {
-        return complain_errno(err, path, errno);
+    const int error = gw_folder_open(&self->folder, folder, &self->owners);
+    if (error != 0) {
+        return complain_folder(err, path, error);
     }
-    if ((status.st_mode & S_IWOTH) != 0U && (status.st_mode & S_ISVTX) == 0U) {
-        (void)complain(err, path, "anybody may write to its directory and put another socket in its place",
-                       "take that right away (chmod o-w), or choose another directory with --socket");
-        return EX_NOPERM;
+    if (self->folder.shared) {
+        (void)fprintf(err,
+                      "iwheel-gateway: warning: socket %s: while no gateway runs, anybody can put another socket there "
+                      "and answer for it; for more than a trial choose a directory of its own with --socket\n",
+                      path);
     }
     return 0;
+}
+
+// In the folder -------------------------------------------------------------------------------------------------------
+
+/// A socket's address has no "relative to a descriptor": the process stands in the folder meanwhile. The descriptor leads
+/// back; -1: from a place that we may not even look at.
+static bool enter(const gw_listener_t *self, int *out_back) {
+    *out_back = open(".", O_PATH | O_DIRECTORY | O_CLOEXEC);
+    return fchdir(self->folder.fd) == 0;
+}
+
+static void leave(int back) {
+    if (back >= 0) {
+        (void)!fchdir(back);
+        (void)close(back);
+    }
 }
 
 static bool somebody_answers(const struct sockaddr_un *address) {
@@ -61,25 +87,79 @@ static bool somebody_answers(const struct sockaddr_un *address) {
     return answered;
 }
 
-/// Makes the path free, if it is safe to.
-static int clear_path(const struct sockaddr_un *address, FILE *err) {
+static int remove_name(const gw_listener_t *self, bool stranger, FILE *err) {
+    if (unlinkat(self->folder.fd, self->name, 0) == 0 || errno == ENOENT) {
+        return 0;
+    }
+    if (stranger) {
+        (void)complain(err, self->path, "it is another user's, and only he can take it away",
+                       "choose a directory of your own with --socket");
+        return EX_NOPERM;
+    }
+    return complain_errno(err, self->path, errno);
+}
+
+/// Makes the name free, if it is safe to.
+static int clear_name(const gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
     struct stat status;
-    if (lstat(address->sun_path, &status) != 0) {
-        return errno == ENOENT ? 0 : complain_errno(err, address->sun_path, errno);
+    if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
+        return errno == ENOENT ? 0 : complain_errno(err, self->path, errno);
     }
     if (S_ISLNK(status.st_mode)) {
-        return complain(err, address->sun_path, "is a symbolic link, which is not followed",
+        return complain(err, self->path, "is a symbolic link, which is not followed",
                         "remove it, or name the real path with --socket");
     }
     if (!S_ISSOCK(status.st_mode)) {
-        return complain(err, address->sun_path, "exists and is no socket, so it is left alone",
+        return complain(err, self->path, "exists and is no socket, so it is left alone",
                         "remove it, or choose another path with --socket");
     }
-    if (somebody_answers(address)) {
-        return complain(err, address->sun_path, "another program answers on it",
+    const bool stranger = !gw_owners_have(&self->owners, status.st_uid);
+    if (!stranger && somebody_answers(address)) {
+        return complain(err, self->path, "another program answers on it",
                         "stop that one, or choose another path with --socket");
     }
-    return unlink(address->sun_path) == 0 || errno == ENOENT ? 0 : complain_errno(err, address->sun_path, errno);
+    return remove_name(self, stranger, err);
+}
+
+/// Nobody but us can have put it there; if somebody has, it is not served.
+static int verify(gw_listener_t *self, mode_t mode, FILE *err) {
+    struct stat status;
+    if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
+        return complain_errno(err, self->path, errno);
+    }
+    if (!S_ISSOCK(status.st_mode) || status.st_uid != geteuid()) {
+        return complain(err, self->path, "something else took its place",
+                        "choose a directory with --socket to which nobody else may write");
+    }
+    self->device = status.st_dev;
+    self->inode = status.st_ino;
+    const bool right = (status.st_mode & 0777U) == mode; // Not so where the folder has access control lists.
+    return right || fchmodat(self->folder.fd, self->name, mode, AT_SYMLINK_NOFOLLOW) == 0
+               ? 0
+               : complain_errno(err, self->path, errno);
+}
+
+/// Has its mode from the first moment; nobody is let in before it listens.
+static int bind_socket(gw_listener_t *self, const struct sockaddr_un *address, mode_t mode, FILE *err) {
+    self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (self->fd < 0) {
+        return complain_errno(err, self->path, errno);
+    }
+    const mode_t before = umask(~mode & 0777U);
+    const int result = bind(self->fd, (const struct sockaddr *)address, sizeof *address);
+    const int error = errno;
+    (void)umask(before);
+    return result == 0 ? verify(self, mode, err) : complain_errno(err, self->path, error);
+}
+
+static int make_socket(gw_listener_t *self, mode_t mode, FILE *err) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", self->name);
+    int back;
+    int result = enter(self, &back) ? clear_name(self, &address, err) : complain_errno(err, self->path, errno);
+    result = result != 0 ? result : bind_socket(self, &address, mode, err);
+    leave(back);
+    return result;
 }
 
 static void give_to_group(const gw_listener_t *self, const gateway_config_t *config, gw_log_t *log) {
@@ -89,52 +169,26 @@ static void give_to_group(const gw_listener_t *self, const gateway_config_t *con
     }
     struct stat status;
     const struct group *group = getgrnam(name);
-    if (group != NULL && lstat(self->path, &status) == 0 && status.st_gid == group->gr_gid) {
+    if (group != NULL && fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) == 0 &&
+        status.st_gid == group->gr_gid) {
         return; // As a service, which may not call chown.
     }
     if (group == NULL) {
         gw_log(log, GW_LOG_WARNING, "there is no group %s; the socket keeps our own group (groupadd --system %s)", name,
                name);
-    } else if (lchown(self->path, (uid_t)-1, group->gr_gid) != 0) {
+    } else if (fchownat(self->folder.fd, self->name, (uid_t)-1, group->gr_gid, AT_SYMLINK_NOFOLLOW) != 0) {
         gw_log(log, GW_LOG_WARNING, "the socket cannot be given to group %s: %s; it keeps our own group", name,
                strerror(errno));
     }
 }
 
-static int bind_socket(gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
-    struct stat status;
-    self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (self->fd < 0) {
-        return complain_errno(err, address->sun_path, errno);
-    }
-    const mode_t before = umask(0177);
-    const int result = bind(self->fd, (const struct sockaddr *)address, sizeof *address);
-    const int error = errno;
-    (void)umask(before);
-    if (result != 0) {
-        (void)close(self->fd);
-        return complain_errno(err, address->sun_path, error);
-    }
-    (void)memcpy(self->path, address->sun_path, sizeof self->path);
-    if (lstat(self->path, &status) == 0) {
-        self->device = status.st_dev;
-        self->inode = status.st_ino;
-    }
-    return 0;
-}
-
 int gw_listener_open(gw_listener_t *self, const gateway_config_t *config, gw_log_t *log, FILE *err) {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    *self = (gw_listener_t){.fd = -1, .reserve_fd = -1};
-    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", config->northbound.socket);
-    int result = clear_path(&address, err);
-    result = result != 0 ? result : bind_socket(self, &address, err);
-    if (result != 0) {
-        return result;
+    int result = make_socket(self, config->northbound.mode, err);
+    if (result == 0) {
+        give_to_group(self, config, log);
+        result = listen(self->fd, BACKLOG) == 0 ? 0 : complain_errno(err, self->path, errno);
     }
-    give_to_group(self, config, log);
-    if (chmod(self->path, config->northbound.mode) != 0 || listen(self->fd, BACKLOG) != 0) {
-        result = complain_errno(err, self->path, errno);
+    if (result != 0) {
         gw_listener_close(self);
         return result;
     }
@@ -142,20 +196,23 @@ int gw_listener_open(gw_listener_t *self, const gateway_config_t *config, gw_log
     return 0;
 }
 
+static void close_one(int *fd) {
+    if (*fd >= 0) {
+        (void)close(*fd);
+        *fd = -1;
+    }
+}
+
 void gw_listener_close(gw_listener_t *self) {
     struct stat status;
-    if (self->fd < 0) {
-        return;
+    if (self->inode != 0U && fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) == 0 &&
+        status.st_dev == self->device && status.st_ino == self->inode) {
+        (void)unlinkat(self->folder.fd, self->name, 0);
     }
-    if (lstat(self->path, &status) == 0 && status.st_dev == self->device && status.st_ino == self->inode) {
-        (void)unlink(self->path);
-    }
-    (void)close(self->fd);
-    self->fd = -1;
-    if (self->reserve_fd >= 0) {
-        (void)close(self->reserve_fd);
-        self->reserve_fd = -1;
-    }
+    self->inode = 0;
+    gw_folder_close(&self->folder);
+    close_one(&self->fd);
+    close_one(&self->reserve_fd);
 }
 
 void gw_listener_restore(gw_listener_t *self) {

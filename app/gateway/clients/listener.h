@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 /// The northbound socket: made safely, accepted from without ever spinning, removed at the end.
 ///
-/// A path that is taken is replaced only if it is a socket on which nobody answers. Accepting needs a descriptor: one
+/// Its folder must belong to somebody who may run a gateway (process/owners.h), and nobody else may write there; one like
+/// /tmp is used with a warning. It is opened once, and the socket is made, changed and removed in it by name, never by a
+/// path that somebody could turn elsewhere meanwhile. A name that is taken is replaced only if it is a socket on which
+/// nobody answers, or a stranger's. Accepting needs a descriptor: one
 /// is kept in reserve, so that with none left a newcomer can still be taken, told and closed instead of waking the
 /// loop for ever.
 #ifndef GATEWAY_LISTENER_H
@@ -9,6 +12,7 @@
 
 #include "gateway_config.h"
 #include "process/log.h"
+#include "process/owners.h"
 
 #include <sys/types.h>
 
@@ -23,22 +27,25 @@ typedef enum {
 } gw_accept_t;
 
 typedef struct {
-    char path[GATEWAY_PATH_SIZE];
+    char path[GATEWAY_PATH_SIZE]; ///< For people.
+    char name[GATEWAY_PATH_SIZE]; ///< In the folder.
+    gw_owners_t owners;
+    gw_folder_t folder;
     dev_t device; ///< Of the socket as we made it, so that nobody else's is removed.
     ino_t inode;
     int fd;
     int reserve_fd;
 } gw_listener_t;
 
-/// Makes the socket's directory if only that is missing, and refuses one in which anybody could put another socket in
-/// our place. 0, or a sysexits code after cause and cure have been printed on `err`.
-int gw_listener_prepare(const gateway_config_t *config, FILE *err);
+/// Makes the socket's folder if only that is missing, opens and judges it. 0, or a sysexits code after cause and cure have been
+/// printed on `err`.
+int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, FILE *err);
 
-/// In a prepared directory. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does
+/// After gw_listener_prepare. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does
 /// not exist or may not be given is a warning in the log: the socket is then stricter than asked for.
 int gw_listener_open(gw_listener_t *self, const gateway_config_t *config, gw_log_t *log, FILE *err);
 
-/// Closes the socket and removes its file, if it is still ours.
+/// Closes the socket and removes its file, if it is still ours; closes the folder.
 void gw_listener_close(gw_listener_t *self);
 
 /// Takes one waiting connection. Never blocks.

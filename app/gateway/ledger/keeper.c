@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "keeper.h"
 
+#include "process/owners.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -37,12 +39,13 @@ static void answer(const work_t *work, gw_keeper_news_t news, int error) {
 }
 
 static int read_whole(int fd, char *text, size_t *out_length) {
+    const gw_owners_t owners = gw_owners_of(GW_RUNTIME_DIRECTORY);
     struct stat status;
     if (fstat(fd, &status) != 0) {
         return errno;
     }
-    if (!S_ISREG(status.st_mode)) {
-        return EINVAL;
+    if (!gw_owners_wrote(&owners, &status)) {
+        return GW_FOLDER_FILE;
     }
     if (status.st_size > (off_t)GW_KEEPER_TEXT_MAX) {
         return EFBIG;
@@ -59,7 +62,7 @@ static int read_whole(int fd, char *text, size_t *out_length) {
 
 static void tell_file(work_t *work) {
     size_t length = 0;
-    const int directory = open(work->directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const int directory = gw_folder_open_own(work->directory);
     if (directory < 0) {
         answer(work, GW_KEEPER_FAILED, errno);
         return;
@@ -79,12 +82,12 @@ static void tell_file(work_t *work) {
     }
 }
 
-/// Beside the file, to the disk, then over it. The directory is locked meanwhile: the keeper of a gateway that died may
+/// Beside the file, to the disk, then over it; never into a file that is there already. The directory is locked meanwhile: the keeper of a gateway that died may
 /// still be at it.
 static int write_over(const work_t *work, int directory, size_t length) {
     const char *text = &work->message[1];
-    const int fd =
-        openat(directory, work->fresh, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0644);
+    (void)unlinkat(directory, work->fresh, 0);
+    const int fd = openat(directory, work->fresh, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (fd < 0) {
         return errno;
     }
@@ -102,7 +105,7 @@ static int write_over(const work_t *work, int directory, size_t length) {
 }
 
 static int in_directory(const work_t *work, size_t length) {
-    const int directory = open(work->directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const int directory = gw_folder_open_own(work->directory);
     if (directory < 0) {
         return errno;
     }

@@ -42,7 +42,7 @@ bool gw_keeper_write(gw_keeper_t *self, const char *text, size_t length);
 void gw_keeper_set_aside(gw_keeper_t *self);
 
 /// The next news, if there are any. `*out_length` bytes are written to `out_text` with GW_KEEPER_READ; `*out_error` is
-/// an errno with GW_KEEPER_BAD and GW_KEEPER_FAILED.
+/// an errno, or a reason of owners.h, with GW_KEEPER_BAD and GW_KEEPER_FAILED.
 gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_MAX], size_t *out_length,
                                 int *out_error);
 

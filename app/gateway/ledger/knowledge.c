@@ -6,6 +6,7 @@
 #include "daemon.h"
 #include "knowledge_told.h"
 #include "names.h"
+#include "process/owners.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -161,7 +162,7 @@ static void take_file(gw_daemon_t *daemon, gw_keeper_news_t news, const char *te
     } else {
         self->state = GW_MEMORY_IGNORED;
         if (news == GW_KEEPER_BAD) {
-            (void)snprintf(self->reason, sizeof self->reason, "it cannot be read: %s", strerror(self->error));
+            (void)snprintf(self->reason, sizeof self->reason, "it cannot be read: %s", gw_folder_fault(self->error));
         }
         gw_keeper_set_aside(&self->keeper);
     }

@@ -2,8 +2,7 @@
 #include "knowledge_json.h"
 
 #include "names.h"
-
-#include <string.h>
+#include "process/owners.h"
 
 void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, json_out_t *json) {
     const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
@@ -44,7 +43,7 @@ static void write_memory(const gw_knowledge_t *self, json_out_t *json) {
     json_out_text(json, "state", names[self->state]);
     json_out_text(json, "reason",
                   self->state == GW_MEMORY_IGNORED  ? self->reason
-                  : self->state == GW_MEMORY_FAILED ? strerror(self->error)
+                  : self->state == GW_MEMORY_FAILED ? gw_folder_fault(self->error)
                                                     : NULL);
     json_out_close(json, '}');
 }

@@ -4,6 +4,7 @@
 #include "clients/event.h"
 #include "knowledge_json.h"
 #include "names.h"
+#include "process/owners.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -84,10 +85,10 @@ void gw_knowledge_tell_memory(gw_daemon_t *daemon) {
     case GW_MEMORY_FAILED:
     case GW_MEMORY_LOADING:
     default:
-        gw_log(log, GW_LOG_WARNING, "what is learnt about the wheels is not kept in %s: %s; %s", self->path,
-               strerror(self->error),
-               self->keeper.fd < 0 ? "start the gateway again"
-                                   : "make the directory and room in it, or set [record] directory; tried again");
+        gw_log(log, GW_LOG_WARNING, "what is learnt about the wheels is not kept in %s: %s; %s%s", self->path,
+               gw_folder_fault(self->error),
+               self->keeper.fd < 0 ? "start the gateway again" : gw_folder_cure(self->error),
+               self->keeper.fd < 0 ? "" : ", or set [record] directory; tried again");
         break;
     }
 }

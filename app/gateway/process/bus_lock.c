@@ -19,19 +19,13 @@ const char *gw_bus_lock_local_path(const char *bus) {
     return strncmp(bus, local_prefix, length) == 0 ? bus + length : NULL;
 }
 
-void gw_bus_lock_folder(const char *path, char *out_folder, size_t size) {
-    const char *slash = strrchr(path, '/');
-    const int length = slash == NULL ? 1 : slash == path ? 1 : (int)(slash - path);
-    (void)snprintf(out_folder, size, "%.*s", length, slash == NULL ? "." : path);
-}
-
 /// A path of any length and spelling as 16 digits.
 static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
     char folder[GATEWAY_ADDRESS_SIZE];
     char real[PATH_MAX];
     const char *slash = strrchr(path, '/');
     uint64_t hash = 0xCBF29CE484222325U;
-    gw_bus_lock_folder(path, folder, sizeof folder);
+    gw_folder_of(path, folder, sizeof folder);
     const char *const parts[] = {realpath(folder, real) != NULL ? real : folder, "/", slash == NULL ? path : slash + 1};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         for (const char *c = parts[i]; *c != '\0'; ++c) {
@@ -137,7 +131,7 @@ int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory
     if (path != NULL) {
         (void)snprintf(self->path, sizeof self->path, "%s.gateway-lock", path);
         name_local(path, self->names.key);
-        gw_bus_lock_folder(path, folder, sizeof folder);
+        gw_folder_of(path, folder, sizeof folder);
     } else {
         name_interface(self, bus, directory);
         (void)snprintf(folder, sizeof folder, "%.96s", directory);

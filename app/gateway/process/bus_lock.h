@@ -42,7 +42,4 @@ void gw_bus_lock_release(gw_bus_lock_t *self);
 /// The path of a local bus; NULL if the name is that of an interface.
 const char *gw_bus_lock_local_path(const char *bus);
 
-/// The folder of a path, as text.
-void gw_bus_lock_folder(const char *path, char *out_folder, size_t size);
-
 #endif

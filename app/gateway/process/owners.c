@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -25,9 +26,10 @@ bool gw_owners_wrote(const gw_owners_t *self, const struct stat *status) {
     return S_ISREG(status->st_mode) && status->st_nlink == 1U && gw_owners_have(self, status->st_uid);
 }
 
-/// Opened with a slash behind its name, a symbolic link would be followed.
+/// With a slash behind its name, a symbolic link would be followed.
 static int open_unlinked(const char *path) {
     char bare[4096];
+    struct stat status;
     size_t length = strlen(path);
     if (length == 0U || length >= sizeof bare) {
         errno = length == 0U ? ENOENT : ENAMETOOLONG;
@@ -38,7 +40,11 @@ static int open_unlinked(const char *path) {
     }
     (void)memcpy(bare, path, length);
     bare[length] = '\0';
-    return open(bare, O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    const int fd = open(bare, O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (fd < 0 && errno == ENOTDIR) { // That it is no directory would mislead.
+        errno = lstat(bare, &status) == 0 && S_ISLNK(status.st_mode) ? ELOOP : ENOTDIR;
+    }
+    return fd;
 }
 
 static int judge(const struct stat *status, const gw_owners_t *owners, bool *out_shared) {
@@ -54,8 +60,7 @@ int gw_folder_open(gw_folder_t *self, const char *path, const gw_owners_t *owner
     struct stat status;
     *self = (gw_folder_t){.fd = open_unlinked(path)};
     if (self->fd < 0) {
-        // What says "no directory" of a symbolic link to one would mislead.
-        return errno == ENOTDIR && lstat(path, &status) == 0 && S_ISLNK(status.st_mode) ? ELOOP : errno;
+        return errno;
     }
     const int error = fstat(self->fd, &status) != 0 ? errno : judge(&status, owners, &self->shared);
     if (error != 0) {
@@ -71,14 +76,34 @@ void gw_folder_close(gw_folder_t *self) {
     }
 }
 
+int gw_folder_open_own(const char *path) {
+    const gw_owners_t owners = gw_owners_of(GW_RUNTIME_DIRECTORY);
+    gw_folder_t folder;
+    int error = gw_folder_open(&folder, path, &owners);
+    error = error == 0 && folder.shared ? GW_FOLDER_SHARED : error;
+    const int fd = error == 0 ? openat(folder.fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+    error = error == 0 && fd < 0 ? errno : error;
+    gw_folder_close(&folder);
+    errno = error;
+    return fd;
+}
+
+void gw_folder_of(const char *path, char *out_folder, size_t size) {
+    const char *slash = strrchr(path, '/');
+    const int length = slash == NULL || slash == path ? 1 : (int)(slash - path);
+    (void)snprintf(out_folder, size, "%.*s", length, slash == NULL ? "." : path);
+}
+
 const char *gw_folder_fault(int error) {
     switch (error) {
     case GW_FOLDER_FOREIGN:
-        return "its directory belongs to another user, who could put anything in its place";
+        return "the directory belongs to another user, who could put anything there";
     case GW_FOLDER_SHARED:
-        return "others than its owner may write to its directory and put anything in its place";
+        return "others than the directory's owner may write to it and put anything there";
+    case GW_FOLDER_FILE:
+        return "the file belongs to another user, has a second name, or is no ordinary file";
     case ELOOP:
-        return "its directory is a symbolic link, which is not followed";
+        return "the directory is a symbolic link, which is not followed";
     default:
         return strerror(error);
     }
@@ -87,22 +112,21 @@ const char *gw_folder_fault(int error) {
 const char *gw_folder_cure(int error) {
     switch (error) {
     case GW_FOLDER_FOREIGN:
-        return "give the directory to the gateway's user (chown)";
+    case EACCES:
+    case EPERM:
+        return "give the directory to the gateway's user";
     case GW_FOLDER_SHARED:
         return "take that right away (chmod go-w)";
+    case GW_FOLDER_FILE:
+        return "remove it";
     case ELOOP:
-        return "name the real directory";
-    case ENOENT:
-        return "make the directory";
+        return "name the directory itself";
     case ENOSPC:
     case EDQUOT:
         return "make room there";
     case EROFS:
-        return "it is mounted read-only";
-    case EACCES:
-    case EPERM:
-        return "give the directory to the gateway's user";
+        return "mount it for writing";
     default:
-        return "mend it";
+        return "make the directory";
     }
 }

@@ -19,7 +19,11 @@ typedef struct {
 } gw_owners_t;
 
 /// Reasons why a folder is not used, beside an errno.
-enum { GW_FOLDER_FOREIGN = 0x10000, GW_FOLDER_SHARED };
+enum {
+    GW_FOLDER_FOREIGN = 0x10000, ///< It belongs to a stranger.
+    GW_FOLDER_SHARED,            ///< Others than its owner may write there.
+    GW_FOLDER_FILE,              ///< A file in it belongs to a stranger, has a second name, or is none.
+};
 
 typedef struct {
     int fd;      ///< O_PATH; -1: not open.
@@ -39,6 +43,13 @@ bool gw_owners_wrote(const gw_owners_t *self, const struct stat *status);
 int gw_folder_open(gw_folder_t *self, const char *path, const gw_owners_t *owners);
 
 void gw_folder_close(gw_folder_t *self);
+
+/// Opens a folder for reading and writing files, in which nobody else may put anything, sticky or not. A descriptor, or -1 with
+/// errno, which may be one of the reasons above.
+int gw_folder_open_own(const char *path);
+
+/// The folder of a path, as text.
+void gw_folder_of(const char *path, char *out_folder, size_t size);
 
 /// What is wrong, and what mends it, of an errno or one of the reasons.
 const char *gw_folder_fault(int error);

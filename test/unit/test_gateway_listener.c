@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: MIT
+// The northbound socket: in which folders it is made, what it replaces, and what it has touched afterwards.
+#include "clients/listener.h"
+
+#include "unity.h"
+
+#include <fcntl.h>
+#include <grp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#define STRANGER 65534
+
+static gateway_config_t config;
+static gw_listener_t listener;
+static gw_log_t quiet;
+static char folder[64];
+static char said[1024];
+
+void setUp(void) {
+    gateway_config_default(&config);
+    (void)snprintf(folder, sizeof folder, "/tmp/iwheel-listener-XXXXXX");
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/gateway.sock", folder);
+    (void)snprintf(config.northbound.group, sizeof config.northbound.group, "none");
+    listener = (gw_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
+    (void)memset(said, 0, sizeof said);
+    gw_log_open(&quiet, GW_LOG_ERROR);
+}
+
+void tearDown(void) {
+    char command[96];
+    gw_listener_close(&listener);
+    gw_log_close(&quiet);
+    (void)snprintf(command, sizeof command, "rm -rf %s", folder);
+    TEST_ASSERT_EQUAL_INT(0, system(command));
+}
+
+static int prepare(void) {
+    FILE *err = fmemopen(said, sizeof said, "w");
+    const int result = gw_listener_prepare(&listener, &config, err);
+    (void)fclose(err);
+    return result;
+}
+
+static int make(void) {
+    FILE *err = fmemopen(said, sizeof said, "w");
+    const int result = gw_listener_open(&listener, &config, &quiet, err);
+    (void)fclose(err);
+    return result;
+}
+
+static const char *in_folder(const char *name) {
+    static char path[96];
+    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+static void assert_said(const char *words) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, words), said);
+}
+
+static void refused_to_prepare(int code, const char *why, const char *cure) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(code, prepare(), said);
+    assert_said(why);
+    assert_said(cure);
+    TEST_ASSERT_EQUAL_INT(-1, listener.folder.fd);
+}
+
+static bool is_root(void) {
+    if (geteuid() != 0) {
+        TEST_MESSAGE("SKIPPED: giving files away needs root");
+    }
+    return geteuid() == 0;
+}
+
+static void test_folder_of_our_own_is_used_without_a_word(void) {
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0755));
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_STRING("", said);
+}
+
+static void test_folder_that_others_may_write_to_is_refused_with_the_cure(void) {
+    static const mode_t modes[] = {0777, 0775, 0757, 0770};
+    for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
+        TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
+        refused_to_prepare(EX_NOPERM, "others than the directory's owner may write to it", "chmod go-w");
+    }
+}
+
+static void test_folder_like_tmp_is_used_with_a_warning(void) {
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 01777));
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    assert_said("warning");
+    assert_said("--socket");
+    TEST_ASSERT_EQUAL_INT(0, make());
+}
+
+static void test_folder_of_another_user_is_refused_with_the_cure(void) {
+    if (!is_root()) {
+        return;
+    }
+    static const mode_t modes[] = {0755, 01777};
+    TEST_ASSERT_EQUAL_INT(0, chown(folder, STRANGER, STRANGER));
+    for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
+        TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
+        refused_to_prepare(EX_NOPERM, "belongs to another user", "give the directory to the gateway's user");
+    }
+}
+
+static void test_folder_behind_a_symbolic_link_is_refused(void) {
+    TEST_ASSERT_EQUAL_INT(0, symlink(".", in_folder("link")));
+    (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/link/gateway.sock", folder);
+    refused_to_prepare(EX_UNAVAILABLE, "symbolic link", "name the directory itself");
+    (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/link//gateway.sock", folder);
+    refused_to_prepare(EX_UNAVAILABLE, "symbolic link", "name the directory itself");
+}
+
+static void test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothing(void) {
+    char aside[80];
+    struct stat status;
+    (void)snprintf(aside, sizeof aside, "%s/kept", folder);
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("a"), 0755));
+    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("b"), 0755));
+    (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/a/gateway.sock", folder);
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT(0, rename(in_folder("a"), aside));
+    TEST_ASSERT_EQUAL_INT(0, symlink("b", in_folder("a")));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, make(), said);
+    TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("b/gateway.sock"), &status));
+    TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("kept/gateway.sock"), &status));
+    gw_listener_close(&listener);
+    TEST_ASSERT_EQUAL_INT(-1, lstat(in_folder("kept/gateway.sock"), &status));
+}
+
+static void test_socket_has_its_mode_and_group_and_the_process_stands_where_it_stood(void) {
+    char before[256];
+    char after[256];
+    struct stat status;
+    config.northbound.mode = 0640;
+    if (geteuid() == 0 && getgrgid(1) != NULL) {
+        (void)snprintf(config.northbound.group, sizeof config.northbound.group, "%s", getgrgid(1)->gr_name);
+    }
+    const mode_t mask = umask(0027);
+    TEST_ASSERT_NOT_NULL(getcwd(before, sizeof before));
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT(0, make());
+    TEST_ASSERT_NOT_NULL(getcwd(after, sizeof after));
+    TEST_ASSERT_EQUAL_STRING(before, after);
+    TEST_ASSERT_EQUAL_UINT32(0027, umask(mask));
+    TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("gateway.sock"), &status));
+    TEST_ASSERT_EQUAL_UINT32(0640, status.st_mode & 07777U);
+    TEST_ASSERT_EQUAL_UINT32(geteuid() == 0 ? 1 : getegid(), status.st_gid);
+}
+
+/// Somebody's socket at our place; `fd` is -1 if nobody answers on it any more.
+static int put_socket(bool answers) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", in_folder("gateway.sock"));
+    TEST_ASSERT_EQUAL_INT(0, bind(fd, (const struct sockaddr *)&address, sizeof address));
+    TEST_ASSERT_EQUAL_INT(0, answers ? listen(fd, 1) : close(fd));
+    return answers ? fd : -1;
+}
+
+static void test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is_not(void) {
+    (void)put_socket(false);
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT(0, make());
+    gw_listener_close(&listener);
+    const int fd = put_socket(true);
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
+    assert_said("another program answers on it");
+    (void)close(fd);
+}
+
+static void test_socket_of_a_stranger_does_not_keep_root_from_starting_although_it_answers(void) {
+    if (!is_root()) {
+        return;
+    }
+    const int fd = put_socket(true);
+    TEST_ASSERT_EQUAL_INT(0, chown(in_folder("gateway.sock"), STRANGER, STRANGER));
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 01777));
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, make(), said);
+    (void)close(fd);
+}
+
+static void test_link_and_plain_file_at_its_place_are_left_alone(void) {
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT(0, symlink("elsewhere", in_folder("gateway.sock")));
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
+    assert_said("symbolic link");
+    TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("gateway.sock")));
+    (void)close(open(in_folder("gateway.sock"), O_WRONLY | O_CREAT, 0600));
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
+    assert_said("is no socket");
+    TEST_ASSERT_EQUAL_INT(0, access(in_folder("gateway.sock"), F_OK));
+}
+
+static void test_socket_that_somebody_put_in_place_of_ours_is_not_removed_at_the_end(void) {
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT(0, make());
+    TEST_ASSERT_EQUAL_INT(0, rename(in_folder("gateway.sock"), strcat(strcpy(said, folder), "/moved")));
+    (void)put_socket(false);
+    gw_listener_close(&listener);
+    TEST_ASSERT_EQUAL_INT(0, access(in_folder("gateway.sock"), F_OK));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_folder_of_our_own_is_used_without_a_word);
+    RUN_TEST(test_folder_that_others_may_write_to_is_refused_with_the_cure);
+    RUN_TEST(test_folder_like_tmp_is_used_with_a_warning);
+    RUN_TEST(test_folder_of_another_user_is_refused_with_the_cure);
+    RUN_TEST(test_folder_behind_a_symbolic_link_is_refused);
+    RUN_TEST(test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothing);
+    RUN_TEST(test_socket_has_its_mode_and_group_and_the_process_stands_where_it_stood);
+    RUN_TEST(test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is_not);
+    RUN_TEST(test_socket_of_a_stranger_does_not_keep_root_from_starting_although_it_answers);
+    RUN_TEST(test_link_and_plain_file_at_its_place_are_left_alone);
+    RUN_TEST(test_socket_that_somebody_put_in_place_of_ours_is_not_removed_at_the_end);
+    return UNITY_END();
+}
