@@ -28,6 +28,40 @@ DEFAULTS = {
 }
 
 
+STRANGER = 65534
+BECOME_STRANGER = f"""
+import os, signal, socket, sys
+os.setgroups([]); os.setgid({STRANGER}); os.setuid({STRANGER})  # Only now: he may not be able to read our Python.
+"""
+HOLD_NAMES = f"""{BECOME_STRANGER}
+held = []
+for name in sys.argv[2:]:
+    held.append(socket.socket(socket.AF_UNIX))
+    held[-1].bind("\\0" + name)
+    if sys.argv[1] == "listening":
+        held[-1].listen(0)
+print("held", flush=True)
+signal.pause()
+"""
+
+
+def lock_names(bus):
+    """What root's gateway would call itself in the network namespace: app/gateway/process/bus_names.h."""
+    key = bus
+    if bus.startswith("unix:"):
+        value = 0xCBF29CE484222325
+        for byte in os.path.realpath(bus[5:]).encode():
+            value = (value ^ byte) * 0x100000001B3 % 2**64
+        key = f"unix-{value:016x}"
+    return [f"iwheel-gateway/{key}"] + [f"iwheel-gateway/{key}/0/{place}" for place in (1, 2, 3)]
+
+
+def become_stranger():
+    os.setgroups([])
+    os.setgid(STRANGER)
+    os.setuid(STRANGER)
+
+
 def die_with_parent():
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -280,6 +314,17 @@ class Rig:
         self.timeline.append(Event(now_us(), "end"))
         self.gateway.signal(number)
         return self.gateway.wait(3)
+
+    def stranger(self, way, names):
+        """Another user's process that holds these names, "listening" or "silent". Needs root."""
+        process = Process([sys.executable, "-c", HOLD_NAMES, way, *names], self.path("stranger.out"))
+        self.processes.append(process)
+        deadline = time.monotonic() + 10
+        while "held" not in process.text():
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"the stranger holds nothing: {process.text()}")
+            time.sleep(0.02)
+        return process
 
     def client(self, name="test"):
         client = Client(self.path(self.socket_name), self.timeline, name)

@@ -166,8 +166,9 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
             holder = (gw_holder_t){.uid = owner_listed(name)};
             (void)snprintf(holder.name, sizeof holder.name, "%s", name);
         }
-        if (holder.uid == NOBODY || !gw_owners_have(&self->owners, holder.uid)) {
-            *out_stranger = holder;
+        const bool stranger = holder.uid == NOBODY || !gw_owners_have(&self->owners, holder.uid);
+        if (stranger && (out_stranger->name[0] == '\0' || (out_stranger->pid == 0 && holder.pid > 0))) {
+            *out_stranger = holder; // One is told: the first of whom most is known.
         }
     }
     return 0;

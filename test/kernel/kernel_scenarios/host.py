@@ -2,6 +2,7 @@
 """Rows 24, 27 and 30: clocks that jump, processes that stand still, disks that are full, a second gateway."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,7 +10,7 @@ import time
 
 from catalogue import kernel_test
 from client import Streamer
-from harness import Process, now_us
+from harness import STRANGER, Process, become_stranger, lock_names, now_us, wait_connect
 from judge_log import GAP_US, Event
 from kernel_rig import SlcanRig
 from scenario import REGISTRY
@@ -138,6 +139,59 @@ def row30_two_gateways(t):
 @kernel_test("two gateways on one adapter", "adapter", 30, SlcanRig)
 def row30_two_gateways_adapter(t):
     second_gateway(t)
+
+
+@kernel_test("strangers hold the names of the lock: the gateway starts, also after a kill in motion, and alone", "host", 30)
+def row30_strangers(t):
+    rig, _, stream = driving(t)
+    names = lock_names(rig.gateway_bus())
+    killed_us = now_us()
+    rig.kill_gateway(signal.SIGKILL)
+    stream.stop()
+    stranger = rig.stranger("listening", names[:1])
+    rig.stranger("silent", names[1:])
+    rig.start_gateway(wheels=False, restart_hold=True)
+    observer = rig.client("observer")
+    time.sleep(0.3)
+    sent = rig.bus.setpoints(killed_us + 20_000)
+    t.check(sent and not any(speed for _, _, speed in sent), f"zeros and nothing but zeros: {sent[:4]}")
+    text = rig.gateway.text()
+    t.check(f"process {stranger.child.pid} of user 65534 holds @{names[0]}" in text, f"who holds it: {text[:600]}")
+    os.mkdir(rig.path("elsewhere"))
+    other = Process(rig.gateway_command("--socket", rig.path("elsewhere/gateway.sock")), rig.path("second.out"))
+    rig.processes.append(other)
+    t.check(other.wait(5) == 69, f"a second gateway is refused: {other.text()[-300:]}")
+    t.check(rig.wait_status(observer, lambda s: s["state"] == "listening", 4), "listening after the hold")
+    t.arm(observer)
+    t.drive_for(observer, 200, 200, 0.4)
+    t.judge(rig)
+
+
+@kernel_test("another user's gateway on the same interface gives way to root's", "host", 30)
+def row30_gives_way(t):
+    rig = t.rig()
+    folder = rig.path("theirs")
+    os.mkdir(folder)
+    os.chmod(rig.folder, 0o755)
+    os.chown(folder, STRANGER, STRANGER)
+    command = rig.gateway_command("--socket", os.path.join(folder, "gateway.sock"), "--estop", "none")
+    shutil.copy(rig.path("gateway.conf"), folder)
+    command[command.index(rig.path("gateway.conf"))] = os.path.join(folder, "gateway.conf")
+    os.chown(os.path.join(folder, "gateway.conf"), STRANGER, STRANGER)
+    theirs = Process(command, rig.path("theirs.out"), become_stranger)
+    rig.processes.append(theirs)
+    wait_connect(os.path.join(folder, "gateway.sock"), theirs).close()
+    rig.start_gateway()
+    t.check(f"process {theirs.child.pid} of user 65534 holds" in rig.gateway.text(), f"named: {rig.gateway.text()[-400:]}")
+    t.check(theirs.wait(5) == 69, "it ends")
+    t.check("goes before this one" in theirs.text(), f"and says why: {theirs.text()[-300:]}")
+    again = Process(command, rig.path("again.out"), become_stranger)
+    rig.processes.append(again)
+    t.check(again.wait(5) == 69 and "another gateway already serves" in again.text(), f"nor starts: {again.text()[-300:]}")
+    client = rig.client()
+    t.arm(client)
+    t.drive_for(client, 200, 200, 0.4)
+    t.judge(rig)
 
 
 @kernel_test("the first gateway is killed: its interface is free again at once", "host", 30)
