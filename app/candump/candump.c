@@ -2,6 +2,7 @@
 #include "candump.h"
 
 #include "candump_data.h"
+#include "plain.h"
 
 #include <string.h>
 
@@ -62,6 +63,9 @@ static const char *parse_interface(candump_cursor_t *cursor, candump_t *frame) {
         }
         frame->interface[length] = *cursor->at;
         length++;
+    }
+    if (!plain_text(frame->interface)) {
+        return "the interface name holds characters that move a terminal; is the line damaged?";
     }
     return length == 0U || !skip_blanks(cursor) ? "ends behind the time or the interface; is the line cut?" : NULL;
 }

@@ -253,6 +253,53 @@ class Showing(WithGateway):
         out = self.show(snapshot("armed", lease=lease, cause="\u001b]0;x"))
         self.assertIn("evil", out)
 
+    MOVING = "\u007f\u0080\u009b2J\u009f\u061c\u200e\u200f\u2028\u2029\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+
+    def hostile(self):
+        """A gateway that sends such characters as they are, and others between its values."""
+        class Hostile(FakeGateway):
+            @staticmethod
+            def say(connection, value):
+                connection.sendall(json.dumps(value, ensure_ascii=False, separators=(",\r", ":\t")).encode() + b"\n")
+
+            def on_status(self, _connection, _request):
+                return {"ok": True, **snapshot("armed", cause=Showing.MOVING, warnings=[Showing.MOVING])}
+
+            def on_why(self, _connection, _request):
+                return {"ok": True, "number": 1, "sentence": Showing.MOVING, "latched": True, "recording": "/x" + Showing.MOVING}
+
+            def on_stop(self, _connection, _request):
+                return {"ok": False, "error": "busy" + Showing.MOVING, "message": Showing.MOVING}
+
+            def on_watch(self, connection, request):
+                reply = {"id": request["id"], **super().on_watch(connection, request)}
+                self.say(connection, reply)
+                self.say(connection, {"event": "lease", "name": Showing.MOVING, "filler": "x" * 5000 + Showing.MOVING})
+        return self.serve(Hostile)
+
+    def assert_plain(self, text):
+        self.assertNotRegex(text, "[\\x00-\\x09\\x0b-\\x1f\\x7f-\\x9f\\u061c\\u200e\\u200f\\u2028-\\u202e\\u2066-\\u2069]")
+
+    def test_nothing_of_a_hostile_gateway_reaches_the_terminal_raw(self):
+        gateway = self.hostile()
+        for words in (("status",), ("why",), ("stop",), ("--json", "status"), ("--json", "why"), ("--json", "stop")):
+            code, out, err, _ = self.ctl(*words, gateway=gateway)
+            self.assertIn(code, (0, 1), err)
+            self.assertTrue(out + err)
+            self.assert_plain(out + err)
+            if words[0] == "--json" and words[1] == "status":
+                self.assertEqual(json.loads(out)["cause"], self.MOVING, "by number, so that programs read the same")
+
+    def test_watch_shows_events_by_number_where_they_would_move_the_terminal(self):
+        process = start("--socket", self.hostile().path, "watch")
+        self.addCleanup(process.kill)
+        line = process.stdout.readline()
+        self.assert_plain(line)
+        event = json.loads(line)
+        self.assertEqual((event["name"], event["filler"]), (self.MOVING, "x" * 5000 + self.MOVING))
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=10)
+
     def test_latched_names_cause_sentence_and_cure(self):
         out = self.show(snapshot("latched", cause="wheel_lost"),
                         why={"ok": True, "number": 1, "sentence": "left wheel not heard for 53 ms", "latched": True})

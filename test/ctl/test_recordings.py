@@ -87,6 +87,13 @@ class Decode(unittest.TestCase):
         self.assertIn("standard input:4: the last line has no line end", err)
         self.assertIn("2 of 4 lines", err)
 
+    def test_interface_names_that_would_move_the_terminal_are_bad_lines(self):
+        for name in ("\x9b2J", "c\u009bn", "c\u202en", "c\u2028n", "\x7f"):
+            for words in (("decode",), ("decode", "--csv"), ("--json", "decode")):
+                code, out, err = run(*words, text=f"(1760000000.000000) {name} 100#00000000\n")
+                self.assertEqual(65, code, (name, out, err))
+                self.assertNotRegex(out + err, "[\x7f-\x9f\u2028-\u202e]")
+
     def test_thousand_bad_lines_are_counted_not_told(self):
         code, _, err = self.decode("x\n" * 1000)
         self.assertEqual(65, code)

@@ -2,6 +2,7 @@
 // A connection of the northbound socket (bytes in, lines out), the JSON writer, and the sentence of `why`.
 #include "clients/client.h"
 #include "json/json_out.h"
+#include "process/log.h"
 #include "why.h"
 
 #include "unity.h"
@@ -155,6 +156,36 @@ static void test_client_gone_is_noticed_when_written_to(void) {
     gw_client_flush(&client);
     TEST_ASSERT_TRUE(client.failed);
     peer = -1;
+}
+
+static void test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8(void) {
+    char line[256];
+    json_out_t json;
+    json_out_init(&json, line, sizeof line);
+    json_out_open(&json, NULL, '{');
+    json_out_text(&json, "t", "\x1b[2J\xC2\x9B\xE2\x80\xAE\xE2\x80\xA8\xD8\x9C\xE2\x81\xA9\x9B\xE2\x82\xAC\xE2\x82");
+    json_out_close(&json, '}');
+    line[json_out_finish(&json)] = '\0';
+    TEST_ASSERT_EQUAL_STRING(
+        "{\"t\":\"\\u001B[2J\\u009B\\u202E\\u2028\\u061C\\u2069\\uFFFD\xE2\x82\xAC\\uFFFD\\uFFFD\"}\n", line);
+}
+
+static void test_log_line_is_plain_whatever_stands_in_it(void) {
+    char line[256] = "";
+    int ends[2];
+    gw_log_t log;
+    const int before = dup(STDERR_FILENO);
+    TEST_ASSERT_EQUAL_INT(0, pipe(ends));
+    TEST_ASSERT_EQUAL_INT(STDERR_FILENO, dup2(ends[1], STDERR_FILENO));
+    gw_log_open(&log, GW_LOG_INFO);
+    gw_log(&log, GW_LOG_INFO, "from %s", "\x1b[2J\n\xC2\x9B\xE2\x80\xAE\x9B\xC3\xA9");
+    gw_log_close(&log);
+    (void)dup2(before, STDERR_FILENO);
+    (void)close(before);
+    (void)close(ends[1]);
+    TEST_ASSERT_GREATER_THAN(0, read(ends[0], line, sizeof line - 1U));
+    (void)close(ends[0]);
+    TEST_ASSERT_EQUAL_STRING("iwheel-gateway: info: from ?[2J????\xC3\xA9\n", line);
 }
 
 static void test_json_escapes_and_separates(void) {
@@ -343,6 +374,8 @@ int main(void) {
     RUN_TEST(test_client_room_for_the_longest_reply_is_kept_free_of_events);
     RUN_TEST(test_client_event_to_one_that_is_leaving_is_dropped);
     RUN_TEST(test_client_gone_is_noticed_when_written_to);
+    RUN_TEST(test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8);
+    RUN_TEST(test_log_line_is_plain_whatever_stands_in_it);
     RUN_TEST(test_json_escapes_and_separates);
     RUN_TEST(test_json_that_does_not_fit_is_no_line_at_any_size);
     RUN_TEST(test_why_names_cause_numbers_time_and_cure);

@@ -293,6 +293,33 @@ static void test_request_texts_have_a_length_and_no_control_characters(void) {
     refused(GW_BAD_VALUE, "{\"cmd\":\"arm\",\"takeover\":null}");
 }
 
+static void test_request_texts_with_what_moves_a_terminal_are_refused_in_every_field_and_spelling(void) {
+    static const char *const forms[] = {
+        "{\"cmd\":\"arm\",\"name\":\"a%sb\"}",
+        "{\"cmd\":\"estop\",\"reason\":\"a%sb\"}",
+        "{\"cmd\":\"status\",\"id\":\"a%sb\"}",
+        "{\"cmd\":\"confirm\",\"item\":\"dlc\",\"value\":\"a%sb\"}",
+    };
+    static const char *const moving[] = {
+        "\\u0001",  "\\u001b",      "\\u007f",  "\x7f",         "\\u0080",  "\xC2\x80",     "\\u009b",
+        "\xC2\x9B", "\\u009f",      "\xC2\x9F", "\\u061c",      "\xD8\x9C", "\\u200e",      "\xE2\x80\x8F",
+        "\\u2028",  "\xE2\x80\xA9", "\\u202a",  "\xE2\x80\xAE", "\\u2066",  "\xE2\x81\xA9",
+    };
+    static const char *const plain[] = {"\xC2\xA0", "\\u00e9", "\xE2\x82\xAC", "\\u202f", "\\ud83d\\uded1"};
+    char line[128];
+    for (size_t form = 0; form < sizeof forms / sizeof forms[0]; form++) {
+        for (size_t i = 0; i < sizeof moving / sizeof moving[0]; i++) {
+            (void)snprintf(line, sizeof line, forms[form], moving[i]);
+            refused(GW_BAD_VALUE, line);
+            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(refusal.message, "move a terminal"), refusal.message);
+        }
+        for (size_t i = 0; i < sizeof plain / sizeof plain[0]; i++) {
+            (void)snprintf(line, sizeof line, forms[form], plain[i]);
+            TEST_ASSERT_TRUE_MESSAGE(gw_request_parse(line, strlen(line), &request, &refusal), line);
+        }
+    }
+}
+
 static void test_request_tare_takes_a_side_or_both(void) {
     accepted("{\"cmd\":\"tare\"}", GW_CMD_TARE);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, request.sides);
@@ -323,6 +350,7 @@ int main(void) {
     RUN_TEST(test_request_command_must_be_a_known_text);
     RUN_TEST(test_request_watch_topics_become_bits_and_unknown_ones_refuse_all);
     RUN_TEST(test_request_texts_have_a_length_and_no_control_characters);
+    RUN_TEST(test_request_texts_with_what_moves_a_terminal_are_refused_in_every_field_and_spelling);
     RUN_TEST(test_request_tare_takes_a_side_or_both);
     return UNITY_END();
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "plain.h"
 #include "talk/ctl.h"
 #include "talk/signals.h"
 
@@ -105,8 +106,16 @@ static output_t write_text(const client_t *client, const char *text, size_t size
     return OUTPUT_OPEN;
 }
 
+/// As it came, but for what moves a terminal.
 static output_t write_line(const client_t *client) {
-    const output_t state = write_text(client, client->line, strlen(client->line));
+    char piece[PIPE_BUF];
+    size_t length;
+    const char *rest = client->line;
+    output_t state = OUTPUT_OPEN;
+    while (*rest != '\0' && state == OUTPUT_OPEN) {
+        rest = plain_json(rest, piece, sizeof piece, &length);
+        state = write_text(client, piece, length);
+    }
     return state == OUTPUT_OPEN ? write_text(client, "\n", 1) : state;
 }
 

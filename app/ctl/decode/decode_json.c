@@ -3,6 +3,8 @@
 
 #include "frame_line.h"
 
+#include "text/text.h"
+
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,12 +40,7 @@ bool decode_print_json(const candump_t *frame, const decoded_t *decoded) {
         (json_int_t)frame->id, "extended", (int)frame->extended, "remote", (int)frame->remote, "fd", (int)frame->fd,
         "dlc", (int)frame->length, "data", bytes_of(frame), "wheel", text_or_null(decoded->wheel), "message",
         decoded->message, "values", values_of(decoded), "note", text_or_null(decoded->note));
-    char *text = line != NULL ? json_dumps(line, JSON_COMPACT) : NULL;
+    const bool written = line != NULL && text_json_value(line, stdout);
     json_decref(line);
-    if (text == NULL) {
-        return false;
-    }
-    (void)puts(text);
-    free(text);
-    return true;
+    return written;
 }

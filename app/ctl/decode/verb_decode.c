@@ -5,6 +5,7 @@
 #include "recordings/config_option.h"
 #include "recordings/recording.h"
 #include "talk/ctl.h"
+#include "text/text.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -49,11 +50,11 @@ static void write_begin(const decode_t *self, const candump_t *frame) {
     const time_t seconds = (time_t)(frame->time_us / 1000000);
     if (frame->time_us >= CALENDAR_US && localtime_r(&seconds, &local) != NULL &&
         strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &local) > 0U) {
-        (void)printf("# %s, from %s.%06" PRId64 " local time; times in seconds from there\n", self->recording.name,
-                     text, frame->time_us % 1000000);
+        text_line(stdout, "# %s, from %s.%06" PRId64 " local time; times in seconds from there", self->recording.name,
+                  text, frame->time_us % 1000000);
     } else {
-        (void)printf("# %s, from %" PRId64 ".%06" PRId64 " s; times in seconds from there\n", self->recording.name,
-                     frame->time_us / 1000000, frame->time_us % 1000000);
+        text_line(stdout, "# %s, from %" PRId64 ".%06" PRId64 " s; times in seconds from there", self->recording.name,
+                  frame->time_us / 1000000, frame->time_us % 1000000);
     }
 }
 

@@ -176,8 +176,7 @@ static void print_json(const doctor_t *self) {
     json_t *root = json_pack("{s:b,s:s?,s:b,s:o,s:o,s:o}", "ok", self->findings.total[INSPECT_FAIL] == 0U, "bus",
                              self->bus, "gateway", self->gateway.result == NEAR_FOUND, "findings", list, "rates",
                              rates_of(self), "load_permille", load);
-    (void)json_dumpf(root, stdout, JSON_COMPACT);
-    (void)putchar('\n');
+    (void)text_json_value(root, stdout);
     json_decref(root);
 }
 

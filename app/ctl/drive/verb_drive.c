@@ -288,7 +288,7 @@ static int finish(drive_t *self, end_t end) {
                         "(1 s), stops them");
     }
     if (self->ctl->json && self->last_line[0] != '\0') {
-        (void)puts(self->last_line);
+        text_json(self->last_line, stdout);
     }
     int code = ctl_ask(self->ctl, json_pack("{s:s}", "cmd", "stop"), &reply);
     json_decref(reply);

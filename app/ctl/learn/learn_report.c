@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "learn_findings.h"
 
+#include "text/text.h"
+
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -137,8 +139,8 @@ static void suggest(const learn_findings_t *findings) {
 void learn_report(const learn_t *self, const char *name) {
     static learn_findings_t findings;
     const int64_t ms = (self->last_us - self->first_us) / 1000;
-    (void)printf("%s: %" PRIu64 " frames in %" PRId64 ".%" PRId64 " s\n", name, self->frames, ms / 1000,
-                 (ms < 0 ? -ms : ms) % 1000 / 100);
+    text_line(stdout, "%s: %" PRIu64 " frames in %" PRId64 ".%" PRId64 " s", name, self->frames, ms / 1000,
+              (ms < 0 ? -ms : ms) % 1000 / 100);
     print_setpoints(self);
     print_telemetry(self);
     (void)puts("\nWhat it tells (+ speaks for, - speaks against, ? says nothing about)");

@@ -2,6 +2,7 @@
 #include "replay_tell.h"
 
 #include "names.h"
+#include "text/text.h"
 #include "why.h"
 
 #include <inttypes.h>
@@ -10,6 +11,7 @@
 
 __attribute__((format(printf, 4, 5))) static void tell(const replay_t *self, iw_time_us_t at_us, const char *what,
                                                        const char *format, ...) {
+    char text[1024];
     va_list list;
     if (self->quiet) {
         return;
@@ -17,9 +19,9 @@ __attribute__((format(printf, 4, 5))) static void tell(const replay_t *self, iw_
     const iw_time_us_t since_us = at_us > self->zero_us ? at_us - self->zero_us : 0U;
     (void)fprintf(self->out, "%6" PRIu64 ".%06" PRIu64 "  %-10s ", since_us / 1000000U, since_us % 1000000U, what);
     va_start(list, format);
-    (void)vfprintf(self->out, format, list);
+    (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
-    (void)fputc('\n', self->out);
+    text_line(self->out, "%s", text); // Names in it come from the recording.
 }
 
 static const char *side_name(size_t side) {

@@ -5,6 +5,7 @@
 #include "replay.h"
 #include "replay_warm.h"
 #include "talk/ctl.h"
+#include "text/text.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -184,7 +185,8 @@ static void name_things(verb_replay_t *self) {
 
 /// As it was: steps, requests and answers where they were.
 static void replay_exactly(verb_replay_t *self) {
-    (void)printf("# %s, with its requests and the port's answers; times in seconds from its first entry\n", self->path);
+    text_line(stdout, "# %s, with its requests and the port's answers; times in seconds from its first entry",
+              self->path);
     if (peek_entry(self)) {
         replay_init(&self->replay, &self->config, self->entry.at_us, stdout);
         name_things(self);
@@ -230,9 +232,9 @@ static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
 
 /// Frames are all there is: nobody asks for anything, the bus is up, the e-stop released.
 static void replay_frames(verb_replay_t *self) {
-    (void)printf(
-        "# %s, frames only: nobody arms. Setpoints marked T are the gateway's own, others another controller's\n",
-        self->path);
+    text_line(stdout,
+              "# %s, frames only: nobody arms. Setpoints marked T are the gateway's own, others another controller's",
+              self->path);
     if (peek_frame(self)) {
         replay_init(&self->replay, &self->config, time_of(self, &self->frame), stdout);
     }

@@ -167,7 +167,7 @@ int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
 
 int ctl_accept(const ctl_t *self, json_t **reply) {
     if (self->json) {
-        (void)puts(self->client.line);
+        text_json(self->client.line, stdout);
     }
     if (json_is_true(json_object_get(*reply, "ok"))) {
         return CTL_OK;

@@ -1,32 +1,53 @@
 // SPDX-License-Identifier: MIT
 #include "text.h"
 
+#include "plain.h"
+
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-static bool is_control(const unsigned char *c) {
-    return *c < 0x20U || *c == 0x7FU || (c[0] == 0xC2U && c[1] >= 0x80U && c[1] <= 0x9FU);
+void text_safe(const char *text, FILE *out) {
+    size_t bytes;
+    for (; *text != '\0'; text += bytes) {
+        const bool plain = plain_is(plain_read(text, &bytes));
+        (void)fwrite(plain ? text : "?", 1, plain ? bytes : 1U, out);
+    }
 }
 
-void text_safe(const char *text, FILE *out) {
-    for (const unsigned char *c = (const unsigned char *)text; *c != '\0'; c++) {
-        if (!is_control(c)) {
-            (void)fputc(*c, out);
-            continue;
-        }
-        (void)fputc('?', out);
-        c += *c == 0xC2U ? 1 : 0;
+void text_json(const char *line, FILE *out) {
+    char piece[256];
+    size_t length;
+    while (*line != '\0') {
+        line = plain_json(line, piece, sizeof piece, &length);
+        (void)fwrite(piece, 1, length, out);
     }
+    (void)fputc('\n', out);
+}
+
+void text_line(FILE *out, const char *format, ...) {
+    char text[2048];
+    va_list list;
+    va_start(list, format);
+    (void)vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    text_safe(text, out);
+    (void)fputc('\n', out);
 }
 
 void text_clean(const char *text, char *out, size_t size) {
-    size_t used = 0;
-    for (const unsigned char *c = (const unsigned char *)text; *c != '\0' && used + 1U < size; c++) {
-        out[used++] = is_control(c) ? '?' : (char)*c;
-        c += is_control(c) && *c == 0xC2U ? 1 : 0;
+    plain_copy(text, out, size);
+}
+
+bool text_json_value(const json_t *value, FILE *out) {
+    char *line = json_dumps(value, JSON_COMPACT);
+    if (line == NULL) {
+        return false;
     }
-    out[used] = '\0';
+    text_json(line, out);
+    free(line);
+    return true;
 }
 
 bool text_wants_colour(FILE *out) {

@@ -10,11 +10,20 @@
 /// Long enough for every cell.
 #define TEXT_CELL 48U
 
-/// Writes `text` without what could command a terminal: names and reasons come from other people's programs.
+/// Writes `text` without what moves a terminal (plain.h): names and reasons come from other people's programs.
 void text_safe(const char *text, FILE *out);
 
 /// The same into a buffer; what does not fit is left out.
 void text_clean(const char *text, char *out, size_t size);
+
+/// The same of a formatted text, as a line of its own.
+__attribute__((format(printf, 2, 3))) void text_line(FILE *out, const char *format, ...);
+
+/// Writes a line of JSON, which may come from a hostile program, as it is but for such characters: these by number.
+void text_json(const char *line, FILE *out);
+
+/// The same of a value. False if there is not enough memory.
+bool text_json_value(const json_t *value, FILE *out);
 
 /// True if `out` is a terminal that wants colours (NO_COLOR and TERM=dumb say no).
 bool text_wants_colour(FILE *out);

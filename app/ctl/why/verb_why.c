@@ -63,9 +63,9 @@ static void print_recording(const json_t *reply) {
     const char *path = json_string_value(json_object_get(reply, "recording"));
     const char *error = json_string_value(json_object_get(reply, "recording_error"));
     if (path != NULL) {
-        (void)printf("recorded in %s; decide it again: iwheelctl replay %s\n", path, path);
+        text_line(stdout, "recorded in %s; decide it again: iwheelctl replay %s", path, path);
     } else if (error != NULL) {
-        (void)printf("not recorded on disk: %s; the gateway's log tells the cure\n", error);
+        text_line(stdout, "not recorded on disk: %s; the gateway's log tells the cure", error);
     }
 }
 

@@ -66,8 +66,7 @@ static void list_one(const char *directory, const char *name, bool json) {
     }
     if (json && events.why != NULL) {
         (void)json_object_set_new(events.why, "recording", json_string(path));
-        (void)json_dumpf(events.why, stdout, JSON_COMPACT);
-        (void)putchar('\n');
+        (void)text_json_value(events.why, stdout);
     } else if (!json) {
         print_line(name, events.why);
     }
@@ -86,8 +85,9 @@ int why_disk_list(const char *directory, bool json) {
     }
     free(names);
     if (!json) {
-        (void)printf("%s%d stop%s recorded in %s%s\n", count > 0 ? "\n" : "", count, count == 1 ? "" : "s", directory,
-                     count > 0 ? "; one of them with its frames: iwheelctl why NUMBER" : "");
+        (void)fputs(count > 0 ? "\n" : "", stdout);
+        text_line(stdout, "%d stop%s recorded in %s%s", count, count == 1 ? "" : "s", directory,
+                  count > 0 ? "; one of them with its frames: iwheelctl why NUMBER" : "");
     }
     return CTL_OK;
 }
@@ -161,12 +161,11 @@ int why_disk_show(const char *directory, const char *name, size_t frames, bool j
     const int64_t stop_us = json_integer_value(json_object_get(events.why, "at_us")) +
                             json_integer_value(json_object_get(events.head, "wall_minus_monotonic_us"));
     if (json) {
-        (void)json_dumpf(events.why, stdout, JSON_COMPACT);
-        (void)putchar('\n');
+        (void)text_json_value(events.why, stdout);
     } else if (why_print_stop(events.why)) {
         path[strlen(path) - (sizeof EVENTS - 1U)] = '\0';
         (void)snprintf(path + strlen(path), sizeof EVENTS, FRAMES);
-        (void)printf("recorded in %s; decide it again: iwheelctl replay %s\n", path, path);
+        text_line(stdout, "recorded in %s; decide it again: iwheelctl replay %s", path, path);
         code = frames > 0U ? print_frames(path, stop_us, frames) : CTL_OK;
     }
     events_close(&events);

@@ -2,6 +2,7 @@
 #include "request.h"
 
 #include "json/json_arena.h"
+#include "plain.h"
 
 #include <inttypes.h>
 #include <jansson.h>
@@ -87,16 +88,9 @@ static bool too_deep(const char *line, size_t length) {
     return false;
 }
 
-/// Printable and short enough. jansson has checked the UTF-8 and refuses \u0000.
+/// Plain and short enough. jansson has checked the UTF-8 and refuses \u0000.
 static bool is_plain(const char *text, size_t max) {
-    const size_t length = strlen(text);
-    for (size_t i = 0; i < length; ++i) {
-        const unsigned char byte = (unsigned char)text[i];
-        if (byte < 0x20U || byte == 0x7FU) {
-            return false;
-        }
-    }
-    return length <= max;
+    return strlen(text) <= max && plain_text(text);
 }
 
 /// May stand in a message: nothing that could have been cut in the middle of a character.
@@ -112,8 +106,11 @@ static const char *quotable(const char *text, const char *otherwise) {
 static bool read_text(const field_t *field, const json_t *value, char *target, gw_refusal_t *out_refusal) {
     const char *text = json_string_value(value);
     if (text == NULL || *text == '\0' || !is_plain(text, field->max)) {
-        return refuse(out_refusal, GW_BAD_VALUE, "%s must be a text of 1 to %zu bytes without control characters",
-                      field->name, field->max);
+        return refuse(
+            out_refusal, GW_BAD_VALUE,
+            "%s must be a text of 1 to %zu bytes without characters that move a terminal (control characters, "
+            "line separators, marks of writing direction)",
+            field->name, field->max);
     }
     (void)memcpy(target, text, strlen(text) + 1U);
     return true;
@@ -221,7 +218,9 @@ static bool read_id(const json_t *root, gw_id_t *out_id, gw_refusal_t *out_refus
         (void)memcpy(out_id->text, text, strlen(text) + 1U);
     } else if (value != NULL) {
         return refuse(out_refusal, GW_BAD_VALUE,
-                      "id must be an integer or a text of at most %u bytes without control characters", GW_ID_TEXT_MAX);
+                      "id must be an integer or a text of at most %u bytes without characters that move a terminal "
+                      "(control characters, line separators, marks of writing direction)",
+                      GW_ID_TEXT_MAX);
     }
     return true;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "json_out.h"
 
+#include "plain.h"
+
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,21 +20,29 @@ static void put_text(json_out_t *self, const char *text) {
     put(self, text, strlen(text));
 }
 
+/// One character; what moves a terminal as its number, a byte that is no UTF-8 as U+FFFD.
+static size_t put_character(json_out_t *self, const char *text) {
+    size_t bytes;
+    char escape[16];
+    const uint32_t code_point = plain_read(text, &bytes);
+    if (code_point == '"' || code_point == '\\') {
+        escape[0] = '\\';
+        escape[1] = *text;
+        put(self, escape, 2U);
+    } else if (!plain_is(code_point)) {
+        const uint32_t shown = code_point == PLAIN_BROKEN ? 0xFFFDU : code_point;
+        (void)snprintf(escape, sizeof escape, "\\u%04X", (unsigned)shown);
+        put_text(self, escape);
+    } else {
+        put(self, text, bytes);
+    }
+    return bytes;
+}
+
 static void put_escaped(json_out_t *self, const char *text) {
     put(self, "\"", 1U);
-    for (; *text != '\0'; ++text) {
-        const unsigned char byte = (unsigned char)*text;
-        char escape[8];
-        if (byte == '"' || byte == '\\') {
-            escape[0] = '\\';
-            escape[1] = *text;
-            put(self, escape, 2U);
-        } else if (byte < 0x20U || byte == 0x7FU) {
-            (void)snprintf(escape, sizeof escape, "\\u%04X", (unsigned)byte);
-            put_text(self, escape);
-        } else {
-            put(self, text, 1U);
-        }
+    while (*text != '\0') {
+        text += put_character(self, text);
     }
     put(self, "\"", 1U);
 }

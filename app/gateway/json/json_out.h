@@ -2,8 +2,8 @@
 /// Writes one JSON object as one line into a buffer of fixed size.
 ///
 /// Commas are placed by the writer. A name of NULL is for array elements. What does not fit sets `overflow` and the
-/// line must not be used. Texts are escaped; they must be valid UTF-8 (ours, or read by the request parser, which
-/// checks). No heap.
+/// line must not be used. Texts are escaped: what moves a terminal (plain.h) stands as \uXXXX, and what is no UTF-8 as U+FFFD.
+/// No heap.
 #ifndef GATEWAY_JSON_OUT_H
 #define GATEWAY_JSON_OUT_H
 

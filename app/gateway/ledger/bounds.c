@@ -48,6 +48,16 @@ static bool fits_pose(int32_t figure, bool confirmed) {
     return confirmed ? within(figure, step, 3 * 1000 * -INT16_MIN) : within(figure, 0, 1000 / GW_EVIDENCE_POSE_FACTOR);
 }
 
+static bool fits_included(int32_t figure, bool confirmed) {
+    const int32_t removed = 10 * IW_FORCE_REMOVED_PERCENT;
+    return confirmed ? near_ratio(figure, 10) || near_ratio(figure, 1) : within(figure, -removed, removed);
+}
+
+static bool fits_gear(int32_t figure, bool confirmed) {
+    const int32_t share = confirmed ? GW_EVIDENCE_FITS_PERMILLE : GW_EVIDENCE_FAILS_PERMILLE;
+    return within(figure, 1000 - share, 1000 + share) == confirmed;
+}
+
 /// Measured: is it what this measurement gives?
 static bool fits_bus(iw_ledger_item_t item, const gw_known_item_t *known) {
     const bool confirmed = known->entry.state == IW_LEDGER_CONFIRMED;
@@ -57,16 +67,14 @@ static bool fits_bus(iw_ledger_item_t item, const gw_known_item_t *known) {
     case IW_LEDGER_FORCE_UNIT_RIGHT:
         return fits_unit(known, confirmed);
     case IW_LEDGER_OFFSET_INCLUDED:
-        return confirmed ? near_ratio(figure, 10) || near_ratio(figure, 1)
-                         : within(figure, -10 * IW_FORCE_REMOVED_PERCENT, 10 * IW_FORCE_REMOVED_PERCENT);
+        return fits_included(figure, confirmed);
     case IW_LEDGER_FEEDBACK_SIGN_LEFT:
     case IW_LEDGER_FEEDBACK_SIGN_RIGHT:
         return figure != INT32_MIN && fits_sign(figure, confirmed);
     case IW_LEDGER_SETPOINT_TYPE:
         return confirmed && fits_type(figure);
     case IW_LEDGER_GEAR_RATIO:
-        return confirmed ? within(figure, 1000 - GW_EVIDENCE_FITS_PERMILLE, 1000 + GW_EVIDENCE_FITS_PERMILLE)
-                         : !within(figure, 1000 - GW_EVIDENCE_FAILS_PERMILLE, 1000 + GW_EVIDENCE_FAILS_PERMILLE);
+        return fits_gear(figure, confirmed);
     case IW_LEDGER_POSE_BYTE_ORDER:
         return fits_pose(figure, confirmed);
     case IW_LEDGER_DLC:

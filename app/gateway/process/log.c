@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "log.h"
 
+#include "plain.h"
+
 #include "iwheel_linux/clock.h"
 
 #include <fcntl.h>
@@ -55,6 +57,7 @@ static void earn_credit(gw_log_t *self) {
 }
 
 void gw_log(gw_log_t *self, gw_log_level_t level, const char *format, ...) {
+    char raw[LINE_SIZE];
     char line[LINE_SIZE];
     if (level > self->level) {
         return;
@@ -64,15 +67,16 @@ void gw_log(gw_log_t *self, gw_log_level_t level, const char *format, ...) {
         ++self->dropped;
         return;
     }
-    int length = snprintf(line, sizeof line, "iwheel-gateway: %s: ", level_names[level]);
+    int length = snprintf(raw, sizeof raw, "iwheel-gateway: %s: ", level_names[level]);
     if (self->dropped > 0U) {
-        length += snprintf(&line[length], sizeof line - (size_t)length, "(%u lines dropped before this one) ",
+        length += snprintf(&raw[length], sizeof raw - (size_t)length, "(%u lines dropped before this one) ",
                            (unsigned)self->dropped);
     }
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(&line[length], sizeof line - (size_t)length - 1U, format, arguments);
+    (void)vsnprintf(&raw[length], sizeof raw - (size_t)length, format, arguments);
     va_end(arguments);
+    plain_copy(raw, line, sizeof line - 1U); // Cut anywhere, and with names that others chose.
     const size_t end = strlen(line);
     line[end] = '\n';
     --self->credit;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "options.h"
 
+#include "plain.h"
+
 #include <errno.h>
 #include <getopt.h>
 #include <sysexits.h>
@@ -43,7 +45,9 @@ void gw_options_help(FILE *out) {
 }
 
 static int misuse(FILE *err, const char *what) {
-    (void)fprintf(err, "iwheel-gateway: %s; see iwheel-gateway --help\n", what);
+    char plain[256];
+    plain_copy(what, plain, sizeof plain);
+    (void)fprintf(err, "iwheel-gateway: %s; see iwheel-gateway --help\n", plain);
     return EX_USAGE;
 }
 
