@@ -328,6 +328,9 @@ static void test_parse_nul_and_control_characters_are_refused(void) {
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, parse_bytes(nul, sizeof(nul) - 1U));
     TEST_ASSERT_NOT_NULL(strstr(messages, "iw.conf:2: holds the control character 0x00"));
     refused("[drive]\nlease_ms = 300\x1b[0m\n", "iw.conf:2: ", "0x1B");
+    refused("[drive]\nlease_ms = 3\xC2\x9B"
+            "2J\xE2\x80\xAE\x7F\n",
+            "iw.conf:2: ", "lease_ms = 3?2J??");
 }
 
 static void test_parse_tells_all_errors_up_to_twenty(void) {

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "config_relations.h"
 
+#include "config_value.h"
+#include "plain.h"
+
 #include <stdarg.h>
 #include <string.h>
 
 #define WATCHDOG_MS 1000U
 
 void config_complain(config_report_t *report, unsigned line, const char *format, ...) {
+    char text[CONFIG_MESSAGE_SIZE + 64U];
+    char plain[CONFIG_MESSAGE_SIZE + 64U];
     va_list list;
     report->errors++;
     if (report->errors > CONFIG_ERRORS_SHOWN) {
@@ -18,9 +23,10 @@ void config_complain(config_report_t *report, unsigned line, const char *format,
     }
     (void)fputs(": ", report->err);
     va_start(list, format);
-    (void)vfprintf(report->err, format, list);
+    (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
-    (void)fputc('\n', report->err);
+    plain_copy(text, plain, sizeof plain); // It quotes the file.
+    (void)fprintf(report->err, "%s\n", plain);
 }
 
 void config_complain_end(config_report_t *report) {
