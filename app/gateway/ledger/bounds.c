@@ -45,7 +45,8 @@ static bool fits_type(int32_t figure) {
 
 static bool fits_pose(int32_t figure, bool confirmed) {
     const int32_t step = GW_EVIDENCE_POSE_FACTOR * 1000;
-    return confirmed ? within(figure, step, 3 * 1000 * -INT16_MIN) : within(figure, 0, 1000 / GW_EVIDENCE_POSE_FACTOR);
+    return confirmed ? within(figure, step, INT64_C(3000) * -INT16_MIN)
+                     : within(figure, 0, 1000 / GW_EVIDENCE_POSE_FACTOR);
 }
 
 static bool fits_included(int32_t figure, bool confirmed) {

@@ -24,6 +24,7 @@
 /// Of an attribute in it.
 #define HEAD ((size_t)4U)
 static_assert(HEAD == sizeof(struct nlattr), "values follow the head at once");
+static_assert(sizeof(struct nlmsghdr) % HEAD == 0 && sizeof(struct unix_diag_msg) % HEAD == 0, "nothing is between");
 
 static void name_of(const gw_bus_names_t *self, uid_t uid, unsigned place, char out_name[GW_BUS_NAME_SIZE]) {
     if (place == 0U) {
@@ -43,7 +44,7 @@ static socklen_t address_of(const char *name, struct sockaddr_un *out_address) {
 
 /// The owner of a socket of that name, from one message of the list; NOBODY if it is another's.
 static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
-    const char *at = (const char *)NLMSG_DATA(message) + NLMSG_ALIGN(sizeof(struct unix_diag_msg));
+    const char *at = (const char *)message + sizeof(struct nlmsghdr) + sizeof(struct unix_diag_msg);
     const char *end = (const char *)message + message->nlmsg_len;
     struct nlattr head;
     uid_t uid = NOBODY;
