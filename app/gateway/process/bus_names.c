@@ -74,7 +74,7 @@ static uid_t search_list(int fd, const char *name) {
     (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     while (iw_clock_now_us() < until_us) {
         const ssize_t got = recv(fd, buffer, sizeof buffer, 0);
-        const struct nlmsghdr *message = (const struct nlmsghdr *)buffer;
+        struct nlmsghdr *message = (struct nlmsghdr *)(void *)buffer;
         for (ssize_t left = got; left > 0 && NLMSG_OK(message, (size_t)left); message = NLMSG_NEXT(message, left)) {
             const uid_t uid = message->nlmsg_type == SOCK_DIAG_BY_FAMILY ? owner_in(message, name) : NOBODY;
             if (uid != NOBODY || message->nlmsg_type == NLMSG_DONE || message->nlmsg_type == NLMSG_ERROR) {
