@@ -12,7 +12,10 @@ typedef struct {
     ctl_verb_t run;
     const char *words;   ///< What follows the name.
     const char *summary; ///< One line.
-    const char *details; ///< More, for the verb's own help; lines end with '\n'.
+    const char *details; ///< More, for the verb's own help; lines end with '\n' and may be of any length.
+    const char *no_json; ///< Why it refuses --json, and what to do instead; null: it answers in JSON.
+    /// The words that may follow, by their number from 0 on, null behind the last; a null pointer: others, or none.
+    const char *(*choice)(unsigned number);
 } verb_t;
 
 /// The verb of that name, or a null pointer.
@@ -24,7 +27,7 @@ void help_print(FILE *out);
 /// The page of a verb.
 void help_print_verb(const verb_t *verb, FILE *out);
 
-/// The names of all verbs, separated by blanks.
-void help_names(char *out, size_t size);
+/// Tells that there is no such verb and which one may be meant; with "" that there is none at all. Returns CTL_USAGE.
+int help_unknown(const char *name);
 
 #endif

@@ -66,9 +66,7 @@ static bool take_arguments(arguments_t *self, int count, char **arguments) {
 }
 
 static int dispatch(const arguments_t *arguments) {
-    char names[256];
     const verb_t *verb = arguments->verb != NULL ? help_find(arguments->verb) : NULL;
-    help_names(names, sizeof(names));
     if (arguments->version) {
         (void)puts("iwheelctl " IWHEEL_VERSION);
         return CTL_OK;
@@ -77,15 +75,15 @@ static int dispatch(const arguments_t *arguments) {
         help_print(stdout);
         return CTL_OK;
     }
-    if (arguments->verb == NULL) {
-        return ctl_fail(CTL_USAGE, "no verb given; known are: %s", names);
-    }
     if (verb == NULL) {
-        return ctl_fail(CTL_USAGE, "unknown verb \"%s\"; known are: %s", arguments->verb, names);
+        return help_unknown(arguments->verb != NULL ? arguments->verb : "");
     }
     if (arguments->help) {
         help_print_verb(verb, stdout);
         return CTL_OK;
+    }
+    if (arguments->ctl->json && verb->no_json != NULL) {
+        return ctl_fail(CTL_USAGE, "%s", verb->no_json);
     }
     return verb->run(arguments->ctl, arguments->count, arguments->words);
 }

@@ -10,24 +10,28 @@
 
 #define AGE_MAX_ms INT64_C(86400000)
 
-static const char usage[] =
-    "usage: iwheel-sim [OPTION]...             be a pair of simulated wheels and the bus they are on\n"
-    "       iwheel-sim [--control PATH] COMMAND   tell a running one, for example: iwheel-sim power off\n"
-    "\n"
-    "  --can unix:PATH     the bus: a local socket that the gateway connects to\n"
-    "  --can IFACE         or a CAN interface, for example vcan0\n"
-    "  --estop PATH        the e-stop button: a local socket\n"
-    "  --control PATH      where commands come in, one a line; `iwheel-sim help` lists them\n"
-    "  --script FILE       commands at given times: `at 2.5 power off`, `wait 1`, `estop press`, # comment\n"
-    "  --log FILE          every frame on the bus as candump log, stamps of CLOCK_MONOTONIC; - is standard output.\n"
-    "                      Lines `# SECONDS COMMAND` tell what was done to the wheels\n"
-    "  --log-direction     ends each line of the log in T (a client sent it) or R\n"
-    "  --seed N            same seed, same noise (1)\n"
-    "  --uptime SECONDS    the wheels have been running so long already (0: they boot now)\n"
-    "  --quiet             print only errors\n"
-    "  --version, --help\n"
-    "\n"
-    "Exit codes: 0 ok, 1 the running simulator refused the command, 64 usage, 65 faulty script, 69 unavailable.\n";
+static const char usage[] = "usage: iwheel-sim [OPTION]...           be two simulated wheels and their bus\n"
+                            "       iwheel-sim [--control PATH] COMMAND tell a running one, such as: power off\n"
+                            "\n"
+                            "  --can unix:PATH     the bus: a local socket that the gateway connects to\n"
+                            "  --can IFACE         or a CAN interface, for example vcan0\n"
+                            "  --estop PATH        the e-stop button: a local socket\n"
+                            "  --control PATH      where commands come in, one a line; `iwheel-sim help` lists\n"
+                            "                      them\n"
+                            "  --script FILE       commands at given times: `at 2.5 power off`, `wait 1`,\n"
+                            "                      `estop press`, # comment\n"
+                            "  --log FILE          every frame on the bus as candump log, stamps of\n"
+                            "                      CLOCK_MONOTONIC; - is standard output. Lines\n"
+                            "                      `# SECONDS COMMAND` tell what was done to the wheels\n"
+                            "  --log-direction     ends each line of the log in T (a client sent it) or R\n"
+                            "  --no-keys           on a terminal: no faults at the touch of a key\n"
+                            "  --seed N            same seed, same noise (1)\n"
+                            "  --uptime SECONDS    the wheels have been running so long already (0: boot)\n"
+                            "  --quiet             print only errors\n"
+                            "  --version, --help\n"
+                            "\n"
+                            "Exit codes: 0 ok, 1 the running simulator refused the command, 64 usage,\n"
+                            "65 faulty script, 69 unavailable.\n";
 
 enum {
     OPTION_CAN = 256,
@@ -36,6 +40,7 @@ enum {
     OPTION_SCRIPT,
     OPTION_LOG,
     OPTION_DIRECTION,
+    OPTION_NO_KEYS,
     OPTION_SEED,
     OPTION_UPTIME
 };
@@ -47,6 +52,7 @@ static const struct option long_options[] = {
     {"script", required_argument, NULL, OPTION_SCRIPT},
     {"log", required_argument, NULL, OPTION_LOG},
     {"log-direction", no_argument, NULL, OPTION_DIRECTION},
+    {"no-keys", no_argument, NULL, OPTION_NO_KEYS},
     {"seed", required_argument, NULL, OPTION_SEED},
     {"uptime", required_argument, NULL, OPTION_UPTIME},
     {"quiet", no_argument, NULL, 'q'},
@@ -123,6 +129,9 @@ static int set_option(sim_options_t *options, int option, const char *value) {
         return -1;
     case OPTION_DIRECTION:
         options->log_direction = true;
+        return -1;
+    case OPTION_NO_KEYS:
+        options->no_keys = true;
         return -1;
     case 'q':
         options->quiet = true;

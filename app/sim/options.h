@@ -17,6 +17,7 @@ typedef struct {
     uint64_t seed;
     uint64_t age_us; ///< Wheels have been running this long already; 0: they boot.
     bool quiet;
+    bool no_keys; ///< On a terminal, too, no key plants a fault.
     bool log_direction;
     char command[SIM_LINE_BYTES]; ///< To give to a running simulator; empty: be one.
 } sim_options_t;

@@ -256,11 +256,16 @@ int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {
         self->panel.world = &self->world;
         self->panel.hooks = (sim_hooks_t){self->on_socketcan ? NULL : &self->hub, &self->button, mark, quit, self};
         greet(self, options);
+        self->keys = (sim_keys_t){.watch.fd = -1, .loop = &self->loop, .execute = execute, .context = self};
+        if (!options->quiet && !options->no_keys) {
+            sim_keys_open(&self->keys);
+        }
     }
     return result;
 }
 
 void sim_simulator_close(sim_simulator_t *self) {
+    sim_keys_close(&self->keys);
     sim_control_close(&self->control);
     sim_button_close(&self->button);
     if (self->on_socketcan) {

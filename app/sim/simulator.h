@@ -11,6 +11,7 @@
 #include "button.h"
 #include "control.h"
 #include "hub.h"
+#include "keys.h"
 #include "options.h"
 #include "panel.h"
 #include "script.h"
@@ -26,6 +27,7 @@ typedef struct {
     sim_socketcan_t can; ///< In place of the hub.
     sim_button_t button;
     sim_control_t control;
+    sim_keys_t keys;
     sim_script_t script;
     sim_bus_log_t log;
     sim_panel_t panel;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "names.h"
 #include "plain.h"
 #include "talk/ctl.h"
 #include "talk/signals.h"
@@ -15,14 +16,12 @@
 /// How often a watch without events looks whether somebody still reads it.
 #define LOOK_US 500000
 
-/// The first TOPICS_USUAL are watched when none is named.
-static const char *const topics[] = {"state", "bus", "estop", "lease", "stop", "force", "frame"};
-#define TOPICS       (sizeof(topics) / sizeof(topics[0]))
-#define TOPICS_USUAL 5U
+/// So many of the topics, the first ones, are watched when none is named.
+#define TOPICS_USUAL ((unsigned)GW_TOPIC_STOP + 1U)
 
 static bool is_topic(const char *word) {
-    for (size_t i = 0; i < TOPICS; i++) {
-        if (strcmp(topics[i], word) == 0) {
+    for (unsigned i = 0; i < (unsigned)GW_TOPICS; i++) {
+        if (strcmp(gw_topic_name((gw_topic_t)i), word) == 0) {
             return true;
         }
     }
@@ -70,8 +69,8 @@ static json_t *compose(int count, char **words) {
         return NULL;
     }
     const bool usual = json_array_size(list) == 0;
-    for (size_t i = 0; usual && i < TOPICS_USUAL; i++) {
-        (void)json_array_append_new(list, json_string(topics[i]));
+    for (unsigned i = 0; usual && i < TOPICS_USUAL; i++) {
+        (void)json_array_append_new(list, json_string(gw_topic_name((gw_topic_t)i)));
     }
     return json_pack("{s:s,s:o,s:i}", "cmd", "watch", "topics", list, "rate_hz", rate_hz);
 }

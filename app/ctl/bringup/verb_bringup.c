@@ -126,9 +126,6 @@ int verb_bringup(ctl_t *self, int count, char **words) {
     if (!parse_words(count, words, &parsed)) {
         return CTL_USAGE;
     }
-    if (self->json) {
-        return ctl_fail(CTL_USAGE, "bringup talks with a person; it has no --json (doctor has)");
-    }
     bringup_t *bringup = calloc(1, sizeof(*bringup));
     if (bringup == NULL) {
         return ctl_fail(CTL_INTERNAL, "out of memory");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "doctor.h"
+#include "text/duration.h"
 #include "text/paper.h"
 #include "text/text.h"
 
@@ -10,8 +11,8 @@
 #include <unistd.h>
 
 #define INDENT        6U
-#define LISTEN_MIN_MS 200U
-#define LISTEN_MAX_MS 60000U
+#define LISTEN_MIN_US 200000
+#define LISTEN_MAX_US 60000000
 
 typedef struct {
     const char *bus;
@@ -22,14 +23,14 @@ typedef struct {
 } words_t;
 
 static bool parse_listen(const char *text, unsigned *out_ms) {
-    char *end = NULL;
-    const double seconds = text != NULL ? strtod(text, &end) : -1.0;
-    if (text == NULL || end == text || (*end != '\0' && strcmp(end, "s") != 0) ||
-        !(seconds * 1000.0 >= LISTEN_MIN_MS && seconds * 1000.0 <= LISTEN_MAX_MS)) {
-        (void)ctl_fail(CTL_USAGE, "--listen wants a time in seconds, 0.2s to 60s");
+    static const duration_range_t range = {LISTEN_MIN_US, LISTEN_MAX_US};
+    char why[160];
+    int64_t us = 0;
+    if (!duration_option("--listen", text, range, &us, why, sizeof(why))) {
+        (void)ctl_fail(CTL_USAGE, "%s", why);
         return false;
     }
-    *out_ms = (unsigned)(seconds * 1000.0);
+    *out_ms = (unsigned)(us / 1000);
     return true;
 }
 

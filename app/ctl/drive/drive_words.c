@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "drive_words.h"
 
+#include "text/duration.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -20,49 +22,12 @@ static bool parse_integer(const char *text, int limit, int *out_number) {
     return number <= limit;
 }
 
-/// "2s", "1.5s", "300ms".
-static bool parse_time(const char *text, int *out_ms) {
-    const size_t whole = strspn(text, "0123456789");
-    const char *rest = text + whole;
-    int number = 0;
-    int thousandths = 0;
-    if (whole == 0 || whole > 6U) {
-        return false;
-    }
-    for (size_t i = 0; i < whole; i++) {
-        number = number * 10 + (text[i] - '0');
-    }
-    if (*rest == '.') {
-        const size_t digits = strspn(rest + 1, "0123456789");
-        int weight = 100;
-        if (digits == 0 || digits > 3U || rest[1U + digits] != 's') {
-            return false;
-        }
-        for (size_t i = 1; i <= digits; i++, weight /= 10) {
-            thousandths += (rest[i] - '0') * weight;
-        }
-        rest += 1U + digits;
-    }
-    if (strcmp(rest, "s") == 0) {
-        *out_ms = number * 1000 + thousandths;
-        return true;
-    }
-    *out_ms = number;
-    return strcmp(rest, "ms") == 0;
-}
-
 static bool parse_for(const char *text, drive_words_t *drive, char *out_why) {
-    if (text == NULL || !parse_time(text, &drive->time_ms)) {
-        (void)snprintf(out_why, DRIVE_WHY_SIZE, "--for wants a time with its unit, such as 2s or 500ms, not \"%s\"",
-                       text != NULL ? text : "");
-        return false;
-    }
-    if (drive->time_ms < DRIVE_TIME_MIN_MS || drive->time_ms > DRIVE_TIME_MAX_MS) {
-        (void)snprintf(out_why, DRIVE_WHY_SIZE, "--for %s is out of range; write %dms to %ds", text, DRIVE_TIME_MIN_MS,
-                       DRIVE_TIME_MAX_MS / 1000);
-        return false;
-    }
-    return true;
+    static const duration_range_t range = {DRIVE_TIME_MIN_MS * INT64_C(1000), DRIVE_TIME_MAX_MS * INT64_C(1000)};
+    int64_t us = 0;
+    const bool good = duration_option("--for", text, range, &us, out_why, DRIVE_WHY_SIZE);
+    drive->time_ms = good ? (int)(us / 1000) : drive->time_ms;
+    return good;
 }
 
 static bool parse_pair(char **words, int limit, int *out_pair) {

@@ -12,6 +12,8 @@ typedef struct {
     FILE *file;
     const char *name; ///< Of the file, as shown; "standard output".
     char interface[CANDUMP_INTERFACE_SIZE];
+    char bus[128];         ///< As it was asked for, or as the gateway names it.
+    bool from_gateway;     ///< Else from the bus itself.
     int64_t wall_minus_us; ///< Wall clock minus monotonic clock, of the whole recording: its times never step.
     int64_t end_us;        ///< Monotonic; INT64_MAX: until a signal.
     int64_t first_us;      ///< Of the first frame.

@@ -2,17 +2,20 @@
 #include "recorder.h"
 #include "talk/near.h"
 #include "talk/signals.h"
+#include "text/duration.h"
 #include "text/text.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
 #define USUAL_BUS "can0"
+/// A millisecond to a month.
+#define FOR_MIN_US 1000
+#define FOR_MAX_US (720 * INT64_C(3600000000))
 
 typedef struct {
     const char *path; ///< NULL: a name made of the time.
@@ -20,32 +23,14 @@ typedef struct {
     int64_t for_us;   ///< 0: until a signal.
 } words_t;
 
-/// "10s", "5min", "2h", "500ms". False if it is none.
-static bool parse_time(const char *text, int64_t *out_us) {
-    static const struct {
-        const char *unit;
-        int64_t us;
-    } units[] = {{"ms", 1000}, {"s", 1000000}, {"min", 60000000}, {"h", 3600000000}};
-    char *end = NULL;
-    if (text == NULL || text[0] < '0' || text[0] > '9') {
-        return false;
-    }
-    const unsigned long number = strtoul(text, &end, 10);
-    for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {
-        if (strcmp(end, units[i].unit) == 0 && number > 0U && number < 1000000U) {
-            *out_us = (int64_t)number * units[i].us;
-            return true;
-        }
-    }
-    return false;
-}
-
 static int parse(words_t *self, int count, char **words) {
+    static const duration_range_t range = {FOR_MIN_US, FOR_MAX_US};
+    char why[160];
     for (int i = 0; i < count; i++) {
         const char *next = i + 1 < count ? words[i + 1] : NULL;
         if (strcmp(words[i], "--for") == 0) {
-            if (!parse_time(next, &self->for_us)) {
-                return ctl_fail(CTL_USAGE, "--for wants a time with its unit: 500ms, 10s, 5min, 2h");
+            if (!duration_option("--for", next, range, &self->for_us, why, sizeof why)) {
+                return ctl_fail(CTL_USAGE, "%s", why);
             }
             i++;
         } else if (strcmp(words[i], "--can") == 0) {
@@ -108,11 +93,14 @@ static int record(ctl_t *ctl, const words_t *words, recorder_t *self) {
     json_decref(gateway.status);
     if (gateway.result == NEAR_FOUND) {
         name_interface(self, gateway.bus);
+        (void)snprintf(self->bus, sizeof self->bus, "%s", gateway.bus);
+        self->from_gateway = true;
         (void)ctl_fail(CTL_OK, "recording what the gateway on %s sees, to %s; Ctrl-C ends it", gateway.bus, self->name);
         return recorder_from_gateway(ctl, self);
     }
     const char *bus = words->bus != NULL ? words->bus : USUAL_BUS;
     name_interface(self, bus);
+    (void)snprintf(self->bus, sizeof self->bus, "%s", bus);
     (void)ctl_fail(CTL_OK, "no gateway for it: recording from %s itself, sending nothing, to %s; Ctrl-C ends it", bus,
                    self->name);
     return recorder_from_bus(bus, self);
@@ -130,32 +118,49 @@ static int finish_empty(recorder_t *self, int code) {
                                   "doctor tells");
 }
 
-static int finish(recorder_t *self, int code) {
+static void sum_up(const recorder_t *self, bool json) {
+    const int64_t span_us = self->last_us - self->first_us;
+    const int64_t ms = span_us / 1000;
+    if (json) {
+        json_t *sum = json_pack("{s:b,s:s,s:s,s:b,s:I,s:I,s:I}", "ok", 1, "file", self->name, "bus", self->bus,
+                                "gateway", (int)self->from_gateway, "frames", (json_int_t)self->frames, "lost",
+                                (json_int_t)self->lost, "span_us", (json_int_t)span_us);
+        (void)json_dumpf(sum, stdout, JSON_COMPACT);
+        (void)putchar('\n');
+        json_decref(sum);
+        return;
+    }
+    (void)ctl_fail(CTL_OK, "%" PRIu64 " frames in %" PRId64 ".%" PRId64 " s recorded to %s", self->frames, ms / 1000,
+                   ms % 1000 / 100, self->name);
+    if (self->lost > 0U) {
+        (void)ctl_fail(CTL_OK, "%" PRIu64 " frames came faster than they could be taken and are missing", self->lost);
+    }
+}
+
+static int finish(recorder_t *self, bool json, int code) {
     const int error = errno;
     const bool broken = ferror(self->file) != 0;
     if (self->frames == 0U) {
         return finish_empty(self, code);
     }
     const bool closed = self->file == stdout ? fflush(stdout) == 0 : fclose(self->file) == 0;
-    const int64_t ms = (self->last_us - self->first_us) / 1000;
-    (void)ctl_fail(CTL_OK, "%" PRIu64 " frames in %" PRId64 ".%" PRId64 " s recorded to %s", self->frames, ms / 1000,
-                   ms % 1000 / 100, self->name);
-    if (self->lost > 0U) {
-        (void)ctl_fail(CTL_OK, "%" PRIu64 " frames came faster than they could be taken and are missing", self->lost);
+    const int why = broken ? error : errno;
+    if (!broken && closed) {
+        sum_up(self, json);
+        return code;
     }
-    if (broken || !closed) {
-        const int why = broken ? error : errno;
-        return why == EPIPE
-                   ? CTL_OK
-                   : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be written: %s; make room", self->name, strerror(why));
-    }
-    return code;
+    return why == EPIPE ? CTL_OK
+                        : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be written: %s; make room", self->name, strerror(why));
 }
 
 int verb_record(ctl_t *self, int count, char **words) {
     words_t parsed = {0};
     recorder_t recorder = {.wall_minus_us = wall_minus_us()};
+    const bool json = self->json;
     int code = parse(&parsed, count, words);
+    if (code == CTL_OK && json && parsed.path != NULL && strcmp(parsed.path, "-") == 0) {
+        return ctl_fail(CTL_USAGE, "record writes the recording or --json to standard output, not both; name a FILE");
+    }
     code = code == CTL_OK ? open_file(&recorder, parsed.path) : code;
     if (code != CTL_OK) {
         return code;
@@ -164,5 +169,6 @@ int verb_record(ctl_t *self, int count, char **words) {
     signals_catch();
     recorder.end_us = parsed.for_us > 0 ? client_now_us() + parsed.for_us : INT64_MAX;
     code = record(self, &parsed, &recorder);
-    return finish(&recorder, code);
+    self->json = json;
+    return finish(&recorder, json, code);
 }

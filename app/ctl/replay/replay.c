@@ -93,7 +93,7 @@ static void begin_core(replay_t *self, const iw_config_t *config, iw_time_us_t a
     }
 }
 
-void replay_init(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, FILE *out) {
+void replay_init(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, replay_out_t out) {
     (void)memset(self, 0, sizeof *self);
     self->out = out;
     self->zero_us = at_us;

@@ -23,9 +23,15 @@ typedef struct {
     uint64_t different;
 } replay_score_t;
 
+/// Where it is told, and how.
+typedef struct {
+    FILE *file;
+    bool json; ///< One object a line instead of text.
+} replay_out_t;
+
 typedef struct {
     iw_gateway_t gateway;
-    FILE *out;
+    replay_out_t out;
     const char *estop_name;
     const char *bus_name;
     iw_time_us_t zero_us; ///< Printed times count from here.
@@ -67,7 +73,7 @@ typedef struct {
 } replay_t;
 
 /// Begins with the bus active, the e-stop released, in LISTENING. `config` must be one that the core accepts.
-void replay_init(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, FILE *out);
+void replay_init(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, replay_out_t out);
 
 /// The same, as the recorded gateway began.
 void replay_start(replay_t *self, const iw_config_t *config, const blackbox_entry_t *entry);

@@ -5,23 +5,64 @@
 #include "text/text.h"
 #include "why.h"
 
+#include <ctype.h>
 #include <inttypes.h>
+#include <jansson.h>
 #include <stdarg.h>
+#include <stddef.h>
 #include <string.h>
+
+#define TEXT_SIZE 1024U
+
+static void put_object(const replay_out_t *out, json_t *object) {
+    (void)json_dumpf(object, out->file, JSON_COMPACT);
+    (void)fputc('\n', out->file);
+    json_decref(object);
+}
+
+/// "stop asked" is stop_asked.
+static void name_event(const char *what, char out_name[16]) {
+    size_t i = 0;
+    for (; what[i] != '\0' && i < 15U; i++) {
+        const bool letter = isalpha((unsigned char)what[i]) != 0;
+        out_name[i] = letter ? (char)tolower((unsigned char)what[i]) : '_';
+    }
+    out_name[i] = '\0';
+}
 
 __attribute__((format(printf, 4, 5))) static void tell(const replay_t *self, iw_time_us_t at_us, const char *what,
                                                        const char *format, ...) {
-    char text[1024];
+    char text[TEXT_SIZE];
+    char event[16];
     va_list list;
     if (self->quiet) {
         return;
     }
     const iw_time_us_t since_us = at_us > self->zero_us ? at_us - self->zero_us : 0U;
-    (void)fprintf(self->out, "%6" PRIu64 ".%06" PRIu64 "  %-10s ", since_us / 1000000U, since_us % 1000000U, what);
     va_start(list, format);
     (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
-    text_line(self->out, "%s", text); // Names in it come from the recording.
+    name_event(what, event);
+    if (self->out.json) {
+        put_object(&self->out, json_pack("{s:I,s:s,s:s}", "t_us", (json_int_t)since_us, "event", event, "text", text));
+    } else {
+        (void)fprintf(self->out.file, "%6" PRIu64 ".%06" PRIu64 "  %-10s ", since_us / 1000000U, since_us % 1000000U,
+                      what);
+        text_line(self->out.file, "%s", text); // Names in it come from the recording.
+    }
+}
+
+void replay_note(const replay_out_t *out, const char *format, ...) {
+    char text[TEXT_SIZE];
+    va_list list;
+    va_start(list, format);
+    (void)vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    if (out->json) {
+        put_object(out, json_pack("{s:s,s:s}", "event", "note", "text", text));
+    } else {
+        text_line(out->file, "# %s", text);
+    }
 }
 
 static const char *side_name(size_t side) {
@@ -185,19 +226,52 @@ void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry)
     }
 }
 
-static void tell_score(const replay_t *self, const char *what, const replay_score_t *score) {
-    if (score->same + score->different > 0U) {
-        (void)fprintf(self->out, "# %s: %" PRIu64 " of %" PRIu64 " as recorded\n", what, score->same,
-                      score->same + score->different);
+static const struct {
+    const char *name;
+    const char *what;
+    size_t offset;
+} scores[] = {
+    {"setpoints", "setpoints on the bus", offsetof(replay_t, setpoints)},
+    {"requests", "answers to requests", offsetof(replay_t, requests)},
+    {"states", "changes of state", offsetof(replay_t, states)},
+    {"stops", "stops", offsetof(replay_t, stops)},
+};
+#define SCORES (sizeof(scores) / sizeof(scores[0]))
+
+static replay_score_t score_of(const replay_t *self, size_t number) {
+    replay_score_t score;
+    (void)memcpy(&score, (const char *)self + scores[number].offset, sizeof score);
+    return score;
+}
+
+static void sum_up_as_json(const replay_t *self) {
+    json_t *compared = json_object();
+    for (size_t i = 0; i < SCORES; i++) {
+        const replay_score_t score = score_of(self, i);
+        (void)json_object_set_new(
+            compared, scores[i].name,
+            json_pack("{s:I,s:I}", "same", (json_int_t)score.same, "different", (json_int_t)score.different));
     }
+    put_object(&self->out,
+               json_pack("{s:s,s:s,s:I,s:I,s:I,s:o}", "event", "summary", "state",
+                         gw_state_name(iw_gateway_state(&self->gateway)), "stops",
+                         (json_int_t)self->gateway.permit.stop.number, "frames", (json_int_t)self->total_frames,
+                         "setpoint_frames", (json_int_t)self->total_sent, "as_recorded", compared));
 }
 
 void replay_finish(const replay_t *self) {
-    (void)fprintf(self->out, "# end: %s, %u stop%s, %" PRIu64 " frames in, %" PRIu64 " setpoint frames out\n",
-                  gw_state_name(iw_gateway_state(&self->gateway)), (unsigned)self->gateway.permit.stop.number,
-                  self->gateway.permit.stop.number == 1U ? "" : "s", self->total_frames, self->total_sent);
-    tell_score(self, "setpoints on the bus", &self->setpoints);
-    tell_score(self, "answers to requests", &self->requests);
-    tell_score(self, "changes of state", &self->states);
-    tell_score(self, "stops", &self->stops);
+    if (self->out.json) {
+        sum_up_as_json(self);
+        return;
+    }
+    replay_note(&self->out, "end: %s, %u stop%s, %" PRIu64 " frames in, %" PRIu64 " setpoint frames out",
+                gw_state_name(iw_gateway_state(&self->gateway)), (unsigned)self->gateway.permit.stop.number,
+                self->gateway.permit.stop.number == 1U ? "" : "s", self->total_frames, self->total_sent);
+    for (size_t i = 0; i < SCORES; i++) {
+        const replay_score_t score = score_of(self, i);
+        if (score.same + score.different > 0U) {
+            replay_note(&self->out, "%s: %" PRIu64 " of %" PRIu64 " as recorded", scores[i].what, score.same,
+                        score.same + score.different);
+        }
+    }
 }

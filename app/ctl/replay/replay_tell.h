@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What a replay decides, in lines for people. Private to the replay.
+/// What a replay decides, in lines for people or as JSON. Private to the replay.
 #ifndef REPLAY_TELL_H
 #define REPLAY_TELL_H
 
@@ -16,5 +16,8 @@ void replay_tell_answer(const replay_t *self, const blackbox_entry_t *entry);
 
 /// A decision was recorded that is not ours.
 void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry);
+
+/// A remark that belongs to no time.
+__attribute__((format(printf, 2, 3))) void replay_note(const replay_out_t *out, const char *format, ...);
 
 #endif

@@ -3,6 +3,7 @@
 #include "recordings/events.h"
 #include "recordings/recording.h"
 #include "replay.h"
+#include "replay_tell.h"
 #include "replay_warm.h"
 #include "talk/ctl.h"
 #include "text/text.h"
@@ -20,6 +21,7 @@
 
 typedef struct {
     const char *path;
+    replay_out_t out;
     iw_config_t config;
     bool configured;
     recording_t recording;
@@ -168,10 +170,10 @@ static void begin_within(verb_replay_t *self) {
     }
     if (self->has_entry && self->entry.kind == (uint8_t)BLACKBOX_STATE) {
         const bool reached = replay_warm(&self->replay, &self->config, &self->entry);
-        (void)printf(
-            "# begins while the gateway was running: its state %s; force offsets and assumptions of before are "
-            "unknown\n",
-            reached ? "is taken over" : "could not be taken over, so decisions differ");
+        replay_note(&self->out,
+                    "begins while the gateway was running: its state %s; force offsets and assumptions of before are "
+                    "unknown",
+                    reached ? "is taken over" : "could not be taken over, so decisions differ");
         self->has_entry = false;
     }
 }
@@ -185,10 +187,10 @@ static void name_things(verb_replay_t *self) {
 
 /// As it was: steps, requests and answers where they were.
 static void replay_exactly(verb_replay_t *self) {
-    text_line(stdout, "# %s, with its requests and the port's answers; times in seconds from its first entry",
-              self->path);
+    replay_note(&self->out, "%s, with its requests and the port's answers; times in seconds from its first entry",
+                self->path);
     if (peek_entry(self)) {
-        replay_init(&self->replay, &self->config, self->entry.at_us, stdout);
+        replay_init(&self->replay, &self->config, self->entry.at_us, self->out);
         name_things(self);
         self->replay.compares = true;
         if (self->entry.kind != (uint8_t)BLACKBOX_START) {
@@ -219,8 +221,8 @@ static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
     }
     if (at_us - replay->now_us > GAP_US) {
         const iw_time_us_t cut_us = at_us - replay->now_us - GAP_US;
-        (void)printf("# nothing for %" PRIu64 " s; cut to %u s\n", (at_us - replay->now_us) / 1000000U,
-                     GAP_US / 1000000U);
+        replay_note(&self->out, "nothing for %" PRIu64 " s; cut to %u s", (at_us - replay->now_us) / 1000000U,
+                    GAP_US / 1000000U);
         self->cut_us += cut_us;
         at_us -= cut_us;
     }
@@ -232,11 +234,11 @@ static iw_time_us_t pass_time(verb_replay_t *self, iw_time_us_t at_us) {
 
 /// Frames are all there is: nobody asks for anything, the bus is up, the e-stop released.
 static void replay_frames(verb_replay_t *self) {
-    text_line(stdout,
-              "# %s, frames only: nobody arms. Setpoints marked T are the gateway's own, others another controller's",
-              self->path);
+    replay_note(&self->out,
+                "%s, frames only: nobody arms. Setpoints marked T are the gateway's own, others another controller's",
+                self->path);
     if (peek_frame(self)) {
-        replay_init(&self->replay, &self->config, time_of(self, &self->frame), stdout);
+        replay_init(&self->replay, &self->config, time_of(self, &self->frame), self->out);
     }
     while (peek_frame(self)) {
         iw_time_us_t at_us = time_of(self, &self->frame);
@@ -248,7 +250,8 @@ static void replay_frames(verb_replay_t *self) {
     }
     flush_group(self);
     if (self->backwards > 0U) {
-        (void)printf("# time goes back %" PRIu64 " times; those frames were taken as of then\n", self->backwards);
+        replay_note(&self->out, "time goes back %" PRIu64 " times; those frames were taken as of then",
+                    self->backwards);
     }
 }
 
@@ -258,8 +261,8 @@ static int finish(verb_replay_t *self) {
         replay_finish(&self->replay);
     }
     if (self->events.lost > 0U || (self->events.file != NULL && !self->events.whole)) {
-        (void)printf("# the recording is not whole: %" PRIu64 " entries are missing%s\n", self->events.lost,
-                     self->events.whole ? "" : ", and so is its end");
+        replay_note(&self->out, "the recording is not whole: %" PRIu64 " entries are missing%s", self->events.lost,
+                    self->events.whole ? "" : ", and so is its end");
     }
     const bool bad = self->events.bad > 0U;
     events_close(&self->events);
@@ -269,7 +272,7 @@ static int finish(verb_replay_t *self) {
 int verb_replay(ctl_t *self, int count, char **words) {
     static verb_replay_t replay;
     int code = parse_words(&replay, count, words);
-    (void)self;
+    replay.out = (replay_out_t){.file = stdout, .json = self->json};
     code = code == CTL_OK ? recording_open(&replay.recording, replay.path) : code;
     if (code != CTL_OK) {
         return code;

@@ -24,7 +24,7 @@ enum {
 /// What the options say, for every verb.
 typedef struct {
     const char *socket; ///< Of --socket; null: look for it.
-    bool json;          ///< Print the gateway's own reply lines instead of text for humans.
+    bool json;          ///< Objects, one a line, instead of text for humans: the gateway's own replies, or the verb's.
     client_t client;
 } ctl_t;
 
@@ -47,6 +47,7 @@ int verb_replay(ctl_t *self, int count, char **words);
 int verb_decode(ctl_t *self, int count, char **words);
 int verb_bringup(ctl_t *self, int count, char **words);
 int verb_top(ctl_t *self, int count, char **words);
+int verb_help(ctl_t *self, int count, char **words);
 
 /// Prints "iwheelctl: ..." on stderr and returns `code`.
 __attribute__((format(printf, 2, 3))) int ctl_fail(int code, const char *format, ...);

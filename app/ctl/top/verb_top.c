@@ -222,9 +222,6 @@ int verb_top(ctl_t *self, int count, char **words) {
     if (!ctl_words_at_most("top", count, 0, words)) {
         return CTL_USAGE;
     }
-    if (self->json) {
-        return ctl_fail(CTL_USAGE, "top draws a screen; for JSON lines: iwheelctl watch state");
-    }
     if (isatty(STDIN_FILENO) != 1 || isatty(STDOUT_FILENO) != 1) {
         return ctl_fail(CTL_USAGE, "top needs a terminal; without one: iwheelctl status, or iwheelctl watch");
     }

@@ -44,8 +44,9 @@ static int parse(words_t *self, int count, char **words) {
         } else if (strcmp(words[i], "--frames") == 0) {
             code = parse_frames(next, &self->frames);
             i++;
-        } else if (strcmp(words[i], "--directory") == 0 && i + 1 < count) {
+        } else if (strcmp(words[i], "--directory") == 0) {
             self->directory = next;
+            code = next != NULL ? CTL_OK : ctl_fail(CTL_USAGE, "--directory wants the directory of the recordings");
             i++;
         } else if (!names_recording(words[i]) || self->name != NULL) {
             code = ctl_fail(CTL_USAGE, "why does not understand \"%s\"; see: iwheelctl why --help", words[i]);

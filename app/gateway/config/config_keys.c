@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "config_keys.h"
 
+#include "similar.h"
+
 #include <string.h>
 
 #define FIELD(member)             .offset = offsetof(gateway_config_t, member), .size = sizeof(((gateway_config_t *)0)->member)
@@ -122,46 +124,13 @@ const config_key_t *config_key_elsewhere(const char *key) {
     return NULL;
 }
 
-static size_t least(size_t a, size_t b) {
-    return a < b ? a : b;
-}
-
-#define WORD_MAX 40U
-
-/// Edit distance of two words; SIZE_MAX if one of them is too long to be compared.
-static size_t distance(const char *a, const char *b) {
-    size_t row[WORD_MAX + 1U];
-    const size_t width = strlen(b);
-    if (width > WORD_MAX || strlen(a) > WORD_MAX) {
-        return SIZE_MAX;
-    }
-    for (size_t j = 0; j <= width; j++) {
-        row[j] = j;
-    }
-    for (size_t i = 0; a[i] != '\0'; i++) {
-        size_t diagonal = row[0];
-        row[0] = i + 1U;
-        for (size_t j = 0; j < width; j++) {
-            const size_t above = row[j + 1U];
-            row[j + 1U] = least(diagonal + (a[i] != b[j] ? 1U : 0U), 1U + least(above, row[j]));
-            diagonal = above;
-        }
-    }
-    return row[width];
-}
-
 const config_key_t *config_key_similar(const char *section, const char *key) {
     const config_key_t *best = NULL;
-    size_t best_distance = 4U;
-    const size_t length = strlen(key);
+    size_t best_distance = GW_WORD_STRANGE;
     for (size_t i = 0; i < config_key_count; i++) {
         const config_key_t *row = &config_keys[i];
-        if (strcmp(row->section, section) != 0) {
-            continue;
-        }
-        const bool beginning = length >= 3U && strncmp(row->key, key, length) == 0;
-        const size_t far = beginning ? 0U : distance(key, row->key);
-        if (far < best_distance && far < strlen(row->key)) {
+        const size_t far = strcmp(row->section, section) == 0 ? gw_word_distance(key, row->key) : GW_WORD_STRANGE;
+        if (far < best_distance) {
             best = row;
             best_distance = far;
         }

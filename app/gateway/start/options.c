@@ -25,8 +25,8 @@ static const struct option long_options[] = {
 };
 
 void gw_options_help(FILE *out) {
-    (void)fputs("iwheel-gateway: drives a pair of iWheels on a CAN bus for the clients of its socket.\n"
-                "It sends nothing until a client arms.\n"
+    (void)fputs("iwheel-gateway: drives a pair of iWheels on a CAN bus for the clients of its\n"
+                "socket. It sends nothing until a client arms.\n"
                 "\n"
                 "usage: iwheel-gateway [options]\n"
                 "  -c, --config FILE   configuration (" GATEWAY_CONFIG_PATH ", if it exists)\n"
@@ -39,7 +39,8 @@ void gw_options_help(FILE *out) {
                 "      --log-level L   error, warning, info (default) or debug\n"
                 "      --version, --help\n"
                 "\n"
-                "exit codes: 0 ok, 1 a check failed, 64 usage, 69 bus, socket or e-stop unavailable,\n"
+                "exit codes: 0 ok, 1 a check failed, 64 usage, 69 bus, socket or e-stop\n"
+                "unavailable (of --check: nothing failed, but these could not be looked at),\n"
                 "70 internal, 77 permission, 78 configuration\n",
                 out);
 }

@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""One grammar for all verbs of iwheelctl: durations, --json, help, what is nearly right, completion, 80 columns.
+
+Usage: test_commands.py BUILD [unittest's arguments]
+"""
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+sys.path.insert(0, os.path.join(ROOT, "test", "system"))
+from harness import find_program  # noqa: E402
+
+BUILD = ""
+# Those that talk with a person.
+WITHOUT_JSON = {"top", "bringup", "help"}
+
+
+def run(*words, program="iwheelctl", **more):
+    """(exit code, stdout, stderr)"""
+    environment = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
+    done = subprocess.run([find_program(BUILD, program), *words], capture_output=True, text=True, timeout=30,
+                          stdin=subprocess.DEVNULL, env={**environment, "TERM": "dumb"}, check=False, **more)
+    return done.returncode, done.stdout, done.stderr
+
+
+def verbs():
+    return [line.split("\t")[0] for line in run("help", "--list")[1].splitlines()]
+
+
+def listed(verb):
+    return run("help", verb, "--list")[1].split()
+
+
+class Grammar(unittest.TestCase):
+    # Every option of every verb that takes a time: the words before it, the range.
+    DURATIONS = ((("drive", "1", "2", "--for"), "20ms to 10min"), (("record", "-", "--for"), "1ms to 720h"),
+                 (("doctor", "--listen"), "200ms to 1min"))
+
+    def test_every_duration_is_written_alike_and_refused_alike(self):
+        for words, bounds in self.DURATIONS:
+            for wrong in ("2", "soon", "-1s", "2m", "1.s", "", "1.2345s"):
+                code, out, err = run("--socket", "/nonexistent", *words, wrong)
+                self.assertEqual((64, "", f'iwheelctl: {words[-1]} wants a time with its unit, such as 500ms, 1.5s, 2min '
+                                  f'or 1h, not "{wrong}"\n'), (code, out, err), words)
+            code, _, err = run("--socket", "/nonexistent", *words, "0s")
+            self.assertEqual((64, f"iwheelctl: {words[-1]} 0s is out of range; write {bounds}\n"), (code, err))
+            for right in ("300ms", "0.3s", "0.005min") + (("2s", "0.001h") if words[0] == "drive" else ()):
+                self.assertNotEqual(64, run("--socket", "/nonexistent", *words, right, *(
+                    ("unix:/nonexistent",) if words[0] == "doctor" else ("--can", "unix:/nonexistent")
+                    if words[0] == "record" else ()))[0], (words, right))
+
+    def test_no_option_of_a_verb_takes_a_time_otherwise(self):
+        """A new one belongs into the table above."""
+        taking = {(verb, option) for verb in verbs()
+                  for option in re.findall(r"^(--[a-z-]+) TIME", run("help", verb)[1], re.MULTILINE)}
+        self.assertEqual({(words[0], words[-1]) for words, _ in self.DURATIONS}, taking)
+
+    def test_verb_nearly_right_is_asked_after_and_a_strange_one_gets_the_list(self):
+        for typed, meant in (("staus", "status"), ("recrod", "record"), ("dirve", "drive"), ("doc", "doctor"), ("hepl", "help")):
+            code, _, err = run(typed)
+            self.assertEqual((64, f'iwheelctl: unknown verb "{typed}"; did you mean {meant}? All: iwheelctl help\n'), (code, err))
+            self.assertEqual((64, err), (lambda done: (done[0], done[2]))(run("help", typed)))
+        self.assertIn("known are: status top", run("xyzzy")[2])
+
+
+class Json(unittest.TestCase):
+    def test_verbs_without_answer_refuse_json_with_a_sentence(self):
+        for verb in WITHOUT_JSON:
+            for words in (("--json", verb), (verb, "--json")):
+                code, out, err = run(*words)
+                self.assertEqual((64, ""), (code, out), words)
+                self.assertRegex(err, r"^iwheelctl: .*json|JSON", verb)
+            self.assertNotIn("--json", listed(verb))
+            self.assertNotIn("[--json]", run("help", verb)[1])
+
+    def test_every_other_verb_offers_it(self):
+        for verb in set(verbs()) - WITHOUT_JSON:
+            self.assertIn("--json", listed(verb))
+            self.assertIn("[--json]", run("help", verb)[1])
+
+    def test_replay_tells_the_same_as_objects(self):
+        recording = os.path.join(ROOT, "test", "recordings", "estop.log")
+        code, text, _ = run("replay", recording)
+        self.assertEqual(0, code)
+        code, out, err = run("--json", "replay", recording)
+        self.assertEqual((0, ""), (code, err))
+        objects = [json.loads(line) for line in out.splitlines()]
+        told = [line for line in text.splitlines() if not line.startswith("#")]
+        timed = [entry for entry in objects if "t_us" in entry]
+        self.assertGreater(len(timed), 5)
+        for line, entry in zip(told, timed, strict=True):
+            self.assertTrue(line.endswith(entry["text"]), (line, entry))
+            self.assertEqual(line.split()[0], f"{entry['t_us'] // 1000000}.{entry['t_us'] % 1000000:06}")
+        self.assertEqual({"summary"}, {entry["event"] for entry in objects if "t_us" not in entry} - {"note"})
+        summary = objects[-1]
+        self.assertEqual("summary", summary["event"])
+        for name, what in (("setpoints", "setpoints on the bus"), ("states", "changes of state"), ("stops", "stops")):
+            score = summary["as_recorded"][name]
+            self.assertIn(f"# {what}: {score['same']} of {score['same'] + score['different']} as recorded", text)
+
+    def test_record_to_standard_output_cannot_be_json_as_well(self):
+        code, out, err = run("--json", "record", "-")
+        self.assertEqual((64, ""), (code, out))
+        self.assertIn("name a FILE", err)
+
+
+class Help(unittest.TestCase):
+    def test_help_of_a_verb_is_the_page_of_its_option(self):
+        for verb in verbs():
+            self.assertEqual(run(verb, "--help"), run("help", verb))
+        self.assertEqual(run("--help"), run("help"))
+
+    def test_no_help_is_wider_than_80_columns(self):
+        pages = [("iwheelctl", ("help",)), ("iwheel-gateway", ("--help",)), ("iwheel-sim", ("--help",)),
+                 *(("iwheelctl", ("help", verb)) for verb in verbs())]
+        for program, words in pages:
+            code, out, _ = run(*words, program=program)
+            self.assertEqual(0, code, (program, words))
+            self.assertGreater(out.count("\n"), 2)
+            for line in out.splitlines():
+                self.assertLessEqual(len(line), 80, (program, words, line))
+
+    def test_every_option_that_a_page_explains_stands_in_its_usage_and_is_understood(self):
+        for verb in verbs():
+            page = run("help", verb)[1]
+            explained = set(re.findall(r"^(--[a-z-]+)", page, re.MULTILINE))
+            usage = page.split("\n\n")[0]
+            self.assertEqual(explained, set(re.findall(r"--[a-z-]+", usage)) - {"--json", "--socket"}, verb)
+            for option in explained:
+                err = run("--socket", "/nonexistent", verb, option)[2]
+                self.assertNotRegex(err, f'does not understand "{option}"|no topic|unknown option', (verb, option))
+
+
+if __name__ == "__main__":
+    BUILD = sys.argv.pop(1)
+    unittest.main()

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// What every verb understands: durations, and words that are nearly right.
+#include "similar.h"
+#include "text/duration.h"
+
+#include "unity.h"
+
+void setUp(void) {}
+
+void tearDown(void) {}
+
+static void test_duration_in_every_unit_with_decimals_is_read(void) {
+    static const struct {
+        const char *text;
+        int64_t us;
+    } cases[] = {
+        {"500ms", 500000},     {"2s", 2000000}, {"1.5s", 1500000}, {"2min", 120000000}, {"1h", 3600000000},
+        {"0.25min", 15000000}, {"0.5ms", 500},  {"0s", 0},         {"1.125s", 1125000}, {"999999h", 3599996400000000},
+        {"007s", 7000000}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        int64_t us = -1;
+        TEST_ASSERT_TRUE_MESSAGE(duration_parse(cases[i].text, &us), cases[i].text);
+        TEST_ASSERT_EQUAL_INT64_MESSAGE(cases[i].us, us, cases[i].text);
+    }
+}
+
+static void test_duration_that_is_none_is_refused_and_touches_nothing(void) {
+    static const char *const cases[] = {"",        "2",    "s",        "2 s", "-1s",  "+1s", "1.s",
+                                        "1.2345s", ".5s",  "1,5s",     "2m",  "2sec", "2S",  "1.5.2s",
+                                        "1e3s",    "0x1s", "1234567s", "2s ", " 2s",  "infs"};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        int64_t us = 77;
+        TEST_ASSERT_FALSE_MESSAGE(duration_parse(cases[i], &us), cases[i]);
+        TEST_ASSERT_EQUAL_INT64(77, us);
+    }
+}
+
+static void test_duration_option_out_of_range_tells_the_range_as_it_is_written(void) {
+    static const duration_range_t range = {20000, 600000000};
+    char why[160];
+    int64_t us = 77;
+    TEST_ASSERT_TRUE(duration_option("--for", "10min", range, &us, why, sizeof why));
+    TEST_ASSERT_EQUAL_INT64(600000000, us);
+    TEST_ASSERT_TRUE(duration_option("--for", "20ms", range, &us, why, sizeof why));
+    TEST_ASSERT_FALSE(duration_option("--for", "19ms", range, &us, why, sizeof why));
+    TEST_ASSERT_EQUAL_STRING("--for 19ms is out of range; write 20ms to 10min", why);
+    TEST_ASSERT_FALSE(duration_option("--for", "600001ms", range, &us, why, sizeof why));
+    TEST_ASSERT_FALSE(duration_option("--for", NULL, range, &us, why, sizeof why));
+    TEST_ASSERT_EQUAL_STRING("--for wants a time with its unit, such as 500ms, 1.5s, 2min or 1h, not \"\"", why);
+    TEST_ASSERT_EQUAL_INT64(20000, us);
+}
+
+static void test_word_nearly_right_is_near_and_a_strange_one_is_not(void) {
+    TEST_ASSERT_EQUAL_size_t(0, gw_word_distance("stat", "status"));
+    TEST_ASSERT_EQUAL_size_t(1, gw_word_distance("staus", "status"));
+    TEST_ASSERT_EQUAL_size_t(2, gw_word_distance("hlep", "help"));
+    TEST_ASSERT_EQUAL_size_t(3, gw_word_distance("priod_m", "period_msx"));
+    TEST_ASSERT_EQUAL_size_t(GW_WORD_STRANGE, gw_word_distance("xyz", "top"));
+    TEST_ASSERT_EQUAL_size_t(GW_WORD_STRANGE, gw_word_distance("st", "status"));
+    TEST_ASSERT_EQUAL_size_t(GW_WORD_STRANGE, gw_word_distance("", "top"));
+    TEST_ASSERT_EQUAL_size_t(GW_WORD_STRANGE,
+                             gw_word_distance("period_msperiod_msperiod_msperiod_msperiod_ms", "period_ms"));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_duration_in_every_unit_with_decimals_is_read);
+    RUN_TEST(test_duration_that_is_none_is_refused_and_touches_nothing);
+    RUN_TEST(test_duration_option_out_of_range_tells_the_range_as_it_is_written);
+    RUN_TEST(test_word_nearly_right_is_near_and_a_strange_one_is_not);
+    return UNITY_END();
+}
