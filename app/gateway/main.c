@@ -118,15 +118,6 @@ static int run(gw_daemon_t *daemon) {
     return result;
 }
 
-static int check(gw_daemon_t *daemon) {
-    int result = open_hal(daemon);
-    if (result == 0) {
-        result = gw_report_check(daemon, stdout);
-        iw_linux_hal_close(&daemon->hal);
-    }
-    return result;
-}
-
 static int act(const gw_options_t *options, gw_daemon_t *daemon) {
     const int result = gw_options_configure(options, &daemon->config, stderr);
     if (result != 0) {
@@ -138,7 +129,7 @@ static int act(const gw_options_t *options, gw_daemon_t *daemon) {
     }
     json_arena_install();
     gw_log_open(&daemon->log, options->log_level);
-    const int code = options->action == GW_CHECK ? check(daemon) : run(daemon);
+    const int code = options->action == GW_CHECK ? gw_report_check(&daemon->config, stdout) : run(daemon);
     gw_log_close(&daemon->log);
     return code;
 }

@@ -7,6 +7,7 @@
 
 void inspect_begin(inspect_findings_t *self) {
     memset(self, 0, sizeof *self);
+    self->absent = INSPECT_FAIL;
 }
 
 void inspect_say(inspect_findings_t *self, const char *check, inspect_verdict_t verdict, const char *format, ...) {
@@ -37,7 +38,7 @@ void inspect_cure(inspect_findings_t *self, const char *format, ...) {
 
 const char *inspect_verdict_word(inspect_verdict_t verdict) {
     static const char *const words[INSPECT_VERDICTS] = {
-        [INSPECT_OK] = "ok", [INSPECT_WARN] = "warn", [INSPECT_FAIL] = "fail"};
+        [INSPECT_OK] = "ok", [INSPECT_WARN] = "warn", [INSPECT_FAIL] = "fail", [INSPECT_SKIP] = "skip"};
     return words[verdict];
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What was found out, one sentence each: ok, worth a warning, or wrong; and the command that mends it.
+/// What was found out, one sentence each: ok, worth a warning, wrong, or not to be looked at here; and the command that mends it.
 ///
 /// The owner fills a list by calling the judges (inspect.h) and its own code, and prints it as it likes. No heap.
 #ifndef INSPECT_FINDINGS_H
@@ -13,8 +13,9 @@
 #define INSPECT_TEXT_SIZE    320U
 #define INSPECT_CURE_SIZE    320U
 
-typedef enum { INSPECT_OK = 0, INSPECT_WARN, INSPECT_FAIL } inspect_verdict_t;
-#define INSPECT_VERDICTS 3U
+/// INSPECT_SKIP: this machine has not what there would be to look at.
+typedef enum { INSPECT_OK = 0, INSPECT_WARN, INSPECT_FAIL, INSPECT_SKIP } inspect_verdict_t;
+#define INSPECT_VERDICTS 4U
 
 typedef struct {
     const char *check; ///< What was looked at: a word of a closed list (docs/doctor.md).
@@ -28,6 +29,7 @@ typedef struct {
     unsigned count;
     unsigned lost;                    ///< That did not fit.
     unsigned total[INSPECT_VERDICTS]; ///< Of each verdict, those that did not fit too.
+    inspect_verdict_t absent;         ///< What a machine without CAN or GPIO gets: INSPECT_FAIL unless set otherwise.
 } inspect_findings_t;
 
 void inspect_begin(inspect_findings_t *self);
@@ -39,7 +41,7 @@ __attribute__((format(printf, 4, 5))) void inspect_say(inspect_findings_t *self,
 /// The cure of the finding added last.
 __attribute__((format(printf, 2, 3))) void inspect_cure(inspect_findings_t *self, const char *format, ...);
 
-/// "ok", "warn" or "fail".
+/// "ok", "warn", "fail" or "skip".
 const char *inspect_verdict_word(inspect_verdict_t verdict);
 
 /// True if a finding of that check failed.

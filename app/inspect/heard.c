@@ -22,7 +22,7 @@ unsigned inspect_message_of(uint32_t id) {
 }
 
 void inspect_heard_begin(inspect_heard_t *self) {
-    *self = (inspect_heard_t){.estop = -1, .worst = IW_BUS_ACTIVE};
+    *self = (inspect_heard_t){.estop = -1, .worst = IW_BUS_ACTIVE, .last = IW_BUS_ACTIVE};
 }
 
 static void note_stranger(inspect_heard_t *self, uint32_t id) {
@@ -66,6 +66,7 @@ static void look(iw_linux_hal_t *hal, iw_time_us_t now_us, bool counting, inspec
     const iw_bus_state_t state = functions.bus_state(functions.context);
     heard->was_up = heard->was_up || state >= IW_BUS_PASSIVE;
     heard->worst = state < heard->worst ? state : heard->worst;
+    heard->last = state;
     heard->estop = functions.estop_pressed(functions.context);
     while (functions.receive(functions.context, &frame) > 0) {
         if (counting) {

@@ -26,7 +26,8 @@ typedef struct {
     uint64_t bits;                          ///< Of all frames, without stuff bits.
     iw_time_us_t span_us;                   ///< How long was listened.
     bool was_up;                            ///< The bus took part in life at least for a moment.
-    iw_bus_state_t worst;                   ///< The worst state of the bus seen.
+    iw_bus_state_t worst;                   ///< The worst state of the bus seen ...
+    iw_bus_state_t last;                    ///< ... and the one at the end.
     int estop;                              ///< The last answer of the e-stop, as in iw_hal_t.
 } inspect_heard_t;
 

@@ -29,6 +29,7 @@ typedef struct {
     bool simulated;
     int level;           ///< As in iw_hal_t: 0 released, > 0 pressed, < 0 unreadable.
     const char *trouble; ///< Why it is unreadable, and what to do; may be empty.
+    bool no_gpio;        ///< It would be a line of a GPIO chip, and this machine has none.
 } inspect_estop_t;
 
 /// The same from an open HAL, as last asked.
@@ -42,5 +43,16 @@ const char *inspect_estop_trouble(const iw_linux_hal_t *hal);
 
 /// A bus or an e-stop that cannot be opened at all: `error` of iw_linux_hal_open.
 void inspect_unopened(const char *culprit, bool is_bus, int error, inspect_findings_t *findings);
+
+/// What could be opened.
+typedef struct {
+    bool hal; ///< At all: then it is to be closed.
+    bool bus;
+    bool estop;
+} inspect_opened_t;
+
+/// Opens bus and e-stop to look at them. What cannot be opened is told as a finding, and the other one is opened all the same.
+inspect_opened_t inspect_open(iw_linux_hal_t *hal, const char *bus, const iw_estop_wish_t *line,
+                              inspect_findings_t *findings);
 
 #endif

@@ -150,30 +150,39 @@ static void judge_load(const inspect_heard_t *heard, const inspect_wish_t *wish,
     }
 }
 
+/// The controller has left the bus: what it does not hear says nothing about wheels and cables.
+static void say_bus_off(const iw_bus_link_t *link, const char *bus, inspect_findings_t *findings) {
+    inspect_say(findings, "bus_state", INSPECT_FAIL, "bus %s: bus-off: too many errors, it takes no part any more",
+                bus);
+    if (link->presence == IW_LINK_LOCAL) {
+        inspect_cure(findings, "end it in the simulator: iwheel-sim busoff off");
+    } else {
+        inspect_cure(findings, "check cable, termination and bit rate, then: ip link set %s down; ip link set %s up",
+                     bus, bus);
+    }
+}
+
 /// False if nothing more can be said of the bus.
 static bool judge_life(const iw_bus_link_t *link, const inspect_heard_t *heard, const inspect_wish_t *wish,
                        inspect_findings_t *findings) {
     const char *bus = wish->name;
-    if (heard->was_up) {
-        if (link->presence == IW_LINK_LOCAL) {
-            inspect_say(findings, "interface", INSPECT_OK, "bus %s: up", bus);
-        }
-        if (heard->worst == IW_BUS_PASSIVE) {
-            inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: error passive: most frames go wrong", bus);
-            inspect_cure(findings, "check bit rate, sample point, termination; a wheel without power acknowledges "
-                                   "nothing");
-        }
-        return true;
-    }
-    if (link->presence == IW_LINK_LOCAL) {
+    const bool off = heard->last == IW_BUS_OFF || (!heard->was_up && link->presence == IW_LINK_UP);
+    if (link->presence == IW_LINK_LOCAL && (heard->was_up || off)) {
+        inspect_say(findings, "interface", INSPECT_OK, "bus %s: up", bus);
+    } else if (link->presence == IW_LINK_LOCAL) {
         inspect_say(findings, "interface", INSPECT_FAIL, "bus %s: nobody there", bus);
         inspect_cure(findings, "start the simulator: iwheel-sim --can %s", bus);
-    } else if (link->presence == IW_LINK_UP) {
-        inspect_say(findings, "bus_state", INSPECT_FAIL, "bus %s: bus-off", bus);
-        inspect_cure(findings, "check cable, termination and bit rate, then: ip link set %s down; ip link set %s up",
-                     bus, bus);
     }
-    return false;
+    if (off) {
+        say_bus_off(link, bus, findings);
+    } else if (heard->was_up && heard->worst == IW_BUS_OFF) {
+        inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: it was bus-off while it was listened to", bus);
+        inspect_cure(findings, "check cable, termination and bit rate");
+    } else if (heard->was_up && heard->worst == IW_BUS_PASSIVE) {
+        inspect_say(findings, "bus_state", INSPECT_WARN, "bus %s: error passive: most frames go wrong", bus);
+        inspect_cure(findings, "check bit rate, sample point, termination; a wheel without power acknowledges nothing");
+    }
+    return heard->was_up && !off;
 }
 
 void inspect_bus(const iw_bus_link_t *link, const inspect_heard_t *heard, const inspect_wish_t *wish,

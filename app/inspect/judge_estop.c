@@ -2,7 +2,18 @@
 #include "inspect.h"
 
 #include <errno.h>
+#include <glob.h>
 #include <string.h>
+
+/// A bus on which nobody ever is, to open an e-stop without one.
+#define NO_BUS "unix:/dev/null/none"
+
+static bool has_gpio(void) {
+    glob_t found;
+    const bool any = glob("/dev/gpiochip*", GLOB_NOSORT, NULL, &found) == 0;
+    globfree(&found);
+    return any;
+}
 
 const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
     const int trouble = iw_linux_hal_estop_trouble(hal);
@@ -14,7 +25,8 @@ const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
     }
     switch (trouble) {
     case ENOENT:
-        return "there is no such line; gpioinfo lists them";
+        return has_gpio() ? "there is no such line; gpioinfo lists them"
+                          : "this machine has no GPIO chip (/dev/gpiochip*): load its driver, or use another input";
     case EBUSY:
         return "the line is busy: another program has it; gpioinfo names that program";
     case EACCES:
@@ -32,6 +44,7 @@ inspect_estop_t inspect_estop_of(const iw_linux_hal_t *hal, const char *line) {
         .simulated = hal->estop_ops->simulated,
         .level = hal->estop_last,
         .trouble = inspect_estop_trouble(hal),
+        .no_gpio = hal->estop_ops->present && !hal->estop_ops->simulated && !has_gpio(),
     };
 }
 
@@ -40,7 +53,8 @@ void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings) {
         inspect_say(findings, "estop", INSPECT_WARN, "e-stop: none");
         inspect_cure(findings, "wire a button and set [estop] line");
     } else if (estop->level < 0) {
-        inspect_say(findings, "estop", INSPECT_FAIL, "e-stop %s: unreadable, which counts as pressed", estop->line);
+        inspect_say(findings, "estop", estop->no_gpio ? findings->absent : INSPECT_FAIL,
+                    "e-stop %s: unreadable, which counts as pressed", estop->line);
         inspect_cure(findings, "%s", estop->trouble);
     } else {
         inspect_say(findings, "estop", estop->simulated ? INSPECT_WARN : INSPECT_OK, "e-stop %s: %s%s", estop->line,
@@ -55,16 +69,32 @@ void inspect_unopened(const char *culprit, bool is_bus, int error, inspect_findi
     const char *check = is_bus ? "interface" : "estop";
     const char *what = is_bus ? "bus" : "e-stop";
     if (error == ENOTSUP) {
-        inspect_say(findings, check, INSPECT_FAIL,
+        inspect_say(findings, check, findings->absent,
                     "%s %s: %s was missing when this was built, so it %s only (unix:PATH)", what, culprit,
                     is_bus ? "libmnl" : "libgpiod",
                     is_bus ? "serves the simulator's bus" : "reads the simulator's button");
         inspect_cure(findings, "apt-get install %s, configure and build again", is_bus ? "libmnl-dev" : "libgpiod-dev");
     } else if (error == EAFNOSUPPORT && is_bus) {
-        inspect_say(findings, check, INSPECT_FAIL, "bus %s: this kernel has no CAN sockets", culprit);
+        inspect_say(findings, check, findings->absent, "bus %s: this kernel has no CAN sockets", culprit);
         inspect_cure(findings, "modprobe can_raw, or use the simulator's bus: --can unix:PATH");
     } else {
         inspect_say(findings, check, INSPECT_FAIL, "%s %s: %s", what, culprit, strerror(error));
         inspect_cure(findings, "correct %s", is_bus ? "[bus] interface or --can" : "[estop] line or --estop");
     }
+}
+
+inspect_opened_t inspect_open(iw_linux_hal_t *hal, const char *bus, const iw_estop_wish_t *line,
+                              inspect_findings_t *findings) {
+    const iw_estop_wish_t none = {.name = "none"};
+    inspect_opened_t opened = {.bus = true, .estop = true};
+    const char *culprit = NULL;
+    int error = iw_linux_hal_open(hal, bus, line, &culprit);
+    for (unsigned i = 0; i < 2U && error != 0; ++i) {
+        opened.bus = opened.bus && culprit != bus;
+        opened.estop = opened.estop && culprit == bus;
+        inspect_unopened(culprit, culprit == bus, error, findings);
+        error = iw_linux_hal_open(hal, opened.bus ? bus : NO_BUS, opened.estop ? line : &none, &culprit);
+    }
+    opened.hal = error == 0;
+    return opened;
 }

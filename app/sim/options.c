@@ -11,7 +11,7 @@
 #define AGE_MAX_ms INT64_C(86400000)
 
 static const char usage[] = "usage: iwheel-sim [OPTION]...           be two simulated wheels and their bus\n"
-                            "       iwheel-sim [--control PATH] COMMAND tell a running one, such as: power off\n"
+                            "       iwheel-sim [--control PATH] COMMAND tell a running one, like: power off\n"
                             "\n"
                             "  --can unix:PATH     the bus: a local socket that the gateway connects to\n"
                             "  --can IFACE         or a CAN interface, for example vcan0\n"

@@ -121,6 +121,24 @@ class Doctor(unittest.TestCase):
         self.assertIn("iwheelctl reset", checks["gateway"][0]["cure"])
         self.assertIn("pressed", checks["estop"][0]["text"])
 
+    def test_bus_off_and_error_passive_are_told_beside_a_gateway_too_and_no_cable_is_blamed(self):
+        for beside in (False, True):
+            if beside:
+                self.rig.start_gateway()
+            words = () if beside else self.button()
+            self.rig.sim.ask("busoff on")
+            code, checks, _ = self.doctor(*words)
+            self.assertEqual((1, ["fail"]), (code, self.verdict(checks, "bus_state")), (beside, checks))
+            self.assertIn("bus-off", checks["bus_state"][0]["text"])
+            self.assertNotIn("left_wheel", checks)
+            self.rig.sim.ask("busoff off")
+            self.assertEqual([], self.verdict(self.doctor(*words)[1], "bus_state"))
+        self.rig.sim.ask("passive on")
+        time.sleep(0.1)  # Told once: the doctor, who comes later, knows it from the gateway.
+        _, checks, _ = self.doctor()
+        self.assertEqual(["warn"], self.verdict(checks, "bus_state"), checks)
+        self.assertIn("error passive", checks["bus_state"][0]["text"])
+
     def test_guided_press_on_a_terminal(self):
         parent, child = pty.openpty()
         process = subprocess.Popen([find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"),
@@ -156,7 +174,7 @@ class Doctor(unittest.TestCase):
         self.assertEqual(["ok"], self.verdict(checks, "left_wheel"))
 
     def test_wrong_words(self):
-        for words, about in ((("--listen",), "--listen wants"), (("--listen", "0"), "0.2s to 60s"),
+        for words, about in ((("--listen",), "--listen wants"), (("--listen", "0s"), "200ms to 1min"),
                              (("--estop",), "wants a value"), (("a", "b"), "does not understand"),
                              (("--frobnicate",), "does not understand"), (("eth0/..",), "IFACE")):
             done = subprocess.run([find_program(BUILD, "iwheelctl"), "doctor", *words], capture_output=True, text=True,

@@ -186,13 +186,49 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
 }
 
 static void test_parse_numbers_with_anything_around_them_are_refused(void) {
-    static const char *const values[] = {"20ms", "20 ms", "0x14", "2e1", "20.0",   "+20", "--20",
-                                         "-",    "abc",   "20,",  "2 0", "\"20\"", "20\\"};
+    static const char *const values[] = {"20ms", "20 ms", "0x14", "2e1", "20.0", "+20",
+                                         "--20", "-",     "abc",  "20,", "2 0",  "20\\"};
     char text[64];
     for (size_t i = 0; i < sizeof(values) / sizeof(values[0]); i++) {
         snprintf(text, sizeof(text), "[drive]\nperiod_ms = %s\n", values[i]);
         refused(text, "iw.conf:2: period_ms = ", "write digits alone");
     }
+}
+
+/// Whatever the key, a value in quotes is refused with the cure, never taken with the quotes as part of it.
+static void test_parse_value_in_quotes_is_refused_for_every_key(void) {
+    gateway_config_t whole;
+    unsigned keys = 0;
+    gateway_config_default(&whole);
+    whole.core.setpoint_type_set = true;
+    whole.core.current_role = IW_ROLE_LIMIT;
+    char *const text = printed(&whole);
+    char section[64] = "";
+    for (char *line = strtok(text, "\n"); line != NULL; line = strtok(NULL, "\n")) {
+        static const char *const quotes[] = {"%s\n%s = \"%s\"\n", "%s\n%s = '%s'\n", "%s\n%s = %s\"\n"};
+        char key[64];
+        char value[128];
+        if (line[0] == '[') {
+            (void)snprintf(section, sizeof section, "%s", line);
+        }
+        if (line[0] == ';' || sscanf(line, "%63[a-z_0-9A-Z] = %127[^;]", key, value) != 2) {
+            continue;
+        }
+        for (size_t length = strlen(value); length > 0U && value[length - 1U] == ' '; --length) {
+            value[length - 1U] = '\0';
+        }
+        for (size_t i = 0; i < sizeof quotes / sizeof quotes[0]; ++i) {
+            char lines[320];
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+            (void)snprintf(lines, sizeof lines, quotes[i], section, key, value);
+#pragma GCC diagnostic pop
+            refused(lines, "iw.conf:2: ", "quotes would be part of the value; write it without them");
+        }
+        ++keys;
+    }
+    free(text);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT(38U, keys);
 }
 
 static void test_parse_lease_zero_says_that_it_cannot_be_disabled(void) {
@@ -490,6 +526,7 @@ int main(void) {
     RUN_TEST(test_parse_accepts_comments_indentation_crlf_and_bom);
     RUN_TEST(test_parse_range_ends_are_accepted_and_beyond_refused);
     RUN_TEST(test_parse_numbers_with_anything_around_them_are_refused);
+    RUN_TEST(test_parse_value_in_quotes_is_refused_for_every_key);
     RUN_TEST(test_parse_lease_zero_says_that_it_cannot_be_disabled);
     RUN_TEST(test_parse_words_other_than_the_listed_are_refused);
     RUN_TEST(test_parse_gear_ratio_forms);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "inspect.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <unity.h>
@@ -166,6 +167,43 @@ static void test_error_passive_bus_warns(void) {
     expect("bus_state", INSPECT_WARN, "error passive", "termination");
 }
 
+static void test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because_of_it(void) {
+    const iw_bus_link_t link = {.presence = IW_LINK_UP};
+    heard.was_up = true; // Before it went off, or before its first error frame came.
+    heard.worst = IW_BUS_OFF;
+    heard.last = IW_BUS_OFF;
+    inspect_bus(&link, &heard, &wish, &findings);
+    expect("bus_state", INSPECT_FAIL, "bus-off", "ip link set can0 down; ip link set can0 up");
+    TEST_ASSERT_NULL(find("left_wheel"));
+    inspect_begin(&findings);
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("bus_state", INSPECT_FAIL, "bus-off", "iwheel-sim busoff off");
+    TEST_ASSERT_NULL(find("left_wheel"));
+}
+
+static void test_bus_off_that_is_over_warns_and_the_wheels_are_judged(void) {
+    hear_healthy();
+    heard.worst = IW_BUS_OFF;
+    inspect_bus(&local, &heard, &wish, &findings);
+    expect("bus_state", INSPECT_WARN, "it was bus-off", "termination");
+    expect("left_wheel", INSPECT_OK, "left wheel", "");
+}
+
+static void test_what_a_machine_cannot_have_gets_the_verdict_asked_for(void) {
+    const inspect_estop_t estop = {
+        .line = "ESTOP", .present = true, .level = -1, .trouble = "no chip", .no_gpio = true};
+    findings.absent = INSPECT_SKIP;
+    inspect_estop(&estop, &findings);
+    expect("estop", INSPECT_SKIP, "unreadable", "no chip");
+    inspect_unopened("can0", true, EAFNOSUPPORT, &findings);
+    expect("interface", INSPECT_SKIP, "no CAN sockets", "modprobe can_raw");
+    inspect_begin(&findings);
+    inspect_estop(&estop, &findings);
+    inspect_unopened("can0", true, EAFNOSUPPORT, &findings);
+    TEST_ASSERT_EQUAL_UINT(2U, findings.total[INSPECT_FAIL]);
+    TEST_ASSERT_EQUAL_STRING("skip", inspect_verdict_word(INSPECT_SKIP));
+}
+
 static void test_right_link_has_nothing_to_mend(void) {
     const iw_bus_link_t link = {.presence = IW_LINK_UP,
                                 .echo_proven = true,
@@ -261,6 +299,9 @@ int main(void) {
     RUN_TEST(test_full_bus_warns);
     RUN_TEST(test_bus_that_never_lived_says_nothing_of_wheels);
     RUN_TEST(test_error_passive_bus_warns);
+    RUN_TEST(test_bus_off_is_told_and_nothing_is_blamed_that_is_not_heard_because_of_it);
+    RUN_TEST(test_bus_off_that_is_over_warns_and_the_wheels_are_judged);
+    RUN_TEST(test_what_a_machine_cannot_have_gets_the_verdict_asked_for);
     RUN_TEST(test_right_link_has_nothing_to_mend);
     RUN_TEST(test_each_fault_of_the_link_has_its_command);
     RUN_TEST(test_wrong_timing_only_warns_where_it_is_configured_so);

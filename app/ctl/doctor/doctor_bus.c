@@ -1,11 +1,34 @@
 // SPDX-License-Identifier: MIT
 // What the gateway tells, and what is heard on the bus.
+#include "assumption.h"
 #include "doctor.h"
+#include "names.h"
 #include "text/text.h"
 
 #include <grp.h>
 #include <string.h>
 #include <sys/stat.h>
+
+static bool forces_known(const json_t *status) {
+    return json_is_integer(json_object_get(json_object_get(status, "left"), "force_net_mN")) &&
+           json_is_integer(json_object_get(json_object_get(status, "right"), "force_net_mN"));
+}
+
+static void say_contradicted(doctor_t *self, const char *name, const json_t *entry) {
+    iw_ledger_item_t item = IW_LEDGER_ITEMS; // An item of a gateway newer than we are.
+    const bool known = gw_assumption_of(name, &item);
+    const bool tared = known && item == IW_LEDGER_OFFSET_INCLUDED && forces_known(self->gateway.status);
+    const bool harmless = known && item == IW_LEDGER_DLC;
+    inspect_say(&self->findings, "ledger",
+                tared      ? INSPECT_OK
+                : harmless ? INSPECT_WARN
+                           : INSPECT_FAIL,
+                "assumption %s is contradicted: %s%s", name, text_word(entry, "reason"),
+                tared ? "; the tare has settled it" : "");
+    if (!tared) {
+        inspect_cure(&self->findings, "%s", gw_assumption_cure(item));
+    }
+}
 
 static void list_contradicted(doctor_t *self, json_t *ledger) {
     const char *name = NULL;
@@ -17,9 +40,7 @@ static void list_contradicted(doctor_t *self, json_t *ledger) {
         assumed += strcmp(state, "assumed") == 0 ? 1U : 0U;
         confirmed += strcmp(state, "confirmed") == 0 ? 1U : 0U;
         if (strcmp(state, "contradicted") == 0) {
-            inspect_say(&self->findings, "ledger", INSPECT_FAIL, "assumption %s is contradicted by the %s", name,
-                        text_word(entry, "evidence"));
-            inspect_cure(&self->findings, "see: iwheelctl status; settle it with: iwheelctl bringup");
+            say_contradicted(self, name, entry);
         }
     }
     if (assumed + confirmed > 0U) {
@@ -106,20 +127,31 @@ static bool is_occupied(const doctor_t *self) {
     return result == NEAR_FOUND || result == NEAR_DENIED || result == NEAR_MUTE;
 }
 
+/// False if there is no bus to listen to.
 static bool open_hal(doctor_t *self) {
     const iw_estop_wish_t line = {.name = is_occupied(self) ? "none" : self->config.estop.line,
                                   .active_high = self->config.estop.active_high,
                                   .debounce_ms = self->config.estop.debounce_ms};
-    const iw_estop_wish_t none = {.name = "none"};
-    const char *culprit = NULL;
-    int error = iw_linux_hal_open(&self->hal, self->bus, &line, &culprit);
-    if (error != 0) {
-        inspect_unopened(culprit, culprit == self->bus, error, &self->findings);
-        // Without the e-stop there is still the bus to be looked at.
-        error = culprit == self->bus ? error : iw_linux_hal_open(&self->hal, self->bus, &none, &culprit);
+    const inspect_opened_t opened = inspect_open(&self->hal, self->bus, &line, &self->findings);
+    self->open = opened.hal;
+    return opened.hal && opened.bus;
+}
+
+/// What the gateway has known longer than we listen: a controller tells error passive once, when it becomes so.
+static void hear_gateway(doctor_t *self) {
+    if (!has_gateway(self)) {
+        return;
     }
-    self->open = error == 0;
-    return self->open;
+    json_t *const status = near_ask(self->ctl, json_pack("{s:s}", "cmd", "status"));
+    const char *name = text_word(json_object_get(status, "bus"), "state");
+    for (unsigned i = IW_BUS_OFF; i <= (unsigned)IW_BUS_PASSIVE; i++) {
+        const iw_bus_state_t state = (iw_bus_state_t)i;
+        if (strcmp(name, gw_bus_state_name(state)) == 0) {
+            self->heard.worst = state < self->heard.worst ? state : self->heard.worst;
+            self->heard.last = state < self->heard.last ? state : self->heard.last;
+        }
+    }
+    json_decref(status);
 }
 
 inspect_estop_t doctor_estop(doctor_t *self) {
@@ -154,6 +186,7 @@ void doctor_look_at_bus(doctor_t *self) {
         return;
     }
     inspect_listen(&self->hal, (iw_time_us_t)self->listen_ms * IW_US_PER_MS, &self->heard);
+    hear_gateway(self);
     inspect_link(iw_linux_hal_link(&self->hal), &wish, &self->findings);
     inspect_bus(iw_linux_hal_link(&self->hal), &self->heard, &wish, &self->findings);
     if (has_gateway(self) ||

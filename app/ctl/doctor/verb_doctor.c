@@ -131,7 +131,7 @@ static void print_text(const paper_t *paper, tone_t tone, const char *text) {
 }
 
 void doctor_print(const doctor_t *self, unsigned first) {
-    static const tone_t tones[] = {TONE_GOOD, TONE_CARE, TONE_BAD};
+    static const tone_t tones[] = {TONE_GOOD, TONE_CARE, TONE_BAD, TONE_FAINT};
     const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
     for (unsigned i = first; i < self->findings.count; i++) {
         const inspect_finding_t *finding = &self->findings.finding[i];

@@ -80,7 +80,7 @@ static void note_warnings(gw_daemon_t *daemon) {
     note_left_behind(daemon);
     inspect_findings_t findings;
     inspect_begin(&findings);
-    const inspect_wish_t wish = gw_bus_facts_wish(daemon);
+    const inspect_wish_t wish = gw_bus_facts_wish(&daemon->config);
     inspect_link(iw_linux_hal_link(hal), &wish, &findings);
     for (unsigned i = 0; i < findings.count; ++i) {
         if (findings.finding[i].verdict != INSPECT_OK) {
@@ -125,11 +125,11 @@ void gw_bus_facts_follow(gw_daemon_t *daemon) {
     log_purge(daemon, link->purge);
 }
 
-inspect_wish_t gw_bus_facts_wish(const gw_daemon_t *daemon) {
+inspect_wish_t gw_bus_facts_wish(const gateway_config_t *config) {
     return (inspect_wish_t){
-        .name = daemon->config.bus.interface,
-        .bitrate_hz = daemon->config.bus.bitrate,
-        .sample_point_permille = daemon->config.bus.sample_point_permille,
-        .refuses = daemon->config.bus.on_mismatch == GATEWAY_MISMATCH_REFUSE,
+        .name = config->bus.interface,
+        .bitrate_hz = config->bus.bitrate,
+        .sample_point_permille = config->bus.sample_point_permille,
+        .refuses = config->bus.on_mismatch == GATEWAY_MISMATCH_REFUSE,
     };
 }

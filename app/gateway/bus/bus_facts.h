@@ -13,6 +13,6 @@ void gw_bus_facts_follow(gw_daemon_t *daemon);
 const char *gw_bus_facts_timing(const gw_daemon_t *daemon);
 
 /// What the configuration wants the bus to be.
-inspect_wish_t gw_bus_facts_wish(const gw_daemon_t *daemon);
+inspect_wish_t gw_bus_facts_wish(const gateway_config_t *config);
 
 #endif

@@ -211,11 +211,22 @@ static bool parse_text(const config_key_t *row, const char *text, gateway_config
     return true;
 }
 
+static bool is_quote(char c) {
+    return c == '"' || c == '\'';
+}
+
+static bool is_quoted(const char *text) {
+    return is_quote(text[0]) || is_quote(text[strlen(text) - 1U]);
+}
+
 bool config_value_parse(const config_key_t *row, const char *text, gateway_config_t *config, char *out_why) {
     uint32_t number = 0;
     bool good = false;
     if (text[0] == '\0') {
         return wrong(out_why, "%s has no value; write one, or leave the key out to have its default", row->key);
+    }
+    if (is_quoted(text)) {
+        return wrong(out_why, "%s = %.130s: quotes would be part of the value; write it without them", row->key, text);
     }
     switch (row->kind) {
     case CONFIG_NUMBER:

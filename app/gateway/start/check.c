@@ -2,8 +2,13 @@
 #include "report.h"
 
 #include "bus/bus_facts.h"
+#include "clients/listener.h"
 
+#include <errno.h>
+#include <grp.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <sysexits.h>
 #include <unistd.h>
 
 /// How long the bus is listened to: ten periods of the slowest frame that always comes.
@@ -18,7 +23,7 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
                     config->core.setpoint_type_set ? "" : "setpoint_type",
                     !config->core.setpoint_type_set && config->core.current_role == IW_ROLE_UNSET ? " and " : "",
                     config->core.current_role == IW_ROLE_UNSET ? "current_role" : "");
-        inspect_cure(findings, "set it under [wheels] in the configuration");
+        inspect_cure(findings, "set it under [wheels] in the configuration; unknown: iwheelctl bringup finds it");
     }
     const iw_stop_budget_t budget = iw_config_stop_budget(&config->core);
     inspect_say(findings, "budget", INSPECT_OK,
@@ -27,36 +32,132 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
                 (unsigned)budget.killed_mm);
 }
 
-static void judge_socket(const gateway_config_t *config, inspect_findings_t *findings) {
-    char directory[GATEWAY_PATH_SIZE];
-    const char *path = config->northbound.socket;
-    const char *slash = strrchr(path, '/');
-    (void)snprintf(directory, sizeof directory, "%.*s", slash == NULL ? 1 : (int)(slash - path) + 1,
+/// Whether files can be made in a directory, or it can be made itself, by who looks.
+static bool judge_directory(const char *check, const char *path, inspect_findings_t *findings) {
+    char above[GATEWAY_PATH_SIZE];
+    struct stat status;
+    const char *const slash = strrchr(path, '/');
+    const char *const key = strcmp(check, "record") == 0 ? "[record] directory" : "[northbound] socket";
+    (void)snprintf(above, sizeof above, "%.*s",
+                   slash == NULL   ? 1
+                   : slash == path ? 1
+                                   : (int)(slash - path),
                    slash == NULL ? "." : path);
-    if (access(directory, W_OK | X_OK) == 0) {
-        inspect_say(findings, "socket", INSPECT_OK, "socket %s: its directory is there", path);
+    const bool there = stat(path, &status) == 0;
+    if (there && !S_ISDIR(status.st_mode)) {
+        inspect_say(findings, check, INSPECT_FAIL, "%s: %s is no directory", check, path);
+        inspect_cure(findings, "correct %s in the configuration", key);
+    } else if (!there && errno == ENOENT && access(above, W_OK | X_OK) == 0) {
+        inspect_say(findings, check, INSPECT_OK, "%s: directory %s will be made", check, path);
+        return true;
+    } else if (!there) {
+        inspect_say(findings, check, INSPECT_FAIL, "%s: directory %s: %s, and uid %u cannot make it", check, path,
+                    strerror(errno), (unsigned)geteuid());
+        inspect_cure(findings, "make it: sudo mkdir -p %s; sudo chown %u %s", path, (unsigned)geteuid(), path);
+    } else if (access(path, W_OK | X_OK) != 0) {
+        inspect_say(findings, check, INSPECT_FAIL, "%s: directory %s cannot be written by uid %u", check, path,
+                    (unsigned)geteuid());
+        inspect_cure(findings, "sudo chown %u %s (or check as the user whom the service has)", (unsigned)geteuid(),
+                     path);
     } else {
-        inspect_say(findings, "socket", INSPECT_FAIL, "socket %s: its directory cannot be written", path);
-        inspect_cure(findings, "make it: mkdir -p %s", directory);
+        inspect_say(findings, check, INSPECT_OK, "%s: directory %s can be written", check, path);
+        return true;
+    }
+    return false;
+}
+
+/// What the start would refuse. The directory must be there, or it would be made.
+static void judge_safety(const gateway_config_t *config, inspect_findings_t *findings) {
+    char text[INSPECT_TEXT_SIZE] = "";
+    FILE *const memory = fmemopen(text, sizeof text, "w");
+    if (memory == NULL) {
+        return;
+    }
+    const int result = gw_listener_prepare(config, memory);
+    (void)fclose(memory);
+    if (result != 0) {
+        const char *const ours = "iwheel-gateway: ";
+        char *const what = strncmp(text, ours, strlen(ours)) == 0 ? text + strlen(ours) : text;
+        char *const cure = strstr(what, "; ");
+        what[strcspn(what, "\n")] = '\0';
+        if (cure != NULL) {
+            *cure = '\0';
+        }
+        inspect_say(findings, "socket", INSPECT_FAIL, "%s", what);
+        inspect_cure(findings, "%s", cure != NULL ? cure + 2 : "choose another with --socket");
     }
 }
 
-int gw_report_check(gw_daemon_t *daemon, FILE *out) {
-    inspect_findings_t findings;
+static void judge_rights(const gateway_config_t *config, inspect_findings_t *findings) {
+    const char *const group = config->northbound.group;
+    const bool grouped = strcmp(group, "none") != 0;
+    if (grouped && getgrnam(group) == NULL) {
+        inspect_say(findings, "group", INSPECT_WARN,
+                    "group %s does not exist: the socket keeps the gateway's own group", group);
+        inspect_cure(findings, "sudo groupadd --system %s, or set [northbound] group to another, or to none", group);
+    } else if (grouped) {
+        inspect_say(findings, "group", INSPECT_OK, "group %s may use the socket", group);
+    }
+    if ((config->northbound.mode & S_IWOTH) != 0U) {
+        inspect_say(findings, "mode", INSPECT_WARN, "socket mode %04o: everybody on this machine may move the wheels",
+                    (unsigned)config->northbound.mode);
+        inspect_cure(findings, "set [northbound] mode = 0660");
+    }
+}
+
+static void judge_files(const gateway_config_t *config, inspect_findings_t *findings) {
+    char directory[GATEWAY_PATH_SIZE];
+    const char *const path = config->northbound.socket;
+    const char *const slash = strrchr(path, '/');
+    (void)snprintf(directory, sizeof directory, "%.*s",
+                   slash == NULL   ? 1
+                   : slash == path ? 1
+                                   : (int)(slash - path),
+                   slash == NULL ? "." : path);
+    if (judge_directory("socket", directory, findings) && access(directory, F_OK) == 0) {
+        judge_safety(config, findings);
+    }
+    judge_rights(config, findings);
+    (void)judge_directory("record", config->record.directory, findings);
+}
+
+/// The bus and the e-stop, as far as they can be opened.
+static void judge_machine(const gateway_config_t *config, inspect_findings_t *findings) {
+    static iw_linux_hal_t hal;
     inspect_heard_t heard;
+    const iw_estop_wish_t line = {
+        .name = config->estop.line, .active_high = config->estop.active_high, .debounce_ms = config->estop.debounce_ms};
+    const inspect_wish_t wish = gw_bus_facts_wish(config);
+    const inspect_opened_t opened = inspect_open(&hal, config->bus.interface, &line, findings);
+    if (!opened.hal) {
+        return;
+    }
+    inspect_listen(&hal, LISTEN_US, &heard);
+    if (opened.bus) {
+        inspect_link(iw_linux_hal_link(&hal), &wish, findings);
+        inspect_bus(iw_linux_hal_link(&hal), &heard, &wish, findings);
+    }
+    if (opened.estop) {
+        const inspect_estop_t estop = inspect_estop_of(&hal, config->estop.line);
+        inspect_estop(&estop, findings);
+    }
+    iw_linux_hal_close(&hal);
+}
+
+int gw_report_check(const gateway_config_t *config, FILE *out) {
+    inspect_findings_t findings;
     char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
-    const inspect_wish_t wish = gw_bus_facts_wish(daemon);
     inspect_begin(&findings);
-    inspect_listen(&daemon->hal, LISTEN_US, &heard);
-    judge_config(&daemon->config, &findings);
-    judge_socket(&daemon->config, &findings);
-    inspect_link(iw_linux_hal_link(&daemon->hal), &wish, &findings);
-    inspect_bus(iw_linux_hal_link(&daemon->hal), &heard, &wish, &findings);
-    const inspect_estop_t estop = inspect_estop_of(&daemon->hal, daemon->config.estop.line);
-    inspect_estop(&estop, &findings);
+    findings.absent = INSPECT_SKIP;
+    judge_config(config, &findings);
+    judge_files(config, &findings);
+    judge_machine(config, &findings);
     for (unsigned i = 0; i < findings.count; ++i) {
         inspect_sentence(&findings.finding[i], sentence, sizeof sentence);
         (void)fprintf(out, "%-4s %s\n", inspect_verdict_word(findings.finding[i].verdict), sentence);
     }
-    return findings.total[INSPECT_FAIL] > 0U ? 1 : 0;
+    return inspect_has_failed(&findings, "config") ? EX_CONFIG
+           : findings.total[INSPECT_FAIL] > 0U     ? 1
+           : findings.total[INSPECT_SKIP] > 0U     ? EX_UNAVAILABLE
+                                                   : 0;
 }

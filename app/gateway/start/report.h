@@ -11,8 +11,9 @@ void gw_report_start(gw_daemon_t *daemon);
 /// A bus or e-stop that cannot be opened: cause and cure.
 void gw_report_unopened(const gateway_config_t *config, const char *culprit, int error, FILE *err);
 
-/// Lines "ok", "warn" or "fail" on `out`, each with what mends it; listens to the bus for half a second, sends
-/// nothing. 0, or 1 if something failed.
-int gw_report_check(gw_daemon_t *daemon, FILE *out);
+/// Lines "ok", "warn", "fail" or "skip" on `out`, each with what mends it; listens to the bus for half a second, sends and makes
+/// nothing. EX_CONFIG if the configuration has to be changed; else 1 if something failed; else EX_UNAVAILABLE if something could
+/// not be looked at on this machine; else 0.
+int gw_report_check(const gateway_config_t *config, FILE *out);
 
 #endif

@@ -268,3 +268,33 @@ const char *gw_assumption_cost(iw_ledger_item_t item) {
     };
     return (unsigned)item < IW_LEDGER_ITEMS ? costs[item] : "unknown";
 }
+
+const char *gw_assumption_cure(iw_ledger_item_t item) {
+    static const char *const cures[IW_LEDGER_ITEMS] = {
+        [IW_LEDGER_SETPOINT_TYPE] =
+            "correct setpoint_type under [wheels] (iwheelctl bringup finds it), then: systemctl "
+            "restart iwheel-gateway",
+        [IW_LEDGER_CURRENT_ROLE] = "correct current_role under [wheels], then: systemctl restart iwheel-gateway",
+        [IW_LEDGER_FORCE_UNIT_LEFT] = "correct force_unit under [left], then: systemctl restart iwheel-gateway",
+        [IW_LEDGER_FORCE_UNIT_RIGHT] = "correct force_unit under [right], then: systemctl restart iwheel-gateway",
+        [IW_LEDGER_OFFSET_INCLUDED] = "unload both wheels, then: iwheelctl tare",
+        [IW_LEDGER_FEEDBACK_SIGN_LEFT] =
+            "see why the left wheel turned against its command, then: iwheelctl confirm feedback_sign_left",
+        [IW_LEDGER_FEEDBACK_SIGN_RIGHT] =
+            "see why the right wheel turned against its command, then: iwheelctl confirm feedback_sign_right",
+        [IW_LEDGER_MOUNT_SIGN_LEFT] = "correct invert under [left], then: systemctl restart iwheel-gateway",
+        [IW_LEDGER_MOUNT_SIGN_RIGHT] = "correct invert under [right], then: systemctl restart iwheel-gateway",
+        [IW_LEDGER_WHEEL_RADIUS] = "correct radius_mm under [wheels], then: systemctl restart iwheel-gateway",
+        [IW_LEDGER_TRACK] = "correct track_mm under [wheels] (iwheelctl bringup measures it), then: systemctl restart "
+                            "iwheel-gateway",
+        [IW_LEDGER_GEAR_RATIO] = "correct gear_ratio or rpm_of under [wheels], then: systemctl restart iwheel-gateway",
+        [IW_LEDGER_POSE_BYTE_ORDER] =
+            "the pose is lost, all else works; send us a recording (iwheelctl record), and if "
+            "it came from another device: iwheelctl confirm pose_byte_order",
+        [IW_LEDGER_DLC] =
+            "find the device that sends on the wheels' ids (iwheelctl doctor, iwheelctl watch frame); when "
+            "it is gone: iwheelctl confirm dlc",
+    };
+    const char *cure = (unsigned)item < IW_LEDGER_ITEMS ? cures[item] : NULL;
+    return cure != NULL ? cure : "settle it: iwheelctl ledger tells what it is about, iwheelctl confirm what is right";
+}

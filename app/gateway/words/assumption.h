@@ -56,4 +56,7 @@ void gw_assumption_evidence(iw_ledger_item_t item, const iw_ledger_entry_t *entr
 /// What a contradiction of it disables, and what mends it.
 const char *gw_assumption_cost(iw_ledger_item_t item);
 
+/// What settles a contradiction, with the command that does it. For any value.
+const char *gw_assumption_cure(iw_ledger_item_t item);
+
 #endif
