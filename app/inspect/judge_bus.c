@@ -117,11 +117,8 @@ static void judge_strangers(const inspect_heard_t *heard, const inspect_wish_t *
     }
     inspect_say(findings, "unknown_ids", INSPECT_WARN, "%" PRIu32 " frames are none of the wheels': %s%s",
                 heard->strange, list, heard->strange_ids == INSPECT_STRANGERS ? " ..." : "");
-    if (strncmp(wish->name, "unix:", 5U) == 0) {
-        inspect_cure(findings, "look at them with: iwheelctl watch frame");
-    } else {
-        inspect_cure(findings, "find out who sends them: candump %s", wish->name);
-    }
+    inspect_cure(findings, "find out who sends them: iwheelctl record - --can %s --for 2s | iwheelctl decode",
+                 wish->name);
 }
 
 static void judge_damage(const inspect_heard_t *heard, inspect_findings_t *findings) {

@@ -180,8 +180,15 @@ static void say_latched(const wording_t *self) {
 
 static void say_bus_down(const wording_t *self) {
     const gw_daemon_t *daemon = self->daemon;
-    SAY(self, "bus %s is %s; bring it up (simulated: iwheel-sim --can %s)", daemon->config.bus.interface,
-        gw_bus_state_name(daemon->gateway.bus), daemon->config.bus.interface);
+    const char *bus = daemon->config.bus.interface;
+    const bool local = iw_linux_hal_link(&daemon->hal)->presence == IW_LINK_LOCAL;
+    const bool off = daemon->gateway.bus == IW_BUS_OFF;
+    SAY(self, "bus %s is %s; %s%s", bus, gw_bus_state_name(daemon->gateway.bus),
+        local && off ? "end it in the simulator: iwheel-sim busoff off"
+        : local      ? "start the simulator: iwheel-sim --can "
+        : off        ? "check cable, termination and bit rate; what else: iwheelctl doctor "
+                     : "bring it up; how: iwheelctl doctor ",
+        local && off ? "" : bus);
 }
 
 static void say_timing(const wording_t *self) {

@@ -291,9 +291,8 @@ const char *gw_assumption_cure(iw_ledger_item_t item) {
         [IW_LEDGER_POSE_BYTE_ORDER] =
             "the pose is lost, all else works; send us a recording (iwheelctl record), and if "
             "it came from another device: iwheelctl confirm pose_byte_order",
-        [IW_LEDGER_DLC] =
-            "find the device that sends on the wheels' ids (iwheelctl doctor, iwheelctl watch frame); when "
-            "it is gone: iwheelctl confirm dlc",
+        [IW_LEDGER_DLC] = "find the device that sends on the wheels' ids (iwheelctl watch frame shows them); when "
+                          "it is gone: iwheelctl confirm dlc",
     };
     const char *cure = (unsigned)item < IW_LEDGER_ITEMS ? cures[item] : NULL;
     return cure != NULL ? cure : "settle it: iwheelctl ledger tells what it is about, iwheelctl confirm what is right";
