@@ -86,6 +86,7 @@ class WithWheels(unittest.TestCase):
         self.rig = Rig(BUILD)
         self.addCleanup(self.rig.close)
         self.rig.start_gateway()
+        self.drives = []
 
     def top(self, *size, **more):
         top = Top(self.rig.path("gateway.sock"), *size, **more)
@@ -98,6 +99,7 @@ class WithWheels(unittest.TestCase):
                                    stderr=subprocess.DEVNULL)
         self.addCleanup(process.wait)
         self.addCleanup(process.terminate)
+        self.drives.append(process)
         return process
 
     def see_driving(self, top):
@@ -169,6 +171,76 @@ class WithWheels(unittest.TestCase):
                 self.assertTrue(any("mm/s" in row for row in screen), (columns, rows, screen))
             if columns >= 20 and rows >= 4:
                 self.assertTrue(any("SPACE stop" in row for row in screen), (columns, rows, screen))
+        self.assertEqual(0, top.end())
+
+    def test_40_columns_have_whole_lines_not_the_beginnings_of_long_ones(self):
+        top = self.top(40, 24)
+        rows = top.wait_for("LEDGER")
+        for text in ("e-stop released (SIMULATED)", " LISTENING ", "SPACE stop  E e-stop  R reset  Q quit", "worst --"):
+            self.assertTrue(any(text in row for row in rows), (text, rows))
+        together = " ".join(" ".join(rows).split())
+        for text in ("ready: iwheelctl drive LEFT RIGHT (mm/s) arms and MOVES the wheels", "no stop since the gateway started",
+                     "STOP at most", "no button of this machine stops the wheels"):
+            self.assertIn(text, together)
+        for row in rows:  # Up to the margin only where a sentence goes on.
+            self.assertFalse(len(row.rstrip()) == 40 and not row.startswith((" iWheel", " LEFT", " RIGHT")), row)
+        self.rig.sim.ask("estop press")
+        top.wait_for("LATCHED")
+        self.assertIn("release the e-stop button (or mend its wire), then: iwheelctl reset", " ".join(" ".join(top.look(0.5)).split()))
+        self.assertEqual(0, top.end())
+
+    @staticmethod
+    def dots(top, rows, columns):
+        """How many cells of a part of the screen have dots of a plot."""
+        lines = top.look()[rows[0]:rows[1]]
+        return sum(0x2800 < ord(c) < 0x2900 or c == "*" for line in lines for c in line[columns[0]:columns[1]])
+
+    def test_large_terminals_show_speed_and_force_of_the_last_minute(self):
+        for size, more in (((200, 60), {}), ((80, 60), {}), ((80, 60), {"LANG": "C", "TERM": "vt220"})):  # pyte knows no REP, xterm has it.
+            top = self.top(*size, **more)
+            rows = top.wait_for("LEFT speed, mm/s")
+            for text in ("RIGHT speed, mm/s", "LEFT force, N", "RIGHT force, N", "60 s ago", "now", "SPACE stop"):
+                self.assertTrue(any(text in row for row in rows), (text, rows))
+            self.rig.sim.ask("load both 60")
+            self.see_driving(top) if not more else top.look(1)
+            top.look(1.5)
+            begin = next(i for i, row in enumerate(rows) if "LEFT speed" in row)
+            wide = (8, 98) if size[0] == 200 else (8, 80)
+            self.assertGreater(self.dots(top, (begin, begin + 7), wide), 2, "\n".join(top.look()))
+            if more:
+                self.assertTrue(all(ord(c) < 128 for row in top.look() for c in row))
+            elif size[0] == 200:
+                self.assertTrue(any("-500" in row[100:] or "-200" in row[100:] for row in top.look()), "right: backwards too")
+                force = next(i for i, row in enumerate(rows) if "LEFT force" in row)
+                self.assertTrue(any("+50 " in row or "+100 " in row for row in top.look()[force:]), top.look())
+            self.assertEqual(0, top.end())
+            self.rig.sim.ask("load both 0")
+            for process in self.drives:
+                process.terminate()
+                process.wait()
+
+    def test_where_there_is_no_room_there_is_no_plot(self):
+        top = self.top(80, 24)
+        self.assertFalse(any("last minute" in row or "60 s ago" in row for row in top.wait_for("LEDGER")))
+        top.resize(80, 36)
+        rows = top.wait_for("LEFT speed")
+        self.assertFalse(any("force, N" in row for row in rows), "speed before force")
+        self.assertEqual(0, top.end())
+
+    def test_time_without_a_gateway_is_a_gap_not_a_line(self):
+        top = self.top(200, 60)
+        rows = top.wait_for("LEFT speed")
+        begin = next(i for i, row in enumerate(rows) if "LEFT speed" in row)
+        top.look(2.0)
+        before = self.dots(top, (begin, begin + 17), (8, 98))
+        self.rig.kill_gateway(signal.SIGKILL)
+        top.wait_for("waiting for it to come back")
+        top.look(3.0)
+        self.rig.start_gateway()
+        top.wait_for("LEFT speed")
+        line = next(row for row in top.look(1.0)[begin:] if row[8:98].strip("\u00b7 ") and "speed" not in row)[8:98]
+        self.assertGreater(before, 0)
+        self.assertRegex(line, "[\u2801-\u28ff]\u00b7+[\u2801-\u28ff]", line)
         self.assertEqual(0, top.end())
 
     def test_it_waits_for_a_gateway_that_went_and_comes(self):
@@ -266,8 +338,28 @@ class WithoutWheels(unittest.TestCase):
         self.assertIn("iwheelctl status", done.stderr)
         operator = Operator([find_program(BUILD, "iwheelctl"), "top"], environment(TERM="no-such-thing"))
         self.addCleanup(operator.close)
-        operator.expect("is not known here")
+        operator.expect("nothing can be drawn on this terminal")
         self.assertEqual(64, operator.wait())
+
+    def test_dumb_terminal_is_told_what_works_there_and_nothing_is_drawn(self):
+        operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", "/nonexistent", "top"], environment(TERM="dumb"))
+        self.addCleanup(operator.close)
+        operator.expect("(TERM=dumb); without drawing: iwheelctl status, or iwheelctl watch")
+        self.assertEqual(64, operator.wait())
+        self.assertNotIn(b"\x1b", operator.raw)
+
+    def test_drive_on_a_dumb_terminal_writes_no_commands_and_on_a_narrow_one_keeps_to_its_line(self):
+        for more, columns in (({"TERM": "dumb"}, 80), ({}, 40)):
+            gateway = FakeGateway()
+            self.addCleanup(gateway.close)
+            operator = Operator([find_program(BUILD, "iwheelctl"), "--socket", gateway.path, "drive", "200", "200", "--for",
+                                 "300ms"], environment(**more), columns)
+            self.addCleanup(operator.close)
+            self.assertEqual(0, operator.wait(), operator.text)
+            if more:
+                self.assertNotIn(b"\x1b", operator.raw)
+            for line in operator.text.split("\x1b[K")[1:]:
+                self.assertLess(len(line.split("\r")[0].split("\n")[0]), max(columns, 80) if "drove" in line else columns)
 
 
 if __name__ == "__main__":

@@ -190,7 +190,7 @@ static void look(doctor_t *self, const words_t *words) {
     if (self->bus == NULL) {
         say_no_bus(self);
     } else if (able) {
-        if (!self->ctl->json && isatty(STDERR_FILENO) == 1) {
+        if (!self->ctl->json && text_live_columns(stderr) > 0U) {
             (void)fprintf(stderr, "listening to %s for %.1f s ...\r", self->bus, self->listen_ms / 1e3);
         }
         doctor_look_at_bus(self);

@@ -14,7 +14,6 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 /// A drive command without reply for this long: the gateway hangs.
 #define SILENT_US 1000000
@@ -45,7 +44,7 @@ typedef struct {
     int64_t answered_us; ///< The last reply came.
     long long applied[2];
     bool limited;
-    bool live;           ///< Show progress: stdout is a terminal and --json was not given.
+    unsigned live;       ///< Columns to show progress in; 0: stdout is no terminal that can, or --json was given.
     char last_line[512]; ///< With --json: the last reply to a drive command.
 } drive_t;
 
@@ -66,16 +65,19 @@ static double driven_s(const drive_t *self, int64_t now_us) {
 static void show_progress(const drive_t *self, int64_t now_us) {
     char left[TEXT_CELL];
     char right[TEXT_CELL];
-    if (self->live) {
-        (void)printf("\r\033[Kdriving %lld/%lld mm/s%s   measured %s/%s mm/s   %.1f s of %.1f s", self->applied[0],
-                     self->applied[1], self->limited ? " (limited)" : "", speed_of(self->latest, "left", left),
-                     speed_of(self->latest, "right", right), driven_s(self, now_us), (double)self->words.time_ms / 1e3);
+    char line[256];
+    if (self->live > 0U) {
+        (void)snprintf(line, sizeof(line), "driving %lld/%lld mm/s%s   measured %s/%s mm/s   %.1f s of %.1f s",
+                       self->applied[0], self->applied[1], self->limited ? " (limited)" : "",
+                       speed_of(self->latest, "left", left), speed_of(self->latest, "right", right),
+                       driven_s(self, now_us), (double)self->words.time_ms / 1e3);
+        (void)printf("\r\033[K%.*s", (int)self->live, line);
         (void)fflush(stdout);
     }
 }
 
 static void clear_progress(const drive_t *self) {
-    if (self->live) {
+    if (self->live > 0U) {
         (void)fputs("\r\033[K", stdout);
         (void)fflush(stdout);
     }
@@ -359,7 +361,7 @@ static int arm(drive_t *self) {
 
 int verb_drive(ctl_t *self, int count, char **words) {
     char why[DRIVE_WHY_SIZE];
-    drive_t drive = {.ctl = self, .live = !self->json && isatty(STDOUT_FILENO) == 1};
+    drive_t drive = {.ctl = self, .live = self->json ? 0U : text_live_columns(stdout)};
     if (!drive_words_parse(count, words, &drive.words, why)) {
         return ctl_fail(CTL_USAGE, "%s", why);
     }

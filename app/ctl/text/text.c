@@ -6,6 +6,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 void text_safe(const char *text, FILE *out) {
@@ -50,11 +51,23 @@ bool text_json_value(const json_t *value, FILE *out) {
     return true;
 }
 
+static bool obeys(FILE *out) {
+    const char *term = getenv("TERM");
+    return isatty(fileno(out)) == 1 && term != NULL && term[0] != '\0' && strcmp(term, "dumb") != 0;
+}
+
 bool text_wants_colour(FILE *out) {
     const char *no_color = getenv("NO_COLOR");
-    const char *term = getenv("TERM");
-    return isatty(fileno(out)) == 1 && (no_color == NULL || no_color[0] == '\0') && term != NULL &&
-           strcmp(term, "dumb") != 0;
+    return obeys(out) && (no_color == NULL || no_color[0] == '\0');
+}
+
+unsigned text_live_columns(FILE *out) {
+    struct winsize size = {0};
+    if (!obeys(out)) {
+        return 0;
+    }
+    (void)ioctl(fileno(out), TIOCGWINSZ, &size);
+    return size.ws_col > 1U ? size.ws_col - 1U : 79U;
 }
 
 void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]) {

@@ -28,6 +28,9 @@ bool text_json_value(const json_t *value, FILE *out);
 /// True if `out` is a terminal that wants colours (NO_COLOR and TERM=dumb say no).
 bool text_wants_colour(FILE *out);
 
+/// How many columns of a line may be written over and over on `out`; 0 if it is no terminal, or one that cannot (TERM=dumb).
+unsigned text_live_columns(FILE *out);
+
 /// "%lld unit", or "--" if `value` is no integer.
 void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]);
 

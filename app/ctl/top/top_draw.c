@@ -15,6 +15,8 @@
 #define ROWS_BIG   20
 #define ROWS_FULL  24
 #define ROWS_LEAST 4
+/// In narrower ones they would take the rows that sentences need.
+#define COLUMNS_BIG 55
 
 static const json_t *get(const json_t *object, const char *field) {
     return json_object_get(object, field);
@@ -46,10 +48,15 @@ static void draw_head(const top_model_t *model) {
     const char *button = text_word(estop, "state");
     const bool released = strcmp(button, "released") == 0;
     char right[96];
-    top_put(model, 0, 0, TOP_TITLE, " iWheel  %.40s", text_word(get(model->state, "bus"), "name"));
     (void)snprintf(right, sizeof(right), "e-stop %.16s%s ", strcmp(button, "none") == 0 ? "NONE" : button,
                    json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "");
     const int column = COLS - (int)strlen(right);
+    const int room = column - 10;
+    top_put(model, 0, 0, TOP_TITLE, " iWheel  %.*s",
+            room > 40  ? 40
+            : room > 5 ? room
+                       : 0,
+            text_word(get(model->state, "bus"), "name"));
     top_put(model, 0, column > 0 ? column : 0, released ? TOP_GOOD : TOP_BAD, "%s", right);
 }
 
@@ -61,47 +68,38 @@ static void spell(const char *name, char *out_words, size_t size) {
     }
 }
 
-/// Who drives, or why nobody does and what to do next.
-static void draw_reason(const top_model_t *model, int row, const advice_t *advice) {
+/// Who drives, or why nobody does and what to do next. How many rows it took.
+static int draw_reason(const top_model_t *model, int row, int rows, const advice_t *advice) {
     char left[TEXT_CELL];
     char words[64];
+    char text[TOP_TEXT_SIZE];
     const json_t *lease = get(model->state, "lease");
     const char *cause = json_string_value(get(model->state, "cause"));
-    const top_tone_t tone = tone_of(model, text_word(model->state, "state"));
+    top_tone_t tone = TOP_TITLE;
     if (json_is_integer(get(lease, "holder"))) {
         text_integer(get(lease, "remaining_ms"), "ms", left);
-        top_put(model, row, 1, TOP_TITLE, "%.30s drives (pid %lld); its command holds for %s", text_word(lease, "name"),
-                json_integer_value(get(lease, "pid")), left);
+        (void)snprintf(text, sizeof(text), "%.30s drives (pid %lld); its command holds for %s",
+                       text_word(lease, "name"), json_integer_value(get(lease, "pid")), left);
     } else if (cause != NULL) {
+        tone = tone_of(model, text_word(model->state, "state"));
         spell(cause, words, sizeof(words));
-        top_put(model, row, 1, tone, "%s: %s", words, advice->line[0]);
+        (void)snprintf(text, sizeof(text), "%s: %s", words, advice->line[0]);
     } else {
-        top_put(model, row, 1, TOP_TITLE, "%s", advice->line[0]);
+        (void)snprintf(text, sizeof(text), "%s", advice->line[0]);
     }
+    return top_put_wrapped(model, row, rows, tone, text);
 }
 
-/// Why, in words, and what the last stop was.
-static void draw_cause(const top_model_t *model, int row, int rows) {
+/// Why, in words, and what the last stop was. How many rows it took.
+static int draw_cause(const top_model_t *model, int row, int rows) {
     advice_t advice;
     if (!model->connected || model->state == NULL) {
-        top_put(model, row, 1, TOP_TITLE, "%s", model->notice);
-        return;
+        return top_put_wrapped(model, row, rows, TOP_TITLE, model->notice);
     }
     advice_collect(model->state, &advice);
-    draw_reason(model, row, &advice);
-    const char *rest = model->last_stop;
-    for (int i = 1; i < rows && *rest != '\0'; i++) {
-        const size_t room = COLS > 3 ? (size_t)COLS - 2U : 1U;
-        size_t cut = strlen(rest);
-        if (cut > room && i < rows - 1) {
-            for (cut = room; cut > 0 && rest[cut] != ' '; cut--) {
-            }
-            cut = cut == 0 ? room : cut;
-        }
-        top_put(model, row + i, 1, TOP_FAINT, "%.*s", (int)cut, rest);
-        rest += cut;
-        rest += strspn(rest, " ");
-    }
+    const int first = rows >= 4 ? rows - 2 : rows >= 3 && COLS < TOP_COLUMNS_WHOLE ? 2 : 1;
+    const int used = draw_reason(model, row, first, &advice);
+    return used + top_put_wrapped(model, row + used, rows - used, TOP_FAINT, model->last_stop);
 }
 
 static void draw_keys(const top_model_t *model) {
@@ -109,7 +107,9 @@ static void draw_keys(const top_model_t *model) {
         top_put(model, LINES - 2, 1, TOP_CARE, "%s", model->notice);
     }
     top_put(model, LINES - 1, 0, TOP_TITLE,
-            COLS >= 60 ? " SPACE stop   E e-stop   R reset   Q quit" : " SPACE stop  Q quit");
+            COLS >= TOP_COLUMNS_WHOLE ? " SPACE stop   E e-stop   R reset   Q quit"
+            : COLS >= 38              ? " SPACE stop  E e-stop  R reset  Q quit"
+                                      : " SPACE stop  Q quit");
 }
 
 void top_draw(const top_model_t *model) {
@@ -123,20 +123,21 @@ void top_draw(const top_model_t *model) {
         return;
     }
     draw_head(model);
-    if (LINES >= ROWS_BIG && COLS >= (int)strlen(word) * BIG_COLUMN + 1) {
+    const bool big = LINES >= ROWS_BIG && COLS >= COLUMNS_BIG && COLS >= (int)strlen(word) * BIG_COLUMN + 1;
+    if (big) {
         top_put_big(model, row, tone_of(model, state), word);
         row += BIG_ROWS;
     } else {
         top_put(model, row++, 1, tone_of(model, state), " %s ", word);
     }
-    const int reasons = LINES >= ROWS_FULL ? 3 : LINES >= ROWS_BIG ? 2 : 1;
-    draw_cause(model, row, reasons);
-    row += reasons;
+    // Where the lines are short, the rows that the large letters leave are for whole sentences.
+    const int reasons = LINES >= ROWS_FULL ? (big ? 3 : 5) : LINES >= ROWS_BIG ? (big ? 2 : 4) : big ? 1 : 2;
+    const int used = draw_cause(model, row, reasons);
+    row += big ? reasons : used; // Below large letters nothing moves when a sentence is longer.
     if (model->state != NULL && model->connected) {
-        const bool brief = LINES < ROWS_FULL;
-        top_draw_wheels(model, row, brief);
-        row += brief ? 4 : 7;
-        top_draw_rest(model, row, LINES - 2 - row);
+        row += top_draw_wheels(model, row, LINES < ROWS_FULL);
+        row += top_draw_rest(model, row, LINES - 2 - row);
+        top_draw_plots(model, row + 1, LINES - 2 - row - 1);
     }
     draw_keys(model);
 }

@@ -74,6 +74,23 @@ void top_put(const top_model_t *model, int row, int column, top_tone_t tone, con
     top_tone_end(model, tone);
 }
 
+int top_put_wrapped(const top_model_t *model, int row, int rows, top_tone_t tone, const char *text) {
+    const size_t room = COLS > 3 ? (size_t)COLS - 2U : 1U;
+    int used = 0;
+    for (; used < rows && *text != '\0'; used++) {
+        size_t cut = strlen(text);
+        if (cut > room && used < rows - 1) {
+            for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
+            }
+            cut = cut == 0 ? room : cut;
+        }
+        top_put(model, row + used, 1, tone, "%.*s", (int)cut, text);
+        text += cut;
+        text += strspn(text, " ");
+    }
+    return used;
+}
+
 static const letter_t *find(char letter) {
     for (size_t i = 0; i < sizeof(letters) / sizeof(letters[0]); i++) {
         if (letters[i].letter == letter) {

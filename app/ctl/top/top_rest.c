@@ -13,13 +13,22 @@ static const json_t *get(const json_t *object, const char *field) {
     return json_object_get(object, field);
 }
 
+static bool is_narrow(void) {
+    return COLS < TOP_COLUMNS_WHOLE;
+}
+
 static void draw_bus(const top_model_t *model, int row) {
     char load[TEXT_CELL];
     const json_t *bus = get(model->state, "bus");
     const char *state = text_word(bus, "state");
     text_decimal(get(bus, "load_permille"), 1, "%", load);
-    top_put(model, row, 1, strcmp(state, "active") == 0 ? TOP_PLAIN : TOP_BAD,
-            "BUS     %s, load %s, timing %s, echo %s", state, load, text_word(bus, "timing"), text_word(bus, "echo"));
+    const top_tone_t tone = strcmp(state, "active") == 0 ? TOP_PLAIN : TOP_BAD;
+    if (is_narrow()) {
+        top_put(model, row, 1, tone, "BUS     %s, load %s", state, load);
+    } else {
+        top_put(model, row, 1, tone, "BUS     %s, load %s, timing %s, echo %s", state, load, text_word(bus, "timing"),
+                text_word(bus, "echo"));
+    }
 }
 
 /// A share of the largest bucket as a block of eight heights, or a digit of ten where there are no blocks.
@@ -62,15 +71,21 @@ static void draw_gaps(const top_model_t *model, int row) {
         const long long limit = json_integer_value(json_array_get(limits, last ? i - 1U : i));
         const char *block = height(model, json_integer_value(entry), largest);
         const bool bad = last && json_integer_value(entry) > 0;
-        if (i >= BUCKETS_MAX || column > COLS - 24) {
+        if (i >= BUCKETS_MAX) {
             break;
+        }
+        if (is_narrow()) {
+            top_put(model, row, column++, bad ? TOP_BAD : TOP_TITLE, "%s", block);
+            continue;
         }
         top_put(model, row, column, bad ? TOP_BAD : TOP_TITLE, "%s%s%s", block, block, block);
         top_put(model, row + 1, column, TOP_FAINT, "%s%lld", last ? ">" : "", limit);
         column += limit >= 100 || last ? 5 : 4;
     }
     top_put(model, row, column + 1, TOP_PLAIN, "worst %s", worst);
-    top_put(model, row + 1, column + 1, TOP_FAINT, "ms between setpoints");
+    if (!is_narrow()) {
+        top_put(model, row + 1, column + 1, TOP_FAINT, "ms between setpoints");
+    }
 }
 
 static void draw_ledger(const top_model_t *model, int row) {
@@ -89,8 +104,15 @@ static void draw_ledger(const top_model_t *model, int row) {
             (void)snprintf(&names[used], sizeof(names) - used, " %s", name);
         }
     }
-    top_put(model, row, 1, total[2] > 0 ? TOP_BAD : TOP_PLAIN, "LEDGER  %u confirmed, %u assumed, %u contradicted%s%s",
-            total[0], total[1], total[2], total[2] > 0 ? ":" : "", names);
+    const top_tone_t tone = total[2] > 0 ? TOP_BAD : TOP_PLAIN;
+    if (is_narrow() && total[2] > 0) {
+        top_put(model, row, 1, tone, "LEDGER  %u CONTRADICTED:%s", total[2], names);
+    } else if (is_narrow()) {
+        top_put(model, row, 1, tone, "LEDGER  %u confirmed, %u assumed", total[0], total[1]);
+    } else {
+        top_put(model, row, 1, tone, "LEDGER  %u confirmed, %u assumed, %u contradicted%s%s", total[0], total[1],
+                total[2], total[2] > 0 ? ":" : "", names);
+    }
 }
 
 static void draw_budget(const top_model_t *model, int row) {
@@ -99,28 +121,38 @@ static void draw_budget(const top_model_t *model, int row) {
     const json_t *budget = get(model->state, "budget");
     text_integer(get(budget, "client_lost_ms"), "ms", time);
     text_decimal(get(budget, "client_lost_mm"), 3, "m", way);
-    top_put(model, row, 1, TOP_PLAIN, "STOP    at most %s and %s after the client's last command", time, way);
+    top_put(model, row, 1, TOP_PLAIN,
+            is_narrow() ? "STOP    at most %s and %s" : "STOP    at most %s and %s after the client's last command",
+            time, way);
 }
 
-static void draw_warnings(const top_model_t *model, int row) {
+/// How many rows they took; more than one only on a narrow terminal.
+static int draw_warnings(const top_model_t *model, int row, int rows) {
+    char text[TOP_TEXT_SIZE];
     const json_t *warnings = get(model->state, "warnings");
     const size_t count = json_array_size(warnings);
-    if (count > 0) {
-        const char *first = json_string_value(json_array_get(warnings, 0));
-        top_put(model, row, 1, TOP_CARE, "%zu warning%s: %s", count, count > 1 ? "s" : "",
-                first != NULL ? first : "--");
+    const char *first = json_string_value(json_array_get(warnings, 0));
+    if (count == 0 || rows < 1) {
+        return 0;
     }
+    (void)snprintf(text, sizeof(text), "%zu warning%s: %s", count, count > 1 ? "s" : "", first != NULL ? first : "--");
+    if (!is_narrow()) {
+        top_put(model, row, 1, TOP_CARE, "%s", text);
+        return 1;
+    }
+    return top_put_wrapped(model, row, rows > 4 ? 4 : rows, TOP_CARE, text);
 }
 
-void top_draw_rest(const top_model_t *model, int row, int rows) {
+int top_draw_rest(const top_model_t *model, int row, int rows) {
     // What matters most comes first; what has no row is left out.
-    static const struct {
+    const struct {
         void (*draw)(const top_model_t *, int);
         int rows;
-    } parts[] = {{draw_bus, 1}, {draw_ledger, 1}, {draw_gaps, 2}, {draw_budget, 1}, {draw_warnings, 1}};
-    for (size_t i = 0; i < sizeof(parts) / sizeof(parts[0]) && rows >= parts[i].rows; i++) {
-        parts[i].draw(model, row);
-        row += parts[i].rows;
-        rows -= parts[i].rows;
+    } parts[] = {{draw_bus, 1}, {draw_ledger, 1}, {draw_gaps, is_narrow() ? 1 : 2}, {draw_budget, 1}};
+    int used = 0;
+    for (size_t i = 0; i < sizeof(parts) / sizeof(parts[0]) && rows - used >= parts[i].rows; i++) {
+        parts[i].draw(model, row + used);
+        used += parts[i].rows;
     }
+    return used + draw_warnings(model, row + used, rows - used);
 }

@@ -71,7 +71,8 @@ static void coarse(const json_t *value, int divisor, unsigned digits, const char
     json_decref(rounded);
 }
 
-static void draw_numbers(const top_model_t *model, int row, const json_t *wheel) {
+/// How many rows it took: on a narrow terminal two.
+static int draw_numbers(const top_model_t *model, int row, const json_t *wheel) {
     char force[TEXT_CELL];
     char battery[TEXT_CELL];
     char way[TEXT_CELL];
@@ -85,11 +86,20 @@ static void draw_numbers(const top_model_t *model, int row, const json_t *wheel)
     text_integer(get(wheel, "speed_age_ms"), "", speed_age);
     text_integer(get(wheel, "force_age_ms"), "ms", force_age);
     const bool valid = strcmp(validity, "valid") == 0;
-    top_put(model, row, LABEL_COLUMNS, valid ? TOP_PLAIN : TOP_CARE, "force %s%s%.20s, %s%s, %s, age %s/%s", force,
-            valid ? "" : " ", valid ? "" : validity, full ? ">= " : "", battery, way, speed_age, force_age);
+    const top_tone_t tone = valid ? TOP_PLAIN : TOP_CARE;
+    char first[2U * TEXT_CELL];
+    (void)snprintf(first, sizeof(first), "force %s%s%.20s", force, valid ? "" : " ", valid ? "" : validity);
+    if (COLS >= TOP_COLUMNS_WHOLE) {
+        top_put(model, row, LABEL_COLUMNS, tone, "%s, %s%s, %s, age %s/%s", first, full ? ">= " : "", battery, way,
+                speed_age, force_age);
+        return 1;
+    }
+    top_put(model, row, 1, tone, "%s, %s%s", first, full ? ">= " : "", battery);
+    top_put(model, row + 1, 1, tone, "%s, age %s/%s", way, speed_age, force_age);
+    return 2;
 }
 
-static void draw_wheel(const top_model_t *model, int row, const char *name, bool brief) {
+static int draw_wheel(const top_model_t *model, int row, const char *name, bool brief) {
     const json_t *wheel = get(model->state, name[0] == 'L' ? "left" : "right");
     const bool heard = json_is_true(get(wheel, "heard"));
     char told[24];
@@ -98,17 +108,17 @@ static void draw_wheel(const top_model_t *model, int row, const char *name, bool
     (void)snprintf(does, sizeof(does), "%-6s %s", "", heard ? "does" : "LOST");
     draw_speed(model, row, told, TOP_CARE, get(wheel, "applied_mm_s"));
     draw_speed(model, row + 1, does, heard ? TOP_GOOD : TOP_BAD, get(wheel, "speed_mm_s"));
-    if (!brief) {
-        draw_numbers(model, row + 2, wheel);
-    }
+    return brief ? 2 : 2 + draw_numbers(model, row + 2, wheel);
 }
 
-void top_draw_wheels(const top_model_t *model, int row, bool brief) {
-    draw_wheel(model, row, "LEFT", brief);
-    draw_wheel(model, row + (brief ? 2 : 3), "RIGHT", brief);
-    if (!brief && COLS >= 60) {
-        top_put(model, row + 6, LABEL_COLUMNS, TOP_FAINT, "-%d%*s", model->scale_mm_s,
+int top_draw_wheels(const top_model_t *model, int row, bool brief) {
+    int used = draw_wheel(model, row, "LEFT", brief);
+    used += draw_wheel(model, row + used, "RIGHT", brief);
+    if (!brief && COLS >= TOP_COLUMNS_WHOLE) {
+        top_put(model, row + used, LABEL_COLUMNS, TOP_FAINT, "-%d%*s", model->scale_mm_s,
                 ((COLS - LABEL_COLUMNS - VALUE_COLUMNS - 2) | 1) - (model->scale_mm_s >= 1000 ? 5 : 4) - 5, "");
-        top_put(model, row + 6, COLS - VALUE_COLUMNS - 6, TOP_FAINT, "%+5d mm/s", model->scale_mm_s);
+        top_put(model, row + used, COLS - VALUE_COLUMNS - 6, TOP_FAINT, "%+5d mm/s", model->scale_mm_s);
+        used++;
     }
+    return used;
 }

@@ -26,6 +26,7 @@
 typedef struct {
     ctl_t *ctl;
     top_model_t model;
+    top_history_t history;
     int64_t heard_us;
     int64_t retry_us;
     int64_t notice_until_us;
@@ -207,18 +208,20 @@ static void prepare_terminal(top_model_t *model) {
     }
 }
 
-/// Asked before, because a newterm that fails keeps memory.
-static bool is_terminal_known(void) {
+/// Whether this terminal is known and can move its cursor. Asked before, because a newterm that fails keeps memory.
+static bool can_draw(void) {
     int error = 0;
-    const bool known = setupterm(NULL, STDOUT_FILENO, &error) == OK;
-    if (known) {
-        (void)del_curterm(cur_term);
+    if (setupterm(NULL, STDOUT_FILENO, &error) != OK) {
+        return false;
     }
-    return known;
+    const bool can = cursor_address != NULL && clear_screen != NULL;
+    (void)del_curterm(cur_term);
+    return can;
 }
 
 int verb_top(ctl_t *self, int count, char **words) {
-    top_t top = {.ctl = self, .model = {.scale_mm_s = 200}};
+    static top_t top;
+    top = (top_t){.ctl = self, .model = {.scale_mm_s = 200, .history = &top.history}};
     if (!ctl_words_at_most("top", count, 0, words)) {
         return CTL_USAGE;
     }
@@ -226,14 +229,19 @@ int verb_top(ctl_t *self, int count, char **words) {
         return ctl_fail(CTL_USAGE, "top needs a terminal; without one: iwheelctl status, or iwheelctl watch");
     }
     (void)setlocale(LC_ALL, "");
-    SCREEN *screen = is_terminal_known() ? newterm(NULL, stdout, stdin) : NULL;
+    SCREEN *screen = can_draw() ? newterm(NULL, stdout, stdin) : NULL;
     if (screen == NULL) {
-        return ctl_fail(CTL_USAGE, "this terminal (TERM=%s) is not known here; try: TERM=vt100 iwheelctl top",
-                        getenv("TERM") != NULL ? getenv("TERM") : "");
+        return ctl_fail(
+            CTL_USAGE,
+            "nothing can be drawn on this terminal (TERM=%s); without drawing: iwheelctl status, or iwheelctl watch; "
+            "if it can more than it says: TERM=vt100 iwheelctl top",
+            getenv("TERM") != NULL ? getenv("TERM") : "");
     }
     signals_catch();
     prepare_terminal(&top.model);
     do {
+        top_history_take(&top.history, client_now_us(),
+                         top.model.connected && !top.model.stale ? top.model.state : NULL);
         top_draw(&top.model);
         (void)refresh();
     } while (wait_and_take(&top));
