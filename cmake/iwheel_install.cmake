@@ -44,6 +44,11 @@ if(TARGET iwheel-gateway)
     install(FILES share/iwheel.dbc share/northbound.json DESTINATION ${CMAKE_INSTALL_DATADIR}/iwheel COMPONENT tools)
     install(FILES share/completions/iwheel.bash RENAME iwheelctl
         DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT tools)
+    install(FILES share/completions/_iwheelctl DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT tools)
+    foreach(program iwheelctl iwheel-gateway iwheel-sim) # fish looks for a file of each program's name.
+        install(FILES share/completions/iwheelctl.fish RENAME ${program}.fish
+            DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT tools)
+    endforeach()
     if(IWHEEL_SCDOC)
         iwheel_man(iwheel-gateway 1 gateway)
         iwheel_man(iwheel-gateway.conf 5 gateway)

@@ -1,42 +1,62 @@
 # SPDX-License-Identifier: MIT
 # Completion for iwheelctl, iwheel-gateway and iwheel-sim. It asks the program itself, so it knows what that program knows.
 
-# The options in a help text.
-_iwheel_options() {
-    "$@" --help 2>/dev/null | grep -oE -- '--[a-z][a-z-]*' | sort -u
+# CAN interfaces.
+_iwheel_buses() {
+    grep -lx 280 /sys/class/net/*/type 2>/dev/null | cut -d/ -f5
+}
+
+# Offers the words on standard input; FILE and BUS stand for the names of such.
+_iwheel_offer() {
+    local words
+    words=$(cat)
+    mapfile -t COMPREPLY < <(compgen -W "$(grep -vxE 'FILE|BUS' <<<"$words")" -- "$2")
+    if grep -qx BUS <<<"$words" && [[ $2 != -* ]]; then
+        mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY < <(compgen -W "$(_iwheel_buses)" -- "$2")
+    fi
+    if grep -qx FILE <<<"$words" && [[ $2 != -* ]]; then
+        mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY < <(compgen -f -- "$2")
+    fi
+}
+
+# What the word behind an option is; 1: not known.
+_iwheel_value() {
+    case $1 in
+    --socket | --config | -c | --from | --learn | --gateway | --directory | --control | --script | --log) echo FILE ;;
+    --can) echo BUS && echo unix: ;;
+    --estop) printf '%s\n' none FILE ;;
+    --log-level) printf '%s\n' error warning info debug ;;
+    --for | --listen | --rate | --frames | --current | --seed | --uptime) ;;
+    *) return 1 ;;
+    esac
 }
 
 _iwheelctl() {
-    local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} verb= i verbs
-    verbs=$("$1" --help 2>/dev/null | sed -nE 's/^  ([a-z]+)  +[^ ].*/\1/p')
+    local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} verb='' i verbs
+    verbs=$("$1" help --list 2>/dev/null | cut -f1)
     for ((i = 1; i < COMP_CWORD; i++)); do
         if grep -qxF -- "${COMP_WORDS[i]}" <<<"$verbs"; then
             verb=${COMP_WORDS[i]}
             break
         fi
     done
-    case $previous in
-    --socket) mapfile -t COMPREPLY < <(compgen -f -- "$current") && return ;;
-    esac
-    case $verb:$current in
-    :-*) mapfile -t COMPREPLY < <(compgen -W "$(_iwheel_options "$1")" -- "$current") ;;
-    :*) mapfile -t COMPREPLY < <(compgen -W "$verbs" -- "$current") ;;
-    *:-*) mapfile -t COMPREPLY < <(compgen -W "$(_iwheel_options "$1" "$verb")" -- "$current") ;;
-    tare:*) mapfile -t COMPREPLY < <(compgen -W "left right" -- "$current") ;;
-    watch:*) mapfile -t COMPREPLY < <(compgen -W "state bus estop lease stop force frame" -- "$current") ;;
-    *) mapfile -t COMPREPLY < <(compgen -f -- "$current") ;;
-    esac
+    if _iwheel_value "$previous" >/dev/null; then
+        _iwheel_offer "$1" "$current" < <(_iwheel_value "$previous")
+    elif [ -n "$verb" ]; then
+        _iwheel_offer "$1" "$current" < <("$1" help "$verb" --list 2>/dev/null)
+    else
+        _iwheel_offer "$1" "$current" < <(printf '%s\n' "$verbs" && [[ $current == -* ]] && printf '%s\n' --socket --json --help --version)
+    fi
 }
 
 _iwheel_program() {
     local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]}
-    case $previous:$current in
-    --log-level:*) mapfile -t COMPREPLY < <(compgen -W "error warning info debug" -- "$current") ;;
-    --can:*) mapfile -t COMPREPLY < <(compgen -W "$(cd /sys/class/net 2>/dev/null && grep -lx 280 -- */type 2>/dev/null | cut -d/ -f1)" -- "$current") ;;
-    *:-*) mapfile -t COMPREPLY < <(compgen -W "$(_iwheel_options "$1")" -- "$current") ;;
-    *) mapfile -t COMPREPLY < <(compgen -f -- "$current") ;;
-    esac
+    if _iwheel_value "$previous" >/dev/null; then
+        _iwheel_offer "$1" "$current" < <(_iwheel_value "$previous")
+    else
+        _iwheel_offer "$1" "$current" < <("$1" --help 2>/dev/null | grep -oE -- '--[a-z][a-z-]*' | sort -u)
+    fi
 }
 
-complete -F _iwheelctl iwheelctl
-complete -F _iwheel_program iwheel-gateway iwheel-sim
+complete -o filenames -F _iwheelctl iwheelctl
+complete -o filenames -F _iwheel_program iwheel-gateway iwheel-sim

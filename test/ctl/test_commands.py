@@ -7,6 +7,7 @@ Usage: test_commands.py BUILD [unittest's arguments]
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -135,6 +136,91 @@ class Help(unittest.TestCase):
             for option in explained:
                 err = run("--socket", "/nonexistent", verb, option)[2]
                 self.assertNotRegex(err, f'does not understand "{option}"|no topic|unknown option', (verb, option))
+
+
+ITEMS = ["setpoint_type", "current_role", "force_unit_left", "wheel_radius", "dlc"]
+
+
+class Completion(unittest.TestCase):
+    """What each shell offers is what the program says of itself; asked as the shell asks."""
+
+    def environment(self):
+        folders = [os.path.dirname(os.path.abspath(find_program(BUILD, name)))
+                   for name in ("iwheelctl", "iwheel-gateway", "iwheel-sim")]
+        return {**os.environ, "PATH": ":".join([*folders, os.environ["PATH"]])}
+
+    def ask(self, *command):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False, env=self.environment(), cwd=ROOT,
+                              stdin=subprocess.DEVNULL)
+        return set(done.stdout.split("\n")) - {""}
+
+    def bash(self, *words, program="_iwheelctl"):
+        return self.ask("bash", "-c", 'source share/completions/iwheel.bash; f=$1; shift; COMP_WORDS=("$@"); '
+                        'COMP_CWORD=$(($# - 1)); "$f" "$1"; printf "%s\\n" "${COMPREPLY[@]}"', "bash", program, *words)
+
+    def fish(self, *words):
+        lines = self.ask("fish", "--no-config", "-c", "source share/completions/iwheelctl.fish; complete -C \"$argv\"",
+                         " ".join(words))
+        return {line.split("\t")[0] for line in lines}
+
+    def zsh(self, *words):
+        """Types the words and two tabs on a terminal; what then stands there."""
+        sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+        from operator_at_terminal import Operator
+        operator = Operator(["zsh", "-f", "-i"], {**self.environment(), "TERM": "dumb", "PS1": "", "PROMPT": ""}, 200, 50)
+        self.addCleanup(operator.close)
+        with tempfile.TemporaryDirectory() as folder:
+            operator.type(f"fpath=({ROOT}/share/completions $fpath); autoload -U compinit; compinit -u -d {folder}/dump; "
+                          "setopt list_ambiguous auto_list no_auto_menu; LISTMAX=0; print REA''DY\n")
+            operator.expect("READY")
+            operator.type(" ".join(words) + "\t\t")
+            operator.expect(words[-1] if words[-1] else words[0])
+            for _ in range(30):
+                operator.pump(0.05)
+        return set(re.findall(r"[\w-]+", operator.text[operator.seen:]))
+
+    def shells(self):
+        yield self.bash
+        for name, shell in (("fish", self.fish), ("zsh", self.zsh)):
+            if shutil.which(name):
+                yield shell
+
+    def test_all_shells_are_there(self):
+        missing = [name for name in ("fish", "zsh") if not shutil.which(name)]
+        if missing:
+            self.skipTest(f"{' '.join(missing)} missing (scripts/install_tools check brings them)")
+
+    def test_every_shell_offers_every_verb(self):
+        for shell in self.shells():
+            self.assertLessEqual(set(verbs()), shell("iwheelctl", ""), shell.__name__)
+
+    def test_every_shell_offers_the_items_of_the_ledger_behind_confirm(self):
+        for shell in self.shells():
+            self.assertLessEqual(set(ITEMS), shell("iwheelctl", "confirm", ""), shell.__name__)
+
+    def test_every_shell_offers_topics_sides_and_the_options_of_the_verb_only(self):
+        for shell in self.shells():
+            self.assertLessEqual({"state", "bus", "frame"}, shell("iwheelctl", "watch", ""), shell.__name__)
+            self.assertLessEqual({"left", "right"}, shell("iwheelctl", "tare", ""))
+            offered = shell("iwheelctl", "drive", "--")
+            self.assertLessEqual({"--for", "--takeover", "--current"}, offered, shell.__name__)
+            self.assertNotIn("--csv", offered)
+
+    def test_every_shell_offers_options_and_levels_of_the_gateway(self):
+        self.assertLessEqual({"--check", "--listen-only"}, self.bash("iwheel-gateway", "--", program="_iwheel_program"))
+        for shell in self.shells():
+            more = {"program": "_iwheel_program"} if shell == self.bash else {}
+            self.assertLessEqual({"error", "warning", "debug"}, shell("iwheel-gateway", "--log-level", "", **more), shell.__name__)
+
+    def test_lists_are_those_of_the_program(self):
+        self.assertLessEqual(set(ITEMS), set(listed("confirm")))
+        ledger = subprocess.run(["grep", "-c", "IW_LEDGER_", os.path.join(ROOT, "core", "include", "iwheel", "ledger.h")],
+                                capture_output=True, text=True, check=True)
+        self.assertGreater(int(ledger.stdout), len(ITEMS))
+        for verb in verbs():
+            for word in listed(verb):
+                if word.startswith("--"):
+                    self.assertIn(word, run("help", verb)[1] + "--help --json --socket", (verb, word))
 
 
 if __name__ == "__main__":
