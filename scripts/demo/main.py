@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: MIT
 """The demonstration: the real gateway drives two simulated wheels, and everything told is checked. See ./demo --help."""
 
+import signal
+
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # Before anything is there that has to be taken away again.
+
+# pylint: disable=wrong-import-position
 import argparse
 import os
-import signal
 import sys
 
 from cast import Sleeper
@@ -54,9 +58,10 @@ def parse():
     return parser.parse_args()
 
 
-def tell(story, view, sleeper):
+def tell(story, view, sleeper, interrupts):
     try:
-        story.tell()
+        with interrupts:
+            story.tell()
     finally:
         view.close()
         for driver in story.drivers:
@@ -91,7 +96,32 @@ def report(story, rig, error, sleeper):
         )
 
 
-def run(options):
+class Interrupts:
+    """Ctrl-C and the signals that end a program: they count while `with` lasts, once, and wait before and behind it, so that what is
+    being made or taken away is made or taken away whole."""
+
+    def __init__(self):
+        self.listens, self.came = False, False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self.take)
+
+    def take(self, _number, _frame):
+        self.came = True
+        if self.listens:
+            self.listens = False
+            raise KeyboardInterrupt
+
+    def __enter__(self):
+        self.listens = True
+        if self.came:
+            self.listens = False
+            raise KeyboardInterrupt
+
+    def __exit__(self, *_):
+        self.listens = False
+
+
+def run(options, interrupts):
     try:
         rig = Rig(options.build, CONFIG)
     except (OSError, RuntimeError) as error:
@@ -101,9 +131,10 @@ def run(options):
     view = choose(sys.stdout, options.plain)
     story = Story(rig, view)
     try:
-        tell(story, view, sleeper)
+        tell(story, view, sleeper, interrupts)
         if options.keep:
-            keep(rig)
+            with interrupts:
+                keep(rig)
         else:
             print("Try it yourself: ./demo --keep")
         return 0
@@ -116,14 +147,9 @@ def run(options):
 
 def main():
     options = parse()
-
-    def interrupt(_number, _frame):
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)
-    signal.signal(signal.SIGHUP, interrupt)
+    interrupts = Interrupts()
     try:
-        return run(options)
+        return run(options, interrupts)
     except KeyboardInterrupt:
         print("ended")
         return 0 if options.keep else 130

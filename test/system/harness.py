@@ -2,6 +2,7 @@
 """Starts simulator and gateway in a private folder, keeps the timeline, and ends what it started, by process id."""
 
 import ctypes
+import glob
 import grp
 import os
 import shutil
@@ -193,6 +194,13 @@ class Rig:
     def __init__(self, build, config=None, sim_args=(), estop=True):
         self.build = build
         self.folder = tempfile.mkdtemp(prefix="iwheel-")
+        try:
+            self.begin(config, sim_args, estop)
+        except BaseException:
+            self.remove_folder()
+            raise
+
+    def begin(self, config, sim_args, estop):
         self.timeline = []
         self.processes, self.clients = [], []
         self.gateway = None
@@ -388,7 +396,25 @@ class Rig:
         self.sim.end()
         self.bus.close()
         if not keep:
-            shutil.rmtree(self.folder, ignore_errors=True)
+            self.remove_folder()
+
+    def remove_folder(self):
+        """Once the gateway's own helpers have ended, which write their last file after it, and would make the folder again."""
+        end = time.monotonic() + 3
+        while self.is_used() and time.monotonic() < end:
+            time.sleep(0.01)
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def is_used(self):
+        """Whether a process has our folder in its command line, as the gateway's helpers inherit it."""
+        for path in glob.glob("/proc/[0-9]*/cmdline"):
+            try:
+                with open(path, "rb") as file:
+                    if self.folder.encode() in file.read() and path != f"/proc/{os.getpid()}/cmdline":
+                        return True
+            except OSError:
+                pass
+        return False
 
 
 def find_program(build, name):

@@ -1,0 +1,82 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The demonstration, interrupted at any moment, leaves nothing behind: no file, no process.
+
+Usage: test_demo.py BUILD [unittest's arguments]
+"""
+import concurrent.futures
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
+BUILD = ""
+
+
+def play(seconds, signals=(signal.SIGINT,), spacing=0.0, words=("--plain",)):
+    """(exit code, what is left in its temporary folder, its processes that still run, what it said)"""
+    with tempfile.TemporaryDirectory(prefix="d") as folder:
+        process = subprocess.Popen([sys.executable, os.path.join(ROOT, "scripts", "demo", "main.py"), "--build", BUILD, *words],
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                                   start_new_session=True, env={**os.environ, "TMPDIR": folder})
+        time.sleep(seconds)
+        for number in signals:
+            try:
+                os.killpg(process.pid, number)  # As a terminal does: to all of them.
+            except ProcessLookupError:
+                pass
+            time.sleep(spacing)
+        said = process.communicate(timeout=60)[0]
+        return process.returncode, os.listdir(folder), still_running(process.pid), said
+
+
+def still_running(session, seconds=3.0):
+    """What is left of the session after a moment: the gateway's own helpers see that it is gone and end."""
+    end = time.monotonic() + seconds
+    while True:
+        found = subprocess.run(["pgrep", "--session", str(session)], capture_output=True, text=True, check=False).stdout.split()
+        if not found or time.monotonic() > end:
+            return found
+        time.sleep(0.05)
+
+
+class Interrupted(unittest.TestCase):
+    def all_clean(self, plays):
+        with concurrent.futures.ThreadPoolExecutor(3) as pool:
+            for what, (code, left, running, said) in pool.map(lambda p: (p, play(**p)), plays):
+                self.assertEqual(([], []), (left, running), (what, said[-600:]))
+                self.assertNotEqual(0, code, what)
+                if what["seconds"] >= 0.5:  # Before, it may be Python itself that is interrupted.
+                    self.assertIn(code, (130, -signal.SIGINT), (what, said[-600:]))
+                    self.assertNotIn("Traceback", said)
+
+    def test_ctrl_c_at_any_moment_leaves_nothing(self):
+        self.all_clean([{"seconds": at} for at in (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.8, 1.5, 4, 7, 11)])
+
+    def test_impatient_ctrl_c_leaves_nothing_either(self):
+        self.all_clean([{"seconds": at, "signals": (signal.SIGINT,) * 6, "spacing": 0.07} for at in (0.2, 0.35, 1.0, 5)])
+
+    def test_other_signals_that_end_it(self):
+        for code, left, running, said in (play(1.0, (number,)) for number in (signal.SIGTERM, signal.SIGHUP)):
+            self.assertEqual((130, [], []), (code, left, running), said)
+
+    def test_simulator_that_does_not_start_leaves_nothing(self):
+        with tempfile.TemporaryDirectory(prefix="d") as folder:
+            os.makedirs(os.path.join(folder, "build", "bin"))
+            os.makedirs(os.path.join(folder, "tmp"))
+            for name in ("iwheel-sim", "iwheel-gateway", "iwheelctl"):
+                os.symlink("/bin/false", os.path.join(folder, "build", "bin", name))
+            done = subprocess.run([sys.executable, os.path.join(ROOT, "scripts", "demo", "main.py"), "--build",
+                                   os.path.join(folder, "build")], capture_output=True, text=True, timeout=30, check=False,
+                                  stdin=subprocess.DEVNULL, env={**os.environ, "TMPDIR": os.path.join(folder, "tmp")})
+            self.assertEqual((1, []), (done.returncode, os.listdir(os.path.join(folder, "tmp"))), done.stdout + done.stderr)
+            self.assertIn("the simulator does not start", done.stderr)
+
+
+if __name__ == "__main__":
+    BUILD = os.path.abspath(sys.argv.pop(1))
+    unittest.main()
