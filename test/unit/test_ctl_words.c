@@ -37,15 +37,15 @@ static void test_duration_that_is_none_is_refused_and_touches_nothing(void) {
 
 static void test_duration_option_out_of_range_tells_the_range_as_it_is_written(void) {
     static const duration_range_t range = {20000, 600000000};
-    char why[160];
+    char why[DURATION_WHY_SIZE];
     int64_t us = 77;
-    TEST_ASSERT_TRUE(duration_option("--for", "10min", range, &us, why, sizeof why));
+    TEST_ASSERT_TRUE(duration_option("--for", "10min", range, &us, why));
     TEST_ASSERT_EQUAL_INT64(600000000, us);
-    TEST_ASSERT_TRUE(duration_option("--for", "20ms", range, &us, why, sizeof why));
-    TEST_ASSERT_FALSE(duration_option("--for", "19ms", range, &us, why, sizeof why));
+    TEST_ASSERT_TRUE(duration_option("--for", "20ms", range, &us, why));
+    TEST_ASSERT_FALSE(duration_option("--for", "19ms", range, &us, why));
     TEST_ASSERT_EQUAL_STRING("--for 19ms is out of range; write 20ms to 10min", why);
-    TEST_ASSERT_FALSE(duration_option("--for", "600001ms", range, &us, why, sizeof why));
-    TEST_ASSERT_FALSE(duration_option("--for", NULL, range, &us, why, sizeof why));
+    TEST_ASSERT_FALSE(duration_option("--for", "600001ms", range, &us, why));
+    TEST_ASSERT_FALSE(duration_option("--for", NULL, range, &us, why));
     TEST_ASSERT_EQUAL_STRING("--for wants a time with its unit, such as 500ms, 1.5s, 2min or 1h, not \"\"", why);
     TEST_ASSERT_EQUAL_INT64(20000, us);
 }

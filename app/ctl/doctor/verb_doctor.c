@@ -24,9 +24,9 @@ typedef struct {
 
 static bool parse_listen(const char *text, unsigned *out_ms) {
     static const duration_range_t range = {LISTEN_MIN_US, LISTEN_MAX_US};
-    char why[160];
+    char why[DURATION_WHY_SIZE];
     int64_t us = 0;
-    if (!duration_option("--listen", text, range, &us, why, sizeof(why))) {
+    if (!duration_option("--listen", text, range, &us, why)) {
         (void)ctl_fail(CTL_USAGE, "%s", why);
         return false;
     }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "drive_words.h"
 
-#include "text/duration.h"
-
 #include <stdio.h>
 #include <string.h>
 
@@ -25,7 +23,7 @@ static bool parse_integer(const char *text, int limit, int *out_number) {
 static bool parse_for(const char *text, drive_words_t *drive, char *out_why) {
     static const duration_range_t range = {DRIVE_TIME_MIN_MS * INT64_C(1000), DRIVE_TIME_MAX_MS * INT64_C(1000)};
     int64_t us = 0;
-    const bool good = duration_option("--for", text, range, &us, out_why, DRIVE_WHY_SIZE);
+    const bool good = duration_option("--for", text, range, &us, out_why);
     drive->time_ms = good ? (int)(us / 1000) : drive->time_ms;
     return good;
 }

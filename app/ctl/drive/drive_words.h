@@ -3,6 +3,8 @@
 #ifndef DRIVE_WORDS_H
 #define DRIVE_WORDS_H
 
+#include "text/duration.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -21,7 +23,7 @@ typedef struct {
 } drive_words_t;
 
 /// Size of `out_why`.
-#define DRIVE_WHY_SIZE 160U
+#define DRIVE_WHY_SIZE DURATION_WHY_SIZE
 
 /// False, with `*out_drive` untouched and what is wrong and what to write in `out_why`, if the words are no drive command.
 bool drive_words_parse(int count, char **words, drive_words_t *out_drive, char *out_why);

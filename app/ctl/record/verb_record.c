@@ -25,11 +25,11 @@ typedef struct {
 
 static int parse(words_t *self, int count, char **words) {
     static const duration_range_t range = {FOR_MIN_US, FOR_MAX_US};
-    char why[160];
+    char why[DURATION_WHY_SIZE];
     for (int i = 0; i < count; i++) {
         const char *next = i + 1 < count ? words[i + 1] : NULL;
         if (strcmp(words[i], "--for") == 0) {
-            if (!duration_option("--for", next, range, &self->for_us, why, sizeof why)) {
+            if (!duration_option("--for", next, range, &self->for_us, why)) {
                 return ctl_fail(CTL_USAGE, "%s", why);
             }
             i++;

@@ -54,20 +54,22 @@ void duration_write(int64_t us, char *out_text, size_t size) {
     (void)snprintf(out_text, size, "%" PRId64 "%s", us / units[i].us, units[i].name);
 }
 
-bool duration_option(const char *option, const char *text, duration_range_t range, int64_t *out_us, char *out_why,
-                     size_t size) {
+bool duration_option(const char *option, const char *text, duration_range_t range, int64_t *out_us,
+                     char out_why[DURATION_WHY_SIZE]) {
     char least[24];
     char most[24];
     int64_t us = 0;
     if (text == NULL || !duration_parse(text, &us)) {
-        (void)snprintf(out_why, size, "%s wants a time with its unit, such as " DURATION_FORM ", not \"%.40s\"", option,
+        (void)snprintf(out_why, DURATION_WHY_SIZE,
+                       "%s wants a time with its unit, such as " DURATION_FORM ", not \"%.40s\"", option,
                        text != NULL ? text : "");
         return false;
     }
     if (us < range.min_us || us > range.max_us) {
         duration_write(range.min_us, least, sizeof least);
         duration_write(range.max_us, most, sizeof most);
-        (void)snprintf(out_why, size, "%s %.40s is out of range; write %s to %s", option, text, least, most);
+        (void)snprintf(out_why, DURATION_WHY_SIZE, "%s %.40s is out of range; write %s to %s", option, text, least,
+                       most);
         return false;
     }
     *out_us = us;

@@ -10,6 +10,9 @@
 /// How it is written, for help and messages.
 #define DURATION_FORM "500ms, 1.5s, 2min or 1h"
 
+/// Of what is told about a wrong one.
+#define DURATION_WHY_SIZE 160U
+
 /// From and to what an option may be.
 typedef struct {
     int64_t min_us;
@@ -24,7 +27,7 @@ void duration_write(int64_t us, char *out_text, size_t size);
 
 /// The value of `option` (`text` may be null: there is none). False, with `*out_us` untouched and what is wrong and what to
 /// write in `out_why`, if it is none or out of range.
-bool duration_option(const char *option, const char *text, duration_range_t range, int64_t *out_us, char *out_why,
-                     size_t size);
+bool duration_option(const char *option, const char *text, duration_range_t range, int64_t *out_us,
+                     char out_why[DURATION_WHY_SIZE]);
 
 #endif

@@ -20,6 +20,14 @@
 #define COLUMNS_TWO    120 ///< From this width on both wheels stand side by side.
 #define BRAILLE_DOWN   4
 
+/// A part of the screen.
+typedef struct {
+    int row;
+    int column;
+    int rows;
+    int columns;
+} place_t;
+
 /// One plot: rows of bits, two dots a cell across.
 typedef struct {
     const int32_t *values;
@@ -140,16 +148,18 @@ static void draw_row(const top_model_t *model, const plot_t *plot, int cell_row,
 }
 
 /// What, from where to where; the last row is the axis of time.
-static void draw_plot(const top_model_t *model, int number, int row, int column, int rows, int columns) {
+static void draw_plot(const top_model_t *model, int number, const place_t *place) {
     static const char *const names[TOP_PLOTS] = {"LEFT speed", "RIGHT speed", "LEFT force", "RIGHT force"};
     const bool force = number >= 2;
     bool negative = false;
     const int32_t limit =
         limit_of(&model->history->value[force ? 2 : 0], force ? FORCE_MIN_mN : SPEED_MIN_mm_s, &negative);
-    const int room = columns - LABEL - 1;
+    const int row = place->row;
+    const int column = place->column;
+    const int room = place->columns - LABEL - 1;
     plot_t plot = {.values = model->history->value[number],
                    .columns = room > COLUMNS_MAX ? COLUMNS_MAX : room,
-                   .rows = rows - 2,
+                   .rows = place->rows - 2,
                    .across = model->fine_blocks ? 2 : 1,
                    .down = model->fine_blocks ? BRAILLE_DOWN : 1,
                    .low = negative ? -limit : 0,
@@ -162,10 +172,10 @@ static void draw_plot(const top_model_t *model, int number, int row, int column,
     top_put(model, row + 1, column, TOP_FAINT, "%+7d", (int)plot.high / unit);
     top_put(model, row + 1 + dot_row(&plot, 0) / plot.down, column, TOP_FAINT, "%7d", 0);
     if (negative) {
-        top_put(model, row + rows - 2, column, TOP_FAINT, "%+7d", (int)plot.low / unit);
+        top_put(model, row + place->rows - 2, column, TOP_FAINT, "%+7d", (int)plot.low / unit);
     }
-    top_put(model, row + rows - 1, column + LABEL, TOP_FAINT, "60 s ago");
-    top_put(model, row + rows - 1, column + LABEL + plot.columns - 3, TOP_FAINT, "now");
+    top_put(model, row + place->rows - 1, column + LABEL, TOP_FAINT, "60 s ago");
+    top_put(model, row + place->rows - 1, column + LABEL + plot.columns - 3, TOP_FAINT, "now");
 }
 
 void top_draw_plots(const top_model_t *model, int row, int rows) {
@@ -181,6 +191,7 @@ void top_draw_plots(const top_model_t *model, int row, int rows) {
     const int height = each > ROWS_MAX ? ROWS_MAX : each;
     const int width = COLS / beside;
     for (int i = 0; i < plots; i++) {
-        draw_plot(model, i, row + (i / beside) * height, (i % beside) * width, height, width);
+        const place_t place = {row + (i / beside) * height, (i % beside) * width, height, width};
+        draw_plot(model, i, &place);
     }
 }

@@ -73,8 +73,10 @@ static void judge_safety(const gateway_config_t *config, inspect_findings_t *fin
     if (memory == NULL) {
         return;
     }
-    const int result = gw_listener_prepare(config, memory);
+    static gw_listener_t listener;
+    const int result = gw_listener_prepare(&listener, config, memory);
     (void)fclose(memory);
+    gw_folder_close(&listener.folder);
     if (result != 0) {
         const char *const ours = "iwheel-gateway: ";
         char *const what = strncmp(text, ours, strlen(ours)) == 0 ? text + strlen(ours) : text;
@@ -85,6 +87,18 @@ static void judge_safety(const gateway_config_t *config, inspect_findings_t *fin
         }
         inspect_say(findings, "socket", INSPECT_FAIL, "%s", what);
         inspect_cure(findings, "%s", cure != NULL ? cure + 2 : "choose another with --socket");
+    }
+}
+
+/// Recordings and the ledger are written only where nobody else can put anything.
+static void judge_own(const char *path, inspect_findings_t *findings) {
+    const int fd = gw_folder_open_own(path);
+    if (fd >= 0) {
+        (void)close(fd);
+    } else if (errno != ENOENT) {
+        const int error = errno;
+        inspect_say(findings, "record", INSPECT_FAIL, "record: directory %s: %s", path, gw_folder_fault(error));
+        inspect_cure(findings, "%s", gw_folder_cure(error));
     }
 }
 
@@ -118,7 +132,9 @@ static void judge_files(const gateway_config_t *config, inspect_findings_t *find
         judge_safety(config, findings);
     }
     judge_rights(config, findings);
-    (void)judge_directory("record", config->record.directory, findings);
+    if (judge_directory("record", config->record.directory, findings)) {
+        judge_own(config->record.directory, findings);
+    }
 }
 
 /// The bus and the e-stop, as far as they can be opened.
