@@ -5,7 +5,6 @@ import signal
 
 signal.signal(signal.SIGINT, signal.SIG_DFL)  # Before anything is there that has to be taken away again.
 
-# pylint: disable=wrong-import-position
 import argparse
 import os
 import sys
