@@ -7,7 +7,6 @@
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #define UNKNOWN INT32_MIN
 /// The smallest scales.
@@ -19,6 +18,7 @@
 #define COLUMNS_MAX    300
 #define COLUMNS_TWO    120 ///< From this width on both wheels stand side by side.
 #define BRAILLE_DOWN   4
+#define CELL_SIZE      4 ///< Bytes of a character, and the end.
 
 /// A part of the screen.
 typedef struct {
@@ -110,13 +110,11 @@ static unsigned dot_bit(int x, int y) {
     return bits[x][y];
 }
 
-static size_t put_cell(bool fine, unsigned bits, bool zero, char *out) {
+static size_t put_cell(bool fine, unsigned bits, bool zero, char out[CELL_SIZE]) {
     if (!fine || bits == 0U) {
         const char *empty = !zero ? " " : fine ? "\xC2\xB7" : ".";
         const char *text = bits != 0U ? "*" : empty;
-        const size_t length = strlen(text);
-        memcpy(out, text, length);
-        return length;
+        return (size_t)snprintf(out, CELL_SIZE, "%s", text);
     }
     out[0] = (char)0xE2;
     out[1] = (char)(0xA0U | (bits >> 6));
@@ -125,7 +123,7 @@ static size_t put_cell(bool fine, unsigned bits, bool zero, char *out) {
 }
 
 static void draw_row(const top_model_t *model, const plot_t *plot, int cell_row, int row, int column) {
-    char text[3 * COLUMNS_MAX + 1];
+    char text[3 * COLUMNS_MAX + CELL_SIZE];
     size_t used = 0;
     const bool zero = dot_row(plot, 0) / plot->down == cell_row;
     for (int cell = 0; cell < plot->columns; cell++) {
