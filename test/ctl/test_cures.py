@@ -104,8 +104,8 @@ class EveryCommandExists(unittest.TestCase):
             self.assertIn(match.group(1), PROGRAMS, place)
 
     def test_what_stands_behind_a_colon_is_a_command_that_is_known(self):
-        prose = {"the", "told", "it"}
-        for place, match in self.find(r"(?:then|with|do|it|them|see|one|how|else): ([a-z][\w-]+)", 40):
+        prose = {"the"}
+        for place, match in self.find(r"(?:then|with|do|see|how): ([a-z][\w-]+)", 40):
             self.assertIn(match.group(1), OURS | set(PROGRAMS) | {"sudo"} | prose, place)
 
     def test_units_exist(self):
@@ -138,7 +138,7 @@ class EveryCommandExists(unittest.TestCase):
         for place, match in self.find(r"(\w+)(?: \([^)]*\))?(?: or (\w+))? under \[(\w+)\]", 10):
             one, other, section = match.groups()
             for key in filter(None, (one, other)):
-                if key not in ("it", "them", "and", "s"):
+                if key not in ("it", "them", "both", "and", "s"):
                     self.assertIn((section, key), keys, place)
 
     @unittest.skipUnless(shutil.which("ip"), "ip is missing (apt-get install iproute2)")
@@ -209,7 +209,7 @@ class CarriedOut(unittest.TestCase):
 
     def run_commands(self, cure):
         """Every command of ours in the text, as it stands there; the socket and the control socket are put in."""
-        commands = re.findall(r"(?:iwheelctl|iwheel-sim) [^;,()]+", cure)
+        commands = re.findall(r"(?:iwheelctl|iwheel-sim) [^;,():]+?(?= \w+:|[;,()]|$)", cure)
         where = {"iwheelctl": f"{program('iwheelctl')} --socket {self.rig.path('gateway.sock')}",
                  "iwheel-sim": f"{program('iwheel-sim')} --control {self.rig.path('control')}"}
         for command in commands:
