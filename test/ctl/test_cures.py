@@ -354,6 +354,16 @@ class CarriedOut(unittest.TestCase):
             self.rig.start_gateway()
             self.settle("dlc", lambda: self.rig.sim.ask("padding on"))
 
+    def test_item_nearly_right_is_asked_after(self):
+        self.rig.start_gateway()
+        for typed, meant in (("whel_radius", "did you mean wheel_radius?"), ("setpoint", "did you mean setpoint_type?"),
+                             ("xyzzy", "iwheelctl ledger")):
+            code, _, err = self.ctl("confirm", typed)
+            self.assertEqual(1, code)
+            self.assertIn(meant, err)
+        self.assertNotIn("did you mean", err)
+        self.assertNotIn("did you mean", self.ctl("confirm", "wheel_radius", "x")[2])
+
     def test_tare_settles_a_raw_force_without_its_zero(self):
         self.rig.sim.ask("removed both on")
         self.rig.start_gateway()

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What is assumed about the wheels, what is known, and the operator's word on it.
+#include "names.h"
+#include "similar.h"
 #include "talk/ctl.h"
 #include "text/paper.h"
 #include "text/text.h"
@@ -58,7 +60,7 @@ int verb_ledger(ctl_t *self, int count, char **words) {
 }
 
 /// ITEM [VALUE] [--how TEXT], in any order. NULL after telling what is wrong with the words.
-static json_t *compose(int count, char **words) {
+static json_t *compose(int count, char **words, const char **out_item) {
     char *plain[3] = {NULL, NULL, NULL};
     const char *how = NULL;
     int plains = 0;
@@ -85,12 +87,29 @@ static json_t *compose(int count, char **words) {
     if (request == NULL) {
         (void)ctl_fail(CTL_USAGE, "confirm: item, value and how must be readable text (UTF-8)");
     }
+    *out_item = plain[0];
     return request;
+}
+
+/// The gateway knows no such item: perhaps one that is spelt nearly so.
+static void suggest(const char *item) {
+    const char *best = NULL;
+    size_t best_distance = GW_WORD_STRANGE;
+    for (unsigned i = 0; i < (unsigned)IW_LEDGER_ITEMS; i++) {
+        const char *name = gw_ledger_item_name((iw_ledger_item_t)i);
+        const size_t far = gw_word_distance(item, name);
+        best = far < best_distance ? name : best;
+        best_distance = far < best_distance ? far : best_distance;
+    }
+    if (best != NULL && strcmp(item, best) != 0) {
+        (void)ctl_fail(CTL_NO, "did you mean %s?", best);
+    }
 }
 
 int verb_confirm(ctl_t *self, int count, char **words) {
     json_t *reply = NULL;
-    json_t *request = compose(count, words);
+    const char *item = NULL;
+    json_t *request = compose(count, words, &item);
     if (request == NULL) {
         return CTL_USAGE;
     }
@@ -100,6 +119,9 @@ int verb_confirm(ctl_t *self, int count, char **words) {
         const bool good = strcmp(text_word(reply, "state"), "confirmed") == 0;
         print_item(&paper, good ? "CONFIRMED" : "CONTRADICTED", good ? TONE_GOOD : TONE_BAD, text_word(reply, "item"),
                    reply);
+    }
+    if (code == CTL_NO && !self->json) {
+        suggest(item);
     }
     json_decref(reply);
     return code;
