@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: MIT
+#include "daemon_rig.h"
+
+#include "answers/service.h"
+#include "bus/bus_facts.h"
+#include "json/json_arena.h"
+#include "loop.h"
+#include "status/observe.h"
+
+#include "iwheel_linux/clock.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+/// Far beyond what this machine's own clock can be, so that its timers never come.
+#define START_US  UINT64_C(1000000000000000)
+#define UPTIME_US UINT64_C(600000000)
+#define REPLY_MS  20U
+
+daemon_rig_t daemon_rig;
+
+// The clocks ---------------------------------------------------------------------------------------------------------------
+
+iw_time_us_t iw_clock_now_us(void) {
+    return daemon_rig.now_us;
+}
+
+iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us) {
+    *out_suspended_us = daemon_rig.suspended_us;
+    return daemon_rig.now_us;
+}
+
+iw_time_us_t iw_clock_suspended_us(void) {
+    return daemon_rig.suspended_us;
+}
+
+int64_t iw_clock_wall_us(void) {
+    return (int64_t)(daemon_rig.now_us - START_US);
+}
+
+// Bus and button -----------------------------------------------------------------------------------------------------------
+
+static int rig_send(void *self, const iw_can_frame_t *frame) {
+    daemon_rig_t *rig = &daemon_rig;
+    const iw_side_t side = frame->id == IW_ID_LEFT_SETPOINT ? IW_LEFT : IW_RIGHT;
+    (void)self;
+    if (rig->bus < IW_BUS_PASSIVE) {
+        return -1;
+    }
+    rig->unmarked += daemon_rig_marked() ? 0U : 1U;
+    rig->sent[side]++;
+    rig->told_mm_s[side] = (int16_t)(frame->data[1] << 8 | frame->data[2]);
+    rig->sent_us = rig->now_us;
+    sim_world_submit(&rig->world, rig->now_us, rig->port, frame);
+    return 1;
+}
+
+static int rig_receive(void *self, iw_can_frame_t *out_frame) {
+    daemon_rig_t *rig = &daemon_rig;
+    (void)self;
+    if (rig->rx_next == rig->rx_count) {
+        rig->rx_next = rig->rx_count = 0;
+        return 0;
+    }
+    *out_frame = rig->rx[rig->rx_next++];
+    return 1;
+}
+
+static iw_bus_state_t rig_state(void *self) {
+    (void)self;
+    return daemon_rig.bus;
+}
+
+static int rig_purge(void *self) {
+    (void)self;
+    return 0;
+}
+
+static void rig_close(void *self) {
+    (void)self;
+}
+
+static void rig_tend(void *self, iw_time_us_t now_us) {
+    (void)self;
+    (void)now_us;
+}
+
+static iw_time_us_t rig_next_us(const void *self) {
+    (void)self;
+    return IW_NEVER;
+}
+
+static int rig_bus_fd(const void *self) {
+    (void)self;
+    return daemon_rig.bus_fd;
+}
+
+static const iw_bus_link_t *rig_link(const void *self) {
+    static const iw_bus_link_t link = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
+    (void)self;
+    return &link;
+}
+
+static int rig_estop_fd(const void *self) {
+    (void)self;
+    return daemon_rig.estop_fd;
+}
+
+static int rig_pressed(void *self, bool quiet) {
+    (void)self;
+    (void)quiet;
+    daemon_rig.estop_told = daemon_rig.estop;
+    return daemon_rig.estop;
+}
+
+static int rig_trouble(const void *self) {
+    (void)self;
+    return daemon_rig.estop < 0 ? ENODEV : 0;
+}
+
+static const iw_bus_ops_t bus_ops = {.close = rig_close,
+                                     .watch_fd = rig_bus_fd,
+                                     .tend = rig_tend,
+                                     .next_us = rig_next_us,
+                                     .send = rig_send,
+                                     .receive = rig_receive,
+                                     .state = rig_state,
+                                     .purge = rig_purge,
+                                     .link = rig_link};
+static const iw_estop_ops_t estop_ops = {.close = rig_close,
+                                         .watch_fd = rig_estop_fd,
+                                         .tend = rig_tend,
+                                         .next_us = rig_next_us,
+                                         .pressed = rig_pressed,
+                                         .trouble = rig_trouble,
+                                         .present = true};
+
+// The wait -----------------------------------------------------------------------------------------------------------------
+
+static void take_from_world(daemon_rig_t *rig) {
+    sim_delivery_t delivery;
+    while (sim_world_step(&rig->world, rig->now_us, &delivery)) {
+        if (rig->rx_count < DAEMON_RX_MAX) {
+            rig->rx[rig->rx_count] = delivery.frame;
+            rig->rx[rig->rx_count++].kind = delivery.port == rig->port ? IW_CAN_ECHO : IW_CAN_RECEIVED;
+        }
+    }
+}
+
+/// Makes a descriptor readable or not.
+static void show(int fd, bool readable) {
+    const uint64_t one = 1;
+    uint64_t taken;
+    if (readable) {
+        (void)!write(fd, &one, sizeof one);
+    } else {
+        (void)!read(fd, &taken, sizeof taken);
+    }
+}
+
+static int find_events(daemon_rig_t *rig, int fd, struct epoll_event *events, int max) {
+    int count = 0;
+    if (rig->daemon->wakeup.due_us <= rig->now_us) {
+        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = GW_TAG_TIMER}};
+    }
+    show(rig->bus_fd, rig->rx_next < rig->rx_count);
+    show(rig->estop_fd, rig->estop != rig->estop_told && !rig->estop_silent);
+    const long more = syscall(SYS_epoll_pwait, fd, &events[count], max - count, 0, NULL, 8);
+    return count + (more > 0 ? (int)more : 0);
+}
+
+static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
+    return a_us < b_us ? a_us : b_us;
+}
+
+int epoll_wait(int fd, struct epoll_event *events, int max, int timeout_ms) {
+    daemon_rig_t *rig = &daemon_rig;
+    const iw_time_us_t end_us = timeout_ms < 0 ? IW_NEVER : rig->now_us + (iw_time_us_t)timeout_ms * IW_US_PER_MS;
+    rig->waits++;
+    rig->now_us += rig->stolen_us;
+    rig->stolen_us = 0;
+    while (true) {
+        take_from_world(rig);
+        const int count = find_events(rig, fd, events, max);
+        if (count > 0 || (rig->now_us >= end_us && rig->now_us < rig->until_us)) {
+            return count;
+        }
+        if (rig->now_us >= rig->until_us) {
+            errno = ECANCELED; // Ends the loop, without a cycle.
+            return -1;
+        }
+        iw_time_us_t next_us = earlier(sim_world_wake_us(&rig->world), rig->daemon->wakeup.due_us);
+        next_us = earlier(earlier(next_us, end_us), rig->until_us);
+        rig->now_us = next_us > rig->now_us ? next_us : rig->now_us + 1U;
+    }
+}
+
+// The rig ------------------------------------------------------------------------------------------------------------------
+
+static int listen_somewhere(void) {
+    const struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
+    TEST_ASSERT_EQUAL_INT(0, bind(fd, (const struct sockaddr *)&address, sizeof address.sun_family)); // Any free name.
+    TEST_ASSERT_EQUAL_INT(0, listen(fd, 8));
+    return fd;
+}
+
+static void begin_core(gw_daemon_t *daemon) {
+    daemon->hal = (iw_linux_hal_t){.bus_ops = &bus_ops, .estop_ops = &estop_ops, .estop_last = -1};
+    daemon->hal.tap = gw_observe_tap;
+    daemon->hal.tap_context = daemon;
+    daemon->now_us = daemon_rig.now_us;
+    daemon->suspended_us = daemon_rig.suspended_us;
+    const iw_hal_t port = iw_linux_hal_functions(&daemon->hal);
+    const iw_hal_t hal = gw_tape_hal(&daemon->tape, &port);
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_gateway_init(&daemon->gateway, &daemon->config.core, &hal, daemon->now_us,
+                                                        gw_runtime_crashed(&daemon->runtime)));
+    gw_evidence_init(&daemon->evidence);
+    gw_bus_facts_follow(daemon);
+}
+
+void daemon_rig_start(void) {
+    daemon_rig_t *rig = &daemon_rig;
+    gw_daemon_t *daemon = (gw_daemon_t *)calloc(1, sizeof *daemon);
+    rig->daemon = daemon;
+    gateway_config_default(&daemon->config);
+    fixture_config(&daemon->config.core);
+    daemon->config.record.blackbox_s = 0;
+    (void)snprintf(daemon->config.bus.interface, sizeof daemon->config.bus.interface, "unix:%.60s/bus", rig->folder);
+    gw_log_open(&daemon->log, GW_LOG_ERROR);
+    TEST_ASSERT_EQUAL_INT(0, gw_runtime_open(&daemon->runtime, &daemon->config, rig->folder, stderr));
+    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon->box, &daemon->config));
+    gw_tape_init(&daemon->tape, daemon->box.ring);
+    daemon->listener.fd = listen_somewhere();
+    daemon->listener.reserve_fd = -1;
+    daemon->knowledge.answered = true; // Nobody keeps anything.
+    daemon->knowledge.write_us = IW_NEVER;
+    begin_core(daemon);
+    TEST_ASSERT_EQUAL_INT(0, gw_loop_open(daemon));
+    gw_notify_open(&daemon->notify);
+}
+
+void daemon_rig_crash(void) {
+    gw_daemon_t *daemon = daemon_rig.daemon;
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+        if (daemon->client[i].id != IW_CLIENT_NONE) {
+            (void)close(daemon->client[i].fd);
+        }
+    }
+    gw_loop_close(daemon);
+    gw_notify_close(&daemon->notify);
+    (void)close(daemon->listener.fd);
+    if (daemon->listener.reserve_fd >= 0) {
+        (void)close(daemon->listener.reserve_fd);
+    }
+    gw_box_close(&daemon->box);
+    gw_runtime_close(&daemon->runtime);
+    gw_log_close(&daemon->log);
+    free(daemon);
+    daemon_rig.daemon = NULL;
+}
+
+void daemon_rig_begin(void) {
+    daemon_rig_t *rig = &daemon_rig;
+    sim_pair_config_t pair;
+    json_arena_install();
+    *rig = (daemon_rig_t){.now_us = START_US, .bus = IW_BUS_ACTIVE, .folder = "/tmp/iwheel-daemon-XXXXXX"};
+    TEST_ASSERT_NOT_NULL(mkdtemp(rig->folder));
+    rig->bus_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    rig->estop_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    sim_pair_default(&pair);
+    pair.age_us = UPTIME_US;
+    sim_world_init(&rig->world, &pair, rig->now_us, 1);
+    rig->port = sim_world_connect(&rig->world);
+    daemon_rig_start();
+    daemon_rig_run(1100);
+}
+
+void daemon_rig_end(void) {
+    char path[128];
+    if (daemon_rig.daemon != NULL) {
+        daemon_rig_crash();
+    }
+    static const char *const left[] = {"bus.armed", "bus.gateway-lock", ""};
+    for (size_t i = 0; i < sizeof left / sizeof left[0]; ++i) {
+        (void)snprintf(path, sizeof path, "%s/%s", daemon_rig.folder, left[i]);
+        (void)remove(path);
+    }
+    (void)close(daemon_rig.bus_fd);
+    (void)close(daemon_rig.estop_fd);
+}
+
+void daemon_rig_run(unsigned for_ms) {
+    daemon_rig.until_us = daemon_rig.now_us + daemon_rig.stolen_us + MS(for_ms);
+    daemon_rig.ended = gw_loop_run(daemon_rig.daemon) == 0;
+}
+
+int daemon_rig_connect(void) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    socklen_t length = sizeof address;
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
+    TEST_ASSERT_EQUAL_INT(0, getsockname(daemon_rig.daemon->listener.fd, (struct sockaddr *)&address, &length));
+    TEST_ASSERT_EQUAL_INT(0, connect(fd, (const struct sockaddr *)&address, length));
+    daemon_rig_run(2);
+    return fd;
+}
+
+/// One line of what has come, without its end. False: there is no whole one.
+static bool take_line(int client, char *out_line, size_t size) {
+    const ssize_t seen = recv(client, out_line, size - 1U, MSG_PEEK | MSG_DONTWAIT);
+    const char *end = seen > 0 ? (const char *)memchr(out_line, '\n', (size_t)seen) : NULL;
+    if (end == NULL) {
+        return false;
+    }
+    const size_t length = (size_t)(end - out_line) + 1U;
+    (void)recv(client, out_line, length, MSG_DONTWAIT);
+    out_line[length - 1U] = '\0';
+    return true;
+}
+
+const char *daemon_rig_ask(int client, const char *line) {
+    char *reply = daemon_rig.reply;
+    while (take_line(client, reply, sizeof daemon_rig.reply)) { // Of before.
+    }
+    TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
+    TEST_ASSERT_EQUAL_INT(1, (int)send(client, "\n", 1, MSG_NOSIGNAL));
+    for (unsigned ms = 0; ms < REPLY_MS; ++ms) {
+        daemon_rig_run(1);
+        while (take_line(client, reply, sizeof daemon_rig.reply)) {
+            if (strstr(reply, "\"ok\":") != NULL) {
+                return reply;
+            }
+        }
+    }
+    reply[0] = '\0';
+    return reply;
+}
+
+void daemon_rig_arm(int client) {
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"arm\"}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":true"), reply);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
+void daemon_rig_drive(int client, int left_mm_s, int right_mm_s, unsigned for_ms) {
+    char line[96];
+    (void)snprintf(line, sizeof line, "{\"cmd\":\"drive\",\"left_mm_s\":%d,\"right_mm_s\":%d}", left_mm_s, right_mm_s);
+    const iw_time_us_t until_us = daemon_rig.now_us + MS(for_ms);
+    while (daemon_rig.now_us < until_us) {
+        const iw_time_us_t begin_us = daemon_rig.now_us;
+        const char *reply = daemon_rig_ask(client, line);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":true"), reply);
+        const unsigned used_ms = (unsigned)((daemon_rig.now_us - begin_us) / IW_US_PER_MS);
+        daemon_rig_run(used_ms < 20U ? 20U - used_ms : 1U);
+    }
+}
+
+bool daemon_rig_marked(void) {
+    char path[128];
+    (void)snprintf(path, sizeof path, "%s/bus.armed", daemon_rig.folder);
+    return access(path, F_OK) == 0;
+}
+
+iw_state_t daemon_rig_state(void) {
+    return iw_gateway_state(&daemon_rig.daemon->gateway);
+}

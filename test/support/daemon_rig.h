@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+/// The gateway's whole loop and its clients' sockets, with the simulated wheels, in virtual time: nothing waits, nothing sleeps.
+///
+/// Its own clock, wait and backends stand in for those of the Linux port and the C library (`iw_clock_*`, `epoll_wait`); everything
+/// between is what the daemon runs. There is one rig, because a clock has no context.
+///
+///     daemon_rig_begin();                     a gateway that starts beside wheels that stand
+///     int client = daemon_rig_connect();
+///     daemon_rig_ask(client, "{...}");        the reply to one request
+///     daemon_rig_run(100);                    100 ms of the loop
+///     daemon_rig_crash(); daemon_rig_start(); a kill -9, and the next start
+///     daemon_rig_end();
+#ifndef TEST_DAEMON_RIG_H
+#define TEST_DAEMON_RIG_H
+
+#include "daemon.h"
+#include "fixture.h"
+#include "iwheel_sim/world.h"
+
+#define DAEMON_RX_MAX 256U
+
+typedef struct {
+    gw_daemon_t *daemon;
+    sim_world_t world;
+    iw_time_us_t now_us;
+    iw_time_us_t until_us;       ///< Where `daemon_rig_run` ends.
+    iw_time_us_t suspended_us;   ///< The machine's sleep so far, as the clocks tell it.
+    iw_time_us_t stolen_us;      ///< The next wait takes that much longer: the process stands still.
+    iw_bus_state_t bus;          ///< What the bus answers.
+    int estop;                   ///< What the button answers: 1 pressed, 0, -1 unreadable.
+    bool estop_silent;           ///< The next change of it wakes nobody, as when a GPIO chip goes.
+    uint32_t waits;              ///< Calls of epoll_wait.
+    bool ended;                  ///< The loop has come to its end by itself.
+    uint32_t unmarked;           ///< Setpoints handed over while there was no crash marker.
+    uint32_t sent[IW_SIDES];     ///< Setpoints handed over.
+    int16_t told_mm_s[IW_SIDES]; ///< The last of them.
+    iw_time_us_t sent_us;        ///< When.
+    iw_can_frame_t rx[DAEMON_RX_MAX];
+    unsigned rx_count;
+    unsigned rx_next;
+    int estop_told; ///< What the button's descriptor has told.
+    int bus_fd;
+    int estop_fd;
+    int listen_fd;
+    uint8_t port;
+    char folder[64];
+    char reply[GW_REPLY_MAX];
+} daemon_rig_t;
+
+extern daemon_rig_t daemon_rig;
+
+/// Wheels that have been running for ten minutes, and a gateway that has seen them at rest for a second.
+void daemon_rig_begin(void);
+void daemon_rig_end(void);
+
+/// The process is gone, with nothing put in order.
+void daemon_rig_crash(void);
+
+/// The next start, beside the same wheels.
+void daemon_rig_start(void);
+
+/// The loop for that long.
+void daemon_rig_run(unsigned for_ms);
+
+/// A new connection.
+int daemon_rig_connect(void);
+
+/// Sends a line; the loop runs until its reply has come (20 ms at the most). Events are passed over. Empty: no reply.
+const char *daemon_rig_ask(int client, const char *line);
+
+/// Arms, or drives for that long with a command every 20 ms; fails the test if that is refused.
+void daemon_rig_arm(int client);
+void daemon_rig_drive(int client, int left_mm_s, int right_mm_s, unsigned for_ms);
+
+/// True if the crash marker is there.
+bool daemon_rig_marked(void);
+
+iw_state_t daemon_rig_state(void);
+
+#endif

@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: MIT
+// The daemon's loop in motion, in virtual time: the crash marker, the e-stop, the clocks, the lease, the end.
+#include "daemon_rig.h"
+
+#include "unity.h"
+
+#include <signal.h>
+#include <string.h>
+#include <unistd.h>
+
+static int client;
+
+void setUp(void) {
+    daemon_rig_begin();
+    client = daemon_rig_connect();
+}
+
+void tearDown(void) {
+    (void)close(client);
+    daemon_rig_end();
+}
+
+static void begin_driving(void) {
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 500, 500, 1000);
+    TEST_ASSERT_EQUAL_INT(500, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(500, daemon_rig.told_mm_s[IW_RIGHT]);
+}
+
+static bool is_told_zero(void) {
+    return daemon_rig.told_mm_s[IW_LEFT] == 0 && daemon_rig.told_mm_s[IW_RIGHT] == 0;
+}
+
+static const char *cause(void) {
+    const char *at = strstr(daemon_rig_ask(client, "{\"cmd\":\"why\"}"), "\"cause\":\"");
+    return at != NULL ? at + strlen("\"cause\":\"") : "";
+}
+
+static bool is_cause(const char *name) {
+    const char *is = cause();
+    return strncmp(is, name, strlen(name)) == 0 && is[strlen(name)] == '"';
+}
+
+/// Killed now and started again: zeros and nothing else, at once, for as long as the wheels might keep their last command.
+static void assert_next_start_sends_zeros(void) {
+    daemon_rig_crash();
+    const uint32_t before = daemon_rig.sent[IW_LEFT];
+    const iw_time_us_t begin_us = daemon_rig.now_us;
+    daemon_rig_start();
+    while (daemon_rig.now_us - begin_us < MS(1400)) {
+        daemon_rig_run(20);
+        TEST_ASSERT_TRUE(is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.sent_us < MS(100));
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(before + 50U, daemon_rig.sent[IW_LEFT]);
+    daemon_rig_run(2000);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+}
+
+static void test_marker_is_there_before_the_first_setpoint_and_until_after_the_last(void) {
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+    begin_driving();
+    (void)close(client);
+    client = -1;
+    for (unsigned ms = 0; ms < 5000U; ++ms) {
+        daemon_rig_run(1);
+        TEST_ASSERT_EQUAL_INT(daemon_rig_state() == IW_STATE_STOPPING, daemon_rig_marked());
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.unmarked);
+}
+
+static void test_marker_outlives_a_latch_until_its_zeros_have_been_held(void) {
+    begin_driving();
+    daemon_rig.estop = 1;
+    daemon_rig_run(1000);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    TEST_ASSERT_TRUE(daemon_rig_marked());
+    daemon_rig_run(2000);
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.unmarked);
+}
+
+static void test_killed_while_armed_the_next_start_sends_zeros(void) {
+    begin_driving();
+    assert_next_start_sends_zeros();
+}
+
+static void test_killed_in_the_ramp_the_next_start_sends_zeros(void) {
+    begin_driving();
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
+    daemon_rig_run(60);
+    TEST_ASSERT_FALSE(is_told_zero());
+    assert_next_start_sends_zeros();
+}
+
+static void test_killed_in_the_hold_the_next_start_sends_zeros(void) {
+    begin_driving();
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
+    daemon_rig_run(1000);
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    assert_next_start_sends_zeros();
+}
+
+static void test_killed_in_the_zeros_of_a_restart_the_next_start_sends_them_anew(void) {
+    begin_driving();
+    daemon_rig_crash();
+    daemon_rig_start();
+    daemon_rig_run(700);
+    assert_next_start_sends_zeros();
+}
+
+static void test_killed_while_listening_the_next_start_sends_nothing(void) {
+    begin_driving();
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
+    daemon_rig_run(4000);
+    const uint32_t before = daemon_rig.sent[IW_RIGHT];
+    daemon_rig_crash();
+    daemon_rig_start();
+    daemon_rig_run(2000);
+    TEST_ASSERT_EQUAL_UINT32(before, daemon_rig.sent[IW_RIGHT]);
+}
+
+static void test_estop_edge_is_answered_with_zeros_in_the_same_millisecond(void) {
+    for (unsigned phase = 0; phase < 20U; ++phase) {
+        begin_driving();
+        daemon_rig_run(phase);
+        daemon_rig.estop = 1;
+        const iw_time_us_t pressed_us = daemon_rig.now_us;
+        daemon_rig_run(1);
+        TEST_ASSERT_TRUE(is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig.sent_us >= pressed_us);
+        tearDown();
+        setUp();
+    }
+}
+
+static void test_estop_that_goes_without_a_word_is_seen_within_milliseconds(void) {
+    begin_driving();
+    daemon_rig.estop_silent = true;
+    daemon_rig.estop = -1;
+    daemon_rig_run(5);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    TEST_ASSERT_TRUE(is_told_zero());
+}
+
+static void test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds(void) {
+    begin_driving();
+    daemon_rig_run(21);
+    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // No frame wakes us now.
+    daemon_rig.estop_silent = true;
+    daemon_rig.estop = -1;
+    daemon_rig_run(5);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    TEST_ASSERT_TRUE(is_cause("estop_line"));
+}
+
+static void test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after(void) {
+    static const unsigned hold_ms[] = {0, 100, 1000, 3000};
+    for (size_t i = 0; i < sizeof hold_ms / sizeof hold_ms[0]; ++i) {
+        const int other = daemon_rig_connect();
+        begin_driving();
+        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"estop\",\"reason\":\"test\"}"), "\"ok\":true"));
+        daemon_rig_run(hold_ms[i]);
+        (void)close(other);
+        daemon_rig_run(3000);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"latched\""));
+        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"reset\"}"), "\"ok\":true"));
+    }
+}
+
+static void test_suspended_machine_latches_with_zeros_first(void) {
+    begin_driving();
+    daemon_rig.suspended_us += 2000000U;
+    const uint32_t before = daemon_rig.sent[IW_LEFT];
+    daemon_rig_run(25);
+    TEST_ASSERT_GREATER_THAN_UINT32(before, daemon_rig.sent[IW_LEFT]);
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    TEST_ASSERT_TRUE(is_cause("loop_hung"));
+}
+
+static void test_suspension_counts_once_and_one_from_before_the_start_not_at_all(void) {
+    daemon_rig_crash();
+    daemon_rig.suspended_us += 3600000000U;
+    daemon_rig_start();
+    daemon_rig_run(1100);
+    (void)close(client);
+    client = daemon_rig_connect();
+    begin_driving();
+    daemon_rig.suspended_us += 200000U;
+    daemon_rig_run(25);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    TEST_ASSERT_TRUE(is_told_zero());
+    daemon_rig_run(4000);
+    begin_driving();
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
+static void test_loop_that_stood_still_goes_on_with_zeros(void) {
+    begin_driving();
+    daemon_rig.stolen_us = 150000U;
+    daemon_rig_run(1);
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    daemon_rig_run(4000);
+    begin_driving();
+    daemon_rig.stolen_us = 600000U;
+    daemon_rig_run(1);
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+}
+
+static void test_lease_is_lost_when_commands_end_although_requests_go_on(void) {
+    begin_driving();
+    const iw_time_us_t last_us = daemon_rig.now_us;
+    while (daemon_rig_state() == IW_STATE_ARMED && daemon_rig.now_us - last_us < MS(1000)) {
+        (void)daemon_rig_ask(client, "{\"cmd\":\"status\"}");
+        (void)daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":100}");
+    }
+    TEST_ASSERT_TRUE(daemon_rig.now_us - last_us <= MS(205));
+    TEST_ASSERT_TRUE(is_cause("lease_lost"));
+}
+
+static void test_lease_ends_with_the_connection_at_once(void) {
+    begin_driving();
+    (void)close(client);
+    client = -1;
+    daemon_rig_run(1);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+}
+
+static void test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels(void) {
+    begin_driving();
+    for (unsigned ms = 0; ms < 2000U; ++ms) {
+        (void)(ms % 50U == 0U ? daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}")
+                              : "");
+        daemon_rig_run(1);
+        TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.sent_us <= MS(21));
+    }
+}
+
+static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
+    begin_driving();
+    TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
+    daemon_rig_run(1);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    TEST_ASSERT_FALSE(is_told_zero());
+    const iw_time_us_t told_us = daemon_rig.now_us;
+    daemon_rig_run(10000);
+    TEST_ASSERT_TRUE(daemon_rig.ended);
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_TRUE(daemon_rig.now_us - told_us >= MS(1500));
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+}
+
+static void test_frames_that_nobody_waits_for_are_taken_together_and_one_by_one_as_soon_as_somebody_does(void) {
+    (void)close(client);
+    client = -1;
+    daemon_rig_run(100);
+    daemon_rig.waits = 0;
+    daemon_rig_run(1000);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, daemon_rig.waits);
+    client = daemon_rig_connect();
+    daemon_rig.waits = 0;
+    daemon_rig_run(1000);
+    TEST_ASSERT_GREATER_THAN_UINT32(450, daemon_rig.waits);
+}
+
+static void test_estop_wakes_a_loop_that_lets_frames_wait(void) {
+    (void)close(client);
+    client = -1;
+    daemon_rig_run(100);
+    for (unsigned phase = 0; phase < 10U; ++phase) {
+        daemon_rig_run(7);
+        const iw_time_us_t before_us = daemon_rig.now_us;
+        daemon_rig.estop = daemon_rig.estop == 0 ? 1 : 0;
+        daemon_rig_run(1);
+        TEST_ASSERT_EQUAL_INT(daemon_rig.estop, daemon_rig.estop_told);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_TRUE(daemon_rig.now_us - before_us <= MS(1));
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_marker_is_there_before_the_first_setpoint_and_until_after_the_last);
+    RUN_TEST(test_marker_outlives_a_latch_until_its_zeros_have_been_held);
+    RUN_TEST(test_killed_while_armed_the_next_start_sends_zeros);
+    RUN_TEST(test_killed_in_the_ramp_the_next_start_sends_zeros);
+    RUN_TEST(test_killed_in_the_hold_the_next_start_sends_zeros);
+    RUN_TEST(test_killed_in_the_zeros_of_a_restart_the_next_start_sends_them_anew);
+    RUN_TEST(test_killed_while_listening_the_next_start_sends_nothing);
+    RUN_TEST(test_estop_edge_is_answered_with_zeros_in_the_same_millisecond);
+    RUN_TEST(test_estop_that_goes_without_a_word_is_seen_within_milliseconds);
+    RUN_TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds);
+    RUN_TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after);
+    RUN_TEST(test_suspended_machine_latches_with_zeros_first);
+    RUN_TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all);
+    RUN_TEST(test_loop_that_stood_still_goes_on_with_zeros);
+    RUN_TEST(test_lease_is_lost_when_commands_end_although_requests_go_on);
+    RUN_TEST(test_lease_ends_with_the_connection_at_once);
+    RUN_TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels);
+    RUN_TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker);
+    RUN_TEST(test_frames_that_nobody_waits_for_are_taken_together_and_one_by_one_as_soon_as_somebody_does);
+    RUN_TEST(test_estop_wakes_a_loop_that_lets_frames_wait);
+    return UNITY_END();
+}

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+// Requests as the daemon carries them out, from the line to the wheels, in virtual time.
+#include "daemon_rig.h"
+
+#include "unity.h"
+
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+static int client;
+
+void setUp(void) {
+    daemon_rig_begin();
+    client = daemon_rig_connect();
+}
+
+void tearDown(void) {
+    (void)close(client);
+    daemon_rig_end();
+}
+
+static void assert_reply(const char *line, const char *part) {
+    const char *reply = daemon_rig_ask(client, line);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, part), reply[0] != '\0' ? reply : line);
+}
+
+/// The object `side` of the snapshot.
+static const char *wheel(const char *side) {
+    char name[16];
+    (void)snprintf(name, sizeof name, "\"%s\":{", side);
+    const char *at = strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), name);
+    TEST_ASSERT_NOT_NULL(at);
+    return at;
+}
+
+static bool says(const char *object, const char *words) {
+    const char *found = strstr(object, words);
+    const char *next = strstr(object + 1, "\"right\":{");
+    return found != NULL && (next == NULL || found < next);
+}
+
+static void test_drive_reaches_the_wheel_it_is_for(void) {
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 300, 100, 1000);
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(100, daemon_rig.told_mm_s[IW_RIGHT]);
+    TEST_ASSERT_TRUE(says(wheel("left"), "\"applied_mm_s\":300,"));
+    TEST_ASSERT_TRUE(says(wheel("right"), "\"applied_mm_s\":100,"));
+}
+
+static void test_twist_to_the_left_turns_the_right_wheel_faster(void) {
+    daemon_rig_arm(client);
+    for (unsigned i = 0; i < 50U; ++i) {
+        assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":200,\"yaw_mrad_s\":200}", "\"ok\":true");
+        daemon_rig_run(20);
+    }
+    TEST_ASSERT_EQUAL_INT(200 - 200 * daemon_rig.daemon->config.track_mm / 2000, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(200 + 200 * daemon_rig.daemon->config.track_mm / 2000, daemon_rig.told_mm_s[IW_RIGHT]);
+}
+
+static void test_number_beyond_every_range_is_refused_and_never_wraps_into_it(void) {
+    static const char *const lines[] = {
+        "{\"cmd\":\"drive\",\"left_mm_s\":4294967496,\"right_mm_s\":200}",
+        "{\"cmd\":\"drive\",\"left_mm_s\":200,\"right_mm_s\":-4294967096}",
+        "{\"cmd\":\"drive\",\"left_mm_s\":65736,\"right_mm_s\":200}",
+        "{\"cmd\":\"drive\",\"left_mm_s\":200,\"right_mm_s\":65736}",
+        "{\"cmd\":\"drive\",\"left_mm_s\":200,\"right_mm_s\":200,\"left_mA\":4294967796,\"right_mA\":500}",
+        "{\"cmd\":\"drive\",\"left_mm_s\":200,\"right_mm_s\":200,\"left_mA\":500,\"right_mA\":66036}",
+        "{\"cmd\":\"twist\",\"v_mm_s\":4294967496,\"yaw_mrad_s\":0}",
+        "{\"cmd\":\"twist\",\"v_mm_s\":200,\"yaw_mrad_s\":4294967296}",
+        "{\"cmd\":\"twist\",\"v_mm_s\":9223372036854775807,\"yaw_mrad_s\":-9223372036854775807}",
+    };
+    daemon_rig_arm(client);
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; ++i) {
+        assert_reply(lines[i], "\"error\":\"out_of_range\"");
+        daemon_rig_run(40);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_RIGHT]);
+    }
+}
+
+static void test_battery_at_the_end_of_its_byte_is_flagged_and_only_then(void) {
+    daemon_rig.world.pair.battery_dV = 255;
+    daemon_rig_run(100);
+    TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":true"));
+    TEST_ASSERT_TRUE(says(wheel("right"), "\"saturated\":{\"battery\":true"));
+    daemon_rig.world.pair.battery_dV = 254;
+    daemon_rig_run(100);
+    TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":false"));
+    daemon_rig.world.pair.battery_dV = 255;
+    daemon_rig_run(100);
+    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // What is no longer heard is not known.
+    daemon_rig_run(2000);
+    TEST_ASSERT_TRUE(says(wheel("left"), "\"saturated\":{\"battery\":false"));
+    TEST_ASSERT_TRUE(says(wheel("left"), "\"battery_dV\":null"));
+}
+
+static void test_tare_of_one_wheel_leaves_the_other(void) {
+    daemon_rig_run(3000);
+    const iw_time_us_t asked_us = daemon_rig.now_us;
+    assert_reply("{\"cmd\":\"tare\",\"side\":\"left\"}", "\"left\":{");
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->gateway.force[IW_LEFT].provenance);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->gateway.force[IW_LEFT].offset_us >= asked_us);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->gateway.force[IW_RIGHT].provenance != IW_OFFSET_OPERATOR);
+}
+
+static void test_tare_of_both_that_one_cannot_have_changes_neither(void) {
+    daemon_rig_run(3000);
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 0, 100, 500);
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+    daemon_rig_run(1000);
+    assert_reply("{\"cmd\":\"tare\"}", "the right wheel");
+    TEST_ASSERT_TRUE(daemon_rig.daemon->gateway.force[IW_LEFT].provenance != IW_OFFSET_OPERATOR);
+}
+
+static void test_client_that_goes_while_it_arms_leaves_no_lease(void) {
+    static const char line[] = "{\"cmd\":\"arm\"}\n";
+    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    (void)close(client);
+    daemon_rig_run(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    client = daemon_rig_connect();
+    daemon_rig_arm(client);
+}
+
+static void test_command_behind_arm_in_one_breath_is_stale(void) {
+    static const char lines[] =
+        "{\"cmd\":\"arm\"}\n{\"id\":9,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
+    TEST_ASSERT_EQUAL_INT((int)sizeof lines - 1, (int)send(client, lines, sizeof lines - 1U, MSG_NOSIGNAL));
+    for (unsigned ms = 0; ms < 500U; ++ms) {
+        daemon_rig_run(1);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_RIGHT]);
+    }
+}
+
+static void test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now(void) {
+    static const char line[] = "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 300, 300, 500);
+    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    daemon_rig.stolen_us = 90000U; // Late, but not so late that it stops for that.
+    const iw_time_us_t sent_us = daemon_rig.now_us;
+    daemon_rig_run(1);
+    while (daemon_rig_state() == IW_STATE_ARMED && daemon_rig.now_us - sent_us < MS(1000)) {
+        daemon_rig_run(1);
+    }
+    TEST_ASSERT_TRUE(daemon_rig.now_us - sent_us <= MS(202));
+}
+
+static void test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest(void) {
+    const int other = daemon_rig_connect();
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 200, 200, 500);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"busy\""));
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\",\"takeover\":true}"), "\"ok\":false"));
+    daemon_rig_drive(client, 0, 0, 2000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"busy\""));
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\",\"takeover\":true}"), "\"ok\":true"));
+    assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":0,\"right_mm_s\":0}", "\"error\":\"not_holder\"");
+    (void)close(other);
+}
+
+static void test_arm_while_shutting_down_is_refused(void) {
+    daemon_rig.daemon->shutting_down = true;
+    daemon_rig.daemon->gateway.permit.state = IW_STATE_STOPPING; // So that the loop goes on.
+    daemon_rig.daemon->gateway.permit.hold_us = daemon_rig.now_us;
+    assert_reply("{\"cmd\":\"arm\"}", "shutting down");
+}
+
+static void test_stop_and_estop_need_no_lease(void) {
+    const int other = daemon_rig_connect();
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 200, 200, 300);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"stop\"}"), "\"state\":\"stopping\""));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"estop\"}"), "\"state\":\"latched\""));
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
+    (void)close(other);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_drive_reaches_the_wheel_it_is_for);
+    RUN_TEST(test_twist_to_the_left_turns_the_right_wheel_faster);
+    RUN_TEST(test_number_beyond_every_range_is_refused_and_never_wraps_into_it);
+    RUN_TEST(test_battery_at_the_end_of_its_byte_is_flagged_and_only_then);
+    RUN_TEST(test_tare_of_one_wheel_leaves_the_other);
+    RUN_TEST(test_tare_of_both_that_one_cannot_have_changes_neither);
+    RUN_TEST(test_client_that_goes_while_it_arms_leaves_no_lease);
+    RUN_TEST(test_command_behind_arm_in_one_breath_is_stale);
+    RUN_TEST(test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now);
+    RUN_TEST(test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest);
+    RUN_TEST(test_arm_while_shutting_down_is_refused);
+    RUN_TEST(test_stop_and_estop_need_no_lease);
+    return UNITY_END();
+}
