@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+/// One GPIO line as both generations of libgpiod show it: what a test sets, and what it was asked for.
+#ifndef TEST_FAKE_GPIO_H
+#define TEST_FAKE_GPIO_H
+
+#include <stdbool.h>
+
+typedef struct {
+    int level;       ///< Of the line; -1: it cannot be read.
+    int edges;       ///< That wait to be read.
+    int edges_error; ///< errno of reading them; 0: none.
+    int chip_error;  ///< errno of opening the chip; 0: it opens.
+    int busy_error;  ///< errno of asking for the line; 0: it is given.
+
+    bool is_input;
+    bool pulled_up;
+    bool both_edges;
+    unsigned offset; ///< That was asked for.
+    int open;        ///< Chips open now.
+    int requested;   ///< Lines held now.
+    int reads;       ///< Of edges.
+    int ends[2];     ///< A pipe: the first is the line's descriptor.
+} fake_gpio_t;
+
+extern fake_gpio_t fake_gpio;
+
+/// How many edges one read takes.
+int fake_gpio_take(unsigned room);
+
+/// The line's own chip, its name and its offset there.
+#define FAKE_GPIO_CHIP   "gpiochip3"
+#define FAKE_GPIO_NAME   "ESTOP"
+#define FAKE_GPIO_OFFSET 17U
+
+#endif

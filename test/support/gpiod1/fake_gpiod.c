@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include "../fake_gpio.h"
+
+#include <errno.h>
+#include <gpiod.h>
+#include <stddef.h>
+#include <string.h>
+#include <unistd.h>
+
+static char one;
+
+static void *open_chip(void) {
+    if (fake_gpio.chip_error != 0) {
+        errno = fake_gpio.chip_error;
+        return NULL;
+    }
+    fake_gpio.open++;
+    return &one;
+}
+
+struct gpiod_chip *gpiod_chip_open_by_name(const char *name) {
+    errno = ENOENT;
+    return strcmp(name, FAKE_GPIO_CHIP) == 0 ? (struct gpiod_chip *)open_chip() : NULL;
+}
+
+void gpiod_chip_close(struct gpiod_chip *chip) {
+    (void)chip;
+    fake_gpio.open--;
+}
+
+struct gpiod_line *gpiod_chip_get_line(struct gpiod_chip *chip, unsigned offset) {
+    fake_gpio.offset = offset;
+    errno = EINVAL;
+    return offset == FAKE_GPIO_OFFSET ? (struct gpiod_line *)(void *)chip : NULL;
+}
+
+struct gpiod_line *gpiod_line_find(const char *name) {
+    errno = ENOENT;
+    fake_gpio.offset = FAKE_GPIO_OFFSET;
+    return strcmp(name, FAKE_GPIO_NAME) == 0 ? (struct gpiod_line *)open_chip() : NULL;
+}
+
+void gpiod_line_close_chip(struct gpiod_line *line) {
+    (void)line;
+    fake_gpio.open--;
+    if (fake_gpio.requested > 0) {
+        fake_gpio.requested--;
+        (void)close(fake_gpio.ends[0]);
+        (void)close(fake_gpio.ends[1]);
+    }
+}
+
+static int give(int flags, bool both) {
+    fake_gpio.is_input = true;
+    fake_gpio.both_edges = both;
+    fake_gpio.pulled_up = (flags & GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP) != 0;
+    errno = fake_gpio.busy_error;
+    if (fake_gpio.busy_error != 0 || pipe(fake_gpio.ends) != 0) {
+        return -1;
+    }
+    fake_gpio.requested++;
+    return 0;
+}
+
+int gpiod_line_request_both_edges_events_flags(struct gpiod_line *line, const char *consumer, int flags) {
+    (void)line;
+    (void)consumer;
+    return give(flags, true);
+}
+
+int gpiod_line_request_rising_edge_events_flags(struct gpiod_line *line, const char *consumer, int flags) {
+    (void)line;
+    (void)consumer;
+    return give(flags, false);
+}
+
+int gpiod_line_event_get_fd(struct gpiod_line *line) {
+    (void)line;
+    return fake_gpio.ends[0];
+}
+
+int gpiod_line_get_value(struct gpiod_line *line) {
+    (void)line;
+    errno = ENODEV;
+    return fake_gpio.level;
+}
+
+int gpiod_line_event_read_fd_multiple(int fd, struct gpiod_line_event *events, unsigned count) {
+    (void)fd;
+    (void)memset(events, 0, count * sizeof *events);
+    return fake_gpio_take(count);
+}

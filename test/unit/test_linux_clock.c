@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// Which of the kernel's clocks is which: the wall's may be set, and the one that counts the machine's sleep is not the loop's.
+#include "iwheel_linux/clock.h"
+
+#include "unity.h"
+
+#include <time.h>
+
+/// What the kernel's clocks tell, and by how much each call takes longer than none.
+static struct timespec monotonic;
+static struct timespec boot;
+static struct timespec wall;
+static long passes_ns;
+
+int clock_gettime(clockid_t clock, struct timespec *out_now) {
+    *out_now = clock == CLOCK_MONOTONIC ? monotonic : clock == CLOCK_BOOTTIME ? boot : wall;
+    monotonic.tv_nsec += passes_ns;
+    boot.tv_nsec += passes_ns;
+    return 0;
+}
+
+void setUp(void) {
+    monotonic = (struct timespec){5000, 123456789};
+    boot = (struct timespec){5000, 123456789};
+    wall = (struct timespec){1700000000, 987654321};
+    passes_ns = 0;
+}
+
+void tearDown(void) {}
+
+static void test_clock_of_the_loop_is_monotonic_in_microseconds(void) {
+    TEST_ASSERT_EQUAL_UINT64(5000123456U, iw_clock_now_us());
+    wall.tv_sec -= 3600;
+    boot.tv_sec += 60;
+    TEST_ASSERT_EQUAL_UINT64(5000123456U, iw_clock_now_us());
+    iw_time_us_t suspended_us = 0;
+    TEST_ASSERT_EQUAL_UINT64(5000123456U, iw_clock_read(&suspended_us));
+}
+
+static void test_clock_tells_sleep_that_the_loop_does_not_count(void) {
+    iw_time_us_t suspended_us = 1;
+    (void)iw_clock_read(&suspended_us);
+    TEST_ASSERT_EQUAL_UINT64(0, suspended_us);
+    boot.tv_sec += 2;
+    (void)iw_clock_read(&suspended_us);
+    TEST_ASSERT_EQUAL_UINT64(2000000, suspended_us);
+    TEST_ASSERT_EQUAL_UINT64(2000000, iw_clock_suspended_us());
+    wall.tv_sec += 3600;
+    TEST_ASSERT_EQUAL_UINT64(2000000, iw_clock_suspended_us());
+}
+
+static void test_clock_time_between_the_two_looks_is_never_taken_for_sleep(void) {
+    iw_time_us_t suspended_us = 1;
+    passes_ns = 40000000;
+    (void)iw_clock_read(&suspended_us);
+    TEST_ASSERT_EQUAL_UINT64(0, suspended_us);
+    boot.tv_sec += 2;
+    (void)iw_clock_read(&suspended_us);
+    TEST_ASSERT_TRUE(suspended_us <= 2000000U);
+}
+
+static void test_clock_of_the_wall_is_for_people_only(void) {
+    TEST_ASSERT_EQUAL_INT64(1700000000987654, iw_clock_wall_us());
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_clock_of_the_loop_is_monotonic_in_microseconds);
+    RUN_TEST(test_clock_tells_sleep_that_the_loop_does_not_count);
+    RUN_TEST(test_clock_time_between_the_two_looks_is_never_taken_for_sleep);
+    RUN_TEST(test_clock_of_the_wall_is_for_people_only);
+    return UNITY_END();
+}

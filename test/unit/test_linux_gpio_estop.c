@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+// The e-stop on a GPIO line that the test plays: presses, pulses, a chip that goes and comes, a line that somebody else has.
+#include "gpio_line.h"
+
+#include "iwheel_linux/backend.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdint.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#define MS 1000U
+
+static struct {
+    int level; ///< -1: cannot be read.
+    int edges; ///< -1: gone.
+    int open_error;
+    int opened;
+    int fd;
+} wire;
+
+static iw_backend_store_t store;
+static iw_time_us_t now_us;
+
+int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
+    (void)address;
+    *self = (iw_gpio_line_t){.fd = -1};
+    wire.opened++;
+    if (wire.open_error != 0) {
+        return wire.open_error;
+    }
+    wire.fd = self->fd = eventfd(0, EFD_NONBLOCK);
+    return 0;
+}
+
+void iw_gpio_line_close(iw_gpio_line_t *self) {
+    if (self->fd >= 0) {
+        (void)close(self->fd);
+    }
+    *self = (iw_gpio_line_t){.fd = -1};
+}
+
+int iw_gpio_line_level(const iw_gpio_line_t *self) {
+    (void)self;
+    return wire.level;
+}
+
+int iw_gpio_line_take_edges(iw_gpio_line_t *self) {
+    const int edges = wire.edges;
+    (void)self;
+    wire.edges = edges > 0 ? 0 : edges;
+    return edges;
+}
+
+static void tend(unsigned after_ms) {
+    now_us += (iw_time_us_t)after_ms * MS;
+    iw_gpio_estop_ops->tend(&store, now_us);
+}
+
+/// With a wait before that has told of edges if there are any.
+static int pressed(void) {
+    return iw_gpio_estop_ops->pressed(&store, wire.edges == 0);
+}
+
+static void begin(bool active_high) {
+    const iw_estop_wish_t wish = {.name = "ESTOP", .active_high = active_high, .debounce_ms = 5};
+    wire.level = active_high ? 0 : 1;
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_estop_ops->open(&store, &wish));
+    tend(0);
+}
+
+void setUp(void) {
+    now_us = 7000000;
+    wire.edges = wire.open_error = wire.opened = 0;
+    begin(false);
+}
+
+void tearDown(void) {
+    iw_gpio_estop_ops->close(&store);
+}
+
+static void test_estop_line_low_is_pressed_and_high_is_released(void) {
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+    wire.level = 0;
+    wire.edges = 1;
+    tend(1);
+    TEST_ASSERT_EQUAL_INT(1, pressed());
+    tend(100);
+    TEST_ASSERT_EQUAL_INT(1, pressed());
+    wire.level = 1;
+    wire.edges = 1;
+    tend(1);
+    TEST_ASSERT_EQUAL_INT(1, pressed());
+    TEST_ASSERT_EQUAL_UINT64(now_us + 5U * MS, iw_gpio_estop_ops->next_us(&store));
+    tend(5);
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+}
+
+static void test_estop_line_active_high_is_the_other_way_round(void) {
+    tearDown();
+    begin(true);
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+    wire.level = 1;
+    wire.edges = 1;
+    tend(1);
+    TEST_ASSERT_EQUAL_INT(1, pressed());
+}
+
+static void test_estop_level_is_looked_at_although_the_wait_has_told_nothing(void) {
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+    wire.level = 0;
+    tend(1);
+    TEST_ASSERT_EQUAL_INT(1, iw_gpio_estop_ops->pressed(&store, true));
+}
+
+static void test_estop_pulse_of_which_only_the_edges_are_left_is_a_press(void) {
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+    wire.edges = 2;
+    tend(1);
+    TEST_ASSERT_EQUAL_INT(1, pressed());
+    tend(5);
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+}
+
+static void test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edges(void) {
+    wire.level = -1;
+    tend(1);
+    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    TEST_ASSERT_EQUAL_INT(ENODEV, iw_gpio_estop_ops->trouble(&store));
+    wire.level = 1;
+    tend(200);
+    (void)pressed();
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+    wire.edges = -1;
+    tend(1);
+    TEST_ASSERT_EQUAL_INT(-1, pressed());
+}
+
+static void test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_once(void) {
+    wire.level = -1;
+    tend(1);
+    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    wire.level = 1;
+    tend(200);
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_estop_ops->trouble(&store));
+}
+
+static void test_estop_chip_that_is_gone_is_tried_again_once_in_a_while(void) {
+    wire.level = -1;
+    tend(1);
+    (void)pressed();
+    wire.open_error = ENOENT;
+    wire.opened = 0;
+    for (unsigned ms = 0; ms < 1000U; ms++) {
+        tend(1);
+        TEST_ASSERT_EQUAL_INT(-1, pressed());
+        TEST_ASSERT_TRUE(iw_gpio_estop_ops->next_us(&store) > now_us);
+        TEST_ASSERT_TRUE(iw_gpio_estop_ops->next_us(&store) <= now_us + 200U * MS);
+    }
+    TEST_ASSERT_EQUAL_INT(5, wire.opened);
+    TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_estop_ops->trouble(&store));
+}
+
+static void test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can(void) {
+    tearDown();
+    wire.open_error = EBUSY;
+    begin(false);
+    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    TEST_ASSERT_EQUAL_INT(EBUSY, iw_gpio_estop_ops->trouble(&store));
+    wire.open_error = 0;
+    tend(200);
+    TEST_ASSERT_EQUAL_INT(0, pressed());
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_estop_ops->next_us(&store));
+}
+
+static void test_estop_descriptor_wakes_for_the_line_that_is_open_now(void) {
+    const uint64_t one = 1;
+    struct pollfd wait = {.fd = iw_gpio_estop_ops->watch_fd(&store), .events = POLLIN};
+    TEST_ASSERT_EQUAL_INT(0, poll(&wait, 1, 0));
+    wire.level = -1;
+    tend(1);
+    (void)pressed();
+    wire.level = 1;
+    tend(200);
+    TEST_ASSERT_EQUAL_INT((int)sizeof one, (int)write(wire.fd, &one, sizeof one));
+    TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, 0));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_estop_line_low_is_pressed_and_high_is_released);
+    RUN_TEST(test_estop_line_active_high_is_the_other_way_round);
+    RUN_TEST(test_estop_level_is_looked_at_although_the_wait_has_told_nothing);
+    RUN_TEST(test_estop_pulse_of_which_only_the_edges_are_left_is_a_press);
+    RUN_TEST(test_estop_chip_that_goes_is_unreadable_by_its_level_and_by_its_edges);
+    RUN_TEST(test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_once);
+    RUN_TEST(test_estop_chip_that_is_gone_is_tried_again_once_in_a_while);
+    RUN_TEST(test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can);
+    RUN_TEST(test_estop_descriptor_wakes_for_the_line_that_is_open_now);
+    return UNITY_END();
+}

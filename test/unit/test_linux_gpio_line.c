@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+// A GPIO line through libgpiod, the same for both its generations: how it is asked for, read, lost and given back.
+#include "../support/fake_gpio.h"
+#include "gpio_line.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+
+fake_gpio_t fake_gpio;
+
+static const iw_gpio_address_t by_name = {.name = FAKE_GPIO_NAME};
+static const iw_gpio_address_t by_offset = {.name = FAKE_GPIO_CHIP, .offset = FAKE_GPIO_OFFSET, .by_offset = true};
+static iw_gpio_line_t line;
+
+int fake_gpio_take(unsigned room) {
+    const int taken = fake_gpio.edges < (int)room ? fake_gpio.edges : (int)room;
+    fake_gpio.reads++;
+    if (taken == 0) {
+        errno = fake_gpio.edges_error != 0 ? fake_gpio.edges_error : EAGAIN;
+        return -1;
+    }
+    fake_gpio.edges -= taken;
+    return taken;
+}
+
+void setUp(void) {
+    (void)memset(&fake_gpio, 0, sizeof fake_gpio);
+    (void)memset(&line, 0xA5, sizeof line);
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_name));
+}
+
+void tearDown(void) {
+    iw_gpio_line_close(&line);
+    TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
+    TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
+}
+
+static void test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait(void) {
+    TEST_ASSERT_EQUAL_INT(1, fake_gpio.requested);
+    TEST_ASSERT_TRUE(fake_gpio.is_input);
+    TEST_ASSERT_TRUE(fake_gpio.pulled_up);
+    TEST_ASSERT_TRUE(fake_gpio.both_edges);
+    TEST_ASSERT_EQUAL_INT(fake_gpio.ends[0], line.fd);
+    TEST_ASSERT_TRUE((fcntl(line.fd, F_GETFL) & O_NONBLOCK) != 0);
+    TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, fake_gpio.offset);
+}
+
+static void test_line_by_chip_and_offset_is_that_line(void) {
+    iw_gpio_line_close(&line);
+    fake_gpio.offset = 0;
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_offset));
+    TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, fake_gpio.offset);
+    TEST_ASSERT_EQUAL_INT(1, fake_gpio.open);
+}
+
+static void test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read(void) {
+    fake_gpio.level = 1;
+    TEST_ASSERT_EQUAL_INT(1, iw_gpio_line_level(&line));
+    fake_gpio.level = 0;
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_level(&line));
+    fake_gpio.level = -1;
+    TEST_ASSERT_TRUE(iw_gpio_line_level(&line) < 0);
+}
+
+static void test_edges_are_all_taken_and_counted(void) {
+    static const int numbers[] = {0, 1, 2, 15, 16, 17, 33};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
+        fake_gpio.edges = numbers[i];
+        TEST_ASSERT_EQUAL_INT(numbers[i], iw_gpio_line_take_edges(&line));
+        TEST_ASSERT_EQUAL_INT(0, fake_gpio.edges);
+    }
+}
+
+static void test_edges_without_end_take_a_bounded_time(void) {
+    fake_gpio.edges = 1000000;
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(IW_GPIO_EDGES_MAX, iw_gpio_line_take_edges(&line));
+    TEST_ASSERT_LESS_OR_EQUAL_INT(IW_GPIO_EDGES_MAX, fake_gpio.reads);
+}
+
+static void test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none(void) {
+    fake_gpio.edges_error = ENODEV;
+    TEST_ASSERT_TRUE(iw_gpio_line_take_edges(&line) < 0);
+    fake_gpio.edges = 3;
+    TEST_ASSERT_TRUE(iw_gpio_line_take_edges(&line) < 0); // Whatever there was before.
+    fake_gpio.edges_error = EINTR;
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_take_edges(&line));
+}
+
+static void test_line_that_cannot_be_had_says_why_and_leaves_nothing_open(void) {
+    iw_gpio_line_close(&line);
+    fake_gpio.busy_error = EBUSY;
+    TEST_ASSERT_EQUAL_INT(EBUSY, iw_gpio_line_open(&line, &by_name));
+    TEST_ASSERT_EQUAL_INT(-1, line.fd);
+    TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
+    fake_gpio.busy_error = 0;
+    fake_gpio.chip_error = EACCES;
+    TEST_ASSERT_EQUAL_INT(EACCES, iw_gpio_line_open(&line, &by_name));
+    TEST_ASSERT_EQUAL_INT(EACCES, iw_gpio_line_open(&line, &by_offset));
+    fake_gpio.chip_error = 0;
+    const iw_gpio_address_t nobody = {.name = "NOBODY"};
+    const iw_gpio_address_t nowhere = {.name = "gpiochip9", .offset = FAKE_GPIO_OFFSET, .by_offset = true};
+    TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_line_open(&line, &nobody));
+    TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_line_open(&line, &nowhere));
+    TEST_ASSERT_EQUAL_INT(-1, line.fd);
+}
+
+static void test_line_that_is_closed_is_given_back(void) {
+    iw_gpio_line_close(&line);
+    TEST_ASSERT_EQUAL_INT(-1, line.fd);
+    TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_name));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait);
+    RUN_TEST(test_line_by_chip_and_offset_is_that_line);
+    RUN_TEST(test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read);
+    RUN_TEST(test_edges_are_all_taken_and_counted);
+    RUN_TEST(test_edges_without_end_take_a_bounded_time);
+    RUN_TEST(test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none);
+    RUN_TEST(test_line_that_cannot_be_had_says_why_and_leaves_nothing_open);
+    RUN_TEST(test_line_that_is_closed_is_given_back);
+    return UNITY_END();
+}

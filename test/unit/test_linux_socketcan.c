@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: MIT
+// SocketCAN over an interface played by the test: states, losses, what is old, what is forged. No kernel, no time, no rights.
+#include "fake_interface.h"
+#include "netlink_restart.h"
+
+#include "iwheel_linux/backend.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <linux/can/error.h>
+#include <sys/socket.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+static const iw_can_frame_t setpoint = {.id = 266, .dlc = 5};
+static iw_backend_store_t store;
+static iw_time_us_t now_us;
+
+/// `socket` is asked once, for looking at interfaces; this machine need not know CAN.
+int socket(int domain, int type, int protocol) {
+    (void)domain;
+    (void)type;
+    (void)protocol;
+    return dup(STDERR_FILENO);
+}
+
+static void tend(void) {
+    iw_socketcan_ops->tend(&store, now_us);
+}
+
+static void wait_ms(unsigned ms) {
+    now_us += (iw_time_us_t)ms * IW_US_PER_MS;
+    tend();
+}
+
+static iw_bus_state_t state(void) {
+    return iw_socketcan_ops->state(&store);
+}
+
+static int receive(iw_can_frame_t *out_frame) {
+    return iw_socketcan_ops->receive(&store, out_frame);
+}
+
+/// Takes all there is; the number of frames.
+static unsigned drain(void) {
+    iw_can_frame_t frame;
+    unsigned count = 0;
+    while (receive(&frame) > 0) {
+        count++;
+    }
+    return count;
+}
+
+static int send_setpoint(void) {
+    return iw_socketcan_ops->send(&store, &setpoint);
+}
+
+static const iw_bus_link_t *link_now(void) {
+    return iw_socketcan_ops->link(&store);
+}
+
+void setUp(void) {
+    now_us = 5000000;
+    fake_interface_init();
+    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_ops->open(&store, "can0"));
+    tend();
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
+void tearDown(void) {
+    iw_socketcan_ops->close(&store);
+}
+
+static void test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once(void) {
+    fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
+    fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
+static void test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow(void) {
+    for (unsigned i = 0; i < 10U; i++) {
+        fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    }
+    fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
+    fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
+    fake_interface_put(&fake_interface.ours, 288, 4, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_UINT(11, drain());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
+static void test_bus_off_that_lasts_is_told_until_the_controller_is_back(void) {
+    fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
+    fake_interface.carrier = 0;
+    for (unsigned i = 0; i < 100U; i++) {
+        wait_ms(20);
+        TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    }
+    fake_interface.carrier = 1; // Its error frame was lost.
+    wait_ms(200);
+    (void)state();
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_socketcan_ops->next_us(&store));
+}
+
+static void test_bus_off_that_was_forged_is_told_once_and_checked_at_once(void) {
+    fake_interface_put_error(CAN_ERR_BUSOFF, 0, MSG_DONTROUTE);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_UINT(1, fake_interface.looks);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
+static void test_good_news_that_were_forged_are_not_believed(void) {
+    fake_interface.carrier = 0;
+    fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
+    fake_interface_put_error(CAN_ERR_RESTARTED, 0, MSG_DONTROUTE);
+    fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE, MSG_DONTROUTE);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+}
+
+static void test_passive_lasts_until_active_and_active_does_not_end_bus_off(void) {
+    fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, state());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_PASSIVE, state());
+    (void)drain();
+    fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+    (void)drain();
+    fake_interface.carrier = 0;
+    fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
+    fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+}
+
+static void test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_again(void) {
+    iw_can_frame_t frame;
+    fake_interface.ours.error = ENETDOWN;
+    fake_interface.presence = IW_LINK_DOWN;
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+    fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    fake_interface_put(&fake_interface.others, 0x700, 4, 0);
+    TEST_ASSERT_TRUE(receive(&frame) < 0);
+    fake_interface.presence = IW_LINK_UP;
+    fake_interface.news = true;
+    fake_interface_put(&fake_interface.ours, 288, 4, MSG_CONFIRM);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_UINT(0, drain());
+    TEST_ASSERT_EQUAL_UINT(1, fake_interface.opened); // The same socket.
+}
+
+static void test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old(void) {
+    fake_interface.ours.error = ENETDOWN;
+    fake_interface.presence = IW_LINK_DOWN;
+    wait_ms(1);
+    fake_interface.presence = IW_LINK_UP;
+    fake_interface.news = true;
+    fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    tend();
+    TEST_ASSERT_EQUAL_UINT(0, drain());
+    fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    TEST_ASSERT_EQUAL_UINT(1, drain());
+}
+
+static void test_batch_half_taken_when_the_link_goes_down_is_forgotten(void) {
+    iw_can_frame_t frame;
+    for (unsigned i = 0; i < 20U; i++) {
+        fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    }
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    fake_interface.send_result = -1;
+    TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
+    TEST_ASSERT_TRUE(receive(&frame) < 0);
+    fake_interface.send_result = 1;
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_UINT(0, drain());
+}
+
+static void test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_once(void) {
+    fake_interface.ours.error = ENETDOWN;
+    wait_ms(1);
+    wait_ms(200); // It was up all along, as far as can be seen.
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_EQUAL_INT(1, send_setpoint());
+}
+
+static void test_interface_that_was_deleted_and_made_again_gets_new_sockets(void) {
+    fake_interface.ours.error = ENODEV;
+    fake_interface.presence = IW_LINK_ABSENT;
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+    TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
+    fake_interface.presence = IW_LINK_UP;
+    fake_interface.index = 4;
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_UINT(2, fake_interface.opened);
+    (void)state();
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_EQUAL_INT(1, send_setpoint());
+}
+
+static void test_interface_that_was_deleted_and_made_again_with_the_same_index_gets_new_sockets(void) {
+    fake_interface.ours.error = ENODEV;
+    wait_ms(1);
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_UINT(2, fake_interface.opened);
+}
+
+static void test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_otherwise(void) {
+    fake_interface.ours.error = ENETDOWN;
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+    fake_interface.state = IW_BUS_OFF;
+    fake_interface.carrier = 0;
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    fake_interface.carrier = 1;
+    wait_ms(200);
+    (void)state();
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
+static void test_netlink_that_does_not_answer_leaves_an_interface_that_is_up(void) {
+    fake_interface.ours.error = ENETDOWN;
+    wait_ms(1);
+    (void)state();
+    fake_interface.netlink_fails = true;
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_FALSE(link_now()->echo_proven);
+}
+
+static void test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period(void) {
+    fake_interface.ours.error = ENETDOWN;
+    fake_interface.presence = IW_LINK_DOWN;
+    wait_ms(1);
+    tend();
+    TEST_ASSERT_EQUAL_UINT64(now_us + 200000U, iw_socketcan_ops->next_us(&store));
+    const unsigned before = fake_interface.readings;
+    fake_interface.presence = IW_LINK_UP;
+    wait_ms(199);
+    TEST_ASSERT_EQUAL_UINT(before, fake_interface.readings);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_UINT(before + 1U, fake_interface.readings);
+}
+
+static void test_full_queue_is_no_loss(void) {
+    fake_interface.send_result = 0;
+    TEST_ASSERT_EQUAL_INT(0, send_setpoint());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
+static void test_purge_restarts_the_link_once_and_tells_how_it_ended(void) {
+    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_ops->purge(&store));
+    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_ops->purge(&store));
+    TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
+    TEST_ASSERT_EQUAL_INT(3, fake_interface.restarted);
+    const uint32_t changes = link_now()->changes;
+    fake_interface.restart_result = 0;
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, link_now()->purge);
+    TEST_ASSERT_TRUE(link_now()->changes != changes);
+    (void)iw_socketcan_ops->purge(&store);
+    TEST_ASSERT_EQUAL_UINT(2, fake_interface.restarts);
+}
+
+static void test_purge_that_was_not_allowed_is_not_tried_again(void) {
+    (void)iw_socketcan_ops->purge(&store);
+    fake_interface.restart_result = EPERM;
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NOT_ALLOWED, link_now()->purge);
+    (void)iw_socketcan_ops->purge(&store);
+    TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
+}
+
+static void test_purge_where_the_echo_proves_nothing_leaves_the_link_alone(void) {
+    iw_socketcan_ops->close(&store);
+    fake_interface_init();
+    fake_interface.link.echo_proven = false;
+    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_ops->open(&store, "vcan0"));
+    (void)iw_socketcan_ops->purge(&store);
+    TEST_ASSERT_EQUAL_UINT(0, fake_interface.restarts);
+}
+
+static void test_flood_of_errors_takes_a_bounded_part_of_a_step(void) {
+    for (unsigned i = 0; i < 1000U; i++) {
+        fake_interface_put_error(CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING, 0);
+    }
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_UINT(0, drain());
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(10, fake_interface.fills);
+    TEST_ASSERT_GREATER_THAN_UINT(600, fake_interface.ours.count);
+}
+
+static void test_lost_frames_are_counted_and_the_carrier_is_looked_at(void) {
+    fake_interface.ours.lost = 7;
+    fake_interface.carrier = 0; // The error frame that told was among them.
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_UINT32(7, link_now()->lost);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+}
+
+static void test_other_ids_come_after_ours_and_not_right_after_a_setpoint(void) {
+    iw_can_frame_t frame;
+    fake_interface_put(&fake_interface.others, 0x700, 4, 0);
+    fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    wait_ms(20);
+    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_HEX32(256, frame.id);
+    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_HEX32(0x700, frame.id);
+    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    fake_interface_put(&fake_interface.others, 0x701, 4, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(1, send_setpoint());
+    wait_ms(2);
+    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_HEX32(0x701, frame.id);
+}
+
+static void test_echo_is_told_by_the_mark_of_the_message(void) {
+    iw_can_frame_t frame;
+    fake_interface_put(&fake_interface.ours, 266, 5, MSG_CONFIRM | MSG_DONTROUTE);
+    fake_interface_put(&fake_interface.ours, 266, 5, MSG_DONTROUTE);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_UINT8(IW_CAN_ECHO, frame.kind);
+    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
+    TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, frame.kind);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once);
+    RUN_TEST(test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow);
+    RUN_TEST(test_bus_off_that_lasts_is_told_until_the_controller_is_back);
+    RUN_TEST(test_bus_off_that_was_forged_is_told_once_and_checked_at_once);
+    RUN_TEST(test_good_news_that_were_forged_are_not_believed);
+    RUN_TEST(test_passive_lasts_until_active_and_active_does_not_end_bus_off);
+    RUN_TEST(test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_again);
+    RUN_TEST(test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old);
+    RUN_TEST(test_batch_half_taken_when_the_link_goes_down_is_forgotten);
+    RUN_TEST(test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_once);
+    RUN_TEST(test_interface_that_was_deleted_and_made_again_gets_new_sockets);
+    RUN_TEST(test_interface_that_was_deleted_and_made_again_with_the_same_index_gets_new_sockets);
+    RUN_TEST(test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_otherwise);
+    RUN_TEST(test_netlink_that_does_not_answer_leaves_an_interface_that_is_up);
+    RUN_TEST(test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period);
+    RUN_TEST(test_full_queue_is_no_loss);
+    RUN_TEST(test_purge_restarts_the_link_once_and_tells_how_it_ended);
+    RUN_TEST(test_purge_that_was_not_allowed_is_not_tried_again);
+    RUN_TEST(test_purge_where_the_echo_proves_nothing_leaves_the_link_alone);
+    RUN_TEST(test_flood_of_errors_takes_a_bounded_part_of_a_step);
+    RUN_TEST(test_lost_frames_are_counted_and_the_carrier_is_looked_at);
+    RUN_TEST(test_other_ids_come_after_ours_and_not_right_after_a_setpoint);
+    RUN_TEST(test_echo_is_told_by_the_mark_of_the_message);
+    return UNITY_END();
+}
