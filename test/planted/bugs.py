@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Safety bugs to be planted in copies of the core. Each names the rule that it breaks, as docs/safety-case.md counts them.
+Those of everything around the core are in parts_bugs.py.
 
-What stands in the core is told by a few words of code; blanks and line ends between them do not matter, and they must
+What stands in a file is told by a few words of code; blanks and line ends between them do not matter, and they must
 occur exactly once in the file.
 """
 from typing import NamedTuple
@@ -9,10 +10,11 @@ from typing import NamedTuple
 
 class Bug(NamedTuple):
     name: str
-    rule: str   # Of docs/safety-case.md.
-    file: str   # In core/src.
+    rule: str   # Of docs/safety-case.md, or the page whose promise it breaks.
+    file: str   # In core/src; around the core, from the top of the tree.
     before: str
     after: str
+    tests: tuple = ()  # Around the core: the tests that must fail, each of them.
 
 
 BUGS = [

@@ -60,6 +60,7 @@ static int rig_send(void *self, const iw_can_frame_t *frame) {
     rig->unmarked += daemon_rig_marked() ? 0U : 1U;
     rig->sent[side]++;
     rig->told_mm_s[side] = (int16_t)(frame->data[1] << 8 | frame->data[2]);
+    rig->told_mA[side] = (int16_t)(frame->data[3] << 8 | frame->data[4]);
     rig->sent_us = rig->now_us;
     sim_world_submit(&rig->world, rig->now_us, rig->port, frame);
     return 1;
@@ -117,10 +118,12 @@ static int rig_estop_fd(const void *self) {
 }
 
 static int rig_pressed(void *self, bool quiet) {
+    daemon_rig_t *rig = &daemon_rig;
+    const bool pulse = rig->estop_pulse && !quiet; // Without a word from the wait, edges are not read.
     (void)self;
-    (void)quiet;
-    daemon_rig.estop_told = daemon_rig.estop;
-    return daemon_rig.estop;
+    rig->estop_told = rig->estop;
+    rig->estop_pulse = rig->estop_pulse && quiet;
+    return rig->estop == 0 && pulse ? 1 : rig->estop;
 }
 
 static int rig_trouble(const void *self) {
@@ -174,7 +177,7 @@ static int find_events(daemon_rig_t *rig, int fd, struct epoll_event *events, in
         events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = GW_TAG_TIMER}};
     }
     show(rig->bus_fd, rig->rx_next < rig->rx_count);
-    show(rig->estop_fd, rig->estop != rig->estop_told && !rig->estop_silent);
+    show(rig->estop_fd, rig->estop_pulse || (rig->estop != rig->estop_told && !rig->estop_silent));
     const long more = syscall(SYS_epoll_pwait, fd, &events[count], max - count, 0, NULL, 8);
     return count + (more > 0 ? (int)more : 0);
 }

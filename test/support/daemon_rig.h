@@ -28,11 +28,13 @@ typedef struct {
     iw_time_us_t stolen_us;      ///< The next wait takes that much longer: the process stands still.
     iw_bus_state_t bus;          ///< What the bus answers.
     int estop;                   ///< What the button answers: 1 pressed, 0, -1 unreadable.
+    bool estop_pulse;            ///< Edges wait to be read: pressed and released again. They wake.
     bool estop_silent;           ///< The next change of it wakes nobody, as when a GPIO chip goes.
     uint32_t waits;              ///< Calls of epoll_wait.
     bool ended;                  ///< The loop has come to its end by itself.
     uint32_t unmarked;           ///< Setpoints handed over while there was no crash marker.
     uint32_t sent[IW_SIDES];     ///< Setpoints handed over.
+    int16_t told_mA[IW_SIDES];   ///< Of the last of them.
     int16_t told_mm_s[IW_SIDES]; ///< The last of them.
     iw_time_us_t sent_us;        ///< When.
     iw_can_frame_t rx[DAEMON_RX_MAX];

@@ -155,6 +155,9 @@ int iw_netlink_restart_poll(pid_t process) {
 iw_link_presence_t iw_netdev_presence(int fd, const char *name, int *out_index) {
     (void)fd;
     (void)name;
+    for (; fake_interface.late > 0U; fake_interface.late--) {
+        fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    }
     if (fake_interface.presence != IW_LINK_ABSENT) {
         *out_index = fake_interface.index;
     }

@@ -27,6 +27,7 @@ typedef struct {
     iw_bus_link_t link;   ///< The same of the rest.
     bool netlink_fails;
     bool news;          ///< Some interface has changed.
+    unsigned late;      ///< So many frames come while it is looked whether the interface is up.
     int send_result;    ///< 1, 0 no room, -1 lost.
     int restart_result; ///< Of `poll`; IW_NETLINK_RESTART_RUNNING at first.
     fake_queue_t ours;

@@ -5,7 +5,10 @@
 #include "unity.h"
 
 #include <signal.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 static int client;
@@ -147,14 +150,28 @@ static void test_estop_that_goes_without_a_word_is_seen_within_milliseconds(void
 }
 
 static void test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds(void) {
+    for (unsigned phase = 0; phase < 20U; phase += 3U) {
+        begin_driving();
+        daemon_rig_run(phase);
+        sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // No frame wakes us now.
+        daemon_rig.estop_silent = true;
+        daemon_rig.estop = -1;
+        daemon_rig_run(5);
+        TEST_ASSERT_EQUAL_INT(-1, daemon_rig.estop_told);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_TRUE(is_cause("estop_line"));
+        tearDown();
+        setUp();
+    }
+}
+
+static void test_estop_pulse_that_is_over_when_it_is_looked_at_latches(void) {
     begin_driving();
-    daemon_rig_run(21);
-    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // No frame wakes us now.
-    daemon_rig.estop_silent = true;
-    daemon_rig.estop = -1;
-    daemon_rig_run(5);
+    daemon_rig_run(7);
+    daemon_rig.estop_pulse = true;
+    daemon_rig_run(1);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-    TEST_ASSERT_TRUE(is_cause("estop_line"));
+    TEST_ASSERT_TRUE(is_told_zero());
 }
 
 static void test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after(void) {
@@ -233,6 +250,54 @@ static void test_lease_ends_with_the_connection_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
 }
 
+static void test_lease_that_ends_with_the_connection_ends_before_anything_that_was_sent_last(void) {
+    static const char line[] = "{\"cmd\":\"stop\"}\n";
+    begin_driving();
+    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    (void)close(client);
+    daemon_rig_run(1);
+    client = daemon_rig_connect();
+    TEST_ASSERT_TRUE(is_cause("client_gone"));
+}
+
+/// What the service manager has heard: the longest time between two words that feed its watchdog.
+static iw_time_us_t longest_unfed_us(int manager, unsigned for_ms) {
+    char word[32];
+    iw_time_us_t fed_us = daemon_rig.now_us;
+    iw_time_us_t longest_us = 0;
+    for (unsigned ms = 0; ms < for_ms; ++ms) {
+        daemon_rig_run(1);
+        for (ssize_t n = recv(manager, word, sizeof word, MSG_DONTWAIT); n > 0;
+             n = recv(manager, word, sizeof word, MSG_DONTWAIT)) {
+            fed_us = strncmp(word, "WATCHDOG=1", (size_t)n) == 0 ? daemon_rig.now_us : fed_us;
+        }
+        longest_us = daemon_rig.now_us - fed_us > longest_us ? daemon_rig.now_us - fed_us : longest_us;
+    }
+    return longest_us;
+}
+
+static void test_watchdog_is_fed_at_half_its_time_with_and_without_motion(void) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int manager = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/notify", daemon_rig.folder);
+    TEST_ASSERT_EQUAL_INT(0, bind(manager, (const struct sockaddr *)&address, sizeof address));
+    (void)setenv("NOTIFY_SOCKET", address.sun_path, 1);
+    (void)setenv("WATCHDOG_USEC", "400000", 1);
+    daemon_rig_crash();
+    daemon_rig_start();
+    (void)unsetenv("NOTIFY_SOCKET");
+    (void)unsetenv("WATCHDOG_USEC");
+    const iw_time_us_t at_rest_us = longest_unfed_us(manager, 2000);
+    (void)close(client);
+    client = daemon_rig_connect();
+    daemon_rig_arm(client);
+    const iw_time_us_t armed_us = longest_unfed_us(manager, 900);
+    (void)close(manager);
+    (void)unlink(address.sun_path);
+    TEST_ASSERT_TRUE(at_rest_us <= MS(220));
+    TEST_ASSERT_TRUE(armed_us <= MS(220));
+}
+
 static void test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels(void) {
     begin_driving();
     for (unsigned ms = 0; ms < 2000U; ++ms) {
@@ -297,12 +362,15 @@ int main(void) {
     RUN_TEST(test_estop_edge_is_answered_with_zeros_in_the_same_millisecond);
     RUN_TEST(test_estop_that_goes_without_a_word_is_seen_within_milliseconds);
     RUN_TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds);
+    RUN_TEST(test_estop_pulse_that_is_over_when_it_is_looked_at_latches);
     RUN_TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after);
     RUN_TEST(test_suspended_machine_latches_with_zeros_first);
     RUN_TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all);
     RUN_TEST(test_loop_that_stood_still_goes_on_with_zeros);
     RUN_TEST(test_lease_is_lost_when_commands_end_although_requests_go_on);
     RUN_TEST(test_lease_ends_with_the_connection_at_once);
+    RUN_TEST(test_lease_that_ends_with_the_connection_ends_before_anything_that_was_sent_last);
+    RUN_TEST(test_watchdog_is_fed_at_half_its_time_with_and_without_motion);
     RUN_TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels);
     RUN_TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker);
     RUN_TEST(test_frames_that_nobody_waits_for_are_taken_together_and_one_by_one_as_soon_as_somebody_does);

@@ -49,6 +49,17 @@ static void test_drive_reaches_the_wheel_it_is_for(void) {
     TEST_ASSERT_TRUE(says(wheel("right"), "\"applied_mm_s\":100,"));
 }
 
+static void test_current_reaches_the_wheel_it_is_for(void) {
+    daemon_rig_arm(client);
+    for (unsigned i = 0; i < 50U; ++i) {
+        assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100,\"left_mA\":500,\"right_mA\":900}",
+                     "\"ok\":true");
+        daemon_rig_run(20);
+    }
+    TEST_ASSERT_EQUAL_INT(500, daemon_rig.told_mA[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(900, daemon_rig.told_mA[IW_RIGHT]);
+}
+
 static void test_twist_to_the_left_turns_the_right_wheel_faster(void) {
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; ++i) {
@@ -170,6 +181,33 @@ static void test_arm_while_shutting_down_is_refused(void) {
     assert_reply("{\"cmd\":\"arm\"}", "shutting down");
 }
 
+static void test_arm_with_what_motion_depends_on_contradicted_is_denied(void) {
+    iw_ledger_contradict(&daemon_rig.daemon->gateway.ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"denied\"");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+}
+
+static unsigned events_waiting(const char *name) {
+    static char text[1U << 20];
+    unsigned count = 0;
+    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    text[length > 0 ? length : 0] = '\0';
+    for (const char *at = strstr(text, name); at != NULL; at = strstr(at + 1, name)) {
+        count++;
+    }
+    return count;
+}
+
+static void test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall(void) {
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":50}", "\"ok\":true");
+    (void)events_waiting("force");
+    daemon_rig_run(1000);
+    TEST_ASSERT_UINT_WITHIN(2, 50, events_waiting("\"event\":\"force\""));
+    daemon_rig.stolen_us = 3000000U;
+    daemon_rig_run(100);
+    TEST_ASSERT_UINT_WITHIN(2, 5, events_waiting("\"event\":\"force\""));
+}
+
 static void test_stop_and_estop_need_no_lease(void) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
@@ -184,6 +222,7 @@ static void test_stop_and_estop_need_no_lease(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_drive_reaches_the_wheel_it_is_for);
+    RUN_TEST(test_current_reaches_the_wheel_it_is_for);
     RUN_TEST(test_twist_to_the_left_turns_the_right_wheel_faster);
     RUN_TEST(test_number_beyond_every_range_is_refused_and_never_wraps_into_it);
     RUN_TEST(test_battery_at_the_end_of_its_byte_is_flagged_and_only_then);
@@ -194,6 +233,8 @@ int main(void) {
     RUN_TEST(test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now);
     RUN_TEST(test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest);
     RUN_TEST(test_arm_while_shutting_down_is_refused);
+    RUN_TEST(test_arm_with_what_motion_depends_on_contradicted_is_denied);
+    RUN_TEST(test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall);
     RUN_TEST(test_stop_and_estop_need_no_lease);
     return UNITY_END();
 }

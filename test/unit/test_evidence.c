@@ -97,6 +97,23 @@ static void test_evidence_one_odd_stretch_contradicts_no_ratio(void) {
     TEST_ASSERT_EQUAL_INT(before.state, iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_GEAR_RATIO)->state);
 }
 
+static void test_evidence_odd_stretches_between_good_ones_contradict_no_ratio(void) {
+    for (unsigned times = 0; times < 5U; times++) {
+        rig.gateway.wheel[IW_LEFT].ticks += 70;
+        world_rig_drive(&rig, 400, 400, 12000);
+    }
+    assert_entry(IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED);
+}
+
+static void test_evidence_a_type_is_not_confirmed_by_speeds_that_keep_changing(void) {
+    world_rig_drive(&rig, 300, 300, 100);
+    for (unsigned times = 0; times < 40U; times++) {
+        const int32_t mm_s = times % 2U == 0U ? 330 : 300;
+        world_rig_drive(&rig, mm_s, mm_s, 200);
+    }
+    assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED);
+}
+
 static void test_evidence_a_reboot_or_a_gap_begins_anew(void) {
     world_rig_drive(&rig, 400, 400, 3000);
     for (unsigned times = 0; times < 4U; times++) {
@@ -153,6 +170,8 @@ int main(void) {
     RUN_TEST(test_evidence_the_right_gear_is_confirmed_whosever_the_rpm_are);
     RUN_TEST(test_evidence_rpm_of_the_rotor_taken_for_the_wheels_contradict_the_ratio);
     RUN_TEST(test_evidence_one_odd_stretch_contradicts_no_ratio);
+    RUN_TEST(test_evidence_odd_stretches_between_good_ones_contradict_no_ratio);
+    RUN_TEST(test_evidence_a_type_is_not_confirmed_by_speeds_that_keep_changing);
     RUN_TEST(test_evidence_a_reboot_or_a_gap_begins_anew);
     RUN_TEST(test_evidence_a_pose_the_other_way_round_contradicts_its_byte_order);
     RUN_TEST(test_evidence_a_pose_that_jumps_once_contradicts_nothing);

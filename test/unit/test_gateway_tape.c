@@ -96,6 +96,21 @@ static void test_answers_are_noted_first_and_when_they_change(void) {
     TEST_ASSERT_EQUAL_UINT64(4, entries[7].at_us);
 }
 
+static void test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_no_bus(void) {
+    const iw_can_frame_t frame = {.id = 266, .dlc = 5};
+    const uint8_t kinds[] = {BLACKBOX_NOT_SENT, BLACKBOX_NOT_SENT};
+    gw_tape_step_begin(&tape, 5);
+    (void)hal.send(hal.context, &frame);
+    send_answer = 0;
+    (void)hal.send(hal.context, &frame);
+    send_answer = -1;
+    (void)hal.send(hal.context, &frame);
+    expect_kinds(kinds, sizeof kinds);
+    TEST_ASSERT_EQUAL_INT64(0, entries[0].as.value);
+    TEST_ASSERT_EQUAL_INT64(-1, entries[1].as.value);
+    TEST_ASSERT_EQUAL_UINT32(266, entries[1].number);
+}
+
 static void test_frames_have_the_time_of_their_step_and_stand_for_it(void) {
     const uint8_t kinds[] = {BLACKBOX_ESTOP, BLACKBOX_BUS, BLACKBOX_FRAME, BLACKBOX_FRAME, BLACKBOX_STEP};
     waiting = 2;
@@ -198,6 +213,7 @@ static void test_without_a_ring_nothing_is_noted_and_all_passes(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_answers_are_noted_first_and_when_they_change);
+    RUN_TEST(test_frame_that_was_not_taken_is_noted_whether_there_was_no_room_or_no_bus);
     RUN_TEST(test_frames_have_the_time_of_their_step_and_stand_for_it);
     RUN_TEST(test_only_a_send_that_failed_is_noted);
     RUN_TEST(test_answers_are_noted_again_each_second);

@@ -137,6 +137,14 @@ static void test_release_an_edge_is_told_however_late_it_is_asked_for(void) {
     TEST_ASSERT_FALSE(pressed());
 }
 
+static void test_release_an_edge_is_told_although_it_was_looked_at_again_before_anybody_asked(void) {
+    look(0, false, true);
+    look(10U * MS, false, false);
+    now_us += 1000U * MS;
+    TEST_ASSERT_TRUE(pressed());
+    TEST_ASSERT_FALSE(pressed());
+}
+
 static void test_release_a_level_seen_and_gone_again_is_told_without_any_edge(void) {
     look(0, true, false);
     look(10U * MS, false, false);
@@ -167,6 +175,7 @@ int main(void) {
     RUN_TEST(test_release_is_put_off_by_every_bounce);
     RUN_TEST(test_release_a_pulse_between_two_looks_is_told);
     RUN_TEST(test_release_an_edge_is_told_however_late_it_is_asked_for);
+    RUN_TEST(test_release_an_edge_is_told_although_it_was_looked_at_again_before_anybody_asked);
     RUN_TEST(test_release_a_level_seen_and_gone_again_is_told_without_any_edge);
     RUN_TEST(test_release_without_debounce_follows_the_level);
     return UNITY_END();

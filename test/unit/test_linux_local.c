@@ -164,6 +164,22 @@ static void test_local_hub_gone_and_back_before_anybody_asked_is_reported_once(v
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
 }
 
+static void test_local_batch_half_taken_when_the_hub_goes_is_forgotten(void) {
+    const iw_can_frame_t frame = {.id = 266, .dlc = 5};
+    iw_can_frame_t heard;
+    for (unsigned i = 0; i < 10; i++) {
+        tell(256, 4, 0, 0);
+    }
+    TEST_ASSERT_EQUAL_INT(1, receive(&heard));
+    (void)close(hub);
+    TEST_ASSERT_TRUE(functions.send(functions.context, &frame) < 0);
+    iw_linux_hal_tend(&hal, now_us); // Back at once.
+    hub = accept(bus_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(hub >= 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
+}
+
 static void test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_off(void) {
     iw_can_frame_t heard;
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
@@ -296,6 +312,9 @@ static void test_estop_pulse_between_two_looks_is_an_edge(void) {
     press("0");
     TEST_ASSERT_TRUE(estop() > 0); // The release is an edge too.
     TEST_ASSERT_EQUAL_INT(0, estop());
+    press("100"); // Told twice that it is released.
+    TEST_ASSERT_TRUE(estop() > 0);
+    TEST_ASSERT_EQUAL_INT(0, estop());
 }
 
 static void test_estop_any_byte_but_zero_is_pressed(void) {
@@ -365,6 +384,7 @@ int main(void) {
     RUN_TEST(test_local_formats_are_kept_apart);
     RUN_TEST(test_local_messages_of_another_size_are_left_out);
     RUN_TEST(test_local_hub_gone_and_back_before_anybody_asked_is_reported_once);
+    RUN_TEST(test_local_batch_half_taken_when_the_hub_goes_is_forgotten);
     RUN_TEST(test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_off);
     RUN_TEST(test_local_error_frames_change_the_state_and_are_no_frames);
     RUN_TEST(test_local_good_news_of_another_client_are_not_believed_and_bad_news_are_told_once);

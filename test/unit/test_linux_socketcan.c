@@ -166,11 +166,22 @@ static void test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_
     wait_ms(1);
     fake_interface.presence = IW_LINK_UP;
     fake_interface.news = true;
-    fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    fake_interface.late = 40;
     tend();
     TEST_ASSERT_EQUAL_UINT(0, drain());
     fake_interface_put(&fake_interface.ours, 256, 4, 0);
     TEST_ASSERT_EQUAL_UINT(1, drain());
+}
+
+static void test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_wake_nobody(void) {
+    fake_interface.ours.error = ENETDOWN;
+    fake_interface.presence = IW_LINK_DOWN;
+    wait_ms(1);
+    fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    fake_interface_put(&fake_interface.others, 0x700, 4, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_UINT(0, fake_interface.ours.count);
+    TEST_ASSERT_EQUAL_UINT(0, fake_interface.others.count);
 }
 
 static void test_batch_half_taken_when_the_link_goes_down_is_forgotten(void) {
@@ -357,6 +368,7 @@ int main(void) {
     RUN_TEST(test_passive_lasts_until_active_and_active_does_not_end_bus_off);
     RUN_TEST(test_frames_from_before_the_link_went_down_are_not_heard_when_it_is_up_again);
     RUN_TEST(test_frames_that_come_while_it_is_looked_whether_the_link_is_up_are_old);
+    RUN_TEST(test_frames_that_come_while_the_link_is_down_are_taken_so_that_they_wake_nobody);
     RUN_TEST(test_batch_half_taken_when_the_link_goes_down_is_forgotten);
     RUN_TEST(test_link_that_went_and_came_between_two_looks_is_told_as_a_loss_once);
     RUN_TEST(test_interface_that_was_deleted_and_made_again_gets_new_sockets);

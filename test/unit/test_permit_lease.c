@@ -250,6 +250,20 @@ static void test_permit_disconnect_of_anybody_else_changes_nothing(void) {
     }
 }
 
+static void test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after(void) {
+    static const iw_time_us_t after_us[] = {0, MS(1), MS(1000), MS(1600), MS(12000), MS(60000)};
+    for (size_t i = 0; i < sizeof after_us / sizeof after_us[0]; i++) {
+        permit_rig_begin(&rig, (i & 1U) == 0U ? PERMIT_ARMED : PERMIT_LISTENING);
+        iw_permit_raise(&rig.permit, rig.now_us, IW_CAUSE_ESTOP_SOFTWARE, IW_SIDES_NONE, (uint32_t)OTHER);
+        permit_rig_wait(&rig, after_us[i]);
+        for (unsigned client = 0; client < 12U; client++) {
+            iw_permit_disconnect(&rig.permit, rig.now_us, (iw_client_t)client);
+        }
+        permit_rig_wait(&rig, MS(20));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+    }
+}
+
 static void test_permit_disconnect_of_the_former_holder_changes_nothing(void) {
     static const permit_situation_t after[] = {PERMIT_STOPPING, PERMIT_HOLDING, PERMIT_LATCHED};
     for (size_t i = 0; i < 3; i++) {
@@ -321,6 +335,7 @@ int main(void) {
     RUN_TEST(test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion);
     RUN_TEST(test_permit_disconnect_of_the_holder_ends_the_lease_at_once);
     RUN_TEST(test_permit_disconnect_of_anybody_else_changes_nothing);
+    RUN_TEST(test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after);
     RUN_TEST(test_permit_disconnect_of_the_former_holder_changes_nothing);
     RUN_TEST(test_permit_stop_needs_no_lease_and_ramps);
     RUN_TEST(test_permit_stop_elsewhere_changes_nothing);

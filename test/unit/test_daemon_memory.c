@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+// What an earlier run has kept, put beside what this one knows: in the daemon's loop, with a keeper played by the test.
+#include "assumption.h"
+#include "daemon_rig.h"
+
+#include "unity.h"
+
+#include <string.h>
+#include <unistd.h>
+
+static int client;
+static gw_known_t stored;
+static gw_keeper_news_t news;
+static char text[GW_MEMORY_SIZE];
+static size_t length;
+static unsigned writes;
+static bool set_aside;
+
+int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name) {
+    (void)directory;
+    (void)name;
+    *self = (gw_keeper_t){.fd = -1};
+    return 0;
+}
+
+bool gw_keeper_write(gw_keeper_t *self, const char *written, size_t size) {
+    (void)self;
+    (void)memcpy(text, written, size);
+    length = size;
+    writes++;
+    return true;
+}
+
+void gw_keeper_set_aside(gw_keeper_t *self) {
+    (void)self;
+    set_aside = true;
+}
+
+gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_MAX], size_t *out_length,
+                                int *out_error) {
+    const gw_keeper_news_t now = news;
+    (void)self;
+    *out_length = length;
+    *out_error = 0;
+    (void)memcpy(out_text, text, length);
+    news = GW_KEEPER_NO_NEWS;
+    return now;
+}
+
+void gw_keeper_close(gw_keeper_t *self) {
+    (void)self;
+}
+
+static const iw_config_t *config(void) {
+    return &daemon_rig.daemon->gateway.config;
+}
+
+static const iw_ledger_entry_t *entry(iw_ledger_item_t item) {
+    return iw_ledger_entry(&daemon_rig.daemon->gateway.ledger, item);
+}
+
+/// A finding of an earlier run for what is configured now.
+static void store(iw_ledger_item_t item, iw_ledger_state_t state, iw_evidence_t evidence) {
+    gw_known_item_t *known = &stored.item[item];
+    known->entry = (iw_ledger_entry_t){.state = state, .evidence = evidence, .figure = 1000};
+    known->since_wall_us = 1700000000000000;
+    gw_assumption_value(config(), item, known->value);
+}
+
+static void store_offset(iw_side_t side, iw_force_unit_t unit, int32_t offset_mN) {
+    stored.offset[side] = (gw_known_offset_t){
+        .from = IW_OFFSET_OPERATOR, .unit = unit, .offset_mN = offset_mN, .samples = 40, .wall_us = 1700000000000000};
+}
+
+/// The keeper tells it, as soon as the loop runs.
+static void tell_stored(void) {
+    length = gw_memory_write(&stored, daemon_rig.daemon->config.bus.interface, text, sizeof text);
+    news = GW_KEEPER_READ;
+    daemon_rig.daemon->knowledge.answered = false;
+    daemon_rig.daemon->knowledge.start_us = daemon_rig.now_us;
+    daemon_rig_run(5);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->knowledge.answered);
+    TEST_ASSERT_FALSE(set_aside);
+}
+
+void setUp(void) {
+    (void)memset(&stored, 0, sizeof stored);
+    news = GW_KEEPER_NO_NEWS;
+    writes = 0;
+    set_aside = false;
+    daemon_rig_begin();
+    client = daemon_rig_connect();
+}
+
+void tearDown(void) {
+    (void)close(client);
+    daemon_rig_end();
+}
+
+static void test_memory_finding_is_believed_for_the_value_it_was_found_for(void) {
+    store(IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED, IW_EVIDENCE_BUS);
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, entry(IW_LEDGER_GEAR_RATIO)->state);
+    TEST_ASSERT_EQUAL_INT(IW_EVIDENCE_BUS, entry(IW_LEDGER_GEAR_RATIO)->evidence);
+}
+
+static void test_memory_finding_for_another_value_is_forgotten(void) {
+    store(IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR);
+    (void)strcpy(stored.item[IW_LEDGER_GEAR_RATIO].value, "7");
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, entry(IW_LEDGER_GEAR_RATIO)->state);
+}
+
+static void test_memory_contradiction_stays_one(void) {
+    store(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR);
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry(IW_LEDGER_SETPOINT_TYPE)->state);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"arm\"}"), "\"error\":\"denied\""));
+}
+
+static void test_memory_contradiction_of_this_run_is_not_talked_over(void) {
+    store(IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR);
+    iw_ledger_contradict(&daemon_rig.daemon->gateway.ledger, IW_LEDGER_GEAR_RATIO, IW_EVIDENCE_BUS, 3000);
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry(IW_LEDGER_GEAR_RATIO)->state);
+}
+
+static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only(void) {
+    store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
+    store_offset(IW_RIGHT, config()->force_unit[IW_RIGHT] == IW_FORCE_CN ? IW_FORCE_DN : IW_FORCE_CN, 4321);
+    tell_stored();
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->gateway.force[IW_LEFT].provenance);
+    TEST_ASSERT_EQUAL_INT32(1234, daemon_rig.daemon->gateway.force[IW_LEFT].offset_mN);
+    TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, daemon_rig.daemon->gateway.force[IW_RIGHT].provenance);
+    TEST_ASSERT_NOT_EQUAL(4321, daemon_rig.daemon->gateway.force[IW_RIGHT].offset_mN);
+}
+
+static void test_memory_of_a_tare_has_the_figures_of_that_wheel(void) {
+    daemon_rig_run(3000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
+    const gw_known_t *known = &daemon_rig.daemon->knowledge.known;
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, known->offset[IW_RIGHT].from);
+    TEST_ASSERT_GREATER_THAN_UINT32(20, known->offset[IW_RIGHT].samples);
+    TEST_ASSERT_EQUAL_INT32(daemon_rig.daemon->gateway.force[IW_RIGHT].offset_mN, known->offset[IW_RIGHT].offset_mN);
+    TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, known->offset[IW_LEFT].from);
+}
+
+static void test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second(void) {
+    daemon_rig.daemon->knowledge.write_us = 0;
+    daemon_rig_run(3000);
+    const unsigned before = writes;
+    for (unsigned i = 0; i < 10U; ++i) {
+        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\"}"), "\"ok\":true"));
+        daemon_rig_run(290);
+    }
+    TEST_ASSERT_UINT_WITHIN(1, 3, writes - before);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_memory_finding_is_believed_for_the_value_it_was_found_for);
+    RUN_TEST(test_memory_finding_for_another_value_is_forgotten);
+    RUN_TEST(test_memory_contradiction_stays_one);
+    RUN_TEST(test_memory_contradiction_of_this_run_is_not_talked_over);
+    RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
+    RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
+    RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
+    return UNITY_END();
+}
