@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Bugs to be planted around the core: daemon, Linux port, STM32 driver, tools. Each names the tests that must fail for it.
+"""Bugs to be planted around the core: daemon, Linux port, STM32 driver, tools. Each names the tests that must fail for it: programs
+of test/unit and test/target in the default build. Also what of the core neither simulation nor orders can meet.
 
-The rule is one of docs/safety-case.md, or the page whose promise is broken. Words of code as in bugs.py.
+The rule is one of docs/safety-case.md, or the page of docs/ whose promise is broken. Words of code as in bugs.py.
 """
 from bugs import Bug
 
@@ -16,9 +17,9 @@ LEARN = "app/ctl/learn/learn.c"
 PARTS = [
     # The loop.
     Bug("marker-gone-at-stopping", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon))",
-        "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon) && daemon->gateway.permit.state != IW_STATE_STOPPING)", MOTION),
+        "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon) && iw_gateway_state(&daemon->gateway) != IW_STATE_STOPPING)", MOTION),
     Bug("marker-gone-when-latched", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon))",
-        "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon) && daemon->gateway.permit.state != IW_STATE_LATCHED)", MOTION),
+        "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon) && iw_gateway_state(&daemon->gateway) != IW_STATE_LATCHED)", MOTION),
     Bug("marker-after-the-first-frame", "R3", LOOP, "gw_bus_facts_follow(daemon); mark_if_sending(daemon);", "gw_bus_facts_follow(daemon);", MOTION),
     Bug("suspension-not-told", "R7", LOOP, "iw_gateway_suspended(&daemon->gateway, suspended_us - daemon->suspended_us);", "", MOTION),
     Bug("suspension-told-again", "R7", LOOP, "daemon->suspended_us = suspended_us > daemon->suspended_us ? suspended_us : daemon->suspended_us;", "", MOTION),
@@ -26,10 +27,13 @@ PARTS = [
     Bug("estop-edge-lost-in-the-wait", "R2", LOOP, "iw_linux_hal_waited(&daemon->hal, true);", "", MOTION),
     Bug("signal-ends-at-once", "R4", LOOP, "daemon->shutting_down && !gw_daemon_is_sending(daemon)", "daemon->shutting_down", MOTION),
     Bug("signal-ends-in-the-hold", "R4", LOOP, "daemon->shutting_down && !gw_daemon_is_sending(daemon)",
-        "daemon->shutting_down && daemon->gateway.permit.state != IW_STATE_ARMED && daemon->gateway.permit.view.output_zero", MOTION),
+        "daemon->shutting_down && iw_gateway_state(&daemon->gateway) != IW_STATE_ARMED && daemon->gateway.permit.view.output_zero", MOTION),
     Bug("signal-without-a-stop", "R4", LOOP, "iw_gateway_stop(&daemon->gateway, daemon->now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);", "", MOTION),
     Bug("clients-wait-for-frames", "R11", LOOP, "all_taken && daemon->clients == 0U &&", "all_taken &&", MOTION),
-    Bug("latched-hold-is-no-sending", "R3", "app/gateway/daemon.c", "(permit->state == IW_STATE_LATCHED && permit->holding)", "false", MOTION),
+    Bug("latched-hold-is-no-sending", "R3", "app/gateway/daemon.c", "return iw_gateway_is_sending(&self->gateway);", "return iw_gateway_is_sending(&self->gateway) && iw_gateway_state(&self->gateway) != IW_STATE_LATCHED;", MOTION),
+    Bug("latch-goes-with-its-client", "R2", "core/src/permit.c", "if (client != self->holder) { return; }",
+        "if (self->phase == IW_PHASE_LATCHED && self->stop.detail == client) { self->phase = IW_PHASE_LISTENING; } if (client != self->holder) { return; }",
+        ("unit_permit_lease", *MOTION)),
     # Requests.
     Bug("range-wraps", "R9", DISPATCH, "return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;", "return (int32_t)value;", REQUESTS),
     Bug("sides-swapped", "R8", DISPATCH, "{saturate(request->left_mm_s), saturate(request->right_mm_s)}",
@@ -123,13 +127,13 @@ PARTS = [
     Bug("stm32-ring-hands-out-stale-tags", "R6", "port/stm32_stub/frame_ring.c", "self->tag[head % IW_FRAME_RING_LENGTH] = tag;", "self->tag[tail % IW_FRAME_RING_LENGTH] = tag;",
         ("unit_bxcan_transmit",)),
     # learn.
-    Bug("learn-of-the-left-wheel-only", "learn", LEARN, "learn_wheel_t *wheel = &self->wheel[message->side];", "learn_wheel_t *wheel = &self->wheel[IW_LEFT];", ("unit_ctl_learn",)),
-    Bug("learn-judges-before-it-is-steady", "learn", LEARN, "at_us - setpoint->steady_since_us >= STEADY_US", "at_us >= setpoint->steady_since_us", ("unit_ctl_learn",)),
-    Bug("learn-forward-is-backward", "learn", LEARN, "now->speed_mm_s > 0 ? &self->current_forward_mA : now->speed_mm_s < 0", "now->speed_mm_s < 0 ? &self->current_forward_mA : now->speed_mm_s > 0", ("unit_ctl_learn",)),
-    Bug("learn-counts-a-reboot-as-way", "learn", LEARN, "self->has_ticks && step < TICKS_MAX", "self->has_ticks", ("unit_ctl_learn",)),
-    Bug("learn-takes-force-in-motion", "learn", LEARN, "self->rest_since_us >= 0 && at_us - self->rest_since_us >= REST_US", "self->rest_since_us >= 0", ("unit_ctl_learn",)),
-    Bug("learn-rest-never-ends", "learn", LEARN, "if (size_of(rpm) > REST_RPM) { self->rest_since_us = -1; } else if", "if", ("unit_ctl_learn",)),
-    Bug("learn-pose-that-wraps-jumps", "learn", LEARN, "step > INT16_MAX ? 65536U - step : step", "step", ("unit_ctl_learn",)),
-    Bug("learn-turns-over-a-gap", "learn", LEARN, "gap_ms > 0 && gap_ms < RPM_GAP_MS", "gap_ms > 0", ("unit_ctl_learn",)),
-    Bug("learn-mixed-sender-is-one", "learn", LEARN, "frame->mark == CANDUMP_SENT ? 1U : 0U", "frame->mark == CANDUMP_SENT ? 1U : self->sent > 0U ? 1U : 0U", ("unit_ctl_learn",)),
+    Bug("learn-of-the-left-wheel-only", "tools", LEARN, "learn_wheel_t *wheel = &self->wheel[message->side];", "learn_wheel_t *wheel = &self->wheel[IW_LEFT];", ("unit_ctl_learn",)),
+    Bug("learn-judges-before-it-is-steady", "tools", LEARN, "at_us - setpoint->steady_since_us >= STEADY_US", "at_us >= setpoint->steady_since_us", ("unit_ctl_learn",)),
+    Bug("learn-forward-is-backward", "tools", LEARN, "now->speed_mm_s > 0 ? &self->current_forward_mA : now->speed_mm_s < 0", "now->speed_mm_s < 0 ? &self->current_forward_mA : now->speed_mm_s > 0", ("unit_ctl_learn",)),
+    Bug("learn-counts-a-reboot-as-way", "tools", LEARN, "self->has_ticks && step < TICKS_MAX", "self->has_ticks", ("unit_ctl_learn",)),
+    Bug("learn-takes-force-in-motion", "tools", LEARN, "self->rest_since_us >= 0 && at_us - self->rest_since_us >= REST_US", "self->rest_since_us >= 0", ("unit_ctl_learn",)),
+    Bug("learn-rest-never-ends", "tools", LEARN, "if (size_of(rpm) > REST_RPM) { self->rest_since_us = -1; } else if", "if", ("unit_ctl_learn",)),
+    Bug("learn-pose-that-wraps-jumps", "tools", LEARN, "step > INT16_MAX ? 65536U - step : step", "step", ("unit_ctl_learn",)),
+    Bug("learn-turns-over-a-gap", "tools", LEARN, "gap_ms > 0 && gap_ms < RPM_GAP_MS", "gap_ms > 0", ("unit_ctl_learn",)),
+    Bug("learn-mixed-sender-is-one", "tools", LEARN, "frame->mark == CANDUMP_SENT ? 1U : 0U", "frame->mark == CANDUMP_SENT ? 1U : self->sent > 0U ? 1U : 0U", ("unit_ctl_learn",)),
 ]

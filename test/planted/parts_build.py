@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Programs with one file changed: the unit tests of whatever lies around the core, and the gateway for the system tests.
+"""Unit tests with one file of what they test changed.
 
 The default build tells how each file is compiled and each program linked. A change costs the compilation of that one file, as it is
 compiled for the program that judges, and one link: the changed object stands before the libraries, or in the place of the program's
@@ -14,8 +14,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 TIMEOUT_S = 120  # Of tests that take less than a second, on the busiest machine.
-GATEWAY = "iwheel-gateway"
-BESIDE = ("app/sim/iwheel-sim", "app/ctl/iwheelctl", "test/system/libiwheel_hook.so")
 
 
 def output_of(words):
@@ -77,43 +75,24 @@ class Parts:
 
     def judge(self, test, source=None, changed=None):
         """(what that test finds or None, None), or (None, why it cannot be told). Without a change: the program as it was built."""
-        if test.startswith("unit_"):
-            return self.judge_unit(test, source, changed)
-        return self.judge_system(test, source, changed)
-
-    def judge_unit(self, test, source, changed):
         if changed is None:
             folder, words = self.link_of(test)
-            return find_failure([folder / output_of(words)], self.work), None
+            return find_failure(folder / output_of(words), self.work), None
         program = changed.parent / test
         why = self.link(test, source, changed, program)
-        return (None, why) if why else (find_failure([program], changed.parent), None)
-
-    def judge_system(self, test, source, changed):
-        build = self.build
-        if changed is not None:
-            build = changed.parent / "build"
-            for path in BESIDE:
-                (build / path).parent.mkdir(parents=True, exist_ok=True)
-                (build / path).unlink(missing_ok=True)
-                (build / path).symlink_to(self.build / path)
-            (build / "app/gateway").mkdir(exist_ok=True)
-            why = self.link(GATEWAY, source, changed, build / "app/gateway" / GATEWAY)
-            if why:
-                return None, why
-        return find_failure([ROOT / "test/system/run", "--build", build, "--only", test, "--jobs", "1"], self.work), None
+        return (None, why) if why else (find_failure(program, changed.parent), None)
 
 
-def find_failure(command, folder):
+def find_failure(program, folder):
     """The first test that fails, or how the program ended; None if it passed."""
     try:
-        done = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, errors="replace",
+        done = subprocess.run([str(program)], cwd=folder, capture_output=True, text=True, errors="replace",
                               stdin=subprocess.DEVNULL, timeout=TIMEOUT_S)
     except subprocess.TimeoutExpired:
         return "does not end"
     if done.returncode == 0:
         return None
-    found = re.search(r":(test_\w+):FAIL", done.stdout) or re.search(r"^FAIL (\w+)", done.stdout, re.M)
+    found = re.search(r":(test_\w+):FAIL", done.stdout)
     if found:
         return found[1]
     return f"ends by {signal.Signals(-done.returncode).name}" if done.returncode < 0 else f"ends with status {done.returncode}"

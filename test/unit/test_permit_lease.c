@@ -260,7 +260,7 @@ static void test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after(v
             iw_permit_disconnect(&rig.permit, rig.now_us, (iw_client_t)client);
         }
         permit_rig_wait(&rig, MS(20));
-        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, rig.permit.state);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
     }
 }
 
