@@ -64,7 +64,7 @@ static void store(iw_ledger_item_t item, iw_ledger_state_t state, iw_evidence_t 
     gw_known_item_t *known = &stored.item[item];
     known->entry = (iw_ledger_entry_t){.state = state, .evidence = evidence, .figure = 1000};
     known->since_wall_us = 1700000000000000;
-    gw_assumption_value(config(), item, known->value);
+    gw_assumption_value(&daemon_rig.daemon->config, item, known->value);
 }
 
 static void store_offset(iw_side_t side, iw_force_unit_t unit, int32_t offset_mN) {

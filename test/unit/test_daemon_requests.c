@@ -176,7 +176,7 @@ static void test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest(void)
 
 static void test_arm_while_shutting_down_is_refused(void) {
     daemon_rig.daemon->shutting_down = true;
-    daemon_rig.daemon->gateway.permit.state = IW_STATE_STOPPING; // So that the loop goes on.
+    daemon_rig.daemon->gateway.permit.phase = IW_PHASE_HOLDING; // So that the loop goes on.
     daemon_rig.daemon->gateway.permit.hold_us = daemon_rig.now_us;
     assert_reply("{\"cmd\":\"arm\"}", "shutting down");
 }
