@@ -154,31 +154,69 @@ int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame) {
     return (self->phase == IW_BXCAN_RUNNING) ? 0 : -1;
 }
 
-int iw_bxcan_purge(void *context) {
-    iw_bxcan_t *const self = context;
-    iw_bxcan_registers_t *const registers = self->config.registers;
+/// Aborts all mailboxes, bxCAN 7.1, and forgets what they owe. TSR is written, never read and written back: a completion that comes
+/// between would be cleared with it.
+static bool abort_all(iw_bxcan_t *self) {
+    iw_register_t *const tsr = &self->config.registers->TSR;
+    iw_register_write(tsr, ABORT);
+    if (!poll_tsr(self, EMPTY)) {
+        return false;
+    }
+    iw_register_write(tsr, COMPLETED);
+    return true;
+}
+
+static void forget(iw_bxcan_t *self) {
+    (void)memset(self->outgoing, 0, sizeof self->outgoing);
+    self->epoch++;
+}
+
+/// Takes back all that waits, or leaves it to a later call. The interrupts are masked meanwhile.
+static bool take_back(iw_bxcan_t *self) {
     mask_transmit(self);
-    iw_register_write(&registers->TSR, ABORT);
-    const bool done = poll_tsr(self, EMPTY);
+    const bool done = abort_all(self);
     if (done) {
-        iw_register_write(&registers->TSR, COMPLETED);
-        (void)memset(self->outgoing, 0, sizeof self->outgoing);
-        self->epoch++;
+        forget(self);
     }
     unmask_transmit(self);
-    return done ? 1 : 0;
+    return done;
+}
+
+/// An abort that does not end: the frame is lost in the controller, which is reset, mailboxes and all. STARTING is told as a loss
+/// of the bus, and nothing is sent before it has been joined anew.
+static void start_anew(iw_bxcan_t *self) {
+    mask_transmit(self);
+    self->config.reset();
+    forget(self);
+    self->resets++;
+    self->phase = IW_BXCAN_STARTING;
+    write_mcr(self, IW_MCR_INRQ);
+    unmask_transmit(self);
+}
+
+/// Off the bus nothing leaves: not in bus-off, which only `bus_state` ends, and it joins no bus before all is taken back.
+int iw_bxcan_purge(void *context) {
+    iw_bxcan_t *const self = context;
+    if (take_back(self)) {
+        return 1;
+    }
+    if (self->phase != IW_BXCAN_RUNNING || is_bus_off(self)) {
+        return 0;
+    }
+    start_anew(self);
+    return 1;
 }
 
 /// Both lead through initialisation mode: bus-off is left by entering and leaving it (bxCAN 7.6), and a device that somebody
 /// has reset or put to sleep begins anew. What waits to be sent must not survive either.
 static void begin(iw_bxcan_t *self, iw_bxcan_phase_t phase) {
     self->phase = phase;
-    (void)iw_bxcan_purge(self);
+    (void)take_back(self);
     write_mcr(self, IW_MCR_INRQ);
 }
 
 static void leave_init(iw_bxcan_t *self) {
-    if (iw_bxcan_purge(self) <= 0) {
+    if (!take_back(self)) {
         return;
     }
     if (self->phase == IW_BXCAN_STARTING) {

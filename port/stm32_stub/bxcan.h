@@ -37,6 +37,7 @@ typedef struct {
     uint32_t bit_timing;             ///< BTR without mode bits: IW_BIT_BTR of bit_rate.h.
     uint32_t poll_limit;             ///< Reads of a register that take longer than the longest frame, 160 us.
     bool silent;                     ///< Listen without acknowledging. `send` then always fails.
+    void (*reset)(void);             ///< Resets the device (RCC), when an abort does not end. Of CAN1 it takes CAN2's filters too.
 } iw_bxcan_config_t;
 
 typedef enum {
@@ -66,6 +67,7 @@ typedef struct {
     volatile uint32_t lost;     ///< Frames and echoes that found the ring full.
     uint32_t losses_told;       ///< Of both, those that `receive` has reported.
     uint32_t bus_offs;          ///< Since the start.
+    uint32_t resets;            ///< Of the controller by us, since the start.
     uint8_t epoch;              ///< Counts purges: echoes from before one are not delivered.
 } iw_bxcan_t;
 
@@ -85,7 +87,9 @@ void iw_bxcan_init(iw_bxcan_t *self, const iw_bxcan_config_t *config);
 int iw_bxcan_send(void *context, const iw_can_frame_t *frame);
 int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame);
 iw_bus_state_t iw_bxcan_bus_state(void *context);
-/// Aborts all mailboxes and waits for their end, 160 us at the most. Echoes that were not delivered yet never come.
+/// Aborts all mailboxes and waits for their end, at most `poll_limit` reads. Echoes that were not delivered yet never come, not that of a
+/// frame that got through meanwhile either. An abort that does not end resets the controller: > 0 too, since nothing is left in it,
+/// and `bus_state` tells a loss of the bus. 0 only while off the bus: it is joined again only when all has been taken back.
 int iw_bxcan_purge(void *context);
 
 /// The device's interrupts: transmit, FIFO 0, and status change and error. The last only wakes the CPU.

@@ -72,6 +72,14 @@ void rig_reset(void) {
     }
 }
 
+static void reset_first(void) {
+    bxcan_model_reset(&rig[0].model, 28);
+}
+
+static void reset_second(void) {
+    bxcan_model_reset(&rig[1].model, 28);
+}
+
 void rig_init(int device, bool silent) {
     const iw_bxcan_config_t config = {
         .registers = &rig[device].window,
@@ -80,6 +88,7 @@ void rig_init(int device, bool silent) {
         .bit_timing = 0x03590001U,
         .poll_limit = 1000,
         .silent = silent,
+        .reset = (device == 0) ? reset_first : reset_second,
     };
     iw_bxcan_init(&rig[device].driver, &config);
 }

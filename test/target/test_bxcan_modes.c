@@ -206,6 +206,23 @@ static void test_recovery_waits_until_what_waits_is_taken_back(void) {
     TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
 }
 
+static void test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery(void) {
+    const iw_can_frame_t frame = rig_frame(266, 1);
+    model_frame_t on_bus;
+    rig_start(0);
+    (void)iw_bxcan_send(driver, &frame);
+    fail_until_bus_off();
+    model->abort_reads = 2000;
+    TEST_ASSERT_EQUAL(0, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(0, driver->resets);
+    for (int i = 0; i < 4; i++) {
+        TEST_ASSERT_EQUAL(IW_BUS_OFF, state());
+    }
+    bxcan_model_recessive(model, REJOIN_BITS);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, state());
+    TEST_ASSERT_EQUAL(MODEL_NONE, bxcan_model_offer(model, &on_bus));
+}
+
 static void test_error_passive_is_told_apart(void) {
     const iw_can_frame_t frame = rig_frame(266, 1);
     model_frame_t on_bus;
@@ -337,6 +354,7 @@ int main(void) {
     RUN_TEST(test_send_fails_in_bus_off_that_nobody_has_reported_yet);
     RUN_TEST(test_nothing_from_before_bus_off_is_sent_after_it);
     RUN_TEST(test_recovery_waits_until_what_waits_is_taken_back);
+    RUN_TEST(test_purge_that_does_not_end_in_bus_off_is_left_to_the_recovery);
     RUN_TEST(test_error_passive_is_told_apart);
     RUN_TEST(test_receive_errors_are_told);
     RUN_TEST(test_error_interrupt_wakes_and_ends);

@@ -192,11 +192,17 @@ static void test_old_frame_that_fails_while_being_replaced_never_comes(void) {
     assert_no_echo();
 }
 
+static void join_again(void) {
+    TEST_ASSERT_EQUAL(IW_BUS_DOWN, iw_bxcan_bus_state(driver));
+    (void)iw_bxcan_bus_state(driver);
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(driver));
+}
+
 static void test_frame_that_never_ends_is_waited_for_with_a_bound(void) {
     (void)send(266, 1);
     begin_first();
     TEST_ASSERT_EQUAL(0, send(266, 2));
-    TEST_ASSERT_EQUAL(0, iw_bxcan_purge(driver));
     (void)lose_frame_on_bus(0x08);
     (void)iw_bxcan_errors(driver); // The interrupt strikes.
     assert_nothing_waits();
@@ -204,6 +210,47 @@ static void test_frame_that_never_ends_is_waited_for_with_a_bound(void) {
     TEST_ASSERT_EQUAL(1, send(266, 3));
     assert_on_bus(266, 3);
     assert_echo(266, 3);
+    assert_no_echo();
+}
+
+static void test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_of_the_bus(void) {
+    (void)send(266, 1);
+    (void)send(298, 1);
+    begin_first();
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, driver->resets);
+    TEST_ASSERT_LESS_THAN(0, send(266, 2));
+    join_again();
+    assert_nothing_waits();
+    assert_no_echo();
+    TEST_ASSERT_EQUAL(1, send(266, 3));
+    assert_on_bus(266, 3);
+    assert_echo(266, 3);
+    assert_no_echo();
+}
+
+static void test_purge_of_a_controller_that_ignores_aborts_resets_it(void) {
+    (void)send(266, 1);
+    model->abort_reads = UINT32_MAX;
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    assert_nothing_waits();
+    join_again();
+    assert_nothing_waits();
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, driver->resets);
+}
+
+static void test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing(void) {
+    (void)send(266, 1);
+    (void)send(298, 1);
+    begin_first();
+    (void)lose_frame_on_bus(0x08);
+    bxcan_model_hold(model, 50, true);
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(0, driver->resets);
+    bxcan_model_recessive(model, 11);
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(driver));
+    assert_nothing_waits();
     assert_no_echo();
 }
 
@@ -281,6 +328,64 @@ static void test_frame_that_completes_during_a_purge_has_no_echo_afterwards(void
     assert_on_bus(266, 2);
     assert_echo(266, 2);
     assert_no_echo();
+}
+
+static int mailbox_of(uint32_t id) {
+    int found = MODEL_NONE;
+    for (int i = 0; i < MODEL_MAILBOXES; i++) {
+        found = (model->mailbox[i].pending && model->mailbox[i].tir >> 21 == id) ? i : found;
+    }
+    TEST_ASSERT_NOT_EQUAL(MODEL_NONE, found);
+    return found;
+}
+
+/// The right frame gets through when the interrupt has just been masked and nothing was aborted yet.
+static bool send_right_at_masking(uint32_t offset) {
+    if (offset != 0x14U) {
+        return true;
+    }
+    const int mailbox = mailbox_of(298);
+    bxcan_model_begin(model, mailbox);
+    bxcan_model_end(model, mailbox, MODEL_SENT);
+    return false;
+}
+
+static void fill_mailboxes(void) {
+    TEST_ASSERT_EQUAL(1, send(266, 1));
+    TEST_ASSERT_EQUAL(1, send(298, 1));
+    TEST_ASSERT_EQUAL(1, send(300, 1));
+}
+
+static void test_purge_of_three_full_mailboxes_empties_them_all(void) {
+    fill_mailboxes();
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(0, driver->resets);
+    assert_nothing_waits();
+    TEST_ASSERT_EQUAL(IW_BUS_ACTIVE, iw_bxcan_bus_state(driver));
+    fill_mailboxes();
+}
+
+static void test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_waiting(void) {
+    fill_mailboxes();
+    rig[0].on_read = send_right_at_masking;
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    assert_no_echo();
+    assert_nothing_waits();
+    TEST_ASSERT_EQUAL(0, driver->resets);
+}
+
+static void test_completion_while_another_mailbox_is_withdrawn_is_not_lost(void) {
+    fill_mailboxes();
+    rig[0].on_read = send_right_at_masking;
+    TEST_ASSERT_EQUAL(1, send(266, 2));
+    assert_echo(298, 1);
+    assert_no_echo();
+    assert_on_bus(266, 2);
+    assert_on_bus(300, 1);
+    assert_echo(266, 1);
+    assert_echo(266, 2);
+    assert_echo(300, 1);
+    TEST_ASSERT_EQUAL(1, send(298, 2));
 }
 
 static void test_purge_of_an_idle_device_succeeds(void) {
@@ -364,6 +469,9 @@ int main(void) {
     RUN_TEST(test_old_frame_that_gets_through_while_being_replaced_has_its_own_echo);
     RUN_TEST(test_old_frame_that_fails_while_being_replaced_never_comes);
     RUN_TEST(test_frame_that_never_ends_is_waited_for_with_a_bound);
+    RUN_TEST(test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_of_the_bus);
+    RUN_TEST(test_purge_of_a_controller_that_ignores_aborts_resets_it);
+    RUN_TEST(test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing);
     RUN_TEST(test_failed_attempts_before_an_abort_are_no_echo);
     RUN_TEST(test_slow_abort_is_awaited);
     RUN_TEST(test_fourth_frame_waits_for_a_free_mailbox);
@@ -371,6 +479,9 @@ int main(void) {
     RUN_TEST(test_echo_from_before_a_purge_never_comes);
     RUN_TEST(test_purge_keeps_what_was_received);
     RUN_TEST(test_frame_that_completes_during_a_purge_has_no_echo_afterwards);
+    RUN_TEST(test_purge_of_three_full_mailboxes_empties_them_all);
+    RUN_TEST(test_purge_of_three_while_one_completes_leaves_no_echo_and_nothing_waiting);
+    RUN_TEST(test_completion_while_another_mailbox_is_withdrawn_is_not_lost);
     RUN_TEST(test_purge_of_an_idle_device_succeeds);
     RUN_TEST(test_receive_of_a_stopped_device_is_broken);
     RUN_TEST(test_random_traffic_keeps_the_account);
