@@ -185,8 +185,10 @@ static bool take_back(iw_bxcan_t *self) {
 /// An abort that does not end: the frame is lost in the controller, which is reset, mailboxes and all. STARTING is told as a loss
 /// of the bus, and nothing is sent before it has been joined anew.
 static void start_anew(iw_bxcan_t *self) {
+    iw_register_t *const reset = self->config.reset_register;
     mask_transmit(self);
-    self->config.reset();
+    iw_register_write(reset, iw_register_read(reset) | self->config.reset_bits);
+    iw_register_write(reset, iw_register_read(reset) & ~self->config.reset_bits);
     forget(self);
     self->resets++;
     self->phase = IW_BXCAN_STARTING;

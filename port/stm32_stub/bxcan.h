@@ -37,7 +37,8 @@ typedef struct {
     uint32_t bit_timing;             ///< BTR without mode bits: IW_BIT_BTR of bit_rate.h.
     uint32_t poll_limit;             ///< Reads of a register that take longer than the longest frame, 160 us.
     bool silent;                     ///< Listen without acknowledging. `send` then always fails.
-    void (*reset)(void);             ///< Resets the device (RCC), when an abort does not end. Of CAN1 it takes CAN2's filters too.
+    iw_register_t *reset_register;   ///< RCC's that resets the device, used when an abort does not end ...
+    uint32_t reset_bits; ///< ... and which bits. Where CAN2 is used too, both devices': CAN1 holds its filters.
 } iw_bxcan_config_t;
 
 typedef enum {

@@ -32,11 +32,16 @@ typedef struct {
 
 #define CRYSTAL_INPUT (IW_BOARD_CRYSTAL_IS_CLOCK != 0 ? HSEBYP : 0U)
 
-// A poll takes 8 cycles at the least, at 8 MHz: 10 ms. A crystal needs 2 ms.
-#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 100U)
+// A poll takes 8 cycles at the least, at 8 MHz: 1 ms. The PLL needs 0.3 ms at the most; the crystal goes on starting between the calls.
+#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 1000U)
 
-static_assert(IW_BOARD_CRYSTAL_HZ * IW_BOARD_PLL_MULTIPLIER == IW_BOARD_CORE_HZ, "the PLL multiplies the crystal");
-static_assert(IW_BOARD_PLL_MULTIPLIER >= 2U && IW_BOARD_PLL_MULTIPLIER <= 9U, "7.3.2, and 72 MHz are the limit");
+static_assert(
+    IW_BOARD_CRYSTAL_HZ >= IW_BOARD_CRYSTAL_MIN_HZ && IW_BOARD_CRYSTAL_HZ <= IW_BOARD_CRYSTAL_MAX_HZ &&
+        IW_BOARD_PLL_MULTIPLIER >= 2U && IW_BOARD_PLL_MULTIPLIER <= 16U &&
+        IW_BOARD_CRYSTAL_HZ * IW_BOARD_PLL_MULTIPLIER == IW_BOARD_CORE_HZ,
+    "this crystal cannot give the bus exactly: an STM32F1 multiplies it by 2 to 16 (7.3.2), and half of that must be a "
+    "multiple of 8 MHz and at most 36 MHz. Take one of 4, 6, 8, 12 or 16 MHz (-DIWHEEL_CRYSTAL_HZ=8000000)");
+static_assert(IW_BOARD_CORE_HZ <= 72000000U, "the chip's limit");
 static_assert(IW_BOARD_APB1_HZ * 2U == IW_BOARD_CORE_HZ, "PPRE1_HALF is what is written");
 
 static bool wait_for(const volatile uint32_t *flags, uint32_t mask, uint32_t value) {
@@ -64,14 +69,14 @@ static bool try_start(void) {
     return wait_for(&RCC->CFGR, SWS, SWS_PLL);
 }
 
+/// The crystal stays on after a failure: one that needs longer goes on starting while the call is repeated.
 bool iw_clock_start(void) {
     if (try_start()) {
         RCC->CR |= CSSON; // 7.2.7: a failing crystal raises the NMI and the internal oscillator takes over.
         return true;
     }
     RCC->CFGR &= ~SW;
-    RCC->CR &= ~PLLON; // PLL before its source.
-    RCC->CR &= ~HSEON;
+    RCC->CR &= ~PLLON;
     return false;
 }
 

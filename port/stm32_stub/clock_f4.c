@@ -37,12 +37,17 @@ typedef struct {
 
 #define CRYSTAL_INPUT (IW_BOARD_CRYSTAL_IS_CLOCK != 0 ? HSEBYP : 0U)
 
-// A poll takes 8 cycles at the least, at 16 MHz: 10 ms. A crystal needs 2 ms.
-#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 100U)
+// A poll takes 8 cycles at the least, at 16 MHz: 1 ms. The PLL needs 0.3 ms at the most; the crystal goes on starting between the calls.
+#define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 1000U)
 
-static_assert(IW_BOARD_CRYSTAL_HZ / IW_BOARD_PLL_M == 2000000U, "7.3.2 recommends 2 MHz into the PLL");
-static_assert(IW_BOARD_CRYSTAL_HZ / IW_BOARD_PLL_M * IW_BOARD_PLL_N / IW_BOARD_PLL_P == IW_BOARD_CORE_HZ,
-              "the PLL's output");
+static_assert(IW_BOARD_CRYSTAL_HZ >= IW_BOARD_CRYSTAL_MIN_HZ && IW_BOARD_CRYSTAL_HZ <= IW_BOARD_CRYSTAL_MAX_HZ &&
+                  IW_BOARD_PLL_INPUT_HZ * IW_BOARD_PLL_M == IW_BOARD_CRYSTAL_HZ,
+              "this crystal cannot give the bus exactly: 1 to 2 MHz that divide it and 320 MHz must go into the PLL "
+              "(7.3.2). Take any "
+              "whole MHz from 4 to 26, or 12.5 or 19.2 MHz (-DIWHEEL_CRYSTAL_HZ=25000000)");
+static_assert(IW_BOARD_PLL_M >= 2U && IW_BOARD_PLL_M <= 63U && IW_BOARD_PLL_N >= 50U && IW_BOARD_PLL_N <= 432U,
+              "7.3.2");
+static_assert(IW_BOARD_PLL_INPUT_HZ * IW_BOARD_PLL_N / IW_BOARD_PLL_P == IW_BOARD_CORE_HZ, "the PLL's output");
 static_assert(IW_BOARD_CORE_HZ <= 168000000U, "faster needs overdrive, and an F407 cannot");
 static_assert(IW_BOARD_APB1_HZ * 4U == IW_BOARD_CORE_HZ, "PPRE1_QUARTER is what is written");
 
@@ -77,14 +82,14 @@ static bool try_start(void) {
     return wait_for(&RCC->CFGR, SWS, SWS_PLL);
 }
 
+/// The crystal stays on after a failure: one that needs longer goes on starting while the call is repeated.
 bool iw_clock_start(void) {
     if (try_start()) {
         RCC->CR |= CSSON; // 7.2.7: a failing crystal raises the NMI and the internal oscillator takes over.
         return true;
     }
     RCC->CFGR &= ~SW;
-    RCC->CR &= ~PLLON; // PLL before its source.
-    RCC->CR &= ~HSEON;
+    RCC->CR &= ~PLLON;
     return false;
 }
 

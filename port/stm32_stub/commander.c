@@ -1,8 +1,32 @@
 // SPDX-License-Identifier: MIT
 #include "commander.h"
 
-#define CLIENT   1U
-#define RETRY_US 100000U
+#include "pins.h"
+#include "report.h"
+
+#define CLIENT    1U
+#define RETRY_US  100000U
+#define STABLE_US 20000U
+
+bool iw_commander_pressed(iw_commander_t *self, iw_time_us_t now_us) {
+    const bool level = iw_pins_button_low();
+    if (level != self->level) {
+        self->level = level;
+        self->change_us = now_us;
+    }
+    if (now_us - self->change_us < STABLE_US) {
+        return false;
+    }
+    const bool press = level && self->released;
+    self->released = !level;
+    return press;
+}
+
+void iw_commander_reset(iw_gateway_t *gateway, iw_time_us_t now_us) {
+    if (iw_gateway_state(gateway) == IW_STATE_LATCHED) {
+        iw_report_reset(iw_gateway_reset(gateway, now_us));
+    }
+}
 
 bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(gateway);

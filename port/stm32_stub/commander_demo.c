@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "commander.h"
-#include "pins.h"
-
-#define STABLE_US 20000U
 
 /// Both wheels slowly forward, rest, back, and rest: where it began.
 typedef struct {
@@ -18,20 +15,8 @@ bool iw_commander_sends(void) {
     return true;
 }
 
-/// True once for each press: low for STABLE_US after it was high for STABLE_US. A held button repeats nothing, and one that is down
-/// from the start counts only after it was let go.
-static bool was_pressed(iw_commander_t *self, iw_time_us_t now_us) {
-    const bool level = iw_pins_button_low();
-    if (level != self->level) {
-        self->level = level;
-        self->change_us = now_us;
-    }
-    if (now_us - self->change_us < STABLE_US) {
-        return false;
-    }
-    const bool press = level && self->released;
-    self->released = !level;
-    return press;
+const char *iw_commander_words(void) {
+    return "holds both wheels at zero; the button starts a slow profile";
 }
 
 static int32_t profile_speed_mm_s(iw_commander_t *self, iw_time_us_t now_us) {
@@ -46,11 +31,11 @@ static int32_t profile_speed_mm_s(iw_commander_t *self, iw_time_us_t now_us) {
 
 /// One button: resets a latch; starts the profile; stops it. A press never does two of these.
 void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
-    const bool press = was_pressed(self, now_us);
+    const bool press = iw_commander_pressed(self, now_us);
     if (!iw_commander_arm(self, gateway, now_us)) {
         self->running = false;
         if (press) {
-            (void)iw_gateway_reset(gateway, now_us);
+            iw_commander_reset(gateway, now_us);
         }
         return;
     }

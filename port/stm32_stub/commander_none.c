@@ -5,8 +5,12 @@ bool iw_commander_sends(void) {
     return false;
 }
 
+const char *iw_commander_words(void) {
+    return "listens and sends nothing";
+}
+
 void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
-    (void)self;
-    (void)gateway;
-    (void)now_us;
+    if (iw_commander_pressed(self, now_us)) {
+        iw_commander_reset(gateway, now_us);
+    }
 }

@@ -4,16 +4,23 @@
 #include "bxcan.h"
 #include "clock.h"
 #include "commander.h"
+#include "console.h"
 #include "cortex_m.h"
 #include "estop.h"
 #include "iwheel/gateway.h"
 #include "lamp.h"
 #include "marker.h"
 #include "pins.h"
+#include "report.h"
 #include "watchdog.h"
 
-// A poll takes 4 cycles at the least, and the longest frame 160 us: 1 ms is plenty.
-#define ABORT_POLLS (IW_BOARD_CORE_HZ / 4U / 1000U)
+// A poll takes 4 cycles at the least, and the longest frame with an error at its end 200 us: 250 us, and 1.5 ms at the most.
+#define ABORT_POLLS (IW_BOARD_CORE_HZ / 4U / 4000U)
+#define CAN_RESET   (1U << 25) // In RCC's APB1RSTR, RM0008 7.3.4 and RM0090 7.3.8.
+// A crystal that has not started by now is told of.
+#define CRYSTAL_LATE_US 100000U
+// While text waits the loop goes round this often.
+#define CHARACTER_US 1000U
 
 void iw_exti0_handler(void);
 void iw_can_transmit_handler(void);
@@ -41,14 +48,22 @@ void iw_can_error_handler(void) {
     iw_wake();
 }
 
-/// Tries until the crystal runs; meanwhile time is counted on the internal oscillator, and the lamp tells.
+/// Tries until the crystal runs; meanwhile time is counted on the internal oscillator, and lamp and console tell.
 static void wait_for_crystal(void) {
+    bool is_told = false;
     iw_time_start(IW_BOARD_INTERNAL_HZ);
+    iw_console_start(IW_BOARD_INTERNAL_HZ);
     while (!iw_clock_start()) {
+        if (!is_told && iw_time_now_us() > CRYSTAL_LATE_US) {
+            is_told = true;
+            iw_report_no_crystal();
+        }
+        (void)iw_console_step();
         iw_pins_lamp(iw_lamp_is_lit(IW_LAMP_NO_CRYSTAL, iw_time_now_us()));
         iw_watchdog_feed();
     }
     iw_time_start(IW_BOARD_CORE_HZ);
+    iw_console_start(IW_BOARD_APB1_HZ);
 }
 
 static void start_bus(void) {
@@ -58,6 +73,8 @@ static void start_bus(void) {
         .bit_timing = IW_BIT_BTR,
         .poll_limit = ABORT_POLLS,
         .silent = !iw_commander_sends(),
+        .reset_register = (iw_register_t *)IW_BOARD_CAN_RESET_ADDRESS,
+        .reset_bits = CAN_RESET,
     };
     iw_bxcan_init(&bus, &config);
     iw_irq_enable(IW_IRQ_CAN_TRANSMIT);
@@ -85,10 +102,13 @@ static void cycle(iw_gateway_t *gateway, iw_commander_t *commander) {
     const iw_time_us_t now_us = iw_time_now_us();
     iw_commander_step(commander, gateway, now_us);
     const iw_time_us_t next_us = iw_gateway_step(gateway, now_us);
-    iw_marker_set(iw_permit_demand(&gateway->permit) != IW_DEMAND_SILENCE);
-    iw_pins_lamp(iw_lamp_is_lit(iw_lamp_pattern(gateway, iw_pins_estop_high()), now_us));
+    const bool estop_high = iw_pins_estop_high();
+    iw_marker_step(gateway, now_us);
+    iw_pins_lamp(iw_lamp_is_lit(iw_lamp_pattern(gateway, estop_high), now_us));
+    iw_report_step(gateway, estop_high);
+    const bool more = iw_console_step();
     iw_watchdog_feed();
-    iw_sleep_until(next_us);
+    iw_sleep_until((more && next_us > now_us + CHARACTER_US) ? now_us + CHARACTER_US : next_us);
 }
 
 /// Returns only if the configuration is wrong, which the tests of the image exclude.
@@ -105,6 +125,7 @@ int main(void) {
     if (!start_gateway(&gateway, restarted)) {
         return 1;
     }
+    iw_report_start(restarted);
     for (;;) {
         cycle(&gateway, &commander);
     }

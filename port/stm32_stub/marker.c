@@ -5,13 +5,35 @@
 
 __attribute__((section(".noinit"))) static volatile uint32_t word, inverse;
 
+static iw_time_us_t zeros_us; // Since when nothing but zeros is demanded; 0: something else is, or nothing.
+static bool zeros_proven;     // Both wheels' zeros of this hold have been acknowledged.
+
+static void set(bool sending) {
+    word = sending ? SENDING : 0U;
+    inverse = sending ? ~SENDING : 0U;
+}
+
 bool iw_marker_take(bool power_on) {
     const bool was_sending = !power_on && word == SENDING && inverse == ~SENDING;
-    iw_marker_set(false);
+    if (!was_sending) {
+        set(false);
+    }
     return was_sending;
 }
 
-void iw_marker_set(bool sending) {
-    word = sending ? SENDING : 0U;
-    inverse = sending ? ~SENDING : 0U;
+void iw_marker_step(const iw_gateway_t *gateway, iw_time_us_t now_us) {
+    const bool silent = iw_permit_demand(&gateway->permit) == IW_DEMAND_SILENCE;
+    if (!silent) {
+        set(true);
+    } else if (zeros_proven) {
+        set(false);
+    }
+    if (silent || !iw_setpoint_is_zero(&gateway->setpoint)) {
+        zeros_us = 0;
+        zeros_proven = false;
+    } else if (zeros_us == 0U) {
+        zeros_us = now_us;
+    } else {
+        zeros_proven = zeros_proven || iw_outbox_proven_since(&gateway->sender.outbox, zeros_us);
+    }
 }

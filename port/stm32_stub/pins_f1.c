@@ -8,44 +8,72 @@ typedef struct {
 
 #define APB2ENR      (*(volatile uint32_t *)0x40021018U)
 #define APB1ENR      (*(volatile uint32_t *)0x4002101CU)
+#define AFIO_MAPR    (*(volatile uint32_t *)0x40010004U)
 #define AFIO_EXTICR1 (*(volatile uint32_t *)0x40010008U)
-#define PORT_A       ((port_t *)0x40010800U)
-#define PORT_C       ((port_t *)0x40011000U)
-
-#define ESTOP  (1U << 0)
-#define BUTTON (1U << 1)
-#define CAN_RX (1U << 11)
-#define LAMP   (1U << 13)
+#define PORT_A       0x40010800U
 
 // Four bits a pin, 9.2.1 and 9.2.2.
-#define INPUT_PULLED     0x8U
-#define OUTPUT_SLOW      0x2U
-#define ALTERNATE        0x9U // Push-pull, 10 MHz: enough for 1 Mbit/s, and quiet.
-#define FIELD(pin, mode) ((uint32_t)(mode) << (4U * ((pin) % 8U)))
+#define INPUT_PULLED 0x8U
+#define OUTPUT_SLOW  0x2U
+#define ALTERNATE    0x9U // Push-pull, 10 MHz: enough for 1 Mbit/s, and quiet.
 
-static void set_fields(volatile uint32_t *address, uint32_t mask, uint32_t fields) {
-    *address = (*address & ~mask) | fields;
+static port_t *port_of(uint32_t pin) {
+    return (port_t *)(PORT_A + pin / 16U * 0x400U);
+}
+
+static void set_level(uint32_t pin, bool high) {
+    port_of(pin)->BSRR = (high ? 1U : 0x10000U) << (pin % 16U); // 9.2.5: the upper half clears.
+}
+
+static bool is_high(uint32_t pin) {
+    return ((port_of(pin)->IDR >> (pin % 16U)) & 1U) != 0U;
+}
+
+static void set_mode(uint32_t pin, uint32_t mode) {
+    volatile uint32_t *const fields = (pin % 16U < 8U) ? &port_of(pin)->CRL : &port_of(pin)->CRH;
+    const uint32_t shift = 4U * (pin % 8U);
+    *fields = (*fields & ~(0xFU << shift)) | (mode << shift);
+}
+
+/// 9.1.1: an input's output bit chooses up.
+static void pull_up(uint32_t pin) {
+    set_level(pin, true);
+    set_mode(pin, INPUT_PULLED);
+}
+
+static void enable_clocks(void) {
+    static const uint8_t pins[] = {IW_BOARD_ESTOP, IW_BOARD_BUTTON, IW_BOARD_LAMP, IW_BOARD_CAN_RX, IW_BOARD_UART_RX};
+    uint32_t ports = 0;
+    for (size_t i = 0; i < sizeof pins; i++) {
+        ports |= 1U << (pins[i] / 16U);
+    }
+    APB2ENR |= (ports << 2) | (1U << 0); // 7.3.7: ports, AFIO.
+    APB1ENR |= (1U << 25) | (1U << 17);  // 7.3.8: CAN, USART2.
 }
 
 void iw_pins_init(void) {
-    APB2ENR |= (1U << 0) | (1U << 2) | (1U << 4); // 7.3.7: AFIO, ports A and C.
-    APB1ENR |= 1U << 25;                          // 7.3.8: CAN.
-    PORT_A->BSRR = ESTOP | BUTTON | CAN_RX; // 9.1.1: an input's output bit chooses up. No transceiver reads recessive.
+    enable_clocks();
+    pull_up(IW_BOARD_ESTOP);
+    pull_up(IW_BOARD_BUTTON);
+    pull_up(IW_BOARD_CAN_RX); // No transceiver reads recessive.
+    pull_up(IW_BOARD_UART_RX);
     iw_pins_lamp(false);
-    set_fields(&PORT_A->CRL, FIELD(0, 0xF) | FIELD(1, 0xF), FIELD(0, INPUT_PULLED) | FIELD(1, INPUT_PULLED));
-    set_fields(&PORT_A->CRH, FIELD(11, 0xF) | FIELD(12, 0xF), FIELD(11, INPUT_PULLED) | FIELD(12, ALTERNATE));
-    set_fields(&PORT_C->CRH, FIELD(13, 0xF), FIELD(13, OUTPUT_SLOW));
-    set_fields(&AFIO_EXTICR1, 0xFU, 0U); // 9.4.3: EXTI0 is PA0.
+    set_mode(IW_BOARD_LAMP, OUTPUT_SLOW);
+    AFIO_MAPR =
+        (IW_BOARD_CAN_ON_PA11 != 0) ? 0U : (2U << 13); // 9.4.2: CAN_REMAP; SWJ_CFG 0 leaves the debugger its pins.
+    set_mode(IW_BOARD_CAN_TX, ALTERNATE);
+    set_mode(IW_BOARD_UART_TX, ALTERNATE);
+    AFIO_EXTICR1 = (AFIO_EXTICR1 & ~0xFU) | (IW_BOARD_ESTOP / 16U); // 9.4.3: EXTI0's port.
 }
 
 bool iw_pins_estop_high(void) {
-    return (PORT_A->IDR & ESTOP) != 0U;
+    return is_high(IW_BOARD_ESTOP);
 }
 
 bool iw_pins_button_low(void) {
-    return (PORT_A->IDR & BUTTON) == 0U;
+    return !is_high(IW_BOARD_BUTTON);
 }
 
 void iw_pins_lamp(bool lit) {
-    PORT_C->BSRR = lit ? LAMP << 16 : LAMP; // 9.2.5: the upper half clears.
+    set_level(IW_BOARD_LAMP, lit == (IW_BOARD_LAMP_LIT != 0));
 }

@@ -3,51 +3,84 @@
 #include "pins.h"
 
 typedef struct {
-    volatile uint32_t MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFRL, AFRH;
+    volatile uint32_t MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFR[2];
 } port_t;
 
 #define AHB1ENR        (*(volatile uint32_t *)0x40023830U)
 #define APB1ENR        (*(volatile uint32_t *)0x40023840U)
 #define APB2ENR        (*(volatile uint32_t *)0x40023844U)
 #define SYSCFG_EXTICR1 (*(volatile uint32_t *)0x40013808U)
-#define PORT_A         ((port_t *)0x40020000U)
+#define PORT_A         0x40020000U
 
-#define ESTOP  (1U << 0)
-#define BUTTON (1U << 1)
-#define LAMP   (1U << 5)
+// Two bits a pin in MODER (8.4.1), OSPEEDR (8.4.3) and PUPDR (8.4.4), four in AFR (8.4.9).
+#define OUTPUT    1U
+#define ALTERNATE 2U
+#define MEDIUM    1U // The slowest, after reset, has edges of up to 100 ns: a tenth of a bit.
+#define PULL_UP   1U
+#define AF_USART2 7U
+#define AF_CAN1   9U
 
-// Two bits a pin in MODER (8.4.1) and PUPDR (8.4.4), four in AFRH (8.4.10).
-#define OUTPUT            1U
-#define ALTERNATE         2U
-#define PULL_UP           1U
-#define AF_CAN1           9U
-#define FIELD(pin, value) ((uint32_t)(value) << (2U * (pin)))
+static port_t *port_of(uint32_t pin) {
+    return (port_t *)(PORT_A + pin / 16U * 0x400U);
+}
 
-static void set_fields(volatile uint32_t *address, uint32_t mask, uint32_t fields) {
-    *address = (*address & ~mask) | fields;
+static bool is_high(uint32_t pin) {
+    return ((port_of(pin)->IDR >> (pin % 16U)) & 1U) != 0U;
+}
+
+static void set_two(volatile uint32_t *fields, uint32_t pin, uint32_t value) {
+    const uint32_t shift = 2U * (pin % 16U);
+    *fields = (*fields & ~(3U << shift)) | (value << shift);
+}
+
+static void pull_up(uint32_t pin) {
+    set_two(&port_of(pin)->PUPDR, pin, PULL_UP);
+}
+
+static void set_alternate(uint32_t pin, uint32_t function) {
+    port_t *const port = port_of(pin);
+    volatile uint32_t *const fields = &port->AFR[pin % 16U / 8U];
+    const uint32_t shift = 4U * (pin % 8U);
+    *fields = (*fields & ~(0xFU << shift)) | (function << shift);
+    set_two(&port->OSPEEDR, pin, MEDIUM);
+    set_two(&port->MODER, pin, ALTERNATE);
+}
+
+static void enable_clocks(void) {
+    static const uint8_t pins[] = {IW_BOARD_ESTOP, IW_BOARD_BUTTON, IW_BOARD_LAMP, IW_BOARD_CAN_RX, IW_BOARD_UART_RX};
+    uint32_t ports = 0;
+    for (size_t i = 0; i < sizeof pins; i++) {
+        ports |= 1U << (pins[i] / 16U);
+    }
+    AHB1ENR |= ports;                   // 7.3.10
+    APB1ENR |= (1U << 25) | (1U << 17); // 7.3.13: CAN1, USART2.
+    APB2ENR |= 1U << 14;                // 7.3.14: SYSCFG.
 }
 
 void iw_pins_init(void) {
-    AHB1ENR |= 1U << 0;  // 7.3.10: port A.
-    APB1ENR |= 1U << 25; // 7.3.13: CAN1.
-    APB2ENR |= 1U << 14; // 7.3.14: SYSCFG.
+    enable_clocks();
     iw_pins_lamp(false);
-    set_fields(&PORT_A->PUPDR, FIELD(0, 3) | FIELD(1, 3) | FIELD(11, 3),
-               FIELD(0, PULL_UP) | FIELD(1, PULL_UP) | FIELD(11, PULL_UP)); // No transceiver reads recessive.
-    set_fields(&PORT_A->AFRH, 0x000FF000U, (AF_CAN1 << 12) | (AF_CAN1 << 16));
-    set_fields(&PORT_A->MODER, FIELD(0, 3) | FIELD(1, 3) | FIELD(5, 3) | FIELD(11, 3) | FIELD(12, 3),
-               FIELD(5, OUTPUT) | FIELD(11, ALTERNATE) | FIELD(12, ALTERNATE));
-    set_fields(&SYSCFG_EXTICR1, 0xFU, 0U); // 9.2.3: EXTI0 is PA0.
+    set_two(&port_of(IW_BOARD_LAMP)->MODER, IW_BOARD_LAMP, OUTPUT);
+    pull_up(IW_BOARD_ESTOP);
+    pull_up(IW_BOARD_BUTTON);
+    pull_up(IW_BOARD_CAN_RX); // No transceiver reads recessive.
+    pull_up(IW_BOARD_UART_RX);
+    set_alternate(IW_BOARD_CAN_RX, AF_CAN1);
+    set_alternate(IW_BOARD_CAN_TX, AF_CAN1);
+    set_alternate(IW_BOARD_UART_RX, AF_USART2);
+    set_alternate(IW_BOARD_UART_TX, AF_USART2);
+    SYSCFG_EXTICR1 = (SYSCFG_EXTICR1 & ~0xFU) | (IW_BOARD_ESTOP / 16U); // 9.2.3: EXTI0's port.
 }
 
 bool iw_pins_estop_high(void) {
-    return (PORT_A->IDR & ESTOP) != 0U;
+    return is_high(IW_BOARD_ESTOP);
 }
 
 bool iw_pins_button_low(void) {
-    return (PORT_A->IDR & BUTTON) == 0U;
+    return !is_high(IW_BOARD_BUTTON);
 }
 
 void iw_pins_lamp(bool lit) {
-    PORT_A->BSRR = lit ? LAMP : LAMP << 16; // 8.4.7: the upper half clears.
+    const bool high = lit == (IW_BOARD_LAMP_LIT != 0);
+    port_of(IW_BOARD_LAMP)->BSRR = (high ? 1U : 0x10000U) << (IW_BOARD_LAMP % 16U); // 8.4.7: the upper half clears.
 }

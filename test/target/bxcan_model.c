@@ -379,6 +379,10 @@ const char *bxcan_model_violation(const bxcan_model_t *self) {
     return self->violation;
 }
 
+void bxcan_model_slow_aborts(bxcan_model_t *self, uint32_t reads) {
+    self->abort_reads = reads;
+}
+
 uint32_t bxcan_model_overruns(const bxcan_model_t *self) {
     return self->overruns;
 }

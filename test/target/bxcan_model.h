@@ -113,6 +113,9 @@ bool bxcan_model_irq_fifo0(const bxcan_model_t *self);
 bool bxcan_model_irq_error(const bxcan_model_t *self);
 uint32_t bxcan_model_lines(const bxcan_model_t *self);
 
+/// Test: TSR must be read this often until an abort takes effect.
+void bxcan_model_slow_aborts(bxcan_model_t *self, uint32_t reads);
+
 /// Frames that found their FIFO full since the reset.
 uint32_t bxcan_model_overruns(const bxcan_model_t *self);
 

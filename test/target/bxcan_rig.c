@@ -5,7 +5,8 @@
 
 #include <string.h>
 
-#define STORM 100000
+#define STORM     100000
+#define RESET_BIT 0x02000000U
 
 rig_device_t rig[RIG_DEVICES];
 static bool is_serving;
@@ -44,8 +45,21 @@ static void serve(rig_device_t *device) {
     is_serving = false;
 }
 
+/// RCC's register of one device: while its bit is set, the device is in reset.
+static rig_device_t *reset_at(const iw_register_t *address) {
+    for (int i = 0; i < RIG_DEVICES; i++) {
+        if (address == &rig[i].reset) {
+            return &rig[i];
+        }
+    }
+    return NULL;
+}
+
 uint32_t iw_register_read(const iw_register_t *address) {
     uint32_t offset = 0;
+    if (reset_at(address) != NULL) {
+        return *address;
+    }
     rig_device_t *const device = device_at(address, &offset);
     const uint32_t value = bxcan_model_read(&device->model, offset);
     if (device->on_read != NULL && !is_serving && !device->on_read(offset)) {
@@ -57,6 +71,13 @@ uint32_t iw_register_read(const iw_register_t *address) {
 
 void iw_register_write(iw_register_t *address, uint32_t value) {
     uint32_t offset = 0;
+    rig_device_t *const resetting = reset_at(address);
+    if (resetting != NULL) {
+        TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, value & ~RESET_BIT, "another device was reset too");
+        *address = value;
+        bxcan_model_reset(&resetting->model, 28);
+        return;
+    }
     rig_device_t *const device = device_at(address, &offset);
     bxcan_model_write(&device->model, offset, value);
     serve(device);
@@ -67,17 +88,10 @@ void rig_reset(void) {
     for (int i = 0; i < RIG_DEVICES; i++) {
         (void)memset(&rig[i], 0xA5, sizeof rig[i]);
         rig[i].on_read = NULL;
+        rig[i].reset = 0;
         rig[i].interrupts = 0;
         bxcan_model_reset(&rig[i].model, 28);
     }
-}
-
-static void reset_first(void) {
-    bxcan_model_reset(&rig[0].model, 28);
-}
-
-static void reset_second(void) {
-    bxcan_model_reset(&rig[1].model, 28);
 }
 
 void rig_init(int device, bool silent) {
@@ -88,7 +102,8 @@ void rig_init(int device, bool silent) {
         .bit_timing = 0x03590001U,
         .poll_limit = 1000,
         .silent = silent,
-        .reset = (device == 0) ? reset_first : reset_second,
+        .reset_register = &rig[device].reset,
+        .reset_bits = RESET_BIT,
     };
     iw_bxcan_init(&rig[device].driver, &config);
 }

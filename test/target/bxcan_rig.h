@@ -14,6 +14,7 @@
 typedef struct {
     bxcan_model_t model;
     iw_bxcan_registers_t window; ///< Only its address means something.
+    iw_register_t reset;         ///< RCC's, with a bit for this device.
     iw_bxcan_t driver;
     uint32_t interrupts;              ///< Served so far.
     bool (*on_read)(uint32_t offset); ///< Called after each read of this device; false: not again.

@@ -8,6 +8,7 @@ BUILDS holds BOARD-IMAGE.elf for the boards and images that scenarios.py names; 
 Needs the Python package unicorn. The last line is "N passed, N failed, N skipped".
 """
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -33,7 +34,8 @@ class Rig:
         with tempfile.TemporaryDirectory() as folder: # Not /dev/stdout: objcopy run by root can put a file in its place.
             subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", str(elf), f"{folder}/image"], check=True)
             image = Path(folder, "image").read_bytes()
-        self.machine = Machine(BOARDS[board_name](), image)
+        wiring = scenarios.WIRING.get(re.sub(r"^.*-", "", Path(elf).stem), {})
+        self.machine = Machine(BOARDS[board_name](**wiring), image)
         if oscillator is not None:
             self.machine.watchdog.lsi_hz = self.machine.board.lsi_limits_hz[oscillator]
         self.addresses, self.stack_area, self.elf = symbols.addresses(elf), symbols.stack_area(elf), elf
@@ -47,6 +49,15 @@ class Rig:
 
     def counter(self, name):
         return int.from_bytes(self.machine.cpu.mem_read(self.addresses[name], 4), "little")
+
+    def poke(self, name, value):
+        """Sets a variable of the image."""
+        address, size = symbols.variable(self.elf, name)
+        self.machine.cpu.mem_write(address, (value % (1 << 8 * size)).to_bytes(size, "little"))
+
+    def console(self):
+        """The lines that it told so far."""
+        return self.machine.uart.sent.decode("ascii").split("\r\n")
 
     def function(self, name):
         return symbols.function(self.elf, name)

@@ -3,8 +3,10 @@
 
 Verdicts are passed on the bus, the lamp and the count of resets: on what can be seen from outside.
 """
+import re
+
 from emulator.can import LEFT, RIGHT, Frame
-from emulator.chip import MS, US
+from emulator.chip import MS, PINRSTF, US
 
 SECOND = 1000 * MS
 ZERO = (0, 2000) # Role "limit": zero speed with the configured maximum current.
@@ -60,17 +62,17 @@ def assert_held_then_silent(rig, since_ns, hold_ns=1475 * MS):
 
 
 def open_estop(rig):
-    rig.machine.port_a.release(0) # Nothing but the pull-up drives the pin then, as with a cut wire.
+    rig.machine.board.drive("estop", None) # Nothing but the pull-up drives the pin then, as with a cut wire.
 
 
 def close_estop(rig):
-    rig.machine.port_a.drive(0, 0)
+    rig.machine.board.drive("estop", 0)
 
 
 def press_button(rig, span_ns=60 * MS):
-    rig.machine.port_a.drive(1, 0)
+    rig.machine.board.drive("button", 0)
     rig.run(span_ns)
-    rig.machine.port_a.release(1)
+    rig.machine.board.drive("button", None)
 
 
 def start_demo(rig):
@@ -135,6 +137,28 @@ def fast_watchdog(rig):
     arm(rig)
 
 
+def passes_wrap(rig, wrap_ms):
+    """Time is set to 600 ms before, at the start; then the other way round nothing may be seen of it."""
+    rig.run(MS)
+    rig.poke("ticks_ms", wrap_ms - 600)
+    rig.poke("ticks_slept", wrap_ms - 600)
+    arm(rig)
+    rig.run(SECOND)
+    assert_gaps(rig.setpoints(100 * MS), 22 * MS)
+    assert_lamp_steady_since(rig, SECOND)
+    assert rig.machine.call(rig.function("iw_time_now_us")) > wrap_ms * 1000, "time has wrapped"
+
+
+def time_passes_32_bits_of_microseconds(rig):
+    """After 71 minutes nothing happens."""
+    passes_wrap(rig, (1 << 32) // 1000)
+
+
+def time_passes_32_bits_of_milliseconds(rig):
+    """After 49 days nothing happens."""
+    passes_wrap(rig, 1 << 32)
+
+
 def time_never_goes_back(rig):
     """Asked at every cycle around a tick, the time only grows, and by as much as has passed."""
     arm(rig)
@@ -179,6 +203,23 @@ def estop_pulse(rig):
     assert_lamp(rig, LATCHED)
 
 
+def estop_wakes(rig):
+    """Pressed while nothing else would wake the loop for a while: the edge does, and zeros leave at once."""
+    arm(rig)
+    machine = rig.machine
+    for _ in range(1000):
+        since_pair_ns = machine.now_ns - rig.setpoints()[-1].time_ns
+        quiet_ns = min(wheel.next_ns for wheel in machine.bus.wheels) - machine.now_ns
+        if machine.bus.current is None and quiet_ns > 1700 * US and 2 * MS < since_pair_ns < 15 * MS:
+            break
+        rig.run(37 * US)
+    pressed_ns = machine.now_ns
+    open_estop(rig)
+    rig.run(20 * MS)
+    first = rig.setpoints(pressed_ns)[0]
+    assert first.time_ns - pressed_ns < 700 * US, f"first zero {(first.time_ns - pressed_ns) / MS:.3f} ms after the edge"
+
+
 def estop_chatters(rig):
     """The contact opens and closes every 50 us for 100 ms: latched, and neither the bus nor the watchdog notices."""
     arm(rig)
@@ -203,6 +244,62 @@ def estop_at_start(rig):
     rig.run(1200 * MS)
     assert_lamp(rig, LATCHED)
     assert not rig.setpoints() and rig.machine.bus.attempts == 0
+
+
+def reset_by_button(rig):
+    """Without a host the button resets a latch: refused while pressed, and what follows is arming with zeros. The console tells."""
+    arm(rig)
+    pressed_ns = rig.machine.now_ns
+    open_estop(rig)
+    rig.run(300 * MS)
+    press_button(rig)
+    rig.run(500 * MS)
+    assert "reset refused: the e-stop is pressed" in rig.console(), rig.console()
+    close_estop(rig)
+    rig.run(2 * SECOND)
+    assert_lamp(rig, LATCHED)
+    assert "then press the button on PA1" in rig.console()[-2], rig.console()
+    silent_ns = rig.machine.now_ns
+    rig.run(300 * MS)
+    assert not rig.setpoints(silent_ns)
+    press_button(rig)
+    rig.run(1200 * MS)
+    assert "reset done" in rig.console(), rig.console()
+    assert_lamp(rig, ARMED)
+    assert_zero(rig.setpoints(pressed_ns))
+
+
+def reset_while_listening(rig):
+    """The image that listens only: a latch is reset by the button, and nothing is sent."""
+    rig.run(500 * MS)
+    open_estop(rig)
+    rig.run(300 * MS)
+    close_estop(rig)
+    rig.run(1500 * MS)
+    assert_lamp(rig, LATCHED)
+    press_button(rig)
+    rig.run(1200 * MS)
+    assert_lamp(rig, LISTENING)
+    assert rig.machine.bus.attempts == 0
+
+
+def console(rig):
+    """The first line tells version, clock, pins, bit timing, e-stop; a line each change; and both again when somebody types."""
+    rig.run(1500 * MS)
+    machine, lines = rig.machine, rig.console()
+    told = re.fullmatch(r"iwheel \d+\.\d+\.\d+ on (\w+) \([\w ]+\): clock (\d+) MHz from a crystal of (\d+) kHz; CAN on PB8 PB9 at (\d+) bit/s, "
+                        r"sampled at 62\.5 %, BTR 0x([0-9A-F]{8}); e-stop on PB0: released; holds both wheels at zero", lines[0])
+    assert told, lines[0]
+    facts = (machine.board.name.upper(), machine.clocks.core_hz // 10**6, machine.clocks.crystal_hz // 1000, 10**6, machine.can.read(0x1C))
+    assert (told[1], *map(int, told.groups()[1:4]), int(told[5], 16)) == facts, (told.groups(), facts)
+    assert lines[-2:] == ["armed; bus active; e-stop released", ""], lines
+    machine.uart.send(b"?")
+    rig.run(500 * MS)
+    assert rig.console()[len(lines) - 1:] == [lines[0], lines[-2], ""], rig.console()
+    open_estop(rig)
+    rig.run(300 * MS)
+    assert rig.console()[-2].startswith("latched by estop_line; bus active; e-stop pressed; to reset: "), rig.console()
+    assert_gaps(rig.setpoints(100 * MS), 22 * MS)
 
 
 def wheel_missing(rig):
@@ -255,6 +352,23 @@ def acknowledgement_lost(rig):
     assert_zero(rig.setpoints(lost_ns + MS))
     assert rig.counter("purges") >= 1
     assert_lamp(rig, LATCHED)
+
+
+def abort_without_end(rig):
+    """In motion nobody acknowledges, and the controller does not end the abort: it is reset, and nothing old comes."""
+    start_demo(rig)
+    rig.machine.can.slow_aborts(0xFFFFFFFF)
+    rig.machine.bus.acknowledge_chip = False
+    lost_ns = rig.machine.now_ns
+    rig.run(300 * MS)
+    assert rig.counter("resets") >= 1, "the controller was not reset"
+    rig.machine.bus.acknowledge_chip = True
+    rig.run(2500 * MS)
+    assert_zero(rig.setpoints(lost_ns + MS))
+    assert_lamp(rig, LATCHED)
+    press_button(rig)
+    rig.run(SECOND)
+    assert_lamp(rig, ARMED)
 
 
 def bus_off(rig):
@@ -411,8 +525,16 @@ def no_crystal(rig):
     rig.run(1200 * MS)
     assert_lamp(rig, NO_CRYSTAL)
     assert not rig.machine.can.is_on() and rig.machine.bus.attempts == 0
+    assert rig.console() == ["no crystal of 8000 kHz yet: the bus is left alone until it runs", ""], rig.console()
     rig.machine.clocks.set_crystal(True)
     arm(rig)
+
+
+def slow_crystal(rig):
+    """A crystal that needs 45 ms is waited for, not started anew again and again."""
+    rig.machine.clocks.start_ns = 45 * MS
+    arm(rig)
+    assert rig.machine.can.timing() == (1_000_000, 625), rig.machine.can.timing()
 
 
 def crystal_dies(rig):
@@ -445,6 +567,70 @@ def hang(rig):
     assert_zero(rig.setpoints(reset_ns))
 
 
+def reset_again(rig):
+    """In motion the chip is reset, and at any instant of the next 100 ms once more: zeros follow, each time."""
+    start_demo(rig)
+    machine, last_ns = rig.machine, rig.machine.now_ns
+    instants = [*range(0, 8_000, 250), *range(8_000, 100_000, 4_000)]
+    for instant_us in instants:
+        for span_ns in (instant_us * US, 100 * MS):
+            last_ns = machine.now_ns
+            machine.reset("pin", PINRSTF)
+            rig.run(max(span_ns, US))
+        frames = rig.setpoints(last_ns)
+        assert len(frames) >= 2, f"no zeros after a second reset {instant_us} us after the first"
+        assert_zero(frames)
+    rig.expect_resets(*["pin"] * (2 * len(instants)))
+    rig.run(3 * SECOND)
+    assert_lamp(rig, ARMED)
+    machine.reset("pin", PINRSTF)
+    rig.expect_resets(*["pin"] * (2 * len(instants) + 1))
+
+
+def reset_after_the_hold(rig):
+    """A stop that was acknowledged is over: the run after it listens before it arms."""
+    start_demo(rig)
+    open_estop(rig)
+    rig.run(2500 * MS)
+    machine = rig.machine
+    machine.reset("pin", PINRSTF)
+    reset_ns = machine.now_ns
+    rig.run(SECOND)
+    rig.expect_resets("pin")
+    assert not rig.setpoints(reset_ns), "zeros although the wheels have long been stopped"
+
+
+def reset_after_unproven_hold(rig):
+    """A stop that nobody acknowledged is not over for the next run: zeros first."""
+    start_demo(rig)
+    machine = rig.machine
+    machine.bus.acknowledge_chip = False
+    rig.run(2500 * MS)
+    machine.reset("pin", PINRSTF)
+    reset_ns = machine.now_ns
+    machine.bus.acknowledge_chip = True
+    rig.run(300 * MS)
+    rig.expect_resets("pin")
+    assert rig.setpoints(reset_ns), "no zeros first"
+    assert_zero(rig.setpoints(reset_ns))
+
+
+def stack_overflow(rig):
+    """In motion the stack reaches its end: a fault, not a changed variable; it begins anew with zeros."""
+    start_demo(rig)
+    machine, overflow_ns = rig.machine, rig.machine.now_ns
+    while machine.active or not machine.sleeping:
+        rig.run(US)
+    machine.cpu.reg_write(machine.SP, rig.stack_area[0] + 16)
+    rig.run(2 * SECOND)
+    rig.expect_resets("software")
+    assert machine.faults == 1, "no fault"
+    reset_ns = machine.resets[0][0]
+    assert reset_ns - overflow_ns < 10 * MS, "the fault was not noticed at once"
+    assert rig.setpoints(reset_ns)[0].time_ns - reset_ns < 300 * MS, "no zeros first"
+    assert_zero(rig.setpoints(overflow_ns + MS))
+
+
 def loop_stuck(rig):
     """In motion the main loop goes round on one spot while interrupts are served as ever: the watchdog bites."""
     start_demo(rig)
@@ -474,7 +660,7 @@ def stuck_while_listening(rig):
 def demo_button_held_through_reset(rig):
     """The button that started the profile stays down while the watchdog bites: no motion until it is let go and pressed again."""
     arm(rig)
-    rig.machine.port_a.drive(1, 0)
+    rig.machine.board.drive("button", 0)
     rig.run(600 * MS)
     assert rig.setpoints()[-1].setpoint()[0] == 100, "the profile did not start"
     rig.machine.divert()
@@ -482,7 +668,7 @@ def demo_button_held_through_reset(rig):
     rig.expect_resets("watchdog")
     reset_ns = rig.machine.resets[0][0]
     assert_lamp(rig, ARMED)
-    rig.machine.port_a.release(1)
+    rig.machine.board.drive("button", None)
     rig.run(300 * MS)
     assert_zero(rig.setpoints(reset_ns))
     press_button(rig)
@@ -515,9 +701,9 @@ def demo_second_press_stops(rig):
 
 def demo_button_held(rig):
     """The button is down when power comes: no motion before it was let go and pressed again. Held, it repeats nothing."""
-    rig.machine.port_a.drive(1, 0)
+    rig.machine.board.drive("button", 0)
     arm(rig, 1500 * MS)
-    rig.machine.port_a.release(1)
+    rig.machine.board.drive("button", None)
     rig.run(500 * MS)
     assert_zero(rig.setpoints())
     press_button(rig, 7 * SECOND)
@@ -554,18 +740,24 @@ def demo_estop(rig):
 
 # image -> scenarios; the watchdog's oscillator is nominal, slowest (0) or fastest (1) where given.
 SCENARIOS = {
-    "listen": (listening,),
-    "zero": (nominal, time_never_goes_back, fast_watchdog, estop, estop_pulse, estop_chatters, estop_at_start, wheel_missing,
-             wheel_lost, no_acknowledgement, stuck_at_start, open_at_start, full_bus, overrun, second_master, no_crystal,
+    "listen": (listening, reset_while_listening),
+    "zero": (nominal, console, time_never_goes_back, time_passes_32_bits_of_microseconds, time_passes_32_bits_of_milliseconds, fast_watchdog,
+             estop, estop_pulse, estop_wakes, estop_chatters, estop_at_start, reset_by_button, wheel_missing, wheel_lost,
+             no_acknowledgement, stuck_at_start, open_at_start, full_bus, overrun, second_master, no_crystal, slow_crystal,
              stuck_while_listening),
     "setpoint": (setpoint_role,),
     "demo": (demo_profile, demo_second_press_stops, demo_button_held, demo_button_held_through_reset, demo_estop, acknowledgement_lost,
-             cable_torn, receiver_open, bus_off, stuck_in_motion, babbling, crystal_dies, hang, loop_stuck),
+             abort_without_end, cable_torn, receiver_open, bus_off, stuck_in_motion, babbling, crystal_dies, hang, loop_stuck, reset_again,
+             reset_after_the_hold, reset_after_unproven_hold, stack_overflow),
 }
 # The STM32F446 has the files of the STM32F407: what may differ is its clock.
-BY_BOARD = {"stm32f103": SCENARIOS, "stm32f407": SCENARIOS,
-            "stm32f446": {"zero": (nominal,), "clock": (clock_input,), "demo": (crystal_dies,)}}
+BY_BOARD = {"stm32f103": {**SCENARIOS, "usb": (nominal,), "crystal12": (nominal,)},
+            "stm32f407": {**SCENARIOS, "crystal": (nominal,)},
+            "stm32f446": {"zero": (nominal, console), "clock": (clock_input,), "demo": (crystal_dies,)}}
 # Long, and what they ask does not depend on the chip's family: on the second board only in ./check --full.
 LONG = (wheel_lost, estop_chatters, demo_profile, demo_second_press_stops, demo_button_held, second_master, babbling, overrun, cable_torn,
-        stuck_while_listening)
+        stuck_while_listening, time_passes_32_bits_of_microseconds, time_passes_32_bits_of_milliseconds, reset_by_button, reset_again,
+        reset_while_listening, abort_without_end, reset_after_the_hold, reset_after_unproven_hold)
+# image -> what differs around the chip.
+WIRING = {"usb": {"transceiver": "PA11"}, "crystal": {"crystal_hz": 25_000_000}, "crystal12": {"crystal_hz": 12_000_000}}
 OSCILLATOR = {fast_watchdog: 1, hang: 0, loop_stuck: 0, stuck_while_listening: 0, no_crystal: 1, clock_input: 1}

@@ -8,6 +8,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 FIELDS = {
     "overruns": ("bus", "iw_bxcan_t", "overruns"),
     "lost": ("bus", "iw_bxcan_t", "lost"),
+    "resets": ("bus", "iw_bxcan_t", "resets"),
     "bus_offs": ("bus", "iw_bxcan_t", "bus_offs"),
     "received": ("gateway", "iw_gateway_t", "counters.received"),
     "bad_format": ("gateway", "iw_gateway_t", "counters.bad_format"),
@@ -39,10 +40,17 @@ def addresses(elf):
 
 
 def stack_area(elf):
-    """(lowest, highest) address of what is left for the stack."""
+    """(lowest, highest) address of the stack."""
     run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
     found = dict(reversed(line.split()[0::2]) for line in run.stdout.splitlines() if " iw_link_" in line)
-    return int(found["iw_link_ram_end"], 16), int(found["iw_link_stack_top"], 16)
+    return int(found["iw_link_stack_bottom"], 16), int(found["iw_link_stack_top"], 16)
+
+
+def variable(elf, name):
+    """(address, size) of a variable."""
+    run = subprocess.run(["arm-none-eabi-nm", "-S", str(elf)], capture_output=True, text=True, check=True)
+    return next((int(address, 16), int(size, 16)) for address, size, kind, *found in map(str.split, run.stdout.splitlines())
+                if kind in "bBdD" and found == [name])
 
 
 def function(elf, name):

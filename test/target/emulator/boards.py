@@ -14,23 +14,52 @@ class Board:
     """What all have in common. `blocks`: address of a block -> (name, its clock: offset in RCC and bit, or None)."""
 
     can_address = 0x40006400
+    pins = {"estop": ("port_b", 0), "button": ("port_a", 1)}
+    uart_pins, can_pairs = ("port_a", 3, 2), {"PB8": ("port_b", 8, 9), "PA11": ("port_a", 11, 12)}
+    ports = ("port_a", "port_b", "port_c", "port_d")
+
+    def __init__(self, transceiver="PB8", crystal_hz=None):
+        self.transceiver, self.crystal_hz = self.can_pairs[transceiver], crystal_hz
 
     def build(self, machine, seed):
         machine.clocks = self.clocks(machine)
-        machine.port_a, machine.exti, machine.watchdog = self.port(), chip.Exti(), chip.Watchdog(self.lsi_hz)
-        machine.port_c = self.port()
+        machine.clocks.crystal_hz = self.crystal_hz or machine.clocks.crystal_hz
+        machine.exti, machine.watchdog, machine.uart = chip.Exti(), chip.Watchdog(self.lsi_hz), chip.Uart(machine)
+        for name in self.ports:
+            setattr(machine, name, self.port())
         machine.can = Controller(machine)
         machine.bus = Bus(machine, seed)
         machine.can_listens = False # Clocked and on its pins.
-        machine.lamp = Lamp(self.lamp_port, self.lamp_pin, self.lamp_lit)
-        machine.port_a.drive(0, 0) # The e-stop's contact is closed.
+        machine.lamp = Lamp(*self.lamp)
         self.machine = machine
+        self.drive("estop", 0) # The contact is closed.
         self.devices = {block: (name, clock, *self.accessors(name)) for block, (name, clock) in self.blocks.items()}
 
     def reset(self, machine):
-        for part in (machine.clocks, machine.port_a, machine.port_c, machine.exti, machine.watchdog, machine.can):
+        machine.bus.chip_vanishes()
+        for part in (machine.clocks, machine.exti, machine.watchdog, machine.uart, machine.can, *(getattr(machine, name) for name in self.ports)):
             part.reset()
+        self.remap = 0
         machine.can_listens = False
+
+    remap = 0 # AFIO_MAPR
+
+    def drive(self, what, level):
+        """Something outside drives a pin; None: nothing but the pin's own pull-up does."""
+        port, pin = self.pins[what]
+        if level is None:
+            getattr(self.machine, port).release(pin)
+        else:
+            getattr(self.machine, port).drive(pin, level)
+
+    def estop_level(self):
+        """Of the pin that EXTI line 0 looks at."""
+        port = self.ports[self.machine.exti.selection & 0xF]
+        return getattr(self.machine, port).level(0)
+
+    def uart_is_connected(self):
+        port, rx, tx = self.uart_pins
+        return getattr(self.machine, port).is_pair(rx, tx, 7)
 
     def interrupts(self, machine):
         """The interrupts whose lines are up."""
@@ -44,22 +73,29 @@ class Board:
 
     def connect_can(self):
         machine = self.machine
-        machine.can_listens = machine.port_a.is_can_pair(11, 12) and machine.clocks.is_enabled(*self.blocks[self.can_address][1])
+        port, rx, tx = self.transceiver
+        machine.can_listens = (getattr(machine, port).is_pair(rx, tx, 9) and self.is_mapped(self.transceiver)
+                               and machine.clocks.is_enabled(*self.blocks[self.can_address][1]))
+
+    def is_mapped(self, _):
+        """The controller is led to these pins."""
+        return True
 
     def accessors(self, name):
         """How a device is read and written, each a function of the offset (and the value)."""
         machine = self.machine
         clocks, watchdog = machine.clocks, machine.watchdog
-        if name in ("port_a", "port_c"):
+        if name in self.ports:
             port = getattr(machine, name)
             return port.read, lambda offset, value: self.write_port(port, offset, value)
         return {
             "rcc": (lambda offset: clocks.read(offset, machine.now_ns), self.write_clocks),
             "flash": (lambda offset: clocks.acr, lambda offset, value: setattr(clocks, "acr", value)),
             "exti": (lambda offset: machine.exti.registers[offset], machine.exti.write),
-            "selection": (lambda offset: machine.exti.selection, self.write_selection),
+            "selection": (lambda offset: machine.exti.selection if offset == 0x8 else self.remap, self.write_selection),
             "watchdog": (lambda offset: watchdog.read(offset, machine.now_ns),
                          lambda offset, value: watchdog.write(offset, value, machine.now_ns)),
+            "uart": (machine.uart.read, machine.uart.write),
             "can": (machine.can.read, machine.can.write),
         }[name]
 
@@ -73,8 +109,14 @@ class Board:
         self.connect_can()
 
     def write_selection(self, offset, value):
-        self.machine.expect(offset == 0x8, "another EXTI selection than the first was written")
-        self.machine.exti.selection = value
+        if offset == 0x8:
+            self.machine.exti.select(value)
+            return
+        self.machine.expect(offset == self.remap_offset, "another EXTI selection than the first was written")
+        self.remap = value
+        self.connect_can()
+
+    remap_offset = None
 
     def find(self, block, offset):
         """(name, read, write) of the device there, or Nones."""
@@ -94,36 +136,43 @@ class Board:
         name, _, write = self.find(block, offset)
         if name:
             write(offset, value)
-        if name not in ("port_a", "port_c", "watchdog"):
+        if name not in (*self.ports, "watchdog", "uart"):
             self.machine.clock.is_asked_to_stop = 1 # Other interrupts may come now.
 
 
 class Stm32f103(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32f103", arm.UC_CPU_ARM_CORTEX_M3, 14, 40_000, (30_000, 60_000)
-    clocks, port, lamp_port, lamp_pin, lamp_lit = chip.ClocksF1, chip.PortF1, "port_c", 13, 0
+    clocks, port, lamp, remap_offset = chip.ClocksF1, chip.PortF1, ("port_c", 13, 0), 0x4
     ram_size = 20 * 1024
     blocks = {
         0x40021000: ("rcc", None), 0x40022000: ("flash", None), 0x40003000: ("watchdog", None),
         0x40010000: ("selection", (0x18, 0)), 0x40010400: ("exti", None), 0x40010800: ("port_a", (0x18, 2)),
-        0x40011000: ("port_c", (0x18, 4)), 0x40006400: ("can", (0x1C, 25)),
+        0x40010C00: ("port_b", (0x18, 3)), 0x40011000: ("port_c", (0x18, 4)), 0x40011400: ("port_d", (0x18, 5)),
+        0x40004400: ("uart", (0x1C, 17)), 0x40006400: ("can", (0x1C, 25)),
     }
+
+    def is_mapped(self, transceiver):
+        """RM0008 9.4.2: CAN_REMAP. SWJ_CFG other than 0 would take the debugger's pins."""
+        self.machine.expect(not self.remap >> 24 & 7, "SWJ_CFG was changed")
+        return self.remap >> 13 & 3 == {"port_a": 0, "port_b": 2}[transceiver[0]]
 
 
 class Stm32f407(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32f407", arm.UC_CPU_ARM_CORTEX_M4, 28, 32_000, (17_000, 47_000)
-    clocks, port, lamp_port, lamp_pin, lamp_lit = chip.ClocksF4, chip.PortF4, "port_a", 5, 1
+    clocks, port, lamp = chip.ClocksF4, chip.PortF4, ("port_d", 12, 1)
     ram_size = 128 * 1024
     blocks = {
         0x40023800: ("rcc", None), 0x40023C00: ("flash", None), 0x40003000: ("watchdog", None),
         0x40013800: ("selection", (0x44, 14)), 0x40013C00: ("exti", None), 0x40020000: ("port_a", (0x30, 0)),
-        0x40006400: ("can", (0x40, 25)),
+        0x40020400: ("port_b", (0x30, 1)), 0x40020800: ("port_c", (0x30, 2)), 0x40020C00: ("port_d", (0x30, 3)),
+        0x40004400: ("uart", (0x40, 17)), 0x40006400: ("can", (0x40, 25)),
     }
 
 
 class Stm32f446(Stm32f407):
     """Other limits of the clock tree, and a clock instead of a crystal where the board has it from its debugger."""
 
-    name, clocks = "stm32f446", chip.ClocksF446
+    name, clocks, lamp = "stm32f446", chip.ClocksF446, ("port_a", 5, 1)
 
 
 BOARDS = {board.name: board for board in (Stm32f103, Stm32f407, Stm32f446)}

@@ -24,7 +24,7 @@ def load_model(path):
     for name, result, arguments in (
             ("create", pointer, [number]), ("reset", None, [pointer, number]), ("read", number, [pointer, number]),
             ("write", None, [pointer, number, number]), ("is_on", ctypes.c_bool, [pointer]), ("recessive", None, [pointer, number]),
-            ("dominant", None, [pointer]), ("hold", None, [pointer, number, ctypes.c_bool]), ("offer", ctypes.c_int, [pointer, frame]), ("begin", None, [pointer, ctypes.c_int]),
+            ("dominant", None, [pointer]), ("hold", None, [pointer, number, ctypes.c_bool]), ("offer", ctypes.c_int, [pointer, frame]), ("begin", None, [pointer, ctypes.c_int]), ("slow_aborts", None, [pointer, number]),
             ("end", None, [pointer, ctypes.c_int, ctypes.c_int]), ("hear", ctypes.c_bool, [pointer, frame]),
             ("hear_error", None, [pointer]), ("lines", number, [pointer]), ("violation", ctypes.c_char_p, [pointer]),
             ("overruns", number, [pointer])):
@@ -72,7 +72,7 @@ class Controller:
     def __init__(self, machine):
         self.machine, self.model = machine, self.library.bxcan_model_create(machine.board.banks)
         for name in ("read", "write", "is_on", "recessive", "dominant", "hold", "offer", "begin", "end", "hear", "hear_error", "lines",
-                     "violation", "overruns"):
+                     "violation", "overruns", "slow_aborts"):
             setattr(self, name, partial(getattr(self.library, f"bxcan_model_{name}"), self.model))
 
     def reset(self):
@@ -197,6 +197,12 @@ class Bus:
         self.cut = where
         self.break_off(BIT_ERROR if where == "receiver" else NO_ACKNOWLEDGEMENT)
         self.idle_ns = self.machine.now_ns
+
+    def chip_vanishes(self):
+        """The chip's controller is reset: its frame breaks off, and the others see an error."""
+        if self.current and self.current[1] is not None:
+            self.current = None
+            self.idle_ns = self.machine.now_ns + 17 * BIT_NS
 
     def break_off(self, end):
         """What happens to a frame under way."""

@@ -9,6 +9,7 @@ US = 1000 # Times are nanoseconds.
 MS = 1000 * US
 
 HSION, HSIRDY, HSEON, HSERDY, HSEBYP, CSSON, PLLON, PLLRDY = (1 << bit for bit in (0, 1, 16, 17, 18, 19, 24, 25))
+CANRST = 1 << 25
 PORRSTF, PINRSTF, SFTRSTF, IWDGRSTF, RMVF = (1 << bit for bit in (27, 26, 28, 29, 24))
 
 
@@ -79,6 +80,12 @@ class Clocks:
         elif offset == self.pllcfgr_offset:
             self.expect(not self.cr & PLLON, "the PLL was changed while it runs")
             self.pllcfgr = value
+        elif offset == self.apb1_reset_offset:
+            self.expect(not value & ~CANRST, "another device than the bus controller was reset")
+            self.enable[offset] = value
+            if value & CANRST:
+                self.chip.bus.chip_vanishes()
+                self.chip.can.reset()
         else:
             self.enable[offset] = value
         self.update(now_ns)
@@ -99,6 +106,7 @@ class Clocks:
 
 class ClocksF1(Clocks):
     internal_hz, csr_offset, cfgr_offset, pllcfgr_offset, acr_reset = 8_000_000, 0x24, 0x04, None, 0x30
+    apb1_reset_offset = 0x10
     pll_bits = 0x3F0000
 
     def pll_from_hse(self):
@@ -119,6 +127,7 @@ class ClocksF1(Clocks):
 
 class ClocksF4(Clocks):
     internal_hz, csr_offset, cfgr_offset, pllcfgr_offset, acr_reset = 16_000_000, 0x74, 0x08, 0x04, 0
+    apb1_reset_offset = 0x20
     pll_bits = 0
     core_max_hz, apb1_max_hz, apb2_max_hz = 168_000_000, 42_000_000, 84_000_000
     reserved, reserved_value = 0xF << 28, 2 << 28 # Of PLLCFGR, kept as after reset.
@@ -134,7 +143,7 @@ class ClocksF4(Clocks):
         self.expect(source / m * n / (self.pllcfgr >> 24 & 0xF) <= 48_000_000, "the PLL's 48 MHz output is too fast")
         self.expect(self.pllcfgr & self.reserved == self.reserved_value, "reserved bits of PLLCFGR were changed")
         self.expect((self.pllcfgr >> 28 & 7) >= 2, "PLLR below 2 is not allowed")
-        return source // m * n // p
+        return source * n // m // p
 
     def apb1_hz(self):
         return self.core_hz // (1, 1, 1, 1, 2, 4, 8, 16)[self.cfgr >> 10 & 7]
@@ -190,8 +199,9 @@ class PortF1(Port):
     def is_output(self, pin):
         return self.field(pin) in (1, 2, 3)
 
-    def is_can_pair(self, rx, tx):
-        return self.field(rx) in (4, 8) and self.field(tx) in (9, 10, 11)
+    def is_pair(self, rx, tx, _):
+        """Received and transmitted by a device; an output of 2 MHz is too slow for the bus, and enough for a serial port."""
+        return self.field(rx) in (4, 8) and self.field(tx) in (9, 11)
 
     def read(self, offset):
         if offset in (0, 4):
@@ -232,9 +242,10 @@ class PortF4(Port):
     def is_output(self, pin):
         return self.two(0, pin) == 1
 
-    def is_can_pair(self, rx, tx):
+    def is_pair(self, rx, tx, wanted):
+        """Received and transmitted by a device with that alternate function, at more than the lowest output speed."""
         function = [self.registers[0x20 + 4 * (pin // 8)] >> 4 * (pin % 8) & 0xF for pin in (rx, tx)]
-        return self.two(0, rx) == 2 and self.two(0, tx) == 2 and function == [9, 9]
+        return self.two(0, rx) == 2 and self.two(0, tx) == 2 and function == [wanted, wanted] and self.two(8, tx) != 0
 
     def read(self, offset):
         if offset == 0x10:
@@ -251,7 +262,7 @@ class PortF4(Port):
 
 
 class Exti:
-    """Line 0 only. The selection (AFIO or SYSCFG) must name port A, which is what it names after reset."""
+    """Line 0 only. The selection (AFIO or SYSCFG) names its port: port A after reset."""
 
     def __init__(self):
         self.reset()
@@ -261,7 +272,7 @@ class Exti:
         self.selection, self.last = 0, None
 
     def look(self, level):
-        if self.last is not None and level != self.last and not self.selection & 0xF:
+        if self.last is not None and level != self.last:
             if self.registers[0x8 if level else 0xC] & 1:
                 self.registers[0x14] |= 1
         self.last = level
@@ -269,11 +280,59 @@ class Exti:
     def line(self):
         return bool(self.registers[0x14] & self.registers[0] & 1)
 
+    def select(self, selection):
+        self.selection, self.last = selection, None
+
     def write(self, offset, value):
         if offset == 0x14:
             self.registers[offset] &= ~value
         else:
             self.registers[offset] = value
+
+
+class Uart:
+    """USART2 with a terminal at its other end, without interrupts. `sent`: what the chip said; `send`: what somebody types."""
+
+    baud = 115200
+
+    def __init__(self, chip):
+        self.chip, self.sent, self.typed = chip, bytearray(), bytearray()
+        self.reset()
+
+    def reset(self):
+        self.brr = self.cr1 = 0
+        self.free_ns = self.came_ns = 0
+
+    def send(self, text):
+        self.typed += text
+
+    def byte_ns(self):
+        return 10 * 10**9 // self.baud
+
+    def read(self, offset):
+        now_ns = self.chip.now_ns
+        received = self.typed and self.cr1 & 4 and now_ns >= self.came_ns
+        if offset == 0:
+            return (0x80 if now_ns >= self.free_ns else 0) | (0x20 if received else 0)
+        if offset == 4 and received:
+            self.came_ns = now_ns + self.byte_ns()
+            return self.typed.pop(0)
+        return {8: self.brr, 0xC: self.cr1}.get(offset, 0)
+
+    def write(self, offset, value):
+        now_ns = self.chip.now_ns
+        if offset == 4:
+            rate = self.chip.clocks.apb1_hz() / max(self.brr, 1)
+            self.chip.expect(abs(rate / self.baud - 1) < 0.02, f"the serial port runs at {rate:.0f} baud")
+            self.chip.expect(self.cr1 & 0x2008 == 0x2008, "the serial port's transmitter is off")
+            self.chip.expect(now_ns >= self.free_ns, "a character was overwritten")
+            self.chip.expect(self.chip.board.uart_is_connected(), "the serial port is not on its pins")
+            self.sent.append(value & 0xFF)
+            self.free_ns = now_ns + self.byte_ns()
+        elif offset == 8:
+            self.brr = value
+        elif offset == 0xC:
+            self.cr1 = value
 
 
 class Watchdog:

@@ -7,7 +7,7 @@ are on the slow side, so that a verdict about time is too. Interrupts all have o
 import ctypes
 import struct
 
-from unicorn import UC_ARCH_ARM, UC_ERR_OK, UC_HOOK_BLOCK, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError
+from unicorn import (UC_ARCH_ARM, UC_ERR_FETCH_UNMAPPED, UC_ERR_OK, UC_ERR_READ_UNMAPPED, UC_ERR_WRITE_UNMAPPED, UC_HOOK_BLOCK, UC_HOOK_INTR, UC_MODE_MCLASS, UC_MODE_THUMB, Uc, UcError)
 from unicorn import arm_const as arm
 from unicorn.unicorn_py3.unicorn import MMIO_READ_CFUNC, MMIO_WRITE_CFUNC, uclib
 
@@ -23,7 +23,8 @@ BACK, ENDLESS = 0x080F0000, 0x080F0100 # In the flash, beyond every image; ENDLE
 SP, LR, PC, XPSR, PRIMASK = (getattr(arm, f"UC_ARM_REG_{name}") for name in ("SP", "LR", "PC", "XPSR", "PRIMASK"))
 FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, LR, PC, XPSR)
 IT_STATE = 0x0600FC00
-NMI, SYSTICK, IRQ = 2, 15, 16
+NMI, HARD_FAULT, SYSTICK, IRQ = 2, 3, 15, 16
+NO_MEMORY = (UC_ERR_READ_UNMAPPED, UC_ERR_WRITE_UNMAPPED, UC_ERR_FETCH_UNMAPPED)
 
 
 class BlockClock(ctypes.Structure):
@@ -34,13 +35,14 @@ class BlockClock(ctypes.Structure):
 
 class Machine:
     library = None # Holds block_hook; set by the runner.
+    SP = SP
     POISON = 0xA5  # What RAM is full of after power-on: anything but zero.
 
     def __init__(self, board, image, seed=1):
         self.board, self.image, self.now_ns = board, image, 0
         self.violations, self.resets, self.alarms = [], [], []
         self.nmi, self.frozen = False, False
-        self.busy_ns = 0
+        self.busy_ns = self.faults = 0
         self.build_cpu()
         board.build(self, seed)
         self.reset_cpu()
@@ -90,6 +92,10 @@ class Machine:
         clock.is_asked_to_stop = clock.has_stopped = 0
         pc, = self.pc.read()
         status = uclib.uc_emu_start(self.cpu._uch, pc | 1, self.until, 0, 0)
+        if status in NO_MEMORY and self.error is None:
+            self.spend()
+            self.hard_fault()
+            return
         if status != UC_ERR_OK or self.error is not None:
             raise RuntimeError(f"the CPU faulted at 0x{pc:08X}: {self.error or UcError(status)}") from self.error
         self.spend()
@@ -99,6 +105,14 @@ class Machine:
             raise RuntimeError(f"trap {self.trap} at 0x{self.pc.read()[0]:08X}")
         elif not clock.has_stopped:
             self.sleeping = True
+
+    def hard_fault(self):
+        """An access where no memory is, which nobody but HardFault's handler takes. Without a stack the registers cannot be saved, and the
+        handler begins nevertheless."""
+        self.faults += 1
+        vector, = struct.unpack_from("<I", self.image, 4 * HARD_FAULT)
+        self.active, self.sleeping = HARD_FAULT, False
+        self.cpu.reg_write(PC, vector | 1)
 
     def at(self, time_ns, action):
         """Does something from outside at that time."""
@@ -155,7 +169,7 @@ class Machine:
             self.clocks.update(self.now_ns)
         self.bus.advance(self.now_ns)
         self.count_tick()
-        if self.port_a.changed:
+        if self.port_a.changed or self.port_b.changed:
             self.look_at_pins()
         if self.watchdog.deadline_ns is not None and self.now_ns >= self.watchdog.deadline_ns:
             self.reset("watchdog", IWDGRSTF)
@@ -169,8 +183,9 @@ class Machine:
                 self.pending.add(IRQ + irq)
 
     def look_at_pins(self):
-        self.port_a.changed = False
-        self.exti.look(self.port_a.level(0))
+        for name in self.board.ports:
+            getattr(self, name).changed = False
+        self.exti.look(self.board.estop_level())
         self.lamp.look(self)
 
     # ---- exceptions and reset -------------------------------------------------------------------------------------
@@ -187,7 +202,11 @@ class Machine:
         aligned = stack & 4
         stack -= 32 + aligned
         values[7] = values[7] & ~0x200 | (0x200 if aligned else 0)
-        self.cpu.mem_write(stack, struct.pack("<8I", *values))
+        try:
+            self.cpu.mem_write(stack, struct.pack("<8I", *values))
+        except UcError: # There is no memory for the stack.
+            self.hard_fault()
+            return True
         vector, = struct.unpack_from("<I", self.image, 4 * number)
         self.after_entry.write(stack, values[7] & ~IT_STATE, EXC_RETURN, vector) # A handler does not begin within an IT block.
         self.spend(12)
@@ -207,6 +226,7 @@ class Machine:
         self.cpu.reg_write(PRIMASK, 0)
         self.cpu.reg_write(SP, stack)
         self.cpu.reg_write(PC, start | 1)
+        self.cpu.reg_write(XPSR, 0x01000000)
         self.pending, self.active, self.enabled, self.sleeping, self.reset_requested = set(), None, 0, False, False
         self.look_at_pins()
         self.tick_ns, self.syst = None, {0x10: 0, 0x14: 0, 0x18: 0}

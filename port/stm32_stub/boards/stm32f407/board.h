@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: MIT
-/// An STM32F405 or F407 with a crystal of 8 MHz (Discovery boards).
+/// An STM32F405 or F407 with a crystal of 8 MHz (STM32F4DISCOVERY: UM1472).
 ///
 /// A board is this header and `memory.ld` beside it; the family's files do the rest. To make another board of the same family copy
 /// this folder, change what differs, and name it with -DIWHEEL_BOARD; a clock that cannot give the bus exactly does not compile.
-///
-/// | pin  | is                                                             |
-/// |------|----------------------------------------------------------------|
-/// | PA0  | e-stop: normally closed contact to ground; open is pressed     |
-/// | PA1  | start and reset: normally open button to ground (demo only)    |
-/// | PA5  | lamp, lit by a high level; see lamp.h                          |
-/// | PA11 | CAN1 receive, from the transceiver                             |
-/// | PA12 | CAN1 transmit, to the transceiver                              |
 #ifndef IW_STM32_BOARD_H
 #define IW_STM32_BOARD_H
 
-#include "board_f4.h" // With another crystal: its lines here, changed.
+#define IW_BOARD_NAME     "STM32F407 (Discovery)"
+#define IW_BOARD_LAMP     IW_PIN_D(12U) ///< LD4, the green one (UM1472). PA5 is the clock of its motion sensor.
+#define IW_BOARD_LAMP_LIT 1             ///< The level that lights it.
+
+#include "board_f4.h"
 
 #endif

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// Sections are those of RM0008: 27.6, which RM0090 (30.6) shares.
+#include "console.h"
+
+#include <assert.h>
+
+typedef struct {
+    volatile uint32_t SR, DR, BRR, CR1;
+} usart_t;
+
+#define USART2 ((usart_t *)0x40004400U)
+#define BAUD   115200U
+#define RXNE   (1U << 5)
+#define TXE    (1U << 7)
+#define RE     (1U << 2)
+#define TE     (1U << 3)
+#define UE     (1U << 13)
+#define LENGTH 512U
+
+static_assert((LENGTH & (LENGTH - 1U)) == 0U, "the indices wrap at a power of two");
+
+static char waiting[LENGTH];
+static uint32_t put, taken; // Characters since the start.
+
+void iw_console_start(uint32_t apb1_hz) {
+    USART2->BRR = (apb1_hz + BAUD / 2U) / BAUD; // 27.3.4: sixteenths.
+    USART2->CR1 = UE | TE | RE;
+}
+
+static void append(char character) {
+    if (put - taken < LENGTH - 1U) {
+        waiting[put++ % LENGTH] = character;
+    }
+}
+
+void iw_console_text(const char *text) {
+    for (; *text != '\0'; text++) {
+        append(*text);
+    }
+}
+
+void iw_console_number(uint32_t value) {
+    char digit[10];
+    uint32_t digits = 0;
+    do {
+        digit[digits++] = (char)('0' + value % 10U);
+        value /= 10U;
+    } while (value > 0U);
+    while (digits > 0U) {
+        append(digit[--digits]);
+    }
+}
+
+void iw_console_hex(uint32_t value) {
+    iw_console_text("0x");
+    for (uint32_t shift = 32U; shift > 0U; shift -= 4U) {
+        append("0123456789ABCDEF"[(value >> (shift - 4U)) & 0xFU]);
+    }
+}
+
+bool iw_console_step(void) {
+    if (put != taken && (USART2->SR & TXE) != 0U) {
+        USART2->DR = (uint8_t)waiting[taken++ % LENGTH];
+    }
+    return put != taken;
+}
+
+bool iw_console_asked(void) {
+    if ((USART2->SR & RXNE) == 0U) {
+        return false;
+    }
+    (void)USART2->DR; // Clears RXNE, and the overrun of what came before (27.6.1).
+    return true;
+}
