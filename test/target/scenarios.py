@@ -96,6 +96,17 @@ def nominal(rig):
     rig.note(f"CPU {rig.machine.busy_ns * 100 / rig.machine.now_ns:.1f} % busy, {rig.stack_used()} B of stack used")
 
 
+def usb_pins(rig):
+    """The transceiver is on PA11 and PA12, and the image made for that."""
+    nominal(rig)
+
+
+def other_crystal(rig):
+    """A crystal of another frequency, and the image made for that: the bus is as exact."""
+    nominal(rig)
+    assert str(rig.machine.clocks.crystal_hz // 1000) + " kHz" in rig.console()[0], rig.console()
+
+
 def listening(rig):
     """Without setpoint type and role: hears everything, sends nothing, does not even acknowledge."""
     rig.run(2 * SECOND)
@@ -351,6 +362,43 @@ def acknowledgement_lost(rig):
     rig.run(2500 * MS)
     assert_zero(rig.setpoints(lost_ns + MS))
     assert rig.counter("purges") >= 1
+    assert_lamp(rig, LATCHED)
+
+
+def silence_is_silent(rig):
+    """In motion nobody acknowledges for 20 s, wheels without power among them: after the hold nothing is tried any more, and nothing leaves when
+    they get power. Reset, arming and a new press are needed."""
+    start_demo(rig)
+    bus, lost_ns = rig.machine.bus, rig.machine.now_ns
+    for wheel in bus.wheels:
+        wheel.power(False, lost_ns)
+    rig.run(11 * SECOND)
+    attempts = bus.attempts
+    rig.run(9 * SECOND)
+    assert bus.attempts == attempts, f"{bus.attempts - attempts} attempts in silence"
+    back_ns = rig.machine.now_ns
+    for wheel in bus.wheels:
+        wheel.power(True, back_ns)
+    rig.run(2 * SECOND)
+    assert not rig.setpoints(back_ns), f"{len(rig.setpoints(back_ns))} frames left by themselves"
+    assert_lamp(rig, LATCHED)
+    press_button(rig)
+    rig.run(SECOND)
+    assert_lamp(rig, ARMED)
+    assert_zero(rig.setpoints(back_ns))
+
+
+def silence_after_a_stuck_bus(rig):
+    """In motion the bus is held dominant for 12 s: what waited then never leaves."""
+    start_demo(rig)
+    stuck_ns = rig.machine.now_ns
+    rig.machine.bus.hold_dominant(True)
+    rig.run(12 * SECOND)
+    rig.machine.bus.hold_dominant(False)
+    free_ns = rig.machine.now_ns
+    rig.run(2 * SECOND)
+    assert not rig.setpoints(free_ns), f"{len(rig.setpoints(free_ns))} frames left by themselves"
+    assert_zero(rig.setpoints(stuck_ns + MS))
     assert_lamp(rig, LATCHED)
 
 
@@ -747,17 +795,17 @@ SCENARIOS = {
              stuck_while_listening),
     "setpoint": (setpoint_role,),
     "demo": (demo_profile, demo_second_press_stops, demo_button_held, demo_button_held_through_reset, demo_estop, acknowledgement_lost,
-             abort_without_end, cable_torn, receiver_open, bus_off, stuck_in_motion, babbling, crystal_dies, hang, loop_stuck, reset_again,
+             silence_is_silent, silence_after_a_stuck_bus, abort_without_end, cable_torn, receiver_open, bus_off, stuck_in_motion, babbling, crystal_dies, hang, loop_stuck, reset_again,
              reset_after_the_hold, reset_after_unproven_hold, stack_overflow),
 }
 # The STM32F446 has the files of the STM32F407: what may differ is its clock.
-BY_BOARD = {"stm32f103": {**SCENARIOS, "usb": (nominal,), "crystal12": (nominal,)},
-            "stm32f407": {**SCENARIOS, "crystal": (nominal,)},
+BY_BOARD = {"stm32f103": {**SCENARIOS, "usb": (usb_pins,), "crystal12": (other_crystal,)},
+            "stm32f407": {**SCENARIOS, "crystal": (other_crystal,)},
             "stm32f446": {"zero": (nominal, console), "clock": (clock_input,), "demo": (crystal_dies,)}}
 # Long, and what they ask does not depend on the chip's family: on the second board only in ./check --full.
 LONG = (wheel_lost, estop_chatters, demo_profile, demo_second_press_stops, demo_button_held, second_master, babbling, overrun, cable_torn,
         stuck_while_listening, time_passes_32_bits_of_microseconds, time_passes_32_bits_of_milliseconds, reset_by_button, reset_again,
-        reset_while_listening, abort_without_end, reset_after_the_hold, reset_after_unproven_hold)
+        reset_while_listening, silence_is_silent, silence_after_a_stuck_bus, abort_without_end, reset_after_the_hold, reset_after_unproven_hold)
 # image -> what differs around the chip.
 WIRING = {"usb": {"transceiver": "PA11"}, "crystal": {"crystal_hz": 25_000_000}, "crystal12": {"crystal_hz": 12_000_000}}
 OSCILLATOR = {fast_watchdog: 1, hang: 0, loop_stuck: 0, stuck_while_listening: 0, no_crystal: 1, clock_input: 1}

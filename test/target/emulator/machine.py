@@ -130,7 +130,7 @@ class Machine:
             self.sleeping = False
             if self.enter_exception():
                 continue
-            self.execute(self.now_ns + 1 if self.pending else next_ns)
+            self.execute(self.now_ns + 1 if self.pending and not self.active else next_ns)
 
     def divert(self):
         """The main loop goes round on one spot from now on, while interrupts come and are served."""
@@ -150,7 +150,7 @@ class Machine:
         while self.pc.read()[0] != BACK:
             self.attend()
             if not self.enter_exception():
-                self.execute(self.now_ns + 1 if self.pending else self.next_event_ns())
+                self.execute(self.now_ns + 1 if self.pending and not self.active else self.next_event_ns())
         low, high = self.result.read()
         self.cpu.context_restore(saved)
         self.sleeping, self.until = asleep, NOWHERE
