@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Sizes of the STM32 images, and the worst stack of core and images by call graph, as lines for docs/sizes.md.
 
-The images are those of the presets arm-m3 and arm, which listen, and of the builds beside them that end in -demo. An interrupt may come anywhere, and none interrupts another: the
+The images are those of the presets arm-m3 and arm, which listen, of the build beside arm that ends in -f446, and of the builds beside
+these that end in -demo. An interrupt may come anywhere, and none interrupts another: the
 worst handler and the registers that the CPU saves are on top of the main loop's deepest path. Calls through the HAL go to each of
 its functions.
 """
@@ -10,7 +11,8 @@ from pathlib import Path
 
 from stack_usage import INDIRECT, Depth, add_runtime_calls, read_graph
 
-BOARDS = {"STM32F103": ("iwheel_stm32f103", 1), "STM32F407": ("iwheel_stm32f407", 2)} # Image and which build it is in.
+# Image, which build it is in, and how that one's name goes on.
+BOARDS = {"STM32F103": ("iwheel_stm32f103", 1, ""), "STM32F407": ("iwheel_stm32f407", 2, ""), "STM32F446": ("iwheel_stm32f446", 2, "-f446")}
 HAL = ("iw_bxcan_send", "iw_bxcan_receive", "iw_bxcan_bus_state", "iw_bxcan_purge", "iw_estop_pressed")
 HANDLERS = ("iw_systick_handler", "iw_exti0_handler", "iw_can_transmit_handler", "iw_can_receive_handler", "iw_can_error_handler")
 SAVED_BY_CPU = 36 # Eight registers and four bytes to align them.
@@ -46,12 +48,21 @@ def image_stack(build, image):
     return total
 
 
+def stack_room(elf):
+    """What the linker's script leaves for the stack."""
+    run = subprocess.run(["arm-none-eabi-nm", str(elf)], capture_output=True, text=True, check=True)
+    return next(int(line.split()[0], 16) for line in run.stdout.splitlines() if line.endswith(" iw_link_stack_size"))
+
+
 def image_sizes(build, image):
-    """(flash, RAM without stack)"""
-    elf = next(Path(build).rglob(f"{image}.elf"))
+    """(flash, RAM without stack, worst stack); the latter must fit."""
+    elf, used = next(Path(build).rglob(f"{image}.elf")), image_stack(build, image)
+    room = stack_room(elf)
+    if used > room:
+        raise SystemExit(f"{image} needs {used} B of stack, sections.ld has {room} B")
     run = subprocess.run(["arm-none-eabi-size", str(elf)], capture_output=True, text=True, check=True)
     text, data, bss = map(int, run.stdout.splitlines()[1].split()[:3])
-    return text + data, data + bss
+    return text + data, data + bss - room, used
 
 
 def lines(builds):
@@ -60,11 +71,10 @@ def lines(builds):
             "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |", "|-----------------|-----------:|-----------:|-----------:|",
             "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |", "",
             "The images per board, in bytes: the one that listens, and the one with the demonstration profile. RAM is without the stack; the stack "
-            "is the worst of main loop and interrupt.", "",
+            "is the worst of main loop and interrupt, of the 2048 that sections.ld keeps for it.", "",
             "| image            |    flash   |     RAM    |    stack   |", "|------------------|-----------:|-----------:|-----------:|"]
-    for board, (image, which) in BOARDS.items():
+    for board, (image, which, more) in BOARDS.items():
         for kind in ("listen", "demo"):
-            build = str(builds[which]).rstrip("/") + {"listen": "", "demo": "-demo"}[kind]
-            numbers = (*image_sizes(build, image), image_stack(build, image))
-            rows.append(f"| {f'{board} {kind}':<16} | " + " | ".join(f"{number:>10}" for number in numbers) + " |")
+            build = str(builds[which]).rstrip("/") + more + {"listen": "", "demo": "-demo"}[kind]
+            rows.append(f"| {f'{board} {kind}':<16} | " + " | ".join(f"{number:>10}" for number in image_sizes(build, image)) + " |")
     return rows

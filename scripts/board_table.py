@@ -76,7 +76,7 @@ def flash_lines(board):
     yield f"    openocd -f interface/stlink.cfg -f target/{OPENOCD[board]}.cfg -c \"program {where}.elf verify reset exit\""
     yield f"    st-flash --reset write {where}.bin {address(board)}"
     yield f"    probe-rs download --chip {CHIPS[board]} {where}.elf && probe-rs reset --chip {CHIPS[board]}"
-    yield f"    STM32_Programmer_CLI -c port=SWD -w {where}.hex -v -rst"
+    yield f"    STM32_Programmer_CLI -c port=SWD --download {where}.hex -v -rst"
     yield ""
 
 
