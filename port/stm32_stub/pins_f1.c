@@ -4,13 +4,16 @@
 
 typedef struct {
     volatile uint32_t CRL, CRH, IDR, ODR, BSRR;
+    uint32_t reserved[251];
 } port_t;
+
+static_assert(sizeof(port_t) == 0x400, "port B follows port A");
 
 #define APB2ENR      (*(volatile uint32_t *)0x40021018U)
 #define APB1ENR      (*(volatile uint32_t *)0x4002101CU)
 #define AFIO_MAPR    (*(volatile uint32_t *)0x40010004U)
 #define AFIO_EXTICR1 (*(volatile uint32_t *)0x40010008U)
-#define PORT_A       0x40010800U
+#define PORTS        ((port_t *)0x40010800U)
 
 // Four bits a pin, 9.2.1 and 9.2.2.
 #define INPUT_PULLED 0x8U
@@ -18,7 +21,7 @@ typedef struct {
 #define ALTERNATE    0x9U // Push-pull, 10 MHz: enough for 1 Mbit/s, and quiet.
 
 static port_t *port_of(uint32_t pin) {
-    return (port_t *)(PORT_A + pin / 16U * 0x400U);
+    return &PORTS[pin / 16U];
 }
 
 static void set_level(uint32_t pin, bool high) {

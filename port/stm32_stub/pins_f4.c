@@ -4,13 +4,16 @@
 
 typedef struct {
     volatile uint32_t MODER, OTYPER, OSPEEDR, PUPDR, IDR, ODR, BSRR, LCKR, AFR[2];
+    uint32_t reserved[246];
 } port_t;
+
+static_assert(sizeof(port_t) == 0x400, "port B follows port A");
 
 #define AHB1ENR        (*(volatile uint32_t *)0x40023830U)
 #define APB1ENR        (*(volatile uint32_t *)0x40023840U)
 #define APB2ENR        (*(volatile uint32_t *)0x40023844U)
 #define SYSCFG_EXTICR1 (*(volatile uint32_t *)0x40013808U)
-#define PORT_A         0x40020000U
+#define PORTS          ((port_t *)0x40020000U)
 
 // Two bits a pin in MODER (8.4.1), OSPEEDR (8.4.3) and PUPDR (8.4.4), four in AFR (8.4.9).
 #define OUTPUT    1U
@@ -21,7 +24,7 @@ typedef struct {
 #define AF_CAN1   9U
 
 static port_t *port_of(uint32_t pin) {
-    return (port_t *)(PORT_A + pin / 16U * 0x400U);
+    return &PORTS[pin / 16U];
 }
 
 static bool is_high(uint32_t pin) {
