@@ -142,6 +142,8 @@ class Machine:
 
     def call(self, address):
         """The 64-bit result of a function of the image without arguments, called now, with interrupts as in the main loop."""
+        while self.active: # Within a handler no interrupt would come, and what waits for one would wait for ever.
+            self.run(US // 20)
         saved, asleep = self.cpu.context_save(), self.sleeping
         self.cpu.reg_write(PRIMASK, 0)
         self.cpu.reg_write(LR, BACK | 1)
