@@ -55,6 +55,9 @@ class Rig:
         address, size = symbols.variable(self.elf, name)
         self.machine.cpu.mem_write(address, (value % (1 << 8 * size)).to_bytes(size, "little"))
 
+    def peek(self, name):
+        return int.from_bytes(self.machine.cpu.mem_read(*symbols.variable(self.elf, name)), "little")
+
     def console(self):
         """The lines that it told so far."""
         return self.machine.uart.sent.decode("ascii").split("\r\n")

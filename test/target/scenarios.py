@@ -150,7 +150,8 @@ def fast_watchdog(rig):
 
 def passes_wrap(rig, wrap_ms):
     """Time is set to 600 ms before, at the start; then the other way round nothing may be seen of it."""
-    rig.run(MS)
+    while not 1 <= rig.peek("ticks_ms") < 4: # Before, RAM has not been cleared yet.
+        rig.run(50 * US)
     rig.poke("ticks_ms", wrap_ms - 600)
     rig.poke("ticks_slept", wrap_ms - 600)
     arm(rig)

@@ -172,6 +172,7 @@ class Bus:
         self.acknowledge_chip = True
         self.current = None        # (frame, mailbox or None, end)
         self.idle_ns = 0
+        self.suspended_ns = 0      # Until then the chip may not begin: an error-passive node waits 8 bits after each of its frames.
 
     def next_event_ns(self, now_ns):
         times = [wheel.next_ns for wheel in self.wheels]
@@ -181,6 +182,7 @@ class Bus:
             waiting = self.extra or self.flood or any(wheel.queue for wheel in self.wheels)
             times.append(max(self.idle_ns, now_ns) if waiting else None)
             times.append(self.idle_ns if self.idle_ns > now_ns else None)
+            times.append(self.suspended_ns if self.suspended_ns > now_ns else None)
             times.append(now_ns + 11 * BIT_NS if not self.machine.can.is_on() else None)
         return min((time for time in times if time is not None), default=None)
 
@@ -234,7 +236,7 @@ class Bus:
                 self.arbitrate(now_ns)
 
     def arbitrate(self, now_ns):
-        mailbox, frame = self.machine.can.offered() if self.machine.can_listens else (None, None)
+        mailbox, frame = self.machine.can.offered() if self.machine.can_listens and now_ns >= self.suspended_ns else (None, None)
         candidates = [(frame.id, 0, frame, mailbox)] if frame else []
         candidates += [(offer.id, 1, offer, None) for offer in self.offers()]
         if not candidates:
@@ -277,6 +279,8 @@ class Bus:
         understood = self.machine.can.understands() and not self.corrupt_chip and self.cut != "receiver"
         heard = any(wheel.powered for wheel in self.wheels) and self.acknowledge_chip and not self.cut
         self.machine.can.end(mailbox, BIT_ERROR if not understood else SENT if heard else NO_ACKNOWLEDGEMENT)
+        if self.machine.can.read(0x18) & 2: # ESR.EPVF
+            self.suspended_ns = self.idle_ns + 8 * BIT_NS
         return understood and heard
 
     def finish_theirs(self, frame):
