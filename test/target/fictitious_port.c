@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Somebody follows docs/porting.md: its code is included here as it stands there, on a controller with two transmit slots that exists
+// Somebody follows docs/porting.md: its files are compiled as they stand there, on a controller with two transmit slots that exists
 // nowhere. The time is virtual. Ends with 0 if the wheels are told what was wished, and 1 if they are not within 3 s.
-#include "iwheel/bit_timing.h"
-#include "iwheel/gateway.h"
+#include "my_port.h"
+
+#include "iwheel/proto.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -10,14 +11,13 @@
 #define SLOTS     2
 #define QUEUE_MAX 64U
 
-typedef struct {
+static struct {
     iw_can_frame_t slot[SLOTS];
     bool is_full[SLOTS];
     iw_can_frame_t queue[QUEUE_MAX];
     uint32_t first, count;
-} my_can_t;
+} my_can;
 
-static my_can_t my_can;
 static iw_time_us_t time_us = 1000;
 static iw_time_us_t telemetry_us = 1000;
 static int16_t told_mm_s[IW_SIDES];
@@ -29,67 +29,64 @@ static void put(const iw_can_frame_t *frame) {
     }
 }
 
-static int my_send(void *context, const iw_can_frame_t *frame) {
-    my_can_t *const can = context;
+int my_send(void *context, const iw_can_frame_t *frame) {
+    (void)context;
     for (size_t i = 0; i < SLOTS; i++) {
-        if (!can->is_full[i]) {
-            can->slot[i] = *frame;
-            can->is_full[i] = true;
+        if (!my_can.is_full[i]) {
+            my_can.slot[i] = *frame;
+            my_can.is_full[i] = true;
             return 1;
         }
     }
     return 0;
 }
 
-static int my_receive(void *context, iw_can_frame_t *out_frame) {
-    my_can_t *const can = context;
-    if (can->count == 0U) {
+int my_receive(void *context, iw_can_frame_t *out_frame) {
+    (void)context;
+    if (my_can.count == 0U) {
         return 0;
     }
-    *out_frame = can->queue[can->first];
-    can->first = (can->first + 1U) % QUEUE_MAX;
-    can->count--;
+    *out_frame = my_can.queue[my_can.first];
+    my_can.first = (my_can.first + 1U) % QUEUE_MAX;
+    my_can.count--;
     return 1;
 }
 
-static iw_bus_state_t my_bus_state(void *context) {
+iw_bus_state_t my_bus_state(void *context) {
     (void)context;
     return IW_BUS_ACTIVE;
 }
 
-static int my_purge(void *context) {
-    (void)memset(((my_can_t *)context)->is_full, 0, sizeof my_can.is_full);
+int my_purge(void *context) {
+    (void)context;
+    (void)memset(my_can.is_full, 0, sizeof my_can.is_full);
     return 1;
 }
 
-static int my_estop_pressed(void *context) {
+int my_estop_pressed(void *context) {
     (void)context;
     return 0;
 }
 
-static iw_time_us_t my_time_us(void) {
+iw_time_us_t my_time_us(void) {
     return time_us;
 }
 
-static void my_watchdog_feed(void) {
+void my_watchdog_feed(void) {
     feeds++;
 }
 
-static int32_t my_wish_left(void) {
+int32_t my_wish_left(void) {
     return 120;
 }
 
-static int32_t my_wish_right(void) {
+int32_t my_wish_right(void) {
     return -80;
 }
 
-static bool my_wish_to_arm(void) {
+bool my_wish_to_arm(void) {
     return true;
 }
-
-static void my_sleep_until(iw_time_us_t until_us);
-
-#include "porting_page.inc"
 
 /// Everything in the slots is sent and acknowledged.
 static void send_slots(void) {
@@ -116,7 +113,7 @@ static void send_telemetry(void) {
     telemetry_us += 4000U;
 }
 
-static void my_sleep_until(iw_time_us_t until_us) {
+void my_sleep_until(iw_time_us_t until_us) {
     if (told_mm_s[IW_LEFT] == 120 && told_mm_s[IW_RIGHT] == -80 && feeds > 100U) {
         exit(0);
     }
