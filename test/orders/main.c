@@ -18,6 +18,7 @@ static const uint32_t mixed_us[] = {0,        90,       1 * MS,   9 * MS,    47 
 #define MIXED (sizeof mixed_us / sizeof mixed_us[0])
 
 typedef enum { START_REST = 0, START_DRIVING, STARTS } start_t;
+#define COMBINATIONS ((unsigned)STARTS * (unsigned)MODES)
 
 /// One complete enumeration.
 typedef struct {
@@ -201,7 +202,7 @@ static int play_everything(unsigned length, bool full, unsigned part, unsigned p
     unsigned failed = 0;
     uint64_t sequences = 0;
     for (unsigned spacing = spacings; spacing-- > 0U;) {
-        for (unsigned which = 0; which < STARTS * MODES; which++, index++) {
+        for (unsigned which = 0; which < COMBINATIONS; which++, index++) {
             const combination_t combination = {(start_t)(which % STARTS), (world_mode_t)(which / STARTS), spacing,
                                                length};
             if ((index + spacing) % parts != part) {
