@@ -10,6 +10,7 @@
 #include "iwheel_linux/clock.h"
 
 #include <fcntl.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sysexits.h>
@@ -17,12 +18,11 @@
 
 /// 0, 1 and 2 must be open, or a socket of ours would take the place of one and be written to.
 static void secure_standard_streams(void) {
-    int fd = open("/dev/null", O_RDWR);
-    while (fd >= 0 && fd <= STDERR_FILENO) {
-        fd = open("/dev/null", O_RDWR);
-    }
-    if (fd >= 0) {
-        (void)close(fd);
+    FILE *const streams[] = {stdin, stdout, stderr};
+    for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
+        if (fcntl(fd, F_GETFD) < 0 && freopen("/dev/null", "r+", streams[fd]) == NULL) {
+            return; // Without /dev/null there are worse troubles.
+        }
     }
 }
 

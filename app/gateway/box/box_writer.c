@@ -42,10 +42,10 @@ typedef struct {
 /// Nothing of the gateway's shall be held: no stream, no signal, no folder.
 static void become_writer(void) {
     const int null = open("/dev/null", O_RDWR);
-    for (int fd = STDIN_FILENO; fd <= STDERR_FILENO && null >= 0; fd++) {
-        (void)dup2(null, fd);
-    }
-    if (null > STDERR_FILENO) {
+    if (null >= 0) { // And above the standard streams, which are open.
+        for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
+            (void)dup2(null, fd);
+        }
         (void)close(null);
     }
     (void)signal(SIGINT, SIG_IGN); // It ends when the gateway does.

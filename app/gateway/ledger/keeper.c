@@ -137,15 +137,19 @@ static void keep(work_t *work) {
 
 /// Nothing of the gateway's stays open here but our end of the connection.
 static void become_keeper(int fd) {
-    const int nothing = open("/dev/null", O_RDWR);
+    const int null = open("/dev/null", O_RDWR);
     (void)prctl(PR_SET_NAME, "iwheel-keeper");
     (void)signal(SIGTERM, SIG_IGN);
     (void)signal(SIGINT, SIG_IGN);
     (void)signal(SIGHUP, SIG_IGN);
-    for (int i = 0; i < INHERITED_MAX; ++i) {
-        if (i <= STDERR_FILENO) {
-            (void)dup2(nothing, i);
-        } else if (i != fd) {
+    if (null >= 0) { // And above the standard streams, which are open.
+        for (int i = STDIN_FILENO; i <= STDERR_FILENO; i++) {
+            (void)dup2(null, i);
+        }
+        (void)close(null);
+    }
+    for (int i = STDERR_FILENO + 1; i < INHERITED_MAX; i++) {
+        if (i != fd) {
             (void)close(i);
         }
     }
