@@ -38,8 +38,8 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
 
 static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_can_frame_t *frame) {
     const bool accepted = self->hal->send(self->hal->context, frame) > 0;
-    iw_outbox_sent(&self->outbox, side, now_us, frame, accepted);
     self->later += accepted ? 0U : 1U;
+    iw_outbox_sent(&self->outbox, side, now_us, frame, accepted);
     return accepted;
 }
 

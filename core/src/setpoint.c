@@ -117,17 +117,17 @@ static uint32_t ramp_step(uint32_t slope, iw_time_us_t elapsed_us) {
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
 }
 
-/// Where a quantity may go now: not past zero in one step.
-static axis_t plan(int32_t *value, int32_t target, uint32_t away, uint32_t towards) {
+/// Where a quantity may go now: not past zero in one step. (In place: a copy would lie on the deepest stack of the core.)
+static void plan(axis_t *axis, int32_t target, uint32_t away, uint32_t towards) {
+    const int32_t *const value = axis->value;
     const bool through_zero = *value != 0 && (target > 0) != (*value > 0);
     const int32_t aim = through_zero ? 0 : target;
     const uint32_t way = (uint32_t)iw_magnitude(aim - *value);
-    axis_t axis = {value, aim, (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value), FRACTION_ONE};
-    const uint32_t allowed = axis.braking ? towards : away;
-    if (allowed < way) {
-        axis.fraction = fraction_of(allowed, way);
-    }
-    return axis;
+    const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value);
+    const uint32_t allowed = braking ? towards : away;
+    axis->aim = aim;
+    axis->braking = braking;
+    axis->fraction = (allowed < way) ? fraction_of(allowed, way) : FRACTION_ONE;
 }
 
 /// A speed step as the same share of the maximum current. `step` is at most 20 m/s, the steepest slope for a second: 32
@@ -163,9 +163,10 @@ static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us) {
     axis_t axes[AXES];
     for (size_t side = 0; side < IW_SIDES; side++) {
         const iw_command_t *const target = &self->target.wheel[side];
-        axes[2U * side] = plan(&self->speed_um_s[side], target->speed_mm_s * 1000, away, towards);
-        axes[2U * side + 1U] =
-            plan(&self->current_uA[side], ramps_current ? target->current_mA * 1000 : 0, current_away, current_towards);
+        axes[2U * side].value = &self->speed_um_s[side];
+        axes[2U * side + 1U].value = &self->current_uA[side];
+        plan(&axes[2U * side], target->speed_mm_s * 1000, away, towards);
+        plan(&axes[2U * side + 1U], ramps_current ? target->current_mA * 1000 : 0, current_away, current_towards);
     }
     advance_together(axes);
 }
