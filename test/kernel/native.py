@@ -29,6 +29,16 @@ exec "$@"
 """
 
 
+def why_not_alone():
+    """What keeps us from a network and mounts of our own, and the cure; None if nothing does."""
+    tried = subprocess.run([*ALONE, "true"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    if tried.returncode == 0:
+        return None
+    # A chroot of a plain folder: mounts made in there would be made outside as well.
+    cure = " (in a chroot: mount --bind its folder onto itself before you enter it)" if "propagation" in tried.stdout else ""
+    return f"no network and mounts of our own can be had here: {tried.stdout.strip()}{cure}"
+
+
 def why_not_native():
     """What keeps this machine's kernel from being used, and the cure; None if nothing does."""
     if os.geteuid() != 0:
@@ -41,6 +51,9 @@ def why_not_native():
             subprocess.run(["modprobe", "-q", module], stderr=subprocess.DEVNULL, check=False)
     if not os.path.isdir(GPIO_SIM):
         return f"no {GPIO_SIM} here: it needs Linux 5.17 or later, modprobe gpio-sim, and configfs mounted; or run without --native"
+    reason = why_not_alone()
+    if reason:
+        return reason
     command = ["unshare", "--net", "ip", "link", "add", "vcan0", "type", "vcan"]
     made = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     return None if made.returncode == 0 else f"this kernel makes no vcan interface (modprobe vcan, or run without --native): {made.stdout.strip()}"

@@ -48,8 +48,12 @@ class Native(unittest.TestCase):
             self.assertIn("modprobe gpio-sim", native.why_not_native())
 
     def test_no_vcan_tells_what_ip_said(self):
-        with answers(2, "Error: Unknown device type.\n"):
+        with answers(2, "Error: Unknown device type.\n"), mock.patch.object(native, "why_not_alone", return_value=None):
             self.assertRegex(native.why_not_native(), "modprobe vcan.*Unknown device type")
+
+    def test_chroot_of_a_plain_folder_names_the_cure(self):
+        with answers(1, "unshare: cannot change root filesystem propagation: Invalid argument\n"):
+            self.assertRegex(native.why_not_native(), "propagation.*mount --bind")
 
     def test_modules_are_asked_for_first(self):
         with answers(0) as run:
@@ -75,8 +79,9 @@ class NativeBoot(unittest.TestCase):
     """The real thing, without a test in its plan: it needs no module, only the right to a network of its own."""
 
     def test_plan_without_tests_is_worked_off_and_ends(self):
-        if os.geteuid() != 0 or subprocess.run(["unshare", "--net", "true"], check=False, stderr=subprocess.DEVNULL).returncode:
-            self.skipTest("may not make a network of its own")
+        reason = native.why_not_alone() if os.geteuid() == 0 else "needs root"
+        if reason:
+            self.skipTest(reason)
         plan = {"build": "/nowhere", "group": "plumbing", "tests": [], "virtual": True, "full": False, "seed": 1, "hours": 1}
         with tempfile.TemporaryDirectory() as folder:
             boot = native.NativeBoot(None, folder, "plumbing", plan, os.sched_getaffinity(0))
