@@ -117,7 +117,6 @@ static const char *parse_mark(candump_cursor_t *cursor, candump_t *frame) {
 candump_result_t candump_parse(const char *line, size_t length, candump_t *out_frame, const char **out_why) {
     candump_t frame = {0};
     candump_cursor_t cursor = {line, line + length};
-    const char *why;
     while (cursor.end > cursor.at && (cursor.end[-1] == '\n' || cursor.end[-1] == '\r' || is_blank(cursor.end[-1]))) {
         cursor.end--;
     }
@@ -125,9 +124,12 @@ candump_result_t candump_parse(const char *line, size_t length, candump_t *out_f
     if (cursor.at == cursor.end || *cursor.at == '#' || *cursor.at == ';') {
         return CANDUMP_EMPTY;
     }
-    if ((why = parse_time(&cursor, &frame)) != NULL || (why = parse_interface(&cursor, &frame)) != NULL ||
-        (why = parse_id(&cursor, &frame)) != NULL || (why = candump_parse_data(&cursor, &frame)) != NULL ||
-        (why = parse_mark(&cursor, &frame)) != NULL) {
+    const char *why = parse_time(&cursor, &frame);
+    why = (why != NULL) ? why : parse_interface(&cursor, &frame);
+    why = (why != NULL) ? why : parse_id(&cursor, &frame);
+    why = (why != NULL) ? why : candump_parse_data(&cursor, &frame);
+    why = (why != NULL) ? why : parse_mark(&cursor, &frame);
+    if (why != NULL) {
         *out_why = why;
         return CANDUMP_BAD;
     }

@@ -102,7 +102,7 @@ int main(int count, char **arguments) {
     arguments_t self = {.ctl = &ctl};
     (void)signal(SIGPIPE, SIG_IGN);
     client_init(&ctl.client);
-    self.words = calloc((size_t)count + 1U, sizeof(*self.words));
+    self.words = (char **)calloc((size_t)count + 1U, sizeof(*self.words));
     if (self.words == NULL) {
         return ctl_fail(CTL_INTERNAL, "out of memory");
     }
@@ -111,6 +111,6 @@ int main(int count, char **arguments) {
         code = dispatch(&self);
     }
     client_close(&ctl.client);
-    free(self.words);
+    free((void *)self.words);
     return check_output(code);
 }

@@ -65,7 +65,9 @@ static void look(iw_linux_hal_t *hal, iw_time_us_t now_us, bool counting, inspec
     iw_linux_hal_tend(hal, now_us);
     const iw_bus_state_t state = functions.bus_state(functions.context);
     heard->was_up = heard->was_up || state >= IW_BUS_PASSIVE;
-    heard->worst = state < heard->worst ? state : heard->worst;
+    if (state < heard->worst) {
+        heard->worst = state;
+    }
     heard->last = state;
     heard->estop = functions.estop_pressed(functions.context);
     while (functions.receive(functions.context, &frame) > 0) {

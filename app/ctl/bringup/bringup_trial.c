@@ -112,8 +112,10 @@ _Noreturn static void become_gateway(const trial_t *trial) {
     path_of(trial, "gateway.conf", config, sizeof(config));
     path_of(trial, "gateway.log", log, sizeof(log));
     const int fd = open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    (void)dup2(fd, STDOUT_FILENO);
-    (void)dup2(fd, STDERR_FILENO);
+    if (fd >= 0) {
+        (void)dup2(fd, STDOUT_FILENO);
+        (void)dup2(fd, STDERR_FILENO);
+    }
     (void)sigemptyset(&none);
     (void)sigprocmask(SIG_SETMASK, &none, NULL);
     (void)setpgid(0, 0); // Ctrl-C is for us: we end it in order.

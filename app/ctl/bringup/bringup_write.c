@@ -109,7 +109,7 @@ static bool write_file(bringup_t *self, const char *path) {
         return false;
     }
     print_head(commenter.date, file);
-    gateway_config_print_noted(&self->config, comment, &context, file);
+    gateway_config_print_noted(&self->config, comment, (const void *)&context, file);
     const bool written = fflush(file) == 0 && ferror(file) == 0 && fsync(fileno(file)) == 0;
     if (fclose(file) != 0 || !written || !put_in_place(beside, path)) {
         talk_say("Cannot write %s: %s. Name another one.", path, strerror(errno));

@@ -83,7 +83,7 @@ int why_disk_list(const char *directory, bool json) {
         list_one(directory, names[i]->d_name, json);
         free(names[i]);
     }
-    free(names);
+    free((void *)names);
     if (!json) {
         (void)fputs(count > 0 ? "\n" : "", stdout);
         text_line(stdout, "%d stop%s recorded in %s%s", count, count == 1 ? "" : "s", directory,
@@ -111,7 +111,7 @@ static bool find(const char *directory, const char *name, char out_path[PATH_SIZ
         }
         free(names[i]);
     }
-    free(names);
+    free((void *)names);
     return found;
 }
 

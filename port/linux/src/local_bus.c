@@ -70,10 +70,11 @@ static int local_send(void *self, const iw_can_frame_t *frame) {
     }
     struct can_frame raw = {.can_id = frame->id & IW_CAN_ID_MASK, .len = frame->dlc};
     (void)memcpy(raw.data, frame->data, sizeof raw.data);
-    if (send(bus->link.fd, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)sizeof raw) {
+    const ssize_t sent = send(bus->link.fd, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (sent == (ssize_t)sizeof raw) {
         return 1;
     }
-    if (errno == EAGAIN || errno == ENOBUFS || errno == EINTR) {
+    if (sent < 0 && (errno == EAGAIN || errno == ENOBUFS || errno == EINTR)) {
         return 0;
     }
     lose(bus);

@@ -121,8 +121,9 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
 int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame) {
     struct can_frame raw = {.can_id = frame->id & ~IW_CAN_FD, .len = frame->dlc};
     (void)memcpy(raw.data, frame->data, sizeof raw.data);
-    if (send(self->fd, &raw, sizeof raw, MSG_DONTWAIT) == (ssize_t)sizeof raw) {
+    const ssize_t sent = send(self->fd, &raw, sizeof raw, MSG_DONTWAIT);
+    if (sent == (ssize_t)sizeof raw) {
         return 1;
     }
-    return errno == EAGAIN || errno == ENOBUFS || errno == EINTR ? 0 : -1;
+    return sent < 0 && (errno == EAGAIN || errno == ENOBUFS || errno == EINTR) ? 0 : -1;
 }
