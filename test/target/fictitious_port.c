@@ -3,7 +3,7 @@
 // nowhere. The time is virtual. Ends with 0 if the wheels are told what was wished, and 1 if they are not within 3 s.
 #include "my_port.h"
 
-#include "iwheel/proto.h"
+#include "iwheel/codec.h"
 
 #include <stdlib.h>
 #include <string.h>
