@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The C codec behind a pipe, so that a codec in another language can be compared with it. One line in, one line out:
 //
-//     decode ID HEXBYTES         ->  ID VALUE...   as the messages below, or: error NUMBER (an iw_status_t)
+//     decode ID HEXBYTES         ->  ID VALUE...   as the messages below, or: error
 //     encode ID VALUE...         ->  ID HEXBYTES
+//     row N                      ->  ID LENGTH PERIOD_MS KIND SIDE of the core's table
 //
 // Values stand in the order of the frame's bytes. Ids are decimal.
 #include <inttypes.h>
@@ -15,21 +16,6 @@
 
 #define LINE_MAX_BYTES 160
 #define VALUES_MAX     4
-
-typedef struct {
-    uint32_t id;
-    iw_codec_kind_t kind;
-    iw_side_t side;
-} message_id_t;
-
-static const message_id_t message_ids[] = {
-    {IW_ID_LEFT_SETPOINT, IW_CODEC_SETPOINT, IW_LEFT}, {IW_ID_RIGHT_SETPOINT, IW_CODEC_SETPOINT, IW_RIGHT},
-    {IW_ID_LEFT_SPEED, IW_CODEC_SPEED, IW_LEFT},       {IW_ID_RIGHT_SPEED, IW_CODEC_SPEED, IW_RIGHT},
-    {IW_ID_LEFT_STATUS, IW_CODEC_STATUS, IW_LEFT},     {IW_ID_RIGHT_STATUS, IW_CODEC_STATUS, IW_RIGHT},
-    {IW_ID_RIGHT_POSE, IW_CODEC_POSE, IW_RIGHT},       {IW_ID_LEFT_FORCE, IW_CODEC_FORCE, IW_LEFT},
-    {IW_ID_RIGHT_FORCE, IW_CODEC_FORCE, IW_RIGHT},     {IW_ID_LEFT_OFFSET, IW_CODEC_OFFSET, IW_LEFT},
-    {IW_ID_RIGHT_OFFSET, IW_CODEC_OFFSET, IW_RIGHT},
-};
 
 /// Writes the message's values in the order of its bytes; returns how many.
 static size_t values_of(const message_t *message, long *values) {
@@ -129,12 +115,11 @@ static void encode_line(uint32_t id, const char *text) {
         values[i] = strtol(text, &rest, 10);
         text = rest;
     }
-    for (size_t i = 0; i < sizeof message_ids / sizeof message_ids[0]; i++) {
-        if (message_ids[i].id == id) {
-            message.kind = message_ids[i].kind;
-            message.side = message_ids[i].side;
-            set_values(&message, values);
-        }
+    const iw_codec_row_t *row = iw_codec_find(id);
+    if (row != NULL) {
+        message.kind = (iw_codec_kind_t)row->kind;
+        message.side = (iw_side_t)row->side;
+        set_values(&message, values);
     }
     if (message_encode(&message, &frame) != IW_OK) {
         printf("error\n");
@@ -145,6 +130,12 @@ static void encode_line(uint32_t id, const char *text) {
         printf("%02X", frame.data[i]);
     }
     printf("\n");
+}
+
+static void row_line(uint32_t number) {
+    const iw_codec_row_t *row = &iw_codec_rows[number % IW_CODEC_ROWS];
+    printf("%u %u %u %s %s\n", row->id, row->length, row->period_ms, iw_codec_name((iw_codec_kind_t)row->kind),
+           row->side == IW_LEFT ? "left" : "right");
 }
 
 int main(void) {
@@ -158,8 +149,10 @@ int main(void) {
             decode_line(id, rest);
         } else if (strncmp(line, "encode ", 7) == 0) {
             encode_line(id, rest);
+        } else if (strncmp(line, "row ", 4) == 0) {
+            row_line(id);
         } else {
-            (void)fprintf(stderr, "codec_line: neither 'decode ID HEX' nor 'encode ID VALUES': %s\n", line);
+            (void)fprintf(stderr, "codec_line: neither 'decode ID HEX', 'encode ID VALUES' nor 'row N': %s\n", line);
             return 65;
         }
     }

@@ -112,6 +112,16 @@ class TestDatabase(unittest.TestCase):
                                  (message.length, message.cycle_time, message.senders[0]))
                 self.assertFalse(message.is_extended_frame)
 
+    def test_messages_are_the_rows_of_the_core(self):
+        rows = [answer.split() for answer in CODEC.ask([f"row {number}" for number in range(len(IDS))])]
+        self.assertEqual(IDS, sorted(int(row[0]) for row in rows))
+        for can_id, length, period_ms, kind, side in rows:
+            message = DATABASE.get_message_by_frame_id(int(can_id))
+            self.assertEqual(f"{side}{kind}", message.name.lower())
+            self.assertEqual(int(length), message.length)
+            # Of a setpoint the core has the longest period allowed, the DBC the gateway's own.
+            self.assertTrue(message.cycle_time == int(period_ms) or kind == "setpoint" and message.cycle_time < int(period_ms))
+
     def test_every_message_tells_its_number_in_hexadecimal(self):
         for message in DATABASE.messages:
             self.assertIn(f"0x{message.frame_id:03X}", message.comment)

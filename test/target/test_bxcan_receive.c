@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Filters, FIFO and ring: sections 7.3 and 7.4.
 #include "bxcan_rig.h"
+#include "iwheel/codec.h"
 #include "unity.h"
 
 #include <string.h>
@@ -42,6 +43,7 @@ static void test_exactly_the_eleven_ids_pass_of_all_2048_data_and_remote(void) {
         for (uint8_t remote = 0; remote <= 1; remote++) {
             const model_frame_t frame = {.id = id, .remote = remote, .dlc = 4};
             iw_can_frame_t taken;
+            TEST_ASSERT_EQUAL_MESSAGE(iw_codec_find(id) != NULL, is_ours(id), "the core's table has other ids");
             TEST_ASSERT_EQUAL_MESSAGE(is_ours(id) ? 1 : 0, pass(&frame, &taken), "an id is filtered wrongly");
             if (is_ours(id)) {
                 TEST_ASSERT_EQUAL_HEX32(id | (remote != 0U ? IW_CAN_REMOTE : 0U), taken.id);
