@@ -62,9 +62,8 @@ static const iw_ledger_entry_t *entry(iw_ledger_item_t item) {
 /// A finding of an earlier run for what is configured now.
 static void store(iw_ledger_item_t item, iw_ledger_state_t state, iw_evidence_t evidence) {
     gw_known_item_t *known = &stored.item[item];
-    const int32_t measured = state == IW_LEDGER_CONFIRMED ? 1000 : 2000; // Of the gear ratio, in thousandths.
-    known->entry = (iw_ledger_entry_t){
-        .state = state, .evidence = evidence, .figure = evidence == IW_EVIDENCE_BUS ? measured : 0};
+    const bool measured = evidence == IW_EVIDENCE_BUS; // The operator's word has no figure.
+    known->entry = (iw_ledger_entry_t){.state = state, .evidence = evidence, .figure = measured ? 1000 : 0};
     known->since_wall_us = 1700000000000000;
     gw_assumption_value(&daemon_rig.daemon->config, item, known->value);
 }

@@ -93,6 +93,13 @@ static void test_bus_off_between_frames_of_one_batch_is_told_although_frames_fol
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
+static void test_restart_tells_of_a_loss_that_was_not_heard(void) {
+    fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
 static void test_bus_off_that_lasts_is_told_until_the_controller_is_back(void) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface.carrier = 0;
@@ -362,6 +369,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once);
     RUN_TEST(test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow);
+    RUN_TEST(test_restart_tells_of_a_loss_that_was_not_heard);
     RUN_TEST(test_bus_off_that_lasts_is_told_until_the_controller_is_back);
     RUN_TEST(test_bus_off_that_was_forged_is_told_once_and_checked_at_once);
     RUN_TEST(test_good_news_that_were_forged_are_not_believed);
