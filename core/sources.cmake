@@ -2,6 +2,8 @@
 # The core's sources, for core/CMakeLists.txt and the Zephyr module.
 set(IWHEEL_CORE_SOURCES
     src/bit_timing.c
+    src/cause.c
+    src/codec.c
     src/config.c
     src/cycle.c
     src/follow.c
@@ -11,7 +13,6 @@ set(IWHEEL_CORE_SOURCES
     src/ledger.c
     src/outbox.c
     src/permit.c
-    src/codec.c
     src/sender.c
     src/setpoint.c
     src/wheel.c)

@@ -29,7 +29,7 @@ static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_
 }
 
 /// As the wheel does it, byte by byte; not by the codec that wrote them.
-static iw_codec_setpoint_t read_setpoint(const uint8_t *data) {
+static iw_codec_setpoint_t as_the_wheel_reads(const uint8_t *data) {
     const iw_codec_setpoint_t setpoint = {
         .speed_mm_s = (int16_t)(uint16_t)(data[1] * 256U + data[2]),
         .current_mA = (int16_t)(uint16_t)(data[3] * 256U + data[4]),
@@ -72,7 +72,7 @@ static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, iw_si
 iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     const bool left = frame->id == IW_ID_LEFT_SETPOINT;
     const iw_side_t side = left ? IW_LEFT : IW_RIGHT;
-    const iw_codec_setpoint_t setpoint = read_setpoint(frame->data);
+    const iw_codec_setpoint_t setpoint = as_the_wheel_reads(frame->data);
     iw_gate_verdict_t verdict = IW_GATE_NOT_A_SETPOINT;
     if ((left || frame->id == IW_ID_RIGHT_SETPOINT) && frame->dlc == self->config->setpoint_dlc) {
         verdict = judge(self, now_us, side, &setpoint);

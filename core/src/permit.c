@@ -1,55 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/permit.h"
 
+#include "cause.h"
+
 #include <string.h>
-
-#define BIT(cause) (1U << (uint32_t)(cause))
-
-IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
-
-/// What a cause does.
-typedef enum {
-    STOPS = 0,     ///< Stops what is ARMED.
-    LATCHES,       ///< Latches while setpoints are sent; else remembered, to refuse arm and reset while present.
-    ALWAYS_LATCHES ///< Latches whatever the state.
-} effect_t;
-
-typedef struct {
-    uint8_t effect; ///< An effect_t.
-    bool level;     ///< There as long as it is told in every step; else an event that is past after IW_PERMIT_EVENT_US.
-    bool at_once;   ///< Stops without a ramp.
-    uint8_t refusal; ///< An iw_refusal_t: how it refuses while it is present.
-} cause_row_t;
-
-static const cause_row_t rows[IW_CAUSES] = {
-    [IW_CAUSE_NONE] = {STOPS, false, false, IW_REFUSE_NONE},
-    [IW_CAUSE_ESTOP_LINE] = {ALWAYS_LATCHES, true, true, IW_REFUSE_ESTOP_PRESSED},
-    [IW_CAUSE_ESTOP_SOFTWARE] = {ALWAYS_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_BUS_DOWN] = {LATCHES, true, true, IW_REFUSE_BUS_DOWN},
-    [IW_CAUSE_SECOND_MASTER] = {LATCHES, false, true, IW_REFUSE_SECOND_MASTER},
-    [IW_CAUSE_SEND_STALLED] = {LATCHES, true, true, IW_REFUSE_SEND_STALLED},
-    [IW_CAUSE_WHEEL_REBOOTED] = {LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_WHEEL_LOST] = {LATCHES, true, true, IW_REFUSE_WHEEL_LOST},
-    [IW_CAUSE_FEEDBACK_SIGN] = {LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_OVERSPEED] = {LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_LOOP_HUNG] = {LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_INTERNAL] = {ALWAYS_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_LOOP_LATE] = {STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_WHEEL_BLOCKED] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_LEASE_LOST] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_CLIENT_GONE] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_CLIENT_STOP] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_SHUTDOWN] = {STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
-    [IW_CAUSE_RESTART] = {STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
-};
-
-/// Of several latching causes at once, the one that is told: the most telling first.
-static const uint8_t telling[] = {
-    IW_CAUSE_ESTOP_LINE,   IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_BUS_DOWN,   IW_CAUSE_SECOND_MASTER,
-    IW_CAUSE_SEND_STALLED, IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_FEEDBACK_SIGN,
-    IW_CAUSE_OVERSPEED,    IW_CAUSE_LOOP_HUNG,      IW_CAUSE_INTERNAL,
-};
-#define TELLING (sizeof telling / sizeof telling[0])
 
 /// What a phase is called outside, and what it demands of the scheduler.
 typedef struct {
@@ -91,10 +45,6 @@ bool iw_permit_arming(const iw_permit_t *self) {
     return self->phase == IW_PHASE_ARMING || self->phase == IW_PHASE_REARMING;
 }
 
-bool iw_cause_latches(iw_cause_t cause) {
-    return rows[cause].effect != STOPS;
-}
-
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted) {
     memset(self, 0, sizeof *self);
     self->config = config;
@@ -111,10 +61,6 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     }
 }
 
-static bool within(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us) {
-    return then_us != IW_NEVER && now_us - then_us < span_us;
-}
-
 static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, iw_time_us_t span_us) {
     self->lease_from_us = now_us;
     self->lease_until_us = now_us + span_us;
@@ -126,26 +72,11 @@ static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
 }
 
 uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us) {
-    const uint32_t told = self->present | self->raised;
-    uint32_t present = 0;
-    for (size_t i = 0; i < TELLING; i++) {
-        const uint8_t cause = telling[i];
-        const bool is =
-            rows[cause].level ? (told & BIT(cause)) != 0U : within(now_us, self->seen_us[cause], IW_PERMIT_EVENT_US);
-        present |= is ? BIT(cause) : 0U;
-    }
-    return present;
+    return iw_cause_present(self->present | self->raised, self->seen_us, now_us);
 }
 
-/// The most telling of the causes present, as a refusal.
 static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us) {
-    const uint32_t present = iw_permit_present(self, now_us);
-    for (size_t i = 0; i < TELLING; i++) {
-        if ((present & BIT(telling[i])) != 0U) {
-            return (iw_refusal_t)rows[telling[i]].refusal;
-        }
-    }
-    return IW_REFUSE_NONE;
+    return iw_cause_refusal(iw_permit_present(self, now_us));
 }
 
 static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us) {
@@ -154,7 +85,7 @@ static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us)
 }
 
 static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
-    return within(now_us, self->stale_us, IW_PERMIT_STALE_US);
+    return self->stale_us != IW_NEVER && now_us - self->stale_us < IW_PERMIT_STALE_US;
 }
 
 /// The granted arm comes to nothing: back to where it was asked for.
@@ -185,7 +116,7 @@ static void brake(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint
     record_stop(self, now_us, cause, sides, detail);
     self->blocked = (cause == IW_CAUSE_WHEEL_BLOCKED) ? self->holder : IW_CLIENT_NONE;
     self->phase = IW_PHASE_BRAKING;
-    self->at_once = rows[cause].at_once;
+    self->at_once = iw_cause_rows[cause].at_once;
     self->hold_us = IW_NEVER;
     self->holder = IW_CLIENT_NONE;
 }
@@ -194,7 +125,7 @@ static void latch(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint
     record_stop(self, now_us, cause, sides, detail);
     self->stop.latched = true;
     const bool silent = self->phase == IW_PHASE_LISTENING;
-    end_arming(self, (iw_refusal_t)rows[cause].refusal);
+    end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
     self->phase = silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
     self->hold_us = now_us;
     self->holder = IW_CLIENT_NONE;
@@ -205,9 +136,9 @@ static bool latches(const iw_permit_t *self, iw_cause_t cause) {
     case IW_PHASE_LISTENING:
     case IW_PHASE_ARMING:
     case IW_PHASE_RESTARTING:
-        return rows[cause].effect == ALWAYS_LATCHES;
+        return iw_cause_rows[cause].effect == IW_ALWAYS_LATCHES;
     default:
-        return rows[cause].effect != STOPS;
+        return iw_cause_rows[cause].effect != IW_STOPS;
     }
 }
 
@@ -218,7 +149,7 @@ static void count_stranger(iw_permit_t *self) {
 }
 
 void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
-    self->raised |= BIT(cause);
+    self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;
     if (iw_permit_state(self) == IW_STATE_LATCHED) {
         return;
@@ -230,13 +161,13 @@ void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, u
     } else if (self->phase == IW_PHASE_RESTARTING && cause == IW_CAUSE_SECOND_MASTER) {
         count_stranger(self);
     } else {
-        end_arming(self, (iw_refusal_t)rows[cause].refusal);
-        self->at_once = self->at_once || rows[cause].at_once;
+        end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
+        self->at_once = self->at_once || iw_cause_rows[cause].at_once;
     }
 }
 
 void iw_permit_keep_present(iw_permit_t *self) {
-    self->raised |= self->present & (BIT(IW_CAUSE_SEND_STALLED) | BIT(IW_CAUSE_WHEEL_LOST));
+    self->raised |= self->present & (IW_CAUSE_BIT(IW_CAUSE_SEND_STALLED) | IW_CAUSE_BIT(IW_CAUSE_WHEEL_LOST));
 }
 
 static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {

@@ -119,7 +119,8 @@ static void test_unknown_ids_are_listed_and_the_list_is_bounded(void) {
     frame.id = 0x1ABCDEF0U | IW_CAN_EXTENDED;
     inspect_heard_take(&heard, &frame);
     inspect_bus(&local, &heard, &wish, &findings);
-    expect("unknown_ids", INSPECT_WARN, "3 frames are none of the wheels': 0x266 0x1ABCDEF0", "iwheelctl record - --can can0 --for 2s | iwheelctl decode");
+    expect("unknown_ids", INSPECT_WARN, "3 frames are none of the wheels': 0x266 0x1ABCDEF0",
+           "iwheelctl record - --can can0 --for 2s | iwheelctl decode");
     for (uint32_t id = 1; id <= 20U; ++id) {
         frame.id = id;
         inspect_heard_take(&heard, &frame);

@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: MIT
-// What is kept from one run to the next: the text, everything that is wrong with a text, and the process that keeps it.
+// What is kept from one run to the next: the text, everything that is wrong with a text.
 #include "json/json_arena.h"
-#include "ledger/keeper.h"
 #include "ledger/memory.h"
 #include "names.h"
-#include "process/owners.h"
 
 #include "unity.h"
 
-#include <errno.h>
-#include <fcntl.h>
-#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #define BUS "unix:/tmp/\"a\" b/bus"
 
@@ -25,7 +17,6 @@ static gw_known_t got;
 static char text[GW_MEMORY_SIZE];
 static char reason[GW_MEMORY_REASON_SIZE];
 static size_t length;
-static char folder[] = "/tmp/iwheel-memory-XXXXXX";
 
 /// What the bus has shown of each item, at the edge of what it can show; state ASSUMED: only the operator can know.
 static const struct {
@@ -396,202 +387,8 @@ static void test_memory_file_name_is_one_plain_word(void) {
     TEST_ASSERT_EQUAL_STRING("ledger-unix__run_a_b_.._bus", name);
 }
 
-// The keeper ----------------------------------------------------------------------------------------------------------
-
-static gw_keeper_t keeper;
-static char heard[GW_KEEPER_TEXT_MAX];
-static int error;
-static char second[128];
-
-static gw_keeper_news_t next_news(void) {
-    gw_keeper_news_t news = GW_KEEPER_NO_NEWS;
-    struct pollfd wait = {.fd = keeper.fd, .events = POLLIN};
-    while (news == GW_KEEPER_NO_NEWS && poll(&wait, 1, 5000) == 1) {
-        news = gw_keeper_hear(&keeper, heard, &length, &error);
-    }
-    return news;
-}
-
-static void open_keeper(const char *directory, gw_keeper_news_t expected) {
-    error = 0;
-    TEST_ASSERT_EQUAL_INT(0, gw_keeper_open(&keeper, directory, "file"));
-    TEST_ASSERT_FALSE_MESSAGE(gw_keeper_write(&keeper, "x", 1), "not before it has answered");
-    TEST_ASSERT_EQUAL_INT(expected, next_news());
-}
-
-static char *in_folder(const char *name) {
-    static char path[128];
-    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
-
-static void put_file(const char *name, const char *content) {
-    FILE *file = fopen(in_folder(name), "w");
-    TEST_ASSERT_NOT_NULL(file);
-    (void)fputs(content, file);
-    (void)fclose(file);
-}
-
-static void assert_file(const char *name, const char *content) {
-    char found[64] = "";
-    FILE *file = fopen(in_folder(name), "r");
-    TEST_ASSERT_NOT_NULL_MESSAGE(file, name);
-    (void)!fread(found, 1, sizeof found - 1U, file);
-    (void)fclose(file);
-    TEST_ASSERT_EQUAL_STRING(content, found);
-}
-
-static void test_keeper_writes_reads_back_and_sets_aside(void) {
-    open_keeper(folder, GW_KEEPER_ABSENT);
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "one", 3));
-    TEST_ASSERT_FALSE_MESSAGE(gw_keeper_write(&keeper, "two", 3), "one at a time");
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
-    assert_file("file", "one");
-    gw_keeper_close(&keeper);
-    open_keeper(folder, GW_KEEPER_READ);
-    TEST_ASSERT_EQUAL_UINT(3, length);
-    TEST_ASSERT_EQUAL_MEMORY("one", heard, 3);
-    gw_keeper_set_aside(&keeper);
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "two", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
-    assert_file("file.damaged", "one");
-    assert_file("file", "two");
-    TEST_ASSERT_EQUAL_INT(-1, access(in_folder("file.new"), F_OK));
-    gw_keeper_close(&keeper);
-}
-
-static void test_keeper_without_its_directory_fails_and_recovers_when_it_comes(void) {
-    char missing[64];
-    (void)snprintf(missing, sizeof missing, "%s/later", folder);
-    open_keeper(missing, GW_KEEPER_FAILED);
-    TEST_ASSERT_EQUAL_INT(ENOENT, error);
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "one", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_FAILED, next_news());
-    TEST_ASSERT_EQUAL_INT(ENOENT, error);
-    TEST_ASSERT_EQUAL_INT(0, mkdir(missing, 0700));
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "two", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
-    assert_file("later/file", "two");
-    gw_keeper_close(&keeper);
-    (void)unlink(in_folder("later/file"));
-    (void)rmdir(missing);
-}
-
-static void test_keeper_takes_no_link_pipe_or_giant_for_its_file(void) {
-    put_file("other", "precious");
-    (void)unlink(in_folder("file"));
-    TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file")));
-    open_keeper(folder, GW_KEEPER_BAD);
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
-    assert_file("other", "precious");
-    assert_file("file", "new");
-    gw_keeper_close(&keeper);
-    (void)unlink(in_folder("file"));
-    TEST_ASSERT_EQUAL_INT(0, mkfifo(in_folder("file"), 0600));
-    open_keeper(folder, GW_KEEPER_BAD);
-    gw_keeper_close(&keeper);
-    (void)unlink(in_folder("file"));
-    put_file("file", "");
-    TEST_ASSERT_EQUAL_INT(0, truncate(in_folder("file"), (off_t)GW_KEEPER_TEXT_MAX + 1));
-    open_keeper(folder, GW_KEEPER_BAD);
-    TEST_ASSERT_EQUAL_INT(EFBIG, error);
-    gw_keeper_close(&keeper);
-    (void)unlink(in_folder("file"));
-}
-
-static void test_keeper_that_cannot_write_keeps_the_old_file(void) {
-    put_file("file", "old");
-    TEST_ASSERT_EQUAL_INT(0, mkdir(in_folder("file.new"), 0755));
-    open_keeper(folder, GW_KEEPER_READ);
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_FAILED, next_news());
-    assert_file("file", "old");
-    gw_keeper_close(&keeper);
-    TEST_ASSERT_EQUAL_INT(0, rmdir(in_folder("file.new")));
-}
-
-static void test_keeper_never_writes_into_a_file_that_is_there_already(void) {
-    put_file("other", "precious");
-    TEST_ASSERT_EQUAL_INT(0, link(in_folder("other"), strcpy(second, in_folder("file.new"))));
-    open_keeper(folder, GW_KEEPER_READ);
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
-    assert_file("other", "precious");
-    assert_file("file", "new");
-    TEST_ASSERT_EQUAL_INT(0, symlink("other", in_folder("file.new")));
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "newer", 5));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
-    assert_file("other", "precious");
-    gw_keeper_close(&keeper);
-}
-
-static void assert_not_read(int why) {
-    open_keeper(folder, GW_KEEPER_BAD);
-    TEST_ASSERT_EQUAL_INT(why, error);
-    gw_keeper_close(&keeper);
-}
-
-static void test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger(void) {
-    put_file("file", "old");
-    TEST_ASSERT_EQUAL_INT(0, link(in_folder("file"), strcpy(second, in_folder("again"))));
-    assert_not_read(GW_FOLDER_FILE);
-    TEST_ASSERT_EQUAL_INT(0, unlink(second));
-    if (geteuid() != 0) {
-        TEST_MESSAGE("SKIPPED in part: giving a file away needs root");
-        return;
-    }
-    TEST_ASSERT_EQUAL_INT(0, chown(in_folder("file"), 65534, 65534));
-    assert_not_read(GW_FOLDER_FILE);
-    (void)unlink(in_folder("file"));
-}
-
-static void assert_no_folder(const char *path, int why) {
-    open_keeper(path, GW_KEEPER_FAILED);
-    TEST_ASSERT_EQUAL_INT(why, error);
-    TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_FAILED, next_news());
-    TEST_ASSERT_EQUAL_INT(why, error);
-    gw_keeper_close(&keeper);
-}
-
-static void test_keeper_uses_no_folder_in_which_others_can_put_things(void) {
-    static const mode_t modes[] = {0777, 01777, 0775, 0757};
-    for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
-        TEST_ASSERT_EQUAL_INT(0, chmod(folder, modes[i]));
-        assert_no_folder(folder, GW_FOLDER_SHARED);
-    }
-    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0700));
-    TEST_ASSERT_EQUAL_INT(0, symlink(".", strcpy(second, in_folder("link"))));
-    assert_no_folder(second, ELOOP);
-    strcat(second, "/");
-    assert_no_folder(second, ELOOP);
-    TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("link")));
-    if (geteuid() != 0) {
-        TEST_MESSAGE("SKIPPED in part: giving a folder away needs root");
-        return;
-    }
-    TEST_ASSERT_EQUAL_INT(0, chown(folder, 65534, 65534));
-    assert_no_folder(folder, GW_FOLDER_FOREIGN);
-    TEST_ASSERT_EQUAL_INT(0, chown(folder, 0, 0));
-}
-
-static void test_keeper_that_died_is_noticed_and_nothing_waits_for_it(void) {
-    TEST_ASSERT_EQUAL_INT(0, gw_keeper_open(&keeper, folder, "file"));
-    (void)next_news();
-    (void)shutdown(keeper.fd, SHUT_RDWR);
-    (void)gw_keeper_write(&keeper, "new", 3);
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_GONE, next_news());
-    gw_keeper_close(&keeper);
-    TEST_ASSERT_FALSE(gw_keeper_write(&keeper, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_NO_NEWS, gw_keeper_hear(&keeper, heard, &length, &error));
-}
-
 int main(void) {
     UNITY_BEGIN();
-    if (mkdtemp(folder) == NULL) {
-        return 1;
-    }
     RUN_TEST(test_memory_what_is_written_is_read_back_even_at_its_extremes);
     RUN_TEST(test_memory_with_every_item_at_its_longest_fits);
     RUN_TEST(test_memory_of_nothing_is_a_memory);
@@ -607,18 +404,5 @@ int main(void) {
     RUN_TEST(test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_believed);
     RUN_TEST(test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed);
     RUN_TEST(test_memory_file_name_is_one_plain_word);
-    RUN_TEST(test_keeper_writes_reads_back_and_sets_aside);
-    RUN_TEST(test_keeper_without_its_directory_fails_and_recovers_when_it_comes);
-    RUN_TEST(test_keeper_takes_no_link_pipe_or_giant_for_its_file);
-    RUN_TEST(test_keeper_that_cannot_write_keeps_the_old_file);
-    RUN_TEST(test_keeper_never_writes_into_a_file_that_is_there_already);
-    RUN_TEST(test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger);
-    RUN_TEST(test_keeper_uses_no_folder_in_which_others_can_put_things);
-    RUN_TEST(test_keeper_that_died_is_noticed_and_nothing_waits_for_it);
-    (void)unlink(in_folder("file"));
-    (void)unlink(in_folder("file.new"));
-    (void)unlink(in_folder("file.damaged"));
-    (void)unlink(in_folder("other"));
-    (void)rmdir(folder);
     return UNITY_END();
 }

@@ -3,8 +3,8 @@
 
 #include "evidence.h"
 
-#include "iwheel/follow.h"
 #include "iwheel/codec.h"
+#include "iwheel/follow.h"
 
 #include <stdlib.h>
 #include <string.h>

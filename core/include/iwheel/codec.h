@@ -61,11 +61,13 @@ typedef enum {
     IW_CODEC_OFFSET,
     IW_CODEC_SETPOINT,
     IW_CODEC_POSE,
-    IW_CODEC_KINDS,
-    IW_CODEC_UNKNOWN = IW_CODEC_KINDS, ///< No message: not one of the eleven numbers, whatever the format.
-    IW_CODEC_BAD_FORMAT,               ///< No message: one of the numbers on a remote, extended, error or FD frame.
-    IW_CODEC_BAD_LENGTH,               ///< No message: shorter than the table, or dlc > 8.
+    IW_CODEC_UNKNOWN,    ///< No message: not one of the eleven numbers, whatever the format.
+    IW_CODEC_BAD_FORMAT, ///< No message: one of the numbers on a remote, extended, error or FD frame.
+    IW_CODEC_BAD_LENGTH, ///< No message: shorter than the table, or dlc > 8.
 } iw_codec_kind_t;
+
+/// So many kinds of message: what is below this is one.
+#define IW_CODEC_KINDS IW_CODEC_UNKNOWN
 
 /// One message of the table.
 typedef struct {

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+#include "cause.h"
+
+IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
+
+const iw_cause_row_t iw_cause_rows[IW_CAUSES] = {
+    [IW_CAUSE_NONE] = {IW_STOPS, false, false, IW_REFUSE_NONE},
+    [IW_CAUSE_ESTOP_LINE] = {IW_ALWAYS_LATCHES, true, true, IW_REFUSE_ESTOP_PRESSED},
+    [IW_CAUSE_ESTOP_SOFTWARE] = {IW_ALWAYS_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_BUS_DOWN] = {IW_LATCHES, true, true, IW_REFUSE_BUS_DOWN},
+    [IW_CAUSE_SECOND_MASTER] = {IW_LATCHES, false, true, IW_REFUSE_SECOND_MASTER},
+    [IW_CAUSE_SEND_STALLED] = {IW_LATCHES, true, true, IW_REFUSE_SEND_STALLED},
+    [IW_CAUSE_WHEEL_REBOOTED] = {IW_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_WHEEL_LOST] = {IW_LATCHES, true, true, IW_REFUSE_WHEEL_LOST},
+    [IW_CAUSE_FEEDBACK_SIGN] = {IW_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_OVERSPEED] = {IW_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_LOOP_HUNG] = {IW_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_INTERNAL] = {IW_ALWAYS_LATCHES, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_LOOP_LATE] = {IW_STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_WHEEL_BLOCKED] = {IW_STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_LEASE_LOST] = {IW_STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_CLIENT_GONE] = {IW_STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_CLIENT_STOP] = {IW_STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_SHUTDOWN] = {IW_STOPS, false, false, IW_REFUSE_CAUSE_PRESENT},
+    [IW_CAUSE_RESTART] = {IW_STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
+};
+
+/// Of several latching causes at once, the one that is told: the most telling first.
+static const uint8_t telling[] = {
+    IW_CAUSE_ESTOP_LINE,   IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_BUS_DOWN,   IW_CAUSE_SECOND_MASTER,
+    IW_CAUSE_SEND_STALLED, IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_FEEDBACK_SIGN,
+    IW_CAUSE_OVERSPEED,    IW_CAUSE_LOOP_HUNG,      IW_CAUSE_INTERNAL,
+};
+#define TELLING (sizeof telling / sizeof telling[0])
+
+bool iw_cause_latches(iw_cause_t cause) {
+    return iw_cause_rows[cause].effect != IW_STOPS;
+}
+
+static bool seen_lately(iw_time_us_t now_us, iw_time_us_t seen_us) {
+    return seen_us != IW_NEVER && now_us - seen_us < IW_PERMIT_EVENT_US;
+}
+
+uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us) {
+    uint32_t present = 0;
+    for (size_t i = 0; i < TELLING; i++) {
+        const uint32_t bit = IW_CAUSE_BIT(telling[i]);
+        const bool is = iw_cause_rows[telling[i]].level ? (told & bit) != 0U : seen_lately(now_us, seen_us[telling[i]]);
+        present |= is ? bit : 0U;
+    }
+    return present;
+}
+
+iw_refusal_t iw_cause_refusal(uint32_t present) {
+    for (size_t i = 0; i < TELLING; i++) {
+        if ((present & IW_CAUSE_BIT(telling[i])) != 0U) {
+            return (iw_refusal_t)iw_cause_rows[telling[i]].refusal;
+        }
+    }
+    return IW_REFUSE_NONE;
+}
