@@ -49,6 +49,8 @@ SOURCES = {
     "ledger_state": ("words/names.c", "gw_ledger_state_name", set()),
     "evidence": ("words/names.c", "gw_evidence_name", set()),
     "timing": ("bus/bus_facts.c", "gw_bus_facts_timing", set()),
+    "memory_state": ("ledger/knowledge_json.c", "write_memory", {"memory", "file", "state", "reason"}),
+    "fault_alone": ("status/observe.c", "observe_faults", set()),
 }
 
 
@@ -401,7 +403,7 @@ def gateway_words(description):
     """What words a source of the gateway knows and the description does not, or the other way round."""
     for kind, (path, function, others) in SOURCES.items():
         path = os.path.join("app", "gateway", path)
-        match = re.search(rf"^const char \*{function}\(.*?^}}", read(path), re.MULTILINE | re.DOTALL)
+        match = re.search(rf"^(?:const char \*|static void ){function}\(.*?^}}", read(path), re.MULTILINE | re.DOTALL)
         if match is None:
             yield f"{path}: {function} is not there; scripts/northbound.py must know where the words of {kind} are now"
             continue

@@ -105,7 +105,7 @@ def deviations(folder, fault):
 
 def northbound(folder, fault):
     """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
-    sources = ("app/gateway/words/names.c", "app/gateway/bus/bus_facts.c")
+    sources = [f"app/gateway/{name}" for name in ("words/names.c", "bus/bus_facts.c", "ledger/knowledge_json.c", "status/observe.c")]
     for name in ("scripts/northbound.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / name).read_text()
@@ -238,6 +238,8 @@ CASES = [
     (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
     (northbound, "python3", "clean", ("", "", ""), False),
     (northbound, "python3", "a word that only the gateway has", ("app/gateway/words/names.c", '"active"', '"awake"'), True),
+    (northbound, "python3", "a fault that is no cause", ("app/gateway/status/observe.c", '"still_moving", true', '"still_rolling", true'), True),
+    (northbound, "python3", "a state of the memory", ("app/gateway/ledger/knowledge_json.c", '"ignored"', '"distrusted"'), True),
     (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),
     (northbound, "python3", "a field that the client does not know", ("python/src/iwheel/_protocol.py", "    heard: bool\n", ""), True),
     (northbound, "python3", "a field that is not documented", ("docs/northbound.md", "`heard`, `at_rest`", "`at_rest`"), True),

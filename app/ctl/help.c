@@ -68,7 +68,8 @@ static const verb_t verbs[] = {
           "Moves nothing. VALUE is what was found at the machine, as the configuration file writes it; another one "
           "than the "
           "configured contradicts the item, and what depends on it is disabled. Without VALUE: what is configured is "
-          "right.\n"),
+          "right.\n"
+          "--how TEXT  by what it was found: a tape, bringup; kept as the item's evidence, 127 bytes at most\n"),
      .choice = item_choice},
     {VERB("doctor", verb_doctor, "[IFACE] [--estop LINE] [--config FILE] [--listen TIME] [--no-press]",
           "what is wrong with bus, wheels and e-stop, and what mends it",

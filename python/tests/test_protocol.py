@@ -211,7 +211,7 @@ class Story(unittest.TestCase):
         self.wait_granted(me, "tare", side="right")
         self.ask(me, "confirm", item="wheel_radius", value=200)
         self.ask(me, "status")
-        self.ask(me, "confirm", item="wheel_radius")
+        self.ask(me, "confirm", item="wheel_radius", how="a tape")
         self.ask(me, "confirm", item="mount_sign_left", value="yes")
         self.ask(me, "arm", refused="denied")
         self.ask(me, "confirm", item="mount_sign_left", value="no")

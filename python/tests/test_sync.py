@@ -403,6 +403,7 @@ class Answers(RigCase):
             self.assertIn("radius_mm", entry["disabled"])
             self.assertEqual(gateway.confirm("wheel_radius")["state"], "confirmed")
             self.assertEqual(gateway.confirm("mount_sign_left", "no")["item"], "mount_sign_left")
+            self.assertEqual(gateway.confirm("track", how="a tape from tyre to tyre")["reason"], "found by a tape from tyre to tyre")
             with self.assertRaises(ValueError):
                 gateway.confirm("wheel_radius", 192.5)
 

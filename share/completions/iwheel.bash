@@ -26,7 +26,7 @@ _iwheel_value() {
     --can) echo BUS && echo unix: ;;
     --estop) printf '%s\n' none FILE ;;
     --log-level) printf '%s\n' error warning info debug ;;
-    --for | --listen | --rate | --frames | --current | --seed | --uptime) ;;
+    --how | --for | --listen | --rate | --frames | --current | --seed | --uptime) ;;
     *) return 1 ;;
     esac
 }

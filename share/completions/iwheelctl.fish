@@ -45,7 +45,7 @@ function __iwheel_value
             __fish_complete_path (commandline -ct)
         case --log-level
             printf '%s\n' error warning info debug
-        case --for --listen --rate --frames --current --seed --uptime
+        case --how --for --listen --rate --frames --current --seed --uptime
         case '*'
             return 1
     end

@@ -227,9 +227,9 @@ class AsyncGateway:
     async def tare(self, side: Optional[str] = None) -> Tared:
         return cast(Tared, without_envelope(await self._ask("tare", side=side)))
 
-    async def confirm(self, item: str, value: Union[str, Whole, None] = None) -> Confirmed:
+    async def confirm(self, item: str, value: Union[str, Whole, None] = None, how: Optional[str] = None) -> Confirmed:
         found = value if value is None or isinstance(value, str) else integer("value", value)
-        return cast(Confirmed, without_envelope(await self._ask("confirm", item=item, value=found)))
+        return cast(Confirmed, without_envelope(await self._ask("confirm", item=item, value=found, how=how)))
 
     def arm(self, name: Optional[str] = None, *, takeover: bool = False, wait: float = ARM_S) -> _Arming:
         """`async with gateway.arm("name") as wheels:`, or `wheels = await gateway.arm("name")`. `wait` as in `Gateway.arm`."""

@@ -132,14 +132,15 @@ class Gateway:
         """
         return cast(Tared, without_envelope(self._ask("tare", side=side)))
 
-    def confirm(self, item: str, value: Union[str, Whole, None] = None) -> Confirmed:
+    def confirm(self, item: str, value: Union[str, Whole, None] = None, how: Optional[str] = None) -> Confirmed:
         """The operator's word on an item of the assumption ledger (docs/ledger.md). Moves nothing.
 
         `value` is what was found at the machine; without it what is configured is confirmed. Returns the item's entry: another value
-        than the configured one contradicts it, and `disabled` tells what that costs.
+        than the configured one contradicts it, and `disabled` tells what that costs. `how` it was found (up to 127 bytes) is kept as its
+        evidence.
         """
         found = value if value is None or isinstance(value, str) else integer("value", value)
-        return cast(Confirmed, without_envelope(self._ask("confirm", item=item, value=found)))
+        return cast(Confirmed, without_envelope(self._ask("confirm", item=item, value=found, how=how)))
 
     def arm(self, name: Optional[str] = None, *, takeover: bool = False, wait: float = ARM_S) -> Armed:
         """Asks for permission to drive; the wheels stay at zero until the first command. An older one of this Gateway ends.

@@ -207,6 +207,8 @@ class LedgerEntry(TypedDict):
     """in force"""
     found: Optional[str]
     """by the operator, if told"""
+    how: Optional[str]
+    """by what it was found, if told"""
     since_wall_us: Optional[int]
     reason: str
     """the evidence in words"""
@@ -225,6 +227,7 @@ LedgerItem = Literal[
     "mount_sign_left",
     "mount_sign_right",
     "wheel_radius",
+    "track",
     "gear_ratio",
     "pose_byte_order",
     "dlc",
@@ -273,6 +276,8 @@ class Counters(TypedDict):
     late_steps: int
     out_of_range: int
     purges: int
+    left_behind: int
+    """times that a setpoint stayed in the controller"""
     pairs: int
     send_later: int
     clamped: int
