@@ -94,6 +94,8 @@ static const verb_t verbs[] = {
           "--learn FILE     a recording of another controller (candump -L): the setpoint types to try first\n"
           "--current MA     the most that the motors get, 500 if not told\n"
           "--gateway PROG   the gateway's program, if it is not beside this one\n"
+          "Settles e-stop, gear, setpoint type, current role, signs, units of force, radius and track; what was not "
+          "seen, all of it, is noted and not confirmed.\n"
           "Exit code 1: ended early, nothing was written.\n"),
      .no_json = "bringup talks with a person; it has no --json (doctor has)"},
     {VERB("why", verb_why, "[NUMBER|FILE] [--list] [--frames N] [--directory DIR]",
