@@ -23,7 +23,7 @@ bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero) {
 }
 
 /// The four bytes behind the setpoint's type.
-static uint32_t value_of(const iw_can_frame_t *frame) {
+IW_BE_INLINE uint32_t value_of(const iw_can_frame_t *frame) {
     return (iw_be_word(frame, 0) << 8) | (iw_be_word(frame, 1) >> 24);
 }
 

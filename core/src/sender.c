@@ -19,8 +19,8 @@ bool iw_sender_ready(const iw_sender_t *self, bool zero) {
 }
 
 /// The frame for one wheel, in its own frame of reference. False, with the reason in `verdict`, if the gate stops it.
-static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_command_t *command,
-                    iw_can_frame_t *out_frame) {
+static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_command_t *command) {
+    iw_can_frame_t *const frame = &self->frame[side];
     const iw_config_t *const config = self->config;
     const bool invert = config->invert[side];
     iw_codec_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
@@ -30,13 +30,14 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
     if (invert && config->current_role == IW_ROLE_SETPOINT) {
         setpoint.current_mA = (int16_t)-setpoint.current_mA;
     }
-    self->clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, out_frame) ? 1U : 0U;
-    const iw_gate_verdict_t verdict = iw_gate_check(&self->gate, now_us, out_frame);
+    self->clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, frame) ? 1U : 0U;
+    const iw_gate_verdict_t verdict = iw_gate_check(&self->gate, now_us, frame);
     self->verdict = (verdict == IW_GATE_PASS) ? self->verdict : verdict;
     return verdict == IW_GATE_PASS;
 }
 
-static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_can_frame_t *frame) {
+static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side) {
+    const iw_can_frame_t *const frame = &self->frame[side];
     const bool accepted = self->hal->send(self->hal->context, frame) > 0;
     self->later += accepted ? 0U : 1U;
     iw_outbox_sent(&self->outbox, side, now_us, frame, accepted);
@@ -52,15 +53,15 @@ static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
 }
 
 /// Left, then right. What the port refuses on the left does not leave on the right either, unless it is a zero.
-static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, const iw_can_frame_t frame[IW_SIDES], bool zero) {
+static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
     const bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
     const bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
     bool taken = true;
     if (left) {
-        taken = hand_over(self, now_us, IW_LEFT, &frame[IW_LEFT]);
+        taken = hand_over(self, now_us, IW_LEFT);
     }
     if (right && (taken || zero)) {
-        taken = hand_over(self, now_us, IW_RIGHT, &frame[IW_RIGHT]) && taken;
+        taken = hand_over(self, now_us, IW_RIGHT) && taken;
     }
     if (taken && left && right) {
         measure_gap(self, now_us);
@@ -69,13 +70,12 @@ static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, const iw_can_
 }
 
 iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero) {
-    iw_can_frame_t frame[IW_SIDES];
     for (size_t side = 0; side < IW_SIDES; side++) {
-        if (!prepare(self, now_us, (iw_side_t)side, &pair->wheel[side], &frame[side])) {
+        if (!prepare(self, now_us, (iw_side_t)side, &pair->wheel[side])) {
             return IW_SEND_STOPPED;
         }
     }
-    return hand_over_both(self, now_us, frame, zero) ? IW_SEND_DONE : IW_SEND_LATER;
+    return hand_over_both(self, now_us, zero) ? IW_SEND_DONE : IW_SEND_LATER;
 }
 
 void iw_sender_rest(iw_sender_t *self) {
