@@ -59,6 +59,29 @@ static void test_takeover_while_an_assumption_is_contradicted_is_refused(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
+static void know(iw_ledger_state_t state, iw_evidence_t evidence, int32_t figure) {
+    const iw_ledger_entry_t entry = {.state = state, .evidence = evidence, .figure = figure};
+    iw_gateway_know(&rig.gateway, IW_LEDGER_MOUNT_SIGN_LEFT, &entry);
+}
+
+static void assert_known(iw_ledger_state_t state, iw_evidence_t evidence, int32_t figure) {
+    const iw_ledger_entry_t *entry = iw_ledger_entry(ledger(), IW_LEDGER_MOUNT_SIGN_LEFT);
+    TEST_ASSERT_EQUAL_INT(state, entry->state);
+    TEST_ASSERT_EQUAL_INT(evidence, entry->evidence);
+    TEST_ASSERT_EQUAL_INT32(figure, entry->figure);
+}
+
+static void test_what_is_known_from_elsewhere_guards_motion_as_what_the_bus_has_shown(void) {
+    know(IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, -3);
+    assert_known(IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, -3);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER, false));
+    know(IW_LEDGER_ASSUMED, IW_EVIDENCE_DOCUMENT, 0);
+    assert_known(IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, -3);
+    know(IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 4);
+    assert_known(IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 4);
+    gateway_rig_arm(&rig);
+}
+
 /// The left wheel's force in a state of its own: what the sensor shows, what the ledger says of unit and offset.
 typedef struct {
     iw_offset_provenance_t provenance;
@@ -176,6 +199,7 @@ int main(void) {
     RUN_TEST(test_arm_with_any_other_assumption_contradicted_is_granted);
     RUN_TEST(test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption);
     RUN_TEST(test_takeover_while_an_assumption_is_contradicted_is_refused);
+    RUN_TEST(test_what_is_known_from_elsewhere_guards_motion_as_what_the_bus_has_shown);
     RUN_TEST(test_force_validity_follows_sensor_and_ledger);
     RUN_TEST(test_force_validity_of_the_right_wheel_asks_for_its_own_unit);
     RUN_TEST(test_length_of_any_message_that_the_table_has_otherwise_contradicts_it);

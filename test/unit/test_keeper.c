@@ -48,6 +48,12 @@ static char *in_folder(const char *name) {
     return path;
 }
 
+/// A second name of a file that is there.
+static void name_again(const char *name, const char *again) {
+    (void)strcpy(second, in_folder(again));
+    TEST_ASSERT_EQUAL_INT(0, link(in_folder(name), second));
+}
+
 static void put_file(const char *name, const char *content) {
     FILE *file = fopen(in_folder(name), "w");
     TEST_ASSERT_NOT_NULL(file);
@@ -136,7 +142,7 @@ static void test_keeper_that_cannot_write_keeps_the_old_file(void) {
 
 static void test_keeper_never_writes_into_a_file_that_is_there_already(void) {
     put_file("other", "precious");
-    TEST_ASSERT_EQUAL_INT(0, link(in_folder("other"), strcpy(second, in_folder("file.new"))));
+    name_again("other", "file.new");
     open_keeper(folder, GW_KEEPER_READ);
     TEST_ASSERT_TRUE(gw_keeper_write(&keeper, "new", 3));
     TEST_ASSERT_EQUAL_INT(GW_KEEPER_WRITTEN, next_news());
@@ -157,7 +163,7 @@ static void assert_not_read(int why) {
 
 static void test_keeper_takes_no_file_with_a_second_name_or_of_a_stranger(void) {
     put_file("file", "old");
-    TEST_ASSERT_EQUAL_INT(0, link(in_folder("file"), strcpy(second, in_folder("again"))));
+    name_again("file", "again");
     assert_not_read(GW_FOLDER_FILE);
     TEST_ASSERT_EQUAL_INT(0, unlink(second));
     if (geteuid() != 0) {

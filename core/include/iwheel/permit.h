@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: MIT
 /// May the wheels move, and if not, why?
 ///
-///     LISTENING --arm--> ARMING --TX confirmed--> ARMED --lease lost | stop | disarm--> BRAKING
-///         ^ ^              | not in time            ^                                      | output zero
-///         | |              v                        | TX confirmed                         v
-///         | +----------- LISTENING               REARMING <------------- arm ---------- HOLDING --held--> LISTENING
-///         |                                         | not in time                         ^
-///         |                                         +-------------------------------------+
+///     LISTENING --arm--> ARMING --TX confirmed--> ARMED --lease lost | stop | disarm | cause--> BRAKING
+///         ^ ^              | failed                 ^                                              | output zero
+///         | |              v                        | TX confirmed                                 v
+///         | +----------- LISTENING               REARMING <---------------- arm --------------- HOLDING --held--> LISTENING
+///         |                                         | failed                                      ^
+///         |                                         +---------------------------------------------+
 ///         |   RESTARTING --held, or somebody else drives--> LISTENING
 ///         |
 ///         |   any of them --latching cause--> CUT --held--> LATCHED;  from LISTENING at once: LATCHED
 ///         +------------------------------- reset ------------- CUT, LATCHED
+///
+/// Arming has failed when TX is not confirmed in time, and by any stop, disarm or cause. A stop at zero output can be
+/// followed by arm before a step has made HOLDING of BRAKING: then REARMING falls back to BRAKING.
 ///
 /// A client sees four of them: LISTENING (and ARMING), ARMED, STOPPING (BRAKING, HOLDING, REARMING, RESTARTING) and
 /// LATCHED (and CUT). Nothing is sent in LISTENING and LATCHED; ARMING sends one zero pair, and ARMED begins when it is
