@@ -373,20 +373,22 @@ static void test_lock_held_by_the_service_keeps_out_root_and_everybody_else(void
 static int go[2];
 static int told[2];
 
-/// A developer's gateway: looks who has come when it is told to, and says whom it gives way to.
+/// A developer's gateway: looks whether it is alone and says so, looks who has come when it is told to, and says whom it
+/// gives way to.
 static int open_and_tend(void) {
     const int result = open_second();
     const pid_t process = fork();
+    char byte = '\0';
     if (process == 0) {
-        char byte;
         const bool alone = !gw_bus_lock_tend(&second.lock, 0);
+        (void)!write(told[1], "", 1);
         (void)!read(go[0], &byte, 1);
         const bool gives_way = gw_bus_lock_tend(&second.lock, GW_BUS_LOCK_LOOK_US);
         const gw_holder_t holder = alone && gives_way ? second.lock.holder : (gw_holder_t){.uid = (uid_t)-1};
         (void)!write(told[1], &holder, sizeof holder);
         _exit(0);
     }
-    return result;
+    return read(told[0], &byte, 1) == 1 ? result : -1;
 }
 
 static void test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up(void) {
