@@ -186,7 +186,9 @@ static void request(void) {
 static void operate(iw_side_t side) {
     const iw_ledger_item_t item = (iw_ledger_item_t)Frama_C_interval(0, IW_LEDGER_ITEMS - 1);
     const iw_evidence_t evidence = (iw_evidence_t)Frama_C_interval(IW_EVIDENCE_NONE, IW_EVIDENCE_OPERATOR);
-    switch (Frama_C_interval(0, 3)) {
+    const iw_ledger_state_t state = (iw_ledger_state_t)Frama_C_interval(IW_LEDGER_ASSUMED, IW_LEDGER_CONTRADICTED);
+    const iw_ledger_entry_t entry = {state, evidence, any_i32()};
+    switch (Frama_C_interval(0, 4)) {
     case 0:
         iw_ledger_assume(&gateway.ledger, item, evidence);
         break;
@@ -195,6 +197,9 @@ static void operate(iw_side_t side) {
         break;
     case 2:
         iw_ledger_contradict(&gateway.ledger, item, evidence, any_i32());
+        break;
+    case 3:
+        iw_gateway_know(&gateway, item, &entry);
         break;
     default:
         iw_force_restore(&gateway.force[side], any_bool() ? IW_OFFSET_STORED : IW_OFFSET_OPERATOR,
@@ -214,6 +219,9 @@ static void look(iw_side_t side) {
     (void)iw_gateway_state(&gateway);
     (void)iw_gateway_arming(&gateway);
     (void)iw_gateway_arm_refusal(&gateway);
+    (void)iw_gateway_is_sending(&gateway);
+    (void)iw_gateway_force_validity(&gateway, now_us, side);
+    (void)iw_cause_latches((iw_cause_t)Frama_C_interval(IW_CAUSE_NONE, IW_CAUSES - 1));
     (void)iw_permit_present(&gateway.permit, now_us);
     (void)iw_ledger_entry(&gateway.ledger, IW_LEDGER_DLC);
 }
@@ -227,9 +235,11 @@ static void calculate(void) {
     const iw_bit_timing_achieved_t wanted = {any_u32(), any_u16()};
     (void)iw_bit_timing_achieved(any_u32(), &timing);
     (void)iw_bit_timing_solve(&limits, any_u32(), &wanted, &timing);
+    (void)iw_codec_find(any_u32());
     const iw_codec_kind_t kind = (iw_codec_kind_t)Frama_C_interval(IW_CODEC_SPEED, IW_CODEC_POSE);
     const iw_side_t side = (iw_side_t)Frama_C_interval(IW_LEFT, IW_RIGHT);
     Frama_C_make_unknown((char *)told, sizeof told);
+    (void)iw_codec_name(kind);
     (void)iw_codec_encode(kind, side, &told[side], &frame);
     (void)receive_frame(NULL, &frame);
     (void)iw_codec_decode(&frame, told);
