@@ -85,7 +85,7 @@ PARTS = [
     Bug("old-frames-kept-while-down", "R11", SOCKETCAN, "if (!bus->up) { drop_old(bus);", "if (!bus->up) {", CAN),
     Bug("half-a-batch-from-before", "R7", SOCKETCAN, "iw_socketcan_socket_forget(&bus->ours);", "", CAN),
     Bug("forged-recovery-believed", "R13", SOCKETCAN, "} else if (forged) { return; } else", "} else", CAN),
-    Bug("active-ends-bus-off", "R13", SOCKETCAN, "(error == IW_CAN_ERROR_ACTIVE && bus->present == IW_BUS_PASSIVE)", "error == IW_CAN_ERROR_ACTIVE", CAN),
+    Bug("active-ends-bus-off", "R13", SOCKETCAN, "error == IW_CAN_ERROR_ACTIVE && bus->present == IW_BUS_PASSIVE", "error == IW_CAN_ERROR_ACTIVE", CAN),
     Bug("bus-off-never-looked-at-again", "R13", SOCKETCAN, "bus->look_us = bus->now_us + (forged ? 0U : RETRY_US);", "", CAN),
     Bug("old-socket-of-a-new-interface", "R13", SOCKETCAN, "bus->interface = error == ENODEV ? 0 : bus->interface; iw_socketcan", "iw_socketcan", CAN),
     Bug("purge-not-allowed-tried-again", "R6", SOCKETCAN, "bus->link.purge == IW_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven", "!bus->link.echo_proven", CAN),
