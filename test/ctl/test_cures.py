@@ -22,10 +22,10 @@ from harness import Rig, find_program  # noqa: E402
 BUILD = ""
 # Programs of others that cures name: the Debian package, and the words that may follow. None: anything.
 PROGRAMS = {
-    "apt-get": ("apt", {"install"}), "candump": ("can-utils", None), "chmod": ("coreutils", {"o-w"}),
+    "apt-get": ("apt", {"install"}), "candump": ("can-utils", None), "chmod": ("coreutils", {"go-w"}),
     "chown": ("coreutils", None), "chrt": ("util-linux", {"-f"}), "gpiodetect": ("gpiod", None), "gpioinfo": ("gpiod", None),
     "groupadd": ("passwd", {"--system"}), "ip": ("iproute2", None), "journalctl": ("systemd", {"-u"}),
-    "mkdir": ("coreutils", {"-p"}), "modprobe": ("kmod", {"can_raw"}), "systemctl": ("systemd", {"start", "stop", "restart"}),
+    "mkdir": ("coreutils", {"-p"}), "modprobe": ("kmod", {"can_raw"}), "systemctl": ("systemd", {"start", "stop", "restart", "enable"}),
     "timedatectl": ("systemd", {"set-ntp"}), "usermod": ("passwd", {"-aG"}),
 }
 OURS = {"iwheelctl", "iwheel-sim", "iwheel-gateway"}
@@ -109,8 +109,9 @@ class EveryCommandExists(unittest.TestCase):
             self.assertIn(match.group(1), OURS | set(PROGRAMS) | {"sudo"} | prose, place)
 
     def test_units_exist(self):
-        for place, match in self.find(r"(?:systemctl \w+|journalctl -u) ([\w@-]+)", 5):
-            self.assertTrue(os.path.exists(os.path.join(ROOT, "share", "systemd", match.group(1) + ".service")), place)
+        for place, match in self.find(r"(?:systemctl \w+(?: --now)?|journalctl -u) ([\w-]+)(?:(@)[\w%]*)?(\.path)?", 5):
+            unit = f"{match[1]}{match[2] or ''}{match[3] or '.service'}"
+            self.assertTrue(os.path.exists(os.path.join(ROOT, "share", "systemd", unit)), place)
 
     def test_files_of_ours_exist(self):
         for place, match in self.find(r"(?<![/\w])((?:share|docs|scripts)/[\w./-]+\w)"):
@@ -453,9 +454,9 @@ class Check(unittest.TestCase):
         os.mkdir(self.rig.path("open"))
         os.chmod(self.rig.path("open"), 0o777)
         self.rig.socket_name = "open/gateway.sock"
-        code, text = self.only("fail", "anybody may write")
+        code, text = self.only("fail", "others than the directory's owner may write")
         self.assertEqual(1, code)
-        subprocess.run(re.search(r"\((chmod o-w)\)", text).group(1).split() + [self.rig.path("open")], check=True)
+        subprocess.run(re.search(r"\((chmod go-w)\)", text).group(1).split() + [self.rig.path("open")], check=True)
         self.assertEqual(0, self.gone("fail", "socket"))
 
     def test_machine_without_can_or_gpio_is_judged_as_far_as_it_goes(self):
