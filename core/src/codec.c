@@ -39,9 +39,9 @@ const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind) {
 }
 
 const iw_codec_row_t *iw_codec_find(uint32_t id) {
-    for (const iw_codec_row_t *row = iw_codec_rows; row < &iw_codec_rows[IW_CODEC_ROWS]; row++) {
-        if (row->id == id) {
-            return row;
+    for (size_t i = 0; i < IW_CODEC_ROWS; i++) {
+        if (iw_codec_rows[i].id == id) {
+            return &iw_codec_rows[i];
         }
     }
     return NULL;
@@ -161,16 +161,16 @@ static void put_status(iw_can_frame_t *out_frame, const iw_codec_status_t *statu
 
 iw_status_t iw_codec_encode(iw_codec_kind_t kind, iw_side_t side, const iw_codec_wheel_t *wheel,
                             iw_can_frame_t *out_frame) {
-    const iw_codec_row_t *row = iw_codec_rows;
-    while (row < &iw_codec_rows[IW_CODEC_ROWS] && (row->kind != (uint8_t)kind || row->side != (uint8_t)side)) {
-        row++;
+    size_t i = 0;
+    while (i < IW_CODEC_ROWS && (iw_codec_rows[i].kind != (uint8_t)kind || iw_codec_rows[i].side != (uint8_t)side)) {
+        i++;
     }
-    if (row == &iw_codec_rows[IW_CODEC_ROWS]) {
+    if (i == IW_CODEC_ROWS) {
         return IW_ERR_ID;
     }
     memset(out_frame, 0, sizeof *out_frame);
-    out_frame->id = row->id;
-    out_frame->dlc = row->length;
+    out_frame->id = iw_codec_rows[i].id;
+    out_frame->dlc = iw_codec_rows[i].length;
     switch (kind) {
     case IW_CODEC_SPEED:
         iw_be_put_word(out_frame, 0, iw_be_join(wheel->speed.speed_rpm, wheel->speed.acceleration_raw));

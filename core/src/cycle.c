@@ -82,8 +82,8 @@ static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
     }
 }
 
-static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side,
-                       const iw_codec_wheel_t *told) {
+static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side) {
+    const iw_codec_wheel_t *const told = &self->told[side];
     const iw_wheel_t *const wheel = &self->wheel[side];
     iw_force_t *const force = &self->force[side];
     const iw_unit_evidence_t before = force->evidence;
@@ -116,12 +116,11 @@ static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length
 }
 
 /// Telemetry. A reboot is acted upon before the frame that revealed it is used any further.
-static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side,
-                 const iw_codec_wheel_t *told) {
+static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side) {
     iw_wheel_t *const wheel = &self->wheel[side];
     const bool first = wheel->first_us == IW_NEVER;
     self->counters.received++;
-    iw_wheel_hear(wheel, now_us, kind, told, !self->stalled);
+    iw_wheel_hear(wheel, now_us, kind, &self->told[side], !self->stalled);
     const iw_reboot_t reboot = iw_wheel_take_reboot(wheel);
     if (reboot != IW_REBOOT_NONE) {
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_REBOOTED, side_bit(side), (uint32_t)reboot);
@@ -130,9 +129,8 @@ static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, 
         iw_force_reopen(&self->force[side], wheel->boot_seen);
     }
     if (kind == IW_CODEC_FORCE || kind == IW_CODEC_OFFSET) {
-        hear_force(self, now_us, kind, side, told);
+        hear_force(self, now_us, kind, side);
     } else if (kind == IW_CODEC_POSE) {
-        self->pose = told->pose;
         self->pose_us = now_us;
     }
 }
@@ -158,12 +156,11 @@ static void take_setpoint(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_
 }
 
 static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
-    iw_codec_wheel_t told[IW_SIDES]; // Of the message that is decoded, and of its wheel, nothing else is read.
     if (is_setpoint_id(frame->id)) {
         take_setpoint(self, now_us, frame);
         return;
     }
-    const iw_codec_kind_t kind = iw_codec_decode(frame, told);
+    const iw_codec_kind_t kind = iw_codec_decode(frame, self->told);
     const iw_side_t side = iw_codec_side(frame->id);
     switch (kind) {
     case IW_CODEC_BAD_FORMAT:
@@ -178,7 +175,7 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
         break;
     default:
         note_length(self, kind, frame->dlc);
-        hear(self, now_us, kind, side, &told[side]);
+        hear(self, now_us, kind, side);
         break;
     }
 }

@@ -172,8 +172,8 @@ static void test_gateway_pose_is_kept_with_its_time(void) {
     put(&message);
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.pose_us);
-    TEST_ASSERT_EQUAL_INT(-1, rig.gateway.pose.x_mm);
-    TEST_ASSERT_EQUAL_INT(31415, rig.gateway.pose.psi_mrad);
+    TEST_ASSERT_EQUAL_INT(-1, rig.gateway.told[IW_RIGHT].pose.x_mm);
+    TEST_ASSERT_EQUAL_INT(31415, rig.gateway.told[IW_RIGHT].pose.psi_mrad);
 }
 
 static void test_gateway_driving_confirms_the_feedback_sign_once(void) {

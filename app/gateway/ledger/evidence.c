@@ -107,7 +107,7 @@ static int64_t step_of(int16_t from, int16_t to) {
 
 static void look_at_pose(gw_evidence_t *self, iw_gateway_t *gateway) {
     const iw_codec_pose_t was = self->pose;
-    const iw_codec_pose_t is = gateway->pose;
+    const iw_codec_pose_t is = gateway->told[IW_RIGHT].pose;
     const bool gap =
         self->pose_us == IW_NEVER || gateway->pose_us - self->pose_us > (iw_time_us_t)2 * GW_EVIDENCE_GAP_US;
     if (gateway->pose_us == IW_NEVER || gateway->pose_us == self->pose_us) {

@@ -98,7 +98,7 @@ static bool at_limit(int16_t value) {
 
 static void write_pose(const gw_daemon_t *daemon, json_out_t *json) {
     const iw_gateway_t *gateway = &daemon->gateway;
-    const iw_codec_pose_t *pose = &gateway->pose;
+    const iw_codec_pose_t *pose = &gateway->told[IW_RIGHT].pose;
     const bool fresh = gw_snapshot_is_fresh(daemon->now_us, gateway->pose_us, GW_STATUS_STALE_US) &&
                        !contradicted(daemon, IW_LEDGER_POSE_BYTE_ORDER);
     json_out_open(json, "pose", '{');

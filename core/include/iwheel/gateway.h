@@ -69,6 +69,7 @@ typedef struct {
 typedef struct {
     iw_config_t config;
     iw_hal_t hal;
+    iw_codec_wheel_t told[IW_SIDES]; ///< What each wheel last told, message by message.
     iw_wheel_t wheel[IW_SIDES];
     iw_force_t force[IW_SIDES];
     iw_follow_t follow[IW_SIDES];
@@ -80,10 +81,9 @@ typedef struct {
     iw_time_us_t stalled_since_us; ///< When the first of the steps in a row that judge nothing was wanted.
     iw_time_us_t suspended_us;     ///< Told since the last step.
     iw_time_us_t promised_us;      ///< When the last step asked to be called again.
-    iw_time_us_t pose_us;          ///< IW_NEVER: none.
+    iw_time_us_t pose_us;          ///< Of the pose that the right wheel told; IW_NEVER: none.
     iw_time_us_t purged_us;        ///< When a purge was last tried in this silence; IW_NEVER: not yet.
     uint32_t purged_stop;          ///< Number of the stop in whose zeros a purge was tried.
-    iw_codec_pose_t pose;
     iw_bus_state_t bus;
     iw_bus_facts_t facts;
     bool backlog; ///< The last step left frames behind.
