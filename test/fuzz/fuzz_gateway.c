@@ -123,10 +123,10 @@ static void put_telemetry(world_t *world, int16_t rpm) {
 
 /// What the account waits for, or the same with a wrong byte.
 static void put_echo(world_t *world, iw_side_t side, uint8_t wrong) {
-    const int32_t value = world->gateway.sender.outbox.value[side][0];
+    const uint32_t value = world->gateway.sender.outbox.value[side][0];
     iw_can_frame_t frame = {.id = (side == IW_LEFT) ? 266U : 298U, .dlc = 5, .kind = IW_CAN_ECHO};
     for (unsigned i = 0; i < 4U; i++) {
-        frame.data[1U + i] = (uint8_t)((uint32_t)value >> (24U - 8U * i));
+        frame.data[1U + i] = (uint8_t)(value >> (24U - 8U * i));
     }
     frame.data[4] ^= wrong;
     put(world, &frame);
