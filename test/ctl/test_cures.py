@@ -328,7 +328,7 @@ class CarriedOut(unittest.TestCase):
         if match := re.match(r"correct (\w+)(?: or \w+)? under \[(\w+)\].*then: systemctl restart iwheel-gateway", cure):
             key, section = match.groups()
             right = {"setpoint_type": 2, "current_role": "setpoint", "force_unit": "dN" if section == "left" else "cN",
-                     "invert": "yes", "radius_mm": 181, "gear_ratio": "3/2"}[key]
+                     "invert": "yes", "radius_mm": 181, "track_mm": 600, "gear_ratio": "3/2"}[key]
             self.rig.settings.setdefault(section, {})[key] = right
             self.rig.write_config()
             self.rig.kill_gateway(signal.SIGTERM)
@@ -343,7 +343,7 @@ class CarriedOut(unittest.TestCase):
 
     def test_doctors_cure_of_each_contradiction_settles_it(self):
         wrong = {"setpoint_type": "2", "current_role": "setpoint", "mount_sign_left": "yes", "mount_sign_right": "yes",
-                 "wheel_radius": "181", "gear_ratio": "3/2", "feedback_sign_left": "no", "feedback_sign_right": "no",
+                 "wheel_radius": "181", "track": "600", "gear_ratio": "3/2", "feedback_sign_left": "no", "feedback_sign_right": "no",
                  "pose_byte_order": "no"}
         for item, value in wrong.items():
             with self.subTest(item):
