@@ -16,13 +16,13 @@
 #endif
 
 /// Bytes 0-3 of a frame's data, or 4-7 for `index` 1.
-IW_BE_INLINE uint32_t iw_be_word(const iw_can_frame_t *frame, uint32_t index) {
-    const uint8_t *const bytes = (const uint8_t *)IW_BE_ALIGNED(&frame->data[4U * index]);
+IW_BE_INLINE uint32_t iw_be_word(const iw_can_frame_t *frame, size_t index) {
+    const uint8_t *const bytes = (const uint8_t *)IW_BE_ALIGNED(&frame->data[(size_t)4 * index]);
     return ((uint32_t)bytes[0] << 24) | ((uint32_t)bytes[1] << 16) | ((uint32_t)bytes[2] << 8) | bytes[3];
 }
 
-IW_BE_INLINE void iw_be_put_word(iw_can_frame_t *frame, uint32_t index, uint32_t word) {
-    uint8_t *const bytes = (uint8_t *)IW_BE_ALIGNED(&frame->data[4U * index]);
+IW_BE_INLINE void iw_be_put_word(iw_can_frame_t *frame, size_t index, uint32_t word) {
+    uint8_t *const bytes = (uint8_t *)IW_BE_ALIGNED(&frame->data[(size_t)4 * index]);
     bytes[0] = (uint8_t)(word >> 24);
     bytes[1] = (uint8_t)((word >> 16) & 0xFFU);
     bytes[2] = (uint8_t)((word >> 8) & 0xFFU);

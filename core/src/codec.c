@@ -35,7 +35,7 @@ iw_side_t iw_codec_side(uint32_t id) {
 }
 
 const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind) {
-    return &iw_codec_rows[2U * (uint32_t)kind];
+    return &iw_codec_rows[(size_t)2 * (size_t)kind];
 }
 
 const iw_codec_row_t *iw_codec_find(uint32_t id) {
