@@ -311,7 +311,7 @@ static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us,
 }
 
 static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
-    const bool blocked = self->blocked != IW_CLIENT_NONE && self->blocked == client;
+    const bool blocked = self->blocked == client;
     switch (iw_permit_state(self)) {
     case IW_STATE_LATCHED:
         return refuse_latched(self, sent_us);

@@ -43,7 +43,9 @@ static void test_arm_with_any_other_assumption_contradicted_is_granted(void) {
         }
     }
     TEST_ASSERT_EQUAL_UINT(IW_LEDGER_ITEMS - 6U, others);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, iw_ledger_doubt(ledger()));
     gateway_rig_arm(&rig);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
 static void test_arm_of_a_latched_gateway_tells_the_latch_before_the_assumption(void) {
@@ -193,6 +195,28 @@ static void test_length_of_other_messages_as_in_the_table_confirms_nothing(void)
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, iw_ledger_entry(ledger(), IW_LEDGER_DLC)->state);
 }
 
+static void test_what_is_only_assumed_elsewhere_says_nothing(void) {
+    static const iw_ledger_entry_t assumed = {IW_LEDGER_ASSUMED, IW_EVIDENCE_OPERATOR, 0};
+    const uint32_t changes = ledger()->changes;
+    iw_gateway_know(&rig.gateway, IW_LEDGER_CURRENT_ROLE, &assumed);
+    TEST_ASSERT_EQUAL_UINT32(changes, ledger()->changes);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, iw_ledger_entry(ledger(), IW_LEDGER_CURRENT_ROLE)->state);
+}
+
+static void test_is_sending_from_arm_until_the_zeros_have_been_held(void) {
+    TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
+    TEST_ASSERT_TRUE(iw_gateway_is_sending(&rig.gateway));
+    gateway_rig_arm(&rig);
+    TEST_ASSERT_TRUE(iw_gateway_is_sending(&rig.gateway));
+    gateway_rig_stop(&rig);
+    TEST_ASSERT_TRUE(iw_gateway_is_sending(&rig.gateway));
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
+    iw_gateway_estop(&rig.gateway, rig.now_us, HOLDER);
+    TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused);
@@ -206,5 +230,7 @@ int main(void) {
     RUN_TEST(test_length_once_contradicted_is_told_once);
     RUN_TEST(test_length_of_frames_that_are_no_telemetry_says_nothing);
     RUN_TEST(test_length_of_other_messages_as_in_the_table_confirms_nothing);
+    RUN_TEST(test_what_is_only_assumed_elsewhere_says_nothing);
+    RUN_TEST(test_is_sending_from_arm_until_the_zeros_have_been_held);
     return UNITY_END();
 }

@@ -168,7 +168,9 @@ static void test_gateway_status_length_is_noted(void) {
 
 static void test_gateway_pose_is_kept_with_its_time(void) {
     const message_t message = {IW_CODEC_POSE, IW_RIGHT, {.pose = {-1, 2, -3, 31415}}};
+    gateway_rig_run(&rig, MS(100)); // Speeds and states are no poses.
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, rig.gateway.pose_us);
+    rig.now_us += 1; // When nothing else is heard.
     put(&message);
     gateway_rig_step(&rig);
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.pose_us);

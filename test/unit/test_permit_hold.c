@@ -245,6 +245,7 @@ static void test_permit_restarted_without_any_wheel_ends_as_well(void) {
     TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, iw_permit_demand(&rig.permit));
     TEST_ASSERT_TRUE(iw_permit_next_us(&rig.permit) == rig.now_us + MS(1500));
     assert_holding_until(MS(1500), IW_STATE_LISTENING);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.permit.still_moving); // Nobody knows whether they move.
 }
 
 static void hear_foreign(uint8_t sides) {

@@ -241,6 +241,13 @@ static void test_permit_disconnect_of_the_holder_ends_the_lease_at_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_CLIENT_NONE, rig.permit.holder);
 }
 
+static void test_permit_drive_after_another_stop_is_blocked_for_nobody(void) {
+    for (iw_client_t client = 1; client < 9U; client++) {
+        permit_rig_begin(&rig, PERMIT_STOPPING);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_NOT_ARMED, permit_rig_drive(&rig, client, true));
+    }
+}
+
 static void test_permit_disconnect_of_anybody_else_changes_nothing(void) {
     for (int situation = 0; situation < PERMIT_SITUATIONS; situation++) {
         permit_rig_begin(&rig, (permit_situation_t)situation);
@@ -334,6 +341,7 @@ int main(void) {
     RUN_TEST(test_permit_takeover_of_nothing_is_an_ordinary_arm);
     RUN_TEST(test_permit_takeover_after_the_end_of_the_lease_does_not_prolong_motion);
     RUN_TEST(test_permit_disconnect_of_the_holder_ends_the_lease_at_once);
+    RUN_TEST(test_permit_drive_after_another_stop_is_blocked_for_nobody);
     RUN_TEST(test_permit_disconnect_of_anybody_else_changes_nothing);
     RUN_TEST(test_permit_latch_outlives_whoever_caused_it_in_the_hold_and_after);
     RUN_TEST(test_permit_disconnect_of_the_former_holder_changes_nothing);
