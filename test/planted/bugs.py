@@ -65,7 +65,7 @@ BUGS = [
     Bug("burst-after-stall", "R7", "setpoint.c", "(elapsed_us < granted_us) ? elapsed_us : granted_us)", "elapsed_us)"),
     Bug("excused-again-and-again", "R7", "wheel.c", "if (self->heard_us >= self->excused_us) {", "if (self->heard_us != IW_NEVER) {"),
     Bug("drive-from-before-arm", "R7", "permit.c", "if (sent_us < self->armed_us) { return IW_REFUSE_STALE_COMMAND; }", ""),
-    Bug("late-frames-count", "R7", "cycle.c", "iw_wheel_hear(wheel, now_us, kind, told, !self->stalled);", "iw_wheel_hear(wheel, now_us, kind, told, true);"),
+    Bug("late-frames-count", "R7", "cycle.c", "iw_wheel_hear(wheel, now_us, kind, &self->told[side], !self->stalled);", "iw_wheel_hear(wheel, now_us, kind, &self->told[side], true);"),
     Bug("steep", "R12", "setpoint.c", "ramp_step(config->accel_mm_s2,", "ramp_step(3U * config->accel_mm_s2,"),
     Bug("sign-not-through-zero", "R8", "setpoint.c", "const bool through_zero = *value != 0 && (target > 0) != (*value > 0);", "const bool through_zero = false;"),
     Bug("speed-not-limited", "R8", "gateway.c", "applied.limited = scale_pair(drive.speed_mm_s, config->max_speed_mm_s);", "applied.limited = false;"),
