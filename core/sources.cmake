@@ -5,14 +5,14 @@ set(IWHEEL_CORE_SOURCES
     src/cause.c
     src/codec.c
     src/config.c
-    src/cycle.c
+    src/confirmation.c
+    src/envelope.c
     src/follow.c
-    src/force.c
-    src/gate.c
+    src/force_offset.c
     src/gateway.c
     src/ledger.c
-    src/outbox.c
     src/permit.c
     src/sender.c
     src/setpoint.c
+    src/step.c
     src/wheel.c)

@@ -133,7 +133,7 @@ def update(text, tests, bugs):
 def self_test(text, tests, bugs, rules):
     """Planted in the page: each must be found."""
     faults = [
-        text.replace("`cycle.c: watch_loop`", "`cycle.c: watch_nothing`"),
+        text.replace("`step.c: watch_loop`", "`step.c: watch_nothing`"),
         text.replace("`row01_client_killed`", "`row01_client_kissed`"),
         text.replace("- oracle: 101, ", "- oracle: "),
         text.replace("- oracle: 101, ", "- oracle: 101, 999, "),

@@ -21,7 +21,7 @@ TEXT_GOAL = 6 * 1024  # What the design asks for, and what the core does not rea
 # No step back from where it is. From 12 800 B: what is left in a controller is taken back when zeros end, arming and force are judged by the
 # ledger here and not in the daemon, and what a cause does is a table.
 TEXT_LIMIT = 26 * 512 + 128
-TYPES = ("iw_gateway_t", "iw_config_t", "iw_wheel_t", "iw_force_t", "iw_permit_t", "iw_setpoint_t", "iw_outbox_t", "iw_gate_t")
+TYPES = ("iw_gateway_t", "iw_config_t", "iw_wheel_t", "iw_force_t", "iw_permit_t", "iw_setpoint_t", "iw_confirmation_t", "iw_envelope_t")
 ROW = re.compile(r"^\| `?([^|`]+?)`? +\|(.*)\|$", re.MULTILINE)
 
 

@@ -9,6 +9,7 @@
 #define BLACKBOX_ENTRY_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 typedef enum {
     BLACKBOX_FRAME = 0, ///< number: id with flags; a: dlc; b: iw_can_kind_t; as.data.

@@ -12,6 +12,7 @@
 #define CANDUMP_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 #define CANDUMP_DATA_MAX 64U
 /// With its terminator; a longer name is refused.

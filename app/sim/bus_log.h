@@ -8,6 +8,7 @@
 #define SIM_BUS_LOG_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 /// Nothing waits longer than this to be written.
 #define SIM_LOG_HOLD_US 20000U

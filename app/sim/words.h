@@ -6,6 +6,7 @@
 #define SIM_WORDS_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 #define SIM_WORDS_MAX  64U
 #define SIM_LINE_BYTES 256U

@@ -4,6 +4,7 @@
 #define IW_BE_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 /// A call would cost more than the load and swap that the shifts become; compilers that count before that do not see
 /// it, nor that the data of a frame lie at a multiple of four.

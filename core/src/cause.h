@@ -3,7 +3,7 @@
 #ifndef IW_CAUSE_H
 #define IW_CAUSE_H
 
-#include "iwheel/permit.h"
+#include "iwheel/private/permit.h"
 
 typedef enum {
     IW_STOPS = 0,      ///< Stops what is ARMED.

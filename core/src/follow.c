@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/follow.h"
+#include "iwheel/private/follow.h"
 
 #include "magnitude.h"
 

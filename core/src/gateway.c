@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gateway.h"
 
-#include "cycle.h"
 #include "magnitude.h"
+#include "step.h"
 
 #include <string.h>
 
@@ -50,12 +50,12 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
 }
 
 iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
-    iw_cycle_begin(self, now_us);
-    iw_cycle_receive(self, now_us);
-    iw_cycle_judge(self, now_us);
-    iw_cycle_send(self, now_us);
-    iw_cycle_keep_silent(self, now_us);
-    self->promised_us = iw_cycle_next_us(self, now_us);
+    iw_step_begin(self, now_us);
+    iw_step_receive(self, now_us);
+    iw_step_judge(self, now_us);
+    iw_step_send(self, now_us);
+    iw_step_keep_silent(self, now_us);
+    self->promised_us = iw_step_next_us(self, now_us);
     return self->promised_us;
 }
 

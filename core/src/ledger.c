@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/ledger.h"
+#include "iwheel/private/ledger.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/permit.h"
+#include "iwheel/private/permit.h"
 
 #include "cause.h"
 
@@ -24,7 +24,7 @@ static const phase_row_t phases[IW_PHASES] = {
     [IW_PHASE_LATCHED] = {IW_STATE_LATCHED, IW_DEMAND_SILENCE, IW_DEMAND_SILENCE},
 };
 
-/// So many setpoints can be un-echoed when a process dies: two of each wheel (see outbox.h).
+/// So many setpoints can be un-echoed when a process dies: two of each wheel (see transmit.h).
 #define LEFT_BEHIND_MAX 4U
 
 /// True if the configuration allows sending at all.

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/sender.h"
+#include "iwheel/private/transmit.h"
+
+#include "iwheel/codec.h"
 
 #include <string.h>
 
@@ -8,17 +10,17 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
     self->config = config;
     self->hal = hal;
     self->pair_us = IW_NEVER;
-    iw_outbox_init(&self->outbox);
-    iw_gate_init(&self->gate, config);
+    iw_confirmation_init(&self->confirmation);
+    iw_envelope_init(&self->envelope, config);
 }
 
 bool iw_sender_ready(const iw_sender_t *self, bool zero) {
-    const bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
-    const bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
+    const bool left = iw_confirmation_may_send(&self->confirmation, IW_LEFT, zero);
+    const bool right = iw_confirmation_may_send(&self->confirmation, IW_RIGHT, zero);
     return zero ? left || right : left && right;
 }
 
-/// The frame for one wheel, in its own frame of reference. False, with the reason in `verdict`, if the gate stops it.
+/// The frame for one wheel, in its own frame of reference. False, with the reason in `verdict`, if the envelope stops it.
 static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_command_t *command) {
     iw_can_frame_t *const frame = &self->frame[side];
     const iw_config_t *const config = self->config;
@@ -31,16 +33,16 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
         setpoint.current_mA = (int16_t)-setpoint.current_mA;
     }
     self->clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, frame) ? 1U : 0U;
-    const iw_gate_verdict_t verdict = iw_gate_check(&self->gate, now_us, frame);
-    self->verdict = (verdict == IW_GATE_PASS) ? self->verdict : verdict;
-    return verdict == IW_GATE_PASS;
+    const iw_envelope_verdict_t verdict = iw_envelope_check(&self->envelope, now_us, frame);
+    self->verdict = (verdict == IW_ENVELOPE_PASS) ? self->verdict : verdict;
+    return verdict == IW_ENVELOPE_PASS;
 }
 
 static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side) {
     const iw_can_frame_t *const frame = &self->frame[side];
     const bool accepted = self->hal->send(self->hal->context, frame) > 0;
     self->later += accepted ? 0U : 1U;
-    iw_outbox_sent(&self->outbox, side, now_us, frame, accepted);
+    iw_confirmation_sent(&self->confirmation, side, now_us, frame, accepted);
     return accepted;
 }
 
@@ -54,8 +56,8 @@ static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
 
 /// Left, then right. What the port refuses on the left does not leave on the right either, unless it is a zero.
 static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
-    const bool left = iw_outbox_may_send(&self->outbox, IW_LEFT, zero);
-    const bool right = iw_outbox_may_send(&self->outbox, IW_RIGHT, zero);
+    const bool left = iw_confirmation_may_send(&self->confirmation, IW_LEFT, zero);
+    const bool right = iw_confirmation_may_send(&self->confirmation, IW_RIGHT, zero);
     bool taken = true;
     if (left) {
         taken = hand_over(self, now_us, IW_LEFT);
@@ -80,13 +82,13 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw
 
 void iw_sender_rest(iw_sender_t *self) {
     self->pair_us = IW_NEVER;
-    iw_outbox_rest(&self->outbox);
+    iw_confirmation_rest(&self->confirmation);
 }
 
 int iw_sender_purge(iw_sender_t *self) {
     const int answer = self->hal->purge(self->hal->context);
     if (answer > 0) {
-        iw_outbox_clear(&self->outbox);
+        iw_confirmation_clear(&self->confirmation);
     }
     return answer;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/setpoint.h"
+#include "iwheel/private/setpoint.h"
 
 #include "iwheel/codec.h"
 #include "magnitude.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/wheel.h"
+#include "iwheel/private/wheel.h"
 
 #include <string.h>
 

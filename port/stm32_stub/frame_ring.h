@@ -7,6 +7,7 @@
 #define IW_STM32_FRAME_RING_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 #include <stdatomic.h>
 

@@ -34,6 +34,6 @@ void iw_marker_step(const iw_gateway_t *gateway, iw_time_us_t now_us) {
     } else if (zeros_us == 0U) {
         zeros_us = now_us;
     } else {
-        zeros_proven = zeros_proven || iw_outbox_proven_since(&gateway->sender.outbox, zeros_us);
+        zeros_proven = zeros_proven || iw_confirmation_proven_since(&gateway->sender.confirmation, zeros_us);
     }
 }

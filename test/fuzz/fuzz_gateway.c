@@ -123,7 +123,7 @@ static void put_telemetry(world_t *world, int16_t rpm) {
 
 /// What the account waits for, or the same with a wrong byte.
 static void put_echo(world_t *world, iw_side_t side, uint8_t wrong) {
-    const uint32_t value = world->gateway.sender.outbox.value[side][0];
+    const uint32_t value = world->gateway.sender.confirmation.value[side][0];
     iw_can_frame_t frame = {.id = (side == IW_LEFT) ? 266U : 298U, .dlc = 5, .kind = IW_CAN_ECHO};
     for (unsigned i = 0; i < 4U; i++) {
         frame.data[1U + i] = (uint8_t)(value >> (24U - 8U * i));
@@ -195,7 +195,7 @@ static void step(world_t *world, uint32_t after_us) {
     world->now_us += after_us;
     const iw_time_us_t next_us = iw_gateway_step(&world->gateway, world->now_us);
     fuzz_require(next_us >= world->now_us && next_us <= world->now_us + 60000U, "it wants to be called in time");
-    fuzz_require(world->gateway.sender.gate.stopped == 0U && world->gateway.sender.clamped == 0U,
+    fuzz_require(world->gateway.sender.envelope.stopped == 0U && world->gateway.sender.clamped == 0U,
                  "the gate has nothing to stop");
 }
 
@@ -204,7 +204,7 @@ static void calm(world_t *world, uint8_t steps) {
     for (unsigned i = 0; i < steps % 64U; i++) {
         put_telemetry(world, 0);
         for (int side = 0; side < IW_SIDES; side++) {
-            for (uint8_t pending = world->gateway.sender.outbox.pending[side]; pending > 0U; pending--) {
+            for (uint8_t pending = world->gateway.sender.confirmation.pending[side]; pending > 0U; pending--) {
                 put_echo(world, (iw_side_t)side, 0);
             }
         }

@@ -4,7 +4,7 @@
 #define TEST_FORCE_RIG_H
 
 #include "fixture.h"
-#include "iwheel/force.h"
+#include "iwheel/force_offset.h"
 
 typedef struct {
     iw_config_t config;

@@ -4,7 +4,7 @@
 #define TEST_PERMIT_RIG_H
 
 #include "fixture.h"
-#include "iwheel/permit.h"
+#include "iwheel/private/permit.h"
 
 /// The client that holds the lease in every prepared situation, and another one.
 #define HOLDER ((iw_client_t)7)

@@ -4,7 +4,7 @@
 #define TEST_SETPOINT_RIG_H
 
 #include "fixture.h"
-#include "iwheel/setpoint.h"
+#include "iwheel/private/setpoint.h"
 
 typedef struct {
     iw_config_t config;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Does a wheel do what it is told? Each verdict with its threshold, its time and what starts the time anew.
 #include "fixture.h"
-#include "iwheel/follow.h"
+#include "iwheel/private/follow.h"
 #include "unity.h"
 #include <string.h>
 

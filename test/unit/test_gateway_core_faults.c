@@ -342,8 +342,8 @@ static void test_gateway_what_the_gate_stops_is_an_internal_fault(void) {
     gateway_rig_run(&rig, MS(20));
     assert_latched(IW_CAUSE_INTERNAL);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_NONE, stop()->sides);
-    TEST_ASSERT_EQUAL_UINT32(IW_GATE_SPEED, stop()->detail);
-    TEST_ASSERT_TRUE(rig.gateway.sender.gate.stopped > 0);
+    TEST_ASSERT_EQUAL_UINT32(IW_ENVELOPE_SPEED, stop()->detail);
+    TEST_ASSERT_TRUE(rig.gateway.sender.envelope.stopped > 0);
 }
 
 int main(void) {

@@ -45,10 +45,10 @@ static void test_gateway_late_step_leaves_a_wheel_that_is_there_alone(void) {
 }
 
 static void run_until_a_pair_is_on_its_way(void) {
-    for (unsigned i = 0; i < 300U && rig.gateway.sender.outbox.pending[IW_LEFT] == 0U; i++) {
+    for (unsigned i = 0; i < 300U && rig.gateway.sender.confirmation.pending[IW_LEFT] == 0U; i++) {
         gateway_rig_run(&rig, MS(1) / 10U);
     }
-    TEST_ASSERT_TRUE(rig.gateway.sender.outbox.pending[IW_LEFT] > 0U);
+    TEST_ASSERT_TRUE(rig.gateway.sender.confirmation.pending[IW_LEFT] > 0U);
 }
 
 static void test_gateway_arm_behind_a_zero_on_its_way_is_not_refused(void) {

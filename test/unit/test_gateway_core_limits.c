@@ -45,7 +45,7 @@ static void test_gateway_counts_what_it_sent_and_what_it_could_not(void) {
     TEST_ASSERT_EQUAL_UINT32(rig.bus.sent, 2U * sender->pairs);
     TEST_ASSERT_EQUAL_UINT32(0, sender->later);
     TEST_ASSERT_EQUAL_UINT32(0, sender->clamped);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, sender->verdict);
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, sender->verdict);
     const uint32_t pairs = sender->pairs;
     rig.bus.send_result[IW_RIGHT] = 0;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(30));

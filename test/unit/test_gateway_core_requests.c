@@ -245,7 +245,7 @@ static void test_gateway_echo_that_nobody_waits_for_proves_nothing(void) {
     echo.id = IW_ID_RIGHT_SETPOINT;
     fake_bus_put(&rig.bus, &echo);
     gateway_rig_step(&rig);
-    TEST_ASSERT_EQUAL_UINT32(2, rig.gateway.sender.outbox.stray);
+    TEST_ASSERT_EQUAL_UINT32(2, rig.gateway.sender.confirmation.stray);
     TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.counters.foreign);
     (void)gateway_rig_request_arm(&rig, HOLDER, false);
     gateway_rig_run(&rig, MS(60));

@@ -67,7 +67,7 @@ static void test_gateway_pair_waits_for_the_echoes_of_both_wheels(void) {
     TEST_ASSERT_EQUAL_UINT64(rig.now_us, sent_us);
     (void)gateway_rig_drive(&rig, HOLDER, 300, 300);
     gateway_rig_run(&rig, MS(8));
-    TEST_ASSERT_EQUAL_UINT8(0, rig.gateway.sender.outbox.pending[IW_LEFT]);
+    TEST_ASSERT_EQUAL_UINT8(0, rig.gateway.sender.confirmation.pending[IW_LEFT]);
     TEST_ASSERT_EQUAL_UINT64(sent_us, rig.bus.last_us[IW_LEFT]);
     gateway_rig_run(&rig, FAKE_BUS_FRAME_US);
     TEST_ASSERT_EQUAL_UINT64(sent_us + MS(8) + FAKE_BUS_FRAME_US, rig.bus.last_us[IW_LEFT]);
@@ -182,7 +182,7 @@ static void test_gateway_late_echo_within_the_limit_holds_back_but_does_not_stop
     (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     TEST_ASSERT_EQUAL_INT(400, rig.bus.told_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.gate.stopped);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.envelope.stopped);
 }
 
 static void test_gateway_bus_down_or_off_in_motion_latches_and_sends_zero_first(void) {

@@ -170,7 +170,7 @@ static void walk(uint32_t seed, uint32_t steps) {
     TEST_ASSERT_TRUE_MESSAGE(tally.stops > steps / 10000U, "hardly ever stopped");
     TEST_ASSERT_TRUE_MESSAGE(tally.resets > steps / 5000U, "hardly ever reset");
     TEST_ASSERT_TRUE_MESSAGE(rig.judge.moving_frames > steps / 50U, "hardly ever moving");
-    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, rig.gateway.sender.gate.stopped, "the gate had to stop a frame");
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, rig.gateway.sender.envelope.stopped, "the gate had to stop a frame");
 }
 
 static void test_gateway_walk_with_current_limit_keeps_the_invariants(void) {

@@ -2,7 +2,7 @@
 // The assumption ledger: its diagram, walked through exhaustively, beside a model that keeps to the diagram.
 #include <string.h>
 
-#include "iwheel/ledger.h"
+#include "iwheel/private/ledger.h"
 #include "unity.h"
 
 #define POISON 0xA5

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The sender alone: whole pairs, both or none, what it counts and how it begins.
 #include "fake_bus.h"
-#include "iwheel/sender.h"
+#include "iwheel/private/transmit.h"
 #include "unity.h"
 #include <string.h>
 
@@ -32,7 +32,7 @@ static iw_send_result_t send(int16_t left_mm_s, int16_t right_mm_s) {
 }
 
 static void echo(iw_side_t side) {
-    iw_outbox_echo(&sender.outbox, side, &bus.last[side]);
+    iw_confirmation_echo(&sender.confirmation, side, &bus.last[side]);
 }
 
 /// A whole pair of zeros, echoed.
@@ -45,15 +45,15 @@ static void send_whole(iw_time_us_t after_us) {
 
 static void test_sender_begins_with_nothing_sent_and_nothing_under_way(void) {
     TEST_ASSERT_TRUE(iw_sender_ready(&sender, false));
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&sender.outbox) == IW_NEVER);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.outbox.stray);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.gate.stopped);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&sender.confirmation) == IW_NEVER);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.confirmation.stray);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.envelope.stopped);
     TEST_ASSERT_EQUAL_UINT32(0, sender.gap_us);
     TEST_ASSERT_EQUAL_UINT32(0, sender.gap_max_us);
     TEST_ASSERT_EQUAL_UINT32(0, sender.pairs);
     TEST_ASSERT_EQUAL_UINT32(0, sender.later);
     TEST_ASSERT_EQUAL_UINT32(0, sender.clamped);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, sender.verdict);
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, sender.verdict);
 }
 
 static void test_sender_first_pair_ends_no_gap(void) {
@@ -110,9 +110,9 @@ static void test_sender_remembers_why_the_gate_stopped_a_pair(void) {
     TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, (int16_t)(config.max_speed_mm_s + 1)));
     TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
     send_whole(0);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SPEED, sender.verdict);
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SPEED, sender.verdict);
     TEST_ASSERT_EQUAL_INT(IW_SEND_STOPPED, send(0, 100));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, sender.verdict);
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, sender.verdict);
 }
 
 static void test_sender_purge_clears_the_account_only_if_the_port_surely_did(void) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // When do setpoint pairs leave? Grid, spacing, silence, lateness.
 #include "fixture.h"
-#include "iwheel/setpoint.h"
+#include "iwheel/private/setpoint.h"
 #include "unity.h"
 #include <string.h>
 

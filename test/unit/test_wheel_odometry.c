@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // How far and how fast? Unwrapping, jumps, geometry, mirrored wheels.
 #include "fixture.h"
-#include "iwheel/wheel.h"
+#include "iwheel/private/wheel.h"
 #include "message.h"
 #include "unity.h"
 #include <string.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Is a wheel there, at rest, or back from a reboot?
 #include "fixture.h"
-#include "iwheel/wheel.h"
+#include "iwheel/private/wheel.h"
 #include "message.h"
 #include "unity.h"
 #include <string.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
 
-#include "iwheel/wheel.h"
+#include "iwheel/private/wheel.h"
 
 #include <inttypes.h>
 #include <stdlib.h>

@@ -102,7 +102,7 @@ static void say_not_at_rest(const wording_t *self) {
 static void say_stalled(const wording_t *self) {
     static const char cure[] = "check that the wheels have power and the bus is terminated";
     const gw_daemon_t *daemon = self->daemon;
-    const iw_time_us_t waiting_us = iw_outbox_waiting_us(&daemon->gateway.sender.outbox);
+    const iw_time_us_t waiting_us = iw_confirmation_waiting_us(&daemon->gateway.sender.confirmation);
     const char *bus = daemon->config.bus.interface;
     if (waiting_us == IW_NEVER) {
         SAY(self, "the zero setpoints were not acknowledged on the bus within %u ms; %s",

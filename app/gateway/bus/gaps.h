@@ -6,7 +6,7 @@
 #ifndef GATEWAY_GAPS_H
 #define GATEWAY_GAPS_H
 
-#include "iwheel/sender.h"
+#include "iwheel/private/transmit.h"
 #include "json/json_out.h"
 
 #define GW_GAP_BUCKETS 10U

@@ -11,7 +11,7 @@
 
 #include "request.h"
 
-#include "iwheel/permit.h"
+#include "iwheel/private/permit.h"
 
 /// The longest reply or event with its newline.
 #define GW_REPLY_MAX 65537U

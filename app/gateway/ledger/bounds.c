@@ -4,7 +4,7 @@
 #include "evidence.h"
 
 #include "iwheel/codec.h"
-#include "iwheel/follow.h"
+#include "iwheel/private/follow.h"
 
 #include <stdlib.h>
 #include <string.h>

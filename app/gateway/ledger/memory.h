@@ -10,7 +10,7 @@
 
 #include "assumption.h"
 
-#include "iwheel/force.h"
+#include "iwheel/force_offset.h"
 
 /// The longest text that is written.
 #define GW_MEMORY_SIZE 12288U

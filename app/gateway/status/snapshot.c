@@ -178,8 +178,8 @@ static void write_counters(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_int(json, "pairs", sender->pairs);
     json_out_int(json, "send_later", sender->later);
     json_out_int(json, "clamped", sender->clamped);
-    json_out_int(json, "gate_stopped", sender->gate.stopped);
-    json_out_int(json, "stray_echoes", sender->outbox.stray);
+    json_out_int(json, "gate_stopped", sender->envelope.stopped);
+    json_out_int(json, "stray_echoes", sender->confirmation.stray);
     json_out_int(json, "gap_max_us", sender->gap_max_us);
     json_out_int(json, "still_moving", daemon->gateway.permit.still_moving);
     json_out_close(json, '}');

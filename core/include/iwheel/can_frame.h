@@ -6,7 +6,7 @@
 #ifndef IW_CAN_FRAME_H
 #define IW_CAN_FRAME_H
 
-#include "iwheel/types.h"
+#include <stdint.h>
 
 #define IW_CAN_EXTENDED 0x80000000U ///< 29-bit id.
 #define IW_CAN_REMOTE   0x40000000U ///< Remote transmission request: carries no data.

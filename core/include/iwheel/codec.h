@@ -25,6 +25,7 @@
 #define IW_CODEC_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 #define IW_ID_LEFT_SETPOINT  266U ///< 0x10A
 #define IW_ID_RIGHT_SETPOINT 298U ///< 0x12A

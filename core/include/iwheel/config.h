@@ -8,17 +8,6 @@
 
 #include "iwheel/types.h"
 
-/// What the current beside the speed means to the wheel. The document does not say, so there is no default and the
-/// wheels do not move until it is set.
-typedef enum {
-    IW_ROLE_UNSET = 0,
-    IW_ROLE_LIMIT,    ///< Zero is speed 0 with the configured maximum current; its sign is never inverted.
-    IW_ROLE_SETPOINT, ///< Zero is 0/0; current ramps with the speed; `invert` negates it too.
-} iw_current_role_t;
-
-/// Unit of a wheel's raw normal force. The document says cN for the left and dN for the right wheel.
-typedef enum { IW_FORCE_CN = 0, IW_FORCE_DN = 1 } iw_force_unit_t;
-
 /// Ranges are inclusive.
 typedef struct {
     uint16_t period_ms;       ///< Spacing of setpoint pairs, 5..50.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// A pair of wheels: everything of the core wired together.
 ///
-///     bus -> receive -> decode -> wheel state -> permission -> scheduler -> encode -> gate -> send -> bus
+///     bus -> receive -> decode -> wheel state -> permission -> scheduler -> encode -> envelope -> send -> bus
 ///
 /// The owner calls `iw_gateway_step` when a frame, an e-stop edge or the time it returned is there, and as often as
 /// it likes. Requests may come between steps, from the same thread of execution; a step right after one sends what
@@ -14,14 +14,14 @@
 
 #include "iwheel/codec.h"
 #include "iwheel/config.h"
-#include "iwheel/follow.h"
-#include "iwheel/force.h"
+#include "iwheel/force_offset.h"
 #include "iwheel/hal.h"
-#include "iwheel/ledger.h"
-#include "iwheel/permit.h"
-#include "iwheel/sender.h"
-#include "iwheel/setpoint.h"
-#include "iwheel/wheel.h"
+#include "iwheel/private/follow.h"
+#include "iwheel/private/ledger.h"
+#include "iwheel/private/permit.h"
+#include "iwheel/private/setpoint.h"
+#include "iwheel/private/transmit.h"
+#include "iwheel/private/wheel.h"
 
 /// A step later than this cannot tell when its frames came: they neither refresh nor fail a wheel's liveness.
 #define IW_GATEWAY_LATE_US 20000U
@@ -40,7 +40,7 @@ typedef struct {
     bool echo_proven;         ///< An echo proves that the frame was on the bus (IFF_ECHO; bxCAN).
 } iw_bus_facts_t;
 
-/// Beside these: `iw_sender_t` counts what was sent, `iw_gate_t::stopped`, `iw_outbox_t::stray`, `iw_wheel_t::reboots`.
+/// Beside these: `iw_sender_t` counts what was sent, `iw_envelope_t::stopped`, `iw_confirmation_t::stray`, `iw_wheel_t::reboots`.
 typedef struct {
     uint32_t received;     ///< Frames of the nine telemetry ids that were read.
     uint32_t echoes;       ///< Echoes of our setpoints.
@@ -66,7 +66,7 @@ typedef struct {
     bool limited;   ///< It differs from the request: both wheels scaled by one factor.
 } iw_applied_t;
 
-typedef struct {
+typedef struct iw_gateway {
     iw_config_t config;
     iw_hal_t hal;
     iw_codec_wheel_t told[IW_SIDES]; ///< What each wheel last told, message by message.

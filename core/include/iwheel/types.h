@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Words that every module shares: time, sides, status codes, a command for a pair of wheels.
+/// Words that every module shares: time, sides, status codes, a command for a pair of wheels; states, causes of a stop,
+/// refusals; what is assumed of the wheels.
 ///
 /// Units stand at the end of a name: `_mm_s _mm_s2 _mA _mN _rpm _dV _degC _ms _us _permille`. Everything is an
 /// integer. Programmer errors (a null pointer, an enumerator that does not exist) are not reported: they are the
@@ -43,5 +44,136 @@ typedef struct {
 typedef struct {
     iw_command_t wheel[IW_SIDES];
 } iw_pair_t;
+
+/// What the current beside the speed means to the wheel. The document does not say, so there is no default and the
+/// wheels do not move until it is set.
+typedef enum {
+    IW_ROLE_UNSET = 0,
+    IW_ROLE_LIMIT,    ///< Zero is speed 0 with the configured maximum current; its sign is never inverted.
+    IW_ROLE_SETPOINT, ///< Zero is 0/0; current ramps with the speed; `invert` negates it too.
+} iw_current_role_t;
+
+/// Unit of a wheel's raw normal force. The document says cN for the left and dN for the right wheel.
+typedef enum { IW_FORCE_CN = 0, IW_FORCE_DN = 1 } iw_force_unit_t;
+
+/// Who asks: chosen by the owner, never reused for another connection. 0 is nobody.
+typedef uint32_t iw_client_t;
+#define IW_CLIENT_NONE 0U
+
+/// What a client is told.
+typedef enum { IW_STATE_LISTENING = 0, IW_STATE_ARMED, IW_STATE_STOPPING, IW_STATE_LATCHED } iw_state_t;
+
+/// What the scheduler aims at.
+typedef enum {
+    IW_DEMAND_SILENCE = 0, ///< Send nothing.
+    IW_DEMAND_ZERO,        ///< Zero without ramp.
+    IW_DEMAND_BRAKE,       ///< Ramp to zero, then zero.
+    IW_DEMAND_FOLLOW,      ///< Ramp to the client's command.
+} iw_demand_t;
+
+/// Why the wheels were stopped. `iw_stop_t::detail` is given with each.
+typedef enum {
+    IW_CAUSE_NONE = 0,
+    IW_CAUSE_ESTOP_LINE,     ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
+    IW_CAUSE_ESTOP_SOFTWARE, ///< A client said estop. Detail: which iw_client_t.
+    IW_CAUSE_BUS_DOWN,       ///< Down, gone or bus-off. Detail: an iw_bus_state_t.
+    IW_CAUSE_SECOND_MASTER,  ///< Somebody else sends setpoints. Detail: their id.
+    IW_CAUSE_SEND_STALLED,   ///< A setpoint was not echoed. Detail: ms waited.
+    IW_CAUSE_WHEEL_REBOOTED, ///< Detail: an iw_reboot_t.
+    IW_CAUSE_WHEEL_LOST,     ///< Not heard. Detail: ms since it was; UINT32_MAX: never.
+    IW_CAUSE_FEEDBACK_SIGN,  ///< Turns against its command. Detail: |measured| mm/s.
+    IW_CAUSE_OVERSPEED,      ///< Faster than applied. Detail: |measured| mm/s.
+    IW_CAUSE_LOOP_HUNG,      ///< Our own loop was late by more than 500 ms. Detail: ms.
+    IW_CAUSE_INTERNAL,       ///< An internal check failed. Detail: an iw_envelope_verdict_t.
+    IW_CAUSE_LOOP_LATE,      ///< Late by 100 to 500 ms: zero without ramp. Detail: ms.
+    IW_CAUSE_WHEEL_BLOCKED,  ///< Below 20 % of its command. Detail: |measured| mm/s.
+    IW_CAUSE_LEASE_LOST,     ///< The holder sent no drive command in time. Detail: ms since its last one, or since arm.
+    IW_CAUSE_CLIENT_GONE,    ///< The holder disconnected. Detail: 0.
+    IW_CAUSE_CLIENT_STOP,    ///< A client said stop or disarm. Detail: 0.
+    IW_CAUSE_SHUTDOWN,       ///< The gateway is ending. Detail: 0.
+    IW_CAUSE_RESTART,        ///< The gateway began anew after a crash while armed. Detail: 0.
+    IW_CAUSES,
+} iw_cause_t;
+
+/// Bits for `sides`: which wheel a cause speaks of.
+#define IW_SIDES_NONE  0U
+#define IW_SIDES_LEFT  1U
+#define IW_SIDES_RIGHT 2U
+#define IW_SIDES_BOTH  3U
+
+/// Why a request was refused. Each has one name in the northbound protocol.
+typedef enum {
+    IW_REFUSE_NONE = 0, ///< Not refused.
+    IW_REFUSE_OUT_OF_RANGE,
+    IW_REFUSE_MISSING_FIELD, ///< Currents omitted although the current is a setpoint.
+    IW_REFUSE_NOT_HOLDER,    ///< Somebody else holds the lease.
+    IW_REFUSE_BUSY,          ///< Somebody else holds the lease, and no takeover was asked for.
+    IW_REFUSE_NOT_ARMED,
+    IW_REFUSE_LATCHED,
+    IW_REFUSE_ESTOP_PRESSED,
+    IW_REFUSE_BUS_DOWN,
+    IW_REFUSE_TIMING_MISMATCH,
+    IW_REFUSE_WHEEL_LOST,
+    IW_REFUSE_WHEEL_BLOCKED,
+    IW_REFUSE_NOT_AT_REST,
+    IW_REFUSE_SEND_STALLED,
+    IW_REFUSE_SECOND_MASTER,
+    IW_REFUSE_CAUSE_PRESENT, ///< `iw_permit_present` tells which.
+    IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
+    IW_REFUSE_STALE_COMMAND, ///< `iw_permit_t::stale_client` sent a nonzero drive too recently.
+    IW_REFUSE_LISTEN_ONLY,
+    IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_ledger_doubt` tells which.
+    IW_REFUSALS,
+} iw_refusal_t;
+
+/// The last stop, for `why`.
+typedef struct {
+    iw_time_us_t at_us;
+    uint32_t number;    ///< Counts stops; 0: there was none.
+    uint32_t detail;    ///< See iw_cause_t.
+    iw_client_t client; ///< Who held the lease, or asked for the stop.
+    iw_pair_t applied;  ///< What the wheels were told right before it, in the machine's frame.
+    iw_cause_t cause;
+    iw_state_t from;
+    uint8_t sides;
+    bool latched;
+} iw_stop_t;
+
+/// What the document leaves open, and is therefore assumed until it is found out.
+typedef enum {
+    IW_LEDGER_SETPOINT_TYPE,      ///< Byte 0 of a setpoint.
+    IW_LEDGER_CURRENT_ROLE,       ///< Limit or setpoint.
+    IW_LEDGER_FORCE_UNIT_LEFT,    ///< cN, as documented.
+    IW_LEDGER_FORCE_UNIT_RIGHT,   ///< dN, as documented.
+    IW_LEDGER_OFFSET_INCLUDED,    ///< The raw force still contains the offset, as documented.
+    IW_LEDGER_FEEDBACK_SIGN_LEFT, ///< A positive command is measured as a positive speed.
+    IW_LEDGER_FEEDBACK_SIGN_RIGHT,
+    IW_LEDGER_MOUNT_SIGN_LEFT, ///< A positive command moves the machine forward. Only the operator can know.
+    IW_LEDGER_MOUNT_SIGN_RIGHT,
+    IW_LEDGER_WHEEL_RADIUS, ///< "Approximately 192 mm".
+    IW_LEDGER_TRACK,      ///< Distance between the wheels. The core needs none: whoever turns twists into speeds does.
+    IW_LEDGER_GEAR_RATIO, ///< Rotor turns per wheel turn, and which of them the rpm count.
+    IW_LEDGER_POSE_BYTE_ORDER, ///< Most significant byte first: the table does not say it for the pose.
+    IW_LEDGER_DLC,             ///< Frames are as long as the table: the document does not state it.
+    IW_LEDGER_ITEMS,
+} iw_ledger_item_t;
+
+typedef enum { IW_LEDGER_ASSUMED = 0, IW_LEDGER_CONFIRMED, IW_LEDGER_CONTRADICTED } iw_ledger_state_t;
+
+typedef enum {
+    IW_EVIDENCE_NONE = 0,      ///< Nothing: not configured and not documented.
+    IW_EVIDENCE_DOCUMENT,      ///< The document says so.
+    IW_EVIDENCE_CONFIGURATION, ///< The operator configured it, nothing confirmed it.
+    IW_EVIDENCE_BUS,           ///< Measured; `figure` tells what.
+    IW_EVIDENCE_OPERATOR,      ///< The operator looked at the machine.
+} iw_evidence_t;
+
+/// What is known of an assumption.
+typedef struct {
+    iw_ledger_state_t state;
+    iw_evidence_t evidence;
+    int32_t figure; ///< Of IW_EVIDENCE_BUS: force unit and offset: 1000 x raw / offset in dN; sign: measured mm/s at a
+                    ///< positive command; DLC: the length received.
+} iw_ledger_entry_t;
 
 #endif

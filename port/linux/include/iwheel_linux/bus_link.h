@@ -6,6 +6,7 @@
 #define IWHEEL_LINUX_BUS_LINK_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 typedef enum {
     IW_LINK_LOCAL = 0, ///< Not an interface of the kernel: the rest of what is told here is void but `echo_proven`.

@@ -15,6 +15,7 @@
 #define IWHEEL_SIM_BUS_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 #define SIM_BUS_PORTS 24U
 /// The longest queue of a port.

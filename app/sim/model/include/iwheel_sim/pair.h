@@ -20,6 +20,7 @@
 #define IWHEEL_SIM_PAIR_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 #include "iwheel_sim/wheel.h"
 
 typedef struct {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "cycle.h"
+#include "step.h"
+
+#include "iwheel/gateway.h"
 
 #include "magnitude.h"
 
@@ -53,7 +55,7 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
     }
 }
 
-void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us) {
+void iw_step_begin(iw_gateway_t *self, iw_time_us_t now_us) {
     const int pressed = self->hal.estop_pressed(self->hal.context);
     if (pressed != 0) {
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE,
@@ -62,7 +64,7 @@ void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us) {
     watch_loop(self, now_us);
     self->bus = self->hal.bus_state(self->hal.context);
     if (self->bus < IW_BUS_PASSIVE) {
-        iw_outbox_clear(&self->sender.outbox);
+        iw_confirmation_clear(&self->sender.confirmation);
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_BUS_DOWN, IW_SIDES_NONE, (uint32_t)self->bus);
     }
 }
@@ -149,7 +151,7 @@ static bool is_setpoint_id(uint32_t id) {
 static void take_setpoint(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     if (frame->kind == IW_CAN_ECHO) {
         self->counters.echoes++;
-        iw_outbox_echo(&self->sender.outbox, iw_codec_side(frame->id), frame);
+        iw_confirmation_echo(&self->sender.confirmation, iw_codec_side(frame->id), frame);
     } else {
         hear_foreign(self, now_us, frame->id);
     }
@@ -180,7 +182,7 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
     }
 }
 
-void iw_cycle_receive(iw_gateway_t *self, iw_time_us_t now_us) {
+void iw_step_receive(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
     while (taken < IW_GATEWAY_DRAIN_MAX && self->hal.receive(self->hal.context, &frame) > 0) {
@@ -207,7 +209,7 @@ static void watch_silence(iw_gateway_t *self, iw_time_us_t now_us) {
 
 /// How long a setpoint has waited for its echo, if too long; else 0.
 static iw_time_us_t overdue_us(const iw_gateway_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t waiting_us = iw_outbox_waiting_us(&self->sender.outbox);
+    const iw_time_us_t waiting_us = iw_confirmation_waiting_us(&self->sender.confirmation);
     if (waiting_us == IW_NEVER || now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
         return 0;
     }
@@ -283,7 +285,7 @@ static bool both_at_rest(const iw_gateway_t *self, iw_time_us_t now_us, uint32_t
            iw_wheel_at_rest(&self->wheel[IW_RIGHT], now_us, for_us);
 }
 
-void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us) {
+void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_permit_view_t view;
     if (self->stalled) {
         iw_permit_keep_present(&self->permit);
@@ -297,9 +299,9 @@ void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     view.settled = both_at_rest(self, now_us, IW_PERMIT_SETTLED_US);
     view.output_zero = iw_setpoint_is_zero(&self->setpoint);
     view.timing_ok = !self->facts.timing_contradicted;
-    view.can_send = iw_outbox_may_send(&self->sender.outbox, IW_LEFT, true) &&
-                    iw_outbox_may_send(&self->sender.outbox, IW_RIGHT, true);
-    view.proven = iw_outbox_proven_since(&self->sender.outbox, self->permit.arming_us);
+    view.can_send = iw_confirmation_may_send(&self->sender.confirmation, IW_LEFT, true) &&
+                    iw_confirmation_may_send(&self->sender.confirmation, IW_RIGHT, true);
+    view.proven = iw_confirmation_proven_since(&self->sender.confirmation, self->permit.arming_us);
     view.applied = iw_setpoint_applied(&self->setpoint);
     iw_permit_step(&self->permit, now_us, &view);
 }
@@ -319,7 +321,7 @@ static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
     return result;
 }
 
-void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us) {
+void iw_step_send(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_demand_t demand = iw_permit_demand(&self->permit);
     iw_setpoint_demand(&self->setpoint, now_us, demand);
     if (demand == IW_DEMAND_SILENCE) {
@@ -333,7 +335,7 @@ void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us) {
 
 /// Whether a wheel is heard is no argument: without acknowledgement none is. An echo that is only late by the bus is given
 /// its time, and one that was received may stand in the backlog.
-void iw_cycle_keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
+void iw_step_keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
     if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE) {
         self->purged_us = IW_NEVER; // Nothing is left behind either: arm was refused until it was gone.
         return;
@@ -357,7 +359,7 @@ static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {
     return (a < b) ? a : b;
 }
 
-iw_time_us_t iw_cycle_next_us(const iw_gateway_t *self, iw_time_us_t now_us) {
+iw_time_us_t iw_step_next_us(const iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t due_us = iw_setpoint_next_us(&self->setpoint);
     iw_time_us_t next_us =
         sooner(now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));

@@ -31,11 +31,6 @@
 #define IW_PERMIT_H
 
 #include "iwheel/config.h"
-#include "iwheel/setpoint.h"
-
-/// Who asks: chosen by the owner, never reused for another connection. 0 is nobody.
-typedef uint32_t iw_client_t;
-#define IW_CLIENT_NONE 0U
 
 /// After arm the lease lasts this long, since only zeros leave before the first drive. Longer than any lease_ms.
 #define IW_PERMIT_FIRST_LEASE_US 1000000U
@@ -47,9 +42,6 @@ typedef uint32_t iw_client_t;
 #define IW_PERMIT_SETTLED_US 500000U
 /// ... but at most this long.
 #define IW_PERMIT_HOLD_MAX_US 10000000U
-
-/// What a client is told.
-typedef enum { IW_STATE_LISTENING = 0, IW_STATE_ARMED, IW_STATE_STOPPING, IW_STATE_LATCHED } iw_state_t;
 
 /// The states of the diagram above.
 typedef enum {
@@ -64,74 +56,6 @@ typedef enum {
     IW_PHASE_LATCHED,       ///< Latched; silent.
     IW_PHASES,
 } iw_phase_t;
-
-/// Why the wheels were stopped. `iw_stop_t::detail` is given with each.
-typedef enum {
-    IW_CAUSE_NONE = 0,
-    IW_CAUSE_ESTOP_LINE,     ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
-    IW_CAUSE_ESTOP_SOFTWARE, ///< A client said estop. Detail: which iw_client_t.
-    IW_CAUSE_BUS_DOWN,       ///< Down, gone or bus-off. Detail: an iw_bus_state_t.
-    IW_CAUSE_SECOND_MASTER,  ///< Somebody else sends setpoints. Detail: their id.
-    IW_CAUSE_SEND_STALLED,   ///< A setpoint was not echoed. Detail: ms waited.
-    IW_CAUSE_WHEEL_REBOOTED, ///< Detail: an iw_reboot_t.
-    IW_CAUSE_WHEEL_LOST,     ///< Not heard. Detail: ms since it was; UINT32_MAX: never.
-    IW_CAUSE_FEEDBACK_SIGN,  ///< Turns against its command. Detail: |measured| mm/s.
-    IW_CAUSE_OVERSPEED,      ///< Faster than applied. Detail: |measured| mm/s.
-    IW_CAUSE_LOOP_HUNG,      ///< Our own loop was late by more than 500 ms. Detail: ms.
-    IW_CAUSE_INTERNAL,       ///< An internal check failed. Detail: an iw_gate_verdict_t.
-    IW_CAUSE_LOOP_LATE,      ///< Late by 100 to 500 ms: zero without ramp. Detail: ms.
-    IW_CAUSE_WHEEL_BLOCKED,  ///< Below 20 % of its command. Detail: |measured| mm/s.
-    IW_CAUSE_LEASE_LOST,     ///< The holder sent no drive command in time. Detail: ms since its last one, or since arm.
-    IW_CAUSE_CLIENT_GONE,    ///< The holder disconnected. Detail: 0.
-    IW_CAUSE_CLIENT_STOP,    ///< A client said stop or disarm. Detail: 0.
-    IW_CAUSE_SHUTDOWN,       ///< The gateway is ending. Detail: 0.
-    IW_CAUSE_RESTART,        ///< The gateway began anew after a crash while armed. Detail: 0.
-    IW_CAUSES,
-} iw_cause_t;
-
-/// Bits for `sides`: which wheel a cause speaks of.
-#define IW_SIDES_NONE  0U
-#define IW_SIDES_LEFT  1U
-#define IW_SIDES_RIGHT 2U
-#define IW_SIDES_BOTH  3U
-
-/// Why a request was refused. Each has one name in the northbound protocol.
-typedef enum {
-    IW_REFUSE_NONE = 0, ///< Not refused.
-    IW_REFUSE_OUT_OF_RANGE,
-    IW_REFUSE_MISSING_FIELD, ///< Currents omitted although the current is a setpoint.
-    IW_REFUSE_NOT_HOLDER,    ///< Somebody else holds the lease.
-    IW_REFUSE_BUSY,          ///< Somebody else holds the lease, and no takeover was asked for.
-    IW_REFUSE_NOT_ARMED,
-    IW_REFUSE_LATCHED,
-    IW_REFUSE_ESTOP_PRESSED,
-    IW_REFUSE_BUS_DOWN,
-    IW_REFUSE_TIMING_MISMATCH,
-    IW_REFUSE_WHEEL_LOST,
-    IW_REFUSE_WHEEL_BLOCKED,
-    IW_REFUSE_NOT_AT_REST,
-    IW_REFUSE_SEND_STALLED,
-    IW_REFUSE_SECOND_MASTER,
-    IW_REFUSE_CAUSE_PRESENT, ///< `iw_permit_present` tells which.
-    IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
-    IW_REFUSE_STALE_COMMAND, ///< `iw_permit_t::stale_client` sent a nonzero drive too recently.
-    IW_REFUSE_LISTEN_ONLY,
-    IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_ledger_doubt` tells which.
-    IW_REFUSALS,
-} iw_refusal_t;
-
-/// The last stop, for `why`.
-typedef struct {
-    iw_time_us_t at_us;
-    uint32_t number;    ///< Counts stops; 0: there was none.
-    uint32_t detail;    ///< See iw_cause_t.
-    iw_client_t client; ///< Who held the lease, or asked for the stop.
-    iw_pair_t applied;  ///< What the wheels were told right before it, in the machine's frame.
-    iw_cause_t cause;
-    iw_state_t from;
-    uint8_t sides;
-    bool latched;
-} iw_stop_t;
 
 /// What the owner knows at this step.
 typedef struct {

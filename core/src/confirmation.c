@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/outbox.h"
+#include "iwheel/private/transmit.h"
 
 #include "be.h"
 
 #include <string.h>
 
-void iw_outbox_init(iw_outbox_t *self) {
+void iw_confirmation_init(iw_confirmation_t *self) {
     memset(self, 0, sizeof *self);
-    iw_outbox_clear(self);
+    iw_confirmation_clear(self);
 }
 
-void iw_outbox_clear(iw_outbox_t *self) {
+void iw_confirmation_clear(iw_confirmation_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->pending[side] = 0;
         self->waiting_us[side] = IW_NEVER;
@@ -18,7 +18,7 @@ void iw_outbox_clear(iw_outbox_t *self) {
     }
 }
 
-bool iw_outbox_may_send(const iw_outbox_t *self, iw_side_t side, bool zero) {
+bool iw_confirmation_may_send(const iw_confirmation_t *self, iw_side_t side, bool zero) {
     return self->pending[side] < (zero ? 2U : 1U);
 }
 
@@ -27,8 +27,8 @@ IW_BE_INLINE uint32_t value_of(const iw_can_frame_t *frame) {
     return (iw_be_word(frame, 0) << 8) | (iw_be_word(frame, 1) >> 24);
 }
 
-void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, const iw_can_frame_t *frame,
-                    bool accepted) {
+void iw_confirmation_sent(iw_confirmation_t *self, iw_side_t side, iw_time_us_t now_us, const iw_can_frame_t *frame,
+                          bool accepted) {
     if (self->waiting_us[side] == IW_NEVER) {
         self->waiting_us[side] = now_us;
     }
@@ -39,7 +39,7 @@ void iw_outbox_sent(iw_outbox_t *self, iw_side_t side, iw_time_us_t now_us, cons
     }
 }
 
-void iw_outbox_rest(iw_outbox_t *self) {
+void iw_confirmation_rest(iw_confirmation_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (self->pending[side] == 0U) {
             self->waiting_us[side] = IW_NEVER;
@@ -47,7 +47,7 @@ void iw_outbox_rest(iw_outbox_t *self) {
     }
 }
 
-void iw_outbox_echo(iw_outbox_t *self, iw_side_t side, const iw_can_frame_t *echo) {
+void iw_confirmation_echo(iw_confirmation_t *self, iw_side_t side, const iw_can_frame_t *echo) {
     if (self->pending[side] == 0U || self->value[side][0] != value_of(echo)) {
         self->stray++;
         return;
@@ -59,11 +59,11 @@ void iw_outbox_echo(iw_outbox_t *self, iw_side_t side, const iw_can_frame_t *ech
     self->waiting_us[side] = (self->pending[side] > 0U) ? self->sent_us[side][0] : IW_NEVER;
 }
 
-bool iw_outbox_proven_since(const iw_outbox_t *self, iw_time_us_t since_us) {
+bool iw_confirmation_proven_since(const iw_confirmation_t *self, iw_time_us_t since_us) {
     return self->proven_us[IW_LEFT] >= since_us && self->proven_us[IW_RIGHT] >= since_us;
 }
 
-iw_time_us_t iw_outbox_waiting_us(const iw_outbox_t *self) {
+iw_time_us_t iw_confirmation_waiting_us(const iw_confirmation_t *self) {
     const iw_time_us_t left = self->waiting_us[IW_LEFT];
     const iw_time_us_t right = self->waiting_us[IW_RIGHT];
     return (left < right) ? left : right;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// The gate and the scheduler know nothing of each other: whatever the scheduler makes of commands and times, the gate must pass it.
+/// The envelope and the scheduler know nothing of each other: whatever the scheduler makes of commands and times, the envelope must pass it.
 #include <string.h>
 
-#include "iwheel/gate.h"
-#include "iwheel/setpoint.h"
+#include "iwheel/codec.h"
+#include "iwheel/private/setpoint.h"
+#include "iwheel/private/transmit.h"
 #include "unity.h"
 
 void setUp(void) {}
@@ -34,23 +35,24 @@ static iw_command_t any_command(const iw_config_t *config) {
     return command;
 }
 
-static void send_through_gate(iw_gate_t *gate, const iw_config_t *config, iw_time_us_t now_us, const iw_pair_t *pair) {
+static void send_through_gate(iw_envelope_t *envelope, const iw_config_t *config, iw_time_us_t now_us,
+                              const iw_pair_t *pair) {
     for (int side = IW_LEFT; side <= IW_RIGHT; side++) {
         const iw_command_t *const command = &pair->wheel[side];
         const iw_codec_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
         iw_can_frame_t frame;
         TEST_ASSERT_FALSE(iw_codec_encode_setpoint((iw_side_t)side, &setpoint, (uint8_t)config->setpoint_dlc, &frame));
-        TEST_ASSERT_EQUAL(IW_GATE_PASS, iw_gate_check(gate, now_us, &frame));
+        TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check(envelope, now_us, &frame));
     }
 }
 
 static void run_once(void) {
     const iw_config_t config = any_config();
     iw_setpoint_t setpoint;
-    iw_gate_t gate;
+    iw_envelope_t envelope;
     iw_time_us_t now_us = 1000000U + draw(1000000U);
     iw_setpoint_init(&setpoint, &config);
-    iw_gate_init(&gate, &config);
+    iw_envelope_init(&envelope, &config);
     iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_ZERO);
     for (uint32_t i = 0; i < 400U; i++) {
         iw_pair_t pair;
@@ -64,7 +66,7 @@ static void run_once(void) {
         }
         now_us = iw_setpoint_next_us(&setpoint) + draw(30000U);
         iw_setpoint_take(&setpoint, now_us, &pair);
-        send_through_gate(&gate, &config, now_us, &pair);
+        send_through_gate(&envelope, &config, now_us, &pair);
     }
 }
 

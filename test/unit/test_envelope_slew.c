@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The gate and time: how far a speed may be from the one before.
+// The envelope and time: how far a speed may be from the one before.
 #include <string.h>
 
-#include "iwheel/gate.h"
+#include "iwheel/private/transmit.h"
 #include "unity.h"
 
 #define POISON   0xA5
@@ -12,12 +12,12 @@
 #define ROUNDING_MM_S 1
 
 static iw_config_t config;
-static iw_gate_t gate;
+static iw_envelope_t envelope;
 
 static void restart(void) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
-    memset(&gate, POISON, sizeof gate);
-    iw_gate_init(&gate, &config);
+    memset(&envelope, POISON, sizeof envelope);
+    iw_envelope_init(&envelope, &config);
 }
 
 void setUp(void) {
@@ -30,31 +30,31 @@ void setUp(void) {
 
 void tearDown(void) {}
 
-static iw_gate_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
+static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     const uint32_t speed = (uint32_t)speed_mm_s;
     const uint32_t current = (uint32_t)current_mA;
     const iw_can_frame_t frame = {.id = side == IW_LEFT ? 266U : 298U,
                                   .dlc = 5,
                                   .data = {7, (uint8_t)(speed >> 8 & 0xFFU), (uint8_t)(speed & 0xFFU),
                                            (uint8_t)(current >> 8 & 0xFFU), (uint8_t)(current & 0xFFU)}};
-    return iw_gate_check(&gate, now_us, &frame);
+    return iw_envelope_check(&envelope, now_us, &frame);
 }
 
 /// Brings the wheel to a speed, as fast as the slope allows.
 static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
-    const int32_t step = config.accel_mm_s2 * (int32_t)(IW_GATE_ELAPSED_MAX_US / 1000U) / 1000;
+    const int32_t step = config.accel_mm_s2 * (int32_t)(IW_ENVELOPE_ELAPSED_MAX_US / 1000U) / 1000;
     const int32_t direction = speed_mm_s < 0 ? -1 : 1;
     iw_time_us_t past_us = AGES_US;
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us - past_us, side, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us - past_us, side, 0, 0));
     for (int32_t reached = step; reached < direction * speed_mm_s; reached += step) {
-        past_us -= IW_GATE_ELAPSED_MAX_US;
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us - past_us, side, direction * reached, 0));
+        past_us -= IW_ENVELOPE_ELAPSED_MAX_US;
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us - past_us, side, direction * reached, 0));
     }
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us, side, speed_mm_s, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, side, speed_mm_s, 0));
 }
 
-/// The verdict on going from one speed to another in the given time, with a fresh gate.
-static iw_gate_verdict_t change(int32_t from_mm_s, int32_t to_mm_s, iw_time_us_t elapsed_us) {
+/// The verdict on going from one speed to another in the given time, with a fresh envelope.
+static iw_envelope_verdict_t change(int32_t from_mm_s, int32_t to_mm_s, iw_time_us_t elapsed_us) {
     restart();
     settle(START_US, IW_LEFT, from_mm_s);
     return check(START_US + elapsed_us, IW_LEFT, to_mm_s, 0);
@@ -69,10 +69,10 @@ static void check_boundary(int32_t from_mm_s, int32_t direction, uint32_t slope_
     const int32_t allowed = (int32_t)(slope_mm_s2 * elapsed_us / 1000000U);
     const int32_t inside = from_mm_s + direction * allowed;
     const int32_t outside = from_mm_s + direction * (allowed + 1 + ROUNDING_MM_S);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(from_mm_s, inside, elapsed_us));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(-from_mm_s, -inside, elapsed_us));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(from_mm_s, outside, elapsed_us));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(-from_mm_s, -outside, elapsed_us));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(from_mm_s, inside, elapsed_us));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(-from_mm_s, -inside, elapsed_us));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(from_mm_s, outside, elapsed_us));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(-from_mm_s, -outside, elapsed_us));
 }
 
 static void test_check_away_from_zero_allows_the_acceleration_and_no_more(void) {
@@ -111,12 +111,12 @@ static void run_ramp(int32_t direction, iw_time_us_t step_us) {
     while (rising || speed_um_s > 0) {
         const uint64_t up_um_s = config.accel_mm_s2 * step_us / 1000U;
         const uint64_t down_um_s = config.decel_mm_s2 * step_us / 1000U;
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us, IW_LEFT, direction * (int32_t)(speed_um_s / 1000U), 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, IW_LEFT, direction * (int32_t)(speed_um_s / 1000U), 0));
         rising = rising && speed_um_s + up_um_s <= config.max_speed_mm_s * 1000U;
         speed_um_s = rising ? speed_um_s + up_um_s : speed_um_s > down_um_s ? speed_um_s - down_um_s : 0;
         now_us += step_us;
     }
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us, IW_LEFT, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, IW_LEFT, 0, 0));
 }
 
 static void test_check_ramp_cut_to_whole_numbers_passes(void) {
@@ -131,34 +131,34 @@ static void test_check_ramp_cut_to_whole_numbers_passes(void) {
 
 static void test_check_same_speed_at_once_passes(void) {
     settle(START_US, IW_LEFT, 321);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 321, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_LEFT, 321, 0));
 }
 
 static void test_check_sign_change_is_stopped_until_zero_was_sent(void) {
     static const int32_t speeds[] = {1, 2, 3, 10, 500, 1000};
     for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
         const int32_t speed = speeds[i];
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(speed, -speed, AGES_US));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(-speed, speed, AGES_US));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(speed, -1, AGES_US));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(-speed, 1, AGES_US));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(speed, 0, 0));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + AGES_US, IW_LEFT, speed > 240 ? -240 : -speed, 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(speed, -speed, AGES_US));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(-speed, speed, AGES_US));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(speed, -1, AGES_US));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(-speed, 1, AGES_US));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(speed, 0, 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + AGES_US, IW_LEFT, speed > 240 ? -240 : -speed, 0));
     }
 }
 
 static void test_check_zero_passes_at_once_from_every_speed(void) {
     for (int32_t speed = -1000; speed <= 1000; speed++) {
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(speed, 0, 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(speed, 0, 0));
     }
 }
 
 static void test_check_after_a_zero_the_ramp_begins_at_zero(void) {
     settle(START_US, IW_LEFT, 1000);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 0, 2000));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 1000, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 16 + ROUNDING_MM_S + 1, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 16, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_LEFT, 0, 2000));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 1000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 16 + ROUNDING_MM_S + 1, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 16, 0));
 }
 
 static void test_check_zero_speed_is_a_zero_whatever_the_limit_current(void) {
@@ -166,7 +166,7 @@ static void test_check_zero_speed_is_a_zero_whatever_the_limit_current(void) {
     for (size_t i = 0; i < sizeof currents / sizeof currents[0]; i++) {
         restart();
         settle(START_US, IW_LEFT, 1000);
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 0, currents[i]));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_LEFT, 0, currents[i]));
     }
 }
 
@@ -174,51 +174,54 @@ static void test_check_zero_speed_with_current_is_no_zero_if_current_is_a_setpoi
     config.current_role = IW_ROLE_SETPOINT;
     restart();
     settle(START_US, IW_LEFT, 1000);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US, IW_LEFT, 0, 1));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 0, -2000));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US, IW_LEFT, 0, 1));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 0, -2000));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 0, 0));
 }
 
 static void test_check_refused_frame_is_not_remembered(void) {
     static const struct {
         int32_t speed_mm_s;
         int32_t current_mA;
-        iw_gate_verdict_t verdict;
-    } refused[] = {{0, 2001, IW_GATE_CURRENT}, {1001, 0, IW_GATE_SPEED}, {500, 0, IW_GATE_SLEW}, {-5, 0, IW_GATE_SLEW}};
+        iw_envelope_verdict_t verdict;
+    } refused[] = {{0, 2001, IW_ENVELOPE_CURRENT},
+                   {1001, 0, IW_ENVELOPE_SPEED},
+                   {500, 0, IW_ENVELOPE_SLEW},
+                   {-5, 0, IW_ENVELOPE_SLEW}};
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         restart();
         settle(START_US, IW_LEFT, 100);
         TEST_ASSERT_EQUAL_INT(refused[i].verdict,
                               check(START_US + 10000, IW_LEFT, refused[i].speed_mm_s, refused[i].current_mA));
-        TEST_ASSERT_EQUAL_UINT32(1, gate.stopped);
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 116 + ROUNDING_MM_S + 1, 0));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 116, 0));
-        TEST_ASSERT_EQUAL_UINT32(2, gate.stopped);
+        TEST_ASSERT_EQUAL_UINT32(1, envelope.stopped);
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 116 + ROUNDING_MM_S + 1, 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 116, 0));
+        TEST_ASSERT_EQUAL_UINT32(2, envelope.stopped);
     }
 }
 
 static void test_check_passed_frame_is_remembered_with_its_time(void) {
     settle(START_US, IW_LEFT, 100);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 10000, IW_LEFT, 108, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_LEFT, 116 + ROUNDING_MM_S + 1, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 116, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 10000, IW_LEFT, 108, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_LEFT, 116 + ROUNDING_MM_S + 1, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 116, 0));
 }
 
 static void test_check_wheels_do_not_share_their_memory(void) {
     settle(START_US, IW_LEFT, 1000);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_RIGHT, 0, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(START_US + 20000, IW_RIGHT, 1000, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_RIGHT, -16, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US + 20000, IW_LEFT, 1000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_RIGHT, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(START_US + 20000, IW_RIGHT, 1000, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_RIGHT, -16, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + 20000, IW_LEFT, 1000, 0));
 }
 
 static void test_check_silence_is_no_permission_to_jump(void) {
     static const iw_time_us_t silences[] = {300001, 1000000, AGES_US, (iw_time_us_t)1 << 50, (iw_time_us_t)1 << 62};
     for (size_t i = 0; i < sizeof silences / sizeof silences[0]; i++) {
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(0, 240 + ROUNDING_MM_S + 1, silences[i]));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(0, 240, silences[i]));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(1000, 550 - ROUNDING_MM_S - 1, silences[i]));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(1000, 550, silences[i]));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(0, 240 + ROUNDING_MM_S + 1, silences[i]));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(0, 240, silences[i]));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(1000, 550 - ROUNDING_MM_S - 1, silences[i]));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(1000, 550, silences[i]));
     }
 }
 
@@ -226,19 +229,19 @@ static void test_check_steepest_slope_over_the_longest_time_does_not_overflow(vo
     config.accel_mm_s2 = 20000;
     config.decel_mm_s2 = 20000;
     config.max_speed_mm_s = 5000;
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(0, 5000, 300000));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(5000, 1, 300000));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, change(0, 5000, 250000));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, change(0, 5000, 249000));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(0, 5000, 300000));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(5000, 1, 300000));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(0, 5000, 250000));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(0, 5000, 249000));
 }
 
 static void test_check_first_frame_must_start_near_zero(void) {
     static const iw_time_us_t starts[] = {0, 1000, START_US, (iw_time_us_t)1 << 62};
     for (size_t i = 0; i < sizeof starts / sizeof starts[0]; i++) {
         restart();
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(starts[i], IW_LEFT, 1000, 0));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_SLEW, check(starts[i], IW_RIGHT, -1000, 0));
-        TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(starts[i], IW_RIGHT, 0, 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(starts[i], IW_LEFT, 1000, 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, check(starts[i], IW_RIGHT, -1000, 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(starts[i], IW_RIGHT, 0, 0));
     }
 }
 

@@ -2,7 +2,7 @@
 // The gate: what may leave, byte by byte, and nothing else.
 #include <string.h>
 
-#include "iwheel/gate.h"
+#include "iwheel/private/transmit.h"
 #include "unity.h"
 
 #define POISON   0xA5
@@ -10,27 +10,27 @@
 #define AGES_US  3600000000ULL
 
 static iw_config_t config;
-static iw_gate_t gate;
+static iw_envelope_t envelope;
 
 void setUp(void) {
     iw_config_default(&config);
     config.setpoint_type = 1;
     config.setpoint_type_set = true;
     config.current_role = IW_ROLE_LIMIT;
-    memset(&gate, POISON, sizeof gate);
-    iw_gate_init(&gate, &config);
+    memset(&envelope, POISON, sizeof envelope);
+    iw_envelope_init(&envelope, &config);
 }
 
 void tearDown(void) {}
 
-/// The configuration was changed: a new gate for it.
+/// The configuration was changed: a new envelope for it.
 static void restart(void) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
-    memset(&gate, POISON, sizeof gate);
-    iw_gate_init(&gate, &config);
+    memset(&envelope, POISON, sizeof envelope);
+    iw_envelope_init(&envelope, &config);
 }
 
-/// Bytes written by hand, so that an error of the encoder does not hide one of the gate.
+/// Bytes written by hand, so that an error of the encoder does not hide one of the envelope.
 static iw_can_frame_t setpoint(iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     iw_can_frame_t frame;
     const uint32_t speed = (uint32_t)speed_mm_s;
@@ -46,23 +46,23 @@ static iw_can_frame_t setpoint(iw_side_t side, int32_t speed_mm_s, int32_t curre
     return frame;
 }
 
-static iw_gate_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
+static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     const iw_can_frame_t frame = setpoint(side, speed_mm_s, current_mA);
-    return iw_gate_check(&gate, now_us, &frame);
+    return iw_envelope_check(&envelope, now_us, &frame);
 }
 
 /// Brings the wheel to a low speed: zero, and long after it the speed.
 static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us - AGES_US, side, 0, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us, side, speed_mm_s, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us - AGES_US, side, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, side, speed_mm_s, 0));
 }
 
 static void test_init_forgets_everything(void) {
-    TEST_ASSERT_EQUAL_UINT32(0, gate.stopped);
-    TEST_ASSERT_EQUAL_INT32(0, gate.last_mm_s[IW_LEFT]);
-    TEST_ASSERT_EQUAL_INT32(0, gate.last_mm_s[IW_RIGHT]);
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_LEFT, 0, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(START_US, IW_RIGHT, 0, 2000));
+    TEST_ASSERT_EQUAL_UINT32(0, envelope.stopped);
+    TEST_ASSERT_EQUAL_INT32(0, envelope.last_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT32(0, envelope.last_mm_s[IW_RIGHT]);
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_LEFT, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US, IW_RIGHT, 0, 2000));
 }
 
 static uint32_t format_of(unsigned bits) {
@@ -79,11 +79,11 @@ static uint32_t sweep_number(uint32_t number) {
         frame.dlc = (uint8_t)(rest / 16U % 16U);
         frame.kind = (uint8_t)(rest / 256U);
         const bool wanted = (frame.id == 266 || frame.id == 298) && frame.dlc == config.setpoint_dlc;
-        const iw_gate_verdict_t verdict = iw_gate_check(&gate, START_US, &frame);
-        if (verdict != (wanted ? IW_GATE_PASS : IW_GATE_NOT_A_SETPOINT)) {
+        const iw_envelope_verdict_t verdict = iw_envelope_check(&envelope, START_US, &frame);
+        if (verdict != (wanted ? IW_ENVELOPE_PASS : IW_ENVELOPE_NOT_A_SETPOINT)) {
             TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, frame.id, "wrong verdict for this id");
         }
-        passed += verdict == IW_GATE_PASS ? 1U : 0U;
+        passed += verdict == IW_ENVELOPE_PASS ? 1U : 0U;
     }
     return passed;
 }
@@ -97,7 +97,7 @@ static void test_check_every_id_length_and_format_passes_the_two_setpoints_only(
             passed += sweep_number(number);
         }
         TEST_ASSERT_EQUAL_UINT32(4, passed);
-        TEST_ASSERT_EQUAL_UINT32(2048U * 512U - 4U, gate.stopped);
+        TEST_ASSERT_EQUAL_UINT32(2048U * 512U - 4U, envelope.stopped);
     }
 }
 
@@ -105,7 +105,7 @@ static void test_check_wider_number_with_our_low_bits_is_stopped(void) {
     for (unsigned bit = 11; bit < 32; bit++) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.id |= (uint32_t)1 << bit;
-        TEST_ASSERT_EQUAL_INT(IW_GATE_NOT_A_SETPOINT, iw_gate_check(&gate, START_US, &frame));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_NOT_A_SETPOINT, iw_envelope_check(&envelope, START_US, &frame));
     }
 }
 
@@ -113,8 +113,8 @@ static void test_check_absurd_length_is_stopped(void) {
     for (unsigned dlc = 0; dlc < 256; dlc++) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.dlc = (uint8_t)dlc;
-        const iw_gate_verdict_t wanted = dlc == 5 ? IW_GATE_PASS : IW_GATE_NOT_A_SETPOINT;
-        TEST_ASSERT_EQUAL_INT(wanted, iw_gate_check(&gate, START_US, &frame));
+        const iw_envelope_verdict_t wanted = dlc == 5 ? IW_ENVELOPE_PASS : IW_ENVELOPE_NOT_A_SETPOINT;
+        TEST_ASSERT_EQUAL_INT(wanted, iw_envelope_check(&envelope, START_US, &frame));
     }
 }
 
@@ -125,8 +125,8 @@ static void test_check_every_type_passes_the_configured_one_only(void) {
         for (unsigned type = 0; type < 256; type++) {
             iw_can_frame_t frame = setpoint(IW_LEFT, 0, 0);
             frame.data[0] = (uint8_t)type;
-            const iw_gate_verdict_t wanted = type == configured ? IW_GATE_PASS : IW_GATE_TYPE;
-            TEST_ASSERT_EQUAL_INT(wanted, iw_gate_check(&gate, START_US, &frame));
+            const iw_envelope_verdict_t wanted = type == configured ? IW_ENVELOPE_PASS : IW_ENVELOPE_TYPE;
+            TEST_ASSERT_EQUAL_INT(wanted, iw_envelope_check(&envelope, START_US, &frame));
         }
     }
 }
@@ -137,17 +137,17 @@ static void test_check_type_not_configured_stops_every_type_even_at_zero(void) {
     for (unsigned type = 0; type < 256; type++) {
         iw_can_frame_t frame = setpoint(IW_LEFT, 0, 0);
         frame.data[0] = (uint8_t)type;
-        TEST_ASSERT_EQUAL_INT(IW_GATE_TYPE, iw_gate_check(&gate, START_US, &frame));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, iw_envelope_check(&envelope, START_US, &frame));
     }
-    TEST_ASSERT_EQUAL_UINT32(256, gate.stopped);
+    TEST_ASSERT_EQUAL_UINT32(256, envelope.stopped);
 }
 
 static void test_check_role_not_configured_stops_everything(void) {
     config.current_role = IW_ROLE_UNSET;
     restart();
-    TEST_ASSERT_EQUAL_INT(IW_GATE_TYPE, check(START_US, IW_LEFT, 0, 0));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_TYPE, check(START_US, IW_RIGHT, 0, 100));
-    TEST_ASSERT_EQUAL_UINT32(2, gate.stopped);
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, check(START_US, IW_LEFT, 0, 0));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, check(START_US, IW_RIGHT, 0, 100));
+    TEST_ASSERT_EQUAL_UINT32(2, envelope.stopped);
 }
 
 /// A limit has no sign: a negative one is no current that may leave.
@@ -156,8 +156,8 @@ static void sweep_currents(int32_t speed_mm_s) {
     const int32_t lowest = config.current_role == IW_ROLE_LIMIT ? 0 : -highest;
     for (int32_t current = -32768; current <= 32767; current++) {
         const bool within = current >= lowest && current <= highest;
-        const iw_gate_verdict_t verdict = check(START_US, IW_LEFT, speed_mm_s, current);
-        if (verdict != (within ? IW_GATE_PASS : IW_GATE_CURRENT)) {
+        const iw_envelope_verdict_t verdict = check(START_US, IW_LEFT, speed_mm_s, current);
+        if (verdict != (within ? IW_ENVELOPE_PASS : IW_ENVELOPE_CURRENT)) {
             TEST_ASSERT_EQUAL_INT32_MESSAGE(0, current, "wrong verdict for this current");
         }
     }
@@ -186,9 +186,9 @@ static void test_check_every_speed_passes_within_the_configured_maximum_only(voi
         for (int32_t speed = -32768; speed <= 32767; speed++) {
             const bool within = speed >= -(int32_t)maxima[i] && speed <= (int32_t)maxima[i];
             const iw_time_us_t now_us = AGES_US + (iw_time_us_t)(speed + 32768) * 2U * AGES_US;
-            TEST_ASSERT_EQUAL_INT(IW_GATE_PASS, check(now_us, IW_RIGHT, 0, 0));
-            const iw_gate_verdict_t verdict = check(now_us + AGES_US, IW_RIGHT, speed, 0);
-            if (verdict != (within ? IW_GATE_PASS : IW_GATE_SPEED)) {
+            TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, IW_RIGHT, 0, 0));
+            const iw_envelope_verdict_t verdict = check(now_us + AGES_US, IW_RIGHT, speed, 0);
+            if (verdict != (within ? IW_ENVELOPE_PASS : IW_ENVELOPE_SPEED)) {
                 TEST_ASSERT_EQUAL_INT32_MESSAGE(0, speed, "wrong verdict for this speed");
             }
         }
@@ -199,12 +199,12 @@ static void test_check_many_things_wrong_names_the_first_in_the_documented_order
     iw_can_frame_t frame = setpoint(IW_LEFT, 30000, 30000);
     frame.data[0] = 2;
     frame.id = 267;
-    TEST_ASSERT_EQUAL_INT(IW_GATE_NOT_A_SETPOINT, iw_gate_check(&gate, START_US, &frame));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_NOT_A_SETPOINT, iw_envelope_check(&envelope, START_US, &frame));
     frame.id = 266;
-    TEST_ASSERT_EQUAL_INT(IW_GATE_TYPE, iw_gate_check(&gate, START_US, &frame));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_CURRENT, check(START_US, IW_LEFT, 30000, 30000));
-    TEST_ASSERT_EQUAL_INT(IW_GATE_SPEED, check(START_US, IW_LEFT, 30000, 0));
-    TEST_ASSERT_EQUAL_UINT32(4, gate.stopped);
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, iw_envelope_check(&envelope, START_US, &frame));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_CURRENT, check(START_US, IW_LEFT, 30000, 30000));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SPEED, check(START_US, IW_LEFT, 30000, 0));
+    TEST_ASSERT_EQUAL_UINT32(4, envelope.stopped);
 }
 
 int main(void) {

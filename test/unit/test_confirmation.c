@@ -3,16 +3,16 @@
 #include <string.h>
 
 #include "iwheel/codec.h"
-#include "iwheel/outbox.h"
+#include "iwheel/private/transmit.h"
 #include "unity.h"
 
 #define POISON 0xA5
 
-static iw_outbox_t outbox;
+static iw_confirmation_t account;
 
 void setUp(void) {
-    memset(&outbox, POISON, sizeof outbox);
-    iw_outbox_init(&outbox);
+    memset(&account, POISON, sizeof account);
+    iw_confirmation_init(&account);
 }
 
 void tearDown(void) {}
@@ -26,18 +26,18 @@ static iw_can_frame_t setpoint(iw_side_t side, int16_t speed_mm_s, int16_t curre
 
 static void sent_value(iw_side_t side, iw_time_us_t now_us, int16_t speed_mm_s, int16_t current_mA) {
     const iw_can_frame_t frame = setpoint(side, speed_mm_s, current_mA);
-    iw_outbox_sent(&outbox, side, now_us, &frame, true);
+    iw_confirmation_sent(&account, side, now_us, &frame, true);
 }
 
 static void echo_value(iw_side_t side, int16_t speed_mm_s, int16_t current_mA) {
     const iw_can_frame_t frame = setpoint(side, speed_mm_s, current_mA);
-    iw_outbox_echo(&outbox, side, &frame);
+    iw_confirmation_echo(&account, side, &frame);
 }
 
 /// The same bytes every time.
 static void sent(iw_side_t side, iw_time_us_t now_us, bool accepted) {
     const iw_can_frame_t frame = setpoint(side, 0, 0);
-    iw_outbox_sent(&outbox, side, now_us, &frame, accepted);
+    iw_confirmation_sent(&account, side, now_us, &frame, accepted);
 }
 
 static void echo(iw_side_t side) {
@@ -95,7 +95,7 @@ static void apply(iw_side_t side, event_t event, uint32_t now, model_t *models) 
         echo(side);
         model_echo(model);
     } else if (event == CLEAR) {
-        iw_outbox_clear(&outbox);
+        iw_confirmation_clear(&account);
         model_clear(&models[IW_LEFT]);
         model_clear(&models[IW_RIGHT]);
     }
@@ -109,20 +109,21 @@ static uint32_t earlier(uint32_t a, uint32_t b) {
 static bool agrees(const model_t *models, uint32_t now) {
     for (int side = 0; side < IW_SIDES; side++) {
         for (int zero = 0; zero <= 1; zero++) {
-            if (iw_outbox_may_send(&outbox, (iw_side_t)side, zero != 0) != model_may_send(&models[side], zero != 0)) {
+            if (iw_confirmation_may_send(&account, (iw_side_t)side, zero != 0) !=
+                model_may_send(&models[side], zero != 0)) {
                 return false;
             }
         }
     }
     for (uint32_t since = 1; since <= now + 1; since++) {
         const bool proven = models[IW_LEFT].proven >= since && models[IW_RIGHT].proven >= since;
-        if (iw_outbox_proven_since(&outbox, since) != proven) {
+        if (iw_confirmation_proven_since(&account, since) != proven) {
             return false;
         }
     }
     const uint32_t waiting = earlier(models[IW_LEFT].waiting, models[IW_RIGHT].waiting);
-    return iw_outbox_waiting_us(&outbox) == (waiting == 0 ? IW_NEVER : waiting) &&
-           outbox.stray == models[IW_LEFT].stray + models[IW_RIGHT].stray;
+    return iw_confirmation_waiting_us(&account) == (waiting == 0 ? IW_NEVER : waiting) &&
+           account.stray == models[IW_LEFT].stray + models[IW_RIGHT].stray;
 }
 
 /// Walks one sequence of events of one wheel; the other is left alone.
@@ -164,71 +165,71 @@ static void test_every_sequence_of_six_events_of_both_wheels_agrees_with_the_mod
 }
 
 static void test_init_owes_nothing(void) {
-    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
-    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_RIGHT, false));
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
-    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 1));
-    TEST_ASSERT_EQUAL_UINT32(0, outbox.stray);
+    TEST_ASSERT_TRUE(iw_confirmation_may_send(&account, IW_LEFT, false));
+    TEST_ASSERT_TRUE(iw_confirmation_may_send(&account, IW_RIGHT, false));
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
+    TEST_ASSERT_FALSE(iw_confirmation_proven_since(&account, 1));
+    TEST_ASSERT_EQUAL_UINT32(0, account.stray);
 }
 
 static void test_may_send_zero_never_waits_for_an_echo(void) {
     sent(IW_LEFT, 100, true);
-    TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, false));
-    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, true));
+    TEST_ASSERT_FALSE(iw_confirmation_may_send(&account, IW_LEFT, false));
+    TEST_ASSERT_TRUE(iw_confirmation_may_send(&account, IW_LEFT, true));
     sent(IW_LEFT, 200, true);
-    TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, true));
-    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_RIGHT, false));
+    TEST_ASSERT_FALSE(iw_confirmation_may_send(&account, IW_LEFT, true));
+    TEST_ASSERT_TRUE(iw_confirmation_may_send(&account, IW_RIGHT, false));
 }
 
 static void test_waiting_refused_frame_waits_from_the_first_refusal(void) {
     sent(IW_RIGHT, 1000, false);
     sent(IW_RIGHT, 2000, false);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 1000);
     sent(IW_RIGHT, 3000, true);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 1000);
     echo(IW_RIGHT);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
 }
 
 static void test_rest_ends_the_waiting_of_what_was_only_refused(void) {
     sent(IW_LEFT, 1000, false);
     sent(IW_RIGHT, 1000, false);
-    iw_outbox_rest(&outbox);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
-    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+    iw_confirmation_rest(&account);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
+    TEST_ASSERT_TRUE(iw_confirmation_may_send(&account, IW_LEFT, false));
 }
 
 static void test_rest_forgets_nothing_that_was_handed_over(void) {
     sent(IW_LEFT, 1000, false);
     sent(IW_LEFT, 2000, true);
     sent(IW_RIGHT, 500, false);
-    iw_outbox_rest(&outbox);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
-    TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+    iw_confirmation_rest(&account);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 1000);
+    TEST_ASSERT_FALSE(iw_confirmation_may_send(&account, IW_LEFT, false));
     echo(IW_LEFT);
-    TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 1) == false);
+    TEST_ASSERT_TRUE(iw_confirmation_proven_since(&account, 1) == false);
     sent(IW_RIGHT, 3000, true);
-    iw_outbox_rest(&outbox);
+    iw_confirmation_rest(&account);
     echo(IW_RIGHT);
-    TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 2000));
+    TEST_ASSERT_TRUE(iw_confirmation_proven_since(&account, 2000));
 }
 
 static void test_waiting_is_that_of_the_wheel_that_waits_longest(void) {
     sent(IW_LEFT, 2000, true);
     sent(IW_RIGHT, 1000, true);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 1000);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 1000);
     echo(IW_RIGHT);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 2000);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 2000);
 }
 
 static void test_proven_since_needs_both_wheels(void) {
     sent(IW_LEFT, 5000, true);
     sent(IW_RIGHT, 5001, true);
     echo(IW_LEFT);
-    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 5000));
+    TEST_ASSERT_FALSE(iw_confirmation_proven_since(&account, 5000));
     echo(IW_RIGHT);
-    TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 5000));
-    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 5001));
+    TEST_ASSERT_TRUE(iw_confirmation_proven_since(&account, 5000));
+    TEST_ASSERT_FALSE(iw_confirmation_proven_since(&account, 5001));
 }
 
 static void test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer(void) {
@@ -237,32 +238,32 @@ static void test_proven_since_late_echo_of_an_old_frame_proves_nothing_newer(voi
     sent(IW_RIGHT, 9000, true);
     echo(IW_RIGHT);
     echo(IW_LEFT);
-    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 1001));
+    TEST_ASSERT_FALSE(iw_confirmation_proven_since(&account, 1001));
     echo(IW_LEFT);
-    TEST_ASSERT_TRUE(iw_outbox_proven_since(&outbox, 9000));
+    TEST_ASSERT_TRUE(iw_confirmation_proven_since(&account, 9000));
 }
 
 static void test_echo_after_clear_is_stray_and_proves_nothing(void) {
     sent(IW_LEFT, 1000, true);
     sent(IW_RIGHT, 1000, true);
-    iw_outbox_clear(&outbox);
+    iw_confirmation_clear(&account);
     echo(IW_LEFT);
     echo(IW_RIGHT);
-    TEST_ASSERT_EQUAL_UINT32(2, outbox.stray);
-    TEST_ASSERT_FALSE(iw_outbox_proven_since(&outbox, 1000));
-    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+    TEST_ASSERT_EQUAL_UINT32(2, account.stray);
+    TEST_ASSERT_FALSE(iw_confirmation_proven_since(&account, 1000));
+    TEST_ASSERT_TRUE(iw_confirmation_may_send(&account, IW_LEFT, false));
 }
 
 static void test_echo_from_before_a_clear_does_not_settle_what_was_sent_after_it(void) {
     sent_value(IW_LEFT, 1000, 0, 2000);
-    iw_outbox_clear(&outbox);
+    iw_confirmation_clear(&account);
     sent_value(IW_LEFT, 2000, 300, 2000);
     echo_value(IW_LEFT, 0, 2000);
-    TEST_ASSERT_EQUAL_UINT32(1, outbox.stray);
-    TEST_ASSERT_FALSE(iw_outbox_may_send(&outbox, IW_LEFT, false));
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 2000);
+    TEST_ASSERT_EQUAL_UINT32(1, account.stray);
+    TEST_ASSERT_FALSE(iw_confirmation_may_send(&account, IW_LEFT, false));
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 2000);
     echo_value(IW_LEFT, 300, 2000);
-    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_LEFT, false));
+    TEST_ASSERT_TRUE(iw_confirmation_may_send(&account, IW_LEFT, false));
 }
 
 static void test_echo_that_differs_in_one_byte_is_stray(void) {
@@ -271,10 +272,10 @@ static void test_echo_that_differs_in_one_byte_is_stray(void) {
     sent_value(IW_RIGHT, 1000, 0x0202, 0x0304);
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
         echo_value(IW_RIGHT, others[i][0], others[i][1]);
-        TEST_ASSERT_EQUAL_UINT32(i + 1U, outbox.stray);
+        TEST_ASSERT_EQUAL_UINT32(i + 1U, account.stray);
     }
     echo_value(IW_RIGHT, 0x0202, 0x0304);
-    TEST_ASSERT_TRUE(iw_outbox_may_send(&outbox, IW_RIGHT, false));
+    TEST_ASSERT_TRUE(iw_confirmation_may_send(&account, IW_RIGHT, false));
 }
 
 static void test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo(void) {
@@ -282,10 +283,10 @@ static void test_zero_behind_a_setpoint_is_settled_second_by_its_own_echo(void) 
     sent_value(IW_LEFT, 2000, 0, 2000);
     echo_value(IW_LEFT, 300, 2000);
     echo_value(IW_LEFT, 300, 2000);
-    TEST_ASSERT_EQUAL_UINT32(1, outbox.stray);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == 2000);
+    TEST_ASSERT_EQUAL_UINT32(1, account.stray);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == 2000);
     echo_value(IW_LEFT, 0, 2000);
-    TEST_ASSERT_TRUE(iw_outbox_waiting_us(&outbox) == IW_NEVER);
+    TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&account) == IW_NEVER);
 }
 
 int main(void) {

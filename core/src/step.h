@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: MIT
 /// The parts of one cycle of the gateway, in the order in which `iw_gateway_step` calls them. Private to the core.
-#ifndef IW_CYCLE_H
-#define IW_CYCLE_H
+#ifndef IW_STEP_H
+#define IW_STEP_H
 
-#include "iwheel/gateway.h"
+#include "iwheel/types.h"
+
+struct iw_gateway;
 
 /// Our own lateness, the e-stop line, the state of the bus.
-void iw_cycle_begin(iw_gateway_t *self, iw_time_us_t now_us);
+void iw_step_begin(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// Takes what was received: echoes to the account, telemetry to the wheels, foreign setpoints to the permission.
-void iw_cycle_receive(iw_gateway_t *self, iw_time_us_t now_us);
+void iw_step_receive(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step.
-void iw_cycle_judge(iw_gateway_t *self, iw_time_us_t now_us);
+void iw_step_judge(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// Sends what is due under the permission's demand.
-void iw_cycle_send(iw_gateway_t *self, iw_time_us_t now_us);
+void iw_step_send(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// Silence is silent: what is still in a controller when nothing is sent any more would be repeated there until a wheel
 /// has power to acknowledge it. It is taken back, or told.
-void iw_cycle_keep_silent(iw_gateway_t *self, iw_time_us_t now_us);
+void iw_step_keep_silent(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// When to call again: not later than one period from now.
-iw_time_us_t iw_cycle_next_us(const iw_gateway_t *self, iw_time_us_t now_us);
+iw_time_us_t iw_step_next_us(const struct iw_gateway *self, iw_time_us_t now_us);
 
 #endif

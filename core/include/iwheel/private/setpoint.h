@@ -23,13 +23,6 @@
 /// A changed command leaves at once, but not sooner than this after the last pair.
 #define IW_SETPOINT_SPACING_US 5000U
 
-typedef enum {
-    IW_DEMAND_SILENCE = 0, ///< Send nothing.
-    IW_DEMAND_ZERO,        ///< Zero without ramp.
-    IW_DEMAND_BRAKE,       ///< Ramp to zero, then zero.
-    IW_DEMAND_FOLLOW,      ///< Ramp to the client's command.
-} iw_demand_t;
-
 typedef struct {
     const iw_config_t *config;
     iw_time_us_t last_us;         ///< When the last pair was taken.

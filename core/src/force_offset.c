@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/force.h"
+#include "iwheel/force_offset.h"
 
 #include "magnitude.h"
 

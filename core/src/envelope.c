@@ -1,23 +1,25 @@
 // SPDX-License-Identifier: MIT
-#include "iwheel/gate.h"
+#include "iwheel/private/transmit.h"
 
+#include "iwheel/codec.h"
 #include "magnitude.h"
 
 #include <string.h>
 
-void iw_gate_init(iw_gate_t *self, const iw_config_t *config) {
+void iw_envelope_init(iw_envelope_t *self, const iw_config_t *config) {
     memset(self, 0, sizeof *self);
     self->config = config;
 }
 
 /// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
 static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us) {
-    const uint32_t elapsed = (elapsed_us < IW_GATE_ELAPSED_MAX_US) ? (uint32_t)elapsed_us : IW_GATE_ELAPSED_MAX_US;
+    const uint32_t elapsed =
+        (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? (uint32_t)elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
     const uint32_t change_um_s = slope_mm_s2 * (elapsed / 1000U) + slope_mm_s2 * (elapsed % 1000U) / 1000U;
     return 1U + change_um_s / 1000U;
 }
 
-static bool slew_ok(const iw_gate_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s) {
+static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s) {
     const int32_t last_mm_s = self->last_mm_s[side];
     const uint32_t from = (uint32_t)iw_magnitude(last_mm_s);
     const uint32_t to = (uint32_t)iw_magnitude(speed_mm_s);
@@ -51,33 +53,33 @@ static bool current_ok(const iw_config_t *config, int32_t current_mA) {
     return !negative_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
 }
 
-static iw_gate_verdict_t judge(const iw_gate_t *self, iw_time_us_t now_us, iw_side_t side,
-                               const iw_codec_setpoint_t *setpoint) {
+static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_us, iw_side_t side,
+                                   const iw_codec_setpoint_t *setpoint) {
     const iw_config_t *const config = self->config;
     if (!type_ok(config, setpoint->type)) {
-        return IW_GATE_TYPE;
+        return IW_ENVELOPE_TYPE;
     }
     if (!current_ok(config, setpoint->current_mA)) {
-        return IW_GATE_CURRENT;
+        return IW_ENVELOPE_CURRENT;
     }
     if ((uint32_t)iw_magnitude(setpoint->speed_mm_s) > config->max_speed_mm_s) {
-        return IW_GATE_SPEED;
+        return IW_ENVELOPE_SPEED;
     }
     if (!is_zero(config, setpoint) && !slew_ok(self, side, now_us - self->last_us[side], setpoint->speed_mm_s)) {
-        return IW_GATE_SLEW;
+        return IW_ENVELOPE_SLEW;
     }
-    return IW_GATE_PASS;
+    return IW_ENVELOPE_PASS;
 }
 
-iw_gate_verdict_t iw_gate_check(iw_gate_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
+iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     const bool left = frame->id == IW_ID_LEFT_SETPOINT;
     const iw_side_t side = left ? IW_LEFT : IW_RIGHT;
     const iw_codec_setpoint_t setpoint = as_the_wheel_reads(frame->data);
-    iw_gate_verdict_t verdict = IW_GATE_NOT_A_SETPOINT;
+    iw_envelope_verdict_t verdict = IW_ENVELOPE_NOT_A_SETPOINT;
     if ((left || frame->id == IW_ID_RIGHT_SETPOINT) && frame->dlc == self->config->setpoint_dlc) {
         verdict = judge(self, now_us, side, &setpoint);
     }
-    if (verdict == IW_GATE_PASS) {
+    if (verdict == IW_ENVELOPE_PASS) {
         self->last_us[side] = now_us;
         self->last_mm_s[side] = setpoint.speed_mm_s;
     } else {

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+/// The assumption ledger: what the document leaves open, what we assume, and what was found out.
+///
+///     ASSUMED --confirm--> CONFIRMED --contradict--> CONTRADICTED --confirm by the operator--> CONFIRMED
+///        \--------------- contradict ----------------^
+///
+/// A contradiction found on the bus stays until the operator settles it: evidence that comes and goes must not hide it.
+#ifndef IW_LEDGER_H
+#define IW_LEDGER_H
+
+#include "iwheel/types.h"
+
+typedef struct {
+    iw_ledger_entry_t entry[IW_LEDGER_ITEMS];
+    uint32_t changes; ///< Grows with every change: for whoever wants to tell or to store it.
+} iw_ledger_t;
+
+/// Every item ASSUMED: documented ones with IW_EVIDENCE_DOCUMENT, the others with IW_EVIDENCE_NONE.
+void iw_ledger_init(iw_ledger_t *self);
+
+/// States where an ASSUMED item comes from. Changes nothing if it is no longer ASSUMED.
+void iw_ledger_assume(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence);
+
+/// Evidence for it. From the bus it does not lift a contradiction, and does not replace the operator's word.
+void iw_ledger_confirm(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure);
+
+/// Evidence against it.
+void iw_ledger_contradict(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure);
+
+/// The item of a wheel's force unit.
+iw_ledger_item_t iw_ledger_force_unit(iw_side_t side);
+
+/// True if the wheels must not be moved while this item is contradicted: type, role and the signs.
+bool iw_ledger_guards_motion(iw_ledger_item_t item);
+
+/// The first contradicted item that guards motion; IW_LEDGER_ITEMS if there is none.
+iw_ledger_item_t iw_ledger_doubt(const iw_ledger_t *self);
+
+/// The item's present entry.
+const iw_ledger_entry_t *iw_ledger_entry(const iw_ledger_t *self, iw_ledger_item_t item);
+
+#endif

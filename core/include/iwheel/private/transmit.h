@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+/// Hands a pair to the bus: whole, within the envelope, and on account.
+///
+///     pair -> invert -> encode -> envelope (both frames) -> port (left, then right) -> TX confirmation
+///
+/// Both frames are judged before one of them leaves. If the port takes the left and not the right, the caller is told
+/// and the next pair must be zero.
+#ifndef IW_TRANSMIT_H
+#define IW_TRANSMIT_H
+
+#include "iwheel/can_frame.h"
+#include "iwheel/config.h"
+#include "iwheel/hal.h"
+
+// ---- Envelope ----
+//
+// The envelope that every outgoing frame must keep to, judged, right before it is handed to the port.
+//
+// It knows nothing of why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a
+// setpoint of one of the two ids, with the configured type and length, current and speed within the configured
+// maxima, and a speed no further from the last one that passed than the configured slopes allow for the time
+// between; a change of sign must pass through a zero that was sent. A zero of the right type and current passes
+// whatever its slew. A negative current is refused where the current is a limit; while setpoint type or current role
+// are unset nothing passes.
+//
+// Written independently of the scheduler, so that an error in one is caught by the other.
+
+/// Time between two frames counts up to this. Longer silence is no permission to jump: after it comes a zero.
+#define IW_ENVELOPE_ELAPSED_MAX_US 300000U
+
+typedef enum {
+    IW_ENVELOPE_PASS = 0,
+    IW_ENVELOPE_NOT_A_SETPOINT, ///< Wrong id, format or length.
+    IW_ENVELOPE_TYPE,           ///< Not the configured setpoint type, or none is configured.
+    IW_ENVELOPE_CURRENT,
+    IW_ENVELOPE_SPEED,
+    IW_ENVELOPE_SLEW,
+} iw_envelope_verdict_t;
+
+typedef struct {
+    const iw_config_t *config;
+    iw_time_us_t last_us[IW_SIDES]; ///< When the last frame passed.
+    int32_t last_mm_s[IW_SIDES];    ///< Its speed, as on the bus; 0 at first.
+    uint32_t stopped;               ///< Frames that did not pass.
+} iw_envelope_t;
+
+/// `config` must be checked and outlive it.
+void iw_envelope_init(iw_envelope_t *self, const iw_config_t *config);
+
+/// Judges one frame; what does not pass is counted and must not be sent.
+iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
+
+// ---- TX confirmation ----
+//
+// Which setpoints are on their way? The account of sent and echoed frames.
+//
+// Per wheel at most one setpoint is un-echoed, and behind it at most one zero: so a queue of old setpoints cannot
+// form, and a zero never waits for an echo. Echoes of one id come in the order sent. An echo that was on its way when
+// the account was cleared may come later than the next frame is sent: so an echo counts only if it bears the speed and
+// current of the oldest un-echoed frame.
+//
+//     FREE --sent--> ONE --zero sent--> TWO;  each echo goes one back;  clear: FREE
+//     (a refused frame only waits; an echo or the end of sending ends that)
+
+typedef struct {
+    iw_time_us_t waiting_us[IW_SIDES]; ///< Since when a setpoint waits to be proven; IW_NEVER: none does.
+    iw_time_us_t sent_us[IW_SIDES][2]; ///< Of the un-echoed frames, oldest first.
+    iw_time_us_t proven_us[IW_SIDES];  ///< When the last echoed frame had been sent; 0: none yet.
+    uint32_t stray;                    ///< Echoes that nothing was waiting for.
+    uint32_t value[IW_SIDES][2];       ///< What they bear: speed and current, as they stand in the frame.
+    uint8_t pending[IW_SIDES];         ///< Un-echoed frames, 0..2.
+} iw_confirmation_t;
+
+void iw_confirmation_init(iw_confirmation_t *self);
+
+/// Forgets what is un-echoed and what was proven: it was purged, or the bus went away with it.
+void iw_confirmation_clear(iw_confirmation_t *self);
+
+/// True if this wheel may be sent a setpoint now; `zero` tells whether it is a zero.
+bool iw_confirmation_may_send(const iw_confirmation_t *self, iw_side_t side, bool zero);
+
+/// A frame was handed over (`accepted`; only where `iw_confirmation_may_send`) or refused by the port. A refused one starts
+/// the waiting too, so that a port that takes nothing is found out; the next echo of that wheel settles it, or `rest`.
+void iw_confirmation_sent(iw_confirmation_t *self, iw_side_t side, iw_time_us_t now_us, const iw_can_frame_t *frame,
+                          bool accepted);
+
+/// Nothing is being sent any more. What was only refused waits no longer: nobody would ever settle it. What was handed
+/// over still does.
+void iw_confirmation_rest(iw_confirmation_t *self);
+
+/// The echo of a setpoint came.
+void iw_confirmation_echo(iw_confirmation_t *self, iw_side_t side, const iw_can_frame_t *echo);
+
+/// True if, for both wheels, a frame that was sent at `since_us` or later has been echoed. `since_us` > 0.
+bool iw_confirmation_proven_since(const iw_confirmation_t *self, iw_time_us_t since_us);
+
+/// Since when the longest-waiting setpoint waits; IW_NEVER if none does.
+iw_time_us_t iw_confirmation_waiting_us(const iw_confirmation_t *self);
+
+// ---- Sender ----
+
+typedef enum {
+    IW_SEND_DONE = 0, ///< Every frame that was due was taken by the port.
+    IW_SEND_LATER,    ///< The port did not take every frame.
+    IW_SEND_STOPPED,  ///< The envelope stopped it: nothing was sent. `verdict` tells why.
+} iw_send_result_t;
+
+typedef struct {
+    const iw_config_t *config;
+    const iw_hal_t *hal;
+    iw_confirmation_t confirmation;
+    iw_envelope_t envelope;
+    iw_time_us_t pair_us;           ///< When the last whole pair was taken by the port; IW_NEVER: none since silence.
+    uint32_t gap_us;                ///< Between the last two pairs.
+    uint32_t gap_max_us;            ///< The largest since the last silence ended.
+    uint32_t pairs;                 ///< Whole pairs taken by the port.
+    uint32_t later;                 ///< Setpoints that the port did not take.
+    uint32_t clamped;               ///< Currents that the encoder had to clamp.
+    iw_envelope_verdict_t verdict;  ///< The last that was not IW_ENVELOPE_PASS.
+    iw_can_frame_t frame[IW_SIDES]; ///< The pair that is being sent: kept here to spare the stack.
+} iw_sender_t;
+
+/// `config` must be checked; it and `hal` must outlive the sender.
+void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t *hal);
+
+/// True if the pair may leave now: both wheels, unless it is `zero`, which leaves to whichever wheel it can.
+bool iw_sender_ready(const iw_sender_t *self, bool zero);
+
+/// Sends the pair, given in the machine's frame, to the wheels that may have it.
+iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero);
+
+/// Nothing is being sent: gaps are measured anew from the next pair, and what was refused is forgotten.
+void iw_sender_rest(iw_sender_t *self);
+
+/// Asks the port to take back what is not on the bus; if it surely could, the account is cleared. The port's answer: see
+/// hal.h.
+int iw_sender_purge(iw_sender_t *self);
+
+#endif
