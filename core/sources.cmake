@@ -7,6 +7,7 @@ set(IWHEEL_CORE_SOURCES
     src/config.c
     src/confirmation.c
     src/envelope.c
+    src/evidence.c
     src/follow.c
     src/force_offset.c
     src/gateway.c
@@ -14,5 +15,6 @@ set(IWHEEL_CORE_SOURCES
     src/permit.c
     src/sender.c
     src/setpoint.c
+    src/snapshot.c
     src/step.c
     src/wheel.c)

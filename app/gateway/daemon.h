@@ -16,7 +16,6 @@
 #include "clients/client.h"
 #include "clients/listener.h"
 #include "gateway_config.h"
-#include "ledger/evidence.h"
 #include "ledger/knowledge.h"
 #include "process/log.h"
 #include "process/notify.h"
@@ -24,6 +23,7 @@
 #include "process/wakeup.h"
 #include "why.h"
 
+#include "iwheel/evidence.h"
 #include "iwheel/gateway.h"
 #include "iwheel_linux/linux_hal.h"
 
@@ -67,7 +67,7 @@ typedef struct gw_daemon {
     gw_observed_t observed;
     gw_gaps_t gaps;
     gw_knowledge_t knowledge;
-    gw_evidence_t evidence;
+    iw_motion_evidence_t evidence;
     gw_stop_note_t last_stop;
     iw_time_us_t now_us;         ///< Of the present cycle.
     iw_time_us_t woken_us;       ///< When the wait ended: what a client sends later than this was not waiting then.
@@ -102,6 +102,9 @@ typedef struct gw_daemon {
 
 /// The open connection with this number; NULL if it is gone.
 gw_client_t *gw_daemon_client(gw_daemon_t *self, iw_client_t id);
+
+/// What is known of the wheels now: after a step or a request, look again.
+iw_snapshot_t gw_daemon_look(const gw_daemon_t *self);
 
 /// True while setpoints are sent, or about to be.
 bool gw_daemon_is_sending(const gw_daemon_t *self);

@@ -97,7 +97,7 @@ static void give_way(gw_daemon_t *daemon) {
 }
 
 static void mark_if_sending(gw_daemon_t *daemon) {
-    if (!daemon->gateway.config.listen_only && !gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon))) {
+    if (!daemon->config.core.listen_only && !gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon))) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "cannot change the crash marker %s: %s; after a crash the wheels would keep their last command for a "
                "second",
@@ -131,9 +131,10 @@ static void step(gw_daemon_t *daemon) {
     daemon->step_next_us = iw_gateway_step(&daemon->gateway, daemon->now_us);
     gw_tape_step_end(&daemon->tape);
     daemon->requested = false;
-    gw_gaps_note(&daemon->gaps, &daemon->gateway.sender);
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
+    gw_gaps_note(&daemon->gaps, &seen.sent);
     mark_if_sending(daemon);
-    gw_evidence_look(&daemon->evidence, &daemon->gateway, daemon->now_us);
+    iw_motion_evidence_look(&daemon->evidence, &daemon->gateway, &seen);
     gw_observe(daemon);
     gw_dispatch_arming(daemon);
 }

@@ -55,7 +55,7 @@ static int start_core(gw_daemon_t *daemon) {
                                                    .kind = BLACKBOX_START,
                                                    .a = restarted,
                                                    .b = daemon->config.core.listen_only});
-    gw_evidence_init(&daemon->evidence);
+    iw_motion_evidence_init(&daemon->evidence);
     gw_bus_facts_follow(daemon);
     gw_why_sentence(&daemon->last_stop.stop, &(gw_why_context_t){0}, daemon->last_stop.sentence, GW_SENTENCE_SIZE);
     if (restarted) {

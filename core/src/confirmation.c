@@ -59,8 +59,10 @@ void iw_confirmation_echo(iw_confirmation_t *self, iw_side_t side, const iw_can_
     self->waiting_us[side] = (self->pending[side] > 0U) ? self->sent_us[side][0] : IW_NEVER;
 }
 
-bool iw_confirmation_proven_since(const iw_confirmation_t *self, iw_time_us_t since_us) {
-    return self->proven_us[IW_LEFT] >= since_us && self->proven_us[IW_RIGHT] >= since_us;
+iw_time_us_t iw_confirmation_proven_us(const iw_confirmation_t *self) {
+    const iw_time_us_t left = self->proven_us[IW_LEFT];
+    const iw_time_us_t right = self->proven_us[IW_RIGHT];
+    return (left < right) ? left : right;
 }
 
 iw_time_us_t iw_confirmation_waiting_us(const iw_confirmation_t *self) {

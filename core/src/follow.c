@@ -32,7 +32,7 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
     const iw_config_t *const config = self->config;
     const int32_t applied = iw_magnitude(applied_mm_s);
     const int32_t measured = iw_magnitude(measured_mm_s);
-    const bool clear = applied > IW_FOLLOW_SIGN_MM_S && measured > IW_FOLLOW_SIGN_MM_S;
+    const bool clear = applied > IW_SIGN_MM_S && measured > IW_SIGN_MM_S;
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);
     const int32_t progress = same ? measured : 0;
     const bool stuck =

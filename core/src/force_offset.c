@@ -16,17 +16,16 @@ IW_STATIC_ASSERT(IW_FORCE_WINDOW_SAMPLES <= UINT8_MAX, ring_index_fits);
 IW_STATIC_ASSERT((uint64_t)SPREAD_MAX *SPREAD_MAX *IW_FORCE_WINDOW_SAMPLES <= UINT32_MAX, spread_fits);
 
 static int32_t scale_mN(const iw_force_t *self) {
-    return (self->config->force_unit[self->side] == IW_FORCE_CN) ? 10 : 100;
+    return (self->unit == IW_FORCE_CN) ? 10 : 100;
 }
 
 static bool saturated(int16_t raw) {
     return raw == INT16_MIN || raw == INT16_MAX;
 }
 
-void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side) {
+void iw_force_init(iw_force_t *self, iw_force_unit_t unit) {
     memset(self, 0, sizeof *self);
-    self->config = config;
-    self->side = side;
+    self->unit = unit;
     self->raw_us = IW_NEVER;
     self->offset_us = IW_NEVER;
 }
@@ -180,7 +179,8 @@ void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_
     settle(self, now_us);
 }
 
-iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
+/// Judges a tare without making it. `*out_mean_mN` is what it would make the zero.
+static iw_tare_t judge_tare(const iw_force_t *self, iw_time_us_t now_us, int32_t *out_mean_mN) {
     if (self->count < IW_FORCE_WINDOW_SAMPLES || now_us - self->raw_us >= IW_FORCE_STALE_US) {
         return IW_TARE_NO_FORCE;
     }
@@ -196,12 +196,26 @@ iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
     if (known && far_from_offset(self, quality.mean_mN, IW_FORCE_LOADED_mN)) {
         return IW_TARE_LOADED;
     }
-    adopt(self, now_us, IW_OFFSET_OPERATOR, quality.mean_mN);
+    *out_mean_mN = quality.mean_mN;
     return IW_TARE_OK;
 }
 
+iw_tare_t iw_force_may_tare(const iw_force_t *self, iw_time_us_t now_us) {
+    int32_t mean_mN = 0;
+    return judge_tare(self, now_us, &mean_mN);
+}
+
+iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
+    int32_t mean_mN = 0;
+    const iw_tare_t result = judge_tare(self, now_us, &mean_mN);
+    if (result == IW_TARE_OK) {
+        adopt(self, now_us, IW_OFFSET_OPERATOR, mean_mN);
+    }
+    return result;
+}
+
 static bool unit_contradicted(const iw_force_t *self) {
-    const iw_unit_evidence_t other = (self->config->force_unit[self->side] == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
+    const iw_unit_evidence_t other = (self->unit == IW_FORCE_CN) ? IW_UNIT_DN : IW_UNIT_CN;
     return self->evidence == other;
 }
 

@@ -39,7 +39,7 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     self->purged_us = IW_NEVER;
     for (size_t side = 0; side < IW_SIDES; side++) {
         iw_wheel_init(&self->wheel[side], &self->config, (iw_side_t)side, now_us);
-        iw_force_init(&self->force[side], &self->config, (iw_side_t)side);
+        iw_force_init(&self->force[side], self->config.force_unit[side]);
         iw_follow_init(&self->follow[side], &self->config);
     }
     iw_permit_init(&self->permit, &self->config, now_us, restarted);
@@ -77,14 +77,6 @@ iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t
         iw_setpoint_hasten(&self->setpoint, now_us);
     }
     return refusal;
-}
-
-bool iw_gateway_arming(const iw_gateway_t *self) {
-    return iw_permit_arming(&self->permit);
-}
-
-iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self) {
-    return self->permit.arm_refusal;
 }
 
 /// Both values by one factor, so that the larger is `limit`. True if they had to be.
@@ -173,8 +165,30 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
     iw_permit_disconnect(&self->permit, now_us, client);
 }
 
-iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
-    return iw_force_tare(&self->force[side], now_us);
+static uint32_t side_bit(size_t side) {
+    return (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT;
+}
+
+iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side) {
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        const bool wanted = (sides & side_bit(side)) != 0U;
+        const iw_tare_t result = wanted ? iw_force_may_tare(&self->force[side], now_us) : IW_TARE_OK;
+        if (result != IW_TARE_OK) {
+            *out_side = (iw_side_t)side;
+            return result;
+        }
+    }
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        if ((sides & side_bit(side)) != 0U) {
+            (void)iw_force_tare(&self->force[side], now_us);
+        }
+    }
+    return IW_TARE_OK;
+}
+
+void iw_gateway_restore_offset(iw_gateway_t *self, iw_side_t side, iw_offset_provenance_t provenance,
+                               int32_t offset_mN) {
+    iw_force_restore(&self->force[side], provenance, offset_mN);
 }
 
 void iw_gateway_know(iw_gateway_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry) {
@@ -183,40 +197,4 @@ void iw_gateway_know(iw_gateway_t *self, iw_ledger_item_t item, const iw_ledger_
     } else if (entry->state == IW_LEDGER_CONFIRMED) {
         iw_ledger_confirm(&self->ledger, item, entry->evidence, entry->figure);
     }
-}
-
-/// The operator's word against what the wheel's offset says of the unit, or of the offset: only a tare is to be trusted.
-static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_t validity) {
-    const bool judged = validity == IW_FORCE_UNIT_CONTRADICTED || validity == IW_FORCE_OFFSET_REMOVED;
-    if (!judged) {
-        return validity;
-    }
-    return (force->provenance == IW_OFFSET_OPERATOR) ? IW_FORCE_VALID : IW_FORCE_OFFSET_DOUBTED;
-}
-
-iw_force_validity_t iw_gateway_force_validity(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
-    const iw_force_t *const force = &self->force[side];
-    const iw_ledger_entry_t *const unit = iw_ledger_entry(&self->ledger, iw_ledger_force_unit(side));
-    const iw_ledger_entry_t *const included = iw_ledger_entry(&self->ledger, IW_LEDGER_OFFSET_INCLUDED);
-    const iw_ledger_entry_t *const asked = (force->evidence == IW_UNIT_OFFSET_REMOVED) ? included : unit;
-    iw_force_validity_t validity = iw_force_validity(force, now_us);
-    if (asked->evidence == IW_EVIDENCE_OPERATOR) {
-        validity = overruled(force, validity);
-    }
-    if (validity == IW_FORCE_VALID && unit->state == IW_LEDGER_CONTRADICTED) {
-        return IW_FORCE_UNIT_CONTRADICTED;
-    }
-    if (validity == IW_FORCE_VALID && included->state == IW_LEDGER_CONTRADICTED &&
-        force->provenance != IW_OFFSET_OPERATOR) {
-        return IW_FORCE_OFFSET_REMOVED;
-    }
-    return validity;
-}
-
-iw_state_t iw_gateway_state(const iw_gateway_t *self) {
-    return iw_permit_state(&self->permit);
-}
-
-bool iw_gateway_is_sending(const iw_gateway_t *self) {
-    return iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE;
 }

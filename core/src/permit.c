@@ -85,7 +85,7 @@ static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us)
 }
 
 static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
-    return self->stale_us != IW_NEVER && now_us - self->stale_us < IW_PERMIT_STALE_US;
+    return self->stale_us != IW_NEVER && now_us - self->stale_us < IW_STALE_COMMAND_US;
 }
 
 /// The granted arm comes to nothing: back to where it was asked for.
@@ -176,7 +176,7 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     if (self->view.proven && waited_us <= limit_us) {
         self->phase = IW_PHASE_ARMED;
         self->armed_us = now_us;
-        grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
+        grant_lease(self, now_us, IW_FIRST_LEASE_US);
     } else if (waited_us >= limit_us) {
         end_arming(self, IW_REFUSE_SEND_STALLED);
     }
@@ -292,7 +292,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
     self->holder = client;
     if (self->phase == IW_PHASE_ARMED) {
         self->armed_us = now_us;
-        grant_lease(self, now_us, IW_PERMIT_FIRST_LEASE_US);
+        grant_lease(self, now_us, IW_FIRST_LEASE_US);
     } else {
         begin_arming(self, now_us);
     }

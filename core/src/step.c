@@ -301,7 +301,7 @@ void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     view.timing_ok = !self->facts.timing_contradicted;
     view.can_send = iw_confirmation_may_send(&self->sender.confirmation, IW_LEFT, true) &&
                     iw_confirmation_may_send(&self->sender.confirmation, IW_RIGHT, true);
-    view.proven = iw_confirmation_proven_since(&self->sender.confirmation, self->permit.arming_us);
+    view.proven = iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;
     view.applied = iw_setpoint_applied(&self->setpoint);
     iw_permit_step(&self->permit, now_us, &view);
 }

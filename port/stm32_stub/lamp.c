@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "lamp.h"
 
-uint16_t iw_lamp_pattern(const iw_gateway_t *gateway, bool estop_pressed) {
+uint16_t iw_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed) {
     if (estop_pressed) {
         return IW_LAMP_ESTOP;
     }
-    switch (iw_gateway_state(gateway)) {
+    switch (seen->state) {
     case IW_STATE_ARMED:
         return IW_LAMP_ARMED;
     case IW_STATE_STOPPING:
@@ -14,7 +14,7 @@ uint16_t iw_lamp_pattern(const iw_gateway_t *gateway, bool estop_pressed) {
         return IW_LAMP_LATCHED;
     case IW_STATE_LISTENING:
     default:
-        return (gateway->bus < IW_BUS_PASSIVE) ? IW_LAMP_NO_BUS : IW_LAMP_LISTENING;
+        return (seen->bus < IW_BUS_PASSIVE) ? IW_LAMP_NO_BUS : IW_LAMP_LISTENING;
     }
 }
 

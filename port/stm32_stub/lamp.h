@@ -14,7 +14,7 @@
 #ifndef IW_STM32_LAMP_H
 #define IW_STM32_LAMP_H
 
-#include "iwheel/gateway.h"
+#include "iwheel/snapshot.h"
 
 #define IW_LAMP_SLOT_US 62500U
 
@@ -26,8 +26,8 @@
 #define IW_LAMP_ESTOP      0x00FFU
 #define IW_LAMP_LATCHED    0x0F0FU
 
-/// The pattern for what the gateway is doing; `estop_pressed` is the contact's level.
-uint16_t iw_lamp_pattern(const iw_gateway_t *gateway, bool estop_pressed);
+/// The pattern for what the gateway does; `estop_pressed` is the contact's level.
+uint16_t iw_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed);
 
 /// Whether a pattern's lamp is lit at that time.
 bool iw_lamp_is_lit(uint16_t pattern, iw_time_us_t now_us);

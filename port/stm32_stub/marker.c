@@ -21,19 +21,19 @@ bool iw_marker_take(bool power_on) {
     return was_sending;
 }
 
-void iw_marker_step(const iw_gateway_t *gateway, iw_time_us_t now_us) {
-    const bool silent = iw_permit_demand(&gateway->permit) == IW_DEMAND_SILENCE;
+void iw_marker_step(const iw_snapshot_t *seen) {
+    const bool silent = seen->demand == IW_DEMAND_SILENCE;
     if (!silent) {
         set(true);
     } else if (zeros_proven) {
         set(false);
     }
-    if (silent || !iw_setpoint_is_zero(&gateway->setpoint)) {
+    if (silent || !seen->output_zero) {
         zeros_us = 0;
         zeros_proven = false;
     } else if (zeros_us == 0U) {
-        zeros_us = now_us;
+        zeros_us = seen->at_us;
     } else {
-        zeros_proven = zeros_proven || iw_confirmation_proven_since(&gateway->sender.confirmation, zeros_us);
+        zeros_proven = zeros_proven || seen->confirmed_us >= zeros_us;
     }
 }

@@ -5,7 +5,7 @@
 #ifndef IW_STM32_MARKER_H
 #define IW_STM32_MARKER_H
 
-#include "iwheel/gateway.h"
+#include "iwheel/snapshot.h"
 
 /// True if a run before this start was sending setpoints and no run has ended that: the wheels would keep the last command for their
 /// full second. Ask once, before `iw_marker_step`. `power_on`: RAM holds nothing of such a run.
@@ -13,6 +13,6 @@ bool iw_marker_take(bool power_on);
 
 /// After each step of the gateway. Sets the marker while setpoints are sent; clears it in the silence after a hold in which zeros for both
 /// wheels were acknowledged.
-void iw_marker_step(const iw_gateway_t *gateway, iw_time_us_t now_us);
+void iw_marker_step(const iw_snapshot_t *seen);
 
 #endif

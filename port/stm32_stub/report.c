@@ -49,7 +49,7 @@ void iw_report_start(bool restarted) {
     shown = 0;
 }
 
-static void tell_state(const iw_gateway_t *gateway, bool estop_pressed) {
+static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
     static const char *const states[] = {"listening", "armed", "stopping", "latched"};
     static const char *const buses[] = {"down", "off", "passive", "active"};
     static const char *const causes[IW_CAUSES] = {
@@ -73,14 +73,14 @@ static void tell_state(const iw_gateway_t *gateway, bool estop_pressed) {
         [IW_CAUSE_SHUTDOWN] = "shutdown",
         [IW_CAUSE_RESTART] = "restart",
     };
-    const iw_state_t state = iw_gateway_state(gateway);
+    const iw_state_t state = seen->state;
     iw_console_text(WORDS(states, state));
     if (state == IW_STATE_LATCHED || state == IW_STATE_STOPPING) {
         iw_console_text(" by ");
-        iw_console_text(WORDS(causes, gateway->permit.stop.cause));
+        iw_console_text(WORDS(causes, seen->stop->cause));
     }
     iw_console_text("; bus ");
-    iw_console_text(WORDS(buses, gateway->bus));
+    iw_console_text(WORDS(buses, seen->bus));
     iw_console_text(estop_pressed ? "; e-stop pressed" : "; e-stop released");
     if (state == IW_STATE_LATCHED) {
         iw_console_text("; to reset: mend the cause, release the e-stop, then press the button on");
@@ -89,16 +89,16 @@ static void tell_state(const iw_gateway_t *gateway, bool estop_pressed) {
     iw_console_text("\r\n");
 }
 
-void iw_report_step(const iw_gateway_t *gateway, bool estop_pressed) {
-    const uint32_t state = (uint32_t)iw_gateway_state(gateway);
-    const uint32_t now = 0x80000000U | (estop_pressed ? 0x10000U : 0U) | ((uint32_t)gateway->permit.stop.cause << 8) |
-                         ((uint32_t)gateway->bus << 4) | state;
+void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
+    const uint32_t state = (uint32_t)seen->state;
+    const uint32_t now = 0x80000000U | (estop_pressed ? 0x10000U : 0U) | ((uint32_t)seen->stop->cause << 8) |
+                         ((uint32_t)seen->bus << 4) | state;
     if (iw_console_asked()) {
         iw_report_start(false);
     }
     if (now != shown) {
         shown = now;
-        tell_state(gateway, estop_pressed);
+        tell_state(seen, estop_pressed);
     }
 }
 

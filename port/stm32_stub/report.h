@@ -7,7 +7,7 @@
 #ifndef IW_STM32_REPORT_H
 #define IW_STM32_REPORT_H
 
-#include "iwheel/gateway.h"
+#include "iwheel/snapshot.h"
 
 /// There is no crystal yet.
 void iw_report_no_crystal(void);
@@ -16,7 +16,7 @@ void iw_report_no_crystal(void);
 void iw_report_start(bool restarted);
 
 /// After each step: a line when state, cause, bus or e-stop changed, or somebody asks.
-void iw_report_step(const iw_gateway_t *gateway, bool estop_pressed);
+void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed);
 
 /// How a press of the button that should reset was answered.
 void iw_report_reset(iw_refusal_t refusal);

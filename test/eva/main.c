@@ -150,6 +150,7 @@ static void drive(bool has_current) {
 }
 
 static void request(void) {
+    iw_side_t refused;
     switch (Frama_C_interval(0, 8)) {
     case 0:
         (void)iw_gateway_arm(&gateway, now_us, any_u32(), any_bool());
@@ -170,7 +171,7 @@ static void request(void) {
         iw_gateway_disconnect(&gateway, now_us, any_u32());
         break;
     case 6:
-        (void)iw_gateway_tare(&gateway, now_us, any_bool() ? IW_LEFT : IW_RIGHT);
+        (void)iw_gateway_tare(&gateway, now_us, (uint8_t)Frama_C_interval(IW_SIDES_NONE, IW_SIDES_BOTH), &refused);
         break;
     case 7:
         iw_gateway_suspended(&gateway, any_time());
@@ -202,14 +203,15 @@ static void operate(iw_side_t side) {
         iw_gateway_know(&gateway, item, &entry);
         break;
     default:
-        iw_force_restore(&gateway.force[side], any_bool() ? IW_OFFSET_STORED : IW_OFFSET_OPERATOR,
-                         Frama_C_interval(-IW_FORCE_OFFSET_MAX_mN, IW_FORCE_OFFSET_MAX_mN));
+        iw_gateway_restore_offset(&gateway, side, any_bool() ? IW_OFFSET_STORED : IW_OFFSET_OPERATOR,
+                                  Frama_C_interval(-IW_FORCE_OFFSET_MAX_mN, IW_FORCE_OFFSET_MAX_mN));
         break;
     }
 }
 
 /// What a program shows of the wheels.
 static void look(iw_side_t side) {
+    iw_snapshot_t seen;
     (void)iw_wheel_speed_mm_s(&gateway.wheel[side]);
     (void)iw_wheel_distance_nm(&gateway.wheel[side]);
     (void)iw_force_validity(&gateway.force[side], now_us);
@@ -220,7 +222,7 @@ static void look(iw_side_t side) {
     (void)iw_gateway_arming(&gateway);
     (void)iw_gateway_arm_refusal(&gateway);
     (void)iw_gateway_is_sending(&gateway);
-    (void)iw_gateway_force_validity(&gateway, now_us, side);
+    iw_gateway_snapshot(&gateway, now_us, &seen);
     (void)iw_cause_latches((iw_cause_t)Frama_C_interval(IW_CAUSE_NONE, IW_CAUSES - 1));
     (void)iw_permit_present(&gateway.permit, now_us);
     (void)iw_ledger_entry(&gateway.ledger, IW_LEDGER_DLC);

@@ -9,7 +9,7 @@ from bugs import Bug
 MOTION, REQUESTS = ("unit_daemon_motion",), ("unit_daemon_requests",)
 CAN, GPIO, CLOCK = ("unit_linux_socketcan",), ("unit_linux_gpio_estop",), ("unit_linux_clock",)
 LOOP, DISPATCH, SERVICE = "app/gateway/loop.c", "app/gateway/answers/dispatch.c", "app/gateway/answers/service.c"
-CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c", "app/gateway/ledger/evidence.c"
+CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c", "core/src/evidence.c"
 SOCKETCAN, LOCAL = "port/linux/src/socketcan.c", "port/linux/src/local_bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
 LEARN = "app/ctl/learn/learn.c"

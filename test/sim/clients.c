@@ -114,6 +114,7 @@ static void request_reset(rig_t *rig, const request_t *request, const iw_gateway
 }
 
 static void run_request(rig_t *rig, const request_t *request) {
+    iw_side_t refused;
     const iw_gateway_t before = rig->gateway;
     switch (request->kind) {
     case EV_ONE_DRIVE:
@@ -143,7 +144,7 @@ static void run_request(rig_t *rig, const request_t *request) {
                     request->id == rig->oracle.holder || request->id == rig->oracle.pending_arm);
         break;
     default:
-        (void)iw_gateway_tare(&rig->gateway, rig->now_us, (request->a != 0) ? IW_RIGHT : IW_LEFT);
+        (void)iw_gateway_tare(&rig->gateway, rig->now_us, (request->a != 0) ? IW_SIDES_RIGHT : IW_SIDES_LEFT, &refused);
         break;
     }
     rig_wake(rig, rig->now_us);

@@ -228,7 +228,7 @@ static void begin_core(gw_daemon_t *daemon) {
     const iw_hal_t hal = gw_tape_hal(&daemon->tape, &port);
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_gateway_init(&daemon->gateway, &daemon->config.core, &hal, daemon->now_us,
                                                         gw_runtime_crashed(&daemon->runtime)));
-    gw_evidence_init(&daemon->evidence);
+    iw_motion_evidence_init(&daemon->evidence);
     gw_bus_facts_follow(daemon);
 }
 

@@ -11,7 +11,7 @@ void force_rig_init(force_rig_t *self) {
 
 void force_rig_begin(force_rig_t *self, iw_side_t side, bool boot_seen) {
     memset(&self->force, FIXTURE_POISON, sizeof self->force);
-    iw_force_init(&self->force, &self->config, side);
+    iw_force_init(&self->force, self->config.force_unit[side]);
     iw_force_reopen(&self->force, boot_seen);
 }
 

@@ -201,3 +201,9 @@ bool gateway_rig_told_zero(const gateway_rig_t *self) {
     }
     return true;
 }
+
+iw_snapshot_t gateway_rig_look(const gateway_rig_t *self) {
+    iw_snapshot_t seen;
+    iw_gateway_snapshot(&self->gateway, self->now_us, &seen);
+    return seen;
+}

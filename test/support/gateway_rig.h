@@ -65,4 +65,7 @@ void gateway_rig_foreign(gateway_rig_t *self, uint32_t id);
 /// True if the last setpoints accepted for both wheels are zero.
 bool gateway_rig_told_zero(const gateway_rig_t *self);
 
+/// What is known now.
+iw_snapshot_t gateway_rig_look(const gateway_rig_t *self);
+
 #endif

@@ -40,7 +40,9 @@ static void step(world_rig_t *rig) {
         rig->rx[rig->rx_count++].kind = delivery.port == rig->port ? IW_CAN_ECHO : IW_CAN_RECEIVED;
     }
     (void)iw_gateway_step(&rig->gateway, rig->now_us);
-    gw_evidence_look(&rig->evidence, &rig->gateway, rig->now_us);
+    iw_snapshot_t seen;
+    iw_gateway_snapshot(&rig->gateway, rig->now_us, &seen);
+    iw_motion_evidence_look(&rig->evidence, &rig->gateway, &seen);
 }
 
 void world_rig_run(world_rig_t *self, unsigned for_ms) {
@@ -58,7 +60,7 @@ void world_rig_restart(world_rig_t *self) {
                           .estop_pressed = port_nothing,
                           .context = self};
     memset(&self->evidence, FIXTURE_POISON, sizeof self->evidence);
-    gw_evidence_init(&self->evidence);
+    iw_motion_evidence_init(&self->evidence);
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_gateway_init(&self->gateway, &self->config, &hal, self->now_us, false));
 }
 

@@ -4,8 +4,8 @@
 #define TEST_WORLD_RIG_H
 
 #include "fixture.h"
+#include "iwheel/evidence.h"
 #include "iwheel_sim/world.h"
-#include "ledger/evidence.h"
 
 #define WORLD_RX_MAX 256U
 #define WORLD_CLIENT ((iw_client_t)1)
@@ -14,7 +14,7 @@ typedef struct {
     iw_config_t config;
     sim_world_t world;
     iw_gateway_t gateway;
-    gw_evidence_t evidence;
+    iw_motion_evidence_t evidence;
     iw_time_us_t now_us;
     iw_can_frame_t rx[WORLD_RX_MAX]; ///< What came since the last step.
     unsigned rx_count;

@@ -39,9 +39,17 @@ static void assert_zero(iw_side_t side, iw_offset_provenance_t provenance, int32
     TEST_ASSERT_INT32_WITHIN(300, about_mN, force(side)->offset_mN);
 }
 
+static iw_tare_t tare(iw_side_t side) {
+    iw_side_t refused = side;
+    const iw_tare_t result =
+        iw_gateway_tare(&rig.gateway, rig.now_us, (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, &refused);
+    TEST_ASSERT_EQUAL_INT(side, refused);
+    return result;
+}
+
 static void assert_tare(iw_tare_t expected, iw_side_t side) {
     const iw_force_t before = *force(side);
-    const iw_tare_t result = iw_gateway_tare(&rig.gateway, rig.now_us, side);
+    const iw_tare_t result = tare(side);
     TEST_ASSERT_EQUAL_INT(expected, result);
     if (expected != IW_TARE_OK) {
         TEST_ASSERT_EQUAL_MEMORY(&before, force(side), sizeof before);

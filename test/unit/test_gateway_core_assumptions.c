@@ -127,8 +127,8 @@ static void test_force_validity_follows_sensor_and_ledger(void) {
         force->evidence = cases[i].evidence;
         ledger()->entry[IW_LEDGER_FORCE_UNIT_LEFT] = cases[i].unit;
         ledger()->entry[IW_LEDGER_OFFSET_INCLUDED] = cases[i].included;
-        TEST_ASSERT_EQUAL_INT(cases[i].expected, iw_gateway_force_validity(&rig.gateway, rig.now_us, IW_LEFT));
-        TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_gateway_force_validity(&rig.gateway, rig.now_us, IW_RIGHT));
+        TEST_ASSERT_EQUAL_INT(cases[i].expected, gateway_rig_look(&rig).wheel[IW_LEFT].force_validity);
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, gateway_rig_look(&rig).wheel[IW_RIGHT].force_validity);
     }
 }
 
@@ -137,9 +137,9 @@ static void test_force_validity_of_the_right_wheel_asks_for_its_own_unit(void) {
     force->raw_us = rig.now_us;
     force->provenance = IW_OFFSET_WHEEL;
     iw_ledger_contradict(ledger(), IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_BUS, 0);
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, iw_gateway_force_validity(&rig.gateway, rig.now_us, IW_RIGHT));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, gateway_rig_look(&rig).wheel[IW_RIGHT].force_validity);
     iw_ledger_contradict(ledger(), IW_LEDGER_FORCE_UNIT_RIGHT, IW_EVIDENCE_BUS, 0);
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, iw_gateway_force_validity(&rig.gateway, rig.now_us, IW_RIGHT));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, gateway_rig_look(&rig).wheel[IW_RIGHT].force_validity);
 }
 
 static void hear_empty(uint32_t id, uint8_t length) {

@@ -130,11 +130,31 @@ static void test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels(void) {
     TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, rig.gateway.force[IW_LEFT].quality.window);
 }
 
+static iw_tare_t tare(iw_side_t side) {
+    iw_side_t refused = side;
+    const iw_tare_t result =
+        iw_gateway_tare(&rig.gateway, rig.now_us, (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, &refused);
+    TEST_ASSERT_EQUAL_INT(side, refused);
+    return result;
+}
+
+static void test_gateway_tare_of_both_is_made_whole_or_not_at_all(void) {
+    iw_side_t refused = IW_LEFT;
+    gateway_rig_run(&rig, MS(20));
+    press_for(IW_LEFT, 700, MS(2100));
+    const iw_force_t before = rig.gateway.force[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT(IW_TARE_NO_FORCE, iw_gateway_tare(&rig.gateway, rig.now_us, IW_SIDES_BOTH, &refused));
+    TEST_ASSERT_EQUAL_INT(IW_RIGHT, refused);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway.force[IW_LEFT], sizeof before);
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, iw_gateway_tare(&rig.gateway, rig.now_us, IW_SIDES_NONE, &refused));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway.force[IW_LEFT], sizeof before);
+}
+
 static void test_gateway_tare_makes_the_present_force_zero(void) {
-    TEST_ASSERT_EQUAL_INT(IW_TARE_NO_FORCE, iw_gateway_tare(&rig.gateway, rig.now_us, IW_RIGHT));
+    TEST_ASSERT_EQUAL_INT(IW_TARE_NO_FORCE, tare(IW_RIGHT));
     gateway_rig_run(&rig, MS(20));
     press_for(IW_RIGHT, 70, MS(2100));
-    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, iw_gateway_tare(&rig.gateway, rig.now_us, IW_RIGHT));
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, tare(IW_RIGHT));
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, rig.gateway.force[IW_RIGHT].provenance);
     TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.gateway.force[IW_RIGHT]));
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.gateway.force[IW_LEFT].provenance);
@@ -222,6 +242,7 @@ int main(void) {
     RUN_TEST(test_gateway_turning_wheel_contaminates_its_own_window_only);
     RUN_TEST(test_gateway_force_of_a_wheel_without_speed_frames_is_taken_for_still);
     RUN_TEST(test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels);
+    RUN_TEST(test_gateway_tare_of_both_is_made_whole_or_not_at_all);
     RUN_TEST(test_gateway_tare_makes_the_present_force_zero);
     RUN_TEST(test_gateway_rebooted_wheel_opens_its_window_anew);
     RUN_TEST(test_gateway_status_length_is_noted);

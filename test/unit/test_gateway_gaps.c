@@ -5,19 +5,19 @@
 #include <unity.h>
 
 static gw_gaps_t gaps;
-static iw_sender_t sender;
+static iw_snapshot_sent_t sent;
 
 void setUp(void) {
     memset(&gaps, 0, sizeof gaps);
-    memset(&sender, 0, sizeof sender);
+    memset(&sent, 0, sizeof sent);
 }
 
 void tearDown(void) {}
 
 static void pair_after(uint32_t gap_us) {
-    ++sender.pairs;
-    sender.gap_us = gap_us;
-    gw_gaps_note(&gaps, &sender);
+    ++sent.pairs;
+    sent.gap_us = gap_us;
+    gw_gaps_note(&gaps, &sent);
 }
 
 static void test_first_pair_after_silence_is_no_gap(void) {
@@ -28,8 +28,8 @@ static void test_first_pair_after_silence_is_no_gap(void) {
 
 static void test_step_that_sends_nothing_counts_nothing_twice(void) {
     pair_after(20000U);
-    gw_gaps_note(&gaps, &sender);
-    gw_gaps_note(&gaps, &sender);
+    gw_gaps_note(&gaps, &sent);
+    gw_gaps_note(&gaps, &sent);
     TEST_ASSERT_EQUAL_UINT32(1U, gaps.count[3]);
 }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
 
-#include "iwheel/private/wheel.h"
-
 #include <inttypes.h>
 #include <stdlib.h>
 
@@ -46,7 +44,7 @@ static void put(decoded_t *out, field_t field, int32_t value) {
 }
 
 static void put_status(const iw_codec_status_t *status, decoded_t *out) {
-    const bool hot = status->temperature_degC > IW_WHEEL_TEMPERATURE_MAX_degC;
+    const bool hot = status->temperature_degC > IW_TEMPERATURE_MAX_degC;
     const bool busy = status->cpu_percent > PERCENT_MAX;
     put(out, FIELD_BATTERY, status->battery_dV);
     put(out, FIELD_ODOMETRY, status->odometry_ticks);

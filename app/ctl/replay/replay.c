@@ -76,6 +76,12 @@ static int port_estop(void *context) {
     return ((const replay_t *)context)->estop;
 }
 
+iw_snapshot_t replay_look(const replay_t *self) {
+    iw_snapshot_t seen;
+    iw_gateway_snapshot(&self->gateway, self->now_us, &seen);
+    return seen;
+}
+
 static void begin_core(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, bool restarted) {
     const iw_hal_t hal = {.send = port_send,
                           .receive = port_receive,
@@ -86,10 +92,11 @@ static void begin_core(replay_t *self, const iw_config_t *config, iw_time_us_t a
     (void)iw_gateway_init(&self->gateway, config, &hal, at_us, restarted);
     self->now_us = at_us;
     self->next_us = at_us;
-    self->state = iw_gateway_state(&self->gateway);
-    (void)memcpy(self->ledger, self->gateway.ledger.entry, sizeof self->ledger);
+    const iw_snapshot_t seen = replay_look(self);
+    self->state = seen.state;
+    (void)memcpy(self->ledger, seen.assumed, sizeof self->ledger);
     for (size_t side = 0; side < IW_SIDES; side++) {
-        self->force[side] = iw_force_validity(&self->gateway.force[side], at_us);
+        self->force[side] = seen.wheel[side].force_validity;
     }
 }
 
@@ -164,9 +171,15 @@ static iw_refusal_t drive(replay_t *self, const blackbox_entry_t *entry) {
     return iw_gateway_drive(&self->gateway, sent_us, entry->number, &wanted, &applied);
 }
 
+static void tare(replay_t *self, const blackbox_entry_t *entry) {
+    const uint8_t sides = (entry->a == (uint8_t)IW_RIGHT) ? IW_SIDES_RIGHT : IW_SIDES_LEFT;
+    iw_side_t refused;
+    (void)iw_gateway_tare(&self->gateway, entry->at_us, sides, &refused);
+}
+
 /// What was decided then, beside what is decided now.
 static void compare(replay_t *self, const blackbox_entry_t *entry) {
-    const iw_stop_t *stop = &self->gateway.permit.stop;
+    const iw_stop_t *stop = replay_look(self).stop;
     const bool is_state = entry->kind == (uint8_t)BLACKBOX_STATE;
     const bool same = is_state ? (uint8_t)iw_gateway_state(&self->gateway) == entry->a
                                : (uint8_t)stop->cause == entry->a && stop->sides == entry->b &&
@@ -236,7 +249,7 @@ void replay_event(replay_t *self, const blackbox_entry_t *entry) {
         iw_gateway_disconnect(gateway, entry->at_us, entry->number);
         break;
     case BLACKBOX_TARE:
-        (void)iw_gateway_tare(gateway, entry->at_us, entry->a == (uint8_t)IW_RIGHT ? IW_RIGHT : IW_LEFT);
+        tare(self, entry);
         replay_tell_request(self, entry, IW_REFUSE_NONE);
         break;
     case BLACKBOX_LEDGER:

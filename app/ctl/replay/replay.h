@@ -88,6 +88,9 @@ void replay_step(replay_t *self, iw_time_us_t at_us);
 /// BLACKBOX_FRAME, _STEP and _START are not for here.
 void replay_event(replay_t *self, const blackbox_entry_t *entry);
 
+/// What is known of the wheels after the last step.
+iw_snapshot_t replay_look(const replay_t *self);
+
 /// Tells in a closing line or two what was fed in, and how it compares with what was recorded.
 void replay_finish(const replay_t *self);
 

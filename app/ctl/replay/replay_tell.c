@@ -69,10 +69,10 @@ static const char *side_name(size_t side) {
     return side == IW_LEFT ? "left" : "right";
 }
 
-static void tell_wheels(replay_t *self) {
+static void tell_wheels(replay_t *self, const iw_snapshot_t *seen) {
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const bool heard = iw_wheel_heard(&self->gateway.wheel[side], self->now_us);
-        const iw_force_validity_t force = iw_force_validity(&self->gateway.force[side], self->now_us);
+        const bool heard = seen->wheel[side].heard;
+        const iw_force_validity_t force = seen->wheel[side].force_validity;
         if (heard != self->heard[side]) {
             tell(self, self->now_us, "wheel", "%s %s", side_name(side), heard ? "heard" : "not heard any more");
             self->heard[side] = heard;
@@ -84,9 +84,9 @@ static void tell_wheels(replay_t *self) {
     }
 }
 
-static void tell_ledger(replay_t *self) {
+static void tell_ledger(replay_t *self, const iw_snapshot_t *seen) {
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        const iw_ledger_entry_t *entry = &self->gateway.ledger.entry[item];
+        const iw_ledger_entry_t *entry = &seen->assumed[item];
         if (entry->state != self->ledger[item].state) {
             tell(self, self->now_us, "assumption", "%s: %s by the %s (figure %" PRId32 ")",
                  gw_ledger_item_name((iw_ledger_item_t)item), gw_ledger_state_name(entry->state),
@@ -96,8 +96,7 @@ static void tell_ledger(replay_t *self) {
     }
 }
 
-static void tell_causes(replay_t *self) {
-    const uint32_t present = iw_permit_present(&self->gateway.permit, self->now_us);
+static void tell_causes(replay_t *self, uint32_t present) {
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if (((present ^ self->present) & (1U << cause)) != 0U) {
             tell(self, self->now_us, "fault", "%s%s", gw_cause_name((iw_cause_t)cause),
@@ -107,8 +106,7 @@ static void tell_causes(replay_t *self) {
     self->present = present;
 }
 
-static void tell_stop(replay_t *self) {
-    const iw_stop_t *stop = &self->gateway.permit.stop;
+static void tell_stop(replay_t *self, const iw_stop_t *stop) {
     char sentence[GW_SENTENCE_SIZE];
     char client[32];
     if (stop->number == self->stop_number) {
@@ -123,17 +121,14 @@ static void tell_stop(replay_t *self) {
     self->drive_client = IW_CLIENT_NONE;
 }
 
-static void tell_arming(replay_t *self) {
-    const bool arming = iw_gateway_arming(&self->gateway);
-    if (self->arming && !arming && iw_gateway_state(&self->gateway) != IW_STATE_ARMED) {
-        tell(self, self->now_us, "arm", "refused: %s",
-             gw_error_name(gw_error_of(iw_gateway_arm_refusal(&self->gateway))));
+static void tell_arming(replay_t *self, const iw_snapshot_t *seen) {
+    if (self->arming && !seen->arming && seen->state != IW_STATE_ARMED) {
+        tell(self, self->now_us, "arm", "refused: %s", gw_error_name(gw_error_of(seen->arm_refusal)));
     }
-    self->arming = arming;
+    self->arming = seen->arming;
 }
 
-static void tell_state(replay_t *self) {
-    const iw_state_t state = iw_gateway_state(&self->gateway);
+static void tell_state(replay_t *self, iw_state_t state) {
     if (state != self->state) {
         tell(self, self->now_us, "state", "%s", gw_state_name(state));
         self->state = state;
@@ -142,12 +137,13 @@ static void tell_state(replay_t *self) {
 }
 
 void replay_tell_step(replay_t *self) {
-    tell_wheels(self);
-    tell_ledger(self);
-    tell_causes(self);
-    tell_stop(self);
-    tell_arming(self);
-    tell_state(self);
+    const iw_snapshot_t seen = replay_look(self);
+    tell_wheels(self, &seen);
+    tell_ledger(self, &seen);
+    tell_causes(self, seen.present);
+    tell_stop(self, seen.stop);
+    tell_arming(self, &seen);
+    tell_state(self, seen.state);
 }
 
 static void tell_drive(replay_t *self, const blackbox_entry_t *entry, const char *result) {
@@ -220,7 +216,7 @@ void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry)
         tell(self, entry->at_us, "DIFFERENT", "state %s, when it was recorded %s",
              gw_state_name(iw_gateway_state(&self->gateway)), gw_state_name((iw_state_t)entry->a));
     } else {
-        const iw_stop_t *stop = &self->gateway.permit.stop;
+        const iw_stop_t *stop = replay_look(self).stop;
         tell(self, entry->at_us, "DIFFERENT", "last stop %s (%u), when it was recorded %s (%" PRId64 ")",
              gw_cause_name(stop->cause), (unsigned)stop->detail, gw_cause_name((iw_cause_t)entry->a), entry->as.value);
     }
@@ -255,7 +251,7 @@ static void sum_up_as_json(const replay_t *self) {
     put_object(&self->out,
                json_pack("{s:s,s:s,s:I,s:I,s:I,s:o}", "event", "summary", "state",
                          gw_state_name(iw_gateway_state(&self->gateway)), "stops",
-                         (json_int_t)self->gateway.permit.stop.number, "frames", (json_int_t)self->total_frames,
+                         (json_int_t)replay_look(self).stop->number, "frames", (json_int_t)self->total_frames,
                          "setpoint_frames", (json_int_t)self->total_sent, "as_recorded", compared));
 }
 
@@ -264,9 +260,10 @@ void replay_finish(const replay_t *self) {
         sum_up_as_json(self);
         return;
     }
+    const uint32_t stops = replay_look(self).stop->number;
     replay_note(&self->out, "end: %s, %u stop%s, %" PRIu64 " frames in, %" PRIu64 " setpoint frames out",
-                gw_state_name(iw_gateway_state(&self->gateway)), (unsigned)self->gateway.permit.stop.number,
-                self->gateway.permit.stop.number == 1U ? "" : "s", self->total_frames, self->total_sent);
+                gw_state_name(iw_gateway_state(&self->gateway)), (unsigned)stops, stops == 1U ? "" : "s",
+                self->total_frames, self->total_sent);
     for (size_t i = 0; i < SCORES; i++) {
         const replay_score_t score = score_of(self, i);
         if (score.same + score.different > 0U) {

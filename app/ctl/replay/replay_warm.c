@@ -15,7 +15,7 @@ static int16_t obedient_rpm(const replay_t *self, size_t side, const iw_can_fram
     if (setpoint == NULL || iw_codec_decode(setpoint, told) != IW_CODEC_SETPOINT) {
         return 0;
     }
-    return (int16_t)(told[side].setpoint.speed_mm_s * 1000 / (int32_t)self->gateway.wheel[side].um_s_per_rpm);
+    return (int16_t)(told[side].setpoint.speed_mm_s * 1000 / (int32_t)replay_look(self).wheel[side].um_s_per_rpm);
 }
 
 /// A cycle of the made-up bus: both wheels show what they were told last.
@@ -45,11 +45,12 @@ static iw_time_us_t ramp_us(const iw_config_t *config, const blackbox_drive_t *d
 }
 
 static void keep_driving(replay_t *self, const blackbox_entry_t *state, iw_time_us_t at_us) {
-    iw_drive_t wanted = {.has_current = self->gateway.config.current_role == IW_ROLE_SETPOINT};
+    const iw_config_t *config = replay_look(self).config;
+    iw_drive_t wanted = {.has_current = config->current_role == IW_ROLE_SETPOINT};
     iw_applied_t applied;
     for (size_t side = 0; side < IW_SIDES; side++) {
         wanted.speed_mm_s[side] = state->as.drive.speed_mm_s[side];
-        wanted.current_mA[side] = wanted.has_current ? (int32_t)self->gateway.config.max_current_mA : 0;
+        wanted.current_mA[side] = wanted.has_current ? (int32_t)config->max_current_mA : 0;
     }
     (void)iw_gateway_drive(&self->gateway, at_us, state->number, &wanted, &applied);
 }
@@ -57,7 +58,7 @@ static void keep_driving(replay_t *self, const blackbox_entry_t *state, iw_time_
 /// Arms for the recorded holder, drives until the ramp is through; returns when it is.
 static void drive_up(replay_t *self, const blackbox_entry_t *state, iw_time_us_t from_us) {
     iw_can_frame_t last[IW_SIDES] = {0};
-    const iw_time_us_t rest_us = (iw_time_us_t)self->gateway.config.rest_ms * IW_US_PER_MS;
+    const iw_time_us_t rest_us = (iw_time_us_t)replay_look(self).config->rest_ms * IW_US_PER_MS;
     const bool moves = state->a != (uint8_t)IW_STATE_LISTENING;
     bool asked = false;
     for (iw_time_us_t at_us = from_us; at_us < state->at_us; at_us += PERIOD_US) {

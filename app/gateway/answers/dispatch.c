@@ -109,12 +109,12 @@ static void do_watch(const call_t *call) {
     send_reply(client, &json);
 }
 
-static void reply_armed(gw_daemon_t *daemon, gw_client_t *client, const gw_id_t *id) {
-    const iw_stop_budget_t budget = iw_config_stop_budget(&daemon->gateway.config);
-    json_out_t json = begin_reply(daemon, id);
-    json_out_text(&json, "state", gw_state_name(iw_gateway_state(&daemon->gateway)));
-    json_out_int(&json, "lease_ms", daemon->gateway.config.lease_ms);
-    json_out_int(&json, "first_lease_ms", IW_PERMIT_FIRST_LEASE_US / IW_US_PER_MS);
+static void reply_armed(gw_daemon_t *daemon, const iw_snapshot_t *seen, gw_client_t *client) {
+    const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
+    json_out_t json = begin_reply(daemon, &client->arm_id);
+    json_out_text(&json, "state", gw_state_name(seen->state));
+    json_out_int(&json, "lease_ms", seen->config->lease_ms);
+    json_out_int(&json, "first_lease_ms", IW_FIRST_LEASE_US / IW_US_PER_MS);
     json_out_int(&json, "stop_budget_ms", budget.client_lost_ms);
     json_out_int(&json, "stop_budget_mm", budget.client_lost_mm);
     json_out_open(&json, "warnings", '[');
@@ -148,21 +148,21 @@ static void do_arm(const call_t *call) {
 }
 
 void gw_dispatch_arming(gw_daemon_t *daemon) {
-    const iw_permit_t *permit = &daemon->gateway.permit;
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
         gw_client_t *client = &daemon->client[i];
-        const bool holds = permit->holder == client->id;
-        if (client->id == IW_CLIENT_NONE || !client->arming || (holds && iw_gateway_arming(&daemon->gateway))) {
+        const bool holds = seen.holder == client->id;
+        if (client->id == IW_CLIENT_NONE || !client->arming || (holds && seen.arming)) {
             continue;
         }
         client->arming = false;
         gw_client_check_caught_up(client, daemon->now_us);
-        if (holds && iw_gateway_state(&daemon->gateway) == IW_STATE_ARMED) {
-            reply_armed(daemon, client, &client->arm_id);
+        if (holds && seen.state == IW_STATE_ARMED) {
+            reply_armed(daemon, &seen, client);
             continue;
         }
         const gw_request_t request = {.cmd = GW_CMD_ARM};
-        const iw_refusal_t refusal = iw_gateway_arm_refusal(&daemon->gateway);
+        const iw_refusal_t refusal = seen.arm_refusal;
         gw_refusal_t words;
         gw_refuse_describe(daemon, &request, refusal == IW_REFUSE_NONE ? IW_REFUSE_NOT_ARMED : refusal, &words);
         send_refusal(daemon, client, &client->arm_id, &words);
@@ -175,12 +175,13 @@ static int32_t saturate(int64_t value) {
 }
 
 static iw_refusal_t judge_drive(const call_t *call, const iw_drive_t *wanted, iw_applied_t *out_applied) {
-    iw_gateway_t *gateway = &call->daemon->gateway;
+    gw_daemon_t *daemon = call->daemon;
+    const iw_time_us_t armed_us = gw_daemon_look(daemon).armed_us;
     const iw_time_us_t sent_us =
-        gw_client_sent_us(call->client, call->daemon->now_us, gateway->permit.armed_us); // It may have waited for us.
-    const iw_refusal_t refusal = iw_gateway_drive(gateway, sent_us, call->client->id, wanted, out_applied);
-    const blackbox_entry_t entry = {.at_us = call->daemon->now_us, .number = call->client->id, .b = (uint8_t)refusal};
-    gw_tape_drive(&call->daemon->tape, &entry, wanted, sent_us);
+        gw_client_sent_us(call->client, daemon->now_us, armed_us); // It may have waited for us.
+    const iw_refusal_t refusal = iw_gateway_drive(&daemon->gateway, sent_us, call->client->id, wanted, out_applied);
+    const blackbox_entry_t entry = {.at_us = daemon->now_us, .number = call->client->id, .b = (uint8_t)refusal};
+    gw_tape_drive(&daemon->tape, &entry, wanted, sent_us);
     return refusal;
 }
 
@@ -228,7 +229,7 @@ static void do_twist(const call_t *call) {
     const int64_t yaw = call->request->yaw_mrad_s;
     const int64_t v_mm_s = v > limit ? limit : v < -limit ? -limit : v;
     const int64_t yaw_mrad_s = yaw > limit ? limit : yaw < -limit ? -limit : yaw;
-    if (yaw != 0 && iw_ledger_entry(&call->daemon->gateway.ledger, IW_LEDGER_TRACK)->state == IW_LEDGER_CONTRADICTED) {
+    if (yaw != 0 && gw_daemon_look(call->daemon).assumed[IW_LEDGER_TRACK].state == IW_LEDGER_CONTRADICTED) {
         refuse_turn(call);
         return;
     }
@@ -266,42 +267,48 @@ static void do_reset(const call_t *call) {
     reply_state(call);
 }
 
+/// What was in force before a tare.
+typedef struct {
+    iw_offset_provenance_t provenance;
+    iw_time_us_t offset_us;
+    int32_t offset_mN;
+} zero_t;
+
+static zero_t zero_of(const iw_force_t *force) {
+    return (zero_t){.provenance = force->provenance, .offset_us = force->offset_us, .offset_mN = force->offset_mN};
+}
+
 /// The zero of one wheel after a tare, and before.
-static void write_tare(const gw_daemon_t *daemon, iw_side_t side, const iw_force_t *before, json_out_t *json) {
-    const iw_force_quality_t *quality = &daemon->knowledge.tare[side];
-    const bool knew = before->provenance != IW_OFFSET_NONE;
-    json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
-    json_out_int(json, "offset_mN", daemon->gateway.force[side].offset_mN);
+static void write_tare(const iw_force_t *force, const iw_force_quality_t *quality, const zero_t *before,
+                       json_out_t *json) {
+    json_out_int(json, "offset_mN", force->offset_mN);
     json_out_int(json, "samples", quality->samples);
     json_out_int(json, "deviation_mN", quality->deviation_mN);
     json_out_int(json, "drift_mN", quality->drift_mN);
-    json_out_known(json, "before_mN", knew, before->offset_mN);
+    json_out_known(json, "before_mN", before->provenance != IW_OFFSET_NONE, before->offset_mN);
     json_out_text(json, "before_provenance", gw_offset_word(before->provenance, before->offset_us));
-    json_out_close(json, '}');
 }
 
-/// Both wheels or none: tried on copies first.
 static void do_tare(const call_t *call) {
     gw_daemon_t *daemon = call->daemon;
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
-        iw_force_t trial = daemon->gateway.force[side];
-        const bool wanted = (call->request->sides & (1U << side)) != 0U;
-        const iw_tare_t result = wanted ? iw_force_tare(&trial, daemon->now_us) : IW_TARE_OK;
-        if (result != IW_TARE_OK) {
-            gw_refusal_t words;
-            gw_refuse_describe_tare((iw_side_t)side, result, &words);
-            send_refusal(daemon, call->client, &call->request->id, &words);
-            return;
-        }
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
+    const zero_t before[IW_SIDES] = {zero_of(seen.wheel[IW_LEFT].force), zero_of(seen.wheel[IW_RIGHT].force)};
+    iw_side_t refused = IW_LEFT;
+    const iw_tare_t result = gw_knowledge_tare(daemon, call->request->sides, &refused);
+    if (result != IW_TARE_OK) {
+        gw_refusal_t words;
+        gw_refuse_describe_tare(refused, result, &words);
+        send_refusal(daemon, call->client, &call->request->id, &words);
+        return;
     }
-    const iw_force_t before[IW_SIDES] = {daemon->gateway.force[IW_LEFT], daemon->gateway.force[IW_RIGHT]};
     json_out_t json = begin_reply(daemon, &call->request->id);
-    json_out_text(&json, "state", gw_state_name(iw_gateway_state(&daemon->gateway)));
+    json_out_text(&json, "state", gw_state_name(seen.state));
     for (unsigned side = 0; side < IW_SIDES; ++side) {
         if ((call->request->sides & (1U << side)) != 0U) {
-            const iw_tare_t result = gw_knowledge_tare(daemon, (iw_side_t)side);
             note(call, &(blackbox_entry_t){.kind = BLACKBOX_TARE, .a = (uint8_t)side, .b = (uint8_t)result});
-            write_tare(daemon, (iw_side_t)side, &before[side], &json);
+            json_out_open(&json, side == IW_LEFT ? "left" : "right", '{');
+            write_tare(seen.wheel[side].force, &daemon->knowledge.tare[side], &before[side], &json);
+            json_out_close(&json, '}');
         }
     }
     send_reply(call->client, &json);

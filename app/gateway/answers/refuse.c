@@ -10,6 +10,7 @@
 /// Where a message is being written.
 typedef struct {
     gw_daemon_t *daemon;
+    iw_snapshot_t seen;
     const gw_request_t *request;
     char *text;
     size_t size;
@@ -31,12 +32,11 @@ static void name_client(gw_daemon_t *daemon, iw_client_t id, char *out_text, siz
 }
 
 static void say_holder(const wording_t *self) {
-    const iw_permit_t *permit = &self->daemon->gateway.permit;
+    const iw_snapshot_t *seen = &self->seen;
     char holder[GW_CLIENT_TEXT_SIZE];
-    name_client(self->daemon, permit->holder, holder, sizeof holder);
-    const uint64_t left_ms = iw_permit_arming(permit) || permit->lease_until_us <= self->daemon->now_us
-                                 ? 0U
-                                 : (permit->lease_until_us - self->daemon->now_us) / IW_US_PER_MS;
+    name_client(self->daemon, seen->holder, holder, sizeof holder);
+    const uint64_t left_ms =
+        seen->arming || seen->lease_until_us <= seen->at_us ? 0U : (seen->lease_until_us - seen->at_us) / IW_US_PER_MS;
     SAY(self,
         "%s holds the lease for another %" PRIu64
         " ms at least; let it stop first, or, with the wheels at rest, arm with takeover",
@@ -45,8 +45,8 @@ static void say_holder(const wording_t *self) {
 
 static void say_not_armed(const wording_t *self) {
     const gw_daemon_t *daemon = self->daemon;
-    const iw_stop_t *stop = &daemon->gateway.permit.stop;
-    const char *state = gw_state_name(iw_gateway_state(&daemon->gateway));
+    const iw_stop_t *stop = self->seen.stop;
+    const char *state = gw_state_name(self->seen.state);
     if (daemon->shutting_down) {
         SAY(self, "not armed: the gateway is shutting down");
     } else if (stop->number > 0U) {
@@ -71,8 +71,8 @@ static void say_lost(const wording_t *self) {
     const gw_daemon_t *daemon = self->daemon;
     size_t length = 0;
     for (unsigned side = 0; side < IW_SIDES; ++side) {
-        const iw_wheel_t *wheel = &daemon->gateway.wheel[side];
-        if (iw_wheel_heard(wheel, daemon->now_us) || length >= self->size) {
+        const iw_snapshot_wheel_t *wheel = &self->seen.wheel[side];
+        if (wheel->heard || length >= self->size) {
             continue;
         }
         char *end = &self->text[length];
@@ -90,23 +90,22 @@ static void say_lost(const wording_t *self) {
 }
 
 static void say_not_at_rest(const wording_t *self) {
-    const iw_gateway_t *gateway = &self->daemon->gateway;
-    const iw_pair_t applied = iw_setpoint_applied(&gateway->setpoint);
+    const iw_snapshot_t *seen = &self->seen;
     SAY(self,
         "the wheels turn or are told to: left %d rpm, told %d mm/s; right %d rpm, told %d mm/s; wait until both stand "
         "for %u ms",
-        gateway->wheel[IW_LEFT].speed.speed_rpm, applied.wheel[IW_LEFT].speed_mm_s,
-        gateway->wheel[IW_RIGHT].speed.speed_rpm, applied.wheel[IW_RIGHT].speed_mm_s, gateway->config.rest_ms);
+        seen->wheel[IW_LEFT].told->speed.speed_rpm, seen->applied.wheel[IW_LEFT].speed_mm_s,
+        seen->wheel[IW_RIGHT].told->speed.speed_rpm, seen->applied.wheel[IW_RIGHT].speed_mm_s, seen->config->rest_ms);
 }
 
 static void say_stalled(const wording_t *self) {
     static const char cure[] = "check that the wheels have power and the bus is terminated";
     const gw_daemon_t *daemon = self->daemon;
-    const iw_time_us_t waiting_us = iw_confirmation_waiting_us(&daemon->gateway.sender.confirmation);
+    const iw_time_us_t waiting_us = self->seen.waiting_us;
     const char *bus = daemon->config.bus.interface;
     if (waiting_us == IW_NEVER) {
-        SAY(self, "the zero setpoints were not acknowledged on the bus within %u ms; %s",
-            daemon->gateway.config.echo_ms, cure);
+        SAY(self, "the zero setpoints were not acknowledged on the bus within %u ms; %s", self->seen.config->echo_ms,
+            cure);
     } else if (iw_linux_hal_link(&daemon->hal)->presence == IW_LINK_LOCAL) {
         SAY(self, "a setpoint has been waiting for %" PRIu64 " ms to be acknowledged on the bus; %s",
             ms_since(daemon, waiting_us), cure);
@@ -119,19 +118,18 @@ static void say_stalled(const wording_t *self) {
 }
 
 static void say_stale(const wording_t *self) {
-    const iw_permit_t *permit = &self->daemon->gateway.permit;
     char client[GW_CLIENT_TEXT_SIZE];
-    name_client(self->daemon, permit->stale_client, client, sizeof client);
+    name_client(self->daemon, self->seen.stale_client, client, sizeof client);
     if (self->request->cmd == GW_CMD_DRIVE || self->request->cmd == GW_CMD_TWIST) {
         SAY(self, "this command was sent before arm was answered; wait for that answer, then command anew");
         return;
     }
     SAY(self, "%s sent a nonzero drive command %" PRIu64 " ms ago; let go of the stick, wait %u ms, try again", client,
-        ms_since(self->daemon, permit->stale_us), IW_PERMIT_STALE_US / IW_US_PER_MS);
+        ms_since(self->daemon, self->seen.stale_us), IW_STALE_COMMAND_US / IW_US_PER_MS);
 }
 
 static void say_second_master(const wording_t *self) {
-    const iw_time_us_t seen_us = self->daemon->gateway.permit.seen_us[IW_CAUSE_SECOND_MASTER];
+    const iw_time_us_t seen_us = self->seen.seen_us[IW_CAUSE_SECOND_MASTER];
     SAY(self,
         "somebody else sent a setpoint (id 266 = 0x10A or 298 = 0x12A) %" PRIu64
         " ms ago; switch the other sender off, wait a second",
@@ -139,22 +137,21 @@ static void say_second_master(const wording_t *self) {
 }
 
 static void say_present(const wording_t *self) {
-    const iw_permit_t *permit = &self->daemon->gateway.permit;
-    const uint32_t present = iw_permit_present(permit, self->daemon->now_us);
+    const uint32_t present = self->seen.present;
     for (unsigned cause = 0; cause < IW_CAUSES; ++cause) {
         if ((present & (1U << cause)) != 0U) {
             SAY(self, "%s was seen %" PRIu64 " ms ago; %s, and wait a second", gw_cause_name((iw_cause_t)cause),
-                ms_since(self->daemon, permit->seen_us[cause]), gw_why_cure((iw_cause_t)cause));
+                ms_since(self->daemon, self->seen.seen_us[cause]), gw_why_cure((iw_cause_t)cause));
             return;
         }
     }
     SAY(self, "zeros are still being sent because the gateway died while armed; wait %u ms",
-        self->daemon->gateway.config.zero_hold_ms);
+        self->seen.config->zero_hold_ms);
 }
 
 static void say_out_of_range(const wording_t *self) {
     const gw_request_t *request = self->request;
-    const bool setpoint = self->daemon->gateway.config.current_role == IW_ROLE_SETPOINT;
+    const bool setpoint = self->seen.config->current_role == IW_ROLE_SETPOINT;
     if (request->cmd == GW_CMD_TWIST) {
         SAY(self, "%" PRId64 " mm/s with %" PRId64 " mrad/s makes a wheel faster than 32767 mm/s; nothing was applied",
             request->v_mm_s, request->yaw_mrad_s);
@@ -166,7 +163,7 @@ static void say_out_of_range(const wording_t *self) {
 }
 
 static void say_type(const wording_t *self) {
-    const iw_config_t *config = &self->daemon->gateway.config;
+    const iw_config_t *config = self->seen.config;
     const bool both = !config->setpoint_type_set && config->current_role == IW_ROLE_UNSET;
     SAY(self,
         "%s%s%s not configured, and the wheels' document leaves %s open; set %s under [wheels] in the configuration",
@@ -182,8 +179,8 @@ static void say_bus_down(const wording_t *self) {
     const gw_daemon_t *daemon = self->daemon;
     const char *bus = daemon->config.bus.interface;
     const bool local = iw_linux_hal_link(&daemon->hal)->presence == IW_LINK_LOCAL;
-    const bool off = daemon->gateway.bus == IW_BUS_OFF;
-    SAY(self, "bus %s is %s; %s%s", bus, gw_bus_state_name(daemon->gateway.bus),
+    const bool off = self->seen.bus == IW_BUS_OFF;
+    SAY(self, "bus %s is %s; %s%s", bus, gw_bus_state_name(self->seen.bus),
         local && off ? "end it in the simulator: iwheel-sim busoff off"
         : local      ? "start the simulator: iwheel-sim --can "
         : off        ? "check cable, termination and bit rate; what else: iwheelctl doctor "
@@ -211,15 +208,15 @@ static void say_listen_only(const wording_t *self) {
 }
 
 static void write_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, char *out_text, size_t size) {
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
     char evidence[GW_EVIDENCE_SIZE];
-    gw_assumption_evidence(item, iw_ledger_entry(&daemon->gateway.ledger, item),
-                           &daemon->knowledge.known.item[item].word, evidence);
+    gw_assumption_evidence(item, &seen.assumed[item], &daemon->knowledge.known.item[item].word, evidence);
     (void)snprintf(out_text, size, "%s is contradicted: %s; %s", gw_ledger_item_name(item), evidence,
                    gw_assumption_cost(item));
 }
 
 static void say_contradicted(const wording_t *self) {
-    write_contradicted(self->daemon, iw_ledger_doubt(&self->daemon->gateway.ledger), self->text, self->size);
+    write_contradicted(self->daemon, self->seen.doubt, self->text, self->size);
 }
 
 void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_refusal_t refusal,
@@ -236,7 +233,8 @@ void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_ref
         [IW_REFUSE_STALE_COMMAND] = say_stale,       [IW_REFUSE_LISTEN_ONLY] = say_listen_only,
         [IW_REFUSE_CONTRADICTED] = say_contradicted,
     };
-    const wording_t wording = {daemon, request, out_refusal->message, sizeof out_refusal->message};
+    const wording_t wording = {daemon, gw_daemon_look(daemon), request, out_refusal->message,
+                               sizeof out_refusal->message};
     out_refusal->error = gw_error_of(refusal);
     if ((size_t)refusal < sizeof say / sizeof say[0] && say[refusal] != NULL) {
         say[refusal](&wording);

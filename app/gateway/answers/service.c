@@ -162,7 +162,7 @@ typedef bool (*service_t)(gw_daemon_t *daemon, gw_client_t *client);
 /// of them is served. True if all were.
 static bool go_round(gw_daemon_t *daemon, service_t service, uint32_t *next) {
     iw_time_us_t end_us = 0; // Of the time for all but the first.
-    gw_client_t *holder = gw_daemon_client(daemon, daemon->gateway.permit.holder);
+    gw_client_t *holder = gw_daemon_client(daemon, gw_daemon_look(daemon).holder);
     const uint32_t first = *next;
     bool worked = false;
     if (holder != NULL) {

@@ -43,11 +43,12 @@ void gw_record_stop(gw_daemon_t *daemon) {
 }
 
 void gw_record_state(gw_daemon_t *daemon, iw_state_t before) {
-    const iw_pair_t applied = iw_setpoint_applied(&daemon->gateway.setpoint);
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
+    const iw_pair_t applied = seen.applied;
     blackbox_entry_t entry = {.at_us = daemon->now_us,
                               .kind = BLACKBOX_STATE,
-                              .number = daemon->gateway.permit.holder,
-                              .a = (uint8_t)iw_gateway_state(&daemon->gateway),
+                              .number = seen.holder,
+                              .a = (uint8_t)seen.state,
                               .b = (uint8_t)before};
     for (unsigned side = 0; side < IW_SIDES; ++side) {
         entry.as.drive.speed_mm_s[side] = applied.wheel[side].speed_mm_s;
@@ -57,7 +58,7 @@ void gw_record_state(gw_daemon_t *daemon, iw_state_t before) {
 }
 
 void gw_record_assumption(gw_daemon_t *daemon, iw_ledger_item_t item) {
-    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
+    const iw_ledger_entry_t *entry = &gw_daemon_look(daemon).assumed[item];
     gw_tape_put(&daemon->tape, &(blackbox_entry_t){.at_us = daemon->now_us,
                                                    .kind = BLACKBOX_LEDGER,
                                                    .number = (uint32_t)entry->evidence,
@@ -69,7 +70,7 @@ void gw_record_assumption(gw_daemon_t *daemon, iw_ledger_item_t item) {
 void gw_record_again(gw_daemon_t *daemon) {
     if (gw_tape_again(&daemon->tape, daemon->now_us)) {
         gw_record_state(daemon, iw_gateway_state(&daemon->gateway));
-        const iw_ledger_item_t doubt = iw_ledger_doubt(&daemon->gateway.ledger);
+        const iw_ledger_item_t doubt = gw_daemon_look(daemon).doubt;
         if (doubt != IW_LEDGER_ITEMS) {
             gw_record_assumption(daemon, doubt);
         }

@@ -59,7 +59,7 @@ __attribute__((format(printf, 2, 3))) static void warn(gw_daemon_t *daemon, cons
 }
 
 static void note_left_behind(gw_daemon_t *daemon) {
-    if (daemon->gateway.left_behind) {
+    if (gw_daemon_look(daemon).left_behind) {
         char sentence[GW_WARNING_SIZE];
         gw_bus_left_sentence(iw_linux_hal_link(&daemon->hal), daemon->config.bus.interface, sentence, sizeof sentence);
         warn(daemon, "%s", sentence);
@@ -95,7 +95,7 @@ static void note_warnings(gw_daemon_t *daemon) {
 static void tell_left_behind(gw_daemon_t *daemon) {
     const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
     const char *bus = daemon->config.bus.interface;
-    daemon->left_told = daemon->gateway.left_behind;
+    daemon->left_told = gw_daemon_look(daemon).left_behind;
     if (daemon->left_told) {
         char sentence[GW_WARNING_SIZE];
         gw_bus_left_sentence(link, bus, sentence, sizeof sentence);
@@ -110,7 +110,7 @@ static void tell_left_behind(gw_daemon_t *daemon) {
 
 void gw_bus_facts_follow(gw_daemon_t *daemon) {
     const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
-    if (daemon->left_told != daemon->gateway.left_behind) {
+    if (daemon->left_told != gw_daemon_look(daemon).left_behind) {
         tell_left_behind(daemon);
     }
     if (daemon->link_known && link->changes == daemon->link_changes) {

@@ -3,12 +3,12 @@
 
 const uint16_t gw_gap_limits_ms[GW_GAP_BUCKETS - 1U] = {5, 10, 15, 20, 25, 30, 40, 50, 100};
 
-void gw_gaps_note(gw_gaps_t *self, const iw_sender_t *sender) {
-    if (sender->pairs == self->pairs) {
+void gw_gaps_note(gw_gaps_t *self, const iw_snapshot_sent_t *sent) {
+    if (sent->pairs == self->pairs) {
         return;
     }
-    self->pairs = sender->pairs;
-    const uint32_t gap_us = sender->gap_us;
+    self->pairs = sent->pairs;
+    const uint32_t gap_us = sent->gap_us;
     if (gap_us == 0U) {
         return; // The first pair after silence.
     }

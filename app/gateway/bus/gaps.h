@@ -6,7 +6,7 @@
 #ifndef GATEWAY_GAPS_H
 #define GATEWAY_GAPS_H
 
-#include "iwheel/private/transmit.h"
+#include "iwheel/snapshot.h"
 #include "json/json_out.h"
 
 #define GW_GAP_BUCKETS 10U
@@ -14,14 +14,14 @@
 typedef struct {
     uint32_t count[GW_GAP_BUCKETS]; ///< Gaps up to `gw_gap_limits_ms` of the bucket; the last bucket has no limit.
     uint32_t worst_us;
-    uint32_t pairs; ///< Of the sender, when last looked at.
+    uint32_t pairs; ///< When last looked at.
 } gw_gaps_t;
 
 /// Upper bounds, inclusive, of all buckets but the last.
 extern const uint16_t gw_gap_limits_ms[GW_GAP_BUCKETS - 1U];
 
-/// Looks at the sender after a step, which sends one pair at the most.
-void gw_gaps_note(gw_gaps_t *self, const iw_sender_t *sender);
+/// Looks at what was sent after a step, which sends one pair at the most.
+void gw_gaps_note(gw_gaps_t *self, const iw_snapshot_sent_t *sent);
 
 /// Writes the object's fields.
 void gw_gaps_write(const gw_gaps_t *self, json_out_t *json);

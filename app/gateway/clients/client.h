@@ -11,7 +11,7 @@
 
 #include "request.h"
 
-#include "iwheel/private/permit.h"
+#include "iwheel/types.h"
 
 /// The longest reply or event with its newline.
 #define GW_REPLY_MAX 65537U

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "bounds.h"
 
-#include "evidence.h"
-
 #include "iwheel/codec.h"
-#include "iwheel/private/follow.h"
+#include "iwheel/evidence.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -34,19 +32,19 @@ static int32_t largest_rpm(void) {
 
 static bool fits_sign(int32_t figure, bool confirmed) {
     const int32_t along = confirmed ? figure : -figure;
-    return along > IW_FOLLOW_SIGN_MM_S && along <= -INT16_MIN * largest_rpm();
+    return along > IW_SIGN_MM_S && along <= -INT16_MIN * largest_rpm();
 }
 
 /// Within 15 % of the speed it was told, and 1 rpm.
 static bool fits_type(int32_t figure) {
-    const int32_t share = 150 + largest_rpm() * 1000 / GW_EVIDENCE_TYPE_MM_S;
+    const int32_t share = 150 + largest_rpm() * 1000 / IW_EVIDENCE_TYPE_MM_S;
     return within(figure, 1000 - share, 1000 + share);
 }
 
 static bool fits_pose(int32_t figure, bool confirmed) {
-    const int32_t step = GW_EVIDENCE_POSE_FACTOR * 1000;
+    const int32_t step = IW_EVIDENCE_POSE_FACTOR * 1000;
     return confirmed ? within(figure, step, INT64_C(3000) * -INT16_MIN)
-                     : within(figure, 0, 1000 / GW_EVIDENCE_POSE_FACTOR);
+                     : within(figure, 0, 1000 / IW_EVIDENCE_POSE_FACTOR);
 }
 
 static bool fits_included(int32_t figure, bool confirmed) {
@@ -55,7 +53,7 @@ static bool fits_included(int32_t figure, bool confirmed) {
 }
 
 static bool fits_gear(int32_t figure, bool confirmed) {
-    const int32_t share = confirmed ? GW_EVIDENCE_FITS_PERMILLE : GW_EVIDENCE_FAILS_PERMILLE;
+    const int32_t share = confirmed ? IW_EVIDENCE_FITS_PERMILLE : IW_EVIDENCE_FAILS_PERMILLE;
     return within(figure, 1000 - share, 1000 + share) == confirmed;
 }
 

@@ -27,7 +27,7 @@ void gw_knowledge_open(gw_knowledge_t *self, const gateway_config_t *config) {
 
 /// Notes an entry that is not as it was. Another figure for the same finding is no news.
 static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
-    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
+    const iw_ledger_entry_t *entry = &gw_daemon_look(daemon).assumed[item];
     gw_known_item_t *known = &daemon->knowledge.known.item[item];
     const bool news = entry->state != known->entry.state || entry->evidence != known->entry.evidence;
     if (entry->state == IW_LEDGER_ASSUMED || (!news && entry->figure == known->entry.figure)) {
@@ -49,7 +49,7 @@ static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
 /// The offset in force is one of this run: notes where it comes from and how good it is. One that the wheel's force cannot
 /// reach is not kept.
 static void note_offset(gw_daemon_t *daemon, iw_side_t side) {
-    const iw_force_t *force = &daemon->gateway.force[side];
+    const iw_force_t *force = gw_daemon_look(daemon).wheel[side].force;
     iw_force_quality_t quality = {0};
     if (force->provenance == IW_OFFSET_OPERATOR) {
         quality = daemon->knowledge.tare[side];
@@ -57,7 +57,7 @@ static void note_offset(gw_daemon_t *daemon, iw_side_t side) {
         quality = force->quality;
     }
     const gw_known_offset_t known = {.from = force->provenance,
-                                     .unit = daemon->gateway.config.force_unit[side],
+                                     .unit = daemon->config.core.force_unit[side],
                                      .offset_mN = force->offset_mN,
                                      .drift_mN = quality.drift_mN,
                                      .deviation_mN = quality.deviation_mN,
@@ -70,7 +70,7 @@ static void note_offset(gw_daemon_t *daemon, iw_side_t side) {
 }
 
 static void observe_offset(gw_daemon_t *daemon, iw_side_t side) {
-    const iw_force_t *force = &daemon->gateway.force[side];
+    const iw_force_t *force = gw_daemon_look(daemon).wheel[side].force;
     gw_told_offset_t *told = &daemon->knowledge.told[side];
     gw_told_offset_t now = {
         .offset_us = force->offset_us, .offset_mN = force->offset_mN, .provenance = force->provenance};
@@ -99,8 +99,7 @@ void gw_knowledge_observe(gw_daemon_t *daemon) {
 
 /// What an earlier run found is put beside what this one has found already, which is fresher.
 static void merge_item(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_known_item_t *stored) {
-    iw_ledger_t *ledger = &daemon->gateway.ledger;
-    const iw_ledger_entry_t *present = iw_ledger_entry(ledger, item);
+    const iw_ledger_entry_t *present = &gw_daemon_look(daemon).assumed[item];
     char value[GW_VALUE_SIZE];
     gw_assumption_value(&daemon->config, item, value);
     if (stored->entry.state == IW_LEDGER_ASSUMED || present->state == IW_LEDGER_CONTRADICTED) {
@@ -122,11 +121,10 @@ static void merge_item(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_know
 }
 
 static void merge_offset(gw_daemon_t *daemon, iw_side_t side, const gw_known_offset_t *stored) {
-    iw_force_t *force = &daemon->gateway.force[side];
     if (stored->from == IW_OFFSET_NONE) {
         return;
     }
-    if (stored->unit != daemon->gateway.config.force_unit[side]) {
+    if (stored->unit != daemon->config.core.force_unit[side]) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the %s wheel's stored force offset was taken in another force_unit: forgotten; unload both wheels, "
                "then: iwheelctl tare",
@@ -135,8 +133,9 @@ static void merge_offset(gw_daemon_t *daemon, iw_side_t side, const gw_known_off
         return;
     }
     daemon->knowledge.known.offset[side] = *stored;
-    iw_force_restore(force, stored->from == IW_OFFSET_OPERATOR ? IW_OFFSET_OPERATOR : IW_OFFSET_STORED,
-                     stored->offset_mN);
+    iw_gateway_restore_offset(&daemon->gateway, side,
+                              stored->from == IW_OFFSET_OPERATOR ? IW_OFFSET_OPERATOR : IW_OFFSET_STORED,
+                              stored->offset_mN);
 }
 
 static void merge(gw_daemon_t *daemon, const gw_known_t *stored) {
@@ -249,11 +248,15 @@ gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, cons
     return verdict;
 }
 
-iw_tare_t gw_knowledge_tare(gw_daemon_t *daemon, iw_side_t side) {
-    const iw_force_quality_t quality = iw_force_measure(&daemon->gateway.force[side]);
-    const iw_tare_t result = iw_gateway_tare(&daemon->gateway, daemon->now_us, side);
-    if (result == IW_TARE_OK) {
-        daemon->knowledge.tare[side] = quality;
+iw_tare_t gw_knowledge_tare(gw_daemon_t *daemon, uint8_t sides, iw_side_t *out_refused) {
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
+    const iw_force_quality_t quality[IW_SIDES] = {iw_force_measure(seen.wheel[IW_LEFT].force),
+                                                  iw_force_measure(seen.wheel[IW_RIGHT].force)};
+    const iw_tare_t result = iw_gateway_tare(&daemon->gateway, daemon->now_us, sides, out_refused);
+    for (unsigned side = 0; side < IW_SIDES; ++side) {
+        if (result == IW_TARE_OK && (sides & (1U << side)) != 0U) {
+            daemon->knowledge.tare[side] = quality[side];
+        }
     }
     return result;
 }

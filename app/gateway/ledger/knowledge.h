@@ -68,8 +68,9 @@ void gw_knowledge_tend(struct gw_daemon *daemon);
 /// The operator's word: `word->found` as in gw_assumption_compare.
 gw_found_t gw_knowledge_confirm(struct gw_daemon *daemon, iw_ledger_item_t item, const gw_word_t *word);
 
-/// Tares a wheel and remembers the window it was measured in.
-iw_tare_t gw_knowledge_tare(struct gw_daemon *daemon, iw_side_t side);
+/// Tares these wheels (bits of IW_SIDES_), all or none, and remembers the windows they were measured in. `*out_refused`:
+/// which one refused.
+iw_tare_t gw_knowledge_tare(struct gw_daemon *daemon, uint8_t sides, iw_side_t *out_refused);
 
 /// Hands over the rest. The keeper ends when it is on the disk.
 void gw_knowledge_close(gw_knowledge_t *self, const char *bus);

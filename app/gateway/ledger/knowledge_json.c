@@ -5,7 +5,7 @@
 #include "process/owners.h"
 
 void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, json_out_t *json) {
-    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
+    const iw_ledger_entry_t *entry = &gw_daemon_look(daemon).assumed[item];
     const gw_known_item_t *known = &daemon->knowledge.known.item[item];
     const bool noted = entry->state != IW_LEDGER_ASSUMED && known->entry.state == entry->state;
     char value[GW_VALUE_SIZE];

@@ -18,7 +18,7 @@ static const char *side_name(iw_side_t side) {
 }
 
 void gw_knowledge_tell_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
-    const iw_ledger_entry_t *entry = iw_ledger_entry(&daemon->gateway.ledger, item);
+    const iw_ledger_entry_t *entry = &gw_daemon_look(daemon).assumed[item];
     const bool bad = entry->state == IW_LEDGER_CONTRADICTED;
     char value[GW_VALUE_SIZE];
     char evidence[GW_EVIDENCE_SIZE];
@@ -94,10 +94,10 @@ void gw_knowledge_tell_memory(gw_daemon_t *daemon) {
 }
 
 /// Names of the items in one state, as one text.
-static void list_items(const iw_ledger_t *ledger, iw_ledger_state_t state, char *out_text, size_t size) {
+static void list_items(const iw_ledger_entry_t *assumed, iw_ledger_state_t state, char *out_text, size_t size) {
     out_text[0] = '\0';
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
-        if (iw_ledger_entry(ledger, (iw_ledger_item_t)item)->state == state) {
+        if (assumed[item].state == state) {
             const size_t length = strlen(out_text);
             (void)snprintf(&out_text[length], size - length, "%s%s", length > 0U ? ", " : "",
                            gw_ledger_item_name((iw_ledger_item_t)item));
@@ -106,19 +106,18 @@ static void list_items(const iw_ledger_t *ledger, iw_ledger_state_t state, char 
 }
 
 void gw_knowledge_tell_ledger(gw_daemon_t *daemon) {
-    const iw_ledger_t *ledger = &daemon->gateway.ledger;
+    const iw_ledger_entry_t *assumed = gw_daemon_look(daemon).assumed;
     char items[512];
-    list_items(ledger, IW_LEDGER_CONFIRMED, items, sizeof items);
+    list_items(assumed, IW_LEDGER_CONFIRMED, items, sizeof items);
     if (items[0] != '\0') {
         gw_log(&daemon->log, GW_LOG_INFO, "confirmed before: %s", items);
     }
-    list_items(ledger, IW_LEDGER_ASSUMED, items, sizeof items);
+    list_items(assumed, IW_LEDGER_ASSUMED, items, sizeof items);
     if (items[0] != '\0') {
         gw_log(&daemon->log, GW_LOG_INFO, "assumed, never verified: %s", items);
     }
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
-        const iw_ledger_entry_t *entry = iw_ledger_entry(ledger, (iw_ledger_item_t)item);
-        if (entry->state == IW_LEDGER_CONTRADICTED) {
+        if (assumed[item].state == IW_LEDGER_CONTRADICTED) {
             gw_knowledge_tell_item(daemon, (iw_ledger_item_t)item);
         }
     }

@@ -51,8 +51,7 @@ static void note_client(gw_daemon_t *daemon, gw_stop_note_t *note, char *out_tex
     }
 }
 
-static void observe_stop(gw_daemon_t *daemon) {
-    const iw_stop_t *stop = &daemon->gateway.permit.stop;
+static void observe_stop(gw_daemon_t *daemon, const iw_stop_t *stop) {
     if (stop->number == daemon->observed.stop_number) {
         return;
     }
@@ -74,10 +73,9 @@ static void observe_stop(gw_daemon_t *daemon) {
     gw_event_send(daemon, &json, GW_TOPIC_STOP);
 }
 
-static void observe_lease(gw_daemon_t *daemon) {
+static void observe_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     gw_observed_t *observed = &daemon->observed;
-    const iw_permit_t *permit = &daemon->gateway.permit;
-    const iw_client_t holder = iw_permit_state(permit) == IW_STATE_ARMED ? permit->holder : IW_CLIENT_NONE;
+    const iw_client_t holder = seen->state == IW_STATE_ARMED ? seen->holder : IW_CLIENT_NONE;
     if (holder == observed->holder) {
         return;
     }
@@ -100,8 +98,7 @@ static void observe_lease(gw_daemon_t *daemon) {
     gw_event_send(daemon, &json, GW_TOPIC_LEASE);
 }
 
-static void observe_bus(gw_daemon_t *daemon, bool first) {
-    const iw_bus_state_t bus = daemon->gateway.bus;
+static void observe_bus(gw_daemon_t *daemon, iw_bus_state_t bus, bool first) {
     if (bus == daemon->observed.bus && !first) {
         return;
     }
@@ -140,10 +137,9 @@ static void tell_fault(gw_daemon_t *daemon, const char *cause, bool present) {
 }
 
 /// While armed or stopping a cause makes a stop, which is told as such; here are the others.
-static void observe_faults(gw_daemon_t *daemon) {
+static void observe_faults(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     gw_observed_t *observed = &daemon->observed;
-    const iw_permit_t *permit = &daemon->gateway.permit;
-    const uint32_t present = iw_permit_present(permit, daemon->now_us);
+    const uint32_t present = seen->present;
     const uint32_t changed = present ^ observed->present;
     for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; ++cause) {
         if ((changed & (1U << cause)) != 0U) {
@@ -151,24 +147,25 @@ static void observe_faults(gw_daemon_t *daemon) {
         }
     }
     observed->present = present;
-    if (permit->still_moving != observed->still_moving) {
-        observed->still_moving = permit->still_moving;
+    if (seen->still_moving != observed->still_moving) {
+        observed->still_moving = seen->still_moving;
         tell_fault(daemon, "still_moving", true);
     }
-    if (daemon->gateway.left_behind != observed->left_behind) {
-        observed->left_behind = daemon->gateway.left_behind;
+    if (seen->left_behind != observed->left_behind) {
+        observed->left_behind = seen->left_behind;
         tell_fault(daemon, "setpoint_left", observed->left_behind);
     }
 }
 
 void gw_observe(gw_daemon_t *daemon) {
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
     const bool first = !daemon->observed.started;
     daemon->observed.started = true;
-    observe_bus(daemon, first);
+    observe_bus(daemon, seen.bus, first);
     observe_estop(daemon, first);
-    observe_faults(daemon);
-    observe_stop(daemon);
-    observe_lease(daemon);
+    observe_faults(daemon, &seen);
+    observe_stop(daemon, seen.stop);
+    observe_lease(daemon, &seen);
     observe_state(daemon, first);
     gw_knowledge_observe(daemon);
     gw_record_again(daemon);

@@ -18,77 +18,76 @@ bool gw_snapshot_is_fresh(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_
     return then_us != IW_NEVER && now_us - then_us < span_us;
 }
 
-static bool contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item) {
-    return iw_ledger_entry(&daemon->gateway.ledger, item)->state == IW_LEDGER_CONTRADICTED;
+static bool contradicted(const iw_snapshot_t *seen, iw_ledger_item_t item) {
+    return seen->assumed[item].state == IW_LEDGER_CONTRADICTED;
 }
 
 /// Whether speeds in mm/s, or distances, mean anything: they rest on radius and gear ratio.
-static bool is_speed_known(const gw_daemon_t *daemon) {
-    return !contradicted(daemon, IW_LEDGER_WHEEL_RADIUS) &&
-           !(daemon->gateway.config.rpm_of_rotor && contradicted(daemon, IW_LEDGER_GEAR_RATIO));
+static bool is_speed_known(const iw_snapshot_t *seen) {
+    return !contradicted(seen, IW_LEDGER_WHEEL_RADIUS) &&
+           !(seen->config->rpm_of_rotor && contradicted(seen, IW_LEDGER_GEAR_RATIO));
 }
 
-static bool is_distance_known(const gw_daemon_t *daemon) {
-    return !contradicted(daemon, IW_LEDGER_WHEEL_RADIUS) && !contradicted(daemon, IW_LEDGER_GEAR_RATIO);
+static bool is_distance_known(const iw_snapshot_t *seen) {
+    return !contradicted(seen, IW_LEDGER_WHEEL_RADIUS) && !contradicted(seen, IW_LEDGER_GEAR_RATIO);
 }
 
-static void write_motion(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
-    const iw_gateway_t *gateway = &daemon->gateway;
-    const iw_wheel_t *wheel = &gateway->wheel[side];
-    const bool heard = iw_wheel_heard(wheel, daemon->now_us);
-    const bool following = gateway->setpoint.demand == IW_DEMAND_FOLLOW;
-    const bool sending = gateway->setpoint.demand != IW_DEMAND_SILENCE;
-    const iw_command_t applied = iw_setpoint_applied(&gateway->setpoint).wheel[side];
-    const iw_command_t wanted = gateway->setpoint.target.wheel[side];
+static void write_motion(const iw_snapshot_t *seen, iw_side_t side, json_out_t *json) {
+    const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
+    const bool heard = wheel->heard;
+    const bool following = seen->demand == IW_DEMAND_FOLLOW;
+    const bool sending = seen->demand != IW_DEMAND_SILENCE;
+    const iw_command_t applied = seen->applied.wheel[side];
+    const iw_command_t wanted = seen->target.wheel[side];
     json_out_bool(json, "heard", heard);
     if (heard) {
-        json_out_bool(json, "at_rest",
-                      iw_wheel_at_rest(wheel, daemon->now_us, (uint32_t)gateway->config.rest_ms * IW_US_PER_MS));
+        json_out_bool(json, "at_rest", wheel->at_rest);
     } else {
         json_out_null(json, "at_rest");
     }
-    json_out_known(json, "speed_rpm", heard, wheel->speed.speed_rpm);
-    json_out_known(json, "speed_mm_s", heard && is_speed_known(daemon), iw_wheel_speed_mm_s(wheel));
-    json_out_known(json, "acceleration_raw", heard, wheel->speed.acceleration_raw);
+    json_out_known(json, "speed_rpm", heard, wheel->told->speed.speed_rpm);
+    json_out_known(json, "speed_mm_s", heard && is_speed_known(seen), wheel->speed_mm_s);
+    json_out_known(json, "acceleration_raw", heard, wheel->told->speed.acceleration_raw);
     json_out_known(json, "commanded_mm_s", following, wanted.speed_mm_s);
     json_out_known(json, "commanded_mA", following, wanted.current_mA);
     json_out_known(json, "applied_mm_s", sending, applied.speed_mm_s);
     json_out_known(json, "applied_mA", sending, applied.current_mA);
-    gw_snapshot_write_age(json, "speed_age_ms", daemon->now_us, wheel->speed_us);
+    gw_snapshot_write_age(json, "speed_age_ms", seen->at_us, wheel->speed_us);
 }
 
-static void write_condition(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
-    const iw_wheel_t *wheel = &daemon->gateway.wheel[side];
-    const iw_force_validity_t force = iw_gateway_force_validity(&daemon->gateway, daemon->now_us, side);
+static void write_condition(const iw_snapshot_t *seen, iw_side_t side, json_out_t *json) {
+    const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
+    const iw_codec_status_t *status = &wheel->told->status;
+    const iw_force_validity_t force = wheel->force_validity;
     const bool ever = wheel->status_us != IW_NEVER;
-    const bool fresh = gw_snapshot_is_fresh(daemon->now_us, wheel->status_us, GW_STATUS_STALE_US);
-    const bool warm = fresh && wheel->status.temperature_degC <= IW_WHEEL_TEMPERATURE_MAX_degC;
-    const bool cpu = fresh && wheel->status.cpu_percent <= 100U;
-    json_out_known(json, "battery_dV", fresh, wheel->status.battery_dV);
-    json_out_known(json, "temperature_degC", warm, wheel->status.temperature_degC);
-    json_out_known(json, "cpu_percent", cpu, wheel->status.cpu_percent);
+    const bool fresh = gw_snapshot_is_fresh(seen->at_us, wheel->status_us, GW_STATUS_STALE_US);
+    const bool warm = fresh && status->temperature_degC <= IW_TEMPERATURE_MAX_degC;
+    const bool cpu = fresh && status->cpu_percent <= 100U;
+    json_out_known(json, "battery_dV", fresh, status->battery_dV);
+    json_out_known(json, "temperature_degC", warm, status->temperature_degC);
+    json_out_known(json, "cpu_percent", cpu, status->cpu_percent);
     json_out_known(json, "ticks", ever, wheel->ticks);
-    json_out_known(json, "distance_mm", ever && is_distance_known(daemon), iw_wheel_distance_nm(wheel) / 1000000);
-    gw_snapshot_write_age(json, "status_age_ms", daemon->now_us, wheel->status_us);
+    json_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->distance_nm / 1000000);
+    gw_snapshot_write_age(json, "status_age_ms", seen->at_us, wheel->status_us);
     json_out_int(json, "reboots", wheel->reboots);
     json_out_open(json, "valid", '{');
-    json_out_bool(json, "speed", iw_wheel_heard(wheel, daemon->now_us));
+    json_out_bool(json, "speed", wheel->heard);
     json_out_bool(json, "status", fresh);
     json_out_bool(json, "temperature", warm);
     json_out_bool(json, "cpu", cpu);
     json_out_bool(json, "force", force == IW_FORCE_VALID);
     json_out_close(json, '}');
     json_out_open(json, "saturated", '{');
-    json_out_bool(json, "battery", fresh && wheel->status.battery_dV == IW_BATTERY_SATURATED_dV);
+    json_out_bool(json, "battery", fresh && status->battery_dV == IW_BATTERY_SATURATED_dV);
     json_out_bool(json, "force", force == IW_FORCE_SATURATED);
     json_out_close(json, '}');
 }
 
-static void write_wheel(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
+static void write_wheel(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side, json_out_t *json) {
     json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
-    write_motion(daemon, side, json);
-    write_condition(daemon, side, json);
-    gw_snapshot_write_wheel_force(daemon, side, json);
+    write_motion(seen, side, json);
+    write_condition(seen, side, json);
+    gw_snapshot_write_wheel_force(daemon, seen, side, json);
     json_out_close(json, '}');
 }
 
@@ -96,43 +95,40 @@ static bool at_limit(int16_t value) {
     return value == INT16_MIN || value == INT16_MAX;
 }
 
-static void write_pose(const gw_daemon_t *daemon, json_out_t *json) {
-    const iw_gateway_t *gateway = &daemon->gateway;
-    const iw_codec_pose_t *pose = &gateway->told[IW_RIGHT].pose;
-    const bool fresh = gw_snapshot_is_fresh(daemon->now_us, gateway->pose_us, GW_STATUS_STALE_US) &&
-                       !contradicted(daemon, IW_LEDGER_POSE_BYTE_ORDER);
+static void write_pose(const iw_snapshot_t *seen, json_out_t *json) {
+    const iw_codec_pose_t *pose = &seen->wheel[IW_RIGHT].told->pose;
+    const bool fresh = gw_snapshot_is_fresh(seen->at_us, seen->pose_us, GW_STATUS_STALE_US) &&
+                       !contradicted(seen, IW_LEDGER_POSE_BYTE_ORDER);
     json_out_open(json, "pose", '{');
     json_out_known(json, "x_mm", fresh, pose->x_mm);
     json_out_known(json, "y_mm", fresh, pose->y_mm);
     json_out_known(json, "z_mm", fresh, pose->z_mm);
     json_out_known(json, "psi_mrad", fresh, pose->psi_mrad);
     json_out_bool(json, "limited", fresh && (at_limit(pose->x_mm) || at_limit(pose->y_mm) || at_limit(pose->z_mm)));
-    gw_snapshot_write_age(json, "age_ms", daemon->now_us, gateway->pose_us);
+    gw_snapshot_write_age(json, "age_ms", seen->at_us, seen->pose_us);
     json_out_close(json, '}');
 }
 
-static void write_lease(gw_daemon_t *daemon, json_out_t *json) {
-    const iw_permit_t *permit = &daemon->gateway.permit;
-    const gw_client_t *holder = gw_daemon_client(daemon, permit->holder);
-    const bool running = holder != NULL && !iw_permit_arming(permit) && permit->lease_until_us > daemon->now_us;
+static void write_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen, json_out_t *json) {
+    const gw_client_t *holder = gw_daemon_client(daemon, seen->holder);
+    const bool running = holder != NULL && !seen->arming && seen->lease_until_us > seen->at_us;
     json_out_open(json, "lease", '{');
-    json_out_known(json, "holder", holder != NULL, permit->holder);
+    json_out_known(json, "holder", holder != NULL, seen->holder);
     json_out_text(json, "name", holder != NULL && holder->name[0] != '\0' ? holder->name : NULL);
     json_out_known(json, "pid", holder != NULL && holder->pid > 0, holder != NULL ? holder->pid : 0);
     json_out_known(json, "remaining_ms", running,
-                   running ? (int64_t)((permit->lease_until_us - daemon->now_us) / IW_US_PER_MS) : 0);
-    json_out_int(json, "lease_ms", daemon->gateway.config.lease_ms);
+                   running ? (int64_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS) : 0);
+    json_out_int(json, "lease_ms", seen->config->lease_ms);
     json_out_close(json, '}');
 }
 
-static void write_surroundings(const gw_daemon_t *daemon, json_out_t *json) {
-    const iw_gateway_t *gateway = &daemon->gateway;
+static void write_surroundings(const gw_daemon_t *daemon, const iw_snapshot_t *seen, json_out_t *json) {
     const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
     json_out_open(json, "bus", '{');
     json_out_text(json, "name", daemon->config.bus.interface);
-    json_out_text(json, "state", gw_bus_state_name(gateway->bus));
+    json_out_text(json, "state", gw_bus_state_name(seen->bus));
     json_out_text(json, "timing", gw_bus_facts_timing(daemon));
-    json_out_text(json, "echo", gateway->facts.echo_proven ? "proven" : "unproven");
+    json_out_text(json, "echo", seen->echo_proven ? "proven" : "unproven");
     json_out_known(json, "bitrate", link->bitrate_hz != 0U, link->bitrate_hz);
     json_out_known(json, "sample_point_permille", link->sample_point_permille != 0U, link->sample_point_permille);
     json_out_known(json, "load_permille", link->presence == IW_LINK_UP, link->load_permille);
@@ -151,8 +147,8 @@ static void write_gaps(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_close(json, '}');
 }
 
-static void write_budget(const gw_daemon_t *daemon, json_out_t *json) {
-    const iw_stop_budget_t budget = iw_config_stop_budget(&daemon->gateway.config);
+static void write_budget(const iw_snapshot_t *seen, json_out_t *json) {
+    const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
     json_out_open(json, "budget", '{');
     json_out_int(json, "client_lost_ms", budget.client_lost_ms);
     json_out_int(json, "client_lost_mm", budget.client_lost_mm);
@@ -161,9 +157,9 @@ static void write_budget(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_close(json, '}');
 }
 
-static void write_counters(const gw_daemon_t *daemon, json_out_t *json) {
-    const iw_counters_t *counters = &daemon->gateway.counters;
-    const iw_sender_t *sender = &daemon->gateway.sender;
+static void write_counters(const iw_snapshot_t *seen, json_out_t *json) {
+    const iw_counters_t *counters = seen->counters;
+    const iw_snapshot_sent_t *sent = &seen->sent;
     json_out_open(json, "counters", '{');
     json_out_int(json, "received", counters->received);
     json_out_int(json, "echoes", counters->echoes);
@@ -175,13 +171,13 @@ static void write_counters(const gw_daemon_t *daemon, json_out_t *json) {
     json_out_int(json, "out_of_range", counters->out_of_range);
     json_out_int(json, "purges", counters->purges);
     json_out_int(json, "left_behind", counters->left_behind);
-    json_out_int(json, "pairs", sender->pairs);
-    json_out_int(json, "send_later", sender->later);
-    json_out_int(json, "clamped", sender->clamped);
-    json_out_int(json, "gate_stopped", sender->envelope.stopped);
-    json_out_int(json, "stray_echoes", sender->confirmation.stray);
-    json_out_int(json, "gap_max_us", sender->gap_max_us);
-    json_out_int(json, "still_moving", daemon->gateway.permit.still_moving);
+    json_out_int(json, "pairs", sent->pairs);
+    json_out_int(json, "send_later", sent->later);
+    json_out_int(json, "clamped", sent->clamped);
+    json_out_int(json, "gate_stopped", sent->stopped);
+    json_out_int(json, "stray_echoes", sent->stray_echoes);
+    json_out_int(json, "gap_max_us", sent->gap_max_us);
+    json_out_int(json, "still_moving", seen->still_moving);
     json_out_close(json, '}');
 }
 
@@ -196,27 +192,27 @@ void gw_snapshot_write_causes(json_out_t *json, const char *name, uint32_t cause
 }
 
 void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json) {
-    const iw_permit_t *permit = &daemon->gateway.permit;
-    const iw_state_t state = iw_permit_state(permit);
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
+    const iw_state_t state = seen.state;
     const bool stopped = state == IW_STATE_STOPPING || state == IW_STATE_LATCHED;
     json_out_int(json, "t_us", (int64_t)daemon->now_us);
     json_out_int(json, "wall_us", iw_clock_wall_us());
     json_out_text(json, "version", IWHEEL_VERSION);
     json_out_text(json, "state", gw_state_name(state));
-    json_out_bool(json, "arming", iw_permit_arming(permit));
-    json_out_text(json, "cause", stopped ? gw_cause_name(permit->stop.cause) : NULL);
-    gw_snapshot_write_causes(json, "present", iw_permit_present(permit, daemon->now_us));
-    write_lease(daemon, json);
-    write_surroundings(daemon, json);
-    write_wheel(daemon, IW_LEFT, json);
-    write_wheel(daemon, IW_RIGHT, json);
-    write_pose(daemon, json);
+    json_out_bool(json, "arming", seen.arming);
+    json_out_text(json, "cause", stopped ? gw_cause_name(seen.stop->cause) : NULL);
+    gw_snapshot_write_causes(json, "present", seen.present);
+    write_lease(daemon, &seen, json);
+    write_surroundings(daemon, &seen, json);
+    write_wheel(daemon, &seen, IW_LEFT, json);
+    write_wheel(daemon, &seen, IW_RIGHT, json);
+    write_pose(&seen, json);
     gw_knowledge_write(daemon, json);
     write_gaps(daemon, json);
-    write_budget(daemon, json);
-    write_counters(daemon, json);
+    write_budget(&seen, json);
+    write_counters(&seen, json);
     json_out_int(json, "clients", daemon->clients);
-    json_out_bool(json, "listen_only", daemon->gateway.config.listen_only);
+    json_out_bool(json, "listen_only", seen.config->listen_only);
     json_out_bool(json, "shutting_down", daemon->shutting_down);
     json_out_open(json, "warnings", '[');
     for (uint32_t i = 0; i < daemon->warnings; ++i) {

@@ -16,7 +16,8 @@ void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json);
 void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json);
 
 /// The fields about force of one wheel's object in a snapshot.
-void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json);
+void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side,
+                                   json_out_t *json);
 
 /// The age in ms of something that happened then; null if it never did.
 void gw_snapshot_write_age(json_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us);

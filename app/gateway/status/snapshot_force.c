@@ -28,8 +28,8 @@ static int64_t age_ms(const gw_daemon_t *daemon, const iw_force_t *force, const 
     return known->wall_us > 0 && known->wall_us <= wall_us ? (wall_us - known->wall_us) / 1000 : -1;
 }
 
-static zero_t describe_zero(const gw_daemon_t *daemon, iw_side_t side) {
-    const iw_force_t *force = &daemon->gateway.force[side];
+static zero_t describe_zero(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side) {
+    const iw_force_t *force = seen->wheel[side].force;
     const gw_known_offset_t *known = &daemon->knowledge.known.offset[side];
     const bool ours = force->provenance != IW_OFFSET_NONE && force->provenance != IW_OFFSET_WHEEL &&
                       (known->from == IW_OFFSET_ESTIMATED || known->from == IW_OFFSET_OPERATOR);
@@ -67,12 +67,13 @@ static void write_known_bool(json_out_t *json, const char *name, bool known, boo
     }
 }
 
-void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, iw_side_t side, json_out_t *json) {
-    const iw_force_t *force = &daemon->gateway.force[side];
-    const iw_force_validity_t validity = iw_gateway_force_validity(&daemon->gateway, daemon->now_us, side);
+void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side,
+                                   json_out_t *json) {
+    const iw_force_t *force = seen->wheel[side].force;
+    const iw_force_validity_t validity = seen->wheel[side].force_validity;
     const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
     const bool offset = force->provenance != IW_OFFSET_NONE;
-    const zero_t zero = describe_zero(daemon, side);
+    const zero_t zero = describe_zero(daemon, seen, side);
     json_out_known(json, "force_raw", heard, force->raw);
     json_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
     json_out_known(json, "force_offset_mN", offset, force->offset_mN);
@@ -93,13 +94,14 @@ void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, iw_side_t side, js
 }
 
 void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json) {
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
     json_out_int(json, "t_us", (int64_t)daemon->now_us);
     for (unsigned i = 0; i < IW_SIDES; ++i) {
         const iw_side_t side = (iw_side_t)i;
-        const iw_force_t *force = &daemon->gateway.force[side];
-        const iw_force_validity_t validity = iw_gateway_force_validity(&daemon->gateway, daemon->now_us, side);
+        const iw_force_t *force = seen.wheel[side].force;
+        const iw_force_validity_t validity = seen.wheel[side].force_validity;
         const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
-        const zero_t zero = describe_zero(daemon, side);
+        const zero_t zero = describe_zero(daemon, &seen, side);
         json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
         json_out_known(json, "raw", heard, force->raw);
         json_out_known(json, "raw_mN", heard, iw_force_raw_mN(force));

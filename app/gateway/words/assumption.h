@@ -9,7 +9,7 @@
 
 #include "gateway_config.h"
 
-#include "iwheel/private/ledger.h"
+#include "iwheel/types.h"
 
 /// The longest value with its terminator.
 #define GW_VALUE_SIZE 40U

@@ -52,6 +52,8 @@
 #define IW_TICKS_PER_TURN 60U
 /// The wheel stops by itself this long after the last setpoint it received.
 #define IW_WHEEL_WATCHDOG_US 1000000U
+/// Temperatures above this are not believed (trap 14: a byte cannot show below 0 degC).
+#define IW_TEMPERATURE_MAX_degC 200U
 /// A battery byte of 255 means "at least 25.5 V".
 #define IW_BATTERY_SATURATED_dV 255U
 

@@ -37,6 +37,15 @@ typedef struct {
     iw_force_unit_t force_unit[IW_SIDES]; ///< As documented unless the wheel proves otherwise.
 } iw_config_t;
 
+// Fixed by the safety rules.
+
+/// After arm the lease lasts this long, since only zeros leave before the first drive. Longer than any lease_ms.
+#define IW_FIRST_LEASE_US 1000000U
+/// A nonzero drive command this recent refuses arm and reset. No lease_ms is longer.
+#define IW_STALE_COMMAND_US 500000U
+/// Signs are compared only if command and measurement are both above this. Safety rule.
+#define IW_SIGN_MM_S 100
+
 /// Which field `iw_config_check` found wrong, in the order of the struct; then relations between fields.
 typedef enum {
     IW_CONFIG_OK = 0,

@@ -19,7 +19,7 @@
 #ifndef IW_FORCE_H
 #define IW_FORCE_H
 
-#include "iwheel/config.h"
+#include "iwheel/types.h"
 
 /// Two seconds of force frames at their documented period of 50 ms.
 #define IW_FORCE_WINDOW_SAMPLES 40U
@@ -96,7 +96,6 @@ typedef struct {
 } iw_force_quality_t;
 
 typedef struct {
-    const iw_config_t *config;
     iw_time_us_t raw_us;
     iw_time_us_t offset_us;  ///< When the offset in force was taken; IW_NEVER: none, or by an earlier run.
     int32_t offset_mN;       ///< The offset in force; 0 with IW_OFFSET_NONE.
@@ -106,7 +105,7 @@ typedef struct {
     uint8_t count; ///< Samples in the ring.
     uint8_t still; ///< Of the newest samples, how many in a row came from a wheel at rest.
     uint8_t next;
-    iw_side_t side;
+    iw_force_unit_t unit; ///< Of `raw`.
     iw_offset_provenance_t provenance;
     iw_unit_evidence_t evidence;
     int32_t evidence_permille;  ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
@@ -115,8 +114,8 @@ typedef struct {
     bool boot_seen;
 } iw_force_t;
 
-/// `config` must be checked and outlive it.
-void iw_force_init(iw_force_t *self, const iw_config_t *config, iw_side_t side);
+/// `unit`: as configured.
+void iw_force_init(iw_force_t *self, iw_force_unit_t unit);
 
 /// The wheel (re)started or was heard for the first time: the window opens. `boot_seen`: its start was observed, so
 /// that our window covers the wheel's own first two seconds.
@@ -136,6 +135,9 @@ void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_
 /// Makes the mean of the last two seconds the offset, as OPERATOR. Refused, changing nothing, with the reason. LOADED
 /// is not judged where the offset in force is itself in doubt.
 iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us);
+
+/// What a tare would come to now; changes nothing.
+iw_tare_t iw_force_may_tare(const iw_force_t *self, iw_time_us_t now_us);
 
 /// What the last two seconds show: the window that a tare would take. Means something only with a full ring
 /// (`count` is IW_FORCE_WINDOW_SAMPLES).

@@ -22,6 +22,7 @@
 #include "iwheel/private/setpoint.h"
 #include "iwheel/private/transmit.h"
 #include "iwheel/private/wheel.h"
+#include "iwheel/snapshot.h"
 
 /// A step later than this cannot tell when its frames came: they neither refresh nor fail a wheel's liveness.
 #define IW_GATEWAY_LATE_US 20000U
@@ -39,20 +40,6 @@ typedef struct {
     bool timing_contradicted; ///< Rate or sample point differ from the configured ones: arm is refused.
     bool echo_proven;         ///< An echo proves that the frame was on the bus (IFF_ECHO; bxCAN).
 } iw_bus_facts_t;
-
-/// Beside these: `iw_sender_t` counts what was sent, `iw_envelope_t::stopped`, `iw_confirmation_t::stray`, `iw_wheel_t::reboots`.
-typedef struct {
-    uint32_t received;     ///< Frames of the nine telemetry ids that were read.
-    uint32_t echoes;       ///< Echoes of our setpoints.
-    uint32_t bad_format;   ///< Known id on a remote, extended, error or FD frame: ignored.
-    uint32_t bad_length;   ///< Known id, shorter than the table: ignored.
-    uint32_t unknown;      ///< Any other id.
-    uint32_t foreign;      ///< Setpoints that are not ours.
-    uint32_t late_steps;   ///< Steps later than IW_GATEWAY_LATE_US.
-    uint32_t out_of_range; ///< Drive requests refused for their values.
-    uint32_t purges;       ///< Purges the port confirmed.
-    uint32_t left_behind;  ///< Times that a setpoint was left in a controller (see `iw_gateway_t`).
-} iw_counters_t;
 
 /// A drive request. Values are taken as they come: what does not fit is refused here.
 typedef struct {
@@ -113,8 +100,6 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts);
 /// Asks to be armed. IW_REFUSE_NONE: poll `iw_gateway_arming` after each step; when false, the state is ARMED with
 /// this client as holder, or `iw_gateway_arm_refusal` tells why not.
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
-bool iw_gateway_arming(const iw_gateway_t *self);
-iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self);
 
 /// Commands both wheels, whole or not at all. `*out_applied` is written only if IW_REFUSE_NONE. `sent_us`: when the
 /// command was sent, as far as is known, not later than now; the lease runs from then (see `iw_permit_drive`).
@@ -133,20 +118,16 @@ iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us);
 /// A client's connection ended.
 void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);
 
-/// Makes the present force of a wheel its zero.
-iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side);
+/// Makes the present force of these wheels (bits IW_SIDES_LEFT, IW_SIDES_RIGHT) their zero: all of them, or none if one
+/// refuses, which is then told in `*out_side`.
+iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side);
+
+/// Puts a force offset of an earlier run in force, unless this run has a better one: see `iw_force_restore`.
+void iw_gateway_restore_offset(iw_gateway_t *self, iw_side_t side, iw_offset_provenance_t provenance,
+                               int32_t offset_mN);
 
 /// Tells what is known of an assumption from elsewhere: the operator's word, or what an earlier run found. From the bus
 /// the core learns itself. An entry that is only ASSUMED says nothing.
 void iw_gateway_know(iw_gateway_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry);
-
-/// Whether a wheel's net force means anything now, and if not, why: what the sensor shows, and what the ledger says of
-/// its unit and offset.
-iw_force_validity_t iw_gateway_force_validity(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side);
-
-iw_state_t iw_gateway_state(const iw_gateway_t *self);
-
-/// True while setpoints are sent, or about to be.
-bool iw_gateway_is_sending(const iw_gateway_t *self);
 
 #endif

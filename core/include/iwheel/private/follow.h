@@ -8,8 +8,6 @@
 
 #include "iwheel/config.h"
 
-/// Signs are compared only if command and measurement are both above this. Safety rule.
-#define IW_FOLLOW_SIGN_MM_S 100
 /// Opposite signs must last this long. Safety rule.
 #define IW_FOLLOW_SIGN_US 300000U
 /// A wheel is blocked below this share of its command ...
@@ -29,7 +27,7 @@ typedef struct {
     iw_time_us_t sign_since_us; ///< IW_NEVER: the condition does not hold.
     iw_time_us_t over_since_us;
     iw_time_us_t blocked_since_us;
-    iw_time_us_t agree_since_us; ///< Same sign, both above IW_FOLLOW_SIGN_MM_S.
+    iw_time_us_t agree_since_us; ///< Same sign, both above IW_SIGN_MM_S.
 } iw_follow_t;
 
 /// `config` must be checked and outlive it.
@@ -41,7 +39,7 @@ void iw_follow_restart(iw_follow_t *self);
 /// Compares the speed applied and measured now, both in the machine's frame. The gravest verdict comes first.
 iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32_t applied_mm_s, int32_t measured_mm_s);
 
-/// True if command and measurement have agreed in sign, both above IW_FOLLOW_SIGN_MM_S, for IW_FOLLOW_SIGN_US.
+/// True if command and measurement have agreed in sign, both above IW_SIGN_MM_S, for IW_FOLLOW_SIGN_US.
 bool iw_follow_sign_confirmed(const iw_follow_t *self, iw_time_us_t now_us);
 
 #endif

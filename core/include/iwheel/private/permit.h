@@ -32,10 +32,6 @@
 
 #include "iwheel/config.h"
 
-/// After arm the lease lasts this long, since only zeros leave before the first drive. Longer than any lease_ms.
-#define IW_PERMIT_FIRST_LEASE_US 1000000U
-/// A nonzero drive command this recent refuses arm and reset. No lease_ms is longer.
-#define IW_PERMIT_STALE_US 500000U
 /// An event-like cause is gone when not seen for this long.
 #define IW_PERMIT_EVENT_US 1000000U
 /// Zeros are held until both wheels were at rest for this long ...

@@ -91,8 +91,8 @@ void iw_confirmation_rest(iw_confirmation_t *self);
 /// The echo of a setpoint came.
 void iw_confirmation_echo(iw_confirmation_t *self, iw_side_t side, const iw_can_frame_t *echo);
 
-/// True if, for both wheels, a frame that was sent at `since_us` or later has been echoed. `since_us` > 0.
-bool iw_confirmation_proven_since(const iw_confirmation_t *self, iw_time_us_t since_us);
+/// Of each wheel the last echoed frame: when the older of them was sent. 0: not both wheels have one yet.
+iw_time_us_t iw_confirmation_proven_us(const iw_confirmation_t *self);
 
 /// Since when the longest-waiting setpoint waits; IW_NEVER if none does.
 iw_time_us_t iw_confirmation_waiting_us(const iw_confirmation_t *self);

@@ -32,8 +32,6 @@
 /// Beyond this, either way, ticks are counted no more: so a distance in nanometres fits 64 bits whatever a wheel says. At
 /// the 20 mm of a tick without gear that is two million kilometres. Ours.
 #define IW_WHEEL_TICKS_MAX 100000000000
-/// Temperatures above this are not believed (trap 14: a byte cannot show below 0 degC).
-#define IW_WHEEL_TEMPERATURE_MAX_degC 200U
 
 typedef enum {
     IW_REBOOT_NONE = 0,

@@ -2,36 +2,37 @@
 /// Evidence for the assumption ledger that the wheels' own motion gives, beside what the core finds itself (force units,
 /// offset, feedback signs, lengths of frames).
 ///
-/// It lives in the daemon and not in the core because no safety rule needs it: a controller without it drives as well.
+/// For whoever wants it: it reads through the snapshot and writes through `iw_gateway_know`, and is linked only where it is
+/// called. No safety rule needs it: a controller without it drives as well.
 ///
 /// - gear ratio: ticks moved against the turns that the rpm say, while a wheel turns one way, not too slowly
 /// - byte order of the pose: read the right way round it moves in small steps, the other way round in large ones
 /// - setpoint type: a wheel runs at the speed it was told, steadily
 ///
-/// Looks at the core after each step; reads no clock, keeps no frame. Thresholds are ours.
-#ifndef GATEWAY_EVIDENCE_H
-#define GATEWAY_EVIDENCE_H
+/// Reads no clock, keeps no frame. Thresholds are ours.
+#ifndef IW_EVIDENCE_H
+#define IW_EVIDENCE_H
 
 #include "iwheel/gateway.h"
 
 /// A wheel slower than this says too little about its ratio: 1 rpm of resolution is 10 %.
-#define GW_EVIDENCE_RPM 10
+#define IW_EVIDENCE_RPM 10
 /// One rotor turn.
-#define GW_EVIDENCE_TICKS 60
+#define IW_EVIDENCE_TICKS 60
 /// Ticks within this share of what the rpm say: the ratio fits. Further off than the other: it does not; between: nothing.
-#define GW_EVIDENCE_FITS_PERMILLE  120
-#define GW_EVIDENCE_FAILS_PERMILLE 250
+#define IW_EVIDENCE_FITS_PERMILLE  120
+#define IW_EVIDENCE_FAILS_PERMILLE 250
 /// That often in a row it must not fit: a frame may be lost.
-#define GW_EVIDENCE_MISSES 3U
+#define IW_EVIDENCE_MISSES 3U
 /// A gap longer than this between two frames begins anew.
-#define GW_EVIDENCE_GAP_US 100000U
+#define IW_EVIDENCE_GAP_US 100000U
 /// Steps of the pose in which it moved.
-#define GW_EVIDENCE_POSE_STEPS 25U
+#define IW_EVIDENCE_POSE_STEPS 25U
 /// So many times as far it must move, read the wrong way round.
-#define GW_EVIDENCE_POSE_FACTOR 8
+#define IW_EVIDENCE_POSE_FACTOR 8
 /// At least so fast, and for so long within 15 % of it (and 1 rpm), a wheel must run to speak for the setpoint type.
-#define GW_EVIDENCE_TYPE_MM_S 150
-#define GW_EVIDENCE_TYPE_US   1000000U
+#define IW_EVIDENCE_TYPE_MM_S 150
+#define IW_EVIDENCE_TYPE_US   1000000U
 
 /// One wheel.
 typedef struct {
@@ -45,20 +46,20 @@ typedef struct {
     int16_t rpm;          ///< Of the last speed frame.
     int16_t applied_mm_s; ///< When the wheel began to run as told.
     bool open;            ///< A window has begun.
-} gw_evidence_wheel_t;
+} iw_motion_evidence_wheel_t;
 
 typedef struct {
-    gw_evidence_wheel_t wheel[IW_SIDES];
+    iw_motion_evidence_wheel_t wheel[IW_SIDES];
     iw_time_us_t pose_us;
     iw_codec_pose_t pose;
     uint32_t pose_steps;
     int64_t moved;    ///< As it is read.
     int64_t reversed; ///< Read the other way round.
-} gw_evidence_t;
+} iw_motion_evidence_t;
 
-void gw_evidence_init(gw_evidence_t *self);
+void iw_motion_evidence_init(iw_motion_evidence_t *self);
 
-/// What the last step has brought, into the gateway's ledger.
-void gw_evidence_look(gw_evidence_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
+/// After each step: what it has brought, into what the gateway assumes. `seen`: looked at since the step.
+void iw_motion_evidence_look(iw_motion_evidence_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen);
 
 #endif

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+/// Everything that may be known of a gateway, in one struct: the only door for reading. Writing goes through the requests
+/// of gateway.h; what lies in private/ is named by nobody outside the core.
+///
+///     iw_snapshot_t now;
+///     iw_gateway_snapshot(&gateway, now_us, &now);
+///     if (now.state == IW_STATE_ARMED && now.wheel[IW_LEFT].heard) { ... now.wheel[IW_LEFT].speed_mm_s ... }
+///
+/// Values are those of the call: after a step or a request, look again. What stands behind a pointer is the gateway's
+/// own, lives as long as it does, and shows what is there when it is read. A step fills nothing: only a look costs.
+#ifndef IW_SNAPSHOT_H
+#define IW_SNAPSHOT_H
+
+#include "iwheel/codec.h"
+#include "iwheel/config.h"
+#include "iwheel/force_offset.h"
+#include "iwheel/hal.h"
+#include "iwheel/types.h"
+
+struct iw_gateway;
+
+/// What was received and how it went. They wrap at 32 bits.
+typedef struct {
+    uint32_t received;     ///< Frames of the nine telemetry ids that were read.
+    uint32_t echoes;       ///< Echoes of our setpoints.
+    uint32_t bad_format;   ///< Known id on a remote, extended, error or FD frame: ignored.
+    uint32_t bad_length;   ///< Known id, shorter than the table: ignored.
+    uint32_t unknown;      ///< Any other id.
+    uint32_t foreign;      ///< Setpoints that are not ours.
+    uint32_t late_steps;   ///< Steps later than IW_GATEWAY_LATE_US.
+    uint32_t out_of_range; ///< Drive requests refused for their values.
+    uint32_t purges;       ///< Purges the port confirmed.
+    uint32_t left_behind;  ///< Times that a setpoint was left in a controller (see `iw_snapshot_t::left_behind`).
+} iw_counters_t;
+
+/// What was sent.
+typedef struct {
+    uint32_t pairs;        ///< Whole pairs taken by the port.
+    uint32_t later;        ///< Setpoints that the port did not take.
+    uint32_t clamped;      ///< Currents that the codec had to clamp. Nonzero means an error of ours.
+    uint32_t stopped;      ///< Frames that the envelope stopped. Nonzero means an error of ours.
+    uint32_t stray_echoes; ///< Echoes that nothing was waiting for.
+    uint32_t gap_us;       ///< Between the last two pairs; 0: the last one was the first after silence.
+    uint32_t gap_max_us;   ///< The largest since the last silence ended.
+} iw_snapshot_sent_t;
+
+/// One wheel. mm/s and distance are in the machine's frame of reference (`invert` applied), rpm and ticks in the wheel's.
+typedef struct {
+    const iw_codec_wheel_t *told;       ///< What it last told, message by message, as on the bus.
+    const iw_force_t *force;            ///< Its force, and where its zero comes from.
+    iw_force_validity_t force_validity; ///< Whether `iw_force_net_mN` means anything now, and if not, why.
+    iw_time_us_t speed_us;              ///< When its last speed frame came; IW_NEVER: none yet.
+    iw_time_us_t status_us;             ///< The same of its status; IW_NEVER also after a reboot, until it tells anew.
+    int64_t ticks;                      ///< Odometry, unwrapped, across reboots.
+    int64_t distance_nm;
+    int32_t speed_mm_s; ///< Measured, rounded towards zero. Meaningless while not heard.
+    uint32_t um_s_per_rpm;
+    uint32_t reboots;
+    bool heard;   ///< Its speed was heard less than `wheel_silent_ms` ago.
+    bool at_rest; ///< Heard, and within `rest_rpm` for `rest_ms`.
+} iw_snapshot_wheel_t;
+
+typedef struct {
+    iw_time_us_t at_us; ///< When it was looked.
+    const iw_config_t *config;
+    const iw_counters_t *counters;
+    const iw_stop_t *stop;            ///< The last one; `number` is 0 if there was none.
+    const iw_ledger_entry_t *assumed; ///< What is assumed of the wheels, by iw_ledger_item_t.
+    const iw_time_us_t *seen_us;      ///< When each iw_cause_t was last seen; IW_NEVER: never.
+    iw_snapshot_wheel_t wheel[IW_SIDES];
+    iw_snapshot_sent_t sent;
+    iw_time_us_t pose_us;        ///< Of the pose that the right wheel told; IW_NEVER: none.
+    iw_time_us_t armed_us;       ///< When ARMED began or the lease was taken over.
+    iw_time_us_t lease_until_us; ///< In ARMED: without another drive command the lease ends here.
+    iw_time_us_t stale_us;       ///< The last nonzero drive command of anybody, accepted or not; IW_NEVER: none.
+    iw_time_us_t waiting_us;     ///< Since when a setpoint waits for its TX confirmation; IW_NEVER: none does.
+    iw_time_us_t
+        confirmed_us; ///< Of each wheel the last confirmed setpoint: when the older of them was sent; 0: not both yet.
+    iw_client_t holder;       ///< Of the lease, also while arming; IW_CLIENT_NONE: nobody.
+    iw_client_t stale_client; ///< Who sent the command of `stale_us`.
+    iw_pair_t target;         ///< What the client commands, after limits; zero unless the demand is to follow.
+    iw_pair_t applied;        ///< What the wheels were last told, after ramps, in the machine's frame.
+    uint32_t
+        present; ///< Bit per latching cause that is there now, or happened less than a second ago: keeps from reset.
+    uint32_t assumed_changes; ///< Grows with every change of what is assumed.
+    uint32_t still_moving;    ///< Holds that ended by their longest time with a wheel not at rest.
+    iw_state_t state;
+    iw_refusal_t arm_refusal; ///< Why the last arming failed.
+    iw_demand_t demand;       ///< What the scheduler aims at since the last step.
+    iw_bus_state_t bus;
+    iw_ledger_item_t doubt; ///< The first contradicted assumption that keeps the wheels still; IW_LEDGER_ITEMS: none.
+    bool arming;            ///< An arm that was granted waits for its TX confirmation.
+    bool output_zero;       ///< The pair last told was zero, or a stop at once has made it so.
+    bool echo_proven;       ///< See `iw_bus_facts_t`.
+    bool
+        left_behind; ///< Nothing is sent, but a setpoint is overdue and the port cannot take it back (it said so, or let
+                     ///< IW_GATEWAY_LOST_ECHO_US pass): it may leave when wheels get power.
+} iw_snapshot_t;
+
+/// Looks at everything. `now_us`: of the last step, or later.
+void iw_gateway_snapshot(const struct iw_gateway *self, iw_time_us_t now_us, iw_snapshot_t *out_snapshot);
+
+/// Four of its answers alone, for those who need no more.
+iw_state_t iw_gateway_state(const struct iw_gateway *self);
+bool iw_gateway_arming(const struct iw_gateway *self);
+iw_refusal_t iw_gateway_arm_refusal(const struct iw_gateway *self);
+
+/// True while setpoints are sent, or about to be.
+bool iw_gateway_is_sending(const struct iw_gateway *self);
+
+#endif

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel/gateway.h"
+
+iw_state_t iw_gateway_state(const iw_gateway_t *self) {
+    return iw_permit_state(&self->permit);
+}
+
+bool iw_gateway_arming(const iw_gateway_t *self) {
+    return iw_permit_arming(&self->permit);
+}
+
+iw_refusal_t iw_gateway_arm_refusal(const iw_gateway_t *self) {
+    return self->permit.arm_refusal;
+}
+
+bool iw_gateway_is_sending(const iw_gateway_t *self) {
+    return iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE;
+}
+
+/// The operator's word against what the wheel's offset says of the unit, or of the offset: only a tare is to be trusted.
+static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_t validity) {
+    const bool judged = validity == IW_FORCE_UNIT_CONTRADICTED || validity == IW_FORCE_OFFSET_REMOVED;
+    if (!judged) {
+        return validity;
+    }
+    return (force->provenance == IW_OFFSET_OPERATOR) ? IW_FORCE_VALID : IW_FORCE_OFFSET_DOUBTED;
+}
+
+/// What the sensor shows, and what is assumed of its unit and offset.
+static iw_force_validity_t force_validity(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
+    const iw_force_t *const force = &self->force[side];
+    const iw_ledger_entry_t *const unit = iw_ledger_entry(&self->ledger, iw_ledger_force_unit(side));
+    const iw_ledger_entry_t *const included = iw_ledger_entry(&self->ledger, IW_LEDGER_OFFSET_INCLUDED);
+    const iw_ledger_entry_t *const asked = (force->evidence == IW_UNIT_OFFSET_REMOVED) ? included : unit;
+    iw_force_validity_t validity = iw_force_validity(force, now_us);
+    if (asked->evidence == IW_EVIDENCE_OPERATOR) {
+        validity = overruled(force, validity);
+    }
+    if (validity == IW_FORCE_VALID && unit->state == IW_LEDGER_CONTRADICTED) {
+        return IW_FORCE_UNIT_CONTRADICTED;
+    }
+    if (validity == IW_FORCE_VALID && included->state == IW_LEDGER_CONTRADICTED &&
+        force->provenance != IW_OFFSET_OPERATOR) {
+        return IW_FORCE_OFFSET_REMOVED;
+    }
+    return validity;
+}
+
+static void look_at_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side,
+                          iw_snapshot_wheel_t *out_wheel) {
+    const iw_wheel_t *const wheel = &self->wheel[side];
+    out_wheel->told = &self->told[side];
+    out_wheel->force = &self->force[side];
+    out_wheel->force_validity = force_validity(self, now_us, side);
+    out_wheel->speed_us = wheel->speed_us;
+    out_wheel->status_us = wheel->status_us;
+    out_wheel->ticks = wheel->ticks;
+    out_wheel->distance_nm = iw_wheel_distance_nm(wheel);
+    out_wheel->speed_mm_s = iw_wheel_speed_mm_s(wheel);
+    out_wheel->um_s_per_rpm = wheel->um_s_per_rpm;
+    out_wheel->reboots = wheel->reboots;
+    out_wheel->heard = iw_wheel_heard(wheel, now_us);
+    out_wheel->at_rest = iw_wheel_at_rest(wheel, now_us, (uint32_t)self->config.rest_ms * IW_US_PER_MS);
+}
+
+static void look_at_sender(const iw_sender_t *sender, iw_snapshot_sent_t *out_sent) {
+    out_sent->pairs = sender->pairs;
+    out_sent->later = sender->later;
+    out_sent->clamped = sender->clamped;
+    out_sent->stopped = sender->envelope.stopped;
+    out_sent->stray_echoes = sender->confirmation.stray;
+    out_sent->gap_us = sender->gap_us;
+    out_sent->gap_max_us = sender->gap_max_us;
+}
+
+static void look_at_permit(const iw_permit_t *permit, iw_time_us_t now_us, iw_snapshot_t *out_snapshot) {
+    out_snapshot->stop = &permit->stop;
+    out_snapshot->seen_us = permit->seen_us;
+    out_snapshot->armed_us = permit->armed_us;
+    out_snapshot->lease_until_us = permit->lease_until_us;
+    out_snapshot->stale_us = permit->stale_us;
+    out_snapshot->holder = permit->holder;
+    out_snapshot->stale_client = permit->stale_client;
+    out_snapshot->present = iw_permit_present(permit, now_us);
+    out_snapshot->still_moving = permit->still_moving;
+    out_snapshot->state = iw_permit_state(permit);
+    out_snapshot->arm_refusal = permit->arm_refusal;
+    out_snapshot->arming = iw_permit_arming(permit);
+}
+
+void iw_gateway_snapshot(const iw_gateway_t *self, iw_time_us_t now_us, iw_snapshot_t *out_snapshot) {
+    const iw_confirmation_t *const confirmation = &self->sender.confirmation;
+    out_snapshot->at_us = now_us;
+    out_snapshot->config = &self->config;
+    out_snapshot->counters = &self->counters;
+    out_snapshot->assumed = self->ledger.entry;
+    out_snapshot->assumed_changes = self->ledger.changes;
+    out_snapshot->doubt = iw_ledger_doubt(&self->ledger);
+    look_at_wheel(self, now_us, IW_LEFT, &out_snapshot->wheel[IW_LEFT]);
+    look_at_wheel(self, now_us, IW_RIGHT, &out_snapshot->wheel[IW_RIGHT]);
+    look_at_sender(&self->sender, &out_snapshot->sent);
+    look_at_permit(&self->permit, now_us, out_snapshot);
+    out_snapshot->pose_us = self->pose_us;
+    out_snapshot->waiting_us = iw_confirmation_waiting_us(confirmation);
+    out_snapshot->confirmed_us = iw_confirmation_proven_us(confirmation);
+    out_snapshot->demand = self->setpoint.demand;
+    out_snapshot->target = self->setpoint.target;
+    out_snapshot->applied = iw_setpoint_applied(&self->setpoint);
+    out_snapshot->output_zero = iw_setpoint_is_zero(&self->setpoint);
+    out_snapshot->bus = self->bus;
+    out_snapshot->echo_proven = self->facts.echo_proven;
+    out_snapshot->left_behind = self->left_behind;
+}
