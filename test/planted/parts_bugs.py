@@ -47,7 +47,7 @@ PARTS = [
     Bug("tare-tries-the-left-wheel-twice", "R9", DISPATCH, "iw_force_t trial = daemon->gateway.force[side];", "iw_force_t trial = daemon->gateway.force[IW_LEFT];", REQUESTS),
     Bug("tare-of-the-other-wheel", "ledger", DISPATCH, "gw_knowledge_tare(daemon, (iw_side_t)side)", "gw_knowledge_tare(daemon, (iw_side_t)(1U - side))", REQUESTS),
     Bug("armed-while-ending", "R4", DISPATCH, "if (daemon->shutting_down) {", "if (false) {", REQUESTS),
-    Bug("contradicted-type-drives", "R8", "core/src/gateway.c", "iw_ledger_doubt(&self->ledger) != IW_LEDGER_ITEMS", "iw_ledger_doubt(&self->ledger) > IW_LEDGER_ITEMS", REQUESTS),
+    Bug("contradicted-type-drives", "R8", "core/src/gateway.c", "self->ledger.doubt != IW_LEDGER_ITEMS", "self->ledger.doubt > IW_LEDGER_ITEMS", REQUESTS),
     # Clients.
     Bug("lease-outlives-its-client", "R1", SERVICE, "iw_gateway_disconnect(&daemon->gateway, daemon->now_us, client->id);", "", MOTION),
     Bug("lease-ends-after-the-lines", "R1", SERVICE, "if (client->leaving) {", "if (client->leaving && !client->readable) {", MOTION),
