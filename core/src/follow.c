@@ -9,10 +9,9 @@ void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
 }
 
 void iw_follow_restart(iw_follow_t *self) {
-    self->sign_since_us = IW_NEVER;
-    self->over_since_us = IW_NEVER;
-    self->blocked_since_us = IW_NEVER;
-    self->agree_since_us = IW_NEVER;
+    for (size_t i = 0; i < IW_FOLLOW_VERDICTS; i++) {
+        self->since_us[i] = IW_NEVER;
+    }
 }
 
 /// Keeps the start of a condition; true once it has held without a break for `for_us`.
@@ -35,22 +34,26 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
     const bool clear = applied > IW_SIGN_MM_S && measured > IW_SIGN_MM_S;
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);
     const int32_t progress = same ? measured : 0;
-    const bool stuck =
-        applied >= IW_FOLLOW_BLOCKED_MIN_MM_S && (int64_t)progress * 100 < (int64_t)applied * IW_FOLLOW_BLOCKED_PERCENT;
-    const bool sign = lasts(&self->sign_since_us, now_us, clear && !same, IW_FOLLOW_SIGN_US);
-    const bool over = lasts(&self->over_since_us, now_us, measured > applied + (int32_t)config->follow_mm_s,
-                            (uint32_t)config->follow_ms * IW_US_PER_MS);
-    const bool blocked = lasts(&self->blocked_since_us, now_us, stuck, (uint32_t)config->blocked_ms * IW_US_PER_MS);
-    (void)lasts(&self->agree_since_us, now_us, clear && same, 0);
-    if (sign) {
-        return IW_FOLLOW_SIGN;
+    const bool holds[IW_FOLLOW_VERDICTS] = {
+        clear && same,
+        clear && !same,
+        measured > applied + (int32_t)config->follow_mm_s,
+        applied >= IW_FOLLOW_BLOCKED_MIN_MM_S && progress * 100 < applied * IW_FOLLOW_BLOCKED_PERCENT,
+    };
+    const uint32_t for_us[IW_FOLLOW_VERDICTS] = {
+        IW_FOLLOW_SIGN_US,
+        IW_FOLLOW_SIGN_US,
+        (uint32_t)config->follow_ms * IW_US_PER_MS,
+        (uint32_t)config->blocked_ms * IW_US_PER_MS,
+    };
+    iw_follow_verdict_t verdict = IW_FOLLOW_OK;
+    for (uint32_t i = 0; i < IW_FOLLOW_VERDICTS; i++) {
+        const bool lasted = lasts(&self->since_us[i], now_us, holds[i], for_us[i]);
+        verdict = (lasted && verdict == IW_FOLLOW_OK) ? (iw_follow_verdict_t)i : verdict;
     }
-    if (over) {
-        return IW_FOLLOW_OVERSPEED;
-    }
-    return blocked ? IW_FOLLOW_BLOCKED : IW_FOLLOW_OK;
+    return verdict;
 }
 
 bool iw_follow_sign_confirmed(const iw_follow_t *self, iw_time_us_t now_us) {
-    return self->agree_since_us != IW_NEVER && now_us - self->agree_since_us >= IW_FOLLOW_SIGN_US;
+    return self->since_us[IW_FOLLOW_OK] != IW_NEVER && now_us - self->since_us[IW_FOLLOW_OK] >= IW_FOLLOW_SIGN_US;
 }

@@ -21,18 +21,23 @@ typedef struct {
 /// A speed and a current for each wheel.
 #define AXES ((size_t)2 * IW_SIDES)
 
-static iw_command_t zero_command(const iw_config_t *config) {
-    const int16_t full_mA = (int16_t)config->max_current_mA;
-    const iw_command_t zero = {0, (config->current_role == IW_ROLE_LIMIT) ? full_mA : (int16_t)0};
-    return zero;
+/// The command is zero from now on.
+static void forget_command(iw_setpoint_t *self) {
+    const bool limit = self->config->current_role == IW_ROLE_LIMIT;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        self->target.wheel[side].speed_mm_s = 0;
+        self->target.wheel[side].current_mA = limit ? (int16_t)self->config->max_current_mA : (int16_t)0;
+    }
 }
 
+/// So is the output.
 static void clear(iw_setpoint_t *self) {
-    memset(self->speed_um_s, 0, sizeof self->speed_um_s);
-    memset(self->current_uA, 0, sizeof self->current_uA);
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        self->speed_um_s[side] = 0;
+        self->current_uA[side] = 0;
+    }
     self->from_zero = true;
-    self->target.wheel[IW_LEFT] = zero_command(self->config);
-    self->target.wheel[IW_RIGHT] = zero_command(self->config);
+    forget_command(self);
 }
 
 void iw_setpoint_init(iw_setpoint_t *self, const iw_config_t *config) {
@@ -61,8 +66,7 @@ void iw_setpoint_demand(iw_setpoint_t *self, iw_time_us_t now_us, iw_demand_t de
         return;
     }
     self->demand = demand;
-    self->target.wheel[IW_LEFT] = zero_command(self->config);
-    self->target.wheel[IW_RIGHT] = zero_command(self->config);
+    forget_command(self);
     if (demand == IW_DEMAND_SILENCE) {
         clear(self);
         self->last_us = IW_NEVER;

@@ -12,6 +12,11 @@ static uint32_t whole_ms(iw_time_us_t span_us) {
     return (span_us < UINT32_MAX) ? (uint32_t)span_us / IW_US_PER_MS : UINT32_MAX / IW_US_PER_MS;
 }
 
+/// A cause whose detail is a time.
+static void raise_after(iw_gateway_t *self, iw_time_us_t now_us, iw_cause_t cause, iw_time_us_t span_us) {
+    iw_permit_raise(&self->permit, now_us, cause, IW_SIDES_NONE, whole_ms(span_us));
+}
+
 static uint8_t side_bit(size_t side) {
     return (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT;
 }
@@ -49,9 +54,9 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t run_us = now_us - self->stalled_since_us;
     const iw_time_us_t blind_us = (run_us > late_us) ? run_us : late_us;
     if (late_us > IW_GATEWAY_HUNG_US) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_LOOP_HUNG, IW_SIDES_NONE, whole_ms(late_us));
+        raise_after(self, now_us, IW_CAUSE_LOOP_HUNG, late_us);
     } else if (blind_us >= IW_GATEWAY_STOP_US) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_LOOP_LATE, IW_SIDES_NONE, whole_ms(blind_us));
+        raise_after(self, now_us, IW_CAUSE_LOOP_LATE, blind_us);
     }
 }
 
@@ -86,12 +91,11 @@ static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
 
 static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side) {
     const iw_codec_wheel_t *const told = &self->told[side];
-    const iw_wheel_t *const wheel = &self->wheel[side];
     iw_force_t *const force = &self->force[side];
     const iw_unit_evidence_t before = force->evidence;
     if (kind == IW_CODEC_FORCE) {
         // By its last speed, however old: a stall of ours is no motion of the wheel's.
-        const bool still = iw_magnitude(wheel->speed.speed_rpm) <= self->config.rest_rpm;
+        const bool still = iw_magnitude(told->speed.speed_rpm) <= self->config.rest_rpm;
         iw_force_hear(force, now_us, told->force.force_raw, still);
     } else {
         iw_force_hear_offset(force, now_us, told->offset.offset_dN);
@@ -228,7 +232,7 @@ static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us) {
     if (waited_us == 0U) {
         return;
     }
-    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SEND_STALLED, IW_SIDES_NONE, whole_ms(waited_us));
+    raise_after(self, now_us, IW_CAUSE_SEND_STALLED, waited_us);
     if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE && self->purged_stop != self->permit.stop.number) {
         self->purged_stop = self->permit.stop.number;
         (void)ask_back(self);

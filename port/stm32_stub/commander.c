@@ -41,12 +41,10 @@ bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t 
 }
 
 iw_refusal_t iw_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s) {
-    iw_snapshot_t seen;
-    iw_gateway_snapshot(gateway, now_us, &seen);
     const iw_drive_t drive = {
         .speed_mm_s = {speed_mm_s, speed_mm_s},
         .current_mA = {0, 0},
-        .has_current = seen.config->current_role == IW_ROLE_SETPOINT,
+        .has_current = IWHEEL_CURRENT_ROLE_VALUE == IW_ROLE_SETPOINT,
     };
     iw_applied_t applied;
     return iw_gateway_drive(gateway, now_us, CLIENT, &drive, &applied);

@@ -103,7 +103,7 @@ static void cycle(iw_gateway_t *gateway, iw_commander_t *commander) {
     iw_commander_step(commander, gateway, now_us);
     const iw_time_us_t next_us = iw_gateway_step(gateway, now_us);
     const bool estop_high = iw_pins_estop_high();
-    iw_snapshot_t seen;
+    static iw_snapshot_t seen; // Not on the stack, which it would nearly double.
     iw_gateway_snapshot(gateway, now_us, &seen);
     iw_marker_step(&seen);
     iw_pins_lamp(iw_lamp_is_lit(iw_lamp_pattern(&seen, estop_high), now_us));

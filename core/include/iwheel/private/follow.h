@@ -16,18 +16,16 @@
 #define IW_FOLLOW_BLOCKED_MIN_MM_S 100
 
 typedef enum {
-    IW_FOLLOW_OK = 0,
+    IW_FOLLOW_OK = 0,    ///< Its clock: same sign, both above IW_SIGN_MM_S.
     IW_FOLLOW_SIGN,      ///< Opposite to its command.
     IW_FOLLOW_OVERSPEED, ///< Faster than applied by follow_mm_s for follow_ms.
     IW_FOLLOW_BLOCKED,   ///< Below 20 % of its command for blocked_ms.
+    IW_FOLLOW_VERDICTS,
 } iw_follow_verdict_t;
 
 typedef struct {
     const iw_config_t *config;
-    iw_time_us_t sign_since_us; ///< IW_NEVER: the condition does not hold.
-    iw_time_us_t over_since_us;
-    iw_time_us_t blocked_since_us;
-    iw_time_us_t agree_since_us; ///< Same sign, both above IW_SIGN_MM_S.
+    iw_time_us_t since_us[IW_FOLLOW_VERDICTS]; ///< Since when the condition of each verdict holds; IW_NEVER: it does not.
 } iw_follow_t;
 
 /// `config` must be checked and outlive it.
