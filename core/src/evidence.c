@@ -6,14 +6,16 @@
 
 #include <string.h>
 
+/// |permille - 1000| up to which the figure is told as it is.
+#define FIGURE_OFF_MAX (INT32_MAX / 2)
+/// The largest step that a pose can make: half of 16 bits in X, Y and PSI.
+#define POSE_STEP_MAX (3 * 32768)
+
+IW_STATIC_ASSERT((int64_t)(IW_EVIDENCE_POSE_FAR + 2 * POSE_STEP_MAX) * 1000 <= INT32_MAX, figure_of_the_pose_fits);
+
 void iw_motion_evidence_init(iw_motion_evidence_t *self) {
     memset(self, 0, sizeof *self);
     self->pose_us = IW_NEVER;
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        self->wheel[side].speed_us = IW_NEVER;
-        self->wheel[side].status_us = IW_NEVER;
-        self->wheel[side].steady_us = IW_NEVER;
-    }
 }
 
 /// What is no longer only assumed needs no more evidence for it.
@@ -29,34 +31,19 @@ static void contradict(iw_gateway_t *gateway, iw_ledger_item_t item, int32_t fig
     iw_gateway_know(gateway, item, &entry);
 }
 
-static bool turns(int16_t rpm) {
-    return iw_magnitude(rpm) >= IW_EVIDENCE_RPM;
-}
-
-/// Of 64 bits.
-static int64_t magnitude(int64_t value) {
-    return (value < 0) ? -value : value;
-}
-
-static void close_window(iw_motion_evidence_wheel_t *self) {
-    self->open = false;
-    self->turned = 0;
-}
-
-/// Adds what it turned since the last speed frame. A gap, a slow wheel or a new direction ends the window.
+/// Adds what it turned since the last speed frame. A gap, a slow wheel or a new direction ends the stretch.
 static void add_turn(iw_motion_evidence_wheel_t *self, const iw_snapshot_wheel_t *wheel) {
+    const iw_time_us_t elapsed_us = wheel->speed_us - self->speed_us;
     const int16_t rpm = wheel->told->speed.speed_rpm;
-    const bool gap = self->speed_us == IW_NEVER || wheel->speed_us - self->speed_us > IW_EVIDENCE_GAP_US ||
-                     self->reboots != wheel->reboots;
-    const bool steady = turns(rpm) && turns(self->rpm) && (rpm < 0) == (self->rpm < 0);
-    if (gap || !steady) {
-        close_window(self);
-    } else if (self->open) {
-        self->turned += ((int64_t)rpm + self->rpm) * (int64_t)(wheel->speed_us - self->speed_us) / 2;
+    const bool steady = rpm * self->rpm >= IW_EVIDENCE_RPM * IW_EVIDENCE_RPM;
+    if (elapsed_us > IW_EVIDENCE_GAP_US || !steady || self->turned > IW_EVIDENCE_TURNED_MAX) {
+        self->open = false;
+    } else {
+        const int64_t both = iw_magnitude(rpm) + iw_magnitude(self->rpm);
+        self->turned += both * (int64_t)elapsed_us / 2;
     }
     self->speed_us = wheel->speed_us;
     self->rpm = rpm;
-    self->reboots = wheel->reboots;
 }
 
 /// One rotor rpm is one tick per second, since 60 ticks are one turn.
@@ -65,11 +52,16 @@ static int64_t expected_ticks(const iw_motion_evidence_wheel_t *self, const iw_c
     return config->rpm_of_rotor ? turned : turned * config->gear_turns / config->gear_per;
 }
 
+static int64_t magnitude(int64_t value) {
+    return (value < 0) ? -value : value;
+}
+
+/// `moved`: the way the rpm say.
 static void judge_ratio(iw_motion_evidence_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
                         int64_t moved, int64_t expected) {
     const int64_t permille = moved * 1000 / expected;
     const int64_t off = magnitude(permille - 1000);
-    const int32_t figure = (int32_t)(permille > INT32_MAX ? INT32_MAX : permille < INT32_MIN ? INT32_MIN : permille);
+    const int32_t figure = (off <= FIGURE_OFF_MAX) ? (int32_t)permille : INT32_MAX;
     if (off <= IW_EVIDENCE_FITS_PERMILLE) {
         self->misses = 0;
         confirm(gateway, seen, IW_LEDGER_GEAR_RATIO, figure);
@@ -81,36 +73,45 @@ static void judge_ratio(iw_motion_evidence_wheel_t *self, iw_gateway_t *gateway,
     }
 }
 
-/// Windows begin and end with a status frame, which brings the ticks.
+/// Stretches begin and end with a status frame, which brings the ticks.
 static void compare_ticks(iw_motion_evidence_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
-                          const iw_snapshot_wheel_t *wheel) {
-    const int64_t moved = wheel->ticks - self->ticks;
-    const int64_t expected = expected_ticks(self, seen->config);
-    const bool enough = magnitude(expected) >= IW_EVIDENCE_TICKS;
-    if (self->open && !enough) {
-        return;
-    }
+                          int64_t ticks) {
     if (self->open) {
-        judge_ratio(self, gateway, seen, moved, expected);
+        const int64_t expected = expected_ticks(self, seen->config);
+        const int64_t moved = ticks - self->ticks;
+        if (expected < IW_EVIDENCE_TICKS) {
+            return;
+        }
+        judge_ratio(self, gateway, seen, (self->rpm < 0) ? -moved : moved, expected);
     }
     self->turned = 0;
-    self->ticks = wheel->ticks;
-    self->open = turns(wheel->told->speed.speed_rpm);
+    self->ticks = ticks;
+    self->open = true;
+}
+
+static void look_at_ratio(iw_motion_evidence_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
+                          const iw_snapshot_wheel_t *wheel) {
+    if (wheel->reboots != self->reboots) {
+        self->reboots = wheel->reboots;
+        self->open = false;
+    }
+    if (wheel->speed_us != self->speed_us) {
+        add_turn(self, wheel);
+    }
+    if (wheel->status_us != IW_NEVER && wheel->status_us != self->status_us) {
+        self->status_us = wheel->status_us;
+        compare_ticks(self, gateway, seen, wheel->ticks);
+    }
 }
 
 static void look_at_type(iw_motion_evidence_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
-                         size_t side) {
-    const int32_t applied = seen->applied.wheel[side].speed_mm_s;
-    const int32_t measured = seen->wheel[side].speed_mm_s;
-    const int32_t one_rpm = (int32_t)seen->wheel[side].um_s_per_rpm / 1000 + 1;
-    const bool driving = seen->state == IW_STATE_ARMED && iw_magnitude(applied) >= IW_EVIDENCE_TYPE_MM_S;
-    const bool follows =
-        seen->wheel[side].heard && iw_magnitude(measured - applied) <= iw_magnitude(applied) * 15 / 100 + one_rpm;
-    if (!driving || !follows || applied != self->applied_mm_s) {
-        self->steady_us = IW_NEVER;
-        self->applied_mm_s = (int16_t)applied;
-    } else if (self->steady_us == IW_NEVER) {
+                         const iw_snapshot_wheel_t *wheel, int16_t applied) {
+    const int32_t measured = wheel->speed_mm_s;
+    const int32_t slack = iw_magnitude(applied) * 15 / 100 + (int32_t)wheel->um_s_per_rpm / 1000 + 1;
+    const bool follows = seen->state == IW_STATE_ARMED && wheel->heard && iw_magnitude(measured - applied) <= slack;
+    if (iw_magnitude(applied) < IW_EVIDENCE_TYPE_MM_S || !follows || applied != self->applied_mm_s) {
         self->steady_us = seen->at_us;
+        self->applied_mm_s = applied;
     } else if (seen->at_us - self->steady_us >= IW_EVIDENCE_TYPE_US) {
         confirm(gateway, seen, IW_LEDGER_SETPOINT_TYPE, measured * 1000 / applied);
     }
@@ -121,32 +122,24 @@ static int16_t reversed(int16_t value) {
     return (int16_t)(uint16_t)((bits << 8) | (bits >> 8));
 }
 
-/// The shorter way round 16 bits: X, Y and PSI wrap.
-static int64_t step_of(int16_t from, int16_t to) {
-    return magnitude((int16_t)(uint16_t)((uint16_t)to - (uint16_t)from));
+static iw_codec_pose_t reversed_pose(const iw_codec_pose_t *pose) {
+    const iw_codec_pose_t other = {reversed(pose->x_mm), reversed(pose->y_mm), reversed(pose->z_mm),
+                                   reversed(pose->psi_mrad)};
+    return other;
 }
 
-static void look_at_pose(iw_motion_evidence_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
-    const iw_codec_pose_t was = self->pose;
-    const iw_codec_pose_t is = seen->wheel[IW_RIGHT].told->pose;
-    const bool gap = self->pose_us == IW_NEVER || seen->pose_us - self->pose_us > (iw_time_us_t)2 * IW_EVIDENCE_GAP_US;
-    if (seen->pose_us == IW_NEVER || seen->pose_us == self->pose_us) {
-        return;
-    }
-    self->pose_us = seen->pose_us;
-    self->pose = is;
-    const int64_t step = step_of(was.x_mm, is.x_mm) + step_of(was.y_mm, is.y_mm) + step_of(was.psi_mrad, is.psi_mrad);
-    if (gap || step == 0) {
-        return;
-    }
-    self->moved += step;
-    self->reversed += step_of(reversed(was.x_mm), reversed(is.x_mm)) + step_of(reversed(was.y_mm), reversed(is.y_mm)) +
-                      step_of(reversed(was.psi_mrad), reversed(is.psi_mrad));
-    self->pose_steps++;
-    if (self->pose_steps < IW_EVIDENCE_POSE_STEPS) {
-        return;
-    }
-    const int32_t figure = (int32_t)(self->reversed * 1000 / self->moved);
+/// The shorter way round 16 bits: X, Y and PSI wrap.
+static int32_t way(int16_t from, int16_t to) {
+    return iw_magnitude((int16_t)(uint16_t)((uint16_t)to - (uint16_t)from));
+}
+
+static int32_t pose_step(const iw_codec_pose_t *from, const iw_codec_pose_t *to) {
+    return way(from->x_mm, to->x_mm) + way(from->y_mm, to->y_mm) + way(from->psi_mrad, to->psi_mrad);
+}
+
+/// `moved` is not 0: every step that was counted moved.
+static void judge_pose(iw_motion_evidence_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
+    const int32_t figure = self->reversed * 1000 / self->moved;
     if (self->reversed >= IW_EVIDENCE_POSE_FACTOR * self->moved) {
         confirm(gateway, seen, IW_LEDGER_POSE_BYTE_ORDER, figure);
     } else if (self->moved >= IW_EVIDENCE_POSE_FACTOR * self->reversed) {
@@ -157,18 +150,31 @@ static void look_at_pose(iw_motion_evidence_t *self, iw_gateway_t *gateway, cons
     self->reversed = 0;
 }
 
+static void look_at_pose(iw_motion_evidence_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
+    const iw_codec_pose_t was = self->pose;
+    const iw_codec_pose_t is = seen->wheel[IW_RIGHT].told->pose;
+    const iw_codec_pose_t was_reversed = reversed_pose(&was);
+    const iw_codec_pose_t is_reversed = reversed_pose(&is);
+    const int32_t step = pose_step(&was, &is);
+    const bool gap = self->pose_us == IW_NEVER || seen->pose_us - self->pose_us > (iw_time_us_t)2 * IW_EVIDENCE_GAP_US;
+    self->pose_us = seen->pose_us;
+    self->pose = is;
+    if (gap || step == 0) {
+        return;
+    }
+    self->moved += step;
+    self->reversed += pose_step(&was_reversed, &is_reversed);
+    self->pose_steps++;
+    if (self->pose_steps >= IW_EVIDENCE_POSE_STEPS || self->moved + self->reversed > IW_EVIDENCE_POSE_FAR) {
+        judge_pose(self, gateway, seen);
+    }
+}
+
 void iw_motion_evidence_look(iw_motion_evidence_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen) {
     for (size_t side = 0; side < IW_SIDES; side++) {
-        iw_motion_evidence_wheel_t *const evidence = &self->wheel[side];
         const iw_snapshot_wheel_t *const wheel = &seen->wheel[side];
-        if (wheel->speed_us != IW_NEVER && wheel->speed_us != evidence->speed_us) {
-            add_turn(evidence, wheel);
-        }
-        if (wheel->status_us != IW_NEVER && wheel->status_us != evidence->status_us) {
-            evidence->status_us = wheel->status_us;
-            compare_ticks(evidence, gateway, seen, wheel);
-        }
-        look_at_type(evidence, gateway, seen, side);
+        look_at_ratio(&self->wheel[side], gateway, seen, wheel);
+        look_at_type(&self->wheel[side], gateway, seen, wheel, seen->applied.wheel[side].speed_mm_s);
     }
     look_at_pose(self, gateway, seen);
 }

@@ -6,13 +6,14 @@
 /// Eva computes a superset of all values that every object can have at every statement of every such run. What it cannot
 /// exclude of undefined behaviour is an alarm, and no alarm may stay: docs/static.md.
 #include "iwheel/bit_timing.h"
-#include "iwheel/gateway.h"
+#include "iwheel/evidence.h"
 
 #include <__fc_builtin.h>
 
 #define GEAR_MAX 100U
 
 static iw_gateway_t gateway;
+static iw_motion_evidence_t evidence;
 static iw_time_us_t now_us;
 
 static bool any_bool(void) {
@@ -223,6 +224,7 @@ static void look(iw_side_t side) {
     (void)iw_gateway_is_sending(&gateway);
     iw_gateway_snapshot(&gateway, now_us, &seen);
     (void)iw_snapshot_force_validity(&seen, side);
+    iw_motion_evidence_look(&evidence, &gateway, &seen);
     (void)iw_cause_latches((iw_cause_t)Frama_C_interval(IW_CAUSE_NONE, IW_CAUSES - 1));
     (void)iw_permit_present(&gateway.permit, now_us);
     (void)iw_ledger_entry(&gateway.ledger, IW_LEDGER_DLC);
@@ -281,6 +283,7 @@ int main(void) {
     if (iw_gateway_init(&gateway, &config, &hal, now_us, any_bool()) != IW_CONFIG_OK) {
         return 1;
     }
+    iw_motion_evidence_init(&evidence);
     //@ slevel merge;
     live();
     return 0;

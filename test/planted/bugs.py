@@ -42,7 +42,7 @@ BUGS = [
     Bug("arm-while-contradicted", "R3", "gateway.c", "self->ledger.doubt != IW_LEDGER_ITEMS) {", "self->ledger.doubt == IW_LEDGER_SETPOINT_TYPE) {"),
     Bug("takeover-unasked", "R3", "permit.c", "(!takeover || iw_permit_arming(self))", "(iw_permit_arming(self))"),
     Bug("anybody-drives", "R3", "permit.c", "if (self->holder != client) { return IW_REFUSE_NOT_HOLDER; }", "if (client == IW_CLIENT_NONE) { return IW_REFUSE_NOT_HOLDER; }"),
-    Bug("target-survives-stop", "R3", "setpoint.c", "self->demand = demand; self->target.wheel[IW_LEFT] = zero_command(self->config); self->target.wheel[IW_RIGHT] = zero_command(self->config);", "self->demand = demand;"),
+    Bug("target-survives-stop", "R3", "setpoint.c", "self->demand = demand; forget_command(self);", "self->demand = demand;"),
     Bug("rest-by-one-frame", "R3", "wheel.c", "now_us - self->rest_since_us >= for_us", "now_us >= self->rest_since_us"),
     Bug("restart-without-zeros", "R3", "permit.c", "if (restarted && may_send(config)) {", "if (restarted && config->listen_only) {"),
     Bug("restart-yields-at-once", "R3", "permit.c", "self->strangers > LEFT_BEHIND_MAX", "self->strangers > 0U"),

@@ -38,7 +38,7 @@ CRASHES = {signal.SIGILL, signal.SIGTRAP, signal.SIGSEGV, signal.SIGBUS, signal.
 NUMBER = "IWHEEL_MUTANT"
 ENDLESS = {signal.SIGXCPU, signal.SIGXFSZ}
 # Unit tests that sweep every value come last: most changes are caught long before them.
-SLOW = ("outbox", "gateway_core_walk", "bit_timing", "codec_sweep", "gate_scheduler")
+SLOW = ("confirmation", "gateway_core_walk", "bit_timing", "codec_sweep", "envelope_scheduler")
 
 
 class Run(NamedTuple):

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// The real core and the simulated pair of wheels on one bus, in virtual time, with the daemon's evidence beside them.
+/// The real core and the simulated pair of wheels on one bus, in virtual time, with the evidence from motion beside them.
 #ifndef TEST_WORLD_RIG_H
 #define TEST_WORLD_RIG_H
 
 #include "fixture.h"
 #include "iwheel/evidence.h"
+#include "iwheel/gateway.h"
 #include "iwheel_sim/world.h"
 
 #define WORLD_RX_MAX 256U

@@ -15,10 +15,12 @@
 
 #include "iwheel/snapshot.h"
 
-/// A wheel slower than this says too little about its ratio: 1 rpm of resolution is 10 %.
+/// A wheel slower than this (geometric mean of two frames) says too little about its ratio: 1 rpm of resolution is 10 %.
 #define IW_EVIDENCE_RPM 10
-/// One rotor turn.
+/// One rotor turn: no shorter stretch is judged.
 #define IW_EVIDENCE_TICKS 60
+/// So many turns of the rpm (x us) without an end: status frames are missing, and the stretch begins anew. 100000 ticks.
+#define IW_EVIDENCE_TURNED_MAX 100000000000
 /// Ticks within this share of what the rpm say: the ratio fits. Further off than the other: it does not; between: nothing.
 #define IW_EVIDENCE_FITS_PERMILLE  120
 #define IW_EVIDENCE_FAILS_PERMILLE 250
@@ -26,8 +28,9 @@
 #define IW_EVIDENCE_MISSES 3U
 /// A gap longer than this between two frames begins anew.
 #define IW_EVIDENCE_GAP_US 100000U
-/// Steps of the pose in which it moved.
+/// Steps of the pose in which it moved; fewer, if read both ways they add up to more than this (mm and mrad).
 #define IW_EVIDENCE_POSE_STEPS 25U
+#define IW_EVIDENCE_POSE_FAR   1000000
 /// So many times as far it must move, read the wrong way round.
 #define IW_EVIDENCE_POSE_FACTOR 8
 /// At least so fast, and for so long within 15 % of it (and 1 rpm), a wheel must run to speak for the setpoint type.
@@ -38,23 +41,23 @@
 typedef struct {
     iw_time_us_t speed_us;  ///< Of the last speed frame that was added.
     iw_time_us_t status_us; ///< Of the last status frame that was looked at.
-    iw_time_us_t steady_us; ///< Since when it has run as told; IW_NEVER: it does not.
-    int64_t turned;         ///< rpm x us since the window began.
+    iw_time_us_t steady_us; ///< When it was last seen not to run as told, or was told something else.
+    int64_t turned;         ///< |rpm| x us since the stretch began.
     int64_t ticks;          ///< Where it began.
     uint32_t reboots;
     uint32_t misses;
     int16_t rpm;          ///< Of the last speed frame.
-    int16_t applied_mm_s; ///< When the wheel began to run as told.
-    bool open;            ///< A window has begun.
+    int16_t applied_mm_s; ///< What it is told since `steady_us`.
+    bool open;            ///< A stretch has begun.
 } iw_motion_evidence_wheel_t;
 
 typedef struct {
     iw_motion_evidence_wheel_t wheel[IW_SIDES];
-    iw_time_us_t pose_us;
+    iw_time_us_t pose_us; ///< Of the last pose that was looked at; IW_NEVER: none yet.
     iw_codec_pose_t pose;
     uint32_t pose_steps;
-    int64_t moved;    ///< As it is read.
-    int64_t reversed; ///< Read the other way round.
+    int32_t moved;    ///< In those steps, as it is read.
+    int32_t reversed; ///< Read the other way round.
 } iw_motion_evidence_t;
 
 void iw_motion_evidence_init(iw_motion_evidence_t *self);

@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: MIT
+// The one door for reading: what a snapshot shows is what the gateway's parts have, in every state, and nothing is left out.
+#include "gateway_rig.h"
+#include "message.h"
+#include "unity.h"
+
+#include <string.h>
+
+#define PLACE(member)                                                                                                  \
+    { offsetof(iw_snapshot_t, member), sizeof(((iw_snapshot_t *)0)->member), #member }
+#define PLACES_OF_WHEEL(side)                                                                                          \
+    PLACE(wheel[side].told), PLACE(wheel[side].force), PLACE(wheel[side].speed_us), PLACE(wheel[side].status_us),      \
+        PLACE(wheel[side].ticks), PLACE(wheel[side].nm_per_tick), PLACE(wheel[side].speed_mm_s),                       \
+        PLACE(wheel[side].um_s_per_rpm), PLACE(wheel[side].reboots), PLACE(wheel[side].heard),                         \
+        PLACE(wheel[side].at_rest)
+
+typedef struct {
+    size_t offset;
+    size_t size;
+    const char *name;
+} place_t;
+
+/// Every field, in the order of the struct.
+static const place_t places[] = {
+    PLACE(at_us),        PLACE(config),         PLACE(counters),        PLACE(sent),
+    PLACE(stop),         PLACE(assumed),        PLACE(seen_us),         PLACES_OF_WHEEL(0),
+    PLACES_OF_WHEEL(1),  PLACE(stopped),        PLACE(stray_echoes),    PLACE(pose_us),
+    PLACE(armed_us),     PLACE(lease_until_us), PLACE(stale_us),        PLACE(waiting_us),
+    PLACE(confirmed_us), PLACE(holder),         PLACE(stale_client),    PLACE(target),
+    PLACE(applied),      PLACE(present),        PLACE(assumed_changes), PLACE(still_moving),
+    PLACE(state),        PLACE(arm_refusal),    PLACE(demand),          PLACE(bus),
+    PLACE(doubt),        PLACE(arming),         PLACE(output_zero),     PLACE(echo_proven),
+    PLACE(left_behind),
+};
+#define PLACES (sizeof places / sizeof places[0])
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static void assert_wheel(const iw_snapshot_wheel_t *seen, iw_side_t side, iw_time_us_t now_us) {
+    const iw_wheel_t *wheel = &rig.gateway.wheel[side];
+    TEST_ASSERT_EQUAL_PTR(&rig.gateway.told[side], seen->told);
+    TEST_ASSERT_EQUAL_PTR(&rig.gateway.force[side], seen->force);
+    TEST_ASSERT_EQUAL_UINT64(wheel->speed_us, seen->speed_us);
+    TEST_ASSERT_EQUAL_UINT64(wheel->status_us, seen->status_us);
+    TEST_ASSERT_EQUAL_INT64(wheel->ticks, seen->ticks);
+    TEST_ASSERT_EQUAL_INT32(wheel->nm_per_tick, seen->nm_per_tick);
+    TEST_ASSERT_EQUAL_INT32(iw_wheel_speed_mm_s(wheel), seen->speed_mm_s);
+    TEST_ASSERT_EQUAL_UINT32(wheel->um_s_per_rpm, seen->um_s_per_rpm);
+    TEST_ASSERT_EQUAL_UINT32(wheel->reboots, seen->reboots);
+    TEST_ASSERT_EQUAL_INT(iw_wheel_heard(wheel, now_us), seen->heard);
+    TEST_ASSERT_EQUAL_INT(iw_wheel_rest_us(wheel, now_us) >= rig.config.rest_ms * 1000U, seen->at_rest);
+}
+
+static void assert_sent(const iw_snapshot_t *seen) {
+    const iw_sender_t *sender = &rig.gateway.sender;
+    TEST_ASSERT_EQUAL_PTR(&sender->sent, seen->sent);
+    TEST_ASSERT_EQUAL_UINT32(sender->envelope.stopped, seen->stopped);
+    TEST_ASSERT_EQUAL_UINT32(sender->confirmation.stray, seen->stray_echoes);
+}
+
+static void assert_permit(const iw_snapshot_t *seen, iw_time_us_t now_us) {
+    const iw_permit_t *permit = &rig.gateway.permit;
+    TEST_ASSERT_EQUAL_PTR(&permit->stop, seen->stop);
+    TEST_ASSERT_EQUAL_PTR(permit->seen_us, seen->seen_us);
+    TEST_ASSERT_EQUAL_UINT64(permit->armed_us, seen->armed_us);
+    TEST_ASSERT_EQUAL_UINT64(permit->lease_until_us, seen->lease_until_us);
+    TEST_ASSERT_EQUAL_UINT64(permit->stale_us, seen->stale_us);
+    TEST_ASSERT_EQUAL_UINT32(permit->holder, seen->holder);
+    TEST_ASSERT_EQUAL_UINT32(permit->stale_client, seen->stale_client);
+    TEST_ASSERT_EQUAL_HEX32(iw_permit_present(permit, now_us), seen->present);
+    TEST_ASSERT_EQUAL_UINT32(permit->still_moving, seen->still_moving);
+    TEST_ASSERT_EQUAL_INT(iw_permit_state(permit), seen->state);
+    TEST_ASSERT_EQUAL_INT(permit->arm_refusal, seen->arm_refusal);
+    TEST_ASSERT_EQUAL_INT(iw_permit_arming(permit), seen->arming);
+    TEST_ASSERT_EQUAL_INT(seen->state, iw_gateway_state(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(seen->arming, iw_gateway_arming(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(seen->arm_refusal, iw_gateway_arm_refusal(&rig.gateway));
+    TEST_ASSERT_EQUAL_INT(iw_permit_demand(permit) != IW_DEMAND_SILENCE, iw_gateway_is_sending(&rig.gateway));
+}
+
+static void assert_rest(const iw_snapshot_t *seen) {
+    const iw_gateway_t *gateway = &rig.gateway;
+    const iw_pair_t applied = iw_setpoint_applied(&gateway->setpoint);
+    TEST_ASSERT_EQUAL_PTR(&gateway->config, seen->config);
+    TEST_ASSERT_EQUAL_PTR(&gateway->counters, seen->counters);
+    TEST_ASSERT_EQUAL_PTR(gateway->ledger.entry, seen->assumed);
+    TEST_ASSERT_EQUAL_UINT32(gateway->ledger.changes, seen->assumed_changes);
+    TEST_ASSERT_EQUAL_INT(gateway->ledger.doubt, seen->doubt);
+    TEST_ASSERT_EQUAL_UINT64(gateway->pose_us, seen->pose_us);
+    TEST_ASSERT_EQUAL_UINT64(iw_confirmation_waiting_us(&gateway->sender.confirmation), seen->waiting_us);
+    TEST_ASSERT_EQUAL_UINT64(iw_confirmation_proven_us(&gateway->sender.confirmation), seen->confirmed_us);
+    TEST_ASSERT_EQUAL_INT(gateway->setpoint.demand, seen->demand);
+    TEST_ASSERT_EQUAL_MEMORY(&gateway->setpoint.target, &seen->target, sizeof seen->target);
+    TEST_ASSERT_EQUAL_MEMORY(&applied, &seen->applied, sizeof applied);
+    TEST_ASSERT_EQUAL_INT(iw_setpoint_is_zero(&gateway->setpoint), seen->output_zero);
+    TEST_ASSERT_EQUAL_INT(gateway->bus, seen->bus);
+    TEST_ASSERT_EQUAL_INT(gateway->facts.echo_proven, seen->echo_proven);
+    TEST_ASSERT_EQUAL_INT(gateway->left_behind, seen->left_behind);
+}
+
+/// Looks twice, into structs that were not alike before: every field must be alike now, and what the parts have.
+static iw_snapshot_t look_at(iw_time_us_t now_us) {
+    static iw_gateway_t before;
+    iw_snapshot_t seen;
+    iw_snapshot_t again;
+    memcpy(&before, &rig.gateway, sizeof before);
+    memset(&seen, FIXTURE_POISON, sizeof seen);
+    memset(&again, (uint8_t)~FIXTURE_POISON, sizeof again);
+    iw_gateway_snapshot(&rig.gateway, now_us, &seen);
+    iw_gateway_snapshot(&rig.gateway, now_us, &again);
+    for (size_t i = 0; i < PLACES; i++) {
+        const int other = memcmp((const uint8_t *)&seen + places[i].offset, (const uint8_t *)&again + places[i].offset,
+                                 places[i].size);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, other, places[i].name);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway, sizeof before);
+    TEST_ASSERT_EQUAL_UINT64(now_us, seen.at_us);
+    assert_wheel(&seen.wheel[IW_LEFT], IW_LEFT, now_us);
+    assert_wheel(&seen.wheel[IW_RIGHT], IW_RIGHT, now_us);
+    assert_sent(&seen);
+    assert_permit(&seen, now_us);
+    assert_rest(&seen);
+    return seen;
+}
+
+static iw_snapshot_t look(void) {
+    return look_at(rig.now_us);
+}
+
+static void put(iw_codec_kind_t kind, iw_side_t side, const iw_codec_wheel_t *as) {
+    const message_t message = {kind, side, *as};
+    iw_can_frame_t frame;
+    TEST_ASSERT_EQUAL_INT(IW_OK, message_encode(&message, &frame));
+    fake_bus_put(&rig.bus, &frame);
+}
+
+static void test_snapshot_no_field_is_missing_in_this_test(void) {
+    size_t end = 0;
+    for (size_t i = 0; i < PLACES; i++) {
+        TEST_ASSERT_TRUE_MESSAGE(places[i].offset >= end, places[i].name);
+        TEST_ASSERT_TRUE_MESSAGE(places[i].offset - end < sizeof(iw_time_us_t), places[i].name);
+        end = places[i].offset + places[i].size;
+    }
+    TEST_ASSERT_TRUE(sizeof(iw_snapshot_t) - end < sizeof(iw_time_us_t));
+}
+
+static void test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus(void) {
+    const iw_snapshot_t seen = look();
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.wheel[side].speed_us);
+        TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.wheel[side].status_us);
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_snapshot_force_validity(&seen, (iw_side_t)side));
+        TEST_ASSERT_FALSE(seen.wheel[side].heard || seen.wheel[side].at_rest);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, seen.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, seen.demand);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, seen.bus);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, seen.doubt);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.pose_us);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.stale_us);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.waiting_us);
+    TEST_ASSERT_EQUAL_UINT64(0, seen.confirmed_us);
+    TEST_ASSERT_EQUAL_UINT32(0, seen.stop->number);
+    TEST_ASSERT_EQUAL_UINT32(0, seen.present);
+    TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, seen.holder);
+    TEST_ASSERT_TRUE(seen.output_zero);
+    for (size_t cause = 0; cause < IW_CAUSES; cause++) {
+        TEST_ASSERT_EQUAL_UINT64(IW_NEVER, seen.seen_us[cause]);
+    }
+}
+
+static void test_snapshot_listening_shows_what_each_wheel_told_and_when(void) {
+    const iw_codec_wheel_t force = {.force = {0, 200}};
+    const iw_codec_wheel_t pose = {.pose = {1, 2, 3, 4}};
+    rig.config.invert[IW_RIGHT] = true;
+    gateway_rig_begin(&rig, false);
+    gateway_rig_run(&rig, MS(5)); // Each has told its ticks once: counting begins there.
+    rig.wheel[IW_LEFT] = (rig_wheel_t){false, true, 1, 7, rig.wheel[IW_LEFT].speed_us, rig.wheel[IW_LEFT].status_us};
+    rig.wheel[IW_RIGHT] =
+        (rig_wheel_t){false, true, 9, 11, rig.wheel[IW_RIGHT].speed_us, rig.wheel[IW_RIGHT].status_us};
+    gateway_rig_run(&rig, MS(295));
+    rig.now_us += 100U;
+    put(IW_CODEC_FORCE, IW_RIGHT, &force);
+    put(IW_CODEC_POSE, IW_RIGHT, &pose);
+    gateway_rig_step(&rig);
+    const iw_snapshot_t seen = look_at(rig.now_us + 50U);
+    TEST_ASSERT_EQUAL_UINT64(50, seen.at_us - seen.pose_us);
+    TEST_ASSERT_EQUAL_INT16(4, seen.wheel[IW_RIGHT].told->pose.psi_mrad);
+    TEST_ASSERT_EQUAL_INT32(20, seen.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT32(-180, seen.wheel[IW_RIGHT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT64(7, seen.wheel[IW_LEFT].ticks);
+    TEST_ASSERT_EQUAL_INT64(11, seen.wheel[IW_RIGHT].ticks);
+    TEST_ASSERT_TRUE(seen.wheel[IW_LEFT].ticks * seen.wheel[IW_LEFT].nm_per_tick > 0 &&
+                     seen.wheel[IW_RIGHT].ticks * seen.wheel[IW_RIGHT].nm_per_tick < 0);
+    TEST_ASSERT_TRUE(seen.wheel[IW_LEFT].at_rest);
+    TEST_ASSERT_FALSE(seen.wheel[IW_RIGHT].at_rest);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, iw_snapshot_force_validity(&seen, (iw_side_t)IW_LEFT));
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_NO_OFFSET, iw_snapshot_force_validity(&seen, (iw_side_t)IW_RIGHT));
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, seen.bus);
+}
+
+static void test_snapshot_heard_and_at_rest_are_those_of_the_look(void) {
+    gateway_rig_run(&rig, MS(199));
+    const iw_time_us_t rest_us = rig.gateway.wheel[IW_LEFT].rest_since_us + MS(rig.config.rest_ms);
+    TEST_ASSERT_FALSE(look_at(rest_us - 1U).wheel[IW_LEFT].at_rest);
+    TEST_ASSERT_TRUE(look_at(rest_us).wheel[IW_LEFT].at_rest);
+    const iw_time_us_t lost_us = rig.gateway.wheel[IW_LEFT].heard_us + MS(rig.config.wheel_silent_ms);
+    TEST_ASSERT_TRUE(look_at(lost_us - 1U).wheel[IW_LEFT].heard);
+    TEST_ASSERT_FALSE(look_at(lost_us).wheel[IW_LEFT].heard);
+}
+
+static void test_snapshot_arming_shows_who_waits_and_since_when(void) {
+    gateway_rig_run(&rig, MS(1100));
+    rig.bus.echo_delay_us = MS(20);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    const iw_time_us_t asked_us = rig.now_us;
+    gateway_rig_run(&rig, MS(10));
+    const iw_snapshot_t seen = look();
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, seen.state);
+    TEST_ASSERT_TRUE(seen.arming);
+    TEST_ASSERT_TRUE(iw_gateway_is_sending(&rig.gateway));
+    TEST_ASSERT_EQUAL_UINT32(HOLDER, seen.holder);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, seen.demand);
+    TEST_ASSERT_EQUAL_UINT64(asked_us, seen.waiting_us);
+    TEST_ASSERT_EQUAL_UINT64(0, seen.confirmed_us);
+}
+
+static void test_snapshot_confirmed_is_the_older_of_both_wheels(void) {
+    gateway_rig_run(&rig, MS(1100));
+    rig.bus.echo_delay_us = MS(2);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    const iw_time_us_t first_us = rig.now_us;
+    gateway_rig_run(&rig, MS(2)); // The left one's echo is there, the right one's not yet.
+    TEST_ASSERT_EQUAL_UINT64(0, look().confirmed_us);
+    gateway_rig_run(&rig, FAKE_BUS_FRAME_US);
+    TEST_ASSERT_EQUAL_UINT64(first_us, look().confirmed_us);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, look().waiting_us);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, look().state);
+}
+
+static void test_snapshot_armed_shows_command_ramp_and_lease(void) {
+    gateway_rig_arm(&rig);
+    const iw_snapshot_t armed = look();
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, armed.state);
+    TEST_ASSERT_FALSE(armed.arming);
+    TEST_ASSERT_EQUAL_UINT64(armed.armed_us + MS(1000), armed.lease_until_us);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_cruise(&rig, 400, -200, MS(200)));
+    const iw_snapshot_t seen = look();
+    TEST_ASSERT_EQUAL_INT16(400, seen.target.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT16(-200, seen.target.wheel[IW_RIGHT].speed_mm_s);
+    TEST_ASSERT_INT16_WITHIN(50, 140, seen.applied.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_INT16_WITHIN(25, -70, seen.applied.wheel[IW_RIGHT].speed_mm_s);
+    TEST_ASSERT_FALSE(seen.output_zero);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_FOLLOW, seen.demand);
+    TEST_ASSERT_EQUAL_UINT64(seen.stale_us + MS(rig.config.lease_ms), seen.lease_until_us);
+    TEST_ASSERT_EQUAL_UINT64(MS(50), seen.at_us - seen.stale_us);
+    TEST_ASSERT_EQUAL_UINT32(HOLDER, seen.stale_client);
+    TEST_ASSERT_TRUE(seen.sent->pairs > 0U && seen.sent->gap_max_us >= seen.sent->gap_us);
+    TEST_ASSERT_UINT32_WITHIN(1, seen.sent->pairs, seen.counters->echoes / 2U);
+}
+
+static void test_snapshot_braking_tells_the_stop_and_what_was_applied(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(400));
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(50));
+    const iw_snapshot_t seen = look();
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, seen.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_BRAKE, seen.demand);
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, seen.stop->cause);
+    TEST_ASSERT_EQUAL_UINT64(MS(50), seen.at_us - seen.stop->at_us);
+    TEST_ASSERT_TRUE(seen.stop->applied.wheel[IW_LEFT].speed_mm_s > seen.applied.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT16(0, seen.target.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_FALSE(seen.output_zero);
+    TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, seen.holder);
+}
+
+static void test_snapshot_latched_shows_a_cause_for_as_long_as_it_keeps_from_reset(void) {
+    const uint32_t bit = 1U << IW_CAUSE_ESTOP_SOFTWARE;
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, MS(400));
+    iw_gateway_estop(&rig.gateway, rig.now_us, OTHER);
+    const iw_time_us_t pressed_us = rig.now_us;
+    gateway_rig_step(&rig);
+    const iw_snapshot_t seen = look();
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, seen.state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_ZERO, seen.demand);
+    TEST_ASSERT_TRUE(seen.output_zero);
+    TEST_ASSERT_EQUAL_UINT32(OTHER, seen.stop->detail);
+    TEST_ASSERT_EQUAL_UINT64(pressed_us, seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE]);
+    TEST_ASSERT_EQUAL_HEX32(bit, look_at(pressed_us + MS(1000) - 1U).present);
+    TEST_ASSERT_EQUAL_HEX32(0, look_at(pressed_us + MS(1000)).present);
+    gateway_rig_run(&rig, MS(5000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, look().state);
+    TEST_ASSERT_EQUAL_INT(IW_DEMAND_SILENCE, look().demand);
+    TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
+}
+
+static void test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew(void) {
+    rig.wheel[IW_RIGHT].ticks = 500;
+    gateway_rig_run(&rig, MS(100));
+    rig.wheel[IW_RIGHT].mute = true;
+    gateway_rig_run(&rig, MS(1100));
+    TEST_ASSERT_FALSE(look().wheel[IW_RIGHT].heard);
+    rig.wheel[IW_RIGHT].mute = false;
+    rig.wheel[IW_RIGHT].status_us = rig.now_us + MS(20);
+    gateway_rig_run(&rig, MS(10));
+    const iw_snapshot_t back = look();
+    TEST_ASSERT_EQUAL_UINT32(1, back.wheel[IW_RIGHT].reboots);
+    TEST_ASSERT_EQUAL_UINT32(0, back.wheel[IW_LEFT].reboots);
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, back.wheel[IW_RIGHT].status_us);
+    TEST_ASSERT_TRUE(back.wheel[IW_RIGHT].heard);
+    TEST_ASSERT_EQUAL_HEX32(1U << IW_CAUSE_WHEEL_REBOOTED, back.present);
+    gateway_rig_run(&rig, MS(11));
+    TEST_ASSERT_TRUE(look().at_us - look().wheel[IW_RIGHT].status_us <= MS(1));
+}
+
+static void test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels_still(void) {
+    const iw_ledger_entry_t wrong = {IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, 0};
+    const uint32_t changes = look().assumed_changes;
+    iw_gateway_know(&rig.gateway, IW_LEDGER_GEAR_RATIO, &wrong);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, look().doubt);
+    iw_gateway_know(&rig.gateway, IW_LEDGER_MOUNT_SIGN_LEFT, &wrong);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_MOUNT_SIGN_LEFT, look().doubt);
+    iw_gateway_know(&rig.gateway, IW_LEDGER_CURRENT_ROLE, &wrong);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CURRENT_ROLE, look().doubt);
+    TEST_ASSERT_EQUAL_UINT32(changes + 3U, look().assumed_changes);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, look().assumed[IW_LEDGER_GEAR_RATIO].state);
+}
+
+static void test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind(void) {
+    const iw_bus_facts_t facts = {false, true};
+    iw_gateway_bus_facts(&rig.gateway, &facts);
+    gateway_rig_run(&rig, MS(1100));
+    rig.bus.acknowledged = false;
+    rig.bus.purge_result = -1;
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_request_arm(&rig, HOLDER, false));
+    gateway_rig_run(&rig, MS(100));
+    const iw_snapshot_t seen = look();
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_SEND_STALLED, seen.arm_refusal);
+    TEST_ASSERT_TRUE(seen.left_behind);
+    TEST_ASSERT_TRUE(seen.echo_proven);
+    TEST_ASSERT_FALSE(iw_gateway_is_sending(&rig.gateway));
+}
+
+/// Counters that nothing ordinary moves, each with a value of its own.
+static void test_snapshot_every_count_of_sending_is_its_own(void) {
+    gateway_rig_arm(&rig);
+    rig.gateway.sender.sent.later = 101;
+    rig.gateway.sender.sent.clamped = 102;
+    rig.gateway.sender.envelope.stopped = 103;
+    rig.gateway.sender.confirmation.stray = 104;
+    rig.gateway.permit.still_moving = 105;
+    const iw_snapshot_t seen = look();
+    TEST_ASSERT_EQUAL_UINT32(101, seen.sent->later);
+    TEST_ASSERT_EQUAL_UINT32(102, seen.sent->clamped);
+    TEST_ASSERT_EQUAL_UINT32(103, seen.stopped);
+    TEST_ASSERT_EQUAL_UINT32(104, seen.stray_echoes);
+    TEST_ASSERT_EQUAL_UINT32(105, seen.still_moving);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_snapshot_no_field_is_missing_in_this_test);
+    RUN_TEST(test_snapshot_before_the_first_frame_knows_nothing_of_wheels_and_bus);
+    RUN_TEST(test_snapshot_listening_shows_what_each_wheel_told_and_when);
+    RUN_TEST(test_snapshot_heard_and_at_rest_are_those_of_the_look);
+    RUN_TEST(test_snapshot_arming_shows_who_waits_and_since_when);
+    RUN_TEST(test_snapshot_confirmed_is_the_older_of_both_wheels);
+    RUN_TEST(test_snapshot_armed_shows_command_ramp_and_lease);
+    RUN_TEST(test_snapshot_braking_tells_the_stop_and_what_was_applied);
+    RUN_TEST(test_snapshot_latched_shows_a_cause_for_as_long_as_it_keeps_from_reset);
+    RUN_TEST(test_snapshot_after_a_reboot_the_status_is_never_until_it_tells_anew);
+    RUN_TEST(test_snapshot_doubt_is_the_first_contradiction_that_keeps_the_wheels_still);
+    RUN_TEST(test_snapshot_a_failed_arming_tells_why_and_what_is_left_behind);
+    RUN_TEST(test_snapshot_every_count_of_sending_is_its_own);
+    return UNITY_END();
+}
