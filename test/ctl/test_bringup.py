@@ -63,13 +63,14 @@ class Bringup(unittest.TestCase):
     def nothing_left_behind(self):
         """Whatever way out a test took; a gateway that was left alone holds its zeros first."""
         try:
-            self.nothing_left_soon(8 if self.killed else 0)
+            self.nothing_left_soon(self.PATIENCE_S if self.killed else 0)
         finally:
             shutil.rmtree(self.runtime)
 
     killed = False
+    PATIENCE_S = 16  # Zeros are held for ten seconds beside a wheel that turns.
 
-    def nothing_left_soon(self, seconds=8):
+    def nothing_left_soon(self, seconds=PATIENCE_S):
         end = time.monotonic() + seconds
         while os.listdir(self.runtime):
             self.assertLess(time.monotonic(), end, "bringup's folder is left behind")
