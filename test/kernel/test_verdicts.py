@@ -79,6 +79,13 @@ class Verdicts(Witnessed):
         self.assertEqual(("skipped", [GAP]), (verdict, failures))
         self.assertRegex(figures[0], "up to 200 ms late in each of 6 attempts, alone too; .*: test/kernel/run --only made_up$")
 
+    def test_put_off_and_wrong_alone_too_in_more_than_time_fails(self):
+        self.late(FAULT_US, 200_000)
+        run = Scripted(GAP, REFUSED)
+        run.softened = lambda result: result  # As in the system tests: what is checked is no matter of time.
+        self.assertEqual("stalled", run.test("made_up")[0])
+        self.assertEqual(("failed", [GAP, REFUSED]), run.test_alone("made_up")[::2])
+
     def test_put_off_and_quiet_at_the_end_is_judged(self):
         self.assertEqual("passed", Scripted().test_alone("made_up")[0])
         self.assertEqual("failed", Scripted(GAP).test_alone("made_up")[0])
