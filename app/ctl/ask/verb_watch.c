@@ -123,11 +123,11 @@ static int pump(ctl_t *self) {
     output_t output = OUTPUT_OPEN;
     while (output == OUTPUT_OPEN) {
         json_t *line = NULL;
-        const client_result_t result = client_receive(&self->client, client_now_us() + LOOK_US, &line);
-        if (result == CLIENT_INTERRUPTED) {
+        const iwc_result_t result = client_receive(&self->client, client_now_us() + LOOK_US, &line);
+        if (result == IWC_INTERRUPTED) {
             return CTL_OK;
         }
-        if (result != CLIENT_OK && result != CLIENT_TIMEOUT) {
+        if (result != IWC_OK && result != IWC_TIMEOUT) {
             return ctl_lost(self, result);
         }
         const bool event = json_object_get(line, "event") != NULL;
