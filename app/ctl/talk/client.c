@@ -71,6 +71,7 @@ iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_li
         return result;
     }
     self->line = message.text;
+    self->skipped += message.skipped;
     *out_line = json_loadb(message.text, message.length, JSON_REJECT_DUPLICATES, NULL);
     return (*out_line != NULL) ? IWC_OK : IWC_GARBLED;
 }
