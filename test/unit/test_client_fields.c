@@ -11,13 +11,14 @@
 #include <string.h>
 
 #define WHEEL(more)                                                                                                    \
-    "{\"heard\":true,\"at_rest\":false,\"speed_mm_s\":-210,\"applied_mm_s\":null,\"commanded_mm_s\":300," more             \
+    "{\"heard\":true,\"at_rest\":false,\"speed_mm_s\":-210,\"applied_mm_s\":null,\"commanded_mm_s\":300," more         \
     "\"distance_mm\":5000000000,\"battery_dV\":243,\"temperature_degC\":-3,\"speed_age_ms\":3,\"force_age_ms\":29}"
 static const char STATUS[] =
-    "{\"id\":2,\"ok\":true,\"t_us\":99000000,\"state\":\"armed\",\"cause\":null,\"lease\":{\"holder\":7,\"name\":\"\\u001b[2J \\\"x\\\\\","
+    "{\"id\":2,\"ok\":true,\"t_us\":99000000,\"state\":\"armed\",\"cause\":null,\"lease\":{\"holder\":7,\"name\":"
+    "\"\\u001b[2J \\\"x\\\\\","
     "\"remaining_ms\":120},\"bus\":{\"state\":\"active\"},\"estop\":{\"state\":\"released\"},"
-    "\"left\":" WHEEL("\"force_validity\":\"valid\",\"force_net_mN\":-120,") ",\"right\":"
-    WHEEL("\"force_validity\":\"saturated\",\"force_net_mN\":-99,") ",\"warnings\":[\"\xc3\xa4\",1.5e3,[],{}]}";
+    "\"left\":" WHEEL("\"force_validity\":\"valid\",\"force_net_mN\":-120,") ",\"right\":" WHEEL(
+        "\"force_validity\":\"saturated\",\"force_net_mN\":-99,") ",\"warnings\":[\"\xc3\xa4\",1.5e3,[],{}]}";
 
 static iwc_t *gateway;
 
@@ -70,13 +71,52 @@ static void test_json_every_change_of_a_byte_is_judged_as_by_jansson(void) {
 }
 
 static void test_json_hard_cases_are_judged_as_by_jansson(void) {
-    static const char *const texts[] = {
-        "{}", " {} ", "{ }", "[]", "1", "", " ", "{\"a\":1,}", "{,}", "{\"a\"}", "{\"a\":}", "{\"a\":01}", "{\"a\":-}", "{\"a\":-0}",
-        "{\"a\":1.}", "{\"a\":.5}", "{\"a\":1e}", "{\"a\":1e+5}", "{\"a\":1E-5}", "{\"a\":+1}", "{\"a\":NaN}", "{\"a\":tru}", "{\"a\":truex}",
-        "{\"a\":[1,]}", "{\"a\":[,]}", "{\"a\":[1 2]}", "{\"a\":\"\\x\"}", "{\"a\":\"\\u12\"}", "{\"a\":\"\\u12g4\"}", "{\"a\":\"\t\"}",
-        "{\"a\":\"\xc0\x80\"}", "{\"a\":\"\xe0\x9f\xbf\"}", "{\"a\":\"\xed\xa0\x80\"}", "{\"a\":\"\xf4\x90\x80\x80\"}",
-        "{\"a\":\"\xf0\x8f\xbf\xbf\"}", "{\"a\":\"\xf0\x9f\x9a\xb6\"}", "{\"a\":\"\xe2\x82\"}", "{\"a\":1,\"a\":2}", "{\"a\":{\"b\":1},\"b\":{\"b\":1}}",
-        "{\"a\":[{\"b\":1,\"b\":1}]}", "{}{}", "{} x", "{'a':1}", "{\"a\":1 \"b\":2}", "{\"a\" : 1 , \"b\" : [ ] }", "\xef\xbb\xbf{}"};
+    static const char *const texts[] = {"{}",
+                                        " {} ",
+                                        "{ }",
+                                        "[]",
+                                        "1",
+                                        "",
+                                        " ",
+                                        "{\"a\":1,}",
+                                        "{,}",
+                                        "{\"a\"}",
+                                        "{\"a\":}",
+                                        "{\"a\":01}",
+                                        "{\"a\":-}",
+                                        "{\"a\":-0}",
+                                        "{\"a\":1.}",
+                                        "{\"a\":.5}",
+                                        "{\"a\":1e}",
+                                        "{\"a\":1e+5}",
+                                        "{\"a\":1E-5}",
+                                        "{\"a\":+1}",
+                                        "{\"a\":NaN}",
+                                        "{\"a\":tru}",
+                                        "{\"a\":truex}",
+                                        "{\"a\":[1,]}",
+                                        "{\"a\":[,]}",
+                                        "{\"a\":[1 2]}",
+                                        "{\"a\":\"\\x\"}",
+                                        "{\"a\":\"\\u12\"}",
+                                        "{\"a\":\"\\u12g4\"}",
+                                        "{\"a\":\"\t\"}",
+                                        "{\"a\":\"\xc0\x80\"}",
+                                        "{\"a\":\"\xe0\x9f\xbf\"}",
+                                        "{\"a\":\"\xed\xa0\x80\"}",
+                                        "{\"a\":\"\xf4\x90\x80\x80\"}",
+                                        "{\"a\":\"\xf0\x8f\xbf\xbf\"}",
+                                        "{\"a\":\"\xf0\x9f\x9a\xb6\"}",
+                                        "{\"a\":\"\xe2\x82\"}",
+                                        "{\"a\":1,\"a\":2}",
+                                        "{\"a\":{\"b\":1},\"b\":{\"b\":1}}",
+                                        "{\"a\":[{\"b\":1,\"b\":1}]}",
+                                        "{}{}",
+                                        "{} x",
+                                        "{'a':1}",
+                                        "{\"a\":1 \"b\":2}",
+                                        "{\"a\" : 1 , \"b\" : [ ] }",
+                                        "\xef\xbb\xbf{}"};
     for (size_t i = 0; i < sizeof(texts) / sizeof(texts[0]); i++) {
         compare(texts[i], strlen(texts[i]));
     }
@@ -114,9 +154,10 @@ static void test_json_many_keys_cost_no_more_than_their_length(void) {
 }
 
 static void test_field_integers_are_whole_and_fit(void) {
-    const iwc_message_t message = message_of(
-        "{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"c\":9223372036854775808,\"d\":1.0,\"e\":null,\"f\":true,\"g\":\"1\",\"h\":1e2,"
-        "\"i\":{\"a\":5},\"j\":-9223372036854775809,\"k\":-0}");
+    const iwc_message_t message =
+        message_of("{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"c\":9223372036854775808,\"d\":1.0,\"e\":"
+                   "null,\"f\":true,\"g\":\"1\",\"h\":1e2,"
+                   "\"i\":{\"a\":5},\"j\":-9223372036854775809,\"k\":-0}");
     static const char *const unknown[] = {"c", "d", "e", "f", "g", "h", "i", "j", "x", "i.b", "a.b", "i.a.b", ""};
     TEST_ASSERT_EQUAL_INT64(INT64_MAX, iwc_integer(&message, "a").value);
     TEST_ASSERT_EQUAL_INT64(INT64_MIN, iwc_integer(&message, "b").value);
@@ -185,7 +226,8 @@ static void test_state_of_a_snapshot_is_read_and_unknown_is_not_zero(void) {
 }
 
 static void test_state_of_what_is_no_snapshot_is_untouched(void) {
-    static const char *const texts[] = {"{\"id\":1,\"ok\":true,\"state\":\"armed\"}", "{\"event\":\"bus\",\"state\":\"down\"}"};
+    static const char *const texts[] = {"{\"id\":1,\"ok\":true,\"state\":\"armed\"}",
+                                        "{\"event\":\"bus\",\"state\":\"down\"}"};
     iwc_state_t state = {.t_us = 42};
     for (size_t i = 0; i < 2; i++) {
         const iwc_message_t message = message_of(texts[i]);

@@ -88,7 +88,9 @@ static void test_connect_greeting_tells_our_number_and_sends_nothing(void) {
 }
 
 static void test_connect_too_many_clients_is_refused_with_its_words(void) {
-    TEST_ASSERT_EQUAL(IWC_REFUSED, adopt_with("{\"id\":null,\"ok\":false,\"error\":\"too_many_clients\",\"message\":\"16 of 16\"}\n"));
+    TEST_ASSERT_EQUAL(
+        IWC_REFUSED,
+        adopt_with("{\"id\":null,\"ok\":false,\"error\":\"too_many_clients\",\"message\":\"16 of 16\"}\n"));
     TEST_ASSERT_EQUAL_STRING("too_many_clients", iwc_error(gateway));
     TEST_ASSERT_EQUAL_STRING("16 of 16", iwc_reason(gateway));
     TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
@@ -101,8 +103,9 @@ static void test_connect_without_greeting_is_given_up(void) {
 }
 
 static void test_connect_another_service_is_garbled(void) {
-    static const char *const first[] = {"ok iwheel-sim\n", "[1]\n", "{\"event\":\"hi\"}\n", "{\"id\":1,\"ok\":true}\n", "{}\n",
-                                        "{\"event\":\"hello\",\"event\":\"hello\"}\n"};
+    static const char *const first[] = {
+        "ok iwheel-sim\n",          "[1]\n", "{\"event\":\"hi\"}\n",
+        "{\"id\":1,\"ok\":true}\n", "{}\n",  "{\"event\":\"hello\",\"event\":\"hello\"}\n"};
     for (size_t i = 0; i < sizeof(first) / sizeof(first[0]); i++) {
         TEST_ASSERT_EQUAL_MESSAGE(IWC_GARBLED, adopt_with(first[i]), first[i]);
         TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
@@ -190,8 +193,15 @@ static void test_ask_events_without_end_do_not_outlast_the_timeout(void) {
 static void test_ask_what_is_no_request_is_not_sent(void) {
     char text[IWC_REQUEST_MAX + 10U];
     int64_t id = 0;
-    static const char *const bad[] = {"", "{}", "[]", "{\"cmd\":\"stop\"", "{\"cmd\":\"stop\",\"id\":1}", "{\"cmd\":\n\"stop\"}",
-                                      "{\"cmd\":\"stop\"}{\"cmd\":\"stop\"}", "{\"cmd\":\"a\",\"cmd\":\"b\"}", " {\"cmd\":\"stop\"}"};
+    static const char *const bad[] = {"",
+                                      "{}",
+                                      "[]",
+                                      "{\"cmd\":\"stop\"",
+                                      "{\"cmd\":\"stop\",\"id\":1}",
+                                      "{\"cmd\":\n\"stop\"}",
+                                      "{\"cmd\":\"stop\"}{\"cmd\":\"stop\"}",
+                                      "{\"cmd\":\"a\",\"cmd\":\"b\"}",
+                                      " {\"cmd\":\"stop\"}"};
     for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         TEST_ASSERT_EQUAL_MESSAGE(IWC_INVALID, iwc_send(gateway, bad[i], 0, &id), bad[i]);
     }
@@ -214,22 +224,25 @@ static void test_ask_helpers_send_what_the_protocol_says(void) {
     (void)iwc_watch(gateway, IWC_WATCH_STATE | IWC_WATCH_FRAME, 20, 0);
     (void)iwc_reset(gateway, 0);
     (void)iwc_estop(gateway, "stairs", 0);
-    TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"arm\",\"name\":\"a \\\"b\\\\\",\"takeover\":true}\n"
-                             "{\"id\":3,\"cmd\":\"drive\",\"left_mm_s\":-300,\"right_mm_s\":200}\n"
-                             "{\"id\":5,\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":2,\"left_mA\":3,\"right_mA\":-4}\n"
-                             "{\"id\":7,\"cmd\":\"twist\",\"v_mm_s\":5,\"yaw_mrad_s\":-6}\n"
-                             "{\"id\":10,\"cmd\":\"watch\",\"rate_hz\":20,\"topics\":[\"state\",\"frame\"]}\n"
-                             "{\"id\":12,\"cmd\":\"reset\"}\n"
-                             "{\"id\":14,\"cmd\":\"estop\",\"reason\":\"stairs\"}\n",
-                             hear());
+    TEST_ASSERT_EQUAL_STRING(
+        "{\"id\":2,\"cmd\":\"arm\",\"name\":\"a \\\"b\\\\\",\"takeover\":true}\n"
+        "{\"id\":3,\"cmd\":\"drive\",\"left_mm_s\":-300,\"right_mm_s\":200}\n"
+        "{\"id\":5,\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":2,\"left_mA\":3,\"right_mA\":-4}\n"
+        "{\"id\":7,\"cmd\":\"twist\",\"v_mm_s\":5,\"yaw_mrad_s\":-6}\n"
+        "{\"id\":10,\"cmd\":\"watch\",\"rate_hz\":20,\"topics\":[\"state\",\"frame\"]}\n"
+        "{\"id\":12,\"cmd\":\"reset\"}\n"
+        "{\"id\":14,\"cmd\":\"estop\",\"reason\":\"stairs\"}\n",
+        hear());
 }
 
 static void test_ask_terms_and_applied_values_come_back(void) {
     iwc_terms_t terms;
     iwc_applied_t applied;
     const iwc_drive_t command = {.left_mm_s = 2000, .right_mm_s = 2000};
-    say("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"first_lease_ms\":1000,\"stop_budget_ms\":887,\"stop_budget_mm\":554}\n"
-        "{\"id\":4,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,\"limited\":true}\n");
+    say("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"first_lease_ms\":1000,\"stop_budget_ms\":887,\"stop_budget_mm\":554}"
+        "\n"
+        "{\"id\":4,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,\"limited\":"
+        "true}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_arm(gateway, NULL, false, SOON, &terms));
     TEST_ASSERT_EQUAL_INT32(200, terms.lease_ms);
     TEST_ASSERT_EQUAL_INT32(1000, terms.first_lease_ms);
@@ -237,7 +250,8 @@ static void test_ask_terms_and_applied_values_come_back(void) {
     TEST_ASSERT_EQUAL_INT32(554, terms.stop_budget_mm);
     // The second reply came early, before its request: it is an answer to nothing yet, and the drive goes unanswered.
     TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_drive(gateway, &command, 1, &applied));
-    say("{\"id\":6,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,\"limited\":true}\n");
+    say("{\"id\":6,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,\"limited\":"
+        "true}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, SOON, &applied));
     TEST_ASSERT_EQUAL_INT32(1000, applied.left_mm_s);
     TEST_ASSERT_EQUAL_INT32(-999, applied.right_mm_s);
@@ -296,7 +310,8 @@ static void test_line_without_end_ends_the_connection(void) {
 }
 
 static void test_line_of_garbage_ends_the_connection_behind_the_good_ones(void) {
-    static const char *const bad[] = {"x\n", "\n", "{\"ok\":true,\"event\":\"both\"}\n", "{\"neither\":1}\n", "{\"event\":\"\xff\"}\n"};
+    static const char *const bad[] = {"x\n", "\n", "{\"ok\":true,\"event\":\"both\"}\n", "{\"neither\":1}\n",
+                                      "{\"event\":\"\xff\"}\n"};
     for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
         TEST_ASSERT_EQUAL(IWC_OK, adopt_with(HELLO));
         say("{\"event\":\"good\"}\n");
@@ -330,7 +345,8 @@ static void test_flood_nobody_takes_leaves_the_newest_and_the_count(void) {
     uint64_t told = 0;
     int64_t last = -1;
     for (int i = 0; i < 5000; i++) {
-        (void)snprintf(text, sizeof(text), "{\"event\":\"%s\",\"number\":%d,\"pad\":\"%200s\"}\n", (i % 10 == 0) ? "stop" : "state", i, "");
+        (void)snprintf(text, sizeof(text), "{\"event\":\"%s\",\"number\":%d,\"pad\":\"%200s\"}\n",
+                       (i % 10 == 0) ? "stop" : "state", i, "");
         say(text);
         if (i % 500 == 499) {
             TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"status\"}", 0, NULL));
@@ -364,7 +380,8 @@ static void test_flood_of_different_things_drops_the_oldest(void) {
 
 static void test_latest_keeps_one_of_each_thing_in_order(void) {
     say("{\"event\":\"fault\",\"cause\":\"overspeed\"}\n{\"event\":\"state\",\"n\":1}\n{\"id\":1,\"ok\":true}\n"
-        "{\"event\":\"fault\",\"cause\":\"bus_down\"}\n{\"event\":\"lost\",\"count\":10}\n{\"event\":\"state\",\"n\":2}\n"
+        "{\"event\":\"fault\",\"cause\":\"bus_down\"}\n{\"event\":\"lost\",\"count\":10}\n{\"event\":\"state\",\"n\":2}"
+        "\n"
         "{\"event\":\"frame\",\"id\":256,\"kind\":\"echo\"}\n{\"event\":\"frame\",\"id\":256,\"kind\":\"received\"}\n"
         "{\"event\":\"state\",\"n\":3}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_latest(gateway));
@@ -417,9 +434,11 @@ static void test_drive_to_a_gateway_that_hangs_is_told_and_forgotten(void) {
     (void)hear();
     say("{\"id\":1,\"ok\":true}\n");
     TEST_ASSERT_EQUAL_STRING("", hear());
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, 0, NULL)); // There is a reply again; nobody has to take it first.
+    TEST_ASSERT_EQUAL(IWC_OK,
+                      iwc_drive(gateway, &command, 0, NULL)); // There is a reply again; nobody has to take it first.
     TEST_ASSERT_EQUAL(IWC_FULL, iwc_drive(gateway, &command, 0, NULL));
-    TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_ask(gateway, "{\"cmd\":\"status\"}", 0, NULL)); // Everything else still goes out.
+    TEST_ASSERT_EQUAL(IWC_TIMEOUT,
+                      iwc_ask(gateway, "{\"cmd\":\"status\"}", 0, NULL)); // Everything else still goes out.
     TEST_ASSERT_NOT_NULL(strstr(hear(), "status"));
 }
 

@@ -15,7 +15,8 @@
 
 typedef struct {
     iwc_t *gateway;
-    bool open; ///< `client_open` has succeeded and nobody has closed it: what the gateway ended is not opened anew by itself.
+    bool
+        open; ///< `client_open` has succeeded and nobody has closed it: what the gateway ended is not opened anew by itself.
     unsigned seen_signals;
     uint64_t skipped; ///< Events left out so far; whoever tells them sets it to 0.
     const char *line; ///< The last line received, terminated; valid until the next receive.

@@ -60,8 +60,10 @@ const char *iwc_words(iwc_result_t result) {
         [IWC_GARBLED] = "not the gateway's language on this socket; check its path, or versions that differ",
         [IWC_NEWER] = "the gateway speaks a newer protocol; install the libiwheel-client that belongs to it",
         [IWC_INVALID] = "an argument is outside its range; see the contract in iwheel_client/client.h",
-        [IWC_NOT_THERE] = "nobody listens on the socket; start the gateway (systemctl start iwheel-gateway), or name its socket",
-        [IWC_DENIED] = "the socket may not be used by you; join its group (sudo usermod -aG iwheel $USER), then log in again",
+        [IWC_NOT_THERE] =
+            "nobody listens on the socket; start the gateway (systemctl start iwheel-gateway), or name its socket",
+        [IWC_DENIED] =
+            "the socket may not be used by you; join its group (sudo usermod -aG iwheel $USER), then log in again",
         [IWC_SEVERAL] = "several gateways are running; name the socket of one (IWHEEL_SOCKET)",
     };
     const size_t index = (size_t)result;
@@ -117,7 +119,8 @@ iwc_result_t iwc_find(const char *directory, char *out, size_t size) {
 iwc_result_t iwc_await(const iwc_t *self, short events, int64_t deadline_us) {
     const int64_t now_us = iwc_now_us();
     const int64_t left_us = (deadline_us > now_us) ? deadline_us - now_us : 0;
-    const struct timespec timeout = {.tv_sec = (time_t)(left_us / 1000000), .tv_nsec = (long)(left_us % 1000000 * 1000)};
+    const struct timespec timeout = {.tv_sec = (time_t)(left_us / 1000000),
+                                     .tv_nsec = (long)(left_us % 1000000 * 1000)};
     struct pollfd entry = {.fd = (events != 0) ? self->fd : -1, .events = events};
     const int ready = ppoll(&entry, 1, (deadline_us == INT64_MAX) ? NULL : &timeout, self->let_in);
     if (ready < 0) {

@@ -19,19 +19,19 @@
 #define IWC_IN_SIZE (4U * (IWC_LINE_MAX + 1U))
 
 struct iwc {
-    int fd;             ///< -1: closed; what came before may still be taken.
-    pid_t owner;        ///< The process that connected: a forked child may not speak for it.
-    iwc_result_t over;  ///< IWC_OK while the connection lives, else what became of it.
-    bool newer;         ///< The gateway speaks a protocol above IWC_PROTOCOL.
-    int error_number;   ///< errno of the last iwc_connect.
+    int fd;            ///< -1: closed; what came before may still be taken.
+    pid_t owner;       ///< The process that connected: a forked child may not speak for it.
+    iwc_result_t over; ///< IWC_OK while the connection lives, else what became of it.
+    bool newer;        ///< The gateway speaks a protocol above IWC_PROTOCOL.
+    int error_number;  ///< errno of the last iwc_connect.
     const sigset_t *let_in;
-    sigset_t mask;      ///< What let_in points to.
-    int64_t number;     ///< Of this connection, by the gateway.
-    int64_t requests;   ///< Sent so far. Ids are even where a call waits for the reply, odd where iwc_next brings it.
-    int64_t awaited;    ///< The id that a call waits for; 0: none.
-    size_t answer;      ///< The length of the answer to it in `line`; 0: not there yet.
+    sigset_t mask;    ///< What let_in points to.
+    int64_t number;   ///< Of this connection, by the gateway.
+    int64_t requests; ///< Sent so far. Ids are even where a call waits for the reply, odd where iwc_next brings it.
+    int64_t awaited;  ///< The id that a call waits for; 0: none.
+    size_t answer;    ///< The length of the answer to it in `line`; 0: not there yet.
     int64_t driven[IWC_DRIVES_MAX]; ///< Ids of drive commands without reply; 0: free.
-    uint64_t skipped;   ///< Events left out since the last message that was taken.
+    uint64_t skipped;               ///< Events left out since the last message that was taken.
     size_t begin;
     size_t whole;
     size_t end;

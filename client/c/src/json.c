@@ -31,24 +31,29 @@ static size_t count_digits(iwc_span_t rest) {
     return count;
 }
 
-/// Bytes of the character in UTF-8 (RFC 3629: no overlong form, no surrogate, nothing above U+10FFFF); 0: it is none.
+/// Whether the second byte may follow the first (RFC 3629: no overlong form, no surrogate, nothing above U+10FFFF).
+static bool may_follow(unsigned char first, unsigned char second) {
+    const unsigned low = (first == 0xE0U) ? 0xA0U : (first == 0xF0U) ? 0x90U : 0x80U;
+    const unsigned high = (first == 0xEDU) ? 0x9FU : (first == 0xF4U) ? 0x8FU : 0xBFU;
+    return second >= low && second <= high;
+}
+
+/// Bytes of the character in UTF-8; 0: it is none.
 static size_t character_length(iwc_span_t rest) {
     const unsigned char *byte = (const unsigned char *)rest.at;
     if (byte[0] < 0x80U) {
         return 1;
     }
     const size_t length = (byte[0] >= 0xF0U) ? 4 : (byte[0] >= 0xE0U) ? 3 : 2;
-    if (byte[0] < 0xC2U || byte[0] > 0xF4U || rest.length < length) {
+    if (byte[0] < 0xC2U || byte[0] > 0xF4U || rest.length < length || !may_follow(byte[0], byte[1])) {
         return 0;
     }
-    for (size_t i = 1; i < length; i++) {
+    for (size_t i = 2; i < length; i++) {
         if ((byte[i] & 0xC0U) != 0x80U) {
             return 0;
         }
     }
-    const bool overlong = (byte[0] == 0xE0U && byte[1] < 0xA0U) || (byte[0] == 0xF0U && byte[1] < 0x90U);
-    const bool beyond = (byte[0] == 0xEDU && byte[1] > 0x9FU) || (byte[0] == 0xF4U && byte[1] > 0x8FU);
-    return (overlong || beyond) ? 0 : length;
+    return length;
 }
 
 static bool is_hex(char digit) {
@@ -218,7 +223,8 @@ static iwc_span_t find_key(iwc_span_t object, const char *key, size_t length) {
     }
     rest = skip_blanks(forward(rest, 1));
     while (begins_with(rest, '"')) {
-        const bool found = rest.length > length + 1U && memcmp(rest.at + 1, key, length) == 0 && rest.at[length + 1U] == '"';
+        const bool found =
+            rest.length > length + 1U && memcmp(rest.at + 1, key, length) == 0 && rest.at[length + 1U] == '"';
         const iwc_span_t value = skip_key(rest);
         rest = skip_value(value, IWC_JSON_DEPTH);
         if (found && rest.at != NULL) {

@@ -133,7 +133,7 @@ iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, iwc_messa
 // ---- composing ----------------------------------------------------------------------------------------------------
 
 /// Room for the longest request of ours: `estop` with a reason that is escaped throughout.
-#define TEXT_SIZE 640U
+#define TEXT_SIZE        640U
 #define NAME_MAX_BYTES   64U
 #define REASON_MAX_BYTES 200U
 
@@ -230,16 +230,17 @@ static iwc_result_t command(iwc_t *self, const char *request, int timeout_ms, iw
     }
     const iwc_result_t result = iwc_ask(self, request, timeout_ms, &reply);
     if (result == IWC_OK && out_applied != NULL) {
-        *out_applied =
-            (iwc_applied_t){number_at(&reply, "left_mm_s"), number_at(&reply, "right_mm_s"), number_at(&reply, "left_mA"),
-                            number_at(&reply, "right_mA"), iwc_truth(&reply, "limited").value == 1};
+        *out_applied = (iwc_applied_t){number_at(&reply, "left_mm_s"), number_at(&reply, "right_mm_s"),
+                                       number_at(&reply, "left_mA"), number_at(&reply, "right_mA"),
+                                       iwc_truth(&reply, "limited").value == 1};
     }
     return result;
 }
 
 iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *drive, int timeout_ms, iwc_applied_t *out_applied) {
     request_t request = {.used = 0};
-    add(&request, "{\"cmd\":\"drive\",\"left_mm_s\":%ld,\"right_mm_s\":%ld", (long)drive->left_mm_s, (long)drive->right_mm_s);
+    add(&request, "{\"cmd\":\"drive\",\"left_mm_s\":%ld,\"right_mm_s\":%ld", (long)drive->left_mm_s,
+        (long)drive->right_mm_s);
     if (drive->has_current) {
         add(&request, ",\"left_mA\":%ld,\"right_mA\":%ld", (long)drive->left_mA, (long)drive->right_mA);
     }

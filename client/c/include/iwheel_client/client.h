@@ -55,14 +55,14 @@ typedef enum {
     IWC_TIMEOUT,     ///< Nothing came within the time given.
     IWC_INTERRUPTED, ///< A signal handler ran while waiting.
     IWC_REFUSED,     ///< The gateway said no; nothing was applied. `iwc_error` and `iwc_reason` tell more.
-    IWC_FULL,        ///< Not sent: the gateway does not read, or IWC_DRIVES_MAX drive commands have no reply. Nothing is kept.
-    IWC_CLOSED,      ///< There is no connection: never made, ended by the gateway, or broken. The lease went with it.
-    IWC_GARBLED,     ///< What came is not the gateway's language, so the connection was closed.
-    IWC_NEWER,       ///< The gateway speaks a newer protocol: connected, but only for reading, `stop` and `estop`.
-    IWC_INVALID,     ///< An argument is outside what its function says. Nothing was sent.
-    IWC_NOT_THERE,   ///< Nobody listens on the socket, or there is none.
-    IWC_DENIED,      ///< The socket, or IWC_DIRECTORY, may not be used by this user.
-    IWC_SEVERAL      ///< More than one gateway is running, and none was named.
+    IWC_FULL, ///< Not sent: the gateway does not read, or IWC_DRIVES_MAX drive commands have no reply. Nothing is kept.
+    IWC_CLOSED,    ///< There is no connection: never made, ended by the gateway, or broken. The lease went with it.
+    IWC_GARBLED,   ///< What came is not the gateway's language, so the connection was closed.
+    IWC_NEWER,     ///< The gateway speaks a newer protocol: connected, but only for reading, `stop` and `estop`.
+    IWC_INVALID,   ///< An argument is outside what its function says. Nothing was sent.
+    IWC_NOT_THERE, ///< Nobody listens on the socket, or there is none.
+    IWC_DENIED,    ///< The socket, or IWC_DIRECTORY, may not be used by this user.
+    IWC_SEVERAL    ///< More than one gateway is running, and none was named.
 } iwc_result_t;
 
 typedef struct iwc iwc_t;
@@ -114,9 +114,10 @@ IWC_API void iwc_let_in(iwc_t *self, const sigset_t *mask);
 typedef struct {
     const char *text; ///< One JSON object, terminated; unknown fields are to be ignored.
     size_t length;
-    bool is_event;    ///< Else a reply.
-    int64_t id;       ///< Of the request that a reply answers; 0 for an event.
-    uint64_t skipped; ///< So many events were left out before this one: by `iwc_latest`, or because nobody took them for too long.
+    bool is_event; ///< Else a reply.
+    int64_t id;    ///< Of the request that a reply answers; 0 for an event.
+    uint64_t
+        skipped; ///< So many events were left out before this one: by `iwc_latest`, or because nobody took them for too long.
 } iwc_message_t;
 
 /// The oldest message that was not taken yet: an event, or the reply to an `iwc_send`. IWC_TIMEOUT, IWC_INTERRUPTED; after the last
@@ -186,12 +187,12 @@ typedef struct {
 typedef struct {
     int64_t t_us; ///< CLOCK_MONOTONIC of the gateway's machine.
     iwc_machine_t machine;
-    char cause[32];            ///< Why it is stopping or latched; empty: it is neither.
-    iwc_value_t holder;        ///< Of the lease; not known: nobody holds it.
-    bool ours;                 ///< This connection holds it.
-    iwc_value_t remaining_ms;  ///< Of the lease.
-    bool estop_released;       ///< False: pressed, unreadable or none.
-    bool bus_active;           ///< False: down, bus-off or error passive.
+    char cause[32];           ///< Why it is stopping or latched; empty: it is neither.
+    iwc_value_t holder;       ///< Of the lease; not known: nobody holds it.
+    bool ours;                ///< This connection holds it.
+    iwc_value_t remaining_ms; ///< Of the lease.
+    bool estop_released;      ///< False: pressed, unreadable or none.
+    bool bus_active;          ///< False: down, bus-off or error passive.
     iwc_wheel_t left;
     iwc_wheel_t right;
 } iwc_state_t;
@@ -249,7 +250,8 @@ typedef struct {
 IWC_API iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *command, int timeout_ms, iwc_applied_t *out_applied);
 
 /// The same as forward speed and turning rate, positive to the left (mrad/s).
-IWC_API iwc_result_t iwc_twist(iwc_t *self, int32_t v_mm_s, int32_t yaw_mrad_s, int timeout_ms, iwc_applied_t *out_applied);
+IWC_API iwc_result_t iwc_twist(iwc_t *self, int32_t v_mm_s, int32_t yaw_mrad_s, int timeout_ms,
+                               iwc_applied_t *out_applied);
 
 /// Ramp to zero, whoever drives. If it cannot be handed over or is not answered in time, the connection is closed, which stops the
 /// wheels if the lease was ours. As `iwc_ask`.
