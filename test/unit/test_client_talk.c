@@ -222,6 +222,7 @@ static void test_ask_helpers_send_what_the_protocol_says(void) {
     (void)iwc_drive(gateway, &full, 0, NULL);
     (void)iwc_twist(gateway, 5, -6, 0, NULL);
     (void)iwc_watch(gateway, IWC_WATCH_STATE | IWC_WATCH_FRAME, 20, 0);
+    (void)iwc_watch(gateway, 0, 1, 0);
     (void)iwc_reset(gateway, 0);
     (void)iwc_estop(gateway, "stairs", 0);
     TEST_ASSERT_EQUAL_STRING(
@@ -230,8 +231,9 @@ static void test_ask_helpers_send_what_the_protocol_says(void) {
         "{\"id\":5,\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":2,\"left_mA\":3,\"right_mA\":-4}\n"
         "{\"id\":7,\"cmd\":\"twist\",\"v_mm_s\":5,\"yaw_mrad_s\":-6}\n"
         "{\"id\":10,\"cmd\":\"watch\",\"rate_hz\":20,\"topics\":[\"state\",\"frame\"]}\n"
-        "{\"id\":12,\"cmd\":\"reset\"}\n"
-        "{\"id\":14,\"cmd\":\"estop\",\"reason\":\"stairs\"}\n",
+        "{\"id\":12,\"cmd\":\"watch\",\"rate_hz\":1,\"topics\":[]}\n"
+        "{\"id\":14,\"cmd\":\"reset\"}\n"
+        "{\"id\":16,\"cmd\":\"estop\",\"reason\":\"stairs\"}\n",
         hear());
 }
 

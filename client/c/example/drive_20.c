@@ -11,13 +11,13 @@ int main(int count, char **words) {
     iwc_terms_t terms = {.lease_ms = 0};
     iwc_result_t result = (gateway != NULL) ? iwc_connect(gateway, NULL, 1000) : IWC_INVALID;
     result = (result == IWC_OK) ? iwc_arm(gateway, "drive_20", false, 1000, &terms) : result;
-    const int seconds = (count > 1) ? atoi(words[1]) : 2;
+    const int seconds = (count > 1) ? (int)strtol(words[1], NULL, 10) : 2;
     for (int left_ms = seconds * 1000; result == IWC_OK && left_ms > 0; left_ms -= terms.lease_ms / 3 + 1) {
         result = iwc_drive(gateway, &(iwc_drive_t){.left_mm_s = 200, .right_mm_s = 200}, 100, NULL);
-        usleep((useconds_t)terms.lease_ms * 1000U / 3U);
+        (void)usleep((useconds_t)terms.lease_ms * 1000U / 3U);
     }
     if (result != IWC_OK) {
-        fprintf(stderr, "drive_20: %s\n", (result == IWC_REFUSED) ? iwc_reason(gateway) : iwc_words(result));
+        (void)fprintf(stderr, "drive_20: %s\n", (result == IWC_REFUSED) ? iwc_reason(gateway) : iwc_words(result));
     }
     const iwc_result_t stopped = (terms.lease_ms > 0) ? iwc_stop(gateway, 1000) : result;
     iwc_free(gateway);

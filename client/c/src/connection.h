@@ -16,7 +16,7 @@
 #include <sys/un.h>
 
 /// Room for two lines that are kept, one that is coming, and one to read into.
-#define IWC_IN_SIZE (4U * (IWC_LINE_MAX + 1U))
+#define IWC_IN_SIZE (4U * ((size_t)IWC_LINE_MAX + 1U))
 
 struct iwc {
     int fd;            ///< -1: closed; what came before may still be taken.

@@ -6,8 +6,6 @@
 // Each `skip_` takes the rest of the text and returns what follows the thing skipped; `at` NULL: it is none.
 static const iwc_span_t NOTHING = {NULL, 0};
 
-static iwc_span_t skip_value(iwc_span_t rest, unsigned depth);
-
 static iwc_span_t forward(iwc_span_t rest, size_t count) {
     return (iwc_span_t){rest.at + count, rest.length - count};
 }
@@ -17,7 +15,7 @@ static bool begins_with(iwc_span_t rest, char wanted) {
 }
 
 static iwc_span_t skip_blanks(iwc_span_t rest) {
-    while (rest.length > 0 && rest.at != NULL && memchr(" \t\r\n", rest.at[0], 4) != NULL) {
+    while (rest.at != NULL && rest.length > 0 && rest.at[0] != '\0' && strchr(" \t\r\n", rest.at[0]) != NULL) {
         rest = forward(rest, 1);
     }
     return rest;
@@ -135,75 +133,86 @@ static iwc_span_t skip_key(iwc_span_t rest) {
     return begins_with(rest, ':') ? skip_blanks(forward(rest, 1)) : NOTHING;
 }
 
+/// An object or array that is open.
 typedef struct {
+    char close;
+    unsigned keys;
     iwc_span_t key[IWC_JSON_KEYS];
-    unsigned count;
-} keys_t;
+} level_t;
 
 /// False if the key at `rest`, which ends where `behind` begins, was there before.
-static bool note_key(keys_t *self, iwc_span_t rest, iwc_span_t behind) {
+static bool note_key(level_t *self, iwc_span_t rest, iwc_span_t behind) {
     const iwc_span_t key = {rest.at, (size_t)(behind.at - rest.at)};
-    for (unsigned i = 0; i < self->count; i++) {
+    for (unsigned i = 0; i < self->keys; i++) {
         if (self->key[i].length == key.length && memcmp(self->key[i].at, key.at, key.length) == 0) {
             return false;
         }
     }
-    if (self->count < IWC_JSON_KEYS) {
-        self->key[self->count] = key;
-        self->count++;
+    if (self->keys < IWC_JSON_KEYS) {
+        self->key[self->keys] = key;
+        self->keys++;
     }
     return true;
 }
 
-/// A key that is new, and its colon.
-static iwc_span_t skip_new_key(keys_t *keys, iwc_span_t rest) {
+/// Up to the value of the next member: in an object behind its key, which must be new.
+static iwc_span_t skip_to_member(level_t *self, iwc_span_t rest) {
+    rest = skip_blanks(rest);
+    if (self->close == ']') {
+        return rest;
+    }
     const iwc_span_t behind = skip_string(rest);
-    return (behind.at != NULL && note_key(keys, rest, behind)) ? skip_key(rest) : NOTHING;
+    return (behind.at != NULL && note_key(self, rest, behind)) ? skip_key(rest) : NOTHING;
 }
 
-/// An object or array.
-static iwc_span_t skip_container(iwc_span_t rest, unsigned depth) {
-    const bool object = rest.at[0] == '{';
-    const char close = object ? '}' : ']';
-    keys_t keys;
-    keys.count = 0;
-    if (depth == 0) {
-        return NOTHING;
-    }
-    rest = skip_blanks(forward(rest, 1));
-    if (begins_with(rest, close)) {
-        return forward(rest, 1);
-    }
-    for (;;) {
-        rest = object ? skip_new_key(&keys, rest) : rest;
-        rest = skip_blanks(skip_value(rest, depth - 1U));
-        if (begins_with(rest, close)) {
-            return forward(rest, 1);
-        }
-        if (!begins_with(rest, ',')) {
-            return NOTHING;
-        }
-        rest = skip_blanks(forward(rest, 1));
-    }
-}
-
-static iwc_span_t skip_value(iwc_span_t rest, unsigned depth) {
-    if (rest.at == NULL || rest.length == 0) {
-        return NOTHING;
-    }
-    switch (rest.at[0]) {
-    case '{':
-    case '[':
-        return skip_container(rest, depth);
-    case '"':
+static iwc_span_t skip_scalar(iwc_span_t rest) {
+    if (begins_with(rest, '"')) {
         return skip_string(rest);
-    case 't':
-    case 'f':
-    case 'n':
-        return skip_word(rest);
-    default:
-        return skip_number(rest);
     }
+    if (begins_with(rest, 't') || begins_with(rest, 'f') || begins_with(rest, 'n')) {
+        return skip_word(rest);
+    }
+    return skip_number(rest);
+}
+
+/// Behind a value: closes what ends there, and goes to the next one in what does not. `*depth` 0: all is closed.
+static iwc_span_t skip_closings(level_t *level, unsigned *depth, iwc_span_t rest) {
+    while (*depth > 0) {
+        level_t *inner = &level[*depth - 1U];
+        rest = skip_blanks(rest);
+        if (begins_with(rest, inner->close)) {
+            rest = forward(rest, 1);
+            (*depth)--;
+        } else {
+            return begins_with(rest, ',') ? skip_to_member(inner, forward(rest, 1)) : NOTHING;
+        }
+    }
+    return rest;
+}
+
+static iwc_span_t skip_value(iwc_span_t rest) {
+    level_t level[IWC_JSON_DEPTH];
+    unsigned depth = 0;
+    do {
+        if (begins_with(rest, '{') || begins_with(rest, '[')) {
+            if (depth == IWC_JSON_DEPTH) {
+                return NOTHING;
+            }
+            level_t *inner = &level[depth];
+            depth++;
+            inner->close = (rest.at[0] == '{') ? '}' : ']';
+            inner->keys = 0;
+            rest = skip_blanks(forward(rest, 1));
+            if (!begins_with(rest, inner->close)) {
+                rest = skip_to_member(inner, rest);
+                continue;
+            }
+        } else {
+            rest = skip_scalar(rest);
+        }
+        rest = skip_closings(level, &depth, rest);
+    } while (depth > 0 && rest.at != NULL && rest.length > 0);
+    return (depth == 0) ? rest : NOTHING;
 }
 
 bool iwc_json_is_object(const char *text, size_t length) {
@@ -211,7 +220,7 @@ bool iwc_json_is_object(const char *text, size_t length) {
     if (!begins_with(rest, '{')) {
         return false;
     }
-    rest = skip_blanks(skip_container(rest, IWC_JSON_DEPTH));
+    rest = skip_blanks(skip_value(rest));
     return rest.at != NULL && rest.length == 0;
 }
 
@@ -226,7 +235,7 @@ static iwc_span_t find_key(iwc_span_t object, const char *key, size_t length) {
         const bool found =
             rest.length > length + 1U && memcmp(rest.at + 1, key, length) == 0 && rest.at[length + 1U] == '"';
         const iwc_span_t value = skip_key(rest);
-        rest = skip_value(value, IWC_JSON_DEPTH);
+        rest = skip_value(value);
         if (found && rest.at != NULL) {
             return (iwc_span_t){value.at, (size_t)(rest.at - value.at)};
         }

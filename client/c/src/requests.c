@@ -4,7 +4,6 @@
 #include "queue.h"
 
 #include <poll.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -142,12 +141,26 @@ typedef struct {
     size_t used;
 } request_t;
 
-__attribute__((format(printf, 2, 3))) static void add(request_t *self, const char *format, ...) {
-    va_list list;
-    va_start(list, format);
-    const int n = vsnprintf(self->text + self->used, TEXT_SIZE - self->used, format, list);
-    va_end(list);
-    self->used += (n > 0) ? (size_t)n : 0U;
+static void add(request_t *self, const char *text) {
+    const size_t length = strlen(text);
+    if (self->used + length < TEXT_SIZE) {
+        memcpy(self->text + self->used, text, length + 1U);
+        self->used += length;
+    }
+}
+
+static request_t begin_request(const char *cmd) {
+    request_t request = {.used = 0};
+    add(&request, "{\"cmd\":\"");
+    add(&request, cmd);
+    add(&request, "\"");
+    return request;
+}
+
+static void add_integer(request_t *self, const char *key, int32_t value) {
+    char text[48];
+    (void)snprintf(text, sizeof(text), ",\"%s\":%ld", key, (long)value);
+    add(self, text);
 }
 
 /// False if the text may not stand in a request.
@@ -158,20 +171,23 @@ static bool add_text(request_t *self, const char *key, const char *text, size_t 
     if (strlen(text) > most) {
         return false;
     }
-    add(self, ",\"%s\":\"", key);
+    add(self, ",\"");
+    add(self, key);
+    add(self, "\":\"");
     for (; *text != '\0'; text++) {
+        const char piece[3] = {'\\', *text, '\0'};
         if ((unsigned char)*text < 0x20U || *text == 0x7F) {
             return false;
         }
-        add(self, "%s%c", (*text == '"' || *text == '\\') ? "\\" : "", *text);
+        add(self, (*text == '"' || *text == '\\') ? piece : piece + 1);
     }
     add(self, "\"");
     return true;
 }
 
 static iwc_result_t ask_plainly(iwc_t *self, const char *cmd, int timeout_ms) {
-    request_t request = {.used = 0};
-    add(&request, "{\"cmd\":\"%s\"}", cmd);
+    request_t request = begin_request(cmd);
+    add(&request, "}");
     return iwc_ask(self, request.text, timeout_ms, NULL);
 }
 
@@ -187,19 +203,21 @@ iwc_result_t iwc_status(iwc_t *self, int timeout_ms, iwc_state_t *out_state) {
 iwc_result_t iwc_watch(iwc_t *self, unsigned topics, int rate_hz, int timeout_ms) {
     static const char *const names[] = {"state", "bus", "estop", "lease", "stop", "force", "frame"};
     const size_t count = sizeof(names) / sizeof(names[0]);
-    request_t request = {.used = 0};
+    request_t request = begin_request("watch");
     if (topics >= 1U << count || rate_hz < 1 || rate_hz > 100) {
         return IWC_INVALID;
     }
-    add(&request, "{\"cmd\":\"watch\",\"rate_hz\":%d,\"topics\":[", rate_hz);
-    const char *comma = "";
+    add_integer(&request, "rate_hz", rate_hz);
+    add(&request, ",\"topics\":[");
+    const char *comma = "\"";
     for (size_t i = 0; i < count; i++) {
         if ((topics & (1U << i)) != 0U) {
-            add(&request, "%s\"%s\"", comma, names[i]);
-            comma = ",";
+            add(&request, comma);
+            add(&request, names[i]);
+            comma = "\",\"";
         }
     }
-    add(&request, "]}");
+    add(&request, (topics != 0U) ? "\"]}" : "]}");
     return iwc_ask(self, request.text, timeout_ms, NULL);
 }
 
@@ -209,12 +227,11 @@ static int32_t number_at(const iwc_message_t *reply, const char *path) {
 
 iwc_result_t iwc_arm(iwc_t *self, const char *name, bool takeover, int timeout_ms, iwc_terms_t *out_terms) {
     iwc_message_t reply;
-    request_t request = {.used = 0};
-    add(&request, "{\"cmd\":\"arm\"");
+    request_t request = begin_request("arm");
     if (!add_text(&request, "name", name, NAME_MAX_BYTES)) {
         return IWC_INVALID;
     }
-    add(&request, "%s}", takeover ? ",\"takeover\":true" : "");
+    add(&request, takeover ? ",\"takeover\":true}" : "}");
     const iwc_result_t result = iwc_ask(self, request.text, timeout_ms, &reply);
     if (result == IWC_OK && out_terms != NULL) {
         *out_terms = (iwc_terms_t){number_at(&reply, "lease_ms"), number_at(&reply, "first_lease_ms"),
@@ -223,6 +240,7 @@ iwc_result_t iwc_arm(iwc_t *self, const char *name, bool takeover, int timeout_m
     return result;
 }
 
+/// `request` drives.
 static iwc_result_t command(iwc_t *self, const char *request, int timeout_ms, iwc_applied_t *out_applied) {
     iwc_message_t reply;
     if (timeout_ms == 0) {
@@ -238,19 +256,22 @@ static iwc_result_t command(iwc_t *self, const char *request, int timeout_ms, iw
 }
 
 iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *drive, int timeout_ms, iwc_applied_t *out_applied) {
-    request_t request = {.used = 0};
-    add(&request, "{\"cmd\":\"drive\",\"left_mm_s\":%ld,\"right_mm_s\":%ld", (long)drive->left_mm_s,
-        (long)drive->right_mm_s);
+    request_t request = begin_request("drive");
+    add_integer(&request, "left_mm_s", drive->left_mm_s);
+    add_integer(&request, "right_mm_s", drive->right_mm_s);
     if (drive->has_current) {
-        add(&request, ",\"left_mA\":%ld,\"right_mA\":%ld", (long)drive->left_mA, (long)drive->right_mA);
+        add_integer(&request, "left_mA", drive->left_mA);
+        add_integer(&request, "right_mA", drive->right_mA);
     }
     add(&request, "}");
     return command(self, request.text, timeout_ms, out_applied);
 }
 
 iwc_result_t iwc_twist(iwc_t *self, int32_t v_mm_s, int32_t yaw_mrad_s, int timeout_ms, iwc_applied_t *out_applied) {
-    request_t request = {.used = 0};
-    add(&request, "{\"cmd\":\"twist\",\"v_mm_s\":%ld,\"yaw_mrad_s\":%ld}", (long)v_mm_s, (long)yaw_mrad_s);
+    request_t request = begin_request("twist");
+    add_integer(&request, "v_mm_s", v_mm_s);
+    add_integer(&request, "yaw_mrad_s", yaw_mrad_s);
+    add(&request, "}");
     return command(self, request.text, timeout_ms, out_applied);
 }
 
@@ -267,8 +288,7 @@ iwc_result_t iwc_stop(iwc_t *self, int timeout_ms) {
 }
 
 iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms) {
-    request_t request = {.used = 0};
-    add(&request, "{\"cmd\":\"estop\"");
+    request_t request = begin_request("estop");
     if (!add_text(&request, "reason", reason, REASON_MAX_BYTES)) {
         return IWC_INVALID;
     }
