@@ -114,10 +114,9 @@ IWC_API void iwc_let_in(iwc_t *self, const sigset_t *mask);
 typedef struct {
     const char *text; ///< One JSON object, terminated; unknown fields are to be ignored.
     size_t length;
-    bool is_event; ///< Else a reply.
-    int64_t id;    ///< Of the request that a reply answers; 0 for an event.
-    uint64_t
-        skipped; ///< So many events were left out before this one: by `iwc_latest`, or because nobody took them for too long.
+    bool is_event;    ///< Else a reply.
+    int64_t id;       ///< Of the request that a reply answers; 0 for an event.
+    uint64_t skipped; ///< Events left out before this one: by `iwc_latest`, or because nobody took them for too long.
 } iwc_message_t;
 
 /// The oldest message that was not taken yet: an event, or the reply to an `iwc_send`. IWC_TIMEOUT, IWC_INTERRUPTED; after the last
