@@ -90,6 +90,7 @@ bool iwc_queue_take(iwc_t *self, iwc_message_t *out_message) {
             (void)iwc_json_integer(iwc_json_find(span, "id"), &out_message->id);
             out_message->id = out_message->is_event ? 0 : out_message->id;
             self->skipped = 0;
+            self->answer = 0;
             return true;
         }
     }

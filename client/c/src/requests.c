@@ -114,9 +114,9 @@ iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, iwc_messa
     self->answer = 0;
     iwc_result_t result = send_as(self, request, self->awaited, deadline_us);
     result = (result == IWC_OK) ? await_answer(self, deadline_us) : result;
-    const iwc_message_t reply = {.text = self->line, .length = self->answer, .id = self->awaited};
     self->awaited = 0;
-    if (result != IWC_OK) {
+    iwc_message_t reply;
+    if (result != IWC_OK || !iwc_reply(self, &reply)) {
         return result;
     }
     if (out_reply != NULL) {
@@ -127,6 +127,15 @@ iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, iwc_messa
     }
     iwc_keep_refusal(self, &reply);
     return IWC_REFUSED;
+}
+
+bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply) {
+    if (self->answer == 0) {
+        return false;
+    }
+    *out_reply = (iwc_message_t){.text = self->line, .length = self->answer};
+    out_reply->id = iwc_integer(out_reply, "id").value;
+    return true;
 }
 
 // ---- composing ----------------------------------------------------------------------------------------------------

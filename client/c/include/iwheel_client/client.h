@@ -160,6 +160,10 @@ IWC_API iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, i
 /// read: IWC_FULL after it, and nothing is kept. A request that could leave only in part ends the connection (IWC_CLOSED).
 IWC_API iwc_result_t iwc_send(iwc_t *self, const char *request, int timeout_ms, int64_t *out_id);
 
+/// The reply that the last call waited for, for what its function does not hand out, such as `warnings` of `iwc_arm`. False: there was
+/// none, or another message was taken since.
+IWC_API bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply);
+
 /// Name and words of the last refusal; empty: there was none. The words tell cause and cure.
 IWC_API const char *iwc_error(const iwc_t *self);
 IWC_API const char *iwc_reason(const iwc_t *self);
