@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The example of libiwheel-client drives real time's gateway with simulated wheels; however it dies, they stop.
+"""The example of libiwheel-client drives simulated wheels through the real gateway; however it dies, they stop.
 
 usage: test_example.py BUILD [TEST...]
 """

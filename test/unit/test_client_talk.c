@@ -241,11 +241,8 @@ static void test_ask_terms_and_applied_values_come_back(void) {
     iwc_terms_t terms;
     iwc_applied_t applied;
     const iwc_drive_t command = {.left_mm_s = 2000, .right_mm_s = 2000};
-    say("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"first_lease_ms\":1000,\"stop_budget_ms\":887,\"stop_budget_mm\":554,"
-        "\"warnings\":[\"w\"]}"
-        "\n"
-        "{\"id\":4,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,\"limited\":"
-        "true}\n");
+    say("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"first_lease_ms\":1000,\"stop_budget_ms\":887,"
+        "\"stop_budget_mm\":554,\"warnings\":[\"w\"]}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_arm(gateway, NULL, false, SOON, &terms));
     TEST_ASSERT_EQUAL_INT32(200, terms.lease_ms);
     TEST_ASSERT_EQUAL_INT32(1000, terms.first_lease_ms);
@@ -255,10 +252,8 @@ static void test_ask_terms_and_applied_values_come_back(void) {
     TEST_ASSERT_TRUE(iwc_reply(gateway, &message));
     TEST_ASSERT_EQUAL_STRING_LEN("[\"w\"]", iwc_json(&message, "warnings", &length), 5);
     TEST_ASSERT_EQUAL_INT64(2, message.id);
-    // The second reply came early, before its request: it is an answer to nothing yet, and the drive goes unanswered.
-    TEST_ASSERT_EQUAL(IWC_TIMEOUT, iwc_drive(gateway, &command, 1, &applied));
-    say("{\"id\":6,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,\"limited\":"
-        "true}\n");
+    say("{\"id\":4,\"ok\":true,\"left_mm_s\":1000,\"right_mm_s\":-999,\"left_mA\":2000,\"right_mA\":1999,"
+        "\"limited\":true}\n");
     TEST_ASSERT_EQUAL(IWC_OK, iwc_drive(gateway, &command, SOON, &applied));
     TEST_ASSERT_TRUE(iwc_reply(gateway, &message));
     TEST_ASSERT_EQUAL_INT32(1000, applied.left_mm_s);

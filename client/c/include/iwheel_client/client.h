@@ -80,7 +80,7 @@ IWC_API const char *iwc_words(iwc_result_t result);
 
 /// The socket meant when none is named: $IWHEEL_SOCKET, else the only *.sock in `directory` (NULL: IWC_DIRECTORY, and only then the
 /// environment is looked at). IWC_OK with the path in `out`; IWC_SEVERAL with all of them, separated by blanks, as far as they fit;
-/// IWC_DENIED or IWC_NOT_THERE with an empty text.
+/// IWC_DENIED or IWC_NOT_THERE with an empty text; IWC_INVALID if $IWHEEL_SOCKET does not fit.
 IWC_API iwc_result_t iwc_find(const char *directory, char *out, size_t size);
 
 /// Closes what is open, connects to `path` (NULL: the one that `iwc_find` finds) and awaits the gateway's greeting. Nothing is armed.
@@ -126,7 +126,7 @@ IWC_API iwc_result_t iwc_next(iwc_t *self, int timeout_ms, iwc_message_t *out_me
 /// For a slow reader: reads all that waits and leaves out each event of which a newer one is there, counted in `skipped`, so that
 /// `iwc_next` hands out the latest values instead of a backlog. Events are the same thing if their name is, and of `fault` the cause,
 /// of `offset` the side, of `ledger` the item, of `frame` id and kind. What the gateway had to leave out itself (`lost`) is counted too.
-/// Replies stay. Never waits. IWC_OK, or IWC_CLOSED or IWC_GARBLED if the connection has ended.
+/// Replies stay, as far as they fit. Never waits. IWC_OK, or IWC_CLOSED or IWC_GARBLED if the connection has ended.
 IWC_API iwc_result_t iwc_latest(iwc_t *self);
 
 /// A number of a message; not known: null, not there, or not a whole number of 64 bits.
@@ -256,8 +256,8 @@ IWC_API iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *command, int time
 IWC_API iwc_result_t iwc_twist(iwc_t *self, int32_t v_mm_s, int32_t yaw_mrad_s, int timeout_ms,
                                iwc_applied_t *out_applied);
 
-/// Ramp to zero, whoever drives. If it cannot be handed over or is not answered in time, the connection is closed, which stops the
-/// wheels if the lease was ours. As `iwc_ask`.
+/// Ramp to zero, whoever drives. If it cannot be handed over or is not answered in time, or a signal ends the wait, the
+/// connection is closed, which stops the wheels if the lease was ours. As `iwc_ask`.
 IWC_API iwc_result_t iwc_stop(iwc_t *self, int timeout_ms);
 
 /// Zero without ramp, latched until `iwc_reset`; otherwise as `iwc_stop`. `reason`: up to 200 bytes, no control characters; NULL: none.
