@@ -4,6 +4,7 @@
 usage: test_example.py BUILD [TEST...]
 """
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -90,6 +91,17 @@ class Example(RigCase):
         self.rig.start_gateway(restart_hold=True)
         time.sleep(0.3)
         self.assertLess(self.last_motion_us(), killed_us + 1000)
+
+    @unittest.skipUnless(shutil.which("c++"), "no C++ compiler (apt-get install g++)")
+    def test_program_in_cpp_drives_and_stops(self):
+        program = self.rig.path("client")
+        library = os.path.join(BUILD, "client", "c", "libiwheel-client.a")
+        subprocess.run(["c++", "-std=c++11", "-I", os.path.join(ROOT, "client", "c", "include"),
+                        os.path.join(ROOT, "test", "package", "client.cpp"), library, "-o", program], check=True)
+        done = subprocess.run([program], capture_output=True, text=True, timeout=10, env={**os.environ, "IWHEEL_SOCKET": self.socket})
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        with Gateway(self.socket) as gateway:
+            self.assertEqual(("client_stop", "client.cpp"), (gateway.why()["cause"], gateway.why()["client_name"]))
 
     def test_example_without_a_gateway_or_with_a_second_one_says_so(self):
         self.start_driving()
