@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "connection.h"
-#include "queue.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -63,4 +63,18 @@ void iwc_end(iwc_t *self, iwc_result_t result);
 /// Keeps name and words of a refusal.
 void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply);
 
+// ---- the lines in the buffer: queue.c -----------------------------------------------------------------------------
+
+/// Looks at what came since the last time. False: a line is no message, or too long; the good ones before it are kept.
+bool iwc_queue_admit(iwc_t *self);
+
+/// Hands out the oldest message, in `self->line`. False: there is none.
+bool iwc_queue_take(iwc_t *self, iwc_message_t *out_message);
+
+/// Leaves out, counted, every event of which a newer one is there, and then the oldest messages until half of the buffer is free.
+void iwc_queue_thin(iwc_t *self);
+
+/// Makes room to read into: a line at least.
+void iwc_queue_make_room(iwc_t *self);
+
 #endif

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Requests: composed, numbered, sent; and the reply that a call waits for.
 #include "connection.h"
-#include "queue.h"
 
 #include <poll.h>
 #include <stdio.h>
