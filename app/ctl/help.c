@@ -42,6 +42,8 @@ static const verb_t verbs[] = {
     {VERB("watch", verb_watch, "[TOPIC...] [--rate HZ]", "events as they come, one JSON object per line",
           "Reads only. Topics: state bus estop lease stop force frame; without one: the first five.\n"
           "--rate HZ  1 to 100: events of state and force per second, 10 if not told\n"
+          "A reader that is too slow gets the latest values instead of a backlog, and before them how many events\n"
+          "were left out: {\"event\":\"lost\",\"count\":N}.\n"
           "Ends with exit code 0 on Ctrl-C or when nobody reads its output any more.\n"),
      .choice = topic_choice},
     {VERB("drive", verb_drive, "LEFT RIGHT [--for TIME] [--takeover] [--current LEFT RIGHT]",

@@ -31,6 +31,7 @@ def by_hand():
         "request": [line.encode() for line in said] + [b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":-1,"id":"x"}'],
         "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ngear_ratio = 3/2\n"],
         "candump": [ODD_LINES.encode()],
+        "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
 
 
@@ -73,6 +74,12 @@ def request():
 
 def config():
     return [RECORDED.with_suffix(".conf").read_bytes()]
+
+
+def client():
+    """What the gateway noted of itself, told as events."""
+    lines = [json.dumps({"event": row["type"], **row}).encode() + b"\n" for row in rows()]
+    return [b"\0" + line for line in lines[:20]] + [bytes([how]) + b"".join(lines[:60]) for how in (0, 1, 8, 40)]
 
 
 def put(number, data, own):
@@ -122,4 +129,4 @@ def gateway():
 
 def recorded():
     """{target: [bytes]}: a target that does not take them has lost what it was for."""
-    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump()}
+    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client()}

@@ -13,6 +13,8 @@ CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c
 SOCKETCAN, LOCAL = "port/linux/src/socketcan.c", "port/linux/src/local_bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
 LEARN = "app/ctl/learn/learn.c"
+LINK, QUEUE, ASKING = "client/c/src/connection.c", "client/c/src/queue.c", "client/c/src/requests.c"
+TALK, FIELDS = ("unit_client_talk",), ("unit_client_fields",)
 
 PARTS = [
     # The loop.
@@ -139,4 +141,26 @@ PARTS = [
     Bug("learn-pose-that-wraps-jumps", "tools", LEARN, "step > INT16_MAX ? 65536U - step : step", "step", ("unit_ctl_learn",)),
     Bug("learn-turns-over-a-gap", "tools", LEARN, "gap_us <= 0 || gap_us >= RPM_GAP_US", "gap_us <= 0", ("unit_ctl_learn",)),
     Bug("learn-mixed-sender-is-one", "tools", LEARN, "frame->mark == CANDUMP_SENT ? 1U : 0U", "frame->mark == CANDUMP_SENT ? 1U : self->sent > 0U ? 1U : 0U", ("unit_ctl_learn",)),
+    # libiwheel-client.
+    Bug("client-half-a-command-leaves-later", "client", LINK, "if (result != IWC_OK && sent > 0) {", "if (false) {", TALK),
+    Bug("client-drives-pile-up-in-the-socket", "client", ASKING, "*place = id;", "(void)place;", TALK),
+    Bug("client-drive-not-sent-counts-as-sent", "client", ASKING, "if (result == IWC_OK) { *place = id; }", "*place = id;", TALK),
+    Bug("client-guesses-at-a-newer-protocol", "client", ASKING, "if (self->newer && !is_harmless(cmd)) {", "if (self->newer && is_driving(cmd)) {", TALK),
+    Bug("client-stop-unheard-keeps-the-lease", "client", ASKING, "if (result != IWC_OK && result != IWC_REFUSED && result != IWC_INVALID) {", "if (result == IWC_CLOSED) {", TALK),
+    Bug("client-dies-of-a-dead-gateway", "client", LINK, "length - sent, MSG_NOSIGNAL)", "length - sent, 0)", TALK),
+    Bug("client-child-drives-for-its-parent", "client", ASKING, "if (self->fd < 0 || getpid() != self->owner) {", "if (self->fd < 0) {", TALK),
+    Bug("client-child-ends-its-parents-lease", "client", LINK, "(getpid() == self->owner) ? shutdown", "true ? shutdown", TALK),
+    Bug("client-close-leaves-a-copy-alive", "client", LINK, "(void)((getpid() == self->owner) ? shutdown(self->fd, SHUT_RDWR) : 0);", "", TALK),
+    Bug("client-late-reply-answers-the-next", "client", QUEUE, "(!has_id || id == self->awaited)", "(!has_id || !is_odd(id))", TALK),
+    Bug("client-half-a-line-counts", "client", LINK, "if (got > 0) {", "if (got == 0 && self->end > self->whole) { self->in[self->end] = '\\n'; self->end++; (void)iwc_queue_admit(self); } if (got > 0) {", TALK),
+    Bug("client-line-without-end-is-kept", "client", QUEUE, "return self->end - self->whole <= IWC_LINE_MAX;", "return true;", TALK),
+    Bug("client-garbage-is-passed-over", "client", LINK, "iwc_end(self, IWC_GARBLED);", "self->end = self->whole;", TALK),
+    Bug("client-latest-is-a-backlog", "client", QUEUE, "stays = kept->kind[i] != kind;", "stays = true;", TALK),
+    Bug("client-latest-mixes-causes", "client", QUEUE, '{"fault", {"cause", NULL}},', '{"fault", {NULL, NULL}},', TALK),
+    Bug("client-left-out-uncounted", "client", QUEUE, "if (!stays) { self->skipped++;", "if (!stays) {", TALK),
+    Bug("client-unknown-is-zero", "client", "client/c/src/fields.c", "value.known = iwc_json_integer(iwc_json_find(object, key), &value.value);",
+        "(void)iwc_json_integer(iwc_json_find(object, key), &value.value); value.known = true;", FIELDS),
+    Bug("client-force-without-a-zero", "client", "client/c/src/fields.c", 'if (iwc_is(&inner, "force_validity", "valid")) {', "{", FIELDS),
+    Bug("client-number-wraps", "client", "client/c/src/json.c", "if (number > (limit - digit) / 10U) {", "if (false) {", FIELDS),
+    Bug("client-key-twice", "client", "client/c/src/json.c", "(behind.at != NULL && note_key(self, rest, behind))", "(behind.at != NULL)", FIELDS),
 ]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// iwheelctl's search for the only gateway.
-#include "talk/find_socket.h"
+// The search for the only gateway.
+#include "iwheel_client/client.h"
 
 #include "unity.h"
 
@@ -44,7 +44,7 @@ void tearDown(void) {
 }
 
 static void test_find_missing_directory_is_none(void) {
-    TEST_ASSERT_EQUAL(FIND_SOCKET_NONE, find_socket("/nonexistent", out, sizeof(out)));
+    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find("/nonexistent", out, sizeof(out)));
     TEST_ASSERT_EQUAL_STRING("", out);
 }
 
@@ -52,7 +52,7 @@ static void test_find_only_sockets_with_the_suffix_count(void) {
     add_file("gateway.sock");
     add_socket("control");
     add_socket(".sock");
-    TEST_ASSERT_EQUAL(FIND_SOCKET_NONE, find_socket(directory, out, sizeof(out)));
+    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find(directory, out, sizeof(out)));
 }
 
 static void test_find_the_only_one_is_taken(void) {
@@ -60,14 +60,14 @@ static void test_find_the_only_one_is_taken(void) {
     add_file("gateway.lock");
     add_socket("can0.sock");
     (void)snprintf(path, sizeof(path), "%s/can0.sock", directory);
-    TEST_ASSERT_EQUAL(FIND_SOCKET_ONE, find_socket(directory, out, sizeof(out)));
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof(out)));
     TEST_ASSERT_EQUAL_STRING(path, out);
 }
 
 static void test_find_several_are_listed(void) {
     add_socket("can0.sock");
     add_socket("can1.sock");
-    TEST_ASSERT_EQUAL(FIND_SOCKET_SEVERAL, find_socket(directory, out, sizeof(out)));
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof(out)));
     TEST_ASSERT_NOT_NULL(strstr(out, "/can0.sock"));
     TEST_ASSERT_NOT_NULL(strstr(out, "/can1.sock"));
 }
@@ -76,7 +76,7 @@ static void test_find_list_that_does_not_fit_is_cut_between_paths(void) {
     char little[48];
     add_socket("can0.sock");
     add_socket("can1.sock");
-    TEST_ASSERT_EQUAL(FIND_SOCKET_SEVERAL, find_socket(directory, little, sizeof(little)));
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, little, sizeof(little)));
     TEST_ASSERT_EQUAL_STRING(".sock", little + strlen(little) - 5U);
 }
 
