@@ -252,7 +252,7 @@ CASES = [
     (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
     (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
     (northbound, "python3", "clean", ("", "", ""), False),
-    (northbound, "python3", "a word that only the gateway has", ("app/gateway/words/names.c", '"active"', '"awake"'), True),
+    (northbound, "python3", "a word that only the gateway has", ("northbound/src/words.c", '"active"', '"awake"'), True),
     (northbound, "python3", "a fault that is no cause", ("app/gateway/status/observe.c", '"still_moving", true', '"still_rolling", true'), True),
     (northbound, "python3", "a state of the memory", ("app/gateway/ledger/knowledge_json.c", '"ignored"', '"distrusted"'), True),
     (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),

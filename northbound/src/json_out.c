@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include "json_out.h"
 
-#include "plain.h"
+#include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/text.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
-static void put(json_out_t *self, const char *text, size_t length) {
+static void put(iwn_out_t *self, const char *text, size_t length) {
     if (self->overflow || length >= self->size - self->length) {
         self->overflow = true;
         return;
@@ -16,21 +16,21 @@ static void put(json_out_t *self, const char *text, size_t length) {
     self->length += length;
 }
 
-static void put_text(json_out_t *self, const char *text) {
+static void put_text(iwn_out_t *self, const char *text) {
     put(self, text, strlen(text));
 }
 
 /// One character; what moves a terminal as its number, a byte that is no UTF-8 as U+FFFD.
-static size_t put_character(json_out_t *self, const char *text) {
+static size_t put_character(iwn_out_t *self, const char *text) {
     size_t bytes;
     char escape[16];
-    const uint32_t code_point = plain_read(text, &bytes);
+    const uint32_t code_point = iwn_plain_read(text, &bytes);
     if (code_point == '"' || code_point == '\\') {
         escape[0] = '\\';
         escape[1] = *text;
         put(self, escape, 2U);
-    } else if (!plain_is(code_point)) {
-        const uint32_t shown = code_point == PLAIN_BROKEN ? 0xFFFDU : code_point;
+    } else if (!iwn_plain_is(code_point)) {
+        const uint32_t shown = code_point == IWN_PLAIN_BROKEN ? 0xFFFDU : code_point;
         (void)snprintf(escape, sizeof escape, "\\u%04X", (unsigned)shown);
         put_text(self, escape);
     } else {
@@ -39,7 +39,7 @@ static size_t put_character(json_out_t *self, const char *text) {
     return bytes;
 }
 
-static void put_escaped(json_out_t *self, const char *text) {
+static void put_escaped(iwn_out_t *self, const char *text) {
     put(self, "\"", 1U);
     while (*text != '\0') {
         text += put_character(self, text);
@@ -47,7 +47,7 @@ static void put_escaped(json_out_t *self, const char *text) {
     put(self, "\"", 1U);
 }
 
-static void begin(json_out_t *self, const char *name) {
+static void begin(iwn_out_t *self, const char *name) {
     if (self->comma) {
         put(self, ",", 1U);
     }
@@ -58,56 +58,56 @@ static void begin(json_out_t *self, const char *name) {
     }
 }
 
-void json_out_init(json_out_t *self, char *data, size_t size) {
-    *self = (json_out_t){.data = data, .size = size};
+void iwn_out_init(iwn_out_t *self, char *data, size_t size) {
+    *self = (iwn_out_t){.data = data, .size = size};
 }
 
-void json_out_open(json_out_t *self, const char *name, char bracket) {
+void iwn_out_open(iwn_out_t *self, const char *name, char bracket) {
     begin(self, name);
     put(self, &bracket, 1U);
     self->comma = false;
 }
 
-void json_out_close(json_out_t *self, char bracket) {
+void iwn_out_close(iwn_out_t *self, char bracket) {
     put(self, &bracket, 1U);
     self->comma = true;
 }
 
-void json_out_int(json_out_t *self, const char *name, int64_t value) {
+void iwn_out_int(iwn_out_t *self, const char *name, int64_t value) {
     char digits[24];
     (void)snprintf(digits, sizeof digits, "%" PRId64, value);
     begin(self, name);
     put_text(self, digits);
 }
 
-void json_out_bool(json_out_t *self, const char *name, bool value) {
+void iwn_out_bool(iwn_out_t *self, const char *name, bool value) {
     begin(self, name);
     put_text(self, value ? "true" : "false");
 }
 
-void json_out_null(json_out_t *self, const char *name) {
+void iwn_out_null(iwn_out_t *self, const char *name) {
     begin(self, name);
     put_text(self, "null");
 }
 
-void json_out_known(json_out_t *self, const char *name, bool known, int64_t value) {
+void iwn_out_known(iwn_out_t *self, const char *name, bool known, int64_t value) {
     if (known) {
-        json_out_int(self, name, value);
+        iwn_out_int(self, name, value);
     } else {
-        json_out_null(self, name);
+        iwn_out_null(self, name);
     }
 }
 
-void json_out_text(json_out_t *self, const char *name, const char *text) {
+void iwn_out_text(iwn_out_t *self, const char *name, const char *text) {
     if (text == NULL) {
-        json_out_null(self, name);
+        iwn_out_null(self, name);
         return;
     }
     begin(self, name);
     put_escaped(self, text);
 }
 
-size_t json_out_finish(json_out_t *self) {
+size_t iwn_out_finish(iwn_out_t *self) {
     put(self, "\n", 1U);
     return self->overflow ? 0U : self->length;
 }

@@ -17,25 +17,25 @@ typedef struct {
     size_t length;
     bool comma; ///< The next element needs one before it.
     bool overflow;
-} json_out_t;
+} iwn_out_t;
 
-void json_out_init(json_out_t *self, char *data, size_t size);
+void iwn_out_init(iwn_out_t *self, char *data, size_t size);
 
 /// `bracket` is '{' or '['; close with the matching '}' or ']'.
-void json_out_open(json_out_t *self, const char *name, char bracket);
-void json_out_close(json_out_t *self, char bracket);
+void iwn_out_open(iwn_out_t *self, const char *name, char bracket);
+void iwn_out_close(iwn_out_t *self, char bracket);
 
-void json_out_int(json_out_t *self, const char *name, int64_t value);
-void json_out_bool(json_out_t *self, const char *name, bool value);
-void json_out_null(json_out_t *self, const char *name);
+void iwn_out_int(iwn_out_t *self, const char *name, int64_t value);
+void iwn_out_bool(iwn_out_t *self, const char *name, bool value);
+void iwn_out_null(iwn_out_t *self, const char *name);
 
 /// `null` unless known.
-void json_out_known(json_out_t *self, const char *name, bool known, int64_t value);
+void iwn_out_known(iwn_out_t *self, const char *name, bool known, int64_t value);
 
 /// A NULL text is `null`.
-void json_out_text(json_out_t *self, const char *name, const char *text);
+void iwn_out_text(iwn_out_t *self, const char *name, const char *text);
 
 /// Ends the line. Its length with the newline; 0 if it did not fit.
-size_t json_out_finish(json_out_t *self);
+size_t iwn_out_finish(iwn_out_t *self);
 
 #endif
