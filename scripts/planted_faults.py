@@ -105,7 +105,7 @@ def deviations(folder, fault):
 
 def northbound(folder, fault):
     """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
-    sources = [f"app/gateway/{name}" for name in ("words/names.c", "bus/bus_facts.c", "ledger/knowledge_json.c", "status/observe.c")]
+    sources = ["northbound/src/words.c", *(f"app/gateway/{name}.c" for name in ("bus/bus_facts", "ledger/knowledge_json", "status/observe"))]
     for name in ("scripts/northbound.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / name).read_text()

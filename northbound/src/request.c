@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include "iwheel_northbound/request.h"
 
 #include "json/json_arena.h"
 
-#include "iwheel_northbound/request.h"
 #include "iwheel_northbound/text.h"
 
 #include <inttypes.h>

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-
 #include "iwheel_northbound/text.h"
 
 #include <stdio.h>

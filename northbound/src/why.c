@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-
 #include "iwheel_northbound/why.h"
+
 #include "iwheel_northbound/words.h"
 
 #include <stdio.h>

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_northbound/words.h"
 
+#include <string.h>
+
 #define PICK(table, index)                                                                                             \
     ((size_t)(index) < sizeof(table) / sizeof(table)[0] && (table)[index] != NULL ? (table)[index] : "unknown")
 
@@ -187,6 +189,16 @@ const char *iwn_ledger_item_name(iw_ledger_item_t item) {
         [IW_LEDGER_DLC] = "dlc",
     };
     return PICK(names, item);
+}
+
+bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        if (strcmp(name, iwn_ledger_item_name((iw_ledger_item_t)item)) == 0) {
+            *out_item = (iw_ledger_item_t)item;
+            return true;
+        }
+    }
+    return false;
 }
 
 const char *iwn_ledger_state_name(iw_ledger_state_t state) {

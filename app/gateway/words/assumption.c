@@ -1,22 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "assumption.h"
 
-#include "iwheel_northbound/words.h"
-
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
-        if (strcmp(name, iwn_ledger_item_name((iw_ledger_item_t)item)) == 0) {
-            *out_item = (iw_ledger_item_t)item;
-            return true;
-        }
-    }
-    return false;
-}
 
 static const char *yes_or_no(bool yes) {
     return yes ? "yes" : "no";

@@ -4,8 +4,11 @@
 /// Commas are placed by the writer. A name of NULL is for array elements. What does not fit sets `overflow` and the
 /// line must not be used. Texts are escaped: what moves a terminal (plain.h) stands as \uXXXX, and what is no UTF-8 as U+FFFD.
 /// No heap.
-#ifndef GATEWAY_JSON_OUT_H
-#define GATEWAY_JSON_OUT_H
+#ifndef IWHEEL_NORTHBOUND_JSON_OUT_H
+#define IWHEEL_NORTHBOUND_JSON_OUT_H
+
+#include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -34,6 +37,9 @@ void iwn_out_known(iwn_out_t *self, const char *name, bool known, int64_t value)
 
 /// A NULL text is `null`.
 void iwn_out_text(iwn_out_t *self, const char *name, const char *text);
+
+/// The fields of a frame, into an object that is open: for `why` and the event `frame`.
+void iwn_out_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, iwn_out_t *json);
 
 /// Ends the line. Its length with the newline; 0 if it did not fit.
 size_t iwn_out_finish(iwn_out_t *self);

@@ -3,8 +3,8 @@
 ///
 /// A pure function of the bytes, so that it can be tested and fuzzed alone. What depends on the state of the wheels
 /// is judged later, by the core.
-#ifndef GATEWAY_REQUEST_H
-#define GATEWAY_REQUEST_H
+#ifndef IWHEEL_NORTHBOUND_REQUEST_H
+#define IWHEEL_NORTHBOUND_REQUEST_H
 
 #include "assumption.h"
 

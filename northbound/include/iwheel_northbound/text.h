@@ -5,8 +5,8 @@
 /// U+2029), Unicode's bidirectional controls (U+061C, U+200E, U+200F, U+202A-202E, U+2066-2069), and bytes that are
 /// no UTF-8, which an old terminal takes for control characters. Such a text is refused where it comes in, and nothing of
 /// it is printed raw. Pure functions.
-#ifndef PLAIN_H
-#define PLAIN_H
+#ifndef IWHEEL_NORTHBOUND_TEXT_H
+#define IWHEEL_NORTHBOUND_TEXT_H
 
 #include <stdbool.h>
 #include <stddef.h>

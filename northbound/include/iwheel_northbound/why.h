@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// Why did the wheels stop? One sentence with cause, time and numbers, made when it happened: later the client may be
 /// gone and the wheels elsewhere.
-#ifndef GATEWAY_WHY_H
-#define GATEWAY_WHY_H
+#ifndef IWHEEL_NORTHBOUND_WHY_H
+#define IWHEEL_NORTHBOUND_WHY_H
 
 #include "iwheel/gateway.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// The words of the northbound protocol for errors, causes, states and the rest. Each list is closed and documented in
 /// docs/northbound.md; a value outside its list is "unknown".
-#ifndef GATEWAY_NAMES_H
-#define GATEWAY_NAMES_H
+#ifndef IWHEEL_NORTHBOUND_WORDS_H
+#define IWHEEL_NORTHBOUND_WORDS_H
 
 #include "iwheel/gateway.h"
 
@@ -49,6 +49,10 @@ typedef enum {
     IWN_TOPICS,
 } iwn_topic_t;
 
+/// The longest value of a ledger item, and the longest text on how it was found, each with its terminator.
+#define IWN_VALUE_SIZE 40U
+#define IWN_HOW_SIZE   128U
+
 const char *iwn_error_name(iwn_error_t error);
 /// The northbound error for a refusal of the core.
 iwn_error_t iwn_error_of(iw_refusal_t refusal);
@@ -68,6 +72,8 @@ const char *iwn_window_name(iw_window_t window);
 const char *iwn_unit_evidence_name(iw_unit_evidence_t evidence);
 const char *iwn_force_validity_name(iw_force_validity_t validity);
 const char *iwn_ledger_item_name(iw_ledger_item_t item);
+/// False if no item has that name.
+bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item);
 const char *iwn_ledger_state_name(iw_ledger_state_t state);
 const char *iwn_evidence_name(iw_evidence_t evidence);
 
