@@ -32,25 +32,25 @@ TYPES = os.path.join("python", "src", "iwheel", "_protocol.py")
 DOCUMENT = os.path.join("docs", "northbound.md")
 PLAIN = {"integer": "int", "boolean": "bool", "text": "str"}
 FIELD_KEYS = {"type", "list", "keys", "null", "optional", "unit", "what", "least", "most", "default", "bytes"}
-# Where the gateway keeps its words: the function whose texts they are, and what else is among them.
+# Where the words are kept: the function whose texts they are, and what else is among them.
 SOURCES = {
-    "error": ("words/names.c", "gw_error_name", {"ok"}),
-    "topic": ("words/names.c", "gw_topic_name", set()),
-    "state": ("words/names.c", "gw_state_name", set()),
-    "cause": ("words/names.c", "gw_cause_name", {"none"}),
-    "bus_state": ("words/names.c", "gw_bus_state_name", set()),
-    "estop_state": ("words/names.c", "gw_estop_name", set()),
-    "sides": ("words/names.c", "gw_sides_name", set()),
-    "provenance": ("words/names.c", "gw_provenance_name", set()),
-    "window": ("words/names.c", "gw_window_name", set()),
-    "unit_evidence": ("words/names.c", "gw_unit_evidence_name", set()),
-    "force_validity": ("words/names.c", "gw_force_validity_name", set()),
-    "ledger_item": ("words/names.c", "gw_ledger_item_name", set()),
-    "ledger_state": ("words/names.c", "gw_ledger_state_name", set()),
-    "evidence": ("words/names.c", "gw_evidence_name", set()),
-    "timing": ("bus/bus_facts.c", "gw_bus_facts_timing", set()),
-    "memory_state": ("ledger/knowledge_json.c", "write_memory", {"memory", "file", "state", "reason"}),
-    "fault_alone": ("status/observe.c", "observe_faults", set()),
+    "error": ("northbound/src/words.c", "iwn_error_name", {"ok"}),
+    "topic": ("northbound/src/words.c", "iwn_topic_name", set()),
+    "state": ("northbound/src/words.c", "iwn_state_name", set()),
+    "cause": ("northbound/src/words.c", "iwn_cause_name", {"none"}),
+    "bus_state": ("northbound/src/words.c", "iwn_bus_state_name", set()),
+    "estop_state": ("northbound/src/words.c", "iwn_estop_name", set()),
+    "sides": ("northbound/src/words.c", "iwn_sides_name", set()),
+    "provenance": ("northbound/src/words.c", "iwn_provenance_name", set()),
+    "window": ("northbound/src/words.c", "iwn_window_name", set()),
+    "unit_evidence": ("northbound/src/words.c", "iwn_unit_evidence_name", set()),
+    "force_validity": ("northbound/src/words.c", "iwn_force_validity_name", set()),
+    "ledger_item": ("northbound/src/words.c", "iwn_ledger_item_name", set()),
+    "ledger_state": ("northbound/src/words.c", "iwn_ledger_state_name", set()),
+    "evidence": ("northbound/src/words.c", "iwn_evidence_name", set()),
+    "timing": ("app/gateway/bus/bus_facts.c", "gw_bus_facts_timing", set()),
+    "memory_state": ("app/gateway/ledger/knowledge_json.c", "write_memory", {"memory", "file", "state", "reason"}),
+    "fault_alone": ("app/gateway/status/observe.c", "observe_faults", set()),
 }
 
 
@@ -400,9 +400,8 @@ def differences(what, told, wanted):
 
 
 def gateway_words(description):
-    """What words a source of the gateway knows and the description does not, or the other way round."""
+    """What words a source of ours knows and the description does not, or the other way round."""
     for kind, (path, function, others) in SOURCES.items():
-        path = os.path.join("app", "gateway", path)
         match = re.search(rf"^(?:const char \*|static void ){function}\(.*?^}}", read(path), re.MULTILINE | re.DOTALL)
         if match is None:
             yield f"{path}: {function} is not there; scripts/northbound.py must know where the words of {kind} are now"

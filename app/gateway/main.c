@@ -57,7 +57,7 @@ static int start_core(gw_daemon_t *daemon) {
                                                    .b = daemon->config.core.listen_only});
     gw_evidence_init(&daemon->evidence);
     gw_bus_facts_follow(daemon);
-    gw_why_sentence(&daemon->last_stop.stop, &(gw_why_context_t){0}, daemon->last_stop.sentence, GW_SENTENCE_SIZE);
+    iwn_why_sentence(&daemon->last_stop.stop, &(iwn_why_context_t){0}, daemon->last_stop.sentence, IWN_SENTENCE_SIZE);
     if (restarted) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the gateway before this one died while the wheels were armed: sending zeros for %u ms",

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "names.h"
-#include "plain.h"
 #include "talk/ctl.h"
 #include "talk/signals.h"
+
+#include "iwheel_northbound/text.h"
+#include "iwheel_northbound/words.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -17,11 +18,11 @@
 #define LOOK_US 500000
 
 /// So many of the topics, the first ones, are watched when none is named.
-#define TOPICS_USUAL ((unsigned)GW_TOPIC_STOP + 1U)
+#define TOPICS_USUAL ((unsigned)IWN_TOPIC_STOP + 1U)
 
 static bool is_topic(const char *word) {
-    for (unsigned i = 0; i < (unsigned)GW_TOPICS; i++) {
-        if (strcmp(gw_topic_name((gw_topic_t)i), word) == 0) {
+    for (unsigned i = 0; i < (unsigned)IWN_TOPICS; i++) {
+        if (strcmp(iwn_topic_name((iwn_topic_t)i), word) == 0) {
             return true;
         }
     }
@@ -70,7 +71,7 @@ static json_t *compose(int count, char **words) {
     }
     const bool usual = json_array_size(list) == 0;
     for (unsigned i = 0; usual && i < TOPICS_USUAL; i++) {
-        (void)json_array_append_new(list, json_string(gw_topic_name((gw_topic_t)i)));
+        (void)json_array_append_new(list, json_string(iwn_topic_name((iwn_topic_t)i)));
     }
     return json_pack("{s:s,s:o,s:i}", "cmd", "watch", "topics", list, "rate_hz", rate_hz);
 }
@@ -112,7 +113,7 @@ static output_t write_line(const client_t *client) {
     const char *rest = client->line;
     output_t state = OUTPUT_OPEN;
     while (*rest != '\0' && state == OUTPUT_OPEN) {
-        rest = plain_json(rest, piece, sizeof piece, &length);
+        rest = iwn_plain_json(rest, piece, sizeof piece, &length);
         state = write_text(client, piece, length);
     }
     return state == OUTPUT_OPEN ? write_text(client, "\n", 1) : state;

@@ -3,8 +3,9 @@
 
 #include "bounds.h"
 #include "json/json_arena.h"
-#include "json/json_out.h"
-#include "names.h"
+
+#include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/words.h"
 
 #include <ctype.h>
 #include <inttypes.h>
@@ -36,55 +37,55 @@ void gw_memory_name(const char *bus, char *out_name, size_t size) {
     }
 }
 
-static void write_item(const gw_known_item_t *known, const char *name, json_out_t *json) {
-    json_out_open(json, name, '{');
-    json_out_text(json, "state", gw_ledger_state_name(known->entry.state));
-    json_out_text(json, "evidence", gw_evidence_name(known->entry.evidence));
-    json_out_int(json, "figure", known->entry.figure);
-    json_out_text(json, "value", known->value);
-    json_out_text(json, "found", known->word.found);
-    json_out_int(json, "since_wall_us", known->since_wall_us);
+static void write_item(const gw_known_item_t *known, const char *name, iwn_out_t *json) {
+    iwn_out_open(json, name, '{');
+    iwn_out_text(json, "state", iwn_ledger_state_name(known->entry.state));
+    iwn_out_text(json, "evidence", iwn_evidence_name(known->entry.evidence));
+    iwn_out_int(json, "figure", known->entry.figure);
+    iwn_out_text(json, "value", known->value);
+    iwn_out_text(json, "found", known->word.found);
+    iwn_out_int(json, "since_wall_us", known->since_wall_us);
     if (known->word.how[0] != '\0') {
-        json_out_text(json, "how", known->word.how); // Left out otherwise, so that earlier versions can read it.
+        iwn_out_text(json, "how", known->word.how); // Left out otherwise, so that earlier versions can read it.
     }
-    json_out_close(json, '}');
+    iwn_out_close(json, '}');
 }
 
-static void write_offset(const gw_known_offset_t *known, const char *name, json_out_t *json) {
-    json_out_open(json, name, '{');
-    json_out_text(json, "from", gw_provenance_name(known->from));
-    json_out_text(json, "unit", known->unit == IW_FORCE_CN ? "cN" : "dN");
-    json_out_int(json, "offset_mN", known->offset_mN);
-    json_out_int(json, "drift_mN", known->drift_mN);
-    json_out_int(json, "deviation_mN", known->deviation_mN);
-    json_out_int(json, "samples", known->samples);
-    json_out_int(json, "wall_us", known->wall_us);
-    json_out_close(json, '}');
+static void write_offset(const gw_known_offset_t *known, const char *name, iwn_out_t *json) {
+    iwn_out_open(json, name, '{');
+    iwn_out_text(json, "from", iwn_provenance_name(known->from));
+    iwn_out_text(json, "unit", known->unit == IW_FORCE_CN ? "cN" : "dN");
+    iwn_out_int(json, "offset_mN", known->offset_mN);
+    iwn_out_int(json, "drift_mN", known->drift_mN);
+    iwn_out_int(json, "deviation_mN", known->deviation_mN);
+    iwn_out_int(json, "samples", known->samples);
+    iwn_out_int(json, "wall_us", known->wall_us);
+    iwn_out_close(json, '}');
 }
 
 size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text, size_t size) {
-    json_out_t json;
-    json_out_init(&json, out_text, size - SUM_LENGTH);
-    json_out_open(&json, NULL, '{');
-    json_out_text(&json, "format", FORMAT);
-    json_out_int(&json, "version", VERSION);
-    json_out_text(&json, "bus", bus);
-    json_out_open(&json, "items", '{');
+    iwn_out_t json;
+    iwn_out_init(&json, out_text, size - SUM_LENGTH);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_text(&json, "format", FORMAT);
+    iwn_out_int(&json, "version", VERSION);
+    iwn_out_text(&json, "bus", bus);
+    iwn_out_open(&json, "items", '{');
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
         if (known->item[item].entry.state != IW_LEDGER_ASSUMED) {
-            write_item(&known->item[item], gw_ledger_item_name((iw_ledger_item_t)item), &json);
+            write_item(&known->item[item], iwn_ledger_item_name((iw_ledger_item_t)item), &json);
         }
     }
-    json_out_close(&json, '}');
-    json_out_open(&json, "offsets", '{');
+    iwn_out_close(&json, '}');
+    iwn_out_open(&json, "offsets", '{');
     for (unsigned side = 0; side < IW_SIDES; ++side) {
         if (known->offset[side].from != IW_OFFSET_NONE) {
             write_offset(&known->offset[side], side == IW_LEFT ? "left" : "right", &json);
         }
     }
-    json_out_close(&json, '}');
-    json_out_close(&json, '}');
-    const size_t length = json_out_finish(&json);
+    iwn_out_close(&json, '}');
+    iwn_out_close(&json, '}');
+    const size_t length = iwn_out_finish(&json);
     if (length == 0U) {
         return 0;
     }
@@ -142,7 +143,7 @@ static bool read_items(json_t *items, gw_known_t *known) {
     json_t *object;
     json_object_foreach(items, name, object) {
         iw_ledger_item_t item;
-        if (!gw_assumption_of(name, &item) || !read_item(object, &known->item[item]) ||
+        if (!iwn_ledger_item_of(name, &item) || !read_item(object, &known->item[item]) ||
             !gw_bounds_item(item, &known->item[item])) {
             return false;
         }
@@ -153,7 +154,7 @@ static bool read_items(json_t *items, gw_known_t *known) {
 static bool read_provenance(const json_t *object, iw_offset_provenance_t *out_from) {
     const char *word = json_string_value(json_object_get(object, "from"));
     for (int from = IW_OFFSET_ESTIMATED; word != NULL && from <= (int)IW_OFFSET_OPERATOR; ++from) {
-        if (strcmp(word, gw_provenance_name((iw_offset_provenance_t)from)) == 0) {
+        if (strcmp(word, iwn_provenance_name((iw_offset_provenance_t)from)) == 0) {
             *out_from = (iw_offset_provenance_t)from;
             return true;
         }

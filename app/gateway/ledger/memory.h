@@ -21,8 +21,8 @@
 typedef struct {
     iw_ledger_entry_t entry; ///< IW_LEDGER_ASSUMED: there is none.
     int64_t since_wall_us;
-    char value[GW_VALUE_SIZE]; ///< What was configured when it was found.
-    gw_word_t word;            ///< What the operator found instead, and how it was found; empty: nothing, or not told.
+    char value[IWN_VALUE_SIZE]; ///< What was configured when it was found.
+    gw_word_t word;             ///< What the operator found instead, and how it was found; empty: nothing, or not told.
 } gw_known_item_t;
 
 /// The force offset of one wheel.

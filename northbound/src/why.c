@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "why.h"
+#include "iwheel_northbound/why.h"
 
-#include "names.h"
+#include "iwheel_northbound/words.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -25,14 +25,14 @@ static void lost_wheel(const iw_stop_t *stop, char *out, size_t size) {
     }
 }
 
-static void software_estop(const char *client, const gw_why_context_t *context, char *out, size_t size) {
+static void software_estop(const char *client, const iwn_why_context_t *context, char *out, size_t size) {
     const char *reason = context->reason == NULL ? "" : context->reason;
     (void)snprintf(out, size, "software e-stop by %s%s%s%s", client, *reason == '\0' ? "" : " (\"", reason,
                    *reason == '\0' ? "" : "\")");
 }
 
 /// Causes in the machine: bus and wheels.
-static void machine_clause(const iw_stop_t *stop, const gw_why_context_t *context, char *out, size_t size) {
+static void machine_clause(const iw_stop_t *stop, const iwn_why_context_t *context, char *out, size_t size) {
     const unsigned detail = stop->detail;
     switch (stop->cause) {
     case IW_CAUSE_WHEEL_LOST:
@@ -60,13 +60,13 @@ static void machine_clause(const iw_stop_t *stop, const gw_why_context_t *contex
         (void)snprintf(out, size, "%s blocked: only %u mm/s", wheels(stop->sides), detail);
         break;
     default:
-        (void)snprintf(out, size, "%s", gw_cause_name(stop->cause));
+        (void)snprintf(out, size, "%s", iwn_cause_name(stop->cause));
         break;
     }
 }
 
 /// Causes on our side: people, clients, ourselves; the rest by `machine_clause`.
-static void clause(const iw_stop_t *stop, const gw_why_context_t *context, char *out, size_t size) {
+static void clause(const iw_stop_t *stop, const iwn_why_context_t *context, char *out, size_t size) {
     const char *client = context->client == NULL ? "a client" : context->client;
     const unsigned detail = stop->detail;
     switch (stop->cause) {
@@ -114,7 +114,7 @@ static const char *manner(const iw_stop_t *stop) {
     return stop->cause == IW_CAUSE_LOOP_LATE || stop->cause == IW_CAUSE_RESTART ? "zero at once" : "ramped to zero";
 }
 
-void gw_why_sentence(const iw_stop_t *stop, const gw_why_context_t *context, char *out_sentence, size_t size) {
+void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, char *out_sentence, size_t size) {
     char what[384];
     char doing[64];
     if (stop->number == 0U) {
@@ -123,7 +123,7 @@ void gw_why_sentence(const iw_stop_t *stop, const gw_why_context_t *context, cha
     }
     clause(stop, context, what, sizeof what);
     const bool ours = stop->cause != IW_CAUSE_RESTART; // Else nobody here knows what was going on.
-    (void)snprintf(doing, sizeof doing, "%s%s", ours ? " while " : "", ours ? gw_state_name(stop->from) : "");
+    (void)snprintf(doing, sizeof doing, "%s%s", ours ? " while " : "", ours ? iwn_state_name(stop->from) : "");
     if (stop->from == IW_STATE_ARMED || stop->from == IW_STATE_STOPPING) {
         (void)snprintf(doing, sizeof doing, " while %s %d/%d mm/s",
                        stop->from == IW_STATE_ARMED ? "driving" : "stopping from",
@@ -131,10 +131,10 @@ void gw_why_sentence(const iw_stop_t *stop, const gw_why_context_t *context, cha
     }
     const unsigned long long ms = (unsigned long long)(stop->at_us / IW_US_PER_MS);
     (void)snprintf(out_sentence, size, "%s%s; %s at %llu.%03llu s; %s", what, doing, manner(stop), ms / 1000U,
-                   ms % 1000U, gw_why_cure(stop->cause));
+                   ms % 1000U, iwn_why_cure(stop->cause));
 }
 
-const char *gw_why_cure(iw_cause_t cause) {
+const char *iwn_why_cure(iw_cause_t cause) {
     static const char *const cures[IW_CAUSES] = {
         [IW_CAUSE_NONE] = "nothing to do",
         [IW_CAUSE_ESTOP_LINE] = "release the button, then: iwheelctl reset",

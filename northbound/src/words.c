@@ -1,74 +1,76 @@
 // SPDX-License-Identifier: MIT
-#include "names.h"
+#include "iwheel_northbound/words.h"
+
+#include <string.h>
 
 #define PICK(table, index)                                                                                             \
     ((size_t)(index) < sizeof(table) / sizeof(table)[0] && (table)[index] != NULL ? (table)[index] : "unknown")
 
-const char *gw_error_name(gw_error_t error) {
-    static const char *const names[GW_ERRORS] = {
-        [GW_OK] = "ok",
-        [GW_BAD_JSON] = "bad_json",
-        [GW_LINE_TOO_LONG] = "line_too_long",
-        [GW_UNKNOWN_CMD] = "unknown_cmd",
-        [GW_UNKNOWN_FIELD] = "unknown_field",
-        [GW_MISSING_FIELD] = "missing_field",
-        [GW_BAD_VALUE] = "bad_value",
-        [GW_OUT_OF_RANGE] = "out_of_range",
-        [GW_NOT_HOLDER] = "not_holder",
-        [GW_BUSY] = "busy",
-        [GW_NOT_ARMED] = "not_armed",
-        [GW_LATCHED] = "latched",
-        [GW_ESTOP_PRESSED] = "estop_pressed",
-        [GW_BUS_DOWN] = "bus_down",
-        [GW_TIMING_MISMATCH] = "timing_mismatch",
-        [GW_WHEEL_LOST] = "wheel_lost",
-        [GW_WHEEL_BLOCKED] = "wheel_blocked",
-        [GW_NOT_AT_REST] = "not_at_rest",
-        [GW_SEND_STALLED] = "send_stalled",
-        [GW_SECOND_MASTER] = "second_master",
-        [GW_CAUSE_PRESENT] = "cause_present",
-        [GW_TYPE_NOT_SET] = "type_not_set",
-        [GW_STALE_COMMAND] = "stale_command",
-        [GW_LISTEN_ONLY] = "listen_only",
-        [GW_TOO_MANY_CLIENTS] = "too_many_clients",
-        [GW_DENIED] = "denied",
-        [GW_INTERNAL] = "internal",
+const char *iwn_error_name(iwn_error_t error) {
+    static const char *const names[IWN_ERRORS] = {
+        [IWN_OK] = "ok",
+        [IWN_BAD_JSON] = "bad_json",
+        [IWN_LINE_TOO_LONG] = "line_too_long",
+        [IWN_UNKNOWN_CMD] = "unknown_cmd",
+        [IWN_UNKNOWN_FIELD] = "unknown_field",
+        [IWN_MISSING_FIELD] = "missing_field",
+        [IWN_BAD_VALUE] = "bad_value",
+        [IWN_OUT_OF_RANGE] = "out_of_range",
+        [IWN_NOT_HOLDER] = "not_holder",
+        [IWN_BUSY] = "busy",
+        [IWN_NOT_ARMED] = "not_armed",
+        [IWN_LATCHED] = "latched",
+        [IWN_ESTOP_PRESSED] = "estop_pressed",
+        [IWN_BUS_DOWN] = "bus_down",
+        [IWN_TIMING_MISMATCH] = "timing_mismatch",
+        [IWN_WHEEL_LOST] = "wheel_lost",
+        [IWN_WHEEL_BLOCKED] = "wheel_blocked",
+        [IWN_NOT_AT_REST] = "not_at_rest",
+        [IWN_SEND_STALLED] = "send_stalled",
+        [IWN_SECOND_MASTER] = "second_master",
+        [IWN_CAUSE_PRESENT] = "cause_present",
+        [IWN_TYPE_NOT_SET] = "type_not_set",
+        [IWN_STALE_COMMAND] = "stale_command",
+        [IWN_LISTEN_ONLY] = "listen_only",
+        [IWN_TOO_MANY_CLIENTS] = "too_many_clients",
+        [IWN_DENIED] = "denied",
+        [IWN_INTERNAL] = "internal",
     };
     return PICK(names, error);
 }
 
-gw_error_t gw_error_of(iw_refusal_t refusal) {
-    static const gw_error_t errors[] = {
-        [IW_REFUSE_NONE] = GW_OK,
-        [IW_REFUSE_OUT_OF_RANGE] = GW_OUT_OF_RANGE,
-        [IW_REFUSE_MISSING_FIELD] = GW_MISSING_FIELD,
-        [IW_REFUSE_NOT_HOLDER] = GW_NOT_HOLDER,
-        [IW_REFUSE_BUSY] = GW_BUSY,
-        [IW_REFUSE_NOT_ARMED] = GW_NOT_ARMED,
-        [IW_REFUSE_LATCHED] = GW_LATCHED,
-        [IW_REFUSE_ESTOP_PRESSED] = GW_ESTOP_PRESSED,
-        [IW_REFUSE_BUS_DOWN] = GW_BUS_DOWN,
-        [IW_REFUSE_TIMING_MISMATCH] = GW_TIMING_MISMATCH,
-        [IW_REFUSE_WHEEL_LOST] = GW_WHEEL_LOST,
-        [IW_REFUSE_WHEEL_BLOCKED] = GW_WHEEL_BLOCKED,
-        [IW_REFUSE_NOT_AT_REST] = GW_NOT_AT_REST,
-        [IW_REFUSE_SEND_STALLED] = GW_SEND_STALLED,
-        [IW_REFUSE_SECOND_MASTER] = GW_SECOND_MASTER,
-        [IW_REFUSE_CAUSE_PRESENT] = GW_CAUSE_PRESENT,
-        [IW_REFUSE_TYPE_NOT_SET] = GW_TYPE_NOT_SET,
-        [IW_REFUSE_STALE_COMMAND] = GW_STALE_COMMAND,
-        [IW_REFUSE_LISTEN_ONLY] = GW_LISTEN_ONLY,
-        [IW_REFUSE_CONTRADICTED] = GW_DENIED,
+iwn_error_t iwn_error_of(iw_refusal_t refusal) {
+    static const iwn_error_t errors[] = {
+        [IW_REFUSE_NONE] = IWN_OK,
+        [IW_REFUSE_OUT_OF_RANGE] = IWN_OUT_OF_RANGE,
+        [IW_REFUSE_MISSING_FIELD] = IWN_MISSING_FIELD,
+        [IW_REFUSE_NOT_HOLDER] = IWN_NOT_HOLDER,
+        [IW_REFUSE_BUSY] = IWN_BUSY,
+        [IW_REFUSE_NOT_ARMED] = IWN_NOT_ARMED,
+        [IW_REFUSE_LATCHED] = IWN_LATCHED,
+        [IW_REFUSE_ESTOP_PRESSED] = IWN_ESTOP_PRESSED,
+        [IW_REFUSE_BUS_DOWN] = IWN_BUS_DOWN,
+        [IW_REFUSE_TIMING_MISMATCH] = IWN_TIMING_MISMATCH,
+        [IW_REFUSE_WHEEL_LOST] = IWN_WHEEL_LOST,
+        [IW_REFUSE_WHEEL_BLOCKED] = IWN_WHEEL_BLOCKED,
+        [IW_REFUSE_NOT_AT_REST] = IWN_NOT_AT_REST,
+        [IW_REFUSE_SEND_STALLED] = IWN_SEND_STALLED,
+        [IW_REFUSE_SECOND_MASTER] = IWN_SECOND_MASTER,
+        [IW_REFUSE_CAUSE_PRESENT] = IWN_CAUSE_PRESENT,
+        [IW_REFUSE_TYPE_NOT_SET] = IWN_TYPE_NOT_SET,
+        [IW_REFUSE_STALE_COMMAND] = IWN_STALE_COMMAND,
+        [IW_REFUSE_LISTEN_ONLY] = IWN_LISTEN_ONLY,
+        [IW_REFUSE_CONTRADICTED] = IWN_DENIED,
     };
-    return (size_t)refusal < sizeof errors / sizeof errors[0] ? errors[refusal] : GW_INTERNAL;
+    return (size_t)refusal < sizeof errors / sizeof errors[0] ? errors[refusal] : IWN_INTERNAL;
 }
 
-const char *gw_topic_name(gw_topic_t topic) {
-    static const char *const names[GW_TOPICS] = {"state", "bus", "estop", "lease", "stop", "force", "frame"};
+const char *iwn_topic_name(iwn_topic_t topic) {
+    static const char *const names[IWN_TOPICS] = {"state", "bus", "estop", "lease", "stop", "force", "frame"};
     return PICK(names, topic);
 }
 
-const char *gw_state_name(iw_state_t state) {
+const char *iwn_state_name(iw_state_t state) {
     static const char *const names[] = {
         [IW_STATE_LISTENING] = "listening",
         [IW_STATE_ARMED] = "armed",
@@ -78,7 +80,7 @@ const char *gw_state_name(iw_state_t state) {
     return PICK(names, state);
 }
 
-const char *gw_cause_name(iw_cause_t cause) {
+const char *iwn_cause_name(iw_cause_t cause) {
     static const char *const names[IW_CAUSES] = {
         [IW_CAUSE_NONE] = "none",
         [IW_CAUSE_ESTOP_LINE] = "estop_line",
@@ -103,7 +105,7 @@ const char *gw_cause_name(iw_cause_t cause) {
     return PICK(names, cause);
 }
 
-const char *gw_bus_state_name(iw_bus_state_t state) {
+const char *iwn_bus_state_name(iw_bus_state_t state) {
     static const char *const names[] = {
         [IW_BUS_DOWN] = "down",
         [IW_BUS_OFF] = "bus_off",
@@ -113,19 +115,19 @@ const char *gw_bus_state_name(iw_bus_state_t state) {
     return PICK(names, state);
 }
 
-const char *gw_estop_name(int answer, bool present) {
+const char *iwn_estop_name(int answer, bool present) {
     if (!present) {
         return "none";
     }
     return answer == 0 ? "released" : answer > 0 ? "pressed" : "unreadable";
 }
 
-const char *gw_sides_name(uint8_t sides) {
+const char *iwn_sides_name(uint8_t sides) {
     static const char *const names[] = {NULL, "left", "right", "both"};
     return names[sides & IW_SIDES_BOTH];
 }
 
-const char *gw_provenance_name(iw_offset_provenance_t provenance) {
+const char *iwn_provenance_name(iw_offset_provenance_t provenance) {
     static const char *const names[] = {
         [IW_OFFSET_NONE] = "none",   [IW_OFFSET_STORED] = "stored",     [IW_OFFSET_ESTIMATED] = "estimated",
         [IW_OFFSET_WHEEL] = "wheel", [IW_OFFSET_OPERATOR] = "operator",
@@ -133,12 +135,12 @@ const char *gw_provenance_name(iw_offset_provenance_t provenance) {
     return PICK(names, provenance);
 }
 
-const char *gw_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offset_us) {
+const char *iwn_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offset_us) {
     const bool stored = provenance != IW_OFFSET_NONE && offset_us == IW_NEVER;
-    return gw_provenance_name(stored ? IW_OFFSET_STORED : provenance);
+    return iwn_provenance_name(stored ? IW_OFFSET_STORED : provenance);
 }
 
-const char *gw_window_name(iw_window_t window) {
+const char *iwn_window_name(iw_window_t window) {
     static const char *const names[] = {
         [IW_WINDOW_OPEN] = "open",           [IW_WINDOW_GOOD] = "good",   [IW_WINDOW_MOVING] = "moving",
         [IW_WINDOW_NOISY] = "noisy",         [IW_WINDOW_DRIFT] = "drift", [IW_WINDOW_LOADED] = "loaded",
@@ -147,7 +149,7 @@ const char *gw_window_name(iw_window_t window) {
     return PICK(names, window);
 }
 
-const char *gw_unit_evidence_name(iw_unit_evidence_t evidence) {
+const char *iwn_unit_evidence_name(iw_unit_evidence_t evidence) {
     static const char *const names[] = {
         [IW_UNIT_UNKNOWN] = "unknown", [IW_UNIT_CN] = "cN",
         [IW_UNIT_DN] = "dN",           [IW_UNIT_OFFSET_REMOVED] = "offset_removed",
@@ -156,7 +158,7 @@ const char *gw_unit_evidence_name(iw_unit_evidence_t evidence) {
     return PICK(names, evidence);
 }
 
-const char *gw_force_validity_name(iw_force_validity_t validity) {
+const char *iwn_force_validity_name(iw_force_validity_t validity) {
     static const char *const names[] = {
         [IW_FORCE_VALID] = "valid",
         [IW_FORCE_NOT_HEARD] = "not_heard",
@@ -169,7 +171,7 @@ const char *gw_force_validity_name(iw_force_validity_t validity) {
     return PICK(names, validity);
 }
 
-const char *gw_ledger_item_name(iw_ledger_item_t item) {
+const char *iwn_ledger_item_name(iw_ledger_item_t item) {
     static const char *const names[IW_LEDGER_ITEMS] = {
         [IW_LEDGER_SETPOINT_TYPE] = "setpoint_type",
         [IW_LEDGER_CURRENT_ROLE] = "current_role",
@@ -189,12 +191,22 @@ const char *gw_ledger_item_name(iw_ledger_item_t item) {
     return PICK(names, item);
 }
 
-const char *gw_ledger_state_name(iw_ledger_state_t state) {
+bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        if (strcmp(name, iwn_ledger_item_name((iw_ledger_item_t)item)) == 0) {
+            *out_item = (iw_ledger_item_t)item;
+            return true;
+        }
+    }
+    return false;
+}
+
+const char *iwn_ledger_state_name(iw_ledger_state_t state) {
     static const char *const names[] = {"assumed", "confirmed", "contradicted"};
     return PICK(names, state);
 }
 
-const char *gw_evidence_name(iw_evidence_t evidence) {
+const char *iwn_evidence_name(iw_evidence_t evidence) {
     static const char *const names[] = {
         [IW_EVIDENCE_NONE] = "none", [IW_EVIDENCE_DOCUMENT] = "document", [IW_EVIDENCE_CONFIGURATION] = "configuration",
         [IW_EVIDENCE_BUS] = "bus",   [IW_EVIDENCE_OPERATOR] = "operator",
