@@ -253,22 +253,22 @@ static const field_t *find_field(iwn_json_t name, iwn_cmd_t cmd) {
 
 /// Names 64 characters of it, if all of it can be shown.
 static bool refuse_unknown(iwn_cmd_t cmd, iwn_json_t name, iwn_refusal_t *out_refusal) {
-    char shown[65];
-    size_t length = 0;
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     iwn_json_t rest = iwn_json_inside(name);
+    out_refusal->error = IWN_UNKNOWN_FIELD;
+    IWN_TEXT_JOIN(&message, cmd_names[cmd], " has no field \"");
+    const size_t begin = message.length;
     for (uint32_t c = iwn_json_character(&rest); c != 0U; c = iwn_json_character(&rest)) {
+        const char character = (char)c;
         if (c < 0x20U || c > 0x7EU) {
-            shown[0] = '?';
-            length = 1;
+            message.length = begin;
+            IWN_TEXT_JOIN(&message, "?");
             break;
         }
-        if (length < sizeof shown - 1U) {
-            shown[length] = (char)c;
-            length++;
-        }
+        iwn_text_span(&message, &character, (message.length < begin + 64U) ? 1U : 0U);
     }
-    shown[length] = '\0';
-    return REFUSE(out_refusal, IWN_UNKNOWN_FIELD, cmd_names[cmd], " has no field \"", shown, "\"; leave it out");
+    IWN_TEXT_JOIN(&message, "\"; leave it out");
+    return false;
 }
 
 /// Every field that is there is known and right. `*out_seen` has a bit for each of them.
