@@ -122,6 +122,13 @@ static void test_json_refusal_tells_what_is_wrong_and_near_what(void) {
     refused("[truetruetruetruetruet]", "invalid token");
 }
 
+static void test_json_character_cut_by_the_end_is_not_completed_from_behind(void) {
+    static const char text[] = "[\"\xC3\xA9\"]";
+    iwn_text_t fault = iwn_text_begin(why, sizeof why);
+    TEST_ASSERT_FALSE(iwn_json_check(text, 3U, &work, &root, &fault));
+    TEST_ASSERT_EQUAL_STRING("unable to decode byte 0xc3 near '\"'", why);
+}
+
 static void test_json_walk_gives_members_and_values_in_their_order(void) {
     const char *text = " { \"a\" : [ 1 , \"]\" , { } ] , \"b\" : { \"c\\\"\" : null } , \"d\" : -5 } ";
     static const char *const names[] = {"a", "b", "d"};
@@ -194,6 +201,7 @@ int main(void) {
     RUN_TEST(test_json_names_are_compared_each_with_each_and_as_many_as_fit_a_line);
     RUN_TEST(test_json_text_longer_than_its_places_can_be_told_is_refused);
     RUN_TEST(test_json_refusal_tells_what_is_wrong_and_near_what);
+    RUN_TEST(test_json_character_cut_by_the_end_is_not_completed_from_behind);
     RUN_TEST(test_json_walk_gives_members_and_values_in_their_order);
     RUN_TEST(test_json_kinds_are_told_apart);
     RUN_TEST(test_json_integers_come_as_sent_to_the_last_one);
