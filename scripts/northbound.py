@@ -255,8 +255,6 @@ FIELDS_HEADER = """// SPDX-License-Identifier: MIT
 #ifndef IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 #define IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
 
-// clang-format off
-
 /// In the order of iwn_cmd_t.
 """
 KINDS = {"text": "TEXT", "boolean": "FLAG", "topic": "TOPICS", "side": "SIDE", "ledger_item": "ITEM"}
@@ -270,10 +268,9 @@ def c_kind(field):
 
 
 def c_macro(name, rows):
-    """A macro of several lines, with the backslashes below each other."""
+    """A macro of several lines, as clang-format sets them."""
     lines = [f"#define {name}", *(f"    {row}" for row in rows)]
-    width = max(len(line) for line in lines) + 1
-    return "\n".join([*(f"{line:{width}}\\" for line in lines[:-1]), lines[-1]])
+    return "\n".join([*(f"{line:119}\\" for line in lines[:-1]), lines[-1]])
 
 
 def c_fields(description):

@@ -24,9 +24,9 @@ ODD_LINES = """(1760000000.000001) can0 100#00100000
 
 def json_vectors():
     """Every row of the unit tests' table, as a line and as a field's value. A line break would end a request."""
-    rows = re.findall(r'^    (?:OWN_)?(?:YES|NO)\("[^"]*", (.*)\)', (ROOT / "test/support/json_vectors.h").read_text(), re.M)
+    rows = re.findall(r'^(?:OWN_)?(?:YES|NO)\("[^"]*", (.*)\)', (ROOT / "test/support/json_vectors.inc").read_text(), re.M)
     texts = [b"".join(ast.literal_eval("b" + literal) for literal in re.findall(r'"(?:[^"\\]|\\.)*"', row)) for row in rows]
-    assert len(texts) > 200, "the table of test/support/json_vectors.h has another form"
+    assert len(texts) > 200, "the table of test/support/json_vectors.inc has another form"
     return [line for text in texts if b"\n" not in text for line in (text, b'{"cmd":"watch","topics":' + text + b"}")]
 
 
