@@ -327,6 +327,7 @@ class Document:
 
     def complaints(self):
         yield from self.requests()
+        yield from self.limits()
         yield from self.events()
         yield from self.snapshot()
         yield from self.errors()
@@ -357,8 +358,26 @@ class Document:
             else:
                 refusal = self.description.objects["refusal"]["fields"]
                 yield from self.description.complaints(body, refusal, f"example of a refusal of {cmd}")
+        yield from self.ranges(cmd, part)
         if cmd != "status":  # Its fields have tables of their own.
             yield from (f"{DOCUMENT}: {cmd} does not speak of {name}" for name in {**wanted, **replied} if name not in shown)
+
+    def limits(self):
+        """Numbers that hold for all requests and replies, before the first of them."""
+        text = " ".join(self.text.split("## Requests")[0].split())
+        limits = self.description.limits
+        told = {"request_bytes": f"A request has at most {limits['request_bytes']} bytes", "line_bytes": f"a reply or event at most {limits['line_bytes']}",
+                "id_text_bytes": f"a string of up to {limits['id_text_bytes']} bytes", "depth": f"nested at most {limits['depth']} deep"}
+        yield from (f"{DOCUMENT}: the limit {name} is not told as {words!r}" for name, words in told.items() if words not in text)
+
+    def ranges(self, cmd, part):
+        """Lengths, ranges and defaults of a request's fields."""
+        text = " ".join(part.split())
+        for name, field in self.description.fields(self.description.requests[cmd]).items():
+            wanted = [f"up to {field['bytes']} bytes"] if "bytes" in field else []
+            wanted += [f"{field['least']}..{field['most']}"] if "most" in field else []
+            wanted += [f"default {field['default']}"] if "default" in field else []
+            yield from (f"{DOCUMENT}: {name} of {cmd} is not told as {words!r}" for words in wanted if words not in text)
 
     def events(self):
         text = section(self.text, "## Events")
