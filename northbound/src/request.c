@@ -103,7 +103,7 @@ static bool read_text(const field_t *field, iwn_json_t value, char *target, iwn_
     char digits[NUMBER_SIZE];
     if (!iwn_json_text(value, target, field->max + 1U) || *target == '\0' || !iwn_plain_text(target)) {
         return REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be a text of 1 to ", number(field->max, digits),
-                      " bytes" NOT_PLAIN);
+                      " bytes", NOT_PLAIN);
     }
     return true;
 }
@@ -204,7 +204,7 @@ static bool read_id(iwn_json_t value, iwn_id_t *out_id, iwn_refusal_t *out_refus
         return true;
     }
     return REFUSE(out_refusal, IWN_BAD_VALUE, "id must be an integer or a text of at most ",
-                  number(IWN_ID_TEXT_MAX, digits), " bytes" NOT_PLAIN);
+                  number(IWN_ID_TEXT_MAX, digits), " bytes", NOT_PLAIN);
 }
 
 static bool read_cmd(iwn_json_t value, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {

@@ -134,13 +134,14 @@ static char *digits_32(uint32_t number, char *end) {
         "555657585960616263646566676869707172737475767778798081828384858687888990919293949596979899";
     while (number >= 100U) {
         const uint32_t rest = number / 100U;
+        const size_t pair = number - rest * 100U;
         end -= 2;
-        (void)memcpy(end, &pairs[2U * (number - rest * 100U)], 2U);
+        (void)memcpy(end, &pairs[2U * pair], 2U);
         number = rest;
     }
     if (number >= 10U) {
         end -= 2;
-        (void)memcpy(end, &pairs[2U * number], 2U);
+        (void)memcpy(end, &pairs[2U * (size_t)number], 2U);
         return end;
     }
     *--end = (char)('0' + number);

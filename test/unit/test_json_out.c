@@ -72,7 +72,8 @@ static void test_json_that_does_not_fit_is_no_line_at_any_size(void) {
 
 static void test_json_number_is_written_as_printf_writes_it(void) {
     int64_t number = 1;
-    for (unsigned digits = 0; digits < 19U; digits++, number *= 10) {
+    for (unsigned digits = 1; digits < 19U; digits++) {
+        number *= 10;
         for (int64_t off = -101; off <= 101; off++) {
             char wanted[64];
             setUp();
@@ -80,7 +81,6 @@ static void test_json_number_is_written_as_printf_writes_it(void) {
             iwn_out_int(&json, NULL, -(number + off));
             (void)snprintf(wanted, sizeof wanted, "\"n\":%" PRId64 ",%" PRId64, number + off, -(number + off));
             expect(wanted);
-            number += (digits == 18U && off == 101) ? -1 : 0; // The next power does not exist.
         }
     }
     setUp();
