@@ -97,6 +97,7 @@ typedef struct gw_daemon {
     uint32_t tapped;                        ///< Frames in `tap`. A step takes no more than there is room for.
     gw_tapped_t tap[GW_FRAMES];
     char line[GW_REPLY_MAX]; ///< Where replies and events are written.
+    iwn_work_t work;         ///< For reading requests.
     gw_client_t client[GW_CLIENTS_MAX];
 } gw_daemon_t;
 

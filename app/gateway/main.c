@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "answers/service.h"
 #include "bus/bus_facts.h"
-#include "json/json_arena.h"
 #include "loop.h"
 #include "start/options.h"
 #include "start/report.h"
@@ -127,7 +126,6 @@ static int act(const gw_options_t *options, gw_daemon_t *daemon) {
         gateway_config_print(&daemon->config, stdout);
         return 0;
     }
-    json_arena_install();
     gw_log_open(&daemon->log, options->log_level);
     const int code = options->action == GW_CHECK ? gw_report_check(&daemon->config, stdout) : run(daemon);
     gw_log_close(&daemon->log);

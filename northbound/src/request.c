@@ -1,312 +1,339 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_northbound/request.h"
 
-#include "json/json_arena.h"
+#include "request_fields.h"
 
-#include "iwheel_northbound/text.h"
-
-#include <inttypes.h>
-#include <jansson.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <string.h>
 
-typedef enum {
-    FIELD_INTEGER,
-    FIELD_RATE,
-    FIELD_TEXT,
-    FIELD_FLAG,
-    FIELD_TOPICS,
-    FIELD_SIDE,
-    FIELD_ITEM,
-    FIELD_VALUE
-} field_kind_t;
+typedef enum { INTEGER, RATE, TEXT, FLAG, TOPICS, SIDE, ITEM, VALUE } field_kind_t;
 
 /// A field that some commands have. `cmd` and `id` are common to all and treated apart.
 typedef struct {
     const char *name;
-    size_t offset;    ///< Of the value in iwn_request_t.
-    size_t max;       ///< Of a text, in bytes.
+    uint16_t offset;  ///< Of the value in iwn_request_t.
+    uint16_t max;     ///< Of a text, in bytes.
     uint16_t allowed; ///< Bit per iwn_cmd_t.
     bool required;
-    field_kind_t kind;
+    uint8_t kind; ///< field_kind_t
 } field_t;
 
-#define BIT(cmd)   ((uint16_t)(1U << (cmd)))
-#define IN(member) offsetof(iwn_request_t, member)
+#define BIT(cmd) (1U << IWN_CMD_##cmd)
+#define ROW(name, member, kind, bytes, required, allowed)                                                              \
+    {#name, offsetof(iwn_request_t, member), bytes, allowed, required, kind},
+#define INDEX(name, member, kind, bytes, required, allowed) FIELD_##name,
+#define HAS_ROOM(name, member, kind, bytes, required, allowed)                                                         \
+    &&((bytes) == 0 || sizeof(((iwn_request_t *)0)->member) == (bytes) + 1U)
+#define NAME(name) #name,
 
-static const field_t fields[] = {
-    {"left_mm_s", IN(left_mm_s), 0, BIT(IWN_CMD_DRIVE), true, FIELD_INTEGER},
-    {"right_mm_s", IN(right_mm_s), 0, BIT(IWN_CMD_DRIVE), true, FIELD_INTEGER},
-    {"left_mA", IN(left_mA), 0, BIT(IWN_CMD_DRIVE), false, FIELD_INTEGER},
-    {"right_mA", IN(right_mA), 0, BIT(IWN_CMD_DRIVE), false, FIELD_INTEGER},
-    {"v_mm_s", IN(v_mm_s), 0, BIT(IWN_CMD_TWIST), true, FIELD_INTEGER},
-    {"yaw_mrad_s", IN(yaw_mrad_s), 0, BIT(IWN_CMD_TWIST), true, FIELD_INTEGER},
-    {"topics", IN(topics), 0, BIT(IWN_CMD_WATCH), true, FIELD_TOPICS},
-    {"rate_hz", IN(rate_hz), 0, BIT(IWN_CMD_WATCH), false, FIELD_RATE},
-    {"name", IN(name), IWN_NAME_MAX, BIT(IWN_CMD_ARM), false, FIELD_TEXT},
-    {"takeover", IN(takeover), 0, BIT(IWN_CMD_ARM), false, FIELD_FLAG},
-    {"reason", IN(reason), IWN_REASON_MAX, BIT(IWN_CMD_ESTOP), false, FIELD_TEXT},
-    {"side", IN(sides), 0, BIT(IWN_CMD_TARE), false, FIELD_SIDE},
-    {"item", IN(item), 0, BIT(IWN_CMD_CONFIRM), true, FIELD_ITEM},
-    {"value", IN(value), IWN_VALUE_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_VALUE},
-    {"how", IN(how), IWN_HOW_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_TEXT},
-};
-#define FIELDS (sizeof fields / sizeof fields[0])
+static const field_t fields[] = {IWN_REQUEST_FIELDS(ROW)};
+enum { IWN_REQUEST_FIELDS(INDEX) FIELDS };
 
-static const char *const cmd_names[IWN_CMDS] = {"hello",  "status", "watch", "arm",  "drive", "twist",  "stop",
-                                                "disarm", "estop",  "reset", "tare", "why",   "confirm"};
+static const char *const cmd_names[] = {IWN_REQUEST_NAMES(NAME)};
+IW_STATIC_ASSERT(sizeof cmd_names / sizeof cmd_names[0] == IWN_CMDS, a_name_for_each_command);
+IW_STATIC_ASSERT(true IWN_REQUEST_FIELDS(HAS_ROOM), room_for_each_text_and_its_terminator);
+IW_STATIC_ASSERT(IWN_CMDS <= 16 && FIELDS <= 32, a_bit_for_each_command_and_each_field);
 
-__attribute__((format(printf, 3, 4))) static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error,
-                                                         const char *format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
+#define REFUSE(refusal, error, ...) refuse((refusal), (error), (const char *const[]){__VA_ARGS__, NULL})
+#define NOT_PLAIN                                                                                                      \
+    " without characters that move a terminal (control characters, line separators, marks of writing direction)"
+
+#define NUMBER_SIZE (IWN_DIGITS_MAX + 1U)
+
+/// A number for a message.
+static const char *number(int64_t value, char out_digits[NUMBER_SIZE]) {
+    iwn_text_t text = iwn_text_begin(out_digits, NUMBER_SIZE);
+    iwn_text_int(&text, value);
+    return out_digits;
+}
+
+static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const *texts) {
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
     out_refusal->error = error;
-    (void)vsnprintf(out_refusal->message, sizeof out_refusal->message, format, arguments);
-    va_end(arguments);
+    iwn_text_join(&message, texts);
     return false;
 }
 
-/// Nesting is counted before jansson recurses. Brackets in texts do not count.
-static bool too_deep(const char *line, size_t length) {
+/// The same, with all of some words at the end.
+static bool refuse_but(iwn_refusal_t *out_refusal, iwn_error_t error, const char *text, const char *(*word)(unsigned)) {
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    out_refusal->error = error;
+    IWN_TEXT_JOIN(&message, text);
+    for (unsigned i = 0; word(i) != NULL; i++) {
+        IWN_TEXT_JOIN(&message, " ", word(i));
+    }
+    return false;
+}
+
+static const char *cmd_word(unsigned index) {
+    return (index < IWN_CMDS) ? cmd_names[index] : NULL;
+}
+
+static const char *topic_word(unsigned index) {
+    return (index < IWN_TOPICS) ? iwn_topic_name((iwn_topic_t)index) : NULL;
+}
+
+/// Which of the words it is; how many there are if it is none.
+static unsigned find_word(iwn_json_t value, const char *(*word)(unsigned)) {
+    unsigned i = 0;
+    while (word(i) != NULL && !iwn_json_is(value, word(i))) {
+        i++;
+    }
+    return i;
+}
+
+/// Brackets of the line, whatever else is wrong with it. Those in texts do not count.
+static bool is_too_deep(const char *line, size_t length) {
     unsigned depth = 0;
     bool in_text = false;
-    for (size_t i = 0; i < length; ++i) {
+    for (size_t i = 0; i < length && depth <= IWN_DEPTH_MAX; i++) {
         const char c = line[i];
         if (in_text) {
             in_text = c != '"';
-            i += c == '\\' ? 1U : 0U;
-        } else if (c == '"') {
-            in_text = true;
-        } else if (c == '{' || c == '[') {
-            if (++depth > IWN_DEPTH_MAX) {
-                return true;
-            }
-        } else if ((c == '}' || c == ']') && depth > 0U) {
-            --depth;
+            i += (c == '\\') ? 1U : 0U;
+        } else {
+            in_text = c == '"';
+            depth += (c == '{' || c == '[') ? 1U : 0U;
+            depth -= ((c == '}' || c == ']') && depth > 0U) ? 1U : 0U;
         }
     }
-    return false;
+    return depth > IWN_DEPTH_MAX;
 }
 
-/// Plain and short enough. jansson has checked the UTF-8 and refuses \u0000.
-static bool is_plain(const char *text, size_t max) {
-    return strlen(text) <= max && iwn_plain_text(text);
-}
-
-/// May stand in a message: nothing that could have been cut in the middle of a character.
-static const char *quotable(const char *text, const char *otherwise) {
-    for (const char *c = text; *c != '\0'; ++c) {
-        if (*c < 0x20 || *c > 0x7E) {
-            return otherwise;
-        }
-    }
-    return text;
-}
-
-static bool read_text(const field_t *field, const json_t *value, char *target, iwn_refusal_t *out_refusal) {
-    const char *text = json_string_value(value);
-    if (text == NULL || *text == '\0' || !is_plain(text, field->max)) {
-        return refuse(
-            out_refusal, IWN_BAD_VALUE,
-            "%s must be a text of 1 to %zu bytes without characters that move a terminal (control characters, "
-            "line separators, marks of writing direction)",
-            field->name, field->max);
-    }
-    (void)memcpy(target, text, strlen(text) + 1U);
-    return true;
-}
-
-static bool read_integer(const field_t *field, const json_t *value, int64_t *target, iwn_refusal_t *out_refusal) {
-    if (!json_is_integer(value)) {
-        return refuse(out_refusal, IWN_BAD_VALUE, "%s must be an integer: no fraction, no exponent, no quotes",
-                      field->name);
-    }
-    *target = json_integer_value(value);
-    if (field->kind == FIELD_RATE && *target < 1) {
-        return refuse(out_refusal, IWN_OUT_OF_RANGE, "%s must be at least 1; to end watching send an empty topics list",
-                      field->name);
+static bool read_text(const field_t *field, iwn_json_t value, char *target, iwn_refusal_t *out_refusal) {
+    char digits[NUMBER_SIZE];
+    if (!iwn_json_text(value, target, field->max + 1U) || *target == '\0' || !iwn_plain_text(target)) {
+        return REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be a text of 1 to ", number(field->max, digits),
+                      " bytes", NOT_PLAIN);
     }
     return true;
 }
 
-static bool read_topics(const json_t *value, uint8_t *target, iwn_refusal_t *out_refusal) {
-    static const char cure[] = "topics must be a list of these words: state bus estop lease stop force frame";
-    if (!json_is_array(value)) {
-        return refuse(out_refusal, IWN_BAD_VALUE, "%s", cure);
+static bool read_integer(const field_t *field, iwn_json_t value, int64_t *target, iwn_refusal_t *out_refusal) {
+    if (iwn_json_kind(value) != IWN_JSON_INTEGER) {
+        return REFUSE(out_refusal, IWN_BAD_VALUE, field->name,
+                      " must be an integer: no fraction, no exponent, no quotes");
     }
-    for (size_t i = 0; i < json_array_size(value); ++i) {
-        const char *word = json_string_value(json_array_get(value, i));
-        unsigned topic = 0;
-        while (word != NULL && topic < IWN_TOPICS && strcmp(word, iwn_topic_name((iwn_topic_t)topic)) != 0) {
-            ++topic;
-        }
-        if (word == NULL || topic == IWN_TOPICS) {
-            return refuse(out_refusal, IWN_BAD_VALUE, "%s", cure);
-        }
+    *target = iwn_json_integer(value);
+    if (field->kind == RATE && *target < 1) {
+        return REFUSE(out_refusal, IWN_OUT_OF_RANGE, field->name,
+                      " must be at least 1; to end watching send an empty topics list");
+    }
+    return true;
+}
+
+static bool read_topics(iwn_json_t value, uint8_t *target, iwn_refusal_t *out_refusal) {
+    bool good = iwn_json_kind(value) == IWN_JSON_LIST;
+    iwn_json_t rest = iwn_json_inside(value);
+    while (good && iwn_json_next(&rest, NULL, &value)) {
+        const unsigned topic = find_word(value, topic_word);
+        good = topic < IWN_TOPICS;
         *target |= (uint8_t)(1U << topic);
     }
-    return true;
+    return good || refuse_but(out_refusal, IWN_BAD_VALUE, "topics must be a list of these words:", topic_word);
 }
 
-static bool read_side(const json_t *value, uint8_t *target, iwn_refusal_t *out_refusal) {
-    const char *word = json_string_value(value);
-    if (word != NULL && strcmp(word, "left") == 0) {
+static bool read_side(iwn_json_t value, uint8_t *target, iwn_refusal_t *out_refusal) {
+    if (iwn_json_is(value, "left")) {
         *target = IW_SIDES_LEFT;
-    } else if (word != NULL && strcmp(word, "right") == 0) {
+    } else if (iwn_json_is(value, "right")) {
         *target = IW_SIDES_RIGHT;
     } else {
-        return refuse(out_refusal, IWN_BAD_VALUE, "side must be \"left\" or \"right\"; leave it out for both");
+        return REFUSE(out_refusal, IWN_BAD_VALUE, "side must be \"left\" or \"right\"; leave it out for both");
     }
     return true;
 }
 
-static bool read_item(const json_t *value, iw_ledger_item_t *target, iwn_refusal_t *out_refusal) {
-    const char *name = json_string_value(value);
-    if (name == NULL || !iwn_ledger_item_of(name, target)) {
-        return refuse(out_refusal, IWN_BAD_VALUE,
-                      "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
+static bool read_item(iwn_json_t value, iw_ledger_item_t *target, iwn_refusal_t *out_refusal) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        if (iwn_json_is(value, iwn_ledger_item_name((iw_ledger_item_t)item))) {
+            *target = (iw_ledger_item_t)item;
+            return true;
+        }
     }
-    return true;
+    return REFUSE(out_refusal, IWN_BAD_VALUE,
+                  "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
 }
 
 /// A number becomes its digits, so that 192 and "192" are the same.
-static bool read_value(const field_t *field, const json_t *value, char *target, iwn_refusal_t *out_refusal) {
-    if (json_is_integer(value)) {
-        (void)snprintf(target, IWN_VALUE_SIZE, "%" PRId64, (int64_t)json_integer_value(value));
-        return true;
+static bool read_value(const field_t *field, iwn_json_t value, char *target, iwn_refusal_t *out_refusal) {
+    if (iwn_json_kind(value) != IWN_JSON_INTEGER) {
+        return read_text(field, value, target, out_refusal);
     }
-    return read_text(field, value, target, out_refusal);
-}
-
-static bool read_flag(const field_t *field, const json_t *value, bool *target, iwn_refusal_t *out_refusal) {
-    if (!json_is_boolean(value)) {
-        return refuse(out_refusal, IWN_BAD_VALUE, "%s must be true or false", field->name);
-    }
-    *target = json_is_true(value);
+    iwn_text_t text = iwn_text_begin(target, field->max + 1U);
+    iwn_text_int(&text, iwn_json_integer(value));
     return true;
 }
 
-static bool read_field(const field_t *field, const json_t *value, iwn_request_t *request, iwn_refusal_t *out_refusal) {
-    void *target = (char *)request + field->offset;
+static bool read_flag(const field_t *field, iwn_json_t value, bool *target, iwn_refusal_t *out_refusal) {
+    const iwn_json_kind_t kind = iwn_json_kind(value);
+    *target = kind == IWN_JSON_TRUE;
+    return *target || kind == IWN_JSON_FALSE ||
+           REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be true or false");
+}
+
+static bool read_field(const field_t *field, iwn_json_t value, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    void *const target = (char *)request + field->offset;
     switch (field->kind) {
-    case FIELD_TEXT:
+    case TEXT:
         return read_text(field, value, (char *)target, out_refusal);
-    case FIELD_FLAG:
+    case FLAG:
         return read_flag(field, value, (bool *)target, out_refusal);
-    case FIELD_TOPICS:
+    case TOPICS:
         return read_topics(value, (uint8_t *)target, out_refusal);
-    case FIELD_SIDE:
+    case SIDE:
         return read_side(value, (uint8_t *)target, out_refusal);
-    case FIELD_ITEM:
+    case ITEM:
         return read_item(value, (iw_ledger_item_t *)target, out_refusal);
-    case FIELD_VALUE:
+    case VALUE:
         return read_value(field, value, (char *)target, out_refusal);
-    case FIELD_INTEGER:
-    case FIELD_RATE:
+    case INTEGER:
+    case RATE:
     default:
         return read_integer(field, value, (int64_t *)target, out_refusal);
     }
 }
 
-static bool read_id(const json_t *root, iwn_id_t *out_id, iwn_refusal_t *out_refusal) {
-    const json_t *value = json_object_get(root, "id");
-    const char *text = json_string_value(value);
-    if (json_is_integer(value)) {
-        *out_id = (iwn_id_t){.kind = IWN_ID_NUMBER, .number = json_integer_value(value)};
-    } else if (text != NULL && is_plain(text, IWN_ID_TEXT_MAX)) {
-        out_id->kind = IWN_ID_TEXT;
-        (void)memcpy(out_id->text, text, strlen(text) + 1U);
-    } else if (value != NULL) {
-        return refuse(out_refusal, IWN_BAD_VALUE,
-                      "id must be an integer or a text of at most %u bytes without characters that move a terminal "
-                      "(control characters, line separators, marks of writing direction)",
-                      IWN_ID_TEXT_MAX);
+static bool read_id(iwn_json_t value, iwn_id_t *out_id, iwn_refusal_t *out_refusal) {
+    char digits[NUMBER_SIZE];
+    if (iwn_json_kind(value) == IWN_JSON_INTEGER) {
+        *out_id = (iwn_id_t){.kind = IWN_ID_NUMBER, .number = iwn_json_integer(value)};
+        return true;
     }
+    if (iwn_json_text(value, out_id->text, sizeof out_id->text) && iwn_plain_text(out_id->text)) {
+        out_id->kind = IWN_ID_TEXT;
+        return true;
+    }
+    return REFUSE(out_refusal, IWN_BAD_VALUE, "id must be an integer or a text of at most ",
+                  number(IWN_ID_TEXT_MAX, digits), " bytes", NOT_PLAIN);
+}
+
+static bool read_cmd(iwn_json_t value, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {
+    if (iwn_json_kind(value) != IWN_JSON_TEXT) {
+        return REFUSE(out_refusal, IWN_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
+    }
+    const unsigned cmd = find_word(value, cmd_word);
+    if (cmd == IWN_CMDS) {
+        return refuse_but(out_refusal, IWN_UNKNOWN_CMD, "cmd must be one of", cmd_word);
+    }
+    *out_cmd = (iwn_cmd_t)cmd;
     return true;
 }
 
-static bool read_cmd(const json_t *root, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {
-    const json_t *value = json_object_get(root, "cmd");
-    const char *name = json_string_value(value);
-    if (value == NULL) {
-        return refuse(out_refusal, IWN_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
-    }
-    if (name == NULL) {
-        return refuse(out_refusal, IWN_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
-    }
-    for (unsigned i = 0; i < IWN_CMDS; ++i) {
-        if (strcmp(name, cmd_names[i]) == 0) {
-            *out_cmd = (iwn_cmd_t)i;
-            return true;
+/// What all requests have in common, wherever in the object it stands.
+static bool read_common(iwn_json_t root, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    iwn_json_t rest = iwn_json_inside(root);
+    iwn_json_t name;
+    iwn_json_t value;
+    iwn_json_t id = {NULL};
+    iwn_json_t cmd = {NULL};
+    while (iwn_json_next(&rest, &name, &value)) {
+        if (iwn_json_is(name, "id")) {
+            id = value;
+        } else if (iwn_json_is(name, "cmd")) {
+            cmd = value;
         }
     }
-    return refuse(out_refusal, IWN_UNKNOWN_CMD,
-                  "cmd must be one of hello status watch arm drive twist stop disarm estop reset tare why confirm");
+    if (id.at != NULL && !read_id(id, &request->id, out_refusal)) {
+        return false;
+    }
+    if (cmd.at == NULL) {
+        return REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
+    }
+    return read_cmd(cmd, &request->cmd, out_refusal);
 }
 
-static const field_t *find_field(const char *name, iwn_cmd_t cmd) {
-    for (size_t i = 0; i < FIELDS; ++i) {
-        if ((fields[i].allowed & BIT(cmd)) != 0U && strcmp(name, fields[i].name) == 0) {
+static const field_t *find_field(iwn_json_t name, iwn_cmd_t cmd) {
+    for (unsigned i = 0; i < FIELDS; i++) {
+        if ((fields[i].allowed & 1U << cmd) != 0U && iwn_json_is(name, fields[i].name)) {
             return &fields[i];
         }
     }
     return NULL;
 }
 
-/// Every field that is there is known and right.
-static bool read_fields(json_t *root, iwn_request_t *request, iwn_refusal_t *out_refusal) {
-    for (void *it = json_object_iter(root); it != NULL; it = json_object_iter_next(root, it)) {
-        const char *name = json_object_iter_key(it);
-        if (strcmp(name, "id") == 0 || strcmp(name, "cmd") == 0) {
+/// Names 64 characters of it, if all of it can be shown.
+static bool refuse_unknown(iwn_cmd_t cmd, iwn_json_t name, iwn_refusal_t *out_refusal) {
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    iwn_json_t rest = iwn_json_inside(name);
+    out_refusal->error = IWN_UNKNOWN_FIELD;
+    IWN_TEXT_JOIN(&message, cmd_names[cmd], " has no field \"");
+    const size_t begin = message.length;
+    for (uint32_t c = iwn_json_character(&rest); c != 0U; c = iwn_json_character(&rest)) {
+        const char character = (char)c;
+        if (c < 0x20U || c > 0x7EU) {
+            message.length = begin;
+            IWN_TEXT_JOIN(&message, "?");
+            break;
+        }
+        iwn_text_span(&message, &character, (message.length < begin + 64U) ? 1U : 0U);
+    }
+    IWN_TEXT_JOIN(&message, "\"; leave it out");
+    return false;
+}
+
+/// Every field that is there is known and right. `*out_seen` has a bit for each of them.
+static bool read_fields(iwn_json_t root, iwn_request_t *request, uint32_t *out_seen, iwn_refusal_t *out_refusal) {
+    iwn_json_t rest = iwn_json_inside(root);
+    iwn_json_t name;
+    iwn_json_t value;
+    while (iwn_json_next(&rest, &name, &value)) {
+        if (iwn_json_is(name, "id") || iwn_json_is(name, "cmd")) {
             continue;
         }
-        const field_t *field = find_field(name, request->cmd);
+        const field_t *const field = find_field(name, request->cmd);
         if (field == NULL) {
-            return refuse(out_refusal, IWN_UNKNOWN_FIELD, "%s has no field \"%.64s\"; leave it out",
-                          cmd_names[request->cmd], quotable(name, "?"));
+            return refuse_unknown(request->cmd, name, out_refusal);
         }
-        if (!read_field(field, json_object_iter_value(it), request, out_refusal)) {
+        if (!read_field(field, value, request, out_refusal)) {
             return false;
         }
+        *out_seen |= 1U << (field - fields);
     }
     return true;
 }
 
 /// Every field that must be there is.
-static bool is_complete(const json_t *root, const iwn_request_t *request, iwn_refusal_t *out_refusal) {
-    for (size_t i = 0; i < FIELDS; ++i) {
-        const bool needed = fields[i].required && (fields[i].allowed & BIT(request->cmd)) != 0U;
-        if (needed && json_object_get(root, fields[i].name) == NULL) {
-            return refuse(out_refusal, IWN_MISSING_FIELD, "%s needs %s", cmd_names[request->cmd], fields[i].name);
+static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    for (unsigned i = 0; i < FIELDS; i++) {
+        const bool needed = fields[i].required && (fields[i].allowed & 1U << request->cmd) != 0U;
+        if (needed && (seen & 1U << i) == 0U) {
+            return REFUSE(out_refusal, IWN_MISSING_FIELD, cmd_names[request->cmd], " needs ", fields[i].name);
         }
     }
-    if ((json_object_get(root, "left_mA") == NULL) != (json_object_get(root, "right_mA") == NULL)) {
-        return refuse(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
+    request->has_current = (seen & 1U << FIELD_left_mA) != 0U;
+    if (request->has_current != ((seen & 1U << FIELD_right_mA) != 0U)) {
+        return REFUSE(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
     }
     return true;
 }
 
-bool iwn_request_parse(const char *line, size_t length, iwn_request_t *out_request, iwn_refusal_t *out_refusal) {
-    *out_request = (iwn_request_t){.rate_hz = IWN_RATE_DEFAULT_HZ, .sides = IW_SIDES_BOTH};
+/// One object, right in form.
+static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_json_t *out_root,
+                      iwn_refusal_t *out_refusal) {
+    char digits[NUMBER_SIZE];
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    out_refusal->error = IWN_BAD_JSON;
+    IWN_TEXT_JOIN(&message, "not one JSON object on one line: ");
+    if (iwn_json_check(line, length, work, out_root, &message)) {
+        IWN_TEXT_JOIN(&message, "it is not an object");
+        return iwn_json_kind(*out_root) == IWN_JSON_OBJECT;
+    }
+    return is_too_deep(line, length)
+               ? REFUSE(out_refusal, IWN_BAD_JSON, "nested more than ", number(IWN_DEPTH_MAX, digits), " deep")
+               : false;
+}
+
+bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
+                      iwn_refusal_t *out_refusal) {
+    const iwn_request_t request = {.rate_hz = IWN_RATE_DEFAULT_HZ, .sides = IW_SIDES_BOTH};
+    char digits[NUMBER_SIZE];
+    iwn_json_t root;
+    uint32_t seen = 0;
+    *out_request = request;
     if (length > IWN_LINE_MAX) {
-        return refuse(out_refusal, IWN_LINE_TOO_LONG, "a request has at most %u bytes; end each with a newline",
-                      IWN_LINE_MAX);
+        return REFUSE(out_refusal, IWN_LINE_TOO_LONG, "a request has at most ", number(IWN_LINE_MAX, digits),
+                      " bytes; end each with a newline");
     }
-    if (too_deep(line, length)) {
-        return refuse(out_refusal, IWN_BAD_JSON, "nested more than %u deep", IWN_DEPTH_MAX);
-    }
-    json_error_t error;
-    json_arena_reset();
-    json_t *root = json_loadb(line, length, JSON_REJECT_DUPLICATES, &error);
-    if (!json_is_object(root)) {
-        const char *reason = root == NULL ? error.text : "it is not an object";
-        return refuse(out_refusal, IWN_BAD_JSON, "not one JSON object on one line: %s", quotable(reason, "unreadable"));
-    }
-    if (!read_id(root, &out_request->id, out_refusal) || !read_cmd(root, &out_request->cmd, out_refusal) ||
-        !read_fields(root, out_request, out_refusal) || !is_complete(root, out_request, out_refusal)) {
-        return false;
-    }
-    out_request->has_current = json_object_get(root, "left_mA") != NULL;
-    return true;
+    return read_line(line, length, work, &root, out_refusal) && read_common(root, out_request, out_refusal) &&
+           read_fields(root, out_request, &seen, out_refusal) && is_complete(seen, out_request, out_refusal);
 }

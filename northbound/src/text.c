@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_northbound/text.h"
 
-#include <stdio.h>
 #include <string.h>
 
-/// As long as a number can make it; every character that moves a terminal takes four digits.
-#define ESCAPE_SIZE 12U
+/// Every character that moves a terminal takes four digits.
+#define ESCAPE_SIZE sizeof "\\uFFFD"
 
 static const struct {
     uint32_t first;
@@ -90,8 +89,10 @@ static size_t escape(uint32_t code_point, char out_escape[ESCAPE_SIZE]) {
         out_escape[0] = ' ';
         return 1;
     }
-    const uint32_t shown = code_point == IWN_PLAIN_BROKEN ? 0xFFFDU : code_point;
-    return (size_t)snprintf(out_escape, ESCAPE_SIZE, "\\u%04X", (unsigned)shown);
+    iwn_text_t text = iwn_text_begin(out_escape, ESCAPE_SIZE);
+    IWN_TEXT_JOIN(&text, "\\u");
+    iwn_text_hex(&text, (code_point == IWN_PLAIN_BROKEN) ? 0xFFFDU : code_point, 4U);
+    return text.length;
 }
 
 const char *iwn_plain_json(const char *line, char *out, size_t size, size_t *out_length) {
@@ -110,4 +111,91 @@ const char *iwn_plain_json(const char *line, char *out, size_t size, size_t *out
     }
     *out_length = used;
     return line;
+}
+
+size_t iwn_utf8(uint32_t code_point, char out_bytes[4]) {
+    if (code_point < 0x80U) {
+        out_bytes[0] = (char)code_point;
+        return 1;
+    }
+    const size_t length = (code_point < 0x800U) ? 2U : (code_point < 0x10000U) ? 3U : 4U;
+    for (size_t i = length - 1U; i > 0U; i--) {
+        out_bytes[i] = (char)(0x80U | (code_point & 0x3FU));
+        code_point >>= 6;
+    }
+    out_bytes[0] = (char)((0xF00U >> length & 0xFFU) | code_point);
+    return length;
+}
+
+/// 32 bits: a controller divides 64 bits by a function of a hundred instructions.
+static char *digits_32(uint32_t number, char *end) {
+    static const char pairs[] =
+        "00010203040506070809101112131415161718192021222324252627282930313233343536373839404142434445464748495051525354"
+        "555657585960616263646566676869707172737475767778798081828384858687888990919293949596979899";
+    while (number >= 100U) {
+        const uint32_t rest = number / 100U;
+        const size_t pair = number - rest * 100U;
+        end -= 2;
+        (void)memcpy(end, &pairs[2U * pair], 2U);
+        number = rest;
+    }
+    if (number >= 10U) {
+        end -= 2;
+        (void)memcpy(end, &pairs[2U * (size_t)number], 2U);
+        return end;
+    }
+    *--end = (char)('0' + number);
+    return end;
+}
+
+char *iwn_digits(int64_t number, char *end) {
+    uint64_t rest = (number < 0) ? 0U - (uint64_t)number : (uint64_t)number;
+    while (rest > UINT32_MAX) {
+        const uint64_t high = rest / 1000000000U;
+        char *const begin = end - 9;
+        char *at = digits_32((uint32_t)(rest - high * 1000000000U), end);
+        while (at > begin) {
+            *--at = '0';
+        }
+        end = begin;
+        rest = high;
+    }
+    end = digits_32((uint32_t)rest, end);
+    if (number < 0) {
+        *--end = '-';
+    }
+    return end;
+}
+
+iwn_text_t iwn_text_begin(char *data, size_t size) {
+    data[0] = '\0';
+    return (iwn_text_t){data, size, 0};
+}
+
+void iwn_text_span(iwn_text_t *self, const char *text, size_t length) {
+    const size_t room = self->size - self->length - 1U;
+    const size_t fits = (length < room) ? length : room;
+    (void)memcpy(&self->data[self->length], text, fits);
+    self->length += fits;
+    self->data[self->length] = '\0';
+}
+
+void iwn_text_int(iwn_text_t *self, int64_t number) {
+    char digits[IWN_DIGITS_MAX];
+    const char *const end = digits + sizeof digits;
+    const char *const begin = iwn_digits(number, digits + sizeof digits);
+    iwn_text_span(self, begin, (size_t)(end - begin));
+}
+
+void iwn_text_hex(iwn_text_t *self, uint32_t number, unsigned digits) {
+    while (digits > 0U) {
+        digits--;
+        iwn_text_span(self, &"0123456789ABCDEF"[number >> 4U * digits & 15U], 1U);
+    }
+}
+
+void iwn_text_join(iwn_text_t *self, const char *const *texts) {
+    for (; *texts != NULL; texts++) {
+        iwn_text_span(self, *texts, strlen(*texts));
+    }
 }

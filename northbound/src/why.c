@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_northbound/why.h"
 
+#include "iwheel_northbound/text.h"
 #include "iwheel_northbound/words.h"
-
-#include <stdio.h>
-#include <string.h>
 
 static const char *wheels(uint8_t sides) {
     static const char *const names[] = {"a wheel", "left wheel", "right wheel", "both wheels"};
@@ -17,89 +15,119 @@ static const char *reboot_evidence(uint32_t detail) {
                                           : "its start-up offset frames came back";
 }
 
-static void lost_wheel(const iw_stop_t *stop, char *out, size_t size) {
-    if (stop->detail == UINT32_MAX) {
-        (void)snprintf(out, size, "%s never heard", wheels(stop->sides));
-    } else {
-        (void)snprintf(out, size, "%s not heard for %u ms", wheels(stop->sides), (unsigned)stop->detail);
-    }
+static void add_number(iwn_text_t *text, int64_t number, const char *unit) {
+    iwn_text_int(text, number);
+    IWN_TEXT_JOIN(text, unit);
 }
 
-static void software_estop(const char *client, const iwn_why_context_t *context, char *out, size_t size) {
-    const char *reason = context->reason == NULL ? "" : context->reason;
-    (void)snprintf(out, size, "software e-stop by %s%s%s%s", client, *reason == '\0' ? "" : " (\"", reason,
-                   *reason == '\0' ? "" : "\")");
+/// How many it takes.
+static unsigned hex_digits(uint32_t number) {
+    unsigned digits = 1;
+    while (number >= 16U) {
+        number >>= 4;
+        digits++;
+    }
+    return digits;
+}
+
+static void add_lost_wheel(const iw_stop_t *stop, iwn_text_t *text) {
+    if (stop->detail == UINT32_MAX) {
+        IWN_TEXT_JOIN(text, wheels(stop->sides), " never heard");
+    } else {
+        IWN_TEXT_JOIN(text, wheels(stop->sides), " not heard for ");
+        add_number(text, stop->detail, " ms");
+    }
 }
 
 /// Causes in the machine: bus and wheels.
-static void machine_clause(const iw_stop_t *stop, const iwn_why_context_t *context, char *out, size_t size) {
-    const unsigned detail = stop->detail;
+static void add_machine_clause(const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
+    const char *const sides = wheels(stop->sides);
     switch (stop->cause) {
     case IW_CAUSE_WHEEL_LOST:
-        lost_wheel(stop, out, size);
+        add_lost_wheel(stop, text);
         break;
     case IW_CAUSE_WHEEL_REBOOTED:
-        (void)snprintf(out, size, "%s rebooted (%s)", wheels(stop->sides), reboot_evidence(detail));
+        IWN_TEXT_JOIN(text, sides, " rebooted (", reboot_evidence(stop->detail), ")");
         break;
     case IW_CAUSE_SEND_STALLED:
-        (void)snprintf(out, size, "setpoint not acknowledged on the bus for %u ms", detail);
+        IWN_TEXT_JOIN(text, "setpoint not acknowledged on the bus for ");
+        add_number(text, stop->detail, " ms");
         break;
     case IW_CAUSE_BUS_DOWN:
-        (void)snprintf(out, size, "bus %s %s", context->bus, detail == IW_BUS_OFF ? "is bus-off" : "is down or gone");
+        IWN_TEXT_JOIN(text, "bus ", context->bus, (stop->detail == IW_BUS_OFF) ? " is bus-off" : " is down or gone");
         break;
     case IW_CAUSE_SECOND_MASTER:
-        (void)snprintf(out, size, "somebody else sent a setpoint, id %u (0x%X)", detail, detail);
+        IWN_TEXT_JOIN(text, "somebody else sent a setpoint, id ");
+        add_number(text, stop->detail, " (0x");
+        iwn_text_hex(text, stop->detail, hex_digits(stop->detail));
+        IWN_TEXT_JOIN(text, ")");
         break;
     case IW_CAUSE_FEEDBACK_SIGN:
-        (void)snprintf(out, size, "%s turns against its command at %u mm/s", wheels(stop->sides), detail);
+        IWN_TEXT_JOIN(text, sides, " turns against its command at ");
+        add_number(text, stop->detail, " mm/s");
         break;
     case IW_CAUSE_OVERSPEED:
-        (void)snprintf(out, size, "%s turns faster than told, at %u mm/s", wheels(stop->sides), detail);
+        IWN_TEXT_JOIN(text, sides, " turns faster than told, at ");
+        add_number(text, stop->detail, " mm/s");
         break;
     case IW_CAUSE_WHEEL_BLOCKED:
-        (void)snprintf(out, size, "%s blocked: only %u mm/s", wheels(stop->sides), detail);
+        IWN_TEXT_JOIN(text, sides, " blocked: only ");
+        add_number(text, stop->detail, " mm/s");
         break;
     default:
-        (void)snprintf(out, size, "%s", iwn_cause_name(stop->cause));
+        IWN_TEXT_JOIN(text, iwn_cause_name(stop->cause));
         break;
     }
 }
 
-/// Causes on our side: people, clients, ourselves; the rest by `machine_clause`.
-static void clause(const iw_stop_t *stop, const iwn_why_context_t *context, char *out, size_t size) {
-    const char *client = context->client == NULL ? "a client" : context->client;
-    const unsigned detail = stop->detail;
+/// Causes that a person or a client is behind; the rest by `add_machine_clause`.
+static void add_client_clause(const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
+    const char *const client = (context->client != NULL) ? context->client : "a client";
+    const char *const reason = (context->reason != NULL) ? context->reason : "";
+    switch (stop->cause) {
+    case IW_CAUSE_ESTOP_SOFTWARE:
+        IWN_TEXT_JOIN(text, "software e-stop by ", client, (*reason != '\0') ? " (\"" : "", reason,
+                      (*reason != '\0') ? "\")" : "");
+        break;
+    case IW_CAUSE_LEASE_LOST:
+        IWN_TEXT_JOIN(text, client, " sent no drive command for ");
+        add_number(text, stop->detail, " ms");
+        break;
+    case IW_CAUSE_CLIENT_GONE:
+        IWN_TEXT_JOIN(text, client, " disconnected");
+        break;
+    case IW_CAUSE_CLIENT_STOP:
+        IWN_TEXT_JOIN(text, client, " said stop");
+        break;
+    default:
+        add_machine_clause(stop, context, text);
+        break;
+    }
+}
+
+/// Causes on our side; the rest by `add_client_clause`.
+static void add_clause(const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
     switch (stop->cause) {
     case IW_CAUSE_ESTOP_LINE:
-        (void)snprintf(out, size, "e-stop %s %s", context->estop, detail == 2U ? "unreadable or gone" : "pressed");
-        break;
-    case IW_CAUSE_ESTOP_SOFTWARE:
-        software_estop(client, context, out, size);
+        IWN_TEXT_JOIN(text, "e-stop ", context->estop, (stop->detail == 2U) ? " unreadable or gone" : " pressed");
         break;
     case IW_CAUSE_LOOP_HUNG:
     case IW_CAUSE_LOOP_LATE:
-        (void)snprintf(out, size, "the gateway itself was held up for %u ms", detail);
+        IWN_TEXT_JOIN(text, "the gateway itself was held up for ");
+        add_number(text, stop->detail, " ms");
         break;
     case IW_CAUSE_INTERNAL:
-        (void)snprintf(out, size, "an internal check failed (%u)", detail);
-        break;
-    case IW_CAUSE_LEASE_LOST:
-        (void)snprintf(out, size, "%s sent no drive command for %u ms", client, detail);
-        break;
-    case IW_CAUSE_CLIENT_GONE:
-        (void)snprintf(out, size, "%s disconnected", client);
-        break;
-    case IW_CAUSE_CLIENT_STOP:
-        (void)snprintf(out, size, "%s said stop", client);
+        IWN_TEXT_JOIN(text, "an internal check failed (");
+        add_number(text, stop->detail, ")");
         break;
     case IW_CAUSE_SHUTDOWN:
-        (void)snprintf(out, size, "the gateway was told to end");
+        IWN_TEXT_JOIN(text, "the gateway was told to end");
         break;
     case IW_CAUSE_RESTART:
-        (void)snprintf(out, size, "the gateway before this one died while the wheels were armed");
+        IWN_TEXT_JOIN(text, "the gateway before this one died while the wheels were armed");
         break;
     default:
-        machine_clause(stop, context, out, size);
+        add_client_clause(stop, context, text);
         break;
     }
 }
@@ -114,24 +142,36 @@ static const char *manner(const iw_stop_t *stop) {
     return stop->cause == IW_CAUSE_LOOP_LATE || stop->cause == IW_CAUSE_RESTART ? "zero at once" : "ramped to zero";
 }
 
+/// What was going on.
+static void add_doing(const iw_stop_t *stop, iwn_text_t *text) {
+    if (stop->from == IW_STATE_ARMED || stop->from == IW_STATE_STOPPING) {
+        IWN_TEXT_JOIN(text, (stop->from == IW_STATE_ARMED) ? " while driving " : " while stopping from ");
+        add_number(text, stop->applied.wheel[IW_LEFT].speed_mm_s, "/");
+        add_number(text, stop->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s");
+    } else if (stop->cause != IW_CAUSE_RESTART) { // Then nobody here knows.
+        IWN_TEXT_JOIN(text, " while ", iwn_state_name(stop->from));
+    }
+}
+
+/// In seconds, with three decimals.
+static void add_time(iw_time_us_t at_us, iwn_text_t *text) {
+    const iw_time_us_t ms = at_us / IW_US_PER_MS;
+    const unsigned decimals = (unsigned)(ms % 1000U);
+    add_number(text, (int64_t)(ms / 1000U), (decimals < 10U) ? ".00" : (decimals < 100U) ? ".0" : ".");
+    add_number(text, decimals, " s");
+}
+
 void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, char *out_sentence, size_t size) {
-    char what[384];
-    char doing[64];
+    iwn_text_t text = iwn_text_begin(out_sentence, size);
     if (stop->number == 0U) {
-        (void)snprintf(out_sentence, size, "no stop since the gateway started");
+        IWN_TEXT_JOIN(&text, "no stop since the gateway started");
         return;
     }
-    clause(stop, context, what, sizeof what);
-    const bool ours = stop->cause != IW_CAUSE_RESTART; // Else nobody here knows what was going on.
-    (void)snprintf(doing, sizeof doing, "%s%s", ours ? " while " : "", ours ? iwn_state_name(stop->from) : "");
-    if (stop->from == IW_STATE_ARMED || stop->from == IW_STATE_STOPPING) {
-        (void)snprintf(doing, sizeof doing, " while %s %d/%d mm/s",
-                       stop->from == IW_STATE_ARMED ? "driving" : "stopping from",
-                       stop->applied.wheel[IW_LEFT].speed_mm_s, stop->applied.wheel[IW_RIGHT].speed_mm_s);
-    }
-    const unsigned long long ms = (unsigned long long)(stop->at_us / IW_US_PER_MS);
-    (void)snprintf(out_sentence, size, "%s%s; %s at %llu.%03llu s; %s", what, doing, manner(stop), ms / 1000U,
-                   ms % 1000U, iwn_why_cure(stop->cause));
+    add_clause(stop, context, &text);
+    add_doing(stop, &text);
+    IWN_TEXT_JOIN(&text, "; ", manner(stop), " at ");
+    add_time(stop->at_us, &text);
+    IWN_TEXT_JOIN(&text, "; ", iwn_why_cure(stop->cause));
 }
 
 const char *iwn_why_cure(iw_cause_t cause) {

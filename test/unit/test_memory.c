@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // What is kept from one run to the next: the text, everything that is wrong with a text.
-#include "json/json_arena.h"
 #include "ledger/memory.h"
 
 #include "iwheel_northbound/words.h"
@@ -69,7 +68,6 @@ static void fill(void) {
 }
 
 void setUp(void) {
-    json_arena_install();
     fill();
     memset(&got, 0xA5, sizeof got);
     length = gw_memory_write(&known, BUS, text, sizeof text);

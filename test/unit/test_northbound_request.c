@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // One line of a client: what is a request, and what is refused as a whole, with which name.
-#include "json/json_arena.h"
 
 #include "iwheel_northbound/request.h"
 
@@ -9,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
+static iwn_work_t work;
 static iwn_request_t request;
 static iwn_refusal_t refusal;
 
@@ -20,7 +20,7 @@ void setUp(void) {
 void tearDown(void) {}
 
 static bool parse(const char *line) {
-    return iwn_request_parse(line, strlen(line), &request, &refusal);
+    return iwn_request_read(line, strlen(line), &work, &request, &refusal);
 }
 
 static void accepted(const char *line, iwn_cmd_t cmd) {
@@ -161,10 +161,10 @@ static void test_request_not_one_object_is_bad_json(void) {
 
 static void test_request_nul_byte_anywhere_is_bad_json(void) {
     static const char line[] = "{\"cmd\":\"stop\"}\0";
-    TEST_ASSERT_FALSE(iwn_request_parse(line, sizeof line - 1U, &request, &refusal));
+    TEST_ASSERT_FALSE(iwn_request_read(line, sizeof line - 1U, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
     static const char inside[] = "{\"cmd\":\"st\0op\"}";
-    TEST_ASSERT_FALSE(iwn_request_parse(inside, sizeof inside - 1U, &request, &refusal));
+    TEST_ASSERT_FALSE(iwn_request_read(inside, sizeof inside - 1U, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
 }
 
@@ -172,7 +172,7 @@ static void test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_te
     char line[IWN_LINE_MAX];
     size_t length = (size_t)snprintf(line, sizeof line, "{\"cmd\":\"arm\",\"name\":");
     memset(&line[length], '[', 3000);
-    TEST_ASSERT_FALSE(iwn_request_parse(line, length + 3000U, &request, &refusal));
+    TEST_ASSERT_FALSE(iwn_request_read(line, length + 3000U, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_INT(IWN_BAD_JSON, refusal.error);
     TEST_ASSERT_NOT_NULL(strstr(refusal.message, "nested"));
     refused(IWN_BAD_VALUE, "{\"cmd\":\"arm\",\"name\":[[[[[[[]]]]]]]}");
@@ -184,12 +184,12 @@ static void test_request_line_of_4096_bytes_is_taken_and_one_more_is_not(void) {
     char line[IWN_LINE_MAX + 1U];
     memset(line, ' ', sizeof line);
     memcpy(line, "{\"cmd\":\"why\"}", 13);
-    TEST_ASSERT_TRUE(iwn_request_parse(line, IWN_LINE_MAX, &request, &refusal));
-    TEST_ASSERT_FALSE(iwn_request_parse(line, IWN_LINE_MAX + 1U, &request, &refusal));
+    TEST_ASSERT_TRUE(iwn_request_read(line, IWN_LINE_MAX, &work, &request, &refusal));
+    TEST_ASSERT_FALSE(iwn_request_read(line, IWN_LINE_MAX + 1U, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_INT(IWN_LINE_TOO_LONG, refusal.error);
 }
 
-static void test_request_every_worst_line_fits_the_arena(void) {
+static void test_request_worst_lines_are_read_to_their_end(void) {
     static const char *const units[] = {"{},", "[],", "\"\",", "1,", "1.5,", "{\"a\":1},", "[1],", "\"\\u20ac\","};
     char line[IWN_LINE_MAX];
     for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {
@@ -199,7 +199,7 @@ static void test_request_every_worst_line_fits_the_arena(void) {
             length += strlen(units[i]);
         }
         length += (size_t)snprintf(&line[length], sizeof line - length, "1]}");
-        TEST_ASSERT_FALSE(iwn_request_parse(line, length, &request, &refusal));
+        TEST_ASSERT_FALSE(iwn_request_read(line, length, &work, &request, &refusal));
         TEST_ASSERT_EQUAL_STRING_MESSAGE("bad_value", iwn_error_name(refusal.error), units[i]);
     }
     char keys[IWN_LINE_MAX];
@@ -208,9 +208,8 @@ static void test_request_every_worst_line_fits_the_arena(void) {
         length += (size_t)snprintf(&keys[length], sizeof keys - length, ",\"%x\":{}", key);
     }
     length += (size_t)snprintf(&keys[length], sizeof keys - length, "}");
-    TEST_ASSERT_FALSE(iwn_request_parse(keys, length, &request, &refusal));
+    TEST_ASSERT_FALSE(iwn_request_read(keys, length, &work, &request, &refusal));
     TEST_ASSERT_EQUAL_STRING("unknown_field", iwn_error_name(refusal.error));
-    TEST_ASSERT_LESS_THAN_UINT(JSON_ARENA_SIZE, json_arena_peak());
 }
 
 static void test_request_integer_of_another_type_is_a_bad_value(void) {
@@ -316,7 +315,7 @@ static void test_request_texts_with_what_moves_a_terminal_are_refused_in_every_f
         }
         for (size_t i = 0; i < sizeof plain / sizeof plain[0]; i++) {
             (void)snprintf(line, sizeof line, forms[form], plain[i]);
-            TEST_ASSERT_TRUE_MESSAGE(iwn_request_parse(line, strlen(line), &request, &refusal), line);
+            TEST_ASSERT_TRUE_MESSAGE(iwn_request_read(line, strlen(line), &work, &request, &refusal), line);
         }
     }
 }
@@ -333,7 +332,6 @@ static void test_request_tare_takes_a_side_or_both(void) {
 }
 
 int main(void) {
-    json_arena_install();
     UNITY_BEGIN();
     RUN_TEST(test_request_each_command_with_its_fields_is_accepted);
     RUN_TEST(test_request_drive_takes_numbers_as_sent);
@@ -344,7 +342,7 @@ int main(void) {
     RUN_TEST(test_request_nul_byte_anywhere_is_bad_json);
     RUN_TEST(test_request_nesting_beyond_the_limit_is_bad_json_and_brackets_in_texts_do_not_nest);
     RUN_TEST(test_request_line_of_4096_bytes_is_taken_and_one_more_is_not);
-    RUN_TEST(test_request_every_worst_line_fits_the_arena);
+    RUN_TEST(test_request_worst_lines_are_read_to_their_end);
     RUN_TEST(test_request_integer_of_another_type_is_a_bad_value);
     RUN_TEST(test_request_missing_field_is_named);
     RUN_TEST(test_request_field_of_another_command_is_unknown);

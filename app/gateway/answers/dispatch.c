@@ -368,7 +368,7 @@ void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line
     };
     iwn_request_t request;
     iwn_refusal_t refusal;
-    if (!iwn_request_parse(line, length, &request, &refusal)) {
+    if (!iwn_request_read(line, length, &daemon->work, &request, &refusal)) {
         send_refusal(daemon, client, &request.id, &refusal);
         return;
     }

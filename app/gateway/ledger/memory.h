@@ -45,7 +45,7 @@ typedef struct {
 size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text, size_t size);
 
 /// Reads a text. False, with the reason in words and `*out_known` untouched, unless it was written by gw_memory_write
-/// for this bus. Uses the arena of json_arena.h, which it resets.
+/// for this bus.
 bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t *out_known,
                     char out_reason[GW_MEMORY_REASON_SIZE]);
 

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: MIT
 /// One line of a client, read and judged: a request that is right in form, or a refusal.
 ///
-/// A pure function of the bytes, so that it can be tested and fuzzed alone. What depends on the state of the wheels
-/// is judged later, by the core.
+/// A pure function of the bytes, so that it can be tested and fuzzed alone: no heap, no stdio. What depends on the state of the
+/// wheels is judged later, by the core. Which fields a request has is told by share/northbound.json.
 #ifndef IWHEEL_NORTHBOUND_REQUEST_H
 #define IWHEEL_NORTHBOUND_REQUEST_H
 
-#include "assumption.h"
-
+#include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/words.h"
 
 /// Bytes of a request without its newline.
-#define IWN_LINE_MAX 4096U
-/// Deepest nesting that is parsed at all; requests need 2.
-#define IWN_DEPTH_MAX       8U
+#define IWN_LINE_MAX        4096U
 #define IWN_ID_TEXT_MAX     64U
 #define IWN_NAME_MAX        64U
 #define IWN_REASON_MAX      200U
@@ -75,7 +72,9 @@ typedef struct {
 } iwn_refusal_t;
 
 /// Reads `length` bytes (no newline among them). True: `*out_request` is complete. False: `*out_refusal` tells why, and
-/// `out_request->id` holds the id as far as it could be read. Uses the arena of json_arena.h, which it resets.
-bool iwn_request_parse(const char *line, size_t length, iwn_request_t *out_request, iwn_refusal_t *out_refusal);
+/// `out_request->id` holds the id as far as it could be read. What is wrong with the whole line comes first, then the id, then
+/// the command, then its fields in their order, then what is missing.
+bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
+                      iwn_refusal_t *out_refusal);
 
 #endif

@@ -8,7 +8,7 @@
 
 #define IWN_SENTENCE_SIZE 640U
 
-/// What is known of the stop besides what the core knows. Texts may be NULL.
+/// What is known of the stop besides what the core knows. `client` and `reason` may be NULL.
 typedef struct {
     const char *client; ///< As gw_client_describe writes it.
     const char *reason; ///< The client's words with a software e-stop.
