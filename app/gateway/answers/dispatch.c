@@ -238,7 +238,12 @@ static void do_twist(const call_t *call) {
     drive(call, &wanted);
 }
 
+static gw_stopper_t stopper_of(const call_t *call) {
+    return (gw_stopper_t){.at_us = call->daemon->now_us, .pid = call->client->pid, .uid = call->client->uid};
+}
+
 static void do_stop(const call_t *call) {
+    call->daemon->stopped_by = stopper_of(call);
     iw_gateway_stop(&call->daemon->gateway, call->daemon->now_us, call->client->id, IW_CAUSE_CLIENT_STOP);
     note(call, &(blackbox_entry_t){.kind = BLACKBOX_STOP, .a = IW_CAUSE_CLIENT_STOP});
     call->daemon->requested = true;
@@ -247,6 +252,12 @@ static void do_stop(const call_t *call) {
 
 static void do_estop(const call_t *call) {
     gw_daemon_t *daemon = call->daemon;
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
+    daemon->estopped_by = stopper_of(call);
+    if (seen.state == IW_STATE_LATCHED && daemon->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US) {
+        reply_state(call); // In force already: a flood of it costs neither a step nor what the black box holds.
+        return;
+    }
     if (iw_gateway_state(&daemon->gateway) != IW_STATE_LATCHED) {
         memcpy(daemon->estop_reason, call->request->reason, sizeof daemon->estop_reason);
     }
@@ -369,6 +380,10 @@ void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line
     iwn_request_t request;
     iwn_refusal_t refusal;
     if (!iwn_request_read(line, length, &daemon->work, &request, &refusal)) {
+        send_refusal(daemon, client, &request.id, &refusal);
+        return;
+    }
+    if (gw_refuse_by_right(daemon, client->right, request.cmd, &refusal)) {
         send_refusal(daemon, client, &request.id, &refusal);
         return;
     }

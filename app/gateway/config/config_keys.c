@@ -98,6 +98,17 @@ const config_key_t config_keys[] = {
     {"northbound", "group", "", "Group of the socket; none: the gateway's own.", .kind = CONFIG_GROUP,
      FIELD(northbound.group)},
     {"northbound", "max_clients", " clients", "Connections at the same time.", NUMBER(northbound.max_clients, 1, 64)},
+    {"northbound", "watch_socket", "",
+     "Where clients connect that may look, stop and e-stop, but never drive; none: there is no such socket. Tools find "
+     "it\n"
+     "as watch/NAME.sock in the directory of socket NAME.sock.",
+     .kind = CONFIG_PATH, FIELD(northbound.watch_socket)},
+    {"northbound", "watch_mode", "", "Permissions of that socket, octal: who may connect may stop the wheels.",
+     .kind = CONFIG_MODE, FIELD(northbound.watch_mode)},
+    {"northbound", "watch_group", "", "Group of that socket; none: the gateway's own.", .kind = CONFIG_GROUP,
+     FIELD(northbound.watch_group)},
+    {"northbound", "max_watchers", " clients", "Connections to it at the same time; they take none of max_clients.",
+     NUMBER(northbound.max_watchers, 1, 64)},
 
     {"record", "blackbox_s", " s", "Ring in memory, written on every latched stop; 0: none.",
      NUMBER(record.blackbox_s, 0, 600)},

@@ -41,7 +41,7 @@ typedef struct {
 } config_key_t;
 
 /// Upper bound of the number of rows, for arrays with one element per row.
-#define CONFIG_KEYS_MAX 48U
+#define CONFIG_KEYS_MAX 52U
 
 /// The rows and their number.
 extern const config_key_t config_keys[];

@@ -29,7 +29,7 @@ void gateway_config_default(gateway_config_t *out_config) {
         .bus = {"can0", 1000000U, 625U, GATEWAY_MISMATCH_REFUSE},
         .track_mm = 540U,
         .estop = {"ESTOP", true, 5U},
-        .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U},
+        .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U},
         .record = {30U, "/var/lib/iwheel"},
     };
     *out_config = standard;

@@ -186,7 +186,8 @@ static const char *wrong_text(const config_key_t *row, const char *text) {
     if (reason != NULL) {
         return reason;
     }
-    if (row->kind == CONFIG_PATH && text[length - 1U] == '/' && length > 1U && strcmp(row->key, "socket") == 0) {
+    if (row->kind == CONFIG_PATH && text[length - 1U] == '/' && length > 1U &&
+        strcmp(row->section, "northbound") == 0) {
         return "is a directory, not a socket";
     }
     if (row->kind == CONFIG_GROUP) {
