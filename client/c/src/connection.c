@@ -79,25 +79,70 @@ static bool is_socket(const char *path) {
            stat(path, &status) == 0 && S_ISSOCK(status.st_mode);
 }
 
-static iwc_result_t find_in(const char *directory, char *out, size_t size) {
+/// What is found in a directory.
+typedef struct {
+    char *out;
+    size_t size;
+    size_t used;
+    unsigned count;
+} found_t;
+
+static void note_found(found_t *self, const char *path) {
+    const int n = snprintf(self->out + self->used, self->size - self->used, "%s%s", (self->used > 0) ? " " : "", path);
+    self->count++;
+    self->used += (n > 0 && (size_t)n < self->size - self->used) ? (size_t)n : 0U;
+    self->out[self->used] = '\0';
+}
+
+static bool may_use(const char *path) {
+    return faccessat(AT_FDCWD, path, W_OK, AT_EACCESS) == 0;
+}
+
+/// Of a gateway's two sockets the one to drive by, unless only the other is there or may be used.
+static void note_gateway(found_t *self, const char *directory, const char *name) {
+    char drive[PATH_MAX];
+    char watch[PATH_MAX];
+    const int length = snprintf(drive, sizeof drive, "%s/%s", directory, name);
+    const int watch_length = snprintf(watch, sizeof watch, "%s/" IWC_WATCH_DIRECTORY "/%s", directory, name);
+    if (length < 0 || (size_t)length >= sizeof drive || watch_length < 0 || (size_t)watch_length >= sizeof watch) {
+        return;
+    }
+    const bool has_drive = is_socket(drive);
+    const bool has_watch = is_socket(watch);
+    if (has_watch && (!has_drive || (!may_use(drive) && may_use(watch)))) {
+        note_found(self, watch);
+    } else if (has_drive) {
+        note_found(self, drive);
+    }
+}
+
+/// The gateways that have a socket in `directory`, or, with `alone`, one in its folder for watching only.
+static int find_gateways(found_t *self, const char *directory, bool alone) {
     char path[PATH_MAX];
-    unsigned found = 0;
-    size_t used = 0;
-    DIR *folder = opendir(directory);
+    (void)snprintf(path, sizeof path, "%s%s", directory, alone ? "/" IWC_WATCH_DIRECTORY : "");
+    DIR *folder = opendir(path);
     if (folder == NULL) {
-        return (errno == EACCES) ? IWC_DENIED : IWC_NOT_THERE;
+        return errno;
     }
     for (const struct dirent *entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
         const int length = snprintf(path, sizeof path, "%s/%s", directory, entry->d_name);
-        if (length > 0 && (size_t)length < sizeof path && is_socket(path)) {
-            found++;
-            const int n = snprintf(out + used, size - used, "%s%s", (used > 0) ? " " : "", path);
-            used += (n > 0 && (size_t)n < size - used) ? (size_t)n : 0U;
-            out[used] = '\0';
+        const bool counted = alone && length > 0 && (size_t)length < sizeof path && is_socket(path);
+        if (!counted) {
+            note_gateway(self, directory, entry->d_name);
         }
     }
     (void)closedir(folder);
-    return (found == 0) ? IWC_NOT_THERE : (found == 1) ? IWC_OK : IWC_SEVERAL;
+    return 0;
+}
+
+static iwc_result_t find_in(const char *directory, char *out, size_t size) {
+    found_t found = {.out = out, .size = size};
+    const int error = find_gateways(&found, directory, false);
+    (void)find_gateways(&found, directory, true);
+    if (found.count > 0) {
+        return (found.count == 1) ? IWC_OK : IWC_SEVERAL;
+    }
+    return (error == EACCES) ? IWC_DENIED : IWC_NOT_THERE;
 }
 
 iwc_result_t iwc_find(const char *directory, char *out, size_t size) {
@@ -230,6 +275,7 @@ static iwc_result_t greet(iwc_t *self, int64_t deadline_us) {
         return result;
     }
     self->number = iwc_integer(&hello, "client").value;
+    self->watches = iwc_is(&hello, "rights", "watch");
     self->newer = iwc_integer(&hello, "api").value > IWC_PROTOCOL;
     return self->newer ? IWC_NEWER : IWC_OK;
 }
@@ -326,6 +372,10 @@ bool iwc_pending(const iwc_t *self) {
         at = (size_t)((const char *)memchr(self->in + at, '\n', self->whole - at) - self->in) + 1U;
     }
     return false;
+}
+
+bool iwc_watches_only(const iwc_t *self) {
+    return self->fd >= 0 && self->watches;
 }
 
 const char *iwc_path(const iwc_t *self) {
