@@ -3,8 +3,6 @@
 /// word about side, kind or remote frames. What a codec costs beyond this is the price of being one.
 #include "codec.h"
 
-#include "iwheel/types.h"
-
 typedef struct {
     int16_t first;
     int16_t second;
