@@ -67,11 +67,6 @@ PARTS = [
     Bug("watcher-may-not-stop", "R2", REFUSE, "[IWN_CMD_STOP] = true,", "[IWN_CMD_STOP] = false,", WATCHERS),
     Bug("watcher-may-not-estop", "R2", REFUSE, "[IWN_CMD_ESTOP] = true,", "[IWN_CMD_ESTOP] = false,", WATCHERS),
     Bug("denied-without-words", "northbound", REFUSE, "say_right(daemon, out_refusal); return true;", "out_refusal->error = IWN_DENIED; out_refusal->message[0] = 0; return true;", WATCHERS),
-    Bug("watchers-take-drivers-slots", "R11", SERVICE, "(right == GW_WATCH) ? daemon->watchers : daemon->clients - daemon->watchers", "(void)right, daemon->clients", WATCHERS),
-    Bug("watchers-without-a-pace", "R11", SERVICE, "client->right == GW_DRIVE || client->hung_up || daemon->now_us >= client->line_us", "true", WATCHERS),
-    Bug("watchers-drive-by-their-slot", "R1", SERVICE, "(slot < GW_DRIVERS_MAX) ? GW_DRIVE : GW_WATCH", "GW_DRIVE", WATCHERS),
-    Bug("estop-again-is-no-estop", "R2", DISPATCH, "seen.state == IW_STATE_LATCHED && daemon->now_us", "daemon->now_us", WATCHERS),
-    Bug("who-keeps-stopping-is-not-known", "northbound", DISPATCH, "daemon->estopped_by = stopper_of(call);", "", WATCHERS),
     Bug("holder-served-in-turn", "R11", SERVICE, "if (holder != NULL) { (void)service(daemon, holder); }", "holder = NULL;", ("unit_service_rounds",)),
     Bug("burst-of-telemetry-after-a-stall", "R11", "app/gateway/status/observe.c", "if (client->next_us <= daemon->now_us) {", "if (false) {", REQUESTS),
     # The northbound library.
