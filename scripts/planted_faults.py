@@ -147,6 +147,21 @@ def style(folder, code):
     return run(sys.executable, SCRIPTS / "style_metrics.py", folder)
 
 
+def house(folder, fault):
+    """The tree with one change: file, what stands there, what stands there then. Of the programs only the one changed is compiled anew."""
+    file, old, new = fault
+    for part in ("core", "northbound", "client", "port", "app", "scripts"):
+        if (ROOT / part).is_dir():
+            shutil.copytree(ROOT / part, folder / part)
+    text = (folder / file).read_text()
+    assert old in text, f"{file} no longer has {old}"
+    (folder / file).write_text(text.replace(old, new, 1))
+    flags = [f"-I{folder / part}" for part in ("core/include", "port/stm32_stub", "port/stm32_stub/access", "port/stm32_stub/boards/stm32f103")]
+    lamp = str(folder / "port/stm32_stub/lamp.c")
+    (folder / "compile_commands.json").write_text(json.dumps([{"file": lamp, "directory": str(folder), "command": f"gcc -std=c99 {' '.join(flags)} -o a.o -c {lamp}"}]))
+    return run(sys.executable, folder / "scripts/house.py", folder)
+
+
 def sizes(_, new):
     spec = importlib.util.spec_from_file_location("size_table", SCRIPTS / "size_table.py")
     module = importlib.util.module_from_spec(spec)
@@ -254,6 +269,10 @@ CASES = [
     (style, "lizard", "401 lines", CLEAN + "\n" * 395, True),
     (style, "lizard", "no licence line", CLEAN.split("\n", 1)[1], True),
     (style, "lizard", "unfinished", CLEAN + "// " + "TO" + "DO\n", True),
+    (house, "gcc", "clean", ("port/stm32_stub/lamp.c", "#include", "#include"), False),
+    (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\nint iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}'), True),
+    (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),
+    (house, "gcc", "a header includes one level more", ("core/src/magnitude.h", "#include <stdint.h>", '#include "iwheel/gateway.h"'), True),
     (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
     (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),

@@ -132,7 +132,7 @@ static void step(gw_daemon_t *daemon) {
     gw_tape_step_end(&daemon->tape);
     daemon->requested = false;
     const iw_snapshot_t seen = gw_daemon_look(daemon);
-    gw_gaps_note(&daemon->gaps, &seen.sent);
+    gw_gaps_note(&daemon->gaps, seen.sent);
     mark_if_sending(daemon);
     iw_motion_evidence_look(&daemon->evidence, &daemon->gateway, &seen);
     gw_observe(daemon);

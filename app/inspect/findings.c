@@ -42,15 +42,6 @@ const char *inspect_verdict_word(inspect_verdict_t verdict) {
     return words[verdict];
 }
 
-bool inspect_has_failed(const inspect_findings_t *self, const char *check) {
-    for (unsigned i = 0; i < self->count; ++i) {
-        if (self->finding[i].verdict == INSPECT_FAIL && strcmp(self->finding[i].check, check) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
 void inspect_sentence(const inspect_finding_t *finding, char *out_text, size_t size) {
     (void)snprintf(out_text, size, "%s%s%s", finding->text, finding->cure[0] != '\0' ? "; " : "", finding->cure);
 }

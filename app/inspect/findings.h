@@ -44,9 +44,6 @@ __attribute__((format(printf, 2, 3))) void inspect_cure(inspect_findings_t *self
 /// "ok", "warn", "fail" or "skip".
 const char *inspect_verdict_word(inspect_verdict_t verdict);
 
-/// True if a finding of that check failed.
-bool inspect_has_failed(const inspect_findings_t *self, const char *check);
-
 /// "text; cure" in one line.
 void inspect_sentence(const inspect_finding_t *finding, char *out_text, size_t size);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/evidence.h"
 
+#include "iwheel/gateway.h"
 #include "magnitude.h"
 
 #include <string.h>

@@ -3,15 +3,17 @@
 
 #include "magnitude.h"
 
+#include <string.h>
+
+IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, all_bits_are_set);
+
 void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
     self->config = config;
     iw_follow_restart(self);
 }
 
 void iw_follow_restart(iw_follow_t *self) {
-    for (size_t i = 0; i < IW_FOLLOW_VERDICTS; i++) {
-        self->since_us[i] = IW_NEVER;
-    }
+    memset(self->since_us, 0xFF, sizeof self->since_us); // IW_NEVER
 }
 
 /// Keeps the start of a condition; true once it has held without a break for `for_us`.

@@ -69,7 +69,7 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts) {
 
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     // A latch is told first: it must be left first.
-    if (iw_permit_state(&self->permit) != IW_STATE_LATCHED && iw_ledger_doubt(&self->ledger) != IW_LEDGER_ITEMS) {
+    if (iw_permit_state(&self->permit) != IW_STATE_LATCHED && self->ledger.doubt != IW_LEDGER_ITEMS) {
         return IW_REFUSE_CONTRADICTED;
     }
     const iw_refusal_t refusal = iw_permit_arm(&self->permit, now_us, client, takeover);
@@ -165,13 +165,9 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
     iw_permit_disconnect(&self->permit, now_us, client);
 }
 
-static uint32_t side_bit(size_t side) {
-    return (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT;
-}
-
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side) {
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const bool wanted = (sides & side_bit(side)) != 0U;
+        const bool wanted = (sides & (1U << side)) != 0U;
         const iw_tare_t result = wanted ? iw_force_may_tare(&self->force[side], now_us) : IW_TARE_OK;
         if (result != IW_TARE_OK) {
             *out_side = (iw_side_t)side;
@@ -179,7 +175,7 @@ iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides
         }
     }
     for (size_t side = 0; side < IW_SIDES; side++) {
-        if ((sides & side_bit(side)) != 0U) {
+        if ((sides & (1U << side)) != 0U) {
             (void)iw_force_tare(&self->force[side], now_us);
         }
     }

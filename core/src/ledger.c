@@ -12,9 +12,34 @@ static const iw_ledger_item_t documented[] = {
 
 void iw_ledger_init(iw_ledger_t *self) {
     memset(self, 0, sizeof *self);
+    self->doubt = IW_LEDGER_ITEMS;
     for (size_t i = 0; i < sizeof documented / sizeof documented[0]; i++) {
         self->entry[documented[i]].evidence = IW_EVIDENCE_DOCUMENT;
     }
+}
+
+bool iw_ledger_guards_motion(iw_ledger_item_t item) {
+    switch (item) {
+    case IW_LEDGER_SETPOINT_TYPE:
+    case IW_LEDGER_CURRENT_ROLE:
+    case IW_LEDGER_FEEDBACK_SIGN_LEFT:
+    case IW_LEDGER_FEEDBACK_SIGN_RIGHT:
+    case IW_LEDGER_MOUNT_SIGN_LEFT:
+    case IW_LEDGER_MOUNT_SIGN_RIGHT:
+        return true;
+    default:
+        return false;
+    }
+}
+
+/// The first contradicted item that guards motion.
+static iw_ledger_item_t find_doubt(const iw_ledger_t *self) {
+    uint32_t item = 0;
+    while (item < IW_LEDGER_ITEMS &&
+           (self->entry[item].state != IW_LEDGER_CONTRADICTED || !iw_ledger_guards_motion((iw_ledger_item_t)item))) {
+        item++;
+    }
+    return (iw_ledger_item_t)item;
 }
 
 static void change(iw_ledger_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *next) {
@@ -22,6 +47,7 @@ static void change(iw_ledger_t *self, iw_ledger_item_t item, const iw_ledger_ent
     if (entry->state != next->state || entry->evidence != next->evidence || entry->figure != next->figure) {
         *entry = *next;
         self->changes++;
+        self->doubt = find_doubt(self);
     }
 }
 
@@ -48,29 +74,6 @@ void iw_ledger_contradict(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_
 
 iw_ledger_item_t iw_ledger_force_unit(iw_side_t side) {
     return (side == IW_LEFT) ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
-}
-
-bool iw_ledger_guards_motion(iw_ledger_item_t item) {
-    switch (item) {
-    case IW_LEDGER_SETPOINT_TYPE:
-    case IW_LEDGER_CURRENT_ROLE:
-    case IW_LEDGER_FEEDBACK_SIGN_LEFT:
-    case IW_LEDGER_FEEDBACK_SIGN_RIGHT:
-    case IW_LEDGER_MOUNT_SIGN_LEFT:
-    case IW_LEDGER_MOUNT_SIGN_RIGHT:
-        return true;
-    default:
-        return false;
-    }
-}
-
-iw_ledger_item_t iw_ledger_doubt(const iw_ledger_t *self) {
-    uint32_t item = 0;
-    while (item < IW_LEDGER_ITEMS &&
-           (self->entry[item].state != IW_LEDGER_CONTRADICTED || !iw_ledger_guards_motion((iw_ledger_item_t)item))) {
-        item++;
-    }
-    return (iw_ledger_item_t)item;
 }
 
 const iw_ledger_entry_t *iw_ledger_entry(const iw_ledger_t *self, iw_ledger_item_t item) {

@@ -24,6 +24,8 @@ static const phase_row_t phases[IW_PHASES] = {
     [IW_PHASE_LATCHED] = {IW_STATE_LATCHED, IW_DEMAND_SILENCE, IW_DEMAND_SILENCE},
 };
 
+IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, all_bits_are_set);
+
 /// So many setpoints can be un-echoed when a process dies: two of each wheel (see transmit.h).
 #define LEFT_BEHIND_MAX 4U
 
@@ -41,17 +43,11 @@ iw_demand_t iw_permit_demand(const iw_permit_t *self) {
     return (iw_demand_t)(self->at_once ? row->at_once : row->demand);
 }
 
-bool iw_permit_arming(const iw_permit_t *self) {
-    return self->phase == IW_PHASE_ARMING || self->phase == IW_PHASE_REARMING;
-}
-
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted) {
     memset(self, 0, sizeof *self);
     self->config = config;
     self->stale_us = IW_NEVER;
-    for (size_t cause = 0; cause < IW_CAUSES; cause++) {
-        self->seen_us[cause] = IW_NEVER;
-    }
+    memset(self->seen_us, 0xFF, sizeof self->seen_us); // IW_NEVER
     if (restarted && may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
@@ -151,6 +147,7 @@ static void count_stranger(iw_permit_t *self) {
 void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;
+    self->quiet = false;
     if (iw_permit_state(self) == IW_STATE_LATCHED) {
         return;
     }
@@ -227,6 +224,7 @@ void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view
     self->view = *view;
     self->present = self->raised;
     self->raised = 0;
+    self->quiet = self->quiet || iw_permit_present(self, now_us) == 0U;
     if (iw_permit_arming(self)) {
         step_arming(self, now_us);
     }

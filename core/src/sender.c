@@ -32,7 +32,7 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
     if (invert && config->current_role == IW_ROLE_SETPOINT) {
         setpoint.current_mA = (int16_t)-setpoint.current_mA;
     }
-    self->clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, frame) ? 1U : 0U;
+    self->sent.clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, frame) ? 1U : 0U;
     const iw_envelope_verdict_t verdict = iw_envelope_check(&self->envelope, now_us, frame);
     self->verdict = (verdict == IW_ENVELOPE_PASS) ? self->verdict : verdict;
     return verdict == IW_ENVELOPE_PASS;
@@ -41,17 +41,18 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
 static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side) {
     const iw_can_frame_t *const frame = &self->frame[side];
     const bool accepted = self->hal->send(self->hal->context, frame) > 0;
-    self->later += accepted ? 0U : 1U;
+    self->sent.later += accepted ? 0U : 1U;
     iw_confirmation_sent(&self->confirmation, side, now_us, frame, accepted);
     return accepted;
 }
 
 static void measure_gap(iw_sender_t *self, iw_time_us_t now_us) {
     const bool first = self->pair_us == IW_NEVER;
-    self->gap_us = first ? 0U : (uint32_t)(now_us - self->pair_us);
-    self->gap_max_us = (first || self->gap_us > self->gap_max_us) ? self->gap_us : self->gap_max_us;
+    self->sent.gap_us = first ? 0U : (uint32_t)(now_us - self->pair_us);
+    self->sent.gap_max_us =
+        (first || self->sent.gap_us > self->sent.gap_max_us) ? self->sent.gap_us : self->sent.gap_max_us;
     self->pair_us = now_us;
-    self->pairs++;
+    self->sent.pairs++;
 }
 
 /// Left, then right. What the port refuses on the left does not leave on the right either, unless it is a zero.

@@ -26,13 +26,12 @@ static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_
     return (force->provenance == IW_OFFSET_OPERATOR) ? IW_FORCE_VALID : IW_FORCE_OFFSET_DOUBTED;
 }
 
-/// What the sensor shows, and what is assumed of its unit and offset.
-static iw_force_validity_t force_validity(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
-    const iw_force_t *const force = &self->force[side];
-    const iw_ledger_entry_t *const unit = iw_ledger_entry(&self->ledger, iw_ledger_force_unit(side));
-    const iw_ledger_entry_t *const included = iw_ledger_entry(&self->ledger, IW_LEDGER_OFFSET_INCLUDED);
+iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_side_t side) {
+    const iw_force_t *const force = self->wheel[side].force;
+    const iw_ledger_entry_t *const unit = &self->assumed[iw_ledger_force_unit(side)];
+    const iw_ledger_entry_t *const included = &self->assumed[IW_LEDGER_OFFSET_INCLUDED];
     const iw_ledger_entry_t *const asked = (force->evidence == IW_UNIT_OFFSET_REMOVED) ? included : unit;
-    iw_force_validity_t validity = iw_force_validity(force, now_us);
+    iw_force_validity_t validity = iw_force_validity(force, self->at_us);
     if (asked->evidence == IW_EVIDENCE_OPERATOR) {
         validity = overruled(force, validity);
     }
@@ -49,28 +48,18 @@ static iw_force_validity_t force_validity(const iw_gateway_t *self, iw_time_us_t
 static void look_at_wheel(const iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side,
                           iw_snapshot_wheel_t *out_wheel) {
     const iw_wheel_t *const wheel = &self->wheel[side];
+    const uint32_t rest_us = iw_wheel_rest_us(wheel, now_us); // More than 0 only if it is heard.
     out_wheel->told = &self->told[side];
     out_wheel->force = &self->force[side];
-    out_wheel->force_validity = force_validity(self, now_us, side);
     out_wheel->speed_us = wheel->speed_us;
     out_wheel->status_us = wheel->status_us;
     out_wheel->ticks = wheel->ticks;
-    out_wheel->distance_nm = iw_wheel_distance_nm(wheel);
+    out_wheel->nm_per_tick = wheel->nm_per_tick;
     out_wheel->speed_mm_s = iw_wheel_speed_mm_s(wheel);
     out_wheel->um_s_per_rpm = wheel->um_s_per_rpm;
     out_wheel->reboots = wheel->reboots;
-    out_wheel->heard = iw_wheel_heard(wheel, now_us);
-    out_wheel->at_rest = iw_wheel_at_rest(wheel, now_us, (uint32_t)self->config.rest_ms * IW_US_PER_MS);
-}
-
-static void look_at_sender(const iw_sender_t *sender, iw_snapshot_sent_t *out_sent) {
-    out_sent->pairs = sender->pairs;
-    out_sent->later = sender->later;
-    out_sent->clamped = sender->clamped;
-    out_sent->stopped = sender->envelope.stopped;
-    out_sent->stray_echoes = sender->confirmation.stray;
-    out_sent->gap_us = sender->gap_us;
-    out_sent->gap_max_us = sender->gap_max_us;
+    out_wheel->heard = rest_us > 0U || iw_wheel_heard(wheel, now_us);
+    out_wheel->at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
 }
 
 static void look_at_permit(const iw_permit_t *permit, iw_time_us_t now_us, iw_snapshot_t *out_snapshot) {
@@ -81,7 +70,7 @@ static void look_at_permit(const iw_permit_t *permit, iw_time_us_t now_us, iw_sn
     out_snapshot->stale_us = permit->stale_us;
     out_snapshot->holder = permit->holder;
     out_snapshot->stale_client = permit->stale_client;
-    out_snapshot->present = iw_permit_present(permit, now_us);
+    out_snapshot->present = permit->quiet ? 0U : iw_permit_present(permit, now_us);
     out_snapshot->still_moving = permit->still_moving;
     out_snapshot->state = iw_permit_state(permit);
     out_snapshot->arm_refusal = permit->arm_refusal;
@@ -95,10 +84,12 @@ void iw_gateway_snapshot(const iw_gateway_t *self, iw_time_us_t now_us, iw_snaps
     out_snapshot->counters = &self->counters;
     out_snapshot->assumed = self->ledger.entry;
     out_snapshot->assumed_changes = self->ledger.changes;
-    out_snapshot->doubt = iw_ledger_doubt(&self->ledger);
+    out_snapshot->doubt = self->ledger.doubt;
     look_at_wheel(self, now_us, IW_LEFT, &out_snapshot->wheel[IW_LEFT]);
     look_at_wheel(self, now_us, IW_RIGHT, &out_snapshot->wheel[IW_RIGHT]);
-    look_at_sender(&self->sender, &out_snapshot->sent);
+    out_snapshot->sent = &self->sender.sent;
+    out_snapshot->stopped = self->sender.envelope.stopped;
+    out_snapshot->stray_echoes = self->sender.confirmation.stray;
     look_at_permit(&self->permit, now_us, out_snapshot);
     out_snapshot->pose_us = self->pose_us;
     out_snapshot->waiting_us = iw_confirmation_waiting_us(confirmation);

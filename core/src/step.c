@@ -17,8 +17,10 @@ static void raise_after(iw_gateway_t *self, iw_time_us_t now_us, iw_cause_t caus
     iw_permit_raise(&self->permit, now_us, cause, IW_SIDES_NONE, whole_ms(span_us));
 }
 
+IW_STATIC_ASSERT(IW_SIDES_LEFT << IW_RIGHT == IW_SIDES_RIGHT, one_bit_per_side);
+
 static uint8_t side_bit(size_t side) {
-    return (side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT;
+    return (uint8_t)(IW_SIDES_LEFT << side);
 }
 
 static void excuse_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
@@ -143,8 +145,7 @@ static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, 
 
 static void hear_foreign(iw_gateway_t *self, iw_time_us_t now_us, uint32_t id) {
     self->counters.foreign++;
-    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SECOND_MASTER,
-                    (id == IW_ID_LEFT_SETPOINT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, id);
+    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SECOND_MASTER, side_bit(iw_codec_side(id)), id);
 }
 
 static bool is_setpoint_id(uint32_t id) {
@@ -284,9 +285,11 @@ static void watch_wheels(iw_gateway_t *self, iw_time_us_t now_us) {
     watch_wheel(self, now_us, IW_RIGHT, applied.wheel[IW_RIGHT].speed_mm_s);
 }
 
-static bool both_at_rest(const iw_gateway_t *self, iw_time_us_t now_us, uint32_t for_us) {
-    return iw_wheel_at_rest(&self->wheel[IW_LEFT], now_us, for_us) &&
-           iw_wheel_at_rest(&self->wheel[IW_RIGHT], now_us, for_us);
+/// How long both wheels have been at rest; 0: one turns, or is not heard.
+static uint32_t both_rest_us(const iw_gateway_t *self, iw_time_us_t now_us) {
+    const uint32_t left_us = iw_wheel_rest_us(&self->wheel[IW_LEFT], now_us);
+    const uint32_t right_us = iw_wheel_rest_us(&self->wheel[IW_RIGHT], now_us);
+    return (left_us < right_us) ? left_us : right_us;
 }
 
 void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
@@ -298,9 +301,10 @@ void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
         watch_silence(self, now_us);
         watch_wheels(self, now_us);
     }
+    const uint32_t rest_us = both_rest_us(self, now_us);
     view.heard = iw_wheel_heard(&self->wheel[IW_LEFT], now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], now_us);
-    view.at_rest = both_at_rest(self, now_us, (uint32_t)self->config.rest_ms * IW_US_PER_MS);
-    view.settled = both_at_rest(self, now_us, IW_PERMIT_SETTLED_US);
+    view.at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
+    view.settled = rest_us >= IW_PERMIT_SETTLED_US;
     view.output_zero = iw_setpoint_is_zero(&self->setpoint);
     view.timing_ok = !self->facts.timing_contradicted;
     view.can_send = iw_confirmation_may_send(&self->sender.confirmation, IW_LEFT, true) &&

@@ -28,10 +28,11 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
     self->status_us = IW_NEVER;
     self->rest_since_us = IW_NEVER;
     self->any_us = now_us;
-    self->nm_per_tick = nm_per_rpm / config->gear_turns * config->gear_per +
-                        nm_per_rpm % config->gear_turns * config->gear_per / config->gear_turns;
-    self->um_s_per_rpm = (config->rpm_of_rotor ? self->nm_per_tick : nm_per_rpm) / 1000U;
-    self->us_per_tick_min = self->nm_per_tick / FASTEST_NM_PER_US;
+    const uint32_t nm_per_tick = nm_per_rpm / config->gear_turns * config->gear_per +
+                                 nm_per_rpm % config->gear_turns * config->gear_per / config->gear_turns;
+    self->nm_per_tick = config->invert[side] ? -(int32_t)nm_per_tick : (int32_t)nm_per_tick;
+    self->um_s_per_rpm = (config->rpm_of_rotor ? nm_per_tick : nm_per_rpm) / 1000U;
+    self->us_per_tick_min = nm_per_tick / FASTEST_NM_PER_US;
 }
 
 static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence) {
@@ -126,18 +127,17 @@ bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us) {
     return self->heard_us == IW_NEVER || now_us - since_us >= silent_us(self);
 }
 
-bool iw_wheel_at_rest(const iw_wheel_t *self, iw_time_us_t now_us, uint32_t for_us) {
-    return iw_wheel_heard(self, now_us) && self->rest_since_us != IW_NEVER && now_us - self->rest_since_us >= for_us;
+uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us) {
+    const iw_time_us_t rest_us = now_us - self->rest_since_us;
+    if (self->rest_since_us == IW_NEVER || !iw_wheel_heard(self, now_us)) {
+        return 0;
+    }
+    return (rest_us < UINT32_MAX) ? (uint32_t)rest_us : UINT32_MAX;
 }
 
 int32_t iw_wheel_speed_mm_s(const iw_wheel_t *self) {
     const int32_t speed_um_s = self->speed.speed_rpm * (int32_t)self->um_s_per_rpm;
     return (self->config->invert[self->side] ? -speed_um_s : speed_um_s) / 1000;
-}
-
-int64_t iw_wheel_distance_nm(const iw_wheel_t *self) {
-    const int64_t distance_nm = self->ticks * (int64_t)self->nm_per_tick;
-    return self->config->invert[self->side] ? -distance_nm : distance_nm;
 }
 
 iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self) {

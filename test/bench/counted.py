@@ -72,7 +72,7 @@ def arm_linked(work, cpu):
 def driving(work, cpu):
     """The program of test/bench/step, with its gateway driving."""
     elf = count_arm.build(work / f"step-{cpu}.elf", cpu, [HERE / "step/step.c", *sorted((CORE / "src").glob("*.c"))], INCLUDES,
-                          ["bench_prepare", "bench_idle", "bench_frame_in", "bench_pair"])
+                          ["bench_prepare", "bench_idle", "bench_frame_in", "bench_pair", "bench_look", "bench_seen"])
     program = count_arm.Program(elf, cpu)
     if program.call("bench_prepare")[0] != 1:
         raise SystemExit("the gateway of test/bench/step does not drive")
@@ -93,10 +93,12 @@ def arm_steps(work, cpu):
     program = driving(work, cpu)
     idle_sent, idle = program.call("bench_idle")
     received, frame = program.call("bench_frame_in")
+    look = sum(count for name, count in program.profile("bench_look").items() if name != "bench_look")
+    seen, _ = program.call("bench_seen")
     pair_sent, pair = program.call("bench_pair")
-    if (idle_sent, received, pair_sent) != (0, 1, 1):
-        raise SystemExit(f"the steps of test/bench/step did something else: {idle_sent} {received} {pair_sent}")
-    return {"nothing due": idle, "a frame in": frame, "a pair due": pair}
+    if (idle_sent, received, seen, pair_sent) != (0, 1, 1, 1):
+        raise SystemExit(f"the steps of test/bench/step did something else: {idle_sent} {received} {seen} {pair_sent}")
+    return {"nothing due": idle, "a frame in": frame, "a pair due": pair, "a look at everything": look}
 
 
 def everything(work):

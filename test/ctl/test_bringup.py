@@ -61,13 +61,30 @@ class Bringup(unittest.TestCase):
         time.sleep(0.5)
 
     def nothing_left_behind(self):
-        """Whatever way out a test took."""
-        left = os.listdir(self.runtime)
-        shutil.rmtree(self.runtime)
-        if not self.killed:
-            self.assertEqual([], left, "bringup's folder is left behind")
+        """Whatever way out a test took; a gateway that was left alone holds its zeros first."""
+        try:
+            self.nothing_left_soon(self.PATIENCE_S if self.killed else 0)
+        finally:
+            shutil.rmtree(self.runtime)
 
     killed = False
+    PATIENCE_S = 16  # Zeros are held for ten seconds beside a wheel that turns.
+
+    def nothing_left_soon(self, seconds=PATIENCE_S):
+        end = time.monotonic() + seconds
+        while os.listdir(self.runtime):
+            self.assertLess(time.monotonic(), end, "bringup's folder is left behind")
+            time.sleep(0.05)
+
+    @staticmethod
+    def child_of(operator, name):
+        """The process number of the child of that name; others of ours may be there."""
+        with open(f"/proc/{operator.process.pid}/task/{operator.process.pid}/children", encoding="ascii") as file:
+            for child in file.read().split():
+                with open(f"/proc/{child}/comm", encoding="ascii") as comm:
+                    if comm.read().strip() == name:
+                        return int(child)
+        raise AssertionError(f"no child {name}")
 
     def start(self, *words):
         operator = Patient([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--can",
@@ -373,13 +390,27 @@ class Bringup(unittest.TestCase):
         operator.answer("types to try", "1")
         operator.expect("any key stops it")
         time.sleep(0.5)
-        self.killed = True  # Nothing can tidy up then.
+        self.killed = True
+        self.assertEqual(1, len(os.listdir(self.runtime)))
         operator.process.kill()
         killed_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
         time.sleep(4.5)
         self.assertFalse([frame for frame in self.moving() if frame[0] > killed_us + 1_000_000])
         last = max(frame[0] for frame in self.rig.bus.setpoints())
         self.assertLess(last, killed_us + 4_000_000, "its gateway ended")
+        operator.close()
+        self.nothing_left_soon()
+
+    def test_killed_together_with_its_gateway_and_its_terminal_it_leaves_nothing_behind(self):
+        operator = self.begin()
+        operator.expect("types to try")
+        self.assertEqual(["gateway.conf", "gateway.log", "gateway.sock"], sorted(
+            name for name in os.listdir(os.path.join(self.runtime, *os.listdir(self.runtime))) if name.startswith("gateway")))
+        gateway = self.child_of(operator, "iwheel-gateway")
+        os.killpg(operator.process.pid, signal.SIGKILL)
+        os.kill(gateway, signal.SIGKILL)
+        operator.close()
+        self.nothing_left_soon()
 
     def test_nothing_goes_without_the_checks_or_the_press(self):
         self.rig.sim.ask("mute right")
@@ -678,9 +709,7 @@ class Bringup(unittest.TestCase):
         self.addCleanup(operator.close)
         operator.answer("finger on the e-stop?", "y")
         operator.expect("Press the e-stop button now")
-        with open(f"/proc/{operator.process.pid}/task/{operator.process.pid}/children", encoding="ascii") as file:
-            gateway = file.read().split()[0]
-        with open(f"/proc/{gateway}/cmdline", "rb") as file:
+        with open(f"/proc/{self.child_of(operator, 'iwheel-gateway')}/cmdline", "rb") as file:
             folder = os.path.dirname(file.read().split(b"\0")[2].decode())
         self.assertRegex(folder, "^/tmp/iwheel-bringup-")
         self.rig.sim.ask("estop press")  # A stop, of which the gateway keeps a recording.

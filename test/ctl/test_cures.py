@@ -466,13 +466,29 @@ class Check(unittest.TestCase):
         self.assertEqual((69, 1), (code, len(found.get("skip", []))), done.stdout)
         self.assertIn("e-stop ESTOP", found["skip"][0])
         self.assertTrue(any("left wheel" in text for text in found["ok"]), "the bus is looked at all the same")
-        # A configuration that is not right is more than a machine that is not.
-        self.set("wheels", current_role="limit")
+        # What cannot be configured before somebody has seen the wheels changes nothing in that; a mistake does.
         del self.rig.settings["wheels"]["setpoint_type"]
         self.rig.write_config()
-        code, found, _ = self.check("--estop", "ESTOP")
-        self.assertEqual(78, code)
-        self.assertEqual(1, len(found["skip"]))
+        self.assertEqual(69, self.check("--estop", "ESTOP")[0])
+        self.set("wheels", setpoint_type="300")
+        self.assertEqual(78, self.check("--estop", "ESTOP")[0])
+
+    def test_configuration_before_commissioning_is_right_for_listening_and_the_gateway_starts_with_it(self):
+        right = dict(self.rig.settings["wheels"])
+        for missing in ("setpoint_type", "current_role"):
+            del self.rig.settings["wheels"][missing]
+            self.rig.write_config()
+            code, text = self.only("warn", f"{missing} not configured: it starts and listens, arm will be refused")
+            self.assertEqual(0, code)
+            self.assertIn("set it under [wheels]", text)
+            code, found, done = self.check("--listen-only")
+            self.assertEqual((0, []), (code, [text for text in found.get("warn", []) if "configured" in text]), done.stdout)
+            self.rig.start_gateway()
+            refused = self.rig.client().request("arm")
+            self.assertEqual((False, "type_not_set"), (refused["ok"], refused.get("error")))
+            self.rig.kill_gateway(signal.SIGTERM)
+            self.set("wheels", **{missing: right[missing]})
+        self.assertEqual(0, self.gone("warn", "not configured"))
 
     def test_bus_that_cannot_be_opened_hides_neither_the_rest_nor_the_e_stop(self):
         code, found, done = self.check("--can", "nocan0")

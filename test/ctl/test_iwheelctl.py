@@ -215,6 +215,40 @@ class Showing(WithGateway):
         none = wheel(force_offset_mN=None, offset_provenance="none", offset_origin=None, offset_contaminated=True)
         self.assertRegex(self.show(snapshot(left=none)), r"its zero +-- none IN DOUBT +8\.000 N wheel")
 
+    def test_setpoint_that_is_never_acknowledged_though_the_wheels_are_heard_names_the_restart_of_the_link(self):
+        restart = ("ip link set can7 down; ip link set can7 up",
+                   "systemctl enable --now iwheel-can-restart@can7.path")
+
+        class Stalled(FakeGateway):
+            heard, bus = True, "can7"
+
+            def on_status(self, _connection, _request):
+                return {"ok": True, **snapshot("latched", cause="send_stalled", present=["send_stalled"], left=wheel(),
+                                               right=wheel(heard=self.heard), bus={"name": self.bus, "state": "active"})}
+
+            def on_why(self, _connection, _request):
+                return {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
+        gateway = self.serve(Stalled)
+        doctor = ("doctor", "--no-press", "--listen", "200ms")
+        for heard, bus in ((True, "can7"), (False, "can7"), (True, "unix:/nowhere")):
+            gateway.heard, gateway.bus = heard, bus
+            told = {words[0]: self.ctl(*words, gateway=gateway)[1] for words in (("status",), ("why",), doctor)}
+            findings = json.loads(self.ctl("--json", *doctor, gateway=gateway)[1])["findings"]
+            finding, = (finding for finding in findings if finding["check"] == "send_stalled")
+            self.assertEqual("fail", finding["verdict"])
+            told["finding"] = finding["cure"]
+            for what, text in told.items():
+                text = " ".join(text.split())
+                for command in restart:
+                    self.assertEqual(heard and bus == "can7", command in text, (what, text))
+                self.assertEqual(not (heard and bus == "can7"), "check the wheels' power and the cable" in text, (what, text))
+
+    def test_why_of_a_setpoint_that_was_acknowledged_since_names_no_cure(self):
+        class Cured(FakeGateway):
+            def on_why(self, _connection, _request):
+                return {"ok": True, "number": 1, "cause": "send_stalled", "sentence": "setpoint not acknowledged", "at_us": 1}
+        self.assertNotIn("still", self.ctl("why", gateway=self.serve(Cured))[1])
+
     def test_contradiction_tells_evidence_and_cost_and_what_to_do_next(self):
         entry = {"state": "contradicted", "evidence": "operator", "figure": None, "value": "no", "reason": "the operator found yes",
                  "disabled": "arm is refused; correct invert under [left]"}

@@ -214,7 +214,6 @@ static void operate(iw_side_t side) {
 static void look(iw_side_t side) {
     iw_snapshot_t seen;
     (void)iw_wheel_speed_mm_s(&gateway.wheel[side]);
-    (void)iw_wheel_distance_nm(&gateway.wheel[side]);
     (void)iw_force_validity(&gateway.force[side], now_us);
     (void)iw_force_raw_mN(&gateway.force[side]);
     (void)iw_force_net_mN(&gateway.force[side]);
@@ -224,6 +223,7 @@ static void look(iw_side_t side) {
     (void)iw_gateway_arm_refusal(&gateway);
     (void)iw_gateway_is_sending(&gateway);
     iw_gateway_snapshot(&gateway, now_us, &seen);
+    (void)iw_snapshot_force_validity(&seen, side);
     iw_motion_evidence_look(&evidence, &gateway, &seen);
     (void)iw_cause_latches((iw_cause_t)Frama_C_interval(IW_CAUSE_NONE, IW_CAUSES - 1));
     (void)iw_permit_present(&gateway.permit, now_us);

@@ -195,7 +195,7 @@ static void step(world_t *world, uint32_t after_us) {
     world->now_us += after_us;
     const iw_time_us_t next_us = iw_gateway_step(&world->gateway, world->now_us);
     fuzz_require(next_us >= world->now_us && next_us <= world->now_us + 60000U, "it wants to be called in time");
-    fuzz_require(world->gateway.sender.envelope.stopped == 0U && world->gateway.sender.clamped == 0U,
+    fuzz_require(world->gateway.sender.envelope.stopped == 0U && world->gateway.sender.sent.clamped == 0U,
                  "the gate has nothing to stop");
 }
 

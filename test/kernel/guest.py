@@ -29,16 +29,25 @@ def main(path):
     if not plan["virtual"]:
         run.watch()
     with open(plan["results"], "a", encoding="utf-8", buffering=1) as results:
-        for name in plan["tests"]:
-            begin, run.last, run.latencies = time.monotonic(), {}, {}
-            verdict, figures, failures = run.test(name)
-            result = {"name": name, "verdict": verdict, "figures": figures, "failures": failures}
-            result["seconds"] = time.monotonic() - begin
-            result.update(run.latencies)
-            result["measures"], result["logs"] = run.last.get("measures", {}), run.last.get("logs", [])
-            results.write(json.dumps(result) + "\n")
+        stalled = [name for name in plan["tests"] if not work_off(run, name, run.test, results)]
+        for name in stalled:
+            work_off(run, name, run.test_alone, results)
     run.close()
     return 0
+
+
+def work_off(run, name, test, results):
+    """False, and nothing is told, if the machine stalled in each attempt: to be tried again at the end."""
+    begin, run.last, run.latencies = time.monotonic(), {}, {}
+    verdict, figures, failures = test(name)
+    if verdict == "stalled":
+        return False
+    result = {"name": name, "verdict": verdict, "figures": figures, "failures": failures}
+    result["seconds"] = time.monotonic() - begin
+    result.update(run.latencies)
+    result["measures"], result["logs"] = run.last.get("measures", {}), run.last.get("logs", [])
+    results.write(json.dumps(result) + "\n")
+    return True
 
 
 if __name__ == "__main__":

@@ -93,6 +93,8 @@ class GuestRun(Run):
     such a kernel), so what counts is a delay that is long enough, and near enough, to have caused what is wrong.
     """
 
+    command = "test/kernel/run"
+
     def __init__(self, plan):  # pylint: disable=super-init-not-called
         self.plan, self.last, self.latencies = plan, {}, {}
         self.limit_s = SOAK_LIMIT_S if plan["group"] == "soak" else FULL_LIMIT_S if plan["full"] else LIMIT_S
@@ -115,6 +117,9 @@ class GuestRun(Run):
             self.witness.kill()
             self.witness.wait()
             shutil.rmtree(self.folder, ignore_errors=True)
+
+    def stalls(self, begin_us, end_us):
+        return kernel_rig.late_wakings(begin_us, end_us, kernel_rig.STALL_US)
 
     def excused(self, result, failure):
         text, kind, at_us = failure

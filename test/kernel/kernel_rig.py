@@ -32,13 +32,17 @@ STALL_US = 10_000  # what the judge allows between the gateway's clock and the b
 PACE = {"slow": 1}  # of telemetry, by guest.py before each test: see catalogue.Entry
 
 
-def machine_late(from_us, to_us, more_than_us):
-    """Whether the witness woke up that late meanwhile. In virtual time there is none, and nothing is late."""
+def late_wakings(from_us, to_us, more_than_us):
+    """When the witness woke up that late meanwhile, and how late. In virtual time there is none, and nothing is late."""
     if not WITNESS["file"]:
-        return False
+        return []
     with open(WITNESS["file"], encoding="ascii") as file:
         pairs = [tuple(map(int, line.split())) for line in file if line.endswith("\n")]
-    return any(late > more_than_us and at >= from_us and at - late <= to_us for at, late in pairs)
+    return [(at, late) for at, late in pairs if late > more_than_us and at >= from_us and at - late <= to_us]
+
+
+def machine_late(from_us, to_us, more_than_us):
+    return bool(late_wakings(from_us, to_us, more_than_us))
 
 
 class Press(NamedTuple):

@@ -61,8 +61,8 @@ LEGEND = """
 *Longest gap*: between setpoints of one wheel while the bus took frames (100 ms allowed). *Stop begins within*: from the fault to the
 first setpoint that is slower, the worst of all tests of the row. *Old frames*: nonzero setpoints that came out on the bus after a
 stall, an outage or a stop was over, the most of all tests of the row; on an adapter whose echo proves nothing they cannot be ruled
-out (see below). `--`: not measured by any test of the row. Tests in real time beside which the machine stalled three times are not
-judged, and not counted.
+out (see below). `--`: not measured by any test of the row. Tests in real time beside which the machine stalled each time, at the
+end and alone too, are not judged, and not counted.
 """
 NATIVE = """
 `test/kernel/run --native`, the tests in real time on a machine's own kernel with its modules vcan, slcan and gpio-sim, has not been run on

@@ -9,6 +9,7 @@ import os
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
@@ -66,11 +67,43 @@ class Verdicts(Witnessed):
             with self.subTest(failures):
                 self.assertEqual(("failed", 1), self.outcome(*failures))
 
-    def test_stalled_machine_is_repeated_then_not_judged(self):
+    def test_stalled_machine_is_repeated_then_put_off(self):
         self.late(FAULT_US, 200_000)
         for failures in ([GAP], [REFUSED], [GAP, REFUSED], [PAIR]):
             with self.subTest(failures):
-                self.assertEqual(("skipped", TRIES), self.outcome(*failures))
+                self.assertEqual(("stalled", TRIES), self.outcome(*failures))
+
+    def test_put_off_and_stalled_alone_too_is_skipped_with_the_lateness_and_the_command(self):
+        self.late(FAULT_US, 200_000)
+        verdict, figures, failures = Scripted(GAP).test_alone("made_up")
+        self.assertEqual(("skipped", [GAP]), (verdict, failures))
+        self.assertRegex(figures[0], "up to 200 ms late in each of 6 attempts, alone too; .*: test/kernel/run --only made_up$")
+
+    def test_put_off_and_wrong_alone_too_in_more_than_time_fails(self):
+        self.late(FAULT_US, 200_000)
+        run = Scripted(GAP, REFUSED)
+        run.softened = lambda result: result  # As in the system tests: what is checked is no matter of time.
+        self.assertEqual("stalled", run.test("made_up")[0])
+        self.assertEqual(("failed", [GAP, REFUSED]), run.test_alone("made_up")[::2])
+
+    def test_put_off_and_quiet_at_the_end_is_judged(self):
+        self.assertEqual("passed", Scripted().test_alone("made_up")[0])
+        self.assertEqual("failed", Scripted(GAP).test_alone("made_up")[0])
+
+    def test_repeated_only_when_the_machine_has_been_quiet_for_a_second_or_patience_ends(self):
+        clock, run = [10.0], Scripted(GAP)
+        self.late(12_000_000, 200_000)
+        with mock.patch("runner.now_us", lambda: int(clock[0] * 1e6)), mock.patch("runner.time") as time:
+            time.monotonic, time.sleep = (lambda: clock[0]), lambda seconds: clock.__setitem__(0, clock[0] + seconds)
+            for begin, end in ((10.0, 10.0), (12.1, 13.0), (13.5, 13.5)):
+                clock[0] = begin
+                run.await_quiet()
+                self.assertAlmostEqual(end, clock[0], delta=0.15)
+            for at in range(20, 60):
+                self.late(at * 1_000_000, 20_000)
+            clock[0] = 20.5
+            run.await_quiet()
+            self.assertAlmostEqual(30.5, clock[0], delta=0.15)
 
     def test_stalled_machine_excuses_no_motion_no_latch_and_no_form(self):
         self.late(FAULT_US, 200_000)

@@ -39,7 +39,7 @@ BUGS = [
     Bug("arm-while-latched", "R3", "permit.c", "if (iw_permit_state(self) == IW_STATE_LATCHED) { return refuse_latched(self, now_us); } if (!may_send", "if (!may_send"),
     Bug("arm-while-cause-present", "R3", "permit.c", "if (present != IW_REFUSE_NONE) { return present; } if (!self->view.timing_ok)", "if (!self->view.timing_ok)"),
     Bug("arm-without-echo", "R3", "permit.c", "if (self->view.proven && waited_us <= limit_us) {", "if (waited_us <= limit_us) {"),
-    Bug("arm-while-contradicted", "R3", "gateway.c", "iw_ledger_doubt(&self->ledger) != IW_LEDGER_ITEMS) {", "iw_ledger_doubt(&self->ledger) == IW_LEDGER_SETPOINT_TYPE) {"),
+    Bug("arm-while-contradicted", "R3", "gateway.c", "self->ledger.doubt != IW_LEDGER_ITEMS) {", "self->ledger.doubt == IW_LEDGER_SETPOINT_TYPE) {"),
     Bug("takeover-unasked", "R3", "permit.c", "(!takeover || iw_permit_arming(self))", "(iw_permit_arming(self))"),
     Bug("anybody-drives", "R3", "permit.c", "if (self->holder != client) { return IW_REFUSE_NOT_HOLDER; }", "if (client == IW_CLIENT_NONE) { return IW_REFUSE_NOT_HOLDER; }"),
     Bug("target-survives-stop", "R3", "setpoint.c", "self->demand = demand; forget_command(self);", "self->demand = demand;"),

@@ -47,7 +47,7 @@ PARTS = [
     Bug("tare-tries-the-left-wheel-twice", "R9", "core/src/gateway.c", "iw_force_may_tare(&self->force[side], now_us)", "iw_force_may_tare(&self->force[IW_LEFT], now_us)", REQUESTS),
     Bug("tare-of-the-other-wheel", "ledger", "core/src/gateway.c", "iw_force_tare(&self->force[side], now_us)", "iw_force_tare(&self->force[1U - side], now_us)", REQUESTS),
     Bug("armed-while-ending", "R4", DISPATCH, "if (daemon->shutting_down) {", "if (false) {", REQUESTS),
-    Bug("contradicted-type-drives", "R8", "core/src/gateway.c", "iw_ledger_doubt(&self->ledger) != IW_LEDGER_ITEMS", "iw_ledger_doubt(&self->ledger) > IW_LEDGER_ITEMS", REQUESTS),
+    Bug("contradicted-type-drives", "R8", "core/src/gateway.c", "self->ledger.doubt != IW_LEDGER_ITEMS", "self->ledger.doubt > IW_LEDGER_ITEMS", REQUESTS),
     # Clients.
     Bug("lease-outlives-its-client", "R1", SERVICE, "iw_gateway_disconnect(&daemon->gateway, daemon->now_us, client->id);", "", MOTION),
     Bug("lease-ends-after-the-lines", "R1", SERVICE, "if (client->leaving) {", "if (client->leaving && !client->readable) {", MOTION),

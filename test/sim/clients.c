@@ -87,7 +87,7 @@ static bool is_contradicted(const iw_gateway_t *gateway) {
 /// The operator has looked at the machine and says that it is as configured.
 static void settle_assumption(rig_t *rig) {
     const iw_ledger_entry_t word = {IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
-    iw_gateway_know(&rig->gateway, iw_ledger_doubt(&rig->gateway.ledger), &word);
+    iw_gateway_know(&rig->gateway, rig->gateway.ledger.doubt, &word);
 }
 
 static void request_arm(rig_t *rig, const request_t *request, const iw_gateway_t *before) {

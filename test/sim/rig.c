@@ -406,7 +406,7 @@ static void judge_whole(rig_t *rig) {
 }
 
 static void judge_internal(rig_t *rig) {
-    if (rig->gateway.sender.envelope.stopped != 0U || rig->gateway.sender.clamped != 0U) {
+    if (rig->gateway.sender.envelope.stopped != 0U || rig->gateway.sender.sent.clamped != 0U) {
         oracle_fail(&rig->oracle, rig->now_us, RULE_INTERNAL, "the gate had to stop a frame of the scheduler");
     }
 }

@@ -5,6 +5,7 @@
 
 #include "fixture.h"
 #include "iwheel/evidence.h"
+#include "iwheel/gateway.h"
 #include "iwheel_sim/world.h"
 
 #define WORLD_RX_MAX 256U

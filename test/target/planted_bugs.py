@@ -1,7 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Bugs that somebody could write into the port: file, text, what it becomes, and who must notice.
 
-The tests of the driver against the model notice those of DRIVER, a scenario on the emulated STM32F103 those of IMAGE.
+The tests of the driver against the model notice those of DRIVER, a scenario on the emulated STM32F103 those of IMAGE. All stand in
+docs/planted-bugs.md as well: `section` is what is written there.
+"""
+
+HEADING = "## The STM32 port"
+HEAD = f"""{HEADING}
+
+Written by `test/target/planted --update`; `./check target` proves that it lists them all. Each bug is planted alone in a copy of the port, and
+who stands beside it must notice: a test of the driver against a model of the controller, or a scenario of the emulated STM32F103 with
+one of its images (these with `./check --full`).
+
+| bug | file | noticed by |
+|---|---|---|
 """
 
 DRIVER = {
@@ -79,3 +91,16 @@ IMAGE = {
     "a console that waits": ("console.c", "    if (put != taken && (USART2->SR & TXE) != 0U) {\n",
                              "    while (put != taken) {\n        while ((USART2->SR & TXE) == 0U) {\n        }\n", "zero", "console"),
 }
+
+
+def section():
+    """Of docs/planted-bugs.md, from its heading to the end."""
+    driver = [f"| {name} | `port/stm32_stub/{file}` | `test_bxcan_{test}` |" for name, (file, _, _, test) in DRIVER.items()]
+    image = [f"| {name} | `port/stm32_stub/{file}` | scenario `{scenario}`, image `{image}` |"
+             for name, (file, _, _, image, scenario) in IMAGE.items()]
+    return HEAD + "\n".join(driver + image) + "\n"
+
+
+def replace_section(page):
+    """The page with this section as it should be."""
+    return page.split(HEADING)[0].rstrip("\n") + "\n\n" + section()

@@ -5,6 +5,8 @@
 
 #include "unity.h"
 
+#include <stdio.h>
+
 void setUp(void) {}
 
 void tearDown(void) {}
@@ -50,6 +52,35 @@ static void test_duration_option_out_of_range_tells_the_range_as_it_is_written(v
     TEST_ASSERT_EQUAL_INT64(20000, us);
 }
 
+static void test_duration_option_without_its_unit_is_told_as_it_should_be_written(void) {
+    static const duration_range_t range = {20000, 600000000};
+    static const struct {
+        const char *text;
+        const char *meant;
+    } cases[] = {{"2", "; write: --for 2s"},
+                 {"0.5", "; write: --for 0.5s"},
+                 {"2m", "; write: --for 2min"},
+                 {"700", ""},
+                 {"20m", ""},
+                 {"0", ""},
+                 {"", ""},
+                 {"2x", ""},
+                 {"m", ""},
+                 {"1.2345", ""},
+                 {"-1", ""}};
+    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+        char why[DURATION_WHY_SIZE];
+        char wanted[DURATION_WHY_SIZE];
+        int64_t us = 77;
+        (void)snprintf(wanted, sizeof wanted,
+                       "--for wants a time with its unit, such as " DURATION_FORM ", not \"%s\"%s", cases[i].text,
+                       cases[i].meant);
+        TEST_ASSERT_FALSE(duration_option("--for", cases[i].text, range, &us, why));
+        TEST_ASSERT_EQUAL_STRING(wanted, why);
+        TEST_ASSERT_EQUAL_INT64(77, us);
+    }
+}
+
 static void test_word_nearly_right_is_near_and_a_strange_one_is_not(void) {
     TEST_ASSERT_EQUAL_size_t(0, gw_word_distance("stat", "status"));
     TEST_ASSERT_EQUAL_size_t(1, gw_word_distance("staus", "status"));
@@ -67,6 +98,7 @@ int main(void) {
     RUN_TEST(test_duration_in_every_unit_with_decimals_is_read);
     RUN_TEST(test_duration_that_is_none_is_refused_and_touches_nothing);
     RUN_TEST(test_duration_option_out_of_range_tells_the_range_as_it_is_written);
+    RUN_TEST(test_duration_option_without_its_unit_is_told_as_it_should_be_written);
     RUN_TEST(test_word_nearly_right_is_near_and_a_strange_one_is_not);
     return UNITY_END();
 }

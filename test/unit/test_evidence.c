@@ -2,6 +2,7 @@
 // What wheels tell by their motion, frame by frame: looks at snapshots made by hand, up to and beyond every limit.
 #include "fixture.h"
 #include "iwheel/evidence.h"
+#include "iwheel/gateway.h"
 
 #include "unity.h"
 

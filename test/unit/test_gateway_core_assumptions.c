@@ -18,6 +18,11 @@ static iw_ledger_t *ledger(void) {
     return &rig.gateway.ledger;
 }
 
+static iw_force_validity_t force_validity(iw_side_t side) {
+    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    return iw_snapshot_force_validity(&seen, side);
+}
+
 static void test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_refused(void) {
     static const iw_ledger_item_t guards[] = {IW_LEDGER_SETPOINT_TYPE,      IW_LEDGER_CURRENT_ROLE,
                                               IW_LEDGER_FEEDBACK_SIGN_LEFT, IW_LEDGER_FEEDBACK_SIGN_RIGHT,
@@ -25,12 +30,12 @@ static void test_arm_while_an_assumption_that_guards_motion_is_contradicted_is_r
     for (size_t i = 0; i < sizeof guards / sizeof guards[0]; i++) {
         iw_ledger_contradict(ledger(), guards[i], IW_EVIDENCE_OPERATOR, 0);
         TEST_ASSERT_TRUE(iw_ledger_guards_motion(guards[i]));
-        TEST_ASSERT_EQUAL_INT(guards[i], iw_ledger_doubt(ledger()));
+        TEST_ASSERT_EQUAL_INT(guards[i], ledger()->doubt);
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_CONTRADICTED, gateway_rig_request_arm(&rig, HOLDER, false));
         TEST_ASSERT_FALSE(iw_gateway_arming(&rig.gateway));
         iw_ledger_confirm(ledger(), guards[i], IW_EVIDENCE_OPERATOR, 0);
     }
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, iw_ledger_doubt(ledger()));
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, ledger()->doubt);
     gateway_rig_arm(&rig);
 }
 
@@ -43,7 +48,7 @@ static void test_arm_with_any_other_assumption_contradicted_is_granted(void) {
         }
     }
     TEST_ASSERT_EQUAL_UINT(IW_LEDGER_ITEMS - 6U, others);
-    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, iw_ledger_doubt(ledger()));
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, ledger()->doubt);
     gateway_rig_arm(&rig);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
@@ -127,8 +132,8 @@ static void test_force_validity_follows_sensor_and_ledger(void) {
         force->evidence = cases[i].evidence;
         ledger()->entry[IW_LEDGER_FORCE_UNIT_LEFT] = cases[i].unit;
         ledger()->entry[IW_LEDGER_OFFSET_INCLUDED] = cases[i].included;
-        TEST_ASSERT_EQUAL_INT(cases[i].expected, gateway_rig_look(&rig).wheel[IW_LEFT].force_validity);
-        TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, gateway_rig_look(&rig).wheel[IW_RIGHT].force_validity);
+        TEST_ASSERT_EQUAL_INT(cases[i].expected, force_validity(IW_LEFT));
+        TEST_ASSERT_EQUAL_INT(IW_FORCE_NOT_HEARD, force_validity(IW_RIGHT));
     }
 }
 
@@ -137,9 +142,9 @@ static void test_force_validity_of_the_right_wheel_asks_for_its_own_unit(void) {
     force->raw_us = rig.now_us;
     force->provenance = IW_OFFSET_WHEEL;
     iw_ledger_contradict(ledger(), IW_LEDGER_FORCE_UNIT_LEFT, IW_EVIDENCE_BUS, 0);
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, gateway_rig_look(&rig).wheel[IW_RIGHT].force_validity);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_VALID, force_validity(IW_RIGHT));
     iw_ledger_contradict(ledger(), IW_LEDGER_FORCE_UNIT_RIGHT, IW_EVIDENCE_BUS, 0);
-    TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, gateway_rig_look(&rig).wheel[IW_RIGHT].force_validity);
+    TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_validity(IW_RIGHT));
 }
 
 static void hear_empty(uint32_t id, uint8_t length) {

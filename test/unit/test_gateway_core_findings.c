@@ -218,7 +218,7 @@ static void test_gateway_current_that_must_be_clamped_is_counted(void) {
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(50));
     TEST_ASSERT_TRUE(rig.bus.sent > sent);
-    TEST_ASSERT_EQUAL_UINT32(rig.bus.sent - sent, rig.gateway.sender.clamped);
+    TEST_ASSERT_EQUAL_UINT32(rig.bus.sent - sent, rig.gateway.sender.sent.clamped);
     TEST_ASSERT_EQUAL_INT(2000, fake_bus_command(&rig.bus.last[IW_LEFT]).current_mA);
 }
 

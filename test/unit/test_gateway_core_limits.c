@@ -42,16 +42,16 @@ static void test_gateway_counts_what_it_sent_and_what_it_could_not(void) {
     gateway_rig_arm(&rig);
     const iw_sender_t *const sender = &rig.gateway.sender;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(500));
-    TEST_ASSERT_EQUAL_UINT32(rig.bus.sent, 2U * sender->pairs);
-    TEST_ASSERT_EQUAL_UINT32(0, sender->later);
-    TEST_ASSERT_EQUAL_UINT32(0, sender->clamped);
+    TEST_ASSERT_EQUAL_UINT32(rig.bus.sent, 2U * sender->sent.pairs);
+    TEST_ASSERT_EQUAL_UINT32(0, sender->sent.later);
+    TEST_ASSERT_EQUAL_UINT32(0, sender->sent.clamped);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, sender->verdict);
-    const uint32_t pairs = sender->pairs;
+    const uint32_t pairs = sender->sent.pairs;
     rig.bus.send_result[IW_RIGHT] = 0;
     (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
-    TEST_ASSERT_EQUAL_UINT32(pairs, sender->pairs);
-    TEST_ASSERT_EQUAL_UINT32(rig.bus.refused, sender->later);
-    TEST_ASSERT_TRUE(sender->later > 0);
+    TEST_ASSERT_EQUAL_UINT32(pairs, sender->sent.pairs);
+    TEST_ASSERT_EQUAL_UINT32(rig.bus.refused, sender->sent.later);
+    TEST_ASSERT_TRUE(sender->sent.later > 0);
 }
 
 static void test_gateway_counts_telemetry(void) {
@@ -64,15 +64,15 @@ static void test_gateway_counts_telemetry(void) {
 static void test_gateway_gap_is_measured_anew_after_silence(void) {
     gateway_rig_run(&rig, MS(1000));
     (void)gateway_rig_request_arm(&rig, HOLDER, false);
-    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(0, rig.gateway.sender.sent.gap_us);
     gateway_rig_run(&rig, MS(50));
     gateway_rig_stop(&rig);
     gateway_rig_run(&rig, MS(5000));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
     gateway_rig_arm(&rig);
     gateway_rig_run(&rig, MS(100));
-    TEST_ASSERT_TRUE(rig.gateway.sender.gap_max_us <= 20000U);
-    TEST_ASSERT_TRUE(rig.gateway.sender.gap_us > 0);
+    TEST_ASSERT_TRUE(rig.gateway.sender.sent.gap_max_us <= 20000U);
+    TEST_ASSERT_TRUE(rig.gateway.sender.sent.gap_us > 0);
 }
 
 static void test_gateway_echo_is_overdue_at_its_limit_exactly(void) {
@@ -110,11 +110,11 @@ static void test_gateway_zero_to_one_wheel_keeps_the_period(void) {
     rig.bus.send_result[IW_RIGHT] = 0;
     gateway_rig_press(&rig, true);
     gateway_rig_run(&rig, MS(40));
-    const uint32_t pairs = rig.gateway.sender.pairs;
+    const uint32_t pairs = rig.gateway.sender.sent.pairs;
     rig.bus.send_result[IW_RIGHT] = 1;
     gateway_rig_run(&rig, MS(15));
     TEST_ASSERT_EQUAL_UINT8(1, rig.bus.unechoed[IW_RIGHT]);
-    TEST_ASSERT_EQUAL_UINT32(pairs, rig.gateway.sender.pairs);
+    TEST_ASSERT_EQUAL_UINT32(pairs, rig.gateway.sender.sent.pairs);
 }
 
 static void test_gateway_arm_in_the_zero_hold_sends_its_pair_at_once(void) {

@@ -46,8 +46,8 @@ static void test_gateway_period_is_exact_and_both_frames_leave_together(void) {
         TEST_ASSERT_EQUAL_UINT64(rig.bus.last_us[IW_LEFT], rig.bus.last_us[IW_RIGHT]);
         last_us = rig.bus.last_us[IW_LEFT];
     }
-    TEST_ASSERT_EQUAL_UINT32(20000, rig.gateway.sender.gap_us);
-    TEST_ASSERT_EQUAL_UINT32(20000, rig.gateway.sender.gap_max_us);
+    TEST_ASSERT_EQUAL_UINT32(20000, rig.gateway.sender.sent.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(20000, rig.gateway.sender.sent.gap_max_us);
 }
 
 static void test_gateway_changed_command_leaves_in_the_same_step(void) {
@@ -143,7 +143,7 @@ static void test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros(vo
         rig.bus.send_result[side] = 1;
         gateway_rig_run(&rig, MS(6));
         TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
-        TEST_ASSERT_TRUE(rig.gateway.sender.later > 0);
+        TEST_ASSERT_TRUE(rig.gateway.sender.sent.later > 0);
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
         (void)gateway_rig_cruise(&rig, 100, 100, MS(300));
         TEST_ASSERT_EQUAL_INT(100, rig.bus.told_mm_s[side]);

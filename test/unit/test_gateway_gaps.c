@@ -5,7 +5,7 @@
 #include <unity.h>
 
 static gw_gaps_t gaps;
-static iw_snapshot_sent_t sent;
+static iw_sent_t sent;
 
 void setUp(void) {
     memset(&gaps, 0, sizeof gaps);

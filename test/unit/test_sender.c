@@ -48,31 +48,31 @@ static void test_sender_begins_with_nothing_sent_and_nothing_under_way(void) {
     TEST_ASSERT_TRUE(iw_confirmation_waiting_us(&sender.confirmation) == IW_NEVER);
     TEST_ASSERT_EQUAL_UINT32(0, sender.confirmation.stray);
     TEST_ASSERT_EQUAL_UINT32(0, sender.envelope.stopped);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_us);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_max_us);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.pairs);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.later);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.clamped);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.pairs);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.later);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.clamped);
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, sender.verdict);
 }
 
 static void test_sender_first_pair_ends_no_gap(void) {
     send_whole(0);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_us);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_max_us);
-    TEST_ASSERT_EQUAL_UINT32(1, sender.pairs);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
+    TEST_ASSERT_EQUAL_UINT32(1, sender.sent.pairs);
 }
 
 static void test_sender_keeps_the_largest_gap_until_the_next_silence(void) {
     send_whole(0);
     send_whole(MS(20));
     send_whole(MS(10));
-    TEST_ASSERT_EQUAL_UINT32(10000, sender.gap_us);
-    TEST_ASSERT_EQUAL_UINT32(20000, sender.gap_max_us);
+    TEST_ASSERT_EQUAL_UINT32(10000, sender.sent.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(20000, sender.sent.gap_max_us);
     iw_sender_rest(&sender);
     send_whole(MS(5000));
-    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_us);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.gap_max_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_us);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.gap_max_us);
 }
 
 static void test_sender_zero_to_one_wheel_only_is_no_whole_pair(void) {
@@ -87,7 +87,7 @@ static void test_sender_zero_to_one_wheel_only_is_no_whole_pair(void) {
         TEST_ASSERT_FALSE(iw_sender_ready(&sender, false));
         TEST_ASSERT_EQUAL_INT(IW_SEND_DONE, send(0, 0));
         TEST_ASSERT_EQUAL_UINT32(5, bus.sent);
-        TEST_ASSERT_EQUAL_UINT32(2, sender.pairs);
+        TEST_ASSERT_EQUAL_UINT32(2, sender.sent.pairs);
     }
 }
 
@@ -95,15 +95,15 @@ static void test_sender_zero_goes_to_the_right_wheel_though_the_port_refuses_the
     bus.send_result[IW_LEFT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(0, 0));
     TEST_ASSERT_EQUAL_UINT32(1, bus.sent);
-    TEST_ASSERT_EQUAL_UINT32(1, sender.later);
-    TEST_ASSERT_EQUAL_UINT32(0, sender.pairs);
+    TEST_ASSERT_EQUAL_UINT32(1, sender.sent.later);
+    TEST_ASSERT_EQUAL_UINT32(0, sender.sent.pairs);
 }
 
 static void test_sender_motion_leaves_to_both_wheels_or_to_none_behind_a_refused_left_one(void) {
     bus.send_result[IW_LEFT] = 0;
     TEST_ASSERT_EQUAL_INT(IW_SEND_LATER, send(1, 1));
     TEST_ASSERT_EQUAL_UINT32(0, bus.sent);
-    TEST_ASSERT_EQUAL_UINT32(1, sender.later);
+    TEST_ASSERT_EQUAL_UINT32(1, sender.sent.later);
 }
 
 static void test_sender_remembers_why_the_gate_stopped_a_pair(void) {

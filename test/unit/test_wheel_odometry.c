@@ -53,10 +53,14 @@ static iw_reboot_t jump(int32_t ticks, iw_time_us_t after_us) {
     return jump_from(5000, 5000 + ticks, after_us);
 }
 
+static int64_t distance_nm(void) {
+    return wheel.ticks * wheel.nm_per_tick;
+}
+
 static void test_wheel_first_status_frame_is_no_distance(void) {
     hear_ticks(INT32_MIN);
     TEST_ASSERT_EQUAL_INT64(0, wheel.ticks);
-    TEST_ASSERT_EQUAL_INT64(0, iw_wheel_distance_nm(&wheel));
+    TEST_ASSERT_EQUAL_INT64(0, distance_nm());
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
     TEST_ASSERT_EQUAL_INT(255, wheel.status.battery_dV);
 }
@@ -89,7 +93,7 @@ static void test_wheel_ticks_go_on_beyond_32_bits(void) {
     hear_ticks(0);
     hear_ticks(20);
     TEST_ASSERT_EQUAL_INT64((int64_t)INT32_MAX + 40, wheel.ticks);
-    TEST_ASSERT_TRUE(iw_wheel_distance_nm(&wheel) == ((int64_t)INT32_MAX + 40) * (int64_t)wheel.nm_per_tick);
+    TEST_ASSERT_TRUE(distance_nm() == ((int64_t)INT32_MAX + 40) * (int64_t)wheel.nm_per_tick);
 }
 
 static void test_wheel_ticks_end_at_their_limit_in_both_directions(void) {
@@ -110,7 +114,7 @@ static void test_wheel_distance_fits_at_the_limit_of_ticks_and_the_largest_wheel
     config.radius_mm = 500;
     begin_side(IW_LEFT);
     wheel.ticks = IW_WHEEL_TICKS_MAX;
-    TEST_ASSERT_EQUAL_INT64(5236000000000000000, iw_wheel_distance_nm(&wheel));
+    TEST_ASSERT_EQUAL_INT64(5236000000000000000, distance_nm());
 }
 
 static void test_wheel_jump_beyond_physics_is_a_reboot_not_a_distance(void) {
@@ -176,7 +180,7 @@ static void test_wheel_jump_of_half_of_all_numbers_is_judged_to_the_tick(void) {
 static void test_wheel_distance_and_speed_of_the_documented_wheel(void) {
     hear_ticks(0);
     hear_ticks(10);
-    TEST_ASSERT_INT64_WITHIN(1000, 201061930, iw_wheel_distance_nm(&wheel));
+    TEST_ASSERT_INT64_WITHIN(1000, 201061930, distance_nm());
     hear_speed(100);
     TEST_ASSERT_EQUAL_INT(2010, iw_wheel_speed_mm_s(&wheel));
     hear_speed(-100);
@@ -195,7 +199,7 @@ static void test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only(void) {
     begin_side(IW_LEFT);
     hear_ticks(0);
     hear_ticks(25);
-    TEST_ASSERT_INT64_WITHIN(1000, 40212386, iw_wheel_distance_nm(&wheel));
+    TEST_ASSERT_INT64_WITHIN(1000, 40212386, distance_nm());
     hear_speed(100);
     TEST_ASSERT_EQUAL_INT(2010, iw_wheel_speed_mm_s(&wheel));
     config.rpm_of_rotor = true;
@@ -222,7 +226,7 @@ static void test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere(void
             hear_ticks(10);
             const int64_t expected_nm = nm_per_turn_60th(radii_mm[r]) * 10 * gears[g][1] / gears[g][0];
             const uint64_t margin_nm = (uint64_t)expected_nm / 100000U + 100U;
-            TEST_ASSERT_INT64_WITHIN(margin_nm, expected_nm, iw_wheel_distance_nm(&wheel));
+            TEST_ASSERT_INT64_WITHIN(margin_nm, expected_nm, distance_nm());
         }
     }
 }
@@ -251,7 +255,7 @@ static void test_wheel_inverted_negates_what_the_machine_sees_only(void) {
     hear_speed(100);
     TEST_ASSERT_EQUAL_INT64(10, wheel.ticks);
     TEST_ASSERT_EQUAL_INT(100, wheel.speed.speed_rpm);
-    TEST_ASSERT_INT64_WITHIN(1000, -201061930, iw_wheel_distance_nm(&wheel));
+    TEST_ASSERT_INT64_WITHIN(1000, -201061930, distance_nm());
     TEST_ASSERT_EQUAL_INT(-2010, iw_wheel_speed_mm_s(&wheel));
     begin_side(IW_LEFT);
     hear_speed(100);

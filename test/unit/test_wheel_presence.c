@@ -56,10 +56,14 @@ static void hear_for(iw_time_us_t for_us, int16_t rpm) {
     now_us = until_us;
 }
 
+static bool rests(iw_time_us_t at_us, uint32_t for_us) {
+    return iw_wheel_rest_us(&wheel, at_us + 1U) > for_us;
+}
+
 static void test_wheel_never_heard_is_lost_and_not_at_rest(void) {
     TEST_ASSERT_FALSE(iw_wheel_heard(&wheel, now_us));
     TEST_ASSERT_TRUE(iw_wheel_lost(&wheel, now_us));
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_FALSE(rests(now_us, 0));
     TEST_ASSERT_TRUE(wheel.speed_us == IW_NEVER);
     TEST_ASSERT_TRUE(wheel.rest_since_us == IW_NEVER);
     TEST_ASSERT_EQUAL_INT(IW_REBOOT_NONE, iw_wheel_take_reboot(&wheel));
@@ -142,17 +146,17 @@ static void test_wheel_at_rest_counts_an_unbroken_run(void) {
     hear(0);
     const iw_time_us_t start_us = now_us;
     hear_for(MS(200), 0);
-    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us, 0));
-    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, start_us + MS(200), 200000));
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, start_us + MS(200) - 1U, 200000));
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, start_us + MS(200), 500000));
+    TEST_ASSERT_TRUE(rests(now_us, 0));
+    TEST_ASSERT_TRUE(rests(start_us + MS(200), 200000));
+    TEST_ASSERT_FALSE(rests(start_us + MS(200) - 1U, 200000));
+    TEST_ASSERT_FALSE(rests(start_us + MS(200), 500000));
     now_us += MS(4);
     hear(3);
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_FALSE(rests(now_us, 0));
     now_us += MS(4);
     hear(0);
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 1));
-    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us + 1U, 1));
+    TEST_ASSERT_FALSE(rests(now_us, 1));
+    TEST_ASSERT_TRUE(rests(now_us + 1U, 1));
 }
 
 static void test_wheel_at_rest_has_its_limit_in_both_directions(void) {
@@ -164,12 +168,12 @@ static void test_wheel_at_rest_has_its_limit_in_both_directions(void) {
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         begin();
         hear(cases[i].rpm);
-        TEST_ASSERT_EQUAL_INT(cases[i].rest, iw_wheel_at_rest(&wheel, now_us, 0));
+        TEST_ASSERT_EQUAL_INT(cases[i].rest, rests(now_us, 0));
     }
     config.rest_rpm = 0;
     begin();
     hear(1);
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
 static void test_wheel_rest_is_broken_by_a_gap(void) {
@@ -177,23 +181,23 @@ static void test_wheel_rest_is_broken_by_a_gap(void) {
     hear_for(MS(400), 0);
     now_us += SILENT_US - 4000U;
     hear(0);
-    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us, 400000));
+    TEST_ASSERT_TRUE(rests(now_us, 400000));
     now_us += SILENT_US;
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_FALSE(rests(now_us, 0));
     hear(0);
-    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us, 0));
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 1));
+    TEST_ASSERT_TRUE(rests(now_us, 0));
+    TEST_ASSERT_FALSE(rests(now_us, 1));
 }
 
 static void test_wheel_rest_does_not_begin_but_can_end_with_a_frame_of_unknown_age(void) {
     hear_as(0, false);
     hear(5);
     hear_as(0, false);
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_FALSE(rests(now_us, 0));
     hear(0);
-    TEST_ASSERT_TRUE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_TRUE(rests(now_us, 0));
     hear_as(30, false);
-    TEST_ASSERT_FALSE(iw_wheel_at_rest(&wheel, now_us, 0));
+    TEST_ASSERT_FALSE(rests(now_us, 0));
 }
 
 static void test_wheel_silent_for_a_second_has_rebooted(void) {

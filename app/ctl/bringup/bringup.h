@@ -39,7 +39,9 @@ typedef struct {
 typedef struct {
     char folder[64]; ///< Empty: none was made.
     char program[512];
-    int pid; ///< 0: none runs.
+    int pid;   ///< 0: none runs.
+    int guard; ///< The process that removes the folder when nobody holds `leash` any more; 0: none.
+    int leash;
 } trial_t;
 
 typedef struct {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The gateway of the session: started with a trial configuration in a folder of its own, ended with us whatever happens.
+// The gateway of the session: started with a trial configuration in a folder of its own; both end with us whatever happens.
 #include "bringup.h"
 #include "talk/signals.h"
 #include "text/text.h"
@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,6 +32,60 @@ static void path_of(const trial_t *trial, const char *name, char *out_path, size
     (void)snprintf(out_path, size, "%s/%s", trial->folder, name);
 }
 
+static int remove_one(const char *path, const struct stat *status, int kind, struct FTW *place) {
+    (void)status;
+    (void)kind;
+    (void)place;
+    (void)remove(path); // What cannot be removed now is tried again.
+    return 0;
+}
+
+/// With all that is in it: the gateway leaves its ledger there, and recordings of stops. Its keeper and its writer end a
+/// little later than it does, and may still be at it. 0, or an exit code.
+static int remove_folder(const char *folder) {
+    const int64_t end_us = client_now_us() + END_US;
+    while (access(folder, F_OK) == 0) {
+        (void)nftw(folder, remove_one, 8, FTW_DEPTH | FTW_PHYS | FTW_MOUNT);
+        if (client_now_us() > end_us) {
+            return CTL_UNAVAILABLE;
+        }
+        nap();
+    }
+    return 0;
+}
+
+/// Waits until neither we nor the gateway hold the leash, whatever ended us, and removes the folder. In a session of its own,
+/// which neither Ctrl-C nor the end of a terminal reaches, and holding nothing else: neither the client's socket nor a pipe.
+_Noreturn static void become_guard(const char *folder, int held) {
+    char nothing;
+    (void)setsid();
+    (void)signal(SIGTERM, SIG_IGN);
+    (void)dup2(held, STDIN_FILENO);
+    (void)close_range(STDOUT_FILENO, UINT_MAX, 0);
+    while (read(STDIN_FILENO, &nothing, 1) < 0 && errno == EINTR) {
+    }
+    _exit(remove_folder(folder));
+}
+
+/// False if there can be no guard.
+static bool start_guard(trial_t *trial) {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) {
+        return false;
+    }
+    trial->guard = fork();
+    if (trial->guard == 0) {
+        (void)close(ends[1]);
+        become_guard(trial->folder, ends[0]);
+    }
+    trial->leash = ends[1];
+    (void)close(ends[0]);
+    if (trial->guard < 0) {
+        (void)close(ends[1]);
+    }
+    return trial->guard > 0;
+}
+
 static bool make_folder(trial_t *trial) {
     const char *runtime = getenv("XDG_RUNTIME_DIR");
     if (trial->folder[0] != '\0') {
@@ -38,12 +93,16 @@ static bool make_folder(trial_t *trial) {
     }
     (void)snprintf(trial->folder, sizeof(trial->folder), "%.30s/iwheel-bringup-XXXXXX",
                    runtime != NULL && runtime[0] == '/' && strlen(runtime) <= 30U ? runtime : "/tmp");
-    if (mkdtemp(trial->folder) == NULL) {
-        (void)ctl_fail(CTL_UNAVAILABLE, "cannot make a folder like %s: %s", trial->folder, strerror(errno));
-        trial->folder[0] = '\0';
-        return false;
+    const bool made = mkdtemp(trial->folder) != NULL;
+    if (made && start_guard(trial)) {
+        return true;
     }
-    return true;
+    (void)ctl_fail(CTL_UNAVAILABLE, "cannot make a folder like %s: %s", trial->folder, strerror(errno));
+    if (made) {
+        (void)rmdir(trial->folder);
+    }
+    trial->folder[0] = '\0';
+    return false;
 }
 
 /// The configuration to be tried, slowed down, with everything that belongs to a real gateway turned to our folder.
@@ -120,6 +179,7 @@ _Noreturn static void become_gateway(const trial_t *trial) {
     (void)sigprocmask(SIG_SETMASK, &none, NULL);
     (void)setpgid(0, 0); // Ctrl-C is for us: we end it in order.
     (void)prctl(PR_SET_PDEATHSIG, SIGTERM);
+    (void)fcntl(trial->leash, F_SETFD, 0); // The folder is there as long as it runs.
     (void)execlp(trial->program, trial->program, "-c", config, (char *)NULL);
     (void)fprintf(stderr, "%s: %s; name it with --gateway PROGRAM\n", trial->program, strerror(errno));
     _exit(CTL_UNAVAILABLE);
@@ -197,28 +257,20 @@ void trial_stop(bringup_t *self) {
     self->trial.pid = 0;
 }
 
-static int remove_one(const char *path, const struct stat *status, int kind, struct FTW *place) {
-    (void)status;
-    (void)kind;
-    (void)place;
-    (void)remove(path); // What cannot be removed now is tried again.
-    return 0;
-}
-
-/// With all that is in it: the gateway leaves its ledger there, and recordings of stops. Its keeper and its writer end a
-/// little later than it does, and may still be at it.
 void trial_close(bringup_t *self) {
-    const int64_t end_us = client_now_us() + END_US;
+    trial_t *trial = &self->trial;
+    int status = 0;
     trial_stop(self);
-    while (self->trial.folder[0] != '\0' && access(self->trial.folder, F_OK) == 0) {
-        (void)nftw(self->trial.folder, remove_one, 8, FTW_DEPTH | FTW_PHYS | FTW_MOUNT);
-        if (client_now_us() > end_us) {
-            talk_say("%s could not be removed; please do.", self->trial.folder);
-            break;
-        }
-        nap();
+    if (trial->folder[0] == '\0') {
+        return;
     }
-    self->trial.folder[0] = '\0';
+    (void)close(trial->leash);
+    while (waitpid(trial->guard, &status, 0) < 0 && errno == EINTR) {
+    }
+    if (status != 0) {
+        talk_say("%s could not be removed; please do.", trial->folder);
+    }
+    trial->folder[0] = '\0';
 }
 
 json_t *trial_status(bringup_t *self) {

@@ -3,6 +3,7 @@
 #include "assumption.h"
 #include "doctor.h"
 #include "names.h"
+#include "status/advice.h"
 #include "text/text.h"
 
 #include <grp.h>
@@ -50,15 +51,15 @@ static void list_contradicted(doctor_t *self, json_t *ledger) {
     }
 }
 
-static bool is_present(const json_t *status, const char *cause) {
-    size_t index = 0;
-    const json_t *present = NULL;
-    json_array_foreach(json_object_get(status, "present"), index, present) {
-        if (json_is_string(present) && strcmp(json_string_value(present), cause) == 0) {
-            return true;
-        }
+/// A setpoint that nobody acknowledges keeps arm refused, and may leave late.
+static void judge_sending(doctor_t *self) {
+    char cure[ADVICE_SIZE];
+    if (advice_is_present(self->gateway.status, "send_stalled")) {
+        inspect_say(&self->findings, "send_stalled", INSPECT_FAIL,
+                    "a setpoint of the gateway is not acknowledged on the bus");
+        (void)advice_cure(self->gateway.status, "send_stalled", cure);
+        inspect_cure(&self->findings, "%s", cure);
     }
-    return false;
 }
 
 static void look_at_status(doctor_t *self) {
@@ -72,7 +73,8 @@ static void look_at_status(doctor_t *self) {
     if (latched) {
         inspect_cure(findings, "iwheelctl why tells the cause; when it is gone: iwheelctl reset");
     }
-    if (is_present(status, "second_master")) {
+    judge_sending(self);
+    if (advice_is_present(status, "second_master")) {
         inspect_say(findings, "second_master", INSPECT_FAIL,
                     "the gateway hears setpoints that are not its own, id 266 (0x10A) or 298 (0x12A)");
         inspect_cure(findings, "switch off the other program or device that sends them");

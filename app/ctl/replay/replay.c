@@ -96,7 +96,7 @@ static void begin_core(replay_t *self, const iw_config_t *config, iw_time_us_t a
     self->state = seen.state;
     (void)memcpy(self->ledger, seen.assumed, sizeof self->ledger);
     for (size_t side = 0; side < IW_SIDES; side++) {
-        self->force[side] = seen.wheel[side].force_validity;
+        self->force[side] = iw_snapshot_force_validity(&seen, (iw_side_t)side);
     }
 }
 

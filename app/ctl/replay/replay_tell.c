@@ -72,7 +72,7 @@ static const char *side_name(size_t side) {
 static void tell_wheels(replay_t *self, const iw_snapshot_t *seen) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         const bool heard = seen->wheel[side].heard;
-        const iw_force_validity_t force = seen->wheel[side].force_validity;
+        const iw_force_validity_t force = iw_snapshot_force_validity(seen, (iw_side_t)side);
         if (heard != self->heard[side]) {
             tell(self, self->now_us, "wheel", "%s %s", side_name(side), heard ? "heard" : "not heard any more");
             self->heard[side] = heard;

@@ -17,8 +17,7 @@ static const cure_t cures[] = {
     {"estop_software", "see that nobody is in the way"},
     {"wheel_lost", "switch the wheels on; check their cable and the termination"},
     {"wheel_rebooted", "find out why a wheel lost power; wait until both are heard"},
-    {"send_stalled",
-     "nobody takes our frames: check the wheels' power and the cable; if both are good, take the link down and up"},
+    {"send_stalled", "nobody takes our frames: check the wheels' power and the cable"},
     {"bus_down", "bring the bus up (or start the simulator)"},
     {"second_master", "switch off the other program or device that sends setpoints"},
     {"feedback_sign", "check `invert` and the wheels' wiring before anything else"},
@@ -30,13 +29,42 @@ static const cure_t cures[] = {
     {"lease_lost", "the client must send drive commands more often, or raise lease_ms"},
 };
 
-static const char *cure_of(const char *cause) {
+static bool is_heard(const json_t *status, const char *side) {
+    return json_is_true(json_object_get(json_object_get(status, side), "heard"));
+}
+
+/// Whoever is heard acknowledges as well: then it is no matter of power or cable, and lasts until the link is restarted.
+static bool has_lost_an_echo(const json_t *status, const char *bus) {
+    return strncmp(bus, "unix:", 5U) != 0 && is_heard(status, "left") && is_heard(status, "right");
+}
+
+bool advice_cure(const json_t *status, const char *cause, char out_cure[ADVICE_SIZE]) {
+    const char *bus = text_word(json_object_get(status, "bus"), "name");
+    out_cure[0] = '\0';
+    if (strcmp(cause, "send_stalled") == 0 && has_lost_an_echo(status, bus)) {
+        (void)snprintf(out_cure, ADVICE_SIZE,
+                       "the wheels are heard, so an echo was lost (or the bus is full): ip link set %.32s down; ip "
+                       "link set %.32s up (once and for all: systemctl enable --now iwheel-can-restart@%.32s.path)",
+                       bus, bus, bus);
+        return true;
+    }
     for (size_t i = 0; i < sizeof(cures) / sizeof(cures[0]); i++) {
         if (strcmp(cures[i].cause, cause) == 0) {
-            return cures[i].cure;
+            (void)snprintf(out_cure, ADVICE_SIZE, "%s", cures[i].cure);
         }
     }
-    return NULL;
+    return out_cure[0] != '\0';
+}
+
+bool advice_is_present(const json_t *status, const char *cause) {
+    size_t index = 0;
+    const json_t *present = NULL;
+    json_array_foreach(json_object_get(status, "present"), index, present) {
+        if (json_is_string(present) && strcmp(json_string_value(present), cause) == 0) {
+            return true;
+        }
+    }
+    return false;
 }
 
 __attribute__((format(printf, 2, 3))) static void add(advice_t *self, const char *format, ...) {
@@ -72,9 +100,9 @@ static void add_present(const json_t *status, advice_t *self) {
     const json_t *present = NULL;
     json_array_foreach(json_object_get(status, "present"), index, present) {
         const char *cause = json_is_string(present) ? json_string_value(present) : "--";
-        const char *cure = cure_of(cause);
+        char cure[ADVICE_SIZE];
         if (strcmp(cause, text_word(status, "cause")) != 0) {
-            add(self, "%s: %s", cause, cure != NULL ? cure : "see: iwheelctl why");
+            add(self, "%.32s: %s", cause, advice_cure(status, cause, cure) ? cure : "see: iwheelctl why");
         }
     }
 }
@@ -100,17 +128,17 @@ static void advise_listening(const json_t *status, advice_t *self) {
 void advice_collect(const json_t *status, advice_t *out_advice) {
     const char *state = text_word(status, "state");
     const char *cause = text_word(status, "cause");
+    char cure[ADVICE_SIZE];
     memset(out_advice, 0, sizeof(*out_advice));
+    const bool known = advice_cure(status, cause, cure);
     if (strcmp(state, "listening") == 0) {
         advise_listening(status, out_advice);
     } else if (strcmp(state, "armed") == 0) {
         add(out_advice, "the wheels obey the holder of the lease; iwheelctl stop ends that");
     } else if (strcmp(state, "stopping") == 0) {
-        const char *cure = cure_of(cause);
-        add(out_advice, "%s", cure != NULL ? cure : "wait until both wheels are at rest, then arm again");
+        add(out_advice, "%s", known ? cure : "wait until both wheels are at rest, then arm again");
     } else if (strcmp(state, "latched") == 0) {
-        const char *cure = cure_of(cause);
-        add(out_advice, "%s, then: iwheelctl reset", cure != NULL ? cure : "remove the cause");
+        add(out_advice, "%.290s, then: iwheelctl reset", known ? cure : "remove the cause");
         add_present(status, out_advice);
     } else {
         add(out_advice, "this gateway speaks of a state unknown here; use the iwheelctl of its version");

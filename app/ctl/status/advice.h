@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-/// What to do next, by the state of the gateway.
+/// What to do next, by the state of the gateway, and about a cause.
 #ifndef ADVICE_H
 #define ADVICE_H
 
 #include <jansson.h>
+#include <stdbool.h>
 
 /// How many lines of advice there may be.
 #define ADVICE_LINES 6U
-#define ADVICE_SIZE  160U
+#define ADVICE_SIZE  320U
 
 typedef struct {
     char line[ADVICE_LINES][ADVICE_SIZE];
@@ -16,5 +17,11 @@ typedef struct {
 
 /// Reads the reply of status. At least one line.
 void advice_collect(const json_t *status, advice_t *out_advice);
+
+/// What to do about a cause, as the reply of status tells of bus and wheels. False, with nothing in it, if nobody knows.
+bool advice_cure(const json_t *status, const char *cause, char out_cure[ADVICE_SIZE]);
+
+/// True if the gateway has seen the cause within the last second, or sees it still.
+bool advice_is_present(const json_t *status, const char *cause);
 
 #endif

@@ -54,15 +54,29 @@ void duration_write(int64_t us, char *out_text, size_t size) {
     (void)snprintf(out_text, size, "%" PRId64 "%s", us / units[i].us, units[i].name);
 }
 
+/// A number without its unit was meant in seconds, one with `m` in minutes. False: nobody knows what was meant,
+/// or that would not do either.
+static bool guess(const char *text, duration_range_t range, char *out_text, size_t size) {
+    int64_t us = 0;
+    const size_t digits = strspn(text, "0123456789.");
+    const bool minutes = strcmp(text + digits, "m") == 0;
+    (void)snprintf(out_text, size, "%.*s%s", (int)digits, text, minutes ? "min" : "s");
+    return (minutes || text[digits] == '\0') && duration_parse(out_text, &us) && us >= range.min_us &&
+           us <= range.max_us;
+}
+
 bool duration_option(const char *option, const char *text, duration_range_t range, int64_t *out_us,
                      char out_why[DURATION_WHY_SIZE]) {
     char least[24];
     char most[24];
+    char meant[48];
     int64_t us = 0;
     if (text == NULL || !duration_parse(text, &us)) {
+        const bool guessed = text != NULL && guess(text, range, meant, sizeof meant);
         (void)snprintf(out_why, DURATION_WHY_SIZE,
-                       "%s wants a time with its unit, such as " DURATION_FORM ", not \"%.40s\"", option,
-                       text != NULL ? text : "");
+                       "%s wants a time with its unit, such as " DURATION_FORM ", not \"%.40s\"%s%s%s%s", option,
+                       text != NULL ? text : "", guessed ? "; write: " : "", guessed ? option : "", guessed ? " " : "",
+                       guessed ? meant : "");
         return false;
     }
     if (us < range.min_us || us > range.max_us) {

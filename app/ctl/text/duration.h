@@ -11,7 +11,7 @@
 #define DURATION_FORM "500ms, 1.5s, 2min or 1h"
 
 /// Of what is told about a wrong one.
-#define DURATION_WHY_SIZE 160U
+#define DURATION_WHY_SIZE 200U
 
 /// From and to what an option may be.
 typedef struct {
@@ -26,7 +26,7 @@ bool duration_parse(const char *text, int64_t *out_us);
 void duration_write(int64_t us, char *out_text, size_t size);
 
 /// The value of `option` (`text` may be null: there is none). False, with `*out_us` untouched and what is wrong and what to
-/// write in `out_why`, if it is none or out of range.
+/// write in `out_why`, if it is none or out of range: `2` is refused with `write: --listen 2s`.
 bool duration_option(const char *option, const char *text, duration_range_t range, int64_t *out_us,
                      char out_why[DURATION_WHY_SIZE]);
 

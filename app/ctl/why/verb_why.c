@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "status/advice.h"
 #include "talk/ctl.h"
 #include "talk/near.h"
 #include "text/text.h"
@@ -70,12 +71,26 @@ static void print_recording(const json_t *reply) {
     }
 }
 
+/// The sentence is as old as the stop; whether it is a matter of power, or of a lost echo, is seen only now.
+static void print_stalled(ctl_t *self) {
+    char cure[ADVICE_SIZE];
+    json_t *status = near_ask(self, json_pack("{s:s}", "cmd", "status"));
+    if (advice_is_present(status, "send_stalled") && advice_cure(status, "send_stalled", cure)) {
+        text_line(stdout, "send_stalled is there still: %s", cure);
+    }
+    json_decref(status);
+}
+
 static int ask(ctl_t *self, size_t frames) {
     json_t *reply = NULL;
     const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "why"), &reply);
-    if (code == CTL_OK && !self->json && why_print_stop(reply)) {
-        print_recording(reply);
-        why_print_told(reply, frames);
+    if (code == CTL_OK && !self->json) {
+        const bool stopped = why_print_stop(reply);
+        print_stalled(self);
+        if (stopped) {
+            print_recording(reply);
+            why_print_told(reply, frames);
+        }
     }
     json_decref(reply);
     return code;

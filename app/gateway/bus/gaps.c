@@ -3,7 +3,7 @@
 
 const uint16_t gw_gap_limits_ms[GW_GAP_BUCKETS - 1U] = {5, 10, 15, 20, 25, 30, 40, 50, 100};
 
-void gw_gaps_note(gw_gaps_t *self, const iw_snapshot_sent_t *sent) {
+void gw_gaps_note(gw_gaps_t *self, const iw_sent_t *sent) {
     if (sent->pairs == self->pairs) {
         return;
     }

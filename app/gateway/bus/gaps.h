@@ -21,7 +21,7 @@ typedef struct {
 extern const uint16_t gw_gap_limits_ms[GW_GAP_BUCKETS - 1U];
 
 /// Looks at what was sent after a step, which sends one pair at the most.
-void gw_gaps_note(gw_gaps_t *self, const iw_snapshot_sent_t *sent);
+void gw_gaps_note(gw_gaps_t *self, const iw_sent_t *sent);
 
 /// Writes the object's fields.
 void gw_gaps_write(const gw_gaps_t *self, json_out_t *json);

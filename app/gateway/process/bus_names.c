@@ -74,7 +74,7 @@ static uid_t search_list(int fd, const char *name) {
     (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     while (iw_clock_now_us() < until_us) {
         const ssize_t got = recv(fd, buffer, sizeof buffer, 0);
-        struct nlmsghdr *message = (struct nlmsghdr *)(void *)buffer;
+        struct nlmsghdr *message = (struct nlmsghdr *)buffer;
         for (ssize_t left = got; left > 0 && NLMSG_OK(message, (size_t)left); message = NLMSG_NEXT(message, left)) {
             const uid_t uid = message->nlmsg_type == SOCK_DIAG_BY_FAMILY ? owner_in(message, name) : NOBODY;
             if (uid != NOBODY || message->nlmsg_type == NLMSG_DONE || message->nlmsg_type == NLMSG_ERROR) {
@@ -207,7 +207,9 @@ static seen_t look(const gw_bus_names_t *self, gw_holder_t *out_holder) {
     for (size_t i = 0; i < sizeof users / sizeof users[0]; ++i) {
         for (unsigned place = 1; place < GW_BUS_PLACES && seen != SEEN_EARLIER; ++place) {
             const seen_t one = look_at(self, users[i], place, out_holder);
-            seen = one > seen ? one : seen;
+            if (one > seen) {
+                seen = one;
+            }
         }
     }
     return seen;

@@ -12,8 +12,8 @@ void gw_report_start(gw_daemon_t *daemon);
 void gw_report_unopened(const gateway_config_t *config, const char *culprit, int error, FILE *err);
 
 /// Lines "ok", "warn", "fail" or "skip" on `out`, each with what mends it; listens to the bus for half a second, sends and makes
-/// nothing. EX_CONFIG if the configuration has to be changed; else 1 if something failed; else EX_UNAVAILABLE if something could
-/// not be looked at on this machine; else 0.
+/// nothing. 1 if something failed; else EX_UNAVAILABLE if something could not be looked at on this machine; else 0, also if
+/// the gateway would start and only refuse arm: setpoint type or current role are not known yet.
 int gw_report_check(const gateway_config_t *config, FILE *out);
 
 #endif

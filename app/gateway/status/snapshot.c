@@ -58,7 +58,7 @@ static void write_motion(const iw_snapshot_t *seen, iw_side_t side, json_out_t *
 static void write_condition(const iw_snapshot_t *seen, iw_side_t side, json_out_t *json) {
     const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
     const iw_codec_status_t *status = &wheel->told->status;
-    const iw_force_validity_t force = wheel->force_validity;
+    const iw_force_validity_t force = iw_snapshot_force_validity(seen, side);
     const bool ever = wheel->status_us != IW_NEVER;
     const bool fresh = gw_snapshot_is_fresh(seen->at_us, wheel->status_us, GW_STATUS_STALE_US);
     const bool warm = fresh && status->temperature_degC <= IW_TEMPERATURE_MAX_degC;
@@ -67,7 +67,7 @@ static void write_condition(const iw_snapshot_t *seen, iw_side_t side, json_out_
     json_out_known(json, "temperature_degC", warm, status->temperature_degC);
     json_out_known(json, "cpu_percent", cpu, status->cpu_percent);
     json_out_known(json, "ticks", ever, wheel->ticks);
-    json_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->distance_nm / 1000000);
+    json_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->ticks * wheel->nm_per_tick / 1000000);
     gw_snapshot_write_age(json, "status_age_ms", seen->at_us, wheel->status_us);
     json_out_int(json, "reboots", wheel->reboots);
     json_out_open(json, "valid", '{');
@@ -159,7 +159,7 @@ static void write_budget(const iw_snapshot_t *seen, json_out_t *json) {
 
 static void write_counters(const iw_snapshot_t *seen, json_out_t *json) {
     const iw_counters_t *counters = seen->counters;
-    const iw_snapshot_sent_t *sent = &seen->sent;
+    const iw_sent_t *sent = seen->sent;
     json_out_open(json, "counters", '{');
     json_out_int(json, "received", counters->received);
     json_out_int(json, "echoes", counters->echoes);
@@ -174,8 +174,8 @@ static void write_counters(const iw_snapshot_t *seen, json_out_t *json) {
     json_out_int(json, "pairs", sent->pairs);
     json_out_int(json, "send_later", sent->later);
     json_out_int(json, "clamped", sent->clamped);
-    json_out_int(json, "gate_stopped", sent->stopped);
-    json_out_int(json, "stray_echoes", sent->stray_echoes);
+    json_out_int(json, "gate_stopped", seen->stopped);
+    json_out_int(json, "stray_echoes", seen->stray_echoes);
     json_out_int(json, "gap_max_us", sent->gap_max_us);
     json_out_int(json, "still_moving", seen->still_moving);
     json_out_close(json, '}');

@@ -70,7 +70,7 @@ static void write_known_bool(json_out_t *json, const char *name, bool known, boo
 void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side,
                                    json_out_t *json) {
     const iw_force_t *force = seen->wheel[side].force;
-    const iw_force_validity_t validity = seen->wheel[side].force_validity;
+    const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
     const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
     const bool offset = force->provenance != IW_OFFSET_NONE;
     const zero_t zero = describe_zero(daemon, seen, side);
@@ -99,7 +99,7 @@ void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json) {
     for (unsigned i = 0; i < IW_SIDES; ++i) {
         const iw_side_t side = (iw_side_t)i;
         const iw_force_t *force = seen.wheel[side].force;
-        const iw_force_validity_t validity = seen.wheel[side].force_validity;
+        const iw_force_validity_t validity = iw_snapshot_force_validity(&seen, side);
         const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
         const zero_t zero = describe_zero(daemon, &seen, side);
         json_out_open(json, side == IW_LEFT ? "left" : "right", '{');

@@ -13,7 +13,7 @@
 #ifndef IW_EVIDENCE_H
 #define IW_EVIDENCE_H
 
-#include "iwheel/gateway.h"
+#include "iwheel/snapshot.h"
 
 /// A wheel slower than this (geometric mean of two frames) says too little about its ratio: 1 rpm of resolution is 10 %.
 #define IW_EVIDENCE_RPM 10
@@ -63,6 +63,6 @@ typedef struct {
 void iw_motion_evidence_init(iw_motion_evidence_t *self);
 
 /// After each step: what it has brought, into what the gateway assumes. `seen`: looked at since the step.
-void iw_motion_evidence_look(iw_motion_evidence_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen);
+void iw_motion_evidence_look(iw_motion_evidence_t *self, struct iw_gateway *gateway, const iw_snapshot_t *seen);
 
 #endif

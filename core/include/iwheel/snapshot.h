@@ -33,27 +33,15 @@ typedef struct {
     uint32_t left_behind;  ///< Times that a setpoint was left in a controller (see `iw_snapshot_t::left_behind`).
 } iw_counters_t;
 
-/// What was sent.
-typedef struct {
-    uint32_t pairs;        ///< Whole pairs taken by the port.
-    uint32_t later;        ///< Setpoints that the port did not take.
-    uint32_t clamped;      ///< Currents that the codec had to clamp. Nonzero means an error of ours.
-    uint32_t stopped;      ///< Frames that the envelope stopped. Nonzero means an error of ours.
-    uint32_t stray_echoes; ///< Echoes that nothing was waiting for.
-    uint32_t gap_us;       ///< Between the last two pairs; 0: the last one was the first after silence.
-    uint32_t gap_max_us;   ///< The largest since the last silence ended.
-} iw_snapshot_sent_t;
-
 /// One wheel. mm/s and distance are in the machine's frame of reference (`invert` applied), rpm and ticks in the wheel's.
 typedef struct {
-    const iw_codec_wheel_t *told;       ///< What it last told, message by message, as on the bus.
-    const iw_force_t *force;            ///< Its force, and where its zero comes from.
-    iw_force_validity_t force_validity; ///< Whether `iw_force_net_mN` means anything now, and if not, why.
-    iw_time_us_t speed_us;              ///< When its last speed frame came; IW_NEVER: none yet.
-    iw_time_us_t status_us;             ///< The same of its status; IW_NEVER also after a reboot, until it tells anew.
-    int64_t ticks;                      ///< Odometry, unwrapped, across reboots.
-    int64_t distance_nm;
-    int32_t speed_mm_s; ///< Measured, rounded towards zero. Meaningless while not heard.
+    const iw_codec_wheel_t *told; ///< What it last told, message by message, as on the bus.
+    const iw_force_t *force;      ///< Its force, and where its zero comes from.
+    iw_time_us_t speed_us;        ///< When its last speed frame came; IW_NEVER: none yet.
+    iw_time_us_t status_us;       ///< The same of its status; IW_NEVER also after a reboot, until it tells anew.
+    int64_t ticks;                ///< Odometry, unwrapped, across reboots. The distance in nm is `ticks * nm_per_tick`.
+    int32_t nm_per_tick;          ///< Negative where `invert` is set.
+    int32_t speed_mm_s;           ///< Measured, rounded towards zero. Meaningless while not heard.
     uint32_t um_s_per_rpm;
     uint32_t reboots;
     bool heard;   ///< Its speed was heard less than `wheel_silent_ms` ago.
@@ -64,11 +52,13 @@ typedef struct {
     iw_time_us_t at_us; ///< When it was looked.
     const iw_config_t *config;
     const iw_counters_t *counters;
+    const iw_sent_t *sent;
     const iw_stop_t *stop;            ///< The last one; `number` is 0 if there was none.
     const iw_ledger_entry_t *assumed; ///< What is assumed of the wheels, by iw_ledger_item_t.
     const iw_time_us_t *seen_us;      ///< When each iw_cause_t was last seen; IW_NEVER: never.
     iw_snapshot_wheel_t wheel[IW_SIDES];
-    iw_snapshot_sent_t sent;
+    uint32_t stopped;            ///< Frames that the envelope stopped. Nonzero means an error of ours.
+    uint32_t stray_echoes;       ///< Echoes that nothing was waiting for.
     iw_time_us_t pose_us;        ///< Of the pose that the right wheel told; IW_NEVER: none.
     iw_time_us_t armed_us;       ///< When ARMED began or the lease was taken over.
     iw_time_us_t lease_until_us; ///< In ARMED: without another drive command the lease ends here.
@@ -99,6 +89,10 @@ typedef struct {
 
 /// Looks at everything. `now_us`: of the last step, or later.
 void iw_gateway_snapshot(const struct iw_gateway *self, iw_time_us_t now_us, iw_snapshot_t *out_snapshot);
+
+/// Whether `iw_force_net_mN` of a wheel's force means anything, and if not, why: what the sensor shows, and what is assumed
+/// of its unit and offset.
+iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_side_t side);
 
 /// Four of its answers alone, for those who need no more.
 iw_state_t iw_gateway_state(const struct iw_gateway *self);

@@ -45,6 +45,15 @@ typedef struct {
     iw_command_t wheel[IW_SIDES];
 } iw_pair_t;
 
+/// What was sent: counted since the start.
+typedef struct {
+    uint32_t pairs;      ///< Whole pairs taken by the port.
+    uint32_t later;      ///< Setpoints that the port did not take.
+    uint32_t clamped;    ///< Currents that the encoder had to clamp. Nonzero means an error of ours.
+    uint32_t gap_us;     ///< Between the last two pairs; 0: the last one was the first after silence.
+    uint32_t gap_max_us; ///< The largest since the last silence ended.
+} iw_sent_t;
+
 /// What the current beside the speed means to the wheel. The document does not say, so there is no default and the
 /// wheels do not move until it is set.
 typedef enum {
@@ -122,7 +131,7 @@ typedef enum {
     IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
     IW_REFUSE_STALE_COMMAND, ///< `iw_permit_t::stale_client` sent a nonzero drive too recently.
     IW_REFUSE_LISTEN_ONLY,
-    IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_ledger_doubt` tells which.
+    IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_snapshot_t::doubt` tells which.
     IW_REFUSALS,
 } iw_refusal_t;
 

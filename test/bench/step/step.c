@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// A gateway that drives two obedient wheels, to be run by a counter of instructions: `bench_prepare` brings it to a steady drive, then
-/// `bench_idle` is one step with nothing due, `bench_pair` one in which a pair is due, `bench_frame_in` one that receives a speed.
+/// `bench_idle` is one step with nothing due, `bench_pair` one in which a pair is due, `bench_frame_in` one that receives a speed; `bench_look` takes a snapshot.
 #include "iwheel/gateway.h"
 
 #define CLIENT 7U
@@ -112,4 +112,16 @@ int bench_frame_in(void) {
     wheel_speaks(IW_LEFT);
     (void)iw_gateway_step(&gateway, gateway.promised_us - 1U);
     return gateway.counters.received != received;
+}
+
+static iw_snapshot_t seen;
+
+/// Everything that may be known, looked at once.
+void bench_look(void) {
+    iw_gateway_snapshot(&gateway, gateway.promised_us, &seen);
+}
+
+/// 1 if it has seen what there is.
+int bench_seen(void) {
+    return seen.state == IW_STATE_ARMED && seen.wheel[IW_LEFT].heard && seen.wheel[IW_RIGHT].heard;
 }

@@ -177,6 +177,7 @@ def row30_gives_way(t):
     command = rig.gateway_command("--socket", os.path.join(folder, "gateway.sock"), "--estop", "none")
     shutil.copy(rig.path("gateway.conf"), folder)
     command[command.index(rig.path("gateway.conf"))] = os.path.join(folder, "gateway.conf")
+    command[0] = shutil.copy(command[0], folder)  # The build may lie where only its owner comes, as in /root.
     os.chown(os.path.join(folder, "gateway.conf"), STRANGER, STRANGER)
     theirs = Process(command, rig.path("theirs.out"), become_stranger)
     rig.processes.append(theirs)

@@ -3,6 +3,7 @@
 
 import os
 import re
+import subprocess
 import time
 
 import netdev
@@ -320,6 +321,22 @@ def restart_as_the_unit_does(t, interface):
             netdev.command(*command.replace("%I", interface).split())
 
 
+def told_by_the_tool(t, rig):
+    """What `iwheelctl why` and `doctor` say of it, in one text each."""
+    def ask(*words):
+        return " ".join(subprocess.run([rig.program("iwheelctl"), "--socket", rig.path("gateway.sock"), *words], text=True,
+                                       stdin=subprocess.DEVNULL, capture_output=True, check=False).stdout.split())
+    return {"why": ask("why"), "doctor": ask("doctor", "--no-press", "--listen", "300ms"), "status": ask("status")}
+
+
+def restart_as_doctor_says(t, rig):
+    """The commands, as they stand in its cure."""
+    commands = re.search(r"ip link set \S+ down; ip link set \S+ up", told_by_the_tool(t, rig)["doctor"])
+    if t.check(commands is not None, "doctor names the commands"):
+        for command in commands[0].split("; "):
+            netdev.command(*command.split())
+
+
 def lost_echo(t, cure):
     """An echo gets lost while driving, and the gateway may not restart the link: told, and cured without starting it anew."""
     rig = t.rig(LATE)
@@ -343,7 +360,9 @@ def lost_echo(t, cure):
     said = " ".join(client.request("status")["warnings"])
     for sentence in (refused, said):
         t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in sentence, f"the cure is named: {sentence}")
-    t.check(f"iwheel-can-restart@{rig.interface}.path" in said, f"and the service's: {said}")
+    for what, text in {"a warning": said, **told_by_the_tool(t, rig)}.items():
+        t.check(f"ip link set {rig.interface} down; ip link set {rig.interface} up" in text, f"{what} names the cure: {text}")
+        t.check(f"systemctl enable --now iwheel-can-restart@{rig.interface}.path" in text, f"{what} names the unit: {text}")
     told = [e["present"] for e in observer.collect(0.1) if e["event"] == "fault" and e["cause"] == "setpoint_left"]
     t.check(told == [True], f"the event comes: {told}")
     silent_us = now_us()
@@ -361,7 +380,7 @@ def lost_echo(t, cure):
 
 @kernel_test("a lost echo, link may not be restarted: told; cured by taking the link down and up", "echo", 17)
 def row17_echo_lost_no_rights(t):
-    lost_echo(t, lambda rig: [netdev.command("ip", "link", "set", rig.interface, state) for state in ("down", "up")])
+    lost_echo(t, lambda rig: restart_as_doctor_says(t, rig))
 
 
 @kernel_test("a lost echo, link may not be restarted: the unit that may is asked, and cures it", "echo", 17)

@@ -12,7 +12,8 @@
 
 typedef struct {
     iw_ledger_entry_t entry[IW_LEDGER_ITEMS];
-    uint32_t changes; ///< Grows with every change: for whoever wants to tell or to store it.
+    uint32_t changes;       ///< Grows with every change: for whoever wants to tell or to store it.
+    iw_ledger_item_t doubt; ///< The first contradicted item that guards motion; IW_LEDGER_ITEMS if there is none.
 } iw_ledger_t;
 
 /// Every item ASSUMED: documented ones with IW_EVIDENCE_DOCUMENT, the others with IW_EVIDENCE_NONE.
@@ -32,9 +33,6 @@ iw_ledger_item_t iw_ledger_force_unit(iw_side_t side);
 
 /// True if the wheels must not be moved while this item is contradicted: type, role and the signs.
 bool iw_ledger_guards_motion(iw_ledger_item_t item);
-
-/// The first contradicted item that guards motion; IW_LEDGER_ITEMS if there is none.
-iw_ledger_item_t iw_ledger_doubt(const iw_ledger_t *self);
 
 /// The item's present entry.
 const iw_ledger_entry_t *iw_ledger_entry(const iw_ledger_t *self, iw_ledger_item_t item);

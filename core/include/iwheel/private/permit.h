@@ -85,6 +85,7 @@ typedef struct {
     iw_phase_t phase;
     iw_refusal_t arm_refusal; ///< Why the last arming failed.
     uint8_t strangers;        ///< Foreign setpoints in RESTARTING.
+    bool quiet;               ///< No latching cause is there or happened lately: nothing to look for.
     bool at_once;             ///< BRAKING and what follows: zero without ramp.
 } iw_permit_t;
 
@@ -107,7 +108,9 @@ void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view
 iw_state_t iw_permit_state(const iw_permit_t *self);
 
 /// An arm that was granted waits for its TX confirmation.
-bool iw_permit_arming(const iw_permit_t *self);
+static inline bool iw_permit_arming(const iw_permit_t *self) {
+    return self->phase == IW_PHASE_ARMING || self->phase == IW_PHASE_REARMING;
+}
 
 /// True if this cause latches, at least while setpoints are sent.
 bool iw_cause_latches(iw_cause_t cause);

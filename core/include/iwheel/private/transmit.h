@@ -110,12 +110,8 @@ typedef struct {
     const iw_hal_t *hal;
     iw_confirmation_t confirmation;
     iw_envelope_t envelope;
-    iw_time_us_t pair_us;           ///< When the last whole pair was taken by the port; IW_NEVER: none since silence.
-    uint32_t gap_us;                ///< Between the last two pairs.
-    uint32_t gap_max_us;            ///< The largest since the last silence ended.
-    uint32_t pairs;                 ///< Whole pairs taken by the port.
-    uint32_t later;                 ///< Setpoints that the port did not take.
-    uint32_t clamped;               ///< Currents that the encoder had to clamp.
+    iw_time_us_t pair_us; ///< When the last whole pair was taken by the port; IW_NEVER: none since silence.
+    iw_sent_t sent;
     iw_envelope_verdict_t verdict;  ///< The last that was not IW_ENVELOPE_PASS.
     iw_can_frame_t frame[IW_SIDES]; ///< The pair that is being sent: kept here to spare the stack.
 } iw_sender_t;

@@ -51,7 +51,8 @@ typedef struct {
     iw_time_us_t rest_since_us; ///< Start of the unbroken run of speed frames at rest; IW_NEVER: moving.
     iw_time_us_t excused_us;    ///< Our own stall ended here: silence before it is not the wheel's.
     int64_t ticks;              ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
-    uint32_t nm_per_tick;
+    int32_t
+        nm_per_tick; ///< In the machine's frame: negative where `invert` is set. With IW_WHEEL_TICKS_MAX it fits 64 bits.
     uint32_t um_s_per_rpm;
     uint32_t us_per_tick_min; ///< At IW_WHEEL_FASTEST_MM_S.
     uint32_t reboots;
@@ -80,14 +81,11 @@ bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us);
 /// True if it was never heard, or not for `wheel_silent_ms` and no stall of ours excuses that.
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
 
-/// True if heard, and |rpm| <= rest_rpm without a gap for the last `for_us`.
-bool iw_wheel_at_rest(const iw_wheel_t *self, iw_time_us_t now_us, uint32_t for_us);
+/// How long it has been heard with |rpm| <= rest_rpm, without a gap, UINT32_MAX at the most; 0: it turns, or is not heard.
+uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us);
 
 /// Measured speed in the machine's frame, rounded towards zero. Meaningless while not heard.
 int32_t iw_wheel_speed_mm_s(const iw_wheel_t *self);
-
-/// Distance in the machine's frame in nanometres. It stands still beyond IW_WHEEL_TICKS_MAX.
-int64_t iw_wheel_distance_nm(const iw_wheel_t *self);
 
 /// The evidence of a reboot since the last call, then IW_REBOOT_NONE.
 iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self);
