@@ -9,6 +9,7 @@ usage: man_pages.py --check | --update [--build DIR]
     ; commands           what `iwheel-sim help` lists
     ; configuration      what `iwheel-gateway --print-config` makes of share/gateway.conf
     ; document FILE      a document of ours, from Markdown
+    ; header FILE        the contract in a public header
     ; end
 """
 
@@ -22,7 +23,7 @@ import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim"}
-BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document|header)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
 UNDERLINE = re.compile(r"([_*\\])")
 
 
@@ -63,6 +64,12 @@ class Sources:
 
     def configuration(self, _):
         return literal(self.output("iwheel-gateway", "--print-config", "-c", os.path.join(ROOT, "share", "gateway.conf")))
+
+    def header(self, name):
+        """Without what only a compiler needs."""
+        with open(os.path.join(ROOT, name), encoding="utf-8") as file:
+            text = re.sub(r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|})\n", "", file.read(), flags=re.M)
+        return literal(re.sub(r"\n{3,}", "\n\n", text.replace("IWC_API ", "")))
 
     def document(self, name):
         with open(os.path.join(ROOT, name), encoding="utf-8") as file:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Keeps what is derived from share/northbound.json, the description of the northbound protocol, true to it.
 
-usage: northbound.py --check     fail unless the Python client's types, docs/northbound.md and the gateway's words agree with it
-       northbound.py --update    write the Python client's types anew
+usage: northbound.py --check     fail unless the Python client's types, the C reader's fields, docs/northbound.md, the words and limits agree with it
+       northbound.py --update    write the Python client's types and the C reader's fields anew
 
 The form of the description: `requests`, `events` and `objects` have `fields`, each with
 
@@ -29,28 +29,29 @@ import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 TYPES = os.path.join("python", "src", "iwheel", "_protocol.py")
+FIELDS = os.path.join("northbound", "src", "request_fields.h")
 DOCUMENT = os.path.join("docs", "northbound.md")
 PLAIN = {"integer": "int", "boolean": "bool", "text": "str"}
 FIELD_KEYS = {"type", "list", "keys", "null", "optional", "unit", "what", "least", "most", "default", "bytes"}
-# Where the gateway keeps its words: the function whose texts they are, and what else is among them.
+# Where the words are kept: the function whose texts they are, and what else is among them.
 SOURCES = {
-    "error": ("words/names.c", "gw_error_name", {"ok"}),
-    "topic": ("words/names.c", "gw_topic_name", set()),
-    "state": ("words/names.c", "gw_state_name", set()),
-    "cause": ("words/names.c", "gw_cause_name", {"none"}),
-    "bus_state": ("words/names.c", "gw_bus_state_name", set()),
-    "estop_state": ("words/names.c", "gw_estop_name", set()),
-    "sides": ("words/names.c", "gw_sides_name", set()),
-    "provenance": ("words/names.c", "gw_provenance_name", set()),
-    "window": ("words/names.c", "gw_window_name", set()),
-    "unit_evidence": ("words/names.c", "gw_unit_evidence_name", set()),
-    "force_validity": ("words/names.c", "gw_force_validity_name", set()),
-    "ledger_item": ("words/names.c", "gw_ledger_item_name", set()),
-    "ledger_state": ("words/names.c", "gw_ledger_state_name", set()),
-    "evidence": ("words/names.c", "gw_evidence_name", set()),
-    "timing": ("bus/bus_facts.c", "gw_bus_facts_timing", set()),
-    "memory_state": ("ledger/knowledge_json.c", "write_memory", {"memory", "file", "state", "reason"}),
-    "fault_alone": ("status/observe.c", "observe_faults", set()),
+    "error": ("northbound/src/words.c", "iwn_error_name", {"ok"}),
+    "topic": ("northbound/src/words.c", "iwn_topic_name", set()),
+    "state": ("northbound/src/words.c", "iwn_state_name", set()),
+    "cause": ("northbound/src/words.c", "iwn_cause_name", {"none"}),
+    "bus_state": ("northbound/src/words.c", "iwn_bus_state_name", set()),
+    "estop_state": ("northbound/src/words.c", "iwn_estop_name", set()),
+    "sides": ("northbound/src/words.c", "iwn_sides_name", set()),
+    "provenance": ("northbound/src/words.c", "iwn_provenance_name", set()),
+    "window": ("northbound/src/words.c", "iwn_window_name", set()),
+    "unit_evidence": ("northbound/src/words.c", "iwn_unit_evidence_name", set()),
+    "force_validity": ("northbound/src/words.c", "iwn_force_validity_name", set()),
+    "ledger_item": ("northbound/src/words.c", "iwn_ledger_item_name", set()),
+    "ledger_state": ("northbound/src/words.c", "iwn_ledger_state_name", set()),
+    "evidence": ("northbound/src/words.c", "iwn_evidence_name", set()),
+    "timing": ("app/gateway/bus/bus_facts.c", "gw_bus_facts_timing", set()),
+    "memory_state": ("app/gateway/ledger/knowledge_json.c", "write_memory", {"memory", "file", "state", "reason"}),
+    "fault_alone": ("app/gateway/status/observe.c", "observe_faults", set()),
 }
 
 
@@ -247,6 +248,44 @@ def python_types(description):
     return header + "\n" + re.sub(r"(\nclass [^\n]*\n(?:    [^\n]*\n|\n(?=    ))*)\n(?=[A-Z_])", r"\1\n\n", body) + "\n"
 
 
+# The C reader's table ------------------------------------------------------------------------------------------------
+
+FIELDS_HEADER = """// SPDX-License-Identifier: MIT
+// The requests and their fields, beside cmd and id. Written by scripts/northbound.py from share/northbound.json.
+#ifndef IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
+#define IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
+
+/// In the order of iwn_cmd_t.
+"""
+KINDS = {"text": "TEXT", "boolean": "FLAG", "topic": "TOPICS", "side": "SIDE", "ledger_item": "ITEM"}
+MEMBERS = {"side": "sides"}  # Of iwn_request_t, where it is called otherwise.
+
+
+def c_kind(field):
+    if field["type"] == ["text", "integer"]:
+        return "VALUE"
+    return ("RATE" if field.get("least") == 1 else "INTEGER") if field["type"] == "integer" else KINDS[field["type"]]
+
+
+def c_macro(name, rows):
+    """A macro of several lines, as clang-format sets them."""
+    lines = [f"#define {name}", *(f"    {row}" for row in rows)]
+    return "\n".join([*(f"{line:119}\\" for line in lines[:-1]), lines[-1]])
+
+
+def c_fields(description):
+    rows = {}
+    for cmd in description.requests:
+        for name, field in description.fields(description.requests[cmd]).items():
+            required = "false" if field.get("optional") else "true"
+            row = (name, MEMBERS.get(name, name), c_kind(field), str(field.get("bytes", 0)), required)
+            rows.setdefault(row, []).append(f"BIT({cmd.upper()})")
+    fields = c_macro("IWN_REQUEST_FIELDS(ROW)", [f"ROW({', '.join(row)}, {' | '.join(bits)})" for row, bits in rows.items()])
+    names = c_macro("IWN_REQUEST_NAMES(NAME)", [f"NAME({cmd})" for cmd in description.requests])
+    told = "/// Name, member of iwn_request_t, kind, bytes of a text at most, whether it must be there, requests that have it.\n"
+    return f"{FIELDS_HEADER}{names}\n\n{told}{fields}\n\n#endif\n"
+
+
 # The documentation ---------------------------------------------------------------------------------------------------
 
 
@@ -288,6 +327,7 @@ class Document:
 
     def complaints(self):
         yield from self.requests()
+        yield from self.limits()
         yield from self.events()
         yield from self.snapshot()
         yield from self.errors()
@@ -318,8 +358,26 @@ class Document:
             else:
                 refusal = self.description.objects["refusal"]["fields"]
                 yield from self.description.complaints(body, refusal, f"example of a refusal of {cmd}")
+        yield from self.ranges(cmd, part)
         if cmd != "status":  # Its fields have tables of their own.
             yield from (f"{DOCUMENT}: {cmd} does not speak of {name}" for name in {**wanted, **replied} if name not in shown)
+
+    def limits(self):
+        """Numbers that hold for all requests and replies, before the first of them."""
+        text = " ".join(self.text.split("## Requests")[0].split())
+        limits = self.description.limits
+        told = {"request_bytes": f"A request has at most {limits['request_bytes']} bytes", "line_bytes": f"a reply or event at most {limits['line_bytes']}",
+                "id_text_bytes": f"a string of up to {limits['id_text_bytes']} bytes", "depth": f"nested at most {limits['depth']} deep"}
+        yield from (f"{DOCUMENT}: the limit {name} is not told as {words!r}" for name, words in told.items() if words not in text)
+
+    def ranges(self, cmd, part):
+        """Lengths, ranges and defaults of a request's fields."""
+        text = " ".join(part.split())
+        for name, field in self.description.fields(self.description.requests[cmd]).items():
+            wanted = [f"up to {field['bytes']} bytes"] if "bytes" in field else []
+            wanted += [f"{field['least']}..{field['most']}"] if "most" in field else []
+            wanted += [f"default {field['default']}"] if "default" in field else []
+            yield from (f"{DOCUMENT}: {name} of {cmd} is not told as {words!r}" for words in wanted if words not in text)
 
     def events(self):
         text = section(self.text, "## Events")
@@ -400,9 +458,8 @@ def differences(what, told, wanted):
 
 
 def gateway_words(description):
-    """What words a source of the gateway knows and the description does not, or the other way round."""
+    """What words a source of ours knows and the description does not, or the other way round."""
     for kind, (path, function, others) in SOURCES.items():
-        path = os.path.join("app", "gateway", path)
         match = re.search(rf"^(?:const char \*|static void ){function}\(.*?^}}", read(path), re.MULTILINE | re.DOTALL)
         if match is None:
             yield f"{path}: {function} is not there; scripts/northbound.py must know where the words of {kind} are now"
@@ -413,20 +470,37 @@ def gateway_words(description):
         yield from (f"share/northbound.json: {kind} has {word}, which {path} has not" for word in sorted(wanted - known))
 
 
+def c_limits(description):
+    """Numbers and orders that a header has and the description does not, or the other way round."""
+    path = "northbound/include/iwheel_northbound/{}.h"
+    limits, watch = description.limits, description.fields(description.requests["watch"])
+    wanted = {"IWN_LINE_MAX": limits["request_bytes"], "IWN_ID_TEXT_MAX": limits["id_text_bytes"], "IWN_RATE_MAX_HZ": limits["granted_rate_hz"],
+              "IWN_RATE_DEFAULT_HZ": watch["rate_hz"]["default"], "IWN_DEPTH_MAX": limits["depth"]}
+    for name, number in wanted.items():
+        header = path.format("json_in" if name == "IWN_DEPTH_MAX" else "request")
+        found = re.search(rf"^#define {name} +(\d+)U?$", read(header), re.MULTILINE)
+        if found is None or int(found[1]) != number:
+            yield f"{header}: {name} is {found and found[1]}, in share/northbound.json {number}"
+    for header, prefix, words in (("request", "CMD", description.requests), ("words", "TOPIC", description.words["topic"])):
+        found = [name.lower() for name in re.findall(rf"^    IWN_{prefix}_(\w+)", read(path.format(header)), re.MULTILINE)]
+        if found != list(words):
+            yield f"{path.format(header)}: IWN_{prefix}_... are {found}, in share/northbound.json {list(words)}"
+
+
 def main(arguments):
     if arguments not in (["--check"], ["--update"]):
         print(__doc__.split("\n\n")[1], file=sys.stderr)
         return 64
     description = Description()
     found = list(description.faults())
-    if arguments == ["--update"] and not found:
-        with open(os.path.join(ROOT, TYPES), "w", encoding="utf-8") as file:
-            file.write(python_types(description))
     if not found:
-        current = read(TYPES) if os.path.exists(os.path.join(ROOT, TYPES)) else ""
-        if current != python_types(description):
-            found.append(f"{TYPES} is not what share/northbound.json makes of it; mend: scripts/northbound.py --update")
-        found += [*gateway_words(description), *Document(description).complaints()]
+        for path, text in ((TYPES, python_types(description)), (FIELDS, c_fields(description))):
+            if arguments == ["--update"]:
+                with open(os.path.join(ROOT, path), "w", encoding="utf-8") as file:
+                    file.write(text)
+            elif not os.path.exists(os.path.join(ROOT, path)) or read(path) != text:
+                found.append(f"{path} is not what share/northbound.json makes of it; mend: scripts/northbound.py --update")
+        found += [*gateway_words(description), *c_limits(description), *Document(description).complaints()]
     print("\n".join(found) or "the description of the northbound protocol, its documentation, types and words agree")
     return 1 if found else 0
 

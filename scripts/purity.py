@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Fails unless the core is what it promises: no mutable data, nothing from libc but mem*, no floating point.
+"""Fails unless a portable library is what it promises: no mutable data, nothing from libc but mem*, no floating point.
 
-usage: purity.py LIBRARY SOURCE_DIR
+usage: purity.py [--strings] LIBRARY SOURCE_DIR
 
-LIBRARY is the core compiled for an ARM without an FPU, where every floating point operation is a call.
+LIBRARY is compiled for an ARM without an FPU, where every floating point operation is a call. With --strings it may use a few of str* too.
 """
 import re
 import subprocess
@@ -13,6 +13,7 @@ from pathlib import Path
 
 MUTABLE = set("bBdDCsSgGvV")
 LIBC = {"memcpy", "memset", "memmove", "memcmp"}
+STRINGS = {"strlen", "strcmp", "strchr"}
 # Integer helpers of the compiler's run-time library: division, multiplication and shifts of 64 bits, switch tables.
 RUNTIME = re.compile(r"__aeabi_(u?idiv(mod)?|u?ldivmod|lmul|ll?s[lr]|lasr|u?lcmp|mem(cpy|set|move|clr)[48]?|idiv0|ldiv0)$"
                      r"|__gnu_thumb1_case_\w+$|__clzsi2$|__ctzsi2$|__popcountsi2$")
@@ -20,7 +21,7 @@ HEADERS = {"stdbool.h", "stddef.h", "stdint.h", "limits.h", "string.h"}
 COMMENT = re.compile(r"//.*|/\*.*?\*/|\"[^\"\n]*\"", re.DOTALL)
 
 
-def symbol_findings(library):
+def symbol_findings(library, libc):
     run = subprocess.run(["arm-none-eabi-nm", "-A", library], capture_output=True, text=True, check=True)
     rows = [re.match(r"(?:.*:)?([^:]+):(?:[0-9a-f]+)?\s+(\w) (\S+)$", line) for line in run.stdout.splitlines() if line]
     symbols = [row.groups() for row in rows if row]
@@ -30,8 +31,8 @@ def symbol_findings(library):
     for unit, kind, name in symbols:
         if kind in MUTABLE:
             yield f"{unit}: {name}: mutable data (nm says {kind})"
-        if kind == "U" and name not in defined and name not in LIBC and not RUNTIME.match(name):
-            yield f"{unit}: {name}: undefined, and neither mem* nor an integer helper of the compiler"
+        if kind == "U" and name not in defined and name not in libc and not RUNTIME.match(name):
+            yield f"{unit}: {name}: undefined, and neither of {', '.join(sorted(libc))} nor an integer helper of the compiler"
 
 
 def source_findings(folder):
@@ -48,9 +49,11 @@ def source_findings(folder):
 
 
 def main(arguments):
-    if len(arguments) != 3:
+    libc = LIBC | STRINGS if "--strings" in arguments else LIBC
+    paths = [word for word in arguments[1:] if word != "--strings"]
+    if len(paths) != 2:
         sys.exit(__doc__)
-    findings = [*symbol_findings(arguments[1]), *source_findings(arguments[2])]
+    findings = [*symbol_findings(paths[0], libc), *source_findings(paths[1])]
     print(*findings, sep="\n")
     return 1 if findings else 0
 

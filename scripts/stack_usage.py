@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Worst stack of every entry point of the core, from gcc's call graph; fails on recursion, variable stack or too much.
+"""Worst stack of every entry point of the core, or of another library of ours, from gcc's call graph; fails on recursion, variable stack or too much.
 
-usage: stack_usage.py BUILD_DIR LIMIT_BYTES
+usage: stack_usage.py BUILD_DIR LIMIT_BYTES [LIBRARY]
 
 BUILD_DIR was configured with cmake/arm-none-eabi.cmake. Functions of the compiler's run-time library, which the graph does not
 know, are found through the relocations; they and mem* are charged a fixed amount. Calls through the HAL end here: a port adds its own.
@@ -53,7 +53,7 @@ def own_stack(size, name):
     """Bytes of one function alone."""
     if name in size:
         return size[name]
-    return 0 if name == INDIRECT else LIBC if name.startswith("mem") else RUNTIME
+    return 0 if name == INDIRECT else LIBC if name.startswith(("mem", "str")) else RUNTIME
 
 
 class Depth:
@@ -80,13 +80,14 @@ def short(name):
 
 
 def main(arguments):
-    if len(arguments) != 3:
+    if len(arguments) not in (3, 4):
         sys.exit(__doc__)
     limit = int(arguments[2])
-    objects = sorted(path for path in Path(arguments[1]).rglob("*.c.o*") if "iwheel_core.dir" in path.parts)
+    library = arguments[3] if len(arguments) == 4 else "iwheel_core"
+    objects = sorted(path for path in Path(arguments[1]).rglob("*.c.o*") if f"{library}.dir" in path.parts)
     objects = [path for path in objects if path.suffix in (".o", ".obj")]
     if not objects:
-        sys.exit(f"no objects of the core in {arguments[1]}: build a preset of the arm family first")
+        sys.exit(f"no objects of {library} in {arguments[1]}: build a preset of the arm family first")
     size, calls, findings = read_graph(objects)
     add_runtime_calls(objects, size, calls)
     depth = Depth(size, calls)

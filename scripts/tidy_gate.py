@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""clang-tidy on every file of core, port/linux and app that BUILD_DIR (preset clang) compiles; any finding fails.
+"""clang-tidy on every file of core, port/linux, app and client that BUILD_DIR (preset clang) compiles; any finding fails.
 
 usage: tidy_gate.py BUILD_DIR [JOBS]
 
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from file_by_file import ROOT, commands_of, look_at_all, tell
 
-FOLDERS = ("core/src/", "port/linux/", "app/")
+FOLDERS = ("core/src/", "northbound/src/", "port/linux/", "app/", "client/")
 
 
 def main(arguments):

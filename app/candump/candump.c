@@ -2,7 +2,8 @@
 #include "candump.h"
 
 #include "candump_data.h"
-#include "plain.h"
+
+#include "iwheel_northbound/text.h"
 
 #include <string.h>
 
@@ -64,7 +65,7 @@ static const char *parse_interface(candump_cursor_t *cursor, candump_t *frame) {
         frame->interface[length] = *cursor->at;
         length++;
     }
-    if (!plain_text(frame->interface)) {
+    if (!iwn_plain_text(frame->interface)) {
         return "the interface name holds characters that move a terminal; is the line damaged?";
     }
     return length == 0U || !skip_blanks(cursor) ? "ends behind the time or the interface; is the line cut?" : NULL;

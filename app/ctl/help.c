@@ -2,16 +2,17 @@
 #include "help.h"
 
 #include "gateway_config.h"
-#include "names.h"
 #include "similar.h"
 #include "text/duration.h"
+
+#include "iwheel_northbound/words.h"
 
 #include <string.h>
 
 #define WIDTH 80U
 
 static const char *topic_choice(unsigned number) {
-    return number < (unsigned)GW_TOPICS ? gw_topic_name((gw_topic_t)number) : NULL;
+    return number < (unsigned)IWN_TOPICS ? iwn_topic_name((iwn_topic_t)number) : NULL;
 }
 
 static const char *side_choice(unsigned number) {
@@ -20,7 +21,7 @@ static const char *side_choice(unsigned number) {
 }
 
 static const char *item_choice(unsigned number) {
-    return number < (unsigned)IW_LEDGER_ITEMS ? gw_ledger_item_name((iw_ledger_item_t)number) : NULL;
+    return number < (unsigned)IW_LEDGER_ITEMS ? iwn_ledger_item_name((iw_ledger_item_t)number) : NULL;
 }
 
 static const char *verb_choice(unsigned number);
@@ -42,6 +43,8 @@ static const verb_t verbs[] = {
     {VERB("watch", verb_watch, "[TOPIC...] [--rate HZ]", "events as they come, one JSON object per line",
           "Reads only. Topics: state bus estop lease stop force frame; without one: the first five.\n"
           "--rate HZ  1 to 100: events of state and force per second, 10 if not told\n"
+          "A reader that is too slow gets the latest values instead of a backlog, and before them how many events\n"
+          "were left out: {\"event\":\"lost\",\"count\":N}.\n"
           "Ends with exit code 0 on Ctrl-C or when nobody reads its output any more.\n"),
      .choice = topic_choice},
     {VERB("drive", verb_drive, "LEFT RIGHT [--for TIME] [--takeover] [--current LEFT RIGHT]",

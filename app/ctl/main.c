@@ -101,16 +101,15 @@ int main(int count, char **arguments) {
     static ctl_t ctl;
     arguments_t self = {.ctl = &ctl};
     (void)signal(SIGPIPE, SIG_IGN);
-    client_init(&ctl.client);
     self.words = (char **)calloc((size_t)count + 1U, sizeof(*self.words));
-    if (self.words == NULL) {
+    if (!client_init(&ctl.client) || self.words == NULL) {
         return ctl_fail(CTL_INTERNAL, "out of memory");
     }
     int code = CTL_USAGE;
     if (take_arguments(&self, count, arguments)) {
         code = dispatch(&self);
     }
-    client_close(&ctl.client);
+    client_free(&ctl.client);
     free((void *)self.words);
     return check_output(code);
 }

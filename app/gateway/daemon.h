@@ -21,11 +21,11 @@
 #include "process/notify.h"
 #include "process/runtime.h"
 #include "process/wakeup.h"
-#include "why.h"
 
 #include "iwheel/evidence.h"
 #include "iwheel/gateway.h"
 #include "iwheel_linux/linux_hal.h"
+#include "iwheel_northbound/why.h"
 
 #define GW_CLIENTS_MAX 64U
 /// Frames of one step, for the watchers of the topic `frame`.
@@ -44,7 +44,7 @@ typedef struct {
     bool left_behind;
     int estop;
     bool started; ///< The first observation only takes notes.
-    char holder_name[GW_NAME_MAX + 1U];
+    char holder_name[IWN_NAME_MAX + 1U];
     char holder_text[GW_CLIENT_TEXT_SIZE];
 } gw_observed_t;
 
@@ -68,7 +68,7 @@ typedef struct gw_daemon {
     gw_gaps_t gaps;
     gw_knowledge_t knowledge;
     iw_motion_evidence_t evidence;
-    gw_stop_note_t last_stop;
+    iwn_stop_note_t last_stop;
     iw_time_us_t now_us;         ///< Of the present cycle.
     iw_time_us_t woken_us;       ///< When the wait ended: what a client sends later than this was not waiting then.
     iw_time_us_t suspended_us;   ///< Of the machine, as last looked at.
@@ -93,10 +93,11 @@ typedef struct gw_daemon {
     bool left_told; ///< That a setpoint was left in the controller.
     uint32_t warnings;
     char warning[GW_WARNINGS][GW_WARNING_SIZE];
-    char estop_reason[GW_REASON_MAX + 1U]; ///< Of the last software e-stop.
-    uint32_t tapped;                       ///< Frames in `tap`. A step takes no more than there is room for.
+    char estop_reason[IWN_REASON_MAX + 1U]; ///< Of the last software e-stop.
+    uint32_t tapped;                        ///< Frames in `tap`. A step takes no more than there is room for.
     gw_tapped_t tap[GW_FRAMES];
     char line[GW_REPLY_MAX]; ///< Where replies and events are written.
+    iwn_work_t work;         ///< For reading requests.
     gw_client_t client[GW_CLIENTS_MAX];
 } gw_daemon_t;
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "answers/service.h"
 #include "bus/bus_facts.h"
-#include "json/json_arena.h"
 #include "loop.h"
 #include "start/options.h"
 #include "start/report.h"
@@ -57,7 +56,7 @@ static int start_core(gw_daemon_t *daemon) {
                                                    .b = daemon->config.core.listen_only});
     iw_motion_evidence_init(&daemon->evidence);
     gw_bus_facts_follow(daemon);
-    gw_why_sentence(&daemon->last_stop.stop, &(gw_why_context_t){0}, daemon->last_stop.sentence, GW_SENTENCE_SIZE);
+    iwn_why_sentence(&daemon->last_stop.stop, &(iwn_why_context_t){0}, daemon->last_stop.sentence, IWN_SENTENCE_SIZE);
     if (restarted) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the gateway before this one died while the wheels were armed: sending zeros for %u ms",
@@ -127,7 +126,6 @@ static int act(const gw_options_t *options, gw_daemon_t *daemon) {
         gateway_config_print(&daemon->config, stdout);
         return 0;
     }
-    json_arena_install();
     gw_log_open(&daemon->log, options->log_level);
     const int code = options->action == GW_CHECK ? gw_report_check(&daemon->config, stdout) : run(daemon);
     gw_log_close(&daemon->log);

@@ -75,6 +75,58 @@ def as_nobody(call):
         return pipe.read()
 
 
+def backlog():
+    """What has piled up: 900 snapshots, and among them what must not be lost with them."""
+    events = [{"event": "state", "number": number} for number in range(900)]
+    events[100:100] = [{"event": "fault", "cause": "bus_down"}, {"event": "fault", "cause": "overspeed"}, {"event": "lost", "count": 40}]
+    return b"".join(json.dumps(event).encode() + b"\n" for event in [{"id": 1, "ok": True}, *events])
+
+
+class Slow(unittest.TestCase):
+    """Who reads slowly and wants the latest values."""
+
+    def judge(self, events):
+        states = [event["number"] for event in events if event["event"] == "state"]
+        self.assertEqual(states, sorted(states))
+        self.assertEqual(states[-1], 899)
+        self.assertLess(len(states), 50)  # As often as was read in between.
+        self.assertEqual({event["cause"] for event in events if event["event"] == "fault"}, {"bus_down", "overspeed"})
+        self.assertEqual(sum(event["count"] for event in events if event["event"] == "lost"), 900 - len(states) + 40)
+
+    def test_the_latest_values_and_how_many_were_left_out(self):
+        impostor = Impostor(backlog())
+        self.addCleanup(impostor.end)
+        with Gateway(impostor.path) as gateway:
+            gateway.watch("state")
+            time.sleep(0.3)
+            self.judge(list(gateway.events(timeout=0.2, latest=True)))
+
+    def test_the_latest_values_with_asyncio(self):
+        impostor = Impostor(backlog())
+        self.addCleanup(impostor.end)
+
+        async def story():
+            async with AsyncGateway(impostor.path) as gateway:
+                await gateway.watch("state")
+                await asyncio.sleep(0.3)
+                return [event async for event in gateway.events(timeout=0.2, latest=True)]
+
+        self.judge(asyncio.run(story()))
+
+    def test_the_end_of_the_connection_comes_after_the_latest_values(self):
+        impostor = Impostor(backlog(), close=True)
+        self.addCleanup(impostor.end)
+        with Gateway(impostor.path) as gateway:
+            gateway.watch("state")
+            time.sleep(0.3)
+            names = []
+            for event in gateway.events(timeout=0.2, latest=True):
+                names.append(event["event"])
+                if "disconnected" in names:
+                    break
+        self.assertEqual([name for name in names if name != "lost"], ["fault", "fault", "state", "disconnected"])
+
+
 class Hostile(unittest.TestCase):
     def both(self, says, error, close=False, ask="status", hello=HELLO):
         impostor = Impostor(says, close, hello)

@@ -344,7 +344,8 @@ class Requests(RigCase):
         for word in [*words, *(["horse"] if words else [])]:
             yield [word] if field.get("list") else word, word != "horse"
         if "bytes" in field:
-            yield "x" * field["bytes"], True
+            if kinds == ["text"]:  # Which texts the value of an item may be, depends on the item.
+                yield "x" * field["bytes"], True
             yield "x" * (field["bytes"] + 1), False
         for end, step in (("least", -1), ("most", 1)):
             if end in field:

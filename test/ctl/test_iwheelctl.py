@@ -751,6 +751,33 @@ class Watching(WithGateway):
         self.assertEqual(0, process.wait(5))
         process.communicate()
 
+    def test_slow_reader_gets_the_latest_values_and_how_many_were_left_out(self):
+        class Flood(FakeGateway):
+            total, done = 20000, False
+
+            def on_watch(self, connection, request):
+                self.say(connection, {"id": request["id"], **super().on_watch(connection, request)})
+                for number in range(self.total):
+                    self.say(connection, {"event": "state", "number": number, "filling": "x" * 200})
+                    if number == 10:
+                        self.say(connection, {"event": "fault", "cause": "bus_down", "present": True})
+                self.done = True
+        gateway = self.serve(Flood)
+        process = start("--socket", gateway.path, "watch")
+        wait_until(lambda: gateway.done)  # Nobody reads, and still the gateway gets rid of all of them.
+        time.sleep(0.2)
+        lines = []
+        while not lines or lines[-1].get("number") != Flood.total - 1:
+            lines.append(json.loads(process.stdout.readline()))
+        process.terminate()
+        process.communicate(timeout=10)
+        states = [line["number"] for line in lines if line["event"] == "state"]
+        lost = sum(line["count"] for line in lines if line["event"] == "lost")
+        self.assertLess(len(states), Flood.total / 10)  # What the pipe held, and then the last one.
+        self.assertEqual(states, sorted(states))
+        self.assertEqual(Flood.total, len(states) + lost)
+        self.assertEqual(1, sum(line["event"] == "fault" for line in lines))
+
     def test_gateway_that_ends_is_unavailable(self):
         class Ending(FakeGateway):
             def on_watch(self, connection, request):

@@ -1,42 +1,79 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a client's line: a request in which every field is what it should be, or a refusal that can be printed.
+// Any bytes as a client's line: a request in which every field is what it should be, or a refusal that can be printed; and the
+// same as the reader of before says (old_reader.h), to the word.
 #include "fuzz.h"
 
-#include "clients/request.h"
-#include "json/json_arena.h"
+#include "old_reader.h"
 
 static bool terminated(const char *text, size_t size) {
     return memchr(text, '\0', size) != NULL;
 }
 
-static void judge_refusal(const gw_refusal_t *refusal) {
-    fuzz_require(refusal->error > GW_OK && refusal->error < GW_ERRORS, "the refusal has a name");
+static void judge_refusal(const iwn_refusal_t *refusal) {
+    fuzz_require(refusal->error > IWN_OK && refusal->error < IWN_ERRORS, "the refusal has a name");
     fuzz_require(terminated(refusal->message, sizeof refusal->message) && refusal->message[0] != '\0', "and a message");
     for (const char *c = refusal->message; *c != '\0'; c++) {
         fuzz_require(*c >= 0x20 && *c <= 0x7E, "that can be printed");
     }
 }
 
-static void judge_request(const gw_request_t *request) {
-    fuzz_require(request->cmd < GW_CMDS, "the command exists");
+static void judge_request(const iwn_request_t *request) {
+    fuzz_require(request->cmd < IWN_CMDS, "the command exists");
     fuzz_require(terminated(request->name, sizeof request->name) &&
                      terminated(request->reason, sizeof request->reason) &&
-                     terminated(request->value, sizeof request->value),
+                     terminated(request->value, sizeof request->value) && terminated(request->how, sizeof request->how),
                  "texts end");
-    fuzz_require(request->cmd != GW_CMD_WATCH || request->rate_hz >= 1, "the rate is positive");
-    fuzz_require(request->cmd != GW_CMD_TARE || (request->sides >= IW_SIDES_LEFT && request->sides <= IW_SIDES_BOTH),
+    fuzz_require(request->cmd != IWN_CMD_WATCH || request->rate_hz >= 1, "the rate is positive");
+    fuzz_require(request->cmd != IWN_CMD_TARE || (request->sides >= IW_SIDES_LEFT && request->sides <= IW_SIDES_BOTH),
                  "tare names a side");
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    static bool installed;
-    static gw_request_t request;
-    static gw_refusal_t refusal;
-    if (!installed) {
-        json_arena_install();
-        installed = true;
+static void compare_ids(const iwn_id_t *now, const iwn_id_t *before) {
+    fuzz_require(now->kind == before->kind, "the id is of the same kind");
+    fuzz_require(now->kind != IWN_ID_NUMBER || now->number == before->number, "the id is the same number");
+    fuzz_require(now->kind != IWN_ID_TEXT || strcmp(now->text, before->text) == 0, "the id is the same text");
+}
+
+static void compare_requests(const iwn_request_t *now, const iwn_request_t *before) {
+    fuzz_require(now->cmd == before->cmd, "the same command");
+    fuzz_require(now->left_mm_s == before->left_mm_s && now->right_mm_s == before->right_mm_s &&
+                     now->v_mm_s == before->v_mm_s && now->yaw_mrad_s == before->yaw_mrad_s,
+                 "the same speeds");
+    fuzz_require(now->has_current == before->has_current && now->left_mA == before->left_mA &&
+                     now->right_mA == before->right_mA,
+                 "the same currents");
+    fuzz_require(now->rate_hz == before->rate_hz && now->topics == before->topics, "the same subscription");
+    fuzz_require(now->takeover == before->takeover && now->sides == before->sides && now->item == before->item,
+                 "the same choices");
+    fuzz_require(strcmp(now->name, before->name) == 0 && strcmp(now->reason, before->reason) == 0 &&
+                     strcmp(now->value, before->value) == 0 && strcmp(now->how, before->how) == 0,
+                 "the same texts");
+}
+
+/// The reader of before drops a NUL behind a number or a word without a sound: that one difference is meant.
+static void compare(const char *line, size_t size, bool taken, const iwn_request_t *now, const iwn_refusal_t *refusal) {
+    static iwn_request_t before;
+    static iwn_refusal_t refusal_before;
+    const bool taken_before = old_request_read(line, size, &before, &refusal_before);
+    if (memchr(line, '\0', size) != NULL) {
+        fuzz_require(!taken && refusal->error == IWN_BAD_JSON, "a NUL is bad JSON");
+        return;
     }
-    if (memchr(data, '\n', size) != NULL || size > GW_LINE_MAX) {
+    fuzz_require(taken == taken_before, "both take it, or none does");
+    compare_ids(&now->id, &before.id);
+    if (taken) {
+        compare_requests(now, &before);
+    } else {
+        fuzz_require(refusal->error == refusal_before.error, "refused by the same name");
+        fuzz_require(strcmp(refusal->message, refusal_before.message) == 0, "refused in the same words");
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    static iwn_work_t work;
+    static iwn_request_t request;
+    static iwn_refusal_t refusal;
+    if (memchr(data, '\n', size) != NULL || size > IWN_LINE_MAX) {
         return -1;
     }
     // A copy of exactly that length: a byte read behind it is found.
@@ -44,15 +81,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     memcpy(line, data, size);
     memset(&request, 0xA5, sizeof request);
     memset(&refusal, 0xA5, sizeof refusal);
-    if (gw_request_parse(line, size, &request, &refusal)) {
+    const bool taken = iwn_request_read(line, size, &work, &request, &refusal);
+    if (taken) {
         fuzz_tell("taken");
         judge_request(&request);
     } else {
         fuzz_tell("refused");
         judge_refusal(&refusal);
     }
-    fuzz_require(request.id.kind <= GW_ID_TEXT, "the id is known, or known to be unknown");
-    fuzz_require(json_arena_peak() < JSON_ARENA_SIZE, "the arena is large enough");
+    fuzz_require(request.id.kind <= IWN_ID_TEXT, "the id is known, or known to be unknown");
+    compare(line, size, taken, &request, &refusal);
     free(line);
     return 0;
 }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What the fuzz targets begin with: by hand, and from what the product itself recorded (test/recordings)."""
+import ast
 import collections
 import json
 import re
@@ -21,6 +22,14 @@ ODD_LINES = """(1760000000.000001) can0 100#00100000
 """
 
 
+def json_vectors():
+    """Every row of the unit tests' table, as a line and as a field's value. A line break would end a request."""
+    rows = re.findall(r'^(?:OWN_)?(?:YES|NO)\("[^"]*", (.*)\)', (ROOT / "test/support/json_vectors.inc").read_text(), re.M)
+    texts = [b"".join(ast.literal_eval("b" + literal) for literal in re.findall(r'"(?:[^"\\]|\\.)*"', row)) for row in rows]
+    assert len(texts) > 200, "the table of test/support/json_vectors.inc has another form"
+    return [line for text in texts if b"\n" not in text for line in (text, b'{"cmd":"watch","topics":' + text + b"}")]
+
+
 def by_hand():
     """{target: [bytes]}: also what a target must refuse."""
     said = [line for path in (ROOT / "docs/northbound.md", ROOT / "README.md") for line in re.findall(r"\{\"[^`\n]*\}", path.read_text())]
@@ -28,9 +37,10 @@ def by_hand():
     return {
         "codec": [bytes([n, 8, 0, *range(8)]) for n in range(len(IDS))] + [b"\xff\x80\x00\x01\x0a\x08\x00" + bytes(8)],
         "gateway": [drives, drives + bytes([8, 0, 2, 1]) + drives, bytes([2]) + drives[1:]],
-        "request": [line.encode() for line in said] + [b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":-1,"id":"x"}'],
+        "request": [line.encode() for line in said] + json_vectors() + [b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":-1,"id":"x"}'],
         "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ngear_ratio = 3/2\n"],
         "candump": [ODD_LINES.encode()],
+        "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
 
 
@@ -73,6 +83,12 @@ def request():
 
 def config():
     return [RECORDED.with_suffix(".conf").read_bytes()]
+
+
+def client():
+    """What the gateway noted of itself, told as events."""
+    lines = [json.dumps({"event": row["type"], **row}).encode() + b"\n" for row in rows()]
+    return [b"\0" + line for line in lines[:20]] + [bytes([how]) + b"".join(lines[:60]) for how in (0, 1, 8, 40)]
 
 
 def put(number, data, own):
@@ -122,4 +138,4 @@ def gateway():
 
 def recorded():
     """{target: [bytes]}: a target that does not take them has lost what it was for."""
-    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump()}
+    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client()}

@@ -13,6 +13,10 @@ CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c
 SOCKETCAN, LOCAL = "port/linux/src/socketcan.c", "port/linux/src/local_bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
 LEARN = "app/ctl/learn/learn.c"
+LINK, QUEUE, ASKING = "client/c/src/connection.c", "client/c/src/queue.c", "client/c/src/requests.c"
+TALK, FIELDS = ("unit_client_talk",), ("unit_client_fields",)
+READER, CHECKER, SCANNER, WRITER = (f"northbound/src/{name}.c" for name in ("request", "json_in", "json_scan", "json_out"))
+JSON, REQUEST, LINES = ("unit_json_in",), ("unit_northbound_request",), ("unit_json_out",)
 
 PARTS = [
     # The loop.
@@ -57,11 +61,36 @@ PARTS = [
     Bug("lost-events-not-told", "northbound", CLIENT, "++self->lost;", "self->lost = 1;", ("unit_northbound_lines",)),
     Bug("holder-served-in-turn", "R11", SERVICE, "if (holder != NULL) { (void)service(daemon, holder); }", "holder = NULL;", ("unit_service_rounds",)),
     Bug("burst-of-telemetry-after-a-stall", "R11", "app/gateway/status/observe.c", "if (client->next_us <= daemon->now_us) {", "if (false) {", REQUESTS),
+    # The northbound library.
+    Bug("names-compared-as-they-are-spelt", "northbound", CHECKER, "a = iwn_scan_character(&one); b = iwn_scan_character(&other);",
+        "a = (unsigned char)*one++; b = (unsigned char)*other++; a = (a == '\"') ? 0U : a; b = (b == '\"') ? 0U : b;", JSON),
+    Bug("names-of-an-inner-object-kept", "northbound", CHECKER, "self->names = self->first[self->depth];", "", JSON),
+    Bug("last-of-the-names-not-compared", "northbound", CHECKER, "unsigned high = self->names;", "unsigned high = (self->names > low) ? self->names - 1U : low;", JSON),
+    Bug("eighth-level-is-refused", "northbound", CHECKER, "if (self->depth == IWN_DEPTH_MAX) {", "if (self->depth == IWN_DEPTH_MAX - 1U) {", (*JSON, *REQUEST)),
+    Bug("anything-behind-the-object", "northbound", CHECKER, "(iwn_scan(&self.scan) == IWN_TOKEN_END || fail(&self, \"end of file expected\"))", "true", (*JSON, *REQUEST)),
+    Bug("comma-before-the-end", "northbound", CHECKER, "if (token != ',') { return fail(self, in_list(self) ? \"']' expected\" : \"'}' expected\"); } token = iwn_scan(&self->scan);",
+        "if (token != ',') { return fail(self, in_list(self) ? \"']' expected\" : \"'}' expected\"); } token = iwn_scan(&self->scan); "
+        "if (token == closing(self)) { close_container(self); return true; }", (*JSON, *REQUEST)),
+    Bug("leading-zero-read", "northbound", SCANNER, "if (iwn_scan_is_digit(c)) { return IWN_TOKEN_INVALID; }", "(void)skip_digits(self, &c);", (*JSON, *REQUEST)),
+    Bug("integer-wraps", "R9", SCANNER, "if (number > (most - digit) / 10U) {", "if (false) {", (*JSON, *REQUEST)),
+    Bug("smallest-integer-refused", "northbound", SCANNER, "negative ? (uint64_t)INT64_MAX + 1U : (uint64_t)INT64_MAX", "(uint64_t)INT64_MAX", (*JSON, *REQUEST)),
+    Bug("utf8-behind-the-end", "northbound", SCANNER, "(void)memcpy(copy, self->at, (left < 4U) ? left : 4U);", "(void)left; (void)memcpy(copy, self->at, 4U);", JSON),
+    Bug("single-surrogate-read", "northbound", SCANNER, "const bool paired = is_high(unit) || is_low(unit);", "const bool paired = is_high(unit) && c[5] == '\\\\';", JSON),
+    Bug("nul-in-a-text", "northbound", SCANNER, "self->has_nul = self->has_nul || unit == 0U;", "", (*JSON, *REQUEST)),
+    Bug("double-too-large-by-its-digits", "northbound", SCANNER, "(exponent == REAL_EXPONENT_MAX && is_beyond(first, end))", "false", JSON),
+    Bug("text-without-room-for-its-end", "northbound", "northbound/src/json_in.c", "if (used + length >= size) {", "if (used + length > size) {", (*JSON, *REQUEST)),
+    Bug("name-that-moves-a-terminal", "northbound", READER, "*target == '\\0' || !iwn_plain_text(target)", "*target == '\\0'", REQUEST),
+    Bug("fields-of-every-request", "northbound", READER, "if ((fields[i].allowed & 1U << cmd) != 0U && iwn_json_is(name, fields[i].name)) {", "(void)cmd; if (iwn_json_is(name, fields[i].name)) {", REQUEST),
+    Bug("one-current-without-the-other", "R9", READER, "if (request->has_current != ((seen & 1U << FIELD_right_mA) != 0U)) {", "if (false) {", REQUEST),
+    Bug("whole-real-is-an-integer", "northbound", CHECKER, "(*value.at == '.' || *value.at == 'e' || *value.at == 'E')", "(*value.at == 'e' || *value.at == 'E')", (*JSON, *REQUEST)),
+    Bug("line-one-byte-too-long", "northbound", WRITER, "length >= self->size - self->length", "length > self->size - self->length", LINES),
+    Bug("erase-not-escaped-in-a-long-text", "northbound", WRITER, "(word | control | quote | backslash | erase)", "(word | control | quote | backslash)", LINES),
+    Bug("zeros-within-a-number-lost", "northbound", "northbound/src/text.c", "while (at > begin) {", "while (false) {", LINES),
     # What is told.
     Bug("battery-full-unflagged", "northbound", "app/gateway/status/snapshot.c", "status->battery_dV == IW_BATTERY_SATURATED_dV",
         "status->battery_dV > IW_BATTERY_SATURATED_dV", REQUESTS),
-    Bug("wheels-told-the-wrong-way-round", "northbound", "app/gateway/status/snapshot.c", 'json_out_open(json, side == IW_LEFT ? "left" : "right", \'{\'); write_motion',
-        'json_out_open(json, side == IW_LEFT ? "right" : "left", \'{\'); write_motion', REQUESTS),
+    Bug("wheels-told-the-wrong-way-round", "northbound", "app/gateway/status/snapshot.c", 'iwn_out_open(json, side == IW_LEFT ? "left" : "right", \'{\'); write_motion',
+        'iwn_out_open(json, side == IW_LEFT ? "right" : "left", \'{\'); write_motion', REQUESTS),
     Bug("watchdog-fed-too-late", "R11", "app/gateway/process/notify.c", "limit_us / 2U", "limit_us * 2U", MOTION),
     Bug("tape-without-refused-frames", "recordings", TAPE, "if (answer <= 0) {", "if (answer < 0) {", ("unit_gateway_tape",)),
     Bug("tape-keeps-the-old-bus", "recordings", TAPE, "self->bus = state;", "", ("unit_gateway_tape",)),
@@ -139,4 +168,26 @@ PARTS = [
     Bug("learn-pose-that-wraps-jumps", "tools", LEARN, "step > INT16_MAX ? 65536U - step : step", "step", ("unit_ctl_learn",)),
     Bug("learn-turns-over-a-gap", "tools", LEARN, "gap_us <= 0 || gap_us >= RPM_GAP_US", "gap_us <= 0", ("unit_ctl_learn",)),
     Bug("learn-mixed-sender-is-one", "tools", LEARN, "frame->mark == CANDUMP_SENT ? 1U : 0U", "frame->mark == CANDUMP_SENT ? 1U : self->sent > 0U ? 1U : 0U", ("unit_ctl_learn",)),
+    # libiwheel-client.
+    Bug("client-half-a-command-leaves-later", "client", LINK, "if (result != IWC_OK && sent > 0) {", "if (false) {", TALK),
+    Bug("client-drives-pile-up-in-the-socket", "client", ASKING, "*place = id;", "(void)place;", TALK),
+    Bug("client-drive-not-sent-counts-as-sent", "client", ASKING, "if (result == IWC_OK) { *place = id; }", "*place = id;", TALK),
+    Bug("client-guesses-at-a-newer-protocol", "client", ASKING, "if (self->newer && !is_harmless(cmd)) {", "if (self->newer && is_driving(cmd)) {", TALK),
+    Bug("client-stop-unheard-keeps-the-lease", "client", ASKING, "if (result != IWC_OK && result != IWC_REFUSED && result != IWC_INVALID) {", "if (result == IWC_CLOSED) {", TALK),
+    Bug("client-dies-of-a-dead-gateway", "client", LINK, "length - sent, MSG_NOSIGNAL)", "length - sent, 0)", TALK),
+    Bug("client-child-drives-for-its-parent", "client", ASKING, "if (self->fd < 0 || getpid() != self->owner) {", "if (self->fd < 0) {", TALK),
+    Bug("client-child-ends-its-parents-lease", "client", LINK, "(getpid() == self->owner) ? shutdown", "true ? shutdown", TALK),
+    Bug("client-close-leaves-a-copy-alive", "client", LINK, "(void)((getpid() == self->owner) ? shutdown(self->fd, SHUT_RDWR) : 0);", "", TALK),
+    Bug("client-late-reply-answers-the-next", "client", QUEUE, "(!has_id || id == self->awaited)", "(!has_id || !is_odd(id))", TALK),
+    Bug("client-half-a-line-counts", "client", LINK, "if (got > 0) {", "if (got == 0 && self->end > self->whole) { self->in[self->end] = '\\n'; self->end++; (void)iwc_queue_admit(self); } if (got > 0) {", TALK),
+    Bug("client-line-without-end-is-kept", "client", QUEUE, "return self->end - self->whole <= IWC_LINE_MAX;", "return true;", TALK),
+    Bug("client-garbage-is-passed-over", "client", LINK, "iwc_end(self, IWC_GARBLED);", "self->end = self->whole;", TALK),
+    Bug("client-latest-is-a-backlog", "client", QUEUE, "stays = kept->kind[i] != kind;", "stays = true;", TALK),
+    Bug("client-latest-mixes-causes", "client", QUEUE, '{"fault", {"cause", NULL}},', '{"fault", {NULL, NULL}},', TALK),
+    Bug("client-left-out-uncounted", "client", QUEUE, "if (!stays) { self->skipped++;", "if (!stays) {", TALK),
+    Bug("client-unknown-is-zero", "client", "client/c/src/fields.c", "value.known = iwc_json_integer(iwc_json_find(object, key), &value.value);",
+        "(void)iwc_json_integer(iwc_json_find(object, key), &value.value); value.known = true;", FIELDS),
+    Bug("client-force-without-a-zero", "client", "client/c/src/fields.c", 'if (iwc_is(&inner, "force_validity", "valid")) {', "{", FIELDS),
+    Bug("client-number-wraps", "client", "client/c/src/json.c", "if (number > (limit - digit) / 10U) {", "if (false) {", FIELDS),
+    Bug("client-key-twice", "client", "client/c/src/json.c", "(behind.at != NULL && note_key(self, rest, behind))", "(behind.at != NULL)", FIELDS),
 ]

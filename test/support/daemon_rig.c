@@ -3,7 +3,6 @@
 
 #include "answers/service.h"
 #include "bus/bus_facts.h"
-#include "json/json_arena.h"
 #include "loop.h"
 #include "status/observe.h"
 
@@ -276,7 +275,6 @@ void daemon_rig_crash(void) {
 void daemon_rig_begin(void) {
     daemon_rig_t *rig = &daemon_rig;
     sim_pair_config_t pair;
-    json_arena_install();
     *rig = (daemon_rig_t){.now_us = START_US, .bus = IW_BUS_ACTIVE, .folder = "/tmp/iwheel-daemon-XXXXXX"};
     TEST_ASSERT_NOT_NULL(mkdtemp(rig->folder));
     rig->bus_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The ledger's items in words: the value in force, what somebody found beside it, what a contradiction costs.
 #include "assumption.h"
-#include "names.h"
+
+#include "iwheel_northbound/words.h"
 
 #include "unity.h"
 
@@ -25,7 +26,7 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void assert_value(iw_ledger_item_t item, const char *expected) {
-    char value[GW_VALUE_SIZE];
+    char value[IWN_VALUE_SIZE];
     memset(value, 0x5A, sizeof value);
     gw_assumption_value(&config, item, value);
     TEST_ASSERT_EQUAL_STRING(expected, value);
@@ -62,13 +63,13 @@ static void test_assumption_longest_values_fit(void) {
 static void test_assumption_every_item_is_found_by_its_name_and_nothing_else_is(void) {
     for (unsigned n = 0; n < IW_LEDGER_ITEMS; n++) {
         iw_ledger_item_t item = IW_LEDGER_ITEMS;
-        TEST_ASSERT_TRUE(gw_assumption_of(gw_ledger_item_name((iw_ledger_item_t)n), &item));
+        TEST_ASSERT_TRUE(iwn_ledger_item_of(iwn_ledger_item_name((iw_ledger_item_t)n), &item));
         TEST_ASSERT_EQUAL_UINT(n, item);
     }
     iw_ledger_item_t item = IW_LEDGER_ITEMS;
-    TEST_ASSERT_FALSE(gw_assumption_of("", &item));
-    TEST_ASSERT_FALSE(gw_assumption_of("unknown", &item));
-    TEST_ASSERT_FALSE(gw_assumption_of("wheel_radius ", &item));
+    TEST_ASSERT_FALSE(iwn_ledger_item_of("", &item));
+    TEST_ASSERT_FALSE(iwn_ledger_item_of("unknown", &item));
+    TEST_ASSERT_FALSE(iwn_ledger_item_of("wheel_radius ", &item));
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, item);
 }
 

@@ -54,13 +54,13 @@ static void test_worst_is_kept_over_silence(void) {
 
 static void test_written_as_limits_counts_and_worst(void) {
     char line[256];
-    json_out_t json;
-    json_out_init(&json, line, sizeof line);
-    json_out_open(&json, NULL, '{');
+    iwn_out_t json;
+    iwn_out_init(&json, line, sizeof line);
+    iwn_out_open(&json, NULL, '{');
     pair_after(20000U);
     gw_gaps_write(&gaps, &json);
-    json_out_close(&json, '}');
-    (void)json_out_finish(&json);
+    iwn_out_close(&json, '}');
+    (void)iwn_out_finish(&json);
     TEST_ASSERT_NOT_NULL(strstr(line, "\"limits_ms\":[5,10,15,20,25,30,40,50,100],\"count\":[0,0,0,1,0,0,0,0,0,0],"
                                       "\"worst_us\":20000"));
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What is kept from one run to the next: the text, everything that is wrong with a text.
-#include "json/json_arena.h"
 #include "ledger/memory.h"
-#include "names.h"
+
+#include "iwheel_northbound/words.h"
 
 #include "unity.h"
 
@@ -49,8 +49,8 @@ static void fill_item(unsigned item) {
                   .figure = shown[item].figure},
         .since_wall_us = item % 2U == 0U ? 0 : INT64_C(253402300799000000),
     };
-    (void)snprintf(entry->value, GW_VALUE_SIZE, "%s", shown[item].value);
-    (void)snprintf(entry->word.found, GW_VALUE_SIZE, "%s", by_bus ? "" : shown[item].value);
+    (void)snprintf(entry->value, IWN_VALUE_SIZE, "%s", shown[item].value);
+    (void)snprintf(entry->word.found, IWN_VALUE_SIZE, "%s", by_bus ? "" : shown[item].value);
 }
 
 static void fill(void) {
@@ -68,7 +68,6 @@ static void fill(void) {
 }
 
 void setUp(void) {
-    json_arena_install();
     fill();
     memset(&got, 0xA5, sizeof got);
     length = gw_memory_write(&known, BUS, text, sizeof text);
@@ -293,10 +292,10 @@ static void test_memory_of_each_item_at_the_edge_of_what_is_measured_is_believed
         const int32_t figures[] = {rows[i].low, rows[i].high, rows[i].low - 1, rows[i].high + 1, INT32_MIN, INT32_MAX};
         memset(&known, 0, sizeof known);
         gw_known_item_t *entry = &known.item[rows[i].item];
-        (void)snprintf(entry->value, GW_VALUE_SIZE, "%s", rows[i].value);
+        (void)snprintf(entry->value, IWN_VALUE_SIZE, "%s", rows[i].value);
         for (size_t j = 0; j < sizeof figures / sizeof figures[0]; j++) {
             entry->entry = (iw_ledger_entry_t){rows[i].state, IW_EVIDENCE_BUS, figures[j]};
-            TEST_ASSERT_EQUAL_MESSAGE(j < 2, believed(), gw_ledger_item_name(rows[i].item));
+            TEST_ASSERT_EQUAL_MESSAGE(j < 2, believed(), iwn_ledger_item_name(rows[i].item));
         }
         entry->entry = (iw_ledger_entry_t){rows[i].state, IW_EVIDENCE_BUS, rows[i].low};
         entry->since_wall_us = -1;
@@ -338,10 +337,10 @@ static void test_memory_of_a_value_that_nobody_can_configure_or_find_is_not_beli
         gw_known_item_t *entry = &known.item[rows[i].item];
         entry->entry = (iw_ledger_entry_t){IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
         TEST_ASSERT_TRUE(believed());
-        (void)snprintf(entry->value, GW_VALUE_SIZE, "%s", rows[i].value);
+        (void)snprintf(entry->value, IWN_VALUE_SIZE, "%s", rows[i].value);
         TEST_ASSERT_FALSE_MESSAGE(believed(), rows[i].value);
         entry->value[0] = '\0';
-        (void)snprintf(entry->word.found, GW_VALUE_SIZE, "%s", rows[i].value);
+        (void)snprintf(entry->word.found, IWN_VALUE_SIZE, "%s", rows[i].value);
         TEST_ASSERT_FALSE_MESSAGE(believed(), rows[i].value);
     }
 }

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A connection of the northbound socket (bytes in, lines out), the JSON writer, and the sentence of `why`.
+// A connection of the northbound socket: bytes in, lines out.
 #include "clients/client.h"
-#include "json/json_out.h"
 #include "process/log.h"
-#include "why.h"
 
 #include "unity.h"
 
@@ -94,14 +92,14 @@ static void test_client_half_a_line_at_the_end_is_never_a_line(void) {
 }
 
 static void test_client_line_of_4096_bytes_fits_and_4097_are_too_long(void) {
-    TEST_ASSERT_EQUAL_INT(GW_LINE_MAX, (int)send(peer, big, GW_LINE_MAX, 0));
+    TEST_ASSERT_EQUAL_INT(IWN_LINE_MAX, (int)send(peer, big, IWN_LINE_MAX, 0));
     gw_client_read(&client);
     TEST_ASSERT_FALSE(gw_client_line_too_long(&client));
     say("\n");
     TEST_ASSERT_FALSE(gw_client_line_too_long(&client));
-    gw_client_drop_line(&client, GW_LINE_MAX);
+    gw_client_drop_line(&client, IWN_LINE_MAX);
     TEST_ASSERT_EQUAL_UINT(0, client.in_length);
-    TEST_ASSERT_EQUAL_INT(GW_LINE_MAX + 1, (int)send(peer, big, GW_LINE_MAX + 1U, 0));
+    TEST_ASSERT_EQUAL_INT(IWN_LINE_MAX + 1, (int)send(peer, big, IWN_LINE_MAX + 1U, 0));
     gw_client_read(&client);
     TEST_ASSERT_TRUE(gw_client_line_too_long(&client));
 }
@@ -158,18 +156,6 @@ static void test_client_gone_is_noticed_when_written_to(void) {
     peer = -1;
 }
 
-static void test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8(void) {
-    char line[256];
-    json_out_t json;
-    json_out_init(&json, line, sizeof line);
-    json_out_open(&json, NULL, '{');
-    json_out_text(&json, "t", "\x1b[2J\xC2\x9B\xE2\x80\xAE\xE2\x80\xA8\xD8\x9C\xE2\x81\xA9\x9B\xE2\x82\xAC\xE2\x82");
-    json_out_close(&json, '}');
-    line[json_out_finish(&json)] = '\0';
-    TEST_ASSERT_EQUAL_STRING(
-        "{\"t\":\"\\u001B[2J\\u009B\\u202E\\u2028\\u061C\\u2069\\uFFFD\xE2\x82\xAC\\uFFFD\\uFFFD\"}\n", line);
-}
-
 static void test_log_line_is_plain_whatever_stands_in_it(void) {
     char line[256] = "";
     int ends[2];
@@ -186,137 +172,6 @@ static void test_log_line_is_plain_whatever_stands_in_it(void) {
     TEST_ASSERT_GREATER_THAN(0, read(ends[0], line, sizeof line - 1U));
     (void)close(ends[0]);
     TEST_ASSERT_EQUAL_STRING("iwheel-gateway: info: from ?[2J????\xC3\xA9\n", line);
-}
-
-static void test_json_escapes_and_separates(void) {
-    char line[256];
-    json_out_t json;
-    json_out_init(&json, line, sizeof line);
-    json_out_open(&json, NULL, '{');
-    json_out_int(&json, "low", INT64_MIN);
-    json_out_text(&json, "t", "a\"b\\c\n\x7f\xE2\x82\xAC");
-    json_out_open(&json, "list", '[');
-    json_out_bool(&json, NULL, true);
-    json_out_null(&json, NULL);
-    json_out_close(&json, ']');
-    json_out_open(&json, "empty", '{');
-    json_out_close(&json, '}');
-    json_out_known(&json, "k", false, 5);
-    json_out_known(&json, "l", true, 5);
-    json_out_text(&json, "n", NULL);
-    json_out_close(&json, '}');
-    const size_t length = json_out_finish(&json);
-    line[length] = '\0';
-    TEST_ASSERT_EQUAL_STRING(
-        "{\"low\":-9223372036854775808,\"t\":\"a\\\"b\\\\c\\u000A\\u007F\xE2\x82\xAC\",\"list\":[true,null],"
-        "\"empty\":{},\"k\":null,\"l\":5,\"n\":null}\n",
-        line);
-}
-
-static void test_json_that_does_not_fit_is_no_line_at_any_size(void) {
-    char line[64];
-    for (size_t size = 1; size <= sizeof line; size++) {
-        json_out_t json;
-        memset(line, 0x5A, sizeof line);
-        json_out_init(&json, line, size);
-        json_out_open(&json, NULL, '{');
-        json_out_text(&json, "event", "lost");
-        json_out_close(&json, '}');
-        const size_t whole = strlen("{\"event\":\"lost\"}\n");
-        TEST_ASSERT_EQUAL_UINT(size > whole ? whole : 0U, json_out_finish(&json));
-        for (size_t i = size; i < sizeof line; i++) {
-            TEST_ASSERT_EQUAL_HEX8(0x5A, line[i]);
-        }
-    }
-}
-
-static const gw_why_context_t context = {"\"joystick\" (client 3, pid 9)", "kerb", "unix:/e", "unix:/b"};
-
-static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
-    static char text[GW_SENTENCE_SIZE];
-    iw_stop_t stop;
-    memset(&stop, 0, sizeof stop);
-    stop.number = 1;
-    stop.cause = cause;
-    stop.sides = sides;
-    stop.detail = detail;
-    stop.from = IW_STATE_ARMED;
-    stop.at_us = 12345678;
-    stop.latched = cause < IW_CAUSE_LOOP_LATE;
-    stop.applied.wheel[IW_LEFT].speed_mm_s = 300;
-    stop.applied.wheel[IW_RIGHT].speed_mm_s = -299;
-    gw_why_sentence(&stop, &context, text, sizeof text);
-    return text;
-}
-
-static void test_why_names_cause_numbers_time_and_cure(void) {
-    TEST_ASSERT_EQUAL_STRING(
-        "left wheel not heard for 53 ms while driving 300/-299 mm/s; zero at once, latched at 12.345 s; "
-        "check the wheel's power and cable, then: iwheelctl reset",
-        sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 53));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_BOTH, UINT32_MAX), "both wheels never heard"));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_SECOND_MASTER, 0, 266), "id 266 (0x10A)"));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_SOFTWARE, 0, 3), "\"joystick\" (client 3, pid 9) (\"kerb\")"));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_LINE, 0, 1), "e-stop unix:/e pressed"));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_LINE, 0, 2), "unreadable"));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_BUS_DOWN, 0, IW_BUS_OFF), "bus unix:/b is bus-off"));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LEASE_LOST, 0, 200), "no drive command for 200 ms"));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LEASE_LOST, 0, 200), "ramped to zero at 12.345 s"));
-    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LOOP_LATE, 0, 130), "held up for 130 ms"));
-    TEST_ASSERT_NOT_NULL(
-        strstr(sentence(IW_CAUSE_WHEEL_BLOCKED, IW_SIDES_RIGHT, 12), "right wheel blocked: only 12 mm/s"));
-}
-
-static void test_why_after_a_crash_does_not_say_what_nobody_knows(void) {
-    iw_stop_t stop;
-    char text[GW_SENTENCE_SIZE];
-    memset(&stop, 0, sizeof stop);
-    stop.number = 1;
-    stop.cause = IW_CAUSE_RESTART;
-    gw_why_sentence(&stop, &context, text, sizeof text);
-    TEST_ASSERT_EQUAL_STRING("the gateway before this one died while the wheels were armed; zero at once at 0.000 s; "
-                             "look for the crash in the log, then arm again",
-                             text);
-}
-
-static void test_why_has_a_sentence_and_a_name_for_every_cause(void) {
-    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause < IW_CAUSES; cause++) {
-        const char *text = sentence((iw_cause_t)cause, IW_SIDES_LEFT, 1);
-        TEST_ASSERT_TRUE(strlen(text) > 60U);
-        TEST_ASSERT_NOT_NULL(strstr(text, "12.345 s"));
-        TEST_ASSERT_NULL_MESSAGE(strstr(text, "(null)"), text);
-        TEST_ASSERT_TRUE(strcmp("unknown", gw_cause_name((iw_cause_t)cause)) != 0);
-        for (unsigned other = 0; other < cause; other++) {
-            TEST_ASSERT_TRUE(strcmp(gw_cause_name((iw_cause_t)other), gw_cause_name((iw_cause_t)cause)) != 0);
-        }
-    }
-    TEST_ASSERT_EQUAL_STRING("unknown", gw_cause_name((iw_cause_t)IW_CAUSES));
-}
-
-static void test_why_without_a_stop_says_so(void) {
-    char text[GW_SENTENCE_SIZE];
-    iw_stop_t stop;
-    memset(&stop, 0, sizeof stop);
-    gw_why_sentence(&stop, &context, text, sizeof text);
-    TEST_ASSERT_EQUAL_STRING("no stop since the gateway started", text);
-}
-
-static void test_names_of_all_refusals_are_errors_of_the_closed_list(void) {
-    for (unsigned refusal = IW_REFUSE_OUT_OF_RANGE; refusal < IW_REFUSALS; refusal++) {
-        const gw_error_t error = gw_error_of((iw_refusal_t)refusal);
-        TEST_ASSERT_TRUE(error > GW_OK && error < GW_INTERNAL);
-    }
-    TEST_ASSERT_EQUAL_INT(GW_OK, gw_error_of(IW_REFUSE_NONE));
-    TEST_ASSERT_EQUAL_INT(GW_INTERNAL, gw_error_of((iw_refusal_t)999));
-    for (unsigned error = 0; error < GW_ERRORS; error++) {
-        TEST_ASSERT_TRUE(strcmp("unknown", gw_error_name((gw_error_t)error)) != 0);
-    }
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        TEST_ASSERT_TRUE(strcmp("unknown", gw_ledger_item_name((iw_ledger_item_t)item)) != 0);
-    }
-    TEST_ASSERT_EQUAL_STRING("offset_doubted", gw_force_validity_name(IW_FORCE_OFFSET_DOUBTED));
-    TEST_ASSERT_EQUAL_STRING("unreadable", gw_estop_name(-1, true));
-    TEST_ASSERT_EQUAL_STRING("none", gw_estop_name(0, false));
 }
 
 static void test_client_request_right_after_calm_was_sent_now(void) {
@@ -374,15 +229,7 @@ int main(void) {
     RUN_TEST(test_client_room_for_the_longest_reply_is_kept_free_of_events);
     RUN_TEST(test_client_event_to_one_that_is_leaving_is_dropped);
     RUN_TEST(test_client_gone_is_noticed_when_written_to);
-    RUN_TEST(test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8);
     RUN_TEST(test_log_line_is_plain_whatever_stands_in_it);
-    RUN_TEST(test_json_escapes_and_separates);
-    RUN_TEST(test_json_that_does_not_fit_is_no_line_at_any_size);
-    RUN_TEST(test_why_names_cause_numbers_time_and_cure);
-    RUN_TEST(test_why_after_a_crash_does_not_say_what_nobody_knows);
-    RUN_TEST(test_why_has_a_sentence_and_a_name_for_every_cause);
-    RUN_TEST(test_why_without_a_stop_says_so);
-    RUN_TEST(test_names_of_all_refusals_are_errors_of_the_closed_list);
     RUN_TEST(test_client_request_right_after_calm_was_sent_now);
     RUN_TEST(test_client_with_a_line_left_is_not_caught_up);
     RUN_TEST(test_client_caught_up_later_is_not_forgotten_for_an_earlier_time);

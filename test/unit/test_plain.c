@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What moves a terminal: refused where it comes in, and never printed raw.
-#include "plain.h"
+
+#include "iwheel_northbound/text.h"
 
 #include "unity.h"
 
@@ -53,10 +54,10 @@ static void test_plain_each_code_point_at_the_edges_is_judged_and_read(void) {
         char text[5];
         size_t bytes = 0;
         const size_t length = encode(table[i].code_point, text);
-        TEST_ASSERT_EQUAL_HEX32(table[i].code_point, plain_read(text, &bytes));
+        TEST_ASSERT_EQUAL_HEX32(table[i].code_point, iwn_plain_read(text, &bytes));
         TEST_ASSERT_EQUAL_UINT(length, bytes);
-        TEST_ASSERT_EQUAL_MESSAGE(table[i].plain, plain_is(table[i].code_point), "");
-        TEST_ASSERT_EQUAL(table[i].plain || table[i].code_point == 0U, plain_text(text));
+        TEST_ASSERT_EQUAL_MESSAGE(table[i].plain, iwn_plain_is(table[i].code_point), "");
+        TEST_ASSERT_EQUAL(table[i].plain || table[i].code_point == 0U, iwn_plain_text(text));
     }
 }
 
@@ -69,7 +70,7 @@ static void test_plain_copy_replaces_each_character_once(void) {
         (void)encode(table[i].code_point, character);
         (void)snprintf(text, sizeof text, "a%sb", character);
         (void)snprintf(wanted, sizeof wanted, "a%sb", table[i].plain ? character : "?");
-        plain_copy(text, copy, sizeof copy);
+        iwn_plain_copy(text, copy, sizeof copy);
         TEST_ASSERT_EQUAL_STRING(wanted, copy);
     }
 }
@@ -96,22 +97,22 @@ static void test_plain_bytes_that_are_no_utf8_are_not_plain_and_one_at_a_time(vo
     for (size_t i = 0; i < sizeof broken / sizeof broken[0]; i++) {
         size_t bytes = 0;
         char copy[16];
-        TEST_ASSERT_EQUAL_HEX32(PLAIN_BROKEN, plain_read(broken[i], &bytes));
+        TEST_ASSERT_EQUAL_HEX32(IWN_PLAIN_BROKEN, iwn_plain_read(broken[i], &bytes));
         TEST_ASSERT_EQUAL_UINT(1, bytes);
-        TEST_ASSERT_FALSE(plain_text(broken[i]));
-        plain_copy(broken[i], copy, sizeof copy);
+        TEST_ASSERT_FALSE(iwn_plain_text(broken[i]));
+        iwn_plain_copy(broken[i], copy, sizeof copy);
         TEST_ASSERT_EQUAL_CHAR('?', copy[0]);
-        TEST_ASSERT_TRUE(plain_text(copy));
+        TEST_ASSERT_TRUE(iwn_plain_text(copy));
     }
 }
 
 static void test_plain_copy_never_cuts_a_character(void) {
     char copy[8];
-    plain_copy("12345\xE2\x82\xAC", copy, 8);
+    iwn_plain_copy("12345\xE2\x82\xAC", copy, 8);
     TEST_ASSERT_EQUAL_STRING("12345", copy);
-    plain_copy("1234\xE2\x82\xAC", copy, 8);
+    iwn_plain_copy("1234\xE2\x82\xAC", copy, 8);
     TEST_ASSERT_EQUAL_STRING("1234\xE2\x82\xAC", copy);
-    plain_copy("12345678", copy, 8);
+    iwn_plain_copy("12345678", copy, 8);
     TEST_ASSERT_EQUAL_STRING("1234567", copy);
 }
 
@@ -120,7 +121,7 @@ static void assert_json(const char *line, const char *wanted, size_t piece_size)
     char piece[64];
     size_t length = 0;
     while (*line != '\0') {
-        line = plain_json(line, piece, piece_size, &length);
+        line = iwn_plain_json(line, piece, piece_size, &length);
         TEST_ASSERT_GREATER_THAN_UINT(0, length);
         (void)strncat(whole, piece, length);
     }

@@ -2,7 +2,6 @@
 // Many clients at once: each gets its turn, the holder of the lease gets the first, and none of them gets all the time.
 #include "answers/service.h"
 #include "daemon.h"
-#include "json/json_arena.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -62,7 +61,6 @@ static void all_ask(void) {
 }
 
 void setUp(void) {
-    json_arena_install();
     daemon_ = (gw_daemon_t *)calloc(1, sizeof *daemon_);
     daemon_->epoll_fd = epoll_create1(EPOLL_CLOEXEC);
     gw_log_open(&daemon_->log, GW_LOG_ERROR);

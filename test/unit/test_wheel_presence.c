@@ -360,8 +360,18 @@ static void test_wheel_power_cut_is_one_reboot_although_odometry_starts_anew(voi
     TEST_ASSERT_TRUE(wheel.ticks == 1);
 }
 
+static void test_presence_rest_of_more_than_an_hour_is_counted_up_to_its_limit(void) {
+    const iw_time_us_t hours_us = (iw_time_us_t)UINT32_MAX + 5U;
+    hear_for(MS(20), 0);
+    wheel.rest_since_us = now_us - hours_us;
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, iw_wheel_rest_us(&wheel, now_us));
+    wheel.rest_since_us = now_us - (hours_us - 6U);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX - 1U, iw_wheel_rest_us(&wheel, now_us));
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_presence_rest_of_more_than_an_hour_is_counted_up_to_its_limit);
     RUN_TEST(test_wheel_never_heard_is_lost_and_not_at_rest);
     RUN_TEST(test_wheel_never_heard_is_not_heard_when_time_has_just_begun);
     RUN_TEST(test_wheel_is_heard_for_exactly_its_silence_limit);

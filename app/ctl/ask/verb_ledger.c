@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // What is assumed about the wheels, what is known, and the operator's word on it.
-#include "names.h"
 #include "similar.h"
 #include "talk/ctl.h"
 #include "text/paper.h"
 #include "text/text.h"
+
+#include "iwheel_northbound/words.h"
 
 #include <ctype.h>
 #include <stdlib.h>
@@ -96,7 +97,7 @@ static void suggest(const char *item) {
     const char *best = NULL;
     size_t best_distance = GW_WORD_STRANGE;
     for (unsigned i = 0; i < (unsigned)IW_LEDGER_ITEMS; i++) {
-        const char *name = gw_ledger_item_name((iw_ledger_item_t)i);
+        const char *name = iwn_ledger_item_name((iw_ledger_item_t)i);
         const size_t far = gw_word_distance(item, name);
         best = far < best_distance ? name : best;
         best_distance = far < best_distance ? far : best_distance;

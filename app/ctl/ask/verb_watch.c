@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "names.h"
-#include "plain.h"
 #include "talk/ctl.h"
 #include "talk/signals.h"
 
+#include "iwheel_northbound/text.h"
+#include "iwheel_northbound/words.h"
+
 #include <errno.h>
+#include <inttypes.h>
 #include <limits.h>
 #include <poll.h>
 #include <stdio.h>
@@ -17,11 +19,11 @@
 #define LOOK_US 500000
 
 /// So many of the topics, the first ones, are watched when none is named.
-#define TOPICS_USUAL ((unsigned)GW_TOPIC_STOP + 1U)
+#define TOPICS_USUAL ((unsigned)IWN_TOPIC_STOP + 1U)
 
 static bool is_topic(const char *word) {
-    for (unsigned i = 0; i < (unsigned)GW_TOPICS; i++) {
-        if (strcmp(gw_topic_name((gw_topic_t)i), word) == 0) {
+    for (unsigned i = 0; i < (unsigned)IWN_TOPICS; i++) {
+        if (strcmp(iwn_topic_name((iwn_topic_t)i), word) == 0) {
             return true;
         }
     }
@@ -70,28 +72,38 @@ static json_t *compose(int count, char **words) {
     }
     const bool usual = json_array_size(list) == 0;
     for (unsigned i = 0; usual && i < TOPICS_USUAL; i++) {
-        (void)json_array_append_new(list, json_string(gw_topic_name((gw_topic_t)i)));
+        (void)json_array_append_new(list, json_string(iwn_topic_name((iwn_topic_t)i)));
     }
     return json_pack("{s:s,s:o,s:i}", "cmd", "watch", "topics", list, "rate_hz", rate_hz);
 }
 
 typedef enum { OUTPUT_OPEN = 0, OUTPUT_SIGNAL, OUTPUT_CLOSED, OUTPUT_BROKEN } output_t;
 
-/// Waits until stdout takes `events` (0: looks only whether it is still there).
-static output_t await_output(const client_t *client, short events) {
+/// Looks, or waits if `wanted`, whether stdout takes something. While it does not, its reader is slow: what comes meanwhile is thinned to
+/// the latest values, so that it never reads a backlog.
+static output_t await_output(const client_t *client, bool wanted) {
     const struct timespec none = {0, 0};
-    struct pollfd entry = {.fd = STDOUT_FILENO, .events = events};
-    const int ready = ppoll(&entry, 1, events != 0 ? NULL : &none, signals_let_in());
-    if (signals_count() != client->seen_signals) {
-        return OUTPUT_SIGNAL;
+    for (bool slow = false;; slow = true) {
+        struct pollfd entries[2] = {{.fd = STDOUT_FILENO, .events = wanted ? POLLOUT : 0},
+                                    {.fd = slow ? iwc_fd(client->gateway) : -1, .events = POLLIN}};
+        const int ready = ppoll(entries, 2, slow ? NULL : &none, signals_let_in());
+        if (signals_count() != client->seen_signals) {
+            return OUTPUT_SIGNAL;
+        }
+        if (ready > 0 && (entries[0].revents & (POLLERR | POLLNVAL)) != 0) {
+            return OUTPUT_CLOSED;
+        }
+        if (!wanted || (ready > 0 && entries[0].revents != 0)) {
+            return OUTPUT_OPEN;
+        }
+        (void)iwc_latest(client->gateway);
     }
-    return ready > 0 && (entry.revents & (POLLERR | POLLNVAL)) != 0 ? OUTPUT_CLOSED : OUTPUT_OPEN;
 }
 
 /// Writes a text in pieces that a ready pipe takes without blocking, so that a signal is seen although nobody reads.
 static output_t write_text(const client_t *client, const char *text, size_t size) {
     while (size > 0) {
-        const output_t state = await_output(client, POLLOUT);
+        const output_t state = await_output(client, true);
         if (state != OUTPUT_OPEN) {
             return state;
         }
@@ -105,6 +117,15 @@ static output_t write_text(const client_t *client, const char *text, size_t size
     return OUTPUT_OPEN;
 }
 
+/// How many events were left out before this one, as the gateway itself would tell it.
+static output_t write_lost(client_t *client) {
+    char line[64];
+    const uint64_t count = client->skipped;
+    client->skipped = 0;
+    const int length = snprintf(line, sizeof line, "{\"event\":\"lost\",\"count\":%" PRIu64 "}\n", count);
+    return (count > 0U) ? write_text(client, line, (size_t)length) : OUTPUT_OPEN;
+}
+
 /// As it came, but for what moves a terminal.
 static output_t write_line(const client_t *client) {
     char piece[PIPE_BUF];
@@ -112,7 +133,7 @@ static output_t write_line(const client_t *client) {
     const char *rest = client->line;
     output_t state = OUTPUT_OPEN;
     while (*rest != '\0' && state == OUTPUT_OPEN) {
-        rest = plain_json(rest, piece, sizeof piece, &length);
+        rest = iwn_plain_json(rest, piece, sizeof piece, &length);
         state = write_text(client, piece, length);
     }
     return state == OUTPUT_OPEN ? write_text(client, "\n", 1) : state;
@@ -123,16 +144,17 @@ static int pump(ctl_t *self) {
     output_t output = OUTPUT_OPEN;
     while (output == OUTPUT_OPEN) {
         json_t *line = NULL;
-        const client_result_t result = client_receive(&self->client, client_now_us() + LOOK_US, &line);
-        if (result == CLIENT_INTERRUPTED) {
+        const iwc_result_t result = client_receive(&self->client, client_now_us() + LOOK_US, &line);
+        if (result == IWC_INTERRUPTED) {
             return CTL_OK;
         }
-        if (result != CLIENT_OK && result != CLIENT_TIMEOUT) {
+        if (result != IWC_OK && result != IWC_TIMEOUT) {
             return ctl_lost(self, result);
         }
         const bool event = json_object_get(line, "event") != NULL;
         json_decref(line);
-        output = event ? write_line(&self->client) : await_output(&self->client, 0);
+        output = event ? write_lost(&self->client) : await_output(&self->client, false);
+        output = (event && output == OUTPUT_OPEN) ? write_line(&self->client) : output;
     }
     return output == OUTPUT_BROKEN ? ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno)) : CTL_OK;
 }

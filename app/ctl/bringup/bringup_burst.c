@@ -132,15 +132,16 @@ static burst_end_t drive(run_t *run) {
         }
         if (now_us >= run->next_us) {
             run->next_us = now_us + SPACING_US;
-            if (client_send(client, compose(run->burst), now_us + SILENT_US, &id) != CLIENT_OK) {
+            const iwc_result_t sent = client_send(client, compose(run->burst), now_us, &id);
+            if (sent != IWC_OK && sent != IWC_FULL) { // Full: it does not read, and SILENT_US ends the burst.
                 return fail(run, BURST_LOST, "the gateway is gone");
             }
         }
-        const client_result_t result = client_receive(client, now_us + SPACING_US / 3, &line);
-        if (result == CLIENT_INTERRUPTED) {
+        const iwc_result_t result = client_receive(client, now_us + SPACING_US / 3, &line);
+        if (result == IWC_INTERRUPTED) {
             client->seen_signals = signals_count();
             end = fail(run, BURST_ABORTED, "interrupted");
-        } else if (result != CLIENT_OK && result != CLIENT_TIMEOUT) {
+        } else if (result != IWC_OK && result != IWC_TIMEOUT) {
             end = fail(run, BURST_LOST, "the gateway is gone");
         } else if (line != NULL) {
             end = take_line(run, line, client_now_us());

@@ -243,7 +243,6 @@ bool trial_start(bringup_t *self, const gateway_config_t *config, bool with_reco
 void trial_stop(bringup_t *self) {
     const int64_t end_us = client_now_us() + END_US;
     client_close(&self->ctl->client);
-    client_init(&self->ctl->client);
     if (self->trial.pid <= 0) {
         return;
     }

@@ -2,9 +2,10 @@
 // What the gateway tells, and what is heard on the bus.
 #include "assumption.h"
 #include "doctor.h"
-#include "names.h"
 #include "status/advice.h"
 #include "text/text.h"
+
+#include "iwheel_northbound/words.h"
 
 #include <grp.h>
 #include <string.h>
@@ -17,7 +18,7 @@ static bool forces_known(const json_t *status) {
 
 static void say_contradicted(doctor_t *self, const char *name, const json_t *entry) {
     iw_ledger_item_t item = IW_LEDGER_ITEMS; // An item of a gateway newer than we are.
-    const bool known = gw_assumption_of(name, &item);
+    const bool known = iwn_ledger_item_of(name, &item);
     const bool tared = known && item == IW_LEDGER_OFFSET_INCLUDED && forces_known(self->gateway.status);
     const bool harmless = known && item == IW_LEDGER_DLC;
     inspect_say(&self->findings, "ledger",
@@ -148,7 +149,7 @@ static void hear_gateway(doctor_t *self) {
     const char *name = text_word(json_object_get(status, "bus"), "state");
     for (unsigned i = IW_BUS_OFF; i <= (unsigned)IW_BUS_PASSIVE; i++) {
         const iw_bus_state_t state = (iw_bus_state_t)i;
-        if (strcmp(name, gw_bus_state_name(state)) == 0) {
+        if (strcmp(name, iwn_bus_state_name(state)) == 0) {
             self->heard.worst = state < self->heard.worst ? state : self->heard.worst;
             self->heard.last = state < self->heard.last ? state : self->heard.last;
         }

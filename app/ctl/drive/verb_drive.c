@@ -83,7 +83,7 @@ static void clear_progress(const drive_t *self) {
     }
 }
 
-static client_result_t send_drive(drive_t *self, int64_t now_us) {
+static iwc_result_t send_drive(drive_t *self, int64_t now_us) {
     int64_t id = 0;
     const drive_words_t *words = &self->words;
     json_t *request = json_pack("{s:s,s:i,s:i}", "cmd", "drive", "left_mm_s", words->speed_mm_s[0], "right_mm_s",
@@ -97,8 +97,12 @@ static client_result_t send_drive(drive_t *self, int64_t now_us) {
     if (self->next_us <= now_us) {
         self->next_us = now_us + period_us; // Late: what was missed is not sent in a burst.
     }
+    const iwc_result_t result = client_send(&self->ctl->client, request, now_us, &id);
+    if (result == IWC_FULL) {
+        return IWC_OK; // The gateway does not read: this one is forgotten, and SILENT_US ends the drive.
+    }
     self->sent_us = now_us;
-    return client_send(&self->ctl->client, request, now_us + SILENT_US, &id);
+    return result;
 }
 
 /// What a line from the gateway means for the drive.
@@ -128,11 +132,11 @@ static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
     return END_NONE;
 }
 
-static end_t end_of(const drive_t *self, client_result_t result) {
-    if (result == CLIENT_INTERRUPTED) {
+static end_t end_of(const drive_t *self, iwc_result_t result) {
+    if (result == IWC_INTERRUPTED) {
         return END_SIGNAL;
     }
-    if (result != CLIENT_OK && result != CLIENT_TIMEOUT) {
+    if (result != IWC_OK && result != IWC_TIMEOUT) {
         clear_progress(self);
         (void)ctl_lost(self->ctl, result);
         return END_LOST;
@@ -148,7 +152,7 @@ static end_t run(drive_t *self) {
     while (end == END_NONE) {
         const int64_t now_us = client_now_us();
         const int64_t end_us = self->begin_us > 0 ? self->begin_us + (int64_t)self->words.time_ms * 1000 : INT64_MAX;
-        client_result_t result = CLIENT_OK;
+        iwc_result_t result = IWC_OK;
         json_t *line = NULL;
         if (now_us >= end_us) {
             return END_TIME;
@@ -159,7 +163,7 @@ static end_t run(drive_t *self) {
         if (now_us >= self->next_us) {
             result = send_drive(self, now_us);
         }
-        if (result == CLIENT_OK) {
+        if (result == IWC_OK) {
             result = client_receive(&self->ctl->client, self->next_us < end_us ? self->next_us : end_us, &line);
         }
         end = line != NULL ? take_line(self, line, client_now_us()) : end_of(self, result);
@@ -218,7 +222,7 @@ static int wait_for_rest(drive_t *self) {
         if (now_us >= begin_us + REST_US) {
             return ctl_fail(CTL_TIMEOUT, "a wheel still turns 10 s after the stop; see: iwheelctl status");
         }
-        while (client_receive(&self->ctl->client, now_us + POLL_US, &event) == CLIENT_OK) {
+        while (client_receive(&self->ctl->client, now_us + POLL_US, &event) == IWC_OK) {
             json_decref(event);
         }
         if (signals_count() != self->ctl->client.seen_signals) {
@@ -301,13 +305,13 @@ static int finish(drive_t *self, end_t end) {
 /// Lets time pass and drops what the gateway tells meanwhile. An exit code.
 static int wait_a_moment(const drive_t *self) {
     const int64_t until_us = client_now_us() + POLL_US;
-    client_result_t result = CLIENT_OK;
-    while (result == CLIENT_OK) {
+    iwc_result_t result = IWC_OK;
+    while (result == IWC_OK) {
         json_t *event = NULL;
         result = client_receive(&self->ctl->client, until_us, &event);
         json_decref(event);
     }
-    return result == CLIENT_TIMEOUT ? CTL_OK : ctl_lost(self->ctl, result);
+    return result == IWC_TIMEOUT ? CTL_OK : ctl_lost(self->ctl, result);
 }
 
 static bool passes(const json_t *reply) {

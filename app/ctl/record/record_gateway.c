@@ -30,15 +30,15 @@ int recorder_from_gateway(ctl_t *ctl, recorder_t *self) {
     while (code == CTL_OK && written && client_now_us() < self->end_us) {
         json_t *line = NULL;
         const int64_t look_us = client_now_us() + LOOK_US;
-        const client_result_t result =
+        const iwc_result_t result =
             client_receive(&ctl->client, look_us < self->end_us ? look_us : self->end_us, &line);
-        written = result != CLIENT_OK || take_event(self, line);
+        written = result != IWC_OK || take_event(self, line);
         written = recorder_tend(self) && written;
         json_decref(line);
-        if (result == CLIENT_INTERRUPTED) {
+        if (result == IWC_INTERRUPTED) {
             break;
         }
-        if (result != CLIENT_OK && result != CLIENT_TIMEOUT) {
+        if (result != IWC_OK && result != IWC_TIMEOUT) {
             code = ctl_lost(ctl, result);
         }
     }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "events.h"
 
-#include "names.h"
 #include "talk/ctl.h"
+
+#include "iwheel_northbound/words.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -27,23 +28,23 @@ static unsigned word_of(const json_t *line, const char *name, const char *(*name
 }
 
 static const char *bus_name(unsigned state) {
-    return gw_bus_state_name((iw_bus_state_t)state);
+    return iwn_bus_state_name((iw_bus_state_t)state);
 }
 
 static const char *state_name(unsigned state) {
-    return gw_state_name((iw_state_t)state);
+    return iwn_state_name((iw_state_t)state);
 }
 
 static const char *cause_name(unsigned cause) {
-    return gw_cause_name((iw_cause_t)cause);
+    return iwn_cause_name((iw_cause_t)cause);
 }
 
 static const char *refusal_name(unsigned refusal) {
-    return gw_error_name(gw_error_of((iw_refusal_t)refusal));
+    return iwn_error_name(iwn_error_of((iw_refusal_t)refusal));
 }
 
 static const char *side_name(unsigned sides) {
-    const char *name = gw_sides_name((uint8_t)sides);
+    const char *name = iwn_sides_name((uint8_t)sides);
     return name != NULL ? name : "";
 }
 
@@ -98,15 +99,15 @@ static bool take_decision(const json_t *line, blackbox_entry_t *out) {
 }
 
 static const char *item_name(unsigned item) {
-    return gw_ledger_item_name((iw_ledger_item_t)item);
+    return iwn_ledger_item_name((iw_ledger_item_t)item);
 }
 
 static const char *ledger_state_name(unsigned state) {
-    return gw_ledger_state_name((iw_ledger_state_t)state);
+    return iwn_ledger_state_name((iw_ledger_state_t)state);
 }
 
 static const char *evidence_name(unsigned evidence) {
-    return gw_evidence_name((iw_evidence_t)evidence);
+    return iwn_evidence_name((iw_evidence_t)evidence);
 }
 
 static bool take_assumption(const json_t *line, blackbox_entry_t *out) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "replay_tell.h"
 
-#include "names.h"
 #include "text/text.h"
-#include "why.h"
+
+#include "iwheel_northbound/why.h"
+#include "iwheel_northbound/words.h"
 
 #include <ctype.h>
 #include <inttypes.h>
@@ -78,7 +79,7 @@ static void tell_wheels(replay_t *self, const iw_snapshot_t *seen) {
             self->heard[side] = heard;
         }
         if (force != self->force[side]) {
-            tell(self, self->now_us, "force", "%s: %s", side_name(side), gw_force_validity_name(force));
+            tell(self, self->now_us, "force", "%s: %s", side_name(side), iwn_force_validity_name(force));
             self->force[side] = force;
         }
     }
@@ -89,8 +90,8 @@ static void tell_ledger(replay_t *self, const iw_snapshot_t *seen) {
         const iw_ledger_entry_t *entry = &seen->assumed[item];
         if (entry->state != self->ledger[item].state) {
             tell(self, self->now_us, "assumption", "%s: %s by the %s (figure %" PRId32 ")",
-                 gw_ledger_item_name((iw_ledger_item_t)item), gw_ledger_state_name(entry->state),
-                 gw_evidence_name(entry->evidence), entry->figure);
+                 iwn_ledger_item_name((iw_ledger_item_t)item), iwn_ledger_state_name(entry->state),
+                 iwn_evidence_name(entry->evidence), entry->figure);
         }
         self->ledger[item] = *entry;
     }
@@ -99,7 +100,7 @@ static void tell_ledger(replay_t *self, const iw_snapshot_t *seen) {
 static void tell_causes(replay_t *self, uint32_t present) {
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if (((present ^ self->present) & (1U << cause)) != 0U) {
-            tell(self, self->now_us, "fault", "%s%s", gw_cause_name((iw_cause_t)cause),
+            tell(self, self->now_us, "fault", "%s%s", iwn_cause_name((iw_cause_t)cause),
                  (present & (1U << cause)) != 0U ? "" : " is gone");
         }
     }
@@ -107,30 +108,30 @@ static void tell_causes(replay_t *self, uint32_t present) {
 }
 
 static void tell_stop(replay_t *self, const iw_stop_t *stop) {
-    char sentence[GW_SENTENCE_SIZE];
+    char sentence[IWN_SENTENCE_SIZE];
     char client[32];
     if (stop->number == self->stop_number) {
         return;
     }
     const iw_client_t who = stop->cause == IW_CAUSE_ESTOP_SOFTWARE ? stop->detail : stop->client;
     (void)snprintf(client, sizeof client, "client %u", (unsigned)who);
-    const gw_why_context_t context = {.client = client, .estop = self->estop_name, .bus = self->bus_name};
-    gw_why_sentence(stop, &context, sentence, sizeof sentence);
-    tell(self, self->now_us, "stop", "%u: %s: %s", (unsigned)stop->number, gw_cause_name(stop->cause), sentence);
+    const iwn_why_context_t context = {.client = client, .estop = self->estop_name, .bus = self->bus_name};
+    iwn_why_sentence(stop, &context, sentence, sizeof sentence);
+    tell(self, self->now_us, "stop", "%u: %s: %s", (unsigned)stop->number, iwn_cause_name(stop->cause), sentence);
     self->stop_number = stop->number;
     self->drive_client = IW_CLIENT_NONE;
 }
 
 static void tell_arming(replay_t *self, const iw_snapshot_t *seen) {
     if (self->arming && !seen->arming && seen->state != IW_STATE_ARMED) {
-        tell(self, self->now_us, "arm", "refused: %s", gw_error_name(gw_error_of(seen->arm_refusal)));
+        tell(self, self->now_us, "arm", "refused: %s", iwn_error_name(iwn_error_of(seen->arm_refusal)));
     }
     self->arming = seen->arming;
 }
 
 static void tell_state(replay_t *self, iw_state_t state) {
     if (state != self->state) {
-        tell(self, self->now_us, "state", "%s", gw_state_name(state));
+        tell(self, self->now_us, "state", "%s", iwn_state_name(state));
         self->state = state;
         self->drive_client = IW_CLIENT_NONE;
     }
@@ -163,12 +164,12 @@ static void tell_drive(replay_t *self, const blackbox_entry_t *entry, const char
 
 void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal) {
     char result[96];
-    const char *name = refusal == IW_REFUSE_NONE ? "accepted" : gw_error_name(gw_error_of(refusal));
+    const char *name = refusal == IW_REFUSE_NONE ? "accepted" : iwn_error_name(iwn_error_of(refusal));
     const bool same = (uint8_t)refusal == entry->b || entry->kind == (uint8_t)BLACKBOX_TARE;
     (void)snprintf(result, sizeof result, "%s%s%s%s", name, same ? "" : " (when it was recorded: ",
                    same                                  ? ""
                    : entry->b == (uint8_t)IW_REFUSE_NONE ? "accepted"
-                                                         : gw_error_name(gw_error_of((iw_refusal_t)entry->b)),
+                                                         : iwn_error_name(iwn_error_of((iw_refusal_t)entry->b)),
                    same ? "" : ")");
     switch (entry->kind) {
     case BLACKBOX_DRIVE:
@@ -182,7 +183,7 @@ void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refus
         tell(self, entry->at_us, "reset", "client %u: %s", (unsigned)entry->number, result);
         break;
     case BLACKBOX_STOP:
-        tell(self, entry->at_us, "stop asked", "%s", gw_cause_name((iw_cause_t)entry->a));
+        tell(self, entry->at_us, "stop asked", "%s", iwn_cause_name((iw_cause_t)entry->a));
         break;
     case BLACKBOX_TARE:
         tell(self, entry->at_us, "tare", "%s", side_name(entry->a == (uint8_t)IW_RIGHT ? IW_RIGHT : IW_LEFT));
@@ -197,12 +198,12 @@ void replay_tell_answer(const replay_t *self, const blackbox_entry_t *entry) {
     switch (entry->kind) {
     case BLACKBOX_ESTOP:
         if ((int)entry->as.value != self->estop) {
-            tell(self, entry->at_us, "e-stop", "%s", gw_estop_name((int)entry->as.value, true));
+            tell(self, entry->at_us, "e-stop", "%s", iwn_estop_name((int)entry->as.value, true));
         }
         break;
     case BLACKBOX_BUS:
         if ((iw_bus_state_t)entry->a != self->bus) {
-            tell(self, entry->at_us, "bus", "%s", gw_bus_state_name((iw_bus_state_t)entry->a));
+            tell(self, entry->at_us, "bus", "%s", iwn_bus_state_name((iw_bus_state_t)entry->a));
         }
         break;
     default:
@@ -214,11 +215,12 @@ void replay_tell_answer(const replay_t *self, const blackbox_entry_t *entry) {
 void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry) {
     if (entry->kind == (uint8_t)BLACKBOX_STATE) {
         tell(self, entry->at_us, "DIFFERENT", "state %s, when it was recorded %s",
-             gw_state_name(iw_gateway_state(&self->gateway)), gw_state_name((iw_state_t)entry->a));
+             iwn_state_name(iw_gateway_state(&self->gateway)), iwn_state_name((iw_state_t)entry->a));
     } else {
         const iw_stop_t *stop = replay_look(self).stop;
         tell(self, entry->at_us, "DIFFERENT", "last stop %s (%u), when it was recorded %s (%" PRId64 ")",
-             gw_cause_name(stop->cause), (unsigned)stop->detail, gw_cause_name((iw_cause_t)entry->a), entry->as.value);
+             iwn_cause_name(stop->cause), (unsigned)stop->detail, iwn_cause_name((iw_cause_t)entry->a),
+             entry->as.value);
     }
 }
 
@@ -250,7 +252,7 @@ static void sum_up_as_json(const replay_t *self) {
     }
     put_object(&self->out,
                json_pack("{s:s,s:s,s:I,s:I,s:I,s:o}", "event", "summary", "state",
-                         gw_state_name(iw_gateway_state(&self->gateway)), "stops",
+                         iwn_state_name(iw_gateway_state(&self->gateway)), "stops",
                          (json_int_t)replay_look(self).stop->number, "frames", (json_int_t)self->total_frames,
                          "setpoint_frames", (json_int_t)self->total_sent, "as_recorded", compared));
 }
@@ -262,7 +264,7 @@ void replay_finish(const replay_t *self) {
     }
     const uint32_t stops = replay_look(self).stop->number;
     replay_note(&self->out, "end: %s, %u stop%s, %" PRIu64 " frames in, %" PRIu64 " setpoint frames out",
-                gw_state_name(iw_gateway_state(&self->gateway)), (unsigned)stops, stops == 1U ? "" : "s",
+                iwn_state_name(iw_gateway_state(&self->gateway)), (unsigned)stops, stops == 1U ? "" : "s",
                 self->total_frames, self->total_sent);
     for (size_t i = 0; i < SCORES; i++) {
         const replay_score_t score = score_of(self, i);

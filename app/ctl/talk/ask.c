@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "ctl.h"
-#include "find_socket.h"
 #include "text/text.h"
 
 #include <errno.h>
@@ -35,26 +34,22 @@ bool ctl_words_at_most(const char *verb, int count, int most, char **words) {
 
 /// The path to use, in `found` if it was looked for; null after telling why there is none, with the exit code.
 static const char *choose_socket(const ctl_t *self, char *found, size_t size, int *out_code) {
-    const char *environment = getenv("IWHEEL_SOCKET");
     if (self->socket != NULL) {
         return self->socket;
     }
-    if (environment != NULL && environment[0] != '\0') {
-        return environment;
-    }
-    switch (find_socket(FIND_SOCKET_DIRECTORY, found, size)) {
-    case FIND_SOCKET_ONE:
+    switch (iwc_find(NULL, found, size)) {
+    case IWC_OK:
         return found;
-    case FIND_SOCKET_SEVERAL:
+    case IWC_SEVERAL:
         *out_code = ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", found);
         break;
-    case FIND_SOCKET_DENIED:
+    case IWC_DENIED:
         *out_code =
             ctl_fail(CTL_PERMISSION, "%s may not be read by you; sudo usermod -aG iwheel $USER, then log in again",
-                     FIND_SOCKET_DIRECTORY);
+                     IWC_DIRECTORY);
         break;
-    case FIND_SOCKET_NONE:
-        *out_code = ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", FIND_SOCKET_DIRECTORY, START_HINT);
+    default:
+        *out_code = ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", IWC_DIRECTORY, START_HINT);
         break;
     }
     return NULL;
@@ -71,8 +66,21 @@ static int tell_denied(const char *path) {
                     group->gr_name, group->gr_name);
 }
 
-static int tell_unopened(const char *path, int error) {
-    switch (error) {
+static int tell_refusal(const char *error, const char *message) {
+    return ctl_fail(CTL_NO, "refused (%s): %s", (error != NULL) ? error : "no reason given",
+                    (message != NULL) ? message : "no message");
+}
+
+int ctl_refused(const json_t *reply) {
+    return tell_refusal(json_string_value(json_object_get(reply, "error")),
+                        json_string_value(json_object_get(reply, "message")));
+}
+
+/// Why there is no connection: what the system said, or else the gateway.
+static int tell_unopened(const ctl_t *self, const char *path, iwc_result_t result) {
+    switch (iwc_errno(self->client.gateway)) {
+    case 0:
+        break;
     case EACCES:
     case EPERM:
         return tell_denied(path);
@@ -86,51 +94,36 @@ static int tell_unopened(const char *path, int error) {
     case ENAMETOOLONG:
         return ctl_fail(CTL_USAGE, "--socket %s is too long for a socket (107 characters); use a shorter path", path);
     default:
-        return ctl_fail(CTL_UNAVAILABLE, "%s cannot be opened (%s); %s", path, strerror(error), START_HINT);
+        return ctl_fail(CTL_UNAVAILABLE, "%s cannot be opened (%s); %s", path,
+                        strerror(iwc_errno(self->client.gateway)), START_HINT);
     }
+    if (result == IWC_REFUSED) {
+        return tell_refusal(iwc_error(self->client.gateway), iwc_reason(self->client.gateway));
+    }
+    return ctl_lost(self, result);
 }
 
-int ctl_lost(const ctl_t *self, client_result_t result) {
+int ctl_lost(const ctl_t *self, iwc_result_t result) {
     (void)self;
     switch (result) {
-    case CLIENT_TIMEOUT:
+    case IWC_TIMEOUT:
         return ctl_fail(CTL_TIMEOUT, "no answer within 2 s; the gateway hangs or this is not its socket, see its log");
-    case CLIENT_CLOSED:
+    case IWC_CLOSED:
         return ctl_fail(CTL_UNAVAILABLE, "the gateway ended the connection; see its log, or: iwheelctl status");
-    case CLIENT_GARBLED:
+    case IWC_GARBLED:
         return ctl_fail(CTL_INTERNAL,
                         "not the gateway's language on this socket; check --socket, or versions that differ");
-    case CLIENT_INTERRUPTED:
+    case IWC_INTERRUPTED:
         return ctl_fail(CTL_NO, "interrupted");
-    case CLIENT_OK:
-        break;
+    case IWC_FULL:
+        return ctl_fail(CTL_TIMEOUT, "the gateway takes no request; it hangs, see its log");
+    case IWC_NEWER:
+        return ctl_fail(CTL_UNAVAILABLE, "%s", iwc_words(result));
+    case IWC_INVALID:
+        return ctl_fail(CTL_USAGE, "a request of more than %u bytes; write less", IWC_REQUEST_MAX);
+    default:
+        return CTL_OK;
     }
-    return CTL_OK;
-}
-
-int ctl_refused(const json_t *reply) {
-    const char *error = json_string_value(json_object_get(reply, "error"));
-    const char *message = json_string_value(json_object_get(reply, "message"));
-    return ctl_fail(CTL_NO, "refused (%s): %s", error != NULL ? error : "no reason given",
-                    message != NULL ? message : "no message");
-}
-
-/// The first line tells who is there: the event hello, or the refusal of one client too many.
-static int greet(ctl_t *self) {
-    json_t *line = NULL;
-    const client_result_t result = client_receive(&self->client, client_now_us() + CLIENT_REPLY_US, &line);
-    if (result != CLIENT_OK) {
-        return ctl_lost(self, result);
-    }
-    const char *event = json_string_value(json_object_get(line, "event"));
-    int code = CTL_OK;
-    if (json_is_false(json_object_get(line, "ok"))) {
-        code = ctl_refused(line);
-    } else if (event == NULL || strcmp(event, "hello") != 0) {
-        code = ctl_lost(self, CLIENT_GARBLED);
-    }
-    json_decref(line);
-    return code;
 }
 
 int ctl_connect(ctl_t *self) {
@@ -140,24 +133,24 @@ int ctl_connect(ctl_t *self) {
     if (path == NULL) {
         return code;
     }
-    const int error = client_open(&self->client, path, client_now_us() + CLIENT_REPLY_US);
-    return error != 0 ? tell_unopened(path, error) : greet(self);
+    const iwc_result_t result = client_open(&self->client, path, client_now_us() + CLIENT_REPLY_US);
+    return (result == IWC_OK) ? CTL_OK : tell_unopened(self, path, result);
 }
 
 int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {
     int64_t id = 0;
     const int64_t deadline_us = client_now_us() + CLIENT_REPLY_US;
     *out_reply = NULL;
-    const int code = self->client.socket < 0 ? ctl_connect(self) : CTL_OK;
+    const int code = self->client.open ? CTL_OK : ctl_connect(self);
     if (code != CTL_OK) {
         json_decref(request);
         return code;
     }
-    client_result_t result = client_send(&self->client, request, deadline_us, &id);
-    if (result == CLIENT_OK) {
+    iwc_result_t result = client_send(&self->client, request, deadline_us, &id);
+    if (result == IWC_OK) {
         result = client_wait(&self->client, id, deadline_us, out_reply);
     }
-    return result == CLIENT_OK ? CTL_OK : ctl_lost(self, result);
+    return result == IWC_OK ? CTL_OK : ctl_lost(self, result);
 }
 
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {

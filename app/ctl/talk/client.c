@@ -3,15 +3,9 @@
 
 #include "signals.h"
 
-#include <errno.h>
-#include <poll.h>
-#include <string.h>
-#include <sys/socket.h>
-#include <sys/un.h>
+#include <limits.h>
+#include <stdlib.h>
 #include <time.h>
-#include <unistd.h>
-
-#define RETRY_US 20000
 
 int64_t client_now_us(void) {
     struct timespec now;
@@ -19,145 +13,79 @@ int64_t client_now_us(void) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-void client_init(client_t *self) {
-    memset(self, 0, sizeof(*self));
-    self->socket = -1;
-    self->line = "";
-}
-
-/// Waits for `events` on the connection (on nothing with `events` 0), signals let in.
-static client_result_t await(client_t *self, short events, int64_t deadline_us) {
+/// Rounded up: a wait that ends a moment too early would be repeated for nothing.
+static int left_ms(int64_t deadline_us) {
     const int64_t left_us = deadline_us - client_now_us();
-    if (signals_count() != self->seen_signals) {
-        return CLIENT_INTERRUPTED;
-    }
-    const struct timespec timeout = {left_us > 0 ? left_us / 1000000 : 0, left_us > 0 ? left_us % 1000000 * 1000 : 0};
-    struct pollfd entry = {.fd = events != 0 ? self->socket : -1, .events = events};
-    const int ready = ppoll(&entry, 1, &timeout, signals_let_in());
-    if (ready > 0) {
-        return CLIENT_OK;
-    }
-    if (ready < 0 && errno == EINTR) {
-        return signals_count() != self->seen_signals ? CLIENT_INTERRUPTED : CLIENT_OK;
-    }
-    return ready == 0 ? CLIENT_TIMEOUT : CLIENT_CLOSED;
+    const int64_t ms = (left_us > 0) ? (left_us - 1) / 1000 + 1 : 0;
+    return (ms < INT_MAX) ? (int)ms : INT_MAX;
 }
 
-int client_open(client_t *self, const char *path, int64_t deadline_us) {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    if (strlen(path) >= sizeof(address.sun_path)) {
-        return ENAMETOOLONG;
+bool client_init(client_t *self) {
+    *self = (client_t){.gateway = iwc_new(), .line = ""};
+    return self->gateway != NULL;
+}
+
+void client_free(client_t *self) {
+    iwc_free(self->gateway);
+    self->gateway = NULL;
+}
+
+iwc_result_t client_open(client_t *self, const char *path, int64_t deadline_us) {
+    iwc_let_in(self->gateway, signals_let_in());
+    iwc_result_t result = iwc_connect(self->gateway, path, left_ms(deadline_us));
+    while (result == IWC_INTERRUPTED && signals_count() == self->seen_signals) {
+        result = iwc_connect(self->gateway, path, left_ms(deadline_us));
     }
-    memcpy(address.sun_path, path, strlen(path));
-    self->socket = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (self->socket < 0) {
-        return errno;
-    }
-    while (connect(self->socket, (const struct sockaddr *)&address, sizeof(address)) != 0) {
-        const int error = errno;
-        const int64_t now_us = client_now_us();
-        if (error == EAGAIN && now_us < deadline_us) {
-            (void)await(self, 0, now_us + RETRY_US);
-        } else if (error != EINTR) {
-            client_close(self);
-            return error == EAGAIN ? ETIMEDOUT : error;
-        }
-    }
-    return 0;
+    result = (result == IWC_NEWER) ? IWC_OK : result;
+    self->open = result == IWC_OK;
+    return result;
 }
 
 void client_close(client_t *self) {
-    if (self->socket >= 0) {
-        (void)close(self->socket);
-    }
-    self->socket = -1;
+    iwc_close(self->gateway);
+    self->open = false;
+    self->line = "";
 }
 
-static client_result_t send_all(client_t *self, const char *text, int64_t deadline_us) {
-    size_t left = strlen(text);
-    while (left > 0) {
-        const ssize_t sent = send(self->socket, text, left, MSG_NOSIGNAL);
-        if (sent >= 0) {
-            text += sent;
-            left -= (size_t)sent;
-            continue;
-        }
-        if (errno != EAGAIN && errno != EINTR) {
-            return CLIENT_CLOSED;
-        }
-        const client_result_t result = await(self, POLLOUT, deadline_us);
-        if (result != CLIENT_OK) {
-            return result;
-        }
-    }
-    return CLIENT_OK;
-}
-
-client_result_t client_send(client_t *self, json_t *request, int64_t deadline_us, int64_t *out_id) {
-    char text[4097];
-    *out_id = ++self->next_id;
-    (void)json_object_set_new(request, "id", json_integer(*out_id));
-    const size_t length = json_dumpb(request, text, sizeof(text) - 2U, JSON_COMPACT);
+iwc_result_t client_send(client_t *self, json_t *request, int64_t deadline_us, int64_t *out_id) {
+    char *text = json_dumps(request, JSON_COMPACT);
     json_decref(request);
-    if (length == 0 || length > sizeof(text) - 2U) {
-        return CLIENT_GARBLED;
-    }
-    text[length] = '\n';
-    text[length + 1U] = '\0';
-    return send_all(self, text, deadline_us);
+    iwc_let_in(self->gateway, signals_let_in());
+    iwc_result_t result = IWC_INVALID;
+    do {
+        result = (text != NULL) ? iwc_send(self->gateway, text, left_ms(deadline_us), out_id) : IWC_INVALID;
+    } while (result == IWC_INTERRUPTED && signals_count() == self->seen_signals);
+    free(text);
+    return result;
 }
 
-/// Moves the next complete line to `self->line`; false if there is none yet.
-static bool take_line(client_t *self) {
-    char *begin = self->buffer + self->begin;
-    char *newline = memchr(begin, '\n', self->end - self->begin);
-    if (newline == NULL) {
-        memmove(self->buffer, begin, self->end - self->begin);
-        self->end -= self->begin;
-        self->begin = 0;
-        return false;
-    }
-    *newline = '\0';
-    self->line = begin;
-    self->begin = (size_t)(newline - self->buffer) + 1U;
-    return true;
-}
-
-client_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_line) {
+iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_line) {
+    iwc_message_t message;
+    iwc_result_t result = IWC_INTERRUPTED;
     *out_line = NULL;
-    while (!take_line(self)) {
-        if (self->end >= CLIENT_LINE_MAX + 1U) {
-            return CLIENT_GARBLED;
-        }
-        const client_result_t result = await(self, POLLIN, deadline_us);
-        if (result != CLIENT_OK) {
-            return result;
-        }
-        const ssize_t got = recv(self->socket, self->buffer + self->end, CLIENT_LINE_MAX + 1U - self->end, 0);
-        if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) {
-            return CLIENT_CLOSED;
-        }
-        self->end += got > 0 ? (size_t)got : 0U;
+    iwc_let_in(self->gateway, signals_let_in());
+    while (result == IWC_INTERRUPTED && signals_count() == self->seen_signals) {
+        result = iwc_next(self->gateway, left_ms(deadline_us), &message);
     }
-    *out_line = json_loads(self->line, JSON_REJECT_DUPLICATES, NULL);
-    if (!json_is_object(*out_line)) {
-        json_decref(*out_line);
-        *out_line = NULL;
-        return CLIENT_GARBLED;
+    if (result != IWC_OK) {
+        return result;
     }
-    return CLIENT_OK;
+    self->line = message.text;
+    self->skipped += message.skipped;
+    *out_line = json_loadb(message.text, message.length, JSON_REJECT_DUPLICATES, NULL);
+    return (*out_line != NULL) ? IWC_OK : IWC_GARBLED;
 }
 
-client_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply) {
+iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply) {
     for (;;) {
-        const client_result_t result = client_receive(self, deadline_us, out_reply);
-        if (result != CLIENT_OK) {
+        const iwc_result_t result = client_receive(self, deadline_us, out_reply);
+        if (result != IWC_OK) {
             return result;
         }
         const json_t *its_id = json_object_get(*out_reply, "id");
         const bool is_reply = json_object_get(*out_reply, "ok") != NULL;
         if (is_reply && (!json_is_integer(its_id) || json_integer_value(its_id) == id)) {
-            return CLIENT_OK;
+            return IWC_OK;
         }
         json_decref(*out_reply);
         *out_reply = NULL;

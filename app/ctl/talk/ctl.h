@@ -71,7 +71,7 @@ int ctl_accept(const ctl_t *self, json_t **reply);
 int ctl_refused(const json_t *reply);
 
 /// What a result of `client_receive` that brought no line means to the user. Returns the exit code.
-int ctl_lost(const ctl_t *self, client_result_t result);
+int ctl_lost(const ctl_t *self, iwc_result_t result);
 
 /// True if there are no more words than `most`; else tells so.
 bool ctl_words_at_most(const char *verb, int count, int most, char **words);

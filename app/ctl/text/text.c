@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "text.h"
 
-#include "plain.h"
+#include "iwheel_northbound/text.h"
 
 #include <stdarg.h>
 #include <stdlib.h>
@@ -12,7 +12,7 @@
 void text_safe(const char *text, FILE *out) {
     size_t bytes;
     for (; *text != '\0'; text += bytes) {
-        const bool plain = plain_is(plain_read(text, &bytes));
+        const bool plain = iwn_plain_is(iwn_plain_read(text, &bytes));
         (void)fwrite(plain ? text : "?", 1, plain ? bytes : 1U, out);
     }
 }
@@ -21,7 +21,7 @@ void text_json(const char *line, FILE *out) {
     char piece[256];
     size_t length;
     while (*line != '\0') {
-        line = plain_json(line, piece, sizeof piece, &length);
+        line = iwn_plain_json(line, piece, sizeof piece, &length);
         (void)fwrite(piece, 1, length, out);
     }
     (void)fputc('\n', out);
@@ -38,7 +38,7 @@ void text_line(FILE *out, const char *format, ...) {
 }
 
 void text_clean(const char *text, char *out, size_t size) {
-    plain_copy(text, out, size);
+    iwn_plain_copy(text, out, size);
 }
 
 bool text_json_value(const json_t *value, FILE *out) {

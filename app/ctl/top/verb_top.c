@@ -53,7 +53,6 @@ static void send_request(top_t *self, json_t *request, const char *what) {
 
 static void disconnect(top_t *self, const char *why) {
     client_close(&self->ctl->client);
-    client_init(&self->ctl->client);
     self->ctl->client.seen_signals = signals_count();
     self->model.connected = false;
     self->retry_us = client_now_us() + RETRY_US;
@@ -128,13 +127,16 @@ static void take_line(top_t *self, json_t *line) {
 
 /// Takes what is there without waiting.
 static void read_gateway(top_t *self) {
+    if (self->model.connected) {
+        (void)iwc_latest(self->ctl->client.gateway); // A terminal that is slow shows what is, not what was.
+    }
     while (self->model.connected) {
         json_t *line = NULL;
-        const client_result_t result = client_receive(&self->ctl->client, 0, &line);
-        if (result == CLIENT_OK) {
+        const iwc_result_t result = client_receive(&self->ctl->client, 0, &line);
+        if (result == IWC_OK) {
             take_line(self, line);
             json_decref(line);
-        } else if (result == CLIENT_TIMEOUT || result == CLIENT_INTERRUPTED) {
+        } else if (result == IWC_TIMEOUT || result == IWC_INTERRUPTED) {
             return;
         } else {
             disconnect(self, "the gateway ended the connection; waiting for it to come back");
@@ -168,7 +170,7 @@ static bool take_key(top_t *self, int key) {
 static bool wait_and_take(top_t *self) {
     const int64_t now_us = client_now_us();
     struct pollfd entries[2] = {{.fd = STDIN_FILENO, .events = POLLIN},
-                                {.fd = self->model.connected ? self->ctl->client.socket : -1, .events = POLLIN}};
+                                {.fd = iwc_fd(self->ctl->client.gateway), .events = POLLIN}};
     const struct timespec timeout = {0, DRAW_US * 1000L};
     const int ready = ppoll(entries, 2, &timeout, signals_let_in());
     if (signals_count() != 0U || (ready > 0 && (entries[0].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0)) {

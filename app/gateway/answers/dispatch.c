@@ -17,56 +17,56 @@
 typedef struct {
     gw_daemon_t *daemon;
     gw_client_t *client;
-    const gw_request_t *request;
+    const iwn_request_t *request;
 } call_t;
 
-static void write_id(json_out_t *json, const gw_id_t *id) {
-    if (id->kind == GW_ID_NUMBER) {
-        json_out_int(json, "id", id->number);
+static void write_id(iwn_out_t *json, const iwn_id_t *id) {
+    if (id->kind == IWN_ID_NUMBER) {
+        iwn_out_int(json, "id", id->number);
     } else {
-        json_out_text(json, "id", id->kind == GW_ID_TEXT ? id->text : NULL);
+        iwn_out_text(json, "id", id->kind == IWN_ID_TEXT ? id->text : NULL);
     }
 }
 
-static json_out_t begin_reply(gw_daemon_t *daemon, const gw_id_t *id) {
-    json_out_t json;
-    json_out_init(&json, daemon->line, sizeof daemon->line);
-    json_out_open(&json, NULL, '{');
+static iwn_out_t begin_reply(gw_daemon_t *daemon, const iwn_id_t *id) {
+    iwn_out_t json;
+    iwn_out_init(&json, daemon->line, sizeof daemon->line);
+    iwn_out_open(&json, NULL, '{');
     write_id(&json, id);
-    json_out_bool(&json, "ok", true);
+    iwn_out_bool(&json, "ok", true);
     return json;
 }
 
-static void send_reply(gw_client_t *client, json_out_t *json) {
-    json_out_close(json, '}');
-    gw_client_reply(client, json->data, json_out_finish(json));
+static void send_reply(gw_client_t *client, iwn_out_t *json) {
+    iwn_out_close(json, '}');
+    gw_client_reply(client, json->data, iwn_out_finish(json));
 }
 
-size_t gw_dispatch_write_refusal(gw_daemon_t *daemon, const gw_id_t *id, const gw_refusal_t *refusal) {
-    json_out_t json;
-    json_out_init(&json, daemon->line, sizeof daemon->line);
-    json_out_open(&json, NULL, '{');
+size_t gw_dispatch_write_refusal(gw_daemon_t *daemon, const iwn_id_t *id, const iwn_refusal_t *refusal) {
+    iwn_out_t json;
+    iwn_out_init(&json, daemon->line, sizeof daemon->line);
+    iwn_out_open(&json, NULL, '{');
     write_id(&json, id);
-    json_out_bool(&json, "ok", false);
-    json_out_text(&json, "error", gw_error_name(refusal->error));
-    json_out_text(&json, "message", refusal->message);
-    json_out_close(&json, '}');
-    return json_out_finish(&json);
+    iwn_out_bool(&json, "ok", false);
+    iwn_out_text(&json, "error", iwn_error_name(refusal->error));
+    iwn_out_text(&json, "message", refusal->message);
+    iwn_out_close(&json, '}');
+    return iwn_out_finish(&json);
 }
 
-static void send_refusal(gw_daemon_t *daemon, gw_client_t *client, const gw_id_t *id, const gw_refusal_t *refusal) {
+static void send_refusal(gw_daemon_t *daemon, gw_client_t *client, const iwn_id_t *id, const iwn_refusal_t *refusal) {
     gw_client_reply(client, daemon->line, gw_dispatch_write_refusal(daemon, id, refusal));
 }
 
 static void refuse(const call_t *call, iw_refusal_t refusal) {
-    gw_refusal_t words;
+    iwn_refusal_t words;
     gw_refuse_describe(call->daemon, call->request, refusal, &words);
     send_refusal(call->daemon, call->client, &call->request->id, &words);
 }
 
 static void reply_state(const call_t *call) {
-    json_out_t json = begin_reply(call->daemon, &call->request->id);
-    json_out_text(&json, "state", gw_state_name(iw_gateway_state(&call->daemon->gateway)));
+    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_text(&json, "state", iwn_state_name(iw_gateway_state(&call->daemon->gateway)));
     send_reply(call->client, &json);
 }
 
@@ -79,49 +79,49 @@ static void note(const call_t *call, const blackbox_entry_t *entry) {
 }
 
 static void do_hello(const call_t *call) {
-    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
     gw_observe_write_hello(call->daemon, call->client, &json);
     send_reply(call->client, &json);
 }
 
 static void do_status(const call_t *call) {
-    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
     gw_snapshot_write(call->daemon, &json);
     send_reply(call->client, &json);
 }
 
 static void do_watch(const call_t *call) {
     gw_client_t *client = call->client;
-    const bool limited = call->request->rate_hz > GW_RATE_MAX_HZ;
+    const bool limited = call->request->rate_hz > IWN_RATE_MAX_HZ;
     client->topics = call->request->topics;
-    client->rate_hz = limited ? GW_RATE_MAX_HZ : (uint32_t)call->request->rate_hz;
+    client->rate_hz = limited ? IWN_RATE_MAX_HZ : (uint32_t)call->request->rate_hz;
     client->next_us = call->daemon->now_us;
-    json_out_t json = begin_reply(call->daemon, &call->request->id);
-    json_out_open(&json, "topics", '[');
-    for (unsigned topic = 0; topic < GW_TOPICS; ++topic) {
+    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_open(&json, "topics", '[');
+    for (unsigned topic = 0; topic < IWN_TOPICS; ++topic) {
         if ((client->topics & (1U << topic)) != 0U) {
-            json_out_text(&json, NULL, gw_topic_name((gw_topic_t)topic));
+            iwn_out_text(&json, NULL, iwn_topic_name((iwn_topic_t)topic));
         }
     }
-    json_out_close(&json, ']');
-    json_out_int(&json, "rate_hz", client->rate_hz);
-    json_out_bool(&json, "limited", limited);
+    iwn_out_close(&json, ']');
+    iwn_out_int(&json, "rate_hz", client->rate_hz);
+    iwn_out_bool(&json, "limited", limited);
     send_reply(client, &json);
 }
 
 static void reply_armed(gw_daemon_t *daemon, const iw_snapshot_t *seen, gw_client_t *client) {
     const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
-    json_out_t json = begin_reply(daemon, &client->arm_id);
-    json_out_text(&json, "state", gw_state_name(seen->state));
-    json_out_int(&json, "lease_ms", seen->config->lease_ms);
-    json_out_int(&json, "first_lease_ms", IW_FIRST_LEASE_US / IW_US_PER_MS);
-    json_out_int(&json, "stop_budget_ms", budget.client_lost_ms);
-    json_out_int(&json, "stop_budget_mm", budget.client_lost_mm);
-    json_out_open(&json, "warnings", '[');
+    iwn_out_t json = begin_reply(daemon, &client->arm_id);
+    iwn_out_text(&json, "state", iwn_state_name(seen->state));
+    iwn_out_int(&json, "lease_ms", seen->config->lease_ms);
+    iwn_out_int(&json, "first_lease_ms", IW_FIRST_LEASE_US / IW_US_PER_MS);
+    iwn_out_int(&json, "stop_budget_ms", budget.client_lost_ms);
+    iwn_out_int(&json, "stop_budget_mm", budget.client_lost_mm);
+    iwn_out_open(&json, "warnings", '[');
     for (uint32_t i = 0; i < daemon->warnings; ++i) {
-        json_out_text(&json, NULL, daemon->warning[i]);
+        iwn_out_text(&json, NULL, daemon->warning[i]);
     }
-    json_out_close(&json, ']');
+    iwn_out_close(&json, ']');
     send_reply(client, &json);
 }
 
@@ -129,7 +129,7 @@ static void do_arm(const call_t *call) {
     gw_daemon_t *daemon = call->daemon;
     gw_client_t *client = call->client;
     if (daemon->shutting_down) {
-        const gw_refusal_t refusal = {GW_DENIED, "the gateway is shutting down; wait until it is started again"};
+        const iwn_refusal_t refusal = {IWN_DENIED, "the gateway is shutting down; wait until it is started again"};
         send_refusal(daemon, client, &call->request->id, &refusal);
         return;
     }
@@ -161,9 +161,9 @@ void gw_dispatch_arming(gw_daemon_t *daemon) {
             reply_armed(daemon, &seen, client);
             continue;
         }
-        const gw_request_t request = {.cmd = GW_CMD_ARM};
+        const iwn_request_t request = {.cmd = IWN_CMD_ARM};
         const iw_refusal_t refusal = seen.arm_refusal;
-        gw_refusal_t words;
+        iwn_refusal_t words;
         gw_refuse_describe(daemon, &request, refusal == IW_REFUSE_NONE ? IW_REFUSE_NOT_ARMED : refusal, &words);
         send_refusal(daemon, client, &client->arm_id, &words);
     }
@@ -193,17 +193,17 @@ static void drive(const call_t *call, const iw_drive_t *wanted) {
         return;
     }
     call->daemon->requested = true;
-    json_out_t json = begin_reply(call->daemon, &call->request->id);
-    json_out_int(&json, "left_mm_s", applied.pair.wheel[IW_LEFT].speed_mm_s);
-    json_out_int(&json, "right_mm_s", applied.pair.wheel[IW_RIGHT].speed_mm_s);
-    json_out_int(&json, "left_mA", applied.pair.wheel[IW_LEFT].current_mA);
-    json_out_int(&json, "right_mA", applied.pair.wheel[IW_RIGHT].current_mA);
-    json_out_bool(&json, "limited", applied.limited);
+    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_int(&json, "left_mm_s", applied.pair.wheel[IW_LEFT].speed_mm_s);
+    iwn_out_int(&json, "right_mm_s", applied.pair.wheel[IW_RIGHT].speed_mm_s);
+    iwn_out_int(&json, "left_mA", applied.pair.wheel[IW_LEFT].current_mA);
+    iwn_out_int(&json, "right_mA", applied.pair.wheel[IW_RIGHT].current_mA);
+    iwn_out_bool(&json, "limited", applied.limited);
     send_reply(call->client, &json);
 }
 
 static void do_drive(const call_t *call) {
-    const gw_request_t *request = call->request;
+    const iwn_request_t *request = call->request;
     const iw_drive_t wanted = {
         .speed_mm_s = {saturate(request->left_mm_s), saturate(request->right_mm_s)},
         .current_mA = {saturate(request->left_mA), saturate(request->right_mA)},
@@ -217,7 +217,7 @@ static void do_drive(const call_t *call) {
 static void refuse_turn(const call_t *call) {
     const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
     iw_applied_t applied;
-    gw_refusal_t refusal;
+    iwn_refusal_t refusal;
     (void)judge_drive(call, &unknown, &applied);
     gw_refuse_describe_contradicted(call->daemon, IW_LEDGER_TRACK, &refusal);
     send_refusal(call->daemon, call->client, &call->request->id, &refusal);
@@ -280,13 +280,13 @@ static zero_t zero_of(const iw_force_t *force) {
 
 /// The zero of one wheel after a tare, and before.
 static void write_tare(const iw_force_t *force, const iw_force_quality_t *quality, const zero_t *before,
-                       json_out_t *json) {
-    json_out_int(json, "offset_mN", force->offset_mN);
-    json_out_int(json, "samples", quality->samples);
-    json_out_int(json, "deviation_mN", quality->deviation_mN);
-    json_out_int(json, "drift_mN", quality->drift_mN);
-    json_out_known(json, "before_mN", before->provenance != IW_OFFSET_NONE, before->offset_mN);
-    json_out_text(json, "before_provenance", gw_offset_word(before->provenance, before->offset_us));
+                       iwn_out_t *json) {
+    iwn_out_int(json, "offset_mN", force->offset_mN);
+    iwn_out_int(json, "samples", quality->samples);
+    iwn_out_int(json, "deviation_mN", quality->deviation_mN);
+    iwn_out_int(json, "drift_mN", quality->drift_mN);
+    iwn_out_known(json, "before_mN", before->provenance != IW_OFFSET_NONE, before->offset_mN);
+    iwn_out_text(json, "before_provenance", iwn_offset_word(before->provenance, before->offset_us));
 }
 
 static void do_tare(const call_t *call) {
@@ -296,36 +296,36 @@ static void do_tare(const call_t *call) {
     iw_side_t refused = IW_LEFT;
     const iw_tare_t result = gw_knowledge_tare(daemon, call->request->sides, &refused);
     if (result != IW_TARE_OK) {
-        gw_refusal_t words;
+        iwn_refusal_t words;
         gw_refuse_describe_tare(refused, result, &words);
         send_refusal(daemon, call->client, &call->request->id, &words);
         return;
     }
-    json_out_t json = begin_reply(daemon, &call->request->id);
-    json_out_text(&json, "state", gw_state_name(seen.state));
+    iwn_out_t json = begin_reply(daemon, &call->request->id);
+    iwn_out_text(&json, "state", iwn_state_name(seen.state));
     for (unsigned side = 0; side < IW_SIDES; ++side) {
         if ((call->request->sides & (1U << side)) != 0U) {
             note(call, &(blackbox_entry_t){.kind = BLACKBOX_TARE, .a = (uint8_t)side, .b = (uint8_t)result});
-            json_out_open(&json, side == IW_LEFT ? "left" : "right", '{');
+            iwn_out_open(&json, side == IW_LEFT ? "left" : "right", '{');
             write_tare(seen.wheel[side].force, &daemon->knowledge.tare[side], &before[side], &json);
-            json_out_close(&json, '}');
+            iwn_out_close(&json, '}');
         }
     }
     send_reply(call->client, &json);
 }
 
 static void reply_item(const call_t *call) {
-    json_out_t json = begin_reply(call->daemon, &call->request->id);
-    json_out_text(&json, "item", gw_ledger_item_name(call->request->item));
+    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_text(&json, "item", iwn_ledger_item_name(call->request->item));
     gw_knowledge_write_item(call->daemon, call->request->item, &json);
     send_reply(call->client, &json);
 }
 
 /// The operator's word. Moves nothing; what it contradicts is disabled from now on.
 static void do_confirm(const call_t *call) {
-    const gw_request_t *request = call->request;
-    const char *name = gw_ledger_item_name(request->item);
-    gw_refusal_t words;
+    const iwn_request_t *request = call->request;
+    const char *name = iwn_ledger_item_name(request->item);
+    iwn_refusal_t words;
     gw_word_t word;
     (void)memcpy(word.found, request->value, sizeof word.found);
     (void)memcpy(word.how, request->how, sizeof word.how);
@@ -336,13 +336,13 @@ static void do_confirm(const call_t *call) {
         reply_item(call);
         return;
     case GW_FOUND_UNSET:
-        words.error = GW_TYPE_NOT_SET;
+        words.error = IWN_TYPE_NOT_SET;
         (void)snprintf(words.message, sizeof words.message,
                        "%s is not configured, so there is nothing to confirm; set it under [wheels] first", name);
         break;
     case GW_FOUND_IMPOSSIBLE:
     default:
-        words.error = GW_BAD_VALUE;
+        words.error = IWN_BAD_VALUE;
         (void)snprintf(words.message, sizeof words.message,
                        "value of %s must be %s; leave it out to confirm what is configured", name,
                        gw_assumption_values(request->item));
@@ -352,23 +352,23 @@ static void do_confirm(const call_t *call) {
 }
 
 static void do_why(const call_t *call) {
-    json_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
     gw_snapshot_write_stop(call->daemon, &json);
     gw_record_write(call->daemon, &json);
     send_reply(call->client, &json);
 }
 
 void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line, size_t length) {
-    static void (*const handlers[GW_CMDS])(const call_t *call) = {
-        [GW_CMD_HELLO] = do_hello,     [GW_CMD_STATUS] = do_status, [GW_CMD_WATCH] = do_watch,
-        [GW_CMD_ARM] = do_arm,         [GW_CMD_DRIVE] = do_drive,   [GW_CMD_TWIST] = do_twist,
-        [GW_CMD_STOP] = do_stop,       [GW_CMD_DISARM] = do_stop,   [GW_CMD_ESTOP] = do_estop,
-        [GW_CMD_RESET] = do_reset,     [GW_CMD_TARE] = do_tare,     [GW_CMD_WHY] = do_why,
-        [GW_CMD_CONFIRM] = do_confirm,
+    static void (*const handlers[IWN_CMDS])(const call_t *call) = {
+        [IWN_CMD_HELLO] = do_hello,     [IWN_CMD_STATUS] = do_status, [IWN_CMD_WATCH] = do_watch,
+        [IWN_CMD_ARM] = do_arm,         [IWN_CMD_DRIVE] = do_drive,   [IWN_CMD_TWIST] = do_twist,
+        [IWN_CMD_STOP] = do_stop,       [IWN_CMD_DISARM] = do_stop,   [IWN_CMD_ESTOP] = do_estop,
+        [IWN_CMD_RESET] = do_reset,     [IWN_CMD_TARE] = do_tare,     [IWN_CMD_WHY] = do_why,
+        [IWN_CMD_CONFIRM] = do_confirm,
     };
-    gw_request_t request;
-    gw_refusal_t refusal;
-    if (!gw_request_parse(line, length, &request, &refusal)) {
+    iwn_request_t request;
+    iwn_refusal_t refusal;
+    if (!iwn_request_read(line, length, &daemon->work, &request, &refusal)) {
         send_refusal(daemon, client, &request.id, &refusal);
         return;
     }

@@ -15,6 +15,6 @@ void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line
 void gw_dispatch_arming(gw_daemon_t *daemon);
 
 /// Refuses without a request: `line_too_long` and `too_many_clients`. Writes the line, returns its length.
-size_t gw_dispatch_write_refusal(gw_daemon_t *daemon, const gw_id_t *id, const gw_refusal_t *refusal);
+size_t gw_dispatch_write_refusal(gw_daemon_t *daemon, const iwn_id_t *id, const iwn_refusal_t *refusal);
 
 #endif

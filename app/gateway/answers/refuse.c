@@ -11,7 +11,7 @@
 typedef struct {
     gw_daemon_t *daemon;
     iw_snapshot_t seen;
-    const gw_request_t *request;
+    const iwn_request_t *request;
     char *text;
     size_t size;
 } wording_t;
@@ -46,12 +46,12 @@ static void say_holder(const wording_t *self) {
 static void say_not_armed(const wording_t *self) {
     const gw_daemon_t *daemon = self->daemon;
     const iw_stop_t *stop = self->seen.stop;
-    const char *state = gw_state_name(self->seen.state);
+    const char *state = iwn_state_name(self->seen.state);
     if (daemon->shutting_down) {
         SAY(self, "not armed: the gateway is shutting down");
     } else if (stop->number > 0U) {
         SAY(self, "not armed (%s); the last stop was %" PRIu64 " ms ago: %s. Arm first", state,
-            ms_since(daemon, stop->at_us), gw_cause_name(stop->cause));
+            ms_since(daemon, stop->at_us), iwn_cause_name(stop->cause));
     } else {
         SAY(self, "not armed (%s); arm first", state);
     }
@@ -120,7 +120,7 @@ static void say_stalled(const wording_t *self) {
 static void say_stale(const wording_t *self) {
     char client[GW_CLIENT_TEXT_SIZE];
     name_client(self->daemon, self->seen.stale_client, client, sizeof client);
-    if (self->request->cmd == GW_CMD_DRIVE || self->request->cmd == GW_CMD_TWIST) {
+    if (self->request->cmd == IWN_CMD_DRIVE || self->request->cmd == IWN_CMD_TWIST) {
         SAY(self, "this command was sent before arm was answered; wait for that answer, then command anew");
         return;
     }
@@ -140,8 +140,8 @@ static void say_present(const wording_t *self) {
     const uint32_t present = self->seen.present;
     for (unsigned cause = 0; cause < IW_CAUSES; ++cause) {
         if ((present & (1U << cause)) != 0U) {
-            SAY(self, "%s was seen %" PRIu64 " ms ago; %s, and wait a second", gw_cause_name((iw_cause_t)cause),
-                ms_since(self->daemon, self->seen.seen_us[cause]), gw_why_cure((iw_cause_t)cause));
+            SAY(self, "%s was seen %" PRIu64 " ms ago; %s, and wait a second", iwn_cause_name((iw_cause_t)cause),
+                ms_since(self->daemon, self->seen.seen_us[cause]), iwn_why_cure((iw_cause_t)cause));
             return;
         }
     }
@@ -150,9 +150,9 @@ static void say_present(const wording_t *self) {
 }
 
 static void say_out_of_range(const wording_t *self) {
-    const gw_request_t *request = self->request;
+    const iwn_request_t *request = self->request;
     const bool setpoint = self->seen.config->current_role == IW_ROLE_SETPOINT;
-    if (request->cmd == GW_CMD_TWIST) {
+    if (request->cmd == IWN_CMD_TWIST) {
         SAY(self, "%" PRId64 " mm/s with %" PRId64 " mrad/s makes a wheel faster than 32767 mm/s; nothing was applied",
             request->v_mm_s, request->yaw_mrad_s);
         return;
@@ -180,7 +180,7 @@ static void say_bus_down(const wording_t *self) {
     const char *bus = daemon->config.bus.interface;
     const bool local = iw_linux_hal_link(&daemon->hal)->presence == IW_LINK_LOCAL;
     const bool off = self->seen.bus == IW_BUS_OFF;
-    SAY(self, "bus %s is %s; %s%s", bus, gw_bus_state_name(self->seen.bus),
+    SAY(self, "bus %s is %s; %s%s", bus, iwn_bus_state_name(self->seen.bus),
         local && off ? "end it in the simulator: iwheel-sim busoff off"
         : local      ? "start the simulator: iwheel-sim --can "
         : off        ? "check cable, termination and bit rate; what else: iwheelctl doctor "
@@ -196,7 +196,7 @@ static void say_timing(const wording_t *self) {
 
 static void say_missing(const wording_t *self) {
     SAY(self, "%s needs currents because current_role is setpoint: use drive with left_mA and right_mA",
-        self->request->cmd == GW_CMD_TWIST ? "twist" : "drive");
+        self->request->cmd == IWN_CMD_TWIST ? "twist" : "drive");
 }
 
 static void say_blocked(const wording_t *self) {
@@ -211,7 +211,7 @@ static void write_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item,
     const iw_snapshot_t seen = gw_daemon_look(daemon);
     char evidence[GW_EVIDENCE_SIZE];
     gw_assumption_evidence(item, &seen.assumed[item], &daemon->knowledge.known.item[item].word, evidence);
-    (void)snprintf(out_text, size, "%s is contradicted: %s; %s", gw_ledger_item_name(item), evidence,
+    (void)snprintf(out_text, size, "%s is contradicted: %s; %s", iwn_ledger_item_name(item), evidence,
                    gw_assumption_cost(item));
 }
 
@@ -219,8 +219,8 @@ static void say_contradicted(const wording_t *self) {
     write_contradicted(self->daemon, self->seen.doubt, self->text, self->size);
 }
 
-void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_refusal_t refusal,
-                        gw_refusal_t *out_refusal) {
+void gw_refuse_describe(gw_daemon_t *daemon, const iwn_request_t *request, iw_refusal_t refusal,
+                        iwn_refusal_t *out_refusal) {
     static void (*const say[])(const wording_t *self) = {
         [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range, [IW_REFUSE_MISSING_FIELD] = say_missing,
         [IW_REFUSE_NOT_HOLDER] = say_holder,         [IW_REFUSE_BUSY] = say_holder,
@@ -235,7 +235,7 @@ void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_ref
     };
     const wording_t wording = {daemon, gw_daemon_look(daemon), request, out_refusal->message,
                                sizeof out_refusal->message};
-    out_refusal->error = gw_error_of(refusal);
+    out_refusal->error = iwn_error_of(refusal);
     if ((size_t)refusal < sizeof say / sizeof say[0] && say[refusal] != NULL) {
         say[refusal](&wording);
     } else {
@@ -243,28 +243,28 @@ void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_ref
     }
 }
 
-void gw_refuse_describe_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, gw_refusal_t *out_refusal) {
-    out_refusal->error = GW_DENIED;
+void gw_refuse_describe_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_refusal_t *out_refusal) {
+    out_refusal->error = IWN_DENIED;
     write_contradicted(daemon, item, out_refusal->message, sizeof out_refusal->message);
 }
 
-void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, gw_refusal_t *out_refusal) {
+void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *out_refusal) {
     static const struct {
-        gw_error_t error;
+        iwn_error_t error;
         const char *why;
     } reasons[] = {
-        [IW_TARE_OK] = {GW_OK, ""},
+        [IW_TARE_OK] = {IWN_OK, ""},
         [IW_TARE_NO_FORCE] =
-            {GW_WHEEL_LOST,
+            {IWN_WHEEL_LOST,
              "has not sent force for two seconds without a gap; check its power and cable, wait two seconds"},
-        [IW_TARE_MOVING] = {GW_NOT_AT_REST, "turned within the last two seconds; let it stand, wait two seconds"},
-        [IW_TARE_NOISY] = {GW_DENIED, "has an unsteady force; let go of the machine, wait two seconds"},
-        [IW_TARE_LOADED] = {GW_DENIED,
+        [IW_TARE_MOVING] = {IWN_NOT_AT_REST, "turned within the last two seconds; let it stand, wait two seconds"},
+        [IW_TARE_NOISY] = {IWN_DENIED, "has an unsteady force; let go of the machine, wait two seconds"},
+        [IW_TARE_LOADED] = {IWN_DENIED,
                             "carries a load far from its earlier zero; let go of the machine, wait two seconds"},
-        [IW_TARE_SATURATED] = {GW_DENIED, "shows a force at the end of its range; check the sensor"},
+        [IW_TARE_SATURATED] = {IWN_DENIED, "shows a force at the end of its range; check the sensor"},
     };
     const size_t known = sizeof reasons / sizeof reasons[0];
-    out_refusal->error = (size_t)result < known ? reasons[result].error : GW_INTERNAL;
+    out_refusal->error = (size_t)result < known ? reasons[result].error : IWN_INTERNAL;
     (void)snprintf(out_refusal->message, sizeof out_refusal->message, "the %s wheel %s; nothing was changed",
                    side == IW_LEFT ? "left" : "right",
                    (size_t)result < known ? reasons[result].why : "cannot be tared");

@@ -6,13 +6,13 @@
 #include "daemon.h"
 
 /// `request` is the one refused.
-void gw_refuse_describe(gw_daemon_t *daemon, const gw_request_t *request, iw_refusal_t refusal,
-                        gw_refusal_t *out_refusal);
+void gw_refuse_describe(gw_daemon_t *daemon, const iwn_request_t *request, iw_refusal_t refusal,
+                        iwn_refusal_t *out_refusal);
 
 /// The same for what a contradicted item of the ledger keeps from being done.
-void gw_refuse_describe_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, gw_refusal_t *out_refusal);
+void gw_refuse_describe_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_refusal_t *out_refusal);
 
 /// The same for a tare of that wheel.
-void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, gw_refusal_t *out_refusal);
+void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *out_refusal);
 
 #endif

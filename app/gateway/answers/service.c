@@ -27,7 +27,7 @@ static void welcome(gw_daemon_t *daemon, gw_client_t *client, int fd) {
     client->fd = fd;
     client->pid = (int)peer.pid;
     client->interest = interest.events;
-    client->rate_hz = GW_RATE_DEFAULT_HZ;
+    client->rate_hz = IWN_RATE_DEFAULT_HZ;
     client->drained = true;
     client->caught_up_us = daemon->now_us;
     ++daemon->clients;
@@ -36,8 +36,8 @@ static void welcome(gw_daemon_t *daemon, gw_client_t *client, int fd) {
 }
 
 static void turn_away(gw_daemon_t *daemon, int fd) {
-    const gw_id_t nobody = {.kind = GW_ID_NONE};
-    gw_refusal_t refusal = {.error = GW_TOO_MANY_CLIENTS};
+    const iwn_id_t nobody = {.kind = IWN_ID_NONE};
+    iwn_refusal_t refusal = {.error = IWN_TOO_MANY_CLIENTS};
     (void)snprintf(refusal.message, sizeof refusal.message,
                    "%u clients are connected and there is no room for more; close one, or raise max_clients and the "
                    "limit of open files",
@@ -107,10 +107,10 @@ static void release(gw_daemon_t *daemon, gw_client_t *client) {
 }
 
 static void refuse_long_line(gw_daemon_t *daemon, gw_client_t *client) {
-    const gw_id_t nobody = {.kind = GW_ID_NONE};
-    gw_refusal_t refusal = {.error = GW_LINE_TOO_LONG};
+    const iwn_id_t nobody = {.kind = IWN_ID_NONE};
+    iwn_refusal_t refusal = {.error = IWN_LINE_TOO_LONG};
     (void)snprintf(refusal.message, sizeof refusal.message,
-                   "a request has at most %u bytes and ends with a newline; the connection is closed", GW_LINE_MAX);
+                   "a request has at most %u bytes and ends with a newline; the connection is closed", IWN_LINE_MAX);
     gw_client_reply(client, daemon->line, gw_dispatch_write_refusal(daemon, &nobody, &refusal));
     end_lease(daemon, client);
     gw_client_finish(client, daemon->now_us);

@@ -12,7 +12,8 @@
 
 #include "blackbox_ring.h"
 #include "gateway_config.h"
-#include "why.h"
+
+#include "iwheel_northbound/why.h"
 
 #include <sys/types.h>
 
@@ -28,7 +29,7 @@
 /// What the gateway tells the writer.
 typedef struct {
     bool last; ///< Nothing is to be written: the gateway ends as it should.
-    gw_stop_note_t note;
+    iwn_stop_note_t note;
     char cause[GW_BOX_CAUSE_SIZE];
     char side[8];          ///< "left", "right", "both", or empty.
     char from[16];         ///< Name of the state.

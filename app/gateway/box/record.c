@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: MIT
 #include "record.h"
 
-#include "json/json_frame.h"
-#include "names.h"
 #include "process/owners.h"
 
 #include "iwheel_linux/clock.h"
+#include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/words.h"
 
 #include <stdio.h>
 #include <string.h>
 
 static void order_recording(gw_daemon_t *daemon) {
-    const gw_stop_note_t *note = &daemon->last_stop;
-    const char *side = gw_sides_name(note->stop.sides);
+    const iwn_stop_note_t *note = &daemon->last_stop;
+    const char *side = iwn_sides_name(note->stop.sides);
     gw_box_order_t order = {.note = *note,
                             .wall_minus_us = note->wall_us - (int64_t)daemon->now_us,
                             .mark = blackbox_ring_written(daemon->box.ring)};
-    (void)snprintf(order.cause, sizeof order.cause, "%s", gw_cause_name(note->stop.cause));
+    (void)snprintf(order.cause, sizeof order.cause, "%s", iwn_cause_name(note->stop.cause));
     (void)snprintf(order.side, sizeof order.side, "%s", side != NULL ? side : "");
-    (void)snprintf(order.from, sizeof order.from, "%s", gw_state_name(note->stop.from));
+    (void)snprintf(order.from, sizeof order.from, "%s", iwn_state_name(note->stop.from));
     if (!gw_box_write(&daemon->box, &order)) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "stop %u is not recorded: the process that writes recordings is %s; the frames around it are kept in "
@@ -112,25 +112,25 @@ void gw_record_take(gw_daemon_t *daemon) {
     }
 }
 
-static void write_frames(json_out_t *json, const char *name, const blackbox_entry_t *frames, uint32_t count) {
-    json_out_open(json, name, '[');
+static void write_frames(iwn_out_t *json, const char *name, const blackbox_entry_t *frames, uint32_t count) {
+    iwn_out_open(json, name, '[');
     for (uint32_t i = 0; i < count; ++i) {
         iw_can_frame_t frame = {.id = frames[i].number, .dlc = frames[i].a, .kind = frames[i].b};
         (void)memcpy(frame.data, frames[i].as.data, sizeof frame.data);
-        json_out_open(json, NULL, '{');
-        json_frame_write(&frame, frames[i].at_us, json);
-        json_out_close(json, '}');
+        iwn_out_open(json, NULL, '{');
+        iwn_out_frame(&frame, frames[i].at_us, json);
+        iwn_out_close(json, '}');
     }
-    json_out_close(json, ']');
+    iwn_out_close(json, ']');
 }
 
-void gw_record_write(const gw_daemon_t *daemon, json_out_t *json) {
+void gw_record_write(const gw_daemon_t *daemon, iwn_out_t *json) {
     const gw_box_result_t *last = &daemon->box.last;
     const uint32_t number = daemon->last_stop.stop.number;
     const bool known = number != 0U && last->number == number;
-    json_out_text(json, "directory", daemon->config.record.directory);
-    json_out_text(json, "recording", known && last->error == 0 ? last->path : NULL);
-    json_out_text(json, "recording_error", known && last->error != 0 ? gw_folder_fault(last->error) : NULL);
+    iwn_out_text(json, "directory", daemon->config.record.directory);
+    iwn_out_text(json, "recording", known && last->error == 0 ? last->path : NULL);
+    iwn_out_text(json, "recording_error", known && last->error != 0 ? gw_folder_fault(last->error) : NULL);
     write_frames(json, "frames_before", daemon->tape.before, daemon->tape.before_count);
     write_frames(json, "frames_after", daemon->tape.after, number != 0U ? daemon->tape.after_count : 0U);
 }

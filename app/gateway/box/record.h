@@ -4,7 +4,8 @@
 #define GATEWAY_RECORD_H
 
 #include "daemon.h"
-#include "json/json_out.h"
+
+#include "iwheel_northbound/json_out.h"
 
 /// The stop in `daemon->last_stop` has just been seen: notes it, keeps the frames around it and, if it latched, orders a
 /// recording.
@@ -23,6 +24,6 @@ void gw_record_again(gw_daemon_t *daemon);
 void gw_record_take(gw_daemon_t *daemon);
 
 /// Where the last stop was written and the frames around it, into an object that is open.
-void gw_record_write(const gw_daemon_t *daemon, json_out_t *json);
+void gw_record_write(const gw_daemon_t *daemon, iwn_out_t *json);
 
 #endif

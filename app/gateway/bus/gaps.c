@@ -20,16 +20,16 @@ void gw_gaps_note(gw_gaps_t *self, const iw_sent_t *sent) {
     self->worst_us = gap_us > self->worst_us ? gap_us : self->worst_us;
 }
 
-void gw_gaps_write(const gw_gaps_t *self, json_out_t *json) {
-    json_out_open(json, "limits_ms", '[');
+void gw_gaps_write(const gw_gaps_t *self, iwn_out_t *json) {
+    iwn_out_open(json, "limits_ms", '[');
     for (uint32_t i = 0; i < GW_GAP_BUCKETS - 1U; ++i) {
-        json_out_int(json, NULL, gw_gap_limits_ms[i]);
+        iwn_out_int(json, NULL, gw_gap_limits_ms[i]);
     }
-    json_out_close(json, ']');
-    json_out_open(json, "count", '[');
+    iwn_out_close(json, ']');
+    iwn_out_open(json, "count", '[');
     for (uint32_t i = 0; i < GW_GAP_BUCKETS; ++i) {
-        json_out_int(json, NULL, self->count[i]);
+        iwn_out_int(json, NULL, self->count[i]);
     }
-    json_out_close(json, ']');
-    json_out_known(json, "worst_us", self->worst_us > 0U, self->worst_us);
+    iwn_out_close(json, ']');
+    iwn_out_known(json, "worst_us", self->worst_us > 0U, self->worst_us);
 }

@@ -7,7 +7,7 @@
 #define GATEWAY_GAPS_H
 
 #include "iwheel/snapshot.h"
-#include "json/json_out.h"
+#include "iwheel_northbound/json_out.h"
 
 #define GW_GAP_BUCKETS 10U
 
@@ -24,6 +24,6 @@ extern const uint16_t gw_gap_limits_ms[GW_GAP_BUCKETS - 1U];
 void gw_gaps_note(gw_gaps_t *self, const iw_sent_t *sent);
 
 /// Writes the object's fields.
-void gw_gaps_write(const gw_gaps_t *self, json_out_t *json);
+void gw_gaps_write(const gw_gaps_t *self, iwn_out_t *json);
 
 #endif

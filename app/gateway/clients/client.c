@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "client.h"
 
-#include "json/json_out.h"
+#include "iwheel_northbound/json_out.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -86,13 +86,13 @@ void gw_client_reply(gw_client_t *self, const char *line, size_t length) {
 
 static bool tell_lost(gw_client_t *self) {
     char line[64];
-    json_out_t json;
-    json_out_init(&json, line, sizeof line);
-    json_out_open(&json, NULL, '{');
-    json_out_text(&json, "event", "lost");
-    json_out_int(&json, "count", self->lost);
-    json_out_close(&json, '}');
-    return queue(self, line, json_out_finish(&json), GW_REPLY_MAX);
+    iwn_out_t json;
+    iwn_out_init(&json, line, sizeof line);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_text(&json, "event", "lost");
+    iwn_out_int(&json, "count", self->lost);
+    iwn_out_close(&json, '}');
+    return queue(self, line, iwn_out_finish(&json), GW_REPLY_MAX);
 }
 
 void gw_client_event(gw_client_t *self, const char *line, size_t length) {

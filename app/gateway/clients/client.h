@@ -9,9 +9,8 @@
 #ifndef GATEWAY_CLIENT_H
 #define GATEWAY_CLIENT_H
 
-#include "request.h"
-
 #include "iwheel/types.h"
+#include "iwheel_northbound/request.h"
 
 /// The longest reply or event with its newline.
 #define GW_REPLY_MAX 65537U
@@ -34,7 +33,7 @@ typedef struct {
     bool closing; ///< Nothing more is read.
     bool failed;  ///< Cannot be written to any more.
     bool arming;  ///< An arm waits for its reply; later lines wait behind it.
-    gw_id_t arm_id;
+    iwn_id_t arm_id;
     uint8_t topics;
     uint32_t lost; ///< Events that did not fit since the last `lost` event.
     uint32_t rate_hz;
@@ -45,8 +44,8 @@ typedef struct {
     size_t in_length;
     size_t out_start;
     size_t out_end;
-    char name[GW_NAME_MAX + 1U]; ///< As given with arm; empty: none.
-    char in[GW_LINE_MAX + 1U];
+    char name[IWN_NAME_MAX + 1U]; ///< As given with arm; empty: none.
+    char in[IWN_LINE_MAX + 1U];
     char out[GW_OUT_SIZE];
 } gw_client_t;
 

@@ -4,12 +4,13 @@
 #define GATEWAY_EVENT_H
 
 #include "daemon.h"
-#include "json/json_out.h"
+
+#include "iwheel_northbound/json_out.h"
 
 /// Begun in the daemon's line buffer, with its name. One at a time.
-json_out_t gw_event_begin(gw_daemon_t *daemon, const char *name);
+iwn_out_t gw_event_begin(gw_daemon_t *daemon, const char *name);
 
 /// Closed and sent. Whoever reads too slowly loses it; one that does not fit the buffer is sent to nobody.
-void gw_event_send(gw_daemon_t *daemon, json_out_t *json, gw_topic_t topic);
+void gw_event_send(gw_daemon_t *daemon, iwn_out_t *json, iwn_topic_t topic);
 
 #endif

@@ -2,7 +2,8 @@
 #include "config_relations.h"
 
 #include "config_value.h"
-#include "plain.h"
+
+#include "iwheel_northbound/text.h"
 
 #include <stdarg.h>
 #include <string.h>
@@ -25,7 +26,7 @@ void config_complain(config_report_t *report, unsigned line, const char *format,
     va_start(list, format);
     (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
-    plain_copy(text, plain, sizeof plain); // It quotes the file.
+    iwn_plain_copy(text, plain, sizeof plain); // It quotes the file.
     (void)fprintf(report->err, "%s\n", plain);
 }
 

@@ -85,7 +85,7 @@ static bool fits_bus(iw_ledger_item_t item, const gw_known_item_t *known) {
 
 /// A value that can be configured, or that an operator may find.
 static bool can_be(iw_ledger_item_t item, const char *value) {
-    char bare[GW_VALUE_SIZE];
+    char bare[IWN_VALUE_SIZE];
     gateway_config_t config;
     gateway_config_default(&config);
     config.core.setpoint_type_set = true;

@@ -5,10 +5,10 @@
 #include "box/record.h"
 #include "daemon.h"
 #include "knowledge_told.h"
-#include "names.h"
 #include "process/owners.h"
 
 #include "iwheel_linux/clock.h"
+#include "iwheel_northbound/words.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -100,14 +100,14 @@ void gw_knowledge_observe(gw_daemon_t *daemon) {
 /// What an earlier run found is put beside what this one has found already, which is fresher.
 static void merge_item(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_known_item_t *stored) {
     const iw_ledger_entry_t *present = &gw_daemon_look(daemon).assumed[item];
-    char value[GW_VALUE_SIZE];
+    char value[IWN_VALUE_SIZE];
     gw_assumption_value(&daemon->config, item, value);
     if (stored->entry.state == IW_LEDGER_ASSUMED || present->state == IW_LEDGER_CONTRADICTED) {
         return;
     }
     if (strcmp(value, stored->value) != 0) {
         gw_log(&daemon->log, GW_LOG_INFO, "%s: what was found before was for %s, and %s is configured now: forgotten",
-               gw_ledger_item_name(item), stored->value, value[0] != '\0' ? value : "nothing");
+               iwn_ledger_item_name(item), stored->value, value[0] != '\0' ? value : "nothing");
         daemon->knowledge.changed = true;
         return;
     }

@@ -4,12 +4,13 @@
 #define GATEWAY_KNOWLEDGE_JSON_H
 
 #include "daemon.h"
-#include "json/json_out.h"
+
+#include "iwheel_northbound/json_out.h"
 
 /// The objects `ledger` and `memory` of a snapshot: every item; file, state and reason.
-void gw_knowledge_write(const gw_daemon_t *daemon, json_out_t *json);
+void gw_knowledge_write(const gw_daemon_t *daemon, iwn_out_t *json);
 
 /// One item of the ledger, its state and what it rests on, into an object that is open.
-void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, json_out_t *json);
+void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_out_t *json);
 
 #endif

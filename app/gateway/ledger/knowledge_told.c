@@ -3,8 +3,9 @@
 
 #include "clients/event.h"
 #include "knowledge_json.h"
-#include "names.h"
 #include "process/owners.h"
+
+#include "iwheel_northbound/words.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,31 +21,31 @@ static const char *side_name(iw_side_t side) {
 void gw_knowledge_tell_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
     const iw_ledger_entry_t *entry = &gw_daemon_look(daemon).assumed[item];
     const bool bad = entry->state == IW_LEDGER_CONTRADICTED;
-    char value[GW_VALUE_SIZE];
+    char value[IWN_VALUE_SIZE];
     char evidence[GW_EVIDENCE_SIZE];
     gw_assumption_value(&daemon->config, item, value);
     gw_assumption_evidence(item, entry, &daemon->knowledge.known.item[item].word, evidence);
     gw_log(&daemon->log, bad ? GW_LOG_WARNING : GW_LOG_INFO, "assumption %s = %s is %s by the %s: %s%s%s",
-           gw_ledger_item_name(item), value, gw_ledger_state_name(entry->state), gw_evidence_name(entry->evidence),
+           iwn_ledger_item_name(item), value, iwn_ledger_state_name(entry->state), iwn_evidence_name(entry->evidence),
            evidence, bad ? "; disabled: " : "", bad ? gw_assumption_cost(item) : "");
-    json_out_t json = gw_event_begin(daemon, "ledger");
-    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
-    json_out_text(&json, "item", gw_ledger_item_name(item));
+    iwn_out_t json = gw_event_begin(daemon, "ledger");
+    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_text(&json, "item", iwn_ledger_item_name(item));
     gw_knowledge_write_item(daemon, item, &json);
-    gw_event_send(daemon, &json, GW_TOPIC_STATE);
+    gw_event_send(daemon, &json, IWN_TOPIC_STATE);
 }
 
 /// "12.300 N, stored (wheel)", or "none".
 static void describe(const gw_told_offset_t *offset, char *out_text, size_t size) {
-    const char *word = gw_offset_word(offset->provenance, offset->offset_us);
-    const bool stored = strcmp(word, gw_provenance_name(IW_OFFSET_STORED)) == 0;
+    const char *word = iwn_offset_word(offset->provenance, offset->offset_us);
+    const bool stored = strcmp(word, iwn_provenance_name(IW_OFFSET_STORED)) == 0;
     if (offset->provenance == IW_OFFSET_NONE) {
         (void)snprintf(out_text, size, "none");
         return;
     }
     (void)snprintf(out_text, size, "%s%d.%03d N, %s%s%s%s", offset->offset_mN < 0 ? "-" : "",
                    abs(offset->offset_mN / 1000), abs(offset->offset_mN % 1000), word, stored ? " (" : "",
-                   stored ? gw_provenance_name(offset->from) : "", stored ? ")" : "");
+                   stored ? iwn_provenance_name(offset->from) : "", stored ? ")" : "");
 }
 
 void gw_knowledge_tell_offset(gw_daemon_t *daemon, iw_side_t side, const gw_told_offset_t *now,
@@ -58,14 +59,14 @@ void gw_knowledge_tell_offset(gw_daemon_t *daemon, iw_side_t side, const gw_told
     describe(before, was, sizeof was);
     gw_log(&daemon->log, moved ? GW_LOG_WARNING : GW_LOG_INFO, "%s force offset: %s; before: %s", side_name(side), is,
            was);
-    json_out_t json = gw_event_begin(daemon, "offset");
-    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
-    json_out_text(&json, "side", side_name(side));
-    json_out_known(&json, "offset_mN", known, now->offset_mN);
-    json_out_text(&json, "provenance", gw_offset_word(now->provenance, now->offset_us));
-    json_out_known(&json, "before_mN", knew, before->offset_mN);
-    json_out_text(&json, "before_provenance", gw_offset_word(before->provenance, before->offset_us));
-    gw_event_send(daemon, &json, GW_TOPIC_FORCE);
+    iwn_out_t json = gw_event_begin(daemon, "offset");
+    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_text(&json, "side", side_name(side));
+    iwn_out_known(&json, "offset_mN", known, now->offset_mN);
+    iwn_out_text(&json, "provenance", iwn_offset_word(now->provenance, now->offset_us));
+    iwn_out_known(&json, "before_mN", knew, before->offset_mN);
+    iwn_out_text(&json, "before_provenance", iwn_offset_word(before->provenance, before->offset_us));
+    gw_event_send(daemon, &json, IWN_TOPIC_FORCE);
 }
 
 void gw_knowledge_tell_memory(gw_daemon_t *daemon) {
@@ -100,7 +101,7 @@ static void list_items(const iw_ledger_entry_t *assumed, iw_ledger_state_t state
         if (assumed[item].state == state) {
             const size_t length = strlen(out_text);
             (void)snprintf(&out_text[length], size - length, "%s%s", length > 0U ? ", " : "",
-                           gw_ledger_item_name((iw_ledger_item_t)item));
+                           iwn_ledger_item_name((iw_ledger_item_t)item));
         }
     }
 }

@@ -2,13 +2,13 @@
 #include "memory.h"
 
 #include "bounds.h"
-#include "json/json_arena.h"
-#include "json/json_out.h"
-#include "names.h"
+
+#include "iwheel_northbound/json_in.h"
+#include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/words.h"
 
 #include <ctype.h>
 #include <inttypes.h>
-#include <jansson.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -36,55 +36,55 @@ void gw_memory_name(const char *bus, char *out_name, size_t size) {
     }
 }
 
-static void write_item(const gw_known_item_t *known, const char *name, json_out_t *json) {
-    json_out_open(json, name, '{');
-    json_out_text(json, "state", gw_ledger_state_name(known->entry.state));
-    json_out_text(json, "evidence", gw_evidence_name(known->entry.evidence));
-    json_out_int(json, "figure", known->entry.figure);
-    json_out_text(json, "value", known->value);
-    json_out_text(json, "found", known->word.found);
-    json_out_int(json, "since_wall_us", known->since_wall_us);
+static void write_item(const gw_known_item_t *known, const char *name, iwn_out_t *json) {
+    iwn_out_open(json, name, '{');
+    iwn_out_text(json, "state", iwn_ledger_state_name(known->entry.state));
+    iwn_out_text(json, "evidence", iwn_evidence_name(known->entry.evidence));
+    iwn_out_int(json, "figure", known->entry.figure);
+    iwn_out_text(json, "value", known->value);
+    iwn_out_text(json, "found", known->word.found);
+    iwn_out_int(json, "since_wall_us", known->since_wall_us);
     if (known->word.how[0] != '\0') {
-        json_out_text(json, "how", known->word.how); // Left out otherwise, so that earlier versions can read it.
+        iwn_out_text(json, "how", known->word.how); // Left out otherwise, so that earlier versions can read it.
     }
-    json_out_close(json, '}');
+    iwn_out_close(json, '}');
 }
 
-static void write_offset(const gw_known_offset_t *known, const char *name, json_out_t *json) {
-    json_out_open(json, name, '{');
-    json_out_text(json, "from", gw_provenance_name(known->from));
-    json_out_text(json, "unit", known->unit == IW_FORCE_CN ? "cN" : "dN");
-    json_out_int(json, "offset_mN", known->offset_mN);
-    json_out_int(json, "drift_mN", known->drift_mN);
-    json_out_int(json, "deviation_mN", known->deviation_mN);
-    json_out_int(json, "samples", known->samples);
-    json_out_int(json, "wall_us", known->wall_us);
-    json_out_close(json, '}');
+static void write_offset(const gw_known_offset_t *known, const char *name, iwn_out_t *json) {
+    iwn_out_open(json, name, '{');
+    iwn_out_text(json, "from", iwn_provenance_name(known->from));
+    iwn_out_text(json, "unit", known->unit == IW_FORCE_CN ? "cN" : "dN");
+    iwn_out_int(json, "offset_mN", known->offset_mN);
+    iwn_out_int(json, "drift_mN", known->drift_mN);
+    iwn_out_int(json, "deviation_mN", known->deviation_mN);
+    iwn_out_int(json, "samples", known->samples);
+    iwn_out_int(json, "wall_us", known->wall_us);
+    iwn_out_close(json, '}');
 }
 
 size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text, size_t size) {
-    json_out_t json;
-    json_out_init(&json, out_text, size - SUM_LENGTH);
-    json_out_open(&json, NULL, '{');
-    json_out_text(&json, "format", FORMAT);
-    json_out_int(&json, "version", VERSION);
-    json_out_text(&json, "bus", bus);
-    json_out_open(&json, "items", '{');
+    iwn_out_t json;
+    iwn_out_init(&json, out_text, size - SUM_LENGTH);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_text(&json, "format", FORMAT);
+    iwn_out_int(&json, "version", VERSION);
+    iwn_out_text(&json, "bus", bus);
+    iwn_out_open(&json, "items", '{');
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
         if (known->item[item].entry.state != IW_LEDGER_ASSUMED) {
-            write_item(&known->item[item], gw_ledger_item_name((iw_ledger_item_t)item), &json);
+            write_item(&known->item[item], iwn_ledger_item_name((iw_ledger_item_t)item), &json);
         }
     }
-    json_out_close(&json, '}');
-    json_out_open(&json, "offsets", '{');
+    iwn_out_close(&json, '}');
+    iwn_out_open(&json, "offsets", '{');
     for (unsigned side = 0; side < IW_SIDES; ++side) {
         if (known->offset[side].from != IW_OFFSET_NONE) {
             write_offset(&known->offset[side], side == IW_LEFT ? "left" : "right", &json);
         }
     }
-    json_out_close(&json, '}');
-    json_out_close(&json, '}');
-    const size_t length = json_out_finish(&json);
+    iwn_out_close(&json, '}');
+    iwn_out_close(&json, '}');
+    const size_t length = iwn_out_finish(&json);
     if (length == 0U) {
         return 0;
     }
@@ -93,67 +93,68 @@ size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text,
 }
 
 /// A field's number, if it is one within the limits.
-static bool read_number(const json_t *object, const char *field, int64_t low, int64_t high, int64_t *out_number) {
-    const json_t *value = json_object_get(object, field);
-    *out_number = json_integer_value(value);
-    return json_is_integer(value) && *out_number >= low && *out_number <= high;
-}
-
-static bool read_text(const json_t *object, const char *field, char *out_text, size_t size) {
-    const char *text = json_string_value(json_object_get(object, field));
-    const size_t length = text == NULL ? size : strlen(text);
-    if (length >= size) {
+static bool read_number(iwn_json_t object, const char *field, int64_t low, int64_t high, int64_t *out_number) {
+    iwn_json_t value;
+    if (!iwn_json_find(object, field, &value) || iwn_json_kind(value) != IWN_JSON_INTEGER) {
         return false;
     }
-    (void)memcpy(out_text, text, length + 1U);
-    return true;
+    *out_number = iwn_json_integer(value);
+    return *out_number >= low && *out_number <= high;
+}
+
+static bool read_text(iwn_json_t object, const char *field, char *out_text, size_t size) {
+    iwn_json_t value;
+    return iwn_json_find(object, field, &value) && iwn_json_text(value, out_text, size);
+}
+
+/// Whether a field is this text.
+static bool is_text(iwn_json_t object, const char *field, const char *text) {
+    iwn_json_t value;
+    return iwn_json_find(object, field, &value) && iwn_json_is(value, text);
+}
+
+static size_t count_fields(iwn_json_t object) {
+    iwn_json_t rest = iwn_json_inside(object);
+    iwn_json_t name;
+    iwn_json_t value;
+    size_t count = 0;
+    while (iwn_json_next(&rest, &name, &value)) {
+        count++;
+    }
+    return count;
 }
 
 /// What the operator found, and how: ledgers of before do not tell that.
-static bool read_word(const json_t *object, gw_word_t *out_word) {
-    const bool has_how = json_object_get(object, "how") != NULL;
-    return json_object_size(object) == (has_how ? 7U : 6U) &&
+static bool read_word(iwn_json_t object, gw_word_t *out_word) {
+    iwn_json_t how;
+    const bool has_how = iwn_json_find(object, "how", &how);
+    return count_fields(object) == (has_how ? 7U : 6U) &&
            read_text(object, "found", out_word->found, sizeof out_word->found) &&
-           (!has_how || read_text(object, "how", out_word->how, sizeof out_word->how));
+           (!has_how || iwn_json_text(how, out_word->how, sizeof out_word->how));
 }
 
-static bool read_item(const json_t *object, gw_known_item_t *out_known) {
+static bool read_item(const char *name, iwn_json_t object, gw_known_t *known) {
+    iw_ledger_item_t item;
     int64_t figure;
-    int64_t since;
-    const char *state = json_string_value(json_object_get(object, "state"));
-    const char *evidence = json_string_value(json_object_get(object, "evidence"));
-    if (state == NULL || evidence == NULL || !read_number(object, "figure", INT32_MIN, INT32_MAX, &figure) ||
-        !read_number(object, "since_wall_us", INT64_MIN, INT64_MAX, &since) ||
-        !read_text(object, "value", out_known->value, sizeof out_known->value) ||
-        !read_word(object, &out_known->word)) {
+    const bool confirmed = is_text(object, "state", "confirmed");
+    const bool by_bus = is_text(object, "evidence", "bus");
+    if (!iwn_ledger_item_of(name, &item) || !(confirmed || is_text(object, "state", "contradicted")) ||
+        !(by_bus || is_text(object, "evidence", "operator")) ||
+        !read_number(object, "figure", INT32_MIN, INT32_MAX, &figure)) {
         return false;
     }
-    const bool confirmed = strcmp(state, "confirmed") == 0;
-    const bool by_bus = strcmp(evidence, "bus") == 0;
-    out_known->entry = (iw_ledger_entry_t){.state = confirmed ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED,
-                                           .evidence = by_bus ? IW_EVIDENCE_BUS : IW_EVIDENCE_OPERATOR,
-                                           .figure = (int32_t)figure};
-    out_known->since_wall_us = since;
-    return (confirmed || strcmp(state, "contradicted") == 0) && (by_bus || strcmp(evidence, "operator") == 0);
+    gw_known_item_t *found = &known->item[item];
+    found->entry = (iw_ledger_entry_t){.state = confirmed ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED,
+                                       .evidence = by_bus ? IW_EVIDENCE_BUS : IW_EVIDENCE_OPERATOR,
+                                       .figure = (int32_t)figure};
+    return read_number(object, "since_wall_us", INT64_MIN, INT64_MAX, &found->since_wall_us) &&
+           read_text(object, "value", found->value, sizeof found->value) && read_word(object, &found->word) &&
+           gw_bounds_item(item, found);
 }
 
-static bool read_items(json_t *items, gw_known_t *known) {
-    const char *name;
-    json_t *object;
-    json_object_foreach(items, name, object) {
-        iw_ledger_item_t item;
-        if (!gw_assumption_of(name, &item) || !read_item(object, &known->item[item]) ||
-            !gw_bounds_item(item, &known->item[item])) {
-            return false;
-        }
-    }
-    return json_is_object(items);
-}
-
-static bool read_provenance(const json_t *object, iw_offset_provenance_t *out_from) {
-    const char *word = json_string_value(json_object_get(object, "from"));
-    for (int from = IW_OFFSET_ESTIMATED; word != NULL && from <= (int)IW_OFFSET_OPERATOR; ++from) {
-        if (strcmp(word, gw_provenance_name((iw_offset_provenance_t)from)) == 0) {
+static bool read_provenance(iwn_json_t object, iw_offset_provenance_t *out_from) {
+    for (int from = IW_OFFSET_ESTIMATED; from <= (int)IW_OFFSET_OPERATOR; ++from) {
+        if (is_text(object, "from", iwn_provenance_name((iw_offset_provenance_t)from))) {
             *out_from = (iw_offset_provenance_t)from;
             return true;
         }
@@ -161,56 +162,68 @@ static bool read_provenance(const json_t *object, iw_offset_provenance_t *out_fr
     return false;
 }
 
-static bool read_offset(const json_t *object, gw_known_offset_t *out_known) {
+static bool read_offset(const char *name, iwn_json_t object, gw_known_t *known) {
     int64_t offset;
     int64_t drift;
     int64_t deviation;
     int64_t samples;
-    const char *unit = json_string_value(json_object_get(object, "unit"));
-    if (unit == NULL || json_object_size(object) != 7U || !read_provenance(object, &out_known->from) ||
+    const bool left = strcmp(name, "left") == 0;
+    const bool centi = is_text(object, "unit", "cN");
+    gw_known_offset_t *found = &known->offset[left ? IW_LEFT : IW_RIGHT];
+    if (!(left || strcmp(name, "right") == 0) || !(centi || is_text(object, "unit", "dN")) ||
+        count_fields(object) != 7U || !read_provenance(object, &found->from) ||
         !read_number(object, "offset_mN", -IW_FORCE_OFFSET_MAX_mN, IW_FORCE_OFFSET_MAX_mN, &offset) ||
         !read_number(object, "drift_mN", INT32_MIN, INT32_MAX, &drift) ||
         !read_number(object, "deviation_mN", 0, UINT32_MAX, &deviation) ||
         !read_number(object, "samples", 0, UINT8_MAX, &samples) ||
-        !read_number(object, "wall_us", INT64_MIN, INT64_MAX, &out_known->wall_us)) {
+        !read_number(object, "wall_us", INT64_MIN, INT64_MAX, &found->wall_us)) {
         return false;
     }
-    out_known->unit = strcmp(unit, "cN") == 0 ? IW_FORCE_CN : IW_FORCE_DN;
-    out_known->offset_mN = (int32_t)offset;
-    out_known->drift_mN = (int32_t)drift;
-    out_known->deviation_mN = (uint32_t)deviation;
-    out_known->samples = (uint32_t)samples;
-    return out_known->unit == IW_FORCE_CN || strcmp(unit, "dN") == 0;
+    found->unit = centi ? IW_FORCE_CN : IW_FORCE_DN;
+    found->offset_mN = (int32_t)offset;
+    found->drift_mN = (int32_t)drift;
+    found->deviation_mN = (uint32_t)deviation;
+    found->samples = (uint32_t)samples;
+    return gw_bounds_offset(found);
 }
 
-static bool read_offsets(json_t *offsets, gw_known_t *known) {
-    const char *name;
-    json_t *object;
-    json_object_foreach(offsets, name, object) {
-        const bool left = strcmp(name, "left") == 0;
-        gw_known_offset_t *offset = &known->offset[left ? IW_LEFT : IW_RIGHT];
-        if ((!left && strcmp(name, "right") != 0) || !read_offset(object, offset) || !gw_bounds_offset(offset)) {
+/// Each member of the object with that name, by its reader.
+static bool read_all(iwn_json_t root, const char *field, gw_known_t *known,
+                     bool (*read_one)(const char *, iwn_json_t, gw_known_t *)) {
+    char name[32]; // A longer one is none of ours.
+    iwn_json_t object;
+    iwn_json_t found;
+    iwn_json_t value;
+    if (!iwn_json_find(root, field, &object) || iwn_json_kind(object) != IWN_JSON_OBJECT) {
+        return false;
+    }
+    iwn_json_t rest = iwn_json_inside(object);
+    while (iwn_json_next(&rest, &found, &value)) {
+        if (!iwn_json_text(found, name, sizeof name) || iwn_json_kind(value) != IWN_JSON_OBJECT ||
+            !read_one(name, value, known)) {
             return false;
         }
     }
-    return json_is_object(offsets);
+    return true;
 }
 
 /// NULL, or what is wrong with the line.
-static const char *read_line(const json_t *root, const char *bus, gw_known_t *known) {
+static const char *read_line(const char *text, size_t length, const char *bus, gw_known_t *known) {
+    iwn_work_t work;
+    char why[GW_MEMORY_REASON_SIZE];
+    iwn_text_t unused = iwn_text_begin(why, sizeof why); // The words below are for people; JSON's would not help them.
+    iwn_json_t root;
     int64_t version;
-    const char *format = json_string_value(json_object_get(root, "format"));
-    const char *of_bus = json_string_value(json_object_get(root, "bus"));
-    if (format == NULL || strcmp(format, FORMAT) != 0) {
+    if (!iwn_json_check(text, length, &work, &root, &unused) || !is_text(root, "format", FORMAT)) {
         return "it is no ledger of an iWheel gateway";
     }
     if (!read_number(root, "version", VERSION, VERSION, &version)) {
         return "another version of the gateway wrote it";
     }
-    if (of_bus == NULL || strcmp(of_bus, bus) != 0) {
+    if (!is_text(root, "bus", bus)) {
         return "it speaks of another bus";
     }
-    if (!read_items(json_object_get(root, "items"), known) || !read_offsets(json_object_get(root, "offsets"), known)) {
+    if (!read_all(root, "items", known, read_item) || !read_all(root, "offsets", known, read_offset)) {
         return "it holds what no gateway has measured";
     }
     return NULL;
@@ -224,9 +237,7 @@ bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t
     const char *fault = "it is damaged: its checksum is wrong";
     (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", checksum(text, body));
     if (length > SUM_LENGTH && memcmp(&text[body], sum, SUM_LENGTH) == 0) {
-        json_arena_reset();
-        const json_t *root = json_loadb(text, body, JSON_REJECT_DUPLICATES, NULL);
-        fault = root == NULL ? "it is no ledger of an iWheel gateway" : read_line(root, bus, &known);
+        fault = read_line(text, body, bus, &known);
     }
     if (fault != NULL) {
         (void)snprintf(out_reason, GW_MEMORY_REASON_SIZE, "%s", fault);

@@ -21,8 +21,8 @@
 typedef struct {
     iw_ledger_entry_t entry; ///< IW_LEDGER_ASSUMED: there is none.
     int64_t since_wall_us;
-    char value[GW_VALUE_SIZE]; ///< What was configured when it was found.
-    gw_word_t word;            ///< What the operator found instead, and how it was found; empty: nothing, or not told.
+    char value[IWN_VALUE_SIZE]; ///< What was configured when it was found.
+    gw_word_t word;             ///< What the operator found instead, and how it was found; empty: nothing, or not told.
 } gw_known_item_t;
 
 /// The force offset of one wheel.
@@ -45,7 +45,7 @@ typedef struct {
 size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text, size_t size);
 
 /// Reads a text. False, with the reason in words and `*out_known` untouched, unless it was written by gw_memory_write
-/// for this bus. Uses the arena of json_arena.h, which it resets.
+/// for this bus.
 bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t *out_known,
                     char out_reason[GW_MEMORY_REASON_SIZE]);
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "log.h"
 
-#include "plain.h"
-
 #include "iwheel_linux/clock.h"
+#include "iwheel_northbound/text.h"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -76,7 +75,7 @@ void gw_log(gw_log_t *self, gw_log_level_t level, const char *format, ...) {
     va_start(arguments, format);
     (void)vsnprintf(&raw[length], sizeof raw - (size_t)length, format, arguments);
     va_end(arguments);
-    plain_copy(raw, line, sizeof line - 1U); // Cut anywhere, and with names that others chose.
+    iwn_plain_copy(raw, line, sizeof line - 1U); // Cut anywhere, and with names that others chose.
     const size_t end = strlen(line);
     line[end] = '\n';
     --self->credit;

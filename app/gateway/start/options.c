@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "options.h"
 
-#include "plain.h"
+#include "iwheel_northbound/text.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -47,7 +47,7 @@ void gw_options_help(FILE *out) {
 
 static int misuse(FILE *err, const char *what) {
     char plain[256];
-    plain_copy(what, plain, sizeof plain);
+    iwn_plain_copy(what, plain, sizeof plain);
     (void)fprintf(err, "iwheel-gateway: %s; see iwheel-gateway --help\n", plain);
     return EX_USAGE;
 }

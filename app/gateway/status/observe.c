@@ -4,10 +4,10 @@
 #include "box/record.h"
 #include "clients/event.h"
 #include "inspect.h"
-#include "json/json_frame.h"
 #include "snapshot.h"
 
 #include "iwheel_linux/clock.h"
+#include "iwheel_northbound/json_out.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -17,9 +17,9 @@
 IW_STATIC_ASSERT(GW_CLIENTS_MAX <= 64U, a_bit_per_client);
 
 static void tell_state(gw_daemon_t *daemon) {
-    json_out_t json = gw_event_begin(daemon, "state");
+    iwn_out_t json = gw_event_begin(daemon, "state");
     gw_snapshot_write(daemon, &json);
-    gw_event_send(daemon, &json, GW_TOPIC_STATE);
+    gw_event_send(daemon, &json, IWN_TOPIC_STATE);
 }
 
 static void observe_state(gw_daemon_t *daemon, bool first) {
@@ -27,14 +27,14 @@ static void observe_state(gw_daemon_t *daemon, bool first) {
     if (state == daemon->observed.state && !first) {
         return;
     }
-    gw_log(&daemon->log, GW_LOG_INFO, "state: %s", gw_state_name(state));
+    gw_log(&daemon->log, GW_LOG_INFO, "state: %s", iwn_state_name(state));
     gw_record_state(daemon, first ? state : daemon->observed.state);
     daemon->observed.state = state;
     tell_state(daemon);
 }
 
 /// Who asked for it or held the lease, while that is still known.
-static void note_client(gw_daemon_t *daemon, gw_stop_note_t *note, char *out_text, size_t size) {
+static void note_client(gw_daemon_t *daemon, iwn_stop_note_t *note, char *out_text, size_t size) {
     const gw_observed_t *observed = &daemon->observed;
     if (note->stop.cause == IW_CAUSE_ESTOP_SOFTWARE) {
         note->stop.client = note->stop.detail;
@@ -57,20 +57,20 @@ static void observe_stop(gw_daemon_t *daemon, const iw_stop_t *stop) {
     }
     daemon->observed.stop_number = stop->number;
     char who[GW_CLIENT_TEXT_SIZE];
-    gw_stop_note_t *note = &daemon->last_stop;
-    *note = (gw_stop_note_t){.stop = *stop, .wall_us = iw_clock_wall_us()};
+    iwn_stop_note_t *note = &daemon->last_stop;
+    *note = (iwn_stop_note_t){.stop = *stop, .wall_us = iw_clock_wall_us()};
     note_client(daemon, note, who, sizeof who);
-    const gw_why_context_t context = {.client = who,
-                                      .reason = daemon->estop_reason,
-                                      .estop = daemon->config.estop.line,
-                                      .bus = daemon->config.bus.interface};
-    gw_why_sentence(&note->stop, &context, note->sentence, sizeof note->sentence);
+    const iwn_why_context_t context = {.client = who,
+                                       .reason = daemon->estop_reason,
+                                       .estop = daemon->config.estop.line,
+                                       .bus = daemon->config.bus.interface};
+    iwn_why_sentence(&note->stop, &context, note->sentence, sizeof note->sentence);
     gw_log(&daemon->log, GW_LOG_WARNING, "stop %u: %s", (unsigned)stop->number, note->sentence);
     gw_record_stop(daemon);
-    json_out_t json = gw_event_begin(daemon, "stop");
-    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_t json = gw_event_begin(daemon, "stop");
+    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
     gw_snapshot_write_stop(daemon, &json);
-    gw_event_send(daemon, &json, GW_TOPIC_STOP);
+    gw_event_send(daemon, &json, IWN_TOPIC_STOP);
 }
 
 static void observe_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
@@ -89,13 +89,13 @@ static void observe_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     }
     gw_log(&daemon->log, GW_LOG_INFO, "lease %s: %s", change,
            holder == IW_CLIENT_NONE ? "nobody" : observed->holder_text);
-    json_out_t json = gw_event_begin(daemon, "lease");
-    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
-    json_out_text(&json, "change", change);
-    json_out_known(&json, "holder", holder != IW_CLIENT_NONE, holder);
-    json_out_text(&json, "name", client != NULL && client->name[0] != '\0' ? client->name : NULL);
-    json_out_known(&json, "former", former != IW_CLIENT_NONE, former);
-    gw_event_send(daemon, &json, GW_TOPIC_LEASE);
+    iwn_out_t json = gw_event_begin(daemon, "lease");
+    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_text(&json, "change", change);
+    iwn_out_known(&json, "holder", holder != IW_CLIENT_NONE, holder);
+    iwn_out_text(&json, "name", client != NULL && client->name[0] != '\0' ? client->name : NULL);
+    iwn_out_known(&json, "former", former != IW_CLIENT_NONE, former);
+    gw_event_send(daemon, &json, IWN_TOPIC_LEASE);
 }
 
 static void observe_bus(gw_daemon_t *daemon, iw_bus_state_t bus, bool first) {
@@ -104,11 +104,11 @@ static void observe_bus(gw_daemon_t *daemon, iw_bus_state_t bus, bool first) {
     }
     daemon->observed.bus = bus;
     gw_log(&daemon->log, bus == IW_BUS_ACTIVE ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s",
-           daemon->config.bus.interface, gw_bus_state_name(bus));
-    json_out_t json = gw_event_begin(daemon, "bus");
-    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
-    json_out_text(&json, "state", gw_bus_state_name(bus));
-    gw_event_send(daemon, &json, GW_TOPIC_BUS);
+           daemon->config.bus.interface, iwn_bus_state_name(bus));
+    iwn_out_t json = gw_event_begin(daemon, "bus");
+    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_text(&json, "state", iwn_bus_state_name(bus));
+    gw_event_send(daemon, &json, IWN_TOPIC_BUS);
 }
 
 static void observe_estop(gw_daemon_t *daemon, bool first) {
@@ -117,23 +117,23 @@ static void observe_estop(gw_daemon_t *daemon, bool first) {
         return;
     }
     daemon->observed.estop = answer;
-    const char *name = gw_estop_name(answer, daemon->hal.estop_ops->present);
+    const char *name = iwn_estop_name(answer, daemon->hal.estop_ops->present);
     const char *trouble = inspect_estop_trouble(&daemon->hal);
     gw_log(&daemon->log, answer == 0 ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s", daemon->config.estop.line,
            name, trouble[0] == '\0' ? "" : ": ", trouble);
-    json_out_t json = gw_event_begin(daemon, "estop");
-    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
-    json_out_text(&json, "state", name);
-    gw_event_send(daemon, &json, GW_TOPIC_ESTOP);
+    iwn_out_t json = gw_event_begin(daemon, "estop");
+    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_text(&json, "state", name);
+    gw_event_send(daemon, &json, IWN_TOPIC_ESTOP);
 }
 
 static void tell_fault(gw_daemon_t *daemon, const char *cause, bool present) {
     gw_log(&daemon->log, present ? GW_LOG_WARNING : GW_LOG_INFO, "%s: %s", present ? "fault" : "fault gone", cause);
-    json_out_t json = gw_event_begin(daemon, "fault");
-    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
-    json_out_text(&json, "cause", cause);
-    json_out_bool(&json, "present", present);
-    gw_event_send(daemon, &json, GW_TOPIC_STOP);
+    iwn_out_t json = gw_event_begin(daemon, "fault");
+    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_text(&json, "cause", cause);
+    iwn_out_bool(&json, "present", present);
+    gw_event_send(daemon, &json, IWN_TOPIC_STOP);
 }
 
 /// While armed or stopping a cause makes a stop, which is told as such; here are the others.
@@ -143,7 +143,7 @@ static void observe_faults(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     const uint32_t changed = present ^ observed->present;
     for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; ++cause) {
         if ((changed & (1U << cause)) != 0U) {
-            tell_fault(daemon, gw_cause_name((iw_cause_t)cause), (present & (1U << cause)) != 0U);
+            tell_fault(daemon, iwn_cause_name((iw_cause_t)cause), (present & (1U << cause)) != 0U);
         }
     }
     observed->present = present;
@@ -174,25 +174,25 @@ void gw_observe(gw_daemon_t *daemon) {
 
 static bool wants_periodic(const gw_client_t *client) {
     return client->id != IW_CLIENT_NONE && !client->closing && !client->ended &&
-           (client->topics & ((1U << GW_TOPIC_STATE) | (1U << GW_TOPIC_FORCE))) != 0U;
+           (client->topics & ((1U << IWN_TOPIC_STATE) | (1U << IWN_TOPIC_FORCE))) != 0U;
 }
 
 /// Written once, for all in `due` (a bit per slot) who watch the topic.
-static void send_periodic(gw_daemon_t *daemon, gw_topic_t topic, uint64_t due) {
+static void send_periodic(gw_daemon_t *daemon, iwn_topic_t topic, uint64_t due) {
     size_t length = 0;
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
         if ((due >> i & 1U) == 0U || (daemon->client[i].topics & (1U << topic)) == 0U) {
             continue;
         }
         if (length == 0U) {
-            json_out_t json = gw_event_begin(daemon, gw_topic_name(topic));
-            if (topic == GW_TOPIC_STATE) {
+            iwn_out_t json = gw_event_begin(daemon, iwn_topic_name(topic));
+            if (topic == IWN_TOPIC_STATE) {
                 gw_snapshot_write(daemon, &json);
             } else {
                 gw_snapshot_write_force(daemon, &json);
             }
-            json_out_close(&json, '}');
-            length = json_out_finish(&json);
+            iwn_out_close(&json, '}');
+            length = iwn_out_finish(&json);
         }
         gw_client_event(&daemon->client[i], daemon->line, length);
     }
@@ -212,8 +212,8 @@ void gw_observe_periodic(gw_daemon_t *daemon) {
         }
     }
     if (due != 0U) {
-        send_periodic(daemon, GW_TOPIC_STATE, due);
-        send_periodic(daemon, GW_TOPIC_FORCE, due);
+        send_periodic(daemon, IWN_TOPIC_STATE, due);
+        send_periodic(daemon, IWN_TOPIC_FORCE, due);
     }
 }
 
@@ -228,7 +228,7 @@ iw_time_us_t gw_observe_next_us(const gw_daemon_t *daemon) {
     return next_us;
 }
 
-static bool anybody_watches(const gw_daemon_t *daemon, gw_topic_t topic) {
+static bool anybody_watches(const gw_daemon_t *daemon, iwn_topic_t topic) {
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
         if (daemon->client[i].id != IW_CLIENT_NONE && (daemon->client[i].topics & (1U << topic)) != 0U) {
             return true;
@@ -245,13 +245,13 @@ void gw_observe_tap(void *context, const iw_can_frame_t *frame) {
 }
 
 static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
-    json_out_t json = gw_event_begin(daemon, "frame");
-    json_frame_write(&tapped->frame, tapped->at_us, &json);
-    gw_event_send(daemon, &json, GW_TOPIC_FRAME);
+    iwn_out_t json = gw_event_begin(daemon, "frame");
+    iwn_out_frame(&tapped->frame, tapped->at_us, &json);
+    gw_event_send(daemon, &json, IWN_TOPIC_FRAME);
 }
 
 void gw_observe_frames(gw_daemon_t *daemon) {
-    if (anybody_watches(daemon, GW_TOPIC_FRAME)) {
+    if (anybody_watches(daemon, IWN_TOPIC_FRAME)) {
         for (uint32_t i = 0; i < daemon->tapped; ++i) {
             tell_frame(daemon, &daemon->tap[i]);
         }
@@ -259,19 +259,19 @@ void gw_observe_frames(gw_daemon_t *daemon) {
     daemon->tapped = 0;
 }
 
-void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, json_out_t *json) {
-    json_out_text(json, "name", "iwheel-gateway");
-    json_out_text(json, "version", IWHEEL_VERSION);
-    json_out_int(json, "api", API_VERSION);
-    json_out_text(json, "bus", daemon->config.bus.interface);
-    json_out_text(json, "state", gw_state_name(iw_gateway_state(&daemon->gateway)));
-    json_out_int(json, "client", client->id);
+void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, iwn_out_t *json) {
+    iwn_out_text(json, "name", "iwheel-gateway");
+    iwn_out_text(json, "version", IWHEEL_VERSION);
+    iwn_out_int(json, "api", API_VERSION);
+    iwn_out_text(json, "bus", daemon->config.bus.interface);
+    iwn_out_text(json, "state", iwn_state_name(iw_gateway_state(&daemon->gateway)));
+    iwn_out_int(json, "client", client->id);
 }
 
 void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client) {
-    json_out_t json = gw_event_begin(daemon, "hello");
+    iwn_out_t json = gw_event_begin(daemon, "hello");
     gw_observe_write_hello(daemon, client, &json);
-    json_out_int(&json, "t_us", (int64_t)daemon->now_us);
-    json_out_close(&json, '}');
-    gw_client_event(client, daemon->line, json_out_finish(&json));
+    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_close(&json, '}');
+    gw_client_event(client, daemon->line, iwn_out_finish(&json));
 }

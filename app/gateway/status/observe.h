@@ -6,7 +6,8 @@
 #define GATEWAY_OBSERVE_H
 
 #include "daemon.h"
-#include "json/json_out.h"
+
+#include "iwheel_northbound/json_out.h"
 
 /// Looks at the core and tells what is new. After every step, and before a client's slot is freed.
 void gw_observe(gw_daemon_t *daemon);
@@ -27,6 +28,6 @@ void gw_observe_tap(void *context, const iw_can_frame_t *frame);
 void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client);
 
 /// Name, version and so on, into an object that is open: event and reply of `hello`.
-void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, json_out_t *json);
+void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, iwn_out_t *json);
 
 #endif

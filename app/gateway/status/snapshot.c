@@ -9,9 +9,9 @@
 #include <stdio.h>
 #include <string.h>
 
-void gw_snapshot_write_age(json_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us) {
+void gw_snapshot_write_age(iwn_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us) {
     const bool known = then_us != IW_NEVER && then_us <= now_us;
-    json_out_known(json, name, known, known ? (int64_t)((now_us - then_us) / IW_US_PER_MS) : 0);
+    iwn_out_known(json, name, known, known ? (int64_t)((now_us - then_us) / IW_US_PER_MS) : 0);
 }
 
 bool gw_snapshot_is_fresh(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us) {
@@ -32,30 +32,30 @@ static bool is_distance_known(const iw_snapshot_t *seen) {
     return !contradicted(seen, IW_LEDGER_WHEEL_RADIUS) && !contradicted(seen, IW_LEDGER_GEAR_RATIO);
 }
 
-static void write_motion(const iw_snapshot_t *seen, iw_side_t side, json_out_t *json) {
+static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
     const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
     const bool heard = wheel->heard;
     const bool following = seen->demand == IW_DEMAND_FOLLOW;
     const bool sending = seen->demand != IW_DEMAND_SILENCE;
     const iw_command_t applied = seen->applied.wheel[side];
     const iw_command_t wanted = seen->target.wheel[side];
-    json_out_bool(json, "heard", heard);
+    iwn_out_bool(json, "heard", heard);
     if (heard) {
-        json_out_bool(json, "at_rest", wheel->at_rest);
+        iwn_out_bool(json, "at_rest", wheel->at_rest);
     } else {
-        json_out_null(json, "at_rest");
+        iwn_out_null(json, "at_rest");
     }
-    json_out_known(json, "speed_rpm", heard, wheel->told->speed.speed_rpm);
-    json_out_known(json, "speed_mm_s", heard && is_speed_known(seen), wheel->speed_mm_s);
-    json_out_known(json, "acceleration_raw", heard, wheel->told->speed.acceleration_raw);
-    json_out_known(json, "commanded_mm_s", following, wanted.speed_mm_s);
-    json_out_known(json, "commanded_mA", following, wanted.current_mA);
-    json_out_known(json, "applied_mm_s", sending, applied.speed_mm_s);
-    json_out_known(json, "applied_mA", sending, applied.current_mA);
+    iwn_out_known(json, "speed_rpm", heard, wheel->told->speed.speed_rpm);
+    iwn_out_known(json, "speed_mm_s", heard && is_speed_known(seen), wheel->speed_mm_s);
+    iwn_out_known(json, "acceleration_raw", heard, wheel->told->speed.acceleration_raw);
+    iwn_out_known(json, "commanded_mm_s", following, wanted.speed_mm_s);
+    iwn_out_known(json, "commanded_mA", following, wanted.current_mA);
+    iwn_out_known(json, "applied_mm_s", sending, applied.speed_mm_s);
+    iwn_out_known(json, "applied_mA", sending, applied.current_mA);
     gw_snapshot_write_age(json, "speed_age_ms", seen->at_us, wheel->speed_us);
 }
 
-static void write_condition(const iw_snapshot_t *seen, iw_side_t side, json_out_t *json) {
+static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
     const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
     const iw_codec_status_t *status = &wheel->told->status;
     const iw_force_validity_t force = iw_snapshot_force_validity(seen, side);
@@ -63,144 +63,144 @@ static void write_condition(const iw_snapshot_t *seen, iw_side_t side, json_out_
     const bool fresh = gw_snapshot_is_fresh(seen->at_us, wheel->status_us, GW_STATUS_STALE_US);
     const bool warm = fresh && status->temperature_degC <= IW_TEMPERATURE_MAX_degC;
     const bool cpu = fresh && status->cpu_percent <= 100U;
-    json_out_known(json, "battery_dV", fresh, status->battery_dV);
-    json_out_known(json, "temperature_degC", warm, status->temperature_degC);
-    json_out_known(json, "cpu_percent", cpu, status->cpu_percent);
-    json_out_known(json, "ticks", ever, wheel->ticks);
-    json_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->ticks * wheel->nm_per_tick / 1000000);
+    iwn_out_known(json, "battery_dV", fresh, status->battery_dV);
+    iwn_out_known(json, "temperature_degC", warm, status->temperature_degC);
+    iwn_out_known(json, "cpu_percent", cpu, status->cpu_percent);
+    iwn_out_known(json, "ticks", ever, wheel->ticks);
+    iwn_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->ticks * wheel->nm_per_tick / 1000000);
     gw_snapshot_write_age(json, "status_age_ms", seen->at_us, wheel->status_us);
-    json_out_int(json, "reboots", wheel->reboots);
-    json_out_open(json, "valid", '{');
-    json_out_bool(json, "speed", wheel->heard);
-    json_out_bool(json, "status", fresh);
-    json_out_bool(json, "temperature", warm);
-    json_out_bool(json, "cpu", cpu);
-    json_out_bool(json, "force", force == IW_FORCE_VALID);
-    json_out_close(json, '}');
-    json_out_open(json, "saturated", '{');
-    json_out_bool(json, "battery", fresh && status->battery_dV == IW_BATTERY_SATURATED_dV);
-    json_out_bool(json, "force", force == IW_FORCE_SATURATED);
-    json_out_close(json, '}');
+    iwn_out_int(json, "reboots", wheel->reboots);
+    iwn_out_open(json, "valid", '{');
+    iwn_out_bool(json, "speed", wheel->heard);
+    iwn_out_bool(json, "status", fresh);
+    iwn_out_bool(json, "temperature", warm);
+    iwn_out_bool(json, "cpu", cpu);
+    iwn_out_bool(json, "force", force == IW_FORCE_VALID);
+    iwn_out_close(json, '}');
+    iwn_out_open(json, "saturated", '{');
+    iwn_out_bool(json, "battery", fresh && status->battery_dV == IW_BATTERY_SATURATED_dV);
+    iwn_out_bool(json, "force", force == IW_FORCE_SATURATED);
+    iwn_out_close(json, '}');
 }
 
-static void write_wheel(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side, json_out_t *json) {
-    json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
+static void write_wheel(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
+    iwn_out_open(json, side == IW_LEFT ? "left" : "right", '{');
     write_motion(seen, side, json);
     write_condition(seen, side, json);
     gw_snapshot_write_wheel_force(daemon, seen, side, json);
-    json_out_close(json, '}');
+    iwn_out_close(json, '}');
 }
 
 static bool at_limit(int16_t value) {
     return value == INT16_MIN || value == INT16_MAX;
 }
 
-static void write_pose(const iw_snapshot_t *seen, json_out_t *json) {
+static void write_pose(const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_codec_pose_t *pose = &seen->wheel[IW_RIGHT].told->pose;
     const bool fresh = gw_snapshot_is_fresh(seen->at_us, seen->pose_us, GW_STATUS_STALE_US) &&
                        !contradicted(seen, IW_LEDGER_POSE_BYTE_ORDER);
-    json_out_open(json, "pose", '{');
-    json_out_known(json, "x_mm", fresh, pose->x_mm);
-    json_out_known(json, "y_mm", fresh, pose->y_mm);
-    json_out_known(json, "z_mm", fresh, pose->z_mm);
-    json_out_known(json, "psi_mrad", fresh, pose->psi_mrad);
-    json_out_bool(json, "limited", fresh && (at_limit(pose->x_mm) || at_limit(pose->y_mm) || at_limit(pose->z_mm)));
+    iwn_out_open(json, "pose", '{');
+    iwn_out_known(json, "x_mm", fresh, pose->x_mm);
+    iwn_out_known(json, "y_mm", fresh, pose->y_mm);
+    iwn_out_known(json, "z_mm", fresh, pose->z_mm);
+    iwn_out_known(json, "psi_mrad", fresh, pose->psi_mrad);
+    iwn_out_bool(json, "limited", fresh && (at_limit(pose->x_mm) || at_limit(pose->y_mm) || at_limit(pose->z_mm)));
     gw_snapshot_write_age(json, "age_ms", seen->at_us, seen->pose_us);
-    json_out_close(json, '}');
+    iwn_out_close(json, '}');
 }
 
-static void write_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen, json_out_t *json) {
+static void write_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_t *json) {
     const gw_client_t *holder = gw_daemon_client(daemon, seen->holder);
     const bool running = holder != NULL && !seen->arming && seen->lease_until_us > seen->at_us;
-    json_out_open(json, "lease", '{');
-    json_out_known(json, "holder", holder != NULL, seen->holder);
-    json_out_text(json, "name", holder != NULL && holder->name[0] != '\0' ? holder->name : NULL);
-    json_out_known(json, "pid", holder != NULL && holder->pid > 0, holder != NULL ? holder->pid : 0);
-    json_out_known(json, "remaining_ms", running,
-                   running ? (int64_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS) : 0);
-    json_out_int(json, "lease_ms", seen->config->lease_ms);
-    json_out_close(json, '}');
+    iwn_out_open(json, "lease", '{');
+    iwn_out_known(json, "holder", holder != NULL, seen->holder);
+    iwn_out_text(json, "name", holder != NULL && holder->name[0] != '\0' ? holder->name : NULL);
+    iwn_out_known(json, "pid", holder != NULL && holder->pid > 0, holder != NULL ? holder->pid : 0);
+    iwn_out_known(json, "remaining_ms", running,
+                  running ? (int64_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS) : 0);
+    iwn_out_int(json, "lease_ms", seen->config->lease_ms);
+    iwn_out_close(json, '}');
 }
 
-static void write_surroundings(const gw_daemon_t *daemon, const iw_snapshot_t *seen, json_out_t *json) {
+static void write_surroundings(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
-    json_out_open(json, "bus", '{');
-    json_out_text(json, "name", daemon->config.bus.interface);
-    json_out_text(json, "state", gw_bus_state_name(seen->bus));
-    json_out_text(json, "timing", gw_bus_facts_timing(daemon));
-    json_out_text(json, "echo", seen->echo_proven ? "proven" : "unproven");
-    json_out_known(json, "bitrate", link->bitrate_hz != 0U, link->bitrate_hz);
-    json_out_known(json, "sample_point_permille", link->sample_point_permille != 0U, link->sample_point_permille);
-    json_out_known(json, "load_permille", link->presence == IW_LINK_UP, link->load_permille);
-    json_out_known(json, "lost_frames", link->presence == IW_LINK_UP, link->lost);
-    json_out_close(json, '}');
-    json_out_open(json, "estop", '{');
-    json_out_text(json, "line", daemon->config.estop.line);
-    json_out_text(json, "state", gw_estop_name(daemon->hal.estop_last, daemon->hal.estop_ops->present));
-    json_out_bool(json, "simulated", daemon->hal.estop_ops->simulated);
-    json_out_close(json, '}');
+    iwn_out_open(json, "bus", '{');
+    iwn_out_text(json, "name", daemon->config.bus.interface);
+    iwn_out_text(json, "state", iwn_bus_state_name(seen->bus));
+    iwn_out_text(json, "timing", gw_bus_facts_timing(daemon));
+    iwn_out_text(json, "echo", seen->echo_proven ? "proven" : "unproven");
+    iwn_out_known(json, "bitrate", link->bitrate_hz != 0U, link->bitrate_hz);
+    iwn_out_known(json, "sample_point_permille", link->sample_point_permille != 0U, link->sample_point_permille);
+    iwn_out_known(json, "load_permille", link->presence == IW_LINK_UP, link->load_permille);
+    iwn_out_known(json, "lost_frames", link->presence == IW_LINK_UP, link->lost);
+    iwn_out_close(json, '}');
+    iwn_out_open(json, "estop", '{');
+    iwn_out_text(json, "line", daemon->config.estop.line);
+    iwn_out_text(json, "state", iwn_estop_name(daemon->hal.estop_last, daemon->hal.estop_ops->present));
+    iwn_out_bool(json, "simulated", daemon->hal.estop_ops->simulated);
+    iwn_out_close(json, '}');
 }
 
-static void write_gaps(const gw_daemon_t *daemon, json_out_t *json) {
-    json_out_open(json, "gaps", '{');
+static void write_gaps(const gw_daemon_t *daemon, iwn_out_t *json) {
+    iwn_out_open(json, "gaps", '{');
     gw_gaps_write(&daemon->gaps, json);
-    json_out_close(json, '}');
+    iwn_out_close(json, '}');
 }
 
-static void write_budget(const iw_snapshot_t *seen, json_out_t *json) {
+static void write_budget(const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
-    json_out_open(json, "budget", '{');
-    json_out_int(json, "client_lost_ms", budget.client_lost_ms);
-    json_out_int(json, "client_lost_mm", budget.client_lost_mm);
-    json_out_int(json, "killed_ms", budget.killed_ms);
-    json_out_int(json, "killed_mm", budget.killed_mm);
-    json_out_close(json, '}');
+    iwn_out_open(json, "budget", '{');
+    iwn_out_int(json, "client_lost_ms", budget.client_lost_ms);
+    iwn_out_int(json, "client_lost_mm", budget.client_lost_mm);
+    iwn_out_int(json, "killed_ms", budget.killed_ms);
+    iwn_out_int(json, "killed_mm", budget.killed_mm);
+    iwn_out_close(json, '}');
 }
 
-static void write_counters(const iw_snapshot_t *seen, json_out_t *json) {
+static void write_counters(const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_counters_t *counters = seen->counters;
     const iw_sent_t *sent = seen->sent;
-    json_out_open(json, "counters", '{');
-    json_out_int(json, "received", counters->received);
-    json_out_int(json, "echoes", counters->echoes);
-    json_out_int(json, "bad_format", counters->bad_format);
-    json_out_int(json, "bad_length", counters->bad_length);
-    json_out_int(json, "unknown", counters->unknown);
-    json_out_int(json, "foreign", counters->foreign);
-    json_out_int(json, "late_steps", counters->late_steps);
-    json_out_int(json, "out_of_range", counters->out_of_range);
-    json_out_int(json, "purges", counters->purges);
-    json_out_int(json, "left_behind", counters->left_behind);
-    json_out_int(json, "pairs", sent->pairs);
-    json_out_int(json, "send_later", sent->later);
-    json_out_int(json, "clamped", sent->clamped);
-    json_out_int(json, "gate_stopped", seen->stopped);
-    json_out_int(json, "stray_echoes", seen->stray_echoes);
-    json_out_int(json, "gap_max_us", sent->gap_max_us);
-    json_out_int(json, "still_moving", seen->still_moving);
-    json_out_close(json, '}');
+    iwn_out_open(json, "counters", '{');
+    iwn_out_int(json, "received", counters->received);
+    iwn_out_int(json, "echoes", counters->echoes);
+    iwn_out_int(json, "bad_format", counters->bad_format);
+    iwn_out_int(json, "bad_length", counters->bad_length);
+    iwn_out_int(json, "unknown", counters->unknown);
+    iwn_out_int(json, "foreign", counters->foreign);
+    iwn_out_int(json, "late_steps", counters->late_steps);
+    iwn_out_int(json, "out_of_range", counters->out_of_range);
+    iwn_out_int(json, "purges", counters->purges);
+    iwn_out_int(json, "left_behind", counters->left_behind);
+    iwn_out_int(json, "pairs", sent->pairs);
+    iwn_out_int(json, "send_later", sent->later);
+    iwn_out_int(json, "clamped", sent->clamped);
+    iwn_out_int(json, "gate_stopped", seen->stopped);
+    iwn_out_int(json, "stray_echoes", seen->stray_echoes);
+    iwn_out_int(json, "gap_max_us", sent->gap_max_us);
+    iwn_out_int(json, "still_moving", seen->still_moving);
+    iwn_out_close(json, '}');
 }
 
-void gw_snapshot_write_causes(json_out_t *json, const char *name, uint32_t causes) {
-    json_out_open(json, name, '[');
+void gw_snapshot_write_causes(iwn_out_t *json, const char *name, uint32_t causes) {
+    iwn_out_open(json, name, '[');
     for (unsigned cause = 0; cause < IW_CAUSES; ++cause) {
         if ((causes & (1U << cause)) != 0U) {
-            json_out_text(json, NULL, gw_cause_name((iw_cause_t)cause));
+            iwn_out_text(json, NULL, iwn_cause_name((iw_cause_t)cause));
         }
     }
-    json_out_close(json, ']');
+    iwn_out_close(json, ']');
 }
 
-void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json) {
+void gw_snapshot_write(gw_daemon_t *daemon, iwn_out_t *json) {
     const iw_snapshot_t seen = gw_daemon_look(daemon);
     const iw_state_t state = seen.state;
     const bool stopped = state == IW_STATE_STOPPING || state == IW_STATE_LATCHED;
-    json_out_int(json, "t_us", (int64_t)daemon->now_us);
-    json_out_int(json, "wall_us", iw_clock_wall_us());
-    json_out_text(json, "version", IWHEEL_VERSION);
-    json_out_text(json, "state", gw_state_name(state));
-    json_out_bool(json, "arming", seen.arming);
-    json_out_text(json, "cause", stopped ? gw_cause_name(seen.stop->cause) : NULL);
+    iwn_out_int(json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_int(json, "wall_us", iw_clock_wall_us());
+    iwn_out_text(json, "version", IWHEEL_VERSION);
+    iwn_out_text(json, "state", iwn_state_name(state));
+    iwn_out_bool(json, "arming", seen.arming);
+    iwn_out_text(json, "cause", stopped ? iwn_cause_name(seen.stop->cause) : NULL);
     gw_snapshot_write_causes(json, "present", seen.present);
     write_lease(daemon, &seen, json);
     write_surroundings(daemon, &seen, json);
@@ -211,32 +211,32 @@ void gw_snapshot_write(gw_daemon_t *daemon, json_out_t *json) {
     write_gaps(daemon, json);
     write_budget(&seen, json);
     write_counters(&seen, json);
-    json_out_int(json, "clients", daemon->clients);
-    json_out_bool(json, "listen_only", seen.config->listen_only);
-    json_out_bool(json, "shutting_down", daemon->shutting_down);
-    json_out_open(json, "warnings", '[');
+    iwn_out_int(json, "clients", daemon->clients);
+    iwn_out_bool(json, "listen_only", seen.config->listen_only);
+    iwn_out_bool(json, "shutting_down", daemon->shutting_down);
+    iwn_out_open(json, "warnings", '[');
     for (uint32_t i = 0; i < daemon->warnings; ++i) {
-        json_out_text(json, NULL, daemon->warning[i]);
+        iwn_out_text(json, NULL, daemon->warning[i]);
     }
-    json_out_close(json, ']');
+    iwn_out_close(json, ']');
 }
 
-void gw_snapshot_write_stop(const gw_daemon_t *daemon, json_out_t *json) {
-    const gw_stop_note_t *note = &daemon->last_stop;
+void gw_snapshot_write_stop(const gw_daemon_t *daemon, iwn_out_t *json) {
+    const iwn_stop_note_t *note = &daemon->last_stop;
     const iw_stop_t *stop = &note->stop;
     const bool any = stop->number > 0U;
-    json_out_int(json, "number", stop->number);
-    json_out_text(json, "cause", any ? gw_cause_name(stop->cause) : NULL);
-    json_out_text(json, "side", any ? gw_sides_name(stop->sides) : NULL);
-    json_out_known(json, "detail", any, stop->detail);
-    json_out_text(json, "from", any ? gw_state_name(stop->from) : NULL);
-    json_out_bool(json, "latched", any && stop->latched);
-    json_out_known(json, "client", stop->client != IW_CLIENT_NONE, stop->client);
-    json_out_text(json, "client_name", note->client_name[0] != '\0' ? note->client_name : NULL);
-    json_out_known(json, "applied_left_mm_s", any, stop->applied.wheel[IW_LEFT].speed_mm_s);
-    json_out_known(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
-    json_out_known(json, "at_us", any, (int64_t)stop->at_us);
-    json_out_known(json, "wall_us", any, note->wall_us);
+    iwn_out_int(json, "number", stop->number);
+    iwn_out_text(json, "cause", any ? iwn_cause_name(stop->cause) : NULL);
+    iwn_out_text(json, "side", any ? iwn_sides_name(stop->sides) : NULL);
+    iwn_out_known(json, "detail", any, stop->detail);
+    iwn_out_text(json, "from", any ? iwn_state_name(stop->from) : NULL);
+    iwn_out_bool(json, "latched", any && stop->latched);
+    iwn_out_known(json, "client", stop->client != IW_CLIENT_NONE, stop->client);
+    iwn_out_text(json, "client_name", note->client_name[0] != '\0' ? note->client_name : NULL);
+    iwn_out_known(json, "applied_left_mm_s", any, stop->applied.wheel[IW_LEFT].speed_mm_s);
+    iwn_out_known(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
+    iwn_out_known(json, "at_us", any, (int64_t)stop->at_us);
+    iwn_out_known(json, "wall_us", any, note->wall_us);
     gw_snapshot_write_age(json, "age_ms", daemon->now_us, any ? stop->at_us : IW_NEVER);
-    json_out_text(json, "sentence", note->sentence);
+    iwn_out_text(json, "sentence", note->sentence);
 }

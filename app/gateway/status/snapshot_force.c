@@ -36,7 +36,7 @@ static zero_t describe_zero(const gw_daemon_t *daemon, const iw_snapshot_t *seen
     const bool window = force->quality.window != IW_WINDOW_OPEN;
     const bool bad = window && force->quality.window != IW_WINDOW_GOOD;
     zero_t zero = {.known = known,
-                   .word = gw_offset_word(force->provenance, force->offset_us),
+                   .word = iwn_offset_word(force->provenance, force->offset_us),
                    .age_ms = age_ms(daemon, force, known),
                    .samples = force->quality.samples,
                    .deviation_mN = force->quality.deviation_mN,
@@ -59,62 +59,62 @@ static zero_t describe_zero(const gw_daemon_t *daemon, const iw_snapshot_t *seen
     return zero;
 }
 
-static void write_known_bool(json_out_t *json, const char *name, bool known, bool value) {
+static void write_known_bool(iwn_out_t *json, const char *name, bool known, bool value) {
     if (known) {
-        json_out_bool(json, name, value);
+        iwn_out_bool(json, name, value);
     } else {
-        json_out_null(json, name);
+        iwn_out_null(json, name);
     }
 }
 
 void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side,
-                                   json_out_t *json) {
+                                   iwn_out_t *json) {
     const iw_force_t *force = seen->wheel[side].force;
     const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
     const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
     const bool offset = force->provenance != IW_OFFSET_NONE;
     const zero_t zero = describe_zero(daemon, seen, side);
-    json_out_known(json, "force_raw", heard, force->raw);
-    json_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
-    json_out_known(json, "force_offset_mN", offset, force->offset_mN);
-    json_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
-    json_out_text(json, "force_validity", gw_force_validity_name(validity));
+    iwn_out_known(json, "force_raw", heard, force->raw);
+    iwn_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
+    iwn_out_known(json, "force_offset_mN", offset, force->offset_mN);
+    iwn_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+    iwn_out_text(json, "force_validity", iwn_force_validity_name(validity));
     gw_snapshot_write_age(json, "force_age_ms", daemon->now_us, force->raw_us);
-    json_out_text(json, "offset_provenance", zero.word);
-    json_out_text(json, "offset_origin",
-                  zero.known->from != IW_OFFSET_NONE ? gw_provenance_name(zero.known->from) : NULL);
-    json_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
+    iwn_out_text(json, "offset_provenance", zero.word);
+    iwn_out_text(json, "offset_origin",
+                 zero.known->from != IW_OFFSET_NONE ? iwn_provenance_name(zero.known->from) : NULL);
+    iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
     write_known_bool(json, "offset_contaminated", zero.judged, zero.contaminated);
-    json_out_text(json, "offset_window", gw_window_name(force->quality.window));
-    json_out_known(json, "offset_samples", zero.measured, zero.samples);
-    json_out_known(json, "offset_deviation_mN", zero.measured, zero.deviation_mN);
-    json_out_known(json, "offset_drift_mN", zero.measured, zero.drift_mN);
-    json_out_known(json, "wheel_offset_mN", force->wheel_offset_heard, (int64_t)force->wheel_offset_dN * 100);
-    json_out_text(json, "unit_evidence", gw_unit_evidence_name(force->evidence));
+    iwn_out_text(json, "offset_window", iwn_window_name(force->quality.window));
+    iwn_out_known(json, "offset_samples", zero.measured, zero.samples);
+    iwn_out_known(json, "offset_deviation_mN", zero.measured, zero.deviation_mN);
+    iwn_out_known(json, "offset_drift_mN", zero.measured, zero.drift_mN);
+    iwn_out_known(json, "wheel_offset_mN", force->wheel_offset_heard, (int64_t)force->wheel_offset_dN * 100);
+    iwn_out_text(json, "unit_evidence", iwn_unit_evidence_name(force->evidence));
 }
 
-void gw_snapshot_write_force(const gw_daemon_t *daemon, json_out_t *json) {
+void gw_snapshot_write_force(const gw_daemon_t *daemon, iwn_out_t *json) {
     const iw_snapshot_t seen = gw_daemon_look(daemon);
-    json_out_int(json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_int(json, "t_us", (int64_t)daemon->now_us);
     for (unsigned i = 0; i < IW_SIDES; ++i) {
         const iw_side_t side = (iw_side_t)i;
         const iw_force_t *force = seen.wheel[side].force;
         const iw_force_validity_t validity = iw_snapshot_force_validity(&seen, side);
         const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
         const zero_t zero = describe_zero(daemon, &seen, side);
-        json_out_open(json, side == IW_LEFT ? "left" : "right", '{');
-        json_out_known(json, "raw", heard, force->raw);
-        json_out_known(json, "raw_mN", heard, iw_force_raw_mN(force));
-        json_out_known(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
-        json_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
-        json_out_text(json, "validity", gw_force_validity_name(validity));
-        json_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
+        iwn_out_open(json, side == IW_LEFT ? "left" : "right", '{');
+        iwn_out_known(json, "raw", heard, force->raw);
+        iwn_out_known(json, "raw_mN", heard, iw_force_raw_mN(force));
+        iwn_out_known(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
+        iwn_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+        iwn_out_text(json, "validity", iwn_force_validity_name(validity));
+        iwn_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
         gw_snapshot_write_age(json, "age_ms", daemon->now_us, force->raw_us);
-        json_out_text(json, "provenance", zero.word);
-        json_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
+        iwn_out_text(json, "provenance", zero.word);
+        iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
         write_known_bool(json, "contaminated", zero.judged, zero.contaminated);
-        json_out_known(json, "samples", zero.measured, zero.samples);
-        json_out_known(json, "deviation_mN", zero.measured, zero.deviation_mN);
-        json_out_close(json, '}');
+        iwn_out_known(json, "samples", zero.measured, zero.samples);
+        iwn_out_known(json, "deviation_mN", zero.measured, zero.deviation_mN);
+        iwn_out_close(json, '}');
     }
 }

@@ -1,22 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "assumption.h"
 
-#include "names.h"
-
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-bool gw_assumption_of(const char *name, iw_ledger_item_t *out_item) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
-        if (strcmp(name, gw_ledger_item_name((iw_ledger_item_t)item)) == 0) {
-            *out_item = (iw_ledger_item_t)item;
-            return true;
-        }
-    }
-    return false;
-}
 
 static const char *yes_or_no(bool yes) {
     return yes ? "yes" : "no";
@@ -30,30 +18,30 @@ static const char *role_word(iw_current_role_t role) {
     return role == IW_ROLE_LIMIT ? "limit" : role == IW_ROLE_SETPOINT ? "setpoint" : "";
 }
 
-static void write_gear(const iw_config_t *config, char out_value[GW_VALUE_SIZE]) {
+static void write_gear(const iw_config_t *config, char out_value[IWN_VALUE_SIZE]) {
     char per[8] = "";
     if (config->gear_per != 1U) {
         (void)snprintf(per, sizeof per, "/%u", config->gear_per);
     }
-    (void)snprintf(out_value, GW_VALUE_SIZE, "%u%s, rpm of the %s", config->gear_turns, per,
+    (void)snprintf(out_value, IWN_VALUE_SIZE, "%u%s, rpm of the %s", config->gear_turns, per,
                    config->rpm_of_rotor ? "rotor" : "wheel");
 }
 
-void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t item, char out_value[GW_VALUE_SIZE]) {
+void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t item, char out_value[IWN_VALUE_SIZE]) {
     const iw_config_t *config = &configured->core;
     const char *word = "yes";
     out_value[0] = '\0';
     switch (item) {
     case IW_LEDGER_SETPOINT_TYPE:
         if (config->setpoint_type_set) {
-            (void)snprintf(out_value, GW_VALUE_SIZE, "%u", config->setpoint_type);
+            (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", config->setpoint_type);
         }
         return;
     case IW_LEDGER_WHEEL_RADIUS:
-        (void)snprintf(out_value, GW_VALUE_SIZE, "%u", config->radius_mm);
+        (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", config->radius_mm);
         return;
     case IW_LEDGER_TRACK:
-        (void)snprintf(out_value, GW_VALUE_SIZE, "%u", configured->track_mm);
+        (void)snprintf(out_value, IWN_VALUE_SIZE, "%u", configured->track_mm);
         return;
     case IW_LEDGER_GEAR_RATIO:
         write_gear(config, out_value);
@@ -72,7 +60,7 @@ void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t it
     default:
         break;
     }
-    (void)snprintf(out_value, GW_VALUE_SIZE, "%s", word);
+    (void)snprintf(out_value, IWN_VALUE_SIZE, "%s", word);
 }
 
 const char *gw_assumption_values(iw_ledger_item_t item) {
@@ -144,7 +132,7 @@ static gw_found_t compare_word(const char *found, const char *wanted, const char
 
 gw_found_t gw_assumption_compare(const gateway_config_t *configured, iw_ledger_item_t item, const char *found) {
     const iw_config_t *config = &configured->core;
-    char wanted[GW_VALUE_SIZE];
+    char wanted[IWN_VALUE_SIZE];
     gw_assumption_value(configured, item, wanted);
     if (wanted[0] == '\0') {
         return GW_FOUND_UNSET;

@@ -10,17 +10,14 @@
 #include "gateway_config.h"
 
 #include "iwheel/types.h"
+#include "iwheel_northbound/words.h"
 
-/// The longest value with its terminator.
-#define GW_VALUE_SIZE 40U
 /// The longest sentence with its terminator.
 #define GW_EVIDENCE_SIZE 256U
 /// A radius within this share of the configured one is the configured one: nobody measures a tyre better.
 #define GW_RADIUS_PERCENT 2
 /// The same for the track: tyres are broad.
 #define GW_TRACK_PERCENT 2
-/// The longest text that tells how something was found, with its terminator.
-#define GW_HOW_SIZE 128U
 
 /// What somebody found, beside what is in force.
 typedef enum {
@@ -32,15 +29,12 @@ typedef enum {
 
 /// The operator's word on an item. Both texts may be empty: not told.
 typedef struct {
-    char found[GW_VALUE_SIZE]; ///< Which value.
-    char how[GW_HOW_SIZE];     ///< By what it was found: "bringup: 3 full turns by hand, ...".
+    char found[IWN_VALUE_SIZE]; ///< Which value.
+    char how[IWN_HOW_SIZE];     ///< By what it was found: "bringup: 3 full turns by hand, ...".
 } gw_word_t;
 
-/// False if no item has that name.
-bool gw_assumption_of(const char *name, iw_ledger_item_t *out_item);
-
 /// The value in force; empty if none is configured.
-void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t item, char out_value[GW_VALUE_SIZE]);
+void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t item, char out_value[IWN_VALUE_SIZE]);
 
 /// Compares `found` with the value in force. `found` may be empty: the operator confirms what is in force.
 gw_found_t gw_assumption_compare(const gateway_config_t *configured, iw_ledger_item_t item, const char *found);

@@ -36,6 +36,7 @@ from ._wire import (
     integers,
     lost_event,
     lost_with,
+    newest,
     period_of,
     result_of,
     seconds_of,
@@ -61,6 +62,7 @@ class _Stream:
         self.events: Deque[Event] = deque()
         self.error: Optional[GatewayUnavailable] = None
         self._lost = 0
+        self._latest = False
         self._wire = Wire()
         self._waiting: Dict[int, "asyncio.Future[Message]"] = {}
         self._reader, self._writer, self._pid = reader, writer, os.getpid()
@@ -114,11 +116,18 @@ class _Stream:
                 f"{self.path}: no answer to {cmd} within {timeout:g} s; the connection was closed"
             ) from None
 
-    def take_event(self) -> Optional[Event]:
+    def take_event(self, latest: bool = False) -> Optional[Event]:
+        self._latest = latest
+        if latest:
+            self._leave_out()
         if self._lost > 0:
             count, self._lost = self._lost, 0
             return lost_event(count)
         return self.events.popleft() if self.events else None
+
+    def _leave_out(self) -> None:
+        kept, left_out = newest(self.events)
+        self.events, self._lost = deque(kept), self._lost + left_out
 
     async def _read(self) -> None:
         try:
@@ -146,6 +155,8 @@ class _Stream:
             if not self.hello.done():
                 self.hello.set_result(message)
             return
+        if self._latest and len(self.events) >= EVENTS_KEPT:
+            self._leave_out()
         if len(self.events) >= EVENTS_KEPT:
             self.events.popleft()
             self._lost += 1
@@ -207,10 +218,10 @@ class AsyncGateway:
         self._subscription = fields if topics else None
         return cast(Watched, without_envelope(granted))
 
-    async def events(self, timeout: Optional[float] = None) -> AsyncIterator[Event]:
+    async def events(self, timeout: Optional[float] = None, *, latest: bool = False) -> AsyncIterator[Event]:
         """As `Gateway.events`, with `disconnected`, `reconnected` and `lost`."""
         while True:
-            event = await self._next_event(timeout)
+            event = await self._next_event(timeout, latest)
             if event is None:
                 return
             yield event
@@ -293,13 +304,13 @@ class AsyncGateway:
                 raise
             await asyncio.sleep(ARM_AGAIN_S)
 
-    async def _next_event(self, timeout: Optional[float]) -> Optional[Event]:
+    async def _next_event(self, timeout: Optional[float], latest: bool) -> Optional[Event]:
         deadline = time.monotonic() + (timeout if timeout is not None else float("inf"))
         if self._stream is None:
             await self._connected(None)
         stream = self._stream
         while stream is not None:
-            event = stream.take_event()
+            event = stream.take_event(latest)
             if event is not None:
                 return event
             if not stream.open:

@@ -13,7 +13,7 @@ from typing import Any, Deque, Dict, Mapping, Optional, Set
 
 from ._errors import GatewayUnavailable, NoAnswer, ProtocolError
 from ._types import Event
-from ._wire import Message, Wire, cannot_connect, lost_event
+from ._wire import Message, Wire, cannot_connect, lost_event, newest
 
 EVENTS_KEPT = 1000
 SLICE_S = 0.05
@@ -30,6 +30,9 @@ class Connection:
         self.arms = 0
         """How often this connection was armed: only the last one counts."""
         self.events: Deque[Event] = deque()
+        self._latest = False
+        self.untold: Optional[str] = None
+        """What ended the connection, if whoever reads the events has not been told."""
         self._lost = 0
         self._wire = Wire()
         self._replies: Dict[int, Message] = {}
@@ -114,6 +117,20 @@ class Connection:
             return lost_event(count)
         return self.events.popleft() if self.events else None
 
+    def thin(self) -> None:
+        """Takes what has come and leaves out every event of which a newer one is there; from now on also when too many are kept."""
+        self._latest = True
+        try:
+            while self.open and self._readable(0.0):
+                self._read()
+        except GatewayUnavailable as error:
+            self.untold = str(error)
+        self._leave_out()
+
+    def _leave_out(self) -> None:
+        kept, left_out = newest(self.events)
+        self.events, self._lost = deque(kept), self._lost + left_out
+
     def _fail(self, error: GatewayUnavailable) -> GatewayUnavailable:
         self._error = self._error or error
         self.close()
@@ -170,6 +187,8 @@ class Connection:
         if message["event"] == "hello":
             self.hello = message
             return
+        if self._latest and len(self.events) >= EVENTS_KEPT:
+            self._leave_out()
         if len(self.events) >= EVENTS_KEPT:
             self.events.popleft()
             self._lost += 1

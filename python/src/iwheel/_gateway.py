@@ -97,14 +97,17 @@ class Gateway:
         self._subscription = fields if topics else None
         return cast(Watched, without_envelope(granted))
 
-    def events(self, timeout: Optional[float] = None) -> Iterator[Event]:
+    def events(self, timeout: Optional[float] = None, *, latest: bool = False) -> Iterator[Event]:
         """Events as they come; ends when none came for `timeout` seconds (None: never ends).
 
         A lost connection is an event too: `disconnected`, then `reconnected` as soon as the gateway is back, with the same
         subscription. `lost` tells how many events were not read in time.
+
+        `latest`: for who may be slow. Of each thing only the newest event that is there (`fault`, `offset`, `ledger` and `frame` differ by
+        cause, side, item, id), instead of a backlog; before it `lost` tells how many were left out.
         """
         while True:
-            event = self._next_event(timeout)
+            event = self._next_event(timeout, latest)
             if event is None:
                 return
             yield event
@@ -222,13 +225,15 @@ class Gateway:
             connection.alive()
             return result_of(cmd, connection.ask(cmd, fields, self._timeout))
 
-    def _next_event(self, timeout: Optional[float]) -> Optional[Event]:
+    def _next_event(self, timeout: Optional[float], latest: bool) -> Optional[Event]:
         with self._alone():
             deadline = time.monotonic() + (timeout if timeout is not None else float("inf"))
             if self._connection is not None and not self._connection.open:
                 return self._back_again(deadline)
             connection = self._connection or self._connected(None)
             while True:
+                if latest:
+                    connection.thin()
                 event = connection.take_event()
                 if event is not None:
                     return event
@@ -238,6 +243,7 @@ class Gateway:
                     connection.wait(deadline)
                 except GatewayUnavailable as error:
                     if not connection.events:
+                        connection.untold = None
                         return {"event": "disconnected", "message": str(error)}
 
     def _back_again(self, deadline: float) -> Optional[Event]:
@@ -245,6 +251,9 @@ class Gateway:
         left = self._connection.take_event()
         if left is not None:
             return left
+        untold, self._connection.untold = self._connection.untold, None
+        if untold is not None:
+            return {"event": "disconnected", "message": untold}
         try:
             self._connected(deadline)
         except GatewayUnavailable:

@@ -351,12 +351,6 @@ class Tared(_TaredPartly):
     state: State
 
 
-class Confirmed(LedgerEntry):
-    """The reply to `confirm`: the item and its entry. `value` is what is configured."""
-
-    item: LedgerItem
-
-
 Sides = Literal["left", "right", "both"]
 
 FrameKind = Literal["received", "echo"]
@@ -413,3 +407,9 @@ class Stop(StopSummary):
     """up to 40"""
     frames_after: List[Frame]
     """up to 40"""
+
+
+class Confirmed(LedgerEntry):
+    """The reply to `confirm`: the item and its entry. `value` is what is configured."""
+
+    item: LedgerItem

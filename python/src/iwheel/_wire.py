@@ -8,7 +8,7 @@ import math
 import numbers
 import operator
 import os
-from typing import Any, Dict, List, Mapping, Optional, cast
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Tuple, cast
 
 from ._errors import ConnectionLost, GatewayUnavailable, LeaseEnded, ProtocolError, Refused
 from ._protocol import API, LINE_MAX, REQUEST_MAX
@@ -30,6 +30,8 @@ ARM_S = 2.0
 """How long `arm` waits out a stop that is only just over."""
 ARM_AGAIN_S = 0.05
 RATE_MAX_HZ = 100
+DISTINCTIONS = {"fault": ("cause",), "offset": ("side",), "ledger": ("item",), "frame": ("id", "kind")}
+"""What makes two events of one name different things."""
 
 Message = Dict[str, Any]
 
@@ -176,6 +178,21 @@ def without_envelope(reply: Message) -> Any:
 def lost_event(count: int) -> Event:
     """What the gateway tells a slow reader, told by ourselves: events that were not taken in time."""
     return {"event": "lost", "count": count}
+
+
+def newest(events: Iterable[Event]) -> Tuple[List[Event], int]:
+    """Of each thing only the newest event, and how many were left out: here, or by the gateway (`lost`)."""
+    kept: Dict[Tuple[str, ...], Event] = {}
+    left_out = 0
+    for event in events:
+        name = event["event"]
+        if name == "lost":
+            left_out += event["count"]
+            continue
+        thing = (name, *(str(event.get(field)) for field in DISTINCTIONS.get(name, ())))
+        left_out += kept.pop(thing, None) is not None
+        kept[thing] = event
+    return list(kept.values()), left_out
 
 
 def stands(status: Message) -> bool:

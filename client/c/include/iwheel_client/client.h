@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: MIT
+/// A connection to iwheel-gateway for programs in C: connect, ask, listen, drive.
+///
+///     iwc_t *gateway = iwc_new();
+///     iwc_terms_t terms;
+///     if (iwc_connect(gateway, NULL, 1000) == IWC_OK && iwc_arm(gateway, "example", false, 1000, &terms) == IWC_OK) {
+///         // iwc_drive(...) every terms.lease_ms / 3, for as long as the wheels shall turn
+///         iwc_stop(gateway, 1000);
+///     }
+///     iwc_free(gateway);
+///
+/// What moves the wheels is the caller, and nobody else. No call repeats a drive command, there is no thread, no timer and no signal
+/// handler, and a command that cannot leave now is told (IWC_FULL) and forgotten, never sent later. So a program that hangs, is frozen
+/// or killed stops the wheels: the gateway ends its lease `lease_ms` after the last command, or at once with the connection. A lost
+/// connection stays lost (IWC_CLOSED) until the caller connects and arms again.
+///
+/// A call waits no longer than the `timeout_ms` that it is given: 0 does not wait at all, IWC_FOREVER has no end. A signal handler that
+/// ran meanwhile ends the wait (IWC_INTERRUPTED). SIGPIPE is never raised.
+///
+/// One handle belongs to one thread at a time; different handles know nothing of each other. Memory: what `iwc_new` takes, and nothing
+/// after it. After fork() the child may call only `iwc_free`; the parent's connection goes on.
+///
+/// Units are the last part of a name. Speeds are in the machine's sense: positive is forward, on both sides.
+#ifndef IWHEEL_CLIENT_H
+#define IWHEEL_CLIENT_H
+
+#include <signal.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define IWC_API __attribute__((visibility("default")))
+#else
+#define IWC_API
+#endif
+
+/// The northbound protocol that this library knows (`api` in docs/northbound.md).
+#define IWC_PROTOCOL 1
+/// Longest request, and longest reply or event, without their newlines.
+#define IWC_REQUEST_MAX 4096U
+#define IWC_LINE_MAX    65536U
+/// So many drive commands may be without their reply; a gateway that answers has one at the most.
+#define IWC_DRIVES_MAX 4U
+/// Where gateways put their sockets, one per bus.
+#define IWC_DIRECTORY "/run/iwheel"
+#define IWC_FOREVER   (-1)
+
+typedef enum {
+    IWC_OK = 0,
+    IWC_TIMEOUT,     ///< Nothing came within the time given.
+    IWC_INTERRUPTED, ///< A signal handler ran while waiting.
+    IWC_REFUSED,     ///< The gateway said no; nothing was applied. `iwc_error` and `iwc_reason` tell more.
+    IWC_FULL, ///< Not sent: the gateway does not read, or IWC_DRIVES_MAX drive commands have no reply. Nothing is kept.
+    IWC_CLOSED,    ///< There is no connection: never made, ended by the gateway, or broken. The lease went with it.
+    IWC_GARBLED,   ///< What came is not the gateway's language, so the connection was closed.
+    IWC_NEWER,     ///< The gateway speaks a newer protocol: connected, but only for reading, `stop` and `estop`.
+    IWC_INVALID,   ///< An argument is outside what its function says. Nothing was sent.
+    IWC_NOT_THERE, ///< Nobody listens on the socket, or there is none.
+    IWC_DENIED,    ///< The socket, or IWC_DIRECTORY, may not be used by this user.
+    IWC_SEVERAL    ///< More than one gateway is running, and none was named.
+} iwc_result_t;
+
+typedef struct iwc iwc_t;
+
+/// A handle without connection. NULL: out of memory.
+IWC_API iwc_t *iwc_new(void);
+
+/// Closes the connection, which ends a lease that is held through it. NULL is allowed.
+IWC_API void iwc_free(iwc_t *self);
+
+/// What a result means and what to do, in one line of English.
+IWC_API const char *iwc_words(iwc_result_t result);
+
+// ---- the connection -----------------------------------------------------------------------------------------------
+
+/// The socket meant when none is named: $IWHEEL_SOCKET, else the only *.sock in `directory` (NULL: IWC_DIRECTORY, and only then the
+/// environment is looked at). IWC_OK with the path in `out`; IWC_SEVERAL with all of them, separated by blanks, as far as they fit;
+/// IWC_DENIED or IWC_NOT_THERE with an empty text; IWC_INVALID if $IWHEEL_SOCKET does not fit.
+IWC_API iwc_result_t iwc_find(const char *directory, char *out, size_t size);
+
+/// Closes what is open, connects to `path` (NULL: the one that `iwc_find` finds) and awaits the gateway's greeting. Nothing is armed.
+/// IWC_OK and IWC_NEWER: connected. Else it is not: IWC_NOT_THERE, IWC_DENIED, IWC_SEVERAL, IWC_TIMEOUT, IWC_INTERRUPTED, IWC_GARBLED,
+/// IWC_CLOSED, IWC_REFUSED (too many clients), IWC_INVALID (longer than 107 bytes).
+IWC_API iwc_result_t iwc_connect(iwc_t *self, const char *path, int timeout_ms);
+
+/// Takes a connected stream socket instead, which it closes later. As `iwc_connect` from the greeting on.
+IWC_API iwc_result_t iwc_adopt(iwc_t *self, int fd, int timeout_ms);
+
+/// Ends the connection, and with it the lease. What came before and was not taken is forgotten.
+IWC_API void iwc_close(iwc_t *self);
+
+/// For poll(): wait for POLLIN on this descriptor, then call `iwc_next` with timeout 0 until it has no more. -1: not connected. First
+/// take what is here already: `iwc_pending`.
+IWC_API int iwc_fd(const iwc_t *self);
+IWC_API bool iwc_pending(const iwc_t *self);
+
+/// The path of `iwc_connect`; errno of the call that made it fail (0: another reason); the number that the gateway gave this
+/// connection, `lease.holder` if it holds the lease (0: none).
+IWC_API const char *iwc_path(const iwc_t *self);
+IWC_API int iwc_errno(const iwc_t *self);
+IWC_API int64_t iwc_number(const iwc_t *self);
+
+/// The signal mask in force while a call waits, as ppoll() takes it: for programs that block signals elsewhere. NULL: unchanged.
+IWC_API void iwc_let_in(iwc_t *self, const sigset_t *mask);
+
+// ---- messages -----------------------------------------------------------------------------------------------------
+
+/// A reply or event. Valid until the next call with the same handle, except `iwc_latest`, `iwc_pending`, `iwc_fd`.
+typedef struct {
+    const char *text; ///< One JSON object, terminated; unknown fields are to be ignored.
+    size_t length;
+    bool is_event;    ///< Else a reply.
+    int64_t id;       ///< Of the request that a reply answers; 0 for an event.
+    uint64_t skipped; ///< Events left out before this one: by `iwc_latest`, or because nobody took them for too long.
+} iwc_message_t;
+
+/// The oldest message that was not taken yet: an event, or the reply to an `iwc_send`. IWC_TIMEOUT, IWC_INTERRUPTED; after the last
+/// message of a connection that has ended IWC_CLOSED or IWC_GARBLED.
+IWC_API iwc_result_t iwc_next(iwc_t *self, int timeout_ms, iwc_message_t *out_message);
+
+/// For a slow reader: reads all that waits and leaves out each event of which a newer one is there, counted in `skipped`, so that
+/// `iwc_next` hands out the latest values instead of a backlog. Events are the same thing if their name is, and of `fault` the cause,
+/// of `offset` the side, of `ledger` the item, of `frame` id and kind. What the gateway had to leave out itself (`lost`) is counted too.
+/// Replies stay, as far as they fit. Never waits. IWC_OK, or IWC_CLOSED or IWC_GARBLED if the connection has ended.
+IWC_API iwc_result_t iwc_latest(iwc_t *self);
+
+/// A number of a message; not known: null, not there, or not a whole number of 64 bits.
+typedef struct {
+    bool known;
+    int64_t value; ///< 0 if not known.
+} iwc_value_t;
+
+/// A field by its path, such as "left.speed_mm_s". A truth counts as 1 or 0 in `iwc_truth` only.
+IWC_API iwc_value_t iwc_integer(const iwc_message_t *message, const char *path);
+IWC_API iwc_value_t iwc_truth(const iwc_message_t *message, const char *path);
+
+/// A text, cut where `size` ends between two characters. False, and an empty text: none is there. What would move a terminal stays as
+/// the gateway wrote it, \uXXXX.
+IWC_API bool iwc_text(const iwc_message_t *message, const char *path, char *out, size_t size);
+
+/// Whether the text at `path` is exactly that.
+IWC_API bool iwc_is(const iwc_message_t *message, const char *path, const char *text);
+
+/// The JSON of any field. NULL: it is not there.
+IWC_API const char *iwc_json(const iwc_message_t *message, const char *path, size_t *out_length);
+
+// ---- asking -------------------------------------------------------------------------------------------------------
+
+/// Sends a request, a JSON object of one line without `id`, and waits for its reply only. Events that come meanwhile are kept, as far as
+/// they fit. IWC_OK, IWC_REFUSED (also with the reply), IWC_FULL, or no reply: IWC_TIMEOUT, IWC_INTERRUPTED, IWC_CLOSED, IWC_GARBLED; it
+/// may have been applied then. `out_reply` may be NULL.
+IWC_API iwc_result_t iwc_ask(iwc_t *self, const char *request, int timeout_ms, iwc_message_t *out_reply);
+
+/// The same without waiting for the reply, which `iwc_next` brings; `*out_id` is its id. `timeout_ms` is for a gateway that does not
+/// read: IWC_FULL after it, and nothing is kept. A request that could leave only in part ends the connection (IWC_CLOSED).
+IWC_API iwc_result_t iwc_send(iwc_t *self, const char *request, int timeout_ms, int64_t *out_id);
+
+/// The reply that the last call waited for, for what its function does not hand out, such as `warnings` of `iwc_arm`. False: there was
+/// none, or another message was taken since.
+IWC_API bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply);
+
+/// Name and words of the last refusal; empty: there was none. The words tell cause and cure.
+IWC_API const char *iwc_error(const iwc_t *self);
+IWC_API const char *iwc_reason(const iwc_t *self);
+
+// ---- reading ------------------------------------------------------------------------------------------------------
+
+typedef enum { IWC_STATE_UNKNOWN = 0, IWC_LISTENING, IWC_ARMED, IWC_STOPPING, IWC_LATCHED } iwc_machine_t;
+
+typedef struct {
+    bool heard;                 ///< Its speed came within `wheel_silent_ms`.
+    iwc_value_t at_rest;        ///< 1: stands.
+    iwc_value_t speed_mm_s;     ///< Measured.
+    iwc_value_t commanded_mm_s; ///< What the client wants.
+    iwc_value_t applied_mm_s;   ///< What the wheel was told last; not known in silence.
+    iwc_value_t distance_mm;
+    iwc_value_t force_net_mN; ///< Known only if it is valid: zero known, unit not contradicted, not saturated.
+    iwc_value_t battery_dV;
+    iwc_value_t temperature_degC;
+    iwc_value_t speed_age_ms;
+    iwc_value_t force_age_ms;
+} iwc_wheel_t;
+
+/// The most wanted of a snapshot: the reply to `status`, the event `state`.
+typedef struct {
+    int64_t t_us; ///< CLOCK_MONOTONIC of the gateway's machine.
+    iwc_machine_t machine;
+    char cause[32];           ///< Why it is stopping or latched; empty: it is neither.
+    iwc_value_t holder;       ///< Of the lease; not known: nobody holds it.
+    bool ours;                ///< This connection holds it.
+    iwc_value_t remaining_ms; ///< Of the lease.
+    bool estop_released;      ///< False: pressed, unreadable or none.
+    bool bus_active;          ///< False: down, bus-off or error passive.
+    iwc_wheel_t left;
+    iwc_wheel_t right;
+} iwc_state_t;
+
+/// False, with `*out_state` untouched, if the message is no snapshot.
+IWC_API bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out_state);
+
+/// Asks for a snapshot. As `iwc_ask`.
+IWC_API iwc_result_t iwc_status(iwc_t *self, int timeout_ms, iwc_state_t *out_state);
+
+enum {
+    IWC_WATCH_STATE = 1,
+    IWC_WATCH_BUS = 2,
+    IWC_WATCH_ESTOP = 4,
+    IWC_WATCH_LEASE = 8,
+    IWC_WATCH_STOP = 16,
+    IWC_WATCH_FORCE = 32,
+    IWC_WATCH_FRAME = 64
+};
+
+/// Which events come from now on, instead of those before; 0 ends it. `rate_hz` 1..100 is for state and force. As `iwc_ask`.
+IWC_API iwc_result_t iwc_watch(iwc_t *self, unsigned topics, int rate_hz, int timeout_ms);
+
+// ---- driving and stopping -----------------------------------------------------------------------------------------
+
+typedef struct {
+    int32_t lease_ms;       ///< Each accepted command holds so long. Send three in that time.
+    int32_t first_lease_ms; ///< The first one must come within this.
+    int32_t stop_budget_ms; ///< How long the machine goes on at most after the last command,
+    int32_t stop_budget_mm; ///< and how far.
+} iwc_terms_t;
+
+/// Asks for permission to drive; moves nothing. `name` (up to 64 bytes, no control characters) is shown to others, NULL: none.
+/// `takeover` takes the lease from another holder, with both wheels at rest. As `iwc_ask`.
+IWC_API iwc_result_t iwc_arm(iwc_t *self, const char *name, bool takeover, int timeout_ms, iwc_terms_t *out_terms);
+
+typedef struct {
+    int32_t left_mm_s; ///< -32768..32767.
+    int32_t right_mm_s;
+    bool has_current; ///< The currents are told; needed where current_role is setpoint.
+    int32_t left_mA;  ///< -2000..2000.
+    int32_t right_mA;
+} iwc_drive_t;
+
+typedef struct {
+    int32_t left_mm_s; ///< The target after limits; ramps come on top.
+    int32_t right_mm_s;
+    int32_t left_mA;
+    int32_t right_mA;
+    bool limited; ///< Both wheels were scaled by one factor.
+} iwc_applied_t;
+
+/// One drive command, once: it holds one lease. With `timeout_ms` 0 it is handed over and its reply comes with `iwc_next`; else waits
+/// for the reply, as `iwc_ask`, and tells what it applied (`out_applied` may be NULL). Before the reply to `iwc_arm` it is refused.
+IWC_API iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *command, int timeout_ms, iwc_applied_t *out_applied);
+
+/// The same as forward speed and turning rate, positive to the left (mrad/s).
+IWC_API iwc_result_t iwc_twist(iwc_t *self, int32_t v_mm_s, int32_t yaw_mrad_s, int timeout_ms,
+                               iwc_applied_t *out_applied);
+
+/// Ramp to zero, whoever drives. If it cannot be handed over or is not answered in time, or a signal ends the wait, the
+/// connection is closed, which stops the wheels if the lease was ours. As `iwc_ask`.
+IWC_API iwc_result_t iwc_stop(iwc_t *self, int timeout_ms);
+
+/// Zero without ramp, latched until `iwc_reset`; otherwise as `iwc_stop`. `reason`: up to 200 bytes, no control characters; NULL: none.
+/// No substitute for the button that cuts power.
+IWC_API iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms);
+
+/// Leaves the latch, if its cause is gone. Moves nothing. As `iwc_ask`.
+IWC_API iwc_result_t iwc_reset(iwc_t *self, int timeout_ms);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

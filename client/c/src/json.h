@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+/// JSON where it lies: is it an object, and where in it is a field? No copy, no heap.
+///
+/// RFC 8259 in valid UTF-8, nested IWC_JSON_DEPTH deep at most, and no key twice: of the first IWC_JSON_KEYS in an object this is
+/// looked at, so that a hostile line costs no more than its length.
+#ifndef IWC_JSON_H
+#define IWC_JSON_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define IWC_JSON_DEPTH 8U
+#define IWC_JSON_KEYS  128U
+
+typedef struct {
+    const char *at; ///< NULL: nothing.
+    size_t length;
+} iwc_span_t;
+
+/// True if the text is one object and nothing else but blanks.
+bool iwc_json_is_object(const char *text, size_t length);
+
+/// The value at a path of keys, "left.speed_mm_s", in an object for which `iwc_json_is_object` holds; keys are compared as written.
+iwc_span_t iwc_json_find(iwc_span_t object, const char *path);
+
+/// True if the value is exactly that text, as written between its quotes.
+bool iwc_json_is_text(iwc_span_t value, const char *text);
+
+/// True with the number in `*out_number` if the value is a whole one of 64 bits.
+bool iwc_json_integer(iwc_span_t value, int64_t *out_number);
+
+#endif

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+/// Writes one JSON object as one line into a buffer of fixed size.
+///
+/// Commas are placed by the writer. A name of NULL is for elements of a list. What does not fit sets `overflow` and the line must not
+/// be used. Texts are escaped: what moves a terminal (text.h) stands as \uXXXX, and what is no UTF-8 as U+FFFD. Names are words of
+/// ours, in which nothing is to be escaped. No heap, no stdio.
+///
+/// Each element is written as a whole, in one or two copies. The functions that take a name are inline so that the compiler
+/// knows how long a literal one is.
+#ifndef IWHEEL_NORTHBOUND_JSON_OUT_H
+#define IWHEEL_NORTHBOUND_JSON_OUT_H
+
+#include "iwheel/can_frame.h"
+#include "iwheel/types.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+typedef struct {
+    char *data;
+    size_t size;
+    size_t length;
+    bool comma; ///< The next element needs one before it.
+    bool overflow;
+} iwn_out_t;
+
+/// Part of a text, not terminated.
+typedef struct {
+    const char *text;
+    size_t length;
+} iwn_span_t;
+
+void iwn_out_init(iwn_out_t *self, char *data, size_t size);
+
+/// Ends the line. Its length with the newline; 0 if it did not fit.
+size_t iwn_out_finish(iwn_out_t *self);
+
+/// `bracket` is the one that was opened, or its counterpart.
+void iwn_out_close(iwn_out_t *self, char bracket);
+
+/// The fields of a frame, into an object that is open: for `why` and the event `frame`.
+void iwn_out_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, iwn_out_t *json);
+
+/// A value that is JSON already: `true`, a number, a whole object written before.
+void iwn_out_span(iwn_out_t *self, iwn_span_t name, iwn_span_t value);
+void iwn_out_number(iwn_out_t *self, iwn_span_t name, int64_t value);
+/// A NULL text is `null`.
+void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text);
+void iwn_out_bracket(iwn_out_t *self, iwn_span_t name, char bracket);
+
+static inline iwn_span_t iwn_span(const char *text) {
+    return (iwn_span_t){text, (text != NULL) ? strlen(text) : 0U};
+}
+
+/// `bracket` is '{' or '['; close with the matching '}' or ']'.
+static inline void iwn_out_open(iwn_out_t *self, const char *name, char bracket) {
+    iwn_out_bracket(self, iwn_span(name), bracket);
+}
+
+static inline void iwn_out_int(iwn_out_t *self, const char *name, int64_t value) {
+    iwn_out_number(self, iwn_span(name), value);
+}
+
+static inline void iwn_out_bool(iwn_out_t *self, const char *name, bool value) {
+    iwn_out_span(self, iwn_span(name), value ? iwn_span("true") : iwn_span("false"));
+}
+
+static inline void iwn_out_null(iwn_out_t *self, const char *name) {
+    iwn_out_span(self, iwn_span(name), iwn_span("null"));
+}
+
+/// `null` unless known.
+static inline void iwn_out_known(iwn_out_t *self, const char *name, bool known, int64_t value) {
+    if (known) {
+        iwn_out_int(self, name, value);
+    } else {
+        iwn_out_null(self, name);
+    }
+}
+
+/// A NULL text is `null`.
+static inline void iwn_out_text(iwn_out_t *self, const char *name, const char *text) {
+    iwn_out_string(self, iwn_span(name), text);
+}
+
+#endif

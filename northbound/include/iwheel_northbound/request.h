@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+/// One line of a client, read and judged: a request that is right in form, or a refusal.
+///
+/// A pure function of the bytes, so that it can be tested and fuzzed alone: no heap, no stdio. What depends on the state of the
+/// wheels is judged later, by the core. Which fields a request has is told by share/northbound.json.
+#ifndef IWHEEL_NORTHBOUND_REQUEST_H
+#define IWHEEL_NORTHBOUND_REQUEST_H
+
+#include "iwheel_northbound/json_in.h"
+#include "iwheel_northbound/words.h"
+
+/// Bytes of a request without its newline.
+#define IWN_LINE_MAX        4096U
+#define IWN_ID_TEXT_MAX     64U
+#define IWN_NAME_MAX        64U
+#define IWN_REASON_MAX      200U
+#define IWN_RATE_MAX_HZ     100
+#define IWN_RATE_DEFAULT_HZ 10
+
+typedef enum {
+    IWN_CMD_HELLO = 0,
+    IWN_CMD_STATUS,
+    IWN_CMD_WATCH,
+    IWN_CMD_ARM,
+    IWN_CMD_DRIVE,
+    IWN_CMD_TWIST,
+    IWN_CMD_STOP,
+    IWN_CMD_DISARM,
+    IWN_CMD_ESTOP,
+    IWN_CMD_RESET,
+    IWN_CMD_TARE,
+    IWN_CMD_WHY,
+    IWN_CMD_CONFIRM,
+    IWN_CMDS,
+} iwn_cmd_t;
+
+typedef enum { IWN_ID_NONE = 0, IWN_ID_NUMBER, IWN_ID_TEXT } iwn_id_kind_t;
+
+/// What a reply must repeat.
+typedef struct {
+    iwn_id_kind_t kind;
+    int64_t number;
+    char text[IWN_ID_TEXT_MAX + 1U];
+} iwn_id_t;
+
+/// Only the fields of its `cmd` mean anything. Numbers are as sent: any 64-bit integer.
+typedef struct {
+    iwn_id_t id;
+    iwn_cmd_t cmd;
+    int64_t left_mm_s;
+    int64_t right_mm_s;
+    int64_t left_mA;
+    int64_t right_mA;
+    int64_t v_mm_s;
+    int64_t yaw_mrad_s;
+    int64_t rate_hz;  ///< At least 1; not limited yet.
+    bool has_current; ///< Both currents were given.
+    bool takeover;
+    uint8_t topics;                   ///< Bit per iwn_topic_t.
+    uint8_t sides;                    ///< IW_SIDES_..., of tare.
+    iw_ledger_item_t item;            ///< Of confirm.
+    char value[IWN_VALUE_SIZE];       ///< Of confirm, a number in decimal digits; empty: not given.
+    char how[IWN_HOW_SIZE];           ///< Of confirm; empty: not given.
+    char name[IWN_NAME_MAX + 1U];     ///< Empty: not given.
+    char reason[IWN_REASON_MAX + 1U]; ///< Empty: not given.
+} iwn_request_t;
+
+/// Why not: the name, and cause and cure in words.
+typedef struct {
+    iwn_error_t error;
+    char message[512];
+} iwn_refusal_t;
+
+/// Reads `length` bytes (no newline among them). True: `*out_request` is complete. False: `*out_refusal` tells why, and
+/// `out_request->id` holds the id as far as it could be read. What is wrong with the whole line comes first, then the id, then
+/// the command, then its fields in their order, then what is missing.
+bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
+                      iwn_refusal_t *out_refusal);
+
+#endif

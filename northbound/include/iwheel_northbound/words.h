@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+/// The words of the northbound protocol for errors, causes, states and the rest. Each list is closed and documented in
+/// docs/northbound.md; a value outside its list is "unknown".
+#ifndef IWHEEL_NORTHBOUND_WORDS_H
+#define IWHEEL_NORTHBOUND_WORDS_H
+
+#include "iwheel/gateway.h"
+
+typedef enum {
+    IWN_OK = 0,
+    IWN_BAD_JSON,
+    IWN_LINE_TOO_LONG,
+    IWN_UNKNOWN_CMD,
+    IWN_UNKNOWN_FIELD,
+    IWN_MISSING_FIELD,
+    IWN_BAD_VALUE,
+    IWN_OUT_OF_RANGE,
+    IWN_NOT_HOLDER,
+    IWN_BUSY,
+    IWN_NOT_ARMED,
+    IWN_LATCHED,
+    IWN_ESTOP_PRESSED,
+    IWN_BUS_DOWN,
+    IWN_TIMING_MISMATCH,
+    IWN_WHEEL_LOST,
+    IWN_WHEEL_BLOCKED,
+    IWN_NOT_AT_REST,
+    IWN_SEND_STALLED,
+    IWN_SECOND_MASTER,
+    IWN_CAUSE_PRESENT,
+    IWN_TYPE_NOT_SET,
+    IWN_STALE_COMMAND,
+    IWN_LISTEN_ONLY,
+    IWN_TOO_MANY_CLIENTS,
+    IWN_DENIED,
+    IWN_INTERNAL,
+    IWN_ERRORS,
+} iwn_error_t;
+
+/// Subscriptions, usable as bit numbers.
+typedef enum {
+    IWN_TOPIC_STATE = 0,
+    IWN_TOPIC_BUS,
+    IWN_TOPIC_ESTOP,
+    IWN_TOPIC_LEASE,
+    IWN_TOPIC_STOP,
+    IWN_TOPIC_FORCE,
+    IWN_TOPIC_FRAME,
+    IWN_TOPICS,
+} iwn_topic_t;
+
+/// The longest value of a ledger item, and the longest text on how it was found, each with its terminator.
+#define IWN_VALUE_SIZE 40U
+#define IWN_HOW_SIZE   128U
+
+const char *iwn_error_name(iwn_error_t error);
+/// The northbound error for a refusal of the core.
+iwn_error_t iwn_error_of(iw_refusal_t refusal);
+
+const char *iwn_topic_name(iwn_topic_t topic);
+const char *iwn_state_name(iw_state_t state);
+const char *iwn_cause_name(iw_cause_t cause);
+const char *iwn_bus_state_name(iw_bus_state_t state);
+/// Of the last answer of the HAL's `estop_pressed`; `present` is false if there is no e-stop at all.
+const char *iwn_estop_name(int answer, bool present);
+/// "left", "right", "both"; NULL for none.
+const char *iwn_sides_name(uint8_t sides);
+const char *iwn_provenance_name(iw_offset_provenance_t provenance);
+/// The same of an offset in force: one of an earlier run (`offset_us` is IW_NEVER) is "stored", whoever took it.
+const char *iwn_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offset_us);
+const char *iwn_window_name(iw_window_t window);
+const char *iwn_unit_evidence_name(iw_unit_evidence_t evidence);
+const char *iwn_force_validity_name(iw_force_validity_t validity);
+const char *iwn_ledger_item_name(iw_ledger_item_t item);
+/// False if no item has that name.
+bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item);
+const char *iwn_ledger_state_name(iw_ledger_state_t state);
+const char *iwn_evidence_name(iw_evidence_t evidence);
+
+#endif

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_northbound/json_in.h"
+
+#include "json_scan.h"
+
+#include <string.h>
+
+typedef struct {
+    iwn_scan_t scan;
+    uint16_t *name_at;
+    unsigned names;                ///< Of all objects that are open.
+    uint16_t first[IWN_DEPTH_MAX]; ///< The first of them, per object.
+    bool is_list[IWN_DEPTH_MAX];
+    unsigned depth;
+} check_t;
+
+static bool fail(check_t *self, const char *what) {
+    return iwn_scan_fail(&self->scan, what);
+}
+
+// Objects and lists -------------------------------------------------------------------------------------------------
+
+/// Below 0, 0 or above 0: the names that begin behind their quotes there, by what they mean.
+static int compare_names(const char *one, const char *other) {
+    uint32_t a;
+    uint32_t b;
+    do {
+        a = iwn_scan_character(&one);
+        b = iwn_scan_character(&other);
+    } while (a == b && a != 0U);
+    return (a < b) ? -1 : (a > b) ? 1 : 0;
+}
+
+/// Puts the token among the names of its object. False, and that is told, if it is there already.
+static bool add_name(check_t *self) {
+    unsigned low = self->first[self->depth - 1U];
+    unsigned high = self->names;
+    while (low < high) {
+        const unsigned middle = (low + high) / 2U;
+        const int order = compare_names(self->scan.token + 1, &self->scan.text[self->name_at[middle]]);
+        if (order == 0) {
+            return fail(self, "duplicate object key");
+        }
+        low = (order > 0) ? middle + 1U : low;
+        high = (order < 0) ? middle : high;
+    }
+    if (self->names == IWN_NAMES_MAX) {
+        return fail(self, "too many names");
+    }
+    (void)memmove(&self->name_at[low + 1U], &self->name_at[low], (self->names - low) * sizeof self->name_at[0]);
+    self->name_at[low] = (uint16_t)(self->scan.token + 1 - self->scan.text);
+    self->names++;
+    return true;
+}
+
+/// A name and its colon; `*token` is then the value's.
+static bool check_name(check_t *self, int *token) {
+    if (*token != IWN_TOKEN_TEXT) {
+        return fail(self, "string or '}' expected");
+    }
+    if (self->scan.has_nul) {
+        return fail(self, "NUL byte in object key not supported");
+    }
+    if (!add_name(self)) {
+        return false;
+    }
+    if (iwn_scan(&self->scan) != ':') {
+        return fail(self, "':' expected");
+    }
+    *token = iwn_scan(&self->scan);
+    return true;
+}
+
+static bool in_list(const check_t *self) {
+    return self->depth > 0U && self->is_list[self->depth - 1U];
+}
+
+static int closing(const check_t *self) {
+    return in_list(self) ? ']' : '}';
+}
+
+static void close_container(check_t *self) {
+    self->depth--;
+    self->names = self->first[self->depth];
+}
+
+/// The token opens an object or list; `*token` is then the first value's. False: it failed, or there is none, which closes it.
+static bool open_container(check_t *self, int *token) {
+    if (self->depth == IWN_DEPTH_MAX) {
+        return fail(self, "nested too deeply");
+    }
+    self->is_list[self->depth] = *token == '[';
+    self->first[self->depth] = (uint16_t)self->names;
+    self->depth++;
+    *token = iwn_scan(&self->scan);
+    if (*token == closing(self)) {
+        close_container(self);
+        return false;
+    }
+    return in_list(self) || check_name(self, token);
+}
+
+static bool check_scalar(check_t *self, int token) {
+    if (token == IWN_TOKEN_TEXT && self->scan.has_nul) {
+        return fail(self, "\\u0000 is not allowed without JSON_ALLOW_NUL");
+    }
+    if (token == IWN_TOKEN_INVALID) {
+        return fail(self, "invalid token");
+    }
+    if (token == IWN_TOKEN_END && in_list(self)) {
+        return fail(self, "']' expected");
+    }
+    return token == IWN_TOKEN_TEXT || token == IWN_TOKEN_SCALAR || fail(self, "unexpected token");
+}
+
+/// A whole scalar, or the beginning of objects and lists down to the first scalar, or the end of an empty one of them.
+static bool check_value(check_t *self, int token) {
+    while (token == '{' || token == '[') {
+        if (!open_container(self, &token)) {
+            return !self->scan.failed;
+        }
+    }
+    return check_scalar(self, token);
+}
+
+/// What stands behind a value of an object or list: its end, or a comma and the next one.
+static bool check_next(check_t *self) {
+    int token = iwn_scan(&self->scan);
+    if (token == closing(self)) {
+        close_container(self);
+        return true;
+    }
+    if (token != ',') {
+        return fail(self, in_list(self) ? "']' expected" : "'}' expected");
+    }
+    token = iwn_scan(&self->scan);
+    return (in_list(self) || check_name(self, &token)) && check_value(self, token);
+}
+
+bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault) {
+    check_t self = {.scan = {.text = text, .end = text + length, .at = text, .token = text, .fault = fault},
+                    .name_at = work->name_at};
+    const int token = (length <= UINT16_MAX) ? iwn_scan(&self.scan) : IWN_TOKEN_END;
+    if (token != '{' && token != '[') {
+        return fail(&self, "'[' or '{' expected");
+    }
+    out_root->at = self.scan.token;
+    bool good = check_value(&self, token);
+    while (good && self.depth > 0U) {
+        good = check_next(&self);
+    }
+    return good && (iwn_scan(&self.scan) == IWN_TOKEN_END || fail(&self, "end of file expected"));
+}
+
+// Walking what has been checked ---------------------------------------------------------------------------------------
+
+static const char *skip_blanks(const char *at) {
+    while (iwn_scan_is_blank(*at)) {
+        at++;
+    }
+    return at;
+}
+
+static const char *skip_text(const char *at) {
+    for (at++; *at != '"'; at++) {
+        at += (*at == '\\') ? 1 : 0;
+    }
+    return at + 1;
+}
+
+static const char *skip_scalar(const char *at) {
+    while (iwn_scan_is_digit(*at) || iwn_scan_is_letter(*at) || *at == '-' || *at == '+' || *at == '.') {
+        at++;
+    }
+    return at;
+}
+
+static const char *skip_value(const char *at) {
+    unsigned depth = 0;
+    do {
+        if (*at == '"') {
+            at = skip_text(at);
+        } else if (*at == '{' || *at == '[') {
+            depth++;
+            at++;
+        } else if (*at == '}' || *at == ']') {
+            depth--;
+            at++;
+        } else {
+            const char *const behind = skip_scalar(at);
+            at = (behind > at) ? behind : at + 1; // Or a comma, a colon, a blank.
+        }
+    } while (depth > 0U);
+    return at;
+}
+
+iwn_json_kind_t iwn_json_kind(iwn_json_t value) {
+    static const char first[] = {[IWN_JSON_OBJECT] = '{', [IWN_JSON_LIST] = '[',  [IWN_JSON_TEXT] = '"',
+                                 [IWN_JSON_TRUE] = 't',   [IWN_JSON_FALSE] = 'f', [IWN_JSON_NULL] = 'n'};
+    for (unsigned kind = 0; kind < sizeof first; kind++) {
+        if (*value.at == first[kind]) {
+            return (iwn_json_kind_t)kind;
+        }
+    }
+    do {
+        value.at++;
+    } while (iwn_scan_is_digit(*value.at));
+    return (*value.at == '.' || *value.at == 'e' || *value.at == 'E') ? IWN_JSON_REAL : IWN_JSON_INTEGER;
+}
+
+iwn_json_t iwn_json_inside(iwn_json_t container) {
+    return (iwn_json_t){container.at + 1};
+}
+
+bool iwn_json_next(iwn_json_t *rest, iwn_json_t *out_name, iwn_json_t *out_value) {
+    const char *at = skip_blanks(rest->at);
+    at = (*at == ',') ? skip_blanks(at + 1) : at;
+    if (*at == '}' || *at == ']') {
+        return false;
+    }
+    if (out_name != NULL) {
+        out_name->at = at;
+        at = skip_blanks(skip_blanks(skip_text(at)) + 1);
+    }
+    out_value->at = at;
+    rest->at = skip_value(at);
+    return true;
+}
+
+bool iwn_json_find(iwn_json_t object, const char *name, iwn_json_t *out_value) {
+    iwn_json_t rest = iwn_json_inside(object);
+    iwn_json_t found;
+    while (*object.at == '{' && iwn_json_next(&rest, &found, out_value)) {
+        if (iwn_json_is(found, name)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+uint32_t iwn_json_character(iwn_json_t *rest) {
+    return iwn_scan_character(&rest->at);
+}
+
+bool iwn_json_is(iwn_json_t value, const char *text) {
+    if (*value.at != '"') {
+        return false;
+    }
+    const char *at = value.at + 1;
+    size_t bytes = 1;
+    for (; *text != '\0'; text += bytes) {
+        if (*at == '\\') {
+            if (iwn_scan_character(&at) != iwn_plain_read(text, &bytes)) {
+                return false;
+            }
+        } else if (*at == *text && *at != '"') { // UTF-8 is equal byte by byte.
+            at++;
+            bytes = 1;
+        } else {
+            return false;
+        }
+    }
+    return *at == '"';
+}
+
+bool iwn_json_text(iwn_json_t value, char *out_text, size_t size) {
+    if (*value.at != '"') {
+        return false;
+    }
+    const char *at = value.at + 1;
+    size_t used = 0;
+    for (uint32_t code_point = iwn_scan_character(&at); code_point != 0U; code_point = iwn_scan_character(&at)) {
+        char bytes[4];
+        const size_t length = iwn_utf8(code_point, bytes);
+        if (used + length >= size) {
+            return false;
+        }
+        (void)memcpy(&out_text[used], bytes, length);
+        used += length;
+    }
+    out_text[used] = '\0';
+    return true;
+}
+
+int64_t iwn_json_integer(iwn_json_t value) {
+    const bool negative = *value.at == '-';
+    uint64_t number = 0;
+    for (const char *c = value.at + (negative ? 1 : 0); iwn_scan_is_digit(*c); c++) {
+        number = number * 10U + (unsigned)(*c - '0');
+    }
+    return (int64_t)(negative ? 0U - number : number);
+}

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_northbound/json_out.h"
+
+#include "iwheel_northbound/text.h"
+
+#define EXTENDED_ID_MASK 0x1FFFFFFFU
+/// A byte of a word of the machine, in all of its bytes.
+#define IN_EACH(byte) ((size_t)-1 / 255U * (byte))
+
+/// Room for so many bytes; NULL: there is none, the line is lost.
+static char *take(iwn_out_t *self, size_t length) {
+    if (self->overflow || length >= self->size - self->length) {
+        self->overflow = true;
+        return NULL;
+    }
+    char *const at = &self->data[self->length];
+    self->length += length;
+    return at;
+}
+
+static void put(iwn_out_t *self, const char *text, size_t length) {
+    char *const at = take(self, length);
+    if (at != NULL) {
+        (void)memcpy(at, text, length);
+    }
+}
+
+/// Comma, name and colon, and room for a value of that length, which is returned; NULL: it does not fit.
+static char *begin(iwn_out_t *self, iwn_span_t name, size_t length) {
+    const size_t comma = self->comma ? 1U : 0U;
+    char *at = take(self, comma + ((name.text != NULL) ? name.length + 3U : 0U) + length);
+    self->comma = true;
+    if (at == NULL) {
+        return NULL;
+    }
+    *at = ',';
+    at += comma;
+    if (name.text != NULL) {
+        *at = '"';
+        (void)memcpy(at + 1, name.text, name.length);
+        at += name.length + 1U;
+        at[0] = '"';
+        at[1] = ':';
+        at += 2;
+    }
+    return at;
+}
+
+void iwn_out_init(iwn_out_t *self, char *data, size_t size) {
+    *self = (iwn_out_t){.data = data, .size = size};
+}
+
+void iwn_out_bracket(iwn_out_t *self, iwn_span_t name, char bracket) {
+    iwn_out_span(self, name, (iwn_span_t){&bracket, 1U});
+    self->comma = false;
+}
+
+void iwn_out_close(iwn_out_t *self, char bracket) {
+    put(self, &bracket, 1U);
+    self->comma = true;
+}
+
+void iwn_out_span(iwn_out_t *self, iwn_span_t name, iwn_span_t value) {
+    char *const at = begin(self, name, value.length);
+    if (at != NULL) {
+        (void)memcpy(at, value.text, value.length);
+    }
+}
+
+void iwn_out_number(iwn_out_t *self, iwn_span_t name, int64_t value) {
+    char digits[IWN_DIGITS_MAX];
+    char *const end = digits + sizeof digits;
+    const char *const first = iwn_digits(value, end);
+    iwn_out_span(self, name, (iwn_span_t){first, (size_t)(end - first)});
+}
+
+/// Whether a byte stands in a text as it is.
+static bool is_plain(char c) {
+    return c >= 0x20 && c < 0x7F && c != '"' && c != '\\';
+}
+
+/// How many of the bytes from there on stand as they are: a word of the machine at a time. In one whose bytes are below
+/// 0x80 a subtraction borrows only behind a byte that is not plain either.
+static size_t plain_length(const char *text, size_t length) {
+    size_t plain = 0;
+    size_t word;
+    for (; plain + sizeof word <= length; plain += sizeof word) {
+        (void)memcpy(&word, &text[plain], sizeof word);
+        const size_t control = word - IN_EACH(0x20U);
+        const size_t quote = (word ^ IN_EACH(0x22U)) - IN_EACH(1U);
+        const size_t backslash = (word ^ IN_EACH(0x5CU)) - IN_EACH(1U);
+        const size_t erase = (word ^ IN_EACH(0x7FU)) - IN_EACH(1U);
+        if (((word | control | quote | backslash | erase) & IN_EACH(0x80U)) != 0U) {
+            break;
+        }
+    }
+    while (plain < length && is_plain(text[plain])) {
+        plain++;
+    }
+    return plain;
+}
+
+/// One character that may have to be written otherwise; how many bytes it has in `text`.
+static size_t put_character(iwn_out_t *self, const char *text) {
+    char escape[7];
+    size_t bytes;
+    iwn_text_t written = iwn_text_begin(escape, sizeof escape);
+    const uint32_t code_point = iwn_plain_read(text, &bytes);
+    if (code_point == '"' || code_point == '\\') {
+        IWN_TEXT_JOIN(&written, "\\");
+        iwn_text_span(&written, text, 1U);
+    } else if (iwn_plain_is(code_point)) {
+        iwn_text_span(&written, text, bytes);
+    } else {
+        IWN_TEXT_JOIN(&written, "\\u");
+        iwn_text_hex(&written, (code_point == IWN_PLAIN_BROKEN) ? 0xFFFDU : code_point, 4U);
+    }
+    put(self, escape, written.length);
+    return bytes;
+}
+
+/// The rest of a text, from a character on that may have to be written otherwise.
+static void put_escaped(iwn_out_t *self, const char *text, size_t length) {
+    size_t at = 0;
+    while (at < length) {
+        at += put_character(self, &text[at]);
+        const size_t plain = plain_length(&text[at], length - at);
+        put(self, &text[at], plain);
+        at += plain;
+    }
+}
+
+void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text) {
+    if (text == NULL) {
+        iwn_out_span(self, name, (iwn_span_t){"null", 4U});
+        return;
+    }
+    const size_t length = strlen(text);
+    const size_t plain = plain_length(text, length);
+    char *const at = begin(self, name, plain + ((plain == length) ? 2U : 1U));
+    if (at == NULL) {
+        return;
+    }
+    at[0] = '"';
+    (void)memcpy(at + 1, text, plain);
+    if (plain == length) {
+        at[length + 1U] = '"';
+        return;
+    }
+    put_escaped(self, &text[plain], length - plain);
+    put(self, "\"", 1U);
+}
+
+size_t iwn_out_finish(iwn_out_t *self) {
+    put(self, "\n", 1U);
+    return self->overflow ? 0U : self->length;
+}
+
+void iwn_out_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, iwn_out_t *json) {
+    const bool extended = (frame->id & IW_CAN_EXTENDED) != 0U;
+    char data[2U * IW_CAN_DATA_MAX + 1U];
+    iwn_text_t hex = iwn_text_begin(data, sizeof data);
+    for (size_t i = 0; i < frame->dlc && i < IW_CAN_DATA_MAX; i++) {
+        iwn_text_hex(&hex, frame->data[i], 2U);
+    }
+    iwn_out_int(json, "t_us", (int64_t)at_us);
+    iwn_out_int(json, "id", frame->id & (extended ? EXTENDED_ID_MASK : IW_CAN_ID_MASK));
+    iwn_out_int(json, "dlc", frame->dlc);
+    iwn_out_text(json, "data", data);
+    iwn_out_text(json, "kind", (frame->kind == (uint8_t)IW_CAN_ECHO) ? "echo" : "received");
+    iwn_out_open(json, "flags", '[');
+    if (extended) {
+        iwn_out_text(json, NULL, "extended");
+    }
+    if ((frame->id & IW_CAN_REMOTE) != 0U) {
+        iwn_out_text(json, NULL, "remote");
+    }
+    if (!extended && (frame->id & IW_CAN_FD) != 0U) {
+        iwn_out_text(json, NULL, "fd");
+    }
+    iwn_out_close(json, ']');
+}

@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_northbound/request.h"
+
+#include "request_fields.h"
+
+#include <string.h>
+
+typedef enum { INTEGER, RATE, TEXT, FLAG, TOPICS, SIDE, ITEM, VALUE } field_kind_t;
+
+/// A field that some commands have. `cmd` and `id` are common to all and treated apart.
+typedef struct {
+    const char *name;
+    uint16_t offset;  ///< Of the value in iwn_request_t.
+    uint16_t max;     ///< Of a text, in bytes.
+    uint16_t allowed; ///< Bit per iwn_cmd_t.
+    bool required;
+    uint8_t kind; ///< field_kind_t
+} field_t;
+
+#define BIT(cmd) (1U << IWN_CMD_##cmd)
+#define ROW(name, member, kind, bytes, required, allowed)                                                              \
+    {#name, offsetof(iwn_request_t, member), bytes, allowed, required, kind},
+#define INDEX(name, member, kind, bytes, required, allowed) FIELD_##name,
+#define HAS_ROOM(name, member, kind, bytes, required, allowed)                                                         \
+    &&((bytes) == 0 || sizeof(((iwn_request_t *)0)->member) == (bytes) + 1U)
+#define NAME(name) #name,
+
+static const field_t fields[] = {IWN_REQUEST_FIELDS(ROW)};
+enum { IWN_REQUEST_FIELDS(INDEX) FIELDS };
+
+static const char *const cmd_names[] = {IWN_REQUEST_NAMES(NAME)};
+IW_STATIC_ASSERT(sizeof cmd_names / sizeof cmd_names[0] == IWN_CMDS, a_name_for_each_command);
+IW_STATIC_ASSERT(true IWN_REQUEST_FIELDS(HAS_ROOM), room_for_each_text_and_its_terminator);
+IW_STATIC_ASSERT(IWN_CMDS <= 16 && FIELDS <= 32, a_bit_for_each_command_and_each_field);
+
+#define REFUSE(refusal, error, ...) refuse((refusal), (error), (const char *const[]){__VA_ARGS__, NULL})
+#define NOT_PLAIN                                                                                                      \
+    " without characters that move a terminal (control characters, line separators, marks of writing direction)"
+
+#define NUMBER_SIZE (IWN_DIGITS_MAX + 1U)
+
+/// A number for a message.
+static const char *number(int64_t value, char out_digits[NUMBER_SIZE]) {
+    iwn_text_t text = iwn_text_begin(out_digits, NUMBER_SIZE);
+    iwn_text_int(&text, value);
+    return out_digits;
+}
+
+static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error, const char *const *texts) {
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    out_refusal->error = error;
+    iwn_text_join(&message, texts);
+    return false;
+}
+
+/// The same, with all of some words at the end.
+static bool refuse_but(iwn_refusal_t *out_refusal, iwn_error_t error, const char *text, const char *(*word)(unsigned)) {
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    out_refusal->error = error;
+    IWN_TEXT_JOIN(&message, text);
+    for (unsigned i = 0; word(i) != NULL; i++) {
+        IWN_TEXT_JOIN(&message, " ", word(i));
+    }
+    return false;
+}
+
+static const char *cmd_word(unsigned index) {
+    return (index < IWN_CMDS) ? cmd_names[index] : NULL;
+}
+
+static const char *topic_word(unsigned index) {
+    return (index < IWN_TOPICS) ? iwn_topic_name((iwn_topic_t)index) : NULL;
+}
+
+/// Which of the words it is; how many there are if it is none.
+static unsigned find_word(iwn_json_t value, const char *(*word)(unsigned)) {
+    unsigned i = 0;
+    while (word(i) != NULL && !iwn_json_is(value, word(i))) {
+        i++;
+    }
+    return i;
+}
+
+/// Brackets of the line, whatever else is wrong with it. Those in texts do not count.
+static bool is_too_deep(const char *line, size_t length) {
+    unsigned depth = 0;
+    bool in_text = false;
+    for (size_t i = 0; i < length && depth <= IWN_DEPTH_MAX; i++) {
+        const char c = line[i];
+        if (in_text) {
+            in_text = c != '"';
+            i += (c == '\\') ? 1U : 0U;
+        } else {
+            in_text = c == '"';
+            depth += (c == '{' || c == '[') ? 1U : 0U;
+            depth -= ((c == '}' || c == ']') && depth > 0U) ? 1U : 0U;
+        }
+    }
+    return depth > IWN_DEPTH_MAX;
+}
+
+static bool read_text(const field_t *field, iwn_json_t value, char *target, iwn_refusal_t *out_refusal) {
+    char digits[NUMBER_SIZE];
+    if (!iwn_json_text(value, target, field->max + 1U) || *target == '\0' || !iwn_plain_text(target)) {
+        return REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be a text of 1 to ", number(field->max, digits),
+                      " bytes", NOT_PLAIN);
+    }
+    return true;
+}
+
+static bool read_integer(const field_t *field, iwn_json_t value, int64_t *target, iwn_refusal_t *out_refusal) {
+    if (iwn_json_kind(value) != IWN_JSON_INTEGER) {
+        return REFUSE(out_refusal, IWN_BAD_VALUE, field->name,
+                      " must be an integer: no fraction, no exponent, no quotes");
+    }
+    *target = iwn_json_integer(value);
+    if (field->kind == RATE && *target < 1) {
+        return REFUSE(out_refusal, IWN_OUT_OF_RANGE, field->name,
+                      " must be at least 1; to end watching send an empty topics list");
+    }
+    return true;
+}
+
+static bool read_topics(iwn_json_t value, uint8_t *target, iwn_refusal_t *out_refusal) {
+    bool good = iwn_json_kind(value) == IWN_JSON_LIST;
+    iwn_json_t rest = iwn_json_inside(value);
+    while (good && iwn_json_next(&rest, NULL, &value)) {
+        const unsigned topic = find_word(value, topic_word);
+        good = topic < IWN_TOPICS;
+        *target |= (uint8_t)(1U << topic);
+    }
+    return good || refuse_but(out_refusal, IWN_BAD_VALUE, "topics must be a list of these words:", topic_word);
+}
+
+static bool read_side(iwn_json_t value, uint8_t *target, iwn_refusal_t *out_refusal) {
+    if (iwn_json_is(value, "left")) {
+        *target = IW_SIDES_LEFT;
+    } else if (iwn_json_is(value, "right")) {
+        *target = IW_SIDES_RIGHT;
+    } else {
+        return REFUSE(out_refusal, IWN_BAD_VALUE, "side must be \"left\" or \"right\"; leave it out for both");
+    }
+    return true;
+}
+
+static bool read_item(iwn_json_t value, iw_ledger_item_t *target, iwn_refusal_t *out_refusal) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        if (iwn_json_is(value, iwn_ledger_item_name((iw_ledger_item_t)item))) {
+            *target = (iw_ledger_item_t)item;
+            return true;
+        }
+    }
+    return REFUSE(out_refusal, IWN_BAD_VALUE,
+                  "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
+}
+
+/// A number becomes its digits, so that 192 and "192" are the same.
+static bool read_value(const field_t *field, iwn_json_t value, char *target, iwn_refusal_t *out_refusal) {
+    if (iwn_json_kind(value) != IWN_JSON_INTEGER) {
+        return read_text(field, value, target, out_refusal);
+    }
+    iwn_text_t text = iwn_text_begin(target, field->max + 1U);
+    iwn_text_int(&text, iwn_json_integer(value));
+    return true;
+}
+
+static bool read_flag(const field_t *field, iwn_json_t value, bool *target, iwn_refusal_t *out_refusal) {
+    const iwn_json_kind_t kind = iwn_json_kind(value);
+    *target = kind == IWN_JSON_TRUE;
+    return *target || kind == IWN_JSON_FALSE ||
+           REFUSE(out_refusal, IWN_BAD_VALUE, field->name, " must be true or false");
+}
+
+static bool read_field(const field_t *field, iwn_json_t value, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    void *const target = (char *)request + field->offset;
+    switch (field->kind) {
+    case TEXT:
+        return read_text(field, value, (char *)target, out_refusal);
+    case FLAG:
+        return read_flag(field, value, (bool *)target, out_refusal);
+    case TOPICS:
+        return read_topics(value, (uint8_t *)target, out_refusal);
+    case SIDE:
+        return read_side(value, (uint8_t *)target, out_refusal);
+    case ITEM:
+        return read_item(value, (iw_ledger_item_t *)target, out_refusal);
+    case VALUE:
+        return read_value(field, value, (char *)target, out_refusal);
+    case INTEGER:
+    case RATE:
+    default:
+        return read_integer(field, value, (int64_t *)target, out_refusal);
+    }
+}
+
+static bool read_id(iwn_json_t value, iwn_id_t *out_id, iwn_refusal_t *out_refusal) {
+    char digits[NUMBER_SIZE];
+    if (iwn_json_kind(value) == IWN_JSON_INTEGER) {
+        *out_id = (iwn_id_t){.kind = IWN_ID_NUMBER, .number = iwn_json_integer(value)};
+        return true;
+    }
+    if (iwn_json_text(value, out_id->text, sizeof out_id->text) && iwn_plain_text(out_id->text)) {
+        out_id->kind = IWN_ID_TEXT;
+        return true;
+    }
+    return REFUSE(out_refusal, IWN_BAD_VALUE, "id must be an integer or a text of at most ",
+                  number(IWN_ID_TEXT_MAX, digits), " bytes", NOT_PLAIN);
+}
+
+static bool read_cmd(iwn_json_t value, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {
+    if (iwn_json_kind(value) != IWN_JSON_TEXT) {
+        return REFUSE(out_refusal, IWN_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
+    }
+    const unsigned cmd = find_word(value, cmd_word);
+    if (cmd == IWN_CMDS) {
+        return refuse_but(out_refusal, IWN_UNKNOWN_CMD, "cmd must be one of", cmd_word);
+    }
+    *out_cmd = (iwn_cmd_t)cmd;
+    return true;
+}
+
+/// What all requests have in common, wherever in the object it stands.
+static bool read_common(iwn_json_t root, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    iwn_json_t rest = iwn_json_inside(root);
+    iwn_json_t name;
+    iwn_json_t value;
+    iwn_json_t id = {NULL};
+    iwn_json_t cmd = {NULL};
+    while (iwn_json_next(&rest, &name, &value)) {
+        if (iwn_json_is(name, "id")) {
+            id = value;
+        } else if (iwn_json_is(name, "cmd")) {
+            cmd = value;
+        }
+    }
+    if (id.at != NULL && !read_id(id, &request->id, out_refusal)) {
+        return false;
+    }
+    if (cmd.at == NULL) {
+        return REFUSE(out_refusal, IWN_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
+    }
+    return read_cmd(cmd, &request->cmd, out_refusal);
+}
+
+static const field_t *find_field(iwn_json_t name, iwn_cmd_t cmd) {
+    for (unsigned i = 0; i < FIELDS; i++) {
+        if ((fields[i].allowed & 1U << cmd) != 0U && iwn_json_is(name, fields[i].name)) {
+            return &fields[i];
+        }
+    }
+    return NULL;
+}
+
+/// Names 64 characters of it, if all of it can be shown.
+static bool refuse_unknown(iwn_cmd_t cmd, iwn_json_t name, iwn_refusal_t *out_refusal) {
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    iwn_json_t rest = iwn_json_inside(name);
+    out_refusal->error = IWN_UNKNOWN_FIELD;
+    IWN_TEXT_JOIN(&message, cmd_names[cmd], " has no field \"");
+    const size_t begin = message.length;
+    for (uint32_t c = iwn_json_character(&rest); c != 0U; c = iwn_json_character(&rest)) {
+        const char character = (char)c;
+        if (c < 0x20U || c > 0x7EU) {
+            message.length = begin;
+            IWN_TEXT_JOIN(&message, "?");
+            break;
+        }
+        iwn_text_span(&message, &character, (message.length < begin + 64U) ? 1U : 0U);
+    }
+    IWN_TEXT_JOIN(&message, "\"; leave it out");
+    return false;
+}
+
+/// Every field that is there is known and right. `*out_seen` has a bit for each of them.
+static bool read_fields(iwn_json_t root, iwn_request_t *request, uint32_t *out_seen, iwn_refusal_t *out_refusal) {
+    iwn_json_t rest = iwn_json_inside(root);
+    iwn_json_t name;
+    iwn_json_t value;
+    while (iwn_json_next(&rest, &name, &value)) {
+        if (iwn_json_is(name, "id") || iwn_json_is(name, "cmd")) {
+            continue;
+        }
+        const field_t *const field = find_field(name, request->cmd);
+        if (field == NULL) {
+            return refuse_unknown(request->cmd, name, out_refusal);
+        }
+        if (!read_field(field, value, request, out_refusal)) {
+            return false;
+        }
+        *out_seen |= 1U << (field - fields);
+    }
+    return true;
+}
+
+/// Every field that must be there is.
+static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    for (unsigned i = 0; i < FIELDS; i++) {
+        const bool needed = fields[i].required && (fields[i].allowed & 1U << request->cmd) != 0U;
+        if (needed && (seen & 1U << i) == 0U) {
+            return REFUSE(out_refusal, IWN_MISSING_FIELD, cmd_names[request->cmd], " needs ", fields[i].name);
+        }
+    }
+    request->has_current = (seen & 1U << FIELD_left_mA) != 0U;
+    if (request->has_current != ((seen & 1U << FIELD_right_mA) != 0U)) {
+        return REFUSE(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
+    }
+    return true;
+}
+
+/// One object, right in form.
+static bool read_line(const char *line, size_t length, iwn_work_t *work, iwn_json_t *out_root,
+                      iwn_refusal_t *out_refusal) {
+    char digits[NUMBER_SIZE];
+    iwn_text_t message = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    out_refusal->error = IWN_BAD_JSON;
+    IWN_TEXT_JOIN(&message, "not one JSON object on one line: ");
+    if (iwn_json_check(line, length, work, out_root, &message)) {
+        IWN_TEXT_JOIN(&message, "it is not an object");
+        return iwn_json_kind(*out_root) == IWN_JSON_OBJECT;
+    }
+    return is_too_deep(line, length)
+               ? REFUSE(out_refusal, IWN_BAD_JSON, "nested more than ", number(IWN_DEPTH_MAX, digits), " deep")
+               : false;
+}
+
+bool iwn_request_read(const char *line, size_t length, iwn_work_t *work, iwn_request_t *out_request,
+                      iwn_refusal_t *out_refusal) {
+    const iwn_request_t request = {.rate_hz = IWN_RATE_DEFAULT_HZ, .sides = IW_SIDES_BOTH};
+    char digits[NUMBER_SIZE];
+    iwn_json_t root;
+    uint32_t seen = 0;
+    *out_request = request;
+    if (length > IWN_LINE_MAX) {
+        return REFUSE(out_refusal, IWN_LINE_TOO_LONG, "a request has at most ", number(IWN_LINE_MAX, digits),
+                      " bytes; end each with a newline");
+    }
+    return read_line(line, length, work, &root, out_refusal) && read_common(root, out_request, out_refusal) &&
+           read_fields(root, out_request, &seen, out_refusal) && is_complete(seen, out_request, out_refusal);
+}

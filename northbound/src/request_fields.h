@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// The requests and their fields, beside cmd and id. Written by scripts/northbound.py from share/northbound.json.
+#ifndef IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
+#define IWHEEL_NORTHBOUND_REQUEST_FIELDS_H
+
+/// In the order of iwn_cmd_t.
+#define IWN_REQUEST_NAMES(NAME)                                                                                        \
+    NAME(hello)                                                                                                        \
+    NAME(status)                                                                                                       \
+    NAME(watch)                                                                                                        \
+    NAME(arm)                                                                                                          \
+    NAME(drive)                                                                                                        \
+    NAME(twist)                                                                                                        \
+    NAME(stop)                                                                                                         \
+    NAME(disarm)                                                                                                       \
+    NAME(estop)                                                                                                        \
+    NAME(reset)                                                                                                        \
+    NAME(tare)                                                                                                         \
+    NAME(why)                                                                                                          \
+    NAME(confirm)
+
+/// Name, member of iwn_request_t, kind, bytes of a text at most, whether it must be there, requests that have it.
+#define IWN_REQUEST_FIELDS(ROW)                                                                                        \
+    ROW(topics, topics, TOPICS, 0, true, BIT(WATCH))                                                                   \
+    ROW(rate_hz, rate_hz, RATE, 0, false, BIT(WATCH))                                                                  \
+    ROW(name, name, TEXT, 64, false, BIT(ARM))                                                                         \
+    ROW(takeover, takeover, FLAG, 0, false, BIT(ARM))                                                                  \
+    ROW(left_mm_s, left_mm_s, INTEGER, 0, true, BIT(DRIVE))                                                            \
+    ROW(right_mm_s, right_mm_s, INTEGER, 0, true, BIT(DRIVE))                                                          \
+    ROW(left_mA, left_mA, INTEGER, 0, false, BIT(DRIVE))                                                               \
+    ROW(right_mA, right_mA, INTEGER, 0, false, BIT(DRIVE))                                                             \
+    ROW(v_mm_s, v_mm_s, INTEGER, 0, true, BIT(TWIST))                                                                  \
+    ROW(yaw_mrad_s, yaw_mrad_s, INTEGER, 0, true, BIT(TWIST))                                                          \
+    ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))                                                                  \
+    ROW(side, sides, SIDE, 0, false, BIT(TARE))                                                                        \
+    ROW(item, item, ITEM, 0, true, BIT(CONFIRM))                                                                       \
+    ROW(value, value, VALUE, 39, false, BIT(CONFIRM))                                                                  \
+    ROW(how, how, TEXT, 127, false, BIT(CONFIRM))
+
+#endif

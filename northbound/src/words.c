@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_northbound/words.h"
+
+#include <string.h>
+
+#define PICK(table, index)                                                                                             \
+    ((size_t)(index) < sizeof(table) / sizeof(table)[0] && (table)[index] != NULL ? (table)[index] : "unknown")
+
+const char *iwn_error_name(iwn_error_t error) {
+    static const char *const names[IWN_ERRORS] = {
+        [IWN_OK] = "ok",
+        [IWN_BAD_JSON] = "bad_json",
+        [IWN_LINE_TOO_LONG] = "line_too_long",
+        [IWN_UNKNOWN_CMD] = "unknown_cmd",
+        [IWN_UNKNOWN_FIELD] = "unknown_field",
+        [IWN_MISSING_FIELD] = "missing_field",
+        [IWN_BAD_VALUE] = "bad_value",
+        [IWN_OUT_OF_RANGE] = "out_of_range",
+        [IWN_NOT_HOLDER] = "not_holder",
+        [IWN_BUSY] = "busy",
+        [IWN_NOT_ARMED] = "not_armed",
+        [IWN_LATCHED] = "latched",
+        [IWN_ESTOP_PRESSED] = "estop_pressed",
+        [IWN_BUS_DOWN] = "bus_down",
+        [IWN_TIMING_MISMATCH] = "timing_mismatch",
+        [IWN_WHEEL_LOST] = "wheel_lost",
+        [IWN_WHEEL_BLOCKED] = "wheel_blocked",
+        [IWN_NOT_AT_REST] = "not_at_rest",
+        [IWN_SEND_STALLED] = "send_stalled",
+        [IWN_SECOND_MASTER] = "second_master",
+        [IWN_CAUSE_PRESENT] = "cause_present",
+        [IWN_TYPE_NOT_SET] = "type_not_set",
+        [IWN_STALE_COMMAND] = "stale_command",
+        [IWN_LISTEN_ONLY] = "listen_only",
+        [IWN_TOO_MANY_CLIENTS] = "too_many_clients",
+        [IWN_DENIED] = "denied",
+        [IWN_INTERNAL] = "internal",
+    };
+    return PICK(names, error);
+}
+
+iwn_error_t iwn_error_of(iw_refusal_t refusal) {
+    static const iwn_error_t errors[] = {
+        [IW_REFUSE_NONE] = IWN_OK,
+        [IW_REFUSE_OUT_OF_RANGE] = IWN_OUT_OF_RANGE,
+        [IW_REFUSE_MISSING_FIELD] = IWN_MISSING_FIELD,
+        [IW_REFUSE_NOT_HOLDER] = IWN_NOT_HOLDER,
+        [IW_REFUSE_BUSY] = IWN_BUSY,
+        [IW_REFUSE_NOT_ARMED] = IWN_NOT_ARMED,
+        [IW_REFUSE_LATCHED] = IWN_LATCHED,
+        [IW_REFUSE_ESTOP_PRESSED] = IWN_ESTOP_PRESSED,
+        [IW_REFUSE_BUS_DOWN] = IWN_BUS_DOWN,
+        [IW_REFUSE_TIMING_MISMATCH] = IWN_TIMING_MISMATCH,
+        [IW_REFUSE_WHEEL_LOST] = IWN_WHEEL_LOST,
+        [IW_REFUSE_WHEEL_BLOCKED] = IWN_WHEEL_BLOCKED,
+        [IW_REFUSE_NOT_AT_REST] = IWN_NOT_AT_REST,
+        [IW_REFUSE_SEND_STALLED] = IWN_SEND_STALLED,
+        [IW_REFUSE_SECOND_MASTER] = IWN_SECOND_MASTER,
+        [IW_REFUSE_CAUSE_PRESENT] = IWN_CAUSE_PRESENT,
+        [IW_REFUSE_TYPE_NOT_SET] = IWN_TYPE_NOT_SET,
+        [IW_REFUSE_STALE_COMMAND] = IWN_STALE_COMMAND,
+        [IW_REFUSE_LISTEN_ONLY] = IWN_LISTEN_ONLY,
+        [IW_REFUSE_CONTRADICTED] = IWN_DENIED,
+    };
+    return (size_t)refusal < sizeof errors / sizeof errors[0] ? errors[refusal] : IWN_INTERNAL;
+}
+
+const char *iwn_topic_name(iwn_topic_t topic) {
+    static const char *const names[IWN_TOPICS] = {"state", "bus", "estop", "lease", "stop", "force", "frame"};
+    return PICK(names, topic);
+}
+
+const char *iwn_state_name(iw_state_t state) {
+    static const char *const names[] = {
+        [IW_STATE_LISTENING] = "listening",
+        [IW_STATE_ARMED] = "armed",
+        [IW_STATE_STOPPING] = "stopping",
+        [IW_STATE_LATCHED] = "latched",
+    };
+    return PICK(names, state);
+}
+
+const char *iwn_cause_name(iw_cause_t cause) {
+    static const char *const names[IW_CAUSES] = {
+        [IW_CAUSE_NONE] = "none",
+        [IW_CAUSE_ESTOP_LINE] = "estop_line",
+        [IW_CAUSE_ESTOP_SOFTWARE] = "estop_software",
+        [IW_CAUSE_WHEEL_LOST] = "wheel_lost",
+        [IW_CAUSE_WHEEL_REBOOTED] = "wheel_rebooted",
+        [IW_CAUSE_SEND_STALLED] = "send_stalled",
+        [IW_CAUSE_BUS_DOWN] = "bus_down",
+        [IW_CAUSE_SECOND_MASTER] = "second_master",
+        [IW_CAUSE_FEEDBACK_SIGN] = "feedback_sign",
+        [IW_CAUSE_OVERSPEED] = "overspeed",
+        [IW_CAUSE_LOOP_HUNG] = "loop_hung",
+        [IW_CAUSE_INTERNAL] = "internal",
+        [IW_CAUSE_LOOP_LATE] = "loop_late",
+        [IW_CAUSE_WHEEL_BLOCKED] = "wheel_blocked",
+        [IW_CAUSE_LEASE_LOST] = "lease_lost",
+        [IW_CAUSE_CLIENT_GONE] = "client_gone",
+        [IW_CAUSE_CLIENT_STOP] = "client_stop",
+        [IW_CAUSE_SHUTDOWN] = "shutdown",
+        [IW_CAUSE_RESTART] = "restart",
+    };
+    return PICK(names, cause);
+}
+
+const char *iwn_bus_state_name(iw_bus_state_t state) {
+    static const char *const names[] = {
+        [IW_BUS_DOWN] = "down",
+        [IW_BUS_OFF] = "bus_off",
+        [IW_BUS_PASSIVE] = "passive",
+        [IW_BUS_ACTIVE] = "active",
+    };
+    return PICK(names, state);
+}
+
+const char *iwn_estop_name(int answer, bool present) {
+    if (!present) {
+        return "none";
+    }
+    return answer == 0 ? "released" : answer > 0 ? "pressed" : "unreadable";
+}
+
+const char *iwn_sides_name(uint8_t sides) {
+    static const char *const names[] = {NULL, "left", "right", "both"};
+    return names[sides & IW_SIDES_BOTH];
+}
+
+const char *iwn_provenance_name(iw_offset_provenance_t provenance) {
+    static const char *const names[] = {
+        [IW_OFFSET_NONE] = "none",   [IW_OFFSET_STORED] = "stored",     [IW_OFFSET_ESTIMATED] = "estimated",
+        [IW_OFFSET_WHEEL] = "wheel", [IW_OFFSET_OPERATOR] = "operator",
+    };
+    return PICK(names, provenance);
+}
+
+const char *iwn_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offset_us) {
+    const bool stored = provenance != IW_OFFSET_NONE && offset_us == IW_NEVER;
+    return iwn_provenance_name(stored ? IW_OFFSET_STORED : provenance);
+}
+
+const char *iwn_window_name(iw_window_t window) {
+    static const char *const names[] = {
+        [IW_WINDOW_OPEN] = "open",           [IW_WINDOW_GOOD] = "good",   [IW_WINDOW_MOVING] = "moving",
+        [IW_WINDOW_NOISY] = "noisy",         [IW_WINDOW_DRIFT] = "drift", [IW_WINDOW_LOADED] = "loaded",
+        [IW_WINDOW_SATURATED] = "saturated",
+    };
+    return PICK(names, window);
+}
+
+const char *iwn_unit_evidence_name(iw_unit_evidence_t evidence) {
+    static const char *const names[] = {
+        [IW_UNIT_UNKNOWN] = "unknown", [IW_UNIT_CN] = "cN",
+        [IW_UNIT_DN] = "dN",           [IW_UNIT_OFFSET_REMOVED] = "offset_removed",
+        [IW_UNIT_UNCLEAR] = "unclear",
+    };
+    return PICK(names, evidence);
+}
+
+const char *iwn_force_validity_name(iw_force_validity_t validity) {
+    static const char *const names[] = {
+        [IW_FORCE_VALID] = "valid",
+        [IW_FORCE_NOT_HEARD] = "not_heard",
+        [IW_FORCE_SATURATED] = "saturated",
+        [IW_FORCE_NO_OFFSET] = "no_offset",
+        [IW_FORCE_UNIT_CONTRADICTED] = "unit_contradicted",
+        [IW_FORCE_OFFSET_REMOVED] = "offset_removed",
+        [IW_FORCE_OFFSET_DOUBTED] = "offset_doubted",
+    };
+    return PICK(names, validity);
+}
+
+const char *iwn_ledger_item_name(iw_ledger_item_t item) {
+    static const char *const names[IW_LEDGER_ITEMS] = {
+        [IW_LEDGER_SETPOINT_TYPE] = "setpoint_type",
+        [IW_LEDGER_CURRENT_ROLE] = "current_role",
+        [IW_LEDGER_FORCE_UNIT_LEFT] = "force_unit_left",
+        [IW_LEDGER_FORCE_UNIT_RIGHT] = "force_unit_right",
+        [IW_LEDGER_OFFSET_INCLUDED] = "offset_included",
+        [IW_LEDGER_FEEDBACK_SIGN_LEFT] = "feedback_sign_left",
+        [IW_LEDGER_FEEDBACK_SIGN_RIGHT] = "feedback_sign_right",
+        [IW_LEDGER_MOUNT_SIGN_LEFT] = "mount_sign_left",
+        [IW_LEDGER_MOUNT_SIGN_RIGHT] = "mount_sign_right",
+        [IW_LEDGER_WHEEL_RADIUS] = "wheel_radius",
+        [IW_LEDGER_TRACK] = "track",
+        [IW_LEDGER_GEAR_RATIO] = "gear_ratio",
+        [IW_LEDGER_POSE_BYTE_ORDER] = "pose_byte_order",
+        [IW_LEDGER_DLC] = "dlc",
+    };
+    return PICK(names, item);
+}
+
+bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+        if (strcmp(name, iwn_ledger_item_name((iw_ledger_item_t)item)) == 0) {
+            *out_item = (iw_ledger_item_t)item;
+            return true;
+        }
+    }
+    return false;
+}
+
+const char *iwn_ledger_state_name(iw_ledger_state_t state) {
+    static const char *const names[] = {"assumed", "confirmed", "contradicted"};
+    return PICK(names, state);
+}
+
+const char *iwn_evidence_name(iw_evidence_t evidence) {
+    static const char *const names[] = {
+        [IW_EVIDENCE_NONE] = "none", [IW_EVIDENCE_DOCUMENT] = "document", [IW_EVIDENCE_CONFIGURATION] = "configuration",
+        [IW_EVIDENCE_BUS] = "bus",   [IW_EVIDENCE_OPERATOR] = "operator",
+    };
+    return PICK(names, evidence);
+}

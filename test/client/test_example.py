@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""The example of libiwheel-client drives simulated wheels through the real gateway; however it dies, they stop.
+
+usage: test_example.py BUILD [TEST...]
+"""
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+os.environ["IWHEEL_BUILD"] = os.path.abspath(sys.argv.pop(1))
+sys.path[:0] = [os.path.join(ROOT, "python", "tests"), os.path.join(ROOT, "python", "src")]
+
+from rig import BUILD, RigCase, now_us  # noqa: E402
+
+from iwheel import Gateway  # noqa: E402
+
+LEASE_MS = 300  # Of the rig.
+RAMP_MS = 200  # From 200 mm/s at 1500 mm/s2, and as much again for a busy machine.
+
+
+class Example(RigCase):
+    def start(self, seconds):
+        child = subprocess.Popen([os.path.join(BUILD, "client", "c", "drive_20"), str(seconds)], stderr=subprocess.PIPE, text=True,
+                                 env={**os.environ, "IWHEEL_SOCKET": self.socket})
+        self.addCleanup(child.stderr.close)
+        self.addCleanup(child.wait)
+        self.addCleanup(child.kill)
+        return child
+
+    def speed(self):
+        with Gateway(self.socket) as gateway:
+            return gateway.status()["left"]["speed_mm_s"] or 0
+
+    def start_driving(self):
+        """A drive without end, at full speed."""
+        child = self.start(600)
+        self.wait_until(lambda: self.speed() > 150)
+        return child
+
+    def cause(self):
+        with Gateway(self.socket) as gateway:
+            return gateway.why()["cause"]
+
+    def test_example_drives_for_its_time_and_stops(self):
+        begin_us = now_us()
+        child = self.start(1)
+        _, err = child.communicate(timeout=10)
+        self.assertEqual((0, ""), (child.returncode, err))
+        self.assertEqual("client_stop", self.cause())
+        self.assertGreater(self.last_motion_us() - begin_us, 900_000)
+        time.sleep(0.3)
+        self.assert_stood_by(now_us(), 0)
+
+    def test_example_that_dies_ends_its_lease_with_its_connection(self):
+        for number in (signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT, signal.SIGINT, signal.SIGTERM, signal.SIGPIPE):
+            child = self.start_driving()
+            died_us = now_us()
+            child.send_signal(number)
+            self.assertEqual(-number, child.wait(5))
+            time.sleep(0.7)
+            self.assertEqual("client_gone", self.cause(), number)
+            self.assert_stood_by(died_us, 60 + RAMP_MS)
+
+    def test_example_that_is_frozen_loses_its_lease(self):
+        child = self.start_driving()
+        frozen_us = now_us()
+        child.send_signal(signal.SIGSTOP)
+        time.sleep(1.0)
+        self.assertEqual("lease_lost", self.cause())
+        self.assert_stood_by(frozen_us, LEASE_MS + 60 + RAMP_MS)
+        time.sleep(1.5)
+        thawed_us = now_us()
+        child.send_signal(signal.SIGCONT)
+        _, err = child.communicate(timeout=10)
+        self.assertEqual(1, child.returncode)
+        self.assertIn("arm", err)  # Its next command is refused, with the cure.
+        self.assertLess(self.last_motion_us(), thawed_us)
+
+    def test_example_whose_gateway_starts_anew_ends_and_moves_nothing(self):
+        child = self.start_driving()
+        self.rig.kill_gateway(signal.SIGKILL)
+        killed_us = now_us()
+        _, err = child.communicate(timeout=10)
+        self.assertEqual(1, child.returncode)
+        self.assertIn("there is no connection; connect, and arm again", err)
+        self.rig.start_gateway(restart_hold=True)
+        time.sleep(0.3)
+        self.assertLess(self.last_motion_us(), killed_us + 1000)
+
+    @unittest.skipUnless(shutil.which("c++"), "no C++ compiler (apt-get install g++)")
+    def test_program_in_cpp_drives_and_stops(self):
+        program = self.rig.path("client")
+        library = os.path.join(BUILD, "client", "c", "libiwheel-client.a")
+        subprocess.run(["c++", "-std=c++11", "-I", os.path.join(ROOT, "client", "c", "include"),
+                        os.path.join(ROOT, "test", "package", "client.cpp"), library, "-o", program], check=True)
+        done = subprocess.run([program], capture_output=True, text=True, timeout=10, env={**os.environ, "IWHEEL_SOCKET": self.socket})
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        with Gateway(self.socket) as gateway:
+            self.assertEqual(("client_stop", "client.cpp"), (gateway.why()["cause"], gateway.why()["client_name"]))
+
+    def test_example_without_a_gateway_or_with_a_second_one_says_so(self):
+        self.start_driving()
+        second = self.start(1)
+        _, err = second.communicate(timeout=10)
+        self.assertEqual(1, second.returncode)
+        self.assertIn("drive_20", err)  # Who holds the lease.
+        self.socket = "/nonexistent/gateway.sock"
+        lost = self.start(1)
+        _, err = lost.communicate(timeout=10)
+        self.assertEqual(1, lost.returncode)
+        self.assertIn("nobody listens", err)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,343 @@
+// SPDX-License-Identifier: MIT
+// The gateway's reader of requests as it was until version 0.1, on jansson: what the new one must agree with. For tests only.
+#include "old_reader.h"
+
+#include "iwheel_northbound/text.h"
+
+#include <inttypes.h>
+#include <jansson.h>
+#include <stdalign.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static alignas(max_align_t) uint8_t arena[524288];
+static size_t used;
+
+static void *arena_take(size_t size) {
+    const size_t step = alignof(max_align_t);
+    if (size > sizeof arena) {
+        return NULL;
+    }
+    const size_t rounded = (size + step - 1U) / step * step;
+    if (rounded > sizeof arena - used) {
+        return NULL;
+    }
+    void *block = &arena[used];
+    used += rounded;
+    return block;
+}
+
+static void arena_leave(void *block) {
+    (void)block; // All of it goes at once, by json_arena_reset.
+}
+
+static void install(void) {
+    json_set_alloc_funcs(arena_take, arena_leave);
+    json_object_seed(0);
+}
+
+typedef enum {
+    FIELD_INTEGER,
+    FIELD_RATE,
+    FIELD_TEXT,
+    FIELD_FLAG,
+    FIELD_TOPICS,
+    FIELD_SIDE,
+    FIELD_ITEM,
+    FIELD_VALUE
+} field_kind_t;
+
+/// A field that some commands have. `cmd` and `id` are common to all and treated apart.
+typedef struct {
+    const char *name;
+    size_t offset;    ///< Of the value in iwn_request_t.
+    size_t max;       ///< Of a text, in bytes.
+    uint16_t allowed; ///< Bit per iwn_cmd_t.
+    bool required;
+    field_kind_t kind;
+} field_t;
+
+#define BIT(cmd)   ((uint16_t)(1U << (cmd)))
+#define IN(member) offsetof(iwn_request_t, member)
+
+static const field_t fields[] = {
+    {"left_mm_s", IN(left_mm_s), 0, BIT(IWN_CMD_DRIVE), true, FIELD_INTEGER},
+    {"right_mm_s", IN(right_mm_s), 0, BIT(IWN_CMD_DRIVE), true, FIELD_INTEGER},
+    {"left_mA", IN(left_mA), 0, BIT(IWN_CMD_DRIVE), false, FIELD_INTEGER},
+    {"right_mA", IN(right_mA), 0, BIT(IWN_CMD_DRIVE), false, FIELD_INTEGER},
+    {"v_mm_s", IN(v_mm_s), 0, BIT(IWN_CMD_TWIST), true, FIELD_INTEGER},
+    {"yaw_mrad_s", IN(yaw_mrad_s), 0, BIT(IWN_CMD_TWIST), true, FIELD_INTEGER},
+    {"topics", IN(topics), 0, BIT(IWN_CMD_WATCH), true, FIELD_TOPICS},
+    {"rate_hz", IN(rate_hz), 0, BIT(IWN_CMD_WATCH), false, FIELD_RATE},
+    {"name", IN(name), IWN_NAME_MAX, BIT(IWN_CMD_ARM), false, FIELD_TEXT},
+    {"takeover", IN(takeover), 0, BIT(IWN_CMD_ARM), false, FIELD_FLAG},
+    {"reason", IN(reason), IWN_REASON_MAX, BIT(IWN_CMD_ESTOP), false, FIELD_TEXT},
+    {"side", IN(sides), 0, BIT(IWN_CMD_TARE), false, FIELD_SIDE},
+    {"item", IN(item), 0, BIT(IWN_CMD_CONFIRM), true, FIELD_ITEM},
+    {"value", IN(value), IWN_VALUE_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_VALUE},
+    {"how", IN(how), IWN_HOW_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_TEXT},
+};
+#define FIELDS (sizeof fields / sizeof fields[0])
+
+static const char *const cmd_names[IWN_CMDS] = {"hello",  "status", "watch", "arm",  "drive", "twist",  "stop",
+                                                "disarm", "estop",  "reset", "tare", "why",   "confirm"};
+
+__attribute__((format(printf, 3, 4))) static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error,
+                                                         const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    out_refusal->error = error;
+    (void)vsnprintf(out_refusal->message, sizeof out_refusal->message, format, arguments);
+    va_end(arguments);
+    return false;
+}
+
+/// Nesting is counted before jansson recurses. Brackets in texts do not count.
+static bool too_deep(const char *line, size_t length) {
+    unsigned depth = 0;
+    bool in_text = false;
+    for (size_t i = 0; i < length; ++i) {
+        const char c = line[i];
+        if (in_text) {
+            in_text = c != '"';
+            i += c == '\\' ? 1U : 0U;
+        } else if (c == '"') {
+            in_text = true;
+        } else if (c == '{' || c == '[') {
+            if (++depth > IWN_DEPTH_MAX) {
+                return true;
+            }
+        } else if ((c == '}' || c == ']') && depth > 0U) {
+            --depth;
+        }
+    }
+    return false;
+}
+
+/// Plain and short enough. jansson has checked the UTF-8 and refuses \u0000.
+static bool is_plain(const char *text, size_t max) {
+    return strlen(text) <= max && iwn_plain_text(text);
+}
+
+/// May stand in a message: nothing that could have been cut in the middle of a character.
+static const char *quotable(const char *text, const char *otherwise) {
+    for (const char *c = text; *c != '\0'; ++c) {
+        if (*c < 0x20 || *c > 0x7E) {
+            return otherwise;
+        }
+    }
+    return text;
+}
+
+static bool read_text(const field_t *field, const json_t *value, char *target, iwn_refusal_t *out_refusal) {
+    const char *text = json_string_value(value);
+    if (text == NULL || *text == '\0' || !is_plain(text, field->max)) {
+        return refuse(
+            out_refusal, IWN_BAD_VALUE,
+            "%s must be a text of 1 to %zu bytes without characters that move a terminal (control characters, "
+            "line separators, marks of writing direction)",
+            field->name, field->max);
+    }
+    (void)memcpy(target, text, strlen(text) + 1U);
+    return true;
+}
+
+static bool read_integer(const field_t *field, const json_t *value, int64_t *target, iwn_refusal_t *out_refusal) {
+    if (!json_is_integer(value)) {
+        return refuse(out_refusal, IWN_BAD_VALUE, "%s must be an integer: no fraction, no exponent, no quotes",
+                      field->name);
+    }
+    *target = json_integer_value(value);
+    if (field->kind == FIELD_RATE && *target < 1) {
+        return refuse(out_refusal, IWN_OUT_OF_RANGE, "%s must be at least 1; to end watching send an empty topics list",
+                      field->name);
+    }
+    return true;
+}
+
+static bool read_topics(const json_t *value, uint8_t *target, iwn_refusal_t *out_refusal) {
+    static const char cure[] = "topics must be a list of these words: state bus estop lease stop force frame";
+    if (!json_is_array(value)) {
+        return refuse(out_refusal, IWN_BAD_VALUE, "%s", cure);
+    }
+    for (size_t i = 0; i < json_array_size(value); ++i) {
+        const char *word = json_string_value(json_array_get(value, i));
+        unsigned topic = 0;
+        while (word != NULL && topic < IWN_TOPICS && strcmp(word, iwn_topic_name((iwn_topic_t)topic)) != 0) {
+            ++topic;
+        }
+        if (word == NULL || topic == IWN_TOPICS) {
+            return refuse(out_refusal, IWN_BAD_VALUE, "%s", cure);
+        }
+        *target |= (uint8_t)(1U << topic);
+    }
+    return true;
+}
+
+static bool read_side(const json_t *value, uint8_t *target, iwn_refusal_t *out_refusal) {
+    const char *word = json_string_value(value);
+    if (word != NULL && strcmp(word, "left") == 0) {
+        *target = IW_SIDES_LEFT;
+    } else if (word != NULL && strcmp(word, "right") == 0) {
+        *target = IW_SIDES_RIGHT;
+    } else {
+        return refuse(out_refusal, IWN_BAD_VALUE, "side must be \"left\" or \"right\"; leave it out for both");
+    }
+    return true;
+}
+
+static bool read_item(const json_t *value, iw_ledger_item_t *target, iwn_refusal_t *out_refusal) {
+    const char *name = json_string_value(value);
+    if (name == NULL || !iwn_ledger_item_of(name, target)) {
+        return refuse(out_refusal, IWN_BAD_VALUE,
+                      "item must be one of the ledger's, for example \"wheel_radius\"; see them all: iwheelctl ledger");
+    }
+    return true;
+}
+
+/// A number becomes its digits, so that 192 and "192" are the same.
+static bool read_value(const field_t *field, const json_t *value, char *target, iwn_refusal_t *out_refusal) {
+    if (json_is_integer(value)) {
+        (void)snprintf(target, IWN_VALUE_SIZE, "%" PRId64, (int64_t)json_integer_value(value));
+        return true;
+    }
+    return read_text(field, value, target, out_refusal);
+}
+
+static bool read_flag(const field_t *field, const json_t *value, bool *target, iwn_refusal_t *out_refusal) {
+    if (!json_is_boolean(value)) {
+        return refuse(out_refusal, IWN_BAD_VALUE, "%s must be true or false", field->name);
+    }
+    *target = json_is_true(value);
+    return true;
+}
+
+static bool read_field(const field_t *field, const json_t *value, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    void *target = (char *)request + field->offset;
+    switch (field->kind) {
+    case FIELD_TEXT:
+        return read_text(field, value, (char *)target, out_refusal);
+    case FIELD_FLAG:
+        return read_flag(field, value, (bool *)target, out_refusal);
+    case FIELD_TOPICS:
+        return read_topics(value, (uint8_t *)target, out_refusal);
+    case FIELD_SIDE:
+        return read_side(value, (uint8_t *)target, out_refusal);
+    case FIELD_ITEM:
+        return read_item(value, (iw_ledger_item_t *)target, out_refusal);
+    case FIELD_VALUE:
+        return read_value(field, value, (char *)target, out_refusal);
+    case FIELD_INTEGER:
+    case FIELD_RATE:
+    default:
+        return read_integer(field, value, (int64_t *)target, out_refusal);
+    }
+}
+
+static bool read_id(const json_t *root, iwn_id_t *out_id, iwn_refusal_t *out_refusal) {
+    const json_t *value = json_object_get(root, "id");
+    const char *text = json_string_value(value);
+    if (json_is_integer(value)) {
+        *out_id = (iwn_id_t){.kind = IWN_ID_NUMBER, .number = json_integer_value(value)};
+    } else if (text != NULL && is_plain(text, IWN_ID_TEXT_MAX)) {
+        out_id->kind = IWN_ID_TEXT;
+        (void)memcpy(out_id->text, text, strlen(text) + 1U);
+    } else if (value != NULL) {
+        return refuse(out_refusal, IWN_BAD_VALUE,
+                      "id must be an integer or a text of at most %u bytes without characters that move a terminal "
+                      "(control characters, line separators, marks of writing direction)",
+                      IWN_ID_TEXT_MAX);
+    }
+    return true;
+}
+
+static bool read_cmd(const json_t *root, iwn_cmd_t *out_cmd, iwn_refusal_t *out_refusal) {
+    const json_t *value = json_object_get(root, "cmd");
+    const char *name = json_string_value(value);
+    if (value == NULL) {
+        return refuse(out_refusal, IWN_MISSING_FIELD, "a request needs cmd, for example {\"cmd\":\"status\"}");
+    }
+    if (name == NULL) {
+        return refuse(out_refusal, IWN_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
+    }
+    for (unsigned i = 0; i < IWN_CMDS; ++i) {
+        if (strcmp(name, cmd_names[i]) == 0) {
+            *out_cmd = (iwn_cmd_t)i;
+            return true;
+        }
+    }
+    return refuse(out_refusal, IWN_UNKNOWN_CMD,
+                  "cmd must be one of hello status watch arm drive twist stop disarm estop reset tare why confirm");
+}
+
+static const field_t *find_field(const char *name, iwn_cmd_t cmd) {
+    for (size_t i = 0; i < FIELDS; ++i) {
+        if ((fields[i].allowed & BIT(cmd)) != 0U && strcmp(name, fields[i].name) == 0) {
+            return &fields[i];
+        }
+    }
+    return NULL;
+}
+
+/// Every field that is there is known and right.
+static bool read_fields(json_t *root, iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    for (void *it = json_object_iter(root); it != NULL; it = json_object_iter_next(root, it)) {
+        const char *name = json_object_iter_key(it);
+        if (strcmp(name, "id") == 0 || strcmp(name, "cmd") == 0) {
+            continue;
+        }
+        const field_t *field = find_field(name, request->cmd);
+        if (field == NULL) {
+            return refuse(out_refusal, IWN_UNKNOWN_FIELD, "%s has no field \"%.64s\"; leave it out",
+                          cmd_names[request->cmd], quotable(name, "?"));
+        }
+        if (!read_field(field, json_object_iter_value(it), request, out_refusal)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Every field that must be there is.
+static bool is_complete(const json_t *root, const iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    for (size_t i = 0; i < FIELDS; ++i) {
+        const bool needed = fields[i].required && (fields[i].allowed & BIT(request->cmd)) != 0U;
+        if (needed && json_object_get(root, fields[i].name) == NULL) {
+            return refuse(out_refusal, IWN_MISSING_FIELD, "%s needs %s", cmd_names[request->cmd], fields[i].name);
+        }
+    }
+    if ((json_object_get(root, "left_mA") == NULL) != (json_object_get(root, "right_mA") == NULL)) {
+        return refuse(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
+    }
+    return true;
+}
+
+bool old_request_read(const char *line, size_t length, iwn_request_t *out_request, iwn_refusal_t *out_refusal) {
+    *out_request = (iwn_request_t){.rate_hz = IWN_RATE_DEFAULT_HZ, .sides = IW_SIDES_BOTH};
+    if (length > IWN_LINE_MAX) {
+        return refuse(out_refusal, IWN_LINE_TOO_LONG, "a request has at most %u bytes; end each with a newline",
+                      IWN_LINE_MAX);
+    }
+    if (too_deep(line, length)) {
+        return refuse(out_refusal, IWN_BAD_JSON, "nested more than %u deep", IWN_DEPTH_MAX);
+    }
+    json_error_t error;
+    static bool installed;
+    if (!installed) {
+        install();
+        installed = true;
+    }
+    used = 0;
+    json_t *root = json_loadb(line, length, JSON_REJECT_DUPLICATES, &error);
+    if (!json_is_object(root)) {
+        const char *reason = root == NULL ? error.text : "it is not an object";
+        return refuse(out_refusal, IWN_BAD_JSON, "not one JSON object on one line: %s", quotable(reason, "unreadable"));
+    }
+    if (!read_id(root, &out_request->id, out_refusal) || !read_cmd(root, &out_request->cmd, out_refusal) ||
+        !read_fields(root, out_request, out_refusal) || !is_complete(root, out_request, out_refusal)) {
+        return false;
+    }
+    out_request->has_current = json_object_get(root, "left_mA") != NULL;
+    return true;
+}

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: MIT
+// libiwheel-client reading JSON: the same objects as jansson takes, and what stands in them.
+#include "iwheel_client/client.h"
+#include "json.h"
+
+#include "unity.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define WHEEL(more)                                                                                                    \
+    "{\"heard\":true,\"at_rest\":false,\"speed_mm_s\":-210,\"applied_mm_s\":null,\"commanded_mm_s\":300," more         \
+    "\"distance_mm\":5000000000,\"battery_dV\":243,\"temperature_degC\":-3,\"speed_age_ms\":3,\"force_age_ms\":29}"
+static const char STATUS[] =
+    "{\"id\":2,\"ok\":true,\"t_us\":99000000,\"state\":\"armed\",\"cause\":null,\"lease\":{\"holder\":7,\"name\":"
+    "\"\\u001b[2J \\\"x\\\\\","
+    "\"remaining_ms\":120},\"bus\":{\"state\":\"active\"},\"estop\":{\"state\":\"released\"},"
+    "\"left\":" WHEEL("\"force_validity\":\"valid\",\"force_net_mN\":-120,") ",\"right\":" WHEEL(
+        "\"force_validity\":\"saturated\",\"force_net_mN\":-99,") ",\"warnings\":[\"\xc3\xa4\",1.5e3,[],{}]}";
+
+static iwc_t *gateway;
+
+void setUp(void) {
+    gateway = iwc_new();
+}
+
+void tearDown(void) {
+    iwc_free(gateway);
+}
+
+static iwc_message_t message_of(const char *text) {
+    return (iwc_message_t){.text = text, .length = strlen(text)};
+}
+
+static bool jansson_takes(const char *text, size_t length) {
+    json_t *value = json_loadb(text, length, JSON_REJECT_DUPLICATES, NULL);
+    const bool object = json_is_object(value);
+    json_decref(value);
+    return object;
+}
+
+static void compare(const char *text, size_t length) {
+    if (iwc_json_is_object(text, length) != jansson_takes(text, length)) {
+        char why[200];
+        (void)snprintf(why, sizeof(why), "%.*s", (length < 190) ? (int)length : 190, text);
+        TEST_ASSERT_EQUAL_MESSAGE(jansson_takes(text, length), iwc_json_is_object(text, length), why);
+    }
+}
+
+static void test_json_every_cut_of_a_snapshot_is_judged_as_by_jansson(void) {
+    for (size_t length = 0; length < sizeof(STATUS); length++) {
+        compare(STATUS, length);
+    }
+}
+
+static void test_json_every_change_of_a_byte_is_judged_as_by_jansson(void) {
+    static const char bytes[] = "\"\\{}[],:0-.eE+ x\x01\x7f\xc3\xa4\xed\xf5\nnu/";
+    char text[sizeof(STATUS)];
+    unsigned taken = 0;
+    for (size_t at = 0; at + 1U < sizeof(STATUS); at++) {
+        for (size_t i = 0; i + 1U < sizeof(bytes); i++) {
+            memcpy(text, STATUS, sizeof(STATUS));
+            text[at] = bytes[i];
+            compare(text, sizeof(STATUS) - 1U);
+            taken += iwc_json_is_object(text, sizeof(STATUS) - 1U) ? 1U : 0U;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN(1000, taken); // Both sides saw good ones too.
+}
+
+static void test_json_hard_cases_are_judged_as_by_jansson(void) {
+    static const char *const texts[] = {"{}",
+                                        " {} ",
+                                        "{ }",
+                                        "[]",
+                                        "1",
+                                        "",
+                                        " ",
+                                        "{\"a\":1,}",
+                                        "{,}",
+                                        "{\"a\"}",
+                                        "{\"a\":}",
+                                        "{\"a\":01}",
+                                        "{\"a\":-}",
+                                        "{\"a\":-0}",
+                                        "{\"a\":1.}",
+                                        "{\"a\":.5}",
+                                        "{\"a\":1e}",
+                                        "{\"a\":1e+5}",
+                                        "{\"a\":1E-5}",
+                                        "{\"a\":+1}",
+                                        "{\"a\":NaN}",
+                                        "{\"a\":tru}",
+                                        "{\"a\":truex}",
+                                        "{\"a\":[1,]}",
+                                        "{\"a\":[,]}",
+                                        "{\"a\":[1 2]}",
+                                        "{\"a\":\"\\x\"}",
+                                        "{\"a\":\"\\u12\"}",
+                                        "{\"a\":\"\\u12g4\"}",
+                                        "{\"a\":\"\t\"}",
+                                        "{\"a\":\"\xc0\x80\"}",
+                                        "{\"a\":\"\xe0\x9f\xbf\"}",
+                                        "{\"a\":\"\xed\xa0\x80\"}",
+                                        "{\"a\":\"\xf4\x90\x80\x80\"}",
+                                        "{\"a\":\"\xf0\x8f\xbf\xbf\"}",
+                                        "{\"a\":\"\xf0\x9f\x9a\xb6\"}",
+                                        "{\"a\":\"\xe2\x82\"}",
+                                        "{\"a\":1,\"a\":2}",
+                                        "{\"a\":{\"b\":1},\"b\":{\"b\":1}}",
+                                        "{\"a\":[{\"b\":1,\"b\":1}]}",
+                                        "{}{}",
+                                        "{} x",
+                                        "{'a':1}",
+                                        "{\"a\":1 \"b\":2}",
+                                        "{\"a\" : 1 , \"b\" : [ ] }",
+                                        "\xef\xbb\xbf{}"};
+    for (size_t i = 0; i < sizeof(texts) / sizeof(texts[0]); i++) {
+        compare(texts[i], strlen(texts[i]));
+    }
+}
+
+static void test_json_a_nul_stands_nowhere(void) {
+    char text[sizeof(STATUS)];
+    for (size_t at = 0; at < sizeof(STATUS); at++) {
+        memcpy(text, STATUS, sizeof(STATUS));
+        text[at] = '\0';
+        TEST_ASSERT_FALSE(iwc_json_is_object(text, sizeof(STATUS) - ((at + 1U < sizeof(STATUS)) ? 1U : 0U)));
+    }
+}
+
+static void test_json_depth_is_bounded(void) {
+    char text[200] = "{\"a\":";
+    const char *const inner = text + 5;
+    for (unsigned depth = 1; depth < 40; depth++) {
+        memset(text + 5, '[', depth);
+        memset(text + 5 + depth, ']', depth);
+        text[5 + 2U * depth] = '}';
+        TEST_ASSERT_EQUAL(depth < IWC_JSON_DEPTH, iwc_json_is_object(text, 6U + 2U * depth));
+    }
+    TEST_ASSERT_EQUAL_CHAR('[', *inner);
+}
+
+static void test_json_many_keys_cost_no_more_than_their_length(void) {
+    static char text[IWC_LINE_MAX];
+    size_t used = (size_t)snprintf(text, sizeof(text), "{\"a\":1");
+    for (unsigned i = 0; used < sizeof(text) - 30U; i++) {
+        used += (size_t)snprintf(text + used, sizeof(text) - used, ",\"%x\":0", i + 0x10U);
+    }
+    used += (size_t)snprintf(text + used, sizeof(text) - used, ",\"a\":2}");
+    TEST_ASSERT_FALSE(iwc_json_is_object(text, used)); // The first keys are remembered to the end.
+}
+
+static void test_field_integers_are_whole_and_fit(void) {
+    const iwc_message_t message =
+        message_of("{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"c\":9223372036854775808,\"d\":1.0,\"e\":"
+                   "null,\"f\":true,\"g\":\"1\",\"h\":1e2,"
+                   "\"i\":{\"a\":5},\"j\":-9223372036854775809,\"k\":-0}");
+    static const char *const unknown[] = {"c", "d", "e", "f", "g", "h", "i", "j", "x", "i.b", "a.b", "i.a.b", ""};
+    TEST_ASSERT_EQUAL_INT64(INT64_MAX, iwc_integer(&message, "a").value);
+    TEST_ASSERT_EQUAL_INT64(INT64_MIN, iwc_integer(&message, "b").value);
+    TEST_ASSERT_EQUAL_INT64(5, iwc_integer(&message, "i.a").value);
+    TEST_ASSERT_TRUE(iwc_integer(&message, "k").known);
+    TEST_ASSERT_EQUAL_INT64(1, iwc_truth(&message, "f").value);
+    TEST_ASSERT_FALSE(iwc_truth(&message, "e").known);
+    for (size_t i = 0; i < sizeof(unknown) / sizeof(unknown[0]); i++) {
+        TEST_ASSERT_FALSE_MESSAGE(iwc_integer(&message, unknown[i]).known, unknown[i]);
+        TEST_ASSERT_EQUAL_INT64(0, iwc_integer(&message, unknown[i]).value);
+    }
+}
+
+static void test_field_texts_move_no_terminal_and_are_cut_between_characters(void) {
+    const iwc_message_t message = message_of(STATUS);
+    const iwc_message_t umlauts = message_of("{\"a\":\"\xc3\xa4\xc3\xa4\\u001b\"}");
+    char text[20];
+    TEST_ASSERT_TRUE(iwc_text(&message, "lease.name", text, sizeof(text)));
+    TEST_ASSERT_EQUAL_STRING("\\u001b[2J \"x\\", text);
+    TEST_ASSERT_TRUE(iwc_text(&umlauts, "a", text, 4));
+    TEST_ASSERT_EQUAL_STRING("\xc3\xa4", text);
+    TEST_ASSERT_TRUE(iwc_text(&umlauts, "a", text, 10));
+    TEST_ASSERT_EQUAL_STRING("\xc3\xa4\xc3\xa4", text);
+    TEST_ASSERT_FALSE(iwc_text(&message, "cause", text, sizeof(text)));
+    TEST_ASSERT_EQUAL_STRING("", text);
+    TEST_ASSERT_TRUE(iwc_is(&message, "state", "armed"));
+    TEST_ASSERT_FALSE(iwc_is(&message, "state", "arme"));
+    TEST_ASSERT_FALSE(iwc_is(&message, "t_us", "99000000"));
+}
+
+static void test_field_json_is_what_stands_there(void) {
+    size_t length = 0;
+    const iwc_message_t message = message_of(STATUS);
+    const char *bus = iwc_json(&message, "bus", &length);
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"state\":\"active\"}", bus, length);
+    TEST_ASSERT_EQUAL_size_t(18, length);
+    TEST_ASSERT_NULL(iwc_json(&message, "nothing", &length));
+    TEST_ASSERT_EQUAL_size_t(0, length);
+}
+
+static void test_state_of_a_snapshot_is_read_and_unknown_is_not_zero(void) {
+    const iwc_message_t message = message_of(STATUS);
+    iwc_state_t state;
+    TEST_ASSERT_TRUE(iwc_state(gateway, &message, &state));
+    TEST_ASSERT_EQUAL_INT64(99000000, state.t_us);
+    TEST_ASSERT_EQUAL(IWC_ARMED, state.machine);
+    TEST_ASSERT_EQUAL_STRING("", state.cause);
+    TEST_ASSERT_EQUAL_INT64(7, state.holder.value);
+    TEST_ASSERT_FALSE(state.ours); // Not connected: nobody's number.
+    TEST_ASSERT_EQUAL_INT64(120, state.remaining_ms.value);
+    TEST_ASSERT_TRUE(state.estop_released && state.bus_active && state.left.heard && state.right.heard);
+    TEST_ASSERT_TRUE(state.left.at_rest.known);
+    TEST_ASSERT_EQUAL_INT64(0, state.left.at_rest.value);
+    TEST_ASSERT_EQUAL_INT64(-210, state.left.speed_mm_s.value);
+    TEST_ASSERT_EQUAL_INT64(300, state.left.commanded_mm_s.value);
+    TEST_ASSERT_FALSE(state.left.applied_mm_s.known);
+    TEST_ASSERT_EQUAL_INT64(5000000000, state.left.distance_mm.value);
+    TEST_ASSERT_EQUAL_INT64(243, state.left.battery_dV.value);
+    TEST_ASSERT_EQUAL_INT64(-3, state.left.temperature_degC.value);
+    TEST_ASSERT_EQUAL_INT64(3, state.left.speed_age_ms.value);
+    TEST_ASSERT_EQUAL_INT64(29, state.left.force_age_ms.value);
+    TEST_ASSERT_TRUE(state.left.force_net_mN.known);
+    TEST_ASSERT_EQUAL_INT64(-120, state.left.force_net_mN.value);
+    TEST_ASSERT_FALSE(state.right.force_net_mN.known); // Saturated: the figure beside it means nothing.
+    TEST_ASSERT_EQUAL_INT64(0, state.right.force_net_mN.value);
+}
+
+static void test_state_of_what_is_no_snapshot_is_untouched(void) {
+    static const char *const texts[] = {"{\"id\":1,\"ok\":true,\"state\":\"armed\"}",
+                                        "{\"event\":\"bus\",\"state\":\"down\"}"};
+    iwc_state_t state = {.t_us = 42};
+    for (size_t i = 0; i < 2; i++) {
+        const iwc_message_t message = message_of(texts[i]);
+        TEST_ASSERT_FALSE(iwc_state(gateway, &message, &state));
+        TEST_ASSERT_EQUAL_INT64(42, state.t_us);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_json_every_cut_of_a_snapshot_is_judged_as_by_jansson);
+    RUN_TEST(test_json_every_change_of_a_byte_is_judged_as_by_jansson);
+    RUN_TEST(test_json_hard_cases_are_judged_as_by_jansson);
+    RUN_TEST(test_json_a_nul_stands_nowhere);
+    RUN_TEST(test_json_depth_is_bounded);
+    RUN_TEST(test_json_many_keys_cost_no_more_than_their_length);
+    RUN_TEST(test_field_integers_are_whole_and_fit);
+    RUN_TEST(test_field_texts_move_no_terminal_and_are_cut_between_characters);
+    RUN_TEST(test_field_json_is_what_stands_there);
+    RUN_TEST(test_state_of_a_snapshot_is_read_and_unknown_is_not_zero);
+    RUN_TEST(test_state_of_what_is_no_snapshot_is_untouched);
+    return UNITY_END();
+}

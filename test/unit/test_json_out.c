@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+// The writer of replies and events: the same bytes as a writer that goes byte by byte, and never one too many.
+#include "iwheel_northbound/json_out.h"
+#include "unity.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+static char line[512];
+static iwn_out_t json;
+
+void setUp(void) {
+    memset(line, 0x5A, sizeof line);
+    iwn_out_init(&json, line, sizeof line);
+}
+
+void tearDown(void) {}
+
+static void expect(const char *text) {
+    TEST_ASSERT_FALSE(json.overflow);
+    TEST_ASSERT_EQUAL_UINT(strlen(text), json.length);
+    TEST_ASSERT_EQUAL_STRING_LEN(text, line, json.length);
+}
+
+static void test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8(void) {
+    iwn_out_init(&json, line, sizeof line);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_text(&json, "t", "\x1b[2J\xC2\x9B\xE2\x80\xAE\xE2\x80\xA8\xD8\x9C\xE2\x81\xA9\x9B\xE2\x82\xAC\xE2\x82");
+    iwn_out_close(&json, '}');
+    line[iwn_out_finish(&json)] = '\0';
+    TEST_ASSERT_EQUAL_STRING(
+        "{\"t\":\"\\u001B[2J\\u009B\\u202E\\u2028\\u061C\\u2069\\uFFFD\xE2\x82\xAC\\uFFFD\\uFFFD\"}\n", line);
+}
+
+static void test_json_escapes_and_separates(void) {
+    iwn_out_init(&json, line, sizeof line);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_int(&json, "low", INT64_MIN);
+    iwn_out_text(&json, "t", "a\"b\\c\n\x7f\xE2\x82\xAC");
+    iwn_out_open(&json, "list", '[');
+    iwn_out_bool(&json, NULL, true);
+    iwn_out_null(&json, NULL);
+    iwn_out_close(&json, ']');
+    iwn_out_open(&json, "empty", '{');
+    iwn_out_close(&json, '}');
+    iwn_out_known(&json, "k", false, 5);
+    iwn_out_known(&json, "l", true, 5);
+    iwn_out_text(&json, "n", NULL);
+    iwn_out_close(&json, '}');
+    const size_t length = iwn_out_finish(&json);
+    line[length] = '\0';
+    TEST_ASSERT_EQUAL_STRING(
+        "{\"low\":-9223372036854775808,\"t\":\"a\\\"b\\\\c\\u000A\\u007F\xE2\x82\xAC\",\"list\":[true,null],"
+        "\"empty\":{},\"k\":null,\"l\":5,\"n\":null}\n",
+        line);
+}
+
+static void test_json_that_does_not_fit_is_no_line_at_any_size(void) {
+    for (size_t size = 1; size <= 64U; size++) {
+        memset(line, 0x5A, sizeof line);
+        iwn_out_init(&json, line, size);
+        iwn_out_open(&json, NULL, '{');
+        iwn_out_text(&json, "event", "lost");
+        iwn_out_close(&json, '}');
+        const size_t whole = strlen("{\"event\":\"lost\"}\n");
+        TEST_ASSERT_EQUAL_UINT(size > whole ? whole : 0U, iwn_out_finish(&json));
+        for (size_t i = size; i < sizeof line; i++) {
+            TEST_ASSERT_EQUAL_HEX8(0x5A, line[i]);
+        }
+    }
+}
+
+static void test_json_number_is_written_as_printf_writes_it(void) {
+    int64_t number = 1;
+    for (unsigned digits = 1; digits < 19U; digits++) {
+        number *= 10;
+        for (int64_t off = -101; off <= 101; off++) {
+            char wanted[64];
+            setUp();
+            iwn_out_int(&json, "n", number + off);
+            iwn_out_int(&json, NULL, -(number + off));
+            (void)snprintf(wanted, sizeof wanted, "\"n\":%" PRId64 ",%" PRId64, number + off, -(number + off));
+            expect(wanted);
+        }
+    }
+    setUp();
+    iwn_out_int(&json, NULL, INT64_MAX);
+    iwn_out_int(&json, NULL, 4294967296);
+    iwn_out_int(&json, NULL, 4000000000000000007);
+    expect("9223372036854775807,4294967296,4000000000000000007");
+}
+
+/// As the RFC and text.h say, one byte after the other, for bytes below 0x80.
+static void write_slowly(const char *text, char *out) {
+    out += sprintf(out, "\"t\":\"");
+    for (; *text != '\0'; text++) {
+        if (*text == '"' || *text == '\\') {
+            out += sprintf(out, "\\%c", *text);
+        } else if (*text < 0x20 || *text == 0x7F) {
+            out += sprintf(out, "\\u%04X", (unsigned)*text);
+        } else {
+            out += sprintf(out, "%c", *text);
+        }
+    }
+    (void)sprintf(out, "\"");
+}
+
+static void test_json_every_byte_at_every_place_of_a_text_is_escaped_as_byte_by_byte(void) {
+    char text[32];
+    char wanted[256];
+    for (size_t length = 1; length < 20U; length++) {
+        for (size_t at = 0; at < length; at++) {
+            for (int byte = 1; byte < 0x80; byte++) {
+                setUp();
+                memset(text, 'x', length);
+                text[length] = '\0';
+                text[at] = (char)byte;
+                iwn_out_text(&json, "t", text);
+                write_slowly(text, wanted);
+                expect(wanted);
+            }
+        }
+    }
+}
+
+static void test_json_every_single_byte_beyond_ascii_is_a_replacement_at_every_place(void) {
+    char text[32];
+    for (size_t at = 0; at < 18U; at++) {
+        for (int byte = 0x80; byte < 0x100; byte++) {
+            setUp();
+            memset(text, 'x', 18);
+            text[18] = '\0';
+            text[at] = (char)byte;
+            iwn_out_text(&json, NULL, text);
+            TEST_ASSERT_EQUAL_UINT(2U + 17U + 6U, json.length);
+            TEST_ASSERT_EQUAL_STRING_LEN("\\uFFFD", &line[1U + at], 6U);
+        }
+    }
+}
+
+static void test_json_text_beyond_ascii_is_kept(void) {
+    iwn_out_text(&json, "t", "a\xC3\xA9\xE2\x82\xAC\xF0\x9F\x98\x80 12345678 \xC3\xA9");
+    expect("\"t\":\"a\xC3\xA9\xE2\x82\xAC\xF0\x9F\x98\x80 12345678 \xC3\xA9\"");
+}
+
+static void test_json_every_element_fits_to_the_last_byte_and_not_one_less(void) {
+    char whole[512];
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_int(&json, "int", -1234567);
+    iwn_out_bool(&json, "yes", true);
+    iwn_out_text(&json, "text", "plain");
+    iwn_out_text(&json, "escaped", "a\n\"b\xFF");
+    iwn_out_null(&json, "null");
+    iwn_out_span(&json, iwn_span("whole"), iwn_span("{\"a\":[1,2]}"));
+    iwn_out_close(&json, '}');
+    const size_t length = iwn_out_finish(&json);
+    memcpy(whole, line, length);
+    for (size_t size = 1; size <= length + 1U; size++) {
+        memset(line, 0x5A, sizeof line);
+        iwn_out_init(&json, line, size);
+        iwn_out_open(&json, NULL, '{');
+        iwn_out_int(&json, "int", -1234567);
+        iwn_out_bool(&json, "yes", true);
+        iwn_out_text(&json, "text", "plain");
+        iwn_out_text(&json, "escaped", "a\n\"b\xFF");
+        iwn_out_null(&json, "null");
+        iwn_out_span(&json, iwn_span("whole"), iwn_span("{\"a\":[1,2]}"));
+        iwn_out_close(&json, '}');
+        TEST_ASSERT_EQUAL_UINT((size > length) ? length : 0U, iwn_out_finish(&json));
+        TEST_ASSERT_EQUAL_HEX8(0x5A, line[size]);
+    }
+    TEST_ASSERT_EQUAL_STRING_LEN(whole, line, length);
+    TEST_ASSERT_EQUAL_STRING_LEN(
+        "{\"int\":-1234567,\"yes\":true,\"text\":\"plain\",\"escaped\":\"a\\u000A\\\"b\\uFFFD\",\"null\":null,"
+        "\"whole\":{\"a\":[1,2]}}\n",
+        line, length);
+}
+
+static void test_json_frame_has_its_bytes_its_kind_and_its_flags(void) {
+    const iw_can_frame_t frame = {.id = 0x10AU, .dlc = 3, .kind = (uint8_t)IW_CAN_ECHO, .data = {0x00, 0x9F, 0xA0}};
+    iwn_out_frame(&frame, 17, &json);
+    expect("\"t_us\":17,\"id\":266,\"dlc\":3,\"data\":\"009FA0\",\"kind\":\"echo\",\"flags\":[]");
+    setUp();
+    const iw_can_frame_t odd = {.id = IW_CAN_EXTENDED | IW_CAN_REMOTE | 0x1FFFFFFFU, .dlc = 0};
+    iwn_out_frame(&odd, 0, &json);
+    expect("\"t_us\":0,\"id\":536870911,\"dlc\":0,\"data\":\"\",\"kind\":\"received\",\"flags\":[\"extended\","
+           "\"remote\"]");
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_json_shows_by_number_what_moves_a_terminal_and_is_never_broken_utf8);
+    RUN_TEST(test_json_escapes_and_separates);
+    RUN_TEST(test_json_that_does_not_fit_is_no_line_at_any_size);
+    RUN_TEST(test_json_number_is_written_as_printf_writes_it);
+    RUN_TEST(test_json_every_byte_at_every_place_of_a_text_is_escaped_as_byte_by_byte);
+    RUN_TEST(test_json_every_single_byte_beyond_ascii_is_a_replacement_at_every_place);
+    RUN_TEST(test_json_text_beyond_ascii_is_kept);
+    RUN_TEST(test_json_every_element_fits_to_the_last_byte_and_not_one_less);
+    RUN_TEST(test_json_frame_has_its_bytes_its_kind_and_its_flags);
+    return UNITY_END();
+}

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+// The words of the protocol: the sentence of `why`, the names of the closed lists, and texts put together without stdio.
+#include "iwheel_northbound/text.h"
+#include "iwheel_northbound/why.h"
+#include "iwheel_northbound/words.h"
+#include "unity.h"
+
+#include <string.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static const iwn_why_context_t context = {"\"joystick\" (client 3, pid 9)", "kerb", "unix:/e", "unix:/b"};
+
+static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
+    static char text[IWN_SENTENCE_SIZE];
+    iw_stop_t stop;
+    memset(&stop, 0, sizeof stop);
+    stop.number = 1;
+    stop.cause = cause;
+    stop.sides = sides;
+    stop.detail = detail;
+    stop.from = IW_STATE_ARMED;
+    stop.at_us = 12345678;
+    stop.latched = cause < IW_CAUSE_LOOP_LATE;
+    stop.applied.wheel[IW_LEFT].speed_mm_s = 300;
+    stop.applied.wheel[IW_RIGHT].speed_mm_s = -299;
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    return text;
+}
+
+static void test_why_names_cause_numbers_time_and_cure(void) {
+    TEST_ASSERT_EQUAL_STRING(
+        "left wheel not heard for 53 ms while driving 300/-299 mm/s; zero at once, latched at 12.345 s; "
+        "check the wheel's power and cable, then: iwheelctl reset",
+        sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_LEFT, 53));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_WHEEL_LOST, IW_SIDES_BOTH, UINT32_MAX), "both wheels never heard"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_SECOND_MASTER, 0, 266), "id 266 (0x10A)"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_SOFTWARE, 0, 3), "\"joystick\" (client 3, pid 9) (\"kerb\")"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_LINE, 0, 1), "e-stop unix:/e pressed"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_ESTOP_LINE, 0, 2), "unreadable"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_BUS_DOWN, 0, IW_BUS_OFF), "bus unix:/b is bus-off"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LEASE_LOST, 0, 200), "no drive command for 200 ms"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LEASE_LOST, 0, 200), "ramped to zero at 12.345 s"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LOOP_LATE, 0, 130), "held up for 130 ms"));
+    TEST_ASSERT_NOT_NULL(
+        strstr(sentence(IW_CAUSE_WHEEL_BLOCKED, IW_SIDES_RIGHT, 12), "right wheel blocked: only 12 mm/s"));
+}
+
+static void test_why_after_a_crash_does_not_say_what_nobody_knows(void) {
+    iw_stop_t stop;
+    char text[IWN_SENTENCE_SIZE];
+    memset(&stop, 0, sizeof stop);
+    stop.number = 1;
+    stop.cause = IW_CAUSE_RESTART;
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("the gateway before this one died while the wheels were armed; zero at once at 0.000 s; "
+                             "look for the crash in the log, then arm again",
+                             text);
+}
+
+static void test_why_has_a_sentence_and_a_name_for_every_cause(void) {
+    for (unsigned cause = IW_CAUSE_ESTOP_LINE; cause < IW_CAUSES; cause++) {
+        const char *text = sentence((iw_cause_t)cause, IW_SIDES_LEFT, 1);
+        TEST_ASSERT_TRUE(strlen(text) > 60U);
+        TEST_ASSERT_NOT_NULL(strstr(text, "12.345 s"));
+        TEST_ASSERT_TRUE(strcmp("unknown", iwn_cause_name((iw_cause_t)cause)) != 0);
+        for (unsigned other = 0; other < cause; other++) {
+            TEST_ASSERT_TRUE(strcmp(iwn_cause_name((iw_cause_t)other), iwn_cause_name((iw_cause_t)cause)) != 0);
+        }
+    }
+    TEST_ASSERT_EQUAL_STRING("unknown", iwn_cause_name((iw_cause_t)IW_CAUSES));
+}
+
+static void test_why_without_a_stop_says_so(void) {
+    char text[IWN_SENTENCE_SIZE];
+    iw_stop_t stop;
+    memset(&stop, 0, sizeof stop);
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("no stop since the gateway started", text);
+}
+
+static void test_names_of_all_refusals_are_errors_of_the_closed_list(void) {
+    for (unsigned refusal = IW_REFUSE_OUT_OF_RANGE; refusal < IW_REFUSALS; refusal++) {
+        const iwn_error_t error = iwn_error_of((iw_refusal_t)refusal);
+        TEST_ASSERT_TRUE(error > IWN_OK && error < IWN_INTERNAL);
+    }
+    TEST_ASSERT_EQUAL_INT(IWN_OK, iwn_error_of(IW_REFUSE_NONE));
+    TEST_ASSERT_EQUAL_INT(IWN_INTERNAL, iwn_error_of((iw_refusal_t)999));
+    for (unsigned error = 0; error < IWN_ERRORS; error++) {
+        TEST_ASSERT_TRUE(strcmp("unknown", iwn_error_name((iwn_error_t)error)) != 0);
+    }
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        TEST_ASSERT_TRUE(strcmp("unknown", iwn_ledger_item_name((iw_ledger_item_t)item)) != 0);
+    }
+    TEST_ASSERT_EQUAL_STRING("offset_doubted", iwn_force_validity_name(IW_FORCE_OFFSET_DOUBTED));
+    TEST_ASSERT_EQUAL_STRING("unreadable", iwn_estop_name(-1, true));
+    TEST_ASSERT_EQUAL_STRING("none", iwn_estop_name(0, false));
+}
+
+static void test_why_shows_three_decimals_of_any_time(void) {
+    static const struct {
+        iw_time_us_t at_us;
+        const char *shown;
+    } cases[] = {{0, "at 0.000 s"},
+                 {7999, "at 0.007 s"},
+                 {42000, "at 0.042 s"},
+                 {999999, "at 0.999 s"},
+                 {1234567890123, "at 1234567.890 s"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[IWN_SENTENCE_SIZE];
+        const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_SHUTDOWN, .at_us = cases[i].at_us};
+        iwn_why_sentence(&stop, &context, text, sizeof text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, cases[i].shown), text);
+    }
+}
+
+static void test_why_that_does_not_fit_is_cut_and_ends(void) {
+    char text[24];
+    const iw_stop_t stop = {.number = 1, .cause = IW_CAUSE_CLIENT_STOP};
+    memset(text, 'x', sizeof text);
+    iwn_why_sentence(&stop, &context, text, 20U);
+    TEST_ASSERT_EQUAL_STRING("\"joystick\" (client ", text);
+    TEST_ASSERT_EQUAL_HEX8('x', text[20]);
+}
+
+static void test_text_is_put_together_and_ends_at_any_size(void) {
+    char buffer[16];
+    for (size_t size = 1; size < sizeof buffer; size++) {
+        memset(buffer, 'x', sizeof buffer);
+        iwn_text_t text = iwn_text_begin(buffer, size);
+        IWN_TEXT_JOIN(&text, "ab", "", "c");
+        iwn_text_int(&text, -12);
+        iwn_text_hex(&text, 0x1AFU, 4U);
+        const size_t fits = (size - 1U < 10U) ? size - 1U : 10U;
+        TEST_ASSERT_EQUAL_UINT(fits, text.length);
+        TEST_ASSERT_EQUAL_STRING_LEN("abc-1201AF", buffer, fits);
+        TEST_ASSERT_EQUAL_HEX8('\0', buffer[fits]);
+        TEST_ASSERT_EQUAL_HEX8('x', buffer[size]);
+    }
+}
+
+static void test_text_of_every_code_point_reads_as_it_was_written(void) {
+    for (uint32_t code_point = 1; code_point <= 0x10FFFFU; code_point++) {
+        char bytes[5] = "";
+        size_t read;
+        if (code_point >= 0xD800U && code_point <= 0xDFFFU) {
+            continue;
+        }
+        const size_t length = iwn_utf8(code_point, bytes);
+        TEST_ASSERT_EQUAL_HEX32(code_point, iwn_plain_read(bytes, &read));
+        TEST_ASSERT_EQUAL_UINT(length, read);
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_why_names_cause_numbers_time_and_cure);
+    RUN_TEST(test_why_after_a_crash_does_not_say_what_nobody_knows);
+    RUN_TEST(test_why_has_a_sentence_and_a_name_for_every_cause);
+    RUN_TEST(test_why_without_a_stop_says_so);
+    RUN_TEST(test_names_of_all_refusals_are_errors_of_the_closed_list);
+    RUN_TEST(test_why_shows_three_decimals_of_any_time);
+    RUN_TEST(test_why_that_does_not_fit_is_cut_and_ends);
+    RUN_TEST(test_text_is_put_together_and_ends_at_any_size);
+    RUN_TEST(test_text_of_every_code_point_reads_as_it_was_written);
+    return UNITY_END();
+}
