@@ -12,7 +12,7 @@ static void put(pretend_wheels_t *self, const iw_can_frame_t *frame) {
 }
 
 void pretend_wheels_run(pretend_wheels_t *self) {
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         const int16_t rpm = (int16_t)(self->speed_mm_s[side] * 60 * 1000 / UM_PER_TURN);
         const iw_codec_wheel_t told = {.speed = {.speed_rpm = rpm}};
         iw_can_frame_t frame;
@@ -44,8 +44,8 @@ static int receive(void *context, iw_can_frame_t *out_frame) {
         return 0;
     }
     *out_frame = self->queue[0];
-    --self->count;
-    for (unsigned i = 0; i < self->count; ++i) {
+    self->count--;
+    for (unsigned i = 0; i < self->count; i++) {
         self->queue[i] = self->queue[i + 1U];
     }
     return 1;

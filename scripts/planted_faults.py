@@ -164,6 +164,12 @@ def house(folder, fault):
     return run(sys.executable, folder / "scripts/house.py", folder)
 
 
+def dialect(folder, code):
+    (folder / "app").mkdir()
+    (folder / "app/planted.c").write_text(code)
+    return run(SCRIPTS / "dialect.py", "--check", folder)
+
+
 def sizes(_, new):
     spec = importlib.util.spec_from_file_location("size_table", SCRIPTS / "size_table.py")
     module = importlib.util.module_from_spec(spec)
@@ -274,6 +280,10 @@ CASES = [
     (style, "lizard", "401 lines", CLEAN + "\n" * 395, True),
     (style, "lizard", "no licence line", CLEAN.split("\n", 1)[1], True),
     (style, "lizard", "unfinished", CLEAN + "// " + "TO" + "DO\n", True),
+    (dialect, "python3", "clean", function("    a++;\n    return (a > 1) ? a : 0;\n"), False),
+    (dialect, "python3", "++ before a name", function("    ++a;\n    return a;\n"), True),
+    (dialect, "python3", "a comparison that chooses", function("    return a > 1 ? a : 0;\n"), True),
+    (dialect, "python3", "parentheses around what is no type", function("    return (int)sizeof(a);\n"), True),
     (house, "gcc", "clean", ("port/stm32_stub/lamp.c", "#include", "#include"), False),
     (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\nint iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}'), True),
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),

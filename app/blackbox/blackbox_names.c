@@ -26,7 +26,7 @@ static const char *const names[BLACKBOX_KINDS] = {
 };
 
 const char *blackbox_kind_name(blackbox_kind_t kind) {
-    return (unsigned)kind < BLACKBOX_KINDS ? names[kind] : "unknown";
+    return ((unsigned)kind < BLACKBOX_KINDS) ? names[kind] : "unknown";
 }
 
 blackbox_kind_t blackbox_kind_of(const char *name) {

@@ -5,7 +5,7 @@
 
 static uint64_t capacity_of(uint32_t seconds) {
     const uint64_t wanted = (uint64_t)seconds * BLACKBOX_ENTRIES_PER_S;
-    return wanted > BLACKBOX_ENTRIES_MIN ? wanted : BLACKBOX_ENTRIES_MIN;
+    return (wanted > BLACKBOX_ENTRIES_MIN) ? wanted : BLACKBOX_ENTRIES_MIN;
 }
 
 size_t blackbox_ring_size(uint32_t seconds) {
@@ -31,22 +31,22 @@ uint64_t blackbox_ring_written(const blackbox_ring_t *self) {
 /// The oldest entry that is surely whole: the slot of the one before it may be under the writer's hands.
 static uint64_t oldest(const blackbox_ring_t *self) {
     const uint64_t written = blackbox_ring_written(self);
-    return written >= self->capacity ? written - self->capacity + 1U : 0U;
+    return (written >= self->capacity) ? written - self->capacity + 1U : 0U;
 }
 
 uint64_t blackbox_ring_copy(const blackbox_ring_t *self, uint64_t from, uint64_t to, blackbox_entry_t *out,
                             size_t *out_count) {
     const uint64_t written = blackbox_ring_written(self);
-    const uint64_t end = to < written ? to : written;
-    uint64_t first = from > oldest(self) ? from : oldest(self);
+    const uint64_t end = (to < written) ? to : written;
+    uint64_t first = (from > oldest(self)) ? from : oldest(self);
     for (uint64_t number = first; number < end; number++) {
         out[number - first] = self->entry[number % self->capacity];
     }
     atomic_thread_fence(memory_order_acquire);
     const uint64_t valid = oldest(self); // What was overwritten meanwhile may be torn.
-    const size_t copied = first < end ? (size_t)(end - first) : 0U;
-    const size_t torn = valid <= first ? 0U : valid - first < copied ? (size_t)(valid - first) : copied;
-    (void)memmove(out, out + torn, (copied - torn) * sizeof *out);
+    const size_t copied = (first < end) ? (size_t)(end - first) : 0U;
+    const size_t torn = (valid <= first) ? 0U : (valid - first < copied) ? (size_t)(valid - first) : copied;
+    memmove(out, out + torn, (copied - torn) * sizeof *out);
     first += torn;
     *out_count = copied - torn;
     return first;

@@ -30,7 +30,7 @@ static bool skip_blanks(candump_cursor_t *cursor) {
 static unsigned take_digits(candump_cursor_t *cursor, unsigned counted, int64_t *value) {
     unsigned digits = 0;
     for (; cursor->at < cursor->end && *cursor->at >= '0' && *cursor->at <= '9'; cursor->at++) {
-        *value = digits < counted ? *value * 10 + (*cursor->at - '0') : *value;
+        *value = (digits < counted) ? *value * 10 + (*cursor->at - '0') : *value;
         digits++;
     }
     return digits;
@@ -50,7 +50,7 @@ static const char *parse_time(candump_cursor_t *cursor, candump_t *frame) {
         !candump_take(cursor, ')')) {
         return "the time is not (SECONDS.MICROSECONDS); record with candump -L or iwheelctl record";
     }
-    frame->time_us = seconds * 1000000 + fraction * scale[decimals < 6U ? decimals : 6U];
+    frame->time_us = seconds * 1000000 + fraction * scale[(decimals < 6U) ? decimals : 6U];
     return NULL;
 }
 
@@ -68,7 +68,7 @@ static const char *parse_interface(candump_cursor_t *cursor, candump_t *frame) {
     if (!iwn_plain_text(frame->interface)) {
         return "the interface name holds characters that move a terminal; is the line damaged?";
     }
-    return length == 0U || !skip_blanks(cursor) ? "ends behind the time or the interface; is the line cut?" : NULL;
+    return (length == 0U || !skip_blanks(cursor)) ? "ends behind the time or the interface; is the line cut?" : NULL;
 }
 
 static const char *take_id(candump_t *frame, uint32_t number, unsigned digits) {
@@ -81,7 +81,7 @@ static const char *take_id(candump_t *frame, uint32_t number, unsigned digits) {
     if (digits == STANDARD_DIGITS && number > IW_CAN_ID_MASK) {
         return "a 3-digit id goes up to 7FF; write an extended id with 8 digits";
     }
-    return frame->id > CANDUMP_ID_MASK ? "an extended id goes up to 1FFFFFFF; is the line damaged?" : NULL;
+    return (frame->id > CANDUMP_ID_MASK) ? "an extended id goes up to 1FFFFFFF; is the line damaged?" : NULL;
 }
 
 static const char *parse_id(candump_cursor_t *cursor, candump_t *frame) {
@@ -92,7 +92,7 @@ static const char *parse_id(candump_cursor_t *cursor, candump_t *frame) {
         digits++;
     }
     if (!candump_take(cursor, '#')) {
-        return digits > 0U && (cursor->at == cursor->end || is_blank(*cursor->at))
+        return (digits > 0U && (cursor->at == cursor->end || is_blank(*cursor->at)))
                    ? "no # behind the id: this is candump's screen form; record with candump -L or iwheelctl record"
                    : "no hexadecimal id with a # behind it; is the line damaged?";
     }
@@ -110,7 +110,7 @@ static const char *parse_mark(candump_cursor_t *cursor, candump_t *frame) {
         frame->mark = CANDUMP_SENT;
     }
     (void)skip_blanks(cursor);
-    return cursor->at == cursor->end
+    return (cursor->at == cursor->end)
                ? NULL
                : "something follows the data that is neither R nor T nor a hexadecimal digit; delete it";
 }
@@ -140,14 +140,14 @@ candump_result_t candump_parse(const char *line, size_t length, candump_t *out_f
 
 iw_can_frame_t candump_to_core(const candump_t *frame) {
     iw_can_frame_t core = {.id = frame->id,
-                           .dlc = frame->length < IW_CAN_DATA_MAX ? frame->length : (uint8_t)IW_CAN_DATA_MAX,
-                           .kind = frame->mark == CANDUMP_SENT ? (uint8_t)IW_CAN_ECHO : (uint8_t)IW_CAN_RECEIVED};
+                           .dlc = (frame->length < IW_CAN_DATA_MAX) ? frame->length : (uint8_t)IW_CAN_DATA_MAX,
+                           .kind = (frame->mark == CANDUMP_SENT) ? (uint8_t)IW_CAN_ECHO : (uint8_t)IW_CAN_RECEIVED};
     core.id |= frame->extended ? IW_CAN_EXTENDED : 0U;
     core.id |= frame->remote ? IW_CAN_REMOTE : 0U;
     core.id |= frame->error ? IW_CAN_ERROR : 0U;
-    core.id |= frame->fd && !frame->extended ? IW_CAN_FD : 0U;
+    core.id |= (frame->fd && !frame->extended) ? IW_CAN_FD : 0U;
     if (!frame->remote) {
-        (void)memcpy(core.data, frame->data, core.dlc);
+        memcpy(core.data, frame->data, core.dlc);
     }
     return core;
 }
@@ -156,14 +156,14 @@ candump_t candump_from_core(const iw_can_frame_t *frame, int64_t time_us, const 
     const bool extended = (frame->id & IW_CAN_EXTENDED) != 0U;
     candump_t out = {.time_us = time_us,
                      .id = frame->id & (extended ? CANDUMP_ID_MASK : IW_CAN_ID_MASK),
-                     .mark = frame->kind == (uint8_t)IW_CAN_ECHO ? CANDUMP_SENT : CANDUMP_RECEIVED,
-                     .length = frame->dlc < IW_CAN_DATA_MAX ? frame->dlc : (uint8_t)IW_CAN_DATA_MAX,
+                     .mark = (frame->kind == (uint8_t)IW_CAN_ECHO) ? CANDUMP_SENT : CANDUMP_RECEIVED,
+                     .length = (frame->dlc < IW_CAN_DATA_MAX) ? frame->dlc : (uint8_t)IW_CAN_DATA_MAX,
                      .extended = extended,
                      .remote = (frame->id & IW_CAN_REMOTE) != 0U,
                      .fd = !extended && (frame->id & IW_CAN_FD) != 0U};
     const size_t length = strlen(interface);
-    (void)memcpy(out.data, frame->data, out.length);
-    (void)memcpy(out.interface, interface,
-                 length < CANDUMP_INTERFACE_SIZE ? length : CANDUMP_INTERFACE_SIZE - 1U); // The rest is zero.
+    memcpy(out.data, frame->data, out.length);
+    memcpy(out.interface, interface,
+           (length < CANDUMP_INTERFACE_SIZE) ? length : CANDUMP_INTERFACE_SIZE - 1U); // The rest is zero.
     return out;
 }

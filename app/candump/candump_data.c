@@ -8,11 +8,11 @@ int candump_hex(char digit) {
     if (digit >= 'A' && digit <= 'F') {
         return digit - 'A' + 10;
     }
-    return digit >= 'a' && digit <= 'f' ? digit - 'a' + 10 : -1;
+    return (digit >= 'a' && digit <= 'f') ? digit - 'a' + 10 : -1;
 }
 
 static int next_hex(const candump_cursor_t *cursor, size_t ahead) {
-    return (size_t)(cursor->end - cursor->at) > ahead ? candump_hex(cursor->at[ahead]) : -1;
+    return ((size_t)(cursor->end - cursor->at) > ahead) ? candump_hex(cursor->at[ahead]) : -1;
 }
 
 bool candump_take(candump_cursor_t *cursor, char wanted) {
@@ -84,5 +84,5 @@ const char *candump_parse_data(candump_cursor_t *cursor, candump_t *frame) {
         return parse_remote(cursor, frame);
     }
     const char *why = parse_bytes(cursor, IW_CAN_DATA_MAX, frame);
-    return why != NULL ? why : parse_raw_dlc(cursor, frame);
+    return (why != NULL) ? why : parse_raw_dlc(cursor, frame);
 }

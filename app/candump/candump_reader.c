@@ -18,14 +18,14 @@ void candump_reader_init(candump_reader_t *self, int fd) {
 }
 
 static void fill(candump_reader_t *self) {
-    (void)memmove(self->buffer, &self->buffer[self->begin], self->end - self->begin);
+    memmove(self->buffer, &self->buffer[self->begin], self->end - self->begin);
     self->end -= self->begin;
     self->begin = 0;
     ssize_t got;
     do {
-        got = read(self->fd, &self->buffer[self->end], sizeof(self->buffer) - self->end);
+        got = read(self->fd, &self->buffer[self->end], sizeof self->buffer - self->end);
     } while (got < 0 && errno == EINTR);
-    self->end += got > 0 ? (size_t)got : 0U;
+    self->end += (got > 0) ? (size_t)got : 0U;
     self->ended = got <= 0;
     self->failed = got < 0;
 }
@@ -34,7 +34,7 @@ static void fill(candump_reader_t *self) {
 static const char *find_newline(candump_reader_t *self) {
     for (;;) {
         const size_t there = self->end - self->begin;
-        const size_t looked = there < CANDUMP_READ_MAX ? there : CANDUMP_READ_MAX;
+        const size_t looked = (there < CANDUMP_READ_MAX) ? there : CANDUMP_READ_MAX;
         const char *newline = memchr(&self->buffer[self->begin], '\n', looked);
         if (newline != NULL || self->ended || looked == CANDUMP_READ_MAX) {
             return newline;
@@ -47,7 +47,7 @@ static void skip_line(candump_reader_t *self) {
     const char *newline = NULL;
     while (newline == NULL && (self->begin < self->end || !self->ended)) {
         newline = memchr(&self->buffer[self->begin], '\n', self->end - self->begin);
-        self->begin = newline != NULL ? (size_t)(newline - self->buffer) + 1U : self->end;
+        self->begin = (newline != NULL) ? (size_t)(newline - self->buffer) + 1U : self->end;
         if (newline == NULL) {
             fill(self);
         }
@@ -73,9 +73,10 @@ static candump_read_t read_rest(candump_reader_t *self, candump_t *frame) {
     const char *why = "";
     const candump_result_t result = candump_parse(&self->buffer[self->begin], there, frame, &why);
     self->begin = self->end;
-    return result == CANDUMP_EMPTY ? CANDUMP_READ_END
-                                   : tell_bad(self, "the last line has no line end, so it may be cut and is left out; "
-                                                    "if it is whole, add the line end");
+    return (result == CANDUMP_EMPTY)
+               ? CANDUMP_READ_END
+               : tell_bad(self, "the last line has no line end, so it may be cut and is left out; "
+                                "if it is whole, add the line end");
 }
 
 candump_read_t candump_reader_next(candump_reader_t *self, candump_t *out_frame) {
@@ -90,7 +91,7 @@ candump_read_t candump_reader_next(candump_reader_t *self, candump_t *out_frame)
         self->line++;
         const candump_result_t result = candump_parse(line, length, out_frame, &self->why);
         if (result != CANDUMP_EMPTY) {
-            return result == CANDUMP_FRAME ? CANDUMP_READ_FRAME : CANDUMP_READ_BAD;
+            return (result == CANDUMP_FRAME) ? CANDUMP_READ_FRAME : CANDUMP_READ_BAD;
         }
     }
 }

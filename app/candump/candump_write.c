@@ -51,7 +51,7 @@ size_t candump_write(const candump_t *frame, char out_line[CANDUMP_LINE_SIZE]) {
     }
     if (frame->mark != CANDUMP_UNMARKED) {
         out_line[length++] = ' ';
-        out_line[length++] = frame->mark == CANDUMP_SENT ? 'T' : 'R';
+        out_line[length++] = (frame->mark == CANDUMP_SENT) ? 'T' : 'R';
     }
     out_line[length++] = '\n';
     out_line[length] = '\0';

@@ -12,16 +12,16 @@
 #define WIDTH 80U
 
 static const char *topic_choice(unsigned number) {
-    return number < (unsigned)IWN_TOPICS ? iwn_topic_name((iwn_topic_t)number) : NULL;
+    return (number < (unsigned)IWN_TOPICS) ? iwn_topic_name((iwn_topic_t)number) : NULL;
 }
 
 static const char *side_choice(unsigned number) {
     static const char *const sides[] = {"left", "right"};
-    return number < 2U ? sides[number] : NULL;
+    return (number < 2U) ? sides[number] : NULL;
 }
 
 static const char *item_choice(unsigned number) {
-    return number < (unsigned)IW_LEDGER_ITEMS ? iwn_ledger_item_name((iw_ledger_item_t)number) : NULL;
+    return (number < (unsigned)IW_LEDGER_ITEMS) ? iwn_ledger_item_name((iw_ledger_item_t)number) : NULL;
 }
 
 static const char *verb_choice(unsigned number);
@@ -149,10 +149,10 @@ static const verb_t verbs[] = {
           "completion in a shell\n"),
      .no_json = "help is text for people; it has no --json", .choice = verb_choice},
 };
-#define VERBS (sizeof(verbs) / sizeof(verbs[0]))
+#define VERBS (sizeof verbs / sizeof verbs[0])
 
 static const char *verb_choice(unsigned number) {
-    return number < VERBS ? verbs[number].name : NULL;
+    return (number < VERBS) ? verbs[number].name : NULL;
 }
 
 const verb_t *help_find(const char *name) {
@@ -170,16 +170,16 @@ int help_unknown(const char *name) {
     size_t best_distance = GW_WORD_STRANGE;
     for (size_t i = 0; i < VERBS; i++) {
         const size_t far = gw_word_distance(name, verbs[i].name);
-        best = far < best_distance ? verbs[i].name : best;
-        best_distance = far < best_distance ? far : best_distance;
+        best = (far < best_distance) ? verbs[i].name : best;
+        best_distance = (far < best_distance) ? far : best_distance;
         const size_t used = strlen(known);
-        (void)snprintf(&known[used], sizeof(known) - used, "%s%s", i > 0 ? " " : "", verbs[i].name);
+        (void)snprintf(&known[used], sizeof known - used, "%s%s", (i > 0) ? " " : "", verbs[i].name);
     }
     if (name[0] == '\0') {
         return ctl_fail(CTL_USAGE, "no verb given; known are: %s", known);
     }
-    return best != NULL ? ctl_fail(CTL_USAGE, "unknown verb \"%s\"; did you mean %s? All: iwheelctl help", name, best)
-                        : ctl_fail(CTL_USAGE, "unknown verb \"%s\"; known are: %s", name, known);
+    return (best != NULL) ? ctl_fail(CTL_USAGE, "unknown verb \"%s\"; did you mean %s? All: iwheelctl help", name, best)
+                          : ctl_fail(CTL_USAGE, "unknown verb \"%s\"; known are: %s", name, known);
 }
 
 /// Where a line that goes on is indented to: below what an option's name is explained by.
@@ -196,8 +196,8 @@ static size_t hang_of(const char *line, size_t length) {
 static void print_wrapped(const char *text, size_t hang, FILE *out) {
     while (*text != '\0') {
         size_t left = strcspn(text, "\n");
-        const char *next = text + left + (text[left] == '\n' ? 1U : 0U);
-        const size_t indent = hang > 0 ? hang : hang_of(text, left);
+        const char *next = text + left + ((text[left] == '\n') ? 1U : 0U);
+        const size_t indent = (hang > 0) ? hang : hang_of(text, left);
         size_t room = WIDTH;
         while (left > room) {
             size_t cut = room;
@@ -238,15 +238,15 @@ static void print_choices(const verb_t *verb, FILE *out) {
     char line[512] = "ITEM  ";
     for (unsigned i = 0; verb->choice(i) != NULL; i++) {
         const size_t used = strlen(line);
-        (void)snprintf(&line[used], sizeof(line) - used, "%s%s", i > 0 ? ", " : "", verb->choice(i));
+        (void)snprintf(&line[used], sizeof line - used, "%s%s", (i > 0) ? ", " : "", verb->choice(i));
     }
     print_wrapped(line, 6U, out);
 }
 
 void help_print_verb(const verb_t *verb, FILE *out) {
     char usage[256];
-    (void)snprintf(usage, sizeof(usage), "Usage: iwheelctl [--socket PATH]%s %s%s%s",
-                   verb->no_json == NULL ? " [--json]" : "", verb->name, verb->words[0] != '\0' ? " " : "",
+    (void)snprintf(usage, sizeof usage, "Usage: iwheelctl [--socket PATH]%s %s%s%s",
+                   (verb->no_json == NULL) ? " [--json]" : "", verb->name, (verb->words[0] != '\0') ? " " : "",
                    verb->words);
     print_wrapped(usage, 7U, out);
     (void)fprintf(out, "\n%s: %s\n", verb->name, verb->summary);
@@ -274,7 +274,7 @@ static void list_words(const verb_t *verb, FILE *out) {
     if (strncmp(verb->words, "[IFACE", 6U) == 0) {
         (void)fputs("BUS\n", out);
     }
-    (void)fputs(verb->no_json == NULL ? "--json\n--socket\n--help\n" : "--socket\n--help\n", out);
+    (void)fputs((verb->no_json == NULL) ? "--json\n--socket\n--help\n" : "--socket\n--help\n", out);
 }
 
 int verb_help(ctl_t *self, int count, char **words) {
@@ -284,7 +284,7 @@ int verb_help(ctl_t *self, int count, char **words) {
     if (!ctl_words_at_most("help", count, 1, words)) {
         return CTL_USAGE;
     }
-    const verb_t *verb = count > 0 ? help_find(words[0]) : NULL;
+    const verb_t *verb = (count > 0) ? help_find(words[0]) : NULL;
     if (count > 0 && verb == NULL) {
         return help_unknown(words[0]);
     }

@@ -18,7 +18,7 @@ typedef struct {
 /// Takes one of the options that stand anywhere. How many arguments it used; 0: it is none of them; -1 after telling a mistake.
 static int take_option(arguments_t *self, int left, char **argument) {
     static const char socket[] = "--socket";
-    const size_t length = sizeof(socket) - 1U;
+    const size_t length = sizeof socket - 1U;
     if (strcmp(argument[0], "--json") == 0) {
         self->ctl->json = true;
     } else if (strcmp(argument[0], "--help") == 0 || strcmp(argument[0], "-h") == 0) {
@@ -56,7 +56,7 @@ static bool take_arguments(arguments_t *self, int count, char **arguments) {
             self->words[self->count] = arguments[i];
             self->count++;
         }
-        i += used == 0 ? 1 : used;
+        i += (used == 0) ? 1 : used;
     }
     if (self->ctl->socket != NULL && self->ctl->socket[0] == '\0') {
         (void)ctl_fail(CTL_USAGE, "--socket wants a path, such as --socket /run/iwheel/gateway.sock");
@@ -66,7 +66,7 @@ static bool take_arguments(arguments_t *self, int count, char **arguments) {
 }
 
 static int dispatch(const arguments_t *arguments) {
-    const verb_t *verb = arguments->verb != NULL ? help_find(arguments->verb) : NULL;
+    const verb_t *verb = (arguments->verb != NULL) ? help_find(arguments->verb) : NULL;
     if (arguments->version) {
         (void)puts("iwheelctl " IWHEEL_VERSION);
         return CTL_OK;
@@ -76,7 +76,7 @@ static int dispatch(const arguments_t *arguments) {
         return CTL_OK;
     }
     if (verb == NULL) {
-        return help_unknown(arguments->verb != NULL ? arguments->verb : "");
+        return help_unknown((arguments->verb != NULL) ? arguments->verb : "");
     }
     if (arguments->help) {
         help_print_verb(verb, stdout);

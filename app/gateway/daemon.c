@@ -2,7 +2,7 @@
 #include "daemon.h"
 
 gw_client_t *gw_daemon_client(gw_daemon_t *self, iw_client_t id) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX && id != IW_CLIENT_NONE; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX && id != IW_CLIENT_NONE; i++) {
         if (self->client[i].id == id) {
             return &self->client[i];
         }

@@ -27,7 +27,7 @@
 
 static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
-    return fd < 0 || epoll_ctl(daemon->epoll_fd, EPOLL_CTL_ADD, fd, &interest) == 0 ? 0 : errno;
+    return (fd < 0 || epoll_ctl(daemon->epoll_fd, EPOLL_CTL_ADD, fd, &interest) == 0) ? 0 : errno;
 }
 
 static int open_signals(void) {
@@ -55,7 +55,7 @@ int gw_loop_open(gw_daemon_t *daemon) {
                        iw_linux_hal_estop_fd(&daemon->hal),
                        daemon->box.fd};
     const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS, GW_TAG_ESTOP, GW_TAG_BOX};
-    for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; ++i) {
+    for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; i++) {
         error = watch(daemon, fds[i], tags[i]);
     }
     return error;
@@ -116,7 +116,7 @@ static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
         gw_log(&daemon->log, GW_LOG_WARNING, "the machine was suspended for %llu ms",
                (unsigned long long)((suspended_us - daemon->suspended_us) / IW_US_PER_MS));
     }
-    daemon->suspended_us = suspended_us > daemon->suspended_us ? suspended_us : daemon->suspended_us;
+    daemon->suspended_us = (suspended_us > daemon->suspended_us) ? suspended_us : daemon->suspended_us;
 }
 
 /// The core's cycle, and what follows from it at once.
@@ -140,7 +140,7 @@ static void step(gw_daemon_t *daemon) {
 }
 
 static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
-    return a_us < b_us ? a_us : b_us;
+    return (a_us < b_us) ? a_us : b_us;
 }
 
 static iw_time_us_t look_us(const gw_daemon_t *daemon) {
@@ -251,7 +251,7 @@ int gw_loop_run(gw_daemon_t *daemon) {
         iw_linux_hal_waited(&daemon->hal, count < 0); // Interrupted, it has found nothing out.
         daemon->now_us = iw_clock_now_us();
         daemon->woken_us = daemon->now_us;
-        for (int i = 0; i < count; ++i) {
+        for (int i = 0; i < count; i++) {
             somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
         }
         cycle(daemon, somebody_knocks);

@@ -98,7 +98,7 @@ static int serve(gw_daemon_t *daemon) {
 static int run(gw_daemon_t *daemon) {
     gw_knowledge_open(&daemon->knowledge, &daemon->config);
     int result = gw_listener_prepare(&daemon->listener, &daemon->config, stderr);
-    result = result != 0 ? result : gw_runtime_open(&daemon->runtime, &daemon->config, GW_RUNTIME_DIRECTORY, stderr);
+    result = (result != 0) ? result : gw_runtime_open(&daemon->runtime, &daemon->config, GW_RUNTIME_DIRECTORY, stderr);
     if (result != 0) {
         return result;
     }
@@ -107,7 +107,7 @@ static int run(gw_daemon_t *daemon) {
         result = EX_UNAVAILABLE;
     }
     gw_tape_init(&daemon->tape, daemon->box.ring);
-    result = result == 0 ? open_hal(daemon) : result;
+    result = (result == 0) ? open_hal(daemon) : result;
     if (result == 0) {
         result = serve(daemon);
         iw_linux_hal_close(&daemon->hal);
@@ -127,7 +127,7 @@ static int act(const gw_options_t *options, gw_daemon_t *daemon) {
         return 0;
     }
     gw_log_open(&daemon->log, options->log_level);
-    const int code = options->action == GW_CHECK ? gw_report_check(&daemon->config, stdout) : run(daemon);
+    const int code = (options->action == GW_CHECK) ? gw_report_check(&daemon->config, stdout) : run(daemon);
     gw_log_close(&daemon->log);
     return code;
 }

@@ -11,9 +11,9 @@ void inspect_begin(inspect_findings_t *self) {
 }
 
 void inspect_say(inspect_findings_t *self, const char *check, inspect_verdict_t verdict, const char *format, ...) {
-    ++self->total[verdict];
+    self->total[verdict]++;
     if (self->count == INSPECT_FINDINGS_MAX) {
-        ++self->lost;
+        self->lost++;
         return;
     }
     inspect_finding_t *finding = &self->finding[self->count++];
@@ -43,5 +43,5 @@ const char *inspect_verdict_word(inspect_verdict_t verdict) {
 }
 
 void inspect_sentence(const inspect_finding_t *finding, char *out_text, size_t size) {
-    (void)snprintf(out_text, size, "%s%s%s", finding->text, finding->cure[0] != '\0' ? "; " : "", finding->cure);
+    (void)snprintf(out_text, size, "%s%s%s", finding->text, (finding->cure[0] != '\0') ? "; " : "", finding->cure);
 }

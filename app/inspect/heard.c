@@ -9,7 +9,7 @@
 #define LOOK_MS 10
 
 uint32_t inspect_nominal_mHz(const iw_codec_row_t *row) {
-    return row->kind == IW_CODEC_SETPOINT ? 0U : 1000000U / row->period_ms;
+    return (row->kind == IW_CODEC_SETPOINT) ? 0U : 1000000U / row->period_ms;
 }
 
 bool inspect_always(const iw_codec_row_t *row) {
@@ -18,7 +18,7 @@ bool inspect_always(const iw_codec_row_t *row) {
 
 unsigned inspect_message_of(uint32_t id) {
     const iw_codec_row_t *row = iw_codec_find(id);
-    return row != NULL ? (unsigned)(row - iw_codec_rows) : IW_CODEC_ROWS;
+    return (row != NULL) ? (unsigned)(row - iw_codec_rows) : IW_CODEC_ROWS;
 }
 
 void inspect_heard_begin(inspect_heard_t *self) {
@@ -26,8 +26,8 @@ void inspect_heard_begin(inspect_heard_t *self) {
 }
 
 static void note_stranger(inspect_heard_t *self, uint32_t id) {
-    ++self->strange;
-    for (uint32_t i = 0; i < self->strange_ids; ++i) {
+    self->strange++;
+    for (uint32_t i = 0; i < self->strange_ids; i++) {
         if (self->strange_id[i] == id) {
             return;
         }
@@ -45,16 +45,16 @@ void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame) {
     }
     switch (iw_codec_decode(frame, told)) {
     case IW_CODEC_BAD_LENGTH:
-        ++self->bad_length;
+        self->bad_length++;
         break;
     case IW_CODEC_BAD_FORMAT:
-        ++self->bad_format;
+        self->bad_format++;
         break;
     case IW_CODEC_UNKNOWN:
         note_stranger(self, frame->id);
         break;
     default:
-        ++self->count[inspect_message_of(frame->id)];
+        self->count[inspect_message_of(frame->id)]++;
         break;
     }
 }
@@ -90,7 +90,7 @@ void inspect_listen(iw_linux_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *o
 }
 
 uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message) {
-    return self->span_us == 0U ? 0U : (uint32_t)((uint64_t)self->count[message] * 1000U * 1000000U / self->span_us);
+    return (self->span_us == 0U) ? 0U : (uint32_t)((uint64_t)self->count[message] * 1000U * 1000000U / self->span_us);
 }
 
 uint32_t inspect_load_permille(const inspect_heard_t *self, uint32_t bitrate_hz) {

@@ -14,7 +14,7 @@
 #define MESSAGE_FORMAT "%s %s %u (0x%03X)"
 
 static const char *side_of(const iw_codec_row_t *row) {
-    return row->side == IW_LEFT ? "left" : "right";
+    return (row->side == IW_LEFT) ? "left" : "right";
 }
 
 static const char *name_of(const iw_codec_row_t *row) {
@@ -22,7 +22,7 @@ static const char *name_of(const iw_codec_row_t *row) {
 }
 
 static const char *wheel_check(iw_side_t side) {
-    return side == IW_LEFT ? "left_wheel" : "right_wheel";
+    return (side == IW_LEFT) ? "left_wheel" : "right_wheel";
 }
 
 /// "250.0"
@@ -35,7 +35,7 @@ static bool rate_is_off(const inspect_heard_t *heard, unsigned index) {
     const iw_codec_row_t *row = &iw_codec_rows[index];
     const uint64_t wanted = (uint64_t)inspect_nominal_mHz(row) * heard->span_us / 1000000U / 1000U;
     const uint64_t got = heard->count[index];
-    const uint64_t off = got > wanted ? got - wanted : wanted - got;
+    const uint64_t off = (got > wanted) ? got - wanted : wanted - got;
     return inspect_always(row) && off > wanted * RATE_OFF_PERMILLE / 1000U + RATE_OFF_FRAMES;
 }
 
@@ -61,21 +61,21 @@ static void judge_rate(const inspect_heard_t *heard, unsigned index, inspect_fin
 
 /// Whether a wheel is there, and what it sends how often.
 static void judge_wheel(const inspect_heard_t *heard, iw_side_t side, inspect_findings_t *findings) {
-    const char *name = side == IW_LEFT ? "left" : "right";
+    const char *name = (side == IW_LEFT) ? "left" : "right";
     const uint64_t span_ms = heard->span_us / IW_US_PER_MS;
     char list[INSPECT_TEXT_SIZE] = "";
     uint32_t speeds = 0;
-    for (unsigned i = 0; i < IW_CODEC_ROWS; ++i) {
+    for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
         if (row->side != side || inspect_nominal_mHz(row) == 0U) {
             continue;
         }
-        speeds += row->kind == IW_CODEC_SPEED ? heard->count[i] : 0U;
+        speeds += (row->kind == IW_CODEC_SPEED) ? heard->count[i] : 0U;
         if (heard->count[i] > 0U) {
             const size_t length = strlen(list);
             char rate[16];
             write_rate(inspect_rate_mHz(heard, i), rate);
-            (void)snprintf(&list[length], sizeof list - length, "%s%s %s/s", length > 0U ? ", " : "", name_of(row),
+            (void)snprintf(&list[length], sizeof list - length, "%s%s %s/s", (length > 0U) ? ", " : "", name_of(row),
                            rate);
         }
     }
@@ -85,7 +85,7 @@ static void judge_wheel(const inspect_heard_t *heard, iw_side_t side, inspect_fi
         return;
     }
     inspect_say(findings, wheel_check(side), INSPECT_OK, "%s wheel: %s", name, list);
-    for (unsigned i = 0; i < IW_CODEC_ROWS; ++i) {
+    for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
         if (iw_codec_rows[i].side == side) {
             judge_rate(heard, i, findings);
         }
@@ -107,16 +107,16 @@ static void judge_strangers(const inspect_heard_t *heard, const inspect_wish_t *
     if (heard->strange == 0U) {
         return;
     }
-    for (uint32_t i = 0; i < heard->strange_ids; ++i) {
+    for (uint32_t i = 0; i < heard->strange_ids; i++) {
         const uint32_t id = heard->strange_id[i];
         const bool extended = (id & IW_CAN_EXTENDED) != 0U;
         const uint32_t number = id & (extended ? 0x1FFFFFFFU : IW_CAN_ID_MASK);
         const size_t length = strlen(list);
         (void)snprintf(&list[length], sizeof list - length, extended ? "%s0x%08" PRIX32 : "%s0x%03" PRIX32,
-                       i > 0U ? " " : "", number);
+                       (i > 0U) ? " " : "", number);
     }
     inspect_say(findings, "unknown_ids", INSPECT_WARN, "%" PRIu32 " frames are none of the wheels': %s%s",
-                heard->strange, list, heard->strange_ids == INSPECT_STRANGERS ? " ..." : "");
+                heard->strange, list, (heard->strange_ids == INSPECT_STRANGERS) ? " ..." : "");
     inspect_cure(findings, "find out who sends them: iwheelctl record - --can %s --for 2s | iwheelctl decode",
                  wish->name);
 }

@@ -58,7 +58,7 @@ void inspect_estop(const inspect_estop_t *estop, inspect_findings_t *findings) {
         inspect_cure(findings, "%s", estop->trouble);
     } else {
         inspect_say(findings, "estop", estop->simulated ? INSPECT_WARN : INSPECT_OK, "e-stop %s: %s%s", estop->line,
-                    estop->level > 0 ? "pressed" : "released", estop->simulated ? ", SIMULATED" : "");
+                    (estop->level > 0) ? "pressed" : "released", estop->simulated ? ", SIMULATED" : "");
         if (estop->simulated) {
             inspect_cure(findings, "wire a button before real wheels turn");
         }
@@ -89,7 +89,7 @@ inspect_opened_t inspect_open(iw_linux_hal_t *hal, const char *bus, const iw_est
     inspect_opened_t opened = {.bus = true, .estop = true};
     const char *culprit = NULL;
     int error = iw_linux_hal_open(hal, bus, line, &culprit);
-    for (unsigned i = 0; i < 2U && error != 0; ++i) {
+    for (unsigned i = 0; i < 2U && error != 0; i++) {
         opened.bus = opened.bus && culprit != bus;
         opened.estop = opened.estop && culprit == bus;
         inspect_unopened(culprit, culprit == bus, error, findings);

@@ -66,7 +66,7 @@ static void judge_timing(const iw_bus_link_t *link, const inspect_wish_t *wish, 
         (void)snprintf(sample_point, sizeof sample_point, "%u.%u %%", link->sample_point_permille / 10U,
                        link->sample_point_permille % 10U);
     }
-    inspect_say(findings, "bit_timing", timing == IW_TIMING_WRONG && !wish->refuses ? INSPECT_WARN : verdicts[timing],
+    inspect_say(findings, "bit_timing", (timing == IW_TIMING_WRONG && !wish->refuses) ? INSPECT_WARN : verdicts[timing],
                 "bit timing: %s, sample point %s; wanted %" PRIu32 " bit/s, %u.%u %%", bitrate, sample_point,
                 wish->bitrate_hz, wish->sample_point_permille / 10U, wish->sample_point_permille % 10U);
     if (timing != IW_TIMING_RIGHT) {

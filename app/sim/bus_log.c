@@ -66,7 +66,7 @@ static size_t data_text(char *out, const iw_can_frame_t *frame) {
         out[0] = 'R';
         return 1U;
     }
-    for (size_t i = 0U; i < frame->dlc; ++i) {
+    for (size_t i = 0U; i < frame->dlc; i++) {
         out[2U * i] = digit[frame->data[i] >> 4];
         out[2U * i + 1U] = digit[frame->data[i] & 0x0FU];
     }

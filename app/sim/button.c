@@ -20,7 +20,7 @@ static void tell(const sim_button_t *self, sim_watch_t *client) {
 }
 
 static void tell_all(sim_button_t *self) {
-    for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; i++) {
         if (self->client[i].fd >= 0) {
             tell(self, &self->client[i]);
         }
@@ -36,7 +36,7 @@ static void client_ready(sim_watch_t *watch) {
 }
 
 static bool admit(sim_button_t *self, int fd) {
-    for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS && !self->unplugged; ++i) {
+    for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS && !self->unplugged; i++) {
         sim_watch_t *const client = &self->client[i];
         if (client->fd < 0) {
             client->fd = fd;
@@ -62,7 +62,7 @@ static void somebody_connects(sim_watch_t *watch) {
 bool sim_button_open(sim_button_t *self, const char *path, sim_reason_t *out_reason) {
     self->release_us = IW_NEVER;
     self->watch = (sim_watch_t){somebody_connects, self, -1};
-    for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; i++) {
         self->client[i] = (sim_watch_t){client_ready, self, -1};
     }
     if (!sim_listener_open(&self->listener, path, SOCK_STREAM, out_reason)) {
@@ -87,7 +87,7 @@ void sim_button_pulse(sim_button_t *self, iw_time_us_t until_us) {
 
 void sim_button_unplug(sim_button_t *self, bool unplugged) {
     self->unplugged = unplugged;
-    for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; i++) {
         if (unplugged && self->client[i].fd >= 0) {
             drop(self, &self->client[i]);
         }

@@ -62,7 +62,7 @@ static void client_ready(sim_watch_t *watch) {
 }
 
 static bool admit(sim_control_t *self, int fd) {
-    for (unsigned i = 0U; i < SIM_CONTROL_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_CONTROL_CLIENTS; i++) {
         sim_control_client_t *const client = &self->client[i];
         if (client->watch.fd < 0) {
             client->watch.fd = fd;
@@ -87,7 +87,7 @@ static void somebody_connects(sim_watch_t *watch) {
 
 bool sim_control_open(sim_control_t *self, const char *path, sim_reason_t *out_reason) {
     self->watch = (sim_watch_t){somebody_connects, self, -1};
-    for (unsigned i = 0U; i < SIM_CONTROL_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_CONTROL_CLIENTS; i++) {
         self->client[i].control = self;
         self->client[i].watch = (sim_watch_t){client_ready, &self->client[i], -1};
     }
@@ -99,7 +99,7 @@ bool sim_control_open(sim_control_t *self, const char *path, sim_reason_t *out_r
 }
 
 void sim_control_close(sim_control_t *self) {
-    for (unsigned i = 0U; i < SIM_CONTROL_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_CONTROL_CLIENTS; i++) {
         if (self->client[i].watch.fd >= 0) {
             drop(&self->client[i]);
         }

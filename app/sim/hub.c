@@ -52,7 +52,7 @@ static void pass_on(sim_client_t *client, const iw_can_frame_t *frame, uint8_t m
 }
 
 void sim_hub_deliver(sim_hub_t *self, const sim_delivery_t *delivery) {
-    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         if (self->client[i].watch.fd >= 0) {
             bool const own = self->client[i].port == delivery->port;
             pass_on(&self->client[i], &delivery->frame, own ? MARK_ECHO : MARK_NONE);
@@ -61,7 +61,7 @@ void sim_hub_deliver(sim_hub_t *self, const sim_delivery_t *delivery) {
 }
 
 static void tell_others(sim_hub_t *self, const sim_client_t *from, const iw_can_frame_t *frame) {
-    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         if (self->client[i].watch.fd >= 0 && &self->client[i] != from) {
             pass_on(&self->client[i], frame, (from == NULL) ? MARK_NONE : MARK_FORGED);
         }
@@ -88,7 +88,7 @@ static void take(sim_client_t *client, const struct can_frame *message) {
 
 static void client_ready(sim_watch_t *watch) {
     sim_client_t *const client = watch->owner;
-    for (unsigned i = 0U; i < BATCH && watch->fd >= 0; ++i) {
+    for (unsigned i = 0U; i < BATCH && watch->fd >= 0; i++) {
         unsigned char bytes[sizeof(struct can_frame) + 1U];
         struct can_frame message;
         ssize_t const length = recv(watch->fd, bytes, sizeof bytes, MSG_DONTWAIT);
@@ -139,7 +139,7 @@ static void somebody_connects(sim_watch_t *watch) {
 
 bool sim_hub_open(sim_hub_t *self, const char *path, sim_reason_t *out_reason) {
     self->watch = (sim_watch_t){somebody_connects, self, -1};
-    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         self->client[i].watch.fd = -1;
     }
     if (!sim_listener_open(&self->listener, path, SOCK_SEQPACKET, out_reason)) {
@@ -150,7 +150,7 @@ bool sim_hub_open(sim_hub_t *self, const char *path, sim_reason_t *out_reason) {
 }
 
 static void drop_all(sim_hub_t *self) {
-    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         if (self->client[i].watch.fd >= 0) {
             drop(&self->client[i]);
         }

@@ -40,16 +40,16 @@ _Static_assert(KEYS <= 32U, "one bit each");
 
 /// The table on the screen; a star marks what is on.
 static void show(const sim_keys_t *self) {
-    for (size_t i = 0U; i < KEYS; ++i) {
+    for (size_t i = 0U; i < KEYS; i++) {
         bool const last = i % COLUMNS == COLUMNS - 1U || i == KEYS - 1U;
-        (void)printf(" %c%c %-22s%s", (self->on & (1U << i)) != 0U ? '*' : ' ', keys[i].key, keys[i].what,
+        (void)printf(" %c%c %-22s%s", ((self->on & (1U << i)) != 0U) ? '*' : ' ', keys[i].key, keys[i].what,
                      last ? "\n" : "");
     }
     (void)fflush(stdout);
 }
 
 static void press(sim_keys_t *self, char letter) {
-    for (size_t i = 0U; i < KEYS; ++i) {
+    for (size_t i = 0U; i < KEYS; i++) {
         const sim_key_t *const key = &keys[i];
         unsigned const bit = 1U << i;
         bool const is_on = (self->on & bit) != 0U;
@@ -86,11 +86,11 @@ static void typed(sim_watch_t *watch) {
     sim_keys_t *const self = watch->owner;
     char letters[16];
     // In the background a read would stop the whole process.
-    ssize_t const length = watch->fd >= 0 && is_ours(watch->fd) ? read(watch->fd, letters, sizeof letters) : 0;
+    ssize_t const length = (watch->fd >= 0 && is_ours(watch->fd)) ? read(watch->fd, letters, sizeof letters) : 0;
     if (length <= 0 && watch->fd >= 0) {
         let_go(self);
     }
-    for (ssize_t i = 0; i < length; ++i) {
+    for (ssize_t i = 0; i < length; i++) {
         press(self, letters[i]);
     }
 }

@@ -48,7 +48,7 @@ void sim_loop_wait(const sim_loop_t *self, iw_time_us_t wake_us, void (*before)(
     set_timer(self, wake_us);
     int const count = epoll_wait(self->epoll_fd, event, EVENTS_MAX, -1);
     before(context);
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < count; i++) {
         sim_watch_t *const watch = event[i].data.ptr;
         if (watch != NULL) {
             watch->ready(watch);

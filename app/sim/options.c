@@ -151,7 +151,7 @@ static int set_option(sim_options_t *options, int option, const char *value) {
 
 static int set_command(sim_options_t *options, int argc, char **argv) {
     size_t used = 0U;
-    for (int i = optind; i < argc; ++i) {
+    for (int i = optind; i < argc; i++) {
         int const length =
             snprintf(&options->command[used], sizeof options->command - used, "%s%s", (used > 0U) ? " " : "", argv[i]);
         used += (size_t)length;

@@ -8,7 +8,7 @@ const char SIM_USAGE[] = "usage";
 
 static size_t describe(char *out, size_t size, const sim_command_t *table, unsigned count) {
     size_t used = 0U;
-    for (unsigned i = 0U; i < count && used < size; ++i) {
+    for (unsigned i = 0U; i < count && used < size; i++) {
         char call[64];
         (void)snprintf(call, sizeof call, "%s %s", table[i].name, table[i].arguments);
         int const length = snprintf(&out[used], size - used, "%-42s %s\n", call, table[i].help);
@@ -25,7 +25,7 @@ static sim_outcome_t help(sim_panel_t *self) {
 }
 
 static const sim_command_t *find_in(const sim_command_t *table, unsigned count, const char *name) {
-    for (unsigned i = 0U; i < count; ++i) {
+    for (unsigned i = 0U; i < count; i++) {
         if (strcmp(table[i].name, name) == 0) {
             return &table[i];
         }

@@ -173,7 +173,7 @@ static result_t log_mark(const sim_call_t *call) {
     if (strcmp(call->words->word[1], "mark") != 0) {
         return SIM_USAGE;
     }
-    for (unsigned i = 2U; i < call->words->count; ++i) {
+    for (unsigned i = 2U; i < call->words->count; i++) {
         int const length = snprintf(&text[used], sizeof text - used, "%s%s", (i > 2U) ? " " : "", call->words->word[i]);
         used += (size_t)length;
     }

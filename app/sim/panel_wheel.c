@@ -15,7 +15,7 @@ typedef struct {
 
 static chosen_t choose(const sim_call_t *call, unsigned mask) {
     chosen_t chosen = {{NULL, NULL}, 0U};
-    for (unsigned side = 0U; side < IW_SIDES; ++side) {
+    for (unsigned side = 0U; side < IW_SIDES; side++) {
         if (((mask >> side) & 1U) != 0U) {
             chosen.wheel[chosen.count++] = &call->world->pair.wheel[side];
         }
@@ -56,7 +56,7 @@ static result_t reboot(const sim_call_t *call) {
     if (!call->world->pair.power) {
         return "the wheels have no power; first: power on";
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         sim_world_reboot(call->world, call->now_us, chosen.wheel[i]->side);
     }
     return NULL;
@@ -67,7 +67,7 @@ static result_t set_muted(const sim_call_t *call) {
     if (!sides(call, &chosen)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->muted = call->words->word[0][0] == 'm';
     }
     return NULL;
@@ -78,7 +78,7 @@ static result_t set_blocked(const sim_call_t *call) {
     if (!sides(call, &chosen)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
         chosen.wheel[i]->motion.blocked = call->words->word[0][0] == 'b';
     }
@@ -91,7 +91,7 @@ static result_t set_load(const sim_call_t *call) {
     if (!sides(call, &chosen) || !sim_words_milli(call->words->word[2], (sim_range_t){-4000000, 4000000}, &load_mN)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->force.load_mN = (int32_t)load_mN;
     }
     return NULL;
@@ -103,7 +103,7 @@ static result_t set_unit(const sim_call_t *call) {
     if (!sides(call, &chosen) || !one_of(call, 2U, (sim_choice_t){"cN", "dN"}, &centi)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->force.unit = centi ? IW_FORCE_CN : IW_FORCE_DN;
     }
     return NULL;
@@ -115,7 +115,7 @@ static result_t set_sign(const sim_call_t *call) {
     if (!sides(call, &chosen) || !one_of(call, 2U, (sim_choice_t){"swapped", "normal"}, &swapped)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
         chosen.wheel[i]->motion.swapped = swapped;
     }
@@ -132,7 +132,7 @@ static result_t set_runaway(const sim_call_t *call) {
     if (call->words->count == 4U && !(on && sim_words_integer(call->words->word[3], (sim_range_t){1, 3000}, &more))) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
         chosen.wheel[i]->motion.runaway_mm_s = on ? (int16_t)more : 0;
     }
@@ -145,7 +145,7 @@ static result_t set_removed(const sim_call_t *call) {
     if (!sides(call, &chosen) || !one_of(call, 2U, on_off, &on)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->force.zero_removed = on;
     }
     return NULL;
@@ -159,7 +159,7 @@ static result_t set_raw(const sim_call_t *call) {
         !(automatic || sim_words_integer(call->words->word[2], (sim_range_t){INT16_MIN, INT16_MAX}, &raw))) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->force.forced_raw = (int32_t)raw;
     }
     return NULL;
@@ -171,7 +171,7 @@ static result_t set_zero(const sim_call_t *call) {
     if (!sides(call, &chosen) || !sim_words_milli(call->words->word[2], (sim_range_t){-4000000, 4000000}, &zero_mN)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->force.sensor_zero_mN = (int32_t)zero_mN;
     }
     return NULL;
@@ -184,7 +184,7 @@ static result_t set_ticks(const sim_call_t *call) {
         !sim_words_integer(call->words->word[2], (sim_range_t){INT32_MIN, INT32_MAX}, &ticks)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->motion.ticks = (uint32_t)(uint64_t)ticks;
     }
     return NULL;
@@ -196,7 +196,7 @@ static result_t push(const sim_call_t *call) {
     if (!sides(call, &chosen) || !sim_words_milli(call->words->word[2], (sim_range_t){-100000, 100000}, &way_mm)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         sim_motion_push(&chosen.wheel[i]->motion, call->now_us, (int32_t)way_mm);
     }
     return NULL;
@@ -210,8 +210,8 @@ static result_t turn(const sim_call_t *call) {
     }
     // On the spot: each wheel rolls along a circle as wide as the track; 355 / 113 is pi.
     const int32_t way_mm = (int32_t)(milli_turns * 355 * pair->pose.track_mm / 113000);
-    for (unsigned side = 0U; side < IW_SIDES; ++side) {
-        const int32_t sign = (side == IW_LEFT) != pair->pose.mirrored[side] ? -1 : 1;
+    for (unsigned side = 0U; side < IW_SIDES; side++) {
+        const int32_t sign = ((side == IW_LEFT) != pair->pose.mirrored[side]) ? -1 : 1;
         sim_motion_push(&pair->wheel[side].motion, call->now_us, sign * way_mm);
     }
     return NULL;
@@ -232,7 +232,7 @@ static result_t set_radius(const sim_call_t *call) {
     if (!sides(call, &chosen) || !sim_words_integer(call->words->word[2], (sim_range_t){20, 500}, &radius_mm)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->motion.config.radius_mm = (uint16_t)radius_mm;
     }
     return NULL;
@@ -249,7 +249,7 @@ static result_t set_gear(const sim_call_t *call) {
     if (call->words->count == 4U && !sim_words_integer(call->words->word[3], range, &per)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
         chosen.wheel[i]->motion.tick_rest = 0;
         chosen.wheel[i]->motion.config.gear_turns = (uint16_t)turns;
@@ -264,7 +264,7 @@ static result_t set_rpm(const sim_call_t *call) {
     if (!sides(call, &chosen) || !one_of(call, 2U, (sim_choice_t){"rotor", "wheel"}, &rotor)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->motion.config.rpm_of_rotor = rotor;
     }
     return NULL;
@@ -276,7 +276,7 @@ static result_t set_mirror(const sim_call_t *call) {
     if (!sides(call, &chosen) || !one_of(call, 2U, on_off, &on)) {
         return SIM_USAGE;
     }
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         call->world->pair.pose.mirrored[chosen.wheel[i]->side] = on;
     }
     return NULL;
@@ -288,7 +288,7 @@ static result_t set_role(const sim_call_t *call) {
         return SIM_USAGE;
     }
     chosen_t const chosen = choose(call, BOTH);
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         sim_motion_advance(&chosen.wheel[i]->motion, call->now_us);
         chosen.wheel[i]->motion.config.current_is_setpoint = setpoint;
     }
@@ -310,7 +310,7 @@ static result_t set_type(const sim_call_t *call) {
         return SIM_USAGE;
     }
     chosen_t const chosen = choose(call, BOTH);
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->motion.config.accepted_type = (int16_t)type;
     }
     if (!any) {
@@ -325,7 +325,7 @@ static result_t set_loss(const sim_call_t *call) {
         return SIM_USAGE;
     }
     chosen_t const chosen = choose(call, BOTH);
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->loss_permille = (uint16_t)(milli_percent / 100);
     }
     return NULL;
@@ -337,7 +337,7 @@ static result_t set_slow(const sim_call_t *call) {
         return SIM_USAGE;
     }
     chosen_t const chosen = choose(call, BOTH);
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         sim_wheel_slow(chosen.wheel[i], (uint32_t)permille);
     }
     return NULL;
@@ -358,7 +358,7 @@ static result_t set_ambient(const sim_call_t *call) {
         return SIM_USAGE;
     }
     chosen_t const chosen = choose(call, BOTH);
-    for (unsigned i = 0U; i < chosen.count; ++i) {
+    for (unsigned i = 0U; i < chosen.count; i++) {
         chosen.wheel[i]->ambient_degC = (int32_t)ambient;
     }
     return NULL;

@@ -17,7 +17,7 @@ static bool fail(sim_script_fault_t *out_fault, unsigned line, const char *reaso
 /// What follows the first `words` words.
 static const char *after(const char *line, unsigned words) {
     const char *at = line + strspn(line, " \t");
-    for (unsigned i = 0U; i < words; ++i) {
+    for (unsigned i = 0U; i < words; i++) {
         at += strcspn(at, " \t");
         at += strspn(at, " \t");
     }

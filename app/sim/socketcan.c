@@ -80,7 +80,7 @@ void sim_socketcan_deliver(sim_socketcan_t *self, const sim_delivery_t *delivery
 bool sim_socketcan_refuses(const char *command) {
     static const char *const refused[] = {"ack", "stall", "busoff", "passive", "bus", "queue"};
     size_t const length = strcspn(command, " \t");
-    for (size_t i = 0U; i < sizeof refused / sizeof refused[0]; ++i) {
+    for (size_t i = 0U; i < sizeof refused / sizeof refused[0]; i++) {
         if (strlen(refused[i]) == length && strncmp(command, refused[i], length) == 0) {
             return true;
         }

@@ -33,7 +33,7 @@ static int receive(int fd, bool help) {
         }
         used += (size_t)length;
     }
-    answer[help && used >= 2U ? used - 2U : used] = '\0';
+    answer[(help && used >= 2U) ? used - 2U : used] = '\0';
     (void)fputs(answer, stdout);
     return (strncmp(answer, "error", 5U) == 0) ? 1 : EX_OK;
 }

@@ -13,7 +13,7 @@ bool sim_words_split(sim_words_t *self, const char *line) {
     memcpy(self->text, line, length + 1U);
     self->count = 0U;
     bool inside = false;
-    for (char *at = self->text; *at != '\0'; ++at) {
+    for (char *at = self->text; *at != '\0'; at++) {
         if (*at == ' ' || *at == '\t' || *at == '\r') {
             *at = '\0';
             inside = false;
@@ -76,7 +76,7 @@ static bool read_scaled(const char *word, unsigned places, int64_t *out_value) {
         return false;
     }
     if (*at == '.' && places > 0U) {
-        ++at;
+        at++;
         behind = read_digits(&at, places, &value);
         if (behind == 0U) {
             return false;
@@ -85,7 +85,7 @@ static bool read_scaled(const char *word, unsigned places, int64_t *out_value) {
     if (*at != '\0') {
         return false;
     }
-    for (; behind < places; ++behind) {
+    for (; behind < places; behind++) {
         value *= 10;
     }
     *out_value = negative ? -value : value;
@@ -123,7 +123,7 @@ static int hex_value(char c) {
 /// Reads exactly `count` hexadecimal digits.
 static bool read_hex(const char *at, size_t count, uint32_t *out_value) {
     uint32_t value = 0U;
-    for (size_t i = 0U; i < count; ++i) {
+    for (size_t i = 0U; i < count; i++) {
         int const digit = hex_value(at[i]);
         if (digit < 0) {
             return false;
@@ -143,7 +143,7 @@ static bool read_data(const char *at, iw_can_frame_t *frame) {
     if (length % 2U != 0U || length / 2U > IW_CAN_DATA_MAX) {
         return false;
     }
-    for (size_t i = 0U; i < length / 2U; ++i) {
+    for (size_t i = 0U; i < length / 2U; i++) {
         uint32_t byte = 0U;
         if (!read_hex(&at[2U * i], 2U, &byte)) {
             return false;

@@ -38,7 +38,7 @@ void reset_handler(void) {
     for (uint32_t *to = link_data_start; to < link_data_end; ++to, ++from) {
         *to = *from;
     }
-    for (uint32_t *to = link_bss_start; to < link_bss_end; ++to) {
+    for (uint32_t *to = link_bss_start; to < link_bss_end; to++) {
         *to = 0;
     }
     (void)main();
@@ -71,7 +71,7 @@ void board_watchdog_feed(void) {}
 
 void board_sleep_until(iw_time_us_t until_us) {
     const iw_time_us_t frame_us = time_us + IW_US_PER_MS;
-    time_us = until_us < frame_us && until_us > time_us ? until_us : frame_us;
+    time_us = (until_us < frame_us && until_us > time_us) ? until_us : frame_us;
     pretend_wheels_run(&wheels);
     if (time_us >= END_us) {
         end(wheels.fastest_mm_s == 200 && wheels.speed_mm_s[IW_LEFT] == 0 && wheels.speed_mm_s[IW_RIGHT] == 0);

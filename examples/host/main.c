@@ -26,5 +26,5 @@ int main(void) {
         }
     }
     (void)printf("fastest: %d mm/s, now: %d mm/s\n", wheels.fastest_mm_s, wheels.speed_mm_s[IW_LEFT]);
-    return wheels.fastest_mm_s == 200 && wheels.speed_mm_s[IW_LEFT] == 0 && before == IW_STATE_LISTENING ? 0 : 1;
+    return (wheels.fastest_mm_s == 200 && wheels.speed_mm_s[IW_LEFT] == 0 && before == IW_STATE_LISTENING) ? 0 : 1;
 }

@@ -47,7 +47,7 @@ static bool add_name(check_t *self) {
     if (self->names == IWN_NAMES_MAX) {
         return fail(self, "too many names");
     }
-    (void)memmove(&self->name_at[low + 1U], &self->name_at[low], (self->names - low) * sizeof self->name_at[0]);
+    memmove(&self->name_at[low + 1U], &self->name_at[low], (self->names - low) * sizeof self->name_at[0]);
     self->name_at[low] = (uint16_t)(self->scan.token + 1 - self->scan.text);
     self->names++;
     return true;
@@ -275,7 +275,7 @@ bool iwn_json_text(iwn_json_t value, char *out_text, size_t size) {
         if (used + length >= size) {
             return false;
         }
-        (void)memcpy(&out_text[used], bytes, length);
+        memcpy(&out_text[used], bytes, length);
         used += length;
     }
     out_text[used] = '\0';

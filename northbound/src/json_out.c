@@ -21,7 +21,7 @@ static char *take(iwn_out_t *self, size_t length) {
 static void put(iwn_out_t *self, const char *text, size_t length) {
     char *const at = take(self, length);
     if (at != NULL) {
-        (void)memcpy(at, text, length);
+        memcpy(at, text, length);
     }
 }
 
@@ -37,7 +37,7 @@ static char *begin(iwn_out_t *self, iwn_span_t name, size_t length) {
     at += comma;
     if (name.text != NULL) {
         *at = '"';
-        (void)memcpy(at + 1, name.text, name.length);
+        memcpy(at + 1, name.text, name.length);
         at += name.length + 1U;
         at[0] = '"';
         at[1] = ':';
@@ -63,7 +63,7 @@ void iwn_out_close(iwn_out_t *self, char bracket) {
 void iwn_out_span(iwn_out_t *self, iwn_span_t name, iwn_span_t value) {
     char *const at = begin(self, name, value.length);
     if (at != NULL) {
-        (void)memcpy(at, value.text, value.length);
+        memcpy(at, value.text, value.length);
     }
 }
 
@@ -85,7 +85,7 @@ static size_t plain_length(const char *text, size_t length) {
     size_t plain = 0;
     size_t word;
     for (; plain + sizeof word <= length; plain += sizeof word) {
-        (void)memcpy(&word, &text[plain], sizeof word);
+        memcpy(&word, &text[plain], sizeof word);
         const size_t control = word - IN_EACH(0x20U);
         const size_t quote = (word ^ IN_EACH(0x22U)) - IN_EACH(1U);
         const size_t backslash = (word ^ IN_EACH(0x5CU)) - IN_EACH(1U);
@@ -142,7 +142,7 @@ void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text) {
         return;
     }
     at[0] = '"';
-    (void)memcpy(at + 1, text, plain);
+    memcpy(at + 1, text, plain);
     if (plain == length) {
         at[length + 1U] = '"';
         return;

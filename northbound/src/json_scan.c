@@ -72,7 +72,7 @@ static size_t character_length(const iwn_scan_t *self) {
     size_t bytes;
     char copy[5] = "";
     const size_t left = (size_t)(self->end - self->at);
-    (void)memcpy(copy, self->at, (left < 4U) ? left : 4U);
+    memcpy(copy, self->at, (left < 4U) ? left : 4U);
     return (iwn_plain_read(copy, &bytes) != IWN_PLAIN_BROKEN) ? bytes : 0U;
 }
 

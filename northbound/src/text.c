@@ -15,7 +15,7 @@ static const struct {
 };
 
 bool iwn_plain_is(uint32_t code_point) {
-    for (size_t i = 0; i < sizeof moving / sizeof moving[0]; ++i) {
+    for (size_t i = 0; i < sizeof moving / sizeof moving[0]; i++) {
         if (code_point >= moving[i].first && code_point <= moving[i].last) {
             return false;
         }
@@ -34,16 +34,16 @@ static size_t length_of(unsigned char first) {
     if (first >= 0xE0U && first <= 0xEFU) {
         return 3;
     }
-    return first >= 0xF0U && first <= 0xF4U ? 4U : 0U;
+    return (first >= 0xF0U && first <= 0xF4U) ? 4U : 0U;
 }
 
 uint32_t iwn_plain_read(const char *text, size_t *out_bytes) {
     static const uint32_t least[] = {0, 0, 0x80U, 0x800U, 0x10000U};
     const unsigned char first = (unsigned char)*text;
     const size_t length = length_of(first);
-    uint32_t code_point = length > 1U ? first & (0x7FU >> length) : first;
+    uint32_t code_point = (length > 1U) ? first & (0x7FU >> length) : first;
     *out_bytes = 1;
-    for (size_t i = 1; i < length; ++i) {
+    for (size_t i = 1; i < length; i++) {
         const unsigned char next = (unsigned char)text[i];
         if ((next & 0xC0U) != 0x80U) {
             return IWN_PLAIN_BROKEN;
@@ -77,7 +77,7 @@ void iwn_plain_copy(const char *text, char *out, size_t size) {
         if (used + length >= size) {
             break;
         }
-        (void)memcpy(&out[used], plain ? text : "?", length);
+        memcpy(&out[used], plain ? text : "?", length);
         used += length;
     }
     out[used] = '\0';
@@ -106,7 +106,7 @@ const char *iwn_plain_json(const char *line, char *out, size_t size, size_t *out
         if (used + length > size) {
             break;
         }
-        (void)memcpy(&out[used], plain ? line : escaped, length);
+        memcpy(&out[used], plain ? line : escaped, length);
         used += length;
     }
     *out_length = used;
@@ -136,12 +136,12 @@ static char *digits_32(uint32_t number, char *end) {
         const uint32_t rest = number / 100U;
         const size_t pair = number - rest * 100U;
         end -= 2;
-        (void)memcpy(end, &pairs[2U * pair], 2U);
+        memcpy(end, &pairs[2U * pair], 2U);
         number = rest;
     }
     if (number >= 10U) {
         end -= 2;
-        (void)memcpy(end, &pairs[2U * (size_t)number], 2U);
+        memcpy(end, &pairs[2U * (size_t)number], 2U);
         return end;
     }
     *--end = (char)('0' + number);
@@ -175,7 +175,7 @@ iwn_text_t iwn_text_begin(char *data, size_t size) {
 void iwn_text_span(iwn_text_t *self, const char *text, size_t length) {
     const size_t room = self->size - self->length - 1U;
     const size_t fits = (length < room) ? length : room;
-    (void)memcpy(&self->data[self->length], text, fits);
+    memcpy(&self->data[self->length], text, fits);
     self->length += fits;
     self->data[self->length] = '\0';
 }

@@ -10,9 +10,9 @@ static const char *wheels(uint8_t sides) {
 }
 
 static const char *reboot_evidence(uint32_t detail) {
-    return detail == IW_REBOOT_SILENCE    ? "it was silent for a second"
-           : detail == IW_REBOOT_ODOMETRY ? "its odometry jumped"
-                                          : "its start-up offset frames came back";
+    return (detail == IW_REBOOT_SILENCE)    ? "it was silent for a second"
+           : (detail == IW_REBOOT_ODOMETRY) ? "its odometry jumped"
+                                            : "its start-up offset frames came back";
 }
 
 static void add_number(iwn_text_t *text, int64_t number, const char *unit) {
@@ -139,7 +139,7 @@ static const char *manner(const iw_stop_t *stop) {
     if (stop->latched) {
         return "zero at once, latched";
     }
-    return stop->cause == IW_CAUSE_LOOP_LATE || stop->cause == IW_CAUSE_RESTART ? "zero at once" : "ramped to zero";
+    return (stop->cause == IW_CAUSE_LOOP_LATE || stop->cause == IW_CAUSE_RESTART) ? "zero at once" : "ramped to zero";
 }
 
 /// What was going on.
@@ -196,5 +196,5 @@ const char *iwn_why_cure(iw_cause_t cause) {
         [IW_CAUSE_SHUTDOWN] = "start it again to go on",
         [IW_CAUSE_RESTART] = "look for the crash in the log, then arm again",
     };
-    return (unsigned)cause < IW_CAUSES ? cures[cause] : cures[IW_CAUSE_INTERNAL];
+    return ((unsigned)cause < IW_CAUSES) ? cures[cause] : cures[IW_CAUSE_INTERNAL];
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define PICK(table, index)                                                                                             \
-    ((size_t)(index) < sizeof(table) / sizeof(table)[0] && (table)[index] != NULL ? (table)[index] : "unknown")
+    ((size_t)(index) < sizeof table / sizeof table[0] && (table)[index] != NULL ? (table)[index] : "unknown")
 
 const char *iwn_error_name(iwn_error_t error) {
     static const char *const names[IWN_ERRORS] = {
@@ -62,7 +62,7 @@ iwn_error_t iwn_error_of(iw_refusal_t refusal) {
         [IW_REFUSE_LISTEN_ONLY] = IWN_LISTEN_ONLY,
         [IW_REFUSE_CONTRADICTED] = IWN_DENIED,
     };
-    return (size_t)refusal < sizeof errors / sizeof errors[0] ? errors[refusal] : IWN_INTERNAL;
+    return ((size_t)refusal < sizeof errors / sizeof errors[0]) ? errors[refusal] : IWN_INTERNAL;
 }
 
 const char *iwn_topic_name(iwn_topic_t topic) {
@@ -119,7 +119,7 @@ const char *iwn_estop_name(int answer, bool present) {
     if (!present) {
         return "none";
     }
-    return answer == 0 ? "released" : answer > 0 ? "pressed" : "unreadable";
+    return (answer == 0) ? "released" : (answer > 0) ? "pressed" : "unreadable";
 }
 
 const char *iwn_sides_name(uint8_t sides) {
@@ -192,7 +192,7 @@ const char *iwn_ledger_item_name(iw_ledger_item_t item) {
 }
 
 bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         if (strcmp(name, iwn_ledger_item_name((iw_ledger_item_t)item)) == 0) {
             *out_item = (iw_ledger_item_t)item;
             return true;

@@ -17,7 +17,7 @@ static void write_mcr(const iw_bxcan_t *self, uint32_t request) {
 }
 
 void iw_bxcan_init(iw_bxcan_t *self, const iw_bxcan_config_t *config) {
-    (void)memset(self, 0, sizeof *self);
+    memset(self, 0, sizeof *self);
     self->config = *config;
     write_mcr(self, IW_MCR_INRQ);
 }
@@ -167,7 +167,7 @@ static bool abort_all(iw_bxcan_t *self) {
 }
 
 static void forget(iw_bxcan_t *self) {
-    (void)memset(self->outgoing, 0, sizeof self->outgoing);
+    memset(self->outgoing, 0, sizeof self->outgoing);
     self->epoch++;
 }
 

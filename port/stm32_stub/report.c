@@ -6,7 +6,7 @@
 #include "console.h"
 #include "pins.h"
 
-#define WORDS(names, index) (((size_t)(index) < sizeof(names) / sizeof(names)[0]) ? (names)[index] : "?")
+#define WORDS(names, index) (((size_t)(index) < sizeof names / sizeof names[0]) ? (names)[index] : "?")
 
 // What is shown now, in one number; 0: nothing was shown yet.
 static uint32_t shown;

@@ -135,7 +135,7 @@ static void encode_line(uint32_t id, const char *text) {
 static void row_line(uint32_t number) {
     const iw_codec_row_t *row = &iw_codec_rows[number % IW_CODEC_ROWS];
     printf("%u %u %u %s %s\n", row->id, row->length, row->period_ms, iw_codec_name((iw_codec_kind_t)row->kind),
-           row->side == IW_LEFT ? "left" : "right");
+           (row->side == IW_LEFT) ? "left" : "right");
 }
 
 int main(void) {

@@ -26,7 +26,7 @@ static void judge_line(const char *line, size_t length) {
     candump_t frame;
     const char *why = NULL;
     // A copy of exactly that length: a byte read behind it is found.
-    char *const copy = malloc(length > 0U ? length : 1U);
+    char *const copy = malloc((length > 0U) ? length : 1U);
     memcpy(copy, line, length);
     switch (candump_parse(copy, length, &frame, &why)) {
     case CANDUMP_FRAME:

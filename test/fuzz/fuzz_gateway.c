@@ -136,7 +136,7 @@ static void put_any(world_t *world, fuzz_bytes_t *bytes) {
     static const uint16_t ids[] = {266, 298, 257, 289, 290, 512, 544, 513, 545, 600, 256, 288};
     iw_can_frame_t frame = {.id = ids[fuzz_byte(bytes) % (sizeof ids / sizeof ids[0])]};
     const uint8_t format = fuzz_byte(bytes);
-    frame.id |= (format & 0xF0U) == 0xF0U ? (uint32_t)format << 28 : 0U;
+    frame.id |= ((format & 0xF0U) == 0xF0U) ? (uint32_t)format << 28 : 0U;
     frame.dlc = format % 9U;
     for (size_t i = 0; i < IW_CAN_DATA_MAX; i++) {
         frame.data[i] = fuzz_byte(bytes);

@@ -77,7 +77,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         return -1;
     }
     // A copy of exactly that length: a byte read behind it is found.
-    char *const line = malloc(size > 0U ? size : 1U);
+    char *const line = malloc((size > 0U) ? size : 1U);
     memcpy(line, data, size);
     memset(&request, 0xA5, sizeof request);
     memset(&refusal, 0xA5, sizeof refusal);

@@ -97,11 +97,11 @@ __attribute__((format(printf, 3, 4))) static bool refuse(iwn_refusal_t *out_refu
 static bool too_deep(const char *line, size_t length) {
     unsigned depth = 0;
     bool in_text = false;
-    for (size_t i = 0; i < length; ++i) {
+    for (size_t i = 0; i < length; i++) {
         const char c = line[i];
         if (in_text) {
             in_text = c != '"';
-            i += c == '\\' ? 1U : 0U;
+            i += (c == '\\') ? 1U : 0U;
         } else if (c == '"') {
             in_text = true;
         } else if (c == '{' || c == '[') {
@@ -109,7 +109,7 @@ static bool too_deep(const char *line, size_t length) {
                 return true;
             }
         } else if ((c == '}' || c == ']') && depth > 0U) {
-            --depth;
+            depth--;
         }
     }
     return false;
@@ -122,7 +122,7 @@ static bool is_plain(const char *text, size_t max) {
 
 /// May stand in a message: nothing that could have been cut in the middle of a character.
 static const char *quotable(const char *text, const char *otherwise) {
-    for (const char *c = text; *c != '\0'; ++c) {
+    for (const char *c = text; *c != '\0'; c++) {
         if (*c < 0x20 || *c > 0x7E) {
             return otherwise;
         }
@@ -139,7 +139,7 @@ static bool read_text(const field_t *field, const json_t *value, char *target, i
             "line separators, marks of writing direction)",
             field->name, field->max);
     }
-    (void)memcpy(target, text, strlen(text) + 1U);
+    memcpy(target, text, strlen(text) + 1U);
     return true;
 }
 
@@ -161,11 +161,11 @@ static bool read_topics(const json_t *value, uint8_t *target, iwn_refusal_t *out
     if (!json_is_array(value)) {
         return refuse(out_refusal, IWN_BAD_VALUE, "%s", cure);
     }
-    for (size_t i = 0; i < json_array_size(value); ++i) {
+    for (size_t i = 0; i < json_array_size(value); i++) {
         const char *word = json_string_value(json_array_get(value, i));
         unsigned topic = 0;
         while (word != NULL && topic < IWN_TOPICS && strcmp(word, iwn_topic_name((iwn_topic_t)topic)) != 0) {
-            ++topic;
+            topic++;
         }
         if (word == NULL || topic == IWN_TOPICS) {
             return refuse(out_refusal, IWN_BAD_VALUE, "%s", cure);
@@ -242,7 +242,7 @@ static bool read_id(const json_t *root, iwn_id_t *out_id, iwn_refusal_t *out_ref
         *out_id = (iwn_id_t){.kind = IWN_ID_NUMBER, .number = json_integer_value(value)};
     } else if (text != NULL && is_plain(text, IWN_ID_TEXT_MAX)) {
         out_id->kind = IWN_ID_TEXT;
-        (void)memcpy(out_id->text, text, strlen(text) + 1U);
+        memcpy(out_id->text, text, strlen(text) + 1U);
     } else if (value != NULL) {
         return refuse(out_refusal, IWN_BAD_VALUE,
                       "id must be an integer or a text of at most %u bytes without characters that move a terminal "
@@ -261,7 +261,7 @@ static bool read_cmd(const json_t *root, iwn_cmd_t *out_cmd, iwn_refusal_t *out_
     if (name == NULL) {
         return refuse(out_refusal, IWN_BAD_VALUE, "cmd must be a text, for example {\"cmd\":\"status\"}");
     }
-    for (unsigned i = 0; i < IWN_CMDS; ++i) {
+    for (unsigned i = 0; i < IWN_CMDS; i++) {
         if (strcmp(name, cmd_names[i]) == 0) {
             *out_cmd = (iwn_cmd_t)i;
             return true;
@@ -272,7 +272,7 @@ static bool read_cmd(const json_t *root, iwn_cmd_t *out_cmd, iwn_refusal_t *out_
 }
 
 static const field_t *find_field(const char *name, iwn_cmd_t cmd) {
-    for (size_t i = 0; i < FIELDS; ++i) {
+    for (size_t i = 0; i < FIELDS; i++) {
         if ((fields[i].allowed & BIT(cmd)) != 0U && strcmp(name, fields[i].name) == 0) {
             return &fields[i];
         }
@@ -301,7 +301,7 @@ static bool read_fields(json_t *root, iwn_request_t *request, iwn_refusal_t *out
 
 /// Every field that must be there is.
 static bool is_complete(const json_t *root, const iwn_request_t *request, iwn_refusal_t *out_refusal) {
-    for (size_t i = 0; i < FIELDS; ++i) {
+    for (size_t i = 0; i < FIELDS; i++) {
         const bool needed = fields[i].required && (fields[i].allowed & BIT(request->cmd)) != 0U;
         if (needed && json_object_get(root, fields[i].name) == NULL) {
             return refuse(out_refusal, IWN_MISSING_FIELD, "%s needs %s", cmd_names[request->cmd], fields[i].name);
@@ -331,7 +331,7 @@ bool old_request_read(const char *line, size_t length, iwn_request_t *out_reques
     used = 0;
     json_t *root = json_loadb(line, length, JSON_REJECT_DUPLICATES, &error);
     if (!json_is_object(root)) {
-        const char *reason = root == NULL ? error.text : "it is not an object";
+        const char *reason = (root == NULL) ? error.text : "it is not an object";
         return refuse(out_refusal, IWN_BAD_JSON, "not one JSON object on one line: %s", quotable(reason, "unreadable"));
     }
     if (!read_id(root, &out_request->id, out_refusal) || !read_cmd(root, &out_request->cmd, out_refusal) ||

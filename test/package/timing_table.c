@@ -51,7 +51,7 @@ static const controller_t controllers[] = {
 };
 
 static const char *verdict(unsigned off_permille) {
-    return off_permille <= 5U ? "yes" : off_permille <= 25U ? "with a warning" : "**no**";
+    return (off_permille <= 5U) ? "yes" : (off_permille <= 25U) ? "with a warning" : "**no**";
 }
 
 static void row(const controller_t *controller) {
@@ -70,7 +70,7 @@ static void row(const controller_t *controller) {
 
 int main(void) {
     (void)puts("| controller | its clock | nearest sample point at 1 Mbit/s | for iWheels |\n|---|---|---|---|");
-    for (size_t i = 0; i < sizeof controllers / sizeof controllers[0]; ++i) {
+    for (size_t i = 0; i < sizeof controllers / sizeof controllers[0]; i++) {
         row(&controllers[i]);
     }
     return 0;

@@ -43,7 +43,7 @@ BUGS = [
     Bug("takeover-unasked", "R3", "permit.c", "(!takeover || iw_permit_arming(self))", "(iw_permit_arming(self))"),
     Bug("anybody-drives", "R3", "permit.c", "if (self->holder != client) { return IW_REFUSE_NOT_HOLDER; }", "if (client == IW_CLIENT_NONE) { return IW_REFUSE_NOT_HOLDER; }"),
     Bug("target-survives-stop", "R3", "setpoint.c", "self->demand = demand; forget_command(self);", "self->demand = demand;"),
-    Bug("rest-by-one-frame", "R3", "wheel.c", "return (rest_us < UINT32_MAX) ? (uint32_t)rest_us : UINT32_MAX;", "(void)rest_us; return UINT32_MAX;"),
+    Bug("rest-by-one-frame", "R3", "wheel.c", "return (rest_us < UINT32_MAX) ? (uint32_t)rest_us : UINT32_MAX;", "return UINT32_MAX;"),
     Bug("restart-without-zeros", "R3", "permit.c", "if (restarted && may_send(config)) {", "if (restarted && config->listen_only) {"),
     Bug("restart-yields-at-once", "R3", "permit.c", "self->strangers > LEFT_BEHIND_MAX", "self->strangers > 0U"),
     Bug("no-hold", "R4", "permit.c", "held_us >= (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS && time", "held_us >= 1000U && time"),

@@ -188,7 +188,7 @@ void scenario_draw(scenario_t *self, uint64_t seed) {
     const uint32_t minutes4 = (uint32_t)(self->chaos_us / (15U * S)) + 1U;
     const uint32_t rate = between(&random, 1, 3);
     for (unsigned kind = 0; kind < EV_KINDS; kind++) {
-        if (kind < EV_GOOD_CLIENT ? chance(&random, 25) : chance(&random, 40)) {
+        if ((kind < EV_GOOD_CLIENT) ? chance(&random, 25) : chance(&random, 40)) {
             draw_kind(self, kind, between(&random, 1, minutes4 * rate), &random);
         }
     }

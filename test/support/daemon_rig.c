@@ -51,7 +51,7 @@ int64_t iw_clock_wall_us(void) {
 
 static int rig_send(void *self, const iw_can_frame_t *frame) {
     daemon_rig_t *rig = &daemon_rig;
-    const iw_side_t side = frame->id == IW_ID_LEFT_SETPOINT ? IW_LEFT : IW_RIGHT;
+    const iw_side_t side = (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT;
     (void)self;
     if (rig->bus < IW_BUS_PASSIVE) {
         return -1;
@@ -122,12 +122,12 @@ static int rig_pressed(void *self, bool quiet) {
     (void)self;
     rig->estop_told = rig->estop;
     rig->estop_pulse = rig->estop_pulse && quiet;
-    return rig->estop == 0 && pulse ? 1 : rig->estop;
+    return (rig->estop == 0 && pulse) ? 1 : rig->estop;
 }
 
 static int rig_trouble(const void *self) {
     (void)self;
-    return daemon_rig.estop < 0 ? ENODEV : 0;
+    return (daemon_rig.estop < 0) ? ENODEV : 0;
 }
 
 static const iw_bus_ops_t bus_ops = {.close = rig_close,
@@ -154,7 +154,7 @@ static void take_from_world(daemon_rig_t *rig) {
     while (sim_world_step(&rig->world, rig->now_us, &delivery)) {
         if (rig->rx_count < DAEMON_RX_MAX) {
             rig->rx[rig->rx_count] = delivery.frame;
-            rig->rx[rig->rx_count++].kind = delivery.port == rig->port ? IW_CAN_ECHO : IW_CAN_RECEIVED;
+            rig->rx[rig->rx_count++].kind = (delivery.port == rig->port) ? IW_CAN_ECHO : IW_CAN_RECEIVED;
         }
     }
 }
@@ -178,16 +178,16 @@ static int find_events(daemon_rig_t *rig, int fd, struct epoll_event *events, in
     show(rig->bus_fd, rig->rx_next < rig->rx_count);
     show(rig->estop_fd, rig->estop_pulse || (rig->estop != rig->estop_told && !rig->estop_silent));
     const long more = syscall(SYS_epoll_pwait, fd, &events[count], max - count, 0, NULL, 8);
-    return count + (more > 0 ? (int)more : 0);
+    return count + ((more > 0) ? (int)more : 0);
 }
 
 static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
-    return a_us < b_us ? a_us : b_us;
+    return (a_us < b_us) ? a_us : b_us;
 }
 
 int epoll_wait(int fd, struct epoll_event *events, int max, int timeout_ms) {
     daemon_rig_t *rig = &daemon_rig;
-    const iw_time_us_t end_us = timeout_ms < 0 ? IW_NEVER : rig->now_us + (iw_time_us_t)timeout_ms * IW_US_PER_MS;
+    const iw_time_us_t end_us = (timeout_ms < 0) ? IW_NEVER : rig->now_us + (iw_time_us_t)timeout_ms * IW_US_PER_MS;
     rig->waits++;
     rig->now_us += rig->stolen_us;
     rig->stolen_us = 0;
@@ -203,7 +203,7 @@ int epoll_wait(int fd, struct epoll_event *events, int max, int timeout_ms) {
         }
         iw_time_us_t next_us = earlier(sim_world_wake_us(&rig->world), rig->daemon->wakeup.due_us);
         next_us = earlier(earlier(next_us, end_us), rig->until_us);
-        rig->now_us = next_us > rig->now_us ? next_us : rig->now_us + 1U;
+        rig->now_us = (next_us > rig->now_us) ? next_us : rig->now_us + 1U;
     }
 }
 
@@ -254,7 +254,7 @@ void daemon_rig_start(void) {
 
 void daemon_rig_crash(void) {
     gw_daemon_t *daemon = daemon_rig.daemon;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         if (daemon->client[i].id != IW_CLIENT_NONE) {
             (void)close(daemon->client[i].fd);
         }
@@ -293,7 +293,7 @@ void daemon_rig_end(void) {
         daemon_rig_crash();
     }
     static const char *const left[] = {"bus.armed", "bus.gateway-lock", ""};
-    for (size_t i = 0; i < sizeof left / sizeof left[0]; ++i) {
+    for (size_t i = 0; i < sizeof left / sizeof left[0]; i++) {
         (void)snprintf(path, sizeof path, "%s/%s", daemon_rig.folder, left[i]);
         (void)remove(path);
     }
@@ -319,7 +319,7 @@ int daemon_rig_connect(void) {
 /// One line of what has come, without its end. False: there is no whole one.
 static bool take_line(int client, char *out_line, size_t size) {
     const ssize_t seen = recv(client, out_line, size - 1U, MSG_PEEK | MSG_DONTWAIT);
-    const char *end = seen > 0 ? (const char *)memchr(out_line, '\n', (size_t)seen) : NULL;
+    const char *end = (seen > 0) ? (const char *)memchr(out_line, '\n', (size_t)seen) : NULL;
     if (end == NULL) {
         return false;
     }
@@ -335,7 +335,7 @@ const char *daemon_rig_ask(int client, const char *line) {
     }
     TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
     TEST_ASSERT_EQUAL_INT(1, (int)send(client, "\n", 1, MSG_NOSIGNAL));
-    for (unsigned ms = 0; ms < REPLY_MS; ++ms) {
+    for (unsigned ms = 0; ms < REPLY_MS; ms++) {
         daemon_rig_run(1);
         while (take_line(client, reply, sizeof daemon_rig.reply)) {
             if (strstr(reply, "\"ok\":") != NULL) {
@@ -362,7 +362,7 @@ void daemon_rig_drive(int client, int left_mm_s, int right_mm_s, unsigned for_ms
         const char *reply = daemon_rig_ask(client, line);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":true"), reply);
         const unsigned used_ms = (unsigned)((daemon_rig.now_us - begin_us) / IW_US_PER_MS);
-        daemon_rig_run(used_ms < 20U ? 20U - used_ms : 1U);
+        daemon_rig_run((used_ms < 20U) ? 20U - used_ms : 1U);
     }
 }
 

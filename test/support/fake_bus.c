@@ -6,7 +6,7 @@
 #define UNKNOWN_ID 0x7FFU
 
 static iw_side_t side_of(const iw_can_frame_t *frame) {
-    return frame->id == IW_ID_LEFT_SETPOINT ? IW_LEFT : IW_RIGHT;
+    return (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT;
 }
 
 iw_command_t fake_bus_command(const iw_can_frame_t *frame) {
@@ -30,7 +30,7 @@ void fake_bus_init(fake_bus_t *self, iw_time_us_t now_us) {
 static int fake_send(void *context, const iw_can_frame_t *frame) {
     fake_bus_t *const self = context;
     const iw_side_t side = side_of(frame);
-    const int result = self->flights < FAKE_BUS_FLIGHT_MAX ? self->send_result[side] : 0;
+    const int result = (self->flights < FAKE_BUS_FLIGHT_MAX) ? self->send_result[side] : 0;
     if (self->listener != NULL) {
         self->listener(self->listener_context, frame, result > 0);
     }
@@ -95,7 +95,7 @@ static int fake_estop(void *context) {
     fake_bus_t *const self = context;
     const bool edge = self->estop_edge;
     self->estop_edge = false;
-    return self->estop_level != 0 ? self->estop_level : edge;
+    return (self->estop_level != 0) ? self->estop_level : edge;
 }
 
 iw_hal_t fake_bus_hal(fake_bus_t *self) {

@@ -12,7 +12,7 @@
 fake_interface_t fake_interface;
 
 void fake_interface_init(void) {
-    (void)memset(&fake_interface, 0, sizeof fake_interface);
+    memset(&fake_interface, 0, sizeof fake_interface);
     fake_interface.presence = IW_LINK_UP;
     fake_interface.index = 3;
     fake_interface.carrier = 1;
@@ -37,7 +37,7 @@ void fake_interface_put_error(uint32_t what, uint8_t controller, int flags) {
 
 /// The other socket never counts what it has lost; that tells the two apart.
 static fake_queue_t *queue_of(const iw_socketcan_socket_t *self) {
-    return self->lost == UINT32_MAX ? &fake_interface.others : &fake_interface.ours;
+    return (self->lost == UINT32_MAX) ? &fake_interface.others : &fake_interface.ours;
 }
 
 void iw_socketcan_socket_init(iw_socketcan_socket_t *self) {
@@ -49,9 +49,9 @@ int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_sock
     if (interface != fake_interface.index) {
         return ENODEV;
     }
-    fake_interface.opened += share == IW_SOCKETCAN_OURS ? 1U : 0U;
+    fake_interface.opened += (share == IW_SOCKETCAN_OURS) ? 1U : 0U;
     self->fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-    self->lost = share == IW_SOCKETCAN_OURS ? 0U : UINT32_MAX;
+    self->lost = (share == IW_SOCKETCAN_OURS) ? 0U : UINT32_MAX;
     queue_of(self)->count = 0; // A new socket has an empty queue.
     return 0;
 }
@@ -87,7 +87,7 @@ int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
         queue->count--;
     }
     self->drained = self->count < IW_SOCKETCAN_BATCH;
-    self->lost = queue == &fake_interface.ours ? queue->lost : self->lost;
+    self->lost = (queue == &fake_interface.ours) ? queue->lost : self->lost;
     return error;
 }
 

@@ -28,7 +28,7 @@ void force_rig_quiet(force_rig_t *self, uint32_t samples, int16_t raw) {
 
 void force_rig_alternate(force_rig_t *self, int16_t even, int16_t odd) {
     for (uint32_t n = 0; n < IW_FORCE_WINDOW_SAMPLES; n++) {
-        force_rig_hear(self, (n & 1U) == 0U ? even : odd, true);
+        force_rig_hear(self, ((n & 1U) == 0U) ? even : odd, true);
     }
 }
 

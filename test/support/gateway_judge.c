@@ -54,7 +54,7 @@ static void judge_right_to_move(gateway_judge_t *self, iw_side_t side, int32_t s
 
 static void judge_frame(void *context, const iw_can_frame_t *frame, bool accepted) {
     gateway_judge_t *const self = context;
-    const iw_side_t side = frame->id == IW_ID_LEFT_SETPOINT ? IW_LEFT : IW_RIGHT;
+    const iw_side_t side = (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : IW_RIGHT;
     const iw_command_t command = fake_bus_command(frame);
     const bool zero = is_zero(self, &command);
     const bool listening = iw_gateway_state(self->gateway) == IW_STATE_LISTENING;
@@ -130,7 +130,7 @@ static void judge_gap(gateway_judge_t *self) {
         self->gap_us = bus->now_us;
     }
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const iw_time_us_t from_us = self->frame_us[side] > self->gap_us ? self->frame_us[side] : self->gap_us;
+        const iw_time_us_t from_us = (self->frame_us[side] > self->gap_us) ? self->frame_us[side] : self->gap_us;
         blame(self, bus->now_us - from_us >= MS(100), "4: a gap of 100 ms between setpoints");
     }
 }

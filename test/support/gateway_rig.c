@@ -78,7 +78,7 @@ static void advance(gateway_rig_t *self) {
 }
 
 void gateway_rig_step(gateway_rig_t *self) {
-    const iw_time_us_t late_us = self->now_us > self->wake_us ? self->now_us - self->wake_us : 0;
+    const iw_time_us_t late_us = (self->now_us > self->wake_us) ? self->now_us - self->wake_us : 0;
     advance(self);
     gateway_judge_before(&self->judge, self->bus.estop_level != 0 || self->bus.estop_edge, late_us);
     self->wake_us = iw_gateway_step(&self->gateway, self->now_us);
@@ -87,7 +87,7 @@ void gateway_rig_step(gateway_rig_t *self) {
 }
 
 static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {
-    return a < b ? a : b;
+    return (a < b) ? a : b;
 }
 
 void gateway_rig_run(gateway_rig_t *self, iw_time_us_t for_us) {
@@ -99,12 +99,12 @@ void gateway_rig_run(gateway_rig_t *self, iw_time_us_t for_us) {
         if (next_us > until_us || self->judge.violation != NULL) {
             break;
         }
-        steps_now = next_us > self->now_us ? 0U : steps_now + 1U;
+        steps_now = (next_us > self->now_us) ? 0U : steps_now + 1U;
         if (steps_now > STEPS_AT_ONCE_MAX) {
             self->judge.violation = "asks to be called again at once, for ever";
             break;
         }
-        self->now_us = next_us > self->now_us ? next_us : self->now_us;
+        self->now_us = (next_us > self->now_us) ? next_us : self->now_us;
         gateway_rig_step(self);
     }
     self->now_us = until_us;

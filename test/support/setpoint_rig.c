@@ -28,7 +28,7 @@ void setpoint_rig_demand(setpoint_rig_t *self, iw_demand_t demand) {
 iw_pair_t setpoint_rig_take_next(setpoint_rig_t *self) {
     const iw_time_us_t next_us = iw_setpoint_next_us(&self->setpoint);
     TEST_ASSERT_TRUE_MESSAGE(next_us != IW_NEVER, "nothing will ever be due");
-    return setpoint_rig_take_after(self, next_us > self->now_us ? next_us - self->now_us : 0);
+    return setpoint_rig_take_after(self, (next_us > self->now_us) ? next_us - self->now_us : 0);
 }
 
 iw_pair_t setpoint_rig_take_after(setpoint_rig_t *self, iw_time_us_t for_us) {

@@ -37,7 +37,7 @@ static void step(world_rig_t *rig) {
     while (sim_world_step(&rig->world, rig->now_us, &delivery)) {
         TEST_ASSERT_LESS_THAN_UINT(WORLD_RX_MAX, rig->rx_count);
         rig->rx[rig->rx_count] = delivery.frame;
-        rig->rx[rig->rx_count++].kind = delivery.port == rig->port ? IW_CAN_ECHO : IW_CAN_RECEIVED;
+        rig->rx[rig->rx_count++].kind = (delivery.port == rig->port) ? IW_CAN_ECHO : IW_CAN_RECEIVED;
     }
     (void)iw_gateway_step(&rig->gateway, rig->now_us);
     iw_snapshot_t seen;

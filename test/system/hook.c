@@ -25,9 +25,9 @@ static const char asleep[] = "asleep ";
 /// What the file says; empty without one.
 static void read_order(char line[LINE_SIZE]) {
     const char *path = getenv("IWHEEL_HOOK");
-    const int fd = path == NULL ? -1 : open(path, O_RDONLY | O_CLOEXEC);
-    const ssize_t length = fd < 0 ? -1 : read(fd, line, LINE_SIZE - 1);
-    line[length > 0 ? length : 0] = '\0';
+    const int fd = (path == NULL) ? -1 : open(path, O_RDONLY | O_CLOEXEC);
+    const ssize_t length = (fd < 0) ? -1 : read(fd, line, LINE_SIZE - 1);
+    line[(length > 0) ? length : 0] = '\0';
     if (fd >= 0) {
         (void)close(fd);
     }
@@ -45,7 +45,7 @@ static void hang_if(const char *word) {
 /// The function that ours stands in front of.
 static void find(const char *name, void *out_function, size_t size) {
     void *const symbol = dlsym(RTLD_NEXT, name);
-    (void)memcpy(out_function, &symbol, size);
+    memcpy(out_function, &symbol, size);
 }
 
 ssize_t recv(int fd, void *buffer, size_t size, int flags) {

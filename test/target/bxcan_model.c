@@ -26,7 +26,7 @@ void bxcan_model_destroy(bxcan_model_t *self) {
 }
 
 void bxcan_model_reset(bxcan_model_t *self, uint32_t banks) {
-    (void)memset(self, 0, sizeof *self);
+    memset(self, 0, sizeof *self);
     self->banks = banks;
     self->mcr = 0x00010002U;
     self->msr = 0x00000C02U;
@@ -141,7 +141,7 @@ static uint32_t read_fifo_status(bxcan_model_t *self, model_fifo_t *fifo) {
     }
     const uint32_t flags = (fifo->full ? RFR_FULL : 0U) | (fifo->overrun ? RFR_FOVR : 0U);
     (void)self;
-    return fifo->count | flags | (fifo->release_reads > 0U ? RFR_RFOM : 0U);
+    return fifo->count | flags | ((fifo->release_reads > 0U) ? RFR_RFOM : 0U);
 }
 
 static void write_fifo_status(bxcan_model_t *self, model_fifo_t *fifo, uint32_t value, uint32_t offset) {
@@ -170,8 +170,8 @@ static uint32_t read_fifo_output(bxcan_model_t *self, uint32_t offset) {
 }
 
 static uint32_t read_esr(const bxcan_model_t *self) {
-    const uint32_t most = self->tec > self->rec ? self->tec : self->rec;
-    return (most >= 96U ? 1U : 0U) | (most > 127U ? ESR_EPVF : 0U) | (self->bus_off ? ESR_BOFF : 0U) |
+    const uint32_t most = (self->tec > self->rec) ? self->tec : self->rec;
+    return ((most >= 96U) ? 1U : 0U) | ((most > 127U) ? ESR_EPVF : 0U) | (self->bus_off ? ESR_BOFF : 0U) |
            (self->lec << 4) | ((self->tec & 0xFFU) << 16) | (self->rec << 24);
 }
 

@@ -16,7 +16,7 @@ void model_bytes_of(uint32_t low, uint32_t high, uint8_t *out_bytes) {
 void model_fifo_release(model_fifo_t *fifo) {
     fifo->count--;
     fifo->full = false;
-    (void)memmove(&fifo->entry[0], &fifo->entry[1], (MODEL_DEPTH - 1U) * sizeof fifo->entry[0]);
+    memmove(&fifo->entry[0], &fifo->entry[1], (MODEL_DEPTH - 1U) * sizeof fifo->entry[0]);
 }
 
 static uint32_t *filter_register(bxcan_model_t *self, uint32_t offset) {

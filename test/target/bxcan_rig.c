@@ -86,7 +86,7 @@ void iw_register_write(iw_register_t *address, uint32_t value) {
 void rig_reset(void) {
     is_serving = false;
     for (int i = 0; i < RIG_DEVICES; i++) {
-        (void)memset(&rig[i], 0xA5, sizeof rig[i]);
+        memset(&rig[i], 0xA5, sizeof rig[i]);
         rig[i].on_read = NULL;
         rig[i].reset = 0;
         rig[i].interrupts = 0;

@@ -59,7 +59,7 @@ iw_bus_state_t my_bus_state(void *context) {
 
 int my_purge(void *context) {
     (void)context;
-    (void)memset(my_can.is_full, 0, sizeof my_can.is_full);
+    memset(my_can.is_full, 0, sizeof my_can.is_full);
     return 1;
 }
 

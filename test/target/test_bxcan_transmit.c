@@ -417,7 +417,7 @@ static void test_random_traffic_keeps_the_account(void) {
         case 0:
         case 1:
             mark = (uint8_t)(mark % 100U + 1U);
-            if (send(side == 0U ? 266U : 298U, mark) > 0) {
+            if (send((side == 0U) ? 266U : 298U, mark) > 0) {
                 TEST_ASSERT_LESS_THAN_MESSAGE(2, open[side], "a third frame is on its way");
                 marks[side][open[side]++] = mark;
                 newest_sent[side] = mark;

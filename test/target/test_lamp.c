@@ -10,7 +10,7 @@ void setUp(void);
 void tearDown(void);
 
 void setUp(void) {
-    (void)memset(&seen, 0, sizeof seen);
+    memset(&seen, 0, sizeof seen);
     seen.bus = IW_BUS_ACTIVE;
 }
 
@@ -47,7 +47,7 @@ static void test_pressed_contact_shows_before_any_state(void) {
 static void test_listening_tells_whether_the_bus_is_there(void) {
     for (int bus = IW_BUS_DOWN; bus <= IW_BUS_ACTIVE; bus++) {
         seen.bus = (iw_bus_state_t)bus;
-        TEST_ASSERT_EQUAL_HEX16(bus < IW_BUS_PASSIVE ? IW_LAMP_NO_BUS : IW_LAMP_LISTENING,
+        TEST_ASSERT_EQUAL_HEX16((bus < IW_BUS_PASSIVE) ? IW_LAMP_NO_BUS : IW_LAMP_LISTENING,
                                 pattern_in(IW_STATE_LISTENING));
     }
 }

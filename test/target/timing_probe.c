@@ -24,5 +24,5 @@ int main(void) {
     const bool is_solved = iw_bit_timing_solve(&limits, IW_BOARD_APB1_HZ, &wanted, &solved) == IW_OK;
     const bool same = ours.prescaler == solved.prescaler && ours.tseg1 == solved.tseg1 && ours.tseg2 == solved.tseg2;
     (void)printf("%u Hz: BTR 0x%08X\n", (unsigned)IW_BOARD_APB1_HZ, (unsigned)IW_BIT_BTR);
-    return is_exact(&ours) && is_solved && same && jump <= ours.tseg2 && jump <= 4U ? 0 : 1;
+    return (is_exact(&ours) && is_solved && same && jump <= ours.tseg2 && jump <= 4U) ? 0 : 1;
 }

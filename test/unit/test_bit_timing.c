@@ -27,7 +27,7 @@ static distance_t distance_of(uint32_t tseg1, uint32_t tseg2, uint32_t wanted_pe
     const uint64_t quanta = 1U + tseg1 + tseg2;
     const uint64_t is = 1000U * (1U + (uint64_t)tseg1);
     const uint64_t wanted = wanted_permille * quanta;
-    const distance_t distance = {is > wanted ? is - wanted : wanted - is, quanta};
+    const distance_t distance = {(is > wanted) ? is - wanted : wanted - is, quanta};
     return distance;
 }
 

@@ -12,7 +12,7 @@ void setUp(void) {
     const size_t size = blackbox_ring_size(1);
     ring = (blackbox_ring_t *)malloc(size);
     TEST_ASSERT_NOT_NULL(ring);
-    (void)memset(ring, 0xA5, size);
+    memset(ring, 0xA5, size);
     blackbox_ring_init(ring, 1);
 }
 
@@ -21,7 +21,7 @@ void tearDown(void) {
 }
 
 static void put(uint64_t from, uint64_t to) {
-    for (uint64_t i = from; i < to; ++i) {
+    for (uint64_t i = from; i < to; i++) {
         const blackbox_entry_t entry = {.at_us = i, .number = (uint32_t)i, .kind = BLACKBOX_FRAME};
         blackbox_ring_put(ring, &entry);
     }
@@ -31,7 +31,7 @@ static void expect(uint64_t from, uint64_t to, uint64_t first, size_t count) {
     size_t got;
     TEST_ASSERT_EQUAL_UINT64(first, blackbox_ring_copy(ring, from, to, out, &got));
     TEST_ASSERT_EQUAL_size_t(count, got);
-    for (size_t i = 0; i < got; ++i) {
+    for (size_t i = 0; i < got; i++) {
         TEST_ASSERT_EQUAL_UINT64(first + i, out[i].at_us);
     }
 }
@@ -71,7 +71,7 @@ static void test_size_follows_the_seconds_and_has_a_least(void) {
 }
 
 static void test_every_kind_has_a_name_of_its_own(void) {
-    for (unsigned kind = 0; kind < BLACKBOX_KINDS; ++kind) {
+    for (unsigned kind = 0; kind < BLACKBOX_KINDS; kind++) {
         TEST_ASSERT_EQUAL(kind, blackbox_kind_of(blackbox_kind_name((blackbox_kind_t)kind)));
     }
     TEST_ASSERT_EQUAL(BLACKBOX_KINDS, blackbox_kind_of("nonsense"));

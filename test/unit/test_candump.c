@@ -13,15 +13,15 @@ void tearDown(void) {}
 static candump_result_t parse(const char *line, candump_t *out, const char **out_why) {
     char exact[512];
     const size_t length = strlen(line);
-    (void)memset(exact, 'A', sizeof exact);
-    (void)memcpy(&exact[sizeof exact - length], line, length);
+    memset(exact, 'A', sizeof exact);
+    memcpy(&exact[sizeof exact - length], line, length);
     return candump_parse(&exact[sizeof exact - length], length, out, out_why);
 }
 
 static candump_t good(const char *line) {
     candump_t frame;
     const char *why = "";
-    (void)memset(&frame, 0xA5, sizeof frame);
+    memset(&frame, 0xA5, sizeof frame);
     TEST_ASSERT_EQUAL_MESSAGE(CANDUMP_FRAME, parse(line, &frame, &why), line);
     return frame;
 }
@@ -30,7 +30,7 @@ static void check_bad(const char *line, const char *part_of_why) {
     candump_t frame;
     candump_t before;
     const char *why = "";
-    (void)memset(&frame, 0xA5, sizeof frame);
+    memset(&frame, 0xA5, sizeof frame);
     before = frame;
     TEST_ASSERT_EQUAL_MESSAGE(CANDUMP_BAD, parse(line, &frame, &why), line);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(why, part_of_why), why);
@@ -102,7 +102,7 @@ static void test_blank_lines_and_comments_are_empty(void) {
     candump_t frame;
     const char *why;
     const char *const lines[] = {"", "\n", " \t\r\n", "# a comment", "; another", "  # (1.0) can0 100#00"};
-    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; ++i) {
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         TEST_ASSERT_EQUAL_MESSAGE(CANDUMP_EMPTY, parse(lines[i], &frame, &why), lines[i]);
     }
 }
@@ -135,7 +135,7 @@ static void test_bad_line_tells_cause_and_cure(void) {
 
 static void test_fd_frame_holds_64_bytes_and_not_more(void) {
     char line[256] = "(1.0) can0 10A##0";
-    for (int i = 0; i < 64; ++i) {
+    for (int i = 0; i < 64; i++) {
         (void)strcat(line, "5A");
     }
     TEST_ASSERT_EQUAL(64, good(line).length);
@@ -165,7 +165,7 @@ static void test_longest_line_fits(void) {
     candump_t frame = {.time_us = 999999999999999999, .id = CANDUMP_ID_MASK, .extended = true, .fd = true};
     frame.mark = CANDUMP_SENT;
     frame.length = CANDUMP_DATA_MAX;
-    (void)memset(frame.interface, 'a', sizeof frame.interface - 1U);
+    memset(frame.interface, 'a', sizeof frame.interface - 1U);
     TEST_ASSERT_LESS_THAN(CANDUMP_LINE_SIZE, candump_write(&frame, line));
     TEST_ASSERT_EQUAL(64, good(line).length);
 }
@@ -183,11 +183,11 @@ static void test_written_interface_has_letters_and_digits_only(void) {
 
 static void test_core_frame_comes_back_the_same(void) {
     static const uint32_t ids[] = {0, 0x7FF, 266, 0x1FFFFFFF | IW_CAN_EXTENDED, 266 | IW_CAN_REMOTE, 266 | IW_CAN_FD};
-    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; ++i) {
-        for (uint8_t dlc = 0; dlc <= IW_CAN_DATA_MAX; ++dlc) {
+    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
+        for (uint8_t dlc = 0; dlc <= IW_CAN_DATA_MAX; dlc++) {
             iw_can_frame_t core = {.id = ids[i], .dlc = dlc, .kind = i & 1U};
             char line[CANDUMP_LINE_SIZE];
-            for (uint8_t j = 0; j < dlc && (ids[i] & IW_CAN_REMOTE) == 0U; ++j) {
+            for (uint8_t j = 0; j < dlc && (ids[i] & IW_CAN_REMOTE) == 0U; j++) {
                 core.data[j] = (uint8_t)(0xF0U + j);
             }
             candump_t frame = candump_from_core(&core, 5, "can0");
@@ -206,14 +206,14 @@ static void test_core_frame_comes_back_the_same(void) {
 static void test_damaged_lines_are_judged_without_reading_outside(void) {
     static const char *const lines[] = {"(1.5) can0 10A#0101F40064 T", "(1.5) can0 10A##1001122 R",
                                         "(1.5) can0 0000010A#R5", "(1.5) can0 100#1122334455667788_F"};
-    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; ++i) {
-        for (size_t at = 0; at < strlen(lines[i]); ++at) {
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        for (size_t at = 0; at < strlen(lines[i]); at++) {
             candump_t frame;
             const char *why;
             char damaged[64];
             (void)snprintf(damaged, sizeof damaged, "%.*s", (int)at, lines[i]);
             TEST_ASSERT_LESS_OR_EQUAL(CANDUMP_BAD, parse(damaged, &frame, &why));
-            for (unsigned byte = 1; byte < 256U; ++byte) {
+            for (unsigned byte = 1; byte < 256U; byte++) {
                 (void)snprintf(damaged, sizeof damaged, "%s", lines[i]);
                 damaged[at] = (char)byte;
                 TEST_ASSERT_LESS_OR_EQUAL(CANDUMP_BAD, parse(damaged, &frame, &why));

@@ -94,7 +94,7 @@ static void test_blank_rest_is_no_line(void) {
 
 static void test_endless_line_is_told_once_and_the_next_is_read(void) {
     char long_line[5000];
-    (void)memset(long_line, '(', sizeof long_line);
+    memset(long_line, '(', sizeof long_line);
     long_line[sizeof long_line - 1U] = '\n';
     give("(1.0) can0 100#00\n");
     give_bytes(long_line, sizeof long_line);
@@ -126,11 +126,11 @@ static void test_what_cannot_be_read_is_no_end_of_file(void) {
 
 static void test_more_than_the_buffer_holds_comes_whole(void) {
     uint64_t line = 0;
-    for (unsigned round = 0; round < 30U; ++round) {
-        for (unsigned i = 0; i < 200U; ++i) {
+    for (unsigned round = 0; round < 30U; round++) {
+        for (unsigned i = 0; i < 200U; i++) {
             give("(1.0) can0 100#0011223344556677\n");
         }
-        for (unsigned i = 0; i < 200U; ++i) {
+        for (unsigned i = 0; i < 200U; i++) {
             expect_frame(0x100, ++line);
         }
     }

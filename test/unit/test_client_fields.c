@@ -44,7 +44,7 @@ static bool jansson_takes(const char *text, size_t length) {
 static void compare(const char *text, size_t length) {
     if (iwc_json_is_object(text, length) != jansson_takes(text, length)) {
         char why[200];
-        (void)snprintf(why, sizeof(why), "%.*s", (length < 190) ? (int)length : 190, text);
+        (void)snprintf(why, sizeof why, "%.*s", (length < 190) ? (int)length : 190, text);
         TEST_ASSERT_EQUAL_MESSAGE(jansson_takes(text, length), iwc_json_is_object(text, length), why);
     }
 }
@@ -60,7 +60,7 @@ static void test_json_every_change_of_a_byte_is_judged_as_by_jansson(void) {
     char text[sizeof(STATUS)];
     unsigned taken = 0;
     for (size_t at = 0; at + 1U < sizeof(STATUS); at++) {
-        for (size_t i = 0; i + 1U < sizeof(bytes); i++) {
+        for (size_t i = 0; i + 1U < sizeof bytes; i++) {
             memcpy(text, STATUS, sizeof(STATUS));
             text[at] = bytes[i];
             compare(text, sizeof(STATUS) - 1U);
@@ -117,7 +117,7 @@ static void test_json_hard_cases_are_judged_as_by_jansson(void) {
                                         "{\"a\":1 \"b\":2}",
                                         "{\"a\" : 1 , \"b\" : [ ] }",
                                         "\xef\xbb\xbf{}"};
-    for (size_t i = 0; i < sizeof(texts) / sizeof(texts[0]); i++) {
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         compare(texts[i], strlen(texts[i]));
     }
 }
@@ -145,11 +145,11 @@ static void test_json_depth_is_bounded(void) {
 
 static void test_json_many_keys_cost_no_more_than_their_length(void) {
     static char text[IWC_LINE_MAX];
-    size_t used = (size_t)snprintf(text, sizeof(text), "{\"a\":1");
-    for (unsigned i = 0; used < sizeof(text) - 30U; i++) {
-        used += (size_t)snprintf(text + used, sizeof(text) - used, ",\"%x\":0", i + 0x10U);
+    size_t used = (size_t)snprintf(text, sizeof text, "{\"a\":1");
+    for (unsigned i = 0; used < sizeof text - 30U; i++) {
+        used += (size_t)snprintf(text + used, sizeof text - used, ",\"%x\":0", i + 0x10U);
     }
-    used += (size_t)snprintf(text + used, sizeof(text) - used, ",\"a\":2}");
+    used += (size_t)snprintf(text + used, sizeof text - used, ",\"a\":2}");
     TEST_ASSERT_FALSE(iwc_json_is_object(text, used)); // The first keys are remembered to the end.
 }
 
@@ -165,7 +165,7 @@ static void test_field_integers_are_whole_and_fit(void) {
     TEST_ASSERT_TRUE(iwc_integer(&message, "k").known);
     TEST_ASSERT_EQUAL_INT64(1, iwc_truth(&message, "f").value);
     TEST_ASSERT_FALSE(iwc_truth(&message, "e").known);
-    for (size_t i = 0; i < sizeof(unknown) / sizeof(unknown[0]); i++) {
+    for (size_t i = 0; i < sizeof unknown / sizeof unknown[0]; i++) {
         TEST_ASSERT_FALSE_MESSAGE(iwc_integer(&message, unknown[i]).known, unknown[i]);
         TEST_ASSERT_EQUAL_INT64(0, iwc_integer(&message, unknown[i]).value);
     }
@@ -175,13 +175,13 @@ static void test_field_texts_move_no_terminal_and_are_cut_between_characters(voi
     const iwc_message_t message = message_of(STATUS);
     const iwc_message_t umlauts = message_of("{\"a\":\"\xc3\xa4\xc3\xa4\\u001b\"}");
     char text[20];
-    TEST_ASSERT_TRUE(iwc_text(&message, "lease.name", text, sizeof(text)));
+    TEST_ASSERT_TRUE(iwc_text(&message, "lease.name", text, sizeof text));
     TEST_ASSERT_EQUAL_STRING("\\u001b[2J \"x\\", text);
     TEST_ASSERT_TRUE(iwc_text(&umlauts, "a", text, 4));
     TEST_ASSERT_EQUAL_STRING("\xc3\xa4", text);
     TEST_ASSERT_TRUE(iwc_text(&umlauts, "a", text, 10));
     TEST_ASSERT_EQUAL_STRING("\xc3\xa4\xc3\xa4", text);
-    TEST_ASSERT_FALSE(iwc_text(&message, "cause", text, sizeof(text)));
+    TEST_ASSERT_FALSE(iwc_text(&message, "cause", text, sizeof text));
     TEST_ASSERT_EQUAL_STRING("", text);
     TEST_ASSERT_TRUE(iwc_is(&message, "state", "armed"));
     TEST_ASSERT_FALSE(iwc_is(&message, "state", "arme"));

@@ -18,14 +18,14 @@ static char out[256];
 static void add_socket(const char *name) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int one = socket(AF_UNIX, SOCK_STREAM, 0);
-    (void)snprintf(address.sun_path, sizeof(address.sun_path), "%s/%s", directory, name);
-    TEST_ASSERT_EQUAL_INT(0, bind(one, (const struct sockaddr *)&address, sizeof(address)));
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s/%s", directory, name);
+    TEST_ASSERT_EQUAL_INT(0, bind(one, (const struct sockaddr *)&address, sizeof address));
     (void)close(one);
 }
 
 static void add_file(const char *name) {
     char path[128];
-    (void)snprintf(path, sizeof(path), "%s/%s", directory, name);
+    (void)snprintf(path, sizeof path, "%s/%s", directory, name);
     FILE *file = fopen(path, "w");
     TEST_ASSERT_NOT_NULL(file);
     (void)fclose(file);
@@ -34,17 +34,17 @@ static void add_file(const char *name) {
 void setUp(void) {
     memcpy(strrchr(directory, '-'), "-XXXXXX", 8);
     TEST_ASSERT_NOT_NULL(mkdtemp(directory));
-    memset(out, 'x', sizeof(out) - 1U);
+    memset(out, 'x', sizeof out - 1U);
 }
 
 void tearDown(void) {
     char command[128];
-    (void)snprintf(command, sizeof(command), "rm -r %s", directory);
+    (void)snprintf(command, sizeof command, "rm -r %s", directory);
     TEST_ASSERT_EQUAL_INT(0, system(command));
 }
 
 static void test_find_missing_directory_is_none(void) {
-    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find("/nonexistent", out, sizeof(out)));
+    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find("/nonexistent", out, sizeof out));
     TEST_ASSERT_EQUAL_STRING("", out);
 }
 
@@ -52,22 +52,22 @@ static void test_find_only_sockets_with_the_suffix_count(void) {
     add_file("gateway.sock");
     add_socket("control");
     add_socket(".sock");
-    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find(directory, out, sizeof(out)));
+    TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_find(directory, out, sizeof out));
 }
 
 static void test_find_the_only_one_is_taken(void) {
     char path[128];
     add_file("gateway.lock");
     add_socket("can0.sock");
-    (void)snprintf(path, sizeof(path), "%s/can0.sock", directory);
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof(out)));
+    (void)snprintf(path, sizeof path, "%s/can0.sock", directory);
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
     TEST_ASSERT_EQUAL_STRING(path, out);
 }
 
 static void test_find_several_are_listed(void) {
     add_socket("can0.sock");
     add_socket("can1.sock");
-    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof(out)));
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
     TEST_ASSERT_NOT_NULL(strstr(out, "/can0.sock"));
     TEST_ASSERT_NOT_NULL(strstr(out, "/can1.sock"));
 }
@@ -76,7 +76,7 @@ static void test_find_list_that_does_not_fit_is_cut_between_paths(void) {
     char little[48];
     add_socket("can0.sock");
     add_socket("can1.sock");
-    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, little, sizeof(little)));
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, little, sizeof little));
     TEST_ASSERT_EQUAL_STRING(".sock", little + strlen(little) - 5U);
 }
 

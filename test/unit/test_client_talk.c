@@ -34,7 +34,7 @@ static void say(const char *text) {
 static const char *hear(void) {
     size_t used = 0;
     for (ssize_t now = 1; now > 0; used += (now > 0) ? (size_t)now : 0U) {
-        now = recv(server, heard + used, sizeof(heard) - 1U - used, MSG_DONTWAIT);
+        now = recv(server, heard + used, sizeof heard - 1U - used, MSG_DONTWAIT);
     }
     heard[used] = '\0';
     return heard;
@@ -54,7 +54,7 @@ static iwc_result_t adopt_with(const char *first) {
         (void)close(server);
     }
     server = pair[1];
-    (void)setsockopt(server, SOL_SOCKET, SO_SNDBUF, &room, sizeof(room));
+    (void)setsockopt(server, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
     say(first);
     return iwc_adopt(gateway, pair[0], SOON);
 }
@@ -104,7 +104,7 @@ static void test_connect_another_service_is_garbled(void) {
     static const char *const first[] = {
         "ok iwheel-sim\n",          "[1]\n", "{\"event\":\"hi\"}\n",
         "{\"id\":1,\"ok\":true}\n", "{}\n",  "{\"event\":\"hello\",\"event\":\"hello\"}\n"};
-    for (size_t i = 0; i < sizeof(first) / sizeof(first[0]); i++) {
+    for (size_t i = 0; i < sizeof first / sizeof first[0]; i++) {
         TEST_ASSERT_EQUAL_MESSAGE(IWC_GARBLED, adopt_with(first[i]), first[i]);
         TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
     }
@@ -115,8 +115,8 @@ static void test_connect_nobody_there_is_told_with_the_reason(void) {
     TEST_ASSERT_EQUAL(IWC_NOT_THERE, iwc_connect(gateway, "/nonexistent/x.sock", 0));
     TEST_ASSERT_EQUAL_INT(ENOENT, iwc_errno(gateway));
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_next(gateway, 0, &message));
-    memset(path, 'x', sizeof(path));
-    path[sizeof(path) - 1U] = '\0';
+    memset(path, 'x', sizeof path);
+    path[sizeof path - 1U] = '\0';
     TEST_ASSERT_EQUAL(IWC_INVALID, iwc_connect(gateway, path, 0));
     TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iwc_errno(gateway));
 }
@@ -200,10 +200,10 @@ static void test_ask_what_is_no_request_is_not_sent(void) {
                                       "{\"cmd\":\"stop\"}{\"cmd\":\"stop\"}",
                                       "{\"cmd\":\"a\",\"cmd\":\"b\"}",
                                       " {\"cmd\":\"stop\"}"};
-    for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         TEST_ASSERT_EQUAL_MESSAGE(IWC_INVALID, iwc_send(gateway, bad[i], 0, &id), bad[i]);
     }
-    (void)snprintf(text, sizeof(text), "{\"cmd\":\"%*s\"}", (int)IWC_REQUEST_MAX - 10, "x");
+    (void)snprintf(text, sizeof text, "{\"cmd\":\"%*s\"}", (int)IWC_REQUEST_MAX - 10, "x");
     TEST_ASSERT_EQUAL(IWC_INVALID, iwc_send(gateway, text, 0, &id));
     TEST_ASSERT_EQUAL(IWC_INVALID, iwc_watch(gateway, 128, 10, 0));
     TEST_ASSERT_EQUAL(IWC_INVALID, iwc_watch(gateway, 1, 101, 0));
@@ -281,8 +281,8 @@ static void test_line_in_single_bytes_is_one_message(void) {
 /// An event of so many bytes without its newline.
 static void say_long(size_t length) {
     static char text[IWC_LINE_MAX + 10U];
-    const int n = snprintf(text, sizeof(text), "{\"event\":\"");
-    memset(text + n, 'e', sizeof(text) - (size_t)n);
+    const int n = snprintf(text, sizeof text, "{\"event\":\"");
+    memset(text + n, 'e', sizeof text - (size_t)n);
     memcpy(text + length - 2U, "\"}\n", 4);
     say(text);
 }
@@ -313,7 +313,7 @@ static void test_line_without_end_ends_the_connection(void) {
 static void test_line_of_garbage_ends_the_connection_behind_the_good_ones(void) {
     static const char *const bad[] = {"x\n", "\n", "{\"ok\":true,\"event\":\"both\"}\n", "{\"neither\":1}\n",
                                       "{\"event\":\"\xff\"}\n"};
-    for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         TEST_ASSERT_EQUAL(IWC_OK, adopt_with(HELLO));
         say("{\"event\":\"good\"}\n");
         say(bad[i]);
@@ -346,7 +346,7 @@ static void test_flood_nobody_takes_leaves_the_newest_and_the_count(void) {
     uint64_t told = 0;
     int64_t last = -1;
     for (int i = 0; i < 5000; i++) {
-        (void)snprintf(text, sizeof(text), "{\"event\":\"%s\",\"number\":%d,\"pad\":\"%200s\"}\n",
+        (void)snprintf(text, sizeof text, "{\"event\":\"%s\",\"number\":%d,\"pad\":\"%200s\"}\n",
                        (i % 10 == 0) ? "stop" : "state", i, "");
         say(text);
         if (i % 500 == 499) {
@@ -367,7 +367,7 @@ static void test_flood_of_different_things_drops_the_oldest(void) {
     uint64_t told = 0;
     int64_t last = -1;
     for (int i = 0; i < 300; i++) {
-        (void)snprintf(text, sizeof(text), "{\"event\":\"frame\",\"id\":%d,\"kind\":\"received\"}\n", i);
+        (void)snprintf(text, sizeof text, "{\"event\":\"frame\",\"id\":%d,\"kind\":\"received\"}\n", i);
         say(text);
     }
     TEST_ASSERT_EQUAL(IWC_OK, iwc_latest(gateway));
@@ -447,7 +447,7 @@ static void test_drive_to_a_gateway_that_hangs_is_told_and_forgotten(void) {
 static void stuff(void) {
     const int room = 1;
     int64_t id = 0;
-    TEST_ASSERT_EQUAL_INT(0, setsockopt(iwc_fd(gateway), SOL_SOCKET, SO_SNDBUF, &room, sizeof(room)));
+    TEST_ASSERT_EQUAL_INT(0, setsockopt(iwc_fd(gateway), SOL_SOCKET, SO_SNDBUF, &room, sizeof room));
     for (int i = 0; i < 10000; i++) {
         const iwc_result_t result = iwc_send(gateway, "{\"cmd\":\"hello\"}", 0, &id);
         if (result == IWC_FULL) {
@@ -477,9 +477,9 @@ static void test_drive_of_which_half_has_left_ends_the_connection(void) {
     char text[IWC_REQUEST_MAX - 20U];
     char line[] = "{\"id\":1,\"cmd\":\"hello\"}\n";
     int64_t id = 0;
-    (void)snprintf(text, sizeof(text), "{\"cmd\":\"drive\",\"x\":\"%*s\"}", (int)sizeof(text) - 30, "");
+    (void)snprintf(text, sizeof text, "{\"cmd\":\"drive\",\"x\":\"%*s\"}", (int)sizeof text - 30, "");
     stuff();
-    TEST_ASSERT_EQUAL(sizeof(line) - 1U, recv(server, line, sizeof(line) - 1U, 0)); // Room for a part.
+    TEST_ASSERT_EQUAL(sizeof line - 1U, recv(server, line, sizeof line - 1U, 0)); // Room for a part.
     TEST_ASSERT_EQUAL(IWC_CLOSED, iwc_send(gateway, text, 0, &id));
     TEST_ASSERT_NOT_NULL(strstr(hear(), "drive"));
     TEST_ASSERT_NULL(strchr(strstr(heard, "drive"), '\n'));

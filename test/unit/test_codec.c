@@ -67,7 +67,7 @@ static void test_golden_table_covers_all_eleven_messages(void) {
     for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         unsigned found = 0;
         for (size_t v = 0; v < GOLDEN_VECTORS; v++) {
-            found += golden_vectors[v].frame.id == ids[i] ? 1U : 0U;
+            found += (golden_vectors[v].frame.id == ids[i]) ? 1U : 0U;
         }
         TEST_ASSERT_EQUAL_UINT(5, found);
     }
@@ -234,12 +234,12 @@ static void test_encode_setpoint_pads_every_length_with_zeros(void) {
 
 /// What must be on the bus for a wanted current.
 static int32_t clamped(int32_t current_mA) {
-    return current_mA > 2000 ? 2000 : current_mA < -2000 ? -2000 : current_mA;
+    return (current_mA > 2000) ? 2000 : (current_mA < -2000) ? -2000 : current_mA;
 }
 
 static int32_t current_of(const iw_can_frame_t *frame) {
     const int32_t value = frame->data[3] * 256 + frame->data[4];
-    return value >= 32768 ? value - 65536 : value;
+    return (value >= 32768) ? value - 65536 : value;
 }
 
 static void test_encode_setpoint_clamps_every_current_and_reports_it(void) {

@@ -96,7 +96,7 @@ static int64_t read_bytes(const field_t *field, const uint8_t *data) {
         value = value * 256 + data[field->byte + i];
         range *= 256;
     }
-    return field->is_signed && value >= range / 2 ? value - range : value;
+    return (field->is_signed && value >= range / 2) ? value - range : value;
 }
 
 static void write_bytes(const field_t *field, int64_t value, uint8_t *data) {
@@ -163,7 +163,7 @@ static bool encodes_to_the_table(const layout_t *layout, const iw_can_frame_t *f
     if (layout->kind == IW_CODEC_SETPOINT) {
         const field_t *current = &layout->field[2];
         const int64_t wanted = read_bytes(current, frame->data);
-        write_bytes(current, wanted > 2000 ? 2000 : wanted < -2000 ? -2000 : wanted, expected.data);
+        write_bytes(current, (wanted > 2000) ? 2000 : (wanted < -2000) ? -2000 : wanted, expected.data);
     }
     return message_encode(&message, &actual) == IW_OK && actual.id == expected.id && actual.dlc == expected.dlc &&
            actual.kind == expected.kind && memcmp(actual.data, expected.data, IW_CAN_DATA_MAX) == 0;
@@ -199,7 +199,7 @@ static iw_can_frame_t frame_of(const layout_t *layout, uint8_t background) {
 
 static void sweep_narrow_field(const layout_t *layout, const field_t *field, uint8_t background) {
     iw_can_frame_t frame = frame_of(layout, background);
-    const int64_t values = field->width == 2 ? 65536 : 256;
+    const int64_t values = (field->width == 2) ? 65536 : 256;
     for (int64_t value = 0; value < values; value++) {
         write_bytes(field, value, frame.data);
         check_frame(layout, &frame);
@@ -250,7 +250,7 @@ static iw_codec_kind_t expected_kind(uint32_t number, uint32_t format, uint8_t d
     if (format != 0) {
         return IW_CODEC_BAD_FORMAT;
     }
-    return dlc < layout->dlc || dlc > IW_CAN_DATA_MAX ? IW_CODEC_BAD_LENGTH : layout->kind;
+    return (dlc < layout->dlc || dlc > IW_CAN_DATA_MAX) ? IW_CODEC_BAD_LENGTH : layout->kind;
 }
 
 static bool is_poison(const iw_codec_wheel_t told[IW_SIDES]) {
@@ -276,7 +276,7 @@ static void test_decode_every_id_length_format_and_kind_gives_the_documented_kin
         for (unsigned rest = 0; rest < 2U * 16U * 16U; rest++) {
             uint32_t format = 0;
             for (unsigned bit = 0; bit < FORMAT_BITS; bit++) {
-                format |= (rest >> bit & 1U) != 0 ? formats[bit] : 0U;
+                format |= ((rest >> bit & 1U) != 0) ? formats[bit] : 0U;
             }
             iw_can_frame_t frame = {
                 .id = number | format, .dlc = (uint8_t)(rest / 16U % 16U), .kind = (uint8_t)(rest / 256U)};

@@ -114,7 +114,7 @@ static void test_check_every_value_of_every_field_is_judged_by_its_range(void) {
     for (size_t i = 0; i < LIMITS; i++) {
         for (uint32_t value = 0; value <= 65535; value++) {
             const bool within = value >= limits[i].min && value <= limits[i].max;
-            make_room(value >= 1 && value <= 1000 ? (uint16_t)value : 1);
+            make_room((value >= 1 && value <= 1000) ? (uint16_t)value : 1);
             put(&limits[i], (uint16_t)value);
             const iw_config_fault_t fault = iw_config_check(&config);
             if (fault != (within ? IW_CONFIG_OK : limits[i].fault)) {
@@ -189,7 +189,7 @@ static void test_check_every_gear_ratio_is_judged_by_one_and_one_hundred(void) {
             config.gear_turns = turns;
             config.gear_per = per;
             const double ratio = (double)turns / per;
-            const iw_config_fault_t wanted = ratio > 100.0 || ratio < 1.0 ? IW_CONFIG_GEAR_RATIO : IW_CONFIG_OK;
+            const iw_config_fault_t wanted = (ratio > 100.0 || ratio < 1.0) ? IW_CONFIG_GEAR_RATIO : IW_CONFIG_OK;
             if (iw_config_check(&config) != wanted) {
                 TEST_ASSERT_EQUAL_UINT16_MESSAGE(per, turns, "wrong verdict for this pair");
             }

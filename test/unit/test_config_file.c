@@ -14,10 +14,10 @@ static gateway_config_t config;
 static gateway_config_t before;
 
 static int parse_bytes(const char *text, size_t size) {
-    memset(messages, 0, sizeof(messages));
-    memset(&config, 0xA5, sizeof(config));
+    memset(messages, 0, sizeof messages);
+    memset(&config, 0xA5, sizeof config);
     before = config;
-    FILE *err = fmemopen(messages, sizeof(messages), "w");
+    FILE *err = fmemopen(messages, sizeof messages, "w");
     const int result = gateway_config_parse("iw.conf", text, size, &config, err);
     fclose(err);
     return result;
@@ -35,7 +35,7 @@ static void accepted(const char *text) {
 /// Refused, nothing applied, and every one of the words is in the messages.
 static void refused(const char *text, const char *where, const char *what) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(GATEWAY_CONFIG_ERROR, parse(text), text);
-    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof(config));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof config);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, where), messages);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(messages, what), messages);
 }
@@ -43,7 +43,7 @@ static void refused(const char *text, const char *where, const char *what) {
 static unsigned lines_in(const char *text) {
     unsigned lines = 0;
     for (; *text != '\0'; text++) {
-        lines += *text == '\n' ? 1U : 0U;
+        lines += (*text == '\n') ? 1U : 0U;
     }
     return lines;
 }
@@ -130,7 +130,7 @@ static void test_parse_every_key_reaches_its_field(void) {
                                 core->echo_ms,        core->rest_rpm,       core->rest_ms,      core->follow_mm_s,
                                 core->follow_ms,      core->blocked_ms};
     const uint16_t wanted[] = {10, 300, 500, 2000, 900, 1500, 1200, 60, 70, 3, 250, 310, 510, 1100};
-    TEST_ASSERT_EQUAL_UINT16_ARRAY(wanted, numbers, sizeof(wanted) / sizeof(wanted[0]));
+    TEST_ASSERT_EQUAL_UINT16_ARRAY(wanted, numbers, sizeof wanted / sizeof wanted[0]);
     TEST_ASSERT_EQUAL_STRING("gpiochip0:4", config.estop.line);
     TEST_ASSERT_FALSE(config.estop.active_high);
     TEST_ASSERT_EQUAL_UINT16(7, config.estop.debounce_ms);
@@ -170,16 +170,16 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
     };
     char text[128];
     char cure[64];
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         const long inside[] = {rows[i].min, rows[i].max};
         const long outside[] = {rows[i].min - 1, rows[i].max + 1, rows[i].max + 65536, 4294967296L + rows[i].min};
         for (size_t j = 0; j < 2; j++) {
-            snprintf(text, sizeof(text), "[%s]\n%s = %ld\n", rows[i].section, rows[i].key, inside[j]);
+            snprintf(text, sizeof text, "[%s]\n%s = %ld\n", rows[i].section, rows[i].key, inside[j]);
             accepted(text);
         }
-        snprintf(cure, sizeof(cure), "%ld..%ld", rows[i].min, rows[i].max);
+        snprintf(cure, sizeof cure, "%ld..%ld", rows[i].min, rows[i].max);
         for (size_t j = 0; j < 4; j++) {
-            snprintf(text, sizeof(text), "[%s]\n%s = %ld\n", rows[i].section, rows[i].key, outside[j]);
+            snprintf(text, sizeof text, "[%s]\n%s = %ld\n", rows[i].section, rows[i].key, outside[j]);
             refused(text, "iw.conf:2: ", cure);
         }
     }
@@ -189,8 +189,8 @@ static void test_parse_numbers_with_anything_around_them_are_refused(void) {
     static const char *const values[] = {"20ms", "20 ms", "0x14", "2e1", "20.0", "+20",
                                          "--20", "-",     "abc",  "20,", "2 0",  "20\\"};
     char text[64];
-    for (size_t i = 0; i < sizeof(values) / sizeof(values[0]); i++) {
-        snprintf(text, sizeof(text), "[drive]\nperiod_ms = %s\n", values[i]);
+    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
+        snprintf(text, sizeof text, "[drive]\nperiod_ms = %s\n", values[i]);
         refused(text, "iw.conf:2: period_ms = ", "write digits alone");
     }
 }
@@ -215,16 +215,16 @@ static void test_parse_value_in_quotes_is_refused_for_every_key(void) {
         if (line[0] == ';' || sscanf(line, "%63[a-z_0-9A-Z] = %127[^;]", key, value) != 2) {
             continue;
         }
-        for (size_t length = strlen(value); length > 0U && value[length - 1U] == ' '; --length) {
+        for (size_t length = strlen(value); length > 0U && value[length - 1U] == ' '; length--) {
             value[length - 1U] = '\0';
         }
-        for (size_t i = 0; i < sizeof before_value / sizeof before_value[0]; ++i) {
+        for (size_t i = 0; i < sizeof before_value / sizeof before_value[0]; i++) {
             char lines[320];
             (void)snprintf(lines, sizeof lines, "%s\n%s = %s%s%s\n", section, key, before_value[i], value,
                            behind_value[i]);
             refused(lines, "iw.conf:2: ", "quotes would be part of the value; write it without them");
         }
-        ++keys;
+        keys++;
     }
     free(text);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT(38U, keys);
@@ -253,8 +253,8 @@ static void test_parse_gear_ratio_forms(void) {
     static const char *const bad[] = {"1/", "/2",  "1/2/3",     "1.5", "1 / 2", "a/b",      "-1/2",
                                       "0",  "1/0", "1001/1000", "101", "1/2",   "999/1000", "4294967297"};
     char text[64];
-    for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
-        snprintf(text, sizeof(text), "[wheels]\ngear_ratio = %s\n", bad[i]);
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        snprintf(text, sizeof text, "[wheels]\ngear_ratio = %s\n", bad[i]);
         refused(text, "iw.conf:2: gear_ratio = ", ";");
     }
 }
@@ -281,18 +281,18 @@ static void test_parse_texts_that_cannot_be_names_are_refused(void) {
 static void test_parse_socket_path_as_long_as_an_address_allows(void) {
     char text[512];
     char path[GATEWAY_PATH_SIZE + 1U];
-    memset(path, 'a', sizeof(path));
+    memset(path, 'a', sizeof path);
     path[0] = '/';
     path[GATEWAY_PATH_SIZE - 1U] = '\0';
-    snprintf(text, sizeof(text), "[northbound]\nsocket = %s\n[bus]\ninterface = unix:%s\n", path, path);
+    snprintf(text, sizeof text, "[northbound]\nsocket = %s\n[bus]\ninterface = unix:%s\n", path, path);
     accepted(text);
     TEST_ASSERT_EQUAL_STRING(path, config.northbound.socket);
     TEST_ASSERT_EQUAL_STRING(path, config.bus.interface + 5);
     path[GATEWAY_PATH_SIZE - 1U] = 'b';
     path[GATEWAY_PATH_SIZE] = '\0';
-    snprintf(text, sizeof(text), "[northbound]\nsocket = %s\n", path);
+    snprintf(text, sizeof text, "[northbound]\nsocket = %s\n", path);
     refused(text, "iw.conf:2: ", "too long");
-    snprintf(text, sizeof(text), "[bus]\ninterface = unix:%s\n", path);
+    snprintf(text, sizeof text, "[bus]\ninterface = unix:%s\n", path);
     refused(text, "iw.conf:2: ", "too long");
 }
 
@@ -321,8 +321,8 @@ static void test_parse_unknown_key_names_the_nearest(void) {
 static void test_parse_ids_cannot_be_configured(void) {
     static const char *const keys[] = {"id", "left_id", "id_left", "can_id", "right_ids"};
     char text[64];
-    for (size_t i = 0; i < sizeof(keys) / sizeof(keys[0]); i++) {
-        snprintf(text, sizeof(text), "[left]\n%s = 298\n", keys[i]);
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
+        snprintf(text, sizeof text, "[left]\n%s = 298\n", keys[i]);
         refused(text, "iw.conf:2: ", "fixed by the wheels");
     }
 }
@@ -345,7 +345,7 @@ static void test_parse_duplicate_key_is_refused_even_in_a_repeated_section(void)
 static void test_parse_overlong_line_is_refused_wherever_the_cut_would_be(void) {
     char text[512];
     for (size_t length = 190; length < 420; length++) {
-        memset(text, ' ', sizeof(text));
+        memset(text, ' ', sizeof text);
         memcpy(text, "[drive]\nlease_ms = 300", 22);
         memcpy(text + 8 + length - 4, ";abc\n", 6);
         if (length <= 197) {
@@ -360,7 +360,7 @@ static void test_parse_overlong_line_is_refused_wherever_the_cut_would_be(void) 
 
 static void test_parse_nul_and_control_characters_are_refused(void) {
     static const char nul[] = "[drive]\nlease_ms = 300\0 0\nperiod_ms = 20\n";
-    TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, parse_bytes(nul, sizeof(nul) - 1U));
+    TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, parse_bytes(nul, sizeof nul - 1U));
     TEST_ASSERT_NOT_NULL(strstr(messages, "iw.conf:2: holds the control character 0x00"));
     refused("[drive]\nlease_ms = 300\x1b[0m\n", "iw.conf:2: ", "0x1B");
     refused("[drive]\nlease_ms = 3\xC2\x9B"
@@ -400,7 +400,7 @@ static void test_print_and_load_is_a_fixed_point_for_defaults_and_every_word(voi
     gateway_config_t wanted;
     gateway_config_default(&wanted);
     assert_fixed_point(&wanted);
-    TEST_ASSERT_EQUAL_MEMORY(&wanted, &config, sizeof(wanted));
+    TEST_ASSERT_EQUAL_MEMORY(&wanted, &config, sizeof wanted);
     wanted.core.setpoint_type_set = true;
     wanted.core.setpoint_type = 255;
     wanted.core.current_role = IW_ROLE_LIMIT;
@@ -412,7 +412,7 @@ static void test_print_and_load_is_a_fixed_point_for_defaults_and_every_word(voi
     wanted.core.gear_turns = 7;
     wanted.core.gear_per = 3;
     assert_fixed_point(&wanted);
-    TEST_ASSERT_EQUAL_MEMORY(&wanted, &config, sizeof(wanted));
+    TEST_ASSERT_EQUAL_MEMORY(&wanted, &config, sizeof wanted);
 }
 
 static void test_print_shows_unset_keys_as_comments(void) {
@@ -430,12 +430,12 @@ static void test_print_shows_unset_keys_as_comments(void) {
 
 static void test_print_fits_the_line_limit_with_the_longest_texts(void) {
     gateway_config_default(&before);
-    memset(before.bus.interface, 'a', sizeof(before.bus.interface) - 1U);
+    memset(before.bus.interface, 'a', sizeof before.bus.interface - 1U);
     memcpy(before.bus.interface, "unix:", 5);
-    memcpy(before.estop.line, before.bus.interface, sizeof(before.estop.line));
-    memset(before.northbound.socket, 'b', sizeof(before.northbound.socket) - 1U);
-    memset(before.record.directory, 'c', sizeof(before.record.directory) - 1U);
-    memset(before.northbound.group, 'g', sizeof(before.northbound.group) - 1U);
+    memcpy(before.estop.line, before.bus.interface, sizeof before.estop.line);
+    memset(before.northbound.socket, 'b', sizeof before.northbound.socket - 1U);
+    memset(before.record.directory, 'c', sizeof before.record.directory - 1U);
+    memset(before.northbound.group, 'g', sizeof before.northbound.group - 1U);
     assert_fixed_point(&before);
 }
 
@@ -443,7 +443,7 @@ static void test_shipped_example_is_what_print_gives_for_the_defaults(void) {
     static char shipped[32768];
     FILE *file = fopen(IWHEEL_SHARE_DIR "/gateway.conf", "r");
     TEST_ASSERT_NOT_NULL_MESSAGE(file, IWHEEL_SHARE_DIR "/gateway.conf is missing");
-    const size_t size = fread(shipped, 1, sizeof(shipped) - 1U, file);
+    const size_t size = fread(shipped, 1, sizeof shipped - 1U, file);
     fclose(file);
     shipped[size] = '\0';
     gateway_config_default(&config);
@@ -454,10 +454,10 @@ static void test_shipped_example_is_what_print_gives_for_the_defaults(void) {
 }
 
 static int load(const char *path) {
-    memset(messages, 0, sizeof(messages));
-    memset(&config, 0xA5, sizeof(config));
+    memset(messages, 0, sizeof messages);
+    memset(&config, 0xA5, sizeof config);
     before = config;
-    FILE *err = fmemopen(messages, sizeof(messages), "w");
+    FILE *err = fmemopen(messages, sizeof messages, "w");
     const int result = gateway_config_load(path, &config, err);
     fclose(err);
     return result;
@@ -472,7 +472,7 @@ static void test_load_reads_a_file_and_names_it_in_errors(void) {
     TEST_ASSERT_EQUAL_UINT16(300, config.core.lease_ms);
     TEST_ASSERT_TRUE(dprintf(file, "period=1\n") > 0);
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, load(path));
-    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof(config));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof config);
     TEST_ASSERT_EQUAL_INT(0, strncmp(messages, path, strlen(path)));
     TEST_ASSERT_NOT_NULL(strstr(messages, "did you mean period_ms?"));
     TEST_ASSERT_EQUAL_INT(0, ftruncate(file, (off_t)GATEWAY_CONFIG_FILE_MAX));
@@ -489,12 +489,12 @@ static void test_load_missing_directory_and_device_are_refused(void) {
     TEST_ASSERT_NOT_NULL(strstr(messages, "not a regular file"));
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, load("/dev/zero"));
     TEST_ASSERT_NOT_NULL(strstr(messages, "not a regular file"));
-    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof(config));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof config);
 }
 
 static int override(const char *name, const char *value) {
-    memset(messages, 0, sizeof(messages));
-    FILE *err = fmemopen(messages, sizeof(messages), "w");
+    memset(messages, 0, sizeof messages);
+    FILE *err = fmemopen(messages, sizeof messages, "w");
     const int result = gateway_config_override(&config, name, value, "--option", err);
     fclose(err);
     return result;
@@ -513,7 +513,7 @@ static void test_override_changes_one_key_by_the_same_rules(void) {
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, override("bus.nonsense", "1"));
     TEST_ASSERT_EQUAL_INT(GATEWAY_CONFIG_ERROR, override("drive.max_speed_mm_s", "5000"));
     TEST_ASSERT_NOT_NULL(strstr(messages, "to stop, more than the 1000 ms"));
-    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof(config));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &config, sizeof config);
     assert_fixed_point(&before);
 }
 

@@ -60,7 +60,7 @@ static bool model_may_send(const model_t *model, bool zero) {
 }
 
 static void model_sent(model_t *model, uint32_t now, bool accepted) {
-    model->waiting = model->waiting == 0 ? now : model->waiting;
+    model->waiting = (model->waiting == 0) ? now : model->waiting;
     if (accepted) {
         model->sent[model->pending] = now;
         model->pending++;
@@ -75,7 +75,7 @@ static void model_echo(model_t *model) {
     model->proven = model->sent[0];
     model->sent[0] = model->sent[1];
     model->pending--;
-    model->waiting = model->pending > 0 ? model->sent[0] : 0;
+    model->waiting = (model->pending > 0) ? model->sent[0] : 0;
 }
 
 static void model_clear(model_t *model) {
@@ -102,7 +102,7 @@ static void apply(iw_side_t side, event_t event, uint32_t now, model_t *models) 
 }
 
 static uint32_t earlier(uint32_t a, uint32_t b) {
-    return a == 0 ? b : b == 0 ? a : a < b ? a : b;
+    return (a == 0) ? b : (b == 0) ? a : (a < b) ? a : b;
 }
 
 /// The same to whoever looks from outside?
@@ -122,7 +122,7 @@ static bool agrees(const model_t *models, uint32_t now) {
         }
     }
     const uint32_t waiting = earlier(models[IW_LEFT].waiting, models[IW_RIGHT].waiting);
-    return iw_confirmation_waiting_us(&account) == (waiting == 0 ? IW_NEVER : waiting) &&
+    return iw_confirmation_waiting_us(&account) == ((waiting == 0) ? IW_NEVER : waiting) &&
            account.stray == models[IW_LEFT].stray + models[IW_RIGHT].stray;
 }
 

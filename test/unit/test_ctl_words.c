@@ -19,7 +19,7 @@ static void test_duration_in_every_unit_with_decimals_is_read(void) {
         {"500ms", 500000},     {"2s", 2000000}, {"1.5s", 1500000}, {"2min", 120000000}, {"1h", 3600000000},
         {"0.25min", 15000000}, {"0.5ms", 500},  {"0s", 0},         {"1.125s", 1125000}, {"999999h", 3599996400000000},
         {"007s", 7000000}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         int64_t us = -1;
         TEST_ASSERT_TRUE_MESSAGE(duration_parse(cases[i].text, &us), cases[i].text);
         TEST_ASSERT_EQUAL_INT64_MESSAGE(cases[i].us, us, cases[i].text);
@@ -30,7 +30,7 @@ static void test_duration_that_is_none_is_refused_and_touches_nothing(void) {
     static const char *const cases[] = {"",        "2",    "s",        "2 s", "-1s",  "+1s", "1.s",
                                         "1.2345s", ".5s",  "1,5s",     "2m",  "2sec", "2S",  "1.5.2s",
                                         "1e3s",    "0x1s", "1234567s", "2s ", " 2s",  "infs"};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         int64_t us = 77;
         TEST_ASSERT_FALSE_MESSAGE(duration_parse(cases[i], &us), cases[i]);
         TEST_ASSERT_EQUAL_INT64(77, us);
@@ -68,7 +68,7 @@ static void test_duration_option_without_its_unit_is_told_as_it_should_be_writte
                  {"m", ""},
                  {"1.2345", ""},
                  {"-1", ""}};
-    for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char why[DURATION_WHY_SIZE];
         char wanted[DURATION_WHY_SIZE];
         int64_t us = 77;

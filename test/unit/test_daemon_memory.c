@@ -25,7 +25,7 @@ int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name) {
 
 bool gw_keeper_write(gw_keeper_t *self, const char *written, size_t size) {
     (void)self;
-    (void)memcpy(text, written, size);
+    memcpy(text, written, size);
     length = size;
     writes++;
     return true;
@@ -42,7 +42,7 @@ gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_
     (void)self;
     *out_length = length;
     *out_error = 0;
-    (void)memcpy(out_text, text, length);
+    memcpy(out_text, text, length);
     news = GW_KEEPER_NO_NEWS;
     return now;
 }
@@ -85,7 +85,7 @@ static void tell_stored(void) {
 }
 
 void setUp(void) {
-    (void)memset(&stored, 0, sizeof stored);
+    memset(&stored, 0, sizeof stored);
     news = GW_KEEPER_NO_NEWS;
     writes = 0;
     set_aside = false;
@@ -128,7 +128,7 @@ static void test_memory_contradiction_of_this_run_is_not_talked_over(void) {
 
 static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only(void) {
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
-    store_offset(IW_RIGHT, config()->force_unit[IW_RIGHT] == IW_FORCE_CN ? IW_FORCE_DN : IW_FORCE_CN, 4321);
+    store_offset(IW_RIGHT, (config()->force_unit[IW_RIGHT] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN, 4321);
     tell_stored();
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->gateway.force[IW_LEFT].provenance);
     TEST_ASSERT_EQUAL_INT32(1234, daemon_rig.daemon->gateway.force[IW_LEFT].offset_mN);
@@ -150,7 +150,7 @@ static void test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_oft
     daemon_rig.daemon->knowledge.write_us = 0;
     daemon_rig_run(3000);
     const unsigned before = writes;
-    for (unsigned i = 0; i < 10U; ++i) {
+    for (unsigned i = 0; i < 10U; i++) {
         TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\"}"), "\"ok\":true"));
         daemon_rig_run(290);
     }

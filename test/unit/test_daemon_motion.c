@@ -36,7 +36,7 @@ static bool is_told_zero(void) {
 
 static const char *cause(void) {
     const char *at = strstr(daemon_rig_ask(client, "{\"cmd\":\"why\"}"), "\"cause\":\"");
-    return at != NULL ? at + strlen("\"cause\":\"") : "";
+    return (at != NULL) ? at + strlen("\"cause\":\"") : "";
 }
 
 static bool is_cause(const char *name) {
@@ -66,7 +66,7 @@ static void test_marker_is_there_before_the_first_setpoint_and_until_after_the_l
     begin_driving();
     (void)close(client);
     client = -1;
-    for (unsigned ms = 0; ms < 5000U; ++ms) {
+    for (unsigned ms = 0; ms < 5000U; ms++) {
         daemon_rig_run(1);
         TEST_ASSERT_EQUAL_INT(daemon_rig_state() == IW_STATE_STOPPING, daemon_rig_marked());
     }
@@ -127,7 +127,7 @@ static void test_killed_while_listening_the_next_start_sends_nothing(void) {
 }
 
 static void test_estop_edge_is_answered_with_zeros_in_the_same_millisecond(void) {
-    for (unsigned phase = 0; phase < 20U; ++phase) {
+    for (unsigned phase = 0; phase < 20U; phase++) {
         begin_driving();
         daemon_rig_run(phase);
         daemon_rig.estop = 1;
@@ -176,7 +176,7 @@ static void test_estop_pulse_that_is_over_when_it_is_looked_at_latches(void) {
 
 static void test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after(void) {
     static const unsigned hold_ms[] = {0, 100, 1000, 3000};
-    for (size_t i = 0; i < sizeof hold_ms / sizeof hold_ms[0]; ++i) {
+    for (size_t i = 0; i < sizeof hold_ms / sizeof hold_ms[0]; i++) {
         const int other = daemon_rig_connect();
         begin_driving();
         TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"estop\",\"reason\":\"test\"}"), "\"ok\":true"));
@@ -265,13 +265,13 @@ static iw_time_us_t longest_unfed_us(int manager, unsigned for_ms) {
     char word[32];
     iw_time_us_t fed_us = daemon_rig.now_us;
     iw_time_us_t longest_us = 0;
-    for (unsigned ms = 0; ms < for_ms; ++ms) {
+    for (unsigned ms = 0; ms < for_ms; ms++) {
         daemon_rig_run(1);
         for (ssize_t n = recv(manager, word, sizeof word, MSG_DONTWAIT); n > 0;
              n = recv(manager, word, sizeof word, MSG_DONTWAIT)) {
-            fed_us = strncmp(word, "WATCHDOG=1", (size_t)n) == 0 ? daemon_rig.now_us : fed_us;
+            fed_us = (strncmp(word, "WATCHDOG=1", (size_t)n) == 0) ? daemon_rig.now_us : fed_us;
         }
-        longest_us = daemon_rig.now_us - fed_us > longest_us ? daemon_rig.now_us - fed_us : longest_us;
+        longest_us = (daemon_rig.now_us - fed_us > longest_us) ? daemon_rig.now_us - fed_us : longest_us;
     }
     return longest_us;
 }
@@ -300,9 +300,9 @@ static void test_watchdog_is_fed_at_half_its_time_with_and_without_motion(void) 
 
 static void test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels(void) {
     begin_driving();
-    for (unsigned ms = 0; ms < 2000U; ++ms) {
-        (void)(ms % 50U == 0U ? daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}")
-                              : "");
+    for (unsigned ms = 0; ms < 2000U; ms++) {
+        (void)((ms % 50U == 0U) ? daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}")
+                                : "");
         daemon_rig_run(1);
         TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.sent_us <= MS(21));
     }
@@ -339,10 +339,10 @@ static void test_estop_wakes_a_loop_that_lets_frames_wait(void) {
     (void)close(client);
     client = -1;
     daemon_rig_run(100);
-    for (unsigned phase = 0; phase < 10U; ++phase) {
+    for (unsigned phase = 0; phase < 10U; phase++) {
         daemon_rig_run(7);
         const iw_time_us_t before_us = daemon_rig.now_us;
-        daemon_rig.estop = daemon_rig.estop == 0 ? 1 : 0;
+        daemon_rig.estop = (daemon_rig.estop == 0) ? 1 : 0;
         daemon_rig_run(1);
         TEST_ASSERT_EQUAL_INT(daemon_rig.estop, daemon_rig.estop_told);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());

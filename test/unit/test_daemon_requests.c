@@ -22,7 +22,7 @@ void tearDown(void) {
 
 static void assert_reply(const char *line, const char *part) {
     const char *reply = daemon_rig_ask(client, line);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, part), reply[0] != '\0' ? reply : line);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, part), (reply[0] != '\0') ? reply : line);
 }
 
 /// The object `side` of the snapshot.
@@ -51,7 +51,7 @@ static void test_drive_reaches_the_wheel_it_is_for(void) {
 
 static void test_current_reaches_the_wheel_it_is_for(void) {
     daemon_rig_arm(client);
-    for (unsigned i = 0; i < 50U; ++i) {
+    for (unsigned i = 0; i < 50U; i++) {
         assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100,\"left_mA\":500,\"right_mA\":900}",
                      "\"ok\":true");
         daemon_rig_run(20);
@@ -62,7 +62,7 @@ static void test_current_reaches_the_wheel_it_is_for(void) {
 
 static void test_twist_to_the_left_turns_the_right_wheel_faster(void) {
     daemon_rig_arm(client);
-    for (unsigned i = 0; i < 50U; ++i) {
+    for (unsigned i = 0; i < 50U; i++) {
         assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":200,\"yaw_mrad_s\":200}", "\"ok\":true");
         daemon_rig_run(20);
     }
@@ -83,7 +83,7 @@ static void test_number_beyond_every_range_is_refused_and_never_wraps_into_it(vo
         "{\"cmd\":\"twist\",\"v_mm_s\":9223372036854775807,\"yaw_mrad_s\":-9223372036854775807}",
     };
     daemon_rig_arm(client);
-    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; ++i) {
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         assert_reply(lines[i], "\"error\":\"out_of_range\"");
         daemon_rig_run(40);
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
@@ -140,7 +140,7 @@ static void test_command_behind_arm_in_one_breath_is_stale(void) {
     static const char lines[] =
         "{\"cmd\":\"arm\"}\n{\"id\":9,\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
     TEST_ASSERT_EQUAL_INT((int)sizeof lines - 1, (int)send(client, lines, sizeof lines - 1U, MSG_NOSIGNAL));
-    for (unsigned ms = 0; ms < 500U; ++ms) {
+    for (unsigned ms = 0; ms < 500U; ms++) {
         daemon_rig_run(1);
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_RIGHT]);
@@ -191,7 +191,7 @@ static unsigned events_waiting(const char *name) {
     static char text[1U << 20];
     unsigned count = 0;
     const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    text[length > 0 ? length : 0] = '\0';
+    text[(length > 0) ? length : 0] = '\0';
     for (const char *at = strstr(text, name); at != NULL; at = strstr(at + 1, name)) {
         count++;
     }

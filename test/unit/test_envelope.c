@@ -36,7 +36,7 @@ static iw_can_frame_t setpoint(iw_side_t side, int32_t speed_mm_s, int32_t curre
     const uint32_t speed = (uint32_t)speed_mm_s;
     const uint32_t current = (uint32_t)current_mA;
     memset(&frame, 0, sizeof frame);
-    frame.id = side == IW_LEFT ? 266 : 298;
+    frame.id = (side == IW_LEFT) ? 266 : 298;
     frame.dlc = (uint8_t)config.setpoint_dlc;
     frame.data[0] = config.setpoint_type;
     frame.data[1] = (uint8_t)(speed >> 8 & 0xFFU);
@@ -66,8 +66,8 @@ static void test_init_forgets_everything(void) {
 }
 
 static uint32_t format_of(unsigned bits) {
-    return ((bits & 1U) != 0 ? IW_CAN_EXTENDED : 0U) | ((bits & 2U) != 0 ? IW_CAN_REMOTE : 0U) |
-           ((bits & 4U) != 0 ? IW_CAN_ERROR : 0U) | ((bits & 8U) != 0 ? IW_CAN_FD : 0U);
+    return (((bits & 1U) != 0) ? IW_CAN_EXTENDED : 0U) | (((bits & 2U) != 0) ? IW_CAN_REMOTE : 0U) |
+           (((bits & 4U) != 0) ? IW_CAN_ERROR : 0U) | (((bits & 8U) != 0) ? IW_CAN_FD : 0U);
 }
 
 /// Every length, format and kind with this number; returns how many passed.
@@ -83,7 +83,7 @@ static uint32_t sweep_number(uint32_t number) {
         if (verdict != (wanted ? IW_ENVELOPE_PASS : IW_ENVELOPE_NOT_A_SETPOINT)) {
             TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, frame.id, "wrong verdict for this id");
         }
-        passed += verdict == IW_ENVELOPE_PASS ? 1U : 0U;
+        passed += (verdict == IW_ENVELOPE_PASS) ? 1U : 0U;
     }
     return passed;
 }
@@ -113,7 +113,7 @@ static void test_check_absurd_length_is_stopped(void) {
     for (unsigned dlc = 0; dlc < 256; dlc++) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.dlc = (uint8_t)dlc;
-        const iw_envelope_verdict_t wanted = dlc == 5 ? IW_ENVELOPE_PASS : IW_ENVELOPE_NOT_A_SETPOINT;
+        const iw_envelope_verdict_t wanted = (dlc == 5) ? IW_ENVELOPE_PASS : IW_ENVELOPE_NOT_A_SETPOINT;
         TEST_ASSERT_EQUAL_INT(wanted, iw_envelope_check(&envelope, START_US, &frame));
     }
 }
@@ -125,7 +125,7 @@ static void test_check_every_type_passes_the_configured_one_only(void) {
         for (unsigned type = 0; type < 256; type++) {
             iw_can_frame_t frame = setpoint(IW_LEFT, 0, 0);
             frame.data[0] = (uint8_t)type;
-            const iw_envelope_verdict_t wanted = type == configured ? IW_ENVELOPE_PASS : IW_ENVELOPE_TYPE;
+            const iw_envelope_verdict_t wanted = (type == configured) ? IW_ENVELOPE_PASS : IW_ENVELOPE_TYPE;
             TEST_ASSERT_EQUAL_INT(wanted, iw_envelope_check(&envelope, START_US, &frame));
         }
     }
@@ -153,7 +153,7 @@ static void test_check_role_not_configured_stops_everything(void) {
 /// A limit has no sign: a negative one is no current that may leave.
 static void sweep_currents(int32_t speed_mm_s) {
     const int32_t highest = config.max_current_mA;
-    const int32_t lowest = config.current_role == IW_ROLE_LIMIT ? 0 : -highest;
+    const int32_t lowest = (config.current_role == IW_ROLE_LIMIT) ? 0 : -highest;
     for (int32_t current = -32768; current <= 32767; current++) {
         const bool within = current >= lowest && current <= highest;
         const iw_envelope_verdict_t verdict = check(START_US, IW_LEFT, speed_mm_s, current);

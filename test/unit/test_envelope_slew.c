@@ -33,7 +33,7 @@ void tearDown(void) {}
 static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     const uint32_t speed = (uint32_t)speed_mm_s;
     const uint32_t current = (uint32_t)current_mA;
-    const iw_can_frame_t frame = {.id = side == IW_LEFT ? 266U : 298U,
+    const iw_can_frame_t frame = {.id = (side == IW_LEFT) ? 266U : 298U,
                                   .dlc = 5,
                                   .data = {7, (uint8_t)(speed >> 8 & 0xFFU), (uint8_t)(speed & 0xFFU),
                                            (uint8_t)(current >> 8 & 0xFFU), (uint8_t)(current & 0xFFU)}};
@@ -43,7 +43,7 @@ static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t 
 /// Brings the wheel to a speed, as fast as the slope allows.
 static void settle(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s) {
     const int32_t step = config.accel_mm_s2 * (int32_t)(IW_ENVELOPE_ELAPSED_MAX_US / 1000U) / 1000;
-    const int32_t direction = speed_mm_s < 0 ? -1 : 1;
+    const int32_t direction = (speed_mm_s < 0) ? -1 : 1;
     iw_time_us_t past_us = AGES_US;
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us - past_us, side, 0, 0));
     for (int32_t reached = step; reached < direction * speed_mm_s; reached += step) {
@@ -113,7 +113,7 @@ static void run_ramp(int32_t direction, iw_time_us_t step_us) {
         const uint64_t down_um_s = config.decel_mm_s2 * step_us / 1000U;
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, IW_LEFT, direction * (int32_t)(speed_um_s / 1000U), 0));
         rising = rising && speed_um_s + up_um_s <= config.max_speed_mm_s * 1000U;
-        speed_um_s = rising ? speed_um_s + up_um_s : speed_um_s > down_um_s ? speed_um_s - down_um_s : 0;
+        speed_um_s = rising ? speed_um_s + up_um_s : (speed_um_s > down_um_s) ? speed_um_s - down_um_s : 0;
         now_us += step_us;
     }
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(now_us, IW_LEFT, 0, 0));
@@ -143,7 +143,7 @@ static void test_check_sign_change_is_stopped_until_zero_was_sent(void) {
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(speed, -1, AGES_US));
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SLEW, change(-speed, 1, AGES_US));
         TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, change(speed, 0, 0));
-        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + AGES_US, IW_LEFT, speed > 240 ? -240 : -speed, 0));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_PASS, check(START_US + AGES_US, IW_LEFT, (speed > 240) ? -240 : -speed, 0));
     }
 }
 

@@ -49,7 +49,8 @@ static void look(void) {
 static void assert_entry(iw_ledger_item_t item, iw_ledger_state_t state, int32_t figure) {
     TEST_ASSERT_EQUAL_INT(state, seen.assumed[item].state);
     TEST_ASSERT_EQUAL_INT32(figure, seen.assumed[item].figure);
-    TEST_ASSERT_EQUAL_INT(state == IW_LEDGER_ASSUMED ? IW_EVIDENCE_NONE : IW_EVIDENCE_BUS, seen.assumed[item].evidence);
+    TEST_ASSERT_EQUAL_INT((state == IW_LEDGER_ASSUMED) ? IW_EVIDENCE_NONE : IW_EVIDENCE_BUS,
+                          seen.assumed[item].evidence);
 }
 
 static void assert_ratio(iw_ledger_state_t state, int32_t figure) {
@@ -93,7 +94,7 @@ static void assert_after_one(int64_t moved, iw_ledger_state_t state) {
     begin_at(FIXTURE_START_US);
     begin_stretch(RPM);
     stretch(moved);
-    assert_ratio(state, state == IW_LEDGER_ASSUMED ? 0 : (int32_t)moved);
+    assert_ratio(state, (state == IW_LEDGER_ASSUMED) ? 0 : (int32_t)moved);
 }
 
 static void assert_after_misses(int64_t moved, iw_ledger_state_t state, int32_t figure) {
@@ -184,7 +185,7 @@ static void test_evidence_a_stretch_is_one_whole_rotor_turn_at_least(void) {
 static void test_evidence_turns_between_two_frames_are_their_mean(void) {
     begin_stretch(RPM);
     for (unsigned i = 0; i < FRAMES; i++) {
-        speed_of(IW_LEFT, i % 2U == 0U ? 3 * RPM : RPM, FRAME_US);
+        speed_of(IW_LEFT, (i % 2U == 0U) ? 3 * RPM : RPM, FRAME_US);
     }
     status_of(IW_LEFT, 2000);
     assert_ratio(IW_LEDGER_CONFIRMED, 1000);
@@ -272,7 +273,7 @@ static void test_evidence_a_reboot_that_the_status_frame_itself_reveals_judges_n
 static void test_evidence_wheels_below_ten_rpm_say_nothing(void) {
     begin_stretch(9);
     for (unsigned i = 0; i < FRAMES; i++) {
-        speed_of(IW_LEFT, i % 2U == 0U ? 11 : 9, FRAME_US);
+        speed_of(IW_LEFT, (i % 2U == 0U) ? 11 : 9, FRAME_US);
     }
     status_of(IW_LEFT, 100);
     assert_ratio(IW_LEDGER_ASSUMED, 0);
@@ -281,7 +282,7 @@ static void test_evidence_wheels_below_ten_rpm_say_nothing(void) {
 static void test_evidence_looking_again_adds_nothing(void) {
     begin_stretch(12);
     for (unsigned i = 0; i < FRAMES; i++) {
-        speed_of(IW_LEFT, i % 2U == 0U ? 9 : 12, FRAME_US);
+        speed_of(IW_LEFT, (i % 2U == 0U) ? 9 : 12, FRAME_US);
         look();
     }
     assert_ratio(IW_LEDGER_ASSUMED, 0);

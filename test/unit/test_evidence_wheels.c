@@ -108,7 +108,7 @@ static void test_evidence_wheels_odd_stretches_between_good_ones_contradict_no_r
 static void test_evidence_wheels_a_type_is_not_confirmed_by_speeds_that_keep_changing(void) {
     world_rig_drive(&rig, 300, 300, 100);
     for (unsigned times = 0; times < 40U; times++) {
-        const int32_t mm_s = times % 2U == 0U ? 330 : 300;
+        const int32_t mm_s = (times % 2U == 0U) ? 330 : 300;
         world_rig_drive(&rig, mm_s, mm_s, 200);
     }
     assert_entry(IW_LEDGER_SETPOINT_TYPE, IW_LEDGER_ASSUMED);
@@ -119,7 +119,7 @@ static void test_evidence_wheels_a_reboot_or_a_gap_begins_anew(void) {
     for (unsigned times = 0; times < 4U; times++) {
         sim_world_reboot(&rig.world, rig.now_us, IW_LEFT);
         world_rig_run(&rig, 1000);
-        rig.world.pair.wheel[IW_LEFT].motion.ticks += times % 2U == 0U ? 100000U : 0U;
+        rig.world.pair.wheel[IW_LEFT].motion.ticks += (times % 2U == 0U) ? 100000U : 0U;
         world_rig_run(&rig, 2000);
         (void)iw_gateway_reset(&rig.gateway, rig.now_us);
         world_rig_run(&rig, 8000);

@@ -169,7 +169,7 @@ static void test_force_tare_takes_the_mean_of_the_last_two_seconds(void) {
 static void test_force_tare_after_long_rest_is_accepted(void) {
     for (uint32_t n = 0; n < 300; n++) {
         force_rig_quiet(&rig, 1, 100);
-        TEST_ASSERT_EQUAL_INT(n < 39 ? IW_TARE_NO_FORCE : IW_TARE_OK, force_rig_tare(&rig));
+        TEST_ASSERT_EQUAL_INT((n < 39) ? IW_TARE_NO_FORCE : IW_TARE_OK, force_rig_tare(&rig));
     }
 }
 
@@ -263,13 +263,13 @@ static void test_force_tare_a_millinewton_beyond_20_N_is_a_load(void) {
 
 static void test_force_contradicted_unit_is_invalid_and_never_rescaled(void) {
     for (int side = 0; side < IW_SIDES; side++) {
-        const int16_t wrong = side == IW_LEFT ? 100 : 1000;
-        const int16_t right = side == IW_LEFT ? 1000 : 100;
+        const int16_t wrong = (side == IW_LEFT) ? 100 : 1000;
+        const int16_t right = (side == IW_LEFT) ? 1000 : 100;
         begin((iw_side_t)side, false);
         force_rig_quiet(&rig, 40, wrong);
         force_rig_offset(&rig, 100);
         TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_rig_validity(&rig));
-        TEST_ASSERT_EQUAL_INT32(side == IW_LEFT ? 1000 : 100000, iw_force_raw_mN(&rig.force));
+        TEST_ASSERT_EQUAL_INT32((side == IW_LEFT) ? 1000 : 100000, iw_force_raw_mN(&rig.force));
         TEST_ASSERT_EQUAL_INT(IW_FORCE_UNIT_CONTRADICTED, force_rig_validity(&rig));
         begin((iw_side_t)side, false);
         force_rig_quiet(&rig, 40, right);

@@ -17,7 +17,7 @@ static void begin(iw_side_t side, bool boot_seen) {
 
 static void assert_window(iw_window_t expected) {
     TEST_ASSERT_EQUAL_INT(expected, rig.force.quality.window);
-    TEST_ASSERT_EQUAL_INT(expected == IW_WINDOW_GOOD ? IW_OFFSET_ESTIMATED : IW_OFFSET_NONE, rig.force.provenance);
+    TEST_ASSERT_EQUAL_INT((expected == IW_WINDOW_GOOD) ? IW_OFFSET_ESTIMATED : IW_OFFSET_NONE, rig.force.provenance);
 }
 
 static void test_force_begins_open_and_knows_nothing(void) {
@@ -87,7 +87,7 @@ static void test_force_never_heard_is_not_heard_when_time_has_just_begun(void) {
 /// 30 of 40 samples are 2 cN off the mean: the root of 3 cN2 is 17.3 mN.
 static void test_force_deviation_is_told_to_a_millinewton(void) {
     for (uint32_t n = 0; n < 40; n++) {
-        force_rig_hear(&rig, (int16_t)(n % 4U == 3U ? 100 : (n % 8U < 4U) == (n % 2U == 0U) ? 102 : 98), true);
+        force_rig_hear(&rig, (int16_t)((n % 4U == 3U) ? 100 : ((n % 8U < 4U) == (n % 2U == 0U)) ? 102 : 98), true);
     }
     TEST_ASSERT_EQUAL_INT32(1000, rig.force.quality.mean_mN);
     TEST_ASSERT_EQUAL_UINT32(17, rig.force.quality.deviation_mN);
@@ -136,11 +136,11 @@ static void test_force_wildest_noise_does_not_overflow(void) {
         begin((iw_side_t)side, false);
         force_rig_alternate(&rig, 32766, -32767);
         assert_window(IW_WINDOW_NOISY);
-        TEST_ASSERT_EQUAL_UINT32(side == IW_LEFT ? 81910 : 819100, rig.force.quality.deviation_mN); // Capped.
+        TEST_ASSERT_EQUAL_UINT32((side == IW_LEFT) ? 81910 : 819100, rig.force.quality.deviation_mN); // Capped.
         begin((iw_side_t)side, false);
         force_rig_alternate(&rig, 0, 1400);
         assert_window(IW_WINDOW_NOISY);
-        TEST_ASSERT_UINT32_WITHIN(100, side == IW_LEFT ? 7000 : 70000, rig.force.quality.deviation_mN);
+        TEST_ASSERT_UINT32_WITHIN(100, (side == IW_LEFT) ? 7000 : 70000, rig.force.quality.deviation_mN);
     }
 }
 

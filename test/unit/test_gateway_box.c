@@ -53,7 +53,7 @@ static gw_box_news_t wait_news(void) {
 static gw_box_order_t stopped(const char *cause) {
     const iw_time_us_t now_us = iw_clock_now_us();
     const iw_time_us_t stop_us = now_us - GW_BOX_AFTER_US;
-    for (unsigned i = 0; i < 10U; ++i) {
+    for (unsigned i = 0; i < 10U; i++) {
         const blackbox_entry_t frame = {.at_us = stop_us - 1000U + i,
                                         .kind = BLACKBOX_FRAME,
                                         .number = 256,
@@ -85,7 +85,7 @@ static unsigned count_files(void) {
     DIR *list = opendir(config.record.directory);
     TEST_ASSERT_NOT_NULL(list);
     for (const struct dirent *entry = readdir(list); entry != NULL; entry = readdir(list)) {
-        files += strncmp(entry->d_name, "stop-", 5) == 0 ? 1U : 0U;
+        files += (strncmp(entry->d_name, "stop-", 5) == 0) ? 1U : 0U;
     }
     (void)closedir(list);
     return files;
@@ -145,7 +145,7 @@ static void test_many_stops_keep_the_newest_and_touch_nothing_else(void) {
     FILE *mine = fopen(path, "w");
     TEST_ASSERT_NOT_NULL(mine);
     (void)fclose(mine);
-    for (unsigned i = 0; i < GW_BOX_RECORDINGS_MAX + 2U; ++i) {
+    for (unsigned i = 0; i < GW_BOX_RECORDINGS_MAX + 2U; i++) {
         record("estop_line", 0);
     }
     TEST_ASSERT_EQUAL(3U * GW_BOX_RECORDINGS_MAX + 1U, count_files());
@@ -196,7 +196,7 @@ static void test_frozen_writer_never_blocks_the_gateway(void) {
     const iw_time_us_t begin_us = iw_clock_now_us();
     unsigned taken = 0;
     while (taken < 100000U && gw_box_write(&box, &order)) {
-        ++taken;
+        taken++;
     }
     TEST_ASSERT_LESS_THAN(100000U, taken);
     TEST_ASSERT_LESS_THAN(1000000U, iw_clock_now_us() - begin_us);
@@ -218,7 +218,7 @@ static void test_killed_writer_is_noticed_and_started_again_later(void) {
 
 static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not(void) {
     char text[8192];
-    for (int sending = 0; sending < 2; ++sending) {
+    for (int sending = 0; sending < 2; sending++) {
         start();
         (void)stopped("");
         const blackbox_entry_t setpoint = {.at_us = iw_clock_now_us(),
@@ -233,7 +233,7 @@ static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one
         box.fd = -1;
         gw_box_close(&box);
         open_box = false;
-        for (unsigned i = 0; i < 100U && kill(box.pid, 0) == 0; ++i) {
+        for (unsigned i = 0; i < 100U && kill(box.pid, 0) == 0; i++) {
             (void)usleep(50000);
             (void)waitpid(box.pid, NULL, WNOHANG);
         }

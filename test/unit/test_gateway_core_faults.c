@@ -139,7 +139,7 @@ static void test_gateway_second_master_latches_armed_and_stopping(void) {
         gateway_rig_step(&rig);
         assert_latched(IW_CAUSE_SECOND_MASTER);
         TEST_ASSERT_EQUAL_UINT32(ids[i % 2U], stop()->detail);
-        TEST_ASSERT_EQUAL_UINT8(i % 2U == 0 ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
+        TEST_ASSERT_EQUAL_UINT8((i % 2U == 0) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
         tearDown();
     }
 }
@@ -178,7 +178,7 @@ static void test_gateway_silent_wheel_latches_within_its_limit_and_a_period(void
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
         (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
         assert_latched(IW_CAUSE_WHEEL_LOST);
-        TEST_ASSERT_EQUAL_UINT8(side == IW_LEFT ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
+        TEST_ASSERT_EQUAL_UINT8((side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
         TEST_ASSERT_UINT32_WITHIN(20, 60, stop()->detail);
         gateway_rig_run(&rig, MS(1100));
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_reset(&rig));

@@ -83,7 +83,7 @@ static void test_gateway_zeros_leave_to_whichever_wheel_can_have_one(void) {
     for (uint32_t n = 0; n < 5000; n++) {
         gateway_rig_run(&rig, 100);
         for (size_t side = 0; side < IW_SIDES; side++) {
-            seen_us[side] = rig.bus.last_us[side] > seen_us[side] ? rig.bus.last_us[side] : seen_us[side];
+            seen_us[side] = (rig.bus.last_us[side] > seen_us[side]) ? rig.bus.last_us[side] : seen_us[side];
             TEST_ASSERT_TRUE(rig.now_us - seen_us[side] < MS(60));
         }
     }
@@ -134,7 +134,7 @@ static void test_gateway_pair_that_one_wheel_cannot_have_is_followed_by_zeros(vo
     for (int side = 0; side < IW_SIDES; side++) {
         setUp();
         drive_on();
-        rig.bus.send_result[side] = side == IW_LEFT ? 0 : -1;
+        rig.bus.send_result[side] = (side == IW_LEFT) ? 0 : -1;
         (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
         const uint32_t refused = rig.bus.refused;
         while (rig.bus.refused == refused) {

@@ -21,12 +21,12 @@ void setUp(void) {
 void tearDown(void) {}
 
 static iw_client_t any_client(void) {
-    return fixture_random_in(&chance, 0, 3) == 0 ? OTHER : HOLDER;
+    return (fixture_random_in(&chance, 0, 3) == 0) ? OTHER : HOLDER;
 }
 
 static int32_t any_speed(void) {
-    const int32_t limit = fixture_random_in(&chance, 0, 20) == 0 ? 40000 : 1300;
-    return fixture_random_in(&chance, 0, 5) == 0 ? 0 : fixture_random_in(&chance, -limit, limit);
+    const int32_t limit = (fixture_random_in(&chance, 0, 20) == 0) ? 40000 : 1300;
+    return (fixture_random_in(&chance, 0, 5) == 0) ? 0 : fixture_random_in(&chance, -limit, limit);
 }
 
 static void heal(void) {
@@ -45,13 +45,13 @@ static void heal(void) {
 }
 
 static void hurt(void) {
-    const iw_side_t side = fixture_random_in(&chance, 0, 1) == 0 ? IW_LEFT : IW_RIGHT;
+    const iw_side_t side = (fixture_random_in(&chance, 0, 1) == 0) ? IW_LEFT : IW_RIGHT;
     switch (fixture_random_in(&chance, 0, 9)) {
     case 0:
         rig.bus.acknowledged = false;
         break;
     case 1:
-        fake_bus_break(&rig.bus, fixture_random_in(&chance, 0, 1) == 0 ? IW_BUS_DOWN : IW_BUS_OFF);
+        fake_bus_break(&rig.bus, (fixture_random_in(&chance, 0, 1) == 0) ? IW_BUS_DOWN : IW_BUS_OFF);
         break;
     case 2:
         rig.bus.send_result[side] = fixture_random_in(&chance, -1, 0);
@@ -70,7 +70,7 @@ static void hurt(void) {
         rig.bus.estop_edge = true;
         break;
     case 7:
-        gateway_rig_foreign(&rig, side == IW_LEFT ? 266U : 298U);
+        gateway_rig_foreign(&rig, (side == IW_LEFT) ? 266U : 298U);
         break;
     case 8:
         rig.wheel[side].ticks += fixture_random_in(&chance, -100000, 250000);

@@ -15,7 +15,7 @@ void setUp(void) {
 void tearDown(void) {}
 
 static void pair_after(uint32_t gap_us) {
-    ++sent.pairs;
+    sent.pairs++;
     sent.gap_us = gap_us;
     gw_gaps_note(&gaps, &sent);
 }

@@ -45,9 +45,9 @@ static unsigned writings_seen(int watch) {
     const ssize_t length = read(watch, events, sizeof events);
     for (ssize_t at = 0; at < length;) {
         struct inotify_event event;
-        (void)memcpy(&event, &events[at], sizeof event);
+        memcpy(&event, &events[at], sizeof event);
         at += (ssize_t)(sizeof event + event.len);
-        ++seen;
+        seen++;
     }
     return seen;
 }

@@ -30,7 +30,7 @@ void setUp(void) {
     (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "%s/gateway.sock", folder);
     (void)snprintf(config.northbound.group, sizeof config.northbound.group, "none");
     listener = (gw_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
-    (void)memset(said, 0, sizeof said);
+    memset(said, 0, sizeof said);
     gw_log_open(&quiet, GW_LOG_ERROR);
 }
 
@@ -156,7 +156,7 @@ static void test_socket_has_its_mode_and_group_and_the_process_stands_where_it_s
     TEST_ASSERT_EQUAL_UINT32(0027, umask(mask));
     TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("gateway.sock"), &status));
     TEST_ASSERT_EQUAL_UINT32(0640, status.st_mode & 07777U);
-    TEST_ASSERT_EQUAL_UINT32(geteuid() == 0 ? 1 : getegid(), status.st_gid);
+    TEST_ASSERT_EQUAL_UINT32((geteuid() == 0) ? 1 : getegid(), status.st_gid);
 }
 
 /// Somebody's socket at our place; `fd` is -1 if nobody answers on it any more.

@@ -33,7 +33,7 @@ static const char *under(const char *name) {
 }
 
 static void configure(gateway_config_t *config, const char *bus, const char *folder) {
-    (void)memset(config, 0, sizeof *config);
+    memset(config, 0, sizeof *config);
     (void)snprintf(config->bus.interface, sizeof config->bus.interface, "%s", bus);
     (void)snprintf(config->northbound.socket, sizeof config->northbound.socket, "%s/%s/gateway.sock", top, folder);
     (void)mkdir(under(folder), 0755);
@@ -70,7 +70,7 @@ void setUp(void) {
     memcpy(strrchr(top, '-'), "-XXXXXX", 8);
     TEST_ASSERT_NOT_NULL(mkdtemp(top));
     (void)snprintf(shared, sizeof shared, "%s/shared", top);
-    (void)memset(said, 0, sizeof said);
+    memset(said, 0, sizeof said);
     configure(&one, interface(), "one");
     configure(&other, interface(), "other");
 }
@@ -119,7 +119,7 @@ static void test_lock_of_interface_is_free_after_close_and_after_death(void) {
 
 static void test_many_who_ask_leave_the_lock_where_it_is(void) {
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
-    for (int i = 0; i < 500; ++i) {
+    for (int i = 0; i < 500; i++) {
         TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, open_runtime(&second, &other));
     }
 }
@@ -199,7 +199,7 @@ static int in_process_of(uid_t uid, int (*act)(void)) {
     TEST_ASSERT_EQUAL_INT(0, chmod(top, 0755));
     child = fork();
     if (child == 0) {
-        result = setgid(uid) == 0 && setuid(uid) == 0 ? act() : -2;
+        result = (setgid(uid) == 0 && setuid(uid) == 0) ? act() : -2;
         (void)!write(ends[1], &result, sizeof result);
         for (;;) {
             (void)pause();
@@ -217,15 +217,15 @@ static int bind_abstract(const char *name, int backlog) {
     (void)snprintf(address.sun_path + 1, sizeof address.sun_path - 1U, "%s", name);
     const int result = bind(fd, (const struct sockaddr *)&address,
                             (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1U + strlen(name)));
-    return result == 0 && backlog >= 0 ? listen(fd, backlog) : result;
+    return (result == 0 && backlog >= 0) ? listen(fd, backlog) : result;
 }
 
 /// The places of root's gateway.
 static int take_names(unsigned count, int backlog) {
     char name[64];
     int result = 0;
-    for (unsigned place = 0; place < count && result == 0; ++place) {
-        (void)snprintf(name, sizeof name, place == 0 ? "iwheel-gateway/%s" : "iwheel-gateway/%s/0/%u", interface(),
+    for (unsigned place = 0; place < count && result == 0; place++) {
+        (void)snprintf(name, sizeof name, (place == 0) ? "iwheel-gateway/%s" : "iwheel-gateway/%s/0/%u", interface(),
                        place);
         result = bind_abstract(name, backlog);
     }
@@ -317,7 +317,7 @@ static void test_lock_taken_at_a_later_place_still_excludes_when_the_stranger_ha
 
 static int hold_file(void) {
     const int fd = open(under("bus.gateway-lock"), O_RDWR | O_CREAT, 0666);
-    return fd >= 0 ? flock(fd, LOCK_EX | LOCK_NB) : -1;
+    return (fd >= 0) ? flock(fd, LOCK_EX | LOCK_NB) : -1;
 }
 
 static void test_lock_of_local_bus_with_its_file_held_by_a_stranger_is_taken_and_excludes(void) {
@@ -384,11 +384,11 @@ static int open_and_tend(void) {
         (void)!write(told[1], "", 1);
         (void)!read(go[0], &byte, 1);
         const bool gives_way = gw_bus_lock_tend(&second.lock, GW_BUS_LOCK_LOOK_US);
-        const gw_holder_t holder = alone && gives_way ? second.lock.holder : (gw_holder_t){.uid = (uid_t)-1};
+        const gw_holder_t holder = (alone && gives_way) ? second.lock.holder : (gw_holder_t){.uid = (uid_t)-1};
         (void)!write(told[1], &holder, sizeof holder);
         _exit(0);
     }
-    return read(told[0], &byte, 1) == 1 ? result : -1;
+    return (read(told[0], &byte, 1) == 1) ? result : -1;
 }
 
 static void test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_up(void) {
@@ -406,7 +406,7 @@ static void test_lock_held_by_another_user_does_not_keep_root_out_and_is_given_u
     TEST_ASSERT_EQUAL_INT(0, holder.uid);
     TEST_ASSERT_EQUAL_INT(getpid(), holder.pid);
     TEST_ASSERT_FALSE_MESSAGE(gw_bus_lock_tend(&first.lock, GW_BUS_LOCK_LOOK_US), "root gives way to nobody");
-    for (size_t i = 0; i < 2U; ++i) {
+    for (size_t i = 0; i < 2U; i++) {
         (void)close(go[i]);
         (void)close(told[i]);
     }
@@ -433,17 +433,17 @@ static int how_many_run(void) {
     TEST_ASSERT_EQUAL_INT(0, pipe(start));
     TEST_ASSERT_EQUAL_INT(0, pipe(done));
     TEST_ASSERT_EQUAL_INT(0, pipe(results));
-    for (int i = 0; i < STARTERS; ++i) {
+    for (int i = 0; i < STARTERS; i++) {
         if (fork() == 0) {
-            start_at_once(i == 0 ? &one : &other, start, done, results[1]);
+            start_at_once((i == 0) ? &one : &other, start, done, results[1]);
         }
     }
     (void)close(start[0]);
     (void)close(start[1]);
-    for (int i = 0; i < STARTERS; ++i) {
+    for (int i = 0; i < STARTERS; i++) {
         int result = -1;
         TEST_ASSERT_EQUAL_INT(sizeof result, read(results[0], &result, sizeof result));
-        running += result == 0 ? 1 : 0;
+        running += (result == 0) ? 1 : 0;
     }
     (void)close(done[0]);
     (void)close(done[1]);
@@ -455,13 +455,13 @@ static int how_many_run(void) {
 }
 
 static void test_lock_of_several_that_start_in_the_same_moment_goes_to_one(void) {
-    for (int round = 0; round < 3; ++round) {
+    for (int round = 0; round < 3; round++) {
         TEST_ASSERT_EQUAL_INT(1, how_many_run());
     }
     remove_top();
     TEST_ASSERT_EQUAL_INT(0, mkdir(top, 0755));
     spoil_shared(); // By name alone.
-    for (int round = 0; round < 3; ++round) {
+    for (int round = 0; round < 3; round++) {
         TEST_ASSERT_EQUAL_INT(1, how_many_run());
     }
 }
@@ -476,7 +476,7 @@ static void test_marker_of_a_stranger_is_none_and_is_not_used(void) {
     TEST_ASSERT_EQUAL_INT(0, mkdir(shared, 0755));
     TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
     gw_runtime_close(&first);
-    for (int i = 0; i < (int)GW_RUNTIME_PLACES; ++i) {
+    for (int i = 0; i < (int)GW_RUNTIME_PLACES; i++) {
         (void)close(open(first.place[i], O_WRONLY | O_CREAT, 0666));
         TEST_ASSERT_EQUAL_INT(0, chown(first.place[i], STRANGER, STRANGER));
     }

@@ -24,7 +24,7 @@ static int fake_send(void *context, const iw_can_frame_t *frame) {
 static int fake_receive(void *context, iw_can_frame_t *out_frame) {
     (void)context;
     *out_frame = (iw_can_frame_t){.id = 256, .dlc = 4, .data = {(uint8_t)waiting}};
-    return waiting > 0 ? waiting-- : 0;
+    return (waiting > 0) ? waiting-- : 0;
 }
 
 static iw_bus_state_t fake_bus(void *context) {
@@ -76,7 +76,7 @@ static void look(void) {
 static void expect_kinds(const uint8_t *kinds, size_t expected) {
     look();
     TEST_ASSERT_EQUAL_size_t(expected, count);
-    for (size_t i = 0; i < expected; ++i) {
+    for (size_t i = 0; i < expected; i++) {
         TEST_ASSERT_EQUAL(kinds[i], entries[i].kind);
     }
 }
@@ -170,7 +170,7 @@ static void test_drive_keeps_what_was_asked_and_when_it_was_sent(void) {
 }
 
 static void test_frames_around_a_stop_are_kept_apart(void) {
-    for (iw_time_us_t at_us = 1; at_us <= 100; ++at_us) {
+    for (iw_time_us_t at_us = 1; at_us <= 100; at_us++) {
         waiting = 1;
         step(at_us);
         step(at_us); // Steps between the frames do not count.
@@ -181,7 +181,7 @@ static void test_frames_around_a_stop_are_kept_apart(void) {
     TEST_ASSERT_EQUAL_UINT64(100U - GW_AROUND + 1U, tape.before[0].at_us);
     TEST_ASSERT_EQUAL_UINT64(100, tape.before[GW_AROUND - 1U].at_us);
     TEST_ASSERT_EQUAL_UINT32(0, tape.after_count);
-    for (iw_time_us_t at_us = 101; at_us <= 101U + 2U * GW_AROUND; ++at_us) {
+    for (iw_time_us_t at_us = 101; at_us <= 101U + 2U * GW_AROUND; at_us++) {
         waiting = 1;
         step(at_us);
     }

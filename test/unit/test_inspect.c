@@ -23,14 +23,14 @@ void tearDown(void) {}
 static void hear_healthy(void) {
     heard.was_up = true;
     heard.span_us = 2000000U;
-    for (unsigned i = 0; i < IW_CODEC_ROWS; ++i) {
+    for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
         heard.count[i] = inspect_always(&iw_codec_rows[i]) ? inspect_nominal_mHz(&iw_codec_rows[i]) * 2U / 1000U : 0U;
     }
     heard.bits = 120000U;
 }
 
 static const inspect_finding_t *find(const char *check) {
-    for (unsigned i = 0; i < findings.count; ++i) {
+    for (unsigned i = 0; i < findings.count; i++) {
         if (strcmp(findings.finding[i].check, check) == 0) {
             return &findings.finding[i];
         }
@@ -58,8 +58,8 @@ static void test_healthy_bus_finds_nothing_to_mend(void) {
 
 static void test_silent_wheel_fails_and_its_other_messages_are_not_asked_for(void) {
     hear_healthy();
-    for (unsigned i = 0; i < IW_CODEC_ROWS; ++i) {
-        heard.count[i] = iw_codec_rows[i].side == IW_RIGHT ? 0U : heard.count[i];
+    for (unsigned i = 0; i < IW_CODEC_ROWS; i++) {
+        heard.count[i] = (iw_codec_rows[i].side == IW_RIGHT) ? 0U : heard.count[i];
     }
     inspect_bus(&local, &heard, &wish, &findings);
     expect("right_wheel", INSPECT_FAIL, "right wheel: not heard for 2000 ms", "power, cable");
@@ -121,7 +121,7 @@ static void test_unknown_ids_are_listed_and_the_list_is_bounded(void) {
     inspect_bus(&local, &heard, &wish, &findings);
     expect("unknown_ids", INSPECT_WARN, "3 frames are none of the wheels': 0x266 0x1ABCDEF0",
            "iwheelctl record - --can can0 --for 2s | iwheelctl decode");
-    for (uint32_t id = 1; id <= 20U; ++id) {
+    for (uint32_t id = 1; id <= 20U; id++) {
         frame.id = id;
         inspect_heard_take(&heard, &frame);
     }
@@ -275,7 +275,7 @@ static void test_estop_levels(void) {
 }
 
 static void test_full_list_counts_on_and_loses_no_failure(void) {
-    for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; ++i) {
+    for (unsigned i = 0; i < INSPECT_FINDINGS_MAX + 3U; i++) {
         inspect_say(&findings, "rates", INSPECT_FAIL, "%u", i);
         inspect_cure(&findings, "cure %u", i);
     }

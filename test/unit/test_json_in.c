@@ -41,8 +41,8 @@ static iwn_json_t member(const char *name) {
     return value;
 }
 
-#define YES(name, text)     TEST_ASSERT_TRUE_MESSAGE(check(text, sizeof(text) - 1U), name);
-#define NO(name, text)      TEST_ASSERT_FALSE_MESSAGE(check(text, sizeof(text) - 1U), name);
+#define YES(name, text)     TEST_ASSERT_TRUE_MESSAGE(check(text, sizeof text - 1U), name);
+#define NO(name, text)      TEST_ASSERT_FALSE_MESSAGE(check(text, sizeof text - 1U), name);
 #define OWN_YES(name, text) YES(name, text)
 #define OWN_NO(name, text)  NO(name, text)
 

@@ -63,7 +63,7 @@ static void test_json_that_does_not_fit_is_no_line_at_any_size(void) {
         iwn_out_text(&json, "event", "lost");
         iwn_out_close(&json, '}');
         const size_t whole = strlen("{\"event\":\"lost\"}\n");
-        TEST_ASSERT_EQUAL_UINT(size > whole ? whole : 0U, iwn_out_finish(&json));
+        TEST_ASSERT_EQUAL_UINT((size > whole) ? whole : 0U, iwn_out_finish(&json));
         for (size_t i = size; i < sizeof line; i++) {
             TEST_ASSERT_EQUAL_HEX8(0x5A, line[i]);
         }

@@ -141,11 +141,11 @@ static void apply(operation_t operation, int32_t figure) {
     const iw_ledger_item_t item = IW_LEDGER_GEAR_RATIO;
     if (operation <= ASSUME_CONFIGURATION) {
         iw_ledger_assume(&ledger, item,
-                         operation == ASSUME_DOCUMENT ? IW_EVIDENCE_DOCUMENT : IW_EVIDENCE_CONFIGURATION);
+                         (operation == ASSUME_DOCUMENT) ? IW_EVIDENCE_DOCUMENT : IW_EVIDENCE_CONFIGURATION);
     } else if (operation <= CONFIRM_OPERATOR) {
-        iw_ledger_confirm(&ledger, item, operation == CONFIRM_BUS ? IW_EVIDENCE_BUS : IW_EVIDENCE_OPERATOR, figure);
+        iw_ledger_confirm(&ledger, item, (operation == CONFIRM_BUS) ? IW_EVIDENCE_BUS : IW_EVIDENCE_OPERATOR, figure);
     } else {
-        iw_ledger_contradict(&ledger, item, operation == CONTRADICT_BUS ? IW_EVIDENCE_BUS : IW_EVIDENCE_OPERATOR,
+        iw_ledger_contradict(&ledger, item, (operation == CONTRADICT_BUS) ? IW_EVIDENCE_BUS : IW_EVIDENCE_OPERATOR,
                              figure);
     }
 }

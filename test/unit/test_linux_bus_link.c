@@ -17,9 +17,9 @@ static iw_timing_t judge(uint32_t bitrate_hz, uint16_t sample_point_permille) {
 }
 
 static void test_timing_bands_around_the_wanted_sample_point(void) {
-    for (uint16_t permille = 1; permille <= 1000; ++permille) {
-        const int off = permille > 625 ? permille - 625 : 625 - permille;
-        const iw_timing_t expected = off <= 5 ? IW_TIMING_RIGHT : off <= 25 ? IW_TIMING_NEAR : IW_TIMING_WRONG;
+    for (uint16_t permille = 1; permille <= 1000; permille++) {
+        const int off = (permille > 625) ? permille - 625 : 625 - permille;
+        const iw_timing_t expected = (off <= 5) ? IW_TIMING_RIGHT : (off <= 25) ? IW_TIMING_NEAR : IW_TIMING_WRONG;
         TEST_ASSERT_EQUAL_MESSAGE(expected, judge(1000000, permille), "sample point");
     }
 }

@@ -30,7 +30,7 @@ static bool passes(const struct can_filter *filter, canid_t can_id) {
 
 static bool is_ours(canid_t can_id) {
     bool any = false;
-    for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
+    for (size_t i = 0; i < IW_SOCKETCAN_IDS; i++) {
         any = any || passes(&ours[i], can_id);
     }
     return any;
@@ -38,7 +38,7 @@ static bool is_ours(canid_t can_id) {
 
 static bool is_others(canid_t can_id) {
     bool all = true; // Joined.
-    for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
+    for (size_t i = 0; i < IW_SOCKETCAN_IDS; i++) {
         all = all && passes(&others[i], can_id);
     }
     return all;
@@ -46,14 +46,14 @@ static bool is_others(canid_t can_id) {
 
 static bool is_known(uint32_t number) {
     bool known = false;
-    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; ++i) {
+    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         known = known || ids[i] == number;
     }
     return known;
 }
 
 static void test_filters_every_standard_id_goes_to_exactly_one_socket(void) {
-    for (uint32_t id = 0; id <= CAN_SFF_MASK; ++id) {
+    for (uint32_t id = 0; id <= CAN_SFF_MASK; id++) {
         TEST_ASSERT_EQUAL_MESSAGE(is_known(id), is_ours(id), "ours");
         TEST_ASSERT_EQUAL_MESSAGE(is_known(id), is_ours(id | CAN_RTR_FLAG), "remote");
         TEST_ASSERT_EQUAL_MESSAGE(!is_known(id), is_others(id), "others");
@@ -62,7 +62,7 @@ static void test_filters_every_standard_id_goes_to_exactly_one_socket(void) {
 }
 
 static void test_filters_an_extended_frame_counts_by_its_whole_number(void) {
-    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; ++i) {
+    for (size_t i = 0; i < sizeof ids / sizeof ids[0]; i++) {
         TEST_ASSERT_TRUE(is_ours(ids[i] | CAN_EFF_FLAG));
         TEST_ASSERT_FALSE(is_others(ids[i] | CAN_EFF_FLAG));
         TEST_ASSERT_FALSE(is_ours(ids[i] | CAN_EFF_FLAG | 0x800U));
@@ -71,7 +71,7 @@ static void test_filters_an_extended_frame_counts_by_its_whole_number(void) {
 }
 
 static void test_filters_do_not_ask_for_error_frames(void) {
-    for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
+    for (size_t i = 0; i < IW_SOCKETCAN_IDS; i++) {
         TEST_ASSERT_EQUAL_HEX32(0, ours[i].can_mask & CAN_ERR_FLAG);
         TEST_ASSERT_EQUAL_HEX32(0, others[i].can_mask & CAN_ERR_FLAG);
     }

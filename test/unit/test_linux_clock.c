@@ -13,7 +13,7 @@ static struct timespec wall;
 static long passes_ns;
 
 int clock_gettime(clockid_t clock, struct timespec *out_now) {
-    *out_now = clock == CLOCK_MONOTONIC ? monotonic : clock == CLOCK_BOOTTIME ? boot : wall;
+    *out_now = (clock == CLOCK_MONOTONIC) ? monotonic : (clock == CLOCK_BOOTTIME) ? boot : wall;
     monotonic.tv_nsec += passes_ns;
     boot.tv_nsec += passes_ns;
     return 0;

@@ -36,7 +36,7 @@ static void test_address_by_chip_and_offset(void) {
 
 static void test_address_by_name(void) {
     static const char *const names[] = {"ESTOP", "GPIO17", "gpiochip0", "a:4", "gpio:4", "none2", "a b", "x"};
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(0, iw_gpio_address_parse(names[i], &address), names[i]);
         TEST_ASSERT_FALSE_MESSAGE(address.by_offset, names[i]);
         TEST_ASSERT_EQUAL_STRING(names[i], address.name);
@@ -56,7 +56,7 @@ static void test_address_that_is_none_is_refused_and_changes_nothing(void) {
                                         "gpiochipx:4",
                                         "gpiochip0:4:5",
                                         "gpiochip99999999999999999999:1"};
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(EINVAL, iw_gpio_address_parse(wrong[i], &address), wrong[i]);
     }
     TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_gpio_address_parse("a-line-name-of-thirty-two-letters", &address));
@@ -109,7 +109,7 @@ static void test_release_counts_when_it_has_lasted(void) {
 static void test_release_is_put_off_by_every_bounce(void) {
     look(0, true, true);
     (void)pressed();
-    for (unsigned bounce = 0; bounce < 20U; ++bounce) {
+    for (unsigned bounce = 0; bounce < 20U; bounce++) {
         look(4U * MS, (bounce & 1U) != 0U, true);
         TEST_ASSERT_TRUE(pressed());
     }

@@ -51,7 +51,7 @@ int iw_gpio_line_level(const iw_gpio_line_t *self) {
 int iw_gpio_line_take_edges(iw_gpio_line_t *self) {
     const int edges = wire.edges;
     (void)self;
-    wire.edges = edges > 0 ? 0 : edges;
+    wire.edges = (edges > 0) ? 0 : edges;
     return edges;
 }
 

@@ -16,10 +16,10 @@ static const iw_gpio_address_t by_offset = {.name = FAKE_GPIO_CHIP, .offset = FA
 static iw_gpio_line_t line;
 
 int fake_gpio_take(unsigned room) {
-    const int taken = fake_gpio.edges < (int)room ? fake_gpio.edges : (int)room;
+    const int taken = (fake_gpio.edges < (int)room) ? fake_gpio.edges : (int)room;
     fake_gpio.reads++;
     if (taken == 0) {
-        errno = fake_gpio.edges_error != 0 ? fake_gpio.edges_error : EAGAIN;
+        errno = (fake_gpio.edges_error != 0) ? fake_gpio.edges_error : EAGAIN;
         return -1;
     }
     fake_gpio.edges -= taken;
@@ -27,8 +27,8 @@ int fake_gpio_take(unsigned room) {
 }
 
 void setUp(void) {
-    (void)memset(&fake_gpio, 0, sizeof fake_gpio);
-    (void)memset(&line, 0xA5, sizeof line);
+    memset(&fake_gpio, 0, sizeof fake_gpio);
+    memset(&line, 0xA5, sizeof line);
     TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_name));
 }
 
@@ -67,7 +67,7 @@ static void test_level_is_that_of_the_wire_and_gone_when_it_cannot_be_read(void)
 
 static void test_edges_are_all_taken_and_counted(void) {
     static const int numbers[] = {0, 1, 2, 15, 16, 17, 33};
-    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
         fake_gpio.edges = numbers[i];
         TEST_ASSERT_EQUAL_INT(numbers[i], iw_gpio_line_take_edges(&line));
         TEST_ASSERT_EQUAL_INT(0, fake_gpio.edges);

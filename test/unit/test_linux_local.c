@@ -190,7 +190,7 @@ static void test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_
     for (unsigned i = 0; i < 1000; i++) { // A second, asked every millisecond.
         const iw_time_us_t before_us = iw_linux_hal_next_us(&hal);
         iw_linux_hal_tend(&hal, now_us);
-        attempts += iw_linux_hal_next_us(&hal) != before_us ? 1U : 0U;
+        attempts += (iw_linux_hal_next_us(&hal) != before_us) ? 1U : 0U;
         TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) > now_us);
         TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) <= now_us + 200000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
@@ -262,7 +262,7 @@ static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void)
     int result = 1;
     while (result > 0) {
         result = functions.send(functions.context, &frame);
-        sent += result > 0 ? 1U : 0U;
+        sent += (result > 0) ? 1U : 0U;
         TEST_ASSERT_LESS_THAN_UINT(100000, sent);
     }
     TEST_ASSERT_EQUAL_INT(0, result);

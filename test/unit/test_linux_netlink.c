@@ -178,7 +178,7 @@ static void test_attributes_cut_short_anywhere_are_survived(void) {
     begin(IFF_UP | IFF_ECHO);
     add_controller(&(controller_t){.bitrate = 1000000, .sample_point = 625});
     const uint32_t whole = message->nlmsg_len;
-    for (uint32_t length = (uint32_t)NLMSG_HDRLEN + (uint32_t)sizeof *interface; length < whole; ++length) {
+    for (uint32_t length = (uint32_t)NLMSG_HDRLEN + (uint32_t)sizeof *interface; length < whole; length++) {
         message->nlmsg_len = length;
         TEST_ASSERT_TRUE(iw_netlink_parse(message, &reading));
         TEST_ASSERT_EQUAL_INT(7, reading.index);

@@ -47,7 +47,7 @@ static void fill_item(unsigned item) {
         .entry = {.state = by_bus ? shown[item].state : IW_LEDGER_CONTRADICTED,
                   .evidence = by_bus ? IW_EVIDENCE_BUS : IW_EVIDENCE_OPERATOR,
                   .figure = shown[item].figure},
-        .since_wall_us = item % 2U == 0U ? 0 : INT64_C(253402300799000000),
+        .since_wall_us = (item % 2U == 0U) ? 0 : INT64_C(253402300799000000),
     };
     (void)snprintf(entry->value, IWN_VALUE_SIZE, "%s", shown[item].value);
     (void)snprintf(entry->word.found, IWN_VALUE_SIZE, "%s", by_bus ? "" : shown[item].value);
@@ -158,7 +158,7 @@ static void forge(const char *body) {
     for (const char *c = body; *c != '\0'; c++) {
         sum ^= (unsigned char)*c;
         for (unsigned bit = 0; bit < 8U; bit++) {
-            sum = (sum >> 1) ^ ((sum & 1U) != 0U ? 0xEDB88320U : 0U);
+            sum = (sum >> 1) ^ (((sum & 1U) != 0U) ? 0xEDB88320U : 0U);
         }
     }
     length = (size_t)snprintf(text, sizeof text, "%s%08x\n", body, (unsigned)~sum);
@@ -373,7 +373,7 @@ static void test_memory_of_an_offset_that_no_wheel_can_show_is_not_believed(void
         char row[32];
         (void)snprintf(row, sizeof row, "row %zu", i);
         memset(&known, 0, sizeof known);
-        known.offset[i % 2U == 0U ? IW_LEFT : IW_RIGHT] = rows[i].offset;
+        known.offset[(i % 2U == 0U) ? IW_LEFT : IW_RIGHT] = rows[i].offset;
         TEST_ASSERT_EQUAL_MESSAGE(rows[i].good, believed(), row);
     }
 }

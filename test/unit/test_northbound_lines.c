@@ -55,8 +55,8 @@ static size_t drain(char *text, size_t size) {
     ssize_t count = 1;
     while (count > 0) {
         gw_client_flush(&client);
-        count = recv(peer, text == NULL ? big : &text[total], text == NULL ? sizeof big : size - total, 0);
-        total += count > 0 ? (size_t)count : 0U;
+        count = recv(peer, (text == NULL) ? big : &text[total], (text == NULL) ? sizeof big : size - total, 0);
+        total += (count > 0) ? (size_t)count : 0U;
     }
     return total;
 }
@@ -210,7 +210,7 @@ static void test_client_with_bytes_left_in_its_socket_is_not_caught_up(void) {
 }
 
 static void test_client_that_filled_the_buffer_is_not_caught_up(void) {
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL_INT(4000, (int)send(peer, big, 4000, MSG_NOSIGNAL));
     }
     gw_client_read(&client);

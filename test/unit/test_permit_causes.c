@@ -67,10 +67,10 @@ static void assert_effect(effect_t effect, const iw_permit_t *before, iw_cause_t
     const iw_demand_t demand = iw_permit_demand(&rig.permit);
     const bool stops = effect == LATCH || effect == LATCH_SILENT || effect == RAMP;
     const bool cuts_armed = effect == CUT && iw_permit_state(before) == IW_STATE_ARMED;
-    TEST_ASSERT_EQUAL_UINT32(before->stop.number + (stops || cuts_armed ? 1U : 0U), rig.permit.stop.number);
+    TEST_ASSERT_EQUAL_UINT32(before->stop.number + ((stops || cuts_armed) ? 1U : 0U), rig.permit.stop.number);
     if (effect == LATCH || effect == LATCH_SILENT) {
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
-        TEST_ASSERT_EQUAL_INT(effect == LATCH ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE, demand);
+        TEST_ASSERT_EQUAL_INT((effect == LATCH) ? IW_DEMAND_ZERO : IW_DEMAND_SILENCE, demand);
         assert_stop_told(cause, iw_permit_state(before), true);
     } else if (effect == RAMP) {
         TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_permit_state(&rig.permit));

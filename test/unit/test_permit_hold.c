@@ -170,7 +170,7 @@ static void test_permit_reset_within_a_second_of_an_event_is_refused(void) {
         permit_rig_raise(&rig, events[i]);
         permit_rig_wait(&rig, MS(1000) - 1U);
         const iw_refusal_t refusal = permit_rig_reset(&rig);
-        TEST_ASSERT_EQUAL_INT(events[i] == IW_CAUSE_SECOND_MASTER ? IW_REFUSE_SECOND_MASTER : IW_REFUSE_CAUSE_PRESENT,
+        TEST_ASSERT_EQUAL_INT((events[i] == IW_CAUSE_SECOND_MASTER) ? IW_REFUSE_SECOND_MASTER : IW_REFUSE_CAUSE_PRESENT,
                               refusal);
         TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_permit_state(&rig.permit));
         permit_rig_wait(&rig, 1);
@@ -315,7 +315,7 @@ static uint32_t outside(const iw_permit_t *permit) {
 static void assert_next_is_right(void) {
     const iw_permit_t now = rig.permit;
     const iw_time_us_t next_us = iw_permit_next_us(&rig.permit);
-    const iw_time_us_t before_us = next_us == IW_NEVER ? rig.now_us + MS(100000) : next_us - 1U;
+    const iw_time_us_t before_us = (next_us == IW_NEVER) ? rig.now_us + MS(100000) : next_us - 1U;
     if (before_us >= rig.now_us) {
         iw_permit_step(&rig.permit, before_us, &rig.view);
         TEST_ASSERT_EQUAL_HEX32_MESSAGE(outside(&now), outside(&rig.permit), "changed before next_us");
@@ -331,7 +331,7 @@ static void assert_next_is_right(void) {
 
 static void random_input(fixture_random_t *random) {
     const uint32_t choice = fixture_random(random) % 24U;
-    const iw_client_t client = (fixture_random(random) & 1U) != 0U ? HOLDER : OTHER;
+    const iw_client_t client = ((fixture_random(random) & 1U) != 0U) ? HOLDER : OTHER;
     rig.view.settled = rig.view.settled != (choice == 0U);
     rig.view.at_rest = rig.view.settled || choice < 12U;
     rig.view.output_zero = choice != 1U;

@@ -13,7 +13,7 @@ void setUp(void) {
 void tearDown(void) {}
 
 static bool between(int32_t low, int32_t value, int32_t high) {
-    return low <= high ? (value >= low && value <= high) : (value >= high && value <= low);
+    return (low <= high) ? (value >= low && value <= high) : (value >= high && value <= low);
 }
 
 static void test_setpoint_acceleration_follows_time_at_every_period(void) {
@@ -31,7 +31,7 @@ static void test_setpoint_acceleration_follows_time_at_every_period(void) {
             for (uint32_t n = 0; n < 60; n++) {
                 const iw_pair_t pair = setpoint_rig_take_next(&rig);
                 const int64_t ideal = (int64_t)(rig.now_us - start_us) * accels[k] / 1000000;
-                const int64_t expected = ideal > 5000 ? 5000 : ideal;
+                const int64_t expected = (ideal > 5000) ? 5000 : ideal;
                 TEST_ASSERT_INT_WITHIN(1, expected, pair.wheel[IW_LEFT].speed_mm_s);
                 TEST_ASSERT_INT_WITHIN(1, -expected, pair.wheel[IW_RIGHT].speed_mm_s);
             }
@@ -50,7 +50,7 @@ static void test_setpoint_braking_follows_time_at_every_period(void) {
         do {
             const iw_pair_t pair = setpoint_rig_take_next(&rig);
             const int64_t ideal = 1000 - (int64_t)(rig.now_us - start_us) * rig.config.decel_mm_s2 / 1000000;
-            TEST_ASSERT_INT_WITHIN(1, ideal < 0 ? 0 : ideal, pair.wheel[IW_LEFT].speed_mm_s);
+            TEST_ASSERT_INT_WITHIN(1, (ideal < 0) ? 0 : ideal, pair.wheel[IW_LEFT].speed_mm_s);
             TEST_ASSERT_TRUE_MESSAGE(rig.now_us <= start_us + MS(1000), "does not come to zero");
         } while (!setpoint_rig_is_zero(&rig));
     }
@@ -263,7 +263,7 @@ static void test_setpoint_never_passes_its_target_and_never_exceeds_the_slopes(v
         for (int side = 0; side < IW_SIDES; side++) {
             const int32_t was = before.wheel[side].speed_mm_s;
             const int32_t is = pair.wheel[side].speed_mm_s;
-            const int32_t slope = abs(is) > abs(was) ? rig.config.accel_mm_s2 : rig.config.decel_mm_s2;
+            const int32_t slope = (abs(is) > abs(was)) ? rig.config.accel_mm_s2 : rig.config.decel_mm_s2;
             TEST_ASSERT_TRUE(between(was, is, target.wheel[side].speed_mm_s));
             TEST_ASSERT_TRUE(abs(is - was) <= slope * (int32_t)(rig.now_us - before_us) / 1000000 + 1);
         }
@@ -334,7 +334,7 @@ static void test_setpoint_accelerating_wheel_does_not_hold_up_a_braking_one(void
     while (rig.now_us < start_us + MS(600)) {
         const iw_pair_t pair = setpoint_rig_take_next(&rig);
         const int64_t ideal = 1000 - (int64_t)(rig.now_us - start_us) * 1500 / 1000000;
-        TEST_ASSERT_INT_WITHIN(1, ideal < 100 ? 100 : ideal, pair.wheel[IW_LEFT].speed_mm_s);
+        TEST_ASSERT_INT_WITHIN(1, (ideal < 100) ? 100 : ideal, pair.wheel[IW_LEFT].speed_mm_s);
     }
 }
 

@@ -65,7 +65,7 @@ static void test_bus_delivers_at_the_end_of_the_frame_and_not_before(void) {
 }
 
 static void test_bus_lowest_id_wins_when_several_wait(void) {
-    for (uint8_t port = 0U; port < 5U; ++port) {
+    for (uint8_t port = 0U; port < 5U; port++) {
         sim_bus_open(&bus, port, 4U, false);
     }
     submit(START_US, 0U, 545U);
@@ -113,7 +113,7 @@ static void test_bus_full_queue_loses_the_newest_and_counts_it(void) {
 
 static void test_bus_queue_survives_going_round_many_times(void) {
     sim_bus_open(&bus, 0U, 3U, false);
-    for (uint32_t i = 0U; i < 500U; ++i) {
+    for (uint32_t i = 0U; i < 500U; i++) {
         submit(START_US + i * MS, 0U, i);
         submit(START_US + i * MS, 0U, i + 1000U);
         expect_next(START_US + (i + 1U) * MS, i, 0U);

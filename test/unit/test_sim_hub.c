@@ -45,7 +45,7 @@ static int run_simulator(void) {
 }
 
 static int open_socket(const char *path, int type) {
-    for (unsigned tries = 0U; tries < WITHIN_MS; ++tries) {
+    for (unsigned tries = 0U; tries < WITHIN_MS; tries++) {
         int const fd = sim_listener_connect(path, type);
         if (fd >= 0) {
             return fd;
@@ -109,7 +109,7 @@ static const char *tell(const char *command) {
 
 /// Waits for a frame with this id word. Its echo mark, or -1 if the connection closed.
 static int wait_for_frame(int fd, canid_t id, struct can_frame *out_frame) {
-    for (unsigned i = 0U; i < 10000U; ++i) {
+    for (unsigned i = 0U; i < 10000U; i++) {
         size_t const length = receive(fd, out_frame, sizeof *out_frame);
         if (length == 0U) {
             return -1;
@@ -148,7 +148,7 @@ static void test_hub_reader_that_stalls_loses_frames_and_the_others_none(void) {
     int const stalled = open_socket(options.can_path, SOCK_SEQPACKET);
     int const reader = open_socket(options.can_path, SOCK_SEQPACKET);
     TEST_ASSERT_EQUAL_STRING("ok\n", tell("babble 7FE 200 on"));
-    for (unsigned i = 0U; i < 1000U; ++i) {
+    for (unsigned i = 0U; i < 1000U; i++) {
         (void)wait_for_frame(reader, 0x7FEU, &frame);
     }
     TEST_ASSERT_NOT_NULL(strstr(tell("status"), "\"clients\":2"));
@@ -206,7 +206,7 @@ static void test_hub_error_frame_of_a_client_reaches_the_others_only(void) {
     (void)send(liar, &forged, sizeof forged, MSG_NOSIGNAL);
     TEST_ASSERT_EQUAL_INT(2, wait_for_frame(other, forged.can_id, &frame)); // Marked as a client's.
     send_setpoint(liar);
-    for (unsigned i = 0U; i < 100U; ++i) {
+    for (unsigned i = 0U; i < 100U; i++) {
         (void)receive(liar, &frame, sizeof frame);
         TEST_ASSERT_NOT_EQUAL_HEX32(forged.can_id, frame.can_id);
     }
@@ -260,7 +260,7 @@ static void test_control_takes_bytes_one_by_one_and_several_lines_at_once(void) 
     start();
     int const fd = open_socket(options.control_path, SOCK_STREAM);
     const char *const text = "power on\n";
-    for (size_t i = 0U; i < strlen(text); ++i) {
+    for (size_t i = 0U; i < strlen(text); i++) {
         TEST_ASSERT_EQUAL_INT(1, send(fd, &text[i], 1U, MSG_NOSIGNAL));
     }
     TEST_ASSERT_EQUAL_size_t(3U, receive(fd, answer, 3U));
@@ -296,7 +296,7 @@ static void test_control_nul_in_a_line_is_refused(void) {
 
 static void test_simulator_ends_cleanly_and_takes_its_sockets_away(void) {
     static const int signals[] = {SIGTERM, SIGINT};
-    for (size_t i = 0U; i < 2U; ++i) {
+    for (size_t i = 0U; i < 2U; i++) {
         start();
         TEST_ASSERT_EQUAL_INT(EX_OK, end(signals[i]));
         TEST_ASSERT_NOT_EQUAL(0, access(options.can_path, F_OK));

@@ -48,7 +48,7 @@ static void test_random_same_seed_gives_same_numbers_and_another_seed_others(voi
     sim_random_init(&one, 7U);
     sim_random_init(&same, 7U);
     sim_random_init(&other, 8U);
-    for (unsigned i = 0U; i < 1000U; ++i) {
+    for (unsigned i = 0U; i < 1000U; i++) {
         uint32_t const number = sim_random_next(&one);
         TEST_ASSERT_EQUAL_UINT32(number, sim_random_next(&same));
         differ += (number != sim_random_next(&other)) ? 1U : 0U;
@@ -62,7 +62,7 @@ static void test_random_noise_stays_within_and_reaches_its_amplitude_around_zero
     int32_t low = 0;
     int32_t high = 0;
     sim_random_init(&random, 1U);
-    for (unsigned i = 0U; i < 20000U; ++i) {
+    for (unsigned i = 0U; i < 20000U; i++) {
         int32_t const value = sim_random_noise(&random, 10);
         sum += value;
         low = (value < low) ? value : low;
@@ -91,7 +91,7 @@ static void test_trig_known_angles_give_known_values(void) {
         {10 * SIM_TRIG_TURN_nrad + 523598776, 500000, 866025},
         {-10 * SIM_TRIG_TURN_nrad - 523598776, -500000, 866025},
     };
-    for (size_t i = 0U; i < sizeof known / sizeof known[0]; ++i) {
+    for (size_t i = 0U; i < sizeof known / sizeof known[0]; i++) {
         int64_t const sine = sim_trig_sin(known[i].angle_nrad) * 1000000 / SIM_TRIG_ONE;
         int64_t const cosine = sim_trig_cos(known[i].angle_nrad) * 1000000 / SIM_TRIG_ONE;
         TEST_ASSERT_INT64_WITHIN(10, known[i].sine_ppm, sine);
@@ -119,7 +119,7 @@ static void test_motion_reaches_the_speed_it_is_told_without_overshoot(void) {
 static void test_motion_acceleration_is_bound_by_the_current(void) {
     static const int16_t current_mA[] = {2000, 1000, -1000, 250};
     static const int32_t most_um_s[] = {400000, 200000, 200000, 50000};
-    for (size_t i = 0U; i < 4U; ++i) {
+    for (size_t i = 0U; i < 4U; i++) {
         restart();
         (void)drive(START_US, 100U, 5000, current_mA[i]);
         TEST_ASSERT_INT32_WITHIN(2000, most_um_s[i], motion.speed_um_s);
@@ -167,7 +167,7 @@ static void test_motion_coasts_the_same_in_one_step_or_many(void) {
     iw_time_us_t const last_us = drive(START_US, 500U, 800, 2000);
     many = motion;
     sim_motion_advance(&motion, last_us + 3000U * MS);
-    for (unsigned ms = 1U; ms <= 3000U; ++ms) {
+    for (unsigned ms = 1U; ms <= 3000U; ms++) {
         sim_motion_advance(&many, last_us + ms * MS);
     }
     TEST_ASSERT_EQUAL_INT32(motion.speed_um_s, many.speed_um_s);

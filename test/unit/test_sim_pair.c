@@ -21,7 +21,7 @@ static void test_pair_every_id_keeps_its_period_exactly_for_ten_seconds(void) {
     rig_run(START_US, START_US + 4U * SECOND);
     rig_forget();
     rig_run(START_US + 4U * SECOND, START_US + 14U * SECOND);
-    for (size_t i = 0U; i < sizeof due / sizeof due[0]; ++i) {
+    for (size_t i = 0U; i < sizeof due / sizeof due[0]; i++) {
         seen_t const *const of = &seen[due[i].id];
         TEST_ASSERT_EQUAL_UINT32(10000000U / due[i].period_us, of->count);
         TEST_ASSERT_EQUAL_UINT32(due[i].period_us, of->shortest_us);
@@ -33,10 +33,10 @@ static void test_pair_sends_its_nine_ids_and_nothing_else(void) {
     uint32_t total = 0U;
     uint32_t known = 0U;
     rig_run(START_US, START_US + 10U * SECOND);
-    for (uint32_t id = 0U; id < sizeof seen / sizeof seen[0]; ++id) {
+    for (uint32_t id = 0U; id < sizeof seen / sizeof seen[0]; id++) {
         total += seen[id].count;
     }
-    for (size_t i = 0U; i < 9U; ++i) {
+    for (size_t i = 0U; i < 9U; i++) {
         static const uint32_t ids[] = {256U, 257U, 288U, 289U, 290U, 512U, 513U, 544U, 545U};
         known += seen[ids[i]].count;
         TEST_ASSERT_GREATER_THAN_UINT32(0U, seen[ids[i]].count);
@@ -180,7 +180,7 @@ static void test_pair_ignores_frames_that_are_no_setpoint_of_the_table(void) {
         {.id = 288U, .dlc = 4U, .data = {1, 44}},
         {.id = 513U, .dlc = 2U},
     };
-    for (size_t i = 0U; i < sizeof strange / sizeof strange[0]; ++i) {
+    for (size_t i = 0U; i < sizeof strange / sizeof strange[0]; i++) {
         sim_pair_hear(&pair, BOOTED, &strange[i]);
     }
     TEST_ASSERT_EQUAL_MEMORY(&before, &pair, sizeof pair);

@@ -138,7 +138,7 @@ static void test_panel_every_command_with_right_arguments_is_done(void) {
         "estop plug",
         "normal",
     };
-    for (size_t i = 0U; i < sizeof right / sizeof right[0]; ++i) {
+    for (size_t i = 0U; i < sizeof right / sizeof right[0]; i++) {
         expect_done(right[i]);
     }
 }
@@ -259,7 +259,7 @@ static void test_panel_wrong_commands_are_refused_and_change_nothing(void) {
         "power\ton\x01",
         "\x80",
     };
-    for (size_t i = 0U; i < sizeof wrong / sizeof wrong[0]; ++i) {
+    for (size_t i = 0U; i < sizeof wrong / sizeof wrong[0]; i++) {
         expect_refused(wrong[i]);
     }
     TEST_ASSERT_EQUAL_UINT(0U, quits);
@@ -308,7 +308,7 @@ static void test_panel_reboot_without_power_is_refused_with_the_cure(void) {
 static void test_panel_help_lists_commands_and_ends_in_a_dot(void) {
     TEST_ASSERT_EQUAL_INT(SIM_ASKED, sim_panel_execute(&panel, NOW_US, "help"));
     static const char *const name[] = {"power", "reboot", "load", "sign", "foreign", "estop", "status", "help"};
-    for (size_t i = 0U; i < sizeof name / sizeof name[0]; ++i) {
+    for (size_t i = 0U; i < sizeof name / sizeof name[0]; i++) {
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(panel.answer, name[i]), name[i]);
     }
     TEST_ASSERT_EQUAL_STRING("\n.\n", &panel.answer[strlen(panel.answer) - 3U]);

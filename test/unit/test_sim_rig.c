@@ -50,7 +50,7 @@ static void take_until(iw_time_us_t until_us) {
 void rig_run(iw_time_us_t from_us, iw_time_us_t until_us) {
     for (iw_time_us_t now_us = from_us; driving && now_us < until_us; now_us += 20U * MS) {
         take_until(now_us);
-        for (unsigned side = 0U; side < IW_SIDES; ++side) {
+        for (unsigned side = 0U; side < IW_SIDES; side++) {
             iw_codec_setpoint_t const setpoint = {command_mm_s[side], 2000, 1U};
             iw_can_frame_t frame;
             (void)iw_codec_encode_setpoint((iw_side_t)side, &setpoint, IW_DLC_SETPOINT, &frame);

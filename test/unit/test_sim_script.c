@@ -42,7 +42,7 @@ static bool load(const char *text, sim_script_fault_t *fault) {
 
 static void expect_step(iw_time_us_t at_us, const char *command) {
     TEST_ASSERT_EQUAL_UINT64(at_us, sim_script_next_us(&script));
-    TEST_ASSERT_NULL(at_us > 0U ? sim_script_take(&script, at_us - 1U) : NULL);
+    TEST_ASSERT_NULL((at_us > 0U) ? sim_script_take(&script, at_us - 1U) : NULL);
     TEST_ASSERT_EQUAL_STRING(command, sim_script_take(&script, at_us));
 }
 
@@ -74,7 +74,7 @@ static void test_script_faults_are_told_with_their_line(void) {
         {"at 99999999 quit\n", 1U},
         {"at 1.0001 quit\n", 1U},
     };
-    for (size_t i = 0U; i < sizeof faulty / sizeof faulty[0]; ++i) {
+    for (size_t i = 0U; i < sizeof faulty / sizeof faulty[0]; i++) {
         sim_script_fault_t fault = {0U, ""};
         TEST_ASSERT_FALSE_MESSAGE(load(faulty[i].text, &fault), faulty[i].text);
         TEST_ASSERT_EQUAL_UINT_MESSAGE(faulty[i].line, fault.line, faulty[i].text);
@@ -90,7 +90,7 @@ static void test_script_line_too_long_and_too_many_commands_are_refused(void) {
     TEST_ASSERT_FALSE(load(text, &fault));
     TEST_ASSERT_EQUAL_UINT(1U, fault.line);
     text[0] = '\0';
-    for (unsigned i = 0U; i < SIM_SCRIPT_STEPS; ++i) {
+    for (unsigned i = 0U; i < SIM_SCRIPT_STEPS; i++) {
         memcpy(&text[i * 9U], "power on\n", 10U);
     }
     TEST_ASSERT_TRUE(load(text, &fault));

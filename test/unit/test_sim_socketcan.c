@@ -12,7 +12,7 @@ void tearDown(void) {}
 
 static void test_commands_that_need_the_hub_are_refused_with_any_arguments(void) {
     static const char *const refused[] = {"ack off", "stall on", "busoff", "passive\ton", "bus down", "queue 4"};
-    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; ++i) {
+    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
         TEST_ASSERT_TRUE_MESSAGE(sim_socketcan_refuses(refused[i]), refused[i]);
     }
 }
@@ -21,7 +21,7 @@ static void test_commands_of_the_wheels_and_other_nodes_are_not(void) {
     static const char *const allowed[] = {"power off",   "mute left", "foreign once", "frame 100#", "babble 1 100 on",
                                           "estop press", "status",    "normal",       "busy",       "",
                                           "acknowledge", "b"};
-    for (size_t i = 0; i < sizeof allowed / sizeof allowed[0]; ++i) {
+    for (size_t i = 0; i < sizeof allowed / sizeof allowed[0]; i++) {
         TEST_ASSERT_FALSE_MESSAGE(sim_socketcan_refuses(allowed[i]), allowed[i]);
     }
 }

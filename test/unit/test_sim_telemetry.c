@@ -91,7 +91,7 @@ static void test_pair_speed_frames_tell_the_speed_without_bias(void) {
     int64_t sum = 0;
     rig_drive(500, -300);
     rig_run(START_US, START_US + 3U * SECOND);
-    for (unsigned i = 0U; i < 1000U; ++i) {
+    for (unsigned i = 0U; i < 1000U; i++) {
         iw_time_us_t const now_us = START_US + 3U * SECOND + i * 4U * MS;
         rig_run(now_us, now_us + 4U * MS);
         sum += rig_last(256U).as.speed.speed_rpm;

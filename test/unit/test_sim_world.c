@@ -55,7 +55,7 @@ static iw_time_us_t drive(uint8_t port, iw_time_us_t from_us, iw_time_us_t until
     iw_time_us_t now_us = from_us;
     for (; now_us < until_us; now_us += 20U * MS) {
         run_until(now_us);
-        for (unsigned side = 0U; side < IW_SIDES; ++side) {
+        for (unsigned side = 0U; side < IW_SIDES; side++) {
             iw_can_frame_t const frame = setpoint((iw_side_t)side, speed_mm_s);
             sim_world_submit(&world, now_us, port, &frame);
         }
@@ -100,7 +100,7 @@ static void test_world_woken_at_the_end_of_frames_tells_the_same_with_half_the_w
     uint32_t const fewer = sleep_until(START_US + 3U * SECOND + SIM_WORLD_FRAME_US, sim_world_wake_us);
     TEST_ASSERT_GREATER_THAN_UINT32(1000U, told);
     TEST_ASSERT_UINT32_WITHIN(2U, told, count);
-    for (uint32_t i = 0U; i < told; ++i) {
+    for (uint32_t i = 0U; i < told; i++) {
         TEST_ASSERT_EQUAL_UINT64(every_step[i].end_us, history[i].end_us);
         TEST_ASSERT_EQUAL_UINT32(every_step[i].frame.id, history[i].frame.id);
         TEST_ASSERT_EQUAL_UINT8_ARRAY(every_step[i].frame.data, history[i].frame.data, IW_CAN_DATA_MAX);
@@ -113,7 +113,7 @@ static void test_world_client_gets_its_frames_back_within_a_millisecond(void) {
     (void)drive(port, START_US + SECOND, START_US + 2U * SECOND, 300);
     run_until(START_US + 2U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(100U, count);
-    for (uint32_t i = 0U; i < count; ++i) {
+    for (uint32_t i = 0U; i < count; i++) {
         iw_time_us_t const sent_us = START_US + SECOND + (i / 2U) * 20U * MS;
         TEST_ASSERT_EQUAL_UINT8(port, history[i].port);
         TEST_ASSERT_EQUAL_HEX32((i % 2U == 0U) ? 266U : 298U, history[i].frame.id);
@@ -137,7 +137,7 @@ static void test_world_power_cut_keeps_old_setpoints_that_come_out_when_it_retur
     TEST_ASSERT_EQUAL_UINT32(0U, count);
     run_until(back_us + 500U * MS);
     TEST_ASSERT_EQUAL_UINT32(SIM_QUEUE_DEFAULT, count);
-    for (uint32_t i = 0U; i < count; ++i) {
+    for (uint32_t i = 0U; i < count; i++) {
         TEST_ASSERT_EQUAL_INT16(1000, told_mm_s(i));
     }
     TEST_ASSERT_GREATER_THAN_INT32(100000, world.pair.wheel[IW_LEFT].motion.speed_um_s);
@@ -193,7 +193,7 @@ static void test_world_disconnected_client_takes_its_queue_along(void) {
 }
 
 static void test_world_has_room_for_so_many_clients_and_no_more(void) {
-    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; ++i) {
+    for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         TEST_ASSERT_EQUAL_UINT8(SIM_PORT_CLIENT + i, sim_world_connect(&world));
     }
     TEST_ASSERT_EQUAL_UINT8(SIM_BUS_NONE, sim_world_connect(&world));
@@ -271,7 +271,7 @@ static void test_world_babbling_high_id_delays_the_others_by_one_frame_only(void
     uint32_t setpoints = 0U;
     (void)drive(port, START_US + SECOND, START_US + SECOND + 200U * MS, 100);
     run_until(START_US + SECOND + 200U * MS);
-    for (uint32_t i = 0U; i < count; ++i) {
+    for (uint32_t i = 0U; i < count; i++) {
         if (history[i].port == port) {
             TEST_ASSERT_LESS_THAN_UINT64(START_US + SECOND + (setpoints / 2U) * 20U * MS + 900U, history[i].end_us);
             setpoints += 1U;
@@ -281,7 +281,7 @@ static void test_world_babbling_high_id_delays_the_others_by_one_frame_only(void
 }
 
 static void plant_everything(void) {
-    for (unsigned side = 0U; side < IW_SIDES; ++side) {
+    for (unsigned side = 0U; side < IW_SIDES; side++) {
         sim_wheel_t *const wheel = &world.pair.wheel[side];
         wheel->muted = true;
         wheel->loss_permille = 500U;
@@ -312,7 +312,7 @@ static void test_world_heal_undoes_every_fault(void) {
     run_until(START_US + 4U * SECOND);
     TEST_ASSERT_EQUAL_UINT32(200U, count);
     TEST_ASSERT_GREATER_THAN_UINT32(1500U, telemetry);
-    for (unsigned side = 0U; side < IW_SIDES; ++side) {
+    for (unsigned side = 0U; side < IW_SIDES; side++) {
         TEST_ASSERT_INT32_WITHIN(1000, 300000, world.pair.wheel[side].motion.speed_um_s);
         TEST_ASSERT_GREATER_THAN_INT64(0, sim_motion_milli_rpm(&world.pair.wheel[side].motion));
     }
@@ -325,7 +325,7 @@ static uint64_t hash_until(uint64_t hash, iw_time_us_t until_us) {
     sim_delivery_t delivery;
     while (sim_world_step(&world, until_us, &delivery)) {
         hash = hash * 31U + delivery.frame.id + delivery.end_us;
-        for (unsigned i = 0U; i < delivery.frame.dlc; ++i) {
+        for (unsigned i = 0U; i < delivery.frame.dlc; i++) {
             hash = hash * 31U + delivery.frame.data[i];
         }
     }

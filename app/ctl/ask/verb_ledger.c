@@ -99,8 +99,8 @@ static void suggest(const char *item) {
     for (unsigned i = 0; i < (unsigned)IW_LEDGER_ITEMS; i++) {
         const char *name = iwn_ledger_item_name((iw_ledger_item_t)i);
         const size_t far = gw_word_distance(item, name);
-        best = far < best_distance ? name : best;
-        best_distance = far < best_distance ? far : best_distance;
+        best = (far < best_distance) ? name : best;
+        best_distance = (far < best_distance) ? far : best_distance;
     }
     if (best != NULL && strcmp(item, best) != 0) {
         (void)ctl_fail(CTL_NO, "did you mean %s?", best);

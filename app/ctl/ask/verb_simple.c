@@ -27,8 +27,8 @@ static int ask_and_tell_state(ctl_t *self, json_t *request) {
     if (code == CTL_OK && !self->json) {
         const char *state = text_word(reply, "state");
         const char *text = state;
-        for (size_t i = 0; i < sizeof(meanings) / sizeof(meanings[0]); i++) {
-            text = strcmp(meanings[i].state, state) == 0 ? meanings[i].meaning : text;
+        for (size_t i = 0; i < sizeof meanings / sizeof meanings[0]; i++) {
+            text = (strcmp(meanings[i].state, state) == 0) ? meanings[i].meaning : text;
         }
         print_line(text);
     }
@@ -47,8 +47,8 @@ int verb_estop(ctl_t *self, int count, char **words) {
     char reason[201] = "";
     size_t used = 0;
     for (int i = 0; i < count; i++) {
-        const int n = snprintf(reason + used, sizeof(reason) - used, "%s%s", i > 0 ? " " : "", words[i]);
-        used += n > 0 && (size_t)n < sizeof(reason) - used ? (size_t)n : sizeof(reason) - used - 1U;
+        const int n = snprintf(reason + used, sizeof reason - used, "%s%s", (i > 0) ? " " : "", words[i]);
+        used += (n > 0 && (size_t)n < sizeof reason - used) ? (size_t)n : sizeof reason - used - 1U;
     }
     json_t *request = json_pack("{s:s}", "cmd", "estop");
     json_t *text = json_string(reason);
@@ -87,7 +87,7 @@ static void print_tare(const json_t *reply, const char *side) {
 
 int verb_tare(ctl_t *self, int count, char **words) {
     json_t *reply = NULL;
-    const char *side = count > 0 ? words[0] : NULL;
+    const char *side = (count > 0) ? words[0] : NULL;
     if (!ctl_words_at_most("tare", count, 1, words)) {
         return CTL_USAGE;
     }
@@ -95,7 +95,7 @@ int verb_tare(ctl_t *self, int count, char **words) {
         return ctl_fail(CTL_USAGE, "tare \"%s\": no such wheel; write left, right, or nothing for both", side);
     }
     json_t *request =
-        side != NULL ? json_pack("{s:s,s:s}", "cmd", "tare", "side", side) : json_pack("{s:s}", "cmd", "tare");
+        (side != NULL) ? json_pack("{s:s,s:s}", "cmd", "tare", "side", side) : json_pack("{s:s}", "cmd", "tare");
     const int code = ctl_ask(self, request, &reply);
     if (code == CTL_OK && !self->json) {
         print_tare(reply, "left");

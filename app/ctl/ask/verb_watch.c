@@ -48,7 +48,7 @@ static bool parse_words(int count, char **words, json_t *list, int *out_rate_hz)
     for (int i = 0; i < count; i++) {
         if (strcmp(words[i], "--rate") == 0) {
             i++;
-            if (!parse_rate(i < count ? words[i] : NULL, out_rate_hz)) {
+            if (!parse_rate((i < count) ? words[i] : NULL, out_rate_hz)) {
                 (void)ctl_fail(CTL_USAGE, "--rate wants a number of events per second, 1..%d", RATE_MAX_HZ);
                 return false;
             }
@@ -107,12 +107,12 @@ static output_t write_text(const client_t *client, const char *text, size_t size
         if (state != OUTPUT_OPEN) {
             return state;
         }
-        const ssize_t written = write(STDOUT_FILENO, text, size < PIPE_BUF ? size : PIPE_BUF);
+        const ssize_t written = write(STDOUT_FILENO, text, (size < PIPE_BUF) ? size : PIPE_BUF);
         if (written < 0 && errno != EINTR && errno != EAGAIN) {
-            return errno == EPIPE ? OUTPUT_CLOSED : OUTPUT_BROKEN;
+            return (errno == EPIPE) ? OUTPUT_CLOSED : OUTPUT_BROKEN;
         }
-        text += written > 0 ? written : 0;
-        size -= written > 0 ? (size_t)written : 0U;
+        text += (written > 0) ? written : 0;
+        size -= (written > 0) ? (size_t)written : 0U;
     }
     return OUTPUT_OPEN;
 }
@@ -136,7 +136,7 @@ static output_t write_line(const client_t *client) {
         rest = iwn_plain_json(rest, piece, sizeof piece, &length);
         state = write_text(client, piece, length);
     }
-    return state == OUTPUT_OPEN ? write_text(client, "\n", 1) : state;
+    return (state == OUTPUT_OPEN) ? write_text(client, "\n", 1) : state;
 }
 
 /// Prints events until a signal, the end of the reader or of the gateway.
@@ -156,7 +156,8 @@ static int pump(ctl_t *self) {
         output = event ? write_lost(&self->client) : await_output(&self->client, false);
         output = (event && output == OUTPUT_OPEN) ? write_line(&self->client) : output;
     }
-    return output == OUTPUT_BROKEN ? ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno)) : CTL_OK;
+    return (output == OUTPUT_BROKEN) ? ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno))
+                                     : CTL_OK;
 }
 
 int verb_watch(ctl_t *self, int count, char **words) {
@@ -171,5 +172,5 @@ int verb_watch(ctl_t *self, int count, char **words) {
     const int code = ctl_ask(self, request, &reply);
     self->json = json;
     json_decref(reply);
-    return code == CTL_OK ? pump(self) : code;
+    return (code == CTL_OK) ? pump(self) : code;
 }

@@ -62,7 +62,7 @@ static bringup_result_t await_estop(bringup_t *self, const char *wanted, int64_t
         (void)ppoll(NULL, 0, &pause, signals_let_in());
     }
     talk_keys_end();
-    return signals_count() != signals ? BRINGUP_QUIT : there ? BRINGUP_ON : BRINGUP_FAILED;
+    return (signals_count() != signals) ? BRINGUP_QUIT : there ? BRINGUP_ON : BRINGUP_FAILED;
 }
 
 static bringup_result_t go_without(bringup_t *self) {
@@ -116,6 +116,6 @@ bringup_result_t bringup_estop(bringup_t *self) {
     }
     talk_say("Seen. It will stop the wheels in everything that follows, and so does any key.");
     bringup_note(self, "estop", "line", NULL, "press and release were seen%s",
-                 strncmp(self->config.estop.line, "unix:", 5U) == 0 ? " (a SIMULATED button)" : "");
+                 (strncmp(self->config.estop.line, "unix:", 5U) == 0) ? " (a SIMULATED button)" : "");
     return trial_wait_ready(self) ? BRINGUP_ON : BRINGUP_FAILED;
 }

@@ -34,7 +34,7 @@ typedef struct {
 } run_t;
 
 static burst_end_t fail(run_t *run, burst_end_t end, const char *why) {
-    (void)snprintf(run->outcome->why, sizeof(run->outcome->why), "%s", why);
+    (void)snprintf(run->outcome->why, sizeof run->outcome->why, "%s", why);
     return end;
 }
 
@@ -55,7 +55,7 @@ static bool is_told(const json_t *wheel, const char *field, int wanted) {
 
 static bool is_in_force(const burst_t *burst, const json_t *state) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *wheel = json_object_get(state, side == IW_LEFT ? "left" : "right");
+        const json_t *wheel = json_object_get(state, (side == IW_LEFT) ? "left" : "right");
         if (!is_told(wheel, "applied_mm_s", burst->speed_mm_s[side]) ||
             (burst->has_current && !is_told(wheel, "applied_mA", burst->current_mA[side]))) {
             return false;
@@ -79,8 +79,8 @@ static bool speeds_of(const json_t *state, int out_mm_s[IW_SIDES]) {
 static bool is_enough(const burst_t *burst, const outcome_t *outcome) {
     const int left = abs(outcome->peak_mm_s[IW_LEFT]);
     const int right = abs(outcome->peak_mm_s[IW_RIGHT]);
-    const int fast = left > right ? left : right;
-    const int slow = left > right ? right : left;
+    const int fast = (left > right) ? left : right;
+    const int slow = (left > right) ? right : left;
     return burst->enough_mm_s > 0 && (slow >= burst->enough_mm_s || fast >= ENOUGH_OF_ONE * burst->enough_mm_s);
 }
 
@@ -93,7 +93,7 @@ static void take_speeds(run_t *run, const json_t *state, int64_t now_us) {
     }
     for (unsigned side = 0; side < IW_SIDES; side++) {
         int *peak = &run->outcome->peak_mm_s[side];
-        *peak = abs(speed[side]) > abs(*peak) ? speed[side] : *peak;
+        *peak = (abs(speed[side]) > abs(*peak)) ? speed[side] : *peak;
         run->sum_mm_s[side] += late ? speed[side] : 0;
     }
     run->enough = run->enough || is_enough(run->burst, run->outcome);
@@ -172,8 +172,8 @@ static burst_end_t judge(run_t *run, burst_end_t end) {
 static void stop(run_t *run, burst_end_t end) {
     ctl_t *ctl = run->bringup->ctl;
     const int64_t rest_us = client_now_us() + REST_US;
-    json_t *request = end == BURST_ABORTED ? json_pack("{s:s,s:s}", "cmd", "estop", "reason", "a key in bringup")
-                                           : json_pack("{s:s}", "cmd", "stop");
+    json_t *request = (end == BURST_ABORTED) ? json_pack("{s:s,s:s}", "cmd", "estop", "reason", "a key in bringup")
+                                             : json_pack("{s:s}", "cmd", "stop");
     json_decref(near_ask(ctl, request));
     json_decref(near_ask(ctl, json_pack("{s:s,s:[]}", "cmd", "watch", "topics")));
     for (bool resting = false; !resting && client_now_us() < rest_us;) {
@@ -215,7 +215,7 @@ void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     out_outcome->end = judge(&run, end);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         out_outcome->mean_mm_s[side] =
-            run.enough || run.samples == 0 ? out_outcome->peak_mm_s[side] : (int)(run.sum_mm_s[side] / run.samples);
+            (run.enough || run.samples == 0) ? out_outcome->peak_mm_s[side] : (int)(run.sum_mm_s[side] / run.samples);
     }
 }
 
@@ -229,7 +229,7 @@ bringup_result_t burst_show(bringup_t *self, const burst_t *burst, outcome_t *ou
                      out_outcome->mean_mm_s[IW_RIGHT]);
             return BRINGUP_ON;
         }
-        talk_say("  %s: %s", out_outcome->end == BURST_REFUSED ? "It did not begin" : "STOPPED", out_outcome->why);
+        talk_say("  %s: %s", (out_outcome->end == BURST_REFUSED) ? "It did not begin" : "STOPPED", out_outcome->why);
         if (!talk_yes("Once more?", false, &again)) {
             return BRINGUP_QUIT;
         }

@@ -50,14 +50,14 @@ static force_t look_at_force(bringup_t *self, iw_side_t side) {
         if (json_is_integer(raw)) {
             const long long value = json_integer_value(raw);
             sum += (double)value;
-            force.low = value < force.low ? value : force.low;
-            force.high = value > force.high ? value : force.high;
+            force.low = (value < force.low) ? value : force.low;
+            force.high = (value > force.high) ? value : force.high;
             count++;
         }
         json_decref(status);
         (void)nanosleep(&pause, NULL);
     }
-    force.mean = count > 0 ? sum / count : 0.0;
+    force.mean = (count > 0) ? sum / count : 0.0;
     force.heard = count >= LOOKS * 9 / 10;
     return force;
 }
@@ -90,11 +90,11 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
     }
     self->config.core.force_unit[side] = cn ? IW_FORCE_CN : IW_FORCE_DN;
     talk_say("  %.0f counts for %.1f N: the unit is %s%s.%s", fabs(counts), mass_kg * G_N_PER_kg, word,
-             self->config.core.force_unit[side] == before ? "" : ", other than configured until now",
-             counts < 0.0 ? " The force counts downwards: pressing is negative." : "");
-    bringup_note(self, names[side], "force_unit", side == IW_LEFT ? "force_unit_left" : "force_unit_right",
+             (self->config.core.force_unit[side] == before) ? "" : ", other than configured until now",
+             (counts < 0.0) ? " The force counts downwards: pressing is negative." : "");
+    bringup_note(self, names[side], "force_unit", (side == IW_LEFT) ? "force_unit_left" : "force_unit_right",
                  "%.2f kg changed the raw force by %.0f counts%s", mass_kg, counts,
-                 counts < 0.0 ? "; pressing makes it smaller" : "");
+                 (counts < 0.0) ? "; pressing makes it smaller" : "");
 }
 
 /// Without a mass: only whether the handle is this wheel's, and which way it counts.
@@ -145,7 +145,7 @@ static bringup_result_t measure(bringup_t *self, iw_side_t side, bool *out_again
     force_t loaded;
     bool weighed = false;
     *out_again = false;
-    (void)snprintf(question, sizeof(question), "Mass in kg that you will put on the %s handle (Enter: press by hand)",
+    (void)snprintf(question, sizeof question, "Mass in kg that you will put on the %s handle (Enter: press by hand)",
                    names[side]);
     if (!talk_number(question, MASS_MIN_kg, MASS_MAX_kg, &mass_kg, &weighed) ||
         !talk_ask("Hands and weights off both handles, then Enter", "go", answer)) {
@@ -158,7 +158,7 @@ static bringup_result_t measure(bringup_t *self, iw_side_t side, bool *out_again
     if (!free.heard) {
         return tell_deaf(self, side);
     }
-    (void)snprintf(question, sizeof(question), "Now %s the %s handle and leave it so, then Enter",
+    (void)snprintf(question, sizeof question, "Now %s the %s handle and leave it so, then Enter",
                    weighed ? "put the mass on" : "press", names[side]);
     if (!talk_ask(question, "go", answer)) {
         return BRINGUP_QUIT;

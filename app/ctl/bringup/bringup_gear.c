@@ -24,7 +24,7 @@ typedef enum { RPM_UNSEEN = 0, RPM_WHEEL, RPM_ROTOR } rpm_of_t;
 
 /// What is wrong with it, told; or false.
 static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turned) {
-    const iw_side_t other = side == IW_LEFT ? IW_RIGHT : IW_LEFT;
+    const iw_side_t other = (side == IW_LEFT) ? IW_RIGHT : IW_LEFT;
     const char *name = bringup_side(side);
     if (!hand->heard) {
         talk_say("  The wheels were not heard all the time.");
@@ -49,7 +49,7 @@ static bringup_result_t turn(bringup_t *self, iw_side_t side, turned_t *out_turn
     char prompt[96];
     bool again = true;
     *out_done = false;
-    (void)snprintf(prompt, sizeof(prompt), "Turn the %s wheel exactly %d times in one direction, then press Enter ...",
+    (void)snprintf(prompt, sizeof prompt, "Turn the %s wheel exactly %d times in one direction, then press Enter ...",
                    bringup_side(side), TURNS);
     while (!*out_done && again) {
         hand_t hand;
@@ -62,7 +62,7 @@ static bringup_result_t turn(bringup_t *self, iw_side_t side, turned_t *out_turn
         const double rotor = (double)llabs(hand.ticks[side]) / IW_TICKS_PER_TURN;
         *out_turned = (turned_t){.ticks = llabs(hand.ticks[side]),
                                  .gear = rotor / TURNS,
-                                 .share = rotor > 0.0 ? hand.rpm_turns[side] / rotor : 0.0};
+                                 .share = (rotor > 0.0) ? hand.rpm_turns[side] / rotor : 0.0};
         *out_done = !is_no_turn(&hand, side, out_turned);
         if (!*out_done && !talk_yes("Once more?", true, &again)) {
             return BRINGUP_QUIT;
@@ -91,7 +91,7 @@ static rpm_of_t judge_rpm(const turned_t turned[IW_SIDES]) {
         rotor = rotor && is_about(turned[side].share, 1.0);
         wheel = wheel && is_about(turned[side].share, 1.0 / turned[side].gear);
     }
-    return rotor == wheel ? RPM_UNSEEN : rotor ? RPM_ROTOR : RPM_WHEEL;
+    return (rotor == wheel) ? RPM_UNSEEN : rotor ? RPM_ROTOR : RPM_WHEEL;
 }
 
 static void note_gear(bringup_t *self, const turned_t turned[IW_SIDES], bool geared, rpm_of_t rpm) {
@@ -121,13 +121,13 @@ static bringup_result_t judge_gear(bringup_t *self, const turned_t turned[IW_SID
     const bool geared = core.gear_turns > core.gear_per;
     const rpm_of_t rpm = judge_rpm(turned);
     // Without a gear the wheel's rpm and the rotor's are the same.
-    core.rpm_of_rotor = geared && (rpm == RPM_UNSEEN ? core.rpm_of_rotor : rpm == RPM_ROTOR);
+    core.rpm_of_rotor = geared && ((rpm == RPM_UNSEEN) ? core.rpm_of_rotor : rpm == RPM_ROTOR);
     talk_say("  %lld and %lld ticks in %d turns: %.2f turns of the rotor per turn of the wheel; %s.",
              turned[IW_LEFT].ticks, turned[IW_RIGHT].ticks, TURNS, gear,
-             !geared             ? "no gear: rotor and wheel turn together"
-             : rpm == RPM_UNSEEN ? "whose turns the rpm count was not to be seen (turn faster to see it)"
-             : rpm == RPM_ROTOR  ? "the rpm count the rotor's turns"
-                                 : "the rpm count the wheel's turns");
+             !geared               ? "no gear: rotor and wheel turn together"
+             : (rpm == RPM_UNSEEN) ? "whose turns the rpm count was not to be seen (turn faster to see it)"
+             : (rpm == RPM_ROTOR)  ? "the rpm count the rotor's turns"
+                                   : "the rpm count the wheel's turns");
     if (!talk_yes("Take that?", true, out_taken)) {
         return BRINGUP_QUIT;
     }

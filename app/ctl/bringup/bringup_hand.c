@@ -84,7 +84,7 @@ bool hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand) {
         (void)puts("");
         return false;
     }
-    return read(STDIN_FILENO, line, sizeof(line)) > 0 && line[0] != 'q';
+    return read(STDIN_FILENO, line, sizeof line) > 0 && line[0] != 'q';
 }
 
 bool hand_went_one_way(const hand_t *hand, iw_side_t side) {

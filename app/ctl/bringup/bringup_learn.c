@@ -30,13 +30,13 @@ static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
     for (unsigned rank = 0; rank < 4U; rank++) {
         unsigned best = 0;
         for (unsigned type = 1; type < TYPES; type++) {
-            best = left[type] > left[best] ? type : best;
+            best = (left[type] > left[best]) ? type : best;
         }
         if (left[best] == 0U) {
             break;
         }
-        const int n = snprintf(&out_list[used], size - used, "%s%u", used > 0U ? "," : "", best);
-        used += n > 0 && (size_t)n < size - used ? (size_t)n : 0U;
+        const int n = snprintf(&out_list[used], size - used, "%s%u", (used > 0U) ? "," : "", best);
+        used += (n > 0 && (size_t)n < size - used) ? (size_t)n : 0U;
         left[best] = 0U;
     }
     return frames;
@@ -46,8 +46,8 @@ static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
 static void take_length(bringup_t *self, const learn_t *learn) {
     const learn_range_t *left = &learn_known(learn, IW_ID_LEFT_SETPOINT)->length;
     const learn_range_t *right = &learn_known(learn, IW_ID_RIGHT_SETPOINT)->length;
-    const int low = left->low < right->low ? left->low : right->low;
-    const int high = left->high > right->high ? left->high : right->high;
+    const int low = (left->low < right->low) ? left->low : right->low;
+    const int high = (left->high > right->high) ? left->high : right->high;
     const bool both = learn->setpoint[IW_LEFT].count > 0U && learn->setpoint[IW_RIGHT].count > 0U;
     if (both && low == high && low > DLC_MIN && low <= DLC_MAX) {
         self->config.core.setpoint_dlc = (uint16_t)low;

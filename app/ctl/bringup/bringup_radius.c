@@ -18,7 +18,7 @@
 static double radius_of(const bringup_t *self, double distance_m, long long ticks) {
     const iw_config_t *core = &self->config.core;
     const double turns = (double)llabs(ticks) / IW_TICKS_PER_TURN * core->gear_per / core->gear_turns;
-    return turns > 0.0 ? distance_m * 1000.0 / (2.0 * M_PI * turns) : 0.0;
+    return (turns > 0.0) ? distance_m * 1000.0 / (2.0 * M_PI * turns) : 0.0;
 }
 
 /// The odometry of a machine that was pushed forwards must have counted forwards, by the signs found before.
@@ -60,7 +60,7 @@ static void keep_radius(bringup_t *self, const hand_t *hand, double distance_m, 
     const double ticks = (double)(llabs(hand->ticks[IW_LEFT]) + llabs(hand->ticks[IW_RIGHT])) / 2.0;
     self->config.core.radius_mm = (uint16_t)lround(mean);
     self->mm_per_tick = straight ? distance_m * 1000.0 / ticks : 0.0;
-    bringup_note(self, "wheels", "radius_mm", straight && geared ? "wheel_radius" : NULL,
+    bringup_note(self, "wheels", "radius_mm", (straight && geared) ? "wheel_radius" : NULL,
                  "%.2f m pushed: left %lld, right %lld ticks%s%s", distance_m, hand->ticks[IW_LEFT],
                  hand->ticks[IW_RIGHT], geared ? "" : "; the gear is assumed", straight ? "" : "; not straight");
 }

@@ -28,15 +28,15 @@ typedef struct {
 
 /// A bit per side that turned.
 static unsigned turned(const outcome_t *outcome) {
-    return (abs(outcome->peak_mm_s[IW_LEFT]) >= TORQUE_MM_S ? LEFT : 0U) |
-           (abs(outcome->peak_mm_s[IW_RIGHT]) >= TORQUE_MM_S ? RIGHT : 0U);
+    return ((abs(outcome->peak_mm_s[IW_LEFT]) >= TORQUE_MM_S) ? LEFT : 0U) |
+           ((abs(outcome->peak_mm_s[IW_RIGHT]) >= TORQUE_MM_S) ? RIGHT : 0U);
 }
 
 static const char *wheels(unsigned sides) {
-    return sides == BOTH    ? "both wheels"
-           : sides == LEFT  ? "the left wheel"
-           : sides == RIGHT ? "the right wheel"
-                            : "no wheel";
+    return (sides == BOTH)    ? "both wheels"
+           : (sides == LEFT)  ? "the left wheel"
+           : (sides == RIGHT) ? "the right wheel"
+                              : "no wheel";
 }
 
 static bringup_result_t try_burst(bringup_t *self, const burst_t *burst, unsigned *out_turned) {
@@ -50,7 +50,7 @@ static bringup_result_t try_burst(bringup_t *self, const burst_t *burst, unsigne
 static void find_setpoint(role_t *found, unsigned sides, int current_mA) {
     found->role = "setpoint";
     found->seen = sides == BOTH;
-    (void)snprintf(found->how, sizeof(found->how), "%d mA without speed turned %s", current_mA, wheels(sides));
+    (void)snprintf(found->how, sizeof found->how, "%d mA without speed turned %s", current_mA, wheels(sides));
     if (!found->seen) {
         talk_say(
             "Only %s: the other one may be held. A current that turns a wheel by itself is no limit, but it was not "
@@ -96,7 +96,7 @@ static bringup_result_t try_limit(bringup_t *self, role_t *found) {
     found->seen = sides == BOTH;
     if (found->seen) {
         found->role = "limit";
-        (void)snprintf(found->how, sizeof(found->how),
+        (void)snprintf(found->how, sizeof found->how,
                        "%d mA alone and %d mm/s alone turned no wheel, both together did", self->current_mA,
                        BRINGUP_SPEED_MM_S);
         talk_say("They turn with both, and with neither alone: the current is a limit.");
@@ -118,7 +118,7 @@ static bringup_result_t find_role(bringup_t *self, role_t *found) {
     unsigned by_current = 0U;
     unsigned by_speed = 0U;
     bringup_result_t shown = try_burst(self, &current_only, &by_current);
-    shown = shown == BRINGUP_ON ? try_burst(self, &speed_only, &by_speed) : shown;
+    shown = (shown == BRINGUP_ON) ? try_burst(self, &speed_only, &by_speed) : shown;
     if (shown != BRINGUP_ON) {
         return shown;
     }
@@ -150,8 +150,8 @@ static bringup_result_t keep_role(bringup_t *self, const role_t *found) {
         talk_say("limit or setpoint, please: nothing can be driven without one of them (q ends bringup).");
     }
     const bool same = strcmp(answer, found->role) == 0;
-    self->config.core.current_role = strcmp(answer, "limit") == 0 ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
-    bringup_note(self, "wheels", "current_role", same && found->seen ? "current_role" : NULL, "%s",
+    self->config.core.current_role = (strcmp(answer, "limit") == 0) ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
+    bringup_note(self, "wheels", "current_role", (same && found->seen) ? "current_role" : NULL, "%s",
                  same ? found->how : "typed in; the wheels did not show it");
     return BRINGUP_ON;
 }
@@ -166,5 +166,5 @@ bringup_result_t bringup_role(bringup_t *self) {
         return BRINGUP_FAILED;
     }
     const bringup_result_t result = find_role(self, &found);
-    return result == BRINGUP_ON ? keep_role(self, &found) : result;
+    return (result == BRINGUP_ON) ? keep_role(self, &found) : result;
 }

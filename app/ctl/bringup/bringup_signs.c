@@ -16,7 +16,7 @@ static burst_t turn(const bringup_t *self, int left_mm_s, int right_mm_s) {
     burst_t burst = {.speed_mm_s = {left_mm_s, right_mm_s}, .for_ms = TURN_MS};
     burst.has_current = self->config.core.current_role == IW_ROLE_SETPOINT;
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        burst.current_mA[side] = burst.speed_mm_s[side] != 0 ? self->current_mA : 0;
+        burst.current_mA[side] = (burst.speed_mm_s[side] != 0) ? self->current_mA : 0;
     }
     return burst;
 }
@@ -24,7 +24,7 @@ static burst_t turn(const bringup_t *self, int left_mm_s, int right_mm_s) {
 /// What the bus shows: the wheel that was told to turn did, the other did not, and the measured sign is the told one.
 static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_t side) {
     const int told = outcome->mean_mm_s[side];
-    const int other = outcome->mean_mm_s[side == IW_LEFT ? IW_RIGHT : IW_LEFT];
+    const int other = outcome->mean_mm_s[(side == IW_LEFT) ? IW_RIGHT : IW_LEFT];
     if (abs(told) < MOVES_MM_S && abs(other) >= MOVES_MM_S) {
         talk_say("The bus says that the OTHER wheel turned: left and right are exchanged. Their ids are fixed, so "
                  "exchange the wheels (or their plugs), then begin again.");
@@ -55,7 +55,7 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
 static void keep_sign(bringup_t *self, iw_side_t side, bool forward) {
     bool *invert = &self->config.core.invert[side];
     *invert = forward ? *invert : !*invert;
-    bringup_note(self, names[side], "invert", side == IW_LEFT ? "mount_sign_left" : "mount_sign_right",
+    bringup_note(self, names[side], "invert", (side == IW_LEFT) ? "mount_sign_left" : "mount_sign_right",
                  "somebody saw it turn %s with invert = %s", forward ? "forwards" : "backwards",
                  (forward ? *invert : !*invert) ? "yes" : "no");
 }
@@ -66,9 +66,9 @@ static bringup_result_t look_at(bringup_t *self, iw_side_t side, bool *out_again
     char question[96];
     outcome_t outcome;
     const burst_t burst =
-        turn(self, side == IW_LEFT ? BRINGUP_SPEED_MM_S : 0, side == IW_RIGHT ? BRINGUP_SPEED_MM_S : 0);
+        turn(self, (side == IW_LEFT) ? BRINGUP_SPEED_MM_S : 0, (side == IW_RIGHT) ? BRINGUP_SPEED_MM_S : 0);
     *out_again = false;
-    (void)snprintf(question, sizeof(question), "Look at the %s wheel. Enter turns it for %.1f s", names[side],
+    (void)snprintf(question, sizeof question, "Look at the %s wheel. Enter turns it for %.1f s", names[side],
                    TURN_MS / 1e3);
     if (!talk_ask(question, "go", answer)) {
         return BRINGUP_QUIT;
@@ -80,7 +80,7 @@ static bringup_result_t look_at(bringup_t *self, iw_side_t side, bool *out_again
     if (!bus_agrees(self, &outcome, side)) {
         return BRINGUP_FAILED;
     }
-    (void)snprintf(question, sizeof(question),
+    (void)snprintf(question, sizeof question,
                    "It would take the machine f forwards, b backwards (o: other wheel, "
                    "r: again)");
     for (;;) {

@@ -22,7 +22,7 @@ void talk_say(const char *format, ...) {
     char text[1024];
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(text, sizeof(text), format, arguments);
+    (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     const char *rest = text;
     while (*rest != '\0') {
@@ -30,7 +30,7 @@ void talk_say(const char *format, ...) {
         if (cut > PAPER_WIDTH) {
             for (cut = PAPER_WIDTH; cut > 0 && rest[cut] != ' '; cut--) {
             }
-            cut = cut == 0 ? PAPER_WIDTH : cut;
+            cut = (cut == 0) ? PAPER_WIDTH : cut;
         }
         (void)printf("%.*s\n", (int)cut, rest);
         rest += cut;

@@ -22,7 +22,7 @@
 static double rolled(const bringup_t *self, const hand_t *hand, iw_side_t side) {
     const iw_config_t *core = &self->config.core;
     const double assumed = 2.0 * M_PI * core->radius_mm / IW_TICKS_PER_TURN * core->gear_per / core->gear_turns;
-    const double way_mm = (double)hand->ticks[side] * (self->mm_per_tick > 0.0 ? self->mm_per_tick : assumed);
+    const double way_mm = (double)hand->ticks[side] * ((self->mm_per_tick > 0.0) ? self->mm_per_tick : assumed);
     return core->invert[side] ? -way_mm : way_mm;
 }
 
@@ -77,7 +77,7 @@ static bringup_result_t judge_track(bringup_t *self, const hand_t *hand, int tur
         return BRINGUP_ON;
     }
     talk_say("  Left rolled %.2f m, right %.2f m in %d turns: the track is %.0f mm%s.", left / 1e3, right / 1e3, turns,
-             track_mm, self->mm_per_tick > 0.0 ? "" : ", if the radius is as configured: no distance was measured");
+             track_mm, (self->mm_per_tick > 0.0) ? "" : ", if the radius is as configured: no distance was measured");
     if (!near) {
         talk_say(
             "  Configured were %.0f mm. A tape from the middle of one tyre to the middle of the other tells whether "
@@ -129,8 +129,8 @@ bringup_result_t bringup_track(bringup_t *self) {
         if (!given) {
             return BRINGUP_ON;
         }
-        (void)snprintf(prompt, sizeof(prompt), "Turn it %d full turn%s, let it stand at the mark, then press Enter ...",
-                       turns, turns == 1 ? "" : "s");
+        (void)snprintf(prompt, sizeof prompt, "Turn it %d full turn%s, let it stand at the mark, then press Enter ...",
+                       turns, (turns == 1) ? "" : "s");
         if (!talk_ask("Point it at the mark, then Enter", "go", answer)) {
             return BRINGUP_QUIT;
         }

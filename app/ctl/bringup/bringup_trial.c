@@ -91,8 +91,8 @@ static bool make_folder(trial_t *trial) {
     if (trial->folder[0] != '\0') {
         return true;
     }
-    (void)snprintf(trial->folder, sizeof(trial->folder), "%.30s/iwheel-bringup-XXXXXX",
-                   runtime != NULL && runtime[0] == '/' && strlen(runtime) <= 30U ? runtime : "/tmp");
+    (void)snprintf(trial->folder, sizeof trial->folder, "%.30s/iwheel-bringup-XXXXXX",
+                   (runtime != NULL && runtime[0] == '/' && strlen(runtime) <= 30U) ? runtime : "/tmp");
     const bool made = mkdtemp(trial->folder) != NULL;
     if (made && start_guard(trial)) {
         return true;
@@ -121,10 +121,10 @@ static void slow_down(const bringup_t *self, const gateway_config_t *config, boo
     out_trial->core.echo_ms = 150;
     out_trial->northbound.mode = 0600;
     out_trial->northbound.max_clients = 4;
-    (void)snprintf(out_trial->northbound.group, sizeof(out_trial->northbound.group), "none");
-    path_of(&self->trial, "gateway.sock", out_trial->northbound.socket, sizeof(out_trial->northbound.socket));
+    (void)snprintf(out_trial->northbound.group, sizeof out_trial->northbound.group, "none");
+    path_of(&self->trial, "gateway.sock", out_trial->northbound.socket, sizeof out_trial->northbound.socket);
     if (!with_records) {
-        (void)snprintf(out_trial->record.directory, sizeof(out_trial->record.directory), "%s", self->trial.folder);
+        (void)snprintf(out_trial->record.directory, sizeof out_trial->record.directory, "%s", self->trial.folder);
     }
 }
 
@@ -132,7 +132,7 @@ static bool write_config(const bringup_t *self, const gateway_config_t *config, 
     gateway_config_t trial;
     char path[128];
     slow_down(self, config, with_records, &trial);
-    path_of(&self->trial, "gateway.conf", path, sizeof(path));
+    path_of(&self->trial, "gateway.conf", path, sizeof path);
     FILE *file = fopen(path, "we");
     if (file == NULL) {
         (void)ctl_fail(CTL_UNAVAILABLE, "cannot write %s: %s", path, strerror(errno));
@@ -145,31 +145,31 @@ static bool write_config(const bringup_t *self, const gateway_config_t *config, 
 /// Where the gateway's program is: as told, beside this program, where the build puts it, or in the path.
 static void find_program(trial_t *trial) {
     char self[400];
-    const ssize_t length = readlink("/proc/self/exe", self, sizeof(self) - 1U);
+    const ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1U);
     if (trial->program[0] != '\0') {
         return;
     }
-    self[length > 0 ? length : 0] = '\0';
+    self[(length > 0) ? length : 0] = '\0';
     char *slash = strrchr(self, '/');
     if (slash != NULL) {
         static const char *const places[] = {"", "/../gateway"};
         *slash = '\0';
-        for (size_t i = 0; i < sizeof(places) / sizeof(places[0]); i++) {
-            (void)snprintf(trial->program, sizeof(trial->program), "%s%s/iwheel-gateway", self, places[i]);
+        for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+            (void)snprintf(trial->program, sizeof trial->program, "%s%s/iwheel-gateway", self, places[i]);
             if (access(trial->program, X_OK) == 0) {
                 return;
             }
         }
     }
-    (void)snprintf(trial->program, sizeof(trial->program), "iwheel-gateway");
+    (void)snprintf(trial->program, sizeof trial->program, "iwheel-gateway");
 }
 
 _Noreturn static void become_gateway(const trial_t *trial) {
     char config[128];
     char log[128];
     sigset_t none;
-    path_of(trial, "gateway.conf", config, sizeof(config));
-    path_of(trial, "gateway.log", log, sizeof(log));
+    path_of(trial, "gateway.conf", config, sizeof config);
+    path_of(trial, "gateway.log", log, sizeof log);
     const int fd = open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     if (fd >= 0) {
         (void)dup2(fd, STDOUT_FILENO);
@@ -190,11 +190,11 @@ static void tell_log(const trial_t *trial) {
     char path[128];
     char line[512];
     char last[512] = "it wrote nothing";
-    path_of(trial, "gateway.log", path, sizeof(path));
+    path_of(trial, "gateway.log", path, sizeof path);
     FILE *file = fopen(path, "re");
-    while (file != NULL && fgets(line, sizeof(line), file) != NULL) {
+    while (file != NULL && fgets(line, sizeof line, file) != NULL) {
         line[strcspn(line, "\n")] = '\0';
-        memcpy(last, line, sizeof(last));
+        memcpy(last, line, sizeof last);
     }
     if (file != NULL) {
         (void)fclose(file);
@@ -207,7 +207,7 @@ static bool connect_to(bringup_t *self) {
     char path[128];
     const char *const named = self->ctl->socket;
     const int64_t end_us = client_now_us() + START_US;
-    path_of(&self->trial, "gateway.sock", path, sizeof(path));
+    path_of(&self->trial, "gateway.sock", path, sizeof path);
     self->ctl->socket = path;
     do {
         near_look(self->ctl, NULL, &gateway);
@@ -297,7 +297,7 @@ static const char *missing(const json_t *status) {
     if (json_array_size(json_object_get(status, "present")) > 0) {
         return "a fault that was seen just now stays";
     }
-    return strcmp(text_word(status, "state"), "listening") == 0 ? NULL : "the gateway does not come to rest";
+    return (strcmp(text_word(status, "state"), "listening") == 0) ? NULL : "the gateway does not come to rest";
 }
 
 bool trial_wait_ready(bringup_t *self) {

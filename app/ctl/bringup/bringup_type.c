@@ -149,10 +149,10 @@ bringup_result_t bringup_type(bringup_t *self) {
     bool found = false;
     talk_step(4, "the setpoint type (WHEELS TURN, in the air)");
     if (self->config.core.setpoint_type_set) {
-        (void)snprintf(suggestion, sizeof(suggestion), "%u", self->config.core.setpoint_type);
+        (void)snprintf(suggestion, sizeof suggestion, "%u", self->config.core.setpoint_type);
     }
     if (self->recording != NULL) {
-        (void)bringup_learn(self, suggestion, sizeof(suggestion));
+        (void)bringup_learn(self, suggestion, sizeof suggestion);
     }
     talk_say("Byte 0 of every setpoint is a type whose values the wheels' document does not list. Write the one you "
              "know (from the maker, or from a recording: --learn FILE), or the ones to try, such as 0-7 or 1,4. Each "

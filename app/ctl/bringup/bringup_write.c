@@ -23,18 +23,18 @@ void bringup_note(bringup_t *self, const char *section, const char *key, const c
         return;
     }
     bringup_note_t *note = &self->note[at];
-    self->notes = at == self->notes ? at + 1U : self->notes;
+    self->notes = (at == self->notes) ? at + 1U : self->notes;
     note->section = section;
     note->key = key;
     note->item = item;
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(note->text, sizeof(note->text), format, arguments);
+    (void)vsnprintf(note->text, sizeof note->text, format, arguments);
     va_end(arguments);
 }
 
 const char *bringup_side(iw_side_t side) {
-    return side == IW_LEFT ? "left" : "right";
+    return (side == IW_LEFT) ? "left" : "right";
 }
 
 bool bringup_is_confirmed(const bringup_t *self, const char *item) {
@@ -69,8 +69,8 @@ static const char *comment(const void *context, const char *section, const char 
     if (note == NULL) {
         return NULL;
     }
-    (void)snprintf(self->text, sizeof(self->text), "BRINGUP %s, %s: %s", self->date,
-                   note->item != NULL ? "confirmed" : "noted", note->text);
+    (void)snprintf(self->text, sizeof self->text, "BRINGUP %s, %s: %s", self->date,
+                   (note->item != NULL) ? "confirmed" : "noted", note->text);
     return self->text;
 }
 
@@ -83,7 +83,7 @@ static void print_head(const char *date, FILE *out) {
 static bool put_in_place(const char *beside, const char *path) {
     char old[512];
     if (access(path, F_OK) == 0) {
-        (void)snprintf(old, sizeof(old), "%.500s.old", path);
+        (void)snprintf(old, sizeof old, "%.500s.old", path);
         if (rename(path, old) != 0) {
             return false;
         }
@@ -99,9 +99,9 @@ static bool write_file(bringup_t *self, const char *path) {
     char beside[512];
     struct tm local;
     const time_t now = time(NULL);
-    (void)snprintf(beside, sizeof(beside), "%.500s.new", path);
+    (void)snprintf(beside, sizeof beside, "%.500s.new", path);
     if (localtime_r(&now, &local) != NULL) {
-        (void)strftime(commenter.date, sizeof(commenter.date), "%Y-%m-%d", &local);
+        (void)strftime(commenter.date, sizeof commenter.date, "%Y-%m-%d", &local);
     }
     FILE *file = fopen(beside, "we");
     if (file == NULL) {
@@ -121,17 +121,17 @@ static bool write_file(bringup_t *self, const char *path) {
 
 static const char *value_of(const bringup_t *self, const bringup_note_t *note, char out_value[32]) {
     const iw_config_t *core = &self->config.core;
-    const iw_side_t side = strcmp(note->section, "left") == 0 ? IW_LEFT : IW_RIGHT;
+    const iw_side_t side = (strcmp(note->section, "left") == 0) ? IW_LEFT : IW_RIGHT;
     if (strcmp(note->key, "setpoint_type") == 0) {
         (void)snprintf(out_value, 32, "%u", core->setpoint_type);
     } else if (strcmp(note->key, "current_role") == 0) {
-        (void)snprintf(out_value, 32, "%s", core->current_role == IW_ROLE_LIMIT ? "limit" : "setpoint");
+        (void)snprintf(out_value, 32, "%s", (core->current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint");
     } else if (strcmp(note->key, "invert") == 0) {
         (void)snprintf(out_value, 32, "%s", core->invert[side] ? "yes" : "no");
     } else if (strcmp(note->key, "force_unit") == 0) {
-        (void)snprintf(out_value, 32, "%s", core->force_unit[side] == IW_FORCE_CN ? "cN" : "dN");
+        (void)snprintf(out_value, 32, "%s", (core->force_unit[side] == IW_FORCE_CN) ? "cN" : "dN");
     } else if (strcmp(note->key, "gear_ratio") == 0) {
-        (void)snprintf(out_value, 32, core->gear_per == 1U ? "%u" : "%u/%u", core->gear_turns, core->gear_per);
+        (void)snprintf(out_value, 32, (core->gear_per == 1U) ? "%u" : "%u/%u", core->gear_turns, core->gear_per);
     } else if (strcmp(note->key, "radius_mm") == 0) {
         (void)snprintf(out_value, 32, "%u", core->radius_mm);
     } else if (strcmp(note->key, "track_mm") == 0) {
@@ -147,8 +147,8 @@ static void tell_findings(const bringup_t *self) {
     talk_say("What was found:");
     for (unsigned i = 0; i < self->notes; i++) {
         const bringup_note_t *note = &self->note[i];
-        (void)printf("  %s [%s] %s%s%s\n", note->item != NULL ? "confirmed" : "noted    ", note->section, note->key,
-                     value_of(self, note, value)[0] != '\0' ? " = " : "", value);
+        (void)printf("  %s [%s] %s%s%s\n", (note->item != NULL) ? "confirmed" : "noted    ", note->section, note->key,
+                     (value_of(self, note, value)[0] != '\0') ? " = " : "", value);
         talk_say("    %s", note->text);
     }
 }

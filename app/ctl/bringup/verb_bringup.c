@@ -29,7 +29,7 @@ static const char **option_of(const char *word, words_t *words) {
         {"--can", &words->can},         {"--estop", &words->estop},     {"--from", &words->from},
         {"--gateway", &words->gateway}, {"--current", &words->current}, {"--learn", &words->learn},
     };
-    for (size_t i = 0; i < sizeof(options) / sizeof(options[0]); i++) {
+    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
         if (strcmp(word, options[i].name) == 0) {
             return options[i].value;
         }
@@ -71,7 +71,7 @@ static bool parse_current(const char *text, int *out_mA) {
 /// Where it begins: a file, the installed one, the defaults; then the words. An exit code.
 static int configure(bringup_t *self, const words_t *words) {
     gateway_config_t *config = &self->config;
-    const char *path = words->from != NULL ? words->from : GATEWAY_CONFIG_PATH;
+    const char *path = (words->from != NULL) ? words->from : GATEWAY_CONFIG_PATH;
     gateway_config_default(config);
     if ((words->from != NULL || access(path, F_OK) == 0) && gateway_config_load(path, config, stderr) != 0) {
         return GATEWAY_CONFIG_ERROR;
@@ -86,12 +86,12 @@ static int configure(bringup_t *self, const words_t *words) {
     if (words->learn != NULL && access(words->learn, R_OK) != 0) {
         return ctl_fail(CTL_USAGE, "--learn %s: %s; name a recording in candump's form", words->learn, strerror(errno));
     }
-    self->out_path = words->out != NULL ? words->out : "gateway.conf";
+    self->out_path = (words->out != NULL) ? words->out : "gateway.conf";
     self->current_mA = BRINGUP_CURRENT_mA;
     if (words->gateway != NULL) {
-        (void)snprintf(self->trial.program, sizeof(self->trial.program), "%.500s", words->gateway);
+        (void)snprintf(self->trial.program, sizeof self->trial.program, "%.500s", words->gateway);
     }
-    return words->current != NULL && !parse_current(words->current, &self->current_mA) ? CTL_USAGE : CTL_OK;
+    return (words->current != NULL && !parse_current(words->current, &self->current_mA)) ? CTL_USAGE : CTL_OK;
 }
 
 /// What it is and what it needs. False if the operator does not agree.
@@ -115,7 +115,7 @@ static bringup_result_t guide(bringup_t *self) {
         bringup_signs,  bringup_force, bringup_radius, bringup_track, bringup_write,
     };
     bringup_result_t result = BRINGUP_ON;
-    for (size_t i = 0; i < sizeof(steps) / sizeof(steps[0]) && result == BRINGUP_ON; i++) {
+    for (size_t i = 0; i < sizeof steps / sizeof steps[0] && result == BRINGUP_ON; i++) {
         result = steps[i](self);
     }
     return result;
@@ -137,9 +137,9 @@ int verb_bringup(ctl_t *self, int count, char **words) {
         const bringup_result_t result = introduce(bringup) ? guide(bringup) : BRINGUP_QUIT;
         trial_close(bringup);
         if (result != BRINGUP_ON) {
-            talk_say(result == BRINGUP_QUIT ? "Ended. Nothing was written." : "Nothing was written.");
+            talk_say((result == BRINGUP_QUIT) ? "Ended. Nothing was written." : "Nothing was written.");
         }
-        code = result == BRINGUP_ON ? CTL_OK : CTL_NO;
+        code = (result == BRINGUP_ON) ? CTL_OK : CTL_NO;
     }
     free(bringup);
     return code;

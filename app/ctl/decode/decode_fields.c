@@ -54,14 +54,14 @@ static void put_status(const iw_codec_status_t *status, decoded_t *out) {
     if (!busy) {
         put(out, FIELD_CPU, status->cpu_percent);
     }
-    out->note = hot || busy ? IMPOSSIBLE_NOTE : status->battery_dV == IW_BATTERY_SATURATED_dV ? BATTERY_NOTE : "";
+    out->note = (hot || busy) ? IMPOSSIBLE_NOTE : (status->battery_dV == IW_BATTERY_SATURATED_dV) ? BATTERY_NOTE : "";
 }
 
 static void put_force(const iw_codec_force_t *force, iw_force_unit_t unit, decoded_t *out) {
     put(out, FIELD_FORCE_RAW, force->force_raw);
-    put(out, FIELD_FORCE, force->force_raw * (unit == IW_FORCE_CN ? MN_PER_CN : MN_PER_DN));
+    put(out, FIELD_FORCE, force->force_raw * ((unit == IW_FORCE_CN) ? MN_PER_CN : MN_PER_DN));
     put(out, FIELD_FORCE_DEBUG, force->debug_raw);
-    out->note = force->force_raw == INT16_MIN || force->force_raw == INT16_MAX ? SATURATED_NOTE : "";
+    out->note = (force->force_raw == INT16_MIN || force->force_raw == INT16_MAX) ? SATURATED_NOTE : "";
 }
 
 static void put_message(iw_codec_kind_t kind, const iw_codec_wheel_t *told, iw_force_unit_t unit, decoded_t *out) {
@@ -112,7 +112,7 @@ void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decod
         break;
     default:
         out->message = iw_codec_name(kind);
-        out->wheel = side == IW_LEFT ? "left" : "right";
+        out->wheel = (side == IW_LEFT) ? "left" : "right";
         put_message(kind, &told[side], config->force_unit[side], out);
         break;
     }
@@ -129,8 +129,8 @@ const char *field_column(field_t field) {
 static void print_value(const decoded_t *decoded, field_t field, FILE *out) {
     const field_words_t *word = &words[field];
     const long value = decoded->value[field];
-    const char *gap = word->unit[0] == '\0' ? "" : " ";
-    const char *label_gap = word->label[0] == '\0' ? "" : " ";
+    const char *gap = (word->unit[0] == '\0') ? "" : " ";
+    const char *label_gap = (word->label[0] == '\0') ? "" : " ";
     long scale = 1;
     for (unsigned i = 0; i < word->digits; i++) {
         scale *= 10;
@@ -138,7 +138,7 @@ static void print_value(const decoded_t *decoded, field_t field, FILE *out) {
     if (scale == 1) {
         (void)fprintf(out, "%s%s%ld%s%s", word->label, label_gap, value, gap, word->unit);
     } else {
-        (void)fprintf(out, "%s%s%s%ld.%0*ld%s%s", word->label, label_gap, value < 0 ? "-" : "", labs(value) / scale,
+        (void)fprintf(out, "%s%s%s%ld.%0*ld%s%s", word->label, label_gap, (value < 0) ? "-" : "", labs(value) / scale,
                       (int)word->digits, labs(value) % scale, gap, word->unit);
     }
 }

@@ -11,8 +11,8 @@
 
 /// Text, or null if there is none or it is not UTF-8.
 static json_t *text_or_null(const char *text) {
-    json_t *value = text[0] != '\0' ? json_string(text) : NULL;
-    return value != NULL ? value : json_null();
+    json_t *value = (text[0] != '\0') ? json_string(text) : NULL;
+    return (value != NULL) ? value : json_null();
 }
 
 static json_t *bytes_of(const candump_t *frame) {

@@ -29,7 +29,7 @@ static bool has_flag(const json_t *told, const char *wanted) {
 candump_t frame_from_json(const json_t *told, int64_t *out_at_us) {
     const char *kind = json_string_value(json_object_get(told, "kind"));
     candump_t frame = {.id = (uint32_t)json_integer_value(json_object_get(told, "id")) & CANDUMP_ID_MASK,
-                       .mark = kind != NULL && strcmp(kind, "echo") == 0 ? CANDUMP_SENT : CANDUMP_RECEIVED,
+                       .mark = (kind != NULL && strcmp(kind, "echo") == 0) ? CANDUMP_SENT : CANDUMP_RECEIVED,
                        .extended = has_flag(told, "extended"),
                        .remote = has_flag(told, "remote"),
                        .fd = has_flag(told, "fd")};

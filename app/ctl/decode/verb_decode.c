@@ -30,7 +30,7 @@ static int parse_words(decode_t *self, int count, char **words) {
         if (strcmp(words[i], "--csv") == 0) {
             self->csv = true;
         } else if (strcmp(words[i], "--config") == 0) {
-            const int code = config_option_load("decode", i + 1 < count ? words[++i] : NULL, &self->config);
+            const int code = config_option_load("decode", (i + 1 < count) ? words[++i] : NULL, &self->config);
             if (code != CTL_OK) {
                 return code;
             }
@@ -40,7 +40,7 @@ static int parse_words(decode_t *self, int count, char **words) {
             self->path = words[i];
         }
     }
-    self->path = self->path != NULL ? self->path : "-";
+    self->path = (self->path != NULL) ? self->path : "-";
     return CTL_OK;
 }
 
@@ -64,10 +64,10 @@ static void write_text(decode_t *self, const candump_t *frame, const decoded_t *
         write_begin(self, frame);
     }
     const int64_t since_us = frame->time_us - self->begin_us;
-    const int64_t size_us = since_us < 0 ? -since_us : since_us;
+    const int64_t size_us = (since_us < 0) ? -since_us : since_us;
     char time_text[32];
-    (void)snprintf(time_text, sizeof time_text, "%s%" PRId64 ".%06" PRId64, since_us < 0 ? "-" : "", size_us / 1000000,
-                   size_us % 1000000);
+    (void)snprintf(time_text, sizeof time_text, "%s%" PRId64 ".%06" PRId64, (since_us < 0) ? "-" : "",
+                   size_us / 1000000, size_us % 1000000);
     frame_print(time_text, frame, decoded);
 }
 
@@ -83,7 +83,7 @@ static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     char name[CANDUMP_INTERFACE_SIZE];
     for (size_t i = 0; i < sizeof name; i++) { // A comma or quote would be another column.
         const char c = frame->interface[i];
-        name[i] = c == ',' || c == '"' || c == '\'' ? '_' : c;
+        name[i] = (c == ',' || c == '"' || c == '\'') ? '_' : c;
     }
     (void)printf("%" PRId64 ".%06" PRId64 ",%s,%s,%" PRIu32 ",0x%0*" PRIX32 ",%u,", frame->time_us / 1000000,
                  frame->time_us % 1000000, name, frame_direction(frame), frame->id, frame->extended ? 8 : 3, frame->id,
@@ -124,7 +124,7 @@ int verb_decode(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && decode.csv && self->json) {
         return ctl_fail(CTL_USAGE, "decode writes --csv or --json, not both");
     }
-    code = code == CTL_OK ? recording_open(&decode.recording, decode.path) : code;
+    code = (code == CTL_OK) ? recording_open(&decode.recording, decode.path) : code;
     if (code != CTL_OK) {
         return code;
     }
@@ -138,5 +138,5 @@ int verb_decode(ctl_t *self, int count, char **words) {
         }
     }
     const int read = recording_close(&decode.recording);
-    return code == CTL_OK ? read : code;
+    return (code == CTL_OK) ? read : code;
 }

@@ -39,8 +39,8 @@ static void list_contradicted(doctor_t *self, json_t *ledger) {
     unsigned confirmed = 0;
     json_object_foreach(ledger, name, entry) {
         const char *state = text_word(entry, "state");
-        assumed += strcmp(state, "assumed") == 0 ? 1U : 0U;
-        confirmed += strcmp(state, "confirmed") == 0 ? 1U : 0U;
+        assumed += (strcmp(state, "assumed") == 0) ? 1U : 0U;
+        confirmed += (strcmp(state, "confirmed") == 0) ? 1U : 0U;
         if (strcmp(state, "contradicted") == 0) {
             say_contradicted(self, name, entry);
         }
@@ -86,9 +86,9 @@ static void look_at_status(doctor_t *self) {
 /// The group whose members may use the socket (or its directory).
 static void cure_denied(doctor_t *self) {
     struct stat status;
-    const struct group *group = stat(self->gateway.path, &status) == 0 ? getgrgid(status.st_gid) : NULL;
+    const struct group *group = (stat(self->gateway.path, &status) == 0) ? getgrgid(status.st_gid) : NULL;
     inspect_cure(&self->findings, "sudo usermod -aG %s $USER, then log in again",
-                 group != NULL ? group->gr_name : "iwheel");
+                 (group != NULL) ? group->gr_name : "iwheel");
 }
 
 void doctor_look_at_gateway(doctor_t *self) {
@@ -150,8 +150,8 @@ static void hear_gateway(doctor_t *self) {
     for (unsigned i = IW_BUS_OFF; i <= (unsigned)IW_BUS_PASSIVE; i++) {
         const iw_bus_state_t state = (iw_bus_state_t)i;
         if (strcmp(name, iwn_bus_state_name(state)) == 0) {
-            self->heard.worst = state < self->heard.worst ? state : self->heard.worst;
-            self->heard.last = state < self->heard.last ? state : self->heard.last;
+            self->heard.worst = (state < self->heard.worst) ? state : self->heard.worst;
+            self->heard.last = (state < self->heard.last) ? state : self->heard.last;
         }
     }
     json_decref(status);
@@ -170,9 +170,9 @@ inspect_estop_t doctor_estop(doctor_t *self) {
         .line = text_word(estop, "line"),
         .present = strcmp(state, "none") != 0,
         .simulated = json_is_true(json_object_get(estop, "simulated")),
-        .level = strcmp(state, "released") == 0  ? 0
-                 : strcmp(state, "pressed") == 0 ? 1
-                                                 : -1,
+        .level = (strcmp(state, "released") == 0)  ? 0
+                 : (strcmp(state, "pressed") == 0) ? 1
+                                                   : -1,
         .trouble = "the gateway's log tells why: journalctl -u iwheel-gateway",
     };
 }

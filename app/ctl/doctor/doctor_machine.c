@@ -49,11 +49,11 @@ unsigned doctor_interfaces(char *out_names, size_t size) {
     for (const struct dirent *entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
         char path[512];
         char type[16] = "";
-        (void)snprintf(path, sizeof(path), "/sys/class/net/%s/type", entry->d_name);
-        if (entry->d_name[0] != '.' && read_word(path, type, sizeof(type)) && strcmp(type, TYPE_CAN) == 0) {
+        (void)snprintf(path, sizeof path, "/sys/class/net/%s/type", entry->d_name);
+        if (entry->d_name[0] != '.' && read_word(path, type, sizeof type) && strcmp(type, TYPE_CAN) == 0) {
             const size_t used = strlen(out_names);
-            (void)snprintf(&out_names[used], size - used, "%s%s", found > 0 ? " " : "", entry->d_name);
-            ++found;
+            (void)snprintf(&out_names[used], size - used, "%s%s", (found > 0) ? " " : "", entry->d_name);
+            found++;
         }
     }
     (void)closedir(folder);
@@ -65,12 +65,12 @@ static void read_driver(const char *bus, char *out_name, size_t size) {
     char path[128];
     char target[256];
     out_name[0] = '\0';
-    (void)snprintf(path, sizeof(path), "/sys/class/net/%.20s/device/driver", bus);
-    const ssize_t length = readlink(path, target, sizeof(target) - 1U);
+    (void)snprintf(path, sizeof path, "/sys/class/net/%.20s/device/driver", bus);
+    const ssize_t length = readlink(path, target, sizeof target - 1U);
     if (length > 0) {
         target[length] = '\0';
         const char *slash = strrchr(target, '/');
-        (void)snprintf(out_name, size, "%.63s", slash != NULL ? slash + 1 : target);
+        (void)snprintf(out_name, size, "%.63s", (slash != NULL) ? slash + 1 : target);
     }
 }
 
@@ -78,7 +78,7 @@ static void say_no_can(doctor_t *self) {
     struct utsname kernel;
     char path[512];
     (void)uname(&kernel);
-    (void)snprintf(path, sizeof(path), "/lib/modules/%s", kernel.release);
+    (void)snprintf(path, sizeof path, "/lib/modules/%s", kernel.release);
     inspect_say(&self->findings, "kernel", INSPECT_FAIL, "kernel %s: no CAN sockets", kernel.release);
     if (access(path, F_OK) == 0) {
         inspect_cure(&self->findings, "modprobe can_raw (and for ever: echo can_raw > /etc/modules-load.d/can.conf)");
@@ -98,7 +98,7 @@ static bool look_at_kernel(doctor_t *self) {
         return false;
     }
     (void)close(probe);
-    read_driver(self->bus != NULL ? self->bus : "", driver, sizeof(driver));
+    read_driver((self->bus != NULL) ? self->bus : "", driver, sizeof driver);
     if (driver[0] != '\0') {
         inspect_say(&self->findings, "kernel", INSPECT_OK, "kernel: CAN sockets are there; %s is driven by %s",
                     self->bus, driver);
@@ -122,7 +122,7 @@ static int64_t worst_lateness_us(void) {
         const int64_t begin_us = now_us();
         (void)nanosleep(&nap, NULL);
         const int64_t late_us = now_us() - begin_us - NAP_NS / 1000;
-        worst_us = late_us > worst_us ? late_us : worst_us;
+        worst_us = (late_us > worst_us) ? late_us : worst_us;
     }
     return worst_us;
 }
@@ -160,7 +160,7 @@ static void look_at_rights(doctor_t *self) {
     if (group == NULL || geteuid() == 0) {
         return;
     }
-    const int count = getgroups((int)(sizeof(groups) / sizeof(groups[0])), groups);
+    const int count = getgroups((int)(sizeof groups / sizeof groups[0]), groups);
     bool member = getegid() == group->gr_gid;
     for (int i = 0; i < count; i++) {
         member = member || groups[i] == group->gr_gid;

@@ -27,7 +27,7 @@ static bool await_level(doctor_t *self, bool pressed, bool *out_skipped) {
         if (poll(&key, 1, LOOK_MS) > 0) {
             char line[64];
             *out_skipped = true;
-            (void)!read(STDIN_FILENO, line, sizeof(line));
+            (void)!read(STDIN_FILENO, line, sizeof line);
             return false;
         }
     }
@@ -72,7 +72,7 @@ void doctor_press(doctor_t *self) {
         return;
     }
     inspect_say(&self->findings, "estop_press", INSPECT_OK, "e-stop: press and release were seen%s",
-                self->gateway.result == NEAR_FOUND ? "; the gateway is latched now, as it must be" : "");
+                (self->gateway.result == NEAR_FOUND) ? "; the gateway is latched now, as it must be" : "");
     if (self->gateway.result == NEAR_FOUND) {
         inspect_cure(&self->findings, "iwheelctl reset");
     }

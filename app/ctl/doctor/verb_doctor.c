@@ -37,10 +37,10 @@ static bool parse_listen(const char *text, unsigned *out_ms) {
 static bool parse_words(int count, char **words, words_t *out_words) {
     *out_words = (words_t){.listen_ms = DOCTOR_LISTEN_MS, .press = true};
     for (int i = 0; i < count; i++) {
-        const char *value = i + 1 < count ? words[i + 1] : NULL;
-        const char **text = strcmp(words[i], "--config") == 0  ? &out_words->config
-                            : strcmp(words[i], "--estop") == 0 ? &out_words->estop
-                                                               : NULL;
+        const char *value = (i + 1 < count) ? words[i + 1] : NULL;
+        const char **text = (strcmp(words[i], "--config") == 0)  ? &out_words->config
+                            : (strcmp(words[i], "--estop") == 0) ? &out_words->estop
+                                                                 : NULL;
         if (text != NULL && value == NULL) {
             (void)ctl_fail(CTL_USAGE, "%s wants a value; see: iwheelctl doctor --help", words[i]);
             return false;
@@ -67,7 +67,7 @@ static bool parse_words(int count, char **words, words_t *out_words) {
 /// The configuration in force: the file if there is one, then the words. An exit code.
 static int configure(doctor_t *self, const words_t *words) {
     gateway_config_t *config = &self->config;
-    const char *path = words->config != NULL ? words->config : GATEWAY_CONFIG_PATH;
+    const char *path = (words->config != NULL) ? words->config : GATEWAY_CONFIG_PATH;
     gateway_config_default(config);
     if ((words->config != NULL || access(path, F_OK) == 0) && gateway_config_load(path, config, stderr) != 0) {
         return GATEWAY_CONFIG_ERROR;
@@ -96,15 +96,15 @@ static void choose_bus(doctor_t *self, const words_t *words) {
         self->bus = self->config.bus.interface;
         return;
     }
-    if (doctor_interfaces(names, sizeof(names)) == 1U) {
-        (void)snprintf(self->found_bus, sizeof(self->found_bus), "%.112s", names);
+    if (doctor_interfaces(names, sizeof names) == 1U) {
+        (void)snprintf(self->found_bus, sizeof self->found_bus, "%.112s", names);
         self->bus = self->found_bus;
     }
 }
 
 static void say_no_bus(doctor_t *self) {
     char names[256];
-    if (doctor_interfaces(names, sizeof(names)) > 0U) {
+    if (doctor_interfaces(names, sizeof names) > 0U) {
         inspect_say(&self->findings, "interface", INSPECT_FAIL, "bus: there are several CAN interfaces: %s", names);
         inspect_cure(&self->findings, "name one: iwheelctl doctor IFACE");
     } else {
@@ -121,7 +121,7 @@ static void print_text(const paper_t *paper, tone_t tone, const char *text) {
         if (cut > room) {
             for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
             }
-            cut = cut == 0 ? room : cut;
+            cut = (cut == 0) ? room : cut;
         }
         paper_say(paper, tone, "%s%.*s", first ? "" : "      ", (int)cut, text);
         paper_end(paper);
@@ -148,7 +148,7 @@ void doctor_print(const doctor_t *self, unsigned first) {
 static void print_sum(const doctor_t *self) {
     const unsigned *total = self->findings.total;
     (void)printf("%u ok, %u to be looked at, %u wrong%s\n", total[INSPECT_OK], total[INSPECT_WARN], total[INSPECT_FAIL],
-                 total[INSPECT_FAIL] > 0U ? ": begin with the first" : "");
+                 (total[INSPECT_FAIL] > 0U) ? ": begin with the first" : "");
 }
 
 static json_t *rates_of(const doctor_t *self) {
@@ -157,7 +157,7 @@ static json_t *rates_of(const doctor_t *self) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
         (void)json_array_append_new(rates, json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)row->id, "name",
                                                      iw_codec_name((iw_codec_kind_t)row->kind), "side",
-                                                     row->side == IW_LEFT ? "left" : "right", "nominal_mHz",
+                                                     (row->side == IW_LEFT) ? "left" : "right", "nominal_mHz",
                                                      (json_int_t)inspect_nominal_mHz(row), "measured_mHz",
                                                      (json_int_t)inspect_rate_mHz(&self->heard, i)));
     }
@@ -171,7 +171,7 @@ static void print_json(const doctor_t *self) {
         const inspect_finding_t *finding = &self->findings.finding[i];
         (void)json_array_append_new(list, json_pack("{s:s,s:s,s:s,s:s?}", "check", finding->check, "verdict",
                                                     inspect_verdict_word(finding->verdict), "text", finding->text,
-                                                    "cure", finding->cure[0] != '\0' ? finding->cure : NULL));
+                                                    "cure", (finding->cure[0] != '\0') ? finding->cure : NULL));
     }
     json_t *load = listened ? json_integer(inspect_load_permille(&self->heard, self->config.bus.bitrate)) : json_null();
     json_t *root = json_pack("{s:b,s:s?,s:b,s:o,s:o,s:o}", "ok", self->findings.total[INSPECT_FAIL] == 0U, "bus",

@@ -7,7 +7,7 @@
 /// A whole decimal number, possibly negative, of which |number| <= limit.
 static bool parse_integer(const char *text, int limit, int *out_number) {
     const bool negative = text[0] == '-';
-    const char *digits = text + (negative || text[0] == '+' ? 1 : 0);
+    const char *digits = text + ((negative || text[0] == '+') ? 1 : 0);
     const size_t length = strlen(digits);
     int number = 0;
     if (length == 0 || length > 9U || strspn(digits, "0123456789") != length) {
@@ -46,7 +46,7 @@ static bool parse_option(int count, char **words, int *at, drive_words_t *drive,
     }
     if (strcmp(word, "--for") == 0) {
         *at += 1;
-        return parse_for(left > 0 ? words[*at] : NULL, drive, out_why);
+        return parse_for((left > 0) ? words[*at] : NULL, drive, out_why);
     }
     if (strcmp(word, "--current") == 0) {
         drive->has_current = left >= 2 && parse_pair(&words[*at + 1], DRIVE_CURRENT_MAX_mA, drive->current_mA);
@@ -69,7 +69,7 @@ bool drive_words_parse(int count, char **words, drive_words_t *out_drive, char *
     for (int i = 0; i < count && why[0] == '\0'; i++) {
         if (speeds < 2 && is_number(words[i])) {
             if (!parse_integer(words[i], 32768, &drive.speed_mm_s[speeds]) || drive.speed_mm_s[speeds] == 32768) {
-                (void)snprintf(why, sizeof(why), "\"%.40s\" is no speed; write whole mm/s within -32768..32767",
+                (void)snprintf(why, sizeof why, "\"%.40s\" is no speed; write whole mm/s within -32768..32767",
                                words[i]);
             }
             speeds++;
@@ -78,7 +78,7 @@ bool drive_words_parse(int count, char **words, drive_words_t *out_drive, char *
         }
     }
     if (why[0] == '\0' && speeds < 2) {
-        (void)snprintf(why, sizeof(why),
+        (void)snprintf(why, sizeof why,
                        "drive wants two speeds in mm/s, left and right, such as: iwheelctl drive 200 200");
     }
     (void)snprintf(out_why, DRIVE_WHY_SIZE, "%s", why);

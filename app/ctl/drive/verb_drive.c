@@ -59,7 +59,7 @@ static const char *speed_of(const json_t *snapshot, const char *side, char out[T
 }
 
 static double driven_s(const drive_t *self, int64_t now_us) {
-    return self->begin_us > 0 ? (double)(now_us - self->begin_us) / 1e6 : 0.0;
+    return (self->begin_us > 0) ? (double)(now_us - self->begin_us) / 1e6 : 0.0;
 }
 
 static void show_progress(const drive_t *self, int64_t now_us) {
@@ -67,7 +67,7 @@ static void show_progress(const drive_t *self, int64_t now_us) {
     char right[TEXT_CELL];
     char line[256];
     if (self->live > 0U) {
-        (void)snprintf(line, sizeof(line), "driving %lld/%lld mm/s%s   measured %s/%s mm/s   %.1f s of %.1f s",
+        (void)snprintf(line, sizeof line, "driving %lld/%lld mm/s%s   measured %s/%s mm/s   %.1f s of %.1f s",
                        self->applied[0], self->applied[1], self->limited ? " (limited)" : "",
                        speed_of(self->latest, "left", left), speed_of(self->latest, "right", right),
                        driven_s(self, now_us), (double)self->words.time_ms / 1e3);
@@ -115,7 +115,7 @@ static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
         }
         return END_NONE;
     }
-    (void)snprintf(self->last_line, sizeof(self->last_line), "%s", self->ctl->client.line);
+    (void)snprintf(self->last_line, sizeof self->last_line, "%s", self->ctl->client.line);
     if (!json_is_true(ok)) {
         clear_progress(self);
         (void)ctl_refused(line);
@@ -151,7 +151,7 @@ static end_t run(drive_t *self) {
     self->answered_us = self->next_us;
     while (end == END_NONE) {
         const int64_t now_us = client_now_us();
-        const int64_t end_us = self->begin_us > 0 ? self->begin_us + (int64_t)self->words.time_ms * 1000 : INT64_MAX;
+        const int64_t end_us = (self->begin_us > 0) ? self->begin_us + (int64_t)self->words.time_ms * 1000 : INT64_MAX;
         iwc_result_t result = IWC_OK;
         json_t *line = NULL;
         if (now_us >= end_us) {
@@ -164,9 +164,9 @@ static end_t run(drive_t *self) {
             result = send_drive(self, now_us);
         }
         if (result == IWC_OK) {
-            result = client_receive(&self->ctl->client, self->next_us < end_us ? self->next_us : end_us, &line);
+            result = client_receive(&self->ctl->client, (self->next_us < end_us) ? self->next_us : end_us, &line);
         }
-        end = line != NULL ? take_line(self, line, client_now_us()) : end_of(self, result);
+        end = (line != NULL) ? take_line(self, line, client_now_us()) : end_of(self, result);
         json_decref(line);
     }
     return end;
@@ -201,7 +201,7 @@ static int ask_quietly(const drive_t *self, json_t *request, json_t **out_reply)
 /// Waits until both wheels stand and the next drive would not be refused for this one. A further signal ends the wait.
 static int wait_for_rest(drive_t *self) {
     const int64_t begin_us = client_now_us();
-    const int64_t fresh_us = self->sent_us + (self->lease_us > FRESH_US ? self->lease_us : FRESH_US);
+    const int64_t fresh_us = self->sent_us + ((self->lease_us > FRESH_US) ? self->lease_us : FRESH_US);
     for (;;) {
         json_t *status = NULL;
         json_t *event = NULL;
@@ -235,7 +235,7 @@ static int wait_for_rest(drive_t *self) {
 static void way_of(const drive_t *self, const char *side, char out[TEXT_CELL]) {
     const json_t *from = json_object_get(json_object_get(self->first, side), "distance_mm");
     const json_t *to = json_object_get(json_object_get(self->latest, side), "distance_mm");
-    json_t *way = json_is_integer(from) && json_is_integer(to)
+    json_t *way = (json_is_integer(from) && json_is_integer(to))
                       ? json_integer(json_integer_value(to) - json_integer_value(from))
                       : json_null();
     text_decimal(way, 3, "m", out);
@@ -279,7 +279,7 @@ static int judge(const drive_t *self, end_t end, int64_t stop_us) {
         return ctl_fail(CTL_NO, "while stopping the gateway latched (%s); see: iwheelctl why",
                         text_word(self->latest, "cause"));
     }
-    return end == END_TIME ? CTL_OK : CTL_NO;
+    return (end == END_TIME) ? CTL_OK : CTL_NO;
 }
 
 /// Stops, whatever happened before.
@@ -298,8 +298,8 @@ static int finish(drive_t *self, end_t end) {
     }
     int code = ctl_ask(self->ctl, json_pack("{s:s}", "cmd", "stop"), &reply);
     json_decref(reply);
-    code = code == CTL_OK ? wait_for_rest(self) : code;
-    return code == CTL_OK ? judge(self, end, stop_us) : code;
+    code = (code == CTL_OK) ? wait_for_rest(self) : code;
+    return (code == CTL_OK) ? judge(self, end, stop_us) : code;
 }
 
 /// Lets time pass and drops what the gateway tells meanwhile. An exit code.
@@ -311,7 +311,7 @@ static int wait_a_moment(const drive_t *self) {
         result = client_receive(&self->ctl->client, until_us, &event);
         json_decref(event);
     }
-    return result == IWC_TIMEOUT ? CTL_OK : ctl_lost(self->ctl, result);
+    return (result == IWC_TIMEOUT) ? CTL_OK : ctl_lost(self->ctl, result);
 }
 
 static bool passes(const json_t *reply) {
@@ -329,10 +329,10 @@ static int ask_to_arm(const drive_t *self, json_t *request, json_t **out_reply) 
         json_decref(*out_reply);
         *out_reply = NULL;
         code = wait_a_moment(self);
-        code = code == CTL_OK ? ctl_exchange(self->ctl, json_incref(request), out_reply) : code;
+        code = (code == CTL_OK) ? ctl_exchange(self->ctl, json_incref(request), out_reply) : code;
     }
     json_decref(request);
-    return code == CTL_OK ? ctl_accept(self->ctl, out_reply) : code;
+    return (code == CTL_OK) ? ctl_accept(self->ctl, out_reply) : code;
 }
 
 /// Subscribes to the wheels' state and arms. An exit code.
@@ -358,7 +358,7 @@ static int arm(drive_t *self) {
         (void)ctl_fail(CTL_OK, "warning: %s", json_is_string(warning) ? json_string_value(warning) : "--");
     }
     const json_int_t lease_ms = json_integer_value(json_object_get(reply, "lease_ms"));
-    self->lease_us = (lease_ms >= LEASE_MIN_MS && lease_ms <= LEASE_MAX_MS ? lease_ms : LEASE_MIN_MS) * 1000;
+    self->lease_us = ((lease_ms >= LEASE_MIN_MS && lease_ms <= LEASE_MAX_MS) ? lease_ms : LEASE_MIN_MS) * 1000;
     json_decref(reply);
     return code;
 }

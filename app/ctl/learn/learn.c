@@ -29,16 +29,16 @@ static const uint32_t ids[LEARN_IDS] = {IW_ID_LEFT_SETPOINT, IW_ID_RIGHT_SETPOIN
 static const learn_range_t nothing = {INT32_MAX, INT32_MIN};
 
 static void widen(learn_range_t *range, int32_t value) {
-    range->low = value < range->low ? value : range->low;
-    range->high = value > range->high ? value : range->high;
+    range->low = (value < range->low) ? value : range->low;
+    range->high = (value > range->high) ? value : range->high;
 }
 
 static int32_t size_of(int32_t value) {
-    return value < 0 ? -value : value;
+    return (value < 0) ? -value : value;
 }
 
 void learn_init(learn_t *self) {
-    (void)memset(self, 0, sizeof *self);
+    memset(self, 0, sizeof *self);
     for (size_t i = 0; i < LEARN_IDS; i++) {
         self->known[i] = (learn_id_t){.id = ids[i], .length = nothing, .period = {.last_us = -1}};
     }
@@ -62,9 +62,9 @@ static void note_period(learn_period_t *period, int64_t at_us) {
     const int64_t gap_us = at_us - period->last_us;
     if (period->last_us >= 0 && gap_us >= 0) {
         const int64_t ms = (gap_us + 500) / 1000;
-        period->histogram[ms < (int64_t)LEARN_PERIOD_MAX_MS ? (size_t)ms : LEARN_PERIOD_MAX_MS]++;
+        period->histogram[(ms < (int64_t)LEARN_PERIOD_MAX_MS) ? (size_t)ms : LEARN_PERIOD_MAX_MS]++;
         period->counted++;
-        period->longest_us = gap_us > period->longest_us ? gap_us : period->longest_us;
+        period->longest_us = (gap_us > period->longest_us) ? gap_us : period->longest_us;
     }
     period->last_us = at_us;
 }
@@ -94,7 +94,7 @@ static size_t index_of(uint32_t id) {
 
 const learn_id_t *learn_known(const learn_t *self, uint32_t id) {
     const size_t i = index_of(id);
-    return i < LEARN_IDS ? &self->known[i] : NULL;
+    return (i < LEARN_IDS) ? &self->known[i] : NULL;
 }
 
 static learn_id_t *find_other(learn_t *self, const candump_t *frame) {
@@ -125,8 +125,8 @@ static void note_direction(learn_setpoint_t *self, const iw_codec_setpoint_t *no
         widen(&self->current_at_rest_mA, now->current_mA);
         return;
     }
-    learn_range_t *current = now->speed_mm_s > 0 ? &self->current_forward_mA : &self->current_backward_mA;
-    *(now->speed_mm_s > 0 ? &self->forward : &self->backward) += 1U;
+    learn_range_t *current = (now->speed_mm_s > 0) ? &self->current_forward_mA : &self->current_backward_mA;
+    *((now->speed_mm_s > 0) ? &self->forward : &self->backward) += 1U;
     self->type_moving[now->type]++;
     widen(current, now->current_mA);
 }
@@ -145,10 +145,10 @@ static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const 
     const bool same = now->speed_mm_s == self->last.speed_mm_s && now->current_mA == self->last.current_mA;
     const int64_t gap_us = frame->time_us - self->last_us;
     self->count++;
-    self->sent += frame->mark == CANDUMP_SENT ? 1U : 0U;
+    self->sent += (frame->mark == CANDUMP_SENT) ? 1U : 0U;
     self->type[now->type]++;
-    self->changes_of_type += !first && now->type != self->last.type ? 1U : 0U;
-    self->over_limit += size_of(now->current_mA) > IW_CURRENT_LIMIT_mA ? 1U : 0U;
+    self->changes_of_type += (!first && now->type != self->last.type) ? 1U : 0U;
+    self->over_limit += (size_of(now->current_mA) > IW_CURRENT_LIMIT_mA) ? 1U : 0U;
     self->padding += is_padded(frame) ? 1U : 0U;
     widen(&self->speed_mm_s, now->speed_mm_s);
     widen(&self->current_mA, now->current_mA);
@@ -163,7 +163,7 @@ static void note_setpoint(learn_setpoint_t *self, const candump_t *frame, const 
 /// The wheel's answer to a speed that it was told for long enough.
 static void note_answer(learn_wheel_t *self, const iw_codec_setpoint_t *told, int32_t rpm, int64_t for_us) {
     const int32_t told_mm_s = told->speed_mm_s;
-    learn_answer_t *answer = told_mm_s > 0 ? &self->forward : &self->backward;
+    learn_answer_t *answer = (told_mm_s > 0) ? &self->forward : &self->backward;
     const bool turns = size_of(rpm) > REST_RPM;
     if (told_mm_s == 0 && told->current_mA != 0) {
         self->stood_us += turns ? 0 : for_us;
@@ -178,17 +178,17 @@ static void note_answer(learn_wheel_t *self, const iw_codec_setpoint_t *told, in
     }
     const int64_t told_um_s = (int64_t)size_of(told_mm_s) * 1000;
     const int64_t off_um_s = told_um_s - (int64_t)size_of(rpm) * UM_S_PER_RPM;
-    const int64_t slack_um_s = told_um_s / 10 > UM_S_PER_RPM ? told_um_s / 10 : UM_S_PER_RPM;
-    answer->with_us += (told_mm_s > 0) == (rpm > 0) ? for_us : 0;
-    answer->against_us += (told_mm_s > 0) == (rpm > 0) ? 0 : for_us;
+    const int64_t slack_um_s = (told_um_s / 10 > UM_S_PER_RPM) ? told_um_s / 10 : UM_S_PER_RPM;
+    answer->with_us += ((told_mm_s > 0) == (rpm > 0)) ? for_us : 0;
+    answer->against_us += ((told_mm_s > 0) == (rpm > 0)) ? 0 : for_us;
     self->steady_us += for_us;
-    self->steady_fit_us += off_um_s <= slack_um_s && off_um_s >= -slack_um_s ? for_us : 0;
+    self->steady_fit_us += (off_um_s <= slack_um_s && off_um_s >= -slack_um_s) ? for_us : 0;
     self->steady_mm_s += size_of(told_mm_s);
     self->steady_rpm += size_of(rpm);
 }
 
 static void note_speed(learn_wheel_t *self, const learn_setpoint_t *setpoint, int64_t at_us, int32_t rpm) {
-    const int64_t gap_us = self->rpm_us >= 0 ? at_us - self->rpm_us : 0;
+    const int64_t gap_us = (self->rpm_us >= 0) ? at_us - self->rpm_us : 0;
     const bool gap = gap_us <= 0 || gap_us >= RPM_GAP_US;
     const bool told = setpoint->count > 0U && at_us - setpoint->last_us <= (int64_t)IW_WHEEL_WATCHDOG_US;
     self->speeds++;
@@ -212,7 +212,7 @@ static void note_speed(learn_wheel_t *self, const learn_setpoint_t *setpoint, in
 /// Ticks and rpm are compared only from one status frame to the next, where speed frames came all the time.
 static void note_ticks(learn_wheel_t *self, int64_t at_us, int32_t ticks) {
     const uint32_t forward = (uint32_t)ticks - (uint32_t)self->last_ticks;
-    const uint32_t step = forward > INT32_MAX ? 0U - forward : forward;
+    const uint32_t step = (forward > INT32_MAX) ? 0U - forward : forward;
     const int64_t between_us = at_us - self->last_ticks_us;
     const bool covered = !self->pending_slow && between_us > 0 && self->pending_us + UNCOVERED_US >= between_us;
     if (self->statuses > 0U && covered && step < TICKS_MAX) {
@@ -245,7 +245,7 @@ static uint64_t way(const uint8_t *now, const uint8_t *before, size_t high, size
         const uint16_t a = (uint16_t)((unsigned)now[i + high] << 8U | now[i + low]);
         const uint16_t b = (uint16_t)((unsigned)before[i + high] << 8U | before[i + low]);
         const uint16_t step = (uint16_t)(a - b);
-        sum += step > INT16_MAX ? 65536U - step : step; // It may wrap.
+        sum += (step > INT16_MAX) ? 65536U - step : step; // It may wrap.
     }
     return sum;
 }
@@ -254,13 +254,13 @@ static void note_pose(learn_pose_t *self, int64_t at_us, const uint8_t *data) {
     const int64_t gap_us = at_us - self->last_us;
     if (self->count > 0U && gap_us >= 0 && gap_us <= POSE_GAP_US) {
         const uint64_t big = way(data, self->last, 0, 1);
-        self->moves += big > 0U ? 1U : 0U;
+        self->moves += (big > 0U) ? 1U : 0U;
         self->way_big += big;
         self->way_little += way(data, self->last, 1, 0);
     }
     self->count++;
     self->last_us = at_us;
-    (void)memcpy(self->last, data, sizeof self->last);
+    memcpy(self->last, data, sizeof self->last);
 }
 
 static void note_message(learn_t *self, const candump_t *frame, iw_codec_kind_t kind, const iw_codec_wheel_t *told) {
@@ -294,8 +294,8 @@ static void note_message(learn_t *self, const candump_t *frame, iw_codec_kind_t 
 void learn_frame(learn_t *self, const candump_t *frame) {
     iw_codec_wheel_t told[IW_SIDES];
     const iw_can_frame_t core = candump_to_core(frame);
-    self->first_us = self->frames == 0U ? frame->time_us : self->first_us;
-    self->backwards += self->frames > 0U && frame->time_us < self->last_us ? 1U : 0U;
+    self->first_us = (self->frames == 0U) ? frame->time_us : self->first_us;
+    self->backwards += (self->frames > 0U && frame->time_us < self->last_us) ? 1U : 0U;
     self->last_us = frame->time_us;
     self->frames++;
     if (frame->error) {
@@ -304,11 +304,11 @@ void learn_frame(learn_t *self, const candump_t *frame) {
     }
     const iw_codec_kind_t kind = iw_codec_decode(&core, told);
     const bool ours = kind < IW_CODEC_KINDS;
-    const size_t known = ours || kind == IW_CODEC_BAD_LENGTH ? index_of(frame->id) : LEARN_IDS;
-    learn_id_t *id = known < LEARN_IDS ? &self->known[known] : NULL;
-    self->strange += kind == IW_CODEC_BAD_FORMAT ? 1U : 0U;
-    self->too_short += kind == IW_CODEC_BAD_LENGTH ? 1U : 0U;
-    id = kind == IW_CODEC_UNKNOWN ? find_other(self, frame) : id;
+    const size_t known = (ours || kind == IW_CODEC_BAD_LENGTH) ? index_of(frame->id) : LEARN_IDS;
+    learn_id_t *id = (known < LEARN_IDS) ? &self->known[known] : NULL;
+    self->strange += (kind == IW_CODEC_BAD_FORMAT) ? 1U : 0U;
+    self->too_short += (kind == IW_CODEC_BAD_LENGTH) ? 1U : 0U;
+    id = (kind == IW_CODEC_UNKNOWN) ? find_other(self, frame) : id;
     if (id != NULL) {
         note_id(id, frame);
     }

@@ -7,7 +7,7 @@
 #include <string.h>
 
 const char *learn_side(unsigned side) {
-    return side == IW_LEFT ? "left" : "right";
+    return (side == IW_LEFT) ? "left" : "right";
 }
 
 bool learn_is_empty(const learn_range_t *range) {
@@ -17,7 +17,7 @@ bool learn_is_empty(const learn_range_t *range) {
 learn_finding_t *learn_say(learn_findings_t *self, char mark, const char *item, unsigned side, const char *format,
                            ...) {
     // More than there is room for cannot be said: every sentence is said once, or once per side.
-    learn_finding_t *finding = &self->at[self->count < LEARN_FINDINGS_MAX - 1U ? self->count++ : self->count];
+    learn_finding_t *finding = &self->at[(self->count < LEARN_FINDINGS_MAX - 1U) ? self->count++ : self->count];
     va_list list;
     *finding = (learn_finding_t){.mark = mark, .item = item, .side = side};
     va_start(list, format);
@@ -41,7 +41,7 @@ bool learn_suggests(const learn_findings_t *self, const learn_finding_t *finding
     const learn_finding_t *type = learn_find(self, "setpoint_type", LEARN_BOTH);
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
         if (finding->value[0] != '\0' && strcmp(finding->item, keys[i]) == 0) {
-            *out_section = finding->side == LEARN_BOTH ? "wheels" : learn_side(finding->side);
+            *out_section = (finding->side == LEARN_BOTH) ? "wheels" : learn_side(finding->side);
             *out_key = keys[i];
             // Without a type that moves the wheels nobody knows what the rest of a setpoint meant.
             return finding->side != LEARN_BOTH || (type != NULL && type->mark == '+');

@@ -68,8 +68,8 @@ static json_t *wheel(const learn_wheel_t *each) {
                                answer(&each->forward), "told_backward", answer(&each->backward), "stood_at_zero_ms",
                                json_integer(each->stood_us / 1000), "ran_at_zero_ms", json_integer(each->ran_us / 1000),
                                "status_frames", number(each->statuses));
-    const json_int_t um_s = each->steady_rpm > 0 ? each->steady_mm_s * 1000 / each->steady_rpm : 0;
-    (void)json_object_set_new(object, "um_s_per_rpm", um_s > 0 ? json_integer(um_s) : json_null());
+    const json_int_t um_s = (each->steady_rpm > 0) ? each->steady_mm_s * 1000 / each->steady_rpm : 0;
+    (void)json_object_set_new(object, "um_s_per_rpm", (um_s > 0) ? json_integer(um_s) : json_null());
     (void)json_object_set_new(object, "ticks", number(each->ticks));
     (void)json_object_set_new(object, "milli_turns", json_integer(each->turned_rpm_us / 60000));
     (void)json_object_set_new(object, "force_frames", number(each->forces));
@@ -85,13 +85,13 @@ static json_t *findings_of(const learn_findings_t *self, json_t *suggested) {
         const learn_finding_t *each = &self->at[i];
         const char *section;
         const char *key;
-        (void)json_array_append_new(list, json_pack("{s:s,s:s?,s:s,s:s?,s:s}", "item", each->item, "side",
-                                                    each->side == LEARN_BOTH ? NULL : learn_side(each->side), "verdict",
-                                                    each->mark == '+'   ? "for"
-                                                    : each->mark == '-' ? "against"
-                                                                        : "unknown",
-                                                    "value", each->value[0] != '\0' ? each->value : NULL, "text",
-                                                    each->text));
+        (void)json_array_append_new(
+            list, json_pack("{s:s,s:s?,s:s,s:s?,s:s}", "item", each->item, "side",
+                            (each->side == LEARN_BOTH) ? NULL : learn_side(each->side), "verdict",
+                            (each->mark == '+')   ? "for"
+                            : (each->mark == '-') ? "against"
+                                                  : "unknown",
+                            "value", (each->value[0] != '\0') ? each->value : NULL, "text", each->text));
         if (learn_suggests(self, each, &section, &key)) {
             json_t *lines = json_object_get(suggested, section);
             if (lines == NULL) {

@@ -25,9 +25,9 @@ static void types_text(const learn_setpoint_t *setpoint, char *out) {
     out[0] = '\0';
     for (unsigned type = 0; type < 256U; type++) {
         if (setpoint->type[type] > 0U && used < LEARN_TEXT - 32U) {
-            const int n = snprintf(out + used, LEARN_TEXT - used, "%s%u (%u %%)", kinds > 0U ? ", " : "", type,
+            const int n = snprintf(out + used, LEARN_TEXT - used, "%s%u (%u %%)", (kinds > 0U) ? ", " : "", type,
                                    (unsigned)(setpoint->type[type] * 100U / setpoint->count));
-            used += n > 0 ? (size_t)n : 0U;
+            used += (n > 0) ? (size_t)n : 0U;
             kinds++;
         }
     }
@@ -140,7 +140,7 @@ void learn_report(const learn_t *self, const char *name) {
     static learn_findings_t findings;
     const int64_t ms = (self->last_us - self->first_us) / 1000;
     text_line(stdout, "%s: %" PRIu64 " frames in %" PRId64 ".%" PRId64 " s", name, self->frames, ms / 1000,
-              (ms < 0 ? -ms : ms) % 1000 / 100);
+              ((ms < 0) ? -ms : ms) % 1000 / 100);
     print_setpoints(self);
     print_telemetry(self);
     (void)puts("\nWhat it tells (+ speaks for, - speaks against, ? says nothing about)");

@@ -26,7 +26,7 @@ static uint64_t moving(const learn_setpoint_t *setpoint) {
 
 /// What both wheels must have for a sentence about both. NULL: both have it; else the one that has not, or both.
 static const char *lacking(bool left, bool right) {
-    return left && right ? NULL : left ? "the right wheel" : right ? "the left wheel" : "both wheels";
+    return (left && right) ? NULL : left ? "the right wheel" : right ? "the left wheel" : "both wheels";
 }
 
 /// What keeps the type from being told although every setpoint with a speed has it. NULL: nothing.
@@ -115,9 +115,9 @@ static bool is_constant(const learn_setpoint_t *setpoint) {
 }
 
 static bool is_only(const learn_range_t *range, int sign) {
-    return learn_is_empty(range) || (sign > 0   ? range->low > 0
-                                     : sign < 0 ? range->high < 0
-                                                : range->low == 0 && range->high == 0);
+    return learn_is_empty(range) || ((sign > 0)   ? range->low > 0
+                                     : (sign < 0) ? range->high < 0
+                                                  : range->low == 0 && range->high == 0);
 }
 
 /// No current at rest, and otherwise of the sign of the speed, as far as there is any.
@@ -143,8 +143,8 @@ static void list_untold(const learn_t *self, char *out_list, size_t size) {
             told = told && count[kind] >= LEARN_FRAMES_MIN;
         }
         if (!told) {
-            const int n = snprintf(&out_list[used], size - used, "%s%s", used > 0U ? ", " : "", words[kind]);
-            used += n > 0 ? (size_t)n : 0U;
+            const int n = snprintf(&out_list[used], size - used, "%s%s", (used > 0U) ? ", " : "", words[kind]);
+            used += (n > 0) ? (size_t)n : 0U;
         }
     }
 }
@@ -224,7 +224,7 @@ static void weigh_length(const learn_t *self, learn_findings_t *out) {
         (void)learn_say(out, '?', "setpoint_dlc", LEARN_BOTH,
                         "length of setpoints: not one length on both wheels, so which of them counts is open");
     } else {
-        learn_finding_t *told = learn_say(out, left->low == (int32_t)IW_DLC_SETPOINT ? '+' : '-', "setpoint_dlc",
+        learn_finding_t *told = learn_say(out, (left->low == (int32_t)IW_DLC_SETPOINT) ? '+' : '-', "setpoint_dlc",
                                           LEARN_BOTH, "every setpoint has %" PRId32 " bytes (the document says %u)",
                                           left->low, (unsigned)IW_DLC_SETPOINT);
         (void)snprintf(told->value, sizeof told->value, "%" PRId32, left->low);

@@ -40,7 +40,7 @@ bool learn_stayed(const learn_wheel_t *wheel) {
 /// 1: with the sign that was told; -1: against it; 0: now so, now so. Only if the direction was seen.
 static int sign_of(const learn_answer_t *answer) {
     const int64_t all = turned_us(answer);
-    return answer->against_us * 20 < all ? 1 : answer->with_us * 20 < all ? -1 : 0;
+    return (answer->against_us * 20 < all) ? 1 : (answer->with_us * 20 < all) ? -1 : 0;
 }
 
 /// Why no sign can be told of that wheel.
@@ -58,7 +58,7 @@ static const char *no_sign(const learn_t *self, unsigned side) {
 
 /// "a positive setpoint is measured as a positive speed": a direction that was told, and the sign found for it.
 static void say_direction(bool forward, int sign, char *out_text, size_t size) {
-    const char *measured = sign > 0 ? (forward ? "positive" : "negative") : (forward ? "NEGATIVE" : "POSITIVE");
+    const char *measured = (sign > 0) ? (forward ? "positive" : "negative") : (forward ? "NEGATIVE" : "POSITIVE");
     (void)snprintf(out_text, size, "a %s setpoint is measured as a %s speed", forward ? "positive" : "negative",
                    measured);
 }
@@ -84,10 +84,10 @@ static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out
     say_direction(forward, first, ahead, sizeof ahead);
     say_direction(false, first, back, sizeof back);
     learn_finding_t *told =
-        learn_say(out, first > 0 ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s", learn_side(side), ahead,
-                  forward && backward ? ", " : "", forward && backward ? back : " (the other direction: not seen)",
-                  first > 0 ? "" : "; the gateway would latch feedback_sign");
-    (void)snprintf(told->value, sizeof told->value, "%s", first > 0 ? "yes" : "no");
+        learn_say(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s", learn_side(side), ahead,
+                  (forward && backward) ? ", " : "", (forward && backward) ? back : " (the other direction: not seen)",
+                  (first > 0) ? "" : "; the gateway would latch feedback_sign");
+    (void)snprintf(told->value, sizeof told->value, "%s", (first > 0) ? "yes" : "no");
 }
 
 /// Speed told against rpm shown.
@@ -120,9 +120,9 @@ static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_finding
 static void weigh_ticks(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
     if (wheel->turned_rpm_us < (int64_t)TURNS_MIN * US_PER_MIN) {
         (void)learn_say(out, '?', "ticks_per_turn", side, "%s ticks per turn: %s", learn_side(side),
-                        wheel->statuses == 0U ? "none of its status frames is in it"
-                        : wheel->speeds == 0U ? "none of its speed frames is in it"
-                                              : "fewer than two turns at 10 rpm or more, without a gap, are in it");
+                        (wheel->statuses == 0U) ? "none of its status frames is in it"
+                        : (wheel->speeds == 0U) ? "none of its speed frames is in it"
+                                                : "fewer than two turns at 10 rpm or more, without a gap, are in it");
         return;
     }
     const uint64_t tenths = wheel->ticks * 10U * US_PER_MIN / (uint64_t)wheel->turned_rpm_us;
@@ -130,9 +130,9 @@ static void weigh_ticks(const learn_wheel_t *wheel, unsigned side, learn_finding
     (void)learn_say(out, same ? '+' : '-', "ticks_per_turn", side,
                     "%s: %" PRIu64 ".%" PRIu64 " ticks per turn of what the rpm count; %s", learn_side(side),
                     tenths / 10U, tenths % 10U,
-                    same            ? "the rotor makes 60, so the rpm are the rotor's, or there is no gear"
-                    : tenths > 660U ? "the rotor makes 60, so there is a gear between: gear_ratio"
-                                    : "the rotor makes 60, and no gear makes fewer: were frames lost?");
+                    same              ? "the rotor makes 60, so the rpm are the rotor's, or there is no gear"
+                    : (tenths > 660U) ? "the rotor makes 60, so there is a gear between: gear_ratio"
+                                      : "the rotor makes 60, and no gear makes fewer: were frames lost?");
 }
 
 /// What is missing for a ratio of force and offset; NULL: nothing.
@@ -155,20 +155,20 @@ static const char *no_force(const learn_wheel_t *wheel) {
         return "needs a second at rest, told by its speed frames";
     }
     const int32_t mean = (int32_t)(wheel->rest_force_sum / (int64_t)wheel->rest_force_count);
-    const int32_t slack = (mean < 0 ? -mean : mean) / 10 + QUIET_COUNTS;
-    return rest->high - rest->low > slack ? "the force sways while the wheel rests: somebody touched it" : NULL;
+    const int32_t slack = ((mean < 0) ? -mean : mean) / 10 + QUIET_COUNTS;
+    return (rest->high - rest->low > slack) ? "the force sways while the wheel rests: somebody touched it" : NULL;
 }
 
 /// What the ratio (1000 x raw / offset) speaks for: "cN", "dN", "removed", or NULL.
 static const char *unit_of(int64_t permille) {
-    return permille >= 8000 && permille <= 12000 ? "cN"
-           : permille >= 800 && permille <= 1200 ? "dN"
-           : permille > -200 && permille < 200   ? "removed"
-                                                 : NULL;
+    return (permille >= 8000 && permille <= 12000) ? "cN"
+           : (permille >= 800 && permille <= 1200) ? "dN"
+           : (permille > -200 && permille < 200)   ? "removed"
+                                                   : NULL;
 }
 
 static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
-    const char *documented = side == IW_LEFT ? "cN" : "dN";
+    const char *documented = (side == IW_LEFT) ? "cN" : "dN";
     const char *missing = no_force(wheel);
     if (missing != NULL) {
         (void)learn_say(out, '?', "force_unit", side, "%s force unit: %s", learn_side(side), missing);
@@ -176,18 +176,18 @@ static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_finding
     }
     const int64_t permille =
         wheel->rest_force_sum * 1000 / (int64_t)wheel->rest_force_count / (int64_t)wheel->offset_dN.low;
-    const int64_t size = permille < 0 ? -permille : permille;
+    const int64_t size = (permille < 0) ? -permille : permille;
     const char *unit = unit_of(permille);
     const bool is_unit = unit != NULL && unit[1] == 'N';
     const bool dead = wheel->force.low == wheel->force.high;
     learn_finding_t *told =
-        learn_say(out, is_unit && unit[0] == documented[0] ? '+' : '-', "force_unit", side,
+        learn_say(out, (is_unit && unit[0] == documented[0]) ? '+' : '-', "force_unit", side,
                   "%s force at rest / offset = %s%" PRId64 ".%02" PRId64 ": %s%s (the document says %s)",
-                  learn_side(side), permille < 0 ? "-" : "", size / 1000, size % 1000 / 10,
-                  unit == NULL ? "neither cN (10) nor dN (1) nor offset removed (0): pressed at the start?"
-                  : is_unit    ? unit
-                  : dead       ? "the wheel subtracts the offset itself, or its force never changes"
-                               : "the wheel subtracts the offset itself",
+                  learn_side(side), (permille < 0) ? "-" : "", size / 1000, size % 1000 / 10,
+                  (unit == NULL) ? "neither cN (10) nor dN (1) nor offset removed (0): pressed at the start?"
+                  : is_unit      ? unit
+                  : dead         ? "the wheel subtracts the offset itself, or its force never changes"
+                                 : "the wheel subtracts the offset itself",
                   is_unit ? " per count, if nothing pressed it" : "", documented);
     (void)snprintf(told->value, sizeof told->value, "%s", is_unit ? unit : "");
 }
@@ -196,7 +196,7 @@ static void weigh_pose(const learn_pose_t *pose, learn_findings_t *out) {
     const bool enough = pose->moves >= POSE_MOVES_MIN && pose->way_big + pose->way_little >= POSE_WAY_MIN;
     if (!enough) {
         (void)learn_say(out, '?', "pose_byte_order", LEARN_BOTH, "byte order of the pose: %s",
-                        pose->count == 0U ? "no pose frame (290 = 0x122) is in it" : "it hardly changes");
+                        (pose->count == 0U) ? "no pose frame (290 = 0x122) is in it" : "it hardly changes");
     } else if (pose->way_big * 4U < pose->way_little) {
         learn_finding_t *told = learn_say(out, '+', "pose_byte_order", LEARN_BOTH,
                                           "the pose is smooth with the most significant byte first");

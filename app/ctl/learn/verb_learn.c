@@ -29,5 +29,5 @@ int verb_learn(ctl_t *self, int count, char **words) {
         learn_report(&learn, recording.name);
     }
     code = recording_close(&recording);
-    return code != CTL_OK || told ? code : CTL_NO;
+    return (code != CTL_OK || told) ? code : CTL_NO;
 }

@@ -33,7 +33,7 @@ static int tell_unopened(const char *bus, int error) {
 }
 
 static int tell_down(const char *bus) {
-    return strncmp(bus, "unix:", 5) == 0
+    return (strncmp(bus, "unix:", 5) == 0)
                ? ctl_fail(CTL_UNAVAILABLE, "nobody answers on %s; is the simulator running? iwheel-sim --can %s", bus,
                           bus)
                : ctl_fail(
@@ -79,7 +79,7 @@ static bool comes_up(source_t *source) {
 
 int recorder_from_bus(const char *bus, recorder_t *self) {
     source_t source = {.ops = iw_bus_backend(bus), .signals = signals_count()};
-    const int error = source.ops == NULL ? ENOTSUP : source.ops->open(&source.store, bus);
+    const int error = (source.ops == NULL) ? ENOTSUP : source.ops->open(&source.store, bus);
     if (error != 0) {
         return tell_unopened(bus, error);
     }

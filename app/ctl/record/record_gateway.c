@@ -13,7 +13,7 @@ static bool take_event(recorder_t *self, const json_t *line) {
     int64_t at_us = 0;
     if (event != NULL && strcmp(event, "lost") == 0) {
         const json_int_t count = json_integer_value(json_object_get(line, "count"));
-        self->lost += count > 0 ? (uint64_t)count : 0U;
+        self->lost += (count > 0) ? (uint64_t)count : 0U;
     }
     if (event == NULL || strcmp(event, "frame") != 0) {
         return true;
@@ -31,7 +31,7 @@ int recorder_from_gateway(ctl_t *ctl, recorder_t *self) {
         json_t *line = NULL;
         const int64_t look_us = client_now_us() + LOOK_US;
         const iwc_result_t result =
-            client_receive(&ctl->client, look_us < self->end_us ? look_us : self->end_us, &line);
+            client_receive(&ctl->client, (look_us < self->end_us) ? look_us : self->end_us, &line);
         written = result != IWC_OK || take_event(self, line);
         written = recorder_tend(self) && written;
         json_decref(line);

@@ -9,7 +9,7 @@ bool recorder_put(recorder_t *self, const candump_t *frame, int64_t at_us) {
     whole.time_us = at_us + self->wall_minus_us;
     (void)snprintf(whole.interface, sizeof whole.interface, "%s", self->interface);
     const size_t length = candump_write(&whole, line);
-    self->first_us = self->frames == 0U ? at_us : self->first_us;
+    self->first_us = (self->frames == 0U) ? at_us : self->first_us;
     self->last_us = at_us;
     self->frames++;
     return fwrite(line, 1, length, self->file) == length;

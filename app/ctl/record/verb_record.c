@@ -27,7 +27,7 @@ static int parse(words_t *self, int count, char **words) {
     static const duration_range_t range = {FOR_MIN_US, FOR_MAX_US};
     char why[DURATION_WHY_SIZE];
     for (int i = 0; i < count; i++) {
-        const char *next = i + 1 < count ? words[i + 1] : NULL;
+        const char *next = (i + 1 < count) ? words[i + 1] : NULL;
         if (strcmp(words[i], "--for") == 0) {
             if (!duration_option("--for", next, range, &self->for_us, why)) {
                 return ctl_fail(CTL_USAGE, "%s", why);
@@ -65,10 +65,10 @@ static int open_file(recorder_t *self, const char *path) {
         path = made;
     }
     const int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-    self->file = fd >= 0 ? fdopen(fd, "w") : NULL;
+    self->file = (fd >= 0) ? fdopen(fd, "w") : NULL;
     self->name = path;
     if (self->file == NULL) {
-        return errno == EEXIST
+        return (errno == EEXIST)
                    ? ctl_fail(CTL_USAGE, "%s is there already; name another file, or remove it", path)
                    : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be made: %s; name another place", path, strerror(errno));
     }
@@ -98,7 +98,7 @@ static int record(ctl_t *ctl, const words_t *words, recorder_t *self) {
         (void)ctl_fail(CTL_OK, "recording what the gateway on %s sees, to %s; Ctrl-C ends it", gateway.bus, self->name);
         return recorder_from_gateway(ctl, self);
     }
-    const char *bus = words->bus != NULL ? words->bus : USUAL_BUS;
+    const char *bus = (words->bus != NULL) ? words->bus : USUAL_BUS;
     name_interface(self, bus);
     (void)snprintf(self->bus, sizeof self->bus, "%s", bus);
     (void)ctl_fail(CTL_OK, "no gateway for it: recording from %s itself, sending nothing, to %s; Ctrl-C ends it", bus,
@@ -112,7 +112,7 @@ static int finish_empty(recorder_t *self, int code) {
         (void)fclose(self->file);
         (void)unlink(self->name);
     }
-    return code != CTL_OK
+    return (code != CTL_OK)
                ? code
                : ctl_fail(CTL_NO, "the bus was silent, nothing is recorded: wheels powered? cable? iwheelctl "
                                   "doctor tells");
@@ -143,14 +143,15 @@ static int finish(recorder_t *self, bool json, int code) {
     if (self->frames == 0U) {
         return finish_empty(self, code);
     }
-    const bool closed = self->file == stdout ? fflush(stdout) == 0 : fclose(self->file) == 0;
+    const bool closed = (self->file == stdout) ? fflush(stdout) == 0 : fclose(self->file) == 0;
     const int why = broken ? error : errno;
     if (!broken && closed) {
         sum_up(self, json);
         return code;
     }
-    return why == EPIPE ? CTL_OK
-                        : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be written: %s; make room", self->name, strerror(why));
+    return (why == EPIPE)
+               ? CTL_OK
+               : ctl_fail(CTL_UNAVAILABLE, "%s: cannot be written: %s; make room", self->name, strerror(why));
 }
 
 int verb_record(ctl_t *self, int count, char **words) {
@@ -161,13 +162,13 @@ int verb_record(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && json && parsed.path != NULL && strcmp(parsed.path, "-") == 0) {
         return ctl_fail(CTL_USAGE, "record writes the recording or --json to standard output, not both; name a FILE");
     }
-    code = code == CTL_OK ? open_file(&recorder, parsed.path) : code;
+    code = (code == CTL_OK) ? open_file(&recorder, parsed.path) : code;
     if (code != CTL_OK) {
         return code;
     }
     self->json = false;
     signals_catch();
-    recorder.end_us = parsed.for_us > 0 ? client_now_us() + parsed.for_us : INT64_MAX;
+    recorder.end_us = (parsed.for_us > 0) ? client_now_us() + parsed.for_us : INT64_MAX;
     code = record(self, &parsed, &recorder);
     self->json = json;
     return finish(&recorder, json, code);

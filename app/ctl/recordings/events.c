@@ -45,7 +45,7 @@ static const char *refusal_name(unsigned refusal) {
 
 static const char *side_name(unsigned sides) {
     const char *name = iwn_sides_name((uint8_t)sides);
-    return name != NULL ? name : "";
+    return (name != NULL) ? name : "";
 }
 
 static uint8_t flag(const json_t *line, const char *name) {
@@ -67,7 +67,7 @@ static bool take_refusal(const json_t *line, uint8_t *out) {
 }
 
 static int32_t limited(int64_t value, int64_t limit) {
-    return (int32_t)(value > limit ? limit : value < -limit - 1 ? -limit - 1 : value);
+    return (int32_t)((value > limit) ? limit : (value < -limit - 1) ? -limit - 1 : value);
 }
 
 static void take_speeds(const json_t *line, const char *left, const char *right, blackbox_drive_t *out) {
@@ -80,7 +80,7 @@ static bool take_drive(const json_t *line, blackbox_entry_t *out) {
     out->a = json_is_integer(json_object_get(line, "left_mA")) ? 1U : 0U;
     out->as.drive.current_mA[IW_LEFT] = (int16_t)limited(integer(line, "left_mA"), INT16_MAX);
     out->as.drive.current_mA[IW_RIGHT] = (int16_t)limited(integer(line, "right_mA"), INT16_MAX);
-    out->as.drive.age_us = age_us < 0 ? 0U : age_us > UINT32_MAX ? UINT32_MAX : (uint32_t)age_us;
+    out->as.drive.age_us = (age_us < 0) ? 0U : (age_us > UINT32_MAX) ? UINT32_MAX : (uint32_t)age_us;
     take_speeds(line, "left_mm_s", "right_mm_s", &out->as.drive);
     return take_refusal(line, &out->b);
 }
@@ -92,7 +92,7 @@ static bool take_decision(const json_t *line, blackbox_entry_t *out) {
                take_word(word_of(line, "before", state_name, IW_STATE_LATCHED + 1U), IW_STATE_LATCHED + 1U, &out->b);
     }
     const unsigned sides = word_of(line, "side", side_name, IW_SIDES_BOTH + 1U);
-    out->b = (uint8_t)(sides > IW_SIDES_BOTH ? IW_SIDES_NONE : sides);
+    out->b = (uint8_t)((sides > IW_SIDES_BOTH) ? IW_SIDES_NONE : sides);
     out->as.value = integer(line, "detail");
     out->number = (uint32_t)integer(line, "number");
     return take_word(word_of(line, "cause", cause_name, IW_CAUSES), IW_CAUSES, &out->a);
@@ -164,13 +164,13 @@ static bool take_fields(const json_t *line, blackbox_entry_t *out) {
 /// An entry of a line; false if it is none.
 static bool take_entry(events_t *self, const json_t *line, blackbox_entry_t *out, uint64_t *out_frames) {
     const char *type = json_string_value(json_object_get(line, "type"));
-    const blackbox_kind_t kind = type != NULL ? blackbox_kind_of(type) : BLACKBOX_KINDS;
+    const blackbox_kind_t kind = (type != NULL) ? blackbox_kind_of(type) : BLACKBOX_KINDS;
     const int64_t at_us = integer(line, "t_us");
     const int64_t frames = integer(line, "frames");
     (void)self;
-    *out = (blackbox_entry_t){.kind = (uint8_t)kind, .at_us = at_us > 0 ? (uint64_t)at_us : 0U};
+    *out = (blackbox_entry_t){.kind = (uint8_t)kind, .at_us = (at_us > 0) ? (uint64_t)at_us : 0U};
     out->number = (uint32_t)integer(line, "client");
-    *out_frames = frames > 0 ? (uint64_t)frames : 0U;
+    *out_frames = (frames > 0) ? (uint64_t)frames : 0U;
     return kind != BLACKBOX_KINDS && kind != BLACKBOX_FRAME && take_fields(line, out);
 }
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 static int side_of(const iw_can_frame_t *frame) {
-    return frame->id == IW_ID_LEFT_SETPOINT ? IW_LEFT : frame->id == IW_ID_RIGHT_SETPOINT ? IW_RIGHT : -1;
+    return (frame->id == IW_ID_LEFT_SETPOINT) ? IW_LEFT : (frame->id == IW_ID_RIGHT_SETPOINT) ? IW_RIGHT : -1;
 }
 
 /// The next noted answer of that kind; `otherwise` if none is left.
@@ -30,7 +30,7 @@ static int port_send(void *context, const iw_can_frame_t *frame) {
     }
     self->total_sent++;
     if (self->sent_count[side] == REPLAY_SENT) { // The oldest will have no echo any more.
-        (void)memmove(&self->sent[side][0], &self->sent[side][1], sizeof self->sent[side] - sizeof self->sent[side][0]);
+        memmove(&self->sent[side][0], &self->sent[side][1], sizeof self->sent[side] - sizeof self->sent[side][0]);
         self->sent_count[side]--;
     }
     self->sent[side][self->sent_count[side]++] = *frame;
@@ -50,7 +50,7 @@ static void compare_echo(replay_t *self, const iw_can_frame_t *frame) {
     self->setpoints.different += same ? 0U : 1U;
     if (self->sent_count[side] > 0U) {
         self->sent_count[side]--;
-        (void)memmove(&self->sent[side][0], &self->sent[side][1], self->sent_count[side] * sizeof self->sent[side][0]);
+        memmove(&self->sent[side][0], &self->sent[side][1], self->sent_count[side] * sizeof self->sent[side][0]);
     }
 }
 
@@ -94,14 +94,14 @@ static void begin_core(replay_t *self, const iw_config_t *config, iw_time_us_t a
     self->next_us = at_us;
     const iw_snapshot_t seen = replay_look(self);
     self->state = seen.state;
-    (void)memcpy(self->ledger, seen.assumed, sizeof self->ledger);
+    memcpy(self->ledger, seen.assumed, sizeof self->ledger);
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->force[side] = iw_snapshot_force_validity(&seen, (iw_side_t)side);
     }
 }
 
 void replay_init(replay_t *self, const iw_config_t *config, iw_time_us_t at_us, replay_out_t out) {
-    (void)memset(self, 0, sizeof *self);
+    memset(self, 0, sizeof *self);
     self->out = out;
     self->zero_us = at_us;
     self->bus = IW_BUS_ACTIVE;
@@ -137,7 +137,7 @@ static void echo_what_was_sent(replay_t *self) {
 }
 
 void replay_step(replay_t *self, iw_time_us_t at_us) {
-    self->now_us = at_us > self->now_us ? at_us : self->now_us;
+    self->now_us = (at_us > self->now_us) ? at_us : self->now_us;
     self->next_us = iw_gateway_step(&self->gateway, self->now_us);
     self->frames = 0;
     self->received = 0;
@@ -167,7 +167,7 @@ static iw_refusal_t drive(replay_t *self, const blackbox_entry_t *entry) {
         wanted.speed_mm_s[side] = recorded->speed_mm_s[side];
         wanted.current_mA[side] = recorded->current_mA[side];
     }
-    const iw_time_us_t sent_us = entry->at_us > recorded->age_us ? entry->at_us - recorded->age_us : 0U;
+    const iw_time_us_t sent_us = (entry->at_us > recorded->age_us) ? entry->at_us - recorded->age_us : 0U;
     return iw_gateway_drive(&self->gateway, sent_us, entry->number, &wanted, &applied);
 }
 
@@ -208,7 +208,7 @@ static void answer(replay_t *self, const blackbox_entry_t *entry) {
         iw_gateway_bus_facts(&self->gateway, &facts);
         break;
     case BLACKBOX_SUSPENDED:
-        iw_gateway_suspended(&self->gateway, entry->as.value > 0 ? (iw_time_us_t)entry->as.value : 0U);
+        iw_gateway_suspended(&self->gateway, (entry->as.value > 0) ? (iw_time_us_t)entry->as.value : 0U);
         replay_tell_answer(self, entry);
         break;
     default:

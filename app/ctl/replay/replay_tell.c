@@ -39,7 +39,7 @@ __attribute__((format(printf, 4, 5))) static void tell(const replay_t *self, iw_
     if (self->quiet) {
         return;
     }
-    const iw_time_us_t since_us = at_us > self->zero_us ? at_us - self->zero_us : 0U;
+    const iw_time_us_t since_us = (at_us > self->zero_us) ? at_us - self->zero_us : 0U;
     va_start(list, format);
     (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
@@ -67,7 +67,7 @@ void replay_note(const replay_out_t *out, const char *format, ...) {
 }
 
 static const char *side_name(size_t side) {
-    return side == IW_LEFT ? "left" : "right";
+    return (side == IW_LEFT) ? "left" : "right";
 }
 
 static void tell_wheels(replay_t *self, const iw_snapshot_t *seen) {
@@ -101,7 +101,7 @@ static void tell_causes(replay_t *self, uint32_t present) {
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if (((present ^ self->present) & (1U << cause)) != 0U) {
             tell(self, self->now_us, "fault", "%s%s", iwn_cause_name((iw_cause_t)cause),
-                 (present & (1U << cause)) != 0U ? "" : " is gone");
+                 ((present & (1U << cause)) != 0U) ? "" : " is gone");
         }
     }
     self->present = present;
@@ -113,7 +113,7 @@ static void tell_stop(replay_t *self, const iw_stop_t *stop) {
     if (stop->number == self->stop_number) {
         return;
     }
-    const iw_client_t who = stop->cause == IW_CAUSE_ESTOP_SOFTWARE ? stop->detail : stop->client;
+    const iw_client_t who = (stop->cause == IW_CAUSE_ESTOP_SOFTWARE) ? stop->detail : stop->client;
     (void)snprintf(client, sizeof client, "client %u", (unsigned)who);
     const iwn_why_context_t context = {.client = client, .estop = self->estop_name, .bus = self->bus_name};
     iwn_why_sentence(stop, &context, sentence, sizeof sentence);
@@ -164,20 +164,20 @@ static void tell_drive(replay_t *self, const blackbox_entry_t *entry, const char
 
 void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal) {
     char result[96];
-    const char *name = refusal == IW_REFUSE_NONE ? "accepted" : iwn_error_name(iwn_error_of(refusal));
+    const char *name = (refusal == IW_REFUSE_NONE) ? "accepted" : iwn_error_name(iwn_error_of(refusal));
     const bool same = (uint8_t)refusal == entry->b || entry->kind == (uint8_t)BLACKBOX_TARE;
     (void)snprintf(result, sizeof result, "%s%s%s%s", name, same ? "" : " (when it was recorded: ",
-                   same                                  ? ""
-                   : entry->b == (uint8_t)IW_REFUSE_NONE ? "accepted"
-                                                         : iwn_error_name(iwn_error_of((iw_refusal_t)entry->b)),
+                   same                                    ? ""
+                   : (entry->b == (uint8_t)IW_REFUSE_NONE) ? "accepted"
+                                                           : iwn_error_name(iwn_error_of((iw_refusal_t)entry->b)),
                    same ? "" : ")");
     switch (entry->kind) {
     case BLACKBOX_DRIVE:
         tell_drive(self, entry, result);
         break;
     case BLACKBOX_ARM:
-        tell(self, entry->at_us, "arm", "client %u%s: %s", (unsigned)entry->number, entry->a != 0U ? ", takeover" : "",
-             result);
+        tell(self, entry->at_us, "arm", "client %u%s: %s", (unsigned)entry->number,
+             (entry->a != 0U) ? ", takeover" : "", result);
         break;
     case BLACKBOX_RESET:
         tell(self, entry->at_us, "reset", "client %u: %s", (unsigned)entry->number, result);
@@ -186,7 +186,7 @@ void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refus
         tell(self, entry->at_us, "stop asked", "%s", iwn_cause_name((iw_cause_t)entry->a));
         break;
     case BLACKBOX_TARE:
-        tell(self, entry->at_us, "tare", "%s", side_name(entry->a == (uint8_t)IW_RIGHT ? IW_RIGHT : IW_LEFT));
+        tell(self, entry->at_us, "tare", "%s", side_name((entry->a == (uint8_t)IW_RIGHT) ? IW_RIGHT : IW_LEFT));
         break;
     default:
         tell(self, entry->at_us, "estop", "client %u", (unsigned)entry->number);
@@ -234,11 +234,11 @@ static const struct {
     {"states", "changes of state", offsetof(replay_t, states)},
     {"stops", "stops", offsetof(replay_t, stops)},
 };
-#define SCORES (sizeof(scores) / sizeof(scores[0]))
+#define SCORES (sizeof scores / sizeof scores[0])
 
 static replay_score_t score_of(const replay_t *self, size_t number) {
     replay_score_t score;
-    (void)memcpy(&score, (const char *)self + scores[number].offset, sizeof score);
+    memcpy(&score, (const char *)self + scores[number].offset, sizeof score);
     return score;
 }
 
@@ -264,7 +264,7 @@ void replay_finish(const replay_t *self) {
     }
     const uint32_t stops = replay_look(self).stop->number;
     replay_note(&self->out, "end: %s, %u stop%s, %" PRIu64 " frames in, %" PRIu64 " setpoint frames out",
-                iwn_state_name(iw_gateway_state(&self->gateway)), (unsigned)stops, stops == 1U ? "" : "s",
+                iwn_state_name(iw_gateway_state(&self->gateway)), (unsigned)stops, (stops == 1U) ? "" : "s",
                 self->total_frames, self->total_sent);
     for (size_t i = 0; i < SCORES; i++) {
         const replay_score_t score = score_of(self, i);

@@ -26,7 +26,7 @@ static void turn(replay_t *self, iw_time_us_t at_us, iw_can_frame_t last[IW_SIDE
     for (size_t side = 0; side < IW_SIDES; side++) {
         iw_can_frame_t frame;
         const iw_codec_wheel_t told = {
-            .speed = {.speed_rpm = obedient_rpm(self, side, last[side].id != 0U ? &last[side] : NULL)}};
+            .speed = {.speed_rpm = obedient_rpm(self, side, (last[side].id != 0U) ? &last[side] : NULL)}};
         if (iw_codec_encode(IW_CODEC_SPEED, (iw_side_t)side, &told, &frame) == IW_OK) {
             (void)replay_frame(self, &frame);
         }
@@ -37,10 +37,11 @@ static void turn(replay_t *self, iw_time_us_t at_us, iw_can_frame_t last[IW_SIDE
 static iw_time_us_t ramp_us(const iw_config_t *config, const blackbox_drive_t *drive) {
     int64_t fastest = 0;
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const int64_t speed = drive->speed_mm_s[side] < 0 ? -(int64_t)drive->speed_mm_s[side] : drive->speed_mm_s[side];
-        fastest = speed > fastest ? speed : fastest;
+        const int64_t speed =
+            (drive->speed_mm_s[side] < 0) ? -(int64_t)drive->speed_mm_s[side] : drive->speed_mm_s[side];
+        fastest = (speed > fastest) ? speed : fastest;
     }
-    fastest = fastest > config->max_speed_mm_s ? config->max_speed_mm_s : fastest;
+    fastest = (fastest > config->max_speed_mm_s) ? config->max_speed_mm_s : fastest;
     return (iw_time_us_t)fastest * 1000000U / config->accel_mm_s2;
 }
 
@@ -78,7 +79,7 @@ bool replay_warm(replay_t *self, const iw_config_t *config, const blackbox_entry
     const iw_bus_state_t bus = self->bus;
     const iw_time_us_t needed_us =
         (iw_time_us_t)config->rest_ms * IW_US_PER_MS + ramp_us(config, &state->as.drive) + SLACK_US;
-    const iw_time_us_t from_us = state->at_us > needed_us ? state->at_us - needed_us : 0U;
+    const iw_time_us_t from_us = (state->at_us > needed_us) ? state->at_us - needed_us : 0U;
     const char *names[] = {self->estop_name, self->bus_name};
     replay_init(self, config, from_us, self->out);
     self->estop_name = names[0];

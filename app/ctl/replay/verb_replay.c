@@ -55,7 +55,7 @@ static bool beside(const char *path, const char *ending, char out[PATH_SIZE]) {
 static int parse_words(verb_replay_t *self, int count, char **words) {
     for (int i = 0; i < count; i++) {
         if (strcmp(words[i], "--config") == 0) {
-            const int code = config_option_load("replay", i + 1 < count ? words[++i] : NULL, &self->config);
+            const int code = config_option_load("replay", (i + 1 < count) ? words[++i] : NULL, &self->config);
             if (code != CTL_OK) {
                 return code;
             }
@@ -66,7 +66,8 @@ static int parse_words(verb_replay_t *self, int count, char **words) {
             self->path = words[i];
         }
     }
-    return self->path != NULL ? CTL_OK : ctl_fail(CTL_USAGE, "replay wants a recording; see: iwheelctl replay --help");
+    return (self->path != NULL) ? CTL_OK
+                                : ctl_fail(CTL_USAGE, "replay wants a recording; see: iwheelctl replay --help");
 }
 
 /// The configuration that was in force lies beside the gateway's own recordings.
@@ -89,7 +90,7 @@ static int find_events(verb_replay_t *self) {
         return CTL_OK;
     }
     if (!events_open(&self->events, path)) {
-        return errno == EPROTO ? CTL_DATA : ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
+        return (errno == EPROTO) ? CTL_DATA : ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
     }
     self->wall_minus_us = json_integer_value(json_object_get(self->events.head, "wall_minus_monotonic_us"));
     return CTL_OK;
@@ -114,7 +115,7 @@ static bool peek_entry(verb_replay_t *self) {
 
 static iw_time_us_t time_of(const verb_replay_t *self, const candump_t *frame) {
     const int64_t at_us = frame->time_us - self->wall_minus_us - (int64_t)self->cut_us;
-    return at_us > 0 ? (iw_time_us_t)at_us : 0U;
+    return (at_us > 0) ? (iw_time_us_t)at_us : 0U;
 }
 
 /// The frame joins those of the same time; others step first.
@@ -181,8 +182,8 @@ static void begin_within(verb_replay_t *self) {
 static void name_things(verb_replay_t *self) {
     const char *estop = json_string_value(json_object_get(self->events.head, "estop"));
     const char *bus = json_string_value(json_object_get(self->events.head, "bus"));
-    self->replay.estop_name = estop != NULL ? estop : "line";
-    self->replay.bus_name = bus != NULL ? bus : "";
+    self->replay.estop_name = (estop != NULL) ? estop : "line";
+    self->replay.bus_name = (bus != NULL) ? bus : "";
 }
 
 /// As it was: steps, requests and answers where they were.
@@ -266,19 +267,19 @@ static int finish(verb_replay_t *self) {
     }
     const bool bad = self->events.bad > 0U;
     events_close(&self->events);
-    return code == CTL_OK && bad ? CTL_DATA : code;
+    return (code == CTL_OK && bad) ? CTL_DATA : code;
 }
 
 int verb_replay(ctl_t *self, int count, char **words) {
     static verb_replay_t replay;
     int code = parse_words(&replay, count, words);
     replay.out = (replay_out_t){.file = stdout, .json = self->json};
-    code = code == CTL_OK ? recording_open(&replay.recording, replay.path) : code;
+    code = (code == CTL_OK) ? recording_open(&replay.recording, replay.path) : code;
     if (code != CTL_OK) {
         return code;
     }
     code = find_config(&replay);
-    code = code == CTL_OK ? find_events(&replay) : code;
+    code = (code == CTL_OK) ? find_events(&replay) : code;
     if (code != CTL_OK) {
         return code;
     }

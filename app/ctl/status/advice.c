@@ -48,7 +48,7 @@ bool advice_cure(const json_t *status, const char *cause, char out_cure[ADVICE_S
                        bus, bus, bus);
         return true;
     }
-    for (size_t i = 0; i < sizeof(cures) / sizeof(cures[0]); i++) {
+    for (size_t i = 0; i < sizeof cures / sizeof cures[0]; i++) {
         if (strcmp(cures[i].cause, cause) == 0) {
             (void)snprintf(out_cure, ADVICE_SIZE, "%s", cures[i].cure);
         }
@@ -89,8 +89,8 @@ static void add_contradictions(const json_t *status, advice_t *self) {
     json_t *entry = NULL;
     json_object_foreach(json_object_get(status, "ledger"), name, entry) {
         const char *cost = text_word(entry, "disabled");
-        if (strncmp(cost, refuses, sizeof(refuses) - 1U) == 0) {
-            add(self, "cannot arm, %.32s is contradicted: %.96s", name, cost + sizeof(refuses) - 1U);
+        if (strncmp(cost, refuses, sizeof refuses - 1U) == 0) {
+            add(self, "cannot arm, %.32s is contradicted: %.96s", name, cost + sizeof refuses - 1U);
         }
     }
 }

@@ -34,7 +34,7 @@ static void draw_state(const paper_t *paper, const json_t *status, const json_t 
     }
     paper_end(paper);
     for (unsigned i = 0; i < advice.lines; i++) {
-        paper_wrap(paper, i == 0 ? "next" : "", TONE_TITLE, advice.line[i]);
+        paper_wrap(paper, (i == 0) ? "next" : "", TONE_TITLE, advice.line[i]);
     }
     if (json_is_string(sentence) && json_string_length(sentence) > 0) {
         paper_wrap(paper, "last stop", TONE_PLAIN, json_string_value(sentence));
@@ -53,10 +53,10 @@ static void draw_lease(const paper_t *paper, const json_t *lease) {
     text_integer(get(lease, "remaining_ms"), "ms", left);
     text_integer(get(lease, "lease_ms"), "ms", whole);
     if (held) {
-        (void)snprintf(text, sizeof(text), "%.128s (client %s, pid %s), %s left; a command holds for %s",
+        (void)snprintf(text, sizeof text, "%.128s (client %s, pid %s), %s left; a command holds for %s",
                        text_word(lease, "name"), client, pid, left, whole);
     } else {
-        (void)snprintf(text, sizeof(text), "nobody drives; a command holds for %s", whole);
+        (void)snprintf(text, sizeof text, "nobody drives; a command holds for %s", whole);
     }
     paper_wrap(paper, "LEASE", held ? TONE_CARE : TONE_PLAIN, text);
 }
@@ -66,10 +66,10 @@ static void draw_surroundings(const paper_t *paper, const json_t *status) {
     const json_t *bus = get(status, "bus");
     const json_t *estop = get(status, "estop");
     const char *button = text_word(estop, "state");
-    (void)snprintf(text, sizeof(text), "%.128s %.32s, timing %.32s, echo %.32s", text_word(bus, "name"),
+    (void)snprintf(text, sizeof text, "%.128s %.32s, timing %.32s, echo %.32s", text_word(bus, "name"),
                    text_word(bus, "state"), text_word(bus, "timing"), text_word(bus, "echo"));
     paper_wrap(paper, "BUS", is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, text);
-    (void)snprintf(text, sizeof(text), "%.32s%s, line %.128s", is(button, "none") ? "NONE" : button,
+    (void)snprintf(text, sizeof text, "%.32s%s, line %.128s", is(button, "none") ? "NONE" : button,
                    json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "", text_word(estop, "line"));
     paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
 }
@@ -123,7 +123,7 @@ static void write_value(const value_t *value, const json_t *wheel, char number[T
 
 /// The word that explains the values; of a zero also where a stored one came from, and whether it was taken under load.
 static void write_remark(const row_t *row, const json_t *wheel, char remark[TEXT_CELL]) {
-    const char *word = row->remark != NULL ? text_word(wheel, row->remark) : "";
+    const char *word = (row->remark != NULL) ? text_word(wheel, row->remark) : "";
     const bool zero = row->remark != NULL && is(row->remark, "offset_provenance");
     const bool stored = zero && is(word, "stored") && json_is_string(get(wheel, "offset_origin"));
     const bool spoilt = zero && json_is_true(get(wheel, "offset_contaminated"));
@@ -141,12 +141,12 @@ static void draw_cell(const paper_t *paper, const row_t *row, unsigned width, co
         const value_t *value = &row->values[i];
         write_value(value, wheel, number);
         known = known || !is(number, "--");
-        const int n = snprintf(cell + used, sizeof(cell) - used, "%s%s%s", used > 0 ? ", " : "",
+        const int n = snprintf(cell + used, sizeof cell - used, "%s%s%s", (used > 0) ? ", " : "",
                                is_lower_bound(value, wheel) ? ">= " : "", number);
-        used += n > 0 && (size_t)n < sizeof(cell) - used ? (size_t)n : 0U;
+        used += (n > 0 && (size_t)n < sizeof cell - used) ? (size_t)n : 0U;
     }
     write_remark(row, wheel, remark);
-    (void)snprintf(cell + used, sizeof(cell) - used, "%s%s", used > 0 && remark[0] != '\0' ? " " : "", remark);
+    (void)snprintf(cell + used, sizeof cell - used, "%s%s", (used > 0 && remark[0] != '\0') ? " " : "", remark);
     paper_text(paper, known ? TONE_PLAIN : TONE_FAINT, width, cell);
 }
 
@@ -154,7 +154,7 @@ static void draw_head(const paper_t *paper, const char *name, unsigned width, co
     const json_t *heard = get(wheel, "heard");
     const char *rest = json_is_true(get(wheel, "at_rest")) ? "at rest" : "turning";
     char head[TEXT_CELL];
-    (void)snprintf(head, sizeof(head), "%s %s", name, json_is_true(heard) ? rest : "NOT HEARD");
+    (void)snprintf(head, sizeof head, "%s %s", name, json_is_true(heard) ? rest : "NOT HEARD");
     paper_text(paper, json_is_true(heard) ? TONE_TITLE : TONE_BAD, width, head);
 }
 
@@ -163,7 +163,7 @@ static void draw_wheels(const paper_t *paper, const json_t *left, const json_t *
     draw_head(paper, "LEFT", PAPER_CELL, left);
     draw_head(paper, "RIGHT", 0, right);
     paper_end(paper);
-    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         paper_label(paper, rows[i].label);
         draw_cell(paper, &rows[i], PAPER_CELL, left);
         draw_cell(paper, &rows[i], 0, right);
@@ -177,8 +177,8 @@ static void draw_pose(const paper_t *paper, const json_t *pose) {
     char number[TEXT_CELL];
     paper_label(paper, "POSE");
     for (size_t i = 0; i < 4; i++) {
-        text_integer(get(pose, fields[i]), i < 3 ? "mm" : "mrad", number);
-        paper_say(paper, TONE_PLAIN, "%s%s %s", i > 0 ? ", " : "", names[i], number);
+        text_integer(get(pose, fields[i]), (i < 3) ? "mm" : "mrad", number);
+        paper_say(paper, TONE_PLAIN, "%s%s %s", (i > 0) ? ", " : "", names[i], number);
     }
     paper_say(paper, TONE_CARE, "%s", json_is_true(get(pose, "limited")) ? ", AT THE END OF ITS RANGE" : "");
     paper_end(paper);
@@ -193,12 +193,12 @@ static void draw_ledger(const paper_t *paper, json_t *ledger, const char *state,
     json_t *entry = NULL;
     json_object_foreach(ledger, name, entry) {
         const int n = is(text_word(entry, "state"), state)
-                          ? snprintf(text + used, sizeof(text) - used, "%s%s", used > 0 ? ", " : "", name)
+                          ? snprintf(text + used, sizeof text - used, "%s%s", (used > 0) ? ", " : "", name)
                           : 0;
-        used += n > 0 && (size_t)n < sizeof(text) - used ? (size_t)n : 0U;
+        used += (n > 0 && (size_t)n < sizeof text - used) ? (size_t)n : 0U;
     }
     if (used > 0) {
-        (void)snprintf(title, sizeof(title), "%s", is(state, "assumed") ? "UNVERIFIED" : "CONFIRMED");
+        (void)snprintf(title, sizeof title, "%s", is(state, "assumed") ? "UNVERIFIED" : "CONFIRMED");
         paper_wrap(paper, title, tone, text);
     }
 }
@@ -211,7 +211,7 @@ static void draw_contradictions(const paper_t *paper, json_t *ledger) {
     json_t *entry = NULL;
     json_object_foreach(ledger, name, entry) {
         if (is(text_word(entry, "state"), "contradicted")) {
-            (void)snprintf(text, sizeof(text), "%.64s = %.64s: %.240s; disabled: %.240s", name,
+            (void)snprintf(text, sizeof text, "%.64s = %.64s: %.240s; disabled: %.240s", name,
                            text_word(entry, "value"), text_word(entry, "reason"), text_word(entry, "disabled"));
             paper_wrap(paper, label, TONE_BAD, text);
             label = "";
@@ -224,7 +224,7 @@ static void draw_memory(const paper_t *paper, const json_t *memory) {
     char text[512];
     const char *state = text_word(memory, "state");
     if (is(state, "ignored") || is(state, "failed")) {
-        (void)snprintf(text, sizeof(text), "%.256s: %.160s", text_word(memory, "file"), text_word(memory, "reason"));
+        (void)snprintf(text, sizeof text, "%.256s: %.160s", text_word(memory, "file"), text_word(memory, "reason"));
         paper_wrap(paper, is(state, "failed") ? "NOT KEPT" : "NOT TRUSTED", TONE_CARE, text);
     }
 }
@@ -239,8 +239,8 @@ static void draw_budget(const paper_t *paper, const json_t *budget) {
     for (size_t i = 0; i < 2; i++) {
         text_integer(get(budget, cases[i][1]), "ms", time);
         text_decimal(get(budget, cases[i][2]), 3, "m", way);
-        paper_label(paper, i == 0 ? "STOP BUDGET" : "");
-        paper_say(paper, TONE_PLAIN, "%s: at most %s, %s%s", cases[i][0], time, way, i == 0 ? "" : ", then unknown");
+        paper_label(paper, (i == 0) ? "STOP BUDGET" : "");
+        paper_say(paper, TONE_PLAIN, "%s: at most %s, %s%s", cases[i][0], time, way, (i == 0) ? "" : ", then unknown");
         paper_end(paper);
     }
 }
@@ -249,7 +249,7 @@ static void draw_warnings(const paper_t *paper, const json_t *warnings) {
     size_t index = 0;
     const json_t *warning = NULL;
     json_array_foreach(warnings, index, warning) {
-        paper_wrap(paper, index == 0 ? "WARNINGS" : "", TONE_CARE,
+        paper_wrap(paper, (index == 0) ? "WARNINGS" : "", TONE_CARE,
                    json_is_string(warning) ? json_string_value(warning) : "--");
     }
 }

@@ -21,5 +21,5 @@ int verb_status(ctl_t *self, int count, char **words) {
     }
     json_decref(status);
     json_decref(why);
-    return why != NULL ? CTL_OK : CTL_UNAVAILABLE;
+    return (why != NULL) ? CTL_OK : CTL_UNAVAILABLE;
 }

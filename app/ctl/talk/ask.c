@@ -16,7 +16,7 @@ int ctl_fail(int code, const char *format, ...) {
     char text[2048];
     va_list list;
     va_start(list, format);
-    (void)vsnprintf(text, sizeof(text), format, list);
+    (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
     (void)fputs("iwheelctl: ", stderr);
     text_safe(text, stderr);
@@ -57,7 +57,7 @@ static const char *choose_socket(const ctl_t *self, char *found, size_t size, in
 
 static int tell_denied(const char *path) {
     struct stat status;
-    const struct group *group = stat(path, &status) == 0 ? getgrgid(status.st_gid) : NULL;
+    const struct group *group = (stat(path, &status) == 0) ? getgrgid(status.st_gid) : NULL;
     if (group == NULL) {
         return ctl_fail(CTL_PERMISSION, "%s: permission denied; ask its owner, or use sudo", path);
     }
@@ -129,7 +129,7 @@ int ctl_lost(const ctl_t *self, iwc_result_t result) {
 int ctl_connect(ctl_t *self) {
     char found[512];
     int code = CTL_OK;
-    const char *path = choose_socket(self, found, sizeof(found), &code);
+    const char *path = choose_socket(self, found, sizeof found, &code);
     if (path == NULL) {
         return code;
     }
@@ -150,12 +150,12 @@ int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {
     if (result == IWC_OK) {
         result = client_wait(&self->client, id, deadline_us, out_reply);
     }
-    return result == IWC_OK ? CTL_OK : ctl_lost(self, result);
+    return (result == IWC_OK) ? CTL_OK : ctl_lost(self, result);
 }
 
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {
     const int code = ctl_exchange(self, request, out_reply);
-    return code == CTL_OK ? ctl_accept(self, out_reply) : code;
+    return (code == CTL_OK) ? ctl_accept(self, out_reply) : code;
 }
 
 int ctl_accept(const ctl_t *self, json_t **reply) {

@@ -19,12 +19,12 @@ void signals_catch(void) {
     sigset_t blocked;
     (void)sigemptyset(&blocked);
     const int caught_signals[] = {SIGINT, SIGTERM, SIGHUP};
-    for (size_t i = 0; i < sizeof(caught_signals) / sizeof(caught_signals[0]); i++) {
+    for (size_t i = 0; i < sizeof caught_signals / sizeof caught_signals[0]; i++) {
         (void)sigaddset(&blocked, caught_signals[i]);
         (void)sigaction(caught_signals[i], &action, NULL);
     }
     (void)sigprocmask(SIG_BLOCK, &blocked, &let_in);
-    for (size_t i = 0; i < sizeof(caught_signals) / sizeof(caught_signals[0]); i++) {
+    for (size_t i = 0; i < sizeof caught_signals / sizeof caught_signals[0]; i++) {
         (void)sigdelset(&let_in, caught_signals[i]);
     }
     catching = true;

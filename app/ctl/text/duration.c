@@ -13,7 +13,7 @@ static const struct {
     const char *name;
     int64_t us;
 } units[] = {{"h", 3600000000}, {"min", 60000000}, {"s", 1000000}, {"ms", 1000}};
-#define UNITS (sizeof(units) / sizeof(units[0]))
+#define UNITS (sizeof units / sizeof units[0])
 
 /// Appends the digits at `*at` to `*number`. False: there are none, or more than `most`.
 static bool take_digits(const char **at, size_t most, int64_t *number) {
@@ -75,8 +75,8 @@ bool duration_option(const char *option, const char *text, duration_range_t rang
         const bool guessed = text != NULL && guess(text, range, meant, sizeof meant);
         (void)snprintf(out_why, DURATION_WHY_SIZE,
                        "%s wants a time with its unit, such as " DURATION_FORM ", not \"%.40s\"%s%s%s%s", option,
-                       text != NULL ? text : "", guessed ? "; write: " : "", guessed ? option : "", guessed ? " " : "",
-                       guessed ? meant : "");
+                       (text != NULL) ? text : "", guessed ? "; write: " : "", guessed ? option : "",
+                       guessed ? " " : "", guessed ? meant : "");
         return false;
     }
     if (us < range.min_us || us > range.max_us) {

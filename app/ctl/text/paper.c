@@ -26,7 +26,7 @@ void paper_say(const paper_t *self, tone_t tone, const char *format, ...) {
     char text[TEXT_MAX];
     va_list list;
     va_start(list, format);
-    (void)vsnprintf(text, sizeof(text), format, list);
+    (void)vsnprintf(text, sizeof text, format, list);
     va_end(list);
     paper_text(self, tone, 0, text);
 }
@@ -43,7 +43,7 @@ void paper_wrap(const paper_t *self, const char *label, tone_t tone, const char 
         if (cut > room) {
             for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
             }
-            cut = cut == 0 ? room : cut;
+            cut = (cut == 0) ? room : cut;
         }
         memcpy(piece, text, cut);
         piece[cut] = '\0';

@@ -67,7 +67,7 @@ unsigned text_live_columns(FILE *out) {
         return 0;
     }
     (void)ioctl(fileno(out), TIOCGWINSZ, &size);
-    return size.ws_col > 1U ? size.ws_col - 1U : 79U;
+    return (size.ws_col > 1U) ? size.ws_col - 1U : 79U;
 }
 
 void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]) {
@@ -84,9 +84,9 @@ void text_decimal(const json_t *value, unsigned digits, const char *unit, char o
     for (unsigned i = 0; i < digits; i++) {
         scale *= 10U;
     }
-    const unsigned long long size = number < 0 ? 0ULL - (unsigned long long)number : (unsigned long long)number;
-    const char *sign = number < 0 ? "-" : "";
-    const char *gap = unit[0] != '\0' ? " " : "";
+    const unsigned long long size = (number < 0) ? 0ULL - (unsigned long long)number : (unsigned long long)number;
+    const char *sign = (number < 0) ? "-" : "";
+    const char *gap = (unit[0] != '\0') ? " " : "";
     if (digits == 0) {
         (void)snprintf(out, TEXT_CELL, "%s%llu%s%s", sign, size, gap, unit);
     } else {
@@ -113,5 +113,5 @@ void text_age(const json_t *age_ms, char out[TEXT_CELL]) {
 
 const char *text_word(const json_t *object, const char *field) {
     const char *word = json_string_value(json_object_get(object, field));
-    return word != NULL ? word : "--";
+    return (word != NULL) ? word : "--";
 }

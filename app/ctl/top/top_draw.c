@@ -26,14 +26,14 @@ static top_tone_t tone_of(const top_model_t *model, const char *state) {
     if (!model->connected || model->stale || strcmp(state, "latched") == 0) {
         return TOP_BAD;
     }
-    return strcmp(state, "listening") == 0 ? TOP_GOOD : TOP_CARE;
+    return (strcmp(state, "listening") == 0) ? TOP_GOOD : TOP_CARE;
 }
 
 /// The one word that matters most, in capitals.
 static void state_word(const top_model_t *model, char out_word[16]) {
     const char *state = text_word(model->state, "state");
     const char *word = !model->connected                           ? "NO GATEWAY"
-                       : model->stale || model->state == NULL      ? "NO ANSWER"
+                       : (model->stale || model->state == NULL)    ? "NO ANSWER"
                        : json_is_true(get(model->state, "arming")) ? "ARMING"
                                                                    : state;
     size_t i = 0;
@@ -48,16 +48,16 @@ static void draw_head(const top_model_t *model) {
     const char *button = text_word(estop, "state");
     const bool released = strcmp(button, "released") == 0;
     char right[96];
-    (void)snprintf(right, sizeof(right), "e-stop %.16s%s ", strcmp(button, "none") == 0 ? "NONE" : button,
+    (void)snprintf(right, sizeof right, "e-stop %.16s%s ", (strcmp(button, "none") == 0) ? "NONE" : button,
                    json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "");
     const int column = COLS - (int)strlen(right);
     const int room = column - 10;
     top_put(model, 0, 0, TOP_TITLE, " iWheel  %.*s",
-            room > 40  ? 40
-            : room > 5 ? room
-                       : 0,
+            (room > 40)  ? 40
+            : (room > 5) ? room
+                         : 0,
             text_word(get(model->state, "bus"), "name"));
-    top_put(model, 0, column > 0 ? column : 0, released ? TOP_GOOD : TOP_BAD, "%s", right);
+    top_put(model, 0, (column > 0) ? column : 0, released ? TOP_GOOD : TOP_BAD, "%s", right);
 }
 
 /// A name of the protocol as words.
@@ -78,14 +78,14 @@ static int draw_reason(const top_model_t *model, int row, int rows, const advice
     top_tone_t tone = TOP_TITLE;
     if (json_is_integer(get(lease, "holder"))) {
         text_integer(get(lease, "remaining_ms"), "ms", left);
-        (void)snprintf(text, sizeof(text), "%.30s drives (pid %lld); its command holds for %s",
-                       text_word(lease, "name"), json_integer_value(get(lease, "pid")), left);
+        (void)snprintf(text, sizeof text, "%.30s drives (pid %lld); its command holds for %s", text_word(lease, "name"),
+                       json_integer_value(get(lease, "pid")), left);
     } else if (cause != NULL) {
         tone = tone_of(model, text_word(model->state, "state"));
-        spell(cause, words, sizeof(words));
-        (void)snprintf(text, sizeof(text), "%s: %s", words, advice->line[0]);
+        spell(cause, words, sizeof words);
+        (void)snprintf(text, sizeof text, "%s: %s", words, advice->line[0]);
     } else {
-        (void)snprintf(text, sizeof(text), "%s", advice->line[0]);
+        (void)snprintf(text, sizeof text, "%s", advice->line[0]);
     }
     return top_put_wrapped(model, row, rows, tone, text);
 }
@@ -97,7 +97,7 @@ static int draw_cause(const top_model_t *model, int row, int rows) {
         return top_put_wrapped(model, row, rows, TOP_TITLE, model->notice);
     }
     advice_collect(model->state, &advice);
-    const int first = rows >= 4 ? rows - 2 : rows >= 3 && COLS < TOP_COLUMNS_WHOLE ? 2 : 1;
+    const int first = (rows >= 4) ? rows - 2 : (rows >= 3 && COLS < TOP_COLUMNS_WHOLE) ? 2 : 1;
     const int used = draw_reason(model, row, first, &advice);
     return used + top_put_wrapped(model, row + used, rows - used, TOP_FAINT, model->last_stop);
 }
@@ -107,9 +107,9 @@ static void draw_keys(const top_model_t *model) {
         top_put(model, LINES - 2, 1, TOP_CARE, "%s", model->notice);
     }
     top_put(model, LINES - 1, 0, TOP_TITLE,
-            COLS >= TOP_COLUMNS_WHOLE ? " SPACE stop   E e-stop   R reset   Q quit"
-            : COLS >= 38              ? " SPACE stop  E e-stop  R reset  Q quit"
-                                      : " SPACE stop  Q quit");
+            (COLS >= TOP_COLUMNS_WHOLE) ? " SPACE stop   E e-stop   R reset   Q quit"
+            : (COLS >= 38)              ? " SPACE stop  E e-stop  R reset  Q quit"
+                                        : " SPACE stop  Q quit");
 }
 
 void top_draw(const top_model_t *model) {
@@ -131,7 +131,7 @@ void top_draw(const top_model_t *model) {
         top_put(model, row++, 1, tone_of(model, state), " %s ", word);
     }
     // Where the lines are short, the rows that the large letters leave are for whole sentences.
-    const int reasons = LINES >= ROWS_FULL ? (big ? 3 : 5) : LINES >= ROWS_BIG ? (big ? 2 : 4) : big ? 1 : 2;
+    const int reasons = (LINES >= ROWS_FULL) ? (big ? 3 : 5) : (LINES >= ROWS_BIG) ? (big ? 2 : 4) : big ? 1 : 2;
     const int used = draw_cause(model, row, reasons);
     row += big ? reasons : used; // Below large letters nothing moves when a sentence is longer.
     if (model->state != NULL && model->connected) {

@@ -51,7 +51,7 @@ void top_history_take(top_history_t *self, int64_t now_us, const json_t *state) 
         }
     }
     for (int i = 0; i < TOP_PLOTS && state != NULL; i++) {
-        const json_t *wheel = json_object_get(state, i % 2 == 0 ? "left" : "right");
+        const json_t *wheel = json_object_get(state, (i % 2 == 0) ? "left" : "right");
         const json_t *value = json_object_get(wheel, fields[i / 2]);
         if (json_is_integer(value) && llabs(json_integer_value(value)) < INT32_MAX) {
             self->value[i][slot % TOP_HISTORY] = (int32_t)json_integer_value(value);
@@ -65,13 +65,13 @@ static int32_t limit_of(const int32_t (*pair)[TOP_HISTORY], int32_t least, bool 
     *out_negative = false;
     for (int i = 0; i < 2 * TOP_HISTORY; i++) {
         const int32_t value = pair[i / TOP_HISTORY][i % TOP_HISTORY];
-        const int64_t size = value == UNKNOWN ? 0 : llabs((long long)value);
-        largest = size > largest ? size : largest;
+        const int64_t size = (value == UNKNOWN) ? 0 : llabs((long long)value);
+        largest = (size > largest) ? size : largest;
         *out_negative = *out_negative || (value != UNKNOWN && value < -least / 20);
     }
     int64_t limit = least;
     for (int step = 0; limit < largest; step++) {
-        limit = step % 3 == 1 ? limit * 5 / 2 : limit * 2; // 1 2 5 10 20 50
+        limit = (step % 3 == 1) ? limit * 5 / 2 : limit * 2; // 1 2 5 10 20 50
     }
     return (int32_t)limit;
 }
@@ -82,7 +82,7 @@ static int dot_row(const plot_t *plot, int32_t value) {
     const int64_t span = (int64_t)plot->high - plot->low;
     const int64_t up = ((int64_t)value - plot->low) * (dots - 1);
     const int row = dots - 1 - (int)((up + span / 2) / span);
-    return row < 0 ? 0 : row >= dots ? dots - 1 : row;
+    return (row < 0) ? 0 : (row >= dots) ? dots - 1 : row;
 }
 
 /// From which dot to which the values of one column of dots reach. False: nothing is known of it.
@@ -93,12 +93,12 @@ static bool reach(const plot_t *plot, int64_t slot, int x, int *out_top, int *ou
     *out_top = INT_MAX;
     *out_bottom = -1;
     // From the value before, so that a jump is a line.
-    for (int i = first > 0 ? first - 1 : 0; i < (last > first ? last : first + 1); i++) {
+    for (int i = (first > 0) ? first - 1 : 0; i < ((last > first) ? last : first + 1); i++) {
         const int32_t value = plot->values[(slot + 1 + i) % TOP_HISTORY];
         if (value != UNKNOWN) {
             const int row = dot_row(plot, value);
-            *out_top = row < *out_top ? row : *out_top;
-            *out_bottom = row > *out_bottom ? row : *out_bottom;
+            *out_top = (row < *out_top) ? row : *out_top;
+            *out_bottom = (row > *out_bottom) ? row : *out_bottom;
         }
     }
     return *out_bottom >= 0;
@@ -113,7 +113,7 @@ static unsigned dot_bit(int x, int y) {
 static size_t put_cell(bool fine, unsigned bits, bool zero, char out[CELL_SIZE]) {
     if (!fine || bits == 0U) {
         const char *empty = !zero ? " " : fine ? "\xC2\xB7" : ".";
-        const char *text = bits != 0U ? "*" : empty;
+        const char *text = (bits != 0U) ? "*" : empty;
         return (size_t)snprintf(out, CELL_SIZE, "%s", text);
     }
     out[0] = (char)0xE2;
@@ -136,7 +136,7 @@ static void draw_row(const top_model_t *model, const plot_t *plot, int cell_row,
             }
             for (int y = 0; y < plot->down; y++) {
                 const int dot = cell_row * plot->down + y;
-                bits |= dot >= top && dot <= bottom ? dot_bit(x, y) : 0U;
+                bits |= (dot >= top && dot <= bottom) ? dot_bit(x, y) : 0U;
             }
         }
         used += put_cell(model->fine_blocks, bits, zero, &text[used]);
@@ -156,7 +156,7 @@ static void draw_plot(const top_model_t *model, int number, const place_t *place
     const int column = place->column;
     const int room = place->columns - LABEL - 1;
     plot_t plot = {.values = model->history->value[number],
-                   .columns = room > COLUMNS_MAX ? COLUMNS_MAX : room,
+                   .columns = (room > COLUMNS_MAX) ? COLUMNS_MAX : room,
                    .rows = place->rows - 2,
                    .across = model->fine_blocks ? 2 : 1,
                    .down = model->fine_blocks ? BRAILLE_DOWN : 1,
@@ -177,7 +177,7 @@ static void draw_plot(const top_model_t *model, int number, const place_t *place
 }
 
 void top_draw_plots(const top_model_t *model, int row, int rows) {
-    const int beside = COLS >= COLUMNS_TWO ? 2 : 1;
+    const int beside = (COLS >= COLUMNS_TWO) ? 2 : 1;
     int plots = TOP_PLOTS;
     while (plots > 0 && rows / (plots / beside) < ROWS_MIN) {
         plots -= 2; // Speed before force.
@@ -186,7 +186,7 @@ void top_draw_plots(const top_model_t *model, int row, int rows) {
         return;
     }
     const int each = rows / (plots / beside);
-    const int height = each > ROWS_MAX ? ROWS_MAX : each;
+    const int height = (each > ROWS_MAX) ? ROWS_MAX : each;
     const int width = COLS / beside;
     for (int i = 0; i < plots; i++) {
         const place_t place = {row + (i / beside) * height, (i % beside) * width, height, width};

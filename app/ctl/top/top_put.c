@@ -34,7 +34,7 @@ static attr_t attributes_of(const top_model_t *model, top_tone_t tone) {
     if (!model->colour || tone == TOP_PLAIN || tone == TOP_TITLE || tone == TOP_FAINT) {
         return plain[tone];
     }
-    return COLOR_PAIR((int)tone) | (tone == TOP_GOOD ? A_NORMAL : A_BOLD);
+    return COLOR_PAIR((int)tone) | ((tone == TOP_GOOD) ? A_NORMAL : A_BOLD);
 }
 
 void top_tone_begin(const top_model_t *model, top_tone_t tone) {
@@ -56,14 +56,14 @@ void top_put(const top_model_t *model, int row, int column, top_tone_t tone, con
         return;
     }
     va_start(arguments, format);
-    (void)vsnprintf(text, sizeof(text), format, arguments);
+    (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
-    text_clean(text, clean, sizeof(clean));
+    text_clean(text, clean, sizeof clean);
     // Cut by characters, not by bytes: continuation bytes of UTF-8 take no column.
     size_t length = 0;
     int columns = 0;
     while (clean[length] != '\0') {
-        columns += ((unsigned char)clean[length] & 0xC0U) != 0x80U ? 1 : 0;
+        columns += (((unsigned char)clean[length] & 0xC0U) != 0x80U) ? 1 : 0;
         if (columns > room) {
             break;
         }
@@ -75,14 +75,14 @@ void top_put(const top_model_t *model, int row, int column, top_tone_t tone, con
 }
 
 int top_put_wrapped(const top_model_t *model, int row, int rows, top_tone_t tone, const char *text) {
-    const size_t room = COLS > 3 ? (size_t)COLS - 2U : 1U;
+    const size_t room = (COLS > 3) ? (size_t)COLS - 2U : 1U;
     int used = 0;
     for (; used < rows && *text != '\0'; used++) {
         size_t cut = strlen(text);
         if (cut > room && used < rows - 1) {
             for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
             }
-            cut = cut == 0 ? room : cut;
+            cut = (cut == 0) ? room : cut;
         }
         top_put(model, row + used, 1, tone, "%.*s", (int)cut, text);
         text += cut;
@@ -92,7 +92,7 @@ int top_put_wrapped(const top_model_t *model, int row, int rows, top_tone_t tone
 }
 
 static const letter_t *find(char letter) {
-    for (size_t i = 0; i < sizeof(letters) / sizeof(letters[0]); i++) {
+    for (size_t i = 0; i < sizeof letters / sizeof letters[0]; i++) {
         if (letters[i].letter == letter) {
             return &letters[i];
         }
@@ -103,7 +103,7 @@ static const letter_t *find(char letter) {
 /// Blanks in reverse are blocks on every terminal.
 void top_put_big(const top_model_t *model, int row, top_tone_t tone, const char *word) {
     int column = 1;
-    (void)attrset((int)(attributes_of(model, tone == TOP_BAD && !model->colour ? TOP_CARE : tone) | A_REVERSE));
+    (void)attrset((int)(attributes_of(model, (tone == TOP_BAD && !model->colour) ? TOP_CARE : tone) | A_REVERSE));
     for (const char *c = word; *c != '\0'; c++, column += LETTER_COLUMNS + 1) {
         const letter_t *letter = find(*c);
         for (int y = 0; letter != NULL && y < LETTER_ROWS; y++) {

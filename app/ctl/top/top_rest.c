@@ -22,7 +22,7 @@ static void draw_bus(const top_model_t *model, int row) {
     const json_t *bus = get(model->state, "bus");
     const char *state = text_word(bus, "state");
     text_decimal(get(bus, "load_permille"), 1, "%", load);
-    const top_tone_t tone = strcmp(state, "active") == 0 ? TOP_PLAIN : TOP_BAD;
+    const top_tone_t tone = (strcmp(state, "active") == 0) ? TOP_PLAIN : TOP_BAD;
     if (is_narrow()) {
         top_put(model, row, 1, tone, "BUS     %s, load %s", state, load);
     } else {
@@ -43,7 +43,7 @@ static const char *height(const top_model_t *model, long long count, long long l
                                          "\xE2\x96\x87",
                                          "\xE2\x96\x88"};
     static const char *const signs[] = {" ", ".", ".", ":", ":", "|", "|", "#", "#"};
-    const long long eighths = largest > 0 && count > 0 ? (count * 8 + largest - 1) / largest : 0;
+    const long long eighths = (largest > 0 && count > 0) ? (count * 8 + largest - 1) / largest : 0;
     return model->fine_blocks ? blocks[eighths] : signs[eighths];
 }
 
@@ -63,7 +63,7 @@ static void draw_gaps(const top_model_t *model, int row) {
     text_decimal(tenths, 1, "ms", worst);
     json_decref(tenths);
     json_array_foreach(counts, i, entry) {
-        largest = json_integer_value(entry) > largest ? json_integer_value(entry) : largest;
+        largest = (json_integer_value(entry) > largest) ? json_integer_value(entry) : largest;
     }
     top_put(model, row, 1, TOP_PLAIN, "GAPS");
     json_array_foreach(counts, i, entry) {
@@ -80,7 +80,7 @@ static void draw_gaps(const top_model_t *model, int row) {
         }
         top_put(model, row, column, bad ? TOP_BAD : TOP_TITLE, "%s%s%s", block, block, block);
         top_put(model, row + 1, column, TOP_FAINT, "%s%lld", last ? ">" : "", limit);
-        column += limit >= 100 || last ? 5 : 4;
+        column += (limit >= 100 || last) ? 5 : 4;
     }
     top_put(model, row, column + 1, TOP_PLAIN, "worst %s", worst);
     if (!is_narrow()) {
@@ -97,21 +97,21 @@ static void draw_ledger(const top_model_t *model, int row) {
     json_object_foreach(json_object_get(model->state, "ledger"), name, entry) {
         const char *state = text_word(entry, "state");
         for (unsigned i = 0; i < 3U; i++) {
-            total[i] += strcmp(state, states[i]) == 0 ? 1U : 0U;
+            total[i] += (strcmp(state, states[i]) == 0) ? 1U : 0U;
         }
         if (strcmp(state, states[2]) == 0) {
             const size_t used = strlen(names);
-            (void)snprintf(&names[used], sizeof(names) - used, " %s", name);
+            (void)snprintf(&names[used], sizeof names - used, " %s", name);
         }
     }
-    const top_tone_t tone = total[2] > 0 ? TOP_BAD : TOP_PLAIN;
+    const top_tone_t tone = (total[2] > 0) ? TOP_BAD : TOP_PLAIN;
     if (is_narrow() && total[2] > 0) {
         top_put(model, row, 1, tone, "LEDGER  %u CONTRADICTED:%s", total[2], names);
     } else if (is_narrow()) {
         top_put(model, row, 1, tone, "LEDGER  %u confirmed, %u assumed", total[0], total[1]);
     } else {
         top_put(model, row, 1, tone, "LEDGER  %u confirmed, %u assumed, %u contradicted%s%s", total[0], total[1],
-                total[2], total[2] > 0 ? ":" : "", names);
+                total[2], (total[2] > 0) ? ":" : "", names);
     }
 }
 
@@ -135,12 +135,13 @@ static int draw_warnings(const top_model_t *model, int row, int rows) {
     if (count == 0 || rows < 1) {
         return 0;
     }
-    (void)snprintf(text, sizeof(text), "%zu warning%s: %s", count, count > 1 ? "s" : "", first != NULL ? first : "--");
+    (void)snprintf(text, sizeof text, "%zu warning%s: %s", count, (count > 1) ? "s" : "",
+                   (first != NULL) ? first : "--");
     if (!is_narrow()) {
         top_put(model, row, 1, TOP_CARE, "%s", text);
         return 1;
     }
-    return top_put_wrapped(model, row, rows > 4 ? 4 : rows, TOP_CARE, text);
+    return top_put_wrapped(model, row, (rows > 4) ? 4 : rows, TOP_CARE, text);
 }
 
 int top_draw_rest(const top_model_t *model, int row, int rows) {
@@ -150,7 +151,7 @@ int top_draw_rest(const top_model_t *model, int row, int rows) {
         int rows;
     } parts[] = {{draw_bus, 1}, {draw_ledger, 1}, {draw_gaps, is_narrow() ? 1 : 2}, {draw_budget, 1}};
     int used = 0;
-    for (size_t i = 0; i < sizeof(parts) / sizeof(parts[0]) && rows - used >= parts[i].rows; i++) {
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0] && rows - used >= parts[i].rows; i++) {
         parts[i].draw(model, row + used);
         used += parts[i].rows;
     }

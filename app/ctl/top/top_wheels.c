@@ -21,11 +21,11 @@ int top_scale(int before_mm_s, const json_t *state) {
     static const char *const fields[] = {"speed_mm_s", "applied_mm_s", "commanded_mm_s"};
     int largest = before_mm_s;
     for (unsigned i = 0; i < 6U; i++) {
-        const json_t *value = get(get(state, i < 3U ? "left" : "right"), fields[i % 3U]);
+        const json_t *value = get(get(state, (i < 3U) ? "left" : "right"), fields[i % 3U]);
         const int speed = json_is_integer(value) ? abs((int)json_integer_value(value)) : 0;
-        largest = speed > largest ? speed : largest;
+        largest = (speed > largest) ? speed : largest;
     }
-    for (size_t i = 0; i < sizeof(steps) / sizeof(steps[0]); i++) {
+    for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
         if (largest <= steps[i]) {
             return steps[i];
         }
@@ -45,7 +45,7 @@ static void draw_bar(const top_model_t *model, int row, top_tone_t tone, const j
     }
     const long long speed = json_is_integer(value) ? json_integer_value(value) : 0;
     long long length = (llabs(speed) * half + model->scale_mm_s / 2) / model->scale_mm_s;
-    length = length > half ? half : length;
+    length = (length > half) ? half : length;
     for (int i = 1; i <= half; i++) {
         const bool left = speed < 0 && i <= length;
         const bool right = speed > 0 && i <= length;
@@ -61,7 +61,7 @@ static void draw_speed(const top_model_t *model, int row, const char *label, top
     top_put(model, row, 1, TOP_TITLE, "%s", label);
     draw_bar(model, row, tone, value);
     const int column = COLS - VALUE_COLUMNS;
-    top_put(model, row, column > LABEL_COLUMNS ? column : LABEL_COLUMNS, TOP_TITLE, "%13s", number);
+    top_put(model, row, (column > LABEL_COLUMNS) ? column : LABEL_COLUMNS, TOP_TITLE, "%13s", number);
 }
 
 /// An integer as fewer decimals than it has: what is read across a room needs no thousandths.
@@ -88,7 +88,7 @@ static int draw_numbers(const top_model_t *model, int row, const json_t *wheel) 
     const bool valid = strcmp(validity, "valid") == 0;
     const top_tone_t tone = valid ? TOP_PLAIN : TOP_CARE;
     char first[2U * TEXT_CELL];
-    (void)snprintf(first, sizeof(first), "force %s%s%.20s", force, valid ? "" : " ", valid ? "" : validity);
+    (void)snprintf(first, sizeof first, "force %s%s%.20s", force, valid ? "" : " ", valid ? "" : validity);
     if (COLS >= TOP_COLUMNS_WHOLE) {
         top_put(model, row, LABEL_COLUMNS, tone, "%s, %s%s, %s, age %s/%s", first, full ? ">= " : "", battery, way,
                 speed_age, force_age);
@@ -100,12 +100,12 @@ static int draw_numbers(const top_model_t *model, int row, const json_t *wheel) 
 }
 
 static int draw_wheel(const top_model_t *model, int row, const char *name, bool brief) {
-    const json_t *wheel = get(model->state, name[0] == 'L' ? "left" : "right");
+    const json_t *wheel = get(model->state, (name[0] == 'L') ? "left" : "right");
     const bool heard = json_is_true(get(wheel, "heard"));
     char told[24];
     char does[24];
-    (void)snprintf(told, sizeof(told), "%-6s told", name);
-    (void)snprintf(does, sizeof(does), "%-6s %s", "", heard ? "does" : "LOST");
+    (void)snprintf(told, sizeof told, "%-6s told", name);
+    (void)snprintf(does, sizeof does, "%-6s %s", "", heard ? "does" : "LOST");
     draw_speed(model, row, told, TOP_CARE, get(wheel, "applied_mm_s"));
     draw_speed(model, row + 1, does, heard ? TOP_GOOD : TOP_BAD, get(wheel, "speed_mm_s"));
     return brief ? 2 : 2 + draw_numbers(model, row + 2, wheel);
@@ -116,7 +116,7 @@ int top_draw_wheels(const top_model_t *model, int row, bool brief) {
     used += draw_wheel(model, row + used, "RIGHT", brief);
     if (!brief && COLS >= TOP_COLUMNS_WHOLE) {
         top_put(model, row + used, LABEL_COLUMNS, TOP_FAINT, "-%d%*s", model->scale_mm_s,
-                ((COLS - LABEL_COLUMNS - VALUE_COLUMNS - 2) | 1) - (model->scale_mm_s >= 1000 ? 5 : 4) - 5, "");
+                ((COLS - LABEL_COLUMNS - VALUE_COLUMNS - 2) | 1) - ((model->scale_mm_s >= 1000) ? 5 : 4) - 5, "");
         top_put(model, row + used, COLS - VALUE_COLUMNS - 6, TOP_FAINT, "%+5d mm/s", model->scale_mm_s);
         used++;
     }

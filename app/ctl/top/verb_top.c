@@ -37,7 +37,7 @@ typedef struct {
 __attribute__((format(printf, 2, 3))) static void notice(top_t *self, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(self->model.notice, sizeof(self->model.notice), format, arguments);
+    (void)vsnprintf(self->model.notice, sizeof self->model.notice, format, arguments);
     va_end(arguments);
     self->notice_until_us = client_now_us() + NOTICE_US;
 }
@@ -63,9 +63,9 @@ static void disconnect(top_t *self, const char *why) {
 
 static void keep_sentence(top_t *self, const json_t *stop) {
     const char *sentence = json_string_value(json_object_get(stop, "sentence"));
-    (void)snprintf(self->model.last_stop, sizeof(self->model.last_stop), "%s%s",
-                   json_integer_value(json_object_get(stop, "number")) > 0 ? "last stop: " : "",
-                   sentence != NULL ? sentence : "");
+    (void)snprintf(self->model.last_stop, sizeof self->model.last_stop, "%s%s",
+                   (json_integer_value(json_object_get(stop, "number")) > 0) ? "last stop: " : "",
+                   (sentence != NULL) ? sentence : "");
     // What to do about a latch stands in the line above it, and two lines hold no more than the rest.
     char *const cure = strrchr(self->model.last_stop, ';');
     if (cure != NULL && json_is_true(json_object_get(stop, "latched"))) {
@@ -237,13 +237,13 @@ int verb_top(ctl_t *self, int count, char **words) {
             CTL_USAGE,
             "nothing can be drawn on this terminal (TERM=%s); without drawing: iwheelctl status, or iwheelctl watch; "
             "if it can more than it says: TERM=vt100 iwheelctl top",
-            getenv("TERM") != NULL ? getenv("TERM") : "");
+            (getenv("TERM") != NULL) ? getenv("TERM") : "");
     }
     signals_catch();
     prepare_terminal(&top.model);
     do {
         top_history_take(&top.history, client_now_us(),
-                         top.model.connected && !top.model.stale ? top.model.state : NULL);
+                         (top.model.connected && !top.model.stale) ? top.model.state : NULL);
         top_draw(&top.model);
         (void)refresh();
     } while (wait_and_take(&top));

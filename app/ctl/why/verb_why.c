@@ -22,7 +22,7 @@ typedef struct {
 
 static int parse_frames(const char *text, size_t *out) {
     char *end = NULL;
-    const unsigned long number = text != NULL && text[0] >= '0' && text[0] <= '9' ? strtoul(text, &end, 10) : 0UL;
+    const unsigned long number = (text != NULL && text[0] >= '0' && text[0] <= '9') ? strtoul(text, &end, 10) : 0UL;
     if (end == NULL || *end != '\0' || number > WHY_FRAMES_MAX) {
         return ctl_fail(CTL_USAGE, "--frames wants a number of frames before and after the stop, 0 to %u",
                         WHY_FRAMES_MAX);
@@ -38,7 +38,7 @@ static bool names_recording(const char *word) {
 
 static int parse(words_t *self, int count, char **words) {
     for (int i = 0; i < count; i++) {
-        const char *next = i + 1 < count ? words[i + 1] : NULL;
+        const char *next = (i + 1 < count) ? words[i + 1] : NULL;
         int code = CTL_OK;
         if (strcmp(words[i], "--list") == 0) {
             self->list = true;
@@ -47,7 +47,7 @@ static int parse(words_t *self, int count, char **words) {
             i++;
         } else if (strcmp(words[i], "--directory") == 0) {
             self->directory = next;
-            code = next != NULL ? CTL_OK : ctl_fail(CTL_USAGE, "--directory wants the directory of the recordings");
+            code = (next != NULL) ? CTL_OK : ctl_fail(CTL_USAGE, "--directory wants the directory of the recordings");
             i++;
         } else if (!names_recording(words[i]) || self->name != NULL) {
             code = ctl_fail(CTL_USAGE, "why does not understand \"%s\"; see: iwheelctl why --help", words[i]);
@@ -104,9 +104,9 @@ static const char *find_directory(ctl_t *self, const words_t *words, json_t **ou
     near_gateway_t gateway = {0};
     near_look(self, NULL, &gateway);
     json_decref(gateway.status);
-    *out_owner = gateway.result == NEAR_FOUND ? near_ask(self, json_pack("{s:s}", "cmd", "why")) : NULL;
+    *out_owner = (gateway.result == NEAR_FOUND) ? near_ask(self, json_pack("{s:s}", "cmd", "why")) : NULL;
     const char *told = json_string_value(json_object_get(*out_owner, "directory"));
-    return told != NULL ? told : WHY_DISK_DIRECTORY;
+    return (told != NULL) ? told : WHY_DISK_DIRECTORY;
 }
 
 int verb_why(ctl_t *self, int count, char **words) {

@@ -50,7 +50,7 @@ static void print_line(const char *name, const json_t *why) {
     }
     const unsigned long number = strtoul(name + sizeof PREFIX - 1U, NULL, 10);
     (void)printf("%6lu  %s  ", number, wall);
-    text_safe(sentence != NULL ? sentence : "-- (the recording is cut)", stdout);
+    text_safe((sentence != NULL) ? sentence : "-- (the recording is cut)", stdout);
     (void)putchar('\n');
 }
 
@@ -85,9 +85,9 @@ int why_disk_list(const char *directory, bool json) {
     }
     free((void *)names);
     if (!json) {
-        (void)fputs(count > 0 ? "\n" : "", stdout);
-        text_line(stdout, "%d stop%s recorded in %s%s", count, count == 1 ? "" : "s", directory,
-                  count > 0 ? "; one of them with its frames: iwheelctl why NUMBER" : "");
+        (void)fputs((count > 0) ? "\n" : "", stdout);
+        text_line(stdout, "%d stop%s recorded in %s%s", count, (count == 1) ? "" : "s", directory,
+                  (count > 0) ? "; one of them with its frames: iwheelctl why NUMBER" : "");
     }
     return CTL_OK;
 }
@@ -133,7 +133,7 @@ static int print_frames(const char *path, int64_t stop_us, size_t most) {
             kept++;
             continue;
         }
-        for (size_t i = kept > most ? kept - most : 0U; after == 0U && i < kept; i++) {
+        for (size_t i = (kept > most) ? kept - most : 0U; after == 0U && i < kept; i++) {
             why_print_frame(&before[i % most], before[i % most].time_us - stop_us);
         }
         if (after == 0U) {
@@ -142,7 +142,7 @@ static int print_frames(const char *path, int64_t stop_us, size_t most) {
         why_print_frame(&frame, frame.time_us - stop_us);
         after++;
     }
-    for (size_t i = kept > most ? kept - most : 0U; after == 0U && i < kept; i++) {
+    for (size_t i = (kept > most) ? kept - most : 0U; after == 0U && i < kept; i++) {
         why_print_frame(&before[i % most], before[i % most].time_us - stop_us);
     }
     return recording_close(&recording);
@@ -155,7 +155,7 @@ int why_disk_show(const char *directory, const char *name, size_t frames, bool j
         return ctl_fail(CTL_DATA, "no stop %s is recorded in %s; see: iwheelctl why --list", name, directory);
     }
     if (!events_open(&events, path)) {
-        return errno == EPROTO ? CTL_DATA : ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
+        return (errno == EPROTO) ? CTL_DATA : ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
     }
     int code = CTL_OK;
     const int64_t stop_us = json_integer_value(json_object_get(events.why, "at_us")) +
@@ -166,7 +166,7 @@ int why_disk_show(const char *directory, const char *name, size_t frames, bool j
         path[strlen(path) - (sizeof EVENTS - 1U)] = '\0';
         (void)snprintf(path + strlen(path), sizeof EVENTS, FRAMES);
         text_line(stdout, "recorded in %s; decide it again: iwheelctl replay %s", path, path);
-        code = frames > 0U ? print_frames(path, stop_us, frames) : CTL_OK;
+        code = (frames > 0U) ? print_frames(path, stop_us, frames) : CTL_OK;
     }
     events_close(&events);
     return code;

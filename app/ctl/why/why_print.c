@@ -18,7 +18,7 @@ static void print_when(const json_t *why) {
     if (json_is_integer(wall_us)) {
         const time_t seconds = (time_t)(json_integer_value(wall_us) / 1000000);
         if (localtime_r(&seconds, &local) != NULL) {
-            (void)strftime(wall, sizeof(wall), "%Y-%m-%d %H:%M:%S", &local);
+            (void)strftime(wall, sizeof wall, "%Y-%m-%d %H:%M:%S", &local);
         }
     }
     (void)printf("at %s", wall);
@@ -49,10 +49,10 @@ void why_print_frame(const candump_t *frame, int64_t since_us) {
     decoded_t decoded;
     iw_config_t config;
     const iw_can_frame_t core = candump_to_core(frame);
-    const int64_t size_us = since_us < 0 ? -since_us : since_us;
+    const int64_t size_us = (since_us < 0) ? -since_us : since_us;
     iw_config_default(&config);
     decode_fields(&core, &config, &decoded);
-    (void)snprintf(since, sizeof since, "%c%" PRId64 ".%01" PRId64 " ms", since_us < 0 ? '-' : '+', size_us / 1000,
+    (void)snprintf(since, sizeof since, "%c%" PRId64 ".%01" PRId64 " ms", (since_us < 0) ? '-' : '+', size_us / 1000,
                    size_us % 1000 / 100);
     frame_print(since, frame, &decoded);
 }
@@ -76,7 +76,7 @@ void why_print_told(const json_t *why, size_t most) {
         return;
     }
     (void)putchar('\n');
-    for (size_t i = count > most ? count - most : 0U; i < count; i++) {
+    for (size_t i = (count > most) ? count - most : 0U; i < count; i++) {
         print_told(json_array_get(before, i), stop_us);
     }
     why_print_moment();

@@ -24,7 +24,7 @@ static void write_id(iwn_out_t *json, const iwn_id_t *id) {
     if (id->kind == IWN_ID_NUMBER) {
         iwn_out_int(json, "id", id->number);
     } else {
-        iwn_out_text(json, "id", id->kind == IWN_ID_TEXT ? id->text : NULL);
+        iwn_out_text(json, "id", (id->kind == IWN_ID_TEXT) ? id->text : NULL);
     }
 }
 
@@ -98,7 +98,7 @@ static void do_watch(const call_t *call) {
     client->next_us = call->daemon->now_us;
     iwn_out_t json = begin_reply(call->daemon, &call->request->id);
     iwn_out_open(&json, "topics", '[');
-    for (unsigned topic = 0; topic < IWN_TOPICS; ++topic) {
+    for (unsigned topic = 0; topic < IWN_TOPICS; topic++) {
         if ((client->topics & (1U << topic)) != 0U) {
             iwn_out_text(&json, NULL, iwn_topic_name((iwn_topic_t)topic));
         }
@@ -118,7 +118,7 @@ static void reply_armed(gw_daemon_t *daemon, const iw_snapshot_t *seen, gw_clien
     iwn_out_int(&json, "stop_budget_ms", budget.client_lost_ms);
     iwn_out_int(&json, "stop_budget_mm", budget.client_lost_mm);
     iwn_out_open(&json, "warnings", '[');
-    for (uint32_t i = 0; i < daemon->warnings; ++i) {
+    for (uint32_t i = 0; i < daemon->warnings; i++) {
         iwn_out_text(&json, NULL, daemon->warning[i]);
     }
     iwn_out_close(&json, ']');
@@ -140,7 +140,7 @@ static void do_arm(const call_t *call) {
         return;
     }
     if (call->request->name[0] != '\0') {
-        (void)memcpy(client->name, call->request->name, sizeof client->name);
+        memcpy(client->name, call->request->name, sizeof client->name);
     }
     client->arming = true;
     client->arm_id = call->request->id;
@@ -149,7 +149,7 @@ static void do_arm(const call_t *call) {
 
 void gw_dispatch_arming(gw_daemon_t *daemon) {
     const iw_snapshot_t seen = gw_daemon_look(daemon);
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         gw_client_t *client = &daemon->client[i];
         const bool holds = seen.holder == client->id;
         if (client->id == IW_CLIENT_NONE || !client->arming || (holds && seen.arming)) {
@@ -164,14 +164,14 @@ void gw_dispatch_arming(gw_daemon_t *daemon) {
         const iwn_request_t request = {.cmd = IWN_CMD_ARM};
         const iw_refusal_t refusal = seen.arm_refusal;
         iwn_refusal_t words;
-        gw_refuse_describe(daemon, &request, refusal == IW_REFUSE_NONE ? IW_REFUSE_NOT_ARMED : refusal, &words);
+        gw_refuse_describe(daemon, &request, (refusal == IW_REFUSE_NONE) ? IW_REFUSE_NOT_ARMED : refusal, &words);
         send_refusal(daemon, client, &client->arm_id, &words);
     }
 }
 
 /// A number too large for the core is too large for the wheels: the core refuses it by its range.
 static int32_t saturate(int64_t value) {
-    return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
+    return (value > INT32_MAX) ? INT32_MAX : (value < INT32_MIN) ? INT32_MIN : (int32_t)value;
 }
 
 static iw_refusal_t judge_drive(const call_t *call, const iw_drive_t *wanted, iw_applied_t *out_applied) {
@@ -227,8 +227,8 @@ static void do_twist(const call_t *call) {
     const int64_t limit = 1000000; // Far outside, and no product of it overflows.
     const int64_t v = call->request->v_mm_s;
     const int64_t yaw = call->request->yaw_mrad_s;
-    const int64_t v_mm_s = v > limit ? limit : v < -limit ? -limit : v;
-    const int64_t yaw_mrad_s = yaw > limit ? limit : yaw < -limit ? -limit : yaw;
+    const int64_t v_mm_s = (v > limit) ? limit : (v < -limit) ? -limit : v;
+    const int64_t yaw_mrad_s = (yaw > limit) ? limit : (yaw < -limit) ? -limit : yaw;
     if (yaw != 0 && gw_daemon_look(call->daemon).assumed[IW_LEDGER_TRACK].state == IW_LEDGER_CONTRADICTED) {
         refuse_turn(call);
         return;
@@ -248,7 +248,7 @@ static void do_stop(const call_t *call) {
 static void do_estop(const call_t *call) {
     gw_daemon_t *daemon = call->daemon;
     if (iw_gateway_state(&daemon->gateway) != IW_STATE_LATCHED) {
-        (void)memcpy(daemon->estop_reason, call->request->reason, sizeof daemon->estop_reason);
+        memcpy(daemon->estop_reason, call->request->reason, sizeof daemon->estop_reason);
     }
     iw_gateway_estop(&daemon->gateway, daemon->now_us, call->client->id);
     note(call, &(blackbox_entry_t){.kind = BLACKBOX_ESTOPPED});
@@ -303,10 +303,10 @@ static void do_tare(const call_t *call) {
     }
     iwn_out_t json = begin_reply(daemon, &call->request->id);
     iwn_out_text(&json, "state", iwn_state_name(seen.state));
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         if ((call->request->sides & (1U << side)) != 0U) {
             note(call, &(blackbox_entry_t){.kind = BLACKBOX_TARE, .a = (uint8_t)side, .b = (uint8_t)result});
-            iwn_out_open(&json, side == IW_LEFT ? "left" : "right", '{');
+            iwn_out_open(&json, (side == IW_LEFT) ? "left" : "right", '{');
             write_tare(seen.wheel[side].force, &daemon->knowledge.tare[side], &before[side], &json);
             iwn_out_close(&json, '}');
         }
@@ -327,8 +327,8 @@ static void do_confirm(const call_t *call) {
     const char *name = iwn_ledger_item_name(request->item);
     iwn_refusal_t words;
     gw_word_t word;
-    (void)memcpy(word.found, request->value, sizeof word.found);
-    (void)memcpy(word.how, request->how, sizeof word.how);
+    memcpy(word.found, request->value, sizeof word.found);
+    memcpy(word.how, request->how, sizeof word.how);
     switch (gw_knowledge_confirm(call->daemon, request->item, &word)) {
     case GW_FOUND_SAME:
     case GW_FOUND_DIFFERENT:

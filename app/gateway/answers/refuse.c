@@ -19,7 +19,7 @@ typedef struct {
 #define SAY(self, ...) (void)snprintf((self)->text, (self)->size, __VA_ARGS__)
 
 static uint64_t ms_since(const gw_daemon_t *daemon, iw_time_us_t then_us) {
-    return then_us < daemon->now_us ? (daemon->now_us - then_us) / IW_US_PER_MS : 0U;
+    return (then_us < daemon->now_us) ? (daemon->now_us - then_us) / IW_US_PER_MS : 0U;
 }
 
 static void name_client(gw_daemon_t *daemon, iw_client_t id, char *out_text, size_t size) {
@@ -35,8 +35,9 @@ static void say_holder(const wording_t *self) {
     const iw_snapshot_t *seen = &self->seen;
     char holder[GW_CLIENT_TEXT_SIZE];
     name_client(self->daemon, seen->holder, holder, sizeof holder);
-    const uint64_t left_ms =
-        seen->arming || seen->lease_until_us <= seen->at_us ? 0U : (seen->lease_until_us - seen->at_us) / IW_US_PER_MS;
+    const uint64_t left_ms = (seen->arming || seen->lease_until_us <= seen->at_us)
+                                 ? 0U
+                                 : (seen->lease_until_us - seen->at_us) / IW_US_PER_MS;
     SAY(self,
         "%s holds the lease for another %" PRIu64
         " ms at least; let it stop first, or, with the wheels at rest, arm with takeover",
@@ -70,14 +71,14 @@ static void say_estop(const wording_t *self) {
 static void say_lost(const wording_t *self) {
     const gw_daemon_t *daemon = self->daemon;
     size_t length = 0;
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         const iw_snapshot_wheel_t *wheel = &self->seen.wheel[side];
         if (wheel->heard || length >= self->size) {
             continue;
         }
         char *end = &self->text[length];
         const size_t room = self->size - length;
-        const char *name = side == IW_LEFT ? "left" : "right";
+        const char *name = (side == IW_LEFT) ? "left" : "right";
         if (wheel->speed_us == IW_NEVER) {
             (void)snprintf(end, room, "the %s wheel was never heard; ", name);
         } else {
@@ -138,7 +139,7 @@ static void say_second_master(const wording_t *self) {
 
 static void say_present(const wording_t *self) {
     const uint32_t present = self->seen.present;
-    for (unsigned cause = 0; cause < IW_CAUSES; ++cause) {
+    for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if ((present & (1U << cause)) != 0U) {
             SAY(self, "%s was seen %" PRIu64 " ms ago; %s, and wait a second", iwn_cause_name((iw_cause_t)cause),
                 ms_since(self->daemon, self->seen.seen_us[cause]), iwn_why_cure((iw_cause_t)cause));
@@ -168,7 +169,7 @@ static void say_type(const wording_t *self) {
     SAY(self,
         "%s%s%s not configured, and the wheels' document leaves %s open; set %s under [wheels] in the configuration",
         config->setpoint_type_set ? "" : "setpoint_type", both ? " and " : "",
-        config->current_role == IW_ROLE_UNSET ? "current_role" : "", both ? "them" : "it", both ? "them" : "it");
+        (config->current_role == IW_ROLE_UNSET) ? "current_role" : "", both ? "them" : "it", both ? "them" : "it");
 }
 
 static void say_latched(const wording_t *self) {
@@ -181,11 +182,11 @@ static void say_bus_down(const wording_t *self) {
     const bool local = iw_linux_hal_link(&daemon->hal)->presence == IW_LINK_LOCAL;
     const bool off = self->seen.bus == IW_BUS_OFF;
     SAY(self, "bus %s is %s; %s%s", bus, iwn_bus_state_name(self->seen.bus),
-        local && off ? "end it in the simulator: iwheel-sim busoff off"
-        : local      ? "start the simulator: iwheel-sim --can "
-        : off        ? "check cable, termination and bit rate; what else: iwheelctl doctor "
-                     : "bring it up; how: iwheelctl doctor ",
-        local && off ? "" : bus);
+        (local && off) ? "end it in the simulator: iwheel-sim busoff off"
+        : local        ? "start the simulator: iwheel-sim --can "
+        : off          ? "check cable, termination and bit rate; what else: iwheelctl doctor "
+                       : "bring it up; how: iwheelctl doctor ",
+        (local && off) ? "" : bus);
 }
 
 static void say_timing(const wording_t *self) {
@@ -196,7 +197,7 @@ static void say_timing(const wording_t *self) {
 
 static void say_missing(const wording_t *self) {
     SAY(self, "%s needs currents because current_role is setpoint: use drive with left_mA and right_mA",
-        self->request->cmd == IWN_CMD_TWIST ? "twist" : "drive");
+        (self->request->cmd == IWN_CMD_TWIST) ? "twist" : "drive");
 }
 
 static void say_blocked(const wording_t *self) {
@@ -264,8 +265,8 @@ void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *ou
         [IW_TARE_SATURATED] = {IWN_DENIED, "shows a force at the end of its range; check the sensor"},
     };
     const size_t known = sizeof reasons / sizeof reasons[0];
-    out_refusal->error = (size_t)result < known ? reasons[result].error : IWN_INTERNAL;
+    out_refusal->error = ((size_t)result < known) ? reasons[result].error : IWN_INTERNAL;
     (void)snprintf(out_refusal->message, sizeof out_refusal->message, "the %s wheel %s; nothing was changed",
-                   side == IW_LEFT ? "left" : "right",
-                   (size_t)result < known ? reasons[result].why : "cannot be tared");
+                   (side == IW_LEFT) ? "left" : "right",
+                   ((size_t)result < known) ? reasons[result].why : "cannot be tared");
 }

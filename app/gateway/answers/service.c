@@ -22,7 +22,7 @@ static void welcome(gw_daemon_t *daemon, gw_client_t *client, int fd) {
         (void)close(fd);
         return;
     }
-    (void)memset(client, 0, offsetof(gw_client_t, in));
+    memset(client, 0, offsetof(gw_client_t, in));
     client->id = ++daemon->last_client;
     client->fd = fd;
     client->pid = (int)peer.pid;
@@ -30,7 +30,7 @@ static void welcome(gw_daemon_t *daemon, gw_client_t *client, int fd) {
     client->rate_hz = IWN_RATE_DEFAULT_HZ;
     client->drained = true;
     client->caught_up_us = daemon->now_us;
-    ++daemon->clients;
+    daemon->clients++;
     gw_log(&daemon->log, GW_LOG_DEBUG, "client %u (pid %d) connected", (unsigned)client->id, client->pid);
     gw_observe_hello(daemon, client);
 }
@@ -49,7 +49,7 @@ static void turn_away(gw_daemon_t *daemon, int fd) {
 }
 
 static gw_client_t *free_slot(gw_daemon_t *daemon) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX && daemon->clients < daemon->config.northbound.max_clients; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX && daemon->clients < daemon->config.northbound.max_clients; i++) {
         if (daemon->client[i].id == IW_CLIENT_NONE) {
             return &daemon->client[i];
         }
@@ -64,10 +64,10 @@ static void listen_to_newcomers(gw_daemon_t *daemon, bool wanted) {
 }
 
 void gw_service_accept(gw_daemon_t *daemon) {
-    for (unsigned i = 0; i < GW_ACCEPTS_PER_CYCLE; ++i) {
+    for (unsigned i = 0; i < GW_ACCEPTS_PER_CYCLE; i++) {
         int fd;
         const gw_accept_t result = gw_listener_accept(&daemon->listener, &fd);
-        gw_client_t *client = result == GW_ACCEPT_ONE ? free_slot(daemon) : NULL;
+        gw_client_t *client = (result == GW_ACCEPT_ONE) ? free_slot(daemon) : NULL;
         if (result == GW_ACCEPT_NONE) {
             return;
         }
@@ -103,7 +103,7 @@ static void release(gw_daemon_t *daemon, gw_client_t *client) {
     (void)close(client->fd);
     client->id = IW_CLIENT_NONE;
     client->topics = 0;
-    --daemon->clients;
+    daemon->clients--;
 }
 
 static void refuse_long_line(gw_daemon_t *daemon, gw_client_t *client) {
@@ -117,7 +117,7 @@ static void refuse_long_line(gw_daemon_t *daemon, gw_client_t *client) {
 }
 
 static void carry_out_lines(gw_daemon_t *daemon, gw_client_t *client) {
-    for (unsigned i = 0; i < GW_LINES_PER_CYCLE && !client->arming && !client->closing && !client->failed; ++i) {
+    for (unsigned i = 0; i < GW_LINES_PER_CYCLE && !client->arming && !client->closing && !client->failed; i++) {
         size_t length;
         const char *line = gw_client_line(client, &length);
         if (line == NULL) {
@@ -168,10 +168,10 @@ static bool go_round(gw_daemon_t *daemon, service_t service, uint32_t *next) {
     if (holder != NULL) {
         (void)service(daemon, holder);
     }
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         gw_client_t *client = &daemon->client[(first + i) % GW_CLIENTS_MAX];
         const iw_time_us_t now_us = worked ? iw_clock_now_us() : 0U;
-        end_us = end_us == 0U && worked ? now_us + GW_ROUND_US : end_us;
+        end_us = (end_us == 0U && worked) ? now_us + GW_ROUND_US : end_us;
         if (worked && now_us >= end_us) {
             *next = (first + i) % GW_CLIENTS_MAX;
             return false;
@@ -191,7 +191,7 @@ static bool serve_if_wanted(gw_daemon_t *daemon, gw_client_t *client) {
 
 void gw_service_clients(gw_daemon_t *daemon) {
     daemon->clients_waiting = !go_round(daemon, serve_if_wanted, &daemon->next_served);
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         gw_client_t *client = &daemon->client[i];
         if (client->id != IW_CLIENT_NONE && !client->readable) {
             gw_client_note_caught_up(client, daemon->woken_us);
@@ -237,7 +237,7 @@ void gw_service_flush(gw_daemon_t *daemon) {
 }
 
 bool gw_service_is_busy(const gw_daemon_t *daemon) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         if (daemon->client[i].id != IW_CLIENT_NONE && has_line(&daemon->client[i])) {
             return true;
         }
@@ -246,8 +246,8 @@ bool gw_service_is_busy(const gw_daemon_t *daemon) {
 }
 
 iw_time_us_t gw_service_next_us(const gw_daemon_t *daemon) {
-    iw_time_us_t next_us = daemon->listen_from_us != 0U ? daemon->listen_from_us : IW_NEVER;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    iw_time_us_t next_us = (daemon->listen_from_us != 0U) ? daemon->listen_from_us : IW_NEVER;
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         const gw_client_t *client = &daemon->client[i];
         if (client->id != IW_CLIENT_NONE && client->closing && client->close_us < next_us) {
             next_us = client->close_us;
@@ -257,7 +257,7 @@ iw_time_us_t gw_service_next_us(const gw_daemon_t *daemon) {
 }
 
 void gw_service_close_all(gw_daemon_t *daemon) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         if (daemon->client[i].id != IW_CLIENT_NONE) {
             release(daemon, &daemon->client[i]);
         }

@@ -36,7 +36,7 @@ static uint32_t number_of(const char *name) {
     }
     char *end;
     const unsigned long number = strtoul(name + prefix, &end, 10);
-    return *end == '-' && number < UINT32_MAX ? (uint32_t)number : 0U;
+    return (*end == '-' && number < UINT32_MAX) ? (uint32_t)number : 0U;
 }
 
 static bool is_event_file(const char *name) {
@@ -50,8 +50,8 @@ static void count_file(int directory, const char *name, survey_t *survey) {
     if (number == 0U || fstatat(directory, name, &status, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(status.st_mode)) {
         return;
     }
-    survey->oldest = survey->oldest == 0U || number < survey->oldest ? number : survey->oldest;
-    survey->newest = number > survey->newest ? number : survey->newest;
+    survey->oldest = (survey->oldest == 0U || number < survey->oldest) ? number : survey->oldest;
+    survey->newest = (number > survey->newest) ? number : survey->newest;
     survey->recordings += is_event_file(name) ? 1U : 0U;
     survey->bytes += (uint64_t)status.st_size;
 }
@@ -59,7 +59,7 @@ static void count_file(int directory, const char *name, survey_t *survey) {
 /// Calls for each file; a directory that cannot be read has none.
 static void visit(int directory, void (*take)(int directory, const char *name, void *context), void *context) {
     const int fd = openat(directory, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    DIR *list = fd >= 0 ? fdopendir(fd) : NULL;
+    DIR *list = (fd >= 0) ? fdopendir(fd) : NULL;
     if (list == NULL) {
         if (fd >= 0) {
             (void)close(fd);
@@ -125,5 +125,5 @@ FILE *gw_box_files_create(int directory, const char *stem, const char *ending) {
     if (fd >= 0) {
         (void)fchmod(fd, 0644); // Whoever may enter the directory may read it, whatever the service's umask.
     }
-    return fd >= 0 ? fdopen(fd, "w") : NULL;
+    return (fd >= 0) ? fdopen(fd, "w") : NULL;
 }

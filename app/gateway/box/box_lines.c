@@ -36,12 +36,12 @@ size_t gw_box_line_stop(const gw_box_order_t *order, char out_line[GW_BOX_LINE_S
     iwn_out_t json = begin(out_line, "why");
     iwn_out_int(&json, "number", stop->number);
     iwn_out_text(&json, "cause", order->cause);
-    iwn_out_text(&json, "side", order->side[0] != '\0' ? order->side : NULL);
+    iwn_out_text(&json, "side", (order->side[0] != '\0') ? order->side : NULL);
     iwn_out_int(&json, "detail", stop->detail);
     iwn_out_text(&json, "from", order->from);
     iwn_out_bool(&json, "latched", stop->latched);
     iwn_out_known(&json, "client", stop->client != IW_CLIENT_NONE, stop->client);
-    iwn_out_text(&json, "client_name", order->note.client_name[0] != '\0' ? order->note.client_name : NULL);
+    iwn_out_text(&json, "client_name", (order->note.client_name[0] != '\0') ? order->note.client_name : NULL);
     iwn_out_int(&json, "applied_left_mm_s", stop->applied.wheel[IW_LEFT].speed_mm_s);
     iwn_out_int(&json, "applied_right_mm_s", stop->applied.wheel[IW_RIGHT].speed_mm_s);
     iwn_out_int(&json, "at_us", (int64_t)stop->at_us);
@@ -52,7 +52,7 @@ size_t gw_box_line_stop(const gw_box_order_t *order, char out_line[GW_BOX_LINE_S
 
 static void put_refusal(iwn_out_t *json, uint8_t refusal) {
     iwn_out_text(json, "refused",
-                 refusal == (uint8_t)IW_REFUSE_NONE ? NULL : iwn_error_name(iwn_error_of((iw_refusal_t)refusal)));
+                 (refusal == (uint8_t)IW_REFUSE_NONE) ? NULL : iwn_error_name(iwn_error_of((iw_refusal_t)refusal)));
 }
 
 static void put_drive(iwn_out_t *json, const blackbox_entry_t *entry) {
@@ -128,7 +128,7 @@ static void put_request(iwn_out_t *json, const blackbox_entry_t *entry) {
         iwn_out_int(json, "figure", entry->as.value);
         break;
     case BLACKBOX_TARE:
-        iwn_out_text(json, "side", entry->a == (uint8_t)IW_LEFT ? "left" : "right");
+        iwn_out_text(json, "side", (entry->a == (uint8_t)IW_LEFT) ? "left" : "right");
         iwn_out_bool(json, "done", entry->b == (uint8_t)IW_TARE_OK);
         break;
     default:

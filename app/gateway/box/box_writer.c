@@ -67,7 +67,7 @@ static void write_entry(writer_t *self, const blackbox_entry_t *entry) {
         return;
     }
     iw_can_frame_t frame = {.id = entry->number, .dlc = entry->a, .kind = entry->b};
-    (void)memcpy(frame.data, entry->as.data, sizeof frame.data);
+    memcpy(frame.data, entry->as.data, sizeof frame.data);
     const candump_t out = candump_from_core(&frame, (int64_t)entry->at_us + self->order->wall_minus_us, self->bus);
     put_line(self->frames_file, line, candump_write(&out, line));
     self->frames++;
@@ -120,7 +120,7 @@ static void follow(writer_t *self) {
 
 /// 0 or an errno. Closes the file.
 static int finish_file(FILE *file) {
-    int error = ferror(file) != 0 ? EIO : 0;
+    int error = (ferror(file) != 0) ? EIO : 0;
     if (fflush(file) != 0 || fsync(fileno(file)) != 0) {
         error = errno;
     }
@@ -132,7 +132,7 @@ static int finish_file(FILE *file) {
 
 /// Flushes both; the errno of what did not work, as early as possible.
 static int flush(writer_t *self) {
-    return fflush(self->frames_file) != 0 || fflush(self->events_file) != 0 ? errno : 0;
+    return (fflush(self->frames_file) != 0 || fflush(self->events_file) != 0) ? errno : 0;
 }
 
 static int write_config(writer_t *self, int directory, const char *stem) {
@@ -148,7 +148,7 @@ static int fill_files(writer_t *self) {
     char line[GW_BOX_LINE_SIZE];
     const iw_stop_t *stop = &self->order->note.stop;
     const iw_time_us_t length_us = (iw_time_us_t)self->config->record.blackbox_s * 1000000U;
-    const iw_time_us_t since_us = stop->at_us > length_us ? stop->at_us - length_us : 1U;
+    const iw_time_us_t since_us = (stop->at_us > length_us) ? stop->at_us - length_us : 1U;
     const iw_time_us_t begin_us = begin_of(self, since_us);
     const bool from_start = blackbox_ring_written(self->ring) < self->ring->capacity && begin_us <= self->copy[0].at_us;
     self->next = 0;
@@ -176,17 +176,17 @@ static int write_files(writer_t *self, int directory, uint32_t number) {
     if (error == EEXIST) {
         return error; // Somebody else's: the gateway before us may still be writing its last.
     }
-    self->frames_file = error == 0 ? gw_box_files_create(directory, stem, ".log") : NULL;
-    self->events_file = self->frames_file != NULL ? gw_box_files_create(directory, stem, ".jsonl") : NULL;
-    error = error == 0 && self->events_file == NULL ? errno : error;
+    self->frames_file = (error == 0) ? gw_box_files_create(directory, stem, ".log") : NULL;
+    self->events_file = (self->frames_file != NULL) ? gw_box_files_create(directory, stem, ".jsonl") : NULL;
+    error = (error == 0 && self->events_file == NULL) ? errno : error;
     if (self->events_file != NULL) {
         error = fill_files(self);
         const int events_error = finish_file(self->events_file);
-        error = error != 0 ? error : events_error;
+        error = (error != 0) ? error : events_error;
     }
     if (self->frames_file != NULL) {
         const int frames_error = finish_file(self->frames_file);
-        error = error != 0 ? error : frames_error;
+        error = (error != 0) ? error : frames_error;
     }
     if (error != 0) {
         gw_box_files_remove(directory, number);
@@ -226,7 +226,7 @@ static void carry_out(writer_t *self, const gw_box_order_t *order) {
 /// Said at once, not when the first stop is lost.
 static void try_directory(writer_t *self) {
     const int directory = gw_box_files_open(self->config->record.directory);
-    self->result = (gw_box_result_t){.error = directory < 0 ? errno : 0};
+    self->result = (gw_box_result_t){.error = (directory < 0) ? errno : 0};
     if (directory >= 0 && faccessat(directory, ".", W_OK, AT_EACCESS) != 0) {
         self->result.error = errno;
     }
@@ -245,7 +245,7 @@ static void find_last_setpoints(writer_t *self, uint64_t written, iw_pair_t *out
     for (size_t i = 0; i < count; i++) {
         iw_codec_wheel_t told[IW_SIDES];
         iw_can_frame_t frame = {.id = self->copy[i].number, .dlc = self->copy[i].a};
-        (void)memcpy(frame.data, self->copy[i].as.data, sizeof frame.data);
+        memcpy(frame.data, self->copy[i].as.data, sizeof frame.data);
         const iw_side_t side = iw_codec_side(frame.id);
         if (self->copy[i].kind == (uint8_t)BLACKBOX_FRAME && iw_codec_decode(&frame, told) == IW_CODEC_SETPOINT) {
             out_pair->wheel[side].speed_mm_s = told[side].setpoint.speed_mm_s;
@@ -280,7 +280,7 @@ void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gateway_config
     gw_box_order_t order;
     writer_t self = {.fd = fd, .ring = ring, .config = config};
     become_writer();
-    self.bus = strncmp(config->bus.interface, "unix:", 5) == 0 ? "local" : config->bus.interface;
+    self.bus = (strncmp(config->bus.interface, "unix:", 5) == 0) ? "local" : config->bus.interface;
     self.copy = (blackbox_entry_t *)calloc(ring->capacity, sizeof *self.copy);
     if (self.copy == NULL) {
         return;

@@ -17,14 +17,14 @@ static void order_recording(gw_daemon_t *daemon) {
                             .wall_minus_us = note->wall_us - (int64_t)daemon->now_us,
                             .mark = blackbox_ring_written(daemon->box.ring)};
     (void)snprintf(order.cause, sizeof order.cause, "%s", iwn_cause_name(note->stop.cause));
-    (void)snprintf(order.side, sizeof order.side, "%s", side != NULL ? side : "");
+    (void)snprintf(order.side, sizeof order.side, "%s", (side != NULL) ? side : "");
     (void)snprintf(order.from, sizeof order.from, "%s", iwn_state_name(note->stop.from));
     if (!gw_box_write(&daemon->box, &order)) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "stop %u is not recorded: the process that writes recordings is %s; the frames around it are kept in "
                "memory: iwheelctl why",
                (unsigned)note->stop.number,
-               daemon->box.fd < 0 ? "gone (it is started again after 10 s)" : "too far behind (is the disk slow?)");
+               (daemon->box.fd < 0) ? "gone (it is started again after 10 s)" : "too far behind (is the disk slow?)");
     }
 }
 
@@ -50,7 +50,7 @@ void gw_record_state(gw_daemon_t *daemon, iw_state_t before) {
                               .number = seen.holder,
                               .a = (uint8_t)seen.state,
                               .b = (uint8_t)before};
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         entry.as.drive.speed_mm_s[side] = applied.wheel[side].speed_mm_s;
         entry.as.drive.current_mA[side] = applied.wheel[side].current_mA;
     }
@@ -114,9 +114,9 @@ void gw_record_take(gw_daemon_t *daemon) {
 
 static void write_frames(iwn_out_t *json, const char *name, const blackbox_entry_t *frames, uint32_t count) {
     iwn_out_open(json, name, '[');
-    for (uint32_t i = 0; i < count; ++i) {
+    for (uint32_t i = 0; i < count; i++) {
         iw_can_frame_t frame = {.id = frames[i].number, .dlc = frames[i].a, .kind = frames[i].b};
-        (void)memcpy(frame.data, frames[i].as.data, sizeof frame.data);
+        memcpy(frame.data, frames[i].as.data, sizeof frame.data);
         iwn_out_open(json, NULL, '{');
         iwn_out_frame(&frame, frames[i].at_us, json);
         iwn_out_close(json, '}');
@@ -129,8 +129,8 @@ void gw_record_write(const gw_daemon_t *daemon, iwn_out_t *json) {
     const uint32_t number = daemon->last_stop.stop.number;
     const bool known = number != 0U && last->number == number;
     iwn_out_text(json, "directory", daemon->config.record.directory);
-    iwn_out_text(json, "recording", known && last->error == 0 ? last->path : NULL);
-    iwn_out_text(json, "recording_error", known && last->error != 0 ? gw_folder_fault(last->error) : NULL);
+    iwn_out_text(json, "recording", (known && last->error == 0) ? last->path : NULL);
+    iwn_out_text(json, "recording_error", (known && last->error != 0) ? gw_folder_fault(last->error) : NULL);
     write_frames(json, "frames_before", daemon->tape.before, daemon->tape.before_count);
-    write_frames(json, "frames_after", daemon->tape.after, number != 0U ? daemon->tape.after_count : 0U);
+    write_frames(json, "frames_after", daemon->tape.after, (number != 0U) ? daemon->tape.after_count : 0U);
 }

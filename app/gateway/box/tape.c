@@ -12,7 +12,7 @@
 #define ECHO   2U
 
 void gw_tape_init(gw_tape_t *self, blackbox_ring_t *ring) {
-    (void)memset(self, 0, sizeof *self);
+    memset(self, 0, sizeof *self);
     self->ring = ring;
     self->facts = UNTOLD;
     self->after_count = GW_AROUND; // Nothing is waited for.
@@ -27,7 +27,7 @@ void gw_tape_put(gw_tape_t *self, const blackbox_entry_t *entry) {
 static void put_frame(gw_tape_t *self, const iw_can_frame_t *frame) {
     blackbox_entry_t entry = {
         .at_us = self->step_us, .kind = BLACKBOX_FRAME, .number = frame->id, .a = frame->dlc, .b = frame->kind};
-    (void)memcpy(entry.as.data, frame->data, sizeof entry.as.data);
+    memcpy(entry.as.data, frame->data, sizeof entry.as.data);
     gw_tape_put(self, &entry);
     if (self->after_count < GW_AROUND) {
         self->after[self->after_count++] = entry;
@@ -53,7 +53,7 @@ static int tape_receive(void *context, iw_can_frame_t *out_frame) {
     gw_tape_t *self = (gw_tape_t *)context;
     const int answer = self->inner.receive(self->inner.context, out_frame);
     if (answer > 0) {
-        ++self->step_frames;
+        self->step_frames++;
         put_frame(self, out_frame);
     }
     return answer;
@@ -138,15 +138,15 @@ bool gw_tape_again(gw_tape_t *self, iw_time_us_t now_us) {
 }
 
 static int16_t saturate(int32_t value) {
-    return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value);
+    return (int16_t)((value > INT16_MAX) ? INT16_MAX : (value < INT16_MIN) ? INT16_MIN : value);
 }
 
 void gw_tape_drive(gw_tape_t *self, const blackbox_entry_t *entry, const iw_drive_t *request, iw_time_us_t sent_us) {
     blackbox_entry_t whole = *entry;
     whole.kind = BLACKBOX_DRIVE;
     whole.a = request->has_current;
-    whole.as.drive.age_us = (uint32_t)(entry->at_us - sent_us < UINT32_MAX ? entry->at_us - sent_us : UINT32_MAX);
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
+    whole.as.drive.age_us = (uint32_t)((entry->at_us - sent_us < UINT32_MAX) ? entry->at_us - sent_us : UINT32_MAX);
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         whole.as.drive.speed_mm_s[side] = request->speed_mm_s[side];
         whole.as.drive.current_mA[side] = request->has_current ? saturate(request->current_mA[side]) : (int16_t)0;
     }
@@ -162,12 +162,12 @@ void gw_tape_mark(gw_tape_t *self) {
         return;
     }
     const uint64_t written = blackbox_ring_written(self->ring);
-    (void)blackbox_ring_copy(self->ring, written > LOOK_BACK ? written - LOOK_BACK : 0U, written, last, &count);
+    (void)blackbox_ring_copy(self->ring, (written > LOOK_BACK) ? written - LOOK_BACK : 0U, written, last, &count);
     size_t first = count;
-    for (uint32_t frames = 0; first > 0U && frames < GW_AROUND; --first) {
-        frames += last[first - 1U].kind == (uint8_t)BLACKBOX_FRAME ? 1U : 0U;
+    for (uint32_t frames = 0; first > 0U && frames < GW_AROUND; first--) {
+        frames += (last[first - 1U].kind == (uint8_t)BLACKBOX_FRAME) ? 1U : 0U;
     }
-    for (; first < count; ++first) {
+    for (; first < count; first++) {
         if (last[first].kind == (uint8_t)BLACKBOX_FRAME) {
             self->before[self->before_count++] = last[first];
         }

@@ -54,7 +54,7 @@ __attribute__((format(printf, 2, 3))) static void warn(gw_daemon_t *daemon, cons
         va_start(arguments, format);
         (void)vsnprintf(daemon->warning[daemon->warnings], GW_WARNING_SIZE, format, arguments);
         va_end(arguments);
-        ++daemon->warnings;
+        daemon->warnings++;
     }
 }
 
@@ -82,7 +82,7 @@ static void note_warnings(gw_daemon_t *daemon) {
     inspect_begin(&findings);
     const inspect_wish_t wish = gw_bus_facts_wish(&daemon->config);
     inspect_link(iw_linux_hal_link(hal), &wish, &findings);
-    for (unsigned i = 0; i < findings.count; ++i) {
+    for (unsigned i = 0; i < findings.count; i++) {
         if (findings.finding[i].verdict != INSPECT_OK) {
             char sentence[GW_WARNING_SIZE];
             inspect_sentence(&findings.finding[i], sentence, sizeof sentence);

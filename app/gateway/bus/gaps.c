@@ -14,20 +14,20 @@ void gw_gaps_note(gw_gaps_t *self, const iw_sent_t *sent) {
     }
     uint32_t bucket = 0;
     while (bucket < GW_GAP_BUCKETS - 1U && gap_us > gw_gap_limits_ms[bucket] * IW_US_PER_MS) {
-        ++bucket;
+        bucket++;
     }
-    ++self->count[bucket];
-    self->worst_us = gap_us > self->worst_us ? gap_us : self->worst_us;
+    self->count[bucket]++;
+    self->worst_us = (gap_us > self->worst_us) ? gap_us : self->worst_us;
 }
 
 void gw_gaps_write(const gw_gaps_t *self, iwn_out_t *json) {
     iwn_out_open(json, "limits_ms", '[');
-    for (uint32_t i = 0; i < GW_GAP_BUCKETS - 1U; ++i) {
+    for (uint32_t i = 0; i < GW_GAP_BUCKETS - 1U; i++) {
         iwn_out_int(json, NULL, gw_gap_limits_ms[i]);
     }
     iwn_out_close(json, ']');
     iwn_out_open(json, "count", '[');
-    for (uint32_t i = 0; i < GW_GAP_BUCKETS; ++i) {
+    for (uint32_t i = 0; i < GW_GAP_BUCKETS; i++) {
         iwn_out_int(json, NULL, self->count[i]);
     }
     iwn_out_close(json, ']');

@@ -36,7 +36,7 @@ const char *gw_client_line(const gw_client_t *self, size_t *out_length) {
 
 void gw_client_drop_line(gw_client_t *self, size_t length) {
     self->in_length -= length + 1U;
-    (void)memmove(self->in, &self->in[length + 1U], self->in_length);
+    memmove(self->in, &self->in[length + 1U], self->in_length);
 }
 
 void gw_client_note_caught_up(gw_client_t *self, iw_time_us_t then_us) {
@@ -69,11 +69,11 @@ static bool queue(gw_client_t *self, const char *line, size_t length, size_t res
         return false;
     }
     if (length > sizeof self->out - self->out_end) {
-        (void)memmove(self->out, &self->out[self->out_start], waiting);
+        memmove(self->out, &self->out[self->out_start], waiting);
         self->out_start = 0;
         self->out_end = waiting;
     }
-    (void)memcpy(&self->out[self->out_end], line, length);
+    memcpy(&self->out[self->out_end], line, length);
     self->out_end += length;
     return true;
 }
@@ -103,7 +103,7 @@ void gw_client_event(gw_client_t *self, const char *line, size_t length) {
         self->lost = 0;
     }
     if (self->lost > 0U || !queue(self, line, length, GW_REPLY_MAX)) {
-        ++self->lost;
+        self->lost++;
     }
 }
 

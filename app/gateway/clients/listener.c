@@ -26,14 +26,14 @@ static int complain_errno(FILE *err, const char *path, int error) {
         cure = "run as a user who may write to its directory, or choose another with --socket";
     }
     (void)complain(err, path, strerror(error), cure);
-    return error == EACCES || error == EPERM ? EX_NOPERM : EX_UNAVAILABLE;
+    return (error == EACCES || error == EPERM) ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
 static int complain_folder(FILE *err, const char *path, int error) {
     char cure[128];
     (void)snprintf(cure, sizeof cure, "%s, or choose another with --socket", gw_folder_cure(error));
     (void)complain(err, path, gw_folder_fault(error), cure);
-    return error == EACCES || error == EPERM || error >= GW_FOLDER_FOREIGN ? EX_NOPERM : EX_UNAVAILABLE;
+    return (error == EACCES || error == EPERM || error >= GW_FOLDER_FOREIGN) ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
 int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, FILE *err) {
@@ -43,7 +43,7 @@ int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, FIL
     *self =
         (gw_listener_t){.fd = -1, .reserve_fd = -1, .owners = gw_owners_of(GW_RUNTIME_DIRECTORY), .folder = {.fd = -1}};
     (void)snprintf(self->path, sizeof self->path, "%s", path);
-    (void)snprintf(self->name, sizeof self->name, "%s", slash == NULL ? path : slash + 1);
+    (void)snprintf(self->name, sizeof self->name, "%s", (slash == NULL) ? path : slash + 1);
     gw_folder_of(path, folder, sizeof folder);
     if (mkdir(folder, 0755) != 0 && errno != EEXIST) {
         return complain_errno(err, path, errno);
@@ -103,7 +103,7 @@ static int remove_name(const gw_listener_t *self, bool stranger, FILE *err) {
 static int clear_name(const gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
     struct stat status;
     if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
-        return errno == ENOENT ? 0 : complain_errno(err, self->path, errno);
+        return (errno == ENOENT) ? 0 : complain_errno(err, self->path, errno);
     }
     if (S_ISLNK(status.st_mode)) {
         return complain(err, self->path, "is a symbolic link, which is not followed",
@@ -134,7 +134,7 @@ static int verify(gw_listener_t *self, mode_t mode, FILE *err) {
     self->device = status.st_dev;
     self->inode = status.st_ino;
     const bool right = (status.st_mode & 0777U) == mode; // Not so where the folder has access control lists.
-    return right || fchmodat(self->folder.fd, self->name, mode, AT_SYMLINK_NOFOLLOW) == 0
+    return (right || fchmodat(self->folder.fd, self->name, mode, AT_SYMLINK_NOFOLLOW) == 0)
                ? 0
                : complain_errno(err, self->path, errno);
 }
@@ -149,7 +149,7 @@ static int bind_socket(gw_listener_t *self, const struct sockaddr_un *address, m
     const int result = bind(self->fd, (const struct sockaddr *)address, sizeof *address);
     const int error = errno;
     (void)umask(before);
-    return result == 0 ? verify(self, mode, err) : complain_errno(err, self->path, error);
+    return (result == 0) ? verify(self, mode, err) : complain_errno(err, self->path, error);
 }
 
 static int make_socket(gw_listener_t *self, mode_t mode, FILE *err) {
@@ -157,7 +157,7 @@ static int make_socket(gw_listener_t *self, mode_t mode, FILE *err) {
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", self->name);
     int back;
     int result = enter(self, &back) ? clear_name(self, &address, err) : complain_errno(err, self->path, errno);
-    result = result != 0 ? result : bind_socket(self, &address, mode, err);
+    result = (result != 0) ? result : bind_socket(self, &address, mode, err);
     leave(back);
     return result;
 }
@@ -186,7 +186,7 @@ int gw_listener_open(gw_listener_t *self, const gateway_config_t *config, gw_log
     int result = make_socket(self, config->northbound.mode, err);
     if (result == 0) {
         give_to_group(self, config, log);
-        result = listen(self->fd, BACKLOG) == 0 ? 0 : complain_errno(err, self->path, errno);
+        result = (listen(self->fd, BACKLOG) == 0) ? 0 : complain_errno(err, self->path, errno);
     }
     if (result != 0) {
         gw_listener_close(self);
@@ -239,5 +239,5 @@ gw_accept_t gw_listener_accept(gw_listener_t *self, int *out_fd) {
     if (*out_fd >= 0) {
         return GW_ACCEPT_CROWDED;
     }
-    return errno == EAGAIN ? GW_ACCEPT_NONE : GW_ACCEPT_PAUSE;
+    return (errno == EAGAIN) ? GW_ACCEPT_NONE : GW_ACCEPT_PAUSE;
 }

@@ -103,8 +103,8 @@ const config_key_t config_keys[] = {
      NUMBER(record.blackbox_s, 0, 600)},
     {"record", "directory", "", "Where recordings are written.", .kind = CONFIG_PATH, FIELD(record.directory)},
 };
-const size_t config_key_count = sizeof(config_keys) / sizeof(config_keys[0]);
-IW_STATIC_ASSERT(sizeof(config_keys) / sizeof(config_keys[0]) <= CONFIG_KEYS_MAX, keys_fit);
+const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];
+IW_STATIC_ASSERT(sizeof config_keys / sizeof config_keys[0] <= CONFIG_KEYS_MAX, keys_fit);
 
 const config_key_t *config_key_find(const char *section, const char *key) {
     for (size_t i = 0; i < config_key_count; i++) {
@@ -129,7 +129,7 @@ const config_key_t *config_key_similar(const char *section, const char *key) {
     size_t best_distance = GW_WORD_STRANGE;
     for (size_t i = 0; i < config_key_count; i++) {
         const config_key_t *row = &config_keys[i];
-        const size_t far = strcmp(row->section, section) == 0 ? gw_word_distance(key, row->key) : GW_WORD_STRANGE;
+        const size_t far = (strcmp(row->section, section) == 0) ? gw_word_distance(key, row->key) : GW_WORD_STRANGE;
         if (far < best_distance) {
             best = row;
             best_distance = far;
@@ -153,11 +153,11 @@ void config_keys_list(const char *section, char *out, size_t size) {
     out[0] = '\0';
     for (size_t i = 0; i < config_key_count; i++) {
         const config_key_t *row = &config_keys[i];
-        const char *name = section != NULL ? row->key : row->section;
+        const char *name = (section != NULL) ? row->key : row->section;
         if ((section != NULL && strcmp(row->section, section) != 0) || strcmp(name, last) == 0) {
             continue;
         }
-        const int n = snprintf(out + used, size - used, "%s%s", used > 0 ? ", " : "", name);
+        const int n = snprintf(out + used, size - used, "%s%s", (used > 0) ? ", " : "", name);
         if (n < 0 || (size_t)n >= size - used) {
             return;
         }

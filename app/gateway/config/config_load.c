@@ -39,7 +39,7 @@ void gateway_config_default(gateway_config_t *out_config) {
 /// The line promised to become a value, but inih made none of it.
 static void settle_pending(loader_t *loader) {
     if (loader->pending != NULL) {
-        const int length = loader->pending_length > 40U ? 40 : (int)loader->pending_length;
+        const int length = (loader->pending_length > 40U) ? 40 : (int)loader->pending_length;
         config_complain(&loader->report, loader->line,
                         "\"%.*s\" is not KEY = VALUE; add the '=' or begin the line with ;", length, loader->pending);
         loader->pending = NULL;
@@ -88,7 +88,7 @@ static void check_section(loader_t *loader, const char *line, size_t length) {
     name[(size_t)(end - line) - 1U] = '\0';
     loader->section_bad = !config_section_known(name);
     if (loader->section_bad) {
-        config_keys_list(NULL, known, sizeof(known));
+        config_keys_list(NULL, known, sizeof known);
         config_complain(&loader->report, loader->line, "unknown section [%s]; known are: %s", name, known);
     }
 }
@@ -97,7 +97,7 @@ static void check_section(loader_t *loader, const char *line, size_t length) {
 static const char *cut_line(loader_t *loader, size_t *out_length) {
     const char *line = loader->text + loader->at;
     const char *newline = memchr(line, '\n', loader->size - loader->at);
-    size_t length = newline != NULL ? (size_t)(newline - line) : loader->size - loader->at;
+    size_t length = (newline != NULL) ? (size_t)(newline - line) : loader->size - loader->at;
     loader->at += length + 1U;
     loader->line++;
     if (loader->line == 1U && length >= 3U && memcmp(line, "\xEF\xBB\xBF", 3) == 0) {
@@ -154,7 +154,7 @@ static void unknown_key(loader_t *loader, const char *section, const char *key) 
         config_complain(&loader->report, loader->line, "no key stands before the '='; write KEY = VALUE");
     } else if (section[0] == '\0') {
         config_complain(&loader->report, loader->line, "%s stands before any section; put it under [%s]", key,
-                        elsewhere != NULL ? elsewhere->section : "its section");
+                        (elsewhere != NULL) ? elsewhere->section : "its section");
     } else if (elsewhere != NULL) {
         config_complain(&loader->report, loader->line, "%s is no key of [%s]; move it to [%s]", key, section,
                         elsewhere->section);
@@ -168,7 +168,7 @@ static void unknown_key(loader_t *loader, const char *section, const char *key) 
         config_complain(&loader->report, loader->line, "unknown key %s in [%s]; did you mean %s?", key, section,
                         similar->key);
     } else {
-        config_keys_list(section, known, sizeof(known));
+        config_keys_list(section, known, sizeof known);
         config_complain(&loader->report, loader->line, "unknown key %s in [%s]; known are: %s", key, section, known);
     }
 }
@@ -204,7 +204,8 @@ int gateway_config_parse(const char *name, const char *text, size_t size, gatewa
     gateway_config_default(&loader.config);
     const int result = ini_parse_stream(next_line, &loader, take_value, &loader);
     if (result != 0 && loader.report.errors == 0) {
-        config_complain(&loader.report, result > 0 ? (unsigned)result : 0U, "cannot be read; write KEY = VALUE lines");
+        config_complain(&loader.report, (result > 0) ? (unsigned)result : 0U,
+                        "cannot be read; write KEY = VALUE lines");
     }
     if (loader.report.errors == 0) {
         config_relations_check(&loader.report, &loader.config, loader.seen);
@@ -248,8 +249,8 @@ int gateway_config_load(const char *path, gateway_config_t *out_config, FILE *er
     const int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (file < 0) {
         config_complain(&report, 0, "cannot be opened (%s); %s", strerror(errno),
-                        errno == EACCES ? "give the gateway's user the right to read it"
-                                        : "create it from share/gateway.conf, or give another with -c FILE");
+                        (errno == EACCES) ? "give the gateway's user the right to read it"
+                                          : "create it from share/gateway.conf, or give another with -c FILE");
         return GATEWAY_CONFIG_ERROR;
     }
     const bool good = read_file(&report, file, text, &size);
@@ -278,7 +279,7 @@ int gateway_config_override(gateway_config_t *config, const char *name, const ch
         if (report.errors == 0) {
             *config = changed;
         }
-        return report.errors == 0 ? 0 : GATEWAY_CONFIG_ERROR;
+        return (report.errors == 0) ? 0 : GATEWAY_CONFIG_ERROR;
     }
     config_complain(&report, 0, "%s is no key of the configuration; write SECTION.KEY", name);
     return GATEWAY_CONFIG_ERROR;

@@ -12,14 +12,14 @@ static void print_key(const config_key_t *row, const gateway_config_t *config, c
     char value[CONFIG_MESSAGE_SIZE];
     (void)fputs("; ", out);
     for (const char *c = row->help; *c != '\0'; c++) {
-        (void)fputs(*c == '\n' ? "\n; " : (char[2]){*c, '\0'}, out);
+        (void)fputs((*c == '\n') ? "\n; " : (char[2]){*c, '\0'}, out);
     }
     const bool set = config_value_format(row, config, value);
     const int width = fprintf(out, "\n%s%s = %s", set ? "" : ";", row->key, set ? value : "?") - 1;
-    config_value_choices(row, choices, sizeof(choices));
+    config_value_choices(row, choices, sizeof choices);
     const bool has_default = config_value_format(row, defaults, value);
-    (void)fprintf(out, "%*s ; %s%s%s%s\n", width < REMARK_COLUMN ? REMARK_COLUMN - width : 0, "", choices,
-                  choices[0] != '\0' ? ", " : "", has_default ? "default " : "no default", value);
+    (void)fprintf(out, "%*s ; %s%s%s%s\n", (width < REMARK_COLUMN) ? REMARK_COLUMN - width : 0, "", choices,
+                  (choices[0] != '\0') ? ", " : "", has_default ? "default " : "no default", value);
 }
 
 static void print_note(const char *note, FILE *out) {

@@ -40,9 +40,9 @@ void config_complain_end(config_report_t *report) {
 static unsigned last_line(const unsigned *seen) {
     static const char *const involved[] = {"period_ms", "lease_ms", "decel_mm_s2", "max_speed_mm_s"};
     unsigned line = 0;
-    for (size_t i = 0; i < sizeof(involved) / sizeof(involved[0]); i++) {
+    for (size_t i = 0; i < sizeof involved / sizeof involved[0]; i++) {
         const config_key_t *row = config_key_find("drive", involved[i]);
-        line = seen[row - config_keys] > line ? seen[row - config_keys] : line;
+        line = (seen[row - config_keys] > line) ? seen[row - config_keys] : line;
     }
     return line;
 }
@@ -69,7 +69,7 @@ void config_relations_check(config_report_t *report, const gateway_config_t *con
     char cures[CONFIG_MESSAGE_SIZE];
     const iw_config_fault_t fault = iw_config_check(core);
     if (fault == IW_CONFIG_STOP_BUDGET) {
-        budget_cures(core, cures, sizeof(cures));
+        budget_cures(core, cures, sizeof cures);
         config_complain(
             report, last_line(seen),
             "after a lost client the wheels would need lease_ms %u + period_ms %u + max_speed_mm_s %u / decel_mm_s2 %u "

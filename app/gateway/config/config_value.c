@@ -25,7 +25,7 @@ static bool read_digits(const char *text, size_t length, uint32_t base, uint32_t
         if (digit >= base) {
             return false;
         }
-        number = number > UINT32_MAX / 16U ? number : number * base + digit;
+        number = (number > UINT32_MAX / 16U) ? number : number * base + digit;
     }
     *out_number = number;
     return length > 0;
@@ -35,12 +35,12 @@ static void store(const config_key_t *row, gateway_config_t *config, uint32_t nu
     unsigned char *field = (unsigned char *)config + row->offset;
     const uint8_t narrow = (uint8_t)number;
     const uint16_t middle = (uint16_t)number;
-    if (row->size == sizeof(narrow)) {
-        memcpy(field, &narrow, sizeof(narrow));
-    } else if (row->size == sizeof(middle)) {
-        memcpy(field, &middle, sizeof(middle));
+    if (row->size == sizeof narrow) {
+        memcpy(field, &narrow, sizeof narrow);
+    } else if (row->size == sizeof middle) {
+        memcpy(field, &middle, sizeof middle);
     } else {
-        memcpy(field, &number, sizeof(number));
+        memcpy(field, &number, sizeof number);
     }
 }
 
@@ -49,15 +49,15 @@ static uint32_t load(const config_key_t *row, const gateway_config_t *config) {
     uint8_t narrow = 0;
     uint16_t middle = 0;
     uint32_t number = 0;
-    if (row->size == sizeof(narrow)) {
-        memcpy(&narrow, field, sizeof(narrow));
+    if (row->size == sizeof narrow) {
+        memcpy(&narrow, field, sizeof narrow);
         return narrow;
     }
-    if (row->size == sizeof(middle)) {
-        memcpy(&middle, field, sizeof(middle));
+    if (row->size == sizeof middle) {
+        memcpy(&middle, field, sizeof middle);
         return middle;
     }
-    memcpy(&number, field, sizeof(number));
+    memcpy(&number, field, sizeof number);
     return number;
 }
 
@@ -89,7 +89,7 @@ static bool parse_number(const config_key_t *row, const char *text, uint32_t *ou
     uint32_t max = 0;
     const bool negative = text[0] == '-';
     config_value_range(row, &min, &max);
-    config_value_choices(row, choices, sizeof(choices));
+    config_value_choices(row, choices, sizeof choices);
     if (!read_digits(text + (negative ? 1 : 0), strlen(text) - (negative ? 1U : 0U), 10U, out_number)) {
         return wrong(
             out_why,
@@ -132,7 +132,7 @@ static bool parse_ratio(const config_key_t *row, const char *text, gateway_confi
     const char *slash = strchr(text, '/');
     uint32_t turns = 0;
     uint32_t per = 1;
-    const size_t first = slash != NULL ? (size_t)(slash - text) : strlen(text);
+    const size_t first = (slash != NULL) ? (size_t)(slash - text) : strlen(text);
     if (!read_digits(text, first, 10U, &turns) ||
         (slash != NULL && !read_digits(slash + 1, strlen(slash + 1), 10U, &per))) {
         return wrong(out_why, "%s = %s is not N or N/M; write rotor turns per wheel turn, for example 1 or 27/2",
@@ -176,7 +176,7 @@ static const char *wrong_address(const char *text, size_t size) {
     if (strncmp(text, "unix:", 5) == 0 && text[5] == '\0') {
         return "has no path after unix:";
     }
-    return strlen(text) < size ? NULL : "is too long for a socket address (107 characters)";
+    return (strlen(text) < size) ? NULL : "is too long for a socket address (107 characters)";
 }
 
 /// What is wrong with a text, or a null pointer.
@@ -190,10 +190,10 @@ static const char *wrong_text(const config_key_t *row, const char *text) {
         return "is a directory, not a socket";
     }
     if (row->kind == CONFIG_GROUP) {
-        return length <= GROUP_NAME_MAX && strpbrk(text, " /:") == NULL ? NULL : "is not a group name";
+        return (length <= GROUP_NAME_MAX && strpbrk(text, " /:") == NULL) ? NULL : "is not a group name";
     }
     if (row->kind == CONFIG_INTERFACE && strncmp(text, "unix:", 5) != 0) {
-        return length <= INTERFACE_NAME_MAX && strpbrk(text, " /:") == NULL
+        return (length <= INTERFACE_NAME_MAX && strpbrk(text, " /:") == NULL)
                    ? NULL
                    : "is neither an interface name (at most 15 characters, such as can0) nor unix:PATH";
     }
@@ -271,7 +271,7 @@ bool config_value_format(const config_key_t *row, const gateway_config_t *config
         (void)snprintf(out, CONFIG_MESSAGE_SIZE, "%04o", (unsigned)load(row, config));
         return true;
     case CONFIG_RATIO:
-        (void)snprintf(out, CONFIG_MESSAGE_SIZE, core->gear_per == 1U ? "%u" : "%u/%u", (unsigned)core->gear_turns,
+        (void)snprintf(out, CONFIG_MESSAGE_SIZE, (core->gear_per == 1U) ? "%u" : "%u/%u", (unsigned)core->gear_turns,
                        (unsigned)core->gear_per);
         return true;
     case CONFIG_WORD:

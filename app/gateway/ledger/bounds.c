@@ -22,7 +22,7 @@ static bool near_ratio(int32_t figure, int32_t ratio) {
 
 static bool fits_unit(const gw_known_item_t *known, bool confirmed) {
     const bool is_cn = strcmp(known->value, "cN") == 0;
-    return near_ratio(known->entry.figure, is_cn == confirmed ? 10 : 1);
+    return near_ratio(known->entry.figure, (is_cn == confirmed) ? 10 : 1);
 }
 
 /// Speed of the largest wheel at one rpm, in mm/s, and one more for what is cut off.
@@ -90,8 +90,8 @@ static bool can_be(iw_ledger_item_t item, const char *value) {
     gateway_config_default(&config);
     config.core.setpoint_type_set = true;
     config.core.current_role = IW_ROLE_LIMIT;
-    (void)memcpy(bare, value, sizeof bare);
-    char *rest = item == IW_LEDGER_GEAR_RATIO ? strstr(bare, ", rpm of the ") : NULL;
+    memcpy(bare, value, sizeof bare);
+    char *rest = (item == IW_LEDGER_GEAR_RATIO) ? strstr(bare, ", rpm of the ") : NULL;
     if (rest != NULL && (strcmp(rest, ", rpm of the wheel") == 0 || strcmp(rest, ", rpm of the rotor") == 0)) {
         *rest = '\0';
     }

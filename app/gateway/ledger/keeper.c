@@ -34,7 +34,7 @@ typedef struct {
 
 static void answer(const work_t *work, gw_keeper_news_t news, int error) {
     char message[1U + sizeof error] = {(char)news};
-    (void)memcpy(&message[1], &error, sizeof error);
+    memcpy(&message[1], &error, sizeof error);
     (void)send(work->fd, message, sizeof message, MSG_NOSIGNAL);
 }
 
@@ -54,10 +54,10 @@ static int read_whole(int fd, char *text, size_t *out_length) {
     ssize_t count = 1;
     while (count > 0 && length < GW_KEEPER_TEXT_MAX) {
         count = read(fd, &text[length], GW_KEEPER_TEXT_MAX - length);
-        length += count > 0 ? (size_t)count : 0U;
+        length += (count > 0) ? (size_t)count : 0U;
     }
     *out_length = length;
-    return count < 0 ? errno : 0;
+    return (count < 0) ? errno : 0;
 }
 
 static void tell_file(work_t *work) {
@@ -68,7 +68,7 @@ static void tell_file(work_t *work) {
         return;
     }
     const int fd = openat(directory, work->name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    int error = fd < 0 ? errno : 0;
+    int error = (fd < 0) ? errno : 0;
     (void)close(directory);
     if (fd >= 0) {
         error = read_whole(fd, &work->message[1], &length);
@@ -78,7 +78,7 @@ static void tell_file(work_t *work) {
         work->message[0] = (char)GW_KEEPER_READ;
         (void)send(work->fd, work->message, length + 1U, MSG_NOSIGNAL);
     } else {
-        answer(work, error == ENOENT ? GW_KEEPER_ABSENT : GW_KEEPER_BAD, error);
+        answer(work, (error == ENOENT) ? GW_KEEPER_ABSENT : GW_KEEPER_BAD, error);
     }
 }
 
@@ -92,10 +92,10 @@ static int write_over(const work_t *work, int directory, size_t length) {
         return errno;
     }
     const ssize_t count = write(fd, text, length);
-    int error = count < 0 ? errno : (size_t)count < length ? ENOSPC : 0;
-    error = error == 0 && fsync(fd) != 0 ? errno : error;
-    error = close(fd) != 0 && error == 0 ? errno : error;
-    error = error == 0 && renameat(directory, work->fresh, directory, work->name) != 0 ? errno : error;
+    int error = (count < 0) ? errno : ((size_t)count < length) ? ENOSPC : 0;
+    error = (error == 0 && fsync(fd) != 0) ? errno : error;
+    error = (close(fd) != 0 && error == 0) ? errno : error;
+    error = (error == 0 && renameat(directory, work->fresh, directory, work->name) != 0) ? errno : error;
     if (error != 0) {
         (void)unlinkat(directory, work->fresh, 0);
     } else {
@@ -129,7 +129,7 @@ static void keep(work_t *work) {
             const bool writes = work->message[0] == SAY_WRITE;
             const int error = in_directory(work, (size_t)length - 1U);
             if (writes) {
-                answer(work, error == 0 ? GW_KEEPER_WRITTEN : GW_KEEPER_FAILED, error);
+                answer(work, (error == 0) ? GW_KEEPER_WRITTEN : GW_KEEPER_FAILED, error);
             }
         }
     } while (length > 0 || (length < 0 && errno == EINTR));
@@ -171,7 +171,7 @@ int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name) {
         keep(&work);
         _exit(0);
     }
-    const int error = child < 0 ? errno : 0;
+    const int error = (child < 0) ? errno : 0;
     (void)close(pair[1]);
     if (error != 0) {
         (void)close(pair[0]);
@@ -189,7 +189,7 @@ static bool say(const gw_keeper_t *self, char what, const char *text, size_t len
         return false;
     }
     message[0] = what;
-    (void)memcpy(&message[1], text, length);
+    memcpy(&message[1], text, length);
     return send(self->fd, message, length + 1U, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)length + 1;
 }
 
@@ -224,9 +224,9 @@ gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_
     const gw_keeper_news_t news = (gw_keeper_news_t)message[0];
     if (news == GW_KEEPER_READ) {
         *out_length = (size_t)length - 1U;
-        (void)memcpy(out_text, &message[1], *out_length);
+        memcpy(out_text, &message[1], *out_length);
     } else if (length == (ssize_t)(1U + sizeof *out_error)) {
-        (void)memcpy(out_error, &message[1], sizeof *out_error);
+        memcpy(out_error, &message[1], sizeof *out_error);
     }
     return news;
 }

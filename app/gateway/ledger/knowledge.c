@@ -90,7 +90,7 @@ void gw_knowledge_observe(gw_daemon_t *daemon) {
     if (!daemon->knowledge.answered) {
         return;
     }
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         observe_item(daemon, (iw_ledger_item_t)item);
     }
     observe_offset(daemon, IW_LEFT);
@@ -107,7 +107,7 @@ static void merge_item(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_know
     }
     if (strcmp(value, stored->value) != 0) {
         gw_log(&daemon->log, GW_LOG_INFO, "%s: what was found before was for %s, and %s is configured now: forgotten",
-               iwn_ledger_item_name(item), stored->value, value[0] != '\0' ? value : "nothing");
+               iwn_ledger_item_name(item), stored->value, (value[0] != '\0') ? value : "nothing");
         daemon->knowledge.changed = true;
         return;
     }
@@ -128,18 +128,18 @@ static void merge_offset(gw_daemon_t *daemon, iw_side_t side, const gw_known_off
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the %s wheel's stored force offset was taken in another force_unit: forgotten; unload both wheels, "
                "then: iwheelctl tare",
-               side == IW_LEFT ? "left" : "right");
+               (side == IW_LEFT) ? "left" : "right");
         daemon->knowledge.changed = true;
         return;
     }
     daemon->knowledge.known.offset[side] = *stored;
     iw_gateway_restore_offset(&daemon->gateway, side,
-                              stored->from == IW_OFFSET_OPERATOR ? IW_OFFSET_OPERATOR : IW_OFFSET_STORED,
+                              (stored->from == IW_OFFSET_OPERATOR) ? IW_OFFSET_OPERATOR : IW_OFFSET_STORED,
                               stored->offset_mN);
 }
 
 static void merge(gw_daemon_t *daemon, const gw_known_t *stored) {
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         merge_item(daemon, (iw_ledger_item_t)item, &stored->item[item]);
     }
     merge_offset(daemon, IW_LEFT, &stored->offset[IW_LEFT]);
@@ -155,8 +155,8 @@ static void take_file(gw_daemon_t *daemon, gw_keeper_news_t news, const char *te
     } else if (news == GW_KEEPER_READ &&
                gw_memory_read(text, length, daemon->config.bus.interface, &stored, self->reason)) {
         self->state = GW_MEMORY_KEPT;
-        self->kept_length = length <= sizeof self->kept ? length : 0U;
-        (void)memcpy(self->kept, text, self->kept_length);
+        self->kept_length = (length <= sizeof self->kept) ? length : 0U;
+        memcpy(self->kept, text, self->kept_length);
         merge(daemon, &stored);
     } else {
         self->state = GW_MEMORY_IGNORED;
@@ -196,7 +196,7 @@ static void hear_keeper(gw_daemon_t *daemon) {
         self->error = error;
         take_file(daemon, news, text, length);
     } else if (news != GW_KEEPER_NO_NEWS) {
-        take_result(daemon, news, news == GW_KEEPER_GONE ? ECHILD : error);
+        take_result(daemon, news, (news == GW_KEEPER_GONE) ? ECHILD : error);
     }
     const bool waited = daemon->now_us - self->start_us > GW_KNOWLEDGE_PATIENCE_US;
     if (!self->answered && (self->state != GW_MEMORY_LOADING || waited)) {
@@ -210,7 +210,7 @@ static void hand_over(gw_knowledge_t *self, const char *bus) {
     const size_t length = gw_memory_write(&self->known, bus, text, sizeof text);
     const bool same = length == self->kept_length && memcmp(text, self->kept, length) == 0;
     if (same || gw_keeper_write(&self->keeper, text, length)) {
-        (void)memcpy(self->kept, text, length);
+        memcpy(self->kept, text, length);
         self->kept_length = length;
         self->changed = false;
     }
@@ -236,7 +236,7 @@ gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, cons
     if (verdict != GW_FOUND_SAME && verdict != GW_FOUND_DIFFERENT) {
         return verdict;
     }
-    const iw_ledger_entry_t entry = {verdict == GW_FOUND_SAME ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED,
+    const iw_ledger_entry_t entry = {(verdict == GW_FOUND_SAME) ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED,
                                      IW_EVIDENCE_OPERATOR, 0};
     iw_gateway_know(gateway, item, &entry);
     gw_record_assumption(daemon, item);
@@ -253,7 +253,7 @@ iw_tare_t gw_knowledge_tare(gw_daemon_t *daemon, uint8_t sides, iw_side_t *out_r
     const iw_force_quality_t quality[IW_SIDES] = {iw_force_measure(seen.wheel[IW_LEFT].force),
                                                   iw_force_measure(seen.wheel[IW_RIGHT].force)};
     const iw_tare_t result = iw_gateway_tare(&daemon->gateway, daemon->now_us, sides, out_refused);
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         if (result == IW_TARE_OK && (sides & (1U << side)) != 0U) {
             daemon->knowledge.tare[side] = quality[side];
         }

@@ -16,17 +16,17 @@ void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, i
     iwn_out_text(json, "state", iwn_ledger_state_name(entry->state));
     iwn_out_text(json, "evidence", iwn_evidence_name(entry->evidence));
     iwn_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
-    iwn_out_text(json, "value", value[0] != '\0' ? value : NULL);
-    iwn_out_text(json, "found", noted && known->word.found[0] != '\0' ? known->word.found : NULL);
-    iwn_out_text(json, "how", noted && known->word.how[0] != '\0' ? known->word.how : NULL);
+    iwn_out_text(json, "value", (value[0] != '\0') ? value : NULL);
+    iwn_out_text(json, "found", (noted && known->word.found[0] != '\0') ? known->word.found : NULL);
+    iwn_out_text(json, "how", (noted && known->word.how[0] != '\0') ? known->word.how : NULL);
     iwn_out_known(json, "since_wall_us", noted, known->since_wall_us);
     iwn_out_text(json, "reason", reason);
-    iwn_out_text(json, "disabled", entry->state == IW_LEDGER_CONTRADICTED ? gw_assumption_cost(item) : NULL);
+    iwn_out_text(json, "disabled", (entry->state == IW_LEDGER_CONTRADICTED) ? gw_assumption_cost(item) : NULL);
 }
 
 static void write_ledger(const gw_daemon_t *daemon, iwn_out_t *json) {
     iwn_out_open(json, "ledger", '{');
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         iwn_out_open(json, iwn_ledger_item_name((iw_ledger_item_t)item), '{');
         gw_knowledge_write_item(daemon, (iw_ledger_item_t)item, json);
         iwn_out_close(json, '}');
@@ -43,9 +43,9 @@ static void write_memory(const gw_knowledge_t *self, iwn_out_t *json) {
     iwn_out_text(json, "file", self->path);
     iwn_out_text(json, "state", names[self->state]);
     iwn_out_text(json, "reason",
-                 self->state == GW_MEMORY_IGNORED  ? self->reason
-                 : self->state == GW_MEMORY_FAILED ? gw_folder_fault(self->error)
-                                                   : NULL);
+                 (self->state == GW_MEMORY_IGNORED)  ? self->reason
+                 : (self->state == GW_MEMORY_FAILED) ? gw_folder_fault(self->error)
+                                                     : NULL);
     iwn_out_close(json, '}');
 }
 

@@ -15,7 +15,7 @@
 #define MOVED_mN ((int32_t)IW_FORCE_QUIET_mN)
 
 static const char *side_name(iw_side_t side) {
-    return side == IW_LEFT ? "left" : "right";
+    return (side == IW_LEFT) ? "left" : "right";
 }
 
 void gw_knowledge_tell_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
@@ -43,7 +43,7 @@ static void describe(const gw_told_offset_t *offset, char *out_text, size_t size
         (void)snprintf(out_text, size, "none");
         return;
     }
-    (void)snprintf(out_text, size, "%s%d.%03d N, %s%s%s%s", offset->offset_mN < 0 ? "-" : "",
+    (void)snprintf(out_text, size, "%s%d.%03d N, %s%s%s%s", (offset->offset_mN < 0) ? "-" : "",
                    abs(offset->offset_mN / 1000), abs(offset->offset_mN % 1000), word, stored ? " (" : "",
                    stored ? iwn_provenance_name(offset->from) : "", stored ? ")" : "");
 }
@@ -88,8 +88,8 @@ void gw_knowledge_tell_memory(gw_daemon_t *daemon) {
     default:
         gw_log(log, GW_LOG_WARNING, "what is learnt about the wheels is not kept in %s: %s; %s%s", self->path,
                gw_folder_fault(self->error),
-               self->keeper.fd < 0 ? "start the gateway again" : gw_folder_cure(self->error),
-               self->keeper.fd < 0 ? "" : ", or set [record] directory; tried again");
+               (self->keeper.fd < 0) ? "start the gateway again" : gw_folder_cure(self->error),
+               (self->keeper.fd < 0) ? "" : ", or set [record] directory; tried again");
         break;
     }
 }
@@ -97,10 +97,10 @@ void gw_knowledge_tell_memory(gw_daemon_t *daemon) {
 /// Names of the items in one state, as one text.
 static void list_items(const iw_ledger_entry_t *assumed, iw_ledger_state_t state, char *out_text, size_t size) {
     out_text[0] = '\0';
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         if (assumed[item].state == state) {
             const size_t length = strlen(out_text);
-            (void)snprintf(&out_text[length], size - length, "%s%s", length > 0U ? ", " : "",
+            (void)snprintf(&out_text[length], size - length, "%s%s", (length > 0U) ? ", " : "",
                            iwn_ledger_item_name((iw_ledger_item_t)item));
         }
     }
@@ -117,7 +117,7 @@ void gw_knowledge_tell_ledger(gw_daemon_t *daemon) {
     if (items[0] != '\0') {
         gw_log(&daemon->log, GW_LOG_INFO, "assumed, never verified: %s", items);
     }
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         if (assumed[item].state == IW_LEDGER_CONTRADICTED) {
             gw_knowledge_tell_item(daemon, (iw_ledger_item_t)item);
         }

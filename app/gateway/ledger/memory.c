@@ -20,10 +20,10 @@
 /// CRC-32 as everybody computes it (zip, Ethernet).
 static uint32_t checksum(const char *text, size_t length) {
     uint32_t sum = UINT32_MAX;
-    for (size_t i = 0; i < length; ++i) {
+    for (size_t i = 0; i < length; i++) {
         sum ^= (unsigned char)text[i];
-        for (unsigned bit = 0; bit < 8U; ++bit) {
-            sum = (sum >> 1) ^ ((sum & 1U) != 0U ? 0xEDB88320U : 0U);
+        for (unsigned bit = 0; bit < 8U; bit++) {
+            sum = (sum >> 1) ^ (((sum & 1U) != 0U) ? 0xEDB88320U : 0U);
         }
     }
     return ~sum;
@@ -31,8 +31,8 @@ static uint32_t checksum(const char *text, size_t length) {
 
 void gw_memory_name(const char *bus, char *out_name, size_t size) {
     (void)snprintf(out_name, size, "ledger-%s", bus);
-    for (char *c = out_name; *c != '\0'; ++c) {
-        *c = isalnum((unsigned char)*c) != 0 || *c == '-' || *c == '.' ? *c : '_';
+    for (char *c = out_name; *c != '\0'; c++) {
+        *c = (isalnum((unsigned char)*c) != 0 || *c == '-' || *c == '.') ? *c : '_';
     }
 }
 
@@ -53,7 +53,7 @@ static void write_item(const gw_known_item_t *known, const char *name, iwn_out_t
 static void write_offset(const gw_known_offset_t *known, const char *name, iwn_out_t *json) {
     iwn_out_open(json, name, '{');
     iwn_out_text(json, "from", iwn_provenance_name(known->from));
-    iwn_out_text(json, "unit", known->unit == IW_FORCE_CN ? "cN" : "dN");
+    iwn_out_text(json, "unit", (known->unit == IW_FORCE_CN) ? "cN" : "dN");
     iwn_out_int(json, "offset_mN", known->offset_mN);
     iwn_out_int(json, "drift_mN", known->drift_mN);
     iwn_out_int(json, "deviation_mN", known->deviation_mN);
@@ -70,16 +70,16 @@ size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text,
     iwn_out_int(&json, "version", VERSION);
     iwn_out_text(&json, "bus", bus);
     iwn_out_open(&json, "items", '{');
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; ++item) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         if (known->item[item].entry.state != IW_LEDGER_ASSUMED) {
             write_item(&known->item[item], iwn_ledger_item_name((iw_ledger_item_t)item), &json);
         }
     }
     iwn_out_close(&json, '}');
     iwn_out_open(&json, "offsets", '{');
-    for (unsigned side = 0; side < IW_SIDES; ++side) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         if (known->offset[side].from != IW_OFFSET_NONE) {
-            write_offset(&known->offset[side], side == IW_LEFT ? "left" : "right", &json);
+            write_offset(&known->offset[side], (side == IW_LEFT) ? "left" : "right", &json);
         }
     }
     iwn_out_close(&json, '}');
@@ -153,7 +153,7 @@ static bool read_item(const char *name, iwn_json_t object, gw_known_t *known) {
 }
 
 static bool read_provenance(iwn_json_t object, iw_offset_provenance_t *out_from) {
-    for (int from = IW_OFFSET_ESTIMATED; from <= (int)IW_OFFSET_OPERATOR; ++from) {
+    for (int from = IW_OFFSET_ESTIMATED; from <= (int)IW_OFFSET_OPERATOR; from++) {
         if (is_text(object, "from", iwn_provenance_name((iw_offset_provenance_t)from))) {
             *out_from = (iw_offset_provenance_t)from;
             return true;
@@ -233,7 +233,7 @@ bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t
                     char out_reason[GW_MEMORY_REASON_SIZE]) {
     char sum[SUM_LENGTH + 1U];
     gw_known_t known = {0};
-    const size_t body = length < SUM_LENGTH ? 0U : length - SUM_LENGTH;
+    const size_t body = (length < SUM_LENGTH) ? 0U : length - SUM_LENGTH;
     const char *fault = "it is damaged: its checksum is wrong";
     (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", checksum(text, body));
     if (length > SUM_LENGTH && memcmp(&text[body], sum, SUM_LENGTH) == 0) {

@@ -16,7 +16,7 @@ static const char local_prefix[] = "unix:";
 
 const char *gw_bus_lock_local_path(const char *bus) {
     const size_t length = sizeof local_prefix - 1U;
-    return strncmp(bus, local_prefix, length) == 0 ? bus + length : NULL;
+    return (strncmp(bus, local_prefix, length) == 0) ? bus + length : NULL;
 }
 
 /// A path of any length and spelling as 16 digits.
@@ -26,9 +26,10 @@ static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
     const char *slash = strrchr(path, '/');
     uint64_t hash = 0xCBF29CE484222325U;
     gw_folder_of(path, folder, sizeof folder);
-    const char *const parts[] = {realpath(folder, real) != NULL ? real : folder, "/", slash == NULL ? path : slash + 1};
-    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
-        for (const char *c = parts[i]; *c != '\0'; ++c) {
+    const char *const parts[] = {(realpath(folder, real) != NULL) ? real : folder, "/",
+                                 (slash == NULL) ? path : slash + 1};
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
+        for (const char *c = parts[i]; *c != '\0'; c++) {
             hash = (hash ^ (unsigned char)*c) * 0x100000001B3U;
         }
     }
@@ -38,7 +39,7 @@ static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
 /// Interfaces of one name may be in several network namespaces, which share the directory.
 static unsigned long long network_namespace(void) {
     struct stat status;
-    return stat("/proc/self/ns/net", &status) == 0 ? (unsigned long long)status.st_ino : 0U;
+    return (stat("/proc/self/ns/net", &status) == 0) ? (unsigned long long)status.st_ino : 0U;
 }
 
 static int open_file(const char *path) {
@@ -46,7 +47,7 @@ static int open_file(const char *path) {
     int fd = open(path, flags);
     if (fd < 0 && errno == ENOENT) { // Asked for at once, a stranger's file in a folder like /tmp would be an error.
         fd = open(path, flags | O_CREAT | O_EXCL, 0600);
-        fd = fd < 0 && errno == EEXIST ? open(path, flags) : fd;
+        fd = (fd < 0 && errno == EEXIST) ? open(path, flags) : fd;
     }
     return fd;
 }
@@ -94,7 +95,7 @@ static void sign(const gw_bus_lock_t *self, int fd) {
 static int lock_file(gw_bus_lock_t *self) {
     struct stat status;
     const int fd = open_file(self->path);
-    self->error = fd < 0 ? errno : 0;
+    self->error = (fd < 0) ? errno : 0;
     if (fd < 0 && lstat(self->path, &status) == 0 && !gw_owners_have(&self->names.owners, status.st_uid)) {
         note_stranger(self, &status);
     }
@@ -141,7 +142,7 @@ int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory
     if (error == 0 && path != NULL && (self->error == ENOENT || self->error == ENOTDIR)) {
         error = self->error; // No bus can be there.
     }
-    error = error != 0 ? error : gw_bus_names_take(&self->names, &self->holder, &self->stranger[1]);
+    error = (error != 0) ? error : gw_bus_names_take(&self->names, &self->holder, &self->stranger[1]);
     if (error != 0) {
         gw_bus_lock_release(self);
     }

@@ -36,7 +36,7 @@ static void name_of(const gw_bus_names_t *self, uid_t uid, unsigned place, char 
 
 static socklen_t address_of(const char *name, struct sockaddr_un *out_address) {
     *out_address = (struct sockaddr_un){.sun_family = AF_UNIX};
-    (void)memcpy(out_address->sun_path + 1, name + 1, strlen(name + 1)); // A zero byte stands for the `@`.
+    memcpy(out_address->sun_path + 1, name + 1, strlen(name + 1)); // A zero byte stands for the `@`.
     return (socklen_t)(offsetof(struct sockaddr_un, sun_path) + strlen(name));
 }
 
@@ -50,8 +50,8 @@ static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
     uid_t uid = NOBODY;
     bool ours = false;
     while (at + HEAD <= end) {
-        (void)memcpy(&head, at, sizeof head);
-        const size_t length = head.nla_len < HEAD ? 0U : head.nla_len - HEAD;
+        memcpy(&head, at, sizeof head);
+        const size_t length = (head.nla_len < HEAD) ? 0U : head.nla_len - HEAD;
         const char *value = at + HEAD;
         if (head.nla_len < HEAD || value + length > end) {
             break;
@@ -59,7 +59,7 @@ static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
         if (head.nla_type == UNIX_DIAG_NAME) {
             ours = length == strlen(name) && value[0] == '\0' && memcmp(value + 1, name + 1, length - 1U) == 0;
         } else if (head.nla_type == UNIX_DIAG_UID && length == sizeof uid) {
-            (void)memcpy(&uid, value, sizeof uid);
+            memcpy(&uid, value, sizeof uid);
         }
         at += (head.nla_len + HEAD - 1U) / HEAD * HEAD;
     }
@@ -76,7 +76,7 @@ static uid_t search_list(int fd, const char *name) {
         const ssize_t got = recv(fd, buffer, sizeof buffer, 0);
         struct nlmsghdr *message = (struct nlmsghdr *)buffer;
         for (ssize_t left = got; left > 0 && NLMSG_OK(message, (size_t)left); message = NLMSG_NEXT(message, left)) {
-            const uid_t uid = message->nlmsg_type == SOCK_DIAG_BY_FAMILY ? owner_in(message, name) : NOBODY;
+            const uid_t uid = (message->nlmsg_type == SOCK_DIAG_BY_FAMILY) ? owner_in(message, name) : NOBODY;
             if (uid != NOBODY || message->nlmsg_type == NLMSG_DONE || message->nlmsg_type == NLMSG_ERROR) {
                 return uid;
             }
@@ -156,7 +156,7 @@ static int take_place(gw_bus_names_t *self, gw_holder_t *out_stranger) {
     char name[GW_BUS_NAME_SIZE];
     int error = EADDRINUSE;
     self->fd = -1;
-    for (self->place = 0; self->place < GW_BUS_PLACES; ++self->place) {
+    for (self->place = 0; self->place < GW_BUS_PLACES; self->place++) {
         name_of(self, self->owners.own, self->place, name);
         error = bind_name(name, &self->fd);
         if (error != EADDRINUSE) {
@@ -204,8 +204,8 @@ static seen_t look_at(const gw_bus_names_t *self, uid_t uid, unsigned place, gw_
 static seen_t look(const gw_bus_names_t *self, gw_holder_t *out_holder) {
     const uid_t users[] = {0, self->owners.service, self->owners.own};
     seen_t seen = look_at(self, self->owners.own, 0U, out_holder);
-    for (size_t i = 0; i < sizeof users / sizeof users[0]; ++i) {
-        for (unsigned place = 1; place < GW_BUS_PLACES && seen != SEEN_EARLIER; ++place) {
+    for (size_t i = 0; i < sizeof users / sizeof users[0]; i++) {
+        for (unsigned place = 1; place < GW_BUS_PLACES && seen != SEEN_EARLIER; place++) {
             const seen_t one = look_at(self, users[i], place, out_holder);
             if (one > seen) {
                 seen = one;
@@ -236,7 +236,7 @@ int gw_bus_names_take(gw_bus_names_t *self, gw_holder_t *out_holder, gw_holder_t
 
 bool gw_bus_names_tend(gw_bus_names_t *self, gw_holder_t *out_holder) {
     const bool first = self->owners.own == 0U || self->owners.own == self->owners.service;
-    for (unsigned i = 0; i < ASKERS_MAX && self->fd >= 0; ++i) {
+    for (unsigned i = 0; i < ASKERS_MAX && self->fd >= 0; i++) {
         const int fd = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC);
         if (fd < 0) {
             break;

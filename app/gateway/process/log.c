@@ -50,7 +50,7 @@ static void earn_credit(gw_log_t *self) {
     const iw_time_us_t now_us = iw_clock_now_us();
     const uint64_t earned = (now_us - self->credit_us) / LINE_US;
     if (earned > 0U) {
-        self->credit = earned + self->credit > BURST_LINES ? BURST_LINES : self->credit + (uint32_t)earned;
+        self->credit = (earned + self->credit > BURST_LINES) ? BURST_LINES : self->credit + (uint32_t)earned;
         self->credit_us += earned * LINE_US;
     }
 }
@@ -63,7 +63,7 @@ void gw_log(gw_log_t *self, gw_log_level_t level, const char *format, ...) {
     }
     earn_credit(self);
     if (self->credit == 0U) {
-        ++self->dropped;
+        self->dropped++;
         return;
     }
     int length = snprintf(raw, sizeof raw, "iwheel-gateway: %s: ", level_names[level]);
@@ -78,12 +78,12 @@ void gw_log(gw_log_t *self, gw_log_level_t level, const char *format, ...) {
     iwn_plain_copy(raw, line, sizeof line - 1U); // Cut anywhere, and with names that others chose.
     const size_t end = strlen(line);
     line[end] = '\n';
-    --self->credit;
+    self->credit--;
     self->dropped = put_line(self, line, end + 1U) ? 0U : self->dropped + 1U;
 }
 
 bool gw_log_level_of(const char *word, gw_log_level_t *out_level) {
-    for (unsigned i = 0; i < GW_LOG_LEVELS; ++i) {
+    for (unsigned i = 0; i < GW_LOG_LEVELS; i++) {
         if (strcmp(word, level_names[i]) == 0) {
             *out_level = (gw_log_level_t)i;
             return true;

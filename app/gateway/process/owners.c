@@ -32,17 +32,17 @@ static int open_unlinked(const char *path) {
     struct stat status;
     size_t length = strlen(path);
     if (length == 0U || length >= sizeof bare) {
-        errno = length == 0U ? ENOENT : ENAMETOOLONG;
+        errno = (length == 0U) ? ENOENT : ENAMETOOLONG;
         return -1;
     }
     while (length > 1U && path[length - 1U] == '/') {
-        --length;
+        length--;
     }
-    (void)memcpy(bare, path, length);
+    memcpy(bare, path, length);
     bare[length] = '\0';
     const int fd = open(bare, O_PATH | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     if (fd < 0 && errno == ENOTDIR) { // That it is no directory would mislead.
-        errno = lstat(bare, &status) == 0 && S_ISLNK(status.st_mode) ? ELOOP : ENOTDIR;
+        errno = (lstat(bare, &status) == 0 && S_ISLNK(status.st_mode)) ? ELOOP : ENOTDIR;
     }
     return fd;
 }
@@ -53,7 +53,7 @@ static int judge(const struct stat *status, const gw_owners_t *owners, bool *out
     if (!gw_owners_have(owners, status->st_uid)) {
         return GW_FOLDER_FOREIGN;
     }
-    return *out_shared && !sticky ? GW_FOLDER_SHARED : 0;
+    return (*out_shared && !sticky) ? GW_FOLDER_SHARED : 0;
 }
 
 int gw_folder_open(gw_folder_t *self, const char *path, const gw_owners_t *owners) {
@@ -62,7 +62,7 @@ int gw_folder_open(gw_folder_t *self, const char *path, const gw_owners_t *owner
     if (self->fd < 0) {
         return errno;
     }
-    const int error = fstat(self->fd, &status) != 0 ? errno : judge(&status, owners, &self->shared);
+    const int error = (fstat(self->fd, &status) != 0) ? errno : judge(&status, owners, &self->shared);
     if (error != 0) {
         gw_folder_close(self);
     }
@@ -80,9 +80,9 @@ int gw_folder_open_own(const char *path) {
     const gw_owners_t owners = gw_owners_of(GW_RUNTIME_DIRECTORY);
     gw_folder_t folder;
     int error = gw_folder_open(&folder, path, &owners);
-    error = error == 0 && folder.shared ? GW_FOLDER_SHARED : error;
-    const int fd = error == 0 ? openat(folder.fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
-    error = error == 0 && fd < 0 ? errno : error;
+    error = (error == 0 && folder.shared) ? GW_FOLDER_SHARED : error;
+    const int fd = (error == 0) ? openat(folder.fd, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+    error = (error == 0 && fd < 0) ? errno : error;
     gw_folder_close(&folder);
     errno = error;
     return fd;
@@ -90,8 +90,8 @@ int gw_folder_open_own(const char *path) {
 
 void gw_folder_of(const char *path, char *out_folder, size_t size) {
     const char *slash = strrchr(path, '/');
-    const int length = slash == NULL || slash == path ? 1 : (int)(slash - path);
-    (void)snprintf(out_folder, size, "%.*s", length, slash == NULL ? "." : path);
+    const int length = (slash == NULL || slash == path) ? 1 : (int)(slash - path);
+    (void)snprintf(out_folder, size, "%.*s", length, (slash == NULL) ? "." : path);
 }
 
 const char *gw_folder_fault(int error) {

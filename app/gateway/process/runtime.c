@@ -13,7 +13,7 @@ static void name_places(gw_runtime_t *self, const gateway_config_t *config, cons
     const char *local_path = gw_bus_lock_local_path(bus);
     const char *socket_path = config->northbound.socket;
     const char *slash = strrchr(socket_path, '/');
-    const int length = slash == NULL ? 0 : (int)(slash - socket_path) + 1;
+    const int length = (slash == NULL) ? 0 : (int)(slash - socket_path) + 1;
     if (local_path != NULL) {
         (void)snprintf(self->place[0], GW_RUNTIME_PATH_SIZE, "%s.armed", local_path);
     } else {
@@ -47,7 +47,7 @@ static int explain(const gw_bus_lock_t *lock, const char *bus, int error, FILE *
         return EX_UNAVAILABLE;
     }
     (void)fprintf(err, "iwheel-gateway: cannot lock the bus with %s: %s; %s\n", lock->path, strerror(error),
-                  error == ENOENT ? "make its directory, or correct --can" : "correct --can, or start it again");
+                  (error == ENOENT) ? "make its directory, or correct --can" : "correct --can, or start it again");
     return EX_UNAVAILABLE;
 }
 
@@ -56,7 +56,7 @@ static void warn(const gw_bus_lock_t *lock, const char *bus, FILE *err) {
     static const char prefix[] = "iwheel-gateway: warning:";
     const gw_owners_t *owners = &lock->names.owners;
     char who[64];
-    for (size_t i = 0; i < sizeof lock->stranger / sizeof lock->stranger[0]; ++i) {
+    for (size_t i = 0; i < sizeof lock->stranger / sizeof lock->stranger[0]; i++) {
         if (lock->stranger[i].name[0] != '\0') {
             (void)fprintf(err,
                           "%s %s holds %s, with which gateways lock %s; it is neither root nor the service, and keeps "
@@ -88,7 +88,7 @@ int gw_runtime_open(gw_runtime_t *self, const gateway_config_t *config, const ch
         return explain(&self->lock, config->bus.interface, error, err);
     }
     warn(&self->lock, config->bus.interface, err);
-    for (size_t i = 0; i < GW_RUNTIME_PLACES; ++i) {
+    for (size_t i = 0; i < GW_RUNTIME_PLACES; i++) {
         self->marked = self->marked || is_marked(&self->lock.names.owners, self->place[i]);
     }
     return 0;
@@ -106,7 +106,7 @@ static bool set_marker(gw_runtime_t *self) {
     if (self->directory != NULL) {
         (void)mkdir(self->directory, 0755); // Whether it is there now is seen next.
     }
-    for (size_t i = 0; i < GW_RUNTIME_PLACES && self->place[i][0] != '\0'; ++i) {
+    for (size_t i = 0; i < GW_RUNTIME_PLACES && self->place[i][0] != '\0'; i++) {
         self->marker_path = self->place[i];
         (void)unlink(self->place[i]); // A stranger could take his own away again.
         const int fd = open(self->place[i], O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0600);
@@ -119,7 +119,7 @@ static bool set_marker(gw_runtime_t *self) {
 
 /// Wherever it is: the one before us may have had other rights.
 static bool remove_markers(gw_runtime_t *self) {
-    for (size_t i = 0; i < GW_RUNTIME_PLACES && self->place[i][0] != '\0'; ++i) {
+    for (size_t i = 0; i < GW_RUNTIME_PLACES && self->place[i][0] != '\0'; i++) {
         if (unlink(self->place[i]) != 0 && errno != ENOENT && errno != ENOTDIR) {
             self->marker_path = self->place[i];
             return false;

@@ -11,7 +11,7 @@
 
 int gw_wakeup_open(gw_wakeup_t *self) {
     *self = (gw_wakeup_t){.fd = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC), .due_us = IW_NEVER};
-    return self->fd < 0 ? errno : 0;
+    return (self->fd < 0) ? errno : 0;
 }
 
 void gw_wakeup_close(gw_wakeup_t *self) {

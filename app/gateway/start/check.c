@@ -20,13 +20,13 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
         inspect_say(findings, "config", INSPECT_OK, "it only listens: setpoint type and current role are not needed");
     } else if (config->core.setpoint_type_set && config->core.current_role != IW_ROLE_UNSET) {
         inspect_say(findings, "config", INSPECT_OK, "setpoint type %u, current role %s", config->core.setpoint_type,
-                    config->core.current_role == IW_ROLE_LIMIT ? "limit" : "setpoint");
+                    (config->core.current_role == IW_ROLE_LIMIT) ? "limit" : "setpoint");
     } else {
         inspect_say(findings, "config", INSPECT_WARN,
                     "%s%s%s not configured: it starts and listens, arm will be refused",
                     config->core.setpoint_type_set ? "" : "setpoint_type",
-                    !config->core.setpoint_type_set && config->core.current_role == IW_ROLE_UNSET ? " and " : "",
-                    config->core.current_role == IW_ROLE_UNSET ? "current_role" : "");
+                    (!config->core.setpoint_type_set && config->core.current_role == IW_ROLE_UNSET) ? " and " : "",
+                    (config->core.current_role == IW_ROLE_UNSET) ? "current_role" : "");
         inspect_cure(findings, "set it under [wheels] in the configuration; unknown: iwheelctl bringup finds it");
     }
     const iw_stop_budget_t budget = iw_config_stop_budget(&config->core);
@@ -41,12 +41,12 @@ static bool judge_directory(const char *check, const char *path, inspect_finding
     char above[GATEWAY_PATH_SIZE];
     struct stat status;
     const char *const slash = strrchr(path, '/');
-    const char *const key = strcmp(check, "record") == 0 ? "[record] directory" : "[northbound] socket";
+    const char *const key = (strcmp(check, "record") == 0) ? "[record] directory" : "[northbound] socket";
     (void)snprintf(above, sizeof above, "%.*s",
-                   slash == NULL   ? 1
-                   : slash == path ? 1
-                                   : (int)(slash - path),
-                   slash == NULL ? "." : path);
+                   (slash == NULL)   ? 1
+                   : (slash == path) ? 1
+                                     : (int)(slash - path),
+                   (slash == NULL) ? "." : path);
     const bool there = stat(path, &status) == 0;
     if (there && !S_ISDIR(status.st_mode)) {
         inspect_say(findings, check, INSPECT_FAIL, "%s: %s is no directory", check, path);
@@ -83,14 +83,14 @@ static void judge_safety(const gateway_config_t *config, inspect_findings_t *fin
     gw_folder_close(&listener.folder);
     if (result != 0) {
         const char *const ours = "iwheel-gateway: ";
-        char *const what = strncmp(text, ours, strlen(ours)) == 0 ? text + strlen(ours) : text;
+        char *const what = (strncmp(text, ours, strlen(ours)) == 0) ? text + strlen(ours) : text;
         char *const cure = strstr(what, "; ");
         what[strcspn(what, "\n")] = '\0';
         if (cure != NULL) {
             *cure = '\0';
         }
         inspect_say(findings, "socket", INSPECT_FAIL, "%s", what);
-        inspect_cure(findings, "%s", cure != NULL ? cure + 2 : "choose another with --socket");
+        inspect_cure(findings, "%s", (cure != NULL) ? cure + 2 : "choose another with --socket");
     }
 }
 
@@ -128,10 +128,10 @@ static void judge_files(const gateway_config_t *config, inspect_findings_t *find
     const char *const path = config->northbound.socket;
     const char *const slash = strrchr(path, '/');
     (void)snprintf(directory, sizeof directory, "%.*s",
-                   slash == NULL   ? 1
-                   : slash == path ? 1
-                                   : (int)(slash - path),
-                   slash == NULL ? "." : path);
+                   (slash == NULL)   ? 1
+                   : (slash == path) ? 1
+                                     : (int)(slash - path),
+                   (slash == NULL) ? "." : path);
     if (judge_directory("socket", directory, findings) && access(directory, F_OK) == 0) {
         judge_safety(config, findings);
     }
@@ -172,9 +172,9 @@ int gw_report_check(const gateway_config_t *config, FILE *out) {
     judge_config(config, &findings);
     judge_files(config, &findings);
     judge_machine(config, &findings);
-    for (unsigned i = 0; i < findings.count; ++i) {
+    for (unsigned i = 0; i < findings.count; i++) {
         inspect_sentence(&findings.finding[i], sentence, sizeof sentence);
         (void)fprintf(out, "%-4s %s\n", inspect_verdict_word(findings.finding[i].verdict), sentence);
     }
-    return findings.total[INSPECT_FAIL] > 0U ? 1 : findings.total[INSPECT_SKIP] > 0U ? EX_UNAVAILABLE : 0;
+    return (findings.total[INSPECT_FAIL] > 0U) ? 1 : (findings.total[INSPECT_SKIP] > 0U) ? EX_UNAVAILABLE : 0;
 }

@@ -100,7 +100,7 @@ int gw_options_parse(int count, char **arguments, gw_options_t *out_options, FIL
             }
         } else if (!take_option(option, &options)) {
             (void)snprintf(what, sizeof what, "%s %s", arguments[optind - 1],
-                           option == ':' ? "needs a value" : "is no option of this program");
+                           (option == ':') ? "needs a value" : "is no option of this program");
             return misuse(err, what);
         }
     }
@@ -129,7 +129,7 @@ int gw_options_configure(const gw_options_t *options, gateway_config_t *out_conf
     if (named || access(path, F_OK) == 0 || errno != ENOENT) {
         result = gateway_config_load(path, out_config, err);
     }
-    for (size_t i = 0; i < sizeof overrides / sizeof overrides[0] && result == 0; ++i) {
+    for (size_t i = 0; i < sizeof overrides / sizeof overrides[0] && result == 0; i++) {
         const char *value = overrides[i].value;
         if (value != NULL &&
             gateway_config_override(out_config, overrides[i].name, value, overrides[i].origin, err) != 0) {

@@ -18,7 +18,7 @@ void gw_report_start(gw_daemon_t *daemon) {
     gw_log(log, GW_LOG_INFO,
            "stop budget, gateway killed: %" PRIu32 " ms and %" PRIu32 " mm at full command, then unknown",
            budget.killed_ms, budget.killed_mm);
-    for (uint32_t i = 0; i < daemon->warnings; ++i) {
+    for (uint32_t i = 0; i < daemon->warnings; i++) {
         gw_log(log, GW_LOG_WARNING, "%s", daemon->warning[i]);
     }
     if (!config->core.setpoint_type_set || config->core.current_role == IW_ROLE_UNSET) {

@@ -42,10 +42,10 @@ static void note_client(gw_daemon_t *daemon, iwn_stop_note_t *note, char *out_te
     const gw_client_t *client = gw_daemon_client(daemon, note->stop.client);
     if (client != NULL) {
         gw_client_describe(client, out_text, size);
-        (void)memcpy(note->client_name, client->name, sizeof client->name);
+        memcpy(note->client_name, client->name, sizeof client->name);
     } else if (note->stop.client == observed->holder && observed->holder != IW_CLIENT_NONE) {
         (void)snprintf(out_text, size, "%s", observed->holder_text);
-        (void)memcpy(note->client_name, observed->holder_name, sizeof observed->holder_name);
+        memcpy(note->client_name, observed->holder_name, sizeof observed->holder_name);
     } else {
         (void)snprintf(out_text, size, "a client");
     }
@@ -75,25 +75,25 @@ static void observe_stop(gw_daemon_t *daemon, const iw_stop_t *stop) {
 
 static void observe_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     gw_observed_t *observed = &daemon->observed;
-    const iw_client_t holder = seen->state == IW_STATE_ARMED ? seen->holder : IW_CLIENT_NONE;
+    const iw_client_t holder = (seen->state == IW_STATE_ARMED) ? seen->holder : IW_CLIENT_NONE;
     if (holder == observed->holder) {
         return;
     }
     const iw_client_t former = observed->holder;
     const gw_client_t *client = gw_daemon_client(daemon, holder);
-    const char *change = holder == IW_CLIENT_NONE ? "lost" : former == IW_CLIENT_NONE ? "gained" : "moved";
+    const char *change = (holder == IW_CLIENT_NONE) ? "lost" : (former == IW_CLIENT_NONE) ? "gained" : "moved";
     observed->holder = holder;
     if (client != NULL) {
         gw_client_describe(client, observed->holder_text, sizeof observed->holder_text);
-        (void)memcpy(observed->holder_name, client->name, sizeof client->name);
+        memcpy(observed->holder_name, client->name, sizeof client->name);
     }
     gw_log(&daemon->log, GW_LOG_INFO, "lease %s: %s", change,
-           holder == IW_CLIENT_NONE ? "nobody" : observed->holder_text);
+           (holder == IW_CLIENT_NONE) ? "nobody" : observed->holder_text);
     iwn_out_t json = gw_event_begin(daemon, "lease");
     iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
     iwn_out_text(&json, "change", change);
     iwn_out_known(&json, "holder", holder != IW_CLIENT_NONE, holder);
-    iwn_out_text(&json, "name", client != NULL && client->name[0] != '\0' ? client->name : NULL);
+    iwn_out_text(&json, "name", (client != NULL && client->name[0] != '\0') ? client->name : NULL);
     iwn_out_known(&json, "former", former != IW_CLIENT_NONE, former);
     gw_event_send(daemon, &json, IWN_TOPIC_LEASE);
 }
@@ -103,7 +103,7 @@ static void observe_bus(gw_daemon_t *daemon, iw_bus_state_t bus, bool first) {
         return;
     }
     daemon->observed.bus = bus;
-    gw_log(&daemon->log, bus == IW_BUS_ACTIVE ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s",
+    gw_log(&daemon->log, (bus == IW_BUS_ACTIVE) ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s",
            daemon->config.bus.interface, iwn_bus_state_name(bus));
     iwn_out_t json = gw_event_begin(daemon, "bus");
     iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
@@ -119,8 +119,8 @@ static void observe_estop(gw_daemon_t *daemon, bool first) {
     daemon->observed.estop = answer;
     const char *name = iwn_estop_name(answer, daemon->hal.estop_ops->present);
     const char *trouble = inspect_estop_trouble(&daemon->hal);
-    gw_log(&daemon->log, answer == 0 ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s", daemon->config.estop.line,
-           name, trouble[0] == '\0' ? "" : ": ", trouble);
+    gw_log(&daemon->log, (answer == 0) ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s", daemon->config.estop.line,
+           name, (trouble[0] == '\0') ? "" : ": ", trouble);
     iwn_out_t json = gw_event_begin(daemon, "estop");
     iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
     iwn_out_text(&json, "state", name);
@@ -141,7 +141,7 @@ static void observe_faults(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     gw_observed_t *observed = &daemon->observed;
     const uint32_t present = seen->present;
     const uint32_t changed = present ^ observed->present;
-    for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; ++cause) {
+    for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; cause++) {
         if ((changed & (1U << cause)) != 0U) {
             tell_fault(daemon, iwn_cause_name((iw_cause_t)cause), (present & (1U << cause)) != 0U);
         }
@@ -180,7 +180,7 @@ static bool wants_periodic(const gw_client_t *client) {
 /// Written once, for all in `due` (a bit per slot) who watch the topic.
 static void send_periodic(gw_daemon_t *daemon, iwn_topic_t topic, uint64_t due) {
     size_t length = 0;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         if ((due >> i & 1U) == 0U || (daemon->client[i].topics & (1U << topic)) == 0U) {
             continue;
         }
@@ -200,7 +200,7 @@ static void send_periodic(gw_daemon_t *daemon, iwn_topic_t topic, uint64_t due) 
 
 void gw_observe_periodic(gw_daemon_t *daemon) {
     uint64_t due = 0;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         gw_client_t *client = &daemon->client[i];
         if (wants_periodic(client) && daemon->now_us >= client->next_us) {
             const iw_time_us_t period_us = 1000000U / client->rate_hz;
@@ -219,7 +219,7 @@ void gw_observe_periodic(gw_daemon_t *daemon) {
 
 iw_time_us_t gw_observe_next_us(const gw_daemon_t *daemon) {
     iw_time_us_t next_us = IW_NEVER;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         const gw_client_t *client = &daemon->client[i];
         if (wants_periodic(client) && client->next_us < next_us) {
             next_us = client->next_us;
@@ -229,7 +229,7 @@ iw_time_us_t gw_observe_next_us(const gw_daemon_t *daemon) {
 }
 
 static bool anybody_watches(const gw_daemon_t *daemon, iwn_topic_t topic) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; ++i) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         if (daemon->client[i].id != IW_CLIENT_NONE && (daemon->client[i].topics & (1U << topic)) != 0U) {
             return true;
         }
@@ -252,7 +252,7 @@ static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
 
 void gw_observe_frames(gw_daemon_t *daemon) {
     if (anybody_watches(daemon, IWN_TOPIC_FRAME)) {
-        for (uint32_t i = 0; i < daemon->tapped; ++i) {
+        for (uint32_t i = 0; i < daemon->tapped; i++) {
             tell_frame(daemon, &daemon->tap[i]);
         }
     }

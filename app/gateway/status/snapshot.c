@@ -84,7 +84,7 @@ static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t
 }
 
 static void write_wheel(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
-    iwn_out_open(json, side == IW_LEFT ? "left" : "right", '{');
+    iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
     write_motion(seen, side, json);
     write_condition(seen, side, json);
     gw_snapshot_write_wheel_force(daemon, seen, side, json);
@@ -114,8 +114,8 @@ static void write_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_
     const bool running = holder != NULL && !seen->arming && seen->lease_until_us > seen->at_us;
     iwn_out_open(json, "lease", '{');
     iwn_out_known(json, "holder", holder != NULL, seen->holder);
-    iwn_out_text(json, "name", holder != NULL && holder->name[0] != '\0' ? holder->name : NULL);
-    iwn_out_known(json, "pid", holder != NULL && holder->pid > 0, holder != NULL ? holder->pid : 0);
+    iwn_out_text(json, "name", (holder != NULL && holder->name[0] != '\0') ? holder->name : NULL);
+    iwn_out_known(json, "pid", holder != NULL && holder->pid > 0, (holder != NULL) ? holder->pid : 0);
     iwn_out_known(json, "remaining_ms", running,
                   running ? (int64_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS) : 0);
     iwn_out_int(json, "lease_ms", seen->config->lease_ms);
@@ -183,7 +183,7 @@ static void write_counters(const iw_snapshot_t *seen, iwn_out_t *json) {
 
 void gw_snapshot_write_causes(iwn_out_t *json, const char *name, uint32_t causes) {
     iwn_out_open(json, name, '[');
-    for (unsigned cause = 0; cause < IW_CAUSES; ++cause) {
+    for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if ((causes & (1U << cause)) != 0U) {
             iwn_out_text(json, NULL, iwn_cause_name((iw_cause_t)cause));
         }
@@ -215,7 +215,7 @@ void gw_snapshot_write(gw_daemon_t *daemon, iwn_out_t *json) {
     iwn_out_bool(json, "listen_only", seen.config->listen_only);
     iwn_out_bool(json, "shutting_down", daemon->shutting_down);
     iwn_out_open(json, "warnings", '[');
-    for (uint32_t i = 0; i < daemon->warnings; ++i) {
+    for (uint32_t i = 0; i < daemon->warnings; i++) {
         iwn_out_text(json, NULL, daemon->warning[i]);
     }
     iwn_out_close(json, ']');
@@ -232,7 +232,7 @@ void gw_snapshot_write_stop(const gw_daemon_t *daemon, iwn_out_t *json) {
     iwn_out_text(json, "from", any ? iwn_state_name(stop->from) : NULL);
     iwn_out_bool(json, "latched", any && stop->latched);
     iwn_out_known(json, "client", stop->client != IW_CLIENT_NONE, stop->client);
-    iwn_out_text(json, "client_name", note->client_name[0] != '\0' ? note->client_name : NULL);
+    iwn_out_text(json, "client_name", (note->client_name[0] != '\0') ? note->client_name : NULL);
     iwn_out_known(json, "applied_left_mm_s", any, stop->applied.wheel[IW_LEFT].speed_mm_s);
     iwn_out_known(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
     iwn_out_known(json, "at_us", any, (int64_t)stop->at_us);

@@ -25,7 +25,7 @@ static int64_t age_ms(const gw_daemon_t *daemon, const iw_force_t *force, const 
     if (force->offset_us != IW_NEVER) {
         return (int64_t)((daemon->now_us - force->offset_us) / IW_US_PER_MS);
     }
-    return known->wall_us > 0 && known->wall_us <= wall_us ? (wall_us - known->wall_us) / 1000 : -1;
+    return (known->wall_us > 0 && known->wall_us <= wall_us) ? (wall_us - known->wall_us) / 1000 : -1;
 }
 
 static zero_t describe_zero(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side) {
@@ -82,7 +82,7 @@ void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, const iw_snapshot_
     gw_snapshot_write_age(json, "force_age_ms", daemon->now_us, force->raw_us);
     iwn_out_text(json, "offset_provenance", zero.word);
     iwn_out_text(json, "offset_origin",
-                 zero.known->from != IW_OFFSET_NONE ? iwn_provenance_name(zero.known->from) : NULL);
+                 (zero.known->from != IW_OFFSET_NONE) ? iwn_provenance_name(zero.known->from) : NULL);
     iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
     write_known_bool(json, "offset_contaminated", zero.judged, zero.contaminated);
     iwn_out_text(json, "offset_window", iwn_window_name(force->quality.window));
@@ -96,13 +96,13 @@ void gw_snapshot_write_wheel_force(const gw_daemon_t *daemon, const iw_snapshot_
 void gw_snapshot_write_force(const gw_daemon_t *daemon, iwn_out_t *json) {
     const iw_snapshot_t seen = gw_daemon_look(daemon);
     iwn_out_int(json, "t_us", (int64_t)daemon->now_us);
-    for (unsigned i = 0; i < IW_SIDES; ++i) {
+    for (unsigned i = 0; i < IW_SIDES; i++) {
         const iw_side_t side = (iw_side_t)i;
         const iw_force_t *force = seen.wheel[side].force;
         const iw_force_validity_t validity = iw_snapshot_force_validity(&seen, side);
         const bool heard = gw_snapshot_is_fresh(daemon->now_us, force->raw_us, IW_FORCE_STALE_US);
         const zero_t zero = describe_zero(daemon, &seen, side);
-        iwn_out_open(json, side == IW_LEFT ? "left" : "right", '{');
+        iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
         iwn_out_known(json, "raw", heard, force->raw);
         iwn_out_known(json, "raw_mN", heard, iw_force_raw_mN(force));
         iwn_out_known(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);

@@ -11,11 +11,11 @@ static const char *yes_or_no(bool yes) {
 }
 
 static const char *unit_word(iw_force_unit_t unit) {
-    return unit == IW_FORCE_CN ? "cN" : "dN";
+    return (unit == IW_FORCE_CN) ? "cN" : "dN";
 }
 
 static const char *role_word(iw_current_role_t role) {
-    return role == IW_ROLE_LIMIT ? "limit" : role == IW_ROLE_SETPOINT ? "setpoint" : "";
+    return (role == IW_ROLE_LIMIT) ? "limit" : (role == IW_ROLE_SETPOINT) ? "setpoint" : "";
 }
 
 static void write_gear(const iw_config_t *config, char out_value[IWN_VALUE_SIZE]) {
@@ -51,11 +51,11 @@ void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t it
         break;
     case IW_LEDGER_FORCE_UNIT_LEFT:
     case IW_LEDGER_FORCE_UNIT_RIGHT:
-        word = unit_word(config->force_unit[item == IW_LEDGER_FORCE_UNIT_LEFT ? IW_LEFT : IW_RIGHT]);
+        word = unit_word(config->force_unit[(item == IW_LEDGER_FORCE_UNIT_LEFT) ? IW_LEFT : IW_RIGHT]);
         break;
     case IW_LEDGER_MOUNT_SIGN_LEFT:
     case IW_LEDGER_MOUNT_SIGN_RIGHT:
-        word = yes_or_no(config->invert[item == IW_LEDGER_MOUNT_SIGN_LEFT ? IW_LEFT : IW_RIGHT]);
+        word = yes_or_no(config->invert[(item == IW_LEDGER_MOUNT_SIGN_LEFT) ? IW_LEFT : IW_RIGHT]);
         break;
     default:
         break;
@@ -104,8 +104,8 @@ static gw_found_t compare_number(const char *found, unsigned wanted, unsigned lo
     if (!read_number(found, &number, &rest) || *rest != '\0' || number < low || number > high) {
         return GW_FOUND_IMPOSSIBLE;
     }
-    const unsigned off = number > wanted ? number - wanted : wanted - number;
-    return off * 100U <= wanted * percent ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+    const unsigned off = (number > wanted) ? number - wanted : wanted - number;
+    return (off * 100U <= wanted * percent) ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
 }
 
 static gw_found_t compare_gear(const char *found, const iw_config_t *config) {
@@ -119,7 +119,7 @@ static gw_found_t compare_gear(const char *found, const iw_config_t *config) {
     if (!good || *rest != '\0' || turns < 1U || turns > 1000U || per < 1U || per > 1000U) {
         return GW_FOUND_IMPOSSIBLE;
     }
-    return turns * config->gear_per == per * config->gear_turns ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+    return (turns * config->gear_per == per * config->gear_turns) ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
 }
 
 /// One of two words.
@@ -127,7 +127,7 @@ static gw_found_t compare_word(const char *found, const char *wanted, const char
     if (strcmp(found, one) != 0 && strcmp(found, other) != 0) {
         return GW_FOUND_IMPOSSIBLE;
     }
-    return strcmp(found, wanted) == 0 ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
+    return (strcmp(found, wanted) == 0) ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
 }
 
 gw_found_t gw_assumption_compare(const gateway_config_t *configured, iw_ledger_item_t item, const char *found) {
@@ -162,7 +162,7 @@ gw_found_t gw_assumption_compare(const gateway_config_t *configured, iw_ledger_i
 /// What was measured.
 static void write_figure(iw_ledger_item_t item, const iw_ledger_entry_t *entry, char out_text[GW_EVIDENCE_SIZE]) {
     const int figure = (int)entry->figure;
-    const char *sign = figure < 0 ? "-" : "";
+    const char *sign = (figure < 0) ? "-" : "";
     const int whole = abs(figure / 1000);
     const int part = abs(figure % 1000);
     switch (item) {
@@ -192,15 +192,16 @@ static void write_figure(iw_ledger_item_t item, const iw_ledger_entry_t *entry, 
     case IW_LEDGER_DLC:
     default:
         (void)snprintf(out_text, GW_EVIDENCE_SIZE, "a frame of %d bytes was heard%s", figure,
-                       entry->state == IW_LEDGER_CONTRADICTED ? "; the table has another length" : ", as in the table");
+                       (entry->state == IW_LEDGER_CONTRADICTED) ? "; the table has another length"
+                                                                : ", as in the table");
         break;
     }
 }
 
 /// "the operator found 181 by a tape", "found by bringup: 5.00 m pushed ..."; without `how` only the operator's word.
 static void write_word(bool denied, const gw_word_t *word, char out_text[GW_EVIDENCE_SIZE]) {
-    const char *found = word->found[0] != '\0' ? word->found : "something else";
-    const char *by = word->how[0] != '\0' ? " by " : "";
+    const char *found = (word->found[0] != '\0') ? word->found : "something else";
+    const char *by = (word->how[0] != '\0') ? " by " : "";
     if (denied) {
         (void)snprintf(out_text, GW_EVIDENCE_SIZE, "the operator found %s%s%s", found, by, word->how);
     } else if (word->how[0] != '\0') {
@@ -254,7 +255,7 @@ const char *gw_assumption_cost(iw_ledger_item_t item) {
         [IW_LEDGER_POSE_BYTE_ORDER] = "no pose; this version reads it most significant byte first only",
         [IW_LEDGER_DLC] = "nothing: longer frames are read, shorter ones are ignored and counted as bad_length",
     };
-    return (unsigned)item < IW_LEDGER_ITEMS ? costs[item] : "unknown";
+    return ((unsigned)item < IW_LEDGER_ITEMS) ? costs[item] : "unknown";
 }
 
 const char *gw_assumption_cure(iw_ledger_item_t item) {
@@ -282,6 +283,7 @@ const char *gw_assumption_cure(iw_ledger_item_t item) {
         [IW_LEDGER_DLC] = "find the device that sends on the wheels' ids (iwheelctl watch frame shows them); when "
                           "it is gone: iwheelctl confirm dlc",
     };
-    const char *cure = (unsigned)item < IW_LEDGER_ITEMS ? cures[item] : NULL;
-    return cure != NULL ? cure : "settle it: iwheelctl ledger tells what it is about, iwheelctl confirm what is right";
+    const char *cure = ((unsigned)item < IW_LEDGER_ITEMS) ? cures[item] : NULL;
+    return (cure != NULL) ? cure
+                          : "settle it: iwheelctl ledger tells what it is about, iwheelctl confirm what is right";
 }

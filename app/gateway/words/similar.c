@@ -8,7 +8,7 @@
 #define DISTANCE_MAX  3U
 
 static size_t least(size_t a, size_t b) {
-    return a < b ? a : b;
+    return (a < b) ? a : b;
 }
 
 /// Levenshtein's distance; `width` is the length of `b`, at most LETTERS_MAX.
@@ -22,7 +22,7 @@ static size_t distance(const char *a, const char *b, size_t width) {
         row[0] = i + 1U;
         for (size_t j = 0; j < width; j++) {
             const size_t above = row[j + 1U];
-            row[j + 1U] = least(diagonal + (a[i] != b[j] ? 1U : 0U), 1U + least(above, row[j]));
+            row[j + 1U] = least(diagonal + ((a[i] != b[j]) ? 1U : 0U), 1U + least(above, row[j]));
             diagonal = above;
         }
     }
@@ -39,5 +39,5 @@ size_t gw_word_distance(const char *typed, const char *known) {
         return GW_WORD_STRANGE;
     }
     const size_t far = distance(typed, known, width);
-    return far <= DISTANCE_MAX && 2U * far <= width ? far : GW_WORD_STRANGE;
+    return (far <= DISTANCE_MAX && 2U * far <= width) ? far : GW_WORD_STRANGE;
 }

@@ -66,7 +66,7 @@ const char *iwc_words(iwc_result_t result) {
         [IWC_SEVERAL] = "several gateways are running; name the socket of one (IWHEEL_SOCKET)",
     };
     const size_t index = (size_t)result;
-    return (index < sizeof(words) / sizeof(words[0])) ? words[index] : "";
+    return (index < sizeof words / sizeof words[0]) ? words[index] : "";
 }
 
 // ---- finding the socket -------------------------------------------------------------------------------------------
@@ -88,8 +88,8 @@ static iwc_result_t find_in(const char *directory, char *out, size_t size) {
         return (errno == EACCES) ? IWC_DENIED : IWC_NOT_THERE;
     }
     for (const struct dirent *entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
-        const int length = snprintf(path, sizeof(path), "%s/%s", directory, entry->d_name);
-        if (length > 0 && (size_t)length < sizeof(path) && is_socket(path)) {
+        const int length = snprintf(path, sizeof path, "%s/%s", directory, entry->d_name);
+        if (length > 0 && (size_t)length < sizeof path && is_socket(path)) {
             found++;
             const int n = snprintf(out + used, size - used, "%s%s", (used > 0) ? " " : "", path);
             used += (n > 0 && (size_t)n < size - used) ? (size_t)n : 0U;
@@ -137,7 +137,7 @@ void iwc_end(iwc_t *self, iwc_result_t result) {
     self->fd = -1;
     self->over = result;
     self->number = 0;
-    memset(self->driven, 0, sizeof(self->driven));
+    memset(self->driven, 0, sizeof self->driven);
 }
 
 void iwc_close(iwc_t *self) {
@@ -204,8 +204,8 @@ static void begin(iwc_t *self) {
 }
 
 void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply) {
-    (void)iwc_text(reply, "error", self->error, sizeof(self->error));
-    (void)iwc_text(reply, "message", self->reason, sizeof(self->reason));
+    (void)iwc_text(reply, "error", self->error, sizeof self->error);
+    (void)iwc_text(reply, "message", self->reason, sizeof self->reason);
 }
 
 /// The first line tells who is there: the event hello, or the refusal of one client too many.
@@ -265,14 +265,14 @@ static iwc_result_t meaning_of(int error) {
 /// Calls `self->path` until somebody takes the call or the time is over.
 static iwc_result_t call(iwc_t *self, int64_t deadline_us) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
-    memcpy(address.sun_path, self->path, sizeof(address.sun_path));
+    memcpy(address.sun_path, self->path, sizeof address.sun_path);
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     iwc_result_t result = IWC_OK;
     if (fd < 0) {
         self->error_number = errno;
         return IWC_NOT_THERE;
     }
-    while (result == IWC_OK && connect(fd, (const struct sockaddr *)&address, sizeof(address)) != 0) {
+    while (result == IWC_OK && connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
         const int error = errno;
         const int64_t now_us = iwc_now_us();
         if (error == EAGAIN && now_us < deadline_us) {
@@ -296,17 +296,17 @@ iwc_result_t iwc_connect(iwc_t *self, const char *path, int timeout_ms) {
     const int64_t deadline_us = iwc_deadline_us(timeout_ms);
     begin(self);
     if (path == NULL) {
-        const iwc_result_t result = iwc_find(NULL, found, sizeof(found));
+        const iwc_result_t result = iwc_find(NULL, found, sizeof found);
         if (result != IWC_OK) {
             return result;
         }
         path = found;
     }
-    if (strlen(path) >= sizeof(self->path)) {
+    if (strlen(path) >= sizeof self->path) {
         self->error_number = ENAMETOOLONG;
         return IWC_INVALID;
     }
-    memset(self->path, 0, sizeof(self->path));
+    memset(self->path, 0, sizeof self->path);
     memcpy(self->path, path, strlen(path));
     const iwc_result_t result = call(self, deadline_us);
     return (result == IWC_OK) ? greet(self, deadline_us) : result;

@@ -111,7 +111,7 @@ bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_state_t *out
     memset(out_state, 0, sizeof(*out_state));
     out_state->t_us = iwc_integer(message, "t_us").value;
     out_state->machine = machine_of(message);
-    (void)iwc_text(message, "cause", out_state->cause, sizeof(out_state->cause));
+    (void)iwc_text(message, "cause", out_state->cause, sizeof out_state->cause);
     out_state->holder = iwc_integer(message, "lease.holder");
     out_state->ours = out_state->holder.known && self->number != 0 && out_state->holder.value == self->number;
     out_state->remaining_ms = iwc_integer(message, "lease.remaining_ms");

@@ -118,7 +118,7 @@ static iwc_span_t skip_number(iwc_span_t rest) {
 
 static iwc_span_t skip_word(iwc_span_t rest) {
     static const char *const words[] = {"true", "false", "null"};
-    for (size_t i = 0; i < sizeof(words) / sizeof(words[0]); i++) {
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
         const size_t length = strlen(words[i]);
         if (rest.length >= length && memcmp(rest.at, words[i], length) == 0) {
             return forward(rest, length);

@@ -167,7 +167,7 @@ static request_t begin_request(const char *cmd) {
 
 static void add_integer(request_t *self, const char *key, int32_t value) {
     char text[48];
-    (void)snprintf(text, sizeof(text), ",\"%s\":%ld", key, (long)value);
+    (void)snprintf(text, sizeof text, ",\"%s\":%ld", key, (long)value);
     add(self, text);
 }
 
@@ -210,7 +210,7 @@ iwc_result_t iwc_status(iwc_t *self, int timeout_ms, iwc_state_t *out_state) {
 
 iwc_result_t iwc_watch(iwc_t *self, unsigned topics, int rate_hz, int timeout_ms) {
     static const char *const names[] = {"state", "bus", "estop", "lease", "stop", "force", "frame"};
-    const size_t count = sizeof(names) / sizeof(names[0]);
+    const size_t count = sizeof names / sizeof names[0];
     request_t request = begin_request("watch");
     if (topics >= 1U << count || rate_hz < 1 || rate_hz > 100) {
         return IWC_INVALID;

@@ -16,8 +16,8 @@
 /// already removed). Evidence against the configuration makes force invalid; nothing is ever rescaled.
 ///
 /// Thresholds are ours; the document gives none.
-#ifndef IW_FORCE_H
-#define IW_FORCE_H
+#ifndef IW_FORCE_OFFSET_H
+#define IW_FORCE_OFFSET_H
 
 #include "iwheel/types.h"
 

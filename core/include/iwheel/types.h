@@ -127,7 +127,7 @@ typedef enum {
     IW_REFUSE_NOT_AT_REST,
     IW_REFUSE_SEND_STALLED,
     IW_REFUSE_SECOND_MASTER,
-    IW_REFUSE_CAUSE_PRESENT, ///< `iw_permit_present` tells which.
+    IW_REFUSE_CAUSE_PRESENT, ///< `iw_snapshot_t::present` tells which.
     IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
     IW_REFUSE_STALE_COMMAND, ///< `iw_permit_t::stale_client` sent a nonzero drive too recently.
     IW_REFUSE_LISTEN_ONLY,

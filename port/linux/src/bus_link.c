@@ -9,7 +9,7 @@
 iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint16_t sample_point_permille) {
     const uint16_t actual = link->sample_point_permille;
     const uint16_t off =
-        (uint16_t)(actual > sample_point_permille ? actual - sample_point_permille : sample_point_permille - actual);
+        (uint16_t)((actual > sample_point_permille) ? actual - sample_point_permille : sample_point_permille - actual);
     if (link->is_virtual) {
         return IW_TIMING_VIRTUAL;
     }
@@ -22,7 +22,7 @@ iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint
     if (link->bitrate_hz == 0U || actual == 0U) {
         return IW_TIMING_UNKNOWN;
     }
-    return off > IW_TIMING_NEAR_PERMILLE ? IW_TIMING_NEAR : IW_TIMING_RIGHT;
+    return (off > IW_TIMING_NEAR_PERMILLE) ? IW_TIMING_NEAR : IW_TIMING_RIGHT;
 }
 
 bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other) {
@@ -33,6 +33,6 @@ bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other) {
 }
 
 uint32_t iw_bus_frame_bits(const iw_can_frame_t *frame) {
-    const uint32_t bytes = (frame->id & IW_CAN_REMOTE) != 0U ? 0U : frame->dlc;
-    return ((frame->id & IW_CAN_EXTENDED) != 0U ? BITS_EXTENDED : BITS_STANDARD) + BITS_PER_BYTE * bytes;
+    const uint32_t bytes = ((frame->id & IW_CAN_REMOTE) != 0U) ? 0U : frame->dlc;
+    return (((frame->id & IW_CAN_EXTENDED) != 0U) ? BITS_EXTENDED : BITS_STANDARD) + BITS_PER_BYTE * bytes;
 }

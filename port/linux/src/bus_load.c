@@ -14,7 +14,7 @@ bool iw_bus_load_take(iw_bus_load_t *self, iw_time_us_t now_us, uint32_t bitrate
     if (span_us < US_PER_S) {
         return false;
     }
-    const uint64_t rate_hz = bitrate_hz != 0U ? bitrate_hz : BITRATE_ASSUMED_HZ;
+    const uint64_t rate_hz = (bitrate_hz != 0U) ? bitrate_hz : BITRATE_ASSUMED_HZ;
     *out_permille = (uint32_t)(self->bits * US_PER_S / rate_hz * 1000U / span_us);
     iw_bus_load_begin(self, now_us);
     return true;

@@ -39,7 +39,7 @@ static iw_time_us_t button_next_us(const void *self) {
 }
 
 static void take_levels(unix_estop_t *button, const char *levels, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
+    for (size_t i = 0; i < count; i++) {
         const bool level = levels[i] != '0'; // Whatever is not clearly "released" is pressed.
         button->edge = button->edge || level || (button->known && level != button->level);
         button->level = level;

@@ -13,7 +13,7 @@ static const char chip_prefix[] = "gpiochip";
 static const char *read_number(const char *text, char end, unsigned *out_number) {
     unsigned number = 0;
     const char *digit = text;
-    for (; isdigit((unsigned char)*digit) != 0 && number <= OFFSET_MAX; ++digit) {
+    for (; isdigit((unsigned char)*digit) != 0 && number <= OFFSET_MAX; digit++) {
         number = number * 10U + (unsigned)(*digit - '0');
     }
     if (digit == text || *digit != end || number > OFFSET_MAX) {
@@ -41,7 +41,7 @@ int iw_gpio_address_parse(const char *text, iw_gpio_address_t *out_address) {
     if (length >= sizeof address.name) {
         return ENAMETOOLONG;
     }
-    (void)memcpy(address.name, text, length);
+    memcpy(address.name, text, length);
     *out_address = address;
     return 0;
 }

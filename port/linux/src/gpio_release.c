@@ -21,5 +21,5 @@ bool iw_gpio_release_take_pressed(iw_gpio_release_t *self, iw_time_us_t now_us) 
 }
 
 iw_time_us_t iw_gpio_release_next_us(const iw_gpio_release_t *self, iw_time_us_t now_us) {
-    return !self->active && now_us < self->released_us ? self->released_us : IW_NEVER;
+    return (!self->active && now_us < self->released_us) ? self->released_us : IW_NEVER;
 }

@@ -14,7 +14,7 @@ static struct gpiod_line *find(const iw_gpio_address_t *address) {
         return gpiod_line_find(address->name);
     }
     struct gpiod_chip *chip = gpiod_chip_open_by_name(address->name);
-    struct gpiod_line *line = chip == NULL ? NULL : gpiod_chip_get_line(chip, address->offset);
+    struct gpiod_line *line = (chip == NULL) ? NULL : gpiod_chip_get_line(chip, address->offset);
     if (chip != NULL && line == NULL) {
         gpiod_chip_close(chip);
         errno = ENOENT;
@@ -27,7 +27,7 @@ int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
     errno = 0;
     struct gpiod_line *line = find(address);
     if (line == NULL) {
-        return errno != 0 ? errno : ENOENT;
+        return (errno != 0) ? errno : ENOENT;
     }
     self->line = line;
     if (gpiod_line_request_both_edges_events_flags(line, "iwheel-gateway e-stop",
@@ -59,7 +59,7 @@ int iw_gpio_line_take_edges(iw_gpio_line_t *self) {
     while (taken < IW_GPIO_EDGES_MAX) {
         const int count = gpiod_line_event_read_fd_multiple(self->fd, events, EVENTS);
         if (count < 0) {
-            return errno == EAGAIN || errno == EINTR ? taken : -1;
+            return (errno == EAGAIN || errno == EINTR) ? taken : -1;
         }
         if (count == 0) {
             return taken;

@@ -35,18 +35,18 @@ static struct gpiod_chip *search(const iw_gpio_address_t *address, unsigned *out
     struct gpiod_chip *chip = NULL;
     int refusal = 0;
     DIR *folder = opendir("/dev");
-    const struct dirent *entry = folder == NULL ? NULL : readdir(folder);
+    const struct dirent *entry = (folder == NULL) ? NULL : readdir(folder);
     for (; entry != NULL && chip == NULL; entry = readdir(folder)) {
         if (strncmp(entry->d_name, "gpiochip", 8) == 0) {
             (void)snprintf(path, sizeof path, "/dev/%s", entry->d_name);
             chip = try_chip(path, address, out_offset);
-            refusal = errno == EACCES || errno == EPERM ? errno : refusal;
+            refusal = (errno == EACCES || errno == EPERM) ? errno : refusal;
         }
     }
     if (folder != NULL) {
         (void)closedir(folder);
     }
-    errno = refusal != 0 ? refusal : ENOENT;
+    errno = (refusal != 0) ? refusal : ENOENT;
     return chip;
 }
 
@@ -91,13 +91,13 @@ int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
     errno = 0;
     self->chip = find(address, &offset);
     if (self->chip == NULL) {
-        return errno != 0 ? errno : ENOENT;
+        return (errno != 0) ? errno : ENOENT;
     }
     self->line = request((struct gpiod_chip *)self->chip, offset);
-    self->events = self->line == NULL ? NULL : gpiod_edge_event_buffer_new(EVENTS);
-    self->fd = self->events == NULL ? -1 : gpiod_line_request_get_fd((struct gpiod_line_request *)self->line);
+    self->events = (self->line == NULL) ? NULL : gpiod_edge_event_buffer_new(EVENTS);
+    self->fd = (self->events == NULL) ? -1 : gpiod_line_request_get_fd((struct gpiod_line_request *)self->line);
     if (self->fd < 0 || fcntl(self->fd, F_SETFL, O_NONBLOCK) != 0) {
-        const int error = errno != 0 ? errno : ENOMEM;
+        const int error = (errno != 0) ? errno : ENOMEM;
         iw_gpio_line_close(self);
         return error;
     }
@@ -122,7 +122,7 @@ int iw_gpio_line_level(const iw_gpio_line_t *self) {
         return -1;
     }
     const enum gpiod_line_value value = gpiod_line_request_get_value(line, offset);
-    return value == GPIOD_LINE_VALUE_ERROR ? -1 : (int)(value == GPIOD_LINE_VALUE_ACTIVE);
+    return (value == GPIOD_LINE_VALUE_ERROR) ? -1 : (int)(value == GPIOD_LINE_VALUE_ACTIVE);
 }
 
 int iw_gpio_line_take_edges(iw_gpio_line_t *self) {
@@ -131,7 +131,7 @@ int iw_gpio_line_take_edges(iw_gpio_line_t *self) {
         const int count = gpiod_line_request_read_edge_events((struct gpiod_line_request *)self->line,
                                                               (struct gpiod_edge_event_buffer *)self->events, EVENTS);
         if (count < 0) {
-            return errno == EAGAIN || errno == EINTR ? taken : -1;
+            return (errno == EAGAIN || errno == EINTR) ? taken : -1;
         }
         if (count == 0) {
             return taken;

@@ -94,7 +94,7 @@ void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us) {
 iw_time_us_t iw_linux_hal_next_us(const iw_linux_hal_t *self) {
     const iw_time_us_t bus_us = self->bus_ops->next_us(&self->bus);
     const iw_time_us_t estop_us = self->estop_ops->next_us(&self->estop);
-    return bus_us < estop_us ? bus_us : estop_us;
+    return (bus_us < estop_us) ? bus_us : estop_us;
 }
 
 const iw_bus_link_t *iw_linux_hal_link(const iw_linux_hal_t *self) {

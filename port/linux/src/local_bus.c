@@ -69,7 +69,7 @@ static int local_send(void *self, const iw_can_frame_t *frame) {
         return -1;
     }
     struct can_frame raw = {.can_id = frame->id & IW_CAN_ID_MASK, .len = frame->dlc};
-    (void)memcpy(raw.data, frame->data, sizeof raw.data);
+    memcpy(raw.data, frame->data, sizeof raw.data);
     const ssize_t sent = send(bus->link.fd, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL);
     if (sent == (ssize_t)sizeof raw) {
         return 1;
@@ -95,23 +95,23 @@ static void hear_error(local_bus_t *bus, const struct can_frame *raw) {
         bus->unheeded = IW_BUS_OFF;
         bus->present = IW_BUS_ACTIVE;
     } else if (bus->present >= IW_BUS_PASSIVE && (error == IW_CAN_ERROR_PASSIVE || error == IW_CAN_ERROR_ACTIVE)) {
-        bus->present = error == IW_CAN_ERROR_PASSIVE ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
+        bus->present = (error == IW_CAN_ERROR_PASSIVE) ? IW_BUS_PASSIVE : IW_BUS_ACTIVE;
     }
 }
 
 static void fill_batch(local_bus_t *bus) {
     struct mmsghdr message[BATCH];
     struct iovec part[BATCH];
-    (void)memset(message, 0, sizeof message);
-    for (uint32_t i = 0; i < BATCH; ++i) {
+    memset(message, 0, sizeof message);
+    for (uint32_t i = 0; i < BATCH; i++) {
         part[i] = (struct iovec){.iov_base = &bus->batch[i], .iov_len = sizeof bus->batch[i]};
         message[i].msg_hdr.msg_iov = &part[i];
         message[i].msg_hdr.msg_iovlen = 1;
     }
     const int count = recvmmsg(bus->link.fd, message, BATCH, MSG_DONTWAIT, NULL);
     bus->next = 0;
-    bus->count = count > 0 ? (uint32_t)count : 0U;
-    for (uint32_t i = 0; i < bus->count; ++i) {
+    bus->count = (count > 0) ? (uint32_t)count : 0U;
+    for (uint32_t i = 0; i < bus->count; i++) {
         const bool whole = (message[i].msg_hdr.msg_flags & MSG_TRUNC) == 0;
         bus->size[i] = whole ? message[i].msg_len : sizeof bus->batch[i] + 1U;
     }
@@ -135,7 +135,7 @@ static bool take_message(local_bus_t *bus, iw_can_frame_t *out_frame) {
         hear_error(bus, &bus->batch[i]);
         return false;
     }
-    *out_frame = iw_socketcan_translate(&bus->batch[i], bus->batch[i].__res0 == MARK_ECHO ? MSG_CONFIRM : 0);
+    *out_frame = iw_socketcan_translate(&bus->batch[i], (bus->batch[i].__res0 == MARK_ECHO) ? MSG_CONFIRM : 0);
     return true;
 }
 
@@ -172,7 +172,7 @@ static int local_purge(void *self) {
     if (iw_unix_link_is_up(&bus->link)) {
         lose(bus);
         bus->told.purge = IW_LINK_PURGE_DONE;
-        ++bus->told.changes;
+        bus->told.changes++;
     }
     return 0;
 }

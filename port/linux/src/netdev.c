@@ -31,7 +31,7 @@ iw_link_presence_t iw_netdev_presence(int fd, const char *name, int *out_index) 
     if (!is_can) {
         return IW_LINK_NOT_CAN;
     }
-    return ((unsigned)request.ifr_flags & (unsigned)IFF_UP) != 0U ? IW_LINK_UP : IW_LINK_DOWN;
+    return (((unsigned)request.ifr_flags & (unsigned)IFF_UP) != 0U) ? IW_LINK_UP : IW_LINK_DOWN;
 }
 
 int iw_netdev_carrier(const char *name) {
@@ -47,5 +47,5 @@ int iw_netdev_carrier(const char *name) {
     if (size != 1) {
         return -1;
     }
-    return digit == '1' ? 1 : 0;
+    return (digit == '1') ? 1 : 0;
 }

@@ -44,7 +44,7 @@ int iw_netlink_fd(const iw_netlink_t *self) {
 bool iw_netlink_take_events(iw_netlink_t *self) {
     char first[64]; // Only that there is one counts; the rest of the message is dropped.
     bool any = false;
-    for (int i = 0; i < EVENTS_MAX; ++i) {
+    for (int i = 0; i < EVENTS_MAX; i++) {
         if (recv(iw_netlink_fd(self), first, sizeof first, 0) < 0 && errno != ENOBUFS) {
             break;
         }
@@ -75,9 +75,9 @@ static int take(const iw_netlink_t *self, const struct nlmsghdr *reply, iw_netli
     }
     if (reply->nlmsg_type == NLMSG_ERROR) {
         const struct nlmsgerr *verdict = (const struct nlmsgerr *)mnl_nlmsg_get_payload(reply);
-        return mnl_nlmsg_get_payload_len(reply) < sizeof *verdict ? EBADMSG : -verdict->error;
+        return (mnl_nlmsg_get_payload_len(reply) < sizeof *verdict) ? EBADMSG : -verdict->error;
     }
-    return out_reading != NULL && iw_netlink_parse(reply, out_reading) ? 0 : EBADMSG;
+    return (out_reading != NULL && iw_netlink_parse(reply, out_reading)) ? 0 : EBADMSG;
 }
 
 /// Sends the request and takes its reply, which is there as soon as the kernel has taken the request.
@@ -86,7 +86,7 @@ static int ask(iw_netlink_t *self, const struct nlmsghdr *request, iw_netlink_re
     if (mnl_socket_sendto(self->socket, request, request->nlmsg_len) < 0) {
         return errno;
     }
-    for (int i = 0; i < REPLIES_MAX; ++i) {
+    for (int i = 0; i < REPLIES_MAX; i++) {
         const ssize_t size = mnl_socket_recvfrom(self->socket, buffer, sizeof buffer);
         if (size < 0) {
             return errno;
@@ -110,7 +110,7 @@ int iw_netlink_read(iw_netlink_t *self, const char *name, iw_netlink_reading_t *
     if (error != 0) {
         *out_reading = (iw_netlink_reading_t){.link = {.presence = IW_LINK_ABSENT}, .state = IW_BUS_DOWN};
     }
-    return error == ENODEV ? 0 : error;
+    return (error == ENODEV) ? 0 : error;
 }
 
 int iw_netlink_set_up(iw_netlink_t *self, int index, bool up) {

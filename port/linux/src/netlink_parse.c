@@ -41,7 +41,7 @@ static bool get(attributes_t among, uint16_t type, void *out, size_t size) {
     if (attribute == NULL || mnl_attr_get_payload_len(attribute) < size) {
         return false;
     }
-    (void)memcpy(out, mnl_attr_get_payload(attribute), size);
+    memcpy(out, mnl_attr_get_payload(attribute), size);
     return true;
 }
 
@@ -67,7 +67,7 @@ static void parse_controller(attributes_t data, iw_netlink_reading_t *reading) {
     iw_bus_link_t *link = &reading->link;
     if (get(data, IFLA_CAN_BITTIMING, &timing, sizeof timing)) {
         link->bitrate_hz = timing.bitrate;
-        link->sample_point_permille = (uint16_t)(timing.sample_point <= 1000U ? timing.sample_point : 0U);
+        link->sample_point_permille = (uint16_t)((timing.sample_point <= 1000U) ? timing.sample_point : 0U);
     }
     if (get(data, IFLA_CAN_CTRLMODE, &mode, sizeof mode)) {
         link->is_mute = (mode.flags & CAN_CTRLMODE_LISTENONLY) != 0U;
@@ -100,13 +100,13 @@ bool iw_netlink_parse(const struct nlmsghdr *message, iw_netlink_reading_t *out_
                               (uint32_t)(mnl_nlmsg_get_payload_len(message) - sizeof *interface)};
     iw_bus_link_t *link = &out_reading->link;
     *out_reading = (iw_netlink_reading_t){.index = interface->ifi_index, .state = IW_BUS_DOWN};
-    link->presence = (interface->ifi_flags & IFF_UP) != 0U ? IW_LINK_UP : IW_LINK_DOWN;
+    link->presence = ((interface->ifi_flags & IFF_UP) != 0U) ? IW_LINK_UP : IW_LINK_DOWN;
     if (interface->ifi_type != ARPHRD_CAN) {
         link->presence = IW_LINK_NOT_CAN;
         return true;
     }
     link->echo_proven = (interface->ifi_flags & IFF_ECHO) != 0U;
-    out_reading->state = link->presence == IW_LINK_UP ? IW_BUS_ACTIVE : IW_BUS_DOWN;
+    out_reading->state = (link->presence == IW_LINK_UP) ? IW_BUS_ACTIVE : IW_BUS_DOWN;
     (void)get(all, IFLA_TXQLEN, &link->queue_length, sizeof link->queue_length);
     const struct nlattr *info = find(all, IFLA_LINKINFO);
     if (info != NULL) {

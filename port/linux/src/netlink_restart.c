@@ -21,7 +21,7 @@ static int restart(int interface) {
         return error;
     }
     error = iw_netlink_set_up(&netlink, interface, true);
-    for (int i = 1; i < TRIES_MAX && error != 0 && error != ENODEV; ++i) {
+    for (int i = 1; i < TRIES_MAX && error != 0 && error != ENODEV; i++) {
         (void)sleep(PAUSE_S);
         error = iw_netlink_set_up(&netlink, interface, true);
     }
@@ -36,7 +36,7 @@ int iw_netlink_restart_start(int interface, pid_t *out_process) {
     if (process == 0) {
         (void)close_range(STDERR_FILENO + 1, UINT_MAX, 0); // Else our clients and our lock would seem to live on in it.
         const int error = restart(interface);
-        _exit(error <= UCHAR_MAX ? error : EIO);
+        _exit((error <= UCHAR_MAX) ? error : EIO);
     }
     *out_process = process;
     return 0;

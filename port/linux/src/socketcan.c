@@ -57,7 +57,7 @@ static void lose(socketcan_t *bus, int error) {
     bus->up = false;
     bus->unheeded = IW_BUS_DOWN;
     bus->look_us = bus->now_us;
-    bus->interface = error == ENODEV ? 0 : bus->interface;
+    bus->interface = (error == ENODEV) ? 0 : bus->interface;
     iw_socketcan_socket_forget(&bus->ours);
     iw_socketcan_socket_forget(&bus->others);
 }
@@ -104,13 +104,13 @@ static void drop_old(socketcan_t *bus) {
     }
     const int error = iw_socketcan_socket_drop(&bus->ours);
     (void)iw_socketcan_socket_drop(&bus->others);
-    bus->interface = error == ENODEV ? 0 : bus->interface;
+    bus->interface = (error == ENODEV) ? 0 : bus->interface;
 }
 
 static void note_state(socketcan_t *bus, iw_bus_state_t state) {
     bus->present = state;
-    bus->unheeded = state < IW_BUS_PASSIVE ? state : bus->unheeded;
-    bus->look_us = state < IW_BUS_PASSIVE ? bus->now_us + RETRY_US : IW_NEVER;
+    bus->unheeded = (state < IW_BUS_PASSIVE) ? state : bus->unheeded;
+    bus->look_us = (state < IW_BUS_PASSIVE) ? bus->now_us + RETRY_US : IW_NEVER;
 }
 
 /// Looks whether the interface is back, and if so goes on with the sockets there are, or opens new ones.
@@ -139,7 +139,7 @@ static void look_at_carrier(socketcan_t *bus) {
     if (carrier == 0) {
         note_state(bus, IW_BUS_OFF);
     } else {
-        note_state(bus, bus->present < IW_BUS_PASSIVE ? IW_BUS_ACTIVE : bus->present);
+        note_state(bus, (bus->present < IW_BUS_PASSIVE) ? IW_BUS_ACTIVE : bus->present);
     }
 }
 
@@ -172,11 +172,11 @@ static void fill_ours(socketcan_t *bus) {
         lose(bus, error);
         return;
     }
-    for (uint32_t i = 0; i < ours->count; ++i) {
+    for (uint32_t i = 0; i < ours->count; i++) {
         const struct can_frame *raw = &ours->frame[i];
         if ((raw->can_id & CAN_ERR_FLAG) != 0U) {
             hear_error(bus, iw_can_error_of(raw), (ours->flags[i] & MSG_DONTROUTE) != 0);
-            ++errors;
+            errors++;
         } else {
             bus->load.bits += iw_socketcan_bits(raw);
         }
@@ -184,7 +184,7 @@ static void fill_ours(socketcan_t *bus) {
     if (ours->count == 0U) {
         (void)iw_netlink_take_events(&bus->events); // No news while up, but unread they would wake us for ever.
     } else if (errors == ours->count && bus->errors_left > 0U) {
-        --bus->errors_left;
+        bus->errors_left--;
     }
     if (ours->lost != lost) {
         bus->link.lost = ours->lost;
@@ -198,7 +198,7 @@ static int open_descriptors(socketcan_t *bus) {
         return errno;
     }
     int error = iw_netlink_open(&bus->netlink);
-    error = error != 0 ? error : iw_netlink_open_events(&bus->events);
+    error = (error != 0) ? error : iw_netlink_open_events(&bus->events);
     if (error != 0) {
         return error;
     }
@@ -254,10 +254,10 @@ static void follow_restart(socketcan_t *bus) {
         return;
     }
     bus->restarting = 0;
-    bus->link.purge = result == 0                           ? IW_LINK_PURGE_DONE
-                      : result == EPERM || result == EACCES ? IW_LINK_PURGE_NOT_ALLOWED
-                                                            : IW_LINK_PURGE_FAILED;
-    ++bus->link.changes;
+    bus->link.purge = (result == 0)                           ? IW_LINK_PURGE_DONE
+                      : (result == EPERM || result == EACCES) ? IW_LINK_PURGE_NOT_ALLOWED
+                                                              : IW_LINK_PURGE_FAILED;
+    bus->link.changes++;
 }
 
 static void can_tend(void *self, iw_time_us_t now_us) {
@@ -339,7 +339,7 @@ static bool take_others(socketcan_t *bus, iw_can_frame_t *out_frame) {
         return false;
     }
     bus->load.bits += iw_socketcan_bits(&others->frame[others->next - 1U]);
-    --bus->others_left;
+    bus->others_left--;
     return true;
 }
 
@@ -356,7 +356,7 @@ static iw_bus_state_t can_state(void *self) {
     const iw_bus_state_t unheeded = bus->unheeded;
     const iw_bus_state_t now = bus->up ? bus->present : IW_BUS_DOWN;
     bus->unheeded = IW_BUS_ACTIVE;
-    return unheeded != IW_BUS_ACTIVE ? unheeded : now;
+    return (unheeded != IW_BUS_ACTIVE) ? unheeded : now;
 }
 
 /// Has the link taken down and up: that empties the queue and the controller. It takes its time, so nothing can be
@@ -370,7 +370,7 @@ static int can_purge(void *self) {
     if (bus->restarting == 0 && bus->up && iw_netlink_restart_start(bus->interface, &bus->restarting) != 0) {
         bus->restarting = 0;
         bus->link.purge = IW_LINK_PURGE_FAILED;
-        ++bus->link.changes;
+        bus->link.changes++;
     }
     return 0;
 }

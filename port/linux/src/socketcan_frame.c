@@ -13,8 +13,8 @@ IW_STATIC_ASSERT(IW_CAN_EXTENDED == CAN_EFF_FLAG && IW_CAN_REMOTE == CAN_RTR_FLA
 IW_STATIC_ASSERT(sizeof(struct can_frame) == 16, socketcan_frame_size);
 
 void iw_socketcan_filters(iw_socketcan_share_t share, struct can_filter *out_filters) {
-    const canid_t invert = share == IW_SOCKETCAN_OTHERS ? CAN_INV_FILTER : 0U;
-    for (size_t i = 0; i < IW_SOCKETCAN_IDS; ++i) {
+    const canid_t invert = (share == IW_SOCKETCAN_OTHERS) ? CAN_INV_FILTER : 0U;
+    for (size_t i = 0; i < IW_SOCKETCAN_IDS; i++) {
         out_filters[i] = (struct can_filter){.can_id = iw_codec_rows[i].id | invert, .can_mask = CAN_EFF_MASK};
     }
 }
@@ -23,12 +23,12 @@ iw_can_frame_t iw_socketcan_translate(const struct can_frame *raw, int flags) {
     const bool extended = (raw->can_id & CAN_EFF_FLAG) != 0U;
     iw_can_frame_t frame = {
         .id = raw->can_id & (extended ? CAN_EFF_MASK | CAN_EFF_FLAG : CAN_SFF_MASK),
-        .dlc = raw->len <= IW_CAN_DATA_MAX ? raw->len : (uint8_t)IW_CAN_DATA_MAX,
-        .kind = (uint8_t)((flags & MSG_CONFIRM) != 0 ? IW_CAN_ECHO : IW_CAN_RECEIVED),
+        .dlc = (raw->len <= IW_CAN_DATA_MAX) ? raw->len : (uint8_t)IW_CAN_DATA_MAX,
+        .kind = (uint8_t)(((flags & MSG_CONFIRM) != 0) ? IW_CAN_ECHO : IW_CAN_RECEIVED),
     };
     frame.id |= raw->can_id & CAN_RTR_FLAG;
-    frame.id |= (flags & MSG_TRUNC) != 0 ? IW_CAN_FD : 0U;
-    (void)memcpy(frame.data, raw->data, sizeof frame.data);
+    frame.id |= ((flags & MSG_TRUNC) != 0) ? IW_CAN_FD : 0U;
+    memcpy(frame.data, raw->data, sizeof frame.data);
     return frame;
 }
 
@@ -37,7 +37,7 @@ uint32_t iw_can_error_mask(void) {
 }
 
 iw_can_error_t iw_can_error_of(const struct can_frame *raw) {
-    const uint8_t controller = (raw->can_id & CAN_ERR_CRTL) != 0U ? raw->data[1] : 0U;
+    const uint8_t controller = ((raw->can_id & CAN_ERR_CRTL) != 0U) ? raw->data[1] : 0U;
     if ((raw->can_id & CAN_ERR_BUSOFF) != 0U) {
         return IW_CAN_ERROR_BUS_OFF;
     }

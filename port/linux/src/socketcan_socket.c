@@ -71,7 +71,7 @@ bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self) {
 static void note_drops(iw_socketcan_socket_t *self, struct msghdr *message) {
     const struct cmsghdr *part = CMSG_FIRSTHDR(message);
     if (part != NULL && part->cmsg_level == SOL_SOCKET && part->cmsg_type == SO_RXQ_OVFL) {
-        (void)memcpy(&self->lost, CMSG_DATA(part), sizeof self->lost);
+        memcpy(&self->lost, CMSG_DATA(part), sizeof self->lost);
     }
 }
 
@@ -79,8 +79,8 @@ int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
     struct mmsghdr message[IW_SOCKETCAN_BATCH];
     struct iovec part[IW_SOCKETCAN_BATCH];
     _Alignas(struct cmsghdr) uint8_t drops[IW_SOCKETCAN_BATCH][DROPS_SPACE];
-    (void)memset(message, 0, sizeof message);
-    for (uint32_t i = 0; i < IW_SOCKETCAN_BATCH; ++i) {
+    memset(message, 0, sizeof message);
+    for (uint32_t i = 0; i < IW_SOCKETCAN_BATCH; i++) {
         part[i] = (struct iovec){.iov_base = &self->frame[i], .iov_len = sizeof self->frame[i]};
         message[i].msg_hdr.msg_iov = &part[i];
         message[i].msg_hdr.msg_iovlen = 1;
@@ -88,15 +88,15 @@ int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
         message[i].msg_hdr.msg_controllen = sizeof drops[i];
     }
     const int count = recvmmsg(self->fd, message, IW_SOCKETCAN_BATCH, MSG_DONTWAIT, NULL);
-    const int error = count < 0 ? errno : 0;
+    const int error = (count < 0) ? errno : 0;
     self->next = 0;
-    self->count = count > 0 ? (uint32_t)count : 0U;
+    self->count = (count > 0) ? (uint32_t)count : 0U;
     self->drained = self->count < IW_SOCKETCAN_BATCH;
-    for (uint32_t i = 0; i < self->count; ++i) {
+    for (uint32_t i = 0; i < self->count; i++) {
         self->flags[i] = message[i].msg_hdr.msg_flags;
         note_drops(self, &message[i].msg_hdr);
     }
-    return error == EAGAIN || error == EINTR ? 0 : error;
+    return (error == EAGAIN || error == EINTR) ? 0 : error;
 }
 
 void iw_socketcan_socket_forget(iw_socketcan_socket_t *self) {
@@ -107,9 +107,9 @@ void iw_socketcan_socket_forget(iw_socketcan_socket_t *self) {
 
 int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
     int last = 0;
-    for (int i = 0; i < DROP_BATCHES_MAX; ++i) {
+    for (int i = 0; i < DROP_BATCHES_MAX; i++) {
         const int error = iw_socketcan_socket_fill(self);
-        last = error != 0 ? error : last;
+        last = (error != 0) ? error : last;
         if (error == 0 && self->drained) {
             break;
         }
@@ -120,10 +120,10 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
 
 int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame) {
     struct can_frame raw = {.can_id = frame->id & ~IW_CAN_FD, .len = frame->dlc};
-    (void)memcpy(raw.data, frame->data, sizeof raw.data);
+    memcpy(raw.data, frame->data, sizeof raw.data);
     const ssize_t sent = send(self->fd, &raw, sizeof raw, MSG_DONTWAIT);
     if (sent == (ssize_t)sizeof raw) {
         return 1;
     }
-    return sent < 0 && (errno == EAGAIN || errno == ENOBUFS || errno == EINTR) ? 0 : -1;
+    return (sent < 0 && (errno == EAGAIN || errno == ENOBUFS || errno == EINTR)) ? 0 : -1;
 }

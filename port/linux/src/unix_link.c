@@ -16,7 +16,7 @@ bool iw_unix_link_is_name(const char *name) {
 
 static bool try_connect(iw_unix_link_t *self) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
-    (void)memcpy(address.sun_path, self->path, strlen(self->path) + 1U);
+    memcpy(address.sun_path, self->path, strlen(self->path) + 1U);
     const int fd = socket(AF_UNIX, self->type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) {
         return false;
@@ -85,6 +85,6 @@ bool iw_unix_link_tend(iw_unix_link_t *self, iw_time_us_t now_us) {
     }
     self->retry_us = now_us + self->backoff_us;
     const uint32_t longer_us = self->backoff_us * 2U;
-    self->backoff_us = longer_us < IW_UNIX_LINK_RETRY_MAX_US ? longer_us : IW_UNIX_LINK_RETRY_MAX_US;
+    self->backoff_us = (longer_us < IW_UNIX_LINK_RETRY_MAX_US) ? longer_us : IW_UNIX_LINK_RETRY_MAX_US;
     return false;
 }

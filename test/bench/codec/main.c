@@ -13,5 +13,5 @@ int main(int argc, char **argv) {
     }
     const uint32_t rounds = (uint32_t)strtoul(argv[2], NULL, 10);
     bench_fill();
-    return ((strcmp(argv[1], "decode") == 0) ? bench_decode(rounds) : bench_encode(rounds)) == 0U ? 0 : 1;
+    return (((strcmp(argv[1], "decode") == 0) ? bench_decode(rounds) : bench_encode(rounds)) == 0U) ? 0 : 1;
 }

@@ -21,7 +21,7 @@ static void forget(int from) {
 }
 
 static int open_source(int argc, char **argv) {
-    const int from = argc > 4 ? timed_connect(argv[3]) : STDIN_FILENO;
+    const int from = (argc > 4) ? timed_connect(argv[3]) : STDIN_FILENO;
     if (argc > 4) {
         (void)timed_need((int)write(from, argv[4], strlen(argv[4])), "first line");
         (void)timed_need((int)write(from, "\n", 1), "first line");
@@ -31,12 +31,12 @@ static int open_source(int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
-    const int can = timed_can(argc >= 3 ? argv[1] : "", CAN_INV_FILTER);
+    const int can = timed_can((argc >= 3) ? argv[1] : "", CAN_INV_FILTER);
     const int from = open_source(argc, argv);
     struct can_frame frame = {.can_id = 0x100, .len = 4};
     struct pollfd ready = {.fd = from, .events = POLLIN};
     timed_sleep_until_ns(timed_now_ns(CLOCK_MONOTONIC) + SETTLE_NS);
-    for (long i = atol(argv[2]); i > 0; --i) {
+    for (long i = atol(argv[2]); i > 0; i--) {
         char line[4096];
         timed_sleep_until_ns(timed_now_ns(CLOCK_MONOTONIC) + PAUSE_NS);
         forget(from);

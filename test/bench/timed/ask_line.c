@@ -28,8 +28,8 @@ static void hear_ok(int client) {
     struct pollfd ready = {.fd = client, .events = POLLIN};
     do {
         const ssize_t more =
-            poll(&ready, 1, REPLY_ms) > 0 ? read(client, &answer[length], sizeof answer - 1U - length) : 0;
-        length += more > 0 ? (size_t)more : 0U;
+            (poll(&ready, 1, REPLY_ms) > 0) ? read(client, &answer[length], sizeof answer - 1U - length) : 0;
+        length += (more > 0) ? (size_t)more : 0U;
         answer[length] = '\0';
         if (more <= 0 || strstr(answer, "\"ok\":false") != NULL) {
             (void)fprintf(stderr, "no ok: %s\n", answer);
@@ -57,14 +57,14 @@ static void wait_for_pause(int can, int client) {
 }
 
 int main(int argc, char **argv) {
-    const int can = timed_can(argc >= 6 ? argv[1] : "", TIMED_LEFT);
+    const int can = timed_can((argc >= 6) ? argv[1] : "", TIMED_LEFT);
     const int client = timed_connect(argv[2]);
     timed_ask_for_stamps(can);
     if (argc > 6) {
         say(client, argv[6]);
         hear_ok(client);
     }
-    for (long i = atol(argv[3]); i > 0; --i) {
+    for (long i = atol(argv[3]); i > 0; i--) {
         struct can_frame frame;
         int64_t at_ns;
         wait_for_pause(can, client);

@@ -11,9 +11,9 @@
 extern char **environ;
 
 int main(int argc, char **argv) {
-    const int can = timed_can(argc >= 4 ? argv[1] : "", TIMED_LEFT);
+    const int can = timed_can((argc >= 4) ? argv[1] : "", TIMED_LEFT);
     timed_ask_for_stamps(can);
-    for (long i = atol(argv[2]); i > 0; --i) {
+    for (long i = atol(argv[2]); i > 0; i--) {
         struct can_frame frame;
         int64_t at_ns;
         pid_t child;

@@ -24,7 +24,7 @@ static void repeat(int bcm, canid_t id, long period_us) {
 int main(int argc, char **argv) {
     const int bcm = timed_need(socket(PF_CAN, SOCK_DGRAM, CAN_BCM), "CAN_BCM");
     const struct sockaddr_can address = {.can_family = AF_CAN,
-                                         .can_ifindex = (int)if_nametoindex(argc == 3 ? argv[1] : "")};
+                                         .can_ifindex = (int)if_nametoindex((argc == 3) ? argv[1] : "")};
     (void)timed_need(connect(bcm, (const struct sockaddr *)&address, sizeof address), "interface");
     repeat(bcm, TIMED_LEFT, atol(argv[2]));
     repeat(bcm, TIMED_RIGHT, atol(argv[2]));

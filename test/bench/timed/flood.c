@@ -19,16 +19,16 @@ static struct can_frame wire[BENCH_FRAMES];
 
 static void prepare(void) {
     bench_fill();
-    for (uint32_t i = 0; i < BENCH_FRAMES; ++i) {
+    for (uint32_t i = 0; i < BENCH_FRAMES; i++) {
         wire[i] = (struct can_frame){.can_id = bench_frame[i].id, .len = bench_frame[i].dlc};
-        (void)memcpy(wire[i].data, bench_frame[i].data, bench_frame[i].dlc);
+        memcpy(wire[i].data, bench_frame[i].data, bench_frame[i].dlc);
     }
 }
 
 static long burst(int can, long count, long sent) {
     struct mmsghdr message[BURST_MAX] = {0};
     struct iovec part[BURST_MAX];
-    for (long i = 0; i < count; ++i) {
+    for (long i = 0; i < count; i++) {
         part[i] =
             (struct iovec){.iov_base = &wire[(unsigned long)(sent + i) % BENCH_FRAMES], .iov_len = sizeof wire[0]};
         message[i].msg_hdr = (struct msghdr){.msg_iov = &part[i], .msg_iovlen = 1};
@@ -37,7 +37,7 @@ static long burst(int can, long count, long sent) {
 }
 
 int main(int argc, char **argv) {
-    const int can = timed_can(argc == 4 && atol(argv[2]) <= (long)BURST_MAX * PER_S ? argv[1] : "", CAN_INV_FILTER);
+    const int can = timed_can((argc == 4 && atol(argv[2]) <= (long)BURST_MAX * PER_S) ? argv[1] : "", CAN_INV_FILTER);
     const long rate = atol(argv[2]);
     const int64_t slot_ns = TIMED_NS_PER_S / PER_S;
     const int64_t end_ns = timed_now_ns(CLOCK_MONOTONIC) + (int64_t)(atof(argv[3]) * (double)TIMED_NS_PER_S);
@@ -46,7 +46,7 @@ int main(int argc, char **argv) {
     prepare();
     while (due_ns < end_ns) {
         const int64_t now_ns = timed_now_ns(CLOCK_MONOTONIC);
-        due_ns = now_ns > due_ns + slot_ns ? now_ns : due_ns;
+        due_ns = (now_ns > due_ns + slot_ns) ? now_ns : due_ns;
         due_ns += slot_ns;
         timed_sleep_until_ns(due_ns);
         sent += burst(can, rate / PER_S, sent);

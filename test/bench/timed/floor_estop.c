@@ -20,7 +20,7 @@ static int open_line(const char *path, uint32_t offset) {
 }
 
 int main(int argc, char **argv) {
-    const int can = timed_can(argc == 4 ? argv[1] : "", CAN_INV_FILTER);
+    const int can = timed_can((argc == 4) ? argv[1] : "", CAN_INV_FILTER);
     const int line = open_line(argv[2], (uint32_t)atol(argv[3]));
     struct gpio_v2_line_event event;
     while (read(line, &event, sizeof event) == (ssize_t)sizeof event) {

@@ -19,7 +19,7 @@ static int accept_one(const char *path) {
 }
 
 int main(int argc, char **argv) {
-    const int can = timed_can(argc == 3 ? argv[1] : "", CAN_INV_FILTER);
+    const int can = timed_can((argc == 3) ? argv[1] : "", CAN_INV_FILTER);
     const int client = accept_one(argv[2]);
     char line[256];
     for (ssize_t length; (length = read(client, line, sizeof line - 1U)) > 0;) {

@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 int main(int argc, char **argv) {
-    const int can = timed_can(argc == 3 ? argv[1] : "", CAN_INV_FILTER);
+    const int can = timed_can((argc == 3) ? argv[1] : "", CAN_INV_FILTER);
     const long period_ns = atol(argv[2]) * 1000L;
     const int timer = timed_need(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), "timer");
     const int64_t first_ns = timed_now_ns(CLOCK_MONOTONIC) + period_ns;

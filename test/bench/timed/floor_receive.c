@@ -25,7 +25,7 @@ static void end(int number) {
 /// Into the place where the codec's floor reads it.
 static void take(const struct can_frame *frame, uint32_t at) {
     bench_frame[at] = (iw_can_frame_t){.id = frame->can_id, .dlc = frame->len};
-    (void)memcpy(bench_frame[at].data, frame->data, sizeof frame->data);
+    memcpy(bench_frame[at].data, frame->data, sizeof frame->data);
 }
 
 int main(int argc, char **argv) {
@@ -33,22 +33,22 @@ int main(int argc, char **argv) {
     struct iovec part[BATCH];
     struct can_frame frame[BATCH];
     const struct sigaction action = {.sa_handler = end};
-    const int can = timed_can(argc == 2 ? argv[1] : "", 0);
+    const int can = timed_can((argc == 2) ? argv[1] : "", 0);
     unsigned long frames = 0;
     uint32_t at = 0;
     (void)sigaction(SIGTERM, &action, NULL);
-    for (uint32_t i = 0; i < BATCH; ++i) {
+    for (uint32_t i = 0; i < BATCH; i++) {
         part[i] = (struct iovec){.iov_base = &frame[i], .iov_len = sizeof frame[i]};
         message[i].msg_hdr = (struct msghdr){.msg_iov = &part[i], .msg_iovlen = 1};
     }
     while (ended == 0) {
         const int count = recvmmsg(can, message, BATCH, MSG_WAITFORONE, NULL);
-        for (int i = 0; i < count; ++i) {
+        for (int i = 0; i < count; i++) {
             take(&frame[i], at);
-            at = at + 1U < BENCH_FRAMES ? at + 1U : 0U;
-            (void)(at == 0U ? bench_decode(1) : 0U);
+            at = (at + 1U < BENCH_FRAMES) ? at + 1U : 0U;
+            (void)((at == 0U) ? bench_decode(1) : 0U);
         }
-        frames += count > 0 ? (unsigned long)count : 0UL;
+        frames += (count > 0) ? (unsigned long)count : 0UL;
     }
     (void)printf("%lu\n", frames);
     return 0;

@@ -20,7 +20,7 @@ int main(void) {
         const int64_t due_ns = timed_now_ns(CLOCK_MONOTONIC) + TIMED_NS_PER_S / 1000;
         timed_sleep_until_ns(due_ns);
         const int64_t late_ns = timed_now_ns(CLOCK_MONOTONIC) - due_ns;
-        worst_ns = late_ns > worst_ns ? late_ns : worst_ns;
+        worst_ns = (late_ns > worst_ns) ? late_ns : worst_ns;
     }
     (void)printf("%lld\n", (long long)(worst_ns / 1000));
     return 0;

@@ -11,7 +11,7 @@
 static int64_t stamp[STAMPS_MAX];
 
 int main(int argc, char **argv) {
-    const canid_t id = (canid_t)strtoul(argc == 4 ? argv[2] : "", NULL, 16);
+    const canid_t id = (canid_t)strtoul((argc == 4) ? argv[2] : "", NULL, 16);
     const int can = timed_can(argv[1], id);
     struct can_frame frame;
     uint32_t count = 0;
@@ -21,7 +21,7 @@ int main(int argc, char **argv) {
     while (count < STAMPS_MAX && timed_now_ns(CLOCK_MONOTONIC) < end_ns) {
         count += timed_receive(can, id, &frame, &stamp[count], 100) ? 1U : 0U;
     }
-    for (uint32_t i = 0; i < count; ++i) {
+    for (uint32_t i = 0; i < count; i++) {
         (void)printf("%lld\n", (long long)stamp[i]);
     }
     return 0;

@@ -55,7 +55,7 @@ static void filter(int can, canid_t id) {
     const struct can_filter one = {.can_id = id, .can_mask = CAN_SFF_MASK};
     const socklen_t size = (id == CAN_INV_FILTER) ? 0U : (socklen_t)sizeof one;
     if (id != 0U) {
-        (void)timed_need(setsockopt(can, SOL_CAN_RAW, CAN_RAW_FILTER, size == 0U ? NULL : &one, size), "filter");
+        (void)timed_need(setsockopt(can, SOL_CAN_RAW, CAN_RAW_FILTER, (size == 0U) ? NULL : &one, size), "filter");
     }
 }
 
@@ -104,7 +104,7 @@ static int receive_one(int can, struct can_frame *out_frame, int64_t *out_at_ns,
     }
     const struct cmsghdr *stamp = CMSG_FIRSTHDR(&message);
     if (stamp != NULL) {
-        (void)memcpy(&at, CMSG_DATA(stamp), sizeof at);
+        memcpy(&at, CMSG_DATA(stamp), sizeof at);
     }
     *out_at_ns = (int64_t)at.tv_sec * TIMED_NS_PER_S + at.tv_nsec;
     return 1;

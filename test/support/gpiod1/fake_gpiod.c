@@ -20,7 +20,7 @@ static void *open_chip(void) {
 
 struct gpiod_chip *gpiod_chip_open_by_name(const char *name) {
     errno = ENOENT;
-    return strcmp(name, FAKE_GPIO_CHIP) == 0 ? (struct gpiod_chip *)open_chip() : NULL;
+    return (strcmp(name, FAKE_GPIO_CHIP) == 0) ? (struct gpiod_chip *)open_chip() : NULL;
 }
 
 void gpiod_chip_close(struct gpiod_chip *chip) {
@@ -31,13 +31,13 @@ void gpiod_chip_close(struct gpiod_chip *chip) {
 struct gpiod_line *gpiod_chip_get_line(struct gpiod_chip *chip, unsigned offset) {
     fake_gpio.offset = offset;
     errno = EINVAL;
-    return offset == FAKE_GPIO_OFFSET ? (struct gpiod_line *)(void *)chip : NULL;
+    return (offset == FAKE_GPIO_OFFSET) ? (struct gpiod_line *)(void *)chip : NULL;
 }
 
 struct gpiod_line *gpiod_line_find(const char *name) {
     errno = ENOENT;
     fake_gpio.offset = FAKE_GPIO_OFFSET;
-    return strcmp(name, FAKE_GPIO_NAME) == 0 ? (struct gpiod_line *)open_chip() : NULL;
+    return (strcmp(name, FAKE_GPIO_NAME) == 0) ? (struct gpiod_line *)open_chip() : NULL;
 }
 
 void gpiod_line_close_chip(struct gpiod_line *line) {
@@ -87,6 +87,6 @@ int gpiod_line_get_value(struct gpiod_line *line) {
 
 int gpiod_line_event_read_fd_multiple(int fd, struct gpiod_line_event *events, unsigned count) {
     (void)fd;
-    (void)memset(events, 0, count * sizeof *events);
+    memset(events, 0, count * sizeof *events);
     return fake_gpio_take(count);
 }

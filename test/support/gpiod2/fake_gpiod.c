@@ -58,7 +58,7 @@ void gpiod_chip_close(struct gpiod_chip *chip) {
 
 int gpiod_chip_get_line_offset_from_name(struct gpiod_chip *chip, const char *name) {
     errno = ENOENT;
-    return (void *)chip == (void *)&one && strcmp(name, FAKE_GPIO_NAME) == 0 ? (int)FAKE_GPIO_OFFSET : -1;
+    return ((void *)chip == (void *)&one && strcmp(name, FAKE_GPIO_NAME) == 0) ? (int)FAKE_GPIO_OFFSET : -1;
 }
 
 struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, struct gpiod_request_config *wish,
@@ -66,7 +66,7 @@ struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, str
     (void)chip;
     (void)wish;
     (void)lines;
-    errno = fake_gpio.busy_error != 0 ? fake_gpio.busy_error : EINVAL;
+    errno = (fake_gpio.busy_error != 0) ? fake_gpio.busy_error : EINVAL;
     if (fake_gpio.busy_error != 0 || fake_gpio.offset != FAKE_GPIO_OFFSET || pipe(fake_gpio.ends) != 0) {
         return NULL;
     }
@@ -80,7 +80,7 @@ struct gpiod_line_settings *gpiod_line_settings_new(void) {
 }
 
 void gpiod_line_settings_free(struct gpiod_line_settings *settings) {
-    given -= settings != NULL ? 1U : 0U;
+    given -= (settings != NULL) ? 1U : 0U;
 }
 
 int gpiod_line_settings_set_direction(struct gpiod_line_settings *settings, enum gpiod_line_direction direction) {
@@ -107,14 +107,14 @@ struct gpiod_line_config *gpiod_line_config_new(void) {
 }
 
 void gpiod_line_config_free(struct gpiod_line_config *lines) {
-    given -= lines != NULL ? 1U : 0U;
+    given -= (lines != NULL) ? 1U : 0U;
 }
 
 int gpiod_line_config_add_line_settings(struct gpiod_line_config *lines, const unsigned *offsets, size_t count,
                                         struct gpiod_line_settings *settings) {
     (void)lines;
     (void)settings;
-    fake_gpio.offset = count == 1U ? offsets[0] : 0U;
+    fake_gpio.offset = (count == 1U) ? offsets[0] : 0U;
     return 0;
 }
 
@@ -124,7 +124,7 @@ struct gpiod_request_config *gpiod_request_config_new(void) {
 }
 
 void gpiod_request_config_free(struct gpiod_request_config *wish) {
-    given -= wish != NULL ? 1U : 0U;
+    given -= (wish != NULL) ? 1U : 0U;
 }
 
 void gpiod_request_config_set_consumer(struct gpiod_request_config *wish, const char *consumer) {
@@ -152,21 +152,21 @@ int gpiod_line_request_get_fd(struct gpiod_line_request *line) {
 size_t gpiod_line_request_get_requested_offsets(struct gpiod_line_request *line, unsigned *offsets, size_t max) {
     (void)line;
     offsets[0] = fake_gpio.offset;
-    return max > 0U ? 1U : 0U;
+    return (max > 0U) ? 1U : 0U;
 }
 
 enum gpiod_line_value gpiod_line_request_get_value(struct gpiod_line_request *line, unsigned offset) {
     (void)line;
-    return offset == FAKE_GPIO_OFFSET ? (enum gpiod_line_value)fake_gpio.level : GPIOD_LINE_VALUE_ERROR;
+    return (offset == FAKE_GPIO_OFFSET) ? (enum gpiod_line_value)fake_gpio.level : GPIOD_LINE_VALUE_ERROR;
 }
 
 struct gpiod_edge_event_buffer *gpiod_edge_event_buffer_new(size_t capacity) {
     given++;
-    return capacity > 0U ? (struct gpiod_edge_event_buffer *)(void *)&one : NULL;
+    return (capacity > 0U) ? (struct gpiod_edge_event_buffer *)(void *)&one : NULL;
 }
 
 void gpiod_edge_event_buffer_free(struct gpiod_edge_event_buffer *buffer) {
-    given -= buffer != NULL ? 1U : 0U;
+    given -= (buffer != NULL) ? 1U : 0U;
 }
 
 int gpiod_line_request_read_edge_events(struct gpiod_line_request *line, struct gpiod_edge_event_buffer *buffer,

@@ -93,7 +93,7 @@ static const sim_queued_t *head(const sim_bus_t *self, uint8_t port) {
 
 static iw_time_us_t start_us(const sim_bus_t *self) {
     iw_time_us_t earliest_us = IW_NEVER;
-    for (uint8_t port = 0U; (self->waiting >> port) != 0U; ++port) {
+    for (uint8_t port = 0U; (self->waiting >> port) != 0U; port++) {
         sim_queued_t const *const first = head(self, port);
         if (first != NULL && first->submitted_us < earliest_us) {
             earliest_us = first->submitted_us;
@@ -106,7 +106,7 @@ static iw_time_us_t start_us(const sim_bus_t *self) {
 static uint8_t winner_at(const sim_bus_t *self, iw_time_us_t at_us) {
     uint8_t winner = SIM_BUS_NONE;
     uint64_t best = UINT64_MAX;
-    for (uint8_t port = 0U; (self->waiting >> port) != 0U; ++port) {
+    for (uint8_t port = 0U; (self->waiting >> port) != 0U; port++) {
         sim_queued_t const *const first = head(self, port);
         if (first != NULL && first->submitted_us <= at_us && priority(&first->frame) < best) {
             best = priority(&first->frame);

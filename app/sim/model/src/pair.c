@@ -23,7 +23,7 @@ void sim_pair_init(sim_pair_t *self, const sim_pair_config_t *config, iw_time_us
     }
     *self = (sim_pair_t){.battery_dV = config->battery_dV, .power = true};
     self->pose.track_mm = config->track_mm;
-    for (unsigned side = 0U; side < IW_SIDES; ++side) {
+    for (unsigned side = 0U; side < IW_SIDES; side++) {
         self->pose.mirrored[side] = config->mirrored[side];
         sim_wheel_init(&self->wheel[side], &config->wheel[side], (iw_side_t)side, seed);
         sim_wheel_power(&self->wheel[side], now_us, true);

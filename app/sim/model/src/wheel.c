@@ -17,7 +17,7 @@ static const uint32_t kind_phase_us[SIM_TELEMETRY_KINDS] = {0U, 700U, 900U, 1600
 
 static void find_next(sim_wheel_t *self) {
     self->next_us = IW_NEVER;
-    for (unsigned kind = 0U; kind < SIM_TELEMETRY_KINDS; ++kind) {
+    for (unsigned kind = 0U; kind < SIM_TELEMETRY_KINDS; kind++) {
         if (self->due_us[kind] < self->next_us) {
             self->next_us = self->due_us[kind];
         }
@@ -25,7 +25,7 @@ static void find_next(sim_wheel_t *self) {
 }
 
 static void silence(sim_wheel_t *self) {
-    for (unsigned kind = 0U; kind < SIM_TELEMETRY_KINDS; ++kind) {
+    for (unsigned kind = 0U; kind < SIM_TELEMETRY_KINDS; kind++) {
         self->due_us[kind] = IW_NEVER;
     }
     self->next_us = IW_NEVER;
@@ -62,7 +62,7 @@ static void run(sim_wheel_t *self, iw_time_us_t now_us, uint64_t age_us) {
     self->motion.ticks = 0U;
     self->motion.tick_rest = 0;
     sim_force_restart(&self->force);
-    for (unsigned kind = 0U; kind < SIM_TELEMETRY_KINDS; ++kind) {
+    for (unsigned kind = 0U; kind < SIM_TELEMETRY_KINDS; kind++) {
         self->due_us[kind] = now_us + self->phase_us + kind_phase_us[kind];
     }
     self->due_us[SIM_TELEMETRY_OFFSET] += learn_us;
@@ -150,7 +150,7 @@ static void fill_status(sim_wheel_t *self, uint8_t battery_dV, iw_codec_status_t
 static sim_telemetry_t take_due(sim_wheel_t *self) {
     sim_telemetry_t kind = SIM_TELEMETRY_SPEED;
     while (self->due_us[kind] != self->next_us) {
-        ++kind;
+        kind++;
     }
     bool const offset = kind == SIM_TELEMETRY_OFFSET;
     uint64_t const permille = offset ? 1000U : self->slow_permille;

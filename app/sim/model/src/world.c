@@ -18,7 +18,7 @@ void sim_world_init(sim_world_t *self, const sim_pair_config_t *config, iw_time_
 }
 
 uint8_t sim_world_connect(sim_world_t *self) {
-    for (uint8_t client = 0U; client < SIM_WORLD_CLIENTS; ++client) {
+    for (uint8_t client = 0U; client < SIM_WORLD_CLIENTS; client++) {
         if (!self->connected[client]) {
             uint8_t const port = (uint8_t)(SIM_PORT_CLIENT + client);
             self->connected[client] = true;
@@ -41,7 +41,7 @@ void sim_world_submit(sim_world_t *self, iw_time_us_t now_us, uint8_t port, cons
 }
 
 static void submit_pair(sim_world_t *self, iw_time_us_t now_us) {
-    for (unsigned side = 0U; side < IW_SIDES; ++side) {
+    for (unsigned side = 0U; side < IW_SIDES; side++) {
         iw_can_frame_t frame;
         (void)iw_codec_encode_setpoint((iw_side_t)side, &self->foreign.setpoint, IW_DLC_SETPOINT, &frame);
         (void)sim_bus_submit(&self->bus, now_us, SIM_PORT_FOREIGN, &frame);
@@ -115,7 +115,7 @@ bool sim_world_step(sim_world_t *self, iw_time_us_t now_us, sim_delivery_t *out_
 
 void sim_world_power(sim_world_t *self, iw_time_us_t now_us, bool on) {
     sim_pair_power(&self->pair, now_us, on);
-    for (uint8_t port = SIM_PORT_LEFT; !on && port <= SIM_PORT_RIGHT; ++port) {
+    for (uint8_t port = SIM_PORT_LEFT; !on && port <= SIM_PORT_RIGHT; port++) {
         sim_bus_clear(&self->bus, now_us, port);
     }
     update_ack(self, now_us);
@@ -129,7 +129,7 @@ void sim_world_reboot(sim_world_t *self, iw_time_us_t now_us, iw_side_t side) {
 
 void sim_world_bus_off(sim_world_t *self, iw_time_us_t now_us, bool bus_off) {
     self->bus_off = bus_off;
-    for (uint8_t port = SIM_PORT_CLIENT; bus_off && port < SIM_BUS_PORTS; ++port) {
+    for (uint8_t port = SIM_PORT_CLIENT; bus_off && port < SIM_BUS_PORTS; port++) {
         sim_bus_clear(&self->bus, now_us, port);
     }
 }
@@ -141,7 +141,7 @@ void sim_world_ack(sim_world_t *self, iw_time_us_t now_us, bool on) {
 
 void sim_world_queue(sim_world_t *self, uint8_t depth) {
     self->queue_depth = depth;
-    for (uint8_t port = SIM_PORT_CLIENT; port < SIM_BUS_PORTS; ++port) {
+    for (uint8_t port = SIM_PORT_CLIENT; port < SIM_BUS_PORTS; port++) {
         self->bus.port[port].depth = depth;
     }
 }
