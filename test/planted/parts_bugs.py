@@ -13,6 +13,7 @@ CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c
 SOCKETCAN, LOCAL = "port/linux/src/socketcan.c", "port/linux/src/local_bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
 LEARN = "app/ctl/learn/learn.c"
+STATUS_LEDGER = "app/gateway/ledger/knowledge_json.c"
 LINK, QUEUE, ASKING = "client/c/src/connection.c", "client/c/src/queue.c", "client/c/src/requests.c"
 TALK, FIELDS = ("unit_client_talk",), ("unit_client_fields",)
 READER, CHECKER, SCANNER, WRITER = (f"northbound/src/{name}.c" for name in ("request", "json_in", "json_scan", "json_out"))
@@ -105,6 +106,10 @@ PARTS = [
         ("unit_daemon_memory",)),
     Bug("tare-noted-with-the-left-wheels-figures", "ledger", "app/gateway/ledger/knowledge.c", "quality = daemon->knowledge.tare[side];", "quality = daemon->knowledge.tare[IW_LEFT];",
         ("unit_daemon_memory",)),
+    Bug("status-with-the-entries-of-before", "ledger", STATUS_LEDGER, "is_alike(written->assumed, source->assumed, sizeof written->assumed) &&", "", ("unit_daemon_memory",)),
+    Bug("status-with-the-words-of-before", "ledger", STATUS_LEDGER, "is_alike(written->known, source->known, sizeof written->known)", "true", ("unit_daemon_memory",)),
+    Bug("status-with-the-values-of-before", "ledger", STATUS_LEDGER, "is_alike(&written->config, source->config, sizeof written->config) &&", "", ("unit_daemon_memory",)),
+    Bug("status-of-a-line-that-did-not-fit", "ledger", STATUS_LEDGER, "json->overflow ? 0U : json->length - begin", "json->length - begin", ("unit_daemon_memory",)),
     # SocketCAN.
     Bug("bus-off-forgotten", "R13", SOCKETCAN, "bus->unheeded = IW_BUS_OFF; bus->present = forged", "bus->present = forged", CAN),
     Bug("restart-is-no-loss", "R6", SOCKETCAN, "} else if (error == IW_CAN_ERROR_RESTARTED) { bus->unheeded = IW_BUS_OFF;", "} else if (error == IW_CAN_ERROR_RESTARTED) {", CAN),
