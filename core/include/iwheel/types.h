@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Words that every module shares: time, sides, status codes, a command for a pair of wheels; states, causes of a stop,
+/// Types that every module shares: time, sides, status codes, a command for a pair of wheels; states, causes of a stop,
 /// refusals; what is assumed of the wheels.
 ///
 /// Units stand at the end of a name: `_mm_s _mm_s2 _mA _mN _rpm _dV _degC _ms _us _permille`. Everything is an
@@ -127,9 +127,9 @@ typedef enum {
     IW_REFUSE_NOT_AT_REST,
     IW_REFUSE_SEND_STALLED,
     IW_REFUSE_SECOND_MASTER,
-    IW_REFUSE_CAUSE_PRESENT, ///< `iw_permit_present` tells which.
+    IW_REFUSE_CAUSE_PRESENT, ///< `iw_snapshot_t::present` tells which.
     IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
-    IW_REFUSE_STALE_COMMAND, ///< `iw_permit_t::stale_client` sent a nonzero drive too recently.
+    IW_REFUSE_STALE_COMMAND, ///< `iw_snapshot_t::stale_client` sent a nonzero drive too recently.
     IW_REFUSE_LISTEN_ONLY,
     IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_snapshot_t::doubt` tells which.
     IW_REFUSALS,
@@ -182,7 +182,8 @@ typedef struct {
     iw_ledger_state_t state;
     iw_evidence_t evidence;
     int32_t figure; ///< Of IW_EVIDENCE_BUS: force unit and offset: 1000 x raw / offset in dN; sign: measured mm/s at a
-                    ///< positive command; DLC: the length received.
+        ///< positive command; DLC: the length received; setpoint type: 1000 x measured / applied speed; gear
+        ///< ratio: 1000 x ticks moved / expected; pose: 1000 x way read byte-swapped / way as it is read.
 } iw_ledger_entry_t;
 
 #endif
