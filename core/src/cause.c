@@ -3,7 +3,8 @@
 
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
 
-/// safety.md, "Latching causes". Effect, level or event, without a ramp, refusal while present.
+/// One row per cause: effect, level or event, without a ramp, refusal while present. R2, R7 and R13 say which of them
+/// latch.
 const iw_cause_row_t iw_cause_rows[IW_CAUSES] = {
     [IW_CAUSE_NONE] = {IW_STOPS, false, false, IW_REFUSE_NONE},
     [IW_CAUSE_ESTOP_LINE] = {IW_ALWAYS_LATCHES, true, true, IW_REFUSE_ESTOP_PRESSED},

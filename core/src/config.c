@@ -54,7 +54,7 @@ void iw_config_default(iw_config_t *out_config) {
     out_config->force_unit[IW_RIGHT] = IW_FORCE_DN;
 }
 
-/// Invariant 1: lease, period and ramp together must end before the wheel's own watchdog would.
+/// R1: lease, period and ramp together must end before the wheel's own watchdog would.
 static iw_config_fault_t check_relations(const iw_config_t *config) {
     const iw_stop_budget_t budget = iw_config_stop_budget(config);
     if (config->current_role > IW_ROLE_SETPOINT) {

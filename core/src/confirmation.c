@@ -18,7 +18,7 @@ void iw_confirmation_clear(iw_confirmation_t *self) {
     }
 }
 
-/// Invariant 6: one setpoint without echo, and one zero behind it. A longer queue would be played to a wheel that
+/// R6: one setpoint without echo, and one zero behind it. A longer queue would be played to a wheel that
 /// regains power; without the second place a stop would wait for an echo that may never come.
 bool iw_confirmation_may_send(const iw_confirmation_t *self, iw_side_t side, bool zero) {
     return self->pending[side] < (zero ? 2U : 1U);

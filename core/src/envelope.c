@@ -68,7 +68,7 @@ static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_u
     if ((uint32_t)iw_magnitude(setpoint->speed_mm_s) > config->max_speed_mm_s) {
         return IW_ENVELOPE_SPEED;
     }
-    // Invariant 8: a stop is never held up by its own slope.
+    // R8: a stop is never held up by its own slope.
     if (!is_zero(config, setpoint) && !slew_ok(self, side, now_us - self->last_us[side], setpoint->speed_mm_s)) {
         return IW_ENVELOPE_SLEW;
     }

@@ -50,7 +50,7 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     return IW_CONFIG_OK;
 }
 
-/// The order is a rule: what is received is drained before any age is judged (invariant 7), and everything is judged
+/// The order is a rule: what is received is drained before any age is judged (R7), and everything is judged
 /// before anything is sent, so that a fault of this step stops this step's pair.
 iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_step_begin(self, now_us);
@@ -172,7 +172,7 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
 }
 
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side) {
-    // Both are judged before one is changed (invariant 9: a request is applied whole or not at all).
+    // Both are judged before one is changed (R9: a request is applied whole or not at all).
     for (size_t side = 0; side < IW_SIDES; side++) {
         const bool wanted = (sides & (1U << side)) != 0U;
         const iw_tare_t result = wanted ? iw_force_may_tare(&self->force[side], now_us) : IW_TARE_OK;

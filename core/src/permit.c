@@ -26,7 +26,7 @@ static const phase_row_t phases[IW_PHASES] = {
 
 IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, all_bits_are_set);
 
-/// Setpoints without echo that a process can leave in its controller when it dies: two per wheel (invariant 6).
+/// Setpoints without echo that a process can leave in its controller when it dies: two per wheel (R6).
 #define LEFT_BEHIND_MAX 4U
 
 /// True if the configuration allows sending at all.
@@ -48,7 +48,7 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     self->config = config;
     self->stale_us = IW_NEVER;
     memset(self->seen_us, 0xFF, sizeof self->seen_us); // IW_NEVER
-    // Row 25: after a crash while ARMED the wheels keep the last command until their own watchdog ends it.
+    // Fault 25: after a crash while ARMED the wheels keep the last command until their own watchdog ends it.
     if (restarted && may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
@@ -83,7 +83,7 @@ static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us)
     return pressed ? IW_REFUSE_ESTOP_PRESSED : IW_REFUSE_LATCHED;
 }
 
-/// Invariant 3: a joystick that is still deflected at arm or reset must not set the machine in motion.
+/// R3: a joystick that is still deflected at arm or reset must not set the machine in motion.
 static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
     return self->stale_us != IW_NEVER && now_us - self->stale_us < IW_STALE_COMMAND_US;
 }
@@ -147,7 +147,7 @@ static bool latches(const iw_permit_t *self, iw_cause_t cause) {
 }
 
 /// A setpoint of another sender in RESTARTING. The first few may be the dead process's own, still in its controller;
-/// more than it can have left there means a second master that drives, to whom the hold gives way (row 25).
+/// more than it can have left there means a second master that drives, to whom the hold gives way (fault 25).
 static void count_foreign(iw_permit_t *self) {
     self->strangers++;
     self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
@@ -318,7 +318,7 @@ static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us,
         return IW_REFUSE_NOT_HOLDER;
     }
     if (sent_us < self->armed_us) {
-        return IW_REFUSE_STALE_COMMAND; // It waited in a queue since before arm: not fresh (invariant 3).
+        return IW_REFUSE_STALE_COMMAND; // It waited in a queue since before arm: not fresh (R3).
     }
     return (sent_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;
 }

@@ -14,8 +14,7 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
     iw_envelope_init(&self->envelope, config);
 }
 
-/// A nonzero pair leaves whole or not at all (invariant 5); a zero must not wait for the other wheel's echo (invariant
-/// 6).
+/// A nonzero pair leaves whole or not at all (R5); a zero must not wait for the other wheel's echo (R6).
 bool iw_sender_ready(const iw_sender_t *self, bool zero) {
     const bool left = iw_confirmation_may_send(&self->confirmation, IW_LEFT, zero);
     const bool right = iw_confirmation_may_send(&self->confirmation, IW_RIGHT, zero);
@@ -91,7 +90,7 @@ void iw_sender_rest(iw_sender_t *self) {
     iw_confirmation_rest(&self->confirmation);
 }
 
-/// Forgets only if the port is sure: behind a frame that may still leave no second one must be queued (invariant 6).
+/// Forgets only if the port is sure: behind a frame that may still leave no second one must be queued (R6).
 int iw_sender_purge(iw_sender_t *self) {
     const int answer = self->hal->purge(self->hal->context);
     if (answer > 0) {

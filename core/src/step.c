@@ -40,7 +40,7 @@ static iw_time_us_t take_lateness(iw_gateway_t *self, iw_time_us_t now_us) {
     return suspended_us + ((now_us > self->promised_us) ? now_us - self->promised_us : 0U);
 }
 
-/// Invariant 7 (own hang). One long stall, or one late step after another: what counts is for how long no fault could
+/// R7 (own hang). One long stall, or one late step after another: what counts is for how long no fault could
 /// be judged, since telemetry of a late step has no known time of reception.
 static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t late_us = take_lateness(self, now_us);
@@ -152,7 +152,7 @@ static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, 
     }
 }
 
-/// Two masters on one bus: the wheels obey whoever sent last (safety.md row 19).
+/// Two masters on one bus: the wheels obey whoever sent last (fault 19).
 static void hear_foreign(iw_gateway_t *self, iw_time_us_t now_us, uint32_t id) {
     self->counters.foreign++;
     iw_permit_raise(&self->permit, now_us, IW_CAUSE_SECOND_MASTER, side_bit(iw_codec_side(id)), id);
@@ -198,7 +198,7 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
     }
 }
 
-/// Everything before any age is judged (invariant 7), but bounded: a babbling node must not keep the step from ending.
+/// Everything before any age is judged (R7), but bounded: a babbling node must not keep the step from ending.
 void iw_step_receive(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
@@ -308,7 +308,7 @@ static uint32_t both_rest_us(const iw_gateway_t *self, iw_time_us_t now_us) {
 
 void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_permit_view_t view;
-    // A stalled step neither raises nor clears what is judged by age: the next step on time decides (invariant 7).
+    // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {
         iw_permit_keep_present(&self->permit);
     } else {
@@ -330,7 +330,7 @@ void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_permit_step(&self->permit, now_us, &view);
 }
 
-/// Takes the pair that is due and sends it. Invariant 5 (both or none): a pair of which one frame was not taken is
+/// Takes the pair that is due and sends it. R5 (both or none): a pair of which one frame was not taken is
 /// followed by zeros for both wheels.
 static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
     const bool zero = iw_setpoint_next_is_zero(&self->setpoint);
@@ -352,7 +352,7 @@ void iw_step_send(iw_gateway_t *self, iw_time_us_t now_us) {
     if (demand == IW_DEMAND_SILENCE) {
         iw_sender_rest(&self->sender);
     } else if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
-        // Invariant 12: scheduler and envelope disagree, so one of them is wrong. Zeros leave in this very step.
+        // R12: scheduler and envelope disagree, so one of them is wrong. Zeros leave in this very step.
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
         iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
         (void)send_pair(self, now_us);

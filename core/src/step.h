@@ -21,7 +21,7 @@ void iw_step_judge(struct iw_gateway *self, iw_time_us_t now_us);
 void iw_step_send(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// While nothing is sent, no old setpoint may wait in a controller either: unacknowledged, it is repeated there until a
-/// wheel gets power, and then moves it (safety.md row 18). It is purged, or reported as `left_behind`.
+/// wheel gets power, and then moves it (fault 18). It is purged, or reported as `left_behind`.
 void iw_step_keep_silent(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// When to call again: not later than one period from now.

@@ -24,6 +24,7 @@ void iw_estop_init(void) {
     EXTI->IMR |= LINE;
 }
 
+/// Any edge counts, also the falling one: of a short pulse the level may be gone, and so may the first edge (fault 12).
 void iw_estop_on_edge(void) {
     EXTI->PR = LINE;
     atomic_store_explicit(&had_edge, true, memory_order_relaxed);

@@ -55,7 +55,7 @@ iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, iw_time_us_t now_us
 // Which setpoints were handed to the port and are not confirmed yet? The controller confirms a frame by its echo: our
 // own frame, handed back once another node has acknowledged it.
 //
-// Per wheel at most one setpoint is unconfirmed, and behind it at most one zero (invariant 6): so a queue of old
+// Per wheel at most one setpoint is unconfirmed, and behind it at most one zero (R6): so a queue of old
 // setpoints cannot form, and a zero never waits for an echo. Echoes of one id come in the order sent. After a purge or
 // a loss of the bus all is forgotten, but an echo may still be on its way through a receive queue and arrive behind the
 // next frame: so an echo confirms the oldest unconfirmed frame only if it has that frame's speed and current; otherwise
