@@ -31,7 +31,7 @@ void iw_estop_on_edge(void) {
     iw_wake();
 }
 
-/// An edge between the look and the clearing is told by this call too, so none is lost.
+/// An edge between load and store is covered by the 1 of this same call, so none is lost.
 int iw_estop_pressed(void *context) {
     (void)context;
     if (atomic_load_explicit(&had_edge, memory_order_relaxed)) {

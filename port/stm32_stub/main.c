@@ -18,7 +18,7 @@
 // most.
 #define ABORT_POLLS (IW_BOARD_CORE_HZ / 4U / 4000U)
 #define CAN_RESET   (1U << 25) // In RCC's APB1RSTR, RM0008 7.3.4 and RM0090 7.3.8.
-// A crystal that has not started by now is told of.
+// A crystal that has not started by now is reported.
 #define CRYSTAL_LATE_US 100000U
 // While text waits the loop goes round this often.
 #define CHARACTER_US 1000U

@@ -78,7 +78,7 @@ static int button_open(void *self, const iw_estop_wish_t *wish) {
 /// Until the button has told its level, and after a broken connection, it is unreadable, which counts as pressed (R2).
 static int button_pressed(void *self, bool quiet) {
     unix_estop_t *button = (unix_estop_t *)self;
-    (void)quiet; // Its level is told like its edges, so it is always listened to.
+    (void)quiet; // Level and edges come by the same messages, so they are always read.
     listen_to(button);
     const bool unreadable = button->was_lost || !button->known;
     const bool pressed = button->edge || button->level;

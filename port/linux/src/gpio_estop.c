@@ -21,7 +21,7 @@ typedef struct {
     int trouble; ///< Why it is closed.
     int watch_fd;
     bool active_high;
-    bool was_lost; ///< It went, and `pressed` has not told yet.
+    bool was_lost; ///< The line was lost, and `gpio_pressed` has not reported that yet.
 } gpio_estop_t;
 
 IW_STATIC_ASSERT(sizeof(gpio_estop_t) <= sizeof(iw_backend_store_t), gpio_estop_fits);

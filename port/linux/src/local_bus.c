@@ -10,7 +10,7 @@
 
 /// Frames taken from the kernel in one call.
 #define BATCH 32U
-/// What `__res0` of a frame tells: it is ours, or an error frame that another client made.
+/// Marks that the hub sets in a frame's `__res0`: an echo of ours, or an error frame that another client made.
 #define MARK_ECHO   1U
 #define MARK_FORGED 2U
 
@@ -55,7 +55,7 @@ static iw_time_us_t local_next_us(const void *self) {
     return ((const local_bus_t *)self)->link.retry_us;
 }
 
-/// The hub is gone, and with it whatever it held of ours.
+/// The hub is gone, and with it every frame of ours that it had not sent.
 static void lose(local_bus_t *bus) {
     iw_unix_link_lose(&bus->link);
     bus->unheeded = IW_BUS_DOWN;

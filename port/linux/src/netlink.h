@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The kernel's view of a network interface, through netlink (libmnl).
 ///
-/// A request is answered within the call. It may have to wait for whoever configures a network interface just now
+/// A request is answered within the call. It may have to wait while a network interface is being configured elsewhere
 /// (see netdev.h), so it is made only when an interface has come up.
 #ifndef IW_NETLINK_H
 #define IW_NETLINK_H

@@ -261,7 +261,7 @@ static int can_open(void *self, const char *name) {
         can_close(bus);
         return error;
     }
-    (void)read_link(bus); // Also while it is down: so that what must be set can be told.
+    (void)read_link(bus); // Also while it is down: status and doctor then say which settings are wrong.
     try_up(bus);
     return 0;
 }
@@ -356,7 +356,7 @@ static bool take_others(socketcan_t *bus, iw_can_frame_t *out_frame) {
         return false;
     }
     if (iw_socketcan_socket_is_empty(others) && !others->drained) {
-        (void)iw_socketcan_socket_fill(others); // An error here is one of the other socket too, and told by that.
+        (void)iw_socketcan_socket_fill(others); // An error of the interface shows at the other socket too.
     }
     if (!take(others, out_frame)) {
         others->drained = false;

@@ -19,8 +19,8 @@
 /// LATCHED (and CUT). Nothing is sent in LISTENING and LATCHED; ARMING sends one zero pair, and ARMED begins when it is
 /// confirmed; REARMING is ARMING while zeros are held anyway. What each demands of the scheduler is a row of a table.
 ///
-/// Pure state machine: no I/O, no clock. In every step the owner first tells the faults it sees (`iw_permit_raise`),
-/// then calls `iw_permit_step`, then reads `iw_permit_demand`, which tells what the scheduler must aim at.
+/// Pure state machine: no I/O, no clock. In every step the owner first raises the faults it sees (`iw_permit_raise`),
+/// then calls `iw_permit_step`, then hands `iw_permit_demand` to the scheduler.
 ///
 /// What a cause does is its row: some latch in every state; some latch while setpoints are sent and are otherwise only
 /// remembered, to refuse arm and reset while present; some only stop. RESTARTING sends zeros for a process that died,
@@ -32,7 +32,7 @@
 
 #include "iwheel/config.h"
 
-/// An event-like cause is gone when not seen for this long.
+/// A cause that is an event counts as gone when not seen for this long.
 #define IW_PERMIT_EVENT_US 1000000U
 /// Zeros are held until both wheels were at rest for this long ...
 #define IW_PERMIT_SETTLED_US 500000U

@@ -14,9 +14,10 @@
 
 // ---- Envelope ----
 //
-// The envelope that every outgoing frame must keep to, judged, right before it is handed to the port.
+// The last check (R8) of every outgoing frame, right before it is handed to the port: does it lie within the envelope
+// of what is configured?
 //
-// It knows nothing of why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a
+// It does not know why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a
 // setpoint of one of the two ids, with the configured type and length, current and speed within the configured
 // maxima, and a speed no further from the last one that passed than the configured slopes allow for the time
 // between; a change of sign must pass through a zero that was sent. A zero of the right type and current passes

@@ -26,7 +26,7 @@ typedef struct {
     void (*close)(void *self);
     /// The descriptor to watch for reading; the same from open to close.
     int (*watch_fd)(const void *self);
-    /// Reopens what is gone if its time has come, and gives up what is dead. Call it before every step.
+    /// Reopens a lost interface or connection when the retry is due, and closes a dead one. Call it before every step.
     void (*tend)(void *self, iw_time_us_t now_us);
     /// When `tend` has something to do; IW_NEVER if it has not.
     iw_time_us_t (*next_us)(const void *self);

@@ -17,7 +17,7 @@ typedef struct {
     void (*tap)(void *context, const iw_can_frame_t *frame);
     void *tap_context;
     int estop_last;   ///< The last answer given to the core; -1 before the first.
-    bool estop_quiet; ///< The wait has ended without a word of the e-stop, and nobody has looked at it since.
+    bool estop_quiet; ///< The last wait found no edge at the e-stop's descriptor, and it has not been read since.
     iw_backend_store_t bus;
     iw_backend_store_t estop;
 } iw_linux_hal_t;
