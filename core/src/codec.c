@@ -145,7 +145,7 @@ iw_codec_kind_t iw_codec_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wh
     const bool left = (id & SIDE_BIT) == 0U;
     const uint32_t number = left ? id : id - SIDE_BIT;
     iw_codec_wheel_t *const self = left ? &wheel[IW_LEFT] : &wheel[IW_RIGHT];
-    if (number == IW_ID_LEFT_SPEED) { // Four frames of five, so they are looked for first.
+    if (number == IW_ID_LEFT_SPEED) { // Four frames of five.
         return read_speed(frame, frame->dlc, &self->speed);
     }
     // With a format bit in the length no length fits: a remote or extended frame with a known number is found and

@@ -37,7 +37,8 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
     // Below IW_SIGN_MM_S a sign may be noise, or a wheel that rolls back on a kerb.
     const bool clear = applied > IW_SIGN_MM_S && measured > IW_SIGN_MM_S;
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);
-    const int32_t progress = same ? measured : 0; // Turning backwards is no progress.
+    // Turning backwards is no progress.
+    const int32_t progress = same ? measured : 0;
     const bool holds[IW_FOLLOW_VERDICTS] = {
         clear && same,
         clear && !same,

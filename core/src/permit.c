@@ -148,7 +148,7 @@ static bool latches(const iw_permit_t *self, iw_cause_t cause) {
 
 /// A setpoint of another sender in RESTARTING. The first few may be the dead process's own, still in its controller;
 /// more than it can have left there means a second master that drives, to whom the hold gives way (fault 25).
-static void count_foreign(iw_permit_t *self) {
+static void count_stranger(iw_permit_t *self) {
     self->strangers++;
     self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
 }
@@ -166,7 +166,7 @@ void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, u
     } else if (self->phase == IW_PHASE_ARMED) {
         brake(self, now_us, cause, sides, detail);
     } else if (self->phase == IW_PHASE_RESTARTING && cause == IW_CAUSE_SECOND_MASTER) {
-        count_foreign(self);
+        count_stranger(self);
     } else {
         end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
         self->at_once = self->at_once || iw_cause_rows[cause].at_once;
@@ -295,7 +295,8 @@ static void begin_arming(iw_permit_t *self, iw_time_us_t now_us) {
 
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     if (self->holder == client) {
-        return IW_REFUSE_NONE; // The lease is not renewed: only drive commands do that.
+        // The lease is not renewed: only drive commands do that.
+        return IW_REFUSE_NONE;
     }
     const iw_refusal_t sending = refuse_sending(self, now_us);
     const iw_refusal_t refusal = (sending != IW_REFUSE_NONE) ? sending : refuse_lease(self, now_us, takeover);
@@ -318,7 +319,8 @@ static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us,
         return IW_REFUSE_NOT_HOLDER;
     }
     if (sent_us < self->armed_us) {
-        return IW_REFUSE_STALE_COMMAND; // It waited in a queue since before arm: not fresh (R3).
+        // It waited in a queue since before arm: not fresh (R3).
+        return IW_REFUSE_STALE_COMMAND;
     }
     return (sent_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;
 }

@@ -260,7 +260,8 @@ static iw_ledger_item_t sign_item(size_t side) {
 static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s) {
     iw_follow_t *const follow = &self->follow[side];
     const int32_t measured_mm_s = iw_wheel_speed_mm_s(&self->wheel[side]);
-    const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s; // As at a positive command.
+    // As at a positive command.
+    const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s;
     const uint32_t detail = (uint32_t)iw_magnitude(measured_mm_s);
     switch (iw_follow_step(follow, now_us, applied_mm_s, measured_mm_s)) {
     case IW_FOLLOW_SIGN:
@@ -363,7 +364,7 @@ void iw_step_send(iw_gateway_t *self, iw_time_us_t now_us) {
 /// echo may still come late (`echo_ms`) or stand in the backlog, so neither case counts as stuck yet.
 void iw_step_keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
     if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE) {
-        self->purged_us = IW_NEVER; // `left_behind` is false already: arm was refused until the frame was gone.
+        self->purged_us = IW_NEVER; // Nothing is left behind either: arm was refused until it was gone.
         return;
     }
     if (overdue_us(self, now_us) == 0U) {
