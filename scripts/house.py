@@ -78,7 +78,7 @@ def members_renamed(folder):
 def compiled_anew(job):
     entry, folder = job
     command = [word for word in shlex.split(entry["command"]) if word not in ("ccache", "-c")]
-    command[command.index("-o"):command.index("-o") + 2] = ["-fsyntax-only", "-w"]
+    command[command.index("-o"):command.index("-o") + 2] = ["-fsyntax-only"]
     command = [word.replace(str(HEADERS), folder) for word in command]
     run = subprocess.run(command, cwd=entry["directory"], capture_output=True, text=True)
     return [line for line in run.stderr.splitlines() if "error:" in line]

@@ -31,7 +31,7 @@ def linked(library, cpu, headers, functions):
         source, memory_map = Path(folder) / "use.c", Path(folder) / "map"
         source.write_text("".join(f'#include "iwheel/{header}"\n' for header in headers.split()) + "void *volatile sink;\nvoid use(void) {\n"
                           + "".join(f"    sink = (void *){function};\n" for function in functions.split()) + "}\n")
-        subprocess.run(["arm-none-eabi-gcc", f"-mcpu={CPU_FLAGS[cpu]}", "-mthumb", "-mfloat-abi=soft", "-Os", "-w", f"-I{ROOT / 'core/include'}",
+        subprocess.run(["arm-none-eabi-gcc", f"-mcpu={CPU_FLAGS[cpu]}", "-mthumb", "-mfloat-abi=soft", "-Os", f"-I{ROOT / 'core/include'}",
                         "-nostartfiles", "-specs=nosys.specs", f"-Wl,--gc-sections,-e,use,-Map={memory_map}", source, library, "-o",
                         Path(folder) / "used"], check=True, stderr=subprocess.DEVNULL)
         text = memory_map.read_text().split("Linker script and memory map", 1)[1]

@@ -6,7 +6,7 @@
 #include <string.h>
 
 // iw_follow_restart sets every byte.
-IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, all_bits_are_set);
+IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, never_is_all_ones_to_follow);
 
 void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
     self->config = config;

@@ -24,7 +24,7 @@ static const phase_row_t phases[IW_PHASES] = {
     [IW_PHASE_LATCHED] = {IW_STATE_LATCHED, IW_DEMAND_SILENCE, IW_DEMAND_SILENCE},
 };
 
-IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, all_bits_are_set);
+IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, never_is_all_ones_to_permit);
 
 /// Setpoints without echo that a process can leave in its controller when it dies: two per wheel (R6).
 #define LEFT_BEHIND_MAX 4U

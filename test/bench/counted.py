@@ -101,6 +101,12 @@ def arm_steps(work, cpu):
     return {"nothing due": idle, "a frame in": frame, "a pair due": pair, "a look at everything": look}
 
 
+def status_events(build):
+    """{what of it is kept: instructions of one event `state` on this machine}, of the gateway as it was built there."""
+    program, few, many = Path(build) / "test/bench_status", 20, 120
+    return {what: round((host_instructions(program, what, many) - host_instructions(program, what, few)) / (many - few)) for what in ("kept", "anew")}
+
+
 def everything(work):
     """Rows of (codec, {what is counted: instructions per frame, without those of the loop around it})."""
     rows, loop = [], {}
@@ -123,3 +129,4 @@ if __name__ == "__main__":
         print(name, {key: round(value, 1) for key, value in figures.items()})
     for cpu in ARM_CPUS:
         print(cpu, arm_linked(work, cpu), arm_steps(work, cpu))
+    print("state", status_events(ROOT / "build/default"))

@@ -7,6 +7,7 @@
 /// exclude of undefined behaviour is an alarm, and no alarm may stay: docs/static.md.
 #include "iwheel/bit_timing.h"
 #include "iwheel/evidence.h"
+#include "iwheel/gateway.h"
 
 #include <__fc_builtin.h>
 

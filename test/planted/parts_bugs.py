@@ -13,6 +13,7 @@ CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c
 SOCKETCAN, LOCAL = "port/linux/src/socketcan.c", "port/linux/src/local_bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
 LEARN = "app/ctl/learn/learn.c"
+STATUS_LEDGER = "app/gateway/ledger/knowledge_json.c"
 LINK, QUEUE, ASKING = "client/c/src/connection.c", "client/c/src/queue.c", "client/c/src/requests.c"
 TALK, FIELDS = ("unit_client_talk",), ("unit_client_fields",)
 READER, CHECKER, SCANNER, WRITER = (f"northbound/src/{name}.c" for name in ("request", "json_in", "json_scan", "json_out"))
@@ -89,7 +90,7 @@ PARTS = [
     # What is told.
     Bug("battery-full-unflagged", "northbound", "app/gateway/status/snapshot.c", "status->battery_dV == IW_BATTERY_SATURATED_dV",
         "status->battery_dV > IW_BATTERY_SATURATED_dV", REQUESTS),
-    Bug("wheels-told-the-wrong-way-round", "northbound", "app/gateway/status/snapshot.c", 'iwn_out_open(json, (side == IW_LEFT) ? \"left\" : \"right\", '{'); write_motion',
+    Bug("wheels-told-the-wrong-way-round", "northbound", "app/gateway/status/snapshot.c", 'iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", \'{\'); write_motion',
         'iwn_out_open(json, side == IW_LEFT ? "right" : "left", \'{\'); write_motion', REQUESTS),
     Bug("watchdog-fed-too-late", "R11", "app/gateway/process/notify.c", "limit_us / 2U", "limit_us * 2U", MOTION),
     Bug("tape-without-refused-frames", "recordings", TAPE, "if (answer <= 0) {", "if (answer < 0) {", ("unit_gateway_tape",)),
@@ -105,6 +106,10 @@ PARTS = [
         ("unit_daemon_memory",)),
     Bug("tare-noted-with-the-left-wheels-figures", "ledger", "app/gateway/ledger/knowledge.c", "quality = daemon->knowledge.tare[side];", "quality = daemon->knowledge.tare[IW_LEFT];",
         ("unit_daemon_memory",)),
+    Bug("status-with-the-entries-of-before", "ledger", STATUS_LEDGER, "is_alike(written->assumed, source->assumed, sizeof written->assumed) &&", "", ("unit_daemon_memory",)),
+    Bug("status-with-the-words-of-before", "ledger", STATUS_LEDGER, "is_alike(written->known, source->known, sizeof written->known)", "true", ("unit_daemon_memory",)),
+    Bug("status-with-the-values-of-before", "ledger", STATUS_LEDGER, "is_alike(&written->config, source->config, sizeof written->config) &&", "", ("unit_daemon_memory",)),
+    Bug("status-of-a-line-that-did-not-fit", "ledger", STATUS_LEDGER, "json->overflow ? 0U : json->length - begin", "json->length - begin", ("unit_daemon_memory",)),
     # SocketCAN.
     Bug("bus-off-forgotten", "R13", SOCKETCAN, "bus->unheeded = IW_BUS_OFF; bus->present = forged", "bus->present = forged", CAN),
     Bug("restart-is-no-loss", "R6", SOCKETCAN, "} else if (error == IW_CAN_ERROR_RESTARTED) { bus->unheeded = IW_BUS_OFF;", "} else if (error == IW_CAN_ERROR_RESTARTED) {", CAN),

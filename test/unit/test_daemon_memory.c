@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What an earlier run has kept, put beside what this one knows: in the daemon's loop, with a keeper played by the test.
 #include "assumption.h"
+#include "clients/event.h"
 #include "daemon_rig.h"
+#include "status/snapshot.h"
 
 #include "unity.h"
 
@@ -15,6 +17,7 @@ static char text[GW_MEMORY_SIZE];
 static size_t length;
 static unsigned writes;
 static bool set_aside;
+static char status_before[GW_REPLY_MAX]; ///< The last status that was looked at.
 
 int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name) {
     (void)directory;
@@ -89,6 +92,7 @@ void setUp(void) {
     news = GW_KEEPER_NO_NEWS;
     writes = 0;
     set_aside = false;
+    status_before[0] = '\0';
     daemon_rig_begin();
     client = daemon_rig_connect();
 }
@@ -157,6 +161,150 @@ static void test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_oft
     TEST_ASSERT_UINT_WITHIN(1, 3, writes - before);
 }
 
+// The bytes of the ledger that a status keeps ---------------------------------------------------------------------------------
+
+static gw_ledger_written_t *written(void) {
+    return &daemon_rig.daemon->knowledge.written;
+}
+
+static const char *write_status(char out_line[GW_REPLY_MAX]) {
+    iwn_out_t json = gw_event_begin(daemon_rig.daemon, "state");
+    gw_snapshot_write(daemon_rig.daemon, &json);
+    iwn_out_close(&json, '}');
+    const size_t end = iwn_out_finish(&json);
+    TEST_ASSERT_GREATER_THAN_size_t(1, end);
+    memcpy(out_line, json.data, end - 1U);
+    out_line[end - 1U] = '\0';
+    return out_line;
+}
+
+/// The next status is what it would be had nothing been kept. It differs from the one before, or the change was none.
+static void expect_new_status(const char *changed) {
+    static char next[GW_REPLY_MAX];
+    static char anew[GW_REPLY_MAX];
+    (void)write_status(next);
+    written()->length = 0;
+    (void)write_status(anew);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(anew, next, changed);
+    TEST_ASSERT_TRUE_MESSAGE(strcmp(status_before, next) != 0, changed);
+    TEST_ASSERT_GREATER_THAN_size_t(0, written()->length);
+    memcpy(status_before, next, sizeof status_before);
+}
+
+/// From "nobody knows" through all that may become of it.
+static void change_item(iw_ledger_item_t item) {
+    iw_ledger_t *ledger = &daemon_rig.daemon->gateway.ledger;
+    gw_known_item_t *known = &daemon_rig.daemon->knowledge.known.item[item];
+    const gw_word_t word = {"", "a tape"};
+    *known = (gw_known_item_t){0}; // Some were settled by the first frames.
+    ledger->entry[item] = (iw_ledger_entry_t){0};
+    iw_ledger_confirm(ledger, item, IW_EVIDENCE_BUS, 1000);
+    expect_new_status("confirmed by the bus");
+    iw_ledger_confirm(ledger, item, IW_EVIDENCE_BUS, -2500);
+    expect_new_status("another figure");
+    gw_knowledge_observe(daemon_rig.daemon);
+    expect_new_status("noted");
+    known->since_wall_us++;
+    expect_new_status("noted later");
+    (void)strcpy(known->word.found, "yes");
+    expect_new_status("found");
+    (void)strcpy(known->word.how, "bringup");
+    expect_new_status("how");
+    known->word.how[6] = 'q';
+    expect_new_status("how, in its last letter");
+    iw_ledger_contradict(ledger, item, IW_EVIDENCE_BUS, 1000);
+    expect_new_status("contradicted by the bus");
+    TEST_ASSERT_EQUAL_INT(GW_FOUND_SAME, gw_knowledge_confirm(daemon_rig.daemon, item, &word));
+    gw_knowledge_observe(daemon_rig.daemon);
+    expect_new_status("confirmed by the operator");
+    ledger->entry[item] = (iw_ledger_entry_t){0};
+    expect_new_status("as if it had never been asked");
+}
+
+static void test_status_after_a_change_of_an_item_is_as_written_anew(void) {
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        change_item((iw_ledger_item_t)item);
+    }
+}
+
+static void test_status_after_a_change_of_the_configuration_is_as_written_anew(void) {
+    gateway_config_t *configured = &daemon_rig.daemon->config;
+    iw_config_t *core = &configured->core;
+    core->setpoint_type++;
+    expect_new_status("setpoint_type");
+    core->setpoint_type_set = false;
+    expect_new_status("setpoint_type not set");
+    core->current_role = (core->current_role == IW_ROLE_LIMIT) ? IW_ROLE_SETPOINT : IW_ROLE_LIMIT;
+    expect_new_status("current_role");
+    core->radius_mm++;
+    expect_new_status("radius_mm");
+    core->gear_turns++;
+    expect_new_status("gear_ratio, turns");
+    core->gear_per++;
+    expect_new_status("gear_ratio, per");
+    core->rpm_of_rotor = !core->rpm_of_rotor;
+    expect_new_status("rpm_of");
+    configured->track_mm++;
+    expect_new_status("track_mm");
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        core->invert[side] = !core->invert[side];
+        expect_new_status("invert");
+        core->force_unit[side] = (core->force_unit[side] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN;
+        expect_new_status("force_unit");
+    }
+}
+
+static void test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew(void) {
+    iw_side_t refused;
+    daemon_rig_run(3000);
+    expect_new_status("three seconds later");
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, gw_knowledge_tare(daemon_rig.daemon, IW_SIDES_RIGHT, &refused));
+    expect_new_status("right wheel tared");
+    gw_knowledge_observe(daemon_rig.daemon);
+    expect_new_status("tare noted");
+    store(IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR);
+    store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
+    tell_stored();
+    expect_new_status("what an earlier run kept");
+    TEST_ASSERT_NOT_NULL(strstr(status_before, "\"since_wall_us\":1700000000000000"));
+}
+
+static void test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept(void) {
+    static char next[GW_REPLY_MAX];
+    (void)write_status(next);
+    char *const kept = (char *)memchr(written()->text, 's', written()->length); // Of "setpoint_type".
+    TEST_ASSERT_NOT_NULL(kept);
+    *kept = 'S';
+    TEST_ASSERT_NOT_NULL(strstr(write_status(next), "\"ledger\":{\"Setpoint_type\""));
+}
+
+static void test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time(void) {
+    static char first[GW_REPLY_MAX];
+    static char again[GW_REPLY_MAX];
+    (void)write_status(first);
+    TEST_ASSERT_GREATER_THAN_size_t(0, written()->length);
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) { // What moves a terminal is escaped: six bytes for one.
+        gw_known_item_t *known = &daemon_rig.daemon->knowledge.known.item[item];
+        known->entry = (iw_ledger_entry_t){IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
+        memset(known->word.how, 0x7F, sizeof known->word.how - 1U);
+        daemon_rig.daemon->gateway.ledger.entry[item] = known->entry;
+    }
+    (void)write_status(first);
+    TEST_ASSERT_EQUAL_size_t(0, written()->length);
+    TEST_ASSERT_NOT_NULL(strstr(first, "\"how\":\"\\u007F\\u007F"));
+    TEST_ASSERT_EQUAL_STRING(first, write_status(again));
+}
+
+static void test_status_that_does_not_fit_keeps_nothing(void) {
+    char line[64];
+    iwn_out_t json;
+    iwn_out_init(&json, line, sizeof line);
+    written()->length = 0;
+    gw_snapshot_write(daemon_rig.daemon, &json);
+    TEST_ASSERT_TRUE(json.overflow);
+    TEST_ASSERT_EQUAL_size_t(0, written()->length);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_memory_finding_is_believed_for_the_value_it_was_found_for);
@@ -166,5 +314,11 @@ int main(void) {
     RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
     RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
     RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
+    RUN_TEST(test_status_after_a_change_of_an_item_is_as_written_anew);
+    RUN_TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew);
+    RUN_TEST(test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew);
+    RUN_TEST(test_status_without_a_change_of_the_ledger_has_the_bytes_that_were_kept);
+    RUN_TEST(test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time);
+    RUN_TEST(test_status_that_does_not_fit_keeps_nothing);
     return UNITY_END();
 }

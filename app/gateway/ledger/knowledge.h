@@ -20,6 +20,8 @@
 #define GW_KNOWLEDGE_WRITE_US 1000000U
 /// ... and after one that failed, this far.
 #define GW_KNOWLEDGE_RETRY_US 10000000U
+/// A longer ledger is written anew for each status: none that is told in plain words.
+#define GW_LEDGER_TEXT_SIZE 16384U
 
 typedef enum {
     GW_MEMORY_LOADING = 0,
@@ -37,8 +39,19 @@ typedef struct {
     iw_offset_provenance_t from; ///< Of a stored one: where it came from first.
 } gw_told_offset_t;
 
+/// The object `ledger` of a status, as written last, with copies of all that it was written from: while those are as they
+/// were, so are its bytes.
+typedef struct {
+    gateway_config_t config;
+    iw_ledger_entry_t assumed[IW_LEDGER_ITEMS];
+    gw_known_item_t known[IW_LEDGER_ITEMS];
+    size_t length; ///< 0: nothing is kept.
+    char text[GW_LEDGER_TEXT_SIZE];
+} gw_ledger_written_t;
+
 typedef struct {
     gw_known_t known;
+    gw_ledger_written_t written;
     gw_told_offset_t told[IW_SIDES];
     iw_force_quality_t tare[IW_SIDES]; ///< Of the window of the last tare.
     gw_keeper_t keeper;

@@ -5,13 +5,22 @@
 
 #include "iwheel_northbound/words.h"
 
-void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_out_t *json) {
-    const iw_ledger_entry_t *entry = &gw_daemon_look(daemon).assumed[item];
-    const gw_known_item_t *known = &daemon->knowledge.known.item[item];
+#include <string.h>
+
+/// All that the ledger is written from. What writes it sees nothing else, so that nothing can be missing in `is_as_written`.
+typedef struct {
+    const gateway_config_t *config;
+    const iw_ledger_entry_t *assumed; ///< By item.
+    const gw_known_item_t *known;     ///< By item.
+} source_t;
+
+static void write_item(const source_t *source, iw_ledger_item_t item, iwn_out_t *json) {
+    const iw_ledger_entry_t *entry = &source->assumed[item];
+    const gw_known_item_t *known = &source->known[item];
     const bool noted = entry->state != IW_LEDGER_ASSUMED && known->entry.state == entry->state;
     char value[IWN_VALUE_SIZE];
     char reason[GW_EVIDENCE_SIZE];
-    gw_assumption_value(&daemon->config, item, value);
+    gw_assumption_value(source->config, item, value);
     gw_assumption_evidence(item, entry, &known->word, reason);
     iwn_out_text(json, "state", iwn_ledger_state_name(entry->state));
     iwn_out_text(json, "evidence", iwn_evidence_name(entry->evidence));
@@ -24,14 +33,49 @@ void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, i
     iwn_out_text(json, "disabled", (entry->state == IW_LEDGER_CONTRADICTED) ? gw_assumption_cost(item) : NULL);
 }
 
-static void write_ledger(const gw_daemon_t *daemon, iwn_out_t *json) {
+void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_out_t *json) {
+    const source_t source = {&daemon->config, gw_daemon_look(daemon).assumed, daemon->knowledge.known.item};
+    write_item(&source, item, json);
+}
+
+/// Bytes, padding and all: a difference that means nothing costs one writing anew, and none that means something is missed.
+static bool is_alike(const void *one, const void *other, size_t size) {
+    return memcmp(one, other, size) == 0;
+}
+
+static bool is_as_written(const gw_ledger_written_t *written, const source_t *source) {
+    return written->length > 0U && is_alike(&written->config, source->config, sizeof written->config) &&
+           is_alike(written->assumed, source->assumed, sizeof written->assumed) &&
+           is_alike(written->known, source->known, sizeof written->known);
+}
+
+/// Keeps the bytes of the object that ends the line so far, if there is room for them.
+static void keep(gw_ledger_written_t *written, const source_t *source, const iwn_out_t *json, size_t begin) {
+    const size_t length = json->overflow ? 0U : json->length - begin;
+    written->length = 0;
+    if (length > 0U && length <= sizeof written->text) {
+        memcpy(&written->config, source->config, sizeof written->config);
+        memcpy(written->assumed, source->assumed, sizeof written->assumed);
+        memcpy(written->known, source->known, sizeof written->known);
+        memcpy(written->text, &json->data[begin], length);
+        written->length = length;
+    }
+}
+
+static void write_ledger(gw_ledger_written_t *written, const source_t *source, iwn_out_t *json) {
+    if (is_as_written(written, source)) {
+        iwn_out_span(json, iwn_span("ledger"), (iwn_span_t){written->text, written->length});
+        return;
+    }
     iwn_out_open(json, "ledger", '{');
+    const size_t begin = json->length - 1U;
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         iwn_out_open(json, iwn_ledger_item_name((iw_ledger_item_t)item), '{');
-        gw_knowledge_write_item(daemon, (iw_ledger_item_t)item, json);
+        write_item(source, (iw_ledger_item_t)item, json);
         iwn_out_close(json, '}');
     }
     iwn_out_close(json, '}');
+    keep(written, source, json, begin);
 }
 
 static void write_memory(const gw_knowledge_t *self, iwn_out_t *json) {
@@ -49,7 +93,9 @@ static void write_memory(const gw_knowledge_t *self, iwn_out_t *json) {
     iwn_out_close(json, '}');
 }
 
-void gw_knowledge_write(const gw_daemon_t *daemon, iwn_out_t *json) {
-    write_ledger(daemon, json);
-    write_memory(&daemon->knowledge, json);
+void gw_knowledge_write(gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_t *json) {
+    gw_knowledge_t *const self = &daemon->knowledge;
+    const source_t source = {&daemon->config, seen->assumed, self->known.item};
+    write_ledger(&self->written, &source, json);
+    write_memory(self, json);
 }

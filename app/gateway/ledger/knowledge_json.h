@@ -7,8 +7,9 @@
 
 #include "iwheel_northbound/json_out.h"
 
-/// The objects `ledger` and `memory` of a snapshot: every item; file, state and reason.
-void gw_knowledge_write(const gw_daemon_t *daemon, iwn_out_t *json);
+/// The objects `ledger` and `memory` of a snapshot: every item; file, state and reason. The ledger's bytes are kept and
+/// written again until something of it changes.
+void gw_knowledge_write(gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_t *json);
 
 /// One item of the ledger, its state and what it rests on, into an object that is open.
 void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_out_t *json);

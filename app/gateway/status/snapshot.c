@@ -207,7 +207,7 @@ void gw_snapshot_write(gw_daemon_t *daemon, iwn_out_t *json) {
     write_wheel(daemon, &seen, IW_LEFT, json);
     write_wheel(daemon, &seen, IW_RIGHT, json);
     write_pose(&seen, json);
-    gw_knowledge_write(daemon, json);
+    gw_knowledge_write(daemon, &seen, json);
     write_gaps(daemon, json);
     write_budget(&seen, json);
     write_counters(&seen, json);

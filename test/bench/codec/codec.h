@@ -4,6 +4,7 @@
 #define BENCH_CODEC_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 /// The values of a setpoint, as a program has them.
 typedef struct {

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+/// The event `state`, as it is written for whoever watches, of a gateway that drives two wheels: to be run by a counter of instructions.
+///
+///     bench_status kept ROUNDS    nothing of the ledger has changed since the event before
+///     bench_status anew ROUNDS    something has, each time
+///
+/// Two runs with different ROUNDS differ by the events alone. Exit status 1 if the gateway does not drive or an event is not whole.
+#include "clients/event.h"
+#include "daemon_rig.h"
+#include "status/snapshot.h"
+
+#include "unity.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static unsigned rounds;
+static bool anew;
+
+void setUp(void) {
+    daemon_rig_begin();
+}
+
+void tearDown(void) {
+    daemon_rig_end();
+}
+
+static size_t write_event(gw_daemon_t *daemon) {
+    iwn_out_t json = gw_event_begin(daemon, "state");
+    gw_snapshot_write(daemon, &json);
+    iwn_out_close(&json, '}');
+    return iwn_out_finish(&json);
+}
+
+static void bench_status(void) {
+    gw_daemon_t *const daemon = daemon_rig.daemon;
+    const int client = daemon_rig_connect();
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 300, 300, 500);
+    iw_ledger_entry_t *const entry = &daemon->gateway.ledger.entry[IW_LEDGER_GEAR_RATIO];
+    for (unsigned i = 0; i < rounds; i++) {
+        entry->figure += anew ? 1 : 0;
+        TEST_ASSERT_GREATER_THAN_size_t(0, write_event(daemon));
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    (void)close(client);
+}
+
+int main(int argc, char **argv) {
+    rounds = (argc > 2) ? (unsigned)strtoul(argv[2], NULL, 10) : 0U;
+    anew = argc > 1 && strcmp(argv[1], "anew") == 0;
+    UNITY_BEGIN();
+    RUN_TEST(bench_status);
+    return UNITY_END();
+}
