@@ -318,8 +318,8 @@ static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us,
     if (self->holder != client) {
         return IW_REFUSE_NOT_HOLDER;
     }
+    // It waited in a queue since before arm: not fresh (R3).
     if (sent_us < self->armed_us) {
-        // It waited in a queue since before arm: not fresh (R3).
         return IW_REFUSE_STALE_COMMAND;
     }
     return (sent_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;

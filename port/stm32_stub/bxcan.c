@@ -57,8 +57,8 @@ static void unmask_transmit(const iw_bxcan_t *self) {
     iw_register_write(&self->config.registers->IER, INTERRUPTS);
 }
 
-/// Bounded: an abort ends at the latest with the frame that is on the bus, unless the controller is stuck.
 static bool poll_tsr(const iw_bxcan_t *self, uint32_t flags) {
+    // Bounded: an abort ends at the latest with the frame that is on the bus, unless the controller is stuck.
     for (uint32_t poll = 0; poll < self->config.poll_limit; poll++) {
         if ((iw_register_read(&self->config.registers->TSR) & flags) == flags) {
             return true;
