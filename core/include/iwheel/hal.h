@@ -8,6 +8,7 @@
 #define IW_HAL_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 typedef enum {
     IW_BUS_DOWN = 0, ///< Interface absent, down, or not opened.
