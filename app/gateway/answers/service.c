@@ -144,7 +144,8 @@ static void serve(gw_daemon_t *daemon, gw_client_t *client) {
     if (!client->closing && !client->arming && gw_client_line_too_long(client)) {
         refuse_long_line(daemon, client);
     }
-    const bool gone = client->failed || (client->ended && (client->arming || !has_line(client)));
+    const bool reading = client->reading && !client->hung_up; // Its reply is still to come, and it can take it.
+    const bool gone = client->failed || (client->ended && (client->arming || (!has_line(client) && !reading)));
     if (gone && !client->closing) {
         end_lease(daemon, client);
         gw_client_finish(client, daemon->now_us);

@@ -219,6 +219,21 @@ enum {
 /// Which events come from now on, instead of those before; 0 ends it. `rate_hz` 1..100 is for state and force. As `iwc_ask`.
 IWC_API iwc_result_t iwc_watch(iwc_t *self, unsigned topics, int rate_hz, int timeout_ms);
 
+/// Of the pieces in which recordings come.
+#define IWC_PIECE_MAX 24576U
+
+typedef struct {
+    int64_t offset; ///< Of the first byte.
+    int64_t size;   ///< Of the file now; it may grow for two seconds after its stop.
+    size_t length;  ///< Bytes got: 0 at the end.
+} iwc_piece_t;
+
+/// Reads a piece of a recording: `name` as `recordings` tells it, with .log, .jsonl or .conf behind it; from `offset` on. `out` has room for
+/// IWC_PIECE_MAX bytes. As `iwc_ask`; the piece has its checksum, and with the last one IWC_GARBLED tells a file whose pieces do not
+/// make the whole: `*crc32` is that of all before, 0 for the first, and is carried on; NULL: not compared.
+IWC_API iwc_result_t iwc_recording(iwc_t *self, const char *name, int64_t offset, int timeout_ms, void *out,
+                                   iwc_piece_t *out_piece, uint32_t *crc32);
+
 // ---- driving and stopping -----------------------------------------------------------------------------------------
 
 typedef struct {
