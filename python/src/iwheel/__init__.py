@@ -17,7 +17,7 @@ None means unknown, never 0.
 from ._aio import AsyncArmed, AsyncGateway
 from ._errors import ConnectionLost, GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._gateway import Armed, Gateway
-from ._protocol import Confirmed, Frame, Hello, LedgerEntry, Status, Stop, StopSummary, Tared, Watched, WheelStatus
+from ._protocol import Confirmed, Frame, Hello, LedgerEntry, RecordingEntry, Status, Stop, StopSummary, Tared, Watched, WheelStatus
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._version import __version__
 from ._wire import default_socket
@@ -40,6 +40,7 @@ __all__ = [
     "NoAnswer",
     "OnStatus",
     "ProtocolError",
+    "RecordingEntry",
     "Refused",
     "Status",
     "Stop",
