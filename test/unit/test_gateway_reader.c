@@ -237,7 +237,7 @@ static void test_file_that_grows_or_goes_between_pieces_is_told(void) {
     TEST_ASSERT_EQUAL(0, truncate(path_of(LOG), 5));
     TEST_ASSERT_EQUAL(IWN_OUT_OF_RANGE, ask(LOG, 10));
     TEST_ASSERT_EQUAL(0, unlink(path_of(LOG)));
-    TEST_ASSERT_EQUAL(IWN_BAD_VALUE, ask(LOG, 10));
+    TEST_ASSERT_EQUAL(IWN_DENIED, ask(LOG, 10));
     assert_says("is not there");
 }
 

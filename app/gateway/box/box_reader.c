@@ -282,14 +282,18 @@ static void answer_piece(int directory, const gw_box_question_t *question, gw_bo
         refuse(out, IWN_BAD_VALUE, "name is none of a recording's file: " IS_ENDING);
         return;
     }
+    if (question->offset < 0) {
+        refuse(out, IWN_OUT_OF_RANGE, "offset must be 0 to the size of the file");
+        return;
+    }
     const int fd = open_file(directory, question->name, &size);
     if (fd < 0 && errno == ENOENT) {
-        refuse(out, IWN_BAD_VALUE, "%s is not there (the oldest recordings are removed); ask for recordings",
+        refuse(out, IWN_DENIED, "%s is not there (the oldest recordings are removed); ask for recordings",
                question->name);
     } else if (fd < 0) {
         refuse(out, IWN_DENIED, "%s is not read: %s", question->name,
                (errno == ELOOP) ? "it is a symbolic link, which is not followed" : gw_folder_fault(errno));
-    } else if (question->offset < 0 || question->offset > size) {
+    } else if (question->offset > size) {
         refuse(out, IWN_OUT_OF_RANGE, "offset must be 0 to %" PRId64 ", the size of %s", size, question->name);
     } else {
         write_piece(fd, question, size, out);
