@@ -22,6 +22,7 @@ static void say(const char *text) {
 }
 
 void setUp(void) {
+    piece = (iwc_piece_t){0};
     int pair[2];
     TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM, 0, pair));
     server = pair[1];
@@ -36,40 +37,40 @@ void tearDown(void) {
 }
 
 /// The reply is there before the first question of a fresh connection: its id is 2.
-static iwc_result_t ask(int64_t offset, const char *fields, uint32_t *crc32) {
+static iwc_result_t ask(int64_t next, uint32_t crc32, const char *fields) {
     char line[512];
     (void)snprintf(line, sizeof line, "{\"id\":2,\"ok\":true,\"name\":\"" NAME "\",%s}\n", fields);
     say(line);
-    return iwc_recording(gateway, NAME, offset, SOON, out, &piece, crc32);
+    piece = (iwc_piece_t){.next = next, .crc32 = crc32};
+    return iwc_recording(gateway, NAME, SOON, out, &piece);
 }
 
 /// "123456789" and its parts, as zlib.crc32 has them.
 #define WHOLE "\"data\":\"MTIzNDU2Nzg5\",\"crc32\":3421780262"
 
 static void test_last_piece_is_taken_with_both_checksums(void) {
-    uint32_t crc32 = 0;
     char heard[256] = "";
-    TEST_ASSERT_EQUAL(IWC_OK, ask(0, "\"offset\":0,\"size\":9," WHOLE ",\"file_crc32\":3421780262", &crc32));
+    TEST_ASSERT_EQUAL(IWC_OK, ask(0, 0, "\"offset\":0,\"size\":9," WHOLE ",\"file_crc32\":3421780262"));
     TEST_ASSERT_EQUAL_STRING_LEN("123456789", out, 9);
     TEST_ASSERT_EQUAL(9, piece.length);
     TEST_ASSERT_EQUAL_INT64(9, piece.size);
-    TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, crc32);
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, piece.crc32);
     TEST_ASSERT_GREATER_THAN(0, recv(server, heard, sizeof heard - 1U, 0));
     TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"recording\",\"name\":\"" NAME "\",\"offset\":0}\n", heard);
 }
 
 static void test_second_piece_carries_the_checksum_on(void) {
-    uint32_t crc32 = 0x9BE3E0A3U; // Of "1234".
     TEST_ASSERT_EQUAL(
         IWC_OK,
-        ask(4, "\"offset\":4,\"size\":9,\"data\":\"NTY3ODk=\",\"crc32\":320708720,\"file_crc32\":3421780262", &crc32));
+        ask(4, 0x9BE3E0A3U,
+            "\"offset\":4,\"size\":9,\"data\":\"NTY3ODk=\",\"crc32\":320708720,\"file_crc32\":3421780262")); // Of 1234.
     TEST_ASSERT_EQUAL(5, piece.length);
-    TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, crc32);
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926U, piece.crc32);
 }
 
 static void test_end_of_the_file_is_an_empty_piece(void) {
-    TEST_ASSERT_EQUAL(IWC_OK,
-                      ask(9, "\"offset\":9,\"size\":9,\"data\":\"\",\"crc32\":0,\"file_crc32\":3421780262", NULL));
+    TEST_ASSERT_EQUAL(
+        IWC_OK, ask(9, 0xCBF43926U, "\"offset\":9,\"size\":9,\"data\":\"\",\"crc32\":0,\"file_crc32\":3421780262"));
     TEST_ASSERT_EQUAL(0, piece.length);
 }
 
@@ -87,8 +88,7 @@ static void test_piece_that_is_not_right_ends_the_connection(void) {
         "\"offset\":0,\"size\":-1,\"data\":7,\"crc32\":0,\"file_crc32\":null",
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        uint32_t crc32 = 0;
-        TEST_ASSERT_EQUAL_MESSAGE(IWC_GARBLED, ask(0, bad[i], &crc32), bad[i]);
+        TEST_ASSERT_EQUAL_MESSAGE(IWC_GARBLED, ask(0, 0, bad[i]), bad[i]);
         TEST_ASSERT_EQUAL_INT(-1, iwc_fd(gateway));
         tearDown();
         setUp();
@@ -104,7 +104,7 @@ static void test_piece_longer_than_room_is_not_written(void) {
     say(line);
     static char guarded[IWC_PIECE_MAX + 1U];
     guarded[IWC_PIECE_MAX] = 'X';
-    TEST_ASSERT_EQUAL(IWC_GARBLED, iwc_recording(gateway, NAME, 0, SOON, guarded, &piece, NULL));
+    TEST_ASSERT_EQUAL(IWC_GARBLED, iwc_recording(gateway, NAME, SOON, guarded, &piece));
     TEST_ASSERT_EQUAL('X', guarded[IWC_PIECE_MAX]);
 }
 
@@ -113,15 +113,15 @@ static void test_name_that_could_not_stand_in_a_request_is_not_sent(void) {
     static const char *const bad[] = {
         "", "a\"b", "../a", "a\\b", "a b", "a\nb", "0123456789012345678901234567890123456789012345678901234567890123"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        TEST_ASSERT_EQUAL_MESSAGE(IWC_INVALID, iwc_recording(gateway, bad[i], 0, SOON, out, &piece, NULL), bad[i]);
+        TEST_ASSERT_EQUAL_MESSAGE(IWC_INVALID, iwc_recording(gateway, bad[i], SOON, out, &piece), bad[i]);
     }
-    TEST_ASSERT_EQUAL(IWC_INVALID, iwc_recording(gateway, NAME, -1, SOON, out, &piece, NULL));
+    TEST_ASSERT_EQUAL(IWC_INVALID, iwc_recording(gateway, NAME, SOON, out, &(iwc_piece_t){.next = -1}));
     TEST_ASSERT_EQUAL(-1, recv(server, &byte, 1, MSG_DONTWAIT));
 }
 
 static void test_refusal_leaves_the_connection(void) {
     say("{\"id\":2,\"ok\":false,\"error\":\"bad_value\",\"message\":\"gone\"}\n");
-    TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_recording(gateway, NAME, 0, SOON, out, &piece, NULL));
+    TEST_ASSERT_EQUAL(IWC_REFUSED, iwc_recording(gateway, NAME, SOON, out, &piece));
     TEST_ASSERT_EQUAL_STRING("gone", iwc_reason(gateway));
     TEST_ASSERT_NOT_EQUAL(-1, iwc_fd(gateway));
 }

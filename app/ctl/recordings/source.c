@@ -54,18 +54,15 @@ static bool write_all(int fd, const char *bytes, size_t length) {
 static bool fetch(ctl_t *ctl, const char *name, int64_t most, int fd) {
     static char bytes[IWC_PIECE_MAX];
     iwc_piece_t piece = {.size = 1};
-    uint32_t crc = 0;
-    int64_t got = 0;
-    while (got < piece.size && got < most) {
+    while (piece.next < piece.size && piece.next < most) {
         iwc_let_in(ctl->client.gateway, signals_let_in());
-        const iwc_result_t result = iwc_recording(ctl->client.gateway, name, got, PIECE_MS, bytes, &piece, &crc);
+        const iwc_result_t result = iwc_recording(ctl->client.gateway, name, PIECE_MS, bytes, &piece);
         if (result != IWC_OK || piece.size > BYTES_MAX || !write_all(fd, bytes, piece.length)) {
             if (result != IWC_REFUSED) {
                 client_close(&ctl->client); // A late reply would be taken for another's.
             }
             return false;
         }
-        got += (int64_t)piece.length;
     }
     return lseek(fd, 0, SEEK_SET) == 0;
 }

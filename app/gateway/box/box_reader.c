@@ -209,7 +209,7 @@ static bool whole_crc(int fd, int64_t size, uint32_t *out_crc) {
             return false;
         }
         *out_crc = gw_box_crc32(*out_crc, bytes, most);
-        at += left < (int64_t)sizeof bytes ? left : (int64_t)sizeof bytes;
+        at += (int64_t)most;
     }
     return true;
 }

@@ -64,49 +64,36 @@ static bool is_name(const char *name) {
     return length > 0U && length <= NAME_MAX_BYTES && strspn(name, all) == length;
 }
 
-/// A piece that cannot be right ends the connection: nothing that comes after it can be trusted either.
-static iwc_result_t garbled(iwc_t *self) {
-    iwc_close(self);
-    return IWC_GARBLED;
-}
-
-static bool take(const iwc_message_t *reply, int64_t offset, void *out, iwc_piece_t *piece, uint32_t *out_crc) {
+/// True if the reply brings what comes next.
+static bool take(const iwc_message_t *reply, uint8_t *out, iwc_piece_t *piece) {
     size_t length = 0;
     const char *data = iwc_json(reply, "data", &length);
-    const iwc_value_t size = iwc_integer(reply, "size");
     const iwc_value_t from = iwc_integer(reply, "offset");
     const iwc_value_t crc = iwc_integer(reply, "crc32");
-    *piece = (iwc_piece_t){.offset = offset, .size = size.value};
-    if (!size.known || !from.known || from.value != offset || !crc.known ||
-        !decode((iwc_span_t){data, length}, (uint8_t *)out, &piece->length)) {
+    const iwc_value_t whole = iwc_integer(reply, "file_crc32");
+    piece->size = iwc_integer(reply, "size").value;
+    if (!from.known || from.value != piece->next || !crc.known ||
+        !decode((iwc_span_t){data, length}, out, &piece->length) || crc.value != crc32_of(0, out, piece->length)) {
         return false;
     }
-    *out_crc = crc32_of(0, (const uint8_t *)out, piece->length);
-    const bool goes_on = piece->length > 0U || offset >= size.value; // Else it would be asked for without end.
-    return crc.value == (int64_t)*out_crc && goes_on && offset + (int64_t)piece->length <= size.value;
+    const bool goes_on = piece->length > 0U || piece->next == piece->size; // Else it would be asked for without end.
+    piece->next += (int64_t)piece->length;
+    piece->crc32 = crc32_of(piece->crc32, out, piece->length);
+    return goes_on && piece->next <= piece->size && (!whole.known || whole.value == piece->crc32);
 }
 
-iwc_result_t iwc_recording(iwc_t *self, const char *name, int64_t offset, int timeout_ms, void *out,
-                           iwc_piece_t *out_piece, uint32_t *crc32) {
+iwc_result_t iwc_recording(iwc_t *self, const char *name, int timeout_ms, void *out, iwc_piece_t *piece) {
     char request[160];
     iwc_message_t reply;
-    uint32_t crc = 0;
-    if (!is_name(name) || offset < 0) {
+    if (!is_name(name) || piece->next < 0) {
         return IWC_INVALID;
     }
     (void)snprintf(request, sizeof request, "{\"cmd\":\"recording\",\"name\":\"%s\",\"offset\":%" PRId64 "}", name,
-                   offset);
+                   piece->next);
     const iwc_result_t result = iwc_ask(self, request, timeout_ms, &reply);
-    if (result != IWC_OK) {
-        return result;
+    if (result == IWC_OK && !take(&reply, (uint8_t *)out, piece)) {
+        iwc_close(self); // Nothing that comes after it can be trusted either.
+        return IWC_GARBLED;
     }
-    if (!take(&reply, offset, out, out_piece, &crc)) {
-        return garbled(self);
-    }
-    if (crc32 != NULL) {
-        *crc32 = crc32_of(*crc32, (const uint8_t *)out, out_piece->length);
-        const iwc_value_t whole = iwc_integer(&reply, "file_crc32");
-        return (whole.known && whole.value != (int64_t)*crc32) ? garbled(self) : IWC_OK;
-    }
-    return IWC_OK;
+    return result;
 }

@@ -222,17 +222,18 @@ IWC_API iwc_result_t iwc_watch(iwc_t *self, unsigned topics, int rate_hz, int ti
 /// Of the pieces in which recordings come.
 #define IWC_PIECE_MAX 24576U
 
+/// How far a recording is read; all zero before its first piece.
 typedef struct {
-    int64_t offset; ///< Of the first byte.
-    int64_t size;   ///< Of the file now; it may grow for two seconds after its stop.
-    size_t length;  ///< Bytes got: 0 at the end.
+    int64_t next;   ///< Offset of the first byte that is not read yet. At `size`: that was all.
+    int64_t size;   ///< Of the file, as of the last piece; it may grow for two seconds after its stop.
+    size_t length;  ///< Bytes of the last piece.
+    uint32_t crc32; ///< Of all before `next`.
 } iwc_piece_t;
 
-/// Reads a piece of a recording: `name` as `recordings` tells it, with .log, .jsonl or .conf behind it; from `offset` on. `out` has room for
-/// IWC_PIECE_MAX bytes. As `iwc_ask`; the piece has its checksum, and with the last one IWC_GARBLED tells a file whose pieces do not
-/// make the whole: `*crc32` is that of all before, 0 for the first, and is carried on; NULL: not compared.
-IWC_API iwc_result_t iwc_recording(iwc_t *self, const char *name, int64_t offset, int timeout_ms, void *out,
-                                   iwc_piece_t *out_piece, uint32_t *crc32);
+/// Reads the next piece of a recording's file: `name` as the request `recordings` tells it, with .log, .jsonl or .conf behind it. `out` has
+/// room for IWC_PIECE_MAX bytes. As `iwc_ask`; IWC_GARBLED also for a piece that is not as its checksum says, and for a last one with
+/// which the whole is not.
+IWC_API iwc_result_t iwc_recording(iwc_t *self, const char *name, int timeout_ms, void *out, iwc_piece_t *piece);
 
 // ---- driving and stopping -----------------------------------------------------------------------------------------
 
