@@ -2,6 +2,7 @@
 #include "loop.h"
 
 #include "answers/dispatch.h"
+#include "answers/recordings.h"
 #include "answers/service.h"
 #include "box/record.h"
 #include "bus/bus_facts.h"
@@ -17,7 +18,7 @@
 #include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
-#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 6)
+#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 7)
 
 /// While setpoints leave, the e-stop is looked at this often even if nothing else wakes us: a GPIO chip that goes wakes nobody.
 #define ESTOP_LOOK_US 4000U
@@ -53,8 +54,10 @@ int gw_loop_open(gw_daemon_t *daemon) {
                        daemon->listener.fd,
                        iw_linux_hal_bus_fd(&daemon->hal),
                        iw_linux_hal_estop_fd(&daemon->hal),
-                       daemon->box.fd};
-    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS, GW_TAG_ESTOP, GW_TAG_BOX};
+                       daemon->box.fd,
+                       daemon->box.reader.fd};
+    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS,
+                             GW_TAG_ESTOP, GW_TAG_BOX,    GW_TAG_BOX};
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; i++) {
         error = watch(daemon, fds[i], tags[i]);
     }
@@ -216,6 +219,7 @@ static void listen_to_writer(gw_daemon_t *daemon) {
     if (daemon->now_us >= daemon->box_look_us) {
         daemon->box_look_us = daemon->now_us + BOX_LOOK_US;
         gw_record_take(daemon);
+        gw_recordings_take(daemon);
     }
 }
 
