@@ -57,9 +57,11 @@ static void names_free(names_t *self) {
 static void names_add(names_t *self, const char *stem, const char *ending) {
     char name[NAME_SIZE];
     const int n = snprintf(name, sizeof name, "%s%s", stem, ending);
-    if (n > 0 && (size_t)n < sizeof name && strchr(name, '/') == NULL) {
-        self->name[self->count] = strdup(name);
-        self->count += (self->name[self->count] != NULL) ? 1U : 0U;
+    const bool fits = n > 0 && (size_t)n < sizeof name && strchr(name, '/') == NULL;
+    char *copy = fits ? strdup(name) : NULL;
+    if (copy != NULL) {
+        self->name[self->count] = copy;
+        self->count++;
     }
 }
 
