@@ -7,7 +7,7 @@
 #include "pins.h"
 
 /// A word of a table; "?" beyond its end. Gaps within are NULL.
-#define WORDS(names, index) (((size_t)(index) < sizeof names / sizeof names[0]) ? (names)[index] : "?")
+#define WORDS(names, index) (((size_t)(index) < sizeof(names) / sizeof((names)[0])) ? (names)[index] : "?")
 
 // What is shown now, in one number; 0: nothing was shown yet.
 static uint32_t shown;
