@@ -64,9 +64,17 @@ def parenthesised(text):
     return "".join("(" * opens.get(i, 0) + token + ")" * closes.get(i, 0) for i, token in enumerate(tokens))
 
 
+def without_parentheses(found):
+    """Not in a macro, whose arguments need theirs."""
+    line = found.string[found.string.rfind("\n", 0, found.start()) + 1:found.end()]
+    before = found.string[:found.start() - len(line) + len(found[0])].rstrip("\n")
+    in_macro = line.lstrip().startswith("#") or before.endswith("\\")
+    return found[0] if in_macro or TYPE.search(found[1]) else f"sizeof {found[1]}"
+
+
 def rewrite(text):
     text = INCREMENT.sub(r"\g<before>\g<what>\g<operator>\g<after>", text)
-    text = SIZEOF.sub(lambda found: found[0] if TYPE.search(found[1]) else f"sizeof {found[1]}", text)
+    text = SIZEOF.sub(without_parentheses, text)
     text = VOID_MEM.sub(r"\1", text)
     return parenthesised(text)
 

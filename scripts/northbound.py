@@ -258,7 +258,7 @@ FIELDS_HEADER = """// SPDX-License-Identifier: MIT
 /// In the order of iwn_cmd_t.
 """
 KINDS = {"text": "TEXT", "boolean": "FLAG", "topic": "TOPICS", "side": "SIDE", "ledger_item": "ITEM"}
-MEMBERS = {"side": "sides"}  # Of iwn_request_t, where it is called otherwise.
+MEMBERS = {"side": "sides", "recording.name": "file"}  # Of iwn_request_t, where it is called otherwise.
 
 
 def c_kind(field):
@@ -278,7 +278,8 @@ def c_fields(description):
     for cmd in description.requests:
         for name, field in description.fields(description.requests[cmd]).items():
             required = "false" if field.get("optional") else "true"
-            row = (name, MEMBERS.get(name, name), c_kind(field), str(field.get("bytes", 0)), required)
+            member = MEMBERS.get(f"{cmd}.{name}", MEMBERS.get(name, name))
+            row = (name, member, c_kind(field), str(field.get("bytes", 0)), required)
             rows.setdefault(row, []).append(f"BIT({cmd.upper()})")
     fields = c_macro("IWN_REQUEST_FIELDS(ROW)", [f"ROW({', '.join(row)}, {' | '.join(bits)})" for row, bits in rows.items()])
     names = c_macro("IWN_REQUEST_NAMES(NAME)", [f"NAME({cmd})" for cmd in description.requests])

@@ -144,6 +144,8 @@ def style(folder, code):
     for part in ("core/src", "core/include", "northbound/src", "northbound/include", "port", "app", "test"):
         (folder / part).mkdir(parents=True)
     (folder / "core/src/planted.c").write_text(code)
+    for part in ("core/src", "port"):
+        (folder / part / "commented.c").write_text(CLEAN + ("// A reason.\n" + "int iw_x;\n" * 7) * 12)
     for part in ("northbound/src", "app"):
         (folder / part / "clean.c").write_text(CLEAN)
     return run(sys.executable, SCRIPTS / "style_metrics.py", folder)
@@ -274,10 +276,17 @@ CASES = [
     (northbound, "python3", "an error that means something else", ("docs/northbound.md", "a wheel turns |", "a wheel stands |"), True),
     (northbound, "python3", "an integer without a unit", ("share/northbound.json", '"reboots": {"type": "integer", "unit": "count"', '"reboots": {"type": "integer"'), True),
     (style, "lizard", "clean", CLEAN, False),
+    (style, "lizard", "a comment that names what there is", CLEAN + "// As `iw_f` in planted.c.\n", False),
+    (style, "lizard", "a comment that names a function that is gone", CLEAN + "// As `iw_g`.\n", True),
+    (style, "lizard", "a comment that names a file that is gone", CLEAN + "// See gone.h.\n", True),
+    (style, "lizard", "a comment that names a rule that is gone", CLEAN + "// By R99.\n", True),
+    (style, "lizard", "121 characters", CLEAN + "// " + "a" * 118 + "\n", True),
+    (style, "lizard", "no comment that says why", CLEAN + "int iw_h;\n" * 300, True),
+    (style, "lizard", "nothing but comments", CLEAN + "// A reason.\n" * 60, True),
     (style, "lizard", "61 lines", function("    a++;\n" * 58 + "    return a;\n"), True),
     (style, "lizard", "complexity 12", function("    if (a == 1) {\n        a++;\n    }\n" * 11 + "    return a;\n"), True),
     (style, "lizard", "6 parameters", function("    return a;\n", "int a, int b, int c, int d, int e, int f"), True),
-    (style, "lizard", "401 lines", CLEAN + "\n" * 395, True),
+    (style, "lizard", "401 lines that are no comments", CLEAN + "\n" * 396, True),
     (style, "lizard", "no licence line", CLEAN.split("\n", 1)[1], True),
     (style, "lizard", "unfinished", CLEAN + "// " + "TO" + "DO\n", True),
     (dialect, "python3", "clean", function("    a++;\n    return (a > 1) ? a : 0;\n"), False),

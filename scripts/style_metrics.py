@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Measures functions and files, and fails where a limit of the house style is passed. Needs lizard (PyPI).
+"""Measures functions and files, and fails where a limit of the house style is passed, or where a comment names what is not there.
+Needs lizard (PyPI).
 
 usage: style_metrics.py [ROOT]
 """
@@ -17,11 +18,20 @@ GROUPS = {
     "northbound": (("northbound/src",), 60, 15, 10),
     "ports and apps": (("port", "app", "client"), 80, 25, 15),
 }
-FILE_LINES = 400
+FILE_LINES = 400  # Without lines of comment alone: saying why must not cost anything.
 TEST_FILE_LINES = 600  # Tables of cases may be longer than code.
+LINE = 120
+HEADERS = ("core/include", "northbound/include")
+COMMENTED = ("core", "port")  # What these name in comments must be there, their lines are not longer than LINE ...
+COMMENT_SHARE = {"core/src": (5, 20), "port": (5, 20)}  # ... and so much of their sources' lines, in percent, says why.
+CODE = ("core", "northbound", "client", "port", "app", "zephyr")
 PARAMETERS = 5
 SPDX = "SPDX-License-Identifier: MIT"
 UNFINISHED = re.compile(r"\b(TODO|FIXME|XXX)\b")
+STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
+NAMED = re.compile(r"\b(?:iw|IW)_\w*[A-Za-z0-9]\b(?![*_])|(?<=`)[A-Za-z]\w+(?=(?:\(\))?`)|(?<=::)\w+")
+FILE_NAMED = re.compile(r"(?<![\w/<-])[\w/-]+\.(?:[ch]|md)\b")
+RULE_NAMED = re.compile(r"\bR\d+\b")
 
 
 def sources(root, folders):
@@ -42,8 +52,9 @@ def function_findings(path, functions, limits):
 
 def file_findings(path, name, longest=FILE_LINES):
     lines = path.read_text().splitlines()
-    if len(lines) > longest:
-        yield f"{name}: {len(lines)} lines, at most {longest}"
+    length = sum(not line.lstrip().startswith("//") for line in lines)
+    if length > longest:
+        yield f"{name}: {length} lines without comments, at most {longest}"
     if not lines or SPDX not in lines[0]:
         yield f"{name}:1: the first line must be // {SPDX}"
     for number, line in enumerate(lines, 1):
@@ -51,9 +62,37 @@ def file_findings(path, name, longest=FILE_LINES):
             yield f"{name}:{number}: unfinished: {line.strip()}"
 
 
+def line_findings(path, name):
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        if len(line) > LINE:
+            yield f"{name}:{number}: {len(line)} characters, at most {LINE}"
+
+
+def known_names(root):
+    """(identifiers of the code, names of files, rules of the safety case): what a comment may speak of."""
+    paths = sources(root, CODE)
+    code = "".join(STRING_OR_COMMENT.sub(" ", path.read_text()) for path in paths)
+    documents = [str(path.relative_to(root)) for path in (root / "docs").rglob("*.md")]
+    safety_case = root / "docs/safety-case.md"
+    rules = re.findall(r"^### (R\d+) ", safety_case.read_text(), re.MULTILINE) if safety_case.is_file() else []
+    return set(re.findall(r"\w+", code)), {path.name for path in paths} | set(documents), set(rules)
+
+
+def dangling(path, name, known):
+    """Names in comments that nothing bears: a comment that no longer holds misleads."""
+    identifiers, files, rules = known
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        comment = " ".join(found for found in STRING_OR_COMMENT.findall(line) if found.startswith("/"))
+        gone = [found for found in NAMED.findall(comment) if found not in identifiers]
+        gone += [found for found in FILE_NAMED.findall(comment) if found not in files and Path(found).name not in files]
+        gone += [found for found in RULE_NAMED.findall(comment) if found not in rules]
+        for found in gone:
+            yield f"{name}:{number}: names {found}, which is nowhere"
+
+
 def comment_share(paths):
-    """Percent of non-empty lines that are comments, over all files together."""
-    lines = [line.strip() for path in paths for line in path.read_text().splitlines() if line.strip()]
+    """Percent of non-empty lines that are comments, over all files together; the licence says nothing."""
+    lines = [line.strip() for path in paths for line in path.read_text().splitlines() if line.strip() and SPDX not in line]
     comments = sum(line.startswith(("//", "/*")) or "///<" in line for line in lines)
     return 100 * comments / max(len(lines), 1)
 
@@ -79,9 +118,19 @@ def main(arguments):
               f"max {max(lengths)}; complexity: median {statistics.median(complexities):g}, max {max(complexities)}; "
               f"file lines: median {statistics.median(sizes):g}, max {max(sizes)}; "
               f"comments {comment_share(paths):.0f} %")
-    headers = sources(root, ("core/include", "northbound/include"))
+    headers = sources(root, HEADERS)
     for path in headers:
+        findings += function_findings(path.relative_to(root), lizard.analyze_file(str(path)).function_list, GROUPS["core"])
         findings += file_findings(path, path.relative_to(root))
+    known = known_names(root)
+    for path in sources(root, COMMENTED):
+        findings += line_findings(path, path.relative_to(root))
+        findings += dangling(path, path.relative_to(root), known)
+    for folder, (least, most) in COMMENT_SHARE.items():
+        share = comment_share([path for path in sources(root, (folder,)) if path.suffix == ".c"])
+        print(f"{folder}: {share:.1f} % of the sources' lines are comments")
+        if not least <= share <= most:
+            findings.append(f"{folder}: {share:.1f} % comments, between {least} and {most} % wanted")
     for path in sources(root, ("test",)):
         findings += file_findings(path, path.relative_to(root), TEST_FILE_LINES)
     print(f"public headers: comments {comment_share(headers):.0f} %")

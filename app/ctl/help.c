@@ -104,10 +104,11 @@ static const verb_t verbs[] = {
     {VERB("why", verb_why, "[NUMBER|FILE] [--list] [--frames N] [--directory DIR]",
           "why the wheels were stopped last, in one sentence",
           "Reads only. With the frames around the stop, and where its recording is.\n"
-          "NUMBER, FILE     a stop recorded on disk: its number, or the path of its recording; needs no gateway\n"
-          "--list           all stops recorded on disk; needs no gateway\n"
+          "NUMBER, FILE     a stop recorded on disk: its number, or the path of its recording\n"
+          "--list           all stops recorded on disk\n"
           "--frames N       how many frames before and after, 0 to 40; 12 if not told\n"
-          "--directory DIR  where they are; else the gateway's, else /var/lib/iwheel\n")},
+          "--directory DIR  where they are; else the gateway's, else /var/lib/iwheel\n"
+          "NUMBER, FILE and --list need no gateway where the files may be read; else it is asked for them.\n")},
     {VERB("record", verb_record, "[FILE] [--for TIME] [--can BUS]",
           "what is on the bus, to a file in candump's log form",
           "Reads only: through the gateway if one runs on that bus, else from the bus itself, without ever sending.\n"
@@ -135,7 +136,9 @@ static const verb_t verbs[] = {
           "With --json one object: the figures, every sentence (item, side, verdict, value, text), the suggestions.\n"
           "Exit code 1: there is no setpoint in it.\n")},
     {VERB("replay", verb_replay, "FILE [--config FILE]", "a recording through the gateway's core: what it decides",
-          "Reads only; needs no gateway and no bus. The same recording gives the same bytes each time.\n"
+          "Reads only; needs no bus, and no gateway unless a recording of it is not to be read here: then it is asked "
+          "for "
+          "it. The same recording gives the same bytes each time.\n"
           "Beside a recording of the black box lie the requests and answers of then (.jsonl) and the configuration "
           "(.conf): "
           "with them everything is decided again at the same times and compared with what was decided then. Any other "

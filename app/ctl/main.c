@@ -101,13 +101,12 @@ int main(int count, char **arguments) {
     static ctl_t ctl;
     arguments_t self = {.ctl = &ctl};
     (void)signal(SIGPIPE, SIG_IGN);
-    self.words = (char **)calloc((size_t)count + 1U, sizeof(*self.words));
+    self.words = (char **)calloc((size_t)count + 1U, sizeof *self.words);
+    int code = CTL_INTERNAL;
     if (!client_init(&ctl.client) || self.words == NULL) {
-        return ctl_fail(CTL_INTERNAL, "out of memory");
-    }
-    int code = CTL_USAGE;
-    if (take_arguments(&self, count, arguments)) {
-        code = dispatch(&self);
+        code = ctl_fail(CTL_INTERNAL, "out of memory");
+    } else {
+        code = take_arguments(&self, count, arguments) ? dispatch(&self) : CTL_USAGE;
     }
     client_free(&ctl.client);
     free((void *)self.words);

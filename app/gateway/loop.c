@@ -2,6 +2,7 @@
 #include "loop.h"
 
 #include "answers/dispatch.h"
+#include "answers/recordings.h"
 #include "answers/service.h"
 #include "box/record.h"
 #include "bus/bus_facts.h"
@@ -54,9 +55,10 @@ int gw_loop_open(gw_daemon_t *daemon) {
                        daemon->listener[GW_WATCH].fd,
                        iw_linux_hal_bus_fd(&daemon->hal),
                        iw_linux_hal_estop_fd(&daemon->hal),
-                       daemon->box.fd};
+                       daemon->box.fd,
+                       daemon->box.reader.fd};
     const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER,
-                             GW_TAG_BUS,   GW_TAG_ESTOP,  GW_TAG_BOX};
+                             GW_TAG_BUS,   GW_TAG_ESTOP,  GW_TAG_BOX,      GW_TAG_BOX};
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; i++) {
         error = watch(daemon, fds[i], tags[i]);
     }
@@ -219,6 +221,7 @@ static void listen_to_writer(gw_daemon_t *daemon) {
     if (daemon->now_us >= daemon->box_look_us) {
         daemon->box_look_us = daemon->now_us + BOX_LOOK_US;
         gw_record_take(daemon);
+        gw_recordings_take(daemon);
     }
 }
 

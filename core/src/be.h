@@ -6,8 +6,8 @@
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
 
-/// A call would cost more than the load and swap that the shifts become; compilers that count before that do not see
-/// it, nor that the data of a frame lie at a multiple of four.
+/// Compilers estimate the size of a function before they turn its shifts into a load and a swap, and would not inline
+/// it; and they do not know that a frame's data are aligned to four bytes.
 #ifdef __GNUC__
 #define IW_BE_INLINE         __attribute__((always_inline)) static inline
 #define IW_BE_ALIGNED(bytes) (__builtin_assume_aligned((bytes), 4))

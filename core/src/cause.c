@@ -3,6 +3,8 @@
 
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
 
+/// One row per cause: effect, level or event, without a ramp, refusal while present. R2, R7 and R13 say which of them
+/// latch.
 const iw_cause_row_t iw_cause_rows[IW_CAUSES] = {
     [IW_CAUSE_NONE] = {IW_STOPS, false, false, IW_REFUSE_NONE},
     [IW_CAUSE_ESTOP_LINE] = {IW_ALWAYS_LATCHES, true, true, IW_REFUSE_ESTOP_PRESSED},
@@ -25,7 +27,8 @@ const iw_cause_row_t iw_cause_rows[IW_CAUSES] = {
     [IW_CAUSE_RESTART] = {IW_STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
 };
 
-/// Of several latching causes at once, the one that is told: the most telling first.
+/// Of several latching causes at once this order decides which one refuses: first what explains those behind it (a bus
+/// that is down also loses echoes and wheels).
 static const uint8_t telling[] = {
     IW_CAUSE_ESTOP_LINE,   IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_BUS_DOWN,   IW_CAUSE_SECOND_MASTER,
     IW_CAUSE_SEND_STALLED, IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_FEEDBACK_SIGN,

@@ -12,9 +12,9 @@ typedef enum {
 } iw_effect_t;
 
 typedef struct {
-    uint8_t effect; ///< An iw_effect_t.
-    bool level;     ///< There as long as it is told in every step; else an event that is past after IW_PERMIT_EVENT_US.
-    bool at_once;   ///< Stops without a ramp.
+    uint8_t effect;  ///< An iw_effect_t.
+    bool level;      ///< Present while it is raised in every step; else an event that is past after IW_PERMIT_EVENT_US.
+    bool at_once;    ///< Stops without a ramp.
     uint8_t refusal; ///< An iw_refusal_t: how it refuses while it is present.
 } iw_cause_row_t;
 
@@ -23,10 +23,10 @@ extern const iw_cause_row_t iw_cause_rows[IW_CAUSES];
 /// The bit of a cause in a set of causes.
 #define IW_CAUSE_BIT(cause) (1U << (uint32_t)(cause))
 
-/// The latching causes that are there now: levels that are told, events that were seen less than IW_PERMIT_EVENT_US ago.
+/// The latching causes present now: levels that are raised, events that were seen less than IW_PERMIT_EVENT_US ago.
 uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us);
 
-/// How a set of latching causes refuses: the most telling one decides. IW_REFUSE_NONE if the set is empty.
+/// How a set of latching causes refuses: the one that explains the others decides. IW_REFUSE_NONE if the set is empty.
 iw_refusal_t iw_cause_refusal(uint32_t present);
 
 #endif

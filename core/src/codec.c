@@ -34,6 +34,7 @@ iw_side_t iw_codec_side(uint32_t id) {
     return ((id & SIDE_BIT) == 0U) ? IW_LEFT : IW_RIGHT;
 }
 
+/// Two rows per kind, in the order of the enumeration; the pose, which only the right wheel sends, is the last.
 const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind) {
     return &iw_codec_rows[(size_t)2 * (size_t)kind];
 }
@@ -62,6 +63,7 @@ static iw_codec_kind_t read_speed(const iw_can_frame_t *frame, uint32_t length, 
     return IW_CODEC_SPEED;
 }
 
+/// The odometry lies across both words.
 static iw_codec_kind_t read_status(const iw_can_frame_t *frame, uint32_t length, iw_codec_status_t *out_status) {
     if (!fits(length, IW_DLC_STATUS)) {
         return IW_CODEC_BAD_LENGTH;
@@ -146,7 +148,8 @@ iw_codec_kind_t iw_codec_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wh
     if (number == IW_ID_LEFT_SPEED) { // Four frames of five.
         return read_speed(frame, frame->dlc, &self->speed);
     }
-    // Where the format is wrong no length fits.
+    // With a format bit in the length no length fits: a remote or extended frame with a known number is found and
+    // refused by the same comparison, without a second way through the table.
     const uint32_t format = id & FORMAT_BITS;
     const iw_codec_kind_t kind = read_other(frame, number & ~FORMAT_BITS, frame->dlc | format, self);
     return (kind == IW_CODEC_BAD_LENGTH && format != 0U) ? IW_CODEC_BAD_FORMAT : kind;
@@ -197,6 +200,7 @@ iw_status_t iw_codec_encode(iw_codec_kind_t kind, iw_side_t side, const iw_codec
 
 bool iw_codec_encode_setpoint(iw_side_t side, const iw_codec_setpoint_t *setpoint, uint8_t dlc,
                               iw_can_frame_t *out_frame) {
+    // The last line of defence: limits and envelope have judged it already.
     int32_t current_mA = setpoint->current_mA;
     const bool clamped = current_mA < -IW_CURRENT_LIMIT_mA || current_mA > IW_CURRENT_LIMIT_mA;
     if (clamped) {

@@ -11,6 +11,7 @@ typedef struct {
     iw_config_range_t range;
 } field_t;
 
+/// By offset, so that one loop checks all fields and one table holds ranges and defaults.
 #define FIELD(name, standard, min, max)                                                                                \
     {                                                                                                                  \
         (uint16_t) offsetof(iw_config_t, name), standard, {                                                            \
@@ -53,6 +54,7 @@ void iw_config_default(iw_config_t *out_config) {
     out_config->force_unit[IW_RIGHT] = IW_FORCE_DN;
 }
 
+/// R1: lease, period and ramp together must end before the wheel's own watchdog would.
 static iw_config_fault_t check_relations(const iw_config_t *config) {
     const iw_stop_budget_t budget = iw_config_stop_budget(config);
     if (config->current_role > IW_ROLE_SETPOINT) {
@@ -61,6 +63,7 @@ static iw_config_fault_t check_relations(const iw_config_t *config) {
     if (config->force_unit[IW_LEFT] > IW_FORCE_DN || config->force_unit[IW_RIGHT] > IW_FORCE_DN) {
         return IW_CONFIG_FORCE_UNIT;
     }
+    // A gearbox that speeds the wheel up is a swapped pair of numbers.
     if (config->gear_turns < config->gear_per || config->gear_turns > GEAR_MAX * config->gear_per) {
         return IW_CONFIG_GEAR_RATIO;
     }
@@ -83,6 +86,7 @@ iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config) {
     const uint32_t wait_ms = (uint32_t)config->lease_ms + config->period_ms;
     const uint32_t ramp_ms = divide_up(speed * 1000U, config->decel_mm_s2);
     iw_stop_budget_t budget;
+    // Worst case: the lease ends right after a pair was sent, at full speed on both wheels. v*v/2a is the ramp's way.
     budget.client_lost_ms = wait_ms + ramp_ms;
     budget.client_lost_mm = divide_up(speed * wait_ms, 1000U) + divide_up(speed * speed, 2U * config->decel_mm_s2);
     budget.killed_ms = WATCHDOG_MS;

@@ -19,6 +19,7 @@ static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us) {
     return 1U + change_um_s / 1000U;
 }
 
+/// A reversal must pass through a zero that was sent, even where both slopes together would allow the step.
 static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s) {
     const int32_t last_mm_s = self->last_mm_s[side];
     const uint32_t from = (uint32_t)iw_magnitude(last_mm_s);
@@ -30,7 +31,7 @@ static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t elap
                        : from - to <= allowance(self->config->decel_mm_s2, elapsed_us);
 }
 
-/// As the wheel does it, byte by byte; not by the codec that wrote them.
+/// Read as the wheel reads it, byte by byte, and not with our own codec: an error in that would judge itself right.
 static iw_codec_setpoint_t as_the_wheel_reads(const uint8_t *data) {
     const iw_codec_setpoint_t setpoint = {
         .speed_mm_s = (int16_t)(uint16_t)(data[1] * 256U + data[2]),
@@ -40,6 +41,7 @@ static iw_codec_setpoint_t as_the_wheel_reads(const uint8_t *data) {
     return setpoint;
 }
 
+/// In the role of a limit a zero keeps its current: with a limit of 0 mA a motor has no torque to stop with.
 static bool is_zero(const iw_config_t *config, const iw_codec_setpoint_t *setpoint) {
     return setpoint->speed_mm_s == 0 && (config->current_role == IW_ROLE_LIMIT || setpoint->current_mA == 0);
 }
@@ -49,6 +51,7 @@ static bool type_ok(const iw_config_t *config, uint8_t type) {
 }
 
 static bool current_ok(const iw_config_t *config, int32_t current_mA) {
+    // The document allows -2000 to 2000 mA and does not say what a limit below zero means.
     const bool negative_limit = config->current_role == IW_ROLE_LIMIT && current_mA < 0;
     return !negative_limit && (uint32_t)iw_magnitude(current_mA) <= config->max_current_mA;
 }
@@ -65,6 +68,7 @@ static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_u
     if ((uint32_t)iw_magnitude(setpoint->speed_mm_s) > config->max_speed_mm_s) {
         return IW_ENVELOPE_SPEED;
     }
+    // R8: a stop is never held up by its own slope.
     if (!is_zero(config, setpoint) && !slew_ok(self, side, now_us - self->last_us[side], setpoint->speed_mm_s)) {
         return IW_ENVELOPE_SLEW;
     }

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-/// |permille - 1000| up to which the figure is told as it is.
+/// |permille - 1000| up to which the figure is stored as it is; beyond, it would not fit 32 bits.
 #define FIGURE_OFF_MAX (INT32_MAX / 2)
 /// The largest step that a pose can make: half of 16 bits in X, Y and PSI.
 #define POSE_STEP_MAX (3 * 32768)

@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+// iw_follow_restart sets every byte.
 IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, never_is_all_ones_to_follow);
 
 void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
@@ -33,8 +34,10 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
     const iw_config_t *const config = self->config;
     const int32_t applied = iw_magnitude(applied_mm_s);
     const int32_t measured = iw_magnitude(measured_mm_s);
+    // Below IW_SIGN_MM_S a sign may be noise, or a wheel that rolls back on a kerb.
     const bool clear = applied > IW_SIGN_MM_S && measured > IW_SIGN_MM_S;
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);
+    // Turning backwards is no progress.
     const int32_t progress = same ? measured : 0;
     const bool holds[IW_FOLLOW_VERDICTS] = {
         clear && same,
@@ -48,6 +51,7 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
         (uint32_t)config->follow_ms * IW_US_PER_MS,
         (uint32_t)config->blocked_ms * IW_US_PER_MS,
     };
+    // All clocks run on, also behind a graver verdict: each condition must be timed by itself.
     iw_follow_verdict_t verdict = IW_FOLLOW_OK;
     for (uint32_t i = 0; i < IW_FOLLOW_VERDICTS; i++) {
         const bool lasted = lasts(&self->since_us[i], now_us, holds[i], for_us[i]);

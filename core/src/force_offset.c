@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+/// Samples in one half of the window; the means of both halves show drift.
 #define HALF (IW_FORCE_WINDOW_SAMPLES / 2U)
 /// Deviations of one sample are capped here (raw), so that the sum of their squares fits 32 bits. Far beyond quiet in
 /// either unit.
@@ -19,6 +20,7 @@ static int32_t scale_mN(const iw_force_t *self) {
     return (self->unit == IW_FORCE_CN) ? 10 : 100;
 }
 
+/// The ends of 16 bits are the sensor's limit, not a force.
 static bool saturated(int16_t raw) {
     return raw == INT16_MIN || raw == INT16_MAX;
 }
@@ -37,6 +39,7 @@ void iw_force_reopen(iw_force_t *self, bool boot_seen) {
     self->evidence = IW_UNIT_UNKNOWN;
     self->evidence_permille = 0;
     memset(&self->quality, 0, sizeof self->quality);
+    // The wheel will measure its offset anew; until then the old one is only a memory. A tare survives a reboot.
     if (self->provenance == IW_OFFSET_WHEEL || self->provenance == IW_OFFSET_ESTIMATED) {
         self->provenance = IW_OFFSET_STORED;
     }
@@ -54,6 +57,7 @@ void iw_force_restore(iw_force_t *self, iw_offset_provenance_t provenance, int32
     }
 }
 
+/// Bit by bit: the core has neither floating point nor libm.
 static uint32_t square_root(uint32_t value) {
     uint32_t root = 0;
     for (uint32_t bit = 1U << 15; bit != 0U; bit >>= 1) {
@@ -73,10 +77,13 @@ static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
         sum += capped * capped;
     }
     const uint32_t variance = sum / IW_FORCE_WINDOW_SAMPLES;
+    // Scaled before the root where 32 bits allow it: else a deviation below one raw unit (0.1 N in dN) would round to
+    // 0.
     return (variance <= VARIANCE_FINE) ? square_root(variance * scale * scale) : square_root(variance) * scale;
 }
 
-/// The oldest sample stands at `next`.
+/// The ring is full, so the oldest sample stands at `next`: the first half is the older one. Of several faults the
+/// first of saturated, moving, noisy, drift is told: each would cause those behind it.
 iw_force_quality_t iw_force_measure(const iw_force_t *self) {
     const int32_t scale = scale_mN(self);
     iw_force_quality_t quality = {0, 0, 0, IW_FORCE_WINDOW_SAMPLES, IW_WINDOW_GOOD};
@@ -106,7 +113,8 @@ static bool far_from_offset(const iw_force_t *self, int32_t mean_mN, uint32_t li
     return iw_magnitude(mean_mN - self->offset_mN) > (int32_t)limit_mN;
 }
 
-/// Raw over offset at rest is 10, 1 or 0: exactly one of them must fit.
+/// At rest raw divided by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
+/// since each is narrower than the gap to the next; a ratio that fits none of them is unclear.
 static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN) {
     const int32_t offset = iw_magnitude(offset_dN);
     const bool fits_cn = iw_magnitude(mean_raw - 10 * offset_dN) * 100 <= 10 * offset * IW_FORCE_EVIDENCE_PERCENT;
@@ -121,7 +129,9 @@ static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN) {
     return fits_none ? IW_UNIT_OFFSET_REMOVED : IW_UNIT_UNCLEAR;
 }
 
-/// Compares our own mean with the wheel's offset, once there are both and the window was good.
+/// Compares our own mean with the wheel's offset, once there are both and the window was good. Too small an offset
+/// cannot tell units apart (0 in cN is 0 in dN), but a mean far from it still shows a load in one of the two
+/// measurements.
 static void judge_evidence(iw_force_t *self) {
     const int32_t offset_dN = self->wheel_offset_dN;
     const int32_t mean_raw = self->quality.mean_mN / scale_mN(self);
@@ -136,7 +146,8 @@ static void judge_evidence(iw_force_t *self) {
     }
 }
 
-/// Puts the wheel's own offset in force, unless we saw it being measured under load.
+/// Puts the wheel's own offset in force, unless we saw it being measured under load ("only has sense if you don't apply
+/// any force to the shaft during the first two seconds"). A start that nobody saw gets the benefit of the doubt.
 static void settle(iw_force_t *self, iw_time_us_t now_us) {
     const bool trusted = !self->boot_seen || self->quality.window == IW_WINDOW_GOOD;
     judge_evidence(self);
@@ -147,6 +158,7 @@ static void settle(iw_force_t *self, iw_time_us_t now_us) {
 
 static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
     self->quality = iw_force_measure(self);
+    // A steady load looks like a quiet sensor: only an offset trusted before shows it.
     const bool known = self->provenance == IW_OFFSET_STORED || self->provenance == IW_OFFSET_OPERATOR;
     if (self->quality.window == IW_WINDOW_GOOD && known &&
         far_from_offset(self, self->quality.mean_mN, IW_FORCE_SHIFT_mN)) {
@@ -185,6 +197,7 @@ static iw_tare_t judge_tare(const iw_force_t *self, iw_time_us_t now_us, int32_t
         return IW_TARE_NO_FORCE;
     }
     const iw_force_quality_t quality = iw_force_measure(self);
+    // An offset that is itself in doubt must not veto the tare that would replace it.
     const bool doubted = self->evidence == IW_UNIT_UNCLEAR || self->evidence == IW_UNIT_OFFSET_REMOVED;
     const bool known = self->provenance != IW_OFFSET_NONE && !doubted;
     if (quality.window == IW_WINDOW_SATURATED) {
@@ -229,6 +242,7 @@ iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_u
     if (self->provenance == IW_OFFSET_NONE) {
         return IW_FORCE_NO_OFFSET;
     }
+    // Before the tare: no offset mends a wrong unit.
     if (unit_contradicted(self)) {
         return IW_FORCE_UNIT_CONTRADICTED;
     }

@@ -31,6 +31,7 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     if (fault != IW_CONFIG_OK) {
         return fault;
     }
+    // Copied before any part is initialised: the parts keep pointers to this copy, not to the caller's.
     memset(self, 0, sizeof *self);
     self->config = *config;
     self->hal = *hal;
@@ -49,6 +50,8 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     return IW_CONFIG_OK;
 }
 
+/// The order is a rule: what is received is drained before any age is judged (R7), and everything is judged
+/// before anything is sent, so that a fault of this step stops this step's pair.
 iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_step_begin(self, now_us);
     iw_step_receive(self, now_us);
@@ -68,7 +71,7 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts) {
 }
 
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
-    // A latch is told first: it must be left first.
+    // The latch is reported first: it must be reset before anything else can be mended.
     if (iw_permit_state(&self->permit) != IW_STATE_LATCHED && self->ledger.doubt != IW_LEDGER_ITEMS) {
         return IW_REFUSE_CONTRADICTED;
     }
@@ -79,7 +82,7 @@ iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t
     return refusal;
 }
 
-/// Both values by one factor, so that the larger is `limit`. True if they had to be.
+/// Scales both values by one factor, so that the larger is `limit`: the curve stays the same. True if they had to be.
 static bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
     const int32_t left = iw_magnitude(values[IW_LEFT]);
     const int32_t right = iw_magnitude(values[IW_RIGHT]);
@@ -93,6 +96,7 @@ static bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
 }
 
 static bool drive_in_range(const iw_config_t *config, const iw_drive_t *request) {
+    // A current limit has no sign.
     const int32_t lowest_mA = (config->current_role == IW_ROLE_SETPOINT) ? -IW_CURRENT_LIMIT_mA : 0;
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (request->speed_mm_s[side] < INT16_MIN || request->speed_mm_s[side] > INT16_MAX) {
@@ -113,6 +117,7 @@ static bool drive_nonzero(const iw_config_t *config, const iw_drive_t *request) 
     return speed || (current && config->current_role == IW_ROLE_SETPOINT);
 }
 
+/// Too fast is scaled, not refused: the client's direction is right, and a refusal would let the lease run out.
 static iw_applied_t limit_drive(const iw_config_t *config, const iw_drive_t *request) {
     iw_drive_t drive = *request;
     iw_applied_t applied;
@@ -135,6 +140,7 @@ iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_clien
     const bool nonzero = drive_nonzero(config, request);
     const bool in_range = drive_in_range(config, request);
     if (!in_range || (!request->has_current && config->current_role == IW_ROLE_SETPOINT)) {
+        // Refused for its values, it still shows that somebody wants motion: arm and reset are refused for a while.
         if (nonzero) {
             iw_permit_remember(&self->permit, sent_us, client);
         }
@@ -166,6 +172,7 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
 }
 
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side) {
+    // Both are judged before one is changed (R9: a request is applied whole or not at all).
     for (size_t side = 0; side < IW_SIDES; side++) {
         const bool wanted = (sides & (1U << side)) != 0U;
         const iw_tare_t result = wanted ? iw_force_may_tare(&self->force[side], now_us) : IW_TARE_OK;

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+/// Items for which the document names a value. All others are not even documented.
 static const iw_ledger_item_t documented[] = {
     IW_LEDGER_FORCE_UNIT_LEFT,
     IW_LEDGER_FORCE_UNIT_RIGHT,
@@ -18,6 +19,8 @@ void iw_ledger_init(iw_ledger_t *self) {
     }
 }
 
+/// Motion would be unpredictable: another motor command than meant, or another direction. A wrong force unit or radius
+/// only makes numbers wrong.
 bool iw_ledger_guards_motion(iw_ledger_item_t item) {
     switch (item) {
     case IW_LEDGER_SETPOINT_TYPE:
@@ -61,6 +64,7 @@ void iw_ledger_assume(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t ev
 void iw_ledger_confirm(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure) {
     const iw_ledger_entry_t next = {IW_LEDGER_CONFIRMED, evidence, figure};
     const iw_ledger_entry_t *const entry = &self->entry[item];
+    // Evidence of the bus that comes and goes must not hide a contradiction, nor overrule the operator.
     const bool settled = entry->state == IW_LEDGER_CONTRADICTED || entry->evidence == IW_EVIDENCE_OPERATOR;
     if (evidence == IW_EVIDENCE_OPERATOR || !settled) {
         change(self, item, &next);

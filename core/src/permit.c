@@ -26,7 +26,7 @@ static const phase_row_t phases[IW_PHASES] = {
 
 IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, never_is_all_ones_to_permit);
 
-/// So many setpoints can be un-echoed when a process dies: two of each wheel (see transmit.h).
+/// Setpoints without echo that a process can leave in its controller when it dies: two per wheel (R6).
 #define LEFT_BEHIND_MAX 4U
 
 /// True if the configuration allows sending at all.
@@ -48,6 +48,7 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     self->config = config;
     self->stale_us = IW_NEVER;
     memset(self->seen_us, 0xFF, sizeof self->seen_us); // IW_NEVER
+    // Fault 25: after a crash while ARMED the wheels keep the last command until their own watchdog ends it.
     if (restarted && may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
@@ -62,6 +63,7 @@ static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, iw_time_us_t spa
     self->lease_until_us = now_us + span_us;
 }
 
+/// How long ago the lease was last renewed.
 static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
     const iw_time_us_t unfed_us = now_us - self->lease_from_us;
     return ((unfed_us < UINT32_MAX) ? (uint32_t)unfed_us : UINT32_MAX) / IW_US_PER_MS;
@@ -75,16 +77,18 @@ static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us)
     return iw_cause_refusal(iw_permit_present(self, now_us));
 }
 
+/// The button comes first: no reset helps while it is pressed, and that is the one cure the user can see.
 static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us) {
     const bool pressed = refuse_present(self, now_us) == IW_REFUSE_ESTOP_PRESSED;
     return pressed ? IW_REFUSE_ESTOP_PRESSED : IW_REFUSE_LATCHED;
 }
 
+/// R3: a joystick that is still deflected at arm or reset must not set the machine in motion.
 static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
     return self->stale_us != IW_NEVER && now_us - self->stale_us < IW_STALE_COMMAND_US;
 }
 
-/// The granted arm comes to nothing: back to where it was asked for.
+/// Arming failed: back to the phase it was asked from. `hold_us` tells BRAKING from HOLDING.
 static void end_arming(iw_permit_t *self, iw_refusal_t refusal) {
     const iw_phase_t zeros = (self->hold_us == IW_NEVER) ? IW_PHASE_BRAKING : IW_PHASE_HOLDING;
     if (iw_permit_arming(self)) {
@@ -94,7 +98,7 @@ static void end_arming(iw_permit_t *self, iw_refusal_t refusal) {
     }
 }
 
-/// Writes down why the wheels stop, as long as it is still known what they were told.
+/// Records why the wheels stop. Before the phase changes: `from`, holder and applied speeds are those of the moment.
 static void record_stop(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     iw_stop_t *const stop = &self->stop;
     stop->at_us = now_us;
@@ -108,6 +112,8 @@ static void record_stop(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause
     stop->latched = false;
 }
 
+/// Release: a ramp, because a hard stop topples whoever leans on the machine. `at_once` where waiting is the greater
+/// risk.
 static void brake(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     record_stop(self, now_us, cause, sides, detail);
     self->blocked = (cause == IW_CAUSE_WHEEL_BLOCKED) ? self->holder : IW_CLIENT_NONE;
@@ -117,6 +123,7 @@ static void brake(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint
     self->holder = IW_CLIENT_NONE;
 }
 
+/// From LISTENING no zeros are sent: nothing of ours moves the wheels, and another master may be driving them.
 static void latch(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     record_stop(self, now_us, cause, sides, detail);
     self->stop.latched = true;
@@ -127,6 +134,7 @@ static void latch(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint
     self->holder = IW_CLIENT_NONE;
 }
 
+/// ARMING and RESTARTING send nothing but zeros: a fault there refuses arm, and needs no latch.
 static bool latches(const iw_permit_t *self, iw_cause_t cause) {
     switch (self->phase) {
     case IW_PHASE_LISTENING:
@@ -138,12 +146,14 @@ static bool latches(const iw_permit_t *self, iw_cause_t cause) {
     }
 }
 
-/// A foreign setpoint in RESTARTING: the dead process's own, still in its controller, or somebody who drives.
+/// A setpoint of another sender in RESTARTING. The first few may be the dead process's own, still in its controller;
+/// more than it can have left there means a second master that drives, to whom the hold gives way (fault 25).
 static void count_stranger(iw_permit_t *self) {
     self->strangers++;
     self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
 }
 
+/// LATCHED keeps its first cause: what follows is mostly a consequence of it.
 void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
     self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;
@@ -170,6 +180,7 @@ void iw_permit_keep_present(iw_permit_t *self) {
 static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     const iw_time_us_t limit_us = (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
     const iw_time_us_t waited_us = now_us - self->arming_us;
+    // An echo that comes too late does not arm, even if no step has ended the wait yet.
     if (self->view.proven && waited_us <= limit_us) {
         self->phase = IW_PHASE_ARMED;
         self->armed_us = now_us;
@@ -179,17 +190,20 @@ static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
     }
 }
 
-/// Whether the wheels need not stand for the zeros to end. After a restart nobody knows whether they can be heard.
+/// Whether the hold ends by time alone: the wheels stand, or nobody can wait for that. After a restart they may not
+/// even be heard, and the wheel's own watchdog (1 s) is shorter than the hold.
 static bool time_is_enough(const iw_permit_t *self) {
     return self->view.settled || self->phase == IW_PHASE_RESTARTING;
 }
 
-/// Zeros are held for long enough and until the wheels stand, or for as long as it makes sense; then `phase` follows.
+/// Zeros for `zero_hold_ms` and until the wheels stand, but at most IW_PERMIT_HOLD_MAX_US: a wheel that is pushed or
+/// has a fault would otherwise be fed for ever. Then `phase` follows.
 static void step_hold(iw_permit_t *self, iw_time_us_t now_us, iw_phase_t phase) {
     const iw_time_us_t held_us = now_us - self->hold_us;
     const bool longest = held_us >= IW_PERMIT_HOLD_MAX_US;
     const bool done = held_us >= (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self);
     if (longest || done) {
+        // Silence with a moving wheel is an event that the operator must hear of.
         self->still_moving += (longest && !self->view.settled) ? 1U : 0U;
         self->phase = phase;
     }
@@ -231,7 +245,7 @@ void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view
     step_phase(self, now_us);
 }
 
-/// What speaks against sending at all.
+/// Reasons against sending at all: configuration and latch first, since what comes after them may pass by itself.
 static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us) {
     const iw_refusal_t present = refuse_present(self, now_us);
     if (self->config->listen_only) {
@@ -255,7 +269,7 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     return (self->phase == IW_PHASE_RESTARTING) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
 }
 
-/// What speaks against moving the lease to this client now.
+/// Reasons against giving the lease to this client now.
 static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
     if (self->holder != IW_CLIENT_NONE && (!takeover || iw_permit_arming(self))) {
         return IW_REFUSE_BUSY;
@@ -266,6 +280,7 @@ static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, b
     if (!self->view.at_rest || !self->view.output_zero) {
         return IW_REFUSE_NOT_AT_REST;
     }
+    // Out of silence a frame still in the controller is an old one: arming behind it would send it first.
     if (self->phase == IW_PHASE_LISTENING && !self->view.can_send) {
         return IW_REFUSE_SEND_STALLED;
     }
@@ -280,6 +295,7 @@ static void begin_arming(iw_permit_t *self, iw_time_us_t now_us) {
 
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover) {
     if (self->holder == client) {
+        // The lease is not renewed: only drive commands do that.
         return IW_REFUSE_NONE;
     }
     const iw_refusal_t sending = refuse_sending(self, now_us);
@@ -302,6 +318,7 @@ static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us,
     if (self->holder != client) {
         return IW_REFUSE_NOT_HOLDER;
     }
+    // It waited in a queue since before arm: not fresh (R3).
     if (sent_us < self->armed_us) {
         return IW_REFUSE_STALE_COMMAND;
     }
@@ -323,6 +340,7 @@ static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, 
     }
 }
 
+/// Commands of several clients need not come in the order in which they were sent: the latest counts.
 void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client) {
     if (self->stale_us == IW_NEVER || now_us >= self->stale_us) {
         self->stale_us = now_us;
@@ -332,6 +350,7 @@ void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t clie
 
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero) {
     const iw_refusal_t refusal = refuse_drive(self, sent_us, client);
+    // A refused one too: it shows that somebody wants motion.
     if (nonzero) {
         iw_permit_remember(self, sent_us, client);
     }

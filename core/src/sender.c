@@ -14,13 +14,15 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
     iw_envelope_init(&self->envelope, config);
 }
 
+/// A nonzero pair leaves whole or not at all (R5); a zero must not wait for the other wheel's echo (R6).
 bool iw_sender_ready(const iw_sender_t *self, bool zero) {
     const bool left = iw_confirmation_may_send(&self->confirmation, IW_LEFT, zero);
     const bool right = iw_confirmation_may_send(&self->confirmation, IW_RIGHT, zero);
     return zero ? left || right : left && right;
 }
 
-/// The frame for one wheel, in its own frame of reference. False, with the reason in `verdict`, if the envelope stops it.
+/// The frame for one wheel, in the wheel's own direction. False, with the reason in `verdict`, if the envelope stops
+/// it.
 static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, const iw_command_t *command) {
     iw_can_frame_t *const frame = &self->frame[side];
     const iw_config_t *const config = self->config;
@@ -29,6 +31,7 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
     if (invert) {
         setpoint.speed_mm_s = (int16_t)-setpoint.speed_mm_s;
     }
+    // A limit has no direction: what a wheel makes of a negative one is not documented.
     if (invert && config->current_role == IW_ROLE_SETPOINT) {
         setpoint.current_mA = (int16_t)-setpoint.current_mA;
     }
@@ -72,6 +75,7 @@ static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
     return taken;
 }
 
+/// Both frames are judged before the first one leaves, else a stopped right frame would leave the left one alone.
 iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (!prepare(self, now_us, (iw_side_t)side, &pair->wheel[side])) {
@@ -86,6 +90,7 @@ void iw_sender_rest(iw_sender_t *self) {
     iw_confirmation_rest(&self->confirmation);
 }
 
+/// Forgets only if the port is sure: behind a frame that may still leave no second one must be queued (R6).
 int iw_sender_purge(iw_sender_t *self) {
     const int answer = self->hal->purge(self->hal->context);
     if (answer > 0) {

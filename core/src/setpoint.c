@@ -121,7 +121,8 @@ static uint32_t ramp_step(uint32_t slope, iw_time_us_t elapsed_us) {
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
 }
 
-/// Where a quantity may go now: not past zero in one step. (In place: a copy would lie on the deepest stack of the core.)
+/// Where a quantity may go now: not past zero in one step. Writes in place, since a copy would add to the deepest stack
+/// of the core.
 static void plan(axis_t *axis, int32_t target, uint32_t away, uint32_t towards) {
     const int32_t *const value = axis->value;
     const bool through_zero = *value != 0 && (target > 0) != (*value > 0);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/gateway.h"
 
+// Four fields without a whole snapshot, for callers that poll between steps.
+
 iw_state_t iw_gateway_state(const iw_gateway_t *self) {
     return iw_permit_state(&self->permit);
 }
@@ -17,7 +19,8 @@ bool iw_gateway_is_sending(const iw_gateway_t *self) {
     return iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE;
 }
 
-/// The operator's word against what the wheel's offset says of the unit, or of the offset: only a tare is to be trusted.
+/// The operator has settled the unit or the offset against the evidence of the bus. Then the wheel's offset cannot be
+/// right, and only a tare gives a force that means anything.
 static iw_force_validity_t overruled(const iw_force_t *force, iw_force_validity_t validity) {
     const bool judged = validity == IW_FORCE_UNIT_CONTRADICTED || validity == IW_FORCE_OFFSET_REMOVED;
     if (!judged) {
@@ -32,6 +35,7 @@ iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_sid
     const iw_ledger_entry_t *const included = &self->assumed[IW_LEDGER_OFFSET_INCLUDED];
     const iw_ledger_entry_t *const asked = (force->evidence == IW_UNIT_OFFSET_REMOVED) ? included : unit;
     iw_force_validity_t validity = iw_force_validity(force, self->at_us);
+    // The ledger decides over the force module: it also holds what the operator said and what earlier runs found.
     if (asked->evidence == IW_EVIDENCE_OPERATOR) {
         validity = overruled(force, validity);
     }
@@ -70,6 +74,7 @@ static void look_at_permit(const iw_permit_t *permit, iw_time_us_t now_us, iw_sn
     out_snapshot->stale_us = permit->stale_us;
     out_snapshot->holder = permit->holder;
     out_snapshot->stale_client = permit->stale_client;
+    // `quiet` spares the loop over all causes in a step in which nothing is wrong.
     out_snapshot->present = permit->quiet ? 0U : iw_permit_present(permit, now_us);
     out_snapshot->still_moving = permit->still_moving;
     out_snapshot->state = iw_permit_state(permit);

@@ -5,6 +5,7 @@
 
 #include "magnitude.h"
 
+/// Details of IW_CAUSE_ESTOP_LINE.
 #define ESTOP_PRESSED    1U
 #define ESTOP_UNREADABLE 2U
 
@@ -23,6 +24,7 @@ static uint8_t side_bit(size_t side) {
     return (uint8_t)(IW_SIDES_LEFT << side);
 }
 
+/// A wheel that was lost before our own stall began stays lost: judged at `promised_us`, not now.
 static void excuse_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
     if (!iw_wheel_lost(&self->wheel[side], self->promised_us)) {
         iw_wheel_excuse(&self->wheel[side], now_us);
@@ -30,13 +32,16 @@ static void excuse_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side
     iw_follow_restart(&self->follow[side]);
 }
 
+/// The clock of `now_us` may stand still while the system is suspended; the wheels do not: a suspend counts as
+/// lateness.
 static iw_time_us_t take_lateness(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t suspended_us = self->suspended_us;
     self->suspended_us = 0;
     return suspended_us + ((now_us > self->promised_us) ? now_us - self->promised_us : 0U);
 }
 
-/// One long stall, or step after step too late to judge anything: both are told by how long nothing was judged.
+/// R7 (own hang). One long stall, or one late step after another: what counts is for how long no fault could
+/// be judged, since telemetry of a late step has no known time of reception.
 static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t late_us = take_lateness(self, now_us);
     const bool late = late_us > IW_GATEWAY_LATE_US;
@@ -70,13 +75,15 @@ void iw_step_begin(iw_gateway_t *self, iw_time_us_t now_us) {
     }
     watch_loop(self, now_us);
     self->bus = self->hal.bus_state(self->hal.context);
+    // The port's contract (hal.h): after a loss of the bus nothing sent before it is queued, so no echo is outstanding.
     if (self->bus < IW_BUS_PASSIVE) {
         iw_confirmation_clear(&self->sender.confirmation);
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_BUS_DOWN, IW_SIDES_NONE, (uint32_t)self->bus);
     }
 }
 
-/// What the force module found out about units, as entries of the ledger.
+/// What the force module found out about units, as entries of the ledger. IW_UNIT_UNCLEAR is no entry: it makes this
+/// force doubtful (force_offset.h), but it proves no other unit.
 static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
     const iw_force_t *const force = &self->force[side];
     const iw_ledger_item_t unit = iw_ledger_force_unit(side);
@@ -96,7 +103,7 @@ static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t 
     iw_force_t *const force = &self->force[side];
     const iw_unit_evidence_t before = force->evidence;
     if (kind == IW_CODEC_FORCE) {
-        // By its last speed, however old: a stall of ours is no motion of the wheel's.
+        // By its last speed, however old: our own stall does not mean that the wheel moved.
         const bool still = iw_magnitude(told->speed.speed_rpm) <= self->config.rest_rpm;
         iw_force_hear(force, now_us, told->force.force_raw, still);
     } else {
@@ -107,14 +114,15 @@ static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t 
     }
 }
 
-/// Once is enough: what follows has nothing new to tell.
+/// Only the first one: each entry is a change that is reported and stored, and frames come 500 times a second.
 static void contradict_length(iw_gateway_t *self, uint8_t length) {
     if (iw_ledger_entry(&self->ledger, IW_LEDGER_DLC)->state != IW_LEDGER_CONTRADICTED) {
         iw_ledger_contradict(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
     }
 }
 
-/// A status frame as long as the table has it speaks for its lengths, any message of another length against them.
+/// The document lists bytes and states no DLC. A status frame as long as the table confirms the table's lengths; a
+/// message of another length contradicts them.
 static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length) {
     if (length != iw_codec_row(kind)->length) {
         contradict_length(self, length);
@@ -123,7 +131,8 @@ static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length
     }
 }
 
-/// Telemetry. A reboot is acted upon before the frame that revealed it is used any further.
+/// Telemetry. A reboot is acted upon first: the frame that revealed it may be the first force or offset of the new run,
+/// which belongs into a new window.
 static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side) {
     iw_wheel_t *const wheel = &self->wheel[side];
     const bool first = wheel->first_us == IW_NEVER;
@@ -143,6 +152,7 @@ static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, 
     }
 }
 
+/// Two masters on one bus: the wheels obey whoever sent last (fault 19).
 static void hear_foreign(iw_gateway_t *self, iw_time_us_t now_us, uint32_t id) {
     self->counters.foreign++;
     iw_permit_raise(&self->permit, now_us, IW_CAUSE_SECOND_MASTER, side_bit(iw_codec_side(id)), id);
@@ -152,7 +162,7 @@ static bool is_setpoint_id(uint32_t id) {
     return id == IW_ID_LEFT_SETPOINT || id == IW_ID_RIGHT_SETPOINT;
 }
 
-/// Our own, confirmed, or somebody else's.
+/// An echo is our own frame, confirmed by the controller; anything else with a setpoint's id has another sender.
 static void take_setpoint(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
     if (frame->kind == IW_CAN_ECHO) {
         self->counters.echoes++;
@@ -163,6 +173,7 @@ static void take_setpoint(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_
 }
 
 static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
+    // Before decoding: a foreign setpoint of any length must latch, also one that decodes to nothing.
     if (is_setpoint_id(frame->id)) {
         take_setpoint(self, now_us, frame);
         return;
@@ -187,6 +198,7 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
     }
 }
 
+/// Everything before any age is judged (R7), but bounded: a babbling node must not keep the step from ending.
 void iw_step_receive(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
@@ -227,7 +239,8 @@ static int ask_back(iw_gateway_t *self) {
     return answer;
 }
 
-/// Once per stop the port is asked for what its zeros would wait behind. (A stalled send has ended everything else.)
+/// A missing echo latches. The zeros of that stop would wait behind the stuck frame, so the port is asked to purge it:
+/// once per stop, because a purge may take the link down. (IW_CAUSE_SEND_STALLED leaves nothing but zeros to send.)
 static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t waited_us = overdue_us(self, now_us);
     if (waited_us == 0U) {
@@ -247,6 +260,7 @@ static iw_ledger_item_t sign_item(size_t side) {
 static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s) {
     iw_follow_t *const follow = &self->follow[side];
     const int32_t measured_mm_s = iw_wheel_speed_mm_s(&self->wheel[side]);
+    // As at a positive command.
     const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s;
     const uint32_t detail = (uint32_t)iw_magnitude(measured_mm_s);
     switch (iw_follow_step(follow, now_us, applied_mm_s, measured_mm_s)) {
@@ -269,6 +283,7 @@ static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, i
     }
 }
 
+/// Only while we command: a machine that is pushed by hand in LISTENING is faster than its command of zero.
 static void watch_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side, int32_t applied_mm_s) {
     const iw_state_t state = iw_permit_state(&self->permit);
     const bool ours = state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
@@ -294,6 +309,7 @@ static uint32_t both_rest_us(const iw_gateway_t *self, iw_time_us_t now_us) {
 
 void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_permit_view_t view;
+    // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {
         iw_permit_keep_present(&self->permit);
     } else {
@@ -309,12 +325,14 @@ void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     view.timing_ok = !self->facts.timing_contradicted;
     view.can_send = iw_confirmation_may_send(&self->sender.confirmation, IW_LEFT, true) &&
                     iw_confirmation_may_send(&self->sender.confirmation, IW_RIGHT, true);
+    // Sent at or after the request: the echo of an older zero pair does not arm.
     view.proven = iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;
     view.applied = iw_setpoint_applied(&self->setpoint);
     iw_permit_step(&self->permit, now_us, &view);
 }
 
-/// Takes the pair that is due and sends it. What the port does not take whole is followed by zero.
+/// Takes the pair that is due and sends it. R5 (both or none): a pair of which one frame was not taken is
+/// followed by zeros for both wheels.
 static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
     const bool zero = iw_setpoint_next_is_zero(&self->setpoint);
     iw_pair_t pair;
@@ -335,14 +353,15 @@ void iw_step_send(iw_gateway_t *self, iw_time_us_t now_us) {
     if (demand == IW_DEMAND_SILENCE) {
         iw_sender_rest(&self->sender);
     } else if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
+        // R12: scheduler and envelope disagree, so one of them is wrong. Zeros leave in this very step.
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
         iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
         (void)send_pair(self, now_us);
     }
 }
 
-/// Whether a wheel is heard is no argument: without acknowledgement none is. An echo that is only late by the bus is given
-/// its time, and one that was received may stand in the backlog.
+/// Purges whether or not a wheel is heard: the frame is stuck exactly when no wheel has power to acknowledge it. An
+/// echo may still come late (`echo_ms`) or stand in the backlog, so neither case counts as stuck yet.
 void iw_step_keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
     if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE) {
         self->purged_us = IW_NEVER; // Nothing is left behind either: arm was refused until it was gone.
@@ -374,6 +393,8 @@ iw_time_us_t iw_step_next_us(const iw_gateway_t *self, iw_time_us_t now_us) {
     if (self->backlog) {
         return now_us;
     }
+    // A pair that is overdue could not be sent (no echo yet, bus down): asking to be called at once would be a busy
+    // loop.
     if (due_us > now_us) {
         next_us = sooner(next_us, due_us);
     }

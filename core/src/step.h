@@ -10,7 +10,8 @@ struct iw_gateway;
 /// Our own lateness, the e-stop line, the state of the bus.
 void iw_step_begin(struct iw_gateway *self, iw_time_us_t now_us);
 
-/// Takes what was received: echoes to the account, telemetry to the wheels, foreign setpoints to the permission.
+/// Takes what was received: echoes to the TX confirmation, telemetry to the wheels, foreign setpoints to the
+/// permission.
 void iw_step_receive(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step.
@@ -19,8 +20,8 @@ void iw_step_judge(struct iw_gateway *self, iw_time_us_t now_us);
 /// Sends what is due under the permission's demand.
 void iw_step_send(struct iw_gateway *self, iw_time_us_t now_us);
 
-/// Silence is silent: what is still in a controller when nothing is sent any more would be repeated there until a wheel
-/// has power to acknowledge it. It is taken back, or told.
+/// While nothing is sent, no old setpoint may wait in a controller either: unacknowledged, it is repeated there until a
+/// wheel gets power, and then moves it (fault 18). It is purged, or reported as `left_behind`.
 void iw_step_keep_silent(struct iw_gateway *self, iw_time_us_t now_us);
 
 /// When to call again: not later than one period from now.

@@ -35,6 +35,7 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
     self->us_per_tick_min = nm_per_tick / FASTEST_NM_PER_US;
 }
 
+/// `status_us` is reset because the wheel's odometry begins anew: the next status frame is a start, not a step.
 static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence) {
     self->pending_reboot = evidence;
     self->reboots++;
@@ -56,6 +57,7 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
     }
 }
 
+/// Rest is a run of frames without a gap: one frame at rest behind a silence says nothing of the time between.
 static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
     const bool gap = !iw_wheel_heard(self, now_us);
@@ -71,6 +73,8 @@ static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_spe
     }
 }
 
+/// True if no wheel can have turned so far in that time. `delta` is modulo 2^32, as odometry wraps: the shorter way
+/// counts.
 static bool tick_jump(const iw_wheel_t *self, uint32_t delta, iw_time_us_t elapsed_us) {
     const uint32_t elapsed = (elapsed_us < UINT32_MAX) ? (uint32_t)elapsed_us : UINT32_MAX;
     const uint32_t limit = elapsed / self->us_per_tick_min;
@@ -91,7 +95,7 @@ static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_st
     self->status_us = now_us;
 }
 
-/// Not excused by a stall of ours: what started anew behind our back has only this to tell of it.
+/// Judged after our own stall too: a wheel that rebooted meanwhile shows it by nothing else.
 static void hear_offset(iw_wheel_t *self, iw_time_us_t now_us) {
     if (now_us - self->offset_us >= IW_WHEEL_OFFSET_BACK_US) {
         rebooted(self, now_us, IW_REBOOT_OFFSET_FRAMES);
@@ -112,6 +116,7 @@ void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, 
 }
 
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
+    // One excuse per fresh frame: late steps in a row must not keep a dead wheel alive.
     if (self->heard_us >= self->excused_us) {
         self->excused_us = now_us;
         self->any_us = now_us;

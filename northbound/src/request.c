@@ -20,7 +20,7 @@ typedef struct {
 #define BIT(cmd) (1U << IWN_CMD_##cmd)
 #define ROW(name, member, kind, bytes, required, allowed)                                                              \
     {#name, offsetof(iwn_request_t, member), bytes, allowed, required, kind},
-#define INDEX(name, member, kind, bytes, required, allowed) FIELD_##name,
+#define INDEX(name, member, kind, bytes, required, allowed) FIELD_##member,
 #define HAS_ROOM(name, member, kind, bytes, required, allowed)                                                         \
     &&((bytes) == 0 || sizeof(((iwn_request_t *)0)->member) == (bytes) + 1U)
 #define NAME(name) #name,

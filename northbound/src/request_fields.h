@@ -17,7 +17,9 @@
     NAME(reset)                                                                                                        \
     NAME(tare)                                                                                                         \
     NAME(why)                                                                                                          \
-    NAME(confirm)
+    NAME(confirm)                                                                                                      \
+    NAME(recordings)                                                                                                   \
+    NAME(recording)
 
 /// Name, member of iwn_request_t, kind, bytes of a text at most, whether it must be there, requests that have it.
 #define IWN_REQUEST_FIELDS(ROW)                                                                                        \
@@ -35,6 +37,8 @@
     ROW(side, sides, SIDE, 0, false, BIT(TARE))                                                                        \
     ROW(item, item, ITEM, 0, true, BIT(CONFIRM))                                                                       \
     ROW(value, value, VALUE, 39, false, BIT(CONFIRM))                                                                  \
-    ROW(how, how, TEXT, 127, false, BIT(CONFIRM))
+    ROW(how, how, TEXT, 127, false, BIT(CONFIRM))                                                                      \
+    ROW(name, file, TEXT, 63, true, BIT(RECORDING))                                                                    \
+    ROW(offset, offset, INTEGER, 0, false, BIT(RECORDING))
 
 #endif

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define PICK(table, index)                                                                                             \
-    ((size_t)(index) < sizeof table / sizeof table[0] && (table)[index] != NULL ? (table)[index] : "unknown")
+    (((size_t)(index) < sizeof(table) / sizeof((table)[0]) && (table)[index] != NULL) ? (table)[index] : "unknown")
 
 const char *iwn_error_name(iwn_error_t error) {
     static const char *const names[IWN_ERRORS] = {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 /// The bus of the iWheel, exactly: 1 Mbit/s, sampled at 62.5 %, computed from the board's APB1 clock by the compiler.
 ///
-/// 62.5 % is 5/8, so a bit must have a multiple of 8 quanta, and the most that bxCAN can have is 25 (bxCAN 7.7: 1 + 16 + 8). 24 quanta
-/// would need 14 before and 9 after the sample, one more than there is. Remain 8 and 16, so APB1 must be a multiple of 8 MHz; another
-/// clock does not compile. 16 quanta are taken where they can be had: the finer the quanta, the finer the resynchronisation.
+/// 62.5 % is 5/8, so a bit must have a multiple of 8 quanta, and the most that bxCAN can have is 25 (bxCAN 7.7: 1 + 16
+/// + 8). 24 quanta would need 14 before and 9 after the sample, one more than there is. Remain 8 and 16, so APB1 must
+/// be a multiple of 8 MHz; another clock does not compile. 16 quanta are taken where they can be had: the finer the
+/// quanta, the finer the resynchronisation.
 #ifndef IW_STM32_BIT_RATE_H
 #define IW_STM32_BIT_RATE_H
 

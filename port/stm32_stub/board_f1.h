@@ -14,7 +14,8 @@
 #define IW_BOARD_CRYSTAL_MIN_HZ 4000000U ///< Data sheet, 5.3.6.
 #define IW_BOARD_CRYSTAL_MAX_HZ (IW_BOARD_CRYSTAL_IS_CLOCK != 0 ? 25000000U : 16000000U)
 #define IW_BOARD_INTERNAL_HZ    8000000U ///< The oscillator that runs after reset. Too inaccurate for the bus.
-/// 64 MHz if a multiple of the crystal, else 48. The usual 72 MHz gives 36 on APB1, and that cannot give the bus exactly.
+/// 64 MHz if a multiple of the crystal, else 48. The usual 72 MHz gives 36 on APB1, and that cannot give the bus
+/// exactly.
 #define IW_BOARD_CORE_HZ        ((64000000U % IW_BOARD_CRYSTAL_HZ == 0U) ? 64000000U : 48000000U)
 #define IW_BOARD_PLL_MULTIPLIER (IW_BOARD_CORE_HZ / IW_BOARD_CRYSTAL_HZ)
 #ifndef IW_BOARD_APB1_HZ

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// What boards with an STM32F405, F407 or F446 have in common: the clocks and where things are. For the `board.h` of such a board.
+/// What boards with an STM32F405, F407 or F446 have in common: the clocks and where things are. For the `board.h` of
+/// such a board.
 #ifndef IW_STM32_BOARD_F4_H
 #define IW_STM32_BOARD_F4_H
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The pins that are the same on all boards of this port, chosen so that nothing on a Blue Pill, a Discovery or a Nucleo is in the way.
+/// The pins that are the same on all boards of this port, chosen so that nothing on a Blue Pill, a Discovery or a
+/// Nucleo is in the way.
 ///
 /// | pin           | is                                                                                        |
 /// |---------------|-------------------------------------------------------------------------------------------|

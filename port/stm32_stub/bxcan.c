@@ -10,8 +10,8 @@
 #define ABORT      (IW_TSR_ABRQ(0) | IW_TSR_ABRQ(1) | IW_TSR_ABRQ(2))
 #define EMPTY      (IW_TSR_TME(0) | IW_TSR_TME(1) | IW_TSR_TME(2))
 
-/// MCR, bxCAN 9.2. Zero are NART (unacknowledged frames are repeated until aborted), TXFP (the lowest id first, so left before
-/// right), RFLM (a full FIFO keeps the newest), ABOM (bus-off is left by us) and SLEEP.
+/// MCR, bxCAN 9.2. Zero are NART (unacknowledged frames are repeated until aborted), TXFP (the lowest id first, so left
+/// before right), RFLM (a full FIFO keeps the newest), ABOM (bus-off is left by us) and SLEEP.
 static void write_mcr(const iw_bxcan_t *self, uint32_t request) {
     iw_register_write(&self->config.registers->MCR, IW_MCR_DBF | request);
 }
@@ -44,7 +44,7 @@ static void bytes_of(uint32_t word, uint8_t *out_bytes) {
     }
 }
 
-/// While masked, `on_transmit` does not run. Reading back makes sure that the write has arrived.
+/// While masked, `iw_bxcan_on_transmit` does not run. Reading back makes sure that the write has arrived.
 static void mask_transmit(const iw_bxcan_t *self) {
     iw_register_t *const ier = &self->config.registers->IER;
     iw_register_write(ier, INTERRUPTS & ~IW_IER_TMEIE);
@@ -58,6 +58,7 @@ static void unmask_transmit(const iw_bxcan_t *self) {
 }
 
 static bool poll_tsr(const iw_bxcan_t *self, uint32_t flags) {
+    // Bounded: an abort ends at the latest with the frame that is on the bus, unless the controller is stuck.
     for (uint32_t poll = 0; poll < self->config.poll_limit; poll++) {
         if ((iw_register_read(&self->config.registers->TSR) & flags) == flags) {
             return true;
@@ -66,8 +67,8 @@ static bool poll_tsr(const iw_bxcan_t *self, uint32_t flags) {
     return false;
 }
 
-/// Aborts the mailbox, bxCAN 7.1, and hands the echoes it owes on to its heir. False if it does not end. If it was sent after all its
-/// echoes are left to `on_transmit`, and the mailbox with them.
+/// Aborts the mailbox, bxCAN 7.1, and hands the echoes it owes on to `heir`, the frame that replaces it. False if the
+/// abort does not end. If the frame was sent after all, mailbox and echoes are left to `iw_bxcan_on_transmit`.
 static bool withdraw(iw_bxcan_t *self, uint32_t mailbox, iw_bxcan_outgoing_t *heir) {
     iw_register_t *const tsr = &self->config.registers->TSR;
     iw_register_write(tsr, IW_TSR_ABRQ(mailbox));
@@ -82,7 +83,8 @@ static bool withdraw(iw_bxcan_t *self, uint32_t mailbox, iw_bxcan_outgoing_t *he
     return true;
 }
 
-/// What waits with this id is withdrawn; at most one does. False if it cannot be, or owes as many echoes as can be kept.
+/// What waits with this id is withdrawn; at most one does. False if it cannot be, or owes as many echoes as can be
+/// kept.
 static bool withdraw_id(iw_bxcan_t *self, uint32_t id, iw_bxcan_outgoing_t *heir) {
     bool done = true;
     for (uint32_t mailbox = 0; mailbox < IW_BXCAN_MAILBOXES && done; mailbox++) {
@@ -154,8 +156,8 @@ int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame) {
     return (self->phase == IW_BXCAN_RUNNING) ? 0 : -1;
 }
 
-/// Aborts all mailboxes, bxCAN 7.1, and forgets what they owe. TSR is written, never read and written back: a completion that comes
-/// between would be cleared with it.
+/// Aborts all mailboxes, bxCAN 7.1, and forgets what they owe. TSR is written, never read and written back: a
+/// completion that comes between would be cleared with it.
 static bool abort_all(iw_bxcan_t *self) {
     iw_register_t *const tsr = &self->config.registers->TSR;
     iw_register_write(tsr, ABORT);
@@ -166,6 +168,7 @@ static bool abort_all(iw_bxcan_t *self) {
     return true;
 }
 
+/// After a purge no echo may reach the core (hal.h): those already in the ring have the old epoch.
 static void forget(iw_bxcan_t *self) {
     memset(self->outgoing, 0, sizeof self->outgoing);
     self->epoch++;
@@ -182,8 +185,8 @@ static bool take_back(iw_bxcan_t *self) {
     return done;
 }
 
-/// An abort that does not end: the frame is lost in the controller, which is reset, mailboxes and all. STARTING is told as a loss
-/// of the bus, and nothing is sent before it has been joined anew.
+/// An abort that does not end: the frame is lost in the controller, which is reset, mailboxes and all. STARTING is told
+/// as a loss of the bus, and nothing is sent before it has been joined anew.
 static void start_anew(iw_bxcan_t *self) {
     iw_register_t *const reset = self->config.reset_register;
     mask_transmit(self);
@@ -196,7 +199,8 @@ static void start_anew(iw_bxcan_t *self) {
     unmask_transmit(self);
 }
 
-/// Off the bus nothing leaves: not in bus-off, which only `bus_state` ends, and it joins no bus before all is taken back.
+/// Off the bus nothing leaves: not in bus-off, which only `bus_state` ends, and it joins no bus before all is taken
+/// back.
 int iw_bxcan_purge(void *context) {
     iw_bxcan_t *const self = context;
     if (take_back(self)) {
@@ -209,8 +213,8 @@ int iw_bxcan_purge(void *context) {
     return 1;
 }
 
-/// Both lead through initialisation mode: bus-off is left by entering and leaving it (bxCAN 7.6), and a device that somebody
-/// has reset or put to sleep begins anew. What waits to be sent must not survive either.
+/// Both lead through initialisation mode: bus-off is left by entering and leaving it (bxCAN 7.6), and a device that
+/// somebody has reset or put to sleep begins anew. What waits to be sent must not survive either.
 static void begin(iw_bxcan_t *self, iw_bxcan_phase_t phase) {
     self->phase = phase;
     (void)take_back(self);
@@ -273,6 +277,7 @@ iw_bxcan_errors_t iw_bxcan_errors(const iw_bxcan_t *self) {
     return (iw_bxcan_errors_t){(uint8_t)IW_ESR_TEC(esr), (uint8_t)IW_ESR_REC(esr), (uint8_t)IW_ESR_LEC(esr)};
 }
 
+/// Lost frames are counted, not waited for: this runs in an interrupt.
 static void put(iw_bxcan_t *self, const iw_can_frame_t *frame) {
     if (!iw_frame_ring_put(&self->ring, frame, self->epoch)) {
         self->lost++;
@@ -294,8 +299,8 @@ void iw_bxcan_on_transmit(iw_bxcan_t *self) {
     }
 }
 
-/// One frame of FIFO 0, bxCAN 7.3 and 9.3. The interrupt comes again while there are more; a release still under way shows the old
-/// frame, so it is left for the next time.
+/// One frame of FIFO 0, bxCAN 7.3 and 9.3. The interrupt comes again while there are more; a release still under way
+/// shows the old frame, so it is left for the next time.
 void iw_bxcan_on_receive(iw_bxcan_t *self) {
     iw_bxcan_registers_t *const registers = self->config.registers;
     const uint32_t status = iw_register_read(&registers->RF0R);

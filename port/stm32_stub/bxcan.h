@@ -1,25 +1,32 @@
 // SPDX-License-Identifier: MIT
-/// bxCAN as the HAL's bus: send, receive, bus_state, purge. See iwheel/hal.h for their contracts; the context is the `iw_bxcan_t`.
+/// bxCAN as the HAL's bus: send, receive, bus_state, purge. See iwheel/hal.h for their contracts; the context is the
+/// `iw_bxcan_t`.
 ///
-///     STARTING --INAK--> JOINING --11 recessive bits--> RUNNING --bus-off--> RECOVERING --INAK--> REJOINING --128 x 11--> RUNNING
+///     STARTING --INAK--> JOINING --11 recessive bits--> RUNNING --bus-off--> RECOVERING --INAK--> REJOINING
+///                                                          ^-------- 128 x 11 recessive bits ---------+
 ///
-/// Each call of `bus_state` takes the step that the hardware is ready for and never waits: a bus held dominant, a missing transceiver
-/// or a controller that does not answer leave it where it is (`bus_state` then says IW_BUS_DOWN or IW_BUS_OFF), and it goes on
-/// when the cause is gone. Automatic recovery from bus-off is left off, so that no loss of the bus goes unreported.
+/// Each call of `bus_state` takes the step that the hardware is ready for and never waits: a bus held dominant, a
+/// missing transceiver or a controller that does not answer leave it where it is (`bus_state` then says IW_BUS_DOWN or
+/// IW_BUS_OFF), and it goes on when the cause is gone. Automatic recovery from bus-off is left off, so that no loss of
+/// the bus goes unreported.
 ///
-/// **Echo.** The completion of a mailbox is the echo: the controller reports it only after another node has acknowledged the frame.
-/// A frame that is handed over while one with the same id waits takes its place: the old mailbox is aborted and its end awaited first,
-/// since equal ids leave by mailbox number and the old one could come last. The replaced frame never reaches the bus; when
-/// its successor does, one echo comes for each, the older one's first and each with its own bytes, so that the core's account stays whole
-/// and no echo comes without an acknowledgement. More than two frames that wait for one echo are not kept: `send` then says later.
+/// **Echo.** The completion of a mailbox is the echo: the controller reports it only after another node has
+/// acknowledged the frame. A frame that is handed over while one with the same id waits takes its place: the old
+/// mailbox is aborted and its end awaited first, since equal ids leave by mailbox number and the old one could come
+/// last. The replaced frame never reaches the bus; when its successor does, one echo comes for each, the older one's
+/// first and each with its own bytes: the core gets a TX confirmation for every frame it handed over, and none without
+/// an acknowledgement. More than two frames that wait for one echo are not kept: `send` then says later.
 ///
-/// **Filters** pass exactly the eleven ids of the iWheel in every format of classic CAN (remote and 29-bit frames with such a number are
-/// counted by the core). Setpoints among them are always somebody else's: bxCAN does not receive what it sends.
+/// **Filters** pass exactly the eleven ids of the iWheel in every format of classic CAN (remote and 29-bit frames with
+/// such a number are counted by the core). Setpoints among them are always somebody else's: bxCAN does not receive what
+/// it sends.
 ///
-/// **Losses.** A frame that finds the controller's FIFO or the ring full is counted, and `receive` gives one report of it before the
-/// next frames: a frame with the id IW_CAN_ERROR, which the core counts as unknown. A lost echo ends in `send_stalled` by itself.
+/// **Losses.** A frame that finds the controller's FIFO or the ring full is counted, and `receive` gives one report of
+/// it before the next frames: a frame with the id IW_CAN_ERROR, which the core counts as unknown. A lost echo ends in
+/// IW_CAUSE_SEND_STALLED by itself.
 ///
-/// Instances share nothing. The handlers of one device must have equal priority; everything else is called from the main loop.
+/// Instances share nothing. The handlers of one device must have equal priority; everything else is called from the
+/// main loop.
 #ifndef IW_STM32_BXCAN_H
 #define IW_STM32_BXCAN_H
 
@@ -61,12 +68,12 @@ typedef struct {
 typedef struct {
     iw_bxcan_config_t config;
     iw_frame_ring_t ring;
-    iw_bxcan_outgoing_t
-        outgoing[IW_BXCAN_MAILBOXES]; ///< Shared with `on_transmit`: that is masked while others write it.
+    /// Shared with `iw_bxcan_on_transmit`, whose interrupt is masked while others write it.
+    iw_bxcan_outgoing_t outgoing[IW_BXCAN_MAILBOXES];
     iw_bxcan_phase_t phase;
     volatile uint32_t overruns; ///< Times that a frame came while the controller's FIFO was full.
     volatile uint32_t lost;     ///< Frames and echoes that found the ring full.
-    uint32_t losses_told;       ///< Of both, those that `receive` has reported.
+    uint32_t losses_told;       ///< Of both, those that `iw_bxcan_receive` has reported.
     uint32_t bus_offs;          ///< Since the start.
     uint32_t resets;            ///< Of the controller by us, since the start.
     uint8_t epoch;              ///< Counts purges: echoes from before one are not delivered.
@@ -79,18 +86,20 @@ typedef struct {
     uint8_t last_error; ///< 0 none, 1 stuff, 2 form, 3 acknowledgement, 4 recessive bit, 5 dominant bit, 6 CRC.
 } iw_bxcan_errors_t;
 
-/// Takes the device out of sleep and asks for initialisation mode. Configuration follows in `bus_state`. Does not wait. Two devices
-/// that share filter banks must both be initialised before either is RUNNING: filters cannot change while frames come in.
+/// Takes the device out of sleep and asks for initialisation mode. Configuration follows in `bus_state`. Does not wait.
+/// Two devices that share filter banks must both be initialised before either is RUNNING: filters cannot change while
+/// frames come in.
 void iw_bxcan_init(iw_bxcan_t *self, const iw_bxcan_config_t *config);
 
-/// > 0: in a mailbox. 0: no mailbox is free, or two frames of this id are waiting. < 0: not RUNNING, silent, or not a data frame with an 11-bit id. May wait for the end
-/// of a frame on the bus (160 us) when it replaces one.
+/// > 0: in a mailbox. 0: no mailbox is free, or two frames of this id are waiting. < 0: not RUNNING, silent, or not a
+/// data frame with an 11-bit id. May wait for the end of a frame on the bus (160 us) when it replaces one.
 int iw_bxcan_send(void *context, const iw_can_frame_t *frame);
 int iw_bxcan_receive(void *context, iw_can_frame_t *out_frame);
 iw_bus_state_t iw_bxcan_bus_state(void *context);
-/// Aborts all mailboxes and waits for their end, at most `poll_limit` reads. Echoes that were not delivered yet never come, not that of a
-/// frame that got through meanwhile either. An abort that does not end resets the controller: > 0 too, since nothing is left in it,
-/// and `bus_state` tells a loss of the bus. 0 only while off the bus: it is joined again only when all has been taken back.
+/// Aborts all mailboxes and waits for their end, at most `poll_limit` reads. Echoes that were not delivered yet never
+/// come, not that of a frame that got through meanwhile either. An abort that does not end resets the controller: > 0
+/// too, since nothing is left in it, and `bus_state` tells a loss of the bus. 0 only while off the bus: it is joined
+/// again only when all has been taken back.
 int iw_bxcan_purge(void *context);
 
 /// The device's interrupts: transmit, FIFO 0, and status change and error. The last only wakes the CPU.

@@ -31,7 +31,8 @@ static_assert((IW_ID_LEFT_FORCE ^ IW_ID_LEFT_OFFSET) == 0x01U && (IW_ID_LEFT_FOR
               "0x200, 0x201, 0x220, 0x221");
 static_assert((IW_ID_LEFT_SETPOINT ^ IW_ID_RIGHT_SETPOINT) == 0x20U, "0x10A, 0x12A");
 
-/// 16-bit scale, bxCAN 7.4: mask in the upper, id in the lower half, each STID[15:5] RTR[4] IDE[3] EXID[2:0]. IDE must be 0.
+/// 16-bit scale, bxCAN 7.4: mask in the upper, id in the lower half, each STID[15:5] RTR[4] IDE[3] EXID[2:0]. IDE must
+/// be 0.
 static uint32_t narrow(const group_t *group) {
     const uint32_t mask = ((IW_CAN_ID_MASK & ~(uint32_t)group->varying) << 5) | 0x08U;
     return (mask << 16) | ((uint32_t)group->id << 5);
@@ -43,6 +44,7 @@ static void write_wide(iw_register_t *bank, const group_t *group) {
     iw_register_write(&bank[1], ((0x1FFFFFFFU & ~(uint32_t)group->varying) << 3) | 0x04U);
 }
 
+/// Only our banks' bits: of CAN1 and CAN2 the other device's banks stand in the same registers.
 static void set_bits(iw_register_t *address, uint32_t bits) {
     iw_register_write(address, iw_register_read(address) | bits);
 }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 /// The registers of bxCAN, the bus controller of STM32F0, F1, F2, F3, F4, F7 and L4.
 ///
-/// Names, offsets and bits are those of the reference manuals: chapter 24 of RM0008 (STM32F1), 32 of RM0090 (STM32F405/407), 30 of
-/// RM0390 (STM32F446). The sections within the chapter are the same; comments in this port name them as "bxCAN 7.4" for 24.7.4.
-/// Every gap is `reserved`, and offsets are asserted, so that a forgotten one does not compile.
+/// Names, offsets and bits are those of the reference manuals: chapter 24 of RM0008 (STM32F1), 32 of RM0090
+/// (STM32F405/407), 30 of RM0390 (STM32F446). The sections within the chapter are the same; comments in this port name
+/// them as "bxCAN 7.4" for 24.7.4. Every gap is `reserved`, and offsets are asserted, so that a forgotten one does not
+/// compile.
 #ifndef IW_STM32_BXCAN_REGISTERS_H
 #define IW_STM32_BXCAN_REGISTERS_H
 

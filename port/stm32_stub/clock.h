@@ -5,12 +5,13 @@
 
 #include "iwheel/types.h"
 
-/// Tries to run the core from the crystal: IW_BOARD_CORE_HZ and IW_BOARD_APB1_HZ. False if crystal or PLL are not up within a few milliseconds;
-/// the core is then on the internal oscillator, the crystal goes on starting, and the call may be repeated: also a slow
-/// crystal starts at last. Once true, a failure of the crystal raises the NMI.
+/// Tries to run the core from the crystal: IW_BOARD_CORE_HZ and IW_BOARD_APB1_HZ. False if crystal or PLL are not up
+/// within a few milliseconds; the core is then on the internal oscillator, the crystal goes on starting, and the call
+/// may be repeated: also a slow crystal starts at last. Once true, a failure of the crystal raises the NMI.
 bool iw_clock_start(void);
 
-/// True if this start is a power-on: RAM holds nothing of the run before. Ask once; the flags are cleared for the next start.
+/// True if this start is a power-on: RAM holds nothing of the run before. Ask once; the flags are cleared for the next
+/// start.
 bool iw_clock_was_power_on(void);
 
 #endif

@@ -32,7 +32,8 @@ typedef struct {
 
 #define CRYSTAL_INPUT (IW_BOARD_CRYSTAL_IS_CLOCK != 0 ? HSEBYP : 0U)
 
-// A poll takes 8 cycles at the least, at 8 MHz: 1 ms. The PLL needs 0.3 ms at the most; the crystal goes on starting between the calls.
+// A poll takes 8 cycles at the least, at 8 MHz: 1 ms. The PLL needs 0.3 ms at the most; the crystal goes on starting
+// between the calls.
 #define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 1000U)
 
 static_assert(
@@ -44,6 +45,7 @@ static_assert(
 static_assert(IW_BOARD_CORE_HZ <= 72000000U, "the chip's limit");
 static_assert(IW_BOARD_APB1_HZ * 2U == IW_BOARD_CORE_HZ, "PPRE1_HALF is what is written");
 
+/// Every wait on a flag is bounded: a crystal that is broken must end in a message, not in a dead loop.
 static bool wait_for(const volatile uint32_t *flags, uint32_t mask, uint32_t value) {
     for (uint32_t poll = 0; poll < POLLS_MAX; poll++) {
         if ((*flags & mask) == value) {

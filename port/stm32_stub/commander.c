@@ -8,6 +8,8 @@
 #define RETRY_US  100000U
 #define STABLE_US 20000U
 
+/// Debounced both ways. A button that is stuck or held from before power-on never makes a press (R3: nothing moves by
+/// itself).
 bool iw_commander_pressed(iw_commander_t *self, iw_time_us_t now_us) {
     const bool level = iw_pins_button_low();
     if (level != self->level) {
@@ -41,6 +43,7 @@ bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t 
 }
 
 iw_refusal_t iw_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s) {
+    // As a setpoint, a current of 0: how much of it moves the machine is not known here.
     const iw_drive_t drive = {
         .speed_mm_s = {speed_mm_s, speed_mm_s},
         .current_mA = {0, 0},

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: MIT
-/// Where the commands come from. **This is the place for a product's own command source**: a joystick, a serial line, a planner.
+/// Where the commands come from. **This is the place for a product's own command source**: a joystick, a serial line, a
+/// planner.
 ///
 /// A source is one file with three functions. CMakeLists.txt chooses one of three that come with this port:
 ///
-/// | file             | chosen by                                      | does                                              |
-/// |------------------|------------------------------------------------|---------------------------------------------------|
-/// | commander_none.c | nothing configured                             | nothing: the image listens, silently              |
-/// | commander_zero.c | IWHEEL_SETPOINT_TYPE and IWHEEL_CURRENT_ROLE   | arms as soon as it may, holds both wheels at 0/0  |
-/// | commander_demo.c | these and IWHEEL_DEMO                          | as zero; a press of PA1 starts a slow profile     |
+/// | file             | chosen by                                    | does                                          |
+/// |------------------|----------------------------------------------|-----------------------------------------------|
+/// | commander_none.c | nothing configured                           | nothing: the image listens, silently          |
+/// | commander_zero.c | IWHEEL_SETPOINT_TYPE and IWHEEL_CURRENT_ROLE | arms when it may, holds both wheels at 0/0    |
+/// | commander_demo.c | these and IWHEEL_DEMO                        | as zero; a press of PA1 starts a slow profile |
 ///
-/// There is no host that could reset a latch, so in all of them a press of the button at PA1 does: let go and pressed again after what
-/// latched, refused as any reset (safety: cause gone for a second, e-stop released, both wheels heard and at rest), and never
-/// the beginning of motion. Power off and on does it too.
+/// There is no host that could reset a latch, so in all of them a press of the button at PA1 does: let go and pressed
+/// again after what latched, refused as any reset (safety: cause gone for a second, e-stop released, both wheels heard
+/// and at rest), and never the beginning of motion. Power off and on does it too.
 ///
-/// Rules for one's own: call `iw_gateway_drive` only with a value that somebody wants *now*, since each accepted call feeds the lease
-/// and the lease is what stops the wheels when nobody is there any more. Do not repeat an old value, do not answer a refusal by
-/// trying again with a nonzero value, never wait in here.
+/// Rules for one's own: call `iw_gateway_drive` only with a value that somebody wants *now*, since each accepted call
+/// feeds the lease and the lease is what stops the wheels when nobody is there any more. Do not repeat an old value, do
+/// not answer a refusal by trying again with a nonzero value, never wait in here.
 #ifndef IW_STM32_COMMANDER_H
 #define IW_STM32_COMMANDER_H
 
@@ -34,24 +35,27 @@ typedef struct {
 /// What this source does, for the console's first line.
 const char *iw_commander_words(void);
 
-/// True if this source may command: the controller then takes part in the bus. False: it is silent and does not acknowledge.
+/// True if this source may command: the controller then takes part in the bus. False: it is silent and does not
+/// acknowledge.
 bool iw_commander_sends(void);
 
-/// Called once in every cycle, right before `iw_gateway_step`, at least every 20 ms: what it commands leaves in the same cycle. Must
-/// return within a millisecond.
+/// Called once in every cycle, right before `iw_gateway_step`, at least every 20 ms: what it commands leaves in the
+/// same cycle. Must return within a millisecond.
 void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
 
-/// For sources: asks to be armed when that makes sense, and not more often than every 100 ms. True while armed and holder.
+/// For sources: asks to be armed when that makes sense, and not more often than every 100 ms. True while armed and
+/// holder.
 bool iw_commander_arm(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);
 
-/// For sources: true once for each press of the button: low for 20 ms after it was high for 20 ms. Held, it repeats nothing, and one that is
-/// down from the start counts only after it was let go. To be asked in every cycle.
+/// For sources: true once for each press of the button: low for 20 ms after it was high for 20 ms. Held, it repeats
+/// nothing, and one that is down from the start counts only after it was let go. To be asked in every cycle.
 bool iw_commander_pressed(iw_commander_t *self, iw_time_us_t now_us);
 
 /// For sources: resets a latch if there is one and tells how that went.
 void iw_commander_reset(iw_gateway_t *gateway, iw_time_us_t now_us);
 
-/// For sources: one drive command for both wheels, with the configured maximum current if that is a limit, else with none.
+/// For sources: one drive command for both wheels, with the configured maximum current if that is a limit, else with
+/// none.
 iw_refusal_t iw_commander_drive(iw_gateway_t *gateway, iw_time_us_t now_us, int32_t speed_mm_s);
 
 #endif

@@ -27,6 +27,7 @@ void iw_console_start(uint32_t apb1_hz) {
     USART2->CR1 = UE | TE | RE;
 }
 
+/// What does not fit is dropped: the control loop never waits for a terminal (R11).
 static void append(char character) {
     if (put - taken < LENGTH - 1U) {
         waiting[put++ % LENGTH] = character;
@@ -39,6 +40,7 @@ void iw_console_text(const char *text) {
     }
 }
 
+/// No printf: newlib's would bring the heap.
 void iw_console_number(uint32_t value) {
     char digit[10];
     uint32_t digits = 0;

@@ -13,7 +13,8 @@ void iw_console_text(const char *text);
 void iw_console_number(uint32_t value);
 void iw_console_hex(uint32_t value); ///< With 0x and eight digits.
 
-/// Hands over one character if the last one has gone. True while there are more: call again within a millisecond, or later.
+/// Hands over one character if the last one has gone. True while there are more: call again within a millisecond, or
+/// later.
 bool iw_console_step(void);
 
 /// True if a character came since the last call; which one does not matter.

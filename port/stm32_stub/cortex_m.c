@@ -13,7 +13,7 @@
 
 void iw_systick_handler(void);
 
-// Counted by interrupts; there is no other place for them.
+// Written by interrupt handlers, which get no argument: so they stand at file scope.
 static volatile uint64_t ticks_ms;
 static volatile uint32_t ticks_slept; // The lower half once more, read in one access.
 static atomic_bool is_woken;

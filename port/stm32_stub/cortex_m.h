@@ -18,10 +18,12 @@ typedef enum {
 /// Interrupts and exceptions may come from here on, all with the same priority: none interrupts another.
 void iw_irq_enable(iw_irq_t irq);
 
-/// Starts the tick of 1 ms that time is counted with, or continues it on another clock. `core_hz` is a multiple of 1 MHz.
+/// Starts the tick of 1 ms that time is counted with, or continues it on another clock. `core_hz` is a multiple of 1
+/// MHz.
 void iw_time_start(uint32_t core_hz);
 
-/// Microseconds since the first `iw_time_start`, monotonic. Not from an interrupt, and not while interrupts are held off.
+/// Microseconds since the first `iw_time_start`, monotonic. Not from an interrupt, and not while interrupts are held
+/// off.
 iw_time_us_t iw_time_now_us(void);
 
 /// Makes the next `iw_sleep_until` return at once. From an interrupt that the main loop must act upon.

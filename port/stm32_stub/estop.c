@@ -24,13 +24,14 @@ void iw_estop_init(void) {
     EXTI->IMR |= LINE;
 }
 
+/// Any edge counts, also the falling one: of a short pulse the level may be gone, and so may the first edge (fault 12).
 void iw_estop_on_edge(void) {
     EXTI->PR = LINE;
     atomic_store_explicit(&had_edge, true, memory_order_relaxed);
     iw_wake();
 }
 
-/// An edge between the look and the clearing is told by this call too, so none is lost.
+/// An edge between load and store is covered by the 1 of this same call, so none is lost.
 int iw_estop_pressed(void *context) {
     (void)context;
     if (atomic_load_explicit(&had_edge, memory_order_relaxed)) {

@@ -8,8 +8,8 @@
 /// After `iw_pins_init`. Edges count from here on.
 void iw_estop_init(void);
 
-/// The HAL's `estop_pressed`: 1 while the contact is open, and once for any edge since the last call, however short the pulse.
-/// `context` is not used: there is one e-stop.
+/// The HAL's `estop_pressed`: 1 while the contact is open, and once for any edge since the last call, however short the
+/// pulse. `context` is not used: there is one e-stop.
 int iw_estop_pressed(void *context);
 
 /// The interrupt of the line. Wakes the main loop.

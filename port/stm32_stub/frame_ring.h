@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// A queue of frames between interrupts and the main loop.
 ///
-/// One producer, one consumer: interrupts of equal priority put frames in, the main loop takes them out. No lock: each index is
-/// written by one side only. At most 21 frames come in a millisecond at 1 Mbit/s, so the ring outlasts 3 ms of a full bus.
+/// One producer, one consumer: interrupts of equal priority put frames in, the main loop takes them out. No lock: each
+/// index is written by one side only. At most 21 frames come in a millisecond at 1 Mbit/s, so the ring outlasts 3 ms of
+/// a full bus.
 #ifndef IW_STM32_FRAME_RING_H
 #define IW_STM32_FRAME_RING_H
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "lamp.h"
 
+/// The button comes first: while it is pressed no other cure helps.
 uint16_t iw_lamp_pattern(const iw_snapshot_t *seen, bool estop_pressed) {
     if (estop_pressed) {
         return IW_LAMP_ESTOP;

@@ -14,10 +14,11 @@
 #include "report.h"
 #include "watchdog.h"
 
-// A poll takes 4 cycles at the least, and the longest frame with an error at its end 200 us: 250 us, and 1.5 ms at the most.
+// A poll takes 4 cycles at the least, and the longest frame with an error at its end 200 us: 250 us, and 1.5 ms at the
+// most.
 #define ABORT_POLLS (IW_BOARD_CORE_HZ / 4U / 4000U)
 #define CAN_RESET   (1U << 25) // In RCC's APB1RSTR, RM0008 7.3.4 and RM0090 7.3.8.
-// A crystal that has not started by now is told of.
+// A crystal that has not started by now is reported.
 #define CRYSTAL_LATE_US 100000U
 // While text waits the loop goes round this often.
 #define CHARACTER_US 1000U
@@ -66,6 +67,8 @@ static void wait_for_crystal(void) {
     iw_console_start(IW_BOARD_APB1_HZ);
 }
 
+/// Silent without a command source: the acknowledgement of an image that only listens would pass for a wheel's, and
+/// confirm frames to another master that no wheel has heard.
 static void start_bus(void) {
     const iw_bxcan_config_t config = {
         .registers = (iw_bxcan_registers_t *)IW_BOARD_BXCAN_ADDRESS,
@@ -98,6 +101,7 @@ static bool start_gateway(iw_gateway_t *gateway, bool restarted) {
     return true;
 }
 
+/// The watchdog is fed at the end: only a cycle that got through all of it counts as alive (fault 26).
 static void cycle(iw_gateway_t *gateway, iw_commander_t *commander) {
     const iw_time_us_t now_us = iw_time_now_us();
     iw_commander_step(commander, gateway, now_us);

@@ -13,6 +13,7 @@ static void set(bool sending) {
     inverse = sending ? ~SENDING : 0U;
 }
 
+/// Not cleared here when set: a run that dies before its zeros are acknowledged must find it again.
 bool iw_marker_take(bool power_on) {
     const bool was_sending = !power_on && word == SENDING && inverse == ~SENDING;
     if (!was_sending) {
@@ -21,6 +22,7 @@ bool iw_marker_take(bool power_on) {
     return was_sending;
 }
 
+/// A zero that was only handed over proves nothing; the marker goes with the first zeros that both wheels acknowledged.
 void iw_marker_step(const iw_snapshot_t *seen) {
     const bool silent = seen->demand == IW_DEMAND_SILENCE;
     if (!silent) {

@@ -11,8 +11,8 @@
 static_assert(IW_BOARD_ESTOP % 16U == 0U,
               "the e-stop's interrupt is EXTI line 0: take pin 0 of a port (PA0, PB0, PC0 or PD0)");
 
-/// Clocks the ports, the bus controller and the serial port, sets pull-ups and functions, and connects EXTI line 0 to the e-stop's pin. Works
-/// on any clock.
+/// Clocks the ports, the bus controller and the serial port, sets pull-ups and functions, and connects EXTI line 0 to
+/// the e-stop's pin. Works on any clock.
 void iw_pins_init(void);
 
 /// The level of the e-stop's pin. High: the contact is open or its wire is cut, which is pressed.

@@ -54,6 +54,7 @@ static void enable_clocks(void) {
     APB1ENR |= (1U << 25) | (1U << 17);  // 7.3.8: CAN, USART2.
 }
 
+/// Pull-ups before anything is read: an open contact or a cut wire reads high from the first look.
 void iw_pins_init(void) {
     enable_clocks();
     pull_up(IW_BOARD_ESTOP);

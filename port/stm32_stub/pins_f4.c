@@ -60,6 +60,7 @@ static void enable_clocks(void) {
     APB2ENR |= 1U << 14;                // 7.3.14: SYSCFG.
 }
 
+/// Pull-ups before anything is read: an open contact or a cut wire reads high from the first look.
 void iw_pins_init(void) {
     enable_clocks();
     iw_pins_lamp(false);

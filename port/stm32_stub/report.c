@@ -6,7 +6,8 @@
 #include "console.h"
 #include "pins.h"
 
-#define WORDS(names, index) (((size_t)(index) < sizeof names / sizeof names[0]) ? (names)[index] : "?")
+/// A word of a table; "?" beyond its end. Gaps within are NULL.
+#define WORDS(names, index) (((size_t)(index) < sizeof(names) / sizeof((names)[0])) ? (names)[index] : "?")
 
 // What is shown now, in one number; 0: nothing was shown yet.
 static uint32_t shown;
@@ -49,6 +50,7 @@ void iw_report_start(bool restarted) {
     shown = 0;
 }
 
+/// The words are those of the gateway's protocol (docs/northbound.md), so that one manual serves both.
 static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
     static const char *const states[] = {"listening", "armed", "stopping", "latched"};
     static const char *const buses[] = {"down", "off", "passive", "active"};
@@ -91,6 +93,7 @@ static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
 
 void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     const uint32_t state = (uint32_t)seen->state;
+    // The top bit tells "nothing happens" from "nothing was shown".
     const uint32_t now = 0x80000000U | (estop_pressed ? 0x10000U : 0U) | ((uint32_t)seen->stop->cause << 8) |
                          ((uint32_t)seen->bus << 4) | state;
     if (iw_console_asked()) {
@@ -102,6 +105,7 @@ void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     }
 }
 
+/// With the cure where the operator at the machine has one.
 void iw_report_reset(iw_refusal_t refusal) {
     static const char *const words[] = {
         [IW_REFUSE_NONE] = "done",

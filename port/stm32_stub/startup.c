@@ -12,9 +12,10 @@ void iw_can_error_handler(void);
 extern uint32_t iw_link_stack_top[], iw_link_data_load[], iw_link_data_start[], iw_link_data_end[];
 extern uint32_t iw_link_bss_start[], iw_link_bss_end[];
 
-/// Any fault, the failure of the crystal (NMI) and whatever nobody asked for: begin anew. If setpoints were being sent
-/// the next run begins with zeros; see marker.h. An overflow of the stack ends here too (see sections.ld), so the stack is not used; what
-/// the core makes of a fault without a stack, if not this handler, is a lockup, which the watchdog ends.
+/// Any fault, the failure of the crystal (NMI) and every unexpected exception: reset. If setpoints were being sent
+/// the next run begins with zeros; see marker.h. An overflow of the stack ends here too (see sections.ld), so the stack
+/// is not used; what the core makes of a fault without a stack, if not this handler, is a lockup, which the watchdog
+/// ends.
 __attribute__((naked)) static void fault_handler(void) {
     __asm volatile("ldr r0, =iw_link_stack_top\n msr msp, r0\n b iw_system_reset");
 }

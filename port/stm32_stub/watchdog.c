@@ -18,7 +18,8 @@ typedef struct {
 #define BY_4   0U
 #define RELOAD (IW_BOARD_LSI_MAX_HZ / 4U * IW_WATCHDOG_MS / 1000U + 1U)
 
-// The registers take the values within 5 cycles of the slow oscillator; reads of SR take 8 cycles of the core at the least.
+// The registers take the values within 5 cycles of the slow oscillator; reads of SR take 8 cycles of the core at the
+// least.
 #define POLLS_MAX (IW_BOARD_INTERNAL_HZ / 8U / 1000U)
 
 static_assert(RELOAD <= 0xFFFU, "12 bits");

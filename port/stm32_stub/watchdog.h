@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The independent watchdog: its own oscillator, never to be stopped again. Fed by a complete cycle of the main loop, before that loop
-/// by a complete attempt to start the crystal (nothing can be sent yet), and by nothing else.
+/// The independent watchdog: its own oscillator, never to be stopped again. Fed by a complete cycle of the main loop,
+/// before that loop by a complete attempt to start the crystal (nothing can be sent yet), and by nothing else.
 #ifndef IW_STM32_WATCHDOG_H
 #define IW_STM32_WATCHDOG_H
 

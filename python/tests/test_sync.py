@@ -13,7 +13,8 @@ from fractions import Fraction
 
 from rig import ROOT, RigCase, now_us
 
-from iwheel import ConnectionLost, Gateway, GatewayUnavailable, LeaseEnded, NoAnswer, Refused
+from iwheel import ConnectionLost, Gateway, GatewayUnavailable, LeaseEnded, NoAnswer, ProtocolError, Refused
+from iwheel._wire import add_piece
 
 BUDGET_MS = 987 + 100
 """Lease, period and ramp of the default configuration of rig.py, and what a busy machine adds."""
@@ -31,6 +32,20 @@ class Driving(RigCase):
             self.assertTrue(status["left"]["at_rest"] and status["right"]["at_rest"])
             self.assertGreater(status["left"]["distance_mm"], 30)
             self.assertEqual(gateway.why()["cause"], "client_stop")
+
+    def test_a_recording_comes_whole_and_a_damaged_one_not_at_all(self):
+        with Gateway(self.socket) as gateway:
+            gateway.estop()
+            self.wait_until(lambda: gateway.why()["recording"] is not None, 8.0)
+            path = gateway.why()["recording"]
+            self.assertEqual(gateway.recordings()[-1]["name"] + ".log", os.path.basename(path))
+            with open(path, "rb") as file:
+                self.assertEqual(gateway.recording(os.path.basename(path)), file.read())
+        whole = {"name": "x", "offset": 0, "size": 9, "data": "MTIzNDU2Nzg5", "crc32": 3421780262, "file_crc32": 3421780262}
+        self.assertTrue(add_piece(bytearray(), whole))
+        for damage in ({"data": "MTIzNDU2Nzg4"}, {"data": "MTI"}, {"offset": 1}, {"size": 8}, {"file_crc32": None}, {"data": "", "crc32": 0}):
+            with self.assertRaises(ProtocolError, msg=str(damage)):
+                add_piece(bytearray(), {**whole, **damage})
 
     def test_a_single_command_does_not_outlive_its_lease(self):
         with Gateway(self.socket) as gateway:

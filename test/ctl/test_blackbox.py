@@ -4,16 +4,20 @@
 
 Usage: test_blackbox.py BUILD [unittest's arguments]
 """
+import base64
 import glob
 import json
 import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 import unittest
+import zlib
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
 from client import Streamer  # noqa: E402
@@ -213,6 +217,175 @@ class BlackBox(WithRig):
         self.assertIn("directory", why["recording_error"])
         self.assertEqual(40, len(why["frames_before"]))
         self.assertIn("not recorded on disk", self.ctl("why")[1])
+
+
+class OverTheSocket(WithRig):
+    """The same as from the files, for whoever has only the socket."""
+
+    def away(self, *words):
+        """As from another machine: in a name space in which there is another folder in its place."""
+        command = [find_program(BUILD, "iwheelctl"), "--socket", self.rig.path("gateway.sock"), *words]
+        hidden = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", 'mount -t tmpfs none "$0" && exec "$@"', self.folder]
+        done = subprocess.run(hidden + command, capture_output=True, text=True, timeout=60, check=False)
+        return done.returncode, done.stdout, done.stderr
+
+    def setUp(self):
+        super().setUp()
+        probe = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", f'mount -t tmpfs none "{self.rig.path("")}"']
+        if subprocess.run(probe, capture_output=True, check=False).returncode != 0:
+            self.skipTest("this machine gives no mount name spaces")
+
+    def test_why_and_replay_say_the_same_as_from_the_files(self):
+        stem = self.stop_by_button()
+        number = str(int(os.path.basename(stem).split("-")[1]))
+        for words in (("why", number), ("why", number, "--frames", "40"), ("why", "--list"), ("why", stem + ".log"),
+                      ("replay", stem + ".log"), ("--json", "replay", stem + ".log"), ("--json", "why", "--list")):
+            here = self.ctl(*words)
+            self.assertEqual((0, ""), (here[0], here[2]), words)
+            self.assertEqual(here, self.away(*words), words)
+
+    def test_directory_that_was_named_is_not_asked_for_elsewhere(self):
+        self.stop_by_button()
+        self.assertEqual(0, self.ctl("why", "--list", "--directory", self.folder)[0])
+        code, out, _ = self.away("why", "--list", "--directory", self.folder)
+        self.assertIn("0 stops recorded", out)
+        self.assertEqual(69, self.away("why", "--list", "--directory", self.folder + "/none")[0])
+        self.assertEqual(0, code)
+
+    def test_other_file_is_not_asked_for(self):
+        code, _, err = self.away("replay", "/nowhere/other.log")
+        self.assertEqual(65, code)
+        self.assertIn("there is no such file", err)
+        code, _, err = self.away("replay", "/nowhere/stop-000099-estop_line.log")
+        self.assertEqual(65, code)
+        self.assertIn("there is no such file", err)
+
+
+class Pieces(WithRig):
+    """The requests themselves."""
+
+    def fetch(self, name):
+        data = b""
+        while True:
+            reply = self.client.request("recording", name=name, offset=len(data))
+            self.assertTrue(reply["ok"], reply)
+            piece = base64.b64decode(reply["data"])
+            self.assertEqual(zlib.crc32(piece), reply["crc32"])
+            data += piece
+            if len(data) == reply["size"]:
+                self.assertEqual(zlib.crc32(data), reply["file_crc32"])
+                return data
+            self.assertEqual((24576, None), (len(piece), reply["file_crc32"]))
+
+    def test_pieces_are_the_files_and_no_path_leaves(self):
+        stem = self.stop_by_button()
+        listed = self.client.request("recordings")
+        self.assertNotIn("/", json.dumps(listed))
+        entry = listed["recordings"][0]
+        self.assertEqual(("stop-000001-estop_line", "estop_line"), (entry["name"], entry["cause"]))
+        self.assertLess(abs(entry["wall_us"] / 1e6 - time.time()), 30)
+        for ending in ("log", "jsonl", "conf"):
+            with open(f"{stem}.{ending}", "rb") as file:
+                data = file.read()
+            self.assertEqual(len(data), entry[f"{ending}_bytes"])
+            self.assertEqual(data, self.fetch(f"stop-000001-estop_line.{ending}"))
+
+    def test_nothing_else_is_read(self):
+        self.stop_by_button()
+        with open(os.path.join(self.folder, "secret"), "w", encoding="ascii") as file:
+            file.write("secret")
+        os.symlink("secret", os.path.join(self.folder, "stop-000005-a.log"))
+        for name in ("secret", "../gateway.conf", "/etc/passwd", self.folder + "/stop-000001-estop_line.log", "stop-000001-estop_line",
+                     "./stop-000001-estop_line.log", "stop-000001-estop_line.log/", "."):
+            reply = self.client.request("recording", name=name)
+            self.assertEqual("bad_value", reply["error"], (name, reply))
+            self.assertNotIn(self.folder, reply["message"])
+        self.assertEqual("denied", self.client.request("recording", name="stop-000009-estop_line.log")["error"])
+        reply = self.client.request("recording", name="stop-000005-a.log")
+        self.assertEqual("denied", reply["error"])
+        self.assertNotIn("secret", json.dumps(self.client.request("recordings")))
+        for name in ("", "a" * 64, "stop-000001-estop_line.log\0", "stop-000001-\u202e.log"):
+            self.assertIn(self.client.request("recording", name=name)["error"], ("bad_value", "bad_json"), name)
+
+    def test_reader_that_is_frozen_or_killed_delays_neither_stop_nor_status_nor_recording(self):
+        self.stop_by_button()
+        self.rig.release()
+        time.sleep(1.2)
+        self.assertTrue(self.client.request("reset")["ok"])
+        reader = children(self.rig.gateway.child.pid)["iwheel-records"]
+        os.kill(reader, signal.SIGSTOP)
+        sock = socket.socket(socket.AF_UNIX)
+        self.addCleanup(sock.close)
+        sock.connect(self.rig.path("gateway.sock"))
+        lines = sock.makefile("r", encoding="utf-8")
+        lines.readline()
+        sock.sendall(b'{"cmd":"recordings","id":1}\n{"cmd":"recordings","id":2}\n{"cmd":"estop","id":3}\n{"cmd":"status","id":4}\n')
+        replies = [json.loads(lines.readline()) for _ in range(3)]
+        self.assertEqual([(2, False), (3, True), (4, True)], [(reply["id"], reply["ok"]) for reply in replies])
+        self.assertEqual("denied", replies[0]["error"])
+        self.wait_whole(2)  # Writing is another process's.
+        os.kill(reader, signal.SIGCONT)
+        reply = json.loads(lines.readline())
+        self.assertEqual((1, True), (reply["id"], reply["ok"]))
+        os.kill(reader, signal.SIGSTOP)
+        sock.sendall(b'{"cmd":"recordings","id":5}\n')
+        time.sleep(0.1)
+        os.kill(reader, signal.SIGKILL)
+        reply = json.loads(lines.readline())
+        self.assertEqual((5, "denied"), (reply["id"], reply["error"]))
+        self.assertTrue(self.client.request("status")["ok"])
+
+    def test_question_of_who_says_nothing_more_is_answered(self):
+        sock = socket.socket(socket.AF_UNIX)
+        self.addCleanup(sock.close)
+        sock.connect(self.rig.path("gateway.sock"))
+        sock.sendall(b'{"cmd":"recordings","id":1}\n')
+        sock.shutdown(socket.SHUT_WR)
+        lines = sock.makefile("r", encoding="utf-8").read().splitlines()  # To the end of the file.
+        self.assertEqual((1, True), tuple(json.loads(lines[-1])[name] for name in ("id", "ok")))
+
+    @staticmethod
+    def ran_us(pid):
+        """How long the process was on a processor."""
+        return int(read(f"/proc/{pid}/schedstat").split()[0]) / 1000
+
+    def test_reading_a_large_one_takes_the_loop_no_time(self):
+        stem = self.stop_by_button()
+        self.rig.release()
+        large = os.path.join(self.folder, "stop-000002-estop_line.log")
+        with open(large, "w", encoding="ascii") as file:
+            file.write(read(stem + ".log") * 200)
+        time.sleep(1.2)
+        self.assertTrue(self.client.request("reset")["ok"])
+        readers = [self.rig.client(f"reader{i}") for i in range(4)]
+        end = time.monotonic() + 6
+        got = [0] * len(readers)
+
+        def read_on(i):
+            offset = 0
+            while time.monotonic() < end:
+                reply = readers[i].request("recording", name=os.path.basename(large), offset=offset)
+                offset = (offset + 24576) % (reply["size"] + 1) if reply["ok"] else 0
+                got[i] += reply["ok"]
+
+        threads = [threading.Thread(target=read_on, args=(i,)) for i in range(len(readers))]
+        pid = self.rig.gateway.child.pid
+        stream = self.drive(0.5)
+        idle_us, begin = self.ran_us(pid), time.monotonic()
+        time.sleep(1.0)
+        idle_us = (self.ran_us(pid) - idle_us) / (time.monotonic() - begin)
+        read_us, begin = self.ran_us(pid), time.monotonic()
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        read_us = self.ran_us(pid) - read_us - idle_us * (time.monotonic() - begin)
+        self.assertTrue(self.client.request("status")["ok"])
+        stream.stop()
+        # What others on this machine take of the processor is not the gateway's: its own time for a piece is.
+        print(f"pieces read {got}; the loop took {read_us / sum(got):.0f} us for each", file=sys.stderr)
+        self.assertGreater(min(got), 20)
+        self.assertLess(read_us / sum(got), 1000)
 
 
 class ShortBox(WithRig):

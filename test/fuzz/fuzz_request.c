@@ -46,7 +46,8 @@ static void compare_requests(const iwn_request_t *now, const iwn_request_t *befo
     fuzz_require(now->takeover == before->takeover && now->sides == before->sides && now->item == before->item,
                  "the same choices");
     fuzz_require(strcmp(now->name, before->name) == 0 && strcmp(now->reason, before->reason) == 0 &&
-                     strcmp(now->value, before->value) == 0 && strcmp(now->how, before->how) == 0,
+                     strcmp(now->value, before->value) == 0 && strcmp(now->how, before->how) == 0 &&
+                     strcmp(now->file, before->file) == 0 && now->offset == before->offset,
                  "the same texts");
 }
 

@@ -77,11 +77,14 @@ static const field_t fields[] = {
     {"item", IN(item), 0, BIT(IWN_CMD_CONFIRM), true, FIELD_ITEM},
     {"value", IN(value), IWN_VALUE_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_VALUE},
     {"how", IN(how), IWN_HOW_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_TEXT},
+    {"name", IN(file), IWN_FILE_MAX, BIT(IWN_CMD_RECORDING), true, FIELD_TEXT},
+    {"offset", IN(offset), 0, BIT(IWN_CMD_RECORDING), false, FIELD_INTEGER},
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 
-static const char *const cmd_names[IWN_CMDS] = {"hello",  "status", "watch", "arm",  "drive", "twist",  "stop",
-                                                "disarm", "estop",  "reset", "tare", "why",   "confirm"};
+static const char *const cmd_names[IWN_CMDS] = {"hello", "status", "watch",   "arm",        "drive",
+                                                "twist", "stop",   "disarm",  "estop",      "reset",
+                                                "tare",  "why",    "confirm", "recordings", "recording"};
 
 __attribute__((format(printf, 3, 4))) static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error,
                                                          const char *format, ...) {
@@ -268,7 +271,8 @@ static bool read_cmd(const json_t *root, iwn_cmd_t *out_cmd, iwn_refusal_t *out_
         }
     }
     return refuse(out_refusal, IWN_UNKNOWN_CMD,
-                  "cmd must be one of hello status watch arm drive twist stop disarm estop reset tare why confirm");
+                  "cmd must be one of hello status watch arm drive twist stop disarm estop reset tare why confirm "
+                  "recordings recording");
 }
 
 static const field_t *find_field(const char *name, iwn_cmd_t cmd) {

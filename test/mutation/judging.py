@@ -35,16 +35,28 @@ def versions():
                            check=True).stdout.strip() for name in ("gcc", "clang")]
 
 
+INCLUDED = re.compile(r'^#include "([^"]+)"', re.M)
+
+
+def implemented():
+    """{header: the files of the core that include it first: those which are behind it}"""
+    found = collections.defaultdict(list)
+    for path in sorted(CORE.glob("*.c")):
+        header = INCLUDED.search(path.read_text())[1]
+        found[CORE / header if (CORE / header).exists() else ROOT / "core/include" / header].append(path)
+    return found
+
+
 def reach(sources):
     """The files of the core that these can call into: those whose headers they include, and so on."""
-    todo, seen = list(sources), set()
+    todo, seen, behind = list(sources), set(), implemented()
     while todo:
         path = todo.pop()
         if path not in seen and path.exists():
             seen.add(path)
             folders = [path.parent, CORE, *(ROOT / folder for folder in ("core/include", "app/sim/model/include", "test/sim", "test/support"))]
-            todo += [folder / name for name in re.findall(r'^#include "([^"]+)"', path.read_text(), re.M) for folder in folders]
-            todo.append(CORE / f"{path.stem}.c")
+            todo += [folder / name for name in INCLUDED.findall(path.read_text()) for folder in folders]
+            todo += behind[path]
     return {path.name for path in seen.intersection(files())}
 
 

@@ -156,7 +156,36 @@ static void test_gateway_tare_makes_the_present_force_zero(void) {
     press_for(IW_RIGHT, 70, MS(2100));
     TEST_ASSERT_EQUAL_INT(IW_TARE_OK, tare(IW_RIGHT));
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, rig.gateway.force[IW_RIGHT].provenance);
+    TEST_ASSERT_EQUAL_INT32(7000, rig.gateway.force[IW_RIGHT].offset_mN);
     TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.gateway.force[IW_RIGHT]));
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.gateway.force[IW_LEFT].provenance);
+}
+
+static void test_gateway_tare_of_both_tells_that_the_left_wheel_refuses_and_why(void) {
+    iw_side_t refused = IW_RIGHT;
+    gateway_rig_run(&rig, MS(20));
+    press_for(IW_RIGHT, 70, MS(2100));
+    rig.wheel[IW_LEFT].rpm_fixed = true;
+    rig.wheel[IW_LEFT].rpm = 10;
+    press_for(IW_LEFT, 700, MS(2100));
+    const iw_force_t before = rig.gateway.force[IW_RIGHT];
+    TEST_ASSERT_EQUAL_INT(IW_TARE_MOVING, iw_gateway_tare(&rig.gateway, rig.now_us, IW_SIDES_BOTH, &refused));
+    TEST_ASSERT_EQUAL_INT(IW_LEFT, refused);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway.force[IW_RIGHT], sizeof before);
+}
+
+static void test_gateway_tare_of_the_left_wheel_makes_its_force_zero(void) {
+    gateway_rig_run(&rig, MS(20));
+    press_for(IW_LEFT, 700, MS(2100));
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, tare(IW_LEFT));
+    TEST_ASSERT_EQUAL_INT32(7000, rig.gateway.force[IW_LEFT].offset_mN);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, rig.gateway.force[IW_LEFT].provenance);
+}
+
+static void test_gateway_restored_offset_is_in_force_for_its_wheel(void) {
+    iw_gateway_restore_offset(&rig.gateway, IW_RIGHT, IW_OFFSET_STORED, -1234);
+    TEST_ASSERT_EQUAL_INT32(-1234, rig.gateway.force[IW_RIGHT].offset_mN);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_STORED, rig.gateway.force[IW_RIGHT].provenance);
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, rig.gateway.force[IW_LEFT].provenance);
 }
 
@@ -244,6 +273,9 @@ int main(void) {
     RUN_TEST(test_gateway_stall_of_the_loop_is_no_motion_of_the_wheels);
     RUN_TEST(test_gateway_tare_of_both_is_made_whole_or_not_at_all);
     RUN_TEST(test_gateway_tare_makes_the_present_force_zero);
+    RUN_TEST(test_gateway_tare_of_both_tells_that_the_left_wheel_refuses_and_why);
+    RUN_TEST(test_gateway_tare_of_the_left_wheel_makes_its_force_zero);
+    RUN_TEST(test_gateway_restored_offset_is_in_force_for_its_wheel);
     RUN_TEST(test_gateway_rebooted_wheel_opens_its_window_anew);
     RUN_TEST(test_gateway_status_length_is_noted);
     RUN_TEST(test_gateway_pose_is_kept_with_its_time);

@@ -37,6 +37,7 @@ static void test_init_assumes_everything_and_tells_what_the_document_says(void) 
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, iw_ledger_entry(&ledger, IW_LEDGER_DLC)->state);
     TEST_ASSERT_EQUAL_INT32(0, iw_ledger_entry(&ledger, IW_LEDGER_DLC)->figure);
     TEST_ASSERT_EQUAL_UINT32(0, ledger.changes);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ITEMS, ledger.doubt);
 }
 
 static void test_there_are_fourteen_items(void) {

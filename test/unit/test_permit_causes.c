@@ -236,6 +236,17 @@ static void test_permit_present_does_not_tell_what_does_not_latch(void) {
     TEST_ASSERT_EQUAL_HEX32(0, iw_permit_present(&rig.permit, rig.now_us));
 }
 
+static void test_permit_is_quiet_from_the_step_that_finds_nothing_present_until_a_cause_is_told(void) {
+    permit_rig_begin(&rig, PERMIT_LISTENING);
+    TEST_ASSERT_TRUE(rig.permit.quiet);
+    permit_rig_raise(&rig, IW_CAUSE_SECOND_MASTER);
+    TEST_ASSERT_FALSE(rig.permit.quiet);
+    permit_rig_wait(&rig, IW_PERMIT_EVENT_US - 1U);
+    TEST_ASSERT_FALSE(rig.permit.quiet);
+    permit_rig_wait(&rig, 1U);
+    TEST_ASSERT_TRUE(rig.permit.quiet);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_permit_every_cause_in_every_situation_takes_effect_at_once);
@@ -250,5 +261,6 @@ int main(void) {
     RUN_TEST(test_permit_present_tells_levels_while_told_and_events_for_a_second);
     RUN_TEST(test_permit_step_that_cannot_judge_keeps_what_was_present_beside_what_is_told);
     RUN_TEST(test_permit_present_does_not_tell_what_does_not_latch);
+    RUN_TEST(test_permit_is_quiet_from_the_step_that_finds_nothing_present_until_a_cause_is_told);
     return UNITY_END();
 }

@@ -108,10 +108,8 @@ static void assert_rest(const iw_snapshot_t *seen) {
 
 /// Looks twice, into structs that were not alike before: every field must be alike now, and what the parts have.
 static iw_snapshot_t look_at(iw_time_us_t now_us) {
-    static iw_gateway_t before;
     iw_snapshot_t seen;
     iw_snapshot_t again;
-    memcpy(&before, &rig.gateway, sizeof before);
     memset(&seen, FIXTURE_POISON, sizeof seen);
     memset(&again, (uint8_t)~FIXTURE_POISON, sizeof again);
     iw_gateway_snapshot(&rig.gateway, now_us, &seen);
@@ -121,7 +119,6 @@ static iw_snapshot_t look_at(iw_time_us_t now_us) {
                                  places[i].size);
         TEST_ASSERT_EQUAL_INT_MESSAGE(0, other, places[i].name);
     }
-    TEST_ASSERT_EQUAL_MEMORY(&before, &rig.gateway, sizeof before);
     TEST_ASSERT_EQUAL_UINT64(now_us, seen.at_us);
     assert_wheel(&seen.wheel[IW_LEFT], IW_LEFT, now_us);
     assert_wheel(&seen.wheel[IW_RIGHT], IW_RIGHT, now_us);

@@ -9,4 +9,7 @@
 /// has been told.
 int config_option_load(const char *verb, const char *path, iw_config_t *out_config);
 
+/// The same of a file that is open, which it closes; `path` is its name in messages.
+int config_option_take(const char *path, int fd, iw_config_t *out_config);
+
 #endif

@@ -194,9 +194,9 @@ static json_t *next_line(events_t *self, bool *out_end) {
     return line;
 }
 
-bool events_open(events_t *self, const char *path) {
+bool events_open(events_t *self, const char *path, FILE *file) {
     bool end = false;
-    *self = (events_t){.name = path, .file = fopen(path, "re")};
+    *self = (events_t){.name = path, .file = file};
     if (self->file == NULL) {
         return false;
     }

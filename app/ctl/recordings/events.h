@@ -21,9 +21,9 @@ typedef struct {
     uint64_t lost; ///< Entries that are missing.
 } events_t;
 
-/// Opens it and reads the head. False with errno if there is no such file; EPROTO: it is none of ours, which has been
-/// told.
-bool events_open(events_t *self, const char *path);
+/// Reads the head of `file`, which it closes later; NULL, with errno: there is none. False with errno; EPROTO: it is none of ours, which
+/// has been told. `path` is its name in messages.
+bool events_open(events_t *self, const char *path, FILE *file);
 void events_close(events_t *self);
 
 /// The next entry, and how many frames stand before it. Bad lines are told with their number and left out. False: the

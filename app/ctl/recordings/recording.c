@@ -26,14 +26,16 @@ static int tell_unopened(const char *path, int error) {
 
 int recording_open(recording_t *self, const char *path) {
     const bool standard = strcmp(path, "-") == 0;
+    const int fd = standard ? STDIN_FILENO : open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
+    return (fd >= 0) ? recording_take(self, standard ? "standard input" : path, fd) : tell_unopened(path, errno);
+}
+
+int recording_take(recording_t *self, const char *path, int fd) {
     struct stat status;
-    self->name = standard ? "standard input" : path;
+    self->name = path;
     self->frames = 0;
     self->bad = 0;
-    self->fd = standard ? STDIN_FILENO : open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY);
-    if (self->fd < 0) {
-        return tell_unopened(path, errno);
-    }
+    self->fd = fd;
     if (fstat(self->fd, &status) == 0 && S_ISDIR(status.st_mode)) {
         (void)close(self->fd);
         return tell_unopened(path, EISDIR);

@@ -20,6 +20,9 @@ typedef struct {
 /// Opens it. An exit code, 0 for success; what is wrong has been told.
 int recording_open(recording_t *self, const char *path);
 
+/// The same of a file that is open; it is closed with the recording. `path` is its name in messages.
+int recording_take(recording_t *self, const char *path, int fd);
+
 /// True with the next frame.
 bool recording_next(recording_t *self, candump_t *out_frame);
 

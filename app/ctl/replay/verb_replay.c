@@ -2,6 +2,7 @@
 #include "recordings/config_option.h"
 #include "recordings/events.h"
 #include "recordings/recording.h"
+#include "recordings/source.h"
 #include "replay.h"
 #include "replay_tell.h"
 #include "replay_warm.h"
@@ -21,6 +22,8 @@
 
 typedef struct {
     const char *path;
+    ctl_t *
+        ctl; ///< To ask the gateway, unless the recording is a file here: what lies beside it belongs to it. Then NULL.
     replay_out_t out;
     iw_config_t config;
     bool configured;
@@ -76,20 +79,23 @@ static int find_config(verb_replay_t *self) {
     if (self->configured) {
         return CTL_OK;
     }
-    if (!beside(self->path, ".conf", path) || access(path, F_OK) != 0) {
+    const int fd = beside(self->path, ".conf", path) ? source_open(self->ctl, path, SOURCE_WHOLE) : -1;
+    if (fd < 0) {
         return ctl_fail(CTL_USAGE, "%s: no configuration lies beside it; tell one: iwheelctl replay FILE --config FILE",
                         self->path);
     }
-    return config_option_load("replay", path, &self->config);
+    return config_option_take(path, fd, &self->config);
 }
 
 /// 0 also without such a file.
 static int find_events(verb_replay_t *self) {
     static char path[PATH_SIZE];
-    if (!beside(self->path, ".jsonl", path) || access(path, F_OK) != 0) {
+    errno = ENOENT;
+    FILE *file = beside(self->path, ".jsonl", path) ? source_stream(self->ctl, path, SOURCE_WHOLE) : NULL;
+    if (file == NULL && errno == ENOENT) {
         return CTL_OK;
     }
-    if (!events_open(&self->events, path)) {
+    if (!events_open(&self->events, path, file)) {
         return (errno == EPROTO) ? CTL_DATA : ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
     }
     self->wall_minus_us = json_integer_value(json_object_get(self->events.head, "wall_minus_monotonic_us"));
@@ -270,11 +276,17 @@ static int finish(verb_replay_t *self) {
     return (code == CTL_OK && bad) ? CTL_DATA : code;
 }
 
+static int open_frames(verb_replay_t *self, ctl_t *ctl) {
+    self->ctl = (access(self->path, R_OK) != 0) ? ctl : NULL;
+    const int fd = source_is_ours(self->path) ? source_open(self->ctl, self->path, SOURCE_WHOLE) : -1;
+    return (fd >= 0) ? recording_take(&self->recording, self->path, fd) : recording_open(&self->recording, self->path);
+}
+
 int verb_replay(ctl_t *self, int count, char **words) {
     static verb_replay_t replay;
     int code = parse_words(&replay, count, words);
     replay.out = (replay_out_t){.file = stdout, .json = self->json};
-    code = (code == CTL_OK) ? recording_open(&replay.recording, replay.path) : code;
+    code = (code == CTL_OK) ? open_frames(&replay, self) : code;
     if (code != CTL_OK) {
         return code;
     }

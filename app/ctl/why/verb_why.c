@@ -120,8 +120,8 @@ int verb_why(ctl_t *self, int count, char **words) {
         return ask(self, parsed.frames);
     }
     const char *directory = find_directory(self, &parsed, &owner);
-    code = parsed.list ? why_disk_list(directory, self->json)
-                       : why_disk_show(directory, parsed.name, parsed.frames, self->json);
+    const why_disk_t disk = {(parsed.directory == NULL) ? self : NULL, directory, self->json};
+    code = parsed.list ? why_disk_list(&disk) : why_disk_show(&disk, parsed.name, parsed.frames);
     json_decref(owner);
     return code;
 }

@@ -3,7 +3,7 @@
 
 #include "recordings/events.h"
 #include "recordings/recording.h"
-#include "talk/ctl.h"
+#include "recordings/source.h"
 #include "text/text.h"
 #include "why_print.h"
 
@@ -16,6 +16,7 @@
 #include <time.h>
 
 #define PATH_SIZE 1024U
+#define NAME_SIZE 256U
 #define PREFIX    "stop-"
 #define EVENTS    ".jsonl"
 #define FRAMES    ".log"
@@ -40,6 +41,67 @@ static int is_recording(const struct dirent *entry) {
     return strncmp(entry->d_name, PREFIX, sizeof PREFIX - 1U) == 0 && ending != NULL && strcmp(ending, EVENTS) == 0;
 }
 
+/// The recordings' .jsonl files, the oldest first.
+typedef struct {
+    char **name;
+    size_t count;
+} names_t;
+
+static void names_free(names_t *self) {
+    for (size_t i = 0; i < self->count; i++) {
+        free(self->name[i]);
+    }
+    free((void *)self->name);
+}
+
+static void names_add(names_t *self, const char *stem, const char *ending) {
+    char name[NAME_SIZE];
+    const int n = snprintf(name, sizeof name, "%s%s", stem, ending);
+    const bool fits = n > 0 && (size_t)n < sizeof name && strchr(name, '/') == NULL;
+    char *copy = fits ? strdup(name) : NULL;
+    if (copy != NULL) {
+        self->name[self->count] = copy;
+        self->count++;
+    }
+}
+
+static bool names_on_disk(names_t *self, const char *directory) {
+    struct dirent **found = NULL;
+    const int count = scandir(directory, &found, is_recording, alphasort);
+    const int error = errno;
+    self->name = (count >= 0) ? (char **)calloc((size_t)count + 1U, sizeof *self->name) : NULL;
+    for (int i = 0; i < count; i++) {
+        if (self->name != NULL) {
+            names_add(self, found[i]->d_name, "");
+        }
+        free(found[i]);
+    }
+    free((void *)found);
+    errno = (count >= 0) ? ENOMEM : error;
+    return self->name != NULL;
+}
+
+static bool names_told(names_t *self, ctl_t *ctl) {
+    json_t *reply = source_list(ctl);
+    const json_t *list = json_object_get(reply, "recordings");
+    self->name = (reply != NULL) ? (char **)calloc(json_array_size(list) + 1U, sizeof *self->name) : NULL;
+    for (size_t i = 0; self->name != NULL && i < json_array_size(list); i++) {
+        const json_t *entry = json_array_get(list, i);
+        const char *stem = json_string_value(json_object_get(entry, "name"));
+        if (stem != NULL && json_is_integer(json_object_get(entry, "jsonl_bytes"))) {
+            names_add(self, stem, EVENTS);
+        }
+    }
+    json_decref(reply);
+    return self->name != NULL;
+}
+
+/// The gateway knows best, if it is there: here may be another machine, with recordings of its own. False with errno.
+static bool find_names(names_t *self, const why_disk_t *where) {
+    *self = (names_t){NULL, 0};
+    return (where->ctl != NULL && names_told(self, where->ctl)) || names_on_disk(self, where->directory);
+}
+
 static void print_line(const char *name, const json_t *why) {
     char wall[32] = "--";
     struct tm local;
@@ -54,47 +116,45 @@ static void print_line(const char *name, const json_t *why) {
     (void)putchar('\n');
 }
 
-static void list_one(const char *directory, const char *name, bool json) {
+static void list_one(const why_disk_t *self, const char *name) {
     char path[PATH_SIZE];
     events_t events;
-    (void)snprintf(path, sizeof path, "%s/%s", directory, name);
-    if (!events_open(&events, path)) {
-        if (errno != EPROTO) { // That has been told.
+    (void)snprintf(path, sizeof path, "%s/%s", self->directory, name);
+    if (!events_open(&events, path, source_stream(self->ctl, path, 1))) { // The stop is in the first piece.
+        if (errno != EPROTO) {                                            // That has been told.
             (void)ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
         }
         return;
     }
-    if (json && events.why != NULL) {
+    if (self->json && events.why != NULL) {
         (void)json_object_set_new(events.why, "recording", json_string(path));
         (void)text_json_value(events.why, stdout);
-    } else if (!json) {
+    } else if (!self->json) {
         print_line(name, events.why);
     }
     events_close(&events);
 }
 
-int why_disk_list(const char *directory, bool json) {
-    struct dirent **names = NULL;
-    const int count = scandir(directory, &names, is_recording, alphasort);
-    if (count < 0) {
-        return tell_closed_directory(directory, errno);
+int why_disk_list(const why_disk_t *self) {
+    names_t names;
+    if (!find_names(&names, self)) {
+        return tell_closed_directory(self->directory, errno);
     }
-    for (int i = 0; i < count; i++) {
-        list_one(directory, names[i]->d_name, json);
-        free(names[i]);
+    for (size_t i = 0; i < names.count; i++) {
+        list_one(self, names.name[i]);
     }
-    free((void *)names);
-    if (!json) {
-        (void)fputs((count > 0) ? "\n" : "", stdout);
-        text_line(stdout, "%d stop%s recorded in %s%s", count, (count == 1) ? "" : "s", directory,
-                  (count > 0) ? "; one of them with its frames: iwheelctl why NUMBER" : "");
+    if (!self->json) {
+        (void)fputs((names.count > 0U) ? "\n" : "", stdout);
+        text_line(stdout, "%zu stop%s recorded in %s%s", names.count, (names.count == 1U) ? "" : "s", self->directory,
+                  (names.count > 0U) ? "; one of them with its frames: iwheelctl why NUMBER" : "");
     }
+    names_free(&names);
     return CTL_OK;
 }
 
 /// The path of the recording's .jsonl; false if there is none.
-static bool find(const char *directory, const char *name, char out_path[PATH_SIZE]) {
-    struct dirent **names = NULL;
+static bool find(const why_disk_t *self, const char *name, char out_path[PATH_SIZE]) {
+    names_t names;
     bool found = false;
     if (strspn(name, "0123456789") != strlen(name)) {
         const char *ending = strrchr(name, '.');
@@ -103,26 +163,28 @@ static bool find(const char *directory, const char *name, char out_path[PATH_SIZ
             snprintf(out_path, PATH_SIZE, "%.*s" EVENTS, (int)(is_file ? ending - name : (long)strlen(name)), name);
         return n > 0 && (size_t)n < PATH_SIZE;
     }
-    const int count = scandir(directory, &names, is_recording, alphasort);
-    for (int i = 0; i < count; i++) {
-        if (strtoul(names[i]->d_name + sizeof PREFIX - 1U, NULL, 10) == strtoul(name, NULL, 10)) {
-            found = true;
-            (void)snprintf(out_path, PATH_SIZE, "%s/%s", directory, names[i]->d_name);
-        }
-        free(names[i]);
+    if (!find_names(&names, self)) {
+        return false;
     }
-    free((void *)names);
+    for (size_t i = 0; i < names.count; i++) {
+        if (strtoul(names.name[i] + sizeof PREFIX - 1U, NULL, 10) == strtoul(name, NULL, 10)) {
+            found = true;
+            (void)snprintf(out_path, PATH_SIZE, "%s/%s", self->directory, names.name[i]);
+        }
+    }
+    names_free(&names);
     return found;
 }
 
 /// Goes through the frames; keeps the last ones before the stop, prints them with those after it.
-static int print_frames(const char *path, int64_t stop_us, size_t most) {
+static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t most) {
     static recording_t recording;
     static candump_t before[WHY_FRAMES_MAX];
     candump_t frame;
     size_t kept = 0;
     size_t after = 0;
-    const int code = recording_open(&recording, path);
+    const int fd = source_open(ctl, path, SOURCE_WHOLE);
+    const int code = (fd >= 0) ? recording_take(&recording, path, fd) : recording_open(&recording, path);
     if (code != CTL_OK) {
         return code;
     }
@@ -148,25 +210,25 @@ static int print_frames(const char *path, int64_t stop_us, size_t most) {
     return recording_close(&recording);
 }
 
-int why_disk_show(const char *directory, const char *name, size_t frames, bool json) {
+int why_disk_show(const why_disk_t *self, const char *name, size_t frames) {
     char path[PATH_SIZE];
     events_t events;
-    if (!find(directory, name, path)) {
-        return ctl_fail(CTL_DATA, "no stop %s is recorded in %s; see: iwheelctl why --list", name, directory);
+    if (!find(self, name, path)) {
+        return ctl_fail(CTL_DATA, "no stop %s is recorded in %s; see: iwheelctl why --list", name, self->directory);
     }
-    if (!events_open(&events, path)) {
+    if (!events_open(&events, path, source_stream(self->ctl, path, 1))) {
         return (errno == EPROTO) ? CTL_DATA : ctl_fail(CTL_DATA, "%s: cannot be read: %s", path, strerror(errno));
     }
     int code = CTL_OK;
     const int64_t stop_us = json_integer_value(json_object_get(events.why, "at_us")) +
                             json_integer_value(json_object_get(events.head, "wall_minus_monotonic_us"));
-    if (json) {
+    if (self->json) {
         (void)text_json_value(events.why, stdout);
     } else if (why_print_stop(events.why)) {
         path[strlen(path) - (sizeof EVENTS - 1U)] = '\0';
         (void)snprintf(path + strlen(path), sizeof EVENTS, FRAMES);
         text_line(stdout, "recorded in %s; decide it again: iwheelctl replay %s", path, path);
-        code = (frames > 0U) ? print_frames(path, stop_us, frames) : CTL_OK;
+        code = (frames > 0U) ? print_frames(self->ctl, path, stop_us, frames) : CTL_OK;
     }
     events_close(&events);
     return code;

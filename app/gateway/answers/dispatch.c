@@ -4,6 +4,7 @@
 #include "assumption.h"
 #include "box/record.h"
 #include "ledger/knowledge_json.h"
+#include "recordings.h"
 #include "refuse.h"
 #include "status/observe.h"
 #include "status/snapshot.h"
@@ -35,6 +36,10 @@ static iwn_out_t begin_reply(gw_daemon_t *daemon, const iwn_id_t *id) {
     write_id(&json, id);
     iwn_out_bool(&json, "ok", true);
     return json;
+}
+
+iwn_out_t gw_dispatch_begin_reply(gw_daemon_t *daemon, const iwn_id_t *id) {
+    return begin_reply(daemon, id);
 }
 
 static void send_reply(gw_client_t *client, iwn_out_t *json) {
@@ -369,13 +374,27 @@ static void do_why(const call_t *call) {
     send_reply(call->client, &json);
 }
 
+static void do_recordings(const call_t *call) {
+    gw_recordings_ask(call->daemon, call->client, call->request);
+}
+
 void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line, size_t length) {
     static void (*const handlers[IWN_CMDS])(const call_t *call) = {
-        [IWN_CMD_HELLO] = do_hello,     [IWN_CMD_STATUS] = do_status, [IWN_CMD_WATCH] = do_watch,
-        [IWN_CMD_ARM] = do_arm,         [IWN_CMD_DRIVE] = do_drive,   [IWN_CMD_TWIST] = do_twist,
-        [IWN_CMD_STOP] = do_stop,       [IWN_CMD_DISARM] = do_stop,   [IWN_CMD_ESTOP] = do_estop,
-        [IWN_CMD_RESET] = do_reset,     [IWN_CMD_TARE] = do_tare,     [IWN_CMD_WHY] = do_why,
+        [IWN_CMD_HELLO] = do_hello,
+        [IWN_CMD_STATUS] = do_status,
+        [IWN_CMD_WATCH] = do_watch,
+        [IWN_CMD_ARM] = do_arm,
+        [IWN_CMD_DRIVE] = do_drive,
+        [IWN_CMD_TWIST] = do_twist,
+        [IWN_CMD_STOP] = do_stop,
+        [IWN_CMD_DISARM] = do_stop,
+        [IWN_CMD_ESTOP] = do_estop,
+        [IWN_CMD_RESET] = do_reset,
+        [IWN_CMD_TARE] = do_tare,
+        [IWN_CMD_WHY] = do_why,
         [IWN_CMD_CONFIRM] = do_confirm,
+        [IWN_CMD_RECORDINGS] = do_recordings,
+        [IWN_CMD_RECORDING] = do_recordings,
     };
     iwn_request_t request;
     iwn_refusal_t refusal;

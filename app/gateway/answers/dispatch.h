@@ -14,6 +14,9 @@
 /// Carries out one line. It is applied whole or not at all, and answered; the reply to `arm` may come later.
 void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line, size_t length);
 
+/// A reply that says yes, open for its fields; close its bracket.
+iwn_out_t gw_dispatch_begin_reply(gw_daemon_t *daemon, const iwn_id_t *id);
+
 /// Answers the arms that have been decided by the last step.
 void gw_dispatch_arming(gw_daemon_t *daemon);
 

@@ -176,6 +176,12 @@ static void carry_out_lines(gw_daemon_t *daemon, gw_client_t *client) {
     }
 }
 
+/// Nothing of it is left to be done, but for a recording that it waits for and can take.
+static bool has_ended(const gw_client_t *client) {
+    const bool waits = client->reading && !client->hung_up;
+    return client->ended && (client->arming || (!has_line(client) && !waits));
+}
+
 static void serve(gw_daemon_t *daemon, gw_client_t *client) {
     if (client->leaving) {
         end_lease(daemon, client); // At once, whatever it has sent before.
@@ -187,7 +193,7 @@ static void serve(gw_daemon_t *daemon, gw_client_t *client) {
     if (!client->closing && !client->arming && gw_client_line_too_long(client)) {
         refuse_long_line(daemon, client);
     }
-    const bool gone = client->failed || (client->ended && (client->arming || !has_line(client)));
+    const bool gone = client->failed || has_ended(client);
     if (gone && !client->closing) {
         end_lease(daemon, client);
         gw_client_finish(client, daemon->now_us);

@@ -4,7 +4,9 @@
 ///
 ///     gateway --order, through a socket that never blocks--> writer --result--> gateway
 ///        \----------- ring in shared memory ------------------^
+///            --question, the same way----------------> reader --answer--> gateway
 ///
+/// A second process reads recordings for clients: whoever reads a large one holds up neither the loop nor the next recording.
 /// The writer holds nothing of the gateway's. It outlives it by the time it needs to finish: a gateway that dies while
 /// setpoints are being sent is a stop worth a recording too. If the writer dies, another is started with the next order.
 #ifndef GATEWAY_BOX_H
@@ -13,6 +15,7 @@
 #include "blackbox_ring.h"
 #include "gateway_config.h"
 
+#include "iwheel_northbound/request.h"
 #include "iwheel_northbound/why.h"
 
 #include <sys/types.h>
@@ -23,6 +26,8 @@
 /// The recording goes on for this long after the stop.
 #define GW_BOX_AFTER_US   2000000U
 #define GW_BOX_CAUSE_SIZE 32U
+/// An answer of the process that reads: a piece in base64, or the list, and what is around it.
+#define GW_BOX_ANSWER_SIZE 34000U
 /// Directory, '/', "stop-000001-", cause, ".jsonl".
 #define GW_BOX_PATH_SIZE (GATEWAY_PATH_SIZE + GW_BOX_CAUSE_SIZE + 48U)
 
@@ -46,6 +51,29 @@ typedef struct {
     char path[GW_BOX_PATH_SIZE];
 } gw_box_result_t;
 
+/// What a client wants to read.
+typedef struct {
+    iw_client_t client;
+    bool list;      ///< The recordings there are; else a piece of a file.
+    int64_t offset; ///< Where the piece begins.
+    char name[IWN_FILE_MAX + 1U];
+} gw_box_question_t;
+
+/// What is told to it.
+typedef struct {
+    iw_client_t client;
+    iwn_error_t error; ///< IWN_OK: `text` has the fields of the reply, as JSON; else why not, in words.
+    uint32_t length;   ///< Of the text.
+    char text[GW_BOX_ANSWER_SIZE];
+} gw_box_answer_t;
+
+/// A process of ours at the other end of a socket.
+typedef struct {
+    int fd; ///< -1: there is none.
+    pid_t pid;
+    iw_time_us_t started_us;
+} gw_box_reader_t;
+
 typedef struct {
     blackbox_ring_t *ring;
     size_t ring_size;
@@ -54,6 +82,8 @@ typedef struct {
     pid_t pid; ///< Of the writer.
     iw_time_us_t started_us;
     gw_box_result_t last; ///< The last result; number 0: none.
+    gw_box_reader_t reader;
+    gw_box_answer_t answer; ///< The last one taken.
 } gw_box_t;
 
 /// Makes the ring, and the writer unless blackbox_s is 0. 0, or an errno: not enough memory. Call it while nothing is sent and few
@@ -68,6 +98,14 @@ void gw_box_close(gw_box_t *self);
 bool gw_box_write(gw_box_t *self, const gw_box_order_t *order);
 
 typedef enum { GW_BOX_NOTHING = 0, GW_BOX_RESULT, GW_BOX_WRITER_ENDED } gw_box_news_t;
+
+/// Asks the process that reads. False if it cannot be: blackbox_s is 0, it is gone and was started again only just now, or it has not
+/// answered too much before.
+bool gw_box_ask(gw_box_t *self, const gw_box_question_t *question);
+
+/// The next answer, which is in `answer`; GW_BOX_READER_ENDED: what was asked before stays without one. Never waits.
+typedef enum { GW_BOX_NO_ANSWER = 0, GW_BOX_ANSWER, GW_BOX_READER_ENDED } gw_box_heard_t;
+gw_box_heard_t gw_box_hear(gw_box_t *self);
 
 /// The next news of the writer; GW_BOX_RESULT is in `last`. Never waits.
 gw_box_news_t gw_box_take(gw_box_t *self);

@@ -13,15 +13,11 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 /// How often the entries after the stop are fetched.
 #define FOLLOW_MS 50
-/// The motors come before the diary.
-#define NICE 10
 /// Numbers that somebody else may have taken meanwhile.
 #define TRIES 8U
 
@@ -38,23 +34,6 @@ typedef struct {
     uint64_t frames;
     gw_box_result_t result;
 } writer_t;
-
-/// Nothing of the gateway's shall be held: no stream, no signal, no folder.
-static void become_writer(void) {
-    const int null = open("/dev/null", O_RDWR);
-    if (null >= 0) { // And above the standard streams, which are open.
-        for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
-            (void)dup2(null, fd);
-        }
-        (void)close(null);
-    }
-    (void)signal(SIGINT, SIG_IGN); // It ends when the gateway does.
-    (void)signal(SIGTERM, SIG_IGN);
-    (void)signal(SIGHUP, SIG_IGN);
-    (void)signal(SIGPIPE, SIG_IGN);
-    (void)prctl(PR_SET_NAME, "iwheel-blackbox");
-    (void)setpriority(PRIO_PROCESS, 0, NICE);
-}
 
 static void put_line(FILE *file, const char *line, size_t length) {
     (void)fwrite(line, 1, length, file);
@@ -279,7 +258,6 @@ static void note_death(writer_t *self) {
 void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gateway_config_t *config) {
     gw_box_order_t order;
     writer_t self = {.fd = fd, .ring = ring, .config = config};
-    become_writer();
     self.bus = (strncmp(config->bus.interface, "unix:", 5) == 0) ? "local" : config->bus.interface;
     self.copy = (blackbox_entry_t *)calloc(ring->capacity, sizeof *self.copy);
     if (self.copy == NULL) {

@@ -38,6 +38,8 @@ typedef struct {
     bool failed;  ///< Cannot be written to any more.
     bool arming;  ///< An arm waits for its reply; later lines wait behind it.
     iwn_id_t arm_id;
+    bool reading; ///< A question about recordings has no answer yet; later lines do not wait for it.
+    iwn_id_t read_id;
     uint8_t topics;
     uint32_t lost; ///< Events that did not fit since the last `lost` event.
     uint32_t rate_hz;

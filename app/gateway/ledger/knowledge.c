@@ -26,8 +26,7 @@ void gw_knowledge_open(gw_knowledge_t *self, const gateway_config_t *config) {
 }
 
 /// Notes an entry that is not as it was. Another figure for the same finding is no news.
-static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
-    const iw_ledger_entry_t *entry = &gw_daemon_look(daemon).assumed[item];
+static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item, const iw_ledger_entry_t *entry) {
     gw_known_item_t *known = &daemon->knowledge.known.item[item];
     const bool news = entry->state != known->entry.state || entry->evidence != known->entry.evidence;
     if (entry->state == IW_LEDGER_ASSUMED || (!news && entry->figure == known->entry.figure)) {
@@ -48,8 +47,7 @@ static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
 
 /// The offset in force is one of this run: notes where it comes from and how good it is. One that the wheel's force cannot
 /// reach is not kept.
-static void note_offset(gw_daemon_t *daemon, iw_side_t side) {
-    const iw_force_t *force = gw_daemon_look(daemon).wheel[side].force;
+static void note_offset(gw_daemon_t *daemon, iw_side_t side, const iw_force_t *force) {
     iw_force_quality_t quality = {0};
     if (force->provenance == IW_OFFSET_OPERATOR) {
         quality = daemon->knowledge.tare[side];
@@ -69,8 +67,7 @@ static void note_offset(gw_daemon_t *daemon, iw_side_t side) {
     }
 }
 
-static void observe_offset(gw_daemon_t *daemon, iw_side_t side) {
-    const iw_force_t *force = gw_daemon_look(daemon).wheel[side].force;
+static void observe_offset(gw_daemon_t *daemon, iw_side_t side, const iw_force_t *force) {
     gw_told_offset_t *told = &daemon->knowledge.told[side];
     gw_told_offset_t now = {
         .offset_us = force->offset_us, .offset_mN = force->offset_mN, .provenance = force->provenance};
@@ -79,7 +76,7 @@ static void observe_offset(gw_daemon_t *daemon, iw_side_t side) {
         return;
     }
     if (now.provenance > IW_OFFSET_STORED && now.offset_us != IW_NEVER) {
-        note_offset(daemon, side);
+        note_offset(daemon, side, force);
     }
     now.from = daemon->knowledge.known.offset[side].from;
     gw_knowledge_tell_offset(daemon, side, &now, told);
@@ -90,11 +87,12 @@ void gw_knowledge_observe(gw_daemon_t *daemon) {
     if (!daemon->knowledge.answered) {
         return;
     }
+    const iw_snapshot_t seen = gw_daemon_look(daemon); // Once: this runs in every cycle.
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        observe_item(daemon, (iw_ledger_item_t)item);
+        observe_item(daemon, (iw_ledger_item_t)item, &seen.assumed[item]);
     }
-    observe_offset(daemon, IW_LEFT);
-    observe_offset(daemon, IW_RIGHT);
+    observe_offset(daemon, IW_LEFT, seen.wheel[IW_LEFT].force);
+    observe_offset(daemon, IW_RIGHT, seen.wheel[IW_RIGHT].force);
 }
 
 /// What an earlier run found is put beside what this one has found already, which is fresher.

@@ -23,7 +23,8 @@ static bool is_driving(iwc_span_t cmd) {
 
 /// A newer protocol may mean something else by the same words: nothing is moved or changed by guessing.
 static bool is_harmless(iwc_span_t cmd) {
-    static const char *const harmless[] = {"hello", "status", "why", "watch", "stop", "disarm", "estop", NULL};
+    static const char *const harmless[] = {"hello",  "status", "why",        "watch",     "stop",
+                                           "disarm", "estop",  "recordings", "recording", NULL};
     return is_command(cmd, harmless);
 }
 

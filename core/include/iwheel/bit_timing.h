@@ -37,8 +37,8 @@ typedef struct {
 } iw_bit_timing_achieved_t;
 
 /// Finds segments that give `bitrate_hz` exactly and the sample point nearest to the wanted one; of equals, the one
-/// with the most quanta, and of these the one that samples later. IW_ERR_RANGE, `*out_timing` untouched, if no setting gives that rate exactly or an argument
-/// is 0. The caller judges the sample point with `iw_bit_timing_achieved`.
+/// with the most quanta, and of these the one that samples later. IW_ERR_RANGE, `*out_timing` untouched, if no setting
+/// gives that rate exactly or an argument is 0. The caller judges the sample point with `iw_bit_timing_achieved`.
 iw_status_t iw_bit_timing_solve(const iw_bit_timing_limits_t *limits, uint32_t clock_hz,
                                 const iw_bit_timing_achieved_t *wanted, iw_bit_timing_t *out_timing);
 

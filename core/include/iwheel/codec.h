@@ -20,7 +20,7 @@
 /// | 545 (0x221) | offset   | 2   | same, right                                                          | 1000 ms |
 ///
 /// To read a bus, keep two `iw_codec_wheel_t` and give every frame to `iw_codec_decode`: they hold the latest of
-/// each message, and the row tells what has just come.
+/// each message, and the kind that it returns says which one has just come.
 #ifndef IW_CODEC_H
 #define IW_CODEC_H
 
@@ -52,7 +52,7 @@
 #define IW_TICKS_PER_TURN 60U
 /// The wheel stops by itself this long after the last setpoint it received.
 #define IW_WHEEL_WATCHDOG_US 1000000U
-/// Temperatures above this are not believed (trap 14: a byte cannot show below 0 degC).
+/// Temperatures above this are not believed: an unsigned byte cannot show one below 0 degC.
 #define IW_TEMPERATURE_MAX_degC 200U
 /// A battery byte of 255 means "at least 25.5 V".
 #define IW_BATTERY_SATURATED_dV 255U
@@ -100,7 +100,7 @@ typedef struct {
 
 typedef struct {
     int16_t debug_raw; ///< "Debugging (not important)".
-    int16_t force_raw; ///< cN on the left, dN on the right, says the document. See force.h.
+    int16_t force_raw; ///< cN on the left, dN on the right, says the document. See force_offset.h.
 } iw_codec_force_t;
 
 typedef struct {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// Evidence for the assumption ledger that the wheels' own motion gives, beside what the core finds itself (force units,
-/// offset, feedback signs, lengths of frames).
+/// Evidence for the assumption ledger that the wheels' own motion gives, beside what the core finds itself (force
+/// units, offset, feedback signs, lengths of frames).
 ///
-/// For whoever wants it: it reads through the snapshot and writes through `iw_gateway_know`, and is linked only where it is
-/// called. No safety rule needs it: a controller without it drives as well.
+/// Optional: it reads through the snapshot and writes through `iw_gateway_know`, and is linked only where it is called.
+/// No safety rule needs it: a controller without it drives as well.
 ///
 /// - gear ratio: ticks moved against the turns that the rpm say, while a wheel turns one way, not too slowly
 /// - byte order of the pose: read the right way round it moves in small steps, the other way round in large ones
@@ -15,13 +15,16 @@
 
 #include "iwheel/snapshot.h"
 
-/// A wheel slower than this (geometric mean of two frames) says too little about its ratio: 1 rpm of resolution is 10 %.
+/// A wheel slower than this (geometric mean of two frames) says too little about its ratio: 1 rpm of resolution is 10
+/// %.
 #define IW_EVIDENCE_RPM 10
 /// One rotor turn: no shorter stretch is judged.
 #define IW_EVIDENCE_TICKS 60
-/// So many turns of the rpm (x us) without an end: status frames are missing, and the stretch begins anew. 100000 ticks.
+/// So many turns of the rpm (x us) without an end: status frames are missing, and the stretch begins anew. 100000
+/// ticks.
 #define IW_EVIDENCE_TURNED_MAX 100000000000
-/// Ticks within this share of what the rpm say: the ratio fits. Further off than the other: it does not; between: nothing.
+/// Ticks within this share of what the rpm say: the ratio fits. Further off than the other: it does not; between:
+/// nothing.
 #define IW_EVIDENCE_FITS_PERMILLE  120
 #define IW_EVIDENCE_FAILS_PERMILLE 250
 /// That often in a row it must not fit: a frame may be lost.

@@ -5,15 +5,27 @@
 /// and "only has sense if you don't apply any force to the shaft during the first two seconds". The wheel sends its
 /// own offset only in its first 60 s. So the offset carries its provenance, and a bad one is not a value.
 ///
-///     OPEN --40 samples without a gap--> judged: good  -> ESTIMATED (or a cross-check, if there is something better)
-///       ^                                     bad   -> CONTAMINATED: no value from it
+///     OPEN --40 samples without a gap--> judged: GOOD -> its mean becomes ESTIMATED, unless there is something better
+///       ^                                  any other (contaminated) -> no value from it
 ///       +--- wheel rebooted
 ///
-/// Order of trust: OPERATOR (tare) > WHEEL > ESTIMATED > STORED > NONE. After a reboot WHEEL and ESTIMATED become
-/// STORED. WHEEL is not taken if we saw the wheel start and its first two seconds were contaminated.
+/// Order of trust: OPERATOR (tare) > WHEEL > ESTIMATED > STORED > NONE. A value replaces one that is trusted less;
+/// WHEEL also replaces an older WHEEL, a tare an older tare, and anything STORED. After a reboot WHEEL and ESTIMATED
+/// become STORED. If we saw the wheel start, its offset is taken only once our window over the same two seconds has
+/// been judged GOOD.
 ///
 /// Unit evidence: at rest the raw value divided by the wheel's offset in dN is about 10 (cN), 1 (dN) or 0 (offset
-/// already removed). Evidence against the configuration makes force invalid; nothing is ever rescaled.
+/// already removed). What it does to the force:
+///
+/// | evidence                   | without a tare             | after a tare               |
+/// |----------------------------|----------------------------|----------------------------|
+/// | unknown, the unit as set   | IW_FORCE_VALID             | IW_FORCE_VALID             |
+/// | the other unit             | IW_FORCE_UNIT_CONTRADICTED | IW_FORCE_UNIT_CONTRADICTED |
+/// | offset already removed     | IW_FORCE_OFFSET_REMOVED    | IW_FORCE_VALID             |
+/// | unclear                    | IW_FORCE_OFFSET_DOUBTED    | IW_FORCE_VALID             |
+///
+/// Nothing is ever rescaled. `iw_snapshot_force_validity` adds what the ledger knows: the operator's word, earlier
+/// runs.
 ///
 /// Thresholds are ours; the document gives none.
 #ifndef IW_FORCE_OFFSET_H
@@ -33,7 +45,8 @@
 #define IW_FORCE_LOADED_mN 20000U
 /// No offset is larger: 16 bits of dN.
 #define IW_FORCE_OFFSET_MAX_mN 3276800
-/// Unit evidence needs a wheel offset of at least this.
+/// Unit evidence needs a wheel offset of at least this. A smaller one only becomes IW_UNIT_UNCLEAR, if our own mean is
+/// further from it than IW_FORCE_LOADED_mN.
 #define IW_FORCE_EVIDENCE_MIN_dN 20
 /// ... and a mean within this share of the ratio's prediction; for a removed offset, below this share of the offset.
 #define IW_FORCE_EVIDENCE_PERCENT 15
@@ -41,6 +54,7 @@
 /// Older than this (five periods), the force is not valid, and a window with such a gap starts again.
 #define IW_FORCE_STALE_US 250000U
 
+/// In the order of trust.
 typedef enum {
     IW_OFFSET_NONE = 0,
     IW_OFFSET_STORED,    ///< From an earlier run of the gateway or of the wheel.
@@ -61,11 +75,11 @@ typedef enum {
 } iw_window_t;
 
 typedef enum {
-    IW_UNIT_UNKNOWN = 0, ///< No wheel offset, or too small a one, or a contaminated window.
+    IW_UNIT_UNKNOWN = 0, ///< No wheel offset, too small a one to tell, or no good window.
     IW_UNIT_CN,
     IW_UNIT_DN,
     IW_UNIT_OFFSET_REMOVED, ///< Raw is about 0 at rest although the offset is not.
-    IW_UNIT_UNCLEAR,        ///< None of these, or more than one: somebody pressed during one of the two measurements.
+    IW_UNIT_UNCLEAR,        ///< None of these: somebody pressed during one of the two measurements.
 } iw_unit_evidence_t;
 
 typedef enum {

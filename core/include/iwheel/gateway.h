@@ -8,7 +8,9 @@
 /// follows from it. What the wheels do is a pure function of configuration, times, frames and requests: the same
 /// recording gives the same bytes on every port.
 ///
-/// Size: see the README's table. No heap, no floating point, no file-scope state.
+/// Size: docs/sizes.md. No heap, no floating point, no file-scope state.
+///
+/// R1 to R13 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
@@ -24,13 +26,14 @@
 #include "iwheel/private/wheel.h"
 #include "iwheel/snapshot.h"
 
-/// A step later than this cannot tell when its frames came: they neither refresh nor fail a wheel's liveness.
+/// In a step later than this the time of reception is unknown: its frames neither refresh nor fail a wheel's liveness.
 #define IW_GATEWAY_LATE_US 20000U
 /// Later than this, or in one late step after another for this long: STOPPING without ramp.
 #define IW_GATEWAY_STOP_US 100000U
 /// Later than this: LATCHED.
 #define IW_GATEWAY_HUNG_US 500000U
-/// While nothing is sent and a setpoint is overdue, the port is asked to purge at once, and then this often.
+/// While nothing is sent and a setpoint still lacks its TX confirmation, the port is asked to purge at once, then this
+/// often.
 #define IW_GATEWAY_LOST_ECHO_US 1000000U
 /// Frames taken in one step at the most. A full bus brings 21 in a millisecond.
 #define IW_GATEWAY_DRAIN_MAX 512U
@@ -56,7 +59,7 @@ typedef struct {
 typedef struct iw_gateway {
     iw_config_t config;
     iw_hal_t hal;
-    iw_codec_wheel_t told[IW_SIDES]; ///< What each wheel last told, message by message.
+    iw_codec_wheel_t told[IW_SIDES]; ///< Each wheel's last telemetry, message by message.
     iw_wheel_t wheel[IW_SIDES];
     iw_force_t force[IW_SIDES];
     iw_follow_t follow[IW_SIDES];
@@ -65,19 +68,19 @@ typedef struct iw_gateway {
     iw_sender_t sender;
     iw_ledger_t ledger;
     iw_counters_t counters;
-    iw_time_us_t stalled_since_us; ///< When the first of the steps in a row that judge nothing was wanted.
-    iw_time_us_t suspended_us;     ///< Told since the last step.
+    iw_time_us_t stalled_since_us; ///< When the first of an unbroken run of stalled steps was due.
+    iw_time_us_t suspended_us;     ///< Reported by `iw_gateway_suspended` since the last step.
     iw_time_us_t promised_us;      ///< When the last step asked to be called again.
-    iw_time_us_t pose_us;          ///< Of the pose that the right wheel told; IW_NEVER: none.
+    iw_time_us_t pose_us;          ///< When the last pose came; IW_NEVER: none.
     iw_time_us_t purged_us;        ///< When a purge was last tried in this silence; IW_NEVER: not yet.
     uint32_t purged_stop;          ///< Number of the stop in whose zeros a purge was tried.
     iw_bus_state_t bus;
     iw_bus_facts_t facts;
     bool backlog; ///< The last step left frames behind.
-    bool stalled; ///< This step cannot tell when its frames came.
-    bool
-        left_behind; ///< Nothing is sent, but a setpoint is overdue and the port cannot take it back (it said so, or let
-                     ///< IW_GATEWAY_LOST_ECHO_US pass): it may leave when wheels get power.
+    bool stalled; ///< This step does not know when its frames came: nothing is judged by age.
+    /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or did not
+    /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
+    bool left_behind;
 } iw_gateway_t;
 
 /// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros:
@@ -102,7 +105,9 @@ void iw_gateway_bus_facts(iw_gateway_t *self, const iw_bus_facts_t *facts);
 iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
 /// Commands both wheels, whole or not at all. `*out_applied` is written only if IW_REFUSE_NONE. `sent_us`: when the
-/// command was sent, as far as is known, not later than now; the lease runs from then (see `iw_permit_drive`).
+/// command was sent, as far as is known, not later than now. The lease runs from then, and a command from before ARMED
+/// began is refused as IW_REFUSE_STALE_COMMAND. Commands are passed on in the order in which they were sent: an older
+/// one shortens the lease.
 iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_client_t client, const iw_drive_t *request,
                               iw_applied_t *out_applied);
 
@@ -119,15 +124,15 @@ iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us);
 void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client);
 
 /// Makes the present force of these wheels (bits IW_SIDES_LEFT, IW_SIDES_RIGHT) their zero: all of them, or none if one
-/// refuses, which is then told in `*out_side`.
+/// refuses, which `*out_side` then names.
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side);
 
 /// Puts a force offset of an earlier run in force, unless this run has a better one: see `iw_force_restore`.
 void iw_gateway_restore_offset(iw_gateway_t *self, iw_side_t side, iw_offset_provenance_t provenance,
                                int32_t offset_mN);
 
-/// Tells what is known of an assumption from elsewhere: the operator's word, or what an earlier run found. From the bus
-/// the core learns itself. An entry that is only ASSUMED says nothing.
+/// Enters what is known of an assumption from elsewhere: the operator's word, what an earlier run found, or evidence.h.
+/// What the bus shows directly the core enters itself. An entry that is only ASSUMED changes nothing.
 void iw_gateway_know(iw_gateway_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry);
 
 #endif

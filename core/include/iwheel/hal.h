@@ -8,6 +8,7 @@
 #define IW_HAL_H
 
 #include "iwheel/can_frame.h"
+#include "iwheel/types.h"
 
 typedef enum {
     IW_BUS_DOWN = 0, ///< Interface absent, down, or not opened.
@@ -20,24 +21,27 @@ typedef struct {
     /// Hands one frame to the controller or its queue. A success proves nothing: only the echo does.
     int (*send)(void *context, const iw_can_frame_t *frame);
 
-    /// Takes the oldest frame received, or the echo of one of ours with its bytes, in the order of the bus. Frames that are not for
-    /// us may be left out, but the eleven ids come in every format (remote, extended, FD), so that they are counted.
-    /// Frames that were lost on the way may be told by one frame with the id IW_CAN_ERROR: it is counted as unknown.
+    /// Takes the oldest frame received, or the echo of one of ours with its bytes, in the order of the bus. Frames that
+    /// are not for us may be left out, but the eleven ids come in every format (remote, extended, FD), so that they are
+    /// counted. Lost frames may be reported by one frame with the id IW_CAN_ERROR: it is counted as unknown.
     int (*receive)(void *context, iw_can_frame_t *out_frame);
 
     /// The state of the bus. A loss of the bus, however short, is reported by at least one call after it. When that
     /// call returns, no frame sent before the loss is queued any more.
     iw_bus_state_t (*bus_state)(void *context);
 
-    /// Takes back every setpoint that was handed over and is not on the bus yet, from every queue and mailbox that may
-    /// hold one: without acknowledgement a controller repeats it for ever, and sends it when wheels get power again.
-    /// > 0: surely none is left. None of them reaches the bus after the call, and no echo of any comes from `receive`
-    /// after it, also not of one that was sent while it was being taken back, or whose echo already waited.
-    /// 0: begun, or not done within the call (an abort that does not end in bounded time is left alone). What was taken
-    /// back then gives no echo, what was not still does. That the rest is gone is told by a loss of the bus, or by the
-    /// next call that returns > 0. < 0: cannot do that here.
-    /// Called once in the zeros of a stop, when a setpoint is not echoed in time; once when the zeros end and one still
-    /// is not; then every IW_GATEWAY_LOST_ECHO_US. Whether a wheel is heard does not matter.
+    /// Purges every setpoint that was handed over and is not on the bus yet, from every queue and mailbox that may hold
+    /// one: without acknowledgement a controller repeats it for ever, and sends it when wheels get power again.
+    ///
+    ///     > 0  Surely none is left. None of them reaches the bus after the call, and `receive` brings no echo of any:
+    ///          not of one that was sent during the purge, nor one that was received already.
+    ///     0    Begun, or not done within the call (an abort that does not end in bounded time is left alone). A purged
+    ///          frame gives no echo, one that was not purged still does. A loss of the bus, or the next call that
+    ///          returns > 0, reports that the rest is gone.
+    ///     < 0  Cannot be done here.
+    ///
+    /// Called once in the zeros of a stop, if a setpoint is not echoed in time; once when the zeros have ended and it
+    /// still is not; then every IW_GATEWAY_LOST_ECHO_US. Whether a wheel is heard does not matter.
     int (*purge)(void *context);
 
     /// 0: released, and was so without interruption since the last call. > 0: pressed, or any edge since the last

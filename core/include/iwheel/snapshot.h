@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Everything that may be known of a gateway, in one struct: the only door for reading. Writing goes through the requests
-/// of gateway.h; what lies in private/ is named by nobody outside the core.
+/// Everything that can be read from a gateway, in one struct. Writing goes through the requests of gateway.h; headers
+/// in private/ are for the core alone.
 ///
 ///     iw_snapshot_t now;
 ///     iw_gateway_snapshot(&gateway, now_us, &now);
@@ -30,15 +30,16 @@ typedef struct {
     uint32_t late_steps;   ///< Steps later than IW_GATEWAY_LATE_US.
     uint32_t out_of_range; ///< Drive requests refused for their values.
     uint32_t purges;       ///< Purges the port confirmed.
-    uint32_t left_behind;  ///< Times that a setpoint was left in a controller (see `iw_snapshot_t::left_behind`).
+    uint32_t left_behind;  ///< Times that an unconfirmed setpoint stayed in a controller: `iw_snapshot_t::left_behind`.
 } iw_counters_t;
 
-/// One wheel. mm/s and distance are in the machine's frame of reference (`invert` applied), rpm and ticks in the wheel's.
+/// One wheel. mm/s and distance are in the machine's frame of reference (`invert` applied), rpm and ticks in the
+/// wheel's.
 typedef struct {
-    const iw_codec_wheel_t *told; ///< What it last told, message by message, as on the bus.
+    const iw_codec_wheel_t *told; ///< Its last telemetry, message by message, as on the bus.
     const iw_force_t *force;      ///< Its force, and where its zero comes from.
     iw_time_us_t speed_us;        ///< When its last speed frame came; IW_NEVER: none yet.
-    iw_time_us_t status_us;       ///< The same of its status; IW_NEVER also after a reboot, until it tells anew.
+    iw_time_us_t status_us;       ///< The same of its status; IW_NEVER also after a reboot, until the next one.
     int64_t ticks;                ///< Odometry, unwrapped, across reboots. The distance in nm is `ticks * nm_per_tick`.
     int32_t nm_per_tick;          ///< Negative where `invert` is set.
     int32_t speed_mm_s;           ///< Measured, rounded towards zero. Meaningless while not heard.
@@ -49,7 +50,7 @@ typedef struct {
 } iw_snapshot_wheel_t;
 
 typedef struct {
-    iw_time_us_t at_us; ///< When it was looked.
+    iw_time_us_t at_us; ///< The `now_us` of the call.
     const iw_config_t *config;
     const iw_counters_t *counters;
     const iw_sent_t *sent;
@@ -58,20 +59,20 @@ typedef struct {
     const iw_time_us_t *seen_us;      ///< When each iw_cause_t was last seen; IW_NEVER: never.
     iw_snapshot_wheel_t wheel[IW_SIDES];
     uint32_t stopped;            ///< Frames that the envelope stopped. Nonzero means an error of ours.
-    uint32_t stray_echoes;       ///< Echoes that nothing was waiting for.
-    iw_time_us_t pose_us;        ///< Of the pose that the right wheel told; IW_NEVER: none.
+    uint32_t stray_echoes;       ///< Echoes that no unconfirmed setpoint matched.
+    iw_time_us_t pose_us;        ///< When the last pose came; IW_NEVER: none.
     iw_time_us_t armed_us;       ///< When ARMED began or the lease was taken over.
     iw_time_us_t lease_until_us; ///< In ARMED: without another drive command the lease ends here.
     iw_time_us_t stale_us;       ///< The last nonzero drive command of anybody, accepted or not; IW_NEVER: none.
     iw_time_us_t waiting_us;     ///< Since when a setpoint waits for its TX confirmation; IW_NEVER: none does.
-    iw_time_us_t
-        confirmed_us; ///< Of each wheel the last confirmed setpoint: when the older of them was sent; 0: not both yet.
+    /// Of each wheel's last confirmed setpoint: when the older of the two was sent; 0: not both wheels have one yet.
+    iw_time_us_t confirmed_us;
     iw_client_t holder;       ///< Of the lease, also while arming; IW_CLIENT_NONE: nobody.
     iw_client_t stale_client; ///< Who sent the command of `stale_us`.
     iw_pair_t target;         ///< What the client commands, after limits; zero unless the demand is to follow.
     iw_pair_t applied;        ///< What the wheels were last told, after ramps, in the machine's frame.
-    uint32_t
-        present; ///< Bit per latching cause that is there now, or happened less than a second ago: keeps from reset.
+    /// Bit per latching cause that is there now, or happened less than a second ago: reset is refused.
+    uint32_t present;
     uint32_t assumed_changes; ///< Grows with every change of what is assumed.
     uint32_t still_moving;    ///< Holds that ended by their longest time with a wheel not at rest.
     iw_state_t state;
@@ -80,21 +81,21 @@ typedef struct {
     iw_bus_state_t bus;
     iw_ledger_item_t doubt; ///< The first contradicted assumption that keeps the wheels still; IW_LEDGER_ITEMS: none.
     bool arming;            ///< An arm that was granted waits for its TX confirmation.
-    bool output_zero;       ///< The pair last told was zero, or a stop at once has made it so.
+    bool output_zero;       ///< The pair last sent was zero, or a stop without ramp has made the next one so.
     bool echo_proven;       ///< See `iw_bus_facts_t`.
-    bool
-        left_behind; ///< Nothing is sent, but a setpoint is overdue and the port cannot take it back (it said so, or let
-                     ///< IW_GATEWAY_LOST_ECHO_US pass): it may leave when wheels get power.
+    /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or did not
+    /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
+    bool left_behind;
 } iw_snapshot_t;
 
-/// Looks at everything. `now_us`: of the last step, or later.
+/// Fills `*out_snapshot`. `now_us`: of the last step, or later.
 void iw_gateway_snapshot(const struct iw_gateway *self, iw_time_us_t now_us, iw_snapshot_t *out_snapshot);
 
-/// Whether `iw_force_net_mN` of a wheel's force means anything, and if not, why: what the sensor shows, and what is assumed
-/// of its unit and offset.
+/// Whether `iw_force_net_mN` of a wheel's force means anything, and if not, why: what the sensor shows, and what is
+/// assumed of its unit and offset.
 iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_side_t side);
 
-/// Four of its answers alone, for those who need no more.
+/// Four of its fields alone, for callers that need no more.
 iw_state_t iw_gateway_state(const struct iw_gateway *self);
 bool iw_gateway_arming(const struct iw_gateway *self);
 iw_refusal_t iw_gateway_arm_refusal(const struct iw_gateway *self);

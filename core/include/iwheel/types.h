@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Words that every module shares: time, sides, status codes, a command for a pair of wheels; states, causes of a stop,
+/// Types that every module shares: time, sides, status codes, a command for a pair of wheels; states, causes of a stop,
 /// refusals; what is assumed of the wheels.
 ///
 /// Units stand at the end of a name: `_mm_s _mm_s2 _mA _mN _rpm _dV _degC _ms _us _permille`. Everything is an
@@ -129,7 +129,7 @@ typedef enum {
     IW_REFUSE_SECOND_MASTER,
     IW_REFUSE_CAUSE_PRESENT, ///< `iw_snapshot_t::present` tells which.
     IW_REFUSE_TYPE_NOT_SET,  ///< Setpoint type or current role not configured.
-    IW_REFUSE_STALE_COMMAND, ///< `iw_permit_t::stale_client` sent a nonzero drive too recently.
+    IW_REFUSE_STALE_COMMAND, ///< `iw_snapshot_t::stale_client` sent a nonzero drive too recently.
     IW_REFUSE_LISTEN_ONLY,
     IW_REFUSE_CONTRADICTED, ///< An assumption that motion depends on: `iw_snapshot_t::doubt` tells which.
     IW_REFUSALS,
@@ -160,8 +160,8 @@ typedef enum {
     IW_LEDGER_MOUNT_SIGN_LEFT, ///< A positive command moves the machine forward. Only the operator can know.
     IW_LEDGER_MOUNT_SIGN_RIGHT,
     IW_LEDGER_WHEEL_RADIUS, ///< "Approximately 192 mm".
-    IW_LEDGER_TRACK,      ///< Distance between the wheels. The core needs none: whoever turns twists into speeds does.
-    IW_LEDGER_GEAR_RATIO, ///< Rotor turns per wheel turn, and which of them the rpm count.
+    IW_LEDGER_TRACK,        ///< Distance between the wheels. Not used in the core: it turns a twist into wheel speeds.
+    IW_LEDGER_GEAR_RATIO,   ///< Rotor turns per wheel turn, and which of them the rpm count.
     IW_LEDGER_POSE_BYTE_ORDER, ///< Most significant byte first: the table does not say it for the pose.
     IW_LEDGER_DLC,             ///< Frames are as long as the table: the document does not state it.
     IW_LEDGER_ITEMS,
@@ -182,7 +182,8 @@ typedef struct {
     iw_ledger_state_t state;
     iw_evidence_t evidence;
     int32_t figure; ///< Of IW_EVIDENCE_BUS: force unit and offset: 1000 x raw / offset in dN; sign: measured mm/s at a
-                    ///< positive command; DLC: the length received.
+        ///< positive command; DLC: the length received; setpoint type: 1000 x measured / applied speed; gear
+        ///< ratio: 1000 x ticks moved / expected; pose: 1000 x way read byte-swapped / way as it is read.
 } iw_ledger_entry_t;
 
 #endif

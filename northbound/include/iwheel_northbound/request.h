@@ -14,6 +14,7 @@
 #define IWN_ID_TEXT_MAX     64U
 #define IWN_NAME_MAX        64U
 #define IWN_REASON_MAX      200U
+#define IWN_FILE_MAX        63U
 #define IWN_RATE_MAX_HZ     100
 #define IWN_RATE_DEFAULT_HZ 10
 
@@ -31,6 +32,8 @@ typedef enum {
     IWN_CMD_TARE,
     IWN_CMD_WHY,
     IWN_CMD_CONFIRM,
+    IWN_CMD_RECORDINGS,
+    IWN_CMD_RECORDING,
     IWN_CMDS,
 } iwn_cmd_t;
 
@@ -54,6 +57,7 @@ typedef struct {
     int64_t v_mm_s;
     int64_t yaw_mrad_s;
     int64_t rate_hz;  ///< At least 1; not limited yet.
+    int64_t offset;   ///< Of recording, in bytes; may be negative.
     bool has_current; ///< Both currents were given.
     bool takeover;
     uint8_t topics;                   ///< Bit per iwn_topic_t.
@@ -63,6 +67,7 @@ typedef struct {
     char how[IWN_HOW_SIZE];           ///< Of confirm; empty: not given.
     char name[IWN_NAME_MAX + 1U];     ///< Empty: not given.
     char reason[IWN_REASON_MAX + 1U]; ///< Empty: not given.
+    char file[IWN_FILE_MAX + 1U];     ///< The name that recording asks for.
 } iwn_request_t;
 
 /// Why not: the name, and cause and cure in words.

@@ -6,6 +6,7 @@
 #include <net/if.h>
 #include <string.h>
 
+/// The name alone decides. A name too long for an interface is refused here: cut off, it could name another one.
 const iw_bus_ops_t *iw_bus_backend(const char *name) {
     if (iw_unix_link_is_name(name)) {
         return &iw_local_bus_ops;

@@ -10,6 +10,7 @@ iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint
     const uint16_t actual = link->sample_point_permille;
     const uint16_t off =
         (uint16_t)((actual > sample_point_permille) ? actual - sample_point_permille : sample_point_permille - actual);
+    // The order is that of consequence: what is known to be wrong refuses arm even if the rest is not reported.
     if (link->is_virtual) {
         return IW_TIMING_VIRTUAL;
     }

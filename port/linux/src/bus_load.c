@@ -2,7 +2,7 @@
 #include "bus_load.h"
 
 #define US_PER_S 1000000U
-/// Of the wheels.
+/// The wheels' bit rate, where the kernel reports none.
 #define BITRATE_ASSUMED_HZ 1000000U
 
 void iw_bus_load_begin(iw_bus_load_t *self, iw_time_us_t now_us) {

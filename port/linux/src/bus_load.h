@@ -13,8 +13,8 @@ typedef struct {
 /// Begins a new second.
 void iw_bus_load_begin(iw_bus_load_t *self, iw_time_us_t now_us);
 
-/// The load in thousandths, once the second is over; then the next one begins. False before: nothing is told. A bit rate of 0
-/// is not known: it is taken for that of the wheels.
+/// The load in thousandths, once the second is over; then the next one begins. False before, output untouched. A bit
+/// rate of 0 is not known: it is taken for that of the wheels.
 bool iw_bus_load_take(iw_bus_load_t *self, iw_time_us_t now_us, uint32_t bitrate_hz, uint32_t *out_permille);
 
 #endif

@@ -14,8 +14,8 @@ iw_time_us_t iw_clock_now_us(void) {
 }
 
 iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us) {
-    const iw_time_us_t total_us =
-        read_us(CLOCK_BOOTTIME); // First: what passes between the two makes it less, never more.
+    // First: an interruption between the two reads makes the suspend seem shorter, never longer.
+    const iw_time_us_t total_us = read_us(CLOCK_BOOTTIME);
     const iw_time_us_t running_us = read_us(CLOCK_MONOTONIC);
     *out_suspended_us = (total_us > running_us) ? total_us - running_us : 0U;
     return running_us;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_linux/backend.h"
 
+/// No e-stop at all: `present` is false, so that status and doctor say so wherever the e-stop is shown.
 static int none_open(void *self, const iw_estop_wish_t *wish) {
     (void)self;
     (void)wish;

@@ -47,6 +47,7 @@ static void take_levels(unix_estop_t *button, const char *levels, size_t count) 
     }
 }
 
+/// A broken connection latches even if it is back before the next look: presses may have been missed meanwhile.
 static void listen_to(unix_estop_t *button) {
     char levels[BURST_MAX];
     if (!iw_unix_link_is_up(&button->link)) {
@@ -74,9 +75,10 @@ static int button_open(void *self, const iw_estop_wish_t *wish) {
     return error;
 }
 
+/// Until the button has told its level, and after a broken connection, it is unreadable, which counts as pressed (R2).
 static int button_pressed(void *self, bool quiet) {
     unix_estop_t *button = (unix_estop_t *)self;
-    (void)quiet; // Its level is told like its edges, so it is always listened to.
+    (void)quiet; // Level and edges come by the same messages, so they are always read.
     listen_to(button);
     const bool unreadable = button->was_lost || !button->known;
     const bool pressed = button->edge || button->level;

@@ -27,6 +27,7 @@ int iw_gpio_address_parse(const char *text, iw_gpio_address_t *out_address) {
     iw_gpio_address_t address = {.by_offset = strncmp(text, chip_prefix, sizeof chip_prefix - 1U) == 0 &&
                                               strchr(text, ':') != NULL};
     size_t length = strlen(text);
+    // Lines may be named with a colon too; only a name that also begins like a chip's is an address by offset.
     if (address.by_offset) {
         unsigned chip;
         const char *colon = read_number(text + sizeof chip_prefix - 1U, ':', &chip);

@@ -21,7 +21,7 @@ typedef struct {
     int trouble; ///< Why it is closed.
     int watch_fd;
     bool active_high;
-    bool was_lost; ///< It went, and `pressed` has not told yet.
+    bool was_lost; ///< The line was lost, and `gpio_pressed` has not reported that yet.
 } gpio_estop_t;
 
 IW_STATIC_ASSERT(sizeof(gpio_estop_t) <= sizeof(iw_backend_store_t), gpio_estop_fits);
@@ -30,6 +30,7 @@ static bool is_open(const gpio_estop_t *estop) {
     return estop->line.fd >= 0;
 }
 
+/// A line that cannot be read counts as pressed (R2, fault 14).
 static void lose(gpio_estop_t *estop, int trouble) {
     iw_gpio_line_close(&estop->line);
     estop->trouble = trouble;
@@ -52,6 +53,7 @@ static void try_open(gpio_estop_t *estop) {
     iw_gpio_release_init(&estop->release, estop->debounce_us);
 }
 
+/// Only a malformed name is an error. A line that is absent or busy is retried: until then it counts as pressed.
 static int gpio_open(void *self, const iw_estop_wish_t *wish) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
     *estop = (gpio_estop_t){.line = {.fd = -1},
@@ -92,13 +94,14 @@ static iw_time_us_t gpio_next_us(const void *self) {
     return is_open(estop) ? iw_gpio_release_next_us(&estop->release, estop->now_us) : estop->retry_us;
 }
 
-/// Edges first, then the level: an edge in between wakes us again.
+/// Edges first, then the level: an edge between the two wakes us again, the other order would lose it.
 static void look(gpio_estop_t *estop, bool quiet) {
     if (!is_open(estop)) {
         return;
     }
     const int edges = quiet ? 0 : iw_gpio_line_take_edges(&estop->line);
     const int level = iw_gpio_line_level(&estop->line);
+    // A chip that was unplugged still has a descriptor; only the reads fail.
     if (edges < 0 || level < 0) {
         lose(estop, ENODEV);
         return;

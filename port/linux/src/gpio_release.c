@@ -5,6 +5,7 @@ void iw_gpio_release_init(iw_gpio_release_t *self, uint32_t debounce_us) {
     *self = (iw_gpio_release_t){.debounce_us = debounce_us};
 }
 
+/// A change of level without an edge counts as one: the kernel drops edges when its buffer is full.
 void iw_gpio_release_see(iw_gpio_release_t *self, iw_time_us_t now_us, bool active, bool edge) {
     const bool disturbed = active || edge || self->active;
     self->edge = self->edge || edge || active != self->active;

@@ -9,6 +9,7 @@
 /// The kernel holds this many edges of a line.
 #define EVENTS 16U
 
+/// A line found by its name belongs to a chip that libgpiod opened: closing the line's chip frees both.
 static struct gpiod_line *find(const iw_gpio_address_t *address) {
     if (!address->by_offset) {
         return gpiod_line_find(address->name);

@@ -30,6 +30,8 @@ static struct gpiod_chip *try_chip(const char *path, const iw_gpio_address_t *ad
     return chip;
 }
 
+/// libgpiod 2 has no search by a line's name over all chips. A chip that we may not open is remembered: the line may be
+/// on it, and "permission denied" is the cure where "no such line" would mislead.
 static struct gpiod_chip *search(const iw_gpio_address_t *address, unsigned *out_offset) {
     char path[PATH_SIZE];
     struct gpiod_chip *chip = NULL;
@@ -60,6 +62,7 @@ static struct gpiod_chip *find(const iw_gpio_address_t *address, unsigned *out_o
     return try_chip(path, address, out_offset);
 }
 
+/// Pull-up: a cut wire of a normally closed contact to ground reads high, like the pressed button.
 static bool configure(struct gpiod_line_settings *settings, struct gpiod_line_config *lines, unsigned offset) {
     return gpiod_line_settings_set_direction(settings, GPIOD_LINE_DIRECTION_INPUT) == 0 &&
            gpiod_line_settings_set_edge_detection(settings, GPIOD_LINE_EDGE_BOTH) == 0 &&

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 
+/// Whatever is opened first is closed again if the second fails: nothing stays open on failure.
 int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const iw_estop_wish_t *estop,
                       const char **out_culprit) {
     *self = (iw_linux_hal_t){
@@ -37,6 +38,7 @@ static int hal_send(void *context, const iw_can_frame_t *frame) {
     return self->bus_ops->send(&self->bus, frame);
 }
 
+/// The tap sees a frame before the core does: a recording has the frame before the decision that it caused.
 static int hal_receive(void *context, iw_can_frame_t *out_frame) {
     iw_linux_hal_t *self = (iw_linux_hal_t *)context;
     const int result = self->bus_ops->receive(&self->bus, out_frame);
@@ -56,6 +58,7 @@ static int hal_purge(void *context) {
     return self->bus_ops->purge(&self->bus);
 }
 
+/// `estop_quiet` holds for one look only: the next step without a wait in between must read the edges again.
 static int hal_estop_pressed(void *context) {
     iw_linux_hal_t *self = (iw_linux_hal_t *)context;
     self->estop_last = self->estop_ops->pressed(&self->estop, self->estop_quiet);
@@ -91,6 +94,7 @@ void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us) {
     self->estop_ops->tend(&self->estop, now_us);
 }
 
+/// The sooner of both backends' times.
 iw_time_us_t iw_linux_hal_next_us(const iw_linux_hal_t *self) {
     const iw_time_us_t bus_us = self->bus_ops->next_us(&self->bus);
     const iw_time_us_t estop_us = self->estop_ops->next_us(&self->estop);

@@ -10,7 +10,7 @@
 
 /// Frames taken from the kernel in one call.
 #define BATCH 32U
-/// What `__res0` of a frame tells: it is ours, or an error frame that another client made.
+/// Marks that the hub sets in a frame's `__res0`: an echo of ours, or an error frame that another client made.
 #define MARK_ECHO   1U
 #define MARK_FORGED 2U
 
@@ -22,7 +22,7 @@ typedef struct {
     uint32_t count;
     uint32_t next;
     iw_bus_state_t present;  ///< While the link is up.
-    iw_bus_state_t unheeded; ///< A loss that `state` has not told yet: IW_BUS_DOWN or IW_BUS_OFF; else IW_BUS_ACTIVE.
+    iw_bus_state_t unheeded; ///< A loss that `state` has yet to report: IW_BUS_DOWN or IW_BUS_OFF; else IW_BUS_ACTIVE.
     bool drained;            ///< The last batch was short: nothing more until the next wake-up.
 } local_bus_t;
 
@@ -55,7 +55,7 @@ static iw_time_us_t local_next_us(const void *self) {
     return ((const local_bus_t *)self)->link.retry_us;
 }
 
-/// The hub is gone, and with it whatever it held of ours.
+/// The hub is gone, and with it every frame of ours that it had not sent.
 static void lose(local_bus_t *bus) {
     iw_unix_link_lose(&bus->link);
     bus->unheeded = IW_BUS_DOWN;
@@ -81,8 +81,8 @@ static int local_send(void *self, const iw_can_frame_t *frame) {
     return -1;
 }
 
-/// As on SocketCAN, bad news of another client's stop the wheels, and good news of it are not believed. A restart, however
-/// short the loss before it and whether it was heard or not, has emptied the queue.
+/// As on SocketCAN, a bus-off that another client forged stops the wheels, and an end of bus-off that it forged is not
+/// believed. A restart has emptied the queue, however short the loss before it and whether it was heard or not.
 static void hear_error(local_bus_t *bus, const struct can_frame *raw) {
     const bool forged = raw->__res0 == MARK_FORGED;
     const iw_can_error_t error = iw_can_error_of(raw);
@@ -166,7 +166,7 @@ static iw_bus_state_t local_state(void *self) {
     return iw_unix_link_is_up(&bus->link) ? bus->present : IW_BUS_DOWN;
 }
 
-/// What was sent is the hub's; it drops that with the connection. The next `tend` connects anew.
+/// Unsent frames are held by the hub, which drops them with the connection. The next `tend` connects anew.
 static int local_purge(void *self) {
     local_bus_t *bus = (local_bus_t *)self;
     if (iw_unix_link_is_up(&bus->link)) {

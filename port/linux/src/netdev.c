@@ -13,6 +13,7 @@
 #define ARPHRD_CAN 280
 #endif
 
+/// Three questions by name: in between the interface may vanish, which each of them then reports as absent.
 iw_link_presence_t iw_netdev_presence(int fd, const char *name, int *out_index) {
     struct ifreq request = {.ifr_name = ""};
     (void)snprintf(request.ifr_name, sizeof request.ifr_name, "%s", name);
@@ -42,6 +43,7 @@ int iw_netdev_carrier(const char *name) {
     if (fd < 0) {
         return -1;
     }
+    // The kernel refuses the read (EINVAL) while the interface is down: unknown.
     const ssize_t size = read(fd, &digit, 1);
     (void)close(fd);
     if (size != 1) {

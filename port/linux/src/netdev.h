@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-/// A network interface looked at without waiting: none of these asks for the lock under which interfaces are configured,
-/// which others may hold for seconds (an adapter that does not answer while it is being set up, for example).
+/// State of a network interface, read without waiting: none of these takes the kernel's lock on interface configuration
+/// (RTNL), which others may hold for seconds (while an adapter that does not answer is being set up, for example).
 #ifndef IW_NETDEV_H
 #define IW_NETDEV_H
 
 #include "iwheel_linux/bus_link.h"
 
-/// Whether the interface is there and up. `fd`: any socket. `*out_index` is written unless it is absent. An interface is
-/// seen as up only after the work of setting it up is done.
+/// Whether the interface is there and up. `fd`: any socket. `*out_index` is written unless it is absent. An interface
+/// is seen as up only after the work of setting it up is done.
 iw_link_presence_t iw_netdev_presence(int fd, const char *name, int *out_index);
 
 /// 1: its controller takes part in the bus. 0: it does not; for a CAN controller that is up: bus-off. < 0: unknown.

@@ -68,7 +68,7 @@ static struct nlmsghdr *begin(iw_netlink_t *self, void *buffer, uint16_t type, u
     return message;
 }
 
-/// What the reply to our request `sequence` is: -1 none of ours, 0 taken, else an errno.
+/// What the reply to our request `sequence` is: -1 not an answer to it, 0 taken, else an errno.
 static int take(const iw_netlink_t *self, const struct nlmsghdr *reply, iw_netlink_reading_t *out_reading) {
     if (reply->nlmsg_seq != self->sequence) {
         return -1;

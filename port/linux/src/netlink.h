@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// The kernel's view of a network interface, through netlink (libmnl).
 ///
-/// A request is answered within the call. It may have to wait for whoever configures a network interface just now
+/// A request is answered within the call. It may have to wait while a network interface is being configured elsewhere
 /// (see netdev.h), so it is made only when an interface has come up.
 #ifndef IW_NETLINK_H
 #define IW_NETLINK_H
@@ -23,15 +23,15 @@ typedef struct {
     iw_bus_state_t state; ///< IW_BUS_ACTIVE too if the interface has no error states.
 } iw_netlink_reading_t;
 
-/// 0, or an errno. This and `open_events` are the only calls that allocate.
+/// 0, or an errno. This and `iw_netlink_open_events` are the only calls that allocate.
 int iw_netlink_open(iw_netlink_t *self);
 void iw_netlink_close(iw_netlink_t *self);
 
-/// The same for news: `self` then becomes readable whenever some interface has changed, and is not for requests.
+/// The same for change events: `self` then becomes readable whenever some interface has changed. Not for requests.
 int iw_netlink_open_events(iw_netlink_t *self);
 int iw_netlink_fd(const iw_netlink_t *self);
 
-/// Takes all news. True if there were any; whose is not told.
+/// Takes all events. True if there were any, of whichever interface.
 bool iw_netlink_take_events(iw_netlink_t *self);
 
 /// 0 also for an interface that does not exist (IW_LINK_ABSENT); else an errno, `*out_reading` then is absent.

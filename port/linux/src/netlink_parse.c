@@ -71,6 +71,7 @@ static void parse_controller(attributes_t data, iw_netlink_reading_t *reading) {
     }
     if (get(data, IFLA_CAN_CTRLMODE, &mode, sizeof mode)) {
         link->is_mute = (mode.flags & CAN_CTRLMODE_LISTENONLY) != 0U;
+        // Loopback echoes without the bus, presume-ack sends without acknowledgement: then an echo proves nothing.
         link->echo_proven =
             link->echo_proven && (mode.flags & (CAN_CTRLMODE_LOOPBACK | CAN_CTRLMODE_PRESUME_ACK)) == 0U;
     }
@@ -80,6 +81,7 @@ static void parse_controller(attributes_t data, iw_netlink_reading_t *reading) {
     (void)get(data, IFLA_CAN_RESTART_MS, &link->restart_ms, sizeof link->restart_ms);
 }
 
+/// vcan is of another kind: there is no controller, so no bit timing and no error states.
 static void parse_kind(attributes_t info, iw_netlink_reading_t *reading) {
     static const char controller[] = "can";
     char kind[sizeof controller] = "";

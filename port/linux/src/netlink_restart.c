@@ -11,6 +11,8 @@
 #define TRIES_MAX 60
 #define PAUSE_S   1U
 
+/// An interface that we took down must not stay down because its adapter is slow to answer: setting it up is tried
+/// again. ENODEV: it is gone, there is nothing to bring up.
 static int restart(int interface) {
     iw_netlink_t netlink;
     int error = iw_netlink_open(&netlink);
@@ -28,13 +30,15 @@ static int restart(int interface) {
     return error;
 }
 
+/// A process and not a thread: the kernel's lock on interface configuration can hold it for seconds, and it must
+/// outlive a gateway that is killed between down and up.
 int iw_netlink_restart_start(int interface, pid_t *out_process) {
     const pid_t process = fork();
     if (process < 0) {
         return errno;
     }
     if (process == 0) {
-        (void)close_range(STDERR_FILENO + 1, UINT_MAX, 0); // Else our clients and our lock would seem to live on in it.
+        (void)close_range(STDERR_FILENO + 1, UINT_MAX, 0); // Else clients and the lock file would stay open in it.
         const int error = restart(interface);
         _exit((error <= UCHAR_MAX) ? error : EIO);
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// Takes an interface down and up again, in a process of its own: with some adapters that takes seconds, and the loop must
-/// not wait for it.
+/// Takes an interface down and up again, in a process of its own: with some adapters that takes seconds, and the loop
+/// must not wait for it.
 ///
 ///     start --> RUNNING --poll--> ended: 0 done, or why not
 ///

@@ -1,4 +1,24 @@
 // SPDX-License-Identifier: MIT
+/// A SocketCAN interface as the bus: reopened by its name, its losses reported, old frames never sent again.
+///
+///     CLOSED --interface up: sockets bound--> UP --ENETDOWN, ENODEV--> DOWN --interface up again--> UP
+///       ^                                                               |
+///       +------------- ENODEV, or another index by this name -----------+
+///
+///     within UP, by error frames: ACTIVE <--> PASSIVE --bus-off--> BUS_OFF --restarted, or carrier back--> ACTIVE
+///
+/// CLOSED: `interface` is 0. The first UP comes from it; an interface that was deleted or unplugged and comes back has
+/// a new index and needs new sockets. DOWN: `up` is false, the sockets are kept, since closing them may wait for
+/// whoever configures interfaces (netdev.h), and what they still hold is dropped. `present` holds the state within UP.
+///
+/// Every way into DOWN or BUS_OFF, and a restart whose bus-off was not heard, sets `unheeded`: `state` reports that
+/// loss once, even if the bus is back already, because the kernel's queue is empty then and no echo is owed any more
+/// (hal.h).
+///
+///     purge: NONE --asked: child process takes the link down and up--> RESTARTING --> DONE | NOT_ALLOWED | FAILED
+///
+/// `restarting` is that process. While it works UP goes to DOWN and back as above: that loss is the purge's answer to
+/// the core, `link.purge` only what is shown to people. NOT_ALLOWED stays, DONE and FAILED may be asked again.
 #include "iwheel_linux/backend.h"
 
 #include "bus_load.h"
@@ -34,7 +54,7 @@ typedef struct {
     iw_time_us_t others_us;       ///< When to look at `others` again.
     iw_bus_load_t load;
     iw_bus_state_t present;  ///< While up.
-    iw_bus_state_t unheeded; ///< A loss that `state` has not told yet: IW_BUS_DOWN or IW_BUS_OFF; else IW_BUS_ACTIVE.
+    iw_bus_state_t unheeded; ///< A loss that `state` has yet to report: IW_BUS_DOWN or IW_BUS_OFF; else IW_BUS_ACTIVE.
     uint32_t others_left;    ///< Until `others_us`.
     uint32_t errors_left;
     pid_t restarting; ///< The process that purges; 0: none.
@@ -62,6 +82,7 @@ static void lose(socketcan_t *bus, int error) {
     iw_socketcan_socket_forget(&bus->others);
 }
 
+/// Takes over what the kernel reports; what this file counts itself stays.
 static void note_link(socketcan_t *bus, const iw_bus_link_t *reading) {
     const iw_bus_link_t before = bus->link;
     if (iw_bus_link_is_same(&before, reading)) {
@@ -107,6 +128,7 @@ static void drop_old(socketcan_t *bus) {
     bus->interface = (error == ENODEV) ? 0 : bus->interface;
 }
 
+/// The carrier is looked at again while bus-off: with a forged or a lost error frame nothing else would end it.
 static void note_state(socketcan_t *bus, iw_bus_state_t state) {
     bus->present = state;
     bus->unheeded = (state < IW_BUS_PASSIVE) ? state : bus->unheeded;
@@ -143,8 +165,8 @@ static void look_at_carrier(socketcan_t *bus) {
     }
 }
 
-/// `forged`: a process of this machine sent it, which any may do. Bad news stop the wheels all the same; but good news
-/// are then not believed, and how long it lasts is seen from the carrier.
+/// `forged`: sent by a process of this machine (MSG_DONTROUTE), which any user may do (fault 19). A bus-off stops the
+/// wheels all the same; an end of bus-off is then not believed, and the carrier shows how long it really lasts.
 static void hear_error(socketcan_t *bus, iw_can_error_t error, bool forged) {
     if (error == IW_CAN_ERROR_BUS_OFF) {
         bus->unheeded = IW_BUS_OFF;
@@ -182,7 +204,7 @@ static void fill_ours(socketcan_t *bus) {
         }
     }
     if (ours->count == 0U) {
-        (void)iw_netlink_take_events(&bus->events); // No news while up, but unread they would wake us for ever.
+        (void)iw_netlink_take_events(&bus->events); // Not needed while up, but unread they would wake us for ever.
     } else if (errors == ours->count && bus->errors_left > 0U) {
         bus->errors_left--;
     }
@@ -239,7 +261,7 @@ static int can_open(void *self, const char *name) {
         can_close(bus);
         return error;
     }
-    (void)read_link(bus); // Also while it is down: so that what must be set can be told.
+    (void)read_link(bus); // Also while it is down: status and doctor then say which settings are wrong.
     try_up(bus);
     return 0;
 }
@@ -290,6 +312,7 @@ static iw_time_us_t can_next_us(const void *self) {
     return ((const socketcan_t *)self)->look_us;
 }
 
+/// Success proves nothing: `send` also succeeds while bus-off. Only the echo does (hal.h).
 static int can_send(void *self, const iw_can_frame_t *frame) {
     socketcan_t *bus = (socketcan_t *)self;
     const int result = bus->up ? iw_socketcan_socket_send(&bus->ours, frame) : -1;
@@ -314,6 +337,8 @@ static bool take(iw_socketcan_socket_t *from, iw_can_frame_t *out_frame) {
     return false;
 }
 
+/// `drained` ends the step's loop without one more call of the kernel; it counts once, so that the next step looks
+/// again.
 static bool take_ours(socketcan_t *bus, iw_can_frame_t *out_frame) {
     while (!take(&bus->ours, out_frame)) {
         if (!bus->up || bus->ours.drained || bus->errors_left == 0U) {
@@ -331,7 +356,7 @@ static bool take_others(socketcan_t *bus, iw_can_frame_t *out_frame) {
         return false;
     }
     if (iw_socketcan_socket_is_empty(others) && !others->drained) {
-        (void)iw_socketcan_socket_fill(others); // An error here is one of the other socket too, and told by that.
+        (void)iw_socketcan_socket_fill(others); // An error of the interface shows at the other socket too.
     }
     if (!take(others, out_frame)) {
         others->drained = false;
@@ -359,9 +384,9 @@ static iw_bus_state_t can_state(void *self) {
     return (unheeded != IW_BUS_ACTIVE) ? unheeded : now;
 }
 
-/// Has the link taken down and up: that empties the queue and the controller. It takes its time, so nothing can be
-/// promised here; that it is done is told by the loss of the bus. Not where the echo is unproven: an slcan adapter keeps
-/// what it has of old frames, and only the zeros in the queue behind them would be lost.
+/// Has the link taken down and up: that empties the queue and the controller. It may take seconds, so the answer is
+/// "begun"; the loss of the bus tells the core that it is done. Not where the echo is unproven: an slcan adapter keeps
+/// the old frames that it has, and only the zeros in the queue behind them would be lost.
 static int can_purge(void *self) {
     socketcan_t *bus = (socketcan_t *)self;
     if (bus->link.purge == IW_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven) {

@@ -35,7 +35,7 @@ typedef enum {
 /// The classes of error frames that `iw_can_error_of` understands, for CAN_RAW_ERR_FILTER.
 uint32_t iw_can_error_mask(void);
 
-/// `raw` must be an error frame. The gravest news comes first.
+/// `raw` must be an error frame. If it reports several states, the gravest.
 iw_can_error_t iw_can_error_of(const struct can_frame *raw);
 
 /// Bits that the frame occupies on the bus, with the gap behind it, without stuff bits.

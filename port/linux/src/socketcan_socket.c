@@ -7,8 +7,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// Asked for. The kernel gives no more than net.core.rmem_max, and counts twice; as a rule that is twice of what a socket has
-/// anyway, and a full bus fills it in 26 ms.
+/// Asked for. The kernel gives no more than net.core.rmem_max, and counts twice; as a rule that is twice of what a
+/// socket has anyway, and a full bus fills it in 26 ms.
 #define QUEUE_BYTES (400 * 1024)
 /// More than fits into that queue, at half a kilobyte for each frame.
 #define DROP_BATCHES_MAX 64
@@ -22,6 +22,7 @@ static bool set(int fd, int level, int name, int value) {
     return setsockopt(fd, level, name, &value, sizeof value) == 0;
 }
 
+/// Loopback stays on (the default): it is what echoes our frames and what lets other programs see them.
 static bool ask_for(int fd, iw_socketcan_share_t share) {
     const can_err_mask_t errors = iw_can_error_mask();
     struct can_filter filters[IW_SOCKETCAN_IDS];
@@ -68,6 +69,7 @@ bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self) {
     return self->next == self->count;
 }
 
+/// The kernel's count is a running total per socket, so it replaces ours.
 static void note_drops(iw_socketcan_socket_t *self, struct msghdr *message) {
     const struct cmsghdr *part = CMSG_FIRSTHDR(message);
     if (part != NULL && part->cmsg_level == SOL_SOCKET && part->cmsg_type == SO_RXQ_OVFL) {
@@ -96,7 +98,7 @@ int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
         self->flags[i] = message[i].msg_hdr.msg_flags;
         note_drops(self, &message[i].msg_hdr);
     }
-    return (error == EAGAIN || error == EINTR) ? 0 : error;
+    return (error == EAGAIN || error == EINTR) ? 0 : error; // ENETDOWN, ENODEV: the interface went down or away.
 }
 
 void iw_socketcan_socket_forget(iw_socketcan_socket_t *self) {
@@ -118,6 +120,7 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
     return last;
 }
 
+/// ENOBUFS: the interface's queue is full. Nothing is retried here: a newer setpoint replaces this one (R6).
 int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame) {
     struct can_frame raw = {.can_id = frame->id & ~IW_CAN_FD, .len = frame->dlc};
     memcpy(raw.data, frame->data, sizeof raw.data);

@@ -14,6 +14,7 @@ bool iw_unix_link_is_name(const char *name) {
     return strncmp(name, prefix, sizeof prefix - 1U) == 0;
 }
 
+/// Non-blocking also while connecting: a hub that does not accept must not hold up the loop.
 static bool try_connect(iw_unix_link_t *self) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     memcpy(address.sun_path, self->path, strlen(self->path) + 1U);
@@ -45,6 +46,7 @@ int iw_unix_link_open(iw_unix_link_t *self, const char *name, int type) {
     if (watch_fd < 0) {
         return errno;
     }
+    // Nobody listening is no error: the simulator may be started later.
     *self = (iw_unix_link_t){.path = path,
                              .retry_us = 0,
                              .backoff_us = IW_UNIX_LINK_RETRY_MIN_US,
@@ -72,7 +74,7 @@ void iw_unix_link_lose(iw_unix_link_t *self) {
     if (self->fd >= 0) {
         (void)close(self->fd);
         self->fd = -1;
-        self->retry_us = 0;
+        self->retry_us = 0; // The first attempt is at once; the back-off comes after it has failed.
     }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /// A connection to a unix socket that comes back by itself: connect, lose, wait, connect again.
 ///
-///     DOWN --due: connect works--> UP --hang-up or error--> DOWN (next attempt after the back-off)
+///     DOWN --due: connect works--> UP --hang-up or error--> DOWN (attempts: at once, then after each back-off)
 ///
 /// The back-off doubles from IW_UNIX_LINK_RETRY_MIN_US to IW_UNIX_LINK_RETRY_MAX_US and starts anew with every success.
 /// The epoll set stays the same over all connections: it is what others watch.
@@ -31,7 +31,8 @@ void iw_unix_link_close(iw_unix_link_t *self);
 
 bool iw_unix_link_is_up(const iw_unix_link_t *self);
 
-/// The other side is gone: closes, and tries again after the back-off.
+/// The other side is gone: closes. The next `iw_unix_link_tend` connects again; if that fails, it waits for the
+/// back-off.
 void iw_unix_link_lose(iw_unix_link_t *self);
 
 /// Connects if it is due. True if the link came up now.

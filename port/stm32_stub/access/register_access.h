@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// Reading and writing one register of the bus controller.
 ///
-/// The driver includes this file by name only. A test puts another one before it in the include path, whose two functions
-/// ask a model of the controller; the driver's text stays the same.
+/// The driver includes this file by name only. A test puts another one before it in the include path, whose two
+/// functions ask a model of the controller; the driver's text stays the same.
 #ifndef IW_STM32_REGISTER_ACCESS_H
 #define IW_STM32_REGISTER_ACCESS_H
 

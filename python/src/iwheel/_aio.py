@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any, AsyncIterator, Deque, Dict, Generator, List, Mapping, Optional, Type, Union, cast
 
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
-from ._protocol import Confirmed, Hello, State, Status, Stop, Tared, Watched
+from ._protocol import Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
     ALWAYS,
@@ -26,6 +26,7 @@ from ._wire import (
     REPEATABLE,
     REST_S,
     Message,
+    add_piece,
     Wire,
     applied_of,
     cannot_connect,
@@ -211,6 +212,15 @@ class AsyncGateway:
 
     async def why(self) -> Stop:
         return cast(Stop, without_envelope(await self._ask("why")))
+
+    async def recordings(self) -> List[RecordingEntry]:
+        return cast(List[RecordingEntry], (await self._ask("recordings"))["recordings"])
+
+    async def recording(self, name: str) -> bytes:
+        data = bytearray()
+        while not add_piece(data, cast(Piece, await self._ask("recording", name=name, offset=len(data)))):
+            pass
+        return bytes(data)
 
     async def watch(self, *topics: str, rate_hz: Optional[Whole] = None) -> Watched:
         fields = {"topics": list(topics), **integers(rate_hz=rate_hz)}

@@ -8,11 +8,11 @@ import time
 import warnings
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Iterator, Optional, Type, Union, cast
+from typing import Any, Iterator, List, Optional, Type, Union, cast
 
 from ._connection import Connection
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
-from ._protocol import Confirmed, Hello, State, Status, Stop, Tared, Watched
+from ._protocol import Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
     ALWAYS,
@@ -23,6 +23,7 @@ from ._wire import (
     REPEATABLE,
     REST_S,
     Message,
+    add_piece,
     applied_of,
     check_api,
     default_socket,
@@ -86,6 +87,17 @@ class Gateway:
     def why(self) -> Stop:
         """The last stop; `sentence` tells it in plain English."""
         return cast(Stop, without_envelope(self._ask("why")))
+
+    def recordings(self) -> List[RecordingEntry]:
+        """The recordings of stops on the gateway's disk, the oldest first: `name cause wall_us log_bytes jsonl_bytes conf_bytes`."""
+        return cast(List[RecordingEntry], self._ask("recordings")["recordings"])
+
+    def recording(self, name: str) -> bytes:
+        """A file of one of them, whole and checked: `name` as `recordings` tells it, with .log, .jsonl or .conf behind it."""
+        data = bytearray()
+        while not add_piece(data, cast(Piece, self._ask("recording", name=name, offset=len(data)))):
+            pass
+        return bytes(data)
 
     def watch(self, *topics: str, rate_hz: Optional[Whole] = None) -> Watched:
         """Subscribes to `state bus estop lease stop force frame`; replaces what was subscribed. Then read `events`.

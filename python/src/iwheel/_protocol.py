@@ -417,3 +417,42 @@ class Confirmed(LedgerEntry):
     """The reply to `confirm`: the item and its entry. `value` is what is configured."""
 
     item: LedgerItem
+
+
+class RecordingEntry(TypedDict):
+    """A recording on disk: three files with one name and an ending each."""
+
+    name: str
+    """of its files, without .log, .jsonl or .conf"""
+    cause: str
+    """a cause, or gateway_died"""
+    wall_us: Optional[int]
+    """when its .conf was written, at the stop"""
+    log_bytes: Optional[int]
+    """None: there is no such file"""
+    jsonl_bytes: Optional[int]
+    conf_bytes: Optional[int]
+
+
+class Recordings(TypedDict):
+    """The reply to `recordings`."""
+
+    recordings: List[RecordingEntry]
+    """the oldest first; of more than 64 the newest"""
+
+
+class Piece(TypedDict):
+    """The reply to `recording`: some bytes of a file."""
+
+    name: str
+    """of the file"""
+    offset: int
+    """of the first byte in data"""
+    size: int
+    """of the file now; it may grow for two seconds after the stop"""
+    data: str
+    """base64 (RFC 4648): 24576 bytes, or what is left"""
+    crc32: int
+    """CRC-32 (as zlib's) of these bytes"""
+    file_crc32: Optional[int]
+    """of the whole file; None unless this is its last piece"""

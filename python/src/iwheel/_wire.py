@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+import base64
+import binascii
 import json
 import math
 import numbers
 import operator
 import os
+import zlib
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Tuple, cast
 
 from ._errors import ConnectionLost, GatewayUnavailable, LeaseEnded, ProtocolError, Refused
-from ._protocol import API, LINE_MAX, REQUEST_MAX
+from ._protocol import API, LINE_MAX, REQUEST_MAX, Piece
 from ._types import Applied, Event, Terms
 from ._version import __version__
 
@@ -22,7 +25,7 @@ HARMLESS = ("out_of_range", "bad_value", "missing_field", "unknown_field", "bad_
 """Refusals of a drive command that say nothing about the permission to drive."""
 PASSING = ("not_at_rest", "stale_command")
 """Refusals of `arm` that end by themselves: the wheels come to rest, and a drive command of before is half a second old."""
-REPEATABLE = ("hello", "status", "why", "stop", "estop")
+REPEATABLE = ("hello", "status", "why", "recordings", "recording", "stop", "estop")
 """Asked again on a new connection if the old one broke: they never start a motion."""
 ALWAYS = ("stop", "estop")
 """Sent even to a gateway that speaks a newer protocol."""
@@ -187,6 +190,22 @@ def terms_of(reply: Message) -> Terms:
 def without_envelope(reply: Message) -> Any:
     """The reply without `id` and `ok`."""
     return {name: value for name, value in reply.items() if name not in ("id", "ok")}
+
+
+def add_piece(data: bytearray, piece: Piece) -> bool:
+    """Appends a piece of a recording. True with the last one, when the whole is as its checksum says. ProtocolError: it is not."""
+    try:
+        more = base64.b64decode(piece["data"], validate=True)
+    except binascii.Error as error:
+        raise ProtocolError(f"{piece['name']}: a piece is no base64: {error}") from error
+    if piece["offset"] != len(data) or zlib.crc32(more) != piece["crc32"]:
+        raise ProtocolError(f"{piece['name']}: the piece at {len(data)} is damaged; ask for the recording again")
+    data += more
+    if len(data) < piece["size"] and more:
+        return False
+    if len(data) != piece["size"] or zlib.crc32(data) != piece["file_crc32"]:
+        raise ProtocolError(f"{piece['name']}: its pieces do not make the whole; ask for the recording again")
+    return True
 
 
 def lost_event(count: int) -> Event:

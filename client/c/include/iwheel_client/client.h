@@ -224,6 +224,22 @@ enum {
 /// Which events come from now on, instead of those before; 0 ends it. `rate_hz` 1..100 is for state and force. As `iwc_ask`.
 IWC_API iwc_result_t iwc_watch(iwc_t *self, unsigned topics, int rate_hz, int timeout_ms);
 
+/// Of the pieces in which recordings come.
+#define IWC_PIECE_MAX 24576U
+
+/// How far a recording is read; all zero before its first piece.
+typedef struct {
+    int64_t next;   ///< Offset of the first byte that is not read yet. At `size`: that was all.
+    int64_t size;   ///< Of the file, as of the last piece; it may grow for two seconds after its stop.
+    size_t length;  ///< Bytes of the last piece.
+    uint32_t crc32; ///< Of all before `next`.
+} iwc_piece_t;
+
+/// Reads the next piece of a recording's file: `name` as the request `recordings` tells it, with .log, .jsonl or .conf behind it. `out` has
+/// room for IWC_PIECE_MAX bytes. As `iwc_ask`; IWC_GARBLED also for a piece that is not as its checksum says, and for a last one with
+/// which the whole is not.
+IWC_API iwc_result_t iwc_recording(iwc_t *self, const char *name, int timeout_ms, void *out, iwc_piece_t *piece);
+
 // ---- driving and stopping -----------------------------------------------------------------------------------------
 
 typedef struct {

@@ -25,8 +25,8 @@ typedef enum {
 
 typedef struct {
     const iw_config_t *config;
-    iw_time_us_t
-        since_us[IW_FOLLOW_VERDICTS]; ///< Since when the condition of each verdict holds; IW_NEVER: it does not.
+    /// Since when the condition of each verdict holds; IW_NEVER: it does not.
+    iw_time_us_t since_us[IW_FOLLOW_VERDICTS];
 } iw_follow_t;
 
 /// `config` must be checked and outlive it.

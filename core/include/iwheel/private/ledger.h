@@ -12,7 +12,7 @@
 
 typedef struct {
     iw_ledger_entry_t entry[IW_LEDGER_ITEMS];
-    uint32_t changes;       ///< Grows with every change: for whoever wants to tell or to store it.
+    uint32_t changes;       ///< Grows with every change, so that a program sees when to report or store it.
     iw_ledger_item_t doubt; ///< The first contradicted item that guards motion; IW_LEDGER_ITEMS if there is none.
 } iw_ledger_t;
 

@@ -2,11 +2,11 @@
 /// May the wheels move, and if not, why?
 ///
 ///     LISTENING --arm--> ARMING --TX confirmed--> ARMED --lease lost | stop | disarm | cause--> BRAKING
-///         ^ ^              | failed                 ^                                              | output zero
-///         | |              v                        | TX confirmed                                 v
-///         | +----------- LISTENING               REARMING <---------------- arm --------------- HOLDING --held--> LISTENING
-///         |                                         | failed                                      ^
-///         |                                         +---------------------------------------------+
+///         ^ ^              | failed                 ^                                           | output zero
+///         | |              v                        | TX confirmed                            v
+///         | +----------- LISTENING               REARMING <--------------- arm ----------- HOLDING --held--> LISTENING
+///         |                                         | failed                                 ^
+///         |                                         +----------------------------------------+
 ///         |   RESTARTING --held, or somebody else drives--> LISTENING
 ///         |
 ///         |   any of them --latching cause--> CUT --held--> LATCHED;  from LISTENING at once: LATCHED
@@ -19,12 +19,12 @@
 /// LATCHED (and CUT). Nothing is sent in LISTENING and LATCHED; ARMING sends one zero pair, and ARMED begins when it is
 /// confirmed; REARMING is ARMING while zeros are held anyway. What each demands of the scheduler is a row of a table.
 ///
-/// Pure state machine: no I/O, no clock. In every step the owner first tells the faults it sees (`iw_permit_raise`),
-/// then calls `iw_permit_step`, then reads `iw_permit_demand`, which tells what the scheduler must aim at.
+/// Pure state machine: no I/O, no clock. In every step the owner first raises the faults it sees (`iw_permit_raise`),
+/// then calls `iw_permit_step`, then hands `iw_permit_demand` to the scheduler.
 ///
 /// What a cause does is its row: some latch in every state; some latch while setpoints are sent and are otherwise only
-/// remembered, to refuse arm and reset while present; some only stop. RESTARTING sends zeros for a process that died, and
-/// nothing but those is ours yet: there only what latches in every state latches.
+/// remembered, to refuse arm and reset while present; some only stop. RESTARTING sends zeros for a process that died,
+/// and nothing but those is ours yet: there only what latches in every state latches.
 ///
 /// The lease is fed by accepted drive commands and by nothing else.
 #ifndef IW_PERMIT_H
@@ -32,7 +32,7 @@
 
 #include "iwheel/config.h"
 
-/// An event-like cause is gone when not seen for this long.
+/// A cause that is an event counts as gone when not seen for this long.
 #define IW_PERMIT_EVENT_US 1000000U
 /// Zeros are held until both wheels were at rest for this long ...
 #define IW_PERMIT_SETTLED_US 500000U
@@ -77,21 +77,21 @@ typedef struct {
     iw_time_us_t stale_us;           ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
     iw_client_t stale_client;
     iw_client_t holder;
-    iw_client_t blocked;   ///< Whose wheels were blocked when they stopped: told so until they stand.
-    uint32_t raised;       ///< Bit per cause: told since the last step.
-    uint32_t present;      ///< Bit per cause: told in the last step.
+    iw_client_t blocked;   ///< Whose wheels were blocked when they stopped: refused as such until the hold ends.
+    uint32_t raised;       ///< Bit per cause: raised since the last step.
+    uint32_t present;      ///< Bit per cause: raised in the step before.
     uint32_t still_moving; ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
     iw_stop_t stop;        ///< A record: nothing is decided by it.
     iw_phase_t phase;
     iw_refusal_t arm_refusal; ///< Why the last arming failed.
-    uint8_t strangers;        ///< Foreign setpoints in RESTARTING.
+    uint8_t strangers;        ///< Setpoints of other senders counted in RESTARTING.
     bool quiet;               ///< No latching cause is there or happened lately: nothing to look for.
     bool at_once;             ///< BRAKING and what follows: zero without ramp.
 } iw_permit_t;
 
 /// `config` must be checked and outlive it. `restarted`: begin with zeros (STOPPING, cause RESTART) because the
 /// process before us died while armed. That hold gives way to another master, but not to what the dead process itself
-/// may have left in its controller: two setpoints of each wheel.
+/// may have left in its controller: two setpoints per wheel.
 void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t now_us, bool restarted);
 
 /// Tells that a cause is present or has just happened. It takes effect at once; the first cause of a latch stays the
@@ -122,10 +122,11 @@ iw_demand_t iw_permit_demand(const iw_permit_t *self);
 /// With `takeover` the lease of another client moves over, when outputs are zero and both wheels at rest.
 iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, bool takeover);
 
-/// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted or
-/// not. `sent_us` is when it was sent, as far as the owner can tell, not later than now: a command that waited in a
-/// queue feeds the lease from then, and one from before ARMED began is refused as IW_REFUSE_STALE_COMMAND.
-/// One that was sent before another that has been accepted is accepted too, and shortens the lease: an owner passes them on in order.
+/// A well-formed drive command. IW_REFUSE_NONE: accepted, and the lease is fed. A nonzero one is remembered, accepted
+/// or not. `sent_us` is when it was sent, as far as the owner can tell, not later than now: a command that waited in a
+/// queue feeds the lease from then, and one from before ARMED began is refused as IW_REFUSE_STALE_COMMAND. One that was
+/// sent before another that has been accepted is accepted too, and shortens the lease: an owner passes them on in
+/// order.
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero);
 
 /// Somebody sent a nonzero drive command that was not even judged (out of range): it refuses arm and reset like any

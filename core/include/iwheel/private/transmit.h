@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Hands a pair to the bus: whole, within the envelope, and on account.
+/// Hands a pair to the bus: whole, within the envelope, each frame tracked until its TX confirmation.
 ///
 ///     pair -> invert -> encode -> envelope (both frames) -> port (left, then right) -> TX confirmation
 ///
@@ -14,9 +14,10 @@
 
 // ---- Envelope ----
 //
-// The envelope that every outgoing frame must keep to, judged, right before it is handed to the port.
+// The last check (R8) of every outgoing frame, right before it is handed to the port: does it lie within the envelope
+// of what is configured?
 //
-// It knows nothing of why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a
+// It does not know why a frame is sent. It looks at the bytes, as the wheel would, and lets through only a
 // setpoint of one of the two ids, with the configured type and length, current and speed within the configured
 // maxima, and a speed no further from the last one that passed than the configured slopes allow for the time
 // between; a change of sign must pass through a zero that was sent. A zero of the right type and current passes
@@ -52,49 +53,52 @@ iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, iw_time_us_t now_us
 
 // ---- TX confirmation ----
 //
-// Which setpoints are on their way? The account of sent and echoed frames.
+// Which setpoints were handed to the port and are not confirmed yet? The controller confirms a frame by its echo: our
+// own frame, handed back once another node has acknowledged it.
 //
-// Per wheel at most one setpoint is un-echoed, and behind it at most one zero: so a queue of old setpoints cannot
-// form, and a zero never waits for an echo. Echoes of one id come in the order sent. An echo that was on its way when
-// the account was cleared may come later than the next frame is sent: so an echo counts only if it bears the speed and
-// current of the oldest un-echoed frame.
+// Per wheel at most one setpoint is unconfirmed, and behind it at most one zero (R6): so a queue of old
+// setpoints cannot form, and a zero never waits for an echo. Echoes of one id come in the order sent. After a purge or
+// a loss of the bus all is forgotten, but an echo may still be on its way through a receive queue and arrive behind the
+// next frame: so an echo confirms the oldest unconfirmed frame only if it has that frame's speed and current; otherwise
+// it is stray.
 //
-//     FREE --sent--> ONE --zero sent--> TWO;  each echo goes one back;  clear: FREE
-//     (a refused frame only waits; an echo or the end of sending ends that)
+//     FREE --sent--> ONE --zero sent--> TWO;  each matching echo goes one back;  clear: FREE
+//     (a frame that the port refused only starts the clock; an echo or the end of sending stops it)
 
 typedef struct {
-    iw_time_us_t waiting_us[IW_SIDES]; ///< Since when a setpoint waits to be proven; IW_NEVER: none does.
-    iw_time_us_t sent_us[IW_SIDES][2]; ///< Of the un-echoed frames, oldest first.
-    iw_time_us_t proven_us[IW_SIDES];  ///< When the last echoed frame had been sent; 0: none yet.
-    uint32_t stray;                    ///< Echoes that nothing was waiting for.
-    uint32_t value[IW_SIDES][2];       ///< What they bear: speed and current, as they stand in the frame.
-    uint8_t pending[IW_SIDES];         ///< Un-echoed frames, 0..2.
+    iw_time_us_t waiting_us[IW_SIDES]; ///< Since when a setpoint waits for its echo; IW_NEVER: none does.
+    iw_time_us_t sent_us[IW_SIDES][2]; ///< Of the unconfirmed frames, oldest first.
+    iw_time_us_t proven_us[IW_SIDES];  ///< When the last confirmed frame had been sent; 0: none yet.
+    uint32_t stray;                    ///< Echoes that no unconfirmed frame matched.
+    uint32_t value[IW_SIDES][2];       ///< Of the unconfirmed frames: speed and current, as they stand in the frame.
+    uint8_t pending[IW_SIDES];         ///< Unconfirmed frames, 0..2.
 } iw_confirmation_t;
 
 void iw_confirmation_init(iw_confirmation_t *self);
 
-/// Forgets what is un-echoed and what was proven: it was purged, or the bus went away with it.
+/// Forgets what is unconfirmed and what was confirmed: after a purge or a loss of the bus no echo is owed any more.
 void iw_confirmation_clear(iw_confirmation_t *self);
 
 /// True if this wheel may be sent a setpoint now; `zero` tells whether it is a zero.
 bool iw_confirmation_may_send(const iw_confirmation_t *self, iw_side_t side, bool zero);
 
-/// A frame was handed over (`accepted`; only where `iw_confirmation_may_send`) or refused by the port. A refused one starts
-/// the waiting too, so that a port that takes nothing is found out; the next echo of that wheel settles it, or `rest`.
+/// A frame was handed over (`accepted`; only where `iw_confirmation_may_send`) or refused by the port. A refused one
+/// starts the clock too, so that a port that takes nothing is found out; the next echo of that wheel stops it, or
+/// `iw_confirmation_rest`.
 void iw_confirmation_sent(iw_confirmation_t *self, iw_side_t side, iw_time_us_t now_us, const iw_can_frame_t *frame,
                           bool accepted);
 
-/// Nothing is being sent any more. What was only refused waits no longer: nobody would ever settle it. What was handed
-/// over still does.
+/// Nothing is being sent any more. The clock of a refused frame stops: no echo of it will ever come. A frame that was
+/// handed over still waits for its echo.
 void iw_confirmation_rest(iw_confirmation_t *self);
 
 /// The echo of a setpoint came.
 void iw_confirmation_echo(iw_confirmation_t *self, iw_side_t side, const iw_can_frame_t *echo);
 
-/// Of each wheel the last echoed frame: when the older of them was sent. 0: not both wheels have one yet.
+/// Of each wheel's last confirmed frame: when the older of the two was sent. 0: not both wheels have one yet.
 iw_time_us_t iw_confirmation_proven_us(const iw_confirmation_t *self);
 
-/// Since when the longest-waiting setpoint waits; IW_NEVER if none does.
+/// Since when the setpoint that has waited longest waits; IW_NEVER if none does.
 iw_time_us_t iw_confirmation_waiting_us(const iw_confirmation_t *self);
 
 // ---- Sender ----
@@ -128,8 +132,8 @@ iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw
 /// Nothing is being sent: gaps are measured anew from the next pair, and what was refused is forgotten.
 void iw_sender_rest(iw_sender_t *self);
 
-/// Asks the port to take back what is not on the bus; if it surely could, the account is cleared. The port's answer: see
-/// hal.h.
+/// Asks the port to purge what is not on the bus yet. If it surely did (> 0), nothing is unconfirmed any more. The
+/// answer is the port's: see hal.h.
 int iw_sender_purge(iw_sender_t *self);
 
 #endif

@@ -8,9 +8,9 @@
 /// machine's, with `invert` applied, so that they can be compared with commands.
 ///
 /// A reboot is recognised by: silence of IW_WHEEL_REBOOT_SILENCE_US; odometry that jumps further than any wheel can
-/// turn; offset frames that come back. A wheel sends those from its start on for 60 s (document), so after a pause they
-/// tell of another start. How long they last is no evidence: a wheel may send them for longer, or for ever. Neither is
-/// our own first minute, since a gateway that starts late hears the rest of the wheel's.
+/// turn; offset frames that come back. A wheel sends those in its first 60 s (document), so after a pause they mean
+/// another start. For how long they come is no evidence: a wheel may send them for longer, or for ever. Nor are offset
+/// frames in our own first minute: a gateway that starts late hears the rest of the wheel's.
 #ifndef IW_WHEEL_H
 #define IW_WHEEL_H
 
@@ -29,8 +29,8 @@
 #define IW_WHEEL_FASTEST_MM_S 10000U
 /// Odometry steps up to this many ticks are believed whatever the time between them. Ours.
 #define IW_WHEEL_TICK_SLACK 30U
-/// Beyond this, either way, ticks are counted no more: so a distance in nanometres fits 64 bits whatever a wheel says. At
-/// the 20 mm of a tick without gear that is two million kilometres. Ours.
+/// Beyond this, either way, ticks are counted no more: so a distance in nanometres fits 64 bits whatever a wheel says.
+/// At the 20 mm of a tick without gear that is two million kilometres. Ours.
 #define IW_WHEEL_TICKS_MAX 100000000000
 
 typedef enum {
@@ -51,8 +51,8 @@ typedef struct {
     iw_time_us_t rest_since_us; ///< Start of the unbroken run of speed frames at rest; IW_NEVER: moving.
     iw_time_us_t excused_us;    ///< Our own stall ended here: silence before it is not the wheel's.
     int64_t ticks;              ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
-    int32_t
-        nm_per_tick; ///< In the machine's frame: negative where `invert` is set. With IW_WHEEL_TICKS_MAX it fits 64 bits.
+    /// In the machine's frame: negative where `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64 bits.
+    int32_t nm_per_tick;
     uint32_t um_s_per_rpm;
     uint32_t us_per_tick_min; ///< At IW_WHEEL_FASTEST_MM_S.
     uint32_t reboots;
@@ -66,8 +66,8 @@ typedef struct {
 /// `config` must be checked and outlive the wheel.
 void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us);
 
-/// Takes a message from this wheel: `told` has its values. `fresh` is false in a late step, when the time of reception is unknown: values
-/// are then taken, but the wheel's silence does not end and no run of rest begins.
+/// Takes a message from this wheel: `told` has its values. `fresh` is false in a late step, when the time of reception
+/// is unknown: values are then taken, but the wheel's silence does not end and no run of rest begins.
 void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, const iw_codec_wheel_t *told,
                    bool fresh);
 
@@ -81,7 +81,8 @@ bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us);
 /// True if it was never heard, or not for `wheel_silent_ms` and no stall of ours excuses that.
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
 
-/// How long it has been heard with |rpm| <= rest_rpm, without a gap, UINT32_MAX at the most; 0: it turns, or is not heard.
+/// How long it has been heard with |rpm| <= rest_rpm, without a gap, UINT32_MAX at the most; 0: it turns, or is not
+/// heard.
 uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us);
 
 /// Measured speed in the machine's frame, rounded towards zero. Meaningless while not heard.

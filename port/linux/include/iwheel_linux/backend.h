@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-/// What a kind of bus and a kind of e-stop provide, so that each is one file and nobody else knows which is in use.
+/// Interface of a kind of bus and of a kind of e-stop: each is one file, and the rest of the port does not know which
+/// is in use.
 ///
-/// A backend is opened once and stays open for the life of the process. What it stands for may come and go: the backend then says so
-/// through its state and comes back by itself from `tend`. It owns one descriptor that never changes (an epoll set of its own, if what
-/// it really reads is reopened): the owner watches it for reading and then runs a step.
+/// A backend is opened once and stays open for the life of the process. What it stands for may come and go: the backend
+/// then says so through its state and comes back by itself from `tend`. It owns one descriptor that never changes (an
+/// epoll set of its own, if what it really reads is reopened): the owner watches it for reading and then runs a step.
 ///
 /// Nothing here blocks or allocates after open; open itself may wait for half a second. One thread of execution.
 #ifndef IWHEEL_LINUX_BACKEND_H
@@ -25,7 +26,7 @@ typedef struct {
     void (*close)(void *self);
     /// The descriptor to watch for reading; the same from open to close.
     int (*watch_fd)(const void *self);
-    /// Reopens what is gone if its time has come, and gives up what is dead. Call it before every step.
+    /// Reopens a lost interface or connection when the retry is due, and closes a dead one. Call it before every step.
     void (*tend)(void *self, iw_time_us_t now_us);
     /// When `tend` has something to do; IW_NEVER if it has not.
     iw_time_us_t (*next_us)(const void *self);
@@ -52,15 +53,16 @@ typedef struct {
     int (*watch_fd)(const void *self); ///< -1: there is nothing to watch.
     void (*tend)(void *self, iw_time_us_t now_us);
     iw_time_us_t (*next_us)(const void *self);
-    /// As `estop_pressed` of iw_hal_t. `quiet`: the wait that has just ended found nothing at the descriptor, so that there are no edges
-    /// to be read; the level always is.
+    /// As `estop_pressed` of iw_hal_t. `quiet`: the wait that has just ended found nothing at the descriptor, so that
+    /// there are no edges to be read; the level always is.
     int (*pressed)(void *self, bool quiet);
     int (*trouble)(const void *self); ///< Why it cannot be read, as an errno; 0 while it can.
     bool simulated;                   ///< Not a real button: announced wherever the e-stop is shown.
     bool present;                     ///< False: there is no e-stop at all.
 } iw_estop_ops_t;
 
-/// `unix:PATH`: the local bus. The echo comes from its hub when the simulated wheels have acknowledged, so it is a proof.
+/// `unix:PATH`: the local bus. The echo comes from its hub when the simulated wheels have acknowledged, so it is a
+/// proof.
 extern const iw_bus_ops_t iw_local_bus_ops;
 
 /// SocketCAN, by the interface's name. NULL if this build has left it out.

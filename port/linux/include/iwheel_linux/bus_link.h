@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// What the kernel tells of the link to the bus, and whether its timing is the wheels'.
+/// What the kernel reports of the link to the bus, and whether its bit timing is the wheels'.
 ///
 /// The port reads and never sets any of this; the one exception is a purge (hal.h), which takes the link down and up.
 #ifndef IWHEEL_LINUX_BUS_LINK_H
@@ -9,7 +9,7 @@
 #include "iwheel/types.h"
 
 typedef enum {
-    IW_LINK_LOCAL = 0, ///< Not an interface of the kernel: the rest of what is told here is void but `echo_proven`.
+    IW_LINK_LOCAL = 0, ///< Not an interface of the kernel: of the fields below only `echo_proven` means anything.
     IW_LINK_ABSENT,    ///< No interface has this name now.
     IW_LINK_NOT_CAN,   ///< An interface has it, but it is no CAN interface.
     IW_LINK_DOWN,

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// A bus backend and an e-stop backend, put together as the HAL that the core asks for.
 ///
-/// Between them stand only a tap, which shows every frame received and every echo to whoever wants to look, and the memory of the last
-/// answers, so that nobody else need ask the backends (asking consumes: an edge or a loss is told once).
+/// Between them stand only a tap, which shows every frame received and every echo to an observer, and a copy of the
+/// last answers: an edge or a loss is reported once, so that asking a backend a second time would take it from the
+/// core.
 #ifndef IWHEEL_LINUX_HAL_H
 #define IWHEEL_LINUX_HAL_H
 
@@ -11,17 +12,18 @@
 typedef struct {
     const iw_bus_ops_t *bus_ops;
     const iw_estop_ops_t *estop_ops;
-    /// Called with each frame the core receives, before the core sees it. May be NULL. Must not block or call back into the core.
+    /// Called with each frame the core receives, before the core sees it. May be NULL. Must not block or call back into
+    /// the core.
     void (*tap)(void *context, const iw_can_frame_t *frame);
     void *tap_context;
     int estop_last;   ///< The last answer given to the core; -1 before the first.
-    bool estop_quiet; ///< The wait has ended without a word of the e-stop, and nobody has looked at it since.
+    bool estop_quiet; ///< The last wait found no edge at the e-stop's descriptor, and it has not been read since.
     iw_backend_store_t bus;
     iw_backend_store_t estop;
 } iw_linux_hal_t;
 
-/// Opens both, by their names in the configuration. 0 or an errno; `*out_culprit` is then the name at fault. ENOTSUP: this build
-/// has no backend for it. Nothing stays open on failure. The names must outlive the HAL.
+/// Opens both, by their names in the configuration. 0 or an errno; `*out_culprit` is then the name at fault. ENOTSUP:
+/// this build has no backend for it. Nothing stays open on failure. The names must outlive the HAL.
 int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const iw_estop_wish_t *estop,
                       const char **out_culprit);
 void iw_linux_hal_close(iw_linux_hal_t *self);
@@ -33,8 +35,8 @@ iw_hal_t iw_linux_hal_functions(iw_linux_hal_t *self);
 int iw_linux_hal_bus_fd(const iw_linux_hal_t *self);
 int iw_linux_hal_estop_fd(const iw_linux_hal_t *self);
 
-/// May be called right after a wait for both descriptors, which saves reading of one that has nothing to tell: was the e-stop's found
-/// readable? It counts for one look.
+/// May be called right after a wait for both descriptors, which saves reading of one that has nothing to tell: was the
+/// e-stop's found readable? It counts for one look.
 void iw_linux_hal_waited(iw_linux_hal_t *self, bool estop_told);
 
 /// Call before every step.

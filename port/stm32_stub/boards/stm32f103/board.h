@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 /// An STM32F103x8 or xB with a crystal of 8 MHz ("Blue Pill" and its relatives).
 ///
-/// A board is this header and `memory.ld` beside it; the family's files do the rest. To make another board of the same family copy
-/// this folder, change what differs, and name it with -DIWHEEL_BOARD; a clock that cannot give the bus exactly does not compile.
+/// A board is this header and `memory.ld` beside it; the family's files do the rest. To make another board of the same
+/// family copy this folder, change what differs, and name it with -DIWHEEL_BOARD; a clock that cannot give the bus
+/// exactly does not compile.
 #ifndef IW_STM32_BOARD_H
 #define IW_STM32_BOARD_H
 
