@@ -55,7 +55,7 @@ int gw_loop_open(gw_daemon_t *daemon) {
                        daemon->listener[GW_WATCH].fd,
                        iw_linux_hal_bus_fd(&daemon->hal),
                        iw_linux_hal_estop_fd(&daemon->hal),
-                       daemon->box.fd,
+                       daemon->box.writer.fd,
                        daemon->box.reader.fd};
     const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER,
                              GW_TAG_BUS,   GW_TAG_ESTOP,  GW_TAG_BOX,      GW_TAG_BOX};

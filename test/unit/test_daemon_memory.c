@@ -22,7 +22,7 @@ static char status_before[GW_REPLY_MAX]; ///< The last status that was looked at
 int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name) {
     (void)directory;
     (void)name;
-    *self = (gw_keeper_t){.fd = -1};
+    *self = (gw_keeper_t){.child = {.fd = -1}};
     return 0;
 }
 

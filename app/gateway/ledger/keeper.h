@@ -5,16 +5,15 @@
 ///     gateway --text--> keeper: written beside the file, flushed to the disk, renamed over it
 ///     gateway <--news-- keeper: what was found at the start; what became of each write
 ///
-/// Nothing in the gateway waits: a text goes whole or not at all, news are looked for when the loop comes by. The
-/// keeper ends when the gateway does, after what it was given last. It ignores the signals that end the gateway.
+/// Nothing in the gateway waits: a text goes whole or not at all, news are looked for when the loop comes by.
 #ifndef GATEWAY_KEEPER_H
 #define GATEWAY_KEEPER_H
 
-#include <stdbool.h>
-#include <stddef.h>
+#include "process/child.h"
 
 /// The longest text that is kept or read.
-#define GW_KEEPER_TEXT_MAX 16384U
+#define GW_KEEPER_TEXT_MAX  16384U
+#define GW_KEEPER_NAME_SIZE 288U
 
 typedef enum {
     GW_KEEPER_NO_NEWS = 0,
@@ -27,12 +26,13 @@ typedef enum {
 } gw_keeper_news_t;
 
 typedef struct {
-    int fd;     ///< -1: no keeper.
+    gw_child_t child;
+    const char *directory;
+    char name[GW_KEEPER_NAME_SIZE];
     bool waits; ///< News are owed.
 } gw_keeper_t;
 
-/// Starts the keeper of DIRECTORY/NAME and lets it read. 0, or an errno. Call it before threads, locks or devices are
-/// opened: the keeper closes what it inherits.
+/// Starts the keeper of DIRECTORY/NAME and lets it read. 0, or an errno. `directory` must outlive it.
 int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name);
 
 /// Hands over a text to be kept. False if the keeper cannot take it now: it is busy, or gone.
