@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "help.h"
 
-#include "gateway_config.h"
-#include "similar.h"
+#include "config/gateway_config.h"
 #include "text/duration.h"
+#include "words/similar.h"
 
 #include "iwheel_northbound/words.h"
 

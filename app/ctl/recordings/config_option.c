@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "config_option.h"
 
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 #include "talk/ctl.h"
 
 #include <errno.h>

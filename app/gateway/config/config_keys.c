@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "config_keys.h"
 
-#include "similar.h"
+#include "words/similar.h"
 
 #include <string.h>
 

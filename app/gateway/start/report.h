@@ -3,10 +3,19 @@
 #ifndef GATEWAY_REPORT_H
 #define GATEWAY_REPORT_H
 
-#include "daemon.h"
+#include "clients/listener.h"
+#include "config/gateway_config.h"
+#include "process/log.h"
 
-/// Version, bus, e-stop, stop budget, what was never verified, warnings: to the log.
-void gw_report_start(gw_daemon_t *daemon);
+#include "inspect.h"
+
+/// Version, bus, e-stop, stop budget, what is not configured: to the log. `simulated`: the e-stop is; `watched`: there is a socket to
+/// watch by.
+void gw_report_start(const gateway_config_t *config, bool simulated, bool watched, gw_log_t *log);
+
+/// What the bus is to be, and a socket, by the configuration.
+inspect_wish_t gw_report_wish(const gateway_config_t *config);
+gw_listener_wish_t gw_report_socket(const gateway_config_t *config, gw_right_t right);
 
 /// A bus or e-stop that cannot be opened: cause and cure.
 void gw_report_unopened(const gateway_config_t *config, const char *culprit, int error, FILE *err);

@@ -9,10 +9,12 @@
 #ifndef GATEWAY_BOX_WRITER_H
 #define GATEWAY_BOX_WRITER_H
 
-#include "box.h"
+#include "recording.h"
+
+#include "blackbox_ring.h"
 
 /// Runs until the gateway is gone; then, if setpoints were being sent, writes a last recording. `fd` is the socket to the
 /// gateway.
-void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gateway_config_t *config);
+void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_wish_t *wish);
 
 #endif

@@ -7,7 +7,7 @@
 #ifndef GATEWAY_BOX_READER_H
 #define GATEWAY_BOX_READER_H
 
-#include "box.h"
+#include "recording.h"
 
 /// Bytes of a piece: base64 of it has no padding unless it is the last.
 #define GW_BOX_PIECE 24576U

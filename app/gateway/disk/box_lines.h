@@ -3,13 +3,15 @@
 #ifndef GATEWAY_BOX_LINES_H
 #define GATEWAY_BOX_LINES_H
 
-#include "box.h"
+#include "recording.h"
+
+#include "blackbox_ring.h"
 
 /// The longest line of the file beside the frames.
 #define GW_BOX_LINE_SIZE 4096U
 
 /// First line: what this is and how its times are to be read. Lengths are without a terminator, 0: it did not fit.
-size_t gw_box_line_head(const gateway_config_t *config, const gw_box_order_t *order, bool from_start,
+size_t gw_box_line_head(const gw_box_wish_t *wish, const gw_box_order_t *order, bool from_start,
                         char out_line[GW_BOX_LINE_SIZE]);
 
 /// Second line: the stop.
