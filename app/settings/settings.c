@@ -17,7 +17,7 @@
 
 typedef struct {
     const settings_form_t *form;
-    settings_report_t report;
+    settings_report_t *report;
     const char *text;
     size_t size;
     size_t at;
@@ -107,7 +107,7 @@ static bool is_section(const settings_form_t *form, const char *name) {
 static void settle_pending(loader_t *loader) {
     if (loader->pending != NULL) {
         const int length = (loader->pending_length > 40U) ? 40 : (int)loader->pending_length;
-        settings_complain(&loader->report, loader->line,
+        settings_complain(loader->report, loader->line,
                           "\"%.*s\" is not KEY = VALUE; add the '=' or begin the line with ;", length, loader->pending);
         loader->pending = NULL;
     }
@@ -121,13 +121,13 @@ static bool fit_line(loader_t *loader, const char *line, size_t length) {
     for (size_t i = 0; i < length; i++) {
         const unsigned char c = (unsigned char)line[i];
         if (c < 0x20U && !is_blank((char)c)) {
-            settings_complain(&loader->report, loader->line,
+            settings_complain(loader->report, loader->line,
                               "holds the control character 0x%02X; is this a text file? Delete the character", c);
             return false;
         }
     }
     if (length > LINE_MAX_LENGTH) {
-        settings_complain(&loader->report, loader->line, "has %zu characters; shorten it to %u", length,
+        settings_complain(loader->report, loader->line, "has %zu characters; shorten it to %u", length,
                           LINE_MAX_LENGTH);
         return false;
     }
@@ -142,14 +142,14 @@ static void check_section(loader_t *loader, const char *line, size_t length) {
     const char *after = end;
     loader->section_bad = true;
     if (end == NULL) {
-        settings_complain(&loader->report, loader->line, "the section's name has no ']'; write for example [bus]");
+        settings_complain(loader->report, loader->line, "the section's name has no ']'; write for example [bus]");
         return;
     }
     do {
         after++;
     } while (after < line + length && is_blank(*after));
     if (after < line + length && *after != ';' && *after != '#') {
-        settings_complain(&loader->report, loader->line, "something follows the ']'; begin a new line for it");
+        settings_complain(loader->report, loader->line, "something follows the ']'; begin a new line for it");
         return;
     }
     memcpy(name, line + 1, (size_t)(end - line) - 1U);
@@ -157,7 +157,7 @@ static void check_section(loader_t *loader, const char *line, size_t length) {
     loader->section_bad = !is_section(loader->form, name);
     if (loader->section_bad) {
         (void)list_names(loader->form, NULL, known, sizeof known);
-        settings_complain(&loader->report, loader->line, "unknown section [%s]; known are: %s", name, known);
+        settings_complain(loader->report, loader->line, "unknown section [%s]; known are: %s", name, known);
     }
 }
 
@@ -215,21 +215,21 @@ static void unknown_key(loader_t *loader, const char *section, const char *key) 
     const char *hint = (loader->form->hint != NULL) ? loader->form->hint(key) : NULL;
     const settings_key_t *elsewhere = settings_find(loader->form, NULL, key);
     if (key[0] == '\0') {
-        settings_complain(&loader->report, loader->line, "no key stands before the '='; write KEY = VALUE");
+        settings_complain(loader->report, loader->line, "no key stands before the '='; write KEY = VALUE");
     } else if (section[0] == '\0') {
-        settings_complain(&loader->report, loader->line, "%s stands before any section; put it under [%s]", key,
+        settings_complain(loader->report, loader->line, "%s stands before any section; put it under [%s]", key,
                           (elsewhere != NULL) ? elsewhere->section : "its section");
     } else if (elsewhere != NULL) {
-        settings_complain(&loader->report, loader->line, "%s is no key of [%s]; move it to [%s]", key, section,
+        settings_complain(loader->report, loader->line, "%s is no key of [%s]; move it to [%s]", key, section,
                           elsewhere->section);
     } else if (hint != NULL) {
-        settings_complain(&loader->report, loader->line, "unknown key %s in [%s]; %s", key, section, hint);
+        settings_complain(loader->report, loader->line, "unknown key %s in [%s]; %s", key, section, hint);
     } else if (similar != NULL) {
-        settings_complain(&loader->report, loader->line, "unknown key %s in [%s]; did you mean %s?", key, section,
+        settings_complain(loader->report, loader->line, "unknown key %s in [%s]; did you mean %s?", key, section,
                           similar->key);
     } else {
         (void)list_names(loader->form, section, known, sizeof known);
-        settings_complain(&loader->report, loader->line, "unknown key %s in [%s]; known are: %s", key, section, known);
+        settings_complain(loader->report, loader->line, "unknown key %s in [%s]; known are: %s", key, section, known);
     }
 }
 
@@ -248,30 +248,28 @@ static int take_value(void *context, const char *section, const char *key, const
     }
     unsigned *line = &loader->lines[row - loader->form->keys];
     if (*line != 0) {
-        settings_complain(&loader->report, loader->line, "%s is here a second time (first on line %u); keep one", key,
+        settings_complain(loader->report, loader->line, "%s is here a second time (first on line %u); keep one", key,
                           *line);
         return 1;
     }
     *line = loader->line;
     if (!settings_value_parse(loader->form, row, value, loader->values, why)) {
-        settings_complain(&loader->report, loader->line, "%s", why);
+        settings_complain(loader->report, loader->line, "%s", why);
     }
     return 1;
 }
 
-int settings_parse(const settings_form_t *form, const char *name, const char *text, size_t size, void *values,
-                   FILE *err) {
-    loader_t loader = {
-        .form = form, .report = {.name = name, .err = err}, .text = text, .size = size, .values = values};
+int settings_parse(const settings_form_t *form, settings_report_t *report, const char *text, size_t size,
+                   void *values) {
+    loader_t loader = {.form = form, .report = report, .text = text, .size = size, .values = values};
     const int result = ini_parse_stream(next_line, &loader, take_value, &loader);
-    if (result != 0 && loader.report.errors == 0) {
-        settings_complain(&loader.report, (result > 0) ? (unsigned)result : 0U,
-                          "cannot be read; write KEY = VALUE lines");
+    if (result != 0 && report->errors == 0) {
+        settings_complain(report, (result > 0) ? (unsigned)result : 0U, "cannot be read; write KEY = VALUE lines");
     }
-    if (loader.report.errors == 0 && form->relate != NULL) {
-        form->relate(&loader.report, values, loader.lines);
+    if (report->errors == 0 && form->relate != NULL) {
+        form->relate(report, values, loader.lines);
     }
-    return finish(&loader.report);
+    return finish(report);
 }
 
 /// The file's bytes in `out`, of SETTINGS_FILE_MAX bytes; false after a complaint.
@@ -315,24 +313,23 @@ int settings_load(const settings_form_t *form, const char *path, void *values, F
     }
     const bool good = read_file(&report, form->program, file, text, &size);
     (void)close(file);
-    return good ? settings_parse(form, path, text, size, values, err) : SETTINGS_ERROR;
+    return good ? settings_parse(form, &report, text, size, values) : SETTINGS_ERROR;
 }
 
-int settings_override(const settings_form_t *form, const char *name, const char *value, const char *origin,
-                      void *values, FILE *err) {
+int settings_override(const settings_form_t *form, settings_report_t *report, const char *name, const char *value,
+                      void *values) {
     static const unsigned no_lines[SETTINGS_KEYS_MAX];
-    settings_report_t report = {.name = origin, .err = err};
     char why[SETTINGS_MESSAGE_SIZE];
     const char *key = strchr(name, '.');
     char section[32];
     (void)snprintf(section, sizeof section, "%.*s", (key != NULL) ? (int)(key - name) : 0, name);
     const settings_key_t *row = (key != NULL) ? settings_find(form, section, key + 1) : NULL;
     if (row == NULL) {
-        settings_complain(&report, 0, "%s is no key of the configuration; write SECTION.KEY", name);
+        settings_complain(report, 0, "%s is no key of the configuration; write SECTION.KEY", name);
     } else if (!settings_value_parse(form, row, value, values, why)) {
-        settings_complain(&report, 0, "%s", why);
+        settings_complain(report, 0, "%s", why);
     } else if (form->relate != NULL) {
-        form->relate(&report, values, no_lines);
+        form->relate(report, values, no_lines);
     }
-    return finish(&report);
+    return finish(report);
 }

@@ -87,22 +87,24 @@ typedef struct settings_form {
 /// are of no use then.
 int settings_load(const settings_form_t *form, const char *path, void *values, FILE *err);
 
-/// The same for a text in memory of `size` bytes; `name` stands for the file in messages.
-int settings_parse(const settings_form_t *form, const char *name, const char *text, size_t size, void *values,
-                   FILE *err);
+/// The same for a text in memory of `size` bytes; `report` has the name that stands for the file in messages.
+int settings_parse(const settings_form_t *form, settings_report_t *report, const char *text, size_t size, void *values);
 
-/// One key changed after loading, by the same rules, as the command line does. `name` is "SECTION.KEY"; `origin` (for example
-/// "--estop") begins the message. Returns as `settings_load`.
-int settings_override(const settings_form_t *form, const char *name, const char *value, const char *origin,
-                      void *values, FILE *err);
+/// One key changed after loading, by the same rules, as the command line does. `name` is "SECTION.KEY"; the report's name (for
+/// example "--estop") begins the message. Returns as `settings_load`.
+int settings_override(const settings_form_t *form, settings_report_t *report, const char *name, const char *value,
+                      void *values);
 
-/// What is to be written above a key besides its help, in one line; null: nothing.
-typedef const char *(*settings_note_t)(const void *context, const char *section, const char *key);
+/// Says what is to be written above a key besides its help, in one line; null: nothing.
+typedef struct {
+    const char *(*say)(const void *context, const char *section, const char *key);
+    const void *context;
+} settings_note_t;
 
 /// Writes everything in force as a commented file. Loading it gives the same values and prints the same bytes. `note` may be
 /// null.
-void settings_print(const settings_form_t *form, const void *values, const void *defaults, settings_note_t note,
-                    const void *context, FILE *out);
+void settings_print(const settings_form_t *form, const void *values, const void *defaults, const settings_note_t *note,
+                    FILE *out);
 
 /// The row, in any section if `section` is null; or a null pointer.
 const settings_key_t *settings_find(const settings_form_t *form, const char *section, const char *key);

@@ -274,8 +274,8 @@ static void print_key(const settings_form_t *form, const settings_key_t *row, co
                   (choices[0] != '\0') ? ", " : "", has_default ? "default " : "no default", value);
 }
 
-void settings_print(const settings_form_t *form, const void *values, const void *defaults, settings_note_t note,
-                    const void *context, FILE *out) {
+void settings_print(const settings_form_t *form, const void *values, const void *defaults, const settings_note_t *note,
+                    FILE *out) {
     const char *section = "";
     for (size_t i = 0; i < form->count; i++) {
         const settings_key_t *row = &form->keys[i];
@@ -283,7 +283,7 @@ void settings_print(const settings_form_t *form, const void *values, const void 
             section = row->section;
             (void)fprintf(out, "\n[%s]\n", section);
         }
-        const char *noted = (note != NULL) ? note(context, section, row->key) : NULL;
+        const char *noted = (note != NULL) ? note->say(note->context, section, row->key) : NULL;
         if (noted != NULL) {
             (void)fprintf(out, "; %s\n", noted);
         }

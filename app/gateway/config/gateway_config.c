@@ -257,17 +257,19 @@ int gateway_config_load(const char *path, gateway_config_t *out_config, FILE *er
 }
 
 int gateway_config_parse(const char *name, const char *text, size_t size, gateway_config_t *out_config, FILE *err) {
+    settings_report_t report = {.name = name, .err = err};
     gateway_config_t config;
     gateway_config_default(&config);
-    const int result = settings_parse(&form, name, text, size, &config, err);
+    const int result = settings_parse(&form, &report, text, size, &config);
     *out_config = (result == 0) ? config : *out_config;
     return result;
 }
 
 int gateway_config_override(gateway_config_t *config, const char *name, const char *value, const char *origin,
                             FILE *err) {
+    settings_report_t report = {.name = origin, .err = err};
     gateway_config_t changed = *config;
-    const int result = settings_override(&form, name, value, origin, &changed, err);
+    const int result = settings_override(&form, &report, name, value, &changed);
     *config = (result == 0) ? changed : *config;
     return result;
 }
@@ -278,6 +280,7 @@ void gateway_config_print(const gateway_config_t *config, FILE *out) {
 
 void gateway_config_print_noted(const gateway_config_t *config, gateway_config_note_t note, const void *context,
                                 FILE *out) {
+    const settings_note_t noted = {.say = note, .context = context};
     gateway_config_t defaults;
     gateway_config_default(&defaults);
     (void)fputs(
@@ -288,5 +291,5 @@ void gateway_config_print_noted(const gateway_config_t *config, gateway_config_n
     if (config->core.listen_only) {
         (void)fputs("; In force from the command line: --listen-only, nothing is ever sent.\n", out);
     }
-    settings_print(&form, config, &defaults, note, context, out);
+    settings_print(&form, config, &defaults, (note != NULL) ? &noted : NULL, out);
 }
