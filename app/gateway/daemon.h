@@ -27,9 +27,7 @@
 #include "iwheel_linux/linux_hal.h"
 #include "iwheel_northbound/why.h"
 
-#define GW_CLIENTS_MAX 64U
-/// Frames of one step, for the watchers of the topic `frame`.
-#define GW_FRAMES       IW_GATEWAY_DRAIN_MAX
+#define GW_CLIENTS_MAX  64U
 #define GW_WARNINGS     8U
 #define GW_WARNING_SIZE 400U
 
@@ -47,11 +45,6 @@ typedef struct {
     char holder_name[IWN_NAME_MAX + 1U];
     char holder_text[GW_CLIENT_TEXT_SIZE];
 } gw_observed_t;
-
-typedef struct {
-    iw_time_us_t at_us;
-    iw_can_frame_t frame;
-} gw_tapped_t;
 
 typedef struct gw_daemon {
     gateway_config_t config;
@@ -94,10 +87,8 @@ typedef struct gw_daemon {
     uint32_t warnings;
     char warning[GW_WARNINGS][GW_WARNING_SIZE];
     char estop_reason[IWN_REASON_MAX + 1U]; ///< Of the last software e-stop.
-    uint32_t tapped;                        ///< Frames in `tap`. A step takes no more than there is room for.
-    gw_tapped_t tap[GW_FRAMES];
-    char line[GW_REPLY_MAX]; ///< Where replies and events are written.
-    iwn_work_t work;         ///< For reading requests.
+    char line[GW_REPLY_MAX];                ///< Where replies and events are written.
+    iwn_work_t work;                        ///< For reading requests.
     gw_client_t client[GW_CLIENTS_MAX];
 } gw_daemon_t;
 

@@ -4,6 +4,7 @@
 #define IW_SOCKETCAN_FRAME_H
 
 #include "iwheel/codec.h"
+#include "iwheel_linux/bus_link.h"
 
 #include <linux/can.h>
 
@@ -39,6 +40,9 @@ uint32_t iw_can_error_mask(void);
 iw_can_error_t iw_can_error_of(const struct can_frame *raw);
 
 /// Bits that the frame occupies on the bus, with the gap behind it, without stuff bits.
-uint32_t iw_socketcan_bits(const struct can_frame *raw);
+static inline uint32_t iw_socketcan_bits(const struct can_frame *raw) {
+    const iw_can_frame_t frame = {.id = raw->can_id, .dlc = raw->len};
+    return iw_bus_frame_bits(&frame);
+}
 
 #endif

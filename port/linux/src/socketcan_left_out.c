@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
 // Built in place of SocketCAN where libmnl is missing: without it the bus timing could not be verified.
-#include "iwheel_linux/backend.h"
+#include "bus.h"
 
-const iw_bus_ops_t *const iw_socketcan_ops = NULL;
+const iw_bus_kind_t *const iw_socketcan_kind = NULL;
