@@ -243,7 +243,7 @@ static bool read_file(config_report_t *report, int file, char *out, size_t *out_
 }
 
 int gateway_config_load(const char *path, gateway_config_t *out_config, FILE *err) {
-    char text[GATEWAY_CONFIG_FILE_MAX];
+    static char text[GATEWAY_CONFIG_FILE_MAX]; // Too large for a stack.
     size_t size = 0;
     config_report_t report = {.name = path, .err = err};
     const int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);

@@ -82,7 +82,7 @@ static int take(const iw_netlink_t *self, const struct nlmsghdr *reply, iw_netli
 
 /// Sends the request and takes its reply, which is there as soon as the kernel has taken the request.
 static int ask(iw_netlink_t *self, const struct nlmsghdr *request, iw_netlink_reading_t *out_reading) {
-    _Alignas(struct nlmsghdr) char buffer[REPLY_SIZE];
+    static _Alignas(struct nlmsghdr) char buffer[REPLY_SIZE]; // Too large for a stack.
     if (mnl_socket_sendto(self->socket, request, request->nlmsg_len) < 0) {
         return errno;
     }
