@@ -135,7 +135,7 @@ PARTS = [
     Bug("gpio-level-only-when-told", "R2", ESTOP, "if (!is_open(estop)) { return; }", "if (!is_open(estop) || quiet) { return; }", GPIO),
     Bug("gpio-reopened-without-a-pause", "R11", ESTOP, "estop->retry_us = estop->now_us + RETRY_US;", "estop->retry_us = estop->now_us;", GPIO),
     Bug("gpio-reopened-deaf", "R2", ESTOP, "error == 0 && epoll_ctl(", "error == 0 && estop->now_us == 0U && epoll_ctl(", GPIO),
-    Bug("gpio-edge-lost-between-two-looks", "R2", "port/linux/src/gpio_release.c", "self->edge = self->edge || edge ||", "self->edge = edge ||", ("unit_linux_gpio",)),
+    Bug("gpio-edge-lost-between-two-looks", "R2", "port/linux/src/gpio.c", "self->edge = self->edge || edge ||", "self->edge = edge ||", ("unit_linux_gpio",)),
     Bug("gpio-v1-one-edge", "R2", "port/linux/src/gpio_v1.c", "request_both_edges_events_flags", "request_rising_edge_events_flags", ("unit_linux_gpio_v1",)),
     Bug("gpio-v1-pulled-down", "R2", "port/linux/src/gpio_v1.c", "BIAS_PULL_UP", "BIAS_PULL_DOWN", ("unit_linux_gpio_v1",)),
     Bug("gpio-v1-gone-is-no-edge", "R2", "port/linux/src/gpio_v1.c", "return (errno == EAGAIN || errno == EINTR) ? taken : -1;", "return taken;", ("unit_linux_gpio_v1",)),

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "fake_interface.h"
 
-#include "netdev.h"
-#include "netlink_restart.h"
-
 #include <errno.h>
 #include <string.h>
 #include <sys/eventfd.h>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // SocketCAN over an interface played by the test: states, losses, what is old, what is forged. No kernel, no time, no rights.
 #include "fake_interface.h"
-#include "netlink_restart.h"
 
 #include "iwheel_linux/backend.h"
 

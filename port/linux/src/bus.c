@@ -15,6 +15,9 @@
 #define OTHERS_AFTER_SEND_US 3000U
 /// Batches of nothing but error frames taken in one step: a flood of them must not hold up the loop.
 #define ERROR_BATCHES_PER_STEP 8U
+#define US_PER_S               1000000U
+/// The wheels' bit rate, where the kernel reports none.
+#define BITRATE_ASSUMED_HZ 1000000U
 
 static iw_bus_t *bus_of(iw_backend_store_t *store) {
     return (iw_bus_t *)(void *)store;
@@ -206,4 +209,19 @@ iw_bus_state_t iw_bus_state(iw_backend_store_t *store) {
     const iw_bus_state_t now = bus->up ? bus->present : IW_BUS_DOWN;
     bus->unheeded = IW_BUS_ACTIVE;
     return (unheeded != IW_BUS_ACTIVE) ? unheeded : now;
+}
+
+void iw_bus_load_begin(iw_bus_load_t *self, iw_time_us_t now_us) {
+    *self = (iw_bus_load_t){.since_us = now_us};
+}
+
+bool iw_bus_load_take(iw_bus_load_t *self, iw_time_us_t now_us, uint32_t bitrate_hz, uint32_t *out_permille) {
+    const iw_time_us_t span_us = now_us - self->since_us;
+    if (span_us < US_PER_S) {
+        return false;
+    }
+    const uint64_t rate_hz = (bitrate_hz != 0U) ? bitrate_hz : BITRATE_ASSUMED_HZ;
+    *out_permille = (uint32_t)(self->bits * US_PER_S / rate_hz * 1000U / span_us);
+    iw_bus_load_begin(self, now_us);
+    return true;
 }

@@ -7,16 +7,14 @@
 ///
 /// CLOSED: `interface` is 0. The first UP comes from it; an interface that was deleted or unplugged and comes back has
 /// a new index and needs new sockets. DOWN: `up` is false, the sockets are kept, since closing them may wait for
-/// whoever configures interfaces (netdev.h), and what they still hold is dropped. What happens within UP is in bus.h.
+/// whoever configures interfaces (netlink.h), and what they still hold is dropped. What happens within UP is in bus.h.
 ///
 ///     purge: NONE --asked: child process takes the link down and up--> RESTARTING --> DONE | NOT_ALLOWED | FAILED
 ///
 /// `restarting` is that process. While it works UP goes to DOWN and back as above: that loss is the purge's answer to
 /// the core, `link.purge` only what is shown to people. NOT_ALLOWED stays, DONE and FAILED may be asked again.
 #include "bus.h"
-#include "netdev.h"
 #include "netlink.h"
-#include "netlink_restart.h"
 
 #include <errno.h>
 #include <sys/epoll.h>

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "socketcan_frame.h"
-
-#include "iwheel/codec.h"
+#include "socketcan_socket.h"
 
 #include <linux/can/error.h>
 #include <string.h>

@@ -58,18 +58,13 @@ typedef struct {
     int (*pressed)(void *self, bool quiet);
     int (*trouble)(const void *self); ///< Why it cannot be read, as an errno; 0 while it can.
     bool simulated;                   ///< Not a real button: announced wherever the e-stop is shown.
-    bool present;                     ///< False: there is no e-stop at all.
+    bool present;                     ///< False: there is no e-stop at all, always released.
 } iw_estop_ops_t;
 
 /// `unix:PATH`: the simulator's button.
 extern const iw_estop_ops_t iw_unix_estop_ops;
-/// `none`: always released.
-extern const iw_estop_ops_t iw_no_estop_ops;
 
 /// A line of a GPIO chip, by its name or as `gpiochipN:OFFSET`, through libgpiod. NULL if this build has left it out.
 extern const iw_estop_ops_t *const iw_gpio_estop_ops;
-
-/// The kind of e-stop for a name as in the configuration; NULL if this build has none for it.
-const iw_estop_ops_t *iw_estop_backend(const char *name);
 
 #endif
