@@ -2,8 +2,8 @@
 #include "help.h"
 
 #include "config/gateway_config.h"
+#include "settings/similar.h"
 #include "text/duration.h"
-#include "words/similar.h"
 
 #include "iwheel_northbound/words.h"
 

@@ -150,8 +150,8 @@ static void arm_timer(gw_daemon_t *daemon) {
 /// Frames are worth waking for, unless they keep coming and nobody has any use for them at once: no client is there, and no
 /// setpoint or stop is under way. The e-stop and whoever connects wake us as ever, and then the bus is read first.
 static bool frames_may_wait(const gw_daemon_t *daemon) {
-    const bool all_taken = daemon->wheels.tapped < GW_FRAMES;
-    return daemon->wheels.tapped > 0U && all_taken && gw_clients_count(&daemon->clients) == 0U &&
+    const gw_tape_t *tape = &daemon->wheels.tape;
+    return tape->tapped > 0U && tape->tapped < GW_FRAMES && gw_clients_count(&daemon->clients) == 0U &&
            !gw_wheels_are_sent_to(&daemon->wheels);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What every verb understands: durations, and words that are nearly right.
+#include "settings/similar.h"
 #include "text/duration.h"
-#include "words/similar.h"
 
 #include "unity.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What is assumed about the wheels, what is known, and the operator's word on it.
+#include "settings/similar.h"
 #include "talk/ctl.h"
 #include "text/paper.h"
 #include "text/text.h"
-#include "words/similar.h"
 
 #include "iwheel_northbound/words.h"
 

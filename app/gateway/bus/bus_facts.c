@@ -47,7 +47,7 @@ static void note_warnings(const gw_bus_facts_t *self, gw_wheels_t *wheels) {
         gw_bus_left_sentence(iw_linux_hal_link(hal), wheels->bus, sentence, sizeof sentence);
         warn(wheels, "%s", sentence);
     }
-    inspect_findings_t findings;
+    static inspect_findings_t findings; // Too large for a stack.
     inspect_begin(&findings);
     inspect_link(iw_linux_hal_link(hal), &self->wish, &findings);
     for (unsigned i = 0; i < findings.count; i++) {

@@ -12,11 +12,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/// The first byte of a message: to the keeper ...
+/// The first byte of a message to the keeper; of one from it, it is the news.
 #define SAY_WRITE 'w'
 #define SAY_ASIDE 'a'
-/// ... and the byte before an errno or a text, from it.
-#define MESSAGE_MAX (1U + GW_KEEPER_TEXT_MAX)
 
 /// The keeper's own side.
 typedef struct {
@@ -25,7 +23,7 @@ typedef struct {
     char fresh[GW_KEEPER_NAME_SIZE + 8U];   ///< The file while it is being written.
     char damaged[GW_KEEPER_NAME_SIZE + 8U]; ///< Where a file is set aside.
     int fd;
-    char message[MESSAGE_MAX];
+    char message[GW_KEEPER_MESSAGE_MAX];
 } work_t;
 
 static void answer(const work_t *work, gw_keeper_news_t news, int error) {
@@ -118,8 +116,9 @@ static int in_directory(const work_t *work, size_t length) {
 
 static void keep(int fd, const void *context) {
     const gw_keeper_t *self = (const gw_keeper_t *)context;
-    work_t work = {.directory = self->directory, .name = self->name, .fd = fd};
+    static work_t work; // Too large for a stack.
     ssize_t length;
+    work = (work_t){.directory = self->directory, .name = self->name, .fd = fd};
     (void)snprintf(work.fresh, sizeof work.fresh, "%s.new", work.name);
     (void)snprintf(work.damaged, sizeof work.damaged, "%s.damaged", work.name);
     tell_file(&work);
@@ -143,15 +142,14 @@ int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name) {
     return error;
 }
 
-static bool say(const gw_keeper_t *self, char what, const char *text, size_t length) {
-    char message[MESSAGE_MAX];
+static bool say(gw_keeper_t *self, char what, const char *text, size_t length) {
     if (length > GW_KEEPER_TEXT_MAX) {
         errno = EAGAIN;
         return false;
     }
-    message[0] = what;
-    memcpy(&message[1], text, length);
-    return gw_child_say(&self->child, message, length + 1U);
+    self->message[0] = what;
+    memcpy(&self->message[1], text, length);
+    return gw_child_say(&self->child, self->message, length + 1U);
 }
 
 bool gw_keeper_write(gw_keeper_t *self, const char *text, size_t length) {
@@ -167,12 +165,10 @@ void gw_keeper_set_aside(gw_keeper_t *self) {
     (void)say(self, SAY_ASIDE, "", 0U);
 }
 
-gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_MAX], size_t *out_length,
-                                int *out_error) {
-    char message[MESSAGE_MAX];
+gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, const char **out_text, size_t *out_length, int *out_error) {
     size_t length;
     const gw_child_news_t heard =
-        self->waits ? gw_child_hear(&self->child, message, sizeof message, &length) : GW_CHILD_SILENT;
+        self->waits ? gw_child_hear(&self->child, self->message, sizeof self->message, &length) : GW_CHILD_SILENT;
     if (heard == GW_CHILD_SILENT) {
         return GW_KEEPER_NO_NEWS;
     }
@@ -180,12 +176,12 @@ gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_
     if (heard == GW_CHILD_ENDED) {
         return GW_KEEPER_GONE;
     }
-    const gw_keeper_news_t news = (gw_keeper_news_t)message[0];
+    const gw_keeper_news_t news = (gw_keeper_news_t)self->message[0];
     if (news == GW_KEEPER_READ) {
         *out_length = length - 1U;
-        memcpy(out_text, &message[1], *out_length);
+        *out_text = &self->message[1];
     } else if (length == 1U + sizeof *out_error) {
-        memcpy(out_error, &message[1], sizeof *out_error);
+        memcpy(out_error, &self->message[1], sizeof *out_error);
     }
     return news;
 }

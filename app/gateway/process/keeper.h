@@ -12,8 +12,10 @@
 #include "child.h"
 
 /// The longest text that is kept or read.
-#define GW_KEEPER_TEXT_MAX  16384U
-#define GW_KEEPER_NAME_SIZE 288U
+#define GW_KEEPER_TEXT_MAX 16384U
+/// And the byte before it.
+#define GW_KEEPER_MESSAGE_MAX (1U + GW_KEEPER_TEXT_MAX)
+#define GW_KEEPER_NAME_SIZE   288U
 
 typedef enum {
     GW_KEEPER_NO_NEWS = 0,
@@ -29,7 +31,8 @@ typedef struct {
     gw_child_t child;
     const char *directory;
     char name[GW_KEEPER_NAME_SIZE];
-    bool waits; ///< News are owed.
+    bool waits;                          ///< News are owed.
+    char message[GW_KEEPER_MESSAGE_MAX]; ///< Said or heard last.
 } gw_keeper_t;
 
 /// Starts the keeper of DIRECTORY/NAME and lets it read. 0, or an errno. `directory` must outlive it.
@@ -41,10 +44,9 @@ bool gw_keeper_write(gw_keeper_t *self, const char *text, size_t length);
 /// Asks that the present file be renamed to NAME.damaged before the next text is written.
 void gw_keeper_set_aside(gw_keeper_t *self);
 
-/// The next news, if there are any. `*out_length` bytes are written to `out_text` with GW_KEEPER_READ; `*out_error` is
-/// an errno, or a reason of owners.h, with GW_KEEPER_BAD and GW_KEEPER_FAILED.
-gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_MAX], size_t *out_length,
-                                int *out_error);
+/// The next news, if there are any. `*out_text` and `*out_length` are written with GW_KEEPER_READ: it stays until the
+/// next call. `*out_error` is an errno, or a reason of owners.h, with GW_KEEPER_BAD and GW_KEEPER_FAILED.
+gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, const char **out_text, size_t *out_length, int *out_error);
 
 void gw_keeper_close(gw_keeper_t *self);
 

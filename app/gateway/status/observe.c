@@ -273,12 +273,13 @@ static void tell_frame(gw_status_t *self, const gw_tapped_t *tapped) {
 }
 
 void gw_observe_frames(gw_status_t *self) {
+    gw_tape_t *tape = &self->wheels->tape;
     if (gw_clients_anybody_watches(self->clients, IWN_TOPIC_FRAME)) {
-        for (uint32_t i = 0; i < self->wheels->tapped; i++) {
-            tell_frame(self, &self->wheels->tap[i]);
+        for (uint32_t i = 0; i < tape->tapped; i++) {
+            tell_frame(self, &tape->tap[i]);
         }
     }
-    self->wheels->tapped = 0;
+    tape->tapped = 0;
 }
 
 void gw_observe_write_hello(const gw_wheels_t *wheels, const gw_client_t *client, iwn_out_t *json) {

@@ -62,7 +62,7 @@ void gw_observe_periodic(gw_status_t *self);
 /// When `gw_observe_periodic` has something to do; IW_NEVER if nobody watches.
 iw_time_us_t gw_observe_next_us(const gw_clients_t *clients);
 
-/// Sends the frames tapped since the last call to the watchers of the topic `frame`.
+/// Sends the frames that the tape has tapped since the last call to the watchers of the topic `frame`.
 void gw_observe_frames(gw_status_t *self);
 
 /// The event `hello`, to a new client.

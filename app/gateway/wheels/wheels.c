@@ -5,21 +5,10 @@
 
 #include <string.h>
 
-/// The HAL's tap.
-static void tap(void *context, const iw_can_frame_t *frame) {
-    gw_wheels_t *self = (gw_wheels_t *)context;
-    if (self->tapped < GW_FRAMES) {
-        self->tap[self->tapped++] = (gw_tapped_t){.at_us = self->now_us, .frame = *frame};
-    }
-}
-
 iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, blackbox_ring_t *ring, bool restarted) {
-    const iw_hal_t port = iw_linux_hal_functions(&self->hal);
-    self->hal.tap = tap;
-    self->hal.tap_context = self;
     gw_tape_init(&self->tape, ring);
     iw_motion_evidence_init(&self->evidence);
-    const iw_hal_t hal = gw_tape_hal(&self->tape, &port);
+    const iw_hal_t hal = gw_tape_hal(&self->tape, &self->hal);
     const iw_config_fault_t fault = iw_gateway_init(&self->core, config, &hal, self->now_us, restarted);
     if (fault == IW_CONFIG_OK) {
         gw_wheels_note(self, IW_CLIENT_NONE,

@@ -13,15 +13,8 @@
 #include "iwheel/gateway.h"
 #include "iwheel_linux/linux_hal.h"
 
-/// Frames of one step, for the watchers of the topic `frame`.
-#define GW_FRAMES       IW_GATEWAY_DRAIN_MAX
 #define GW_WARNINGS     8U
 #define GW_WARNING_SIZE 400U
-
-typedef struct {
-    iw_time_us_t at_us;
-    iw_can_frame_t frame;
-} gw_tapped_t;
 
 typedef struct {
     iw_gateway_t core;
@@ -35,8 +28,6 @@ typedef struct {
     iw_time_us_t step_us; ///< When the next step is due, as the last one wished.
     bool requested;       ///< A request has changed something since the last step.
     bool shutting_down;
-    uint32_t tapped; ///< Frames in `tap`. A step takes no more than there is room for.
-    gw_tapped_t tap[GW_FRAMES];
     uint32_t warnings; ///< What is wrong enough to be said at start, in `status` and with every arm.
     char warning[GW_WARNINGS][GW_WARNING_SIZE];
 } gw_wheels_t;
