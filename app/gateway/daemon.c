@@ -10,20 +10,15 @@ void gw_daemon_compose(gw_daemon_t *self) {
     const gateway_config_t *config = &self->config;
     gw_wheels_t *wheels = &self->wheels;
     gw_clients_t *clients = &self->clients;
-    wheels->bus = config->bus.interface;
+    wheels->bus = gw_report_wish(config);
     wheels->estop = config->estop.line;
-    self->facts.wish = gw_report_wish(config);
     self->knowledge.wheels = wheels;
     self->knowledge.log = &self->log;
     self->knowledge.clients = clients;
     self->knowledge.configured = (gw_configured_t){&config->core, config->track_mm};
     self->knowledge.bus = config->bus.interface;
-    self->status = (gw_status_t){.wheels = wheels,
-                                 .facts = &self->facts,
-                                 .knowledge = &self->knowledge,
-                                 .box = &self->box,
-                                 .log = &self->log,
-                                 .clients = clients};
+    self->status = (gw_status_t){
+        .wheels = wheels, .knowledge = &self->knowledge, .box = &self->box, .log = &self->log, .clients = clients};
     self->answers = (gw_answers_t){.wheels = wheels,
                                    .knowledge = &self->knowledge,
                                    .box = &self->box,

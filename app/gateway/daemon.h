@@ -24,7 +24,7 @@
 #include "status/observe.h"
 #include "wheels/wheels.h"
 
-typedef struct {
+typedef struct gw_daemon {
     gateway_config_t config;
     gw_log_t log;
     gw_notify_t notify;

@@ -4,6 +4,7 @@
 #include "answers/recordings.h"
 #include "box/record.h"
 #include "clients/service.h"
+#include "daemon.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -210,7 +211,11 @@ static void listen_to_writer(gw_daemon_t *daemon) {
     if (daemon->wheels.now_us >= daemon->box_look_us) {
         daemon->box_look_us = daemon->wheels.now_us + BOX_LOOK_US;
         gw_record_take(&daemon->box, &daemon->log);
-        gw_recordings_take(&daemon->box, &daemon->clients);
+        if (!gw_recordings_take(&daemon->box, &daemon->clients)) {
+            gw_log(&daemon->log, GW_LOG_WARNING,
+                   "the process that reads recordings has ended (was it killed?); it is started again with the next "
+                   "request");
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "clients/service.h"
+#include "daemon.h"
 #include "loop.h"
 #include "start/options.h"
 #include "start/report.h"

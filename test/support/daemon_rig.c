@@ -2,6 +2,7 @@
 #include "daemon_rig.h"
 
 #include "clients/service.h"
+#include "daemon.h"
 #include "loop.h"
 
 #include "iwheel_linux/clock.h"

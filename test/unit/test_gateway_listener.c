@@ -3,6 +3,7 @@
 #include "clients/listener.h"
 
 #include "config/gateway_config.h"
+#include "process/log.h"
 
 #include "unity.h"
 

@@ -2,9 +2,12 @@
 #include "dispatch.h"
 
 #include "box/record.h"
+#include "clients/clients.h"
+#include "ledger/knowledge.h"
 #include "recordings.h"
 #include "refuse.h"
 #include "status/snapshot.h"
+#include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"
 

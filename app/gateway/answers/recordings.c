@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "recordings.h"
 
+#include "box/box.h"
+#include "clients/clients.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -56,8 +59,6 @@ static void pass_on(gw_clients_t *clients, const gw_box_answer_t *answer) {
 }
 
 static void give_up(gw_clients_t *clients) {
-    gw_log(clients->log, GW_LOG_WARNING,
-           "the process that reads recordings has ended (was it killed?); it is started again with the next request");
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         gw_client_t *client = &clients->client[i];
         if (client->id != IW_CLIENT_NONE && client->reading) {
@@ -68,15 +69,12 @@ static void give_up(gw_clients_t *clients) {
     }
 }
 
-void gw_recordings_take(gw_box_t *box, gw_clients_t *clients) {
-    switch (gw_box_hear(box)) {
-    case GW_CHILD_SAID:
+bool gw_recordings_take(gw_box_t *box, gw_clients_t *clients) {
+    const gw_child_news_t news = gw_box_hear(box);
+    if (news == GW_CHILD_SAID) {
         pass_on(clients, &box->answer);
-        break;
-    case GW_CHILD_ENDED:
+    } else if (news == GW_CHILD_ENDED) {
         give_up(clients);
-        break;
-    case GW_CHILD_SILENT:
-        break;
     }
+    return news != GW_CHILD_ENDED;
 }

@@ -11,7 +11,7 @@
 /// Carries out `recordings` or `recording`: refuses it, or leaves its reply to `gw_recordings_take`.
 void gw_recordings_ask(const gw_call_t *call);
 
-/// Passes on what has been read, if anything has.
-void gw_recordings_take(gw_box_t *box, gw_clients_t *clients);
+/// Passes on what has been read, if anything has. False: the process that reads has ended; who waited for it is told.
+bool gw_recordings_take(struct gw_box *box, struct gw_clients *clients);
 
 #endif

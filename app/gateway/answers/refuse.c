@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "refuse.h"
 
+#include "clients/clients.h"
+#include "ledger/knowledge.h"
+#include "status/observe.h"
+#include "wheels/wheels.h"
+
 #include "iwheel_northbound/words.h"
 
 #include <inttypes.h>
@@ -107,7 +112,7 @@ static void say_stalled(const wording_t *self) {
     static const char cure[] = "check that the wheels have power and the bus is terminated";
     const gw_wheels_t *wheels = self->answers->wheels;
     const iw_time_us_t waiting_us = self->seen.waiting_us;
-    const char *bus = wheels->bus;
+    const char *bus = wheels->bus.name;
     if (waiting_us == IW_NEVER) {
         SAY(self, "the zero setpoints were not acknowledged on the bus within %u ms; %s", self->seen.config->echo_ms,
             cure);
@@ -196,7 +201,7 @@ static void say_latched(const wording_t *self) {
 
 static void say_bus_down(const wording_t *self) {
     const gw_wheels_t *wheels = self->answers->wheels;
-    const char *bus = wheels->bus;
+    const char *bus = wheels->bus.name;
     const bool local = iw_linux_hal_link(&wheels->hal)->presence == IW_LINK_LOCAL;
     const bool off = self->seen.bus == IW_BUS_OFF;
     SAY(self, "bus %s is %s; %s%s", bus, iwn_bus_state_name(self->seen.bus),
@@ -208,7 +213,7 @@ static void say_bus_down(const wording_t *self) {
 }
 
 static void say_timing(const wording_t *self) {
-    const inspect_wish_t *wish = &self->answers->status->facts->wish;
+    const inspect_wish_t *wish = &self->answers->wheels->bus;
     SAY(self, "the bit timing of %s is not %u bit/s with sample point %u permille; set it, or on_mismatch = warn",
         wish->name, (unsigned)wish->bitrate_hz, wish->sample_point_permille);
 }

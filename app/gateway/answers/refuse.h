@@ -3,6 +3,7 @@
 #ifndef GATEWAY_REFUSE_H
 #define GATEWAY_REFUSE_H
 
+#include "clients/client.h"
 #include "dispatch.h"
 
 /// `request` is the one refused.

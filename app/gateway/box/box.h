@@ -16,7 +16,7 @@
 #include "disk/recording.h"
 #include "process/child.h"
 
-typedef struct {
+typedef struct gw_box {
     blackbox_ring_t *ring;
     size_t ring_size;
     gw_box_wish_t wish;

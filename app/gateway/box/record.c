@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "record.h"
 
+#include "box.h"
+#include "process/log.h"
 #include "process/owners.h"
 
 #include "iwheel_northbound/words.h"

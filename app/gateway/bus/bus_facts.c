@@ -2,16 +2,17 @@
 #include "bus_facts.h"
 
 #include "bus_left.h"
+#include "wheels/wheels.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 
-static iw_timing_t judge(const gw_bus_facts_t *self, const iw_bus_link_t *link) {
-    return iw_timing_judge(link, self->wish.bitrate_hz, self->wish.sample_point_permille);
+static iw_timing_t judge(const inspect_wish_t *wish, const iw_bus_link_t *link) {
+    return iw_timing_judge(link, wish->bitrate_hz, wish->sample_point_permille);
 }
 
-const char *gw_bus_facts_timing(const gw_bus_facts_t *self, const iw_bus_link_t *link) {
-    switch (judge(self, link)) {
+const char *gw_bus_facts_timing(const inspect_wish_t *wish, const iw_bus_link_t *link) {
+    switch (judge(wish, link)) {
     case IW_TIMING_RIGHT:
         return "confirmed";
     case IW_TIMING_NEAR:
@@ -33,7 +34,7 @@ __attribute__((format(printf, 2, 3))) static void warn(gw_wheels_t *wheels, cons
     }
 }
 
-static void note_warnings(const gw_bus_facts_t *self, gw_wheels_t *wheels) {
+static void note_warnings(gw_wheels_t *wheels, bool left_behind) {
     const iw_linux_hal_t *hal = &wheels->hal;
     char sentence[GW_WARNING_SIZE];
     wheels->warnings = 0;
@@ -43,13 +44,13 @@ static void note_warnings(const gw_bus_facts_t *self, gw_wheels_t *wheels) {
     } else if (hal->estop_ops->simulated) {
         warn(wheels, "the e-stop %s is SIMULATED: no button of this machine stops the wheels", wheels->estop);
     }
-    if (self->left_behind) {
-        gw_bus_left_sentence(iw_linux_hal_link(hal), wheels->bus, sentence, sizeof sentence);
+    if (left_behind) {
+        gw_bus_left_sentence(iw_linux_hal_link(hal), wheels->bus.name, sentence, sizeof sentence);
         warn(wheels, "%s", sentence);
     }
     static inspect_findings_t findings; // Too large for a stack.
     inspect_begin(&findings);
-    inspect_link(iw_linux_hal_link(hal), &self->wish, &findings);
+    inspect_link(iw_linux_hal_link(hal), &wheels->bus, &findings);
     for (unsigned i = 0; i < findings.count; i++) {
         if (findings.finding[i].verdict != INSPECT_OK) {
             inspect_sentence(&findings.finding[i], sentence, sizeof sentence);
@@ -65,7 +66,8 @@ void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_be
         return;
     }
     if (news) {
-        const iw_bus_facts_t facts = {.timing_contradicted = self->wish.refuses && judge(self, link) == IW_TIMING_WRONG,
+        const iw_bus_facts_t facts = {.timing_contradicted =
+                                          wheels->bus.refuses && judge(&wheels->bus, link) == IW_TIMING_WRONG,
                                       .echo_proven = link->echo_proven};
         self->known = true;
         self->changes = link->changes;
@@ -73,5 +75,5 @@ void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_be
         gw_tape_facts(&wheels->tape, wheels->now_us, &facts);
     }
     self->left_behind = left_behind;
-    note_warnings(self, wheels);
+    note_warnings(wheels, left_behind);
 }

@@ -23,7 +23,7 @@
 /// A request carried out this soon after its client had nothing waiting counts as sent when it is carried out.
 #define GW_PROMPT_US 25000U
 
-typedef struct {
+typedef struct gw_client {
     iw_client_t id; ///< Never used again for another connection; IW_CLIENT_NONE: the slot is free.
     int fd;
     int pid;   ///< Of the process that connected; 0 if unknown.

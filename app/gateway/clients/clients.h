@@ -9,22 +9,24 @@
 
 #include "iwheel_northbound/json_out.h"
 
+struct gw_log;
+
 /// Slots of those who may drive, and behind them of those who may only watch: neither takes the others'.
 #define GW_DRIVERS_MAX  64U
 #define GW_WATCHERS_MAX 64U
 #define GW_CLIENTS_MAX  (GW_DRIVERS_MAX + GW_WATCHERS_MAX)
 
 /// What is done for a client beside reading and sending. Each is called with `context`.
-typedef struct {
+typedef struct gw_servant {
     void (*welcome)(void *context, gw_client_t *client);
     void (*carry_out)(void *context, gw_client_t *client, const char *line, size_t length);
     void (*leave)(void *context, gw_client_t *client); ///< It can hold no lease any more.
     void *context;
 } gw_servant_t;
 
-typedef struct {
+typedef struct gw_clients {
     gw_servant_t servant;
-    gw_log_t *log;
+    struct gw_log *log;
     gw_listener_t listener[GW_RIGHTS];
     uint32_t most[GW_RIGHTS];         ///< Connections, by the configuration.
     uint32_t count[GW_RIGHTS];        ///< The same that are open.

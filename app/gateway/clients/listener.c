@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "listener.h"
 
+#include "process/log.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <grp.h>

@@ -10,11 +10,14 @@
 #ifndef GATEWAY_LISTENER_H
 #define GATEWAY_LISTENER_H
 
-#include "process/log.h"
 #include "process/owners.h"
+
+#include "iwheel/types.h"
 
 #include <stdio.h>
 #include <sys/types.h>
+
+struct gw_log;
 
 /// After an accept that failed for want of anything, the socket is left alone this long.
 #define GW_LISTENER_PAUSE_US 200000U
@@ -60,7 +63,7 @@ int gw_listener_prepare(gw_listener_t *self, const gw_listener_wish_t *wish, FIL
 
 /// After gw_listener_prepare. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does
 /// not exist or may not be given is a warning in the log: the socket is then stricter than asked for.
-int gw_listener_open(gw_listener_t *self, gw_log_t *log, FILE *err);
+int gw_listener_open(gw_listener_t *self, struct gw_log *log, FILE *err);
 
 /// Closes the socket and removes its file, if it is still ours; closes the folder.
 void gw_listener_close(gw_listener_t *self);

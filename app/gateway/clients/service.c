@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "service.h"
 
+#include "process/log.h"
+
 #include "iwheel_linux/clock.h"
 
 #include <stdio.h>

@@ -3,7 +3,8 @@
 
 #include "bounds.h"
 #include "knowledge_told.h"
-#include "process/owners.h"
+#include "process/log.h"
+#include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"
 #include "iwheel_northbound/words.h"

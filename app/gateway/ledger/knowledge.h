@@ -8,11 +8,17 @@
 #ifndef GATEWAY_KNOWLEDGE_H
 #define GATEWAY_KNOWLEDGE_H
 
-#include "clients/clients.h"
 #include "memory.h"
 #include "process/keeper.h"
-#include "process/log.h"
-#include "wheels/wheels.h"
+#include "process/owners.h"
+
+#include "iwheel/gateway.h"
+#include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/request.h"
+
+struct gw_clients;
+struct gw_log;
+struct gw_wheels;
 
 /// Nothing is told before the keeper has answered, but not for longer than this.
 #define GW_KNOWLEDGE_PATIENCE_US 1000000U
@@ -50,10 +56,10 @@ typedef struct {
     char text[GW_LEDGER_TEXT_SIZE];
 } gw_ledger_written_t;
 
-typedef struct {
-    gw_wheels_t *wheels; ///< Of which it is known.
-    gw_log_t *log;       ///< Told what is learnt, and the clients.
-    gw_clients_t *clients;
+typedef struct gw_knowledge {
+    struct gw_wheels *wheels; ///< Of which it is known.
+    struct gw_log *log;       ///< Told what is learnt, and the clients.
+    struct gw_clients *clients;
     gw_configured_t configured;
     const char *bus;
     gw_known_t known;

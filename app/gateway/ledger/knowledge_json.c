@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "process/owners.h"
+#include "wheels/wheels.h"
 
 #include "iwheel_northbound/words.h"
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge_told.h"
 
-#include "process/owners.h"
+#include "clients/clients.h"
+#include "process/log.h"
+#include "wheels/wheels.h"
 
 #include "iwheel_northbound/words.h"
 

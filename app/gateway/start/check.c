@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
+#include "config/gateway_config.h"
 #include "process/owners.h"
 
 #include <errno.h>

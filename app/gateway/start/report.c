@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
+#include "config/gateway_config.h"
+#include "process/log.h"
+
 #include <inttypes.h>
 
 void gw_report_start(const gateway_config_t *config, bool simulated, bool watched, gw_log_t *log) {

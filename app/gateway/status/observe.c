@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "observe.h"
 
+#include "box/box.h"
 #include "box/record.h"
 #include "bus/bus_left.h"
+#include "clients/clients.h"
+#include "ledger/knowledge.h"
+#include "process/log.h"
 #include "process/owners.h"
 #include "snapshot.h"
+#include "wheels/wheels.h"
 
 #include "inspect.h"
 
@@ -57,7 +62,7 @@ static void observe_stop(gw_status_t *self, const iw_stop_t *stop) {
     *note = (iwn_stop_note_t){.stop = *stop, .wall_us = iw_clock_wall_us()};
     note_client(self, note, who, sizeof who);
     const iwn_why_context_t context = {
-        .client = who, .reason = self->estop_reason, .estop = self->wheels->estop, .bus = self->wheels->bus};
+        .client = who, .reason = self->estop_reason, .estop = self->wheels->estop, .bus = self->wheels->bus.name};
     iwn_why_sentence(&note->stop, &context, note->sentence, sizeof note->sentence);
     gw_log(self->log, GW_LOG_WARNING, "stop %u: %s", (unsigned)stop->number, note->sentence);
     gw_wheels_note_stop(self->wheels, stop);
@@ -100,7 +105,7 @@ static void observe_bus(gw_status_t *self, iw_bus_state_t bus, bool first) {
         return;
     }
     self->observed.bus = bus;
-    gw_log(self->log, (bus == IW_BUS_ACTIVE) ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s", self->wheels->bus,
+    gw_log(self->log, (bus == IW_BUS_ACTIVE) ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s", self->wheels->bus.name,
            iwn_bus_state_name(bus));
     iwn_out_t json = gw_clients_begin_event(self->clients, "bus");
     iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
@@ -137,10 +142,10 @@ static void tell_fault(gw_status_t *self, const char *cause, bool present) {
 static void tell_left_behind(gw_status_t *self) {
     const iw_bus_link_t *link = iw_linux_hal_link(&self->wheels->hal);
     char sentence[GW_WARNING_SIZE];
-    gw_bus_left_sentence(link, self->wheels->bus, sentence, sizeof sentence);
+    gw_bus_left_sentence(link, self->wheels->bus.name, sentence, sizeof sentence);
     gw_log(self->log, GW_LOG_WARNING, "%s", sentence);
     if (link->presence != IW_LINK_LOCAL) { // Where nobody could be asked, the sentence says what to do.
-        (void)gw_bus_left_ask(GW_RUNTIME_DIRECTORY, self->wheels->bus);
+        (void)gw_bus_left_ask(GW_RUNTIME_DIRECTORY, self->wheels->bus.name);
     }
 }
 
@@ -170,7 +175,7 @@ static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
 
 static void observe_purge(gw_status_t *self) {
     const iw_link_purge_t purge = iw_linux_hal_link(&self->wheels->hal)->purge;
-    const char *bus = self->wheels->bus;
+    const char *bus = self->wheels->bus.name;
     if (purge == self->observed.purge) {
         return;
     }
@@ -286,7 +291,7 @@ void gw_observe_write_hello(const gw_wheels_t *wheels, const gw_client_t *client
     iwn_out_text(json, "name", "iwheel-gateway");
     iwn_out_text(json, "version", IWHEEL_VERSION);
     iwn_out_int(json, "api", API_VERSION);
-    iwn_out_text(json, "bus", wheels->bus);
+    iwn_out_text(json, "bus", wheels->bus.name);
     iwn_out_text(json, "state", iwn_state_name(iw_gateway_state(&wheels->core)));
     iwn_out_int(json, "client", client->id);
     iwn_out_text(json, "rights", (client->right == GW_DRIVE) ? "drive" : "watch");

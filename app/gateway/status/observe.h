@@ -5,13 +5,18 @@
 #ifndef GATEWAY_OBSERVE_H
 #define GATEWAY_OBSERVE_H
 
-#include "box/box.h"
-#include "bus/bus_facts.h"
-#include "clients/clients.h"
-#include "ledger/knowledge.h"
-#include "wheels/wheels.h"
+#include "clients/client.h"
 
+#include "iwheel/snapshot.h"
+#include "iwheel_linux/bus_link.h"
+#include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/why.h"
+
+struct gw_box;
+struct gw_clients;
+struct gw_knowledge;
+struct gw_log;
+struct gw_wheels;
 
 /// What was last told to the log and to watchers, so that only changes are told.
 typedef struct {
@@ -36,13 +41,12 @@ typedef struct {
     uid_t uid;
 } gw_stopper_t;
 
-typedef struct {
-    gw_wheels_t *wheels; ///< What it tells of; the box records stops.
-    const gw_bus_facts_t *facts;
-    gw_knowledge_t *knowledge;
-    gw_box_t *box;
-    gw_log_t *log; ///< Whom it tells.
-    gw_clients_t *clients;
+typedef struct gw_status {
+    struct gw_wheels *wheels; ///< What it tells of; the box records stops.
+    struct gw_knowledge *knowledge;
+    struct gw_box *box;
+    struct gw_log *log; ///< Whom it tells.
+    struct gw_clients *clients;
     gw_observed_t observed;
     iwn_stop_note_t last_stop;
     gw_stopper_t stopped_by; ///< What the clients have asked for, until the stop that comes of it is told.
@@ -60,7 +64,7 @@ void gw_observe(gw_status_t *self, const iw_snapshot_t *seen);
 void gw_observe_periodic(gw_status_t *self);
 
 /// When `gw_observe_periodic` has something to do; IW_NEVER if nobody watches.
-iw_time_us_t gw_observe_next_us(const gw_clients_t *clients);
+iw_time_us_t gw_observe_next_us(const struct gw_clients *clients);
 
 /// Sends the frames that the tape has tapped since the last call to the watchers of the topic `frame`.
 void gw_observe_frames(gw_status_t *self);
@@ -69,6 +73,6 @@ void gw_observe_frames(gw_status_t *self);
 void gw_observe_hello(gw_status_t *self, gw_client_t *client);
 
 /// Name, version and so on, into an object that is open: event and reply of `hello`.
-void gw_observe_write_hello(const gw_wheels_t *wheels, const gw_client_t *client, iwn_out_t *json);
+void gw_observe_write_hello(const struct gw_wheels *wheels, const gw_client_t *client, iwn_out_t *json);
 
 #endif

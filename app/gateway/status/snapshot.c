@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "snapshot.h"
 
+#include "bus/bus_facts.h"
+#include "clients/clients.h"
+#include "ledger/knowledge.h"
+#include "wheels/wheels.h"
+
 #include "iwheel_linux/clock.h"
 
 #include <stdio.h>
@@ -123,9 +128,9 @@ static void write_surroundings(const gw_status_t *status, const iw_snapshot_t *s
     const gw_wheels_t *wheels = status->wheels;
     const iw_bus_link_t *link = iw_linux_hal_link(&wheels->hal);
     iwn_out_open(json, "bus", '{');
-    iwn_out_text(json, "name", wheels->bus);
+    iwn_out_text(json, "name", wheels->bus.name);
     iwn_out_text(json, "state", iwn_bus_state_name(seen->bus));
-    iwn_out_text(json, "timing", gw_bus_facts_timing(status->facts, link));
+    iwn_out_text(json, "timing", gw_bus_facts_timing(&wheels->bus, link));
     iwn_out_text(json, "echo", seen->echo_proven ? "proven" : "unproven");
     iwn_out_known(json, "bitrate", link->bitrate_hz != 0U, link->bitrate_hz);
     iwn_out_known(json, "sample_point_permille", link->sample_point_permille != 0U, link->sample_point_permille);

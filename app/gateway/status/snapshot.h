@@ -3,6 +3,7 @@
 #ifndef GATEWAY_SNAPSHOT_H
 #define GATEWAY_SNAPSHOT_H
 
+#include "ledger/memory.h"
 #include "observe.h"
 
 /// Telemetry other than speed is worth nothing after this: five periods of the status and pose frames.

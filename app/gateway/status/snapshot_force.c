@@ -2,6 +2,9 @@
 // Forces, with where their zero comes from and how good it is.
 #include "snapshot.h"
 
+#include "ledger/knowledge.h"
+#include "wheels/wheels.h"
+
 #include "iwheel_linux/clock.h"
 
 /// Where the zero comes from, and how good it is.

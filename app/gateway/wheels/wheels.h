@@ -9,6 +9,8 @@
 #include "gaps.h"
 #include "tape.h"
 
+#include "inspect.h"
+
 #include "iwheel/evidence.h"
 #include "iwheel/gateway.h"
 #include "iwheel_linux/linux_hal.h"
@@ -16,13 +18,13 @@
 #define GW_WARNINGS     8U
 #define GW_WARNING_SIZE 400U
 
-typedef struct {
+typedef struct gw_wheels {
     iw_gateway_t core;
     iw_linux_hal_t hal;
     gw_tape_t tape;
     iw_motion_evidence_t evidence;
     gw_gaps_t gaps;
-    const char *bus;      ///< As configured.
+    inspect_wish_t bus;   ///< As configured.
     const char *estop;    ///< The line, as configured.
     iw_time_us_t now_us;  ///< Of the present cycle.
     iw_time_us_t step_us; ///< When the next step is due, as the last one wished.
