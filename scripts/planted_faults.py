@@ -166,6 +166,16 @@ def house(folder, fault):
     return run(sys.executable, folder / "scripts/house.py", folder)
 
 
+def api(folder, fault):
+    """The reference of small copies of the headers' folders, of which one is `fault`."""
+    for name in ("core", "northbound", "client/c", "port/linux"):
+        (folder / name / "include").mkdir(parents=True)
+    (folder / "docs").mkdir()
+    shutil.copy(ROOT / "docs/Doxyfile", folder / "docs")
+    (folder / "core/include/planted.h").write_text(fault)
+    return run(SCRIPTS / "api_reference", folder)
+
+
 def dialect(folder, code):
     (folder / "app").mkdir()
     (folder / "app/planted.c").write_text(code)
@@ -297,6 +307,10 @@ CASES = [
     (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\nint iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}'), True),
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),
     (house, "gcc", "a header includes one level more", ("core/src/magnitude.h", "#include <stdint.h>", '#include "iwheel/gateway.h"'), True),
+    (api, "doxygen", "clean", "/// @file\n/// A header.\n\n/// Does nothing.\nvoid iw_f(void);\n", False),
+    (api, "doxygen", "a function without a word", "/// @file\n/// A header.\n\nvoid iw_f(void);\n", True),
+    (api, "doxygen", "a member without a word", "/// @file\n/// A header.\n\n/// A struct.\ntypedef struct {\n    int a;\n} iw_a_t;\n", True),
+    (api, "doxygen", "a header that Doxygen would pass over", "/// A header.\nvoid iw_f(void);\n", True),
     (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
     (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Interface of a kind of bus and of a kind of e-stop: each is one file, and the rest of the port does not know which
 /// is in use.
 ///
@@ -15,14 +16,15 @@
 
 /// Storage for the state of any backend, so that the owner need not know its size.
 typedef union {
-    uint64_t align;
-    uint8_t bytes[4096];
+    uint64_t align;      ///< For the strictest alignment that a backend needs.
+    uint8_t bytes[4096]; ///< The backend's own.
 } iw_backend_store_t;
 
 /// A kind of bus. `self` is its state, of a type that only the backend knows.
 typedef struct {
     /// 0, or an errno. `name` must outlive the bus. A bus that is merely absent is no error: it is down until it comes.
     int (*open)(void *self, const char *name);
+    /// Gives back what `open` took.
     void (*close)(void *self);
     /// The descriptor to watch for reading; the same from open to close.
     int (*watch_fd)(const void *self);
@@ -32,8 +34,11 @@ typedef struct {
     iw_time_us_t (*next_us)(const void *self);
     /// As in iw_hal_t.
     int (*send)(void *self, const iw_can_frame_t *frame);
+    /// As in iw_hal_t.
     int (*receive)(void *self, iw_can_frame_t *out_frame);
+    /// As `bus_state` of iw_hal_t.
     iw_bus_state_t (*state)(void *self);
+    /// As in iw_hal_t.
     int (*purge)(void *self);
     /// What is known of the link, always up to date.
     const iw_bus_link_t *(*link)(const void *self);
@@ -48,11 +53,12 @@ typedef struct {
 
 /// A kind of e-stop input. The functions mean the same as those of a bus.
 typedef struct {
+    /// 0, or an errno.
     int (*open)(void *self, const iw_estop_wish_t *wish);
-    void (*close)(void *self);
-    int (*watch_fd)(const void *self); ///< -1: there is nothing to watch.
-    void (*tend)(void *self, iw_time_us_t now_us);
-    iw_time_us_t (*next_us)(const void *self);
+    void (*close)(void *self);                     ///< Gives back what `open` took.
+    int (*watch_fd)(const void *self);             ///< -1: there is nothing to watch.
+    void (*tend)(void *self, iw_time_us_t now_us); ///< Call it before every step.
+    iw_time_us_t (*next_us)(const void *self);     ///< When `tend` has something to do; IW_NEVER if not.
     /// As `estop_pressed` of iw_hal_t. `quiet`: the wait that has just ended found nothing at the descriptor, so that
     /// there are no edges to be read; the level always is.
     int (*pressed)(void *self, bool quiet);
@@ -78,6 +84,7 @@ extern const iw_estop_ops_t *const iw_gpio_estop_ops;
 
 /// The backend for a name as in the configuration; NULL if this build has none for it.
 const iw_bus_ops_t *iw_bus_backend(const char *name);
+/// The same for an e-stop's name.
 const iw_estop_ops_t *iw_estop_backend(const char *name);
 
 #endif
