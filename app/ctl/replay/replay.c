@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "replay.h"
 
-#include "replay_tell.h"
-
 #include <string.h>
 
 static int side_of(const iw_can_frame_t *frame) {

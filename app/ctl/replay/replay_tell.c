@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "replay_tell.h"
+#include "replay.h"
 
 #include "text/text.h"
 

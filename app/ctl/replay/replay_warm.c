@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "replay_warm.h"
+#include "replay.h"
 
 #include "iwheel/codec.h"
 

@@ -4,8 +4,6 @@
 #include "recordings/recording.h"
 #include "recordings/source.h"
 #include "replay.h"
-#include "replay_tell.h"
-#include "replay_warm.h"
 #include "talk/ctl.h"
 #include "text/text.h"
 

@@ -3,8 +3,7 @@
 #include "talk/ctl.h"
 #include "talk/near.h"
 #include "text/text.h"
-#include "why_disk.h"
-#include "why_print.h"
+#include "why.h"
 
 #include <stdio.h>
 #include <stdlib.h>

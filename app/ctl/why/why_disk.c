@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "why_disk.h"
+#include "why.h"
 
 #include "recordings/events.h"
 #include "recordings/recording.h"
 #include "recordings/source.h"
 #include "text/text.h"
-#include "why_print.h"
 
 #include <dirent.h>
 #include <errno.h>

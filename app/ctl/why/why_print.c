@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "why_print.h"
+#include "why.h"
 
-#include "decode/frame_json.h"
-#include "decode/frame_line.h"
+#include "decode/frame.h"
 #include "text/text.h"
 
 #include <inttypes.h>
