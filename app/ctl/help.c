@@ -3,6 +3,7 @@
 
 #include "gateway_config.h"
 #include "similar.h"
+#include "talk/words.h"
 #include "text/duration.h"
 
 #include "iwheel_northbound/words.h"
@@ -284,7 +285,7 @@ int verb_help(ctl_t *self, int count, char **words) {
     const bool list = count > 0 && strcmp(words[count - 1], "--list") == 0;
     (void)self;
     count -= list ? 1 : 0;
-    if (!ctl_words_at_most("help", count, 1, words)) {
+    if (!words_at_most("help", count, 1, words)) {
         return CTL_USAGE;
     }
     const verb_t *verb = (count > 0) ? help_find(words[0]) : NULL;

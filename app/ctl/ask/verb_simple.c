@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Verbs that are one request and one answer.
 #include "talk/ctl.h"
+#include "talk/words.h"
 #include "text/text.h"
 
 #include <stdio.h>
@@ -37,7 +38,7 @@ static int ask_and_tell_state(ctl_t *self, json_t *request) {
 }
 
 int verb_stop(ctl_t *self, int count, char **words) {
-    if (!ctl_words_at_most("stop", count, 0, words)) {
+    if (!words_at_most("stop", count, 0, words)) {
         return CTL_USAGE;
     }
     return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "stop"));
@@ -60,7 +61,7 @@ int verb_estop(ctl_t *self, int count, char **words) {
 }
 
 int verb_reset(ctl_t *self, int count, char **words) {
-    if (!ctl_words_at_most("reset", count, 0, words)) {
+    if (!words_at_most("reset", count, 0, words)) {
         return CTL_USAGE;
     }
     return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "reset"));
@@ -88,7 +89,7 @@ static void print_tare(const json_t *reply, const char *side) {
 int verb_tare(ctl_t *self, int count, char **words) {
     json_t *reply = NULL;
     const char *side = (count > 0) ? words[0] : NULL;
-    if (!ctl_words_at_most("tare", count, 1, words)) {
+    if (!words_at_most("tare", count, 1, words)) {
         return CTL_USAGE;
     }
     if (side != NULL && strcmp(side, "left") != 0 && strcmp(side, "right") != 0) {

@@ -55,7 +55,7 @@ static bool is_told(const json_t *wheel, const char *field, int wanted) {
 
 static bool is_in_force(const burst_t *burst, const json_t *state) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *wheel = json_object_get(state, (side == IW_LEFT) ? "left" : "right");
+        const json_t *wheel = json_object_get(state, bringup_side((iw_side_t)side));
         if (!is_told(wheel, "applied_mm_s", burst->speed_mm_s[side]) ||
             (burst->has_current && !is_told(wheel, "applied_mA", burst->current_mA[side]))) {
             return false;
@@ -219,20 +219,23 @@ void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     }
 }
 
-bringup_result_t burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
-    for (bool again = true; again;) {
+bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
+    do {
         (void)fputs("  ... now; any key stops it\n", stdout);
         (void)fflush(stdout);
         burst_run(self, burst, out_outcome);
         if (out_outcome->end == BURST_DONE) {
             talk_say("  left %d mm/s, right %d mm/s measured", out_outcome->mean_mm_s[IW_LEFT],
                      out_outcome->mean_mm_s[IW_RIGHT]);
-            return BRINGUP_ON;
+            return true;
         }
         talk_say("  %s: %s", (out_outcome->end == BURST_REFUSED) ? "It did not begin" : "STOPPED", out_outcome->why);
-        if (!talk_yes("Once more?", false, &again)) {
-            return BRINGUP_QUIT;
-        }
+    } while (talk_yes(self, "Once more?", false));
+    return false;
+}
+
+void burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
+    if (!burst_show(self, burst, out_outcome)) {
+        bringup_fail(self);
     }
-    return BRINGUP_FAILED;
 }

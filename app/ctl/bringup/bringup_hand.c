@@ -72,19 +72,24 @@ static bool wait_for_line(bringup_t *self, const look_t *first, hand_t *hand) {
     return signals_count() == before;
 }
 
-bool hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand) {
+void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand) {
     char line[16] = "";
+    if (!trial_wait_ready(self)) {
+        bringup_fail(self);
+    }
     const look_t first = look(self);
     memset(out_hand, 0, sizeof(*out_hand));
     out_hand->heard = first.heard;
     talk_forget();
     (void)printf("%s ", prompt);
     (void)fflush(stdout);
-    if (!wait_for_line(self, &first, out_hand)) {
+    const bool typed = wait_for_line(self, &first, out_hand);
+    if (!typed) {
         (void)puts("");
-        return false;
     }
-    return read(STDIN_FILENO, line, sizeof line) > 0 && line[0] != 'q';
+    if (!typed || read(STDIN_FILENO, line, sizeof line) <= 0 || line[0] == 'q') {
+        bringup_quit(self);
+    }
 }
 
 bool hand_went_one_way(const hand_t *hand, iw_side_t side) {

@@ -59,10 +59,9 @@ static void take_length(bringup_t *self, const learn_t *learn) {
     }
 }
 
-bool bringup_learn(bringup_t *self, char *out_types, size_t size) {
+void bringup_learn(bringup_t *self, char *out_types, size_t size) {
     study_t *study = calloc(1, sizeof(*study));
     candump_t frame;
-    bool found = false;
     if (study != NULL && recording_open(&study->recording, self->recording) == CTL_OK) {
         learn_init(&study->learn);
         while (recording_next(&study->recording, &frame)) {
@@ -70,8 +69,7 @@ bool bringup_learn(bringup_t *self, char *out_types, size_t size) {
         }
         (void)recording_close(&study->recording);
         const uint64_t frames = list_types(&study->learn, out_types, size);
-        found = frames > 0U;
-        if (found) {
+        if (frames > 0U) {
             talk_say("In %s %" PRIu64 " setpoints have a speed, with type %s. That is what was sent, no proof that the "
                      "wheels turned by it (iwheelctl learn tells).",
                      self->recording, frames, out_types);
@@ -85,5 +83,4 @@ bool bringup_learn(bringup_t *self, char *out_types, size_t size) {
         }
     }
     free(study);
-    return found;
 }

@@ -221,7 +221,7 @@ static bool connect_to(bringup_t *self) {
     return gateway.result == NEAR_FOUND;
 }
 
-bool trial_start(bringup_t *self, const gateway_config_t *config, bool with_records) {
+static bool start(bringup_t *self, const gateway_config_t *config, bool with_records) {
     trial_t *trial = &self->trial;
     trial_stop(self);
     if (!make_folder(trial) || !write_config(self, config, with_records)) {
@@ -238,6 +238,16 @@ bool trial_start(bringup_t *self, const gateway_config_t *config, bool with_reco
         return false;
     }
     return true;
+}
+
+void trial_start(bringup_t *self, const gateway_config_t *config) {
+    if (!start(self, config, false)) {
+        bringup_fail(self);
+    }
+}
+
+bool trial_start_with_records(bringup_t *self) {
+    return start(self, &self->config, true);
 }
 
 void trial_stop(bringup_t *self) {

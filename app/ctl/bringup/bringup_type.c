@@ -27,13 +27,12 @@ burst_t bringup_ahead(const bringup_t *self, unsigned for_ms) {
                      .for_ms = for_ms};
 }
 
-/// A gateway that sends this type, with the role under which a zero surely is no torque.
-bool bringup_start_with(bringup_t *self, int type) {
+void bringup_start_with(bringup_t *self, int type) {
     gateway_config_t config = self->config;
     config.core.setpoint_type = (uint8_t)type;
     config.core.setpoint_type_set = true;
     config.core.current_role = IW_ROLE_SETPOINT;
-    return trial_start(self, &config, false);
+    trial_start(self, &config);
 }
 
 /// A type that means speed turns a wheel about as fast as it is told, whatever else may turn it.
@@ -63,36 +62,27 @@ static void keep_type(bringup_t *self, int type, const outcome_t *outcome) {
     }
 }
 
-/// Tries one type. `*out_found`: both wheels turned and the operator saw it.
-static bringup_result_t try_type(bringup_t *self, int type, bool *out_found) {
+/// Tries one type. True: both wheels turned and the operator saw it.
+static bool try_type(bringup_t *self, int type) {
     outcome_t outcome;
     const burst_t burst = bringup_ahead(self, BRINGUP_PROBE_MS);
-    *out_found = false;
-    if (!bringup_start_with(self, type)) {
-        return BRINGUP_FAILED;
-    }
+    bringup_start_with(self, type);
     (void)printf("type %d:\n", type);
-    const bringup_result_t shown = burst_show(self, &burst, &outcome);
-    if (shown == BRINGUP_QUIT) {
-        return BRINGUP_QUIT;
-    }
-    if (shown == BRINGUP_FAILED) {
-        return BRINGUP_ON;
+    if (!burst_show(self, &burst, &outcome)) {
+        return false;
     }
     if (!both_move(&outcome)) {
         const bool left = abs(outcome.mean_mm_s[IW_LEFT]) >= MOVES_MM_S;
         if (left || abs(outcome.mean_mm_s[IW_RIGHT]) >= MOVES_MM_S) {
             talk_say("  Only the %s wheel turned: is the other one held, or switched off?", left ? "left" : "right");
         }
-        return BRINGUP_ON;
+        return false;
     }
-    if (!talk_yes("Did both wheels turn, slowly and evenly?", true, out_found)) {
-        return BRINGUP_QUIT;
-    }
-    if (*out_found) {
+    const bool seen = talk_yes(self, "Did both wheels turn, slowly and evenly?", true);
+    if (seen) {
         keep_type(self, type, &outcome);
     }
-    return BRINGUP_ON;
+    return seen;
 }
 
 /// "3", "0-7", "1,4,9-12" into one flag per type. False if it is none of these.
@@ -126,23 +116,19 @@ static bool parse_types(const char *text, bool wanted[TYPE_MAX + 1]) {
     }
 }
 
-static bringup_result_t try_types(bringup_t *self, const bool *wanted, bool *out_found) {
-    *out_found = false;
-    for (int type = 0; type <= TYPE_MAX && !*out_found; type++) {
-        const bringup_result_t result = wanted[type] ? try_type(self, type, out_found) : BRINGUP_ON;
-        if (result != BRINGUP_ON) {
-            return result;
+static bool try_types(bringup_t *self, const bool *wanted) {
+    for (int type = 0; type <= TYPE_MAX; type++) {
+        if (wanted[type] && try_type(self, type)) {
+            return true;
         }
     }
-    if (!*out_found) {
-        talk_say("None of these moved both wheels. Other types may; or the wheels need more current (--current, now "
-                 "%d mA); or they do not take commands at all: is their enable switch on?",
-                 self->current_mA);
-    }
-    return BRINGUP_ON;
+    talk_say("None of these moved both wheels. Other types may; or the wheels need more current (--current, now "
+             "%d mA); or they do not take commands at all: is their enable switch on?",
+             self->current_mA);
+    return false;
 }
 
-bringup_result_t bringup_type(bringup_t *self) {
+void bringup_type(bringup_t *self) {
     char answer[BRINGUP_ANSWER_SIZE];
     char suggestion[24] = PROBE_DEFAULT;
     bool wanted[TYPE_MAX + 1];
@@ -152,24 +138,18 @@ bringup_result_t bringup_type(bringup_t *self) {
         (void)snprintf(suggestion, sizeof suggestion, "%u", self->config.core.setpoint_type);
     }
     if (self->recording != NULL) {
-        (void)bringup_learn(self, suggestion, sizeof suggestion);
+        bringup_learn(self, suggestion, sizeof suggestion);
     }
     talk_say("Byte 0 of every setpoint is a type whose values the wheels' document does not list. Write the one you "
              "know (from the maker, or from a recording: --learn FILE), or the ones to try, such as 0-7 or 1,4. Each "
              "is tried for %.1f s at %d mm/s with at most %d mA, until one moves both wheels.",
              BRINGUP_PROBE_MS / 1e3, BRINGUP_SPEED_MM_S, self->current_mA);
     while (!found) {
-        if (!talk_ask("Setpoint type, or types to try", suggestion, answer)) {
-            return BRINGUP_QUIT;
-        }
-        if (!parse_types(answer, wanted)) {
+        talk_ask(self, "Setpoint type, or types to try", suggestion, answer);
+        if (parse_types(answer, wanted)) {
+            found = try_types(self, wanted);
+        } else {
             talk_say("Types are numbers from 0 to %d: 3, 0-7 or 1,4,9-12.", TYPE_MAX);
-            continue;
-        }
-        const bringup_result_t result = try_types(self, wanted, &found);
-        if (result != BRINGUP_ON) {
-            return result;
         }
     }
-    return BRINGUP_ON;
 }

@@ -25,23 +25,14 @@ typedef struct {
 
 /// An exit code.
 static int parse_words(decode_t *self, int count, char **words) {
-    self->path = NULL;
-    for (int i = 0; i < count; i++) {
-        if (strcmp(words[i], "--csv") == 0) {
-            self->csv = true;
-        } else if (strcmp(words[i], "--config") == 0) {
-            const int code = config_option_load("decode", (i + 1 < count) ? words[++i] : NULL, &self->config);
-            if (code != CTL_OK) {
-                return code;
-            }
-        } else if ((words[i][0] == '-' && words[i][1] != '\0') || self->path != NULL) {
-            return ctl_fail(CTL_USAGE, "decode does not understand \"%s\"; see: iwheelctl decode --help", words[i]);
-        } else {
-            self->path = words[i];
-        }
-    }
-    self->path = (self->path != NULL) ? self->path : "-";
-    return CTL_OK;
+    const option_t options[] = {
+        {OPTION("--csv", NULL, &self->csv)},
+        {OPTION("--config", config_option_load, &self->config)},
+        {.name = NULL},
+    };
+    const words_syntax_t syntax = {"decode", options, words_is_file, &self->path};
+    self->path = "-";
+    return words_read(&syntax, count, words);
 }
 
 static void write_begin(const decode_t *self, const candump_t *frame) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "doctor.h"
-#include "text/duration.h"
+#include "talk/words.h"
 #include "text/paper.h"
 #include "text/text.h"
 
@@ -18,50 +18,22 @@ typedef struct {
     const char *bus;
     const char *config;
     const char *estop;
-    unsigned listen_ms;
-    bool press;
+    int64_t listen_us;
+    bool no_press;
 } words_t;
 
-static bool parse_listen(const char *text, unsigned *out_ms) {
-    static const duration_range_t range = {LISTEN_MIN_US, LISTEN_MAX_US};
-    char why[DURATION_WHY_SIZE];
-    int64_t us = 0;
-    if (!duration_option("--listen", text, range, &us, why)) {
-        (void)ctl_fail(CTL_USAGE, "%s", why);
-        return false;
-    }
-    *out_ms = (unsigned)(us / 1000);
-    return true;
-}
-
-static bool parse_words(int count, char **words, words_t *out_words) {
-    *out_words = (words_t){.listen_ms = DOCTOR_LISTEN_MS, .press = true};
-    for (int i = 0; i < count; i++) {
-        const char *value = (i + 1 < count) ? words[i + 1] : NULL;
-        const char **text = (strcmp(words[i], "--config") == 0)  ? &out_words->config
-                            : (strcmp(words[i], "--estop") == 0) ? &out_words->estop
-                                                                 : NULL;
-        if (text != NULL && value == NULL) {
-            (void)ctl_fail(CTL_USAGE, "%s wants a value; see: iwheelctl doctor --help", words[i]);
-            return false;
-        }
-        if (text != NULL) {
-            *text = value;
-            i++;
-        } else if (strcmp(words[i], "--no-press") == 0) {
-            out_words->press = false;
-        } else if (strcmp(words[i], "--listen") == 0) {
-            if (!parse_listen(value, &out_words->listen_ms)) {
-                return false;
-            }
-            i++;
-        } else if (words[i][0] != '-' && out_words->bus == NULL) {
-            out_words->bus = words[i];
-        } else {
-            return ctl_words_at_most("doctor", count - i, 0, &words[i]);
-        }
-    }
-    return true;
+/// An exit code.
+static int parse_words(int count, char **words, words_t *out_words) {
+    *out_words = (words_t){.listen_us = DOCTOR_LISTEN_MS * INT64_C(1000)};
+    const option_t options[] = {
+        {OPTION("--config", option_text, &out_words->config)},
+        {OPTION("--estop", option_text, &out_words->estop)},
+        {OPTION("--listen", option_time, &out_words->listen_us), .range = {LISTEN_MIN_US, LISTEN_MAX_US}},
+        {OPTION("--no-press", NULL, &out_words->no_press)},
+        {.name = NULL},
+    };
+    const words_syntax_t syntax = {"doctor", options, words_is_name, &out_words->bus};
+    return words_read(&syntax, count, words);
 }
 
 /// The configuration in force: the file if there is one, then the words. An exit code.
@@ -200,11 +172,9 @@ static void look(doctor_t *self, const words_t *words) {
 int verb_doctor(ctl_t *self, int count, char **words) {
     words_t parsed;
     static doctor_t doctor;
-    if (!parse_words(count, words, &parsed)) {
-        return CTL_USAGE;
-    }
-    doctor = (doctor_t){.ctl = self, .listen_ms = parsed.listen_ms};
-    const int code = configure(&doctor, &parsed);
+    int code = parse_words(count, words, &parsed);
+    doctor = (doctor_t){.ctl = self, .listen_ms = (unsigned)(parsed.listen_us / 1000)};
+    code = (code == CTL_OK) ? configure(&doctor, &parsed) : code;
     if (code != CTL_OK) {
         return code;
     }
@@ -214,7 +184,7 @@ int verb_doctor(ctl_t *self, int count, char **words) {
     } else {
         doctor_print(&doctor, 0);
         const unsigned printed = doctor.findings.count;
-        if (parsed.press && doctor.open && isatty(STDIN_FILENO) == 1 && isatty(STDOUT_FILENO) == 1) {
+        if (!parsed.no_press && doctor.open && isatty(STDIN_FILENO) == 1 && isatty(STDOUT_FILENO) == 1) {
             doctor_press(&doctor);
             doctor_print(&doctor, printed);
         }

@@ -3,7 +3,7 @@
 #include "decode/frame.h"
 #include "talk/near.h"
 #include "talk/signals.h"
-#include "text/duration.h"
+#include "talk/words.h"
 #include "text/text.h"
 
 #include "iwheel_linux/backend.h"
@@ -51,28 +51,13 @@ typedef struct {
 } words_t;
 
 static int parse(words_t *self, int count, char **words) {
-    static const duration_range_t range = {FOR_MIN_US, FOR_MAX_US};
-    char why[DURATION_WHY_SIZE];
-    for (int i = 0; i < count; i++) {
-        const char *next = (i + 1 < count) ? words[i + 1] : NULL;
-        if (strcmp(words[i], "--for") == 0) {
-            if (!duration_option("--for", next, range, &self->for_us, why)) {
-                return ctl_fail(CTL_USAGE, "%s", why);
-            }
-            i++;
-        } else if (strcmp(words[i], "--can") == 0) {
-            if (next == NULL) {
-                return ctl_fail(CTL_USAGE, "--can wants a bus: can0, or unix:PATH");
-            }
-            self->bus = next;
-            i++;
-        } else if ((words[i][0] == '-' && words[i][1] != '\0') || self->path != NULL) {
-            return ctl_fail(CTL_USAGE, "record does not understand \"%s\"; see: iwheelctl record --help", words[i]);
-        } else {
-            self->path = words[i];
-        }
-    }
-    return CTL_OK;
+    const option_t options[] = {
+        {OPTION("--for", option_time, &self->for_us), .range = {FOR_MIN_US, FOR_MAX_US}},
+        {OPTION("--can", option_text, &self->bus), .wants = "a bus: can0, or unix:PATH"},
+        {.name = NULL},
+    };
+    const words_syntax_t syntax = {"record", options, words_is_file, &self->path};
+    return words_read(&syntax, count, words);
 }
 
 static int open_file(recorder_t *self, const char *path) {

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-int config_option_load(const char *verb, const char *path, iw_config_t *out_config) {
+int config_option_load(const option_t *option, const char *verb, const char *path) {
     gateway_config_t config;
     if (path == NULL) {
         return ctl_fail(CTL_USAGE, "--config wants the gateway's configuration file; see: iwheelctl %s --help", verb);
@@ -16,7 +16,7 @@ int config_option_load(const char *verb, const char *path, iw_config_t *out_conf
     if (gateway_config_load(path, &config, stderr) != 0) {
         return CTL_CONFIG;
     }
-    *out_config = config.core;
+    *(iw_config_t *)option->out = config.core;
     return CTL_OK;
 }
 

@@ -3,11 +3,12 @@
 #ifndef CONFIG_OPTION_H
 #define CONFIG_OPTION_H
 
+#include "talk/words.h"
+
 #include "iwheel/config.h"
 
-/// Reads the gateway's configuration at `path` (NULL: the option had no word behind it). An exit code; what is wrong
-/// has been told.
-int config_option_load(const char *verb, const char *path, iw_config_t *out_config);
+/// Reads the gateway's configuration at `path` into the iw_config_t of the option. An exit code; what is wrong has been told.
+int config_option_load(const option_t *option, const char *verb, const char *path);
 
 /// The same of a file that is open, which it closes; `path` is its name in messages.
 int config_option_take(const char *path, int fd, iw_config_t *out_config);

@@ -2,6 +2,7 @@
 // The answer of `status`, drawn for a human: at most 80 columns, every number with its unit, `--` for what is unknown.
 #include "advice.h"
 #include "talk/ctl.h"
+#include "talk/words.h"
 #include "text/paper.h"
 #include "text/text.h"
 
@@ -277,7 +278,7 @@ static void draw(const json_t *status, const json_t *why) {
 int verb_status(ctl_t *self, int count, char **words) {
     json_t *status = NULL;
     json_t *why = NULL;
-    if (!ctl_words_at_most("status", count, 0, words)) {
+    if (!words_at_most("status", count, 0, words)) {
         return CTL_USAGE;
     }
     const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "status"), &status);

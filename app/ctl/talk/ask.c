@@ -24,12 +24,12 @@ int ctl_fail(int code, const char *format, ...) {
     return code;
 }
 
-bool ctl_words_at_most(const char *verb, int count, int most, char **words) {
-    if (count > most) {
-        (void)ctl_fail(CTL_USAGE, "%s does not understand \"%s\"; see: iwheelctl %s --help", verb, words[most], verb);
-        return false;
+int ctl_finish(int code) {
+    errno = 0;
+    if ((fflush(stdout) != 0 || ferror(stdout) != 0) && errno != EPIPE && errno != 0) {
+        return ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno));
     }
-    return true;
+    return code;
 }
 
 /// The path to use, in `found` if it was looked for; null after telling why there is none, with the exit code.

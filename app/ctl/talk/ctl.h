@@ -52,6 +52,10 @@ int verb_help(ctl_t *self, int count, char **words);
 /// Prints "iwheelctl: ..." on stderr and returns `code`.
 __attribute__((format(printf, 2, 3))) int ctl_fail(int code, const char *format, ...);
 
+/// Before the program ends with `code`: results that could not be written are no success, unless their reader went away on purpose.
+/// The exit code.
+int ctl_finish(int code);
+
 /// Finds the socket and connects. An exit code; 0 is success.
 int ctl_connect(ctl_t *self);
 
@@ -72,8 +76,5 @@ int ctl_refused(const json_t *reply);
 
 /// What a result of `client_receive` that brought no line means to the user. Returns the exit code.
 int ctl_lost(const ctl_t *self, iwc_result_t result);
-
-/// True if there are no more words than `most`; else tells so.
-bool ctl_words_at_most(const char *verb, int count, int most, char **words);
 
 #endif

@@ -2,6 +2,7 @@
 #include "status/advice.h"
 #include "talk/ctl.h"
 #include "talk/near.h"
+#include "talk/words.h"
 #include "text/text.h"
 #include "why.h"
 
@@ -19,14 +20,15 @@ typedef struct {
     bool list;
 } words_t;
 
-static int parse_frames(const char *text, size_t *out) {
+static int take_frames(const option_t *option, const char *verb, const char *text) {
     char *end = NULL;
+    (void)verb;
     const unsigned long number = (text != NULL && text[0] >= '0' && text[0] <= '9') ? strtoul(text, &end, 10) : 0UL;
     if (end == NULL || *end != '\0' || number > WHY_FRAMES_MAX) {
         return ctl_fail(CTL_USAGE, "--frames wants a number of frames before and after the stop, 0 to %u",
                         WHY_FRAMES_MAX);
     }
-    *out = number;
+    *(size_t *)option->out = number;
     return CTL_OK;
 }
 
@@ -36,28 +38,14 @@ static bool names_recording(const char *word) {
 }
 
 static int parse(words_t *self, int count, char **words) {
-    for (int i = 0; i < count; i++) {
-        const char *next = (i + 1 < count) ? words[i + 1] : NULL;
-        int code = CTL_OK;
-        if (strcmp(words[i], "--list") == 0) {
-            self->list = true;
-        } else if (strcmp(words[i], "--frames") == 0) {
-            code = parse_frames(next, &self->frames);
-            i++;
-        } else if (strcmp(words[i], "--directory") == 0) {
-            self->directory = next;
-            code = (next != NULL) ? CTL_OK : ctl_fail(CTL_USAGE, "--directory wants the directory of the recordings");
-            i++;
-        } else if (!names_recording(words[i]) || self->name != NULL) {
-            code = ctl_fail(CTL_USAGE, "why does not understand \"%s\"; see: iwheelctl why --help", words[i]);
-        } else {
-            self->name = words[i];
-        }
-        if (code != CTL_OK) {
-            return code;
-        }
-    }
-    return CTL_OK;
+    const option_t options[] = {
+        {OPTION("--list", NULL, &self->list)},
+        {OPTION("--frames", take_frames, &self->frames)},
+        {OPTION("--directory", option_text, &self->directory), .wants = "the directory of the recordings"},
+        {.name = NULL},
+    };
+    const words_syntax_t syntax = {"why", options, names_recording, &self->name};
+    return words_read(&syntax, count, words);
 }
 
 static void print_recording(const json_t *reply) {
