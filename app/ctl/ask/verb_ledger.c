@@ -3,7 +3,6 @@
 #include "similar.h"
 #include "talk/ctl.h"
 #include "talk/words.h"
-#include "text/paper.h"
 #include "text/text.h"
 
 #include "iwheel_northbound/words.h"

@@ -12,6 +12,7 @@
 #define BRINGUP_H
 
 #include "doctor/doctor.h"
+#include "text/text.h"
 
 /// Wheels in the air: as slow as a sign can be seen from, and no longer than a look takes.
 #define BRINGUP_SPEED_MM_S  100
@@ -161,12 +162,6 @@ _Noreturn void bringup_fail(bringup_t *self);
 burst_t bringup_ahead(const bringup_t *self, unsigned for_ms);
 /// A trial gateway that sends this type, with the role under which a zero surely is no torque.
 void bringup_start_with(bringup_t *self, int type);
-/// The setpoint types in the recording, such as "3,1"; and takes over its length. Untouched, after telling, if there are none.
-void bringup_learn(bringup_t *self, char *out_types, size_t size);
-
-/// "left" or "right".
-const char *bringup_side(iw_side_t side);
-
 /// A note confirms that item of the ledger.
 bool bringup_is_confirmed(const bringup_t *self, const char *item);
 

@@ -2,7 +2,6 @@
 // Before anything turns: the checks of doctor, and the e-stop.
 #include "bringup.h"
 #include "talk/signals.h"
-#include "text/text.h"
 
 #include <poll.h>
 #include <stdio.h>

@@ -2,7 +2,6 @@
 // A short, slow turn of the wheels, which any key ends.
 #include "bringup.h"
 #include "talk/signals.h"
-#include "text/text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -55,7 +54,7 @@ static bool is_told(const json_t *wheel, const char *field, int wanted) {
 
 static bool is_in_force(const burst_t *burst, const json_t *state) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *wheel = json_object_get(state, bringup_side((iw_side_t)side));
+        const json_t *wheel = json_object_get(state, text_side(side));
         if (!is_told(wheel, "applied_mm_s", burst->speed_mm_s[side]) ||
             (burst->has_current && !is_told(wheel, "applied_mA", burst->current_mA[side]))) {
             return false;
@@ -67,7 +66,7 @@ static bool is_in_force(const burst_t *burst, const json_t *state) {
 /// The speeds of both wheels in a snapshot. False if one is not known: an unknown speed is no standstill.
 static bool speeds_of(const json_t *state, int out_mm_s[IW_SIDES]) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *speed = json_object_get(json_object_get(state, bringup_side((iw_side_t)side)), "speed_mm_s");
+        const json_t *speed = json_object_get(json_object_get(state, text_side(side)), "speed_mm_s");
         if (!json_is_integer(speed)) {
             return false;
         }

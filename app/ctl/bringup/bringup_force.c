@@ -46,7 +46,7 @@ static force_t look_at_force(bringup_t *self, iw_side_t side) {
     (void)nanosleep(&settle, NULL);
     for (int i = 0; i < LOOKS; i++) {
         json_t *status = trial_status(self);
-        const json_t *raw = json_object_get(json_object_get(status, bringup_side(side)), "force_raw");
+        const json_t *raw = json_object_get(json_object_get(status, text_side(side)), "force_raw");
         if (json_is_integer(raw)) {
             const long long value = json_integer_value(raw);
             sum += (double)value;
@@ -88,7 +88,7 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
         talk_say("  %.1f counts per newton are neither cN (100) nor dN (10): the unit stays assumed. Was the whole "
                  "mass on this handle?",
                  per_N);
-        bringup_note(self, bringup_side(side), "force_unit", NULL, "assumed: %.1f counts per N fit neither cN nor dN",
+        bringup_note(self, text_side(side), "force_unit", NULL, "assumed: %.1f counts per N fit neither cN nor dN",
                      per_N);
         return;
     }
@@ -96,7 +96,7 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
     talk_say("  %.0f counts for %.1f N: the unit is %s%s.%s", fabs(counts), mass_kg * G_N_PER_kg, word,
              (self->config.core.force_unit[side] == before) ? "" : ", other than configured until now",
              (counts < 0.0) ? " The force counts downwards: pressing is negative." : "");
-    bringup_note(self, bringup_side(side), "force_unit", (side == IW_LEFT) ? "force_unit_left" : "force_unit_right",
+    bringup_note(self, text_side(side), "force_unit", (side == IW_LEFT) ? "force_unit_left" : "force_unit_right",
                  "%.2f kg changed the raw force by %.0f counts%s", mass_kg, counts,
                  (counts < 0.0) ? "; pressing makes it smaller" : "");
 }
@@ -104,19 +104,19 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
 /// Without a mass: only whether the handle is this wheel's, and which way it counts.
 static void tell_press(bringup_t *self, iw_side_t side, double counts) {
     if (fabs(counts) < COUNTS_MIN) {
-        talk_say("  Nothing changed on the %s wheel. Is this its handle?", bringup_side(side));
-        bringup_note(self, bringup_side(side), "force_unit", NULL, "assumed: pressing the handle changed nothing");
+        talk_say("  Nothing changed on the %s wheel. Is this its handle?", text_side(side));
+        bringup_note(self, text_side(side), "force_unit", NULL, "assumed: pressing the handle changed nothing");
         return;
     }
     talk_say("  Pressing changed the raw force by %.0f counts. Its unit stays assumed: only a known mass tells it.",
              counts);
-    bringup_note(self, bringup_side(side), "force_unit", NULL, "assumed; pressing changed the raw force by %.0f counts",
+    bringup_note(self, text_side(side), "force_unit", NULL, "assumed; pressing changed the raw force by %.0f counts",
                  counts);
 }
 
 static void tell_deaf(bringup_t *self, iw_side_t side) {
-    talk_say("  The %s wheel's force was not heard all the time; its unit stays assumed.", bringup_side(side));
-    bringup_note(self, bringup_side(side), "force_unit", NULL, "assumed: no force was heard");
+    talk_say("  The %s wheel's force was not heard all the time; its unit stays assumed.", text_side(side));
+    bringup_note(self, text_side(side), "force_unit", NULL, "assumed: no force was heard");
 }
 
 /// A mass tells the unit only of a force that stands still and is not at its end.
@@ -124,7 +124,7 @@ static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, cons
     if (is_at_its_end(free) || is_at_its_end(loaded)) {
         talk_say("  The raw force is at the end of its range (%lld to %lld); the unit stays assumed. Take less mass.",
                  loaded->low, loaded->high);
-        bringup_note(self, bringup_side(side), "force_unit", NULL, "assumed: the force was at the end of its range");
+        bringup_note(self, text_side(side), "force_unit", NULL, "assumed: the force was at the end of its range");
         return false;
     }
     const double change = loaded->mean - free->mean;
@@ -132,7 +132,7 @@ static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, cons
         talk_say("  The force swayed (free %lld to %lld, loaded %lld to %lld): was the handle or the mass touched "
                  "meanwhile? The unit stays assumed.",
                  free->low, free->high, loaded->low, loaded->high);
-        bringup_note(self, bringup_side(side), "force_unit", NULL, "assumed: the force swayed while it was weighed");
+        bringup_note(self, text_side(side), "force_unit", NULL, "assumed: the force swayed while it was weighed");
         return false;
     }
     return true;
@@ -144,7 +144,7 @@ static bool measure(bringup_t *self, iw_side_t side) {
     char answer[BRINGUP_ANSWER_SIZE];
     double mass_kg = 0.0;
     (void)snprintf(question, sizeof question, "Mass in kg that you will put on the %s handle (Enter: press by hand)",
-                   bringup_side(side));
+                   text_side(side));
     const bool weighed = talk_number(self, question, MASS_MIN_kg, MASS_MAX_kg, &mass_kg);
     talk_ask(self, "Hands and weights off both handles, then Enter", "go", answer);
     const force_t free = look_at_force(self, side);
@@ -153,7 +153,7 @@ static bool measure(bringup_t *self, iw_side_t side) {
         return false;
     }
     (void)snprintf(question, sizeof question, "Now %s the %s handle and leave it so, then Enter",
-                   weighed ? "put the mass on" : "press", bringup_side(side));
+                   weighed ? "put the mass on" : "press", text_side(side));
     talk_ask(self, question, "go", answer);
     const force_t loaded = look_at_force(self, side);
     if (!loaded.heard) {

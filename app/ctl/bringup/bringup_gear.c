@@ -25,13 +25,13 @@ typedef enum { RPM_UNSEEN = 0, RPM_WHEEL, RPM_ROTOR } rpm_of_t;
 /// What is wrong with it, told; or false.
 static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turned) {
     const iw_side_t other = (side == IW_LEFT) ? IW_RIGHT : IW_LEFT;
-    const char *name = bringup_side(side);
+    const char *name = text_side(side);
     if (!hand->heard) {
         talk_say("  The wheels were not heard all the time.");
     } else if (hand->way[other] > hand->way[side]) {
         talk_say("  The %s wheel counted %lld ticks and the %s one %lld: was the wrong one turned, or are they "
                  "exchanged?",
-                 bringup_side(other), hand->ticks[other], name, hand->ticks[side]);
+                 text_side(other), hand->ticks[other], name, hand->ticks[side]);
     } else if (!hand_went_one_way(hand, side)) {
         talk_say("  The %s wheel was turned back and forth: %lld ticks there, %lld in all.", name, hand->ticks[side],
                  hand->way[side]);
@@ -49,7 +49,7 @@ static bool turn(bringup_t *self, iw_side_t side, turned_t *out_turned) {
     char prompt[96];
     hand_t hand;
     (void)snprintf(prompt, sizeof prompt, "Turn the %s wheel exactly %d times in one direction, then press Enter ...",
-                   bringup_side(side), TURNS);
+                   text_side(side), TURNS);
     do {
         hand_follow(self, prompt, &hand);
         const double rotor = (double)llabs(hand.ticks[side]) / IW_TICKS_PER_TURN;

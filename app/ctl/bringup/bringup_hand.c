@@ -28,7 +28,7 @@ static look_t look(bringup_t *self) {
     look_t seen = {.heard = true};
     json_t *status = trial_status(self);
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *wheel = json_object_get(status, bringup_side((iw_side_t)side));
+        const json_t *wheel = json_object_get(status, text_side(side));
         const json_t *ticks = json_object_get(wheel, "ticks");
         const json_t *rpm = json_object_get(wheel, "speed_rpm");
         seen.heard = seen.heard && json_is_integer(ticks) && json_is_integer(rpm);

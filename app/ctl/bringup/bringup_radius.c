@@ -29,12 +29,12 @@ static bool counts_forwards(const bringup_t *self, const hand_t *hand) {
             talk_say(
                 "  The %s wheel counted backwards while the machine went forwards. Either it was pushed backwards, "
                 "or the sign of step 6 is wrong: begin again if you are not sure.",
-                bringup_side((iw_side_t)side));
+                text_side(side));
             return false;
         }
         if (!hand_went_one_way(hand, (iw_side_t)side)) {
             talk_say("  The %s wheel went back and forth: %lld ticks forwards, %lld in all. Once more, please.",
-                     bringup_side((iw_side_t)side), llabs(hand->ticks[side]), hand->way[side]);
+                     text_side(side), llabs(hand->ticks[side]), hand->way[side]);
             return false;
         }
     }

@@ -32,19 +32,19 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
         talk_say(
             "The bus says that BOTH wheels turned (%d and %d mm/s), though only the %s one was told to: what turned "
             "the other? Nothing can be said of a sign so.",
-            told, other, bringup_side(side));
+            told, other, text_side(side));
         return false;
     }
     if (told <= -MOVES_MM_S) {
         talk_say("The %s wheel measures the opposite of what it is told. No key mends that, and the gateway would stop "
                  "for it (feedback_sign): check the wiring between motor and sensor, or ask the maker.",
-                 bringup_side(side));
+                 text_side(side));
         return false;
     }
     if (told < MOVES_MM_S) {
         talk_say("The %s wheel did not turn by itself. Is something in its way? If it needs more current: --current "
                  "(now %d mA).",
-                 bringup_side(side), self->current_mA);
+                 text_side(side), self->current_mA);
         return false;
     }
     return true;
@@ -53,7 +53,7 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
 static void keep_sign(bringup_t *self, iw_side_t side, bool forward) {
     bool *invert = &self->config.core.invert[side];
     *invert = forward ? *invert : !*invert;
-    bringup_note(self, bringup_side(side), "invert", (side == IW_LEFT) ? "mount_sign_left" : "mount_sign_right",
+    bringup_note(self, text_side(side), "invert", (side == IW_LEFT) ? "mount_sign_left" : "mount_sign_right",
                  "somebody saw it turn %s with invert = %s", forward ? "forwards" : "backwards",
                  (forward ? *invert : !*invert) ? "yes" : "no");
 }
@@ -65,7 +65,7 @@ static bool look_at(bringup_t *self, iw_side_t side) {
     outcome_t outcome;
     const burst_t burst =
         turn(self, (side == IW_LEFT) ? BRINGUP_SPEED_MM_S : 0, (side == IW_RIGHT) ? BRINGUP_SPEED_MM_S : 0);
-    (void)snprintf(question, sizeof question, "Look at the %s wheel. Enter turns it for %.1f s", bringup_side(side),
+    (void)snprintf(question, sizeof question, "Look at the %s wheel. Enter turns it for %.1f s", text_side(side),
                    TURN_MS / 1e3);
     talk_ask(self, question, "go", answer);
     burst_insist(self, &burst, &outcome);

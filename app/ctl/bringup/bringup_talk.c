@@ -2,8 +2,6 @@
 // Questions and answers at the terminal.
 #include "bringup.h"
 #include "talk/signals.h"
-#include "text/paper.h"
-#include "text/text.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -26,12 +24,7 @@ void talk_say(const char *format, ...) {
     va_end(arguments);
     const char *rest = text;
     while (*rest != '\0') {
-        size_t cut = strlen(rest);
-        if (cut > PAPER_WIDTH) {
-            for (cut = PAPER_WIDTH; cut > 0 && rest[cut] != ' '; cut--) {
-            }
-            cut = (cut == 0) ? PAPER_WIDTH : cut;
-        }
+        const size_t cut = text_cut(rest, PAPER_WIDTH);
         (void)printf("%.*s\n", (int)cut, rest);
         rest += cut;
         rest += strspn(rest, " ");

@@ -2,7 +2,6 @@
 // The gateway of the session: started with a trial configuration in a folder of its own; both end with us whatever happens.
 #include "bringup.h"
 #include "talk/signals.h"
-#include "text/text.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The configuration that came of it: written whole or not at all, and over an older one only after asking.
 #include "bringup.h"
-#include "text/text.h"
 
 #include <errno.h>
 #include <stdarg.h>
@@ -31,10 +30,6 @@ void bringup_note(bringup_t *self, const char *section, const char *key, const c
     va_start(arguments, format);
     (void)vsnprintf(note->text, sizeof note->text, format, arguments);
     va_end(arguments);
-}
-
-const char *bringup_side(iw_side_t side) {
-    return (side == IW_LEFT) ? "left" : "right";
 }
 
 bool bringup_is_confirmed(const bringup_t *self, const char *item) {

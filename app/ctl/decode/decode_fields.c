@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
 
+#include "text/text.h"
+
 #include <inttypes.h>
 #include <stdlib.h>
 
@@ -112,7 +114,7 @@ void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decod
         break;
     default:
         out->message = iw_codec_name(kind);
-        out->wheel = (side == IW_LEFT) ? "left" : "right";
+        out->wheel = text_side(side);
         put_message(kind, &told[side], config->force_unit[side], out);
         break;
     }

@@ -10,7 +10,6 @@
 #include <jansson.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 /// A time before this is not one since 1970.
 #define CALENDAR_US 1000000000000000
@@ -36,11 +35,9 @@ static int parse_words(decode_t *self, int count, char **words) {
 }
 
 static void write_begin(const decode_t *self, const candump_t *frame) {
-    char text[64];
-    struct tm local;
-    const time_t seconds = (time_t)(frame->time_us / 1000000);
-    if (frame->time_us >= CALENDAR_US && localtime_r(&seconds, &local) != NULL &&
-        strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &local) > 0U) {
+    char text[TEXT_CELL];
+    text_when(frame->time_us, text);
+    if (frame->time_us >= CALENDAR_US && text[0] != '-') {
         text_line(stdout, "# %s, from %s.%06" PRId64 " local time; times in seconds from there", self->recording.name,
                   text, frame->time_us % 1000000);
     } else {

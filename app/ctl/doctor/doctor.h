@@ -41,9 +41,6 @@ void doctor_close(doctor_t *self);
 /// The e-stop's present level, from the gateway or from the line itself.
 inspect_estop_t doctor_estop(doctor_t *self);
 
-/// Guides through a press and a release, on a terminal.
-void doctor_press(doctor_t *self);
-
 /// Prints the findings from number `first` on for people.
 void doctor_print(const doctor_t *self, unsigned first);
 

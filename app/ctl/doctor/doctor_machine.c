@@ -108,20 +108,14 @@ static bool look_at_kernel(doctor_t *self) {
     return true;
 }
 
-static int64_t now_us(void) {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 /// How much too late the worst of many short sleeps ended.
 static int64_t worst_lateness_us(void) {
     int64_t worst_us = 0;
     for (unsigned i = 0; i < NAPS; i++) {
         const struct timespec nap = {0, NAP_NS};
-        const int64_t begin_us = now_us();
+        const int64_t begin_us = client_now_us();
         (void)nanosleep(&nap, NULL);
-        const int64_t late_us = now_us() - begin_us - NAP_NS / 1000;
+        const int64_t late_us = client_now_us() - begin_us - NAP_NS / 1000;
         worst_us = (late_us > worst_us) ? late_us : worst_us;
     }
     return worst_us;

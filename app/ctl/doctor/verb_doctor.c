@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "doctor.h"
 #include "talk/words.h"
-#include "text/paper.h"
 #include "text/text.h"
 
-#include <errno.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +12,9 @@
 #define INDENT        6U
 #define LISTEN_MIN_US 200000
 #define LISTEN_MAX_US 60000000
+/// For a press, or a release.
+#define WAIT_US 20000000
+#define LOOK_MS 20
 
 typedef struct {
     const char *bus;
@@ -87,14 +89,8 @@ static void say_no_bus(doctor_t *self) {
 }
 
 static void print_text(const paper_t *paper, tone_t tone, const char *text) {
-    const size_t room = PAPER_WIDTH - INDENT;
     for (bool first = true; *text != '\0' || first; first = false) {
-        size_t cut = strlen(text);
-        if (cut > room) {
-            for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
-            }
-            cut = (cut == 0) ? room : cut;
-        }
+        const size_t cut = text_cut(text, PAPER_WIDTH - INDENT);
         paper_say(paper, tone, "%s%.*s", first ? "" : "      ", (int)cut, text);
         paper_end(paper);
         text += cut;
@@ -127,11 +123,11 @@ static json_t *rates_of(const doctor_t *self) {
     json_t *rates = json_array();
     for (unsigned i = 0; i < IW_CODEC_ROWS && self->heard.span_us > 0U; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
-        (void)json_array_append_new(rates, json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)row->id, "name",
-                                                     iw_codec_name((iw_codec_kind_t)row->kind), "side",
-                                                     (row->side == IW_LEFT) ? "left" : "right", "nominal_mHz",
-                                                     (json_int_t)inspect_nominal_mHz(row), "measured_mHz",
-                                                     (json_int_t)inspect_rate_mHz(&self->heard, i)));
+        (void)json_array_append_new(rates,
+                                    json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)row->id, "name",
+                                              iw_codec_name((iw_codec_kind_t)row->kind), "side", text_side(row->side),
+                                              "nominal_mHz", (json_int_t)inspect_nominal_mHz(row), "measured_mHz",
+                                              (json_int_t)inspect_rate_mHz(&self->heard, i)));
     }
     return rates;
 }
@@ -169,6 +165,74 @@ static void look(doctor_t *self, const words_t *words) {
     }
 }
 
+/// True once the e-stop is at that level, false if the time is over or a key was pressed.
+static bool await_level(doctor_t *self, bool pressed, bool *out_skipped) {
+    const int64_t end_us = client_now_us() + WAIT_US;
+    while (client_now_us() < end_us) {
+        if (self->gateway.result == NEAR_FOUND) {
+            json_decref(self->gateway.status);
+            self->gateway.status = near_ask(self->ctl, json_pack("{s:s}", "cmd", "status"));
+        }
+        const inspect_estop_t estop = doctor_estop(self);
+        if (estop.level >= 0 && (estop.level > 0) == pressed) {
+            return true;
+        }
+        struct pollfd key = {.fd = STDIN_FILENO, .events = POLLIN};
+        if (poll(&key, 1, LOOK_MS) > 0) {
+            char line[64];
+            *out_skipped = true;
+            (void)!read(STDIN_FILENO, line, sizeof line);
+            return false;
+        }
+    }
+    return false;
+}
+
+static void say_unseen(doctor_t *self, bool skipped, const char *what) {
+    if (skipped) {
+        inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: %s was not tried", what);
+        inspect_cure(&self->findings, "run doctor again and press the button when asked");
+    } else {
+        inspect_say(&self->findings, "estop_press", INSPECT_FAIL, "e-stop: no %s was seen within 20 s", what);
+        inspect_cure(&self->findings, "check the button's wire, [estop] line and [estop] active");
+    }
+}
+
+/// Guides through a press and a release, on a terminal: seen through the same input that will stop the wheels.
+static void press(doctor_t *self) {
+    bool skipped = false;
+    const inspect_estop_t before = doctor_estop(self);
+    const char *state = text_word(self->gateway.status, "state");
+    if (!before.present || before.level != 0) {
+        return;
+    }
+    if (self->gateway.result == NEAR_FOUND && (strcmp(state, "armed") == 0 || strcmp(state, "stopping") == 0)) {
+        inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: not tried, because somebody drives");
+        inspect_cure(&self->findings, "iwheelctl stop, then run doctor again");
+        return;
+    }
+    (void)fputs("\nPress the e-stop button now (Enter skips this) ... ", stdout);
+    (void)fflush(stdout);
+    if (!await_level(self, true, &skipped)) {
+        (void)fputs("\n", stdout);
+        say_unseen(self, skipped, "press");
+        return;
+    }
+    (void)fputs("seen. Release it ... ", stdout);
+    (void)fflush(stdout);
+    const bool released = await_level(self, false, &skipped);
+    (void)fputs(released ? "seen.\n\n" : "\n\n", stdout);
+    if (!released) {
+        say_unseen(self, skipped, "release");
+        return;
+    }
+    inspect_say(&self->findings, "estop_press", INSPECT_OK, "e-stop: press and release were seen%s",
+                (self->gateway.result == NEAR_FOUND) ? "; the gateway is latched now, as it must be" : "");
+    if (self->gateway.result == NEAR_FOUND) {
+        inspect_cure(&self->findings, "iwheelctl reset");
+    }
+}
+
 int verb_doctor(ctl_t *self, int count, char **words) {
     words_t parsed;
     static doctor_t doctor;
@@ -185,7 +249,7 @@ int verb_doctor(ctl_t *self, int count, char **words) {
         doctor_print(&doctor, 0);
         const unsigned printed = doctor.findings.count;
         if (!parsed.no_press && doctor.open && isatty(STDIN_FILENO) == 1 && isatty(STDOUT_FILENO) == 1) {
-            doctor_press(&doctor);
+            press(&doctor);
             doctor_print(&doctor, printed);
         }
         print_sum(&doctor);

@@ -2,6 +2,7 @@
 // What the setpoints of the recording tell: type, role of the current, length. Where a wheel's behaviour belongs to the
 // claim, it was seen as well.
 #include "learn_findings.h"
+#include "text/text.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -58,7 +59,7 @@ static void weigh_common_type(const learn_t *self, int type, learn_findings_t *o
             if (setpoint->type[type] == setpoint->type_moving[type]) {
                 (void)learn_say(out, '?', "setpoint_type", side,
                                 "%s: no setpoint of type %d has speed 0: whether it stops the wheel was not seen",
-                                learn_side(side), type);
+                                text_side(side), type);
             }
         }
     }
@@ -90,7 +91,7 @@ static void weigh_type(const learn_t *self, learn_findings_t *out) {
             (void)learn_say(out, '-', "sender", side,
                             "%s: the type changes %" PRIu64 " times in %" PRIu64
                             " setpoints: two controllers on this bus?",
-                            learn_side(side), setpoint->changes_of_type, setpoint->count);
+                            text_side(side), setpoint->changes_of_type, setpoint->count);
         }
     }
 }

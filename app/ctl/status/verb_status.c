@@ -3,7 +3,6 @@
 #include "advice.h"
 #include "talk/ctl.h"
 #include "talk/words.h"
-#include "text/paper.h"
 #include "text/text.h"
 
 #include <stdio.h>

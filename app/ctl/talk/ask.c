@@ -138,18 +138,13 @@ int ctl_connect(ctl_t *self) {
 }
 
 int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {
-    int64_t id = 0;
-    const int64_t deadline_us = client_now_us() + CLIENT_REPLY_US;
     *out_reply = NULL;
     const int code = self->client.open ? CTL_OK : ctl_connect(self);
     if (code != CTL_OK) {
         json_decref(request);
         return code;
     }
-    iwc_result_t result = client_send(&self->client, request, deadline_us, &id);
-    if (result == IWC_OK) {
-        result = client_wait(&self->client, id, deadline_us, out_reply);
-    }
+    const iwc_result_t result = client_ask(&self->client, request, out_reply);
     return (result == IWC_OK) ? CTL_OK : ctl_lost(self, result);
 }
 

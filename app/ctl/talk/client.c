@@ -76,7 +76,9 @@ iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_li
     return (*out_line != NULL) ? IWC_OK : IWC_GARBLED;
 }
 
-iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply) {
+/// Receives until the reply to `id` comes; events and replies to other requests are dropped. A reply without id is taken too: it is a refusal
+/// of the whole connection or of a line.
+static iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply) {
     for (;;) {
         const iwc_result_t result = client_receive(self, deadline_us, out_reply);
         if (result != IWC_OK) {
@@ -90,4 +92,12 @@ iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t
         json_decref(*out_reply);
         *out_reply = NULL;
     }
+}
+
+iwc_result_t client_ask(client_t *self, json_t *request, json_t **out_reply) {
+    int64_t id = 0;
+    const int64_t deadline_us = client_now_us() + CLIENT_REPLY_US;
+    *out_reply = NULL;
+    const iwc_result_t result = client_send(self, request, deadline_us, &id);
+    return (result == IWC_OK) ? client_wait(self, id, deadline_us, out_reply) : result;
 }

@@ -41,8 +41,7 @@ iwc_result_t client_send(client_t *self, json_t *request, int64_t deadline_us, i
 /// The next line, as a new reference in `*out_line` (null unless IWC_OK).
 iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_line);
 
-/// Receives until the reply to `id` comes; events and replies to other requests are dropped. A reply without id is taken too: it is a refusal
-/// of the whole connection or of a line.
-iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply);
+/// Sends `request`, whose reference it takes, and receives until its reply comes; what comes before is dropped.
+iwc_result_t client_ask(client_t *self, json_t *request, json_t **out_reply);
 
 #endif

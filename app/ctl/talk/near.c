@@ -44,14 +44,8 @@ static near_t connect_to(ctl_t *ctl, const char *path) {
 }
 
 json_t *near_ask(ctl_t *ctl, json_t *request) {
-    int64_t id = 0;
     json_t *reply = NULL;
-    const int64_t deadline_us = client_now_us() + CLIENT_REPLY_US;
-    if (client_send(&ctl->client, request, deadline_us, &id) != IWC_OK ||
-        client_wait(&ctl->client, id, deadline_us, &reply) != IWC_OK) {
-        return NULL;
-    }
-    return reply;
+    return (client_ask(&ctl->client, request, &reply) == IWC_OK) ? reply : NULL;
 }
 
 void near_look(ctl_t *ctl, const char *bus, near_gateway_t *out_gateway) {

@@ -29,7 +29,7 @@ int why_disk_list(const why_disk_t *self);
 /// its files. An exit code.
 int why_disk_show(const why_disk_t *self, const char *name, size_t frames);
 
-// --- for people: the same for the gateway's answer and for a recording on disk (why_print.c) ---------------------
+// --- for people: the same for the gateway's answer and for a recording on disk (verb_why.c) ---------------------
 
 /// Sentence and time of `why`, which is a reply or the line of a recording. False: there was no stop, which has been said.
 bool why_print_stop(const json_t *why);
@@ -39,8 +39,5 @@ void why_print_frame(const candump_t *frame, int64_t since_us);
 
 /// The line between the frames before and after.
 void why_print_moment(void);
-
-/// The last `most` of the frames before and the first `most` after, as the gateway tells them. Nothing if there are none.
-void why_print_told(const json_t *why, size_t most);
 
 #endif

@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #define PATH_SIZE 1024U
 #define NAME_SIZE 256U
@@ -102,13 +101,9 @@ static bool find_names(names_t *self, const why_disk_t *where) {
 }
 
 static void print_line(const char *name, const json_t *why) {
-    char wall[32] = "--";
-    struct tm local;
-    const time_t seconds = (time_t)(json_integer_value(json_object_get(why, "wall_us")) / 1000000);
+    char wall[TEXT_CELL];
     const char *sentence = json_string_value(json_object_get(why, "sentence"));
-    if (localtime_r(&seconds, &local) != NULL) {
-        (void)strftime(wall, sizeof wall, "%Y-%m-%d %H:%M:%S", &local);
-    }
+    text_when(json_integer_value(json_object_get(why, "wall_us")), wall);
     const unsigned long number = strtoul(name + sizeof PREFIX - 1U, NULL, 10);
     (void)printf("%6lu  %s  ", number, wall);
     text_safe((sentence != NULL) ? sentence : "-- (the recording is cut)", stdout);
