@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Before anything turns: the checks of doctor, and the e-stop.
 #include "bringup.h"
-#include "talk/signals.h"
 
 #include <poll.h>
 #include <stdio.h>

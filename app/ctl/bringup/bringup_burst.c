@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A short, slow turn of the wheels, which any key ends.
 #include "bringup.h"
-#include "talk/signals.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -3,7 +3,6 @@
 //
 // Only a known mass tells a unit. Without one the unit stays assumed.
 #include "bringup.h"
-#include "talk/signals.h"
 
 #include <math.h>
 #include <stdio.h>

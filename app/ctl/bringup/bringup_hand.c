@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What wheels count while hands turn or push them. Nothing is sent.
 #include "bringup.h"
-#include "talk/signals.h"
 
 #include <errno.h>
 #include <poll.h>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Questions and answers at the terminal.
 #include "bringup.h"
-#include "talk/signals.h"
 
 #include <errno.h>
 #include <poll.h>

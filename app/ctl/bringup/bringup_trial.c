@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The gateway of the session: started with a trial configuration in a folder of its own; both end with us whatever happens.
 #include "bringup.h"
-#include "talk/signals.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "bringup.h"
-#include "talk/signals.h"
 #include "talk/words.h"
 
 #include <errno.h>
@@ -52,17 +51,10 @@ static bool parse_current(const char *text, int *out_mA) {
 
 /// Where it begins: a file, the installed one, the defaults; then the words. An exit code.
 static int configure(bringup_t *self, const words_t *words) {
-    gateway_config_t *config = &self->config;
-    const char *path = (words->from != NULL) ? words->from : GATEWAY_CONFIG_PATH;
-    gateway_config_default(config);
-    if ((words->from != NULL || access(path, F_OK) == 0) && gateway_config_load(path, config, stderr) != 0) {
-        return GATEWAY_CONFIG_ERROR;
-    }
-    if (words->can != NULL && gateway_config_override(config, "bus.interface", words->can, "--can", stderr) != 0) {
-        return CTL_USAGE;
-    }
-    if (words->estop != NULL && gateway_config_override(config, "estop.line", words->estop, "--estop", stderr) != 0) {
-        return CTL_USAGE;
+    const doctor_named_t bus = {"--can", words->can};
+    const int code = doctor_configure(&self->config, words->from, &bus, words->estop);
+    if (code != CTL_OK) {
+        return code;
     }
     self->recording = words->learn;
     if (words->learn != NULL && access(words->learn, R_OK) != 0) {

@@ -38,18 +38,16 @@ static int parse_words(int count, char **words, words_t *out_words) {
     return words_read(&syntax, count, words);
 }
 
-/// The configuration in force: the file if there is one, then the words. An exit code.
-static int configure(doctor_t *self, const words_t *words) {
-    gateway_config_t *config = &self->config;
-    const char *path = (words->config != NULL) ? words->config : GATEWAY_CONFIG_PATH;
+int doctor_configure(gateway_config_t *config, const char *path, const doctor_named_t *bus, const char *estop) {
+    const char *found = (path != NULL) ? path : GATEWAY_CONFIG_PATH;
     gateway_config_default(config);
-    if ((words->config != NULL || access(path, F_OK) == 0) && gateway_config_load(path, config, stderr) != 0) {
+    if ((path != NULL || access(found, F_OK) == 0) && gateway_config_load(found, config, stderr) != 0) {
         return GATEWAY_CONFIG_ERROR;
     }
-    if (words->bus != NULL && gateway_config_override(config, "bus.interface", words->bus, "IFACE", stderr) != 0) {
+    if (bus->value != NULL && gateway_config_override(config, "bus.interface", bus->value, bus->word, stderr) != 0) {
         return CTL_USAGE;
     }
-    if (words->estop != NULL && gateway_config_override(config, "estop.line", words->estop, "--estop", stderr) != 0) {
+    if (estop != NULL && gateway_config_override(config, "estop.line", estop, "--estop", stderr) != 0) {
         return CTL_USAGE;
     }
     return CTL_OK;
@@ -238,7 +236,8 @@ int verb_doctor(ctl_t *self, int count, char **words) {
     static doctor_t doctor;
     int code = parse_words(count, words, &parsed);
     doctor = (doctor_t){.ctl = self, .listen_ms = (unsigned)(parsed.listen_us / 1000)};
-    code = (code == CTL_OK) ? configure(&doctor, &parsed) : code;
+    const doctor_named_t bus = {"IFACE", parsed.bus};
+    code = (code == CTL_OK) ? doctor_configure(&doctor.config, parsed.config, &bus, parsed.estop) : code;
     if (code != CTL_OK) {
         return code;
     }

@@ -9,7 +9,6 @@
 // waited for, a second at the most.
 #include "drive_words.h"
 #include "talk/ctl.h"
-#include "talk/signals.h"
 #include "text/text.h"
 
 #include <stdio.h>

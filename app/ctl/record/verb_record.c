@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "candump.h"
 #include "decode/frame.h"
-#include "talk/near.h"
-#include "talk/signals.h"
+#include "talk/ctl.h"
 #include "talk/words.h"
 #include "text/text.h"
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "source.h"
 
-#include "talk/near.h"
-#include "talk/signals.h"
+#include "talk/ctl.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -3,7 +3,6 @@
 
 #include "iwheel_northbound/text.h"
 
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
@@ -28,14 +27,18 @@ void text_json(const char *line, FILE *out) {
     (void)fputc('\n', out);
 }
 
-void text_line(FILE *out, const char *format, ...) {
+void text_vline(FILE *out, const char *format, va_list list) {
     char text[2048];
-    va_list list;
-    va_start(list, format);
     (void)vsnprintf(text, sizeof text, format, list);
-    va_end(list);
     text_safe(text, out);
     (void)fputc('\n', out);
+}
+
+void text_line(FILE *out, const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    text_vline(out, format, list);
+    va_end(list);
 }
 
 void text_clean(const char *text, char *out, size_t size) {

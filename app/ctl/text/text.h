@@ -6,6 +6,7 @@
 #include "iwheel/config.h"
 
 #include <jansson.h>
+#include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
 
@@ -20,6 +21,7 @@ void text_clean(const char *text, char *out, size_t size);
 
 /// The same of a formatted text, as a line of its own.
 __attribute__((format(printf, 2, 3))) void text_line(FILE *out, const char *format, ...);
+__attribute__((format(printf, 2, 0))) void text_vline(FILE *out, const char *format, va_list list);
 
 /// Writes a line of JSON, which may come from a hostile program, as it is but for such characters: these by number.
 void text_json(const char *line, FILE *out);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The live screen: snapshots come ten times a second, keys go out as requests. It never arms.
 #include "talk/ctl.h"
-#include "talk/near.h"
-#include "talk/signals.h"
 #include "talk/words.h"
 #include "text/text.h"
 #include "top.h"

@@ -2,7 +2,6 @@
 #include "decode/frame.h"
 #include "status/advice.h"
 #include "talk/ctl.h"
-#include "talk/near.h"
 #include "talk/words.h"
 #include "text/text.h"
 #include "why.h"
