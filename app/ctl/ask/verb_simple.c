@@ -4,6 +4,8 @@
 #include "talk/words.h"
 #include "text/text.h"
 
+#include "iwheel_northbound/text.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -45,18 +47,15 @@ int verb_stop(ctl_t *self, int count, char **words) {
 }
 
 int verb_estop(ctl_t *self, int count, char **words) {
-    char reason[201] = "";
-    size_t used = 0;
+    char reason[201];
+    iwn_text_t text = iwn_text_begin(reason, sizeof reason);
     for (int i = 0; i < count; i++) {
-        const int n = snprintf(reason + used, sizeof reason - used, "%s%s", (i > 0) ? " " : "", words[i]);
-        used += (n > 0 && (size_t)n < sizeof reason - used) ? (size_t)n : sizeof reason - used - 1U;
+        IWN_TEXT_JOIN(&text, (i > 0) ? " " : "", words[i]);
     }
     json_t *request = json_pack("{s:s}", "cmd", "estop");
-    json_t *text = json_string(reason);
-    if (used > 0 && text != NULL) {
-        (void)json_object_set(request, "reason", text);
+    if (text.length > 0U) {
+        (void)json_object_set_new(request, "reason", json_string(reason)); // None if it is no UTF-8.
     }
-    json_decref(text);
     return ask_and_tell_state(self, request);
 }
 

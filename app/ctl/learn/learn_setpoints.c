@@ -4,6 +4,8 @@
 #include "learn_findings.h"
 #include "text/text.h"
 
+#include "iwheel_northbound/text.h"
+
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -134,8 +136,7 @@ static bool both(const learn_t *self, bool (*judge)(const learn_setpoint_t *setp
 /// What was not told to both wheels often enough to speak of "every speed": "0", "forwards", "backwards". Empty: all was.
 static void list_untold(const learn_t *self, char *out_list, size_t size) {
     static const char *const words[] = {"0", "forwards", "backwards"};
-    size_t used = 0;
-    out_list[0] = '\0';
+    iwn_text_t list = iwn_text_begin(out_list, size);
     for (unsigned kind = 0; kind < 3U; kind++) {
         bool told = true;
         for (unsigned side = 0; side < IW_SIDES; side++) {
@@ -144,8 +145,7 @@ static void list_untold(const learn_t *self, char *out_list, size_t size) {
             told = told && count[kind] >= LEARN_FRAMES_MIN;
         }
         if (!told) {
-            const int n = snprintf(&out_list[used], size - used, "%s%s", (used > 0U) ? ", " : "", words[kind]);
-            used += (n > 0) ? (size_t)n : 0U;
+            IWN_TEXT_JOIN(&list, (list.length > 0U) ? ", " : "", words[kind]);
         }
     }
 }

@@ -5,6 +5,8 @@
 #include "talk/words.h"
 #include "text/text.h"
 
+#include "iwheel_northbound/text.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -187,20 +189,17 @@ static void draw_pose(const paper_t *paper, const json_t *pose) {
 
 /// The names of the ledger's items in one state, as one line; nothing if there are none.
 static void draw_ledger(const paper_t *paper, json_t *ledger, const char *state, tone_t tone) {
-    char text[1024] = "";
-    char title[PAPER_LABEL + 1U] = "";
-    size_t used = 0;
+    char text[1024];
+    iwn_text_t names = iwn_text_begin(text, sizeof text);
     const char *name = NULL;
     json_t *entry = NULL;
     json_object_foreach(ledger, name, entry) {
-        const int n = is(text_word(entry, "state"), state)
-                          ? snprintf(text + used, sizeof text - used, "%s%s", (used > 0) ? ", " : "", name)
-                          : 0;
-        used += (n > 0 && (size_t)n < sizeof text - used) ? (size_t)n : 0U;
+        if (is(text_word(entry, "state"), state)) {
+            IWN_TEXT_JOIN(&names, (names.length > 0U) ? ", " : "", name);
+        }
     }
-    if (used > 0) {
-        (void)snprintf(title, sizeof title, "%s", is(state, "assumed") ? "UNVERIFIED" : "CONFIRMED");
-        paper_wrap(paper, title, tone, text);
+    if (names.length > 0U) {
+        paper_wrap(paper, is(state, "assumed") ? "UNVERIFIED" : "CONFIRMED", tone, text);
     }
 }
 

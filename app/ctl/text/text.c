@@ -79,11 +79,14 @@ void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]) {
 }
 
 void text_decimal(const json_t *value, unsigned digits, const char *unit, char out[TEXT_CELL]) {
-    if (!json_is_integer(value)) {
+    if (json_is_integer(value)) {
+        text_number(json_integer_value(value), digits, unit, out);
+    } else {
         (void)snprintf(out, TEXT_CELL, "--");
-        return;
     }
-    const long long number = json_integer_value(value);
+}
+
+void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]) {
     unsigned long long scale = 1;
     for (unsigned i = 0; i < digits; i++) {
         scale *= 10U;

@@ -41,6 +41,9 @@ void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]);
 /// The integer divided by 10 to the power of `digits`, with that many decimals and the unit; "--" if it is none.
 void text_decimal(const json_t *value, unsigned digits, const char *unit, char out[TEXT_CELL]);
 
+/// The same of a number that is known.
+void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]);
+
 /// An age in ms in the unit that suits it: "12 ms", "3.4 s", "5 min", "7 h", "2 days"; "--" if it is none.
 void text_age(const json_t *age_ms, char out[TEXT_CELL]);
 

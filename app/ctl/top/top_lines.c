@@ -4,6 +4,8 @@
 #include "text/text.h"
 #include "top.h"
 
+#include "iwheel_northbound/text.h"
+
 #include <curses.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -68,9 +70,11 @@ static void draw_speed(const top_model_t *model, int row, const char *label, top
 
 /// An integer as fewer decimals than it has: what is read across a room needs no thousandths.
 static void coarse(const json_t *value, int divisor, unsigned digits, const char *unit, char out[TEXT_CELL]) {
-    json_t *rounded = json_is_integer(value) ? json_integer(json_integer_value(value) / divisor) : json_null();
-    text_decimal(rounded, digits, unit, out);
-    json_decref(rounded);
+    if (json_is_integer(value)) {
+        text_number(json_integer_value(value) / divisor, digits, unit, out);
+    } else {
+        (void)snprintf(out, TEXT_CELL, "--");
+    }
 }
 
 /// How many rows it took: on a narrow terminal two.
@@ -169,11 +173,12 @@ static void draw_gaps(const top_model_t *model, int row) {
     size_t i = 0;
     long long largest = 0;
     int column = 9;
-    json_t *tenths = json_is_integer(get(gaps, "worst_us"))
-                         ? json_integer((json_integer_value(get(gaps, "worst_us")) + 99) / 100)
-                         : json_null();
-    text_decimal(tenths, 1, "ms", worst);
-    json_decref(tenths);
+    const json_t *worst_us = get(gaps, "worst_us");
+    if (json_is_integer(worst_us)) {
+        text_number((json_integer_value(worst_us) + 99) / 100, 1, "ms", worst); // Rounded up.
+    } else {
+        (void)snprintf(worst, sizeof worst, "--");
+    }
     json_array_foreach(counts, i, entry) {
         largest = (json_integer_value(entry) > largest) ? json_integer_value(entry) : largest;
     }
@@ -203,7 +208,8 @@ static void draw_gaps(const top_model_t *model, int row) {
 static void draw_ledger(const top_model_t *model, int row) {
     static const char *const states[] = {"confirmed", "assumed", "contradicted"};
     unsigned total[3] = {0, 0, 0};
-    char names[TOP_TEXT_SIZE] = "";
+    char names[TOP_TEXT_SIZE];
+    iwn_text_t list = iwn_text_begin(names, sizeof names);
     const char *name = NULL;
     json_t *entry = NULL;
     json_object_foreach(json_object_get(model->state, "ledger"), name, entry) {
@@ -212,8 +218,7 @@ static void draw_ledger(const top_model_t *model, int row) {
             total[i] += (strcmp(state, states[i]) == 0) ? 1U : 0U;
         }
         if (strcmp(state, states[2]) == 0) {
-            const size_t used = strlen(names);
-            (void)snprintf(&names[used], sizeof names - used, " %s", name);
+            IWN_TEXT_JOIN(&list, " ", name);
         }
     }
     const top_tone_t tone = (total[2] > 0) ? TOP_BAD : TOP_PLAIN;
