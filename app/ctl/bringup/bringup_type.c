@@ -188,7 +188,7 @@ static void take_length(bringup_t *self, const learn_t *learn) {
 static void learn_from_recording(bringup_t *self, char *out_types, size_t size) {
     study_t *study = calloc(1, sizeof(*study));
     candump_t frame;
-    if (study != NULL && recording_open(&study->recording, self->recording) == CTL_OK) {
+    if (study != NULL && recording_open(&study->recording, NULL, self->recording) == CTL_OK) {
         learn_init(&study->learn);
         while (recording_next(&study->recording, &frame)) {
             learn_frame(&study->learn, &frame);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
 #include "frame.h"
-#include "recordings/config_option.h"
 #include "recordings/recording.h"
 #include "talk/ctl.h"
 #include "text/text.h"
@@ -150,7 +149,7 @@ int verb_decode(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && decode.csv && self->json) {
         return ctl_fail(CTL_USAGE, "decode writes --csv or --json, not both");
     }
-    code = (code == CTL_OK) ? recording_open(&decode.recording, decode.path) : code;
+    code = (code == CTL_OK) ? recording_open(&decode.recording, NULL, decode.path) : code;
     if (code != CTL_OK) {
         return code;
     }

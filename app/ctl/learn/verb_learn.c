@@ -266,7 +266,7 @@ int verb_learn(ctl_t *self, int count, char **words) {
     if (count != 1 || (words[0][0] == '-' && words[0][1] != '\0')) {
         return ctl_fail(CTL_USAGE, "learn wants one recording (or -); see: iwheelctl learn --help");
     }
-    int code = recording_open(&recording, words[0]);
+    int code = recording_open(&recording, NULL, words[0]);
     if (code != CTL_OK) {
         return code;
     }

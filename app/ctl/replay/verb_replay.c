@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "recordings/config_option.h"
 #include "recordings/events.h"
 #include "recordings/recording.h"
-#include "recordings/source.h"
 #include "replay.h"
 #include "talk/ctl.h"
 #include "text/text.h"
@@ -264,17 +262,15 @@ static int finish(verb_replay_t *self) {
     return (code == CTL_OK && bad) ? CTL_DATA : code;
 }
 
-static int open_frames(verb_replay_t *self, ctl_t *ctl) {
-    self->ctl = (access(self->path, R_OK) != 0) ? ctl : NULL;
-    const int fd = source_is_ours(self->path) ? source_open(self->ctl, self->path, SOURCE_WHOLE) : -1;
-    return (fd >= 0) ? recording_take(&self->recording, self->path, fd) : recording_open(&self->recording, self->path);
-}
-
 int verb_replay(ctl_t *self, int count, char **words) {
     static verb_replay_t replay;
     int code = parse_words(&replay, count, words);
     replay.out = (replay_out_t){.file = stdout, .json = self->json};
-    code = (code == CTL_OK) ? open_frames(&replay, self) : code;
+    if (code != CTL_OK) {
+        return code;
+    }
+    replay.ctl = (access(replay.path, R_OK) != 0) ? self : NULL;
+    code = recording_open(&replay.recording, replay.ctl, replay.path);
     if (code != CTL_OK) {
         return code;
     }

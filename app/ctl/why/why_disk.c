@@ -3,7 +3,6 @@
 
 #include "recordings/events.h"
 #include "recordings/recording.h"
-#include "recordings/source.h"
 #include "text/text.h"
 
 #include <dirent.h>
@@ -165,8 +164,7 @@ static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t mo
     candump_t frame;
     size_t kept = 0;
     size_t after = 0;
-    const int fd = source_open(ctl, path, SOURCE_WHOLE);
-    const int code = (fd >= 0) ? recording_take(&recording, path, fd) : recording_open(&recording, path);
+    const int code = recording_open(&recording, ctl, path);
     if (code != CTL_OK) {
         return code;
     }
