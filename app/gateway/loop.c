@@ -51,13 +51,14 @@ int gw_loop_open(gw_daemon_t *daemon) {
     int error = gw_wakeup_open(&daemon->wakeup);
     const int fds[] = {daemon->wakeup.fd,
                        daemon->signal_fd,
-                       daemon->listener.fd,
+                       daemon->listener[GW_DRIVE].fd,
+                       daemon->listener[GW_WATCH].fd,
                        iw_linux_hal_bus_fd(&daemon->hal),
                        iw_linux_hal_estop_fd(&daemon->hal),
                        daemon->box.writer.fd,
                        daemon->box.reader.fd};
-    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS,
-                             GW_TAG_ESTOP, GW_TAG_BOX,    GW_TAG_BOX};
+    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER,
+                             GW_TAG_BUS,   GW_TAG_ESTOP,  GW_TAG_BOX,      GW_TAG_BOX};
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; i++) {
         error = watch(daemon, fds[i], tags[i]);
     }
@@ -191,6 +192,7 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
         take_signal(daemon);
         return false;
     case GW_TAG_LISTENER:
+    case GW_TAG_WATCH_LISTENER:
         return true;
     case GW_TAG_BOX:
         daemon->box_look_us = 0;

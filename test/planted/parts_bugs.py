@@ -9,6 +9,7 @@ from bugs import Bug
 MOTION, REQUESTS = ("unit_daemon_motion",), ("unit_daemon_requests",)
 CAN, GPIO, CLOCK = ("unit_linux_socketcan",), ("unit_linux_gpio_estop",), ("unit_linux_clock",)
 LOOP, DISPATCH, SERVICE = "app/gateway/loop.c", "app/gateway/answers/dispatch.c", "app/gateway/answers/service.c"
+REFUSE, WATCHERS = "app/gateway/answers/refuse.c", ("unit_daemon_watchers",)
 CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c", "core/src/evidence.c"
 SOCKETCAN, BUS = "port/linux/src/socketcan.c", "port/linux/src/bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
@@ -60,6 +61,17 @@ PARTS = [
     Bug("caught-up-with-lines-left", "R1", CLIENT, "self->drained && gw_client_line(self, &length) == NULL", "gw_client_line(self, &length) == NULL", ("unit_northbound_lines",)),
     Bug("events-take-the-replys-room", "R11", CLIENT, "if (length + reserve > sizeof self->out - waiting) {", "(void)reserve; if (length > sizeof self->out - waiting) {", ("unit_northbound_lines",)),
     Bug("lost-events-not-told", "northbound", CLIENT, "self->lost++;", "self->lost = 1;", ("unit_northbound_lines",)),
+    # Who may only watch.
+    Bug("watcher-may-arm", "R1", REFUSE, "[IWN_CMD_HELLO] = true,", "[IWN_CMD_HELLO] = true, [IWN_CMD_ARM] = true,", WATCHERS),
+    Bug("watcher-may-reset", "R2", REFUSE, "[IWN_CMD_HELLO] = true,", "[IWN_CMD_HELLO] = true, [IWN_CMD_RESET] = true,", WATCHERS),
+    Bug("watcher-may-not-stop", "R2", REFUSE, "[IWN_CMD_STOP] = true,", "[IWN_CMD_STOP] = false,", WATCHERS),
+    Bug("watcher-may-not-estop", "R2", REFUSE, "[IWN_CMD_ESTOP] = true,", "[IWN_CMD_ESTOP] = false,", WATCHERS),
+    Bug("watchers-take-the-slots-of-drivers", "R11", SERVICE, "(right == GW_WATCH) ? daemon->watchers : daemon->clients - daemon->watchers", "(void)right, daemon->clients", WATCHERS),
+    Bug("watchers-without-a-limit", "R11", SERVICE, "i < end && count_of(daemon, right) < most", "i < end", WATCHERS),
+    Bug("watcher-asks-without-end", "R11", SERVICE, "pace(client, daemon->now_us);", "", WATCHERS),
+    Bug("estop-again-recorded-each-time", "R2", "app/gateway/answers/dispatch.c", "daemon->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "false", WATCHERS),
+    Bug("estop-again-forgotten", "R2", "app/gateway/answers/dispatch.c", "daemon->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "true", WATCHERS),
+    Bug("denied-without-words", "northbound", REFUSE, "say_right(daemon, out_refusal); return true;", "out_refusal->error = IWN_DENIED; out_refusal->message[0] = 0; return true;", WATCHERS),
     Bug("holder-served-in-turn", "R11", SERVICE, "if (holder != NULL) { (void)service(daemon, holder); }", "holder = NULL;", ("unit_service_rounds",)),
     Bug("burst-of-telemetry-after-a-stall", "R11", "app/gateway/status/observe.c", "if (client->next_us <= daemon->now_us) {", "if (false) {", REQUESTS),
     # The northbound library.

@@ -251,8 +251,10 @@ void daemon_rig_start(void) {
     TEST_ASSERT_EQUAL_INT(0, gw_runtime_open(&daemon->runtime, &daemon->config, rig->folder, stderr));
     TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon->box, &daemon->config));
     gw_tape_init(&daemon->tape, daemon->box.ring);
-    daemon->listener.fd = listen_somewhere();
-    daemon->listener.reserve_fd = -1;
+    for (unsigned right = 0; right < GW_RIGHTS; right++) {
+        daemon->listener[right] =
+            (gw_listener_t){.right = (gw_right_t)right, .fd = listen_somewhere(), .reserve_fd = -1};
+    }
     daemon->knowledge.answered = true; // Nobody keeps anything.
     daemon->knowledge.write_us = IW_NEVER;
     begin_core(daemon);
@@ -269,9 +271,11 @@ void daemon_rig_crash(void) {
     }
     gw_loop_close(daemon);
     gw_notify_close(&daemon->notify);
-    (void)close(daemon->listener.fd);
-    if (daemon->listener.reserve_fd >= 0) {
-        (void)close(daemon->listener.reserve_fd);
+    for (unsigned right = 0; right < GW_RIGHTS; right++) {
+        (void)close(daemon->listener[right].fd);
+        if (daemon->listener[right].reserve_fd >= 0) {
+            (void)close(daemon->listener[right].reserve_fd);
+        }
     }
     gw_box_close(&daemon->box);
     gw_runtime_close(&daemon->runtime);
@@ -314,14 +318,18 @@ void daemon_rig_run(unsigned for_ms) {
     daemon_rig.ended = gw_loop_run(daemon_rig.daemon) == 0;
 }
 
-int daemon_rig_connect(void) {
+int daemon_rig_connect_with(gw_right_t right) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
-    TEST_ASSERT_EQUAL_INT(0, getsockname(daemon_rig.daemon->listener.fd, (struct sockaddr *)&address, &length));
+    TEST_ASSERT_EQUAL_INT(0, getsockname(daemon_rig.daemon->listener[right].fd, (struct sockaddr *)&address, &length));
     TEST_ASSERT_EQUAL_INT(0, connect(fd, (const struct sockaddr *)&address, length));
     daemon_rig_run(2);
     return fd;
+}
+
+int daemon_rig_connect(void) {
+    return daemon_rig_connect_with(GW_DRIVE);
 }
 
 /// One line of what has come, without its end. False: there is no whole one.

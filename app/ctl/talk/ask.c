@@ -134,7 +134,13 @@ int ctl_connect(ctl_t *self) {
         return code;
     }
     const iwc_result_t result = client_open(&self->client, path, client_now_us() + CLIENT_REPLY_US);
-    return (result == IWC_OK) ? CTL_OK : tell_unopened(self, path, result);
+    if (result != IWC_OK) {
+        return tell_unopened(self, path, result);
+    }
+    if (iwc_watches_only(self->client.gateway)) {
+        (void)ctl_fail(CTL_OK, "by %s you may watch, stop and estop, but not drive", path);
+    }
+    return CTL_OK;
 }
 
 int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {

@@ -5,6 +5,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 /// Finds the path of the socket; NEAR_FOUND if there is one to try.
 static near_t choose(const ctl_t *ctl, const char *bus, char *out_path, size_t size) {
@@ -23,6 +24,9 @@ static near_t choose(const ctl_t *ctl, const char *bus, char *out_path, size_t s
             return NEAR_SEVERAL;
         }
         (void)snprintf(out_path, size, "%s/%s.sock", IWC_DIRECTORY, bus);
+        if (access(out_path, W_OK) != 0) {
+            (void)snprintf(out_path, size, "%s/%s/%s.sock", IWC_DIRECTORY, IWC_WATCH_DIRECTORY, bus);
+        }
         return NEAR_FOUND;
     default:
         return NEAR_NONE;

@@ -25,6 +25,7 @@ static void become(const gw_child_work_t *work, int fd) {
         for (int stream = STDIN_FILENO; stream <= STDERR_FILENO; stream++) {
             (void)dup2(null, stream);
         }
+        (void)close(null);
     }
     (void)close_range(ITS_FD + 1, UINT_MAX, 0); // Else our clients and our lock would seem to live on in it.
     (void)signal(SIGINT, SIG_IGN);              // It ends when the gateway does.
