@@ -31,8 +31,6 @@
 #define GW_DRIVERS_MAX  64U
 #define GW_WATCHERS_MAX 64U
 #define GW_CLIENTS_MAX  (GW_DRIVERS_MAX + GW_WATCHERS_MAX)
-/// Frames of one step, for the watchers of the topic `frame`.
-#define GW_FRAMES       IW_GATEWAY_DRAIN_MAX
 #define GW_WARNINGS     8U
 #define GW_WARNING_SIZE 400U
 
@@ -50,11 +48,6 @@ typedef struct {
     char holder_name[IWN_NAME_MAX + 1U];
     char holder_text[GW_CLIENT_TEXT_SIZE];
 } gw_observed_t;
-
-typedef struct {
-    iw_time_us_t at_us;
-    iw_can_frame_t frame;
-} gw_tapped_t;
 
 /// Who asked for a stop, or an e-stop, last. `at_us` 0: nobody yet.
 typedef struct {
@@ -106,8 +99,6 @@ typedef struct gw_daemon {
     char estop_reason[IWN_REASON_MAX + 1U]; ///< Of the last software e-stop.
     gw_stopper_t stopped_by;
     gw_stopper_t estopped_by;
-    uint32_t tapped; ///< Frames in `tap`. A step takes no more than there is room for.
-    gw_tapped_t tap[GW_FRAMES];
     char line[GW_REPLY_MAX]; ///< Where replies and events are written.
     iwn_work_t work;         ///< For reading requests.
     gw_client_t client[GW_CLIENTS_MAX];

@@ -4,7 +4,6 @@
 #include "loop.h"
 #include "start/options.h"
 #include "start/report.h"
-#include "status/observe.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -35,14 +34,11 @@ static int open_hal(gw_daemon_t *daemon) {
         gw_report_unopened(&daemon->config, culprit, error, stderr);
         return EX_UNAVAILABLE;
     }
-    daemon->hal.tap = gw_observe_tap;
-    daemon->hal.tap_context = daemon;
     return 0;
 }
 
 static int start_core(gw_daemon_t *daemon) {
-    const iw_hal_t port = iw_linux_hal_functions(&daemon->hal);
-    const iw_hal_t hal = gw_tape_hal(&daemon->tape, &port);
+    const iw_hal_t hal = gw_tape_hal(&daemon->tape, &daemon->hal);
     const bool restarted = gw_runtime_crashed(&daemon->runtime) && !daemon->config.core.listen_only;
     daemon->now_us = iw_clock_now_us();
     daemon->suspended_us = iw_clock_suspended_us();

@@ -182,7 +182,7 @@ static void judge_machine(const gateway_config_t *config, inspect_findings_t *fi
 }
 
 int gw_report_check(const gateway_config_t *config, FILE *out) {
-    inspect_findings_t findings;
+    static inspect_findings_t findings; // Too large for a stack.
     char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
     inspect_begin(&findings);
     findings.absent = INSPECT_SKIP;

@@ -31,7 +31,7 @@ void gw_report_start(gw_daemon_t *daemon) {
 }
 
 void gw_report_unopened(const gateway_config_t *config, const char *culprit, int error, FILE *err) {
-    inspect_findings_t findings;
+    static inspect_findings_t findings; // Too large for a stack.
     char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
     inspect_begin(&findings);
     inspect_unopened(culprit, culprit == config->bus.interface, error, &findings);

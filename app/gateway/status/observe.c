@@ -236,13 +236,6 @@ static bool anybody_watches(const gw_daemon_t *daemon, iwn_topic_t topic) {
     return false;
 }
 
-void gw_observe_tap(void *context, const iw_can_frame_t *frame) {
-    gw_daemon_t *daemon = (gw_daemon_t *)context;
-    if (daemon->tapped < GW_FRAMES) {
-        daemon->tap[daemon->tapped++] = (gw_tapped_t){.at_us = daemon->now_us, .frame = *frame};
-    }
-}
-
 static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
     iwn_out_t json = gw_event_begin(daemon, "frame");
     iwn_out_frame(&tapped->frame, tapped->at_us, &json);
@@ -251,11 +244,11 @@ static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
 
 void gw_observe_frames(gw_daemon_t *daemon) {
     if (anybody_watches(daemon, IWN_TOPIC_FRAME)) {
-        for (uint32_t i = 0; i < daemon->tapped; i++) {
-            tell_frame(daemon, &daemon->tap[i]);
+        for (uint32_t i = 0; i < daemon->tape.tapped; i++) {
+            tell_frame(daemon, &daemon->tape.tap[i]);
         }
     }
-    daemon->tapped = 0;
+    daemon->tape.tapped = 0;
 }
 
 void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, iwn_out_t *json) {
