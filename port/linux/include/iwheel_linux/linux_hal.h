@@ -11,7 +11,7 @@
 
 /// A bus and an e-stop, opened. Its members are the port's own.
 typedef struct {
-    const iw_estop_ops_t *estop_ops; ///< The kind of e-stop.
+    const iw_estop_ops_t *estop_ops; ///< The kind of the e-stop.
     int estop_last;                  ///< The last answer given to the core; -1 before the first.
     bool estop_quiet;       ///< The last wait found no edge at the e-stop's descriptor, and it has not been read since.
     iw_backend_store_t bus; ///< State of the bus.
