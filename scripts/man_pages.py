@@ -68,7 +68,7 @@ class Sources:
     def header(self, name):
         """Without what only a compiler needs."""
         with open(os.path.join(ROOT, name), encoding="utf-8") as file:
-            text = re.sub(r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|})\n", "", file.read(), flags=re.M)
+            text = re.sub(r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|/// @file|})\n", "", file.read(), flags=re.M)
         return literal(re.sub(r"\n{3,}", "\n\n", text.replace("IWC_API ", "")))
 
     def document(self, name):
