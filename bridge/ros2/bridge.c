@@ -298,11 +298,12 @@ static void take_from_ros(bridge_t *self) {
     ros_request_t request;
     ros_command_t command;
     ros_woken(self->ros);
-    while (ros_take_request(self->ros, &request)) {
-        take_request(self, &request);
-    }
+    // A command first: it is soonest on the bus so, and a stop that came with it has the last word.
     if (ros_take_command(self->ros, &command)) {
         take_command(self, &command);
+    }
+    while (ros_take_request(self->ros, &request)) {
+        take_request(self, &request);
     }
 }
 
@@ -350,12 +351,12 @@ static void tell(bridge_t *self, int64_t now) {
 }
 
 void bridge_step(bridge_t *self) {
+    take_from_ros(self);
     if (self->facts.link != ROS_LINK_GONE) {
         take_messages(self);
     } else if (now_us() >= self->retry_us) {
         (void)try_connect(self);
     }
-    take_from_ros(self);
     const int64_t now = now_us();
     judge_silence(self, now);
     if (self->facts.link == ROS_LINK_UP && now - self->heard_us > SILENT_US) {

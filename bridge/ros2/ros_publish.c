@@ -14,6 +14,15 @@ static char right_handle[] = "right_handle";
 static char hardware[] = "iwheel";
 static char nothing[] = "";
 
+/// Samples point to what they hold as if it were theirs; nobody writes to it.
+static char *writable(const char *text) {
+    const union {
+        const char *ours;
+        char *theirs;
+    } pointer = {.ours = text};
+    return pointer.theirs;
+}
+
 static std_msgs_msg_dds__Header_ header(int64_t wall_us, char *frame) {
     return (std_msgs_msg_dds__Header_){
         .stamp = {.sec = (int32_t)(wall_us / 1000000), .nanosec = (uint32_t)(wall_us % 1000000 * 1000)},
@@ -136,13 +145,13 @@ void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t 
     for (size_t i = 0; i < ROS_TELLS; i++) {
         const ros_status_t *status = &statuses[i];
         for (size_t j = 0; j < status->value_count; j++) {
-            values[i][j] = (diagnostic_msgs_msg_dds__KeyValue_){.key = (char *)(uintptr_t)status->values[j].key,
-                                                                .value = (char *)(uintptr_t)status->values[j].text};
+            values[i][j] = (diagnostic_msgs_msg_dds__KeyValue_){.key = writable(status->values[j].key),
+                                                                .value = writable(status->values[j].text)};
         }
         all[i] = (diagnostic_msgs_msg_dds__DiagnosticStatus_){
             .level = (uint8_t)status->level,
-            .name = (char *)(uintptr_t)status->name,
-            .message = (char *)(uintptr_t)status->message,
+            .name = writable(status->name),
+            .message = writable(status->message),
             .hardware_id = hardware,
             .values = {._length = status->value_count, ._buffer = values[i]}};
     }
@@ -152,6 +161,6 @@ void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t 
 }
 
 void ros_publish_state(ros_t *self, const char *json) {
-    const std_msgs_msg_dds__String_ message = {.data = (char *)(uintptr_t)json};
+    const std_msgs_msg_dds__String_ message = {.data = writable(json)};
     (void)dds_write(self->writers[WRITES_STATE], &message);
 }
