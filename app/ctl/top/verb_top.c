@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The live screen: snapshots come ten times a second, keys go out as requests. It never arms.
 #include "talk/ctl.h"
-#include "talk/near.h"
-#include "talk/signals.h"
+#include "talk/words.h"
 #include "text/text.h"
 #include "top.h"
 
@@ -91,6 +90,9 @@ static void try_connect(top_t *self) {
     self->model.state = gateway.status;
     self->model.connected = true;
     self->model.notice[0] = '\0';
+    if (iwc_watches_only(self->ctl->client.gateway)) {
+        notice(self, "by this socket you may watch and stop, but not drive");
+    }
     self->heard_us = client_now_us();
     json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
     keep_sentence(self, why);
@@ -224,7 +226,7 @@ static bool can_draw(void) {
 int verb_top(ctl_t *self, int count, char **words) {
     static top_t top;
     top = (top_t){.ctl = self, .model = {.scale_mm_s = 200, .history = &top.history}};
-    if (!ctl_words_at_most("top", count, 0, words)) {
+    if (!words_at_most("top", count, 0, words)) {
         return CTL_USAGE;
     }
     if (isatty(STDIN_FILENO) != 1 || isatty(STDOUT_FILENO) != 1) {
