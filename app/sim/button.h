@@ -12,7 +12,6 @@
 #define SIM_BUTTON_CLIENTS 8U
 
 typedef struct sim_button {
-    sim_watch_t watch;
     sim_listener_t listener;
     sim_watch_t client[SIM_BUTTON_CLIENTS]; ///< fd -1: free.
     const sim_loop_t *loop;

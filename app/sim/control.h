@@ -19,7 +19,6 @@ typedef struct {
 } sim_control_client_t;
 
 typedef struct sim_control {
-    sim_watch_t watch;
     sim_listener_t listener;
     sim_control_client_t client[SIM_CONTROL_CLIENTS];
     const sim_loop_t *loop;

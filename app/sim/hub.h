@@ -22,7 +22,6 @@ typedef struct {
 } sim_client_t;
 
 typedef struct sim_hub {
-    sim_watch_t watch;
     sim_listener_t listener;
     sim_client_t client[SIM_WORLD_CLIENTS];
     const sim_loop_t *loop;

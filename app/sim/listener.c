@@ -60,10 +60,18 @@ static bool make_room(const char *path, int type, sim_reason_t *out_reason) {
     return unlink(path) == 0 || refuse(out_reason, path, strerror(errno));
 }
 
+static void somebody_connects(sim_watch_t *watch) {
+    sim_listener_t *const self = watch->owner;
+    const int fd = (watch->fd >= 0) ? accept4(watch->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC) : -1;
+    if (fd >= 0 && !self->admit(self->owner, fd)) {
+        (void)close(fd);
+    }
+}
+
 bool sim_listener_open(sim_listener_t *self, const char *path, int type, sim_reason_t *out_reason) {
     struct sockaddr_un address;
     struct stat made;
-    self->fd = -1;
+    self->watch = (sim_watch_t){somebody_connects, self, -1};
     if (!fill_address(&address, path)) {
         return refuse(out_reason, path, "the path of a unix socket has 1 to 107 characters; choose a shorter one");
     }
@@ -72,31 +80,28 @@ bool sim_listener_open(sim_listener_t *self, const char *path, int type, sim_rea
     }
     int const fd = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     bool const bound = fd >= 0 && bind(fd, (struct sockaddr *)&address, sizeof address) == 0;
-    if (!bound || chmod(path, 0660) != 0 || lstat(path, &made) != 0 || listen(fd, BACKLOG) != 0) {
+    self->watch.fd = fd;
+    if (!bound || chmod(path, 0660) != 0 || lstat(path, &made) != 0 || listen(fd, BACKLOG) != 0 ||
+        !sim_loop_add(self->loop, &self->watch)) {
         (void)refuse(out_reason, path, strerror(errno));
         if (fd >= 0) {
             (void)close(fd);
         }
+        self->watch.fd = -1;
         return false;
     }
-    self->fd = fd;
     self->device = made.st_dev;
     self->inode = made.st_ino;
     memcpy(self->path, address.sun_path, sizeof self->path);
     return true;
 }
 
-int sim_listener_accept(const sim_listener_t *self) {
-    return accept4(self->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-}
-
 void sim_listener_close(sim_listener_t *self) {
     struct stat there;
-    if (self->fd < 0) {
+    if (self->watch.fd < 0) {
         return;
     }
-    (void)close(self->fd);
-    self->fd = -1;
+    sim_loop_drop(self->loop, &self->watch);
     if (lstat(self->path, &there) == 0 && there.st_dev == self->device && there.st_ino == self->inode) {
         (void)unlink(self->path);
     }

@@ -34,6 +34,12 @@ void sim_loop_remove(const sim_loop_t *self, const sim_watch_t *watch) {
     (void)epoll_ctl(self->epoll_fd, EPOLL_CTL_DEL, watch->fd, NULL);
 }
 
+void sim_loop_drop(const sim_loop_t *self, sim_watch_t *watch) {
+    sim_loop_remove(self, watch);
+    (void)close(watch->fd);
+    watch->fd = -1;
+}
+
 static void set_timer(const sim_loop_t *self, iw_time_us_t wake_us) {
     struct itimerspec at = {0};
     if (wake_us != IW_NEVER) {

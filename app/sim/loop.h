@@ -29,6 +29,9 @@ bool sim_loop_open(sim_loop_t *self);
 bool sim_loop_add(const sim_loop_t *self, sim_watch_t *watch);
 void sim_loop_remove(const sim_loop_t *self, const sim_watch_t *watch);
 
+/// Removes it and closes its descriptor: `fd` is -1 then.
+void sim_loop_drop(const sim_loop_t *self, sim_watch_t *watch);
+
 /// Waits for the next event or until `wake_us` (IW_NEVER: for events only) and calls `before`, then the handlers of
 /// what is ready.
 void sim_loop_wait(const sim_loop_t *self, iw_time_us_t wake_us, void (*before)(void *context), void *context);

@@ -199,9 +199,9 @@ static int open_sockets(sim_simulator_t *self, const sim_options_t *options) {
     self->hub = (sim_hub_t){.loop = &self->loop, .world = &self->world, .now_us = &self->now_us};
     self->button = (sim_button_t){.loop = &self->loop};
     self->control = (sim_control_t){.loop = &self->loop, .execute = execute, .context = self};
-    self->hub.listener.fd = -1;
-    self->button.listener.fd = -1;
-    self->control.listener.fd = -1;
+    self->hub.listener.watch.fd = -1;
+    self->button.listener.watch.fd = -1;
+    self->control.listener.watch.fd = -1;
     if (open_bus(self, options, &reason) && sim_button_open(&self->button, options->estop_path, &reason) &&
         sim_control_open(&self->control, options->control_path, &reason)) {
         return -1;
