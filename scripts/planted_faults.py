@@ -55,6 +55,13 @@ def stack(folder, code):
     return run(SCRIPTS / "stack_usage.py", folder, 256)
 
 
+def frames(folder, code):
+    (folder / "planted.c").write_text(code)
+    entry = {"directory": str(folder), "file": str(folder / "planted.c"), "command": "gcc -O2 -c planted.c -o planted.o"}
+    (folder / "compile_commands.json").write_text(json.dumps([entry]))
+    return run(SCRIPTS / "stack_usage.py", "--frames", folder, 4096, folder)
+
+
 def coverage(folder, calls):
     """A function with two branches and a main that makes the calls given."""
     sources, objects = folder / "core" / "src", folder / "iwheel_core.dir"
@@ -232,6 +239,9 @@ CASES = [
     (stack, "arm-none-eabi-gcc", "300 bytes", BIG, True),
     (stack, "arm-none-eabi-gcc", "variable length", VARIABLE, True),
     (stack, "arm-none-eabi-gcc", "recursion", RECURSION, True),
+    (frames, "gcc", "4000 bytes", BIG.replace("300", "4000"), False),
+    (frames, "gcc", "4200 bytes", BIG.replace("300", "4200"), True),
+    (frames, "gcc", "variable length", VARIABLE, True),
     (coverage, "gcov", "clean", SOME_FOUR, False),
     (coverage, "gcov", "a branch never taken", "f(0, 0); f(1, 1);", True),
     (coverage, "gcov", "a function never called", "", True),

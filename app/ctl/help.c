@@ -2,7 +2,7 @@
 #include "help.h"
 
 #include "gateway_config.h"
-#include "similar.h"
+#include "settings/similar.h"
 #include "talk/words.h"
 #include "text/duration.h"
 

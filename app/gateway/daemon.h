@@ -27,9 +27,10 @@
 #include "iwheel_linux/linux_hal.h"
 #include "iwheel_northbound/why.h"
 
-#define GW_CLIENTS_MAX 64U
-/// Frames of one step, for the watchers of the topic `frame`.
-#define GW_FRAMES       IW_GATEWAY_DRAIN_MAX
+/// Slots of those who may drive, and behind them of those who may only watch: neither takes the others'.
+#define GW_DRIVERS_MAX  64U
+#define GW_WATCHERS_MAX 64U
+#define GW_CLIENTS_MAX  (GW_DRIVERS_MAX + GW_WATCHERS_MAX)
 #define GW_WARNINGS     8U
 #define GW_WARNING_SIZE 400U
 
@@ -48,10 +49,12 @@ typedef struct {
     char holder_text[GW_CLIENT_TEXT_SIZE];
 } gw_observed_t;
 
+/// Who asked for a stop, or an e-stop, last. `at_us` 0: nobody yet.
 typedef struct {
     iw_time_us_t at_us;
-    iw_can_frame_t frame;
-} gw_tapped_t;
+    int pid;
+    uid_t uid;
+} gw_stopper_t;
 
 typedef struct gw_daemon {
     gateway_config_t config;
@@ -59,7 +62,7 @@ typedef struct gw_daemon {
     gw_notify_t notify;
     gw_runtime_t runtime;
     gw_wakeup_t wakeup;
-    gw_listener_t listener;
+    gw_listener_t listener[GW_RIGHTS];
     gw_box_t box;
     gw_tape_t tape;
     iw_linux_hal_t hal;
@@ -69,16 +72,16 @@ typedef struct gw_daemon {
     gw_knowledge_t knowledge;
     iw_motion_evidence_t evidence;
     iwn_stop_note_t last_stop;
-    iw_time_us_t now_us;         ///< Of the present cycle.
-    iw_time_us_t woken_us;       ///< When the wait ended: what a client sends later than this was not waiting then.
-    iw_time_us_t suspended_us;   ///< Of the machine, as last looked at.
-    iw_time_us_t step_next_us;   ///< As the last step wished.
-    iw_time_us_t box_look_us;    ///< When the black box's writer is listened to next.
-    iw_time_us_t listen_from_us; ///< Nobody is accepted before.
+    iw_time_us_t now_us;       ///< Of the present cycle.
+    iw_time_us_t woken_us;     ///< When the wait ended: what a client sends later than this was not waiting then.
+    iw_time_us_t suspended_us; ///< Of the machine, as last looked at.
+    iw_time_us_t step_next_us; ///< As the last step wished.
+    iw_time_us_t box_look_us;  ///< When the black box's writer is listened to next.
     iw_client_t last_client;
-    uint32_t clients;
-    uint32_t next_served;  ///< Slot where the next round begins.
-    uint32_t next_flushed; ///< The same of sending.
+    uint32_t clients; ///< Watchers among them.
+    uint32_t watchers;
+    uint32_t next_served[GW_RIGHTS];  ///< Slot where the next round begins.
+    uint32_t next_flushed[GW_RIGHTS]; ///< The same of sending.
     int epoll_fd;
     int signal_fd;
     bool shutting_down;
@@ -94,8 +97,8 @@ typedef struct gw_daemon {
     uint32_t warnings;
     char warning[GW_WARNINGS][GW_WARNING_SIZE];
     char estop_reason[IWN_REASON_MAX + 1U]; ///< Of the last software e-stop.
-    uint32_t tapped;                        ///< Frames in `tap`. A step takes no more than there is room for.
-    gw_tapped_t tap[GW_FRAMES];
+    gw_stopper_t stopped_by;
+    gw_stopper_t estopped_by;
     char line[GW_REPLY_MAX]; ///< Where replies and events are written.
     iwn_work_t work;         ///< For reading requests.
     gw_client_t client[GW_CLIENTS_MAX];

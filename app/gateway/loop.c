@@ -51,13 +51,14 @@ int gw_loop_open(gw_daemon_t *daemon) {
     int error = gw_wakeup_open(&daemon->wakeup);
     const int fds[] = {daemon->wakeup.fd,
                        daemon->signal_fd,
-                       daemon->listener.fd,
+                       daemon->listener[GW_DRIVE].fd,
+                       daemon->listener[GW_WATCH].fd,
                        iw_linux_hal_bus_fd(&daemon->hal),
                        iw_linux_hal_estop_fd(&daemon->hal),
-                       daemon->box.fd,
+                       daemon->box.writer.fd,
                        daemon->box.reader.fd};
-    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS,
-                             GW_TAG_ESTOP, GW_TAG_BOX,    GW_TAG_BOX};
+    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER,
+                             GW_TAG_BUS,   GW_TAG_ESTOP,  GW_TAG_BOX,      GW_TAG_BOX};
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; i++) {
         error = watch(daemon, fds[i], tags[i]);
     }
@@ -161,8 +162,8 @@ static void arm_timer(gw_daemon_t *daemon) {
 /// Frames are worth waking for, unless they keep coming and nobody has any use for them at once: no client is there, and no
 /// setpoint or stop is under way. The e-stop and whoever connects wake us as ever, and then the bus is read first.
 static bool frames_may_wait(const gw_daemon_t *daemon) {
-    const bool all_taken = daemon->tapped < GW_FRAMES;
-    return daemon->tapped > 0U && all_taken && daemon->clients == 0U && !gw_daemon_is_sending(daemon);
+    const bool all_taken = daemon->tape.tapped < GW_FRAMES;
+    return daemon->tape.tapped > 0U && all_taken && daemon->clients == 0U && !gw_daemon_is_sending(daemon);
 }
 
 static void heed_bus(gw_daemon_t *daemon) {
@@ -191,6 +192,7 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
         take_signal(daemon);
         return false;
     case GW_TAG_LISTENER:
+    case GW_TAG_WATCH_LISTENER:
         return true;
     case GW_TAG_BOX:
         daemon->box_look_us = 0;

@@ -4,7 +4,6 @@
 #include "loop.h"
 #include "start/options.h"
 #include "start/report.h"
-#include "status/observe.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -35,14 +34,11 @@ static int open_hal(gw_daemon_t *daemon) {
         gw_report_unopened(&daemon->config, culprit, error, stderr);
         return EX_UNAVAILABLE;
     }
-    daemon->hal.tap = gw_observe_tap;
-    daemon->hal.tap_context = daemon;
     return 0;
 }
 
 static int start_core(gw_daemon_t *daemon) {
-    const iw_hal_t port = iw_linux_hal_functions(&daemon->hal);
-    const iw_hal_t hal = gw_tape_hal(&daemon->tape, &port);
+    const iw_hal_t hal = gw_tape_hal(&daemon->tape, &daemon->hal);
     const bool restarted = gw_runtime_crashed(&daemon->runtime) && !daemon->config.core.listen_only;
     daemon->now_us = iw_clock_now_us();
     daemon->suspended_us = iw_clock_suspended_us();
@@ -65,12 +61,25 @@ static int start_core(gw_daemon_t *daemon) {
     return 0;
 }
 
+/// Who only watches must not keep anybody from driving: without its socket the gateway serves all the same.
+static void listen_to_watchers(gw_daemon_t *daemon) {
+    gw_listener_t *watch = &daemon->listener[GW_WATCH];
+    *watch = (gw_listener_t){.right = GW_WATCH, .fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
+    if (gw_listener_wanted(&daemon->config, GW_WATCH) &&
+        (gw_listener_prepare(watch, &daemon->config, GW_WATCH, stderr) != 0 ||
+         gw_listener_open(watch, &daemon->config, &daemon->log, stderr) != 0)) {
+        gw_log(&daemon->log, GW_LOG_WARNING, "nobody can watch on %s (see above); who may drive is served all the same",
+               daemon->config.northbound.watch_socket);
+    }
+}
+
 /// Everything between the start of the core and the loop, in the reverse order at the end.
 static int serve(gw_daemon_t *daemon) {
-    int result = gw_listener_open(&daemon->listener, &daemon->config, &daemon->log, stderr);
+    int result = gw_listener_open(&daemon->listener[GW_DRIVE], &daemon->config, &daemon->log, stderr);
     if (result != 0) {
         return result;
     }
+    listen_to_watchers(daemon);
     result = start_core(daemon);
     if (result == 0 && gw_loop_open(daemon) != 0) {
         (void)fputs("iwheel-gateway: cannot make the descriptors for the event loop; raise the limit of open files\n",
@@ -91,13 +100,14 @@ static int serve(gw_daemon_t *daemon) {
         gw_loop_close(daemon);
         gw_notify_close(&daemon->notify);
     }
-    gw_listener_close(&daemon->listener);
+    gw_listener_close(&daemon->listener[GW_WATCH]);
+    gw_listener_close(&daemon->listener[GW_DRIVE]);
     return result;
 }
 
 static int run(gw_daemon_t *daemon) {
     gw_knowledge_open(&daemon->knowledge, &daemon->config);
-    int result = gw_listener_prepare(&daemon->listener, &daemon->config, stderr);
+    int result = gw_listener_prepare(&daemon->listener[GW_DRIVE], &daemon->config, GW_DRIVE, stderr);
     result = (result != 0) ? result : gw_runtime_open(&daemon->runtime, &daemon->config, GW_RUNTIME_DIRECTORY, stderr);
     if (result != 0) {
         return result;

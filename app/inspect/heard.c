@@ -60,17 +60,16 @@ void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame) {
 }
 
 static void look(iw_linux_hal_t *hal, iw_time_us_t now_us, bool counting, inspect_heard_t *heard) {
-    const iw_hal_t functions = iw_linux_hal_functions(hal);
     iw_can_frame_t frame;
     iw_linux_hal_tend(hal, now_us);
-    const iw_bus_state_t state = functions.bus_state(functions.context);
+    const iw_bus_state_t state = iw_bus_state(&hal->bus);
     heard->was_up = heard->was_up || state >= IW_BUS_PASSIVE;
     if (state < heard->worst) {
         heard->worst = state;
     }
     heard->last = state;
-    heard->estop = functions.estop_pressed(functions.context);
-    while (functions.receive(functions.context, &frame) > 0) {
+    heard->estop = iw_linux_hal_pressed(hal);
+    while (iw_bus_receive(&hal->bus, &frame) > 0) {
         if (counting) {
             inspect_heard_take(heard, &frame);
         }

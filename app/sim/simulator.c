@@ -60,7 +60,7 @@ static bool refuse(sim_panel_t *panel, const char *line) {
 
 static const char *execute(void *context, const char *line) {
     sim_simulator_t *const self = context;
-    if (self->can.ops != NULL && refuse(&self->panel, line)) {
+    if (self->can.is_open && refuse(&self->panel, line)) {
         return self->panel.answer;
     }
     if (sim_panel_execute(&self->panel, self->now_us, line) == SIM_CHANGED) {
@@ -233,7 +233,7 @@ int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {
     pair.age_us = options->age_us;
     self->quiet = options->quiet;
     self->on_socketcan = options->can_interface[0] != '\0';
-    self->can.ops = NULL;
+    self->can.is_open = false;
     self->now_us = sim_loop_clock_us();
     self->start_us = self->now_us;
     self->wake_us = IW_NEVER;

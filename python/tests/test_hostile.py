@@ -4,11 +4,13 @@
 import asyncio
 import json
 import os
+import shutil
 import socket
 import tempfile
 import threading
 import time
 import unittest
+from unittest import mock
 
 import rig  # noqa: F401  The path to the package.
 
@@ -228,6 +230,24 @@ class Hostile(unittest.TestCase):
         os.environ["IWHEEL_SOCKET"] = "/tmp/somewhere.sock"
         self.addCleanup(lambda: os.environ.pop("IWHEEL_SOCKET") if before is None else None)
         self.assertEqual(default_socket(), "/tmp/somewhere.sock")
+
+    def test_of_a_gateways_two_sockets_the_one_that_may_be_used_is_taken(self):
+        folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, folder)
+        os.chmod(folder, 0o755)
+        os.mkdir(os.path.join(folder, "watch"), 0o755)
+        drive, watch = os.path.join(folder, "can0.sock"), os.path.join(folder, "watch", "can0.sock")
+        for path, mode in ((drive, 0o600), (watch, 0o666)):
+            with socket.socket(socket.AF_UNIX) as one:
+                one.bind(path)
+            os.chmod(path, mode)
+        with mock.patch("iwheel._wire.DEFAULT_FOLDER", folder), mock.patch.dict(os.environ):
+            os.environ.pop("IWHEEL_SOCKET", None)
+            self.assertEqual(default_socket(), drive)
+            if os.geteuid() == 0:
+                self.assertIn(watch, as_nobody(Gateway().status))
+            os.unlink(drive)
+            self.assertEqual(default_socket(), watch)
 
 
 if __name__ == "__main__":

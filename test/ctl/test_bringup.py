@@ -290,6 +290,22 @@ class Bringup(unittest.TestCase):
         operator.expect("It TURNED")
         self.assertEqual("setpoint", self.offered(operator, "current_role"))
 
+    def test_wheel_that_runs_away_before_bringup_looks_is_found_out_by_the_stop(self):
+        self.rig.sim.ask("role setpoint")
+        operator = self.begin()
+        operator.answer("types to try", "7")
+        operator.expect("Did both wheels turn")
+        self.rig.sim.ask("block both")
+        operator.seen -= len("Did both wheels turn")
+        operator.answer("Did both wheels turn", "y")
+        operator.expect("Nothing may turn")
+        self.rig.sim.ask("unblock both")
+        operator.expect("any key stops it")
+        operator.process.send_signal(signal.SIGSTOP)  # Hangs, while the gateway sees a wheel run away.
+        time.sleep(1.5)
+        operator.process.send_signal(signal.SIGCONT)
+        operator.expect("It TURNED")
+
     def offered(self, operator, question):
         operator.expect(question)
         operator.expect("[")

@@ -9,8 +9,9 @@ from bugs import Bug
 MOTION, REQUESTS = ("unit_daemon_motion",), ("unit_daemon_requests",)
 CAN, GPIO, CLOCK = ("unit_linux_socketcan",), ("unit_linux_gpio_estop",), ("unit_linux_clock",)
 LOOP, DISPATCH, SERVICE = "app/gateway/loop.c", "app/gateway/answers/dispatch.c", "app/gateway/answers/service.c"
+REFUSE, WATCHERS = "app/gateway/answers/refuse.c", ("unit_daemon_watchers",)
 CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c", "core/src/evidence.c"
-SOCKETCAN, LOCAL = "port/linux/src/socketcan.c", "port/linux/src/local_bus.c"
+SOCKETCAN, BUS = "port/linux/src/socketcan.c", "port/linux/src/bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
 LEARN = "app/ctl/learn/learn.c"
 STATUS_LEDGER = "app/gateway/ledger/knowledge_json.c"
@@ -60,6 +61,17 @@ PARTS = [
     Bug("caught-up-with-lines-left", "R1", CLIENT, "self->drained && gw_client_line(self, &length) == NULL", "gw_client_line(self, &length) == NULL", ("unit_northbound_lines",)),
     Bug("events-take-the-replys-room", "R11", CLIENT, "if (length + reserve > sizeof self->out - waiting) {", "(void)reserve; if (length > sizeof self->out - waiting) {", ("unit_northbound_lines",)),
     Bug("lost-events-not-told", "northbound", CLIENT, "self->lost++;", "self->lost = 1;", ("unit_northbound_lines",)),
+    # Who may only watch.
+    Bug("watcher-may-arm", "R1", REFUSE, "[IWN_CMD_HELLO] = true,", "[IWN_CMD_HELLO] = true, [IWN_CMD_ARM] = true,", WATCHERS),
+    Bug("watcher-may-reset", "R2", REFUSE, "[IWN_CMD_HELLO] = true,", "[IWN_CMD_HELLO] = true, [IWN_CMD_RESET] = true,", WATCHERS),
+    Bug("watcher-may-not-stop", "R2", REFUSE, "[IWN_CMD_STOP] = true,", "[IWN_CMD_STOP] = false,", WATCHERS),
+    Bug("watcher-may-not-estop", "R2", REFUSE, "[IWN_CMD_ESTOP] = true,", "[IWN_CMD_ESTOP] = false,", WATCHERS),
+    Bug("watchers-take-the-slots-of-drivers", "R11", SERVICE, "(right == GW_WATCH) ? daemon->watchers : daemon->clients - daemon->watchers", "(void)right, daemon->clients", WATCHERS),
+    Bug("watchers-without-a-limit", "R11", SERVICE, "i < end && count_of(daemon, right) < most", "i < end", WATCHERS),
+    Bug("watcher-asks-without-end", "R11", SERVICE, "pace(client, daemon->now_us);", "", WATCHERS),
+    Bug("estop-again-recorded-each-time", "R2", "app/gateway/answers/dispatch.c", "daemon->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "false", WATCHERS),
+    Bug("estop-again-forgotten", "R2", "app/gateway/answers/dispatch.c", "daemon->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "true", WATCHERS),
+    Bug("denied-without-words", "northbound", REFUSE, "say_right(daemon, out_refusal); return true;", "out_refusal->error = IWN_DENIED; out_refusal->message[0] = 0; return true;", WATCHERS),
     Bug("holder-served-in-turn", "R11", SERVICE, "if (holder != NULL) { (void)service(daemon, holder); }", "holder = NULL;", ("unit_service_rounds",)),
     Bug("burst-of-telemetry-after-a-stall", "R11", "app/gateway/status/observe.c", "if (client->next_us <= daemon->now_us) {", "if (false) {", REQUESTS),
     # The northbound library.
@@ -111,31 +123,31 @@ PARTS = [
     Bug("status-with-the-values-of-before", "ledger", STATUS_LEDGER, "is_alike(&written->config, source->config, sizeof written->config) &&", "", ("unit_daemon_memory",)),
     Bug("status-of-a-line-that-did-not-fit", "ledger", STATUS_LEDGER, "json->overflow ? 0U : json->length - begin", "json->length - begin", ("unit_daemon_memory",)),
     # SocketCAN.
-    Bug("bus-off-forgotten", "R13", SOCKETCAN, "bus->unheeded = IW_BUS_OFF; bus->present = forged", "bus->present = forged", CAN),
-    Bug("restart-is-no-loss", "R6", SOCKETCAN, "} else if (error == IW_CAN_ERROR_RESTARTED) { bus->unheeded = IW_BUS_OFF;", "} else if (error == IW_CAN_ERROR_RESTARTED) {", CAN),
-    Bug("loss-told-for-ever", "R13", SOCKETCAN, "bus->unheeded = IW_BUS_ACTIVE;", "", CAN),
-    Bug("link-loss-not-told", "R13", SOCKETCAN, "bus->unheeded = IW_BUS_DOWN;", "", CAN),
-    Bug("old-frames-at-up", "R7", SOCKETCAN, "drop_old(bus); if (interface", "if (interface", CAN),
-    Bug("old-frames-kept-while-down", "R11", SOCKETCAN, "if (!bus->up) { drop_old(bus);", "if (!bus->up) {", CAN),
-    Bug("half-a-batch-from-before", "R7", SOCKETCAN, "iw_socketcan_socket_forget(&bus->ours);", "", CAN),
-    Bug("forged-recovery-believed", "R13", SOCKETCAN, "} else if (forged) { return; } else", "} else", CAN),
-    Bug("active-ends-bus-off", "R13", SOCKETCAN, "error == IW_CAN_ERROR_ACTIVE && bus->present == IW_BUS_PASSIVE", "error == IW_CAN_ERROR_ACTIVE", CAN),
-    Bug("bus-off-never-looked-at-again", "R13", SOCKETCAN, "bus->look_us = bus->now_us + (forged ? 0U : RETRY_US);", "", CAN),
-    Bug("old-socket-of-a-new-interface", "R13", SOCKETCAN, "bus->interface = (error == ENODEV) ? 0 : bus->interface; iw_socketcan", "iw_socketcan", CAN),
+    Bug("bus-off-forgotten", "R13", BUS, "bus->unheeded = IW_BUS_OFF; bus->present = forged", "bus->present = forged", CAN),
+    Bug("restart-is-no-loss", "R6", BUS, "} else if (error == IW_CAN_ERROR_RESTARTED) { bus->unheeded = IW_BUS_OFF;", "} else if (error == IW_CAN_ERROR_RESTARTED) {", CAN),
+    Bug("loss-told-for-ever", "R13", BUS, "bus->unheeded = IW_BUS_ACTIVE; return (unheeded", "return (unheeded", CAN),
+    Bug("link-loss-not-told", "R13", BUS, "bus->unheeded = IW_BUS_DOWN;", "", CAN),
+    Bug("old-frames-at-up", "R7", SOCKETCAN, "drop_old(can); if (interface", "if (interface", CAN),
+    Bug("old-frames-kept-while-down", "R11", SOCKETCAN, "if (!bus->up) { drop_old(can);", "if (!bus->up) {", CAN),
+    Bug("half-a-batch-from-before", "R7", BUS, "iw_socketcan_socket_forget(&bus->ours);", "", CAN),
+    Bug("forged-recovery-believed", "R13", BUS, "} else if (forged) { return; } else", "} else", CAN),
+    Bug("active-ends-bus-off", "R13", BUS, "bus->present >= IW_BUS_PASSIVE && (error", "(error", CAN),
+    Bug("bus-off-never-looked-at-again", "R13", BUS, "bus->look_us = bus->now_us + (forged ? 0U : IW_BUS_RETRY_US);", "", CAN),
+    Bug("old-socket-of-a-new-interface", "R13", SOCKETCAN, "can_of(bus)->interface = (error == ENODEV) ? 0 : can_of(bus)->interface;", "(void)bus; (void)error;", CAN),
     Bug("purge-not-allowed-tried-again", "R6", SOCKETCAN, "bus->link.purge == IW_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven", "!bus->link.echo_proven", CAN),
     Bug("purge-without-a-proven-echo", "R6", SOCKETCAN, "bus->link.purge == IW_LINK_PURGE_NOT_ALLOWED || !bus->link.echo_proven", "bus->link.purge == IW_LINK_PURGE_NOT_ALLOWED", CAN),
-    Bug("error-flood-holds-the-loop", "R11", SOCKETCAN, "bus->errors_left--;", "", CAN),
-    Bug("other-ids-right-before-a-setpoint", "R11", SOCKETCAN, "bus->others_us > bus->now_us + OTHERS_AFTER_SEND_US", "bus->others_us < bus->now_us", CAN),
+    Bug("error-flood-holds-the-loop", "R11", BUS, "bus->errors_left--;", "", CAN),
+    Bug("other-ids-right-before-a-setpoint", "R11", BUS, "bus->others_us > bus->now_us + OTHERS_AFTER_SEND_US", "bus->others_us < bus->now_us", CAN),
     # The rest of the Linux port.
-    Bug("local-bus-off-forgotten", "R13", LOCAL, "bus->unheeded = IW_BUS_OFF; bus->present = forged", "bus->present = forged", ("unit_linux_local",)),
-    Bug("local-restart-is-no-loss", "R6", LOCAL, "bus->unheeded = IW_BUS_OFF; bus->present = IW_BUS_ACTIVE;", "bus->present = IW_BUS_ACTIVE;", ("unit_linux_local",)),
-    Bug("local-frames-from-before", "R7", LOCAL, "bus->unheeded = IW_BUS_DOWN; bus->count = 0; bus->next = 0;", "bus->unheeded = IW_BUS_DOWN;", ("unit_linux_local",)),
+    Bug("local-bus-off-forgotten", "R13", BUS, "bus->unheeded = IW_BUS_OFF; bus->present = forged", "bus->present = forged", ("unit_linux_local",)),
+    Bug("local-restart-is-no-loss", "R6", BUS, "} else if (error == IW_CAN_ERROR_RESTARTED) { bus->unheeded = IW_BUS_OFF;", "} else if (error == IW_CAN_ERROR_RESTARTED) {", ("unit_linux_local",)),
+    Bug("local-frames-from-before", "R7", BUS, "iw_socketcan_socket_forget(&bus->ours);", "", ("unit_linux_local",)),
     Bug("gpio-gone-unseen", "R2", ESTOP, "if (edges < 0 || level < 0) {", "if (edges < 0) {", GPIO),
     Bug("gpio-level-upside-down", "R2", ESTOP, "(level == 1) == estop->active_high", "level == 1", GPIO),
     Bug("gpio-level-only-when-told", "R2", ESTOP, "if (!is_open(estop)) { return; }", "if (!is_open(estop) || quiet) { return; }", GPIO),
     Bug("gpio-reopened-without-a-pause", "R11", ESTOP, "estop->retry_us = estop->now_us + RETRY_US;", "estop->retry_us = estop->now_us;", GPIO),
     Bug("gpio-reopened-deaf", "R2", ESTOP, "error == 0 && epoll_ctl(", "error == 0 && estop->now_us == 0U && epoll_ctl(", GPIO),
-    Bug("gpio-edge-lost-between-two-looks", "R2", "port/linux/src/gpio_release.c", "self->edge = self->edge || edge ||", "self->edge = edge ||", ("unit_linux_gpio",)),
+    Bug("gpio-edge-lost-between-two-looks", "R2", "port/linux/src/gpio.c", "self->edge = self->edge || edge ||", "self->edge = edge ||", ("unit_linux_gpio",)),
     Bug("gpio-v1-one-edge", "R2", "port/linux/src/gpio_v1.c", "request_both_edges_events_flags", "request_rising_edge_events_flags", ("unit_linux_gpio_v1",)),
     Bug("gpio-v1-pulled-down", "R2", "port/linux/src/gpio_v1.c", "BIAS_PULL_UP", "BIAS_PULL_DOWN", ("unit_linux_gpio_v1",)),
     Bug("gpio-v1-gone-is-no-edge", "R2", "port/linux/src/gpio_v1.c", "return (errno == EAGAIN || errno == EINTR) ? taken : -1;", "return taken;", ("unit_linux_gpio_v1",)),

@@ -64,8 +64,9 @@ void daemon_rig_start(void);
 /// The loop for that long.
 void daemon_rig_run(unsigned for_ms);
 
-/// A new connection.
+/// A new connection, to drive or to watch.
 int daemon_rig_connect(void);
+int daemon_rig_connect_with(gw_right_t right);
 
 /// Sends a line; the loop runs until its reply has come (20 ms at the most). Events are passed over. Empty: no reply.
 const char *daemon_rig_ask(int client, const char *line);

@@ -80,6 +80,62 @@ static void test_find_list_that_does_not_fit_is_cut_between_paths(void) {
     TEST_ASSERT_EQUAL_STRING(".sock", little + strlen(little) - 5U);
 }
 
+static const char *path_of(const char *name) {
+    static char path[128];
+    (void)snprintf(path, sizeof path, "%s/%s", directory, name);
+    return path;
+}
+
+/// Both sockets of a gateway; the one to drive by is for its owner only.
+static void add_pair(void) {
+    TEST_ASSERT_EQUAL_INT(0, mkdir(path_of("watch"), 0755));
+    TEST_ASSERT_EQUAL_INT(0, chmod(directory, 0755));
+    add_socket("can0.sock");
+    TEST_ASSERT_EQUAL_INT(0, chmod(path_of("can0.sock"), 0600));
+    add_socket("watch/can0.sock");
+    TEST_ASSERT_EQUAL_INT(0, chmod(path_of("watch/can0.sock"), 0666));
+}
+
+static void test_find_two_sockets_of_one_gateway_are_one_and_the_one_to_drive_by_goes_first(void) {
+    add_pair();
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
+}
+
+static void test_find_who_may_not_drive_gets_the_socket_to_watch_by(void) {
+    if (geteuid() != 0) {
+        TEST_IGNORE_MESSAGE("needs root to become somebody else");
+    }
+    add_pair();
+    TEST_ASSERT_EQUAL_INT(0, seteuid(65534));
+    const iwc_result_t result = iwc_find(directory, out, sizeof out);
+    TEST_ASSERT_EQUAL_INT(0, seteuid(0));
+    TEST_ASSERT_EQUAL(IWC_OK, result);
+    TEST_ASSERT_EQUAL_STRING(path_of("watch/can0.sock"), out);
+}
+
+static void test_find_who_may_use_neither_is_led_to_the_one_to_drive_by(void) {
+    if (geteuid() != 0) {
+        TEST_IGNORE_MESSAGE("needs root to become somebody else");
+    }
+    add_pair();
+    TEST_ASSERT_EQUAL_INT(0, chmod(path_of("watch/can0.sock"), 0600));
+    TEST_ASSERT_EQUAL_INT(0, seteuid(65534));
+    const iwc_result_t result = iwc_find(directory, out, sizeof out);
+    TEST_ASSERT_EQUAL_INT(0, seteuid(0));
+    TEST_ASSERT_EQUAL(IWC_OK, result);
+    TEST_ASSERT_EQUAL_STRING(path_of("can0.sock"), out);
+}
+
+static void test_find_a_socket_to_watch_by_alone_counts_as_a_gateway(void) {
+    add_pair();
+    TEST_ASSERT_EQUAL_INT(0, unlink(path_of("can0.sock")));
+    TEST_ASSERT_EQUAL(IWC_OK, iwc_find(directory, out, sizeof out));
+    TEST_ASSERT_EQUAL_STRING(path_of("watch/can0.sock"), out);
+    add_socket("can1.sock");
+    TEST_ASSERT_EQUAL(IWC_SEVERAL, iwc_find(directory, out, sizeof out));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_find_missing_directory_is_none);
@@ -87,5 +143,9 @@ int main(void) {
     RUN_TEST(test_find_the_only_one_is_taken);
     RUN_TEST(test_find_several_are_listed);
     RUN_TEST(test_find_list_that_does_not_fit_is_cut_between_paths);
+    RUN_TEST(test_find_two_sockets_of_one_gateway_are_one_and_the_one_to_drive_by_goes_first);
+    RUN_TEST(test_find_who_may_not_drive_gets_the_socket_to_watch_by);
+    RUN_TEST(test_find_who_may_use_neither_is_led_to_the_one_to_drive_by);
+    RUN_TEST(test_find_a_socket_to_watch_by_alone_counts_as_a_gateway);
     return UNITY_END();
 }

@@ -22,7 +22,7 @@ static char status_before[GW_REPLY_MAX]; ///< The last status that was looked at
 int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name) {
     (void)directory;
     (void)name;
-    *self = (gw_keeper_t){.fd = -1};
+    *self = (gw_keeper_t){.child = {.fd = -1}};
     return 0;
 }
 
@@ -39,13 +39,12 @@ void gw_keeper_set_aside(gw_keeper_t *self) {
     set_aside = true;
 }
 
-gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_MAX], size_t *out_length,
-                                int *out_error) {
+gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, const char **out_text, size_t *out_length, int *out_error) {
     const gw_keeper_news_t now = news;
     (void)self;
     *out_length = length;
     *out_error = 0;
-    memcpy(out_text, text, length);
+    *out_text = text;
     news = GW_KEEPER_NO_NEWS;
     return now;
 }

@@ -44,7 +44,7 @@ void tearDown(void) {
 
 static int prepare(void) {
     FILE *err = fmemopen(said, sizeof said, "w");
-    const int result = gw_listener_prepare(&listener, &config, err);
+    const int result = gw_listener_prepare(&listener, &config, GW_DRIVE, err);
     (void)fclose(err);
     return result;
 }

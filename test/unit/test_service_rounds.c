@@ -32,7 +32,7 @@ static void begin_core(void) {
     gw_tape_init(&daemon_->tape, daemon_->box.ring);
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, iw_linux_hal_open(&daemon_->hal, "unix:/nonexistent/iwheel-bus", &estop, &culprit),
                                   culprit);
-    const iw_hal_t hal = iw_linux_hal_functions(&daemon_->hal);
+    const iw_hal_t hal = gw_tape_hal(&daemon_->tape, &daemon_->hal);
     daemon_->now_us = iw_clock_now_us();
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK,
                           iw_gateway_init(&daemon_->gateway, &daemon_->config.core, &hal, daemon_->now_us, false));

@@ -149,13 +149,34 @@ static burst_end_t drive(run_t *run) {
     return end;
 }
 
+/// A wheel that ran away while it was told to stand, which the gateway may see first and stop: that it turns is the finding.
+static bool ran_away(run_t *run, const json_t *why) {
+    const burst_t *burst = run->burst;
+    const char *side_word = text_word(why, "side");
+    const int measured = (int)json_integer_value(json_object_get(why, "detail"));
+    if (burst->enough_mm_s == 0 || burst->speed_mm_s[IW_LEFT] != 0 || burst->speed_mm_s[IW_RIGHT] != 0 ||
+        json_integer_value(json_object_get(why, "number")) <= run->stops ||
+        strcmp(text_word(why, "cause"), "overspeed") != 0) {
+        return false;
+    }
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        int *peak = &run->outcome->peak_mm_s[side];
+        const bool told = strcmp(side_word, text_side(side)) == 0 || strcmp(side_word, "both") == 0;
+        *peak = (told && abs(measured) > abs(*peak)) ? measured : *peak;
+    }
+    run->enough = true;
+    return true;
+}
+
 /// Whether it was our own stop that ended it, and whether there was something to end: that a wheel did not turn means
 /// nothing unless it was told to.
 static burst_end_t judge(run_t *run, burst_end_t end) {
     json_t *why = near_ask(run->bringup->ctl, json_pack("{s:s}", "cmd", "why"));
     const bool ours = json_integer_value(json_object_get(why, "number")) == run->stops + 1 &&
                       strcmp(text_word(why, "cause"), "client_stop") == 0;
-    if (end == BURST_STOPPED || (end == BURST_DONE && !ours)) {
+    if ((end == BURST_DONE || end == BURST_STOPPED) && ran_away(run, why)) {
+        end = BURST_DONE;
+    } else if (end == BURST_STOPPED || (end == BURST_DONE && !ours)) {
         end = fail(run, BURST_STOPPED, text_word(why, "sentence"));
     } else if (end == BURST_DONE && run->unknown > 0) {
         end = fail(run, BURST_STOPPED, "the speed of a wheel was not known");

@@ -161,8 +161,7 @@ static int record_gateway(ctl_t *ctl, recorder_t *self) {
 }
 
 typedef struct {
-    const iw_bus_ops_t *ops;
-    iw_backend_store_t store;
+    iw_backend_store_t bus;
     unsigned signals;
 } source_t;
 
@@ -192,7 +191,7 @@ static int tell_down(const char *bus) {
 /// Waits for something to read, a signal, or a while.
 static void wait_a_while(source_t *source) {
     const struct timespec while_ = {.tv_sec = 0, .tv_nsec = WAIT_MS * 1000000L};
-    struct pollfd entry = {.fd = source->ops->watch_fd(&source->store), .events = POLLIN};
+    struct pollfd entry = {.fd = iw_bus_fd(&source->bus), .events = POLLIN};
     (void)ppoll(&entry, 1, &while_, signals_let_in());
 }
 
@@ -201,8 +200,8 @@ static bool drain(source_t *source, recorder_t *self) {
     iw_can_frame_t frame;
     const int64_t now_us = client_now_us();
     bool written = true;
-    source->ops->tend(&source->store, (iw_time_us_t)now_us);
-    while (written && source->ops->receive(&source->store, &frame) > 0) {
+    iw_bus_tend(&source->bus, (iw_time_us_t)now_us);
+    while (written && iw_bus_receive(&source->bus, &frame) > 0) {
         candump_t out = candump_from_core(&frame, 0, "");
         out.mark = CANDUMP_RECEIVED;
         written = put(self, &out, now_us);
@@ -213,8 +212,8 @@ static bool drain(source_t *source, recorder_t *self) {
 static bool comes_up(source_t *source) {
     const int64_t until_us = client_now_us() + UP_US;
     for (;;) {
-        source->ops->tend(&source->store, (iw_time_us_t)client_now_us());
-        if (source->ops->state(&source->store) >= IW_BUS_PASSIVE) {
+        iw_bus_tend(&source->bus, (iw_time_us_t)client_now_us());
+        if (iw_bus_state(&source->bus) >= IW_BUS_PASSIVE) {
             return true;
         }
         if (client_now_us() > until_us || signals_count() != source->signals) {
@@ -227,8 +226,9 @@ static bool comes_up(source_t *source) {
 /// Records from the bus itself. The port's backend is opened as the gateway opens it, and only its receiving half is used.
 /// An exit code.
 static int record_bus(const char *bus, recorder_t *self) {
-    source_t source = {.ops = iw_bus_backend(bus), .signals = signals_count()};
-    const int error = (source.ops == NULL) ? ENOTSUP : source.ops->open(&source.store, bus);
+    static source_t source; // Too large for a stack.
+    source.signals = signals_count();
+    const int error = iw_bus_open(&source.bus, bus);
     if (error != 0) {
         return tell_unopened(bus, error);
     }
@@ -239,15 +239,15 @@ static int record_bus(const char *bus, recorder_t *self) {
         if (!drain(&source, self)) {
             break;
         }
-        const bool now_up = source.ops->state(&source.store) >= IW_BUS_PASSIVE;
+        const bool now_up = iw_bus_state(&source.bus) >= IW_BUS_PASSIVE;
         if (now_up != up) {
             (void)ctl_fail(CTL_OK, now_up ? "%s is up again" : "%s went down; waiting for it", bus);
         }
         up = now_up;
     }
-    const iw_bus_link_t *link = source.ops->link(&source.store);
+    const iw_bus_link_t *link = iw_bus_link(&source.bus);
     self->lost += link->lost;
-    source.ops->close(&source.store);
+    iw_bus_close(&source.bus);
     return code;
 }
 

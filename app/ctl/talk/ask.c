@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #define START_HINT "is the gateway running? Start it (systemctl start iwheel-gateway), or give --socket PATH"
 
@@ -46,6 +47,9 @@ static near_t choose(const ctl_t *ctl, const char *bus, char *out_path, size_t s
             return NEAR_SEVERAL;
         }
         (void)snprintf(out_path, size, "%s/%s.sock", IWC_DIRECTORY, bus);
+        if (access(out_path, W_OK) != 0) {
+            (void)snprintf(out_path, size, "%s/%s/%s.sock", IWC_DIRECTORY, IWC_WATCH_DIRECTORY, bus);
+        }
         return NEAR_FOUND;
     default:
         return NEAR_NONE;
@@ -139,7 +143,13 @@ static int connect_to_one(ctl_t *self) {
     }
     const char *path = (self->socket != NULL) ? self->socket : found;
     const iwc_result_t result = client_open(&self->client, path, client_now_us() + CLIENT_REPLY_US);
-    return (result == IWC_OK) ? CTL_OK : tell_unopened(self, path, result);
+    if (result != IWC_OK) {
+        return tell_unopened(self, path, result);
+    }
+    if (iwc_watches_only(self->client.gateway)) {
+        (void)ctl_fail(CTL_OK, "by %s you may watch, stop and estop, but not drive", path);
+    }
+    return CTL_OK;
 }
 
 int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {

@@ -90,6 +90,9 @@ static void try_connect(top_t *self) {
     self->model.state = gateway.status;
     self->model.connected = true;
     self->model.notice[0] = '\0';
+    if (iwc_watches_only(self->ctl->client.gateway)) {
+        notice(self, "by this socket you may watch and stop, but not drive");
+    }
     self->heard_us = client_now_us();
     json_t *why = near_ask(self->ctl, json_pack("{s:s}", "cmd", "why"));
     keep_sentence(self, why);

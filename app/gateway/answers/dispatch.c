@@ -29,17 +29,13 @@ static void write_id(iwn_out_t *json, const iwn_id_t *id) {
     }
 }
 
-static iwn_out_t begin_reply(gw_daemon_t *daemon, const iwn_id_t *id) {
+iwn_out_t gw_dispatch_begin_reply(gw_daemon_t *daemon, const iwn_id_t *id) {
     iwn_out_t json;
     iwn_out_init(&json, daemon->line, sizeof daemon->line);
     iwn_out_open(&json, NULL, '{');
     write_id(&json, id);
     iwn_out_bool(&json, "ok", true);
     return json;
-}
-
-iwn_out_t gw_dispatch_begin_reply(gw_daemon_t *daemon, const iwn_id_t *id) {
-    return begin_reply(daemon, id);
 }
 
 static void send_reply(gw_client_t *client, iwn_out_t *json) {
@@ -70,7 +66,7 @@ static void refuse(const call_t *call, iw_refusal_t refusal) {
 }
 
 static void reply_state(const call_t *call) {
-    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = gw_dispatch_begin_reply(call->daemon, &call->request->id);
     iwn_out_text(&json, "state", iwn_state_name(iw_gateway_state(&call->daemon->gateway)));
     send_reply(call->client, &json);
 }
@@ -84,13 +80,13 @@ static void note(const call_t *call, const blackbox_entry_t *entry) {
 }
 
 static void do_hello(const call_t *call) {
-    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = gw_dispatch_begin_reply(call->daemon, &call->request->id);
     gw_observe_write_hello(call->daemon, call->client, &json);
     send_reply(call->client, &json);
 }
 
 static void do_status(const call_t *call) {
-    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = gw_dispatch_begin_reply(call->daemon, &call->request->id);
     gw_snapshot_write(call->daemon, &json);
     send_reply(call->client, &json);
 }
@@ -101,7 +97,7 @@ static void do_watch(const call_t *call) {
     client->topics = call->request->topics;
     client->rate_hz = limited ? IWN_RATE_MAX_HZ : (uint32_t)call->request->rate_hz;
     client->next_us = call->daemon->now_us;
-    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = gw_dispatch_begin_reply(call->daemon, &call->request->id);
     iwn_out_open(&json, "topics", '[');
     for (unsigned topic = 0; topic < IWN_TOPICS; topic++) {
         if ((client->topics & (1U << topic)) != 0U) {
@@ -116,7 +112,7 @@ static void do_watch(const call_t *call) {
 
 static void reply_armed(gw_daemon_t *daemon, const iw_snapshot_t *seen, gw_client_t *client) {
     const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
-    iwn_out_t json = begin_reply(daemon, &client->arm_id);
+    iwn_out_t json = gw_dispatch_begin_reply(daemon, &client->arm_id);
     iwn_out_text(&json, "state", iwn_state_name(seen->state));
     iwn_out_int(&json, "lease_ms", seen->config->lease_ms);
     iwn_out_int(&json, "first_lease_ms", IW_FIRST_LEASE_US / IW_US_PER_MS);
@@ -198,7 +194,7 @@ static void drive(const call_t *call, const iw_drive_t *wanted) {
         return;
     }
     call->daemon->requested = true;
-    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = gw_dispatch_begin_reply(call->daemon, &call->request->id);
     iwn_out_int(&json, "left_mm_s", applied.pair.wheel[IW_LEFT].speed_mm_s);
     iwn_out_int(&json, "right_mm_s", applied.pair.wheel[IW_RIGHT].speed_mm_s);
     iwn_out_int(&json, "left_mA", applied.pair.wheel[IW_LEFT].current_mA);
@@ -243,7 +239,12 @@ static void do_twist(const call_t *call) {
     drive(call, &wanted);
 }
 
+static gw_stopper_t stopper_of(const call_t *call) {
+    return (gw_stopper_t){.at_us = call->daemon->now_us, .pid = call->client->pid, .uid = call->client->uid};
+}
+
 static void do_stop(const call_t *call) {
+    call->daemon->stopped_by = stopper_of(call);
     iw_gateway_stop(&call->daemon->gateway, call->daemon->now_us, call->client->id, IW_CAUSE_CLIENT_STOP);
     note(call, &(blackbox_entry_t){.kind = BLACKBOX_STOP, .a = IW_CAUSE_CLIENT_STOP});
     call->daemon->requested = true;
@@ -252,6 +253,12 @@ static void do_stop(const call_t *call) {
 
 static void do_estop(const call_t *call) {
     gw_daemon_t *daemon = call->daemon;
+    const iw_snapshot_t seen = gw_daemon_look(daemon);
+    daemon->estopped_by = stopper_of(call);
+    if (seen.state == IW_STATE_LATCHED && daemon->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US) {
+        reply_state(call); // In force already: a flood of it costs neither a step nor what the black box holds.
+        return;
+    }
     if (iw_gateway_state(&daemon->gateway) != IW_STATE_LATCHED) {
         memcpy(daemon->estop_reason, call->request->reason, sizeof daemon->estop_reason);
     }
@@ -306,7 +313,7 @@ static void do_tare(const call_t *call) {
         send_refusal(daemon, call->client, &call->request->id, &words);
         return;
     }
-    iwn_out_t json = begin_reply(daemon, &call->request->id);
+    iwn_out_t json = gw_dispatch_begin_reply(daemon, &call->request->id);
     iwn_out_text(&json, "state", iwn_state_name(seen.state));
     for (unsigned side = 0; side < IW_SIDES; side++) {
         if ((call->request->sides & (1U << side)) != 0U) {
@@ -320,7 +327,7 @@ static void do_tare(const call_t *call) {
 }
 
 static void reply_item(const call_t *call) {
-    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = gw_dispatch_begin_reply(call->daemon, &call->request->id);
     iwn_out_text(&json, "item", iwn_ledger_item_name(call->request->item));
     gw_knowledge_write_item(call->daemon, call->request->item, &json);
     send_reply(call->client, &json);
@@ -357,7 +364,7 @@ static void do_confirm(const call_t *call) {
 }
 
 static void do_why(const call_t *call) {
-    iwn_out_t json = begin_reply(call->daemon, &call->request->id);
+    iwn_out_t json = gw_dispatch_begin_reply(call->daemon, &call->request->id);
     gw_snapshot_write_stop(call->daemon, &json);
     gw_record_write(call->daemon, &json);
     send_reply(call->client, &json);
@@ -387,7 +394,8 @@ void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line
     };
     iwn_request_t request;
     iwn_refusal_t refusal;
-    if (!iwn_request_read(line, length, &daemon->work, &request, &refusal)) {
+    if (!iwn_request_read(line, length, &daemon->work, &request, &refusal) ||
+        gw_refuse_by_right(daemon, client->right, request.cmd, &refusal)) {
         send_refusal(daemon, client, &request.id, &refusal);
         return;
     }

@@ -8,6 +8,9 @@
 /// Lines of one client that are carried out in one cycle.
 #define GW_LINES_PER_CYCLE 4U
 
+/// An e-stop that is asked for again this soon while its latch holds changes nothing.
+#define GW_ESTOP_AGAIN_US 100000U
+
 /// Carries out one line. It is applied whole or not at all, and answered; the reply to `arm` may come later.
 void gw_dispatch_line(gw_daemon_t *daemon, gw_client_t *client, const char *line, size_t length);
 

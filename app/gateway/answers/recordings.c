@@ -68,13 +68,13 @@ static void give_up(gw_daemon_t *daemon) {
 
 void gw_recordings_take(gw_daemon_t *daemon) {
     switch (gw_box_hear(&daemon->box)) {
-    case GW_BOX_ANSWER:
+    case GW_CHILD_SAID:
         pass_on(daemon, &daemon->box.answer);
         break;
-    case GW_BOX_READER_ENDED:
+    case GW_CHILD_ENDED:
         give_up(daemon);
         break;
-    case GW_BOX_NO_ANSWER:
+    case GW_CHILD_SILENT:
         break;
     }
 }

@@ -50,6 +50,11 @@ static void say_not_armed(const wording_t *self) {
     const char *state = iwn_state_name(self->seen.state);
     if (daemon->shutting_down) {
         SAY(self, "not armed: the gateway is shutting down");
+    } else if (stop->number > 0U && stop->cause == IW_CAUSE_CLIENT_STOP && daemon->stopped_by.at_us > 0U) {
+        SAY(self,
+            "not armed (%s); the last stop was %" PRIu64 " ms ago: %s, asked for by user %u (process %d). Arm first",
+            state, ms_since(daemon, stop->at_us), iwn_cause_name(stop->cause), (unsigned)daemon->stopped_by.uid,
+            daemon->stopped_by.pid);
     } else if (stop->number > 0U) {
         SAY(self, "not armed (%s); the last stop was %" PRIu64 " ms ago: %s. Arm first", state,
             ms_since(daemon, stop->at_us), iwn_cause_name(stop->cause));
@@ -137,9 +142,23 @@ static void say_second_master(const wording_t *self) {
         ms_since(self->daemon, seen_us));
 }
 
+/// Whoever keeps stopping is to be found, whatever socket it uses.
+static void say_estopped(const wording_t *self) {
+    const gw_stopper_t *by = &self->daemon->estopped_by;
+    SAY(self,
+        "estop_software was asked for %" PRIu64
+        " ms ago by user %u (process %d); end that program if it keeps asking, and wait a second",
+        ms_since(self->daemon, by->at_us), (unsigned)by->uid, by->pid);
+}
+
 static void say_present(const wording_t *self) {
     const uint32_t present = self->seen.present;
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
+        if (cause == IW_CAUSE_ESTOP_SOFTWARE && (present & (1U << cause)) != 0U &&
+            self->daemon->estopped_by.at_us > 0U) {
+            say_estopped(self);
+            return;
+        }
         if ((present & (1U << cause)) != 0U) {
             SAY(self, "%s was seen %" PRIu64 " ms ago; %s, and wait a second", iwn_cause_name((iw_cause_t)cause),
                 ms_since(self->daemon, self->seen.seen_us[cause]), iwn_why_cure((iw_cause_t)cause));
@@ -247,6 +266,34 @@ void gw_refuse_describe(gw_daemon_t *daemon, const iwn_request_t *request, iw_re
 void gw_refuse_describe_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_refusal_t *out_refusal) {
     out_refusal->error = IWN_DENIED;
     write_contradicted(daemon, item, out_refusal->message, sizeof out_refusal->message);
+}
+
+static void say_right(const gw_daemon_t *daemon, iwn_refusal_t *out_refusal) {
+    const char *socket = daemon->config.northbound.socket;
+    const char *group = daemon->config.northbound.group;
+    out_refusal->error = IWN_DENIED;
+    if (strcmp(group, "none") == 0) {
+        (void)snprintf(out_refusal->message, sizeof out_refusal->message,
+                       "this socket is for watching, stop and estop; who may drive uses %s", socket);
+    } else {
+        (void)snprintf(out_refusal->message, sizeof out_refusal->message,
+                       "this socket is for watching, stop and estop; who may drive uses %s and is in group %s (sudo "
+                       "usermod -aG %s USER, then log in again)",
+                       socket, group, group);
+    }
+}
+
+bool gw_refuse_by_right(const gw_daemon_t *daemon, gw_right_t right, iwn_cmd_t cmd, iwn_refusal_t *out_refusal) {
+    static const bool allowed[IWN_CMDS] = {
+        [IWN_CMD_HELLO] = true, [IWN_CMD_STATUS] = true,     [IWN_CMD_WATCH] = true,
+        [IWN_CMD_WHY] = true,   [IWN_CMD_STOP] = true,       [IWN_CMD_DISARM] = true,
+        [IWN_CMD_ESTOP] = true, [IWN_CMD_RECORDINGS] = true, [IWN_CMD_RECORDING] = true,
+    };
+    if (right == GW_DRIVE || allowed[cmd]) {
+        return false;
+    }
+    say_right(daemon, out_refusal);
+    return true;
 }
 
 void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *out_refusal) {

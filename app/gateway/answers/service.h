@@ -6,7 +6,16 @@
 #include "daemon.h"
 
 /// What a descriptor in the epoll set stands for; a client's tag is GW_TAG_CLIENT plus its slot.
-enum { GW_TAG_TIMER = 0, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS, GW_TAG_ESTOP, GW_TAG_BOX, GW_TAG_CLIENT };
+enum {
+    GW_TAG_TIMER = 0,
+    GW_TAG_SIGNAL,
+    GW_TAG_LISTENER,
+    GW_TAG_WATCH_LISTENER,
+    GW_TAG_BUS,
+    GW_TAG_ESTOP,
+    GW_TAG_BOX,
+    GW_TAG_CLIENT
+};
 
 /// Connections accepted in one cycle.
 #define GW_ACCEPTS_PER_CYCLE 4U
@@ -15,11 +24,16 @@ enum { GW_TAG_TIMER = 0, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_BUS, GW_TAG_ESTO
 /// wheels and the e-stop wait for no number of clients.
 #define GW_ROUND_US 500U
 
+/// Watchers come behind all who may drive, in what is left of that time (one of them always has a turn). After one
+/// turn of several, one line of each is carried out in so long, and one newcomer is let in: a flood of them, even of `estop`, is as slow as that.
+#define GW_WATCHER_LINE_US   10000U
+#define GW_WATCHER_ACCEPT_US 2000U
+
 /// Takes newcomers, or tells them that there is no room.
 void gw_service_accept(gw_daemon_t *daemon);
 
 /// Reads from the clients that have something to say and carries out their next lines: the holder of the lease first,
-/// then the others, as many as the time allows, the rest in the next cycle.
+/// then the others who may drive, then the watchers, as many as the time allows, the rest in the next cycle.
 void gw_service_clients(gw_daemon_t *daemon);
 
 /// Sends what is queued, closes what is finished, and tells epoll what to watch next. In the same order, within the

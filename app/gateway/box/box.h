@@ -14,11 +14,10 @@
 
 #include "blackbox_ring.h"
 #include "gateway_config.h"
+#include "process/child.h"
 
 #include "iwheel_northbound/request.h"
 #include "iwheel_northbound/why.h"
-
-#include <sys/types.h>
 
 /// Recordings on disk are never more, and together never larger, except that the newest is always kept.
 #define GW_BOX_RECORDINGS_MAX 32U
@@ -67,22 +66,13 @@ typedef struct {
     char text[GW_BOX_ANSWER_SIZE];
 } gw_box_answer_t;
 
-/// A process of ours at the other end of a socket.
-typedef struct {
-    int fd; ///< -1: there is none.
-    pid_t pid;
-    iw_time_us_t started_us;
-} gw_box_reader_t;
-
 typedef struct {
     blackbox_ring_t *ring;
     size_t ring_size;
     const gateway_config_t *config;
-    int fd;    ///< To the writer; -1: there is none.
-    pid_t pid; ///< Of the writer.
-    iw_time_us_t started_us;
-    gw_box_result_t last; ///< The last result; number 0: none.
-    gw_box_reader_t reader;
+    gw_child_t writer;
+    gw_child_t reader;
+    gw_box_result_t last;   ///< The last result; number 0: none.
     gw_box_answer_t answer; ///< The last one taken.
 } gw_box_t;
 
@@ -97,17 +87,14 @@ void gw_box_close(gw_box_t *self);
 /// behind.
 bool gw_box_write(gw_box_t *self, const gw_box_order_t *order);
 
-typedef enum { GW_BOX_NOTHING = 0, GW_BOX_RESULT, GW_BOX_WRITER_ENDED } gw_box_news_t;
-
 /// Asks the process that reads. False if it cannot be: blackbox_s is 0, it is gone and was started again only just now, or it has not
 /// answered too much before.
 bool gw_box_ask(gw_box_t *self, const gw_box_question_t *question);
 
-/// The next answer, which is in `answer`; GW_BOX_READER_ENDED: what was asked before stays without one. Never waits.
-typedef enum { GW_BOX_NO_ANSWER = 0, GW_BOX_ANSWER, GW_BOX_READER_ENDED } gw_box_heard_t;
-gw_box_heard_t gw_box_hear(gw_box_t *self);
+/// The next answer of the process that reads, which is in `answer`. Never waits.
+gw_child_news_t gw_box_hear(gw_box_t *self);
 
-/// The next news of the writer; GW_BOX_RESULT is in `last`. Never waits.
-gw_box_news_t gw_box_take(gw_box_t *self);
+/// The next result of the writer, which is in `last`. Never waits.
+gw_child_news_t gw_box_take(gw_box_t *self);
 
 #endif

@@ -33,32 +33,32 @@ typedef struct {
     uint64_t next; ///< Number of the next entry to write.
     uint64_t frames;
     gw_box_result_t result;
+    char line[GW_BOX_LINE_SIZE]; ///< Where each line is made.
 } writer_t;
 
-static void put_line(FILE *file, const char *line, size_t length) {
-    (void)fwrite(line, 1, length, file);
+/// Writes what has been made in `line`.
+static void put_line(const writer_t *self, FILE *file, size_t length) {
+    (void)fwrite(self->line, 1, length, file);
 }
 
 static void write_entry(writer_t *self, const blackbox_entry_t *entry) {
-    char line[GW_BOX_LINE_SIZE];
     if (entry->kind != (uint8_t)BLACKBOX_FRAME) {
-        put_line(self->events_file, line, gw_box_line_entry(entry, self->frames, line));
+        put_line(self, self->events_file, gw_box_line_entry(entry, self->frames, self->line));
         return;
     }
     iw_can_frame_t frame = {.id = entry->number, .dlc = entry->a, .kind = entry->b};
     memcpy(frame.data, entry->as.data, sizeof frame.data);
     const candump_t out = candump_from_core(&frame, (int64_t)entry->at_us + self->order->wall_minus_us, self->bus);
-    put_line(self->frames_file, line, candump_write(&out, line));
+    put_line(self, self->frames_file, candump_write(&out, self->line));
     self->frames++;
 }
 
 /// Writes the entries up to number `to`, those before `since_us` left out.
 static void write_entries(writer_t *self, uint64_t to, iw_time_us_t since_us) {
-    char line[GW_BOX_LINE_SIZE];
     size_t count = 0;
     const uint64_t first = blackbox_ring_copy(self->ring, self->next, to, self->copy, &count);
     if (first > self->next && since_us == 0U) {
-        put_line(self->events_file, line, gw_box_line_lost(first - self->next, self->frames, line));
+        put_line(self, self->events_file, gw_box_line_lost(first - self->next, self->frames, self->line));
     }
     for (size_t i = 0; i < count; i++) {
         if (self->copy[i].at_us >= since_us) {
@@ -124,7 +124,6 @@ static int write_config(writer_t *self, int directory, const char *stem) {
 }
 
 static int fill_files(writer_t *self) {
-    char line[GW_BOX_LINE_SIZE];
     const iw_stop_t *stop = &self->order->note.stop;
     const iw_time_us_t length_us = (iw_time_us_t)self->config->record.blackbox_s * 1000000U;
     const iw_time_us_t since_us = (stop->at_us > length_us) ? stop->at_us - length_us : 1U;
@@ -133,8 +132,8 @@ static int fill_files(writer_t *self) {
     self->next = 0;
     self->frames = 0;
     self->result.ms = (uint32_t)((stop->at_us - begin_us) / IW_US_PER_MS);
-    put_line(self->events_file, line, gw_box_line_head(self->config, self->order, from_start, line));
-    put_line(self->events_file, line, gw_box_line_stop(self->order, line));
+    put_line(self, self->events_file, gw_box_line_head(self->config, self->order, from_start, self->line));
+    put_line(self, self->events_file, gw_box_line_stop(self->order, self->line));
     write_entries(self, self->order->mark, since_us);
     const int error = flush(self);
     if (error != 0) {
@@ -142,7 +141,7 @@ static int fill_files(writer_t *self) {
     }
     follow(self);
     self->result.frames = (uint32_t)self->frames;
-    put_line(self->events_file, line, gw_box_line_end(self->frames, line));
+    put_line(self, self->events_file, gw_box_line_end(self->frames, self->line));
     return flush(self);
 }
 
@@ -257,7 +256,8 @@ static void note_death(writer_t *self) {
 
 void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gateway_config_t *config) {
     gw_box_order_t order;
-    writer_t self = {.fd = fd, .ring = ring, .config = config};
+    static writer_t self; // Too large for a stack.
+    self = (writer_t){.fd = fd, .ring = ring, .config = config};
     self.bus = (strncmp(config->bus.interface, "unix:", 5) == 0) ? "local" : config->bus.interface;
     self.copy = (blackbox_entry_t *)calloc(ring->capacity, sizeof *self.copy);
     if (self.copy == NULL) {

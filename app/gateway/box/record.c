@@ -24,7 +24,8 @@ static void order_recording(gw_daemon_t *daemon) {
                "stop %u is not recorded: the process that writes recordings is %s; the frames around it are kept in "
                "memory: iwheelctl why",
                (unsigned)note->stop.number,
-               (daemon->box.fd < 0) ? "gone (it is started again after 10 s)" : "too far behind (is the disk slow?)");
+               (daemon->box.writer.fd < 0) ? "gone (it is started again after 10 s)"
+                                           : "too far behind (is the disk slow?)");
     }
 }
 
@@ -100,14 +101,14 @@ static void tell_result(gw_daemon_t *daemon, const gw_box_result_t *result) {
 
 void gw_record_take(gw_daemon_t *daemon) {
     switch (gw_box_take(&daemon->box)) {
-    case GW_BOX_RESULT:
+    case GW_CHILD_SAID:
         tell_result(daemon, &daemon->box.last);
         break;
-    case GW_BOX_WRITER_ENDED:
+    case GW_CHILD_ENDED:
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the process that writes recordings has ended (was it killed?); it is started again with the next stop");
         break;
-    case GW_BOX_NOTHING:
+    case GW_CHILD_SILENT:
         break;
     }
 }

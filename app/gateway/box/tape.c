@@ -29,6 +29,9 @@ static void put_frame(gw_tape_t *self, const iw_can_frame_t *frame) {
         .at_us = self->step_us, .kind = BLACKBOX_FRAME, .number = frame->id, .a = frame->dlc, .b = frame->kind};
     memcpy(entry.as.data, frame->data, sizeof entry.as.data);
     gw_tape_put(self, &entry);
+    if (self->tapped < GW_FRAMES) {
+        self->tap[self->tapped++] = (gw_tapped_t){.at_us = self->step_us, .frame = *frame};
+    }
     if (self->after_count < GW_AROUND) {
         self->after[self->after_count++] = entry;
     }
@@ -42,7 +45,7 @@ static void put_value(gw_tape_t *self, blackbox_kind_t kind, uint32_t number, in
 
 static int tape_send(void *context, const iw_can_frame_t *frame) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = self->inner.send(self->inner.context, frame);
+    const int answer = iw_bus_send(&self->port->bus, frame);
     if (answer <= 0) {
         put_value(self, BLACKBOX_NOT_SENT, frame->id, answer);
     }
@@ -51,7 +54,7 @@ static int tape_send(void *context, const iw_can_frame_t *frame) {
 
 static int tape_receive(void *context, iw_can_frame_t *out_frame) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = self->inner.receive(self->inner.context, out_frame);
+    const int answer = iw_bus_receive(&self->port->bus, out_frame);
     if (answer > 0) {
         self->step_frames++;
         put_frame(self, out_frame);
@@ -61,7 +64,7 @@ static int tape_receive(void *context, iw_can_frame_t *out_frame) {
 
 static iw_bus_state_t tape_bus_state(void *context) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const iw_bus_state_t state = self->inner.bus_state(self->inner.context);
+    const iw_bus_state_t state = iw_bus_state(&self->port->bus);
     if (!self->answered || state != self->bus) {
         const blackbox_entry_t entry = {.at_us = self->step_us, .kind = BLACKBOX_BUS, .a = (uint8_t)state};
         gw_tape_put(self, &entry);
@@ -73,14 +76,14 @@ static iw_bus_state_t tape_bus_state(void *context) {
 
 static int tape_purge(void *context) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = self->inner.purge(self->inner.context);
+    const int answer = iw_bus_purge(&self->port->bus);
     put_value(self, BLACKBOX_PURGE, 0, answer);
     return answer;
 }
 
 static int tape_estop_pressed(void *context) {
     gw_tape_t *self = (gw_tape_t *)context;
-    const int answer = self->inner.estop_pressed(self->inner.context);
+    const int answer = iw_linux_hal_pressed(self->port);
     if (!self->answered || answer != self->estop) {
         put_value(self, BLACKBOX_ESTOP, 0, answer);
     }
@@ -88,8 +91,8 @@ static int tape_estop_pressed(void *context) {
     return answer;
 }
 
-iw_hal_t gw_tape_hal(gw_tape_t *self, const iw_hal_t *inner) {
-    self->inner = *inner;
+iw_hal_t gw_tape_hal(gw_tape_t *self, iw_linux_hal_t *port) {
+    self->port = port;
     return (iw_hal_t){
         .send = tape_send,
         .receive = tape_receive,
@@ -154,7 +157,7 @@ void gw_tape_drive(gw_tape_t *self, const blackbox_entry_t *entry, const iw_driv
 }
 
 void gw_tape_mark(gw_tape_t *self) {
-    blackbox_entry_t last[LOOK_BACK];
+    static blackbox_entry_t last[LOOK_BACK]; // Too large for a stack.
     size_t count = 0;
     self->before_count = 0;
     self->after_count = 0;

@@ -1,19 +1,29 @@
 // SPDX-License-Identifier: MIT
-/// Everything that goes into the core, noted in the black box on its way: between the port and the core as a HAL of its own,
-/// beside the requests by the caller. Costs a copy of 32 bytes each; never waits, never fails.
+/// The HAL of the gateway's core: everything that goes into the core passes here and is noted in the black box on its way, and
+/// requests are noted beside it by the caller. Costs a copy of 32 bytes each; never waits, never fails.
+///
+///     core --the one table of functions (hal.h)--> tape --> iw_bus_receive (port/linux) --> socket
 #ifndef GATEWAY_TAPE_H
 #define GATEWAY_TAPE_H
 
 #include "blackbox_ring.h"
 
 #include "iwheel/gateway.h"
+#include "iwheel_linux/linux_hal.h"
 
 /// Frames kept on either side of the last stop, for `why`.
 #define GW_AROUND 40U
+/// Frames of one step, for the watchers of the topic `frame`.
+#define GW_FRAMES IW_GATEWAY_DRAIN_MAX
+
+typedef struct {
+    iw_time_us_t at_us;
+    iw_can_frame_t frame;
+} gw_tapped_t;
 
 typedef struct {
     blackbox_ring_t *ring; ///< NULL: nothing is noted.
-    iw_hal_t inner;
+    iw_linux_hal_t *port;
     iw_time_us_t step_us; ///< Of the present step.
     uint32_t step_frames; ///< Taken in it.
     int estop;            ///< Last answers.
@@ -21,6 +31,8 @@ typedef struct {
     uint8_t facts;         ///< 0xFF: not told yet.
     bool answered;         ///< There are last answers.
     iw_time_us_t again_us; ///< When answers were last written down whether they had changed or not.
+    uint32_t tapped; ///< Frames in `tap`, until somebody sets it to 0. A step takes no more than there is room for.
+    gw_tapped_t tap[GW_FRAMES];
     uint32_t before_count;
     uint32_t after_count;
     blackbox_entry_t before[GW_AROUND]; ///< The frames before the last stop, the oldest first.
@@ -30,8 +42,8 @@ typedef struct {
 /// Begins. `ring` may be NULL.
 void gw_tape_init(gw_tape_t *self, blackbox_ring_t *ring);
 
-/// The HAL to hand to the core instead of `inner`, which is copied. `self` must outlive it.
-iw_hal_t gw_tape_hal(gw_tape_t *self, const iw_hal_t *inner);
+/// The HAL to hand to the core: this port. Both must outlive it and must not move.
+iw_hal_t gw_tape_hal(gw_tape_t *self, iw_linux_hal_t *port);
 
 void gw_tape_put(gw_tape_t *self, const blackbox_entry_t *entry);
 

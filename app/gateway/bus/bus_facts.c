@@ -78,7 +78,7 @@ static void note_warnings(gw_daemon_t *daemon) {
              daemon->config.estop.line);
     }
     note_left_behind(daemon);
-    inspect_findings_t findings;
+    static inspect_findings_t findings; // Too large for a stack.
     inspect_begin(&findings);
     const inspect_wish_t wish = gw_bus_facts_wish(&daemon->config);
     inspect_link(iw_linux_hal_link(hal), &wish, &findings);

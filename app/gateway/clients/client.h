@@ -9,6 +9,8 @@
 #ifndef GATEWAY_CLIENT_H
 #define GATEWAY_CLIENT_H
 
+#include "clients/listener.h"
+
 #include "iwheel/types.h"
 #include "iwheel_northbound/request.h"
 
@@ -24,7 +26,9 @@
 typedef struct {
     iw_client_t id; ///< Never used again for another connection; IW_CLIENT_NONE: the slot is free.
     int fd;
-    int pid;           ///< Of the process that connected; 0 if unknown.
+    int pid;   ///< Of the process that connected; 0 if unknown.
+    uid_t uid; ///< Of its user.
+    gw_right_t right;
     uint32_t interest; ///< What epoll was told to watch.
     bool readable;     ///< epoll says so, in this cycle.
     bool leaving; ///< The other side will send nothing more, though lines of it may be waiting: it can hold no lease.
@@ -42,6 +46,8 @@ typedef struct {
     bool drained;              ///< The last read took all there was.
     iw_time_us_t caught_up_us; ///< Nothing of it was waiting then: what is there now was sent later.
     iw_time_us_t next_us;      ///< When the next periodic event is due.
+    iw_time_us_t line_us;      ///< Of a watcher: its next line is carried out no earlier.
+    bool due;                  ///< A periodic event is due in this cycle.
     iw_time_us_t close_us;     ///< While closing: no later than this.
     size_t in_length;
     size_t out_start;

@@ -13,50 +13,70 @@
 
 #define BACKLOG 128
 
-static int complain(FILE *err, const char *path, const char *what, const char *cure) {
-    (void)fprintf(err, "iwheel-gateway: socket %s: %s; %s\n", path, what, cure);
+/// What a socket is by the configuration.
+typedef struct {
+    const char *path;
+    const char *group;
+    mode_t mode;
+} wish_t;
+
+static wish_t wish_of(const gateway_config_t *config, gw_right_t right) {
+    return (right == GW_DRIVE) ? (wish_t){config->northbound.socket, config->northbound.group, config->northbound.mode}
+                               : (wish_t){config->northbound.watch_socket, config->northbound.watch_group,
+                                          config->northbound.watch_mode};
+}
+
+bool gw_listener_wanted(const gateway_config_t *config, gw_right_t right) {
+    return right == GW_DRIVE || strcmp(config->northbound.watch_socket, "none") != 0;
+}
+
+static const char *option_of(const gw_listener_t *self) {
+    return (self->right == GW_DRIVE) ? "--socket" : "--watch-socket";
+}
+
+/// `cure` ends where the option's name belongs.
+static int complain(const gw_listener_t *self, FILE *err, const char *what, const char *cure) {
+    (void)fprintf(err, "iwheel-gateway: socket %s: %s; %s %s\n", self->path, what, cure, option_of(self));
     return EX_UNAVAILABLE;
 }
 
-static int complain_errno(FILE *err, const char *path, int error) {
-    const char *cure = "correct [northbound] socket or --socket";
-    if (error == ENOENT) {
-        cure = "make its directory, or correct [northbound] socket or --socket";
-    } else if (error == EACCES || error == EPERM) {
-        cure = "run as a user who may write to its directory, or choose another with --socket";
-    }
-    (void)complain(err, path, strerror(error), cure);
-    return (error == EACCES || error == EPERM) ? EX_NOPERM : EX_UNAVAILABLE;
+static int complain_errno(const gw_listener_t *self, FILE *err, int error) {
+    const bool may_not = error == EACCES || error == EPERM;
+    const char *cure = (error == ENOENT) ? "make its directory, or correct [northbound] in the configuration, or"
+                       : may_not         ? "run as a user who may write to its directory, or choose another with"
+                                         : "correct [northbound] in the configuration, or";
+    (void)complain(self, err, strerror(error), cure);
+    return may_not ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
-static int complain_folder(FILE *err, const char *path, int error) {
+static int complain_folder(const gw_listener_t *self, FILE *err, int error) {
     char cure[128];
-    (void)snprintf(cure, sizeof cure, "%s, or choose another with --socket", gw_folder_cure(error));
-    (void)complain(err, path, gw_folder_fault(error), cure);
+    (void)snprintf(cure, sizeof cure, "%s, or choose another with", gw_folder_cure(error));
+    (void)complain(self, err, gw_folder_fault(error), cure);
     return (error == EACCES || error == EPERM || error >= GW_FOLDER_FOREIGN) ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
-int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, FILE *err) {
-    const char *path = config->northbound.socket;
+int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, gw_right_t right, FILE *err) {
+    const char *path = wish_of(config, right).path;
     const char *slash = strrchr(path, '/');
     char folder[GATEWAY_PATH_SIZE];
-    *self =
-        (gw_listener_t){.fd = -1, .reserve_fd = -1, .owners = gw_owners_of(GW_RUNTIME_DIRECTORY), .folder = {.fd = -1}};
+    *self = (gw_listener_t){
+        .right = right, .fd = -1, .reserve_fd = -1, .owners = gw_owners_of(GW_RUNTIME_DIRECTORY), .folder = {.fd = -1}};
     (void)snprintf(self->path, sizeof self->path, "%s", path);
     (void)snprintf(self->name, sizeof self->name, "%s", (slash == NULL) ? path : slash + 1);
     gw_folder_of(path, folder, sizeof folder);
     if (mkdir(folder, 0755) != 0 && errno != EEXIST) {
-        return complain_errno(err, path, errno);
+        return complain_errno(self, err, errno);
     }
     const int error = gw_folder_open(&self->folder, folder, &self->owners);
     if (error != 0) {
-        return complain_folder(err, path, error);
+        return complain_folder(self, err, error);
     }
     if (self->folder.shared) {
         (void)fprintf(err,
                       "iwheel-gateway: warning: socket %s: while no gateway runs, anybody can put another socket there "
-                      "and answer for it; for more than a trial choose a directory of its own with --socket\n",
-                      path);
+                      "and answer for it; for more than a trial choose a directory of its own with %s\n",
+                      path, option_of(self));
     }
     return 0;
 }
@@ -92,31 +112,30 @@ static int remove_name(const gw_listener_t *self, bool stranger, FILE *err) {
         return 0;
     }
     if (stranger) {
-        (void)complain(err, self->path, "it is another user's, and only he can take it away",
-                       "choose a directory of your own with --socket");
+        (void)complain(self, err, "it is another user's, and only he can take it away",
+                       "choose a directory of your own with");
         return EX_NOPERM;
     }
-    return complain_errno(err, self->path, errno);
+    return complain_errno(self, err, errno);
 }
 
 /// Makes the name free, if it is safe to.
 static int clear_name(const gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
     struct stat status;
     if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
-        return (errno == ENOENT) ? 0 : complain_errno(err, self->path, errno);
+        return (errno == ENOENT) ? 0 : complain_errno(self, err, errno);
     }
     if (S_ISLNK(status.st_mode)) {
-        return complain(err, self->path, "is a symbolic link, which is not followed",
-                        "remove it, or name the real path with --socket");
+        return complain(self, err, "is a symbolic link, which is not followed",
+                        "remove it, or name the real path with");
     }
     if (!S_ISSOCK(status.st_mode)) {
-        return complain(err, self->path, "exists and is no socket, so it is left alone",
-                        "remove it, or choose another path with --socket");
+        return complain(self, err, "exists and is no socket, so it is left alone",
+                        "remove it, or choose another path with");
     }
     const bool stranger = !gw_owners_have(&self->owners, status.st_uid);
     if (!stranger && somebody_answers(address)) {
-        return complain(err, self->path, "another program answers on it",
-                        "stop that one, or choose another path with --socket");
+        return complain(self, err, "another program answers on it", "stop that one, or choose another path with");
     }
     return remove_name(self, stranger, err);
 }
@@ -125,45 +144,45 @@ static int clear_name(const gw_listener_t *self, const struct sockaddr_un *addre
 static int verify(gw_listener_t *self, mode_t mode, FILE *err) {
     struct stat status;
     if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
-        return complain_errno(err, self->path, errno);
+        return complain_errno(self, err, errno);
     }
     if (!S_ISSOCK(status.st_mode) || status.st_uid != geteuid()) {
-        return complain(err, self->path, "something else took its place",
-                        "choose a directory with --socket to which nobody else may write");
+        return complain(self, err, "something else took its place",
+                        "choose a directory to which nobody else may write with");
     }
     self->device = status.st_dev;
     self->inode = status.st_ino;
     const bool right = (status.st_mode & 0777U) == mode; // Not so where the folder has access control lists.
     return (right || fchmodat(self->folder.fd, self->name, mode, AT_SYMLINK_NOFOLLOW) == 0)
                ? 0
-               : complain_errno(err, self->path, errno);
+               : complain_errno(self, err, errno);
 }
 
 /// Has its mode from the first moment; nobody is let in before it listens.
 static int bind_socket(gw_listener_t *self, const struct sockaddr_un *address, mode_t mode, FILE *err) {
     self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (self->fd < 0) {
-        return complain_errno(err, self->path, errno);
+        return complain_errno(self, err, errno);
     }
     const mode_t before = umask(~mode & 0777U);
     const int result = bind(self->fd, (const struct sockaddr *)address, sizeof *address);
     const int error = errno;
     (void)umask(before);
-    return (result == 0) ? verify(self, mode, err) : complain_errno(err, self->path, error);
+    return (result == 0) ? verify(self, mode, err) : complain_errno(self, err, error);
 }
 
 static int make_socket(gw_listener_t *self, mode_t mode, FILE *err) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", self->name);
     int back;
-    int result = enter(self, &back) ? clear_name(self, &address, err) : complain_errno(err, self->path, errno);
+    int result = enter(self, &back) ? clear_name(self, &address, err) : complain_errno(self, err, errno);
     result = (result != 0) ? result : bind_socket(self, &address, mode, err);
     leave(back);
     return result;
 }
 
 static void give_to_group(const gw_listener_t *self, const gateway_config_t *config, gw_log_t *log) {
-    const char *name = config->northbound.group;
+    const char *name = wish_of(config, self->right).group;
     if (strcmp(name, "none") == 0) {
         return;
     }
@@ -174,19 +193,19 @@ static void give_to_group(const gw_listener_t *self, const gateway_config_t *con
         return; // As a service, which may not call chown.
     }
     if (group == NULL) {
-        gw_log(log, GW_LOG_WARNING, "there is no group %s; the socket keeps our own group (groupadd --system %s)", name,
-               name);
+        gw_log(log, GW_LOG_WARNING, "there is no group %s; socket %s keeps our own group (groupadd --system %s)", name,
+               self->path, name);
     } else if (fchownat(self->folder.fd, self->name, (uid_t)-1, group->gr_gid, AT_SYMLINK_NOFOLLOW) != 0) {
-        gw_log(log, GW_LOG_WARNING, "the socket cannot be given to group %s: %s; it keeps our own group", name,
-               strerror(errno));
+        gw_log(log, GW_LOG_WARNING, "socket %s cannot be given to group %s: %s; it keeps our own group", self->path,
+               name, strerror(errno));
     }
 }
 
 int gw_listener_open(gw_listener_t *self, const gateway_config_t *config, gw_log_t *log, FILE *err) {
-    int result = make_socket(self, config->northbound.mode, err);
+    int result = make_socket(self, wish_of(config, self->right).mode, err);
     if (result == 0) {
         give_to_group(self, config, log);
-        result = (listen(self->fd, BACKLOG) == 0) ? 0 : complain_errno(err, self->path, errno);
+        result = (listen(self->fd, BACKLOG) == 0) ? 0 : complain_errno(self, err, errno);
     }
     if (result != 0) {
         gw_listener_close(self);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// The northbound socket: made safely, accepted from without ever spinning, removed at the end.
+/// A northbound socket, the one to drive by or the one to watch by: made safely, accepted from without ever spinning, removed at the end.
 ///
 /// Its folder must belong to somebody who may run a gateway (process/owners.h), and nobody else may write there; one like
 /// /tmp is used with a warning. It is opened once, and the socket is made, changed and removed in it by name, never by a
@@ -19,6 +19,13 @@
 /// After an accept that failed for want of anything, the socket is left alone this long.
 #define GW_LISTENER_PAUSE_US 200000U
 
+/// What a socket, and so who connects to it, may do.
+typedef enum {
+    GW_DRIVE = 0, ///< Everything.
+    GW_WATCH,     ///< Look, stop and e-stop.
+    GW_RIGHTS,
+} gw_right_t;
+
 typedef enum {
     GW_ACCEPT_NONE = 0, ///< Nobody waits.
     GW_ACCEPT_ONE,      ///< `*out_fd` is the connection.
@@ -33,13 +40,19 @@ typedef struct {
     gw_folder_t folder;
     dev_t device; ///< Of the socket as we made it, so that nobody else's is removed.
     ino_t inode;
-    int fd;
+    gw_right_t right;
+    iw_time_us_t from_us; ///< Nobody is accepted before.
+    bool full_told;       ///< That somebody was turned away, until the next is let in.
+    int fd;               ///< -1: not open.
     int reserve_fd;
 } gw_listener_t;
 
 /// Makes the socket's folder if only that is missing, opens and judges it. 0, or a sysexits code after cause and cure have been
 /// printed on `err`.
-int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, FILE *err);
+int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, gw_right_t right, FILE *err);
+
+/// Whether the configuration names a socket for that right.
+bool gw_listener_wanted(const gateway_config_t *config, gw_right_t right);
 
 /// After gw_listener_prepare. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does
 /// not exist or may not be given is a warning in the log: the socket is then stricter than asked for.

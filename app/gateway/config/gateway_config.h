@@ -47,6 +47,10 @@ typedef struct gateway_config {
         uint16_t mode;        ///< Permission bits of the socket; the owner's read and write are always among them.
         char group[33];       ///< Owner group of the socket; `none`: the gateway's own.
         uint16_t max_clients; ///< 1..64.
+        char watch_socket[GATEWAY_PATH_SIZE]; ///< For clients that may not drive; `none`: there is none.
+        uint16_t watch_mode;
+        char watch_group[33];
+        uint16_t max_watchers; ///< 1..64, beside max_clients.
     } northbound;
     struct {
         uint16_t blackbox_s; ///< Length of the ring in memory, 0 (none) ..600.

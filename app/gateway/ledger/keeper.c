@@ -5,31 +5,25 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-/// The first byte of a message: to the keeper ...
+/// The first byte of a message to the keeper; of one from it, it is the news.
 #define SAY_WRITE 'w'
 #define SAY_ASIDE 'a'
-/// ... and the byte before an errno or a text, from it.
-#define MESSAGE_MAX   (1U + GW_KEEPER_TEXT_MAX)
-#define NAME_SIZE     288U
-#define INHERITED_MAX 256
 
 /// The keeper's own side.
 typedef struct {
     const char *directory;
-    char name[NAME_SIZE];
-    char fresh[NAME_SIZE];   ///< The file while it is being written.
-    char damaged[NAME_SIZE]; ///< Where a file is set aside.
+    const char *name;
+    char fresh[GW_KEEPER_NAME_SIZE + 8U];   ///< The file while it is being written.
+    char damaged[GW_KEEPER_NAME_SIZE + 8U]; ///< Where a file is set aside.
     int fd;
-    char message[MESSAGE_MAX];
+    char message[GW_KEEPER_MESSAGE_MAX];
 } work_t;
 
 static void answer(const work_t *work, gw_keeper_news_t news, int error) {
@@ -120,81 +114,46 @@ static int in_directory(const work_t *work, size_t length) {
     return error;
 }
 
-static void keep(work_t *work) {
+static void keep(int fd, const void *context) {
+    const gw_keeper_t *self = (const gw_keeper_t *)context;
+    static work_t work; // Too large for a stack.
     ssize_t length;
-    tell_file(work);
+    work = (work_t){.directory = self->directory, .name = self->name, .fd = fd};
+    (void)snprintf(work.fresh, sizeof work.fresh, "%s.new", work.name);
+    (void)snprintf(work.damaged, sizeof work.damaged, "%s.damaged", work.name);
+    tell_file(&work);
     do {
-        length = recv(work->fd, work->message, sizeof work->message, 0);
+        length = recv(fd, work.message, sizeof work.message, 0);
         if (length > 0) {
-            const bool writes = work->message[0] == SAY_WRITE;
-            const int error = in_directory(work, (size_t)length - 1U);
+            const bool writes = work.message[0] == SAY_WRITE;
+            const int error = in_directory(&work, (size_t)length - 1U);
             if (writes) {
-                answer(work, (error == 0) ? GW_KEEPER_WRITTEN : GW_KEEPER_FAILED, error);
+                answer(&work, (error == 0) ? GW_KEEPER_WRITTEN : GW_KEEPER_FAILED, error);
             }
         }
     } while (length > 0 || (length < 0 && errno == EINTR));
 }
 
-/// Nothing of the gateway's stays open here but our end of the connection.
-static void become_keeper(int fd) {
-    const int null = open("/dev/null", O_RDWR);
-    (void)prctl(PR_SET_NAME, "iwheel-keeper");
-    (void)signal(SIGTERM, SIG_IGN);
-    (void)signal(SIGINT, SIG_IGN);
-    (void)signal(SIGHUP, SIG_IGN);
-    if (null >= 0) { // And above the standard streams, which are open.
-        for (int i = STDIN_FILENO; i <= STDERR_FILENO; i++) {
-            (void)dup2(null, i);
-        }
-        (void)close(null);
-    }
-    for (int i = STDERR_FILENO + 1; i < INHERITED_MAX; i++) {
-        if (i != fd) {
-            (void)close(i);
-        }
-    }
-}
-
 int gw_keeper_open(gw_keeper_t *self, const char *directory, const char *name) {
-    int pair[2];
-    *self = (gw_keeper_t){.fd = -1};
-    if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, pair) != 0) {
-        return errno;
-    }
-    const pid_t child = fork();
-    if (child == 0) {
-        work_t work = {.directory = directory, .fd = pair[1]};
-        (void)snprintf(work.name, sizeof work.name, "%s", name);
-        (void)snprintf(work.fresh, sizeof work.fresh, "%.270s.new", name);
-        (void)snprintf(work.damaged, sizeof work.damaged, "%.270s.damaged", name);
-        become_keeper(pair[1]);
-        keep(&work);
-        _exit(0);
-    }
-    const int error = (child < 0) ? errno : 0;
-    (void)close(pair[1]);
-    if (error != 0) {
-        (void)close(pair[0]);
-        return error;
-    }
-    self->fd = pair[0];
-    self->waits = true;
-    return 0;
+    *self = (gw_keeper_t){.directory = directory};
+    (void)snprintf(self->name, sizeof self->name, "%s", name);
+    const int error = gw_child_start(&self->child, &(gw_child_work_t){"iwheel-keeper", 0, keep, self});
+    self->waits = error == 0;
+    return error;
 }
 
-static bool say(const gw_keeper_t *self, char what, const char *text, size_t length) {
-    char message[MESSAGE_MAX];
+static bool say(gw_keeper_t *self, char what, const char *text, size_t length) {
     if (length > GW_KEEPER_TEXT_MAX) {
         errno = EAGAIN;
         return false;
     }
-    message[0] = what;
-    memcpy(&message[1], text, length);
-    return send(self->fd, message, length + 1U, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)length + 1;
+    self->message[0] = what;
+    memcpy(&self->message[1], text, length);
+    return gw_child_say(&self->child, self->message, length + 1U);
 }
 
 bool gw_keeper_write(gw_keeper_t *self, const char *text, size_t length) {
-    if (self->waits || self->fd < 0) {
+    if (self->waits || self->child.fd < 0) {
         return false;
     }
     const bool taken = say(self, SAY_WRITE, text, length);
@@ -206,34 +165,27 @@ void gw_keeper_set_aside(gw_keeper_t *self) {
     (void)say(self, SAY_ASIDE, "", 0U);
 }
 
-gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, char out_text[GW_KEEPER_TEXT_MAX], size_t *out_length,
-                                int *out_error) {
-    char message[MESSAGE_MAX];
-    if (self->fd < 0 || !self->waits) {
-        return GW_KEEPER_NO_NEWS;
-    }
-    const ssize_t length = recv(self->fd, message, sizeof message, MSG_DONTWAIT);
-    if (length < 0 && (errno == EAGAIN || errno == EINTR)) {
+gw_keeper_news_t gw_keeper_hear(gw_keeper_t *self, const char **out_text, size_t *out_length, int *out_error) {
+    size_t length;
+    const gw_child_news_t heard =
+        self->waits ? gw_child_hear(&self->child, self->message, sizeof self->message, &length) : GW_CHILD_SILENT;
+    if (heard == GW_CHILD_SILENT) {
         return GW_KEEPER_NO_NEWS;
     }
     self->waits = false;
-    if (length <= 0) {
-        gw_keeper_close(self);
+    if (heard == GW_CHILD_ENDED) {
         return GW_KEEPER_GONE;
     }
-    const gw_keeper_news_t news = (gw_keeper_news_t)message[0];
+    const gw_keeper_news_t news = (gw_keeper_news_t)self->message[0];
     if (news == GW_KEEPER_READ) {
-        *out_length = (size_t)length - 1U;
-        memcpy(out_text, &message[1], *out_length);
-    } else if (length == (ssize_t)(1U + sizeof *out_error)) {
-        memcpy(out_error, &message[1], sizeof *out_error);
+        *out_length = length - 1U;
+        *out_text = &self->message[1];
+    } else if (length == 1U + sizeof *out_error) {
+        memcpy(out_error, &self->message[1], sizeof *out_error);
     }
     return news;
 }
 
 void gw_keeper_close(gw_keeper_t *self) {
-    if (self->fd >= 0) {
-        (void)close(self->fd);
-        self->fd = -1;
-    }
+    gw_child_close(&self->child);
 }

@@ -186,10 +186,10 @@ static void take_result(gw_daemon_t *daemon, gw_keeper_news_t news, int error) {
 
 static void hear_keeper(gw_daemon_t *daemon) {
     gw_knowledge_t *self = &daemon->knowledge;
-    char text[GW_KEEPER_TEXT_MAX];
+    const char *text = NULL;
     size_t length = 0;
     int error = 0;
-    const gw_keeper_news_t news = gw_keeper_hear(&self->keeper, text, &length, &error);
+    const gw_keeper_news_t news = gw_keeper_hear(&self->keeper, &text, &length, &error);
     if (news == GW_KEEPER_READ || news == GW_KEEPER_ABSENT || news == GW_KEEPER_BAD) {
         self->error = error;
         take_file(daemon, news, text, length);
@@ -204,7 +204,7 @@ static void hear_keeper(gw_daemon_t *daemon) {
 }
 
 static void hand_over(gw_knowledge_t *self, const char *bus) {
-    char text[GW_MEMORY_SIZE];
+    static char text[GW_MEMORY_SIZE]; // Too large for a stack.
     const size_t length = gw_memory_write(&self->known, bus, text, sizeof text);
     const bool same = length == self->kept_length && memcmp(text, self->kept, length) == 0;
     if (same || gw_keeper_write(&self->keeper, text, length)) {

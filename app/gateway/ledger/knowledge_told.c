@@ -88,8 +88,8 @@ void gw_knowledge_tell_memory(gw_daemon_t *daemon) {
     default:
         gw_log(log, GW_LOG_WARNING, "what is learnt about the wheels is not kept in %s: %s; %s%s", self->path,
                gw_folder_fault(self->error),
-               (self->keeper.fd < 0) ? "start the gateway again" : gw_folder_cure(self->error),
-               (self->keeper.fd < 0) ? "" : ", or set [record] directory; tried again");
+               (self->keeper.child.fd < 0) ? "start the gateway again" : gw_folder_cure(self->error),
+               (self->keeper.child.fd < 0) ? "" : ", or set [record] directory; tried again");
         break;
     }
 }

@@ -232,9 +232,10 @@ static const char *read_line(const char *text, size_t length, const char *bus, g
 bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t *out_known,
                     char out_reason[GW_MEMORY_REASON_SIZE]) {
     char sum[SUM_LENGTH + 1U];
-    gw_known_t known = {0};
+    static gw_known_t known; // Too large for a stack.
     const size_t body = (length < SUM_LENGTH) ? 0U : length - SUM_LENGTH;
     const char *fault = "it is damaged: its checksum is wrong";
+    memset(&known, 0, sizeof known);
     (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", checksum(text, body));
     if (length > SUM_LENGTH && memcmp(&text[body], sum, SUM_LENGTH) == 0) {
         fault = read_line(text, body, bus, &known);

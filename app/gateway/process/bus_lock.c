@@ -22,7 +22,7 @@ const char *gw_bus_lock_local_path(const char *bus) {
 /// A path of any length and spelling as 16 digits.
 static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
     char folder[GATEWAY_ADDRESS_SIZE];
-    char real[PATH_MAX];
+    static char real[PATH_MAX]; // Too large for a stack.
     const char *slash = strrchr(path, '/');
     uint64_t hash = 0xCBF29CE484222325U;
     gw_folder_of(path, folder, sizeof folder);

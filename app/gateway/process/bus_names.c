@@ -68,7 +68,7 @@ static uid_t owner_in(const struct nlmsghdr *message, const char *name) {
 
 /// Reads the list until the name comes, or its end.
 static uid_t search_list(int fd, const char *name) {
-    _Alignas(struct nlmsghdr) char buffer[16384];
+    static _Alignas(struct nlmsghdr) char buffer[16384]; // Too large for a stack.
     const iw_time_us_t until_us = iw_clock_now_us() + LIST_US;
     const struct timeval patience = {.tv_usec = LIST_US};
     (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);

@@ -78,7 +78,7 @@ static void judge_safety(const gateway_config_t *config, inspect_findings_t *fin
         return;
     }
     static gw_listener_t listener;
-    const int result = gw_listener_prepare(&listener, config, memory);
+    const int result = gw_listener_prepare(&listener, config, GW_DRIVE, memory);
     (void)fclose(memory);
     gw_folder_close(&listener.folder);
     if (result != 0) {
@@ -106,8 +106,25 @@ static void judge_own(const char *path, inspect_findings_t *findings) {
     }
 }
 
+static void judge_watchers(const gateway_config_t *config, inspect_findings_t *findings) {
+    const char *const group = config->northbound.watch_group;
+    if (!gw_listener_wanted(config, GW_WATCH)) {
+        return;
+    }
+    if (strcmp(group, "none") != 0 && getgrnam(group) == NULL) {
+        inspect_say(findings, "watch_group", INSPECT_WARN,
+                    "group %s does not exist: the socket for watching keeps the gateway's own group", group);
+        inspect_cure(findings, "sudo groupadd --system %s, or set [northbound] watch_group to another, or to none",
+                     group);
+    } else {
+        inspect_say(findings, "watch_group", INSPECT_OK, "group %s may watch on %s", group,
+                    config->northbound.watch_socket);
+    }
+}
+
 static void judge_rights(const gateway_config_t *config, inspect_findings_t *findings) {
     const char *const group = config->northbound.group;
+    judge_watchers(config, findings);
     const bool grouped = strcmp(group, "none") != 0;
     if (grouped && getgrnam(group) == NULL) {
         inspect_say(findings, "group", INSPECT_WARN,
@@ -165,7 +182,7 @@ static void judge_machine(const gateway_config_t *config, inspect_findings_t *fi
 }
 
 int gw_report_check(const gateway_config_t *config, FILE *out) {
-    inspect_findings_t findings;
+    static inspect_findings_t findings; // Too large for a stack.
     char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
     inspect_begin(&findings);
     findings.absent = INSPECT_SKIP;

@@ -8,12 +8,22 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-enum { OPTION_CAN = 256, OPTION_SOCKET, OPTION_ESTOP, OPTION_LISTEN_ONLY, OPTION_CHECK, OPTION_PRINT, OPTION_LOG };
+enum {
+    OPTION_CAN = 256,
+    OPTION_SOCKET,
+    OPTION_WATCH_SOCKET,
+    OPTION_ESTOP,
+    OPTION_LISTEN_ONLY,
+    OPTION_CHECK,
+    OPTION_PRINT,
+    OPTION_LOG
+};
 
 static const struct option long_options[] = {
     {"config", required_argument, NULL, 'c'},
     {"can", required_argument, NULL, OPTION_CAN},
     {"socket", required_argument, NULL, OPTION_SOCKET},
+    {"watch-socket", required_argument, NULL, OPTION_WATCH_SOCKET},
     {"estop", required_argument, NULL, OPTION_ESTOP},
     {"listen-only", no_argument, NULL, OPTION_LISTEN_ONLY},
     {"check", no_argument, NULL, OPTION_CHECK},
@@ -32,6 +42,7 @@ void gw_options_help(FILE *out) {
                 "  -c, --config FILE   configuration (" GATEWAY_CONFIG_PATH ", if it exists)\n"
                 "      --can BUS       CAN interface, or unix:PATH for the simulator's bus\n"
                 "      --socket PATH   where clients connect\n"
+                "      --watch-socket PATH  where clients connect that may not drive, or none\n"
                 "      --estop LINE    e-stop line, unix:PATH for the simulator's button, or none\n"
                 "      --listen-only   never send anything\n"
                 "      --check         check configuration, bus and e-stop; move nothing\n"
@@ -63,6 +74,9 @@ static bool take_option(int option, gw_options_t *options) {
         return true;
     case OPTION_SOCKET:
         options->socket = optarg;
+        return true;
+    case OPTION_WATCH_SOCKET:
+        options->watch_socket = optarg;
         return true;
     case OPTION_ESTOP:
         options->estop = optarg;
@@ -122,6 +136,7 @@ int gw_options_configure(const gw_options_t *options, gateway_config_t *out_conf
     } overrides[] = {
         {"bus.interface", options->can, "--can"},
         {"northbound.socket", options->socket, "--socket"},
+        {"northbound.watch_socket", options->watch_socket, "--watch-socket"},
         {"estop.line", options->estop, "--estop"},
     };
     gateway_config_default(out_config);

@@ -14,6 +14,7 @@ typedef struct {
     const char *config_path;
     const char *can;
     const char *socket;
+    const char *watch_socket;
     const char *estop;
     gw_log_level_t log_level;
     bool listen_only;

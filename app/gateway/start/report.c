@@ -11,6 +11,9 @@ void gw_report_start(gw_daemon_t *daemon) {
     gw_log_t *log = &daemon->log;
     gw_log(log, GW_LOG_INFO, "version " IWHEEL_VERSION "; bus %s; clients at %s%s", config->bus.interface,
            config->northbound.socket, config->core.listen_only ? "; listens only" : "");
+    if (daemon->listener[GW_WATCH].fd >= 0) {
+        gw_log(log, GW_LOG_INFO, "watchers at %s", config->northbound.watch_socket);
+    }
     gw_log(log, GW_LOG_INFO, "e-stop: %s%s", config->estop.line,
            daemon->hal.estop_ops->simulated ? " (SIMULATED)" : "");
     gw_log(log, GW_LOG_INFO, "stop budget, client lost: %" PRIu32 " ms and %" PRIu32 " mm after its last command",
@@ -28,7 +31,7 @@ void gw_report_start(gw_daemon_t *daemon) {
 }
 
 void gw_report_unopened(const gateway_config_t *config, const char *culprit, int error, FILE *err) {
-    inspect_findings_t findings;
+    static inspect_findings_t findings; // Too large for a stack.
     char sentence[INSPECT_TEXT_SIZE + INSPECT_CURE_SIZE];
     inspect_begin(&findings);
     inspect_unopened(culprit, culprit == config->bus.interface, error, &findings);

@@ -14,8 +14,6 @@
 
 #define API_VERSION 1
 
-IW_STATIC_ASSERT(GW_CLIENTS_MAX <= 64U, a_bit_per_client);
-
 static void tell_state(gw_daemon_t *daemon) {
     iwn_out_t json = gw_event_begin(daemon, "state");
     gw_snapshot_write(daemon, &json);
@@ -177,11 +175,11 @@ static bool wants_periodic(const gw_client_t *client) {
            (client->topics & ((1U << IWN_TOPIC_STATE) | (1U << IWN_TOPIC_FORCE))) != 0U;
 }
 
-/// Written once, for all in `due` (a bit per slot) who watch the topic.
-static void send_periodic(gw_daemon_t *daemon, iwn_topic_t topic, uint64_t due) {
+/// Written once, for all who are due and watch the topic.
+static void send_periodic(gw_daemon_t *daemon, iwn_topic_t topic) {
     size_t length = 0;
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
-        if ((due >> i & 1U) == 0U || (daemon->client[i].topics & (1U << topic)) == 0U) {
+        if (!daemon->client[i].due || (daemon->client[i].topics & (1U << topic)) == 0U) {
             continue;
         }
         if (length == 0U) {
@@ -199,21 +197,22 @@ static void send_periodic(gw_daemon_t *daemon, iwn_topic_t topic, uint64_t due) 
 }
 
 void gw_observe_periodic(gw_daemon_t *daemon) {
-    uint64_t due = 0;
+    bool any = false;
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
         gw_client_t *client = &daemon->client[i];
-        if (wants_periodic(client) && daemon->now_us >= client->next_us) {
+        client->due = wants_periodic(client) && daemon->now_us >= client->next_us;
+        if (client->due) {
             const iw_time_us_t period_us = 1000000U / client->rate_hz;
             client->next_us += period_us;
             if (client->next_us <= daemon->now_us) {
                 client->next_us = daemon->now_us + period_us; // After a stall: no burst.
             }
-            due |= 1ULL << i;
+            any = true;
         }
     }
-    if (due != 0U) {
-        send_periodic(daemon, IWN_TOPIC_STATE, due);
-        send_periodic(daemon, IWN_TOPIC_FORCE, due);
+    if (any) {
+        send_periodic(daemon, IWN_TOPIC_STATE);
+        send_periodic(daemon, IWN_TOPIC_FORCE);
     }
 }
 
@@ -237,13 +236,6 @@ static bool anybody_watches(const gw_daemon_t *daemon, iwn_topic_t topic) {
     return false;
 }
 
-void gw_observe_tap(void *context, const iw_can_frame_t *frame) {
-    gw_daemon_t *daemon = (gw_daemon_t *)context;
-    if (daemon->tapped < GW_FRAMES) {
-        daemon->tap[daemon->tapped++] = (gw_tapped_t){.at_us = daemon->now_us, .frame = *frame};
-    }
-}
-
 static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
     iwn_out_t json = gw_event_begin(daemon, "frame");
     iwn_out_frame(&tapped->frame, tapped->at_us, &json);
@@ -252,11 +244,11 @@ static void tell_frame(gw_daemon_t *daemon, const gw_tapped_t *tapped) {
 
 void gw_observe_frames(gw_daemon_t *daemon) {
     if (anybody_watches(daemon, IWN_TOPIC_FRAME)) {
-        for (uint32_t i = 0; i < daemon->tapped; i++) {
-            tell_frame(daemon, &daemon->tap[i]);
+        for (uint32_t i = 0; i < daemon->tape.tapped; i++) {
+            tell_frame(daemon, &daemon->tape.tap[i]);
         }
     }
-    daemon->tapped = 0;
+    daemon->tape.tapped = 0;
 }
 
 void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client, iwn_out_t *json) {
@@ -266,6 +258,7 @@ void gw_observe_write_hello(const gw_daemon_t *daemon, const gw_client_t *client
     iwn_out_text(json, "bus", daemon->config.bus.interface);
     iwn_out_text(json, "state", iwn_state_name(iw_gateway_state(&daemon->gateway)));
     iwn_out_int(json, "client", client->id);
+    iwn_out_text(json, "rights", (client->right == GW_DRIVE) ? "drive" : "watch");
 }
 
 void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client) {

@@ -18,11 +18,8 @@ void gw_observe_periodic(gw_daemon_t *daemon);
 /// When `gw_observe_periodic` has something to do; IW_NEVER if nobody watches.
 iw_time_us_t gw_observe_next_us(const gw_daemon_t *daemon);
 
-/// Sends the frames tapped since the last call to the watchers of the topic `frame`.
+/// Sends the frames that the tape has tapped since the last call to the watchers of the topic `frame`.
 void gw_observe_frames(gw_daemon_t *daemon);
-
-/// Remembers a frame for `gw_observe_frames`, and looks at its length. The HAL's tap; `context` is the daemon.
-void gw_observe_tap(void *context, const iw_can_frame_t *frame);
 
 /// The event `hello`, to a new client.
 void gw_observe_hello(gw_daemon_t *daemon, gw_client_t *client);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "connection.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -10,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -18,7 +16,6 @@
 #define RETRY_US 20000
 /// iwc_latest reads no more often than this: a gateway may be faster than we are.
 #define READS_MAX 64
-static const char SUFFIX[] = ".sock";
 
 int64_t iwc_now_us(void) {
     struct timespec now;
@@ -67,50 +64,6 @@ const char *iwc_words(iwc_result_t result) {
     };
     const size_t index = (size_t)result;
     return (index < sizeof words / sizeof words[0]) ? words[index] : "";
-}
-
-// ---- finding the socket -------------------------------------------------------------------------------------------
-
-static bool is_socket(const char *path) {
-    struct stat status;
-    const size_t length = strlen(path);
-    const char *name = strrchr(path, '/') + 1;
-    return strlen(name) > sizeof(SUFFIX) - 1U && strcmp(path + length - (sizeof(SUFFIX) - 1U), SUFFIX) == 0 &&
-           stat(path, &status) == 0 && S_ISSOCK(status.st_mode);
-}
-
-static iwc_result_t find_in(const char *directory, char *out, size_t size) {
-    char path[PATH_MAX];
-    unsigned found = 0;
-    size_t used = 0;
-    DIR *folder = opendir(directory);
-    if (folder == NULL) {
-        return (errno == EACCES) ? IWC_DENIED : IWC_NOT_THERE;
-    }
-    for (const struct dirent *entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
-        const int length = snprintf(path, sizeof path, "%s/%s", directory, entry->d_name);
-        if (length > 0 && (size_t)length < sizeof path && is_socket(path)) {
-            found++;
-            const int n = snprintf(out + used, size - used, "%s%s", (used > 0) ? " " : "", path);
-            used += (n > 0 && (size_t)n < size - used) ? (size_t)n : 0U;
-            out[used] = '\0';
-        }
-    }
-    (void)closedir(folder);
-    return (found == 0) ? IWC_NOT_THERE : (found == 1) ? IWC_OK : IWC_SEVERAL;
-}
-
-iwc_result_t iwc_find(const char *directory, char *out, size_t size) {
-    const char *named = (directory == NULL) ? getenv("IWHEEL_SOCKET") : NULL;
-    if (size == 0) {
-        return IWC_INVALID;
-    }
-    out[0] = '\0';
-    if (named != NULL && named[0] != '\0') {
-        (void)snprintf(out, size, "%s", named);
-        return (strlen(named) < size) ? IWC_OK : IWC_INVALID;
-    }
-    return find_in((directory != NULL) ? directory : IWC_DIRECTORY, out, size);
 }
 
 // ---- waiting, reading, writing ------------------------------------------------------------------------------------
@@ -230,6 +183,7 @@ static iwc_result_t greet(iwc_t *self, int64_t deadline_us) {
         return result;
     }
     self->number = iwc_integer(&hello, "client").value;
+    self->watches = iwc_is(&hello, "rights", "watch");
     self->newer = iwc_integer(&hello, "api").value > IWC_PROTOCOL;
     return self->newer ? IWC_NEWER : IWC_OK;
 }
@@ -326,6 +280,10 @@ bool iwc_pending(const iwc_t *self) {
         at = (size_t)((const char *)memchr(self->in + at, '\n', self->whole - at) - self->in) + 1U;
     }
     return false;
+}
+
+bool iwc_watches_only(const iwc_t *self) {
+    return self->fd >= 0 && self->watches;
 }
 
 const char *iwc_path(const iwc_t *self) {

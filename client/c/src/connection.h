@@ -22,6 +22,7 @@ struct iwc {
     int fd;            ///< -1: closed; what came before may still be taken.
     pid_t owner;       ///< The process that connected: a forked child may not speak for it.
     iwc_result_t over; ///< IWC_OK while the connection lives, else what became of it.
+    bool watches;      ///< The gateway lets it watch and stop only.
     bool newer;        ///< The gateway speaks a protocol above IWC_PROTOCOL.
     int error_number;  ///< errno of the last iwc_connect.
     const sigset_t *let_in;

@@ -43,7 +43,7 @@ from ._wire import (
 class Gateway:
     """A connection to the gateway, made when it is first needed and again when it broke. Driving is never resumed.
 
-    `socket`: else $IWHEEL_SOCKET, else the only one in /run/iwheel. `timeout`: for each answer, in seconds. `wait`: how long to
+    `socket`: else $IWHEEL_SOCKET, else the only gateway's in /run/iwheel that may be used. `timeout`: for each answer, in seconds. `wait`: how long to
     wait for a gateway that is not there (yet).
 
     One thread at a time: give each thread its own Gateway. `with` closes the connection at its end.
@@ -77,7 +77,7 @@ class Gateway:
     # Reading: moves nothing ------------------------------------------------------------------------------------------
 
     def hello(self) -> Hello:
-        """Who answers: `name version api bus state client`."""
+        """Who answers: `name version api bus state client rights`; `rights` is `drive` or `watch`, by the socket."""
         return cast(Hello, without_envelope(self._ask("hello")))
 
     def status(self) -> Status:

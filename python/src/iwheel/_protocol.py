@@ -11,6 +11,8 @@ LINE_MAX = 65536
 
 State = Literal["listening", "armed", "stopping", "latched"]
 
+Rights = Literal["drive", "watch"]
+
 
 class Hello(TypedDict):
     """Who answers."""
@@ -26,6 +28,8 @@ class Hello(TypedDict):
     state: State
     client: int
     """of this connection; no other one ever gets it"""
+    rights: Rights
+    """of this connection, by its socket"""
 
 
 Cause = Literal[

@@ -11,7 +11,7 @@ import numbers
 import operator
 import os
 import zlib
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Tuple, cast
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Tuple, cast
 
 from ._errors import ConnectionLost, GatewayUnavailable, LeaseEnded, ProtocolError, Refused
 from ._protocol import API, LINE_MAX, REQUEST_MAX, Piece
@@ -19,6 +19,8 @@ from ._types import Applied, Event, Terms
 from ._version import __version__
 
 DEFAULT_FOLDER = "/run/iwheel"
+WATCH_FOLDER = "watch"
+"""In there: the sockets of who may only watch, each under the name of the one to drive by."""
 HARMLESS = ("out_of_range", "bad_value", "missing_field", "unknown_field", "bad_json")
 """Refusals of a drive command that say nothing about the permission to drive."""
 PASSING = ("not_at_rest", "stale_command")
@@ -40,17 +42,29 @@ Message = Dict[str, Any]
 
 
 def default_socket() -> str:
-    """$IWHEEL_SOCKET, or the only socket in /run/iwheel. Several or none: GatewayUnavailable says what to do."""
+    """$IWHEEL_SOCKET, or the socket of the only gateway in /run/iwheel: the one to drive by if it may be used, else the one to watch by.
+    Several: GatewayUnavailable says what to do."""
     named = os.environ.get("IWHEEL_SOCKET")
     if named:
         return named
-    try:
-        names = sorted(name for name in os.listdir(DEFAULT_FOLDER) if name.endswith(".sock"))
-    except OSError:
-        names = []
+    watch_folder = os.path.join(DEFAULT_FOLDER, WATCH_FOLDER)
+    names = sorted(sockets_in(DEFAULT_FOLDER) | sockets_in(watch_folder))
     if len(names) > 1:
         raise GatewayUnavailable(f"several gateways run: {', '.join(names)} in {DEFAULT_FOLDER}; name the socket of one")
-    return os.path.join(DEFAULT_FOLDER, names[0] if names else "gateway.sock")
+    name = names[0] if names else "gateway.sock"
+    drive, watch = os.path.join(DEFAULT_FOLDER, name), os.path.join(watch_folder, name)
+    return watch if may_use(watch) and not may_use(drive) else drive
+
+
+def sockets_in(folder: str) -> Set[str]:
+    try:
+        return {name for name in os.listdir(folder) if name.endswith(".sock")}
+    except OSError:
+        return set()
+
+
+def may_use(path: str) -> bool:
+    return os.access(path, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
 
 
 def cannot_connect(path: str, error: OSError) -> GatewayUnavailable:

@@ -48,7 +48,9 @@ extern "C" {
 #define IWC_DRIVES_MAX 4U
 /// Where gateways put their sockets, one per bus.
 #define IWC_DIRECTORY "/run/iwheel"
-#define IWC_FOREVER   (-1)
+/// In there: their sockets for who may only watch, each under the name of the one to drive by.
+#define IWC_WATCH_DIRECTORY "watch"
+#define IWC_FOREVER         (-1)
 
 typedef enum {
     IWC_OK = 0,
@@ -78,8 +80,8 @@ IWC_API const char *iwc_words(iwc_result_t result);
 
 // ---- the connection -----------------------------------------------------------------------------------------------
 
-/// The socket meant when none is named: $IWHEEL_SOCKET, else the only *.sock in `directory` (NULL: IWC_DIRECTORY, and only then the
-/// environment is looked at). IWC_OK with the path in `out`; IWC_SEVERAL with all of them, separated by blanks, as far as they fit;
+/// The socket meant when none is named: $IWHEEL_SOCKET, else the only gateway's *.sock in `directory` (NULL: IWC_DIRECTORY, and only then
+/// the environment is looked at): the one to drive by if this user may use it, else the one to watch by. IWC_OK with the path in `out`; IWC_SEVERAL with all of them, separated by blanks, as far as they fit;
 /// IWC_DENIED or IWC_NOT_THERE with an empty text; IWC_INVALID if $IWHEEL_SOCKET does not fit.
 IWC_API iwc_result_t iwc_find(const char *directory, char *out, size_t size);
 
@@ -98,6 +100,9 @@ IWC_API void iwc_close(iwc_t *self);
 /// take what is here already: `iwc_pending`.
 IWC_API int iwc_fd(const iwc_t *self);
 IWC_API bool iwc_pending(const iwc_t *self);
+
+/// True if this connection may only look, stop and e-stop; all else is refused ("denied", with the words what it takes).
+IWC_API bool iwc_watches_only(const iwc_t *self);
 
 /// The path of `iwc_connect`; errno of the call that made it fail (0: another reason); the number that the gateway gave this
 /// connection, `lease.holder` if it holds the lease (0: none).

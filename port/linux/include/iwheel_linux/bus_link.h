@@ -59,7 +59,11 @@ typedef enum {
 iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint16_t sample_point_permille);
 
 /// Bits that the frame occupies on the bus, with the gap behind it, without stuff bits.
-uint32_t iw_bus_frame_bits(const iw_can_frame_t *frame);
+static inline uint32_t iw_bus_frame_bits(const iw_can_frame_t *frame) {
+    // Start, id, control, checksum, acknowledgement, end and gap of a classic frame (ISO 11898-1), and the bytes.
+    const uint32_t around = ((frame->id & IW_CAN_EXTENDED) != 0U) ? 67U : 47U;
+    return around + 8U * (((frame->id & IW_CAN_REMOTE) != 0U) ? 0U : frame->dlc);
+}
 
 /// True if both tell the same of the interface: purge, changes, lost and load aside.
 bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other);

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: MIT
+#include "gateway_config.h"
+
+#include "settings/settings.h"
+
+#include <string.h>
+
+#define WATCHDOG_MS        1000U
+#define GEAR_TERM_MAX      1000U
+#define INTERFACE_NAME_MAX 15U
+
+#define AT(member)                SETTINGS_FIELD(gateway_config_t, member)
+#define CORE(member, fault)       .kind = SETTINGS_NUMBER, .range = (fault), AT(core.member)
+#define NUMBER(member, low, high) .kind = SETTINGS_NUMBER, .min = (low), .max = (high), AT(member)
+#define WORD(member, list)        .kind = SETTINGS_WORD, .words = (list), AT(member)
+#define TEXT(member, judge)       .kind = SETTINGS_TEXT, .wrong = (judge), AT(member)
+
+static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
+static const settings_word_t wheel_rotor[] = {{"wheel", 0}, {"rotor", 1}, {NULL, 0}};
+static const settings_word_t low_high[] = {{"low", 0}, {"high", 1}, {NULL, 0}};
+static const settings_word_t mismatch[] = {
+    {"refuse", GATEWAY_MISMATCH_REFUSE}, {"warn", GATEWAY_MISMATCH_WARN}, {NULL, 0}};
+static const settings_word_t roles[] = {{"limit", IW_ROLE_LIMIT}, {"setpoint", IW_ROLE_SETPOINT}, {NULL, 0}};
+static const settings_word_t units[] = {{"cN", IW_FORCE_CN}, {"dN", IW_FORCE_DN}, {NULL, 0}};
+
+static const char *wrong_interface(const char *text) {
+    if (strncmp(text, "unix:", 5) == 0) {
+        return settings_wrong_address(text);
+    }
+    return (strlen(text) <= INTERFACE_NAME_MAX && strpbrk(text, " /:") == NULL)
+               ? NULL
+               : "is neither an interface name (at most 15 characters, such as can0) nor unix:PATH";
+}
+
+static bool parse_ratio(const char *text, void *values, char out_why[SETTINGS_MESSAGE_SIZE]) {
+    gateway_config_t *config = values;
+    const char *slash = strchr(text, '/');
+    const size_t first = (slash != NULL) ? (size_t)(slash - text) : strlen(text);
+    uint32_t turns = 0;
+    uint32_t per = 1;
+    if (!settings_digits(text, first, &turns) ||
+        (slash != NULL && !settings_digits(slash + 1, strlen(slash + 1), &per))) {
+        return settings_wrong(
+            out_why, "gear_ratio = %s is not N or N/M; write rotor turns per wheel turn, for example 1 or 27/2", text);
+    }
+    if (turns < 1U || turns > GEAR_TERM_MAX || per < 1U || per > GEAR_TERM_MAX) {
+        return settings_wrong(out_why, "gear_ratio = %s is out of range; write N and M within 1..1000", text);
+    }
+    iw_config_t trial;
+    iw_config_default(&trial);
+    trial.gear_turns = (uint16_t)turns;
+    trial.gear_per = (uint16_t)per;
+    if (iw_config_check(&trial) != IW_CONFIG_OK) {
+        return settings_wrong(
+            out_why, "gear_ratio = %s is out of range; rotor turns per wheel turn must lie within 1..100", text);
+    }
+    config->core.gear_turns = trial.gear_turns;
+    config->core.gear_per = trial.gear_per;
+    return true;
+}
+
+static void format_ratio(const void *values, char out[SETTINGS_MESSAGE_SIZE]) {
+    const iw_config_t *core = &((const gateway_config_t *)values)->core;
+    (void)snprintf(out, SETTINGS_MESSAGE_SIZE, (core->gear_per == 1U) ? "%u" : "%u/%u", (unsigned)core->gear_turns,
+                   (unsigned)core->gear_per);
+}
+
+static const settings_key_t keys[] = {
+    {"bus", "interface", "", "CAN interface, or unix:PATH for a local bus (its hub is iwheel-sim).",
+     TEXT(bus.interface, wrong_interface)},
+    {"bus", "bitrate", " bit/s", "Expected of the kernel and checked against it, never set by the gateway.",
+     NUMBER(bus.bitrate, 10000, 1000000)},
+    {"bus", "sample_point_permille", " permille",
+     "Expected sample point. Off by more than 5: warning; by more than 25: mismatch; not reported: warning.",
+     NUMBER(bus.sample_point_permille, 500, 900)},
+    {"bus", "on_mismatch", "", "What a wrong bit rate or sample point does: refuse to arm, or only warn.",
+     WORD(bus.on_mismatch, mismatch)},
+
+    {"wheels", "setpoint_type", "",
+     "Byte 0 of every setpoint. The wheels' document lists no values, so there is no default and the gateway does\n"
+     "not arm until it is set. Take it from the vendor, or from a recording of a controller that works.",
+     NUMBER(core.setpoint_type, 0, 255), .set = offsetof(gateway_config_t, core.setpoint_type_set)},
+    {"wheels", "current_role", "",
+     "What the current beside the speed means to the wheel. The document does not say: no default, no arming until\n"
+     "it is set. limit: zero is speed 0 with max_current_mA. setpoint: zero is speed 0 with current 0.",
+     WORD(core.current_role, roles)},
+    {"wheels", "rpm_of", "", "Whose turns the measured rpm count.", WORD(core.rpm_of_rotor, wheel_rotor)},
+    {"wheels", "radius_mm", " mm", "Of the wheel. The document says approximately 192; measure it.",
+     CORE(radius_mm, IW_CONFIG_RADIUS)},
+    {"wheels", "gear_ratio", "", "Rotor turns per wheel turn, N or N/M: each 1..1000, together 1..100.",
+     .kind = SETTINGS_OWN, .parse = parse_ratio, .format = format_ratio},
+    {"wheels", "track_mm", " mm", "Distance between the wheels; only for twist commands.", NUMBER(track_mm, 50, 5000)},
+    {"wheels", "setpoint_dlc", "", "Length of a setpoint frame, zero padded; the document's table has 5 bytes.",
+     CORE(setpoint_dlc, IW_CONFIG_SETPOINT_DLC)},
+
+    {"left", "invert", "", "yes if this wheel is mounted mirrored: its speed is negated, both ways.",
+     WORD(core.invert[IW_LEFT], no_yes)},
+    {"left", "force_unit", "", "Unit of the raw normal force. cN as documented; `iwheelctl status` shows the evidence.",
+     WORD(core.force_unit[IW_LEFT], units)},
+    {"right", "invert", "", "yes if this wheel is mounted mirrored: its speed is negated, both ways.",
+     WORD(core.invert[IW_RIGHT], no_yes)},
+    {"right", "force_unit", "",
+     "Unit of the raw normal force. dN as documented; `iwheelctl status` shows the evidence.",
+     WORD(core.force_unit[IW_RIGHT], units)},
+
+    {"drive", "period_ms", " ms", "Spacing of setpoint pairs, the keep-alive of the wheels.",
+     CORE(period_ms, IW_CONFIG_PERIOD)},
+    {"drive", "lease_ms", " ms",
+     "How long a drive command holds: three periods of the client. It cannot be disabled.\n"
+     "lease_ms + period_ms + 1000 * max_speed_mm_s / decel_mm_s2 must not exceed 1000 ms, the wheels' own watchdog.",
+     CORE(lease_ms, IW_CONFIG_LEASE),
+     .not_zero = "the lease cannot be disabled, it stops the wheels when the client dies"},
+    {"drive", "accel_mm_s2", " mm/s2", "Slope away from zero.", CORE(accel_mm_s2, IW_CONFIG_ACCEL)},
+    {"drive", "decel_mm_s2", " mm/s2", "Slope towards zero, also after a lost client.",
+     CORE(decel_mm_s2, IW_CONFIG_DECEL)},
+    {"drive", "max_speed_mm_s", " mm/s", "Faster commands are scaled down, both wheels by one factor.",
+     CORE(max_speed_mm_s, IW_CONFIG_MAX_SPEED)},
+    {"drive", "max_current_mA", " mA", "Limit of every current sent.", CORE(max_current_mA, IW_CONFIG_MAX_CURRENT)},
+    {"drive", "zero_hold_ms", " ms", "Zeros are sent this long after a stop.", CORE(zero_hold_ms, IW_CONFIG_ZERO_HOLD)},
+
+    {"limits", "wheel_silent_ms", " ms",
+     "A wheel not heard for this long is lost; raise it for adapters that deliver late.",
+     CORE(wheel_silent_ms, IW_CONFIG_WHEEL_SILENT)},
+    {"limits", "echo_ms", " ms", "A setpoint not seen on the bus after this long is stalled.",
+     CORE(echo_ms, IW_CONFIG_ECHO)},
+    {"limits", "rest_rpm", " rpm", "At rest means |rpm| not above this ...", CORE(rest_rpm, IW_CONFIG_REST_RPM)},
+    {"limits", "rest_ms", " ms", "... for this long.", CORE(rest_ms, IW_CONFIG_REST)},
+    {"limits", "follow_mm_s", " mm/s", "A wheel faster than it was told by this ...",
+     CORE(follow_mm_s, IW_CONFIG_FOLLOW_SPEED)},
+    {"limits", "follow_ms", " ms", "... for this long latches.", CORE(follow_ms, IW_CONFIG_FOLLOW)},
+    {"limits", "blocked_ms", " ms", "A wheel below 20 % of its command for this long stops the pair.",
+     CORE(blocked_ms, IW_CONFIG_BLOCKED)},
+
+    {"estop", "line", "", "gpiod line name, gpiochipN:OFFSET, unix:PATH (the simulator's button), or none.",
+     TEXT(estop.line, settings_wrong_address)},
+    {"estop", "active", "",
+     "Level that means pressed. high: a contact normally closed to ground, with a pull-up, so that a cut wire reads "
+     "as\n"
+     "pressed. low is accepted with a warning: a cut wire would go unseen.",
+     WORD(estop.active_high, low_high)},
+    {"estop", "debounce_ms", " ms", "On release only; a press acts at once.", NUMBER(estop.debounce_ms, 0, 1000)},
+
+    {"northbound", "socket", "", "Where clients connect.", TEXT(northbound.socket, settings_wrong_socket)},
+    {"northbound", "mode", "", "Permissions of the socket, octal: who may connect may move the wheels.",
+     .kind = SETTINGS_MODE, AT(northbound.mode)},
+    {"northbound", "group", "", "Group of the socket; none: the gateway's own.",
+     TEXT(northbound.group, settings_wrong_group)},
+    {"northbound", "max_clients", " clients", "Connections at the same time.", NUMBER(northbound.max_clients, 1, 64)},
+    {"northbound", "watch_socket", "",
+     "Where clients connect that may look, stop and e-stop, but never drive; none: there is no such socket. Tools find "
+     "it\n"
+     "as watch/NAME.sock in the directory of socket NAME.sock.",
+     TEXT(northbound.watch_socket, settings_wrong_socket)},
+    {"northbound", "watch_mode", "", "Permissions of that socket, octal: who may connect may stop the wheels.",
+     .kind = SETTINGS_MODE, AT(northbound.watch_mode)},
+    {"northbound", "watch_group", "", "Group of that socket; none: the gateway's own.",
+     TEXT(northbound.watch_group, settings_wrong_group)},
+    {"northbound", "max_watchers", " clients", "Connections to it at the same time; they take none of max_clients.",
+     NUMBER(northbound.max_watchers, 1, 64)},
+
+    {"record", "blackbox_s", " s", "Ring in memory, written on every latched stop; 0: none.",
+     NUMBER(record.blackbox_s, 0, 600)},
+    {"record", "directory", "", "Where recordings are written.", TEXT(record.directory, settings_wrong_address)},
+};
+
+static void find_range(uint16_t range, uint32_t *out_min, uint32_t *out_max) {
+    const iw_config_range_t found = iw_config_range((iw_config_fault_t)range);
+    *out_min = found.min;
+    *out_max = found.max;
+}
+
+static const char *hint(const char *key) {
+    const char *id = strstr(key, "id");
+    const bool speaks_of_ids = id != NULL && (id == key || id[-1] == '_') && strchr("s_", id[2]) != NULL;
+    return speaks_of_ids
+               ? "the ids are fixed by the wheels (setpoints: left 266 = 0x10A, right 298 = 0x12A), delete the "
+                 "line; for exchanged wheels exchange their cables"
+               : NULL;
+}
+
+/// Of the last key of the stop budget that was given.
+static unsigned last_line(const unsigned *lines) {
+    unsigned last = 0;
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
+        const uint16_t range = keys[i].range;
+        const bool involved = range == IW_CONFIG_PERIOD || range == IW_CONFIG_LEASE || range == IW_CONFIG_DECEL ||
+                              range == IW_CONFIG_MAX_SPEED;
+        last = (involved && lines[i] > last) ? lines[i] : last;
+    }
+    return last;
+}
+
+/// Each way of mending the budget alone, as far as its key's range allows.
+static void budget_cures(const iw_config_t *core, char *out, size_t size) {
+    const uint32_t spent = (uint32_t)core->lease_ms + core->period_ms;
+    const uint32_t ramp_ms = ((uint32_t)core->max_speed_mm_s * 1000U + core->decel_mm_s2 - 1U) / core->decel_mm_s2;
+    const uint32_t left_ms = WATCHDOG_MS - spent;
+    const uint32_t decel = ((uint32_t)core->max_speed_mm_s * 1000U + left_ms - 1U) / left_ms;
+    const uint32_t speed = left_ms * core->decel_mm_s2 / 1000U;
+    int used = snprintf(out, size, "write max_speed_mm_s = %u at most", (unsigned)speed);
+    if (decel <= iw_config_range(IW_CONFIG_DECEL).max) {
+        used += snprintf(out + used, size - (size_t)used, ", or decel_mm_s2 = %u at least", (unsigned)decel);
+    }
+    if (ramp_ms + core->period_ms + iw_config_range(IW_CONFIG_LEASE).min <= WATCHDOG_MS) {
+        (void)snprintf(out + used, size - (size_t)used, ", or lease_ms = %u at most",
+                       (unsigned)(WATCHDOG_MS - core->period_ms - ramp_ms));
+    }
+}
+
+static void relate(settings_report_t *report, const void *values, const unsigned *lines) {
+    const iw_config_t *core = &((const gateway_config_t *)values)->core;
+    char cures[SETTINGS_MESSAGE_SIZE];
+    const iw_config_fault_t fault = iw_config_check(core);
+    if (fault == IW_CONFIG_STOP_BUDGET) {
+        budget_cures(core, cures, sizeof cures);
+        settings_complain(
+            report, last_line(lines),
+            "after a lost client the wheels would need lease_ms %u + period_ms %u + max_speed_mm_s %u / decel_mm_s2 %u "
+            "= %u ms to stop, more than the %u ms of their own watchdog; %s",
+            core->lease_ms, core->period_ms, core->max_speed_mm_s, core->decel_mm_s2,
+            (unsigned)iw_config_stop_budget(core).client_lost_ms, WATCHDOG_MS, cures);
+    } else if (fault != IW_CONFIG_OK) {
+        settings_complain(report, 0, "the values do not fit together (fault %d); compare with share/gateway.conf",
+                          (int)fault);
+    }
+}
+
+static const settings_form_t form = {
+    .keys = keys,
+    .count = sizeof keys / sizeof keys[0],
+    .program = "the gateway",
+    .missing = "create it from share/gateway.conf, or give another with -c FILE",
+    .range = find_range,
+    .hint = hint,
+    .relate = relate,
+};
+IW_STATIC_ASSERT(sizeof keys / sizeof keys[0] <= SETTINGS_KEYS_MAX, keys_fit);
+
+void gateway_config_default(gateway_config_t *out_config) {
+    static const gateway_config_t standard = {
+        .bus = {"can0", 1000000U, 625U, GATEWAY_MISMATCH_REFUSE},
+        .track_mm = 540U,
+        .estop = {"ESTOP", true, 5U},
+        .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U},
+        .record = {30U, "/var/lib/iwheel"},
+    };
+    *out_config = standard;
+    iw_config_default(&out_config->core);
+}
+
+int gateway_config_load(const char *path, gateway_config_t *out_config, FILE *err) {
+    gateway_config_t config;
+    gateway_config_default(&config);
+    const int result = settings_load(&form, path, &config, err);
+    *out_config = (result == 0) ? config : *out_config;
+    return result;
+}
+
+int gateway_config_parse(const char *name, const char *text, size_t size, gateway_config_t *out_config, FILE *err) {
+    settings_report_t report = {.name = name, .err = err};
+    gateway_config_t config;
+    gateway_config_default(&config);
+    const int result = settings_parse(&form, &report, text, size, &config);
+    *out_config = (result == 0) ? config : *out_config;
+    return result;
+}
+
+int gateway_config_override(gateway_config_t *config, const char *name, const char *value, const char *origin,
+                            FILE *err) {
+    settings_report_t report = {.name = origin, .err = err};
+    gateway_config_t changed = *config;
+    const int result = settings_override(&form, &report, name, value, &changed);
+    *config = (result == 0) ? changed : *config;
+    return result;
+}
+
+void gateway_config_print(const gateway_config_t *config, FILE *out) {
+    gateway_config_print_noted(config, NULL, NULL, out);
+}
+
+void gateway_config_print_noted(const gateway_config_t *config, gateway_config_note_t note, const void *context,
+                                FILE *out) {
+    const settings_note_t noted = {.say = note, .context = context};
+    gateway_config_t defaults;
+    gateway_config_default(&defaults);
+    (void)fputs(
+        "; Configuration of the iWheel gateway. A key left out has its default; an unknown one is an error. Two have "
+        "no\n"
+        "; default and must be set before the wheels may move: setpoint_type and current_role.\n",
+        out);
+    if (config->core.listen_only) {
+        (void)fputs("; In force from the command line: --listen-only, nothing is ever sent.\n", out);
+    }
+    settings_print(&form, config, &defaults, (note != NULL) ? &noted : NULL, out);
+}

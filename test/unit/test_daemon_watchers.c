@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: MIT
+// Who may watch and who may drive: the right to each request by each socket, and that watchers take nothing from drivers.
+#include "answers/dispatch.h"
+#include "answers/service.h"
+#include "daemon_rig.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#define CROWD GW_WATCHERS_MAX
+
+typedef struct {
+    const char *line;
+    bool watch; ///< Allowed on the socket for watching.
+} right_t;
+
+/// Every command there is.
+static const right_t rights[IWN_CMDS] = {
+    [IWN_CMD_HELLO] = {"{\"cmd\":\"hello\"}", true},
+    [IWN_CMD_STATUS] = {"{\"cmd\":\"status\"}", true},
+    [IWN_CMD_WATCH] = {"{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", true},
+    [IWN_CMD_ARM] = {"{\"cmd\":\"arm\"}", false},
+    [IWN_CMD_DRIVE] = {"{\"cmd\":\"drive\",\"left_mm_s\":0,\"right_mm_s\":0}", false},
+    [IWN_CMD_TWIST] = {"{\"cmd\":\"twist\",\"v_mm_s\":0,\"yaw_mrad_s\":0}", false},
+    [IWN_CMD_STOP] = {"{\"cmd\":\"stop\"}", true},
+    [IWN_CMD_DISARM] = {"{\"cmd\":\"disarm\"}", true},
+    [IWN_CMD_ESTOP] = {"{\"cmd\":\"estop\"}", true},
+    [IWN_CMD_RESET] = {"{\"cmd\":\"reset\"}", false},
+    [IWN_CMD_TARE] = {"{\"cmd\":\"tare\"}", false},
+    [IWN_CMD_WHY] = {"{\"cmd\":\"why\"}", true},
+    [IWN_CMD_RECORDINGS] = {"{\"cmd\":\"recordings\"}", true},
+    [IWN_CMD_RECORDING] = {"{\"cmd\":\"recording\",\"name\":\"none.rec\",\"offset\":0}", true},
+    [IWN_CMD_CONFIRM] = {"{\"cmd\":\"confirm\",\"item\":\"track\",\"value\":\"540\"}", false},
+};
+
+static int driver;
+static int watcher;
+static int crowd[CROWD];
+static unsigned crowded;
+
+void setUp(void) {
+    daemon_rig_begin();
+    daemon_rig.daemon->config.northbound.max_watchers = CROWD;
+    driver = daemon_rig_connect();
+    watcher = daemon_rig_connect_with(GW_WATCH);
+    crowded = 0;
+}
+
+void tearDown(void) {
+    for (unsigned i = 0; i < crowded; i++) {
+        (void)close(crowd[i]);
+    }
+    (void)close(watcher);
+    (void)close(driver);
+    daemon_rig_end();
+}
+
+static void assert_has(const char *reply, const char *part) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, part), (reply[0] != '\0') ? reply : part);
+}
+
+/// Refused because of the socket; a recording may be denied for other reasons.
+static bool is_denied(const char *reply) {
+    TEST_ASSERT_NOT_EQUAL_MESSAGE('\0', reply[0], "no reply");
+    return strstr(reply, "\"error\":\"denied\"") != NULL && strstr(reply, "this socket is for watching") != NULL;
+}
+
+static void say(int client, const char *line) {
+    (void)send(client, line, strlen(line), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+static void connect_crowd(unsigned count) {
+    for (unsigned i = 0; i < count; i++) {
+        crowd[crowded++] = daemon_rig_connect_with(GW_WATCH);
+        daemon_rig_run(3);
+    }
+}
+
+// Rights -------------------------------------------------------------------------------------------------------------------
+
+static void test_right_of_each_request_on_each_socket_is_as_listed(void) {
+    for (unsigned cmd = 0; cmd < IWN_CMDS; cmd++) {
+        TEST_ASSERT_NOT_NULL_MESSAGE(rights[cmd].line, "a command is missing in the table of this test");
+        TEST_ASSERT_EQUAL_INT_MESSAGE(!rights[cmd].watch, is_denied(daemon_rig_ask(watcher, rights[cmd].line)),
+                                      rights[cmd].line);
+        TEST_ASSERT_FALSE_MESSAGE(is_denied(daemon_rig_ask(driver, rights[cmd].line)), rights[cmd].line);
+    }
+}
+
+static void test_denial_names_the_socket_and_the_group_that_cure_it(void) {
+    const char *reply = daemon_rig_ask(watcher, "{\"id\":7,\"cmd\":\"arm\"}");
+    assert_has(reply, "\"id\":7");
+    assert_has(reply, daemon_rig.daemon->config.northbound.socket);
+    assert_has(reply, "usermod -aG iwheel USER");
+    (void)snprintf(daemon_rig.daemon->config.northbound.group, 8, "none");
+    reply = daemon_rig_ask(watcher, "{\"cmd\":\"arm\"}");
+    assert_has(reply, daemon_rig.daemon->config.northbound.socket);
+    TEST_ASSERT_NULL(strstr(reply, "none"));
+}
+
+static void test_hello_tells_the_right(void) {
+    assert_has(daemon_rig_ask(driver, "{\"cmd\":\"hello\"}"), "\"rights\":\"drive\"");
+    assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"hello\"}"), "\"rights\":\"watch\"");
+}
+
+static void test_watcher_who_asks_to_drive_changes_nothing(void) {
+    daemon_rig_arm(driver);
+    daemon_rig_drive(driver, 300, 300, 500);
+    assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"arm\",\"takeover\":true}"), "\"denied\"");
+    assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"drive\",\"left_mm_s\":900,\"right_mm_s\":900}"), "\"denied\"");
+    daemon_rig_drive(driver, 300, 300, 100);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]);
+    (void)daemon_rig_ask(driver, "{\"cmd\":\"stop\"}");
+    daemon_rig_run(2000);
+    (void)daemon_rig_ask(watcher, "{\"cmd\":\"drive\",\"left_mm_s\":900,\"right_mm_s\":900}");
+    daemon_rig_arm(driver); // What a watcher said is no command that somebody might arm into.
+}
+
+static void test_stop_of_a_watcher_stops_whoever_drives(void) {
+    daemon_rig_arm(driver);
+    daemon_rig_drive(driver, 300, 300, 500);
+    assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"stop\"}"), "\"ok\":true");
+    daemon_rig_run(2000);
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
+    const char *reply = daemon_rig_ask(driver, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}");
+    char who[64];
+    (void)snprintf(who, sizeof who, "user %u (process %d)", (unsigned)getuid(), (int)getpid());
+    assert_has(reply, "client_stop");
+    assert_has(reply, who);
+}
+
+static void test_reset_that_an_estop_keeps_away_names_user_and_process(void) {
+    char who[64];
+    (void)snprintf(who, sizeof who, "user %u (process %d)", (unsigned)getuid(), (int)getpid());
+    assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}"), "\"latched\"");
+    daemon_rig_run(900);
+    (void)daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}");
+    daemon_rig_run(500);
+    const char *reply = daemon_rig_ask(driver, "{\"cmd\":\"reset\"}");
+    assert_has(reply, "\"cause_present\"");
+    assert_has(reply, who);
+    daemon_rig_run(1000);
+    assert_has(daemon_rig_ask(driver, "{\"cmd\":\"reset\"}"), "\"ok\":true");
+}
+
+// Quotas -------------------------------------------------------------------------------------------------------------------
+
+static void test_watchers_take_no_slot_of_a_driver(void) {
+    daemon_rig.daemon->config.northbound.max_clients = 2;
+    connect_crowd(CROWD - 1U);
+    TEST_ASSERT_EQUAL_UINT(CROWD, daemon_rig.daemon->watchers);
+    const int second = daemon_rig_connect();
+    assert_has(daemon_rig_ask(second, "{\"cmd\":\"hello\"}"), "\"rights\":\"drive\"");
+    const int third = daemon_rig_connect();
+    char text[GW_CLIENT_TEXT_SIZE * 4U] = "";
+    TEST_ASSERT_GREATER_THAN_INT(0, recv(third, text, sizeof text - 1U, MSG_DONTWAIT));
+    assert_has(text, "raise max_clients");
+    (void)close(second);
+    (void)close(third);
+}
+
+static void test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again(void) {
+    daemon_rig.daemon->config.northbound.max_watchers = 2;
+    connect_crowd(2);
+    char text[GW_CLIENT_TEXT_SIZE * 4U] = "";
+    TEST_ASSERT_GREATER_THAN_INT(0, recv(crowd[1], text, sizeof text - 1U, MSG_DONTWAIT));
+    assert_has(text, "2 watchers are connected");
+    assert_has(text, "raise max_watchers");
+    (void)close(crowd[0]);
+    crowd[0] = -1;
+    daemon_rig_run(10);
+    connect_crowd(1);
+    assert_has(daemon_rig_ask(crowd[2], "{\"cmd\":\"hello\"}"), "\"rights\":\"watch\"");
+    TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->watchers);
+    TEST_ASSERT_EQUAL_UINT(3, daemon_rig.daemon->clients);
+}
+
+static void test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing(void) {
+    connect_crowd(CROWD - 1U);
+    for (unsigned i = 0; i < crowded; i++) {
+        say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\",\"force\",\"frame\"],\"rate_hz\":100}\n");
+    }
+    daemon_rig_arm(driver);
+    const uint32_t sent = daemon_rig.sent[IW_LEFT];
+    const iw_time_us_t begin_us = daemon_rig.now_us;
+    for (unsigned n = 0; n < 50U; n++) {
+        for (unsigned i = 0; i < crowded; i++) {
+            say(crowd[i], "{\"cmd\":\"status\"}\n{\"cmd\":\"arm\"}\n{\"cmd\":\"why\"}\n");
+        }
+        daemon_rig_drive(driver, 300, 300, 20); // Fails if one command of it has no reply within 20 ms.
+    }
+    const uint32_t periods = (uint32_t)((daemon_rig.now_us - begin_us) / 20000U);
+    TEST_ASSERT_UINT_WITHIN(2, periods, daemon_rig.sent[IW_LEFT] - sent);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
+static unsigned replies_of(int client) {
+    static char text[1U << 20];
+    unsigned count = 0;
+    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    text[(length > 0) ? length : 0] = '\0';
+    for (const char *at = strstr(text, "\"ok\":"); at != NULL; at = strstr(at + 1, "\"ok\":")) {
+        count++;
+    }
+    return count;
+}
+
+static void test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace(void) {
+    for (unsigned i = 0; i < 100U; i++) {
+        say(watcher, "{\"cmd\":\"hello\"}\n");
+    }
+    daemon_rig_run(1);
+    TEST_ASSERT_EQUAL_UINT(GW_LINES_PER_CYCLE, replies_of(watcher));
+    const uint32_t waits = daemon_rig.waits;
+    daemon_rig_run(100);
+    TEST_ASSERT_UINT_WITHIN(1, 100000U / GW_WATCHER_LINE_US, replies_of(watcher));
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "lines that have to wait keep nobody awake");
+    daemon_rig_run(1000);
+    TEST_ASSERT_UINT_WITHIN(2, 100U - GW_LINES_PER_CYCLE - 10U, replies_of(watcher));
+}
+
+static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void) {
+    daemon_rig_arm(driver);
+    daemon_rig_drive(driver, 300, 300, 500);
+    connect_crowd(CROWD - 1U);
+    const uint32_t stops = gw_daemon_look(daemon_rig.daemon).stop->number;
+    for (unsigned n = 0; n < 50U; n++) {
+        for (unsigned i = 0; i < crowded; i++) {
+            say(crowd[i], "{\"cmd\":\"estop\"}\n");
+        }
+        daemon_rig_run(20);
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
+    }
+    const iw_snapshot_t seen = gw_daemon_look(daemon_rig.daemon);
+    TEST_ASSERT_TRUE(daemon_rig.now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] <= GW_ESTOP_AGAIN_US + MS(20));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, seen.state);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(stops + 2U, seen.stop->number);
+    assert_has(daemon_rig_ask(driver, "{\"cmd\":\"reset\"}"), "\"cause_present\"");
+    daemon_rig_run(2000);
+    assert_has(daemon_rig_ask(driver, "{\"cmd\":\"reset\"}"), "\"ok\":true");
+}
+
+static iw_time_us_t estop_seen_us(void) {
+    return gw_daemon_look(daemon_rig.daemon).seen_us[IW_CAUSE_ESTOP_SOFTWARE];
+}
+
+static void test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step(void) {
+    assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}"), "\"latched\"");
+    const iw_time_us_t first_us = estop_seen_us();
+    daemon_rig_run(50);
+    assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}"), "\"latched\"");
+    TEST_ASSERT_EQUAL_UINT64(first_us, estop_seen_us());
+    daemon_rig_run(60);
+    assert_has(daemon_rig_ask(watcher, "{\"cmd\":\"estop\"}"), "\"latched\"");
+    TEST_ASSERT_GREATER_THAN_UINT64(first_us, estop_seen_us());
+}
+
+static void test_estop_of_a_watcher_that_goes_at_once_counts(void) {
+    say(watcher, "{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"estop\"}\n");
+    (void)close(watcher);
+    watcher = -1;
+    const uint32_t waits = daemon_rig.waits;
+    daemon_rig_run(100);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->watchers);
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_right_of_each_request_on_each_socket_is_as_listed);
+    RUN_TEST(test_denial_names_the_socket_and_the_group_that_cure_it);
+    RUN_TEST(test_hello_tells_the_right);
+    RUN_TEST(test_watcher_who_asks_to_drive_changes_nothing);
+    RUN_TEST(test_stop_of_a_watcher_stops_whoever_drives);
+    RUN_TEST(test_reset_that_an_estop_keeps_away_names_user_and_process);
+    RUN_TEST(test_watchers_take_no_slot_of_a_driver);
+    RUN_TEST(test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again);
+    RUN_TEST(test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing);
+    RUN_TEST(test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace);
+    RUN_TEST(test_flood_of_estop_latches_once_and_leaves_the_black_box_alone);
+    RUN_TEST(test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step);
+    RUN_TEST(test_estop_of_a_watcher_that_goes_at_once_counts);
+    return UNITY_END();
+}
