@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "box/box.h"
 #include "box/box_files.h"
 
 #include "iwheel_linux/clock.h"

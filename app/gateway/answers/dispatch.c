@@ -3,7 +3,7 @@
 
 #include "assumption.h"
 #include "box/record.h"
-#include "ledger/knowledge_json.h"
+#include "ledger/knowledge.h"
 #include "recordings.h"
 #include "refuse.h"
 #include "status/observe.h"

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "box.h"
 
-#include "box_reader.h"
-#include "box_writer.h"
+#include "box_files.h"
 
 #include <errno.h>
 #include <stddef.h>

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "bounds.h"
 #include "box/record.h"
 #include "daemon.h"
-#include "knowledge_told.h"
 #include "process/owners.h"
 
 #include "iwheel_linux/clock.h"

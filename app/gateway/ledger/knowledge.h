@@ -13,6 +13,7 @@
 #include "memory.h"
 
 #include "iwheel/gateway.h"
+#include "iwheel_northbound/json_out.h"
 
 /// Nothing is told before the keeper has answered, but not for longer than this.
 #define GW_KNOWLEDGE_PATIENCE_US 1000000U
@@ -87,5 +88,25 @@ iw_tare_t gw_knowledge_tare(struct gw_daemon *daemon, uint8_t sides, iw_side_t *
 
 /// Hands over the rest. The keeper ends when it is on the disk.
 void gw_knowledge_close(gw_knowledge_t *self, const char *bus);
+
+/// The objects `ledger` and `memory` of a snapshot: every item; file, state and reason. The ledger's bytes are kept and
+/// written again until something of it changes.
+void gw_knowledge_write(struct gw_daemon *daemon, const iw_snapshot_t *seen, iwn_out_t *json);
+
+/// One item of the ledger, its state and what it rests on, into an object that is open.
+void gw_knowledge_write_item(const struct gw_daemon *daemon, iw_ledger_item_t item, iwn_out_t *json);
+
+/// In words, lines of the log and events; for knowledge.c: an item has changed.
+void gw_knowledge_tell_item(struct gw_daemon *daemon, iw_ledger_item_t item);
+
+/// The offset in force has changed.
+void gw_knowledge_tell_offset(struct gw_daemon *daemon, iw_side_t side, const gw_told_offset_t *now,
+                              const gw_told_offset_t *before);
+
+/// Where it is kept, or why not.
+void gw_knowledge_tell_memory(struct gw_daemon *daemon);
+
+/// The whole ledger, at start.
+void gw_knowledge_tell_ledger(struct gw_daemon *daemon);
 
 #endif

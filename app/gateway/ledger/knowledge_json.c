@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "knowledge_json.h"
+#include "knowledge.h"
 
+#include "daemon.h"
 #include "process/owners.h"
 
 #include "iwheel_northbound/words.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "knowledge_told.h"
+#include "knowledge.h"
 
 #include "clients/event.h"
-#include "knowledge_json.h"
+#include "daemon.h"
 #include "process/owners.h"
 
 #include "iwheel_northbound/words.h"

@@ -2,7 +2,7 @@
 #include "snapshot.h"
 
 #include "bus/bus_facts.h"
-#include "ledger/knowledge_json.h"
+#include "ledger/knowledge.h"
 
 #include "iwheel_linux/clock.h"
 

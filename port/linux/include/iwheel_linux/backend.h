@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// A bus, and the interface of a kind of e-stop: each kind of either is one file, and the rest of the port does not
 /// know which is in use.
 ///
@@ -15,14 +16,15 @@
 
 /// Storage for the state of any backend, so that the owner need not know its size.
 typedef union {
-    uint64_t align;
-    uint8_t bytes[8192];
+    uint64_t align;      ///< For the strictest alignment that a backend needs.
+    uint8_t bytes[8192]; ///< The backend's own.
 } iw_backend_store_t;
 
 /// A bus, by its name: `unix:PATH` is the local bus, any other a SocketCAN interface. 0, or an errno, nothing is open
 /// then; ENOTSUP: this build has none of that kind. `name` must outlive the bus, which must not move. A bus that is
 /// merely absent is no error: it is down until it comes.
 int iw_bus_open(iw_backend_store_t *bus, const char *name);
+/// Gives back what opening took.
 void iw_bus_close(iw_backend_store_t *bus);
 /// The descriptor to watch for reading; the same from open to close.
 int iw_bus_fd(const iw_backend_store_t *bus);
@@ -30,10 +32,13 @@ int iw_bus_fd(const iw_backend_store_t *bus);
 void iw_bus_tend(iw_backend_store_t *bus, iw_time_us_t now_us);
 /// When `tend` has something to do; IW_NEVER if it has not.
 iw_time_us_t iw_bus_next_us(const iw_backend_store_t *bus);
-/// As in iw_hal_t.
+/// As `send` of iw_hal_t.
 int iw_bus_send(iw_backend_store_t *bus, const iw_can_frame_t *frame);
+/// As `receive` of iw_hal_t.
 int iw_bus_receive(iw_backend_store_t *bus, iw_can_frame_t *out_frame);
+/// As `bus_state` of iw_hal_t.
 iw_bus_state_t iw_bus_state(iw_backend_store_t *bus);
+/// As `purge` of iw_hal_t.
 int iw_bus_purge(iw_backend_store_t *bus);
 /// What is known of the link, always up to date.
 const iw_bus_link_t *iw_bus_link(const iw_backend_store_t *bus);
@@ -48,11 +53,12 @@ typedef struct {
 /// A kind of e-stop input. The functions mean the same as those of a bus; `self` is its state, of a type that only it
 /// knows.
 typedef struct {
+    /// 0, or an errno.
     int (*open)(void *self, const iw_estop_wish_t *wish);
-    void (*close)(void *self);
-    int (*watch_fd)(const void *self); ///< -1: there is nothing to watch.
-    void (*tend)(void *self, iw_time_us_t now_us);
-    iw_time_us_t (*next_us)(const void *self);
+    void (*close)(void *self);                     ///< Gives back what `open` took.
+    int (*watch_fd)(const void *self);             ///< -1: there is nothing to watch.
+    void (*tend)(void *self, iw_time_us_t now_us); ///< Call it before every step.
+    iw_time_us_t (*next_us)(const void *self);     ///< When `tend` has something to do; IW_NEVER if not.
     /// As `estop_pressed` of iw_hal_t. `quiet`: the wait that has just ended found nothing at the descriptor, so that
     /// there are no edges to be read; the level always is.
     int (*pressed)(void *self, bool quiet);
