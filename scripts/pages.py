@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Are the pages for those who come next true? The lists of docs/how-to-add.md, and the indexes of test/ and scripts/.
+"""Are the pages for those who come next true? The lists of docs/how-to-add.md, and the indexes of test/, scripts/ and docs/.
 
 usage: pages.py [ROOT]
 
@@ -83,7 +83,7 @@ def judge_index(folder):
 
 def main():
     findings, lists = judge_how_to_add()
-    for folder in ("test", "scripts"):
+    for folder in ("test", "scripts", "docs"):
         more, entries = judge_index(folder)
         findings += more
         print(f"index of {folder}/: {entries} entries")

@@ -186,7 +186,7 @@ def api(folder, fault):
 def pages(folder, fault):
     """A page with one list, and indexes, about a small tree; the fault is (file, old, new), or a file more."""
     tree = {"app/a.c": "int follow_ms;\n", "app/b.c": "int other;\n", "test/README.md": "| `run` | x |\n", "test/run": "x\n", "scripts/README.md": "| `one.py` | x |\n",
-            "scripts/one.py": "x\n", "docs/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n"}
+            "scripts/one.py": "x\n", "docs/README.md": "| `how-to-add.md` | x |\n", "docs/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n"}
     name, old, new = fault
     tree[name] = tree.get(name, "").replace(old, new) if name in tree else new
     for name, text in tree.items():

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Recordings for clients: passed on to the process that reads them (disk/box_reader.h), answered when it answers.
+/// Recordings for clients: passed on to the process that reads them (disk/box_files.h), answered when it answers.
 ///
 /// Nothing waits for it, not even later requests of the same client: a stop behind a slow disk is carried out at once. So a client has
 /// one question at a time, and a cycle takes one answer.

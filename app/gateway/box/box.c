@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "box.h"
 
-#include "disk/box_reader.h"
-#include "disk/box_writer.h"
+#include "disk/box_files.h"
 
 #include <errno.h>
 #include <stddef.h>

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "bus_facts.h"
 
-#include "bus_left.h"
 #include "wheels/wheels.h"
 
+#include <fcntl.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <unistd.h>
+
+#define PATH_SIZE 256
 
 static iw_timing_t judge(const inspect_wish_t *wish, const iw_bus_link_t *link) {
     return iw_timing_judge(link, wish->bitrate_hz, wish->sample_point_permille);
@@ -76,4 +79,34 @@ void gw_bus_facts_follow(gw_bus_facts_t *self, gw_wheels_t *wheels, bool left_be
     }
     self->left_behind = left_behind;
     note_warnings(wheels, left_behind);
+}
+
+void gw_bus_left_sentence(const iw_bus_link_t *link, const char *bus, char *out_sentence, size_t size) {
+    static const char what[] = "a setpoint is still in the controller and may leave when wheels get power";
+    if (link->presence == IW_LINK_LOCAL) {
+        (void)snprintf(out_sentence, size, "bus %s: %s; start its hub (the simulator) again", bus, what);
+    } else if (!link->echo_proven) {
+        (void)snprintf(out_sentence, size, "bus %s: %s; this adapter gives nothing back: switch it off and on", bus,
+                       what);
+    } else {
+        (void)snprintf(out_sentence, size,
+                       "bus %s: %s; empty it: ip link set %s down; ip link set %s up (or let the service do it: "
+                       "systemctl enable --now iwheel-can-restart@%s.path)",
+                       bus, what, bus, bus, bus);
+    }
+}
+
+bool gw_bus_left_ask(const char *directory, const char *interface) {
+    static const char text[] = "restart\n";
+    char path[PATH_SIZE];
+    if (snprintf(path, sizeof path, "%s/%s.restart", directory, interface) >= (int)sizeof path) {
+        return false;
+    }
+    (void)unlink(path); // Made anew, so that nothing is written through a link.
+    const int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    if (fd < 0) {
+        return false;
+    }
+    const bool written = write(fd, text, sizeof text - 1U) == (ssize_t)(sizeof text - 1U);
+    return (close(fd) == 0) && written;
 }

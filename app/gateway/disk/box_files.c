@@ -11,8 +11,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define PREFIX "stop-"
-#define DIGITS 6U
+#define DIGITS_MIN 6U
+#define DIGITS_MAX 10U
+#define LETTERS    "abcdefghijklmnopqrstuvwxyz_"
+
+const char *const gw_box_endings[GW_BOX_ENDINGS] = {".log", ".jsonl", ".conf"};
 
 typedef struct {
     uint32_t oldest; ///< 0: there is none.
@@ -28,15 +31,35 @@ int gw_box_files_open(const char *directory) {
     return gw_folder_open_own(directory);
 }
 
-/// The number in a file's name; 0 if it is none of ours.
-static uint32_t number_of(const char *name) {
-    const size_t prefix = sizeof PREFIX - 1U;
-    if (strncmp(name, PREFIX, prefix) != 0 || strspn(name + prefix, "0123456789") < DIGITS) {
+unsigned gw_box_files_ending(const char *text) {
+    unsigned i = 0;
+    while (i < GW_BOX_ENDINGS && strcmp(text, gw_box_endings[i]) != 0) {
+        i++;
+    }
+    return i;
+}
+
+size_t gw_box_files_stem(const char *name) {
+    const size_t prefix = sizeof GW_BOX_PREFIX - 1U;
+    if (strlen(name) >= GW_BOX_STEM_SIZE || strncmp(name, GW_BOX_PREFIX, prefix) != 0) {
         return 0;
     }
-    char *end;
-    const unsigned long number = strtoul(name + prefix, &end, 10);
-    return (*end == '-' && number < UINT32_MAX) ? (uint32_t)number : 0U;
+    const size_t digits = strspn(name + prefix, "0123456789");
+    const char *cause = name + prefix + digits + 1U;
+    if (digits < DIGITS_MIN || digits > DIGITS_MAX || cause[-1] != '-') {
+        return 0;
+    }
+    const size_t letters = strspn(cause, LETTERS);
+    const bool good =
+        letters > 0U && letters < GW_BOX_CAUSE_SIZE && gw_box_files_ending(cause + letters) < GW_BOX_ENDINGS;
+    return good ? (size_t)(cause - name) + letters : 0U;
+}
+
+/// The number in a file's name; 0 if it is none of ours.
+static uint32_t number_of(const char *name) {
+    const unsigned long number =
+        (gw_box_files_stem(name) > 0U) ? strtoul(name + sizeof GW_BOX_PREFIX - 1U, NULL, 10) : 0U;
+    return (number < UINT32_MAX) ? (uint32_t)number : 0U;
 }
 
 static bool is_event_file(const char *name) {

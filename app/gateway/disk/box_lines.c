@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "box_lines.h"
+#include "box_files.h"
 
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/words.h"

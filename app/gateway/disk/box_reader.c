@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "box_reader.h"
-
 #include "box_files.h"
+
 #include "process/owners.h"
 
 #include "iwheel_northbound/json_out.h"
@@ -17,21 +16,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define PREFIX     "stop-"
-#define DIGITS_MIN 6U
-#define DIGITS_MAX 10U
-#define LETTERS    "abcdefghijklmnopqrstuvwxyz_"
-#define ENDINGS    3U
-#define IS_ENDING  "a name is one that recordings tells, with .log, .jsonl or .conf behind it"
-
-static const char *const endings[ENDINGS] = {".log", ".jsonl", ".conf"};
+#define IS_ENDING "a name is one that recordings tells, with .log, .jsonl or .conf behind it"
 
 /// A recording of the list.
 typedef struct {
     unsigned long number;
     char stem[GW_BOX_STEM_SIZE];
-    bool there[ENDINGS];
-    int64_t bytes[ENDINGS];
+    bool there[GW_BOX_ENDINGS];
+    int64_t bytes[GW_BOX_ENDINGS];
     int64_t wall_us; ///< 0: unknown.
 } listed_t;
 
@@ -51,35 +43,6 @@ uint32_t gw_box_crc32(uint32_t before, const uint8_t *bytes, size_t length) {
         crc = (crc >> 4U) ^ table[crc & 15U];
     }
     return ~crc;
-}
-
-/// Which of the endings it is; ENDINGS if it is none.
-static unsigned ending_of(const char *text) {
-    unsigned i = 0;
-    while (i < ENDINGS && strcmp(text, endings[i]) != 0) {
-        i++;
-    }
-    return i;
-}
-
-/// Length of the name without its ending; 0 if the writer gives no such name.
-static size_t stem_length(const char *name) {
-    const size_t prefix = sizeof PREFIX - 1U;
-    if (strlen(name) >= GW_BOX_STEM_SIZE || strncmp(name, PREFIX, prefix) != 0) {
-        return 0;
-    }
-    const size_t digits = strspn(name + prefix, "0123456789");
-    const char *cause = name + prefix + digits + 1U;
-    if (digits < DIGITS_MIN || digits > DIGITS_MAX || cause[-1] != '-') {
-        return 0;
-    }
-    const size_t letters = strspn(cause, LETTERS);
-    const bool good = letters > 0U && letters < GW_BOX_CAUSE_SIZE && ending_of(cause + letters) < ENDINGS;
-    return good ? (size_t)(cause - name) + letters : 0U;
-}
-
-bool gw_box_reader_knows(const char *name) {
-    return stem_length(name) > 0U;
 }
 
 __attribute__((format(printf, 3, 4))) static void refuse(gw_box_answer_t *out, iwn_error_t error, const char *format,
@@ -107,7 +70,7 @@ static void finish(iwn_out_t *json, gw_box_answer_t *out) {
 
 /// The recording of that name in the list, added if there is room or it is newer than the oldest. NULL: there is none.
 static listed_t *place(list_t *list, const char *name, size_t stem) {
-    const unsigned long number = strtoul(name + sizeof PREFIX - 1U, NULL, 10);
+    const unsigned long number = strtoul(name + sizeof GW_BOX_PREFIX - 1U, NULL, 10);
     listed_t *oldest = &list->entry[0];
     for (size_t i = 0; i < list->count; i++) {
         listed_t *entry = &list->entry[i];
@@ -127,18 +90,18 @@ static listed_t *place(list_t *list, const char *name, size_t stem) {
 
 static void list_file(int directory, const char *name, list_t *list) {
     struct stat status;
-    const size_t stem = stem_length(name);
+    const size_t stem = gw_box_files_stem(name);
     if (stem == 0U || fstatat(directory, name, &status, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(status.st_mode)) {
         return;
     }
     listed_t *entry = place(list, name, stem);
-    const unsigned ending = ending_of(name + stem);
-    if (entry == NULL || ending == ENDINGS) {
+    const unsigned ending = gw_box_files_ending(name + stem);
+    if (entry == NULL || ending == GW_BOX_ENDINGS) {
         return;
     }
     entry->there[ending] = true;
     entry->bytes[ending] = (int64_t)status.st_size;
-    if (strcmp(endings[ending], ".conf") == 0) { // The first to be written, and at once whole.
+    if (strcmp(gw_box_endings[ending], ".conf") == 0) { // The first to be written, and at once whole.
         entry->wall_us = (int64_t)status.st_mtim.tv_sec * 1000000 + status.st_mtim.tv_nsec / 1000;
     }
 }
@@ -169,7 +132,7 @@ static void answer_list(int directory, gw_box_answer_t *out) {
         const listed_t *entry = &list.entry[i];
         iwn_out_open(&json, NULL, '{');
         iwn_out_text(&json, "name", entry->stem);
-        iwn_out_text(&json, "cause", strchr(entry->stem + sizeof PREFIX - 1U, '-') + 1);
+        iwn_out_text(&json, "cause", strchr(entry->stem + sizeof GW_BOX_PREFIX - 1U, '-') + 1);
         iwn_out_known(&json, "wall_us", entry->wall_us > 0, entry->wall_us);
         iwn_out_known(&json, "log_bytes", entry->there[0], entry->bytes[0]);
         iwn_out_known(&json, "jsonl_bytes", entry->there[1], entry->bytes[1]);
@@ -278,7 +241,7 @@ static int open_file(int directory, const char *name, int64_t *out_size) {
 
 static void answer_piece(int directory, const gw_box_question_t *question, gw_box_answer_t *out) {
     int64_t size = 0;
-    if (!gw_box_reader_knows(question->name)) {
+    if (gw_box_files_stem(question->name) == 0U) {
         refuse(out, IWN_BAD_VALUE, "name is none of a recording's file: " IS_ENDING);
         return;
     }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "box_writer.h"
-
 #include "box_files.h"
-#include "box_lines.h"
+
 #include "candump.h"
 
 #include "iwheel_linux/clock.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bounds.h"
+#include "memory.h"
 
 #include "iwheel/codec.h"
 #include "iwheel/evidence.h"

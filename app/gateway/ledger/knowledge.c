@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "bounds.h"
-#include "knowledge_told.h"
 #include "process/log.h"
 #include "wheels/wheels.h"
 

@@ -8,8 +8,8 @@
 #ifndef GATEWAY_KNOWLEDGE_H
 #define GATEWAY_KNOWLEDGE_H
 
+#include "disk/keeper.h"
 #include "memory.h"
-#include "process/keeper.h"
 #include "process/owners.h"
 
 #include "iwheel/gateway.h"
@@ -111,5 +111,18 @@ void gw_knowledge_write_item(const gw_knowledge_t *self, iw_ledger_item_t item, 
 
 /// Hands over the rest. The keeper ends when it is on the disk.
 void gw_knowledge_close(gw_knowledge_t *self);
+
+/// In words, lines of the log and events; for knowledge.c: an item has changed.
+void gw_knowledge_tell_item(gw_knowledge_t *self, iw_ledger_item_t item);
+
+/// The offset in force has changed.
+void gw_knowledge_tell_offset(gw_knowledge_t *self, iw_side_t side, const gw_told_offset_t *now,
+                              const gw_told_offset_t *before);
+
+/// Where it is kept, or why not.
+void gw_knowledge_tell_memory(gw_knowledge_t *self);
+
+/// The whole ledger, at start.
+void gw_knowledge_tell_ledger(gw_knowledge_t *self);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "knowledge_told.h"
+#include "knowledge.h"
 
 #include "clients/clients.h"
 #include "process/log.h"

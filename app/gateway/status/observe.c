@@ -3,7 +3,7 @@
 
 #include "box/box.h"
 #include "box/record.h"
-#include "bus/bus_left.h"
+#include "bus/bus_facts.h"
 #include "clients/clients.h"
 #include "ledger/knowledge.h"
 #include "process/log.h"

@@ -35,8 +35,7 @@ extern "C" {
 #endif
 
 #if defined(__GNUC__)
-/// Marks what the shared library exports.
-#define IWC_API __attribute__((visibility("default")))
+#define IWC_API __attribute__((visibility("default"))) ///< Marks what the shared library exports.
 #else
 #define IWC_API
 #endif

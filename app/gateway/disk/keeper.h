@@ -9,7 +9,7 @@
 #ifndef GATEWAY_KEEPER_H
 #define GATEWAY_KEEPER_H
 
-#include "child.h"
+#include "process/child.h"
 
 /// The longest text that is kept or read.
 #define GW_KEEPER_TEXT_MAX 16384U

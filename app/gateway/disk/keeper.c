@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "keeper.h"
 
-#include "owners.h"
+#include "process/owners.h"
 
 #include <errno.h>
 #include <fcntl.h>
