@@ -6,7 +6,6 @@
 #ifndef SIM_BUTTON_H
 #define SIM_BUTTON_H
 
-#include "listener.h"
 #include "loop.h"
 
 #define SIM_BUTTON_CLIENTS 8U

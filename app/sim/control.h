@@ -5,7 +5,6 @@
 #ifndef SIM_CONTROL_H
 #define SIM_CONTROL_H
 
-#include "listener.h"
 #include "loop.h"
 #include "words.h"
 

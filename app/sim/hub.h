@@ -11,7 +11,6 @@
 #define SIM_HUB_H
 
 #include "iwheel_sim/world.h"
-#include "listener.h"
 #include "loop.h"
 
 typedef struct {

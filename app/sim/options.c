@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "options.h"
+#include "simulator.h"
 
 #include <getopt.h>
 #include <stdio.h>

@@ -9,7 +9,6 @@
 
 #include "iwheel_linux/backend.h"
 #include "iwheel_sim/world.h"
-#include "listener.h"
 #include "loop.h"
 
 typedef struct {

@@ -147,8 +147,8 @@ static int check(const ros_settings_t *settings) {
     int failures = check_gateway(settings);
     ros_t *ros = ros_open(settings, stdout);
     if (ros != NULL) {
-        (void)printf("ok    DDS domain %u, node /%s%s%s\n", settings->ros.domain, settings->ros.ns,
-                     (settings->ros.ns[0] != '\0') ? "/" : "", settings->ros.node);
+        (void)printf("ok    DDS domain %u, node %s in namespace %s\n", settings->ros.domain, settings->ros.node,
+                     settings->ros.ns);
         ros_close(ros);
     } else {
         (void)puts("fail  DDS: see above");

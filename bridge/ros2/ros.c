@@ -73,7 +73,7 @@ static dds_qos_t *qos_of(const char *user_data, int32_t depth, bool reliable, bo
 /// `rt/odom`, in a namespace `rt/w1/odom`.
 static dds_entity_t topic_of(ros_t *self, const topic_t *topic, const char *prefix, const char *suffix) {
     char name[NAME_SIZE];
-    const char *space = (topic->name[0] == '/') ? "" : self->settings.ros.ns;
+    const char *space = (topic->name[0] == '/') ? "" : ros_settings_space(&self->settings);
     (void)snprintf(name, sizeof name, "%s%s%s/%s%s", prefix, (space[0] != '\0') ? "/" : "", space,
                    topic->name + ((topic->name[0] == '/') ? 1 : 0), suffix);
     return dds_create_topic(self->participant, topic->type, name, NULL, NULL);
@@ -176,7 +176,7 @@ static bool announce(ros_t *self) {
     reading += gids_of(inputs, 2, size, readers + reading * size);
     uint32_t writing = gids_of(self->writers, WRITERS, size, writers);
     writing += gids_of(self->replies, ROS_VERBS, size, writers + writing * size);
-    (void)snprintf(space, sizeof space, "/%s", self->settings.ros.ns);
+    (void)snprintf(space, sizeof space, "/%s", ros_settings_space(&self->settings));
 
     dds_topic_descriptor_t type = old ? rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc
                                       : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;

@@ -7,7 +7,7 @@
 #define ROS2_ROS_H
 
 #include "diagnosis.h"
-#include "settings.h"
+#include "ros_settings.h"
 
 typedef struct ros ros_t;
 

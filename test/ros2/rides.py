@@ -517,7 +517,7 @@ def fast_dds(t):
         raise Skip("libfastrtps-dev or g++ is missing (scripts/install_tools check brings it)")
     ride = Ride(t)
     here = os.path.dirname(os.path.abspath(__file__))
-    program = os.path.join(t.build, "fast_peer")
+    program = os.path.join(os.path.abspath(t.build), "fast_peer")
     source = os.path.join(here, "fast_peer.cpp")
     if not os.path.exists(program) or os.path.getmtime(program) < os.path.getmtime(source):
         command = ["c++", "-std=c++14", "-O0", "-o", program, source, "-lfastrtps", "-lfastcdr"]

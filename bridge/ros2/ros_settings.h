@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-/// The bridge's configuration file, read as the gateway's: every error with file, line and cure; a file that is wrong changes nothing.
-#ifndef ROS2_SETTINGS_H
-#define ROS2_SETTINGS_H
+/// The bridge's configuration file, read as the gateway's (settings/settings.h): every error with file, line and cure.
+#ifndef ROS2_ROS_SETTINGS_H
+#define ROS2_ROS_SETTINGS_H
 
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 
 /// Read when no `-c FILE` is given. Its absence is no error then.
-#define ROS_SETTINGS_PATH  "/etc/iwheel/ros2.conf"
-#define ROS_SETTINGS_ERROR 78
+#define ROS_SETTINGS_PATH "/etc/iwheel/ros2.conf"
 
 typedef struct {
     struct {
@@ -19,7 +18,7 @@ typedef struct {
         uint32_t domain; ///< 0..232.
         bool loopback;   ///< This machine only, without multicast; else as CYCLONEDDS_URI says.
         bool humble;     ///< Ids of 24 bytes in ros_discovery_info, as before Iron.
-        char ns[65];     ///< Namespace without its leading slash; empty: none.
+        char ns[65];     ///< Namespace, or `none`.
         char node[65];
     } ros;
     struct {
@@ -39,14 +38,16 @@ typedef struct {
 
 void ros_settings_default(ros_settings_t *out_settings);
 
-/// Reads the file over the defaults. 0, or ROS_SETTINGS_ERROR with `*out_settings` untouched and lines `FILE:LINE: what is wrong; what to do`
-/// on `err`.
+/// Reads the file over the defaults. 0, or SETTINGS_ERROR with `*out_settings` untouched and what is wrong on `err`.
 int ros_settings_load(const char *path, ros_settings_t *out_settings, FILE *err);
 
-/// The same from an open stream; `name` stands for it in messages.
-int ros_settings_read(FILE *in, const char *name, ros_settings_t *out_settings, FILE *err);
+/// The same for a text in memory; `name` stands for the file in messages.
+int ros_settings_parse(const char *name, const char *text, ros_settings_t *out_settings, FILE *err);
 
 /// Writes what is in force as a commented file, which reads back as the same.
 void ros_settings_print(const ros_settings_t *settings, FILE *out);
+
+/// The namespace before a relative name; empty: there is none.
+const char *ros_settings_space(const ros_settings_t *settings);
 
 #endif
