@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Forces, with where their zero comes from and how good it is.
-#include "snapshot.h"
+#include "observe.h"
 
 #include "ledger/knowledge.h"
 #include "wheels/wheels.h"
