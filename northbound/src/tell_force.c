@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// Forces, with where their zero comes from and how good it is.
+#include "tell_force.h"
+
+/// Where the zero comes from, and how good it is.
+typedef struct {
+    const char *word;
+    int64_t age_ms; ///< -1: unknown.
+    uint32_t samples;
+    uint32_t deviation_mN;
+    int32_t drift_mN;
+    bool measured;     ///< The three before mean something.
+    bool judged;       ///< The next means something.
+    bool contaminated; ///< Taken while the wheel turned, or under load or unrest.
+} zero_t;
+
+static int64_t age_ms(const iwn_surroundings_t *around, const iw_force_t *force, const iwn_zero_note_t *noted) {
+    const int64_t wall_us = around->wall_us;
+    if (force->provenance == IW_OFFSET_NONE) {
+        return -1;
+    }
+    if (force->offset_us != IW_NEVER) {
+        return (int64_t)((around->now_us - force->offset_us) / IW_US_PER_MS);
+    }
+    return (noted->wall_us > 0 && noted->wall_us <= wall_us) ? (wall_us - noted->wall_us) / 1000 : -1;
+}
+
+static zero_t describe_zero(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side) {
+    const iw_force_t *force = seen->wheel[side].force;
+    const iwn_zero_note_t *noted = &around->zero[side];
+    const bool ours = force->provenance != IW_OFFSET_NONE && force->provenance != IW_OFFSET_WHEEL &&
+                      (noted->from == IW_OFFSET_ESTIMATED || noted->from == IW_OFFSET_OPERATOR);
+    const bool window = force->quality.window != IW_WINDOW_OPEN;
+    const bool bad = window && force->quality.window != IW_WINDOW_GOOD;
+    zero_t zero = {.word = iwn_offset_word(force->provenance, force->offset_us),
+                   .age_ms = age_ms(around, force, noted),
+                   .samples = force->quality.samples,
+                   .deviation_mN = force->quality.deviation_mN,
+                   .drift_mN = force->quality.drift_mN,
+                   .measured = window,
+                   .judged = bad,
+                   .contaminated = bad};
+    if (ours) {
+        zero.samples = noted->samples;
+        zero.deviation_mN = noted->deviation_mN;
+        zero.drift_mN = noted->drift_mN;
+        zero.measured = true;
+        zero.judged = true;
+        zero.contaminated = false;
+    } else if (force->provenance == IW_OFFSET_WHEEL) { // We judge what we saw: its first two seconds, or its rest now.
+        const bool doubted = force->evidence == IW_UNIT_UNCLEAR;
+        zero.judged = doubted || force->evidence != IW_UNIT_UNKNOWN || (force->boot_seen && window);
+        zero.contaminated = doubted;
+    }
+    return zero;
+}
+
+static void write_known_bool(iwn_out_t *json, const char *name, bool known, bool value) {
+    if (known) {
+        iwn_out_bool(json, name, value);
+    } else {
+        iwn_out_null(json, name);
+    }
+}
+
+static bool is_heard(const iw_force_t *force, iw_time_us_t now_us) {
+    return force->raw_us != IW_NEVER && now_us - force->raw_us < IW_FORCE_STALE_US;
+}
+
+void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side,
+                          iwn_out_t *json) {
+    const iw_force_t *force = seen->wheel[side].force;
+    const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
+    const bool heard = is_heard(force, around->now_us);
+    const bool offset = force->provenance != IW_OFFSET_NONE;
+    const iwn_zero_note_t *noted = &around->zero[side];
+    const zero_t zero = describe_zero(seen, around, side);
+    iwn_out_known(json, "force_raw", heard, force->raw);
+    iwn_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
+    iwn_out_known(json, "force_offset_mN", offset, force->offset_mN);
+    iwn_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+    iwn_out_text(json, "force_validity", iwn_force_validity_name(validity));
+    iwn_tell_age("force_age_ms", around->now_us, force->raw_us, json);
+    iwn_out_text(json, "offset_provenance", zero.word);
+    iwn_out_text(json, "offset_origin", (noted->from != IW_OFFSET_NONE) ? iwn_provenance_name(noted->from) : NULL);
+    iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
+    write_known_bool(json, "offset_contaminated", zero.judged, zero.contaminated);
+    iwn_out_text(json, "offset_window", iwn_window_name(force->quality.window));
+    iwn_out_known(json, "offset_samples", zero.measured, zero.samples);
+    iwn_out_known(json, "offset_deviation_mN", zero.measured, zero.deviation_mN);
+    iwn_out_known(json, "offset_drift_mN", zero.measured, zero.drift_mN);
+    iwn_out_known(json, "wheel_offset_mN", force->wheel_offset_heard, (int64_t)force->wheel_offset_dN * 100);
+    iwn_out_text(json, "unit_evidence", iwn_unit_evidence_name(force->evidence));
+}
+
+void iwn_tell_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
+    iwn_out_int(json, "t_us", (int64_t)around->now_us);
+    for (unsigned i = 0; i < IW_SIDES; i++) {
+        const iw_side_t side = (iw_side_t)i;
+        const iw_force_t *force = seen->wheel[side].force;
+        const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
+        const bool heard = is_heard(force, around->now_us);
+        const zero_t zero = describe_zero(seen, around, side);
+        iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
+        iwn_out_known(json, "raw", heard, force->raw);
+        iwn_out_known(json, "raw_mN", heard, iw_force_raw_mN(force));
+        iwn_out_known(json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
+        iwn_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
+        iwn_out_text(json, "validity", iwn_force_validity_name(validity));
+        iwn_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
+        iwn_tell_age("age_ms", around->now_us, force->raw_us, json);
+        iwn_out_text(json, "provenance", zero.word);
+        iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
+        write_known_bool(json, "contaminated", zero.judged, zero.contaminated);
+        iwn_out_known(json, "samples", zero.measured, zero.samples);
+        iwn_out_known(json, "deviation_mN", zero.measured, zero.deviation_mN);
+        iwn_out_close(json, '}');
+    }
+}
