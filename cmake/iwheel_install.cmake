@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# What `cmake --install` puts where, in three components: gateway, tools, dev (the core for other programs).
+# What `cmake --install` puts where, in components: gateway, tools, ros2, dev (the core for other programs).
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -27,6 +27,11 @@ function(iwheel_man name section component)
     install(FILES ${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man${section} COMPONENT ${component})
 endfunction()
 
+if(TARGET iwheel-ros2)
+    install(TARGETS iwheel-ros2 RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ros2)
+    install(FILES share/ros2.conf DESTINATION ${CMAKE_INSTALL_SYSCONFDIR}/iwheel COMPONENT ros2)
+    install(FILES share/sysusers.d/iwheel-ros2.conf DESTINATION lib/sysusers.d COMPONENT ros2)
+endif()
 if(TARGET iwheel-gateway)
     install(TARGETS iwheel-gateway RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT gateway)
     set(IWHEEL_SYSTEMD_DIR lib/systemd/system CACHE STRING "Where the service units go")
@@ -34,6 +39,9 @@ if(TARGET iwheel-gateway)
     install(FILES share/systemd/iwheel-gateway.service share/systemd/iwheel-gateway@.service
         share/systemd/iwheel-can-restart@.path share/systemd/iwheel-can-restart@.service
         DESTINATION ${IWHEEL_SYSTEMD_DIR} COMPONENT gateway)
+    if(TARGET iwheel-ros2)
+        install(FILES share/systemd/iwheel-ros2.service DESTINATION ${IWHEEL_SYSTEMD_DIR} COMPONENT ros2)
+    endif()
     install(FILES share/sysusers.d/iwheel.conf DESTINATION lib/sysusers.d COMPONENT gateway)
     install(FILES share/tmpfiles.d/iwheel.conf DESTINATION lib/tmpfiles.d COMPONENT gateway)
     install(FILES share/udev/60-iwheel.rules DESTINATION ${IWHEEL_UDEV_DIR} COMPONENT gateway)
@@ -56,6 +64,9 @@ if(TARGET iwheel-gateway)
         iwheel_man(iwheelctl 1 tools)
         iwheel_man(iwheel-sim 1 tools)
         iwheel_man(libiwheel-client 3 client-dev)
+        if(TARGET iwheel-ros2)
+            iwheel_man(iwheel-ros2 1 ros2)
+        endif()
     else()
         message(STATUS "LEFT OUT: the manual pages, because scdoc is missing. Cure: apt-get install scdoc")
     endif()

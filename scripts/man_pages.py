@@ -10,6 +10,7 @@ usage: man_pages.py --check | --update [--build DIR]
     ; configuration      what `iwheel-gateway --print-config` makes of share/gateway.conf
     ; document FILE      a document of ours, from Markdown
     ; header FILE        the contract in a public header
+    ; file FILE          a file of ours as it is
     ; end
 """
 
@@ -22,8 +23,8 @@ import tempfile
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim"}
-BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document|header)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
+FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "../bridge/ros2"}
+BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document|header|file)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
 UNDERLINE = re.compile(r"([_*\\])")
 
 
@@ -65,10 +66,14 @@ class Sources:
     def configuration(self, _):
         return literal(self.output("iwheel-gateway", "--print-config", "-c", os.path.join(ROOT, "share", "gateway.conf")))
 
+    def file(self, name):
+        with open(os.path.join(ROOT, name), encoding="utf-8") as file:
+            return literal(file.read())
+
     def header(self, name):
         """Without what only a compiler needs."""
         with open(os.path.join(ROOT, name), encoding="utf-8") as file:
-            text = re.sub(r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|})\n", "", file.read(), flags=re.M)
+            text = re.sub(r"^(#(?:if|ifdef|ifndef|else|endif|include)\b.*|#define IW\w+( __attribute.*)?|extern .*|// SPDX.*|/// @file|})\n", "", file.read(), flags=re.M)
         return literal(re.sub(r"\n{3,}", "\n\n", text.replace("IWC_API ", "")))
 
     def document(self, name):
@@ -142,6 +147,9 @@ def main():
         path = os.path.join(ROOT, "man", name)
         with open(path, encoding="utf-8") as file:
             text = file.read()
+        if name == "iwheel-ros2.1.scd" and not os.path.exists(sources.program("iwheel-ros2")):
+            print(f"note: man/{name} is not looked at: iwheel-ros2 was not built, cyclonedds-dev is missing")
+            continue
         new = renew(text, sources)
         if new != text:
             stale.append(name)

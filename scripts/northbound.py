@@ -37,9 +37,9 @@ FIELD_KEYS = {"type", "list", "keys", "null", "optional", "unit", "what", "least
 SOURCES = {
     "error": ("northbound/src/words.c", "iwn_error_name", {"ok"}),
     "topic": ("northbound/src/words.c", "iwn_topic_name", set()),
-    "state": ("northbound/src/words.c", "iwn_state_name", set()),
-    "cause": ("northbound/src/words.c", "iwn_cause_name", {"none"}),
-    "bus_state": ("northbound/src/words.c", "iwn_bus_state_name", set()),
+    "state": ("northbound/src/states.c", "iwn_state_name", set()),
+    "cause": ("northbound/src/states.c", "iwn_cause_name", {"none"}),
+    "bus_state": ("northbound/src/states.c", "iwn_bus_state_name", set()),
     "estop_state": ("northbound/src/words.c", "iwn_estop_name", set()),
     "sides": ("northbound/src/words.c", "iwn_sides_name", set()),
     "provenance": ("northbound/src/words.c", "iwn_provenance_name", set()),

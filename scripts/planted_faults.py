@@ -55,6 +55,13 @@ def stack(folder, code):
     return run(SCRIPTS / "stack_usage.py", folder, 256)
 
 
+def frames(folder, code):
+    (folder / "planted.c").write_text(code)
+    entry = {"directory": str(folder), "file": str(folder / "planted.c"), "command": "gcc -O2 -c planted.c -o planted.o"}
+    (folder / "compile_commands.json").write_text(json.dumps([entry]))
+    return run(SCRIPTS / "stack_usage.py", "--frames", folder, 4096, folder)
+
+
 def coverage(folder, calls):
     """A function with two branches and a main that makes the calls given."""
     sources, objects = folder / "core" / "src", folder / "iwheel_core.dir"
@@ -166,6 +173,28 @@ def house(folder, fault):
     return run(sys.executable, folder / "scripts/house.py", folder)
 
 
+def api(folder, fault):
+    """The reference of small copies of the headers' folders, of which one is `fault`."""
+    for name in ("core", "northbound", "client/c", "port/linux"):
+        (folder / name / "include").mkdir(parents=True)
+    (folder / "docs").mkdir()
+    shutil.copy(ROOT / "docs/Doxyfile", folder / "docs")
+    (folder / "core/include/planted.h").write_text(fault)
+    return run(SCRIPTS / "api_reference", folder)
+
+
+def pages(folder, fault):
+    """A page with one list, and indexes, about a small tree; the fault is (file, old, new), or a file more."""
+    tree = {"app/a.c": "int follow_ms;\n", "app/b.c": "int other;\n", "test/README.md": "| `run` | x |\n", "test/run": "x\n", "scripts/README.md": "| `one.py` | x |\n",
+            "scripts/one.py": "x\n", "docs/README.md": "| `how-to-add.md` | x |\n", "docs/how-to-add.md": "## A key\n\n<!-- pattern: follow_ms  in: app -->\n\n1. `app/a.c`: there.\n"}
+    name, old, new = fault
+    tree[name] = tree.get(name, "").replace(old, new) if name in tree else new
+    for name, text in tree.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return run(SCRIPTS / "pages.py", folder)
+
+
 def dialect(folder, code):
     (folder / "app").mkdir()
     (folder / "app/planted.c").write_text(code)
@@ -232,6 +261,9 @@ CASES = [
     (stack, "arm-none-eabi-gcc", "300 bytes", BIG, True),
     (stack, "arm-none-eabi-gcc", "variable length", VARIABLE, True),
     (stack, "arm-none-eabi-gcc", "recursion", RECURSION, True),
+    (frames, "gcc", "4000 bytes", BIG.replace("300", "4000"), False),
+    (frames, "gcc", "4200 bytes", BIG.replace("300", "4200"), True),
+    (frames, "gcc", "variable length", VARIABLE, True),
     (coverage, "gcov", "clean", SOME_FOUR, False),
     (coverage, "gcov", "a branch never taken", "f(0, 0); f(1, 1);", True),
     (coverage, "gcov", "a function never called", "", True),
@@ -297,6 +329,21 @@ CASES = [
     (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\nint iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}'), True),
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),
     (house, "gcc", "a header includes one level more", ("core/src/magnitude.h", "#include <stdint.h>", '#include "iwheel/gateway.h"'), True),
+    (house, "gcc", "two folders need each other", ("app/gateway/process/log.c", '#include "log.h"', '#include "log.h"\n#include "clients/client.h"'), True),
+    (house, "gcc", "another folder's header by its bare name", ("app/gateway/answers/refuse.c", '#include "status/observe.h"', '#include "observe.h"'), True),
+    (house, "gcc", "two arrows more", ("app/gateway/words/assumption.c", '#include "assumption.h"', '#include "assumption.h"\n#include "lock/runtime.h"\n#include "process/log.h"'), True),
+    (house, "gcc", "modules that take the whole daemon", ("app/gateway/daemon.h", "#endif", "void gw_take(gw_daemon_t *daemon);\n" * 30 + "#endif"), True),
+    (api, "doxygen", "clean", "/// @file\n/// A header.\n\n/// Does nothing.\nvoid iw_f(void);\n", False),
+    (api, "doxygen", "a function without a word", "/// @file\n/// A header.\n\nvoid iw_f(void);\n", True),
+    (api, "doxygen", "a member without a word", "/// @file\n/// A header.\n\n/// A struct.\ntypedef struct {\n    int a;\n} iw_a_t;\n", True),
+    (api, "doxygen", "a header that Doxygen would pass over", "/// A header.\nvoid iw_f(void);\n", True),
+    (pages, "python3", "clean", ("app/b.c", "other", "another"), False),
+    (pages, "python3", "a file more has the example", ("app/b.c", "other", "follow_ms"), True),
+    (pages, "python3", "a listed file has it no more", ("app/a.c", "follow_ms", "other"), True),
+    (pages, "python3", "a listed file is not there", ("docs/how-to-add.md", "1. ", "1. `app/c.c`: gone.\n2. "), True),
+    (pages, "python3", "a list without its pattern", ("docs/how-to-add.md", "pattern", "patern"), True),
+    (pages, "python3", "an entry that the index lacks", ("test/more", "", "x\n"), True),
+    (pages, "python3", "an indexed entry that is not there", ("scripts/README.md", "one.py", "two.py"), True),
     (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
     (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),

@@ -3,13 +3,22 @@
 """Worst stack of every entry point of the core, or of another library of ours, from gcc's call graph; fails on recursion, variable stack or too much.
 
 usage: stack_usage.py BUILD_DIR LIMIT_BYTES [LIBRARY]
+       stack_usage.py --frames BUILD_DIR LIMIT_BYTES FOLDER...
 
 BUILD_DIR was configured with cmake/arm-none-eabi.cmake. Functions of the compiler's run-time library, which the graph does not
 know, are found through the relocations; they and mem* are charged a fixed amount. Calls through the HAL end here: a port adds its own.
+
+--frames: no function of these folders may take more than that by itself. BUILD_DIR is any that tells how it compiles
+(compile_commands.json); each source is compiled once more, to nothing.
 """
+import json
+import os
 import re
+import shlex
 import subprocess
 import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 NODE = re.compile(r'node: { title: "([^"]+)" label: "[^"]*?(?:(\d+) bytes \(([a-z,]+)\))?"')
@@ -79,7 +88,36 @@ def short(name):
     return name.rsplit(":", 1)[-1]
 
 
+def frames_of(entry, work):
+    """[(bytes, "file:function", how it is sized)] of the source of one entry of compile_commands.json."""
+    words = [word for word in shlex.split(entry["command"]) if Path(word).name != "ccache"]
+    out = work / entry["file"].replace("/", "_")
+    words[words.index("-o") + 1] = f"{out}.o"
+    subprocess.run([*words, "-fstack-usage", "-w"], cwd=entry["directory"], check=True)
+    rows = [line.split("\t") for line in out.with_suffix(out.suffix + ".su").read_text().splitlines()]
+    return [(int(size), f"{Path(entry['file']).name}:{where.rsplit(':', 1)[-1]}", how) for where, size, how in rows]
+
+
+def frames(build, limit, folders):
+    entries = {}  # A source that several programs compile counts once.
+    for entry in json.loads((Path(build) / "compile_commands.json").read_text()):
+        if any(Path(folder).resolve() in Path(entry["file"]).parents for folder in folders):
+            entries[entry["file"]] = entry
+    if not entries:
+        sys.exit(f"{build} compiles nothing of {' '.join(folders)}: configure it first")
+    with tempfile.TemporaryDirectory() as work, ThreadPoolExecutor(os.cpu_count()) as pool:
+        found = sorted((row for rows in pool.map(lambda entry: frames_of(entry, Path(work)), entries.values()) for row in rows), reverse=True)
+    findings = [f"{name}: {size} B on the stack, {limit} B allowed; what is that large is kept elsewhere" for size, name, _ in found if size > limit]
+    findings += [f"{name}: its stack is {how}, must have a bound" for _, name, how in found if how == "dynamic"]
+    for finding in findings:
+        print(finding)
+    print(f"largest frame of {len(found)} functions in {len(entries)} sources: {found[0][0]} B, {found[0][1]} (limit {limit} B)")
+    return 1 if findings else 0
+
+
 def main(arguments):
+    if len(arguments) > 4 and arguments[1] == "--frames":
+        return frames(arguments[2], int(arguments[3]), arguments[4:])
     if len(arguments) not in (3, 4):
         sys.exit(__doc__)
     limit = int(arguments[2])

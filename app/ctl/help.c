@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "help.h"
 
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 #include "settings/similar.h"
+#include "talk/words.h"
 #include "text/duration.h"
 
+#include "iwheel_northbound/text.h"
 #include "iwheel_northbound/words.h"
 
 #include <string.h>
@@ -168,15 +170,15 @@ const verb_t *help_find(const char *name) {
 }
 
 int help_unknown(const char *name) {
-    char known[256] = "";
+    char known[256];
+    iwn_text_t list = iwn_text_begin(known, sizeof known);
     const char *best = NULL;
     size_t best_distance = GW_WORD_STRANGE;
     for (size_t i = 0; i < VERBS; i++) {
         const size_t far = gw_word_distance(name, verbs[i].name);
         best = (far < best_distance) ? verbs[i].name : best;
         best_distance = (far < best_distance) ? far : best_distance;
-        const size_t used = strlen(known);
-        (void)snprintf(&known[used], sizeof known - used, "%s%s", (i > 0) ? " " : "", verbs[i].name);
+        IWN_TEXT_JOIN(&list, (i > 0) ? " " : "", verbs[i].name);
     }
     if (name[0] == '\0') {
         return ctl_fail(CTL_USAGE, "no verb given; known are: %s", known);
@@ -238,10 +240,10 @@ void help_print(FILE *out) {
 }
 
 static void print_choices(const verb_t *verb, FILE *out) {
-    char line[512] = "ITEM  ";
+    char line[512];
+    iwn_text_t text = iwn_text_begin(line, sizeof line);
     for (unsigned i = 0; verb->choice(i) != NULL; i++) {
-        const size_t used = strlen(line);
-        (void)snprintf(&line[used], sizeof line - used, "%s%s", (i > 0) ? ", " : "", verb->choice(i));
+        IWN_TEXT_JOIN(&text, (i > 0) ? ", " : "ITEM  ", verb->choice(i));
     }
     print_wrapped(line, 6U, out);
 }
@@ -284,7 +286,7 @@ int verb_help(ctl_t *self, int count, char **words) {
     const bool list = count > 0 && strcmp(words[count - 1], "--list") == 0;
     (void)self;
     count -= list ? 1 : 0;
-    if (!ctl_words_at_most("help", count, 1, words)) {
+    if (!words_at_most("help", count, 1, words)) {
         return CTL_USAGE;
     }
     const verb_t *verb = (count > 0) ? help_find(words[0]) : NULL;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "help.h"
 
-#include <errno.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -88,15 +87,6 @@ static int dispatch(const arguments_t *arguments) {
     return verb->run(arguments->ctl, arguments->count, arguments->words);
 }
 
-/// Results that could not be written are no success, unless their reader went away on purpose.
-static int check_output(int code) {
-    errno = 0;
-    if ((fflush(stdout) != 0 || ferror(stdout) != 0) && errno != EPIPE && errno != 0) {
-        return ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno));
-    }
-    return code;
-}
-
 int main(int count, char **arguments) {
     static ctl_t ctl;
     arguments_t self = {.ctl = &ctl};
@@ -110,5 +100,5 @@ int main(int count, char **arguments) {
     }
     client_free(&ctl.client);
     free((void *)self.words);
-    return check_output(code);
+    return ctl_finish(code);
 }

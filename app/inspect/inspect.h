@@ -1,10 +1,105 @@
 // SPDX-License-Identifier: MIT
-/// The judges: what was read of the link, heard on the bus and asked of the e-stop, put into findings.
+/// The judges: what was read of the link, heard on the bus and asked of the e-stop, put into findings. Nothing is ever sent.
+///
+/// A finding is one sentence: ok, worth a warning, wrong, or not to be looked at here; and the command that mends it. The owner
+/// fills a list by calling the judges and its own code, and prints it as it likes. No heap.
+///
+/// Heard is everything on a bus while listening for a while: how many frames of each message, how much of the bus they took, and
+/// what does not belong there.
 #ifndef INSPECT_H
 #define INSPECT_H
 
-#include "findings.h"
-#include "heard.h"
+#include "iwheel/codec.h"
+#include "iwheel_linux/linux_hal.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+// --- findings ----------------------------------------------------------------------------------------------------
+
+/// More than all judges together ever say; what comes after that is counted only.
+#define INSPECT_FINDINGS_MAX 40U
+#define INSPECT_TEXT_SIZE    320U
+#define INSPECT_CURE_SIZE    320U
+
+/// INSPECT_SKIP: this machine has not what there would be to look at.
+typedef enum { INSPECT_OK = 0, INSPECT_WARN, INSPECT_FAIL, INSPECT_SKIP } inspect_verdict_t;
+#define INSPECT_VERDICTS 4U
+
+typedef struct {
+    const char *check; ///< What was looked at: a word of a closed list (docs/doctor.md).
+    inspect_verdict_t verdict;
+    char text[INSPECT_TEXT_SIZE]; ///< What is.
+    char cure[INSPECT_CURE_SIZE]; ///< What mends it; empty if there is nothing to mend.
+} inspect_finding_t;
+
+typedef struct {
+    inspect_finding_t finding[INSPECT_FINDINGS_MAX];
+    unsigned count;
+    unsigned lost;                    ///< That did not fit.
+    unsigned total[INSPECT_VERDICTS]; ///< Of each verdict, those that did not fit too.
+    inspect_verdict_t absent;         ///< What a machine without CAN or GPIO gets: INSPECT_FAIL unless set otherwise.
+} inspect_findings_t;
+
+void inspect_begin(inspect_findings_t *self);
+
+/// Adds a finding without a cure. `check` must be a literal.
+__attribute__((format(printf, 4, 5))) void inspect_say(inspect_findings_t *self, const char *check,
+                                                       inspect_verdict_t verdict, const char *format, ...);
+
+/// The cure of the finding added last.
+__attribute__((format(printf, 2, 3))) void inspect_cure(inspect_findings_t *self, const char *format, ...);
+
+/// "ok", "warn", "fail" or "skip".
+const char *inspect_verdict_word(inspect_verdict_t verdict);
+
+/// "text; cure" in one line.
+void inspect_sentence(const inspect_finding_t *finding, char *out_text, size_t size);
+
+// --- what was heard ----------------------------------------------------------------------------------------------
+
+/// Other ids that are kept by number.
+#define INSPECT_STRANGERS 8U
+
+/// Frames in 1000 s, as documented; 0 of a setpoint.
+uint32_t inspect_nominal_mHz(const iw_codec_row_t *row);
+
+/// A wheel with power sends it always, not only in its first minute.
+bool inspect_always(const iw_codec_row_t *row);
+
+typedef struct {
+    uint32_t count[IW_CODEC_ROWS];          ///< Good frames, in the order of `iw_codec_rows`; our own echoes are none.
+    uint32_t bad_length;                    ///< Known id, shorter than the table.
+    uint32_t bad_format;                    ///< Known id on a remote, extended or FD frame.
+    uint32_t strange;                       ///< Frames of any other id.
+    uint32_t strange_id[INSPECT_STRANGERS]; ///< Their id words, as in iw_can_frame_t.
+    uint32_t strange_ids;                   ///< How many of these.
+    uint64_t bits;                          ///< Of all frames, without stuff bits.
+    iw_time_us_t span_us;                   ///< How long was listened.
+    bool was_up;                            ///< The bus took part in life at least for a moment.
+    iw_bus_state_t worst;                   ///< The worst state of the bus seen ...
+    iw_bus_state_t last;                    ///< ... and the one at the end.
+    int estop;                              ///< The last answer of the e-stop, as in iw_hal_t.
+} inspect_heard_t;
+
+void inspect_heard_begin(inspect_heard_t *self);
+
+/// Takes one frame.
+void inspect_heard_take(inspect_heard_t *self, const iw_can_frame_t *frame);
+
+/// Listens for so long; blocks. The HAL must be open.
+void inspect_listen(iw_linux_hal_t *hal, iw_time_us_t for_us, inspect_heard_t *out_heard);
+
+/// Frames per 1000 s of the message with that index.
+uint32_t inspect_rate_mHz(const inspect_heard_t *self, unsigned message);
+
+/// Index of the message with this id; IW_CODEC_ROWS if there is none.
+unsigned inspect_message_of(uint32_t id);
+
+/// Share of the bus that all frames took.
+uint32_t inspect_load_permille(const inspect_heard_t *self, uint32_t bitrate_hz);
+
+// --- the judges --------------------------------------------------------------------------------------------------
 
 /// What the bus is meant to be.
 typedef struct {

@@ -297,7 +297,7 @@ static bool read_file(settings_report_t *report, const char *program, int file, 
 }
 
 int settings_load(const settings_form_t *form, const char *path, void *values, FILE *err) {
-    char text[SETTINGS_FILE_MAX];
+    static char text[SETTINGS_FILE_MAX]; // Too large for a stack.
     size_t size = 0;
     settings_report_t report = {.name = path, .err = err};
     const int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);

@@ -3,7 +3,7 @@
 ///
 /// Link `iwheel_settings` and include "settings/settings.h". A program says its keys once (`settings_form_t`); reading, range checks,
 /// messages and printing need no code per key. Every error is told as `FILE:LINE: what is wrong; what to do`, the first 20 of
-/// them. Used at start only: it reads a file and writes to a stream, so it may block. No heap, no file-scope state.
+/// them. Used at start only: it reads a file and writes to a stream, so it may block.
 #ifndef IWHEEL_SETTINGS_H
 #define IWHEEL_SETTINGS_H
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "bus_log.h"
 
+#include "candump.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -60,36 +62,16 @@ static void append(sim_bus_log_t *self, iw_time_us_t at_us, const char *line, si
     }
 }
 
-static size_t data_text(char *out, const iw_can_frame_t *frame) {
-    static const char digit[] = "0123456789ABCDEF";
-    if ((frame->id & IW_CAN_REMOTE) != 0U) {
-        out[0] = 'R';
-        return 1U;
-    }
-    for (size_t i = 0U; i < frame->dlc; i++) {
-        out[2U * i] = digit[frame->data[i] >> 4];
-        out[2U * i + 1U] = digit[frame->data[i] & 0x0FU];
-    }
-    return (size_t)frame->dlc * 2U;
-}
-
 void sim_bus_log_frame(sim_bus_log_t *self, iw_time_us_t at_us, const iw_can_frame_t *frame, bool from_client) {
+    char line[CANDUMP_LINE_SIZE];
     if (self->fd < 0) {
         return;
     }
-    char line[LINE_MAX_BYTES];
-    bool const eight_digits = (frame->id & (IW_CAN_EXTENDED | IW_CAN_ERROR)) != 0U;
-    uint32_t const id = frame->id & (eight_digits ? 0x3FFFFFFFU : IW_CAN_ID_MASK);
-    int const head = snprintf(line, sizeof line, "(%" PRIu64 ".%06" PRIu64 ") sim %0*" PRIX32 "#", at_us / US_PER_S,
-                              at_us % US_PER_S, eight_digits ? 8 : 3, id);
-    size_t length = (size_t)head;
-    length += data_text(&line[length], frame);
-    if (self->tell_direction) {
-        line[length++] = ' ';
-        line[length++] = from_client ? 'T' : 'R';
-    }
-    line[length++] = '\n';
-    append(self, at_us, line, length);
+    candump_t written = candump_from_core(frame, (int64_t)at_us, "sim");
+    const candump_mark_t sender = from_client ? CANDUMP_SENT : CANDUMP_RECEIVED;
+    written.mark = self->tell_direction ? sender : CANDUMP_UNMARKED;
+    written.length = written.remote ? 0U : written.length;
+    append(self, at_us, line, candump_write(&written, line));
 }
 
 void sim_bus_log_mark(sim_bus_log_t *self, iw_time_us_t at_us, const char *text) {

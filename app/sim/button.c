@@ -3,19 +3,12 @@
 
 #include <errno.h>
 #include <sys/socket.h>
-#include <unistd.h>
-
-static void drop(const sim_button_t *self, sim_watch_t *client) {
-    sim_loop_remove(self->loop, client);
-    (void)close(client->fd);
-    client->fd = -1;
-}
 
 /// A client that does not read its one byte per press cannot be told any more: it is dropped, which means pressed.
 static void tell(const sim_button_t *self, sim_watch_t *client) {
     char const state = self->pressed ? '1' : '0';
     if (send(client->fd, &state, 1U, MSG_DONTWAIT | MSG_NOSIGNAL) != 1) {
-        drop(self, client);
+        sim_loop_drop(self->loop, client);
     }
 }
 
@@ -28,14 +21,16 @@ static void tell_all(sim_button_t *self) {
 }
 
 static void client_ready(sim_watch_t *watch) {
+    const sim_button_t *const self = watch->owner;
     char ignored[64];
     ssize_t const length = (watch->fd >= 0) ? recv(watch->fd, ignored, sizeof ignored, MSG_DONTWAIT) : -1;
     if (length == 0 || (length < 0 && watch->fd >= 0 && errno != EAGAIN && errno != EINTR)) {
-        drop(watch->owner, watch);
+        sim_loop_drop(self->loop, watch);
     }
 }
 
-static bool admit(sim_button_t *self, int fd) {
+static bool admit(void *owner, int fd) {
+    sim_button_t *const self = owner;
     for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS && !self->unplugged; i++) {
         sim_watch_t *const client = &self->client[i];
         if (client->fd < 0) {
@@ -51,25 +46,13 @@ static bool admit(sim_button_t *self, int fd) {
     return false;
 }
 
-static void somebody_connects(sim_watch_t *watch) {
-    sim_button_t *const self = watch->owner;
-    int const fd = sim_listener_accept(&self->listener);
-    if (fd >= 0 && !admit(self, fd)) {
-        (void)close(fd);
-    }
-}
-
 bool sim_button_open(sim_button_t *self, const char *path, sim_reason_t *out_reason) {
     self->release_us = IW_NEVER;
-    self->watch = (sim_watch_t){somebody_connects, self, -1};
     for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; i++) {
         self->client[i] = (sim_watch_t){client_ready, self, -1};
     }
-    if (!sim_listener_open(&self->listener, path, SOCK_STREAM, out_reason)) {
-        return false;
-    }
-    self->watch.fd = self->listener.fd;
-    return sim_loop_add(self->loop, &self->watch);
+    self->listener = (sim_listener_t){.loop = self->loop, .admit = admit, .owner = self};
+    return sim_listener_open(&self->listener, path, SOCK_STREAM, out_reason);
 }
 
 void sim_button_press(sim_button_t *self, bool pressed) {
@@ -89,7 +72,7 @@ void sim_button_unplug(sim_button_t *self, bool unplugged) {
     self->unplugged = unplugged;
     for (unsigned i = 0U; i < SIM_BUTTON_CLIENTS; i++) {
         if (unplugged && self->client[i].fd >= 0) {
-            drop(self, &self->client[i]);
+            sim_loop_drop(self->loop, &self->client[i]);
         }
     }
 }

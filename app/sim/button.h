@@ -6,13 +6,11 @@
 #ifndef SIM_BUTTON_H
 #define SIM_BUTTON_H
 
-#include "listener.h"
 #include "loop.h"
 
 #define SIM_BUTTON_CLIENTS 8U
 
 typedef struct sim_button {
-    sim_watch_t watch;
     sim_listener_t listener;
     sim_watch_t client[SIM_BUTTON_CLIENTS]; ///< fd -1: free.
     const sim_loop_t *loop;

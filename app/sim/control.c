@@ -4,12 +4,9 @@
 #include <errno.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 static void drop(sim_control_client_t *client) {
-    sim_loop_remove(client->control->loop, &client->watch);
-    (void)close(client->watch.fd);
-    client->watch.fd = -1;
+    sim_loop_drop(client->control->loop, &client->watch);
 }
 
 static void answer(sim_control_client_t *client, const char *text) {
@@ -61,7 +58,8 @@ static void client_ready(sim_watch_t *watch) {
     }
 }
 
-static bool admit(sim_control_t *self, int fd) {
+static bool admit(void *owner, int fd) {
+    sim_control_t *const self = owner;
     for (unsigned i = 0U; i < SIM_CONTROL_CLIENTS; i++) {
         sim_control_client_t *const client = &self->client[i];
         if (client->watch.fd < 0) {
@@ -77,25 +75,13 @@ static bool admit(sim_control_t *self, int fd) {
     return false;
 }
 
-static void somebody_connects(sim_watch_t *watch) {
-    sim_control_t *const self = watch->owner;
-    int const fd = sim_listener_accept(&self->listener);
-    if (fd >= 0 && !admit(self, fd)) {
-        (void)close(fd);
-    }
-}
-
 bool sim_control_open(sim_control_t *self, const char *path, sim_reason_t *out_reason) {
-    self->watch = (sim_watch_t){somebody_connects, self, -1};
     for (unsigned i = 0U; i < SIM_CONTROL_CLIENTS; i++) {
         self->client[i].control = self;
         self->client[i].watch = (sim_watch_t){client_ready, &self->client[i], -1};
     }
-    if (!sim_listener_open(&self->listener, path, SOCK_STREAM, out_reason)) {
-        return false;
-    }
-    self->watch.fd = self->listener.fd;
-    return sim_loop_add(self->loop, &self->watch);
+    self->listener = (sim_listener_t){.loop = self->loop, .admit = admit, .owner = self};
+    return sim_listener_open(&self->listener, path, SOCK_STREAM, out_reason);
 }
 
 void sim_control_close(sim_control_t *self) {

@@ -5,7 +5,6 @@
 #ifndef SIM_CONTROL_H
 #define SIM_CONTROL_H
 
-#include "listener.h"
 #include "loop.h"
 #include "words.h"
 
@@ -19,7 +18,6 @@ typedef struct {
 } sim_control_client_t;
 
 typedef struct sim_control {
-    sim_watch_t watch;
     sim_listener_t listener;
     sim_control_client_t client[SIM_CONTROL_CLIENTS];
     const sim_loop_t *loop;

@@ -35,9 +35,7 @@ iw_can_frame_t sim_hub_error_frame(sim_error_t error) {
 
 static void drop(sim_client_t *client) {
     sim_hub_t *const hub = client->hub;
-    sim_loop_remove(hub->loop, &client->watch);
-    (void)close(client->watch.fd);
-    client->watch.fd = -1;
+    sim_loop_drop(hub->loop, &client->watch);
     hub->clients -= 1U;
     sim_world_disconnect(hub->world, *hub->now_us, client->port);
 }
@@ -109,8 +107,9 @@ static void client_ready(sim_watch_t *watch) {
 }
 
 /// Gives the connection a free place; false if there is none.
-static bool admit(sim_hub_t *self, int fd) {
-    uint8_t const port = sim_world_connect(self->world);
+static bool admit(void *owner, int fd) {
+    sim_hub_t *const self = owner;
+    uint8_t const port = self->down ? SIM_BUS_NONE : sim_world_connect(self->world);
     if (port == SIM_BUS_NONE) {
         return false;
     }
@@ -129,24 +128,12 @@ static bool admit(sim_hub_t *self, int fd) {
     return true;
 }
 
-static void somebody_connects(sim_watch_t *watch) {
-    sim_hub_t *const self = watch->owner;
-    int const fd = sim_listener_accept(&self->listener);
-    if (fd >= 0 && (self->down || !admit(self, fd))) {
-        (void)close(fd);
-    }
-}
-
 bool sim_hub_open(sim_hub_t *self, const char *path, sim_reason_t *out_reason) {
-    self->watch = (sim_watch_t){somebody_connects, self, -1};
     for (unsigned i = 0U; i < SIM_WORLD_CLIENTS; i++) {
         self->client[i].watch.fd = -1;
     }
-    if (!sim_listener_open(&self->listener, path, SOCK_SEQPACKET, out_reason)) {
-        return false;
-    }
-    self->watch.fd = self->listener.fd;
-    return sim_loop_add(self->loop, &self->watch);
+    self->listener = (sim_listener_t){.loop = self->loop, .admit = admit, .owner = self};
+    return sim_listener_open(&self->listener, path, SOCK_SEQPACKET, out_reason);
 }
 
 static void drop_all(sim_hub_t *self) {

@@ -11,7 +11,6 @@
 #define SIM_HUB_H
 
 #include "iwheel_sim/world.h"
-#include "listener.h"
 #include "loop.h"
 
 typedef struct {
@@ -22,7 +21,6 @@ typedef struct {
 } sim_client_t;
 
 typedef struct sim_hub {
-    sim_watch_t watch;
     sim_listener_t listener;
     sim_client_t client[SIM_WORLD_CLIENTS];
     const sim_loop_t *loop;

@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "loop.h"
 
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
 #include <sys/epoll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/timerfd.h>
 #include <time.h>
 #include <unistd.h>
 
 #define EVENTS_MAX 32
 #define US_PER_S   1000000U
+#define BACKLOG    16
 
 iw_time_us_t sim_loop_clock_us(void) {
     struct timespec now;
@@ -34,6 +40,12 @@ void sim_loop_remove(const sim_loop_t *self, const sim_watch_t *watch) {
     (void)epoll_ctl(self->epoll_fd, EPOLL_CTL_DEL, watch->fd, NULL);
 }
 
+void sim_loop_drop(const sim_loop_t *self, sim_watch_t *watch) {
+    sim_loop_remove(self, watch);
+    (void)close(watch->fd);
+    watch->fd = -1;
+}
+
 static void set_timer(const sim_loop_t *self, iw_time_us_t wake_us) {
     struct itimerspec at = {0};
     if (wake_us != IW_NEVER) {
@@ -53,5 +65,102 @@ void sim_loop_wait(const sim_loop_t *self, iw_time_us_t wake_us, void (*before)(
         if (watch != NULL) {
             watch->ready(watch);
         }
+    }
+}
+
+static bool fill_address(struct sockaddr_un *address, const char *path) {
+    size_t const length = strlen(path);
+    *address = (struct sockaddr_un){.sun_family = AF_UNIX};
+    if (length == 0U || length >= sizeof address->sun_path) {
+        errno = ENAMETOOLONG;
+        return false;
+    }
+    memcpy(address->sun_path, path, length);
+    return true;
+}
+
+int sim_listener_connect(const char *path, int type) {
+    struct sockaddr_un address;
+    if (!fill_address(&address, path)) {
+        return -1;
+    }
+    int const fd = socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
+    if (fd >= 0 && connect(fd, (struct sockaddr *)&address, sizeof address) != 0) {
+        int const saved = errno;
+        (void)close(fd);
+        errno = saved;
+        return -1;
+    }
+    return fd;
+}
+
+static bool refuse(sim_reason_t *out_reason, const char *path, const char *why) {
+    (void)snprintf(out_reason->text, sizeof out_reason->text, "%.120s: %s", path, why);
+    return false;
+}
+
+/// Makes room at `path`: nothing there, or a dead socket that is removed.
+static bool make_room(const char *path, int type, sim_reason_t *out_reason) {
+    struct stat there;
+    if (lstat(path, &there) != 0) {
+        return errno == ENOENT || refuse(out_reason, path, strerror(errno));
+    }
+    if (!S_ISSOCK(there.st_mode)) {
+        return refuse(out_reason, path, "exists and is no socket; remove it or choose another path");
+    }
+    int const fd = sim_listener_connect(path, type);
+    if (fd >= 0 || errno != ECONNREFUSED) {
+        if (fd >= 0) {
+            (void)close(fd);
+        }
+        return refuse(out_reason, path, "somebody listens there; end the other iwheel-sim or choose another path");
+    }
+    return unlink(path) == 0 || refuse(out_reason, path, strerror(errno));
+}
+
+static void somebody_connects(sim_watch_t *watch) {
+    sim_listener_t *const self = watch->owner;
+    const int fd = (watch->fd >= 0) ? accept4(watch->fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC) : -1;
+    if (fd >= 0 && !self->admit(self->owner, fd)) {
+        (void)close(fd);
+    }
+}
+
+bool sim_listener_open(sim_listener_t *self, const char *path, int type, sim_reason_t *out_reason) {
+    struct sockaddr_un address;
+    struct stat made;
+    self->watch = (sim_watch_t){somebody_connects, self, -1};
+    if (!fill_address(&address, path)) {
+        return refuse(out_reason, path, "the path of a unix socket has 1 to 107 characters; choose a shorter one");
+    }
+    if (!make_room(path, type, out_reason)) {
+        return false;
+    }
+    int const fd = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    bool const bound = fd >= 0 && bind(fd, (struct sockaddr *)&address, sizeof address) == 0;
+    self->watch.fd = fd;
+    if (!bound || chmod(path, 0660) != 0 || lstat(path, &made) != 0 || listen(fd, BACKLOG) != 0 ||
+        !sim_loop_add(self->loop, &self->watch)) {
+        (void)refuse(out_reason, path, strerror(errno));
+        if (fd >= 0) {
+            (void)close(fd);
+        }
+        self->watch.fd = -1;
+        return false;
+    }
+    self->device = made.st_dev;
+    self->inode = made.st_ino;
+    memcpy(self->path, address.sun_path, sizeof self->path);
+    return true;
+}
+
+void sim_listener_close(sim_listener_t *self) {
+    struct stat there;
+    if (self->watch.fd < 0) {
+        return;
+    }
+    sim_loop_drop(self->loop, &self->watch);
+    if (lstat(self->path, &there) == 0 && there.st_dev == self->device && there.st_ino == self->inode) {
+        (void)unlink(self->path);
     }
 }

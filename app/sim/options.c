@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "options.h"
+#include "simulator.h"
 
 #include <getopt.h>
 #include <stdio.h>
@@ -33,28 +33,17 @@ static const char usage[] = "usage: iwheel-sim [OPTION]...           be two simu
                             "Exit codes: 0 ok, 1 the running simulator refused the command, 64 usage,\n"
                             "65 faulty script, 69 unavailable.\n";
 
-enum {
-    OPTION_CAN = 256,
-    OPTION_ESTOP,
-    OPTION_CONTROL,
-    OPTION_SCRIPT,
-    OPTION_LOG,
-    OPTION_DIRECTION,
-    OPTION_NO_KEYS,
-    OPTION_SEED,
-    OPTION_UPTIME
-};
-
+/// Only q, V and h are letters of the command line as well.
 static const struct option long_options[] = {
-    {"can", required_argument, NULL, OPTION_CAN},
-    {"estop", required_argument, NULL, OPTION_ESTOP},
-    {"control", required_argument, NULL, OPTION_CONTROL},
-    {"script", required_argument, NULL, OPTION_SCRIPT},
-    {"log", required_argument, NULL, OPTION_LOG},
-    {"log-direction", no_argument, NULL, OPTION_DIRECTION},
-    {"no-keys", no_argument, NULL, OPTION_NO_KEYS},
-    {"seed", required_argument, NULL, OPTION_SEED},
-    {"uptime", required_argument, NULL, OPTION_UPTIME},
+    {"can", required_argument, NULL, 'c'},
+    {"estop", required_argument, NULL, 'e'},
+    {"control", required_argument, NULL, 'k'},
+    {"script", required_argument, NULL, 's'},
+    {"log", required_argument, NULL, 'l'},
+    {"log-direction", no_argument, NULL, 'd'},
+    {"no-keys", no_argument, NULL, 'n'},
+    {"seed", required_argument, NULL, 'r'},
+    {"uptime", required_argument, NULL, 'u'},
     {"quiet", no_argument, NULL, 'q'},
     {"version", no_argument, NULL, 'V'},
     {"help", no_argument, NULL, 'h'},
@@ -99,7 +88,7 @@ static int set_can(sim_options_t *options, const char *value) {
 
 static int set_number(sim_options_t *options, int option, const char *value) {
     int64_t number = 0;
-    if (option == OPTION_SEED) {
+    if (option == 'r') {
         if (!sim_words_integer(value, (sim_range_t){0, INT64_MAX}, &number)) {
             return complain("--seed must be a whole number of at most 12 digits, not ", value);
         }
@@ -115,22 +104,22 @@ static int set_number(sim_options_t *options, int option, const char *value) {
 
 static int set_option(sim_options_t *options, int option, const char *value) {
     switch (option) {
-    case OPTION_CAN:
+    case 'c':
         return set_can(options, value);
-    case OPTION_ESTOP:
+    case 'e':
         return set_path(options->estop_path, value);
-    case OPTION_CONTROL:
+    case 'k':
         return set_path(options->control_path, value);
-    case OPTION_SCRIPT:
+    case 's':
         options->script_path = value;
         return -1;
-    case OPTION_LOG:
+    case 'l':
         options->log_path = value;
         return -1;
-    case OPTION_DIRECTION:
+    case 'd':
         options->log_direction = true;
         return -1;
-    case OPTION_NO_KEYS:
+    case 'n':
         options->no_keys = true;
         return -1;
     case 'q':

@@ -4,30 +4,32 @@
 #include <stdio.h>
 #include <string.h>
 
+#define SIM_BOTH ((1U << IW_LEFT) | (1U << IW_RIGHT))
+
 const char SIM_USAGE[] = "usage";
 
-static size_t describe(char *out, size_t size, const sim_command_t *table, unsigned count) {
-    size_t used = 0U;
-    for (unsigned i = 0U; i < count && used < size; i++) {
-        char call[64];
-        (void)snprintf(call, sizeof call, "%s %s", table[i].name, table[i].arguments);
-        int const length = snprintf(&out[used], size - used, "%-42s %s\n", call, table[i].help);
-        used += (size_t)length;
-    }
-    return used;
-}
+static const sim_command_t *const tables[] = {sim_wheel_commands, sim_bus_commands};
+#define TABLES (sizeof tables / sizeof tables[0])
 
 static sim_outcome_t help(sim_panel_t *self) {
-    size_t used = describe(self->answer, sizeof self->answer, sim_wheel_commands, sim_wheel_command_count);
-    used += describe(&self->answer[used], sizeof self->answer - used, sim_bus_commands, sim_bus_command_count);
+    size_t used = 0U;
+    for (size_t i = 0U; i < TABLES; i++) {
+        for (const sim_command_t *each = tables[i]; each->name != NULL; each++) {
+            char call[64];
+            (void)snprintf(call, sizeof call, "%s %s", each->name, each->arguments);
+            used += (size_t)snprintf(&self->answer[used], sizeof self->answer - used, "%-42s %s\n", call, each->help);
+        }
+    }
     (void)snprintf(&self->answer[used], sizeof self->answer - used, "%-42s %s\n.\n", "help", "this list");
     return SIM_ASKED;
 }
 
-static const sim_command_t *find_in(const sim_command_t *table, unsigned count, const char *name) {
-    for (unsigned i = 0U; i < count; i++) {
-        if (strcmp(table[i].name, name) == 0) {
-            return &table[i];
+static const sim_command_t *find(const char *name) {
+    for (size_t i = 0U; i < TABLES; i++) {
+        for (const sim_command_t *each = tables[i]; each->name != NULL; each++) {
+            if (strcmp(each->name, name) == 0) {
+                return each;
+            }
         }
     }
     return NULL;
@@ -38,18 +40,76 @@ static sim_outcome_t refuse(sim_panel_t *self, const char *what, const char *det
     return SIM_REFUSED;
 }
 
-static sim_outcome_t run(sim_panel_t *self, const sim_command_t *command, const sim_call_t *call) {
+static bool read_argument(const sim_argument_t *argument, const char *word, int64_t *out_value) {
+    unsigned sides = 0U;
+    bool first = false;
+    bool good = true;
+    if (argument->also != NULL && strcmp(word, argument->also) == 0) {
+        *out_value = argument->value;
+        return true;
+    }
+    switch (argument->kind) {
+    case SIM_SIDES:
+        good = sim_words_sides(word, &sides);
+        *out_value = sides;
+        return good;
+    case SIM_CHOICE:
+        good = sim_words_choice(word, (sim_choice_t){argument->word, argument->other}, &first);
+        *out_value = first ? 1 : 0;
+        return good;
+    case SIM_WHOLE:
+        return sim_words_integer(word, argument->range, out_value);
+    case SIM_MILLI:
+        return sim_words_milli(word, argument->range, out_value);
+    default:
+        return true;
+    }
+}
+
+/// False if the words are not those that the command takes.
+static bool read_arguments(const sim_command_t *command, sim_call_t *call) {
+    const unsigned given = call->words->count - 1U;
+    unsigned values = 0U;
+    unsigned i = 0U;
+    for (; i < SIM_ARGUMENTS && command->argument[i].kind != SIM_NOTHING; i++) {
+        const sim_argument_t *const argument = &command->argument[i];
+        int64_t value = argument->value;
+        const bool good = (i < given) ? read_argument(argument, call->words->word[i + 1U], &value) : argument->optional;
+        if (!good) {
+            return false;
+        }
+        if (argument->kind == SIM_REST) {
+            return true;
+        }
+        if (argument->kind == SIM_SIDES) {
+            call->sides = (unsigned)value;
+        } else {
+            call->value[values++] = value;
+        }
+    }
+    return given <= i;
+}
+
+static sim_outcome_t run(sim_panel_t *self, const sim_command_t *command, sim_call_t *call) {
     const char *reason = SIM_USAGE;
-    if (call->words->count >= command->words_min && call->words->count <= command->words_max) {
+    if (read_arguments(command, call)) {
         (void)snprintf(self->answer, sizeof self->answer, "ok\n");
-        reason = command->run(call);
+        reason = (command->run != NULL) ? command->run(call) : NULL;
     }
     if (reason == SIM_USAGE) {
         char usage[128];
         (void)snprintf(usage, sizeof usage, "%s %s", command->name, command->arguments);
         return refuse(self, "that is not right; usage: ", usage);
     }
-    return (reason == NULL) ? command->outcome : refuse(self, reason, "");
+    if (reason != NULL) {
+        return refuse(self, reason, "");
+    }
+    for (unsigned side = 0U; side < IW_SIDES && command->each != NULL; side++) {
+        if (((call->sides >> side) & 1U) != 0U) {
+            command->each(call, &call->world->pair.wheel[side]);
+        }
+    }
+    return command->asks ? SIM_ASKED : SIM_CHANGED;
 }
 
 sim_outcome_t sim_panel_execute(sim_panel_t *self, iw_time_us_t now_us, const char *line) {
@@ -64,13 +124,10 @@ sim_outcome_t sim_panel_execute(sim_panel_t *self, iw_time_us_t now_us, const ch
     if (strcmp(words.word[0], "help") == 0) {
         return help(self);
     }
-    const sim_command_t *command = find_in(sim_wheel_commands, sim_wheel_command_count, words.word[0]);
-    if (command == NULL) {
-        command = find_in(sim_bus_commands, sim_bus_command_count, words.word[0]);
-    }
+    const sim_command_t *const command = find(words.word[0]);
     if (command == NULL) {
         return refuse(self, "unknown command; help lists the commands; this is none: ", words.word[0]);
     }
-    sim_call_t const call = {self, self->world, now_us, &words};
+    sim_call_t call = {self, self->world, now_us, &words, SIM_BOTH, {0}};
     return run(self, command, &call);
 }

@@ -7,14 +7,12 @@
 
 #define PULSE_MAX_milli_ms 60000000
 #define STATUS_BYTES       4096U
+/// Not given.
+#define UNTOLD INT64_MIN
+/// Beside on and off.
+#define BUT_ONCE 2
 
 typedef const char *result_t;
-
-static const sim_choice_t on_off = {"on", "off"};
-
-static bool switched(const sim_call_t *call, bool *out_on) {
-    return sim_words_choice(call->words->word[1], on_off, out_on);
-}
 
 static void tell(const sim_call_t *call, sim_error_t error) {
     if (call->panel->hooks.hub != NULL) {
@@ -24,79 +22,52 @@ static void tell(const sim_call_t *call, sim_error_t error) {
 }
 
 static result_t set_ack(const sim_call_t *call) {
-    bool on = false;
-    if (!switched(call, &on)) {
-        return SIM_USAGE;
-    }
-    sim_world_ack(call->world, call->now_us, on);
+    sim_world_ack(call->world, call->now_us, call->value[0] != 0);
     return NULL;
 }
 
 static result_t set_stall(const sim_call_t *call) {
-    bool on = false;
-    if (!switched(call, &on)) {
-        return SIM_USAGE;
-    }
-    sim_bus_stall(&call->world->bus, call->now_us, on);
+    sim_bus_stall(&call->world->bus, call->now_us, call->value[0] != 0);
     return NULL;
 }
 
 static result_t set_busoff(const sim_call_t *call) {
-    bool on = false;
-    if (!switched(call, &on)) {
-        return SIM_USAGE;
-    }
+    const bool on = call->value[0] != 0;
     sim_world_bus_off(call->world, call->now_us, on);
     tell(call, on ? SIM_ERROR_BUS_OFF : SIM_ERROR_RESTARTED);
     return NULL;
 }
 
 static result_t set_passive(const sim_call_t *call) {
-    bool on = false;
-    if (!switched(call, &on)) {
-        return SIM_USAGE;
-    }
-    tell(call, on ? SIM_ERROR_PASSIVE : SIM_ERROR_ACTIVE);
+    tell(call, (call->value[0] != 0) ? SIM_ERROR_PASSIVE : SIM_ERROR_ACTIVE);
     return NULL;
 }
 
 static result_t set_bus(const sim_call_t *call) {
-    bool down = false;
-    if (!sim_words_choice(call->words->word[1], (sim_choice_t){"down", "up"}, &down)) {
-        return SIM_USAGE;
-    }
     if (call->panel->hooks.hub != NULL) {
-        sim_hub_down(call->panel->hooks.hub, down);
+        sim_hub_down(call->panel->hooks.hub, call->value[0] != 0);
     }
     return NULL;
 }
 
 static result_t set_queue(const sim_call_t *call) {
-    int64_t depth = 0;
-    if (!sim_words_integer(call->words->word[1], (sim_range_t){1, SIM_BUS_QUEUE_MAX}, &depth)) {
-        return SIM_USAGE;
-    }
-    sim_world_queue(call->world, (uint8_t)depth);
+    sim_world_queue(call->world, (uint8_t)call->value[0]);
     return NULL;
 }
 
 static result_t set_foreign(const sim_call_t *call) {
-    const sim_words_t *const words = call->words;
-    bool on = false;
-    bool const once = strcmp(words->word[1], "once") == 0;
-    int64_t speed_mm_s = call->world->foreign.setpoint.speed_mm_s;
-    if (!once && !switched(call, &on)) {
+    sim_foreign_t *const foreign = &call->world->foreign;
+    const bool off = call->value[0] == 0;
+    if (call->value[1] != UNTOLD && off) {
         return SIM_USAGE;
     }
-    if (words->count == 3U &&
-        !((on || once) && sim_words_integer(words->word[2], (sim_range_t){INT16_MIN, INT16_MAX}, &speed_mm_s))) {
-        return SIM_USAGE;
+    if (call->value[1] != UNTOLD) {
+        foreign->setpoint.speed_mm_s = (int16_t)call->value[1];
     }
-    call->world->foreign.setpoint.speed_mm_s = (int16_t)speed_mm_s;
-    if (once) {
+    if (call->value[0] == BUT_ONCE) {
         sim_world_foreign_once(call->world, call->now_us);
     } else {
-        call->world->foreign.due_us = on ? call->now_us : IW_NEVER;
+        foreign->due_us = off ? IW_NEVER : call->now_us;
     }
     return NULL;
 }
@@ -111,31 +82,24 @@ static result_t inject(const sim_call_t *call) {
 }
 
 static result_t set_babble(const sim_call_t *call) {
-    const sim_words_t *const words = call->words;
     char text[16];
-    int64_t period_us = 0;
-    bool on = false;
     iw_can_frame_t frame;
-    (void)snprintf(text, sizeof text, "%.10s#", words->word[1]);
-    if (!sim_words_frame(text, &frame) ||
-        !sim_words_integer(words->word[2], (sim_range_t){100, 10000000}, &period_us) ||
-        !sim_words_choice(words->word[3], on_off, &on)) {
+    (void)snprintf(text, sizeof text, "%.10s#", call->words->word[1]);
+    if (!sim_words_frame(text, &frame)) {
         return SIM_USAGE;
     }
     frame.dlc = IW_CAN_DATA_MAX;
-    call->world->babble = (sim_babble_t){on ? call->now_us : IW_NEVER, (uint32_t)period_us, frame};
+    call->world->babble =
+        (sim_babble_t){(call->value[2] != 0) ? call->now_us : IW_NEVER, (uint32_t)call->value[1], frame};
     return NULL;
 }
 
-static result_t press(const sim_call_t *call) {
-    const char *const action = call->words->word[1];
-    sim_button_t *const button = call->panel->hooks.button;
-    bool pressed = false;
-    if (call->words->count != 2U || !sim_words_choice(action, (sim_choice_t){"press", "release"}, &pressed)) {
-        return SIM_USAGE;
+static result_t pulse(const sim_call_t *call, sim_button_t *button) {
+    if (button != NULL && button->pressed) {
+        return "the button is pressed already; first: estop release";
     }
     if (button != NULL) {
-        sim_button_press(button, pressed);
+        sim_button_pulse(button, call->now_us + (iw_time_us_t)call->value[1]);
     }
     return NULL;
 }
@@ -143,26 +107,18 @@ static result_t press(const sim_call_t *call) {
 static result_t set_estop(const sim_call_t *call) {
     const char *const action = call->words->word[1];
     sim_button_t *const button = call->panel->hooks.button;
-    int64_t milli_ms = 0;
-    bool unplug = false;
-    if (sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &unplug) && call->words->count == 2U) {
-        if (button != NULL) {
-            sim_button_unplug(button, unplug);
-        }
-        return NULL;
-    }
-    if (strcmp(action, "pulse") != 0) {
-        return press(call);
-    }
-    if (call->words->count != 3U ||
-        !sim_words_milli(call->words->word[2], (sim_range_t){100, PULSE_MAX_milli_ms}, &milli_ms)) {
+    bool on = false;
+    const bool plug = sim_words_choice(action, (sim_choice_t){"unplug", "plug"}, &on);
+    const bool pulses = strcmp(action, "pulse") == 0;
+    if (pulses != (call->value[1] != UNTOLD) ||
+        (!pulses && !plug && !sim_words_choice(action, (sim_choice_t){"press", "release"}, &on))) {
         return SIM_USAGE;
     }
-    if (button != NULL && button->pressed) {
-        return "the button is pressed already; first: estop release";
+    if (pulses) {
+        return pulse(call, button);
     }
     if (button != NULL) {
-        sim_button_pulse(button, call->now_us + (iw_time_us_t)milli_ms);
+        (plug ? sim_button_unplug : sim_button_press)(button, on);
     }
     return NULL;
 }
@@ -170,9 +126,6 @@ static result_t set_estop(const sim_call_t *call) {
 static result_t log_mark(const sim_call_t *call) {
     char text[SIM_LINE_BYTES] = "";
     size_t used = 0U;
-    if (strcmp(call->words->word[1], "mark") != 0) {
-        return SIM_USAGE;
-    }
     for (unsigned i = 2U; i < call->words->count; i++) {
         int const length = snprintf(&text[used], sizeof text - used, "%s%s", (i > 2U) ? " " : "", call->words->word[i]);
         used += (size_t)length;
@@ -213,20 +166,28 @@ static result_t quit(const sim_call_t *call) {
     return NULL;
 }
 
+#define WORD   .kind = SIM_WORD
+#define SWITCH .kind = SIM_CHOICE, .word = "on", .other = "off", .also = "once", .value = BUT_ONCE
+#define SPEED  .kind = SIM_WHOLE, .range = {INT16_MIN, INT16_MAX}, .optional = true, .value = UNTOLD
+#define PULSE  .kind = SIM_MILLI, .range = {100, PULSE_MAX_milli_ms}, .optional = true, .value = UNTOLD
+
 const sim_command_t sim_bus_commands[] = {
-    {"ack", "on|off", "off: frames of clients are not acknowledged, telemetry goes on", set_ack, 2U, 2U, SIM_CHANGED},
-    {"stall", "on|off", "on: the bus takes no frame from anybody", set_stall, 2U, 2U, SIM_CHANGED},
-    {"busoff", "on|off", "clients' controllers are bus-off; off: restarted", set_busoff, 2U, 2U, SIM_CHANGED},
-    {"passive", "on|off", "tells clients error passive or active, nothing else", set_passive, 2U, 2U, SIM_CHANGED},
-    {"bus", "down|up", "down: closes all connections and takes none", set_bus, 2U, 2U, SIM_CHANGED},
-    {"queue", "N", "frames a client's adapter holds, 1..64 (4)", set_queue, 2U, 2U, SIM_CHANGED},
-    {"foreign", "on|off|once [MM_S]", "another node sends setpoints (300 mm/s)", set_foreign, 2U, 3U, SIM_CHANGED},
-    {"frame", "ID#DATA|ID#R", "another node sends a frame; ID 3 or 8 hex digits", inject, 2U, 2U, SIM_CHANGED},
-    {"babble", "ID PERIOD_US on|off", "another node floods; PERIOD_US from 100", set_babble, 4U, 4U, SIM_CHANGED},
-    {"estop", "press|release|pulse MS|unplug|plug", "the button, or its wire", set_estop, 2U, 3U, SIM_CHANGED},
-    {"log", "mark TEXT", "writes TEXT into the log as a comment", log_mark, 3U, SIM_WORDS_MAX, SIM_ASKED},
-    {"status", "", "what is true now, as one line of JSON", status, 1U, 1U, SIM_ASKED},
-    {"normal", "", "undoes every fault, releases the button", heal, 1U, 1U, SIM_CHANGED},
-    {"quit", "", "ends the simulator", quit, 1U, 1U, SIM_CHANGED},
+    {ONCE("ack", "on|off", "off: frames of clients are not acknowledged, telemetry goes on", set_ack, {ON_OFF})},
+    {ONCE("stall", "on|off", "on: the bus takes no frame from anybody", set_stall, {ON_OFF})},
+    {ONCE("busoff", "on|off", "clients' controllers are bus-off; off: restarted", set_busoff, {ON_OFF})},
+    {ONCE("passive", "on|off", "tells clients error passive or active, nothing else", set_passive, {ON_OFF})},
+    {ONCE("bus", "down|up", "down: closes all connections and takes none", set_bus, {CHOICE("down", "up")})},
+    {ONCE("queue", "N", "frames a client's adapter holds, 1..64 (4)", set_queue, {WHOLE(1, SIM_BUS_QUEUE_MAX)})},
+    {ONCE("foreign", "on|off|once [MM_S]", "another node sends setpoints (300 mm/s)", set_foreign, {SWITCH}, {SPEED})},
+    {ONCE("frame", "ID#DATA|ID#R", "another node sends a frame; ID 3 or 8 hex digits", inject, {WORD})},
+    {ONCE("babble", "ID PERIOD_US on|off", "another node floods; PERIOD_US from 100", set_babble, {WORD},
+          {WHOLE(100, 10000000)}, {ON_OFF})},
+    {ONCE("estop", "press|release|pulse MS|unplug|plug", "the button, or its wire", set_estop, {WORD}, {PULSE})},
+    {ONCE("log", "mark TEXT", "writes TEXT into the log as a comment", log_mark, {CHOICE("mark", "mark")},
+          {.kind = SIM_REST}),
+     .asks = true},
+    {ONCE("status", "", "what is true now, as one line of JSON", status, {0}), .asks = true},
+    {ONCE("normal", "", "undoes every fault, releases the button", heal, {0})},
+    {ONCE("quit", "", "ends the simulator", quit, {0})},
+    {.name = NULL},
 };
-const unsigned sim_bus_command_count = sizeof sim_bus_commands / sizeof sim_bus_commands[0];

@@ -60,7 +60,7 @@ static bool refuse(sim_panel_t *panel, const char *line) {
 
 static const char *execute(void *context, const char *line) {
     sim_simulator_t *const self = context;
-    if (self->can.ops != NULL && refuse(&self->panel, line)) {
+    if (self->can.is_open && refuse(&self->panel, line)) {
         return self->panel.answer;
     }
     if (sim_panel_execute(&self->panel, self->now_us, line) == SIM_CHANGED) {
@@ -199,9 +199,9 @@ static int open_sockets(sim_simulator_t *self, const sim_options_t *options) {
     self->hub = (sim_hub_t){.loop = &self->loop, .world = &self->world, .now_us = &self->now_us};
     self->button = (sim_button_t){.loop = &self->loop};
     self->control = (sim_control_t){.loop = &self->loop, .execute = execute, .context = self};
-    self->hub.listener.fd = -1;
-    self->button.listener.fd = -1;
-    self->control.listener.fd = -1;
+    self->hub.listener.watch.fd = -1;
+    self->button.listener.watch.fd = -1;
+    self->control.listener.watch.fd = -1;
     if (open_bus(self, options, &reason) && sim_button_open(&self->button, options->estop_path, &reason) &&
         sim_control_open(&self->control, options->control_path, &reason)) {
         return -1;
@@ -233,7 +233,7 @@ int sim_simulator_open(sim_simulator_t *self, const sim_options_t *options) {
     pair.age_us = options->age_us;
     self->quiet = options->quiet;
     self->on_socketcan = options->can_interface[0] != '\0';
-    self->can.ops = NULL;
+    self->can.is_open = false;
     self->now_us = sim_loop_clock_us();
     self->start_us = self->now_us;
     self->wake_us = IW_NEVER;

@@ -12,10 +12,35 @@
 #include "control.h"
 #include "hub.h"
 #include "keys.h"
-#include "options.h"
 #include "panel.h"
 #include "script.h"
 #include "socketcan.h"
+#include "words.h"
+
+// --- the command line (options.c) --------------------------------------------------------------------------------
+
+#define SIM_PATH_BYTES 512U
+
+typedef struct {
+    char can_path[SIM_PATH_BYTES]; ///< Of the local bus.
+    char can_interface[16];        ///< SocketCAN instead of it; empty: none.
+    char estop_path[SIM_PATH_BYTES];
+    char control_path[SIM_PATH_BYTES];
+    const char *script_path; ///< NULL: none.
+    const char *log_path;    ///< NULL: none.
+    uint64_t seed;
+    uint64_t age_us; ///< Wheels have been running this long already; 0: they boot.
+    bool quiet;
+    bool no_keys; ///< On a terminal, too, no key plants a fault.
+    bool log_direction;
+    char command[SIM_LINE_BYTES]; ///< To give to a running simulator; empty: be one.
+} sim_options_t;
+
+/// Returns -1 if the program shall go on, else the exit code to end with; everything the user must know has been
+/// printed.
+int sim_options_read(sim_options_t *out_options, int argc, char **argv);
+
+// --- the simulator -----------------------------------------------------------------------------------------------
 
 /// Later than this is a pause, not a delay to catch up with.
 #define SIM_PAUSE_US 500000U

@@ -20,46 +20,45 @@ static void explain(int error, const char *interface, sim_reason_t *out_reason) 
 
 bool sim_socketcan_open(sim_socketcan_t *self, const char *interface, const sim_loop_t *loop, sim_world_t *world,
                         sim_reason_t *out_reason) {
-    const iw_bus_ops_t *const ops = iw_bus_backend(interface);
-    if (ops == NULL) {
+    int const error = iw_bus_open(&self->bus, interface);
+    if (error == ENOTSUP) {
         (void)snprintf(out_reason->text, sizeof out_reason->text,
                        "--can %s: not an interface's name, or libmnl was missing when this was built; apt-get install "
                        "libmnl-dev, configure and build again, or use --can unix:PATH",
                        interface);
         return false;
     }
-    int const error = ops->open(&self->bus, interface);
     if (error != 0) {
         explain(error, interface, out_reason);
         return false;
     }
-    self->ops = ops;
+    self->is_open = true;
     self->world = world;
     self->lost = 0U;
     self->state = IW_BUS_DOWN;
     self->port = sim_world_connect(world);
     sim_world_queue(world, SIM_BUS_QUEUE_MAX); // The interface has queued already; nothing more is lost here.
-    self->watch = (sim_watch_t){nothing_to_do, self, ops->watch_fd(&self->bus)};
+    self->watch = (sim_watch_t){nothing_to_do, self, iw_bus_fd(&self->bus)};
     return sim_loop_add(loop, &self->watch);
 }
 
 void sim_socketcan_close(sim_socketcan_t *self) {
-    if (self->ops != NULL) {
-        self->ops->close(&self->bus);
-        self->ops = NULL;
+    if (self->is_open) {
+        iw_bus_close(&self->bus);
+        self->is_open = false;
     }
 }
 
 bool sim_socketcan_step(sim_socketcan_t *self, iw_time_us_t now_us) {
     iw_can_frame_t frame;
-    if (self->ops == NULL) {
+    if (!self->is_open) {
         return false;
     }
-    self->ops->tend(&self->bus, now_us);
-    iw_bus_state_t const state = self->ops->state(&self->bus);
+    iw_bus_tend(&self->bus, now_us);
+    iw_bus_state_t const state = iw_bus_state(&self->bus);
     bool const changed = state != self->state;
     self->state = state;
-    while (self->ops->receive(&self->bus, &frame) > 0) {
+    while (iw_bus_receive(&self->bus, &frame) > 0) {
         if (frame.kind == (uint8_t)IW_CAN_RECEIVED && (frame.id & IW_CAN_FD) == 0U) {
             sim_world_submit(self->world, now_us, self->port, &frame);
         }
@@ -68,11 +67,11 @@ bool sim_socketcan_step(sim_socketcan_t *self, iw_time_us_t now_us) {
 }
 
 iw_time_us_t sim_socketcan_next_us(const sim_socketcan_t *self) {
-    return (self->ops == NULL) ? IW_NEVER : self->ops->next_us(&self->bus);
+    return self->is_open ? iw_bus_next_us(&self->bus) : IW_NEVER;
 }
 
 void sim_socketcan_deliver(sim_socketcan_t *self, const sim_delivery_t *delivery) {
-    if (self->ops != NULL && delivery->port != self->port && self->ops->send(&self->bus, &delivery->frame) <= 0) {
+    if (self->is_open && delivery->port != self->port && iw_bus_send(&self->bus, &delivery->frame) <= 0) {
         self->lost += 1U;
     }
 }

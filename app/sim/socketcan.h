@@ -9,14 +9,13 @@
 
 #include "iwheel_linux/backend.h"
 #include "iwheel_sim/world.h"
-#include "listener.h"
 #include "loop.h"
 
 typedef struct {
     sim_watch_t watch;
-    const iw_bus_ops_t *ops; ///< NULL: not in use.
     sim_world_t *world;
     iw_backend_store_t bus;
+    bool is_open;  ///< In use.
     uint32_t lost; ///< Frames that the interface did not take.
     uint8_t port;  ///< Of the world, for all that comes from the interface.
     iw_bus_state_t state;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "words.h"
 
-#include "iwheel/types.h"
+#include "candump.h"
 
+#include <stdio.h>
 #include <string.h>
 
 bool sim_words_split(sim_words_t *self, const char *line) {
@@ -110,65 +111,19 @@ bool sim_words_milli(const char *word, sim_range_t range, int64_t *out_milli) {
     return read_scaled(word, 3U, &value) && within(range, value, out_milli);
 }
 
-static int hex_value(char c) {
-    if (is_digit(c)) {
-        return c - '0';
-    }
-    if (c >= 'A' && c <= 'F') {
-        return c - 'A' + 10;
-    }
-    return (c >= 'a' && c <= 'f') ? c - 'a' + 10 : -1;
-}
-
-/// Reads exactly `count` hexadecimal digits.
-static bool read_hex(const char *at, size_t count, uint32_t *out_value) {
-    uint32_t value = 0U;
-    for (size_t i = 0U; i < count; i++) {
-        int const digit = hex_value(at[i]);
-        if (digit < 0) {
-            return false;
-        }
-        value = (value << 4) | (uint32_t)digit;
-    }
-    *out_value = value;
-    return true;
-}
-
-static bool read_data(const char *at, iw_can_frame_t *frame) {
-    size_t const length = strlen(at);
-    if (strcmp(at, "R") == 0 || strcmp(at, "r") == 0) {
-        frame->id |= IW_CAN_REMOTE;
-        return true;
-    }
-    if (length % 2U != 0U || length / 2U > IW_CAN_DATA_MAX) {
-        return false;
-    }
-    for (size_t i = 0U; i < length / 2U; i++) {
-        uint32_t byte = 0U;
-        if (!read_hex(&at[2U * i], 2U, &byte)) {
-            return false;
-        }
-        frame->data[i] = (uint8_t)byte;
-    }
-    frame->dlc = (uint8_t)(length / 2U);
-    return true;
-}
-
 bool sim_words_frame(const char *word, iw_can_frame_t *out_frame) {
-    const char *const hash = strchr(word, '#');
-    size_t const digits = (hash == NULL) ? 0U : (size_t)(hash - word);
-    iw_can_frame_t frame = {0};
-    bool const extended = digits == 8U;
-    if ((digits != 3U && !extended) || !read_hex(word, digits, &frame.id)) {
+    char line[SIM_LINE_BYTES];
+    candump_t frame;
+    const char *why = NULL;
+    const int length = snprintf(line, sizeof line, "(0) sim %s", word);
+    // Its own marks, lengths of remote frames and dots between bytes are not for the panel.
+    if (strspn(word, "0123456789ABCDEFabcdefRr#") != strlen(word) || (size_t)length >= sizeof line ||
+        candump_parse(line, (size_t)length, &frame, &why) != CANDUMP_FRAME) {
         return false;
     }
-    if (frame.id > (extended ? 0x1FFFFFFFU : IW_CAN_ID_MASK)) {
+    if (frame.fd || frame.error || (frame.remote && strpbrk(word, "Rr")[1] != '\0')) {
         return false;
     }
-    frame.id |= extended ? IW_CAN_EXTENDED : 0U;
-    if (!read_data(hash + 1, &frame)) {
-        return false;
-    }
-    *out_frame = frame;
+    *out_frame = candump_to_core(&frame);
     return true;
 }

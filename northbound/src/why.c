@@ -30,105 +30,97 @@ static unsigned hex_digits(uint32_t number) {
     return digits;
 }
 
-static void add_lost_wheel(const iw_stop_t *stop, iwn_text_t *text) {
-    if (stop->detail == UINT32_MAX) {
-        IWN_TEXT_JOIN(text, wheels(stop->sides), " never heard");
-    } else {
-        IWN_TEXT_JOIN(text, wheels(stop->sides), " not heard for ");
-        add_number(text, stop->detail, " ms");
+/// A cause in words, and what to do about it. In a clause stand for what is known of the stop: $w the wheels, $n the detail as
+/// a number, $x the same as hexadecimal digits, $d what it says in words, $c the client, $r its reason, $b the bus, $e the
+/// e-stop.
+typedef struct {
+    const char *clause;
+    const char *cure;
+} row_t;
+
+static const row_t rows[IW_CAUSES] = {
+    [IW_CAUSE_NONE] = {"none", "nothing to do"},
+    // On our side.
+    [IW_CAUSE_ESTOP_LINE] = {"e-stop $e $d", "release the button, then: iwheelctl reset"},
+    [IW_CAUSE_LOOP_HUNG] = {"the gateway itself was held up for $n ms",
+                            "see what else runs on this machine, then: iwheelctl reset"},
+    [IW_CAUSE_LOOP_LATE] = {"the gateway itself was held up for $n ms",
+                            "see what else runs on this machine, then arm again"},
+    [IW_CAUSE_INTERNAL] = {"an internal check failed ($n)", "report this with the log, then: iwheelctl reset"},
+    [IW_CAUSE_SHUTDOWN] = {"the gateway was told to end", "start it again to go on"},
+    [IW_CAUSE_RESTART] = {"the gateway before this one died while the wheels were armed",
+                          "look for the crash in the log, then arm again"},
+    // A person or a client is behind it.
+    [IW_CAUSE_ESTOP_SOFTWARE] = {"software e-stop by $c$r", "when it is safe: iwheelctl reset"},
+    [IW_CAUSE_LEASE_LOST] = {"$c sent no drive command for $n ms",
+                             "send drive commands more often or raise lease_ms, then arm again"},
+    [IW_CAUSE_CLIENT_GONE] = {"$c disconnected", "arm again to go on"},
+    [IW_CAUSE_CLIENT_STOP] = {"$c said stop", "arm again to go on"},
+    // In the machine: bus and wheels.
+    [IW_CAUSE_WHEEL_LOST] = {"$w not heard for $n ms", "check the wheel's power and cable, then: iwheelctl reset"},
+    [IW_CAUSE_WHEEL_REBOOTED] = {"$w rebooted ($d)", "check the wheel's power, then: iwheelctl reset"},
+    [IW_CAUSE_SEND_STALLED] = {"setpoint not acknowledged on the bus for $n ms",
+                               "check that the wheels have power and the bus is terminated, then: iwheelctl reset"},
+    [IW_CAUSE_BUS_DOWN] = {"bus $b is $d", "bring the bus up, then: iwheelctl reset"},
+    [IW_CAUSE_SECOND_MASTER] = {"somebody else sent a setpoint, id $n (0x$x)",
+                                "switch the other sender off, then: iwheelctl reset"},
+    [IW_CAUSE_FEEDBACK_SIGN] = {"$w turns against its command at $n mm/s",
+                                "check invert in the configuration, then: iwheelctl reset"},
+    [IW_CAUSE_OVERSPEED] = {"$w turns faster than told, at $n mm/s",
+                            "check radius, gear ratio and slope, then: iwheelctl reset"},
+    [IW_CAUSE_WHEEL_BLOCKED] = {"$w blocked: only $n mm/s", "remove what blocks the wheel, then arm again"},
+};
+
+static const char *detail_words(const iw_stop_t *stop) {
+    if (stop->cause == IW_CAUSE_ESTOP_LINE) {
+        return (stop->detail == 2U) ? "unreadable or gone" : "pressed";
+    }
+    if (stop->cause == IW_CAUSE_BUS_DOWN) {
+        return (stop->detail == IW_BUS_OFF) ? "bus-off" : "down or gone";
+    }
+    return reboot_evidence(stop->detail);
+}
+
+static const char *word_for(char part, const iw_stop_t *stop, const iwn_why_context_t *context) {
+    switch (part) {
+    case 'w':
+        return wheels(stop->sides);
+    case 'c':
+        return (context->client != NULL) ? context->client : "a client";
+    case 'b':
+        return context->bus;
+    case 'e':
+        return context->estop;
+    default:
+        return detail_words(stop);
     }
 }
 
-/// Causes in the machine: bus and wheels.
-static void add_machine_clause(const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
-    const char *const sides = wheels(stop->sides);
-    switch (stop->cause) {
-    case IW_CAUSE_WHEEL_LOST:
-        add_lost_wheel(stop, text);
-        break;
-    case IW_CAUSE_WHEEL_REBOOTED:
-        IWN_TEXT_JOIN(text, sides, " rebooted (", reboot_evidence(stop->detail), ")");
-        break;
-    case IW_CAUSE_SEND_STALLED:
-        IWN_TEXT_JOIN(text, "setpoint not acknowledged on the bus for ");
-        add_number(text, stop->detail, " ms");
-        break;
-    case IW_CAUSE_BUS_DOWN:
-        IWN_TEXT_JOIN(text, "bus ", context->bus, (stop->detail == IW_BUS_OFF) ? " is bus-off" : " is down or gone");
-        break;
-    case IW_CAUSE_SECOND_MASTER:
-        IWN_TEXT_JOIN(text, "somebody else sent a setpoint, id ");
-        add_number(text, stop->detail, " (0x");
+static void add_part(char part, const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
+    if (part == 'n') {
+        iwn_text_int(text, stop->detail);
+    } else if (part == 'x') {
         iwn_text_hex(text, stop->detail, hex_digits(stop->detail));
-        IWN_TEXT_JOIN(text, ")");
-        break;
-    case IW_CAUSE_FEEDBACK_SIGN:
-        IWN_TEXT_JOIN(text, sides, " turns against its command at ");
-        add_number(text, stop->detail, " mm/s");
-        break;
-    case IW_CAUSE_OVERSPEED:
-        IWN_TEXT_JOIN(text, sides, " turns faster than told, at ");
-        add_number(text, stop->detail, " mm/s");
-        break;
-    case IW_CAUSE_WHEEL_BLOCKED:
-        IWN_TEXT_JOIN(text, sides, " blocked: only ");
-        add_number(text, stop->detail, " mm/s");
-        break;
-    default:
-        IWN_TEXT_JOIN(text, iwn_cause_name(stop->cause));
-        break;
+    } else if (part != 'r') {
+        IWN_TEXT_JOIN(text, word_for(part, stop, context));
+    } else if (context->reason != NULL && context->reason[0] != '\0') {
+        IWN_TEXT_JOIN(text, " (\"", context->reason, "\")");
     }
 }
 
-/// Causes that a person or a client is behind; the rest by `add_machine_clause`.
-static void add_client_clause(const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
-    const char *const client = (context->client != NULL) ? context->client : "a client";
-    const char *const reason = (context->reason != NULL) ? context->reason : "";
-    switch (stop->cause) {
-    case IW_CAUSE_ESTOP_SOFTWARE:
-        IWN_TEXT_JOIN(text, "software e-stop by ", client, (*reason != '\0') ? " (\"" : "", reason,
-                      (*reason != '\0') ? "\")" : "");
-        break;
-    case IW_CAUSE_LEASE_LOST:
-        IWN_TEXT_JOIN(text, client, " sent no drive command for ");
-        add_number(text, stop->detail, " ms");
-        break;
-    case IW_CAUSE_CLIENT_GONE:
-        IWN_TEXT_JOIN(text, client, " disconnected");
-        break;
-    case IW_CAUSE_CLIENT_STOP:
-        IWN_TEXT_JOIN(text, client, " said stop");
-        break;
-    default:
-        add_machine_clause(stop, context, text);
-        break;
-    }
-}
-
-/// Causes on our side; the rest by `add_client_clause`.
 static void add_clause(const iw_stop_t *stop, const iwn_why_context_t *context, iwn_text_t *text) {
-    switch (stop->cause) {
-    case IW_CAUSE_ESTOP_LINE:
-        IWN_TEXT_JOIN(text, "e-stop ", context->estop, (stop->detail == 2U) ? " unreadable or gone" : " pressed");
-        break;
-    case IW_CAUSE_LOOP_HUNG:
-    case IW_CAUSE_LOOP_LATE:
-        IWN_TEXT_JOIN(text, "the gateway itself was held up for ");
-        add_number(text, stop->detail, " ms");
-        break;
-    case IW_CAUSE_INTERNAL:
-        IWN_TEXT_JOIN(text, "an internal check failed (");
-        add_number(text, stop->detail, ")");
-        break;
-    case IW_CAUSE_SHUTDOWN:
-        IWN_TEXT_JOIN(text, "the gateway was told to end");
-        break;
-    case IW_CAUSE_RESTART:
-        IWN_TEXT_JOIN(text, "the gateway before this one died while the wheels were armed");
-        break;
-    default:
-        add_client_clause(stop, context, text);
-        break;
+    const bool known = (unsigned)stop->cause < IW_CAUSES;
+    const char *clause = known ? rows[stop->cause].clause : iwn_cause_name(stop->cause);
+    if (stop->cause == IW_CAUSE_WHEEL_LOST && stop->detail == UINT32_MAX) {
+        clause = "$w never heard";
+    }
+    for (; *clause != '\0'; clause++) {
+        if (*clause == '$') {
+            clause++;
+            add_part(*clause, stop, context, text);
+        } else {
+            iwn_text_span(text, clause, 1U);
+        }
     }
 }
 
@@ -175,26 +167,5 @@ void iwn_why_sentence(const iw_stop_t *stop, const iwn_why_context_t *context, c
 }
 
 const char *iwn_why_cure(iw_cause_t cause) {
-    static const char *const cures[IW_CAUSES] = {
-        [IW_CAUSE_NONE] = "nothing to do",
-        [IW_CAUSE_ESTOP_LINE] = "release the button, then: iwheelctl reset",
-        [IW_CAUSE_ESTOP_SOFTWARE] = "when it is safe: iwheelctl reset",
-        [IW_CAUSE_WHEEL_LOST] = "check the wheel's power and cable, then: iwheelctl reset",
-        [IW_CAUSE_WHEEL_REBOOTED] = "check the wheel's power, then: iwheelctl reset",
-        [IW_CAUSE_SEND_STALLED] = "check that the wheels have power and the bus is terminated, then: iwheelctl reset",
-        [IW_CAUSE_BUS_DOWN] = "bring the bus up, then: iwheelctl reset",
-        [IW_CAUSE_SECOND_MASTER] = "switch the other sender off, then: iwheelctl reset",
-        [IW_CAUSE_FEEDBACK_SIGN] = "check invert in the configuration, then: iwheelctl reset",
-        [IW_CAUSE_OVERSPEED] = "check radius, gear ratio and slope, then: iwheelctl reset",
-        [IW_CAUSE_LOOP_HUNG] = "see what else runs on this machine, then: iwheelctl reset",
-        [IW_CAUSE_INTERNAL] = "report this with the log, then: iwheelctl reset",
-        [IW_CAUSE_LOOP_LATE] = "see what else runs on this machine, then arm again",
-        [IW_CAUSE_WHEEL_BLOCKED] = "remove what blocks the wheel, then arm again",
-        [IW_CAUSE_LEASE_LOST] = "send drive commands more often or raise lease_ms, then arm again",
-        [IW_CAUSE_CLIENT_GONE] = "arm again to go on",
-        [IW_CAUSE_CLIENT_STOP] = "arm again to go on",
-        [IW_CAUSE_SHUTDOWN] = "start it again to go on",
-        [IW_CAUSE_RESTART] = "look for the crash in the log, then arm again",
-    };
-    return ((unsigned)cause < IW_CAUSES) ? cures[cause] : cures[IW_CAUSE_INTERNAL];
+    return rows[((unsigned)cause < IW_CAUSES) ? cause : IW_CAUSE_INTERNAL].cure;
 }

@@ -6,8 +6,7 @@
 #include "console.h"
 #include "pins.h"
 
-/// A word of a table; "?" beyond its end. Gaps within are NULL.
-#define WORDS(names, index) (((size_t)(index) < sizeof(names) / sizeof((names)[0])) ? (names)[index] : "?")
+#include "iwheel_northbound/words.h"
 
 // What is shown now, in one number; 0: nothing was shown yet.
 static uint32_t shown;
@@ -52,37 +51,14 @@ void iw_report_start(bool restarted) {
 
 /// The words are those of the gateway's protocol (docs/northbound.md), so that one manual serves both.
 static void tell_state(const iw_snapshot_t *seen, bool estop_pressed) {
-    static const char *const states[] = {"listening", "armed", "stopping", "latched"};
-    static const char *const buses[] = {"down", "off", "passive", "active"};
-    static const char *const causes[IW_CAUSES] = {
-        [IW_CAUSE_NONE] = "nothing",
-        [IW_CAUSE_ESTOP_LINE] = "estop_line",
-        [IW_CAUSE_ESTOP_SOFTWARE] = "estop_software",
-        [IW_CAUSE_BUS_DOWN] = "bus_down",
-        [IW_CAUSE_SECOND_MASTER] = "second_master",
-        [IW_CAUSE_SEND_STALLED] = "send_stalled",
-        [IW_CAUSE_WHEEL_REBOOTED] = "wheel_rebooted",
-        [IW_CAUSE_WHEEL_LOST] = "wheel_lost",
-        [IW_CAUSE_FEEDBACK_SIGN] = "feedback_sign",
-        [IW_CAUSE_OVERSPEED] = "overspeed",
-        [IW_CAUSE_LOOP_HUNG] = "loop_hung",
-        [IW_CAUSE_INTERNAL] = "internal",
-        [IW_CAUSE_LOOP_LATE] = "loop_late",
-        [IW_CAUSE_WHEEL_BLOCKED] = "wheel_blocked",
-        [IW_CAUSE_LEASE_LOST] = "lease_lost",
-        [IW_CAUSE_CLIENT_GONE] = "client_gone",
-        [IW_CAUSE_CLIENT_STOP] = "client_stop",
-        [IW_CAUSE_SHUTDOWN] = "shutdown",
-        [IW_CAUSE_RESTART] = "restart",
-    };
     const iw_state_t state = seen->state;
-    iw_console_text(WORDS(states, state));
+    iw_console_text(iwn_state_name(state));
     if (state == IW_STATE_LATCHED || state == IW_STATE_STOPPING) {
         iw_console_text(" by ");
-        iw_console_text(WORDS(causes, seen->stop->cause));
+        iw_console_text(iwn_cause_name(seen->stop->cause));
     }
     iw_console_text("; bus ");
-    iw_console_text(WORDS(buses, seen->bus));
+    iw_console_text(iwn_bus_state_name(seen->bus));
     iw_console_text(estop_pressed ? "; e-stop pressed" : "; e-stop released");
     if (state == IW_STATE_LATCHED) {
         iw_console_text("; to reset: mend the cause, release the e-stop, then press the button on");
@@ -118,7 +94,7 @@ void iw_report_reset(iw_refusal_t refusal) {
         [IW_REFUSE_CAUSE_PRESENT] = "refused: its cause was there within the last second",
         [IW_REFUSE_STALE_COMMAND] = "refused: a command that moves is still being given",
     };
-    const char *const found = WORDS(words, refusal);
+    const char *const found = ((size_t)refusal < sizeof words / sizeof words[0]) ? words[refusal] : NULL;
     iw_console_text("reset ");
     iw_console_text((found != NULL) ? found : "refused");
     iw_console_text("\r\n");

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "fake_interface.h"
 
-#include "netdev.h"
-#include "netlink_restart.h"
-
 #include <errno.h>
 #include <string.h>
 #include <sys/eventfd.h>
@@ -63,8 +60,10 @@ void iw_socketcan_socket_close(iw_socketcan_socket_t *self) {
     iw_socketcan_socket_init(self);
 }
 
-bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self) {
-    return self->next == self->count;
+void iw_socketcan_socket_use(iw_socketcan_socket_t *self, int fd, bool is_hub) {
+    (void)self; // There is no hub.
+    (void)fd;
+    (void)is_hub;
 }
 
 void iw_socketcan_socket_forget(iw_socketcan_socket_t *self) {

@@ -26,6 +26,7 @@ from judge import percentile
 from scenario import REGISTRY, Skip, Test
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+WORKER = os.path.join(HERE, "run")  # Another folder of scenarios has its own.
 TRIES = 3
 TIMEOUT_S = 120
 QUIET_US, PATIENCE_S, LOOK_S = 1_000_000, 10, 0.1  # before a scenario is repeated
@@ -106,7 +107,7 @@ class Run:
 
     def once(self, name):
         """Runs the worker; its children die with it."""
-        command = [sys.executable, os.path.join(HERE, "run"), "--worker", name, "--build", self.options.build]
+        command = [sys.executable, WORKER, "--worker", name, "--build", self.options.build]
         worker = subprocess.Popen(
             command + (["--keep"] if self.options.keep else []),
             stdout=subprocess.PIPE,

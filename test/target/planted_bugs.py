@@ -61,8 +61,8 @@ IMAGE = {
     "edges of the e-stop are not latched": (
         "estop.c", "store_explicit(&had_edge, true,", "store_explicit(&had_edge, false,", "zero", "estop_pulse"),
     "no pull-up at the e-stop's pin": ("pins_f1.c", "    pull_up(IW_BOARD_ESTOP);\n", "", "zero", "estop"),
-    "the crystal is waited for without a bound": ("clock_f1.c", "poll < POLLS_MAX;", "true;", "zero", "no_crystal"),
-    "the crystal's failure goes unnoticed": ("clock_f1.c", "RCC->CR |= CSSON;", ";", "demo", "crystal_dies"),
+    "the crystal is waited for without a bound": ("clock.c", "poll < POLLS_MAX;", "true;", "zero", "no_crystal"),
+    "the crystal's failure goes unnoticed": ("clock.c", "RCC_CR |= CSSON;", ";", "demo", "crystal_dies"),
     "an interrupt feeds the watchdog": (
         "main.c", "    iw_bxcan_on_receive(&bus);\n", "    iw_bxcan_on_receive(&bus);\n    iw_watchdog_feed();\n", "demo", "loop_stuck"),
     "no watchdog": ("main.c", "    iw_watchdog_start();\n", "", "demo", "hang"),
@@ -84,7 +84,7 @@ IMAGE = {
     "the marker is cleared by a hold that nobody acknowledged": ("marker.c", "} else if (zeros_proven) {", "} else {", "demo",
                                                                  "reset_after_unproven_hold"),
     "the marker is never cleared": ("marker.c", "} else if (zeros_proven) {", "} else if (false) {", "demo", "reset_after_the_hold"),
-    "the crystal starts anew at each attempt": ("clock_f1.c", "    RCC->CR &= ~PLLON;\n", "    RCC->CR &= ~(PLLON | HSEON);\n", "zero", "slow_crystal"),
+    "the crystal starts anew at each attempt": ("clock.c", "    RCC_CR &= ~PLLON;\n", "    RCC_CR &= ~(PLLON | HSEON);\n", "zero", "slow_crystal"),
     "the bus is on other pins than told": ("pins_f1.c", "(2U << 13)", "(3U << 13)", "zero", "nominal"),
     "the controller's reset has the wrong bit": ("main.c", "(1U << 25)", "(1U << 26)", "demo", "abort_without_end"),
     "a fault that goes on": ("startup.c", "b iw_system_reset", "b .", "demo", "stack_overflow"),

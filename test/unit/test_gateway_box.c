@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "box/box.h"
-#include "box/box_files.h"
+#include "config/gateway_config.h"
+#include "disk/box_files.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -14,6 +15,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <unity.h>
+
+#define CONFIG "[record]\nblackbox_s = 2\n"
 
 static gateway_config_t config;
 static gw_box_t box;
@@ -39,12 +42,17 @@ void tearDown(void) {
 }
 
 static void start(void) {
-    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &config));
+    const gw_box_wish_t wish = {.blackbox_s = config.record.blackbox_s,
+                                .directory = config.record.directory,
+                                .bus = config.bus.interface,
+                                .estop = config.estop.line,
+                                .config = CONFIG};
+    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &wish));
     open_box = true;
 }
 
-static gw_box_news_t wait_news(void) {
-    struct pollfd entry = {.fd = box.fd, .events = POLLIN};
+static gw_child_news_t wait_news(void) {
+    struct pollfd entry = {.fd = box.writer.fd, .events = POLLIN};
     TEST_ASSERT_EQUAL(1, poll(&entry, 1, 10000));
     return gw_box_take(&box);
 }
@@ -75,7 +83,7 @@ static gw_box_order_t stopped(const char *cause) {
 static void record(const char *cause, int error) {
     const gw_box_order_t order = stopped(cause);
     TEST_ASSERT_TRUE(gw_box_write(&box, &order));
-    TEST_ASSERT_EQUAL(GW_BOX_RESULT, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
     TEST_ASSERT_EQUAL(3, box.last.number);
     TEST_ASSERT_EQUAL(error, box.last.error);
 }
@@ -117,7 +125,7 @@ static void test_stop_is_written_as_frames_events_and_configuration(void) {
     TEST_ASSERT_NOT_NULL(strstr(text, "{\"type\":\"end\",\"frames\":10}\n"));
     TEST_ASSERT_NULL(strstr(text, "lost"));
     read_file("stop-000001-estop_line.conf", text, sizeof text);
-    TEST_ASSERT_NOT_NULL(strstr(text, "blackbox_s"));
+    TEST_ASSERT_EQUAL_STRING(CONFIG, text);
 }
 
 static void test_what_is_older_than_blackbox_s_is_left_out(void) {
@@ -159,7 +167,7 @@ static void test_many_stops_keep_the_newest_and_touch_nothing_else(void) {
 static void test_directory_that_cannot_be_is_told_at_once_and_with_each_stop(void) {
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
     start();
-    TEST_ASSERT_EQUAL(GW_BOX_RESULT, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
     TEST_ASSERT_EQUAL(0, box.last.number);
     TEST_ASSERT_EQUAL(ENOENT, box.last.error);
     record("estop_line", ENOENT);
@@ -169,7 +177,7 @@ static void test_directory_that_appears_later_is_used(void) {
     char command[160];
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/folder", folder);
     start();
-    TEST_ASSERT_EQUAL(GW_BOX_RESULT, wait_news());
+    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
     (void)snprintf(command, sizeof command, "mkdir %s/no", folder);
     TEST_ASSERT_EQUAL(0, system(command));
     record("estop_line", 0);
@@ -191,7 +199,7 @@ static void test_oldest_is_dropped_only_below_the_number(void) {
 
 static void test_frozen_writer_never_blocks_the_gateway(void) {
     start();
-    TEST_ASSERT_EQUAL(0, kill(box.pid, SIGSTOP));
+    TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGSTOP));
     const gw_box_order_t order = stopped("estop_line");
     const iw_time_us_t begin_us = iw_clock_now_us();
     unsigned taken = 0;
@@ -200,19 +208,19 @@ static void test_frozen_writer_never_blocks_the_gateway(void) {
     }
     TEST_ASSERT_LESS_THAN(100000U, taken);
     TEST_ASSERT_LESS_THAN(1000000U, iw_clock_now_us() - begin_us);
-    TEST_ASSERT_EQUAL(GW_BOX_NOTHING, gw_box_take(&box));
-    TEST_ASSERT_EQUAL(0, kill(box.pid, SIGKILL));
+    TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_take(&box));
+    TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
 }
 
 static void test_killed_writer_is_noticed_and_started_again_later(void) {
     start();
-    TEST_ASSERT_EQUAL(0, kill(box.pid, SIGKILL));
-    TEST_ASSERT_EQUAL(GW_BOX_WRITER_ENDED, wait_news());
-    TEST_ASSERT_EQUAL(-1, box.fd);
-    TEST_ASSERT_EQUAL(GW_BOX_NOTHING, gw_box_take(&box));
+    TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
+    TEST_ASSERT_EQUAL(GW_CHILD_ENDED, wait_news());
+    TEST_ASSERT_EQUAL(-1, box.writer.fd);
+    TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_take(&box));
     const gw_box_order_t order = stopped("estop_line");
     TEST_ASSERT_FALSE(gw_box_write(&box, &order)); // Too soon.
-    box.started_us -= 10000000U;
+    box.writer.started_us -= 10000000U;
     record("estop_line", 0);
 }
 
@@ -229,13 +237,13 @@ static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one
                                            .as = {.data = {1, 1, 0x2C, 7, 0xD0}}};
         blackbox_ring_put(box.ring, &setpoint);
         atomic_store(&box.ring->sending, sending != 0);
-        (void)close(box.fd); // As a kill would.
-        box.fd = -1;
+        (void)close(box.writer.fd); // As a kill would.
+        box.writer.fd = -1;
         gw_box_close(&box);
         open_box = false;
-        for (unsigned i = 0; i < 100U && kill(box.pid, 0) == 0; i++) {
+        for (unsigned i = 0; i < 100U && kill(box.writer.pid, 0) == 0; i++) {
             (void)usleep(50000);
-            (void)waitpid(box.pid, NULL, WNOHANG);
+            (void)waitpid(box.writer.pid, NULL, WNOHANG);
         }
     }
     TEST_ASSERT_EQUAL(3, count_files());
@@ -246,7 +254,7 @@ static void test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one
 static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {
     config.record.blackbox_s = 0;
     start();
-    TEST_ASSERT_EQUAL(-1, box.fd);
+    TEST_ASSERT_EQUAL(-1, box.writer.fd);
     TEST_ASSERT_NOT_NULL(box.ring);
     const gw_box_order_t order = stopped("estop_line");
     TEST_ASSERT_EQUAL(-1, access(config.record.directory, F_OK));

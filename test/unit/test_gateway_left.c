@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What is said and asked for when a setpoint was left in the controller.
-#include "bus/bus_left.h"
+#include "bus/bus_facts.h"
 
 #include "unity.h"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Recordings as clients get them: which names are read, and what is in a piece.
-#include "box/box_reader.h"
+#include "box/box.h"
+#include "disk/box_files.h"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -148,10 +149,10 @@ static void test_only_names_of_the_writer_are_known(void) {
     make(LOG, 0, 10);
     make("gateway.conf", 0, 10);
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
-        TEST_ASSERT_TRUE_MESSAGE(gw_box_reader_knows(good[i]), good[i]);
+        TEST_ASSERT_TRUE_MESSAGE(gw_box_files_stem(good[i]) > 0U, good[i]);
     }
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
-        TEST_ASSERT_FALSE_MESSAGE(gw_box_reader_knows(bad[i]), bad[i]);
+        TEST_ASSERT_FALSE_MESSAGE(gw_box_files_stem(bad[i]) > 0U, bad[i]);
         TEST_ASSERT_EQUAL_MESSAGE(IWN_BAD_VALUE, ask(bad[i], 0), bad[i]);
     }
 }
@@ -273,20 +274,16 @@ static void test_folder_full_of_recordings_gives_the_newest_that_fit_into_a_line
     assert_says("stop-0000000192-");
 }
 
-static gateway_config_t config;
 static gw_box_t box;
 
-static void wait_for_answer(gw_box_heard_t wanted) {
+static void wait_for_answer(gw_child_news_t wanted) {
     struct pollfd entry = {.fd = box.reader.fd, .events = POLLIN};
     TEST_ASSERT_EQUAL(1, poll(&entry, 1, 10000));
     TEST_ASSERT_EQUAL(wanted, gw_box_hear(&box));
 }
 
 static void open_box(uint16_t seconds) {
-    gateway_config_default(&config);
-    (void)snprintf(config.record.directory, sizeof config.record.directory, "%s", directory);
-    config.record.blackbox_s = seconds;
-    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &config));
+    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &(gw_box_wish_t){.blackbox_s = seconds, .directory = directory}));
 }
 
 static void test_process_answers_and_one_that_is_frozen_holds_up_nobody(void) {
@@ -294,7 +291,7 @@ static void test_process_answers_and_one_that_is_frozen_holds_up_nobody(void) {
     make(LOG, 0, 3U * GW_BOX_PIECE);
     open_box(2);
     TEST_ASSERT_TRUE(gw_box_ask(&box, &question));
-    wait_for_answer(GW_BOX_ANSWER);
+    wait_for_answer(GW_CHILD_SAID);
     TEST_ASSERT_EQUAL(9, box.answer.client);
     TEST_ASSERT_EQUAL(IWN_OK, box.answer.error);
     TEST_ASSERT_EQUAL(0, kill(box.reader.pid, SIGSTOP));
@@ -304,13 +301,13 @@ static void test_process_answers_and_one_that_is_frozen_holds_up_nobody(void) {
         TEST_ASSERT_LESS_THAN(100000U, asked);
     }
     TEST_ASSERT_GREATER_THAN(64U, asked); // One of each client at the least.
-    TEST_ASSERT_EQUAL(GW_BOX_NO_ANSWER, gw_box_hear(&box));
+    TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_hear(&box));
     TEST_ASSERT_EQUAL(0, kill(box.reader.pid, SIGKILL));
-    wait_for_answer(GW_BOX_READER_ENDED);
+    wait_for_answer(GW_CHILD_ENDED);
     TEST_ASSERT_FALSE(gw_box_ask(&box, &question)); // Too soon.
     box.reader.started_us = 0;
     TEST_ASSERT_TRUE(gw_box_ask(&box, &question));
-    wait_for_answer(GW_BOX_ANSWER);
+    wait_for_answer(GW_CHILD_SAID);
     gw_box_close(&box);
 }
 
@@ -319,7 +316,7 @@ static void test_without_recordings_there_is_no_process(void) {
     open_box(0);
     TEST_ASSERT_EQUAL(-1, box.reader.fd);
     TEST_ASSERT_FALSE(gw_box_ask(&box, &question));
-    TEST_ASSERT_EQUAL(GW_BOX_NO_ANSWER, gw_box_hear(&box));
+    TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_hear(&box));
     gw_box_close(&box);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "box/tape.h"
+#include "wheels/tape.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -7,6 +7,7 @@
 
 static blackbox_ring_t *ring;
 static gw_tape_t tape;
+static iw_linux_hal_t port;
 static iw_hal_t hal;
 static blackbox_entry_t entries[BLACKBOX_ENTRIES_MIN];
 static size_t count;
@@ -15,29 +16,29 @@ static size_t count;
 static int send_answer, estop_answer, waiting;
 static iw_bus_state_t bus_answer;
 
-static int fake_send(void *context, const iw_can_frame_t *frame) {
+int iw_bus_send(iw_backend_store_t *context, const iw_can_frame_t *frame) {
     (void)context;
     (void)frame;
     return send_answer;
 }
 
-static int fake_receive(void *context, iw_can_frame_t *out_frame) {
+int iw_bus_receive(iw_backend_store_t *context, iw_can_frame_t *out_frame) {
     (void)context;
     *out_frame = (iw_can_frame_t){.id = 256, .dlc = 4, .data = {(uint8_t)waiting}};
     return (waiting > 0) ? waiting-- : 0;
 }
 
-static iw_bus_state_t fake_bus(void *context) {
+iw_bus_state_t iw_bus_state(iw_backend_store_t *context) {
     (void)context;
     return bus_answer;
 }
 
-static int fake_purge(void *context) {
+int iw_bus_purge(iw_backend_store_t *context) {
     (void)context;
     return 1;
 }
 
-static int fake_estop(void *context) {
+int iw_linux_hal_pressed(iw_linux_hal_t *context) {
     (void)context;
     return estop_answer;
 }
@@ -47,8 +48,7 @@ void setUp(void) {
     TEST_ASSERT_NOT_NULL(ring);
     blackbox_ring_init(ring, 0);
     gw_tape_init(&tape, ring);
-    const iw_hal_t inner = {fake_send, fake_receive, fake_bus, fake_purge, fake_estop, NULL};
-    hal = gw_tape_hal(&tape, &inner);
+    hal = gw_tape_hal(&tape, &port);
     send_answer = 1;
     estop_answer = 0;
     bus_answer = IW_BUS_ACTIVE;
@@ -199,8 +199,7 @@ static void test_few_frames_before_a_stop_are_all_there_is(void) {
 
 static void test_without_a_ring_nothing_is_noted_and_all_passes(void) {
     gw_tape_init(&tape, NULL);
-    const iw_hal_t inner = {fake_send, fake_receive, fake_bus, fake_purge, fake_estop, NULL};
-    hal = gw_tape_hal(&tape, &inner);
+    hal = gw_tape_hal(&tape, &port);
     waiting = 2;
     estop_answer = -1;
     step(1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The process that keeps what is known from one run to the next: what it reads, writes, sets aside and refuses to touch.
-#include "ledger/keeper.h"
+#include "disk/keeper.h"
 #include "process/owners.h"
 
 #include "unity.h"
@@ -18,7 +18,7 @@
 static size_t length;
 static char folder[] = "/tmp/iwheel-keeper-XXXXXX";
 static gw_keeper_t keeper;
-static char heard[GW_KEEPER_TEXT_MAX];
+static const char *heard;
 static int error;
 static char second[128];
 
@@ -28,9 +28,9 @@ void tearDown(void) {}
 
 static gw_keeper_news_t next_news(void) {
     gw_keeper_news_t news = GW_KEEPER_NO_NEWS;
-    struct pollfd wait = {.fd = keeper.fd, .events = POLLIN};
+    struct pollfd wait = {.fd = keeper.child.fd, .events = POLLIN};
     while (news == GW_KEEPER_NO_NEWS && poll(&wait, 1, 5000) == 1) {
-        news = gw_keeper_hear(&keeper, heard, &length, &error);
+        news = gw_keeper_hear(&keeper, &heard, &length, &error);
     }
     return news;
 }
@@ -208,12 +208,12 @@ static void test_keeper_uses_no_folder_in_which_others_can_put_things(void) {
 static void test_keeper_that_died_is_noticed_and_nothing_waits_for_it(void) {
     TEST_ASSERT_EQUAL_INT(0, gw_keeper_open(&keeper, folder, "file"));
     (void)next_news();
-    (void)shutdown(keeper.fd, SHUT_RDWR);
+    (void)shutdown(keeper.child.fd, SHUT_RDWR);
     (void)gw_keeper_write(&keeper, "new", 3);
     TEST_ASSERT_EQUAL_INT(GW_KEEPER_GONE, next_news());
     gw_keeper_close(&keeper);
     TEST_ASSERT_FALSE(gw_keeper_write(&keeper, "new", 3));
-    TEST_ASSERT_EQUAL_INT(GW_KEEPER_NO_NEWS, gw_keeper_hear(&keeper, heard, &length, &error));
+    TEST_ASSERT_EQUAL_INT(GW_KEEPER_NO_NEWS, gw_keeper_hear(&keeper, &heard, &length, &error));
 }
 
 int main(void) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The load of the bus, told once a second.
-#include "bus_load.h"
+#include "bus.h"
 
 #include "unity.h"
 

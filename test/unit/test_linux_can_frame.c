@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which frames the port asks the kernel for, and what it makes of them.
-#include "socketcan_frame.h"
+#include "socketcan_socket.h"
 
 #include "iwheel/codec.h"
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // How a GPIO line is named, and when its button counts as released.
-#include "gpio_address.h"
-#include "gpio_release.h"
+#include "gpio.h"
 
 #include "unity.h"
 

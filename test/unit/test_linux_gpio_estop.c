@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The e-stop on a GPIO line that the test plays: presses, pulses, a chip that goes and comes, a line that somebody else has.
-#include "gpio_line.h"
+#include "gpio.h"
 
 #include "iwheel_linux/backend.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A GPIO line through libgpiod, the same for both its generations: how it is asked for, read, lost and given back.
 #include "../support/fake_gpio.h"
-#include "gpio_line.h"
+#include "gpio.h"
 
 #include "unity.h"
 

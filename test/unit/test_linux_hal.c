@@ -23,8 +23,7 @@ void setUp(void) {
 void tearDown(void) {}
 
 static int look(void) {
-    const iw_hal_t functions = iw_linux_hal_functions(&hal);
-    return functions.estop_pressed(functions.context);
+    return iw_linux_hal_pressed(&hal);
 }
 
 static void test_estop_is_read_whole_by_whoever_does_not_wait(void) {

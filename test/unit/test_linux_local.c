@@ -20,7 +20,6 @@ static char folder[] = "/tmp/iwheel-linux-XXXXXX";
 static char bus_name[64];
 static char estop_name[64];
 static iw_linux_hal_t hal;
-static iw_hal_t functions;
 static int bus_listener;
 static int estop_listener;
 static int hub;
@@ -42,15 +41,15 @@ static void press(const char *levels) {
 }
 
 static int estop(void) {
-    return functions.estop_pressed(functions.context);
+    return iw_linux_hal_pressed(&hal);
 }
 
 static iw_bus_state_t bus(void) {
-    return functions.bus_state(functions.context);
+    return iw_bus_state(&hal.bus);
 }
 
 static int receive(iw_can_frame_t *out_frame) {
-    return functions.receive(functions.context, out_frame);
+    return iw_bus_receive(&hal.bus, out_frame);
 }
 
 static void tell(uint32_t id, uint8_t dlc, uint8_t mark, uint8_t fill) {
@@ -70,7 +69,6 @@ void setUp(void) {
     bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
     now_us = 1000000;
     TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&hal, bus_name, &(iw_estop_wish_t){.name = estop_name}, &culprit));
-    functions = iw_linux_hal_functions(&hal);
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
     TEST_ASSERT_EQUAL_INT(-1, estop());
@@ -92,7 +90,7 @@ static void test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark(
     const iw_can_frame_t frame = {.id = 266, .dlc = 5, .data = {1, 2, 3, 4, 5}};
     struct can_frame raw;
     iw_can_frame_t heard;
-    TEST_ASSERT_TRUE(functions.send(functions.context, &frame) > 0);
+    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) > 0);
     TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
     TEST_ASSERT_EQUAL_HEX32(266, raw.can_id);
     TEST_ASSERT_EQUAL_UINT8(5, raw.len);
@@ -172,7 +170,7 @@ static void test_local_batch_half_taken_when_the_hub_goes_is_forgotten(void) {
     }
     TEST_ASSERT_EQUAL_INT(1, receive(&heard));
     (void)close(hub);
-    TEST_ASSERT_TRUE(functions.send(functions.context, &frame) < 0);
+    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) < 0);
     iw_linux_hal_tend(&hal, now_us); // Back at once.
     hub = accept(bus_listener, NULL, NULL);
     TEST_ASSERT_TRUE(hub >= 0);
@@ -194,7 +192,7 @@ static void test_local_hub_away_is_down_and_retried_no_more_often_than_the_back_
         TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) > now_us);
         TEST_ASSERT_TRUE(iw_linux_hal_next_us(&hal) <= now_us + 200000U);
         TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
-        TEST_ASSERT_TRUE(functions.send(functions.context, &frame) < 0);
+        TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) < 0);
         TEST_ASSERT_TRUE(receive(&heard) < 0);
         now_us += 1000;
     }
@@ -261,7 +259,7 @@ static void test_local_full_hub_means_later_and_nothing_is_lost_or_blocked(void)
     unsigned sent = 0;
     int result = 1;
     while (result > 0) {
-        result = functions.send(functions.context, &frame);
+        result = iw_bus_send(&hal.bus, &frame);
         sent += (result > 0) ? 1U : 0U;
         TEST_ASSERT_LESS_THAN_UINT(100000, sent);
     }
@@ -273,12 +271,12 @@ static void test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_lo
     const iw_can_frame_t frame = {.id = 266, .dlc = 5};
     struct can_frame raw;
     iw_can_frame_t heard;
-    TEST_ASSERT_TRUE(functions.send(functions.context, &frame) > 0);
+    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) > 0);
     TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NONE, iw_linux_hal_link(&hal)->purge);
-    TEST_ASSERT_EQUAL_INT(0, functions.purge(functions.context));
+    TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&hal.bus));
     TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, iw_linux_hal_link(&hal)->purge);
     const uint32_t changes = iw_linux_hal_link(&hal)->changes;
-    TEST_ASSERT_EQUAL_INT(0, functions.purge(functions.context)); // There is nothing to leave.
+    TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&hal.bus)); // There is nothing to leave.
     TEST_ASSERT_EQUAL_UINT32(changes, iw_linux_hal_link(&hal)->changes);
     TEST_ASSERT_EQUAL_INT((int)sizeof raw, (int)recv(hub, &raw, sizeof raw, 0));
     TEST_ASSERT_EQUAL_INT(0, (int)recv(hub, &raw, sizeof raw, 0)); // The end: the hub drops what it holds.
@@ -289,7 +287,7 @@ static void test_local_purge_leaves_the_hub_and_comes_back_which_is_told_as_a_lo
     TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
     TEST_ASSERT_EQUAL_INT(0, receive(&heard)); // No echo of before.
-    TEST_ASSERT_TRUE(functions.send(functions.context, &frame) > 0);
+    TEST_ASSERT_TRUE(iw_bus_send(&hal.bus, &frame) > 0);
 }
 
 static void test_estop_is_unreadable_until_the_button_has_spoken(void) {
@@ -365,8 +363,7 @@ static void test_hal_without_an_estop_is_released_and_watches_nothing(void) {
     static iw_linux_hal_t other;
     const char *culprit = NULL;
     TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&other, bus_name, &(iw_estop_wish_t){.name = "none"}, &culprit));
-    const iw_hal_t none = iw_linux_hal_functions(&other);
-    TEST_ASSERT_EQUAL_INT(0, none.estop_pressed(none.context));
+    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_pressed(&other));
     TEST_ASSERT_EQUAL_INT(-1, iw_linux_hal_estop_fd(&other));
     TEST_ASSERT_FALSE(other.estop_ops->present);
     iw_linux_hal_close(&other);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // SocketCAN over an interface played by the test: states, losses, what is old, what is forged. No kernel, no time, no rights.
 #include "fake_interface.h"
-#include "netlink_restart.h"
 
 #include "iwheel_linux/backend.h"
 
@@ -26,7 +25,7 @@ int socket(int domain, int type, int protocol) {
 }
 
 static void tend(void) {
-    iw_socketcan_ops->tend(&store, now_us);
+    iw_bus_tend(&store, now_us);
 }
 
 static void wait_ms(unsigned ms) {
@@ -35,11 +34,11 @@ static void wait_ms(unsigned ms) {
 }
 
 static iw_bus_state_t state(void) {
-    return iw_socketcan_ops->state(&store);
+    return iw_bus_state(&store);
 }
 
 static int receive(iw_can_frame_t *out_frame) {
-    return iw_socketcan_ops->receive(&store, out_frame);
+    return iw_bus_receive(&store, out_frame);
 }
 
 /// Takes all there is; the number of frames.
@@ -53,23 +52,23 @@ static unsigned drain(void) {
 }
 
 static int send_setpoint(void) {
-    return iw_socketcan_ops->send(&store, &setpoint);
+    return iw_bus_send(&store, &setpoint);
 }
 
 static const iw_bus_link_t *link_now(void) {
-    return iw_socketcan_ops->link(&store);
+    return iw_bus_link(&store);
 }
 
 void setUp(void) {
     now_us = 5000000;
     fake_interface_init();
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_ops->open(&store, "can0"));
+    TEST_ASSERT_EQUAL_INT(0, iw_bus_open(&store, "can0"));
     tend();
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
 void tearDown(void) {
-    iw_socketcan_ops->close(&store);
+    iw_bus_close(&store);
 }
 
 static void test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once(void) {
@@ -111,7 +110,7 @@ static void test_bus_off_that_lasts_is_told_until_the_controller_is_back(void) {
     wait_ms(200);
     (void)state();
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
-    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_socketcan_ops->next_us(&store));
+    TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_bus_next_us(&store));
 }
 
 static void test_bus_off_that_was_forged_is_told_once_and_checked_at_once(void) {
@@ -268,7 +267,7 @@ static void test_down_interface_is_looked_at_no_more_often_than_its_news_and_its
     fake_interface.presence = IW_LINK_DOWN;
     wait_ms(1);
     tend();
-    TEST_ASSERT_EQUAL_UINT64(now_us + 200000U, iw_socketcan_ops->next_us(&store));
+    TEST_ASSERT_EQUAL_UINT64(now_us + 200000U, iw_bus_next_us(&store));
     const unsigned before = fake_interface.readings;
     fake_interface.presence = IW_LINK_UP;
     wait_ms(199);
@@ -284,8 +283,8 @@ static void test_full_queue_is_no_loss(void) {
 }
 
 static void test_purge_restarts_the_link_once_and_tells_how_it_ended(void) {
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_ops->purge(&store));
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_ops->purge(&store));
+    TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&store));
+    TEST_ASSERT_EQUAL_INT(0, iw_bus_purge(&store));
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
     TEST_ASSERT_EQUAL_INT(3, fake_interface.restarted);
     const uint32_t changes = link_now()->changes;
@@ -293,25 +292,25 @@ static void test_purge_restarts_the_link_once_and_tells_how_it_ended(void) {
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, link_now()->purge);
     TEST_ASSERT_TRUE(link_now()->changes != changes);
-    (void)iw_socketcan_ops->purge(&store);
+    (void)iw_bus_purge(&store);
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.restarts);
 }
 
 static void test_purge_that_was_not_allowed_is_not_tried_again(void) {
-    (void)iw_socketcan_ops->purge(&store);
+    (void)iw_bus_purge(&store);
     fake_interface.restart_result = EPERM;
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NOT_ALLOWED, link_now()->purge);
-    (void)iw_socketcan_ops->purge(&store);
+    (void)iw_bus_purge(&store);
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
 }
 
 static void test_purge_where_the_echo_proves_nothing_leaves_the_link_alone(void) {
-    iw_socketcan_ops->close(&store);
+    iw_bus_close(&store);
     fake_interface_init();
     fake_interface.link.echo_proven = false;
-    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_ops->open(&store, "vcan0"));
-    (void)iw_socketcan_ops->purge(&store);
+    TEST_ASSERT_EQUAL_INT(0, iw_bus_open(&store, "vcan0"));
+    (void)iw_bus_purge(&store);
     TEST_ASSERT_EQUAL_UINT(0, fake_interface.restarts);
 }
 

@@ -2,7 +2,7 @@
 // What is assumed about the wheels, what is known, and the operator's word on it.
 #include "settings/similar.h"
 #include "talk/ctl.h"
-#include "text/paper.h"
+#include "talk/words.h"
 #include "text/text.h"
 
 #include "iwheel_northbound/words.h"
@@ -45,7 +45,7 @@ static void print_state(const paper_t *paper, json_t *ledger, const char *state,
 
 int verb_ledger(ctl_t *self, int count, char **words) {
     json_t *status = NULL;
-    if (!ctl_words_at_most("ledger", count, 0, words)) {
+    if (!words_at_most("ledger", count, 0, words)) {
         return CTL_USAGE;
     }
     const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "status"), &status);
@@ -76,7 +76,7 @@ static json_t *compose(int count, char **words, const char **out_item) {
             plain[plains++] = words[i];
         }
     }
-    if (!ctl_words_at_most("confirm", plains, 2, plain)) {
+    if (!words_at_most("confirm", plains, 2, plain)) {
         return NULL;
     }
     if (plains == 0) {

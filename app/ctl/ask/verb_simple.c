@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Verbs that are one request and one answer.
 #include "talk/ctl.h"
+#include "talk/words.h"
 #include "text/text.h"
+
+#include "iwheel_northbound/text.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -37,30 +40,27 @@ static int ask_and_tell_state(ctl_t *self, json_t *request) {
 }
 
 int verb_stop(ctl_t *self, int count, char **words) {
-    if (!ctl_words_at_most("stop", count, 0, words)) {
+    if (!words_at_most("stop", count, 0, words)) {
         return CTL_USAGE;
     }
     return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "stop"));
 }
 
 int verb_estop(ctl_t *self, int count, char **words) {
-    char reason[201] = "";
-    size_t used = 0;
+    char reason[201];
+    iwn_text_t text = iwn_text_begin(reason, sizeof reason);
     for (int i = 0; i < count; i++) {
-        const int n = snprintf(reason + used, sizeof reason - used, "%s%s", (i > 0) ? " " : "", words[i]);
-        used += (n > 0 && (size_t)n < sizeof reason - used) ? (size_t)n : sizeof reason - used - 1U;
+        IWN_TEXT_JOIN(&text, (i > 0) ? " " : "", words[i]);
     }
     json_t *request = json_pack("{s:s}", "cmd", "estop");
-    json_t *text = json_string(reason);
-    if (used > 0 && text != NULL) {
-        (void)json_object_set(request, "reason", text);
+    if (text.length > 0U) {
+        (void)json_object_set_new(request, "reason", json_string(reason)); // None if it is no UTF-8.
     }
-    json_decref(text);
     return ask_and_tell_state(self, request);
 }
 
 int verb_reset(ctl_t *self, int count, char **words) {
-    if (!ctl_words_at_most("reset", count, 0, words)) {
+    if (!words_at_most("reset", count, 0, words)) {
         return CTL_USAGE;
     }
     return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "reset"));
@@ -88,7 +88,7 @@ static void print_tare(const json_t *reply, const char *side) {
 int verb_tare(ctl_t *self, int count, char **words) {
     json_t *reply = NULL;
     const char *side = (count > 0) ? words[0] : NULL;
-    if (!ctl_words_at_most("tare", count, 1, words)) {
+    if (!words_at_most("tare", count, 1, words)) {
         return CTL_USAGE;
     }
     if (side != NULL && strcmp(side, "left") != 0 && strcmp(side, "right") != 0) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "talk/ctl.h"
-#include "talk/signals.h"
 
 #include "iwheel_northbound/text.h"
 #include "iwheel_northbound/words.h"

@@ -6,11 +6,13 @@
 /// Everything that moves goes through a gateway of its own, started for the session with a trial configuration (slow,
 /// little current), so that the core's limits, lease and e-stop hold here as they do later. Each step puts what it found
 /// into `config`, and how it was found into a note. Whatever is not found out stays as it was and is said to be assumed.
+/// What cannot go on, and an operator who wants to end, ends the program at that place (`bringup_fail`, `bringup_quit`).
 /// A value is confirmed only if all that its sentence claims was seen, on both wheels where it speaks of both.
 #ifndef BRINGUP_H
 #define BRINGUP_H
 
 #include "doctor/doctor.h"
+#include "text/text.h"
 
 /// Wheels in the air: as slow as a sign can be seen from, and no longer than a look takes.
 #define BRINGUP_SPEED_MM_S  100
@@ -20,12 +22,6 @@
 #define BRINGUP_STEPS       10U
 #define BRINGUP_NOTES       16U
 #define BRINGUP_ANSWER_SIZE 160U
-
-typedef enum {
-    BRINGUP_ON = 0, ///< The step is done.
-    BRINGUP_QUIT,   ///< The operator wants to end, or nobody answers any more.
-    BRINGUP_FAILED, ///< It cannot go on; the reason was told.
-} bringup_result_t;
 
 /// How a value was found.
 typedef struct {
@@ -91,15 +87,15 @@ __attribute__((format(printf, 1, 2))) void talk_say(const char *format, ...);
 /// A heading.
 void talk_step(unsigned number, const char *title);
 
-/// Asks and reads a line; what was typed before the question is thrown away. An empty line stands for `otherwise`. False
-/// if the operator wants to quit (q, end of input, Ctrl-C).
-bool talk_ask(const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]);
+/// Asks and reads a line; what was typed before the question is thrown away. An empty line stands for `otherwise`. Ends
+/// bringup if the operator wants to quit (q, end of input, Ctrl-C).
+void talk_ask(bringup_t *self, const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]);
 
 /// The same for yes or no.
-bool talk_yes(const char *question, bool otherwise, bool *out_yes);
+bool talk_yes(bringup_t *self, const char *question, bool otherwise);
 
-/// A number within the bounds, asked for until it is one; `*out_given` is false after an empty line.
-bool talk_number(const char *question, double low, double high, double *out_number, bool *out_given);
+/// A number within the bounds, asked for until it is one; false after an empty line.
+bool talk_number(bringup_t *self, const char *question, double low, double high, double *out_number);
 
 /// Forgets what was typed before the question.
 void talk_forget(void);
@@ -112,9 +108,11 @@ bool talk_key_pressed(void);
 
 // --- the trial gateway (bringup_trial.c, bringup_burst.c) --------------------------------------------------------
 
-/// Starts one with `config` on the bus, made slow; the former one ends. Without `with_records` it keeps and finds nothing
-/// of the real gateway's. False after telling why not.
-bool trial_start(bringup_t *self, const gateway_config_t *config, bool with_records);
+/// Starts one with `config` on the bus, made slow; the former one ends. It keeps and finds nothing of the real gateway's.
+/// Ends bringup after telling why not.
+void trial_start(bringup_t *self, const gateway_config_t *config);
+/// The same with the real gateway's records and the configuration found. False after telling why not.
+bool trial_start_with_records(bringup_t *self);
 void trial_stop(bringup_t *self);
 /// Ends it and removes its folder.
 void trial_close(bringup_t *self);
@@ -125,40 +123,45 @@ bool trial_wait_ready(bringup_t *self);
 
 /// Arms, drives, stops and waits until both stand. Any key stops at once.
 void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
-/// The same, told to the operator before and after, and offered again when it went wrong. BRINGUP_ON: it was done;
-/// BRINGUP_FAILED: it was not, and the operator wants no more of it.
-bringup_result_t burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
+/// The same, told to the operator before and after, and offered again when it went wrong. False: it was not done, and the
+/// operator wants no more of it.
+bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
+/// The same; ends bringup if it was not done.
+void burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome);
 
 // --- by hand (bringup_hand.c) ------------------------------------------------------------------------------------
 
-/// Prompts, and adds up what the wheels count until Enter. False if the operator wants to quit.
-bool hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand);
+/// Waits until both wheels stand, prompts, and adds up what they count until Enter. Ends bringup if they do not stand, or the
+/// operator wants to quit.
+void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand);
 
 /// Hardly any of its way was back again.
 bool hand_went_one_way(const hand_t *hand, iw_side_t side);
 
 // --- the steps ---------------------------------------------------------------------------------------------------
 
-bringup_result_t bringup_checks(bringup_t *self);
-bringup_result_t bringup_estop(bringup_t *self);
+void bringup_checks(bringup_t *self);
+void bringup_estop(bringup_t *self);
+void bringup_gear(bringup_t *self);
+void bringup_type(bringup_t *self);
+void bringup_role(bringup_t *self);
+void bringup_signs(bringup_t *self);
+void bringup_force(bringup_t *self);
+void bringup_radius(bringup_t *self);
+void bringup_track(bringup_t *self);
+void bringup_write(bringup_t *self);
+
+// --- what they share ---------------------------------------------------------------------------------------------
+
+/// The operator wants to end, or nobody answers any more: the session's gateway ends, its folder goes, nothing is written.
+_Noreturn void bringup_quit(bringup_t *self);
+/// The same because it cannot go on; the reason was told.
+_Noreturn void bringup_fail(bringup_t *self);
+
 /// Both wheels forwards, with current, as a try of the type.
 burst_t bringup_ahead(const bringup_t *self, unsigned for_ms);
 /// A trial gateway that sends this type, with the role under which a zero surely is no torque.
-bool bringup_start_with(bringup_t *self, int type);
-bringup_result_t bringup_gear(bringup_t *self);
-bringup_result_t bringup_type(bringup_t *self);
-/// The setpoint types in the recording, such as "3,1"; and takes over its length. False, after telling, if there is none.
-bool bringup_learn(bringup_t *self, char *out_types, size_t size);
-bringup_result_t bringup_role(bringup_t *self);
-bringup_result_t bringup_signs(bringup_t *self);
-bringup_result_t bringup_force(bringup_t *self);
-bringup_result_t bringup_radius(bringup_t *self);
-bringup_result_t bringup_track(bringup_t *self);
-bringup_result_t bringup_write(bringup_t *self);
-
-/// "left" or "right".
-const char *bringup_side(iw_side_t side);
-
+void bringup_start_with(bringup_t *self, int type);
 /// A note confirms that item of the ledger.
 bool bringup_is_confirmed(const bringup_t *self, const char *item);
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Before anything turns: the checks of doctor, and the e-stop.
 #include "bringup.h"
-#include "talk/signals.h"
-#include "text/text.h"
 
 #include <poll.h>
 #include <stdio.h>
@@ -14,12 +12,11 @@
 #define RELEASED_US 500000
 #define LOOK_NS     20000000L
 
-bringup_result_t bringup_checks(bringup_t *self) {
+void bringup_checks(bringup_t *self) {
     doctor_t *doctor = calloc(1, sizeof(*doctor));
-    bringup_result_t result = BRINGUP_ON;
     if (doctor == NULL) {
         (void)ctl_fail(CTL_INTERNAL, "out of memory");
-        return BRINGUP_FAILED;
+        bringup_fail(self);
     }
     talk_step(1, "checks (nothing is sent)");
     doctor->ctl = self->ctl;
@@ -28,28 +25,29 @@ bringup_result_t bringup_checks(bringup_t *self) {
     doctor->bus = self->config.bus.interface;
     inspect_begin(&doctor->findings);
     near_look(self->ctl, doctor->bus, &doctor->gateway);
-    if (doctor->gateway.result == NEAR_FOUND) {
+    bool good = doctor->gateway.result != NEAR_FOUND;
+    if (!good) {
         talk_say("A gateway already runs on this bus (%s). Two cannot drive the same wheels: stop it "
                  "(systemctl stop iwheel-gateway, or end its terminal), then start bringup again.",
                  doctor->gateway.path);
-        result = BRINGUP_FAILED;
     } else if (doctor_look_at_machine(doctor)) {
         doctor_look_at_bus(doctor);
     }
     doctor_print(doctor, 0);
-    if (result == BRINGUP_ON && doctor->findings.total[INSPECT_FAIL] > 0U) {
+    if (good && doctor->findings.total[INSPECT_FAIL] > 0U) {
         talk_say("Mend what failed (each line tells how), then start bringup again.");
-        result = BRINGUP_FAILED;
+        good = false;
     }
     doctor_close(doctor);
     client_close(&self->ctl->client);
     free(doctor);
-    return result;
+    if (!good) {
+        bringup_fail(self);
+    }
 }
 
-/// Waits for the e-stop's state as the gateway sees it. BRINGUP_FAILED: it did not come in that time, or a key was
-/// pressed.
-static bringup_result_t await_estop(bringup_t *self, const char *wanted, int64_t for_us) {
+/// Waits for the e-stop's state as the gateway sees it. False: it did not come in that time, or a key was pressed.
+static bool await_estop(bringup_t *self, const char *wanted, int64_t for_us) {
     const int64_t end_us = client_now_us() + for_us;
     const unsigned signals = signals_count();
     const struct timespec pause = {0, LOOK_NS};
@@ -62,60 +60,52 @@ static bringup_result_t await_estop(bringup_t *self, const char *wanted, int64_t
         (void)ppoll(NULL, 0, &pause, signals_let_in());
     }
     talk_keys_end();
-    return (signals_count() != signals) ? BRINGUP_QUIT : there ? BRINGUP_ON : BRINGUP_FAILED;
+    if (signals_count() != signals) {
+        bringup_quit(self);
+    }
+    return there;
 }
 
-static bringup_result_t go_without(bringup_t *self) {
-    bool yes = false;
+static void go_without(bringup_t *self) {
     talk_say("There is NO e-stop line. Then only the keyboard, the wheels' own one-second watchdog and their power "
              "switch stop them. Better: wire a button, name it with --estop LINE, and begin again.");
-    if (!talk_yes("Go on without one?", false, &yes) || !yes) {
-        return BRINGUP_QUIT;
+    if (!talk_yes(self, "Go on without one?", false)) {
+        bringup_quit(self);
     }
     bringup_note(self, "estop", "line", NULL, "there was no e-stop");
-    return BRINGUP_ON;
 }
 
-/// What was waited for did not come, or the operator wants to end.
-static bringup_result_t no_edge(const bringup_t *self, bringup_result_t seen, const char *edge, const char *also) {
-    if (seen == BRINGUP_FAILED) {
+/// Without this edge it does not go on.
+static void need_edge(bringup_t *self, const char *wanted, const char *edge, const char *also) {
+    if (!await_estop(self, wanted, PRESS_US)) {
         talk_say("No %s was seen on %s. Check its wire, %s[estop] active; then begin again.", edge,
                  self->config.estop.line, also);
+        bringup_fail(self);
     }
-    return seen;
 }
 
-bringup_result_t bringup_estop(bringup_t *self) {
+void bringup_estop(bringup_t *self) {
     talk_step(2, "the e-stop (nothing is sent)");
     if (strcmp(self->config.estop.line, "none") == 0) {
-        return go_without(self);
+        go_without(self);
+        return;
     }
-    if (!trial_start(self, &self->config, false)) {
-        return BRINGUP_FAILED;
-    }
+    trial_start(self, &self->config);
     // A press is one only if it was not pressed before.
-    bringup_result_t seen = await_estop(self, "released", RELEASED_US);
-    if (seen == BRINGUP_FAILED) {
+    if (!await_estop(self, "released", RELEASED_US)) {
         talk_say(
             "The e-stop reads as pressed already. Release it now; if it is not pressed, its wire is cut or [estop] "
             "active is the wrong way round ...");
-        seen = await_estop(self, "released", PRESS_US);
-    }
-    if (seen != BRINGUP_ON) {
-        return no_edge(self, seen, "release", "");
+        need_edge(self, "released", "release", "");
     }
     talk_say("Press the e-stop button now ...");
-    seen = await_estop(self, "pressed", PRESS_US);
-    if (seen != BRINGUP_ON) {
-        return no_edge(self, seen, "press", "[estop] line and ");
-    }
+    need_edge(self, "pressed", "press", "[estop] line and ");
     talk_say("Seen. Release it ...");
-    seen = await_estop(self, "released", PRESS_US);
-    if (seen != BRINGUP_ON) {
-        return no_edge(self, seen, "release", "");
-    }
+    need_edge(self, "released", "release", "");
     talk_say("Seen. It will stop the wheels in everything that follows, and so does any key.");
     bringup_note(self, "estop", "line", NULL, "press and release were seen%s",
                  (strncmp(self->config.estop.line, "unix:", 5U) == 0) ? " (a SIMULATED button)" : "");
-    return trial_wait_ready(self) ? BRINGUP_ON : BRINGUP_FAILED;
+    if (!trial_wait_ready(self)) {
+        bringup_fail(self);
+    }
 }

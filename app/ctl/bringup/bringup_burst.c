@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A short, slow turn of the wheels, which any key ends.
 #include "bringup.h"
-#include "talk/signals.h"
-#include "text/text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -55,7 +53,7 @@ static bool is_told(const json_t *wheel, const char *field, int wanted) {
 
 static bool is_in_force(const burst_t *burst, const json_t *state) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *wheel = json_object_get(state, (side == IW_LEFT) ? "left" : "right");
+        const json_t *wheel = json_object_get(state, text_side(side));
         if (!is_told(wheel, "applied_mm_s", burst->speed_mm_s[side]) ||
             (burst->has_current && !is_told(wheel, "applied_mA", burst->current_mA[side]))) {
             return false;
@@ -67,7 +65,7 @@ static bool is_in_force(const burst_t *burst, const json_t *state) {
 /// The speeds of both wheels in a snapshot. False if one is not known: an unknown speed is no standstill.
 static bool speeds_of(const json_t *state, int out_mm_s[IW_SIDES]) {
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *speed = json_object_get(json_object_get(state, bringup_side((iw_side_t)side)), "speed_mm_s");
+        const json_t *speed = json_object_get(json_object_get(state, text_side(side)), "speed_mm_s");
         if (!json_is_integer(speed)) {
             return false;
         }
@@ -163,7 +161,7 @@ static bool ran_away(run_t *run, const json_t *why) {
     }
     for (unsigned side = 0; side < IW_SIDES; side++) {
         int *peak = &run->outcome->peak_mm_s[side];
-        const bool told = strcmp(side_word, bringup_side((iw_side_t)side)) == 0 || strcmp(side_word, "both") == 0;
+        const bool told = strcmp(side_word, text_side(side)) == 0 || strcmp(side_word, "both") == 0;
         *peak = (told && abs(measured) > abs(*peak)) ? measured : *peak;
     }
     run->enough = true;
@@ -240,20 +238,23 @@ void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     }
 }
 
-bringup_result_t burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
-    for (bool again = true; again;) {
+bool burst_show(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
+    do {
         (void)fputs("  ... now; any key stops it\n", stdout);
         (void)fflush(stdout);
         burst_run(self, burst, out_outcome);
         if (out_outcome->end == BURST_DONE) {
             talk_say("  left %d mm/s, right %d mm/s measured", out_outcome->mean_mm_s[IW_LEFT],
                      out_outcome->mean_mm_s[IW_RIGHT]);
-            return BRINGUP_ON;
+            return true;
         }
         talk_say("  %s: %s", (out_outcome->end == BURST_REFUSED) ? "It did not begin" : "STOPPED", out_outcome->why);
-        if (!talk_yes("Once more?", false, &again)) {
-            return BRINGUP_QUIT;
-        }
+    } while (talk_yes(self, "Once more?", false));
+    return false;
+}
+
+void burst_insist(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
+    if (!burst_show(self, burst, out_outcome)) {
+        bringup_fail(self);
     }
-    return BRINGUP_FAILED;
 }

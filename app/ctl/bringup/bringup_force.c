@@ -3,7 +3,6 @@
 //
 // Only a known mass tells a unit. Without one the unit stays assumed.
 #include "bringup.h"
-#include "talk/signals.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -25,8 +24,6 @@
 /// A sway of more than this share of the change is a hand.
 #define SWAY 0.5
 
-static const char *const names[IW_SIDES] = {[IW_LEFT] = "left", [IW_RIGHT] = "right"};
-
 /// The raw force over two seconds.
 typedef struct {
     double mean;
@@ -35,7 +32,9 @@ typedef struct {
     bool heard; ///< All the time, hardly a look without it.
 } force_t;
 
+/// Ends bringup after a signal.
 static force_t look_at_force(bringup_t *self, iw_side_t side) {
+    const unsigned signals = signals_count();
     const struct timespec pause = {0, LOOK_NS};
     const struct timespec settle = {0, SETTLE_NS};
     force_t force = {.low = INT16_MAX, .high = INT16_MIN};
@@ -46,7 +45,7 @@ static force_t look_at_force(bringup_t *self, iw_side_t side) {
     (void)nanosleep(&settle, NULL);
     for (int i = 0; i < LOOKS; i++) {
         json_t *status = trial_status(self);
-        const json_t *raw = json_object_get(json_object_get(status, names[side]), "force_raw");
+        const json_t *raw = json_object_get(json_object_get(status, text_side(side)), "force_raw");
         if (json_is_integer(raw)) {
             const long long value = json_integer_value(raw);
             sum += (double)value;
@@ -56,6 +55,9 @@ static force_t look_at_force(bringup_t *self, iw_side_t side) {
         }
         json_decref(status);
         (void)nanosleep(&pause, NULL);
+    }
+    if (signals_count() != signals) {
+        bringup_quit(self);
     }
     force.mean = (count > 0) ? sum / count : 0.0;
     force.heard = count >= LOOKS * 9 / 10;
@@ -85,14 +87,15 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
         talk_say("  %.1f counts per newton are neither cN (100) nor dN (10): the unit stays assumed. Was the whole "
                  "mass on this handle?",
                  per_N);
-        bringup_note(self, names[side], "force_unit", NULL, "assumed: %.1f counts per N fit neither cN nor dN", per_N);
+        bringup_note(self, text_side(side), "force_unit", NULL, "assumed: %.1f counts per N fit neither cN nor dN",
+                     per_N);
         return;
     }
     self->config.core.force_unit[side] = cn ? IW_FORCE_CN : IW_FORCE_DN;
     talk_say("  %.0f counts for %.1f N: the unit is %s%s.%s", fabs(counts), mass_kg * G_N_PER_kg, word,
              (self->config.core.force_unit[side] == before) ? "" : ", other than configured until now",
              (counts < 0.0) ? " The force counts downwards: pressing is negative." : "");
-    bringup_note(self, names[side], "force_unit", (side == IW_LEFT) ? "force_unit_left" : "force_unit_right",
+    bringup_note(self, text_side(side), "force_unit", (side == IW_LEFT) ? "force_unit_left" : "force_unit_right",
                  "%.2f kg changed the raw force by %.0f counts%s", mass_kg, counts,
                  (counts < 0.0) ? "; pressing makes it smaller" : "");
 }
@@ -100,20 +103,19 @@ static void keep_unit(bringup_t *self, iw_side_t side, double counts, double mas
 /// Without a mass: only whether the handle is this wheel's, and which way it counts.
 static void tell_press(bringup_t *self, iw_side_t side, double counts) {
     if (fabs(counts) < COUNTS_MIN) {
-        talk_say("  Nothing changed on the %s wheel. Is this its handle?", names[side]);
-        bringup_note(self, names[side], "force_unit", NULL, "assumed: pressing the handle changed nothing");
+        talk_say("  Nothing changed on the %s wheel. Is this its handle?", text_side(side));
+        bringup_note(self, text_side(side), "force_unit", NULL, "assumed: pressing the handle changed nothing");
         return;
     }
     talk_say("  Pressing changed the raw force by %.0f counts. Its unit stays assumed: only a known mass tells it.",
              counts);
-    bringup_note(self, names[side], "force_unit", NULL, "assumed; pressing changed the raw force by %.0f counts",
+    bringup_note(self, text_side(side), "force_unit", NULL, "assumed; pressing changed the raw force by %.0f counts",
                  counts);
 }
 
-static bringup_result_t tell_deaf(bringup_t *self, iw_side_t side) {
-    talk_say("  The %s wheel's force was not heard all the time; its unit stays assumed.", names[side]);
-    bringup_note(self, names[side], "force_unit", NULL, "assumed: no force was heard");
-    return BRINGUP_ON;
+static void tell_deaf(bringup_t *self, iw_side_t side) {
+    talk_say("  The %s wheel's force was not heard all the time; its unit stays assumed.", text_side(side));
+    bringup_note(self, text_side(side), "force_unit", NULL, "assumed: no force was heard");
 }
 
 /// A mass tells the unit only of a force that stands still and is not at its end.
@@ -121,7 +123,7 @@ static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, cons
     if (is_at_its_end(free) || is_at_its_end(loaded)) {
         talk_say("  The raw force is at the end of its range (%lld to %lld); the unit stays assumed. Take less mass.",
                  loaded->low, loaded->high);
-        bringup_note(self, names[side], "force_unit", NULL, "assumed: the force was at the end of its range");
+        bringup_note(self, text_side(side), "force_unit", NULL, "assumed: the force was at the end of its range");
         return false;
     }
     const double change = loaded->mean - free->mean;
@@ -129,76 +131,50 @@ static bool is_usable(bringup_t *self, iw_side_t side, const force_t *free, cons
         talk_say("  The force swayed (free %lld to %lld, loaded %lld to %lld): was the handle or the mass touched "
                  "meanwhile? The unit stays assumed.",
                  free->low, free->high, loaded->low, loaded->high);
-        bringup_note(self, names[side], "force_unit", NULL, "assumed: the force swayed while it was weighed");
+        bringup_note(self, text_side(side), "force_unit", NULL, "assumed: the force swayed while it was weighed");
         return false;
     }
     return true;
 }
 
-/// One handle. `*out_again`: it told nothing, and the operator wants to try again.
-static bringup_result_t measure(bringup_t *self, iw_side_t side, bool *out_again) {
+/// One handle. True: it told nothing, and the operator wants to try again.
+static bool measure(bringup_t *self, iw_side_t side) {
     char question[112];
     char answer[BRINGUP_ANSWER_SIZE];
     double mass_kg = 0.0;
-    const unsigned signals = signals_count();
-    force_t free;
-    force_t loaded;
-    bool weighed = false;
-    *out_again = false;
     (void)snprintf(question, sizeof question, "Mass in kg that you will put on the %s handle (Enter: press by hand)",
-                   names[side]);
-    if (!talk_number(question, MASS_MIN_kg, MASS_MAX_kg, &mass_kg, &weighed) ||
-        !talk_ask("Hands and weights off both handles, then Enter", "go", answer)) {
-        return BRINGUP_QUIT;
-    }
-    free = look_at_force(self, side);
-    if (signals_count() != signals) {
-        return BRINGUP_QUIT;
-    }
+                   text_side(side));
+    const bool weighed = talk_number(self, question, MASS_MIN_kg, MASS_MAX_kg, &mass_kg);
+    talk_ask(self, "Hands and weights off both handles, then Enter", "go", answer);
+    const force_t free = look_at_force(self, side);
     if (!free.heard) {
-        return tell_deaf(self, side);
+        tell_deaf(self, side);
+        return false;
     }
     (void)snprintf(question, sizeof question, "Now %s the %s handle and leave it so, then Enter",
-                   weighed ? "put the mass on" : "press", names[side]);
-    if (!talk_ask(question, "go", answer)) {
-        return BRINGUP_QUIT;
-    }
-    loaded = look_at_force(self, side);
-    if (signals_count() != signals) {
-        return BRINGUP_QUIT;
-    }
+                   weighed ? "put the mass on" : "press", text_side(side));
+    talk_ask(self, question, "go", answer);
+    const force_t loaded = look_at_force(self, side);
     if (!loaded.heard) {
-        return tell_deaf(self, side);
-    }
-    if (!weighed) {
+        tell_deaf(self, side);
+    } else if (!weighed) {
         tell_press(self, side, loaded.mean - free.mean);
     } else if (is_usable(self, side, &free, &loaded)) {
         keep_unit(self, side, loaded.mean - free.mean, mass_kg);
-    } else if (!talk_yes("Once more?", true, out_again)) {
-        return BRINGUP_QUIT;
+    } else {
+        return talk_yes(self, "Once more?", true);
     }
-    return BRINGUP_ON;
+    return false;
 }
 
-bringup_result_t bringup_force(bringup_t *self) {
-    bool wanted = false;
+void bringup_force(bringup_t *self) {
     talk_step(7, "the force (nothing turns)");
     talk_say("The document gives cN for the left and dN for the right handle, a factor of ten. A mass that you know "
              "(a bag of %.1f kg or more) settles it.",
              MASS_MIN_kg);
-    if (!trial_start(self, &self->config, false)) {
-        return BRINGUP_FAILED;
-    }
-    if (!talk_yes("Measure the force?", true, &wanted)) {
-        return BRINGUP_QUIT;
-    }
+    trial_start(self, &self->config);
+    const bool wanted = talk_yes(self, "Measure the force?", true);
     for (unsigned side = 0; side < IW_SIDES && wanted;) {
-        bool again = false;
-        const bringup_result_t result = measure(self, (iw_side_t)side, &again);
-        if (result != BRINGUP_ON) {
-            return result;
-        }
-        side += again ? 0U : 1U;
+        side += measure(self, (iw_side_t)side) ? 0U : 1U;
     }
-    return BRINGUP_ON;
 }

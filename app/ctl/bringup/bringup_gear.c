@@ -25,13 +25,13 @@ typedef enum { RPM_UNSEEN = 0, RPM_WHEEL, RPM_ROTOR } rpm_of_t;
 /// What is wrong with it, told; or false.
 static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turned) {
     const iw_side_t other = (side == IW_LEFT) ? IW_RIGHT : IW_LEFT;
-    const char *name = bringup_side(side);
+    const char *name = text_side(side);
     if (!hand->heard) {
         talk_say("  The wheels were not heard all the time.");
     } else if (hand->way[other] > hand->way[side]) {
         talk_say("  The %s wheel counted %lld ticks and the %s one %lld: was the wrong one turned, or are they "
                  "exchanged?",
-                 bringup_side(other), hand->ticks[other], name, hand->ticks[side]);
+                 text_side(other), hand->ticks[other], name, hand->ticks[side]);
     } else if (!hand_went_one_way(hand, side)) {
         talk_say("  The %s wheel was turned back and forth: %lld ticks there, %lld in all.", name, hand->ticks[side],
                  hand->way[side]);
@@ -44,31 +44,23 @@ static bool is_no_turn(const hand_t *hand, iw_side_t side, const turned_t *turne
     return true;
 }
 
-/// One wheel, until it is done or given up. `*out_done`: it was turned.
-static bringup_result_t turn(bringup_t *self, iw_side_t side, turned_t *out_turned, bool *out_done) {
+/// One wheel, until it is done or given up: false.
+static bool turn(bringup_t *self, iw_side_t side, turned_t *out_turned) {
     char prompt[96];
-    bool again = true;
-    *out_done = false;
+    hand_t hand;
     (void)snprintf(prompt, sizeof prompt, "Turn the %s wheel exactly %d times in one direction, then press Enter ...",
-                   bringup_side(side), TURNS);
-    while (!*out_done && again) {
-        hand_t hand;
-        if (!trial_wait_ready(self)) {
-            return BRINGUP_FAILED;
-        }
-        if (!hand_follow(self, prompt, &hand)) {
-            return BRINGUP_QUIT;
-        }
+                   text_side(side), TURNS);
+    do {
+        hand_follow(self, prompt, &hand);
         const double rotor = (double)llabs(hand.ticks[side]) / IW_TICKS_PER_TURN;
         *out_turned = (turned_t){.ticks = llabs(hand.ticks[side]),
                                  .gear = rotor / TURNS,
                                  .share = (rotor > 0.0) ? hand.rpm_turns[side] / rotor : 0.0};
-        *out_done = !is_no_turn(&hand, side, out_turned);
-        if (!*out_done && !talk_yes("Once more?", true, &again)) {
-            return BRINGUP_QUIT;
+        if (!is_no_turn(&hand, side, out_turned)) {
+            return true;
         }
-    }
-    return BRINGUP_ON;
+    } while (talk_yes(self, "Once more?", true));
+    return false;
 }
 
 /// A whole number if it is nearly one, else tenths: what the configuration can hold.
@@ -105,17 +97,16 @@ static void note_gear(bringup_t *self, const turned_t turned[IW_SIDES], bool gea
     }
 }
 
-/// Both wheels were turned. `*out_taken`: the operator agrees.
-static bringup_result_t judge_gear(bringup_t *self, const turned_t turned[IW_SIDES], bool *out_taken) {
+/// Both wheels were turned; what that tells is kept if the operator agrees.
+static void judge_gear(bringup_t *self, const turned_t turned[IW_SIDES]) {
     const double gear = (turned[IW_LEFT].gear + turned[IW_RIGHT].gear) / 2.0;
     iw_config_t core = self->config.core;
-    *out_taken = false;
     if (fabs(turned[IW_LEFT].gear - turned[IW_RIGHT].gear) > gear * 2.0 * GEAR_PERCENT / 100.0) {
         talk_say(
             "  The left wheel makes %.2f turns of its rotor per turn, the right one %.2f: were both turned exactly "
             "%d times? The gear stays as it was.",
             turned[IW_LEFT].gear, turned[IW_RIGHT].gear, TURNS);
-        return BRINGUP_ON;
+        return;
     }
     keep_gear(&core, gear);
     const bool geared = core.gear_turns > core.gear_per;
@@ -128,42 +119,25 @@ static bringup_result_t judge_gear(bringup_t *self, const turned_t turned[IW_SID
              : (rpm == RPM_UNSEEN) ? "whose turns the rpm count was not to be seen (turn faster to see it)"
              : (rpm == RPM_ROTOR)  ? "the rpm count the rotor's turns"
                                    : "the rpm count the wheel's turns");
-    if (!talk_yes("Take that?", true, out_taken)) {
-        return BRINGUP_QUIT;
-    }
-    if (*out_taken) {
+    if (talk_yes(self, "Take that?", true)) {
         self->config.core = core;
         note_gear(self, turned, geared, rpm);
     }
-    return BRINGUP_ON;
 }
 
-bringup_result_t bringup_gear(bringup_t *self) {
-    bool wanted = false;
-    bool done = true;
+void bringup_gear(bringup_t *self) {
     turned_t turned[IW_SIDES];
     talk_step(3, "the gear (nothing is sent; you turn)");
     talk_say("The wheels count %u ticks per turn of the rotor. Whether the rotor turns faster than the wheel, the "
              "document does not say. Mark each tyre, so that a turn can be seen.",
              IW_TICKS_PER_TURN);
-    if (!talk_yes("Turn the wheels by hand?", true, &wanted)) {
-        return BRINGUP_QUIT;
+    if (!talk_yes(self, "Turn the wheels by hand?", true)) {
+        return;
     }
-    if (!wanted) {
-        return BRINGUP_ON;
-    }
-    if (!trial_start(self, &self->config, false)) {
-        return BRINGUP_FAILED;
-    }
-    for (unsigned side = 0; side < IW_SIDES && done; side++) {
-        const bringup_result_t result = turn(self, (iw_side_t)side, &turned[side], &done);
-        if (result != BRINGUP_ON) {
-            return result;
-        }
-    }
-    if (!done) {
+    trial_start(self, &self->config);
+    if (turn(self, IW_LEFT, &turned[IW_LEFT]) && turn(self, IW_RIGHT, &turned[IW_RIGHT])) {
+        judge_gear(self, turned);
+    } else {
         talk_say("  The gear stays as it was.");
-        return BRINGUP_ON;
     }
-    return judge_gear(self, turned, &wanted);
 }

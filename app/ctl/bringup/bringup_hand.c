@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What wheels count while hands turn or push them. Nothing is sent.
 #include "bringup.h"
-#include "talk/signals.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -28,7 +27,7 @@ static look_t look(bringup_t *self) {
     look_t seen = {.heard = true};
     json_t *status = trial_status(self);
     for (unsigned side = 0; side < IW_SIDES; side++) {
-        const json_t *wheel = json_object_get(status, bringup_side((iw_side_t)side));
+        const json_t *wheel = json_object_get(status, text_side(side));
         const json_t *ticks = json_object_get(wheel, "ticks");
         const json_t *rpm = json_object_get(wheel, "speed_rpm");
         seen.heard = seen.heard && json_is_integer(ticks) && json_is_integer(rpm);
@@ -72,19 +71,24 @@ static bool wait_for_line(bringup_t *self, const look_t *first, hand_t *hand) {
     return signals_count() == before;
 }
 
-bool hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand) {
+void hand_follow(bringup_t *self, const char *prompt, hand_t *out_hand) {
     char line[16] = "";
+    if (!trial_wait_ready(self)) {
+        bringup_fail(self);
+    }
     const look_t first = look(self);
     memset(out_hand, 0, sizeof(*out_hand));
     out_hand->heard = first.heard;
     talk_forget();
     (void)printf("%s ", prompt);
     (void)fflush(stdout);
-    if (!wait_for_line(self, &first, out_hand)) {
+    const bool typed = wait_for_line(self, &first, out_hand);
+    if (!typed) {
         (void)puts("");
-        return false;
     }
-    return read(STDIN_FILENO, line, sizeof line) > 0 && line[0] != 'q';
+    if (!typed || read(STDIN_FILENO, line, sizeof line) <= 0 || line[0] == 'q') {
+        bringup_quit(self);
+    }
 }
 
 bool hand_went_one_way(const hand_t *hand, iw_side_t side) {

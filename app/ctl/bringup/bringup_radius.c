@@ -29,12 +29,12 @@ static bool counts_forwards(const bringup_t *self, const hand_t *hand) {
             talk_say(
                 "  The %s wheel counted backwards while the machine went forwards. Either it was pushed backwards, "
                 "or the sign of step 6 is wrong: begin again if you are not sure.",
-                bringup_side((iw_side_t)side));
+                text_side(side));
             return false;
         }
         if (!hand_went_one_way(hand, (iw_side_t)side)) {
             talk_say("  The %s wheel went back and forth: %lld ticks forwards, %lld in all. Once more, please.",
-                     bringup_side((iw_side_t)side), llabs(hand->ticks[side]), hand->way[side]);
+                     text_side(side), llabs(hand->ticks[side]), hand->way[side]);
             return false;
         }
     }
@@ -65,15 +65,14 @@ static void keep_radius(bringup_t *self, const hand_t *hand, double distance_m, 
                  hand->ticks[IW_RIGHT], geared ? "" : "; the gear is assumed", straight ? "" : "; not straight");
 }
 
-static bringup_result_t judge_radius(bringup_t *self, const hand_t *hand, double distance_m, bool *out_done) {
+/// True: it is done.
+static bool judge_radius(bringup_t *self, const hand_t *hand, double distance_m) {
     const double left = radius_of(self, distance_m, hand->ticks[IW_LEFT]);
     const double right = radius_of(self, distance_m, hand->ticks[IW_RIGHT]);
     const double mean = (left + right) / 2.0;
     const bool straight = fabs(left - right) <= mean * ALIKE_PERCENT / 100.0;
-    bool yes = false;
-    *out_done = false;
     if (!is_usable(self, hand)) {
-        return BRINGUP_ON;
+        return false;
     }
     talk_say("  Left %.1f mm, right %.1f mm; mean %.0f mm%s.", left, right, mean,
              bringup_is_confirmed(self, "gear_ratio") ? "" : ", if the gear is as configured: it was not measured");
@@ -83,49 +82,28 @@ static bringup_result_t judge_radius(bringup_t *self, const hand_t *hand, double
     }
     if (mean < RADIUS_MIN || mean > RADIUS_MAX) {
         talk_say("  That is no radius between %d and %d mm: was the distance in metres?", RADIUS_MIN, RADIUS_MAX);
-        return BRINGUP_ON;
+        return false;
     }
-    if (!talk_yes("Take the mean?", straight, &yes)) {
-        return BRINGUP_QUIT;
-    }
-    *out_done = yes;
-    if (yes) {
+    const bool taken = talk_yes(self, "Take the mean?", straight);
+    if (taken) {
         keep_radius(self, hand, distance_m, mean, straight);
     }
-    return BRINGUP_ON;
+    return taken;
 }
 
-bringup_result_t bringup_radius(bringup_t *self) {
+void bringup_radius(bringup_t *self) {
     char answer[BRINGUP_ANSWER_SIZE];
+    double distance_m = 0.0;
+    hand_t hand;
     talk_step(8, "the radius (nothing is sent; you push)");
     talk_say("The document says approximately 192 mm. Put the machine on the ground, mark a straight distance of 3 m "
              "or more, and push the machine along it with its wheels rolling.");
-    if (!trial_start(self, &self->config, false)) {
-        return BRINGUP_FAILED;
-    }
-    for (bool done = false; !done;) {
-        double distance_m = 0.0;
-        bool given = false;
-        hand_t hand;
-        if (!talk_number("Distance in m (Enter: leave it out)", DISTANCE_MIN, DISTANCE_MAX, &distance_m, &given)) {
-            return BRINGUP_QUIT;
+    trial_start(self, &self->config);
+    do {
+        if (!talk_number(self, "Distance in m (Enter: leave it out)", DISTANCE_MIN, DISTANCE_MAX, &distance_m)) {
+            return;
         }
-        if (!given) {
-            return BRINGUP_ON;
-        }
-        if (!talk_ask("Stand at the start, then Enter", "go", answer)) {
-            return BRINGUP_QUIT;
-        }
-        if (!trial_wait_ready(self)) {
-            return BRINGUP_FAILED;
-        }
-        if (!hand_follow(self, "Push it forwards to the end mark, let it stand, then press Enter ...", &hand)) {
-            return BRINGUP_QUIT;
-        }
-        const bringup_result_t result = judge_radius(self, &hand, distance_m, &done);
-        if (result != BRINGUP_ON) {
-            return result;
-        }
-    }
-    return BRINGUP_ON;
+        talk_ask(self, "Stand at the start, then Enter", "go", answer);
+        hand_follow(self, "Push it forwards to the end mark, let it stand, then press Enter ...", &hand);
+    } while (!judge_radius(self, &hand, distance_m));
 }

@@ -39,11 +39,11 @@ static const char *wheels(unsigned sides) {
                               : "no wheel";
 }
 
-static bringup_result_t try_burst(bringup_t *self, const burst_t *burst, unsigned *out_turned) {
+/// What it turned.
+static unsigned try_burst(bringup_t *self, const burst_t *burst) {
     outcome_t outcome = {0};
-    const bringup_result_t shown = burst_show(self, burst, &outcome);
-    *out_turned = turned(&outcome);
-    return shown;
+    burst_insist(self, burst, &outcome);
+    return turned(&outcome);
 }
 
 /// A current without a speed turned something.
@@ -60,39 +60,27 @@ static void find_setpoint(role_t *found, unsigned sides, int current_mA) {
 }
 
 /// Under the role limit a zero is speed 0 with current. If that turns a wheel, the role is the other one.
-static bringup_result_t try_zero(bringup_t *self, unsigned *out_turned) {
+static unsigned try_zero(bringup_t *self) {
     gateway_config_t config = self->config;
     const burst_t zero = {.for_ms = ZERO_MS, .enough_mm_s = TORQUE_MM_S};
     config.core.current_role = IW_ROLE_LIMIT;
-    *out_turned = 0U;
     talk_say("Now a zero as that role has it, speed 0 with %d mA. Nothing may turn.", self->current_mA);
-    if (!trial_start(self, &config, false)) {
-        return BRINGUP_FAILED;
-    }
-    return try_burst(self, &zero, out_turned);
+    trial_start(self, &config);
+    return try_burst(self, &zero);
 }
 
 /// Neither alone turned a wheel: that is a limit only if the two together still do.
-static bringup_result_t try_limit(bringup_t *self, role_t *found) {
+static void try_limit(bringup_t *self, role_t *found) {
     const burst_t together = bringup_ahead(self, BRINGUP_PROBE_MS / 2U);
-    unsigned sides = 0U;
-    bringup_result_t shown = try_zero(self, &sides);
-    if (shown != BRINGUP_ON) {
-        return shown;
-    }
+    unsigned sides = try_zero(self);
     if (sides != 0U) {
         talk_say("It TURNED %s: the current is a setpoint after all.", wheels(sides));
         find_setpoint(found, sides, self->current_mA);
-        return BRINGUP_ON;
+        return;
     }
     talk_say("Nothing turned. Last, speed and current together once more: both wheels must turn, or nothing is known.");
-    if (!bringup_start_with(self, self->config.core.setpoint_type)) {
-        return BRINGUP_FAILED;
-    }
-    shown = try_burst(self, &together, &sides);
-    if (shown != BRINGUP_ON) {
-        return shown;
-    }
+    bringup_start_with(self, self->config.core.setpoint_type);
+    sides = try_burst(self, &together);
     found->seen = sides == BOTH;
     if (found->seen) {
         found->role = "limit";
@@ -106,65 +94,50 @@ static bringup_result_t try_limit(bringup_t *self, role_t *found) {
             "freely and begin again, or answer from what you know.",
             wheels(sides));
     }
-    return BRINGUP_ON;
 }
 
-static bringup_result_t find_role(bringup_t *self, role_t *found) {
+static void find_role(bringup_t *self, role_t *found) {
     const int current_mA = self->current_mA / 2;
     const burst_t current_only = {
         .current_mA = {current_mA, current_mA}, .has_current = true, .for_ms = TORQUE_MS, .enough_mm_s = TORQUE_MM_S};
     const burst_t speed_only = {
         .speed_mm_s = {BRINGUP_SPEED_MM_S, BRINGUP_SPEED_MM_S}, .has_current = true, .for_ms = BRINGUP_PROBE_MS / 2U};
-    unsigned by_current = 0U;
-    unsigned by_speed = 0U;
-    bringup_result_t shown = try_burst(self, &current_only, &by_current);
-    shown = (shown == BRINGUP_ON) ? try_burst(self, &speed_only, &by_speed) : shown;
-    if (shown != BRINGUP_ON) {
-        return shown;
-    }
+    const unsigned by_current = try_burst(self, &current_only);
+    const unsigned by_speed = try_burst(self, &speed_only);
     if (by_current != 0U) {
         talk_say("The current alone turned %s: it is a setpoint.", wheels(by_current));
         find_setpoint(found, by_current, current_mA);
-        return BRINGUP_ON;
-    }
-    if (by_speed != 0U) {
+    } else if (by_speed != 0U) {
         talk_say(
             "The speed without current turned %s, the current alone none: the current seems to mean nothing. Ask the "
             "maker; limit is the usual word for that.",
             wheels(by_speed));
-        return BRINGUP_ON;
+    } else {
+        talk_say("Neither turned a wheel: the current may be a limit.");
+        try_limit(self, found);
     }
-    talk_say("Neither turned a wheel: the current may be a limit.");
-    return try_limit(self, found);
 }
 
-static bringup_result_t keep_role(bringup_t *self, const role_t *found) {
+static void keep_role(bringup_t *self, const role_t *found) {
     char answer[BRINGUP_ANSWER_SIZE];
-    for (;;) {
-        if (!talk_ask("current_role (limit or setpoint)", found->role, answer)) {
-            return BRINGUP_QUIT;
-        }
-        if (strcmp(answer, "limit") == 0 || strcmp(answer, "setpoint") == 0) {
-            break;
-        }
+    talk_ask(self, "current_role (limit or setpoint)", found->role, answer);
+    while (strcmp(answer, "limit") != 0 && strcmp(answer, "setpoint") != 0) {
         talk_say("limit or setpoint, please: nothing can be driven without one of them (q ends bringup).");
+        talk_ask(self, "current_role (limit or setpoint)", found->role, answer);
     }
     const bool same = strcmp(answer, found->role) == 0;
     self->config.core.current_role = (strcmp(answer, "limit") == 0) ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
     bringup_note(self, "wheels", "current_role", (same && found->seen) ? "current_role" : NULL, "%s",
                  same ? found->how : "typed in; the wheels did not show it");
-    return BRINGUP_ON;
 }
 
-bringup_result_t bringup_role(bringup_t *self) {
+void bringup_role(bringup_t *self) {
     role_t found = {.role = "?"};
     talk_step(5, "what the current means (WHEELS MAY TURN, in the air)");
     talk_say("Beside the speed a setpoint has a current. Either it limits the motor's current, or it is a setpoint of "
              "its own. Two to four short tries tell: first %d mA without a speed, then %d mm/s without a current.",
              self->current_mA / 2, BRINGUP_SPEED_MM_S);
-    if (!bringup_start_with(self, self->config.core.setpoint_type)) {
-        return BRINGUP_FAILED;
-    }
-    const bringup_result_t result = find_role(self, &found);
-    return (result == BRINGUP_ON) ? keep_role(self, &found) : result;
+    bringup_start_with(self, self->config.core.setpoint_type);
+    find_role(self, &found);
+    keep_role(self, &found);
 }

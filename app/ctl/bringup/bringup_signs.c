@@ -9,8 +9,6 @@
 #define TURN_MS    1500U
 #define MOVES_MM_S 40
 
-static const char *const names[IW_SIDES] = {[IW_LEFT] = "left", [IW_RIGHT] = "right"};
-
 /// The current that a command needs, by the role just found.
 static burst_t turn(const bringup_t *self, int left_mm_s, int right_mm_s) {
     burst_t burst = {.speed_mm_s = {left_mm_s, right_mm_s}, .for_ms = TURN_MS};
@@ -34,19 +32,19 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
         talk_say(
             "The bus says that BOTH wheels turned (%d and %d mm/s), though only the %s one was told to: what turned "
             "the other? Nothing can be said of a sign so.",
-            told, other, names[side]);
+            told, other, text_side(side));
         return false;
     }
     if (told <= -MOVES_MM_S) {
         talk_say("The %s wheel measures the opposite of what it is told. No key mends that, and the gateway would stop "
                  "for it (feedback_sign): check the wiring between motor and sensor, or ask the maker.",
-                 names[side]);
+                 text_side(side));
         return false;
     }
     if (told < MOVES_MM_S) {
         talk_say("The %s wheel did not turn by itself. Is something in its way? If it needs more current: --current "
                  "(now %d mA).",
-                 names[side], self->current_mA);
+                 text_side(side), self->current_mA);
         return false;
     }
     return true;
@@ -55,101 +53,68 @@ static bool bus_agrees(const bringup_t *self, const outcome_t *outcome, iw_side_
 static void keep_sign(bringup_t *self, iw_side_t side, bool forward) {
     bool *invert = &self->config.core.invert[side];
     *invert = forward ? *invert : !*invert;
-    bringup_note(self, names[side], "invert", (side == IW_LEFT) ? "mount_sign_left" : "mount_sign_right",
+    bringup_note(self, text_side(side), "invert", (side == IW_LEFT) ? "mount_sign_left" : "mount_sign_right",
                  "somebody saw it turn %s with invert = %s", forward ? "forwards" : "backwards",
                  (forward ? *invert : !*invert) ? "yes" : "no");
 }
 
-/// One wheel. `*out_again`: it is to be shown once more.
-static bringup_result_t look_at(bringup_t *self, iw_side_t side, bool *out_again) {
+/// One wheel. False: it is to be shown once more.
+static bool look_at(bringup_t *self, iw_side_t side) {
     char answer[BRINGUP_ANSWER_SIZE];
     char question[96];
     outcome_t outcome;
     const burst_t burst =
         turn(self, (side == IW_LEFT) ? BRINGUP_SPEED_MM_S : 0, (side == IW_RIGHT) ? BRINGUP_SPEED_MM_S : 0);
-    *out_again = false;
-    (void)snprintf(question, sizeof question, "Look at the %s wheel. Enter turns it for %.1f s", names[side],
+    (void)snprintf(question, sizeof question, "Look at the %s wheel. Enter turns it for %.1f s", text_side(side),
                    TURN_MS / 1e3);
-    if (!talk_ask(question, "go", answer)) {
-        return BRINGUP_QUIT;
-    }
-    const bringup_result_t shown = burst_show(self, &burst, &outcome);
-    if (shown != BRINGUP_ON) {
-        return shown;
-    }
+    talk_ask(self, question, "go", answer);
+    burst_insist(self, &burst, &outcome);
     if (!bus_agrees(self, &outcome, side)) {
-        return BRINGUP_FAILED;
+        bringup_fail(self);
     }
-    (void)snprintf(question, sizeof question,
-                   "It would take the machine f forwards, b backwards (o: other wheel, "
-                   "r: again)");
     for (;;) {
-        if (!talk_ask(question, "r", answer)) {
-            return BRINGUP_QUIT;
-        }
+        talk_ask(self, "It would take the machine f forwards, b backwards (o: other wheel, r: again)", "r", answer);
         if (strcmp(answer, "r") == 0) {
-            *out_again = true;
-            return BRINGUP_ON;
+            return false;
         }
         if (strcmp(answer, "o") == 0) {
             talk_say("Then left and right are exchanged. Their ids are fixed, so exchange the wheels (or their plugs), "
                      "then begin again.");
-            return BRINGUP_FAILED;
+            bringup_fail(self);
         }
         if (strcmp(answer, "f") == 0 || strcmp(answer, "b") == 0) {
             keep_sign(self, side, answer[0] == 'f');
-            return BRINGUP_ON;
+            return true;
         }
         talk_say("f, b, o or r, please.");
     }
 }
 
-/// Both wheels with the signs found. `*out_right`: the operator agrees.
-static bringup_result_t verify(bringup_t *self, bool *out_right) {
+/// Both wheels with the signs found. True: the operator agrees.
+static bool verify(bringup_t *self) {
     char answer[BRINGUP_ANSWER_SIZE];
     outcome_t outcome;
     const burst_t burst = turn(self, BRINGUP_SPEED_MM_S, BRINGUP_SPEED_MM_S);
-    *out_right = false;
-    if (!trial_start(self, &self->config, false)) {
-        return BRINGUP_FAILED;
-    }
-    if (!talk_ask("Now both. Enter turns them as for straight ahead", "go", answer)) {
-        return BRINGUP_QUIT;
-    }
-    const bringup_result_t shown = burst_show(self, &burst, &outcome);
-    if (shown != BRINGUP_ON) {
-        return shown;
-    }
+    trial_start(self, &self->config);
+    talk_ask(self, "Now both. Enter turns them as for straight ahead", "go", answer);
+    burst_insist(self, &burst, &outcome);
     if (outcome.mean_mm_s[IW_LEFT] < MOVES_MM_S || outcome.mean_mm_s[IW_RIGHT] < MOVES_MM_S) {
         talk_say(
             "The bus does not say that both went forwards. Something held a wheel, or a sign was not seen rightly: "
             "each wheel once more.");
-        return BRINGUP_ON;
+        return false;
     }
-    return talk_yes("Would the machine have gone straight ahead?", false, out_right) ? BRINGUP_ON : BRINGUP_QUIT;
+    return talk_yes(self, "Would the machine have gone straight ahead?", false);
 }
 
-bringup_result_t bringup_signs(bringup_t *self) {
-    bool right = false;
+void bringup_signs(bringup_t *self) {
     talk_step(6, "which way each wheel turns (WHEELS TURN, in the air)");
     talk_say("Stand behind the machine, where its user will. Each wheel turns alone and slowly; tell which way it "
              "would have taken the machine on the ground.");
-    while (!right) {
-        if (!trial_start(self, &self->config, false)) {
-            return BRINGUP_FAILED;
-        }
+    do {
+        trial_start(self, &self->config);
         for (unsigned side = 0; side < IW_SIDES;) {
-            bool again = false;
-            const bringup_result_t result = look_at(self, (iw_side_t)side, &again);
-            if (result != BRINGUP_ON) {
-                return result;
-            }
-            side += again ? 0U : 1U;
+            side += look_at(self, (iw_side_t)side) ? 1U : 0U;
         }
-        const bringup_result_t result = verify(self, &right);
-        if (result != BRINGUP_ON) {
-            return result;
-        }
-    }
-    return BRINGUP_ON;
+    } while (!verify(self));
 }

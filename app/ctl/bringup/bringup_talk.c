@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Questions and answers at the terminal.
 #include "bringup.h"
-#include "talk/signals.h"
-#include "text/paper.h"
-#include "text/text.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -26,12 +23,7 @@ void talk_say(const char *format, ...) {
     va_end(arguments);
     const char *rest = text;
     while (*rest != '\0') {
-        size_t cut = strlen(rest);
-        if (cut > PAPER_WIDTH) {
-            for (cut = PAPER_WIDTH; cut > 0 && rest[cut] != ' '; cut--) {
-            }
-            cut = (cut == 0) ? PAPER_WIDTH : cut;
-        }
+        const size_t cut = text_cut(rest, PAPER_WIDTH);
         (void)printf("%.*s\n", (int)cut, rest);
         rest += cut;
         rest += strspn(rest, " ");
@@ -86,44 +78,41 @@ void talk_forget(void) {
     (void)tcflush(STDIN_FILENO, TCIFLUSH); // An answer to a question that nobody had read yet is none.
 }
 
-bool talk_ask(const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]) {
+void talk_ask(bringup_t *self, const char *question, const char *otherwise, char out_answer[BRINGUP_ANSWER_SIZE]) {
     talk_forget();
     (void)printf("%s [%s] ", question, otherwise);
     (void)fflush(stdout);
     if (!read_line(out_answer, BRINGUP_ANSWER_SIZE)) {
         (void)puts("");
-        return false;
+        bringup_quit(self);
     }
     trim(out_answer);
     if (out_answer[0] == '\0') {
         (void)snprintf(out_answer, BRINGUP_ANSWER_SIZE, "%s", otherwise);
     }
-    return strcmp(out_answer, "q") != 0;
+    if (strcmp(out_answer, "q") == 0) {
+        bringup_quit(self);
+    }
 }
 
-bool talk_yes(const char *question, bool otherwise, bool *out_yes) {
+bool talk_yes(bringup_t *self, const char *question, bool otherwise) {
     char answer[BRINGUP_ANSWER_SIZE];
     for (;;) {
-        if (!talk_ask(question, otherwise ? "y" : "n", answer)) {
-            return false;
-        }
-        *out_yes = strcmp(answer, "y") == 0 || strcmp(answer, "yes") == 0;
-        if (*out_yes || strcmp(answer, "n") == 0 || strcmp(answer, "no") == 0) {
-            return true;
+        talk_ask(self, question, otherwise ? "y" : "n", answer);
+        const bool yes = strcmp(answer, "y") == 0 || strcmp(answer, "yes") == 0;
+        if (yes || strcmp(answer, "n") == 0 || strcmp(answer, "no") == 0) {
+            return yes;
         }
         talk_say("Please write y or n (q ends bringup).");
     }
 }
 
-bool talk_number(const char *question, double low, double high, double *out_number, bool *out_given) {
+bool talk_number(bringup_t *self, const char *question, double low, double high, double *out_number) {
     char answer[BRINGUP_ANSWER_SIZE];
     for (;;) {
-        if (!talk_ask(question, "skip", answer)) {
+        talk_ask(self, question, "skip", answer);
+        if (strcmp(answer, "skip") == 0) {
             return false;
-        }
-        *out_given = strcmp(answer, "skip") != 0;
-        if (!*out_given) {
-            return true;
         }
         char *end = NULL;
         for (char *comma = strchr(answer, ','); comma != NULL; comma = strchr(comma, ',')) {

@@ -59,22 +59,22 @@ static void keep_track(bringup_t *self, const hand_t *hand, int turns, double tr
                  hand->ticks[IW_RIGHT], rolled_distance ? "" : "; the radius is assumed");
 }
 
-static bringup_result_t judge_track(bringup_t *self, const hand_t *hand, int turns, bool *out_done) {
+/// True: it is done.
+static bool judge_track(bringup_t *self, const hand_t *hand, int turns) {
     const double left = rolled(self, hand, IW_LEFT);
     const double right = rolled(self, hand, IW_RIGHT);
     const double track_mm = fabs(right - left) / (2.0 * M_PI * turns);
     const double before_mm = self->config.track_mm;
     const bool near = fabs(track_mm - before_mm) <= before_mm * OFF_PERCENT / 100.0;
-    *out_done = false;
     if (!is_turn(self, hand)) {
-        return BRINGUP_ON;
+        return false;
     }
     if (track_mm < TRACK_MIN || track_mm > TRACK_MAX) {
         talk_say(
             "  Left rolled %.2f m, right %.2f m in %d turns: that is no track between %d and %d mm. Were the turns "
             "counted rightly?",
             left / 1e3, right / 1e3, turns, TRACK_MIN, TRACK_MAX);
-        return BRINGUP_ON;
+        return false;
     }
     talk_say("  Left rolled %.2f m, right %.2f m in %d turns: the track is %.0f mm%s.", left / 1e3, right / 1e3, turns,
              track_mm, (self->mm_per_tick > 0.0) ? "" : ", if the radius is as configured: no distance was measured");
@@ -84,66 +84,44 @@ static bringup_result_t judge_track(bringup_t *self, const hand_t *hand, int tur
             "the turns were counted rightly.",
             before_mm);
     }
-    if (!talk_yes("Take that?", near, out_done)) {
-        return BRINGUP_QUIT;
-    }
-    if (*out_done) {
+    const bool taken = talk_yes(self, "Take that?", near);
+    if (taken) {
         keep_track(self, hand, turns, track_mm);
     }
-    return BRINGUP_ON;
+    return taken;
 }
 
-/// A whole number of turns. `*out_given` is false if the operator leaves it out.
-static bool ask_turns(int *out_turns, bool *out_given) {
+/// A whole number of turns; 0 if the operator leaves it out.
+static int ask_turns(bringup_t *self) {
     double turns = 0.0;
-    for (;;) {
-        if (!talk_number("How many full turns (3 is good; Enter: leave it out)", 1.0, TURNS_MAX, &turns, out_given)) {
-            return false;
-        }
-        if (!*out_given || turns == floor(turns)) {
-            *out_turns = (int)turns;
-            return true;
+    while (talk_number(self, "How many full turns (3 is good; Enter: leave it out)", 1.0, TURNS_MAX, &turns)) {
+        if (turns == floor(turns)) {
+            return (int)turns;
         }
         talk_say("Full turns only: 1, 2, 3 ...");
     }
+    return 0;
 }
 
-bringup_result_t bringup_track(bringup_t *self) {
+void bringup_track(bringup_t *self) {
     char answer[BRINGUP_ANSWER_SIZE];
     char prompt[128];
+    int turns = 0;
+    hand_t hand;
     talk_step(9, "the track (nothing is sent; you turn the machine)");
     talk_say(
         "The track is the distance between the two wheels; it decides how far a twist turns the machine. Leave the "
         "machine on the ground and mark on the floor which way it points. You will turn it on the spot, one way "
         "only, until it has pointed at the mark so many times.");
-    if (!trial_start(self, &self->config, false)) {
-        return BRINGUP_FAILED;
-    }
-    for (bool done = false; !done;) {
-        bool given = false;
-        int turns = 0;
-        hand_t hand;
-        if (!ask_turns(&turns, &given)) {
-            return BRINGUP_QUIT;
-        }
-        if (!given) {
-            return BRINGUP_ON;
+    trial_start(self, &self->config);
+    do {
+        turns = ask_turns(self);
+        if (turns == 0) {
+            return;
         }
         (void)snprintf(prompt, sizeof prompt, "Turn it %d full turn%s, let it stand at the mark, then press Enter ...",
                        turns, (turns == 1) ? "" : "s");
-        if (!talk_ask("Point it at the mark, then Enter", "go", answer)) {
-            return BRINGUP_QUIT;
-        }
-        if (!trial_wait_ready(self)) {
-            return BRINGUP_FAILED;
-        }
-        if (!hand_follow(self, prompt, &hand)) {
-            return BRINGUP_QUIT;
-        }
-        const bringup_result_t result = judge_track(self, &hand, turns, &done);
-        if (result != BRINGUP_ON) {
-            return result;
-        }
-    }
-    return BRINGUP_ON;
+        talk_ask(self, "Point it at the mark, then Enter", "go", answer);
+        hand_follow(self, prompt, &hand);
+    } while (!judge_track(self, &hand, turns));
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The gateway of the session: started with a trial configuration in a folder of its own; both end with us whatever happens.
 #include "bringup.h"
-#include "talk/signals.h"
-#include "text/text.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -221,7 +219,7 @@ static bool connect_to(bringup_t *self) {
     return gateway.result == NEAR_FOUND;
 }
 
-bool trial_start(bringup_t *self, const gateway_config_t *config, bool with_records) {
+static bool start(bringup_t *self, const gateway_config_t *config, bool with_records) {
     trial_t *trial = &self->trial;
     trial_stop(self);
     if (!make_folder(trial) || !write_config(self, config, with_records)) {
@@ -238,6 +236,16 @@ bool trial_start(bringup_t *self, const gateway_config_t *config, bool with_reco
         return false;
     }
     return true;
+}
+
+void trial_start(bringup_t *self, const gateway_config_t *config) {
+    if (!start(self, config, false)) {
+        bringup_fail(self);
+    }
+}
+
+bool trial_start_with_records(bringup_t *self) {
+    return start(self, &self->config, true);
 }
 
 void trial_stop(bringup_t *self) {

@@ -4,17 +4,29 @@
 // While the role of the current is unknown, wheels are driven as if the current were a setpoint: its zero is 0 mm/s with 0 mA, which is
 // no torque whichever role is right. The other way round, a zero with full current could be full torque.
 #include "bringup.h"
+#include "learn/learn.h"
+#include "recordings/recording.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define TYPE_MAX   255
 #define MOVES_MM_S 40
 /// Measured speed in percent of what was told, between which it was followed: the radius may be another one.
 #define FOLLOWS_LOW   60
 #define FOLLOWS_HIGH  150
 #define PROBE_DEFAULT "0-7"
+
+#define TYPES    256U
+#define TYPE_MAX 255
+#define DLC_MIN  5
+#define DLC_MAX  8
+
+typedef struct {
+    learn_t learn;
+    recording_t recording;
+} study_t;
 
 static bool both_move(const outcome_t *outcome) {
     return abs(outcome->mean_mm_s[IW_LEFT]) >= MOVES_MM_S && abs(outcome->mean_mm_s[IW_RIGHT]) >= MOVES_MM_S;
@@ -27,13 +39,12 @@ burst_t bringup_ahead(const bringup_t *self, unsigned for_ms) {
                      .for_ms = for_ms};
 }
 
-/// A gateway that sends this type, with the role under which a zero surely is no torque.
-bool bringup_start_with(bringup_t *self, int type) {
+void bringup_start_with(bringup_t *self, int type) {
     gateway_config_t config = self->config;
     config.core.setpoint_type = (uint8_t)type;
     config.core.setpoint_type_set = true;
     config.core.current_role = IW_ROLE_SETPOINT;
-    return trial_start(self, &config, false);
+    trial_start(self, &config);
 }
 
 /// A type that means speed turns a wheel about as fast as it is told, whatever else may turn it.
@@ -63,36 +74,28 @@ static void keep_type(bringup_t *self, int type, const outcome_t *outcome) {
     }
 }
 
-/// Tries one type. `*out_found`: both wheels turned and the operator saw it.
-static bringup_result_t try_type(bringup_t *self, int type, bool *out_found) {
+/// Tries one type. True: both wheels turned and the operator saw it.
+static bool try_type(bringup_t *self, int type) {
     outcome_t outcome;
     const burst_t burst = bringup_ahead(self, BRINGUP_PROBE_MS);
-    *out_found = false;
-    if (!bringup_start_with(self, type)) {
-        return BRINGUP_FAILED;
-    }
+    bringup_start_with(self, type);
     (void)printf("type %d:\n", type);
-    const bringup_result_t shown = burst_show(self, &burst, &outcome);
-    if (shown == BRINGUP_QUIT) {
-        return BRINGUP_QUIT;
-    }
-    if (shown == BRINGUP_FAILED) {
-        return BRINGUP_ON;
+    if (!burst_show(self, &burst, &outcome)) {
+        return false;
     }
     if (!both_move(&outcome)) {
         const bool left = abs(outcome.mean_mm_s[IW_LEFT]) >= MOVES_MM_S;
         if (left || abs(outcome.mean_mm_s[IW_RIGHT]) >= MOVES_MM_S) {
-            talk_say("  Only the %s wheel turned: is the other one held, or switched off?", left ? "left" : "right");
+            talk_say("  Only the %s wheel turned: is the other one held, or switched off?",
+                     text_side(left ? IW_LEFT : IW_RIGHT));
         }
-        return BRINGUP_ON;
+        return false;
     }
-    if (!talk_yes("Did both wheels turn, slowly and evenly?", true, out_found)) {
-        return BRINGUP_QUIT;
-    }
-    if (*out_found) {
+    const bool seen = talk_yes(self, "Did both wheels turn, slowly and evenly?", true);
+    if (seen) {
         keep_type(self, type, &outcome);
     }
-    return BRINGUP_ON;
+    return seen;
 }
 
 /// "3", "0-7", "1,4,9-12" into one flag per type. False if it is none of these.
@@ -126,23 +129,89 @@ static bool parse_types(const char *text, bool wanted[TYPE_MAX + 1]) {
     }
 }
 
-static bringup_result_t try_types(bringup_t *self, const bool *wanted, bool *out_found) {
-    *out_found = false;
-    for (int type = 0; type <= TYPE_MAX && !*out_found; type++) {
-        const bringup_result_t result = wanted[type] ? try_type(self, type, out_found) : BRINGUP_ON;
-        if (result != BRINGUP_ON) {
-            return result;
+static bool try_types(bringup_t *self, const bool *wanted) {
+    for (int type = 0; type <= TYPE_MAX; type++) {
+        if (wanted[type] && try_type(self, type)) {
+            return true;
         }
     }
-    if (!*out_found) {
-        talk_say("None of these moved both wheels. Other types may; or the wheels need more current (--current, now "
-                 "%d mA); or they do not take commands at all: is their enable switch on?",
-                 self->current_mA);
-    }
-    return BRINGUP_ON;
+    talk_say("None of these moved both wheels. Other types may; or the wheels need more current (--current, now "
+             "%d mA); or they do not take commands at all: is their enable switch on?",
+             self->current_mA);
+    return false;
 }
 
-bringup_result_t bringup_type(bringup_t *self) {
+/// The types that were sent with a speed, most frequent first as far as there is room: "3" or "3,1".
+static uint64_t list_types(const learn_t *learn, char *out_list, size_t size) {
+    uint64_t left[TYPES];
+    uint64_t frames = 0;
+    size_t used = 0;
+    for (unsigned type = 0; type < TYPES; type++) {
+        left[type] = learn->setpoint[IW_LEFT].type_moving[type] + learn->setpoint[IW_RIGHT].type_moving[type];
+        frames += left[type];
+    }
+    out_list[0] = '\0';
+    for (unsigned rank = 0; rank < 4U; rank++) {
+        unsigned best = 0;
+        for (unsigned type = 1; type < TYPES; type++) {
+            best = (left[type] > left[best]) ? type : best;
+        }
+        if (left[best] == 0U) {
+            break;
+        }
+        const int n = snprintf(&out_list[used], size - used, "%s%u", (used > 0U) ? "," : "", best);
+        used += (n > 0 && (size_t)n < size - used) ? (size_t)n : 0U;
+        left[best] = 0U;
+    }
+    return frames;
+}
+
+/// Setpoints longer than documented are sent so: the other controller had its reasons.
+static void take_length(bringup_t *self, const learn_t *learn) {
+    const learn_range_t *left = &learn_known(learn, IW_ID_LEFT_SETPOINT)->length;
+    const learn_range_t *right = &learn_known(learn, IW_ID_RIGHT_SETPOINT)->length;
+    const int low = (left->low < right->low) ? left->low : right->low;
+    const int high = (left->high > right->high) ? left->high : right->high;
+    const bool both = learn->setpoint[IW_LEFT].count > 0U && learn->setpoint[IW_RIGHT].count > 0U;
+    if (both && low == high && low > DLC_MIN && low <= DLC_MAX) {
+        self->config.core.setpoint_dlc = (uint16_t)low;
+        bringup_note(self, "wheels", "setpoint_dlc", NULL, "every setpoint of the recording has %d bytes", low);
+        talk_say("All of them have %d bytes, so ours get as many (setpoint_dlc).", low);
+    } else if (high > DLC_MIN) {
+        talk_say("They have %d to %d bytes, or only one wheel got any: the length stays %u (setpoint_dlc).", low, high,
+                 self->config.core.setpoint_dlc);
+    }
+}
+
+/// What a recording of another controller suggests, as `learn` reads it: the setpoint types in it, such as "3,1"; and takes over
+/// its length. Suggestions only: the wheels have the last word. Untouched, after telling, if there are none.
+static void learn_from_recording(bringup_t *self, char *out_types, size_t size) {
+    study_t *study = calloc(1, sizeof(*study));
+    candump_t frame;
+    if (study != NULL && recording_open(&study->recording, NULL, self->recording) == CTL_OK) {
+        learn_init(&study->learn);
+        while (recording_next(&study->recording, &frame)) {
+            learn_frame(&study->learn, &frame);
+        }
+        (void)recording_close(&study->recording);
+        const uint64_t frames = list_types(&study->learn, out_types, size);
+        if (frames > 0U) {
+            talk_say("In %s %" PRIu64 " setpoints have a speed, with type %s. That is what was sent, no proof that the "
+                     "wheels turned by it (iwheelctl learn tells).",
+                     self->recording, frames, out_types);
+            if (study->learn.setpoint[IW_LEFT].sent + study->learn.setpoint[IW_RIGHT].sent > 0U) {
+                talk_say("Some are marked as sent by the program that recorded them: if that was this gateway, they "
+                         "repeat its configuration.");
+            }
+            take_length(self, &study->learn);
+        } else {
+            talk_say("In %s there is no setpoint with a speed: it suggests nothing.", self->recording);
+        }
+    }
+    free(study);
+}
+
+void bringup_type(bringup_t *self) {
     char answer[BRINGUP_ANSWER_SIZE];
     char suggestion[24] = PROBE_DEFAULT;
     bool wanted[TYPE_MAX + 1];
@@ -152,24 +221,18 @@ bringup_result_t bringup_type(bringup_t *self) {
         (void)snprintf(suggestion, sizeof suggestion, "%u", self->config.core.setpoint_type);
     }
     if (self->recording != NULL) {
-        (void)bringup_learn(self, suggestion, sizeof suggestion);
+        learn_from_recording(self, suggestion, sizeof suggestion);
     }
     talk_say("Byte 0 of every setpoint is a type whose values the wheels' document does not list. Write the one you "
              "know (from the maker, or from a recording: --learn FILE), or the ones to try, such as 0-7 or 1,4. Each "
              "is tried for %.1f s at %d mm/s with at most %d mA, until one moves both wheels.",
              BRINGUP_PROBE_MS / 1e3, BRINGUP_SPEED_MM_S, self->current_mA);
     while (!found) {
-        if (!talk_ask("Setpoint type, or types to try", suggestion, answer)) {
-            return BRINGUP_QUIT;
-        }
-        if (!parse_types(answer, wanted)) {
+        talk_ask(self, "Setpoint type, or types to try", suggestion, answer);
+        if (parse_types(answer, wanted)) {
+            found = try_types(self, wanted);
+        } else {
             talk_say("Types are numbers from 0 to %d: 3, 0-7 or 1,4,9-12.", TYPE_MAX);
-            continue;
-        }
-        const bringup_result_t result = try_types(self, wanted, &found);
-        if (result != BRINGUP_ON) {
-            return result;
         }
     }
-    return BRINGUP_ON;
 }

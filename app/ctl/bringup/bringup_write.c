@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The configuration that came of it: written whole or not at all, and over an older one only after asking.
 #include "bringup.h"
-#include "text/text.h"
 
 #include <errno.h>
 #include <stdarg.h>
@@ -31,10 +30,6 @@ void bringup_note(bringup_t *self, const char *section, const char *key, const c
     va_start(arguments, format);
     (void)vsnprintf(note->text, sizeof note->text, format, arguments);
     va_end(arguments);
-}
-
-const char *bringup_side(iw_side_t side) {
-    return (side == IW_LEFT) ? "left" : "right";
 }
 
 bool bringup_is_confirmed(const bringup_t *self, const char *item) {
@@ -163,7 +158,7 @@ static const char *how_of(const bringup_note_t *note, char out_how[HOW_SIZE]) {
 /// was not taken.
 static bool confirm_all(bringup_t *self) {
     char value[32];
-    bool taken = trial_start(self, &self->config, true);
+    bool taken = trial_start_with_records(self);
     for (unsigned i = 0; i < self->notes && taken; i++) {
         const bringup_note_t *note = &self->note[i];
         if (note->item != NULL) {
@@ -206,24 +201,15 @@ static void tell_next(bringup_t *self, const char *path) {
     }
 }
 
-bringup_result_t bringup_write(bringup_t *self) {
+void bringup_write(bringup_t *self) {
     char path[BRINGUP_ANSWER_SIZE];
     talk_step(BRINGUP_STEPS, "the configuration");
     trial_stop(self);
     tell_findings(self);
-    for (;;) {
-        bool yes = true;
-        if (!talk_ask("Write it to", self->out_path, path)) {
-            return BRINGUP_QUIT;
-        }
-        if (access(path, F_OK) == 0 && !talk_yes("That file exists. Replace it?", false, &yes)) {
-            return BRINGUP_QUIT;
-        }
-        if (yes && write_file(self, path)) {
-            break;
-        }
-    }
+    do {
+        talk_ask(self, "Write it to", self->out_path, path);
+    } while ((access(path, F_OK) == 0 && !talk_yes(self, "That file exists. Replace it?", false)) ||
+             !write_file(self, path));
     talk_say("Written to %s.", path);
     tell_next(self, path);
-    return BRINGUP_ON;
 }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
 
-#include <inttypes.h>
-#include <stdlib.h>
+#include "text/text.h"
 
 #define PERCENT_MAX     100
 #define MN_PER_CN       10
@@ -112,7 +111,7 @@ void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decod
         break;
     default:
         out->message = iw_codec_name(kind);
-        out->wheel = (side == IW_LEFT) ? "left" : "right";
+        out->wheel = text_side(side);
         put_message(kind, &told[side], config->force_unit[side], out);
         break;
     }
@@ -126,29 +125,14 @@ const char *field_column(field_t field) {
     return words[field].column;
 }
 
-static void print_value(const decoded_t *decoded, field_t field, FILE *out) {
-    const field_words_t *word = &words[field];
-    const long value = decoded->value[field];
-    const char *gap = (word->unit[0] == '\0') ? "" : " ";
-    const char *label_gap = (word->label[0] == '\0') ? "" : " ";
-    long scale = 1;
-    for (unsigned i = 0; i < word->digits; i++) {
-        scale *= 10;
-    }
-    if (scale == 1) {
-        (void)fprintf(out, "%s%s%ld%s%s", word->label, label_gap, value, gap, word->unit);
-    } else {
-        (void)fprintf(out, "%s%s%s%ld.%0*ld%s%s", word->label, label_gap, (value < 0) ? "-" : "", labs(value) / scale,
-                      (int)word->digits, labs(value) % scale, gap, word->unit);
-    }
-}
-
 void field_print_all(const decoded_t *decoded, FILE *out) {
     const char *gap = "";
     for (unsigned field = 0; field < FIELDS; field++) {
         if ((decoded->present & (1U << field)) != 0U) {
-            (void)fputs(gap, out);
-            print_value(decoded, (field_t)field, out);
+            const field_words_t *word = &words[field];
+            char number[TEXT_CELL];
+            text_number(decoded->value[field], word->digits, word->unit, number);
+            (void)fprintf(out, "%s%s%s%s", gap, word->label, (word->label[0] == '\0') ? "" : " ", number);
             gap = ", ";
         }
     }

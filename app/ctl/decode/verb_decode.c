@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "decode_fields.h"
-#include "decode_json.h"
-#include "frame_line.h"
-#include "recordings/config_option.h"
+#include "frame.h"
 #include "recordings/recording.h"
 #include "talk/ctl.h"
 #include "text/text.h"
 
 #include <inttypes.h>
+#include <jansson.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 /// A time before this is not one since 1970.
 #define CALENDAR_US 1000000000000000
@@ -25,31 +23,20 @@ typedef struct {
 
 /// An exit code.
 static int parse_words(decode_t *self, int count, char **words) {
-    self->path = NULL;
-    for (int i = 0; i < count; i++) {
-        if (strcmp(words[i], "--csv") == 0) {
-            self->csv = true;
-        } else if (strcmp(words[i], "--config") == 0) {
-            const int code = config_option_load("decode", (i + 1 < count) ? words[++i] : NULL, &self->config);
-            if (code != CTL_OK) {
-                return code;
-            }
-        } else if ((words[i][0] == '-' && words[i][1] != '\0') || self->path != NULL) {
-            return ctl_fail(CTL_USAGE, "decode does not understand \"%s\"; see: iwheelctl decode --help", words[i]);
-        } else {
-            self->path = words[i];
-        }
-    }
-    self->path = (self->path != NULL) ? self->path : "-";
-    return CTL_OK;
+    const option_t options[] = {
+        {OPTION("--csv", NULL, &self->csv)},
+        {OPTION("--config", config_option_load, &self->config)},
+        {.name = NULL},
+    };
+    const words_syntax_t syntax = {"decode", options, words_is_file, &self->path};
+    self->path = "-";
+    return words_read(&syntax, count, words);
 }
 
 static void write_begin(const decode_t *self, const candump_t *frame) {
-    char text[64];
-    struct tm local;
-    const time_t seconds = (time_t)(frame->time_us / 1000000);
-    if (frame->time_us >= CALENDAR_US && localtime_r(&seconds, &local) != NULL &&
-        strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S", &local) > 0U) {
+    char text[TEXT_CELL];
+    text_when(frame->time_us, text);
+    if (frame->time_us >= CALENDAR_US && text[0] != '-') {
         text_line(stdout, "# %s, from %s.%06" PRId64 " local time; times in seconds from there", self->recording.name,
                   text, frame->time_us % 1000000);
     } else {
@@ -100,13 +87,51 @@ static void write_csv(const candump_t *frame, const decoded_t *decoded) {
     (void)printf(",\"%s\"\n", decoded->note);
 }
 
+/// Text, or null if there is none or it is not UTF-8.
+static json_t *text_or_null(const char *text) {
+    json_t *value = (text[0] != '\0') ? json_string(text) : NULL;
+    return (value != NULL) ? value : json_null();
+}
+
+static json_t *bytes_of(const candump_t *frame) {
+    char data[2U * CANDUMP_DATA_MAX + 1U] = "";
+    for (size_t i = 0; i < frame->length && !frame->remote; i++) {
+        (void)snprintf(&data[2U * i], 3U, "%02X", frame->data[i]);
+    }
+    return json_string(data);
+}
+
+static json_t *values_of(const decoded_t *decoded) {
+    json_t *values = json_object();
+    for (unsigned field = 0; field < FIELDS; field++) {
+        if ((decoded->present & (1U << field)) != 0U) {
+            (void)json_object_set_new(values, field_column((field_t)field), json_integer(decoded->value[field]));
+        }
+    }
+    return values;
+}
+
+/// One object: when and where, id and bytes, whose message it is, and under `values` what it carries, named as in the CSV.
+/// What is not known is null. False if there was no memory for it: nothing is written.
+static bool write_json(const candump_t *frame, const decoded_t *decoded) {
+    json_t *line = json_pack(
+        "{s:I, s:o, s:o, s:I, s:b, s:b, s:b, s:i, s:o, s:o, s:s, s:o, s:o}", "t_us", (json_int_t)frame->time_us,
+        "interface", text_or_null(frame->interface), "direction", text_or_null(frame_direction(frame)), "id",
+        (json_int_t)frame->id, "extended", (int)frame->extended, "remote", (int)frame->remote, "fd", (int)frame->fd,
+        "dlc", (int)frame->length, "data", bytes_of(frame), "wheel", text_or_null(decoded->wheel), "message",
+        decoded->message, "values", values_of(decoded), "note", text_or_null(decoded->note));
+    const bool written = line != NULL && text_json_value(line, stdout);
+    json_decref(line);
+    return written;
+}
+
 /// An exit code.
 static int write_frame(decode_t *self, const candump_t *frame, bool json) {
     decoded_t decoded;
     const iw_can_frame_t core = candump_to_core(frame);
     decode_fields(&core, &self->config, &decoded);
     if (json) {
-        return decode_print_json(frame, &decoded) ? CTL_OK : ctl_fail(CTL_INTERNAL, "not enough memory for a line");
+        return write_json(frame, &decoded) ? CTL_OK : ctl_fail(CTL_INTERNAL, "not enough memory for a line");
     }
     if (self->csv) {
         write_csv(frame, &decoded);
@@ -124,7 +149,7 @@ int verb_decode(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && decode.csv && self->json) {
         return ctl_fail(CTL_USAGE, "decode writes --csv or --json, not both");
     }
-    code = (code == CTL_OK) ? recording_open(&decode.recording, decode.path) : code;
+    code = (code == CTL_OK) ? recording_open(&decode.recording, NULL, decode.path) : code;
     if (code != CTL_OK) {
         return code;
     }

@@ -3,9 +3,9 @@
 #ifndef DOCTOR_H
 #define DOCTOR_H
 
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 #include "inspect.h"
-#include "talk/near.h"
+#include "talk/ctl.h"
 
 /// How long `doctor` listens unless told otherwise.
 #define DOCTOR_LISTEN_MS 2000U
@@ -22,6 +22,16 @@ typedef struct {
     bool open; ///< `hal` is.
     unsigned listen_ms;
 } doctor_t;
+
+/// A word of the command line and what it says; NULL: nothing.
+typedef struct {
+    const char *word;
+    const char *value;
+} doctor_named_t;
+
+/// The configuration in force: the file at `path`, or else the installed one if there is one; then the words. An exit code, after
+/// telling what is wrong.
+int doctor_configure(gateway_config_t *config, const char *path, const doctor_named_t *bus, const char *estop);
 
 /// The interfaces of the kind CAN, separated by blanks. How many.
 unsigned doctor_interfaces(char *out_names, size_t size);
@@ -40,9 +50,6 @@ void doctor_close(doctor_t *self);
 
 /// The e-stop's present level, from the gateway or from the line itself.
 inspect_estop_t doctor_estop(doctor_t *self);
-
-/// Guides through a press and a release, on a terminal.
-void doctor_press(doctor_t *self);
 
 /// Prints the findings from number `first` on for people.
 void doctor_print(const doctor_t *self, unsigned first);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What the gateway tells, and what is heard on the bus.
-#include "assumption.h"
 #include "doctor.h"
 #include "status/advice.h"
 #include "text/text.h"
+#include "words/assumption.h"
 
 #include "iwheel_northbound/words.h"
 
@@ -159,9 +159,8 @@ static void hear_gateway(doctor_t *self) {
 
 inspect_estop_t doctor_estop(doctor_t *self) {
     if (!has_gateway(self)) {
-        const iw_hal_t functions = iw_linux_hal_functions(&self->hal);
         iw_linux_hal_tend(&self->hal, (iw_time_us_t)client_now_us());
-        (void)functions.estop_pressed(functions.context);
+        (void)iw_linux_hal_pressed(&self->hal);
         return inspect_estop_of(&self->hal, self->config.estop.line);
     }
     const json_t *estop = json_object_get(self->gateway.status, "estop");

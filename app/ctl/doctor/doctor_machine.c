@@ -2,6 +2,8 @@
 // What can be said of the machine before the bus is opened.
 #include "doctor.h"
 
+#include "iwheel_northbound/text.h"
+
 #include <dirent.h>
 #include <errno.h>
 #include <grp.h>
@@ -42,7 +44,7 @@ static bool read_word(const char *path, char *out_word, size_t size) {
 unsigned doctor_interfaces(char *out_names, size_t size) {
     unsigned found = 0;
     DIR *folder = opendir("/sys/class/net");
-    out_names[0] = '\0';
+    iwn_text_t names = iwn_text_begin(out_names, size);
     if (folder == NULL) {
         return 0;
     }
@@ -51,8 +53,7 @@ unsigned doctor_interfaces(char *out_names, size_t size) {
         char type[16] = "";
         (void)snprintf(path, sizeof path, "/sys/class/net/%s/type", entry->d_name);
         if (entry->d_name[0] != '.' && read_word(path, type, sizeof type) && strcmp(type, TYPE_CAN) == 0) {
-            const size_t used = strlen(out_names);
-            (void)snprintf(&out_names[used], size - used, "%s%s", (found > 0) ? " " : "", entry->d_name);
+            IWN_TEXT_JOIN(&names, (found > 0) ? " " : "", entry->d_name);
             found++;
         }
     }
@@ -108,20 +109,14 @@ static bool look_at_kernel(doctor_t *self) {
     return true;
 }
 
-static int64_t now_us(void) {
-    struct timespec now;
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 /// How much too late the worst of many short sleeps ended.
 static int64_t worst_lateness_us(void) {
     int64_t worst_us = 0;
     for (unsigned i = 0; i < NAPS; i++) {
         const struct timespec nap = {0, NAP_NS};
-        const int64_t begin_us = now_us();
+        const int64_t begin_us = client_now_us();
         (void)nanosleep(&nap, NULL);
-        const int64_t late_us = now_us() - begin_us - NAP_NS / 1000;
+        const int64_t late_us = client_now_us() - begin_us - NAP_NS / 1000;
         worst_us = (late_us > worst_us) ? late_us : worst_us;
     }
     return worst_us;

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "doctor.h"
-#include "text/duration.h"
-#include "text/paper.h"
+#include "talk/words.h"
 #include "text/text.h"
 
-#include <errno.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,69 +12,42 @@
 #define INDENT        6U
 #define LISTEN_MIN_US 200000
 #define LISTEN_MAX_US 60000000
+/// For a press, or a release.
+#define WAIT_US 20000000
+#define LOOK_MS 20
 
 typedef struct {
     const char *bus;
     const char *config;
     const char *estop;
-    unsigned listen_ms;
-    bool press;
+    int64_t listen_us;
+    bool no_press;
 } words_t;
 
-static bool parse_listen(const char *text, unsigned *out_ms) {
-    static const duration_range_t range = {LISTEN_MIN_US, LISTEN_MAX_US};
-    char why[DURATION_WHY_SIZE];
-    int64_t us = 0;
-    if (!duration_option("--listen", text, range, &us, why)) {
-        (void)ctl_fail(CTL_USAGE, "%s", why);
-        return false;
-    }
-    *out_ms = (unsigned)(us / 1000);
-    return true;
+/// An exit code.
+static int parse_words(int count, char **words, words_t *out_words) {
+    *out_words = (words_t){.listen_us = DOCTOR_LISTEN_MS * INT64_C(1000)};
+    const option_t options[] = {
+        {OPTION("--config", option_text, &out_words->config)},
+        {OPTION("--estop", option_text, &out_words->estop)},
+        {OPTION("--listen", option_time, &out_words->listen_us), .range = {LISTEN_MIN_US, LISTEN_MAX_US}},
+        {OPTION("--no-press", NULL, &out_words->no_press)},
+        {.name = NULL},
+    };
+    const words_syntax_t syntax = {"doctor", options, words_is_name, &out_words->bus};
+    return words_read(&syntax, count, words);
 }
 
-static bool parse_words(int count, char **words, words_t *out_words) {
-    *out_words = (words_t){.listen_ms = DOCTOR_LISTEN_MS, .press = true};
-    for (int i = 0; i < count; i++) {
-        const char *value = (i + 1 < count) ? words[i + 1] : NULL;
-        const char **text = (strcmp(words[i], "--config") == 0)  ? &out_words->config
-                            : (strcmp(words[i], "--estop") == 0) ? &out_words->estop
-                                                                 : NULL;
-        if (text != NULL && value == NULL) {
-            (void)ctl_fail(CTL_USAGE, "%s wants a value; see: iwheelctl doctor --help", words[i]);
-            return false;
-        }
-        if (text != NULL) {
-            *text = value;
-            i++;
-        } else if (strcmp(words[i], "--no-press") == 0) {
-            out_words->press = false;
-        } else if (strcmp(words[i], "--listen") == 0) {
-            if (!parse_listen(value, &out_words->listen_ms)) {
-                return false;
-            }
-            i++;
-        } else if (words[i][0] != '-' && out_words->bus == NULL) {
-            out_words->bus = words[i];
-        } else {
-            return ctl_words_at_most("doctor", count - i, 0, &words[i]);
-        }
-    }
-    return true;
-}
-
-/// The configuration in force: the file if there is one, then the words. An exit code.
-static int configure(doctor_t *self, const words_t *words) {
-    gateway_config_t *config = &self->config;
-    const char *path = (words->config != NULL) ? words->config : GATEWAY_CONFIG_PATH;
+int doctor_configure(gateway_config_t *config, const char *path, const doctor_named_t *bus, const char *estop) {
+    const char *found = (path != NULL) ? path : GATEWAY_CONFIG_PATH;
     gateway_config_default(config);
-    if ((words->config != NULL || access(path, F_OK) == 0) && gateway_config_load(path, config, stderr) != 0) {
+    if ((path != NULL || access(found, F_OK) == 0) && gateway_config_load(found, config, stderr) != 0) {
         return GATEWAY_CONFIG_ERROR;
     }
-    if (words->bus != NULL && gateway_config_override(config, "bus.interface", words->bus, "IFACE", stderr) != 0) {
+    if (bus->value != NULL && gateway_config_override(config, "bus.interface", bus->value, bus->word, stderr) != 0) {
         return CTL_USAGE;
     }
-    if (words->estop != NULL && gateway_config_override(config, "estop.line", words->estop, "--estop", stderr) != 0) {
+    if (estop != NULL && gateway_config_override(config, "estop.line", estop, "--estop", stderr) != 0) {
         return CTL_USAGE;
     }
     return CTL_OK;
@@ -115,14 +87,8 @@ static void say_no_bus(doctor_t *self) {
 }
 
 static void print_text(const paper_t *paper, tone_t tone, const char *text) {
-    const size_t room = PAPER_WIDTH - INDENT;
     for (bool first = true; *text != '\0' || first; first = false) {
-        size_t cut = strlen(text);
-        if (cut > room) {
-            for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
-            }
-            cut = (cut == 0) ? room : cut;
-        }
+        const size_t cut = text_cut(text, PAPER_WIDTH - INDENT);
         paper_say(paper, tone, "%s%.*s", first ? "" : "      ", (int)cut, text);
         paper_end(paper);
         text += cut;
@@ -155,11 +121,11 @@ static json_t *rates_of(const doctor_t *self) {
     json_t *rates = json_array();
     for (unsigned i = 0; i < IW_CODEC_ROWS && self->heard.span_us > 0U; i++) {
         const iw_codec_row_t *row = &iw_codec_rows[i];
-        (void)json_array_append_new(rates, json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)row->id, "name",
-                                                     iw_codec_name((iw_codec_kind_t)row->kind), "side",
-                                                     (row->side == IW_LEFT) ? "left" : "right", "nominal_mHz",
-                                                     (json_int_t)inspect_nominal_mHz(row), "measured_mHz",
-                                                     (json_int_t)inspect_rate_mHz(&self->heard, i)));
+        (void)json_array_append_new(rates,
+                                    json_pack("{s:i,s:s,s:s,s:I,s:I}", "id", (int)row->id, "name",
+                                              iw_codec_name((iw_codec_kind_t)row->kind), "side", text_side(row->side),
+                                              "nominal_mHz", (json_int_t)inspect_nominal_mHz(row), "measured_mHz",
+                                              (json_int_t)inspect_rate_mHz(&self->heard, i)));
     }
     return rates;
 }
@@ -197,14 +163,81 @@ static void look(doctor_t *self, const words_t *words) {
     }
 }
 
+/// True once the e-stop is at that level, false if the time is over or a key was pressed.
+static bool await_level(doctor_t *self, bool pressed, bool *out_skipped) {
+    const int64_t end_us = client_now_us() + WAIT_US;
+    while (client_now_us() < end_us) {
+        if (self->gateway.result == NEAR_FOUND) {
+            json_decref(self->gateway.status);
+            self->gateway.status = near_ask(self->ctl, json_pack("{s:s}", "cmd", "status"));
+        }
+        const inspect_estop_t estop = doctor_estop(self);
+        if (estop.level >= 0 && (estop.level > 0) == pressed) {
+            return true;
+        }
+        struct pollfd key = {.fd = STDIN_FILENO, .events = POLLIN};
+        if (poll(&key, 1, LOOK_MS) > 0) {
+            char line[64];
+            *out_skipped = true;
+            (void)!read(STDIN_FILENO, line, sizeof line);
+            return false;
+        }
+    }
+    return false;
+}
+
+static void say_unseen(doctor_t *self, bool skipped, const char *what) {
+    if (skipped) {
+        inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: %s was not tried", what);
+        inspect_cure(&self->findings, "run doctor again and press the button when asked");
+    } else {
+        inspect_say(&self->findings, "estop_press", INSPECT_FAIL, "e-stop: no %s was seen within 20 s", what);
+        inspect_cure(&self->findings, "check the button's wire, [estop] line and [estop] active");
+    }
+}
+
+/// Guides through a press and a release, on a terminal: seen through the same input that will stop the wheels.
+static void press(doctor_t *self) {
+    bool skipped = false;
+    const inspect_estop_t before = doctor_estop(self);
+    const char *state = text_word(self->gateway.status, "state");
+    if (!before.present || before.level != 0) {
+        return;
+    }
+    if (self->gateway.result == NEAR_FOUND && (strcmp(state, "armed") == 0 || strcmp(state, "stopping") == 0)) {
+        inspect_say(&self->findings, "estop_press", INSPECT_WARN, "e-stop: not tried, because somebody drives");
+        inspect_cure(&self->findings, "iwheelctl stop, then run doctor again");
+        return;
+    }
+    (void)fputs("\nPress the e-stop button now (Enter skips this) ... ", stdout);
+    (void)fflush(stdout);
+    if (!await_level(self, true, &skipped)) {
+        (void)fputs("\n", stdout);
+        say_unseen(self, skipped, "press");
+        return;
+    }
+    (void)fputs("seen. Release it ... ", stdout);
+    (void)fflush(stdout);
+    const bool released = await_level(self, false, &skipped);
+    (void)fputs(released ? "seen.\n\n" : "\n\n", stdout);
+    if (!released) {
+        say_unseen(self, skipped, "release");
+        return;
+    }
+    inspect_say(&self->findings, "estop_press", INSPECT_OK, "e-stop: press and release were seen%s",
+                (self->gateway.result == NEAR_FOUND) ? "; the gateway is latched now, as it must be" : "");
+    if (self->gateway.result == NEAR_FOUND) {
+        inspect_cure(&self->findings, "iwheelctl reset");
+    }
+}
+
 int verb_doctor(ctl_t *self, int count, char **words) {
     words_t parsed;
     static doctor_t doctor;
-    if (!parse_words(count, words, &parsed)) {
-        return CTL_USAGE;
-    }
-    doctor = (doctor_t){.ctl = self, .listen_ms = parsed.listen_ms};
-    const int code = configure(&doctor, &parsed);
+    int code = parse_words(count, words, &parsed);
+    doctor = (doctor_t){.ctl = self, .listen_ms = (unsigned)(parsed.listen_us / 1000)};
+    const doctor_named_t bus = {"IFACE", parsed.bus};
+    code = (code == CTL_OK) ? doctor_configure(&doctor.config, parsed.config, &bus, parsed.estop) : code;
     if (code != CTL_OK) {
         return code;
     }
@@ -214,8 +247,8 @@ int verb_doctor(ctl_t *self, int count, char **words) {
     } else {
         doctor_print(&doctor, 0);
         const unsigned printed = doctor.findings.count;
-        if (parsed.press && doctor.open && isatty(STDIN_FILENO) == 1 && isatty(STDOUT_FILENO) == 1) {
-            doctor_press(&doctor);
+        if (!parsed.no_press && doctor.open && isatty(STDIN_FILENO) == 1 && isatty(STDOUT_FILENO) == 1) {
+            press(&doctor);
             doctor_print(&doctor, printed);
         }
         print_sum(&doctor);

@@ -9,7 +9,6 @@
 // waited for, a second at the most.
 #include "drive_words.h"
 #include "talk/ctl.h"
-#include "talk/signals.h"
 #include "text/text.h"
 
 #include <stdio.h>
@@ -235,11 +234,11 @@ static int wait_for_rest(drive_t *self) {
 static void way_of(const drive_t *self, const char *side, char out[TEXT_CELL]) {
     const json_t *from = json_object_get(json_object_get(self->first, side), "distance_mm");
     const json_t *to = json_object_get(json_object_get(self->latest, side), "distance_mm");
-    json_t *way = (json_is_integer(from) && json_is_integer(to))
-                      ? json_integer(json_integer_value(to) - json_integer_value(from))
-                      : json_null();
-    text_decimal(way, 3, "m", out);
-    json_decref(way);
+    if (json_is_integer(from) && json_is_integer(to)) {
+        text_number(json_integer_value(to) - json_integer_value(from), 3, "m", out);
+    } else {
+        (void)snprintf(out, TEXT_CELL, "--");
+    }
 }
 
 static void sum_up(const drive_t *self, int64_t stop_us) {

@@ -138,10 +138,4 @@ uint32_t learn_period_ms(const learn_period_t *period);
 /// A recording of that id; NULL if the document has no such id.
 const learn_id_t *learn_known(const learn_t *self, uint32_t id);
 
-/// Prints all of it.
-void learn_report(const learn_t *self, const char *name);
-
-/// Prints all of it as one JSON object in one line. False if there is no memory for it.
-bool learn_report_json(const learn_t *self, const char *name);
-
 #endif

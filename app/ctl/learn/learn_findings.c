@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "learn_findings.h"
+#include "text/text.h"
 
 #include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-const char *learn_side(unsigned side) {
-    return (side == IW_LEFT) ? "left" : "right";
-}
 
 bool learn_is_empty(const learn_range_t *range) {
     return range->low > range->high;
@@ -41,7 +38,7 @@ bool learn_suggests(const learn_findings_t *self, const learn_finding_t *finding
     const learn_finding_t *type = learn_find(self, "setpoint_type", LEARN_BOTH);
     for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
         if (finding->value[0] != '\0' && strcmp(finding->item, keys[i]) == 0) {
-            *out_section = (finding->side == LEARN_BOTH) ? "wheels" : learn_side(finding->side);
+            *out_section = (finding->side == LEARN_BOTH) ? "wheels" : text_side(finding->side);
             *out_key = keys[i];
             // Without a type that moves the wheels nobody knows what the rest of a setpoint meant.
             return finding->side != LEARN_BOTH || (type != NULL && type->mark == '+');
@@ -78,19 +75,19 @@ static void weigh_oddities(const learn_t *self, unsigned side, learn_findings_t 
     const int64_t longest_us = self->known[side].period.longest_us;
     if (setpoint->over_limit > 0U) {
         (void)learn_say(out, '-', "current", side,
-                        "%s: %" PRIu64 " setpoints with a current beyond the documented +/-2000 mA", learn_side(side),
+                        "%s: %" PRIu64 " setpoints with a current beyond the documented +/-2000 mA", text_side(side),
                         setpoint->over_limit);
     }
     if (setpoint->padding > 0U) {
         (void)learn_say(out, '-', "padding", side,
-                        "%s: %" PRIu64 " setpoints have something behind the five documented bytes", learn_side(side),
+                        "%s: %" PRIu64 " setpoints have something behind the five documented bytes", text_side(side),
                         setpoint->padding);
     }
     if (longest_us > (int64_t)IW_WHEEL_WATCHDOG_US) {
         (void)learn_say(out, '-', "silence", side,
                         "%s: up to %" PRId64
                         " ms without a setpoint; by the document a wheel stops by itself after 1000 ms",
-                        learn_side(side), longest_us / 1000);
+                        text_side(side), longest_us / 1000);
     }
 }
 

@@ -43,9 +43,6 @@ __attribute__((format(printf, 5, 6))) learn_finding_t *learn_say(learn_findings_
 /// The first finding about it, or NULL.
 const learn_finding_t *learn_find(const learn_findings_t *self, const char *item, unsigned side);
 
-/// "left" or "right".
-const char *learn_side(unsigned side);
-
 bool learn_is_empty(const learn_range_t *range);
 
 /// The wheel turned while it was told a steady speed, long enough and nearly always.

@@ -2,6 +2,9 @@
 // What the setpoints of the recording tell: type, role of the current, length. Where a wheel's behaviour belongs to the
 // claim, it was seen as well.
 #include "learn_findings.h"
+#include "text/text.h"
+
+#include "iwheel_northbound/text.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -58,7 +61,7 @@ static void weigh_common_type(const learn_t *self, int type, learn_findings_t *o
             if (setpoint->type[type] == setpoint->type_moving[type]) {
                 (void)learn_say(out, '?', "setpoint_type", side,
                                 "%s: no setpoint of type %d has speed 0: whether it stops the wheel was not seen",
-                                learn_side(side), type);
+                                text_side(side), type);
             }
         }
     }
@@ -90,7 +93,7 @@ static void weigh_type(const learn_t *self, learn_findings_t *out) {
             (void)learn_say(out, '-', "sender", side,
                             "%s: the type changes %" PRIu64 " times in %" PRIu64
                             " setpoints: two controllers on this bus?",
-                            learn_side(side), setpoint->changes_of_type, setpoint->count);
+                            text_side(side), setpoint->changes_of_type, setpoint->count);
         }
     }
 }
@@ -133,8 +136,7 @@ static bool both(const learn_t *self, bool (*judge)(const learn_setpoint_t *setp
 /// What was not told to both wheels often enough to speak of "every speed": "0", "forwards", "backwards". Empty: all was.
 static void list_untold(const learn_t *self, char *out_list, size_t size) {
     static const char *const words[] = {"0", "forwards", "backwards"};
-    size_t used = 0;
-    out_list[0] = '\0';
+    iwn_text_t list = iwn_text_begin(out_list, size);
     for (unsigned kind = 0; kind < 3U; kind++) {
         bool told = true;
         for (unsigned side = 0; side < IW_SIDES; side++) {
@@ -143,8 +145,7 @@ static void list_untold(const learn_t *self, char *out_list, size_t size) {
             told = told && count[kind] >= LEARN_FRAMES_MIN;
         }
         if (!told) {
-            const int n = snprintf(&out_list[used], size - used, "%s%s", (used > 0U) ? ", " : "", words[kind]);
-            used += (n > 0) ? (size_t)n : 0U;
+            IWN_TEXT_JOIN(&list, (list.length > 0U) ? ", " : "", words[kind]);
         }
     }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the wheels of the recording showed: signs, scale, ticks, units of force, byte order.
 #include "learn_findings.h"
+#include "text/text.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -72,19 +73,19 @@ static void weigh_sign(const learn_t *self, unsigned side, learn_findings_t *out
     char ahead[80];
     char back[80];
     if (!forward && !backward) {
-        (void)learn_say(out, '?', "feedback_sign", side, "%s sign of the speed: %s", learn_side(side),
+        (void)learn_say(out, '?', "feedback_sign", side, "%s sign of the speed: %s", text_side(side),
                         no_sign(self, side));
         return;
     }
     if (first == 0 || first != second) {
         (void)learn_say(out, '-', "feedback_sign", side,
-                        "%s: the measured speed has now the sign of the setpoint, now the other", learn_side(side));
+                        "%s: the measured speed has now the sign of the setpoint, now the other", text_side(side));
         return;
     }
     say_direction(forward, first, ahead, sizeof ahead);
     say_direction(false, first, back, sizeof back);
     learn_finding_t *told =
-        learn_say(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s", learn_side(side), ahead,
+        learn_say(out, (first > 0) ? '+' : '-', "feedback_sign", side, "%s: %s%s%s%s", text_side(side), ahead,
                   (forward && backward) ? ", " : "", (forward && backward) ? back : " (the other direction: not seen)",
                   (first > 0) ? "" : "; the gateway would latch feedback_sign");
     (void)snprintf(told->value, sizeof told->value, "%s", (first > 0) ? "yes" : "no");
@@ -95,7 +96,7 @@ static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_finding
     if (!learn_turned(wheel) || wheel->steady_rpm == 0) {
         (void)learn_say(out, '?', "speed_scale", side,
                         "%s mm/s per rpm: not seen to turn for half a second by a steady speed of 100 mm/s or more",
-                        learn_side(side));
+                        text_side(side));
         return;
     }
     const int64_t um_s = wheel->steady_mm_s * 1000 / wheel->steady_rpm;
@@ -104,22 +105,22 @@ static void weigh_scale(const learn_wheel_t *wheel, unsigned side, learn_finding
         (void)learn_say(out, '+', "speed_scale", side,
                         "%s: %" PRId64 ".%03" PRId64
                         " mm/s of setpoint per measured rpm; 20.106 is expected of 192 mm and rpm of the wheel",
-                        learn_side(side), um_s / 1000, um_s % 1000);
+                        text_side(side), um_s / 1000, um_s % 1000);
     } else if (nearly_all(off_us, wheel->steady_us)) {
         (void)learn_say(out, '-', "speed_scale", side,
                         "%s: %" PRId64 ".%03" PRId64
                         " mm/s of setpoint per measured rpm, where 20.106 is expected of 192 mm and rpm of the wheel: "
                         "another gear (rpm_of, gear_ratio), another radius, or it did not follow",
-                        learn_side(side), um_s / 1000, um_s % 1000);
+                        text_side(side), um_s / 1000, um_s % 1000);
     } else {
         (void)learn_say(out, '?', "speed_scale", side,
-                        "%s mm/s per rpm: the wheel was now at the speed that it was told, now not", learn_side(side));
+                        "%s mm/s per rpm: the wheel was now at the speed that it was told, now not", text_side(side));
     }
 }
 
 static void weigh_ticks(const learn_wheel_t *wheel, unsigned side, learn_findings_t *out) {
     if (wheel->turned_rpm_us < (int64_t)TURNS_MIN * US_PER_MIN) {
-        (void)learn_say(out, '?', "ticks_per_turn", side, "%s ticks per turn: %s", learn_side(side),
+        (void)learn_say(out, '?', "ticks_per_turn", side, "%s ticks per turn: %s", text_side(side),
                         (wheel->statuses == 0U) ? "none of its status frames is in it"
                         : (wheel->speeds == 0U) ? "none of its speed frames is in it"
                                                 : "fewer than two turns at 10 rpm or more, without a gap, are in it");
@@ -128,7 +129,7 @@ static void weigh_ticks(const learn_wheel_t *wheel, unsigned side, learn_finding
     const uint64_t tenths = wheel->ticks * 10U * US_PER_MIN / (uint64_t)wheel->turned_rpm_us;
     const bool same = tenths >= 540U && tenths <= 660U;
     (void)learn_say(out, same ? '+' : '-', "ticks_per_turn", side,
-                    "%s: %" PRIu64 ".%" PRIu64 " ticks per turn of what the rpm count; %s", learn_side(side),
+                    "%s: %" PRIu64 ".%" PRIu64 " ticks per turn of what the rpm count; %s", text_side(side),
                     tenths / 10U, tenths % 10U,
                     same              ? "the rotor makes 60, so the rpm are the rotor's, or there is no gear"
                     : (tenths > 660U) ? "the rotor makes 60, so there is a gear between: gear_ratio"
@@ -171,7 +172,7 @@ static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_finding
     const char *documented = (side == IW_LEFT) ? "cN" : "dN";
     const char *missing = no_force(wheel);
     if (missing != NULL) {
-        (void)learn_say(out, '?', "force_unit", side, "%s force unit: %s", learn_side(side), missing);
+        (void)learn_say(out, '?', "force_unit", side, "%s force unit: %s", text_side(side), missing);
         return;
     }
     const int64_t permille =
@@ -183,7 +184,7 @@ static void weigh_force(const learn_wheel_t *wheel, unsigned side, learn_finding
     learn_finding_t *told =
         learn_say(out, (is_unit && unit[0] == documented[0]) ? '+' : '-', "force_unit", side,
                   "%s force at rest / offset = %s%" PRId64 ".%02" PRId64 ": %s%s (the document says %s)",
-                  learn_side(side), (permille < 0) ? "-" : "", size / 1000, size % 1000 / 10,
+                  text_side(side), (permille < 0) ? "-" : "", size / 1000, size % 1000 / 10,
                   (unit == NULL) ? "neither cN (10) nor dN (1) nor offset removed (0): pressed at the start?"
                   : is_unit      ? unit
                   : dead         ? "the wheel subtracts the offset itself, or its force never changes"

@@ -1,18 +1,272 @@
 // SPDX-License-Identifier: MIT
-#include "learn.h"
+#include "learn_findings.h"
 #include "recordings/recording.h"
 #include "talk/ctl.h"
+#include "text/text.h"
 
+#include <inttypes.h>
+#include <jansson.h>
+#include <stdio.h>
 #include <string.h>
+
+#define CELL 26
+
+static void range_text(const learn_range_t *range, const char *unit, char *out) {
+    if (learn_is_empty(range)) {
+        (void)snprintf(out, LEARN_TEXT, "--");
+    } else if (range->low == range->high) {
+        (void)snprintf(out, LEARN_TEXT, "always %" PRId32 "%s", range->low, unit);
+    } else {
+        (void)snprintf(out, LEARN_TEXT, "%" PRId32 " to %" PRId32 "%s", range->low, range->high, unit);
+    }
+}
+
+static void types_text(const learn_setpoint_t *setpoint, char *out) {
+    size_t used = 0;
+    unsigned kinds = 0;
+    out[0] = '\0';
+    for (unsigned type = 0; type < 256U; type++) {
+        if (setpoint->type[type] > 0U && used < LEARN_TEXT - 32U) {
+            const int n = snprintf(out + used, LEARN_TEXT - used, "%s%u (%u %%)", (kinds > 0U) ? ", " : "", type,
+                                   (unsigned)(setpoint->type[type] * 100U / setpoint->count));
+            used += (n > 0) ? (size_t)n : 0U;
+            kinds++;
+        }
+    }
+    if (kinds == 0U) {
+        (void)snprintf(out, LEARN_TEXT, "--");
+    }
+}
+
+static void period_text(const learn_period_t *period, char *out) {
+    const uint32_t ms = learn_period_ms(period);
+    if (ms == 0U && period->counted < 2U) {
+        (void)snprintf(out, LEARN_TEXT, "--");
+    } else {
+        (void)snprintf(out, LEARN_TEXT, "%" PRIu32 " ms, longest %" PRId64 " ms", ms, period->longest_us / 1000);
+    }
+}
+
+static void print_setpoints(const learn_t *self) {
+    static const char *const labels[] = {"frames", "type", "speed", "current", "length", "period"};
+    char text[sizeof labels / sizeof labels[0]][IW_SIDES][LEARN_TEXT];
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const learn_setpoint_t *each = &self->setpoint[side];
+        (void)snprintf(text[0][side], LEARN_TEXT, "%" PRIu64, each->count);
+        types_text(each, text[1][side]);
+        range_text(&each->speed_mm_s, " mm/s", text[2][side]);
+        range_text(&each->current_mA, " mA", text[3][side]);
+        range_text(&self->known[side].length, " bytes", text[4][side]);
+        period_text(&self->known[side].period, text[5][side]);
+    }
+    (void)printf("\nSetpoints    left 266 (0x10A)%*sright 298 (0x12A)\n", CELL - 15, "");
+    for (size_t i = 0; i < sizeof labels / sizeof labels[0]; i++) {
+        (void)printf("  %-10s %-*s %s\n", labels[i], CELL, text[i][IW_LEFT], text[i][IW_RIGHT]);
+    }
+}
+
+static void print_id(const learn_id_t *id, const char *said) {
+    char length[LEARN_TEXT];
+    char period[LEARN_TEXT];
+    range_text(&id->length, " bytes", length);
+    period_text(&id->period, period);
+    (void)printf("  %4" PRIu32 " (0x%0*" PRIX32 ")  %8" PRIu64 "  %-18s %-26s %s\n", id->id, id->extended ? 8 : 3,
+                 id->id, id->count, length, period, said);
+}
+
+static void print_telemetry(const learn_t *self) {
+    static const char *const documented[LEARN_IDS] = {
+        [2] = "document: 4 bytes, 4 ms",
+        "document: 4 bytes, 4 ms",
+        "document: 7 bytes, 40 ms",
+        "document: 7 bytes, 40 ms",
+        "document: 8 bytes, 40 ms",
+        "document: 4 bytes, 50 ms",
+        "document: 4 bytes, 50 ms",
+        "document: 2 bytes, 1000 ms, first 60 s",
+        "document: 2 bytes, 1000 ms, first 60 s",
+    };
+    (void)puts("\nTelemetry      frames  length             period");
+    for (unsigned i = 2; i < LEARN_IDS; i++) {
+        print_id(&self->known[i], documented[i]);
+    }
+    if (self->others > 0U) {
+        (void)puts("\nOther ids, not in the document");
+    }
+    for (uint32_t i = 0; i < self->others; i++) {
+        print_id(&self->other[i], "");
+    }
+    if (self->more_others > 0U) {
+        (void)printf("  and %" PRIu64 " frames of still other ids\n", self->more_others);
+    }
+}
+
+static void suggest(const learn_findings_t *findings) {
+    const char *last = "";
+    for (unsigned i = 0; i < findings->count; i++) {
+        const char *section;
+        const char *key;
+        if (learn_suggests(findings, &findings->at[i], &section, &key)) {
+            if (last[0] == '\0') {
+                (void)puts(
+                    "\nFor the configuration, as far as it goes (evidence, no proof; then: iwheelctl bringup)\n");
+            }
+            if (strcmp(section, last) != 0) {
+                (void)printf("[%s]\n", section);
+            }
+            (void)printf("%s = %s\n", key, findings->at[i].value);
+            last = section;
+        }
+    }
+}
+
+/// Prints all of it.
+static void report(const learn_t *self, const learn_findings_t *findings, const char *name) {
+    const int64_t ms = (self->last_us - self->first_us) / 1000;
+    text_line(stdout, "%s: %" PRIu64 " frames in %" PRId64 ".%" PRId64 " s", name, self->frames, ms / 1000,
+              ((ms < 0) ? -ms : ms) % 1000 / 100);
+    print_setpoints(self);
+    print_telemetry(self);
+    (void)puts("\nWhat it tells (+ speaks for, - speaks against, ? says nothing about)");
+    for (unsigned i = 0; i < findings->count; i++) {
+        (void)printf("  %c %s\n", findings->at[i].mark, findings->at[i].text);
+    }
+    suggest(findings);
+}
+
+// The same as the report, for programs: what was counted (evidence), what it tells, what it suggests.
+#include "learn_findings.h"
+#include "text/text.h"
+
+#include <inttypes.h>
+#include <jansson.h>
+#include <stdio.h>
+#include <string.h>
+
+/// [low, high], or null.
+static json_t *range(const learn_range_t *range) {
+    return learn_is_empty(range) ? json_null() : json_pack("[i,i]", (int)range->low, (int)range->high);
+}
+
+static json_t *number(uint64_t value) {
+    return json_integer((json_int_t)value);
+}
+
+static json_t *types(const uint64_t count[256]) {
+    json_t *object = json_object();
+    for (unsigned type = 0; type < 256U; type++) {
+        char name[8];
+        (void)snprintf(name, sizeof name, "%u", type);
+        if (count[type] > 0U) {
+            (void)json_object_set_new(object, name, number(count[type]));
+        }
+    }
+    return object;
+}
+
+static json_t *id(const learn_id_t *id) {
+    const bool timed = id->period.counted >= 2U;
+    return json_pack("{s:I,s:b,s:o,s:o,s:o,s:o}", "id", (json_int_t)id->id, "extended", (int)id->extended, "frames",
+                     number(id->count), "length", range(&id->length), "period_ms",
+                     timed ? json_integer((json_int_t)learn_period_ms(&id->period)) : json_null(), "longest_us",
+                     timed ? json_integer((json_int_t)id->period.longest_us) : json_null());
+}
+
+static json_t *setpoints(const learn_t *self, unsigned side) {
+    const learn_setpoint_t *each = &self->setpoint[side];
+    json_t *object = id(&self->known[side]);
+    json_t *more =
+        json_pack("{s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o}", "sent", number(each->sent), "types",
+                  types(each->type), "types_moving", types(each->type_moving), "at_rest", number(each->at_rest),
+                  "forward", number(each->forward), "backward", number(each->backward), "changes_of_type",
+                  number(each->changes_of_type), "over_limit", number(each->over_limit), "padding",
+                  number(each->padding), "speed_mm_s", range(&each->speed_mm_s), "current_mA", range(&each->current_mA),
+                  "current_at_rest_mA", range(&each->current_at_rest_mA), "current_forward_mA",
+                  range(&each->current_forward_mA), "current_backward_mA", range(&each->current_backward_mA));
+    (void)json_object_update(object, more);
+    json_decref(more);
+    return object;
+}
+
+static json_t *answer(const learn_answer_t *answer) {
+    return json_pack("{s:o,s:o,s:o}", "with_ms", json_integer(answer->with_us / 1000), "against_ms",
+                     json_integer(answer->against_us / 1000), "still_ms", json_integer(answer->still_us / 1000));
+}
+
+static json_t *wheel(const learn_wheel_t *each) {
+    const json_int_t um_s = (each->steady_rpm > 0) ? each->steady_mm_s * 1000 / each->steady_rpm : 0;
+    return json_pack("{s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o,s:o}", "speed_frames", number(each->speeds),
+                     "told_forward", answer(&each->forward), "told_backward", answer(&each->backward),
+                     "stood_at_zero_ms", json_integer(each->stood_us / 1000), "ran_at_zero_ms",
+                     json_integer(each->ran_us / 1000), "status_frames", number(each->statuses), "um_s_per_rpm",
+                     (um_s > 0) ? json_integer(um_s) : json_null(), "ticks", number(each->ticks), "milli_turns",
+                     json_integer(each->turned_rpm_us / 60000), "force_frames", number(each->forces), "force_raw",
+                     range(&each->force), "force_raw_at_rest", range(&each->rest_force), "offset_dN",
+                     range(&each->offset_dN));
+}
+
+static json_t *findings_of(const learn_findings_t *self, json_t *suggested) {
+    json_t *list = json_array();
+    for (unsigned i = 0; i < self->count; i++) {
+        const learn_finding_t *each = &self->at[i];
+        const char *section;
+        const char *key;
+        (void)json_array_append_new(
+            list, json_pack("{s:s,s:s?,s:s,s:s?,s:s}", "item", each->item, "side",
+                            (each->side == LEARN_BOTH) ? NULL : text_side(each->side), "verdict",
+                            (each->mark == '+')   ? "for"
+                            : (each->mark == '-') ? "against"
+                                                  : "unknown",
+                            "value", (each->value[0] != '\0') ? each->value : NULL, "text", each->text));
+        if (learn_suggests(self, each, &section, &key)) {
+            json_t *lines = json_object_get(suggested, section);
+            if (lines == NULL) {
+                lines = json_object();
+                (void)json_object_set_new(suggested, section, lines);
+            }
+            (void)json_object_set_new(lines, key, json_string(each->value));
+        }
+    }
+    return list;
+}
+
+static json_t *ids(const learn_id_t *from, unsigned count) {
+    json_t *list = json_array();
+    for (unsigned i = 0; i < count; i++) {
+        (void)json_array_append_new(list, id(&from[i]));
+    }
+    return list;
+}
+
+/// The same for programs, as one JSON object in one line: what was counted (evidence), what it tells, what it suggests. False if
+/// there is no memory for it.
+static bool report_json(const learn_t *self, const learn_findings_t *findings, const char *name) {
+    json_t *suggested = json_object();
+    json_t *root = json_pack("{s:s,s:o,s:I,s:{s:o,s:o},s:{s:o,s:o},s:o,s:o,s:o,s:o,s:o}", "file", name, "frames",
+                             number(self->frames), "duration_us", (json_int_t)(self->last_us - self->first_us),
+                             "setpoints", "left", setpoints(self, IW_LEFT), "right", setpoints(self, IW_RIGHT),
+                             "wheels", "left", wheel(&self->wheel[IW_LEFT]), "right", wheel(&self->wheel[IW_RIGHT]),
+                             "telemetry", ids(&self->known[IW_SIDES], LEARN_IDS - IW_SIDES), "other_ids",
+                             ids(self->other, self->others), "more_others", number(self->more_others), "findings",
+                             findings_of(findings, suggested), "suggested", suggested);
+    if (root == NULL) {
+        return false;
+    }
+    (void)json_dumpf(root, stdout, JSON_COMPACT);
+    (void)putchar('\n');
+    json_decref(root);
+    return true;
+}
 
 int verb_learn(ctl_t *self, int count, char **words) {
     static learn_t learn;
+    static learn_findings_t findings;
     static recording_t recording;
     candump_t frame;
     if (count != 1 || (words[0][0] == '-' && words[0][1] != '\0')) {
         return ctl_fail(CTL_USAGE, "learn wants one recording (or -); see: iwheelctl learn --help");
     }
-    int code = recording_open(&recording, words[0]);
+    int code = recording_open(&recording, NULL, words[0]);
     if (code != CTL_OK) {
         return code;
     }
@@ -20,13 +274,14 @@ int verb_learn(ctl_t *self, int count, char **words) {
     while (recording_next(&recording, &frame)) {
         learn_frame(&learn, &frame);
     }
+    learn_weigh(&learn, &findings);
     const bool told = learn.setpoint[IW_LEFT].count + learn.setpoint[IW_RIGHT].count > 0U;
-    if (self->json && !learn_report_json(&learn, recording.name)) {
+    if (self->json && !report_json(&learn, &findings, recording.name)) {
         (void)recording_close(&recording);
         return ctl_fail(CTL_INTERNAL, "out of memory");
     }
     if (!self->json && learn.frames > 0U) {
-        learn_report(&learn, recording.name);
+        report(&learn, &findings, recording.name);
     }
     code = recording_close(&recording);
     return (code != CTL_OK || told) ? code : CTL_NO;

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-#include "recorder.h"
-#include "talk/near.h"
-#include "talk/signals.h"
-#include "text/duration.h"
+#include "candump.h"
+#include "decode/frame.h"
+#include "talk/ctl.h"
+#include "talk/words.h"
 #include "text/text.h"
+
+#include "iwheel_linux/backend.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <poll.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -17,6 +20,29 @@
 #define FOR_MIN_US 1000
 #define FOR_MAX_US (720 * INT64_C(3600000000))
 
+/// What was written is seen by others so soon.
+#define FLUSH_US 1000000
+#define LOOK_US  500000
+/// How long an interface may take to be seen as up.
+#define UP_US   1000000
+#define WAIT_MS 50
+
+/// A recording being made: where it is written, for how long, from where the frames come.
+typedef struct {
+    FILE *file;
+    const char *name; ///< Of the file, as shown; "standard output".
+    char interface[CANDUMP_INTERFACE_SIZE];
+    char bus[128];         ///< As it was asked for, or as the gateway names it.
+    bool from_gateway;     ///< Else from the bus itself.
+    int64_t wall_minus_us; ///< Wall clock minus monotonic clock, of the whole recording: its times never step.
+    int64_t end_us;        ///< Monotonic; INT64_MAX: until a signal.
+    int64_t first_us;      ///< Of the first frame.
+    int64_t last_us;
+    uint64_t frames;
+    uint64_t lost; ///< That are known to be missing.
+    int64_t flushed_us;
+} recorder_t;
+
 typedef struct {
     const char *path; ///< NULL: a name made of the time.
     const char *bus;  ///< NULL: not told.
@@ -24,28 +50,13 @@ typedef struct {
 } words_t;
 
 static int parse(words_t *self, int count, char **words) {
-    static const duration_range_t range = {FOR_MIN_US, FOR_MAX_US};
-    char why[DURATION_WHY_SIZE];
-    for (int i = 0; i < count; i++) {
-        const char *next = (i + 1 < count) ? words[i + 1] : NULL;
-        if (strcmp(words[i], "--for") == 0) {
-            if (!duration_option("--for", next, range, &self->for_us, why)) {
-                return ctl_fail(CTL_USAGE, "%s", why);
-            }
-            i++;
-        } else if (strcmp(words[i], "--can") == 0) {
-            if (next == NULL) {
-                return ctl_fail(CTL_USAGE, "--can wants a bus: can0, or unix:PATH");
-            }
-            self->bus = next;
-            i++;
-        } else if ((words[i][0] == '-' && words[i][1] != '\0') || self->path != NULL) {
-            return ctl_fail(CTL_USAGE, "record does not understand \"%s\"; see: iwheelctl record --help", words[i]);
-        } else {
-            self->path = words[i];
-        }
-    }
-    return CTL_OK;
+    const option_t options[] = {
+        {OPTION("--for", option_time, &self->for_us), .range = {FOR_MIN_US, FOR_MAX_US}},
+        {OPTION("--can", option_text, &self->bus), .wants = "a bus: can0, or unix:PATH"},
+        {.name = NULL},
+    };
+    const words_syntax_t syntax = {"record", options, words_is_file, &self->path};
+    return words_read(&syntax, count, words);
 }
 
 static int open_file(recorder_t *self, const char *path) {
@@ -86,6 +97,160 @@ static int64_t wall_minus_us(void) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000 - client_now_us();
 }
 
+/// Writes one frame that came at `at_us` (monotonic). False: it cannot be written, errno tells why.
+static bool put(recorder_t *self, const candump_t *frame, int64_t at_us) {
+    char line[CANDUMP_LINE_SIZE];
+    candump_t whole = *frame;
+    whole.time_us = at_us + self->wall_minus_us;
+    (void)snprintf(whole.interface, sizeof whole.interface, "%s", self->interface);
+    const size_t length = candump_write(&whole, line);
+    self->first_us = (self->frames == 0U) ? at_us : self->first_us;
+    self->last_us = at_us;
+    self->frames++;
+    return fwrite(line, 1, length, self->file) == length;
+}
+
+/// Lets others see what was written, once a second. False as above.
+static bool tend(recorder_t *self) {
+    const int64_t now_us = client_now_us();
+    if (now_us - self->flushed_us < FLUSH_US) {
+        return ferror(self->file) == 0;
+    }
+    self->flushed_us = now_us;
+    return fflush(self->file) == 0;
+}
+
+/// True if it could be written.
+static bool take_event(recorder_t *self, const json_t *line) {
+    const char *event = json_string_value(json_object_get(line, "event"));
+    int64_t at_us = 0;
+    if (event != NULL && strcmp(event, "lost") == 0) {
+        const json_int_t count = json_integer_value(json_object_get(line, "count"));
+        self->lost += (count > 0) ? (uint64_t)count : 0U;
+    }
+    if (event == NULL || strcmp(event, "frame") != 0) {
+        return true;
+    }
+    const candump_t frame = frame_from_json(line, &at_us);
+    return put(self, &frame, at_us);
+}
+
+/// Records what the gateway (which is connected) sees: it tells each frame, received and sent. Until the end or a signal.
+/// An exit code.
+static int record_gateway(ctl_t *ctl, recorder_t *self) {
+    json_t *reply = NULL;
+    int code = ctl_ask(ctl, json_pack("{s:s,s:[s]}", "cmd", "watch", "topics", "frame"), &reply);
+    json_decref(reply);
+    bool written = true;
+    while (code == CTL_OK && written && client_now_us() < self->end_us) {
+        json_t *line = NULL;
+        const int64_t look_us = client_now_us() + LOOK_US;
+        const iwc_result_t result =
+            client_receive(&ctl->client, (look_us < self->end_us) ? look_us : self->end_us, &line);
+        written = result != IWC_OK || take_event(self, line);
+        written = tend(self) && written;
+        json_decref(line);
+        if (result == IWC_INTERRUPTED) {
+            break;
+        }
+        if (result != IWC_OK && result != IWC_TIMEOUT) {
+            code = ctl_lost(ctl, result);
+        }
+    }
+    return code;
+}
+
+typedef struct {
+    iw_backend_store_t bus;
+    unsigned signals;
+} source_t;
+
+static int tell_unopened(const char *bus, int error) {
+    if (error == ENOTSUP) {
+        return ctl_fail(CTL_UNAVAILABLE,
+                        "%s: libmnl was missing when this was built, so it reads the simulator's bus only (unix:PATH)",
+                        bus);
+    }
+    if (error == EAFNOSUPPORT) {
+        return ctl_fail(CTL_UNAVAILABLE, "%s: this kernel has no CAN sockets; modprobe can_raw, or: --can unix:PATH",
+                        bus);
+    }
+    return ctl_fail(CTL_UNAVAILABLE, "%s: cannot be opened: %s", bus, strerror(error));
+}
+
+static int tell_down(const char *bus) {
+    return (strncmp(bus, "unix:", 5) == 0)
+               ? ctl_fail(CTL_UNAVAILABLE, "nobody answers on %s; is the simulator running? iwheel-sim --can %s", bus,
+                          bus)
+               : ctl_fail(
+                     CTL_UNAVAILABLE,
+                     "%s is not there or not up; sudo ip link set %s up type can bitrate 1000000 sample-point 0.625",
+                     bus, bus);
+}
+
+/// Waits for something to read, a signal, or a while.
+static void wait_a_while(source_t *source) {
+    const struct timespec while_ = {.tv_sec = 0, .tv_nsec = WAIT_MS * 1000000L};
+    struct pollfd entry = {.fd = iw_bus_fd(&source->bus), .events = POLLIN};
+    (void)ppoll(&entry, 1, &while_, signals_let_in());
+}
+
+/// Everything that is there. False: it could not be written.
+static bool drain(source_t *source, recorder_t *self) {
+    iw_can_frame_t frame;
+    const int64_t now_us = client_now_us();
+    bool written = true;
+    iw_bus_tend(&source->bus, (iw_time_us_t)now_us);
+    while (written && iw_bus_receive(&source->bus, &frame) > 0) {
+        candump_t out = candump_from_core(&frame, 0, "");
+        out.mark = CANDUMP_RECEIVED;
+        written = put(self, &out, now_us);
+    }
+    return tend(self) && written;
+}
+
+static bool comes_up(source_t *source) {
+    const int64_t until_us = client_now_us() + UP_US;
+    for (;;) {
+        iw_bus_tend(&source->bus, (iw_time_us_t)client_now_us());
+        if (iw_bus_state(&source->bus) >= IW_BUS_PASSIVE) {
+            return true;
+        }
+        if (client_now_us() > until_us || signals_count() != source->signals) {
+            return false;
+        }
+        wait_a_while(source);
+    }
+}
+
+/// Records from the bus itself. The port's backend is opened as the gateway opens it, and only its receiving half is used.
+/// An exit code.
+static int record_bus(const char *bus, recorder_t *self) {
+    static source_t source; // Too large for a stack.
+    source.signals = signals_count();
+    const int error = iw_bus_open(&source.bus, bus);
+    if (error != 0) {
+        return tell_unopened(bus, error);
+    }
+    int code = comes_up(&source) ? CTL_OK : tell_down(bus);
+    bool up = true;
+    while (code == CTL_OK && signals_count() == source.signals && client_now_us() < self->end_us) {
+        wait_a_while(&source);
+        if (!drain(&source, self)) {
+            break;
+        }
+        const bool now_up = iw_bus_state(&source.bus) >= IW_BUS_PASSIVE;
+        if (now_up != up) {
+            (void)ctl_fail(CTL_OK, now_up ? "%s is up again" : "%s went down; waiting for it", bus);
+        }
+        up = now_up;
+    }
+    const iw_bus_link_t *link = iw_bus_link(&source.bus);
+    self->lost += link->lost;
+    iw_bus_close(&source.bus);
+    return code;
+}
+
 /// From the gateway if there is one for this bus: it also knows its own frames from others'.
 static int record(ctl_t *ctl, const words_t *words, recorder_t *self) {
     near_gateway_t gateway = {0};
@@ -96,14 +261,14 @@ static int record(ctl_t *ctl, const words_t *words, recorder_t *self) {
         (void)snprintf(self->bus, sizeof self->bus, "%s", gateway.bus);
         self->from_gateway = true;
         (void)ctl_fail(CTL_OK, "recording what the gateway on %s sees, to %s; Ctrl-C ends it", gateway.bus, self->name);
-        return recorder_from_gateway(ctl, self);
+        return record_gateway(ctl, self);
     }
     const char *bus = (words->bus != NULL) ? words->bus : USUAL_BUS;
     name_interface(self, bus);
     (void)snprintf(self->bus, sizeof self->bus, "%s", bus);
     (void)ctl_fail(CTL_OK, "no gateway for it: recording from %s itself, sending nothing, to %s; Ctrl-C ends it", bus,
                    self->name);
-    return recorder_from_bus(bus, self);
+    return record_bus(bus, self);
 }
 
 /// Nothing came: no file is left behind.

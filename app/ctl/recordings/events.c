@@ -27,17 +27,17 @@ static unsigned word_of(const json_t *line, const char *name, const char *(*name
     return count;
 }
 
-static const char *bus_name(unsigned state) {
-    return iwn_bus_state_name((iw_bus_state_t)state);
-}
-
-static const char *state_name(unsigned state) {
-    return iwn_state_name((iw_state_t)state);
-}
-
-static const char *cause_name(unsigned cause) {
-    return iwn_cause_name((iw_cause_t)cause);
-}
+/// What a function of the protocol's words calls a number.
+#define NAMES(of_, function_, type_)                                                                                   \
+    static const char *of_##_name(unsigned number) {                                                                   \
+        return function_((type_)number);                                                                               \
+    }
+NAMES(bus, iwn_bus_state_name, iw_bus_state_t)
+NAMES(state, iwn_state_name, iw_state_t)
+NAMES(cause, iwn_cause_name, iw_cause_t)
+NAMES(item, iwn_ledger_item_name, iw_ledger_item_t)
+NAMES(ledger_state, iwn_ledger_state_name, iw_ledger_state_t)
+NAMES(evidence, iwn_evidence_name, iw_evidence_t)
 
 static const char *refusal_name(unsigned refusal) {
     return iwn_error_name(iwn_error_of((iw_refusal_t)refusal));
@@ -53,7 +53,9 @@ static uint8_t flag(const json_t *line, const char *name) {
 }
 
 /// False if the word is unknown.
-static bool take_word(unsigned value, unsigned count, uint8_t *out) {
+static bool take_word(const json_t *line, const char *name, const char *(*name_of)(unsigned), unsigned count,
+                      uint8_t *out) {
+    const unsigned value = word_of(line, name, name_of, count);
     *out = (uint8_t)value;
     return value < count;
 }
@@ -63,7 +65,7 @@ static bool take_refusal(const json_t *line, uint8_t *out) {
         *out = IW_REFUSE_NONE;
         return true;
     }
-    return take_word(word_of(line, "refused", refusal_name, IW_REFUSALS), IW_REFUSALS, out);
+    return take_word(line, "refused", refusal_name, IW_REFUSALS, out);
 }
 
 static int32_t limited(int64_t value, int64_t limit) {
@@ -88,26 +90,14 @@ static bool take_drive(const json_t *line, blackbox_entry_t *out) {
 static bool take_decision(const json_t *line, blackbox_entry_t *out) {
     if (out->kind == (uint8_t)BLACKBOX_STATE) {
         take_speeds(line, "applied_left_mm_s", "applied_right_mm_s", &out->as.drive);
-        return take_word(word_of(line, "state", state_name, IW_STATE_LATCHED + 1U), IW_STATE_LATCHED + 1U, &out->a) &&
-               take_word(word_of(line, "before", state_name, IW_STATE_LATCHED + 1U), IW_STATE_LATCHED + 1U, &out->b);
+        return take_word(line, "state", state_name, IW_STATE_LATCHED + 1U, &out->a) &&
+               take_word(line, "before", state_name, IW_STATE_LATCHED + 1U, &out->b);
     }
     const unsigned sides = word_of(line, "side", side_name, IW_SIDES_BOTH + 1U);
     out->b = (uint8_t)((sides > IW_SIDES_BOTH) ? IW_SIDES_NONE : sides);
     out->as.value = integer(line, "detail");
     out->number = (uint32_t)integer(line, "number");
-    return take_word(word_of(line, "cause", cause_name, IW_CAUSES), IW_CAUSES, &out->a);
-}
-
-static const char *item_name(unsigned item) {
-    return iwn_ledger_item_name((iw_ledger_item_t)item);
-}
-
-static const char *ledger_state_name(unsigned state) {
-    return iwn_ledger_state_name((iw_ledger_state_t)state);
-}
-
-static const char *evidence_name(unsigned evidence) {
-    return iwn_evidence_name((iw_evidence_t)evidence);
+    return take_word(line, "cause", cause_name, IW_CAUSES, &out->a);
 }
 
 static bool take_assumption(const json_t *line, blackbox_entry_t *out) {
@@ -115,9 +105,8 @@ static bool take_assumption(const json_t *line, blackbox_entry_t *out) {
     const unsigned states = IW_LEDGER_CONTRADICTED + 1U;
     out->number = evidence;
     out->as.value = limited(integer(line, "figure"), INT32_MAX);
-    return evidence <= IW_EVIDENCE_OPERATOR &&
-           take_word(word_of(line, "item", item_name, IW_LEDGER_ITEMS), IW_LEDGER_ITEMS, &out->a) &&
-           take_word(word_of(line, "state", ledger_state_name, states), states, &out->b);
+    return evidence <= IW_EVIDENCE_OPERATOR && take_word(line, "item", item_name, IW_LEDGER_ITEMS, &out->a) &&
+           take_word(line, "state", ledger_state_name, states, &out->b);
 }
 
 static bool take_fields(const json_t *line, blackbox_entry_t *out) {
@@ -128,7 +117,7 @@ static bool take_fields(const json_t *line, blackbox_entry_t *out) {
     case BLACKBOX_STOPPED:
         return take_decision(line, out);
     case BLACKBOX_BUS:
-        return take_word(word_of(line, "state", bus_name, IW_BUS_ACTIVE + 1U), IW_BUS_ACTIVE + 1U, &out->a);
+        return take_word(line, "state", bus_name, IW_BUS_ACTIVE + 1U, &out->a);
     case BLACKBOX_START:
         out->a = flag(line, "restarted");
         out->b = flag(line, "listen_only");
@@ -146,9 +135,10 @@ static bool take_fields(const json_t *line, blackbox_entry_t *out) {
     case BLACKBOX_RESET:
         return take_refusal(line, &out->b);
     case BLACKBOX_STOP:
-        return take_word(word_of(line, "cause", cause_name, IW_CAUSES), IW_CAUSES, &out->a);
+        return take_word(line, "cause", cause_name, IW_CAUSES, &out->a);
     case BLACKBOX_TARE:
-        return take_word(word_of(line, "side", side_name, IW_SIDES_BOTH + 1U) - 1U, IW_SIDES, &out->a);
+        out->a = (uint8_t)(word_of(line, "side", side_name, IW_SIDES_BOTH + 1U) - 1U);
+        return out->a < IW_SIDES;
     case BLACKBOX_LEDGER:
         return take_assumption(line, out);
     case BLACKBOX_NOT_SENT:

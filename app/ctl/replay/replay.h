@@ -94,4 +94,27 @@ iw_snapshot_t replay_look(const replay_t *self);
 /// Tells in a closing line or two what was fed in, and how it compares with what was recorded.
 void replay_finish(const replay_t *self);
 
+/// Brings a replay to where the recorded gateway was when its recording begins: to the state, the lease and the speed that the
+/// recording tells, on wheels made up for it. What it had learned before (force offsets, assumptions) stays unknown.
+/// `state` is a BLACKBOX_STATE; `self->estop` and `self->bus` are the answers at its time. Nothing of this is told. False: the
+/// core could not be brought there.
+bool replay_warm(replay_t *self, const iw_config_t *config, const blackbox_entry_t *state);
+
+// --- what it decides, in lines for people or as JSON (replay_tell.c) ---------------------------------------------
+
+/// What the last step has changed.
+void replay_tell_step(replay_t *self);
+
+/// A request and what became of it. A drive command that says the same as the one before is not told again.
+void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refusal_t refusal);
+
+/// An answer of the port that has changed; before it is taken over.
+void replay_tell_answer(const replay_t *self, const blackbox_entry_t *entry);
+
+/// A decision was recorded that is not ours.
+void replay_tell_difference(const replay_t *self, const blackbox_entry_t *entry);
+
+/// A remark that belongs to no time.
+__attribute__((format(printf, 2, 3))) void replay_note(const replay_out_t *out, const char *format, ...);
+
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "replay_tell.h"
+#include "replay.h"
 
 #include "text/text.h"
 
@@ -66,20 +66,16 @@ void replay_note(const replay_out_t *out, const char *format, ...) {
     }
 }
 
-static const char *side_name(size_t side) {
-    return (side == IW_LEFT) ? "left" : "right";
-}
-
 static void tell_wheels(replay_t *self, const iw_snapshot_t *seen) {
-    for (size_t side = 0; side < IW_SIDES; side++) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
         const bool heard = seen->wheel[side].heard;
         const iw_force_validity_t force = iw_snapshot_force_validity(seen, (iw_side_t)side);
         if (heard != self->heard[side]) {
-            tell(self, self->now_us, "wheel", "%s %s", side_name(side), heard ? "heard" : "not heard any more");
+            tell(self, self->now_us, "wheel", "%s %s", text_side(side), heard ? "heard" : "not heard any more");
             self->heard[side] = heard;
         }
         if (force != self->force[side]) {
-            tell(self, self->now_us, "force", "%s: %s", side_name(side), iwn_force_validity_name(force));
+            tell(self, self->now_us, "force", "%s: %s", text_side(side), iwn_force_validity_name(force));
             self->force[side] = force;
         }
     }
@@ -186,7 +182,7 @@ void replay_tell_request(replay_t *self, const blackbox_entry_t *entry, iw_refus
         tell(self, entry->at_us, "stop asked", "%s", iwn_cause_name((iw_cause_t)entry->a));
         break;
     case BLACKBOX_TARE:
-        tell(self, entry->at_us, "tare", "%s", side_name((entry->a == (uint8_t)IW_RIGHT) ? IW_RIGHT : IW_LEFT));
+        tell(self, entry->at_us, "tare", "%s", text_side((entry->a == (uint8_t)IW_RIGHT) ? IW_RIGHT : IW_LEFT));
         break;
     default:
         tell(self, entry->at_us, "estop", "client %u", (unsigned)entry->number);

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "recordings/config_option.h"
 #include "recordings/events.h"
 #include "recordings/recording.h"
-#include "recordings/source.h"
 #include "replay.h"
-#include "replay_tell.h"
-#include "replay_warm.h"
 #include "talk/ctl.h"
 #include "text/text.h"
 
@@ -25,8 +21,7 @@ typedef struct {
     ctl_t *
         ctl; ///< To ask the gateway, unless the recording is a file here: what lies beside it belongs to it. Then NULL.
     replay_out_t out;
-    iw_config_t config;
-    bool configured;
+    iw_config_t config; ///< Radius 0: none was told.
     recording_t recording;
     events_t events;
     replay_t replay;
@@ -56,27 +51,18 @@ static bool beside(const char *path, const char *ending, char out[PATH_SIZE]) {
 }
 
 static int parse_words(verb_replay_t *self, int count, char **words) {
-    for (int i = 0; i < count; i++) {
-        if (strcmp(words[i], "--config") == 0) {
-            const int code = config_option_load("replay", (i + 1 < count) ? words[++i] : NULL, &self->config);
-            if (code != CTL_OK) {
-                return code;
-            }
-            self->configured = true;
-        } else if ((words[i][0] == '-' && words[i][1] != '\0') || self->path != NULL) {
-            return ctl_fail(CTL_USAGE, "replay does not understand \"%s\"; see: iwheelctl replay --help", words[i]);
-        } else {
-            self->path = words[i];
-        }
-    }
-    return (self->path != NULL) ? CTL_OK
-                                : ctl_fail(CTL_USAGE, "replay wants a recording; see: iwheelctl replay --help");
+    const option_t options[] = {{OPTION("--config", config_option_load, &self->config)}, {.name = NULL}};
+    const words_syntax_t syntax = {"replay", options, words_is_file, &self->path};
+    const int code = words_read(&syntax, count, words);
+    return (code != CTL_OK || self->path != NULL)
+               ? code
+               : ctl_fail(CTL_USAGE, "replay wants a recording; see: iwheelctl replay --help");
 }
 
 /// The configuration that was in force lies beside the gateway's own recordings.
 static int find_config(verb_replay_t *self) {
     char path[PATH_SIZE];
-    if (self->configured) {
+    if (self->config.radius_mm != 0U) {
         return CTL_OK;
     }
     const int fd = beside(self->path, ".conf", path) ? source_open(self->ctl, path, SOURCE_WHOLE) : -1;
@@ -276,17 +262,15 @@ static int finish(verb_replay_t *self) {
     return (code == CTL_OK && bad) ? CTL_DATA : code;
 }
 
-static int open_frames(verb_replay_t *self, ctl_t *ctl) {
-    self->ctl = (access(self->path, R_OK) != 0) ? ctl : NULL;
-    const int fd = source_is_ours(self->path) ? source_open(self->ctl, self->path, SOURCE_WHOLE) : -1;
-    return (fd >= 0) ? recording_take(&self->recording, self->path, fd) : recording_open(&self->recording, self->path);
-}
-
 int verb_replay(ctl_t *self, int count, char **words) {
     static verb_replay_t replay;
     int code = parse_words(&replay, count, words);
     replay.out = (replay_out_t){.file = stdout, .json = self->json};
-    code = (code == CTL_OK) ? open_frames(&replay, self) : code;
+    if (code != CTL_OK) {
+        return code;
+    }
+    replay.ctl = (access(replay.path, R_OK) != 0) ? self : NULL;
+    code = recording_open(&replay.recording, replay.ctl, replay.path);
     if (code != CTL_OK) {
         return code;
     }

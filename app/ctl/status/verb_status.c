@@ -1,14 +1,282 @@
 // SPDX-License-Identifier: MIT
-#include "screen.h"
+// The answer of `status`, drawn for a human: at most 80 columns, every number with its unit, `--` for what is unknown.
+#include "advice.h"
 #include "talk/ctl.h"
+#include "talk/words.h"
 #include "text/text.h"
 
+#include "iwheel_northbound/text.h"
+
 #include <stdio.h>
+#include <string.h>
+
+static bool is(const char *word, const char *other) {
+    return strcmp(word, other) == 0;
+}
+
+static const json_t *get(const json_t *object, const char *field) {
+    return json_object_get(object, field);
+}
+
+static tone_t state_tone(const char *state) {
+    if (is(state, "latched")) {
+        return TONE_BAD;
+    }
+    return is(state, "listening") ? TONE_PLAIN : TONE_CARE;
+}
+
+static void draw_state(const paper_t *paper, const json_t *status, const json_t *why) {
+    const char *state = text_word(status, "state");
+    const json_t *sentence = get(why, "sentence");
+    advice_t advice;
+    advice_collect(status, &advice);
+    paper_label(paper, "STATE");
+    paper_say(paper, state_tone(state), "%.32s", json_is_true(get(status, "arming")) ? "arming" : state);
+    if (json_is_string(get(status, "cause"))) {
+        paper_say(paper, state_tone(state), " (%.32s)", text_word(status, "cause"));
+    }
+    paper_end(paper);
+    for (unsigned i = 0; i < advice.lines; i++) {
+        paper_wrap(paper, (i == 0) ? "next" : "", TONE_TITLE, advice.line[i]);
+    }
+    if (json_is_string(sentence) && json_string_length(sentence) > 0) {
+        paper_wrap(paper, "last stop", TONE_PLAIN, json_string_value(sentence));
+    }
+}
+
+static void draw_lease(const paper_t *paper, const json_t *lease) {
+    char text[512];
+    char client[TEXT_CELL];
+    char pid[TEXT_CELL];
+    char left[TEXT_CELL];
+    char whole[TEXT_CELL];
+    const bool held = json_is_integer(get(lease, "holder"));
+    text_integer(get(lease, "holder"), "", client);
+    text_integer(get(lease, "pid"), "", pid);
+    text_integer(get(lease, "remaining_ms"), "ms", left);
+    text_integer(get(lease, "lease_ms"), "ms", whole);
+    if (held) {
+        (void)snprintf(text, sizeof text, "%.128s (client %s, pid %s), %s left; a command holds for %s",
+                       text_word(lease, "name"), client, pid, left, whole);
+    } else {
+        (void)snprintf(text, sizeof text, "nobody drives; a command holds for %s", whole);
+    }
+    paper_wrap(paper, "LEASE", held ? TONE_CARE : TONE_PLAIN, text);
+}
+
+static void draw_surroundings(const paper_t *paper, const json_t *status) {
+    char text[512];
+    const json_t *bus = get(status, "bus");
+    const json_t *estop = get(status, "estop");
+    const char *button = text_word(estop, "state");
+    (void)snprintf(text, sizeof text, "%.128s %.32s, timing %.32s, echo %.32s", text_word(bus, "name"),
+                   text_word(bus, "state"), text_word(bus, "timing"), text_word(bus, "echo"));
+    paper_wrap(paper, "BUS", is(text_word(bus, "state"), "active") ? TONE_GOOD : TONE_BAD, text);
+    (void)snprintf(text, sizeof text, "%.32s%s, line %.128s", is(button, "none") ? "NONE" : button,
+                   json_is_true(get(estop, "simulated")) ? " (SIMULATED)" : "", text_word(estop, "line"));
+    paper_wrap(paper, "E-STOP", is(button, "released") ? TONE_GOOD : TONE_BAD, text);
+}
+
+/// Instead of a number of digits: an age.
+#define AGE 99U
+
+typedef struct {
+    const char *field; ///< Null: no such value.
+    const char *unit;
+    unsigned digits;
+} value_t;
+
+/// One line with the values of both wheels side by side.
+typedef struct {
+    const char *label;
+    value_t values[2];
+    const char *remark; ///< A field with a word that explains the values, or null.
+} row_t;
+
+static const row_t rows[] = {
+    {"measured", {{"speed_mm_s", "mm/s", 0}, {"speed_rpm", "rpm", 0}}, NULL},
+    {"commanded", {{"commanded_mm_s", "mm/s", 0}, {"commanded_mA", "mA", 0}}, NULL},
+    {"applied", {{"applied_mm_s", "mm/s", 0}, {"applied_mA", "mA", 0}}, NULL},
+    {"speed age", {{"speed_age_ms", "ms", 0}}, NULL},
+    {"distance", {{"distance_mm", "m", 3}, {"ticks", "ticks", 0}}, NULL},
+    {"net force", {{"force_net_mN", "N", 3}}, "force_validity"},
+    {"raw force", {{"force_raw_mN", "N", 3}, {"force_age_ms", "ms ago", 0}}, NULL},
+    {"its zero", {{"force_offset_mN", "N", 3}}, "offset_provenance"},
+    {"taken", {{"offset_age_ms", "ago", AGE}, {"offset_deviation_mN", "N noise", 3}}, NULL},
+    {"unit evidence", {{NULL, NULL, 0}}, "unit_evidence"},
+    {"battery", {{"battery_dV", "V", 1}, {"status_age_ms", "ms ago", 0}}, NULL},
+    {"controller", {{"temperature_degC", "degC", 0}, {"cpu_percent", "% CPU", 0}}, NULL},
+    {"reboots", {{"reboots", "seen", 0}}, NULL},
+};
+
+/// A full byte of battery voltage means at least that much.
+static bool is_lower_bound(const value_t *value, const json_t *wheel) {
+    return is(value->field, "battery_dV") && json_is_true(get(get(wheel, "saturated"), "battery"));
+}
+
+static void write_value(const value_t *value, const json_t *wheel, char number[TEXT_CELL]) {
+    char age[TEXT_CELL];
+    if (value->digits != AGE) {
+        text_decimal(get(wheel, value->field), value->digits, value->unit, number);
+        return;
+    }
+    text_age(get(wheel, value->field), age);
+    (void)snprintf(number, TEXT_CELL, "%.32s%s%s", age, is(age, "--") ? "" : " ", is(age, "--") ? "" : value->unit);
+}
+
+/// The word that explains the values; of a zero also where a stored one came from, and whether it was taken under load.
+static void write_remark(const row_t *row, const json_t *wheel, char remark[TEXT_CELL]) {
+    const char *word = (row->remark != NULL) ? text_word(wheel, row->remark) : "";
+    const bool zero = row->remark != NULL && is(row->remark, "offset_provenance");
+    const bool stored = zero && is(word, "stored") && json_is_string(get(wheel, "offset_origin"));
+    const bool spoilt = zero && json_is_true(get(wheel, "offset_contaminated"));
+    (void)snprintf(remark, TEXT_CELL, "%.16s%s%.16s%s%s", is(word, "valid") ? "" : word, stored ? " (" : "",
+                   stored ? text_word(wheel, "offset_origin") : "", stored ? ")" : "", spoilt ? " IN DOUBT" : "");
+}
+
+static void draw_cell(const paper_t *paper, const row_t *row, unsigned width, const json_t *wheel) {
+    char cell[PAPER_CELL] = "";
+    char number[TEXT_CELL];
+    char remark[TEXT_CELL];
+    size_t used = 0;
+    bool known = row->values[0].field == NULL;
+    for (size_t i = 0; i < 2 && row->values[i].field != NULL; i++) {
+        const value_t *value = &row->values[i];
+        write_value(value, wheel, number);
+        known = known || !is(number, "--");
+        const int n = snprintf(cell + used, sizeof cell - used, "%s%s%s", (used > 0) ? ", " : "",
+                               is_lower_bound(value, wheel) ? ">= " : "", number);
+        used += (n > 0 && (size_t)n < sizeof cell - used) ? (size_t)n : 0U;
+    }
+    write_remark(row, wheel, remark);
+    (void)snprintf(cell + used, sizeof cell - used, "%s%s", (used > 0 && remark[0] != '\0') ? " " : "", remark);
+    paper_text(paper, known ? TONE_PLAIN : TONE_FAINT, width, cell);
+}
+
+static void draw_head(const paper_t *paper, const char *name, unsigned width, const json_t *wheel) {
+    const json_t *heard = get(wheel, "heard");
+    const char *rest = json_is_true(get(wheel, "at_rest")) ? "at rest" : "turning";
+    char head[TEXT_CELL];
+    (void)snprintf(head, sizeof head, "%s %s", name, json_is_true(heard) ? rest : "NOT HEARD");
+    paper_text(paper, json_is_true(heard) ? TONE_TITLE : TONE_BAD, width, head);
+}
+
+static void draw_wheels(const paper_t *paper, const json_t *left, const json_t *right) {
+    paper_label(paper, "WHEELS");
+    draw_head(paper, "LEFT", PAPER_CELL, left);
+    draw_head(paper, "RIGHT", 0, right);
+    paper_end(paper);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        paper_label(paper, rows[i].label);
+        draw_cell(paper, &rows[i], PAPER_CELL, left);
+        draw_cell(paper, &rows[i], 0, right);
+        paper_end(paper);
+    }
+}
+
+static void draw_pose(const paper_t *paper, const json_t *pose) {
+    static const char *const fields[] = {"x_mm", "y_mm", "z_mm", "psi_mrad"};
+    static const char *const names[] = {"x", "y", "z", "psi"};
+    char number[TEXT_CELL];
+    paper_label(paper, "POSE");
+    for (size_t i = 0; i < 4; i++) {
+        text_integer(get(pose, fields[i]), (i < 3) ? "mm" : "mrad", number);
+        paper_say(paper, TONE_PLAIN, "%s%s %s", (i > 0) ? ", " : "", names[i], number);
+    }
+    paper_say(paper, TONE_CARE, "%s", json_is_true(get(pose, "limited")) ? ", AT THE END OF ITS RANGE" : "");
+    paper_end(paper);
+}
+
+/// The names of the ledger's items in one state, as one line; nothing if there are none.
+static void draw_ledger(const paper_t *paper, json_t *ledger, const char *state, tone_t tone) {
+    char text[1024];
+    iwn_text_t names = iwn_text_begin(text, sizeof text);
+    const char *name = NULL;
+    json_t *entry = NULL;
+    json_object_foreach(ledger, name, entry) {
+        if (is(text_word(entry, "state"), state)) {
+            IWN_TEXT_JOIN(&names, (names.length > 0U) ? ", " : "", name);
+        }
+    }
+    if (names.length > 0U) {
+        paper_wrap(paper, is(state, "assumed") ? "UNVERIFIED" : "CONFIRMED", tone, text);
+    }
+}
+
+/// Every contradiction with its evidence and its cost.
+static void draw_contradictions(const paper_t *paper, json_t *ledger) {
+    char text[640];
+    const char *label = "CONTRADICTED";
+    const char *name = NULL;
+    json_t *entry = NULL;
+    json_object_foreach(ledger, name, entry) {
+        if (is(text_word(entry, "state"), "contradicted")) {
+            (void)snprintf(text, sizeof text, "%.64s = %.64s: %.240s; disabled: %.240s", name,
+                           text_word(entry, "value"), text_word(entry, "reason"), text_word(entry, "disabled"));
+            paper_wrap(paper, label, TONE_BAD, text);
+            label = "";
+        }
+    }
+}
+
+/// Nothing, as long as what is learnt is kept.
+static void draw_memory(const paper_t *paper, const json_t *memory) {
+    char text[512];
+    const char *state = text_word(memory, "state");
+    if (is(state, "ignored") || is(state, "failed")) {
+        (void)snprintf(text, sizeof text, "%.256s: %.160s", text_word(memory, "file"), text_word(memory, "reason"));
+        paper_wrap(paper, is(state, "failed") ? "NOT KEPT" : "NOT TRUSTED", TONE_CARE, text);
+    }
+}
+
+static void draw_budget(const paper_t *paper, const json_t *budget) {
+    static const char *const cases[][3] = {
+        {"client lost", "client_lost_ms", "client_lost_mm"},
+        {"gateway dies", "killed_ms", "killed_mm"},
+    };
+    char time[TEXT_CELL];
+    char way[TEXT_CELL];
+    for (size_t i = 0; i < 2; i++) {
+        text_integer(get(budget, cases[i][1]), "ms", time);
+        text_decimal(get(budget, cases[i][2]), 3, "m", way);
+        paper_label(paper, (i == 0) ? "STOP BUDGET" : "");
+        paper_say(paper, TONE_PLAIN, "%s: at most %s, %s%s", cases[i][0], time, way, (i == 0) ? "" : ", then unknown");
+        paper_end(paper);
+    }
+}
+
+static void draw_warnings(const paper_t *paper, const json_t *warnings) {
+    size_t index = 0;
+    const json_t *warning = NULL;
+    json_array_foreach(warnings, index, warning) {
+        paper_wrap(paper, (index == 0) ? "WARNINGS" : "", TONE_CARE,
+                   json_is_string(warning) ? json_string_value(warning) : "--");
+    }
+}
+
+/// `why` is the reply of why, or null. A field that is missing or of another type counts as unknown, so an older or newer
+/// gateway does no harm.
+static void draw(const json_t *status, const json_t *why) {
+    const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
+    draw_state(&paper, status, why);
+    draw_lease(&paper, get(status, "lease"));
+    draw_surroundings(&paper, status);
+    paper_end(&paper);
+    draw_wheels(&paper, get(status, "left"), get(status, "right"));
+    paper_end(&paper);
+    draw_pose(&paper, get(status, "pose"));
+    draw_budget(&paper, get(status, "budget"));
+    draw_contradictions(&paper, json_object_get(status, "ledger"));
+    draw_ledger(&paper, json_object_get(status, "ledger"), "confirmed", TONE_GOOD);
+    draw_ledger(&paper, json_object_get(status, "ledger"), "assumed", TONE_PLAIN);
+    draw_memory(&paper, get(status, "memory"));
+    draw_warnings(&paper, get(status, "warnings"));
+}
 
 int verb_status(ctl_t *self, int count, char **words) {
     json_t *status = NULL;
     json_t *why = NULL;
-    if (!ctl_words_at_most("status", count, 0, words)) {
+    if (!words_at_most("status", count, 0, words)) {
         return CTL_USAGE;
     }
     const int code = ctl_ask(self, json_pack("{s:s}", "cmd", "status"), &status);
@@ -17,7 +285,7 @@ int verb_status(ctl_t *self, int count, char **words) {
         return code;
     }
     if (ctl_ask(self, json_pack("{s:s}", "cmd", "why"), &why) == CTL_OK) {
-        screen_status(status, why, text_wants_colour(stdout), stdout);
+        draw(status, why);
     }
     json_decref(status);
     json_decref(why);

@@ -9,50 +9,51 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #define START_HINT "is the gateway running? Start it (systemctl start iwheel-gateway), or give --socket PATH"
 
 int ctl_fail(int code, const char *format, ...) {
-    char text[2048];
     va_list list;
-    va_start(list, format);
-    (void)vsnprintf(text, sizeof text, format, list);
-    va_end(list);
     (void)fputs("iwheelctl: ", stderr);
-    text_safe(text, stderr);
-    (void)fputc('\n', stderr);
+    va_start(list, format);
+    text_vline(stderr, format, list);
+    va_end(list);
     return code;
 }
 
-bool ctl_words_at_most(const char *verb, int count, int most, char **words) {
-    if (count > most) {
-        (void)ctl_fail(CTL_USAGE, "%s does not understand \"%s\"; see: iwheelctl %s --help", verb, words[most], verb);
-        return false;
+int ctl_finish(int code) {
+    errno = 0;
+    if ((fflush(stdout) != 0 || ferror(stdout) != 0) && errno != EPIPE && errno != 0) {
+        return ctl_fail(CTL_UNAVAILABLE, "cannot write: %s; make room", strerror(errno));
     }
-    return true;
+    return code;
 }
 
-/// The path to use, in `found` if it was looked for; null after telling why there is none, with the exit code.
-static const char *choose_socket(const ctl_t *self, char *found, size_t size, int *out_code) {
-    if (self->socket != NULL) {
-        return self->socket;
+/// Finds the path of the socket; NEAR_FOUND if there is one to try.
+static near_t choose(const ctl_t *ctl, const char *bus, char *out_path, size_t size) {
+    if (ctl->socket != NULL) {
+        (void)snprintf(out_path, size, "%s", ctl->socket);
+        return NEAR_FOUND;
     }
-    switch (iwc_find(NULL, found, size)) {
+    switch (iwc_find(NULL, out_path, size)) {
     case IWC_OK:
-        return found;
-    case IWC_SEVERAL:
-        *out_code = ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", found);
-        break;
+        return NEAR_FOUND;
     case IWC_DENIED:
-        *out_code =
-            ctl_fail(CTL_PERMISSION, "%s may not be read by you; sudo usermod -aG iwheel $USER, then log in again",
-                     IWC_DIRECTORY);
-        break;
+        (void)snprintf(out_path, size, "%s", IWC_DIRECTORY);
+        return NEAR_DENIED;
+    case IWC_SEVERAL:
+        if (bus == NULL) {
+            return NEAR_SEVERAL;
+        }
+        (void)snprintf(out_path, size, "%s/%s.sock", IWC_DIRECTORY, bus);
+        if (access(out_path, W_OK) != 0) {
+            (void)snprintf(out_path, size, "%s/%s/%s.sock", IWC_DIRECTORY, IWC_WATCH_DIRECTORY, bus);
+        }
+        return NEAR_FOUND;
     default:
-        *out_code = ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", IWC_DIRECTORY, START_HINT);
-        break;
+        return NEAR_NONE;
     }
-    return NULL;
 }
 
 static int tell_denied(const char *path) {
@@ -126,13 +127,21 @@ int ctl_lost(const ctl_t *self, iwc_result_t result) {
     }
 }
 
-int ctl_connect(ctl_t *self) {
+/// Finds the socket and connects. An exit code.
+static int connect_to_one(ctl_t *self) {
     char found[512];
-    int code = CTL_OK;
-    const char *path = choose_socket(self, found, sizeof found, &code);
-    if (path == NULL) {
-        return code;
+    switch (choose(self, NULL, found, sizeof found)) {
+    case NEAR_FOUND:
+        break;
+    case NEAR_SEVERAL:
+        return ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", found);
+    case NEAR_DENIED:
+        return ctl_fail(CTL_PERMISSION, "%s may not be read by you; sudo usermod -aG iwheel $USER, then log in again",
+                        found);
+    default:
+        return ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", IWC_DIRECTORY, START_HINT);
     }
+    const char *path = (self->socket != NULL) ? self->socket : found;
     const iwc_result_t result = client_open(&self->client, path, client_now_us() + CLIENT_REPLY_US);
     if (result != IWC_OK) {
         return tell_unopened(self, path, result);
@@ -144,18 +153,13 @@ int ctl_connect(ctl_t *self) {
 }
 
 int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {
-    int64_t id = 0;
-    const int64_t deadline_us = client_now_us() + CLIENT_REPLY_US;
     *out_reply = NULL;
-    const int code = self->client.open ? CTL_OK : ctl_connect(self);
+    const int code = self->client.open ? CTL_OK : connect_to_one(self);
     if (code != CTL_OK) {
         json_decref(request);
         return code;
     }
-    iwc_result_t result = client_send(&self->client, request, deadline_us, &id);
-    if (result == IWC_OK) {
-        result = client_wait(&self->client, id, deadline_us, out_reply);
-    }
+    const iwc_result_t result = client_ask(&self->client, request, out_reply);
     return (result == IWC_OK) ? CTL_OK : ctl_lost(self, result);
 }
 
@@ -175,4 +179,44 @@ int ctl_accept(const ctl_t *self, json_t **reply) {
     json_decref(*reply);
     *reply = NULL;
     return refused;
+}
+
+static near_t look_at(ctl_t *ctl, const char *path) {
+    switch (client_open(&ctl->client, path, client_now_us() + CLIENT_REPLY_US)) {
+    case IWC_OK:
+        return NEAR_FOUND;
+    case IWC_DENIED:
+        return NEAR_DENIED;
+    case IWC_NOT_THERE:
+    case IWC_INVALID:
+        return NEAR_NONE;
+    default:
+        return NEAR_MUTE;
+    }
+}
+
+json_t *near_ask(ctl_t *ctl, json_t *request) {
+    json_t *reply = NULL;
+    return (client_ask(&ctl->client, request, &reply) == IWC_OK) ? reply : NULL;
+}
+
+void near_look(ctl_t *ctl, const char *bus, near_gateway_t *out_gateway) {
+    memset(out_gateway, 0, sizeof(*out_gateway));
+    near_t result = choose(ctl, bus, out_gateway->path, sizeof out_gateway->path);
+    result = (result == NEAR_FOUND) ? look_at(ctl, out_gateway->path) : result;
+    if (result == NEAR_FOUND) {
+        out_gateway->status = near_ask(ctl, json_pack("{s:s}", "cmd", "status"));
+        result = (out_gateway->status != NULL) ? NEAR_FOUND : NEAR_MUTE;
+        (void)snprintf(out_gateway->bus, sizeof out_gateway->bus, "%s",
+                       text_word(json_object_get(out_gateway->status, "bus"), "name"));
+    }
+    if (result == NEAR_FOUND && bus != NULL && strcmp(bus, out_gateway->bus) != 0) {
+        result = NEAR_OTHER;
+        json_decref(out_gateway->status);
+        out_gateway->status = NULL;
+    }
+    if (result != NEAR_FOUND) {
+        client_close(&ctl->client);
+    }
+    out_gateway->result = result;
 }

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "client.h"
 
-#include "signals.h"
-
 #include <limits.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <time.h>
 
@@ -76,7 +75,9 @@ iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_li
     return (*out_line != NULL) ? IWC_OK : IWC_GARBLED;
 }
 
-iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply) {
+/// Receives until the reply to `id` comes; events and replies to other requests are dropped. A reply without id is taken too: it is a refusal
+/// of the whole connection or of a line.
+static iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply) {
     for (;;) {
         const iwc_result_t result = client_receive(self, deadline_us, out_reply);
         if (result != IWC_OK) {
@@ -90,4 +91,46 @@ iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t
         json_decref(*out_reply);
         *out_reply = NULL;
     }
+}
+
+iwc_result_t client_ask(client_t *self, json_t *request, json_t **out_reply) {
+    int64_t id = 0;
+    const int64_t deadline_us = client_now_us() + CLIENT_REPLY_US;
+    *out_reply = NULL;
+    const iwc_result_t result = client_send(self, request, deadline_us, &id);
+    return (result == IWC_OK) ? client_wait(self, id, deadline_us, out_reply) : result;
+}
+
+// A signal handler has no argument for a context: these three cannot live elsewhere.
+static volatile sig_atomic_t caught;
+static bool catching;
+static sigset_t let_in;
+
+static void count(int signal_number) {
+    (void)signal_number;
+    caught = caught + 1;
+}
+
+void signals_catch(void) {
+    struct sigaction action = {.sa_handler = count};
+    sigset_t blocked;
+    (void)sigemptyset(&blocked);
+    const int caught_signals[] = {SIGINT, SIGTERM, SIGHUP};
+    for (size_t i = 0; i < sizeof caught_signals / sizeof caught_signals[0]; i++) {
+        (void)sigaddset(&blocked, caught_signals[i]);
+        (void)sigaction(caught_signals[i], &action, NULL);
+    }
+    (void)sigprocmask(SIG_BLOCK, &blocked, &let_in);
+    for (size_t i = 0; i < sizeof caught_signals / sizeof caught_signals[0]; i++) {
+        (void)sigdelset(&let_in, caught_signals[i]);
+    }
+    catching = true;
+}
+
+unsigned signals_count(void) {
+    return (unsigned)caught;
+}
+
+const sigset_t *signals_let_in(void) {
+    return catching ? &let_in : NULL;
 }

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-/// The connection to the gateway as the verbs use it: libiwheel-client, with jansson's objects and signals.h.
+/// The connection to the gateway as the verbs use it: libiwheel-client, with jansson's objects and signals that are counted.
 ///
 /// Nothing here blocks longer than the deadline it is given (CLOCK_MONOTONIC, microseconds). IWC_INTERRUPTED: a signal caught by
-/// signals.h that `seen_signals` does not count yet.
+/// `signals_catch` that `seen_signals` does not count yet.
 #ifndef CLIENT_H
 #define CLIENT_H
 
 #include "iwheel_client/client.h"
 
 #include <jansson.h>
+#include <signal.h>
 
 /// A gateway that is there answers within milliseconds.
 #define CLIENT_REPLY_US 2000000
@@ -41,8 +42,18 @@ iwc_result_t client_send(client_t *self, json_t *request, int64_t deadline_us, i
 /// The next line, as a new reference in `*out_line` (null unless IWC_OK).
 iwc_result_t client_receive(client_t *self, int64_t deadline_us, json_t **out_line);
 
-/// Receives until the reply to `id` comes; events and replies to other requests are dropped. A reply without id is taken too: it is a refusal
-/// of the whole connection or of a line.
-iwc_result_t client_wait(client_t *self, int64_t id, int64_t deadline_us, json_t **out_reply);
+/// Sends `request`, whose reference it takes, and receives until its reply comes; what comes before is dropped.
+iwc_result_t client_ask(client_t *self, json_t *request, json_t **out_reply);
+
+// --- SIGINT, SIGTERM and SIGHUP, counted instead of deadly, and only where the program waits ---------------------
+
+/// From now on the three are blocked, except in a wait that uses `signals_let_in`, and counted there.
+void signals_catch(void);
+
+/// How many came.
+unsigned signals_count(void);
+
+/// The mask for ppoll. A null pointer, which leaves the mask as it is, without `signals_catch`.
+const sigset_t *signals_let_in(void);
 
 #endif

@@ -52,8 +52,9 @@ int verb_help(ctl_t *self, int count, char **words);
 /// Prints "iwheelctl: ..." on stderr and returns `code`.
 __attribute__((format(printf, 2, 3))) int ctl_fail(int code, const char *format, ...);
 
-/// Finds the socket and connects. An exit code; 0 is success.
-int ctl_connect(ctl_t *self);
+/// Before the program ends with `code`: results that could not be written are no success, unless their reader went away on purpose.
+/// The exit code.
+int ctl_finish(int code);
 
 /// Connects if necessary, sends `request` (whose reference it takes) and waits for its reply. 0 with `*out_reply` (a new reference) if
 /// the gateway agreed; CTL_NO after telling its refusal; other codes after telling what is wrong. With --json the reply's line is
@@ -73,7 +74,28 @@ int ctl_refused(const json_t *reply);
 /// What a result of `client_receive` that brought no line means to the user. Returns the exit code.
 int ctl_lost(const ctl_t *self, iwc_result_t result);
 
-/// True if there are no more words than `most`; else tells so.
-bool ctl_words_at_most(const char *verb, int count, int most, char **words);
+// --- a gateway that may be there or not: looked for without a word -----------------------------------------------
+
+typedef enum {
+    NEAR_NONE = 0, ///< Nobody there.
+    NEAR_FOUND,    ///< Connected; the reply of status is there.
+    NEAR_OTHER,    ///< There is one, but it serves another bus: not connected.
+    NEAR_SEVERAL,  ///< More than one, and nobody said which.
+    NEAR_DENIED,   ///< Its socket may not be used by us.
+    NEAR_MUTE,     ///< Its socket is there and nobody answers in time or in its language.
+} near_t;
+
+typedef struct {
+    near_t result;
+    char path[512]; ///< The socket (or the sockets).
+    json_t *status; ///< With NEAR_FOUND: owned by the caller.
+    char bus[128];  ///< The bus that it serves, with NEAR_FOUND and NEAR_OTHER.
+} near_gateway_t;
+
+/// Looks for the gateway of `bus`, or, with a null pointer, for the only one.
+void near_look(ctl_t *ctl, const char *bus, near_gateway_t *out_gateway);
+
+/// Asks the connected gateway without printing anything. A new reference, or null.
+json_t *near_ask(ctl_t *ctl, json_t *request);
 
 #endif

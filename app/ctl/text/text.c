@@ -3,10 +3,10 @@
 
 #include "iwheel_northbound/text.h"
 
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <time.h>
 #include <unistd.h>
 
 void text_safe(const char *text, FILE *out) {
@@ -27,14 +27,18 @@ void text_json(const char *line, FILE *out) {
     (void)fputc('\n', out);
 }
 
-void text_line(FILE *out, const char *format, ...) {
+void text_vline(FILE *out, const char *format, va_list list) {
     char text[2048];
-    va_list list;
-    va_start(list, format);
     (void)vsnprintf(text, sizeof text, format, list);
-    va_end(list);
     text_safe(text, out);
     (void)fputc('\n', out);
+}
+
+void text_line(FILE *out, const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    text_vline(out, format, list);
+    va_end(list);
 }
 
 void text_clean(const char *text, char *out, size_t size) {
@@ -75,11 +79,14 @@ void text_integer(const json_t *value, const char *unit, char out[TEXT_CELL]) {
 }
 
 void text_decimal(const json_t *value, unsigned digits, const char *unit, char out[TEXT_CELL]) {
-    if (!json_is_integer(value)) {
+    if (json_is_integer(value)) {
+        text_number(json_integer_value(value), digits, unit, out);
+    } else {
         (void)snprintf(out, TEXT_CELL, "--");
-        return;
     }
-    const long long number = json_integer_value(value);
+}
+
+void text_number(long long number, unsigned digits, const char *unit, char out[TEXT_CELL]) {
     unsigned long long scale = 1;
     for (unsigned i = 0; i < digits; i++) {
         scale *= 10U;
@@ -114,4 +121,73 @@ void text_age(const json_t *age_ms, char out[TEXT_CELL]) {
 const char *text_word(const json_t *object, const char *field) {
     const char *word = json_string_value(json_object_get(object, field));
     return (word != NULL) ? word : "--";
+}
+
+const char *text_side(unsigned side) {
+    return (side == IW_LEFT) ? "left" : "right";
+}
+
+size_t text_cut(const char *text, size_t room) {
+    size_t cut = strlen(text);
+    if (cut > room) {
+        for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
+        }
+        cut = (cut == 0) ? room : cut;
+    }
+    return cut;
+}
+
+void text_when(json_int_t wall_us, char out[TEXT_CELL]) {
+    struct tm local;
+    const time_t seconds = (time_t)(wall_us / 1000000);
+    if (localtime_r(&seconds, &local) == NULL || strftime(out, TEXT_CELL, "%Y-%m-%d %H:%M:%S", &local) == 0U) {
+        (void)snprintf(out, TEXT_CELL, "--");
+    }
+}
+
+void paper_text(const paper_t *self, tone_t tone, unsigned width, const char *text) {
+    static const char *const codes[] = {
+        [TONE_PLAIN] = "",        [TONE_TITLE] = "\033[1m",  [TONE_GOOD] = "\033[32m",
+        [TONE_CARE] = "\033[33m", [TONE_BAD] = "\033[1;31m", [TONE_FAINT] = "\033[2m",
+    };
+    const bool coloured = self->colour && tone != TONE_PLAIN;
+    (void)fputs(coloured ? codes[tone] : "", self->out);
+    text_safe(text, self->out);
+    (void)fputs(coloured ? "\033[0m" : "", self->out);
+    for (size_t used = strlen(text); used < width; used++) {
+        (void)fputc(' ', self->out);
+    }
+}
+
+void paper_say(const paper_t *self, tone_t tone, const char *format, ...) {
+    char text[1024];
+    va_list list;
+    va_start(list, format);
+    (void)vsnprintf(text, sizeof text, format, list);
+    va_end(list);
+    paper_text(self, tone, 0, text);
+}
+
+void paper_label(const paper_t *self, const char *label) {
+    paper_text(self, TONE_FAINT, PAPER_LABEL, label);
+}
+
+void paper_wrap(const paper_t *self, const char *label, tone_t tone, const char *text) {
+    char piece[PAPER_WIDTH];
+    const size_t room = PAPER_WIDTH - PAPER_LABEL;
+    do {
+        const size_t cut = text_cut(text, room);
+        memcpy(piece, text, cut);
+        piece[cut] = '\0';
+        paper_label(self, label);
+        paper_text(self, tone, 0, piece);
+        paper_end(self);
+        label = "";
+        text += cut;
+        text += strspn(text, " ");
+    } while (*text != '\0');
+}
+
+void paper_end(const paper_t *self) {
+    (void)fputc('\n', self->out);
 }

@@ -48,10 +48,6 @@ typedef struct {
 /// Draws the whole screen with ncurses, which must be running. Does not refresh it.
 void top_draw(const top_model_t *model);
 
-/// Attributes of a tone, on this terminal.
-void top_tone_begin(const top_model_t *model, top_tone_t tone);
-void top_tone_end(const top_model_t *model, top_tone_t tone);
-
 /// Formatted text at a place, cut at the right margin.
 __attribute__((format(printf, 5, 6))) void top_put(const top_model_t *model, int row, int column, top_tone_t tone,
                                                    const char *format, ...);

@@ -37,16 +37,6 @@ static attr_t attributes_of(const top_model_t *model, top_tone_t tone) {
     return COLOR_PAIR((int)tone) | ((tone == TOP_GOOD) ? A_NORMAL : A_BOLD);
 }
 
-void top_tone_begin(const top_model_t *model, top_tone_t tone) {
-    (void)attrset((int)attributes_of(model, tone));
-}
-
-void top_tone_end(const top_model_t *model, top_tone_t tone) {
-    (void)model;
-    (void)tone;
-    (void)attrset(A_NORMAL);
-}
-
 void top_put(const top_model_t *model, int row, int column, top_tone_t tone, const char *format, ...) {
     char text[2U * TOP_TEXT_SIZE];
     char clean[2U * TOP_TEXT_SIZE];
@@ -69,21 +59,16 @@ void top_put(const top_model_t *model, int row, int column, top_tone_t tone, con
         }
         length++;
     }
-    top_tone_begin(model, tone);
+    (void)attrset((int)attributes_of(model, tone));
     (void)mvaddnstr(row, column, clean, (int)length);
-    top_tone_end(model, tone);
+    (void)attrset(A_NORMAL);
 }
 
 int top_put_wrapped(const top_model_t *model, int row, int rows, top_tone_t tone, const char *text) {
     const size_t room = (COLS > 3) ? (size_t)COLS - 2U : 1U;
     int used = 0;
     for (; used < rows && *text != '\0'; used++) {
-        size_t cut = strlen(text);
-        if (cut > room && used < rows - 1) {
-            for (cut = room; cut > 0 && text[cut] != ' '; cut--) {
-            }
-            cut = (cut == 0) ? room : cut;
-        }
+        const size_t cut = text_cut(text, (used < rows - 1) ? room : SIZE_MAX);
         top_put(model, row + used, 1, tone, "%.*s", (int)cut, text);
         text += cut;
         text += strspn(text, " ");

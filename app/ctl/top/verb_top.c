@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The live screen: snapshots come ten times a second, keys go out as requests. It never arms.
 #include "talk/ctl.h"
-#include "talk/near.h"
-#include "talk/signals.h"
+#include "talk/words.h"
 #include "text/text.h"
 #include "top.h"
 
@@ -227,7 +226,7 @@ static bool can_draw(void) {
 int verb_top(ctl_t *self, int count, char **words) {
     static top_t top;
     top = (top_t){.ctl = self, .model = {.scale_mm_s = 200, .history = &top.history}};
-    if (!ctl_words_at_most("top", count, 0, words)) {
+    if (!words_at_most("top", count, 0, words)) {
         return CTL_USAGE;
     }
     if (isatty(STDIN_FILENO) != 1 || isatty(STDOUT_FILENO) != 1) {

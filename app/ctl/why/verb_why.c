@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
+#include "decode/frame.h"
 #include "status/advice.h"
 #include "talk/ctl.h"
-#include "talk/near.h"
+#include "talk/words.h"
 #include "text/text.h"
-#include "why_disk.h"
-#include "why_print.h"
+#include "why.h"
 
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,14 +21,15 @@ typedef struct {
     bool list;
 } words_t;
 
-static int parse_frames(const char *text, size_t *out) {
+static int take_frames(const option_t *option, const char *verb, const char *text) {
     char *end = NULL;
+    (void)verb;
     const unsigned long number = (text != NULL && text[0] >= '0' && text[0] <= '9') ? strtoul(text, &end, 10) : 0UL;
     if (end == NULL || *end != '\0' || number > WHY_FRAMES_MAX) {
         return ctl_fail(CTL_USAGE, "--frames wants a number of frames before and after the stop, 0 to %u",
                         WHY_FRAMES_MAX);
     }
-    *out = number;
+    *(size_t *)option->out = number;
     return CTL_OK;
 }
 
@@ -37,28 +39,87 @@ static bool names_recording(const char *word) {
 }
 
 static int parse(words_t *self, int count, char **words) {
-    for (int i = 0; i < count; i++) {
-        const char *next = (i + 1 < count) ? words[i + 1] : NULL;
-        int code = CTL_OK;
-        if (strcmp(words[i], "--list") == 0) {
-            self->list = true;
-        } else if (strcmp(words[i], "--frames") == 0) {
-            code = parse_frames(next, &self->frames);
-            i++;
-        } else if (strcmp(words[i], "--directory") == 0) {
-            self->directory = next;
-            code = (next != NULL) ? CTL_OK : ctl_fail(CTL_USAGE, "--directory wants the directory of the recordings");
-            i++;
-        } else if (!names_recording(words[i]) || self->name != NULL) {
-            code = ctl_fail(CTL_USAGE, "why does not understand \"%s\"; see: iwheelctl why --help", words[i]);
-        } else {
-            self->name = words[i];
-        }
-        if (code != CTL_OK) {
-            return code;
-        }
+    const option_t options[] = {
+        {OPTION("--list", NULL, &self->list)},
+        {OPTION("--frames", take_frames, &self->frames)},
+        {OPTION("--directory", option_text, &self->directory), .wants = "the directory of the recordings"},
+        {.name = NULL},
+    };
+    const words_syntax_t syntax = {"why", options, names_recording, &self->name};
+    return words_read(&syntax, count, words);
+}
+
+static void print_when(const json_t *why) {
+    char wall[TEXT_CELL] = "--";
+    char age[TEXT_CELL];
+    const json_t *wall_us = json_object_get(why, "wall_us");
+    const json_t *age_ms = json_object_get(why, "age_ms");
+    if (json_is_integer(wall_us)) {
+        text_when(json_integer_value(wall_us), wall);
     }
-    return CTL_OK;
+    (void)printf("at %s", wall);
+    if (age_ms != NULL) {
+        text_decimal(age_ms, 3, "s", age);
+        (void)printf(", %s ago", age);
+    }
+    (void)printf("; %s\n", json_is_true(json_object_get(why, "latched")) ? "it latched" : "it did not latch");
+}
+
+bool why_print_stop(const json_t *why) {
+    const char *sentence = json_string_value(json_object_get(why, "sentence"));
+    if (sentence == NULL || sentence[0] == '\0') {
+        (void)puts("no stop since the gateway's start");
+        return false;
+    }
+    text_safe(sentence, stdout);
+    (void)putchar('\n');
+    if (!json_is_integer(json_object_get(why, "at_us")) && json_object_get(why, "at_us") != NULL) {
+        return false; // Nothing happened: the sentence says so.
+    }
+    print_when(why);
+    return true;
+}
+
+void why_print_frame(const candump_t *frame, int64_t since_us) {
+    char since[32];
+    decoded_t decoded;
+    iw_config_t config;
+    const iw_can_frame_t core = candump_to_core(frame);
+    const int64_t size_us = (since_us < 0) ? -since_us : since_us;
+    iw_config_default(&config);
+    decode_fields(&core, &config, &decoded);
+    (void)snprintf(since, sizeof since, "%c%" PRId64 ".%01" PRId64 " ms", (since_us < 0) ? '-' : '+', size_us / 1000,
+                   size_us % 1000 / 100);
+    frame_print(since, frame, &decoded);
+}
+
+void why_print_moment(void) {
+    (void)puts("------ stop ---------------------------------------------------------------");
+}
+
+static void print_told(const json_t *told, int64_t stop_us) {
+    int64_t at_us = 0;
+    const candump_t frame = frame_from_json(told, &at_us);
+    why_print_frame(&frame, at_us - stop_us);
+}
+
+/// The last `most` of the frames before and the first `most` after, as the gateway tells them. Nothing if there are none.
+static void print_all_told(const json_t *why, size_t most) {
+    const json_t *before = json_object_get(why, "frames_before");
+    const json_t *after = json_object_get(why, "frames_after");
+    const size_t count = json_array_size(before);
+    const int64_t stop_us = json_integer_value(json_object_get(why, "at_us"));
+    if (count + json_array_size(after) == 0U || most == 0U) {
+        return;
+    }
+    (void)putchar('\n');
+    for (size_t i = (count > most) ? count - most : 0U; i < count; i++) {
+        print_told(json_array_get(before, i), stop_us);
+    }
+    why_print_moment();
+    for (size_t i = 0; i < json_array_size(after) && i < most; i++) {
+        print_told(json_array_get(after, i), stop_us);
+    }
 }
 
 static void print_recording(const json_t *reply) {
@@ -89,7 +150,7 @@ static int ask(ctl_t *self, size_t frames) {
         print_stalled(self);
         if (stopped) {
             print_recording(reply);
-            why_print_told(reply, frames);
+            print_all_told(reply, frames);
         }
     }
     json_decref(reply);

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "why_disk.h"
+#include "why.h"
 
 #include "recordings/events.h"
 #include "recordings/recording.h"
-#include "recordings/source.h"
 #include "text/text.h"
-#include "why_print.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -13,7 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #define PATH_SIZE 1024U
 #define NAME_SIZE 256U
@@ -41,75 +38,56 @@ static int is_recording(const struct dirent *entry) {
     return strncmp(entry->d_name, PREFIX, sizeof PREFIX - 1U) == 0 && ending != NULL && strcmp(ending, EVENTS) == 0;
 }
 
-/// The recordings' .jsonl files, the oldest first.
-typedef struct {
-    char **name;
-    size_t count;
-} names_t;
-
-static void names_free(names_t *self) {
-    for (size_t i = 0; i < self->count; i++) {
-        free(self->name[i]);
-    }
-    free((void *)self->name);
-}
-
-static void names_add(names_t *self, const char *stem, const char *ending) {
+/// Names are listed as the gateway tells them, or as they stand on disk.
+static void add_name(json_t *names, const char *stem, const char *ending) {
     char name[NAME_SIZE];
     const int n = snprintf(name, sizeof name, "%s%s", stem, ending);
-    const bool fits = n > 0 && (size_t)n < sizeof name && strchr(name, '/') == NULL;
-    char *copy = fits ? strdup(name) : NULL;
-    if (copy != NULL) {
-        self->name[self->count] = copy;
-        self->count++;
+    if (n > 0 && (size_t)n < sizeof name && strchr(name, '/') == NULL) {
+        (void)json_array_append_new(names, json_string_nocheck(name));
     }
 }
 
-static bool names_on_disk(names_t *self, const char *directory) {
+/// False with errno.
+static bool names_on_disk(json_t *names, const char *directory) {
     struct dirent **found = NULL;
     const int count = scandir(directory, &found, is_recording, alphasort);
-    const int error = errno;
-    self->name = (count >= 0) ? (char **)calloc((size_t)count + 1U, sizeof *self->name) : NULL;
     for (int i = 0; i < count; i++) {
-        if (self->name != NULL) {
-            names_add(self, found[i]->d_name, "");
-        }
+        add_name(names, found[i]->d_name, "");
         free(found[i]);
     }
     free((void *)found);
-    errno = (count >= 0) ? ENOMEM : error;
-    return self->name != NULL;
+    return count >= 0;
 }
 
-static bool names_told(names_t *self, ctl_t *ctl) {
+static bool names_told(json_t *names, ctl_t *ctl) {
     json_t *reply = source_list(ctl);
-    const json_t *list = json_object_get(reply, "recordings");
-    self->name = (reply != NULL) ? (char **)calloc(json_array_size(list) + 1U, sizeof *self->name) : NULL;
-    for (size_t i = 0; self->name != NULL && i < json_array_size(list); i++) {
-        const json_t *entry = json_array_get(list, i);
+    size_t i = 0;
+    const json_t *entry = NULL;
+    json_array_foreach(json_object_get(reply, "recordings"), i, entry) {
         const char *stem = json_string_value(json_object_get(entry, "name"));
         if (stem != NULL && json_is_integer(json_object_get(entry, "jsonl_bytes"))) {
-            names_add(self, stem, EVENTS);
+            add_name(names, stem, EVENTS);
         }
     }
     json_decref(reply);
-    return self->name != NULL;
+    return reply != NULL;
 }
 
-/// The gateway knows best, if it is there: here may be another machine, with recordings of its own. False with errno.
-static bool find_names(names_t *self, const why_disk_t *where) {
-    *self = (names_t){NULL, 0};
-    return (where->ctl != NULL && names_told(self, where->ctl)) || names_on_disk(self, where->directory);
+/// The recordings' .jsonl files, the oldest first. The gateway knows best, if it is there: here may be another machine, with
+/// recordings of its own. NULL with errno.
+static json_t *find_names(const why_disk_t *where) {
+    json_t *names = json_array();
+    if ((where->ctl != NULL && names_told(names, where->ctl)) || names_on_disk(names, where->directory)) {
+        return names;
+    }
+    json_decref(names);
+    return NULL;
 }
 
 static void print_line(const char *name, const json_t *why) {
-    char wall[32] = "--";
-    struct tm local;
-    const time_t seconds = (time_t)(json_integer_value(json_object_get(why, "wall_us")) / 1000000);
+    char wall[TEXT_CELL];
     const char *sentence = json_string_value(json_object_get(why, "sentence"));
-    if (localtime_r(&seconds, &local) != NULL) {
-        (void)strftime(wall, sizeof wall, "%Y-%m-%d %H:%M:%S", &local);
-    }
+    text_when(json_integer_value(json_object_get(why, "wall_us")), wall);
     const unsigned long number = strtoul(name + sizeof PREFIX - 1U, NULL, 10);
     (void)printf("%6lu  %s  ", number, wall);
     text_safe((sentence != NULL) ? sentence : "-- (the recording is cut)", stdout);
@@ -136,25 +114,29 @@ static void list_one(const why_disk_t *self, const char *name) {
 }
 
 int why_disk_list(const why_disk_t *self) {
-    names_t names;
-    if (!find_names(&names, self)) {
+    json_t *names = find_names(self);
+    size_t i = 0;
+    const json_t *name = NULL;
+    if (names == NULL) {
         return tell_closed_directory(self->directory, errno);
     }
-    for (size_t i = 0; i < names.count; i++) {
-        list_one(self, names.name[i]);
+    json_array_foreach(names, i, name) {
+        list_one(self, json_string_value(name));
     }
+    const size_t count = json_array_size(names);
     if (!self->json) {
-        (void)fputs((names.count > 0U) ? "\n" : "", stdout);
-        text_line(stdout, "%zu stop%s recorded in %s%s", names.count, (names.count == 1U) ? "" : "s", self->directory,
-                  (names.count > 0U) ? "; one of them with its frames: iwheelctl why NUMBER" : "");
+        (void)fputs((count > 0U) ? "\n" : "", stdout);
+        text_line(stdout, "%zu stop%s recorded in %s%s", count, (count == 1U) ? "" : "s", self->directory,
+                  (count > 0U) ? "; one of them with its frames: iwheelctl why NUMBER" : "");
     }
-    names_free(&names);
+    json_decref(names);
     return CTL_OK;
 }
 
 /// The path of the recording's .jsonl; false if there is none.
 static bool find(const why_disk_t *self, const char *name, char out_path[PATH_SIZE]) {
-    names_t names;
+    size_t i = 0;
+    const json_t *each = NULL;
     bool found = false;
     if (strspn(name, "0123456789") != strlen(name)) {
         const char *ending = strrchr(name, '.');
@@ -163,16 +145,15 @@ static bool find(const why_disk_t *self, const char *name, char out_path[PATH_SI
             snprintf(out_path, PATH_SIZE, "%.*s" EVENTS, (int)(is_file ? ending - name : (long)strlen(name)), name);
         return n > 0 && (size_t)n < PATH_SIZE;
     }
-    if (!find_names(&names, self)) {
-        return false;
-    }
-    for (size_t i = 0; i < names.count; i++) {
-        if (strtoul(names.name[i] + sizeof PREFIX - 1U, NULL, 10) == strtoul(name, NULL, 10)) {
+    json_t *names = find_names(self);
+    json_array_foreach(names, i, each) {
+        const char *const text = json_string_value(each);
+        if (strtoul(text + sizeof PREFIX - 1U, NULL, 10) == strtoul(name, NULL, 10)) {
             found = true;
-            (void)snprintf(out_path, PATH_SIZE, "%s/%s", self->directory, names.name[i]);
+            (void)snprintf(out_path, PATH_SIZE, "%s/%s", self->directory, text);
         }
     }
-    names_free(&names);
+    json_decref(names);
     return found;
 }
 
@@ -183,8 +164,7 @@ static int print_frames(ctl_t *ctl, const char *path, int64_t stop_us, size_t mo
     candump_t frame;
     size_t kept = 0;
     size_t after = 0;
-    const int fd = source_open(ctl, path, SOURCE_WHOLE);
-    const int code = (fd >= 0) ? recording_take(&recording, path, fd) : recording_open(&recording, path);
+    const int code = recording_open(&recording, ctl, path);
     if (code != CTL_OK) {
         return code;
     }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "memory.h"
 
-#include "bounds.h"
+#include "disk/box_files.h"
 
+#include "iwheel/codec.h"
+#include "iwheel/evidence.h"
 #include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/words.h"
@@ -10,24 +12,13 @@
 #include <ctype.h>
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define FORMAT  "iwheel-ledger"
 #define VERSION 1
 /// Eight hexadecimal digits and a newline.
 #define SUM_LENGTH 9U
-
-/// CRC-32 as everybody computes it (zip, Ethernet).
-static uint32_t checksum(const char *text, size_t length) {
-    uint32_t sum = UINT32_MAX;
-    for (size_t i = 0; i < length; i++) {
-        sum ^= (unsigned char)text[i];
-        for (unsigned bit = 0; bit < 8U; bit++) {
-            sum = (sum >> 1) ^ (((sum & 1U) != 0U) ? 0xEDB88320U : 0U);
-        }
-    }
-    return ~sum;
-}
 
 void gw_memory_name(const char *bus, char *out_name, size_t size) {
     (void)snprintf(out_name, size, "ledger-%s", bus);
@@ -88,7 +79,8 @@ size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text,
     if (length == 0U) {
         return 0;
     }
-    (void)snprintf(&out_text[length], SUM_LENGTH + 1U, "%08" PRIx32 "\n", checksum(out_text, length));
+    (void)snprintf(&out_text[length], SUM_LENGTH + 1U, "%08" PRIx32 "\n",
+                   gw_box_crc32(0, (const uint8_t *)out_text, length));
     return length + SUM_LENGTH;
 }
 
@@ -232,10 +224,11 @@ static const char *read_line(const char *text, size_t length, const char *bus, g
 bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t *out_known,
                     char out_reason[GW_MEMORY_REASON_SIZE]) {
     char sum[SUM_LENGTH + 1U];
-    gw_known_t known = {0};
+    static gw_known_t known; // Too large for a stack.
     const size_t body = (length < SUM_LENGTH) ? 0U : length - SUM_LENGTH;
     const char *fault = "it is damaged: its checksum is wrong";
-    (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", checksum(text, body));
+    memset(&known, 0, sizeof known);
+    (void)snprintf(sum, sizeof sum, "%08" PRIx32 "\n", gw_box_crc32(0, (const uint8_t *)text, body));
     if (length > SUM_LENGTH && memcmp(&text[body], sum, SUM_LENGTH) == 0) {
         fault = read_line(text, body, bus, &known);
     }

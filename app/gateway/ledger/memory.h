@@ -8,7 +8,7 @@
 #ifndef GATEWAY_MEMORY_H
 #define GATEWAY_MEMORY_H
 
-#include "assumption.h"
+#include "words/assumption.h"
 
 #include "iwheel/force_offset.h"
 
@@ -51,5 +51,18 @@ bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t
 
 /// The name of the file for this bus.
 void gw_memory_name(const char *bus, char *out_name, size_t size);
+
+/// What measuring can give. What was stored is held to the same: a file whose checksum is right can still hold what no
+/// wheel has ever shown. Pure functions.
+///
+/// The furthest raw force in cN that is not saturated. The finer unit cannot say more, and both wheels are of one make: a
+/// zero further off would leave no force to be measured.
+#define GW_BOUNDS_ZERO_mN 327660
+
+/// True if some run of the gateway could have found this: state, evidence, figure, values and time belong together.
+bool gw_bounds_item(iw_ledger_item_t item, const gw_known_item_t *known);
+
+/// True if a wheel could have sent this offset, or a quiet window given it.
+bool gw_bounds_offset(const gw_known_offset_t *known);
 
 #endif

@@ -28,7 +28,7 @@ bool gw_owners_wrote(const gw_owners_t *self, const struct stat *status) {
 
 /// With a slash behind its name, a symbolic link would be followed.
 static int open_unlinked(const char *path) {
-    char bare[4096];
+    static char bare[4096]; // Too large for a stack.
     struct stat status;
     size_t length = strlen(path);
     if (length == 0U || length >= sizeof bare) {

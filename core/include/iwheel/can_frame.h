@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// A classic CAN frame as a value.
 ///
 /// The id word carries the frame's format in its upper bits, so that one comparison with an 11-bit number refuses
@@ -13,7 +14,7 @@
 #define IW_CAN_ERROR    0x20000000U ///< Not a frame of the bus but the controller's report of an error.
 #define IW_CAN_FD       0x10000000U ///< CAN FD frame with an 11-bit id; `data` holds its first 8 bytes.
 #define IW_CAN_ID_MASK  0x000007FFU ///< An 11-bit id. All other bits of a usable frame's id word are zero.
-#define IW_CAN_DATA_MAX 8U
+#define IW_CAN_DATA_MAX 8U          ///< Bytes of a classic frame.
 
 /// Where a frame came from.
 typedef enum {
@@ -21,6 +22,7 @@ typedef enum {
     IW_CAN_ECHO = 1,     ///< We sent it and the controller says that it is on the bus.
 } iw_can_kind_t;
 
+/// A frame of the bus, or one for it.
 typedef struct {
     uint32_t id;                   ///< 11-bit id, or'ed with IW_CAN_EXTENDED, IW_CAN_REMOTE, IW_CAN_ERROR, IW_CAN_FD.
     uint8_t data[IW_CAN_DATA_MAX]; ///< At a multiple of four bytes: read and written a word at a time.

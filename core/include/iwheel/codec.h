@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// The eleven messages of the iWheel: one table of rows, frames to values and back.
 ///
 /// Source of every id, layout, unit and range: the document "CAN Frames for controlling the iWheel". Integers are
@@ -39,12 +40,12 @@
 #define IW_ID_RIGHT_FORCE    544U ///< 0x220
 #define IW_ID_RIGHT_OFFSET   545U ///< 0x221
 
-#define IW_DLC_SETPOINT 5U
-#define IW_DLC_SPEED    4U
-#define IW_DLC_STATUS   7U
-#define IW_DLC_POSE     8U
-#define IW_DLC_FORCE    4U
-#define IW_DLC_OFFSET   2U
+#define IW_DLC_SETPOINT 5U ///< Least length of a setpoint, bytes.
+#define IW_DLC_SPEED    4U ///< Of a speed.
+#define IW_DLC_STATUS   7U ///< Of a status.
+#define IW_DLC_POSE     8U ///< Of a pose.
+#define IW_DLC_FORCE    4U ///< Of a force.
+#define IW_DLC_OFFSET   2U ///< Of an offset.
 
 /// The document's range of the current setpoint is +/- this.
 #define IW_CURRENT_LIMIT_mA 2000
@@ -57,6 +58,7 @@
 /// A battery byte of 255 means "at least 25.5 V".
 #define IW_BATTERY_SATURATED_dV 255U
 
+/// Which message a frame is, or why it is none.
 typedef enum {
     IW_CODEC_SPEED,
     IW_CODEC_STATUS,
@@ -74,60 +76,66 @@ typedef enum {
 
 /// One message of the table.
 typedef struct {
-    uint16_t id;
+    uint16_t id;        ///< 11 bits.
     uint16_t period_ms; ///< As documented; of a setpoint the longest allowed.
     uint8_t length;     ///< The least number of bytes.
     uint8_t kind;       ///< An iw_codec_kind_t. Only IW_CODEC_SETPOINT goes to a wheel; all others come from one.
     uint8_t side;       ///< An iw_side_t: the wheel that sends it, or for a setpoint the wheel it is for.
 } iw_codec_row_t;
 
-#define IW_CODEC_ROWS 11U
+#define IW_CODEC_ROWS 11U ///< Messages in the table.
 
 /// All messages, by kind, the left wheel's before the right one's.
 extern const iw_codec_row_t iw_codec_rows[IW_CODEC_ROWS];
 
+/// How fast a wheel turns.
 typedef struct {
     int16_t acceleration_raw; ///< Unit unknown ("???" in the document): shown, never used.
     int16_t speed_rpm;        ///< Of the wheel or the rotor: see `iw_config_t::rpm_of_rotor`.
 } iw_codec_speed_t;
 
+/// How a wheel is.
 typedef struct {
-    int32_t odometry_ticks; ///< Wraps.
-    uint8_t battery_dV;
-    uint8_t temperature_degC;
-    uint8_t cpu_percent;
+    int32_t odometry_ticks;   ///< Wraps.
+    uint8_t battery_dV;       ///< Saturates at IW_BATTERY_SATURATED_dV.
+    uint8_t temperature_degC; ///< Believed up to IW_TEMPERATURE_MAX_degC.
+    uint8_t cpu_percent;      ///< Load of the wheel's processor.
 } iw_codec_status_t;
 
+/// What the sensor on the shaft shows.
 typedef struct {
     int16_t debug_raw; ///< "Debugging (not important)".
     int16_t force_raw; ///< cN on the left, dN on the right, says the document. See force_offset.h.
 } iw_codec_force_t;
 
+/// Where the machine is, as the right wheel reckons it.
 typedef struct {
-    int16_t x_mm;
-    int16_t y_mm;
-    int16_t z_mm;
+    int16_t x_mm;     ///< Wraps.
+    int16_t y_mm;     ///< Wraps.
+    int16_t z_mm;     ///< Wraps.
     int16_t psi_mrad; ///< Wraps at 65536 mrad, which is no multiple of a turn.
 } iw_codec_pose_t;
 
+/// The force without a load, as the wheel found it at its start.
 typedef struct {
-    int16_t offset_dN;
+    int16_t offset_dN; ///< In dN for both wheels, says the document.
 } iw_codec_offset_t;
 
+/// What a wheel is told.
 typedef struct {
-    int16_t speed_mm_s;
-    int16_t current_mA;
-    uint8_t type; ///< Opaque: the document lists no values.
+    int16_t speed_mm_s; ///< In the wheel's own sense.
+    int16_t current_mA; ///< Within +/- IW_CURRENT_LIMIT_mA.
+    uint8_t type;       ///< Opaque: the document lists no values.
 } iw_codec_setpoint_t;
 
 /// The values of one wheel's messages, each as the last frame of its kind had them. Only the right wheel has a pose.
 typedef struct {
-    iw_codec_speed_t speed;
-    iw_codec_status_t status;
-    iw_codec_force_t force;
-    iw_codec_pose_t pose;
-    iw_codec_setpoint_t setpoint;
-    iw_codec_offset_t offset;
+    iw_codec_speed_t speed;       ///< Every 4 ms.
+    iw_codec_status_t status;     ///< Every 40 ms.
+    iw_codec_force_t force;       ///< Every 50 ms.
+    iw_codec_pose_t pose;         ///< Every 40 ms, of the right wheel.
+    iw_codec_setpoint_t setpoint; ///< The last one that was seen for it.
+    iw_codec_offset_t offset;     ///< In the first 60 s of its run.
 } iw_codec_wheel_t;
 
 /// A row of that kind: what it says of length and period holds for both wheels.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Everything that can be configured in the core, checked once.
 ///
 /// The names, units, ranges and defaults are those of the gateway's configuration file. The caller fills an
@@ -32,7 +33,7 @@ typedef struct {
     bool setpoint_type_set;   ///< The wheels do not move until this is true.
     bool rpm_of_rotor;        ///< The rpm in telemetry are the rotor's, not the wheel's.
     bool listen_only;         ///< Nothing is ever sent; arm is refused.
-    iw_current_role_t current_role;
+    iw_current_role_t current_role;       ///< The wheels do not move while it is IW_ROLE_UNSET.
     bool invert[IW_SIDES];                ///< This wheel is mounted mirrored: negate its speed, both ways.
     iw_force_unit_t force_unit[IW_SIDES]; ///< As documented unless the wheel proves otherwise.
 } iw_config_t;
@@ -75,9 +76,10 @@ typedef enum {
 
 /// The inclusive range of the numeric field that a fault in IW_CONFIG_PERIOD..IW_CONFIG_SETPOINT_DLC names.
 typedef struct {
-    uint16_t min;
-    uint16_t max;
+    uint16_t min; ///< The least.
+    uint16_t max; ///< The most.
 } iw_config_range_t;
+/// The range of that field.
 iw_config_range_t iw_config_range(iw_config_fault_t field);
 
 /// The documented defaults. Setpoint type and current role are left unset: nobody can know them.
@@ -89,11 +91,12 @@ iw_config_fault_t iw_config_check(const iw_config_t *config);
 /// How long (milliseconds, rounded up) and how far (millimetres, rounded up) the machine goes on, at most, after the
 /// client's last command: lease, one period, ramp from the maximum speed.
 typedef struct {
-    uint32_t client_lost_ms;
-    uint32_t client_lost_mm;
-    uint32_t killed_ms; ///< Gateway killed and not restarted: the wheel's watchdog, then unknown.
-    uint32_t killed_mm; ///< At full command for that time; braking comes on top and is not documented.
+    uint32_t client_lost_ms; ///< Until the wheels are told to stand, at most.
+    uint32_t client_lost_mm; ///< The way in that time, at the maximum speed.
+    uint32_t killed_ms;      ///< Gateway killed and not restarted: the wheel's watchdog, then unknown.
+    uint32_t killed_mm;      ///< At full command for that time; braking comes on top and is not documented.
 } iw_stop_budget_t;
+/// Of a configuration that has been checked.
 iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config);
 
 #endif

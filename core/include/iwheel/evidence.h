@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Evidence for the assumption ledger that the wheels' own motion gives, beside what the core finds itself (force
 /// units, offset, feedback signs, lengths of frames).
 ///
@@ -23,22 +24,21 @@
 /// So many turns of the rpm (x us) without an end: status frames are missing, and the stretch begins anew. 100000
 /// ticks.
 #define IW_EVIDENCE_TURNED_MAX 100000000000
-/// Ticks within this share of what the rpm say: the ratio fits. Further off than the other: it does not; between:
-/// nothing.
+/// Ticks within this share of what the rpm say: the ratio fits. Up to the next: nothing.
 #define IW_EVIDENCE_FITS_PERMILLE  120
-#define IW_EVIDENCE_FAILS_PERMILLE 250
+#define IW_EVIDENCE_FAILS_PERMILLE 250 ///< Further off than this: it does not fit.
 /// That often in a row it must not fit: a frame may be lost.
 #define IW_EVIDENCE_MISSES 3U
 /// A gap longer than this between two frames begins anew.
 #define IW_EVIDENCE_GAP_US 100000U
-/// Steps of the pose in which it moved; fewer, if read both ways they add up to more than this (mm and mrad).
+/// So many steps of the pose in which it moved are judged.
 #define IW_EVIDENCE_POSE_STEPS 25U
-#define IW_EVIDENCE_POSE_FAR   1000000
+#define IW_EVIDENCE_POSE_FAR   1000000 ///< Fewer steps do, if read both ways they add up to this, mm and mrad.
 /// So many times as far it must move, read the wrong way round.
 #define IW_EVIDENCE_POSE_FACTOR 8
-/// At least so fast, and for so long within 15 % of it (and 1 rpm), a wheel must run to speak for the setpoint type.
+/// At least so fast a wheel must run to speak for the setpoint type.
 #define IW_EVIDENCE_TYPE_MM_S 150
-#define IW_EVIDENCE_TYPE_US   1000000U
+#define IW_EVIDENCE_TYPE_US   1000000U ///< For so long, within 15 % of what it is told (and 1 rpm).
 
 /// One wheel.
 typedef struct {
@@ -47,22 +47,24 @@ typedef struct {
     iw_time_us_t steady_us; ///< When it was last seen not to run as told, or was told something else.
     int64_t turned;         ///< |rpm| x us since the stretch began.
     int64_t ticks;          ///< Where it began.
-    uint32_t reboots;
-    uint32_t misses;
-    int16_t rpm;          ///< Of the last speed frame.
-    int16_t applied_mm_s; ///< What it is told since `steady_us`.
-    bool open;            ///< A stretch has begun.
+    uint32_t reboots;       ///< As seen: a change begins the stretch anew.
+    uint32_t misses;        ///< Stretches in a row that did not fit.
+    int16_t rpm;            ///< Of the last speed frame.
+    int16_t applied_mm_s;   ///< What it is told since `steady_us`.
+    bool open;              ///< A stretch has begun.
 } iw_motion_evidence_wheel_t;
 
+/// What has been gathered. The caller's, and the only state of this module.
 typedef struct {
-    iw_motion_evidence_wheel_t wheel[IW_SIDES];
-    iw_time_us_t pose_us; ///< Of the last pose that was looked at; IW_NEVER: none yet.
-    iw_codec_pose_t pose;
-    uint32_t pose_steps;
-    int32_t moved;    ///< In those steps, as it is read.
-    int32_t reversed; ///< Read the other way round.
+    iw_motion_evidence_wheel_t wheel[IW_SIDES]; ///< By iw_side_t.
+    iw_time_us_t pose_us;                       ///< Of the last pose that was looked at; IW_NEVER: none yet.
+    iw_codec_pose_t pose;                       ///< That pose.
+    uint32_t pose_steps;                        ///< Steps in which it moved.
+    int32_t moved;                              ///< In those steps, as it is read.
+    int32_t reversed;                           ///< Read the other way round.
 } iw_motion_evidence_t;
 
+/// Nothing gathered yet.
 void iw_motion_evidence_init(iw_motion_evidence_t *self);
 
 /// After each step: what it has brought, into what the gateway assumes. `seen`: looked at since the step.

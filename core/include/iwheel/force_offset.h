@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// The normal force on one wheel, and where its zero comes from.
 ///
 /// The document: force on the shaft = normal force - offset, where the offset is the mean normal force at start-up
@@ -35,9 +36,9 @@
 
 /// Two seconds of force frames at their documented period of 50 ms.
 #define IW_FORCE_WINDOW_SAMPLES 40U
-/// A quiet sensor: standard deviation, and difference of the means of both halves of the window, below these.
+/// A quiet sensor: the standard deviation of the window lies below this.
 #define IW_FORCE_QUIET_mN 1000U
-#define IW_FORCE_DRIFT_mN 1000U
+#define IW_FORCE_DRIFT_mN 1000U ///< ... and the difference of the means of its halves below this.
 /// A mean further than this from an offset that was trusted before is taken for a load: nobody who leans on the machine
 /// while it starts moves its zero by more ...
 #define IW_FORCE_SHIFT_mN 5000U
@@ -48,13 +49,13 @@
 /// Unit evidence needs a wheel offset of at least this. A smaller one only becomes IW_UNIT_UNCLEAR, if our own mean is
 /// further from it than IW_FORCE_LOADED_mN.
 #define IW_FORCE_EVIDENCE_MIN_dN 20
-/// ... and a mean within this share of the ratio's prediction; for a removed offset, below this share of the offset.
+/// ... and a mean within this share of the ratio's prediction.
 #define IW_FORCE_EVIDENCE_PERCENT 15
-#define IW_FORCE_REMOVED_PERCENT  30
+#define IW_FORCE_REMOVED_PERCENT  30 ///< For a removed offset: a mean below this share of the offset.
 /// Older than this (five periods), the force is not valid, and a window with such a gap starts again.
 #define IW_FORCE_STALE_US 250000U
 
-/// In the order of trust.
+/// Where the offset in force comes from, in the order of trust.
 typedef enum {
     IW_OFFSET_NONE = 0,
     IW_OFFSET_STORED,    ///< From an earlier run of the gateway or of the wheel.
@@ -74,6 +75,7 @@ typedef enum {
     IW_WINDOW_SATURATED,
 } iw_window_t;
 
+/// What raw force and wheel offset together say of the unit.
 typedef enum {
     IW_UNIT_UNKNOWN = 0, ///< No wheel offset, too small a one to tell, or no good window.
     IW_UNIT_CN,
@@ -82,6 +84,7 @@ typedef enum {
     IW_UNIT_UNCLEAR,        ///< None of these: somebody pressed during one of the two measurements.
 } iw_unit_evidence_t;
 
+/// What a tare came to.
 typedef enum {
     IW_TARE_OK = 0,
     IW_TARE_NO_FORCE, ///< No unbroken window of recent samples.
@@ -91,6 +94,7 @@ typedef enum {
     IW_TARE_SATURATED,
 } iw_tare_t;
 
+/// Whether the net force means anything.
 typedef enum {
     IW_FORCE_VALID = 0,
     IW_FORCE_NOT_HEARD,
@@ -101,31 +105,33 @@ typedef enum {
     IW_FORCE_OFFSET_DOUBTED, ///< Our own mean and the wheel's offset disagree: one of them was taken under load.
 } iw_force_validity_t;
 
+/// What a window of samples shows.
 typedef struct {
     uint32_t deviation_mN; ///< Standard deviation of the window.
     int32_t drift_mN;      ///< Mean of its second half minus mean of its first half.
-    int32_t mean_mN;
-    uint8_t samples;
-    iw_window_t window;
+    int32_t mean_mN;       ///< Of the raw force.
+    uint8_t samples;       ///< In it.
+    iw_window_t window;    ///< The judgement.
 } iw_force_quality_t;
 
+/// The force on one wheel. Read it through the functions below.
 typedef struct {
-    iw_time_us_t raw_us;
+    iw_time_us_t raw_us;     ///< When `raw` came; IW_NEVER: not yet.
     iw_time_us_t offset_us;  ///< When the offset in force was taken; IW_NEVER: none, or by an earlier run.
     int32_t offset_mN;       ///< The offset in force; 0 with IW_OFFSET_NONE.
     int16_t wheel_offset_dN; ///< The wheel's own, as sent.
     int16_t sample[IW_FORCE_WINDOW_SAMPLES]; ///< Ring of raw values, the last two seconds.
-    int16_t raw;
-    uint8_t count; ///< Samples in the ring.
-    uint8_t still; ///< Of the newest samples, how many in a row came from a wheel at rest.
-    uint8_t next;
-    iw_force_unit_t unit; ///< Of `raw`.
-    iw_offset_provenance_t provenance;
-    iw_unit_evidence_t evidence;
-    int32_t evidence_permille;  ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
-    iw_force_quality_t quality; ///< Of the start-up window.
-    bool wheel_offset_heard;
-    bool boot_seen;
+    int16_t raw;                             ///< The last one, as on the bus.
+    uint8_t count;                           ///< Samples in the ring.
+    uint8_t still;                           ///< Of the newest samples, how many in a row came from a wheel at rest.
+    uint8_t next;                            ///< Where the next sample goes.
+    iw_force_unit_t unit;                    ///< Of `raw`.
+    iw_offset_provenance_t provenance;       ///< Of the offset in force.
+    iw_unit_evidence_t evidence;             ///< Of the unit.
+    int32_t evidence_permille;               ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
+    iw_force_quality_t quality;              ///< Of the start-up window.
+    bool wheel_offset_heard;                 ///< In this run of the wheel.
+    bool boot_seen;                          ///< The start of this run was observed.
 } iw_force_t;
 
 /// `unit`: as configured.

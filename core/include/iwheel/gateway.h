@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// A pair of wheels: everything of the core wired together.
 ///
 ///     bus -> receive -> decode -> wheel state -> permission -> scheduler -> encode -> envelope -> send -> bus
@@ -46,38 +47,40 @@ typedef struct {
 
 /// A drive request. Values are taken as they come: what does not fit is refused here.
 typedef struct {
-    int32_t speed_mm_s[IW_SIDES];
-    int32_t current_mA[IW_SIDES];
-    bool has_current; ///< False: the configured maximum, allowed with IW_ROLE_LIMIT only.
+    int32_t speed_mm_s[IW_SIDES]; ///< In the machine's frame: positive is forward. -32768..32767.
+    int32_t current_mA[IW_SIDES]; ///< +/- IW_CURRENT_LIMIT_mA; not negative with IW_ROLE_LIMIT.
+    bool has_current;             ///< False: the configured maximum, allowed with IW_ROLE_LIMIT only.
 } iw_drive_t;
 
+/// What a drive request came to.
 typedef struct {
     iw_pair_t pair; ///< The target after limits; ramps come on top.
     bool limited;   ///< It differs from the request: both wheels scaled by one factor.
 } iw_applied_t;
 
+/// The whole of it. Members are the core's own: what may be known of them, snapshot.h tells.
 typedef struct iw_gateway {
-    iw_config_t config;
-    iw_hal_t hal;
+    iw_config_t config;              ///< Copied at init.
+    iw_hal_t hal;                    ///< Copied at init.
     iw_codec_wheel_t told[IW_SIDES]; ///< Each wheel's last telemetry, message by message.
-    iw_wheel_t wheel[IW_SIDES];
-    iw_force_t force[IW_SIDES];
-    iw_follow_t follow[IW_SIDES];
-    iw_permit_t permit;
-    iw_setpoint_t setpoint;
-    iw_sender_t sender;
-    iw_ledger_t ledger;
-    iw_counters_t counters;
-    iw_time_us_t stalled_since_us; ///< When the first of an unbroken run of stalled steps was due.
-    iw_time_us_t suspended_us;     ///< Reported by `iw_gateway_suspended` since the last step.
-    iw_time_us_t promised_us;      ///< When the last step asked to be called again.
-    iw_time_us_t pose_us;          ///< When the last pose came; IW_NEVER: none.
-    iw_time_us_t purged_us;        ///< When a purge was last tried in this silence; IW_NEVER: not yet.
-    uint32_t purged_stop;          ///< Number of the stop in whose zeros a purge was tried.
-    iw_bus_state_t bus;
-    iw_bus_facts_t facts;
-    bool backlog; ///< The last step left frames behind.
-    bool stalled; ///< This step does not know when its frames came: nothing is judged by age.
+    iw_wheel_t wheel[IW_SIDES];      ///< What is known of each wheel.
+    iw_force_t force[IW_SIDES];      ///< Its normal force.
+    iw_follow_t follow[IW_SIDES];    ///< Whether it does as told.
+    iw_permit_t permit;              ///< Whether the wheels may move.
+    iw_setpoint_t setpoint;          ///< Which pair is due.
+    iw_sender_t sender;              ///< How it gets to the bus.
+    iw_ledger_t ledger;              ///< What is assumed of the wheels.
+    iw_counters_t counters;          ///< Since init.
+    iw_time_us_t stalled_since_us;   ///< When the first of an unbroken run of stalled steps was due.
+    iw_time_us_t suspended_us;       ///< Reported by `iw_gateway_suspended` since the last step.
+    iw_time_us_t promised_us;        ///< When the last step asked to be called again.
+    iw_time_us_t pose_us;            ///< When the last pose came; IW_NEVER: none.
+    iw_time_us_t purged_us;          ///< When a purge was last tried in this silence; IW_NEVER: not yet.
+    uint32_t purged_stop;            ///< Number of the stop in whose zeros a purge was tried.
+    iw_bus_state_t bus;              ///< As the port reported it in this step.
+    iw_bus_facts_t facts;            ///< As the port told them last.
+    bool backlog;                    ///< The last step left frames behind.
+    bool stalled;                    ///< This step does not know when its frames came: nothing is judged by age.
     /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or did not
     /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
     bool left_behind;

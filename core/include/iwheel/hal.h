@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// What a port provides: five functions and a context.
 ///
 /// None may block, and none may call back into the core. All are called from `iw_gateway_step` only, so from one
@@ -10,6 +11,7 @@
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
 
+/// What the controller says of the bus.
 typedef enum {
     IW_BUS_DOWN = 0, ///< Interface absent, down, or not opened.
     IW_BUS_OFF,      ///< Bus-off: nothing is sent or received.
@@ -17,6 +19,7 @@ typedef enum {
     IW_BUS_ACTIVE,   ///< Error active: the normal state.
 } iw_bus_state_t;
 
+/// Where the core gets frames from and gives them to.
 typedef struct {
     /// Hands one frame to the controller or its queue. A success proves nothing: only the echo does.
     int (*send)(void *context, const iw_can_frame_t *frame);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// The core for C++: include this one instead of gateway.h.
 #ifndef IW_IWHEEL_HPP
 #define IW_IWHEEL_HPP

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Everything that can be read from a gateway, in one struct. Writing goes through the requests of gateway.h; headers
 /// in private/ are for the core alone.
 ///
@@ -43,28 +44,29 @@ typedef struct {
     int64_t ticks;                ///< Odometry, unwrapped, across reboots. The distance in nm is `ticks * nm_per_tick`.
     int32_t nm_per_tick;          ///< Negative where `invert` is set.
     int32_t speed_mm_s;           ///< Measured, rounded towards zero. Meaningless while not heard.
-    uint32_t um_s_per_rpm;
-    uint32_t reboots;
-    bool heard;   ///< Its speed was heard less than `wheel_silent_ms` ago.
-    bool at_rest; ///< Heard, and within `rest_rpm` for `rest_ms`.
+    uint32_t um_s_per_rpm;        ///< Speed in um/s at 1 rpm of its telemetry.
+    uint32_t reboots;             ///< Seen since init.
+    bool heard;                   ///< Its speed was heard less than `wheel_silent_ms` ago.
+    bool at_rest;                 ///< Heard, and within `rest_rpm` for `rest_ms`.
 } iw_snapshot_wheel_t;
 
+/// What can be known of a gateway at one time.
 typedef struct {
-    iw_time_us_t at_us; ///< The `now_us` of the call.
-    const iw_config_t *config;
-    const iw_counters_t *counters;
-    const iw_sent_t *sent;
-    const iw_stop_t *stop;            ///< The last one; `number` is 0 if there was none.
-    const iw_ledger_entry_t *assumed; ///< What is assumed of the wheels, by iw_ledger_item_t.
-    const iw_time_us_t *seen_us;      ///< When each iw_cause_t was last seen; IW_NEVER: never.
-    iw_snapshot_wheel_t wheel[IW_SIDES];
-    uint32_t stopped;            ///< Frames that the envelope stopped. Nonzero means an error of ours.
-    uint32_t stray_echoes;       ///< Echoes that no unconfirmed setpoint matched.
-    iw_time_us_t pose_us;        ///< When the last pose came; IW_NEVER: none.
-    iw_time_us_t armed_us;       ///< When ARMED began or the lease was taken over.
-    iw_time_us_t lease_until_us; ///< In ARMED: without another drive command the lease ends here.
-    iw_time_us_t stale_us;       ///< The last nonzero drive command of anybody, accepted or not; IW_NEVER: none.
-    iw_time_us_t waiting_us;     ///< Since when a setpoint waits for its TX confirmation; IW_NEVER: none does.
+    iw_time_us_t at_us;                  ///< The `now_us` of the call.
+    const iw_config_t *config;           ///< The one in force.
+    const iw_counters_t *counters;       ///< Since init.
+    const iw_sent_t *sent;               ///< Since init.
+    const iw_stop_t *stop;               ///< The last one; `number` is 0 if there was none.
+    const iw_ledger_entry_t *assumed;    ///< What is assumed of the wheels, by iw_ledger_item_t.
+    const iw_time_us_t *seen_us;         ///< When each iw_cause_t was last seen; IW_NEVER: never.
+    iw_snapshot_wheel_t wheel[IW_SIDES]; ///< By iw_side_t.
+    uint32_t stopped;                    ///< Frames that the envelope stopped. Nonzero means an error of ours.
+    uint32_t stray_echoes;               ///< Echoes that no unconfirmed setpoint matched.
+    iw_time_us_t pose_us;                ///< When the last pose came; IW_NEVER: none.
+    iw_time_us_t armed_us;               ///< When ARMED began or the lease was taken over.
+    iw_time_us_t lease_until_us;         ///< In ARMED: without another drive command the lease ends here.
+    iw_time_us_t stale_us;   ///< The last nonzero drive command of anybody, accepted or not; IW_NEVER: none.
+    iw_time_us_t waiting_us; ///< Since when a setpoint waits for its TX confirmation; IW_NEVER: none does.
     /// Of each wheel's last confirmed setpoint: when the older of the two was sent; 0: not both wheels have one yet.
     iw_time_us_t confirmed_us;
     iw_client_t holder;       ///< Of the lease, also while arming; IW_CLIENT_NONE: nobody.
@@ -75,14 +77,14 @@ typedef struct {
     uint32_t present;
     uint32_t assumed_changes; ///< Grows with every change of what is assumed.
     uint32_t still_moving;    ///< Holds that ended by their longest time with a wheel not at rest.
-    iw_state_t state;
+    iw_state_t state;         ///< What a client is told.
     iw_refusal_t arm_refusal; ///< Why the last arming failed.
     iw_demand_t demand;       ///< What the scheduler aims at since the last step.
-    iw_bus_state_t bus;
-    iw_ledger_item_t doubt; ///< The first contradicted assumption that keeps the wheels still; IW_LEDGER_ITEMS: none.
-    bool arming;            ///< An arm that was granted waits for its TX confirmation.
-    bool output_zero;       ///< The pair last sent was zero, or a stop without ramp has made the next one so.
-    bool echo_proven;       ///< See `iw_bus_facts_t`.
+    iw_bus_state_t bus;       ///< As the port reported it last.
+    iw_ledger_item_t doubt;   ///< The first contradicted assumption that keeps the wheels still; IW_LEDGER_ITEMS: none.
+    bool arming;              ///< An arm that was granted waits for its TX confirmation.
+    bool output_zero;         ///< The pair last sent was zero, or a stop without ramp has made the next one so.
+    bool echo_proven;         ///< See `iw_bus_facts_t`.
     /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or did not
     /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
     bool left_behind;
@@ -95,9 +97,11 @@ void iw_gateway_snapshot(const struct iw_gateway *self, iw_time_us_t now_us, iw_
 /// assumed of its unit and offset.
 iw_force_validity_t iw_snapshot_force_validity(const iw_snapshot_t *self, iw_side_t side);
 
-/// Four of its fields alone, for callers that need no more.
+/// `iw_snapshot_t::state` alone, as the three below: for callers that need no more.
 iw_state_t iw_gateway_state(const struct iw_gateway *self);
+/// `iw_snapshot_t::arming` alone.
 bool iw_gateway_arming(const struct iw_gateway *self);
+/// `iw_snapshot_t::arm_refusal` alone.
 iw_refusal_t iw_gateway_arm_refusal(const struct iw_gateway *self);
 
 /// True while setpoints are sent, or about to be.

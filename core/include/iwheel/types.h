@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Types that every module shares: time, sides, status codes, a command for a pair of wheels; states, causes of a stop,
 /// refusals; what is assumed of the wheels.
 ///
@@ -21,11 +22,11 @@ typedef uint64_t iw_time_us_t;
 /// Later than every time; "no wake-up wanted" and "never happened".
 #define IW_NEVER UINT64_MAX
 
-#define IW_US_PER_MS 1000U
+#define IW_US_PER_MS 1000U ///< Microseconds in a millisecond.
 
 /// The two wheels. Usable as an array index.
 typedef enum { IW_LEFT = 0, IW_RIGHT = 1 } iw_side_t;
-#define IW_SIDES 2
+#define IW_SIDES 2 ///< So many wheels.
 
 /// What a function made of its arguments. Outputs are untouched unless the status is IW_OK.
 typedef enum {
@@ -36,13 +37,13 @@ typedef enum {
 
 /// What one wheel is told: bytes 1-4 of its setpoint frame.
 typedef struct {
-    int16_t speed_mm_s;
+    int16_t speed_mm_s; ///< Positive is forward, of the machine; on the bus, of the wheel.
     int16_t current_mA; ///< A limit or a setpoint: the document does not say, `iw_config_t::current_role` does.
 } iw_command_t;
 
 /// What both wheels are told, indexed by `iw_side_t`. They leave together or not at all.
 typedef struct {
-    iw_command_t wheel[IW_SIDES];
+    iw_command_t wheel[IW_SIDES]; ///< By side.
 } iw_pair_t;
 
 /// What was sent: counted since the start.
@@ -67,7 +68,7 @@ typedef enum { IW_FORCE_CN = 0, IW_FORCE_DN = 1 } iw_force_unit_t;
 
 /// Who asks: chosen by the owner, never reused for another connection. 0 is nobody.
 typedef uint32_t iw_client_t;
-#define IW_CLIENT_NONE 0U
+#define IW_CLIENT_NONE 0U ///< No client.
 
 /// What a client is told.
 typedef enum { IW_STATE_LISTENING = 0, IW_STATE_ARMED, IW_STATE_STOPPING, IW_STATE_LATCHED } iw_state_t;
@@ -105,10 +106,10 @@ typedef enum {
 } iw_cause_t;
 
 /// Bits for `sides`: which wheel a cause speaks of.
-#define IW_SIDES_NONE  0U
-#define IW_SIDES_LEFT  1U
-#define IW_SIDES_RIGHT 2U
-#define IW_SIDES_BOTH  3U
+#define IW_SIDES_NONE  0U ///< Neither.
+#define IW_SIDES_LEFT  1U ///< The left one.
+#define IW_SIDES_RIGHT 2U ///< The right one.
+#define IW_SIDES_BOTH  3U ///< Both.
 
 /// Why a request was refused. Each has one name in the northbound protocol.
 typedef enum {
@@ -137,15 +138,15 @@ typedef enum {
 
 /// The last stop, for `why`.
 typedef struct {
-    iw_time_us_t at_us;
+    iw_time_us_t at_us; ///< When.
     uint32_t number;    ///< Counts stops; 0: there was none.
     uint32_t detail;    ///< See iw_cause_t.
     iw_client_t client; ///< Who held the lease, or asked for the stop.
     iw_pair_t applied;  ///< What the wheels were told right before it, in the machine's frame.
-    iw_cause_t cause;
-    iw_state_t from;
-    uint8_t sides;
-    bool latched;
+    iw_cause_t cause;   ///< The first cause.
+    iw_state_t from;    ///< The state that it ended.
+    uint8_t sides;      ///< Which wheel the cause speaks of: IW_SIDES_...
+    bool latched;       ///< It needs a reset.
 } iw_stop_t;
 
 /// What the document leaves open, and is therefore assumed until it is found out.
@@ -167,8 +168,10 @@ typedef enum {
     IW_LEDGER_ITEMS,
 } iw_ledger_item_t;
 
+/// What has become of an assumption.
 typedef enum { IW_LEDGER_ASSUMED = 0, IW_LEDGER_CONFIRMED, IW_LEDGER_CONTRADICTED } iw_ledger_state_t;
 
+/// Where it is known from.
 typedef enum {
     IW_EVIDENCE_NONE = 0,      ///< Nothing: not configured and not documented.
     IW_EVIDENCE_DOCUMENT,      ///< The document says so.
@@ -179,8 +182,8 @@ typedef enum {
 
 /// What is known of an assumption.
 typedef struct {
-    iw_ledger_state_t state;
-    iw_evidence_t evidence;
+    iw_ledger_state_t state; ///< Assumed, confirmed or contradicted.
+    iw_evidence_t evidence;  ///< What that rests on.
     int32_t figure; ///< Of IW_EVIDENCE_BUS: force unit and offset: 1000 x raw / offset in dN; sign: measured mm/s at a
         ///< positive command; DLC: the length received; setpoint type: 1000 x measured / applied speed; gear
         ///< ratio: 1000 x ticks moved / expected; pose: 1000 x way read byte-swapped / way as it is read.

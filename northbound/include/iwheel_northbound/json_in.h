@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Reads JSON where it lies: nothing is copied, nothing is allocated, and what is not JSON to the letter (RFC 8259) is refused.
 ///
 ///     iwn_json_check     once, judges every byte of the text
@@ -25,9 +26,10 @@
 /// Where the names of the open objects begin, sorted within each object. Its owner need not set anything; it is used within one
 /// call only, so that one for all of a program will do.
 typedef struct {
-    uint16_t name_at[IWN_NAMES_MAX];
+    uint16_t name_at[IWN_NAMES_MAX]; ///< Offsets in the text.
 } iwn_work_t;
 
+/// What a value is.
 typedef enum {
     IWN_JSON_OBJECT = 0,
     IWN_JSON_LIST,
@@ -41,13 +43,14 @@ typedef enum {
 
 /// A value in a text that has been checked, or the rest of an object's members or a list's values.
 typedef struct {
-    const char *at;
+    const char *at; ///< Its first byte.
 } iwn_json_t;
 
 /// True: the text, of at most 65535 bytes, is one object or list, and `*out_root` is that. False: the reason is added to
 /// `fault`, in printable ASCII.
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault);
 
+/// What it is, by its first bytes.
 iwn_json_kind_t iwn_json_kind(iwn_json_t value);
 
 /// What there is to walk in an object or list.

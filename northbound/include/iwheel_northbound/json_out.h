@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Writes one JSON object as one line into a buffer of fixed size.
 ///
 /// Commas are placed by the writer. A name of NULL is for elements of a list. What does not fit sets `overflow` and the line must not
-/// be used. Texts are escaped: what moves a terminal (text.h) stands as \uXXXX, and what is no UTF-8 as U+FFFD. Names are words of
+/// be used. Texts are escaped: what moves a terminal (text.h) stands as `\uXXXX`, and what is no UTF-8 as U+FFFD. Names are words of
 /// ours, in which nothing is to be escaped. No heap, no stdio.
 ///
 /// Each element is written as a whole, in one or two copies. The functions that take a name are inline so that the compiler
@@ -18,20 +19,22 @@
 #include <stdint.h>
 #include <string.h>
 
+/// A line that is being written, in a buffer of the owner's.
 typedef struct {
-    char *data;
-    size_t size;
-    size_t length;
-    bool comma; ///< The next element needs one before it.
-    bool overflow;
+    char *data;    ///< The buffer.
+    size_t size;   ///< Of the buffer, bytes.
+    size_t length; ///< Written so far, bytes.
+    bool comma;    ///< The next element needs one before it.
+    bool overflow; ///< Something did not fit: the line must not be used.
 } iwn_out_t;
 
 /// Part of a text, not terminated.
 typedef struct {
-    const char *text;
-    size_t length;
+    const char *text; ///< Its first byte.
+    size_t length;    ///< Bytes.
 } iwn_span_t;
 
+/// Begins a line, with nothing open.
 void iwn_out_init(iwn_out_t *self, char *data, size_t size);
 
 /// Ends the line. Its length with the newline; 0 if it did not fit.
@@ -45,11 +48,14 @@ void iwn_out_frame(const iw_can_frame_t *frame, iw_time_us_t at_us, iwn_out_t *j
 
 /// A value that is JSON already: `true`, a number, a whole object written before.
 void iwn_out_span(iwn_out_t *self, iwn_span_t name, iwn_span_t value);
+/// A whole number.
 void iwn_out_number(iwn_out_t *self, iwn_span_t name, int64_t value);
 /// A NULL text is `null`.
 void iwn_out_string(iwn_out_t *self, iwn_span_t name, const char *text);
+/// As `iwn_out_open`, the name as a span.
 void iwn_out_bracket(iwn_out_t *self, iwn_span_t name, char bracket);
 
+/// A whole text; empty for NULL.
 static inline iwn_span_t iwn_span(const char *text) {
     return (iwn_span_t){text, (text != NULL) ? strlen(text) : 0U};
 }
@@ -59,14 +65,17 @@ static inline void iwn_out_open(iwn_out_t *self, const char *name, char bracket)
     iwn_out_bracket(self, iwn_span(name), bracket);
 }
 
+/// A whole number.
 static inline void iwn_out_int(iwn_out_t *self, const char *name, int64_t value) {
     iwn_out_number(self, iwn_span(name), value);
 }
 
+/// `true` or `false`.
 static inline void iwn_out_bool(iwn_out_t *self, const char *name, bool value) {
     iwn_out_span(self, iwn_span(name), value ? iwn_span("true") : iwn_span("false"));
 }
 
+/// `null`.
 static inline void iwn_out_null(iwn_out_t *self, const char *name) {
     iwn_out_span(self, iwn_span(name), iwn_span("null"));
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// One line of a client, read and judged: a request that is right in form, or a refusal.
 ///
 /// A pure function of the bytes, so that it can be tested and fuzzed alone: no heap, no stdio. What depends on the state of the
@@ -11,13 +12,14 @@
 
 /// Bytes of a request without its newline.
 #define IWN_LINE_MAX        4096U
-#define IWN_ID_TEXT_MAX     64U
-#define IWN_NAME_MAX        64U
-#define IWN_REASON_MAX      200U
-#define IWN_FILE_MAX        63U
-#define IWN_RATE_MAX_HZ     100
-#define IWN_RATE_DEFAULT_HZ 10
+#define IWN_ID_TEXT_MAX     64U  ///< Bytes of an id that is a text.
+#define IWN_NAME_MAX        64U  ///< Bytes of a client's name.
+#define IWN_REASON_MAX      200U ///< Bytes of the reason of an estop.
+#define IWN_FILE_MAX        63U  ///< Bytes of the name of a recording's file.
+#define IWN_RATE_MAX_HZ     100  ///< The highest rate of events that is given.
+#define IWN_RATE_DEFAULT_HZ 10   ///< The rate where none is asked for.
 
+/// What is asked. Their names: share/northbound.json.
 typedef enum {
     IWN_CMD_HELLO = 0,
     IWN_CMD_STATUS,
@@ -37,29 +39,30 @@ typedef enum {
     IWN_CMDS,
 } iwn_cmd_t;
 
+/// Of what type the id of a request is.
 typedef enum { IWN_ID_NONE = 0, IWN_ID_NUMBER, IWN_ID_TEXT } iwn_id_kind_t;
 
 /// What a reply must repeat.
 typedef struct {
-    iwn_id_kind_t kind;
-    int64_t number;
-    char text[IWN_ID_TEXT_MAX + 1U];
+    iwn_id_kind_t kind;              ///< Which of the two below it is, or none.
+    int64_t number;                  ///< As sent.
+    char text[IWN_ID_TEXT_MAX + 1U]; ///< As sent.
 } iwn_id_t;
 
 /// Only the fields of its `cmd` mean anything. Numbers are as sent: any 64-bit integer.
 typedef struct {
-    iwn_id_t id;
-    iwn_cmd_t cmd;
-    int64_t left_mm_s;
-    int64_t right_mm_s;
-    int64_t left_mA;
-    int64_t right_mA;
-    int64_t v_mm_s;
-    int64_t yaw_mrad_s;
-    int64_t rate_hz;  ///< At least 1; not limited yet.
-    int64_t offset;   ///< Of recording, in bytes; may be negative.
-    bool has_current; ///< Both currents were given.
-    bool takeover;
+    iwn_id_t id;                      ///< What the reply repeats.
+    iwn_cmd_t cmd;                    ///< Tells which of the others mean anything.
+    int64_t left_mm_s;                ///< Of drive.
+    int64_t right_mm_s;               ///< Of drive.
+    int64_t left_mA;                  ///< Of drive, with `has_current`.
+    int64_t right_mA;                 ///< Of drive, with `has_current`.
+    int64_t v_mm_s;                   ///< Of twist: forward.
+    int64_t yaw_mrad_s;               ///< Of twist: positive to the left.
+    int64_t rate_hz;                  ///< At least 1; not limited yet.
+    int64_t offset;                   ///< Of recording, in bytes; may be negative.
+    bool has_current;                 ///< Both currents were given.
+    bool takeover;                    ///< Of arm.
     uint8_t topics;                   ///< Bit per iwn_topic_t.
     uint8_t sides;                    ///< IW_SIDES_..., of tare.
     iw_ledger_item_t item;            ///< Of confirm.
@@ -72,8 +75,8 @@ typedef struct {
 
 /// Why not: the name, and cause and cure in words.
 typedef struct {
-    iwn_error_t error;
-    char message[512];
+    iwn_error_t error; ///< The name.
+    char message[512]; ///< The words, terminated.
 } iwn_refusal_t;
 
 /// Reads `length` bytes (no newline among them). True: `*out_request` is complete. False: `*out_refusal` tells why, and

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Why did the wheels stop? One sentence with cause, time and numbers, made when it happened: later the client may be
 /// gone and the wheels elsewhere.
 #ifndef IWHEEL_NORTHBOUND_WHY_H
@@ -6,7 +7,7 @@
 
 #include "iwheel/gateway.h"
 
-#define IWN_SENTENCE_SIZE 640U
+#define IWN_SENTENCE_SIZE 640U ///< Room for any sentence, with its terminator.
 
 /// What is known of the stop besides what the core knows. `client` and `reason` may be NULL.
 typedef struct {
@@ -16,11 +17,12 @@ typedef struct {
     const char *bus;    ///< Name of the bus.
 } iwn_why_context_t;
 
+/// A stop as it is kept for `why`.
 typedef struct {
-    iw_stop_t stop; ///< number 0: there was none.
-    int64_t wall_us;
-    char client_name[65];
-    char sentence[IWN_SENTENCE_SIZE];
+    iw_stop_t stop;                   ///< number 0: there was none.
+    int64_t wall_us;                  ///< When, by the wall clock: us since 1970.
+    char client_name[65];             ///< Of who held the lease or asked; empty: nobody, or no name.
+    char sentence[IWN_SENTENCE_SIZE]; ///< As `iwn_why_sentence` wrote it.
 } iwn_stop_note_t;
 
 /// Writes the sentence for a stop. Pure.

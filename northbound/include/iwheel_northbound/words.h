@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// The words of the northbound protocol for errors, causes, states and the rest. Each list is closed and documented in
 /// docs/northbound.md; a value outside its list is "unknown".
 #ifndef IWHEEL_NORTHBOUND_WORDS_H
@@ -6,6 +7,7 @@
 
 #include "iwheel/gateway.h"
 
+/// Errors of the protocol, in the words of docs/northbound.md.
 typedef enum {
     IWN_OK = 0,
     IWN_BAD_JSON,
@@ -49,32 +51,44 @@ typedef enum {
     IWN_TOPICS,
 } iwn_topic_t;
 
-/// The longest value of a ledger item, and the longest text on how it was found, each with its terminator.
+/// Of the longest value of a ledger item, with its terminator.
 #define IWN_VALUE_SIZE 40U
-#define IWN_HOW_SIZE   128U
+#define IWN_HOW_SIZE   128U ///< Of the longest text on how it was found, with its terminator.
 
+/// Such as "bad_json".
 const char *iwn_error_name(iwn_error_t error);
 /// The northbound error for a refusal of the core.
 iwn_error_t iwn_error_of(iw_refusal_t refusal);
 
+/// Such as "state".
 const char *iwn_topic_name(iwn_topic_t topic);
+/// Such as "listening".
 const char *iwn_state_name(iw_state_t state);
+/// Such as "estop_line".
 const char *iwn_cause_name(iw_cause_t cause);
+/// Such as "active".
 const char *iwn_bus_state_name(iw_bus_state_t state);
 /// Of the last answer of the HAL's `estop_pressed`; `present` is false if there is no e-stop at all.
 const char *iwn_estop_name(int answer, bool present);
 /// "left", "right", "both"; NULL for none.
 const char *iwn_sides_name(uint8_t sides);
+/// Such as "operator".
 const char *iwn_provenance_name(iw_offset_provenance_t provenance);
 /// The same of an offset in force: one of an earlier run (`offset_us` is IW_NEVER) is "stored", whoever took it.
 const char *iwn_offset_word(iw_offset_provenance_t provenance, iw_time_us_t offset_us);
+/// Such as "good".
 const char *iwn_window_name(iw_window_t window);
+/// Such as "cN".
 const char *iwn_unit_evidence_name(iw_unit_evidence_t evidence);
+/// Such as "valid".
 const char *iwn_force_validity_name(iw_force_validity_t validity);
+/// Such as "setpoint_type".
 const char *iwn_ledger_item_name(iw_ledger_item_t item);
 /// False if no item has that name.
 bool iwn_ledger_item_of(const char *name, iw_ledger_item_t *out_item);
+/// Such as "assumed".
 const char *iwn_ledger_state_name(iw_ledger_state_t state);
+/// Such as "document".
 const char *iwn_evidence_name(iw_evidence_t evidence);
 
 #endif

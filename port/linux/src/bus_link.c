@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_linux/bus_link.h"
 
-/// Start, id, control, checksum, acknowledgement, end and gap of a classic frame (ISO 11898-1).
-#define BITS_STANDARD 47U
-#define BITS_EXTENDED 67U
-#define BITS_PER_BYTE 8U
-
 iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint16_t sample_point_permille) {
     const uint16_t actual = link->sample_point_permille;
     const uint16_t off =
@@ -31,9 +26,4 @@ bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other) {
            one->echo_proven == other->echo_proven && one->is_mute == other->is_mute &&
            one->bitrate_hz == other->bitrate_hz && one->sample_point_permille == other->sample_point_permille &&
            one->restart_ms == other->restart_ms && one->queue_length == other->queue_length;
-}
-
-uint32_t iw_bus_frame_bits(const iw_can_frame_t *frame) {
-    const uint32_t bytes = ((frame->id & IW_CAN_REMOTE) != 0U) ? 0U : frame->dlc;
-    return (((frame->id & IW_CAN_EXTENDED) != 0U) ? BITS_EXTENDED : BITS_STANDARD) + BITS_PER_BYTE * bytes;
 }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel_linux/backend.h"
 
-#include "gpio_line.h"
-#include "gpio_release.h"
+#include "gpio.h"
 
 #include <errno.h>
 #include <sys/epoll.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // libgpiod 1.5 and later, before 2.
-#include "gpio_line.h"
+#include "gpio.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // libgpiod 2.
-#include "gpio_line.h"
+#include "gpio.h"
 
 #include <dirent.h>
 #include <errno.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "netdev.h"
+#include "netlink.h"
 
 #include <fcntl.h>
 #include <net/if.h>

@@ -3,10 +3,15 @@
 
 #include <errno.h>
 #include <libmnl/libmnl.h>
+#include <limits.h>
+#include <linux/can/netlink.h>
 #include <linux/if.h>
+#include <linux/if_arp.h>
 #include <linux/if_link.h>
 #include <linux/rtnetlink.h>
+#include <string.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 /// Replies read for one request at the most: what came before is an answer to an earlier one.
@@ -15,6 +20,9 @@
 #define EVENTS_MAX 64
 /// A CAN interface with everything that kernels tell of it takes about 2 KiB.
 #define REPLY_SIZE 16384U
+/// How often, and how far apart, an interface is set up again.
+#define TRIES_MAX 60
+#define PAUSE_S   1U
 
 static int open_for(iw_netlink_t *self, unsigned groups) {
     *self = (iw_netlink_t){.socket = mnl_socket_open2(NETLINK_ROUTE, SOCK_NONBLOCK | SOCK_CLOEXEC)};
@@ -82,7 +90,7 @@ static int take(const iw_netlink_t *self, const struct nlmsghdr *reply, iw_netli
 
 /// Sends the request and takes its reply, which is there as soon as the kernel has taken the request.
 static int ask(iw_netlink_t *self, const struct nlmsghdr *request, iw_netlink_reading_t *out_reading) {
-    _Alignas(struct nlmsghdr) char buffer[REPLY_SIZE];
+    static _Alignas(struct nlmsghdr) char buffer[REPLY_SIZE]; // Too large for a stack.
     if (mnl_socket_sendto(self->socket, request, request->nlmsg_len) < 0) {
         return errno;
     }
@@ -122,4 +130,159 @@ int iw_netlink_set_up(iw_netlink_t *self, int index, bool up) {
     interface->ifi_change = IFF_UP;
     interface->ifi_flags = up ? IFF_UP : 0U;
     return ask(self, request, NULL);
+}
+
+/// An interface that we took down must not stay down because its adapter is slow to answer: setting it up is tried
+/// again. ENODEV: it is gone, there is nothing to bring up.
+static int restart(int interface) {
+    iw_netlink_t netlink;
+    int error = iw_netlink_open(&netlink);
+    if (error == 0) {
+        error = iw_netlink_set_up(&netlink, interface, false);
+    }
+    if (error != 0) {
+        return error;
+    }
+    error = iw_netlink_set_up(&netlink, interface, true);
+    for (int i = 1; i < TRIES_MAX && error != 0 && error != ENODEV; i++) {
+        (void)sleep(PAUSE_S);
+        error = iw_netlink_set_up(&netlink, interface, true);
+    }
+    return error;
+}
+
+/// A process and not a thread: the kernel's lock on interface configuration can hold it for seconds, and it must
+/// outlive a gateway that is killed between down and up.
+int iw_netlink_restart_start(int interface, pid_t *out_process) {
+    const pid_t process = fork();
+    if (process < 0) {
+        return errno;
+    }
+    if (process == 0) {
+        (void)close_range(STDERR_FILENO + 1, UINT_MAX, 0); // Else clients and the lock file would stay open in it.
+        const int error = restart(interface);
+        _exit((error <= UCHAR_MAX) ? error : EIO);
+    }
+    *out_process = process;
+    return 0;
+}
+
+int iw_netlink_restart_poll(pid_t process) {
+    int status = 0;
+    const pid_t ended = waitpid(process, &status, WNOHANG);
+    if (ended == 0) {
+        return IW_NETLINK_RESTART_RUNNING;
+    }
+    if (ended < 0) {
+        return 0; // Somebody else has taken its status; whether the interface is up will be seen.
+    }
+    return WIFEXITED(status) ? WEXITSTATUS(status) : EIO;
+}
+
+IW_STATIC_ASSERT(sizeof(struct ifinfomsg) % NLMSG_ALIGNTO == 0, netlink_attributes_follow_without_a_gap);
+
+/// Attributes side by side.
+typedef struct {
+    const void *first;
+    uint32_t size;
+} attributes_t;
+
+static attributes_t within(const struct nlattr *nest) {
+    return (attributes_t){mnl_attr_get_payload(nest), mnl_attr_get_payload_len(nest)};
+}
+
+static const struct nlattr *find(attributes_t among, uint16_t type) {
+    const uint8_t *const first = (const uint8_t *)among.first;
+    const struct nlattr *attribute = (const struct nlattr *)among.first;
+    int left = (int)among.size;
+    while (mnl_attr_ok(attribute, left)) {
+        if (mnl_attr_get_type(attribute) == type) {
+            return attribute;
+        }
+        attribute = mnl_attr_next(attribute);
+        left = (int)among.size - (int)((const uint8_t *)attribute - first);
+    }
+    return NULL;
+}
+
+/// Copies a payload of exactly this size or larger; newer kernels may append to it. False if there is none.
+static bool get(attributes_t among, uint16_t type, void *out, size_t size) {
+    const struct nlattr *attribute = find(among, type);
+    if (attribute == NULL || mnl_attr_get_payload_len(attribute) < size) {
+        return false;
+    }
+    memcpy(out, mnl_attr_get_payload(attribute), size);
+    return true;
+}
+
+static iw_bus_state_t state_of(uint32_t state) {
+    switch (state) {
+    case CAN_STATE_ERROR_ACTIVE:
+    case CAN_STATE_ERROR_WARNING:
+        return IW_BUS_ACTIVE;
+    case CAN_STATE_ERROR_PASSIVE:
+        return IW_BUS_PASSIVE;
+    case CAN_STATE_BUS_OFF:
+        return IW_BUS_OFF;
+    default:
+        return IW_BUS_DOWN;
+    }
+}
+
+/// The data of an interface of kind "can": a real controller.
+static void parse_controller(attributes_t data, iw_netlink_reading_t *reading) {
+    struct can_bittiming timing;
+    struct can_ctrlmode mode;
+    uint32_t state;
+    iw_bus_link_t *link = &reading->link;
+    if (get(data, IFLA_CAN_BITTIMING, &timing, sizeof timing)) {
+        link->bitrate_hz = timing.bitrate;
+        link->sample_point_permille = (uint16_t)((timing.sample_point <= 1000U) ? timing.sample_point : 0U);
+    }
+    if (get(data, IFLA_CAN_CTRLMODE, &mode, sizeof mode)) {
+        link->is_mute = (mode.flags & CAN_CTRLMODE_LISTENONLY) != 0U;
+        // Loopback echoes without the bus, presume-ack sends without acknowledgement: then an echo proves nothing.
+        link->echo_proven =
+            link->echo_proven && (mode.flags & (CAN_CTRLMODE_LOOPBACK | CAN_CTRLMODE_PRESUME_ACK)) == 0U;
+    }
+    if (get(data, IFLA_CAN_STATE, &state, sizeof state) && link->presence == IW_LINK_UP) {
+        reading->state = state_of(state);
+    }
+    (void)get(data, IFLA_CAN_RESTART_MS, &link->restart_ms, sizeof link->restart_ms);
+}
+
+/// vcan is of another kind: there is no controller, so no bit timing and no error states.
+static void parse_kind(attributes_t info, iw_netlink_reading_t *reading) {
+    static const char controller[] = "can";
+    char kind[sizeof controller] = "";
+    const struct nlattr *data = find(info, IFLA_INFO_DATA);
+    if (!get(info, IFLA_INFO_KIND, kind, sizeof kind) || memcmp(kind, controller, sizeof controller) != 0) {
+        reading->link.is_virtual = true;
+    } else if (data != NULL) {
+        parse_controller(within(data), reading);
+    }
+}
+
+bool iw_netlink_parse(const struct nlmsghdr *message, iw_netlink_reading_t *out_reading) {
+    if (message->nlmsg_type != RTM_NEWLINK || mnl_nlmsg_get_payload_len(message) < sizeof(struct ifinfomsg)) {
+        return false;
+    }
+    const struct ifinfomsg *interface = (const struct ifinfomsg *)mnl_nlmsg_get_payload(message);
+    const attributes_t all = {mnl_nlmsg_get_payload_offset(message, sizeof *interface),
+                              (uint32_t)(mnl_nlmsg_get_payload_len(message) - sizeof *interface)};
+    iw_bus_link_t *link = &out_reading->link;
+    *out_reading = (iw_netlink_reading_t){.index = interface->ifi_index, .state = IW_BUS_DOWN};
+    link->presence = ((interface->ifi_flags & IFF_UP) != 0U) ? IW_LINK_UP : IW_LINK_DOWN;
+    if (interface->ifi_type != ARPHRD_CAN) {
+        link->presence = IW_LINK_NOT_CAN;
+        return true;
+    }
+    link->echo_proven = (interface->ifi_flags & IFF_ECHO) != 0U;
+    out_reading->state = (link->presence == IW_LINK_UP) ? IW_BUS_ACTIVE : IW_BUS_DOWN;
+    (void)get(all, IFLA_TXQLEN, &link->queue_length, sizeof link->queue_length);
+    const struct nlattr *info = find(all, IFLA_LINKINFO);
+    if (info != NULL) {
+        parse_kind(within(info), out_reading);
+    }
+    return true;
 }

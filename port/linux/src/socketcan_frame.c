@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "socketcan_frame.h"
-
-#include "iwheel/codec.h"
-#include "iwheel_linux/bus_link.h"
+#include "socketcan_socket.h"
 
 #include <linux/can/error.h>
 #include <string.h>
@@ -53,9 +50,4 @@ iw_can_error_t iw_can_error_of(const struct can_frame *raw) {
         return IW_CAN_ERROR_ACTIVE;
     }
     return IW_CAN_ERROR_NOTHING;
-}
-
-uint32_t iw_socketcan_bits(const struct can_frame *raw) {
-    const iw_can_frame_t frame = {.id = raw->can_id, .dlc = raw->len};
-    return iw_bus_frame_bits(&frame);
 }

@@ -12,10 +12,27 @@
 #define QUEUE_BYTES (400 * 1024)
 /// More than fits into that queue, at half a kilobyte for each frame.
 #define DROP_BATCHES_MAX 64
-#define DROPS_SPACE      CMSG_SPACE(sizeof(uint32_t))
+/// Marks that the hub sets in a frame's `__res0`: an echo of ours, or an error frame that another client made.
+#define MARK_ECHO   1U
+#define MARK_FORGED 2U
 
 void iw_socketcan_socket_init(iw_socketcan_socket_t *self) {
-    *self = (iw_socketcan_socket_t){.fd = -1};
+    memset(self, 0, sizeof *self);
+    self->fd = -1;
+}
+
+/// All frames are told beside into one place: the kernel's count is a running total, so that the last one tells all.
+void iw_socketcan_socket_use(iw_socketcan_socket_t *self, int fd, bool is_hub) {
+    iw_socketcan_socket_init(self);
+    self->fd = fd;
+    self->is_hub = is_hub;
+    for (uint32_t i = 0; i < IW_SOCKETCAN_BATCH; i++) {
+        self->part[i] = (struct iovec){.iov_base = &self->frame[i], .iov_len = sizeof self->frame[i]};
+        self->message[i].msg_hdr = (struct msghdr){.msg_iov = &self->part[i],
+                                                   .msg_iovlen = 1,
+                                                   .msg_control = self->drops,
+                                                   .msg_controllen = sizeof self->drops};
+    }
 }
 
 static bool set(int fd, int level, int name, int value) {
@@ -54,7 +71,7 @@ int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_sock
         (void)close(fd);
         return error;
     }
-    self->fd = fd;
+    iw_socketcan_socket_use(self, fd, false);
     return 0;
 }
 
@@ -65,11 +82,7 @@ void iw_socketcan_socket_close(iw_socketcan_socket_t *self) {
     iw_socketcan_socket_init(self);
 }
 
-bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self) {
-    return self->next == self->count;
-}
-
-/// The kernel's count is a running total per socket, so it replaces ours.
+/// Of the last message, which has the latest count.
 static void note_drops(iw_socketcan_socket_t *self, struct msghdr *message) {
     const struct cmsghdr *part = CMSG_FIRSTHDR(message);
     if (part != NULL && part->cmsg_level == SOL_SOCKET && part->cmsg_type == SO_RXQ_OVFL) {
@@ -77,26 +90,42 @@ static void note_drops(iw_socketcan_socket_t *self, struct msghdr *message) {
     }
 }
 
-int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
-    struct mmsghdr message[IW_SOCKETCAN_BATCH];
-    struct iovec part[IW_SOCKETCAN_BATCH];
-    _Alignas(struct cmsghdr) uint8_t drops[IW_SOCKETCAN_BATCH][DROPS_SPACE];
-    memset(message, 0, sizeof message);
-    for (uint32_t i = 0; i < IW_SOCKETCAN_BATCH; i++) {
-        part[i] = (struct iovec){.iov_base = &self->frame[i], .iov_len = sizeof self->frame[i]};
-        message[i].msg_hdr.msg_iov = &part[i];
-        message[i].msg_hdr.msg_iovlen = 1;
-        message[i].msg_hdr.msg_control = drops[i];
-        message[i].msg_hdr.msg_controllen = sizeof drops[i];
+/// Keeps what is a frame, and turns the hub's marks into flags. ENOTCONN: it is gone. Frames before the end are still
+/// good; the next call meets the end once more.
+static int sieve(iw_socketcan_socket_t *self) {
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < self->count; i++) {
+        const struct can_frame *raw = &self->frame[i];
+        const uint8_t mark = raw->__res0;
+        if (self->message[i].msg_len == 0U) {
+            self->count = kept;
+            self->drained = false;
+            return (i == 0U) ? ENOTCONN : 0;
+        }
+        if (self->message[i].msg_len == sizeof *raw && (self->flags[i] & MSG_TRUNC) == 0) {
+            self->flags[kept] = (mark == MARK_ECHO) ? MSG_CONFIRM : (mark == MARK_FORGED) ? MSG_DONTROUTE : 0;
+            self->frame[kept++] = *raw;
+        }
     }
-    const int count = recvmmsg(self->fd, message, IW_SOCKETCAN_BATCH, MSG_DONTWAIT, NULL);
+    self->count = kept;
+    return 0;
+}
+
+int iw_socketcan_socket_fill(iw_socketcan_socket_t *self) {
+    const int count = recvmmsg(self->fd, self->message, IW_SOCKETCAN_BATCH, MSG_DONTWAIT, NULL);
     const int error = (count < 0) ? errno : 0;
     self->next = 0;
     self->count = (count > 0) ? (uint32_t)count : 0U;
     self->drained = self->count < IW_SOCKETCAN_BATCH;
+    if (count > 0) {
+        note_drops(self, &self->message[count - 1].msg_hdr);
+    }
     for (uint32_t i = 0; i < self->count; i++) {
-        self->flags[i] = message[i].msg_hdr.msg_flags;
-        note_drops(self, &message[i].msg_hdr);
+        self->flags[i] = self->message[i].msg_hdr.msg_flags;
+        self->message[i].msg_hdr.msg_controllen = sizeof self->drops; // The kernel has told how much it took of it.
+    }
+    if (self->is_hub && count > 0) {
+        return sieve(self);
     }
     return (error == EAGAIN || error == EINTR) ? 0 : error; // ENETDOWN, ENODEV: the interface went down or away.
 }
@@ -124,7 +153,7 @@ int iw_socketcan_socket_drop(iw_socketcan_socket_t *self) {
 int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_frame_t *frame) {
     struct can_frame raw = {.can_id = frame->id & ~IW_CAN_FD, .len = frame->dlc};
     memcpy(raw.data, frame->data, sizeof raw.data);
-    const ssize_t sent = send(self->fd, &raw, sizeof raw, MSG_DONTWAIT);
+    const ssize_t sent = send(self->fd, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL);
     if (sent == (ssize_t)sizeof raw) {
         return 1;
     }

@@ -1,12 +1,57 @@
 // SPDX-License-Identifier: MIT
-/// One CAN_RAW socket, and the frames taken from it in batches.
+/// Frames as the kernel has them and as the core has them, and which of them to ask for: pure functions.
+///
+/// One socket that carries `struct can_frame`, and the frames taken from it in batches: a CAN_RAW socket, or a
+/// connection to the simulator's hub, which marks in `__res0` what the kernel tells by flags.
 #ifndef IW_SOCKETCAN_SOCKET_H
 #define IW_SOCKETCAN_SOCKET_H
 
-#include "socketcan_frame.h"
+#include "iwheel/codec.h"
+#include "iwheel_linux/bus_link.h"
+
+#include <linux/can.h>
+#include <sys/socket.h>
+
+/// The eleven ids of the document.
+#define IW_SOCKETCAN_IDS IW_CODEC_ROWS
+
+/// Which share of the bus a socket is to see.
+typedef enum {
+    IW_SOCKETCAN_OURS,   ///< The eleven ids in every format: the number alone counts, remote or extended or not.
+    IW_SOCKETCAN_OTHERS, ///< Everything else; to be joined: a frame must pass all filters.
+} iw_socketcan_share_t;
+
+/// Writes IW_SOCKETCAN_IDS filters.
+void iw_socketcan_filters(iw_socketcan_share_t share, struct can_filter *out_filters);
+
+/// `flags` are those of the received message: MSG_CONFIRM marks the echo of this very socket's frame, MSG_TRUNC (with
+/// a buffer of one classic frame) an FD frame.
+iw_can_frame_t iw_socketcan_translate(const struct can_frame *raw, int flags);
+
+/// What an error frame says of the controller's state.
+typedef enum {
+    IW_CAN_ERROR_NOTHING = 0, ///< Nothing of it (a lost arbitration, an overflow).
+    IW_CAN_ERROR_BUS_OFF,
+    IW_CAN_ERROR_RESTARTED,
+    IW_CAN_ERROR_PASSIVE,
+    IW_CAN_ERROR_ACTIVE, ///< Error active, or warning level.
+} iw_can_error_t;
+
+/// The classes of error frames that `iw_can_error_of` understands, for CAN_RAW_ERR_FILTER.
+uint32_t iw_can_error_mask(void);
+
+/// `raw` must be an error frame. If it reports several states, the gravest.
+iw_can_error_t iw_can_error_of(const struct can_frame *raw);
+
+/// Bits that the frame occupies on the bus, with the gap behind it, without stuff bits.
+static inline uint32_t iw_socketcan_bits(const struct can_frame *raw) {
+    const iw_can_frame_t frame = {.id = raw->can_id, .dlc = raw->len};
+    return iw_bus_frame_bits(&frame);
+}
 
 /// Frames taken from the kernel in one call.
-#define IW_SOCKETCAN_BATCH 32U
+#define IW_SOCKETCAN_BATCH       32U
+#define IW_SOCKETCAN_DROPS_SPACE CMSG_SPACE(sizeof(uint32_t))
 
 typedef struct {
     struct can_frame frame[IW_SOCKETCAN_BATCH];
@@ -14,12 +59,19 @@ typedef struct {
     uint32_t count;
     uint32_t next;
     uint32_t lost; ///< Frames that the kernel dropped for want of room, since the socket was opened.
-    int fd;        ///< -1: closed.
-    bool drained;  ///< The last batch was short: there was nothing more.
+    struct mmsghdr message[IW_SOCKETCAN_BATCH]; ///< Where the kernel puts frames: made once.
+    struct iovec part[IW_SOCKETCAN_BATCH];
+    _Alignas(struct cmsghdr) uint8_t drops[IW_SOCKETCAN_DROPS_SPACE]; ///< What it says beside the last frame.
+    int fd;                                                           ///< -1: closed.
+    bool drained; ///< The last batch was short: there was nothing more.
+    bool is_hub;  ///< It is a connection to the hub.
 } iw_socketcan_socket_t;
 
 /// Closed, and empty. Not the same as `close`: whatever `fd` was is forgotten.
 void iw_socketcan_socket_init(iw_socketcan_socket_t *self);
+
+/// Begins to take frames from `fd`; the hub's is not closed here. `self` must not move any more.
+void iw_socketcan_socket_use(iw_socketcan_socket_t *self, int fd, bool is_hub);
 
 /// Opens it, not blocking, on the interface with this index. IW_SOCKETCAN_OURS: with error frames, FD frames and own
 /// echoes. 0, or an errno.
@@ -27,7 +79,9 @@ int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_sock
 void iw_socketcan_socket_close(iw_socketcan_socket_t *self);
 
 /// True if all that was taken has been used.
-bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self);
+static inline bool iw_socketcan_socket_is_empty(const iw_socketcan_socket_t *self) {
+    return self->next == self->count;
+}
 
 /// What was taken and not used is forgotten.
 void iw_socketcan_socket_forget(iw_socketcan_socket_t *self);

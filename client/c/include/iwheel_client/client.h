@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// A connection to iwheel-gateway for programs in C: connect, ask, listen, drive.
 ///
 ///     iwc_t *gateway = iwc_new();
@@ -34,24 +35,25 @@ extern "C" {
 #endif
 
 #if defined(__GNUC__)
-#define IWC_API __attribute__((visibility("default")))
+#define IWC_API __attribute__((visibility("default"))) ///< Marks what the shared library exports.
 #else
 #define IWC_API
 #endif
 
 /// The northbound protocol that this library knows (`api` in docs/northbound.md).
 #define IWC_PROTOCOL 1
-/// Longest request, and longest reply or event, without their newlines.
+/// Longest request, without its newline.
 #define IWC_REQUEST_MAX 4096U
-#define IWC_LINE_MAX    65536U
+#define IWC_LINE_MAX    65536U ///< Longest reply or event, without its newline.
 /// So many drive commands may be without their reply; a gateway that answers has one at the most.
 #define IWC_DRIVES_MAX 4U
 /// Where gateways put their sockets, one per bus.
 #define IWC_DIRECTORY "/run/iwheel"
 /// In there: their sockets for who may only watch, each under the name of the one to drive by.
 #define IWC_WATCH_DIRECTORY "watch"
-#define IWC_FOREVER         (-1)
+#define IWC_FOREVER         (-1) ///< As `timeout_ms`: wait without end.
 
+/// What a call came to.
 typedef enum {
     IWC_OK = 0,
     IWC_TIMEOUT,     ///< Nothing came within the time given.
@@ -67,6 +69,7 @@ typedef enum {
     IWC_SEVERAL    ///< More than one gateway is running, and none was named.
 } iwc_result_t;
 
+/// A handle: one connection, or none. Only the library knows what is in it.
 typedef struct iwc iwc_t;
 
 /// A handle without connection. NULL: out of memory.
@@ -99,15 +102,17 @@ IWC_API void iwc_close(iwc_t *self);
 /// For poll(): wait for POLLIN on this descriptor, then call `iwc_next` with timeout 0 until it has no more. -1: not connected. First
 /// take what is here already: `iwc_pending`.
 IWC_API int iwc_fd(const iwc_t *self);
+/// True if `iwc_next` has something without waiting.
 IWC_API bool iwc_pending(const iwc_t *self);
 
 /// True if this connection may only look, stop and e-stop; all else is refused ("denied", with the words what it takes).
 IWC_API bool iwc_watches_only(const iwc_t *self);
 
-/// The path of `iwc_connect`; errno of the call that made it fail (0: another reason); the number that the gateway gave this
-/// connection, `lease.holder` if it holds the lease (0: none).
+/// The path of `iwc_connect`; empty: none.
 IWC_API const char *iwc_path(const iwc_t *self);
+/// errno of the call that made it fail; 0: another reason.
 IWC_API int iwc_errno(const iwc_t *self);
+/// The number that the gateway gave this connection, `lease.holder` if it holds the lease; 0: none.
 IWC_API int64_t iwc_number(const iwc_t *self);
 
 /// The signal mask in force while a call waits, as ppoll() takes it: for programs that block signals elsewhere. NULL: unchanged.
@@ -118,7 +123,7 @@ IWC_API void iwc_let_in(iwc_t *self, const sigset_t *mask);
 /// A reply or event. Valid until the next call with the same handle, except `iwc_latest`, `iwc_pending`, `iwc_fd`.
 typedef struct {
     const char *text; ///< One JSON object, terminated; unknown fields are to be ignored.
-    size_t length;
+    size_t length;    ///< Of `text`, bytes.
     bool is_event;    ///< Else a reply.
     int64_t id;       ///< Of the request that a reply answers; 0 for an event.
     uint64_t skipped; ///< Events left out before this one: by `iwc_latest`, or because nobody took them for too long.
@@ -136,16 +141,17 @@ IWC_API iwc_result_t iwc_latest(iwc_t *self);
 
 /// A number of a message; not known: null, not there, or not a whole number of 64 bits.
 typedef struct {
-    bool known;
+    bool known;    ///< There is a value.
     int64_t value; ///< 0 if not known.
 } iwc_value_t;
 
 /// A field by its path, such as "left.speed_mm_s". A truth counts as 1 or 0 in `iwc_truth` only.
 IWC_API iwc_value_t iwc_integer(const iwc_message_t *message, const char *path);
+/// A truth, as 1 or 0.
 IWC_API iwc_value_t iwc_truth(const iwc_message_t *message, const char *path);
 
 /// A text, cut where `size` ends between two characters. False, and an empty text: none is there. What would move a terminal stays as
-/// the gateway wrote it, \uXXXX.
+/// the gateway wrote it, `\uXXXX`.
 IWC_API bool iwc_text(const iwc_message_t *message, const char *path, char *out, size_t size);
 
 /// Whether the text at `path` is exactly that.
@@ -169,40 +175,43 @@ IWC_API iwc_result_t iwc_send(iwc_t *self, const char *request, int timeout_ms, 
 /// none, or another message was taken since.
 IWC_API bool iwc_reply(const iwc_t *self, iwc_message_t *out_reply);
 
-/// Name and words of the last refusal; empty: there was none. The words tell cause and cure.
+/// Name of the last refusal; empty: there was none.
 IWC_API const char *iwc_error(const iwc_t *self);
+/// Its words, which tell cause and cure.
 IWC_API const char *iwc_reason(const iwc_t *self);
 
 // ---- reading ------------------------------------------------------------------------------------------------------
 
+/// What the gateway does.
 typedef enum { IWC_STATE_UNKNOWN = 0, IWC_LISTENING, IWC_ARMED, IWC_STOPPING, IWC_LATCHED } iwc_machine_t;
 
+/// One wheel in a snapshot.
 typedef struct {
-    bool heard;                 ///< Its speed came within `wheel_silent_ms`.
-    iwc_value_t at_rest;        ///< 1: stands.
-    iwc_value_t speed_mm_s;     ///< Measured.
-    iwc_value_t commanded_mm_s; ///< What the client wants.
-    iwc_value_t applied_mm_s;   ///< What the wheel was told last; not known in silence.
-    iwc_value_t distance_mm;
-    iwc_value_t force_net_mN; ///< Known only if it is valid: zero known, unit not contradicted, not saturated.
-    iwc_value_t battery_dV;
-    iwc_value_t temperature_degC;
-    iwc_value_t speed_age_ms;
-    iwc_value_t force_age_ms;
+    bool heard;                   ///< Its speed came within `wheel_silent_ms`.
+    iwc_value_t at_rest;          ///< 1: stands.
+    iwc_value_t speed_mm_s;       ///< Measured.
+    iwc_value_t commanded_mm_s;   ///< What the client wants.
+    iwc_value_t applied_mm_s;     ///< What the wheel was told last; not known in silence.
+    iwc_value_t distance_mm;      ///< Since the gateway's start; backwards counts down.
+    iwc_value_t force_net_mN;     ///< Known only if it is valid: zero known, unit not contradicted, not saturated.
+    iwc_value_t battery_dV;       ///< Of its battery.
+    iwc_value_t temperature_degC; ///< Of the wheel.
+    iwc_value_t speed_age_ms;     ///< Since its last speed frame.
+    iwc_value_t force_age_ms;     ///< Since its last force frame.
 } iwc_wheel_t;
 
 /// The most wanted of a snapshot: the reply to `status`, the event `state`.
 typedef struct {
-    int64_t t_us; ///< CLOCK_MONOTONIC of the gateway's machine.
-    iwc_machine_t machine;
+    int64_t t_us;             ///< CLOCK_MONOTONIC of the gateway's machine.
+    iwc_machine_t machine;    ///< Its state.
     char cause[32];           ///< Why it is stopping or latched; empty: it is neither.
     iwc_value_t holder;       ///< Of the lease; not known: nobody holds it.
     bool ours;                ///< This connection holds it.
     iwc_value_t remaining_ms; ///< Of the lease.
     bool estop_released;      ///< False: pressed, unreadable or none.
     bool bus_active;          ///< False: down, bus-off or error passive.
-    iwc_wheel_t left;
-    iwc_wheel_t right;
+    iwc_wheel_t left;         ///< The left wheel.
+    iwc_wheel_t right;        ///< The right wheel.
 } iwc_state_t;
 
 /// False, with `*out_state` untouched, if the message is no snapshot.
@@ -211,6 +220,7 @@ IWC_API bool iwc_state(const iwc_t *self, const iwc_message_t *message, iwc_stat
 /// Asks for a snapshot. As `iwc_ask`.
 IWC_API iwc_result_t iwc_status(iwc_t *self, int timeout_ms, iwc_state_t *out_state);
 
+/// Topics of `iwc_watch`, to be or'ed.
 enum {
     IWC_WATCH_STATE = 1,
     IWC_WATCH_BUS = 2,
@@ -242,6 +252,7 @@ IWC_API iwc_result_t iwc_recording(iwc_t *self, const char *name, int timeout_ms
 
 // ---- driving and stopping -----------------------------------------------------------------------------------------
 
+/// On what terms an arm was granted.
 typedef struct {
     int32_t lease_ms;       ///< Each accepted command holds so long. Send three in that time.
     int32_t first_lease_ms; ///< The first one must come within this.
@@ -253,20 +264,22 @@ typedef struct {
 /// `takeover` takes the lease from another holder, with both wheels at rest. As `iwc_ask`.
 IWC_API iwc_result_t iwc_arm(iwc_t *self, const char *name, bool takeover, int timeout_ms, iwc_terms_t *out_terms);
 
+/// A drive command.
 typedef struct {
-    int32_t left_mm_s; ///< -32768..32767.
-    int32_t right_mm_s;
-    bool has_current; ///< The currents are told; needed where current_role is setpoint.
-    int32_t left_mA;  ///< -2000..2000.
-    int32_t right_mA;
+    int32_t left_mm_s;  ///< -32768..32767.
+    int32_t right_mm_s; ///< -32768..32767.
+    bool has_current;   ///< The currents are told; needed where current_role is setpoint.
+    int32_t left_mA;    ///< -2000..2000.
+    int32_t right_mA;   ///< -2000..2000.
 } iwc_drive_t;
 
+/// What a drive command came to.
 typedef struct {
-    int32_t left_mm_s; ///< The target after limits; ramps come on top.
-    int32_t right_mm_s;
-    int32_t left_mA;
-    int32_t right_mA;
-    bool limited; ///< Both wheels were scaled by one factor.
+    int32_t left_mm_s;  ///< The target after limits; ramps come on top.
+    int32_t right_mm_s; ///< As the left.
+    int32_t left_mA;    ///< The target after limits.
+    int32_t right_mA;   ///< As the left.
+    bool limited;       ///< Both wheels were scaled by one factor.
 } iwc_applied_t;
 
 /// One drive command, once: it holds one lease. With `timeout_ms` 0 it is handed over and its reply comes with `iwc_next`; else waits

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Does a wheel do what it is told? Nothing acknowledges a setpoint, so commanded and measured speed are compared.
 ///
 /// Three ways not to: turning the other way, turning faster than told, not turning. Each must last before it counts;
@@ -15,6 +16,7 @@
 /// ... if the command is at least this; below it 1 rpm of resolution (20 mm/s) is too coarse to tell. Ours.
 #define IW_FOLLOW_BLOCKED_MIN_MM_S 100
 
+/// What the comparison shows.
 typedef enum {
     IW_FOLLOW_OK = 0,    ///< Its clock: same sign, both above IW_SIGN_MM_S.
     IW_FOLLOW_SIGN,      ///< Opposite to its command.
@@ -23,8 +25,9 @@ typedef enum {
     IW_FOLLOW_VERDICTS,
 } iw_follow_verdict_t;
 
+/// The clocks of one wheel.
 typedef struct {
-    const iw_config_t *config;
+    const iw_config_t *config; ///< The owner's.
     /// Since when the condition of each verdict holds; IW_NEVER: it does not.
     iw_time_us_t since_us[IW_FOLLOW_VERDICTS];
 } iw_follow_t;

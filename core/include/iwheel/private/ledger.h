@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// The assumption ledger: what the document leaves open, what we assume, and what was found out.
 ///
 ///     ASSUMED --confirm--> CONFIRMED --contradict--> CONTRADICTED --confirm by the operator--> CONFIRMED
@@ -10,8 +11,9 @@
 
 #include "iwheel/types.h"
 
+/// What is assumed of the wheels.
 typedef struct {
-    iw_ledger_entry_t entry[IW_LEDGER_ITEMS];
+    iw_ledger_entry_t entry[IW_LEDGER_ITEMS]; ///< By iw_ledger_item_t.
     uint32_t changes;       ///< Grows with every change, so that a program sees when to report or store it.
     iw_ledger_item_t doubt; ///< The first contradicted item that guards motion; IW_LEDGER_ITEMS if there is none.
 } iw_ledger_t;

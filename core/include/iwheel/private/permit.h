@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// May the wheels move, and if not, why?
 ///
 ///     LISTENING --arm--> ARMING --TX confirmed--> ARMED --lease lost | stop | disarm | cause--> BRAKING
@@ -55,18 +56,19 @@ typedef enum {
 
 /// What the owner knows at this step.
 typedef struct {
-    bool heard;       ///< Both wheels heard.
-    bool at_rest;     ///< Both at rest for rest_ms.
-    bool settled;     ///< Both at rest for IW_PERMIT_SETTLED_US.
-    bool output_zero; ///< The pair last sent was zero, or none was sent since the last silence.
-    bool timing_ok;   ///< The bus timing is not contradicted.
-    bool can_send;    ///< A zero could be handed over for both wheels now.
-    bool proven;      ///< Both frames of the arming pair have been echoed.
-    iw_pair_t applied;
+    bool heard;        ///< Both wheels heard.
+    bool at_rest;      ///< Both at rest for rest_ms.
+    bool settled;      ///< Both at rest for IW_PERMIT_SETTLED_US.
+    bool output_zero;  ///< The pair last sent was zero, or none was sent since the last silence.
+    bool timing_ok;    ///< The bus timing is not contradicted.
+    bool can_send;     ///< A zero could be handed over for both wheels now.
+    bool proven;       ///< Both frames of the arming pair have been echoed.
+    iw_pair_t applied; ///< What the wheels were last told, in the machine's frame.
 } iw_permit_view_t;
 
+/// Phase, lease, causes and the last stop.
 typedef struct {
-    const iw_config_t *config;
+    const iw_config_t *config;       ///< The owner's.
     iw_permit_view_t view;           ///< Of the last step: requests are judged by it.
     iw_time_us_t seen_us[IW_CAUSES]; ///< When each cause was last seen; IW_NEVER: never.
     iw_time_us_t armed_us;           ///< When ARMED began or the lease was taken over: only later commands are fresh.
@@ -75,14 +77,14 @@ typedef struct {
     iw_time_us_t arming_us;          ///< When ARMING or REARMING began.
     iw_time_us_t hold_us;            ///< When the zeros that are held began; IW_NEVER: not since the last stop.
     iw_time_us_t stale_us;           ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
-    iw_client_t stale_client;
-    iw_client_t holder;
-    iw_client_t blocked;   ///< Whose wheels were blocked when they stopped: refused as such until the hold ends.
-    uint32_t raised;       ///< Bit per cause: raised since the last step.
-    uint32_t present;      ///< Bit per cause: raised in the step before.
-    uint32_t still_moving; ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
-    iw_stop_t stop;        ///< A record: nothing is decided by it.
-    iw_phase_t phase;
+    iw_client_t stale_client;        ///< Who sent it.
+    iw_client_t holder;              ///< Of the lease; IW_CLIENT_NONE: nobody.
+    iw_client_t blocked;      ///< Whose wheels were blocked when they stopped: refused as such until the hold ends.
+    uint32_t raised;          ///< Bit per cause: raised since the last step.
+    uint32_t present;         ///< Bit per cause: raised in the step before.
+    uint32_t still_moving;    ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
+    iw_stop_t stop;           ///< A record: nothing is decided by it.
+    iw_phase_t phase;         ///< The state of the diagram.
     iw_refusal_t arm_refusal; ///< Why the last arming failed.
     uint8_t strangers;        ///< Setpoints of other senders counted in RESTARTING.
     bool quiet;               ///< No latching cause is there or happened lately: nothing to look for.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Which setpoint pair is due now, and when is the next one?
 ///
 /// Pure state machine: no I/O and no clock. What to aim at is told by the motion permission as a demand; what the
@@ -23,14 +24,15 @@
 /// A changed command leaves at once, but not sooner than this after the last pair.
 #define IW_SETPOINT_SPACING_US 5000U
 
+/// Ramp and grid of both wheels.
 typedef struct {
-    const iw_config_t *config;
+    const iw_config_t *config;    ///< The owner's.
     iw_time_us_t last_us;         ///< When the last pair was taken.
     iw_time_us_t due_us;          ///< When the next one is due; IW_NEVER in silence.
     iw_pair_t target;             ///< The client's command, cleared whenever the demand is not FOLLOW.
     int32_t speed_um_s[IW_SIDES]; ///< Where the ramp is.
     int32_t current_uA[IW_SIDES]; ///< Ramped only with IW_ROLE_SETPOINT.
-    iw_demand_t demand;
+    iw_demand_t demand;           ///< As told last.
     bool from_zero; ///< The next pair is zero whatever the command: the first after silence, ZERO or a collapse.
 } iw_setpoint_t;
 

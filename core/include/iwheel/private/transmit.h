@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// Hands a pair to the bus: whole, within the envelope, each frame tracked until its TX confirmation.
 ///
 ///     pair -> invert -> encode -> envelope (both frames) -> port (left, then right) -> TX confirmation
@@ -29,6 +30,7 @@
 /// Time between two frames counts up to this. Longer silence is no permission to jump: after it comes a zero.
 #define IW_ENVELOPE_ELAPSED_MAX_US 300000U
 
+/// Whether a frame may leave, and if not, what is wrong with it.
 typedef enum {
     IW_ENVELOPE_PASS = 0,
     IW_ENVELOPE_NOT_A_SETPOINT, ///< Wrong id, format or length.
@@ -38,8 +40,9 @@ typedef enum {
     IW_ENVELOPE_SLEW,
 } iw_envelope_verdict_t;
 
+/// What passed last, against which the next one is judged.
 typedef struct {
-    const iw_config_t *config;
+    const iw_config_t *config;      ///< The owner's.
     iw_time_us_t last_us[IW_SIDES]; ///< When the last frame passed.
     int32_t last_mm_s[IW_SIDES];    ///< Its speed, as on the bus; 0 at first.
     uint32_t stopped;               ///< Frames that did not pass.
@@ -65,6 +68,7 @@ iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, iw_time_us_t now_us
 //     FREE --sent--> ONE --zero sent--> TWO;  each matching echo goes one back;  clear: FREE
 //     (a frame that the port refused only starts the clock; an echo or the end of sending stops it)
 
+/// Frames handed over and not confirmed.
 typedef struct {
     iw_time_us_t waiting_us[IW_SIDES]; ///< Since when a setpoint waits for its echo; IW_NEVER: none does.
     iw_time_us_t sent_us[IW_SIDES][2]; ///< Of the unconfirmed frames, oldest first.
@@ -74,6 +78,7 @@ typedef struct {
     uint8_t pending[IW_SIDES];         ///< Unconfirmed frames, 0..2.
 } iw_confirmation_t;
 
+/// Nothing sent yet.
 void iw_confirmation_init(iw_confirmation_t *self);
 
 /// Forgets what is unconfirmed and what was confirmed: after a purge or a loss of the bus no echo is owed any more.
@@ -103,19 +108,21 @@ iw_time_us_t iw_confirmation_waiting_us(const iw_confirmation_t *self);
 
 // ---- Sender ----
 
+/// What became of a pair.
 typedef enum {
     IW_SEND_DONE = 0, ///< Every frame that was due was taken by the port.
     IW_SEND_LATER,    ///< The port did not take every frame.
     IW_SEND_STOPPED,  ///< The envelope stopped it: nothing was sent. `verdict` tells why.
 } iw_send_result_t;
 
+/// The way of a pair to the port.
 typedef struct {
-    const iw_config_t *config;
-    const iw_hal_t *hal;
-    iw_confirmation_t confirmation;
-    iw_envelope_t envelope;
-    iw_time_us_t pair_us; ///< When the last whole pair was taken by the port; IW_NEVER: none since silence.
-    iw_sent_t sent;
+    const iw_config_t *config;      ///< The owner's.
+    const iw_hal_t *hal;            ///< The owner's.
+    iw_confirmation_t confirmation; ///< What is unconfirmed.
+    iw_envelope_t envelope;         ///< The last check.
+    iw_time_us_t pair_us;           ///< When the last whole pair was taken by the port; IW_NEVER: none since silence.
+    iw_sent_t sent;                 ///< Counted since init.
     iw_envelope_verdict_t verdict;  ///< The last that was not IW_ENVELOPE_PASS.
     iw_can_frame_t frame[IW_SIDES]; ///< The pair that is being sent: kept here to spare the stack.
 } iw_sender_t;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// What is known of one wheel: its last values, how old they are, whether it is there, at rest, or has rebooted.
 ///
 /// "Heard" means its speed frame (4 ms): that is the one the safety rules judge; other frames do not keep a wheel
@@ -19,9 +20,9 @@
 
 /// Silent for this long, a wheel must be assumed to have been without power.
 #define IW_WHEEL_REBOOT_SILENCE_US 1000000U
-/// Of the offset frames (document), and how long a wheel listens to its sensor before the first one.
+/// Of the offset frames (document).
 #define IW_WHEEL_OFFSET_PERIOD_US 1000000U
-#define IW_WHEEL_OFFSET_LEARN_US  2000000U
+#define IW_WHEEL_OFFSET_LEARN_US  2000000U ///< How long a wheel listens to its sensor before the first one.
 /// Offset frames that come after this much of a run without any are back. Four may get lost in a row; and it is longer
 /// than a wheel needs for its first one, so that an ordinary start is none that begins twice. Ours.
 #define IW_WHEEL_OFFSET_BACK_US 5000000U
@@ -33,6 +34,7 @@
 /// At the 20 mm of a tick without gear that is two million kilometres. Ours.
 #define IW_WHEEL_TICKS_MAX 100000000000
 
+/// By what a reboot was recognised.
 typedef enum {
     IW_REBOOT_NONE = 0,
     IW_REBOOT_SILENCE,
@@ -40,8 +42,9 @@ typedef enum {
     IW_REBOOT_OFFSET_FRAMES,
 } iw_reboot_t;
 
+/// What is known of a wheel.
 typedef struct {
-    const iw_config_t *config;
+    const iw_config_t *config;  ///< The owner's.
     iw_time_us_t first_us;      ///< First heard; IW_NEVER: not yet.
     iw_time_us_t offset_us;     ///< Last offset frame of this run, or its start.
     iw_time_us_t any_us;        ///< Last frame of any kind, or the end of our own stall, or the start.
@@ -53,14 +56,14 @@ typedef struct {
     int64_t ticks;              ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
     /// In the machine's frame: negative where `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64 bits.
     int32_t nm_per_tick;
-    uint32_t um_s_per_rpm;
-    uint32_t us_per_tick_min; ///< At IW_WHEEL_FASTEST_MM_S.
-    uint32_t reboots;
-    iw_codec_speed_t speed;
-    iw_codec_status_t status;
-    iw_side_t side;
-    iw_reboot_t pending_reboot;
-    bool boot_seen; ///< This run of the wheel began while we were listening, not before.
+    uint32_t um_s_per_rpm;      ///< Speed in um/s at 1 rpm of its telemetry.
+    uint32_t us_per_tick_min;   ///< At IW_WHEEL_FASTEST_MM_S.
+    uint32_t reboots;           ///< Recognised so far.
+    iw_codec_speed_t speed;     ///< The last one.
+    iw_codec_status_t status;   ///< The last one.
+    iw_side_t side;             ///< Which wheel this is.
+    iw_reboot_t pending_reboot; ///< Not yet taken.
+    bool boot_seen;             ///< This run of the wheel began while we were listening, not before.
 } iw_wheel_t;
 
 /// `config` must be checked and outlive the wheel.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-/// Interface of a kind of bus and of a kind of e-stop: each is one file, and the rest of the port does not know which
-/// is in use.
+/// @file
+/// A bus, and the interface of a kind of e-stop: each kind of either is one file, and the rest of the port does not
+/// know which is in use.
 ///
 /// A backend is opened once and stays open for the life of the process. What it stands for may come and go: the backend
 /// then says so through its state and comes back by itself from `tend`. It owns one descriptor that never changes (an
@@ -15,29 +16,32 @@
 
 /// Storage for the state of any backend, so that the owner need not know its size.
 typedef union {
-    uint64_t align;
-    uint8_t bytes[4096];
+    uint64_t align;      ///< For the strictest alignment that a backend needs.
+    uint8_t bytes[8192]; ///< The backend's own.
 } iw_backend_store_t;
 
-/// A kind of bus. `self` is its state, of a type that only the backend knows.
-typedef struct {
-    /// 0, or an errno. `name` must outlive the bus. A bus that is merely absent is no error: it is down until it comes.
-    int (*open)(void *self, const char *name);
-    void (*close)(void *self);
-    /// The descriptor to watch for reading; the same from open to close.
-    int (*watch_fd)(const void *self);
-    /// Reopens a lost interface or connection when the retry is due, and closes a dead one. Call it before every step.
-    void (*tend)(void *self, iw_time_us_t now_us);
-    /// When `tend` has something to do; IW_NEVER if it has not.
-    iw_time_us_t (*next_us)(const void *self);
-    /// As in iw_hal_t.
-    int (*send)(void *self, const iw_can_frame_t *frame);
-    int (*receive)(void *self, iw_can_frame_t *out_frame);
-    iw_bus_state_t (*state)(void *self);
-    int (*purge)(void *self);
-    /// What is known of the link, always up to date.
-    const iw_bus_link_t *(*link)(const void *self);
-} iw_bus_ops_t;
+/// A bus, by its name: `unix:PATH` is the local bus, any other a SocketCAN interface. 0, or an errno, nothing is open
+/// then; ENOTSUP: this build has none of that kind. `name` must outlive the bus, which must not move. A bus that is
+/// merely absent is no error: it is down until it comes.
+int iw_bus_open(iw_backend_store_t *bus, const char *name);
+/// Gives back what opening took.
+void iw_bus_close(iw_backend_store_t *bus);
+/// The descriptor to watch for reading; the same from open to close.
+int iw_bus_fd(const iw_backend_store_t *bus);
+/// Reopens a lost interface or connection when the retry is due, and closes a dead one. Call it before every step.
+void iw_bus_tend(iw_backend_store_t *bus, iw_time_us_t now_us);
+/// When `tend` has something to do; IW_NEVER if it has not.
+iw_time_us_t iw_bus_next_us(const iw_backend_store_t *bus);
+/// As `send` of iw_hal_t.
+int iw_bus_send(iw_backend_store_t *bus, const iw_can_frame_t *frame);
+/// As `receive` of iw_hal_t.
+int iw_bus_receive(iw_backend_store_t *bus, iw_can_frame_t *out_frame);
+/// As `bus_state` of iw_hal_t.
+iw_bus_state_t iw_bus_state(iw_backend_store_t *bus);
+/// As `purge` of iw_hal_t.
+int iw_bus_purge(iw_backend_store_t *bus);
+/// What is known of the link, always up to date.
+const iw_bus_link_t *iw_bus_link(const iw_backend_store_t *bus);
 
 /// An e-stop input, as configured.
 typedef struct {
@@ -46,38 +50,27 @@ typedef struct {
     uint16_t debounce_ms; ///< A release must last this long. Only for real lines.
 } iw_estop_wish_t;
 
-/// A kind of e-stop input. The functions mean the same as those of a bus.
+/// A kind of e-stop input. The functions mean the same as those of a bus; `self` is its state, of a type that only it
+/// knows.
 typedef struct {
+    /// 0, or an errno.
     int (*open)(void *self, const iw_estop_wish_t *wish);
-    void (*close)(void *self);
-    int (*watch_fd)(const void *self); ///< -1: there is nothing to watch.
-    void (*tend)(void *self, iw_time_us_t now_us);
-    iw_time_us_t (*next_us)(const void *self);
+    void (*close)(void *self);                     ///< Gives back what `open` took.
+    int (*watch_fd)(const void *self);             ///< -1: there is nothing to watch.
+    void (*tend)(void *self, iw_time_us_t now_us); ///< Call it before every step.
+    iw_time_us_t (*next_us)(const void *self);     ///< When `tend` has something to do; IW_NEVER if not.
     /// As `estop_pressed` of iw_hal_t. `quiet`: the wait that has just ended found nothing at the descriptor, so that
     /// there are no edges to be read; the level always is.
     int (*pressed)(void *self, bool quiet);
     int (*trouble)(const void *self); ///< Why it cannot be read, as an errno; 0 while it can.
     bool simulated;                   ///< Not a real button: announced wherever the e-stop is shown.
-    bool present;                     ///< False: there is no e-stop at all.
+    bool present;                     ///< False: there is no e-stop at all, always released.
 } iw_estop_ops_t;
-
-/// `unix:PATH`: the local bus. The echo comes from its hub when the simulated wheels have acknowledged, so it is a
-/// proof.
-extern const iw_bus_ops_t iw_local_bus_ops;
-
-/// SocketCAN, by the interface's name. NULL if this build has left it out.
-extern const iw_bus_ops_t *const iw_socketcan_ops;
 
 /// `unix:PATH`: the simulator's button.
 extern const iw_estop_ops_t iw_unix_estop_ops;
-/// `none`: always released.
-extern const iw_estop_ops_t iw_no_estop_ops;
 
 /// A line of a GPIO chip, by its name or as `gpiochipN:OFFSET`, through libgpiod. NULL if this build has left it out.
 extern const iw_estop_ops_t *const iw_gpio_estop_ops;
-
-/// The backend for a name as in the configuration; NULL if this build has none for it.
-const iw_bus_ops_t *iw_bus_backend(const char *name);
-const iw_estop_ops_t *iw_estop_backend(const char *name);
 
 #endif

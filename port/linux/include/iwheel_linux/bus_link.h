@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// What the kernel reports of the link to the bus, and whether its bit timing is the wheels'.
 ///
 /// The port reads and never sets any of this; the one exception is a purge (hal.h), which takes the link down and up.
@@ -8,6 +9,7 @@
 #include "iwheel/can_frame.h"
 #include "iwheel/types.h"
 
+/// Whether the interface is there.
 typedef enum {
     IW_LINK_LOCAL = 0, ///< Not an interface of the kernel: of the fields below only `echo_proven` means anything.
     IW_LINK_ABSENT,    ///< No interface has this name now.
@@ -26,18 +28,18 @@ typedef enum {
 
 /// Numbers that are 0 are not reported.
 typedef struct {
-    iw_link_presence_t presence;
-    iw_link_purge_t purge;
-    bool is_virtual;  ///< It has no bit timing at all (vcan, the local bus).
-    bool echo_proven; ///< An echo proves that the frame was on the bus (IFF_ECHO, and no mode that makes it a lie).
-    bool is_mute;     ///< The controller is in listen-only mode: nothing can be sent.
-    uint32_t bitrate_hz;
-    uint16_t sample_point_permille;
-    uint32_t restart_ms;    ///< After bus-off the controller tries again by itself; 0: never.
-    uint32_t queue_length;  ///< Frames that may wait in front of the controller.
-    uint32_t changes;       ///< Another number than before: something above has changed.
-    uint32_t lost;          ///< Frames that came faster than we took them, since the link was last opened.
-    uint32_t load_permille; ///< Of the last whole second, without stuff bits (up to a fifth more is possible).
+    iw_link_presence_t presence; ///< Now.
+    iw_link_purge_t purge;       ///< What became of the last one.
+    bool is_virtual;             ///< It has no bit timing at all (vcan, the local bus).
+    bool echo_proven;    ///< An echo proves that the frame was on the bus (IFF_ECHO, and no mode that makes it a lie).
+    bool is_mute;        ///< The controller is in listen-only mode: nothing can be sent.
+    uint32_t bitrate_hz; ///< Bit/s.
+    uint16_t sample_point_permille; ///< Of the bit.
+    uint32_t restart_ms;            ///< After bus-off the controller tries again by itself; 0: never.
+    uint32_t queue_length;          ///< Frames that may wait in front of the controller.
+    uint32_t changes;               ///< Another number than before: something above has changed.
+    uint32_t lost;                  ///< Frames that came faster than we took them, since the link was last opened.
+    uint32_t load_permille;         ///< Of the last whole second, without stuff bits (up to a fifth more is possible).
 } iw_bus_link_t;
 
 /// Off by more than this: worth a warning. Interface of the gateway, [bus] sample_point_permille.
@@ -47,6 +49,7 @@ typedef struct {
 /// More frames than this in front of the controller could be old setpoints when a dead bus revives.
 #define IW_LINK_QUEUE_MAX 4U
 
+/// What the link's timing is beside the wheels'.
 typedef enum {
     IW_TIMING_VIRTUAL = 0, ///< There is none.
     IW_TIMING_UNKNOWN,     ///< The bit rate or the sample point is not reported; what is reported is right.
@@ -59,7 +62,11 @@ typedef enum {
 iw_timing_t iw_timing_judge(const iw_bus_link_t *link, uint32_t bitrate_hz, uint16_t sample_point_permille);
 
 /// Bits that the frame occupies on the bus, with the gap behind it, without stuff bits.
-uint32_t iw_bus_frame_bits(const iw_can_frame_t *frame);
+static inline uint32_t iw_bus_frame_bits(const iw_can_frame_t *frame) {
+    // Start, id, control, checksum, acknowledgement, end and gap of a classic frame (ISO 11898-1), and the bytes.
+    const uint32_t around = ((frame->id & IW_CAN_EXTENDED) != 0U) ? 67U : 47U;
+    return around + 8U * (((frame->id & IW_CAN_REMOTE) != 0U) ? 0U : frame->dlc);
+}
 
 /// True if both tell the same of the interface: purge, changes, lost and load aside.
 bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other);

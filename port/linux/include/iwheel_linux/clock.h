@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+/// @file
 /// The two clocks. Only the monotonic one decides anything; the wall clock is an annotation.
 #ifndef IWHEEL_LINUX_CLOCK_H
 #define IWHEEL_LINUX_CLOCK_H

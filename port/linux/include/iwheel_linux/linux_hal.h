@@ -1,38 +1,36 @@
 // SPDX-License-Identifier: MIT
-/// A bus backend and an e-stop backend, put together as the HAL that the core asks for.
+/// @file
+/// A bus and an e-stop input, opened and tended together: what a HAL for the core is made of. Whoever makes that HAL
+/// passes frames by the functions of backend.h.
 ///
-/// Between them stand only a tap, which shows every frame received and every echo to an observer, and a copy of the
-/// last answers: an edge or a loss is reported once, so that asking a backend a second time would take it from the
-/// core.
+/// A loss or an edge is reported once: asking a second time would take it from the core.
 #ifndef IWHEEL_LINUX_HAL_H
 #define IWHEEL_LINUX_HAL_H
 
 #include "iwheel_linux/backend.h"
 
+/// A bus and an e-stop, opened. Its members are the port's own.
 typedef struct {
-    const iw_bus_ops_t *bus_ops;
-    const iw_estop_ops_t *estop_ops;
-    /// Called with each frame the core receives, before the core sees it. May be NULL. Must not block or call back into
-    /// the core.
-    void (*tap)(void *context, const iw_can_frame_t *frame);
-    void *tap_context;
-    int estop_last;   ///< The last answer given to the core; -1 before the first.
-    bool estop_quiet; ///< The last wait found no edge at the e-stop's descriptor, and it has not been read since.
-    iw_backend_store_t bus;
-    iw_backend_store_t estop;
+    const iw_estop_ops_t *estop_ops; ///< The kind of the e-stop.
+    int estop_last;                  ///< The last answer given to the core; -1 before the first.
+    bool estop_quiet;       ///< The last wait found no edge at the e-stop's descriptor, and it has not been read since.
+    iw_backend_store_t bus; ///< State of the bus.
+    iw_backend_store_t estop; ///< State of the e-stop.
 } iw_linux_hal_t;
 
 /// Opens both, by their names in the configuration. 0 or an errno; `*out_culprit` is then the name at fault. ENOTSUP:
 /// this build has no backend for it. Nothing stays open on failure. The names must outlive the HAL.
 int iw_linux_hal_open(iw_linux_hal_t *self, const char *bus_name, const iw_estop_wish_t *estop,
                       const char **out_culprit);
+/// Closes both.
 void iw_linux_hal_close(iw_linux_hal_t *self);
 
-/// What to hand to `iw_gateway_init`. `self` must not move afterwards.
-iw_hal_t iw_linux_hal_functions(iw_linux_hal_t *self);
+/// As `estop_pressed` of iw_hal_t.
+int iw_linux_hal_pressed(iw_linux_hal_t *self);
 
-/// Descriptors to watch for reading; the e-stop's is -1 if there is nothing to watch.
+/// Descriptor of the bus to watch for reading.
 int iw_linux_hal_bus_fd(const iw_linux_hal_t *self);
+/// The same of the e-stop; -1: there is nothing to watch.
 int iw_linux_hal_estop_fd(const iw_linux_hal_t *self);
 
 /// May be called right after a wait for both descriptors, which saves reading of one that has nothing to tell: was the

@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: MIT
+#include "bridge.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sysexits.h>
+#include <time.h>
+
+#define CONNECT_MS     200
+#define ASK_MS         150
+#define ARM_MS         400 ///< echo_ms is 200 at most.
+#define SECOND_US      1000000
+#define BACKOFF_US     100000
+#define BACKOFF_MAX_US 2000000
+/// Two snapshots may be late; seen within 0.2 s also at the slowest rates, by status requests of our own.
+#define SILENT_US 150000
+
+static int64_t clock_us(clockid_t clock) {
+    struct timespec now;
+    (void)clock_gettime(clock, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+static int64_t now_us(void) {
+    return clock_us(CLOCK_MONOTONIC);
+}
+
+// ---- the gateway: there and gone ----------------------------------------------------------------------------------
+
+static void lose(bridge_t *self, const char *why) {
+    ros_machine_t *machine = &self->facts.machine;
+    if (self->facts.link != ROS_LINK_GONE && machine->now.machine != IWC_LISTENING) {
+        ros_auto_stopped(&self->auto_arm, false);
+    }
+    iwc_close(self->gateway);
+    self->facts.link = ROS_LINK_GONE;
+    machine->now.ours = false;
+    (void)snprintf(self->facts.trouble, sizeof self->facts.trouble, "%s", why);
+    // Not all at once, where several wait for the same gateway.
+    self->retry_us = now_us() + self->backoff_us * 3 / 4 + now_us() % (self->backoff_us / 2);
+    self->backoff_us = (self->backoff_us < BACKOFF_MAX_US / 2) ? self->backoff_us * 2 : BACKOFF_MAX_US;
+    if (!self->told_gone) {
+        (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; trying for ever\n",
+                      self->settings.gateway.socket, why);
+    }
+    self->told_gone = true;
+}
+
+/// What a stop before our time says of the wheels: the bridge has not caused it.
+static void read_last_stop(bridge_t *self) {
+    iwc_message_t why;
+    if (iwc_ask(self->gateway, "{\"cmd\":\"why\"}", ASK_MS, &why) == IWC_OK && iwc_integer(&why, "number").value > 0) {
+        (void)iwc_text(&why, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
+        ros_auto_stopped(&self->auto_arm, false);
+    } else {
+        self->facts.machine.stop[0] = '\0';
+    }
+}
+
+static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
+    ros_machine_t *machine = &self->facts.machine;
+    if (!ros_facts_read(self->gateway, message, machine)) {
+        return;
+    }
+    self->facts.link = ROS_LINK_UP;
+    self->heard_us = now_us();
+    if (self->ledger_due) {
+        self->ledger_due = false;
+        ros_facts_read_ledger(message, machine);
+    }
+    if (machine->now.left.distance_mm.known && machine->now.right.distance_mm.known) {
+        const ros_ways_t ways = {machine->now.t_us, machine->now.left.distance_mm.value,
+                                 machine->now.right.distance_mm.value};
+        ros_odometry_step(&self->odometry, &ways, machine->track_mm);
+        self->facts.odometry_restarts = self->odometry.restarts;
+    }
+}
+
+static iwc_result_t try_connect(bridge_t *self) {
+    const unsigned topics = IWC_WATCH_STATE | IWC_WATCH_BUS | IWC_WATCH_ESTOP | IWC_WATCH_LEASE | IWC_WATCH_STOP;
+    iwc_message_t status;
+    iwc_result_t result = iwc_connect(self->gateway, self->settings.gateway.socket, CONNECT_MS);
+    const bool newer = result == IWC_NEWER;
+    result = newer ? IWC_OK : result;
+    if (result == IWC_OK) {
+        read_last_stop(self);
+        result = iwc_ask(self->gateway, "{\"cmd\":\"status\"}", ASK_MS, &status);
+    }
+    if (result == IWC_OK) {
+        self->ledger_due = true;
+        take_snapshot(self, &status);
+        // Seen within 0.2 s: so often at least.
+        const int rate_hz = (self->settings.odometry.rate_hz < 20U) ? 20 : (int)self->settings.odometry.rate_hz;
+        result = iwc_watch(self->gateway, topics, rate_hz, ASK_MS);
+    }
+    if (result != IWC_OK) {
+        lose(self, (result == IWC_REFUSED) ? iwc_reason(self->gateway) : iwc_words(result));
+        return result;
+    }
+    self->backoff_us = BACKOFF_US;
+    self->told_gone = false;
+    (void)fprintf(
+        stderr, "iwheel-ros2: info: connected to %s%s\n", self->settings.gateway.socket,
+        newer ? ", whose protocol is newer: only watching and stopping; install the iwheel-ros2 that belongs to it"
+              : "");
+    if (self->facts.drive && self->facts.machine.setpoint_current) {
+        (void)fputs("iwheel-ros2: warning: current_role = setpoint: a twist carries no current, so driving is refused; "
+                    "watching works\n",
+                    stderr);
+    }
+    return IWC_OK;
+}
+
+// ---- what the gateway says ----------------------------------------------------------------------------------------
+
+static void take_stop(bridge_t *self, const iwc_message_t *event) {
+    const bool ours = iwc_integer(event, "client").value == iwc_number(self->gateway);
+    const bool silence =
+        iwc_is(event, "cause", "lease_lost") || (self->silenced && iwc_is(event, "cause", "client_stop"));
+    (void)iwc_text(event, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
+    ros_auto_stopped(&self->auto_arm, ours && silence && event->skipped == 0);
+    self->silenced = false;
+    self->commanded_us = 0;
+}
+
+/// Replies are those to commands: all else is waited for.
+static void take_reply(bridge_t *self, const iwc_message_t *reply) {
+    ros_commands_t *commands = &self->facts.commands;
+    commands->refusal[0] = '\0';
+    if (iwc_truth(reply, "ok").value == 0) {
+        commands->refused++;
+        (void)iwc_text(reply, "message", commands->refusal, sizeof commands->refusal);
+    }
+}
+
+static void take_messages(bridge_t *self) {
+    iwc_message_t message;
+    bool fresh = false;
+    iwc_result_t result = iwc_next(self->gateway, 0, &message);
+    for (; result == IWC_OK; result = iwc_next(self->gateway, 0, &message)) {
+        if (!message.is_event) {
+            take_reply(self, &message);
+        } else if (iwc_is(&message, "event", "state")) {
+            take_snapshot(self, &message);
+            fresh = true;
+        } else if (iwc_is(&message, "event", "stop")) {
+            take_stop(self, &message);
+        } else if (iwc_is(&message, "event", "ledger")) {
+            self->ledger_due = true;
+        }
+    }
+    if (result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
+        lose(self, "it has ended, or closed the connection");
+    } else if (fresh) {
+        ros_publish_motion(self->ros, &self->facts.machine, &self->odometry);
+        ros_publish_wrench(self->ros, &self->facts.machine);
+    }
+}
+
+// ---- commands and requests ----------------------------------------------------------------------------------------
+
+/// Empty: may drive.
+static const char *why_not_drive(const bridge_t *self) {
+    if (!self->facts.drive) {
+        return "this bridge only watches: [drive] enabled = no in ros2.conf";
+    }
+    if (self->facts.link == ROS_LINK_GONE) {
+        return "there is no gateway; see /diagnostics";
+    }
+    if (self->facts.machine.setpoint_current) {
+        return "current_role = setpoint: a twist carries no current, so this bridge cannot drive such a machine";
+    }
+    return "";
+}
+
+static iwc_result_t arm(bridge_t *self, iwc_terms_t *out_terms) {
+    const iwc_result_t result = iwc_arm(self->gateway, self->settings.ros.node, false, ARM_MS, out_terms);
+    self->commanded_us = 0;
+    self->silenced = false;
+    if (result != IWC_OK && result != IWC_REFUSED && result != IWC_NEWER) {
+        lose(self, iwc_words(result)); // Whether it is armed nobody knows: the end of the connection ends it.
+    }
+    return result;
+}
+
+/// True with the twist, if the command may be carried out: young, and of numbers. Counts what may not, and tells by `*out_may_arm` whether
+/// it may ask for the lease.
+static bool judge_command(bridge_t *self, const ros_command_t *command, ros_twist_t *out_twist, bool *out_may_arm) {
+    const int64_t now = now_us();
+    const int64_t stamp_us = command->stamp_us;
+    const bool sent_lately = ros_age_pass(&self->ages, command->source, command->sent_us, now);
+    const bool made_lately = stamp_us == 0 || ros_age_pass(&self->stamp_ages, command->source, stamp_us, now);
+    const bool good = ros_twist_read(command->linear, command->angular, out_twist) == ROS_TWIST_GOOD;
+    const bool moves = !good || out_twist->v_mm_s != 0 || out_twist->yaw_mrad_s != 0;
+    *out_may_arm = ros_auto_command(&self->auto_arm, moves, now) && self->settings.drive.auto_arm;
+    self->coming_us = now;
+    self->facts.commands.late += (sent_lately && made_lately) ? 0U : 1U;
+    self->facts.commands.bad += good ? 0U : 1U;
+    return sent_lately && made_lately && good;
+}
+
+/// The command itself moves nothing; the next one drives.
+static void arm_for_command(bridge_t *self) {
+    ros_commands_t *commands = &self->facts.commands;
+    iwc_terms_t terms;
+    const bool refused = arm(self, &terms) == IWC_REFUSED;
+    (void)snprintf(commands->refusal, sizeof commands->refusal, "%s", refused ? iwc_reason(self->gateway) : "");
+}
+
+static void take_command(bridge_t *self, const ros_command_t *command) {
+    const iwc_state_t *state = &self->facts.machine.now;
+    ros_commands_t *commands = &self->facts.commands;
+    ros_twist_t twist = {0, 0};
+    bool may_arm = false;
+    if (!judge_command(self, command, &twist, &may_arm)) {
+        return;
+    }
+    commands->unsent++; // Until it is.
+    if (why_not_drive(self)[0] != '\0') {
+        return;
+    }
+    if (may_arm && state->machine == IWC_LISTENING && !state->holder.known) {
+        arm_for_command(self);
+        return;
+    }
+    if (iwc_twist(self->gateway, twist.v_mm_s, twist.yaw_mrad_s, 0, NULL) == IWC_OK) {
+        commands->unsent--;
+        commands->passed++;
+        self->commanded_us = now_us();
+    }
+}
+
+static void answer_result(bridge_t *self, const ros_request_t *request, iwc_result_t result) {
+    const bool success = result == IWC_OK;
+    char words[ROS_SENTENCE_SIZE];
+    (void)snprintf(words, sizeof words, "%s",
+                   success                   ? ""
+                   : (result == IWC_REFUSED) ? iwc_reason(self->gateway)
+                                             : iwc_words(result));
+    ros_answer(self->ros, request, success, words);
+    if (iwc_fd(self->gateway) < 0 && self->facts.link != ROS_LINK_GONE) {
+        lose(self, iwc_words(result));
+    }
+}
+
+static void take_arm(bridge_t *self, const ros_request_t *request) {
+    iwc_terms_t terms = {.lease_ms = 0};
+    const char *reason = why_not_drive(self);
+    if (reason[0] != '\0') {
+        ros_answer(self->ros, request, false, reason);
+        return;
+    }
+    const iwc_result_t result = arm(self, &terms);
+    if (result != IWC_OK) {
+        answer_result(self, request, result);
+        return;
+    }
+    char words[160];
+    ros_auto_told(&self->auto_arm);
+    (void)snprintf(words, sizeof words,
+                   "armed: send cmd_vel at %d Hz or more, the first within %d ms; a pause above %d ms stops the wheels",
+                   (3000 + terms.lease_ms - 1) / ((terms.lease_ms > 0) ? terms.lease_ms : 1), terms.first_lease_ms,
+                   terms.lease_ms);
+    ros_answer(self->ros, request, true, words);
+}
+
+static void take_request(bridge_t *self, const ros_request_t *request) {
+    const bool young = ros_age_pass(&self->request_ages, request->source, request->sent_us, now_us());
+    if (self->facts.link == ROS_LINK_GONE) {
+        ros_answer(self->ros, request, false, "there is no gateway; see /diagnostics");
+        return;
+    }
+    switch (request->verb) {
+    case ROS_STOP:
+        answer_result(self, request, iwc_stop(self->gateway, ASK_MS));
+        return;
+    case ROS_ESTOP:
+        answer_result(self, request, iwc_estop(self->gateway, "by ROS, iwheel/estop", ASK_MS));
+        return;
+    default:
+        break;
+    }
+    if (!young) {
+        ros_answer(self->ros, request, false, "it came too late to be meant now; ask again");
+    } else if (request->verb == ROS_ARM) {
+        take_arm(self, request);
+    } else if (!self->settings.drive.allow_reset) {
+        ros_answer(self->ros, request, false,
+                   "not over the network: look at the machine, then iwheelctl reset; or set [drive] allow_reset = yes "
+                   "in ros2.conf");
+    } else {
+        answer_result(self, request, iwc_reset(self->gateway, ASK_MS));
+    }
+}
+
+static void take_from_ros(bridge_t *self) {
+    ros_request_t request;
+    ros_command_t command;
+    ros_woken(self->ros);
+    // A command first: it is soonest on the bus so, and a stop that came with it has the last word.
+    if (ros_take_command(self->ros, &command)) {
+        take_command(self, &command);
+    }
+    while (ros_take_request(self->ros, &request)) {
+        take_request(self, &request);
+    }
+}
+
+// ---- time ---------------------------------------------------------------------------------------------------------
+
+static void judge_silence(bridge_t *self, int64_t now) {
+    const int64_t timeout_us = (int64_t)self->settings.drive.timeout_ms * 1000;
+    if (self->commanded_us == 0 || now - self->commanded_us <= timeout_us) {
+        return;
+    }
+    self->commanded_us = 0;
+    if (self->facts.link != ROS_LINK_GONE && self->facts.machine.now.ours) {
+        self->silenced = true;
+        if (iwc_stop(self->gateway, ASK_MS) != IWC_OK && iwc_fd(self->gateway) < 0) {
+            lose(self, "it did not answer to stop");
+        }
+    }
+}
+
+static void tell(bridge_t *self, int64_t now) {
+    char state[sizeof self->state];
+    ros_status_t statuses[ROS_TELLS];
+    ros_state_json(&self->facts, state, sizeof state);
+    const bool changed = strcmp(state, self->state) != 0;
+    if (!changed && now < self->second_us) {
+        return;
+    }
+    if (changed) {
+        memcpy(self->state, state, sizeof state);
+        ros_publish_state(self->ros, state);
+    }
+    self->facts.commands.publishers = ros_publishers(self->ros);
+    self->facts.commands.coming = self->coming_us > 0 && now - self->coming_us < SECOND_US;
+    for (unsigned i = 0; i < ROS_TELLS; i++) {
+        ros_diagnose(&self->facts, (ros_tells_t)i, &statuses[i]);
+    }
+    ros_publish_diagnostics(self->ros, statuses, clock_us(CLOCK_REALTIME));
+    if (now >= self->second_us) {
+        self->second_us = now + SECOND_US;
+        self->ledger_due = true;
+        if (self->facts.link == ROS_LINK_UP) {
+            ros_publish_battery(self->ros, &self->facts.machine);
+        }
+    }
+}
+
+void bridge_step(bridge_t *self) {
+    take_from_ros(self);
+    if (self->facts.link != ROS_LINK_GONE) {
+        take_messages(self);
+    } else if (now_us() >= self->retry_us) {
+        (void)try_connect(self);
+    }
+    const int64_t now = now_us();
+    judge_silence(self, now);
+    if (self->facts.link == ROS_LINK_UP && now - self->heard_us > SILENT_US) {
+        self->facts.link = ROS_LINK_SILENT;
+    }
+    tell(self, now);
+}
+
+int bridge_wait_ms(const bridge_t *self) {
+    const int64_t now = now_us();
+    const bool here = self->facts.link != ROS_LINK_GONE;
+    int64_t next_us = self->second_us;
+    if (here && iwc_pending(self->gateway)) {
+        return 0;
+    }
+    const int64_t others[3] = {
+        here ? INT64_MAX : self->retry_us, (self->facts.link == ROS_LINK_UP) ? self->heard_us + SILENT_US : INT64_MAX,
+        (self->commanded_us > 0) ? self->commanded_us + (int64_t)self->settings.drive.timeout_ms * 1000 : INT64_MAX};
+    for (size_t i = 0; i < 3U; i++) {
+        next_us = (others[i] < next_us) ? others[i] : next_us;
+    }
+    return (next_us > now) ? (int)((next_us - now) / 1000) + 1 : 0;
+}
+
+// ---- begin and end ------------------------------------------------------------------------------------------------
+
+int bridge_open(bridge_t *self, const ros_settings_t *settings) {
+    memset(self, 0, sizeof *self);
+    self->settings = *settings;
+    self->facts.drive = settings->drive.enabled;
+    self->backoff_us = BACKOFF_US;
+    ros_auto_init(&self->auto_arm, now_us());
+    self->gateway = iwc_new();
+    self->ros = (self->gateway != NULL) ? ros_open(settings, stderr) : NULL;
+    if (self->ros == NULL) {
+        iwc_free(self->gateway);
+        return EX_UNAVAILABLE;
+    }
+    if (try_connect(self) == IWC_DENIED && settings->drive.enabled) {
+        (void)fprintf(stderr,
+                      "iwheel-ros2: %s is not for this user: add it to the group iwheel (to drive), or set [drive] "
+                      "enabled = no\n",
+                      settings->gateway.socket);
+        bridge_close(self);
+        return EX_NOPERM;
+    }
+    return 0;
+}
+
+void bridge_close(bridge_t *self) {
+    if (self->facts.machine.now.ours && self->facts.link != ROS_LINK_GONE) {
+        (void)iwc_stop(self->gateway, ASK_MS);
+    }
+    iwc_free(self->gateway);
+    ros_close(self->ros);
+}

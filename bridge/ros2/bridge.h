@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+/// The bridge: a client of the gateway on one side, a node on the other. One thread, one loop, fixed memory.
+///
+/// It passes a command on at most once and repeats nothing, so the wheels stop by the gateway's lease however it ends. Silence of its source
+/// makes it stop once, if it holds the lease; a person's stop is passed on always. After any stop somebody arms again.
+#ifndef ROS2_BRIDGE_H
+#define ROS2_BRIDGE_H
+
+#include "commands.h"
+#include "ros.h"
+
+#include <signal.h>
+
+typedef struct {
+    ros_settings_t settings;
+    iwc_t *gateway;
+    ros_t *ros;
+    ros_facts_t facts;
+    ros_odometry_t odometry;
+    ros_age_t ages;       ///< By the time at which DDS says that a command was sent,
+    ros_age_t stamp_ages; ///< and by the one in its header.
+    ros_age_t request_ages;
+    ros_auto_t auto_arm;
+    bool ledger_due;      ///< Read it out of the next snapshot.
+    bool silenced;        ///< The stop that comes is ours: the source was silent.
+    bool told_gone;       ///< The log knows already that the gateway is gone.
+    int64_t heard_us;     ///< When the last snapshot came.
+    int64_t commanded_us; ///< When the last command was passed on; 0: none since armed.
+    int64_t coming_us;    ///< When the last command came, passed or not.
+    int64_t retry_us;     ///< When to connect again,
+    int64_t backoff_us;   ///< and how long to wait after that.
+    int64_t second_us;    ///< When what is told once a second is due.
+    char state[2048];     ///< The last iwheel/state.
+} bridge_t;
+
+/// Joins the domain and calls the gateway once; that may be there later too. 0, or an exit code of sysexits after a complaint on stderr:
+/// 69 no DDS, 77 the gateway's socket is not for us.
+int bridge_open(bridge_t *self, const ros_settings_t *settings);
+
+/// Does all that is due. Waits nowhere longer than a gateway that hangs needs to be seen: 400 ms.
+void bridge_step(bridge_t *self);
+
+/// When `bridge_step` has something to do without anything coming, in ms from now.
+int bridge_wait_ms(const bridge_t *self);
+
+/// Stops the wheels if they are ours, and leaves.
+void bridge_close(bridge_t *self);
+
+#endif

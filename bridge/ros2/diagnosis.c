@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+#include "diagnosis.h"
+
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+__attribute__((format(printf, 3, 4))) static void say(ros_status_t *status, ros_level_t level, const char *format,
+                                                      ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(status->message, sizeof status->message, format, arguments);
+    va_end(arguments);
+    status->level = level;
+}
+
+static void add(ros_status_t *status, const char *key, bool known, int64_t number) {
+    ros_value_t *value = &status->values[status->value_count++];
+    value->key = key;
+    value->text[0] = '\0';
+    if (known) {
+        (void)snprintf(value->text, sizeof value->text, "%" PRId64, number);
+    }
+}
+
+static const char *word(iwc_machine_t machine) {
+    static const char *const words[] = {"unknown", "listening", "armed", "stopping", "latched"};
+    return words[machine];
+}
+
+// ---- the gateway and what stops the wheels ------------------------------------------------------------------------
+
+static void tell_gateway(const ros_facts_t *facts, ros_status_t *status) {
+    const ros_machine_t *machine = &facts->machine;
+    add(status, "lease_ms", true, machine->lease_ms);
+    add(status, "odometry_restarts", true, facts->odometry_restarts);
+    if (facts->link == ROS_LINK_GONE) {
+        say(status, ROS_ERROR, "gateway gone: %s; wheels that it drove stop by themselves, afterwards arm again",
+            facts->trouble);
+    } else if (facts->link == ROS_LINK_SILENT) {
+        say(status, ROS_ERROR, "the gateway does not answer; see its log (journalctl -u iwheel-gateway)");
+    } else if (machine->now.machine == IWC_LATCHED) {
+        say(status, ROS_ERROR, "stopped and latched: %s; remove the cause, reset (iwheelctl reset), then arm again",
+            machine->stop);
+    } else if (machine->now.machine == IWC_STOPPING) {
+        say(status, ROS_WARN, "stopping: %s", machine->stop);
+    } else if (machine->now.machine == IWC_ARMED) {
+        say(status, ROS_OK, "armed by %s", machine->now.ours ? "this bridge" : machine->holder);
+    } else if (machine->stop[0] != '\0') {
+        say(status, ROS_OK, "listening, call iwheel/arm to drive; the last stop: %s", machine->stop);
+    } else {
+        say(status, ROS_OK, "listening, call iwheel/arm to drive");
+    }
+}
+
+static void tell_estop(const ros_facts_t *facts, ros_status_t *status) {
+    const char *state = facts->machine.estop;
+    if (strcmp(state, "released") == 0) {
+        say(status, ROS_OK, "released");
+    } else if (strcmp(state, "none") == 0) {
+        say(status, ROS_WARN,
+            "there is no e-stop line: no button of this machine stops the wheels; see [estop] line in gateway.conf");
+    } else if (strcmp(state, "pressed") == 0) {
+        say(status, ROS_ERROR, "the e-stop is pressed: release the button, reset (iwheelctl reset), then arm again");
+    } else {
+        say(status, ROS_ERROR,
+            "the e-stop line is %s, which counts as pressed: check its wire, then reset and arm again", state);
+    }
+}
+
+static void tell_bus(const ros_facts_t *facts, ros_status_t *status) {
+    const char *state = facts->machine.bus;
+    if (strcmp(state, "active") == 0) {
+        say(status, ROS_OK, "active");
+    } else if (strcmp(state, "passive") == 0) {
+        say(status, ROS_WARN, "error passive: frames meet errors; check cable and termination");
+    } else if (strcmp(state, "bus_off") == 0) {
+        say(status, ROS_ERROR,
+            "bus off: the controller has left the bus; check cable and bit rate, restart the link, reset, arm again");
+    } else {
+        say(status, ROS_ERROR, "the bus is down: ip link set can0 up (see iwheelctl doctor), then reset and arm again");
+    }
+}
+
+static void tell_timing(const ros_facts_t *facts, ros_status_t *status) {
+    const char *timing = facts->machine.timing;
+    if (strcmp(timing, "contradicted") == 0) {
+        say(status, ROS_ERROR,
+            "bit rate or sample point are not the wheels': set 1 Mbit/s, 62.5 %%; see iwheelctl doctor");
+    } else if (strcmp(timing, "near") == 0) {
+        say(status, ROS_WARN, "the sample point is a little off 62.5 %%; see iwheelctl doctor");
+    } else {
+        say(status, ROS_OK, "bit timing %s", timing);
+    }
+}
+
+static void tell_wheel(const iwc_wheel_t *wheel, ros_status_t *status) {
+    add(status, "speed_mm_s", wheel->speed_mm_s.known, wheel->speed_mm_s.value);
+    add(status, "applied_mm_s", wheel->applied_mm_s.known, wheel->applied_mm_s.value);
+    add(status, "distance_mm", wheel->distance_mm.known, wheel->distance_mm.value);
+    add(status, "force_net_mN", wheel->force_net_mN.known, wheel->force_net_mN.value);
+    add(status, "battery_dV", wheel->battery_dV.known, wheel->battery_dV.value);
+    add(status, "temperature_degC", wheel->temperature_degC.known, wheel->temperature_degC.value);
+    if (!wheel->heard) {
+        say(status, ROS_ERROR, "not heard: check its power and cable, then reset and arm again");
+    } else if (wheel->at_rest.value != 0) {
+        say(status, ROS_OK, "heard, at rest");
+    } else {
+        say(status, ROS_OK, "heard, turning");
+    }
+}
+
+static void tell_ledger(const ros_facts_t *facts, ros_status_t *status) {
+    add(status, "assumed", true, facts->machine.assumed);
+    if (facts->machine.contradicted[0] != '\0') {
+        say(status, ROS_ERROR, "%s", facts->machine.contradicted);
+    } else if (facts->machine.assumed > 0) {
+        say(status, ROS_OK, "%u assumptions are not verified yet; see iwheelctl learn and bringup",
+            facts->machine.assumed);
+    } else {
+        say(status, ROS_OK, "all assumptions are confirmed");
+    }
+}
+
+// ---- cmd_vel ------------------------------------------------------------------------------------------------------
+
+static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
+    const ros_commands_t *commands = &facts->commands;
+    const int64_t lease_ms = (facts->machine.lease_ms > 0) ? facts->machine.lease_ms : 200;
+    add(status, "publishers", true, commands->publishers);
+    add(status, "passed", true, (int64_t)commands->passed);
+    add(status, "dropped_late", true, (int64_t)commands->late);
+    add(status, "dropped_bad", true, (int64_t)commands->bad);
+    add(status, "dropped_unsent", true, (int64_t)commands->unsent);
+    add(status, "refused", true, (int64_t)commands->refused);
+    add(status, "needed_hz", true, (3000 + lease_ms - 1) / lease_ms);
+    if (!facts->drive) {
+        say(status, ROS_OK, "watching only: [drive] enabled = no");
+    } else if (facts->link != ROS_LINK_GONE && facts->machine.setpoint_current) {
+        say(status, ROS_WARN,
+            "current_role = setpoint: a twist carries no current, so this bridge cannot drive such a machine; it only "
+            "watches");
+    } else if (commands->publishers > 1U) {
+        say(status, ROS_WARN, "%u publishers of cmd_vel contradict each other; put twist_mux in between",
+            commands->publishers);
+    } else if (commands->coming && commands->refusal[0] != '\0') {
+        say(status, ROS_WARN, "commands are refused: %s", commands->refusal);
+    } else if (commands->late > 0 || commands->bad > 0) {
+        say(status, ROS_WARN,
+            "%" PRIu64 " commands came too late, %" PRIu64
+            " were no usable numbers: dropped; see the network, and what publishes them",
+            commands->late, commands->bad);
+    } else {
+        say(status, ROS_OK,
+            "send cmd_vel at %" PRId64 " Hz or more: a pause above %" PRId64 " ms stops the wheels, then arm again",
+            (3000 + lease_ms - 1) / lease_ms, lease_ms);
+    }
+}
+
+// ---- all of it ----------------------------------------------------------------------------------------------------
+
+void ros_diagnose(const ros_facts_t *facts, ros_tells_t which, ros_status_t *out_status) {
+    static const char *const names[ROS_TELLS] = {"iwheel: gateway",     "iwheel: e-stop",     "iwheel: bus",
+                                                 "iwheel: bus timing",  "iwheel: left wheel", "iwheel: right wheel",
+                                                 "iwheel: assumptions", "iwheel: cmd_vel"};
+    out_status->name = names[which];
+    out_status->value_count = 0;
+    if (facts->link != ROS_LINK_UP && which != ROS_TELLS_GATEWAY && which != ROS_TELLS_COMMANDS) {
+        say(out_status, ROS_STALE, "not known: the gateway %s",
+            (facts->link == ROS_LINK_GONE) ? "is gone" : "does not answer");
+        return;
+    }
+    switch (which) {
+    case ROS_TELLS_GATEWAY:
+        tell_gateway(facts, out_status);
+        break;
+    case ROS_TELLS_ESTOP:
+        tell_estop(facts, out_status);
+        break;
+    case ROS_TELLS_BUS:
+        tell_bus(facts, out_status);
+        break;
+    case ROS_TELLS_TIMING:
+        tell_timing(facts, out_status);
+        break;
+    case ROS_TELLS_LEFT:
+        tell_wheel(&facts->machine.now.left, out_status);
+        break;
+    case ROS_TELLS_RIGHT:
+        tell_wheel(&facts->machine.now.right, out_status);
+        break;
+    case ROS_TELLS_LEDGER:
+        tell_ledger(facts, out_status);
+        break;
+    default:
+        tell_commands(facts, out_status);
+        break;
+    }
+}
+
+/// `text` as JSON has it; \uXXXX, as the client leaves it in texts, stays what it is.
+static void quote(const char *text, char *out, size_t size) {
+    size_t used = 0;
+    for (; *text != '\0' && used + 3U < size; text++) {
+        if (*text == '"' || (*text == '\\' && text[1] != 'u')) {
+            out[used++] = '\\';
+        }
+        out[used++] = *text;
+    }
+    out[used] = '\0';
+}
+
+void ros_state_json(const ros_facts_t *facts, char *out, size_t size) {
+    static const char *const links[] = {"gone", "silent", "up"};
+    const ros_machine_t *machine = &facts->machine;
+    char stop[2U * ROS_SENTENCE_SIZE];
+    char holder[140];
+    if (facts->link != ROS_LINK_UP) {
+        (void)snprintf(out, size, "{\"gateway\":\"%s\"}", links[facts->link]);
+        return;
+    }
+    quote(machine->stop, stop, sizeof stop);
+    quote(machine->holder, holder, sizeof holder);
+    (void)snprintf(out, size,
+                   "{\"gateway\":\"up\",\"state\":\"%s\",\"cause\":%s%s%s,\"estop\":\"%s\",\"bus\":\"%s\","
+                   "\"lease\":%s,\"holder\":%s%s%s,\"left_heard\":%s,\"right_heard\":%s,\"last_stop\":\"%s\"}",
+                   word(machine->now.machine), (machine->now.cause[0] != '\0') ? "\"" : "null", machine->now.cause,
+                   (machine->now.cause[0] != '\0') ? "\"" : "", machine->estop, machine->bus,
+                   machine->now.ours ? "true" : "false", machine->now.holder.known ? "\"" : "null",
+                   machine->now.holder.known ? holder : "", machine->now.holder.known ? "\"" : "",
+                   machine->now.left.heard ? "true" : "false", machine->now.right.heard ? "true" : "false", stop);
+}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+/// What the bridge knows of the machine and of itself: all that its topics, its diagnostics and its decisions rest on.
+#ifndef ROS2_FACTS_H
+#define ROS2_FACTS_H
+
+#include "odometry.h"
+
+#include "iwheel_client/client.h"
+
+#define ROS_SENTENCE_SIZE 600U
+
+typedef enum {
+    ROS_LINK_GONE = 0, ///< No connection to the gateway.
+    ROS_LINK_SILENT,   ///< Connected, but no snapshot came for too long.
+    ROS_LINK_UP
+} ros_link_t;
+
+/// Commands since the start.
+typedef struct {
+    unsigned publishers;             ///< Of cmd_vel, now.
+    uint64_t passed;                 ///< Handed to the gateway, each once.
+    uint64_t late;                   ///< Too old, or overtaken.
+    uint64_t bad;                    ///< No numbers, or out of any range.
+    uint64_t unsent;                 ///< The gateway was gone or did not read.
+    uint64_t refused;                ///< By the gateway.
+    char refusal[ROS_SENTENCE_SIZE]; ///< Why the last one was refused, and the cure; empty since one was accepted.
+    bool coming;                     ///< One came within the last second.
+} ros_commands_t;
+
+/// Of a snapshot; and of the last stop the sentence.
+typedef struct {
+    iwc_state_t now;
+    int64_t wall_us;
+    char estop[16];
+    char bus[16];
+    char timing[16];
+    char holder[65]; ///< Name of who has the lease.
+    int64_t lease_ms;
+    int64_t radius_mm;
+    int64_t track_mm;
+    ros_measures_t measures;
+    bool setpoint_current;                ///< A twist has no current, but the configuration wants one.
+    char contradicted[ROS_SENTENCE_SIZE]; ///< Of the assumption ledger, with the cure; empty: nothing.
+    unsigned assumed;                     ///< Entries that nothing has verified yet.
+    char stop[ROS_SENTENCE_SIZE];
+} ros_machine_t;
+
+typedef struct {
+    ros_link_t link;
+    char trouble[256]; ///< Why there is no connection.
+    bool drive;        ///< Configured to drive.
+    ros_machine_t machine;
+    ros_commands_t commands;
+    unsigned odometry_restarts;
+} ros_facts_t;
+
+/// Takes in a snapshot (event `state`, reply to `status`). False, with `*out_machine` untouched, if it is none.
+bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_machine_t *out_machine);
+
+/// Takes in what the ledger of a snapshot says: measures, contradictions. Dearer, and seldom new.
+void ros_facts_read_ledger(const iwc_message_t *message, ros_machine_t *machine);
+
+#endif

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#include "odometry.h"
+
+#include <math.h>
+
+#define CONFIRMED 0.01
+#define ASSUMED   0.05
+#define SLIP      0.02
+/// Speeds are whole rpm: of a wheel of 192 mm 20 mm/s, spread evenly.
+#define SPEED_STEP_M_S 0.0058
+/// Room for what is read late and for wheels that a hand spins.
+#define JUMP_MM 200
+
+static bool has_jumped(const ros_ways_t *last, const ros_ways_t *now) {
+    const int64_t elapsed_us = (now->t_us > last->t_us) ? now->t_us - last->t_us : 0;
+    const int64_t most_mm = JUMP_MM + elapsed_us / 1000 * ROS_ODOMETRY_MAX_MM_S / 1000;
+    const int64_t left_mm = now->left_mm - last->left_mm;
+    const int64_t right_mm = now->right_mm - last->right_mm;
+    return left_mm > most_mm || left_mm < -most_mm || right_mm > most_mm || right_mm < -most_mm;
+}
+
+void ros_odometry_step(ros_odometry_t *self, const ros_ways_t *ways, int64_t track_mm) {
+    if (!self->begun || has_jumped(&self->last, ways)) {
+        const unsigned restarts = self->begun ? self->restarts + 1U : 0U;
+        *self = (ros_odometry_t){.begun = true, .start = *ways, .last = *ways, .restarts = restarts};
+        return;
+    }
+    const double track = (double)track_mm;
+    const double left_mm = (double)(ways->left_mm - self->last.left_mm);
+    const double right_mm = (double)(ways->right_mm - self->last.right_mm);
+    const double turned_mm = (double)((ways->right_mm - self->start.right_mm) - (ways->left_mm - self->start.left_mm));
+    const double way_m = (left_mm + right_mm) / 2000.0;
+    const double yaw_rad = turned_mm / track;
+    const double middle_rad = (self->yaw_rad + yaw_rad) / 2.0;
+    self->x_m += way_m * cos(middle_rad);
+    self->y_m += way_m * sin(middle_rad);
+    self->path_m += fabs(way_m);
+    self->turned_rad += fabs(yaw_rad - self->yaw_rad);
+    self->yaw_rad = yaw_rad;
+    self->last = *ways;
+}
+
+ros_doubt_t ros_odometry_doubt(const ros_odometry_t *self, const ros_measures_t *measures, double v_m_s,
+                               double yaw_rad_s) {
+    const double of_way = (measures->radius_confirmed ? CONFIRMED : ASSUMED) + SLIP;
+    const double of_turn = of_way + (measures->track_confirmed ? CONFIRMED : ASSUMED);
+    const double step_rad = measures->tick_m / measures->track_m;
+    const double yaw_rad = step_rad / 2.0 + of_turn * self->turned_rad;
+    // A wrong heading leads aside by as much of the way.
+    const double aside_m = self->path_m * fmin(yaw_rad, 1.0);
+    const double along_m = measures->tick_m / 2.0 + of_way * self->path_m;
+    return (ros_doubt_t){
+        .x_m = along_m + aside_m,
+        .y_m = along_m + aside_m,
+        .yaw_rad = yaw_rad,
+        .v_m_s = SPEED_STEP_M_S + of_way * fabs(v_m_s),
+        .side_m_s = SPEED_STEP_M_S + SLIP * fabs(v_m_s),
+        .yaw_rad_s = SPEED_STEP_M_S * 2.0 / measures->track_m + of_turn * fabs(yaw_rad_s),
+    };
+}

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+/// Where the machine is, from how far its wheels have turned (REP-103: m, rad, x forward, y to the left). Pure.
+///
+/// Integrated from the distances that the gateway counts in ticks, never from speeds: what a late or lost message leaves out, the next one
+/// brings. The heading comes from the whole ways since the start, so that it does not drift by rounding. It starts anew at 0 0 0, with a
+/// jump, only when the distances do: further than a wheel can have come since the last message.
+#ifndef ROS2_ODOMETRY_H
+#define ROS2_ODOMETRY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/// No wheel of this kind is faster.
+#define ROS_ODOMETRY_MAX_MM_S 6000
+
+typedef struct {
+    int64_t t_us;
+    int64_t left_mm;
+    int64_t right_mm;
+} ros_ways_t;
+
+typedef struct {
+    bool begun;
+    ros_ways_t start;
+    ros_ways_t last;
+    double x_m, y_m, yaw_rad;
+    double path_m;     ///< Way of the middle, forwards and backwards alike.
+    double turned_rad; ///< The same for turning.
+    unsigned restarts; ///< Jumps so far.
+} ros_odometry_t;
+
+/// `track_mm` above 0.
+void ros_odometry_step(ros_odometry_t *self, const ros_ways_t *ways, int64_t track_mm);
+
+/// How much of the machine's measures is known.
+typedef struct {
+    bool radius_confirmed;
+    bool track_confirmed;
+    double tick_m; ///< Way of one odometry tick.
+    double track_m;
+} ros_measures_t;
+
+/// Standard deviations.
+typedef struct {
+    double x_m, y_m, yaw_rad;
+    double v_m_s, side_m_s, yaw_rad_s;
+} ros_doubt_t;
+
+/// Of pose and speed: half a tick, 1 % of the way with a confirmed radius or track and 5 % with an assumed one, and for slip, which nobody
+/// measures, another 2 %. `v_m_s`, `yaw_rad_s`: the speed now.
+ros_doubt_t ros_odometry_doubt(const ros_odometry_t *self, const ros_measures_t *measures, double v_m_s,
+                               double yaw_rad_s);
+
+#endif

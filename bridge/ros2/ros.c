@@ -1,0 +1,360 @@
+// SPDX-License-Identifier: MIT
+#include "ros_parts.h"
+
+#include "ros_types.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#define NAME_SIZE 200U
+/// Endpoints of a node, at most.
+#define ENDPOINTS_MAX 24U
+#define HASH(hex)     "typehash=RIHS01_" hex ";"
+
+/// The interface lo does not do multicast where machines have no network.
+static const char LOOPBACK[] =
+    "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"lo\" "
+    "multicast=\"false\"/></Interfaces>"
+    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+    "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers></Discovery>"
+    "</Domain></CycloneDDS>";
+
+/// By its hash a newer ROS knows whether both sides mean the same type (REP-2011).
+typedef struct {
+    const char *name; ///< With a leading / outside of the namespace.
+    const dds_topic_descriptor_t *type;
+    const char *hash;
+    bool kept; ///< Late readers get the last one: transient local.
+} topic_t;
+
+#define HASH_TWIST       HASH("9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a")
+#define HASH_STAMPED     HASH("5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64")
+#define HASH_STRING      HASH("df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18")
+#define HASH_ODOMETRY    HASH("3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0")
+#define HASH_JOINTS      HASH("a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e")
+#define HASH_TF          HASH("e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087")
+#define HASH_WRENCH      HASH("8dc3deaf06b2ab281f9f9a742a8961c328ca7cec16e3fd6586d3a5c83fa78f77")
+#define HASH_BATTERY     HASH("4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741")
+#define HASH_DIAGNOSTICS HASH("5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e")
+
+static const topic_t written[WRITERS] = {
+    [WRITES_ODOM] = {"odom", &nav_msgs_msg_dds__Odometry__desc, HASH_ODOMETRY, false},
+    [WRITES_JOINTS] = {"joint_states", &sensor_msgs_msg_dds__JointState__desc, HASH_JOINTS, false},
+    [WRITES_TF] = {"/tf", &tf2_msgs_msg_dds__TFMessage__desc, HASH_TF, false},
+    [WRITES_LEFT_WRENCH] = {"left/wrench", &geometry_msgs_msg_dds__WrenchStamped__desc, HASH_WRENCH, false},
+    [WRITES_RIGHT_WRENCH] = {"right/wrench", &geometry_msgs_msg_dds__WrenchStamped__desc, HASH_WRENCH, false},
+    [WRITES_LEFT_BATTERY] = {"left/battery_state", &sensor_msgs_msg_dds__BatteryState__desc, HASH_BATTERY, false},
+    [WRITES_RIGHT_BATTERY] = {"right/battery_state", &sensor_msgs_msg_dds__BatteryState__desc, HASH_BATTERY, false},
+    [WRITES_DIAGNOSTICS] = {"/diagnostics", &diagnostic_msgs_msg_dds__DiagnosticArray__desc, HASH_DIAGNOSTICS, false},
+    [WRITES_STATE] = {"iwheel/state", &std_msgs_msg_dds__String__desc, HASH_STRING, true},
+    [WRITES_ANSWER] = {"iwheel/answer", &std_msgs_msg_dds__String__desc, HASH_STRING, false},
+};
+static const topic_t twist = {"cmd_vel", &geometry_msgs_msg_dds__Twist__desc, HASH_TWIST, false};
+static const topic_t twist_stamped = {"cmd_vel", &geometry_msgs_msg_dds__TwistStamped__desc, HASH_STAMPED, false};
+static const topic_t asked = {"iwheel/ask", &std_msgs_msg_dds__String__desc, HASH_STRING, false};
+static const char *const verbs[ROS_VERBS] = {"arm", "stop", "estop", "reset"};
+
+// ---- making entities ----------------------------------------------------------------------------------------------
+
+static dds_qos_t *qos_of(const char *user_data, int32_t depth, bool reliable, bool kept) {
+    const dds_data_representation_id_t classic = DDS_DATA_REPRESENTATION_XCDR1;
+    dds_qos_t *qos = dds_create_qos();
+    dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
+    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, depth);
+    dds_qset_durability(qos, kept ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+    dds_qset_writer_data_lifecycle(qos, false);
+    dds_qset_data_representation(qos, 1, &classic);
+    dds_qset_userdata(qos, user_data, strlen(user_data));
+    return qos;
+}
+
+/// `rt/odom`, in a namespace `rt/w1/odom`.
+static dds_entity_t topic_of(ros_t *self, const topic_t *topic, const char *prefix, const char *suffix) {
+    char name[NAME_SIZE];
+    const char *space = (topic->name[0] == '/') ? "" : ros_settings_space(&self->settings);
+    (void)snprintf(name, sizeof name, "%s%s%s/%s%s", prefix, (space[0] != '\0') ? "/" : "", space,
+                   topic->name + ((topic->name[0] == '/') ? 1 : 0), suffix);
+    return dds_create_topic(self->participant, topic->type, name, NULL, NULL);
+}
+
+static void wake(dds_entity_t reader, void *context) {
+    const uint64_t one = 1;
+    const ros_t *self = context;
+    (void)reader;
+    (void)!write(self->fd, &one, sizeof one);
+}
+
+static dds_entity_t reader_of(ros_t *self, dds_entity_t topic, dds_qos_t *qos) {
+    dds_listener_t *listener = dds_create_listener(self);
+    dds_lset_data_available(listener, wake);
+    const dds_entity_t reader = dds_create_reader(self->participant, topic, qos, listener);
+    dds_delete_listener(listener);
+    dds_delete_qos(qos);
+    return reader;
+}
+
+static dds_entity_t writer_of(ros_t *self, dds_entity_t topic, dds_qos_t *qos) {
+    const dds_entity_t writer = dds_create_writer(self->participant, topic, qos, NULL);
+    dds_delete_qos(qos);
+    return writer;
+}
+
+/// Request and reply know each other by an id in their user data, as rmw_cyclonedds does it.
+static bool open_service(ros_t *self, ros_verb_t verb) {
+    char name[40];
+    char user_data[80];
+    dds_guid_t guid;
+    (void)snprintf(name, sizeof name, "iwheel/%s", verbs[verb]);
+    const topic_t request = {name, &std_srvs_srv_dds__Trigger_Request__desc, NULL, false};
+    const topic_t reply = {name, &std_srvs_srv_dds__Trigger_Response__desc, NULL, false};
+    (void)dds_get_guid(self->participant, &guid);
+    int used = snprintf(user_data, sizeof user_data, "serviceid=%x", (unsigned)verb + 1U);
+    for (size_t i = 1; i < sizeof guid.v; i++) {
+        used += snprintf(user_data + used, sizeof user_data - (size_t)used, ".%x", guid.v[i]);
+    }
+    (void)snprintf(user_data + used, sizeof user_data - (size_t)used, ";");
+    self->requests[verb] =
+        reader_of(self, topic_of(self, &request, "rq", "Request"), qos_of(user_data, 10, true, false));
+    self->replies[verb] = writer_of(self, topic_of(self, &reply, "rr", "Reply"), qos_of(user_data, 10, true, false));
+    return self->requests[verb] > 0 && self->replies[verb] > 0;
+}
+
+static bool open_topics(ros_t *self) {
+    bool good = true;
+    for (unsigned i = 0; i < WRITERS; i++) {
+        const topic_t *topic = &written[i];
+        if (i == WRITES_TF && !self->settings.odometry.tf) {
+            continue;
+        }
+        self->writers[i] = writer_of(self, topic_of(self, topic, "rt", ""),
+                                     qos_of(topic->hash, topic->kept ? 1 : 10, true, topic->kept));
+        good = good && self->writers[i] > 0;
+    }
+    if (self->settings.drive.enabled) {
+        // Best effort matches every publisher, and what was lost never comes later.
+        const topic_t *topic = self->settings.drive.stamped ? &twist_stamped : &twist;
+        self->commands = reader_of(self, topic_of(self, topic, "rt", ""), qos_of(topic->hash, 1, false, false));
+        good = good && self->commands > 0;
+    }
+    self->asks = reader_of(self, topic_of(self, &asked, "rt", ""), qos_of(asked.hash, 10, true, false));
+    for (unsigned verb = 0; verb < ROS_VERBS; verb++) {
+        good = open_service(self, (ros_verb_t)verb) && good;
+    }
+    return good && self->asks > 0;
+}
+
+// ---- the node in the graph ----------------------------------------------------------------------------------------
+
+typedef rmw_dds_common_msg_dds__Gid_ gid_bytes_t;
+typedef rmw_dds_common_humble_msg_dds__Gid_ old_gid_bytes_t;
+typedef rmw_dds_common_msg_dds__ParticipantEntitiesInfo_ node_info_t;
+typedef rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_ old_node_info_t;
+
+static uint32_t gids_of(const dds_entity_t *entities, size_t count, size_t size, uint8_t *out) {
+    uint32_t used = 0;
+    dds_guid_t guid;
+    for (size_t i = 0; i < count && used < ENDPOINTS_MAX; i++) {
+        if (entities[i] > 0 && dds_get_guid(entities[i], &guid) == DDS_RETCODE_OK) {
+            memcpy(out + used * size, guid.v, sizeof guid.v);
+            used++;
+        }
+    }
+    return used;
+}
+
+/// Without this `ros2 node list` has no name for us. Kept for who comes later.
+static bool announce(ros_t *self) {
+    const bool old = self->settings.ros.humble;
+    const size_t size = old ? sizeof(old_gid_bytes_t) : sizeof(gid_bytes_t);
+    uint8_t readers[ENDPOINTS_MAX * sizeof(old_gid_bytes_t)] = {0};
+    uint8_t writers[sizeof readers] = {0};
+    char space[80];
+    const dds_entity_t inputs[2] = {self->commands, self->asks};
+    uint32_t reading = gids_of(self->requests, ROS_VERBS, size, readers);
+    reading += gids_of(inputs, 2, size, readers + reading * size);
+    uint32_t writing = gids_of(self->writers, WRITERS, size, writers);
+    writing += gids_of(self->replies, ROS_VERBS, size, writers + writing * size);
+    (void)snprintf(space, sizeof space, "/%s", ros_settings_space(&self->settings));
+
+    dds_topic_descriptor_t type = old ? rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc
+                                      : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
+    type.m_typename = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename;
+    const dds_entity_t topic = dds_create_topic(self->participant, &type, "ros_discovery_info", NULL, NULL);
+    self->graph = writer_of(self, topic, qos_of("", 1, true, true));
+
+    // Both kinds of node differ in the size of what the buffers hold only.
+    rmw_dds_common_msg_dds__NodeEntitiesInfo_ node = {
+        .node_namespace = space,
+        .node_name = self->settings.ros.node,
+        .reader_gid_seq = {._length = reading, ._buffer = (gid_bytes_t *)(void *)readers},
+        .writer_gid_seq = {._length = writing, ._buffer = (gid_bytes_t *)(void *)writers}};
+    dds_guid_t guid;
+    node_info_t info = {.node_entities_info_seq = {._length = 1, ._buffer = &node}};
+    old_node_info_t old_info = {.node_entities_info_seq = {._length = 1, ._buffer = (void *)&node}};
+    (void)dds_get_guid(self->participant, &guid);
+    memcpy(info.gid.data, guid.v, sizeof guid.v);
+    memcpy(old_info.gid.data, guid.v, sizeof guid.v);
+    return self->graph > 0 &&
+           dds_write(self->graph, old ? (const void *)&old_info : (const void *)&info) == DDS_RETCODE_OK;
+}
+
+// ---- joining and leaving ------------------------------------------------------------------------------------------
+
+static bool join(ros_t *self, FILE *err) {
+    const char *const enclave = "enclave=/;";
+    if (self->settings.ros.loopback) {
+        self->domain = dds_create_domain(self->settings.ros.domain, LOOPBACK);
+    }
+    dds_qos_t *qos = dds_create_qos();
+    dds_qset_userdata(qos, enclave, strlen(enclave));
+    self->participant = dds_create_participant(self->settings.ros.domain, qos, NULL);
+    dds_delete_qos(qos);
+    if (self->participant <= 0) {
+        (void)fprintf(
+            err, "iwheel-ros2: cannot join DDS domain %u (%s); check the network, CYCLONEDDS_URI and [ros] network\n",
+            self->settings.ros.domain, dds_strretcode(-self->participant));
+        return false;
+    }
+    if (!open_topics(self) || !announce(self)) {
+        (void)fprintf(err, "iwheel-ros2: DDS refuses a topic; is [ros] namespace too long?\n");
+        return false;
+    }
+    return true;
+}
+
+ros_t *ros_open(const ros_settings_t *settings, FILE *err) {
+    ros_t *self = calloc(1, sizeof *self);
+    if (self == NULL) {
+        (void)fputs("iwheel-ros2: not enough memory to start\n", err);
+        return NULL;
+    }
+    self->settings = *settings;
+    self->fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    if (self->fd < 0 || !join(self, err)) {
+        ros_close(self);
+        return NULL;
+    }
+    return self;
+}
+
+void ros_close(ros_t *self) {
+    if (self->participant > 0) {
+        (void)dds_delete(self->participant); // And all that belongs to it: afterwards nobody calls `wake`.
+    }
+    if (self->domain > 0) {
+        (void)dds_delete(self->domain);
+    }
+    if (self->fd >= 0) {
+        (void)close(self->fd);
+    }
+    free(self);
+}
+
+int ros_fd(const ros_t *self) {
+    return self->fd;
+}
+
+void ros_woken(ros_t *self) {
+    uint64_t times;
+    (void)!read(self->fd, &times, sizeof times);
+}
+
+// ---- taking -------------------------------------------------------------------------------------------------------
+
+static int64_t time_of(const builtin_interfaces_msg_dds__Time_ *time) {
+    return (int64_t)time->sec * 1000000 + time->nanosec / 1000;
+}
+
+static void copy(const geometry_msgs_msg_dds__Vector3_ *from, double out[3]) {
+    out[0] = from->x;
+    out[1] = from->y;
+    out[2] = from->z;
+}
+
+bool ros_take_command(ros_t *self, ros_command_t *out_command) {
+    void *sample = NULL;
+    dds_sample_info_t info;
+    bool taken = false;
+    while (self->commands > 0 && dds_take(self->commands, &sample, &info, 1, 1) == 1) {
+        if (info.valid_data) {
+            const geometry_msgs_msg_dds__TwistStamped_ *stamped = sample;
+            const geometry_msgs_msg_dds__Twist_ *plain = self->settings.drive.stamped ? &stamped->twist : sample;
+            *out_command = (ros_command_t){.source = info.publication_handle, .sent_us = info.source_timestamp / 1000};
+            out_command->stamp_us = self->settings.drive.stamped ? time_of(&stamped->header.stamp) : 0;
+            copy(&plain->linear, out_command->linear);
+            copy(&plain->angular, out_command->angular);
+            taken = true;
+        }
+        (void)dds_return_loan(self->commands, &sample, 1);
+        sample = NULL;
+    }
+    return taken;
+}
+
+unsigned ros_publishers(const ros_t *self) {
+    const dds_return_t count = (self->commands > 0) ? dds_get_matched_publications(self->commands, NULL, 0) : 0;
+    return (count > 0) ? (unsigned)count : 0U;
+}
+
+static bool take_service(ros_t *self, ros_verb_t verb, ros_request_t *out_request) {
+    void *sample = NULL;
+    dds_sample_info_t info;
+    bool taken = false;
+    while (!taken && dds_take(self->requests[verb], &sample, &info, 1, 1) == 1) {
+        const std_srvs_srv_dds__Trigger_Request_ *request = sample;
+        taken = info.valid_data;
+        if (taken) {
+            *out_request = (ros_request_t){.verb = verb, .client = request->guid, .number = request->seq};
+            out_request->source = info.publication_handle;
+            out_request->sent_us = info.source_timestamp / 1000;
+        }
+        (void)dds_return_loan(self->requests[verb], &sample, 1);
+        sample = NULL;
+    }
+    return taken;
+}
+
+static bool take_ask(ros_t *self, ros_request_t *out_request) {
+    void *sample = NULL;
+    dds_sample_info_t info;
+    bool taken = false;
+    while (!taken && dds_take(self->asks, &sample, &info, 1, 1) == 1) {
+        const std_msgs_msg_dds__String_ *text = sample;
+        for (unsigned verb = 0; verb < ROS_VERBS && info.valid_data && !taken; verb++) {
+            taken = strcmp(text->data, verbs[verb]) == 0;
+            *out_request = (ros_request_t){.verb = (ros_verb_t)verb, .by_topic = true};
+            out_request->source = info.publication_handle;
+            out_request->sent_us = info.source_timestamp / 1000;
+        }
+        (void)dds_return_loan(self->asks, &sample, 1);
+        sample = NULL;
+    }
+    return taken;
+}
+
+bool ros_take_request(ros_t *self, ros_request_t *out_request) {
+    // What stops goes first.
+    static const ros_verb_t order[ROS_VERBS] = {ROS_ESTOP, ROS_STOP, ROS_RESET, ROS_ARM};
+    for (size_t i = 0; i < ROS_VERBS; i++) {
+        if (take_service(self, order[i], out_request)) {
+            return true;
+        }
+    }
+    return take_ask(self, out_request);
+}
+
+void ros_answer(ros_t *self, const ros_request_t *request, bool success, const char *text) {
+    if (request->by_topic) {
+        (void)snprintf(self->text, sizeof self->text, "%s: %s%s%s", verbs[request->verb], success ? "done" : "refused",
+                       (text[0] != '\0') ? ": " : "", text);
+        const std_msgs_msg_dds__String_ answer = {.data = self->text};
+        (void)dds_write(self->writers[WRITES_ANSWER], &answer);
+        return;
+    }
+    (void)snprintf(self->text, sizeof self->text, "%s", text);
+    const std_srvs_srv_dds__Trigger_Response_ reply = {
+        .guid = request->client, .seq = request->number, .success = success, .message = self->text};
+    (void)dds_write(self->replies[request->verb], &reply);
+}

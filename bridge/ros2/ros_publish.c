@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+// What the machine says, as ROS messages: metres, radians, newtons and volts.
+#include "ros_parts.h"
+
+#include "ros_types.h"
+
+#include <math.h>
+
+// Not const, because samples want it so.
+static char left_wheel[] = "left_wheel_joint";
+static char right_wheel[] = "right_wheel_joint";
+static char left_handle[] = "left_handle";
+static char right_handle[] = "right_handle";
+static char hardware[] = "iwheel";
+static char nothing[] = "";
+
+/// Samples point to what they hold as if it were theirs; nobody writes to it.
+static char *writable(const char *text) {
+    const union {
+        const char *ours;
+        char *theirs;
+    } pointer = {.ours = text};
+    return pointer.theirs;
+}
+
+static std_msgs_msg_dds__Header_ header(int64_t wall_us, char *frame) {
+    return (std_msgs_msg_dds__Header_){
+        .stamp = {.sec = (int32_t)(wall_us / 1000000), .nanosec = (uint32_t)(wall_us % 1000000 * 1000)},
+        .frame_id = frame};
+}
+
+static double in_thousands(iwc_value_t value) {
+    return value.known ? (double)value.value / 1000.0 : NAN;
+}
+
+static geometry_msgs_msg_dds__Quaternion_ heading(double yaw_rad) {
+    return (geometry_msgs_msg_dds__Quaternion_){.z = sin(yaw_rad / 2.0), .w = cos(yaw_rad / 2.0)};
+}
+
+/// Squares on the diagonal; what nobody measures is told by a huge one.
+static void spread(double *covariance, double x, double y, double yaw) {
+    const double unknown = 1e6;
+    const double squares[6] = {x * x, y * y, unknown, unknown, unknown, yaw * yaw};
+    for (size_t i = 0; i < 6U; i++) {
+        covariance[7U * i] = squares[i];
+    }
+}
+
+static void publish_odometry(ros_t *self, const ros_machine_t *machine, const ros_odometry_t *odometry) {
+    const double left = in_thousands(machine->now.left.speed_mm_s);
+    const double right = in_thousands(machine->now.right.speed_mm_s);
+    const double v = (left + right) / 2.0;
+    const double yaw_rate = (right - left) / machine->measures.track_m;
+    const ros_doubt_t doubt = ros_odometry_doubt(odometry, &machine->measures, v, yaw_rate);
+    nav_msgs_msg_dds__Odometry_ odom = {.header = header(machine->wall_us, self->settings.odometry.odom_frame),
+                                        .child_frame_id = self->settings.odometry.base_frame};
+    odom.pose.pose.position = (geometry_msgs_msg_dds__Point_){.x = odometry->x_m, .y = odometry->y_m};
+    odom.pose.pose.orientation = heading(odometry->yaw_rad);
+    odom.twist.twist.linear.x = v;
+    odom.twist.twist.angular.z = yaw_rate;
+    spread(odom.pose.covariance, doubt.x_m, doubt.y_m, doubt.yaw_rad);
+    spread(odom.twist.covariance, doubt.v_m_s, doubt.side_m_s, doubt.yaw_rad_s);
+    (void)dds_write(self->writers[WRITES_ODOM], &odom);
+    if (self->writers[WRITES_TF] > 0) {
+        geometry_msgs_msg_dds__TransformStamped_ transform = {
+            .header = odom.header,
+            .child_frame_id = odom.child_frame_id,
+            .transform = {.translation = {.x = odometry->x_m, .y = odometry->y_m},
+                          .rotation = odom.pose.pose.orientation}};
+        const tf2_msgs_msg_dds__TFMessage_ message = {.transforms = {._length = 1, ._buffer = &transform}};
+        (void)dds_write(self->writers[WRITES_TF], &message);
+    }
+}
+
+static void publish_joints(ros_t *self, const ros_machine_t *machine) {
+    const iwc_wheel_t *wheels[2] = {&machine->now.left, &machine->now.right};
+    const double radius_m = (double)machine->radius_mm / 1000.0;
+    char *names[2] = {left_wheel, right_wheel};
+    double positions[2];
+    double velocities[2];
+    for (size_t i = 0; i < 2U; i++) {
+        positions[i] = in_thousands(wheels[i]->distance_mm) / radius_m;
+        velocities[i] = in_thousands(wheels[i]->speed_mm_s) / radius_m;
+    }
+    const sensor_msgs_msg_dds__JointState_ joints = {.header = header(machine->wall_us, nothing),
+                                                     .name = {._length = 2, ._buffer = names},
+                                                     .position = {._length = 2, ._buffer = positions},
+                                                     .velocity = {._length = 2, ._buffer = velocities}};
+    (void)dds_write(self->writers[WRITES_JOINTS], &joints);
+}
+
+void ros_publish_motion(ros_t *self, const ros_machine_t *machine, const ros_odometry_t *odometry) {
+    const iwc_wheel_t *left = &machine->now.left;
+    const iwc_wheel_t *right = &machine->now.right;
+    if (!odometry->begun || machine->measures.track_m <= 0.0) {
+        return;
+    }
+    if (left->distance_mm.known && right->distance_mm.known) {
+        publish_odometry(self, machine, odometry);
+    }
+    if (left->distance_mm.known || right->distance_mm.known) {
+        publish_joints(self, machine);
+    }
+}
+
+void ros_publish_wrench(ros_t *self, const ros_machine_t *machine) {
+    const iwc_wheel_t *wheels[2] = {&machine->now.left, &machine->now.right};
+    char *frames[2] = {left_handle, right_handle};
+    for (unsigned i = 0; i < 2U; i++) {
+        if (!wheels[i]->force_net_mN.known) {
+            continue;
+        }
+        const geometry_msgs_msg_dds__WrenchStamped_ wrench = {
+            .header = header(machine->wall_us, frames[i]),
+            .wrench = {.force = {in_thousands(wheels[i]->force_net_mN), NAN, NAN}, .torque = {NAN, NAN, NAN}}};
+        (void)dds_write(self->writers[WRITES_LEFT_WRENCH + i], &wrench);
+    }
+}
+
+void ros_publish_battery(ros_t *self, const ros_machine_t *machine) {
+    const iwc_wheel_t *wheels[2] = {&machine->now.left, &machine->now.right};
+    char *frames[2] = {left_wheel, right_wheel};
+    for (unsigned i = 0; i < 2U; i++) {
+        if (!wheels[i]->battery_dV.known) {
+            continue;
+        }
+        const sensor_msgs_msg_dds__BatteryState_ battery = {.header = header(machine->wall_us, frames[i]),
+                                                            .voltage = (float)wheels[i]->battery_dV.value / 10.0F,
+                                                            .temperature = NAN,
+                                                            .current = NAN,
+                                                            .charge = NAN,
+                                                            .capacity = NAN,
+                                                            .design_capacity = NAN,
+                                                            .percentage = NAN,
+                                                            .present = true,
+                                                            .location = frames[i],
+                                                            .serial_number = nothing};
+        (void)dds_write(self->writers[WRITES_LEFT_BATTERY + i], &battery);
+    }
+}
+
+void ros_publish_diagnostics(ros_t *self, const ros_status_t *statuses, int64_t wall_us) {
+    diagnostic_msgs_msg_dds__KeyValue_ values[ROS_TELLS][ROS_VALUES_MAX];
+    diagnostic_msgs_msg_dds__DiagnosticStatus_ all[ROS_TELLS];
+    for (size_t i = 0; i < ROS_TELLS; i++) {
+        const ros_status_t *status = &statuses[i];
+        for (size_t j = 0; j < status->value_count; j++) {
+            values[i][j] = (diagnostic_msgs_msg_dds__KeyValue_){.key = writable(status->values[j].key),
+                                                                .value = writable(status->values[j].text)};
+        }
+        all[i] = (diagnostic_msgs_msg_dds__DiagnosticStatus_){
+            .level = (uint8_t)status->level,
+            .name = writable(status->name),
+            .message = writable(status->message),
+            .hardware_id = hardware,
+            .values = {._length = status->value_count, ._buffer = values[i]}};
+    }
+    const diagnostic_msgs_msg_dds__DiagnosticArray_ array = {.header = header(wall_us, nothing),
+                                                             .status = {._length = ROS_TELLS, ._buffer = all}};
+    (void)dds_write(self->writers[WRITES_DIAGNOSTICS], &array);
+}
+
+void ros_publish_state(ros_t *self, const char *json) {
+    const std_msgs_msg_dds__String_ message = {.data = writable(json)};
+    (void)dds_write(self->writers[WRITES_STATE], &message);
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+/// The bridge's configuration file, read as the gateway's (settings/settings.h): every error with file, line and cure.
+#ifndef ROS2_ROS_SETTINGS_H
+#define ROS2_ROS_SETTINGS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+/// Read when no `-c FILE` is given. Its absence is no error then.
+#define ROS_SETTINGS_PATH "/etc/iwheel/ros2.conf"
+
+typedef struct {
+    struct {
+        char socket[108];
+    } gateway;
+    struct {
+        uint32_t domain; ///< 0..232.
+        bool loopback;   ///< This machine only, without multicast; else as CYCLONEDDS_URI says.
+        bool humble;     ///< Ids of 24 bytes in ros_discovery_info, as before Iron.
+        char ns[65];     ///< Namespace, or `none`.
+        char node[65];
+    } ros;
+    struct {
+        bool enabled;
+        bool stamped; ///< cmd_vel is TwistStamped.
+        uint32_t timeout_ms;
+        bool auto_arm;
+        bool allow_reset;
+    } drive;
+    struct {
+        uint32_t rate_hz;
+        char odom_frame[65];
+        char base_frame[65];
+        bool tf;
+    } odometry;
+} ros_settings_t;
+
+void ros_settings_default(ros_settings_t *out_settings);
+
+/// Reads the file over the defaults. 0, or SETTINGS_ERROR with `*out_settings` untouched and what is wrong on `err`.
+int ros_settings_load(const char *path, ros_settings_t *out_settings, FILE *err);
+
+/// The same for a text in memory; `name` stands for the file in messages.
+int ros_settings_parse(const char *name, const char *text, ros_settings_t *out_settings, FILE *err);
+
+/// Writes what is in force as a commented file, which reads back as the same.
+void ros_settings_print(const ros_settings_t *settings, FILE *out);
+
+/// The namespace before a relative name; empty: there is none.
+const char *ros_settings_space(const ros_settings_t *settings);
+
+#endif

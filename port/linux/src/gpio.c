@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include "gpio.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <string.h>
+
+#define OFFSET_MAX 65535U
+
+static const char chip_prefix[] = "gpiochip";
+
+/// Reads digits up to the end or to `end`. NULL if there are none or too many.
+static const char *read_number(const char *text, char end, unsigned *out_number) {
+    unsigned number = 0;
+    const char *digit = text;
+    for (; isdigit((unsigned char)*digit) != 0 && number <= OFFSET_MAX; digit++) {
+        number = number * 10U + (unsigned)(*digit - '0');
+    }
+    if (digit == text || *digit != end || number > OFFSET_MAX) {
+        return NULL;
+    }
+    *out_number = number;
+    return digit;
+}
+
+int iw_gpio_address_parse(const char *text, iw_gpio_address_t *out_address) {
+    iw_gpio_address_t address = {.by_offset = strncmp(text, chip_prefix, sizeof chip_prefix - 1U) == 0 &&
+                                              strchr(text, ':') != NULL};
+    size_t length = strlen(text);
+    // Lines may be named with a colon too; only a name that also begins like a chip's is an address by offset.
+    if (address.by_offset) {
+        unsigned chip;
+        const char *colon = read_number(text + sizeof chip_prefix - 1U, ':', &chip);
+        if (colon == NULL || read_number(colon + 1, '\0', &address.offset) == NULL) {
+            return EINVAL;
+        }
+        length = (size_t)(colon - text);
+    }
+    if (length == 0U) {
+        return EINVAL;
+    }
+    if (length >= sizeof address.name) {
+        return ENAMETOOLONG;
+    }
+    memcpy(address.name, text, length);
+    *out_address = address;
+    return 0;
+}
+
+void iw_gpio_release_init(iw_gpio_release_t *self, uint32_t debounce_us) {
+    *self = (iw_gpio_release_t){.debounce_us = debounce_us};
+}
+
+/// A change of level without an edge counts as one: the kernel drops edges when its buffer is full.
+void iw_gpio_release_see(iw_gpio_release_t *self, iw_time_us_t now_us, bool active, bool edge) {
+    const bool disturbed = active || edge || self->active;
+    self->edge = self->edge || edge || active != self->active;
+    self->active = active;
+    if (disturbed) {
+        self->released_us = now_us + self->debounce_us;
+    }
+}
+
+bool iw_gpio_release_take_pressed(iw_gpio_release_t *self, iw_time_us_t now_us) {
+    const bool pressed = self->active || self->edge || now_us < self->released_us;
+    self->edge = false;
+    return pressed;
+}
+
+iw_time_us_t iw_gpio_release_next_us(const iw_gpio_release_t *self, iw_time_us_t now_us) {
+    return (!self->active && now_us < self->released_us) ? self->released_us : IW_NEVER;
+}

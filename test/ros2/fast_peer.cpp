@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// A peer of another make: Fast DDS, which ROS 2 uses by default. Reads odom, publishes cmd_vel and iwheel/ask; one line for each thing seen.
+//
+//     fast_peer DOMAIN SPEED_M_S     asks to arm, drives for 1.5 s, ends
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/TopicDataType.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+using namespace eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastcdr::Cdr;
+
+// What all three need: numbers and texts in the order in which they stand in the message.
+struct Values {
+    std::vector<double> numbers;
+    std::vector<std::string> texts;
+};
+
+enum class Kind { Twist, String, Odometry };
+
+class Type : public TopicDataType {
+  public:
+    Type(Kind kind, const char *name) : kind_(kind) {
+        setName(name);
+        m_typeSize = 4096;
+        m_isGetKeyDefined = false;
+    }
+    bool serialize(void *data, rtps::SerializedPayload_t *payload) override {
+        const Values *values = static_cast<Values *>(data);
+        eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char *>(payload->data), payload->max_size);
+        Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
+        payload->encapsulation = CDR_LE;
+        cdr.serialize_encapsulation();
+        for (double number : values->numbers) {
+            cdr << number;
+        }
+        for (const std::string &text : values->texts) {
+            cdr << text;
+        }
+        payload->length = static_cast<uint32_t>(cdr.getSerializedDataLength());
+        return true;
+    }
+    bool deserialize(rtps::SerializedPayload_t *payload, void *data) override {
+        Values *values = static_cast<Values *>(data);
+        eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char *>(payload->data), payload->length);
+        Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
+        cdr.read_encapsulation();
+        *values = Values();
+        if (kind_ == Kind::String) {
+            values->texts.resize(1);
+            cdr >> values->texts[0];
+            return true;
+        }
+        int32_t sec = 0;
+        uint32_t nanosec = 0;
+        values->texts.resize(2);
+        cdr >> sec >> nanosec >> values->texts[0] >> values->texts[1];
+        values->numbers.resize(7 + 36 + 6 + 36); // Pose, its covariance, twist, its covariance.
+        for (double &number : values->numbers) {
+            cdr >> number;
+        }
+        return true;
+    }
+    std::function<uint32_t()> getSerializedSizeProvider(void *data) override {
+        (void)data;
+        return [] { return 4096U; };
+    }
+    void *createData() override { return new Values(); }
+    void deleteData(void *data) override { delete static_cast<Values *>(data); }
+    bool getKey(void *, rtps::InstanceHandle_t *, bool) override { return false; }
+
+  private:
+    Kind kind_;
+};
+
+struct Node {
+    DomainParticipant *participant;
+    Publisher *publisher;
+    Subscriber *subscriber;
+
+    Topic *topic(Kind kind, const char *name, const char *type_name) {
+        TypeSupport type(new Type(kind, type_name));
+        type.register_type(participant);
+        return participant->create_topic(name, type_name, TOPIC_QOS_DEFAULT);
+    }
+    DataWriter *writer(Topic *topic) {
+        DataWriterQos qos = DATAWRITER_QOS_DEFAULT; // Reliable, volatile, keep last: as rmw_fastrtps by default.
+        qos.history().depth = 10;
+        return publisher->create_datawriter(topic, qos);
+    }
+    DataReader *reader(Topic *topic) {
+        DataReaderQos qos = DATAREADER_QOS_DEFAULT;
+        qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
+        qos.history().depth = 10;
+        return subscriber->create_datareader(topic, qos);
+    }
+};
+
+// By unicast to the ports of the first participants of this machine: there may be no multicast.
+static DomainParticipant *join(uint32_t domain) {
+    DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
+    for (uint32_t number = 0; number < 8; number++) {
+        rtps::Locator_t locator;
+        locator.kind = LOCATOR_KIND_UDPv4;
+        eprosima::fastrtps::rtps::IPLocator::setIPv4(locator, "127.0.0.1");
+        locator.port = 7400 + 250 * domain + 10 + 2 * number;
+        qos.wire_protocol().builtin.initialPeersList.push_back(locator);
+    }
+    auto loopback = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+    loopback->interfaceWhiteList.push_back("127.0.0.1");
+    qos.transport().user_transports.push_back(loopback);
+    qos.transport().use_builtin_transports = false;
+    return DomainParticipantFactory::get_instance()->create_participant(domain, qos);
+}
+
+int main(int argc, char **argv) {
+    const double speed = (argc == 3) ? std::atof(argv[2]) : 0.0;
+    Node node = {};
+    node.participant = (argc == 3) ? join(static_cast<uint32_t>(std::atoi(argv[1]))) : nullptr;
+    if (node.participant == nullptr) {
+        return 64;
+    }
+    node.publisher = node.participant->create_publisher(PUBLISHER_QOS_DEFAULT);
+    node.subscriber = node.participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
+    DataReader *odom = node.reader(node.topic(Kind::Odometry, "rt/odom", "nav_msgs::msg::dds_::Odometry_"));
+    DataReader *answer = node.reader(node.topic(Kind::String, "rt/iwheel/answer", "std_msgs::msg::dds_::String_"));
+    DataWriter *ask = node.writer(node.topic(Kind::String, "rt/iwheel/ask", "std_msgs::msg::dds_::String_"));
+    DataWriter *cmd = node.writer(node.topic(Kind::Twist, "rt/cmd_vel", "geometry_msgs::msg::dds_::Twist_"));
+    Values values;
+    SampleInfo info;
+    int odometries = 0;
+    bool armed = false;
+    for (int i = 0; i < 300 && !armed; i++) { // 15 s
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        if (i % 10 == 5) {
+            Values arm = {{}, {"arm"}};
+            ask->write(&arm);
+        }
+        while (answer->take_next_sample(&values, &info) == ReturnCode_t::RETCODE_OK) {
+            std::printf("answer %s\n", values.texts[0].c_str());
+            armed = armed || values.texts[0].rfind("arm: done", 0) == 0;
+        }
+    }
+    for (int i = 0; i < 30 && armed; i++) {
+        Values twist = {{speed, 0, 0, 0, 0, 0}, {}};
+        cmd->write(&twist);
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    while (odom->take_next_sample(&values, &info) == ReturnCode_t::RETCODE_OK) {
+        odometries += info.valid_data ? 1 : 0;
+    }
+    if (odometries > 0) {
+        std::printf("odom %s %s x %.3f v %.3f\n", values.texts[0].c_str(), values.texts[1].c_str(), values.numbers[0], values.numbers[43]);
+    }
+    std::fflush(stdout);
+    std::_Exit(0);
+}

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+// Which commands from ROS pass: age, numbers, and when the bridge may arm by itself.
+#include "commands.h"
+
+#include "unity.h"
+
+#include <math.h>
+#include <string.h>
+
+#define SECOND 1000000
+
+static ros_age_t age;
+static ros_auto_t automatic;
+
+void setUp(void) {
+    memset(&age, 0, sizeof age);
+    ros_auto_init(&automatic, 0);
+}
+
+void tearDown(void) {}
+
+// ---- age ----------------------------------------------------------------------------------------------------------
+
+static void test_age_clock_of_the_publisher_is_wrong_passes(void) {
+    for (int64_t t = 0; t < 10 * SECOND; t += SECOND / 20) {
+        TEST_ASSERT_TRUE(ros_age_pass(&age, 7, t + 3600LL * SECOND, t + 1000));
+    }
+}
+
+static void test_age_late_by_the_limit_passes_and_by_more_is_refused(void) {
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 0, 1000));
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 1000, 2000 + ROS_LATE_US));
+    TEST_ASSERT_FALSE(ros_age_pass(&age, 7, 2000, 3100 + ROS_LATE_US));
+}
+
+static void test_age_backlog_after_a_stall_is_refused_until_it_is_young_again(void) {
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 0, 1000));
+    for (int64_t sent = SECOND; sent < 5 * SECOND; sent += SECOND / 10) {
+        TEST_ASSERT_FALSE(ros_age_pass(&age, 7, sent, 5 * SECOND + 300000));
+    }
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 5 * SECOND + 250000, 5 * SECOND + 300000));
+}
+
+static void test_age_overtaken_command_is_refused(void) {
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 50000, 51000));
+    TEST_ASSERT_FALSE(ros_age_pass(&age, 7, 49000, 52000));
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 50000, 53000));
+}
+
+static void test_age_faster_way_later_becomes_the_measure(void) {
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 0, 400000));
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, SECOND, SECOND + 1000));
+    TEST_ASSERT_FALSE(ros_age_pass(&age, 7, 2 * SECOND, 2 * SECOND + 400000));
+}
+
+static void test_age_clocks_that_drift_apart_for_a_day_pass(void) {
+    for (int64_t t = 0; t < 86400LL * SECOND; t += 10 * SECOND) {
+        TEST_ASSERT_TRUE(ros_age_pass(&age, 7, t - t / 20000, t)); // 50 ppm slow.
+    }
+}
+
+static void test_age_publisher_clock_set_back_is_refused_and_a_new_publisher_passes(void) {
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 100 * SECOND, 1000));
+    TEST_ASSERT_FALSE(ros_age_pass(&age, 7, 90 * SECOND, 2000));
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 8, 90 * SECOND, 3000));
+}
+
+static void test_age_more_publishers_than_places_forget_the_longest_silent(void) {
+    for (uint64_t source = 1; source <= ROS_SOURCES; source++) {
+        TEST_ASSERT_TRUE(ros_age_pass(&age, source, 0, (int64_t)source));
+    }
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 1, 10, 20));
+    TEST_ASSERT_TRUE(ros_age_pass(&age, ROS_SOURCES + 1U, 0, 30)); // In the place of 2.
+    TEST_ASSERT_FALSE(ros_age_pass(&age, 1, 11, SECOND));
+    TEST_ASSERT_TRUE(ros_age_pass(&age, 2, 0, SECOND));
+}
+
+// ---- numbers ------------------------------------------------------------------------------------------------------
+
+static ros_twist_verdict_t read_twist(double v, double yaw, ros_twist_t *out) {
+    const double linear[3] = {v, 0, 0};
+    const double angular[3] = {0, 0, yaw};
+    return ros_twist_read(linear, angular, out);
+}
+
+static void test_twist_metres_and_radians_become_thousandths(void) {
+    ros_twist_t twist;
+    TEST_ASSERT_EQUAL(ROS_TWIST_GOOD, read_twist(0.2496, -1.0004, &twist));
+    TEST_ASSERT_EQUAL_INT32(250, twist.v_mm_s);
+    TEST_ASSERT_EQUAL_INT32(-1000, twist.yaw_mrad_s);
+}
+
+static void test_twist_what_is_no_number_anywhere_is_refused_whole(void) {
+    const double bad[] = {NAN, INFINITY, -INFINITY};
+    for (unsigned i = 0; i < 3U; i++) {
+        for (unsigned place = 0; place < 6U; place++) {
+            double vectors[2][3] = {{0.1, 0, 0}, {0, 0, 0.1}};
+            ros_twist_t twist = {11, 12};
+            vectors[place / 3U][place % 3U] = bad[i];
+            TEST_ASSERT_EQUAL(ROS_TWIST_NO_NUMBER, ros_twist_read(vectors[0], vectors[1], &twist));
+            TEST_ASSERT_EQUAL_INT32(11, twist.v_mm_s);
+            TEST_ASSERT_EQUAL_INT32(12, twist.yaw_mrad_s);
+        }
+    }
+}
+
+static void test_twist_beyond_every_range_is_refused(void) {
+    ros_twist_t twist;
+    TEST_ASSERT_EQUAL(ROS_TWIST_TOO_LARGE, read_twist(1e30, 0, &twist));
+    TEST_ASSERT_EQUAL(ROS_TWIST_TOO_LARGE, read_twist(0, -1e30, &twist));
+    TEST_ASSERT_EQUAL(ROS_TWIST_TOO_LARGE, read_twist(32.768, 0, &twist));
+    TEST_ASSERT_EQUAL(ROS_TWIST_GOOD, read_twist(32.767, -32.767, &twist));
+}
+
+// ---- arming by itself ---------------------------------------------------------------------------------------------
+
+static void test_auto_arm_command_after_silence_asks_once(void) {
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, ROS_QUIET_US - 1));
+    setUp();
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, true, ROS_QUIET_US));
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, ROS_QUIET_US + 20000));
+}
+
+static void test_auto_arm_zeros_for_long_enough_ask(void) {
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, 100000));
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 100000 + ROS_QUIET_US - 1));
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 100000 + ROS_QUIET_US));
+}
+
+static void test_auto_arm_stream_that_never_rests_never_asks(void) {
+    for (int64_t t = 0; t < 60LL * SECOND; t += 100000) {
+        TEST_ASSERT_FALSE(ros_auto_command(&automatic, true, t));
+    }
+}
+
+static void test_auto_arm_foreign_stop_waits_for_the_service(void) {
+    ros_auto_stopped(&automatic, false);
+    ros_auto_stopped(&automatic, true);
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, SECOND));
+    ros_auto_told(&automatic);
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 3 * SECOND));
+}
+
+static void test_auto_arm_silence_of_its_own_source_keeps_the_trust(void) {
+    ros_auto_stopped(&automatic, true);
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND));
+}
+
+static void test_auto_arm_refused_by_the_gateway_asks_again_only_later(void) {
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND));
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, SECOND + ROS_QUIET_US - 1));
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND + ROS_QUIET_US));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_age_clock_of_the_publisher_is_wrong_passes);
+    RUN_TEST(test_age_late_by_the_limit_passes_and_by_more_is_refused);
+    RUN_TEST(test_age_backlog_after_a_stall_is_refused_until_it_is_young_again);
+    RUN_TEST(test_age_overtaken_command_is_refused);
+    RUN_TEST(test_age_faster_way_later_becomes_the_measure);
+    RUN_TEST(test_age_clocks_that_drift_apart_for_a_day_pass);
+    RUN_TEST(test_age_publisher_clock_set_back_is_refused_and_a_new_publisher_passes);
+    RUN_TEST(test_age_more_publishers_than_places_forget_the_longest_silent);
+    RUN_TEST(test_twist_metres_and_radians_become_thousandths);
+    RUN_TEST(test_twist_what_is_no_number_anywhere_is_refused_whole);
+    RUN_TEST(test_twist_beyond_every_range_is_refused);
+    RUN_TEST(test_auto_arm_command_after_silence_asks_once);
+    RUN_TEST(test_auto_arm_zeros_for_long_enough_ask);
+    RUN_TEST(test_auto_arm_stream_that_never_rests_never_asks);
+    RUN_TEST(test_auto_arm_foreign_stop_waits_for_the_service);
+    RUN_TEST(test_auto_arm_silence_of_its_own_source_keeps_the_trust);
+    RUN_TEST(test_auto_arm_refused_by_the_gateway_asks_again_only_later);
+    return UNITY_END();
+}

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: MIT
+// What the bridge to ROS makes of a snapshot: odometry with its doubt, diagnostics, state.
+#include "diagnosis.h"
+#include "odometry.h"
+
+#include "unity.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define SECOND 1000000
+#define TRACK  540
+
+static ros_odometry_t odometry;
+static ros_facts_t facts;
+static ros_status_t status;
+
+void setUp(void) {
+    memset(&odometry, 0, sizeof odometry);
+    memset(&facts, 0, sizeof facts);
+    facts.link = ROS_LINK_UP;
+    facts.drive = true;
+    facts.machine.now.machine = IWC_LISTENING;
+    facts.machine.lease_ms = 200;
+    facts.machine.now.left.heard = true;
+    facts.machine.now.right.heard = true;
+    (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "released");
+    (void)snprintf(facts.machine.bus, sizeof facts.machine.bus, "active");
+    (void)snprintf(facts.machine.timing, sizeof facts.machine.timing, "confirmed");
+}
+
+void tearDown(void) {}
+
+static void go(int64_t t_us, int64_t left_mm, int64_t right_mm) {
+    const ros_ways_t ways = {t_us, left_mm, right_mm};
+    ros_odometry_step(&odometry, &ways, TRACK);
+}
+
+/// Unity's own may be built without doubles.
+static void expect_near(double within, double expected, double actual) {
+    char words[80];
+    (void)snprintf(words, sizeof words, "%g expected, not %g", expected, actual);
+    TEST_ASSERT_TRUE_MESSAGE(fabs(actual - expected) <= within, words);
+}
+
+// ---- odometry -----------------------------------------------------------------------------------------------------
+
+static void test_odometry_first_ways_are_the_origin(void) {
+    go(0, 123456, -98765);
+    TEST_ASSERT_TRUE(odometry.begun);
+    expect_near(1e-12, 0.0, odometry.x_m);
+    expect_near(1e-12, 0.0, odometry.yaw_rad);
+    TEST_ASSERT_EQUAL_UINT(0, odometry.restarts);
+}
+
+static void test_odometry_straight_way_is_x(void) {
+    for (int i = 0; i <= 100; i++) {
+        go(i * SECOND / 50, 10 * i, 10 * i);
+    }
+    expect_near(1e-9, 1.0, odometry.x_m);
+    expect_near(1e-9, 0.0, odometry.y_m);
+    expect_near(1e-9, 1.0, odometry.path_m);
+}
+
+static void test_odometry_turn_to_the_left_is_positive_and_does_not_drift(void) {
+    for (int i = 0; i <= 1000; i++) {
+        go(i * SECOND / 50, -17 * i / 10, 17 * i / 10);
+    }
+    expect_near(1e-9, 3400.0 / TRACK, odometry.yaw_rad);
+    expect_near(0.01, 0.0, odometry.x_m);
+}
+
+static void test_odometry_quarter_circle_ends_where_it_must(void) {
+    const double radius_mm = 1000.0;
+    for (int i = 0; i <= 1000; i++) {
+        const double angle = M_PI / 2.0 * i / 1000.0;
+        go(i * SECOND / 50, lround(angle * (radius_mm - TRACK / 2.0)), lround(angle * (radius_mm + TRACK / 2.0)));
+    }
+    expect_near(0.004, 1.0, odometry.x_m);
+    expect_near(0.004, 1.0, odometry.y_m);
+    expect_near(0.003, M_PI / 2.0, odometry.yaw_rad);
+}
+
+static void test_odometry_messages_lost_on_a_straight_way_lose_no_way(void) {
+    go(0, 0, 0);
+    go(2 * SECOND, 1900, 1900);
+    expect_near(1e-9, 1.9, odometry.x_m);
+    TEST_ASSERT_EQUAL_UINT(0, odometry.restarts);
+}
+
+static void test_odometry_ways_that_jump_start_anew(void) {
+    go(0, 0, 0);
+    go(SECOND, 900, 900);
+    go(SECOND + 20000, 0, 900);
+    TEST_ASSERT_EQUAL_UINT(1, odometry.restarts);
+    expect_near(1e-12, 0.0, odometry.x_m);
+    go(SECOND + 40000, 10, 910);
+    expect_near(1e-9, 0.01, odometry.x_m);
+    TEST_ASSERT_EQUAL_UINT(1, odometry.restarts);
+}
+
+static void test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed(void) {
+    const ros_measures_t assumed = {false, false, 0.02, 0.54};
+    const ros_measures_t confirmed = {true, true, 0.02, 0.54};
+    go(0, 0, 0);
+    const ros_doubt_t at_start = ros_odometry_doubt(&odometry, &assumed, 0, 0);
+    for (int i = 1; i <= 100; i++) {
+        go(i * SECOND / 20, 40 * i, 42 * i);
+    }
+    const ros_doubt_t later = ros_odometry_doubt(&odometry, &assumed, 0.8, 0.1);
+    const ros_doubt_t better = ros_odometry_doubt(&odometry, &confirmed, 0.8, 0.1);
+    expect_near(1e-9, 0.01, at_start.x_m);
+    TEST_ASSERT_TRUE(later.x_m > 4.1 * 0.07 && later.yaw_rad > at_start.yaw_rad);
+    TEST_ASSERT_TRUE(better.x_m < later.x_m && better.yaw_rad < later.yaw_rad && better.v_m_s < later.v_m_s);
+    TEST_ASSERT_TRUE(better.x_m > 4.1 * 0.03); // Slip stays.
+}
+
+// ---- a snapshot ---------------------------------------------------------------------------------------------------
+
+static const char SNAPSHOT[] =
+    "{\"event\":\"state\",\"t_us\":5,\"wall_us\":1760000000000007,\"state\":\"armed\",\"cause\":null,"
+    "\"lease\":{\"holder\":4,\"name\":\"joy\\\"stick\",\"remaining_ms\":9,\"lease_ms\":300},"
+    "\"bus\":{\"state\":\"passive\",\"timing\":\"near\"},\"estop\":{\"state\":\"none\"},"
+    "\"left\":{\"heard\":true,\"distance_mm\":-7},\"right\":{\"heard\":false,\"distance_mm\":null},"
+    "\"ledger\":{\"wheel_radius\":{\"state\":\"confirmed\",\"value\":\"200\"},"
+    "\"track\":{\"state\":\"contradicted\",\"value\":\"600\",\"reason\":\"turned too far\",\"disabled\":\"no twist\"},"
+    "\"gear_ratio\":{\"state\":\"assumed\",\"value\":\"5/2, rpm of the rotor\"},"
+    "\"current_role\":{\"state\":\"assumed\",\"value\":\"setpoint\"}}}";
+
+static iwc_message_t snapshot(void) {
+    return (iwc_message_t){.text = SNAPSHOT, .length = sizeof SNAPSHOT - 1U, .is_event = true};
+}
+
+static void test_snapshot_is_read_and_unknown_stays_unknown(void) {
+    iwc_t *gateway = iwc_new();
+    const iwc_message_t message = snapshot();
+    TEST_ASSERT_TRUE(ros_facts_read(gateway, &message, &facts.machine));
+    TEST_ASSERT_EQUAL_INT64(1760000000000007, facts.machine.wall_us);
+    TEST_ASSERT_EQUAL_INT64(300, facts.machine.lease_ms);
+    TEST_ASSERT_EQUAL_STRING("none", facts.machine.estop);
+    TEST_ASSERT_EQUAL_STRING("joy\"stick", facts.machine.holder);
+    TEST_ASSERT_TRUE(facts.machine.now.left.distance_mm.known);
+    TEST_ASSERT_FALSE(facts.machine.now.right.distance_mm.known);
+    const iwc_message_t other = {.text = "{\"event\":\"bus\"}", .length = 15, .is_event = true};
+    TEST_ASSERT_FALSE(ros_facts_read(gateway, &other, &facts.machine));
+    iwc_free(gateway);
+}
+
+static void test_ledger_gives_measures_and_what_is_contradicted(void) {
+    const iwc_message_t message = snapshot();
+    ros_facts_read_ledger(&message, &facts.machine);
+    TEST_ASSERT_EQUAL_INT64(200, facts.machine.radius_mm);
+    TEST_ASSERT_EQUAL_INT64(600, facts.machine.track_mm);
+    TEST_ASSERT_TRUE(facts.machine.measures.radius_confirmed);
+    TEST_ASSERT_FALSE(facts.machine.measures.track_confirmed);
+    expect_near(1e-9, 2.0 * M_PI * 0.2 / 60.0 / 2.5, facts.machine.measures.tick_m);
+    TEST_ASSERT_EQUAL_STRING("track: turned too far; no twist", facts.machine.contradicted);
+    TEST_ASSERT_EQUAL_UINT(2, facts.machine.assumed);
+    TEST_ASSERT_TRUE(facts.machine.setpoint_current);
+}
+
+// ---- diagnostics --------------------------------------------------------------------------------------------------
+
+static void expect(ros_tells_t which, ros_level_t level, const char *part) {
+    ros_diagnose(&facts, which, &status);
+    TEST_ASSERT_EQUAL_MESSAGE(level, status.level, status.message);
+    if (strstr(status.message, part) == NULL) {
+        TEST_FAIL_MESSAGE(status.message);
+    }
+}
+
+static void test_diagnosis_all_in_order_is_ok(void) {
+    for (unsigned i = 0; i < ROS_TELLS; i++) {
+        ros_diagnose(&facts, (ros_tells_t)i, &status);
+        TEST_ASSERT_EQUAL_MESSAGE(ROS_OK, status.level, status.message);
+        TEST_ASSERT_TRUE(strlen(status.message) > 5U && strncmp(status.name, "iwheel: ", 8) == 0);
+    }
+    expect(ROS_TELLS_COMMANDS, ROS_OK, "15 Hz");
+}
+
+static void test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale(void) {
+    facts.link = ROS_LINK_GONE;
+    (void)snprintf(facts.trouble, sizeof facts.trouble, "nobody listens");
+    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "nobody listens");
+    expect(ROS_TELLS_LEFT, ROS_STALE, "gone");
+    facts.link = ROS_LINK_SILENT;
+    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "does not answer");
+    expect(ROS_TELLS_ESTOP, ROS_STALE, "does not answer");
+}
+
+static void test_diagnosis_each_stop_has_its_sentence_and_cure(void) {
+    facts.machine.now.machine = IWC_LATCHED;
+    (void)snprintf(facts.machine.stop, sizeof facts.machine.stop, "the left wheel was lost");
+    expect(ROS_TELLS_GATEWAY, ROS_ERROR, "the left wheel was lost; remove the cause, reset");
+    facts.machine.now.machine = IWC_STOPPING;
+    expect(ROS_TELLS_GATEWAY, ROS_WARN, "stopping: the left wheel was lost");
+    (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "pressed");
+    expect(ROS_TELLS_ESTOP, ROS_ERROR, "release the button");
+    (void)snprintf(facts.machine.estop, sizeof facts.machine.estop, "unreadable");
+    expect(ROS_TELLS_ESTOP, ROS_ERROR, "check its wire");
+    (void)snprintf(facts.machine.bus, sizeof facts.machine.bus, "down");
+    expect(ROS_TELLS_BUS, ROS_ERROR, "arm again");
+    (void)snprintf(facts.machine.bus, sizeof facts.machine.bus, "bus_off");
+    expect(ROS_TELLS_BUS, ROS_ERROR, "arm again");
+    (void)snprintf(facts.machine.timing, sizeof facts.machine.timing, "contradicted");
+    expect(ROS_TELLS_TIMING, ROS_ERROR, "62.5 %");
+    facts.machine.now.right.heard = false;
+    expect(ROS_TELLS_RIGHT, ROS_ERROR, "power and cable");
+    (void)snprintf(facts.machine.contradicted, sizeof facts.machine.contradicted, "track: no");
+    expect(ROS_TELLS_LEDGER, ROS_ERROR, "track: no");
+}
+
+static void test_diagnosis_commands_tell_what_keeps_them_from_driving(void) {
+    facts.commands.late = 3;
+    expect(ROS_TELLS_COMMANDS, ROS_WARN, "3 commands came too late");
+    (void)snprintf(facts.commands.refusal, sizeof facts.commands.refusal, "arm first");
+    facts.commands.coming = true;
+    expect(ROS_TELLS_COMMANDS, ROS_WARN, "refused: arm first");
+    facts.commands.publishers = 2;
+    expect(ROS_TELLS_COMMANDS, ROS_WARN, "twist_mux");
+    facts.machine.setpoint_current = true;
+    expect(ROS_TELLS_COMMANDS, ROS_WARN, "carries no current");
+    facts.drive = false;
+    expect(ROS_TELLS_COMMANDS, ROS_OK, "watching only");
+}
+
+static void test_diagnosis_values_that_are_not_known_are_empty(void) {
+    ros_diagnose(&facts, ROS_TELLS_LEFT, &status);
+    TEST_ASSERT_EQUAL_STRING("speed_mm_s", status.values[0].key);
+    TEST_ASSERT_EQUAL_STRING("", status.values[0].text);
+}
+
+// ---- iwheel/state -------------------------------------------------------------------------------------------------
+
+static void test_state_texts_from_others_stay_within_their_quotes(void) {
+    char json[2048];
+    facts.machine.now.holder.known = true;
+    (void)snprintf(facts.machine.holder, sizeof facts.machine.holder, "a\"b\\\\u0007");
+    (void)snprintf(facts.machine.stop, sizeof facts.machine.stop, "\"x\" stopped");
+    ros_state_json(&facts, json, sizeof json);
+    TEST_ASSERT_NOT_NULL(strstr(json, "\"holder\":\"a\\\"b\\\\\\u0007\""));
+    TEST_ASSERT_NOT_NULL(strstr(json, "\"last_stop\":\"\\\"x\\\" stopped\"}"));
+    TEST_ASSERT_NOT_NULL(strstr(json, "\"cause\":null"));
+}
+
+static void test_state_gateway_gone_tells_nothing_old(void) {
+    char json[2048];
+    facts.link = ROS_LINK_GONE;
+    ros_state_json(&facts, json, sizeof json);
+    TEST_ASSERT_EQUAL_STRING("{\"gateway\":\"gone\"}", json);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_odometry_first_ways_are_the_origin);
+    RUN_TEST(test_odometry_straight_way_is_x);
+    RUN_TEST(test_odometry_turn_to_the_left_is_positive_and_does_not_drift);
+    RUN_TEST(test_odometry_quarter_circle_ends_where_it_must);
+    RUN_TEST(test_odometry_messages_lost_on_a_straight_way_lose_no_way);
+    RUN_TEST(test_odometry_ways_that_jump_start_anew);
+    RUN_TEST(test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed);
+    RUN_TEST(test_snapshot_is_read_and_unknown_stays_unknown);
+    RUN_TEST(test_ledger_gives_measures_and_what_is_contradicted);
+    RUN_TEST(test_diagnosis_all_in_order_is_ok);
+    RUN_TEST(test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale);
+    RUN_TEST(test_diagnosis_each_stop_has_its_sentence_and_cure);
+    RUN_TEST(test_diagnosis_commands_tell_what_keeps_them_from_driving);
+    RUN_TEST(test_diagnosis_values_that_are_not_known_are_empty);
+    RUN_TEST(test_state_texts_from_others_stay_within_their_quotes);
+    RUN_TEST(test_state_gateway_gone_tells_nothing_old);
+    return UNITY_END();
+}

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// The bridge's configuration file: each error with its line and cure, nothing half read.
+#include "ros_settings.h"
+#include "settings/settings.h"
+
+#include "unity.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static ros_settings_t settings;
+static char *told;
+static size_t told_size;
+
+void setUp(void) {
+    memset(&settings, 0x55, sizeof settings);
+}
+
+void tearDown(void) {
+    free(told);
+    told = NULL;
+}
+
+static int read_text(const char *text) {
+    FILE *err = open_memstream(&told, &told_size);
+    const int result = ros_settings_parse("f", text, &settings, err);
+    (void)fclose(err);
+    return result;
+}
+
+static void test_settings_empty_sections_are_the_defaults(void) {
+    TEST_ASSERT_EQUAL_INT(0, read_text("; nothing\n"));
+    TEST_ASSERT_EQUAL_STRING("/run/iwheel/gateway.sock", settings.gateway.socket);
+    TEST_ASSERT_TRUE(settings.drive.enabled);
+    TEST_ASSERT_FALSE(settings.drive.auto_arm || settings.drive.allow_reset || settings.odometry.tf);
+    TEST_ASSERT_EQUAL_UINT32(500, settings.drive.timeout_ms);
+    TEST_ASSERT_EQUAL_STRING("", ros_settings_space(&settings));
+}
+
+static void test_settings_all_keys_are_read(void) {
+    TEST_ASSERT_EQUAL_INT(
+        0, read_text("[gateway]\nsocket = /tmp/x\n[ros]\ndomain=7\nnetwork = loopback\nrelease = humble\n"
+                     "namespace = w1\nnode = base ; a comment\n[drive]\nenabled = no\n"
+                     "command = twist_stamped\n  timeout_ms = 50\nauto_arm = yes\nallow_reset = yes\n"
+                     "[odometry]\nrate_hz = 100\nodom_frame = w1/odom\nbase_frame = b\ntf = yes\n"));
+    TEST_ASSERT_EQUAL_STRING("/tmp/x", settings.gateway.socket);
+    TEST_ASSERT_EQUAL_UINT32(7, settings.ros.domain);
+    TEST_ASSERT_TRUE(settings.ros.loopback && settings.ros.humble && settings.drive.stamped);
+    TEST_ASSERT_EQUAL_STRING("w1", ros_settings_space(&settings));
+    TEST_ASSERT_EQUAL_STRING("base", settings.ros.node);
+    TEST_ASSERT_FALSE(settings.drive.enabled);
+    TEST_ASSERT_EQUAL_UINT32(50, settings.drive.timeout_ms);
+    TEST_ASSERT_TRUE(settings.drive.auto_arm && settings.drive.allow_reset && settings.odometry.tf);
+    TEST_ASSERT_EQUAL_STRING("w1/odom", settings.odometry.odom_frame);
+}
+
+static void test_settings_each_error_names_line_and_cure(void) {
+    const struct {
+        const char *text;
+        const char *words;
+    } cases[] = {
+        {"[drive]\ntimeout_ms = 501\n", "50..500 ms"},
+        {"[drive]\nauto_arm = maybe\n", "no or yes"},
+        {"[drive]\nautoarm = yes\n", "did you mean auto_arm"},
+        {"[ros]\nauto_arm = yes\n", "move it to [drive]"},
+        {"[ros]\nnamespace = 9w\n", "no name for ROS"},
+        {"[ros]\nnamespace = /w\n", "no name for ROS"},
+        {"[ros]\nnode = a b\n", "no name for ROS"},
+        {"[ros]\ndomain = 233\n", "0..232"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        setUp();
+        TEST_ASSERT_EQUAL_INT(SETTINGS_ERROR, read_text(cases[i].text));
+        if (strncmp(told, "f:2: ", 5) != 0 || strstr(told, cases[i].words) == NULL) {
+            TEST_FAIL_MESSAGE(told);
+        }
+        TEST_ASSERT_EQUAL_HEX8(0x55, settings.gateway.socket[0]);
+        tearDown();
+    }
+}
+
+static void test_settings_what_is_printed_reads_back_the_same(void) {
+    char *printed = NULL;
+    size_t size = 0;
+    TEST_ASSERT_EQUAL_INT(0, read_text("[ros]\nnamespace = w1\n[drive]\nauto_arm = yes\n"));
+    const ros_settings_t before = settings;
+    FILE *out = open_memstream(&printed, &size);
+    ros_settings_print(&settings, out);
+    (void)fclose(out);
+    tearDown();
+    TEST_ASSERT_EQUAL_INT(0, read_text(printed));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &settings, sizeof before);
+    free(printed);
+}
+
+static void test_settings_shipped_file_is_the_defaults(void) {
+    ros_settings_t standard;
+    ros_settings_default(&standard);
+    TEST_ASSERT_EQUAL_INT(0, ros_settings_load(IWHEEL_SHARE_DIR "/ros2.conf", &settings, stderr));
+    TEST_ASSERT_EQUAL_MEMORY(&standard, &settings, sizeof standard);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_settings_empty_sections_are_the_defaults);
+    RUN_TEST(test_settings_all_keys_are_read);
+    RUN_TEST(test_settings_each_error_names_line_and_cure);
+    RUN_TEST(test_settings_what_is_printed_reads_back_the_same);
+    RUN_TEST(test_settings_shipped_file_is_the_defaults);
+    return UNITY_END();
+}
