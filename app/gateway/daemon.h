@@ -47,4 +47,13 @@ typedef struct gw_daemon {
 /// Tells the parts of each other and of the configuration, which is set. They are opened after that.
 void gw_daemon_compose(gw_daemon_t *self);
 
+/// Opens epoll, timer and signal descriptors and watches everything the daemon has open. SIGTERM, SIGINT and SIGHUP
+/// are then read by the loop and nowhere else. 0 or an errno.
+int gw_loop_open(gw_daemon_t *daemon);
+void gw_loop_close(gw_daemon_t *daemon);
+
+/// Runs until a signal has asked for the end and the wheels have been brought to a stop. 0, or an errno if waiting
+/// itself failed.
+int gw_loop_run(gw_daemon_t *daemon);
+
 #endif

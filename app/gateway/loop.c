@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "loop.h"
 
-#include "answers/recordings.h"
-#include "box/record.h"
-#include "clients/service.h"
+#include "answers/dispatch.h"
+#include "box/box.h"
+#include "clients/clients.h"
 #include "daemon.h"
 
 #include "iwheel_linux/clock.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "clients/service.h"
+#include "clients/clients.h"
 #include "daemon.h"
-#include "loop.h"
 #include "start/options.h"
 #include "start/report.h"
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "daemon_rig.h"
 
-#include "clients/service.h"
+#include "clients/clients.h"
 #include "daemon.h"
-#include "loop.h"
 
 #include "iwheel_linux/clock.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "wheels/gaps.h"
+#include "wheels/wheels.h"
 
 #include <string.h>
 #include <unity.h>

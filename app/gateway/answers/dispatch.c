@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "dispatch.h"
 
-#include "box/record.h"
+#include "box/box.h"
 #include "clients/clients.h"
 #include "ledger/knowledge.h"
-#include "recordings.h"
-#include "refuse.h"
 #include "status/snapshot.h"
 #include "wheels/wheels.h"
 

@@ -3,11 +3,12 @@
 #ifndef GATEWAY_DISPATCH_H
 #define GATEWAY_DISPATCH_H
 
+#include "clients/client.h"
+
 #include "iwheel/snapshot.h"
 #include "iwheel_northbound/request.h"
 
 struct gw_box;
-struct gw_client;
 struct gw_clients;
 struct gw_knowledge;
 struct gw_servant;
@@ -32,7 +33,7 @@ typedef struct {
 /// One request being carried out.
 typedef struct {
     gw_answers_t *answers;
-    struct gw_client *client;
+    gw_client_t *client;
     const iwn_request_t *request;
 } gw_call_t;
 
@@ -42,5 +43,29 @@ struct gw_servant gw_dispatch_servant(gw_answers_t *self);
 
 /// Answers the arms that have been decided by the last step.
 void gw_dispatch_arming(gw_answers_t *self, const iw_snapshot_t *seen);
+
+/// A refusal of the core in words: cause and cure, with the numbers of this moment.
+///
+/// `request` is the one refused.
+void gw_refuse_describe(const gw_answers_t *answers, const iwn_request_t *request, iw_refusal_t refusal,
+                        iwn_refusal_t *out_refusal);
+
+/// True, with which right it needs and how to have it in `out_refusal`, if a client with that right may not ask for it. Who may only
+/// watch may ask for what moves nothing and for what stops.
+bool gw_refuse_by_right(const gw_answers_t *answers, gw_right_t right, iwn_cmd_t cmd, iwn_refusal_t *out_refusal);
+
+/// The same for a tare of that wheel.
+void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *out_refusal);
+
+/// Recordings for clients: passed on to the process that reads them (disk/box_files.h), answered when it answers.
+///
+/// Nothing waits for it, not even later requests of the same client: a stop behind a slow disk is carried out at once. So a client has
+/// one question at a time, and a cycle takes one answer.
+///
+/// Carries out `recordings` or `recording`: refuses it, or leaves its reply to `gw_recordings_take`.
+void gw_recordings_ask(const gw_call_t *call);
+
+/// Passes on what has been read, if anything has. False: the process that reads has ended; who waited for it is told.
+bool gw_recordings_take(struct gw_box *box, struct gw_clients *clients);
 
 #endif

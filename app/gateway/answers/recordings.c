@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "recordings.h"
+#include "dispatch.h"
 
 #include "box/box.h"
 #include "clients/clients.h"

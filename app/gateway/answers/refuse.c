@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "refuse.h"
+#include "dispatch.h"
 
 #include "clients/clients.h"
 #include "ledger/knowledge.h"

@@ -16,6 +16,10 @@
 #include "disk/recording.h"
 #include "process/child.h"
 
+#include "iwheel_northbound/json_out.h"
+
+struct gw_log;
+
 typedef struct gw_box {
     blackbox_ring_t *ring;
     size_t ring_size;
@@ -46,5 +50,16 @@ gw_child_news_t gw_box_hear(gw_box_t *self);
 
 /// The next result of the writer, which is in `last`. Never waits.
 gw_child_news_t gw_box_take(gw_box_t *self);
+
+/// A stop on its way to disk, and what became of it.
+///
+/// Orders a recording of a stop that has just been seen, if stops are recorded.
+void gw_record_stop(gw_box_t *box, struct gw_log *log, const iwn_stop_note_t *note, iw_time_us_t now_us);
+
+/// Takes what the writer tells, to the log.
+void gw_record_take(gw_box_t *box, struct gw_log *log);
+
+/// Where the stop with this number was written (0: there was none), into an object that is open.
+void gw_record_write(const gw_box_t *box, uint32_t number, iwn_out_t *json);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "service.h"
+#include "clients.h"
 
 #include "process/log.h"
 

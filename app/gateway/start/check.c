@@ -102,32 +102,25 @@ static void judge_own(const char *path, inspect_findings_t *findings) {
     }
 }
 
-static void judge_watchers(const gateway_config_t *config, inspect_findings_t *findings) {
-    const char *const group = config->northbound.watch_group;
-    if (strcmp(config->northbound.watch_socket, "none") == 0) {
+/// `may`: what the group is allowed by that key of [northbound].
+static void judge_group(const char *key, const char *group, const char *may, inspect_findings_t *findings) {
+    if (strcmp(group, "none") == 0 || getgrnam(group) != NULL) {
+        inspect_say(findings, key, INSPECT_OK, "group %s may %s", group, may);
         return;
     }
-    if (strcmp(group, "none") != 0 && getgrnam(group) == NULL) {
-        inspect_say(findings, "watch_group", INSPECT_WARN,
-                    "group %s does not exist: the socket for watching keeps the gateway's own group", group);
-        inspect_cure(findings, "sudo groupadd --system %s, or set [northbound] watch_group to another, or to none",
-                     group);
-    } else {
-        inspect_say(findings, "watch_group", INSPECT_OK, "group %s may watch on %s", group,
-                    config->northbound.watch_socket);
-    }
+    inspect_say(findings, key, INSPECT_WARN, "group %s does not exist: the socket%s keeps the gateway's own group",
+                group, (strcmp(key, "watch_group") == 0) ? " for watching" : "");
+    inspect_cure(findings, "sudo groupadd --system %s, or set [northbound] %s to another, or to none", group, key);
 }
 
 static void judge_rights(const gateway_config_t *config, inspect_findings_t *findings) {
-    const char *const group = config->northbound.group;
-    judge_watchers(config, findings);
-    const bool grouped = strcmp(group, "none") != 0;
-    if (grouped && getgrnam(group) == NULL) {
-        inspect_say(findings, "group", INSPECT_WARN,
-                    "group %s does not exist: the socket keeps the gateway's own group", group);
-        inspect_cure(findings, "sudo groupadd --system %s, or set [northbound] group to another, or to none", group);
-    } else if (grouped) {
-        inspect_say(findings, "group", INSPECT_OK, "group %s may use the socket", group);
+    char watch[GATEWAY_PATH_SIZE + 16U];
+    (void)snprintf(watch, sizeof watch, "watch on %s", config->northbound.watch_socket);
+    if (strcmp(config->northbound.watch_socket, "none") != 0) {
+        judge_group("watch_group", config->northbound.watch_group, watch, findings);
+    }
+    if (strcmp(config->northbound.group, "none") != 0) {
+        judge_group("group", config->northbound.group, "use the socket", findings);
     }
     if ((config->northbound.mode & S_IWOTH) != 0U) {
         inspect_say(findings, "mode", INSPECT_WARN, "socket mode %04o: everybody on this machine may move the wheels",

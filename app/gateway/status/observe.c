@@ -2,7 +2,6 @@
 #include "observe.h"
 
 #include "box/box.h"
-#include "box/record.h"
 #include "bus/bus_facts.h"
 #include "clients/clients.h"
 #include "ledger/knowledge.h"
@@ -20,6 +19,12 @@
 #include <string.h>
 
 #define API_VERSION 1
+
+static iwn_out_t begin_event(gw_status_t *self, const char *name) {
+    iwn_out_t json = gw_clients_begin_event(self->clients, name);
+    iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
+    return json;
+}
 
 static void observe_state(gw_status_t *self, const iw_snapshot_t *seen, bool first) {
     const iw_state_t state = seen->state;
@@ -69,8 +74,7 @@ static void observe_stop(gw_status_t *self, const iw_stop_t *stop) {
     if (stop->latched) {
         gw_record_stop(self->box, self->log, note, self->wheels->now_us);
     }
-    iwn_out_t json = gw_clients_begin_event(self->clients, "stop");
-    iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
+    iwn_out_t json = begin_event(self, "stop");
     gw_snapshot_write_stop(note, self->wheels->now_us, &json);
     gw_clients_send_event(self->clients, &json, IWN_TOPIC_STOP);
 }
@@ -91,8 +95,7 @@ static void observe_lease(gw_status_t *self, const iw_snapshot_t *seen) {
     }
     gw_log(self->log, GW_LOG_INFO, "lease %s: %s", change,
            (holder == IW_CLIENT_NONE) ? "nobody" : observed->holder_text);
-    iwn_out_t json = gw_clients_begin_event(self->clients, "lease");
-    iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
+    iwn_out_t json = begin_event(self, "lease");
     iwn_out_text(&json, "change", change);
     iwn_out_known(&json, "holder", holder != IW_CLIENT_NONE, holder);
     iwn_out_text(&json, "name", (client != NULL && client->name[0] != '\0') ? client->name : NULL);
@@ -107,8 +110,7 @@ static void observe_bus(gw_status_t *self, iw_bus_state_t bus, bool first) {
     self->observed.bus = bus;
     gw_log(self->log, (bus == IW_BUS_ACTIVE) ? GW_LOG_INFO : GW_LOG_WARNING, "bus %s: %s", self->wheels->bus.name,
            iwn_bus_state_name(bus));
-    iwn_out_t json = gw_clients_begin_event(self->clients, "bus");
-    iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
+    iwn_out_t json = begin_event(self, "bus");
     iwn_out_text(&json, "state", iwn_bus_state_name(bus));
     gw_clients_send_event(self->clients, &json, IWN_TOPIC_BUS);
 }
@@ -123,16 +125,14 @@ static void observe_estop(gw_status_t *self, bool first) {
     const char *trouble = inspect_estop_trouble(&self->wheels->hal);
     gw_log(self->log, (answer == 0) ? GW_LOG_INFO : GW_LOG_WARNING, "e-stop %s: %s%s%s", self->wheels->estop, name,
            (trouble[0] == '\0') ? "" : ": ", trouble);
-    iwn_out_t json = gw_clients_begin_event(self->clients, "estop");
-    iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
+    iwn_out_t json = begin_event(self, "estop");
     iwn_out_text(&json, "state", name);
     gw_clients_send_event(self->clients, &json, IWN_TOPIC_ESTOP);
 }
 
 static void tell_fault(gw_status_t *self, const char *cause, bool present) {
     gw_log(self->log, present ? GW_LOG_WARNING : GW_LOG_INFO, "%s: %s", present ? "fault" : "fault gone", cause);
-    iwn_out_t json = gw_clients_begin_event(self->clients, "fault");
-    iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
+    iwn_out_t json = begin_event(self, "fault");
     iwn_out_text(&json, "cause", cause);
     iwn_out_bool(&json, "present", present);
     gw_clients_send_event(self->clients, &json, IWN_TOPIC_STOP);
