@@ -152,7 +152,7 @@ static void write_causes(const char *name, uint32_t causes, iwn_out_t *json) {
 
 void iwn_tell_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
     const bool stopped = seen->state == IW_STATE_STOPPING || seen->state == IW_STATE_LATCHED;
-    iwn_out_int(json, "t_us", (int64_t)around->now_us);
+    iwn_out_int(json, "t_us", (int64_t)seen->at_us);
     iwn_out_known(json, "wall_us", around->wall_us != IWN_WALL_UNKNOWN, around->wall_us);
     iwn_out_text(json, "version", around->version);
     iwn_out_text(json, "state", iwn_state_name(seen->state));

@@ -14,13 +14,12 @@ typedef struct {
     bool contaminated; ///< Taken while the wheel turned, or under load or unrest.
 } zero_t;
 
-static int64_t age_ms(const iwn_surroundings_t *around, const iw_force_t *force, const iwn_zero_note_t *noted) {
-    const int64_t wall_us = around->wall_us;
+static int64_t age_ms(iw_time_us_t now_us, int64_t wall_us, const iw_force_t *force, const iwn_zero_note_t *noted) {
     if (force->provenance == IW_OFFSET_NONE) {
         return -1;
     }
     if (force->offset_us != IW_NEVER) {
-        return (int64_t)((around->now_us - force->offset_us) / IW_US_PER_MS);
+        return (int64_t)((now_us - force->offset_us) / IW_US_PER_MS);
     }
     return (noted->wall_us > 0 && noted->wall_us <= wall_us) ? (wall_us - noted->wall_us) / 1000 : -1;
 }
@@ -33,7 +32,7 @@ static zero_t describe_zero(const iw_snapshot_t *seen, const iwn_surroundings_t 
     const bool window = force->quality.window != IW_WINDOW_OPEN;
     const bool bad = window && force->quality.window != IW_WINDOW_GOOD;
     zero_t zero = {.word = iwn_offset_word(force->provenance, force->offset_us),
-                   .age_ms = age_ms(around, force, noted),
+                   .age_ms = age_ms(seen->at_us, around->wall_us, force, noted),
                    .samples = force->quality.samples,
                    .deviation_mN = force->quality.deviation_mN,
                    .drift_mN = force->quality.drift_mN,
@@ -71,7 +70,7 @@ void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *a
                           iwn_out_t *json) {
     const iw_force_t *force = seen->wheel[side].force;
     const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
-    const bool heard = is_heard(force, around->now_us);
+    const bool heard = is_heard(force, seen->at_us);
     const bool offset = force->provenance != IW_OFFSET_NONE;
     const iwn_zero_note_t *noted = &around->zero[side];
     const zero_t zero = describe_zero(seen, around, side);
@@ -80,7 +79,7 @@ void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *a
     iwn_out_known(json, "force_offset_mN", offset, force->offset_mN);
     iwn_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
     iwn_out_text(json, "force_validity", iwn_force_validity_name(validity));
-    iwn_tell_age("force_age_ms", around->now_us, force->raw_us, json);
+    iwn_tell_age("force_age_ms", seen->at_us, force->raw_us, json);
     iwn_out_text(json, "offset_provenance", zero.word);
     iwn_out_text(json, "offset_origin", (noted->from != IW_OFFSET_NONE) ? iwn_provenance_name(noted->from) : NULL);
     iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
@@ -94,12 +93,12 @@ void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *a
 }
 
 void iwn_tell_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
-    iwn_out_int(json, "t_us", (int64_t)around->now_us);
+    iwn_out_int(json, "t_us", (int64_t)seen->at_us);
     for (unsigned i = 0; i < IW_SIDES; i++) {
         const iw_side_t side = (iw_side_t)i;
         const iw_force_t *force = seen->wheel[side].force;
         const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
-        const bool heard = is_heard(force, around->now_us);
+        const bool heard = is_heard(force, seen->at_us);
         const zero_t zero = describe_zero(seen, around, side);
         iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
         iwn_out_known(json, "raw", heard, force->raw);
@@ -108,7 +107,7 @@ void iwn_tell_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around,
         iwn_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
         iwn_out_text(json, "validity", iwn_force_validity_name(validity));
         iwn_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
-        iwn_tell_age("age_ms", around->now_us, force->raw_us, json);
+        iwn_tell_age("age_ms", seen->at_us, force->raw_us, json);
         iwn_out_text(json, "provenance", zero.word);
         iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
         write_known_bool(json, "contaminated", zero.judged, zero.contaminated);

@@ -48,10 +48,14 @@ void iwn_tell_hello(const iwn_hello_t *hello, iwn_out_t *json) {
     iwn_out_text(json, "rights", hello->watches_only ? "watch" : "drive");
 }
 
+const char *iwn_tell_change(iw_client_t holder, iw_client_t former) {
+    return (holder == IW_CLIENT_NONE) ? "lost" : (former == IW_CLIENT_NONE) ? "gained" : "moved";
+}
+
 void iwn_tell_lease(const iwn_holder_t *holder, iw_client_t former, iwn_out_t *json) {
     const bool held = holder->client != IW_CLIENT_NONE;
     const bool named = held && holder->name != NULL && holder->name[0] != '\0';
-    iwn_out_text(json, "change", !held ? "lost" : (former == IW_CLIENT_NONE) ? "gained" : "moved");
+    iwn_out_text(json, "change", iwn_tell_change(holder->client, former));
     iwn_out_known(json, "holder", held, holder->client);
     iwn_out_text(json, "name", named ? holder->name : NULL);
     iwn_out_known(json, "former", former != IW_CLIENT_NONE, former);

@@ -29,7 +29,6 @@ void tearDown(void) {
 static iw_snapshot_t look(void) {
     iw_snapshot_t seen;
     iw_gateway_snapshot(&rig.gateway, rig.now_us, &seen);
-    around.now_us = rig.now_us;
     return seen;
 }
 
@@ -129,8 +128,8 @@ static void test_reply_that_does_not_fit_is_none(void) {
     const iwn_refusal_t refusal = {.error = IWN_BUSY, .message = "somebody else drives"};
     char line[128];
     const size_t length = iwn_tell_refusal(line, sizeof line, &id, &refusal);
-    TEST_ASSERT_EQUAL_STRING_LEN(
-        "{\"id\":5,\"ok\":false,\"error\":\"busy\",\"message\":\"somebody else drives\"}\n", line, length);
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"id\":5,\"ok\":false,\"error\":\"busy\",\"message\":\"somebody else drives\"}\n",
+                                 line, length);
     for (size_t size = 0; size < length; size++) {
         TEST_ASSERT_EQUAL_size_t(0, iwn_tell_refusal(line, size, &id, &refusal));
     }
