@@ -22,6 +22,10 @@ HEADERS = ROOT / "core/include"
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 TELEMETRY = ("SPEED", "STATUS", "FORCE", "OFFSET", "POSE")
 PRODUCTION = ("core", "northbound", "client", "port", "app")
+# Libraries and programs: where each looks for headers of its own.
+COMPONENTS = {"core": ("core/include", "core/src"), "northbound": ("northbound/include", "northbound/src"), "client/c": ("client/c/include", "client/c/src"),
+              "port/linux": ("port/linux/include", "port/linux/src"), "port/stm32_stub": (), "app/gateway": ("app/gateway",), "app/ctl": ("app/ctl",), "app/sim": ("app/sim",),
+              "app/settings": (), "app/blackbox": (), "app/candump": (), "app/inspect": ()}
 OUTSIDE = ("northbound", "client", "port", "app", "examples", "zephyr", "bridge")
 
 
@@ -46,7 +50,7 @@ def public_headers():
 
 
 def depth(path, folders, known):
-    """Headers of ours below this file, one in the other."""
+    """Headers in these folders and beside it below this file, one in the other."""
     if path not in known:
         known[path] = 0  # Guards against circles.
         for included in INCLUDE.findall(path.read_text()):
@@ -56,10 +60,10 @@ def depth(path, folders, known):
     return known[path]
 
 
-def include_depth():
-    """(levels, where) of the deepest file of the core."""
-    known = {}
-    return max((depth(path, (HEADERS, ROOT / "core/src"), known), name(path)) for path in sources("core"))
+def deepest(headers, component):
+    """(levels, where) of the file with the most headers of its own library or program below it."""
+    known, folders = {}, [ROOT / folder for folder in headers]
+    return max(((depth(path.resolve(), folders, known), name(path)) for path in sources(component)), default=(0, component))
 
 
 def private_includes():
@@ -97,39 +101,64 @@ def uses_of_parts(builds):
     return len(entries), found
 
 
-def arrows(folder):
-    """(used, possible) ways of one subfolder into another, by includes."""
-    subfolders = sorted(path.name for path in folder.iterdir() if path.is_dir())
-    used = set()
-    for path in folder.rglob("*.[ch]"):
-        here = path.relative_to(folder).parts[0]
-        for included in INCLUDE.findall(path.read_text()):
-            there = next((sub for sub in subfolders if (folder / sub / Path(included).name).is_file() and not (path.parent / included).is_file()), None)
-            if here in subfolders and there and there != here:
-                used.add((here, there))
-    return len(used), len(subfolders) * (len(subfolders) - 1)
+def arrows(program):
+    """Ways of one folder of a program into another, by includes: {(from, to)}, the folders ("." is the program's own), and headers
+    that are not included by their folder."""
+    files = {path.relative_to(program) for path in program.rglob("*.[ch]")}
+    names = {path.name: path for path in files}
+    used, bare = set(), []
+    for path in files:
+        for included in INCLUDE.findall((program / path).read_text()):
+            if path.parent / included in files:
+                there = path.parent / included
+            elif Path(included) in files:
+                there = Path(included)
+            else:
+                bare += [f"{name(program / path)} includes {included} without its folder"] if included in names and "/" not in included else []
+                continue
+            if there.parent != path.parent:
+                used.add((str(path.parent), str(there.parent)))
+    return used, sorted({str(path.parent) for path in files}), bare
+
+
+def needing_each_other(used):
+    """Folders that can be reached from themselves."""
+    ways = set(used)
+    for middle in {way[0] for way in used}:
+        ways |= {(a, d) for a, b in ways for c, d in ways if b == middle == c}
+    return sorted({a for a, b in ways if a == b})
+
+
+def fact_of_arrows(program, limit):
+    """Prints how many of the possible arrows a program has; what is wrong with them."""
+    used, folders, bare = arrows(ROOT / program)
+    possible = len(folders) * (len(folders) - 1) // 2
+    circle = needing_each_other(used)
+    percent = 100 * len(used) / possible
+    print(f"arrows between the folders of {program}, its own among them: {len(used)} of {possible} pairs ({percent:.1f} %, limit {limit} %)")
+    return [*bare, *([f"{program}: these need each other: {', '.join(circle)}"] if circle else []),
+            *([f"{len(used)} arrows between the folders of {program}"] if percent > limit else [])]
 
 
 def main(arguments):
     builds = [Path(argument).resolve() for argument in arguments] or [ROOT / "build" / build for build in ("default", "arm", "arm-m3")]
     builds = [build for build in builds if (build / "compile_commands.json").is_file()]
     message, headers, private = files_of_a_message(), public_headers(), private_includes()
-    levels, where = include_depth()
+    levels = {component: deepest(headers, component) for component, headers in COMPONENTS.items()}
+    deep = max((fact, component) for component, fact in levels.items() if component != "core")[0]
     compiled, parts = uses_of_parts(builds)
-    daemon = [path for path in sources("app/gateway") if "gw_daemon_t" in path.read_text()]
-    places = sum(path.read_text().count("gw_daemon_t") for path in daemon)
-    used, possible = arrows(ROOT / "app/gateway")
+    daemon = [line for path in sources("app/gateway") for line in path.read_text().splitlines() if "gw_daemon_t" in line]
     print(f"files that name every telemetry message: {len(message)} (limit 8): {', '.join(message)}")
     print(f"public headers of the core: {len(headers)} (limit 10): {', '.join(headers)}")
-    print(f"include depth of the core: {levels} (limit 4), at {where}")
+    print(f"include depth of the core: {levels['core'][0]} (limit 4), at {levels['core'][1]}; of any other library or program: {deep[0]} (limit 5), at {deep[1]}")
     print(f"private headers included outside the core: {len(private)} (limit 0)")
     print(f"parts of iw_gateway_t named outside the core: {len(parts)} in {compiled} files compiled (limit 0)")
-    print(f"places that take gw_daemon_t: {places} in {len(daemon)} files")
-    print(f"arrows between the folders of app/gateway: {used} of {possible} ({100 * used // possible} %)")
-    findings = [*private, *parts]
+    print(f"lines of app/gateway that name gw_daemon_t, the whole of it: {len(daemon)} (limit 60)")
+    findings = [*private, *parts, *fact_of_arrows("app/gateway", 40), *fact_of_arrows("app/ctl", 40)]
+    findings += [f"{len(daemon)} lines name gw_daemon_t"] if len(daemon) > 60 else []
     findings += [f"{len(message)} files name every message"] if len(message) > 8 else []
     findings += [f"{len(headers)} public headers"] if len(headers) > 10 else []
-    findings += [f"{where} includes {levels} levels deep"] if levels > 4 else []
+    findings += [f"{where} includes {count} levels deep" for component, (count, where) in levels.items() if count > (4 if component == "core" else 5)]
     findings += ["nothing was compiled: cmake --preset default first"] if compiled == 0 else []
     print(*findings, sep="\n")
     return 1 if findings else 0

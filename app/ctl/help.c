@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "help.h"
 
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 #include "settings/similar.h"
 #include "talk/words.h"
 #include "text/duration.h"

@@ -1,21 +1,34 @@
 // SPDX-License-Identifier: MIT
 #include "daemon.h"
 
-gw_client_t *gw_daemon_client(gw_daemon_t *self, iw_client_t id) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX && id != IW_CLIENT_NONE; i++) {
-        if (self->client[i].id == id) {
-            return &self->client[i];
-        }
-    }
-    return NULL;
-}
+#include "start/report.h"
 
-iw_snapshot_t gw_daemon_look(const gw_daemon_t *self) {
-    iw_snapshot_t seen;
-    iw_gateway_snapshot(&self->gateway, self->now_us, &seen);
-    return seen;
-}
+_Static_assert(GW_PATH_SIZE >= GATEWAY_PATH_SIZE && GW_ADDRESS_SIZE >= GATEWAY_ADDRESS_SIZE,
+               "what can be configured has room");
 
-bool gw_daemon_is_sending(const gw_daemon_t *self) {
-    return iw_gateway_is_sending(&self->gateway);
+void gw_daemon_compose(gw_daemon_t *self) {
+    const gateway_config_t *config = &self->config;
+    gw_wheels_t *wheels = &self->wheels;
+    gw_clients_t *clients = &self->clients;
+    wheels->bus = gw_report_wish(config);
+    wheels->estop = config->estop.line;
+    self->knowledge.wheels = wheels;
+    self->knowledge.log = &self->log;
+    self->knowledge.clients = clients;
+    self->knowledge.configured = (gw_configured_t){&config->core, config->track_mm};
+    self->knowledge.bus = config->bus.interface;
+    self->status = (gw_status_t){
+        .wheels = wheels, .knowledge = &self->knowledge, .box = &self->box, .log = &self->log, .clients = clients};
+    self->answers = (gw_answers_t){.wheels = wheels,
+                                   .knowledge = &self->knowledge,
+                                   .box = &self->box,
+                                   .status = &self->status,
+                                   .clients = clients,
+                                   .socket = config->northbound.socket,
+                                   .group = config->northbound.group};
+    clients->servant = gw_dispatch_servant(&self->answers);
+    clients->log = &self->log;
+    clients->most[GW_DRIVE] = config->northbound.max_clients;
+    clients->most[GW_WATCH] = config->northbound.max_watchers;
+    gw_observe_begin(&self->status);
 }

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "loop.h"
 
-#include "answers/dispatch.h"
 #include "answers/recordings.h"
-#include "answers/service.h"
 #include "box/record.h"
-#include "bus/bus_facts.h"
-#include "status/observe.h"
+#include "clients/service.h"
+#include "daemon.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -28,7 +26,7 @@
 
 static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
-    return (fd < 0 || epoll_ctl(daemon->epoll_fd, EPOLL_CTL_ADD, fd, &interest) == 0) ? 0 : errno;
+    return (fd < 0 || epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_ADD, fd, &interest) == 0) ? 0 : errno;
 }
 
 static int open_signals(void) {
@@ -43,18 +41,18 @@ static int open_signals(void) {
 }
 
 int gw_loop_open(gw_daemon_t *daemon) {
-    daemon->epoll_fd = epoll_create1(EPOLL_CLOEXEC);
+    daemon->clients.epoll_fd = epoll_create1(EPOLL_CLOEXEC);
     daemon->signal_fd = open_signals();
-    if (daemon->epoll_fd < 0 || daemon->signal_fd < 0) {
+    if (daemon->clients.epoll_fd < 0 || daemon->signal_fd < 0) {
         return errno;
     }
     int error = gw_wakeup_open(&daemon->wakeup);
     const int fds[] = {daemon->wakeup.fd,
                        daemon->signal_fd,
-                       daemon->listener[GW_DRIVE].fd,
-                       daemon->listener[GW_WATCH].fd,
-                       iw_linux_hal_bus_fd(&daemon->hal),
-                       iw_linux_hal_estop_fd(&daemon->hal),
+                       daemon->clients.listener[GW_DRIVE].fd,
+                       daemon->clients.listener[GW_WATCH].fd,
+                       iw_linux_hal_bus_fd(&daemon->wheels.hal),
+                       iw_linux_hal_estop_fd(&daemon->wheels.hal),
                        daemon->box.writer.fd,
                        daemon->box.reader.fd};
     const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER,
@@ -68,20 +66,18 @@ int gw_loop_open(gw_daemon_t *daemon) {
 void gw_loop_close(gw_daemon_t *daemon) {
     (void)close(daemon->signal_fd);
     gw_wakeup_close(&daemon->wakeup);
-    (void)close(daemon->epoll_fd);
+    (void)close(daemon->clients.epoll_fd);
 }
 
 static void shut_down(gw_daemon_t *daemon) {
-    daemon->shutting_down = true;
+    daemon->wheels.shutting_down = true;
     gw_notify_stopping(&daemon->notify);
-    iw_gateway_stop(&daemon->gateway, daemon->now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
-    gw_tape_put(&daemon->tape,
-                &(blackbox_entry_t){.at_us = daemon->now_us, .kind = BLACKBOX_STOP, .a = IW_CAUSE_SHUTDOWN});
+    gw_wheels_stop(&daemon->wheels, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);
 }
 
 static void take_signal(gw_daemon_t *daemon) {
     struct signalfd_siginfo info;
-    if (read(daemon->signal_fd, &info, sizeof info) == (ssize_t)sizeof info && !daemon->shutting_down) {
+    if (read(daemon->signal_fd, &info, sizeof info) == (ssize_t)sizeof info && !daemon->wheels.shutting_down) {
         gw_log(&daemon->log, GW_LOG_INFO, "%s: stopping the wheels, then ending", strsignal((int)info.ssi_signo));
         shut_down(daemon);
     }
@@ -90,7 +86,7 @@ static void take_signal(gw_daemon_t *daemon) {
 /// Root's and the service's gateways do not wait for one of another user's.
 static void give_way(gw_daemon_t *daemon) {
     const gw_holder_t *holder = &daemon->runtime.lock.holder;
-    if (!daemon->shutting_down && gw_bus_lock_tend(&daemon->runtime.lock, daemon->now_us)) {
+    if (!daemon->wheels.shutting_down && gw_bus_lock_tend(&daemon->runtime.lock, daemon->wheels.now_us)) {
         daemon->gave_way = true;
         gw_log(&daemon->log, GW_LOG_WARNING,
                "a gateway of user %u (process %ld) serves %s now and goes before this one: stopping the wheels, then "
@@ -101,7 +97,8 @@ static void give_way(gw_daemon_t *daemon) {
 }
 
 static void mark_if_sending(gw_daemon_t *daemon) {
-    if (!daemon->config.core.listen_only && !gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon))) {
+    if (!daemon->config.core.listen_only &&
+        !gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels))) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "cannot change the crash marker %s: %s; after a crash the wheels would keep their last command for a "
                "second",
@@ -112,11 +109,7 @@ static void mark_if_sending(gw_daemon_t *daemon) {
 /// While the machine was suspended, the monotonic clock stood still and the wheels did not wait.
 static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
     if (suspended_us > daemon->suspended_us + IW_GATEWAY_LATE_US) {
-        iw_gateway_suspended(&daemon->gateway, suspended_us - daemon->suspended_us);
-        gw_tape_put(&daemon->tape,
-                    &(blackbox_entry_t){.at_us = daemon->now_us,
-                                        .kind = BLACKBOX_SUSPENDED,
-                                        .as = {.value = (int64_t)(suspended_us - daemon->suspended_us)}});
+        gw_wheels_slept(&daemon->wheels, suspended_us - daemon->suspended_us);
         gw_log(&daemon->log, GW_LOG_WARNING, "the machine was suspended for %llu ms",
                (unsigned long long)((suspended_us - daemon->suspended_us) / IW_US_PER_MS));
     }
@@ -125,22 +118,18 @@ static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
 
 /// The core's cycle, and what follows from it at once.
 static void step(gw_daemon_t *daemon) {
+    gw_wheels_t *wheels = &daemon->wheels;
     iw_time_us_t suspended_us;
-    daemon->now_us = iw_clock_read(&suspended_us);
+    wheels->now_us = iw_clock_read(&suspended_us);
     note_suspend(daemon, suspended_us);
-    iw_linux_hal_tend(&daemon->hal, daemon->now_us);
-    gw_bus_facts_follow(daemon);
+    iw_linux_hal_tend(&wheels->hal, wheels->now_us);
+    gw_bus_facts_follow(&daemon->facts, wheels, daemon->status.observed.left_behind);
     mark_if_sending(daemon); // Before the first frame that it warns of.
-    gw_tape_step_begin(&daemon->tape, daemon->now_us);
-    daemon->step_next_us = iw_gateway_step(&daemon->gateway, daemon->now_us);
-    gw_tape_step_end(&daemon->tape);
-    daemon->requested = false;
-    const iw_snapshot_t seen = gw_daemon_look(daemon);
-    gw_gaps_note(&daemon->gaps, seen.sent);
+    const iw_snapshot_t seen = gw_wheels_step(wheels);
     mark_if_sending(daemon);
-    iw_motion_evidence_look(&daemon->evidence, &daemon->gateway, &seen);
-    gw_observe(daemon);
-    gw_dispatch_arming(daemon);
+    iw_motion_evidence_look(&wheels->evidence, &wheels->core, &seen);
+    gw_observe(&daemon->status, &seen);
+    gw_dispatch_arming(&daemon->answers, &seen);
 }
 
 static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
@@ -148,35 +137,36 @@ static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
 }
 
 static iw_time_us_t look_us(const gw_daemon_t *daemon) {
-    const bool wanted = daemon->hal.estop_ops->present && gw_daemon_is_sending(daemon);
-    return wanted ? daemon->now_us + ESTOP_LOOK_US : IW_NEVER;
+    const bool wanted = daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels);
+    return wanted ? daemon->wheels.now_us + ESTOP_LOOK_US : IW_NEVER;
 }
 
 static void arm_timer(gw_daemon_t *daemon) {
-    iw_time_us_t next_us = earlier(daemon->step_next_us, iw_linux_hal_next_us(&daemon->hal));
-    next_us = earlier(next_us, gw_observe_next_us(daemon));
-    next_us = earlier(next_us, gw_service_next_us(daemon));
+    iw_time_us_t next_us = earlier(daemon->wheels.step_us, iw_linux_hal_next_us(&daemon->wheels.hal));
+    next_us = earlier(next_us, gw_observe_next_us(&daemon->clients));
+    next_us = earlier(next_us, gw_service_next_us(&daemon->clients));
     (void)gw_wakeup_by(&daemon->wakeup, earlier(next_us, look_us(daemon)));
 }
 
 /// Frames are worth waking for, unless they keep coming and nobody has any use for them at once: no client is there, and no
 /// setpoint or stop is under way. The e-stop and whoever connects wake us as ever, and then the bus is read first.
 static bool frames_may_wait(const gw_daemon_t *daemon) {
-    const bool all_taken = daemon->tape.tapped < GW_FRAMES;
-    return daemon->tape.tapped > 0U && all_taken && daemon->clients == 0U && !gw_daemon_is_sending(daemon);
+    const gw_tape_t *tape = &daemon->wheels.tape;
+    return tape->tapped > 0U && tape->tapped < GW_FRAMES && gw_clients_count(&daemon->clients) == 0U &&
+           !gw_wheels_are_sent_to(&daemon->wheels);
 }
 
 static void heed_bus(gw_daemon_t *daemon) {
     const bool may_wait = frames_may_wait(daemon);
     struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
     if (may_wait != daemon->frames_wait &&
-        epoll_ctl(daemon->epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->hal), &interest) == 0) {
+        epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->wheels.hal), &interest) == 0) {
         daemon->frames_wait = may_wait;
     }
 }
 
 static int wait_ms(const gw_daemon_t *daemon) {
-    if (gw_service_is_busy(daemon)) {
+    if (daemon->wheels.requested || gw_service_is_busy(&daemon->clients)) {
         return 0;
     }
     return daemon->frames_wait ? FRAMES_WAIT_MS : -1;
@@ -200,10 +190,10 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     case GW_TAG_BUS: // Looked at in every cycle.
         return false;
     case GW_TAG_ESTOP:
-        iw_linux_hal_waited(&daemon->hal, true);
+        iw_linux_hal_waited(&daemon->wheels.hal, true);
         return false;
     default: {
-        gw_client_t *client = &daemon->client[event->data.u64 - GW_TAG_CLIENT];
+        gw_client_t *client = &daemon->clients.client[event->data.u64 - GW_TAG_CLIENT];
         client->readable = (event->events & (EPOLLIN | EPOLLRDHUP)) != 0U;
         client->leaving = client->leaving || (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0U;
         client->hung_up = (event->events & (EPOLLHUP | EPOLLERR)) != 0U;
@@ -213,35 +203,43 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
 }
 
 static bool has_come_to_rest(const gw_daemon_t *daemon) {
-    return daemon->shutting_down && !gw_daemon_is_sending(daemon);
+    return daemon->wheels.shutting_down && !gw_wheels_are_sent_to(&daemon->wheels);
 }
 
 /// Told of by the wait, unless the writer had to be started anew: then by a look now and then.
 static void listen_to_writer(gw_daemon_t *daemon) {
-    if (daemon->now_us >= daemon->box_look_us) {
-        daemon->box_look_us = daemon->now_us + BOX_LOOK_US;
-        gw_record_take(daemon);
-        gw_recordings_take(daemon);
+    if (daemon->wheels.now_us >= daemon->box_look_us) {
+        daemon->box_look_us = daemon->wheels.now_us + BOX_LOOK_US;
+        gw_record_take(&daemon->box, &daemon->log);
+        if (!gw_recordings_take(&daemon->box, &daemon->clients)) {
+            gw_log(&daemon->log, GW_LOG_WARNING,
+                   "the process that reads recordings has ended (was it killed?); it is started again with the next "
+                   "request");
+        }
     }
+}
+
+static iw_client_t holder(const gw_daemon_t *daemon) {
+    return gw_wheels_look(&daemon->wheels).holder;
 }
 
 static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     step(daemon);
-    gw_service_clients(daemon);
-    if (daemon->requested) {
+    gw_service_clients(&daemon->clients, holder(daemon));
+    if (daemon->wheels.requested) {
         step(daemon); // A new command leaves at once.
     }
     if (somebody_knocks) {
-        gw_service_accept(daemon);
+        gw_service_accept(&daemon->clients);
     }
     listen_to_writer(daemon);
     heed_bus(daemon);
-    gw_observe_frames(daemon);
-    gw_observe_periodic(daemon);
-    gw_service_flush(daemon);
-    gw_knowledge_tend(daemon);
+    gw_observe_frames(&daemon->status);
+    gw_observe_periodic(&daemon->status);
+    gw_service_flush(&daemon->clients, holder(daemon));
+    gw_knowledge_tend(&daemon->knowledge);
     give_way(daemon);
-    gw_notify_cycle(&daemon->notify, daemon->now_us);
+    gw_notify_cycle(&daemon->notify, daemon->wheels.now_us);
 }
 
 int gw_loop_run(gw_daemon_t *daemon) {
@@ -249,14 +247,14 @@ int gw_loop_run(gw_daemon_t *daemon) {
     while (!has_come_to_rest(daemon)) {
         struct epoll_event events[EVENTS_PER_WAIT];
         arm_timer(daemon);
-        const int count = epoll_wait(daemon->epoll_fd, events, EVENTS_PER_WAIT, wait_ms(daemon));
+        const int count = epoll_wait(daemon->clients.epoll_fd, events, EVENTS_PER_WAIT, wait_ms(daemon));
         if (count < 0 && errno != EINTR) {
             return errno;
         }
         bool somebody_knocks = false;
-        iw_linux_hal_waited(&daemon->hal, count < 0); // Interrupted, it has found nothing out.
-        daemon->now_us = iw_clock_now_us();
-        daemon->woken_us = daemon->now_us;
+        iw_linux_hal_waited(&daemon->wheels.hal, count < 0); // Interrupted, it has found nothing out.
+        daemon->wheels.now_us = iw_clock_now_us();
+        daemon->clients.now_us = daemon->wheels.now_us;
         for (int i = 0; i < count; i++) {
             somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
         }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "answers/service.h"
-#include "bus/bus_facts.h"
+#include "clients/service.h"
+#include "daemon.h"
 #include "loop.h"
 #include "start/options.h"
 #include "start/report.h"
@@ -29,7 +29,7 @@ static int open_hal(gw_daemon_t *daemon) {
     const iw_estop_wish_t estop = {.name = daemon->config.estop.line,
                                    .active_high = daemon->config.estop.active_high,
                                    .debounce_ms = daemon->config.estop.debounce_ms};
-    const int error = iw_linux_hal_open(&daemon->hal, daemon->config.bus.interface, &estop, &culprit);
+    const int error = iw_linux_hal_open(&daemon->wheels.hal, daemon->config.bus.interface, &estop, &culprit);
     if (error != 0) {
         gw_report_unopened(&daemon->config, culprit, error, stderr);
         return EX_UNAVAILABLE;
@@ -38,44 +38,47 @@ static int open_hal(gw_daemon_t *daemon) {
 }
 
 static int start_core(gw_daemon_t *daemon) {
-    const iw_hal_t hal = gw_tape_hal(&daemon->tape, &daemon->hal);
-    const bool restarted = gw_runtime_crashed(&daemon->runtime) && !daemon->config.core.listen_only;
-    daemon->now_us = iw_clock_now_us();
+    const iw_config_t *config = &daemon->config.core;
+    const bool restarted = gw_runtime_crashed(&daemon->runtime) && !config->listen_only;
+    daemon->wheels.now_us = iw_clock_now_us();
     daemon->suspended_us = iw_clock_suspended_us();
-    if (iw_gateway_init(&daemon->gateway, &daemon->config.core, &hal, daemon->now_us, restarted) != IW_CONFIG_OK) {
+    if (gw_wheels_begin(&daemon->wheels, config, daemon->box.ring, restarted) != IW_CONFIG_OK) {
         (void)fputs("iwheel-gateway: the configuration contradicts itself; see iwheel-gateway --check\n", stderr);
         return EX_CONFIG;
     }
-    gw_tape_put(&daemon->tape, &(blackbox_entry_t){.at_us = daemon->now_us,
-                                                   .kind = BLACKBOX_START,
-                                                   .a = restarted,
-                                                   .b = daemon->config.core.listen_only});
-    iw_motion_evidence_init(&daemon->evidence);
-    gw_bus_facts_follow(daemon);
-    iwn_why_sentence(&daemon->last_stop.stop, &(iwn_why_context_t){0}, daemon->last_stop.sentence, IWN_SENTENCE_SIZE);
+    gw_bus_facts_follow(&daemon->facts, &daemon->wheels, false);
     if (restarted) {
         gw_log(&daemon->log, GW_LOG_WARNING,
                "the gateway before this one died while the wheels were armed: sending zeros for %u ms",
-               daemon->config.core.zero_hold_ms);
+               config->zero_hold_ms);
     }
     return 0;
 }
 
 /// Who only watches must not keep anybody from driving: without its socket the gateway serves all the same.
 static void listen_to_watchers(gw_daemon_t *daemon) {
-    gw_listener_t *watch = &daemon->listener[GW_WATCH];
-    *watch = (gw_listener_t){.right = GW_WATCH, .fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
-    if (gw_listener_wanted(&daemon->config, GW_WATCH) &&
-        (gw_listener_prepare(watch, &daemon->config, GW_WATCH, stderr) != 0 ||
-         gw_listener_open(watch, &daemon->config, &daemon->log, stderr) != 0)) {
+    const gw_listener_wish_t wish = gw_report_socket(&daemon->config, GW_WATCH);
+    gw_listener_t *watch = &daemon->clients.listener[GW_WATCH];
+    *watch = (gw_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
+    if (strcmp(wish.path, "none") != 0 &&
+        (gw_listener_prepare(watch, &wish, stderr) != 0 || gw_listener_open(watch, &daemon->log, stderr) != 0)) {
         gw_log(&daemon->log, GW_LOG_WARNING, "nobody can watch on %s (see above); who may drive is served all the same",
-               daemon->config.northbound.watch_socket);
+               wish.path);
+    }
+}
+
+static void tell_start(gw_daemon_t *daemon) {
+    const gw_wheels_t *wheels = &daemon->wheels;
+    gw_report_start(&daemon->config, wheels->hal.estop_ops->simulated, daemon->clients.listener[GW_WATCH].fd >= 0,
+                    &daemon->log);
+    for (uint32_t i = 0; i < wheels->warnings; i++) {
+        gw_log(&daemon->log, GW_LOG_WARNING, "%s", wheels->warning[i]);
     }
 }
 
 /// Everything between the start of the core and the loop, in the reverse order at the end.
 static int serve(gw_daemon_t *daemon) {
-    int result = gw_listener_open(&daemon->listener[GW_DRIVE], &daemon->config, &daemon->log, stderr);
+    int result = gw_listener_open(&daemon->clients.listener[GW_DRIVE], &daemon->log, stderr);
     if (result != 0) {
         return result;
     }
@@ -88,41 +91,70 @@ static int serve(gw_daemon_t *daemon) {
     }
     if (result == 0) {
         gw_notify_open(&daemon->notify);
-        gw_report_start(daemon);
+        tell_start(daemon);
         const int error = gw_loop_run(daemon);
         if (error != 0) {
             gw_log(&daemon->log, GW_LOG_ERROR, "waiting for events failed: %s", strerror(error));
             result = EX_SOFTWARE;
         }
         result = daemon->gave_way ? EX_UNAVAILABLE : result;
-        gw_service_close_all(daemon);
-        gw_knowledge_close(&daemon->knowledge, daemon->config.bus.interface);
+        gw_service_close_all(&daemon->clients);
+        gw_knowledge_close(&daemon->knowledge);
         gw_loop_close(daemon);
         gw_notify_close(&daemon->notify);
     }
-    gw_listener_close(&daemon->listener[GW_WATCH]);
-    gw_listener_close(&daemon->listener[GW_DRIVE]);
+    gw_listener_close(&daemon->clients.listener[GW_WATCH]);
+    gw_listener_close(&daemon->clients.listener[GW_DRIVE]);
     return result;
 }
 
+/// The configuration in force, as its file would be; NULL: no memory. To be freed.
+static char *print_config(const gateway_config_t *config) {
+    char *text = NULL;
+    size_t size;
+    FILE *memory = open_memstream(&text, &size);
+    if (memory != NULL) {
+        gateway_config_print(config, memory);
+        (void)fclose(memory);
+    }
+    return text;
+}
+
+static int open_box(gw_daemon_t *daemon, const char *config_text) {
+    const gateway_config_t *config = &daemon->config;
+    const gw_box_wish_t wish = {.blackbox_s = config->record.blackbox_s,
+                                .directory = config->record.directory,
+                                .bus = config->bus.interface,
+                                .estop = config->estop.line,
+                                .config = config_text};
+    if (config_text == NULL || gw_box_open(&daemon->box, &wish) != 0) {
+        (void)fputs("iwheel-gateway: not enough memory for the black box; lower [record] blackbox_s\n", stderr);
+        return EX_UNAVAILABLE;
+    }
+    return 0;
+}
+
 static int run(gw_daemon_t *daemon) {
-    gw_knowledge_open(&daemon->knowledge, &daemon->config);
-    int result = gw_listener_prepare(&daemon->listener[GW_DRIVE], &daemon->config, GW_DRIVE, stderr);
-    result = (result != 0) ? result : gw_runtime_open(&daemon->runtime, &daemon->config, GW_RUNTIME_DIRECTORY, stderr);
+    const gateway_config_t *config = &daemon->config;
+    const gw_listener_wish_t drive = gw_report_socket(config, GW_DRIVE);
+    gw_daemon_compose(daemon);
+    gw_knowledge_open(&daemon->knowledge, config->record.directory);
+    int result = gw_listener_prepare(&daemon->clients.listener[GW_DRIVE], &drive, stderr);
+    result = (result != 0) ? result
+                           : gw_runtime_open(&daemon->runtime, config->bus.interface, config->northbound.socket,
+                                             GW_RUNTIME_DIRECTORY, stderr);
     if (result != 0) {
         return result;
     }
-    if (gw_box_open(&daemon->box, &daemon->config) != 0) {
-        (void)fputs("iwheel-gateway: not enough memory for the black box; lower [record] blackbox_s\n", stderr);
-        result = EX_UNAVAILABLE;
-    }
-    gw_tape_init(&daemon->tape, daemon->box.ring);
+    char *text = print_config(config);
+    result = open_box(daemon, text);
     result = (result == 0) ? open_hal(daemon) : result;
     if (result == 0) {
         result = serve(daemon);
-        iw_linux_hal_close(&daemon->hal);
+        iw_linux_hal_close(&daemon->wheels.hal);
     }
     gw_box_close(&daemon->box);
+    free(text);
     gw_runtime_close(&daemon->runtime);
     return result;
 }

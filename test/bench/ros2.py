@@ -4,15 +4,15 @@
 
 usage: test/bench/ros2.py [--build DIR] [--rounds N]    with .venv's python
 
-In turns in one run: commands by libiwheel-client (the call to the first frame of its speed), and by cmd_vel (the same from the publisher's
-write, so all of DDS is in it). Beside it how soon another subscriber has such a message: that much of it is DDS's way, not the bridge's.
+In turns in one run: commands by libiwheel-client (from the call to the first frame of its speed), and by cmd_vel: from the publisher's write, and from when
+DDS in the bridge's process had received it (ros2_stamps.c, preloaded).
 """
 
 import argparse
 import ctypes
 import os
 import sys
-import threading
+import subprocess
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -22,39 +22,29 @@ from bus import now_us  # noqa: E402
 from harness import Process, Rig, percentile  # noqa: E402
 from peer import Peer  # noqa: E402
 
-from cyclonedds.core import Listener  # noqa: E402
-from cyclonedds.sub import DataReader  # noqa: E402
-
 COMMANDS, EVERY_S, COST_S = 120, 0.053, 10
+SPEEDS = (200, 260)
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 300, "accel_mm_s2": 20000, "decel_mm_s2": 20000}}
 
 
-class Heard(Listener):
-    """When another subscriber's reader has a message."""
-
-    def __init__(self):
-        super().__init__()
-        self.times, self.came = [], threading.Event()
-
-    def on_data_available(self, reader):
-        self.times.append(now_us())
-        reader.take(10)
-
-
-def measure(rig, send, speeds=(200, 260)):
-    """Microseconds from each command to the first frame with its speed."""
-    sent = []
-    for number in range(COMMANDS):
-        speed = speeds[number % 2]
-        sent.append((now_us(), speed))
-        send(speed)
-        time.sleep(EVERY_S)
-    frames, found = rig.bus.setpoints(sent[0][0]), []
-    for t_us, speed in sent[5:]:
+def to_frame(rig, commands):
+    """Microseconds from each (t_us, speed) to the first frame with its speed."""
+    frames, found = rig.bus.setpoints(commands[0][0]), []
+    for t_us, speed in commands[5:]:
         hit = next((at for at, _, told in frames if at >= t_us and told == speed), None)
         if hit is not None and hit - t_us < EVERY_S * 1e6:
             found.append(hit - t_us)
     return found
+
+
+def command(send):
+    """Two speeds in turn; what was sent, as (t_us, speed)."""
+    sent = []
+    for number in range(COMMANDS):
+        sent.append((now_us(), SPEEDS[number % 2]))
+        send(sent[-1][1])
+        time.sleep(EVERY_S)
+    return sent
 
 
 def by_client(rig, build):
@@ -62,21 +52,33 @@ def by_client(rig, build):
     library.iwc_new.restype = ctypes.c_void_p
     gateway = ctypes.c_void_p(library.iwc_new())
     assert library.iwc_connect(gateway, rig.path("gateway.sock").encode(), 1000) == 0
-    assert library.iwc_arm(gateway, b"bench", False, 1000, None) == 0
+    for _ in range(60):
+        if library.iwc_arm(gateway, b"bench", False, 1000, None) == 0:
+            break
+        time.sleep(0.1)
     try:
-        return measure(rig, lambda speed: library.iwc_twist(gateway, speed, 0, 40, None))
+        return to_frame(rig, command(lambda speed: library.iwc_twist(gateway, speed, 0, 40, None)))
     finally:
         library.iwc_stop(gateway, 1000)
         library.iwc_free(gateway)
 
 
 def by_bridge(rig, peer, writer):
+    """(from published, from received, inside the bridge)"""
     for _ in range(60):
         if peer.call("iwheel/arm")[0]:
             break
         time.sleep(0.1)
-    messages = {speed: peer.twist(speed / 1000) for speed in (200, 260)}
-    return measure(rig, lambda speed: writer.write(messages[speed]))
+    messages = {speed: peer.twist(speed / 1000) for speed in SPEEDS}
+    sent = command(lambda speed: writer.write(messages[speed]))
+    with open(rig.path("stamps"), encoding="ascii") as file:
+        stamps = [tuple(map(int, line.split())) for line in file]
+    received = []
+    for t_us, speed in sent:
+        found = next((stamp for stamp in stamps if t_us <= stamp[0] < t_us + EVERY_S * 1e6), None)
+        received += [(found, speed)] if found else []
+    inside = [left - came for (came, left), _ in received]
+    return to_frame(rig, sent), to_frame(rig, [(came, speed) for (came, _), speed in received]), inside
 
 
 def at_rest(rig, client):
@@ -99,38 +101,28 @@ def main():
         domain = 1 + os.getpid() % 230
         with open(rig.path("ros2.conf"), "w", encoding="utf-8") as file:
             file.write(f"[gateway]\nsocket = {rig.path('gateway.sock')}\n[ros]\ndomain = {domain}\nnetwork = loopback\n")
-        bridge = Process([os.path.join(options.build, "bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"))
+        preload = rig.path("stamps.so")
+        subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", preload, os.path.join(ROOT, "test/bench/ros2_stamps.c"), "-ldl"], check=True)
+        surroundings = {**os.environ, "LD_PRELOAD": preload, "BENCH_STAMPS": rig.path("stamps")}
+        bridge = Process([os.path.join(options.build, "bridge/ros2/iwheel-ros2"), "-c", rig.path("ros2.conf")], rig.path("bridge.out"), env=surroundings)
         rig.processes.append(bridge)
         peer, client = Peer(domain), rig.client()
         writer = peer.writer("cmd_vel", "geometry_msgs/msg/Twist")
         writer.await_match()
-        client_us, bridge_us = [], []
+        client_us, all_us = [], [[], [], []]
         for _ in range(options.rounds):
             client_us += by_client(rig, options.build)
             at_rest(rig, client)
-            bridge_us += by_bridge(rig, peer, writer)
+            for total, part in zip(all_us, by_bridge(rig, peer, writer)):
+                total += part
             at_rest(rig, client)
-        other, heard, way_us = Peer(domain), Heard(), []
-        reader = DataReader(other.participant, other.reader("unheard", "geometry_msgs/msg/Twist").reader.topic, listener=heard)
-        probe = peer.writer("unheard", "geometry_msgs/msg/Twist")
-        probe.await_match()
-        time.sleep(0.3)
-        for _ in range(COMMANDS):
-            heard.times.clear()
-            t_us = now_us()
-            probe.write(peer.twist(0.1))
-            time.sleep(0.02)
-            way_us += [heard.times[0] - t_us] if heard.times else []
         begin_s = bridge.cpu_seconds()
         time.sleep(COST_S)
         cost = (bridge.cpu_seconds() - begin_s) / COST_S
         print(f"drive by the C client to frame: {words(client_us)}")
-        print(f"cmd_vel published to frame:     {words(bridge_us)}, {percentile(bridge_us, 50) / percentile(client_us, 50):.2f} x")
-        print(f"published to another subscriber: {words(way_us)}")
-        received = percentile(bridge_us, 50) - percentile(way_us, 50)
-        print(f"so from reception to frame:     p50 about {received} µs, {received / percentile(client_us, 50):.2f} x")
+        for what, values in zip(("cmd_vel received to frame", "cmd_vel published to frame", "within the bridge"), (all_us[1], all_us[0], all_us[2])):
+            print(f"{what + ':':<31} {words(values)}, {percentile(values, 50) / percentile(client_us, 50):.2f} x")
         print(f"bridge at 50 Hz odometry:       {100 * cost:.1f} % of one processor, {bridge.resident_kB() / 1024:.1f} MiB resident, {len(os.listdir(f'/proc/{bridge.child.pid}/task'))} threads")
-        del reader
     finally:
         rig.close()
 

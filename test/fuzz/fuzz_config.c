@@ -2,7 +2,7 @@
 // Any bytes as a configuration file: refused with a message and nothing changed, or in force, printed and read back alike.
 #include "fuzz.h"
 
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 
 static void judge_accepted(const gateway_config_t *config, FILE *null) {
     static char printed[GATEWAY_CONFIG_FILE_MAX];

@@ -8,9 +8,9 @@ from bugs import Bug
 
 MOTION, REQUESTS = ("unit_daemon_motion",), ("unit_daemon_requests",)
 CAN, GPIO, CLOCK = ("unit_linux_socketcan",), ("unit_linux_gpio_estop",), ("unit_linux_clock",)
-LOOP, DISPATCH, SERVICE = "app/gateway/loop.c", "app/gateway/answers/dispatch.c", "app/gateway/answers/service.c"
+LOOP, DISPATCH, SERVICE = "app/gateway/loop.c", "app/gateway/answers/dispatch.c", "app/gateway/clients/service.c"
 REFUSE, WATCHERS = "app/gateway/answers/refuse.c", ("unit_daemon_watchers",)
-CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/box/tape.c", "core/src/evidence.c"
+CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/wheels/tape.c", "core/src/evidence.c"
 SOCKETCAN, BUS = "port/linux/src/socketcan.c", "port/linux/src/bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
 LEARN = "app/ctl/learn/learn.c"
@@ -22,21 +22,21 @@ JSON, REQUEST, LINES = ("unit_json_in",), ("unit_northbound_request",), ("unit_j
 
 PARTS = [
     # The loop.
-    Bug("marker-gone-at-stopping", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon))",
-        "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon) && iw_gateway_state(&daemon->gateway) != IW_STATE_STOPPING)", MOTION),
-    Bug("marker-gone-when-latched", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon))",
-        "gw_runtime_mark(&daemon->runtime, gw_daemon_is_sending(daemon) && iw_gateway_state(&daemon->gateway) != IW_STATE_LATCHED)", MOTION),
-    Bug("marker-after-the-first-frame", "R3", LOOP, "gw_bus_facts_follow(daemon); mark_if_sending(daemon);", "gw_bus_facts_follow(daemon);", MOTION),
-    Bug("suspension-not-told", "R7", LOOP, "iw_gateway_suspended(&daemon->gateway, suspended_us - daemon->suspended_us);", "", MOTION),
+    Bug("marker-gone-at-stopping", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels))",
+        "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels) && iw_gateway_state(&daemon->wheels.core) != IW_STATE_STOPPING)", MOTION),
+    Bug("marker-gone-when-latched", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels))",
+        "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels) && iw_gateway_state(&daemon->wheels.core) != IW_STATE_LATCHED)", MOTION),
+    Bug("marker-after-the-first-frame", "R3", LOOP, "daemon->status.observed.left_behind); mark_if_sending(daemon);", "daemon->status.observed.left_behind);", MOTION),
+    Bug("suspension-not-told", "R7", LOOP, "gw_wheels_slept(&daemon->wheels, suspended_us - daemon->suspended_us);", "", MOTION),
     Bug("suspension-told-again", "R7", LOOP, "daemon->suspended_us = (suspended_us > daemon->suspended_us) ? suspended_us : daemon->suspended_us;", "", MOTION),
-    Bug("estop-gone-unseen-between-setpoints", "R2", LOOP, "return wanted ? daemon->now_us + ESTOP_LOOK_US : IW_NEVER;", "(void)wanted; return IW_NEVER;", MOTION),
-    Bug("estop-edge-lost-in-the-wait", "R2", LOOP, "iw_linux_hal_waited(&daemon->hal, true);", "", MOTION),
-    Bug("signal-ends-at-once", "R4", LOOP, "daemon->shutting_down && !gw_daemon_is_sending(daemon)", "daemon->shutting_down", MOTION),
-    Bug("signal-ends-in-the-hold", "R4", LOOP, "daemon->shutting_down && !gw_daemon_is_sending(daemon)",
-        "daemon->shutting_down && iw_gateway_state(&daemon->gateway) != IW_STATE_ARMED && daemon->gateway.permit.view.output_zero", MOTION),
-    Bug("signal-without-a-stop", "R4", LOOP, "iw_gateway_stop(&daemon->gateway, daemon->now_us, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);", "", MOTION),
-    Bug("clients-wait-for-frames", "R11", LOOP, "all_taken && daemon->clients == 0U &&", "all_taken &&", MOTION),
-    Bug("latched-hold-is-no-sending", "R3", "app/gateway/daemon.c", "return iw_gateway_is_sending(&self->gateway);", "return iw_gateway_is_sending(&self->gateway) && iw_gateway_state(&self->gateway) != IW_STATE_LATCHED;", MOTION),
+    Bug("estop-gone-unseen-between-setpoints", "R2", LOOP, "return wanted ? daemon->wheels.now_us + ESTOP_LOOK_US : IW_NEVER;", "(void)wanted; return IW_NEVER;", MOTION),
+    Bug("estop-edge-lost-in-the-wait", "R2", LOOP, "iw_linux_hal_waited(&daemon->wheels.hal, true);", "", MOTION),
+    Bug("signal-ends-at-once", "R4", LOOP, "daemon->wheels.shutting_down && !gw_wheels_are_sent_to(&daemon->wheels)", "daemon->wheels.shutting_down", MOTION),
+    Bug("signal-ends-in-the-hold", "R4", LOOP, "daemon->wheels.shutting_down && !gw_wheels_are_sent_to(&daemon->wheels)",
+        "daemon->wheels.shutting_down && iw_gateway_state(&daemon->wheels.core) != IW_STATE_ARMED && daemon->wheels.core.permit.view.output_zero", MOTION),
+    Bug("signal-without-a-stop", "R4", LOOP, "gw_wheels_stop(&daemon->wheels, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);", "", MOTION),
+    Bug("clients-wait-for-frames", "R11", LOOP, "tape->tapped < GW_FRAMES && gw_clients_count(&daemon->clients) == 0U &&", "tape->tapped < GW_FRAMES &&", MOTION),
+    Bug("latched-hold-is-no-sending", "R3", "app/gateway/wheels/wheels.c", "return iw_gateway_is_sending(&self->core);", "return iw_gateway_is_sending(&self->core) && iw_gateway_state(&self->core) != IW_STATE_LATCHED;", MOTION),
     Bug("latch-goes-with-its-client", "R2", "core/src/permit.c", "if (client != self->holder) { return; }",
         "if (self->phase == IW_PHASE_LATCHED && self->stop.detail == client) { self->phase = IW_PHASE_LISTENING; } if (client != self->holder) { return; }",
         ("unit_permit_lease", *MOTION)),
@@ -48,14 +48,14 @@ PARTS = [
         "{saturate(request->right_mA), saturate(request->left_mA)}", REQUESTS),
     Bug("twist-turns-the-other-way", "R8", DISPATCH, "saturate(v_mm_s - rim_mm_s), saturate(v_mm_s + rim_mm_s)",
         "saturate(v_mm_s + rim_mm_s), saturate(v_mm_s - rim_mm_s)", REQUESTS),
-    Bug("lease-from-when-it-was-read", "R1", DISPATCH, "gw_client_sent_us(call->client, daemon->now_us, armed_us)",
-        "daemon->now_us; (void)armed_us", REQUESTS),
+    Bug("lease-from-when-it-was-read", "R1", DISPATCH, "gw_client_sent_us(call->client, wheels->now_us, armed_us)",
+        "wheels->now_us; (void)armed_us", REQUESTS),
     Bug("tare-tries-the-left-wheel-twice", "R9", "core/src/gateway.c", "iw_force_may_tare(&self->force[side], now_us)", "iw_force_may_tare(&self->force[IW_LEFT], now_us)", REQUESTS),
     Bug("tare-of-the-other-wheel", "ledger", "core/src/gateway.c", "iw_force_tare(&self->force[side], now_us)", "iw_force_tare(&self->force[1U - side], now_us)", REQUESTS),
-    Bug("armed-while-ending", "R4", DISPATCH, "if (daemon->shutting_down) {", "if (false) {", REQUESTS),
+    Bug("armed-while-ending", "R4", DISPATCH, "if (wheels->shutting_down) {", "if (false) {", REQUESTS),
     Bug("contradicted-type-drives", "R8", "core/src/gateway.c", "self->ledger.doubt != IW_LEDGER_ITEMS", "self->ledger.doubt > IW_LEDGER_ITEMS", REQUESTS),
     # Clients.
-    Bug("lease-outlives-its-client", "R1", SERVICE, "iw_gateway_disconnect(&daemon->gateway, daemon->now_us, client->id);", "", MOTION),
+    Bug("lease-outlives-its-client", "R1", DISPATCH, "gw_wheels_leave(self->wheels, client->id);", "", MOTION),
     Bug("lease-ends-after-the-lines", "R1", SERVICE, "if (client->leaving) {", "if (client->leaving && !client->readable) {", MOTION),
     Bug("command-from-before-arm-is-prompt", "R3", CLIENT, "<= GW_PROMPT_US && self->caught_up_us >= since_us;", "<= GW_PROMPT_US; (void)since_us;", REQUESTS),
     Bug("caught-up-with-lines-left", "R1", CLIENT, "self->drained && gw_client_line(self, &length) == NULL", "gw_client_line(self, &length) == NULL", ("unit_northbound_lines",)),
@@ -66,14 +66,14 @@ PARTS = [
     Bug("watcher-may-reset", "R2", REFUSE, "[IWN_CMD_HELLO] = true,", "[IWN_CMD_HELLO] = true, [IWN_CMD_RESET] = true,", WATCHERS),
     Bug("watcher-may-not-stop", "R2", REFUSE, "[IWN_CMD_STOP] = true,", "[IWN_CMD_STOP] = false,", WATCHERS),
     Bug("watcher-may-not-estop", "R2", REFUSE, "[IWN_CMD_ESTOP] = true,", "[IWN_CMD_ESTOP] = false,", WATCHERS),
-    Bug("watchers-take-the-slots-of-drivers", "R11", SERVICE, "(right == GW_WATCH) ? daemon->watchers : daemon->clients - daemon->watchers", "(void)right, daemon->clients", WATCHERS),
-    Bug("watchers-without-a-limit", "R11", SERVICE, "i < end && count_of(daemon, right) < most", "i < end", WATCHERS),
-    Bug("watcher-asks-without-end", "R11", SERVICE, "pace(client, daemon->now_us);", "", WATCHERS),
-    Bug("estop-again-recorded-each-time", "R2", "app/gateway/answers/dispatch.c", "daemon->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "false", WATCHERS),
-    Bug("estop-again-forgotten", "R2", "app/gateway/answers/dispatch.c", "daemon->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "true", WATCHERS),
-    Bug("denied-without-words", "northbound", REFUSE, "say_right(daemon, out_refusal); return true;", "out_refusal->error = IWN_DENIED; out_refusal->message[0] = 0; return true;", WATCHERS),
-    Bug("holder-served-in-turn", "R11", SERVICE, "if (holder != NULL) { (void)service(daemon, holder); }", "holder = NULL;", ("unit_service_rounds",)),
-    Bug("burst-of-telemetry-after-a-stall", "R11", "app/gateway/status/observe.c", "if (client->next_us <= daemon->now_us) {", "if (false) {", REQUESTS),
+    Bug("watchers-take-the-slots-of-drivers", "R11", SERVICE, "self->count[right] < self->most[right]", "gw_clients_count(self) < self->most[right]", WATCHERS),
+    Bug("watchers-without-a-limit", "R11", SERVICE, "i < end && self->count[right] < self->most[right]", "i < end", WATCHERS),
+    Bug("watcher-asks-without-end", "R11", SERVICE, "pace(client, self->now_us);", "", WATCHERS),
+    Bug("estop-again-recorded-each-time", "R2", DISPATCH, "wheels->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "false", WATCHERS),
+    Bug("estop-again-forgotten", "R2", DISPATCH, "wheels->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "true", WATCHERS),
+    Bug("denied-without-words", "northbound", REFUSE, "say_right(answers, out_refusal); return true;", "out_refusal->error = IWN_DENIED; out_refusal->message[0] = 0; return true;", WATCHERS),
+    Bug("holder-served-in-turn", "R11", SERVICE, "if (holder != NULL) { (void)service(self, holder); }", "holder = NULL;", ("unit_service_rounds",)),
+    Bug("burst-of-telemetry-after-a-stall", "R11", "app/gateway/status/observe.c", "if (client->next_us <= self->wheels->now_us) {", "if (false) {", REQUESTS),
     # The northbound library.
     Bug("names-compared-as-they-are-spelt", "northbound", CHECKER, "a = iwn_scan_character(&one); b = iwn_scan_character(&other);",
         "a = (unsigned char)*one++; b = (unsigned char)*other++; a = (a == '\"') ? 0U : a; b = (b == '\"') ? 0U : b;", JSON),
@@ -110,17 +110,17 @@ PARTS = [
     Bug("tape-tells-its-own-time", "recordings", TAPE, "self->step_us = now_us;", "self->step_us = self->step_us == 0U ? now_us : self->step_us;", ("unit_gateway_tape",)),
     Bug("misses-add-up-for-ever", "ledger", EVIDENCE, "self->misses = 0;", "", ("unit_evidence",)),
     Bug("type-confirmed-by-a-changing-command", "ledger", EVIDENCE, "|| applied != self->applied_mm_s)", ")", ("unit_evidence",)),
-    Bug("stored-offset-of-another-unit", "ledger", "app/gateway/ledger/knowledge.c", "if (stored->unit != daemon->config.core.force_unit[side]) {", "if (false) {",
+    Bug("stored-offset-of-another-unit", "ledger", "app/gateway/ledger/knowledge.c", "if (stored->unit != self->configured.core->force_unit[side]) {", "if (false) {",
         ("unit_daemon_memory",)),
     Bug("stored-finding-for-another-value", "ledger", "app/gateway/ledger/knowledge.c", "if (strcmp(value, stored->value) != 0) {", "if (false) {", ("unit_daemon_memory",)),
-    Bug("stored-contradiction-confirms", "ledger", "app/gateway/ledger/knowledge.c", "iw_gateway_know(&daemon->gateway, item, &stored->entry);",
-        "const iw_ledger_entry_t good = {IW_LEDGER_CONFIRMED, stored->entry.evidence, stored->entry.figure}; iw_gateway_know(&daemon->gateway, item, &good);",
+    Bug("stored-contradiction-confirms", "ledger", "app/gateway/ledger/knowledge.c", "gw_wheels_know(self->wheels, item, &stored->entry);",
+        "const iw_ledger_entry_t good = {IW_LEDGER_CONFIRMED, stored->entry.evidence, stored->entry.figure}; gw_wheels_know(self->wheels, item, &good);",
         ("unit_daemon_memory",)),
-    Bug("tare-noted-with-the-left-wheels-figures", "ledger", "app/gateway/ledger/knowledge.c", "quality = daemon->knowledge.tare[side];", "quality = daemon->knowledge.tare[IW_LEFT];",
+    Bug("tare-noted-with-the-left-wheels-figures", "ledger", "app/gateway/ledger/knowledge.c", "quality = self->tare[side];", "quality = self->tare[IW_LEFT];",
         ("unit_daemon_memory",)),
     Bug("status-with-the-entries-of-before", "ledger", STATUS_LEDGER, "is_alike(written->assumed, source->assumed, sizeof written->assumed) &&", "", ("unit_daemon_memory",)),
     Bug("status-with-the-words-of-before", "ledger", STATUS_LEDGER, "is_alike(written->known, source->known, sizeof written->known)", "true", ("unit_daemon_memory",)),
-    Bug("status-with-the-values-of-before", "ledger", STATUS_LEDGER, "is_alike(&written->config, source->config, sizeof written->config) &&", "", ("unit_daemon_memory",)),
+    Bug("status-with-the-values-of-before", "ledger", STATUS_LEDGER, "is_alike(&written->config, source->configured->core, sizeof written->config) &&", "", ("unit_daemon_memory",)),
     Bug("status-of-a-line-that-did-not-fit", "ledger", STATUS_LEDGER, "json->overflow ? 0U : json->length - begin", "json->length - begin", ("unit_daemon_memory",)),
     # SocketCAN.
     Bug("bus-off-forgotten", "R13", BUS, "bus->unheeded = IW_BUS_OFF; bus->present = forged", "bus->present = forged", CAN),

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "daemon_rig.h"
 
-#include "answers/service.h"
-#include "bus/bus_facts.h"
+#include "clients/service.h"
+#include "daemon.h"
 #include "loop.h"
-#include "status/observe.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -229,14 +228,13 @@ static int listen_somewhere(void) {
 }
 
 static void begin_core(gw_daemon_t *daemon) {
-    daemon->hal = (iw_linux_hal_t){.estop_ops = &estop_ops, .estop_last = -1};
-    daemon->now_us = daemon_rig.now_us;
+    gw_wheels_t *wheels = &daemon->wheels;
+    wheels->hal = (iw_linux_hal_t){.estop_ops = &estop_ops, .estop_last = -1};
+    wheels->now_us = daemon_rig.now_us;
     daemon->suspended_us = daemon_rig.suspended_us;
-    const iw_hal_t hal = gw_tape_hal(&daemon->tape, &daemon->hal);
-    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_gateway_init(&daemon->gateway, &daemon->config.core, &hal, daemon->now_us,
+    TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, gw_wheels_begin(wheels, &daemon->config.core, daemon->box.ring,
                                                         gw_runtime_crashed(&daemon->runtime)));
-    iw_motion_evidence_init(&daemon->evidence);
-    gw_bus_facts_follow(daemon);
+    gw_bus_facts_follow(&daemon->facts, wheels, false);
 }
 
 void daemon_rig_start(void) {
@@ -245,15 +243,15 @@ void daemon_rig_start(void) {
     rig->daemon = daemon;
     gateway_config_default(&daemon->config);
     fixture_config(&daemon->config.core);
-    daemon->config.record.blackbox_s = 0;
     (void)snprintf(daemon->config.bus.interface, sizeof daemon->config.bus.interface, "unix:%.60s/bus", rig->folder);
     gw_log_open(&daemon->log, GW_LOG_ERROR);
-    TEST_ASSERT_EQUAL_INT(0, gw_runtime_open(&daemon->runtime, &daemon->config, rig->folder, stderr));
-    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon->box, &daemon->config));
-    gw_tape_init(&daemon->tape, daemon->box.ring);
+    gw_daemon_compose(daemon);
+    TEST_ASSERT_EQUAL_INT(0, gw_runtime_open(&daemon->runtime, daemon->config.bus.interface,
+                                             daemon->config.northbound.socket, rig->folder, stderr));
+    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon->box, &(gw_box_wish_t){.blackbox_s = 0}));
     for (unsigned right = 0; right < GW_RIGHTS; right++) {
-        daemon->listener[right] =
-            (gw_listener_t){.right = (gw_right_t)right, .fd = listen_somewhere(), .reserve_fd = -1};
+        daemon->clients.listener[right] =
+            (gw_listener_t){.wish = {.right = (gw_right_t)right}, .fd = listen_somewhere(), .reserve_fd = -1};
     }
     daemon->knowledge.answered = true; // Nobody keeps anything.
     daemon->knowledge.write_us = IW_NEVER;
@@ -265,16 +263,16 @@ void daemon_rig_start(void) {
 void daemon_rig_crash(void) {
     gw_daemon_t *daemon = daemon_rig.daemon;
     for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
-        if (daemon->client[i].id != IW_CLIENT_NONE) {
-            (void)close(daemon->client[i].fd);
+        if (daemon->clients.client[i].id != IW_CLIENT_NONE) {
+            (void)close(daemon->clients.client[i].fd);
         }
     }
     gw_loop_close(daemon);
     gw_notify_close(&daemon->notify);
     for (unsigned right = 0; right < GW_RIGHTS; right++) {
-        (void)close(daemon->listener[right].fd);
-        if (daemon->listener[right].reserve_fd >= 0) {
-            (void)close(daemon->listener[right].reserve_fd);
+        (void)close(daemon->clients.listener[right].fd);
+        if (daemon->clients.listener[right].reserve_fd >= 0) {
+            (void)close(daemon->clients.listener[right].reserve_fd);
         }
     }
     gw_box_close(&daemon->box);
@@ -322,7 +320,8 @@ int daemon_rig_connect_with(gw_right_t right) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     socklen_t length = sizeof address;
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
-    TEST_ASSERT_EQUAL_INT(0, getsockname(daemon_rig.daemon->listener[right].fd, (struct sockaddr *)&address, &length));
+    TEST_ASSERT_EQUAL_INT(
+        0, getsockname(daemon_rig.daemon->clients.listener[right].fd, (struct sockaddr *)&address, &length));
     TEST_ASSERT_EQUAL_INT(0, connect(fd, (const struct sockaddr *)&address, length));
     daemon_rig_run(2);
     return fd;
@@ -389,5 +388,5 @@ bool daemon_rig_marked(void) {
 }
 
 iw_state_t daemon_rig_state(void) {
-    return iw_gateway_state(&daemon_rig.daemon->gateway);
+    return iw_gateway_state(&daemon_rig.daemon->wheels.core);
 }

@@ -47,7 +47,7 @@ signal.pause()
 
 
 def lock_names(bus):
-    """What root's gateway would call itself in the network namespace: app/gateway/process/bus_names.h."""
+    """What root's gateway would call itself in the network namespace: app/gateway/lock/bus_names.h."""
     key = bus
     if bus.startswith("unix:"):
         value = 0xCBF29CE484222325

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The ledger's items in words: the value in force, what somebody found beside it, what a contradiction costs.
-#include "assumption.h"
+#include "words/assumption.h"
 
 #include "iwheel_northbound/words.h"
 
@@ -9,18 +9,20 @@
 #include <stdio.h>
 #include <string.h>
 
-static gateway_config_t config;
+static iw_config_t config;
+static gw_configured_t configured = {&config, 540};
 static char text[GW_EVIDENCE_SIZE];
 
 void setUp(void) {
-    gateway_config_default(&config);
-    config.core.setpoint_type_set = true;
-    config.core.setpoint_type = 7;
-    config.core.current_role = IW_ROLE_SETPOINT;
-    config.core.invert[IW_RIGHT] = true;
-    config.core.gear_turns = 10;
-    config.core.gear_per = 3;
-    config.core.rpm_of_rotor = true;
+    iw_config_default(&config);
+    configured.track_mm = 540;
+    config.setpoint_type_set = true;
+    config.setpoint_type = 7;
+    config.current_role = IW_ROLE_SETPOINT;
+    config.invert[IW_RIGHT] = true;
+    config.gear_turns = 10;
+    config.gear_per = 3;
+    config.rpm_of_rotor = true;
 }
 
 void tearDown(void) {}
@@ -28,12 +30,12 @@ void tearDown(void) {}
 static void assert_value(iw_ledger_item_t item, const char *expected) {
     char value[IWN_VALUE_SIZE];
     memset(value, 0x5A, sizeof value);
-    gw_assumption_value(&config, item, value);
+    gw_assumption_value(&configured, item, value);
     TEST_ASSERT_EQUAL_STRING(expected, value);
 }
 
 static void assert_found(gw_found_t expected, iw_ledger_item_t item, const char *found) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(expected, gw_assumption_compare(&config, item, found), found);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected, gw_assumption_compare(&configured, item, found), found);
 }
 
 static void test_assumption_values_are_those_of_the_configuration(void) {
@@ -48,15 +50,15 @@ static void test_assumption_values_are_those_of_the_configuration(void) {
     assert_value(IW_LEDGER_GEAR_RATIO, "10/3, rpm of the rotor");
     assert_value(IW_LEDGER_OFFSET_INCLUDED, "yes");
     assert_value(IW_LEDGER_DLC, "yes");
-    gateway_config_default(&config);
+    iw_config_default(&config);
     assert_value(IW_LEDGER_SETPOINT_TYPE, "");
     assert_value(IW_LEDGER_CURRENT_ROLE, "");
     assert_value(IW_LEDGER_GEAR_RATIO, "1, rpm of the wheel");
 }
 
 static void test_assumption_longest_values_fit(void) {
-    config.core.gear_turns = 1000;
-    config.core.gear_per = 999;
+    config.gear_turns = 1000;
+    config.gear_per = 999;
     assert_value(IW_LEDGER_GEAR_RATIO, "1000/999, rpm of the rotor");
 }
 
@@ -80,7 +82,7 @@ static void test_assumption_without_a_value_the_configured_one_is_meant(void) {
 }
 
 static void test_assumption_what_is_not_configured_cannot_be_confirmed(void) {
-    gateway_config_default(&config);
+    iw_config_default(&config);
     assert_found(GW_FOUND_UNSET, IW_LEDGER_SETPOINT_TYPE, "");
     assert_found(GW_FOUND_UNSET, IW_LEDGER_SETPOINT_TYPE, "7");
     assert_found(GW_FOUND_UNSET, IW_LEDGER_CURRENT_ROLE, "limit");
@@ -109,7 +111,7 @@ static void test_assumption_a_radius_within_two_percent_is_the_same(void) {
 }
 
 static void test_assumption_a_track_within_two_percent_is_the_same(void) {
-    config.track_mm = 600;
+    configured.track_mm = 600;
     assert_value(IW_LEDGER_TRACK, "600");
     assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "600");
     assert_found(GW_FOUND_SAME, IW_LEDGER_TRACK, "588");

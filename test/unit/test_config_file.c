@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The gateway's configuration file: what is accepted, what is refused, and what the refusal says.
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 
 #include "unity.h"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What an earlier run has kept, put beside what this one knows: in the daemon's loop, with a keeper played by the test.
-#include "assumption.h"
-#include "clients/event.h"
+#include "clients/clients.h"
 #include "daemon_rig.h"
 #include "status/snapshot.h"
+#include "words/assumption.h"
 
 #include "unity.h"
 
@@ -54,11 +54,11 @@ void gw_keeper_close(gw_keeper_t *self) {
 }
 
 static const iw_config_t *config(void) {
-    return &daemon_rig.daemon->gateway.config;
+    return &daemon_rig.daemon->wheels.core.config;
 }
 
 static const iw_ledger_entry_t *entry(iw_ledger_item_t item) {
-    return iw_ledger_entry(&daemon_rig.daemon->gateway.ledger, item);
+    return iw_ledger_entry(&daemon_rig.daemon->wheels.core.ledger, item);
 }
 
 /// A finding of an earlier run for what is configured now.
@@ -67,12 +67,17 @@ static void store(iw_ledger_item_t item, iw_ledger_state_t state, iw_evidence_t 
     const bool measured = evidence == IW_EVIDENCE_BUS; // The operator's word has no figure.
     known->entry = (iw_ledger_entry_t){.state = state, .evidence = evidence, .figure = measured ? 1000 : 0};
     known->since_wall_us = 1700000000000000;
-    gw_assumption_value(&daemon_rig.daemon->config, item, known->value);
+    gw_assumption_value(&daemon_rig.daemon->knowledge.configured, item, known->value);
 }
 
 static void store_offset(iw_side_t side, iw_force_unit_t unit, int32_t offset_mN) {
     stored.offset[side] = (gw_known_offset_t){
         .from = IW_OFFSET_OPERATOR, .unit = unit, .offset_mN = offset_mN, .samples = 40, .wall_us = 1700000000000000};
+}
+
+static void observe(void) {
+    const iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
+    gw_knowledge_observe(&daemon_rig.daemon->knowledge, &seen);
 }
 
 /// The keeper tells it, as soon as the loop runs.
@@ -124,7 +129,7 @@ static void test_memory_contradiction_stays_one(void) {
 
 static void test_memory_contradiction_of_this_run_is_not_talked_over(void) {
     store(IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR);
-    iw_ledger_contradict(&daemon_rig.daemon->gateway.ledger, IW_LEDGER_GEAR_RATIO, IW_EVIDENCE_BUS, 3000);
+    iw_ledger_contradict(&daemon_rig.daemon->wheels.core.ledger, IW_LEDGER_GEAR_RATIO, IW_EVIDENCE_BUS, 3000);
     tell_stored();
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, entry(IW_LEDGER_GEAR_RATIO)->state);
 }
@@ -133,10 +138,10 @@ static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
     store_offset(IW_RIGHT, (config()->force_unit[IW_RIGHT] == IW_FORCE_CN) ? IW_FORCE_DN : IW_FORCE_CN, 4321);
     tell_stored();
-    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->gateway.force[IW_LEFT].provenance);
-    TEST_ASSERT_EQUAL_INT32(1234, daemon_rig.daemon->gateway.force[IW_LEFT].offset_mN);
-    TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, daemon_rig.daemon->gateway.force[IW_RIGHT].provenance);
-    TEST_ASSERT_NOT_EQUAL(4321, daemon_rig.daemon->gateway.force[IW_RIGHT].offset_mN);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->wheels.core.force[IW_LEFT].provenance);
+    TEST_ASSERT_EQUAL_INT32(1234, daemon_rig.daemon->wheels.core.force[IW_LEFT].offset_mN);
+    TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, daemon_rig.daemon->wheels.core.force[IW_RIGHT].provenance);
+    TEST_ASSERT_NOT_EQUAL(4321, daemon_rig.daemon->wheels.core.force[IW_RIGHT].offset_mN);
 }
 
 static void test_memory_of_a_tare_has_the_figures_of_that_wheel(void) {
@@ -145,7 +150,8 @@ static void test_memory_of_a_tare_has_the_figures_of_that_wheel(void) {
     const gw_known_t *known = &daemon_rig.daemon->knowledge.known;
     TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, known->offset[IW_RIGHT].from);
     TEST_ASSERT_GREATER_THAN_UINT32(20, known->offset[IW_RIGHT].samples);
-    TEST_ASSERT_EQUAL_INT32(daemon_rig.daemon->gateway.force[IW_RIGHT].offset_mN, known->offset[IW_RIGHT].offset_mN);
+    TEST_ASSERT_EQUAL_INT32(daemon_rig.daemon->wheels.core.force[IW_RIGHT].offset_mN,
+                            known->offset[IW_RIGHT].offset_mN);
     TEST_ASSERT_NOT_EQUAL(IW_OFFSET_OPERATOR, known->offset[IW_LEFT].from);
 }
 
@@ -167,8 +173,8 @@ static gw_ledger_written_t *written(void) {
 }
 
 static const char *write_status(char out_line[GW_REPLY_MAX]) {
-    iwn_out_t json = gw_event_begin(daemon_rig.daemon, "state");
-    gw_snapshot_write(daemon_rig.daemon, &json);
+    iwn_out_t json = gw_clients_begin_event(&daemon_rig.daemon->clients, "state");
+    gw_snapshot_write(&daemon_rig.daemon->status, &json);
     iwn_out_close(&json, '}');
     const size_t end = iwn_out_finish(&json);
     TEST_ASSERT_GREATER_THAN_size_t(1, end);
@@ -192,16 +198,17 @@ static void expect_new_status(const char *changed) {
 
 /// From "nobody knows" through all that may become of it.
 static void change_item(iw_ledger_item_t item) {
-    iw_ledger_t *ledger = &daemon_rig.daemon->gateway.ledger;
+    iw_ledger_t *ledger = &daemon_rig.daemon->wheels.core.ledger;
     gw_known_item_t *known = &daemon_rig.daemon->knowledge.known.item[item];
     const gw_word_t word = {"", "a tape"};
+    iwn_refusal_t refusal;
     *known = (gw_known_item_t){0}; // Some were settled by the first frames.
     ledger->entry[item] = (iw_ledger_entry_t){0};
     iw_ledger_confirm(ledger, item, IW_EVIDENCE_BUS, 1000);
     expect_new_status("confirmed by the bus");
     iw_ledger_confirm(ledger, item, IW_EVIDENCE_BUS, -2500);
     expect_new_status("another figure");
-    gw_knowledge_observe(daemon_rig.daemon);
+    observe();
     expect_new_status("noted");
     known->since_wall_us++;
     expect_new_status("noted later");
@@ -213,8 +220,7 @@ static void change_item(iw_ledger_item_t item) {
     expect_new_status("how, in its last letter");
     iw_ledger_contradict(ledger, item, IW_EVIDENCE_BUS, 1000);
     expect_new_status("contradicted by the bus");
-    TEST_ASSERT_EQUAL_INT(GW_FOUND_SAME, gw_knowledge_confirm(daemon_rig.daemon, item, &word));
-    gw_knowledge_observe(daemon_rig.daemon);
+    TEST_ASSERT_TRUE(gw_knowledge_confirm(&daemon_rig.daemon->knowledge, item, &word, &refusal));
     expect_new_status("confirmed by the operator");
     ledger->entry[item] = (iw_ledger_entry_t){0};
     expect_new_status("as if it had never been asked");
@@ -227,8 +233,7 @@ static void test_status_after_a_change_of_an_item_is_as_written_anew(void) {
 }
 
 static void test_status_after_a_change_of_the_configuration_is_as_written_anew(void) {
-    gateway_config_t *configured = &daemon_rig.daemon->config;
-    iw_config_t *core = &configured->core;
+    iw_config_t *core = &daemon_rig.daemon->config.core;
     core->setpoint_type++;
     expect_new_status("setpoint_type");
     core->setpoint_type_set = false;
@@ -243,7 +248,7 @@ static void test_status_after_a_change_of_the_configuration_is_as_written_anew(v
     expect_new_status("gear_ratio, per");
     core->rpm_of_rotor = !core->rpm_of_rotor;
     expect_new_status("rpm_of");
-    configured->track_mm++;
+    daemon_rig.daemon->knowledge.configured.track_mm++;
     expect_new_status("track_mm");
     for (unsigned side = 0; side < IW_SIDES; side++) {
         core->invert[side] = !core->invert[side];
@@ -257,9 +262,9 @@ static void test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew(
     iw_side_t refused;
     daemon_rig_run(3000);
     expect_new_status("three seconds later");
-    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, gw_knowledge_tare(daemon_rig.daemon, IW_SIDES_RIGHT, &refused));
+    TEST_ASSERT_EQUAL_INT(IW_TARE_OK, gw_knowledge_tare(&daemon_rig.daemon->knowledge, IW_SIDES_RIGHT, &refused));
     expect_new_status("right wheel tared");
-    gw_knowledge_observe(daemon_rig.daemon);
+    observe();
     expect_new_status("tare noted");
     store(IW_LEDGER_GEAR_RATIO, IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR);
     store_offset(IW_LEFT, config()->force_unit[IW_LEFT], 1234);
@@ -286,7 +291,7 @@ static void test_status_with_a_ledger_too_long_to_keep_is_written_anew_each_time
         gw_known_item_t *known = &daemon_rig.daemon->knowledge.known.item[item];
         known->entry = (iw_ledger_entry_t){IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
         memset(known->word.how, 0x7F, sizeof known->word.how - 1U);
-        daemon_rig.daemon->gateway.ledger.entry[item] = known->entry;
+        daemon_rig.daemon->wheels.core.ledger.entry[item] = known->entry;
     }
     (void)write_status(first);
     TEST_ASSERT_EQUAL_size_t(0, written()->length);
@@ -299,7 +304,7 @@ static void test_status_that_does_not_fit_keeps_nothing(void) {
     iwn_out_t json;
     iwn_out_init(&json, line, sizeof line);
     written()->length = 0;
-    gw_snapshot_write(daemon_rig.daemon, &json);
+    gw_snapshot_write(&daemon_rig.daemon->status, &json);
     TEST_ASSERT_TRUE(json.overflow);
     TEST_ASSERT_EQUAL_size_t(0, written()->length);
 }

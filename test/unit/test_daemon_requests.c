@@ -111,9 +111,9 @@ static void test_tare_of_one_wheel_leaves_the_other(void) {
     daemon_rig_run(3000);
     const iw_time_us_t asked_us = daemon_rig.now_us;
     assert_reply("{\"cmd\":\"tare\",\"side\":\"left\"}", "\"left\":{");
-    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->gateway.force[IW_LEFT].provenance);
-    TEST_ASSERT_TRUE(daemon_rig.daemon->gateway.force[IW_LEFT].offset_us >= asked_us);
-    TEST_ASSERT_TRUE(daemon_rig.daemon->gateway.force[IW_RIGHT].provenance != IW_OFFSET_OPERATOR);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, daemon_rig.daemon->wheels.core.force[IW_LEFT].provenance);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->wheels.core.force[IW_LEFT].offset_us >= asked_us);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->wheels.core.force[IW_RIGHT].provenance != IW_OFFSET_OPERATOR);
 }
 
 static void test_tare_of_both_that_one_cannot_have_changes_neither(void) {
@@ -123,7 +123,7 @@ static void test_tare_of_both_that_one_cannot_have_changes_neither(void) {
     assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
     daemon_rig_run(1000);
     assert_reply("{\"cmd\":\"tare\"}", "the right wheel");
-    TEST_ASSERT_TRUE(daemon_rig.daemon->gateway.force[IW_LEFT].provenance != IW_OFFSET_OPERATOR);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->wheels.core.force[IW_LEFT].provenance != IW_OFFSET_OPERATOR);
 }
 
 static void test_client_that_goes_while_it_arms_leaves_no_lease(void) {
@@ -175,14 +175,14 @@ static void test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest(void)
 }
 
 static void test_arm_while_shutting_down_is_refused(void) {
-    daemon_rig.daemon->shutting_down = true;
-    daemon_rig.daemon->gateway.permit.phase = IW_PHASE_HOLDING; // So that the loop goes on.
-    daemon_rig.daemon->gateway.permit.hold_us = daemon_rig.now_us;
+    daemon_rig.daemon->wheels.shutting_down = true;
+    daemon_rig.daemon->wheels.core.permit.phase = IW_PHASE_HOLDING; // So that the loop goes on.
+    daemon_rig.daemon->wheels.core.permit.hold_us = daemon_rig.now_us;
     assert_reply("{\"cmd\":\"arm\"}", "shutting down");
 }
 
 static void test_arm_with_what_motion_depends_on_contradicted_is_denied(void) {
-    iw_ledger_contradict(&daemon_rig.daemon->gateway.ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
+    iw_ledger_contradict(&daemon_rig.daemon->wheels.core.ledger, IW_LEDGER_SETPOINT_TYPE, IW_EVIDENCE_OPERATOR, 0);
     assert_reply("{\"cmd\":\"arm\"}", "\"error\":\"denied\"");
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Who may watch and who may drive: the right to each request by each socket, and that watchers take nothing from drivers.
 #include "answers/dispatch.h"
-#include "answers/service.h"
+#include "clients/service.h"
 #include "daemon_rig.h"
 
 #include "unity.h"
@@ -44,7 +44,7 @@ static unsigned crowded;
 
 void setUp(void) {
     daemon_rig_begin();
-    daemon_rig.daemon->config.northbound.max_watchers = CROWD;
+    daemon_rig.daemon->clients.most[GW_WATCH] = CROWD;
     driver = daemon_rig_connect();
     watcher = daemon_rig_connect_with(GW_WATCH);
     crowded = 0;
@@ -151,9 +151,9 @@ static void test_reset_that_an_estop_keeps_away_names_user_and_process(void) {
 // Quotas -------------------------------------------------------------------------------------------------------------------
 
 static void test_watchers_take_no_slot_of_a_driver(void) {
-    daemon_rig.daemon->config.northbound.max_clients = 2;
+    daemon_rig.daemon->clients.most[GW_DRIVE] = 2;
     connect_crowd(CROWD - 1U);
-    TEST_ASSERT_EQUAL_UINT(CROWD, daemon_rig.daemon->watchers);
+    TEST_ASSERT_EQUAL_UINT(CROWD, daemon_rig.daemon->clients.count[GW_WATCH]);
     const int second = daemon_rig_connect();
     assert_has(daemon_rig_ask(second, "{\"cmd\":\"hello\"}"), "\"rights\":\"drive\"");
     const int third = daemon_rig_connect();
@@ -165,7 +165,7 @@ static void test_watchers_take_no_slot_of_a_driver(void) {
 }
 
 static void test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again(void) {
-    daemon_rig.daemon->config.northbound.max_watchers = 2;
+    daemon_rig.daemon->clients.most[GW_WATCH] = 2;
     connect_crowd(2);
     char text[GW_CLIENT_TEXT_SIZE * 4U] = "";
     TEST_ASSERT_GREATER_THAN_INT(0, recv(crowd[1], text, sizeof text - 1U, MSG_DONTWAIT));
@@ -176,8 +176,8 @@ static void test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_ag
     daemon_rig_run(10);
     connect_crowd(1);
     assert_has(daemon_rig_ask(crowd[2], "{\"cmd\":\"hello\"}"), "\"rights\":\"watch\"");
-    TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->watchers);
-    TEST_ASSERT_EQUAL_UINT(3, daemon_rig.daemon->clients);
+    TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[GW_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(3, gw_clients_count(&daemon_rig.daemon->clients));
 }
 
 static void test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing(void) {
@@ -228,7 +228,7 @@ static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void
     daemon_rig_arm(driver);
     daemon_rig_drive(driver, 300, 300, 500);
     connect_crowd(CROWD - 1U);
-    const uint32_t stops = gw_daemon_look(daemon_rig.daemon).stop->number;
+    const uint32_t stops = gw_wheels_look(&daemon_rig.daemon->wheels).stop->number;
     for (unsigned n = 0; n < 50U; n++) {
         for (unsigned i = 0; i < crowded; i++) {
             say(crowd[i], "{\"cmd\":\"estop\"}\n");
@@ -236,7 +236,7 @@ static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void
         daemon_rig_run(20);
         TEST_ASSERT_EQUAL_INT(0, daemon_rig.told_mm_s[IW_LEFT]);
     }
-    const iw_snapshot_t seen = gw_daemon_look(daemon_rig.daemon);
+    const iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
     TEST_ASSERT_TRUE(daemon_rig.now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] <= GW_ESTOP_AGAIN_US + MS(20));
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, seen.state);
     TEST_ASSERT_LESS_OR_EQUAL_UINT(stops + 2U, seen.stop->number);
@@ -246,7 +246,7 @@ static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void
 }
 
 static iw_time_us_t estop_seen_us(void) {
-    return gw_daemon_look(daemon_rig.daemon).seen_us[IW_CAUSE_ESTOP_SOFTWARE];
+    return gw_wheels_look(&daemon_rig.daemon->wheels).seen_us[IW_CAUSE_ESTOP_SOFTWARE];
 }
 
 static void test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step(void) {
@@ -267,7 +267,7 @@ static void test_estop_of_a_watcher_that_goes_at_once_counts(void) {
     const uint32_t waits = daemon_rig.waits;
     daemon_rig_run(100);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
-    TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->watchers);
+    TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[GW_WATCH]);
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
 }
 

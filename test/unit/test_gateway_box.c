@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "box/box_files.h"
+#include "box/box.h"
+#include "config/gateway_config.h"
+#include "disk/box_files.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -13,6 +15,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <unity.h>
+
+#define CONFIG "[record]\nblackbox_s = 2\n"
 
 static gateway_config_t config;
 static gw_box_t box;
@@ -38,7 +42,12 @@ void tearDown(void) {
 }
 
 static void start(void) {
-    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &config));
+    const gw_box_wish_t wish = {.blackbox_s = config.record.blackbox_s,
+                                .directory = config.record.directory,
+                                .bus = config.bus.interface,
+                                .estop = config.estop.line,
+                                .config = CONFIG};
+    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &wish));
     open_box = true;
 }
 
@@ -116,7 +125,7 @@ static void test_stop_is_written_as_frames_events_and_configuration(void) {
     TEST_ASSERT_NOT_NULL(strstr(text, "{\"type\":\"end\",\"frames\":10}\n"));
     TEST_ASSERT_NULL(strstr(text, "lost"));
     read_file("stop-000001-estop_line.conf", text, sizeof text);
-    TEST_ASSERT_NOT_NULL(strstr(text, "blackbox_s"));
+    TEST_ASSERT_EQUAL_STRING(CONFIG, text);
 }
 
 static void test_what_is_older_than_blackbox_s_is_left_out(void) {

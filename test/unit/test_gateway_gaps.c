@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bus/gaps.h"
+#include "wheels/gaps.h"
 
 #include <string.h>
 #include <unity.h>

@@ -2,6 +2,9 @@
 // The northbound socket: in which folders it is made, what it replaces, and what it has touched afterwards.
 #include "clients/listener.h"
 
+#include "config/gateway_config.h"
+#include "process/log.h"
+
 #include "unity.h"
 
 #include <fcntl.h>
@@ -44,14 +47,16 @@ void tearDown(void) {
 
 static int prepare(void) {
     FILE *err = fmemopen(said, sizeof said, "w");
-    const int result = gw_listener_prepare(&listener, &config, GW_DRIVE, err);
+    const gw_listener_wish_t wish = {GW_DRIVE, config.northbound.socket, config.northbound.group,
+                                     config.northbound.mode};
+    const int result = gw_listener_prepare(&listener, &wish, err);
     (void)fclose(err);
     return result;
 }
 
 static int make(void) {
     FILE *err = fmemopen(said, sizeof said, "w");
-    const int result = gw_listener_open(&listener, &config, &quiet, err);
+    const int result = gw_listener_open(&listener, &quiet, err);
     (void)fclose(err);
     return result;
 }

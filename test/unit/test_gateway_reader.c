@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Recordings as clients get them: which names are read, and what is in a piece.
-#include "box/box_files.h"
+#include "box/box.h"
+#include "disk/box_files.h"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -273,7 +274,6 @@ static void test_folder_full_of_recordings_gives_the_newest_that_fit_into_a_line
     assert_says("stop-0000000192-");
 }
 
-static gateway_config_t config;
 static gw_box_t box;
 
 static void wait_for_answer(gw_child_news_t wanted) {
@@ -283,10 +283,7 @@ static void wait_for_answer(gw_child_news_t wanted) {
 }
 
 static void open_box(uint16_t seconds) {
-    gateway_config_default(&config);
-    (void)snprintf(config.record.directory, sizeof config.record.directory, "%s", directory);
-    config.record.blackbox_s = seconds;
-    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &config));
+    TEST_ASSERT_EQUAL(0, gw_box_open(&box, &(gw_box_wish_t){.blackbox_s = seconds, .directory = directory}));
 }
 
 static void test_process_answers_and_one_that_is_frozen_holds_up_nobody(void) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // One gateway per bus, and the marker of a crash, wherever the gateways' sockets lie.
-#include "process/runtime.h"
+#include "lock/runtime.h"
+
+#include "config/gateway_config.h"
 
 #include "unity.h"
 
@@ -42,7 +44,7 @@ static void configure(gateway_config_t *config, const char *bus, const char *fol
 /// Opens it, and keeps what it says in `said`.
 static int open_runtime(gw_runtime_t *runtime, const gateway_config_t *config) {
     FILE *err = fmemopen(said, sizeof said, "w");
-    const int result = gw_runtime_open(runtime, config, shared, err);
+    const int result = gw_runtime_open(runtime, config->bus.interface, config->northbound.socket, shared, err);
     (void)fclose(err);
     return result;
 }

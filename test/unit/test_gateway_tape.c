@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "box/tape.h"
+#include "wheels/tape.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The process that keeps what is known from one run to the next: what it reads, writes, sets aside and refuses to touch.
-#include "ledger/keeper.h"
+#include "disk/keeper.h"
 #include "process/owners.h"
 
 #include "unity.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Many clients at once: each gets its turn, the holder of the lease gets the first, and none of them gets all the time.
-#include "answers/service.h"
+#include "clients/service.h"
 #include "daemon.h"
 
 #include "iwheel_linux/clock.h"
@@ -27,26 +27,24 @@ static void begin_core(void) {
     const iw_estop_wish_t estop = {.name = "none"};
     const char *culprit = "";
     gateway_config_default(&daemon_->config);
-    daemon_->config.record.blackbox_s = 0;
-    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon_->box, &daemon_->config));
-    gw_tape_init(&daemon_->tape, daemon_->box.ring);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(0, iw_linux_hal_open(&daemon_->hal, "unix:/nonexistent/iwheel-bus", &estop, &culprit),
-                                  culprit);
-    const iw_hal_t hal = gw_tape_hal(&daemon_->tape, &daemon_->hal);
-    daemon_->now_us = iw_clock_now_us();
+    gw_daemon_compose(daemon_);
+    TEST_ASSERT_EQUAL_INT(0, gw_box_open(&daemon_->box, &(gw_box_wish_t){.blackbox_s = 0}));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(
+        0, iw_linux_hal_open(&daemon_->wheels.hal, "unix:/nonexistent/iwheel-bus", &estop, &culprit), culprit);
+    daemon_->wheels.now_us = iw_clock_now_us();
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK,
-                          iw_gateway_init(&daemon_->gateway, &daemon_->config.core, &hal, daemon_->now_us, false));
+                          gw_wheels_begin(&daemon_->wheels, &daemon_->config.core, daemon_->box.ring, false));
 }
 
 static void connect_crowd(void) {
     for (unsigned i = 0; i < CROWD; i++) {
         int pair[2];
-        gw_client_t *client = &daemon_->client[i];
+        gw_client_t *client = &daemon_->clients.client[i];
         TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair));
         client->id = i + 1U;
         client->fd = pair[0];
         peer[i] = pair[1];
-        daemon_->clients++;
+        daemon_->clients.count[GW_DRIVE]++;
     }
 }
 
@@ -56,13 +54,13 @@ static void all_ask(void) {
         for (unsigned n = 0; n < LINES; n++) {
             TEST_ASSERT_EQUAL_INT(sizeof line - 1U, send(peer[i], line, sizeof line - 1U, MSG_NOSIGNAL));
         }
-        daemon_->client[i].readable = true;
+        daemon_->clients.client[i].readable = true;
     }
 }
 
 void setUp(void) {
     daemon_ = (gw_daemon_t *)calloc(1, sizeof *daemon_);
-    daemon_->epoll_fd = epoll_create1(EPOLL_CLOEXEC);
+    daemon_->clients.epoll_fd = epoll_create1(EPOLL_CLOEXEC);
     gw_log_open(&daemon_->log, GW_LOG_ERROR);
     begin_core();
     connect_crowd();
@@ -71,18 +69,18 @@ void setUp(void) {
 
 void tearDown(void) {
     for (unsigned i = 0; i < CROWD; i++) {
-        (void)close(daemon_->client[i].fd);
+        (void)close(daemon_->clients.client[i].fd);
         (void)close(peer[i]);
     }
     gw_box_close(&daemon_->box);
-    iw_linux_hal_close(&daemon_->hal);
-    (void)close(daemon_->epoll_fd);
+    iw_linux_hal_close(&daemon_->wheels.hal);
+    (void)close(daemon_->clients.epoll_fd);
     gw_log_close(&daemon_->log);
     free(daemon_);
 }
 
 static bool is_served(unsigned i) {
-    return !daemon_->client[i].readable && daemon_->client[i].in_length == 0U;
+    return !daemon_->clients.client[i].readable && daemon_->clients.client[i].in_length == 0U;
 }
 
 static unsigned served(void) {
@@ -94,16 +92,16 @@ static unsigned served(void) {
 }
 
 static void test_round_serves_no_crowd_at_once_and_says_that_somebody_waits(void) {
-    gw_service_clients(daemon_);
+    gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_GREATER_THAN_UINT(0, served());
     TEST_ASSERT_LESS_THAN_UINT(CROWD, served());
-    TEST_ASSERT_TRUE(gw_service_is_busy(daemon_));
+    TEST_ASSERT_TRUE(gw_service_is_busy(&daemon_->clients));
 }
 
 static void test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn(void) {
     unsigned before = 0;
     for (unsigned rounds = 0; served() < CROWD; rounds++) {
-        gw_service_clients(daemon_);
+        gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
         TEST_ASSERT_GREATER_THAN_UINT(before, served());
         TEST_ASSERT_LESS_THAN_UINT(CROWD, rounds);
         for (unsigned i = 0; i < served(); i++) {
@@ -111,31 +109,30 @@ static void test_round_goes_on_where_the_last_one_ended_until_all_had_their_turn
         }
         before = served();
     }
-    gw_service_clients(daemon_);
-    TEST_ASSERT_FALSE(daemon_->clients_waiting);
+    gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
+    TEST_ASSERT_FALSE(daemon_->clients.some_wait);
 }
 
 static void test_round_begins_with_the_holder_of_the_lease(void) {
-    daemon_->gateway.permit.holder = CROWD;
-    gw_service_clients(daemon_);
+    gw_service_clients(&daemon_->clients, CROWD);
     TEST_ASSERT_TRUE(is_served(CROWD - 1U));
     TEST_ASSERT_LESS_THAN_UINT(CROWD, served());
 }
 
 static void test_round_a_client_that_was_not_reached_is_not_caught_up(void) {
-    daemon_->woken_us = iw_clock_now_us();
-    gw_service_clients(daemon_);
+    daemon_->clients.now_us = iw_clock_now_us();
+    gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     TEST_ASSERT_FALSE(is_served(CROWD - 1U));
-    TEST_ASSERT_EQUAL_UINT64(0, daemon_->client[CROWD - 1U].caught_up_us);
-    TEST_ASSERT_EQUAL_UINT64(daemon_->woken_us, daemon_->client[0].caught_up_us);
+    TEST_ASSERT_EQUAL_UINT64(0, daemon_->clients.client[CROWD - 1U].caught_up_us);
+    TEST_ASSERT_EQUAL_UINT64(daemon_->clients.now_us, daemon_->clients.client[0].caught_up_us);
 }
 
 static void test_round_of_sending_reaches_everybody_in_turn(void) {
     while (served() < CROWD) {
-        gw_service_clients(daemon_);
+        gw_service_clients(&daemon_->clients, IW_CLIENT_NONE);
     }
-    for (unsigned rounds = 0; rounds == 0U || daemon_->lines_waiting; rounds++) {
-        gw_service_flush(daemon_);
+    for (unsigned rounds = 0; rounds == 0U || daemon_->clients.lines_wait; rounds++) {
+        gw_service_flush(&daemon_->clients, IW_CLIENT_NONE);
         TEST_ASSERT_LESS_THAN_UINT(CROWD, rounds);
     }
     for (unsigned i = 0; i < CROWD; i++) {

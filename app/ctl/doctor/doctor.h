@@ -3,7 +3,7 @@
 #ifndef DOCTOR_H
 #define DOCTOR_H
 
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 #include "inspect.h"
 #include "talk/ctl.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "recording.h"
 
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "refuse.h"
 
-#include "assumption.h"
+#include "clients/clients.h"
+#include "ledger/knowledge.h"
+#include "status/observe.h"
+#include "wheels/wheels.h"
+
+#include "iwheel_northbound/words.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -9,7 +14,7 @@
 
 /// Where a message is being written.
 typedef struct {
-    gw_daemon_t *daemon;
+    const gw_answers_t *answers;
     iw_snapshot_t seen;
     const iwn_request_t *request;
     char *text;
@@ -18,12 +23,12 @@ typedef struct {
 
 #define SAY(self, ...) (void)snprintf((self)->text, (self)->size, __VA_ARGS__)
 
-static uint64_t ms_since(const gw_daemon_t *daemon, iw_time_us_t then_us) {
-    return (then_us < daemon->now_us) ? (daemon->now_us - then_us) / IW_US_PER_MS : 0U;
+static uint64_t ms_since(const wording_t *self, iw_time_us_t then_us) {
+    return (then_us < self->seen.at_us) ? (self->seen.at_us - then_us) / IW_US_PER_MS : 0U;
 }
 
-static void name_client(gw_daemon_t *daemon, iw_client_t id, char *out_text, size_t size) {
-    const gw_client_t *client = gw_daemon_client(daemon, id);
+static void name_client(const wording_t *self, iw_client_t id, char *out_text, size_t size) {
+    const gw_client_t *client = gw_clients_find(self->answers->clients, id);
     if (client != NULL) {
         gw_client_describe(client, out_text, size);
     } else {
@@ -34,7 +39,7 @@ static void name_client(gw_daemon_t *daemon, iw_client_t id, char *out_text, siz
 static void say_holder(const wording_t *self) {
     const iw_snapshot_t *seen = &self->seen;
     char holder[GW_CLIENT_TEXT_SIZE];
-    name_client(self->daemon, seen->holder, holder, sizeof holder);
+    name_client(self, seen->holder, holder, sizeof holder);
     const uint64_t left_ms = (seen->arming || seen->lease_until_us <= seen->at_us)
                                  ? 0U
                                  : (seen->lease_until_us - seen->at_us) / IW_US_PER_MS;
@@ -45,36 +50,35 @@ static void say_holder(const wording_t *self) {
 }
 
 static void say_not_armed(const wording_t *self) {
-    const gw_daemon_t *daemon = self->daemon;
+    const gw_status_t *status = self->answers->status;
     const iw_stop_t *stop = self->seen.stop;
     const char *state = iwn_state_name(self->seen.state);
-    if (daemon->shutting_down) {
+    if (self->answers->wheels->shutting_down) {
         SAY(self, "not armed: the gateway is shutting down");
-    } else if (stop->number > 0U && stop->cause == IW_CAUSE_CLIENT_STOP && daemon->stopped_by.at_us > 0U) {
+    } else if (stop->number > 0U && stop->cause == IW_CAUSE_CLIENT_STOP && status->stopped_by.at_us > 0U) {
         SAY(self,
             "not armed (%s); the last stop was %" PRIu64 " ms ago: %s, asked for by user %u (process %d). Arm first",
-            state, ms_since(daemon, stop->at_us), iwn_cause_name(stop->cause), (unsigned)daemon->stopped_by.uid,
-            daemon->stopped_by.pid);
+            state, ms_since(self, stop->at_us), iwn_cause_name(stop->cause), (unsigned)status->stopped_by.uid,
+            status->stopped_by.pid);
     } else if (stop->number > 0U) {
         SAY(self, "not armed (%s); the last stop was %" PRIu64 " ms ago: %s. Arm first", state,
-            ms_since(daemon, stop->at_us), iwn_cause_name(stop->cause));
+            ms_since(self, stop->at_us), iwn_cause_name(stop->cause));
     } else {
         SAY(self, "not armed (%s); arm first", state);
     }
 }
 
 static void say_estop(const wording_t *self) {
-    const gw_daemon_t *daemon = self->daemon;
-    if (daemon->hal.estop_last < 0) {
+    const gw_wheels_t *wheels = self->answers->wheels;
+    if (wheels->hal.estop_last < 0) {
         SAY(self, "the e-stop %s cannot be read, which counts as pressed; check its wire, then: iwheelctl reset",
-            daemon->config.estop.line);
+            wheels->estop);
     } else {
-        SAY(self, "the e-stop %s is pressed; release the button, then: iwheelctl reset", daemon->config.estop.line);
+        SAY(self, "the e-stop %s is pressed; release the button, then: iwheelctl reset", wheels->estop);
     }
 }
 
 static void say_lost(const wording_t *self) {
-    const gw_daemon_t *daemon = self->daemon;
     size_t length = 0;
     for (unsigned side = 0; side < IW_SIDES; side++) {
         const iw_snapshot_wheel_t *wheel = &self->seen.wheel[side];
@@ -88,7 +92,7 @@ static void say_lost(const wording_t *self) {
             (void)snprintf(end, room, "the %s wheel was never heard; ", name);
         } else {
             (void)snprintf(end, room, "the %s wheel was last heard %" PRIu64 " ms ago; ", name,
-                           ms_since(daemon, wheel->speed_us));
+                           ms_since(self, wheel->speed_us));
         }
         length += strlen(end);
     }
@@ -106,32 +110,32 @@ static void say_not_at_rest(const wording_t *self) {
 
 static void say_stalled(const wording_t *self) {
     static const char cure[] = "check that the wheels have power and the bus is terminated";
-    const gw_daemon_t *daemon = self->daemon;
+    const gw_wheels_t *wheels = self->answers->wheels;
     const iw_time_us_t waiting_us = self->seen.waiting_us;
-    const char *bus = daemon->config.bus.interface;
+    const char *bus = wheels->bus.name;
     if (waiting_us == IW_NEVER) {
         SAY(self, "the zero setpoints were not acknowledged on the bus within %u ms; %s", self->seen.config->echo_ms,
             cure);
-    } else if (iw_linux_hal_link(&daemon->hal)->presence == IW_LINK_LOCAL) {
+    } else if (iw_linux_hal_link(&wheels->hal)->presence == IW_LINK_LOCAL) {
         SAY(self, "a setpoint has been waiting for %" PRIu64 " ms to be acknowledged on the bus; %s",
-            ms_since(daemon, waiting_us), cure);
+            ms_since(self, waiting_us), cure);
     } else {
         SAY(self,
             "a setpoint has been waiting for %" PRIu64 " ms to be acknowledged on the bus; %s; if so, it was lost: ip "
             "link set %s down; ip link set %s up",
-            ms_since(daemon, waiting_us), cure, bus, bus);
+            ms_since(self, waiting_us), cure, bus, bus);
     }
 }
 
 static void say_stale(const wording_t *self) {
     char client[GW_CLIENT_TEXT_SIZE];
-    name_client(self->daemon, self->seen.stale_client, client, sizeof client);
+    name_client(self, self->seen.stale_client, client, sizeof client);
     if (self->request->cmd == IWN_CMD_DRIVE || self->request->cmd == IWN_CMD_TWIST) {
         SAY(self, "this command was sent before arm was answered; wait for that answer, then command anew");
         return;
     }
     SAY(self, "%s sent a nonzero drive command %" PRIu64 " ms ago; let go of the stick, wait %u ms, try again", client,
-        ms_since(self->daemon, self->seen.stale_us), IW_STALE_COMMAND_US / IW_US_PER_MS);
+        ms_since(self, self->seen.stale_us), IW_STALE_COMMAND_US / IW_US_PER_MS);
 }
 
 static void say_second_master(const wording_t *self) {
@@ -139,29 +143,29 @@ static void say_second_master(const wording_t *self) {
     SAY(self,
         "somebody else sent a setpoint (id 266 = 0x10A or 298 = 0x12A) %" PRIu64
         " ms ago; switch the other sender off, wait a second",
-        ms_since(self->daemon, seen_us));
+        ms_since(self, seen_us));
 }
 
 /// Whoever keeps stopping is to be found, whatever socket it uses.
 static void say_estopped(const wording_t *self) {
-    const gw_stopper_t *by = &self->daemon->estopped_by;
+    const gw_stopper_t *by = &self->answers->status->estopped_by;
     SAY(self,
         "estop_software was asked for %" PRIu64
         " ms ago by user %u (process %d); end that program if it keeps asking, and wait a second",
-        ms_since(self->daemon, by->at_us), (unsigned)by->uid, by->pid);
+        ms_since(self, by->at_us), (unsigned)by->uid, by->pid);
 }
 
 static void say_present(const wording_t *self) {
     const uint32_t present = self->seen.present;
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if (cause == IW_CAUSE_ESTOP_SOFTWARE && (present & (1U << cause)) != 0U &&
-            self->daemon->estopped_by.at_us > 0U) {
+            self->answers->status->estopped_by.at_us > 0U) {
             say_estopped(self);
             return;
         }
         if ((present & (1U << cause)) != 0U) {
             SAY(self, "%s was seen %" PRIu64 " ms ago; %s, and wait a second", iwn_cause_name((iw_cause_t)cause),
-                ms_since(self->daemon, self->seen.seen_us[cause]), iwn_why_cure((iw_cause_t)cause));
+                ms_since(self, self->seen.seen_us[cause]), iwn_why_cure((iw_cause_t)cause));
             return;
         }
     }
@@ -192,13 +196,13 @@ static void say_type(const wording_t *self) {
 }
 
 static void say_latched(const wording_t *self) {
-    SAY(self, "latched: %s", self->daemon->last_stop.sentence);
+    SAY(self, "latched: %s", self->answers->status->last_stop.sentence);
 }
 
 static void say_bus_down(const wording_t *self) {
-    const gw_daemon_t *daemon = self->daemon;
-    const char *bus = daemon->config.bus.interface;
-    const bool local = iw_linux_hal_link(&daemon->hal)->presence == IW_LINK_LOCAL;
+    const gw_wheels_t *wheels = self->answers->wheels;
+    const char *bus = wheels->bus.name;
+    const bool local = iw_linux_hal_link(&wheels->hal)->presence == IW_LINK_LOCAL;
     const bool off = self->seen.bus == IW_BUS_OFF;
     SAY(self, "bus %s is %s; %s%s", bus, iwn_bus_state_name(self->seen.bus),
         (local && off) ? "end it in the simulator: iwheel-sim busoff off"
@@ -209,9 +213,9 @@ static void say_bus_down(const wording_t *self) {
 }
 
 static void say_timing(const wording_t *self) {
+    const inspect_wish_t *wish = &self->answers->wheels->bus;
     SAY(self, "the bit timing of %s is not %u bit/s with sample point %u permille; set it, or on_mismatch = warn",
-        self->daemon->config.bus.interface, (unsigned)self->daemon->config.bus.bitrate,
-        self->daemon->config.bus.sample_point_permille);
+        wish->name, (unsigned)wish->bitrate_hz, wish->sample_point_permille);
 }
 
 static void say_missing(const wording_t *self) {
@@ -220,26 +224,18 @@ static void say_missing(const wording_t *self) {
 }
 
 static void say_blocked(const wording_t *self) {
-    SAY(self, "stopped: %s", self->daemon->last_stop.sentence);
+    SAY(self, "stopped: %s", self->answers->status->last_stop.sentence);
 }
 
 static void say_listen_only(const wording_t *self) {
     SAY(self, "the gateway runs with --listen-only and never sends; start it without");
 }
 
-static void write_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, char *out_text, size_t size) {
-    const iw_snapshot_t seen = gw_daemon_look(daemon);
-    char evidence[GW_EVIDENCE_SIZE];
-    gw_assumption_evidence(item, &seen.assumed[item], &daemon->knowledge.known.item[item].word, evidence);
-    (void)snprintf(out_text, size, "%s is contradicted: %s; %s", iwn_ledger_item_name(item), evidence,
-                   gw_assumption_cost(item));
-}
-
 static void say_contradicted(const wording_t *self) {
-    write_contradicted(self->daemon, self->seen.doubt, self->text, self->size);
+    gw_knowledge_describe_contradiction(self->answers->knowledge, self->seen.doubt, self->text, self->size);
 }
 
-void gw_refuse_describe(gw_daemon_t *daemon, const iwn_request_t *request, iw_refusal_t refusal,
+void gw_refuse_describe(const gw_answers_t *answers, const iwn_request_t *request, iw_refusal_t refusal,
                         iwn_refusal_t *out_refusal) {
     static void (*const say[])(const wording_t *self) = {
         [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range, [IW_REFUSE_MISSING_FIELD] = say_missing,
@@ -253,7 +249,7 @@ void gw_refuse_describe(gw_daemon_t *daemon, const iwn_request_t *request, iw_re
         [IW_REFUSE_STALE_COMMAND] = say_stale,       [IW_REFUSE_LISTEN_ONLY] = say_listen_only,
         [IW_REFUSE_CONTRADICTED] = say_contradicted,
     };
-    const wording_t wording = {daemon, gw_daemon_look(daemon), request, out_refusal->message,
+    const wording_t wording = {answers, gw_wheels_look(answers->wheels), request, out_refusal->message,
                                sizeof out_refusal->message};
     out_refusal->error = iwn_error_of(refusal);
     if ((size_t)refusal < sizeof say / sizeof say[0] && say[refusal] != NULL) {
@@ -263,14 +259,9 @@ void gw_refuse_describe(gw_daemon_t *daemon, const iwn_request_t *request, iw_re
     }
 }
 
-void gw_refuse_describe_contradicted(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_refusal_t *out_refusal) {
-    out_refusal->error = IWN_DENIED;
-    write_contradicted(daemon, item, out_refusal->message, sizeof out_refusal->message);
-}
-
-static void say_right(const gw_daemon_t *daemon, iwn_refusal_t *out_refusal) {
-    const char *socket = daemon->config.northbound.socket;
-    const char *group = daemon->config.northbound.group;
+static void say_right(const gw_answers_t *answers, iwn_refusal_t *out_refusal) {
+    const char *socket = answers->socket;
+    const char *group = answers->group;
     out_refusal->error = IWN_DENIED;
     if (strcmp(group, "none") == 0) {
         (void)snprintf(out_refusal->message, sizeof out_refusal->message,
@@ -283,7 +274,7 @@ static void say_right(const gw_daemon_t *daemon, iwn_refusal_t *out_refusal) {
     }
 }
 
-bool gw_refuse_by_right(const gw_daemon_t *daemon, gw_right_t right, iwn_cmd_t cmd, iwn_refusal_t *out_refusal) {
+bool gw_refuse_by_right(const gw_answers_t *answers, gw_right_t right, iwn_cmd_t cmd, iwn_refusal_t *out_refusal) {
     static const bool allowed[IWN_CMDS] = {
         [IWN_CMD_HELLO] = true, [IWN_CMD_STATUS] = true,     [IWN_CMD_WATCH] = true,
         [IWN_CMD_WHY] = true,   [IWN_CMD_STOP] = true,       [IWN_CMD_DISARM] = true,
@@ -292,7 +283,7 @@ bool gw_refuse_by_right(const gw_daemon_t *daemon, gw_right_t right, iwn_cmd_t c
     if (right == GW_DRIVE || allowed[cmd]) {
         return false;
     }
-    say_right(daemon, out_refusal);
+    say_right(answers, out_refusal);
     return true;
 }
 

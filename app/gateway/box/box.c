@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "box.h"
 
-#include "box_files.h"
+#include "disk/box_files.h"
 
 #include <errno.h>
 #include <stddef.h>
@@ -12,27 +12,25 @@
 
 static void write_recordings(int fd, const void *context) {
     const gw_box_t *self = (const gw_box_t *)context;
-    gw_box_writer_run(fd, self->ring, self->config);
+    gw_box_writer_run(fd, self->ring, &self->wish);
 }
 
 static void read_recordings(int fd, const void *context) {
     const gw_box_t *self = (const gw_box_t *)context;
-    gw_box_reader_run(fd, self->config->record.directory);
+    gw_box_reader_run(fd, self->wish.directory);
 }
 
-int gw_box_open(gw_box_t *self, const gateway_config_t *config) {
-    *self = (gw_box_t){.writer = {.fd = -1},
-                       .reader = {.fd = -1},
-                       .config = config,
-                       .ring_size = blackbox_ring_size(config->record.blackbox_s)};
+int gw_box_open(gw_box_t *self, const gw_box_wish_t *wish) {
+    *self = (gw_box_t){
+        .writer = {.fd = -1}, .reader = {.fd = -1}, .wish = *wish, .ring_size = blackbox_ring_size(wish->blackbox_s)};
     self->ring = (blackbox_ring_t *)mmap(NULL, self->ring_size, PROT_READ | PROT_WRITE,
                                          MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
     if (self->ring == MAP_FAILED) {
         self->ring = NULL;
         return errno;
     }
-    blackbox_ring_init(self->ring, config->record.blackbox_s);
-    if (config->record.blackbox_s > 0U) {
+    blackbox_ring_init(self->ring, wish->blackbox_s);
+    if (wish->blackbox_s > 0U) {
         (void)gw_child_start(&self->writer, &(gw_child_work_t){"iwheel-blackbox", NICE, write_recordings, self});
         (void)gw_child_start(&self->reader, &(gw_child_work_t){"iwheel-records", NICE, read_recordings, self});
     }

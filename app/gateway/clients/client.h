@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// One connection of the northbound socket: bytes in, lines out; and the table of all of them.
+/// One connection of the northbound socket: bytes in, lines out.
 ///
 /// Buffers are fixed. A full output buffer costs the client events (counted, and told by a `lost` event as soon as
 /// there is room again); half of it is kept for replies, and a client that does not take even those is dropped.
@@ -9,7 +9,7 @@
 #ifndef GATEWAY_CLIENT_H
 #define GATEWAY_CLIENT_H
 
-#include "clients/listener.h"
+#include "listener.h"
 
 #include "iwheel/types.h"
 #include "iwheel_northbound/request.h"
@@ -23,7 +23,7 @@
 /// A request carried out this soon after its client had nothing waiting counts as sent when it is carried out.
 #define GW_PROMPT_US 25000U
 
-typedef struct {
+typedef struct gw_client {
     iw_client_t id; ///< Never used again for another connection; IW_CLIENT_NONE: the slot is free.
     int fd;
     int pid;   ///< Of the process that connected; 0 if unknown.

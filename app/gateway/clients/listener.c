@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "listener.h"
 
+#include "process/log.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <grp.h>
@@ -13,38 +15,26 @@
 
 #define BACKLOG 128
 
-/// What a socket is by the configuration.
-typedef struct {
-    const char *path;
-    const char *group;
-    mode_t mode;
-} wish_t;
-
-static wish_t wish_of(const gateway_config_t *config, gw_right_t right) {
-    return (right == GW_DRIVE) ? (wish_t){config->northbound.socket, config->northbound.group, config->northbound.mode}
-                               : (wish_t){config->northbound.watch_socket, config->northbound.watch_group,
-                                          config->northbound.watch_mode};
-}
-
-bool gw_listener_wanted(const gateway_config_t *config, gw_right_t right) {
-    return right == GW_DRIVE || strcmp(config->northbound.watch_socket, "none") != 0;
-}
-
 static const char *option_of(const gw_listener_t *self) {
-    return (self->right == GW_DRIVE) ? "--socket" : "--watch-socket";
+    return (self->wish.right == GW_DRIVE) ? "--socket" : "--watch-socket";
 }
 
 /// `cure` ends where the option's name belongs.
 static int complain(const gw_listener_t *self, FILE *err, const char *what, const char *cure) {
-    (void)fprintf(err, "iwheel-gateway: socket %s: %s; %s %s\n", self->path, what, cure, option_of(self));
+    (void)fprintf(err, "iwheel-gateway: socket %s: %s; %s %s\n", self->wish.path, what, cure, option_of(self));
     return EX_UNAVAILABLE;
 }
 
 static int complain_errno(const gw_listener_t *self, FILE *err, int error) {
     const bool may_not = error == EACCES || error == EPERM;
-    const char *cure = (error == ENOENT) ? "make its directory, or correct [northbound] in the configuration, or"
-                       : may_not         ? "run as a user who may write to its directory, or choose another with"
-                                         : "correct [northbound] in the configuration, or";
+    char cure[128];
+    if (may_not) {
+        (void)snprintf(cure, sizeof cure, "run as a user who may write to its directory, or choose another with");
+    } else {
+        (void)snprintf(cure, sizeof cure, "%scorrect [northbound] %s in the configuration, or",
+                       (error == ENOENT) ? "make its directory, or " : "",
+                       (self->wish.right == GW_DRIVE) ? "socket" : "watch_socket");
+    }
     (void)complain(self, err, strerror(error), cure);
     return may_not ? EX_NOPERM : EX_UNAVAILABLE;
 }
@@ -56,13 +46,12 @@ static int complain_folder(const gw_listener_t *self, FILE *err, int error) {
     return (error == EACCES || error == EPERM || error >= GW_FOLDER_FOREIGN) ? EX_NOPERM : EX_UNAVAILABLE;
 }
 
-int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, gw_right_t right, FILE *err) {
-    const char *path = wish_of(config, right).path;
+int gw_listener_prepare(gw_listener_t *self, const gw_listener_wish_t *wish, FILE *err) {
+    const char *path = wish->path;
     const char *slash = strrchr(path, '/');
-    char folder[GATEWAY_PATH_SIZE];
+    char folder[GW_PATH_SIZE];
     *self = (gw_listener_t){
-        .right = right, .fd = -1, .reserve_fd = -1, .owners = gw_owners_of(GW_RUNTIME_DIRECTORY), .folder = {.fd = -1}};
-    (void)snprintf(self->path, sizeof self->path, "%s", path);
+        .wish = *wish, .fd = -1, .reserve_fd = -1, .owners = gw_owners_of(GW_RUNTIME_DIRECTORY), .folder = {.fd = -1}};
     (void)snprintf(self->name, sizeof self->name, "%s", (slash == NULL) ? path : slash + 1);
     gw_folder_of(path, folder, sizeof folder);
     if (mkdir(folder, 0755) != 0 && errno != EEXIST) {
@@ -141,7 +130,7 @@ static int clear_name(const gw_listener_t *self, const struct sockaddr_un *addre
 }
 
 /// Nobody but us can have put it there; if somebody has, it is not served.
-static int verify(gw_listener_t *self, mode_t mode, FILE *err) {
+static int verify(gw_listener_t *self, FILE *err) {
     struct stat status;
     if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
         return complain_errno(self, err, errno);
@@ -152,37 +141,37 @@ static int verify(gw_listener_t *self, mode_t mode, FILE *err) {
     }
     self->device = status.st_dev;
     self->inode = status.st_ino;
-    const bool right = (status.st_mode & 0777U) == mode; // Not so where the folder has access control lists.
-    return (right || fchmodat(self->folder.fd, self->name, mode, AT_SYMLINK_NOFOLLOW) == 0)
+    const bool right = (status.st_mode & 0777U) == self->wish.mode; // Not so where the folder has access control lists.
+    return (right || fchmodat(self->folder.fd, self->name, self->wish.mode, AT_SYMLINK_NOFOLLOW) == 0)
                ? 0
                : complain_errno(self, err, errno);
 }
 
 /// Has its mode from the first moment; nobody is let in before it listens.
-static int bind_socket(gw_listener_t *self, const struct sockaddr_un *address, mode_t mode, FILE *err) {
+static int bind_socket(gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
     self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (self->fd < 0) {
         return complain_errno(self, err, errno);
     }
-    const mode_t before = umask(~mode & 0777U);
+    const mode_t before = umask(~self->wish.mode & 0777U);
     const int result = bind(self->fd, (const struct sockaddr *)address, sizeof *address);
     const int error = errno;
     (void)umask(before);
-    return (result == 0) ? verify(self, mode, err) : complain_errno(self, err, error);
+    return (result == 0) ? verify(self, err) : complain_errno(self, err, error);
 }
 
-static int make_socket(gw_listener_t *self, mode_t mode, FILE *err) {
+static int make_socket(gw_listener_t *self, FILE *err) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", self->name);
     int back;
     int result = enter(self, &back) ? clear_name(self, &address, err) : complain_errno(self, err, errno);
-    result = (result != 0) ? result : bind_socket(self, &address, mode, err);
+    result = (result != 0) ? result : bind_socket(self, &address, err);
     leave(back);
     return result;
 }
 
-static void give_to_group(const gw_listener_t *self, const gateway_config_t *config, gw_log_t *log) {
-    const char *name = wish_of(config, self->right).group;
+static void give_to_group(const gw_listener_t *self, gw_log_t *log) {
+    const char *name = self->wish.group;
     if (strcmp(name, "none") == 0) {
         return;
     }
@@ -194,17 +183,17 @@ static void give_to_group(const gw_listener_t *self, const gateway_config_t *con
     }
     if (group == NULL) {
         gw_log(log, GW_LOG_WARNING, "there is no group %s; socket %s keeps our own group (groupadd --system %s)", name,
-               self->path, name);
+               self->wish.path, name);
     } else if (fchownat(self->folder.fd, self->name, (uid_t)-1, group->gr_gid, AT_SYMLINK_NOFOLLOW) != 0) {
-        gw_log(log, GW_LOG_WARNING, "socket %s cannot be given to group %s: %s; it keeps our own group", self->path,
-               name, strerror(errno));
+        gw_log(log, GW_LOG_WARNING, "socket %s cannot be given to group %s: %s; it keeps our own group",
+               self->wish.path, name, strerror(errno));
     }
 }
 
-int gw_listener_open(gw_listener_t *self, const gateway_config_t *config, gw_log_t *log, FILE *err) {
-    int result = make_socket(self, wish_of(config, self->right).mode, err);
+int gw_listener_open(gw_listener_t *self, gw_log_t *log, FILE *err) {
+    int result = make_socket(self, err);
     if (result == 0) {
-        give_to_group(self, config, log);
+        give_to_group(self, log);
         result = (listen(self->fd, BACKLOG) == 0) ? 0 : complain_errno(self, err, errno);
     }
     if (result != 0) {

@@ -10,11 +10,14 @@
 #ifndef GATEWAY_LISTENER_H
 #define GATEWAY_LISTENER_H
 
-#include "gateway_config.h"
-#include "process/log.h"
 #include "process/owners.h"
 
+#include "iwheel/types.h"
+
+#include <stdio.h>
 #include <sys/types.h>
+
+struct gw_log;
 
 /// After an accept that failed for want of anything, the socket is left alone this long.
 #define GW_LISTENER_PAUSE_US 200000U
@@ -33,14 +36,21 @@ typedef enum {
     GW_ACCEPT_PAUSE,    ///< Out of resources: call again after GW_LISTENER_PAUSE_US.
 } gw_accept_t;
 
+/// What a socket is to be, by the configuration. The texts must outlive the listener.
 typedef struct {
-    char path[GATEWAY_PATH_SIZE]; ///< For people.
-    char name[GATEWAY_PATH_SIZE]; ///< In the folder.
+    gw_right_t right;
+    const char *path;  ///< "none": there is none.
+    const char *group; ///< Owner group; "none": the gateway's own.
+    mode_t mode;
+} gw_listener_wish_t;
+
+typedef struct {
+    gw_listener_wish_t wish;
+    char name[GW_PATH_SIZE]; ///< In the folder.
     gw_owners_t owners;
     gw_folder_t folder;
     dev_t device; ///< Of the socket as we made it, so that nobody else's is removed.
     ino_t inode;
-    gw_right_t right;
     iw_time_us_t from_us; ///< Nobody is accepted before.
     bool full_told;       ///< That somebody was turned away, until the next is let in.
     int fd;               ///< -1: not open.
@@ -49,14 +59,11 @@ typedef struct {
 
 /// Makes the socket's folder if only that is missing, opens and judges it. 0, or a sysexits code after cause and cure have been
 /// printed on `err`.
-int gw_listener_prepare(gw_listener_t *self, const gateway_config_t *config, gw_right_t right, FILE *err);
-
-/// Whether the configuration names a socket for that right.
-bool gw_listener_wanted(const gateway_config_t *config, gw_right_t right);
+int gw_listener_prepare(gw_listener_t *self, const gw_listener_wish_t *wish, FILE *err);
 
 /// After gw_listener_prepare. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does
 /// not exist or may not be given is a warning in the log: the socket is then stricter than asked for.
-int gw_listener_open(gw_listener_t *self, const gateway_config_t *config, gw_log_t *log, FILE *err);
+int gw_listener_open(gw_listener_t *self, struct gw_log *log, FILE *err);
 
 /// Closes the socket and removes its file, if it is still ours; closes the folder.
 void gw_listener_close(gw_listener_t *self);

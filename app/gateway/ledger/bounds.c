@@ -9,6 +9,8 @@
 
 /// The end of the year 9999, after which no clock that is right will write anything.
 #define WALL_US_MAX INT64_C(253402300799000000)
+/// One that can be: what is found is compared with it only for its form.
+#define ANY_TRACK_MM 600U
 
 static bool within(int64_t value, int64_t low, int64_t high) {
     return value >= low && value <= high;
@@ -86,16 +88,17 @@ static bool fits_bus(iw_ledger_item_t item, const gw_known_item_t *known) {
 /// A value that can be configured, or that an operator may find.
 static bool can_be(iw_ledger_item_t item, const char *value) {
     char bare[IWN_VALUE_SIZE];
-    gateway_config_t config;
-    gateway_config_default(&config);
-    config.core.setpoint_type_set = true;
-    config.core.current_role = IW_ROLE_LIMIT;
+    iw_config_t config;
+    iw_config_default(&config);
+    config.setpoint_type_set = true;
+    config.current_role = IW_ROLE_LIMIT;
+    const gw_configured_t any = {&config, ANY_TRACK_MM};
     memcpy(bare, value, sizeof bare);
     char *rest = (item == IW_LEDGER_GEAR_RATIO) ? strstr(bare, ", rpm of the ") : NULL;
     if (rest != NULL && (strcmp(rest, ", rpm of the wheel") == 0 || strcmp(rest, ", rpm of the rotor") == 0)) {
         *rest = '\0';
     }
-    return gw_assumption_compare(&config, item, bare) != GW_FOUND_IMPOSSIBLE;
+    return gw_assumption_compare(&any, item, bare) != GW_FOUND_IMPOSSIBLE;
 }
 
 bool gw_bounds_item(iw_ledger_item_t item, const gw_known_item_t *known) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "box/record.h"
-#include "daemon.h"
-#include "process/owners.h"
+#include "process/log.h"
+#include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"
 #include "iwheel_northbound/words.h"
@@ -12,61 +11,61 @@
 #include <stdio.h>
 #include <string.h>
 
-void gw_knowledge_open(gw_knowledge_t *self, const gateway_config_t *config) {
-    char name[GATEWAY_ADDRESS_SIZE + 8U];
-    gw_memory_name(config->bus.interface, name, sizeof name);
-    (void)snprintf(self->path, sizeof self->path, "%s/%s", config->record.directory, name);
+void gw_knowledge_open(gw_knowledge_t *self, const char *directory) {
+    char name[GW_ADDRESS_SIZE + 8U];
+    gw_memory_name(self->bus, name, sizeof name);
+    (void)snprintf(self->path, sizeof self->path, "%s/%s", directory, name);
     self->start_us = iw_clock_now_us();
-    self->error = gw_keeper_open(&self->keeper, config->record.directory, name);
+    self->error = gw_keeper_open(&self->keeper, directory, name);
     if (self->error != 0) {
         self->state = GW_MEMORY_FAILED;
     }
 }
 
 /// Notes an entry that is not as it was. Another figure for the same finding is no news.
-static void observe_item(gw_daemon_t *daemon, iw_ledger_item_t item, const iw_ledger_entry_t *entry) {
-    gw_known_item_t *known = &daemon->knowledge.known.item[item];
+static void observe_item(gw_knowledge_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry) {
+    gw_known_item_t *known = &self->known.item[item];
     const bool news = entry->state != known->entry.state || entry->evidence != known->entry.evidence;
     if (entry->state == IW_LEDGER_ASSUMED || (!news && entry->figure == known->entry.figure)) {
         return;
     }
     known->entry = *entry;
-    daemon->knowledge.changed = true;
+    self->changed = true;
     if (!news) {
         return;
     }
     known->since_wall_us = iw_clock_wall_us();
-    gw_assumption_value(&daemon->config, item, known->value);
+    gw_assumption_value(&self->configured, item, known->value);
     if (known->entry.evidence != IW_EVIDENCE_OPERATOR) {
         known->word = (gw_word_t){"", ""};
     }
-    gw_knowledge_tell_item(daemon, item);
+    gw_knowledge_tell_item(self, item);
 }
 
 /// The offset in force is one of this run: notes where it comes from and how good it is. One that the wheel's force cannot
 /// reach is not kept.
-static void note_offset(gw_daemon_t *daemon, iw_side_t side, const iw_force_t *force) {
+static void note_offset(gw_knowledge_t *self, iw_side_t side, const iw_force_t *force) {
     iw_force_quality_t quality = {0};
     if (force->provenance == IW_OFFSET_OPERATOR) {
-        quality = daemon->knowledge.tare[side];
+        quality = self->tare[side];
     } else if (force->provenance == IW_OFFSET_ESTIMATED) {
         quality = force->quality;
     }
     const gw_known_offset_t known = {.from = force->provenance,
-                                     .unit = daemon->config.core.force_unit[side],
+                                     .unit = self->configured.core->force_unit[side],
                                      .offset_mN = force->offset_mN,
                                      .drift_mN = quality.drift_mN,
                                      .deviation_mN = quality.deviation_mN,
                                      .samples = quality.samples,
                                      .wall_us = iw_clock_wall_us()};
     if (gw_bounds_offset(&known)) {
-        daemon->knowledge.known.offset[side] = known;
-        daemon->knowledge.changed = true;
+        self->known.offset[side] = known;
+        self->changed = true;
     }
 }
 
-static void observe_offset(gw_daemon_t *daemon, iw_side_t side, const iw_force_t *force) {
-    gw_told_offset_t *told = &daemon->knowledge.told[side];
+static void observe_offset(gw_knowledge_t *self, iw_side_t side, const iw_force_t *force) {
+    gw_told_offset_t *told = &self->told[side];
     gw_told_offset_t now = {
         .offset_us = force->offset_us, .offset_mN = force->offset_mN, .provenance = force->provenance};
     const bool tared = now.provenance == IW_OFFSET_OPERATOR && now.offset_us != told->offset_us;
@@ -74,86 +73,82 @@ static void observe_offset(gw_daemon_t *daemon, iw_side_t side, const iw_force_t
         return;
     }
     if (now.provenance > IW_OFFSET_STORED && now.offset_us != IW_NEVER) {
-        note_offset(daemon, side, force);
+        note_offset(self, side, force);
     }
-    now.from = daemon->knowledge.known.offset[side].from;
-    gw_knowledge_tell_offset(daemon, side, &now, told);
+    now.from = self->known.offset[side].from;
+    gw_knowledge_tell_offset(self, side, &now, told);
     *told = now;
 }
 
-void gw_knowledge_observe(gw_daemon_t *daemon) {
-    if (!daemon->knowledge.answered) {
+void gw_knowledge_observe(gw_knowledge_t *self, const iw_snapshot_t *seen) {
+    if (!self->answered) {
         return;
     }
-    const iw_snapshot_t seen = gw_daemon_look(daemon); // Once: this runs in every cycle.
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        observe_item(daemon, (iw_ledger_item_t)item, &seen.assumed[item]);
+        observe_item(self, (iw_ledger_item_t)item, &seen->assumed[item]);
     }
-    observe_offset(daemon, IW_LEFT, seen.wheel[IW_LEFT].force);
-    observe_offset(daemon, IW_RIGHT, seen.wheel[IW_RIGHT].force);
+    observe_offset(self, IW_LEFT, seen->wheel[IW_LEFT].force);
+    observe_offset(self, IW_RIGHT, seen->wheel[IW_RIGHT].force);
 }
 
 /// What an earlier run found is put beside what this one has found already, which is fresher.
-static void merge_item(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_known_item_t *stored) {
-    const iw_ledger_entry_t *present = &gw_daemon_look(daemon).assumed[item];
+static void merge_item(gw_knowledge_t *self, iw_ledger_item_t item, const gw_known_item_t *stored) {
+    const iw_ledger_entry_t *present = &gw_wheels_look(self->wheels).assumed[item];
     char value[IWN_VALUE_SIZE];
-    gw_assumption_value(&daemon->config, item, value);
+    gw_assumption_value(&self->configured, item, value);
     if (stored->entry.state == IW_LEDGER_ASSUMED || present->state == IW_LEDGER_CONTRADICTED) {
         return;
     }
     if (strcmp(value, stored->value) != 0) {
-        gw_log(&daemon->log, GW_LOG_INFO, "%s: what was found before was for %s, and %s is configured now: forgotten",
+        gw_log(self->log, GW_LOG_INFO, "%s: what was found before was for %s, and %s is configured now: forgotten",
                iwn_ledger_item_name(item), stored->value, (value[0] != '\0') ? value : "nothing");
-        daemon->knowledge.changed = true;
+        self->changed = true;
         return;
     }
     if (stored->entry.state == IW_LEDGER_CONTRADICTED || present->state == IW_LEDGER_ASSUMED ||
         stored->entry.evidence == IW_EVIDENCE_OPERATOR) {
-        iw_gateway_know(&daemon->gateway, item, &stored->entry);
-        gw_record_assumption(daemon, item);
+        gw_wheels_know(self->wheels, item, &stored->entry);
     }
-    daemon->knowledge.known.item[item] = *stored;
-    daemon->knowledge.known.item[item].entry = *present;
+    self->known.item[item] = *stored;
+    self->known.item[item].entry = *present;
 }
 
-static void merge_offset(gw_daemon_t *daemon, iw_side_t side, const gw_known_offset_t *stored) {
+static void merge_offset(gw_knowledge_t *self, iw_side_t side, const gw_known_offset_t *stored) {
     if (stored->from == IW_OFFSET_NONE) {
         return;
     }
-    if (stored->unit != daemon->config.core.force_unit[side]) {
-        gw_log(&daemon->log, GW_LOG_WARNING,
+    if (stored->unit != self->configured.core->force_unit[side]) {
+        gw_log(self->log, GW_LOG_WARNING,
                "the %s wheel's stored force offset was taken in another force_unit: forgotten; unload both wheels, "
                "then: iwheelctl tare",
                (side == IW_LEFT) ? "left" : "right");
-        daemon->knowledge.changed = true;
+        self->changed = true;
         return;
     }
-    daemon->knowledge.known.offset[side] = *stored;
-    iw_gateway_restore_offset(&daemon->gateway, side,
+    self->known.offset[side] = *stored;
+    iw_gateway_restore_offset(&self->wheels->core, side,
                               (stored->from == IW_OFFSET_OPERATOR) ? IW_OFFSET_OPERATOR : IW_OFFSET_STORED,
                               stored->offset_mN);
 }
 
-static void merge(gw_daemon_t *daemon, const gw_known_t *stored) {
+static void merge(gw_knowledge_t *self, const gw_known_t *stored) {
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
-        merge_item(daemon, (iw_ledger_item_t)item, &stored->item[item]);
+        merge_item(self, (iw_ledger_item_t)item, &stored->item[item]);
     }
-    merge_offset(daemon, IW_LEFT, &stored->offset[IW_LEFT]);
-    merge_offset(daemon, IW_RIGHT, &stored->offset[IW_RIGHT]);
+    merge_offset(self, IW_LEFT, &stored->offset[IW_LEFT]);
+    merge_offset(self, IW_RIGHT, &stored->offset[IW_RIGHT]);
 }
 
 /// The first news: the file, or why there is none.
-static void take_file(gw_daemon_t *daemon, gw_keeper_news_t news, const char *text, size_t length) {
-    gw_knowledge_t *self = &daemon->knowledge;
+static void take_file(gw_knowledge_t *self, gw_keeper_news_t news, const char *text, size_t length) {
     gw_known_t stored;
     if (news == GW_KEEPER_ABSENT) {
         self->state = GW_MEMORY_NEW;
-    } else if (news == GW_KEEPER_READ &&
-               gw_memory_read(text, length, daemon->config.bus.interface, &stored, self->reason)) {
+    } else if (news == GW_KEEPER_READ && gw_memory_read(text, length, self->bus, &stored, self->reason)) {
         self->state = GW_MEMORY_KEPT;
         self->kept_length = (length <= sizeof self->kept) ? length : 0U;
         memcpy(self->kept, text, self->kept_length);
-        merge(daemon, &stored);
+        merge(self, &stored);
     } else {
         self->state = GW_MEMORY_IGNORED;
         if (news == GW_KEEPER_BAD) {
@@ -161,11 +156,10 @@ static void take_file(gw_daemon_t *daemon, gw_keeper_news_t news, const char *te
         }
         gw_keeper_set_aside(&self->keeper);
     }
-    gw_knowledge_tell_memory(daemon);
+    gw_knowledge_tell_memory(self);
 }
 
-static void take_result(gw_daemon_t *daemon, gw_keeper_news_t news, int error) {
-    gw_knowledge_t *self = &daemon->knowledge;
+static void take_result(gw_knowledge_t *self, gw_keeper_news_t news, int error) {
     const bool failed = news != GW_KEEPER_WRITTEN;
     const bool told = failed && self->state == GW_MEMORY_FAILED && self->error == error;
     const bool mended = !failed && self->state == GW_MEMORY_FAILED;
@@ -175,35 +169,34 @@ static void take_result(gw_daemon_t *daemon, gw_keeper_news_t news, int error) {
     if (failed) {
         self->changed = true;
         self->kept_length = 0;
-        self->write_us = daemon->now_us + GW_KNOWLEDGE_RETRY_US;
+        self->write_us = self->wheels->now_us + GW_KNOWLEDGE_RETRY_US;
     }
     if ((failed && !told) || mended) {
-        gw_knowledge_tell_memory(daemon);
+        gw_knowledge_tell_memory(self);
     }
 }
 
-static void hear_keeper(gw_daemon_t *daemon) {
-    gw_knowledge_t *self = &daemon->knowledge;
+static void hear_keeper(gw_knowledge_t *self) {
     const char *text = NULL;
     size_t length = 0;
     int error = 0;
     const gw_keeper_news_t news = gw_keeper_hear(&self->keeper, &text, &length, &error);
     if (news == GW_KEEPER_READ || news == GW_KEEPER_ABSENT || news == GW_KEEPER_BAD) {
         self->error = error;
-        take_file(daemon, news, text, length);
+        take_file(self, news, text, length);
     } else if (news != GW_KEEPER_NO_NEWS) {
-        take_result(daemon, news, (news == GW_KEEPER_GONE) ? ECHILD : error);
+        take_result(self, news, (news == GW_KEEPER_GONE) ? ECHILD : error);
     }
-    const bool waited = daemon->now_us - self->start_us > GW_KNOWLEDGE_PATIENCE_US;
+    const bool waited = self->wheels->now_us - self->start_us > GW_KNOWLEDGE_PATIENCE_US;
     if (!self->answered && (self->state != GW_MEMORY_LOADING || waited)) {
         self->answered = true;
-        gw_knowledge_tell_ledger(daemon);
+        gw_knowledge_tell_ledger(self);
     }
 }
 
-static void hand_over(gw_knowledge_t *self, const char *bus) {
+static void hand_over(gw_knowledge_t *self) {
     static char text[GW_MEMORY_SIZE]; // Too large for a stack.
-    const size_t length = gw_memory_write(&self->known, bus, text, sizeof text);
+    const size_t length = gw_memory_write(&self->known, self->bus, text, sizeof text);
     const bool same = length == self->kept_length && memcmp(text, self->kept, length) == 0;
     if (same || gw_keeper_write(&self->keeper, text, length)) {
         memcpy(self->kept, text, length);
@@ -212,55 +205,79 @@ static void hand_over(gw_knowledge_t *self, const char *bus) {
     }
 }
 
-void gw_knowledge_tend(gw_daemon_t *daemon) {
-    gw_knowledge_t *self = &daemon->knowledge;
+void gw_knowledge_tend(gw_knowledge_t *self) {
     if (!self->answered || self->keeper.waits) {
-        hear_keeper(daemon);
+        hear_keeper(self);
     }
-    if (self->answered && self->changed && !self->keeper.waits && daemon->now_us >= self->write_us) {
-        self->write_us = daemon->now_us + GW_KNOWLEDGE_WRITE_US;
-        hand_over(self, daemon->config.bus.interface);
+    if (self->answered && self->changed && !self->keeper.waits && self->wheels->now_us >= self->write_us) {
+        self->write_us = self->wheels->now_us + GW_KNOWLEDGE_WRITE_US;
+        hand_over(self);
     }
 }
 
-gw_found_t gw_knowledge_confirm(gw_daemon_t *daemon, iw_ledger_item_t item, const gw_word_t *word) {
-    iw_gateway_t *gateway = &daemon->gateway;
-    gw_known_item_t *known = &daemon->knowledge.known.item[item];
-    const gw_found_t verdict = gw_assumption_compare(&daemon->config, item, word->found);
+/// Why nothing was confirmed.
+static void refuse(iw_ledger_item_t item, gw_found_t verdict, iwn_refusal_t *out_refusal) {
+    const char *name = iwn_ledger_item_name(item);
+    if (verdict == GW_FOUND_UNSET) {
+        out_refusal->error = IWN_TYPE_NOT_SET;
+        (void)snprintf(out_refusal->message, sizeof out_refusal->message,
+                       "%s is not configured, so there is nothing to confirm; set it under [wheels] first", name);
+    } else {
+        out_refusal->error = IWN_BAD_VALUE;
+        (void)snprintf(out_refusal->message, sizeof out_refusal->message,
+                       "value of %s must be %s; leave it out to confirm what is configured", name,
+                       gw_assumption_values(item));
+    }
+}
+
+bool gw_knowledge_confirm(gw_knowledge_t *self, iw_ledger_item_t item, const gw_word_t *word,
+                          iwn_refusal_t *out_refusal) {
+    gw_known_item_t *known = &self->known.item[item];
+    const gw_found_t verdict = gw_assumption_compare(&self->configured, item, word->found);
     const bool stands = verdict == GW_FOUND_SAME && known->entry.state == IW_LEDGER_CONFIRMED &&
                         known->entry.evidence == IW_EVIDENCE_OPERATOR && known->word.how[0] != '\0';
     if (verdict != GW_FOUND_SAME && verdict != GW_FOUND_DIFFERENT) {
-        return verdict;
+        refuse(item, verdict, out_refusal);
+        return false;
     }
     const iw_ledger_entry_t entry = {(verdict == GW_FOUND_SAME) ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED,
                                      IW_EVIDENCE_OPERATOR, 0};
-    iw_gateway_know(gateway, item, &entry);
-    gw_record_assumption(daemon, item);
+    gw_wheels_know(self->wheels, item, &entry);
     if (!stands || word->how[0] != '\0') { // Saying so once more takes nothing from how it was found.
         known->word = *word;
         known->since_wall_us = iw_clock_wall_us();
     }
-    daemon->knowledge.changed = true;
-    return verdict;
+    self->changed = true;
+    const iw_snapshot_t seen = gw_wheels_look(self->wheels);
+    gw_knowledge_observe(self, &seen);
+    return true;
 }
 
-iw_tare_t gw_knowledge_tare(gw_daemon_t *daemon, uint8_t sides, iw_side_t *out_refused) {
-    const iw_snapshot_t seen = gw_daemon_look(daemon);
+iw_tare_t gw_knowledge_tare(gw_knowledge_t *self, uint8_t sides, iw_side_t *out_refused) {
+    const iw_snapshot_t seen = gw_wheels_look(self->wheels);
     const iw_force_quality_t quality[IW_SIDES] = {iw_force_measure(seen.wheel[IW_LEFT].force),
                                                   iw_force_measure(seen.wheel[IW_RIGHT].force)};
-    const iw_tare_t result = iw_gateway_tare(&daemon->gateway, daemon->now_us, sides, out_refused);
+    const iw_tare_t result = iw_gateway_tare(&self->wheels->core, self->wheels->now_us, sides, out_refused);
     for (unsigned side = 0; side < IW_SIDES; side++) {
         if (result == IW_TARE_OK && (sides & (1U << side)) != 0U) {
-            daemon->knowledge.tare[side] = quality[side];
+            self->tare[side] = quality[side];
         }
     }
     return result;
 }
 
-void gw_knowledge_close(gw_knowledge_t *self, const char *bus) {
+void gw_knowledge_describe_contradiction(const gw_knowledge_t *self, iw_ledger_item_t item, char *out_text,
+                                         size_t size) {
+    char evidence[GW_EVIDENCE_SIZE];
+    gw_assumption_evidence(item, &gw_wheels_look(self->wheels).assumed[item], &self->known.item[item].word, evidence);
+    (void)snprintf(out_text, size, "%s is contradicted: %s; %s", iwn_ledger_item_name(item), evidence,
+                   gw_assumption_cost(item));
+}
+
+void gw_knowledge_close(gw_knowledge_t *self) {
     if (self->answered && self->changed) {
         self->keeper.waits = false; // What it owes us no longer matters.
-        hand_over(self, bus);
+        hand_over(self);
     }
     gw_keeper_close(&self->keeper);
 }

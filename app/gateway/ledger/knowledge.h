@@ -8,12 +8,17 @@
 #ifndef GATEWAY_KNOWLEDGE_H
 #define GATEWAY_KNOWLEDGE_H
 
-#include "gateway_config.h"
-#include "keeper.h"
+#include "disk/keeper.h"
 #include "memory.h"
+#include "process/owners.h"
 
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/request.h"
+
+struct gw_clients;
+struct gw_log;
+struct gw_wheels;
 
 /// Nothing is told before the keeper has answered, but not for longer than this.
 #define GW_KNOWLEDGE_PATIENCE_US 1000000U
@@ -43,14 +48,20 @@ typedef struct {
 /// The object `ledger` of a status, as written last, with copies of all that it was written from: while those are as they
 /// were, so are its bytes.
 typedef struct {
-    gateway_config_t config;
+    iw_config_t config;
+    uint32_t track_mm;
     iw_ledger_entry_t assumed[IW_LEDGER_ITEMS];
     gw_known_item_t known[IW_LEDGER_ITEMS];
     size_t length; ///< 0: nothing is kept.
     char text[GW_LEDGER_TEXT_SIZE];
 } gw_ledger_written_t;
 
-typedef struct {
+typedef struct gw_knowledge {
+    struct gw_wheels *wheels; ///< Of which it is known.
+    struct gw_log *log;       ///< Told what is learnt, and the clients.
+    struct gw_clients *clients;
+    gw_configured_t configured;
+    const char *bus;
     gw_known_t known;
     gw_ledger_written_t written;
     gw_told_offset_t told[IW_SIDES];
@@ -64,49 +75,54 @@ typedef struct {
     bool answered;                      ///< The keeper has, or our patience has ended: changes are told.
     bool changed;                       ///< Since the last write.
     char reason[GW_MEMORY_REASON_SIZE]; ///< Why the file found at the start is ignored; empty: it is not.
-    char path[GATEWAY_PATH_SIZE + 128U];
+    char path[GW_PATH_SIZE + 128U];
     char kept[GW_MEMORY_SIZE]; ///< The text handed over last.
 } gw_knowledge_t;
 
-struct gw_daemon;
-
-/// Starts the keeper. Call it before anything is opened. `config` must outlive it.
-void gw_knowledge_open(gw_knowledge_t *self, const gateway_config_t *config);
+/// Starts the keeper of what is known of the wheels at `bus`, in `directory`; the members before are set already and must
+/// outlive it. Call it before anything is opened.
+void gw_knowledge_open(gw_knowledge_t *self, const char *directory);
 
 /// Notes and tells what has changed.
-void gw_knowledge_observe(struct gw_daemon *daemon);
+void gw_knowledge_observe(gw_knowledge_t *self, const iw_snapshot_t *seen);
 
 /// Hears the keeper and hands over what has changed. Once per cycle.
-void gw_knowledge_tend(struct gw_daemon *daemon);
+void gw_knowledge_tend(gw_knowledge_t *self);
 
-/// The operator's word: `word->found` as in gw_assumption_compare.
-gw_found_t gw_knowledge_confirm(struct gw_daemon *daemon, iw_ledger_item_t item, const gw_word_t *word);
+/// The operator's word, noted and told; `word->found` as in gw_assumption_compare. False: it was not taken, and `out_refusal` tells
+/// why.
+bool gw_knowledge_confirm(gw_knowledge_t *self, iw_ledger_item_t item, const gw_word_t *word,
+                          iwn_refusal_t *out_refusal);
 
 /// Tares these wheels (bits of IW_SIDES_), all or none, and remembers the windows they were measured in. `*out_refused`:
 /// which one refused.
-iw_tare_t gw_knowledge_tare(struct gw_daemon *daemon, uint8_t sides, iw_side_t *out_refused);
+iw_tare_t gw_knowledge_tare(gw_knowledge_t *self, uint8_t sides, iw_side_t *out_refused);
 
-/// Hands over the rest. The keeper ends when it is on the disk.
-void gw_knowledge_close(gw_knowledge_t *self, const char *bus);
+/// "track is contradicted: ...; twist is refused", of an item that is.
+void gw_knowledge_describe_contradiction(const gw_knowledge_t *self, iw_ledger_item_t item, char *out_text,
+                                         size_t size);
 
 /// The objects `ledger` and `memory` of a snapshot: every item; file, state and reason. The ledger's bytes are kept and
 /// written again until something of it changes.
-void gw_knowledge_write(struct gw_daemon *daemon, const iw_snapshot_t *seen, iwn_out_t *json);
+void gw_knowledge_write(gw_knowledge_t *self, const iw_snapshot_t *seen, iwn_out_t *json);
 
 /// One item of the ledger, its state and what it rests on, into an object that is open.
-void gw_knowledge_write_item(const struct gw_daemon *daemon, iw_ledger_item_t item, iwn_out_t *json);
+void gw_knowledge_write_item(const gw_knowledge_t *self, iw_ledger_item_t item, iwn_out_t *json);
+
+/// Hands over the rest. The keeper ends when it is on the disk.
+void gw_knowledge_close(gw_knowledge_t *self);
 
 /// In words, lines of the log and events; for knowledge.c: an item has changed.
-void gw_knowledge_tell_item(struct gw_daemon *daemon, iw_ledger_item_t item);
+void gw_knowledge_tell_item(gw_knowledge_t *self, iw_ledger_item_t item);
 
 /// The offset in force has changed.
-void gw_knowledge_tell_offset(struct gw_daemon *daemon, iw_side_t side, const gw_told_offset_t *now,
+void gw_knowledge_tell_offset(gw_knowledge_t *self, iw_side_t side, const gw_told_offset_t *now,
                               const gw_told_offset_t *before);
 
 /// Where it is kept, or why not.
-void gw_knowledge_tell_memory(struct gw_daemon *daemon);
+void gw_knowledge_tell_memory(gw_knowledge_t *self);
 
 /// The whole ledger, at start.
-void gw_knowledge_tell_ledger(struct gw_daemon *daemon);
+void gw_knowledge_tell_ledger(gw_knowledge_t *self);
 
 #endif

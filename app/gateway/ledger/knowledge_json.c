@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "daemon.h"
-#include "process/owners.h"
+#include "wheels/wheels.h"
 
 #include "iwheel_northbound/words.h"
 
@@ -10,7 +9,7 @@
 
 /// All that the ledger is written from. What writes it sees nothing else, so that nothing can be missing in `is_as_written`.
 typedef struct {
-    const gateway_config_t *config;
+    const gw_configured_t *configured;
     const iw_ledger_entry_t *assumed; ///< By item.
     const gw_known_item_t *known;     ///< By item.
 } source_t;
@@ -21,7 +20,7 @@ static void write_item(const source_t *source, iw_ledger_item_t item, iwn_out_t 
     const bool noted = entry->state != IW_LEDGER_ASSUMED && known->entry.state == entry->state;
     char value[IWN_VALUE_SIZE];
     char reason[GW_EVIDENCE_SIZE];
-    gw_assumption_value(source->config, item, value);
+    gw_assumption_value(source->configured, item, value);
     gw_assumption_evidence(item, entry, &known->word, reason);
     iwn_out_text(json, "state", iwn_ledger_state_name(entry->state));
     iwn_out_text(json, "evidence", iwn_evidence_name(entry->evidence));
@@ -34,8 +33,8 @@ static void write_item(const source_t *source, iw_ledger_item_t item, iwn_out_t 
     iwn_out_text(json, "disabled", (entry->state == IW_LEDGER_CONTRADICTED) ? gw_assumption_cost(item) : NULL);
 }
 
-void gw_knowledge_write_item(const gw_daemon_t *daemon, iw_ledger_item_t item, iwn_out_t *json) {
-    const source_t source = {&daemon->config, gw_daemon_look(daemon).assumed, daemon->knowledge.known.item};
+void gw_knowledge_write_item(const gw_knowledge_t *self, iw_ledger_item_t item, iwn_out_t *json) {
+    const source_t source = {&self->configured, gw_wheels_look(self->wheels).assumed, self->known.item};
     write_item(&source, item, json);
 }
 
@@ -45,7 +44,8 @@ static bool is_alike(const void *one, const void *other, size_t size) {
 }
 
 static bool is_as_written(const gw_ledger_written_t *written, const source_t *source) {
-    return written->length > 0U && is_alike(&written->config, source->config, sizeof written->config) &&
+    return written->length > 0U && written->track_mm == source->configured->track_mm &&
+           is_alike(&written->config, source->configured->core, sizeof written->config) &&
            is_alike(written->assumed, source->assumed, sizeof written->assumed) &&
            is_alike(written->known, source->known, sizeof written->known);
 }
@@ -55,7 +55,8 @@ static void keep(gw_ledger_written_t *written, const source_t *source, const iwn
     const size_t length = json->overflow ? 0U : json->length - begin;
     written->length = 0;
     if (length > 0U && length <= sizeof written->text) {
-        memcpy(&written->config, source->config, sizeof written->config);
+        memcpy(&written->config, source->configured->core, sizeof written->config);
+        written->track_mm = source->configured->track_mm;
         memcpy(written->assumed, source->assumed, sizeof written->assumed);
         memcpy(written->known, source->known, sizeof written->known);
         memcpy(written->text, &json->data[begin], length);
@@ -94,9 +95,8 @@ static void write_memory(const gw_knowledge_t *self, iwn_out_t *json) {
     iwn_out_close(json, '}');
 }
 
-void gw_knowledge_write(gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_t *json) {
-    gw_knowledge_t *const self = &daemon->knowledge;
-    const source_t source = {&daemon->config, seen->assumed, self->known.item};
+void gw_knowledge_write(gw_knowledge_t *self, const iw_snapshot_t *seen, iwn_out_t *json) {
+    const source_t source = {&self->configured, seen->assumed, self->known.item};
     write_ledger(&self->written, &source, json);
     write_memory(self, json);
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "knowledge.h"
 
-#include "clients/event.h"
-#include "daemon.h"
-#include "process/owners.h"
+#include "clients/clients.h"
+#include "process/log.h"
+#include "wheels/wheels.h"
 
 #include "iwheel_northbound/words.h"
 
@@ -18,21 +18,21 @@ static const char *side_name(iw_side_t side) {
     return (side == IW_LEFT) ? "left" : "right";
 }
 
-void gw_knowledge_tell_item(gw_daemon_t *daemon, iw_ledger_item_t item) {
-    const iw_ledger_entry_t *entry = &gw_daemon_look(daemon).assumed[item];
+void gw_knowledge_tell_item(gw_knowledge_t *self, iw_ledger_item_t item) {
+    const iw_ledger_entry_t *entry = &gw_wheels_look(self->wheels).assumed[item];
     const bool bad = entry->state == IW_LEDGER_CONTRADICTED;
     char value[IWN_VALUE_SIZE];
     char evidence[GW_EVIDENCE_SIZE];
-    gw_assumption_value(&daemon->config, item, value);
-    gw_assumption_evidence(item, entry, &daemon->knowledge.known.item[item].word, evidence);
-    gw_log(&daemon->log, bad ? GW_LOG_WARNING : GW_LOG_INFO, "assumption %s = %s is %s by the %s: %s%s%s",
+    gw_assumption_value(&self->configured, item, value);
+    gw_assumption_evidence(item, entry, &self->known.item[item].word, evidence);
+    gw_log(self->log, bad ? GW_LOG_WARNING : GW_LOG_INFO, "assumption %s = %s is %s by the %s: %s%s%s",
            iwn_ledger_item_name(item), value, iwn_ledger_state_name(entry->state), iwn_evidence_name(entry->evidence),
            evidence, bad ? "; disabled: " : "", bad ? gw_assumption_cost(item) : "");
-    iwn_out_t json = gw_event_begin(daemon, "ledger");
-    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_t json = gw_clients_begin_event(self->clients, "ledger");
+    iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
     iwn_out_text(&json, "item", iwn_ledger_item_name(item));
-    gw_knowledge_write_item(daemon, item, &json);
-    gw_event_send(daemon, &json, IWN_TOPIC_STATE);
+    gw_knowledge_write_item(self, item, &json);
+    gw_clients_send_event(self->clients, &json, IWN_TOPIC_STATE);
 }
 
 /// "12.300 N, stored (wheel)", or "none".
@@ -48,7 +48,7 @@ static void describe(const gw_told_offset_t *offset, char *out_text, size_t size
                    stored ? iwn_provenance_name(offset->from) : "", stored ? ")" : "");
 }
 
-void gw_knowledge_tell_offset(gw_daemon_t *daemon, iw_side_t side, const gw_told_offset_t *now,
+void gw_knowledge_tell_offset(gw_knowledge_t *self, iw_side_t side, const gw_told_offset_t *now,
                               const gw_told_offset_t *before) {
     const bool known = now->provenance != IW_OFFSET_NONE;
     const bool knew = before->provenance != IW_OFFSET_NONE;
@@ -57,21 +57,20 @@ void gw_knowledge_tell_offset(gw_daemon_t *daemon, iw_side_t side, const gw_told
     char was[64];
     describe(now, is, sizeof is);
     describe(before, was, sizeof was);
-    gw_log(&daemon->log, moved ? GW_LOG_WARNING : GW_LOG_INFO, "%s force offset: %s; before: %s", side_name(side), is,
+    gw_log(self->log, moved ? GW_LOG_WARNING : GW_LOG_INFO, "%s force offset: %s; before: %s", side_name(side), is,
            was);
-    iwn_out_t json = gw_event_begin(daemon, "offset");
-    iwn_out_int(&json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_t json = gw_clients_begin_event(self->clients, "offset");
+    iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
     iwn_out_text(&json, "side", side_name(side));
     iwn_out_known(&json, "offset_mN", known, now->offset_mN);
     iwn_out_text(&json, "provenance", iwn_offset_word(now->provenance, now->offset_us));
     iwn_out_known(&json, "before_mN", knew, before->offset_mN);
     iwn_out_text(&json, "before_provenance", iwn_offset_word(before->provenance, before->offset_us));
-    gw_event_send(daemon, &json, IWN_TOPIC_FORCE);
+    gw_clients_send_event(self->clients, &json, IWN_TOPIC_FORCE);
 }
 
-void gw_knowledge_tell_memory(gw_daemon_t *daemon) {
-    const gw_knowledge_t *self = &daemon->knowledge;
-    gw_log_t *log = &daemon->log;
+void gw_knowledge_tell_memory(gw_knowledge_t *self) {
+    gw_log_t *log = self->log;
     switch (self->state) {
     case GW_MEMORY_KEPT:
         gw_log(log, GW_LOG_INFO, "what is known of the wheels is kept in %s", self->path);
@@ -106,20 +105,20 @@ static void list_items(const iw_ledger_entry_t *assumed, iw_ledger_state_t state
     }
 }
 
-void gw_knowledge_tell_ledger(gw_daemon_t *daemon) {
-    const iw_ledger_entry_t *assumed = gw_daemon_look(daemon).assumed;
+void gw_knowledge_tell_ledger(gw_knowledge_t *self) {
+    const iw_ledger_entry_t *assumed = gw_wheels_look(self->wheels).assumed;
     char items[512];
     list_items(assumed, IW_LEDGER_CONFIRMED, items, sizeof items);
     if (items[0] != '\0') {
-        gw_log(&daemon->log, GW_LOG_INFO, "confirmed before: %s", items);
+        gw_log(self->log, GW_LOG_INFO, "confirmed before: %s", items);
     }
     list_items(assumed, IW_LEDGER_ASSUMED, items, sizeof items);
     if (items[0] != '\0') {
-        gw_log(&daemon->log, GW_LOG_INFO, "assumed, never verified: %s", items);
+        gw_log(self->log, GW_LOG_INFO, "assumed, never verified: %s", items);
     }
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         if (assumed[item].state == IW_LEDGER_CONTRADICTED) {
-            gw_knowledge_tell_item(daemon, (iw_ledger_item_t)item);
+            gw_knowledge_tell_item(self, (iw_ledger_item_t)item);
         }
     }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "memory.h"
 
-#include "box/box_files.h"
+#include "disk/box_files.h"
 
 #include "iwheel/codec.h"
 #include "iwheel/evidence.h"

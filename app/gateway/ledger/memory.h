@@ -8,7 +8,7 @@
 #ifndef GATEWAY_MEMORY_H
 #define GATEWAY_MEMORY_H
 
-#include "assumption.h"
+#include "words/assumption.h"
 
 #include "iwheel/force_offset.h"
 

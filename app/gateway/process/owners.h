@@ -13,6 +13,10 @@
 /// Where locks and markers of interfaces are. It vanishes when the machine is switched off, and the wheels with it.
 #define GW_RUNTIME_DIRECTORY "/run/iwheel"
 
+/// A path that fits a unix socket address, with its terminator; the same behind `unix:`.
+#define GW_PATH_SIZE    108U
+#define GW_ADDRESS_SIZE 113U
+
 typedef struct {
     uid_t own;
     uid_t service; ///< Root's if there is no service.

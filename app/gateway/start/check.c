@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
-#include "bus/bus_facts.h"
-#include "clients/listener.h"
+#include "config/gateway_config.h"
+#include "process/owners.h"
 
 #include <errno.h>
 #include <grp.h>
@@ -40,13 +40,8 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
 static bool judge_directory(const char *check, const char *path, inspect_findings_t *findings) {
     char above[GATEWAY_PATH_SIZE];
     struct stat status;
-    const char *const slash = strrchr(path, '/');
     const char *const key = (strcmp(check, "record") == 0) ? "[record] directory" : "[northbound] socket";
-    (void)snprintf(above, sizeof above, "%.*s",
-                   (slash == NULL)   ? 1
-                   : (slash == path) ? 1
-                                     : (int)(slash - path),
-                   (slash == NULL) ? "." : path);
+    gw_folder_of(path, above, sizeof above);
     const bool there = stat(path, &status) == 0;
     if (there && !S_ISDIR(status.st_mode)) {
         inspect_say(findings, check, INSPECT_FAIL, "%s: %s is no directory", check, path);
@@ -78,7 +73,8 @@ static void judge_safety(const gateway_config_t *config, inspect_findings_t *fin
         return;
     }
     static gw_listener_t listener;
-    const int result = gw_listener_prepare(&listener, config, GW_DRIVE, memory);
+    const gw_listener_wish_t wish = gw_report_socket(config, GW_DRIVE);
+    const int result = gw_listener_prepare(&listener, &wish, memory);
     (void)fclose(memory);
     gw_folder_close(&listener.folder);
     if (result != 0) {
@@ -108,7 +104,7 @@ static void judge_own(const char *path, inspect_findings_t *findings) {
 
 static void judge_watchers(const gateway_config_t *config, inspect_findings_t *findings) {
     const char *const group = config->northbound.watch_group;
-    if (!gw_listener_wanted(config, GW_WATCH)) {
+    if (strcmp(config->northbound.watch_socket, "none") == 0) {
         return;
     }
     if (strcmp(group, "none") != 0 && getgrnam(group) == NULL) {
@@ -142,13 +138,7 @@ static void judge_rights(const gateway_config_t *config, inspect_findings_t *fin
 
 static void judge_files(const gateway_config_t *config, inspect_findings_t *findings) {
     char directory[GATEWAY_PATH_SIZE];
-    const char *const path = config->northbound.socket;
-    const char *const slash = strrchr(path, '/');
-    (void)snprintf(directory, sizeof directory, "%.*s",
-                   (slash == NULL)   ? 1
-                   : (slash == path) ? 1
-                                     : (int)(slash - path),
-                   (slash == NULL) ? "." : path);
+    gw_folder_of(config->northbound.socket, directory, sizeof directory);
     if (judge_directory("socket", directory, findings) && access(directory, F_OK) == 0) {
         judge_safety(config, findings);
     }
@@ -164,7 +154,7 @@ static void judge_machine(const gateway_config_t *config, inspect_findings_t *fi
     inspect_heard_t heard;
     const iw_estop_wish_t line = {
         .name = config->estop.line, .active_high = config->estop.active_high, .debounce_ms = config->estop.debounce_ms};
-    const inspect_wish_t wish = gw_bus_facts_wish(config);
+    const inspect_wish_t wish = gw_report_wish(config);
     const inspect_opened_t opened = inspect_open(&hal, config->bus.interface, &line, findings);
     if (!opened.hal) {
         return;

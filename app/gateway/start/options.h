@@ -3,7 +3,7 @@
 #ifndef GATEWAY_OPTIONS_H
 #define GATEWAY_OPTIONS_H
 
-#include "gateway_config.h"
+#include "config/gateway_config.h"
 #include "process/log.h"
 
 typedef enum { GW_RUN = 0, GW_CHECK, GW_PRINT_CONFIG, GW_VERSION, GW_HELP } gw_action_t;

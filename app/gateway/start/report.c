@@ -1,29 +1,24 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
-#include "inspect.h"
+#include "config/gateway_config.h"
+#include "process/log.h"
 
 #include <inttypes.h>
 
-void gw_report_start(gw_daemon_t *daemon) {
-    const gateway_config_t *config = &daemon->config;
+void gw_report_start(const gateway_config_t *config, bool simulated, bool watched, gw_log_t *log) {
     const iw_stop_budget_t budget = iw_config_stop_budget(&config->core);
-    gw_log_t *log = &daemon->log;
     gw_log(log, GW_LOG_INFO, "version " IWHEEL_VERSION "; bus %s; clients at %s%s", config->bus.interface,
            config->northbound.socket, config->core.listen_only ? "; listens only" : "");
-    if (daemon->listener[GW_WATCH].fd >= 0) {
+    if (watched) {
         gw_log(log, GW_LOG_INFO, "watchers at %s", config->northbound.watch_socket);
     }
-    gw_log(log, GW_LOG_INFO, "e-stop: %s%s", config->estop.line,
-           daemon->hal.estop_ops->simulated ? " (SIMULATED)" : "");
+    gw_log(log, GW_LOG_INFO, "e-stop: %s%s", config->estop.line, simulated ? " (SIMULATED)" : "");
     gw_log(log, GW_LOG_INFO, "stop budget, client lost: %" PRIu32 " ms and %" PRIu32 " mm after its last command",
            budget.client_lost_ms, budget.client_lost_mm);
     gw_log(log, GW_LOG_INFO,
            "stop budget, gateway killed: %" PRIu32 " ms and %" PRIu32 " mm at full command, then unknown",
            budget.killed_ms, budget.killed_mm);
-    for (uint32_t i = 0; i < daemon->warnings; i++) {
-        gw_log(log, GW_LOG_WARNING, "%s", daemon->warning[i]);
-    }
     if (!config->core.setpoint_type_set || config->core.current_role == IW_ROLE_UNSET) {
         gw_log(log, GW_LOG_WARNING,
                "setpoint_type or current_role is not configured: arm will be refused; set both under [wheels]");
@@ -37,4 +32,20 @@ void gw_report_unopened(const gateway_config_t *config, const char *culprit, int
     inspect_unopened(culprit, culprit == config->bus.interface, error, &findings);
     inspect_sentence(&findings.finding[0], sentence, sizeof sentence);
     (void)fprintf(err, "iwheel-gateway: %s\n", sentence);
+}
+
+inspect_wish_t gw_report_wish(const gateway_config_t *config) {
+    return (inspect_wish_t){
+        .name = config->bus.interface,
+        .bitrate_hz = config->bus.bitrate,
+        .sample_point_permille = config->bus.sample_point_permille,
+        .refuses = config->bus.on_mismatch == GATEWAY_MISMATCH_REFUSE,
+    };
+}
+
+gw_listener_wish_t gw_report_socket(const gateway_config_t *config, gw_right_t right) {
+    return (right == GW_DRIVE) ? (gw_listener_wish_t){right, config->northbound.socket, config->northbound.group,
+                                                      config->northbound.mode}
+                               : (gw_listener_wish_t){right, config->northbound.watch_socket,
+                                                      config->northbound.watch_group, config->northbound.watch_mode};
 }

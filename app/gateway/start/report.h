@@ -3,17 +3,27 @@
 #ifndef GATEWAY_REPORT_H
 #define GATEWAY_REPORT_H
 
-#include "daemon.h"
+#include "clients/listener.h"
 
-/// Version, bus, e-stop, stop budget, what was never verified, warnings: to the log.
-void gw_report_start(gw_daemon_t *daemon);
+#include "inspect.h"
+
+struct gateway_config;
+struct gw_log;
+
+/// Version, bus, e-stop, stop budget, what is not configured: to the log. `simulated`: the e-stop is; `watched`: there is a socket to
+/// watch by.
+void gw_report_start(const struct gateway_config *config, bool simulated, bool watched, struct gw_log *log);
+
+/// What the bus is to be, and a socket, by the configuration.
+inspect_wish_t gw_report_wish(const struct gateway_config *config);
+gw_listener_wish_t gw_report_socket(const struct gateway_config *config, gw_right_t right);
 
 /// A bus or e-stop that cannot be opened: cause and cure.
-void gw_report_unopened(const gateway_config_t *config, const char *culprit, int error, FILE *err);
+void gw_report_unopened(const struct gateway_config *config, const char *culprit, int error, FILE *err);
 
 /// Lines "ok", "warn", "fail" or "skip" on `out`, each with what mends it; listens to the bus for half a second, sends and makes
 /// nothing. 1 if something failed; else EX_UNAVAILABLE if something could not be looked at on this machine; else 0, also if
 /// the gateway would start and only refuse arm: setpoint type or current role are not known yet.
-int gw_report_check(const gateway_config_t *config, FILE *out);
+int gw_report_check(const struct gateway_config *config, FILE *out);
 
 #endif

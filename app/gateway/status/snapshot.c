@@ -2,7 +2,9 @@
 #include "snapshot.h"
 
 #include "bus/bus_facts.h"
+#include "clients/clients.h"
 #include "ledger/knowledge.h"
+#include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -83,11 +85,11 @@ static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t
     iwn_out_close(json, '}');
 }
 
-static void write_wheel(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
+static void write_wheel(const gw_known_offset_t *known, const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
     iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
     write_motion(seen, side, json);
     write_condition(seen, side, json);
-    gw_snapshot_write_wheel_force(daemon, seen, side, json);
+    gw_snapshot_write_wheel_force(known, seen, side, json);
     iwn_out_close(json, '}');
 }
 
@@ -109,8 +111,8 @@ static void write_pose(const iw_snapshot_t *seen, iwn_out_t *json) {
     iwn_out_close(json, '}');
 }
 
-static void write_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_t *json) {
-    const gw_client_t *holder = gw_daemon_client(daemon, seen->holder);
+static void write_lease(gw_clients_t *clients, const iw_snapshot_t *seen, iwn_out_t *json) {
+    const gw_client_t *holder = gw_clients_find(clients, seen->holder);
     const bool running = holder != NULL && !seen->arming && seen->lease_until_us > seen->at_us;
     iwn_out_open(json, "lease", '{');
     iwn_out_known(json, "holder", holder != NULL, seen->holder);
@@ -122,12 +124,13 @@ static void write_lease(gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_
     iwn_out_close(json, '}');
 }
 
-static void write_surroundings(const gw_daemon_t *daemon, const iw_snapshot_t *seen, iwn_out_t *json) {
-    const iw_bus_link_t *link = iw_linux_hal_link(&daemon->hal);
+static void write_surroundings(const gw_status_t *status, const iw_snapshot_t *seen, iwn_out_t *json) {
+    const gw_wheels_t *wheels = status->wheels;
+    const iw_bus_link_t *link = iw_linux_hal_link(&wheels->hal);
     iwn_out_open(json, "bus", '{');
-    iwn_out_text(json, "name", daemon->config.bus.interface);
+    iwn_out_text(json, "name", wheels->bus.name);
     iwn_out_text(json, "state", iwn_bus_state_name(seen->bus));
-    iwn_out_text(json, "timing", gw_bus_facts_timing(daemon));
+    iwn_out_text(json, "timing", gw_bus_facts_timing(&wheels->bus, link));
     iwn_out_text(json, "echo", seen->echo_proven ? "proven" : "unproven");
     iwn_out_known(json, "bitrate", link->bitrate_hz != 0U, link->bitrate_hz);
     iwn_out_known(json, "sample_point_permille", link->sample_point_permille != 0U, link->sample_point_permille);
@@ -135,15 +138,15 @@ static void write_surroundings(const gw_daemon_t *daemon, const iw_snapshot_t *s
     iwn_out_known(json, "lost_frames", link->presence == IW_LINK_UP, link->lost);
     iwn_out_close(json, '}');
     iwn_out_open(json, "estop", '{');
-    iwn_out_text(json, "line", daemon->config.estop.line);
-    iwn_out_text(json, "state", iwn_estop_name(daemon->hal.estop_last, daemon->hal.estop_ops->present));
-    iwn_out_bool(json, "simulated", daemon->hal.estop_ops->simulated);
+    iwn_out_text(json, "line", wheels->estop);
+    iwn_out_text(json, "state", iwn_estop_name(wheels->hal.estop_last, wheels->hal.estop_ops->present));
+    iwn_out_bool(json, "simulated", wheels->hal.estop_ops->simulated);
     iwn_out_close(json, '}');
 }
 
-static void write_gaps(const gw_daemon_t *daemon, iwn_out_t *json) {
+static void write_gaps(const gw_gaps_t *gaps, iwn_out_t *json) {
     iwn_out_open(json, "gaps", '{');
-    gw_gaps_write(&daemon->gaps, json);
+    gw_gaps_write(gaps, json);
     iwn_out_close(json, '}');
 }
 
@@ -181,7 +184,7 @@ static void write_counters(const iw_snapshot_t *seen, iwn_out_t *json) {
     iwn_out_close(json, '}');
 }
 
-void gw_snapshot_write_causes(iwn_out_t *json, const char *name, uint32_t causes) {
+static void write_causes(iwn_out_t *json, const char *name, uint32_t causes) {
     iwn_out_open(json, name, '[');
     for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
         if ((causes & (1U << cause)) != 0U) {
@@ -191,38 +194,39 @@ void gw_snapshot_write_causes(iwn_out_t *json, const char *name, uint32_t causes
     iwn_out_close(json, ']');
 }
 
-void gw_snapshot_write(gw_daemon_t *daemon, iwn_out_t *json) {
-    const iw_snapshot_t seen = gw_daemon_look(daemon);
+void gw_snapshot_write(const gw_status_t *status, iwn_out_t *json) {
+    const gw_wheels_t *wheels = status->wheels;
+    const gw_known_offset_t *zero = status->knowledge->known.offset;
+    const iw_snapshot_t seen = gw_wheels_look(wheels);
     const iw_state_t state = seen.state;
     const bool stopped = state == IW_STATE_STOPPING || state == IW_STATE_LATCHED;
-    iwn_out_int(json, "t_us", (int64_t)daemon->now_us);
+    iwn_out_int(json, "t_us", (int64_t)seen.at_us);
     iwn_out_int(json, "wall_us", iw_clock_wall_us());
     iwn_out_text(json, "version", IWHEEL_VERSION);
     iwn_out_text(json, "state", iwn_state_name(state));
     iwn_out_bool(json, "arming", seen.arming);
     iwn_out_text(json, "cause", stopped ? iwn_cause_name(seen.stop->cause) : NULL);
-    gw_snapshot_write_causes(json, "present", seen.present);
-    write_lease(daemon, &seen, json);
-    write_surroundings(daemon, &seen, json);
-    write_wheel(daemon, &seen, IW_LEFT, json);
-    write_wheel(daemon, &seen, IW_RIGHT, json);
+    write_causes(json, "present", seen.present);
+    write_lease(status->clients, &seen, json);
+    write_surroundings(status, &seen, json);
+    write_wheel(&zero[IW_LEFT], &seen, IW_LEFT, json);
+    write_wheel(&zero[IW_RIGHT], &seen, IW_RIGHT, json);
     write_pose(&seen, json);
-    gw_knowledge_write(daemon, &seen, json);
-    write_gaps(daemon, json);
+    gw_knowledge_write(status->knowledge, &seen, json);
+    write_gaps(&wheels->gaps, json);
     write_budget(&seen, json);
     write_counters(&seen, json);
-    iwn_out_int(json, "clients", daemon->clients);
+    iwn_out_int(json, "clients", gw_clients_count(status->clients));
     iwn_out_bool(json, "listen_only", seen.config->listen_only);
-    iwn_out_bool(json, "shutting_down", daemon->shutting_down);
+    iwn_out_bool(json, "shutting_down", wheels->shutting_down);
     iwn_out_open(json, "warnings", '[');
-    for (uint32_t i = 0; i < daemon->warnings; i++) {
-        iwn_out_text(json, NULL, daemon->warning[i]);
+    for (uint32_t i = 0; i < wheels->warnings; i++) {
+        iwn_out_text(json, NULL, wheels->warning[i]);
     }
     iwn_out_close(json, ']');
 }
 
-void gw_snapshot_write_stop(const gw_daemon_t *daemon, iwn_out_t *json) {
-    const iwn_stop_note_t *note = &daemon->last_stop;
+void gw_snapshot_write_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *json) {
     const iw_stop_t *stop = &note->stop;
     const bool any = stop->number > 0U;
     iwn_out_int(json, "number", stop->number);
@@ -237,6 +241,6 @@ void gw_snapshot_write_stop(const gw_daemon_t *daemon, iwn_out_t *json) {
     iwn_out_known(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
     iwn_out_known(json, "at_us", any, (int64_t)stop->at_us);
     iwn_out_known(json, "wall_us", any, note->wall_us);
-    gw_snapshot_write_age(json, "age_ms", daemon->now_us, any ? stop->at_us : IW_NEVER);
+    gw_snapshot_write_age(json, "age_ms", now_us, any ? stop->at_us : IW_NEVER);
     iwn_out_text(json, "sentence", note->sentence);
 }

@@ -27,8 +27,8 @@ static void write_gear(const iw_config_t *config, char out_value[IWN_VALUE_SIZE]
                    config->rpm_of_rotor ? "rotor" : "wheel");
 }
 
-void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t item, char out_value[IWN_VALUE_SIZE]) {
-    const iw_config_t *config = &configured->core;
+void gw_assumption_value(const gw_configured_t *configured, iw_ledger_item_t item, char out_value[IWN_VALUE_SIZE]) {
+    const iw_config_t *config = configured->core;
     const char *word = "yes";
     out_value[0] = '\0';
     switch (item) {
@@ -130,8 +130,8 @@ static gw_found_t compare_word(const char *found, const char *wanted, const char
     return (strcmp(found, wanted) == 0) ? GW_FOUND_SAME : GW_FOUND_DIFFERENT;
 }
 
-gw_found_t gw_assumption_compare(const gateway_config_t *configured, iw_ledger_item_t item, const char *found) {
-    const iw_config_t *config = &configured->core;
+gw_found_t gw_assumption_compare(const gw_configured_t *configured, iw_ledger_item_t item, const char *found) {
+    const iw_config_t *config = configured->core;
     char wanted[IWN_VALUE_SIZE];
     gw_assumption_value(configured, item, wanted);
     if (wanted[0] == '\0') {

@@ -7,8 +7,7 @@
 #ifndef GATEWAY_ASSUMPTION_H
 #define GATEWAY_ASSUMPTION_H
 
-#include "gateway_config.h"
-
+#include "iwheel/config.h"
 #include "iwheel/types.h"
 #include "iwheel_northbound/words.h"
 
@@ -33,11 +32,17 @@ typedef struct {
     char how[IWN_HOW_SIZE];     ///< By what it was found: "bringup: 3 full turns by hand, ...".
 } gw_word_t;
 
+/// What is configured of the wheels.
+typedef struct {
+    const iw_config_t *core;
+    uint32_t track_mm;
+} gw_configured_t;
+
 /// The value in force; empty if none is configured.
-void gw_assumption_value(const gateway_config_t *configured, iw_ledger_item_t item, char out_value[IWN_VALUE_SIZE]);
+void gw_assumption_value(const gw_configured_t *configured, iw_ledger_item_t item, char out_value[IWN_VALUE_SIZE]);
 
 /// Compares `found` with the value in force. `found` may be empty: the operator confirms what is in force.
-gw_found_t gw_assumption_compare(const gateway_config_t *configured, iw_ledger_item_t item, const char *found);
+gw_found_t gw_assumption_compare(const gw_configured_t *configured, iw_ledger_item_t item, const char *found);
 
 /// The values that `found` may have, for messages.
 const char *gw_assumption_values(iw_ledger_item_t item);

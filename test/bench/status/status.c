@@ -5,7 +5,7 @@
 ///     bench_status anew ROUNDS    something has, each time
 ///
 /// Two runs with different ROUNDS differ by the events alone. Exit status 1 if the gateway does not drive or an event is not whole.
-#include "clients/event.h"
+#include "clients/clients.h"
 #include "daemon_rig.h"
 #include "status/snapshot.h"
 
@@ -27,8 +27,8 @@ void tearDown(void) {
 }
 
 static size_t write_event(gw_daemon_t *daemon) {
-    iwn_out_t json = gw_event_begin(daemon, "state");
-    gw_snapshot_write(daemon, &json);
+    iwn_out_t json = gw_clients_begin_event(&daemon->clients, "state");
+    gw_snapshot_write(&daemon->status, &json);
     iwn_out_close(&json, '}');
     return iwn_out_finish(&json);
 }
@@ -38,7 +38,7 @@ static void bench_status(void) {
     const int client = daemon_rig_connect();
     daemon_rig_arm(client);
     daemon_rig_drive(client, 300, 300, 500);
-    iw_ledger_entry_t *const entry = &daemon->gateway.ledger.entry[IW_LEDGER_GEAR_RATIO];
+    iw_ledger_entry_t *const entry = &daemon->wheels.core.ledger.entry[IW_LEDGER_GEAR_RATIO];
     for (unsigned i = 0; i < rounds; i++) {
         entry->figure += anew ? 1 : 0;
         TEST_ASSERT_GREATER_THAN_size_t(0, write_event(daemon));

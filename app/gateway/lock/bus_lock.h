@@ -13,11 +13,10 @@
 #define GATEWAY_BUS_LOCK_H
 
 #include "bus_names.h"
-#include "gateway_config.h"
 
 #include "iwheel/types.h"
 
-#define GW_BUS_LOCK_PATH_SIZE (GATEWAY_ADDRESS_SIZE + 48U)
+#define GW_BUS_LOCK_PATH_SIZE (GW_ADDRESS_SIZE + 48U)
 /// Who may have come is looked at this often.
 #define GW_BUS_LOCK_LOOK_US 1000000U
 

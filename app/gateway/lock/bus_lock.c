@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <limits.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
@@ -21,7 +22,7 @@ const char *gw_bus_lock_local_path(const char *bus) {
 
 /// A path of any length and spelling as 16 digits.
 static void name_local(const char *path, char out_key[GW_BUS_KEY_SIZE]) {
-    char folder[GATEWAY_ADDRESS_SIZE];
+    char folder[GW_ADDRESS_SIZE];
     static char real[PATH_MAX]; // Too large for a stack.
     const char *slash = strrchr(path, '/');
     uint64_t hash = 0xCBF29CE484222325U;
@@ -127,7 +128,7 @@ static void name_interface(gw_bus_lock_t *self, const char *bus, const char *dir
 
 int gw_bus_lock_take(gw_bus_lock_t *self, const char *bus, const char *directory) {
     const char *path = gw_bus_lock_local_path(bus);
-    char folder[GATEWAY_ADDRESS_SIZE];
+    char folder[GW_ADDRESS_SIZE];
     *self = (gw_bus_lock_t){.fd = -1, .names = {.fd = -1}};
     if (path != NULL) {
         (void)snprintf(self->path, sizeof self->path, "%s.gateway-lock", path);

@@ -9,9 +9,10 @@
 #define GATEWAY_RUNTIME_H
 
 #include "bus_lock.h"
-#include "gateway_config.h"
 
-#define GW_RUNTIME_PATH_SIZE (GATEWAY_PATH_SIZE + GATEWAY_ADDRESS_SIZE + 16U)
+#include <stdio.h>
+
+#define GW_RUNTIME_PATH_SIZE (GW_PATH_SIZE + GW_ADDRESS_SIZE + 16U)
 #define GW_RUNTIME_PLACES    2U
 
 typedef struct {
@@ -22,10 +23,10 @@ typedef struct {
     bool marked;                                         ///< It is there, as far as we know.
 } gw_runtime_t;
 
-/// Takes the lock and looks for the marker. `directory` is GW_RUNTIME_DIRECTORY but in tests, and must outlive
+/// Takes the lock of `bus` and looks for the marker, also beside `socket`. `directory` is GW_RUNTIME_DIRECTORY but in tests, and must outlive
 /// `self`. 0, or a sysexits code after the cause and the cure have been printed on `err`; a stranger who holds what locks the
 /// bus is printed there too.
-int gw_runtime_open(gw_runtime_t *self, const gateway_config_t *config, const char *directory, FILE *err);
+int gw_runtime_open(gw_runtime_t *self, const char *bus, const char *socket, const char *directory, FILE *err);
 
 /// Releases the lock. The marker stays as it is.
 void gw_runtime_close(gw_runtime_t *self);

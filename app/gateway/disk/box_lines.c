@@ -19,13 +19,13 @@ static size_t end(iwn_out_t *json) {
     return iwn_out_finish(json);
 }
 
-size_t gw_box_line_head(const gateway_config_t *config, const gw_box_order_t *order, bool from_start,
+size_t gw_box_line_head(const gw_box_wish_t *wish, const gw_box_order_t *order, bool from_start,
                         char out_line[GW_BOX_LINE_SIZE]) {
     iwn_out_t json = begin(out_line, "blackbox");
     iwn_out_int(&json, "format", FORMAT_VERSION);
     iwn_out_text(&json, "version", IWHEEL_VERSION);
-    iwn_out_text(&json, "bus", config->bus.interface);
-    iwn_out_text(&json, "estop", config->estop.line);
+    iwn_out_text(&json, "bus", wish->bus);
+    iwn_out_text(&json, "estop", wish->estop);
     iwn_out_int(&json, "wall_minus_monotonic_us", order->wall_minus_us);
     iwn_out_bool(&json, "from_start", from_start);
     return end(&json);

@@ -22,7 +22,7 @@
 typedef struct {
     int fd;
     const blackbox_ring_t *ring;
-    const gateway_config_t *config;
+    const gw_box_wish_t *wish;
     blackbox_entry_t *copy; ///< As many entries as the ring has.
     const gw_box_order_t *order;
     const char *bus; ///< As the file of frames names it.
@@ -117,20 +117,20 @@ static int write_config(writer_t *self, int directory, const char *stem) {
     if (file == NULL) {
         return errno;
     }
-    gateway_config_print(self->config, file);
+    (void)fputs(self->wish->config, file);
     return finish_file(file);
 }
 
 static int fill_files(writer_t *self) {
     const iw_stop_t *stop = &self->order->note.stop;
-    const iw_time_us_t length_us = (iw_time_us_t)self->config->record.blackbox_s * 1000000U;
+    const iw_time_us_t length_us = (iw_time_us_t)self->wish->blackbox_s * 1000000U;
     const iw_time_us_t since_us = (stop->at_us > length_us) ? stop->at_us - length_us : 1U;
     const iw_time_us_t begin_us = begin_of(self, since_us);
     const bool from_start = blackbox_ring_written(self->ring) < self->ring->capacity && begin_us <= self->copy[0].at_us;
     self->next = 0;
     self->frames = 0;
     self->result.ms = (uint32_t)((stop->at_us - begin_us) / IW_US_PER_MS);
-    put_line(self, self->events_file, gw_box_line_head(self->config, self->order, from_start, self->line));
+    put_line(self, self->events_file, gw_box_line_head(self->wish, self->order, from_start, self->line));
     put_line(self, self->events_file, gw_box_line_stop(self->order, self->line));
     write_entries(self, self->order->mark, since_us);
     const int error = flush(self);
@@ -147,7 +147,7 @@ static int fill_files(writer_t *self) {
 static int write_files(writer_t *self, int directory, uint32_t number) {
     char stem[GW_BOX_STEM_SIZE];
     (void)snprintf(stem, sizeof stem, "stop-%06u-%s", (unsigned)number, self->order->cause);
-    (void)snprintf(self->result.path, sizeof self->result.path, "%s/%s.log", self->config->record.directory, stem);
+    (void)snprintf(self->result.path, sizeof self->result.path, "%s/%s.log", self->wish->directory, stem);
     int error = write_config(self, directory, stem);
     if (error == EEXIST) {
         return error; // Somebody else's: the gateway before us may still be writing its last.
@@ -172,7 +172,7 @@ static int write_files(writer_t *self, int directory, uint32_t number) {
 
 /// A full disk costs the oldest recordings, as far as there are any.
 static int write_recording(writer_t *self) {
-    const int directory = gw_box_files_open(self->config->record.directory);
+    const int directory = gw_box_files_open(self->wish->directory);
     if (directory < 0) {
         return errno;
     }
@@ -201,7 +201,7 @@ static void carry_out(writer_t *self, const gw_box_order_t *order) {
 
 /// Said at once, not when the first stop is lost.
 static void try_directory(writer_t *self) {
-    const int directory = gw_box_files_open(self->config->record.directory);
+    const int directory = gw_box_files_open(self->wish->directory);
     self->result = (gw_box_result_t){.error = (directory < 0) ? errno : 0};
     if (directory >= 0 && faccessat(directory, ".", W_OK, AT_EACCESS) != 0) {
         self->result.error = errno;
@@ -252,11 +252,11 @@ static void note_death(writer_t *self) {
     carry_out(self, &order);
 }
 
-void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gateway_config_t *config) {
+void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_wish_t *wish) {
     gw_box_order_t order;
     static writer_t self; // Too large for a stack.
-    self = (writer_t){.fd = fd, .ring = ring, .config = config};
-    self.bus = (strncmp(config->bus.interface, "unix:", 5) == 0) ? "local" : config->bus.interface;
+    self = (writer_t){.fd = fd, .ring = ring, .wish = wish};
+    self.bus = (strncmp(wish->bus, "unix:", 5) == 0) ? "local" : wish->bus;
     self.copy = (blackbox_entry_t *)calloc(ring->capacity, sizeof *self.copy);
     if (self.copy == NULL) {
         return;

@@ -8,18 +8,16 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-static void name_places(gw_runtime_t *self, const gateway_config_t *config, const char *directory) {
-    const char *bus = config->bus.interface;
+static void name_places(gw_runtime_t *self, const char *bus, const char *socket, const char *directory) {
     const char *local_path = gw_bus_lock_local_path(bus);
-    const char *socket_path = config->northbound.socket;
-    const char *slash = strrchr(socket_path, '/');
-    const int length = (slash == NULL) ? 0 : (int)(slash - socket_path) + 1;
+    const char *slash = strrchr(socket, '/');
+    const int length = (slash == NULL) ? 0 : (int)(slash - socket) + 1;
     if (local_path != NULL) {
         (void)snprintf(self->place[0], GW_RUNTIME_PATH_SIZE, "%s.armed", local_path);
     } else {
         self->directory = directory;
         (void)snprintf(self->place[0], GW_RUNTIME_PATH_SIZE, "%s/%s.armed", directory, bus);
-        (void)snprintf(self->place[1], GW_RUNTIME_PATH_SIZE, "%.*s%s.armed", length, socket_path, bus);
+        (void)snprintf(self->place[1], GW_RUNTIME_PATH_SIZE, "%.*s%s.armed", length, socket, bus);
     }
 }
 
@@ -80,14 +78,14 @@ static bool is_marked(const gw_owners_t *owners, const char *path) {
     return path[0] != '\0' && lstat(path, &status) == 0 && gw_owners_have(owners, status.st_uid);
 }
 
-int gw_runtime_open(gw_runtime_t *self, const gateway_config_t *config, const char *directory, FILE *err) {
+int gw_runtime_open(gw_runtime_t *self, const char *bus, const char *socket, const char *directory, FILE *err) {
     *self = (gw_runtime_t){.marker_path = self->place[0]};
-    name_places(self, config, directory);
-    const int error = gw_bus_lock_take(&self->lock, config->bus.interface, directory);
+    name_places(self, bus, socket, directory);
+    const int error = gw_bus_lock_take(&self->lock, bus, directory);
     if (error != 0) {
-        return explain(&self->lock, config->bus.interface, error, err);
+        return explain(&self->lock, bus, error, err);
     }
-    warn(&self->lock, config->bus.interface, err);
+    warn(&self->lock, bus, err);
     for (size_t i = 0; i < GW_RUNTIME_PLACES; i++) {
         self->marked = self->marked || is_marked(&self->lock.names.owners, self->place[i]);
     }

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+#include "clients.h"
+
+gw_client_t *gw_clients_find(gw_clients_t *self, iw_client_t id) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX && id != IW_CLIENT_NONE; i++) {
+        if (self->client[i].id == id) {
+            return &self->client[i];
+        }
+    }
+    return NULL;
+}
+
+uint32_t gw_clients_count(const gw_clients_t *self) {
+    return self->count[GW_DRIVE] + self->count[GW_WATCH];
+}
+
+static bool watches(const gw_client_t *client, iwn_topic_t topic) {
+    return client->id != IW_CLIENT_NONE && (client->topics & (1U << topic)) != 0U;
+}
+
+bool gw_clients_anybody_watches(const gw_clients_t *self, iwn_topic_t topic) {
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+        if (watches(&self->client[i], topic)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static iwn_out_t begin(gw_clients_t *self) {
+    iwn_out_t json;
+    iwn_out_init(&json, self->line, sizeof self->line);
+    iwn_out_open(&json, NULL, '{');
+    return json;
+}
+
+iwn_out_t gw_clients_begin_event(gw_clients_t *self, const char *name) {
+    iwn_out_t json = begin(self);
+    iwn_out_text(&json, "event", name);
+    return json;
+}
+
+void gw_clients_send_event(gw_clients_t *self, iwn_out_t *json, iwn_topic_t topic) {
+    iwn_out_close(json, '}');
+    const size_t length = iwn_out_finish(json);
+    for (uint32_t i = 0; i < GW_CLIENTS_MAX && length > 0U; i++) {
+        if (watches(&self->client[i], topic)) {
+            gw_client_event(&self->client[i], json->data, length);
+        }
+    }
+}
+
+static iwn_out_t begin_reply(gw_clients_t *self, const iwn_id_t *id, bool ok) {
+    iwn_out_t json = begin(self);
+    if (id->kind == IWN_ID_NUMBER) {
+        iwn_out_int(&json, "id", id->number);
+    } else {
+        iwn_out_text(&json, "id", (id->kind == IWN_ID_TEXT) ? id->text : NULL);
+    }
+    iwn_out_bool(&json, "ok", ok);
+    return json;
+}
+
+iwn_out_t gw_clients_begin_reply(gw_clients_t *self, const iwn_id_t *id) {
+    return begin_reply(self, id, true);
+}
+
+void gw_clients_send_reply(gw_client_t *client, iwn_out_t *json) {
+    iwn_out_close(json, '}');
+    gw_client_reply(client, json->data, iwn_out_finish(json));
+}
+
+size_t gw_clients_write_refusal(gw_clients_t *self, const iwn_id_t *id, const iwn_refusal_t *refusal) {
+    iwn_out_t json = begin_reply(self, id, false);
+    iwn_out_text(&json, "error", iwn_error_name(refusal->error));
+    iwn_out_text(&json, "message", refusal->message);
+    iwn_out_close(&json, '}');
+    return iwn_out_finish(&json);
+}
+
+void gw_clients_refuse(gw_clients_t *self, gw_client_t *client, const iwn_id_t *id, const iwn_refusal_t *refusal) {
+    gw_client_reply(client, self->line, gw_clients_write_refusal(self, id, refusal));
+}

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+/// The wheels' side of the daemon: the core, the port below it, the tape between them, and what is noted of all three.
+///
+/// Whoever only looks takes it const. Whoever acts upon the core does it at `now_us`, notes it on the tape, and sets `requested`
+/// if the loop shall step once more in this cycle.
+#ifndef GATEWAY_WHEELS_H
+#define GATEWAY_WHEELS_H
+
+#include "gaps.h"
+#include "tape.h"
+
+#include "inspect.h"
+
+#include "iwheel/evidence.h"
+#include "iwheel/gateway.h"
+#include "iwheel_linux/linux_hal.h"
+
+#define GW_WARNINGS     8U
+#define GW_WARNING_SIZE 400U
+
+typedef struct gw_wheels {
+    iw_gateway_t core;
+    iw_linux_hal_t hal;
+    gw_tape_t tape;
+    iw_motion_evidence_t evidence;
+    gw_gaps_t gaps;
+    inspect_wish_t bus;   ///< As configured.
+    const char *estop;    ///< The line, as configured.
+    iw_time_us_t now_us;  ///< Of the present cycle.
+    iw_time_us_t step_us; ///< When the next step is due, as the last one wished.
+    bool requested;       ///< A request has changed something since the last step.
+    bool shutting_down;
+    uint32_t warnings; ///< What is wrong enough to be said at start, in `status` and with every arm.
+    char warning[GW_WARNINGS][GW_WARNING_SIZE];
+} gw_wheels_t;
+
+/// Lets the core begin on an open `hal`, with `ring` for the tape (NULL: nothing is noted). `restarted`: the gateway before this one
+/// died while it was sending.
+iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, blackbox_ring_t *ring, bool restarted);
+
+/// What is known of the wheels now: after a step or a request, look again.
+iw_snapshot_t gw_wheels_look(const gw_wheels_t *self);
+
+/// True while setpoints are sent, or about to be.
+bool gw_wheels_are_sent_to(const gw_wheels_t *self);
+
+/// The core's cycle at `now_us`, and a look at what has come of it.
+iw_snapshot_t gw_wheels_step(gw_wheels_t *self);
+
+/// The machine was suspended for so long since the last step.
+void gw_wheels_slept(gw_wheels_t *self, iw_time_us_t for_us);
+
+/// The wheels are to stop; `client` may be IW_CLIENT_NONE.
+void gw_wheels_stop(gw_wheels_t *self, iw_client_t client, iw_cause_t cause);
+
+/// The client is no longer there for the core: its lease ends now.
+void gw_wheels_leave(gw_wheels_t *self, iw_client_t client);
+
+/// The core is told of an assumption: it may refuse to arm for it.
+void gw_wheels_know(gw_wheels_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry);
+
+/// Notes what has gone into the core at `now_us`. `number` is that of the client, if one has asked for it.
+void gw_wheels_note(gw_wheels_t *self, uint32_t number, const blackbox_entry_t *entry);
+
+/// Notes a stop that has just been seen, and keeps the frames around it.
+void gw_wheels_note_stop(gw_wheels_t *self, const iw_stop_t *stop);
+
+/// Notes the state and what it was before.
+void gw_wheels_note_state(gw_wheels_t *self, const iw_snapshot_t *seen, iw_state_t before);
+
+/// Once a second: notes the port's answers, the state and what keeps from arming again.
+void gw_wheels_note_again(gw_wheels_t *self);
+
+/// The frames around the last stop, for `why`, into an object that is open.
+void gw_wheels_write_around(const gw_wheels_t *self, iwn_out_t *json);
+
+#endif
