@@ -27,9 +27,14 @@ static int complain(const gw_listener_t *self, FILE *err, const char *what, cons
 
 static int complain_errno(const gw_listener_t *self, FILE *err, int error) {
     const bool may_not = error == EACCES || error == EPERM;
-    const char *cure = (error == ENOENT) ? "make its directory, or correct [northbound] in the configuration, or"
-                       : may_not         ? "run as a user who may write to its directory, or choose another with"
-                                         : "correct [northbound] in the configuration, or";
+    char cure[128];
+    if (may_not) {
+        (void)snprintf(cure, sizeof cure, "run as a user who may write to its directory, or choose another with");
+    } else {
+        (void)snprintf(cure, sizeof cure, "%scorrect [northbound] %s in the configuration, or",
+                       (error == ENOENT) ? "make its directory, or " : "",
+                       (self->wish.right == GW_DRIVE) ? "socket" : "watch_socket");
+    }
     (void)complain(self, err, strerror(error), cure);
     return may_not ? EX_NOPERM : EX_UNAVAILABLE;
 }
