@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Preloaded into the bridge to ROS 2 by ros2.py: for each command that leaves, when DDS had received it and when it left, in us of CLOCK_MONOTONIC.
+// Preloaded into iwheel-ros2 by ros2.py: for each command that leaves, when DDS had received it and when it left, in us of CLOCK_MONOTONIC.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
