@@ -55,31 +55,14 @@ static void do_watch(const gw_call_t *call) {
     client->rate_hz = limited ? IWN_RATE_MAX_HZ : (uint32_t)call->request->rate_hz;
     client->next_us = call->answers->wheels->now_us;
     iwn_out_t json = begin_reply(call);
-    iwn_out_open(&json, "topics", '[');
-    for (unsigned topic = 0; topic < IWN_TOPICS; topic++) {
-        if ((client->topics & (1U << topic)) != 0U) {
-            iwn_out_text(&json, NULL, iwn_topic_name((iwn_topic_t)topic));
-        }
-    }
-    iwn_out_close(&json, ']');
-    iwn_out_int(&json, "rate_hz", client->rate_hz);
-    iwn_out_bool(&json, "limited", limited);
+    iwn_tell_watched(client->topics, client->rate_hz, limited, &json);
     gw_clients_send_reply(client, &json);
 }
 
 static void reply_armed(gw_answers_t *self, const iw_snapshot_t *seen, gw_client_t *client) {
-    const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
+    const iwn_surroundings_t around = gw_snapshot_around(self->status, seen);
     iwn_out_t json = gw_clients_begin_reply(self->clients, &client->arm_id);
-    iwn_out_text(&json, "state", iwn_state_name(seen->state));
-    iwn_out_int(&json, "lease_ms", seen->config->lease_ms);
-    iwn_out_int(&json, "first_lease_ms", IW_FIRST_LEASE_US / IW_US_PER_MS);
-    iwn_out_int(&json, "stop_budget_ms", budget.client_lost_ms);
-    iwn_out_int(&json, "stop_budget_mm", budget.client_lost_mm);
-    iwn_out_open(&json, "warnings", '[');
-    for (uint32_t i = 0; i < self->wheels->warnings; i++) {
-        iwn_out_text(&json, NULL, self->wheels->warning[i]);
-    }
-    iwn_out_close(&json, ']');
+    iwn_tell_terms(seen, &around, &json);
     gw_clients_send_reply(client, &json);
 }
 
@@ -149,11 +132,7 @@ static void drive(const gw_call_t *call, const iw_drive_t *wanted) {
     }
     call->answers->wheels->requested = true;
     iwn_out_t json = begin_reply(call);
-    iwn_out_int(&json, "left_mm_s", applied.pair.wheel[IW_LEFT].speed_mm_s);
-    iwn_out_int(&json, "right_mm_s", applied.pair.wheel[IW_RIGHT].speed_mm_s);
-    iwn_out_int(&json, "left_mA", applied.pair.wheel[IW_LEFT].current_mA);
-    iwn_out_int(&json, "right_mA", applied.pair.wheel[IW_RIGHT].current_mA);
-    iwn_out_bool(&json, "limited", applied.limited);
+    iwn_tell_applied(&applied, &json);
     gw_clients_send_reply(call->client, &json);
 }
 
@@ -302,7 +281,7 @@ static void do_confirm(const gw_call_t *call) {
 static void do_why(const gw_call_t *call) {
     const iwn_stop_note_t *note = &call->answers->status->last_stop;
     iwn_out_t json = begin_reply(call);
-    gw_snapshot_write_stop(note, call->answers->wheels->now_us, &json);
+    iwn_tell_stop(note, call->answers->wheels->now_us, &json);
     gw_record_write(call->answers->box, note->stop.number, &json);
     gw_wheels_write_around(call->answers->wheels, &json);
     gw_clients_send_reply(call->client, &json);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "clients.h"
 
+#include "iwheel_northbound/tell.h"
+
 gw_client_t *gw_clients_find(gw_clients_t *self, iw_client_t id) {
     for (uint32_t i = 0; i < GW_CLIENTS_MAX && id != IW_CLIENT_NONE; i++) {
         if (self->client[i].id == id) {
@@ -27,17 +29,8 @@ bool gw_clients_anybody_watches(const gw_clients_t *self, iwn_topic_t topic) {
     return false;
 }
 
-static iwn_out_t begin(gw_clients_t *self) {
-    iwn_out_t json;
-    iwn_out_init(&json, self->line, sizeof self->line);
-    iwn_out_open(&json, NULL, '{');
-    return json;
-}
-
 iwn_out_t gw_clients_begin_event(gw_clients_t *self, const char *name) {
-    iwn_out_t json = begin(self);
-    iwn_out_text(&json, "event", name);
-    return json;
+    return iwn_tell_event(self->line, sizeof self->line, name);
 }
 
 void gw_clients_send_event(gw_clients_t *self, iwn_out_t *json, iwn_topic_t topic) {
@@ -50,19 +43,8 @@ void gw_clients_send_event(gw_clients_t *self, iwn_out_t *json, iwn_topic_t topi
     }
 }
 
-static iwn_out_t begin_reply(gw_clients_t *self, const iwn_id_t *id, bool ok) {
-    iwn_out_t json = begin(self);
-    if (id->kind == IWN_ID_NUMBER) {
-        iwn_out_int(&json, "id", id->number);
-    } else {
-        iwn_out_text(&json, "id", (id->kind == IWN_ID_TEXT) ? id->text : NULL);
-    }
-    iwn_out_bool(&json, "ok", ok);
-    return json;
-}
-
 iwn_out_t gw_clients_begin_reply(gw_clients_t *self, const iwn_id_t *id) {
-    return begin_reply(self, id, true);
+    return iwn_tell_reply(self->line, sizeof self->line, id, true);
 }
 
 void gw_clients_send_reply(gw_client_t *client, iwn_out_t *json) {
@@ -71,11 +53,7 @@ void gw_clients_send_reply(gw_client_t *client, iwn_out_t *json) {
 }
 
 size_t gw_clients_write_refusal(gw_clients_t *self, const iwn_id_t *id, const iwn_refusal_t *refusal) {
-    iwn_out_t json = begin_reply(self, id, false);
-    iwn_out_text(&json, "error", iwn_error_name(refusal->error));
-    iwn_out_text(&json, "message", refusal->message);
-    iwn_out_close(&json, '}');
-    return iwn_out_finish(&json);
+    return iwn_tell_refusal(self->line, sizeof self->line, id, refusal);
 }
 
 void gw_clients_refuse(gw_clients_t *self, gw_client_t *client, const iwn_id_t *id, const iwn_refusal_t *refusal) {

@@ -17,8 +17,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define API_VERSION 1
-
 static iwn_out_t begin_event(gw_status_t *self, const char *name) {
     iwn_out_t json = gw_clients_begin_event(self->clients, name);
     iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
@@ -74,7 +72,7 @@ static void observe_stop(gw_status_t *self, const iw_stop_t *stop) {
         gw_record_stop(self->box, self->log, note, self->wheels->now_us);
     }
     iwn_out_t json = begin_event(self, "stop");
-    gw_snapshot_write_stop(note, self->wheels->now_us, &json);
+    iwn_tell_stop(note, self->wheels->now_us, &json);
     gw_clients_send_event(self->clients, &json, IWN_TOPIC_STOP);
 }
 
@@ -86,19 +84,15 @@ static void observe_lease(gw_status_t *self, const iw_snapshot_t *seen) {
     }
     const iw_client_t former = observed->holder;
     const gw_client_t *client = gw_clients_find(self->clients, holder);
-    const char *change = (holder == IW_CLIENT_NONE) ? "lost" : (former == IW_CLIENT_NONE) ? "gained" : "moved";
     observed->holder = holder;
     if (client != NULL) {
         gw_client_describe(client, observed->holder_text, sizeof observed->holder_text);
         memcpy(observed->holder_name, client->name, sizeof client->name);
     }
-    gw_log(self->log, GW_LOG_INFO, "lease %s: %s", change,
+    gw_log(self->log, GW_LOG_INFO, "lease %s: %s", iwn_tell_change(holder, former),
            (holder == IW_CLIENT_NONE) ? "nobody" : observed->holder_text);
     iwn_out_t json = begin_event(self, "lease");
-    iwn_out_text(&json, "change", change);
-    iwn_out_known(&json, "holder", holder != IW_CLIENT_NONE, holder);
-    iwn_out_text(&json, "name", (client != NULL && client->name[0] != '\0') ? client->name : NULL);
-    iwn_out_known(&json, "former", former != IW_CLIENT_NONE, former);
+    iwn_tell_lease(&(iwn_holder_t){.client = holder, .name = (client != NULL) ? client->name : NULL}, former, &json);
     gw_clients_send_event(self->clients, &json, IWN_TOPIC_LEASE);
 }
 
@@ -287,13 +281,12 @@ void gw_observe_frames(gw_status_t *self) {
 }
 
 void gw_observe_write_hello(const gw_wheels_t *wheels, const gw_client_t *client, iwn_out_t *json) {
-    iwn_out_text(json, "name", "iwheel-gateway");
-    iwn_out_text(json, "version", IWHEEL_VERSION);
-    iwn_out_int(json, "api", API_VERSION);
-    iwn_out_text(json, "bus", wheels->bus.name);
-    iwn_out_text(json, "state", iwn_state_name(iw_gateway_state(&wheels->core)));
-    iwn_out_int(json, "client", client->id);
-    iwn_out_text(json, "rights", (client->right == GW_DRIVE) ? "drive" : "watch");
+    iwn_tell_hello(&(iwn_hello_t){.version = IWHEEL_VERSION,
+                                  .bus = wheels->bus.name,
+                                  .state = iw_gateway_state(&wheels->core),
+                                  .client = client->id,
+                                  .watches_only = client->right == GW_WATCH},
+                   json);
 }
 
 void gw_observe_hello(gw_status_t *self, gw_client_t *client) {

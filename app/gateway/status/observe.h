@@ -6,11 +6,10 @@
 #define GATEWAY_OBSERVE_H
 
 #include "clients/client.h"
-#include "ledger/memory.h"
 
 #include "iwheel/snapshot.h"
 #include "iwheel_linux/bus_link.h"
-#include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/tell.h"
 #include "iwheel_northbound/why.h"
 
 struct gw_box;
@@ -76,28 +75,13 @@ void gw_observe_hello(gw_status_t *self, gw_client_t *client);
 /// Name, version and so on, into an object that is open: event and reply of `hello`.
 void gw_observe_write_hello(const struct gw_wheels *wheels, const gw_client_t *client, iwn_out_t *json);
 
-/// Everything that is known, as JSON: the body of `status` and of the event `state`, and parts of it for other events.
-///
-/// Telemetry other than speed is worth nothing after this: five periods of the status and pose frames.
-#define GW_STATUS_STALE_US 200000U
+/// What surrounds the core, for the library that writes `status`, the event `state` and parts of it. It points into `self` and `seen`.
+iwn_surroundings_t gw_snapshot_around(const gw_status_t *self, const iw_snapshot_t *seen);
 
 /// The fields of a snapshot, into an object that is open.
-void gw_snapshot_write(const gw_status_t *status, iwn_out_t *json);
+void gw_snapshot_write(const gw_status_t *self, iwn_out_t *json);
 
 /// Force of both wheels, for the event `force`.
-void gw_snapshot_write_force(const gw_status_t *status, iwn_out_t *json);
-
-/// The fields about force of one wheel's object in a snapshot. `known`: its zero, as noted when it was taken.
-void gw_snapshot_write_wheel_force(const gw_known_offset_t *known, const iw_snapshot_t *seen, iw_side_t side,
-                                   iwn_out_t *json);
-
-/// The age in ms of something that happened then; null if it never did.
-void gw_snapshot_write_age(iwn_out_t *json, const char *name, iw_time_us_t now_us, iw_time_us_t then_us);
-
-/// True if it happened, less than `span_us` ago.
-bool gw_snapshot_is_fresh(iw_time_us_t now_us, iw_time_us_t then_us, iw_time_us_t span_us);
-
-/// The last stop, for `why` and the event `stop`.
-void gw_snapshot_write_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *json);
+void gw_snapshot_write_force(const gw_status_t *self, iwn_out_t *json);
 
 #endif

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Row 5: observers that die, flood, connect a thousand times, use up the descriptors."""
 
+import base64
 import os
 import resource
 import select
 import socket
 import threading
 import time
+import zlib
 
-from client import Streamer
+from client import Client, Streamer
 from scenario import scenario
 
 from .bus_faults import wait_reset
@@ -170,4 +172,66 @@ def row05_sixty_observers(t):
         thread.join()
     for sock in crowd:
         sock.close()
+    t.judge(rig)
+
+
+LARGE = 8 << 20
+
+
+def read_recording(path, name, pieces, over):
+    """Reads it from begin to end, again and again, each piece as soon as the one before is there."""
+    watcher = Client(path, name="reader")
+    offset = 0
+    while not over.is_set():
+        piece = watcher.request("recording", name=name, offset=offset)
+        data = base64.b64decode(piece["data"])
+        assert piece["ok"] and zlib.crc32(data) == piece["crc32"], piece
+        pieces.append(len(data))
+        offset = (offset + len(data)) % piece["size"]
+
+
+@scenario("a crowd of watchers reads a large recording, asks and stops without end: no gap, and the stop counts", 12)
+def row05_watchers_and_recordings(t):
+    rig = t.rig()
+    rig.settings["northbound"].update(watch_socket=rig.path("watch.sock"), watch_group="none")
+    rig.write_config()
+    name = "stop-000001-client_stop.log"
+    with open(rig.path(name), "wb") as file:
+        file.write(os.urandom(LARGE))
+    os.chmod(rig.path(name), 0o640)
+    rig.start_gateway()
+    owner = rig.client("owner")
+    over, pieces = threading.Event(), []
+
+    def flood():
+        sock = connect(rig.path("watch.sock"))
+        while not over.is_set():
+            if select.select([], [sock], [], 0.1)[1]:
+                sock.sendall(b'{"cmd":"status"}\n{"cmd":"arm"}\n')
+            while select.select([sock], [], [], 0)[0] and sock.recv(65536):
+                pass
+        sock.close()
+
+    threads = [
+        threading.Thread(target=read_recording, args=(rig.path("watch.sock"), name, pieces, over)) for _ in range(2)
+    ]
+    threads += [threading.Thread(target=flood) for _ in range(4)]
+    t.arm(owner)
+    stream = Streamer(owner, 300, 300)
+    time.sleep(0.4)
+    for thread in threads:
+        thread.start()
+    time.sleep(3)
+    t.check(sum(pieces) > LARGE, f"{sum(pieces)} bytes were read meanwhile")
+    t.figure(f"{sum(pieces) / 3e6:.0f} MB/s of recordings read meanwhile")
+    watcher = Client(rig.path("watch.sock"), rig.timeline, "watcher")
+    t.expect(watcher.request("drive", left_mm_s=900, right_mm_s=900), "denied")
+    t.expect(watcher.request("stop"))
+    time.sleep(0.1)
+    over.set()
+    for thread in threads:
+        thread.join()
+    stream.stop()
+    t.check(stream.refusal is not None and stream.refusal["error"] == "not_armed", f"after the stop: {stream.refusal}")
+    time.sleep(1)
     t.judge(rig)

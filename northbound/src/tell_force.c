@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Forces, with where their zero comes from and how good it is.
-#include "observe.h"
-
-#include "ledger/knowledge.h"
-#include "wheels/wheels.h"
-
-#include "iwheel_linux/clock.h"
+#include "tell_force.h"
 
 /// Where the zero comes from, and how good it is.
 typedef struct {
-    const gw_known_offset_t *known; ///< As noted when it was taken.
     const char *word;
     int64_t age_ms; ///< -1: unknown.
     uint32_t samples;
@@ -20,26 +14,25 @@ typedef struct {
     bool contaminated; ///< Taken while the wheel turned, or under load or unrest.
 } zero_t;
 
-static int64_t age_ms(iw_time_us_t now_us, const iw_force_t *force, const gw_known_offset_t *known) {
-    const int64_t wall_us = iw_clock_wall_us();
+static int64_t age_ms(iw_time_us_t now_us, int64_t wall_us, const iw_force_t *force, const iwn_zero_note_t *noted) {
     if (force->provenance == IW_OFFSET_NONE) {
         return -1;
     }
     if (force->offset_us != IW_NEVER) {
         return (int64_t)((now_us - force->offset_us) / IW_US_PER_MS);
     }
-    return (known->wall_us > 0 && known->wall_us <= wall_us) ? (wall_us - known->wall_us) / 1000 : -1;
+    return (noted->wall_us > 0 && noted->wall_us <= wall_us) ? (wall_us - noted->wall_us) / 1000 : -1;
 }
 
-static zero_t describe_zero(const gw_known_offset_t *known, const iw_snapshot_t *seen, iw_side_t side) {
+static zero_t describe_zero(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side) {
     const iw_force_t *force = seen->wheel[side].force;
+    const iwn_zero_note_t *noted = &around->zero[side];
     const bool ours = force->provenance != IW_OFFSET_NONE && force->provenance != IW_OFFSET_WHEEL &&
-                      (known->from == IW_OFFSET_ESTIMATED || known->from == IW_OFFSET_OPERATOR);
+                      (noted->from == IW_OFFSET_ESTIMATED || noted->from == IW_OFFSET_OPERATOR);
     const bool window = force->quality.window != IW_WINDOW_OPEN;
     const bool bad = window && force->quality.window != IW_WINDOW_GOOD;
-    zero_t zero = {.known = known,
-                   .word = iwn_offset_word(force->provenance, force->offset_us),
-                   .age_ms = age_ms(seen->at_us, force, known),
+    zero_t zero = {.word = iwn_offset_word(force->provenance, force->offset_us),
+                   .age_ms = age_ms(seen->at_us, around->wall_us, force, noted),
                    .samples = force->quality.samples,
                    .deviation_mN = force->quality.deviation_mN,
                    .drift_mN = force->quality.drift_mN,
@@ -47,9 +40,9 @@ static zero_t describe_zero(const gw_known_offset_t *known, const iw_snapshot_t 
                    .judged = bad,
                    .contaminated = bad};
     if (ours) {
-        zero.samples = known->samples;
-        zero.deviation_mN = known->deviation_mN;
-        zero.drift_mN = known->drift_mN;
+        zero.samples = noted->samples;
+        zero.deviation_mN = noted->deviation_mN;
+        zero.drift_mN = noted->drift_mN;
         zero.measured = true;
         zero.judged = true;
         zero.contaminated = false;
@@ -69,22 +62,26 @@ static void write_known_bool(iwn_out_t *json, const char *name, bool known, bool
     }
 }
 
-void gw_snapshot_write_wheel_force(const gw_known_offset_t *known, const iw_snapshot_t *seen, iw_side_t side,
-                                   iwn_out_t *json) {
+static bool is_heard(const iw_force_t *force, iw_time_us_t now_us) {
+    return force->raw_us != IW_NEVER && now_us - force->raw_us < IW_FORCE_STALE_US;
+}
+
+void iwn_tell_wheel_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side,
+                          iwn_out_t *json) {
     const iw_force_t *force = seen->wheel[side].force;
     const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
-    const bool heard = gw_snapshot_is_fresh(seen->at_us, force->raw_us, IW_FORCE_STALE_US);
+    const bool heard = is_heard(force, seen->at_us);
     const bool offset = force->provenance != IW_OFFSET_NONE;
-    const zero_t zero = describe_zero(known, seen, side);
+    const iwn_zero_note_t *noted = &around->zero[side];
+    const zero_t zero = describe_zero(seen, around, side);
     iwn_out_known(json, "force_raw", heard, force->raw);
     iwn_out_known(json, "force_raw_mN", heard, iw_force_raw_mN(force));
     iwn_out_known(json, "force_offset_mN", offset, force->offset_mN);
     iwn_out_known(json, "force_net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
     iwn_out_text(json, "force_validity", iwn_force_validity_name(validity));
-    gw_snapshot_write_age(json, "force_age_ms", seen->at_us, force->raw_us);
+    iwn_tell_age("force_age_ms", seen->at_us, force->raw_us, json);
     iwn_out_text(json, "offset_provenance", zero.word);
-    iwn_out_text(json, "offset_origin",
-                 (zero.known->from != IW_OFFSET_NONE) ? iwn_provenance_name(zero.known->from) : NULL);
+    iwn_out_text(json, "offset_origin", (noted->from != IW_OFFSET_NONE) ? iwn_provenance_name(noted->from) : NULL);
     iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
     write_known_bool(json, "offset_contaminated", zero.judged, zero.contaminated);
     iwn_out_text(json, "offset_window", iwn_window_name(force->quality.window));
@@ -95,15 +92,14 @@ void gw_snapshot_write_wheel_force(const gw_known_offset_t *known, const iw_snap
     iwn_out_text(json, "unit_evidence", iwn_unit_evidence_name(force->evidence));
 }
 
-void gw_snapshot_write_force(const gw_status_t *status, iwn_out_t *json) {
-    const iw_snapshot_t seen = gw_wheels_look(status->wheels);
-    iwn_out_int(json, "t_us", (int64_t)seen.at_us);
+void iwn_tell_force(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
+    iwn_out_int(json, "t_us", (int64_t)seen->at_us);
     for (unsigned i = 0; i < IW_SIDES; i++) {
         const iw_side_t side = (iw_side_t)i;
-        const iw_force_t *force = seen.wheel[side].force;
-        const iw_force_validity_t validity = iw_snapshot_force_validity(&seen, side);
-        const bool heard = gw_snapshot_is_fresh(seen.at_us, force->raw_us, IW_FORCE_STALE_US);
-        const zero_t zero = describe_zero(&status->knowledge->known.offset[side], &seen, side);
+        const iw_force_t *force = seen->wheel[side].force;
+        const iw_force_validity_t validity = iw_snapshot_force_validity(seen, side);
+        const bool heard = is_heard(force, seen->at_us);
+        const zero_t zero = describe_zero(seen, around, side);
         iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
         iwn_out_known(json, "raw", heard, force->raw);
         iwn_out_known(json, "raw_mN", heard, iw_force_raw_mN(force));
@@ -111,7 +107,7 @@ void gw_snapshot_write_force(const gw_status_t *status, iwn_out_t *json) {
         iwn_out_known(json, "net_mN", validity == IW_FORCE_VALID, iw_force_net_mN(force));
         iwn_out_text(json, "validity", iwn_force_validity_name(validity));
         iwn_out_bool(json, "saturated", validity == IW_FORCE_SATURATED);
-        gw_snapshot_write_age(json, "age_ms", seen.at_us, force->raw_us);
+        iwn_tell_age("age_ms", seen->at_us, force->raw_us, json);
         iwn_out_text(json, "provenance", zero.word);
         iwn_out_known(json, "offset_age_ms", zero.age_ms >= 0, zero.age_ms);
         write_known_bool(json, "contaminated", zero.judged, zero.contaminated);

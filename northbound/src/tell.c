@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_northbound/tell.h"
+
+#include "tell_force.h"
+
+void iwn_tell_age(const char *name, iw_time_us_t now_us, iw_time_us_t then_us, iwn_out_t *json) {
+    const bool known = then_us != IW_NEVER && then_us <= now_us;
+    iwn_out_known(json, name, known, known ? (int64_t)((now_us - then_us) / IW_US_PER_MS) : 0);
+}
+
+static bool is_fresh(iw_time_us_t now_us, iw_time_us_t then_us) {
+    return then_us != IW_NEVER && now_us - then_us < IWN_STATUS_STALE_US;
+}
+
+static bool contradicted(const iw_snapshot_t *seen, iw_ledger_item_t item) {
+    return seen->assumed[item].state == IW_LEDGER_CONTRADICTED;
+}
+
+/// Whether speeds in mm/s, or distances, mean anything: they rest on radius and gear ratio.
+static bool is_speed_known(const iw_snapshot_t *seen) {
+    return !contradicted(seen, IW_LEDGER_WHEEL_RADIUS) &&
+           !(seen->config->rpm_of_rotor && contradicted(seen, IW_LEDGER_GEAR_RATIO));
+}
+
+static bool is_distance_known(const iw_snapshot_t *seen) {
+    return !contradicted(seen, IW_LEDGER_WHEEL_RADIUS) && !contradicted(seen, IW_LEDGER_GEAR_RATIO);
+}
+
+static void write_motion(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
+    const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
+    const bool heard = wheel->heard;
+    const bool following = seen->demand == IW_DEMAND_FOLLOW;
+    const bool sending = seen->demand != IW_DEMAND_SILENCE;
+    const iw_command_t applied = seen->applied.wheel[side];
+    const iw_command_t wanted = seen->target.wheel[side];
+    iwn_out_bool(json, "heard", heard);
+    if (heard) {
+        iwn_out_bool(json, "at_rest", wheel->at_rest);
+    } else {
+        iwn_out_null(json, "at_rest");
+    }
+    iwn_out_known(json, "speed_rpm", heard, wheel->told->speed.speed_rpm);
+    iwn_out_known(json, "speed_mm_s", heard && is_speed_known(seen), wheel->speed_mm_s);
+    iwn_out_known(json, "acceleration_raw", heard, wheel->told->speed.acceleration_raw);
+    iwn_out_known(json, "commanded_mm_s", following, wanted.speed_mm_s);
+    iwn_out_known(json, "commanded_mA", following, wanted.current_mA);
+    iwn_out_known(json, "applied_mm_s", sending, applied.speed_mm_s);
+    iwn_out_known(json, "applied_mA", sending, applied.current_mA);
+    iwn_tell_age("speed_age_ms", seen->at_us, wheel->speed_us, json);
+}
+
+static void write_condition(const iw_snapshot_t *seen, iw_side_t side, iwn_out_t *json) {
+    const iw_snapshot_wheel_t *wheel = &seen->wheel[side];
+    const iw_codec_status_t *status = &wheel->told->status;
+    const iw_force_validity_t force = iw_snapshot_force_validity(seen, side);
+    const bool ever = wheel->status_us != IW_NEVER;
+    const bool fresh = is_fresh(seen->at_us, wheel->status_us);
+    const bool warm = fresh && status->temperature_degC <= IW_TEMPERATURE_MAX_degC;
+    const bool cpu = fresh && status->cpu_percent <= 100U;
+    iwn_out_known(json, "battery_dV", fresh, status->battery_dV);
+    iwn_out_known(json, "temperature_degC", warm, status->temperature_degC);
+    iwn_out_known(json, "cpu_percent", cpu, status->cpu_percent);
+    iwn_out_known(json, "ticks", ever, wheel->ticks);
+    iwn_out_known(json, "distance_mm", ever && is_distance_known(seen), wheel->ticks * wheel->nm_per_tick / 1000000);
+    iwn_tell_age("status_age_ms", seen->at_us, wheel->status_us, json);
+    iwn_out_int(json, "reboots", wheel->reboots);
+    iwn_out_open(json, "valid", '{');
+    iwn_out_bool(json, "speed", wheel->heard);
+    iwn_out_bool(json, "status", fresh);
+    iwn_out_bool(json, "temperature", warm);
+    iwn_out_bool(json, "cpu", cpu);
+    iwn_out_bool(json, "force", force == IW_FORCE_VALID);
+    iwn_out_close(json, '}');
+    iwn_out_open(json, "saturated", '{');
+    iwn_out_bool(json, "battery", fresh && status->battery_dV == IW_BATTERY_SATURATED_dV);
+    iwn_out_bool(json, "force", force == IW_FORCE_SATURATED);
+    iwn_out_close(json, '}');
+}
+
+static void write_wheel(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iw_side_t side, iwn_out_t *json) {
+    iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", '{');
+    write_motion(seen, side, json);
+    write_condition(seen, side, json);
+    iwn_tell_wheel_force(seen, around, side, json);
+    iwn_out_close(json, '}');
+}
+
+static bool at_limit(int16_t value) {
+    return value == INT16_MIN || value == INT16_MAX;
+}
+
+static void write_pose(const iw_snapshot_t *seen, iwn_out_t *json) {
+    const iw_codec_pose_t *pose = &seen->wheel[IW_RIGHT].told->pose;
+    const bool fresh = is_fresh(seen->at_us, seen->pose_us) && !contradicted(seen, IW_LEDGER_POSE_BYTE_ORDER);
+    iwn_out_open(json, "pose", '{');
+    iwn_out_known(json, "x_mm", fresh, pose->x_mm);
+    iwn_out_known(json, "y_mm", fresh, pose->y_mm);
+    iwn_out_known(json, "z_mm", fresh, pose->z_mm);
+    iwn_out_known(json, "psi_mrad", fresh, pose->psi_mrad);
+    iwn_out_bool(json, "limited", fresh && (at_limit(pose->x_mm) || at_limit(pose->y_mm) || at_limit(pose->z_mm)));
+    iwn_tell_age("age_ms", seen->at_us, seen->pose_us, json);
+    iwn_out_close(json, '}');
+}
+
+static bool has_text(const char *text) {
+    return text != NULL && text[0] != '\0';
+}
+
+static void write_lease(const iw_snapshot_t *seen, const iwn_holder_t *holder, iwn_out_t *json) {
+    const bool held = holder->client != IW_CLIENT_NONE;
+    const bool running = held && !seen->arming && seen->lease_until_us > seen->at_us;
+    iwn_out_open(json, "lease", '{');
+    iwn_out_known(json, "holder", held, holder->client);
+    iwn_out_text(json, "name", (held && has_text(holder->name)) ? holder->name : NULL);
+    iwn_out_known(json, "pid", held && holder->pid > 0, holder->pid);
+    iwn_out_known(json, "remaining_ms", running,
+                  running ? (int64_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS) : 0);
+    iwn_out_int(json, "lease_ms", seen->config->lease_ms);
+    iwn_out_close(json, '}');
+}
+
+static void write_bus(const iw_snapshot_t *seen, const iwn_bus_t *bus, iwn_out_t *json) {
+    iwn_out_open(json, "bus", '{');
+    iwn_out_text(json, "name", bus->name);
+    iwn_out_text(json, "state", iwn_bus_state_name(seen->bus));
+    iwn_out_text(json, "timing", bus->timing);
+    iwn_out_text(json, "echo", seen->echo_proven ? "proven" : "unproven");
+    iwn_out_known(json, "bitrate", bus->bitrate_hz != 0U, bus->bitrate_hz);
+    iwn_out_known(json, "sample_point_permille", bus->sample_point_permille != 0U, bus->sample_point_permille);
+    iwn_out_known(json, "load_permille", bus->up, bus->load_permille);
+    iwn_out_known(json, "lost_frames", bus->up, bus->lost);
+    iwn_out_close(json, '}');
+}
+
+static void write_estop(const iwn_estop_t *estop, iwn_out_t *json) {
+    iwn_out_open(json, "estop", '{');
+    iwn_out_text(json, "line", estop->line);
+    iwn_out_text(json, "state", iwn_estop_name(estop->answer, estop->present));
+    iwn_out_bool(json, "simulated", estop->simulated);
+    iwn_out_close(json, '}');
+}
+
+static void write_causes(const char *name, uint32_t causes, iwn_out_t *json) {
+    iwn_out_open(json, name, '[');
+    for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
+        if ((causes & (1U << cause)) != 0U) {
+            iwn_out_text(json, NULL, iwn_cause_name((iw_cause_t)cause));
+        }
+    }
+    iwn_out_close(json, ']');
+}
+
+void iwn_tell_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
+    const bool stopped = seen->state == IW_STATE_STOPPING || seen->state == IW_STATE_LATCHED;
+    iwn_out_int(json, "t_us", (int64_t)seen->at_us);
+    iwn_out_known(json, "wall_us", around->wall_us != IWN_WALL_UNKNOWN, around->wall_us);
+    iwn_out_text(json, "version", around->version);
+    iwn_out_text(json, "state", iwn_state_name(seen->state));
+    iwn_out_bool(json, "arming", seen->arming);
+    iwn_out_text(json, "cause", stopped ? iwn_cause_name(seen->stop->cause) : NULL);
+    write_causes("present", seen->present, json);
+    write_lease(seen, &around->holder, json);
+    write_bus(seen, &around->bus, json);
+    write_estop(&around->estop, json);
+    write_wheel(seen, around, IW_LEFT, json);
+    write_wheel(seen, around, IW_RIGHT, json);
+    write_pose(seen, json);
+}
+
+static void write_budget(const iw_snapshot_t *seen, iwn_out_t *json) {
+    const iw_stop_budget_t budget = iw_config_stop_budget(seen->config);
+    iwn_out_open(json, "budget", '{');
+    iwn_out_int(json, "client_lost_ms", budget.client_lost_ms);
+    iwn_out_int(json, "client_lost_mm", budget.client_lost_mm);
+    iwn_out_int(json, "killed_ms", budget.killed_ms);
+    iwn_out_int(json, "killed_mm", budget.killed_mm);
+    iwn_out_close(json, '}');
+}
+
+static void write_counters(const iw_snapshot_t *seen, iwn_out_t *json) {
+    const iw_counters_t *counters = seen->counters;
+    const iw_sent_t *sent = seen->sent;
+    iwn_out_open(json, "counters", '{');
+    iwn_out_int(json, "received", counters->received);
+    iwn_out_int(json, "echoes", counters->echoes);
+    iwn_out_int(json, "bad_format", counters->bad_format);
+    iwn_out_int(json, "bad_length", counters->bad_length);
+    iwn_out_int(json, "unknown", counters->unknown);
+    iwn_out_int(json, "foreign", counters->foreign);
+    iwn_out_int(json, "late_steps", counters->late_steps);
+    iwn_out_int(json, "out_of_range", counters->out_of_range);
+    iwn_out_int(json, "purges", counters->purges);
+    iwn_out_int(json, "left_behind", counters->left_behind);
+    iwn_out_int(json, "pairs", sent->pairs);
+    iwn_out_int(json, "send_later", sent->later);
+    iwn_out_int(json, "clamped", sent->clamped);
+    iwn_out_int(json, "gate_stopped", seen->stopped);
+    iwn_out_int(json, "stray_echoes", seen->stray_echoes);
+    iwn_out_int(json, "gap_max_us", sent->gap_max_us);
+    iwn_out_int(json, "still_moving", seen->still_moving);
+    iwn_out_close(json, '}');
+}
+
+void iwn_tell_warnings(const iwn_surroundings_t *around, iwn_out_t *json) {
+    iwn_out_open(json, "warnings", '[');
+    for (uint32_t i = 0; i < around->warnings; i++) {
+        iwn_out_text(json, NULL, around->warning[i]);
+    }
+    iwn_out_close(json, ']');
+}
+
+void iwn_tell_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
+    write_budget(seen, json);
+    write_counters(seen, json);
+    iwn_out_int(json, "clients", around->clients);
+    iwn_out_bool(json, "listen_only", seen->config->listen_only);
+    iwn_out_bool(json, "shutting_down", around->shutting_down);
+    iwn_tell_warnings(around, json);
+}
+
+void iwn_tell_stop(const iwn_stop_note_t *note, iw_time_us_t now_us, iwn_out_t *json) {
+    const iw_stop_t *stop = &note->stop;
+    const bool any = stop->number > 0U;
+    iwn_out_int(json, "number", stop->number);
+    iwn_out_text(json, "cause", any ? iwn_cause_name(stop->cause) : NULL);
+    iwn_out_text(json, "side", any ? iwn_sides_name(stop->sides) : NULL);
+    iwn_out_known(json, "detail", any, stop->detail);
+    iwn_out_text(json, "from", any ? iwn_state_name(stop->from) : NULL);
+    iwn_out_bool(json, "latched", any && stop->latched);
+    iwn_out_known(json, "client", stop->client != IW_CLIENT_NONE, stop->client);
+    iwn_out_text(json, "client_name", has_text(note->client_name) ? note->client_name : NULL);
+    iwn_out_known(json, "applied_left_mm_s", any, stop->applied.wheel[IW_LEFT].speed_mm_s);
+    iwn_out_known(json, "applied_right_mm_s", any, stop->applied.wheel[IW_RIGHT].speed_mm_s);
+    iwn_out_known(json, "at_us", any, (int64_t)stop->at_us);
+    iwn_out_known(json, "wall_us", any && note->wall_us != IWN_WALL_UNKNOWN, note->wall_us);
+    iwn_tell_age("age_ms", now_us, any ? stop->at_us : IW_NEVER, json);
+    iwn_out_text(json, "sentence", note->sentence);
+}

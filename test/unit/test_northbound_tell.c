@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+// What is said of the wheels where there is no daemon: a machine without a clock of the day, without names of processes.
+#include "gateway_rig.h"
+#include "unity.h"
+
+#include "iwheel_northbound/tell.h"
+
+#include <string.h>
+
+static gateway_rig_t rig;
+static iwn_surroundings_t around;
+static char text[8192];
+static iwn_out_t json;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+    around = (iwn_surroundings_t){.wall_us = IWN_WALL_UNKNOWN,
+                                  .version = "1.2.3",
+                                  .bus = {.name = "bxcan", .timing = "confirmed", .bitrate_hz = 1000000U},
+                                  .estop = {.line = "PA0", .present = true}};
+    iwn_out_init(&json, text, sizeof text);
+    iwn_out_open(&json, NULL, '{');
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static iw_snapshot_t look(void) {
+    iw_snapshot_t seen;
+    iw_gateway_snapshot(&rig.gateway, rig.now_us, &seen);
+    return seen;
+}
+
+static void assert_says(const char *words) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, words), words);
+}
+
+/// Closes the object: it is one, and it fits.
+static void finish(void) {
+    iwn_out_close(&json, '}');
+    TEST_ASSERT_GREATER_THAN_size_t(0, iwn_out_finish(&json));
+}
+
+static void status(void) {
+    const iw_snapshot_t seen = look();
+    iwn_tell_machine(&seen, &around, &json);
+    iwn_tell_rest(&seen, &around, &json);
+    finish();
+}
+
+static void test_status_of_a_machine_without_a_clock_of_the_day_says_null(void) {
+    status();
+    assert_says("\"wall_us\":null");
+    assert_says("\"version\":\"1.2.3\"");
+    assert_says("\"sample_point_permille\":null"); // Not reported is not 0.
+    assert_says("\"load_permille\":null");
+    assert_says("\"warnings\":[]");
+}
+
+static void test_status_before_a_wheel_was_heard_has_no_value_of_it(void) {
+    status();
+    assert_says("\"left\":{\"heard\":false,\"at_rest\":null,\"speed_rpm\":null,\"speed_mm_s\":null");
+    assert_says("\"battery_dV\":null");
+    assert_says("\"force_net_mN\":null");
+    assert_says("\"offset_age_ms\":null");
+}
+
+static void test_holder_without_name_or_process_is_told_by_its_number(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, 200000U);
+    around.holder = (iwn_holder_t){.client = HOLDER};
+    status();
+    assert_says("\"lease\":{\"holder\":7,\"name\":null,\"pid\":null,\"remaining_ms\":");
+    assert_says("\"state\":\"armed\"");
+    assert_says("\"commanded_mm_s\":300");
+}
+
+static void test_warnings_are_told_in_their_order(void) {
+    around.warning[0] = "one";
+    around.warning[1] = "two";
+    around.warnings = 2;
+    status();
+    assert_says("\"warnings\":[\"one\",\"two\"]");
+}
+
+static void test_stop_without_a_clock_of_the_day_has_its_age(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 300, 300, 200000U);
+    gateway_rig_press(&rig, true);
+    gateway_rig_run(&rig, 500000U);
+    const iw_snapshot_t seen = look();
+    iwn_stop_note_t note = {.stop = *seen.stop, .wall_us = IWN_WALL_UNKNOWN, .sentence = "pressed"};
+    iwn_tell_stop(&note, rig.now_us, &json);
+    finish();
+    assert_says("\"cause\":\"estop_line\"");
+    assert_says("\"wall_us\":null");
+    assert_says("\"age_ms\":499");
+}
+
+static void test_stop_that_never_was_has_nothing_but_its_number(void) {
+    const iwn_stop_note_t none = {.wall_us = IWN_WALL_UNKNOWN};
+    iwn_tell_stop(&none, rig.now_us, &json);
+    finish();
+    assert_says("\"number\":0,\"cause\":null,\"side\":null,\"detail\":null");
+    assert_says("\"at_us\":null,\"wall_us\":null,\"age_ms\":null");
+}
+
+static void test_lease_tells_whether_it_was_gained_moved_or_lost(void) {
+    const struct {
+        iw_client_t holder;
+        iw_client_t former;
+        const char *words;
+    } rows[] = {{7, IW_CLIENT_NONE, "\"change\":\"gained\",\"holder\":7,\"name\":\"me\",\"former\":null"},
+                {7, 8, "\"change\":\"moved\",\"holder\":7,\"name\":\"me\",\"former\":8"},
+                {IW_CLIENT_NONE, 8, "\"change\":\"lost\",\"holder\":null,\"name\":null,\"former\":8"}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const iwn_holder_t holder = {.client = rows[i].holder, .name = "me"};
+        json = iwn_tell_event(text, sizeof text, "lease");
+        iwn_tell_lease(&holder, rows[i].former, &json);
+        finish();
+        assert_says(rows[i].words);
+    }
+}
+
+static void test_reply_that_does_not_fit_is_none(void) {
+    const iwn_id_t id = {.kind = IWN_ID_NUMBER, .number = 5};
+    const iwn_refusal_t refusal = {.error = IWN_BUSY, .message = "somebody else drives"};
+    char line[128];
+    const size_t length = iwn_tell_refusal(line, sizeof line, &id, &refusal);
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"id\":5,\"ok\":false,\"error\":\"busy\",\"message\":\"somebody else drives\"}\n",
+                                 line, length);
+    for (size_t size = 0; size < length; size++) {
+        TEST_ASSERT_EQUAL_size_t(0, iwn_tell_refusal(line, size, &id, &refusal));
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_status_of_a_machine_without_a_clock_of_the_day_says_null);
+    RUN_TEST(test_status_before_a_wheel_was_heard_has_no_value_of_it);
+    RUN_TEST(test_holder_without_name_or_process_is_told_by_its_number);
+    RUN_TEST(test_warnings_are_told_in_their_order);
+    RUN_TEST(test_stop_without_a_clock_of_the_day_has_its_age);
+    RUN_TEST(test_stop_that_never_was_has_nothing_but_its_number);
+    RUN_TEST(test_lease_tells_whether_it_was_gained_moved_or_lost);
+    RUN_TEST(test_reply_that_does_not_fit_is_none);
+    return UNITY_END();
+}
