@@ -67,7 +67,7 @@ PARTS = [
     Bug("watcher-may-not-stop", "R2", REFUSE, "[IWN_CMD_STOP] = true,", "[IWN_CMD_STOP] = false,", WATCHERS),
     Bug("watcher-may-not-estop", "R2", REFUSE, "[IWN_CMD_ESTOP] = true,", "[IWN_CMD_ESTOP] = false,", WATCHERS),
     Bug("watchers-take-the-slots-of-drivers", "R11", SERVICE, "self->count[right] < self->most[right]", "gw_clients_count(self) < self->most[right]", WATCHERS),
-    Bug("watchers-without-a-limit", "R11", SERVICE, "i < end && self->count[right] < self->most[right]", "i < end", WATCHERS),
+    Bug("watchers-without-a-limit", "R11", SERVICE, "i < part[right].slots && self->count[right] < self->most[right]", "i < part[right].slots", WATCHERS),
     Bug("watcher-asks-without-end", "R11", SERVICE, "pace(client, self->now_us);", "", WATCHERS),
     Bug("estop-again-recorded-each-time", "R2", DISPATCH, "wheels->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "false", WATCHERS),
     Bug("estop-again-forgotten", "R2", DISPATCH, "wheels->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "true", WATCHERS),

@@ -2,7 +2,7 @@
 // What an earlier run has kept, put beside what this one knows: in the daemon's loop, with a keeper played by the test.
 #include "clients/clients.h"
 #include "daemon_rig.h"
-#include "status/snapshot.h"
+#include "status/observe.h"
 #include "words/assumption.h"
 
 #include "unity.h"

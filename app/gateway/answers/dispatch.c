@@ -4,7 +4,7 @@
 #include "box/box.h"
 #include "clients/clients.h"
 #include "ledger/knowledge.h"
-#include "status/snapshot.h"
+#include "status/observe.h"
 #include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"

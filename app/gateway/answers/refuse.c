@@ -195,10 +195,6 @@ static void say_type(const wording_t *self) {
         (config->current_role == IW_ROLE_UNSET) ? "current_role" : "", both ? "them" : "it", both ? "them" : "it");
 }
 
-static void say_latched(const wording_t *self) {
-    SAY(self, "latched: %s", self->answers->status->last_stop.sentence);
-}
-
 static void say_bus_down(const wording_t *self) {
     const gw_wheels_t *wheels = self->answers->wheels;
     const char *bus = wheels->bus.name;
@@ -223,8 +219,10 @@ static void say_missing(const wording_t *self) {
         (self->request->cmd == IWN_CMD_TWIST) ? "twist" : "drive");
 }
 
-static void say_blocked(const wording_t *self) {
-    SAY(self, "stopped: %s", self->answers->status->last_stop.sentence);
+/// The last stop still holds.
+static void say_stop(const wording_t *self) {
+    SAY(self, "%s: %s", (self->seen.state == IW_STATE_LATCHED) ? "latched" : "stopped",
+        self->answers->status->last_stop.sentence);
 }
 
 static void say_listen_only(const wording_t *self) {
@@ -240,10 +238,10 @@ void gw_refuse_describe(const gw_answers_t *answers, const iwn_request_t *reques
     static void (*const say[])(const wording_t *self) = {
         [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range, [IW_REFUSE_MISSING_FIELD] = say_missing,
         [IW_REFUSE_NOT_HOLDER] = say_holder,         [IW_REFUSE_BUSY] = say_holder,
-        [IW_REFUSE_NOT_ARMED] = say_not_armed,       [IW_REFUSE_LATCHED] = say_latched,
+        [IW_REFUSE_NOT_ARMED] = say_not_armed,       [IW_REFUSE_LATCHED] = say_stop,
         [IW_REFUSE_ESTOP_PRESSED] = say_estop,       [IW_REFUSE_BUS_DOWN] = say_bus_down,
         [IW_REFUSE_TIMING_MISMATCH] = say_timing,    [IW_REFUSE_WHEEL_LOST] = say_lost,
-        [IW_REFUSE_WHEEL_BLOCKED] = say_blocked,     [IW_REFUSE_NOT_AT_REST] = say_not_at_rest,
+        [IW_REFUSE_WHEEL_BLOCKED] = say_stop,        [IW_REFUSE_NOT_AT_REST] = say_not_at_rest,
         [IW_REFUSE_SEND_STALLED] = say_stalled,      [IW_REFUSE_SECOND_MASTER] = say_second_master,
         [IW_REFUSE_CAUSE_PRESENT] = say_present,     [IW_REFUSE_TYPE_NOT_SET] = say_type,
         [IW_REFUSE_STALE_COMMAND] = say_stale,       [IW_REFUSE_LISTEN_ONLY] = say_listen_only,

@@ -54,12 +54,17 @@ static void turn_away(gw_clients_t *self, gw_listener_t *listener, int fd) {
     listener->full_told = listener->wish.right == GW_WATCH; // A flood of these must not crowd out other messages.
 }
 
+/// Of the table, by right.
+static const struct {
+    uint32_t first;
+    uint32_t slots;
+} part[GW_RIGHTS] = {[GW_DRIVE] = {0U, GW_DRIVERS_MAX}, [GW_WATCH] = {GW_DRIVERS_MAX, GW_WATCHERS_MAX}};
+
 static gw_client_t *free_slot(gw_clients_t *self, gw_right_t right) {
-    const uint32_t first = (right == GW_DRIVE) ? 0U : GW_DRIVERS_MAX;
-    const uint32_t end = (right == GW_DRIVE) ? GW_DRIVERS_MAX : GW_CLIENTS_MAX;
-    for (uint32_t i = first; i < end && self->count[right] < self->most[right]; i++) {
-        if (self->client[i].id == IW_CLIENT_NONE) {
-            return &self->client[i];
+    for (uint32_t i = 0; i < part[right].slots && self->count[right] < self->most[right]; i++) {
+        gw_client_t *client = &self->client[part[right].first + i];
+        if (client->id == IW_CLIENT_NONE) {
+            return client;
         }
     }
     return NULL;
@@ -146,7 +151,7 @@ static bool has_turn(const gw_clients_t *self, const gw_client_t *client) {
 
 /// After a pause as many as fit into one turn are carried out together.
 static void pace(gw_client_t *client, iw_time_us_t now_us) {
-    const iw_time_us_t saved_us = (GW_LINES_PER_CYCLE - 1U) * GW_WATCHER_LINE_US;
+    const iw_time_us_t saved_us = (iw_time_us_t)(GW_LINES_PER_CYCLE - 1U) * GW_WATCHER_LINE_US;
     const bool rested = now_us >= client->line_us + saved_us;
     client->line_us = (rested ? now_us - saved_us : client->line_us) + GW_WATCHER_LINE_US;
 }
@@ -201,13 +206,12 @@ typedef struct {
 /// Those with one right, from where their last round ended, until the time is up. At least one of them is served. True if all
 /// were.
 static bool go_among(gw_clients_t *self, round_t *round, gw_right_t right, uint32_t *next) {
-    const uint32_t base = (right == GW_DRIVE) ? 0U : GW_DRIVERS_MAX;
-    const uint32_t slots = (right == GW_DRIVE) ? GW_DRIVERS_MAX : GW_WATCHERS_MAX;
+    const uint32_t slots = part[right].slots;
     const uint32_t first = *next;
     bool worked = false;
     for (uint32_t i = 0; i < slots; i++) {
         const uint32_t slot = (first + i) % slots;
-        gw_client_t *client = &self->client[base + slot];
+        gw_client_t *client = &self->client[part[right].first + slot];
         const iw_time_us_t now_us = worked ? iw_clock_now_us() : 0U;
         round->end_us = (round->end_us == 0U && worked) ? now_us + GW_ROUND_US : round->end_us;
         if (worked && now_us >= round->end_us) {

@@ -7,7 +7,6 @@
 #include "ledger/knowledge.h"
 #include "process/log.h"
 #include "process/owners.h"
-#include "snapshot.h"
 #include "wheels/wheels.h"
 
 #include "inspect.h"

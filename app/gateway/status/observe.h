@@ -9,8 +9,7 @@
 
 #include "iwheel/snapshot.h"
 #include "iwheel_linux/bus_link.h"
-#include "iwheel_northbound/json_out.h"
-#include "iwheel_northbound/why.h"
+#include "iwheel_northbound/tell.h"
 
 struct gw_box;
 struct gw_clients;
@@ -74,5 +73,14 @@ void gw_observe_hello(gw_status_t *self, gw_client_t *client);
 
 /// Name, version and so on, into an object that is open: event and reply of `hello`.
 void gw_observe_write_hello(const struct gw_wheels *wheels, const gw_client_t *client, iwn_out_t *json);
+
+/// What surrounds the core, for the library that writes it. It points into `status` and `seen`.
+iwn_surroundings_t gw_snapshot_around(const gw_status_t *status, const iw_snapshot_t *seen);
+
+/// Everything that is known, as fields of an object that is open: the body of `status` and of the event `state`.
+void gw_snapshot_write(const gw_status_t *status, iwn_out_t *json);
+
+/// The body of the event `force`.
+void gw_snapshot_write_force(const gw_status_t *status, iwn_out_t *json);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "snapshot.h"
+#include "observe.h"
 
 #include "bus/bus_facts.h"
 #include "clients/clients.h"

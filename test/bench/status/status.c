@@ -7,7 +7,7 @@
 /// Two runs with different ROUNDS differ by the events alone. Exit status 1 if the gateway does not drive or an event is not whole.
 #include "clients/clients.h"
 #include "daemon_rig.h"
-#include "status/snapshot.h"
+#include "status/observe.h"
 
 #include "unity.h"
 
