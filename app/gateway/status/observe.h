@@ -10,7 +10,6 @@
 #include "iwheel/snapshot.h"
 #include "iwheel_linux/bus_link.h"
 #include "iwheel_northbound/tell.h"
-#include "iwheel_northbound/why.h"
 
 struct gw_box;
 struct gw_clients;
@@ -75,13 +74,13 @@ void gw_observe_hello(gw_status_t *self, gw_client_t *client);
 /// Name, version and so on, into an object that is open: event and reply of `hello`.
 void gw_observe_write_hello(const struct gw_wheels *wheels, const gw_client_t *client, iwn_out_t *json);
 
-/// What surrounds the core, for the library that writes `status`, the event `state` and parts of it. It points into `self` and `seen`.
-iwn_surroundings_t gw_snapshot_around(const gw_status_t *self, const iw_snapshot_t *seen);
+/// What surrounds the core, for the library that writes it. It points into `status` and `seen`.
+iwn_surroundings_t gw_snapshot_around(const gw_status_t *status, const iw_snapshot_t *seen);
 
-/// The fields of a snapshot, into an object that is open.
-void gw_snapshot_write(const gw_status_t *self, iwn_out_t *json);
+/// Everything that is known, as fields of an object that is open: the body of `status` and of the event `state`.
+void gw_snapshot_write(const gw_status_t *status, iwn_out_t *json);
 
-/// Force of both wheels, for the event `force`.
-void gw_snapshot_write_force(const gw_status_t *self, iwn_out_t *json);
+/// The body of the event `force`.
+void gw_snapshot_write_force(const gw_status_t *status, iwn_out_t *json);
 
 #endif
