@@ -100,9 +100,9 @@ PARTS = [
     Bug("erase-not-escaped-in-a-long-text", "northbound", WRITER, "(word | control | quote | backslash | erase)", "(word | control | quote | backslash)", LINES),
     Bug("zeros-within-a-number-lost", "northbound", "northbound/src/text.c", "while (at > begin) {", "while (false) {", LINES),
     # What is told.
-    Bug("battery-full-unflagged", "northbound", "app/gateway/status/snapshot.c", "status->battery_dV == IW_BATTERY_SATURATED_dV",
+    Bug("battery-full-unflagged", "northbound", "northbound/src/tell.c", "status->battery_dV == IW_BATTERY_SATURATED_dV",
         "status->battery_dV > IW_BATTERY_SATURATED_dV", REQUESTS),
-    Bug("wheels-told-the-wrong-way-round", "northbound", "app/gateway/status/snapshot.c", 'iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", \'{\'); write_motion',
+    Bug("wheels-told-the-wrong-way-round", "northbound", "northbound/src/tell.c", 'iwn_out_open(json, (side == IW_LEFT) ? "left" : "right", \'{\'); write_motion',
         'iwn_out_open(json, (side == IW_LEFT) ? "right" : "left", \'{\'); write_motion', REQUESTS),
     Bug("watchdog-fed-too-late", "R11", "app/gateway/process/notify.c", "limit_us / 2U", "limit_us * 2U", MOTION),
     Bug("tape-without-refused-frames", "recordings", TAPE, "if (answer <= 0) {", "if (answer < 0) {", ("unit_gateway_tape",)),
