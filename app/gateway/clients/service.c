@@ -209,8 +209,8 @@ static bool go_among(gw_clients_t *self, round_t *round, gw_right_t right, uint3
     const uint32_t slots = part[right].slots;
     const uint32_t first = *next;
     bool worked = false;
-    for (uint32_t i = 0; i < slots; i++) {
-        const uint32_t slot = (first + i) % slots;
+    for (uint32_t i = 0; i < slots && self->count[right] > 0U; i++) {
+        const uint32_t slot = (first + i < slots) ? first + i : first + i - slots;
         gw_client_t *client = &self->client[part[right].first + slot];
         const iw_time_us_t now_us = worked ? iw_clock_now_us() : 0U;
         round->end_us = (round->end_us == 0U && worked) ? now_us + GW_ROUND_US : round->end_us;
