@@ -23,7 +23,7 @@ import tempfile
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "../bridge/ros2"}
+FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "../bridge/ros2", "iwheel-web": "../bridge/web"}
 BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document|header|file)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
 UNDERLINE = re.compile(r"([_*\\])")
 
@@ -145,6 +145,9 @@ def main():
     sources, stale = Sources(os.path.abspath(options.build)), []
     for name in sorted(os.listdir(os.path.join(ROOT, "man"))):
         path = os.path.join(ROOT, "man", name)
+        if name == "iwheel-web.1.scd" and not os.path.exists(sources.program("iwheel-web")):
+            print(f"note: man/{name} is not looked at: iwheel-web was not built, libmicrohttpd-dev or uPlot is missing")
+            continue
         with open(path, encoding="utf-8") as file:
             text = file.read()
         if name == "iwheel-ros2.1.scd" and not os.path.exists(sources.program("iwheel-ros2")):

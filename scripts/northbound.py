@@ -479,7 +479,7 @@ def c_limits(description):
               "IWN_RATE_DEFAULT_HZ": watch["rate_hz"]["default"], "IWN_DEPTH_MAX": limits["depth"]}
     for name, number in wanted.items():
         header = path.format("json_in" if name == "IWN_DEPTH_MAX" else "request")
-        found = re.search(rf"^#define {name} +(\d+)U?$", read(header), re.MULTILINE)
+        found = re.search(rf"^#define {name} +(\d+)U?(?: +//.*)?$", read(header), re.MULTILINE)
         if found is None or int(found[1]) != number:
             yield f"{header}: {name} is {found and found[1]}, in share/northbound.json {number}"
     for header, prefix, words in (("request", "CMD", description.requests), ("words", "TOPIC", description.words["topic"])):

@@ -113,7 +113,7 @@ def deviations(folder, fault):
 def northbound(folder, fault):
     """The description of the protocol and what must agree with it, with one change: file, what stands there, what stands there then."""
     library = [f"include/iwheel_northbound/{name}.h" for name in ("json_in", "request", "words")]
-    sources = [*(f"northbound/{name}" for name in ("src/words.c", "src/request_fields.h", *library)), *(f"app/gateway/{name}.c" for name in ("bus/bus_facts", "ledger/knowledge_json", "status/observe"))]
+    sources = [*(f"northbound/{name}" for name in ("src/words.c", "src/states.c", "src/request_fields.h", *library)), *(f"app/gateway/{name}.c" for name in ("bus/bus_facts", "ledger/knowledge_json", "status/observe"))]
     for name in ("scripts/northbound.py", "share/northbound.json", "docs/northbound.md", "python/src/iwheel/_protocol.py", *sources):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / name).read_text()
@@ -294,7 +294,7 @@ CASES = [
     (deviations, "python3", "a number given twice", ("docs/static.md", "D2", "D1"), True),
     (deviations, "python3", "no reason", ("docs/static.md", "a reason", ""), True),
     (northbound, "python3", "clean", ("", "", ""), False),
-    (northbound, "python3", "a word that only the gateway has", ("northbound/src/words.c", '"active"', '"awake"'), True),
+    (northbound, "python3", "a word that only the gateway has", ("northbound/src/states.c", '"active"', '"awake"'), True),
     (northbound, "python3", "a fault that is no cause", ("app/gateway/status/observe.c", '"still_moving", true', '"still_rolling", true'), True),
     (northbound, "python3", "a state of the memory", ("app/gateway/ledger/knowledge_json.c", '"ignored"', '"distrusted"'), True),
     (northbound, "python3", "a word that the gateway has no longer", ("app/gateway/bus/bus_facts.c", 'return "near";', 'return "confirmed";'), True),

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: MIT
 """Fails unless a portable library is what it promises: no mutable data, nothing from libc but mem*, no floating point.
 
-usage: purity.py [--strings] LIBRARY SOURCE_DIR
+usage: purity.py [--strings] [--on BASE] LIBRARY SOURCE_DIR
 
-LIBRARY is compiled for an ARM without an FPU, where every floating point operation is a call. With --strings it may use a few of str* too.
+LIBRARY is compiled for an ARM without an FPU, where every floating point operation is a call. With --strings it may use a few of str* too,
+with --on what another library has, which is as portable.
 """
+import argparse
 import re
 import subprocess
 import sys
@@ -21,18 +23,23 @@ HEADERS = {"stdbool.h", "stddef.h", "stdint.h", "limits.h", "string.h"}
 COMMENT = re.compile(r"//.*|/\*.*?\*/|\"[^\"\n]*\"", re.DOTALL)
 
 
-def symbol_findings(library, libc):
+def symbols_of(library):
+    """[(object file, kind as nm has it, name)]"""
     run = subprocess.run(["arm-none-eabi-nm", "-A", library], capture_output=True, text=True, check=True)
     rows = [re.match(r"(?:.*:)?([^:]+):(?:[0-9a-f]+)?\s+(\w) (\S+)$", line) for line in run.stdout.splitlines() if line]
-    symbols = [row.groups() for row in rows if row]
+    return [row.groups() for row in rows if row]
+
+
+def symbol_findings(library, allowed):
+    symbols = symbols_of(library)
     defined = {name for _, kind, name in symbols if kind != "U"}
     if not defined:
         yield f"{library} holds no symbols"
     for unit, kind, name in symbols:
         if kind in MUTABLE:
             yield f"{unit}: {name}: mutable data (nm says {kind})"
-        if kind == "U" and name not in defined and name not in libc and not RUNTIME.match(name):
-            yield f"{unit}: {name}: undefined, and neither of {', '.join(sorted(libc))} nor an integer helper of the compiler"
+        if kind == "U" and name not in defined and name not in allowed and not RUNTIME.match(name):
+            yield f"{unit}: {name}: undefined, and neither allowed ({', '.join(sorted(allowed & (LIBC | STRINGS)))}) nor an integer helper of the compiler"
 
 
 def source_findings(folder):
@@ -48,15 +55,20 @@ def source_findings(folder):
             yield f"{path}: {word}"
 
 
-def main(arguments):
-    libc = LIBC | STRINGS if "--strings" in arguments else LIBC
-    paths = [word for word in arguments[1:] if word != "--strings"]
-    if len(paths) != 2:
-        sys.exit(__doc__)
-    findings = [*symbol_findings(paths[0], libc), *source_findings(paths[1])]
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--strings", action="store_true")
+    parser.add_argument("--on", metavar="BASE")
+    parser.add_argument("library")
+    parser.add_argument("source_dir")
+    options = parser.parse_args()
+    allowed = LIBC | (STRINGS if options.strings else set())
+    if options.on:
+        allowed |= {name for _, kind, name in symbols_of(options.on) if kind == "T"}
+    findings = [*symbol_findings(options.library, allowed), *source_findings(options.source_dir)]
     print(*findings, sep="\n")
     return 1 if findings else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv))
+    sys.exit(main())

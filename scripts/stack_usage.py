@@ -93,7 +93,7 @@ def frames_of(entry, work):
     words = [word for word in shlex.split(entry["command"]) if Path(word).name != "ccache"]
     out = work / entry["file"].replace("/", "_")
     words[words.index("-o") + 1] = f"{out}.o"
-    subprocess.run([*words, "-fstack-usage", "-w"], cwd=entry["directory"], check=True)
+    subprocess.run([*words, "-fstack-usage"], cwd=entry["directory"], check=True)
     rows = [line.split("\t") for line in out.with_suffix(out.suffix + ".su").read_text().splitlines()]
     return [(int(size), f"{Path(entry['file']).name}:{where.rsplit(':', 1)[-1]}", how) for where, size, how in rows]
 

@@ -26,6 +26,7 @@ COMMENTED = ("core", "port")  # What these name in comments must be there, their
 COMMENT_SHARE = {"core/src": (5, 20), "port": (5, 20)}  # ... and so much of their sources' lines, in percent, says why.
 CODE = ("core", "northbound", "client", "port", "app", "bridge", "zephyr")
 PARAMETERS = 5
+IMPOSED = ("web_call_handle",)  # A library calls these: it says what they take.
 SPDX = "SPDX-License-Identifier: MIT"
 UNFINISHED = re.compile(r"\b(TODO|FIXME|XXX)\b")
 STRING_OR_COMMENT = re.compile(r'"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
@@ -46,7 +47,7 @@ def function_findings(path, functions, limits):
             yield f"{where}: {function.length} lines, at most {longest}"
         if function.cyclomatic_complexity > complexity:
             yield f"{where}: complexity {function.cyclomatic_complexity}, at most {complexity}"
-        if len(function.parameters) > PARAMETERS:
+        if len(function.parameters) > PARAMETERS and function.name not in IMPOSED:
             yield f"{where}: {len(function.parameters)} parameters, at most {PARAMETERS}"
 
 

@@ -42,6 +42,11 @@ static const verb_t verbs[] = {
           "also speed "
           "and force of the last minute. NO_COLOR is heeded.\n"),
      .no_json = "top draws a screen; for JSON lines: iwheelctl watch state"},
+    {VERB("web", verb_web, "", "the address of the web page, for this browser or a phone",
+          "Reads only; needs the package iwheel-web and the right to read its token: sudo iwheelctl web. On a terminal "
+          "as a QR code too.\n"
+          "WHO HAS THE ADDRESS MAY LOOK AND STOP, and drive if that is configured.\n"),
+     .no_json = "web prints an address; it has no --json"},
     {VERB("watch", verb_watch, "[TOPIC...] [--rate HZ]", "events as they come, one JSON object per line",
           "Reads only. Topics: state bus estop lease stop force frame; without one: the first five.\n"
           "--rate HZ  1 to 100: events of state and force per second, 10 if not told\n"

@@ -20,12 +20,14 @@ from harness import find_program  # noqa: E402
 
 BUILD = ""
 # Those that talk with a person.
-WITHOUT_JSON = {"top", "bringup", "help"}
+WITHOUT_JSON = {"top", "bringup", "help", "web"}
 
 
-def run(*words, program="iwheelctl", **more):
+def run(*words, program="iwheelctl", path=None, **more):
     """(exit code, stdout, stderr)"""
     environment = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR")}
+    if path:
+        environment["PATH"] = path
     done = subprocess.run([find_program(BUILD, program), *words], capture_output=True, text=True, timeout=30,
                           stdin=subprocess.DEVNULL, env={**environment, "TERM": "dumb"}, check=False, **more)
     return done.returncode, done.stdout, done.stderr
@@ -71,6 +73,20 @@ class Grammar(unittest.TestCase):
             self.assertEqual((64, f'iwheelctl: unknown verb "{typed}"; did you mean {meant}? All: iwheelctl help\n'), (code, err))
             self.assertEqual((64, err), (lambda done: (done[0], done[2]))(run("help", typed)))
         self.assertIn("known are: status top", run("xyzzy")[2])
+
+
+class Web(unittest.TestCase):
+    def test_web_is_the_bridges_own_word_or_says_what_to_install(self):
+        with tempfile.TemporaryDirectory() as folder:
+            code, out, err = run("web", path=folder)
+            self.assertEqual((69, ""), (code, out))
+            self.assertIn("apt-get install iwheel-web", err)
+            fake = os.path.join(folder, "iwheel-web")
+            with open(fake, "w", encoding="ascii") as file:
+                file.write("#!/bin/sh\necho \"told $*\"\n")
+            os.chmod(fake, 0o755)
+            self.assertEqual((0, "told --url\n", ""), run("web", path=folder))
+        self.assertEqual(64, run("web", "word")[0])
 
 
 class Json(unittest.TestCase):

@@ -41,6 +41,7 @@ def by_hand():
         + [b'{"cmd":"recording","name":"' + name + b'","offset":-1}' for name in (b"../x", b"a" * 64, b"stop-000001-a.log\\u0000", b"")],
         "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ngear_ratio = 3/2\n"],
         "candump": [ODD_LINES.encode()],
+        "web": [b"GET\n/\n[::1]\nnull\ncross-site\n\n", b"POST\n/api/estop\nwalker.lan:8470\nhttps://walker.lan:8470\nsame-origin\nbearer " + b"0" * 32],
         "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
 
@@ -92,6 +93,14 @@ def client():
     return [b"\0" + line for line in lines[:20]] + [bytes([how]) + b"".join(lines[:60]) for how in (0, 1, 8, 40)]
 
 
+def web():
+    """As a browser asks, with the token of fuzz_web.c: to look, and to drive."""
+    token = b"00112233445566778899aabbccddeeff"
+    said = b"127.0.0.1:8470\nhttp://127.0.0.1:8470\nsame-origin\nBearer " + token
+    drive = b"\n" + token + b"\n9900000\n1\n200\n-100\nstop-000001-estop_line.jsonl"
+    return [b"GET\n/api/events\n" + said + drive, b"POST\n/api/drive\n" + said + drive]
+
+
 def put(number, data, own):
     """A frame in the world of fuzz_gateway.c: an echo of what was sent, or one from the bus."""
     if own:
@@ -139,4 +148,4 @@ def gateway():
 
 def recorded():
     """{target: [bytes]}: a target that does not take them has lost what it was for."""
-    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client()}
+    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client(), "web": web()}

@@ -418,8 +418,8 @@ class Rig:
 
 
 def find_program(build, name):
-    folder = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim"}[name]
-    for path in (os.path.join(build, "app", folder, name), os.path.join(build, "bin", name), os.path.join(build, name)):
+    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "bridge/web"}[name]
+    for path in (os.path.join(build, folder, name), os.path.join(build, "bin", name), os.path.join(build, name)):
         if os.access(path, os.X_OK):
             return path
     raise FileNotFoundError(f"{name} is not in {build}; build it first: cmake --build {build} --target {name}")

@@ -6,8 +6,10 @@
 
 #include "iwheel_northbound/text.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 static void print_line(const char *text) {
     text_safe(text, stdout);
@@ -103,4 +105,15 @@ int verb_tare(ctl_t *self, int count, char **words) {
     }
     json_decref(reply);
     return code;
+}
+
+int verb_web(ctl_t *self, int count, char **words) {
+    (void)self;
+    if (!words_at_most("web", count, 0, words)) {
+        return CTL_USAGE;
+    }
+    // The page's own program knows its configuration, its token and how to draw it.
+    (void)execlp("iwheel-web", "iwheel-web", "--url", (char *)NULL);
+    return ctl_fail(CTL_UNAVAILABLE, "iwheel-web cannot be started (%s); install it: apt-get install iwheel-web",
+                    strerror(errno));
 }

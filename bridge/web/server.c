@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: MIT
+#include "server.h"
+
+#include "common/service.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#define LOOK_US         1000000U
+#define LONGEST_WAIT_MS 250
+#define FILE_MAX        1000000L
+/// Of a request with its headers, and of what is answered at a time.
+#define MEMORY_PER_CONNECTION 16384U
+
+static int complain(int code, const char *what, const char *cure) {
+    (void)fprintf(stderr, "iwheel-web: %s: %s\n", what, cure);
+    return code;
+}
+
+// ---- files --------------------------------------------------------------------------------------------------------
+
+/// The whole file, ended by a NUL; NULL: it cannot be read.
+static char *read_all(const char *path, size_t *out_length) {
+    FILE *file = fopen(path, "re");
+    char *text = (file != NULL) ? malloc((size_t)FILE_MAX) : NULL;
+    *out_length = (text != NULL) ? fread(text, 1, (size_t)FILE_MAX - 1U, file) : 0U;
+    const bool good = text != NULL && ferror(file) == 0 && feof(file) != 0;
+    if (file != NULL) {
+        (void)fclose(file);
+    }
+    if (!good) {
+        free(text);
+        return NULL;
+    }
+    text[*out_length] = '\0';
+    char *fitting = realloc(text, *out_length + 1U);
+    return (fitting != NULL) ? fitting : text;
+}
+
+static int read_page(web_server_t *self) {
+    char path[256];
+    const web_route_t *routes = web_routes();
+    for (size_t i = 0; routes[i].path != NULL && routes[i].verb == WEB_FILE && i < WEB_FILES; i++) {
+        (void)snprintf(path, sizeof path, "%s/%s", self->settings->web.page, routes[i].file);
+        self->files[i].text = read_all(path, &self->files[i].length);
+        if (self->files[i].text == NULL) {
+            return complain(EX_CONFIG, path,
+                            "cannot be read; let page under [web] name the folder of the page's files");
+        }
+    }
+    return 0;
+}
+
+static int read_certificate(web_server_t *self) {
+    size_t length = 0;
+    if (!web_settings_has_tls(self->settings)) {
+        return 0;
+    }
+    self->certificate = read_all(self->settings->web.certificate, &length);
+    if (self->certificate == NULL) {
+        return complain(EX_CONFIG, self->settings->web.certificate,
+                        "cannot be read; give a PEM file that the bridge's user may read");
+    }
+    self->key = read_all(self->settings->web.key, &length);
+    return (self->key != NULL) ? 0
+                               : complain(EX_CONFIG, self->settings->web.key,
+                                          "cannot be read; give a PEM file that the bridge's user may read");
+}
+
+// ---- the socket -----------------------------------------------------------------------------------------------------
+
+static int open_unix(const char *path) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%.107s", path);
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    const int other = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (connect(other, (const struct sockaddr *)&address, sizeof address) != 0 && errno == ECONNREFUSED) {
+        (void)unlink(path); // Left behind by one that was killed.
+    }
+    (void)close(other);
+    const mode_t before = umask(0117);
+    const int bound = bind(fd, (const struct sockaddr *)&address, sizeof address);
+    (void)umask(before);
+    if (bound != 0 || listen(fd, 64) != 0) {
+        (void)close(fd);
+        return -1;
+    }
+    return fd;
+}
+
+static int open_tcp(const web_settings_t *settings) {
+    const int one = 1;
+    struct sockaddr_in6 v6 = {.sin6_family = AF_INET6, .sin6_port = htons((uint16_t)settings->web.port)};
+    struct sockaddr_in v4 = {.sin_family = AF_INET, .sin_port = htons((uint16_t)settings->web.port)};
+    const bool is_v6 = inet_pton(AF_INET6, settings->web.listen, &v6.sin6_addr) == 1;
+    if (!is_v6) {
+        (void)inet_pton(AF_INET, settings->web.listen, &v4.sin_addr);
+    }
+    const struct sockaddr *address = is_v6 ? (const struct sockaddr *)&v6 : (const struct sockaddr *)&v4;
+    const int fd = socket(is_v6 ? AF_INET6 : AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
+    if (bind(fd, address, is_v6 ? sizeof v6 : sizeof v4) != 0 || listen(fd, 64) != 0) {
+        const int error = errno;
+        (void)close(fd);
+        errno = error;
+        return -1;
+    }
+    return fd;
+}
+
+/// Called at both ends of a connection.
+static void take_peer(void *context, struct MHD_Connection *connection, void **place,
+                      enum MHD_ConnectionNotificationCode what) {
+    web_server_t *self = context;
+    if (what == MHD_CONNECTION_NOTIFY_STARTED) {
+        const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+        web_peer_t *peer = calloc(1, sizeof(*peer));
+        if (peer != NULL) {
+            *peer = (web_peer_t){(info != NULL) ? info->connect_fd : -1, false, self->now_us, self->peers};
+            self->peers = peer;
+        }
+        *place = peer;
+        return;
+    }
+    for (web_peer_t **at = &self->peers; *at != NULL; at = &(*at)->next) {
+        if (*at == *place) {
+            web_peer_t *peer = *at;
+            *at = peer->next;
+            free(peer);
+            break;
+        }
+    }
+    *place = NULL;
+}
+
+__attribute__((format(printf, 2, 0))) static void say_nothing(void *context, const char *format, va_list list) {
+    (void)context; // What hostile peers send is no news.
+    (void)format;
+    (void)list;
+}
+
+/// As the library does, but what holds a NUL stays as it was sent, and so is no path or name of ours.
+static size_t unescape(void *context, struct MHD_Connection *connection, char *text) {
+    (void)context;
+    (void)connection;
+    return (strstr(text, "%00") != NULL) ? strlen(text) : MHD_http_unescape(text);
+}
+
+static struct MHD_Daemon *start(web_server_t *self, int fd) {
+    const struct MHD_OptionItem tls[] = {
+        {MHD_OPTION_HTTPS_MEM_CERT, 0, self->certificate},
+        {MHD_OPTION_HTTPS_MEM_KEY, 0, self->key},
+        {MHD_OPTION_END, 0, NULL},
+    };
+    const struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};
+    const unsigned flags = MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | ((self->certificate != NULL) ? MHD_USE_TLS : 0U);
+    return MHD_start_daemon(flags, 0, NULL, NULL, web_call_handle, self, MHD_OPTION_EXTERNAL_LOGGER, say_nothing, NULL,
+                            MHD_OPTION_ARRAY, (self->certificate != NULL) ? tls : plain, MHD_OPTION_LISTEN_SOCKET, fd,
+                            MHD_OPTION_CONNECTION_LIMIT, self->settings->web.max_connections,
+                            MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+                            (size_t)MEMORY_PER_CONNECTION, MHD_OPTION_NOTIFY_COMPLETED, web_call_completed, self,
+                            MHD_OPTION_NOTIFY_CONNECTION, take_peer, self, MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL,
+                            MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
+}
+
+// ---- life -----------------------------------------------------------------------------------------------------------
+
+int web_server_check(web_server_t *self, const web_settings_t *settings) {
+    *self = (web_server_t){.settings = settings};
+    self->now_us = bridge_now_us();
+    self->token = (web_token_t){.path = settings->web.token_file, .hours = settings->web.token_hours};
+    const int code = read_page(self);
+    return (code != 0) ? code : read_certificate(self);
+}
+
+int web_server_open(web_server_t *self, const web_settings_t *settings) {
+    bool changed = false;
+    const int code = web_server_check(self, settings);
+    if (code != 0) {
+        return code;
+    }
+    if (!web_token_refresh(&self->token, &changed, stderr)) {
+        return EX_CONFIG;
+    }
+    if (!web_link_open(&self->link, settings->gateway.socket, settings->gateway.rate_hz, settings->drive.enabled)) {
+        return complain(EX_OSERR, "memory", "there is not enough");
+    }
+    const int fd = web_settings_is_unix(settings) ? open_unix(settings->web.listen + 5) : open_tcp(settings);
+    if (fd < 0) {
+        char what[160];
+        (void)snprintf(what, sizeof what, "cannot listen on %s port %u", settings->web.listen, settings->web.port);
+        return complain((errno == EACCES) ? EX_NOPERM : EX_UNAVAILABLE, what, strerror(errno));
+    }
+    self->daemon = start(self, fd);
+    if (self->daemon == NULL) {
+        (void)close(fd);
+        return complain(EX_CONFIG, settings->web.certificate,
+                        "is no certificate that fits the key; give another pair of PEM files");
+    }
+    return 0;
+}
+
+void web_server_close(web_server_t *self) {
+    self->ending = true;
+    for (web_call_t *stream = self->streams; stream != NULL; stream = stream->next) {
+        web_call_resume(stream);
+    }
+    if (self->daemon != NULL) {
+        (void)MHD_run(self->daemon);
+        web_link_close(&self->link); // Answers what still waits.
+        MHD_stop_daemon(self->daemon);
+    }
+    if (self->daemon != NULL && web_settings_is_unix(self->settings)) {
+        (void)unlink(self->settings->web.listen + 5);
+    }
+    for (size_t i = 0; i < WEB_FILES; i++) {
+        free(self->files[i].text);
+    }
+    free(self->certificate);
+    free(self->key);
+}
+
+// ---- the round ------------------------------------------------------------------------------------------------------
+
+/// Who does not ask in time makes room: half a request, or none, holds a connection no longer.
+static void close_idle_peers(const web_server_t *self) {
+    for (const web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
+        if (!peer->asking && self->now_us - peer->since_us > WEB_HEADER_US) {
+            (void)shutdown(peer->fd, SHUT_RDWR);
+        }
+    }
+}
+
+static void look_at_token(web_server_t *self) {
+    bool changed = false;
+    (void)web_token_refresh(&self->token, &changed, stderr);
+    for (web_call_t *stream = self->streams; changed && stream != NULL; stream = stream->next) {
+        stream->verdict.route = NULL; // Begun with a token that is none any more.
+        web_call_resume(stream);
+    }
+}
+
+/// The page is silent, so nobody holds the pad. Another client's lease is not ours to end.
+static void let_go(web_server_t *self) {
+    iwc_message_t message;
+    iwc_state_t state;
+    if (!web_driver_silent(&self->driver, self->now_us) && self->link.is_here) {
+        return;
+    }
+    if (self->driver.key[0] != '\0' && web_link_state(&self->link, self->now_us, &message) &&
+        iwc_state(self->link.gateway, &message, &state) && state.ours) {
+        (void)web_link_ask(&self->link, "{\"cmd\":\"stop\"}", NULL, NULL, self->now_us);
+    }
+    web_driver_end(&self->driver);
+}
+
+int web_server_step(web_server_t *self) {
+    self->now_us = bridge_now_us();
+    const int code = web_link_step(&self->link, self->now_us);
+    if (code != 0) {
+        return code;
+    }
+    let_go(self);
+    for (web_call_t *stream = self->streams; stream != NULL; stream = stream->next) {
+        if (web_reader_waits(&stream->reader, &self->link.feed) || self->now_us - stream->told_us >= WEB_PULSE_US) {
+            web_call_resume(stream);
+        }
+    }
+    (void)MHD_run(self->daemon);
+    if (self->now_us >= self->look_us) {
+        self->look_us = self->now_us + LOOK_US;
+        close_idle_peers(self);
+        look_at_token(self);
+    }
+    return 0;
+}
+
+int web_server_wait_ms(const web_server_t *self) {
+    const uint64_t now_us = bridge_now_us();
+    const uint64_t next_us = web_link_next_us(&self->link, now_us);
+    unsigned MHD_LONG_LONG http_ms = LONGEST_WAIT_MS;
+    if (MHD_get_timeout(self->daemon, &http_ms) != MHD_YES || http_ms > LONGEST_WAIT_MS) {
+        http_ms = LONGEST_WAIT_MS;
+    }
+    const uint64_t link_ms = (next_us <= now_us) ? 0U : (next_us - now_us + 999U) / 1000U;
+    return (int)((link_ms < http_ms) ? link_ms : http_ms);
+}
+
+int web_server_fd(const web_server_t *self) {
+    const union MHD_DaemonInfo *info = MHD_get_daemon_info(self->daemon, MHD_DAEMON_INFO_EPOLL_FD);
+    return (info != NULL) ? info->epoll_fd : -1;
+}

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+/// The bridge as a whole: HTTP on one side, the gateway on the other, in one thread that never waits for either.
+///
+/// Bounded: connections, bytes of a request, seconds until it is complete, questions to the gateway, events kept.
+#ifndef IW_WEB_SERVER_H
+#define IW_WEB_SERVER_H
+
+#include "driver.h"
+#include "link.h"
+#include "metrics.h"
+#include "settings.h"
+#include "token.h"
+
+#include <microhttpd.h>
+
+/// A request is complete this long after its connection was made or last used, or the connection is closed.
+#define WEB_HEADER_US 5000000U
+/// A stream on which nothing happens says so this often.
+#define WEB_PULSE_US 1000000U
+#define WEB_FILES    16U
+
+/// A connection.
+typedef struct web_peer {
+    int fd;
+    bool asking; ///< In the middle of a complete request.
+    uint64_t since_us;
+    struct web_peer *next;
+} web_peer_t;
+
+typedef struct web_server web_server_t;
+
+/// A request.
+typedef struct web_call {
+    web_server_t *server;
+    struct MHD_Connection *connection;
+    web_verdict_t verdict;
+    bool suspended;
+    char *reply; ///< What it is answered, once it is known.
+    size_t length;
+    unsigned status;
+    web_reader_t reader; ///< WEB_EVENTS
+    uint64_t told_us;    ///< When the stream said something last.
+    struct web_call *next;
+} web_call_t;
+
+typedef struct {
+    char *text;
+    size_t length;
+} web_file_t;
+
+struct web_server {
+    const web_settings_t *settings;
+    web_link_t link;
+    web_token_t token;
+    web_driver_t driver;
+    web_own_t own;
+    web_file_t files[WEB_FILES]; ///< By their place among the routes.
+    struct MHD_Daemon *daemon;
+    web_peer_t *peers;
+    web_call_t *streams;
+    char *certificate;
+    char *key;
+    uint64_t now_us;
+    uint64_t look_us; ///< When to look at peers and token next.
+    bool ending;
+};
+
+/// Reads files and token, opens the socket. 0, or an exit code of sysexits with a line on stderr.
+int web_server_open(web_server_t *self, const web_settings_t *settings);
+
+/// Reads what `open` reads, and opens nothing.
+int web_server_check(web_server_t *self, const web_settings_t *settings);
+void web_server_close(web_server_t *self);
+
+/// Whatever can be done now. 0, or an exit code.
+int web_server_step(web_server_t *self);
+
+/// Milliseconds until `step` has something to do, if neither descriptor has.
+int web_server_wait_ms(const web_server_t *self);
+
+/// The descriptor of HTTP, for poll().
+int web_server_fd(const web_server_t *self);
+
+/// Answers one request: MHD_AccessHandlerCallback and MHD_RequestCompletedCallback of libmicrohttpd.
+enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection, const char *url, const char *method,
+                                const char *version, const char *upload, size_t *upload_size, void **place);
+void web_call_completed(void *context, struct MHD_Connection *connection, void **place,
+                        enum MHD_RequestTerminationCode why);
+
+/// Lets a suspended call go on.
+void web_call_resume(web_call_t *self);
+
+#endif

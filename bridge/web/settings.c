@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+#include "settings.h"
+
+#include <arpa/inet.h>
+#include <string.h>
+
+#ifndef IWHEEL_WEB_PAGE_DIR
+#define IWHEEL_WEB_PAGE_DIR "/usr/share/iwheel-web"
+#endif
+
+#define FIELD(member)             SETTINGS_FIELD(web_settings_t, member)
+#define NUMBER(member, low, high) .kind = SETTINGS_NUMBER, .min = (low), .max = (high), FIELD(member)
+#define SWITCH(member)            .kind = SETTINGS_WORD, .words = no_yes, FIELD(member)
+#define TEXT(member)              .kind = SETTINGS_TEXT, FIELD(member)
+
+static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
+
+static const char *wrong_listen(const char *text) {
+    struct in6_addr address;
+    if (strncmp(text, "unix:", 5) == 0) {
+        return settings_wrong_address(text);
+    }
+    const bool good = inet_pton(AF_INET, text, &address) == 1 || inet_pton(AF_INET6, text, &address) == 1;
+    return good ? NULL : "is no address; write one, such as 127.0.0.1, or unix:PATH";
+}
+
+static const settings_key_t keys[] = {
+    {"gateway", "socket", "", "Of the gateway: its watch socket, or to drive, the one to drive by.",
+     TEXT(gateway.socket), .wrong = settings_wrong_socket},
+    {"gateway", "rate_hz", " Hz", "How often the page is told the state.", NUMBER(gateway.rate_hz, 1, 100)},
+    {"web", "listen", "", "127.0.0.1, another address (needs certificate and key), or unix:PATH for a reverse proxy.",
+     TEXT(web.listen), .wrong = wrong_listen},
+    {"web", "port", "", "Of the page.", NUMBER(web.port, 1, 65535)},
+    {"web", "hosts", "",
+     "Names by which browsers call this machine, separated by blanks, or none. Requests for other names are refused;\n"
+     "addresses and localhost need not be listed.",
+     TEXT(web.hosts)},
+    {"web", "token_file", "",
+     "The secret without which nothing is told; made at the first start, readable by the bridge only.",
+     TEXT(web.token_file)},
+    {"web", "token_hours", " h", "After so long another token is made, and the old one is refused; 0: never.",
+     NUMBER(web.token_hours, 0, 8760)},
+    {"web", "max_connections", "", "At once; a page takes two.", NUMBER(web.max_connections, 8, 1000)},
+    {"web", "page", "", "Folder with the page's files.", TEXT(web.page)},
+    {"web", "certificate", "", "PEM file for TLS; none: without TLS, for this machine only.", TEXT(web.certificate)},
+    {"web", "key", "", "PEM file of its private key.", TEXT(web.key)},
+    {"drive", "enabled", "", "yes: WHO HAS THE TOKEN MAY ARM AND DRIVE. The bridge needs the right to drive for that.",
+     SWITCH(drive.enabled)},
+    {"drive", "allow_reset", "", "yes: who has the token may reset a latched stop. Needs enabled = yes.",
+     SWITCH(drive.allow_reset)},
+    {"drive", "max_speed_mm_s", " mm/s", "Of the page's pad; the gateway's limits hold beside it.",
+     NUMBER(drive.max_speed_mm_s, 10, 2000)},
+    {"drive", "ttl_ms", " ms", "A drive command that was on its way longer is dropped.",
+     NUMBER(drive.ttl_ms, 50, 1000)},
+};
+
+void web_settings_default(web_settings_t *out_settings) {
+    static const web_settings_t standard = {
+        .gateway = {"/run/iwheel/watch/gateway.sock", 20},
+        .web = {.listen = "127.0.0.1",
+                .port = 8470,
+                .hosts = "none",
+                .token_file = "/var/lib/iwheel-web/token",
+                .max_connections = 128,
+                .page = IWHEEL_WEB_PAGE_DIR,
+                .certificate = "none",
+                .key = "none"},
+        .drive = {.max_speed_mm_s = 300, .ttl_ms = 300},
+    };
+    *out_settings = standard;
+}
+
+bool web_settings_is_unix(const web_settings_t *settings) {
+    return strncmp(settings->web.listen, "unix:", 5) == 0;
+}
+
+static bool is_given(const char *text) {
+    return strcmp(text, "none") != 0;
+}
+
+bool web_settings_has_tls(const web_settings_t *settings) {
+    return is_given(settings->web.certificate);
+}
+
+const char *web_settings_hosts(const web_settings_t *settings) {
+    return is_given(settings->web.hosts) ? settings->web.hosts : "";
+}
+
+static bool stays_on_this_machine(const web_settings_t *settings) {
+    const char *listen = settings->web.listen;
+    return web_settings_is_unix(settings) || strncmp(listen, "127.", 4) == 0 || strcmp(listen, "::1") == 0;
+}
+
+static unsigned line_of(const char *key, const unsigned *lines) {
+    return lines[settings_find(&web_settings_form, NULL, key) - keys];
+}
+
+static void relate(settings_report_t *report, const void *values, const unsigned *lines) {
+    const web_settings_t *settings = values;
+    const bool certificate = web_settings_has_tls(settings);
+    if (certificate != is_given(settings->web.key)) {
+        settings_complain(report, line_of(certificate ? "certificate" : "key", lines),
+                          "%s is given without %s; give both files, or none", certificate ? "certificate" : "key",
+                          certificate ? "key" : "certificate");
+    }
+    if (!certificate && !stays_on_this_machine(settings)) {
+        settings_complain(report, line_of("listen", lines),
+                          "listen = %s is reached from other machines, and without TLS everybody between reads the "
+                          "token; give certificate and key, or listen = 127.0.0.1",
+                          settings->web.listen);
+    }
+    if (settings->drive.allow_reset && !settings->drive.enabled) {
+        settings_complain(report, line_of("allow_reset", lines),
+                          "allow_reset = yes needs the right to drive; set enabled = yes, or allow_reset = no");
+    }
+}
+
+const settings_form_t web_settings_form = {
+    .keys = keys,
+    .count = sizeof keys / sizeof keys[0],
+    .program = "iwheel-web",
+    .missing = "create it from share/web.conf",
+    .relate = relate,
+};

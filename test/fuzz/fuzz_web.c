@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// Any bytes as what the web bridge reads itself: header values, path, arguments of a drive command, a recording's name. Nothing is let in without
+// the token and a name of ours, nothing is driven beyond the limits, and no name leads out of the recordings.
+#include "fuzz.h"
+
+#include "driver.h"
+#include "judge.h"
+
+#include <strings.h>
+
+#define FIELDS 12U
+
+static const char token[] = "00112233445566778899aabbccddeeff";
+
+/// Cuts the bytes at each newline into texts of exactly their length: a byte read behind one is found. Missing ones are NULL.
+static void cut(const uint8_t *data, size_t size, char *fields[FIELDS]) {
+    const uint8_t *const end = data + size;
+    for (size_t i = 0; i < FIELDS; i++) {
+        fields[i] = NULL;
+        if (data >= end) {
+            continue;
+        }
+        const uint8_t *newline = memchr(data, '\n', (size_t)(end - data));
+        const size_t length = (size_t)(((newline != NULL) ? newline : end) - data);
+        fields[i] = malloc(length + 1U);
+        memcpy(fields[i], data, length);
+        fields[i][length] = '\0';
+        data += length + 1U;
+    }
+}
+
+static void judge_request(char *fields[FIELDS], bool drives) {
+    const web_rules_t rules = {token, "walker.lan", drives, drives};
+    const web_asked_t asked = {(fields[0] != NULL) ? fields[0] : "",
+                               (fields[1] != NULL) ? fields[1] : "",
+                               fields[2],
+                               fields[3],
+                               fields[4],
+                               fields[5],
+                               false};
+    const web_verdict_t verdict = web_judge(&rules, &asked);
+    fuzz_require((verdict.status == 200U) == (verdict.route != NULL), "a route, or a refusal");
+    fuzz_require(verdict.status == 200U || (verdict.error[0] != '\0' && verdict.message[0] != '\0'),
+                 "a refusal says why");
+    if (verdict.status != 200U) {
+        if (drives) {
+            fuzz_tell("refused");
+        }
+        return;
+    }
+    fuzz_tell("taken");
+    fuzz_require(asked.host != NULL && asked.host[0] != '\0', "no host, no answer");
+    fuzz_require(verdict.route->verb == WEB_FILE ||
+                     (asked.authorization != NULL && strcmp(asked.authorization + 7, token) == 0),
+                 "the token was there");
+    fuzz_require(asked.origin == NULL || strcasecmp(strstr(asked.origin, "//") + 2, asked.host) == 0, "our own page");
+    fuzz_require(drives || (verdict.route->verb != WEB_ARM && verdict.route->verb != WEB_DRIVE &&
+                            verdict.route->verb != WEB_RESET),
+                 "driving is configured");
+}
+
+static void judge_drive(char *fields[FIELDS]) {
+    web_driver_t driver = {0};
+    web_twist_t twist = {0, 0};
+    const web_command_t command = {fields[6], fields[7], fields[8], fields[9], fields[10]};
+    const web_limits_t limits = {300, 300000};
+    web_driver_begin(&driver, token, 0);
+    if (web_driver_take(&driver, &command, &limits, 10000000U, &twist) == NULL) {
+        fuzz_tell("taken");
+        fuzz_require(twist.v_mm_s >= -300 && twist.v_mm_s <= 300 && twist.yaw_mrad_s >= -1000 &&
+                         twist.yaw_mrad_s <= 1000,
+                     "within the limits");
+        fuzz_require(strcmp(command.key, token) == 0 && driver.sequence > 0, "by the page that armed");
+        fuzz_require(web_driver_take(&driver, &command, &limits, 10000000U, &twist) != NULL, "once");
+    } else {
+        fuzz_require(driver.dropped == 1U, "counted");
+        fuzz_tell("refused");
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    char *fields[FIELDS];
+    cut(data, size, fields);
+    judge_request(fields, false);
+    judge_request(fields, true);
+    judge_drive(fields);
+    if (web_recording_name(fields[11])) {
+        fuzz_tell("taken");
+        fuzz_require(strlen(fields[11]) < WEB_NAME_SIZE && strpbrk(fields[11], "/\\\"% ") == NULL &&
+                         fields[11][0] != '.' && strstr(fields[11], "..") == NULL,
+                     "a bare name");
+    }
+    for (size_t i = 0; i < FIELDS; i++) {
+        free(fields[i]);
+    }
+    return 0;
+}

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: MIT
+// What readers of the web bridge's stream get; its metrics, settings and token.
+#include "feed.h"
+#include "metrics.h"
+#include "settings.h"
+#include "token.h"
+
+#include "unity.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <utime.h>
+
+static web_feed_t feed;
+static web_reader_t reader;
+static char out[4096];
+
+void setUp(void) {
+    memset(&feed, 0, sizeof feed);
+    web_reader_begin(&reader, &feed);
+}
+
+void tearDown(void) {
+    web_reader_end(&reader);
+    web_feed_free(&feed);
+}
+
+static const char *take(size_t size) {
+    out[web_reader_take(&reader, &feed, out, size)] = '\0';
+    return out;
+}
+
+static void add(const char *name, const char *json) {
+    TEST_ASSERT_TRUE(web_feed_add(&feed, name, json, strlen(json), strcmp(name, "state") == 0));
+}
+
+static void test_reader_gets_events_in_order_and_then_the_state(void) {
+    add("state", "{\"a\":1}");
+    add("stop", "{\"b\":2}");
+    add("fault", "{\"c\":3}");
+    TEST_ASSERT_TRUE(web_reader_waits(&reader, &feed));
+    TEST_ASSERT_EQUAL_STRING("event: stop\ndata: {\"b\":2}\n\n", take(1000));
+    TEST_ASSERT_EQUAL_STRING("event: fault\ndata: {\"c\":3}\n\n", take(1000));
+    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":1}\n\n", take(1000));
+    TEST_ASSERT_EQUAL_STRING("", take(1000));
+    TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
+}
+
+static void test_slow_reader_gets_the_newest_state_only(void) {
+    for (char i = '0'; i <= '9'; i++) {
+        const char json[] = {'{', '"', i, '"', ':', i, '}', '\0'};
+        add("state", json);
+    }
+    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"9\":9}\n\n", take(1000));
+    TEST_ASSERT_EQUAL_STRING("", take(1000));
+}
+
+static void test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest(void) {
+    add("state", "{\"a\":1}");
+    TEST_ASSERT_EQUAL_STRING("event", take(5));
+    add("state", "{\"a\":2}");
+    add("state", "{\"a\":3}");
+    TEST_ASSERT_EQUAL_STRING(": state\ndata: {\"a\":1}\n\n", take(1000));
+    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":3}\n\n", take(1000));
+}
+
+static void test_reader_that_falls_behind_is_told_how_many_it_missed(void) {
+    for (unsigned i = 0; i < WEB_FEED_KEPT + 7U; i++) {
+        add("bus", "{}");
+    }
+    TEST_ASSERT_EQUAL_STRING("event: lost\ndata: {\"event\":\"lost\",\"count\":7}\n\n", take(1000));
+    for (unsigned i = 0; i < WEB_FEED_KEPT; i++) {
+        TEST_ASSERT_EQUAL_STRING("event: bus\ndata: {}\n\n", take(1000));
+    }
+    TEST_ASSERT_EQUAL_STRING("", take(1000));
+}
+
+static void test_new_reader_begins_with_the_newest_state_and_no_old_event(void) {
+    add("stop", "{}");
+    add("state", "{\"a\":1}");
+    web_reader_begin(&reader, &feed);
+    TEST_ASSERT_EQUAL_STRING("event: state\ndata: {\"a\":1}\n\n", take(1000));
+    TEST_ASSERT_EQUAL_STRING("", take(1000));
+}
+
+static void test_state_that_is_forgotten_is_told_to_nobody(void) {
+    add("state", "{\"a\":1}");
+    web_feed_forget(&feed);
+    TEST_ASSERT_FALSE(web_reader_waits(&reader, &feed));
+    TEST_ASSERT_EQUAL_STRING("", take(1000));
+}
+
+// ---- metrics --------------------------------------------------------------------------------------------------------
+
+static char *metrics_of(const char *json) {
+    char *text = NULL;
+    size_t length = 0;
+    const iwc_message_t message = {.text = json, .length = (json != NULL) ? strlen(json) : 0U};
+    const web_own_t own = {3, 4, 5, 6};
+    FILE *file = open_memstream(&text, &length);
+    web_metrics_write((json != NULL) ? &message : NULL, &own, file);
+    (void)fclose(file);
+    return text;
+}
+
+static void test_metrics_have_base_units_and_leave_out_what_is_unknown(void) {
+    char *text = metrics_of("{\"state\":\"armed\",\"left\":{\"heard\":true,\"speed_mm_s\":-1234,\"battery_dV\":251,"
+                            "\"temperature_degC\":null},"
+                            "\"right\":{\"heard\":false,\"speed_mm_s\":null},\"counters\":{\"pairs\":7},"
+                            "\"gaps\":{\"limits_ms\":[5,20],\"count\":[1,0,2],\"worst_us\":20500}}");
+    static const char *const lines[] = {"\niwheel_up 1\n",
+                                        "\niwheel_state{iwheel_state=\"armed\"} 1\n",
+                                        "\niwheel_state{iwheel_state=\"latched\"} 0\n",
+                                        "\niwheel_wheel_speed_meters_per_second{side=\"left\"} -1.234\n",
+                                        "\niwheel_wheel_battery_volts{side=\"left\"} 25.1\n",
+                                        "\niwheel_wheel_heard{side=\"right\"} 0\n",
+                                        "\niwheel_setpoint_pairs_total 7\n",
+                                        "\niwheel_setpoint_gap_seconds_bucket{le=\"0.005\"} 1\n",
+                                        "\niwheel_setpoint_gap_seconds_bucket{le=\"0.020\"} 1\n",
+                                        "\niwheel_setpoint_gap_seconds_bucket{le=\"+Inf\"} 3\n",
+                                        "\niwheel_setpoint_gap_worst_seconds 0.020500\n",
+                                        "\niwheel_web_watchers 3\n",
+                                        "\niwheel_web_dropped_commands_total 5\n"};
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, lines[i]), lines[i]);
+    }
+    TEST_ASSERT_NULL(strstr(text, "iwheel_wheel_speed_meters_per_second{side=\"right\"}"));
+    TEST_ASSERT_NULL(strstr(text, "iwheel_wheel_temperature_celsius{"));
+    TEST_ASSERT_EQUAL_STRING("# EOF\n", text + strlen(text) - 6U);
+    free(text);
+}
+
+static void test_metrics_without_a_gateway_say_so_and_nothing_of_wheels(void) {
+    char *text = metrics_of(NULL);
+    TEST_ASSERT_NOT_NULL(strstr(text, "\niwheel_up 0\n"));
+    TEST_ASSERT_NULL(strstr(text, "iwheel_wheel"));
+    free(text);
+}
+
+// ---- settings -------------------------------------------------------------------------------------------------------
+
+static char complaint[1024];
+
+static int read_settings(const char *text, web_settings_t *settings) {
+    memset(complaint, 0, sizeof complaint);
+    FILE *err = fmemopen(complaint, sizeof complaint - 1U, "w");
+    settings_report_t report = {.name = "f", .err = err};
+    web_settings_default(settings);
+    const int result = settings_parse(&web_settings_form, &report, text, strlen(text), settings);
+    (void)fclose(err);
+    return result;
+}
+
+static void test_settings_that_are_wrong_are_told_with_line_and_cure(void) {
+    static const char *const cases[][2] = {
+        {"[web]\nport = 0", "f:2: "},
+        {"[web]\nlisten = walker\n", "f:2: listen = walker is no address"},
+        {"[web]\nlisten = 0.0.0.0\n", "f:2: listen = 0.0.0.0 is reached from other machines"},
+        {"[web]\nlisten = ::\n", "f:2: listen = :: is reached from other machines"},
+        {"[web]\nkey = /a\n", "f:2: key is given without certificate"},
+        {"[web]\ncertificate = /a\n", "f:2: certificate is given without key"},
+        {"[drive]\nallow_reset = yes\n", "f:2: allow_reset = yes needs the right to drive"},
+        {"[drive]\nenabled = true\n", "f:2: "},
+        {"[drive]\nport = 1\n", "f:2: port is no key of [drive]; move it to [web]"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        web_settings_t settings;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(SETTINGS_ERROR, read_settings(cases[i][0], &settings), cases[i][0]);
+        TEST_ASSERT_EQUAL_PTR_MESSAGE(complaint, strstr(complaint, cases[i][1]), complaint);
+    }
+}
+
+static void test_settings_that_leave_the_machine_are_taken_with_tls(void) {
+    web_settings_t settings;
+    TEST_ASSERT_EQUAL_INT(
+        0, read_settings("[web]\nlisten = 0.0.0.0\ncertificate = /a\nkey = /b\nhosts = a b\n", &settings));
+    TEST_ASSERT_TRUE(web_settings_has_tls(&settings));
+    TEST_ASSERT_EQUAL_STRING("a b", web_settings_hosts(&settings));
+    TEST_ASSERT_EQUAL_INT(0, read_settings("[web]\nlisten = unix:/run/a.sock\n", &settings));
+    TEST_ASSERT_TRUE(web_settings_is_unix(&settings));
+    TEST_ASSERT_FALSE(web_settings_has_tls(&settings));
+    TEST_ASSERT_EQUAL_STRING("", web_settings_hosts(&settings));
+    TEST_ASSERT_FALSE(settings.drive.enabled);
+}
+
+// ---- the token ------------------------------------------------------------------------------------------------------
+
+static char folder[] = "/tmp/iwheel-token-XXXXXX";
+static char path[64];
+static FILE *silent;
+
+static void begin_token(web_token_t *token, uint32_t hours) {
+    memcpy(strrchr(folder, '-'), "-XXXXXX", 8);
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    (void)snprintf(path, sizeof path, "%s/token", folder);
+    silent = fopen("/dev/null", "w");
+    *token = (web_token_t){.path = path, .hours = hours};
+}
+
+static void end_token(void) {
+    (void)unlink(path);
+    (void)rmdir(folder);
+    (void)fclose(silent);
+}
+
+static void test_token_is_made_for_the_bridge_alone_and_stays(void) {
+    web_token_t token;
+    web_token_t other;
+    struct stat status;
+    bool changed = false;
+    begin_token(&token, 0);
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(changed);
+    TEST_ASSERT_EQUAL_size_t(WEB_TOKEN_SIZE - 1U, strlen(token.text));
+    TEST_ASSERT_EQUAL_INT(0, stat(path, &status));
+    TEST_ASSERT_EQUAL_HEX(0600, status.st_mode & 07777U);
+    other = (web_token_t){.path = path};
+    TEST_ASSERT_TRUE(web_token_refresh(&other, &changed, silent));
+    TEST_ASSERT_EQUAL_STRING(token.text, other.text);
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_FALSE(changed);
+    end_token();
+}
+
+static void test_token_that_is_deleted_or_over_is_replaced(void) {
+    web_token_t token;
+    char before[WEB_TOKEN_SIZE];
+    bool changed = false;
+    begin_token(&token, 1);
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    memcpy(before, token.text, sizeof before);
+    TEST_ASSERT_EQUAL_INT(0, unlink(path));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(changed && strcmp(before, token.text) != 0);
+    memcpy(before, token.text, sizeof before);
+    const struct utimbuf old = {time(NULL) - 3601, time(NULL) - 3601};
+    TEST_ASSERT_EQUAL_INT(0, utime(path, &old));
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_TRUE(changed && strcmp(before, token.text) != 0);
+    end_token();
+}
+
+static void test_token_that_others_can_read_is_refused(void) {
+    web_token_t token;
+    bool changed = false;
+    begin_token(&token, 0);
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_EQUAL_INT(0, chmod(path, 0640));
+    TEST_ASSERT_FALSE(web_token_refresh(&token, &changed, silent));
+    end_token();
+}
+
+static void test_token_that_is_only_read_is_never_made(void) {
+    web_token_t token;
+    bool changed = false;
+    begin_token(&token, 1);
+    token.only_reads = true;
+    TEST_ASSERT_FALSE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_NOT_EQUAL(0, access(path, F_OK));
+    token.only_reads = false;
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    const struct utimbuf old = {time(NULL) - 3601, time(NULL) - 3601};
+    TEST_ASSERT_EQUAL_INT(0, utime(path, &old));
+    token.only_reads = true;
+    TEST_ASSERT_TRUE(web_token_refresh(&token, &changed, silent));
+    TEST_ASSERT_FALSE(changed);
+    end_token();
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_reader_gets_events_in_order_and_then_the_state);
+    RUN_TEST(test_slow_reader_gets_the_newest_state_only);
+    RUN_TEST(test_reader_in_the_middle_of_a_state_gets_its_end_and_then_the_newest);
+    RUN_TEST(test_reader_that_falls_behind_is_told_how_many_it_missed);
+    RUN_TEST(test_new_reader_begins_with_the_newest_state_and_no_old_event);
+    RUN_TEST(test_state_that_is_forgotten_is_told_to_nobody);
+    RUN_TEST(test_metrics_have_base_units_and_leave_out_what_is_unknown);
+    RUN_TEST(test_metrics_without_a_gateway_say_so_and_nothing_of_wheels);
+    RUN_TEST(test_settings_that_are_wrong_are_told_with_line_and_cure);
+    RUN_TEST(test_settings_that_leave_the_machine_are_taken_with_tls);
+    RUN_TEST(test_token_is_made_for_the_bridge_alone_and_stays);
+    RUN_TEST(test_token_that_is_deleted_or_over_is_replaced);
+    RUN_TEST(test_token_that_others_can_read_is_refused);
+    RUN_TEST(test_token_that_is_only_read_is_never_made);
+    return UNITY_END();
+}

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: MIT
+// What the web bridge lets in, and what it reads of a request.
+#include "driver.h"
+#include "judge.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+static const char token[] = "00112233445566778899aabbccddeeff";
+static web_rules_t rules;
+static web_asked_t asked;
+
+void setUp(void) {
+    rules = (web_rules_t){token, "walker.lan other", false, false};
+    asked = (web_asked_t){.method = "GET",
+                          .path = "/api/status",
+                          .host = "127.0.0.1:8470",
+                          .authorization = "Bearer 00112233445566778899aabbccddeeff"};
+}
+
+void tearDown(void) {}
+
+static unsigned status(void) {
+    const web_verdict_t verdict = web_judge(&rules, &asked);
+    TEST_ASSERT_EQUAL(verdict.status == 200, verdict.route != NULL);
+    TEST_ASSERT_TRUE(verdict.status == 200 || (verdict.error[0] != '\0' && verdict.message[0] != '\0'));
+    return verdict.status;
+}
+
+static void test_request_with_token_to_an_address_is_taken(void) {
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    TEST_ASSERT_EQUAL(WEB_STATUS, web_judge(&rules, &asked).route->verb);
+}
+
+static void test_host_of_another_name_is_refused(void) {
+    static const char *const ours[] = {"localhost",        "LOCALHOST:1", "walker.lan", "other:8470",
+                                       "192.168.1.7:8470", "[::1]:8470",  "[fe80::1]"};
+    static const char *const others[] = {"evil.example",
+                                         "walker.lan.evil.example",
+                                         "walker",
+                                         "localhost.evil",
+                                         "",
+                                         "127.0.0.1.evil.example",
+                                         "[::1",
+                                         "127.0.0.1:",
+                                         "127.0.0.1:0",
+                                         "127.0.0.1:99999",
+                                         "127.0.0.1:80x",
+                                         "other walker.lan",
+                                         "[]"};
+    for (size_t i = 0; i < sizeof ours / sizeof ours[0]; i++) {
+        asked.host = ours[i];
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(200, status(), ours[i]);
+    }
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        asked.host = others[i];
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(421, status(), others[i]);
+    }
+    asked.host = NULL;
+    TEST_ASSERT_EQUAL_UINT(421, status());
+}
+
+static void test_origin_of_another_site_is_refused(void) {
+    static const char *const others[] = {"http://evil.example",   "null",
+                                         "http://127.0.0.1:8471", "127.0.0.1:8470",
+                                         "file://127.0.0.1:8470", "http://127.0.0.1:8470/"};
+    asked.origin = "http://127.0.0.1:8470";
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.origin = "https://127.0.0.1:8470";
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        asked.origin = others[i];
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(403, status(), others[i]);
+    }
+}
+
+static void test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link_to_the_page_is_not(void) {
+    asked.site = "cross-site";
+    TEST_ASSERT_EQUAL_UINT(403, status());
+    asked.site = "same-site";
+    TEST_ASSERT_EQUAL_UINT(403, status());
+    asked.site = "same-origin";
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.site = "cross-site";
+    asked.path = "/";
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.origin = "http://evil.example";
+    TEST_ASSERT_EQUAL_UINT(403, status());
+}
+
+static void test_token_missing_wrong_or_longer_is_refused(void) {
+    static const char *const wrong[] = {NULL,
+                                        "",
+                                        "Bearer",
+                                        "Bearer ",
+                                        "Bearer 00112233445566778899aabbccddeef0",
+                                        "Bearer 00112233445566778899aabbccddeeff0",
+                                        "Bearer 0",
+                                        "Basic 00112233445566778899aabbccddeeff",
+                                        "00112233445566778899aabbccddeeff",
+                                        "Bearer  00112233445566778899aabbccddeeff"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        asked.authorization = wrong[i];
+        TEST_ASSERT_EQUAL_UINT(401, status());
+    }
+    asked.path = "/nowhere";
+    TEST_ASSERT_EQUAL_UINT(401, status());
+    asked.path = "/page.js";
+    TEST_ASSERT_EQUAL_UINT(200, status());
+}
+
+static void test_empty_token_of_ours_lets_nobody_in(void) {
+    rules.token = "";
+    asked.authorization = "Bearer ";
+    TEST_ASSERT_EQUAL_UINT(401, status());
+}
+
+static void test_unknown_path_and_other_method_are_refused(void) {
+    static const char *const nowhere[] = {"/api", "/api/status/", "/../etc/passwd",   "/%2e%2e/token", "//",
+                                          "",     "/index.html",  "/uPlot.LICENSE/.."};
+    for (size_t i = 0; i < sizeof nowhere / sizeof nowhere[0]; i++) {
+        asked.path = nowhere[i];
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(404, status(), nowhere[i]);
+    }
+    asked.path = "/api/stop";
+    TEST_ASSERT_EQUAL_UINT(405, status());
+    asked.method = "POST";
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.has_body = true;
+    TEST_ASSERT_EQUAL_UINT(413, status());
+}
+
+static void test_driving_and_reset_are_refused_unless_configured(void) {
+    asked.method = "POST";
+    asked.path = "/api/arm";
+    TEST_ASSERT_EQUAL_UINT(403, status());
+    asked.path = "/api/drive";
+    TEST_ASSERT_EQUAL_UINT(403, status());
+    rules.may_drive = true;
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.path = "/api/reset";
+    TEST_ASSERT_EQUAL_UINT(403, status());
+    rules.may_reset = true;
+    TEST_ASSERT_EQUAL_UINT(200, status());
+}
+
+static void test_stop_and_estop_are_always_taken(void) {
+    asked.method = "POST";
+    asked.path = "/api/stop";
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.path = "/api/estop";
+    TEST_ASSERT_EQUAL_UINT(200, status());
+}
+
+static void test_number_with_anything_beside_its_digits_is_refused(void) {
+    static const char *const wrong[] = {NULL,   "",   "-", "+1", " 1", "1 ", "1.0", "0x1", "1e2", "9223372036854775808",
+                                        "-101", "101"};
+    int64_t value = 7;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        TEST_ASSERT_FALSE(web_number(wrong[i], -100, 100, &value));
+    }
+    TEST_ASSERT_EQUAL_INT64(7, value);
+    TEST_ASSERT_TRUE(web_number("-100", -100, 100, &value));
+    TEST_ASSERT_EQUAL_INT64(-100, value);
+}
+
+static void test_name_of_a_recording_with_a_path_in_it_is_refused(void) {
+    static const char *const wrong[] = {
+        NULL,      "",
+        ".log",    "a",
+        "a.txt",   "../a.log",
+        "a/b.log", "a.log.log",
+        "a\".log", "a b.log",
+        "a\\.log", "a%2f.log",
+        "a.log/",  "0123456789012345678901234567890123456789012345678901234567890123.log"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        TEST_ASSERT_FALSE(web_recording_name(wrong[i]));
+    }
+    TEST_ASSERT_TRUE(web_recording_name("stop-000017-wheel_lost.jsonl"));
+    TEST_ASSERT_TRUE(web_recording_name("a.log"));
+    TEST_ASSERT_TRUE(web_recording_name("a.conf"));
+}
+
+// ---- the driver -----------------------------------------------------------------------------------------------------
+
+#define NOW 5000000U
+
+static web_driver_t driver;
+static const web_limits_t limits = {300, 300000};
+static web_command_t command;
+
+static const char *take(uint64_t now_us) {
+    web_twist_t twist = {-1, -1};
+    const char *why = web_driver_take(&driver, &command, &limits, now_us, &twist);
+    TEST_ASSERT_EQUAL_INT32((why == NULL) ? 200 : -1, twist.v_mm_s);
+    return why;
+}
+
+static void begin(void) {
+    driver = (web_driver_t){0};
+    command = (web_command_t){token, "4900000", "1", "200", "-100"};
+    web_driver_begin(&driver, token, NOW);
+}
+
+static void test_drive_command_of_the_page_that_armed_is_taken_once(void) {
+    begin();
+    TEST_ASSERT_NULL(take(NOW));
+    TEST_ASSERT_NOT_NULL(take(NOW)); // The same again.
+    command.sequence = "3";
+    TEST_ASSERT_NULL(take(NOW));
+    command.sequence = "2"; // Overtaken.
+    TEST_ASSERT_NOT_NULL(take(NOW));
+    TEST_ASSERT_EQUAL_UINT64(2, driver.dropped);
+}
+
+static void test_drive_command_that_is_late_or_from_the_future_is_dropped(void) {
+    begin();
+    TEST_ASSERT_NOT_NULL(take(4900000U + 300001U));
+    TEST_ASSERT_NOT_NULL(take(4899999U));
+    TEST_ASSERT_EQUAL_INT64(0, driver.sequence);
+    TEST_ASSERT_NULL(take(4900000U + 300000U));
+}
+
+static void test_drive_command_of_another_page_is_dropped(void) {
+    begin();
+    command.key = "ffeeddccbbaa99887766554433221100";
+    TEST_ASSERT_NOT_NULL(take(NOW));
+    command.key = NULL;
+    TEST_ASSERT_NOT_NULL(take(NOW));
+    web_driver_end(&driver);
+    command.key = "";
+    TEST_ASSERT_NOT_NULL(take(NOW));
+    command.key = token;
+    TEST_ASSERT_NOT_NULL(take(NOW));
+}
+
+static void test_drive_command_beyond_the_configured_speed_is_dropped(void) {
+    begin();
+    command.v_mm_s = "301";
+    TEST_ASSERT_NOT_NULL(take(NOW));
+    command.v_mm_s = "200";
+    command.yaw_mrad_s = "1001";
+    TEST_ASSERT_NOT_NULL(take(NOW));
+    command.yaw_mrad_s = NULL;
+    TEST_ASSERT_NOT_NULL(take(NOW));
+}
+
+static void test_driver_that_says_nothing_is_silent_and_nobody_is_not(void) {
+    begin();
+    TEST_ASSERT_FALSE(web_driver_silent(&driver, NOW + WEB_FIRST_US - 1U));
+    TEST_ASSERT_TRUE(web_driver_silent(&driver, NOW + WEB_FIRST_US));
+    TEST_ASSERT_NULL(take(NOW));
+    TEST_ASSERT_FALSE(web_driver_silent(&driver, NOW + WEB_SILENT_US - 1U));
+    TEST_ASSERT_TRUE(web_driver_silent(&driver, NOW + WEB_SILENT_US));
+    web_driver_end(&driver);
+    TEST_ASSERT_FALSE(web_driver_silent(&driver, UINT64_MAX));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_request_with_token_to_an_address_is_taken);
+    RUN_TEST(test_host_of_another_name_is_refused);
+    RUN_TEST(test_origin_of_another_site_is_refused);
+    RUN_TEST(test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link_to_the_page_is_not);
+    RUN_TEST(test_token_missing_wrong_or_longer_is_refused);
+    RUN_TEST(test_empty_token_of_ours_lets_nobody_in);
+    RUN_TEST(test_unknown_path_and_other_method_are_refused);
+    RUN_TEST(test_driving_and_reset_are_refused_unless_configured);
+    RUN_TEST(test_stop_and_estop_are_always_taken);
+    RUN_TEST(test_number_with_anything_beside_its_digits_is_refused);
+    RUN_TEST(test_name_of_a_recording_with_a_path_in_it_is_refused);
+    RUN_TEST(test_drive_command_of_the_page_that_armed_is_taken_once);
+    RUN_TEST(test_drive_command_that_is_late_or_from_the_future_is_dropped);
+    RUN_TEST(test_drive_command_of_another_page_is_dropped);
+    RUN_TEST(test_drive_command_beyond_the_configured_speed_is_dropped);
+    RUN_TEST(test_driver_that_says_nothing_is_silent_and_nobody_is_not);
+    return UNITY_END();
+}

@@ -1,0 +1,437 @@
+# SPDX-License-Identifier: MIT
+"""The bridge without a browser: who is let in, what hostile peers get, what reaches the gateway and the bus."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import ssl
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from bus import now_us
+from web_rig import ROOT, Driver, Skip, braking_ms, until
+
+ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/metrics", "/health")
+COMMANDS = ("/api/stop", "/api/estop", "/api/arm", "/api/drive", "/api/reset")
+
+
+def needs(**rig):
+    def mark(function):
+        function.rig = rig
+        return function
+    return mark
+
+
+def full(function):
+    function.full = True
+    return function
+
+
+def raw(rig, data, seconds=3):
+    """What comes back for these bytes, until the bridge closes or says nothing more."""
+    with socket.create_connection(("127.0.0.1", rig.port), timeout=seconds) as one:
+        answer = b""
+        try:
+            one.sendall(data)
+            one.shutdown(socket.SHUT_WR)
+            while piece := one.recv(65536):
+                answer += piece
+        except OSError:
+            pass
+        return answer
+
+
+def gateway_state(rig):
+    client = rig.client(name="looker")
+    try:
+        return client.request("status")
+    finally:
+        client.close()
+
+
+# ---- who is let in --------------------------------------------------------------------------------------------------
+
+
+def test_token_missing_or_wrong_nothing_is_told_and_nothing_stopped(rig):
+    rig.start().connected()
+    driver = Driver(rig)
+    for token in ("", "0" * 32, rig.token[:-1], rig.token + "0", rig.token.upper() + "x"):
+        for path in ROUTES:
+            status, body = rig.ask("GET", path, token=token)
+            assert status == 401 and "bad_token" in body, (token, path, status)
+        for path in COMMANDS:
+            assert rig.ask("POST", path, token=token)[0] == 401, path
+    assert gateway_state(rig)["state"] == "armed"
+    driver.end()
+    assert oct(os.stat(rig.path("token")).st_mode & 0o777) == "0o600"
+    assert rig.ask("GET", "/", token="")[0] == 200
+
+
+@needs(settings={"web": {"token_hours": 1}})
+def test_token_over_or_replaced_ends_streams_and_is_refused(rig):
+    rig.start().connected()
+    for change in (lambda: os.utime(rig.path("token"), (1, 1)), lambda: os.unlink(rig.path("token"))):
+        before = rig.token
+        with rig.stream(10) as stream:
+            assert stream.recv(100).startswith(b"HTTP/1.1 200")
+            change()
+            until(lambda: rig.ask("GET", "/health", token=before)[0] == 401, what="the old token is refused")
+            assert rig.token != before
+            text = b""
+            while not text.endswith(b"\r\n0\r\n\r\n"):
+                piece = stream.recv(65536)
+                assert piece, "the stream ends in form"
+                text = text[-20:] + piece
+        assert rig.ask("GET", "/health")[0] == 200
+
+
+def test_host_of_another_name_is_refused_everywhere(rig):
+    """DNS rebinding: a foreign name that leads to this machine."""
+    rig.start().connected()
+    for host in ("evil.example", f"evil.example:{rig.port}", "localhost.evil.example", ""):
+        for path in ("/", "/page.js", *ROUTES):
+            assert rig.ask("GET", path, headers={"Host": host})[0] in (400, 421), (host, path)
+        assert rig.ask("POST", "/api/estop", headers={"Host": host})[0] in (400, 421)
+    assert b" 400 " in raw(rig, b"GET / HTTP/1.1\r\n\r\n") or b" 421 " in raw(rig, b"GET / HTTP/1.1\r\n\r\n")
+    assert gateway_state(rig)["state"] == "listening"
+
+
+def test_post_from_another_site_changes_nothing(rig):
+    rig.start().connected()
+    driver = Driver(rig)
+    for header in ({"Origin": "http://evil.example"}, {"Origin": "null"}, {"Origin": f"http://127.0.0.1:{rig.port + 1}"}, {"Sec-Fetch-Site": "cross-site"},
+                   {"Sec-Fetch-Site": "same-site"}):
+        for path in COMMANDS:
+            assert rig.ask("POST", path, headers=header)[0] == 403, (header, path)
+    assert gateway_state(rig)["state"] == "armed"
+    assert rig.ask("POST", "/api/stop", headers={"Origin": f"http://127.0.0.1:{rig.port}", "Sec-Fetch-Site": "same-origin"})[0] == 200
+    driver.end()
+
+
+def test_answers_forbid_frames_foreign_sources_and_caches(rig):
+    rig.start()
+    for path in ("/", "/api/stops", "/nowhere"):
+        rig.ask("GET", path)
+        policy = rig.headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "unsafe" not in policy, policy
+        assert rig.headers["Cache-Control"] == "no-store" and rig.headers["X-Content-Type-Options"] == "nosniff"
+        assert "Access-Control-Allow-Origin" not in rig.headers and "Set-Cookie" not in rig.headers
+    page = rig.ask("GET", "/")[1] + rig.ask("GET", "/page.js")[1]
+    assert not re.search(r"(src|href)=\"(https?:)?//", page) and "onclick=\"" not in page
+
+
+def test_paths_lead_nowhere_but_to_the_routes(rig):
+    rig.start().connected()
+    for path in ("/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/page/../../token", "//etc/passwd", "/page.css/../token", "/..%2ftoken", "/%00", "/page.js%00.css",
+                 "/token", "/.git/config", "/index.html"):
+        assert rig.ask("GET", path)[0] in (400, 404), path
+    for name in ("../token", "..%2Ftoken.log", "/etc/passwd.log", "a%22.log", "stop%00.log", "a.log.log", "", "a" * 80 + ".log", "stop-1.log%0a.log"):
+        status, body = rig.ask("GET", f"/api/recording?name={name}")
+        assert status == 400, (name, status, body)
+    assert rig.ask("GET", "/api/recording?name=a.log&offset=-1")[0] == 400
+    assert rig.ask("GET", "/api/recording?name=stop-000001-nowhere.log")[0] == 409
+
+
+def test_request_with_a_body_is_refused_at_once(rig):
+    rig.start().connected()
+    head = f"POST /api/stop HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer {rig.token}\r\n".encode()
+    assert b" 413 " in raw(rig, head + b"Content-Length: 1000000000\r\n\r\nx")
+    assert b" 413 " in raw(rig, head + b"Transfer-Encoding: chunked\r\n\r\n5\r\nhello\r\n0\r\n\r\n")
+
+
+# ---- hostile peers ---------------------------------------------------------------------------------------------------
+
+
+IDLE = """
+import socket, sys
+held = []
+for _ in range(1000):
+    held.append(socket.socket())
+    held[-1].setblocking(False)
+    held[-1].connect_ex(("127.0.0.1", int(sys.argv[1])))
+sys.stdin.read()
+"""
+
+
+@needs(settings={"web": {"max_connections": 64}})
+def test_a_thousand_connections_slow_ones_and_bombs_cost_the_gateway_no_gap_and_the_page_seconds(rig):
+    rig.start().connected()
+    driver = Driver(rig)
+    for bomb in (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"X: " + b"a" * 200_000 + b"\r\n\r\n", b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 20_000 + b"\r\n",
+                 b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n", b"\x16\x03\x01" * 1000, b"\0" * 5000, b"GET / HTTP/9.9\r\n\r\n", b"\r\n" * 9000):
+        answer = raw(rig, bomb)
+        assert not answer or re.match(rb"HTTP/1\.[01] (4\d\d|505) ", answer), answer[:80]
+    assert rig.ask("GET", "/health")[0] == 200
+    slow = [socket.create_connection(("127.0.0.1", rig.port)) for _ in range(20)]
+    idle = subprocess.Popen([sys.executable, "-c", IDLE, str(rig.port)], stdin=subprocess.PIPE)
+    begun = time.monotonic()
+    while time.monotonic() - begun < 6.5:  # A byte now and then is no request.
+        for one in slow:
+            try:
+                one.send(b"G" if one is slow[0] else b"X")
+            except OSError:
+                pass
+        time.sleep(0.5)
+    idle.communicate()
+    until(lambda: rig.answers() and rig.ask("GET", "/health")[0] == 200, 10, "somebody else is answered")
+    closed = 0
+    for one in slow:
+        one.settimeout(0.5)
+        try:
+            while one.recv(100):  # A refusal may come first.
+                pass
+            closed += 1
+        except ConnectionError:
+            closed += 1
+        except OSError:
+            pass
+        one.close()
+    assert closed == len(slow), f"{len(slow) - closed} slow connections are still open"
+    assert rig.web.resident_kB() < 60_000, rig.web.resident_kB()
+    state = gateway_state(rig)
+    assert state["state"] == "armed", f"the wheels were stopped meanwhile: {state['cause']}"
+    driver.end()
+
+
+def test_64_watchers_are_one_client_of_the_gateway_and_all_hear_it(rig):
+    rig.start().connected()
+    before = gateway_state(rig)["clients"]
+    streams = [rig.stream() for _ in range(64)]
+    try:
+        assert gateway_state(rig)["clients"] == before
+        time.sleep(1)  # The first ones fall behind.
+        begun = now_us()
+        for stream in streams:
+            text = b""
+            while (found := re.findall(rb'"event":"state","t_us":(\d+)', text)) == [] or int(found[-1]) < begun:
+                piece = stream.recv(65536)
+                assert piece, "a stream ended"
+                text = text[-200:] + piece
+        assert rig.ask("GET", "/metrics")[1].count("iwheel_web_watchers 64\n") == 1
+        assert rig.web.resident_kB() < 80_000, rig.web.resident_kB()
+    finally:
+        for stream in streams:
+            stream.close()
+    until(lambda: "iwheel_web_watchers 0\n" in rig.ask("GET", "/metrics")[1], what="their streams are let go")
+
+
+# ---- stopping and driving ---------------------------------------------------------------------------------------------
+
+
+def test_stop_is_on_the_bus_within_a_fifth_of_a_second(rig):
+    rig.start().connected()
+    driver = Driver(rig)
+    since = now_us()
+    status, body = rig.ask_json("POST", "/api/stop")
+    assert status == 200 and body["state"] == "stopping", body
+    assert (late := braking_ms(rig, since)) < 200, f"{late} ms"
+    driver.end()
+    until(lambda: gateway_state(rig)["state"] == "listening", what="the wheels stand")
+    assert rig.ask_json("POST", "/api/estop")[1]["state"] == "latched"
+    stops = until(lambda: (found := rig.ask_json("GET", "/api/stops")[1]["stops"]) and len(found) == 2 and found, 8, "both stops are told")
+    assert [stop["cause"] for stop in stops] == ["estop_software", "client_stop"] and len(stops[1]["frames_before"]) == 40
+
+
+def test_gateway_killed_is_said_and_found_again(rig):
+    rig.start().connected()
+    rig.kill_gateway(signal.SIGKILL)
+    until(lambda: rig.ask("GET", "/health")[0] == 503, 3, "health tells it")
+    status, body = rig.ask_json("POST", "/api/stop")
+    assert status == 503 and body["message"].startswith("NOT DELIVERED"), body
+    assert "iwheel_up 0\n" in rig.ask("GET", "/metrics")[1]
+    time.sleep(1)
+    rig.start_gateway()
+    rig.connected()
+    assert rig.ask("POST", "/api/stop")[0] == 200
+    assert rig.web.text().count("is gone; waiting for it") == 1
+
+
+def test_gateway_that_hangs_stop_is_told_as_not_delivered(rig):
+    rig.start().connected()
+    rig.gateway.signal(signal.SIGSTOP)
+    status, body = rig.ask_json("POST", "/api/stop")
+    rig.gateway.signal(signal.SIGCONT)
+    assert status == 504 and body["message"].startswith("NOT DELIVERED"), body
+    rig.connected()
+
+
+def test_bridge_before_the_gateway_waits_for_it(rig):
+    rig.start_web()
+    assert rig.ask_json("GET", "/health")[1]["gateway"] == "away"
+    rig.start_gateway()
+    rig.connected()
+
+
+def test_bridge_that_watches_cannot_drive_arm_or_reset(rig):
+    rig.start().connected()
+    for path in ("/api/arm", "/api/drive?v_mm_s=100", "/api/reset"):
+        status, body = rig.ask_json("POST", path)
+        assert status == 403 and body["error"] == "denied", body
+
+
+def drive_query(rig, key, sequence, age_us=0, v=150):
+    return f"/api/drive?key={key}&sequence={sequence}&t_us={now_us() - age_us}&v_mm_s={v}&yaw_mrad_s=0"
+
+
+@needs(driving=True)
+def test_page_drives_while_it_asks_and_no_longer(rig):
+    rig.start().connected()
+    status, terms = rig.ask_json("POST", "/api/arm")
+    assert status == 200 and terms["ok"], terms
+    assert rig.ask_json("POST", "/api/arm")[1]["error"] == "busy"
+    number = 0
+    for number in range(1, 12):
+        status, body = rig.ask_json("POST", drive_query(rig, terms["key"], number))
+        assert status == 200 and body["left_mm_s"] == 150, body
+        time.sleep(0.05)
+    for query in (drive_query(rig, terms["key"], number), drive_query(rig, terms["key"], number + 1, 400_000), drive_query(rig, "0" * 32, number + 1),
+                  drive_query(rig, terms["key"], number + 1, -1_000_000), drive_query(rig, terms["key"], number + 1, v=301)):
+        status, body = rig.ask_json("POST", query)
+        assert status == 409 and body["error"] == "dropped", body
+    since = now_us()
+    until(lambda: gateway_state(rig)["state"] in ("stopping", "listening"), 3, "silence stops the wheels")
+    assert braking_ms(rig, since) < 1000
+    assert rig.ask_json("POST", drive_query(rig, terms["key"], number + 9))[1]["ok"] is False
+    until(lambda: rig.ask("GET", "/metrics")[1].count("iwheel_web_dropped_commands_total") == 1)
+    until(lambda: rig.ask_json("POST", "/api/arm")[1].get("ok"), 6, "it may arm again")
+
+
+@needs(driving=True)
+def test_bridge_killed_while_driving_stops_the_wheels(rig):
+    rig.start().connected()
+    key = rig.ask_json("POST", "/api/arm")[1]["key"]
+    for number in range(1, 10):
+        assert rig.ask("POST", drive_query(rig, key, number))[0] == 200
+        time.sleep(0.05)
+    since = now_us()
+    rig.web.signal(signal.SIGKILL)
+    assert (late := braking_ms(rig, since)) < 200, f"{late} ms"
+    rig.web.wait(2)
+    rig.start_web()
+    rig.connected()
+    assert rig.ask_json("POST", drive_query(rig, key, 99))[1]["error"] == "dropped"
+
+
+@needs(driving=True, settings={"gateway": {}})
+def test_driving_by_the_watch_socket_ends_with_the_missing_right(rig):
+    rig.start_gateway()
+    rig.web_settings["gateway"]["socket"] = rig.path("watch.sock")
+    web = rig.start_web(wait=False)
+    assert web.wait(5) == 77 and "for watching only" in web.text(), web.text()
+
+
+# ---- TLS, files, figures -----------------------------------------------------------------------------------------------
+
+
+def certificate(rig, name):
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "1", "-subj", "/CN=localhost", "-addext",
+                    "subjectAltName=DNS:localhost,IP:127.0.0.1", "-keyout", rig.path(f"{name}.key"), "-out", rig.path(f"{name}.pem")], check=True, capture_output=True)
+
+
+def test_tls_needs_the_right_certificate_and_ends_without_its_key(rig):
+    if not shutil.which("openssl"):
+        raise Skip("openssl is missing")
+    certificate(rig, "ours")
+    certificate(rig, "other")
+    rig.start_gateway()
+    rig.web_settings["web"].update(certificate=rig.path("ours.pem"), key=rig.path("other.key"))
+    web = rig.start_web(wait=False)
+    assert web.wait(5) == 78 and "no certificate that fits the key" in web.text(), web.text()
+    rig.web_settings["web"].update(key=rig.path("ours.key"))
+    rig.start_web(wait=False)
+
+    def answer(trusted):
+        context = ssl.create_default_context(cafile=rig.path(f"{trusted}.pem"))
+        with socket.create_connection(("127.0.0.1", rig.port), timeout=5) as one, context.wrap_socket(one, server_hostname="localhost") as safe:
+            safe.sendall(f"GET /health HTTP/1.0\r\nHost: localhost\r\nAuthorization: Bearer {rig.token}\r\n\r\n".encode())
+            return safe.recv(1000)
+
+    def answers():
+        try:
+            return b"may_drive" in answer("ours") or b"200" in answer("ours")
+        except ssl.SSLError:
+            raise
+        except OSError:
+            return False
+
+    until(answers, what="TLS answers")
+    try:
+        answer("other")
+        raise AssertionError("a wrong certificate was taken")
+    except ssl.SSLCertVerificationError:
+        pass
+
+
+def test_unix_socket_in_place_of_a_port(rig):
+    rig.web_settings["web"]["listen"] = f"unix:{rig.path('web.sock')}"
+    rig.start_gateway()
+    rig.start_web(wait=False)
+    until(lambda: os.path.exists(rig.path("web.sock")) and Path(rig.path("token")).exists())
+    with socket.socket(socket.AF_UNIX) as one:
+        one.connect(rig.path("web.sock"))
+        one.sendall(f"GET /health HTTP/1.0\r\nHost: localhost\r\nAuthorization: Bearer {rig.token}\r\n\r\n".encode())
+        assert re.match(rb"HTTP/1\.[01] (200|503) ", one.recv(100))
+    assert oct(os.stat(rig.path("web.sock")).st_mode & 0o777) == "0o660"
+    rig.web.signal(signal.SIGTERM)
+    assert rig.web.wait(3) == 0 and not os.path.exists(rig.path("web.sock"))
+
+
+SAMPLE = re.compile(r'([a-z_:][a-z0-9_:]*)(\{[a-z_]+="[^"]*"\})? (-?\d+(?:\.\d+)?)')
+
+
+def test_metrics_are_those_of_the_snapshot_and_well_formed(rig):
+    rig.start().connected()
+    state = rig.ask_json("GET", "/api/status")[1]
+    text = rig.ask("GET", "/metrics")[1]
+    assert rig.headers["Content-Type"].startswith("application/openmetrics-text")
+    types, seen = {}, set()
+    lines = text.splitlines()
+    assert lines[-1] == "# EOF" and lines.count("# EOF") == 1
+    for line in lines[:-1]:
+        if line.startswith("# TYPE "):
+            name, kind = line.split()[2:]
+            assert name not in types, name
+            types[name] = kind
+        elif not line.startswith("# HELP "):
+            found = SAMPLE.fullmatch(line)
+            assert found, line
+            base = next((found[1][: -len(end)] if end else found[1] for end in ("_total", "_bucket", "") if (found[1][: -len(end)] if end else found[1]) in types), None)
+            assert base and (types[base] == "counter") == found[1].endswith("_total"), line
+            assert (found[1], found[2]) not in seen, line
+            seen.add((found[1], found[2]))
+    for side in ("left", "right"):
+        assert f'iwheel_wheel_battery_volts{{side="{side}"}} {state[side]["battery_dV"] / 10:.1f}' in lines
+        assert not any(line.startswith(f'iwheel_wheel_applied_meters_per_second{{side="{side}"') for line in lines), "nothing is told in silence"
+    assert f'iwheel_state{{iwheel_state="{state["state"]}"}} 1' in lines
+
+
+def test_rules_and_dashboard_know_only_figures_that_there_are(rig):
+    rig.start().connected()
+    there = set(re.findall(r"^# TYPE (\S+)", rig.ask("GET", "/metrics")[1], re.MULTILINE))
+    for file in ("share/web/prometheus-rules.yml", "share/web/grafana-dashboard.json"):
+        used = set(re.findall(r"\biwheel_[a-z0-9_]+", (ROOT / file).read_text(encoding="utf-8")))
+        bare = {re.sub(r"_(total|bucket)$", "", name) for name in used}
+        assert used and bare <= there, f"{file}: {bare - there}"
+    json.loads((ROOT / "share/web/grafana-dashboard.json").read_text(encoding="utf-8"))
+    if not shutil.which("promtool"):
+        raise Skip("promtool is missing (apt-get install prometheus)")
+    done = subprocess.run(["promtool", "check", "rules", ROOT / "share/web/prometheus-rules.yml"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_words_of_the_page_are_those_of_iwheelctl(rig):
+    """The cures of causes, and what to do next, stand once more in strings.js: letter for letter."""
+    advice = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "app/ctl").rglob("advice.c"))
+    strings = (ROOT / "bridge/web/page/strings.js").read_text(encoding="utf-8")
+    cures = dict(re.findall(r'\{"(\w+)", "([^"]+)"\}', advice))
+    ours = dict(re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  cures: {"):], re.MULTILINE))
+    assert cures and cures == ours, set(cures.items()) ^ set(ours.items())
+    joined = re.sub(r'"\s*\n\s*"', "", advice)
+    for name, words in re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  next: {"):strings.index("  cures: {")], re.MULTILINE):
+        plain = re.split(r"\{\w+\}", words)
+        assert all(part in joined for part in plain), (name, words)

@@ -1,0 +1,395 @@
+# SPDX-License-Identifier: MIT
+"""The page in a real browser: each element against the snapshot of the same moment, STOP against the bus log, keyboard, contrast, hiding."""
+
+import contextlib
+import os
+import shutil
+import signal
+import time
+from pathlib import Path
+
+from bus import now_us
+from web_rig import Driver, Skip, braking_ms, until
+
+SIZES = {"desk": (1440, 900), "phone": (390, 844)}
+ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "iwheel/web")
+
+
+def needs(**rig):
+    def mark(function):
+        function.rig = rig
+        return function
+    return mark
+
+
+def full(function):
+    function.full = True
+    return function
+
+
+@contextlib.contextmanager
+def page_of(rig, size="desk", scheme="light", url=None):
+    """The page, open and live; anything on its console is an error."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError as error:
+        raise Skip("playwright is missing in .venv (pip install -r scripts/requirements.txt)") from error
+    chromium = shutil.which("chromium")
+    if not chromium:
+        raise Skip("chromium is missing (scripts/install_tools check brings it)")
+    said = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+        try:
+            page = browser.new_page(viewport=dict(zip(("width", "height"), SIZES[size])), color_scheme=scheme, accept_downloads=True)
+            page.set_default_timeout(15000)
+            page.on("console", lambda message: said.append(message.text) if message.type == "error" and "Failed to load resource" not in message.text else None)
+            page.on("pageerror", lambda error: said.append(str(error)))
+            page.goto(url or rig.url)
+            page.said = said
+            yield page
+            assert not said, said
+        finally:
+            browser.close()
+
+
+def seen(page, condition):
+    """The page's policy lets nobody evaluate texts, so it is asked from outside until it is so."""
+    return until(lambda: page.evaluate(condition), 15, condition)
+
+
+def live(page):
+    seen(page, "document.querySelector('#news').className === 'good'")
+    return page
+
+
+# What the page shows for the snapshot that it holds in this moment, and that snapshot.
+READ = """() => { show(); const read = {}; for (const e of document.querySelectorAll('[id]')) read[e.id] = e.textContent; return [page.state, read]; }"""
+
+
+def decimal(value, digits, unit):
+    return "unknown" if value is None else f"{value / 10 ** digits:.{digits}f} {unit}"
+
+
+def wheel_words(wheel):
+    """Written here once more, from docs/northbound.md, not from the page."""
+    words = {
+        "heard": "NOT HEARD" if not wheel["heard"] else "at rest" if wheel["at_rest"] else "turning",
+        "measured": decimal(wheel["speed_mm_s"], 0, "mm/s"), "wanted": decimal(wheel["commanded_mm_s"], 0, "mm/s"), "told": decimal(wheel["applied_mm_s"], 0, "mm/s"),
+        "current": decimal(wheel["applied_mA"], 0, "mA"), "net": decimal(wheel["force_net_mN"], 3, "N"), "offset": decimal(wheel["force_offset_mN"], 3, "N"),
+        "raw": decimal(wheel["force_raw_mN"], 3, "N"), "validity": wheel["force_validity"], "battery": decimal(wheel["battery_dV"], 1, "V"),
+        "temperature": decimal(wheel["temperature_degC"], 0, "°C"), "distance": decimal(wheel["distance_mm"], 3, "m"), "ticks": decimal(wheel["ticks"], 0, "ticks"),
+    }
+    if wheel["saturated"]["battery"] and wheel["battery_dV"] is not None:
+        words["battery"] = ">= " + words["battery"]
+    return words
+
+
+def compare(state, read):
+    assert read["state"] == state["state"] + (f" ({state['cause']})" if state["cause"] else ""), read["state"]
+    assert state["estop"]["line"] in read["estop"] and state["estop"]["state"] in read["estop"] and "SIMULATED" in read["estop"]
+    assert all(str(state["bus"][key]) in read["bus"] for key in ("name", "state", "timing", "echo"))
+    holder = state["lease"]["holder"]
+    assert ("nobody drives" in read["lease"]) == (holder is None)
+    assert holder is None or all(str(state["lease"][key]) in read["lease"] for key in ("name", "holder", "pid", "remaining_ms", "lease_ms"))
+    assert str(state["budget"]["client_lost_ms"]) in read["budget"] and f"{state['budget']['killed_mm'] / 1000:.3f} m" in read["budget"]
+    for side in ("left", "right"):
+        for name, words in wheel_words(state[side]).items():
+            assert read[f"{side}-{name}"] == words, f"{side} {name}: {read[f'{side}-{name}']!r}, in the snapshot {words!r}"
+        assert read[f"{side}-provenance"].startswith(state[side]["offset_provenance"])
+    pose = state["pose"]
+    assert all(f"{key} {'unknown' if pose[field] is None else pose[field]}" in read["pose-says"] for key, field in (("x", "x_mm"), ("y", "y_mm"), ("psi", "psi_mrad")))
+    for item, entry in state["ledger"].items():
+        assert item in read["ledger"] and entry["reason"] in read["ledger"]
+    for name, value in state["counters"].items():
+        assert f"{name}{value}" in read["counters"], name
+    for count in state["gaps"]["count"]:
+        assert str(count) in read["gaps"]
+    assert all(warning in read["warnings"] for warning in state["warnings"])
+
+
+def test_every_element_shows_the_snapshot_of_the_same_moment(rig):
+    rig.start().connected()
+    with page_of(rig) as page:
+        live(page)
+        assert "token" not in page.url, "the token stays in the address"
+        compare(*page.evaluate(READ))
+        driver = Driver(rig)
+        seen(page, "document.querySelector('#state').textContent === 'armed'")
+        for _ in range(5):
+            compare(*page.evaluate(READ))
+            time.sleep(0.1)
+        rig.sim.ask("estop press")
+        seen(page, "document.querySelector('#state').textContent.startsWith('latched')")
+        compare(*page.evaluate(READ))
+        assert "then: iwheelctl reset" in page.inner_text("#advice")
+        driver.end()
+        seen(page, "document.querySelectorAll('#stops details').length === 1 && document.querySelectorAll('#recordings tbody tr').length === 1")
+        page.click("#stops summary")
+        seen(page, "document.querySelectorAll('#stops svg .rx').length > 5 && document.querySelectorAll('#stops svg .tx').length > 1")
+        assert page.locator("#stops table tbody tr").count() >= 40
+
+
+def test_stop_button_is_on_the_bus_within_a_fifth_of_a_second(rig):
+    rig.start().connected()
+    with page_of(rig, "phone") as page:
+        live(page)
+        for press in (lambda: page.click("#stop", no_wait_after=True), lambda: page.keyboard.press("s")):
+            driver = Driver(rig)
+            page.evaluate("addEventListener('pointerdown', () => { window.pressed = performance.now(); }, {capture: true, once: true});"
+                          "addEventListener('keydown', () => { window.pressed = performance.now(); }, {capture: true, once: true})")
+            since = now_us()
+            press()
+            braking_ms(rig, since)
+            # From the press in the browser, not from our asking for it: its clock is compared with ours.
+            here, there = now_us(), page.evaluate("performance.now() - window.pressed")
+            pressed_us = here - there * 1000
+            late = next(t_us for t_us, _, speed in rig.bus.setpoints(since) if abs(speed) < 200) - pressed_us
+            assert late < 200_000, f"{late / 1000} ms"
+            seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
+            driver.end()
+            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+
+
+def test_estop_is_asked_for_once_more_and_cancelled_by_escape(rig):
+    rig.start().connected()
+    with page_of(rig) as page:
+        live(page)
+        page.click("#estop-ask")
+        page.keyboard.press("Escape")
+        time.sleep(0.3)
+        assert rig.ask_json("GET", "/api/status")[1]["state"] == "listening"
+        page.click("#estop-ask")
+        page.click("#ask-yes")
+        seen(page, "document.querySelector('#state').textContent.startsWith('latched (estop_software)')")
+        words = page.inner_text("body").lower()
+        assert "emergency" not in words and "no safety function" in words
+
+
+def test_gateway_killed_all_is_unknown_and_stop_is_loudly_not_delivered(rig):
+    rig.start().connected()
+    with page_of(rig, "phone") as page:
+        live(page)
+        rig.kill_gateway(signal.SIGKILL)
+        seen(page, "document.querySelector('#news').className === 'bad'")
+        read = page.evaluate(READ)[1]
+        assert all(read[name] == "unknown" for name in ("state", "estop", "bus", "lease", "left-measured", "right-battery")), read
+        page.click("#stop")
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('NOT DELIVERED')")
+        size = "e => parseFloat(getComputedStyle(e).fontSize)"
+        assert page.eval_on_selector("#delivered", size) >= page.eval_on_selector("#stop .word", size)
+        assert page.eval_on_selector("#delivered", "e => e.getBoundingClientRect().bottom <= innerHeight")
+        rig.start_gateway()
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
+        live(page)
+
+
+def test_bridge_killed_and_back_the_page_says_so_and_goes_on(rig):
+    rig.start().connected()
+    with page_of(rig) as page:
+        live(page)
+        rig.web.signal(signal.SIGKILL)
+        seen(page, "document.querySelector('#news').textContent.startsWith('No connection')")
+        page.click("#stop")
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('NOT DELIVERED')")
+        rig.web.wait(2)
+        rig.start_web()
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
+        live(page)
+        page.said.clear()  # The browser's own words about the lost connection.
+
+
+def test_wrong_token_asks_for_another(rig):
+    rig.start().connected()
+    with page_of(rig, url=rig.url.replace(rig.token, "0" * 32)) as page:
+        page.wait_for_selector("#login:not([hidden])")
+        page.fill("#token", rig.token)
+        page.keyboard.press("Enter")
+        live(page)
+
+
+def hold(page):
+    page.click("#arm")
+    page.click("#ask-yes")
+    page.locator("#pad").scroll_into_view_if_needed()
+    box = page.locator("#pad").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.3)
+    page.mouse.down()
+
+
+def turns(rig):
+    return until(lambda: rig.bus.setpoints() and rig.bus.setpoints()[-1][2] > 60, 5, "the wheels are told to turn")
+
+
+HIDE = "Object.defineProperty(document, 'hidden', {value: true, configurable: true}); document.dispatchEvent(new Event('visibilitychange'))"
+
+
+@needs(driving=True)
+def test_pad_drives_while_it_is_held_and_stops_when_let_go_or_hidden(rig):
+    rig.start().connected()
+    with page_of(rig) as page:
+        live(page)
+        hold(page)
+        turns(rig)
+        since = now_us()
+        page.mouse.up()
+        assert braking_ms(rig, since) < 500
+        until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+        page.mouse.down()
+        turns(rig)
+        since = now_us()
+        page.evaluate(HIDE)
+        assert braking_ms(rig, since) < 500
+        assert until(lambda: rig.ask_json("GET", "/api/stops")[1]["stops"], what="a stop")[0]["cause"] == "client_stop"
+
+
+@needs(driving=True)
+def test_pad_held_by_a_key_stops_with_the_focus(rig):
+    rig.start().connected()
+    with page_of(rig) as page:
+        live(page)
+        page.click("#arm")
+        page.click("#ask-yes")
+        page.focus("#pad")
+        page.keyboard.down("ArrowUp")
+        turns(rig)
+        since = now_us()
+        page.focus("#freeze")
+        assert braking_ms(rig, since) < 500
+
+
+def test_recording_is_opened_played_and_opened_again_from_its_files(rig):
+    rig.start().connected()
+    driver = Driver(rig)
+    until(lambda: (rig.bus.speed_rpm(0) or 0) >= 9, what="180 mm/s are measured")
+    rig.sim.ask("estop press")
+    until(lambda: (found := rig.ask_json("GET", "/api/recordings")[1].get("recordings")) and found[0]["log_bytes"], 8, "a recording")
+    time.sleep(2.5)  # It grows for two seconds.
+    driver.end()
+    with page_of(rig) as page:
+        live(page)
+        page.wait_for_selector("#recordings button")
+        files = []
+        for ending in (".log", ".jsonl", ".conf"):
+            with page.expect_download() as download:
+                page.click(f"#recordings button:text-is('{ending}')")
+            path = rig.path(download.value.suggested_filename)
+            download.value.save_as(path)
+            assert Path(path).stat().st_size > 100
+            files.append(path)
+        page.click("#recordings button:text-is('Open')")
+        page.wait_for_selector("#player:not([hidden])")
+        fastest = "Math.max(...page.recording.wheels[0].speed.data[3].filter((v) => v !== null))"
+        measured = page.evaluate(fastest)
+        assert 150 < measured < 260, measured
+        assert page.evaluate("page.recording.last > 1 && page.recording.why.cause") == "estop_line"
+        page.click("#play")
+        at = float(page.input_value("#at"))
+        seen(page, f"Number(document.querySelector('#at').value) > {at + 0.2}")
+        page.click("#live")
+        page.set_input_files("#files", files)
+        page.wait_for_selector("#player:not([hidden])")
+        assert page.evaluate(fastest) == measured
+
+
+def test_plots_follow_freeze_zoom_and_are_saved(rig):
+    rig.start().connected()
+    driver = Driver(rig)
+    with page_of(rig) as page:
+        live(page)
+        time.sleep(1.5)
+        newest = "plots.left.speed.uplot.scales.x.max"
+        seen(page, f"{newest} > 0")
+        page.click("#freeze")
+        frozen = page.evaluate(newest)
+        time.sleep(0.5)
+        assert page.evaluate(newest) == frozen
+        page.focus("#left .plot [role=img]")
+        page.keyboard.press("+")
+        seen(page, f"plots.left.speed.uplot.scales.x.max - plots.left.speed.uplot.scales.x.min < 31")
+        page.click("#live")
+        seen(page, f"{newest} > {frozen}")
+        for ending, least in (("CSV", 100), ("PNG", 1000)):
+            with page.expect_download() as download:
+                page.click(f"#left .plot:first-of-type button:text-is('{ending}') >> nth=0")
+            path = Path(rig.path("saved"))
+            download.value.save_as(path)
+            assert path.stat().st_size > least, path.stat().st_size
+            if ending == "CSV":
+                lines = path.read_text(encoding="ascii").splitlines()
+                assert lines[0] == "t_s,wanted_mm_s,told_mm_s,measured_mm_s" and len(lines) > 10, lines[:2]
+                assert all(line.count(",") == 3 and float(line.split(",")[0]) > 0 for line in lines[1:])
+                assert any(line.split(",")[3] not in ("", "0") for line in lines[1:]), "it was driven"
+    driver.end()
+
+
+def test_page_is_accessible_and_fits_in_light_and_dark_on_phone_and_desk(rig):
+    axe = ASSETS / "axe-core-4.14.1/axe.min.js"
+    if not axe.is_file():
+        raise Skip("axe-core is missing (scripts/web_assets --test brings it)")
+    rig.start().connected()
+    rig.ask("POST", "/api/estop")
+    until(lambda: rig.ask_json("GET", "/api/recordings")[1].get("recordings"), what="a recording")
+    for size, scheme in (("desk", "light"), ("phone", "dark"), ("phone", "light"), ("desk", "dark")):
+        with page_of(rig, size, scheme) as page:
+            live(page)
+            page.wait_for_selector("#recordings button")
+            page.evaluate("new Promise((done) => setTimeout(done, 300))")
+            # As a debugger it is not bound by the page's policy.
+            session = page.context.new_cdp_session(page)
+            session.send("Runtime.evaluate", {"expression": axe.read_text(encoding="utf-8")})
+            found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+            assert not found, [(one["id"], [node["target"] for node in one["nodes"]][:4]) for one in found]
+            wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+            assert wide <= 0, f"{size}: {wide} pixels too wide"
+            small = page.evaluate("[...document.querySelectorAll('#bar button')].map((e) => e.getBoundingClientRect().height)")
+            assert min(small) >= 44, small
+
+
+@full
+@needs(settings={"gateway": {"rate_hz": 50}})
+def test_page_stays_smooth_at_50_hz(rig):
+    """IWHEEL_WEB_MINUTES (5; 60 for the hour) on a phone's size: frame times and memory."""
+    minutes = float(os.environ.get("IWHEEL_WEB_MINUTES", "5"))
+    rig.start().connected()
+    driver = Driver(rig)
+    with page_of(rig, "phone") as page:
+        live(page)
+        page.evaluate("document.querySelector('#left').scrollIntoView()")
+        page.evaluate("window.frames_ms = []; let b = performance.now(); const f = (n) => { frames_ms.push(n - b); b = n; requestAnimationFrame(f); }; requestAnimationFrame(f)")
+        heap = []
+        until_s = time.monotonic() + minutes * 60
+        while time.monotonic() < until_s:
+            time.sleep(min(30, minutes * 10))
+            session = page.context.new_cdp_session(page)
+            session.send("HeapProfiler.collectGarbage")
+            heap.append(page.evaluate("performance.memory.usedJSHeapSize") / 1e6)
+        times = sorted(page.evaluate("frames_ms.splice(0)"))
+        print(f"frames: median {times[len(times) // 2]:.1f} ms, 99 % {times[len(times) * 99 // 100]:.1f} ms, longest {times[-1]:.0f} ms; heap {heap[0]:.1f} .. {heap[-1]:.1f} MB", flush=True)
+        assert times[len(times) // 2] < 34 and heap[-1] < 60
+    driver.end()
+
+
+def take_pictures(build, folder):
+    """Those of docs/web.md, with a machine that drives."""
+    from web_rig import WebRig
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for size in SIZES:
+        for scheme in ("light", "dark"):
+            rig = WebRig(build)
+            try:
+                rig.start().connected()
+                driver = Driver(rig, 300)
+                with page_of(rig, size, scheme) as page:
+                    live(page)
+                    for speed in (300, 150, 350, 250):
+                        driver.speed = speed
+                        time.sleep(2)
+                    page.evaluate("goLive(); for (const plot of allPlots()) plot.move(0.35, 0.2)")
+                    time.sleep(0.5)
+                    page.screenshot(path=folder / f"web-{size}-{scheme}.png")
+                driver.end()
+            finally:
+                rig.close()
+    return 0
