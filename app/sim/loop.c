@@ -126,9 +126,26 @@ static void somebody_connects(sim_watch_t *watch) {
     }
 }
 
+/// A socket that listens at the address, and the file it made; -1 with errno.
+static int listen_at(const struct sockaddr_un *address, int type, struct stat *out_made) {
+    const char *path = address->sun_path;
+    const int fd = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd < 0) {
+        return -1;
+    }
+    if (bind(fd, (const struct sockaddr *)address, sizeof *address) != 0 || chmod(path, 0660) != 0 ||
+        lstat(path, out_made) != 0 || listen(fd, BACKLOG) != 0) {
+        const int error = errno;
+        (void)close(fd);
+        errno = error;
+        return -1;
+    }
+    return fd;
+}
+
 bool sim_listener_open(sim_listener_t *self, const char *path, int type, sim_reason_t *out_reason) {
     struct sockaddr_un address;
-    struct stat made;
+    struct stat made = {0};
     self->watch = (sim_watch_t){somebody_connects, self, -1};
     if (!fill_address(&address, path)) {
         return refuse(out_reason, path, "the path of a unix socket has 1 to 107 characters; choose a shorter one");
@@ -136,21 +153,20 @@ bool sim_listener_open(sim_listener_t *self, const char *path, int type, sim_rea
     if (!make_room(path, type, out_reason)) {
         return false;
     }
-    int const fd = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    bool const bound = fd >= 0 && bind(fd, (struct sockaddr *)&address, sizeof address) == 0;
-    self->watch.fd = fd;
-    if (!bound || chmod(path, 0660) != 0 || lstat(path, &made) != 0 || listen(fd, BACKLOG) != 0 ||
-        !sim_loop_add(self->loop, &self->watch)) {
-        (void)refuse(out_reason, path, strerror(errno));
-        if (fd >= 0) {
-            (void)close(fd);
-        }
-        self->watch.fd = -1;
-        return false;
+    const int fd = listen_at(&address, type, &made);
+    if (fd < 0) {
+        return refuse(out_reason, path, strerror(errno));
     }
     self->device = made.st_dev;
     self->inode = made.st_ino;
     memcpy(self->path, address.sun_path, sizeof self->path);
+    self->watch.fd = fd;
+    if (!sim_loop_add(self->loop, &self->watch)) {
+        (void)refuse(out_reason, path, strerror(errno));
+        (void)close(fd);
+        self->watch.fd = -1;
+        return false;
+    }
     return true;
 }
 

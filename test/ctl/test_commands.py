@@ -80,7 +80,7 @@ class Web(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             code, out, err = run("web", path=folder)
             self.assertEqual((69, ""), (code, out))
-            self.assertIn("apt-get install iwheel-web", err)
+            self.assertIn("apt-get install ./iwheel-web_*.deb", err)
             fake = os.path.join(folder, "iwheel-web")
             with open(fake, "w", encoding="ascii") as file:
                 file.write("#!/bin/sh\necho \"told $*\"\n")

@@ -114,6 +114,7 @@ int verb_web(ctl_t *self, int count, char **words) {
     }
     // The page's own program knows its configuration, its token and how to draw it.
     (void)execlp("iwheel-web", "iwheel-web", "--url", (char *)NULL);
-    return ctl_fail(CTL_UNAVAILABLE, "iwheel-web cannot be started (%s); install it: apt-get install iwheel-web",
+    return ctl_fail(CTL_UNAVAILABLE,
+                    "iwheel-web cannot be started (%s); install it: apt-get install ./iwheel-web_*.deb",
                     strerror(errno));
 }
