@@ -40,7 +40,9 @@ void gw_recordings_ask(const gw_call_t *call) {
 /// Its question is answered. A client that has ended is looked at again: it was kept for this only.
 static void settle(gw_client_t *client) {
     client->reading = false;
-    client->readable = client->readable || client->ended;
+    if (client->ended) {
+        client->readable = true;
+    }
 }
 
 static void pass_on(gw_clients_t *clients, const gw_box_answer_t *answer) {
