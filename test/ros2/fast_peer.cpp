@@ -13,8 +13,15 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#if __has_include(<fastrtps/utils/IPLocator.h>)
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
+#define FAST_DDS 2
+#else
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
+#include <fastdds/utils/IPLocator.hpp>
+#define FAST_DDS 3
+#endif
 
 #include <chrono>
 #include <cstdio>
@@ -26,8 +33,17 @@
 #include <vector>
 
 using namespace eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastcdr::Cdr;
+// Debian 12 has version 2, Debian 13 version 3, in which much is called otherwise.
+#if FAST_DDS == 2
+namespace rtps = eprosima::fastrtps::rtps;
+static const auto CDR = Cdr::DDS_CDR;
+static const auto OK = ReturnCode_t::RETCODE_OK;
+#else
+namespace rtps = eprosima::fastdds::rtps;
+static const auto CDR = eprosima::fastcdr::CdrVersion::DDS_CDR;
+static const auto OK = RETCODE_OK;
+#endif
 
 // What all three need: numbers and texts in the order in which they stand in the message.
 struct Values {
@@ -37,47 +53,58 @@ struct Values {
 
 enum class Kind { Twist, String, Odometry };
 
+static void write_values(const Values &values, rtps::SerializedPayload_t &payload) {
+    eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char *>(payload.data), payload.max_size);
+    Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, CDR);
+    payload.encapsulation = CDR_LE;
+    cdr.serialize_encapsulation();
+    for (double number : values.numbers) {
+        cdr << number;
+    }
+    for (const std::string &text : values.texts) {
+        cdr << text;
+    }
+#if FAST_DDS == 2
+    payload.length = static_cast<uint32_t>(cdr.getSerializedDataLength());
+#else
+    payload.length = static_cast<uint32_t>(cdr.get_serialized_data_length());
+#endif
+}
+
+static void read_values(Kind kind, rtps::SerializedPayload_t &payload, Values &values) {
+    eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char *>(payload.data), payload.length);
+    Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, CDR);
+    cdr.read_encapsulation();
+    values = Values();
+    if (kind == Kind::String) {
+        values.texts.resize(1);
+        cdr >> values.texts[0];
+        return;
+    }
+    int32_t sec = 0;
+    uint32_t nanosec = 0;
+    values.texts.resize(2);
+    cdr >> sec >> nanosec >> values.texts[0] >> values.texts[1];
+    values.numbers.resize(7 + 36 + 6 + 36); // Pose, its covariance, twist, its covariance.
+    for (double &number : values.numbers) {
+        cdr >> number;
+    }
+}
+
 class Type : public TopicDataType {
   public:
+#if FAST_DDS == 2
     Type(Kind kind, const char *name) : kind_(kind) {
         setName(name);
         m_typeSize = 4096;
         m_isGetKeyDefined = false;
     }
     bool serialize(void *data, rtps::SerializedPayload_t *payload) override {
-        const Values *values = static_cast<Values *>(data);
-        eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char *>(payload->data), payload->max_size);
-        Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
-        payload->encapsulation = CDR_LE;
-        cdr.serialize_encapsulation();
-        for (double number : values->numbers) {
-            cdr << number;
-        }
-        for (const std::string &text : values->texts) {
-            cdr << text;
-        }
-        payload->length = static_cast<uint32_t>(cdr.getSerializedDataLength());
+        write_values(*static_cast<Values *>(data), *payload);
         return true;
     }
     bool deserialize(rtps::SerializedPayload_t *payload, void *data) override {
-        Values *values = static_cast<Values *>(data);
-        eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char *>(payload->data), payload->length);
-        Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
-        cdr.read_encapsulation();
-        *values = Values();
-        if (kind_ == Kind::String) {
-            values->texts.resize(1);
-            cdr >> values->texts[0];
-            return true;
-        }
-        int32_t sec = 0;
-        uint32_t nanosec = 0;
-        values->texts.resize(2);
-        cdr >> sec >> nanosec >> values->texts[0] >> values->texts[1];
-        values->numbers.resize(7 + 36 + 6 + 36); // Pose, its covariance, twist, its covariance.
-        for (double &number : values->numbers) {
-            cdr >> number;
-        }
+        read_values(kind_, *payload, *static_cast<Values *>(data));
         return true;
     }
     std::function<uint32_t()> getSerializedSizeProvider(void *data) override {
@@ -87,6 +114,26 @@ class Type : public TopicDataType {
     void *createData() override { return new Values(); }
     void deleteData(void *data) override { delete static_cast<Values *>(data); }
     bool getKey(void *, rtps::InstanceHandle_t *, bool) override { return false; }
+#else
+    Type(Kind kind, const char *name) : kind_(kind) {
+        set_name(name);
+        max_serialized_type_size = 4096;
+        is_compute_key_provided = false;
+    }
+    bool serialize(const void *const data, rtps::SerializedPayload_t &payload, DataRepresentationId_t) override {
+        write_values(*static_cast<const Values *>(data), payload);
+        return true;
+    }
+    bool deserialize(rtps::SerializedPayload_t &payload, void *data) override {
+        read_values(kind_, payload, *static_cast<Values *>(data));
+        return true;
+    }
+    uint32_t calculate_serialized_size(const void *const, DataRepresentationId_t) override { return 4096U; }
+    void *create_data() override { return new Values(); }
+    void delete_data(void *data) override { delete static_cast<Values *>(data); }
+    bool compute_key(rtps::SerializedPayload_t &, rtps::InstanceHandle_t &, bool) override { return false; }
+    bool compute_key(const void *const, rtps::InstanceHandle_t &, bool) override { return false; }
+#endif
 
   private:
     Kind kind_;
@@ -121,7 +168,7 @@ static DomainParticipant *join(uint32_t domain) {
     for (uint32_t number = 0; number < 8; number++) {
         rtps::Locator_t locator;
         locator.kind = LOCATOR_KIND_UDPv4;
-        eprosima::fastrtps::rtps::IPLocator::setIPv4(locator, "127.0.0.1");
+        rtps::IPLocator::setIPv4(locator, "127.0.0.1");
         locator.port = 7400 + 250 * domain + 10 + 2 * number;
         qos.wire_protocol().builtin.initialPeersList.push_back(locator);
     }
@@ -155,7 +202,7 @@ int main(int argc, char **argv) {
             Values arm = {{}, {"arm"}};
             ask->write(&arm);
         }
-        while (answer->take_next_sample(&values, &info) == ReturnCode_t::RETCODE_OK) {
+        while (answer->take_next_sample(&values, &info) == OK) {
             std::printf("answer %s\n", values.texts[0].c_str());
             armed = armed || values.texts[0].rfind("arm: done", 0) == 0;
         }
@@ -165,7 +212,7 @@ int main(int argc, char **argv) {
         cmd->write(&twist);
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
-    while (odom->take_next_sample(&values, &info) == ReturnCode_t::RETCODE_OK) {
+    while (odom->take_next_sample(&values, &info) == OK) {
         odometries += info.valid_data ? 1 : 0;
     }
     if (odometries > 0) {

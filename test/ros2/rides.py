@@ -520,7 +520,8 @@ def fast_dds(t):
     program = os.path.join(os.path.abspath(t.build), "fast_peer")
     source = os.path.join(here, "fast_peer.cpp")
     if not os.path.exists(program) or os.path.getmtime(program) < os.path.getmtime(source):
-        command = ["c++", "-std=c++14", "-O0", "-o", program, source, "-lfastrtps", "-lfastcdr"]
+        library = "fastrtps" if os.path.exists("/usr/include/fastrtps") else "fastdds"  # Version 2 or 3.
+        command = ["c++", "-std=c++17", "-O0", "-o", program, source, f"-l{library}", "-lfastcdr"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
         t.check(done.returncode == 0, f"it does not compile: {done.stderr[-600:]}")
     done = subprocess.run([program, str(ride.domain), "0.3"], capture_output=True, text=True, timeout=60, check=False, cwd=ride.rig.folder)
