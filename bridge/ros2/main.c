@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "bridge.h"
 
-#include <errno.h>
+#include "common/service.h"
+
 #include <getopt.h>
 #include <poll.h>
-#include <stddef.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/signalfd.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <sysexits.h>
-#include <time.h>
 #include <unistd.h>
 
 typedef enum { RUN = 0, CHECK, PRINT_CONFIG, VERSION, HELP } action_t;
@@ -47,25 +43,6 @@ static int misuse(const char *what, const char *word) {
     return EX_USAGE;
 }
 
-// ---- systemd ------------------------------------------------------------------------------------------------------
-
-static void notify(const char *words) {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    const char *path = getenv("NOTIFY_SOCKET");
-    const size_t length = (path != NULL) ? strlen(path) : 0U;
-    if (length < 2U || length >= sizeof address.sun_path) {
-        return;
-    }
-    memcpy(address.sun_path, path, length);
-    address.sun_path[0] = (path[0] == '@') ? '\0' : path[0]; // Abstract.
-    const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    if (fd >= 0) {
-        (void)sendto(fd, words, strlen(words), MSG_DONTWAIT | MSG_NOSIGNAL, (const struct sockaddr *)&address,
-                     (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length));
-        (void)close(fd);
-    }
-}
-
 // ---- running ------------------------------------------------------------------------------------------------------
 
 /// Blocked before DDS makes its threads, which inherit that. Both ends are the same: by a descriptor.
@@ -80,20 +57,16 @@ static int open_signals(void) {
 
 static void loop(bridge_t *bridge, int signals) {
     struct pollfd entries[3] = {{.fd = signals, .events = POLLIN}, {.fd = ros_fd(bridge->ros), .events = POLLIN}};
-    time_t fed = 0;
-    notify("READY=1");
+    bridge_service_t service;
+    bridge_service_open(&service);
+    bridge_service_tell(&service, "READY=1");
     while (entries[0].revents == 0) {
-        struct timespec now;
         bridge_step(bridge);
-        (void)clock_gettime(CLOCK_MONOTONIC, &now);
-        if (now.tv_sec != fed) {
-            fed = now.tv_sec;
-            notify("WATCHDOG=1");
-        }
+        bridge_service_round(&service, bridge_now_us());
         entries[2] = (struct pollfd){.fd = iwc_fd(bridge->gateway), .events = POLLIN};
         (void)poll(entries, 3, bridge_wait_ms(bridge));
     }
-    notify("STOPPING=1");
+    bridge_service_tell(&service, "STOPPING=1");
 }
 
 static int run(const ros_settings_t *settings) {
