@@ -14,22 +14,10 @@ import time
 from pathlib import Path
 
 from bus import now_us
-from web_rig import ROOT, Driver, Skip, braking_ms, until
+from web_rig import Driver, ROOT, Skip, braking_ms, full, needs, until
 
 ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/metrics", "/health")
 COMMANDS = ("/api/stop", "/api/estop", "/api/arm", "/api/drive", "/api/reset")
-
-
-def needs(**rig):
-    def mark(function):
-        function.rig = rig
-        return function
-    return mark
-
-
-def full(function):
-    function.full = True
-    return function
 
 
 def raw(rig, data, seconds=3):

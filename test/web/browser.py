@@ -9,22 +9,10 @@ import time
 from pathlib import Path
 
 from bus import now_us
-from web_rig import Driver, Skip, braking_ms, until
+from web_rig import Driver, Skip, braking_ms, full, needs, until
 
 SIZES = {"desk": (1440, 900), "phone": (390, 844)}
 ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "iwheel/web")
-
-
-def needs(**rig):
-    def mark(function):
-        function.rig = rig
-        return function
-    return mark
-
-
-def full(function):
-    function.full = True
-    return function
 
 
 @contextlib.contextmanager

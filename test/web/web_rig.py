@@ -19,6 +19,20 @@ from harness import Process, Rig  # noqa: E402
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 
 
+def needs(**rig):
+    """Marks a test with what its rig is made with."""
+    def mark(function):
+        function.rig = rig
+        return function
+    return mark
+
+
+def full(function):
+    """Marks a test that only --full runs."""
+    function.full = True
+    return function
+
+
 def free_port():
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
