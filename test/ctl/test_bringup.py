@@ -277,20 +277,8 @@ class Bringup(unittest.TestCase):
         self.assertIn("Nothing was written", operator.text)
         self.assertFalse(os.path.exists(self.out))
 
-    def test_wheel_that_could_not_turn_by_current_alone_is_found_out_by_a_zero_that_turns_it(self):
-        self.rig.sim.ask("role setpoint")
-        operator = self.begin()
-        operator.answer("types to try", "7")
-        operator.expect("Did both wheels turn")
-        self.rig.sim.ask("block both")  # Held by somebody during both tries.
-        operator.seen -= len("Did both wheels turn")
-        operator.answer("Did both wheels turn", "y")
-        operator.expect("may be a limit")
-        self.rig.sim.ask("unblock both")
-        operator.expect("It TURNED")
-        self.assertEqual("setpoint", self.offered(operator, "current_role"))
-
-    def test_wheel_that_runs_away_before_bringup_looks_is_found_out_by_the_stop(self):
+    def held_during_the_tries(self):
+        """Somebody holds both wheels from the first question of the role on; the operator goes on."""
         self.rig.sim.ask("role setpoint")
         operator = self.begin()
         operator.answer("types to try", "7")
@@ -298,6 +286,17 @@ class Bringup(unittest.TestCase):
         self.rig.sim.ask("block both")
         operator.seen -= len("Did both wheels turn")
         operator.answer("Did both wheels turn", "y")
+        return operator
+
+    def test_wheel_that_could_not_turn_by_current_alone_is_found_out_by_a_zero_that_turns_it(self):
+        operator = self.held_during_the_tries()
+        operator.expect("may be a limit")
+        self.rig.sim.ask("unblock both")
+        operator.expect("It TURNED")
+        self.assertEqual("setpoint", self.offered(operator, "current_role"))
+
+    def test_wheel_that_runs_away_before_bringup_looks_is_found_out_by_the_stop(self):
+        operator = self.held_during_the_tries()
         operator.expect("Nothing may turn")
         self.rig.sim.ask("unblock both")
         operator.expect("any key stops it")
