@@ -161,7 +161,7 @@ def style(folder, code):
 def house(folder, fault):
     """The tree with one change: file, what stands there, what stands there then. Of the programs only the one changed is compiled anew."""
     file, old, new = fault
-    for part in ("core", "northbound", "client", "port", "app", "scripts"):
+    for part in ("core", "northbound", "client", "port", "app", "bridge", "scripts"):
         if (ROOT / part).is_dir():
             shutil.copytree(ROOT / part, folder / part)
     text = (folder / file).read_text()
