@@ -192,9 +192,7 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
         daemon->box_look_us = 0;
         return false;
     case GW_TAG_BUS: // Looked at in every cycle.
-        return false;
     case GW_TAG_ESTOP:
-        iw_linux_hal_waited(&daemon->wheels.hal, true);
         return false;
     default: {
         gw_client_t *client = &daemon->clients.client[event->data.u64 - GW_TAG_CLIENT];
@@ -251,12 +249,16 @@ int gw_loop_run(gw_daemon_t *daemon) {
             return errno;
         }
         bool somebody_knocks = false;
-        iw_linux_hal_waited(&daemon->wheels.hal, count < 0); // Interrupted, it has found nothing out.
+        // Interrupted, it has found nothing out.
+        iw_linux_told_t told = {.bus = count < 0, .estop = count < 0};
         daemon->wheels.now_us = iw_clock_now_us();
         daemon->clients.now_us = daemon->wheels.now_us;
         for (int i = 0; i < count; i++) {
             somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
+            told.bus = told.bus || events[i].data.u64 == GW_TAG_BUS;
+            told.estop = told.estop || events[i].data.u64 == GW_TAG_ESTOP;
         }
+        iw_linux_hal_waited(&daemon->wheels.hal, told);
         cycle(daemon, somebody_knocks);
         if (!ready) {
             ready = true;

@@ -61,6 +61,11 @@ void iw_bus_tend(iw_backend_store_t *self, iw_time_us_t now_us) {
     (void)now_us;
 }
 
+void iw_bus_waited(iw_backend_store_t *self, bool told) {
+    (void)self;
+    (void)told;
+}
+
 iw_time_us_t iw_bus_next_us(const iw_backend_store_t *self) {
     (void)self;
     return IW_NEVER;
