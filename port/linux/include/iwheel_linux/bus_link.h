@@ -50,8 +50,8 @@ typedef struct {
 /// More frames than this in front of the controller could be old setpoints when a dead bus revives.
 #define IW_LINK_QUEUE_MAX 4U
 
-/// Room that is asked for; granted, the kernel counts it twice (`room_bytes`), and each frame as about 780 bytes: half a
-/// second of a full bus. It gives no more than net.core.rmem_max, as a rule a twentieth of this.
+/// Room that is asked for; granted, the kernel counts it twice (`room_bytes`), and each frame as about 780 bytes: half
+/// a second of a full bus. It gives no more than net.core.rmem_max, as a rule a twentieth of this.
 #define IW_LINK_ROOM_BYTES (4U * 1024U * 1024U)
 
 /// What the link's timing is beside the wheels'.
