@@ -59,8 +59,16 @@ static bool fits(uint32_t length, uint32_t least) {
     return length - least <= IW_CAN_DATA_MAX - least;
 }
 
+/// Of a length that does not fit, the frame's format bits in it.
+static iw_codec_kind_t refusal(uint32_t length) {
+    return (length > UINT8_MAX) ? IW_CODEC_BAD_FORMAT : IW_CODEC_BAD_LENGTH;
+}
+
 /// The odometry lies across both words.
-static iw_codec_kind_t read_status(const iw_can_frame_t *frame, iw_codec_status_t *out_status) {
+static iw_codec_kind_t read_status(const iw_can_frame_t *frame, uint32_t length, iw_codec_status_t *out_status) {
+    if (!fits(length, IW_DLC_STATUS)) {
+        return refusal(length);
+    }
     const uint32_t first = iw_be_word(frame, 0);
     const uint32_t second = iw_be_word(frame, 1);
     out_status->odometry_ticks = (int32_t)((first << 16) | (second >> 16));
@@ -70,14 +78,20 @@ static iw_codec_kind_t read_status(const iw_can_frame_t *frame, iw_codec_status_
     return IW_CODEC_STATUS;
 }
 
-static iw_codec_kind_t read_force(const iw_can_frame_t *frame, iw_codec_force_t *out_force) {
+static iw_codec_kind_t read_force(const iw_can_frame_t *frame, uint32_t length, iw_codec_force_t *out_force) {
+    if (!fits(length, IW_DLC_FORCE)) {
+        return refusal(length);
+    }
     const uint32_t word = iw_be_word(frame, 0);
     out_force->debug_raw = iw_be_low_i16(word);
     out_force->force_raw = iw_be_low_i16(word >> 16);
     return IW_CODEC_FORCE;
 }
 
-static iw_codec_kind_t read_pose(const iw_can_frame_t *frame, iw_codec_pose_t *out_pose) {
+static iw_codec_kind_t read_pose(const iw_can_frame_t *frame, uint32_t length, iw_codec_pose_t *out_pose) {
+    if (!fits(length, IW_DLC_POSE)) {
+        return refusal(length);
+    }
     const uint32_t first = iw_be_word(frame, 0);
     const uint32_t second = iw_be_word(frame, 1);
     out_pose->x_mm = iw_be_low_i16(first >> 16);
@@ -87,7 +101,10 @@ static iw_codec_kind_t read_pose(const iw_can_frame_t *frame, iw_codec_pose_t *o
     return IW_CODEC_POSE;
 }
 
-static iw_codec_kind_t read_setpoint(const iw_can_frame_t *frame, iw_codec_setpoint_t *out_setpoint) {
+static iw_codec_kind_t read_setpoint(const iw_can_frame_t *frame, uint32_t length, iw_codec_setpoint_t *out_setpoint) {
+    if (!fits(length, IW_DLC_SETPOINT)) {
+        return refusal(length);
+    }
     const uint32_t first = iw_be_word(frame, 0);
     out_setpoint->speed_mm_s = iw_be_low_i16(first >> 8);
     out_setpoint->current_mA = iw_be_low_i16((first << 8) | (iw_be_word(frame, 1) >> 24));
@@ -95,42 +112,36 @@ static iw_codec_kind_t read_setpoint(const iw_can_frame_t *frame, iw_codec_setpo
     return IW_CODEC_SETPOINT;
 }
 
-static iw_codec_kind_t read_offset(const iw_can_frame_t *frame, iw_codec_offset_t *out_offset) {
+static iw_codec_kind_t read_offset(const iw_can_frame_t *frame, uint32_t length, iw_codec_offset_t *out_offset) {
+    if (!fits(length, IW_DLC_OFFSET)) {
+        return refusal(length);
+    }
     out_offset->offset_dN = iw_be_low_i16(iw_be_word(frame, 0) >> 16);
     return IW_CODEC_OFFSET;
 }
 
 /// Any message but a good speed, the most frequent first. Kept apart, so that four frames of five save no registers.
 APART iw_codec_kind_t read_other(const iw_can_frame_t *frame, iw_codec_wheel_t *self) {
-    const uint32_t format = frame->id & FORMAT_BITS;
     const uint32_t number = frame->id & ~(FORMAT_BITS | SIDE_BIT);
     // With a format bit in the length no length fits: a remote or extended frame with a known number is found and
     // refused by the same comparison, without a second way through the table.
-    const uint32_t length = frame->dlc | format;
+    const uint32_t length = frame->dlc | (frame->id & FORMAT_BITS);
     if (number == IW_ID_LEFT_STATUS) {
-        if (fits(length, IW_DLC_STATUS)) {
-            return read_status(frame, &self->status);
-        }
-    } else if (number == IW_ID_LEFT_FORCE) {
-        if (fits(length, IW_DLC_FORCE)) {
-            return read_force(frame, &self->force);
-        }
-    } else if (number == IW_ID_RIGHT_POSE - SIDE_BIT && (frame->id & SIDE_BIT) != 0U) {
-        if (fits(length, IW_DLC_POSE)) {
-            return read_pose(frame, &self->pose);
-        }
-    } else if (number == IW_ID_LEFT_OFFSET) {
-        if (fits(length, IW_DLC_OFFSET)) {
-            return read_offset(frame, &self->offset);
-        }
-    } else if (number == IW_ID_LEFT_SETPOINT) {
-        if (fits(length, IW_DLC_SETPOINT)) {
-            return read_setpoint(frame, &self->setpoint);
-        }
-    } else if (number != IW_ID_LEFT_SPEED) {
-        return IW_CODEC_UNKNOWN;
+        return read_status(frame, length, &self->status);
     }
-    return (format != 0U) ? IW_CODEC_BAD_FORMAT : IW_CODEC_BAD_LENGTH;
+    if (number == IW_ID_LEFT_FORCE) {
+        return read_force(frame, length, &self->force);
+    }
+    if (number == IW_ID_RIGHT_POSE - SIDE_BIT && (frame->id & SIDE_BIT) != 0U) {
+        return read_pose(frame, length, &self->pose);
+    }
+    if (number == IW_ID_LEFT_OFFSET) {
+        return read_offset(frame, length, &self->offset);
+    }
+    if (number == IW_ID_LEFT_SETPOINT) {
+        return read_setpoint(frame, length, &self->setpoint);
+    }
+    return (number == IW_ID_LEFT_SPEED) ? refusal(length) : IW_CODEC_UNKNOWN;
 }
 
 iw_codec_kind_t iw_codec_decode(const iw_can_frame_t *frame, iw_codec_wheel_t wheel[IW_SIDES]) {
