@@ -61,7 +61,7 @@ static bool fits(uint32_t length, uint32_t least) {
 
 /// Of a length that does not fit, the frame's format bits in it.
 static iw_codec_kind_t refusal(uint32_t length) {
-    return (length > UINT8_MAX) ? IW_CODEC_BAD_FORMAT : IW_CODEC_BAD_LENGTH;
+    return ((length & FORMAT_BITS) != 0U) ? IW_CODEC_BAD_FORMAT : IW_CODEC_BAD_LENGTH;
 }
 
 /// The odometry lies across both words.
