@@ -8,6 +8,7 @@
 #include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"
+#include "iwheel_northbound/refuse.h"
 
 #include <string.h>
 
@@ -243,7 +244,7 @@ static void do_tare(const gw_call_t *call) {
     const iw_tare_t result = gw_knowledge_tare(knowledge, call->request->sides, &refused);
     if (result != IW_TARE_OK) {
         iwn_refusal_t words;
-        gw_refuse_describe_tare(refused, result, &words);
+        iwn_refuse_describe_tare(refused, result, &words);
         send_refusal(call, &words);
         return;
     }
