@@ -55,6 +55,8 @@ class Machine:
         cpu.mem_write(0x08000000, self.image)
         cpu.mem_write(ENDLESS, bytes((0xFE, 0xE7)))
         cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
+        cpu.mem_map(0x1FFF0000, 0x10000) # What the maker wrote: the chip's own number.
+        cpu.mem_write(self.board.unique_id_address, bytes(range(0x41, 0x4D)))
         self.frame, self.after_entry = Registers(cpu, *FRAME, SP, PRIMASK), Registers(cpu, SP, XPSR, LR, PC)
         self.after_exit, self.pc = Registers(cpu, SP, *FRAME), Registers(cpu, PC)
         self.stack, self.result = Registers(cpu, SP), Registers(cpu, *FRAME[:2])
@@ -159,7 +161,7 @@ class Machine:
         return high << 32 | low
 
     def next_event_ns(self):
-        times = [self.tick_ns, self.watchdog.deadline_ns, self.bus.next_event_ns(self.now_ns)]
+        times = [self.tick_ns, self.watchdog.deadline_ns, self.bus.next_event_ns(self.now_ns), self.uart.next_event_ns(), self.dma.next_event_ns()]
         times += [self.alarms[0][0]] if self.alarms else []
         return min(time for time in times if time is not None)
 
@@ -170,6 +172,8 @@ class Machine:
         if not self.clocks.settled:
             self.clocks.update(self.now_ns)
         self.bus.advance(self.now_ns)
+        self.uart.advance(self.now_ns)
+        self.dma.advance(self.now_ns)
         self.count_tick()
         if self.port_a.changed or self.port_b.changed:
             self.look_at_pins()
@@ -290,8 +294,8 @@ class Machine:
         if offset in self.syst:
             self.syst[offset] = value
             self.tick_ns = self.now_ns + self.tick_span_ns() if self.syst[0x10] & 1 else None
-        elif offset == 0x100:
-            self.enabled |= value
+        elif offset in (0x100, 0x104):
+            self.enabled |= value << 8 * (offset - 0x100)
         elif offset == 0xD0C:
             self.reset_requested = value >> 16 == 0x05FA and bool(value & 4)
         else:

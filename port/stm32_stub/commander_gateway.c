@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// The image that a host drives over the serial line: in the place of a command source, of the report and of the console, for
+// the serial port is the host's.
+#include "commander.h"
+
+#include "bit_rate.h"
+#include "boot.h"
+#include "console.h"
+#include "cortex_m.h"
+#include "host.h"
+#include "pins.h"
+#include "report.h"
+#include "serial.h"
+
+/// Of a machine whose builder did not say; only twist needs it.
+#ifndef IWHEEL_TRACK_MM
+#define IWHEEL_TRACK_MM 540U
+#endif
+
+static_assert(IW_BOARD_APB1_HZ >= 16U * IW_SERIAL_BAUD, "the USART's clock is 16 times its rate at the least: lower IWHEEL_BAUD");
+
+/// 40 % of the line's bytes, so that replies pass.
+#define RATE_MAX_HZ ((IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES > 0U) ? IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES : 1U)
+
+static iw_host_t host;
+static bool is_begun;
+
+const char *iw_commander_words(void) {
+    return "is driven over the serial line";
+}
+
+/// An image that cannot send listens without acknowledging.
+bool iw_commander_sends(void) {
+    return IWHEEL_SETPOINT_TYPE_IS_SET && IWHEEL_CURRENT_ROLE_VALUE != IW_ROLE_UNSET;
+}
+
+static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
+    static char estop[] = "PA0";
+    estop[1] = (char)('A' + IW_BOARD_ESTOP / 16U);
+    const iw_host_place_t place = {
+        .gateway = gateway,
+        .version = IWHEEL_VERSION,
+        .bus = "can",
+        .estop = estop,
+        .bitrate_hz = IW_BOARD_APB1_HZ / IW_BIT_PRESCALER / IW_BIT_QUANTA,
+        .sample_point_permille = (1U + IW_BIT_BS1) * 1000U / IW_BIT_QUANTA,
+        .track_mm = IWHEEL_TRACK_MM,
+        .rate_max_hz = RATE_MAX_HZ,
+        .boot = iw_boot_id(),
+    };
+    iw_host_init(&host, &place, now_us);
+    is_begun = true;
+}
+
+void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
+    (void)self;
+    if (!is_begun) {
+        begin(gateway, now_us);
+    }
+    if (iw_host_take(&host, now_us)) {
+        iw_wake(); // More lines wait: once round the loop, with its look at the e-stop, and then they.
+    }
+}
+
+void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
+    (void)iw_host_tell(&host, seen, estop_pressed);
+}
+
+/// The host is told by the event `link`, once there is a clock for the serial line.
+void iw_report_start(bool restarted) {
+    (void)restarted;
+}
+
+void iw_report_no_crystal(void) {
+}
+
+/// The internal oscillator is too slow for fast lines and too inexact for all of them.
+void iw_console_start(uint32_t apb1_hz) {
+    if (apb1_hz == IW_BOARD_APB1_HZ) {
+        iw_serial_start(apb1_hz);
+    }
+}
+
+bool iw_console_step(void) {
+    if (is_begun) {
+        iw_serial_step();
+    }
+    return false; // The DMA's end wakes the loop.
+}
