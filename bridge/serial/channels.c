@@ -44,9 +44,9 @@ static void turn_away(relay_t *self, gw_client_t *client, const char *why) {
     gw_client_finish(client, self->now_us);
 }
 
-/// An answer to a `drive` may be as late as a longest line each way and what the board does meanwhile.
-static uint64_t patience_us(const relay_t *self) {
-    return 30000U + (uint64_t)4096U * 10U * 1000000U / self->settings->board.baud;
+/// An answer to a `drive` comes no later, unless it is lost: a longest line may be before it.
+static uint64_t hold_us(const relay_t *self) {
+    return 30000U + (uint64_t)4608U * 10U * 1000000U / self->settings->board.baud;
 }
 
 static void welcome(void *context, gw_client_t *client) {
@@ -62,7 +62,7 @@ static void welcome(void *context, gw_client_t *client) {
                                  .tell_close = channel->tell_close,
                                  .since_us = self->now_us,
                                  .used_us = self->now_us};
-    serial_queue_init(&channel->queue, patience_us(self));
+    serial_queue_init(&channel->queue, hold_us(self));
 }
 
 /// Called once or oftener: who has gone holds no lease. Who only asks gets the answers it waits for.
@@ -332,7 +332,7 @@ uint64_t relay_channels_next_us(const relay_t *self) {
     for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
         const relay_channel_t *channel = &self->channel[i];
         const uint64_t then_us =
-            (channel->client != IW_CLIENT_NONE) ? serial_queue_next_us(&channel->queue) : UINT64_MAX;
+            (channel->client != IW_CLIENT_NONE) ? serial_queue_next_us(&channel->queue, self->now_us) : UINT64_MAX;
         next_us = (then_us < next_us) ? then_us : next_us;
     }
     return next_us;

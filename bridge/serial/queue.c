@@ -17,9 +17,9 @@ serial_kind_t serial_kind_of(iwn_cmd_t cmd) {
     }
 }
 
-void serial_queue_init(serial_queue_t *self, uint64_t patience_us) {
+void serial_queue_init(serial_queue_t *self, uint64_t hold_us) {
     memset(self, 0, sizeof *self);
-    self->patience_us = patience_us;
+    self->hold_us = hold_us;
 }
 
 bool serial_queue_is_full(const serial_queue_t *self) {
@@ -67,11 +67,11 @@ void serial_queue_put(serial_queue_t *self) {
 }
 
 /// How long its state may last.
-static uint64_t limit_us(const serial_queue_t *self, const serial_request_t *request) {
+static uint64_t limit_us(const serial_request_t *request) {
     if (request->state == SERIAL_WAITING && request->kind != SERIAL_ASKS) {
         return (request->kind == SERIAL_MOVES) ? SERIAL_FRESH_US : SERIAL_GRANT_US;
     }
-    return (request->kind == SERIAL_MOVES) ? self->patience_us : SERIAL_PATIENCE_US;
+    return (request->kind == SERIAL_MOVES) ? SERIAL_MOVE_PATIENCE_US : SERIAL_PATIENCE_US;
 }
 
 static uint64_t since_us(const serial_request_t *request) {
@@ -95,22 +95,30 @@ static void give_up(serial_request_t *request) {
 void serial_queue_age(serial_queue_t *self, uint64_t now_us) {
     for (unsigned i = 0; i < self->count; i++) {
         serial_request_t *request = at(self, i);
-        if (request->state < SERIAL_HELD && now_us >= since_us(request) + limit_us(self, request)) {
+        if (request->state < SERIAL_HELD && now_us >= since_us(request) + limit_us(request)) {
             self->unanswered += (request->state == SERIAL_SENT) ? 1U : 0U;
             give_up(request);
         }
     }
 }
 
-uint64_t serial_queue_next_us(const serial_queue_t *self) {
+/// When something happens to one of them by itself.
+static uint64_t turn_us(const serial_queue_t *self, const serial_request_t *request, uint64_t now_us) {
+    const uint64_t held_us = request->sent_us + self->hold_us;
+    if (request->state == SERIAL_SENT && request->kind == SERIAL_STOPS) {
+        return request->tried_us + SERIAL_AGAIN_US;
+    }
+    if (request->state == SERIAL_SENT && request->kind == SERIAL_MOVES && held_us > now_us) {
+        return held_us;
+    }
+    return (request->state < SERIAL_HELD) ? since_us(request) + limit_us(request) : UINT64_MAX;
+}
+
+uint64_t serial_queue_next_us(const serial_queue_t *self, uint64_t now_us) {
     uint64_t next_us = UINT64_MAX;
     for (unsigned i = 0; i < self->count; i++) {
-        const serial_request_t *request = &self->ring[(self->first + i) % SERIAL_QUEUE_SIZE];
-        uint64_t then_us = since_us(request) + limit_us(self, request);
-        if (request->state == SERIAL_SENT && request->kind == SERIAL_STOPS) {
-            then_us = request->tried_us + SERIAL_AGAIN_US;
-        }
-        next_us = (request->state < SERIAL_HELD && then_us < next_us) ? then_us : next_us;
+        const uint64_t then_us = turn_us(self, &self->ring[(self->first + i) % SERIAL_QUEUE_SIZE], now_us);
+        next_us = (then_us < next_us) ? then_us : next_us;
     }
     return next_us;
 }
@@ -124,6 +132,11 @@ static unsigned behind_stops(serial_queue_t *self) {
     return end;
 }
 
+/// A `drive` that has been on its way for so long.
+static bool holds_no_more(const serial_queue_t *self, const serial_request_t *request, uint64_t now_us) {
+    return request->kind == SERIAL_MOVES && now_us >= request->sent_us + self->hold_us;
+}
+
 serial_request_t *serial_queue_next(serial_queue_t *self, bool stops_only, uint64_t now_us) {
     const unsigned hurried = behind_stops(self);
     bool unanswered = false;
@@ -135,7 +148,7 @@ serial_request_t *serial_queue_next(serial_queue_t *self, bool stops_only, uint6
         if (again || first) {
             return request;
         }
-        unanswered = unanswered || request->state == SERIAL_SENT;
+        unanswered = unanswered || (request->state == SERIAL_SENT && !holds_no_more(self, request, now_us));
     }
     return NULL;
 }

@@ -6,7 +6,8 @@
 ///        '--replaced, overtaken by a stop, too old--> ANSWERED
 ///
 /// - One request of a client is on the wire at a time. A `drive` that waits is replaced by a newer one: there is never more than
-///   one that is unanswered and one that waits.
+///   one that is unanswered and one that waits; one whose answer takes longer than `hold_us` holds nobody back any more, for
+///   it may be lost.
 /// - A stop goes at once, behind what cannot move anything; what waits before it and could is refused.
 /// - A `drive` that waited for SERIAL_FRESH_US is refused here. What is on the wire is judged by the board, by what it quotes.
 /// - A stop that is not answered is sent again, with the same number; nothing else is.
@@ -26,8 +27,9 @@
 #define SERIAL_GRANT_US 1000000U
 /// A stop is sent again after so long.
 #define SERIAL_AGAIN_US 150000U
-/// The board has lost a question, or we its answer: `arm` may take `echo_ms`.
-#define SERIAL_PATIENCE_US 3000000U
+/// The board has lost a request, or we its answer: `arm` may take `echo_ms`.
+#define SERIAL_PATIENCE_US      3000000U
+#define SERIAL_MOVE_PATIENCE_US 1000000U ///< The same of a `drive`.
 /// Room for a request as it goes over the wire, without channel and CRC.
 #define SERIAL_JSON_MAX (IWN_LINE_BOARD_MAX - 2U - IWN_LINE_SUFFIX)
 
@@ -61,13 +63,13 @@ typedef struct {
     serial_request_t ring[SERIAL_QUEUE_SIZE];
     unsigned first;
     unsigned count;
-    unsigned unanswered;  ///< Requests in a row that the board did not answer.
-    uint64_t patience_us; ///< For the answer to a `drive`, by the speed of the wire.
+    unsigned unanswered; ///< Requests in a row that the board did not answer.
+    uint64_t hold_us;    ///< So long the answer to a `drive` may take, by the speed of the wire.
 } serial_queue_t;
 
 serial_kind_t serial_kind_of(iwn_cmd_t cmd);
 
-void serial_queue_init(serial_queue_t *self, uint64_t patience_us);
+void serial_queue_init(serial_queue_t *self, uint64_t hold_us);
 bool serial_queue_is_full(const serial_queue_t *self);
 
 /// The place of a new request, to be filled in by the caller, who then calls serial_queue_put. Not when it is full.
@@ -78,7 +80,7 @@ void serial_queue_put(serial_queue_t *self);
 /// What has waited too long is ANSWERED.
 void serial_queue_age(serial_queue_t *self, uint64_t now_us);
 /// When there is something to do by the time alone; UINT64_MAX: never.
-uint64_t serial_queue_next_us(const serial_queue_t *self);
+uint64_t serial_queue_next_us(const serial_queue_t *self, uint64_t now_us);
 
 /// What goes to the wire now, or NULL. `stops_only` leaves the others. The caller sends it and calls serial_queue_sent.
 serial_request_t *serial_queue_next(serial_queue_t *self, bool stops_only, uint64_t now_us);
