@@ -18,8 +18,7 @@ static void refuse_as(iw_host_t *self, iw_host_client_t *client, iwn_error_t err
     send_refusal(self, client);
 }
 
-#define REFUSE(self, client, error, ...)                                                                               \
-    refuse_as((self), (client), (error), (const char *const[]){__VA_ARGS__, NULL})
+#define REFUSE(self, client, error, ...) refuse_as((self), (client), (error), (const char *const[]){__VA_ARGS__, NULL})
 
 void iw_answer_refuse(iw_host_t *self, iw_host_client_t *client, iw_refusal_t refusal) {
     const iw_snapshot_t seen = iw_host_look(self);
@@ -73,7 +72,7 @@ static void do_status(iw_host_t *self, iw_host_client_t *client) {
 
 static void do_watch(iw_host_t *self, iw_host_client_t *client) {
     const bool limited = self->request.rate_hz > (int64_t)self->place.rate_max_hz;
-    client->topics = self->request.topics & (uint8_t)~(1U << IWN_TOPIC_FRAME); // The serial line cannot carry the bus.
+    client->topics = self->request.topics & (uint8_t) ~(1U << IWN_TOPIC_FRAME); // The serial line cannot carry the bus.
     client->rate_hz = limited ? self->place.rate_max_hz : (uint32_t)self->request.rate_hz;
     client->next_us = self->now_us;
     client->owed_state = false;
@@ -83,8 +82,7 @@ static void do_watch(iw_host_t *self, iw_host_client_t *client) {
 }
 
 static void do_arm(iw_host_t *self, iw_host_client_t *client) {
-    const iw_refusal_t refusal =
-        iw_gateway_arm(self->place.gateway, self->now_us, client->id, self->request.takeover);
+    const iw_refusal_t refusal = iw_gateway_arm(self->place.gateway, self->now_us, client->id, self->request.takeover);
     if (refusal != IW_REFUSE_NONE) {
         iw_answer_refuse(self, client, refusal);
         return;
@@ -113,7 +111,8 @@ static const char *stale(const iw_host_t *self, const iw_host_client_t *client, 
     const uint64_t lease_us = (uint64_t)self->place.gateway->config.lease_ms * IW_US_PER_MS;
     uint64_t boot = 0;
     if (quote == NULL) {
-        return "it quotes no start of the board: a command that moves begins with boot, seq and t_us, which iwheel-serial "
+        return "it quotes no start of the board: a command that moves begins with boot, seq and t_us, which "
+               "iwheel-serial "
                "puts there";
     }
     for (unsigned i = 0; i < IWN_LINE_BOOT; i++) {
@@ -256,26 +255,55 @@ static bool may_watch(iwn_cmd_t cmd) {
     return allowed[cmd];
 }
 
-void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
-    static void (*const handlers[IWN_CMDS])(iw_host_t *self, iw_host_client_t *client) = {
-        [IWN_CMD_HELLO] = do_hello, [IWN_CMD_STATUS] = do_status, [IWN_CMD_WATCH] = do_watch,
-        [IWN_CMD_ARM] = do_arm,     [IWN_CMD_STOP] = do_stop,     [IWN_CMD_DISARM] = do_stop,
-        [IWN_CMD_ESTOP] = do_estop, [IWN_CMD_RESET] = do_reset,   [IWN_CMD_TARE] = do_tare,
-        [IWN_CMD_WHY] = do_why,
-    };
-    const iwn_cmd_t cmd = self->request.cmd;
-    if (client->watches_only && !may_watch(cmd)) {
-        REFUSE(self, client, IWN_DENIED, "this channel is for watching, stop and estop");
-    } else if (cmd == IWN_CMD_DRIVE) {
+/// No table of functions: the worst stack is found by following the calls.
+static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
+    switch (self->request.cmd) {
+    case IWN_CMD_HELLO:
+        do_hello(self, client);
+        break;
+    case IWN_CMD_STATUS:
+        do_status(self, client);
+        break;
+    case IWN_CMD_WATCH:
+        do_watch(self, client);
+        break;
+    case IWN_CMD_ARM:
+        do_arm(self, client);
+        break;
+    case IWN_CMD_DRIVE:
         do_drive(self, client, quote);
-    } else if (cmd == IWN_CMD_TWIST) {
+        break;
+    case IWN_CMD_TWIST:
         do_twist(self, client, quote);
-    } else if (handlers[cmd] != NULL) {
-        handlers[cmd](self, client);
-    } else {
+        break;
+    case IWN_CMD_STOP:
+    case IWN_CMD_DISARM:
+        do_stop(self, client);
+        break;
+    case IWN_CMD_ESTOP:
+        do_estop(self, client);
+        break;
+    case IWN_CMD_RESET:
+        do_reset(self, client);
+        break;
+    case IWN_CMD_TARE:
+        do_tare(self, client);
+        break;
+    case IWN_CMD_WHY:
+        do_why(self, client);
+        break;
+    default:
         REFUSE(self, client, IWN_DENIED, "this gateway is a microcontroller and has no recordings");
+        break;
+    }
+}
+
+void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
+    if (client->watches_only && !may_watch(self->request.cmd)) {
+        REFUSE(self, client, IWN_DENIED, "this channel is for watching, stop and estop");
         return;
     }
+    carry_out(self, client, quote);
     const iw_snapshot_t seen = iw_host_look(self);
     iw_observe(self, &seen);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The image that a host drives over the serial line: in the place of a command source, of the report and of the console, for
-// the serial port is the host's.
+// The image that a host drives over the serial line: in the place of a command source, and of report and console, for the
+// serial port is the host's.
 #include "commander.h"
 
 #include "bit_rate.h"
@@ -17,7 +17,8 @@
 #define IWHEEL_TRACK_MM 540U
 #endif
 
-static_assert(IW_BOARD_APB1_HZ >= 16U * IW_SERIAL_BAUD, "the USART's clock is 16 times its rate at the least: lower IWHEEL_BAUD");
+static_assert(IW_BOARD_APB1_HZ >= 16U * IW_SERIAL_BAUD,
+              "the USART's clock is 16 times its rate at the least: lower IWHEEL_BAUD");
 
 /// 40 % of the line's bytes, so that replies pass.
 #define RATE_MAX_HZ ((IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES > 0U) ? IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES : 1U)
@@ -71,8 +72,7 @@ void iw_report_start(bool restarted) {
     (void)restarted;
 }
 
-void iw_report_no_crystal(void) {
-}
+void iw_report_no_crystal(void) {}
 
 /// The internal oscillator is too slow for fast lines and too inexact for all of them.
 void iw_console_start(uint32_t apb1_hz) {
