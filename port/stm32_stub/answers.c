@@ -36,7 +36,7 @@ void iw_answer_refuse(iw_host_t *self, iw_host_client_t *client, iw_refusal_t re
         .bus_cure = "check cable, termination, transceiver and that the wheels have power",
         .timing = "the bit timing of the bus is wrong; report this",
         .contradiction = "an assumption that motion depends on is contradicted; see: iwheelctl ledger",
-        .configure = "with -DIWHEEL_SETPOINT_TYPE and -DIWHEEL_CURRENT_ROLE when the image is built",
+        .configure = "by the request config (wheels.setpoint_type and wheels.current_role) and commit",
         .listen_only = "the image never sends; build it without listen only",
     };
     iwn_refuse_describe(&context, &self->request, refusal, &self->refusal);
@@ -82,6 +82,10 @@ static void do_watch(iw_host_t *self, iw_host_client_t *client) {
 }
 
 static void do_arm(iw_host_t *self, iw_host_client_t *client) {
+    if (self->restart_us != 0U) {
+        REFUSE(self, client, IWN_DENIED, "a configuration was committed: the gateway starts anew with it, then arm");
+        return;
+    }
     const iw_refusal_t refusal = iw_gateway_arm(self->place.gateway, self->now_us, client->id, self->request.takeover);
     if (refusal != IW_REFUSE_NONE) {
         iw_answer_refuse(self, client, refusal);
@@ -247,6 +251,74 @@ static void do_why(iw_host_t *self, iw_host_client_t *client) {
     iw_host_send_reply(self, client, &json);
 }
 
+static bool stage(iw_host_t *self, iwn_text_t *why) {
+    const iwn_request_t *const request = &self->request;
+    if (request->value[0] == '\0') {
+        IWN_TEXT_JOIN(why, "key needs a value; without both all keys are read");
+        return false;
+    }
+    if (!iw_settings_set(&self->staged, request->key, request->value, why)) {
+        return false;
+    }
+    self->has_staged = true;
+    return true;
+}
+
+/// Nothing is sent, and nothing has been for the whole hold: what the flash costs in time, no wheel waits for.
+static bool is_silent(const iw_host_t *self) {
+    return iw_gateway_state(self->place.gateway) == IW_STATE_LISTENING && !iw_gateway_is_sending(self->place.gateway) &&
+           !iw_gateway_arming(self->place.gateway);
+}
+
+/// True if what was asked for is done, or there was nothing to do. `*out_error` else.
+static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
+    const iwn_request_t *const request = &self->request;
+    *out_error = IWN_BAD_VALUE;
+    if (request->key[0] != '\0' || request->value[0] != '\0') {
+        return stage(self, why);
+    }
+    if (!request->has_commit) {
+        return true;
+    }
+    if (!request->commit) {
+        self->has_staged = false;
+        self->staged = self->place.kept->settings;
+        return true;
+    }
+    if (!iw_settings_check(&self->staged, why)) {
+        return false;
+    }
+    *out_error = IWN_DENIED;
+    if (!is_silent(self)) {
+        IWN_TEXT_JOIN(
+            why,
+            "the configuration is written only while the gateway is listening and silent: stop, and wait until it is");
+        return false;
+    }
+    *out_error = IWN_INTERNAL;
+    if (!iw_kept_commit(self->place.kept, &self->staged)) {
+        IWN_TEXT_JOIN(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
+                           "on, and try again");
+        return false;
+    }
+    self->has_staged = false;
+    self->restart_us = self->now_us + IW_HOST_RESTART_US;
+    return true;
+}
+
+static void do_config(iw_host_t *self, iw_host_client_t *client) {
+    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
+    if (!configure(self, &why, &self->refusal.error)) {
+        send_refusal(self, client);
+        return;
+    }
+    iwn_out_t json = iw_host_begin_reply(self, &self->request.id);
+    iw_settings_write(&self->staged, &json);
+    iwn_out_bool(&json, "staged", self->has_staged);
+    iwn_out_bool(&json, "restarts", self->restart_us != 0U);
+    iw_host_send_reply(self, client, &json);
+}
+
 static bool may_watch(iwn_cmd_t cmd) {
     static const bool allowed[IWN_CMDS] = {
         [IWN_CMD_HELLO] = true, [IWN_CMD_STATUS] = true, [IWN_CMD_WATCH] = true, [IWN_CMD_WHY] = true,
@@ -288,6 +360,9 @@ static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote
         break;
     case IWN_CMD_TARE:
         do_tare(self, client);
+        break;
+    case IWN_CMD_CONFIG:
+        do_config(self, client);
         break;
     case IWN_CMD_WHY:
         do_why(self, client);

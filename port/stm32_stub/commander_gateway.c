@@ -8,6 +8,7 @@
 #include "console.h"
 #include "cortex_m.h"
 #include "host.h"
+#include "kept.h"
 #include "pins.h"
 #include "report.h"
 #include "serial.h"
@@ -24,7 +25,10 @@ static_assert(IW_BOARD_APB1_HZ >= 16U * IW_SERIAL_BAUD,
 #define RATE_MAX_HZ ((IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES > 0U) ? IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES : 1U)
 
 static iw_host_t host;
+static iw_kept_t kept;
 static bool is_begun;
+static bool is_complete; // It is configured well enough to send.
+static uint32_t track_mm = IWHEEL_TRACK_MM;
 
 const char *iw_commander_words(void) {
     return "is driven over the serial line";
@@ -32,7 +36,21 @@ const char *iw_commander_words(void) {
 
 /// An image that cannot send listens without acknowledging.
 bool iw_commander_sends(void) {
-    return IWHEEL_SETPOINT_TYPE_IS_SET && IWHEEL_CURRENT_ROLE_VALUE != IW_ROLE_UNSET;
+    return is_complete;
+}
+
+/// The counter of the power-ons is behind the name of this start, so that it is written before that name is told. The
+/// number of starts since then is kept in RAM.
+void iw_commander_open(bool power_on) {
+    iw_kept_open(&kept, power_on);
+}
+
+void iw_commander_configure(iw_config_t *config) {
+    if (kept.has_settings) {
+        track_mm = iw_settings_to(&kept.settings, config);
+    }
+    kept.settings = iw_settings_from(config, track_mm);
+    is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
 static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
@@ -45,9 +63,10 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .estop = estop,
         .bitrate_hz = IW_BOARD_APB1_HZ / IW_BIT_PRESCALER / IW_BIT_QUANTA,
         .sample_point_permille = (1U + IW_BIT_BS1) * 1000U / IW_BIT_QUANTA,
-        .track_mm = IWHEEL_TRACK_MM,
+        .kept = &kept,
+        .track_mm = track_mm,
         .rate_max_hz = RATE_MAX_HZ,
-        .boot = iw_boot_id(),
+        .boot = iw_boot_id(kept.power_ons),
     };
     iw_host_init(&host, &place, now_us);
     is_begun = true;
@@ -65,6 +84,9 @@ void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t
 
 void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     (void)iw_host_tell(&host, seen, estop_pressed);
+    if (iw_host_wants_restart(&host)) {
+        iw_system_reset();
+    }
 }
 
 /// The host is told by the event `link`, once there is a clock for the serial line.

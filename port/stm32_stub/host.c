@@ -184,9 +184,14 @@ void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t no
     self->now_us = now_us;
     self->heard_us = now_us;
     self->linked_us = now_us;
+    self->staged = place->kept->settings;
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);
     iwn_why_sentence(&self->stop.stop, &(iwn_why_context_t){0}, self->stop.sentence, sizeof self->stop.sentence);
     iw_host_tell_link(self);
+}
+
+bool iw_host_wants_restart(const iw_host_t *self) {
+    return self->restart_us != 0U && (iw_serial_is_idle() || self->now_us >= self->restart_us);
 }
 
 bool iw_host_take(iw_host_t *self, iw_time_us_t now_us) {

@@ -16,6 +16,8 @@
 #ifndef IW_STM32_HOST_H
 #define IW_STM32_HOST_H
 
+#include "kept.h"
+
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/line.h"
 #include "iwheel_northbound/refuse.h"
@@ -35,6 +37,8 @@
 #define IW_HOST_LINK_ARMED_US 25000U
 /// At most one line_error in this time.
 #define IW_HOST_ERROR_US 200000U
+/// The answer to a commit has left by then, or nobody takes it.
+#define IW_HOST_RESTART_US 500000U
 
 /// A client of the relay's.
 typedef struct {
@@ -78,6 +82,7 @@ typedef struct {
     const char *estop;   ///< Name of the e-stop's pin.
     uint32_t bitrate_hz; ///< Of the bus.
     uint32_t sample_point_permille;
+    iw_kept_t *kept;      ///< What outlives power.
     uint32_t track_mm;    ///< Between the wheels, for twist.
     uint32_t rate_max_hz; ///< Of snapshots that the serial line carries beside replies.
     uint64_t boot;        ///< Another one at every start.
@@ -106,6 +111,9 @@ typedef struct {
     iw_time_us_t stopped_us, estopped_us; ///< When a client last asked; 0: never.
     iw_client_t stopped_by, estopped_by;
     char estop_reason[IWN_REASON_MAX + 1U];
+    iw_settings_t staged; ///< By `config`; in force after a commit and the start that follows it.
+    bool has_staged;
+    iw_time_us_t restart_us; ///< A commit was answered: begin anew then, or when the answer is on the wire; 0: not.
     union {
         iwn_work_t work;                   ///< While a request is read, ...
         char texts[4][IWN_NAME_MAX + 32U]; ///< then names for a sentence, ...
@@ -154,6 +162,9 @@ iw_host_client_t *iw_host_find(iw_host_t *self, iw_client_t id);
 
 /// `"joystick" (client 3)`, into one of `self->scratch.texts`.
 const char *iw_host_name(iw_host_t *self, iw_client_t id, unsigned text);
+
+/// True once the board is to begin anew.
+bool iw_host_wants_restart(const iw_host_t *self);
 
 /// Carries out `self->request`. `quote` is NULL if the line had none.
 void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote);

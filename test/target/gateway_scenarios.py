@@ -261,6 +261,71 @@ def reset_in_motion(rig):
     rig.expect_resets("pin", "watchdog")
 
 
+def keys_of(reply):
+    return {entry["key"]: entry["value"] for entry in reply["keys"]}
+
+
+def config_in_flash(rig):
+    """What is wrong or a daemon's is refused by name, nothing is written while anything is sent, and what is committed is in force after the start
+    that follows it, and after power-off."""
+    host = start(rig)
+    first = host.ask(1, {"cmd": "config"})
+    assert keys_of(first)["drive.lease_ms"] == "200" and keys_of(first)["wheels.setpoint_type"] == "1" and not first["staged"], first
+    for key, value, words in (("bus.interface", "can0", "a daemon's"), ("drive.lease", "200", "no key"), ("drive.lease_ms", "5000", "20 to 500"),
+                              ("wheels.gear_ratio", "1/x", "N or N/M"), ("left.invert", "maybe", "no or yes"), ("drive.lease_ms", "2e2", "20 to 500")):
+        refused = host.ask(1, {"cmd": "config", "key": key, "value": value})
+        assert refused["error"] == "bad_value" and words in refused["message"], refused
+    host.ask(1, {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 5000})
+    assert "exceeds 1000 ms" in host.ask(1, {"cmd": "config", "commit": True})["message"]
+    assert keys_of(host.ask(1, {"cmd": "config", "commit": False})) == keys_of(first)
+    host.arm()
+    host.keep_driving(SPEED, 200)
+    for key, value in (("drive.lease_ms", 300), ("wheels.gear_ratio", "31/2"), ("wheels.track_mm", 600), ("right.invert", "yes"), ("wheels.current_role", "limit")):
+        assert host.ask(1, {"cmd": "config", "key": key, "value": value})["staged"]
+    assert host.ask(1, {"cmd": "config", "commit": True})["error"] == "denied", "written while the wheels turn"
+    host.ask(1, {"cmd": "stop"})
+    rig.run(300 * MS)
+    assert host.ask(1, {"cmd": "config", "commit": True})["error"] == "denied", "written in the hold"
+    rig.run(2 * SECOND)
+    before, boot = rig.machine.flash.erasures, host.boot
+    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
+    host.begin_again()
+    assert rig.machine.flash.erasures == before and host.boot != boot
+    wanted = {**keys_of(first), "drive.lease_ms": "300", "wheels.gear_ratio": "31/2", "wheels.track_mm": "600", "right.invert": "yes"}
+    assert keys_of(host.ask(1, {"cmd": "config"})) == wanted
+    rig.machine.lose_power()
+    host.begin_again()
+    assert keys_of(host.ask(1, {"cmd": "config"})) == wanted and host.ask(1, {"cmd": "status"})["lease"]["lease_ms"] == 300
+    assert host.arm()["lease_ms"] == 300
+    rig.expect_resets("software", "power")
+
+
+def power_cut_while_writing(rig):
+    """Power fails after any number of words of a commit, and during the counting of a power-on: the configuration is the old or the new one, and
+    no two starts have one name."""
+    host, boots, value, resets = start(rig), set(), 200, 0
+    cuts = range(0, 130, 9) if rig.machine.flash.unit == 2 else range(0, 66, 5)
+    for cut in cuts:
+        assert host.boot not in boots, "two starts have one name"
+        boots.add(host.boot)
+        value += 1
+        host.ask(1, {"cmd": "config", "key": "drive.lease_ms", "value": value})
+        rig.machine.flash.cut_after = cut
+        host.say(1, {"cmd": "config", "commit": True})
+        rig.run(100 * MS)
+        if rig.machine.flash.cut_after is not None: # The commit was through before.
+            rig.machine.flash.cut_after, rig.machine.flash.next_cut = None, cut // 2 # And now the counting of the next power-on.
+            rig.machine.lose_power()
+        host.begin_again()
+        now = int(keys_of(host.ask(1, {"cmd": "config"}))["drive.lease_ms"])
+        assert value - 1 <= now <= value, f"lease_ms is {now}, neither {value - 1} nor {value}"
+        value = now
+        resets = len(rig.machine.resets)
+    rig.expect_resets(*(cause for _, cause in rig.machine.resets))
+    assert resets >= len(cuts) and set(rig.expected_resets) <= {"power", "software"}
+    rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
+
+
 def bus_off_driven(rig):
     """Bus-off under a host: latched, told, and nothing moves when the bus is back."""
     host = start_driving(rig)
@@ -376,5 +441,5 @@ def crowd(rig):
 
 
 SCENARIOS = (talks, both_words_and_turns, lease_alone, close_ends, silent_relay, relay_killed_and_anew, relay_stopped_goes_on, stale_in_every_way,
-             nobody_feeds_another, estop_random, software_estop, reset_in_motion, bus_off_driven, hostile_line, noise_on_the_wire, crowd)
+             nobody_feeds_another, estop_random, software_estop, reset_in_motion, config_in_flash, power_cut_while_writing, bus_off_driven, hostile_line, noise_on_the_wire, crowd)
 LONG = (both_words_and_turns, estop_random, hostile_line, crowd, reset_in_motion, nobody_feeds_another)

@@ -102,6 +102,15 @@ class Host:
         self.wait(lambda line: line.channel == 0 and line.message.get("event") == "link")
         return self.open(channel)
 
+    def begin_again(self, channel=1):
+        """After a start of the board: what was cut is forgotten, and nothing of before counts."""
+        self.rest = b""
+        self.uart.sent.clear()
+        self.uart.typed.clear()
+        self.stay_alive()
+        self.t_us = 0
+        return self.begin(channel)
+
     def quoted(self, channel, message, t_us=None, boot=None, seq=None):
         """The request with a quote, as the relay writes it."""
         self.listen()
