@@ -90,7 +90,8 @@ static void say_stalled(wording_t *self) {
     if (waiting_us == IW_NEVER) {
         number(self, "the zero setpoints were not acknowledged on the bus within ", self->seen->config->echo_ms, " ms");
     } else {
-        number(self, "a setpoint has been waiting for ", ms_since(self, waiting_us), " ms to be acknowledged on the bus");
+        number(self, "a setpoint has been waiting for ", ms_since(self, waiting_us),
+               " ms to be acknowledged on the bus");
     }
     SAY(self, "; check that the wheels have power and the bus is terminated");
     if (waiting_us != IW_NEVER && more != NULL) {
@@ -188,7 +189,7 @@ static void say_contradicted(wording_t *self) {
 
 void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_t *request, iw_refusal_t refusal,
                          iwn_refusal_t *out_refusal) {
-    static void (*const say[IW_REFUSALS])(wording_t *self) = {
+    static void (*const say[IW_REFUSALS])(wording_t * self) = {
         [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range, [IW_REFUSE_MISSING_FIELD] = say_missing,
         [IW_REFUSE_NOT_HOLDER] = say_holder,         [IW_REFUSE_BUSY] = say_holder,
         [IW_REFUSE_NOT_ARMED] = say_not_armed,       [IW_REFUSE_LATCHED] = say_stop,

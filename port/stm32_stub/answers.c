@@ -18,8 +18,7 @@ static void refuse_as(iw_host_t *self, iw_host_client_t *client, iwn_error_t err
     send_refusal(self, client);
 }
 
-#define REFUSE(self, client, error, ...)                                                                               \
-    refuse_as((self), (client), (error), (const char *const[]){__VA_ARGS__, NULL})
+#define REFUSE(self, client, error, ...) refuse_as((self), (client), (error), (const char *const[]){__VA_ARGS__, NULL})
 
 void iw_answer_refuse(iw_host_t *self, iw_host_client_t *client, iw_refusal_t refusal) {
     const iw_snapshot_t seen = iw_host_look(self);
@@ -37,7 +36,7 @@ void iw_answer_refuse(iw_host_t *self, iw_host_client_t *client, iw_refusal_t re
         .bus_cure = "check cable, termination, transceiver and that the wheels have power",
         .timing = "the bit timing of the bus is wrong; report this",
         .contradiction = "an assumption that motion depends on is contradicted; see: iwheelctl ledger",
-        .configure = "with -DIWHEEL_SETPOINT_TYPE and -DIWHEEL_CURRENT_ROLE when the image is built",
+        .configure = "by the request config (wheels.setpoint_type and wheels.current_role) and commit",
         .listen_only = "the image never sends; build it without listen only",
     };
     iwn_refuse_describe(&context, &self->request, refusal, &self->refusal);
@@ -73,7 +72,7 @@ static void do_status(iw_host_t *self, iw_host_client_t *client) {
 
 static void do_watch(iw_host_t *self, iw_host_client_t *client) {
     const bool limited = self->request.rate_hz > (int64_t)self->place.rate_max_hz;
-    client->topics = self->request.topics & (uint8_t)~(1U << IWN_TOPIC_FRAME); // The serial line cannot carry the bus.
+    client->topics = self->request.topics & (uint8_t) ~(1U << IWN_TOPIC_FRAME); // The serial line cannot carry the bus.
     client->rate_hz = limited ? self->place.rate_max_hz : (uint32_t)self->request.rate_hz;
     client->next_us = self->now_us;
     client->owed_state = false;
@@ -83,8 +82,11 @@ static void do_watch(iw_host_t *self, iw_host_client_t *client) {
 }
 
 static void do_arm(iw_host_t *self, iw_host_client_t *client) {
-    const iw_refusal_t refusal =
-        iw_gateway_arm(self->place.gateway, self->now_us, client->id, self->request.takeover);
+    if (self->restart_us != 0U) {
+        REFUSE(self, client, IWN_DENIED, "a configuration was committed: the gateway starts anew with it, then arm");
+        return;
+    }
+    const iw_refusal_t refusal = iw_gateway_arm(self->place.gateway, self->now_us, client->id, self->request.takeover);
     if (refusal != IW_REFUSE_NONE) {
         iw_answer_refuse(self, client, refusal);
         return;
@@ -113,7 +115,8 @@ static const char *stale(const iw_host_t *self, const iw_host_client_t *client, 
     const uint64_t lease_us = (uint64_t)self->place.gateway->config.lease_ms * IW_US_PER_MS;
     uint64_t boot = 0;
     if (quote == NULL) {
-        return "it quotes no start of the board: a command that moves begins with boot, seq and t_us, which iwheel-serial "
+        return "it quotes no start of the board: a command that moves begins with boot, seq and t_us, which "
+               "iwheel-serial "
                "puts there";
     }
     for (unsigned i = 0; i < IWN_LINE_BOOT; i++) {
@@ -248,6 +251,74 @@ static void do_why(iw_host_t *self, iw_host_client_t *client) {
     iw_host_send_reply(self, client, &json);
 }
 
+static bool stage(iw_host_t *self, iwn_text_t *why) {
+    const iwn_request_t *const request = &self->request;
+    if (request->value[0] == '\0') {
+        IWN_TEXT_JOIN(why, "key needs a value; without both all keys are read");
+        return false;
+    }
+    if (!iw_settings_set(&self->staged, request->key, request->value, why)) {
+        return false;
+    }
+    self->has_staged = true;
+    return true;
+}
+
+/// Nothing is sent, and nothing has been for the whole hold: what the flash costs in time, no wheel waits for.
+static bool is_silent(const iw_host_t *self) {
+    return iw_gateway_state(self->place.gateway) == IW_STATE_LISTENING && !iw_gateway_is_sending(self->place.gateway) &&
+           !iw_gateway_arming(self->place.gateway);
+}
+
+/// True if what was asked for is done, or there was nothing to do. `*out_error` else.
+static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
+    const iwn_request_t *const request = &self->request;
+    *out_error = IWN_BAD_VALUE;
+    if (request->key[0] != '\0' || request->value[0] != '\0') {
+        return stage(self, why);
+    }
+    if (!request->has_commit) {
+        return true;
+    }
+    if (!request->commit) {
+        self->has_staged = false;
+        self->staged = self->place.kept->settings;
+        return true;
+    }
+    if (!iw_settings_check(&self->staged, why)) {
+        return false;
+    }
+    *out_error = IWN_DENIED;
+    if (!is_silent(self)) {
+        IWN_TEXT_JOIN(
+            why,
+            "the configuration is written only while the gateway is listening and silent: stop, and wait until it is");
+        return false;
+    }
+    *out_error = IWN_INTERNAL;
+    if (!iw_kept_commit(self->place.kept, &self->staged)) {
+        IWN_TEXT_JOIN(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
+                           "on, and try again");
+        return false;
+    }
+    self->has_staged = false;
+    self->restart_us = self->now_us + IW_HOST_RESTART_US;
+    return true;
+}
+
+static void do_config(iw_host_t *self, iw_host_client_t *client) {
+    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
+    if (!configure(self, &why, &self->refusal.error)) {
+        send_refusal(self, client);
+        return;
+    }
+    iwn_out_t json = iw_host_begin_reply(self, &self->request.id);
+    iw_settings_write(&self->staged, &json);
+    iwn_out_bool(&json, "staged", self->has_staged);
+    iwn_out_bool(&json, "restarts", self->restart_us != 0U);
+    iw_host_send_reply(self, client, &json);
+}
+
 static bool may_watch(iwn_cmd_t cmd) {
     static const bool allowed[IWN_CMDS] = {
         [IWN_CMD_HELLO] = true, [IWN_CMD_STATUS] = true, [IWN_CMD_WATCH] = true, [IWN_CMD_WHY] = true,
@@ -256,26 +327,58 @@ static bool may_watch(iwn_cmd_t cmd) {
     return allowed[cmd];
 }
 
-void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
-    static void (*const handlers[IWN_CMDS])(iw_host_t *self, iw_host_client_t *client) = {
-        [IWN_CMD_HELLO] = do_hello, [IWN_CMD_STATUS] = do_status, [IWN_CMD_WATCH] = do_watch,
-        [IWN_CMD_ARM] = do_arm,     [IWN_CMD_STOP] = do_stop,     [IWN_CMD_DISARM] = do_stop,
-        [IWN_CMD_ESTOP] = do_estop, [IWN_CMD_RESET] = do_reset,   [IWN_CMD_TARE] = do_tare,
-        [IWN_CMD_WHY] = do_why,
-    };
-    const iwn_cmd_t cmd = self->request.cmd;
-    if (client->watches_only && !may_watch(cmd)) {
-        REFUSE(self, client, IWN_DENIED, "this channel is for watching, stop and estop");
-    } else if (cmd == IWN_CMD_DRIVE) {
+/// No table of functions: the worst stack is found by following the calls.
+static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
+    switch (self->request.cmd) {
+    case IWN_CMD_HELLO:
+        do_hello(self, client);
+        break;
+    case IWN_CMD_STATUS:
+        do_status(self, client);
+        break;
+    case IWN_CMD_WATCH:
+        do_watch(self, client);
+        break;
+    case IWN_CMD_ARM:
+        do_arm(self, client);
+        break;
+    case IWN_CMD_DRIVE:
         do_drive(self, client, quote);
-    } else if (cmd == IWN_CMD_TWIST) {
+        break;
+    case IWN_CMD_TWIST:
         do_twist(self, client, quote);
-    } else if (handlers[cmd] != NULL) {
-        handlers[cmd](self, client);
-    } else {
+        break;
+    case IWN_CMD_STOP:
+    case IWN_CMD_DISARM:
+        do_stop(self, client);
+        break;
+    case IWN_CMD_ESTOP:
+        do_estop(self, client);
+        break;
+    case IWN_CMD_RESET:
+        do_reset(self, client);
+        break;
+    case IWN_CMD_TARE:
+        do_tare(self, client);
+        break;
+    case IWN_CMD_CONFIG:
+        do_config(self, client);
+        break;
+    case IWN_CMD_WHY:
+        do_why(self, client);
+        break;
+    default:
         REFUSE(self, client, IWN_DENIED, "this gateway is a microcontroller and has no recordings");
+        break;
+    }
+}
+
+void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
+    if (client->watches_only && !may_watch(self->request.cmd)) {
+        REFUSE(self, client, IWN_DENIED, "this channel is for watching, stop and estop");
         return;
     }
+    carry_out(self, client, quote);
     const iw_snapshot_t seen = iw_host_look(self);
     iw_observe(self, &seen);
 }

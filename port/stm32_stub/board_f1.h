@@ -34,6 +34,7 @@
 #define IW_BOARD_BXCAN_ADDRESS     0x40006400U
 #define IW_BOARD_CAN_RESET_ADDRESS 0x40021010U ///< RCC_APB1RSTR
 #define IW_BOARD_UNIQUE_ID_ADDRESS 0x1FFFF7E8U
+#define IW_BOARD_STORE_ADDRESS     0x0800F800U ///< Pages for what is kept; memory.ld leaves them out.
 #define IW_BOARD_EXTI_ADDRESS      0x40010400U
 
 #endif

@@ -14,12 +14,13 @@ static uint64_t mix(uint64_t value) {
     return value ^ value >> 31;
 }
 
-uint64_t iw_boot_id(void) {
+uint64_t iw_boot_id(uint32_t power_ons) {
     static uint64_t id;
     if (id == 0U) {
         count = (count == ~inverse) ? count + 1U : 1U;
         inverse = ~count;
-        id = mix(mix((uint64_t)UNIQUE_ID[0] << 32 | UNIQUE_ID[1]) + ((uint64_t)UNIQUE_ID[2] << 32) + count);
+        id = mix(mix(((uint64_t)UNIQUE_ID[0] << 32 | UNIQUE_ID[1]) ^ UNIQUE_ID[2]) + ((uint64_t)power_ons << 32) +
+                 count);
     }
     return id;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The image that a host drives over the serial line: in the place of a command source, of the report and of the console, for
-// the serial port is the host's.
+// The image that a host drives over the serial line: in the place of a command source, and of report and console, for the
+// serial port is the host's.
 #include "commander.h"
 
 #include "bit_rate.h"
@@ -8,6 +8,7 @@
 #include "console.h"
 #include "cortex_m.h"
 #include "host.h"
+#include "kept.h"
 #include "pins.h"
 #include "report.h"
 #include "serial.h"
@@ -17,13 +18,17 @@
 #define IWHEEL_TRACK_MM 540U
 #endif
 
-static_assert(IW_BOARD_APB1_HZ >= 16U * IW_SERIAL_BAUD, "the USART's clock is 16 times its rate at the least: lower IWHEEL_BAUD");
+static_assert(IW_BOARD_APB1_HZ >= 16U * IW_SERIAL_BAUD,
+              "the USART's clock is 16 times its rate at the least: lower IWHEEL_BAUD");
 
 /// 40 % of the line's bytes, so that replies pass.
 #define RATE_MAX_HZ ((IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES > 0U) ? IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES : 1U)
 
 static iw_host_t host;
+static iw_kept_t kept;
 static bool is_begun;
+static bool is_complete; // It is configured well enough to send.
+static uint32_t track_mm = IWHEEL_TRACK_MM;
 
 const char *iw_commander_words(void) {
     return "is driven over the serial line";
@@ -31,7 +36,21 @@ const char *iw_commander_words(void) {
 
 /// An image that cannot send listens without acknowledging.
 bool iw_commander_sends(void) {
-    return IWHEEL_SETPOINT_TYPE_IS_SET && IWHEEL_CURRENT_ROLE_VALUE != IW_ROLE_UNSET;
+    return is_complete;
+}
+
+/// The counter of the power-ons is behind the name of this start, so that it is written before that name is told. The
+/// number of starts since then is kept in RAM.
+void iw_commander_open(bool power_on) {
+    iw_kept_open(&kept, power_on);
+}
+
+void iw_commander_configure(iw_config_t *config) {
+    if (kept.has_settings) {
+        track_mm = iw_settings_to(&kept.settings, config);
+    }
+    kept.settings = iw_settings_from(config, track_mm);
+    is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
 static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
@@ -44,9 +63,10 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .estop = estop,
         .bitrate_hz = IW_BOARD_APB1_HZ / IW_BIT_PRESCALER / IW_BIT_QUANTA,
         .sample_point_permille = (1U + IW_BIT_BS1) * 1000U / IW_BIT_QUANTA,
-        .track_mm = IWHEEL_TRACK_MM,
+        .kept = &kept,
+        .track_mm = track_mm,
         .rate_max_hz = RATE_MAX_HZ,
-        .boot = iw_boot_id(),
+        .boot = iw_boot_id(kept.power_ons),
     };
     iw_host_init(&host, &place, now_us);
     is_begun = true;
@@ -64,6 +84,9 @@ void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t
 
 void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
     (void)iw_host_tell(&host, seen, estop_pressed);
+    if (iw_host_wants_restart(&host)) {
+        iw_system_reset();
+    }
 }
 
 /// The host is told by the event `link`, once there is a clock for the serial line.
@@ -71,8 +94,7 @@ void iw_report_start(bool restarted) {
     (void)restarted;
 }
 
-void iw_report_no_crystal(void) {
-}
+void iw_report_no_crystal(void) {}
 
 /// The internal oscillator is too slow for fast lines and too inexact for all of them.
 void iw_console_start(uint32_t apb1_hz) {

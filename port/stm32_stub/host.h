@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// The host on the other end of the serial line: several clients on numbered channels (docs/serial.md), each with its own
-/// requests, replies and events of the northbound protocol, and one lease among them.
+/// The host on the other end of the serial line: several clients on numbered channels (docs/serial.md), each with
+/// its own requests, replies and events of the northbound protocol, and one lease among them.
 ///
 ///     CLOSED --open--> OPEN --close | link | relay silent--> CLOSED
 ///
@@ -16,12 +16,14 @@
 #ifndef IW_STM32_HOST_H
 #define IW_STM32_HOST_H
 
+#include "kept.h"
+
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/line.h"
 #include "iwheel_northbound/refuse.h"
 #include "iwheel_northbound/tell.h"
 
-/// The longest line to the host, with its newline: `line_bytes` of the event `link`.
+/// The longest line to the host, with its newline: told by the event link.
 #define IW_HOST_LINE_BYTES 4608U
 /// The longest line but a snapshot's.
 #define IW_HOST_SMALL_BYTES 1664U
@@ -33,21 +35,23 @@
 /// a command cannot quote a younger stamp than it has heard.
 #define IW_HOST_LINK_US       1000000U
 #define IW_HOST_LINK_ARMED_US 25000U
-/// At most one `line_error` in this time.
+/// At most one line_error in this time.
 #define IW_HOST_ERROR_US 200000U
+/// The answer to a commit has left by then, or nobody takes it.
+#define IW_HOST_RESTART_US 500000U
 
 /// A client of the relay's.
 typedef struct {
     iw_client_t id; ///< IW_CLIENT_NONE: closed.
     bool watches_only;
-    bool arming;        ///< An arm of its was granted and waits for its TX confirmation.
-    bool owed_status;   ///< It asked for a snapshot, and
-    bool owed_state;    ///< its subscription is due one; the line was taken.
-    bool has_seq;       ///< `seq` is one.
-    uint8_t topics;     ///< Bit per iwn_topic_t.
-    uint32_t rate_hz;   ///< Of state and force.
-    uint32_t lost;      ///< Lines dropped and not told yet.
-    uint64_t seq;       ///< Of its newest command.
+    bool arming;      ///< An arm of its was granted and waits for its TX confirmation.
+    bool owed_status; ///< It asked for a snapshot, and
+    bool owed_state;  ///< its subscription is due one; the line was taken.
+    bool has_seq;     ///< `seq` is one.
+    uint8_t topics;   ///< Bit per iwn_topic_t.
+    uint32_t rate_hz; ///< Of state and force.
+    uint32_t lost;    ///< Lines dropped and not told yet.
+    uint64_t seq;     ///< Of its newest command.
     iw_time_us_t opened_us;
     iw_time_us_t next_us; ///< When state and force are due.
     iwn_id_t arm_id;
@@ -74,13 +78,14 @@ typedef struct {
 typedef struct {
     iw_gateway_t *gateway;
     const char *version;
-    const char *bus;        ///< Name of the bus, for messages.
-    const char *estop;      ///< Name of the e-stop's pin.
-    uint32_t bitrate_hz;    ///< Of the bus.
+    const char *bus;     ///< Name of the bus, for messages.
+    const char *estop;   ///< Name of the e-stop's pin.
+    uint32_t bitrate_hz; ///< Of the bus.
     uint32_t sample_point_permille;
-    uint32_t track_mm;      ///< Between the wheels, for twist.
-    uint32_t rate_max_hz;   ///< Of snapshots that the serial line carries beside replies.
-    uint64_t boot;          ///< Another one at every start.
+    iw_kept_t *kept;      ///< What outlives power.
+    uint32_t track_mm;    ///< Between the wheels, for twist.
+    uint32_t rate_max_hz; ///< Of snapshots that the serial line carries beside replies.
+    uint64_t boot;        ///< Another one at every start.
 } iw_host_place_t;
 
 typedef struct {
@@ -89,16 +94,16 @@ typedef struct {
     iwn_receiver_t receiver;
     char in[IWN_LINE_BOARD_MAX];
     iw_time_us_t now_us;
-    iw_time_us_t heard_us;  ///< When the last good line came.
-    iw_time_us_t linked_us; ///< When the last `link` was written.
-    iw_time_us_t stamped_us; ///< When any line was.
-    iw_time_us_t error_us;  ///< When the last `line_error` was written.
-    uint32_t errors;        ///< Bad lines since the start.
-    uint32_t errors_told;   ///< Of them, those that a `line_error` has counted.
+    iw_time_us_t heard_us;    ///< When the last good line came.
+    iw_time_us_t linked_us;   ///< When the last `link` was written.
+    iw_time_us_t stamped_us;  ///< When any line was.
+    iw_time_us_t error_us;    ///< When the last line_error was written.
+    uint32_t errors;          ///< Bad lines since the start.
+    uint32_t errors_told;     ///< Of them, those that a line_error has counted.
     iwn_line_verdict_t fault; ///< Of the last of them.
     iw_client_t last_id;
-    uint8_t next_owed;      ///< Whose turn it is to have the long line, so that nobody keeps it.
-    bool estop_high;        ///< The level of the e-stop's pin.
+    uint8_t next_owed; ///< Whose turn it is to have the long line, so that nobody keeps it.
+    bool estop_high;   ///< The level of the e-stop's pin.
     iw_host_told_t told;
     iwn_request_t request;
     iwn_refusal_t refusal;
@@ -106,6 +111,9 @@ typedef struct {
     iw_time_us_t stopped_us, estopped_us; ///< When a client last asked; 0: never.
     iw_client_t stopped_by, estopped_by;
     char estop_reason[IWN_REASON_MAX + 1U];
+    iw_settings_t staged; ///< By `config`; in force after a commit and the start that follows it.
+    bool has_staged;
+    iw_time_us_t restart_us; ///< A commit was answered: begin anew then, or when the answer is on the wire; 0: not.
     union {
         iwn_work_t work;                   ///< While a request is read, ...
         char texts[4][IWN_NAME_MAX + 32U]; ///< then names for a sentence, ...
@@ -117,8 +125,8 @@ typedef struct {
 /// Nobody is there yet.
 void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t now_us);
 
-/// Right before a step of the gateway: ends what must end, and carries out what came, in its order. True if there may be
-/// more: come again at once.
+/// Right before a step of the gateway: ends what must end, and carries out what came, in its order. True if there may
+/// be more: come again at once.
 bool iw_host_take(iw_host_t *self, iw_time_us_t now_us);
 
 /// Right after the step: answers the arms that it decided, tells what changed, and what is due. Returns when to come
@@ -138,6 +146,13 @@ void iw_host_send_event(iw_host_t *self, iwn_topic_t topic, iwn_out_t *json);
 void iw_host_send_event_to(iw_host_t *self, iw_host_client_t *client, iwn_out_t *json);
 void iw_host_send_refusal(iw_host_t *self, iw_host_client_t *client, const iwn_id_t *id);
 
+/// How many lines it has missed, if there is room to say so.
+void iw_host_tell_lost(iw_host_t *self, iw_host_client_t *client);
+/// Who speaks here, on the link, whatever client there is.
+void iw_host_tell_link(iw_host_t *self);
+/// Bad lines since the last time, if that is not too short ago.
+void iw_host_tell_fault(iw_host_t *self);
+
 /// Writes a snapshot into the line that is lent, if it is free: as reply with `id`, or as event `state` (NULL).
 void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id);
 
@@ -147,6 +162,9 @@ iw_host_client_t *iw_host_find(iw_host_t *self, iw_client_t id);
 
 /// `"joystick" (client 3)`, into one of `self->scratch.texts`.
 const char *iw_host_name(iw_host_t *self, iw_client_t id, unsigned text);
+
+/// True once the board is to begin anew.
+bool iw_host_wants_restart(const iw_host_t *self);
 
 /// Carries out `self->request`. `quote` is NULL if the line had none.
 void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote);

@@ -76,10 +76,8 @@ static void observe_stop(iw_host_t *self, const iw_snapshot_t *seen) {
     self->stop.stop = *seen->stop;
     self->stop.wall_us = IWN_WALL_UNKNOWN;
     self->stop.client_name[0] = '\0';
-    const iwn_why_context_t context = {.client = note_client(self),
-                                       .reason = self->estop_reason,
-                                       .estop = self->place.estop,
-                                       .bus = self->place.bus};
+    const iwn_why_context_t context = {
+        .client = note_client(self), .reason = self->estop_reason, .estop = self->place.estop, .bus = self->place.bus};
     iwn_why_sentence(&self->stop.stop, &context, self->stop.sentence, sizeof self->stop.sentence);
     iwn_out_t json = begin(self, "stop");
     iwn_tell_stop(&self->stop, self->now_us, &json);

@@ -28,12 +28,12 @@ static_assert((IW_SERIAL_RECEIVE_BYTES & (IW_SERIAL_RECEIVE_BYTES - 1U)) == 0U &
 // The DMA writes and reads these, and the interrupts' handlers have no argument: so they stand at file scope.
 static char received[IW_SERIAL_RECEIVE_BYTES];
 static char waiting[IW_SERIAL_SEND_BYTES];
-static uint32_t taken;             // Where the next byte received is read.
-static uint32_t put, sent;         // Bytes of `waiting` since the start.
-static uint32_t sending;           // Of them, how many the DMA has now.
-static const char *lent;           // A buffer of somebody else's; NULL: none.
+static uint32_t taken;     // Where the next byte received is read.
+static uint32_t put, sent; // Bytes of `waiting` since the start.
+static uint32_t sending;   // Of them, how many the DMA has now.
+static const char *lent;   // A buffer of somebody else's; NULL: none.
 static uint32_t lent_bytes;
-static uint32_t lent_at;           // It goes before this byte of `waiting`.
+static uint32_t lent_at; // It goes before this byte of `waiting`.
 static bool lent_is_sending;
 static atomic_bool had_error;
 

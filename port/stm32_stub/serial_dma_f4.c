@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0090: 7.3.10 clock enable, 10.5 DMA; table 42: USART2 is channel 4 of DMA1's streams 5 (receive) and 6
-// (transmit). RM0390 (F446): the same.
+// Sections are those of RM0090: 7.3.10 clock enable, 10.5 DMA; table 42: USART2 is channel 4 of DMA1's streams 5 (receive)
+// and 6 (transmit).
 #include "serial.h"
 
 typedef struct {
@@ -32,8 +32,8 @@ void iw_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_
     AHB1ENR |= 1U << 21;
     RECEIVE->CR = 0;
     TRANSMIT->CR = 0;
-    // 10.3.17: off at once unless a byte is on its way, and then after it: the second reading finds it off. An F4 starts
-    // here after a reset, when both are off, so that nothing is waited for.
+    // 10.3.17: off at once unless a byte is on its way, and then after it: here both are off since the
+    // reset, so that nothing is waited for.
     DMA1->HIFCR = ALL_FLAGS;
     RECEIVE->PAR = (uint32_t)(uintptr_t)data_register;
     RECEIVE->M0AR = (uint32_t)(uintptr_t)buffer;
@@ -45,7 +45,7 @@ uint32_t iw_serial_dma_left(void) {
     return RECEIVE->NDTR;
 }
 
-/// 10.3.17: the flags of the last time must be cleared before a stream is enabled again. It has disabled itself at its end.
+/// 10.3.17: the flags of the last time must be cleared before a stream is enabled again. It has disabled itself.
 void iw_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
     DMA1->HIFCR = 0x3DU << 16;
     TRANSMIT->PAR = (uint32_t)(uintptr_t)data_register;

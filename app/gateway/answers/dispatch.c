@@ -257,6 +257,13 @@ static void do_confirm(const gw_call_t *call) {
     gw_clients_send_reply(call->client, &json);
 }
 
+/// A file that an administrator writes is not to be changed by whoever may drive.
+static void do_config(const gw_call_t *call) {
+    const iwn_refusal_t refusal = {IWN_DENIED, "this gateway's configuration is a file: change it, look at it with "
+                                               "iwheel-gateway --check -c FILE, and start the gateway again"};
+    send_refusal(call, &refusal);
+}
+
 static void do_why(const gw_call_t *call) {
     const iwn_stop_note_t *note = &call->answers->status->last_stop;
     iwn_out_t json = begin_reply(call);
@@ -289,6 +296,7 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
         [IWN_CMD_CONFIRM] = do_confirm,
         [IWN_CMD_RECORDINGS] = gw_recordings_ask,
         [IWN_CMD_RECORDING] = gw_recordings_ask,
+        [IWN_CMD_CONFIG] = do_config,
     };
     gw_answers_t *self = (gw_answers_t *)context;
     iwn_request_t request;

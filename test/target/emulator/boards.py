@@ -26,7 +26,8 @@ class Board:
         machine.clocks = self.clocks(machine)
         machine.clocks.crystal_hz = self.crystal_hz or machine.clocks.crystal_hz
         machine.exti, machine.watchdog, machine.uart = chip.Exti(), chip.Watchdog(self.lsi_hz), chip.Uart(machine)
-        machine.dma = self.dma(machine)
+        machine.dma, machine.flash = self.dma(machine), self.flash(machine)
+        machine.map_flash(machine.flash)
         for name in self.ports:
             setattr(machine, name, self.port())
         machine.can = Controller(machine)
@@ -39,7 +40,7 @@ class Board:
 
     def reset(self, machine):
         machine.bus.chip_vanishes()
-        for part in (machine.clocks, machine.exti, machine.watchdog, machine.uart, machine.dma, machine.can, *(getattr(machine, name) for name in self.ports)):
+        for part in (machine.clocks, machine.exti, machine.watchdog, machine.uart, machine.dma, machine.flash, machine.can, *(getattr(machine, name) for name in self.ports)):
             part.reset()
         self.remap = 0
         machine.can_listens = False
@@ -95,7 +96,7 @@ class Board:
             return port.read, lambda offset, value: self.write_port(port, offset, value)
         return {
             "rcc": (lambda offset: clocks.read(offset, machine.now_ns), self.write_clocks),
-            "flash": (lambda offset: clocks.acr, lambda offset, value: setattr(clocks, "acr", value)),
+            "flash": (machine.flash.read, machine.flash.write),
             "exti": (lambda offset: machine.exti.registers[offset], machine.exti.write),
             "selection": (lambda offset: machine.exti.selection if offset == 0x8 else self.remap, self.write_selection),
             "watchdog": (lambda offset: watchdog.read(offset, machine.now_ns),
@@ -148,7 +149,7 @@ class Board:
 
 class Stm32f103(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32f103", arm.UC_CPU_ARM_CORTEX_M3, 14, 40_000, (30_000, 60_000)
-    dma, unique_id_address = chip.DmaF1, 0x1FFFF7E8
+    dma, flash, unique_id_address = chip.DmaF1, chip.FlashF1, 0x1FFFF7E8
     clocks, port, lamp, remap_offset = chip.ClocksF1, chip.PortF1, ("port_c", 13, 0), 0x4
     ram_size = 20 * 1024
     blocks = {
@@ -166,7 +167,7 @@ class Stm32f103(Board):
 
 class Stm32f407(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32f407", arm.UC_CPU_ARM_CORTEX_M4, 28, 32_000, (17_000, 47_000)
-    dma, unique_id_address = chip.DmaF4, 0x1FFF7A10
+    dma, flash, unique_id_address = chip.DmaF4, chip.FlashF4, 0x1FFF7A10
     clocks, port, lamp = chip.ClocksF4, chip.PortF4, ("port_d", 12, 1)
     ram_size = 128 * 1024
     blocks = {

@@ -514,6 +514,99 @@ class DmaF4(Dma):
     kind, bases, clear_offset, bits = StreamF4, (0x88, 0xA0), 0xC, ((10, 11), (20, 21))
 
 
+class Flash:
+    """Pages that the image may erase and program, by the registers of the flash interface. What takes time stops the CPU.
+
+    `cut_after`: power fails during the operation of that number from now on, which gets half of its bits through; `next_cut` is the
+    same for the time after the next power-on."""
+
+    def __init__(self, chip):
+        self.chip, self.memory = chip, bytearray(b"\xFF" * self.size)
+        self.operations, self.erasures, self.cut_after, self.next_cut = 0, 0, None, None
+        self.reset()
+
+    def reset(self):
+        self.sr, self.cr, self.ar, self.keys = 0, self.lock, 0, []
+
+    def fetch(self, address, size):
+        at = address - self.base
+        return int.from_bytes(self.memory[at:at + size], "little")
+
+    def spend_ns(self, span_ns):
+        self.chip.spend(span_ns * self.chip.clocks.core_hz // 10**9)
+
+    def is_cut(self):
+        if self.cut_after is None:
+            return False
+        self.cut_after -= 1
+        if self.cut_after < 0:
+            self.chip.lose_power()
+        return self.cut_after < 0
+
+    def program(self, address, size, value):
+        chip, at = self.chip, address - self.base
+        if chip.power_lost:
+            return
+        chip.expect(self.cr & (self.lock | 1) == 1, "the flash was written without PG")
+        chip.expect(size == self.unit, f"the flash was written with {size} bytes at a time")
+        old = self.fetch(address, size)
+        chip.expect(old == (1 << 8 * size) - 1, f"0x{address:08X} of the flash was programmed twice")
+        self.operations += 1
+        cut = self.is_cut()
+        self.memory[at:at + size] = (old & (value | (0x5A5A5A5A if cut else 0)) & (1 << 8 * size) - 1).to_bytes(size, "little")
+        self.spend_ns(self.program_ns)
+
+    def erase(self, address, size):
+        if self.chip.power_lost:
+            return
+        at = address - self.base
+        self.chip.expect(0 <= at < self.size, f"0x{address:08X} of the flash was erased, which is not for what is kept")
+        self.operations, self.erasures = self.operations + 1, self.erasures + 1
+        cut = self.is_cut()
+        self.memory[at:at + size] = bytes(old | 0xA5 for old in self.memory[at:at + size]) if cut else b"\xFF" * size
+        self.spend_ns(self.erase_ns)
+
+    def read(self, offset):
+        return {0: self.chip.clocks.acr, 0xC: self.sr, 0x10: self.cr, 0x14: self.ar}.get(offset, 0)
+
+    def write(self, offset, value):
+        if offset == 0:
+            self.chip.clocks.acr = value & ~0x1800
+        elif offset == 4:
+            self.keys = (self.keys + [value])[-2:]
+            self.cr &= ~self.lock if self.keys == [0x45670123, 0xCDEF89AB] else ~0
+        elif offset == 0xC:
+            self.sr &= ~value
+        elif offset == 0x10 and not self.cr & self.lock:
+            self.cr = value
+            self.keys = []
+            self.look()
+        elif offset == 0x14:
+            self.ar = value
+
+
+class FlashF1(Flash):
+    """The last two KiB of 64. Slow at the most that the data sheet allows."""
+
+    base, size, lock, unit, program_ns, erase_ns = 0x0800F800, 0x800, 1 << 7, 2, 70 * US, 40 * MS
+
+    def look(self):
+        if self.cr & 0x42 == 0x42:
+            self.erase(self.ar & ~0x3FF, 0x400)
+
+
+class FlashF4(Flash):
+    """Sectors 4 and 5."""
+
+    base, size, lock, unit, program_ns, erase_ns = 0x08010000, 0x30000, 1 << 31, 4, 100 * US, 2000 * MS
+
+    def look(self):
+        sector = self.cr >> 3 & 0xF
+        if self.cr & 0x10002 == 0x10002:
+            self.chip.expect(self.cr >> 8 & 3 == 2, "the flash is not told to work with 32 bits")
+            self.erase({4: 0x08010000, 5: 0x08020000}.get(sector, 0), 0x10000 * (sector - 3))
+
+
 class Watchdog:
     """IWDG. Prescaler and reload take 5 cycles of its oscillator; SR tells."""
 
