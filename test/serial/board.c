@@ -33,10 +33,21 @@ static const char *lent;
 static size_t lent_left;
 static bool line_ended;
 
+/// The image asks byte by byte.
 size_t iw_serial_read(char *out, size_t size) {
-    const ssize_t count = read(STDIN_FILENO, out, size);
-    line_ended = line_ended || count == 0;
-    return (count > 0) ? (size_t)count : 0U;
+    static char taken[4096];
+    static size_t at;
+    static size_t end;
+    if (at == end) {
+        const ssize_t count = read(STDIN_FILENO, taken, sizeof taken);
+        line_ended = line_ended || count == 0;
+        at = 0;
+        end = (count > 0) ? (size_t)count : 0U;
+    }
+    const size_t left = (end - at < size) ? end - at : size;
+    memcpy(out, &taken[at], left);
+    at += left;
+    return left;
 }
 
 bool iw_serial_had_error(void) {
@@ -96,6 +107,13 @@ void iw_serial_step(void) {
     }
 }
 
+/// There is no flash.
+bool iw_kept_commit(iw_kept_t *self, const iw_settings_t *settings) {
+    (void)self;
+    (void)settings;
+    return false;
+}
+
 // ---- the machine --------------------------------------------------------------------------------------------------
 
 static volatile sig_atomic_t reset_pressed;
@@ -109,6 +127,7 @@ static gateway_config_t config;
 static gw_box_t box;
 static gw_wheels_t wheels;
 static iw_host_t host;
+static iw_kept_t kept;
 
 static void must(bool holds, const char *what) {
     if (!holds) {
@@ -135,6 +154,7 @@ static void begin(char **arguments, bool restarted) {
                                    .estop = "PA0",
                                    .bitrate_hz = 500000,
                                    .sample_point_permille = 875,
+                                   .kept = &kept,
                                    .track_mm = 540,
                                    .rate_max_hz = 10,
                                    .boot = boot};

@@ -118,6 +118,11 @@ class SerialRig(Rig):
     """`start_gateway` starts board, cable and relay; clients connect to the relay's sockets."""
 
     cable = board = None
+    # For any machine, however busy: what is judged here is the line.
+    PATIENT = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}}
+
+    def __init__(self, build, config=None, **options):
+        super().__init__(build, {**self.PATIENT, **(config or {})}, **options)
 
     def program(self, name):
         return os.path.join(self.build, PROGRAMS[name], name) if name in PROGRAMS else super().program(name)
