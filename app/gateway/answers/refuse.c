@@ -110,12 +110,7 @@ static void say_right(const gw_answers_t *answers, iwn_refusal_t *out_refusal) {
 }
 
 bool gw_refuse_by_right(const gw_answers_t *answers, gw_right_t right, iwn_cmd_t cmd, iwn_refusal_t *out_refusal) {
-    static const bool allowed[IWN_CMDS] = {
-        [IWN_CMD_HELLO] = true, [IWN_CMD_STATUS] = true,     [IWN_CMD_WATCH] = true,
-        [IWN_CMD_WHY] = true,   [IWN_CMD_STOP] = true,       [IWN_CMD_DISARM] = true,
-        [IWN_CMD_ESTOP] = true, [IWN_CMD_RECORDINGS] = true, [IWN_CMD_RECORDING] = true,
-    };
-    if (right == GW_DRIVE || allowed[cmd]) {
+    if (right == GW_DRIVE || iwn_cmd_watches(cmd)) {
         return false;
     }
     say_right(answers, out_refusal);
