@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The image that a host drives over the serial line: in the place of a command source, and of report and console, for the
-// serial port is the host's.
+// The image that a host drives over the serial line: in the place of a command source, and of report and console, for
+// the serial port is the host's.
 #include "commander.h"
 
 #include "bit_rate.h"

@@ -110,6 +110,12 @@ static gw_box_t box;
 static gw_wheels_t wheels;
 static iw_host_t host;
 
+/// There is no flash here: a configuration lives as long as the file it was read from.
+bool iw_host_keep(const iw_settings_t *settings) {
+    (void)settings;
+    return false;
+}
+
 static void must(bool holds, const char *what) {
     if (!holds) {
         (void)fprintf(stderr, "serial_board: %s\n", what);
@@ -135,6 +141,7 @@ static void begin(char **arguments, bool restarted) {
                                    .estop = "PA0",
                                    .bitrate_hz = 500000,
                                    .sample_point_permille = 875,
+                                   .settings = iw_settings_from(&config.core, 540),
                                    .track_mm = 540,
                                    .rate_max_hz = 10,
                                    .boot = boot};
