@@ -37,6 +37,7 @@ static relay_channel_t *free_channel(relay_t *self) {
 }
 
 static void turn_away(relay_t *self, gw_client_t *client, const char *why) {
+    gw_log(&self->log, GW_LOG_INFO, "client %u (pid %d) is closed: %s", (unsigned)client->id, client->pid, why);
     const iwn_id_t nobody = {.kind = IWN_ID_NONE};
     iwn_refusal_t refusal = {.error = IWN_BUS_DOWN};
     (void)snprintf(refusal.message, sizeof refusal.message, "no board on the serial line: %s", why);

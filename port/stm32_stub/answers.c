@@ -282,7 +282,7 @@ static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) 
     }
     if (!request->commit) {
         self->has_staged = false;
-        self->staged = self->place.kept->settings;
+        self->staged = self->place.settings;
         return true;
     }
     if (!iw_settings_check(&self->staged, why)) {
@@ -296,7 +296,7 @@ static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) 
         return false;
     }
     *out_error = IWN_INTERNAL;
-    if (!iw_kept_commit(self->place.kept, &self->staged)) {
+    if (!iw_host_keep(&self->staged)) {
         IWN_TEXT_JOIN(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
                            "on, and try again");
         return false;

@@ -5,7 +5,8 @@
 
 #include "iwheel/types.h"
 
-/// The same for the whole run. `power_ons`: how many there were, this one among them; starts since then are counted here.
+/// The same for the whole run. `power_ons`: how many there were, this one among them; starts since then are counted
+/// here.
 uint64_t iw_boot_id(uint32_t power_ons);
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The image that a host drives over the serial line: in the place of a command source, and of report and console, for the
-// serial port is the host's.
+// The image that a host drives over the serial line: in the place of a command source, and of report and console, for
+// the serial port is the host's.
 #include "commander.h"
 
 #include "bit_rate.h"
@@ -53,6 +53,10 @@ void iw_commander_configure(iw_config_t *config) {
     is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
+bool iw_host_keep(const iw_settings_t *settings) {
+    return iw_kept_commit(&kept, settings);
+}
+
 static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
     static char estop[] = "PA0";
     estop[1] = (char)('A' + IW_BOARD_ESTOP / 16U);
@@ -63,7 +67,7 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .estop = estop,
         .bitrate_hz = IW_BOARD_APB1_HZ / IW_BIT_PRESCALER / IW_BIT_QUANTA,
         .sample_point_permille = (1U + IW_BIT_BS1) * 1000U / IW_BIT_QUANTA,
-        .kept = &kept,
+        .settings = kept.settings,
         .track_mm = track_mm,
         .rate_max_hz = RATE_MAX_HZ,
         .boot = iw_boot_id(kept.power_ons),

@@ -184,7 +184,7 @@ void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t no
     self->now_us = now_us;
     self->heard_us = now_us;
     self->linked_us = now_us;
-    self->staged = place->kept->settings;
+    self->staged = place->settings;
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);
     iwn_why_sentence(&self->stop.stop, &(iwn_why_context_t){0}, self->stop.sentence, sizeof self->stop.sentence);
     iw_host_tell_link(self);

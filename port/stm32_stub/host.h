@@ -16,7 +16,7 @@
 #ifndef IW_STM32_HOST_H
 #define IW_STM32_HOST_H
 
-#include "kept.h"
+#include "settings.h"
 
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/line.h"
@@ -82,10 +82,10 @@ typedef struct {
     const char *estop;   ///< Name of the e-stop's pin.
     uint32_t bitrate_hz; ///< Of the bus.
     uint32_t sample_point_permille;
-    iw_kept_t *kept;      ///< What outlives power.
-    uint32_t track_mm;    ///< Between the wheels, for twist.
-    uint32_t rate_max_hz; ///< Of snapshots that the serial line carries beside replies.
-    uint64_t boot;        ///< Another one at every start.
+    iw_settings_t settings; ///< In force.
+    uint32_t track_mm;      ///< Between the wheels, for twist.
+    uint32_t rate_max_hz;   ///< Of snapshots that the serial line carries beside replies.
+    uint64_t boot;          ///< Another one at every start.
 } iw_host_place_t;
 
 typedef struct {
@@ -162,6 +162,9 @@ iw_host_client_t *iw_host_find(iw_host_t *self, iw_client_t id);
 
 /// `"joystick" (client 3)`, into one of `self->scratch.texts`.
 const char *iw_host_name(iw_host_t *self, iw_client_t id, unsigned text);
+
+/// By the image: keeps a configuration for the next start. False: it could not, and the one of before stays.
+bool iw_host_keep(const iw_settings_t *settings);
 
 /// True once the board is to begin anew.
 bool iw_host_wants_restart(const iw_host_t *self);

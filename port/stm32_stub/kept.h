@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-/// What this board keeps over power-off, in one record of store.h: how many power-ons there were, and the configuration.
+/// What this board keeps over power-off, in one record of store.h: how many power-ons there were, and the
+/// configuration.
 #ifndef IW_STM32_KEPT_H
 #define IW_STM32_KEPT_H
 
@@ -13,12 +14,12 @@ typedef struct {
     iw_settings_t settings; ///< That one.
 } iw_kept_t;
 
-/// Right after a start, before the watchdog runs. A power-on is counted, which may take as long as an erase; another start
-/// writes nothing.
+/// Right after a start, before the watchdog runs. A power-on is counted, which may take as long as an erase; another
+/// start writes nothing.
 void iw_kept_open(iw_kept_t *self, bool power_on);
 
-/// Commits a configuration. False if the flash did not take it: the one of before stays. May stall the CPU for as long as
-/// store.h says.
+/// Commits a configuration. False if the flash did not take it: the one of before stays. May stall the CPU for as
+/// long as store.h says.
 bool iw_kept_commit(iw_kept_t *self, const iw_settings_t *settings);
 
 #endif

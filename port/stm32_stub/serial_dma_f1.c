@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0008: 7.3.6 clock enable, 13.4 DMA; table 78: USART2 is on channels 6 (receive) and 7 (transmit)
-// of DMA1.
+// Sections are those of RM0008: 7.3.6 clock enable, 13.4 DMA; table 78: USART2 is on channels 6 (receive) and 7
+// (transmit) of DMA1.
 #include "serial.h"
 
 typedef struct {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0090: 7.3.10 clock enable, 10.5 DMA; table 42: USART2 is channel 4 of DMA1's streams 5 (receive)
-// and 6 (transmit).
+// Sections are those of RM0090: 7.3.10 clock enable, 10.5 DMA; table 42: USART2 is channel 4 of DMA1's streams 5
+// (receive) and 6 (transmit).
 #include "serial.h"
 
 typedef struct {

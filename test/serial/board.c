@@ -107,13 +107,6 @@ void iw_serial_step(void) {
     }
 }
 
-/// There is no flash.
-bool iw_kept_commit(iw_kept_t *self, const iw_settings_t *settings) {
-    (void)self;
-    (void)settings;
-    return false;
-}
-
 // ---- the machine --------------------------------------------------------------------------------------------------
 
 static volatile sig_atomic_t reset_pressed;
@@ -127,7 +120,12 @@ static gateway_config_t config;
 static gw_box_t box;
 static gw_wheels_t wheels;
 static iw_host_t host;
-static iw_kept_t kept;
+
+/// There is no flash here: a configuration lives as long as the file it was read from.
+bool iw_host_keep(const iw_settings_t *settings) {
+    (void)settings;
+    return false;
+}
 
 static void must(bool holds, const char *what) {
     if (!holds) {
@@ -154,7 +152,7 @@ static void begin(char **arguments, bool restarted) {
                                    .estop = "PA0",
                                    .bitrate_hz = 500000,
                                    .sample_point_permille = 875,
-                                   .kept = &kept,
+                                   .settings = iw_settings_from(&config.core, 540),
                                    .track_mm = 540,
                                    .rate_max_hz = 10,
                                    .boot = boot};

@@ -70,7 +70,8 @@ class Cable(threading.Thread):
 
     def ask(self, data):
         """To the board, as if the relay had said it."""
-        self.board.sendall(data)
+        with self.lock:  # A line of the relay's comes before it or after it.
+            self.board.sendall(data)
 
     def run(self):
         while not self.over:

@@ -132,7 +132,8 @@ def relay_killed_and_anew(rig):
     old = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": SPEED, "right_mm_s": SPEED, "id": 7})) + b"\n"
     host.say(0, {"cmd": "link"})
     begun_ns = rig.machine.now_ns
-    rig.run(60 * MS)
+    rig.run(PERIOD_NS + RAMP_NS + 30 * MS)
+    assert not moving(rig, begun_ns + PERIOD_NS + RAMP_NS), "the clients of the relay before go on"
     host.open(1)
     host.raw(old)
     assert host.wait(lambda line: line.message.get("id") == 7).message["error"] == "stale_command"

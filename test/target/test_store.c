@@ -53,8 +53,7 @@ void setUp(void) {
     torn_by = 0;
 }
 
-void tearDown(void) {
-}
+void tearDown(void) {}
 
 static void fill(uint32_t payload[IW_STORE_WORDS], uint32_t number) {
     for (uint32_t word = 0; word < IW_STORE_WORDS; word++) {
