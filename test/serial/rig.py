@@ -62,11 +62,13 @@ class Cable(threading.Thread):
             self.write(data)
 
     def write(self, data):
-        try:
-            while data and self.master is not None:
+        """As slow as the relay reads; what it does not read within a while is lost, as on any cable."""
+        end = time.monotonic() + 0.2
+        while data and self.master is not None and time.monotonic() < end:
+            try:
                 data = data[os.write(self.master, data):]
-        except BlockingIOError:
-            pass  # As a cable that nobody reads.
+            except BlockingIOError:
+                time.sleep(0.001)
 
     def ask(self, data):
         """To the board, as if the relay had said it."""
