@@ -139,14 +139,18 @@ static const char *stale(const iw_host_t *self, const iw_host_client_t *client, 
 /// did not exist yet.
 static void drive(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote, const iw_drive_t *wanted) {
     iw_applied_t applied;
-    const char *const why = stale(self, client, quote);
+    const bool armed = iw_gateway_state(self->place.gateway) == IW_STATE_ARMED;
+    const char *const why = armed ? stale(self, client, quote) : NULL; // Else the core refuses it, whatever it quotes.
     if (why != NULL) {
         REFUSE(self, client, IWN_STALE_COMMAND, "this command feeds nothing: ", why);
         return;
     }
-    client->has_seq = true;
-    client->seq = quote->seq;
-    const iw_refusal_t refusal = iw_gateway_drive(self->place.gateway, quote->t_us, client->id, wanted, &applied);
+    if (armed) {
+        client->has_seq = true;
+        client->seq = quote->seq;
+    }
+    const iw_time_us_t sent_us = armed ? quote->t_us : self->now_us;
+    const iw_refusal_t refusal = iw_gateway_drive(self->place.gateway, sent_us, client->id, wanted, &applied);
     if (refusal != IW_REFUSE_NONE) {
         iw_answer_refuse(self, client, refusal);
         return;
