@@ -77,6 +77,17 @@ def both_words_and_turns(rig):
     assert host.ask(1, {"cmd": "nonsense"})["error"] == "unknown_cmd"
     assert host.ask(1, {"cmd": "arm", "speed": 1})["error"] == "unknown_field"
     assert host.ask(1, {"cmd": "recordings"})["error"] == "denied"
+    host.ask(1, {"cmd": "watch", "topics": ["state"]})
+    assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius", "value": 194})["state"] == "confirmed"
+    assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius", "value": "wide"})["error"] == "bad_value"
+    assert host.ask(1, {"cmd": "confirm", "item": "mount_sign_left", "value": "yes"})["state"] == "contradicted"
+    assert host.ask(1, {"cmd": "arm"})["error"] == "denied", "armed although an assumption is contradicted"
+    assert host.ask(1, {"cmd": "confirm", "item": "mount_sign_left"})["state"] == "confirmed"
+    assert host.ask(1, {"cmd": "confirm", "item": "gear_ratio", "value": "2/2"})["state"] == "confirmed"
+    rig.run(20 * MS)
+    told = [event["item"] for event in host.events("ledger") if event["evidence"] == "operator"]
+    assert told == ["wheel_radius", "mount_sign_left", "mount_sign_left", "gear_ratio"], told
+    host.ask(1, {"cmd": "watch", "topics": []})
     rig.run(2500 * MS)
     tared = host.ask(1, {"cmd": "tare", "side": "left"})
     assert tared["ok"] and tared["left"]["samples"] > 0, tared
