@@ -21,11 +21,11 @@ static void refuse_as(iw_host_t *self, iw_host_client_t *client, iwn_error_t err
 #define REFUSE(self, client, error, ...) refuse_as((self), (client), (error), (const char *const[]){__VA_ARGS__, NULL})
 
 void iw_answer_refuse(iw_host_t *self, iw_host_client_t *client, iw_refusal_t refusal) {
-    const iw_snapshot_t seen = iw_host_look(self);
+    const iw_snapshot_t *const seen = iw_host_look(self);
     const iwn_refuse_context_t context = {
-        .seen = &seen,
-        .holder = iw_host_name(self, seen.holder, 0),
-        .stale_client = iw_host_name(self, seen.stale_client, 1),
+        .seen = seen,
+        .holder = iw_host_name(self, seen->holder, 0),
+        .stale_client = iw_host_name(self, seen->stale_client, 1),
         .last_stop = self->stop.sentence,
         .stopped_by = (self->stopped_us > 0U) ? iw_host_name(self, self->stopped_by, 2) : NULL,
         .estopped_by = (self->estopped_us > 0U) ? iw_host_name(self, self->estopped_by, 3) : NULL,
@@ -112,7 +112,6 @@ void iw_answer_arming(iw_host_t *self, iw_host_client_t *client, const iw_snapsh
 
 /// What is wrong with a quote; NULL: nothing. A stamp from before the channel was opened is another client's.
 static const char *stale(const iw_host_t *self, const iw_host_client_t *client, const iwn_quote_t *quote) {
-    const uint64_t lease_us = (uint64_t)self->place.gateway->config.lease_ms * IW_US_PER_MS;
     uint64_t boot = 0;
     if (quote == NULL) {
         return "it quotes no start of the board: a command that moves begins with boot, seq and t_us, which "
@@ -129,7 +128,7 @@ static const char *stale(const iw_host_t *self, const iw_host_client_t *client, 
     if (client->has_seq && quote->seq <= client->seq) {
         return "a command with this seq, or a later one, came before it";
     }
-    if (quote->t_us > self->now_us || quote->t_us < client->opened_us || self->now_us - quote->t_us > lease_us) {
+    if (quote->t_us > self->now_us || quote->t_us < client->opened_us || self->now_us - quote->t_us > self->lease_us) {
         return "it is older than lease_ms, or from before its channel was opened: the line or the host was held up";
     }
     return NULL;
@@ -139,14 +138,18 @@ static const char *stale(const iw_host_t *self, const iw_host_client_t *client, 
 /// did not exist yet.
 static void drive(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote, const iw_drive_t *wanted) {
     iw_applied_t applied;
-    const char *const why = stale(self, client, quote);
+    const bool armed = iw_gateway_state(self->place.gateway) == IW_STATE_ARMED;
+    const char *const why = armed ? stale(self, client, quote) : NULL; // Else the core refuses it, whatever it quotes.
     if (why != NULL) {
         REFUSE(self, client, IWN_STALE_COMMAND, "this command feeds nothing: ", why);
         return;
     }
-    client->has_seq = true;
-    client->seq = quote->seq;
-    const iw_refusal_t refusal = iw_gateway_drive(self->place.gateway, quote->t_us, client->id, wanted, &applied);
+    if (armed) {
+        client->has_seq = true;
+        client->seq = quote->seq;
+    }
+    const iw_time_us_t sent_us = armed ? quote->t_us : self->now_us;
+    const iw_refusal_t refusal = iw_gateway_drive(self->place.gateway, sent_us, client->id, wanted, &applied);
     if (refusal != IW_REFUSE_NONE) {
         iw_answer_refuse(self, client, refusal);
         return;
@@ -190,11 +193,11 @@ static void do_stop(iw_host_t *self, iw_host_client_t *client) {
 }
 
 static void do_estop(iw_host_t *self, iw_host_client_t *client) {
-    const iw_snapshot_t seen = iw_host_look(self);
-    const bool latched = seen.state == IW_STATE_LATCHED;
+    const iw_snapshot_t *const seen = iw_host_look(self);
+    const bool latched = seen->state == IW_STATE_LATCHED;
     self->estopped_us = self->now_us;
     self->estopped_by = client->id;
-    if (!latched || self->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] >= ESTOP_AGAIN_US) {
+    if (!latched || self->now_us - seen->seen_us[IW_CAUSE_ESTOP_SOFTWARE] >= ESTOP_AGAIN_US) {
         if (!latched) {
             memcpy(self->estop_reason, self->request.reason, sizeof self->estop_reason);
         }
@@ -213,8 +216,8 @@ static void do_reset(iw_host_t *self, iw_host_client_t *client) {
 }
 
 static void do_tare(iw_host_t *self, iw_host_client_t *client) {
-    const iw_snapshot_t seen = iw_host_look(self);
-    const iw_force_t before[IW_SIDES] = {*seen.wheel[IW_LEFT].force, *seen.wheel[IW_RIGHT].force};
+    const iw_snapshot_t *const seen = iw_host_look(self);
+    const iw_force_t before[IW_SIDES] = {*seen->wheel[IW_LEFT].force, *seen->wheel[IW_RIGHT].force};
     const iw_force_quality_t quality[IW_SIDES] = {iw_force_measure(&before[IW_LEFT]),
                                                   iw_force_measure(&before[IW_RIGHT])};
     const uint8_t sides = self->request.sides;
@@ -226,11 +229,11 @@ static void do_tare(iw_host_t *self, iw_host_client_t *client) {
         return;
     }
     iwn_out_t json = iw_host_begin_reply(self, &self->request.id);
-    iwn_out_text(&json, "state", iwn_state_name(seen.state));
+    iwn_out_text(&json, "state", iwn_state_name(seen->state));
     for (unsigned side = 0; side < IW_SIDES; side++) {
         if ((sides & (1U << side)) != 0U) {
             iwn_out_open(&json, (side == IW_LEFT) ? "left" : "right", '{');
-            iwn_tell_tare(seen.wheel[side].force, &quality[side], &before[side], &json);
+            iwn_tell_tare(seen->wheel[side].force, &quality[side], &before[side], &json);
             iwn_out_close(&json, '}');
         }
     }
@@ -361,6 +364,9 @@ static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote
     case IWN_CMD_TARE:
         do_tare(self, client);
         break;
+    case IWN_CMD_CONFIRM:
+        iw_answer_confirm(self, client);
+        break;
     case IWN_CMD_CONFIG:
         do_config(self, client);
         break;
@@ -379,6 +385,5 @@ void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quo
         return;
     }
     carry_out(self, client, quote);
-    const iw_snapshot_t seen = iw_host_look(self);
-    iw_observe(self, &seen);
+    iw_observe(self, iw_host_look(self));
 }

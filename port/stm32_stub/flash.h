@@ -6,8 +6,8 @@
 /// | STM32F103  | 62 and 63, 1 KiB each    | 40 ms          | 140 us            | the CPU stands still       |
 /// | STM32F4xx  | sectors 4 (64 KiB) and 5 | 2 s            | 100 us            | the CPU stands still       |
 ///
-/// Figures: data sheets, 5.3.9 (F103), 5.3.12 (F407), 6.3.12 (F446). An erase is longer than the watchdog waits on an
-/// F4: it is for the time before the watchdog is started.
+/// Figures: the data sheets' memory characteristics (5.3.9 of an F103, 5.3.12 of an F4). An erase is longer than the
+/// watchdog waits on an F4: it is for the time before the watchdog is started.
 #ifndef IW_STM32_FLASH_H
 #define IW_STM32_FLASH_H
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Sections are those of RM0090 (F446, RM0390: the same): 3.6 erase and program, 3.9 registers.
+// Sections are those of RM0090: 3.6 erase and program, 3.9 registers.
 #include "flash.h"
 
 #include "board.h"

@@ -12,10 +12,9 @@ static void note_fault(iw_host_t *self, iwn_line_verdict_t fault) {
     self->fault = fault;
 }
 
-iw_snapshot_t iw_host_look(const iw_host_t *self) {
-    iw_snapshot_t seen;
-    iw_gateway_snapshot(self->place.gateway, self->now_us, &seen);
-    return seen;
+const iw_snapshot_t *iw_host_look(iw_host_t *self) {
+    iw_gateway_snapshot(self->place.gateway, self->now_us, &self->seen);
+    return &self->seen;
 }
 
 iw_host_client_t *iw_host_find(iw_host_t *self, iw_client_t id) {
@@ -62,8 +61,7 @@ iwn_surroundings_t iw_host_around(const iw_host_t *self, const iw_snapshot_t *se
 static void end_client(iw_host_t *self, iw_host_client_t *client) {
     if (client->id != IW_CLIENT_NONE) {
         iw_gateway_disconnect(self->place.gateway, self->now_us, client->id);
-        const iw_snapshot_t seen = iw_host_look(self);
-        iw_observe(self, &seen);
+        iw_observe(self, iw_host_look(self));
         memset(client, 0, sizeof *client);
     }
 }
@@ -184,6 +182,9 @@ void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t no
     self->now_us = now_us;
     self->heard_us = now_us;
     self->linked_us = now_us;
+    iw_config_t config;
+    (void)iw_settings_to(&place->settings, &config);
+    self->lease_us = config.lease_ms * IW_US_PER_MS;
     self->staged = place->settings;
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);
     iwn_why_sentence(&self->stop.stop, &(iwn_why_context_t){0}, self->stop.sentence, sizeof self->stop.sentence);

@@ -68,6 +68,7 @@ typedef struct {
     uint32_t stop_number;
     uint32_t still_moving;
     uint32_t assumed_changes;
+    uint8_t assumed[IW_LEDGER_ITEMS]; ///< iw_ledger_state_t.
     bool left_behind;
     bool estop_high;
     bool started;
@@ -105,6 +106,8 @@ typedef struct {
     uint8_t next_owed; ///< Whose turn it is to have the long line, so that nobody keeps it.
     bool estop_high;   ///< The level of the e-stop's pin.
     iw_host_told_t told;
+    uint32_t lease_us;
+    iw_snapshot_t seen; ///< Of iw_host_look: too large for the stack.
     iwn_request_t request;
     iwn_refusal_t refusal;
     iwn_stop_note_t stop;
@@ -156,7 +159,8 @@ void iw_host_tell_fault(iw_host_t *self);
 /// Writes a snapshot into the line that is lent, if it is free: as reply with `id`, or as event `state` (NULL).
 void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id);
 
-iw_snapshot_t iw_host_look(const iw_host_t *self);
+/// Of this moment, until the next call.
+const iw_snapshot_t *iw_host_look(iw_host_t *self);
 iwn_surroundings_t iw_host_around(const iw_host_t *self, const iw_snapshot_t *seen);
 iw_host_client_t *iw_host_find(iw_host_t *self, iw_client_t id);
 
@@ -171,6 +175,10 @@ bool iw_host_wants_restart(const iw_host_t *self);
 
 /// Carries out `self->request`. `quote` is NULL if the line had none.
 void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote);
+/// Carries out `confirm`: the operator's word on an assumption, for this run.
+void iw_answer_confirm(iw_host_t *self, iw_host_client_t *client);
+/// Of the ledger, into an object that is open.
+void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json);
 /// Answers an arm that was granted and then failed or succeeded.
 void iw_answer_arming(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen);
 /// Refuses `self->request` for the core's reason.

@@ -109,6 +109,21 @@ static void observe_state(iw_host_t *self, const iw_snapshot_t *seen, bool first
     }
 }
 
+static void observe_ledger(iw_host_t *self, const iw_snapshot_t *seen) {
+    if (seen->assumed_changes == self->told.assumed_changes) {
+        return;
+    }
+    self->told.assumed_changes = seen->assumed_changes;
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+        if ((uint8_t)seen->assumed[item].state != self->told.assumed[item]) {
+            self->told.assumed[item] = (uint8_t)seen->assumed[item].state;
+            iwn_out_t json = begin(self, "ledger");
+            iw_host_write_item(self, (iw_ledger_item_t)item, &json);
+            iw_host_send_event(self, IWN_TOPIC_STATE, &json);
+        }
+    }
+}
+
 void iw_observe(iw_host_t *self, const iw_snapshot_t *seen) {
     const bool first = !self->told.started;
     self->told.started = true;
@@ -118,4 +133,5 @@ void iw_observe(iw_host_t *self, const iw_snapshot_t *seen) {
     observe_stop(self, seen);
     observe_lease(self, seen);
     observe_state(self, seen, first);
+    observe_ledger(self, seen);
 }

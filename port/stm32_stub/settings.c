@@ -193,32 +193,37 @@ bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
     }
 }
 
-static void write_value(const iw_settings_t *self, const row_t *row, iwn_out_t *json) {
+static bool value_of(const iw_settings_t *self, const row_t *row, char out_text[IW_SETTINGS_TEXT]) {
     const uint16_t value = self->value[row->at];
-    char digits[16];
-    iwn_text_t text = iwn_text_begin(digits, sizeof digits);
+    const unsigned word = (unsigned)value - first_word(row);
+    iwn_text_t text = iwn_text_begin(out_text, IW_SETTINGS_TEXT);
     if (row->kind == WORDS) {
-        const unsigned word = (unsigned)value - first_word(row);
-        iwn_out_text(json, "value", (word < 2U) ? row->word[word] : NULL);
-        return;
+        IWN_TEXT_JOIN(&text, (word < 2U) ? row->word[word] : "");
+        return word < 2U;
     }
     iwn_text_int(&text, value);
     if (row->kind == GEAR && self->value[row->at + 1U] != 1U) {
         IWN_TEXT_JOIN(&text, "/");
         iwn_text_int(&text, self->value[row->at + 1U]);
     }
-    iwn_out_text(json, "value", (row->kind == BYTE && value == UNSET) ? NULL : digits);
+    return row->kind != BYTE || value != UNSET;
+}
+
+bool iw_settings_value(const iw_settings_t *self, const char *key, char out_text[IW_SETTINGS_TEXT]) {
+    const row_t *const row = find(key);
+    return row != NULL && value_of(self, row, out_text);
 }
 
 void iw_settings_write(const iw_settings_t *self, iwn_out_t *json) {
     char name[IWN_KEY_MAX + 1U];
+    char value[IW_SETTINGS_TEXT];
     iwn_out_open(json, "keys", '[');
     for (size_t i = 0; i < ROWS; i++) {
         iwn_text_t key = iwn_text_begin(name, sizeof name);
         IWN_TEXT_JOIN(&key, rows[i].section, ".", rows[i].key);
         iwn_out_open(json, NULL, '{');
         iwn_out_text(json, "key", name);
-        write_value(self, &rows[i], json);
+        iwn_out_text(json, "value", value_of(self, &rows[i], value) ? value : NULL);
         iwn_out_close(json, '}');
     }
     iwn_out_close(json, ']');

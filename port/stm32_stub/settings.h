@@ -25,6 +25,10 @@ uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config);
 /// that value.
 bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iwn_text_t *why);
 
+/// The value as the file writes it. False if there is no such key, or it is not set.
+#define IW_SETTINGS_TEXT 16U
+bool iw_settings_value(const iw_settings_t *self, const char *key, char out_text[IW_SETTINGS_TEXT]);
+
 /// The relations between keys. False, with the reason and the cure in `why`, if one does not hold.
 bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why);
 

@@ -77,6 +77,17 @@ def both_words_and_turns(rig):
     assert host.ask(1, {"cmd": "nonsense"})["error"] == "unknown_cmd"
     assert host.ask(1, {"cmd": "arm", "speed": 1})["error"] == "unknown_field"
     assert host.ask(1, {"cmd": "recordings"})["error"] == "denied"
+    host.ask(1, {"cmd": "watch", "topics": ["state"]})
+    assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius", "value": 194})["state"] == "confirmed"
+    assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius", "value": "wide"})["error"] == "bad_value"
+    assert host.ask(1, {"cmd": "confirm", "item": "mount_sign_left", "value": "yes"})["state"] == "contradicted"
+    assert host.ask(1, {"cmd": "arm"})["error"] == "denied", "armed although an assumption is contradicted"
+    assert host.ask(1, {"cmd": "confirm", "item": "mount_sign_left"})["state"] == "confirmed"
+    assert host.ask(1, {"cmd": "confirm", "item": "gear_ratio", "value": "2/2"})["state"] == "confirmed"
+    rig.run(20 * MS)
+    told = [event["item"] for event in host.events("ledger") if event["evidence"] == "operator"]
+    assert told == ["wheel_radius", "mount_sign_left", "mount_sign_left", "gear_ratio"], told
+    host.ask(1, {"cmd": "watch", "topics": []})
     rig.run(2500 * MS)
     tared = host.ask(1, {"cmd": "tare", "side": "left"})
     assert tared["ok"] and tared["left"]["samples"] > 0, tared
@@ -136,8 +147,14 @@ def relay_killed_and_anew(rig):
     assert not moving(rig, begun_ns + PERIOD_NS + RAMP_NS), "the clients of the relay before go on"
     host.open(1)
     host.raw(old)
-    assert host.wait(lambda line: line.message.get("id") == 7).message["error"] == "stale_command"
+    assert not host.wait(lambda line: line.message.get("id") == 7).message["ok"]
     assert_stops(rig, begun_ns, PERIOD_NS + RAMP_NS)
+    host.arm()
+    armed_ns = rig.machine.now_ns
+    host.raw(old.replace(b'"id":7', b'"id":8')) # Its CRC is wrong now; and as it was:
+    host.raw(old)
+    assert host.wait(lambda line: line.message.get("id") == 7).message["error"] == "stale_command"
+    assert not moving(rig, armed_ns)
 
 
 def relay_stopped_goes_on(rig):
@@ -157,6 +174,10 @@ def stale_in_every_way(rig):
     host = start_driving(rig)
     last_ns, old_us, used = rig.machine.now_ns, host.t_us - 250_000, host.seq[1]
     for turn in range(12):
+        if turn % 4 == 3: # The lease has run out meanwhile: armed again, without a command.
+            rig.run(2 * SECOND)
+            assert not moving(rig, last_ns + LEASE_NS + PERIOD_NS + RAMP_NS)
+            host.arm()
         host.drive(SPEED, boot="0123456789abcdef")
         host.drive(SPEED, seq=used)
         host.drive(SPEED, seq=1)
@@ -166,8 +187,10 @@ def stale_in_every_way(rig):
     rig.run(30 * MS)
     host.listen()
     refused = [line.message for line in host.lines if line.message.get("error") == "stale_command"]
-    assert len(refused) >= 70, f"{len(refused)} of 72 were refused"
-    assert_stops(rig, last_ns, LEASE_NS + PERIOD_NS + RAMP_NS)
+    assert len(refused) >= 40, f"{len(refused)} of 72 were refused as stale"
+    assert not [line for line in host.lines if line.message.get("limited") is not None and line.t_us * 1000 > last_ns + 30 * MS], "one was obeyed"
+    assert_stops(rig, last_ns, rig.machine.now_ns - last_ns)
+    assert not moving(rig, last_ns + LEASE_NS + PERIOD_NS + RAMP_NS)
 
 
 def nobody_feeds_another(rig):

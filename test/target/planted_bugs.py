@@ -89,7 +89,7 @@ IMAGE = {
     "the controller's reset has the wrong bit": ("main.c", "(1U << 25)", "(1U << 26)", "demo", "abort_without_end"),
     "a fault that goes on": ("startup.c", "b iw_system_reset", "b .", "demo", "stack_overflow"),
     "a command of an earlier start is obeyed": ("answers.c", "if (boot != self->place.boot) {", "if (false) {", "gateway", "stale_in_every_way"),
-    "a command that was held up is obeyed": ("answers.c", "self->now_us - quote->t_us > lease_us", "false", "gateway", "stale_in_every_way"),
+    "a command that was held up is obeyed": ("answers.c", "self->now_us - quote->t_us > self->lease_us", "false", "gateway", "stale_in_every_way"),
     "a command is obeyed twice": ("answers.c", "if (client->has_seq && quote->seq <= client->seq) {", "if (false) {", "gateway", "stale_in_every_way"),
     "a command without a quote is obeyed": ("host.c", "quoted ? &quote : NULL", "&(iwn_quote_t){.boot = {0}}", "gateway", "stale_in_every_way"),
     "a closed channel keeps its lease": ("host.c", "        iw_gateway_disconnect(self->place.gateway, self->now_us, client->id);\n", "", "gateway", "close_ends"),
