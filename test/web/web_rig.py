@@ -12,8 +12,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test/system"))
 
+from bus import now_us  # noqa: E402
 from client import Closed  # noqa: E402
 from harness import Process, Rig  # noqa: E402
+from judge_log import LEFT, RIGHT  # noqa: E402
 
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
@@ -171,6 +173,16 @@ class Driver(threading.Thread):
     def end(self):
         self.ended.set()
         self.join(2)
+
+
+def longest_gap_ms(rig, since_us):
+    """The longest time between two setpoints of one wheel on the bus, until now."""
+    until_us = now_us()
+    gaps = []
+    for wheel in (LEFT, RIGHT):
+        times = [since_us] + [t_us for t_us, id_, _ in rig.bus.setpoints(since_us) if id_ == wheel and t_us < until_us]
+        gaps += [after - before for before, after in zip(times, times[1:] + [until_us])]
+    return max(gaps) / 1000
 
 
 def braking_ms(rig, since_us, seconds=2):
