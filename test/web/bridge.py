@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The bridge without a browser: who is let in, what hostile peers get, what reaches the gateway and the bus."""
 
+import contextlib
 import json
 import os
 import re
@@ -11,11 +12,14 @@ import ssl
 import subprocess
 import sys
 import time
+import urllib.parse
+import urllib.request
 from pathlib import Path
 
 from bus import now_us
+from harness import Process
 from judge_log import GAP_US
-from web_rig import Driver, ROOT, Skip, braking_ms, full, longest_gap_ms, needs, until
+from web_rig import Driver, ROOT, Skip, braking_ms, free_port, full, longest_gap_ms, needs, until
 
 ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/metrics", "/health")
 COMMANDS = ("/api/stop", "/api/estop", "/api/arm", "/api/drive", "/api/reset")
@@ -478,6 +482,60 @@ def test_rules_and_dashboard_know_only_figures_that_there_are(rig):
         raise Skip("promtool is missing (apt-get install prometheus)")
     done = subprocess.run(["promtool", "check", "rules", ROOT / "share/web/prometheus-rules.yml"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+PROMETHEUS = """
+global: {{scrape_interval: 200ms, scrape_timeout: 200ms, evaluation_interval: 200ms}}
+rule_files: ["{rules}"]
+scrape_configs:
+  - {{job_name: iwheel, authorization: {{credentials_file: "{token}"}}, static_configs: [{{targets: ["127.0.0.1:{port}"]}}]}}
+"""
+
+
+@contextlib.contextmanager
+def prometheus(rig):
+    """One that scrapes the bridge by the shipped rules: asked by a path, it gives the data of its answer."""
+    if not shutil.which("prometheus"):
+        raise Skip("prometheus is missing (scripts/install_tools check brings it)")
+    port = free_port()
+    Path(rig.path("prometheus.yml")).write_text(PROMETHEUS.format(rules=ROOT / "share/web/prometheus-rules.yml", token=rig.path("token"), port=rig.port), encoding="utf-8")
+    child = Process(["prometheus", f"--config.file={rig.path('prometheus.yml')}", f"--storage.tsdb.path={rig.path('tsdb')}", f"--web.listen-address=127.0.0.1:{port}"],
+                    rig.path("prometheus.out"))
+    rig.processes.append(child)
+
+    def ask(path):
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/{path}", timeout=2) as answer:
+                return json.load(answer)["data"]
+        except OSError:
+            assert child.child.poll() is None, child.text()[-800:]
+            return None
+
+    yield ask
+    child.signal(signal.SIGTERM)
+    child.wait(5)
+
+
+@full
+def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
+    rig.start().connected()
+    with prometheus(rig) as ask:
+        target = until(lambda: (data := ask("targets")) and (found := data["activeTargets"]) and found[0]["health"] != "unknown" and found[0], what="it scrapes")
+        assert target["health"] == "up", target["lastError"]
+
+        def figure(query):
+            data = ask("query?query=" + urllib.parse.quote(query))
+            return float(data["result"][0]["value"][1]) if data and data["result"] else None
+
+        until(lambda: figure("iwheel_up") == 1, what="its figures are there")
+        state = rig.ask_json("GET", "/api/status")[1]
+        assert figure('iwheel_wheel_battery_volts{side="left"}') == state["left"]["battery_dV"] / 10
+        groups = ask("rules")["groups"]
+        assert groups and all(rule["health"] == "ok" for rule in groups[0]["rules"]), groups
+        assert not [alert for alert in ask("alerts")["alerts"] if alert["state"] == "firing"]
+        rig.sim.ask("estop press")
+        firing = until(lambda: [alert for alert in ask("alerts")["alerts"] if alert["state"] == "firing"], 8, "an alert fires")
+        assert [alert["labels"]["alertname"] for alert in firing] == ["IwheelLatched"] and "iwheelctl why" in firing[0]["annotations"]["summary"], firing
 
 
 def test_words_of_the_page_are_those_of_iwheelctl(rig):
