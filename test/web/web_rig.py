@@ -154,7 +154,7 @@ class Driver(threading.Thread):
         self.client, self.speed, self.ended = rig.client(name="joystick"), speed, threading.Event()
         self.turning = False
         self.start()
-        until(lambda: rig.bus.setpoints() and abs(rig.bus.setpoints()[-1][2]) > speed / 2, what="the wheels are told to turn")
+        until(lambda: rig.bus.setpoints() and abs(rig.bus.setpoints()[-1][2]) == speed, what="the wheels are told to turn, and at this speed")
         self.turning = True
 
     def run(self):
@@ -186,10 +186,13 @@ def longest_gap_ms(rig, since_us):
 
 
 def braking_ms(rig, since_us, seconds=2):
-    """How long after this time the first setpoint was on the bus that is nearer to zero than the last one before."""
-    before = [abs(speed) for t_us, _, speed in rig.bus.setpoints() if t_us < since_us][-1]
-
+    """How long after this time the first setpoint was on the bus that is nearer to zero than the one before it of that wheel."""
     def found():
-        return next((t_us for t_us, _, speed in rig.bus.setpoints(since_us) if abs(speed) < before), None)
+        last = {}
+        for t_us, wheel, speed in rig.bus.setpoints():
+            if t_us >= since_us and abs(speed) < last.get(wheel, 0):
+                return t_us
+            last[wheel] = abs(speed)
+        return None
 
     return (until(found, seconds, "the wheels are told to brake") - since_us) / 1000
