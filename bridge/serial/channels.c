@@ -37,9 +37,11 @@ static relay_channel_t *free_channel(relay_t *self) {
 }
 
 static void turn_away(relay_t *self, gw_client_t *client, const char *why) {
+    gw_log(&self->log, GW_LOG_INFO, "client %u (pid %d) is closed: %s", (unsigned)client->id, client->pid, why);
     const iwn_id_t nobody = {.kind = IWN_ID_NONE};
     iwn_refusal_t refusal = {.error = IWN_BUS_DOWN};
-    (void)snprintf(refusal.message, sizeof refusal.message, "no board on the serial line: %s", why);
+    iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
+    IWN_TEXT_JOIN(&text, "no board on the serial line: ", why);
     gw_clients_refuse(&self->clients, client, &nobody, &refusal);
     gw_client_finish(client, self->now_us);
 }
@@ -79,7 +81,8 @@ static void leave(void *context, gw_client_t *client) {
 static void answer_here(relay_channel_t *channel, const iwn_id_t *id, iwn_error_t error, const char *message) {
     serial_request_t *place = serial_queue_place(&channel->queue);
     *place = (serial_request_t){.state = SERIAL_ANSWERED, .id = *id, .error = error};
-    (void)snprintf(place->json, sizeof place->json, "%s", message);
+    iwn_text_t text = iwn_text_begin(place->json, sizeof place->json);
+    IWN_TEXT_JOIN(&text, message);
     place->reason = place->json;
     serial_queue_put(&channel->queue);
 }
@@ -203,7 +206,8 @@ static void tell_answered(relay_t *self, relay_channel_t *channel, gw_client_t *
         if (request->state == SERIAL_HELD) {
             pass_reply(self, client, request, request->json, request->length);
         } else {
-            (void)snprintf(refusal.message, sizeof refusal.message, "%s", request->reason);
+            iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
+            IWN_TEXT_JOIN(&text, request->reason);
             gw_clients_refuse(&self->clients, client, &request->id, &refusal);
         }
         serial_queue_drop(&channel->queue);

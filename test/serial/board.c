@@ -33,10 +33,21 @@ static const char *lent;
 static size_t lent_left;
 static bool line_ended;
 
+/// The image asks byte by byte.
 size_t iw_serial_read(char *out, size_t size) {
-    const ssize_t count = read(STDIN_FILENO, out, size);
-    line_ended = line_ended || count == 0;
-    return (count > 0) ? (size_t)count : 0U;
+    static char taken[4096];
+    static size_t at;
+    static size_t end;
+    if (at == end) {
+        const ssize_t count = read(STDIN_FILENO, taken, sizeof taken);
+        line_ended = line_ended || count == 0;
+        at = 0;
+        end = (count > 0) ? (size_t)count : 0U;
+    }
+    const size_t left = (end - at < size) ? end - at : size;
+    memcpy(out, &taken[at], left);
+    at += left;
+    return left;
 }
 
 bool iw_serial_had_error(void) {

@@ -62,15 +62,18 @@ class Cable(threading.Thread):
             self.write(data)
 
     def write(self, data):
-        try:
-            while data and self.master is not None:
+        """As slow as the relay reads; what it does not read within a while is lost, as on any cable."""
+        end = time.monotonic() + 0.2
+        while data and self.master is not None and time.monotonic() < end:
+            try:
                 data = data[os.write(self.master, data):]
-        except BlockingIOError:
-            pass  # As a cable that nobody reads.
+            except BlockingIOError:
+                time.sleep(0.001)
 
     def ask(self, data):
         """To the board, as if the relay had said it."""
-        self.board.sendall(data)
+        with self.lock:  # A line of the relay's comes before it or after it.
+            self.board.sendall(data)
 
     def run(self):
         while not self.over:
@@ -118,6 +121,11 @@ class SerialRig(Rig):
     """`start_gateway` starts board, cable and relay; clients connect to the relay's sockets."""
 
     cable = board = None
+    # For any machine, however busy: what is judged here is the line.
+    PATIENT = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}}
+
+    def __init__(self, build, config=None, **options):
+        super().__init__(build, {**self.PATIENT, **(config or {})}, **options)
 
     def program(self, name):
         return os.path.join(self.build, PROGRAMS[name], name) if name in PROGRAMS else super().program(name)

@@ -95,15 +95,13 @@ def relay_stopped(t):
         t.arm(client)
         t.drive_for(client, 200, 200, 0.4)
         rig.gateway.signal(signal.SIGSTOP)
-        begin_us, number = now_us(), 100_000
-        while now_us() < begin_us + span * 1e6:
+        for number in range(100_000, 100_000 + int(span * 40)):  # Its socket takes 70 without waiting.
             client.send_raw(raw_drive(number, 200))
-            number += 1
-            time.sleep(0.02)
+            time.sleep(0.025)
         resumed_us = now_us()
         rig.gateway.signal(signal.SIGCONT)
         try:
-            replies = read_replies(client, number - 100_000)
+            replies = read_replies(client, number - 99_999)
             late = [r for r in replies if r.get("id", 0) >= 100_000 and r["ok"]]
             t.check(not late, f"after {span} s {len(late)} commands that had waited were obeyed: {late[:1]}")
             t.check(replies and all(r["error"] in ("stale_command", "not_armed") for r in replies), f"{replies[:2]}")
@@ -155,7 +153,7 @@ def cable_pulled(t):
             time.sleep(0.001)
         refused = rig.client()
         told = refused.read_reply(1.0)
-        t.check(told and told["error"] == "bus_down" and "plug" in told["message"] or "gone" in told["message"], f"without a cable: {told}")
+        t.check(told and told["error"] == "bus_down" and ("plug" in told["message"] or "gone" in told["message"]), f"without a cable: {told}")
         time.sleep(0.3)
         rig.cable.plug()
         client = await_service(t, rig)
@@ -224,7 +222,7 @@ def bad_lines(t):
         block = b"".join(mutated(chance.choice(drives), chance) for _ in range(500))
         rig.cable.ask(b"\n" + block + b"\n")
         sent += 500
-        if sent % 10_000 == 0:
+        if sent % 2000 == 0:
             client.request("hello")
     t.check(client.request("hello")["ok"], "the line is in order after them")
     time.sleep(0.2)
@@ -232,34 +230,59 @@ def bad_lines(t):
     errors = bytes(rig.cable.told).count(b'"line_error"')
     t.check(0 < errors <= 5 * (now_us() - before_us) / 1e6 + 2, f"{errors} line_errors in {(now_us() - before_us) / 1e6:.1f} s")
     t.figure(f"{sent} lines in {(now_us() - before_us) / 1e6:.1f} s, {errors} answers")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 6), "listening")
     t.arm(client)
     t.drive_for(client, 150, 150, 0.3)
     t.expect(client.request("stop"))
     end_well(t, rig, client)
 
 
-@scenario("a wire that damages one line in thirty: driving goes on or stops, and a stop always arrives", 10)
-def noisy(t):
-    rig, client = begin(t)
-    chance = random.Random(3)
+def damage(chance):
+    """One piece in thirty has a bit turned."""
 
-    def damage(data):
+    def pass_on(data):
         if chance.randrange(30) == 0:
             data = bytearray(data)
             data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
         return bytes(data)
 
-    rig.cable.up = rig.cable.down = damage
-    refused = 0
-    for _ in range(120):
-        refused += 0 if client.drive(150, 150)["ok"] else 1
-        time.sleep(0.02)
-    for _ in range(20):
-        t.expect(client.request("stop"))
-    rig.cable.up = rig.cable.down = None
-    t.figure(f"{refused} of 120 commands refused")
-    t.check(refused < 100, f"{refused} of 120 commands were refused")
+    return pass_on
+
+
+@scenario("a wire that damages one line in thirty to the board: what is lost is not obeyed, and a stop always arrives", 12)
+def noisy(t):
+    rig, client = begin(t)
+    rig.cable.up = damage(random.Random(3))
+    stops = 0
+    for _ in range(6):
+        for _ in range(8):
+            client.drive(150, 150)
+            time.sleep(0.02)
+        stops += 1 if client.request("stop")["ok"] else 0
+        rig.wait_status(client, lambda s: s.get("state") == "listening", 6)
+        client.arm()
+    rig.cable.up = None
+    t.check(stops == 6, f"{stops} of 6 stops were answered")
+    t.figure(f"{bytes(rig.cable.told).count(b'line_error')} line_errors")
+    t.expect(client.request("stop"))
     end_well(t, rig, client)
+
+
+@scenario("a wire that damages one line in thirty from the board: a client is told what has no answer, and a stop is said again", 8)
+def deaf(t):
+    rig, client = begin(t)
+    rig.cable.down = damage(random.Random(4))
+    for _ in range(4):
+        for _ in range(8):
+            client.drive(150, 150)
+            time.sleep(0.02)
+        t.check(client.request("stop")["ok"], "a stop is answered")
+        stopped_us = now_us()
+        rig.wait_status(client, lambda s: s.get("state") == "listening", 6)
+        t.check(not rig.moving(stopped_us + 600_000), "it stops")
+        client.arm()
+    rig.cable.down = None
+    t.check(rig.wait_status(client, lambda s: s.get("state") == "listening", 6), "listening")
 
 
 @scenario("delayed by the wire for longer than the lease, nothing is obeyed", 5)
