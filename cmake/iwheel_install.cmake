@@ -44,6 +44,7 @@ if(TARGET iwheel-gateway)
     endif()
     install(FILES share/sysusers.d/iwheel.conf DESTINATION lib/sysusers.d COMPONENT gateway)
     install(FILES share/tmpfiles.d/iwheel.conf DESTINATION lib/tmpfiles.d COMPONENT gateway)
+    install(FILES share/sysctl.d/10-iwheel.conf DESTINATION lib/sysctl.d COMPONENT gateway)
     install(FILES share/udev/60-iwheel.rules DESTINATION ${IWHEEL_UDEV_DIR} COMPONENT gateway)
     install(FILES share/networkd/70-iwheel-can.link share/networkd/80-iwheel-can.network
         DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/iwheel-gateway/examples COMPONENT gateway)

@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
@@ -30,23 +31,33 @@ bool serial_port_has_baud(uint32_t baud) {
     return speed_of(baud) != B0;
 }
 
+/// A line of /proc/locks, such as "1: FLOCK  ADVISORY  WRITE 4711 00:1c:23 0 EOF": who locks this file; 0: it is another line.
+static long holder_in(char *line, const struct stat *status) {
+    char *rest = line;
+    char *word[6];
+    for (unsigned i = 0; i < 6U; i++) {
+        word[i] = strtok_r((i == 0U) ? line : NULL, " ", &rest);
+        if (word[i] == NULL) {
+            return 0;
+        }
+    }
+    char *end;
+    const unsigned long major_number = strtoul(word[5], &end, 16);
+    const unsigned long minor_number = (*end == ':') ? strtoul(end + 1, &end, 16) : 0U;
+    const unsigned long long inode = (*end == ':') ? strtoull(end + 1, NULL, 10) : 0U;
+    const bool ours = strcmp(word[1], "FLOCK") == 0 && inode == status->st_ino &&
+                      makedev((unsigned)major_number, (unsigned)minor_number) == status->st_dev;
+    return ours ? strtol(word[4], NULL, 10) : 0;
+}
+
 /// The process that holds the lock of this port, by the kernel's list; 0: it cannot be told.
 static long holder_of(const char *path) {
     struct stat status;
     char line[256];
     long found = 0;
     FILE *locks = (stat(path, &status) == 0) ? fopen("/proc/locks", "re") : NULL;
-    while (locks != NULL && fgets(line, sizeof line, locks) != NULL) {
-        char kind[16];
-        long pid;
-        unsigned major_number;
-        unsigned minor_number;
-        unsigned long long inode;
-        const int fields =
-            sscanf(line, "%*s %15s %*s %*s %ld %x:%x:%llu", kind, &pid, &major_number, &minor_number, &inode);
-        const bool ours = fields == 5 && strcmp(kind, "FLOCK") == 0 && inode == status.st_ino &&
-                          makedev(major_number, minor_number) == status.st_dev;
-        found = ours ? pid : found;
+    while (locks != NULL && found == 0 && fgets(line, sizeof line, locks) != NULL) {
+        found = holder_in(line, &status);
     }
     if (locks != NULL) {
         (void)fclose(locks);

@@ -61,9 +61,9 @@ class Story:
         if done.returncode != 0:
             raise Failed(f"iwheelctl {words[0]} ended with {done.returncode}")
 
-    def play(self, board):
-        self.tell(f"building the image gateway for {board}, as it is flashed (seconds)")
-        bus = self.start("emulator", [ROOT / "scripts/emulate", board, "--image", "gateway", "--every", "0.5"])
+    def play(self):
+        self.tell("building the image gateway, as it is flashed (seconds)")
+        bus = self.start("emulator", [ROOT / "scripts/emulate", "--image", "gateway", "--every", "0.5"])
         port = self.wait(bus, r"serial port is (/dev/pts/\d+)", BUILD_S)[1]
         self.tell(f"an emulated CPU runs it; its serial port is {port}")
         settings = self.folder / "serial.conf"
@@ -92,7 +92,6 @@ class Story:
 def main():
     parser = argparse.ArgumentParser(prog="./demo --mcu")
     parser.add_argument("--build", required=True, type=Path)
-    parser.add_argument("--board", default="stm32f446")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     if shutil.which("arm-none-eabi-gcc") is None:
@@ -100,7 +99,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="iwheel-") as folder:
         story = Story(options.build, folder)
         try:
-            story.play(options.board)
+            story.play()
         except Failed as error:
             print(f"demo: {error}", file=sys.stderr)
             return 1

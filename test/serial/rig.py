@@ -159,7 +159,7 @@ class SerialRig(Rig):
             time.sleep(0.01)
         return True
 
-    def start_gateway(self, *extra, **options):  # pylint: disable=arguments-differ
+    def start_gateway(self, *extra, **options):
         self.timeline.append(Event(now_us(), "start"))
         self.start_board()
         self.start_relay(*extra)

@@ -217,6 +217,7 @@ def bad_lines(t):
     t.check(len(drives) > 10 and all(b'"boot"' in line and b'"t_us"' in line for line in drives), f"{drives[:1]}")
     chance, before_us = random.Random(7), now_us()
     t.arm(client)
+    rig.timeline.append(Event(now_us() + 1_000_000, "ramp", within_us=LEASE_US))  # Its first lease passes without a command.
     sent = 0
     while sent < 100_000:
         block = b"".join(mutated(chance.choice(drives), chance) for _ in range(500))

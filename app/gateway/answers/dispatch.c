@@ -90,10 +90,11 @@ static void do_arm(const gw_call_t *call) {
 }
 
 void gw_dispatch_arming(gw_answers_t *self, const iw_snapshot_t *seen) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    const gw_clients_t *clients = self->clients;
+    for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
         gw_client_t *client = &self->clients->client[i];
         const bool holds = seen->holder == client->id;
-        if (client->id == IW_CLIENT_NONE || !client->arming || (holds && seen->arming)) {
+        if (!client->arming || (holds && seen->arming)) {
             continue;
         }
         client->arming = false;
