@@ -286,11 +286,10 @@ static int loop(relay_t *self) {
     bridge_service_tell(&self->service, "READY=1");
     while (!ends) {
         struct epoll_event events[EVENTS_PER_WAIT];
-        const uint64_t then_us = next_us(self);
+        const uint64_t then_us = gw_service_is_busy(&self->clients) ? 0U : next_us(self);
         bool knocks = false;
         self->planned_us = (then_us > self->now_us) ? then_us : self->now_us;
-        const int count =
-            gw_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, gw_service_is_busy(&self->clients) ? 0U : then_us);
+        const int count = gw_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, then_us);
         if (count < 0) {
             if (errno != EINTR) {
                 return EX_SOFTWARE;

@@ -291,6 +291,7 @@ def delayed(t):
     rig, client = begin(t)
     t.drive_for(client, 200, 200, 0.4)
     rig.cable.held = True
+    time.sleep(0.03)  # What the cable had in its hand has gone.
     held_us = now_us()
     rig.timeline.append(Event(held_us, "ramp", within_us=LEASE_US))
     for number in range(60):
