@@ -191,9 +191,9 @@ static int open_loop(relay_t *self) {
     (void)sigprocmask(SIG_BLOCK, &set, NULL);
     (void)signal(SIGPIPE, SIG_IGN);
     self->signal_fd = signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
-    self->clients.epoll_fd = epoll_create1(EPOLL_CLOEXEC);
-    if (self->signal_fd < 0 || self->clients.epoll_fd < 0 || gw_wakeup_open(&self->wakeup) != 0 ||
-        watch(self, self->signal_fd, GW_TAG_SIGNAL) != 0 || watch(self, self->wakeup.fd, GW_TAG_TIMER) != 0 ||
+    const int error = gw_wakeup_open(&self->wakeup);
+    self->clients.epoll_fd = self->wakeup.fd;
+    if (self->signal_fd < 0 || error != 0 || watch(self, self->signal_fd, GW_TAG_SIGNAL) != 0 ||
         watch(self, self->clients.listener[GW_DRIVE].fd, GW_TAG_LISTENER) != 0 ||
         watch(self, self->clients.listener[GW_WATCH].fd, GW_TAG_WATCH_LISTENER) != 0) {
         (void)fputs("iwheel-serial: cannot make the descriptors for the event loop; raise the limit of open files\n",
@@ -243,9 +243,6 @@ static void judge_gap(relay_t *self) {
 /// True if somebody wants to be let in.
 static bool note_event(relay_t *self, const struct epoll_event *event, bool *out_end) {
     switch (event->data.u64) {
-    case GW_TAG_TIMER:
-        gw_wakeup_came(&self->wakeup);
-        return false;
     case GW_TAG_SIGNAL:
         *out_end = true;
         return false;
@@ -291,10 +288,9 @@ static int loop(relay_t *self) {
         struct epoll_event events[EVENTS_PER_WAIT];
         const uint64_t then_us = next_us(self);
         bool knocks = false;
-        (void)gw_wakeup_by(&self->wakeup, then_us);
         self->planned_us = (then_us > self->now_us) ? then_us : self->now_us;
         const int count =
-            epoll_wait(self->clients.epoll_fd, events, EVENTS_PER_WAIT, gw_service_is_busy(&self->clients) ? 0 : -1);
+            gw_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, gw_service_is_busy(&self->clients) ? 0U : then_us);
         if (count < 0) {
             if (errno != EINTR) {
                 return EX_SOFTWARE;
