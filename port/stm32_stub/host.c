@@ -199,7 +199,7 @@ bool iw_host_take(iw_host_t *self, iw_time_us_t now_us) {
     char byte;
     unsigned lines = 0;
     self->now_us = now_us;
-    if (now_us - self->heard_us >= IWN_LINE_SILENT_MS * IW_US_PER_MS) {
+    if (now_us - self->heard_us >= (iw_time_us_t)IWN_LINE_SILENT_MS * IW_US_PER_MS) {
         end_all(self);
     }
     if (iw_serial_had_error()) {

@@ -66,7 +66,7 @@ IMAGE = {
     "an interrupt feeds the watchdog": (
         "main.c", "    iw_bxcan_on_receive(&bus);\n", "    iw_bxcan_on_receive(&bus);\n    iw_watchdog_feed();\n", "demo", "loop_stuck"),
     "no watchdog": ("main.c", "    iw_watchdog_start();\n", "", "demo", "hang"),
-    "nobody remembers that setpoints were being sent": ("main.c", "start_gateway(&gateway, restarted)", "start_gateway(&gateway, false)",
+    "nobody remembers that setpoints were being sent": ("main.c", "start_gateway(&gateway, &config, restarted)", "start_gateway(&gateway, &config, false)",
                                                         "demo", "hang"),
     "a button that is down counts as a press": (
         "commander.c", "const bool press = level && self->released;", "const bool press = level;", "demo", "demo_button_held_through_reset"),

@@ -662,7 +662,7 @@ def stack_overflow(rig):
     machine, overflow_ns = rig.machine, rig.machine.now_ns
     while machine.active or not machine.sleeping:
         rig.run(US)
-    machine.cpu.reg_write(machine.SP, rig.stack_area[0] + 16)
+    machine.cpu.reg_write(machine.SP, rig.stack_area[0])
     rig.run(2 * SECOND)
     rig.expect_resets("software")
     assert machine.faults == 1, "no fault"

@@ -18,6 +18,7 @@ from .registers import Registers
 ACCESS_CYCLES = 12
 EXC_RETURN = 0xFFFFFFF9
 EXCEPTION_EXIT = 8 # Unicorn's number for a return from an exception.
+ABORTS = (3, 4) # And those for code and data where the memory map allows none.
 NOWHERE = 0xFFFFFFFE
 BACK, ENDLESS = 0x080F0000, 0x080F0100 # In the flash, beyond every image; ENDLESS is an instruction that jumps to itself.
 SP, LR, PC, XPSR, PRIMASK = (getattr(arm, f"UC_ARM_REG_{name}") for name in ("SP", "LR", "PC", "XPSR", "PRIMASK"))
@@ -106,6 +107,8 @@ class Machine:
         self.spend()
         if self.trap == EXCEPTION_EXIT:
             self.leave_exception()
+        elif self.trap in ABORTS:
+            self.hard_fault()
         elif self.trap is not None:
             raise RuntimeError(f"trap {self.trap} at 0x{self.pc.read()[0]:08X}")
         elif not clock.has_stopped:
