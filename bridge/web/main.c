@@ -143,7 +143,8 @@ static int loop(web_server_t *server) {
     bridge_service_open(&service);
     bridge_service_tell(&service, "READY=1");
     while (end_asked == 0) {
-        struct pollfd waits[] = {{web_server_fd(server), POLLIN, 0}, {web_link_fd(&server->link), POLLIN, 0}};
+        struct pollfd waits[] = {{web_server_fd(server), POLLIN, 0},
+                                 {bridge_link_fd(&server->link.gateway), POLLIN, 0}};
         const int wait_ms = web_server_wait_ms(server);
         const struct timespec wait = {wait_ms / 1000, (long)(wait_ms % 1000) * 1000000L};
         (void)ppoll(waits, 2, &wait, &none);

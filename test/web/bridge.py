@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from bus import now_us
-from web_rig import Driver, ROOT, Skip, braking_ms, full, needs, until
+from trials import ROOT, Driver, Skip, braking_ms, full, needs, until
 
 ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/metrics", "/health")
 COMMANDS = ("/api/stop", "/api/estop", "/api/arm", "/api/drive", "/api/reset")
