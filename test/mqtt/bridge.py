@@ -367,14 +367,15 @@ def test_driving_by_the_watch_socket_ends_with_the_missing_right(rig):
 
 
 def test_broker_killed_and_back_each_stop_once_in_order(rig):
+    line = rig.cut_here()
     rig.start()
     far = rig.online()
     make_stops(rig, 2)
     until(lambda: numbers(far) == [1, 2], what="the first two")
     rig.end_broker()
     last = make_stops(rig, 5)
-    rig.start_broker()
-    until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}: {numbers(far)}")
+    rig.bring_broker_back(line, far)
+    until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}")
     faults = [(event["cause"], event["present"]) for event in far.events("fault") if event["cause"] == "estop_line"]
     assert faults == [("estop_line", True), ("estop_line", False)] * last, faults
     until(lambda: far.messages("info")[-1]["events"]["waiting"] == 0, 5, "the spool is empty")
@@ -408,6 +409,7 @@ def test_network_that_swallows_everything_is_noticed_and_each_stop_told(rig):
 
 
 def test_bridge_killed_while_it_keeps_events_each_stop_once_in_order(rig):
+    line = rig.cut_here()
     rig.start_gateway()
     rig.start_broker()
     far = rig.far()
@@ -422,7 +424,7 @@ def test_bridge_killed_while_it_keeps_events_each_stop_once_in_order(rig):
         os.unlink(rig.path("mqtt.out"))
     unseen = make_stops(rig, 1)  # Nobody was there: told by `why` afterwards.
     rig.start_bridge()
-    rig.start_broker()
+    rig.bring_broker_back(line, far)
     until(lambda: numbers(far) == list(range(1, unseen + 1)), 20, f"all {unseen}")
     assert far.events("stop")[-1].get("missed") is True, far.events("stop")[-1]
     rig.bridge.signal(signal.SIGTERM)
@@ -437,6 +439,7 @@ def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
     def small_files():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
+    line = rig.cut_here()
     rig.start_gateway()
     rig.start_broker()
     far = rig.far()
@@ -445,8 +448,8 @@ def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
     time.sleep(0.4)
     last = make_stops(rig, 5)
     until(lambda: "takes nothing" in rig.bridge.text(), what="said in the log")
-    rig.start_broker()
-    until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}: {numbers(far)}")
+    rig.bring_broker_back(line, far)
+    until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}")
     until(lambda: "on its disk again" in rig.bridge.text(), what="the disk is used again")
 
 
@@ -471,15 +474,17 @@ def test_clock_that_steps_changes_neither_ages_nor_order(rig):
 @full
 def test_campaign_of_kills_each_stop_once_in_order(rig):
     """Bridge and broker, killed in turn, fifty times."""
+    line = rig.cut_here()
     rig.start()
     far = rig.online()
     last = 0
     for turn in range(50):
         last = make_stops(rig, 1)
+        until(lambda number=last: number in numbers(far), 40, "the newest has come")
         if turn % 2:
             rig.end_broker()
             last = make_stops(rig, 1)
-            rig.start_broker()
+            rig.bring_broker_back(line, far)
         else:
             rig.bridge.signal(signal.SIGKILL)
             rig.bridge.wait(3)

@@ -44,11 +44,14 @@ class Far:
         self.client.reconnect_delay_set(0.1, 0.3)
         if setup:
             setup(self.client)
+        self.listens = threading.Event()
         self.client.on_connect = lambda client, *_: client.subscribe([(topic, 1) for topic in topics])
+        self.client.on_subscribe = lambda *_: self.listens.set()
+        self.client.on_disconnect = lambda *_: self.listens.clear()
         self.client.on_message = self.take
         self.client.connect_async("127.0.0.1", port)
         self.client.loop_start()
-        until(self.client.is_connected, what=f"{name} is at the broker")
+        assert self.listens.wait(5), f"{name} is at the broker"
 
     def take(self, _client, _data, message):
         with self.lock:
@@ -130,9 +133,13 @@ class Line(threading.Thread):
         while True:
             try:
                 near = self.listener.accept()[0]
-                far = socket.create_connection(("127.0.0.1", self.to))
             except OSError:
                 return
+            try:
+                far = socket.create_connection(("127.0.0.1", self.to))
+            except OSError:
+                near.close()
+                continue
             self.pairs += [near, far]
             for one, other in ((near, far), (far, near)):
                 threading.Thread(target=self.carry, args=(one, other), daemon=True).start()
@@ -207,6 +214,13 @@ class MqttRig(Rig):
             with socket.socket() as one:
                 return one.connect_ex(("127.0.0.1", self.port)) == 0
         until(listens, what="the broker listens")
+
+    def bring_broker_back(self, line, far):
+        """A broker that was killed knows no listeners: what the bridge told it before `far` is back would be told to nobody."""
+        line.left = 0
+        self.start_broker()
+        assert far.listens.wait(5), "far is back"
+        line.left = None
 
     def end_broker(self, number=9):
         self.broker.signal(number)
