@@ -50,7 +50,7 @@ static void on_connect(struct mosquitto *client, void *context, int code) {
         self->lost = true;
         return;
     }
-    (void)fprintf(stderr, "iwheel-mqtt: connected to the broker at %s port %u\n", self->settings->broker.host,
+    (void)fprintf(stderr, "iwheel-mqtt: connected to the broker at %s port %u\n", self->host,
                   self->settings->broker.port);
     self->told_away = false;
     self->listener.up(self->listener.context);
@@ -140,9 +140,8 @@ int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const
 static void lose(mqtt_broker_t *self, const char *why) {
     const bool was_up = self->state == MQTT_UP;
     if (!self->told_away) {
-        (void)fprintf(stderr, "iwheel-mqtt: no broker at %s port %u (%s%s%s); trying for ever\n",
-                      self->settings->broker.host, self->settings->broker.port, why,
-                      (self->words[0] != '\0') ? "; " : "", self->words);
+        (void)fprintf(stderr, "iwheel-mqtt: no broker at %s port %u (%s%s%s); trying for ever\n", self->host,
+                      self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
     }
     self->told_away = true;
     mosquitto_destroy(self->client);
@@ -159,8 +158,7 @@ static void lose(mqtt_broker_t *self, const char *why) {
 static void *call(void *context) {
     mqtt_caller_t *caller = context;
     const uint64_t one = 1;
-    caller->result = mosquitto_connect(caller->client, caller->settings->broker.host,
-                                       (int)caller->settings->broker.port, (int)caller->settings->broker.keepalive_s);
+    caller->result = mosquitto_connect(caller->client, caller->host, caller->port, caller->keepalive_s);
     caller->error = errno;
     atomic_store(&caller->ended, true);
     (void)!write(caller->wake, &one, sizeof one);
@@ -195,6 +193,11 @@ static bool set_up(mqtt_broker_t *self) {
 static void begin_connecting(mqtt_broker_t *self) {
     pthread_t thread;
     pthread_attr_t attributes;
+    if (!mqtt_settings_host(self->settings, self->next, self->host)) {
+        self->next = 0;
+        (void)mqtt_settings_host(self->settings, 0, self->host);
+    }
+    self->next++;
     self->words[0] = '\0';
     self->lost = false;
     self->refusal = 0;
@@ -203,7 +206,9 @@ static void begin_connecting(mqtt_broker_t *self) {
         return;
     }
     self->caller.client = self->client;
-    self->caller.settings = self->settings;
+    self->caller.host = self->host;
+    self->caller.port = (int)self->settings->broker.port;
+    self->caller.keepalive_s = (int)self->settings->broker.keepalive_s;
     atomic_store(&self->caller.ended, false);
     (void)pthread_attr_init(&attributes);
     (void)pthread_attr_setdetachstate(&attributes, PTHREAD_CREATE_DETACHED);

@@ -27,7 +27,9 @@ typedef enum { MQTT_AWAY, MQTT_CONNECTING, MQTT_GREETING, MQTT_UP } mqtt_broker_
 /// For the thread that connects.
 typedef struct {
     struct mosquitto *client;
-    const mqtt_settings_t *settings;
+    const char *host;
+    int port;
+    int keepalive_s;
     int result;
     int error;
     int wake; ///< Where it tells that it has ended.
@@ -40,12 +42,14 @@ typedef struct {
     mqtt_broker_state_t state;
     struct mosquitto *client; ///< NULL in MQTT_AWAY.
     mqtt_caller_t caller;
-    char *user;      ///< NULL: none.
-    char *password;  ///< Behind `user`.
-    bool told_away;  ///< In the log.
-    bool lost;       ///< The library says so.
-    int refusal;     ///< Of the last CONNACK.
-    char words[160]; ///< What the library said last of its trouble.
+    char host[MQTT_HOST_SIZE]; ///< The one it is at, or tries.
+    size_t next;               ///< Number of the one to try next.
+    char *user;                ///< NULL: none.
+    char *password;            ///< Behind `user`.
+    bool told_away;            ///< In the log.
+    bool lost;                 ///< The library says so.
+    int refusal;               ///< Of the last CONNACK.
+    char words[160];           ///< What the library said last of its trouble.
     uint64_t now_us;
     uint64_t try_us;
     uint64_t wait_us;

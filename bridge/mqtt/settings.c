@@ -34,7 +34,10 @@ static const settings_key_t keys[] = {
      "Name of this machine in topics, iwheel/ID/...: letters, digits, _ and -. No person's name: topics are read by\n"
      "many. With one user per machine at the broker it is that user's name.",
      TEXT(machine.id), .wrong = wrong_name},
-    {"broker", "host", "", "Name or address of the broker, as its certificate has it.", TEXT(broker.host)},
+    {"broker", "host", "",
+     "Name or address of the broker, as its certificate has it; of a cluster several, separated by blanks, tried in "
+     "turn.",
+     TEXT(broker.host)},
     {"broker", "port", "", "By custom 1883 without TLS, 8883 with it.", NUMBER(broker.port, 1, 65535)},
     {"broker", "keepalive_s", " s", "After 1.5 times this without a sign of life both sides count the other as gone.",
      NUMBER(broker.keepalive_s, 5, 3600)},
@@ -89,8 +92,25 @@ bool mqtt_settings_given(const char *text) {
     return strcmp(text, "none") != 0;
 }
 
-static bool stays_on_this_machine(const char *host) {
-    return strncmp(host, "127.", 4) == 0 || strcmp(host, "::1") == 0 || strcmp(host, "localhost") == 0;
+bool mqtt_settings_host(const mqtt_settings_t *settings, size_t number, char out[MQTT_HOST_SIZE]) {
+    const char *at = settings->broker.host + strspn(settings->broker.host, " ");
+    for (; number > 0U && *at != '\0'; number--) {
+        at += strcspn(at, " ");
+        at += strspn(at, " ");
+    }
+    const size_t length = strcspn(at, " ");
+    memcpy(out, at, length);
+    out[length] = '\0';
+    return length > 0U;
+}
+
+static bool stays_on_this_machine(const mqtt_settings_t *settings) {
+    char host[MQTT_HOST_SIZE];
+    bool stays = true;
+    for (size_t i = 0; mqtt_settings_host(settings, i, host); i++) {
+        stays = stays && (strncmp(host, "127.", 4) == 0 || strcmp(host, "::1") == 0 || strcmp(host, "localhost") == 0);
+    }
+    return stays;
 }
 
 static unsigned line_of(const char *section, const char *key, const unsigned *lines) {
@@ -109,7 +129,7 @@ static void relate(settings_report_t *report, const void *values, const unsigned
     if (certificate && !tls) {
         settings_complain(report, line_of("broker", "certificate", lines), "certificate needs TLS; give ca, too");
     }
-    if (!tls && !settings->broker.allow_plain && !stays_on_this_machine(settings->broker.host)) {
+    if (!tls && !settings->broker.allow_plain && !stays_on_this_machine(settings)) {
         settings_complain(report, line_of("broker", "host", lines),
                           "host = %s is another machine, and without TLS whoever is between reads all and may send "
                           "commands; give ca, or say allow_plain = yes",

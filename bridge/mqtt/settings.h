@@ -8,7 +8,8 @@
 /// Read when no `-c FILE` is given. Its absence is no error then.
 #define MQTT_SETTINGS_PATH "/etc/iwheel/mqtt.conf"
 /// Bytes of a machine's id with its terminator.
-#define MQTT_ID_SIZE 33U
+#define MQTT_ID_SIZE   33U
+#define MQTT_HOST_SIZE 256U
 
 typedef struct {
     struct {
@@ -18,7 +19,7 @@ typedef struct {
         char id[MQTT_ID_SIZE]; ///< Of the machine in topics; none: not set yet.
     } machine;
     struct {
-        char host[128];
+        char host[MQTT_HOST_SIZE]; ///< One or more, separated by blanks.
         uint32_t port;
         uint32_t keepalive_s;
         char credentials[108]; ///< A file; none.
@@ -48,6 +49,9 @@ typedef struct {
 void mqtt_settings_default(mqtt_settings_t *out_settings);
 
 extern const settings_form_t mqtt_settings_form;
+
+/// The broker with this number, from 0 on; false: there are no more.
+bool mqtt_settings_host(const mqtt_settings_t *settings, size_t number, char out[MQTT_HOST_SIZE]);
 
 /// False for a text that says `none`.
 bool mqtt_settings_given(const char *text);

@@ -37,10 +37,10 @@ def free_port():
 class Far:
     """Somebody at the broker: keeps all that comes, and sends commands."""
 
-    def __init__(self, port, name="far", topics=("iwheel/#",), setup=None):
+    def __init__(self, port, name="far", topics=("iwheel/#",), setup=None, host="127.0.0.1", clean=True):
         self.name, self.seq, self.all, self.lock = name, 0, [], threading.Lock()
         self.answers = queue.Queue()
-        self.client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id=name)
+        self.client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id=name, clean_session=clean)
         self.client.reconnect_delay_set(0.1, 0.3)
         if setup:
             setup(self.client)
@@ -49,7 +49,7 @@ class Far:
         self.client.on_subscribe = lambda *_: self.listens.set()
         self.client.on_disconnect = lambda *_: self.listens.clear()
         self.client.on_message = self.take
-        self.client.connect_async("127.0.0.1", port)
+        self.client.connect_async(host, port)
         self.client.loop_start()
         assert self.listens.wait(5), f"{name} is at the broker"
 
