@@ -23,7 +23,7 @@ import tempfile
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "../bridge/ros2", "iwheel-web": "../bridge/web", "iwheel-mqtt": "../bridge/mqtt"}
+FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "../bridge/ros2", "iwheel-web": "../bridge/web", "iwheel-mqtt": "../bridge/mqtt", "iwheel-fleet": "../bridge/mqtt"}
 BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document|header|file)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
 UNDERLINE = re.compile(r"([_*\\])")
 
@@ -153,7 +153,7 @@ def main():
         if name == "iwheel-ros2.1.scd" and not os.path.exists(sources.program("iwheel-ros2")):
             print(f"note: man/{name} is not looked at: iwheel-ros2 was not built, cyclonedds-dev is missing")
             continue
-        if name == "iwheel-mqtt.1.scd" and not os.path.exists(sources.program("iwheel-mqtt")):
+        if name in ("iwheel-fleet.1.scd", "iwheel-mqtt.1.scd") and not os.path.exists(sources.program("iwheel-mqtt")):
             print(f"note: man/{name} is not looked at: iwheel-mqtt was not built, libmosquitto-dev is missing")
             continue
         new = renew(text, sources)

@@ -282,8 +282,12 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
                                            (settings->state.every_ms < 1000U) ? 1000U / settings->state.every_ms : 1U,
                                        .drives = settings->drive.enabled};
     const bridge_listener_t gateway = {self, gateway_here, gateway_gone, take_event};
-    const mqtt_broker_listener_t broker = {self, broker_up, broker_down, event_sent, mqtt_bridge_command};
-    *self = (mqtt_bridge_t){.settings = settings};
+    *self = (mqtt_bridge_t){.settings = settings, .topics = {self->commands, NULL}};
+    const mqtt_broker_listener_t broker = {"iwheel-mqtt", self->name,  self->topics, self->will,         self,
+                                           broker_up,     broker_down, event_sent,   mqtt_bridge_command};
+    (void)snprintf(self->name, sizeof self->name, "iwheel-%s", settings->machine.id);
+    mqtt_topic(settings->machine.id, "availability", NULL, self->will);
+    mqtt_topic(settings->machine.id, "cmd", "+", self->commands);
     if (!has_name(settings)) {
         return EX_CONFIG;
     }

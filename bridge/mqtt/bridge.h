@@ -30,6 +30,10 @@ typedef struct {
     mqtt_broker_t broker;
     mqtt_spool_t spool;
     mqtt_judge_t judge;
+    char name[MQTT_ID_SIZE + 8U]; ///< At the broker.
+    char will[MQTT_TOPIC_SIZE];
+    char commands[MQTT_TOPIC_SIZE];
+    const char *topics[2];
     char boot[MQTT_BOOT_SIZE];     ///< Of this run: random.
     char driver[MQTT_SENDER_SIZE]; ///< Who has armed; empty: nobody by this bridge.
     uint64_t silent_us;            ///< When the driver counts as silent.

@@ -2,7 +2,6 @@
 #include "broker.h"
 
 #include "common/link.h"
-#include "tell.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -36,21 +35,23 @@ static void on_log(struct mosquitto *client, void *context, int level, const cha
 
 static void on_connect(struct mosquitto *client, void *context, int code) {
     mqtt_broker_t *self = context;
-    char topic[MQTT_TOPIC_SIZE];
+    int result = MOSQ_ERR_SUCCESS;
     self->refusal = code;
     if (code != 0) {
         self->lost = true;
         return;
     }
-    mqtt_topic(self->settings->machine.id, "cmd", "+", topic);
     self->state = MQTT_UP;
     self->wait_us = SHORTEST_US;
     // QoS 0: what is under way when the connection ends is not sent again.
-    if (mosquitto_subscribe(client, NULL, topic, 0) != MOSQ_ERR_SUCCESS) {
+    for (size_t i = 0; self->listener.topics[i] != NULL && result == MOSQ_ERR_SUCCESS; i++) {
+        result = mosquitto_subscribe(client, NULL, self->listener.topics[i], 0);
+    }
+    if (result != MOSQ_ERR_SUCCESS) {
         self->lost = true;
         return;
     }
-    (void)fprintf(stderr, "iwheel-mqtt: connected to the broker at %s port %u\n", self->host,
+    (void)fprintf(stderr, "%s: connected to the broker at %s port %u\n", self->listener.program, self->host,
                   self->settings->broker.port);
     self->told_away = false;
     self->listener.up(self->listener.context);
@@ -78,7 +79,7 @@ static void on_message(struct mosquitto *client, void *context, const struct mos
 // ---- files --------------------------------------------------------------------------------------------------------
 
 static int complain(int code, const char *path, const char *what) {
-    (void)fprintf(stderr, "iwheel-mqtt: %s: %s\n", path, what);
+    (void)fprintf(stderr, "iwheel: %s: %s\n", path, what);
     return code;
 }
 
@@ -140,8 +141,8 @@ int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const
 static void lose(mqtt_broker_t *self, const char *why) {
     const bool was_up = self->state == MQTT_UP;
     if (!self->told_away) {
-        (void)fprintf(stderr, "iwheel-mqtt: no broker at %s port %u (%s%s%s); trying for ever\n", self->host,
-                      self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
+        (void)fprintf(stderr, "%s: no broker at %s port %u (%s%s%s); trying for ever\n", self->listener.program,
+                      self->host, self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
     }
     self->told_away = true;
     mosquitto_destroy(self->client);
@@ -168,10 +169,8 @@ static void *call(void *context) {
 static bool set_up(mqtt_broker_t *self) {
     const mqtt_settings_t *settings = self->settings;
     const bool certificate = mqtt_settings_given(settings->broker.certificate);
-    char topic[MQTT_TOPIC_SIZE];
-    char name[MQTT_ID_SIZE + 8U];
-    (void)snprintf(name, sizeof name, "iwheel-%s", settings->machine.id);
-    self->client = mosquitto_new(name, true, self);
+    const char *will = self->listener.will;
+    self->client = mosquitto_new(self->listener.name, true, self);
     if (self->client == NULL) {
         return false;
     }
@@ -180,8 +179,7 @@ static bool set_up(mqtt_broker_t *self) {
     mosquitto_disconnect_callback_set(self->client, on_disconnect);
     mosquitto_publish_callback_set(self->client, on_publish);
     mosquitto_message_callback_set(self->client, on_message);
-    mqtt_topic(settings->machine.id, "availability", NULL, topic);
-    return mosquitto_will_set(self->client, topic, 7, "offline", 1, true) == MOSQ_ERR_SUCCESS &&
+    return (will == NULL || mosquitto_will_set(self->client, will, 7, "offline", 1, true) == MOSQ_ERR_SUCCESS) &&
            (self->user == NULL ||
             mosquitto_username_pw_set(self->client, self->user, self->password) == MOSQ_ERR_SUCCESS) &&
            (!mqtt_settings_given(settings->broker.ca) ||
@@ -308,10 +306,10 @@ bool mqtt_broker_close(mqtt_broker_t *self) {
         return false;
     }
     if (self->state == MQTT_UP) {
-        char topic[MQTT_TOPIC_SIZE];
         struct pollfd wait = {.fd = mosquitto_socket(self->client), .events = POLLOUT};
-        mqtt_topic(self->settings->machine.id, "availability", NULL, topic);
-        (void)mosquitto_publish(self->client, NULL, topic, 7, "offline", 0, true);
+        if (self->listener.will != NULL) {
+            (void)mosquitto_publish(self->client, NULL, self->listener.will, 7, "offline", 0, true);
+        }
         (void)mosquitto_disconnect(self->client);
         for (int i = 0; i < 10 && mosquitto_want_write(self->client); i++) {
             (void)poll(&wait, 1, GOODBYE_MS / 10);

@@ -15,12 +15,16 @@
 #include <stdatomic.h>
 
 typedef struct {
+    const char *program;       ///< For the log.
+    const char *name;          ///< Of the client at the broker; no other may have it.
+    const char *const *topics; ///< What it listens to, by QoS 0; ends with NULL.
+    const char *will;          ///< Where the broker says `offline` when this client is gone, retained; NULL: nowhere.
     void *context;
     void (*up)(void *context);
     void (*down)(void *context);
     void (*sent)(void *context, int message); ///< The broker has confirmed it.
     void (*came)(void *context, const struct mosquitto_message *message);
-} mqtt_broker_listener_t;
+} mqtt_broker_listener_t; ///< The texts must outlive the connection.
 
 typedef enum { MQTT_AWAY, MQTT_CONNECTING, MQTT_GREETING, MQTT_UP } mqtt_broker_state_t;
 

@@ -179,3 +179,20 @@ def test_mosquitto_that_forwards_keeps_what_the_fleet_cannot_take(rig):
     last = make_stops(rig, 3)
     rig.processes.append(Process(["mosquitto", "-c", rig.path("fleet.conf")], rig.path("fleet.out")))
     until(lambda: numbers(console) == list(range(first, last + 1)), 40, "all of them")
+
+
+def test_console_shows_who_is_there_and_who_stopped(rig):
+    rig.start()
+    rig.online()
+    config = Path(rig.path("fleet.conf"))
+    config.write_text(f"[broker]\nport = {rig.port}\n", encoding="ascii")
+    rig.far().client.publish("iwheel/w9/availability", "offline", qos=1, retain=True).wait_for_publish(3)
+    with subprocess.Popen([rig.program("iwheel-fleet"), "-c", str(config), "--for", "3", "--json"], stdout=subprocess.PIPE, text=True) as console:
+        time.sleep(0.7)
+        make_stops(rig, 1)
+        rows = [json.loads(line) for line in console.communicate(timeout=10)[0].splitlines()]
+    assert console.returncode == 0 and [(row["machine"], row["online"], row["cause"]) for row in rows] == [(ID, True, "estop_line"), ("w9", False, None)], rows
+    assert "emergency" in rows[0]["sentence"] or "e-stop" in rows[0]["sentence"], rows[0]
+    rig.end_broker()
+    done = subprocess.run([rig.program("iwheel-fleet"), "-c", str(config), "--for", "1"], capture_output=True, text=True, timeout=10, check=False)
+    assert done.returncode == 69 and "no broker" in done.stderr, done
