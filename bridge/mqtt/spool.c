@@ -232,7 +232,8 @@ static void read_file(mqtt_spool_t *self) {
 
 bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes) {
     *self = (mqtt_spool_t){.folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC), .file = -1};
-    self->size = (max_bytes > 2U * MQTT_SPOOL_EVENT_MAX) ? max_bytes : 2U * MQTT_SPOOL_EVENT_MAX;
+    self->size = 2U * (size_t)MQTT_SPOOL_EVENT_MAX;
+    self->size = (max_bytes > self->size) ? max_bytes : self->size;
     const bool ours = self->folder >= 0 && flock(self->folder, LOCK_EX | LOCK_NB) == 0;
     self->data = ours ? malloc(self->size) : NULL;
     if (self->data == NULL) {
