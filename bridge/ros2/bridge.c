@@ -351,6 +351,7 @@ static void tell(bridge_t *self, int64_t now) {
 }
 
 void bridge_step(bridge_t *self) {
+    (void)pthread_mutex_lock(&self->lock);
     take_from_ros(self);
     if (self->facts.link != ROS_LINK_GONE) {
         take_messages(self);
@@ -363,9 +364,10 @@ void bridge_step(bridge_t *self) {
         self->facts.link = ROS_LINK_SILENT;
     }
     tell(self, now);
+    (void)pthread_mutex_unlock(&self->lock);
 }
 
-int bridge_wait_ms(const bridge_t *self) {
+static int wait_ms(const bridge_t *self) {
     const int64_t now = now_us();
     const bool here = self->facts.link != ROS_LINK_GONE;
     int64_t next_us = self->second_us;
@@ -381,35 +383,70 @@ int bridge_wait_ms(const bridge_t *self) {
     return (next_us > now) ? (int)((next_us - now) / 1000) + 1 : 0;
 }
 
+int bridge_wait_ms(bridge_t *self, int *out_fd) {
+    (void)pthread_mutex_lock(&self->lock);
+    const int result = wait_ms(self);
+    *out_fd = iwc_fd(self->gateway);
+    (void)pthread_mutex_unlock(&self->lock);
+    return result;
+}
+
+/// In a thread of DDS. With auto_arm a command may have to wait for the gateway, which is the loop's to do.
+static bool take_now(void *context) {
+    bridge_t *self = context;
+    ros_command_t command;
+    if (pthread_mutex_trylock(&self->lock) != 0) {
+        return false;
+    }
+    const bool can = self->facts.link == ROS_LINK_UP && !self->settings.drive.auto_arm;
+    if (can && ros_take_command(self->ros, &command)) {
+        take_command(self, &command);
+    }
+    (void)pthread_mutex_unlock(&self->lock);
+    return can;
+}
+
 // ---- begin and end ------------------------------------------------------------------------------------------------
 
-int bridge_open(bridge_t *self, const ros_settings_t *settings) {
-    memset(self, 0, sizeof *self);
-    self->settings = *settings;
-    self->facts.drive = settings->drive.enabled;
-    self->backoff_us = BACKOFF_US;
-    ros_auto_init(&self->auto_arm, now_us());
+static int open_both(bridge_t *self) {
     self->gateway = iwc_new();
-    self->ros = (self->gateway != NULL) ? ros_open(settings, stderr) : NULL;
+    self->ros = (self->gateway != NULL) ? ros_open(&self->settings, take_now, self, stderr) : NULL;
     if (self->ros == NULL) {
-        iwc_free(self->gateway);
         return EX_UNAVAILABLE;
     }
-    if (try_connect(self) == IWC_DENIED && settings->drive.enabled) {
+    if (try_connect(self) == IWC_DENIED && self->settings.drive.enabled) {
         (void)fprintf(stderr,
                       "iwheel-ros2: %s is not for this user: add it to the group iwheel (to drive), or set [drive] "
                       "enabled = no\n",
-                      settings->gateway.socket);
-        bridge_close(self);
+                      self->settings.gateway.socket);
         return EX_NOPERM;
     }
     return 0;
 }
 
+int bridge_open(bridge_t *self, const ros_settings_t *settings) {
+    memset(self, 0, sizeof *self);
+    (void)pthread_mutex_init(&self->lock, NULL);
+    (void)pthread_mutex_lock(&self->lock);
+    self->settings = *settings;
+    self->facts.drive = settings->drive.enabled;
+    self->backoff_us = BACKOFF_US;
+    ros_auto_init(&self->auto_arm, now_us());
+    const int result = open_both(self);
+    (void)pthread_mutex_unlock(&self->lock);
+    if (result != 0) {
+        bridge_close(self);
+    }
+    return result;
+}
+
 void bridge_close(bridge_t *self) {
+    (void)pthread_mutex_lock(&self->lock); // For ever: what DDS still receives is nobody's.
     if (self->facts.machine.now.ours && self->facts.link != ROS_LINK_GONE) {
         (void)iwc_stop(self->gateway, ASK_MS);
     }
+    if (self->ros != NULL) {
+        ros_close(self->ros);
+    }
     iwc_free(self->gateway);
-    ros_close(self->ros);
 }
