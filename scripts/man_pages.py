@@ -23,7 +23,8 @@ import tempfile
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "../bridge/ros2", "iwheel-serial": "../bridge/serial", "iwheel-web": "../bridge/web"}
+FOLDERS = {"iwheel-gateway": "gateway", "iwheelctl": "ctl", "iwheel-sim": "sim", "iwheel-ros2": "../bridge/ros2", "iwheel-serial": "../bridge/serial", "iwheel-web": "../bridge/web",
+           "iwheel-mqtt": "../bridge/mqtt", "iwheel-fleet": "../bridge/mqtt"}
 BLOCK = re.compile(r"^; (help|verbs|commands|configuration|document|header|file)(?: (\S+))?\n(.*?)^; end\n", re.MULTILINE | re.DOTALL)
 UNDERLINE = re.compile(r"([_*\\])")
 
@@ -152,6 +153,9 @@ def main():
             text = file.read()
         if name == "iwheel-ros2.1.scd" and not os.path.exists(sources.program("iwheel-ros2")):
             print(f"note: man/{name} is not looked at: iwheel-ros2 was not built, cyclonedds-dev is missing")
+            continue
+        if name in ("iwheel-fleet.1.scd", "iwheel-mqtt.1.scd") and not os.path.exists(sources.program("iwheel-mqtt")):
+            print(f"note: man/{name} is not looked at: iwheel-mqtt was not built, libmosquitto-dev is missing")
             continue
         new = renew(text, sources)
         if new != text:

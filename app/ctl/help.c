@@ -47,6 +47,10 @@ static const verb_t verbs[] = {
           "as a QR code too.\n"
           "WHO HAS THE ADDRESS MAY LOOK AND STOP, and drive if that is configured.\n"),
      .no_json = "web prints an address; it has no --json"},
+    {VERB("fleet", verb_fleet, "", "who of a fleet is there, who stopped and why, as its broker knows",
+          "Reads an MQTT broker, not this machine's gateway; needs the package iwheel-mqtt and /etc/iwheel/fleet.conf. "
+          "Ctrl-C ends it.\n"),
+     .no_json = "fleet draws a table; for JSON lines: iwheel-fleet --for 10 --json"},
     {VERB("watch", verb_watch, "[TOPIC...] [--rate HZ]", "events as they come, one JSON object per line",
           "Reads only. Topics: state bus estop lease stop force frame; without one: the first five.\n"
           "--rate HZ  1 to 100: events of state and force per second, 10 if not told\n"

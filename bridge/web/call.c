@@ -125,7 +125,7 @@ static void take_answer(void *context, const iwc_message_t *reply) {
 static enum MHD_Result ask(web_call_t *self, const char *request) {
     self->suspended = true;
     MHD_suspend_connection(self->connection); // First: the answer may be there at once.
-    if (!web_link_ask(&self->server->link, request, take_answer, self, self->server->now_us)) {
+    if (!bridge_link_ask(&self->server->link.gateway, request, take_answer, self, self->server->now_us)) {
         static const char gone[] = "{\"ok\":false,\"error\":\"not_delivered\",\"message\":\"";
         char text[256];
         const int length = snprintf(text, sizeof text, "%s%s\"}", gone, not_there);
@@ -197,7 +197,7 @@ static enum MHD_Result send_health(web_call_t *self) {
         snprintf(text, sizeof text,
                  "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
                  "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u}\n",
-                 good ? "true" : "false", server->link.is_here ? "connected" : "away",
+                 good ? "true" : "false", server->link.gateway.is_here ? "connected" : "away",
                  settings->drive.enabled ? "true" : "false",
                  (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false",
                  settings->drive.max_speed_mm_s, settings->drive.ttl_ms, settings->gateway.rate_hz);
@@ -218,7 +218,7 @@ static enum MHD_Result send_metrics(web_call_t *self) {
     iwc_message_t state;
     web_own_t own = self->server->own;
     own.dropped = self->server->driver.dropped;
-    own.connections = self->server->link.connections;
+    own.connections = self->server->link.gateway.connections;
     own.watchers = self->server->stream_count;
     own.crowded_out = self->server->crowded_out + self->server->door.crowded_out;
     FILE *out = open_memstream(&text, &length);
@@ -383,7 +383,7 @@ void web_call_completed(void *context, struct MHD_Connection *connection, void *
     if (self == NULL) {
         return;
     }
-    web_link_forget(&server->link, self);
+    bridge_link_forget(&server->link.gateway, self);
     for (web_call_t **at = &server->streams; *at != NULL; at = &(*at)->next) {
         if (*at == self) {
             *at = self->next;

@@ -144,7 +144,7 @@ static int loop(web_server_t *server) {
     bridge_service_tell(&service, "READY=1");
     while (end_asked == 0) {
         int fds[WEB_SERVER_FDS];
-        struct pollfd waits[WEB_SERVER_FDS + 1U] = {{web_link_fd(&server->link), POLLIN, 0}};
+        struct pollfd waits[WEB_SERVER_FDS + 1U] = {{bridge_link_fd(&server->link.gateway), POLLIN, 0}};
         web_server_fds(server, fds);
         for (size_t i = 0; i < WEB_SERVER_FDS; i++) {
             waits[i + 1U] = (struct pollfd){fds[i], POLLIN, 0};

@@ -319,12 +319,12 @@ static void look_at_token(web_server_t *self) {
 static void let_go(web_server_t *self) {
     iwc_message_t message;
     iwc_state_t state;
-    if (!web_driver_silent(&self->driver, self->now_us) && self->link.is_here) {
+    if (!web_driver_silent(&self->driver, self->now_us) && self->link.gateway.is_here) {
         return;
     }
     if (self->driver.key[0] != '\0' && web_link_state(&self->link, self->now_us, &message) &&
-        iwc_state(self->link.gateway, &message, &state) && state.ours) {
-        (void)web_link_ask(&self->link, "{\"cmd\":\"stop\"}", NULL, NULL, self->now_us);
+        iwc_state(self->link.gateway.gateway, &message, &state) && state.ours) {
+        (void)bridge_link_ask(&self->link.gateway, "{\"cmd\":\"stop\"}", NULL, NULL, self->now_us);
     }
     web_driver_end(&self->driver);
 }

@@ -20,7 +20,7 @@ from harness import find_program  # noqa: E402
 
 BUILD = ""
 # Those that talk with a person.
-WITHOUT_JSON = {"top", "bringup", "help", "web"}
+WITHOUT_JSON = {"top", "bringup", "help", "web", "fleet"}
 
 
 def run(*words, program="iwheelctl", path=None, **more):
@@ -87,6 +87,18 @@ class Web(unittest.TestCase):
             os.chmod(fake, 0o755)
             self.assertEqual((0, "told --url\n", ""), run("web", path=folder))
         self.assertEqual(64, run("web", "word")[0])
+
+    def test_fleet_is_the_consoles_own_word_or_says_what_to_install(self):
+        with tempfile.TemporaryDirectory() as folder:
+            code, out, err = run("fleet", path=folder)
+            self.assertEqual((69, ""), (code, out))
+            self.assertIn("apt-get install ./iwheel-mqtt_*.deb", err)
+            fake = os.path.join(folder, "iwheel-fleet")
+            with open(fake, "w", encoding="ascii") as file:
+                file.write("#!/bin/sh\necho \"told $#\"\n")
+            os.chmod(fake, 0o755)
+            self.assertEqual((0, "told 0\n", ""), run("fleet", path=folder))
+        self.assertEqual(64, run("fleet", "word")[0])
 
 
 class Json(unittest.TestCase):

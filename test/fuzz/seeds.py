@@ -4,6 +4,7 @@ import ast
 import collections
 import json
 import re
+import zlib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -43,6 +44,7 @@ def by_hand():
         "candump": [ODD_LINES.encode()],
         "line": [b'0 {"cmd":"link"}*e2d27f9b\n', b'3 1250000 {"ok":true}*e0f15d9c\n', b'1 {"boot":"0123456789abcdef","seq":1,"t_us":2,"cmd":"stop"}\xfe', b"8 {}\xfe\xff8 0 {}\xfe"],
         "web": [b"GET\n/\n[::1]\nnull\ncross-site\n\n", b"POST\n/api/estop\nwalker.lan:8470\nhttps://walker.lan:8470\nsame-origin\nbearer " + b"0" * 32],
+        "mqtt": [b"stop\n{\"from\":\"far\",\"seq\":1,\"boot\":\"0123456789abcdef\",\"t_us\":1}", b"estop\n{\"from\":\"a/b\"}", b"iwspool1" + bytes(40)],
         "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
 
@@ -97,6 +99,19 @@ def client():
     """What the gateway noted of itself, told as events."""
     lines = [json.dumps({"event": row["type"], **row}).encode() + b"\n" for row in rows()]
     return [b"\0" + line for line in lines[:20]] + [bytes([how]) + b"".join(lines[:60]) for how in (0, 1, 8, 40)]
+
+
+def mqtt():
+    """Commands that fuzz_mqtt.c takes, and a spool's file with two events of which one is confirmed."""
+    said = b'\n{"from":"far","seq":7,"boot":"0123456789abcdef","t_us":49900000'
+    verbs = (b"stop", b"arm", b"why", b"estop", b"drive", b"recording")
+    fields = (b"", b"", b',"ttl_ms":500', b',"reason":"in the way"', b',"left_mm_s":100,"right_mm_s":-5', b',"name":"stop-000001-estop_line.log","offset":0')
+
+    def record(letter, number, rest=b""):
+        body = letter + number.to_bytes(8, "little") + bytes(8) + rest
+        return len(body).to_bytes(4, "little") + zlib.crc32(body).to_bytes(4, "little") + body
+    events = [record(b"e", number, b"stop\0" + b'{"number":%d}' % number) for number in (1, 2)]
+    return [verb + said + more + b"}" for verb, more in zip(verbs, fields)] + [b"iwspool1" + record(b"c", 0) + b"".join(events) + record(b"c", 1)]
 
 
 def web():
@@ -154,4 +169,4 @@ def gateway():
 
 def recorded():
     """{target: [bytes]}: a target that does not take them has lost what it was for."""
-    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client(), "web": web(), "line": line()}
+    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client(), "mqtt": mqtt(), "web": web(), "line": line()}

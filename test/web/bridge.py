@@ -19,7 +19,8 @@ from pathlib import Path
 from bus import now_us
 from harness import Process
 from judge_log import GAP_US
-from web_rig import Driver, ROOT, Skip, braking_ms, free_port, full, longest_gap_ms, needs, until
+from trials import ROOT, Driver, Skip, braking_ms, full, longest_gap_ms, needs, until
+from web_rig import free_port
 
 ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/metrics", "/health")
 COMMANDS = ("/api/stop", "/api/estop", "/api/arm", "/api/drive", "/api/reset")

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from bus import now_us
-from web_rig import Driver, Skip, braking_ms, full, needs, until
+from trials import Driver, Skip, braking_ms, full, needs, until
 
 SIZES = {"desk": (1440, 900), "phone": (390, 844)}
 ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "iwheel/web")

@@ -5,52 +5,22 @@ import http.client
 import json
 import socket
 import sys
-import threading
-import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test/system"))
 
-from bus import now_us  # noqa: E402
-from client import Closed  # noqa: E402
 from harness import Process, Rig  # noqa: E402
-from judge_log import LEFT, RIGHT  # noqa: E402
+from trials import until  # noqa: E402
 
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
-
-
-def needs(**rig):
-    """Marks a test with what its rig is made with."""
-    def mark(function):
-        function.rig = rig
-        return function
-    return mark
-
-
-def full(function):
-    """Marks a test that only --full runs."""
-    function.full = True
-    return function
 
 
 def free_port():
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return one.getsockname()[1]
-
-
-def until(condition, seconds=10.0, what="it"):
-    """The first true value of the condition; fails loudly if there is none in time."""
-    deadline = time.monotonic() + seconds
-    while True:
-        value = condition()
-        if value:
-            return value
-        if time.monotonic() > deadline:
-            raise AssertionError(f"not within {seconds} s: {what}")
-        time.sleep(0.02)
 
 
 class WebRig(Rig):
@@ -67,6 +37,9 @@ class WebRig(Rig):
             self.web_settings["drive"] = {"enabled": "yes", "allow_reset": "yes"}
         for section, keys in (settings or {}).items():
             self.web_settings[section].update(keys)
+
+    def words(self):
+        return self.web.text() if self.web else ""
 
     def gateway_command(self, *extra):
         return super().gateway_command("--watch-socket", self.path("watch.sock"), *extra)
@@ -140,59 +113,3 @@ class WebRig(Rig):
 def page_folder(build):
     """The page as it would be installed."""
     return Path(build).resolve() / "bridge/web/page"
-
-
-class Skip(Exception):
-    """This cannot be tested here."""
-
-
-class Driver(threading.Thread):
-    """A client of the gateway that drives until it is told to end, or the wheels are stopped."""
-
-    def __init__(self, rig, speed=200):
-        super().__init__(daemon=True)
-        self.client, self.speed, self.ended = rig.client(name="joystick"), speed, threading.Event()
-        self.turning = False
-        self.start()
-        until(lambda: rig.bus.setpoints() and abs(rig.bus.setpoints()[-1][2]) == speed, what="the wheels are told to turn, and at this speed")
-        self.turning = True
-
-    def run(self):
-        """A busy machine may stop the wheels before the test begins: then once more, after the silence that `arm` wants."""
-        wait, cmd = 0.05, {"cmd": "arm", "name": "joystick"}
-        try:
-            while not self.ended.wait(wait):
-                done = self.client.request(**cmd)["ok"]
-                if not done and self.turning:
-                    return
-                wait = 0.05 if done else 0.6
-                cmd = {"cmd": "drive", "left_mm_s": self.speed, "right_mm_s": self.speed} if done else {"cmd": "arm", "name": "joystick"}
-        except (OSError, Closed):
-            return  # The rig has ended.
-
-    def end(self):
-        self.ended.set()
-        self.join(2)
-
-
-def longest_gap_ms(rig, since_us):
-    """The longest time between two setpoints of one wheel on the bus, until now."""
-    until_us = now_us()
-    gaps = []
-    for wheel in (LEFT, RIGHT):
-        times = [since_us] + [t_us for t_us, id_, _ in rig.bus.setpoints(since_us) if id_ == wheel and t_us < until_us]
-        gaps += [after - before for before, after in zip(times, times[1:] + [until_us])]
-    return max(gaps) / 1000
-
-
-def braking_ms(rig, since_us, seconds=2):
-    """How long after this time the first setpoint was on the bus that is nearer to zero than the one before it of that wheel."""
-    def found():
-        last = {}
-        for t_us, wheel, speed in rig.bus.setpoints():
-            if t_us >= since_us and abs(speed) < last.get(wheel, 0):
-                return t_us
-            last[wheel] = abs(speed)
-        return None
-
-    return (until(found, seconds, "the wheels are told to brake") - since_us) / 1000

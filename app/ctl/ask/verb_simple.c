@@ -107,14 +107,19 @@ int verb_tare(ctl_t *self, int count, char **words) {
     return code;
 }
 
+/// Another package's program in this one's place: it knows its configuration, and how to draw it.
+static int become(const char *program, const char *option, const char *package) {
+    (void)execlp(program, program, option, (char *)NULL);
+    return ctl_fail(CTL_UNAVAILABLE, "%s cannot be started (%s); install it: apt-get install ./%s_*.deb", program,
+                    strerror(errno), package);
+}
+
 int verb_web(ctl_t *self, int count, char **words) {
     (void)self;
-    if (!words_at_most("web", count, 0, words)) {
-        return CTL_USAGE;
-    }
-    // The page's own program knows its configuration, its token and how to draw it.
-    (void)execlp("iwheel-web", "iwheel-web", "--url", (char *)NULL);
-    return ctl_fail(CTL_UNAVAILABLE,
-                    "iwheel-web cannot be started (%s); install it: apt-get install ./iwheel-web_*.deb",
-                    strerror(errno));
+    return words_at_most("web", count, 0, words) ? become("iwheel-web", "--url", "iwheel-web") : CTL_USAGE;
+}
+
+int verb_fleet(ctl_t *self, int count, char **words) {
+    (void)self;
+    return words_at_most("fleet", count, 0, words) ? become("iwheel-fleet", NULL, "iwheel-mqtt") : CTL_USAGE;
 }

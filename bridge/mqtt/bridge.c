@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: MIT
+#include "bridge.h"
+
+#include <errno.h>
+#include <string.h>
+#include <sys/random.h>
+#include <sysexits.h>
+#include <time.h>
+#include <unistd.h>
+
+#define SECOND_US 1000000U
+#define INFO_US   60000000U
+
+static const mqtt_way_t once = {1, false, false};
+static const mqtt_way_t retained = {1, true, false};
+
+static mqtt_buffer_t buffer(mqtt_bridge_t *self) {
+    return (mqtt_buffer_t){self->payload, sizeof self->payload};
+}
+
+static int64_t wall_us(void) {
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+int mqtt_bridge_publish(mqtt_bridge_t *self, const char *what, const char *name, size_t length, mqtt_way_t way) {
+    char topic[MQTT_TOPIC_SIZE];
+    mqtt_topic(self->settings->machine.id, what, name, topic);
+    return (length > 0U) ? mqtt_broker_send(&self->broker, topic, self->payload, length, way) : 0;
+}
+
+static bool newest_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
+    *out_state = (iwc_message_t){.text = self->state, .length = self->state_length, .is_event = true};
+    return self->link.is_here && self->state_length > 0U;
+}
+
+// ---- what the bridge says of itself -------------------------------------------------------------------------------
+
+static void tell_info(mqtt_bridge_t *self) {
+    iwc_message_t state;
+    const mqtt_info_t info = {.boot = self->boot,
+                              .settings = self->settings,
+                              .state = newest_state(self, &state) ? &state : NULL,
+                              .counts = self->judge.counts,
+                              .spooled = self->spool.waiting,
+                              .dropped = self->spool.dropped,
+                              .on_disk = !self->spool.behind,
+                              .unsent = self->broker.unsent};
+    const size_t length = mqtt_tell_info(&info, buffer(self));
+    self->info_due = mqtt_bridge_publish(self, "info", NULL, length, retained) == 0;
+    self->info_us = self->now_us;
+    self->told_waiting = self->spool.waiting;
+}
+
+/// A machine whose gateway is away is as good as away.
+static void tell_availability(mqtt_bridge_t *self, bool always) {
+    const bool online = self->link.is_here && self->state_length > 0U;
+    if (online != self->online || always) {
+        const size_t length =
+            (size_t)snprintf(self->payload, sizeof self->payload, "%s", online ? "online" : "offline");
+        (void)mqtt_bridge_publish(self, "availability", NULL, length, retained);
+        self->online = online;
+    }
+}
+
+static void tell_sensors(mqtt_bridge_t *self) {
+    char topic[MQTT_TOPIC_SIZE];
+    for (size_t i = 0;
+         self->settings->home_assistant.enabled && mqtt_tell_sensor(self->settings, i, topic, buffer(self)); i++) {
+        (void)mqtt_broker_send(&self->broker, topic, self->payload, strlen(self->payload), retained);
+    }
+}
+
+// ---- events -------------------------------------------------------------------------------------------------------
+
+/// Hands the broker what it has not got, a few at a time: order is kept, and what is lost with the connection is sent again.
+static void send_events(mqtt_bridge_t *self) {
+    mqtt_spool_event_t event;
+    char topic[MQTT_TOPIC_SIZE];
+    while (self->broker.state == MQTT_UP && self->inflights < MQTT_INFLIGHT_MAX &&
+           mqtt_spool_after(&self->spool, self->sent_number, &event)) {
+        mqtt_topic(self->settings->machine.id, "event", event.name, topic);
+        const int message = mqtt_broker_send(&self->broker, topic, event.payload, event.length, once);
+        if (message == 0) {
+            return;
+        }
+        self->inflight[self->inflights] = (mqtt_inflight_t){message, event.number, false};
+        self->inflights++;
+        self->sent_number = event.number;
+    }
+}
+
+static void event_sent(void *context, int message) {
+    mqtt_bridge_t *self = context;
+    size_t first = 0;
+    for (size_t i = 0; i < self->inflights; i++) {
+        self->inflight[i].confirmed = self->inflight[i].confirmed || self->inflight[i].message == message;
+    }
+    while (first < self->inflights && self->inflight[first].confirmed) {
+        first++;
+    }
+    if (first > 0U) {
+        mqtt_spool_confirm(&self->spool, self->inflight[first - 1U].number);
+        self->inflights -= first;
+        memmove(self->inflight, self->inflight + first, self->inflights * sizeof self->inflight[0]);
+    }
+    self->info_due = self->info_due || (self->told_waiting > 0U && self->spool.waiting == 0U);
+}
+
+/// An event that is worth to be kept; `stop_us` is the wall clock of the newest stop, by which one is known that happened unseen.
+static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uint64_t stop_us) {
+    if (length == 0U) {
+        self->spool.dropped++;
+        return;
+    }
+    (void)mqtt_spool_add(&self->spool, name, self->payload, length, stop_us);
+}
+
+static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
+    const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
+    keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
+    self->driver[0] = '\0';
+}
+
+static void take_why(void *context, const iwc_message_t *reply) {
+    mqtt_bridge_t *self = context;
+    const uint64_t stop_us = (reply != NULL) ? (uint64_t)iwc_integer(reply, "wall_us").value : 0U;
+    if (reply != NULL && iwc_integer(reply, "number").value > 0 && stop_us != self->spool.mark) {
+        const size_t length = mqtt_tell_missed_stop(self->boot, self->spool.last + 1U, wall_us(), reply, buffer(self));
+        keep_event(self, "stop", length, stop_us);
+    }
+}
+
+// ---- what the gateway says ----------------------------------------------------------------------------------------
+
+/// What makes a state worth sending at once: everything in it that is no measurement.
+static void read_condition(const iwc_message_t *state, char *out, size_t size) {
+    char machine[16];
+    char cause[32];
+    char estop[16];
+    char bus[16];
+    (void)iwc_text(state, "state", machine, sizeof machine);
+    (void)iwc_text(state, "cause", cause, sizeof cause);
+    (void)iwc_text(state, "estop.state", estop, sizeof estop);
+    (void)iwc_text(state, "bus.state", bus, sizeof bus);
+    const iwc_value_t holder = iwc_integer(state, "lease.holder");
+    (void)snprintf(out, size, "%s %s %s %s %lld %d%d", machine, cause, estop, bus, (long long)holder.value,
+                   iwc_truth(state, "left.heard").value == 1, iwc_truth(state, "right.heard").value == 1);
+}
+
+static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, bool spare) {
+    const mqtt_way_t way = {0, false, spare};
+    if (mqtt_bridge_publish(self, "state", NULL, mqtt_tell_state(self->boot, state, buffer(self)), way) != 0) {
+        read_condition(state, self->condition, sizeof self->condition);
+        self->state_us = self->now_us;
+    }
+}
+
+static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
+    char condition[sizeof self->condition];
+    const bool first = self->state_length == 0U;
+    memcpy(self->state, state->text, state->length);
+    self->state_length = state->length;
+    read_condition(state, condition, sizeof condition);
+    // A tenth of the period early: the gateway's and ours must not beat.
+    if (strcmp(condition, self->condition) != 0 ||
+        self->now_us - self->state_us >= (uint64_t)self->settings->state.every_ms * 900U) {
+        tell_state(self, state, true);
+    }
+    if (first) {
+        tell_availability(self, false);
+        tell_info(self);
+    }
+}
+
+static void take_event(void *context, const iwc_message_t *event, uint64_t now_us) {
+    mqtt_bridge_t *self = context;
+    char name[32];
+    self->now_us = now_us;
+    if (!iwc_text(event, "event", name, sizeof name) || !mqtt_settings_is_name(name) || strcmp(name, "hello") == 0) {
+        return;
+    }
+    if (strcmp(name, "state") == 0) {
+        take_state(self, event);
+        return;
+    }
+    if (strcmp(name, "stop") == 0) {
+        take_stop(self, event);
+    } else {
+        const bool lease = strcmp(name, "lease") == 0;
+        if (lease && iwc_integer(event, "holder").value != iwc_number(self->link.gateway)) {
+            self->driver[0] = '\0';
+        }
+        const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
+        keep_event(self, name, length, self->spool.mark);
+    }
+    send_events(self);
+}
+
+static void gateway_here(void *context, uint64_t now_us) {
+    mqtt_bridge_t *self = context;
+    (void)bridge_link_ask(&self->link, "{\"cmd\":\"why\"}", take_why, self, now_us);
+}
+
+static void gateway_gone(void *context, uint64_t now_us) {
+    mqtt_bridge_t *self = context;
+    (void)now_us;
+    self->state_length = 0;
+    self->condition[0] = '\0';
+    self->driver[0] = '\0';
+    tell_availability(self, false);
+    tell_info(self);
+}
+
+// ---- the broker ---------------------------------------------------------------------------------------------------
+
+static void broker_up(void *context) {
+    mqtt_bridge_t *self = context;
+    iwc_message_t state;
+    self->inflights = 0;
+    self->sent_number = 0;
+    tell_availability(self, true);
+    if (newest_state(self, &state)) {
+        tell_state(self, &state, false);
+    }
+    tell_info(self);
+    tell_sensors(self);
+    send_events(self);
+}
+
+static void broker_down(void *context) {
+    mqtt_bridge_t *self = context;
+    self->inflights = 0;
+    mqtt_bridge_stop_if_ours(self);
+}
+
+// ---- the whole ----------------------------------------------------------------------------------------------------
+
+static bool make_boot(char out[MQTT_BOOT_SIZE]) {
+    uint64_t number = 0;
+    const bool good = getrandom(&number, sizeof number, 0) == (ssize_t)sizeof number;
+    (void)snprintf(out, MQTT_BOOT_SIZE, "%016llx", (unsigned long long)number);
+    return good;
+}
+
+static bool has_name(const mqtt_settings_t *settings) {
+    if (!mqtt_settings_given(settings->machine.id)) {
+        (void)fputs("iwheel-mqtt: this machine has no name; set id under [machine] in " MQTT_SETTINGS_PATH "\n",
+                    stderr);
+        return false;
+    }
+    return true;
+}
+
+static int no_spool(const mqtt_settings_t *settings) {
+    (void)fprintf(stderr,
+                  "iwheel-mqtt: %s: %s; make it, for this bridge alone, or name another one as directory under "
+                  "[spool]\n",
+                  settings->spool.directory, (errno == EWOULDBLOCK) ? "another bridge uses it" : strerror(errno));
+    return EX_CANTCREAT;
+}
+
+int mqtt_bridge_check(const mqtt_settings_t *settings) {
+    mqtt_broker_t broker;
+    const mqtt_broker_listener_t nobody = {0};
+    if (!has_name(settings)) {
+        return EX_CONFIG;
+    }
+    if (access(settings->spool.directory, W_OK | X_OK) != 0) {
+        return no_spool(settings);
+    }
+    const int code = mqtt_broker_open(&broker, settings, &nobody);
+    (void)mqtt_broker_close(&broker);
+    return code;
+}
+
+int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
+    const bridge_link_terms_t terms = {.program = "iwheel-mqtt",
+                                       .socket = settings->gateway.socket,
+                                       .rate_hz =
+                                           (settings->state.every_ms < 1000U) ? 1000U / settings->state.every_ms : 1U,
+                                       .drives = settings->drive.enabled};
+    const bridge_listener_t gateway = {self, gateway_here, gateway_gone, take_event};
+    *self = (mqtt_bridge_t){.settings = settings, .topics = {self->commands, NULL}};
+    const mqtt_broker_listener_t broker = {"iwheel-mqtt", self->name,  self->topics, self->will,         self,
+                                           broker_up,     broker_down, event_sent,   mqtt_bridge_command};
+    (void)snprintf(self->name, sizeof self->name, "iwheel-%s", settings->machine.id);
+    mqtt_topic(settings->machine.id, "availability", NULL, self->will);
+    mqtt_topic(settings->machine.id, "cmd", "+", self->commands);
+    if (!has_name(settings)) {
+        return EX_CONFIG;
+    }
+    if (!mqtt_spool_open(&self->spool, settings->spool.directory, (size_t)settings->spool.max_kB * 1000U)) {
+        return no_spool(settings);
+    }
+    if (!make_boot(self->boot) || !bridge_link_open(&self->link, &terms, &gateway)) {
+        (void)fputs("iwheel-mqtt: no memory, or no random numbers\n", stderr);
+        return EX_OSERR;
+    }
+    return mqtt_broker_open(&self->broker, settings, &broker);
+}
+
+static void tend(mqtt_bridge_t *self) {
+    mqtt_spool_tend(&self->spool);
+    if (self->spool.behind != self->told_behind) {
+        self->told_behind = self->spool.behind;
+        (void)fprintf(stderr, "iwheel-mqtt: %s\n",
+                      self->spool.behind
+                          ? "the spool's disk takes nothing; events are kept in memory only. See df, dmesg"
+                          : "the spool is on its disk again");
+        self->info_due = true;
+    }
+    if (self->spool.dropped != self->told_dropped) {
+        (void)fprintf(stderr, "iwheel-mqtt: %llu events dropped so far, the oldest ones: the spool is full\n",
+                      (unsigned long long)self->spool.dropped);
+        self->told_dropped = self->spool.dropped;
+        self->info_due = true;
+    }
+    if (self->info_due || self->now_us - self->info_us >= INFO_US) {
+        tell_info(self);
+    }
+}
+
+int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
+    self->now_us = now_us;
+    mqtt_broker_step(&self->broker, now_us);
+    const int code = bridge_link_step(&self->link, now_us);
+    if (self->driver[0] != '\0' && now_us >= self->silent_us) {
+        mqtt_bridge_stop_if_ours(self);
+    }
+    send_events(self);
+    mqtt_spool_sync(&self->spool);
+    if (now_us >= self->second_us) {
+        self->second_us = now_us + SECOND_US;
+        tend(self);
+    }
+    return code;
+}
+
+int mqtt_bridge_wait_ms(const mqtt_bridge_t *self) {
+    const uint64_t now_us = self->now_us;
+    const uint64_t times[] = {bridge_link_next_us(&self->link, now_us), mqtt_broker_next_us(&self->broker),
+                              self->second_us, (self->driver[0] != '\0') ? self->silent_us : UINT64_MAX};
+    uint64_t next_us = times[0];
+    for (size_t i = 1; i < sizeof times / sizeof times[0]; i++) {
+        next_us = (times[i] < next_us) ? times[i] : next_us;
+    }
+    return (next_us > now_us) ? (int)((next_us - now_us) / 1000U) + 1 : 0;
+}
+
+bool mqtt_bridge_close(mqtt_bridge_t *self) {
+    mqtt_bridge_stop_if_ours(self);
+    bridge_link_close(&self->link);
+    const bool done = mqtt_broker_close(&self->broker); // First: what it confirms is kept.
+    return mqtt_spool_close(&self->spool) && done;
+}

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+/// The bridge as a whole: a client of the gateway on one side, of an MQTT broker on the other, in one thread that waits for neither.
+///
+/// It repeats no command and passes each on at most once, so the wheels stop by the gateway's lease however it ends. If who drives by it
+/// falls silent, or the broker is gone, it says `stop` once, if the lease is its own. Fixed memory but for the spool, which is bounded.
+#ifndef IW_MQTT_BRIDGE_H
+#define IW_MQTT_BRIDGE_H
+
+#include "broker.h"
+#include "spool.h"
+#include "tell.h"
+
+#include "common/link.h"
+
+/// How long who has armed may take for the first command, and who drives between two.
+#define MQTT_FIRST_US  1000000U
+#define MQTT_SILENT_US 500000U
+/// Events that the broker has not confirmed at one time.
+#define MQTT_INFLIGHT_MAX 8U
+
+typedef struct {
+    int message;
+    uint64_t number;
+    bool confirmed;
+} mqtt_inflight_t;
+
+typedef struct {
+    const mqtt_settings_t *settings;
+    bridge_link_t link;
+    mqtt_broker_t broker;
+    mqtt_spool_t spool;
+    mqtt_judge_t judge;
+    char name[MQTT_ID_SIZE + 8U]; ///< At the broker.
+    char will[MQTT_TOPIC_SIZE];
+    char commands[MQTT_TOPIC_SIZE];
+    const char *topics[2];
+    char boot[MQTT_BOOT_SIZE];     ///< Of this run: random.
+    char driver[MQTT_SENDER_SIZE]; ///< Who has armed; empty: nobody by this bridge.
+    uint64_t silent_us;            ///< When the driver counts as silent.
+    uint64_t now_us;
+    uint64_t state_us;     ///< When `state` was sent last.
+    uint64_t second_us;    ///< When what is done once a second is due.
+    uint64_t info_us;      ///< When `info` was sent last.
+    uint64_t sent_number;  ///< Newest event that was handed to the broker in this connection.
+    bool info_due;         ///< Something in it has changed.
+    bool online;           ///< What was said last of it.
+    bool told_behind;      ///< In the log, that the disk takes nothing.
+    size_t told_waiting;   ///< Events, in `info`.
+    uint64_t told_dropped; ///< How many were, in the log.
+    char condition[128];   ///< What makes a state worth sending at once.
+    char state[IWC_LINE_MAX + 1U];
+    size_t state_length; ///< 0: not known.
+    char payload[MQTT_PAYLOAD_SIZE];
+    mqtt_inflight_t inflight[MQTT_INFLIGHT_MAX];
+    size_t inflights;
+} mqtt_bridge_t;
+
+/// 0, or an exit code of sysexits with a line on stderr. Nothing is connected yet.
+int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings);
+
+/// Looks at what `open` needs, and writes nothing. As `open`.
+int mqtt_bridge_check(const mqtt_settings_t *settings);
+
+/// Whatever can be done now. 0, or an exit code.
+int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us);
+
+/// Milliseconds until `step` has something to do, if no descriptor has.
+int mqtt_bridge_wait_ms(const mqtt_bridge_t *self);
+
+/// Stops the wheels if they are driven by it, and leaves. False: end by _exit().
+bool mqtt_bridge_close(mqtt_bridge_t *self);
+
+// ---- between its parts --------------------------------------------------------------------------------------------
+
+/// Publishes `length` bytes of `payload`; as `mqtt_broker_send`.
+int mqtt_bridge_publish(mqtt_bridge_t *self, const char *what, const char *name, size_t length, mqtt_way_t way);
+
+/// What came to a topic of commands. `context` is the bridge.
+void mqtt_bridge_command(void *context, const struct mosquitto_message *message);
+
+/// Once, and only what is ours: somebody else's lease is not this bridge's to end.
+void mqtt_bridge_stop_if_ours(mqtt_bridge_t *self);
+
+#endif

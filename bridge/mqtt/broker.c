@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: MIT
+#include "broker.h"
+
+#include "common/link.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <sys/stat.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#define SHORTEST_US 500000U
+#define LONGEST_US  30000000U
+#define GREETING_US 10000000U
+#define LOOK_US     500000U
+/// Packets read at one go: a flood must not keep the gateway's words waiting.
+#define PACKETS 32
+/// Messages that may wait in the library for a broker that does not read; the spool's are among them.
+#define BEHIND_MAX 64U
+#define GOODBYE_MS 200
+
+// ---- what it is told by the library -------------------------------------------------------------------------------
+
+static void on_log(struct mosquitto *client, void *context, int level, const char *words) {
+    mqtt_broker_t *self = context;
+    (void)client;
+    if ((level & (MOSQ_LOG_ERR | MOSQ_LOG_WARNING)) != 0) {
+        (void)snprintf(self->words, sizeof self->words, "%s", words);
+    }
+}
+
+static void on_connect(struct mosquitto *client, void *context, int code) {
+    mqtt_broker_t *self = context;
+    int result = MOSQ_ERR_SUCCESS;
+    self->refusal = code;
+    if (code != 0) {
+        self->lost = true;
+        return;
+    }
+    self->state = MQTT_UP;
+    self->wait_us = SHORTEST_US;
+    // QoS 0: what is under way when the connection ends is not sent again.
+    for (size_t i = 0; self->listener.topics[i] != NULL && result == MOSQ_ERR_SUCCESS; i++) {
+        result = mosquitto_subscribe(client, NULL, self->listener.topics[i], 0);
+    }
+    if (result != MOSQ_ERR_SUCCESS) {
+        self->lost = true;
+        return;
+    }
+    (void)fprintf(stderr, "%s: connected to the broker at %s port %u\n", self->listener.program, self->host,
+                  self->settings->broker.port);
+    self->told_away = false;
+    self->listener.up(self->listener.context);
+}
+
+static void on_disconnect(struct mosquitto *client, void *context, int code) {
+    mqtt_broker_t *self = context;
+    (void)client;
+    (void)code;
+    self->lost = true;
+}
+
+static void on_publish(struct mosquitto *client, void *context, int message) {
+    mqtt_broker_t *self = context;
+    (void)client;
+    self->listener.sent(self->listener.context, message);
+}
+
+static void on_message(struct mosquitto *client, void *context, const struct mosquitto_message *message) {
+    mqtt_broker_t *self = context;
+    (void)client;
+    self->listener.came(self->listener.context, message);
+}
+
+// ---- files --------------------------------------------------------------------------------------------------------
+
+static int complain(int code, const char *path, const char *what) {
+    (void)fprintf(stderr, "iwheel: %s: %s\n", path, what);
+    return code;
+}
+
+static int read_credentials(mqtt_broker_t *self, const char *path) {
+    struct stat status;
+    char line[512];
+    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    FILE *file = (fd >= 0) ? fdopen(fd, "r") : NULL;
+    if (file == NULL || fstat(fd, &status) != 0) {
+        return complain(EX_NOPERM, path, strerror(errno));
+    }
+    const bool ours = status.st_uid == geteuid() || status.st_uid == 0U;
+    // Root's may be read by the group that the bridge runs in: that is how an administrator gives it.
+    const mode_t others = (status.st_uid == 0U) ? 0037U : 0077U;
+    const bool read = fgets(line, sizeof line, file) != NULL;
+    (void)fclose(file);
+    if (!ours || (status.st_mode & others) != 0U) {
+        return complain(EX_NOPERM, path, "others may read or change it; chown iwheel-mqtt and chmod 600 it");
+    }
+    line[read ? strcspn(line, "\r\n") : 0U] = '\0';
+    char *colon = strchr(line, ':');
+    if (colon == NULL || colon == line) {
+        return complain(EX_CONFIG, path, "its first line is not USER:PASSWORD");
+    }
+    *colon = '\0';
+    self->user = strdup(line);
+    self->password = strdup(colon + 1);
+    explicit_bzero(line, sizeof line);
+    return (self->user != NULL && self->password != NULL) ? 0 : EX_OSERR;
+}
+
+static int look_at_files(const mqtt_settings_t *settings) {
+    const char *const files[] = {settings->broker.ca, settings->broker.certificate, settings->broker.key};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        if (mqtt_settings_given(files[i]) && access(files[i], R_OK) != 0) {
+            return complain(EX_NOPERM, files[i], strerror(errno));
+        }
+    }
+    return 0;
+}
+
+int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const mqtt_broker_listener_t *listener) {
+    *self = (mqtt_broker_t){.settings = settings,
+                            .listener = *listener,
+                            .wait_us = SHORTEST_US,
+                            .random = (uint64_t)getpid(),
+                            .caller = {.wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)}};
+    if (self->caller.wake < 0 || mosquitto_lib_init() != MOSQ_ERR_SUCCESS) {
+        return complain(EX_OSERR, "libmosquitto", strerror(errno));
+    }
+    const int code = look_at_files(settings);
+    return (code != 0 || !mqtt_settings_given(settings->broker.credentials))
+               ? code
+               : read_credentials(self, settings->broker.credentials);
+}
+
+// ---- connecting ---------------------------------------------------------------------------------------------------
+
+static void lose(mqtt_broker_t *self, const char *why) {
+    const bool was_up = self->state == MQTT_UP;
+    if (!self->told_away) {
+        (void)fprintf(stderr, "%s: no broker at %s port %u (%s%s%s); trying for ever\n", self->listener.program,
+                      self->host, self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
+    }
+    self->told_away = true;
+    mosquitto_destroy(self->client);
+    self->client = NULL;
+    self->state = MQTT_AWAY;
+    self->behind = 0;
+    self->try_us = bridge_backoff_us(&self->wait_us, LONGEST_US, &self->random, self->now_us);
+    if (was_up) {
+        self->listener.down(self->listener.context);
+    }
+}
+
+/// Of what libmosquitto promises for it: that no other thread is in the same client.
+static void *call(void *context) {
+    mqtt_caller_t *caller = context;
+    const uint64_t one = 1;
+    caller->result = mosquitto_connect(caller->client, caller->host, caller->port, caller->keepalive_s);
+    caller->error = errno;
+    atomic_store(&caller->ended, true);
+    (void)!write(caller->wake, &one, sizeof one);
+    return NULL;
+}
+
+static bool set_up(mqtt_broker_t *self) {
+    const mqtt_settings_t *settings = self->settings;
+    const bool certificate = mqtt_settings_given(settings->broker.certificate);
+    const char *will = self->listener.will;
+    self->client = mosquitto_new(self->listener.name, true, self);
+    if (self->client == NULL) {
+        return false;
+    }
+    mosquitto_log_callback_set(self->client, on_log);
+    mosquitto_connect_callback_set(self->client, on_connect);
+    mosquitto_disconnect_callback_set(self->client, on_disconnect);
+    mosquitto_publish_callback_set(self->client, on_publish);
+    mosquitto_message_callback_set(self->client, on_message);
+    return (will == NULL || mosquitto_will_set(self->client, will, 7, "offline", 1, true) == MOSQ_ERR_SUCCESS) &&
+           (self->user == NULL ||
+            mosquitto_username_pw_set(self->client, self->user, self->password) == MOSQ_ERR_SUCCESS) &&
+           (!mqtt_settings_given(settings->broker.ca) ||
+            mosquitto_tls_set(self->client, settings->broker.ca, NULL,
+                              certificate ? settings->broker.certificate : NULL,
+                              certificate ? settings->broker.key : NULL, NULL) == MOSQ_ERR_SUCCESS);
+}
+
+static void begin_connecting(mqtt_broker_t *self) {
+    pthread_t thread;
+    pthread_attr_t attributes;
+    if (!mqtt_settings_host(self->settings, self->next, self->host)) {
+        self->next = 0;
+        (void)mqtt_settings_host(self->settings, 0, self->host);
+    }
+    self->next++;
+    self->words[0] = '\0';
+    self->lost = false;
+    self->refusal = 0;
+    if (!set_up(self)) {
+        lose(self, "its client cannot be made: certificate or key, or no memory");
+        return;
+    }
+    self->caller.client = self->client;
+    self->caller.host = self->host;
+    self->caller.port = (int)self->settings->broker.port;
+    self->caller.keepalive_s = (int)self->settings->broker.keepalive_s;
+    atomic_store(&self->caller.ended, false);
+    (void)pthread_attr_init(&attributes);
+    (void)pthread_attr_setdetachstate(&attributes, PTHREAD_CREATE_DETACHED);
+    const int code = pthread_create(&thread, &attributes, call, &self->caller);
+    (void)pthread_attr_destroy(&attributes);
+    if (code != 0) {
+        lose(self, strerror(code));
+        return;
+    }
+    self->state = MQTT_CONNECTING;
+}
+
+static void end_connecting(mqtt_broker_t *self) {
+    uint64_t count = 0;
+    (void)!read(self->caller.wake, &count, sizeof count);
+    if (self->caller.result != MOSQ_ERR_SUCCESS) {
+        lose(self, (self->caller.result == MOSQ_ERR_ERRNO) ? strerror(self->caller.error)
+                                                           : mosquitto_strerror(self->caller.result));
+        return;
+    }
+    self->state = MQTT_GREETING;
+    self->until_us = self->now_us + GREETING_US;
+}
+
+// ---- working ------------------------------------------------------------------------------------------------------
+
+static void work(mqtt_broker_t *self) {
+    int result = mosquitto_loop_read(self->client, PACKETS);
+    if (result == MOSQ_ERR_SUCCESS && mosquitto_want_write(self->client)) {
+        result = mosquitto_loop_write(self->client, 1);
+    }
+    if (result == MOSQ_ERR_SUCCESS && self->now_us >= self->look_us) {
+        self->look_us = self->now_us + LOOK_US;
+        result = mosquitto_loop_misc(self->client);
+    }
+    if (!mosquitto_want_write(self->client)) {
+        self->behind = 0;
+    }
+    if (self->refusal != 0) {
+        lose(self, mosquitto_connack_string(self->refusal));
+    } else if (result != MOSQ_ERR_SUCCESS) {
+        lose(self, (result == MOSQ_ERR_ERRNO) ? strerror(errno) : mosquitto_strerror(result));
+    } else if (self->lost) {
+        lose(self, "the connection has ended");
+    } else if (self->state == MQTT_GREETING && self->now_us >= self->until_us) {
+        lose(self, "it does not answer");
+    }
+}
+
+void mqtt_broker_step(mqtt_broker_t *self, uint64_t now_us) {
+    self->now_us = now_us;
+    if (self->state == MQTT_AWAY && now_us >= self->try_us) {
+        begin_connecting(self);
+    }
+    if (self->state == MQTT_CONNECTING && atomic_load(&self->caller.ended)) {
+        end_connecting(self);
+    }
+    if (self->state == MQTT_GREETING || self->state == MQTT_UP) {
+        work(self);
+    }
+}
+
+uint64_t mqtt_broker_next_us(const mqtt_broker_t *self) {
+    switch (self->state) {
+    case MQTT_AWAY:
+        return self->try_us;
+    case MQTT_CONNECTING:
+        return UINT64_MAX;
+    default:
+        return self->look_us;
+    }
+}
+
+int mqtt_broker_fd(const mqtt_broker_t *self, bool *out_writes) {
+    *out_writes = false;
+    if (self->state == MQTT_AWAY || self->state == MQTT_CONNECTING) {
+        return (self->state == MQTT_CONNECTING) ? self->caller.wake : -1;
+    }
+    *out_writes = mosquitto_want_write(self->client);
+    return mosquitto_socket(self->client);
+}
+
+int mqtt_broker_send(mqtt_broker_t *self, const char *topic, const char *payload, size_t length, mqtt_way_t way) {
+    int number = 0;
+    if (self->state != MQTT_UP || self->behind >= (way.spare ? 1U : BEHIND_MAX) ||
+        mosquitto_publish(self->client, &number, topic, (int)length, payload, way.qos, way.retain) !=
+            MOSQ_ERR_SUCCESS) {
+        self->unsent += (self->state == MQTT_UP) ? 1U : 0U;
+        return 0;
+    }
+    self->behind += mosquitto_want_write(self->client) ? 1U : 0U;
+    return number;
+}
+
+bool mqtt_broker_close(mqtt_broker_t *self) {
+    if (self->state == MQTT_CONNECTING && !atomic_load(&self->caller.ended)) {
+        return false;
+    }
+    if (self->state == MQTT_UP) {
+        struct pollfd wait = {.fd = mosquitto_socket(self->client), .events = POLLOUT};
+        if (self->listener.will != NULL) {
+            (void)mosquitto_publish(self->client, NULL, self->listener.will, 7, "offline", 0, true);
+        }
+        (void)mosquitto_disconnect(self->client);
+        for (int i = 0; i < 10 && mosquitto_want_write(self->client); i++) {
+            (void)poll(&wait, 1, GOODBYE_MS / 10);
+            (void)mosquitto_loop_write(self->client, 1);
+        }
+    }
+    mosquitto_destroy(self->client);
+    (void)mosquitto_lib_cleanup();
+    (void)close(self->caller.wake);
+    free(self->user);
+    free(self->password);
+    return true;
+}

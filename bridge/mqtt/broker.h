@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+/// The one connection to the MQTT broker, kept up for ever, by libmosquitto. It waits for nothing.
+///
+///     AWAY --try--> CONNECTING --socket--> GREETING --CONNACK--> UP --lost--> AWAY, tried again after 0.5 s to 30 s
+///
+/// CONNECTING asks for names and shakes hands, which may wait: a thread of its own does that, and touches nothing else. Clean sessions:
+/// the broker keeps nothing for this machine while it is away, so no command comes late from there.
+#ifndef IW_MQTT_BROKER_H
+#define IW_MQTT_BROKER_H
+
+#include "settings.h"
+
+#include <mosquitto.h>
+#include <pthread.h>
+#include <stdatomic.h>
+
+typedef struct {
+    const char *program;       ///< For the log.
+    const char *name;          ///< Of the client at the broker; no other may have it.
+    const char *const *topics; ///< What it listens to, by QoS 0; ends with NULL.
+    const char *will;          ///< Where the broker says `offline` when this client is gone, retained; NULL: nowhere.
+    void *context;
+    void (*up)(void *context);
+    void (*down)(void *context);
+    void (*sent)(void *context, int message); ///< The broker has confirmed it.
+    void (*came)(void *context, const struct mosquitto_message *message);
+} mqtt_broker_listener_t; ///< The texts must outlive the connection.
+
+typedef enum { MQTT_AWAY, MQTT_CONNECTING, MQTT_GREETING, MQTT_UP } mqtt_broker_state_t;
+
+/// For the thread that connects.
+typedef struct {
+    struct mosquitto *client;
+    const char *host;
+    int port;
+    int keepalive_s;
+    int result;
+    int error;
+    int wake; ///< Where it tells that it has ended.
+    atomic_bool ended;
+} mqtt_caller_t;
+
+typedef struct {
+    const mqtt_settings_t *settings;
+    mqtt_broker_listener_t listener;
+    mqtt_broker_state_t state;
+    struct mosquitto *client; ///< NULL in MQTT_AWAY.
+    mqtt_caller_t caller;
+    char host[MQTT_HOST_SIZE]; ///< The one it is at, or tries.
+    size_t next;               ///< Number of the one to try next.
+    char *user;                ///< NULL: none.
+    char *password;            ///< Behind `user`.
+    bool told_away;            ///< In the log.
+    bool lost;                 ///< The library says so.
+    int refusal;               ///< Of the last CONNACK.
+    char words[160];           ///< What the library said last of its trouble.
+    uint64_t now_us;
+    uint64_t try_us;
+    uint64_t wait_us;
+    uint64_t random;
+    uint64_t until_us; ///< MQTT_GREETING: for CONNACK.
+    uint64_t look_us;  ///< When the library wants to look at its keepalive.
+    unsigned behind;   ///< Messages given while others were not gone yet.
+    uint64_t unsent;   ///< Messages not given because of too many of those.
+} mqtt_broker_t;
+
+/// Reads the credentials and looks at the files of TLS. 0, or an exit code of sysexits with a line on stderr.
+int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const mqtt_broker_listener_t *listener);
+
+/// Says goodbye with `offline`, within 0.2 s. True: all is freed. False: its thread still waits for the network, so end by _exit().
+bool mqtt_broker_close(mqtt_broker_t *self);
+
+void mqtt_broker_step(mqtt_broker_t *self, uint64_t now_us);
+
+/// When `step` has something to do, whatever comes.
+uint64_t mqtt_broker_next_us(const mqtt_broker_t *self);
+
+/// For poll(): a descriptor, -1: none; and whether it waits to write.
+int mqtt_broker_fd(const mqtt_broker_t *self, bool *out_writes);
+
+typedef struct {
+    int qos;
+    bool retain;
+    bool spare; ///< Only if all before it is gone already: there will be a newer one.
+} mqtt_way_t;
+
+/// Hands a message over. Its number for `sent`; 0: it was not handed over, because the broker is not there or does not read.
+int mqtt_broker_send(mqtt_broker_t *self, const char *topic, const char *payload, size_t length, mqtt_way_t way);
+
+#endif

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: MIT
+#include "command.h"
+
+#include "settings.h"
+
+#include "iwheel_northbound/json_out.h"
+
+#include <string.h>
+
+/// A sender who was silent so long may count anew: what it sent before is late by now, whatever its `seq`.
+#define FORGET_US (MQTT_TTL_MAX_MS * 1000ULL)
+
+/// What a verb's own fields may be, and whether it moves the wheels or loosens a latch. Which of them are needed says the gateway.
+typedef struct {
+    const char *word;
+    bool drives;
+    const char *fields[5]; ///< Ends with NULL.
+} form_t;
+
+static const form_t forms[MQTT_VERBS] = {
+    [MQTT_HELLO] = {"hello", false, {NULL}},
+    [MQTT_STOP] = {"stop", false, {NULL}},
+    [MQTT_ESTOP] = {"estop", false, {"reason", NULL}},
+    [MQTT_ARM] = {"arm", true, {NULL}},
+    [MQTT_DRIVE] = {"drive", true, {"left_mm_s", "right_mm_s", "left_mA", "right_mA", NULL}},
+    [MQTT_TWIST] = {"twist", true, {"v_mm_s", "yaw_mrad_s", NULL}},
+    [MQTT_RESET] = {"reset", false, {NULL}},
+    [MQTT_WHY] = {"why", false, {NULL}},
+    [MQTT_RECORDINGS] = {"recordings", false, {NULL}},
+    [MQTT_RECORDING] = {"recording", false, {"name", "offset", NULL}},
+};
+
+const char *mqtt_verb_word(mqtt_verb_t verb) {
+    return (verb < MQTT_VERBS) ? forms[verb].word : "unknown";
+}
+
+const char *mqtt_verdict_word(mqtt_verdict_t verdict) {
+    static const char *const words[MQTT_VERDICTS] = {
+        [MQTT_TAKEN] = "taken",           [MQTT_RETAINED] = "retained", [MQTT_GARBLED] = "garbled",
+        [MQTT_OTHER_BOOT] = "other_boot", [MQTT_LATE] = "late",         [MQTT_EARLY] = "early",
+        [MQTT_DOUBLED] = "doubled",       [MQTT_CROWDED] = "crowded",   [MQTT_DENIED] = "denied",
+    };
+    return (verdict < MQTT_VERDICTS) ? words[verdict] : "unknown";
+}
+
+static bool drop(mqtt_order_t *order, mqtt_verdict_t verdict, const char *why) {
+    order->verdict = verdict;
+    (void)strncpy(order->why, why, sizeof order->why - 1U);
+    return false;
+}
+
+// ---- reading ------------------------------------------------------------------------------------------------------
+
+/// A whole number of the command's; false: there is none.
+static bool number_of(iwn_json_t root, const char *name, int64_t *out_number) {
+    iwn_json_t value;
+    if (!iwn_json_find(root, name, &value) || iwn_json_kind(value) != IWN_JSON_INTEGER) {
+        return false;
+    }
+    *out_number = iwn_json_integer(value);
+    return true;
+}
+
+static bool text_of(iwn_json_t root, const char *name, char *out, size_t size) {
+    iwn_json_t value;
+    return iwn_json_find(root, name, &value) && iwn_json_kind(value) == IWN_JSON_TEXT &&
+           iwn_json_text(value, out, size);
+}
+
+static bool is_one_of(iwn_json_t name, const char *const words[]) {
+    for (size_t i = 0; words[i] != NULL; i++) {
+        if (iwn_json_is(name, words[i])) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Copies a field of the verb's. Numbers and texts only: what is written anew cannot be another request in disguise.
+static bool copy_field(iwn_json_t root, const char *name, iwn_out_t *out) {
+    char text[256];
+    iwn_json_t value;
+    if (!iwn_json_find(root, name, &value)) {
+        return true;
+    }
+    if (iwn_json_kind(value) == IWN_JSON_INTEGER) {
+        iwn_out_int(out, name, iwn_json_integer(value));
+        return true;
+    }
+    if (iwn_json_kind(value) == IWN_JSON_TEXT && iwn_json_text(value, text, sizeof text)) {
+        iwn_out_text(out, name, text);
+        return true;
+    }
+    return false;
+}
+
+static bool write_request(iwn_json_t root, mqtt_order_t *order) {
+    static const char *const common[] = {"boot", "t_us", "ttl_ms", "seq", "from", NULL};
+    const form_t *form = &forms[order->verb];
+    iwn_json_t rest = iwn_json_inside(root);
+    iwn_json_t name;
+    iwn_json_t value;
+    iwn_out_t out;
+    while (iwn_json_next(&rest, &name, &value)) {
+        if (!is_one_of(name, common) && !is_one_of(name, form->fields)) {
+            return false;
+        }
+    }
+    iwn_out_init(&out, order->request, sizeof order->request);
+    iwn_out_open(&out, NULL, '{');
+    iwn_out_text(&out, "cmd", form->word);
+    bool good = true;
+    for (size_t i = 0; form->fields[i] != NULL; i++) {
+        good = copy_field(root, form->fields[i], &out) && good;
+    }
+    if (order->verb == MQTT_ARM) {
+        char who[MQTT_SENDER_SIZE + 8U] = "mqtt ";
+        (void)strncat(who, order->from, MQTT_SENDER_SIZE);
+        iwn_out_text(&out, "name", who);
+    }
+    iwn_out_close(&out, '}');
+    const size_t length = iwn_out_finish(&out);
+    if (!good || length == 0U) {
+        order->request[0] = '\0';
+        return false;
+    }
+    order->request[length - 1U] = '\0'; // The newline: a client's library adds its own.
+    return true;
+}
+
+// ---- judging ------------------------------------------------------------------------------------------------------
+
+/// Where this sender's `seq` is kept; the longest silent one's place, if it has none. MQTT_SENDERS: all are taken.
+static size_t place_of(const mqtt_judge_t *self, const char *from, uint64_t now_us) {
+    size_t oldest = 0;
+    for (size_t i = 0; i < MQTT_SENDERS; i++) {
+        if (strcmp(self->senders[i].name, from) == 0) {
+            return i;
+        }
+        oldest = (self->senders[i].heard_us < self->senders[oldest].heard_us) ? i : oldest;
+    }
+    const bool free = self->senders[oldest].name[0] == '\0' || now_us - self->senders[oldest].heard_us > FORGET_US;
+    return free ? oldest : MQTT_SENDERS;
+}
+
+/// Until when it counts, in ms after what it quotes; 0: `ttl_ms` is none.
+static int64_t ttl_of(const mqtt_rules_t *rules, iwn_json_t root, mqtt_verb_t verb) {
+    const int64_t most_ms = forms[verb].drives ? (int64_t)rules->ttl_ms : (int64_t)MQTT_TTL_MAX_MS;
+    int64_t asked_ms = most_ms;
+    iwn_json_t value;
+    if (iwn_json_find(root, "ttl_ms", &value) &&
+        (!number_of(root, "ttl_ms", &asked_ms) || asked_ms < 1 || asked_ms > (int64_t)MQTT_TTL_MAX_MS)) {
+        return 0;
+    }
+    return (asked_ms < most_ms) ? asked_ms : most_ms;
+}
+
+static bool judge_age(const mqtt_rules_t *rules, iwn_json_t root, uint64_t now_us, mqtt_order_t *order) {
+    char boot[MQTT_BOOT_SIZE] = "";
+    int64_t told_us = -1;
+    const int64_t ttl_ms = ttl_of(rules, root, order->verb);
+    if (!text_of(root, "boot", boot, sizeof boot) || !number_of(root, "t_us", &told_us) || told_us < 0 || ttl_ms == 0) {
+        return drop(order, MQTT_GARBLED, "it needs boot and t_us of a message of this machine's; ttl_ms is 1 to 1000");
+    }
+    if (strcmp(boot, rules->boot) != 0) {
+        return drop(order, MQTT_OTHER_BOOT, "quote the boot and t_us that are here");
+    }
+    if ((uint64_t)told_us > now_us) {
+        return drop(order, MQTT_EARLY, "quote the t_us that is here; add nothing");
+    }
+    if (now_us - (uint64_t)told_us > (uint64_t)ttl_ms * 1000U) {
+        return drop(order, MQTT_LATE, "too long under way, or an old message was quoted; again with the t_us here");
+    }
+    return true;
+}
+
+static bool judge_count(mqtt_judge_t *self, uint64_t now_us, mqtt_order_t *order) {
+    const size_t place = place_of(self, order->from, now_us);
+    if (place == MQTT_SENDERS) {
+        return drop(order, MQTT_CROWDED, "too many senders within a second");
+    }
+    if (strcmp(self->senders[place].name, order->from) == 0 && order->seq <= self->senders[place].seq &&
+        now_us - self->senders[place].heard_us <= FORGET_US) {
+        return drop(order, MQTT_DOUBLED, "seq must rise with each command of a sender");
+    }
+    memcpy(self->senders[place].name, order->from, sizeof order->from);
+    self->senders[place].seq = order->seq;
+    self->senders[place].heard_us = now_us;
+    return true;
+}
+
+static bool find_verb(const char *word, mqtt_verb_t *out_verb) {
+    for (unsigned i = 0; i < (unsigned)MQTT_VERBS; i++) {
+        if (strcmp(forms[i].word, word) == 0) {
+            *out_verb = (mqtt_verb_t)i;
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Who says which verb, in which object.
+static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_json_t *out_root, mqtt_order_t *order) {
+    char fault[80];
+    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
+    if (command->length > MQTT_COMMAND_MAX ||
+        !iwn_json_check(command->payload, command->length, &self->work, out_root, &words) ||
+        iwn_json_kind(*out_root) != IWN_JSON_OBJECT || !text_of(*out_root, "from", order->from, sizeof order->from) ||
+        !mqtt_settings_is_name(order->from)) {
+        order->from[0] = '\0';
+        return drop(order, MQTT_GARBLED, "no JSON object with a name as from");
+    }
+    if (!find_verb(command->verb, &order->verb)) {
+        return drop(order, MQTT_GARBLED, "there is no such command");
+    }
+    if (!number_of(*out_root, "seq", &order->seq) || order->seq < 1) {
+        order->seq = 0;
+        return drop(order, MQTT_GARBLED, "it needs seq, a number from 1 on that rises with each command");
+    }
+    return true;
+}
+
+static bool is_allowed(const mqtt_rules_t *rules, mqtt_verb_t verb) {
+    return (rules->may_drive || !forms[verb].drives) && (rules->may_reset || verb != MQTT_RESET);
+}
+
+static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const mqtt_command_t *command, uint64_t now_us,
+                          mqtt_order_t *order) {
+    iwn_json_t root;
+    if (!read_command(self, command, &root, order)) {
+        return false;
+    }
+    if (command->retained) {
+        return drop(order, MQTT_RETAINED, "a command must not be retained");
+    }
+    if (!write_request(root, order)) {
+        return drop(order, MQTT_GARBLED, "it has a field that this command has not, or a value that is none");
+    }
+    if (order->verb == MQTT_HELLO) {
+        return true;
+    }
+    if (!judge_age(rules, root, now_us, order) || !judge_count(self, now_us, order)) {
+        return false;
+    }
+    return is_allowed(rules, order->verb) ||
+           drop(order, MQTT_DENIED, "this bridge watches and stops; see [drive] in mqtt.conf");
+}
+
+void mqtt_judge(mqtt_judge_t *self, const mqtt_rules_t *rules, const mqtt_command_t *command, uint64_t now_us,
+                mqtt_order_t *out_order) {
+    memset(out_order, 0, sizeof *out_order);
+    if (!judge_command(self, rules, command, now_us, out_order)) {
+        out_order->request[0] = '\0';
+    }
+    self->counts[out_order->verdict]++;
+}

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: MIT
+#include "fleet.h"
+
+#include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/text.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+bool fleet_open(fleet_t *self) {
+    memset(self, 0, sizeof *self);
+    self->machines = calloc(FLEET_MACHINES, sizeof *self->machines);
+    return self->machines != NULL;
+}
+
+void fleet_close(fleet_t *self) {
+    free(self->machines);
+    self->machines = NULL;
+}
+
+/// Its row; a new one in its place. NULL: there are too many.
+static fleet_machine_t *machine_of(fleet_t *self, const char *id) {
+    size_t place = 0;
+    while (place < self->count && strcmp(self->machines[place].id, id) < 0) {
+        place++;
+    }
+    if (place < self->count && strcmp(self->machines[place].id, id) == 0) {
+        return &self->machines[place];
+    }
+    if (self->count == FLEET_MACHINES) {
+        return NULL;
+    }
+    memmove(&self->machines[place + 1U], &self->machines[place], (self->count - place) * sizeof self->machines[0]);
+    self->count++;
+    self->machines[place] = (fleet_machine_t){.online = false};
+    (void)snprintf(self->machines[place].id, sizeof self->machines[place].id, "%s", id);
+    return &self->machines[place];
+}
+
+/// A text that moves no terminal.
+static void read_text(const iwc_message_t *message, const char *path, char *out, size_t size) {
+    char raw[256];
+    if (iwc_text(message, path, raw, sizeof raw)) {
+        iwn_plain_copy(raw, out, size);
+    } else {
+        out[0] = '\0';
+    }
+}
+
+static void read_contradictions(iwn_json_t root, fleet_machine_t *machine) {
+    iwn_json_t ledger;
+    iwn_json_t name;
+    iwn_json_t entry;
+    iwn_json_t state;
+    char word[32];
+    size_t used = 0;
+    machine->contradicted[0] = '\0';
+    if (!iwn_json_find(root, "ledger", &ledger) || iwn_json_kind(ledger) != IWN_JSON_OBJECT) {
+        return;
+    }
+    iwn_json_t rest = iwn_json_inside(ledger);
+    while (iwn_json_next(&rest, &name, &entry)) {
+        if (iwn_json_kind(entry) == IWN_JSON_OBJECT && iwn_json_find(entry, "state", &state) &&
+            iwn_json_is(state, "contradicted") && iwn_json_text(name, word, sizeof word) && iwn_plain_text(word) &&
+            used + strlen(word) + 2U < sizeof machine->contradicted) {
+            used += (size_t)snprintf(machine->contradicted + used, sizeof machine->contradicted - used, "%s%s",
+                                     (used > 0U) ? " " : "", word);
+        }
+    }
+}
+
+static void read_zero(const iwc_message_t *state, const char *side, char out[16]) {
+    char path[40];
+    (void)snprintf(path, sizeof path, "%s.offset_contaminated", side);
+    if (iwc_truth(state, path).value == 1) {
+        (void)snprintf(out, 16, "doubted");
+        return;
+    }
+    (void)snprintf(path, sizeof path, "%s.offset_provenance", side);
+    read_text(state, path, out, 16);
+}
+
+static void take_state(fleet_machine_t *machine, const iwc_message_t *state, iwn_json_t root) {
+    read_text(state, "state", machine->state, sizeof machine->state);
+    read_text(state, "version", machine->version, sizeof machine->version);
+    machine->battery_dV[0] = iwc_integer(state, "left.battery_dV");
+    machine->battery_dV[1] = iwc_integer(state, "right.battery_dV");
+    read_zero(state, "left", machine->zero[0]);
+    read_zero(state, "right", machine->zero[1]);
+    read_contradictions(root, machine);
+}
+
+static void take_stop(fleet_machine_t *machine, const iwc_message_t *stop) {
+    read_text(stop, "cause", machine->cause, sizeof machine->cause);
+    read_text(stop, "sentence", machine->sentence, sizeof machine->sentence);
+    machine->stop_wall_us = iwc_integer(stop, "wall_us").value;
+}
+
+/// `iwheel/ID/WHAT`; false: it is none.
+static bool split(const char *topic, char id[MQTT_ID_SIZE], const char **out_what) {
+    static const char begin[] = "iwheel/";
+    const char *slash = (strncmp(topic, begin, sizeof begin - 1U) == 0) ? strchr(topic + sizeof begin - 1U, '/') : NULL;
+    const size_t length = (slash != NULL) ? (size_t)(slash - topic) - (sizeof begin - 1U) : 0U;
+    if (length == 0U || length >= MQTT_ID_SIZE) {
+        return false;
+    }
+    memcpy(id, topic + sizeof begin - 1U, length);
+    id[length] = '\0';
+    *out_what = slash + 1;
+    return mqtt_settings_is_name(id);
+}
+
+void fleet_take(fleet_t *self, const char *topic, const char *payload, size_t length, uint64_t now_us) {
+    char id[MQTT_ID_SIZE];
+    char fault[80];
+    const char *what = "";
+    iwn_json_t root;
+    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
+    fleet_machine_t *machine = split(topic, id, &what) ? machine_of(self, id) : NULL;
+    if (machine == NULL) {
+        self->left_out++;
+        return;
+    }
+    if (strcmp(what, "availability") == 0) {
+        machine->online = length == 6U && memcmp(payload, "online", 6) == 0;
+        return;
+    }
+    if (!iwn_json_check(payload, length, &self->work, &root, &words) || iwn_json_kind(root) != IWN_JSON_OBJECT) {
+        self->left_out++;
+        return;
+    }
+    const iwc_message_t message = {.text = payload, .length = length, .is_event = true};
+    machine->heard_us = now_us;
+    if (strcmp(what, "state") == 0) {
+        take_state(machine, &message, root);
+    } else if (strcmp(what, "event/stop") == 0) {
+        take_stop(machine, &message);
+    }
+}
+
+// ---- showing ------------------------------------------------------------------------------------------------------
+
+static void show_battery(iwc_value_t value, FILE *out) {
+    if (value.known) {
+        (void)fprintf(out, " %4" PRId64 ".%" PRId64, value.value / 10,
+                      (value.value < 0) ? -(value.value % 10) : value.value % 10);
+    } else {
+        (void)fprintf(out, " %6s", "--");
+    }
+}
+
+static const char *or_unknown(const char *text) {
+    return (text[0] != '\0') ? text : "--";
+}
+
+static void show_time(int64_t wall_us, FILE *out) {
+    char text[32] = "--";
+    const time_t seconds = (time_t)(wall_us / 1000000);
+    struct tm parts;
+    if (wall_us > 0 && localtime_r(&seconds, &parts) != NULL) {
+        (void)strftime(text, sizeof text, "%m-%d %H:%M:%S", &parts);
+    }
+    (void)fprintf(out, " %-14s", text);
+}
+
+/// An item, on how many machines it is contradicted.
+typedef struct {
+    char word[32];
+    unsigned machines;
+} tally_t;
+
+static void count_item(tally_t tallies[FLEET_ITEMS], const char *word) {
+    for (size_t i = 0; i < FLEET_ITEMS; i++) {
+        if (tallies[i].machines == 0U || strcmp(tallies[i].word, word) == 0) {
+            (void)snprintf(tallies[i].word, sizeof tallies[i].word, "%s", word);
+            tallies[i].machines++;
+            return;
+        }
+    }
+}
+
+static void show_contradictions(const fleet_t *self, FILE *out) {
+    tally_t tallies[FLEET_ITEMS] = {{.machines = 0}};
+    for (size_t i = 0; i < self->count; i++) {
+        char words[sizeof self->machines[i].contradicted];
+        char *place = NULL;
+        memcpy(words, self->machines[i].contradicted, sizeof words);
+        for (char *word = strtok_r(words, " ", &place); word != NULL; word = strtok_r(NULL, " ", &place)) {
+            count_item(tallies, word);
+        }
+    }
+    for (size_t i = 0; i < FLEET_ITEMS && tallies[i].machines > 0U; i++) {
+        (void)fprintf(out, "contradicted: %s on %u of %zu\n", tallies[i].word, tallies[i].machines, self->count);
+    }
+}
+
+void fleet_show(const fleet_t *self, uint64_t now_us, FILE *out) {
+    size_t online = 0;
+    (void)now_us;
+    (void)fprintf(out, "%-20s %-8s %-10s %6s %6s %-10s %-10s %-9s %-14s %s\n", "machine", "there", "state", "V left",
+                  "right", "zero left", "right", "version", " last stop", "cause");
+    for (size_t i = 0; i < self->count; i++) {
+        const fleet_machine_t *machine = &self->machines[i];
+        online += machine->online ? 1U : 0U;
+        (void)fprintf(out, "%-20s %-8s %-10s", machine->id, machine->online ? "online" : "offline",
+                      machine->online ? or_unknown(machine->state) : "--");
+        for (size_t side = 0; side < 2U; side++) { // Of who is away nobody knows how full they are now.
+            show_battery(machine->online ? machine->battery_dV[side] : (iwc_value_t){.known = false}, out);
+        }
+        (void)fprintf(out, " %-10s %-10s %-9s", or_unknown(machine->zero[0]), or_unknown(machine->zero[1]),
+                      or_unknown(machine->version));
+        show_time(machine->stop_wall_us, out);
+        (void)fprintf(out, " %s\n", or_unknown(machine->cause));
+    }
+    (void)fprintf(out, "%zu machines, %zu online", self->count, online);
+    if (self->left_out > 0U) {
+        (void)fprintf(out, "; %" PRIu64 " messages left out", self->left_out);
+    }
+    (void)fputs("\n", out);
+    show_contradictions(self, out);
+}
+
+void fleet_tell(const fleet_t *self, uint64_t now_us, FILE *out) {
+    for (size_t i = 0; i < self->count; i++) {
+        const fleet_machine_t *machine = &self->machines[i];
+        char line[1536];
+        iwn_out_t json;
+        iwn_out_init(&json, line, sizeof line);
+        iwn_out_open(&json, NULL, '{');
+        iwn_out_text(&json, "machine", machine->id);
+        iwn_out_bool(&json, "online", machine->online);
+        iwn_out_text(&json, "state", (machine->state[0] != '\0') ? machine->state : NULL);
+        iwn_out_text(&json, "version", (machine->version[0] != '\0') ? machine->version : NULL);
+        iwn_out_known(&json, "left_battery_dV", machine->battery_dV[0].known, machine->battery_dV[0].value);
+        iwn_out_known(&json, "right_battery_dV", machine->battery_dV[1].known, machine->battery_dV[1].value);
+        iwn_out_text(&json, "left_zero", (machine->zero[0][0] != '\0') ? machine->zero[0] : NULL);
+        iwn_out_text(&json, "right_zero", (machine->zero[1][0] != '\0') ? machine->zero[1] : NULL);
+        iwn_out_text(&json, "cause", (machine->cause[0] != '\0') ? machine->cause : NULL);
+        iwn_out_known(&json, "stop_wall_us", machine->stop_wall_us > 0, machine->stop_wall_us);
+        iwn_out_text(&json, "sentence", (machine->sentence[0] != '\0') ? machine->sentence : NULL);
+        iwn_out_text(&json, "contradicted", machine->contradicted);
+        iwn_out_known(&json, "heard_ms", machine->heard_us > 0U, (int64_t)((now_us - machine->heard_us) / 1000U));
+        iwn_out_close(&json, '}');
+        (void)fwrite(line, 1, iwn_out_finish(&json), out);
+    }
+}

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+/// What a fleet's machines say of themselves at a broker: one row each, and what several of them contradict. Pure but for the stream.
+///
+/// What comes is judged before it is read: whoever may write to the broker may send anything.
+#ifndef IW_MQTT_FLEET_H
+#define IW_MQTT_FLEET_H
+
+#include "settings.h"
+
+#include "iwheel_client/client.h"
+#include "iwheel_northbound/json_in.h"
+
+#include <stdio.h>
+
+/// More machines are counted, not shown.
+#define FLEET_MACHINES 1024U
+#define FLEET_ITEMS    16U ///< Assumptions that are counted.
+
+typedef struct {
+    char id[MQTT_ID_SIZE];
+    bool online;
+    char state[12];
+    char version[24];
+    char cause[24]; ///< Of its last stop; empty: none heard.
+    int64_t stop_wall_us;
+    char sentence[200];
+    iwc_value_t battery_dV[2]; ///< Left, right.
+    char zero[2][16];          ///< Where the force's zero comes from; `doubted` if it was taken under load.
+    char contradicted[96];     ///< Assumptions, separated by blanks.
+    uint64_t heard_us;         ///< Its last message; 0: only retained ones.
+} fleet_machine_t;
+
+typedef struct {
+    fleet_machine_t *machines; ///< FLEET_MACHINES of them, sorted by id.
+    size_t count;
+    uint64_t left_out; ///< Messages of machines beyond that, or that were garbled.
+    iwn_work_t work;
+} fleet_t;
+
+/// False: no memory.
+bool fleet_open(fleet_t *self);
+void fleet_close(fleet_t *self);
+
+/// One message; topics of others are passed over.
+void fleet_take(fleet_t *self, const char *topic, const char *payload, size_t length, uint64_t now_us);
+
+/// A table, in lines of at most 118 columns, and what is wrong with several.
+void fleet_show(const fleet_t *self, uint64_t now_us, FILE *out);
+
+/// The same as one JSON object per machine and line.
+void fleet_tell(const fleet_t *self, uint64_t now_us, FILE *out);
+
+#endif

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+#include "settings.h"
+
+#include "command.h"
+
+#include <ctype.h>
+#include <string.h>
+
+#define FIELD(member)             SETTINGS_FIELD(mqtt_settings_t, member)
+#define NUMBER(member, low, high) .kind = SETTINGS_NUMBER, .min = (low), .max = (high), FIELD(member)
+#define SWITCH(member)            .kind = SETTINGS_WORD, .words = no_yes, FIELD(member)
+#define TEXT(member)              .kind = SETTINGS_TEXT, FIELD(member)
+
+static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
+
+bool mqtt_settings_is_name(const char *text) {
+    const size_t length = strlen(text);
+    for (size_t i = 0; i < length; i++) {
+        if (!isalnum((unsigned char)text[i]) && text[i] != '_' && text[i] != '-') {
+            return false;
+        }
+    }
+    return length > 0U && length < MQTT_ID_SIZE;
+}
+
+static const char *wrong_name(const char *text) {
+    return mqtt_settings_is_name(text) ? NULL : "is no name in topics; use letters, digits, _ and -, 32 at most";
+}
+
+static const settings_key_t keys[] = {
+    {"gateway", "socket", "", "Of the gateway: its watch socket, or to drive, the one to drive by.",
+     TEXT(gateway.socket), .wrong = settings_wrong_socket},
+    {"machine", "id", "",
+     "Name of this machine in topics, iwheel/ID/...: letters, digits, _ and -. No person's name: topics are read by\n"
+     "many. With one user per machine at the broker it is that user's name.",
+     TEXT(machine.id), .wrong = wrong_name},
+    {"broker", "host", "",
+     "Name or address of the broker, as its certificate has it; of a cluster several, separated by blanks, tried in "
+     "turn.",
+     TEXT(broker.host)},
+    {"broker", "port", "", "By custom 1883 without TLS, 8883 with it.", NUMBER(broker.port, 1, 65535)},
+    {"broker", "keepalive_s", " s", "After 1.5 times this without a sign of life both sides count the other as gone.",
+     NUMBER(broker.keepalive_s, 5, 3600)},
+    {"broker", "credentials", "",
+     "File with one line USER:PASSWORD, which only the bridge's user and root may read; none: without.",
+     TEXT(broker.credentials)},
+    {"broker", "ca", "", "PEM file of who signed the broker's certificate; none: without TLS.", TEXT(broker.ca)},
+    {"broker", "certificate", "", "PEM file, where the broker wants one of this machine; none.",
+     TEXT(broker.certificate)},
+    {"broker", "key", "", "PEM file of its private key.", TEXT(broker.key)},
+    {"broker", "allow_plain", "",
+     "yes: without TLS to another machine. WHOEVER IS BETWEEN READS ALL AND MAY SEND COMMANDS.",
+     SWITCH(broker.allow_plain)},
+    {"state", "every_ms", " ms",
+     "How often iwheel/ID/state is sent (about 5 kB each), beside at once when it changes. 100 is for driving.",
+     NUMBER(state.every_ms, 100, 3600000)},
+    {"spool", "directory", "", "Where events wait that the broker has not confirmed; it outlives a restart.",
+     TEXT(spool.directory)},
+    {"spool", "max_kB", " kB", "Of the spool. Beyond it the oldest event is dropped and counted.",
+     NUMBER(spool.max_kB, 64, 65536)},
+    {"home_assistant", "enabled", "", "yes: tell Home Assistant which sensors there are.",
+     SWITCH(home_assistant.enabled)},
+    {"home_assistant", "prefix", "", "Of its discovery topics.", TEXT(home_assistant.prefix), .wrong = wrong_name},
+    {"drive", "enabled", "",
+     "yes: WHO MAY WRITE TO iwheel/ID/cmd MAY ARM AND DRIVE. The bridge needs the right to drive for that.",
+     SWITCH(drive.enabled)},
+    {"drive", "allow_reset", "", "yes: who may write there may reset a latched stop. Needs enabled = yes.",
+     SWITCH(drive.allow_reset)},
+    {"drive", "ttl_ms", " ms", "Older commands that drive are dropped.", NUMBER(drive.ttl_ms, 50, MQTT_TTL_MAX_MS)},
+};
+
+void mqtt_settings_default(mqtt_settings_t *out_settings) {
+    static const mqtt_settings_t standard = {
+        .gateway = {"/run/iwheel/watch/gateway.sock"},
+        .machine = {"none"},
+        .broker = {.host = "127.0.0.1",
+                   .port = 1883,
+                   .keepalive_s = 10,
+                   .credentials = "none",
+                   .ca = "none",
+                   .certificate = "none",
+                   .key = "none"},
+        .state = {5000},
+        .spool = {"/var/lib/iwheel-mqtt", 1024},
+        .home_assistant = {.prefix = "homeassistant"},
+        .drive = {.ttl_ms = 300},
+    };
+    *out_settings = standard;
+}
+
+bool mqtt_settings_given(const char *text) {
+    return strcmp(text, "none") != 0;
+}
+
+bool mqtt_settings_host(const mqtt_settings_t *settings, size_t number, char out[MQTT_HOST_SIZE]) {
+    const char *at = settings->broker.host + strspn(settings->broker.host, " ");
+    for (; number > 0U && *at != '\0'; number--) {
+        at += strcspn(at, " ");
+        at += strspn(at, " ");
+    }
+    const size_t length = strcspn(at, " ");
+    memcpy(out, at, length);
+    out[length] = '\0';
+    return length > 0U;
+}
+
+static bool stays_on_this_machine(const mqtt_settings_t *settings) {
+    char host[MQTT_HOST_SIZE];
+    bool stays = true;
+    for (size_t i = 0; mqtt_settings_host(settings, i, host); i++) {
+        stays = stays && (strncmp(host, "127.", 4) == 0 || strcmp(host, "::1") == 0 || strcmp(host, "localhost") == 0);
+    }
+    return stays;
+}
+
+static unsigned line_of(const char *section, const char *key, const unsigned *lines) {
+    return lines[settings_find(&mqtt_settings_form, section, key) - keys];
+}
+
+static void relate(settings_report_t *report, const void *values, const unsigned *lines) {
+    const mqtt_settings_t *settings = values;
+    const bool tls = mqtt_settings_given(settings->broker.ca);
+    const bool certificate = mqtt_settings_given(settings->broker.certificate);
+    if (certificate != mqtt_settings_given(settings->broker.key)) {
+        settings_complain(report, line_of("broker", certificate ? "certificate" : "key", lines),
+                          "%s is given without %s; give both files, or none", certificate ? "certificate" : "key",
+                          certificate ? "key" : "certificate");
+    }
+    if (certificate && !tls) {
+        settings_complain(report, line_of("broker", "certificate", lines), "certificate needs TLS; give ca, too");
+    }
+    if (!tls && !settings->broker.allow_plain && !stays_on_this_machine(settings)) {
+        settings_complain(report, line_of("broker", "host", lines),
+                          "host = %s is another machine, and without TLS whoever is between reads all and may send "
+                          "commands; give ca, or say allow_plain = yes",
+                          settings->broker.host);
+    }
+    if (settings->drive.allow_reset && !settings->drive.enabled) {
+        settings_complain(report, line_of("drive", "allow_reset", lines),
+                          "allow_reset = yes needs the right to drive; set enabled = yes, or allow_reset = no");
+    }
+}
+
+const settings_form_t mqtt_settings_form = {
+    .keys = keys,
+    .count = sizeof keys / sizeof keys[0],
+    .program = "iwheel-mqtt",
+    .missing = "create it from share/mqtt.conf",
+    .relate = relate,
+};

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+/// What may be configured of the MQTT bridge: share/mqtt.conf.
+#ifndef IW_MQTT_SETTINGS_H
+#define IW_MQTT_SETTINGS_H
+
+#include "settings/settings.h"
+
+/// Read when no `-c FILE` is given. Its absence is no error then.
+#define MQTT_SETTINGS_PATH "/etc/iwheel/mqtt.conf"
+/// Bytes of a machine's id with its terminator.
+#define MQTT_ID_SIZE   33U
+#define MQTT_HOST_SIZE 256U
+
+typedef struct {
+    struct {
+        char socket[108];
+    } gateway;
+    struct {
+        char id[MQTT_ID_SIZE]; ///< Of the machine in topics; none: not set yet.
+    } machine;
+    struct {
+        char host[MQTT_HOST_SIZE]; ///< One or more, separated by blanks.
+        uint32_t port;
+        uint32_t keepalive_s;
+        char credentials[108]; ///< A file; none.
+        char ca[108];          ///< none: without TLS.
+        char certificate[108];
+        char key[108];
+        bool allow_plain; ///< Without TLS to another machine.
+    } broker;
+    struct {
+        uint32_t every_ms;
+    } state;
+    struct {
+        char directory[108];
+        uint32_t max_kB;
+    } spool;
+    struct {
+        bool enabled;
+        char prefix[65];
+    } home_assistant;
+    struct {
+        bool enabled;
+        bool allow_reset;
+        uint32_t ttl_ms; ///< Of `arm`, `drive` and `twist`; of all others it is MQTT_TTL_MAX_MS.
+    } drive;
+} mqtt_settings_t;
+
+void mqtt_settings_default(mqtt_settings_t *out_settings);
+
+extern const settings_form_t mqtt_settings_form;
+
+/// The broker with this number, from 0 on; false: there are no more.
+bool mqtt_settings_host(const mqtt_settings_t *settings, size_t number, char out[MQTT_HOST_SIZE]);
+
+/// False for a text that says `none`.
+bool mqtt_settings_given(const char *text);
+
+/// A name in a topic: 1 to 32 letters, digits, `_` or `-`. So it is one in a subject of NATS too.
+bool mqtt_settings_is_name(const char *text);
+
+#endif

@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: MIT
+#include "spool.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+static const char magic[8] = {'i', 'w', 's', 'p', 'o', 'o', 'l', '1'};
+static const char fresh[] = MQTT_SPOOL_FILE ".new";
+
+/// A record: length of what follows its head, and its CRC-32; then a letter, a number and the mark; of an event its name with a NUL, and
+/// its payload. What is confirmed is told by a record with the number up to which.
+#define HEAD_SIZE 8U
+#define BODY_SIZE 17U
+#define CONFIRMED 'c'
+#define EVENT     'e'
+#define DONE_SIZE (HEAD_SIZE + BODY_SIZE)
+
+static uint32_t crc32_of(const uint8_t *bytes, size_t length) {
+    uint32_t crc = UINT32_MAX;
+    for (size_t i = 0; i < length; i++) {
+        crc ^= bytes[i];
+        for (unsigned bit = 0; bit < 8U; bit++) {
+            crc = (crc >> 1U) ^ (((crc & 1U) != 0U) ? 0xEDB88320U : 0U);
+        }
+    }
+    return ~crc;
+}
+
+static void put(uint8_t *at, uint64_t number, size_t bytes) {
+    for (size_t i = 0; i < bytes; i++) {
+        at[i] = (uint8_t)(number >> (8U * i));
+    }
+}
+
+static uint64_t get(const uint8_t *at, size_t bytes) {
+    uint64_t number = 0;
+    for (size_t i = 0; i < bytes; i++) {
+        number |= (uint64_t)at[i] << (8U * i);
+    }
+    return number;
+}
+
+static size_t length_of(const uint8_t *record) {
+    return HEAD_SIZE + (size_t)get(record, 4);
+}
+
+static uint64_t number_of(const uint8_t *record) {
+    return get(record + HEAD_SIZE + 1U, 8);
+}
+
+static uint64_t mark_of(const uint8_t *record) {
+    return get(record + HEAD_SIZE + 9U, 8);
+}
+
+/// Completes a record whose rest, of so many bytes, is there.
+static void seal(const mqtt_spool_t *self, uint8_t *record, uint8_t letter, uint64_t number, size_t rest) {
+    record[HEAD_SIZE] = letter;
+    put(record + HEAD_SIZE + 1U, number, 8);
+    put(record + HEAD_SIZE + 9U, self->mark, 8);
+    put(record, BODY_SIZE + rest, 4);
+    put(record + 4, crc32_of(record + HEAD_SIZE, BODY_SIZE + rest), 4);
+}
+
+// ---- in memory ----------------------------------------------------------------------------------------------------
+
+static void forget_oldest(mqtt_spool_t *self) {
+    self->begin += length_of(self->data + self->begin);
+    self->waiting--;
+}
+
+/// Room for so many bytes behind the newest; at most the whole.
+static uint8_t *make_room(mqtt_spool_t *self, size_t length) {
+    while (self->end - self->begin + length > self->size) {
+        forget_oldest(self);
+        self->dropped++;
+    }
+    if (self->end + length > self->size) {
+        memmove(self->data, self->data + self->begin, self->end - self->begin);
+        self->end -= self->begin;
+        self->begin = 0;
+    }
+    return self->data + self->end;
+}
+
+static void forget_until(mqtt_spool_t *self, uint64_t number) {
+    while (self->begin < self->end && number_of(self->data + self->begin) <= number) {
+        forget_oldest(self);
+    }
+}
+
+bool mqtt_spool_after(const mqtt_spool_t *self, uint64_t number, mqtt_spool_event_t *out_event) {
+    for (size_t at = self->begin; at < self->end; at += length_of(self->data + at)) {
+        const uint8_t *record = self->data + at;
+        if (number_of(record) > number) {
+            const char *name = (const char *)record + HEAD_SIZE + BODY_SIZE;
+            const size_t skip = HEAD_SIZE + BODY_SIZE + strlen(name) + 1U;
+            *out_event =
+                (mqtt_spool_event_t){number_of(record), name, (const char *)record + skip, length_of(record) - skip};
+            return true;
+        }
+    }
+    return false;
+}
+
+// ---- on the disk --------------------------------------------------------------------------------------------------
+
+static bool write_all(int file, const void *bytes, size_t length) {
+    const uint8_t *at = bytes;
+    while (length > 0U) {
+        const ssize_t written = write(file, at, length);
+        if (written < 0 && errno == EINTR) {
+            continue;
+        }
+        if (written <= 0) {
+            return false;
+        }
+        at += written;
+        length -= (size_t)written;
+    }
+    return true;
+}
+
+static void close_file(mqtt_spool_t *self) {
+    if (self->file >= 0) {
+        (void)close(self->file);
+    }
+    self->file = -1;
+}
+
+/// The whole spool into a file of its own, which then takes the old one's place: at any time there is one that is whole.
+static bool write_anew(mqtt_spool_t *self) {
+    uint8_t done[DONE_SIZE];
+    const uint64_t confirmed = self->last - self->waiting;
+    const int file = openat(self->folder, fresh, O_CREAT | O_TRUNC | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0600);
+    seal(self, done, CONFIRMED, confirmed, 0);
+    const bool good = file >= 0 && write_all(file, magic, sizeof magic) && write_all(file, done, sizeof done) &&
+                      write_all(file, self->data + self->begin, self->end - self->begin) && fdatasync(file) == 0 &&
+                      renameat(self->folder, fresh, self->folder, MQTT_SPOOL_FILE) == 0;
+    if (!good) {
+        if (file >= 0) {
+            (void)close(file);
+            (void)unlinkat(self->folder, fresh, 0);
+        }
+        self->behind = true;
+        return false;
+    }
+    (void)fsync(self->folder);
+    close_file(self);
+    self->file = file;
+    self->file_bytes = sizeof magic + sizeof done + self->end - self->begin;
+    self->behind = false;
+    self->unsynced = false;
+    return true;
+}
+
+/// A half record must not stay: what comes after it would not be read.
+static bool append(mqtt_spool_t *self, const uint8_t *record, size_t length) {
+    if (self->behind || self->file_bytes + length > 2U * self->size) {
+        return write_anew(self);
+    }
+    if (!write_all(self->file, record, length)) {
+        self->behind = true;
+        if (ftruncate(self->file, (off_t)self->file_bytes) == 0 &&
+            lseek(self->file, (off_t)self->file_bytes, SEEK_SET) >= 0) {
+            return false;
+        }
+        close_file(self);
+        return false;
+    }
+    self->file_bytes += length;
+    return true;
+}
+
+// ---- reading it again ---------------------------------------------------------------------------------------------
+
+/// One record of a file; its length, or 0: from here on there is none.
+static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left) {
+    if (left < HEAD_SIZE + BODY_SIZE || get(record, 4) < BODY_SIZE || get(record, 4) > MQTT_SPOOL_EVENT_MAX ||
+        length_of(record) > left) {
+        return 0;
+    }
+    const size_t length = length_of(record);
+    const uint64_t number = number_of(record);
+    if (get(record + 4, 4) != crc32_of(record + HEAD_SIZE, length - HEAD_SIZE)) {
+        return 0;
+    }
+    if (record[HEAD_SIZE] == CONFIRMED && length == DONE_SIZE) {
+        forget_until(self, number);
+        self->last = (number > self->last) ? number : self->last;
+        self->mark = mark_of(record);
+        return length;
+    }
+    if (record[HEAD_SIZE] != EVENT || number != self->last + 1U ||
+        memchr(record + HEAD_SIZE + BODY_SIZE, '\0', length - HEAD_SIZE - BODY_SIZE) == NULL) {
+        return 0;
+    }
+    memcpy(make_room(self, length), record, length);
+    self->end += length;
+    self->waiting++;
+    self->last = number;
+    self->mark = mark_of(record);
+    return length;
+}
+
+static void read_file(mqtt_spool_t *self) {
+    const int file = openat(self->folder, MQTT_SPOOL_FILE, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
+    const size_t size = 2U * self->size + MQTT_SPOOL_EVENT_MAX + DONE_SIZE;
+    uint8_t *bytes = (file >= 0) ? malloc(size) : NULL;
+    size_t length = 0;
+    for (ssize_t got = 1; bytes != NULL && got > 0 && length < size; length += (size_t)((got > 0) ? got : 0)) {
+        got = read(file, bytes + length, size - length);
+    }
+    if (bytes != NULL && length >= sizeof magic && memcmp(bytes, magic, sizeof magic) == 0) {
+        size_t at = sizeof magic;
+        for (size_t used = 1; used > 0U && at < length; at += used) {
+            used = read_record(self, bytes + at, length - at);
+        }
+    }
+    free(bytes);
+    if (file >= 0) {
+        (void)close(file);
+    }
+}
+
+// ---- the spool ----------------------------------------------------------------------------------------------------
+
+bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes) {
+    *self = (mqtt_spool_t){.folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC), .file = -1};
+    self->size = 2U * (size_t)MQTT_SPOOL_EVENT_MAX;
+    self->size = (max_bytes > self->size) ? max_bytes : self->size;
+    const bool ours = self->folder >= 0 && flock(self->folder, LOCK_EX | LOCK_NB) == 0;
+    self->data = ours ? malloc(self->size) : NULL;
+    if (self->data == NULL) {
+        const int error = errno;
+        (void)mqtt_spool_close(self);
+        errno = error;
+        return false;
+    }
+    read_file(self);
+    (void)write_anew(self);
+    return true;
+}
+
+bool mqtt_spool_close(mqtt_spool_t *self) {
+    for (int i = 0; i < 100 && atomic_load(&self->sync.state) == MQTT_SYNC_BUSY; i++) {
+        (void)usleep(10000);
+    }
+    const bool done = atomic_load(&self->sync.state) != MQTT_SYNC_BUSY;
+    close_file(self);
+    if (self->folder >= 0) {
+        (void)close(self->folder);
+    }
+    self->folder = -1;
+    free(self->data);
+    self->data = NULL;
+    return done;
+}
+
+bool mqtt_spool_add(mqtt_spool_t *self, const char *name, const char *payload, size_t length, uint64_t mark) {
+    const size_t name_size = strlen(name) + 1U;
+    const size_t rest = name_size + length;
+    if (BODY_SIZE + rest > MQTT_SPOOL_EVENT_MAX) {
+        self->dropped++;
+        return false;
+    }
+    uint8_t *record = make_room(self, HEAD_SIZE + BODY_SIZE + rest);
+    memcpy(record + HEAD_SIZE + BODY_SIZE, name, name_size);
+    memcpy(record + HEAD_SIZE + BODY_SIZE + name_size, payload, length);
+    self->last++;
+    self->mark = mark;
+    seal(self, record, EVENT, self->last, rest);
+    self->end += HEAD_SIZE + BODY_SIZE + rest;
+    self->waiting++;
+    self->unsynced = append(self, record, HEAD_SIZE + BODY_SIZE + rest) || self->unsynced;
+    return true;
+}
+
+void mqtt_spool_confirm(mqtt_spool_t *self, uint64_t number) {
+    uint8_t done[DONE_SIZE];
+    forget_until(self, number);
+    seal(self, done, CONFIRMED, number, 0);
+    (void)append(self, done, sizeof done);
+}
+
+void mqtt_spool_tend(mqtt_spool_t *self) {
+    if (self->behind) {
+        (void)write_anew(self);
+    }
+}
+
+static void *sync_file(void *context) {
+    mqtt_sync_t *sync = context;
+    const bool good = fdatasync(sync->file) == 0;
+    (void)close(sync->file);
+    atomic_store(&sync->state, good ? MQTT_SYNC_IDLE : MQTT_SYNC_FAILED);
+    return NULL;
+}
+
+void mqtt_spool_sync(mqtt_spool_t *self) {
+    pthread_t thread;
+    pthread_attr_t attributes;
+    if (atomic_load(&self->sync.state) == MQTT_SYNC_FAILED) {
+        atomic_store(&self->sync.state, MQTT_SYNC_IDLE);
+        self->behind = true;
+    }
+    if (!self->unsynced || self->behind || atomic_load(&self->sync.state) != MQTT_SYNC_IDLE) {
+        return;
+    }
+    self->sync.file = fcntl(self->file, F_DUPFD_CLOEXEC, 0);
+    atomic_store(&self->sync.state, MQTT_SYNC_BUSY);
+    self->unsynced = false;
+    (void)pthread_attr_init(&attributes);
+    (void)pthread_attr_setdetachstate(&attributes, PTHREAD_CREATE_DETACHED);
+    if (self->sync.file < 0 || pthread_create(&thread, &attributes, sync_file, &self->sync) != 0) {
+        (void)sync_file(&self->sync);
+    }
+    (void)pthread_attr_destroy(&attributes);
+}

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+/// What is published: the gateway's JSON with a few members before its own, and what the bridge says of itself. Pure.
+///
+/// All lines go into a buffer of the caller's. 0: it did not fit, and must not be used.
+#ifndef IW_MQTT_TELL_H
+#define IW_MQTT_TELL_H
+
+#include "command.h"
+#include "settings.h"
+
+#include "iwheel_client/client.h"
+
+/// Longest message: the gateway's longest line and what is put before it.
+#define MQTT_PAYLOAD_SIZE (IWC_LINE_MAX + 512U)
+#define MQTT_TOPIC_SIZE   128U
+
+typedef struct {
+    char *data;
+    size_t size;
+} mqtt_buffer_t;
+
+/// `iwheel/ID/WHAT`, with `/NAME` unless that is NULL.
+void mqtt_topic(const char *id, const char *what, const char *name, char out[MQTT_TOPIC_SIZE]);
+
+/// The verb in the topic of a command to this machine; NULL: it is none.
+const char *mqtt_topic_verb(const char *id, const char *topic);
+
+/// The gateway's message, with `boot` before its own members, so that a command can quote it and its `t_us`.
+size_t mqtt_tell_state(const char *boot, const iwc_message_t *state, mqtt_buffer_t out);
+
+/// An event: `id`, which is `boot` and the number, by which a reader knows doubles; `boot`; and the wall clock when the bridge heard it.
+size_t mqtt_tell_event(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *event,
+                       mqtt_buffer_t out);
+
+/// The reply to `why` as the event `stop`: for one that happened while the bridge was not there. Frames are left out.
+size_t mqtt_tell_missed_stop(const char *boot, uint64_t number, int64_t wall_us, const iwc_message_t *why,
+                             mqtt_buffer_t out);
+
+/// The answer to a command: to which, `boot`, `t_us` now, and the gateway's reply; without one (NULL) whether it was taken, and why not.
+size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
+                        mqtt_buffer_t out);
+
+/// What is retained of the bridge and its machine. `state`: the newest; NULL: the gateway is away.
+typedef struct {
+    const char *boot;
+    const mqtt_settings_t *settings;
+    const iwc_message_t *state;
+    const uint64_t *counts; ///< Of commands, by mqtt_verdict_t.
+    uint64_t spooled;       ///< Events that wait,
+    uint64_t dropped;       ///< that were dropped since the start,
+    bool on_disk;           ///< and whether those that wait are on the disk.
+    uint64_t unsent;        ///< Messages left out because the broker did not read.
+} mqtt_info_t;
+
+size_t mqtt_tell_info(const mqtt_info_t *info, mqtt_buffer_t out);
+
+/// One sensor for Home Assistant. False: there is no such number. An unknown value stays unknown there.
+bool mqtt_tell_sensor(const mqtt_settings_t *settings, size_t number, char out_topic[MQTT_TOPIC_SIZE],
+                      mqtt_buffer_t out);
+
+#endif

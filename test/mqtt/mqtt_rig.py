@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: MIT
+"""Simulated wheels, gateway, MQTT bridge and broker in one private folder, and a client from outside that may send anything."""
+
+import json
+import os
+import pwd
+import queue
+import shutil
+import socket
+import sys
+import threading
+import time
+from pathlib import Path
+
+try:
+    from paho.mqtt import client as paho
+except ImportError:
+    paho = None
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "system"))
+
+from bus import now_us  # noqa: E402
+from harness import Process, Rig  # noqa: E402
+from trials import Skip, until  # noqa: E402
+
+# For any machine, however busy; as in the demonstration.
+CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
+ID = "w1"
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+class Far:
+    """Somebody at the broker: keeps all that comes, and sends commands."""
+
+    def __init__(self, port, name="far", topics=("iwheel/#",), setup=None, host="127.0.0.1", clean=True):
+        self.name, self.seq, self.all, self.lock = name, 0, [], threading.Lock()
+        self.answers = queue.Queue()
+        self.client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id=name, clean_session=clean)
+        self.client.reconnect_delay_set(0.1, 0.3)
+        if setup:
+            setup(self.client)
+        self.listens = threading.Event()
+        self.client.on_connect = lambda client, *_: client.subscribe([(topic, 1) for topic in topics])
+        self.client.on_subscribe = lambda *_: self.listens.set()
+        self.client.on_disconnect = lambda *_: self.listens.clear()
+        self.client.on_message = self.take
+        self.client.connect_async(host, port)
+        self.client.loop_start()
+        assert self.listens.wait(5), f"{name} is at the broker"
+
+    def take(self, _client, _data, message):
+        with self.lock:
+            self.all.append((message.topic, message.payload, message.retain, now_us()))
+        if message.topic.endswith(f"/reply/{self.name}"):
+            self.answers.put(json.loads(message.payload))
+
+    def texts(self, what, machine=ID):
+        with self.lock:
+            return [payload.decode() for topic, payload, _, _ in self.all if topic == f"iwheel/{machine}/{what}"]
+
+    def messages(self, what, machine=ID):
+        return [json.loads(text) for text in self.texts(what, machine)]
+
+    def events(self, name=None, machine=ID):
+        """(topic's name, event) in the order in which they came, doubles by id left out."""
+        seen, found = set(), []
+        with self.lock:
+            all_of = list(self.all)
+        for topic, payload, _, _ in all_of:
+            if topic.startswith(f"iwheel/{machine}/event/"):
+                event = json.loads(payload)
+                if event["id"] not in seen and name in (None, event["event"]):
+                    found.append(event)
+                seen.add(event["id"])
+        return found
+
+    def doubled(self, machine=ID):
+        with self.lock:
+            ids = [json.loads(payload)["id"] for topic, payload, _, _ in self.all if topic.startswith(f"iwheel/{machine}/event/")]
+        return len(ids) - len(set(ids))
+
+    def send(self, verb, machine=ID, retain=False, **fields):
+        """Publishes exactly these fields."""
+        self.client.publish(f"iwheel/{machine}/cmd/{verb}", json.dumps(fields), qos=1, retain=retain)
+
+    def quote(self, seconds=3):
+        """boot and t_us of a message that the machine sends now."""
+        self.seq += 1
+        seq = self.seq
+        self.send("hello", **{"from": self.name, "seq": seq})
+        answer = self.answer(seq, seconds)
+        return {"boot": answer["boot"], "t_us": answer["t_us"]}
+
+    def answer(self, seq, seconds=3):
+        while True:
+            try:
+                answer = self.answers.get(timeout=seconds)
+            except queue.Empty as error:
+                raise AssertionError(f"no answer to {seq} in {seconds} s") from error
+            if answer["seq"] == seq:
+                return answer
+
+    def ask(self, verb, quote=None, wait=True, **fields):
+        """A command as it should be; its answer."""
+        fields = {**(quote or self.quote()), **fields}
+        self.seq += 1
+        seq = self.seq
+        self.send(verb, **{"from": self.name, "seq": seq, **fields})
+        return self.answer(seq) if wait else None
+
+    def close(self):
+        self.client.disconnect()
+        self.client.loop_stop()
+
+
+class Line(threading.Thread):
+    """A network between bridge and broker that can be cut: at any byte, or without a word."""
+
+    def __init__(self, port):
+        super().__init__(daemon=True)
+        self.to, self.pairs, self.frozen = port, [], False
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.port = self.listener.getsockname()[1]
+        self.left = None  # Bytes until it is cut; None: never.
+        self.start()
+
+    def run(self):
+        while True:
+            try:
+                near = self.listener.accept()[0]
+            except OSError:
+                return
+            try:
+                far = socket.create_connection(("127.0.0.1", self.to))
+            except OSError:
+                near.close()
+                continue
+            self.pairs += [near, far]
+            for one, other in ((near, far), (far, near)):
+                threading.Thread(target=self.carry, args=(one, other), daemon=True).start()
+
+    def carry(self, one, other):
+        try:
+            while data := one.recv(4096):
+                while self.frozen:
+                    time.sleep(0.01)
+                if self.left is not None:
+                    data = data[:max(0, self.left)]
+                    self.left -= len(data)
+                other.sendall(data)
+                if self.left is not None and self.left <= 0:
+                    break
+        except OSError:
+            pass
+        for end in (one, other):
+            try:
+                end.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+
+    def close(self):
+        for one in (self.listener, *self.pairs):
+            try:
+                one.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+            one.close()
+
+
+class MqttRig(Rig):
+    """`driving`: commands may drive and reset."""
+
+    def __init__(self, build, driving=False, settings=None, config=None):
+        if not paho:
+            raise Skip("paho-mqtt is missing in .venv (pip install -r scripts/requirements.txt)")
+        if not shutil.which("mosquitto"):
+            raise Skip("mosquitto is missing (scripts/install_tools check brings it)")
+        self.bridge = self.broker = None
+        self.fars, self.port = [], free_port()
+        self.broker_lines = ["allow_anonymous true", "persistence false", f"user {pwd.getpwuid(os.getuid()).pw_name}"]
+        super().__init__(str(build), {section: {**CONFIG.get(section, {}), **(config or {}).get(section, {})} for section in {*CONFIG, *(config or {})}})
+        self.mqtt_settings = {"gateway": {"socket": self.path("gateway.sock" if driving else "watch.sock")}, "machine": {"id": ID}, "broker": {"port": self.port},
+                              "state": {"every_ms": 1000}, "spool": {"directory": self.path("spool")}, "home_assistant": {}, "drive": {}}
+        if driving:
+            self.mqtt_settings["drive"] = {"enabled": "yes", "allow_reset": "yes"}
+        for section, keys in (settings or {}).items():
+            self.mqtt_settings[section].update(keys)
+        Path(self.path("spool")).mkdir(mode=0o700)
+
+    def words(self):
+        return self.bridge.text() if self.bridge else ""
+
+    def gateway_command(self, *extra):
+        return super().gateway_command("--watch-socket", self.path("watch.sock"), *extra)
+
+    def start(self):
+        self.start_gateway()
+        self.start_broker()
+        self.start_bridge()
+        return self
+
+    def start_broker(self):
+        Path(self.path("mosquitto.conf")).write_text("\n".join(["listener " + str(self.port) + " 127.0.0.1", *self.broker_lines, ""]), encoding="utf-8")
+        self.broker = Process(["mosquitto", "-c", self.path("mosquitto.conf")], self.path("mosquitto.out"))
+        self.processes.append(self.broker)
+
+        def listens():
+            assert self.broker.child.poll() is None, self.broker.text()
+            with socket.socket() as one:
+                return one.connect_ex(("127.0.0.1", self.port)) == 0
+        until(listens, what="the broker listens")
+
+    def bring_broker_back(self, line, far):
+        """A broker that was killed knows no listeners: what the bridge told it before `far` is back would be told to nobody."""
+        line.left = 0
+        self.start_broker()
+        assert far.listens.wait(5), "far is back"
+        line.left = None
+
+    def end_broker(self, number=9):
+        self.broker.signal(number)
+        self.broker.wait(5)
+
+    def start_bridge(self, setup=None, **options):
+        with open(self.path("mqtt.conf"), "w", encoding="utf-8") as file:
+            for section, keys in self.mqtt_settings.items():
+                file.write(f"[{section}]\n" + "".join(f"{key} = {value}\n" for key, value in keys.items()))
+        self.bridge = Process([self.program("iwheel-mqtt"), "-c", self.path("mqtt.conf")], self.path("mqtt.out"), setup, **options)
+        self.processes.append(self.bridge)
+        return self.bridge
+
+    def cut_here(self):
+        """Puts a line that can be cut before the broker, for the bridge."""
+        line = Line(self.port)
+        self.mqtt_settings["broker"]["port"] = line.port
+        self.fars.append(line)
+        return line
+
+    def far(self, name="far", **options):
+        one = Far(self.port, name, **options)
+        self.fars.append(one)
+        return one
+
+    def online(self, far=None):
+        far = far or self.far()
+        until(lambda: far.texts("availability")[-1:] == ["online"], what=f"online: {self.words()}")
+        return far
+
+    def gateway_state(self):
+        client = self.client(name="looker")
+        try:
+            return client.request("status")
+        finally:
+            client.close()
+
+    def press(self, pressed=True):
+        self.sim.ask("estop press" if pressed else "estop release")
+
+    def close(self, keep=False):
+        for far in self.fars:
+            far.close()
+        super().close(keep)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""Runs the trials of a bridge: functions test_..., each with a rig of its own, in real time. The last line sums up: "N passed, N failed, N skipped"."""
+
+import argparse
+import os
+import threading
+import time
+import traceback
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from bus import now_us
+from client import Closed
+from judge_log import LEFT, RIGHT
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+TRIES = 2
+
+
+class Skip(Exception):
+    """This cannot be tested here."""
+
+
+def needs(**rig):
+    """Marks a test with what its rig is made with."""
+    def mark(function):
+        function.rig = rig
+        return function
+    return mark
+
+
+def full(function):
+    """Marks a test that only --full runs."""
+    function.full = True
+    return function
+
+
+def until(condition, seconds=10.0, what="it"):
+    """The first true value of the condition; fails loudly if there is none in time."""
+    deadline = time.monotonic() + seconds
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > deadline:
+            raise AssertionError(f"not within {seconds} s: {what}")
+        time.sleep(0.02)
+
+
+class Driver(threading.Thread):
+    """A client of the gateway that drives until it is told to end, or the wheels are stopped."""
+
+    def __init__(self, rig, speed=200):
+        super().__init__(daemon=True)
+        self.client, self.speed, self.ended = rig.client(name="joystick"), speed, threading.Event()
+        self.turning = False
+        self.start()
+        until(lambda: rig.bus.setpoints() and abs(rig.bus.setpoints()[-1][2]) == speed, what="the wheels are told to turn, and at this speed")
+        self.turning = True
+
+    def run(self):
+        """A busy machine may stop the wheels before the test begins: then once more, after the silence that `arm` wants."""
+        wait, cmd = 0.05, {"cmd": "arm", "name": "joystick"}
+        try:
+            while not self.ended.wait(wait):
+                done = self.client.request(**cmd)["ok"]
+                if not done and self.turning:
+                    return
+                wait = 0.05 if done else 0.6
+                cmd = {"cmd": "drive", "left_mm_s": self.speed, "right_mm_s": self.speed} if done else {"cmd": "arm", "name": "joystick"}
+        except (OSError, Closed):
+            return  # The rig has ended.
+
+    def end(self):
+        self.ended.set()
+        self.join(2)
+
+
+def longest_gap_ms(rig, since_us):
+    """The longest time between two setpoints of one wheel on the bus, until now."""
+    until_us = now_us()
+    gaps = []
+    for wheel in (LEFT, RIGHT):
+        times = [since_us] + [t_us for t_us, id_, _ in rig.bus.setpoints(since_us) if id_ == wheel and t_us < until_us]
+        gaps += [after - before for before, after in zip(times, times[1:] + [until_us])]
+    return max(gaps) / 1000
+
+
+def braking_ms(rig, since_us, seconds=2):
+    """How long after this time the first setpoint was on the bus that is nearer to zero than the one before it of that wheel."""
+    def found():
+        last = {}
+        for t_us, wheel, speed in rig.bus.setpoints():
+            if t_us >= since_us and abs(speed) < last.get(wheel, 0):
+                return t_us
+            last[wheel] = abs(speed)
+        return None
+
+    return (until(found, seconds, "the wheels are told to brake") - since_us) / 1000
+
+
+def run(name, function, make_rig):
+    """None, or why it failed. The wheels are simulated in real time: on a busy machine a stop may have another cause, so it is tried again."""
+    for left in reversed(range(TRIES)):
+        rig = make_rig(**getattr(function, "rig", {}))
+        try:
+            function(rig)
+            return None
+        except Skip:
+            raise
+        except Exception as error:  # pylint: disable=broad-except
+            words = f"{type(error).__name__}: {error}\n{traceback.format_exc(limit=-4)}\n{rig.words()[-800:]}"
+            if left == 0:
+                return words
+            print(f"        {name}: once more: {str(error)[:200]}", flush=True)
+            time.sleep(1)
+        finally:
+            rig.close()
+    return None
+
+
+def judge(name, function, make_rig):
+    begun = time.monotonic()
+    try:
+        words = run(name, function, make_rig)
+    except Skip as reason:
+        print(f"skip: {name}: {reason}", flush=True)
+        return "skip:"
+    verdict = "FAILED" if words else "ok"
+    print(f"{verdict:7} {name} ({time.monotonic() - begun:.1f} s){chr(10) + words if words else ''}", flush=True)
+    return verdict
+
+
+def parser(usage):
+    """The arguments that all have; a runner may add its own."""
+    one = argparse.ArgumentParser(usage=usage)
+    one.add_argument("--build", default=ROOT / "build/default")
+    one.add_argument("--only", action="append")
+    one.add_argument("--list", action="store_true")
+    one.add_argument("--jobs", type=int, default=2)
+    return one
+
+
+def main(options, modules, rig):
+    """`rig(build, **what needs() says)` has words(), the log to show with a failure, and close()."""
+    tests = [one for module in modules for one in vars(module).items() if one[0].startswith("test_")]
+    if options.list:
+        print(*(name for name, _ in tests), sep="\n")
+        return 0
+    chosen = [one for one in tests if (not options.only or any(only in one[0] for only in options.only)) and
+              (not getattr(one[1], "full", False) or os.environ.get("IWHEEL_FULL") == "1")]
+    verdicts = {"ok": 0, "FAILED": 0, "skip:": 0}
+    with ThreadPoolExecutor(options.jobs) as pool:
+        for verdict in pool.map(lambda one: judge(*one, lambda **what: rig(options.build, **what)), chosen):
+            verdicts[verdict] += 1
+    passed, failed, skipped = verdicts.values()
+    print(f"{passed} passed, {failed} failed, {skipped} skipped")
+    return 1 if failed or not passed else 0

@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: MIT
+// Which commands by MQTT count, by their age on this machine's clock and their sender's count; and what is told of them.
+#include "command.h"
+#include "tell.h"
+
+#include "unity.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define NOW_US 50000000U
+#define BOOT   "0123456789abcdef"
+
+static mqtt_judge_t judge;
+static mqtt_rules_t rules;
+static mqtt_order_t order;
+
+void setUp(void) {
+    memset(&judge, 0, sizeof judge);
+    rules = (mqtt_rules_t){BOOT, 300, true, true};
+}
+
+void tearDown(void) {}
+
+static mqtt_verdict_t judge_text(const char *verb, const char *text, uint64_t now_us) {
+    const mqtt_command_t command = {verb, text, strlen(text), false};
+    const uint64_t before = judge.counts[MQTT_TAKEN];
+    mqtt_judge(&judge, &rules, &command, now_us, &order);
+    TEST_ASSERT_EQUAL(order.verdict == MQTT_TAKEN, judge.counts[MQTT_TAKEN] == before + 1U);
+    TEST_ASSERT_EQUAL(order.verdict == MQTT_TAKEN, order.request[0] != '\0');
+    TEST_ASSERT_EQUAL(order.verdict == MQTT_TAKEN, order.why[0] == '\0');
+    return order.verdict;
+}
+
+/// By `far`, with these fields of its own behind.
+static mqtt_verdict_t judge_it(const char *verb, uint64_t told_us, int seq, const char *fields, uint64_t now_us) {
+    char text[512];
+    (void)snprintf(text, sizeof text, "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":%llu,\"seq\":%d%s}",
+                   (unsigned long long)told_us, seq, fields);
+    return judge_text(verb, text, now_us);
+}
+
+static void test_command_fresh_is_taken_as_the_gateways_request(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 1, "", NOW_US));
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"stop\"}", order.request);
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("estop", NOW_US, 2, ",\"reason\":\"a \\\"b\\\"\"", NOW_US));
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"estop\",\"reason\":\"a \\\"b\\\"\"}", order.request);
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("drive", NOW_US, 3, ",\"left_mm_s\":-5,\"right_mm_s\":7", NOW_US));
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"drive\",\"left_mm_s\":-5,\"right_mm_s\":7}", order.request);
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("arm", NOW_US, 4, "", NOW_US));
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"arm\",\"name\":\"mqtt far\"}", order.request);
+}
+
+static void test_command_age_is_judged_to_the_microsecond(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 1, "", NOW_US + 1000000U));
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("stop", NOW_US, 2, "", NOW_US + 1000001U));
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("estop", NOW_US, 3, "", NOW_US + 1000001U));
+    TEST_ASSERT_EQUAL(MQTT_EARLY, judge_it("stop", NOW_US + 1U, 4, "", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("drive", NOW_US, 5, "", NOW_US + 300000U));
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 6, "", NOW_US + 300001U));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 7, ",\"ttl_ms\":100", NOW_US + 100000U));
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("stop", NOW_US, 8, ",\"ttl_ms\":100", NOW_US + 100001U));
+}
+
+static void test_command_cannot_make_its_own_life_longer(void) {
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 1, ",\"ttl_ms\":1000", NOW_US + 300001U));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 2, ",\"ttl_ms\":1001", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("stop", NOW_US, 3, ",\"ttl_ms\":0", NOW_US));
+}
+
+static void test_command_of_another_boot_is_dropped_before_its_age(void) {
+    const char *text = "{\"from\":\"far\",\"boot\":\"0123456789abcdee\",\"t_us\":50000000,\"seq\":1}";
+    TEST_ASSERT_EQUAL(MQTT_OTHER_BOOT, judge_text("stop", text, NOW_US));
+}
+
+static void test_command_seq_must_rise(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 5, "", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("stop", NOW_US, 5, "", NOW_US + 1U));
+    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("stop", NOW_US, 4, "", NOW_US + 1000000U));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 6, "", NOW_US + 1000000U));
+}
+
+static void test_command_seq_may_begin_anew_only_when_all_before_is_late(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 500, "", NOW_US));
+    for (uint64_t later_us = 0; later_us <= 3000000U; later_us += 1000U) {
+        TEST_ASSERT_NOT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 500, "", NOW_US + later_us));
+    }
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US + 1000001U, 1, "", NOW_US + 1000001U));
+}
+
+static void test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count(void) {
+    char text[256];
+    for (unsigned i = 0; i <= MQTT_SENDERS; i++) {
+        (void)snprintf(text, sizeof text, "{\"from\":\"s%u\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":9}", i);
+        TEST_ASSERT_EQUAL((i < MQTT_SENDERS) ? MQTT_TAKEN : MQTT_CROWDED, judge_text("stop", text, NOW_US));
+    }
+    (void)snprintf(text, sizeof text, "{\"from\":\"s0\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":9}");
+    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_text("stop", text, NOW_US));
+    (void)snprintf(text, sizeof text, "{\"from\":\"new\",\"boot\":\"" BOOT "\",\"t_us\":51000001,\"seq\":1}");
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("stop", text, NOW_US + 1000001U));
+}
+
+static void test_command_retained_is_dropped_hello_too(void) {
+    const char *text = "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":1}";
+    static const char *const verbs[] = {"stop", "estop", "hello", "drive"};
+    for (size_t i = 0; i < 4U; i++) {
+        const mqtt_command_t command = {verbs[i], text, strlen(text), true};
+        mqtt_judge(&judge, &rules, &command, NOW_US, &order);
+        TEST_ASSERT_EQUAL(MQTT_RETAINED, order.verdict);
+    }
+    TEST_ASSERT_EQUAL_UINT64(4, judge.counts[MQTT_RETAINED]);
+}
+
+static void test_command_hello_needs_no_time(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("hello", "{\"from\":\"far\",\"seq\":1}", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_text("stop", "{\"from\":\"far\",\"seq\":2}", NOW_US));
+}
+
+static void test_command_that_drives_needs_the_right_stop_never(void) {
+    static const char *const verbs[] = {"arm", "drive", "twist", "reset"};
+    rules.may_drive = false;
+    rules.may_reset = false;
+    for (int i = 0; i < 4; i++) {
+        TEST_ASSERT_EQUAL(MQTT_DENIED, judge_it(verbs[i], NOW_US, i + 1, "", NOW_US));
+    }
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 10, "", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("estop", NOW_US, 11, "", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 12, "", NOW_US));
+}
+
+static void test_command_garbled_is_dropped(void) {
+    static const char *const texts[] = {
+        "",
+        "x",
+        "[]",
+        "{\"from\":\"far\"}",
+        "{\"from\":7,\"seq\":1}",
+        "{\"from\":\"\",\"seq\":1}",
+        "{\"from\":\"a/b\",\"seq\":1}",
+        "{\"from\":\"a+\",\"seq\":1}",
+        "{\"from\":\"far\",\"seq\":1.0}",
+        "{\"from\":\"far\",\"seq\":-1}",
+        "{\"from\":\"far\",\"seq\":1,\"seq\":2}",
+        "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "\",\"t_us\":\"1\"}",
+        "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "0\",\"t_us\":1}",
+        "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "\",\"t_us\":-1}",
+        "{\"from\":\"far\",\"seq\":1,\"boot\":\"" BOOT "\",\"t_us\":50000000,\"left_mm_s\":1}",
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(MQTT_GARBLED, judge_text("stop", texts[i], NOW_US), texts[i]);
+    }
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("takeover", NOW_US, 1, "", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":{\"cmd\":\"arm\"}", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":true", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("arm", NOW_US, 1, ",\"takeover\":true", NOW_US));
+}
+
+static void test_command_too_long_is_not_looked_at(void) {
+    static char text[MQTT_COMMAND_MAX + 2U];
+    memset(text, ' ', sizeof text);
+    memcpy(text, "{\"from\":\"far\",\"seq\":1}", 22);
+    const mqtt_command_t command = {"hello", text, MQTT_COMMAND_MAX, false};
+    const mqtt_command_t longer = {"hello", text, MQTT_COMMAND_MAX + 1U, false};
+    mqtt_judge(&judge, &rules, &command, NOW_US, &order);
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, order.verdict);
+    mqtt_judge(&judge, &rules, &longer, NOW_US, &order);
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, order.verdict);
+}
+
+// ---- topics and messages ------------------------------------------------------------------------------------------
+
+static void test_topics_are_of_this_machine_only(void) {
+    char topic[MQTT_TOPIC_SIZE];
+    mqtt_topic("w1", "event", "stop", topic);
+    TEST_ASSERT_EQUAL_STRING("iwheel/w1/event/stop", topic);
+    mqtt_topic("w1", "info", NULL, topic);
+    TEST_ASSERT_EQUAL_STRING("iwheel/w1/info", topic);
+    TEST_ASSERT_EQUAL_STRING("estop", mqtt_topic_verb("w1", "iwheel/w1/cmd/estop"));
+    TEST_ASSERT_NULL(mqtt_topic_verb("w1", "iwheel/w10/cmd/stop"));
+    TEST_ASSERT_NULL(mqtt_topic_verb("w1", "iwheel/w1/event/stop"));
+    TEST_ASSERT_NULL(mqtt_topic_verb("w1", "iwheel/w1/cmd"));
+}
+
+static void test_messages_are_the_gateways_with_ours_before(void) {
+    char text[256];
+    const mqtt_buffer_t buffer = {text, sizeof text};
+    const char *line = "{\"event\":\"fault\",\"t_us\":5}";
+    const iwc_message_t event = {.text = line, .length = strlen(line), .is_event = true};
+    size_t length = mqtt_tell_state(BOOT, &event, buffer);
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT "\",\"event\":\"fault\",\"t_us\":5}", text, length);
+    length = mqtt_tell_event(BOOT, 7, 99, &event, buffer);
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"id\":\"" BOOT "-7\",\"boot\":\"" BOOT
+                                 "\",\"heard_wall_us\":99,\"event\":\"fault\",\"t_us\":5}",
+                                 text, length);
+}
+
+static void test_answer_quotes_time_and_seq_and_the_gateways_reply(void) {
+    char text[512];
+    const mqtt_buffer_t buffer = {text, sizeof text};
+    const char *line = "{\"id\":12,\"ok\":true,\"state\":\"stopping\"}";
+    const iwc_message_t reply = {.text = line, .length = strlen(line)};
+    (void)judge_it("stop", NOW_US, 3, "", NOW_US);
+    size_t length = mqtt_tell_answer(BOOT, NOW_US, &order, &reply, buffer);
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT
+                                 "\",\"t_us\":50000000,\"cmd\":\"stop\",\"seq\":3,\"ok\":true,\"state\":\"stopping\"}",
+                                 text, length);
+    (void)judge_it("stop", NOW_US, 3, "", NOW_US);
+    length = mqtt_tell_answer(BOOT, NOW_US, &order, NULL, buffer);
+    TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT
+                                 "\",\"t_us\":50000000,\"cmd\":\"stop\",\"seq\":3,\"ok\":false,\"error\":\"doubled\","
+                                 "\"message\":\"seq must rise with each command of a sender\"}",
+                                 text, length);
+}
+
+static void test_message_that_does_not_fit_is_none(void) {
+    char text[64];
+    const char *line = "{\"event\":\"fault\",\"t_us\":5}";
+    const iwc_message_t event = {.text = line, .length = strlen(line), .is_event = true};
+    for (size_t size = 1; size < sizeof text; size++) {
+        const size_t length = mqtt_tell_state(BOOT, &event, (mqtt_buffer_t){text, size});
+        TEST_ASSERT_TRUE(length == 0U || (length <= size && text[length - 1U] == '}'));
+    }
+    TEST_ASSERT_EQUAL_size_t(0, mqtt_tell_event(BOOT, 1, 1, &event, (mqtt_buffer_t){text, sizeof text}));
+}
+
+static void test_missed_stop_is_told_without_its_frames(void) {
+    char text[1024];
+    const char *line = "{\"id\":1,\"ok\":true,\"number\":4,\"cause\":\"wheel_lost\",\"wall_us\":77,\"at_us\":66,"
+                       "\"sentence\":\"gone\",\"frames_before\":[1,2,3]}";
+    const iwc_message_t why = {.text = line, .length = strlen(line)};
+    const size_t length = mqtt_tell_missed_stop(BOOT, 2, 99, &why, (mqtt_buffer_t){text, sizeof text});
+    text[length] = '\0';
+    TEST_ASSERT_NOT_NULL(
+        strstr(text, "\"event\":\"stop\",\"missed\":true,\"t_us\":66,\"number\":4,\"cause\":\"wheel_lost\""));
+    TEST_ASSERT_NULL(strstr(text, "frames_before"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"recording\":null}"));
+}
+
+static void test_info_without_a_gateway_invents_nothing(void) {
+    char text[2048];
+    mqtt_settings_t settings;
+    const uint64_t counts[MQTT_VERDICTS] = {1, 2};
+    mqtt_settings_default(&settings);
+    const mqtt_info_t info = {.boot = BOOT, .settings = &settings, .counts = counts, .dropped = 3};
+    const size_t length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
+    text[length] = '\0';
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"gateway\":\"away\",\"version\":null,"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"budget\":null"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"taken\":1,\"retained\":2,"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"dropped\":3,\"on_disk\":false"));
+}
+
+// ---- settings -----------------------------------------------------------------------------------------------------
+
+static unsigned errors_of(const char *text) {
+    mqtt_settings_t settings;
+    FILE *err = fopen("/dev/null", "w");
+    settings_report_t report = {.name = "test", .err = err};
+    mqtt_settings_default(&settings);
+    const int code = settings_parse(&mqtt_settings_form, &report, text, strlen(text), &settings);
+    (void)fclose(err);
+    TEST_ASSERT_EQUAL(code != 0, report.errors != 0U);
+    return report.errors;
+}
+
+static void test_settings_that_would_open_a_door_by_mistake_are_refused(void) {
+    TEST_ASSERT_EQUAL_UINT(0, errors_of("[machine]\nid = w1\n"));
+    TEST_ASSERT_EQUAL_UINT(1, errors_of("[broker]\nhost = broker.example\n"));
+    TEST_ASSERT_EQUAL_UINT(0, errors_of("[broker]\nhost = broker.example\nca = /x.pem\n"));
+    TEST_ASSERT_EQUAL_UINT(0, errors_of("[broker]\nhost = broker.example\nallow_plain = yes\n"));
+    TEST_ASSERT_EQUAL_UINT(1, errors_of("[broker]\nca = /x.pem\nkey = /x.key\n"));
+    TEST_ASSERT_EQUAL_UINT(1, errors_of("[broker]\ncertificate = /x.pem\nkey = /x.key\n"));
+    TEST_ASSERT_EQUAL_UINT(1, errors_of("[drive]\nallow_reset = yes\n"));
+    TEST_ASSERT_EQUAL_UINT(1, errors_of("[drive]\nttl_ms = 1001\n"));
+    TEST_ASSERT_EQUAL_UINT(1, errors_of("[state]\nevery_ms = 99\n"));
+    TEST_ASSERT_EQUAL_UINT(1, errors_of("[machine]\nid = a/b\n"));
+    TEST_ASSERT_EQUAL_UINT(1, errors_of("[machine]\nid = #\n"));
+}
+
+static void test_settings_shipped_are_the_defaults(void) {
+    char shipped[16384];
+    char *printed = NULL;
+    size_t length = 0;
+    mqtt_settings_t settings;
+    FILE *file = fopen(IWHEEL_SHARE_DIR "/mqtt.conf", "r");
+    TEST_ASSERT_NOT_NULL(file);
+    shipped[fread(shipped, 1, sizeof shipped - 1U, file)] = '\0';
+    (void)fclose(file);
+    mqtt_settings_default(&settings);
+    FILE *out = open_memstream(&printed, &length);
+    settings_print(&mqtt_settings_form, &settings, &settings, NULL, out);
+    (void)fclose(out);
+    TEST_ASSERT_EQUAL_STRING(printed, shipped);
+    free(printed);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_command_fresh_is_taken_as_the_gateways_request);
+    RUN_TEST(test_command_age_is_judged_to_the_microsecond);
+    RUN_TEST(test_command_cannot_make_its_own_life_longer);
+    RUN_TEST(test_command_of_another_boot_is_dropped_before_its_age);
+    RUN_TEST(test_command_seq_must_rise);
+    RUN_TEST(test_command_seq_may_begin_anew_only_when_all_before_is_late);
+    RUN_TEST(test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count);
+    RUN_TEST(test_command_retained_is_dropped_hello_too);
+    RUN_TEST(test_command_hello_needs_no_time);
+    RUN_TEST(test_command_that_drives_needs_the_right_stop_never);
+    RUN_TEST(test_command_garbled_is_dropped);
+    RUN_TEST(test_command_too_long_is_not_looked_at);
+    RUN_TEST(test_topics_are_of_this_machine_only);
+    RUN_TEST(test_messages_are_the_gateways_with_ours_before);
+    RUN_TEST(test_answer_quotes_time_and_seq_and_the_gateways_reply);
+    RUN_TEST(test_message_that_does_not_fit_is_none);
+    RUN_TEST(test_missed_stop_is_told_without_its_frames);
+    RUN_TEST(test_info_without_a_gateway_invents_nothing);
+    RUN_TEST(test_settings_that_would_open_a_door_by_mistake_are_refused);
+    RUN_TEST(test_settings_shipped_are_the_defaults);
+    return UNITY_END();
+}

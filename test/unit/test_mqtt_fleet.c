@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT
+// The console's rows, from what machines and anybody else say at the broker.
+#include "fleet.h"
+
+#include "unity.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static fleet_t fleet;
+static char *shown;
+static size_t shown_size;
+
+void setUp(void) {
+    TEST_ASSERT_TRUE(fleet_open(&fleet));
+}
+
+void tearDown(void) {
+    fleet_close(&fleet);
+    free(shown);
+    shown = NULL;
+}
+
+static void take(const char *topic, const char *payload) {
+    fleet_take(&fleet, topic, payload, strlen(payload), 1000000U);
+}
+
+static const char *show(void (*how)(const fleet_t *self, uint64_t now_us, FILE *out)) {
+    free(shown);
+    FILE *out = open_memstream(&shown, &shown_size);
+    how(&fleet, 3000000U, out);
+    (void)fclose(out);
+    return shown;
+}
+
+static const char state[] =
+    "{\"boot\":\"1\",\"event\":\"state\",\"version\":\"0.2.0\",\"state\":\"latched\",\"left\":{\"battery_dV\":240,"
+    "\"offset_provenance\":\"operator\",\"offset_contaminated\":false},\"right\":{\"battery_dV\":null,"
+    "\"offset_provenance\":\"estimated\",\"offset_contaminated\":true},\"ledger\":{\"radius\":{\"state\":"
+    "\"contradicted\"},\"track\":{\"state\":\"confirmed\"}}}";
+
+static void test_fleet_machines_are_sorted_and_counted(void) {
+    take("iwheel/w2/availability", "online");
+    take("iwheel/w10/availability", "offline");
+    take("iwheel/w1/availability", "online");
+    TEST_ASSERT_EQUAL_size_t(3, fleet.count);
+    TEST_ASSERT_EQUAL_STRING("w1", fleet.machines[0].id);
+    TEST_ASSERT_EQUAL_STRING("w10", fleet.machines[1].id);
+    TEST_ASSERT_FALSE(fleet.machines[1].online);
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "3 machines, 2 online\n"));
+}
+
+static void test_fleet_row_tells_state_battery_zero_and_what_is_unknown(void) {
+    take("iwheel/w1/availability", "online");
+    take("iwheel/w1/state", state);
+    const char *text = show(fleet_show);
+    TEST_ASSERT_NOT_NULL(strstr(text, "online   latched      24.0     -- operator   doubted    0.2.0"));
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"left_battery_dV\":240,\"right_battery_dV\":null,"));
+    TEST_ASSERT_NOT_NULL(strstr(shown, "\"cause\":null,\"stop_wall_us\":null,"));
+    TEST_ASSERT_NOT_NULL(strstr(shown, "\"heard_ms\":2000}"));
+}
+
+static void test_fleet_contradictions_are_counted_across_machines(void) {
+    take("iwheel/w1/state", state);
+    take("iwheel/w2/state", state);
+    take("iwheel/w3/availability", "online");
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "contradicted: radius on 2 of 3\n"));
+    TEST_ASSERT_NULL(strstr(shown, "track"));
+}
+
+static void test_fleet_stop_is_told_with_its_cause_and_moves_no_terminal(void) {
+    take("iwheel/w1/event/stop", "{\"event\":\"stop\",\"cause\":\"wheel_\\u001b[2Jlost\",\"wall_us\":1760000000000000,"
+                                 "\"sentence\":\"left wheel\"}");
+    const char *text = show(fleet_show);
+    TEST_ASSERT_NULL(strchr(text, '\033'));
+    TEST_ASSERT_NOT_NULL(strstr(text, "wheel_"));
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"stop_wall_us\":1760000000000000,\"sentence\":\"left wheel\""));
+}
+
+static void test_fleet_garbage_is_left_out_and_counted(void) {
+    static const char *const topics[] = {"iwheel/", "iwheel//state", "iwheel/a b/state", "other/w1/state", "iwheel/w1"};
+    for (size_t i = 0; i < sizeof topics / sizeof topics[0]; i++) {
+        take(topics[i], state);
+    }
+    TEST_ASSERT_EQUAL_size_t(0, fleet.count);
+    take("iwheel/w1/state", "{\"state\":");
+    take("iwheel/w1/state", "[]");
+    take("iwheel/w1/state", "");
+    TEST_ASSERT_EQUAL_UINT64(8, fleet.left_out);
+    TEST_ASSERT_EQUAL_STRING("", fleet.machines[0].state);
+    take("iwheel/w1/state", "{\"ledger\":7,\"left\":[],\"state\":null}");
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"state\":null"));
+}
+
+static void test_fleet_of_too_many_machines_is_counted_not_shown(void) {
+    char topic[64];
+    for (unsigned i = 0; i < FLEET_MACHINES + 5U; i++) {
+        (void)snprintf(topic, sizeof topic, "iwheel/m%u/availability", i);
+        take(topic, "online");
+    }
+    TEST_ASSERT_EQUAL_size_t(FLEET_MACHINES, fleet.count);
+    TEST_ASSERT_EQUAL_UINT64(5, fleet.left_out);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_fleet_machines_are_sorted_and_counted);
+    RUN_TEST(test_fleet_row_tells_state_battery_zero_and_what_is_unknown);
+    RUN_TEST(test_fleet_contradictions_are_counted_across_machines);
+    RUN_TEST(test_fleet_stop_is_told_with_its_cause_and_moves_no_terminal);
+    RUN_TEST(test_fleet_garbage_is_left_out_and_counted);
+    RUN_TEST(test_fleet_of_too_many_machines_is_counted_not_shown);
+    return UNITY_END();
+}

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: MIT
+// Events that wait for the broker: whole and in order whatever happens to file, process and disk.
+#include "spool.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#define SMALL (2U * MQTT_SPOOL_EVENT_MAX)
+
+static char folder[64];
+static char path[80];
+static mqtt_spool_t spool;
+
+void setUp(void) {
+    // In memory where there is such a place: each new file waits for the disk.
+    (void)snprintf(folder, sizeof folder, "%s/iwheel-spool-XXXXXX",
+                   (access("/dev/shm", W_OK) == 0) ? "/dev/shm" : "/tmp");
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    (void)snprintf(path, sizeof path, "%s/" MQTT_SPOOL_FILE, folder);
+    TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
+}
+
+void tearDown(void) {
+    (void)mqtt_spool_close(&spool);
+    (void)unlink(path);
+    (void)rmdir(folder);
+}
+
+static void add(unsigned number) {
+    char text[32];
+    const int length = snprintf(text, sizeof text, "{\"n\":%u}", number);
+    TEST_ASSERT_TRUE(mqtt_spool_add(&spool, "stop", text, (size_t)length, number));
+}
+
+static void reopen(void) {
+    TEST_ASSERT_TRUE(mqtt_spool_close(&spool));
+    TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
+}
+
+/// What waits is numbers `first` to `last`, each as it was added.
+static void expect(unsigned first, unsigned last) {
+    mqtt_spool_event_t event;
+    uint64_t number = 0;
+    for (unsigned i = first; i <= last; i++) {
+        char text[32];
+        (void)snprintf(text, sizeof text, "{\"n\":%u}", i);
+        TEST_ASSERT_TRUE(mqtt_spool_after(&spool, number, &event));
+        TEST_ASSERT_EQUAL_STRING("stop", event.name);
+        TEST_ASSERT_EQUAL_size_t(strlen(text), event.length);
+        TEST_ASSERT_EQUAL_MEMORY(text, event.payload, event.length);
+        TEST_ASSERT_TRUE(event.number > number);
+        number = event.number;
+    }
+    TEST_ASSERT_FALSE(mqtt_spool_after(&spool, number, &event));
+    TEST_ASSERT_EQUAL_size_t((last >= first) ? last - first + 1U : 0U, spool.waiting);
+}
+
+static size_t read_all(char *out, size_t size) {
+    FILE *file = fopen(path, "rb");
+    TEST_ASSERT_NOT_NULL(file);
+    const size_t length = fread(out, 1, size, file);
+    (void)fclose(file);
+    return length;
+}
+
+static void write_all(const char *bytes, size_t length) {
+    FILE *file = fopen(path, "wb");
+    TEST_ASSERT_NOT_NULL(file);
+    TEST_ASSERT_EQUAL_size_t(length, fwrite(bytes, 1, length, file));
+    (void)fclose(file);
+}
+
+static void test_spool_new_is_empty(void) {
+    expect(1, 0);
+    reopen();
+    expect(1, 0);
+}
+
+static void test_spool_events_outlive_the_process_in_order(void) {
+    for (unsigned i = 1; i <= 5; i++) {
+        add(i);
+    }
+    expect(1, 5);
+    reopen();
+    expect(1, 5);
+    add(6);
+    expect(1, 6);
+    TEST_ASSERT_EQUAL_UINT64(6, spool.mark);
+}
+
+static void test_spool_confirmed_events_do_not_come_back(void) {
+    for (unsigned i = 1; i <= 5; i++) {
+        add(i);
+    }
+    mqtt_spool_confirm(&spool, 3);
+    expect(4, 5);
+    reopen();
+    expect(4, 5);
+    mqtt_spool_confirm(&spool, 5);
+    reopen();
+    expect(1, 0);
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(5, spool.last, "numbers go on");
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(5, spool.mark, "the mark stays");
+}
+
+static void test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut(void) {
+    char bytes[1024];
+    size_t ends[6] = {0};
+    (void)mqtt_spool_close(&spool);
+    (void)unlink(path);
+    TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
+    ends[0] = read_all(bytes, sizeof bytes);
+    for (unsigned i = 1; i <= 5; i++) {
+        add(i);
+        ends[i] = read_all(bytes, sizeof bytes);
+    }
+    const size_t length = ends[5];
+    for (size_t cut = 0; cut <= length; cut++) {
+        unsigned whole = 0;
+        (void)mqtt_spool_close(&spool);
+        write_all(bytes, cut);
+        TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
+        while (whole < 5U && ends[whole + 1U] <= cut) {
+            whole++;
+        }
+        expect(1, whole);
+        add(whole + 1U); // And it goes on behind the cut.
+        reopen();
+        expect(1, whole + 1U);
+    }
+}
+
+static void test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it(void) {
+    char bytes[1024];
+    for (unsigned i = 1; i <= 3; i++) {
+        add(i);
+    }
+    const size_t length = read_all(bytes, sizeof bytes);
+    for (size_t at = 0; at < length; at++) {
+        mqtt_spool_event_t event;
+        uint64_t number = 0;
+        unsigned found = 0;
+        (void)mqtt_spool_close(&spool);
+        bytes[at] = (char)(bytes[at] ^ 0x20);
+        write_all(bytes, length);
+        bytes[at] = (char)(bytes[at] ^ 0x20);
+        TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
+        for (; mqtt_spool_after(&spool, number, &event); number = event.number) {
+            found++;
+        }
+        TEST_ASSERT_TRUE_MESSAGE(found < 3U, "what is wrong is not told");
+        expect(1, found);
+    }
+}
+
+static void test_spool_half_written_new_file_is_of_no_account(void) {
+    char fresh[96];
+    add(1);
+    (void)mqtt_spool_close(&spool);
+    (void)snprintf(fresh, sizeof fresh, "%s.new", path);
+    FILE *file = fopen(fresh, "wb");
+    TEST_ASSERT_NOT_NULL(file);
+    (void)fputs("iwspool1 half", file);
+    (void)fclose(file);
+    TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
+    expect(1, 1);
+    TEST_ASSERT_NOT_EQUAL_INT(0, access(fresh, F_OK));
+}
+
+static void test_spool_full_drops_the_oldest_and_counts(void) {
+    unsigned last = 0;
+    while (spool.dropped < 10U) {
+        last++;
+        add(last);
+    }
+    expect(11, last);
+    reopen();
+    TEST_ASSERT_TRUE(spool.waiting > 0U);
+    mqtt_spool_event_t event;
+    TEST_ASSERT_TRUE(mqtt_spool_after(&spool, last - 1U, &event));
+    TEST_ASSERT_EQUAL_UINT64(last, event.number);
+}
+
+static void test_spool_file_stays_bounded_however_many_come_and_go(void) {
+    char bytes[4U * SMALL];
+    for (unsigned i = 1; i <= 5000; i++) {
+        add(i);
+        mqtt_spool_confirm(&spool, i);
+        TEST_ASSERT_TRUE(spool.file_bytes <= 2U * SMALL + MQTT_SPOOL_EVENT_MAX);
+    }
+    TEST_ASSERT_TRUE(read_all(bytes, sizeof bytes) <= 2U * SMALL + MQTT_SPOOL_EVENT_MAX);
+    reopen();
+    expect(1, 0);
+    TEST_ASSERT_EQUAL_UINT64(5000, spool.last);
+}
+
+static void test_spool_event_too_long_is_counted(void) {
+    static char text[MQTT_SPOOL_EVENT_MAX];
+    TEST_ASSERT_FALSE(mqtt_spool_add(&spool, "stop", text, sizeof text, 0));
+    TEST_ASSERT_EQUAL_UINT64(1, spool.dropped);
+    add(1);
+    expect(1, 1);
+}
+
+static void test_spool_disk_full_at_every_byte_loses_nothing_and_recovers(void) {
+    struct rlimit before;
+    (void)getrlimit(RLIMIT_FSIZE, &before);
+    (void)signal(SIGXFSZ, SIG_IGN);
+    for (rlim_t room = 0; room < 400U; room++) {
+        tearDown();
+        setUp();
+        const struct rlimit small = {room, before.rlim_max};
+        (void)setrlimit(RLIMIT_FSIZE, &small);
+        for (unsigned i = 1; i <= 6; i++) {
+            add(i);
+        }
+        mqtt_spool_confirm(&spool, 1);
+        (void)setrlimit(RLIMIT_FSIZE, &before);
+        expect(2, 6);
+        mqtt_spool_tend(&spool);
+        TEST_ASSERT_FALSE(spool.behind);
+        reopen();
+        expect(2, 6);
+    }
+}
+
+static void test_spool_disk_full_and_killed_keeps_what_was_written_before(void) {
+    struct rlimit before;
+    (void)getrlimit(RLIMIT_FSIZE, &before);
+    (void)signal(SIGXFSZ, SIG_IGN);
+    add(1);
+    const struct rlimit small = {100, before.rlim_max};
+    (void)setrlimit(RLIMIT_FSIZE, &small);
+    add(2);
+    add(3);
+    TEST_ASSERT_TRUE(spool.behind);
+    (void)setrlimit(RLIMIT_FSIZE, &before);
+    reopen(); // Closing writes nothing, as a kill.
+    TEST_ASSERT_TRUE(spool.waiting >= 1U);
+    expect(1, (unsigned)spool.waiting);
+}
+
+static void test_spool_sync_brings_to_the_disk_without_waiting(void) {
+    add(1);
+    TEST_ASSERT_TRUE(spool.unsynced);
+    mqtt_spool_sync(&spool);
+    TEST_ASSERT_FALSE(spool.unsynced);
+    TEST_ASSERT_TRUE(mqtt_spool_close(&spool));
+    TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
+    expect(1, 1);
+}
+
+static void test_spool_of_another_process_is_kept_out(void) {
+    mqtt_spool_t other;
+    TEST_ASSERT_FALSE(mqtt_spool_open(&other, folder, SMALL));
+    TEST_ASSERT_EQUAL_INT(EWOULDBLOCK, errno);
+    TEST_ASSERT_FALSE(mqtt_spool_open(&other, "/nowhere", SMALL));
+    TEST_ASSERT_EQUAL_INT(ENOENT, errno);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_spool_new_is_empty);
+    RUN_TEST(test_spool_events_outlive_the_process_in_order);
+    RUN_TEST(test_spool_confirmed_events_do_not_come_back);
+    RUN_TEST(test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut);
+    RUN_TEST(test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it);
+    RUN_TEST(test_spool_half_written_new_file_is_of_no_account);
+    RUN_TEST(test_spool_full_drops_the_oldest_and_counts);
+    RUN_TEST(test_spool_file_stays_bounded_however_many_come_and_go);
+    RUN_TEST(test_spool_event_too_long_is_counted);
+    RUN_TEST(test_spool_disk_full_at_every_byte_loses_nothing_and_recovers);
+    RUN_TEST(test_spool_disk_full_and_killed_keeps_what_was_written_before);
+    RUN_TEST(test_spool_sync_brings_to_the_disk_without_waiting);
+    RUN_TEST(test_spool_of_another_process_is_kept_out);
+    return UNITY_END();
+}
