@@ -140,7 +140,7 @@ static bool check_next(check_t *self) {
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault) {
     check_t self = {.scan = {.text = text, .end = text + length, .at = text, .token = text, .fault = fault},
                     .name_at = work->name_at};
-    const int token = (length <= UINT16_MAX) ? iwn_scan(&self.scan) : IWN_TOKEN_END;
+    const int token = (length <= IWN_JSON_MAX) ? iwn_scan(&self.scan) : IWN_TOKEN_END;
     if (token != '{' && token != '[') {
         return fail(&self, "'[' or '{' expected");
     }

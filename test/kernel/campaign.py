@@ -21,6 +21,7 @@ import repeated
 import report
 from boot import HERE, Boot, find_kernel
 from catalogue import ENTRIES
+from distribution import EmulatedBoot, why_not_emulated
 from groups import GROUPS
 from harness import find_program
 from native import why_not_native, NativeBoot
@@ -64,8 +65,8 @@ class Campaign:
             "build": os.path.abspath(options.build),
             "group": group.name,
             "tests": names,
-            "virtual": group.virtual,
-            "native": self.options.native,
+            "virtual": group.virtual and not group.distribution,
+            "native": self.options.native or group.distribution,
             "full": options.full,
             "seed": options.seed,
             "hours": options.hours,
@@ -83,7 +84,7 @@ class Campaign:
                 self.take(group, {"name": name, "verdict": "skipped", "figures": [reason]})
             return
         processor = self.take_processor(group)
-        boot = (NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan, {processor})
+        boot = (EmulatedBoot if group.distribution else NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan, {processor})
         self.boots.append(boot)
         limit_s = group.full_limit_s if self.options.full else group.limit_s
         done, since = set(), 0
@@ -140,6 +141,8 @@ class Campaign:
 
     def why_skipped(self, group, plan):
         """What is missing for a group that wants another build; else that build is in the plan, and the answer None."""
+        if group.distribution:
+            return why_not_emulated()
         if group.gpiod == 0:
             return None
         if gpiod2.generation(plan["build"]) == group.gpiod:

@@ -7,7 +7,7 @@ from groups import GROUPS
 from judge_log import percentile
 
 VERDICTS = ("passed", "failed", "skipped")
-REAL_TIME = {group.name for group in GROUPS if not group.virtual}
+REAL_TIME = {group.name for group in GROUPS if not group.virtual or group.distribution}
 ESTOP_ROWS = ("row11_", "row12_")
 
 

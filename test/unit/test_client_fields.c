@@ -3,6 +3,8 @@
 #include "iwheel_client/client.h"
 #include "json.h"
 
+#include "iwheel_northbound/json_in.h"
+
 #include "unity.h"
 
 #include <jansson.h>
@@ -90,6 +92,9 @@ static void test_json_hard_cases_are_judged_as_by_jansson(void) {
                                         "{\"a\":1e}",
                                         "{\"a\":1e+5}",
                                         "{\"a\":1E-5}",
+                                        "{\"a\":9223372036854775808}",
+                                        "{\"a\":-9223372036854775809}",
+                                        "{\"a\":1e400}",
                                         "{\"a\":+1}",
                                         "{\"a\":NaN}",
                                         "{\"a\":tru}",
@@ -138,7 +143,7 @@ static void test_json_depth_is_bounded(void) {
         memset(text + 5, '[', depth);
         memset(text + 5 + depth, ']', depth);
         text[5 + 2U * depth] = '}';
-        TEST_ASSERT_EQUAL(depth < IWC_JSON_DEPTH, iwc_json_is_object(text, 6U + 2U * depth));
+        TEST_ASSERT_EQUAL(depth < IWN_DEPTH_MAX, iwc_json_is_object(text, 6U + 2U * depth));
     }
     TEST_ASSERT_EQUAL_CHAR('[', *inner);
 }
@@ -155,10 +160,9 @@ static void test_json_many_keys_cost_no_more_than_their_length(void) {
 
 static void test_field_integers_are_whole_and_fit(void) {
     const iwc_message_t message =
-        message_of("{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"c\":9223372036854775808,\"d\":1.0,\"e\":"
-                   "null,\"f\":true,\"g\":\"1\",\"h\":1e2,"
-                   "\"i\":{\"a\":5},\"j\":-9223372036854775809,\"k\":-0}");
-    static const char *const unknown[] = {"c", "d", "e", "f", "g", "h", "i", "j", "x", "i.b", "a.b", "i.a.b", ""};
+        message_of("{\"a\":9223372036854775807,\"b\":-9223372036854775808,\"d\":1.0,\"e\":null,\"f\":true,\"g\":\"1\","
+                   "\"h\":1e2,\"i\":{\"a\":5},\"k\":-0}");
+    static const char *const unknown[] = {"d", "e", "f", "g", "h", "i", "x", "i.b", "a.b", "i.a.b", ""};
     TEST_ASSERT_EQUAL_INT64(INT64_MAX, iwc_integer(&message, "a").value);
     TEST_ASSERT_EQUAL_INT64(INT64_MIN, iwc_integer(&message, "b").value);
     TEST_ASSERT_EQUAL_INT64(5, iwc_integer(&message, "i.a").value);

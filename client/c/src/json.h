@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: MIT
-/// JSON where it lies: is it an object, and where in it is a field? No copy, no heap.
-///
-/// RFC 8259 in valid UTF-8, nested IWC_JSON_DEPTH deep at most, and no key twice: of the first IWC_JSON_KEYS in an object this is
-/// looked at, so that a hostile line costs no more than its length.
+/// JSON where it lies: is it an object, and where in it is a field? No copy, no heap. `iwheel_northbound/json_in.h` says what is refused.
 #ifndef IWC_JSON_H
 #define IWC_JSON_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-#define IWC_JSON_DEPTH 8U
-#define IWC_JSON_KEYS  128U
 
 typedef struct {
     const char *at; ///< NULL: nothing.

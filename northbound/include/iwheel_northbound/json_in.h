@@ -17,6 +17,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/// Longest text that is read at all: a place in it has 16 bits.
+#define IWN_JSON_MAX 65536U
 /// Deepest nesting that is read at all; requests need 2.
 #define IWN_DEPTH_MAX 8U
 /// Names in objects that are open at one time. A name, its colon, a value and what follows take five bytes at least, so no
@@ -46,7 +48,7 @@ typedef struct {
     const char *at; ///< Its first byte.
 } iwn_json_t;
 
-/// True: the text, of at most 65535 bytes, is one object or list, and `*out_root` is that. False: the reason is added to
+/// True: the text, of at most IWN_JSON_MAX bytes, is one object or list, and `*out_root` is that. False: the reason is added to
 /// `fault`, in printable ASCII.
 bool iwn_json_check(const char *text, size_t length, iwn_work_t *work, iwn_json_t *out_root, iwn_text_t *fault);
 

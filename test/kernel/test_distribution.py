@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The distribution's kernel: what is asked for, and what is answered where it cannot be had. Needs no emulator.
+
+Usage: test/kernel/test_distribution.py
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from unittest import mock
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
+import distribution  # noqa: E402
+
+
+def answers(*texts, code=0):
+    done = [subprocess.CompletedProcess([], code, text) for text in texts]
+    return mock.patch.object(distribution.subprocess, "run", side_effect=done)
+
+
+class Distribution(unittest.TestCase):
+    def setUp(self):
+        self.folder = self.enterContext(tempfile.TemporaryDirectory())
+        self.enterContext(mock.patch.dict(os.environ, {"XDG_CACHE_HOME": self.folder}))
+        self.enterContext(mock.patch.object(distribution.shutil, "which", side_effect=lambda name, path: f"/bin/{name}"))
+        self.enterContext(mock.patch.object(distribution.os, "uname", return_value=mock.Mock(machine="x86_64")))
+
+    def test_program_missing_names_its_package(self):
+        with mock.patch.object(distribution.shutil, "which", side_effect=lambda name, path: None if name == "cpio" else name):
+            self.assertIn("apt-get install cpio", distribution.why_not_emulated())
+
+    def test_another_machine_is_told(self):
+        with mock.patch.object(distribution.os, "uname", return_value=mock.Mock(machine="riscv64")):
+            self.assertIn("this machine is riscv64", distribution.why_not_emulated())
+
+    def test_a_distribution_without_such_a_package_is_told(self):
+        with answers("linux-image-amd64\n"):
+            self.assertIn("no package linux-image-amd64", distribution.why_not_emulated())
+
+    def test_what_apt_says_is_told(self):
+        with answers("E: No packages found\n", code=100):
+            self.assertIn("E: No packages found", distribution.why_not_emulated())
+
+    def test_a_kernel_that_was_fetched_is_not_fetched_again(self):
+        kept = os.path.join(self.folder, "iwheel", "linux-image-6.1.0-1-amd64-6.1.9-1")
+        os.makedirs(kept)
+        with open(os.path.join(kept, "vmlinuz"), "w", encoding="ascii"):
+            pass
+        with answers("  Depends: linux-image-6.1.0-1-amd64\n", "  Candidate: 6.1.9-1\n"):
+            self.assertIsNone(distribution.why_not_emulated())
+
+    def test_image_has_what_a_link_leads_to_and_the_folders_above(self):
+        target, link = os.path.join(self.folder, "far", "target"), os.path.join(self.folder, "link")
+        os.mkdir(os.path.dirname(target))
+        with open(target, "w", encoding="ascii"):
+            pass
+        os.symlink("far/target", link)
+        image = distribution.Image()
+        image.add(link)
+        top = os.path.realpath(self.folder)
+        self.assertLessEqual({os.path.join(top, name) for name in ("link", "far", "far/target")} | {top}, image.files)
+
+
+if __name__ == "__main__":
+    unittest.main()
