@@ -2,7 +2,7 @@
 """Sizes of the STM32 images, and the worst stack of core and images by call graph, as lines for docs/sizes.md.
 
 The images are those of the presets arm-m3 and arm, which listen, of the build beside arm that ends in -f446, and of the builds beside
-these that end in -demo. An interrupt may come anywhere, and none interrupts another: the
+these that end in -demo and -gateway. An interrupt may come anywhere, and none interrupts another: the
 worst handler and the registers that the CPU saves are on top of the main loop's deepest path. Calls through the HAL go to each of
 its functions.
 """
@@ -15,6 +15,8 @@ from stack_usage import INDIRECT, Depth, add_runtime_calls, read_graph
 BOARDS = {"STM32F103": ("iwheel_stm32f103", 1, ""), "STM32F407": ("iwheel_stm32f407", 2, ""), "STM32F446": ("iwheel_stm32f446", 2, "-f446")}
 HAL = ("iw_bxcan_send", "iw_bxcan_receive", "iw_bxcan_bus_state", "iw_bxcan_purge", "iw_estop_pressed")
 HANDLERS = ("iw_systick_handler", "iw_exti0_handler", "iw_can_transmit_handler", "iw_can_receive_handler", "iw_can_error_handler")
+# Of the image gateway alone; and how the functions are called that northbound's refusals reach through a table.
+SERIAL_HANDLERS, THROUGH_TABLE = ("iw_serial_usart_handler", "iw_serial_receive_handler", "iw_serial_transmit_handler"), ":say_"
 SAVED_BY_CPU = 36 # Eight registers and four bytes to align them.
 
 
@@ -38,11 +40,15 @@ def core_stack(build):
 
 
 def image_stack(build, image):
-    size, depth = depth_of(objects_of(build, "iwheel_core", "iwheel_stm32_driver", image), HAL)
+    objects = objects_of(build, "iwheel_core", "iwheel_northbound", "iwheel_stm32_driver", image)
+    known = read_graph(objects)[0]
+    tabled = [name for name in known if THROUGH_TABLE in name and "iw_answer" in known]
+    size, depth = depth_of(objects, (*HAL, *tabled))
+    handlers = (*HANDLERS, *(name for name in SERIAL_HANDLERS if name in size))
     missing = [name for name in (*HAL, *HANDLERS) if name not in size]
     if missing:
         raise SystemExit(f"not in the call graph of {image}: {', '.join(missing)}")
-    total = depth.of("main")[0] + SAVED_BY_CPU + max(depth.of(name)[0] for name in HANDLERS)
+    total = depth.of("main")[0] + SAVED_BY_CPU + max(depth.of(name)[0] for name in handlers)
     if depth.cycles:
         raise SystemExit(f"recursion in {image}: {depth.cycles[0]}")
     return total
@@ -70,11 +76,11 @@ def lines(builds):
     rows = ["", "Worst stack of any of the core's functions in bytes, by call graph, without what the port's HAL functions need below it.", "",
             "|                 | Cortex-M0+ |  Cortex-M3 |  Cortex-M4 |", "|-----------------|-----------:|-----------:|-----------:|",
             "| stack of the core | " + " | ".join(f"{core_stack(build):>10}" for build in builds) + " |", "",
-            "The images per board, in bytes: the one that listens, and the one with the demonstration profile. RAM is without the stack; the stack "
+            "The images per board, in bytes: the one that listens, the one with the demonstration profile, and the one that a host drives. RAM is without the stack; the stack "
             "is the worst of main loop and interrupt, of the 2048 that sections.ld keeps for it.", "",
-            "| image            |    flash   |     RAM    |    stack   |", "|------------------|-----------:|-----------:|-----------:|"]
+            "| image             |    flash   |     RAM    |    stack   |", "|-------------------|-----------:|-----------:|-----------:|"]
     for board, (image, which, more) in BOARDS.items():
-        for kind in ("listen", "demo"):
-            build = str(builds[which]).rstrip("/") + more + {"listen": "", "demo": "-demo"}[kind]
-            rows.append(f"| {f'{board} {kind}':<16} | " + " | ".join(f"{number:>10}" for number in image_sizes(build, image)) + " |")
+        for kind in ("listen", "demo", "gateway"):
+            build = str(builds[which]).rstrip("/") + more + {"listen": ""}.get(kind, f"-{kind}")
+            rows.append(f"| {f'{board} {kind}':<17} | " + " | ".join(f"{number:>10}" for number in image_sizes(build, image)) + " |")
     return rows

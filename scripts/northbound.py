@@ -128,7 +128,7 @@ class Description:
 
     def faults(self):
         """What is wrong with the description itself."""
-        holders = [("objects", self.objects), ("requests", self.requests), ("events", self.events)]
+        holders = [("objects", self.objects), ("requests", self.requests), ("events", self.events), ("serial", self.raw["serial"])]
         for group, members in holders:
             for member, holder in members.items():
                 for name, field in holder["fields"].items():

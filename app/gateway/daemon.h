@@ -39,15 +39,19 @@ typedef struct gw_daemon {
     gw_answers_t answers;
     iw_time_us_t suspended_us; ///< Of the machine, as last looked at.
     iw_time_us_t box_look_us;  ///< When the black box's writer is listened to next.
+    iw_client_t holder;        ///< Of the lease, as of the last step: served first.
     int signal_fd;
-    bool gave_way;    ///< It shuts down because somebody else's gateway goes before it.
-    bool frames_wait; ///< The bus wakes nobody for now: its frames are taken together.
+    bool gave_way;          ///< It shuts down because somebody else's gateway goes before it.
+    iw_time_us_t frames_us; ///< When frames were taken last.
+    iw_time_us_t look_us;   ///< When bus and e-stop are looked at though nothing has woken us.
+    bool frames_may_wait;   ///< As far as the wheels are concerned.
+    bool frames_wait;       ///< The bus wakes nobody for now: its frames are taken together.
 } gw_daemon_t;
 
 /// Tells the parts of each other and of the configuration, which is set. They are opened after that.
 void gw_daemon_compose(gw_daemon_t *self);
 
-/// Opens epoll, timer and signal descriptors and watches everything the daemon has open. SIGTERM, SIGINT and SIGHUP
+/// Opens epoll and signal descriptors and watches everything the daemon has open. SIGTERM, SIGINT and SIGHUP
 /// are then read by the loop and nowhere else. 0 or an errno.
 int gw_loop_open(gw_daemon_t *daemon);
 void gw_loop_close(gw_daemon_t *daemon);

@@ -15,13 +15,17 @@
 #include <unistd.h>
 
 /// Every descriptor at once, so that one that is not told of has nothing to tell.
-#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 7)
+#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 6)
 
-/// While setpoints leave, the e-stop is looked at this often even if nothing else wakes us: a GPIO chip that goes wakes nobody.
-#define ESTOP_LOOK_US 4000U
-#define BOX_LOOK_US   100000U
-/// While nobody is told of frames and nothing is sent, they may wait this long and be taken together.
-#define FRAMES_WAIT_MS 5
+/// While setpoints leave, bus and e-stop are looked at this often even if nothing else wakes us: a GPIO chip that goes wakes nobody.
+/// While one of them waits for its echo, more often.
+#define LOOK_US      3000U
+#define ECHO_LOOK_US 1000U
+/// The same while nothing is sent, if frames wait.
+#define REST_LOOK_US 6000U
+/// Frames that have not come for so long wake us again: nobody looks for nothing.
+#define FRAMES_GONE_US 20000U
+#define BOX_LOOK_US    100000U
 
 static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
@@ -40,22 +44,21 @@ static int open_signals(void) {
 }
 
 int gw_loop_open(gw_daemon_t *daemon) {
-    daemon->clients.epoll_fd = epoll_create1(EPOLL_CLOEXEC);
-    daemon->signal_fd = open_signals();
-    if (daemon->clients.epoll_fd < 0 || daemon->signal_fd < 0) {
-        return errno;
-    }
     int error = gw_wakeup_open(&daemon->wakeup);
-    const int fds[] = {daemon->wakeup.fd,
-                       daemon->signal_fd,
+    daemon->clients.epoll_fd = daemon->wakeup.fd;
+    daemon->signal_fd = (error == 0) ? open_signals() : -1;
+    if (error == 0 && daemon->signal_fd < 0) {
+        error = errno;
+    }
+    const int fds[] = {daemon->signal_fd,
                        daemon->clients.listener[GW_DRIVE].fd,
                        daemon->clients.listener[GW_WATCH].fd,
                        iw_linux_hal_bus_fd(&daemon->wheels.hal),
                        iw_linux_hal_estop_fd(&daemon->wheels.hal),
                        daemon->box.writer.fd,
                        daemon->box.reader.fd};
-    const uint64_t tags[] = {GW_TAG_TIMER, GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER,
-                             GW_TAG_BUS,   GW_TAG_ESTOP,  GW_TAG_BOX,      GW_TAG_BOX};
+    const uint64_t tags[] = {GW_TAG_SIGNAL, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER, GW_TAG_BUS, GW_TAG_ESTOP,
+                             GW_TAG_BOX,    GW_TAG_BOX};
     for (size_t i = 0; i < sizeof fds / sizeof fds[0] && error == 0; i++) {
         error = watch(daemon, fds[i], tags[i]);
     }
@@ -65,7 +68,6 @@ int gw_loop_open(gw_daemon_t *daemon) {
 void gw_loop_close(gw_daemon_t *daemon) {
     (void)close(daemon->signal_fd);
     gw_wakeup_close(&daemon->wakeup);
-    (void)close(daemon->clients.epoll_fd);
 }
 
 static void shut_down(gw_daemon_t *daemon) {
@@ -115,6 +117,17 @@ static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
     daemon->suspended_us = (suspended_us > daemon->suspended_us) ? suspended_us : daemon->suspended_us;
 }
 
+/// Frames may wait and be taken together while nothing depends on one of them at once: while nothing is sent, and while ARMED.
+/// Every step takes them before it judges, and what it judges is tens of milliseconds old. In a stop, and until the wheels are
+/// armed, each frame wakes us. The e-stop and the clients always do.
+static void plan_look(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
+    const bool sending = gw_wheels_are_sent_to(&daemon->wheels);
+    const bool driving = sending && seen->state == IW_STATE_ARMED && !seen->arming;
+    const iw_time_us_t sending_us = (driving && seen->waiting_us != IW_NEVER) ? ECHO_LOOK_US : LOOK_US;
+    daemon->frames_may_wait = !sending || driving;
+    daemon->look_us = seen->at_us + (sending ? sending_us : REST_LOOK_US);
+}
+
 /// The core's cycle, and what follows from it at once.
 static void step(gw_daemon_t *daemon) {
     gw_wheels_t *wheels = &daemon->wheels;
@@ -129,34 +142,36 @@ static void step(gw_daemon_t *daemon) {
     iw_motion_evidence_look(&wheels->evidence, &wheels->core, &seen);
     gw_observe(&daemon->status, &seen);
     gw_dispatch_arming(&daemon->answers, &seen);
+    plan_look(daemon, &seen);
+    daemon->holder = seen.holder;
 }
 
 static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
     return (a_us < b_us) ? a_us : b_us;
 }
 
-static iw_time_us_t look_us(const gw_daemon_t *daemon) {
-    const bool wanted = daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels);
-    return wanted ? daemon->wheels.now_us + ESTOP_LOOK_US : IW_NEVER;
+static bool looks(const gw_daemon_t *daemon) {
+    return daemon->frames_wait || (daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels));
 }
 
-static void arm_timer(gw_daemon_t *daemon) {
+/// When there is something to do though nothing comes; 0: at once.
+static iw_time_us_t next_us(const gw_daemon_t *daemon) {
+    if (daemon->wheels.requested || gw_service_is_busy(&daemon->clients)) {
+        return 0;
+    }
     iw_time_us_t next_us = earlier(daemon->wheels.step_us, iw_linux_hal_next_us(&daemon->wheels.hal));
     next_us = earlier(next_us, gw_observe_next_us(&daemon->clients));
     next_us = earlier(next_us, gw_service_next_us(&daemon->clients));
-    (void)gw_wakeup_by(&daemon->wakeup, earlier(next_us, look_us(daemon)));
+    return looks(daemon) ? earlier(next_us, daemon->look_us) : next_us;
 }
 
-/// Frames are worth waking for, unless they keep coming and nobody has any use for them at once: no client is there, and no
-/// setpoint or stop is under way. The e-stop and whoever connects wake us as ever, and then the bus is read first.
-static bool frames_may_wait(const gw_daemon_t *daemon) {
-    const gw_tape_t *tape = &daemon->wheels.tape;
-    return tape->tapped > 0U && tape->tapped < GW_FRAMES && gw_clients_count(&daemon->clients) == 0U &&
-           !gw_wheels_are_sent_to(&daemon->wheels);
-}
-
+/// Whether the bus is to wake us. Frames that keep coming wait, unless somebody watches them.
 static void heed_bus(gw_daemon_t *daemon) {
-    const bool may_wait = frames_may_wait(daemon);
+    const gw_wheels_t *wheels = &daemon->wheels;
+    daemon->frames_us = (wheels->tape.tapped > 0U) ? wheels->now_us : daemon->frames_us;
+    const bool may_wait = daemon->frames_may_wait && wheels->now_us < daemon->frames_us + FRAMES_GONE_US &&
+                          wheels->tape.tapped < GW_FRAMES &&
+                          !gw_clients_anybody_watches(&daemon->clients, IWN_TOPIC_FRAME);
     struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
     if (may_wait != daemon->frames_wait &&
         epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->wheels.hal), &interest) == 0) {
@@ -164,19 +179,9 @@ static void heed_bus(gw_daemon_t *daemon) {
     }
 }
 
-static int wait_ms(const gw_daemon_t *daemon) {
-    if (daemon->wheels.requested || gw_service_is_busy(&daemon->clients)) {
-        return 0;
-    }
-    return daemon->frames_wait ? FRAMES_WAIT_MS : -1;
-}
-
 /// Notes what the wait has found; nothing is done about it yet.
 static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
     switch (event->data.u64) {
-    case GW_TAG_TIMER:
-        gw_wakeup_came(&daemon->wakeup);
-        return false;
     case GW_TAG_SIGNAL:
         take_signal(daemon);
         return false;
@@ -187,9 +192,7 @@ static bool note_event(gw_daemon_t *daemon, const struct epoll_event *event) {
         daemon->box_look_us = 0;
         return false;
     case GW_TAG_BUS: // Looked at in every cycle.
-        return false;
     case GW_TAG_ESTOP:
-        iw_linux_hal_waited(&daemon->wheels.hal, true);
         return false;
     default: {
         gw_client_t *client = &daemon->clients.client[event->data.u64 - GW_TAG_CLIENT];
@@ -218,13 +221,9 @@ static void listen_to_writer(gw_daemon_t *daemon) {
     }
 }
 
-static iw_client_t holder(const gw_daemon_t *daemon) {
-    return gw_wheels_look(&daemon->wheels).holder;
-}
-
 static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     step(daemon);
-    gw_service_clients(&daemon->clients, holder(daemon));
+    gw_service_clients(&daemon->clients, daemon->holder);
     if (daemon->wheels.requested) {
         step(daemon); // A new command leaves at once.
     }
@@ -235,7 +234,7 @@ static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     heed_bus(daemon);
     gw_observe_frames(&daemon->status);
     gw_observe_periodic(&daemon->status);
-    gw_service_flush(&daemon->clients, holder(daemon));
+    gw_service_flush(&daemon->clients, daemon->holder);
     gw_knowledge_tend(&daemon->knowledge);
     give_way(daemon);
     gw_notify_cycle(&daemon->notify, daemon->wheels.now_us);
@@ -245,18 +244,21 @@ int gw_loop_run(gw_daemon_t *daemon) {
     bool ready = false;
     while (!has_come_to_rest(daemon)) {
         struct epoll_event events[EVENTS_PER_WAIT];
-        arm_timer(daemon);
-        const int count = epoll_wait(daemon->clients.epoll_fd, events, EVENTS_PER_WAIT, wait_ms(daemon));
+        const int count = gw_wakeup_wait(&daemon->wakeup, events, EVENTS_PER_WAIT, next_us(daemon));
         if (count < 0 && errno != EINTR) {
             return errno;
         }
         bool somebody_knocks = false;
-        iw_linux_hal_waited(&daemon->wheels.hal, count < 0); // Interrupted, it has found nothing out.
+        // Interrupted, it has found nothing out.
+        iw_linux_told_t told = {.bus = count < 0, .estop = count < 0};
         daemon->wheels.now_us = iw_clock_now_us();
         daemon->clients.now_us = daemon->wheels.now_us;
         for (int i = 0; i < count; i++) {
             somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
+            told.bus = told.bus || events[i].data.u64 == GW_TAG_BUS;
+            told.estop = told.estop || events[i].data.u64 == GW_TAG_ESTOP;
         }
+        iw_linux_hal_waited(&daemon->wheels.hal, told);
         cycle(daemon, somebody_knocks);
         if (!ready) {
             ready = true;

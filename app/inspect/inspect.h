@@ -113,6 +113,9 @@ typedef struct {
 /// Presence, mode, bit timing, queue, restart-ms, echo. Nothing for the local bus.
 void inspect_link(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings);
 
+/// Room for frames that wait to be taken. Nothing where it is not known.
+void inspect_room(const iw_bus_link_t *link, inspect_findings_t *findings);
+
 /// Whether the bus lives, both wheels and the rate of each id, load, unknown ids, damaged frames, other masters.
 void inspect_bus(const iw_bus_link_t *link, const inspect_heard_t *heard, const inspect_wish_t *wish,
                  inspect_findings_t *findings);

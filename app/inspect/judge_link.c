@@ -4,6 +4,9 @@
 #include <inttypes.h>
 #include <stdio.h>
 
+/// 21 frames, as many as a full bus brings, as the kernel counts them.
+#define BYTES_PER_MS 16384U
+
 /// The commands that set an interface as the wheels need it.
 static void cure_timing(const inspect_wish_t *wish, inspect_findings_t *findings) {
     const char *bus = wish->name;
@@ -101,6 +104,20 @@ static void judge_echo(const iw_bus_link_t *link, const inspect_wish_t *wish, in
     inspect_say(findings, "echo", INSPECT_WARN,
                 "the echo of %s is unproven: whether a setpoint was on the bus cannot be known", wish->name);
     inspect_cure(findings, "use an adapter whose driver has IFF_ECHO (most have; vcan and slcan have not)");
+}
+
+void inspect_room(const iw_bus_link_t *link, inspect_findings_t *findings) {
+    if (link->presence != IW_LINK_UP || link->room_bytes == 0U) {
+        return;
+    }
+    const bool granted = link->room_bytes >= 2U * IW_LINK_ROOM_BYTES;
+    inspect_say(findings, "room", granted ? INSPECT_OK : INSPECT_WARN,
+                "room for frames: %" PRIu32 " of %u KiB granted, %" PRIu32 " ms of a full bus%s",
+                link->room_bytes / 2U / 1024U, IW_LINK_ROOM_BYTES / 1024U, link->room_bytes / BYTES_PER_MS,
+                granted ? "" : "; when others have the processor for longer, frames get lost");
+    if (!granted) {
+        inspect_cure(findings, "sudo sysctl net.core.rmem_max=%u, and start the gateway again", IW_LINK_ROOM_BYTES);
+    }
 }
 
 void inspect_link(const iw_bus_link_t *link, const inspect_wish_t *wish, inspect_findings_t *findings) {

@@ -1,161 +1,16 @@
 // SPDX-License-Identifier: MIT
-#include "bridge.h"
+#include "bridge_parts.h"
 
-#include <inttypes.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sysexits.h>
-#include <time.h>
 
-#define CONNECT_MS     200
-#define ASK_MS         150
-#define ARM_MS         400 ///< echo_ms is 200 at most.
-#define SECOND_US      1000000
-#define BACKOFF_US     100000
-#define BACKOFF_MAX_US 2000000
+#define ARM_MS    400 ///< echo_ms is 200 at most.
+#define SECOND_US 1000000
 /// Two snapshots may be late; seen within 0.2 s also at the slowest rates, by status requests of our own.
 #define SILENT_US 150000
 
-static int64_t clock_us(clockid_t clock) {
-    struct timespec now;
-    (void)clock_gettime(clock, &now);
-    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
-}
-
 static int64_t now_us(void) {
-    return clock_us(CLOCK_MONOTONIC);
-}
-
-// ---- the gateway: there and gone ----------------------------------------------------------------------------------
-
-static void lose(bridge_t *self, const char *why) {
-    ros_machine_t *machine = &self->facts.machine;
-    if (self->facts.link != ROS_LINK_GONE && machine->now.machine != IWC_LISTENING) {
-        ros_auto_stopped(&self->auto_arm, false);
-    }
-    iwc_close(self->gateway);
-    self->facts.link = ROS_LINK_GONE;
-    machine->now.ours = false;
-    (void)snprintf(self->facts.trouble, sizeof self->facts.trouble, "%s", why);
-    // Not all at once, where several wait for the same gateway.
-    self->retry_us = now_us() + self->backoff_us * 3 / 4 + now_us() % (self->backoff_us / 2);
-    self->backoff_us = (self->backoff_us < BACKOFF_MAX_US / 2) ? self->backoff_us * 2 : BACKOFF_MAX_US;
-    if (!self->told_gone) {
-        (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; trying for ever\n",
-                      self->settings.gateway.socket, why);
-    }
-    self->told_gone = true;
-}
-
-/// What a stop before our time says of the wheels: the bridge has not caused it.
-static void read_last_stop(bridge_t *self) {
-    iwc_message_t why;
-    if (iwc_ask(self->gateway, "{\"cmd\":\"why\"}", ASK_MS, &why) == IWC_OK && iwc_integer(&why, "number").value > 0) {
-        (void)iwc_text(&why, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
-        ros_auto_stopped(&self->auto_arm, false);
-    } else {
-        self->facts.machine.stop[0] = '\0';
-    }
-}
-
-static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
-    ros_machine_t *machine = &self->facts.machine;
-    if (!ros_facts_read(self->gateway, message, machine)) {
-        return;
-    }
-    self->facts.link = ROS_LINK_UP;
-    self->heard_us = now_us();
-    if (self->ledger_due) {
-        self->ledger_due = false;
-        ros_facts_read_ledger(message, machine);
-    }
-    if (machine->now.left.distance_mm.known && machine->now.right.distance_mm.known) {
-        const ros_ways_t ways = {machine->now.t_us, machine->now.left.distance_mm.value,
-                                 machine->now.right.distance_mm.value};
-        ros_odometry_step(&self->odometry, &ways, machine->track_mm);
-        self->facts.odometry_restarts = self->odometry.restarts;
-    }
-}
-
-static iwc_result_t try_connect(bridge_t *self) {
-    const unsigned topics = IWC_WATCH_STATE | IWC_WATCH_BUS | IWC_WATCH_ESTOP | IWC_WATCH_LEASE | IWC_WATCH_STOP;
-    iwc_message_t status;
-    iwc_result_t result = iwc_connect(self->gateway, self->settings.gateway.socket, CONNECT_MS);
-    const bool newer = result == IWC_NEWER;
-    result = newer ? IWC_OK : result;
-    if (result == IWC_OK) {
-        read_last_stop(self);
-        result = iwc_ask(self->gateway, "{\"cmd\":\"status\"}", ASK_MS, &status);
-    }
-    if (result == IWC_OK) {
-        self->ledger_due = true;
-        take_snapshot(self, &status);
-        // Seen within 0.2 s: so often at least.
-        const int rate_hz = (self->settings.odometry.rate_hz < 20U) ? 20 : (int)self->settings.odometry.rate_hz;
-        result = iwc_watch(self->gateway, topics, rate_hz, ASK_MS);
-    }
-    if (result != IWC_OK) {
-        lose(self, (result == IWC_REFUSED) ? iwc_reason(self->gateway) : iwc_words(result));
-        return result;
-    }
-    self->backoff_us = BACKOFF_US;
-    self->told_gone = false;
-    (void)fprintf(
-        stderr, "iwheel-ros2: info: connected to %s%s\n", self->settings.gateway.socket,
-        newer ? ", whose protocol is newer: only watching and stopping; install the iwheel-ros2 that belongs to it"
-              : "");
-    if (self->facts.drive && self->facts.machine.setpoint_current) {
-        (void)fputs("iwheel-ros2: warning: current_role = setpoint: a twist carries no current, so driving is refused; "
-                    "watching works\n",
-                    stderr);
-    }
-    return IWC_OK;
-}
-
-// ---- what the gateway says ----------------------------------------------------------------------------------------
-
-static void take_stop(bridge_t *self, const iwc_message_t *event) {
-    const bool ours = iwc_integer(event, "client").value == iwc_number(self->gateway);
-    const bool silence =
-        iwc_is(event, "cause", "lease_lost") || (self->silenced && iwc_is(event, "cause", "client_stop"));
-    (void)iwc_text(event, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
-    ros_auto_stopped(&self->auto_arm, ours && silence && event->skipped == 0);
-    self->silenced = false;
-    self->commanded_us = 0;
-}
-
-/// Replies are those to commands: all else is waited for.
-static void take_reply(bridge_t *self, const iwc_message_t *reply) {
-    ros_commands_t *commands = &self->facts.commands;
-    commands->refusal[0] = '\0';
-    if (iwc_truth(reply, "ok").value == 0) {
-        commands->refused++;
-        (void)iwc_text(reply, "message", commands->refusal, sizeof commands->refusal);
-    }
-}
-
-static void take_messages(bridge_t *self) {
-    iwc_message_t message;
-    bool fresh = false;
-    iwc_result_t result = iwc_next(self->gateway, 0, &message);
-    for (; result == IWC_OK; result = iwc_next(self->gateway, 0, &message)) {
-        if (!message.is_event) {
-            take_reply(self, &message);
-        } else if (iwc_is(&message, "event", "state")) {
-            take_snapshot(self, &message);
-            fresh = true;
-        } else if (iwc_is(&message, "event", "stop")) {
-            take_stop(self, &message);
-        } else if (iwc_is(&message, "event", "ledger")) {
-            self->ledger_due = true;
-        }
-    }
-    if (result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
-        lose(self, "it has ended, or closed the connection");
-    } else if (fresh) {
-        ros_publish_motion(self->ros, &self->facts.machine, &self->odometry);
-        ros_publish_wrench(self->ros, &self->facts.machine);
-    }
+    return bridge_clock_us(CLOCK_MONOTONIC);
 }
 
 // ---- commands and requests ----------------------------------------------------------------------------------------
@@ -179,7 +34,7 @@ static iwc_result_t arm(bridge_t *self, iwc_terms_t *out_terms) {
     self->commanded_us = 0;
     self->silenced = false;
     if (result != IWC_OK && result != IWC_REFUSED && result != IWC_NEWER) {
-        lose(self, iwc_words(result)); // Whether it is armed nobody knows: the end of the connection ends it.
+        bridge_lose(self, iwc_words(result)); // Whether it is armed nobody knows: the end of the connection ends it.
     }
     return result;
 }
@@ -240,7 +95,7 @@ static void answer_result(bridge_t *self, const ros_request_t *request, iwc_resu
                                              : iwc_words(result));
     ros_answer(self->ros, request, success, words);
     if (iwc_fd(self->gateway) < 0 && self->facts.link != ROS_LINK_GONE) {
-        lose(self, iwc_words(result));
+        bridge_lose(self, iwc_words(result));
     }
 }
 
@@ -273,10 +128,10 @@ static void take_request(bridge_t *self, const ros_request_t *request) {
     }
     switch (request->verb) {
     case ROS_STOP:
-        answer_result(self, request, iwc_stop(self->gateway, ASK_MS));
+        answer_result(self, request, iwc_stop(self->gateway, BRIDGE_ASK_MS));
         return;
     case ROS_ESTOP:
-        answer_result(self, request, iwc_estop(self->gateway, "by ROS, iwheel/estop", ASK_MS));
+        answer_result(self, request, iwc_estop(self->gateway, "by ROS, iwheel/estop", BRIDGE_ASK_MS));
         return;
     default:
         break;
@@ -290,7 +145,7 @@ static void take_request(bridge_t *self, const ros_request_t *request) {
                    "not over the network: look at the machine, then iwheelctl reset; or set [drive] allow_reset = yes "
                    "in ros2.conf");
     } else {
-        answer_result(self, request, iwc_reset(self->gateway, ASK_MS));
+        answer_result(self, request, iwc_reset(self->gateway, BRIDGE_ASK_MS));
     }
 }
 
@@ -317,8 +172,8 @@ static void judge_silence(bridge_t *self, int64_t now) {
     self->commanded_us = 0;
     if (self->facts.link != ROS_LINK_GONE && self->facts.machine.now.ours) {
         self->silenced = true;
-        if (iwc_stop(self->gateway, ASK_MS) != IWC_OK && iwc_fd(self->gateway) < 0) {
-            lose(self, "it did not answer to stop");
+        if (iwc_stop(self->gateway, BRIDGE_ASK_MS) != IWC_OK && iwc_fd(self->gateway) < 0) {
+            bridge_lose(self, "it did not answer to stop");
         }
     }
 }
@@ -340,7 +195,7 @@ static void tell(bridge_t *self, int64_t now) {
     for (unsigned i = 0; i < ROS_TELLS; i++) {
         ros_diagnose(&self->facts, (ros_tells_t)i, &statuses[i]);
     }
-    ros_publish_diagnostics(self->ros, statuses, clock_us(CLOCK_REALTIME));
+    ros_publish_diagnostics(self->ros, statuses, bridge_clock_us(CLOCK_REALTIME));
     if (now >= self->second_us) {
         self->second_us = now + SECOND_US;
         self->ledger_due = true;
@@ -351,11 +206,12 @@ static void tell(bridge_t *self, int64_t now) {
 }
 
 void bridge_step(bridge_t *self) {
+    (void)pthread_mutex_lock(&self->lock);
     take_from_ros(self);
     if (self->facts.link != ROS_LINK_GONE) {
-        take_messages(self);
+        bridge_listen(self);
     } else if (now_us() >= self->retry_us) {
-        (void)try_connect(self);
+        (void)bridge_call(self);
     }
     const int64_t now = now_us();
     judge_silence(self, now);
@@ -363,9 +219,10 @@ void bridge_step(bridge_t *self) {
         self->facts.link = ROS_LINK_SILENT;
     }
     tell(self, now);
+    (void)pthread_mutex_unlock(&self->lock);
 }
 
-int bridge_wait_ms(const bridge_t *self) {
+static int wait_ms(const bridge_t *self) {
     const int64_t now = now_us();
     const bool here = self->facts.link != ROS_LINK_GONE;
     int64_t next_us = self->second_us;
@@ -381,35 +238,70 @@ int bridge_wait_ms(const bridge_t *self) {
     return (next_us > now) ? (int)((next_us - now) / 1000) + 1 : 0;
 }
 
+int bridge_wait_ms(bridge_t *self, int *out_fd) {
+    (void)pthread_mutex_lock(&self->lock);
+    const int result = wait_ms(self);
+    *out_fd = iwc_fd(self->gateway);
+    (void)pthread_mutex_unlock(&self->lock);
+    return result;
+}
+
+/// In a thread of DDS. With auto_arm a command may have to wait for the gateway, which is the loop's to do.
+static bool take_now(void *context) {
+    bridge_t *self = context;
+    ros_command_t command;
+    if (pthread_mutex_trylock(&self->lock) != 0) {
+        return false;
+    }
+    const bool can = self->facts.link == ROS_LINK_UP && !self->settings.drive.auto_arm;
+    if (can && ros_take_command(self->ros, &command)) {
+        take_command(self, &command);
+    }
+    (void)pthread_mutex_unlock(&self->lock);
+    return can;
+}
+
 // ---- begin and end ------------------------------------------------------------------------------------------------
 
-int bridge_open(bridge_t *self, const ros_settings_t *settings) {
-    memset(self, 0, sizeof *self);
-    self->settings = *settings;
-    self->facts.drive = settings->drive.enabled;
-    self->backoff_us = BACKOFF_US;
-    ros_auto_init(&self->auto_arm, now_us());
+static int open_both(bridge_t *self) {
     self->gateway = iwc_new();
-    self->ros = (self->gateway != NULL) ? ros_open(settings, stderr) : NULL;
+    self->ros = (self->gateway != NULL) ? ros_open(&self->settings, take_now, self, stderr) : NULL;
     if (self->ros == NULL) {
-        iwc_free(self->gateway);
         return EX_UNAVAILABLE;
     }
-    if (try_connect(self) == IWC_DENIED && settings->drive.enabled) {
+    if (bridge_call(self) == IWC_DENIED && self->settings.drive.enabled) {
         (void)fprintf(stderr,
                       "iwheel-ros2: %s is not for this user: add it to the group iwheel (to drive), or set [drive] "
                       "enabled = no\n",
-                      settings->gateway.socket);
-        bridge_close(self);
+                      self->settings.gateway.socket);
         return EX_NOPERM;
     }
     return 0;
 }
 
+int bridge_open(bridge_t *self, const ros_settings_t *settings) {
+    memset(self, 0, sizeof *self);
+    (void)pthread_mutex_init(&self->lock, NULL);
+    (void)pthread_mutex_lock(&self->lock);
+    self->settings = *settings;
+    self->facts.drive = settings->drive.enabled;
+    self->backoff_us = BRIDGE_BACKOFF_US;
+    ros_auto_init(&self->auto_arm, now_us());
+    const int result = open_both(self);
+    (void)pthread_mutex_unlock(&self->lock);
+    if (result != 0) {
+        bridge_close(self);
+    }
+    return result;
+}
+
 void bridge_close(bridge_t *self) {
+    (void)pthread_mutex_lock(&self->lock); // For ever: what DDS still receives is nobody's.
     if (self->facts.machine.now.ours && self->facts.link != ROS_LINK_GONE) {
-        (void)iwc_stop(self->gateway, ASK_MS);
+        (void)iwc_stop(self->gateway, BRIDGE_ASK_MS);
+    }
+    if (self->ros != NULL) {
+        ros_close(self->ros);
     }
     iwc_free(self->gateway);
-    ros_close(self->ros);
 }

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: MIT
-/// The bridge: a client of the gateway on one side, a node on the other. One thread, one loop, fixed memory.
+/// The bridge: a client of the gateway on one side, a node on the other. One loop, fixed memory.
+///
+/// One thread does everything, but for the plain command that drives: that is passed on by the thread of DDS that received it, if the loop is
+/// waiting, because to wake another thread would take longer than all the rest. Whoever touches what is below holds `lock`; the thread of
+/// DDS only tries it, and wakes the loop if it is held: so DDS never waits for us.
 ///
 /// It passes a command on at most once and repeats nothing, so the wheels stop by the gateway's lease however it ends. Silence of its source
 /// makes it stop once, if it holds the lease; a person's stop is passed on always. After any stop somebody arms again.
@@ -9,9 +13,10 @@
 #include "commands.h"
 #include "ros.h"
 
-#include <signal.h>
+#include <pthread.h>
 
 typedef struct {
+    pthread_mutex_t lock;
     ros_settings_t settings;
     iwc_t *gateway;
     ros_t *ros;
@@ -40,8 +45,8 @@ int bridge_open(bridge_t *self, const ros_settings_t *settings);
 /// Does all that is due. Waits nowhere longer than a gateway that hangs needs to be seen: 400 ms.
 void bridge_step(bridge_t *self);
 
-/// When `bridge_step` has something to do without anything coming, in ms from now.
-int bridge_wait_ms(const bridge_t *self);
+/// When `bridge_step` has something to do without anything coming, in ms from now, and the gateway's descriptor (-1: there is none).
+int bridge_wait_ms(bridge_t *self, int *out_fd);
 
 /// Stops the wheels if they are ours, and leaves.
 void bridge_close(bridge_t *self);

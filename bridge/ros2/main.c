@@ -5,6 +5,7 @@
 
 #include <getopt.h>
 #include <poll.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <sys/signalfd.h>
 #include <sysexits.h>
@@ -63,8 +64,9 @@ static void loop(bridge_t *bridge, int signals) {
     while (entries[0].revents == 0) {
         bridge_step(bridge);
         bridge_service_round(&service, bridge_now_us());
-        entries[2] = (struct pollfd){.fd = iwc_fd(bridge->gateway), .events = POLLIN};
-        (void)poll(entries, 3, bridge_wait_ms(bridge));
+        entries[2] = (struct pollfd){.events = POLLIN};
+        const int wait_ms = bridge_wait_ms(bridge, &entries[2].fd);
+        (void)poll(entries, 3, wait_ms);
     }
     bridge_service_tell(&service, "STOPPING=1");
 }
@@ -118,7 +120,7 @@ static int check_gateway(const ros_settings_t *settings) {
 static int check(const ros_settings_t *settings) {
     (void)puts("ok    configuration");
     int failures = check_gateway(settings);
-    ros_t *ros = ros_open(settings, stdout);
+    ros_t *ros = ros_open(settings, NULL, NULL, stdout);
     if (ros != NULL) {
         (void)printf("ok    DDS domain %u, node %s in namespace %s\n", settings->ros.domain, settings->ros.node,
                      settings->ros.ns);

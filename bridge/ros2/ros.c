@@ -86,9 +86,17 @@ static void wake(dds_entity_t reader, void *context) {
     (void)!write(self->fd, &one, sizeof one);
 }
 
-static dds_entity_t reader_of(ros_t *self, dds_entity_t topic, dds_qos_t *qos) {
+/// A command does not wait for another thread to be woken, if it need not.
+static void take_or_wake(dds_entity_t reader, void *context) {
+    const ros_t *self = context;
+    if (self->came == NULL || !self->came(self->context)) {
+        wake(reader, context);
+    }
+}
+
+static dds_entity_t reader_of(ros_t *self, dds_entity_t topic, dds_qos_t *qos, dds_on_data_available_fn react) {
     dds_listener_t *listener = dds_create_listener(self);
-    dds_lset_data_available(listener, wake);
+    dds_lset_data_available(listener, react);
     const dds_entity_t reader = dds_create_reader(self->participant, topic, qos, listener);
     dds_delete_listener(listener);
     dds_delete_qos(qos);
@@ -116,7 +124,7 @@ static bool open_service(ros_t *self, ros_verb_t verb) {
     }
     (void)snprintf(user_data + used, sizeof user_data - (size_t)used, ";");
     self->requests[verb] =
-        reader_of(self, topic_of(self, &request, "rq", "Request"), qos_of(user_data, 10, true, false));
+        reader_of(self, topic_of(self, &request, "rq", "Request"), qos_of(user_data, 10, true, false), wake);
     self->replies[verb] = writer_of(self, topic_of(self, &reply, "rr", "Reply"), qos_of(user_data, 10, true, false));
     return self->requests[verb] > 0 && self->replies[verb] > 0;
 }
@@ -135,10 +143,11 @@ static bool open_topics(ros_t *self) {
     if (self->settings.drive.enabled) {
         // Best effort matches every publisher, and what was lost never comes later.
         const topic_t *topic = self->settings.drive.stamped ? &twist_stamped : &twist;
-        self->commands = reader_of(self, topic_of(self, topic, "rt", ""), qos_of(topic->hash, 1, false, false));
+        self->commands =
+            reader_of(self, topic_of(self, topic, "rt", ""), qos_of(topic->hash, 1, false, false), take_or_wake);
         good = good && self->commands > 0;
     }
-    self->asks = reader_of(self, topic_of(self, &asked, "rt", ""), qos_of(asked.hash, 10, true, false));
+    self->asks = reader_of(self, topic_of(self, &asked, "rt", ""), qos_of(asked.hash, 10, true, false), wake);
     for (unsigned verb = 0; verb < ROS_VERBS; verb++) {
         good = open_service(self, (ros_verb_t)verb) && good;
     }
@@ -224,13 +233,15 @@ static bool join(ros_t *self, FILE *err) {
     return true;
 }
 
-ros_t *ros_open(const ros_settings_t *settings, FILE *err) {
+ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, FILE *err) {
     ros_t *self = calloc(1, sizeof *self);
     if (self == NULL) {
         (void)fputs("iwheel-ros2: not enough memory to start\n", err);
         return NULL;
     }
     self->settings = *settings;
+    self->came = came;
+    self->context = context;
     self->fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     if (self->fd < 0 || !join(self, err)) {
         ros_close(self);
@@ -241,7 +252,7 @@ ros_t *ros_open(const ros_settings_t *settings, FILE *err) {
 
 void ros_close(ros_t *self) {
     if (self->participant > 0) {
-        (void)dds_delete(self->participant); // And all that belongs to it: afterwards nobody calls `wake`.
+        (void)dds_delete(self->participant); // And all that belongs to it: afterwards nobody calls us.
     }
     if (self->domain > 0) {
         (void)dds_delete(self->domain);

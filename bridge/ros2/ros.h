@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// The DDS side: a node with its topics and services, as ROS 2 sees them. Everything that knows DDS is behind this header.
 ///
-/// DDS receives in threads of its own; they only wake us. Samples are taken and written by the caller's thread, and nothing here waits:
-/// writers keep the last ten, a reader that does not keep up loses.
+/// DDS receives in threads of its own; they wake us, or have a command carried out where it came. All else is taken and written by the
+/// caller's thread, and nothing here waits: writers keep the last ten, a reader that does not keep up loses.
 #ifndef ROS2_ROS_H
 #define ROS2_ROS_H
 
@@ -13,8 +13,11 @@ typedef struct ros ros_t;
 
 typedef enum { ROS_ARM = 0, ROS_STOP, ROS_ESTOP, ROS_RESET, ROS_VERBS } ros_verb_t;
 
-/// Joins the domain. NULL after a complaint on `err`.
-ros_t *ros_open(const ros_settings_t *settings, FILE *err);
+/// Called in a thread of DDS when a command came, from before `ros_open` returns until `ros_close` does. True: it was taken; false: wake us.
+typedef bool (*ros_came_t)(void *context);
+
+/// Joins the domain. `came` may be NULL. NULL after a complaint on `err`.
+ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, FILE *err);
 void ros_close(ros_t *self);
 
 /// Readable when something came. `ros_woken` is called before taking it.

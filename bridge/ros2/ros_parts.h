@@ -32,6 +32,8 @@ struct ros {
     dds_entity_t replies[ROS_VERBS];
     dds_entity_t graph;
     int fd; ///< An eventfd: DDS has something for us.
+    ros_came_t came;
+    void *context; ///< Of `came`.
     char text[2048];
 };
 

@@ -219,9 +219,8 @@ static enum MHD_Result send_metrics(web_call_t *self) {
     web_own_t own = self->server->own;
     own.dropped = self->server->driver.dropped;
     own.connections = self->server->link.connections;
-    for (const web_call_t *stream = self->server->streams; stream != NULL; stream = stream->next) {
-        own.watchers++;
-    }
+    own.watchers = self->server->stream_count;
+    own.crowded_out = self->server->crowded_out + self->server->door.crowded_out;
     FILE *out = open_memstream(&text, &length);
     if (out != NULL) {
         const bool known = web_link_state(&self->server->link, self->server->now_us, &state);
@@ -267,9 +266,13 @@ static ssize_t read_stream(void *context, uint64_t position, char *out, size_t s
 }
 
 static enum MHD_Result send_events(web_call_t *self) {
+    if (self->server->stream_count >= web_server_streams_max(self->server)) {
+        return refuse(self, 503, "busy", "too many watch already: close a page, or raise max_connections under [web]");
+    }
     web_reader_begin(&self->reader, &self->server->link.feed);
     self->next = self->server->streams;
     self->server->streams = self;
+    self->server->stream_count++;
     struct MHD_Response *response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 8192, read_stream, self, NULL);
     return send_response(self, 200, response, self->verdict.route->type);
 }
@@ -333,6 +336,8 @@ static web_call_t *begin(web_server_t *server, struct MHD_Connection *connection
     }
     if (peer != NULL) {
         peer->asking = true;
+        peer->known =
+            peer->known || (self != NULL && self->verdict.route != NULL && self->verdict.route->verb != WEB_FILE);
     }
     return self;
 }
@@ -382,6 +387,7 @@ void web_call_completed(void *context, struct MHD_Connection *connection, void *
     for (web_call_t **at = &server->streams; *at != NULL; at = &(*at)->next) {
         if (*at == self) {
             *at = self->next;
+            server->stream_count--;
             break;
         }
     }

@@ -143,10 +143,15 @@ static int loop(web_server_t *server) {
     bridge_service_open(&service);
     bridge_service_tell(&service, "READY=1");
     while (end_asked == 0) {
-        struct pollfd waits[] = {{web_server_fd(server), POLLIN, 0}, {web_link_fd(&server->link), POLLIN, 0}};
+        int fds[WEB_SERVER_FDS];
+        struct pollfd waits[WEB_SERVER_FDS + 1U] = {{web_link_fd(&server->link), POLLIN, 0}};
+        web_server_fds(server, fds);
+        for (size_t i = 0; i < WEB_SERVER_FDS; i++) {
+            waits[i + 1U] = (struct pollfd){fds[i], POLLIN, 0};
+        }
         const int wait_ms = web_server_wait_ms(server);
         const struct timespec wait = {wait_ms / 1000, (long)(wait_ms % 1000) * 1000000L};
-        (void)ppoll(waits, 2, &wait, &none);
+        (void)ppoll(waits, sizeof waits / sizeof waits[0], &wait, &none);
         const int code = web_server_step(server);
         if (code != 0) {
             return code;

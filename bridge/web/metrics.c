@@ -152,6 +152,7 @@ static void write_own(const web_own_t *own, FILE *out) {
         {"iwheel_web_dropped_commands", "Drive commands that were too old, doubled or of another page", own->dropped,
          true},
         {"iwheel_web_gateway_connections", "Made to the gateway", own->connections, true},
+        {"iwheel_web_crowded_out", "Connections closed to make room for others", own->crowded_out, true},
     };
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         write_head(out, rows[i].name, rows[i].is_counter ? "counter" : "gauge", rows[i].help);

@@ -12,6 +12,7 @@ typedef struct {
     uint64_t refused;     ///< Requests refused since the bridge's start.
     uint64_t dropped;     ///< Drive commands dropped since then.
     uint64_t connections; ///< To the gateway, made since then.
+    uint64_t crowded_out; ///< Connections closed since then to make room for others.
 } web_own_t;
 
 /// `state`: the event `state`; NULL: the gateway is not there, and only that and the bridge's own figures are told.

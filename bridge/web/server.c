@@ -16,6 +16,7 @@
 #define LOOK_US         1000000U
 #define LONGEST_WAIT_MS 250
 #define FILE_MAX        1000000L
+#define NEWCOMERS_MAX   16U
 /// Of a request with its headers, and of what is answered at a time.
 #define MEMORY_PER_CONNECTION 16384U
 
@@ -88,7 +89,7 @@ static int open_unix(const char *path) {
     const mode_t before = umask(0117);
     const int bound = bind(fd, (const struct sockaddr *)&address, sizeof address);
     (void)umask(before);
-    if (bound != 0 || listen(fd, 64) != 0) {
+    if (bound != 0 || listen(fd, SOMAXCONN) != 0) {
         (void)close(fd);
         return -1;
     }
@@ -106,7 +107,7 @@ static int open_tcp(const web_settings_t *settings) {
     const struct sockaddr *address = is_v6 ? (const struct sockaddr *)&v6 : (const struct sockaddr *)&v4;
     const int fd = socket(is_v6 ? AF_INET6 : AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
-    if (bind(fd, address, is_v6 ? sizeof v6 : sizeof v4) != 0 || listen(fd, 64) != 0) {
+    if (bind(fd, address, is_v6 ? sizeof v6 : sizeof v4) != 0 || listen(fd, SOMAXCONN) != 0) {
         const int error = errno;
         (void)close(fd);
         errno = error;
@@ -123,7 +124,8 @@ static void take_peer(void *context, struct MHD_Connection *connection, void **p
         const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
         web_peer_t *peer = calloc(1, sizeof(*peer));
         if (peer != NULL) {
-            *peer = (web_peer_t){(info != NULL) ? info->connect_fd : -1, false, self->now_us, self->peers};
+            *peer = (web_peer_t){
+                .fd = (info != NULL) ? info->connect_fd : -1, .since_us = self->now_us, .next = self->peers};
             self->peers = peer;
         }
         *place = peer;
@@ -153,27 +155,27 @@ static size_t unescape(void *context, struct MHD_Connection *connection, char *t
     return (strstr(text, "%00") != NULL) ? strlen(text) : MHD_http_unescape(text);
 }
 
-static struct MHD_Daemon *start(web_server_t *self, int fd) {
+static struct MHD_Daemon *start(web_server_t *self) {
     const struct MHD_OptionItem tls[] = {
         {MHD_OPTION_HTTPS_MEM_CERT, 0, self->certificate},
         {MHD_OPTION_HTTPS_MEM_KEY, 0, self->key},
         {MHD_OPTION_END, 0, NULL},
     };
     const struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};
-    const unsigned flags = MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME | ((self->certificate != NULL) ? MHD_USE_TLS : 0U);
-    return MHD_start_daemon(flags, 0, NULL, NULL, web_call_handle, self, MHD_OPTION_EXTERNAL_LOGGER, say_nothing, NULL,
-                            MHD_OPTION_ARRAY, (self->certificate != NULL) ? tls : plain, MHD_OPTION_LISTEN_SOCKET, fd,
-                            MHD_OPTION_CONNECTION_LIMIT, self->settings->web.max_connections,
-                            MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-                            (size_t)MEMORY_PER_CONNECTION, MHD_OPTION_NOTIFY_COMPLETED, web_call_completed, self,
-                            MHD_OPTION_NOTIFY_CONNECTION, take_peer, self, MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL,
-                            MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
+    const unsigned flags = MHD_USE_EPOLL | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
+                           ((self->certificate != NULL) ? MHD_USE_TLS : 0U);
+    return MHD_start_daemon(
+        flags, 0, NULL, NULL, web_call_handle, self, MHD_OPTION_EXTERNAL_LOGGER, say_nothing, NULL, MHD_OPTION_ARRAY,
+        (self->certificate != NULL) ? tls : plain, MHD_OPTION_CONNECTION_LIMIT, self->settings->web.max_connections,
+        MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)MEMORY_PER_CONNECTION,
+        MHD_OPTION_NOTIFY_COMPLETED, web_call_completed, self, MHD_OPTION_NOTIFY_CONNECTION, take_peer, self,
+        MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL, MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
 }
 
 // ---- life -----------------------------------------------------------------------------------------------------------
 
 int web_server_check(web_server_t *self, const web_settings_t *settings) {
-    *self = (web_server_t){.settings = settings};
+    *self = (web_server_t){.settings = settings, .door = {.listen_fd = -1, .epoll_fd = -1}};
     self->now_us = bridge_now_us();
     self->token = (web_token_t){.path = settings->web.token_file, .hours = settings->web.token_hours};
     const int code = read_page(self);
@@ -193,14 +195,13 @@ int web_server_open(web_server_t *self, const web_settings_t *settings) {
         return complain(EX_OSERR, "memory", "there is not enough");
     }
     const int fd = web_settings_is_unix(settings) ? open_unix(settings->web.listen + 5) : open_tcp(settings);
-    if (fd < 0) {
+    if (fd < 0 || !web_door_open(&self->door, fd)) {
         char what[160];
         (void)snprintf(what, sizeof what, "cannot listen on %s port %u", settings->web.listen, settings->web.port);
         return complain((errno == EACCES) ? EX_NOPERM : EX_UNAVAILABLE, what, strerror(errno));
     }
-    self->daemon = start(self, fd);
+    self->daemon = start(self);
     if (self->daemon == NULL) {
-        (void)close(fd);
         return complain(EX_CONFIG, settings->web.certificate,
                         "is no certificate that fits the key; give another pair of PEM files");
     }
@@ -217,8 +218,11 @@ void web_server_close(web_server_t *self) {
         web_link_close(&self->link); // Answers what still waits.
         MHD_stop_daemon(self->daemon);
     }
-    if (self->daemon != NULL && web_settings_is_unix(self->settings)) {
-        (void)unlink(self->settings->web.listen + 5);
+    if (self->door.listen_fd >= 0) {
+        web_door_close(&self->door);
+        if (web_settings_is_unix(self->settings)) {
+            (void)unlink(self->settings->web.listen + 5);
+        }
     }
     for (size_t i = 0; i < WEB_FILES; i++) {
         free(self->files[i].text);
@@ -227,16 +231,80 @@ void web_server_close(web_server_t *self) {
     free(self->key);
 }
 
-// ---- the round ------------------------------------------------------------------------------------------------------
+// ---- who is let in, and who makes room ------------------------------------------------------------------------------
 
-/// Who does not ask in time makes room: half a request, or none, holds a connection no longer.
+static void show_out(web_peer_t *peer) {
+    peer->leaving = true;
+    (void)shutdown(peer->fd, SHUT_RDWR);
+}
+
+/// Half a request, or none, holds a connection no longer than this.
 static void close_idle_peers(const web_server_t *self) {
-    for (const web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
+    for (web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
         if (!peer->asking && self->now_us - peer->since_us > WEB_HEADER_US) {
-            (void)shutdown(peer->fd, SHUT_RDWR);
+            show_out(peer);
         }
     }
 }
+
+/// Connections that are let in between two rounds of the library: what they sent is looked at before they could have to make room.
+static unsigned newcomers_max(const web_server_t *self) {
+    const unsigned quarter = self->settings->web.max_connections / 4U;
+    return (quarter < NEWCOMERS_MAX) ? quarter : NEWCOMERS_MAX;
+}
+
+unsigned web_server_streams_max(const web_server_t *self) {
+    return self->settings->web.max_connections * 5U / 8U;
+}
+
+/// The oldest without the token makes room; without such a one, the oldest that asks nothing. NULL: there is nobody.
+static web_peer_t *who_makes_room(const web_server_t *self) {
+    web_peer_t *stranger = NULL;
+    web_peer_t *idle = NULL;
+    for (web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
+        if (!peer->leaving && !peer->known) {
+            stranger = peer;
+        } else if (!peer->leaving && !peer->asking) {
+            idle = peer;
+        }
+    }
+    return (stranger != NULL) ? stranger : idle;
+}
+
+static unsigned count_peers(const web_server_t *self) {
+    unsigned count = 0;
+    for (const web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
+        count += peer->leaving ? 0U : 1U;
+    }
+    return count;
+}
+
+/// Who has spoken at the door comes in.
+static void let_in(web_server_t *self) {
+    const unsigned newcomers = newcomers_max(self);
+    unsigned count = count_peers(self);
+    web_door_step(&self->door, self->now_us);
+    for (unsigned i = 0; i < newcomers; i++) {
+        struct sockaddr_storage address = {.ss_family = AF_UNSPEC};
+        socklen_t size = sizeof address;
+        const int fd = web_door_take(&self->door);
+        if (fd < 0) {
+            return;
+        }
+        web_peer_t *gives_way =
+            (count + newcomers >= self->settings->web.max_connections) ? who_makes_room(self) : NULL;
+        if (gives_way != NULL) {
+            show_out(gives_way);
+            self->crowded_out++;
+            count--;
+        }
+        (void)getpeername(fd, (struct sockaddr *)&address, &size);
+        // What the library does not take it closes.
+        count += (MHD_add_connection(self->daemon, fd, (struct sockaddr *)&address, size) == MHD_YES) ? 1U : 0U;
+    }
+}
+
+// ---- the round ------------------------------------------------------------------------------------------------------
 
 static void look_at_token(web_server_t *self) {
     bool changed = false;
@@ -273,6 +341,7 @@ int web_server_step(web_server_t *self) {
             web_call_resume(stream);
         }
     }
+    let_in(self);
     (void)MHD_run(self->daemon);
     if (self->now_us >= self->look_us) {
         self->look_us = self->now_us + LOOK_US;
@@ -284,16 +353,20 @@ int web_server_step(web_server_t *self) {
 
 int web_server_wait_ms(const web_server_t *self) {
     const uint64_t now_us = bridge_now_us();
-    const uint64_t next_us = web_link_next_us(&self->link, now_us);
+    const uint64_t link_us = web_link_next_us(&self->link, now_us);
+    const uint64_t door_us = web_door_next_us(&self->door, now_us);
+    const uint64_t next_us = (link_us < door_us) ? link_us : door_us;
     unsigned MHD_LONG_LONG http_ms = LONGEST_WAIT_MS;
     if (MHD_get_timeout(self->daemon, &http_ms) != MHD_YES || http_ms > LONGEST_WAIT_MS) {
         http_ms = LONGEST_WAIT_MS;
     }
-    const uint64_t link_ms = (next_us <= now_us) ? 0U : (next_us - now_us + 999U) / 1000U;
-    return (int)((link_ms < http_ms) ? link_ms : http_ms);
+    const uint64_t own_ms = (next_us <= now_us) ? 0U : (next_us - now_us + 999U) / 1000U;
+    return (int)((own_ms < http_ms) ? own_ms : http_ms);
 }
 
-int web_server_fd(const web_server_t *self) {
+void web_server_fds(const web_server_t *self, int out_fds[WEB_SERVER_FDS]) {
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(self->daemon, MHD_DAEMON_INFO_EPOLL_FD);
-    return (info != NULL) ? info->epoll_fd : -1;
+    out_fds[0] = (info != NULL) ? info->epoll_fd : -1;
+    out_fds[1] = self->door.epoll_fd;
+    out_fds[2] = web_door_fd(&self->door, bridge_now_us());
 }

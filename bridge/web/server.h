@@ -2,9 +2,11 @@
 /// The bridge as a whole: HTTP on one side, the gateway on the other, in one thread that never waits for either.
 ///
 /// Bounded: connections, bytes of a request, seconds until it is complete, questions to the gateway, events kept.
+/// Who has the token is heard beside any number of others: these make room, the oldest first.
 #ifndef IW_WEB_SERVER_H
 #define IW_WEB_SERVER_H
 
+#include "door.h"
 #include "driver.h"
 #include "link.h"
 #include "metrics.h"
@@ -22,7 +24,9 @@
 /// A connection.
 typedef struct web_peer {
     int fd;
-    bool asking; ///< In the middle of a complete request.
+    bool asking;  ///< In the middle of a complete request.
+    bool known;   ///< Has asked with the token.
+    bool leaving; ///< Shut down: the library forgets it in its next round.
     uint64_t since_us;
     struct web_peer *next;
 } web_peer_t;
@@ -56,8 +60,11 @@ struct web_server {
     web_own_t own;
     web_file_t files[WEB_FILES]; ///< By their place among the routes.
     struct MHD_Daemon *daemon;
-    web_peer_t *peers;
+    web_door_t door;
+    web_peer_t *peers; ///< The newest first.
     web_call_t *streams;
+    unsigned stream_count;
+    uint64_t crowded_out; ///< Connections of strangers that made room for others.
     char *certificate;
     char *key;
     uint64_t now_us;
@@ -78,8 +85,12 @@ int web_server_step(web_server_t *self);
 /// Milliseconds until `step` has something to do, if neither descriptor has.
 int web_server_wait_ms(const web_server_t *self);
 
-/// The descriptor of HTTP, for poll().
-int web_server_fd(const web_server_t *self);
+/// The descriptors of HTTP, for poll(); -1: not now.
+#define WEB_SERVER_FDS 3U
+void web_server_fds(const web_server_t *self, int out_fds[WEB_SERVER_FDS]);
+
+/// How many may watch at once. The other connections are for who asks something, and for whom nobody knows yet.
+unsigned web_server_streams_max(const web_server_t *self);
 
 /// Answers one request: MHD_AccessHandlerCallback and MHD_RequestCompletedCallback of libmicrohttpd.
 enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection, const char *url, const char *method,

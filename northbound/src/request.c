@@ -39,6 +39,12 @@ IW_STATIC_ASSERT(IWN_CMDS <= 16 && FIELDS <= 32, a_bit_for_each_command_and_each
 
 #define NUMBER_SIZE (IWN_DIGITS_MAX + 1U)
 
+bool iwn_cmd_watches(iwn_cmd_t cmd) {
+    const unsigned watching = BIT(HELLO) | BIT(STATUS) | BIT(WATCH) | BIT(WHY) | BIT(STOP) | BIT(DISARM) | BIT(ESTOP) |
+                              BIT(RECORDINGS) | BIT(RECORDING);
+    return (watching & 1U << cmd) != 0U;
+}
+
 /// A number for a message.
 static const char *number(int64_t value, char out_digits[NUMBER_SIZE]) {
     iwn_text_t text = iwn_text_begin(out_digits, NUMBER_SIZE);
@@ -301,6 +307,7 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
         }
     }
     request->has_current = (seen & 1U << FIELD_left_mA) != 0U;
+    request->has_commit = (seen & 1U << FIELD_commit) != 0U;
     if (request->has_current != ((seen & 1U << FIELD_right_mA) != 0U)) {
         return REFUSE(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
     }

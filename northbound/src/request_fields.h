@@ -19,7 +19,8 @@
     NAME(why)                                                                                                          \
     NAME(confirm)                                                                                                      \
     NAME(recordings)                                                                                                   \
-    NAME(recording)
+    NAME(recording)                                                                                                    \
+    NAME(config)
 
 /// Name, member of iwn_request_t, kind, bytes of a text at most, whether it must be there, requests that have it.
 #define IWN_REQUEST_FIELDS(ROW)                                                                                        \
@@ -36,9 +37,11 @@
     ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))                                                                  \
     ROW(side, sides, SIDE, 0, false, BIT(TARE))                                                                        \
     ROW(item, item, ITEM, 0, true, BIT(CONFIRM))                                                                       \
-    ROW(value, value, VALUE, 39, false, BIT(CONFIRM))                                                                  \
+    ROW(value, value, VALUE, 39, false, BIT(CONFIRM) | BIT(CONFIG))                                                    \
     ROW(how, how, TEXT, 127, false, BIT(CONFIRM))                                                                      \
     ROW(name, file, TEXT, 63, true, BIT(RECORDING))                                                                    \
-    ROW(offset, offset, INTEGER, 0, false, BIT(RECORDING))
+    ROW(offset, offset, INTEGER, 0, false, BIT(RECORDING))                                                             \
+    ROW(key, key, TEXT, 40, false, BIT(CONFIG))                                                                        \
+    ROW(commit, commit, FLAG, 0, false, BIT(CONFIG))
 
 #endif

@@ -90,3 +90,13 @@ void iwn_tell_watched(uint8_t topics, uint32_t rate_hz, bool limited, iwn_out_t 
     iwn_out_int(json, "rate_hz", rate_hz);
     iwn_out_bool(json, "limited", limited);
 }
+
+void iwn_tell_tare(const iw_force_t *force, const iw_force_quality_t *window, const iw_force_t *before,
+                   iwn_out_t *json) {
+    iwn_out_int(json, "offset_mN", force->offset_mN);
+    iwn_out_int(json, "samples", window->samples);
+    iwn_out_int(json, "deviation_mN", window->deviation_mN);
+    iwn_out_int(json, "drift_mN", window->drift_mN);
+    iwn_out_known(json, "before_mN", before->provenance != IW_OFFSET_NONE, before->offset_mN);
+    iwn_out_text(json, "before_provenance", iwn_offset_word(before->provenance, before->offset_us));
+}

@@ -8,6 +8,16 @@
 #define RETRY_US  100000U
 #define STABLE_US 20000U
 
+/// Nothing is kept over power-off.
+void iw_commander_open(bool power_on) {
+    (void)power_on;
+}
+
+/// The options of the build are all there is.
+void iw_commander_configure(iw_config_t *config) {
+    (void)config;
+}
+
 /// Debounced both ways. A button that is stuck or held from before power-on never makes a press (R3: nothing moves by
 /// itself).
 bool iw_commander_pressed(iw_commander_t *self, iw_time_us_t now_us) {

@@ -39,6 +39,12 @@ const char *iw_commander_words(void);
 /// acknowledge.
 bool iw_commander_sends(void);
 
+/// Called once, right after a start and before the watchdog runs: what outlives power may be read and written here.
+void iw_commander_open(bool power_on);
+
+/// Called once, before the gateway begins: `config` has the defaults and the options of the build.
+void iw_commander_configure(iw_config_t *config);
+
 /// Called once in every cycle, right before `iw_gateway_step`, at least every 20 ms: what it commands leaves in the
 /// same cycle. Must return within a millisecond.
 void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us);

@@ -6,7 +6,7 @@
 #define SYST_CSR  (*(volatile uint32_t *)0xE000E010U) // 4.5.1: enable, interrupt, core clock.
 #define SYST_RVR  (*(volatile uint32_t *)0xE000E014U)
 #define SYST_CVR  (*(volatile uint32_t *)0xE000E018U)
-#define NVIC_ISER (*(volatile uint32_t *)0xE000E100U) // 4.3.2
+#define NVIC_ISER ((volatile uint32_t *)0xE000E100U)  // 4.3.2
 #define SCB_ICSR  (*(volatile uint32_t *)0xE000ED04U) // 4.4.3: PENDSTSET.
 #define SCB_AIRCR (*(volatile uint32_t *)0xE000ED0CU) // 4.4.5: key and SYSRESETREQ.
 #define PENDSTSET (1U << 26)
@@ -25,7 +25,7 @@ void iw_systick_handler(void) {
 }
 
 void iw_irq_enable(iw_irq_t irq) {
-    NVIC_ISER = 1UL << (uint32_t)irq;
+    NVIC_ISER[(uint32_t)irq / 32U] = 1UL << ((uint32_t)irq % 32U);
 }
 
 void iw_time_start(uint32_t core_hz) {

@@ -10,9 +10,12 @@
 /// The interrupts of this port. The numbers are the same on every STM32F1 and F4.
 typedef enum {
     IW_IRQ_EXTI0 = 6,
+    IW_IRQ_SERIAL_RECEIVE = 16,  ///< DMA1 channel 6 of an F1, stream 5 of an F4.
+    IW_IRQ_SERIAL_TRANSMIT = 17, ///< DMA1 channel 7, stream 6.
     IW_IRQ_CAN_TRANSMIT = 19,
     IW_IRQ_CAN_RECEIVE = 20,
     IW_IRQ_CAN_ERROR = 22,
+    IW_IRQ_SERIAL = 38, ///< USART2.
 } iw_irq_t;
 
 /// Interrupts and exceptions may come from here on, all with the same priority: none interrupts another.

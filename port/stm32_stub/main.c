@@ -85,16 +85,21 @@ static void start_bus(void) {
     iw_irq_enable(IW_IRQ_CAN_ERROR);
 }
 
-static bool start_gateway(iw_gateway_t *gateway, bool restarted) {
-    static const iw_hal_t hal = {iw_bxcan_send,  iw_bxcan_receive, iw_bxcan_bus_state,
-                                 iw_bxcan_purge, iw_estop_pressed, &bus};
-    const iw_bus_facts_t facts = {.timing_contradicted = false, .echo_proven = true};
+static iw_config_t configuration(void) {
     iw_config_t config;
     iw_config_default(&config);
     config.setpoint_type = IWHEEL_SETPOINT_TYPE_VALUE;
     config.setpoint_type_set = IWHEEL_SETPOINT_TYPE_IS_SET;
     config.current_role = IWHEEL_CURRENT_ROLE_VALUE;
-    if (iw_gateway_init(gateway, &config, &hal, iw_time_now_us(), restarted) != IW_CONFIG_OK) {
+    iw_commander_configure(&config);
+    return config;
+}
+
+static bool start_gateway(iw_gateway_t *gateway, const iw_config_t *config, bool restarted) {
+    static const iw_hal_t hal = {iw_bxcan_send,  iw_bxcan_receive, iw_bxcan_bus_state,
+                                 iw_bxcan_purge, iw_estop_pressed, &bus};
+    const iw_bus_facts_t facts = {.timing_contradicted = false, .echo_proven = true};
+    if (iw_gateway_init(gateway, config, &hal, iw_time_now_us(), restarted) != IW_CONFIG_OK) {
         return false;
     }
     iw_gateway_bus_facts(gateway, &facts);
@@ -121,14 +126,17 @@ static void cycle(iw_gateway_t *gateway, iw_commander_t *commander) {
 int main(void) {
     static iw_gateway_t gateway;
     static iw_commander_t commander;
-    const bool restarted = iw_marker_take(iw_clock_was_power_on());
+    const bool power_on = iw_clock_was_power_on();
+    const bool restarted = iw_marker_take(power_on);
+    iw_commander_open(power_on);
     iw_watchdog_start();
     iw_pins_init();
     wait_for_crystal();
     iw_estop_init();
     iw_irq_enable(IW_IRQ_EXTI0);
+    const iw_config_t config = configuration();
     start_bus();
-    if (!start_gateway(&gateway, restarted)) {
+    if (!start_gateway(&gateway, &config, restarted)) {
         return 1;
     }
     iw_report_start(restarted);

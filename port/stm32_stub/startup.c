@@ -8,6 +8,10 @@ void iw_exti0_handler(void);
 void iw_can_transmit_handler(void);
 void iw_can_receive_handler(void);
 void iw_can_error_handler(void);
+// Of serial.c: an image without it never enables them.
+__attribute__((weak)) void iw_serial_usart_handler(void);
+__attribute__((weak)) void iw_serial_receive_handler(void);
+__attribute__((weak)) void iw_serial_transmit_handler(void);
 
 extern uint32_t iw_link_stack_top[], iw_link_data_load[], iw_link_data_start[], iw_link_data_end[];
 extern uint32_t iw_link_bss_start[], iw_link_bss_end[];
@@ -38,7 +42,7 @@ typedef union {
 } iw_vector_t;
 
 #define EXCEPTIONS 16
-#define VECTORS    (EXCEPTIONS + IW_IRQ_CAN_ERROR + 1)
+#define VECTORS    (EXCEPTIONS + IW_IRQ_SERIAL + 1)
 
 /// The vectors up to the last interrupt that is enabled. Empty ones cannot come.
 __attribute__((section(".vectors"), used)) static const iw_vector_t vectors[VECTORS] = {
@@ -53,6 +57,9 @@ __attribute__((section(".vectors"), used)) static const iw_vector_t vectors[VECT
     [14] = {.handler = fault_handler},
     [15] = {.handler = iw_systick_handler},
     [EXCEPTIONS + IW_IRQ_EXTI0] = {.handler = iw_exti0_handler},
+    [EXCEPTIONS + IW_IRQ_SERIAL_RECEIVE] = {.handler = iw_serial_receive_handler},
+    [EXCEPTIONS + IW_IRQ_SERIAL_TRANSMIT] = {.handler = iw_serial_transmit_handler},
+    [EXCEPTIONS + IW_IRQ_SERIAL] = {.handler = iw_serial_usart_handler},
     [EXCEPTIONS + IW_IRQ_CAN_TRANSMIT] = {.handler = iw_can_transmit_handler},
     [EXCEPTIONS + IW_IRQ_CAN_RECEIVE] = {.handler = iw_can_receive_handler},
     [EXCEPTIONS + IW_IRQ_CAN_ERROR] = {.handler = iw_can_error_handler},

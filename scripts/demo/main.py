@@ -124,6 +124,8 @@ def run(options, interrupts):
     try:
         rig = Rig(options.build, CONFIG)
     except (OSError, RuntimeError) as error:
+        if interrupts.came:  # A terminal tells all of us: the simulator may have ended first.
+            raise KeyboardInterrupt from error
         print(f"FAILED: the simulator does not start: {error}", file=sys.stderr)
         return 1
     sleeper = Sleeper()
@@ -138,6 +140,8 @@ def run(options, interrupts):
             print("Try it yourself: ./demo --keep")
         return 0
     except Exception as error:  # pylint: disable=broad-except
+        if interrupts.came:
+            raise KeyboardInterrupt from error
         report(story, rig, error, sleeper)
         return 1
     finally:

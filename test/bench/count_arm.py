@@ -3,6 +3,7 @@
 import bisect
 import subprocess
 from collections import Counter
+from pathlib import Path
 
 from unicorn import UC_ARCH_ARM, UC_HOOK_CODE, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
 from unicorn import arm_const as arm
@@ -12,19 +13,35 @@ MEMORY = 0x40000
 STACK = BASE + MEMORY - 16
 HOME = BASE + MEMORY - 4  # Where the outermost function returns to.
 MODELS = {"cortex-m0plus": arm.UC_CPU_ARM_CORTEX_M0, "cortex-m4": arm.UC_CPU_ARM_CORTEX_M4}
-FLAGS = ["-mthumb", "-mfloat-abi=soft", "-Os", "-std=c99", "-ffunction-sections", "-fdata-sections", "-ffreestanding", "-fno-common"]
+FLAGS = ["-mthumb", "-mfloat-abi=soft", "-Os", "-std=c99", "-ffunction-sections", "-fdata-sections", "-fno-common"]
+FREESTANDING = ("-ffreestanding",)  # As the core is built.
 
 
-def build(out, cpu, sources, includes, entries):
+def compile_clang(out, cpu, sources, includes, more):
+    """Objects by clang, with the C library's headers of the GNU compiler."""
+    system = subprocess.run(["arm-none-eabi-gcc", "-print-sysroot"], capture_output=True, text=True, check=True).stdout.strip()
+    objects = []
+    for source in map(Path, sources):
+        objects.append(out.with_name(f"{out.stem}-{source.stem}.o"))
+        subprocess.run(["clang", "--target=arm-none-eabi", f"-mcpu={cpu}", *FLAGS, *more, f"-isystem{system}/include", "-isystem/usr/include/newlib",
+                        *[f"-I{path}" for path in includes], "-c", str(source), "-o", str(objects[-1])], check=True)
+    return objects
+
+
+def build(out, cpu, sources, includes, entries, more=FREESTANDING, compiler="gcc"):
     """Links a program without start-up code; `entries` are kept."""
     keep = [f"-Wl,-u,{entry}" for entry in entries]
-    command = ["arm-none-eabi-gcc", f"-mcpu={cpu}", *FLAGS, *[f"-I{path}" for path in includes], *map(str, sources), "-nostartfiles",
+    if compiler == "clang":
+        sources = compile_clang(out, cpu, sources, includes, more)
+    command = ["arm-none-eabi-gcc", f"-mcpu={cpu}", *FLAGS, *more, *[f"-I{path}" for path in includes], *map(str, sources), "-nostartfiles",
                "--specs=nano.specs", f"-Wl,-Ttext={BASE:#x}", "-Wl,-N", "-Wl,--gc-sections", f"-Wl,-e,{entries[0]}", *keep, "-o", str(out)]
-    subprocess.run(command, check=True)
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
+    if done.returncode != 0:
+        raise SystemExit(done.stderr)
     return out
 
 
-def text_size(elf, prefixes=("iw_", "bench_linked_", "left_ids", "lengths", "iwheel_")):
+def text_size(elf, prefixes=("iw_", "read_", "bench_linked_", "left_ids", "lengths", "iwheel_")):
     """Bytes of code and constants of the linked functions whose names begin so."""
     run = subprocess.run(["arm-none-eabi-nm", "-S", str(elf)], capture_output=True, text=True, check=True)
     rows = [line.split() for line in run.stdout.splitlines()]

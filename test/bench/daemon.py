@@ -58,8 +58,8 @@ class Client:
 class Pair:
     """A simulator and a gateway in a folder of their own."""
 
-    def __init__(self, build, folder):
-        self.folder = Path(folder)
+    def __init__(self, build, folder, under=()):
+        self.folder, self.under = Path(folder), under
         self.build = Path(build)
         self.northbound = self.folder / "gateway.sock"
         self.allocations = self.folder / "allocations"
@@ -74,7 +74,7 @@ class Pair:
 
     def start(self):
         environment = dict(os.environ, LD_PRELOAD=str(self.preload), BENCH_ALLOCATIONS=str(self.allocations))
-        return subprocess.Popen([self.build / "app/gateway/iwheel-gateway", "-c", self.folder / "gateway.conf", "--can",
+        return subprocess.Popen([*self.under, self.build / "app/gateway/iwheel-gateway", "-c", self.folder / "gateway.conf", "--can",
                                  f"unix:{self.folder}/bus", "--estop", f"unix:{self.folder}/estop", "--socket", self.northbound,
                                  "--log-level", "error"], env=environment, stderr=subprocess.DEVNULL)
 

@@ -17,7 +17,8 @@ README_ROWS = {  # Of the page, and how the README says it.
     "its mean error, 617 frames/s": "mean error of the setpoint period, 617 frames/s of telemetry",
     "setpoint period, deviation p50, 617": "deviation of the setpoint period, p50, × leanest program",
     "21 000 frames/s: lost": "lost of a full bus, 21 000 frames/s",
-    "617 frames/s: system calls": "system calls for a frame, 617 frames/s, no client",
+    "617 frames/s: system calls for a frame, driving": "system calls for a frame, 617 frames/s, driving",
+    "617 frames/s: system calls for a frame, no client": "system calls for a frame, 617 frames/s, no client",
     "client's line to frame on the bus, p50": "client's line to frame on the bus, p50, × leanest program",
 }
 

@@ -26,7 +26,7 @@ PROGRAMS = {
     "chown": ("coreutils", None), "chrt": ("util-linux", {"-f"}), "gpiodetect": ("gpiod", None), "gpioinfo": ("gpiod", None),
     "groupadd": ("passwd", {"--system"}), "ip": ("iproute2", None), "journalctl": ("systemd", {"-u"}),
     "mkdir": ("coreutils", {"-p"}), "modprobe": ("kmod", {"can_raw"}), "systemctl": ("systemd", {"start", "stop", "restart", "enable"}),
-    "timedatectl": ("systemd", {"set-ntp"}), "usermod": ("passwd", {"-aG"}),
+    "sysctl": ("procps", None), "timedatectl": ("systemd", {"set-ntp"}), "usermod": ("passwd", {"-aG"}),
 }
 OURS = {"iwheelctl", "iwheel-sim", "iwheel-gateway"}
 

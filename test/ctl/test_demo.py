@@ -64,17 +64,31 @@ class Interrupted(unittest.TestCase):
         for code, left, running, said in (play(1.0, (number,)) for number in (signal.SIGTERM, signal.SIGHUP)):
             self.assertEqual((130, [], []), (code, left, running), said)
 
-    def test_simulator_that_does_not_start_leaves_nothing(self):
+    def play_with(self, program):
+        """What comes of it when the programs are this script, and nothing is left behind."""
         with tempfile.TemporaryDirectory(prefix="d") as folder:
             os.makedirs(os.path.join(folder, "build", "bin"))
             os.makedirs(os.path.join(folder, "tmp"))
             for name in ("iwheel-sim", "iwheel-gateway", "iwheelctl"):
-                os.symlink("/bin/false", os.path.join(folder, "build", "bin", name))
+                path = os.path.join(folder, "build", "bin", name)
+                with open(path, "w", encoding="ascii") as file:
+                    file.write("#!/bin/sh\n" + program)
+                os.chmod(path, 0o755)
             done = subprocess.run([sys.executable, os.path.join(ROOT, "scripts", "demo", "main.py"), "--build",
                                    os.path.join(folder, "build")], capture_output=True, text=True, timeout=30, check=False,
                                   stdin=subprocess.DEVNULL, env={**os.environ, "TMPDIR": os.path.join(folder, "tmp")})
-            self.assertEqual((1, []), (done.returncode, os.listdir(os.path.join(folder, "tmp"))), done.stdout + done.stderr)
-            self.assertIn("the simulator does not start", done.stderr)
+            self.assertEqual([], os.listdir(os.path.join(folder, "tmp")), done.stdout + done.stderr)
+            return done
+
+    def test_simulator_that_does_not_start_leaves_nothing(self):
+        done = self.play_with("exit 1\n")
+        self.assertEqual(1, done.returncode, done.stdout + done.stderr)
+        self.assertIn("the simulator does not start", done.stderr)
+
+    def test_ctrl_c_that_ends_the_simulator_first_is_no_failure(self):
+        done = self.play_with("kill -INT $PPID\nexit 1\n")
+        self.assertEqual(130, done.returncode, done.stdout + done.stderr)
+        self.assertNotIn("FAILED", done.stderr)
 
 
 if __name__ == "__main__":

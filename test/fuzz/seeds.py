@@ -41,6 +41,7 @@ def by_hand():
         + [b'{"cmd":"recording","name":"' + name + b'","offset":-1}' for name in (b"../x", b"a" * 64, b"stop-000001-a.log\\u0000", b"")],
         "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ngear_ratio = 3/2\n"],
         "candump": [ODD_LINES.encode()],
+        "line": [b'0 {"cmd":"link"}*e2d27f9b\n', b'3 1250000 {"ok":true}*e0f15d9c\n', b'1 {"boot":"0123456789abcdef","seq":1,"t_us":2,"cmd":"stop"}\xfe', b"8 {}\xfe\xff8 0 {}\xfe"],
         "web": [b"GET\n/\n[::1]\nnull\ncross-site\n\n", b"POST\n/api/estop\nwalker.lan:8470\nhttps://walker.lan:8470\nsame-origin\nbearer " + b"0" * 32],
         "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
@@ -81,6 +82,11 @@ def candump():
 def request():
     """What iwheelctl and the Python client say to a gateway."""
     return [line.encode() for line in (RECORDED.parent / "requests.jsonl").read_text().splitlines()]
+
+
+def line():
+    """The same as the relay says it, on a channel and with a CRC."""
+    return [b"1 " + said + b"\xfe" for said in request() if len(said) < 400]
 
 
 def config():
@@ -148,4 +154,4 @@ def gateway():
 
 def recorded():
     """{target: [bytes]}: a target that does not take them has lost what it was for."""
-    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client(), "web": web()}
+    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client(), "web": web(), "line": line()}

@@ -15,7 +15,6 @@
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/syscall.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -60,6 +59,11 @@ void iw_bus_close(iw_backend_store_t *self) {
 void iw_bus_tend(iw_backend_store_t *self, iw_time_us_t now_us) {
     (void)self;
     (void)now_us;
+}
+
+void iw_bus_waited(iw_backend_store_t *self, bool told) {
+    (void)self;
+    (void)told;
 }
 
 iw_time_us_t iw_bus_next_us(const iw_backend_store_t *self) {
@@ -180,29 +184,33 @@ static void show(int fd, bool readable) {
 }
 
 static int find_events(daemon_rig_t *rig, int fd, struct epoll_event *events, int max) {
-    int count = 0;
-    if (rig->daemon->wakeup.due_us <= rig->now_us) {
-        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = GW_TAG_TIMER}};
-    }
     show(rig->bus_fd, rig->rx_next < rig->rx_count);
     show(rig->estop_fd, rig->estop_pulse || (rig->estop != rig->estop_told && !rig->estop_silent));
-    const long more = syscall(SYS_epoll_pwait, fd, &events[count], max - count, 0, NULL, 8);
-    return count + ((more > 0) ? (int)more : 0);
+    const int count = epoll_wait(fd, events, max, 0);
+    return (count > 0) ? count : 0;
 }
 
 static iw_time_us_t earlier(iw_time_us_t a_us, iw_time_us_t b_us) {
     return (a_us < b_us) ? a_us : b_us;
 }
 
-int epoll_wait(int fd, struct epoll_event *events, int max, int timeout_ms) {
+int gw_wakeup_open(gw_wakeup_t *self) {
+    *self = (gw_wakeup_t){.fd = epoll_create1(EPOLL_CLOEXEC)};
+    return (self->fd < 0) ? errno : 0;
+}
+
+void gw_wakeup_close(gw_wakeup_t *self) {
+    (void)close(self->fd);
+}
+
+int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t end_us) {
     daemon_rig_t *rig = &daemon_rig;
-    const iw_time_us_t end_us = (timeout_ms < 0) ? IW_NEVER : rig->now_us + (iw_time_us_t)timeout_ms * IW_US_PER_MS;
     rig->waits++;
     rig->now_us += rig->stolen_us;
     rig->stolen_us = 0;
     while (true) {
         take_from_world(rig);
-        const int count = find_events(rig, fd, events, max);
+        const int count = find_events(rig, self->fd, events, max);
         if (count > 0 || (rig->now_us >= end_us && rig->now_us < rig->until_us)) {
             return count;
         }
@@ -210,8 +218,7 @@ int epoll_wait(int fd, struct epoll_event *events, int max, int timeout_ms) {
             errno = ECANCELED; // Ends the loop, without a cycle.
             return -1;
         }
-        iw_time_us_t next_us = earlier(sim_world_wake_us(&rig->world), rig->daemon->wakeup.due_us);
-        next_us = earlier(earlier(next_us, end_us), rig->until_us);
+        const iw_time_us_t next_us = earlier(earlier(sim_world_wake_us(&rig->world), end_us), rig->until_us);
         rig->now_us = (next_us > rig->now_us) ? next_us : rig->now_us + 1U;
     }
 }

@@ -30,7 +30,7 @@ typedef struct {
     int estop;                   ///< What the button answers: 1 pressed, 0, -1 unreadable.
     bool estop_pulse;            ///< Edges wait to be read: pressed and released again. They wake.
     bool estop_silent;           ///< The next change of it wakes nobody, as when a GPIO chip goes.
-    uint32_t waits;              ///< Calls of epoll_wait.
+    uint32_t waits;              ///< Of the loop.
     bool ended;                  ///< The loop has come to its end by itself.
     uint32_t unmarked;           ///< Setpoints handed over while there was no crash marker.
     uint32_t sent[IW_SIDES];     ///< Setpoints handed over.

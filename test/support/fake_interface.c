@@ -53,6 +53,11 @@ int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_sock
     return 0;
 }
 
+uint32_t iw_socketcan_socket_room(const iw_socketcan_socket_t *self) {
+    (void)self;
+    return FAKE_ROOM;
+}
+
 void iw_socketcan_socket_close(iw_socketcan_socket_t *self) {
     if (self->fd >= 0) {
         (void)close(self->fd);

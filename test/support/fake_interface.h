@@ -8,6 +8,8 @@
 #include "socketcan_socket.h"
 
 #define FAKE_QUEUE_MAX 2000U
+/// That the kernel grants.
+#define FAKE_ROOM 425984U
 
 typedef struct {
     struct can_frame frame[FAKE_QUEUE_MAX];

@@ -34,8 +34,10 @@ class Rig:
         with tempfile.TemporaryDirectory() as folder: # Not /dev/stdout: objcopy run by root can put a file in its place.
             subprocess.run(["arm-none-eabi-objcopy", "-O", "binary", str(elf), f"{folder}/image"], check=True)
             image = Path(folder, "image").read_bytes()
-        wiring = scenarios.WIRING.get(re.sub(r"^.*-", "", Path(elf).stem), {})
-        self.machine = Machine(BOARDS[board_name](**wiring), image)
+        kind = re.sub(r"^.*-", "", Path(elf).stem)
+        self.machine = Machine(BOARDS[board_name](**scenarios.WIRING.get(kind, {})), image)
+        self.machine.uart.baud = scenarios.BAUD.get(kind, self.machine.uart.baud)
+        self.stack_limit = scenarios.STACK.get(kind, 1024)
         if oscillator is not None:
             self.machine.watchdog.lsi_hz = self.machine.board.lsi_limits_hz[oscillator]
         self.addresses, self.stack_area, self.elf = symbols.addresses(elf), symbols.stack_area(elf), elf
@@ -82,7 +84,7 @@ class Rig:
         assert not self.machine.violations, "; ".join(self.machine.violations)
         violation = self.machine.can.violation().decode()
         assert not violation, f"bus controller: {violation}"
-        assert self.stack_used() <= 1024, f"{self.stack_used()} bytes of stack were used"
+        assert self.stack_used() <= self.stack_limit, f"{self.stack_used()} bytes of stack were used"
         causes = [cause for _, cause in self.machine.resets]
         assert causes == self.expected_resets, f"resets: {causes}, expected: {self.expected_resets}"
         foreign = {frame.id for frame in self.setpoints()} - {scenarios.LEFT, scenarios.RIGHT}

@@ -5,6 +5,8 @@ Verdicts are passed on the bus, the lamp and the count of resets: on what can be
 """
 import re
 
+import gateway_scenarios
+import host
 from emulator.can import LEFT, RIGHT, Frame
 from emulator.chip import MS, PINRSTF, US
 
@@ -788,15 +790,18 @@ SCENARIOS = {
     "demo": (demo_profile, demo_second_press_stops, demo_button_held, demo_button_held_through_reset, demo_estop, acknowledgement_lost,
              silence_is_silent, abort_without_end, cable_torn, receiver_open, bus_off, stuck_in_motion, babbling, crystal_dies, hang, loop_stuck, reset_again,
              reset_after_the_hold, reset_after_unproven_hold, stack_overflow),
+    "gateway": gateway_scenarios.SCENARIOS,
 }
 # The STM32F446 has the files of the STM32F407: what may differ is its clock.
 BY_BOARD = {"stm32f103": {**SCENARIOS, "usb": (usb_pins,), "crystal12": (other_crystal,)},
             "stm32f407": {**SCENARIOS, "crystal": (other_crystal,)},
-            "stm32f446": {"zero": (nominal, console), "clock": (clock_input,), "demo": (crystal_dies,)}}
+            "stm32f446": {"zero": (nominal, console), "clock": (clock_input,), "demo": (crystal_dies,), "gateway": (gateway_scenarios.talks,)}}
 # Long, and what they ask does not depend on the chip's family: on the second board only in ./check --full.
 LONG = (wheel_lost, estop_chatters, demo_profile, demo_second_press_stops, demo_button_held, second_master, babbling, overrun, cable_torn,
         stuck_while_listening, time_passes_32_bits_of_microseconds, time_passes_32_bits_of_milliseconds, reset_by_button, reset_again,
-        reset_while_listening, silence_is_silent, abort_without_end, reset_after_the_hold, reset_after_unproven_hold)
+        reset_while_listening, silence_is_silent, abort_without_end, reset_after_the_hold, reset_after_unproven_hold, *gateway_scenarios.LONG)
+# image -> of its serial port, where it is not 115200; and the stack that it may use, where it is not 1024.
+BAUD, STACK = {"gateway": host.BAUD}, {"gateway": 1900}
 # image -> what differs around the chip.
 WIRING = {"usb": {"transceiver": "PA11"}, "crystal": {"crystal_hz": 25_000_000}, "crystal12": {"crystal_hz": 12_000_000}}
 OSCILLATOR = {fast_watchdog: 1, hang: 0, loop_stuck: 0, stuck_while_listening: 0, no_crystal: 1, clock_input: 1}

@@ -152,6 +152,9 @@ static void test_estop_that_goes_without_a_word_is_seen_within_milliseconds(void
 static void test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds(void) {
     for (unsigned phase = 0; phase < 20U; phase += 3U) {
         begin_driving();
+        if (phase % 2U == 1U) { // Then frames do not wait to be looked at.
+            (void)daemon_rig_ask(client, "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}");
+        }
         daemon_rig_run(phase);
         sim_world_power(&daemon_rig.world, daemon_rig.now_us, false); // No frame wakes us now.
         daemon_rig.estop_silent = true;
@@ -322,17 +325,53 @@ static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
-static void test_frames_that_nobody_waits_for_are_taken_together_and_one_by_one_as_soon_as_somebody_does(void) {
-    (void)close(client);
-    client = -1;
+static uint32_t waits_in_a_second(void) {
     daemon_rig_run(100);
     daemon_rig.waits = 0;
     daemon_rig_run(1000);
-    TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, daemon_rig.waits);
-    client = daemon_rig_connect();
+    return daemon_rig.waits;
+}
+
+static void test_frames_that_nobody_watches_are_taken_together(void) {
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, waits_in_a_second());
+    (void)close(client);
+    client = -1;
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, waits_in_a_second());
+}
+
+static void test_frames_that_somebody_watches_are_taken_one_by_one(void) {
+    (void)daemon_rig_ask(client, "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}");
+    TEST_ASSERT_GREATER_THAN_UINT32(450, waits_in_a_second());
+}
+
+static void test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop(void) {
+    begin_driving();
+    daemon_rig.waits = 0;
+    daemon_rig_run(190);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(90, daemon_rig.waits);
+    daemon_rig.estop = 1;
+    daemon_rig_run(1);
     daemon_rig.waits = 0;
     daemon_rig_run(1000);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     TEST_ASSERT_GREATER_THAN_UINT32(450, daemon_rig.waits);
+}
+
+static void test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wait(void) {
+    for (unsigned phase = 0; phase < 20U; phase++) {
+        begin_driving();
+        daemon_rig_run(phase);
+        TEST_ASSERT_TRUE(daemon_rig.daemon->frames_wait);
+        const iw_time_us_t before_us = daemon_rig.now_us;
+        daemon_rig.rx[daemon_rig.rx_count++] =
+            (iw_can_frame_t){.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_RECEIVED};
+        daemon_rig_run(4);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_TRUE(is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig.sent_us - before_us <= MS(4));
+        tearDown();
+        setUp();
+    }
 }
 
 static void test_estop_wakes_a_loop_that_lets_frames_wait(void) {
@@ -373,7 +412,10 @@ int main(void) {
     RUN_TEST(test_watchdog_is_fed_at_half_its_time_with_and_without_motion);
     RUN_TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels);
     RUN_TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker);
-    RUN_TEST(test_frames_that_nobody_waits_for_are_taken_together_and_one_by_one_as_soon_as_somebody_does);
+    RUN_TEST(test_frames_that_nobody_watches_are_taken_together);
+    RUN_TEST(test_frames_that_somebody_watches_are_taken_one_by_one);
+    RUN_TEST(test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop);
+    RUN_TEST(test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wait);
     RUN_TEST(test_estop_wakes_a_loop_that_lets_frames_wait);
     return UNITY_END();
 }

@@ -47,7 +47,7 @@ void tearDown(void) {
 
 static int prepare(void) {
     FILE *err = fmemopen(said, sizeof said, "w");
-    const gw_listener_wish_t wish = {GW_DRIVE, config.northbound.socket, config.northbound.group,
+    const gw_listener_wish_t wish = {"iwheel-gateway", GW_DRIVE, config.northbound.socket, config.northbound.group,
                                      config.northbound.mode};
     const int result = gw_listener_prepare(&listener, &wish, err);
     (void)fclose(err);

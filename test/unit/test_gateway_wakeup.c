@@ -3,88 +3,86 @@
 
 #include "iwheel_linux/clock.h"
 
-#include <poll.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 #include <unity.h>
 
-#define SOON_US   20000U
-#define LATER_US  3600000000U
-#define PATIENCE  2000 // ms, for a machine that has much to do
-#define AT_ONCE   0
-#define LITTLE_ms 60 // three times SOON_US
+#define SOON_US  20000U
+#define LATER_US 3600000000U
+#define TAG      7U
+#define ROOM     4
 
 static gw_wakeup_t wakeup;
+static int event_fd;
 
 void setUp(void) {
+    struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = TAG}};
     TEST_ASSERT_EQUAL_INT(0, gw_wakeup_open(&wakeup));
+    event_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    TEST_ASSERT_EQUAL_INT(0, epoll_ctl(wakeup.fd, EPOLL_CTL_ADD, event_fd, &interest));
 }
 
 void tearDown(void) {
     gw_wakeup_close(&wakeup);
+    (void)close(event_fd);
 }
 
-static bool wakes_within(int ms) {
-    struct pollfd watched = {.fd = wakeup.fd, .events = POLLIN};
-    return poll(&watched, 1U, ms) == 1;
+static int wait_until(iw_time_us_t until_us) {
+    struct epoll_event events[ROOM];
+    const int count = gw_wakeup_wait(&wakeup, events, ROOM, until_us);
+    if (count == 1) {
+        TEST_ASSERT_EQUAL_UINT64(TAG, events[0].data.u64);
+    }
+    return count;
 }
 
 static iw_time_us_t in_us(iw_time_us_t span_us) {
     return iw_clock_now_us() + span_us;
 }
 
-static void test_wakes_at_its_time_and_not_before(void) {
+static void check_wakes_at_its_time_and_not_before(void) {
     const iw_time_us_t due_us = in_us(SOON_US);
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, due_us));
-    TEST_ASSERT_TRUE(wakes_within(PATIENCE));
+    TEST_ASSERT_EQUAL_INT(0, wait_until(due_us));
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iw_clock_now_us());
 }
 
-static void test_time_that_is_past_wakes_at_once(void) {
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, 0U));
-    TEST_ASSERT_TRUE(wakes_within(AT_ONCE));
+static void check_time_that_is_past_only_looks(void) {
+    TEST_ASSERT_EQUAL_INT(0, wait_until(0U));
+    TEST_ASSERT_EQUAL_INT(0, wait_until(1U));
 }
 
-static void test_later_wish_is_no_reason_to_set_it_anew(void) {
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, in_us(SOON_US)));
-    TEST_ASSERT_FALSE(gw_wakeup_by(&wakeup, in_us(LATER_US)));
-    TEST_ASSERT_FALSE(gw_wakeup_by(&wakeup, IW_NEVER));
-    TEST_ASSERT_TRUE(wakes_within(PATIENCE));
+static void check_event_wakes_before_any_time(void) {
+    TEST_ASSERT_EQUAL_INT(0, eventfd_write(event_fd, 1U));
+    TEST_ASSERT_EQUAL_INT(1, wait_until(0U));
+    TEST_ASSERT_EQUAL_INT(1, wait_until(in_us(LATER_US)));
+    TEST_ASSERT_EQUAL_INT(1, wait_until(IW_NEVER));
 }
 
-static void test_same_wish_is_no_reason_to_set_it_anew(void) {
-    const iw_time_us_t due_us = in_us(LATER_US);
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, due_us));
-    TEST_ASSERT_FALSE(gw_wakeup_by(&wakeup, due_us));
+static void test_wakes_at_its_time_and_not_before(void) {
+    check_wakes_at_its_time_and_not_before();
 }
 
-static void test_sooner_wish_sets_it_anew(void) {
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, in_us(LATER_US)));
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, in_us(SOON_US)));
-    TEST_ASSERT_TRUE(wakes_within(PATIENCE));
+static void test_time_that_is_past_only_looks(void) {
+    check_time_that_is_past_only_looks();
 }
 
-static void test_one_that_has_woken_is_set_anew_and_no_longer_tells(void) {
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, 0U));
-    TEST_ASSERT_TRUE(wakes_within(AT_ONCE));
-    gw_wakeup_came(&wakeup);
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, in_us(LATER_US)));
-    TEST_ASSERT_FALSE(wakes_within(AT_ONCE));
+static void test_event_wakes_before_any_time(void) {
+    check_event_wakes_before_any_time();
 }
 
-static void test_without_a_wish_it_never_wakes(void) {
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, IW_NEVER));
-    TEST_ASSERT_FALSE(wakes_within(LITTLE_ms));
-    TEST_ASSERT_TRUE(gw_wakeup_by(&wakeup, in_us(SOON_US)));
-    TEST_ASSERT_TRUE(wakes_within(PATIENCE));
+static void test_old_kernel_does_the_same_by_two_calls(void) {
+    wakeup.two_calls = true;
+    check_wakes_at_its_time_and_not_before();
+    check_time_that_is_past_only_looks();
+    check_event_wakes_before_any_time();
 }
 
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_wakes_at_its_time_and_not_before);
-    RUN_TEST(test_time_that_is_past_wakes_at_once);
-    RUN_TEST(test_later_wish_is_no_reason_to_set_it_anew);
-    RUN_TEST(test_same_wish_is_no_reason_to_set_it_anew);
-    RUN_TEST(test_sooner_wish_sets_it_anew);
-    RUN_TEST(test_one_that_has_woken_is_set_anew_and_no_longer_tells);
-    RUN_TEST(test_without_a_wish_it_never_wakes);
+    RUN_TEST(test_time_that_is_past_only_looks);
+    RUN_TEST(test_event_wakes_before_any_time);
+    RUN_TEST(test_old_kernel_does_the_same_by_two_calls);
     return UNITY_END();
 }

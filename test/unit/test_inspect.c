@@ -232,6 +232,27 @@ static void test_each_fault_of_the_link_has_its_command(void) {
     expect("echo", INSPECT_WARN, "unproven", "IFF_ECHO");
 }
 
+static void test_room_for_frames_that_is_granted_is_told(void) {
+    const iw_bus_link_t link = {.presence = IW_LINK_UP, .room_bytes = 2U * IW_LINK_ROOM_BYTES};
+    inspect_room(&link, &findings);
+    expect("room", INSPECT_OK, "4096 of 4096 KiB granted, 512 ms of a full bus", "");
+}
+
+static void test_room_for_frames_that_is_not_granted_has_its_command(void) {
+    const iw_bus_link_t link = {.presence = IW_LINK_UP, .room_bytes = 425984U};
+    inspect_room(&link, &findings);
+    expect("room", INSPECT_WARN, "208 of 4096 KiB granted, 26 ms of a full bus; when others",
+           "sudo sysctl net.core.rmem_max=4194304");
+}
+
+static void test_room_for_frames_that_is_not_known_is_not_judged(void) {
+    const iw_bus_link_t hub = {.presence = IW_LINK_LOCAL, .room_bytes = 425984U};
+    const iw_bus_link_t unknown = {.presence = IW_LINK_UP};
+    inspect_room(&hub, &findings);
+    inspect_room(&unknown, &findings);
+    TEST_ASSERT_EQUAL_UINT(0U, findings.count);
+}
+
 static void test_wrong_timing_only_warns_where_it_is_configured_so(void) {
     const iw_bus_link_t link = {.presence = IW_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .restart_ms = 1};
     inspect_wish_t lenient = wish;
@@ -303,6 +324,9 @@ int main(void) {
     RUN_TEST(test_what_a_machine_cannot_have_gets_the_verdict_asked_for);
     RUN_TEST(test_right_link_has_nothing_to_mend);
     RUN_TEST(test_each_fault_of_the_link_has_its_command);
+    RUN_TEST(test_room_for_frames_that_is_granted_is_told);
+    RUN_TEST(test_room_for_frames_that_is_not_granted_has_its_command);
+    RUN_TEST(test_room_for_frames_that_is_not_known_is_not_judged);
     RUN_TEST(test_wrong_timing_only_warns_where_it_is_configured_so);
     RUN_TEST(test_absent_and_foreign_interfaces_are_told_apart);
     RUN_TEST(test_estop_levels);

@@ -32,20 +32,20 @@ static void test_estop_is_read_whole_by_whoever_does_not_wait(void) {
 }
 
 static void test_estop_that_was_not_told_of_has_no_edges(void) {
-    iw_linux_hal_waited(&hal, false);
+    iw_linux_hal_waited(&hal, (iw_linux_told_t){false, false});
     (void)look();
     TEST_ASSERT_TRUE(was_quiet);
 }
 
 static void test_estop_that_was_told_of_is_read_whole(void) {
-    iw_linux_hal_waited(&hal, false);
-    iw_linux_hal_waited(&hal, true);
+    iw_linux_hal_waited(&hal, (iw_linux_told_t){false, false});
+    iw_linux_hal_waited(&hal, (iw_linux_told_t){false, true});
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);
 }
 
 static void test_wait_counts_for_one_look(void) {
-    iw_linux_hal_waited(&hal, false);
+    iw_linux_hal_waited(&hal, (iw_linux_told_t){false, false});
     (void)look();
     (void)look();
     TEST_ASSERT_FALSE(was_quiet);

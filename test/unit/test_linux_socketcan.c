@@ -364,6 +364,38 @@ static void test_echo_is_told_by_the_mark_of_the_message(void) {
     TEST_ASSERT_EQUAL_UINT8(IW_CAN_RECEIVED, frame.kind);
 }
 
+static void test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_again(void) {
+    TEST_ASSERT_EQUAL_UINT32(FAKE_ROOM, link_now()->room_bytes);
+    fake_interface.ours.error = ENETDOWN;
+    fake_interface.link.restart_ms = 99;
+    wait_ms(1);
+    wait_ms(300);
+    TEST_ASSERT_EQUAL_UINT32(99, link_now()->restart_ms);
+    TEST_ASSERT_EQUAL_UINT32(FAKE_ROOM, link_now()->room_bytes);
+}
+
+static void test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_bus(void) {
+    fake_interface.news = true;
+    iw_bus_waited(&store, false);
+    wait_ms(1);
+    TEST_ASSERT_TRUE(fake_interface.news);
+    iw_bus_waited(&store, true);
+    wait_ms(1);
+    TEST_ASSERT_FALSE(fake_interface.news);
+}
+
+static void test_interface_that_is_back_is_found_whatever_the_wait_has_told(void) {
+    fake_interface.ours.error = ENETDOWN;
+    fake_interface.presence = IW_LINK_DOWN;
+    wait_ms(1);
+    fake_interface.presence = IW_LINK_UP;
+    fake_interface.news = true;
+    iw_bus_waited(&store, false);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state()); // The loss, once.
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once);
@@ -391,5 +423,8 @@ int main(void) {
     RUN_TEST(test_lost_frames_are_counted_and_the_carrier_is_looked_at);
     RUN_TEST(test_other_ids_come_after_ours_and_not_right_after_a_setpoint);
     RUN_TEST(test_echo_is_told_by_the_mark_of_the_message);
+    RUN_TEST(test_room_for_frames_is_told_and_stays_told_when_the_link_is_read_again);
+    RUN_TEST(test_news_of_interfaces_are_taken_only_if_the_wait_has_told_of_the_bus);
+    RUN_TEST(test_interface_that_is_back_is_found_whatever_the_wait_has_told);
     return UNITY_END();
 }

@@ -45,6 +45,7 @@ static void connect_crowd(void) {
         client->fd = pair[0];
         peer[i] = pair[1];
         daemon_->clients.count[GW_DRIVE]++;
+        daemon_->clients.open[GW_DRIVE] |= UINT64_C(1) << i;
     }
 }
 

@@ -98,7 +98,7 @@ static char *metrics_of(const char *json) {
     char *text = NULL;
     size_t length = 0;
     const iwc_message_t message = {.text = json, .length = (json != NULL) ? strlen(json) : 0U};
-    const web_own_t own = {3, 4, 5, 6};
+    const web_own_t own = {3, 4, 5, 6, 7};
     FILE *file = open_memstream(&text, &length);
     web_metrics_write((json != NULL) ? &message : NULL, &own, file);
     (void)fclose(file);
@@ -122,7 +122,8 @@ static void test_metrics_have_base_units_and_leave_out_what_is_unknown(void) {
                                         "\niwheel_setpoint_gap_seconds_bucket{le=\"+Inf\"} 3\n",
                                         "\niwheel_setpoint_gap_worst_seconds 0.020500\n",
                                         "\niwheel_web_watchers 3\n",
-                                        "\niwheel_web_dropped_commands_total 5\n"};
+                                        "\niwheel_web_dropped_commands_total 5\n",
+                                        "\niwheel_web_crowded_out_total 7\n"};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, lines[i]), lines[i]);
     }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The bridge without a browser: who is let in, what hostile peers get, what reaches the gateway and the bus."""
 
+import contextlib
 import json
 import os
 import re
@@ -11,10 +12,14 @@ import ssl
 import subprocess
 import sys
 import time
+import urllib.parse
+import urllib.request
 from pathlib import Path
 
 from bus import now_us
-from web_rig import Driver, ROOT, Skip, braking_ms, full, needs, until
+from harness import Process
+from judge_log import GAP_US
+from web_rig import Driver, ROOT, Skip, braking_ms, free_port, full, longest_gap_ms, needs, until
 
 ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/metrics", "/health")
 COMMANDS = ("/api/stop", "/api/estop", "/api/arm", "/api/drive", "/api/reset")
@@ -135,28 +140,82 @@ def test_request_with_a_body_is_refused_at_once(rig):
 # ---- hostile peers ---------------------------------------------------------------------------------------------------
 
 
-IDLE = """
-import socket, sys
-held = []
-for _ in range(1000):
-    held.append(socket.socket())
-    held[-1].setblocking(False)
-    held[-1].connect_ex(("127.0.0.1", int(sys.argv[1])))
-sys.stdin.read()
+# As many connections as it can have, made anew as they are closed. Every second one asks for the page without end, too.
+FLOOD = """
+import select, socket, sys
+def knock(number):
+    one = socket.socket()
+    one.setblocking(False)
+    one.connect_ex(("127.0.0.1", int(sys.argv[1])))
+    poll.register(one, select.POLLIN | (select.POLLOUT if number % 2 else 0))
+    return one
+poll, held = select.poll(), {}
+for number in range(1000):
+    one = knock(number)
+    held[one.fileno()] = (one, number)
+while True:
+    for fd, what in poll.poll():
+        one, number = held[fd]
+        try:
+            if what & select.POLLOUT:
+                one.send(b"GET / HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\n\\r\\n")
+                poll.modify(one, select.POLLIN)
+            elif one.recv(65536):
+                continue
+            else:
+                raise OSError
+        except OSError:
+            poll.unregister(fd)
+            del held[fd]
+            one.close()
+            one = knock(number)
+            held[one.fileno()] = (one, number)
 """
 
 
+def assert_no_gap(rig, since_us):
+    """The gateway promises a setpoint for each wheel before this time, whatever its clients do (invariant 4)."""
+    gap_ms = longest_gap_ms(rig, since_us)
+    print(f"        longest gap on the bus: {gap_ms:.1f} ms", flush=True)
+    assert gap_ms < GAP_US / 1000, f"{gap_ms:.1f} ms between two setpoints of a wheel"
+
+
 @needs(settings={"web": {"max_connections": 64}})
-def test_a_thousand_connections_slow_ones_and_bombs_cost_the_gateway_no_gap_and_the_page_seconds(rig):
+def test_stop_gets_through_a_flood_of_a_thousand_connections_and_the_gateway_has_no_gap(rig):
     rig.start().connected()
-    driver = Driver(rig)
+    driver, since = Driver(rig), now_us()
+    flood = subprocess.Popen([sys.executable, "-c", FLOOD, str(rig.port)], preexec_fn=lambda: os.nice(5))
+    try:
+        crowd = re.compile(r"iwheel_web_crowded_out_total (\d+)\n")
+        before = int(until(lambda: (found := crowd.search(rig.ask("GET", "/metrics")[1])) and int(found[1]) > 1000 and found, what="the flood")[1])
+        for _ in range(20):
+            begun = time.monotonic()
+            assert rig.ask("GET", "/health")[0] == 200
+            assert time.monotonic() - begun < 0.5, "who has the token waits"
+            time.sleep(0.05)
+        assert int(crowd.search(rig.ask("GET", "/metrics")[1])[1]) > before + 1000, "the flood has ended by itself"
+        assert_no_gap(rig, since)
+        assert gateway_state(rig)["state"] == "armed", gateway_state(rig)["cause"]
+        pressed = now_us()
+        status, body = rig.ask_json("POST", "/api/stop")
+        assert status == 200 and body["state"] == "stopping", body
+        assert (late := braking_ms(rig, pressed)) < 500, f"{late} ms"
+        assert rig.web.resident_kB() < 60_000, rig.web.resident_kB()
+    finally:
+        flood.kill()
+        flood.wait()
+    driver.end()
+
+
+def test_slow_connections_and_bombs_cost_the_gateway_no_gap_and_the_page_seconds(rig):
+    rig.start().connected()
+    driver, since = Driver(rig), now_us()
     for bomb in (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"X: " + b"a" * 200_000 + b"\r\n\r\n", b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 20_000 + b"\r\n",
                  b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n", b"\x16\x03\x01" * 1000, b"\0" * 5000, b"GET / HTTP/9.9\r\n\r\n", b"\r\n" * 9000):
         answer = raw(rig, bomb)
         assert not answer or re.match(rb"HTTP/1\.[01] (4\d\d|505) ", answer), answer[:80]
     assert rig.ask("GET", "/health")[0] == 200
     slow = [socket.create_connection(("127.0.0.1", rig.port)) for _ in range(20)]
-    idle = subprocess.Popen([sys.executable, "-c", IDLE, str(rig.port)], stdin=subprocess.PIPE)
     begun = time.monotonic()
     while time.monotonic() - begun < 6.5:  # A byte now and then is no request.
         for one in slow:
@@ -165,8 +224,6 @@ def test_a_thousand_connections_slow_ones_and_bombs_cost_the_gateway_no_gap_and_
             except OSError:
                 pass
         time.sleep(0.5)
-    idle.communicate()
-    until(lambda: rig.answers() and rig.ask("GET", "/health")[0] == 200, 10, "somebody else is answered")
     closed = 0
     for one in slow:
         one.settimeout(0.5)
@@ -180,14 +237,27 @@ def test_a_thousand_connections_slow_ones_and_bombs_cost_the_gateway_no_gap_and_
             pass
         one.close()
     assert closed == len(slow), f"{len(slow) - closed} slow connections are still open"
-    assert rig.web.resident_kB() < 60_000, rig.web.resident_kB()
-    state = gateway_state(rig)
-    assert state["state"] == "armed", f"the wheels were stopped meanwhile: {state['cause']}"
+    assert_no_gap(rig, since)
+    assert gateway_state(rig)["state"] == "armed", gateway_state(rig)["cause"]
     driver.end()
+
+
+@needs(settings={"web": {"max_connections": 8}})
+def test_watchers_leave_room_for_stop(rig):
+    rig.start().connected()
+    streams = [rig.stream() for _ in range(7)]
+    told = [stream.recv(100).split()[1] for stream in streams]
+    assert told == [b"200"] * 5 + [b"503"] * 2, told
+    idle = [socket.create_connection(("127.0.0.1", rig.port)) for _ in range(8)]
+    assert rig.ask("POST", "/api/estop")[0] == 200
+    until(lambda: b"latched" in streams[0].recv(65536), what="who watched goes on watching")
+    for one in streams + idle:
+        one.close()
 
 
 def test_64_watchers_are_one_client_of_the_gateway_and_all_hear_it(rig):
     rig.start().connected()
+    driver, since = Driver(rig), now_us()
     before = gateway_state(rig)["clients"]
     streams = [rig.stream() for _ in range(64)]
     try:
@@ -202,6 +272,8 @@ def test_64_watchers_are_one_client_of_the_gateway_and_all_hear_it(rig):
                 text = text[-200:] + piece
         assert rig.ask("GET", "/metrics")[1].count("iwheel_web_watchers 64\n") == 1
         assert rig.web.resident_kB() < 80_000, rig.web.resident_kB()
+        assert_no_gap(rig, since)
+        driver.end()
     finally:
         for stream in streams:
             stream.close()
@@ -410,6 +482,60 @@ def test_rules_and_dashboard_know_only_figures_that_there_are(rig):
         raise Skip("promtool is missing (apt-get install prometheus)")
     done = subprocess.run(["promtool", "check", "rules", ROOT / "share/web/prometheus-rules.yml"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+PROMETHEUS = """
+global: {{scrape_interval: 200ms, scrape_timeout: 200ms, evaluation_interval: 200ms}}
+rule_files: ["{rules}"]
+scrape_configs:
+  - {{job_name: iwheel, authorization: {{credentials_file: "{token}"}}, static_configs: [{{targets: ["127.0.0.1:{port}"]}}]}}
+"""
+
+
+@contextlib.contextmanager
+def prometheus(rig):
+    """One that scrapes the bridge by the shipped rules: asked by a path, it gives the data of its answer."""
+    if not shutil.which("prometheus"):
+        raise Skip("prometheus is missing (scripts/install_tools check brings it)")
+    port = free_port()
+    Path(rig.path("prometheus.yml")).write_text(PROMETHEUS.format(rules=ROOT / "share/web/prometheus-rules.yml", token=rig.path("token"), port=rig.port), encoding="utf-8")
+    child = Process(["prometheus", f"--config.file={rig.path('prometheus.yml')}", f"--storage.tsdb.path={rig.path('tsdb')}", f"--web.listen-address=127.0.0.1:{port}"],
+                    rig.path("prometheus.out"))
+    rig.processes.append(child)
+
+    def ask(path):
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/v1/{path}", timeout=2) as answer:
+                return json.load(answer)["data"]
+        except OSError:
+            assert child.child.poll() is None, child.text()[-800:]
+            return None
+
+    yield ask
+    child.signal(signal.SIGTERM)
+    child.wait(5)
+
+
+@full
+def test_prometheus_takes_the_figures_and_alerts_of_an_estop(rig):
+    rig.start().connected()
+    with prometheus(rig) as ask:
+        target = until(lambda: (data := ask("targets")) and (found := data["activeTargets"]) and found[0]["health"] != "unknown" and found[0], what="it scrapes")
+        assert target["health"] == "up", target["lastError"]
+
+        def figure(query):
+            data = ask("query?query=" + urllib.parse.quote(query))
+            return float(data["result"][0]["value"][1]) if data and data["result"] else None
+
+        until(lambda: figure("iwheel_up") == 1, what="its figures are there")
+        state = rig.ask_json("GET", "/api/status")[1]
+        assert figure('iwheel_wheel_battery_volts{side="left"}') == state["left"]["battery_dV"] / 10
+        groups = ask("rules")["groups"]
+        assert groups and all(rule["health"] == "ok" for rule in groups[0]["rules"]), groups
+        assert not [alert for alert in ask("alerts")["alerts"] if alert["state"] == "firing"]
+        rig.sim.ask("estop press")
+        firing = until(lambda: [alert for alert in ask("alerts")["alerts"] if alert["state"] == "firing"], 8, "an alert fires")
+        assert [alert["labels"]["alertname"] for alert in firing] == ["IwheelLatched"] and "iwheelctl why" in firing[0]["annotations"]["summary"], firing
 
 
 def test_words_of_the_page_are_those_of_iwheelctl(rig):

@@ -122,18 +122,20 @@ def test_stop_button_is_on_the_bus_within_a_fifth_of_a_second(rig):
     rig.start().connected()
     with page_of(rig, "phone") as page:
         live(page)
-        for press in (lambda: page.click("#stop", no_wait_after=True), lambda: page.keyboard.press("s")):
+        box = page.locator("#stop").bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        for press in (page.mouse.down, lambda: page.keyboard.press("s")):  # The finger stays where it is.
             driver = Driver(rig)
             page.evaluate("addEventListener('pointerdown', () => { window.pressed = performance.now(); }, {capture: true, once: true});"
                           "addEventListener('keydown', () => { window.pressed = performance.now(); }, {capture: true, once: true})")
             since = now_us()
             press()
-            braking_ms(rig, since)
+            braked_us = since + braking_ms(rig, since) * 1000
             # From the press in the browser, not from our asking for it: its clock is compared with ours.
             here, there = now_us(), page.evaluate("performance.now() - window.pressed")
-            pressed_us = here - there * 1000
-            late = next(t_us for t_us, _, speed in rig.bus.setpoints(since) if abs(speed) < 200) - pressed_us
-            assert late < 200_000, f"{late / 1000} ms"
+            late_ms = (braked_us - here) / 1000 + there
+            print(f"        from the press to a smaller setpoint on the bus: {late_ms:.0f} ms", flush=True)
+            assert late_ms < 200, f"{late_ms} ms"
             seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
             driver.end()
             until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
@@ -353,7 +355,9 @@ def test_page_stays_smooth_at_50_hz(rig):
             session.send("HeapProfiler.collectGarbage")
             heap.append(page.evaluate("performance.memory.usedJSHeapSize") / 1e6)
         times = sorted(page.evaluate("frames_ms.splice(0)"))
-        print(f"frames: median {times[len(times) // 2]:.1f} ms, 99 % {times[len(times) * 99 // 100]:.1f} ms, longest {times[-1]:.0f} ms; heap {heap[0]:.1f} .. {heap[-1]:.1f} MB", flush=True)
+        # A sentence for docs/web.md.
+        print(f"{minutes:g} minutes at 50 Hz, 390 x 844: a frame every {times[len(times) // 2]:.1f} ms (median; 99 %: {times[len(times) * 99 // 100]:.1f} ms, longest {times[-1]:.0f} ms, "
+              f"{len(times)} frames), memory of the page {heap[0]:.1f} MB in the beginning and {heap[-1]:.1f} MB at the end, of the bridge {rig.web.resident_kB() / 1024:.1f} MiB.", flush=True)
         assert times[len(times) // 2] < 34 and heap[-1] < 60
     driver.end()
 

@@ -12,8 +12,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test/system"))
 
+from bus import now_us  # noqa: E402
 from client import Closed  # noqa: E402
 from harness import Process, Rig  # noqa: E402
+from judge_log import LEFT, RIGHT  # noqa: E402
 
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
@@ -152,7 +154,7 @@ class Driver(threading.Thread):
         self.client, self.speed, self.ended = rig.client(name="joystick"), speed, threading.Event()
         self.turning = False
         self.start()
-        until(lambda: rig.bus.setpoints() and abs(rig.bus.setpoints()[-1][2]) > speed / 2, what="the wheels are told to turn")
+        until(lambda: rig.bus.setpoints() and abs(rig.bus.setpoints()[-1][2]) == speed, what="the wheels are told to turn, and at this speed")
         self.turning = True
 
     def run(self):
@@ -173,11 +175,24 @@ class Driver(threading.Thread):
         self.join(2)
 
 
-def braking_ms(rig, since_us, seconds=2):
-    """How long after this time the first setpoint was on the bus that is nearer to zero than the last one before."""
-    before = [abs(speed) for t_us, _, speed in rig.bus.setpoints() if t_us < since_us][-1]
+def longest_gap_ms(rig, since_us):
+    """The longest time between two setpoints of one wheel on the bus, until now."""
+    until_us = now_us()
+    gaps = []
+    for wheel in (LEFT, RIGHT):
+        times = [since_us] + [t_us for t_us, id_, _ in rig.bus.setpoints(since_us) if id_ == wheel and t_us < until_us]
+        gaps += [after - before for before, after in zip(times, times[1:] + [until_us])]
+    return max(gaps) / 1000
 
+
+def braking_ms(rig, since_us, seconds=2):
+    """How long after this time the first setpoint was on the bus that is nearer to zero than the one before it of that wheel."""
     def found():
-        return next((t_us for t_us, _, speed in rig.bus.setpoints(since_us) if abs(speed) < before), None)
+        last = {}
+        for t_us, wheel, speed in rig.bus.setpoints():
+            if t_us >= since_us and abs(speed) < last.get(wheel, 0):
+                return t_us
+            last[wheel] = abs(speed)
+        return None
 
     return (until(found, seconds, "the wheels are told to brake") - since_us) / 1000

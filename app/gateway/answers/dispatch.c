@@ -8,6 +8,7 @@
 #include "wheels/wheels.h"
 
 #include "iwheel_linux/clock.h"
+#include "iwheel_northbound/refuse.h"
 
 #include <string.h>
 
@@ -89,10 +90,11 @@ static void do_arm(const gw_call_t *call) {
 }
 
 void gw_dispatch_arming(gw_answers_t *self, const iw_snapshot_t *seen) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    const gw_clients_t *clients = self->clients;
+    for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
         gw_client_t *client = &self->clients->client[i];
         const bool holds = seen->holder == client->id;
-        if (client->id == IW_CLIENT_NONE || !client->arming || (holds && seen->arming)) {
+        if (!client->arming || (holds && seen->arming)) {
             continue;
         }
         client->arming = false;
@@ -213,37 +215,15 @@ static void do_reset(const gw_call_t *call) {
     reply_state(call);
 }
 
-/// What was in force before a tare.
-typedef struct {
-    iw_offset_provenance_t provenance;
-    iw_time_us_t offset_us;
-    int32_t offset_mN;
-} zero_t;
-
-static zero_t zero_of(const iw_force_t *force) {
-    return (zero_t){.provenance = force->provenance, .offset_us = force->offset_us, .offset_mN = force->offset_mN};
-}
-
-/// The zero of one wheel after a tare, and before.
-static void write_tare(const iw_force_t *force, const iw_force_quality_t *quality, const zero_t *before,
-                       iwn_out_t *json) {
-    iwn_out_int(json, "offset_mN", force->offset_mN);
-    iwn_out_int(json, "samples", quality->samples);
-    iwn_out_int(json, "deviation_mN", quality->deviation_mN);
-    iwn_out_int(json, "drift_mN", quality->drift_mN);
-    iwn_out_known(json, "before_mN", before->provenance != IW_OFFSET_NONE, before->offset_mN);
-    iwn_out_text(json, "before_provenance", iwn_offset_word(before->provenance, before->offset_us));
-}
-
 static void do_tare(const gw_call_t *call) {
     gw_knowledge_t *knowledge = call->answers->knowledge;
     const iw_snapshot_t seen = gw_wheels_look(call->answers->wheels);
-    const zero_t before[IW_SIDES] = {zero_of(seen.wheel[IW_LEFT].force), zero_of(seen.wheel[IW_RIGHT].force)};
+    const iw_force_t before[IW_SIDES] = {*seen.wheel[IW_LEFT].force, *seen.wheel[IW_RIGHT].force};
     iw_side_t refused = IW_LEFT;
     const iw_tare_t result = gw_knowledge_tare(knowledge, call->request->sides, &refused);
     if (result != IW_TARE_OK) {
         iwn_refusal_t words;
-        gw_refuse_describe_tare(refused, result, &words);
+        iwn_refuse_describe_tare(refused, result, &words);
         send_refusal(call, &words);
         return;
     }
@@ -253,7 +233,7 @@ static void do_tare(const gw_call_t *call) {
         if ((call->request->sides & (1U << side)) != 0U) {
             note(call, &(blackbox_entry_t){.kind = BLACKBOX_TARE, .a = (uint8_t)side, .b = (uint8_t)result});
             iwn_out_open(&json, (side == IW_LEFT) ? "left" : "right", '{');
-            write_tare(seen.wheel[side].force, &knowledge->tare[side], &before[side], &json);
+            iwn_tell_tare(seen.wheel[side].force, &knowledge->tare[side], &before[side], &json);
             iwn_out_close(&json, '}');
         }
     }
@@ -276,6 +256,13 @@ static void do_confirm(const gw_call_t *call) {
     iwn_out_text(&json, "item", iwn_ledger_item_name(request->item));
     gw_knowledge_write_item(knowledge, request->item, &json);
     gw_clients_send_reply(call->client, &json);
+}
+
+/// A file that an administrator writes is not to be changed by whoever may drive.
+static void do_config(const gw_call_t *call) {
+    const iwn_refusal_t refusal = {IWN_DENIED, "this gateway's configuration is a file: change it, look at it with "
+                                               "iwheel-gateway --check -c FILE, and start the gateway again"};
+    send_refusal(call, &refusal);
 }
 
 static void do_why(const gw_call_t *call) {
@@ -310,6 +297,7 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
         [IWN_CMD_CONFIRM] = do_confirm,
         [IWN_CMD_RECORDINGS] = gw_recordings_ask,
         [IWN_CMD_RECORDING] = gw_recordings_ask,
+        [IWN_CMD_CONFIG] = do_config,
     };
     gw_answers_t *self = (gw_answers_t *)context;
     iwn_request_t request;

@@ -54,9 +54,6 @@ void gw_refuse_describe(const gw_answers_t *answers, const iwn_request_t *reques
 /// watch may ask for what moves nothing and for what stops.
 bool gw_refuse_by_right(const gw_answers_t *answers, gw_right_t right, iwn_cmd_t cmd, iwn_refusal_t *out_refusal);
 
-/// The same for a tare of that wheel.
-void gw_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *out_refusal);
-
 /// Recordings for clients: passed on to the process that reads them (disk/box_files.h), answered when it answers.
 ///
 /// Nothing waits for it, not even later requests of the same client: a stop behind a slow disk is carried out at once. So a client has

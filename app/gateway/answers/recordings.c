@@ -61,9 +61,9 @@ static void pass_on(gw_clients_t *clients, const gw_box_answer_t *answer) {
 }
 
 static void give_up(gw_clients_t *clients) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
         gw_client_t *client = &clients->client[i];
-        if (client->id != IW_CLIENT_NONE && client->reading) {
+        if (client->reading) {
             settle(client);
             refuse(clients, client, &client->read_id, IWN_DENIED,
                    "the process that reads recordings has ended; ask again after 10 s");

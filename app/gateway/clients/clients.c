@@ -4,7 +4,7 @@
 #include "iwheel_northbound/tell.h"
 
 gw_client_t *gw_clients_find(gw_clients_t *self, iw_client_t id) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX && id != IW_CLIENT_NONE; i++) {
+    for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         if (self->client[i].id == id) {
             return &self->client[i];
         }
@@ -17,11 +17,11 @@ uint32_t gw_clients_count(const gw_clients_t *self) {
 }
 
 static bool watches(const gw_client_t *client, iwn_topic_t topic) {
-    return client->id != IW_CLIENT_NONE && (client->topics & (1U << topic)) != 0U;
+    return (client->topics & (1U << topic)) != 0U;
 }
 
 bool gw_clients_anybody_watches(const gw_clients_t *self, iwn_topic_t topic) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         if (watches(&self->client[i], topic)) {
             return true;
         }
@@ -36,7 +36,8 @@ iwn_out_t gw_clients_begin_event(gw_clients_t *self, const char *name) {
 void gw_clients_send_event(gw_clients_t *self, iwn_out_t *json, iwn_topic_t topic) {
     iwn_out_close(json, '}');
     const size_t length = iwn_out_finish(json);
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX && length > 0U; i++) {
+    for (uint32_t i = (length > 0U) ? gw_clients_from(self, 0U) : GW_CLIENTS_MAX; i < GW_CLIENTS_MAX;
+         i = gw_clients_from(self, i + 1U)) {
         if (watches(&self->client[i], topic)) {
             gw_client_event(&self->client[i], json->data, length);
         }

@@ -15,6 +15,7 @@ struct gw_log;
 #define GW_DRIVERS_MAX  64U
 #define GW_WATCHERS_MAX 64U
 #define GW_CLIENTS_MAX  (GW_DRIVERS_MAX + GW_WATCHERS_MAX)
+_Static_assert(GW_DRIVERS_MAX == 64U && GW_WATCHERS_MAX == 64U, "a word has a bit for each slot of one right");
 
 /// What is done for a client beside reading and sending. Each is called with `context`.
 typedef struct gw_servant {
@@ -30,6 +31,7 @@ typedef struct gw_clients {
     gw_listener_t listener[GW_RIGHTS];
     uint32_t most[GW_RIGHTS];         ///< Connections, by the configuration.
     uint32_t count[GW_RIGHTS];        ///< The same that are open.
+    uint64_t open[GW_RIGHTS];         ///< The same: a bit for each slot that is taken.
     uint32_t next_served[GW_RIGHTS];  ///< Slot where the next round begins.
     uint32_t next_flushed[GW_RIGHTS]; ///< The same of sending.
     iw_client_t last_id;
@@ -47,6 +49,17 @@ gw_client_t *gw_clients_find(gw_clients_t *self, iw_client_t id);
 
 /// Open connections.
 uint32_t gw_clients_count(const gw_clients_t *self);
+
+/// The first slot from this one on with an open connection; GW_CLIENTS_MAX: there is none. Free slots cost nothing.
+static inline uint32_t gw_clients_from(const gw_clients_t *self, uint32_t slot) {
+    for (; slot < GW_CLIENTS_MAX; slot = (slot / GW_DRIVERS_MAX + 1U) * GW_DRIVERS_MAX) {
+        const uint64_t open = self->open[slot / GW_DRIVERS_MAX] >> (slot % GW_DRIVERS_MAX);
+        if (open != 0U) {
+            return slot + (uint32_t)__builtin_ctzll(open);
+        }
+    }
+    return GW_CLIENTS_MAX;
+}
 
 bool gw_clients_anybody_watches(const gw_clients_t *self, iwn_topic_t topic);
 
@@ -72,16 +85,7 @@ size_t gw_clients_write_refusal(gw_clients_t *self, const iwn_id_t *id, const iw
 /// Serving the clients: accept, read, carry out, flush, close. Bounded work for each of them in each cycle.
 ///
 /// What a descriptor in the epoll set stands for; a client's tag is GW_TAG_CLIENT plus its slot.
-enum {
-    GW_TAG_TIMER = 0,
-    GW_TAG_SIGNAL,
-    GW_TAG_LISTENER,
-    GW_TAG_WATCH_LISTENER,
-    GW_TAG_BUS,
-    GW_TAG_ESTOP,
-    GW_TAG_BOX,
-    GW_TAG_CLIENT
-};
+enum { GW_TAG_SIGNAL = 0, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER, GW_TAG_BUS, GW_TAG_ESTOP, GW_TAG_BOX, GW_TAG_CLIENT };
 
 /// Lines of one client that are carried out in one cycle.
 #define GW_LINES_PER_CYCLE 4U

@@ -21,7 +21,7 @@ static const char *option_of(const gw_listener_t *self) {
 
 /// `cure` ends where the option's name belongs.
 static int complain(const gw_listener_t *self, FILE *err, const char *what, const char *cure) {
-    (void)fprintf(err, "iwheel-gateway: socket %s: %s; %s %s\n", self->wish.path, what, cure, option_of(self));
+    (void)fprintf(err, "%s: socket %s: %s; %s %s\n", self->wish.program, self->wish.path, what, cure, option_of(self));
     return EX_UNAVAILABLE;
 }
 
@@ -63,9 +63,9 @@ int gw_listener_prepare(gw_listener_t *self, const gw_listener_wish_t *wish, FIL
     }
     if (self->folder.shared) {
         (void)fprintf(err,
-                      "iwheel-gateway: warning: socket %s: while no gateway runs, anybody can put another socket there "
+                      "%s: warning: socket %s: while no gateway runs, anybody can put another socket there "
                       "and answer for it; for more than a trial choose a directory of its own with %s\n",
-                      path, option_of(self));
+                      wish->program, path, option_of(self));
     }
     return 0;
 }

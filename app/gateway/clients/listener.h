@@ -38,6 +38,7 @@ typedef enum {
 
 /// What a socket is to be, by the configuration. The texts must outlive the listener.
 typedef struct {
+    const char *program; ///< Whose it is, for complaints.
     gw_right_t right;
     const char *path;  ///< "none": there is none.
     const char *group; ///< Owner group; "none": the gateway's own.

@@ -32,6 +32,7 @@ static void welcome(gw_clients_t *self, gw_client_t *client, int fd) {
     client->drained = true;
     client->caught_up_us = self->now_us;
     self->count[client->right]++;
+    self->open[client->right] |= UINT64_C(1) << (slot % GW_DRIVERS_MAX);
     gw_log(self->log, GW_LOG_DEBUG, "client %u (pid %d) connected", (unsigned)client->id, client->pid);
     self->servant.welcome(self->servant.context, client);
 }
@@ -127,6 +128,7 @@ static void release(gw_clients_t *self, gw_client_t *client) {
     client->id = IW_CLIENT_NONE;
     client->topics = 0;
     self->count[client->right]--;
+    self->open[client->right] &= ~(UINT64_C(1) << ((size_t)(client - self->client) % GW_DRIVERS_MAX));
 }
 
 static void refuse_long_line(gw_clients_t *self, gw_client_t *client) {
@@ -206,11 +208,12 @@ typedef struct {
 /// Those with one right, from where their last round ended, until the time is up. At least one of them is served. True if all
 /// were.
 static bool go_among(gw_clients_t *self, round_t *round, gw_right_t right, uint32_t *next) {
-    const uint32_t slots = part[right].slots;
-    const uint32_t first = *next;
+    const uint64_t behind = UINT64_MAX << *next;
+    uint64_t left = self->open[right];
     bool worked = false;
-    for (uint32_t i = 0; i < slots && self->count[right] > 0U; i++) {
-        const uint32_t slot = (first + i < slots) ? first + i : first + i - slots;
+    while (left != 0U) {
+        const uint32_t slot = (uint32_t)__builtin_ctzll(((left & behind) != 0U) ? left & behind : left);
+        left &= ~(UINT64_C(1) << slot);
         gw_client_t *client = &self->client[part[right].first + slot];
         const iw_time_us_t now_us = worked ? iw_clock_now_us() : 0U;
         round->end_us = (round->end_us == 0U && worked) ? now_us + GW_ROUND_US : round->end_us;
@@ -218,7 +221,7 @@ static bool go_among(gw_clients_t *self, round_t *round, gw_right_t right, uint3
             *next = slot;
             return false;
         }
-        worked = (client->id != IW_CLIENT_NONE && client != round->holder && round->service(self, client)) || worked;
+        worked = (client != round->holder && round->service(self, client)) || worked;
     }
     return true;
 }
@@ -244,9 +247,9 @@ static bool serve_if_wanted(gw_clients_t *self, gw_client_t *client) {
 
 void gw_service_clients(gw_clients_t *self, iw_client_t holder) {
     self->some_wait = !go_round(self, holder, serve_if_wanted, self->next_served);
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         gw_client_t *client = &self->client[i];
-        if (client->id != IW_CLIENT_NONE && !client->readable) {
+        if (!client->readable) {
             gw_client_note_caught_up(client, self->now_us);
         }
     }
@@ -294,8 +297,8 @@ void gw_service_flush(gw_clients_t *self, iw_client_t holder) {
 }
 
 bool gw_service_is_busy(const gw_clients_t *self) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
-        if (self->client[i].id != IW_CLIENT_NONE && has_turn(self, &self->client[i])) {
+    for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
+        if (has_turn(self, &self->client[i])) {
             return true;
         }
     }
@@ -308,13 +311,12 @@ iw_time_us_t gw_service_next_us(const gw_clients_t *self) {
         const iw_time_us_t from_us = self->listener[right].from_us;
         next_us = (from_us != 0U && from_us < next_us) ? from_us : next_us;
     }
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         const gw_client_t *client = &self->client[i];
-        if (client->id != IW_CLIENT_NONE && client->closing && client->close_us < next_us) {
+        if (client->closing && client->close_us < next_us) {
             next_us = client->close_us;
         }
-        if (client->id != IW_CLIENT_NONE && client->right == GW_WATCH && client->line_us < next_us &&
-            has_line(client)) {
+        if (client->right == GW_WATCH && client->line_us < next_us && has_line(client)) {
             next_us = client->line_us;
         }
     }
@@ -322,9 +324,7 @@ iw_time_us_t gw_service_next_us(const gw_clients_t *self) {
 }
 
 void gw_service_close_all(gw_clients_t *self) {
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
-        if (self->client[i].id != IW_CLIENT_NONE) {
-            release(self, &self->client[i]);
-        }
+    for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
+        release(self, &self->client[i]);
     }
 }

@@ -84,7 +84,10 @@ void gw_knowledge_observe(gw_knowledge_t *self, const iw_snapshot_t *seen) {
     if (!self->answered) {
         return;
     }
-    for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+    const bool observed = self->observed && seen->assumed_changes == self->observed_changes;
+    self->observed = true;
+    self->observed_changes = seen->assumed_changes;
+    for (unsigned item = 0; item < IW_LEDGER_ITEMS && !observed; item++) {
         observe_item(self, (iw_ledger_item_t)item, &seen->assumed[item]);
     }
     observe_offset(self, IW_LEFT, seen->wheel[IW_LEFT].force);

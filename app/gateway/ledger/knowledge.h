@@ -73,6 +73,8 @@ typedef struct gw_knowledge {
     size_t kept_length;
     int error;                          ///< Of GW_MEMORY_FAILED.
     bool answered;                      ///< The keeper has, or our patience has ended: changes are told.
+    bool observed;                      ///< Changes of the ledger have been noted, up to this one:
+    uint32_t observed_changes;          ///< As `iw_snapshot_t::assumed_changes`.
     bool changed;                       ///< Since the last write.
     char reason[GW_MEMORY_REASON_SIZE]; ///< Why the file found at the start is ignored; empty: it is not.
     char path[GW_PATH_SIZE + 128U];

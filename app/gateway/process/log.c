@@ -21,7 +21,8 @@ static const char *const level_names[GW_LOG_LEVELS] = {"error", "warning", "info
 
 void gw_log_open(gw_log_t *self, gw_log_level_t level) {
     struct stat status;
-    *self = (gw_log_t){.credit_us = iw_clock_now_us(), .credit = BURST_LINES, .level = level};
+    *self =
+        (gw_log_t){.program = "iwheel-gateway", .credit_us = iw_clock_now_us(), .credit = BURST_LINES, .level = level};
     self->socket = fstat(STDERR_FILENO, &status) == 0 && S_ISSOCK(status.st_mode);
     self->fd = open("/proc/self/fd/2", O_WRONLY | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     if (self->fd < 0) {
@@ -66,7 +67,7 @@ void gw_log(gw_log_t *self, gw_log_level_t level, const char *format, ...) {
         self->dropped++;
         return;
     }
-    int length = snprintf(raw, sizeof raw, "iwheel-gateway: %s: ", level_names[level]);
+    int length = snprintf(raw, sizeof raw, "%s: %s: ", self->program, level_names[level]);
     if (self->dropped > 0U) {
         length += snprintf(&raw[length], sizeof raw - (size_t)length, "(%u lines dropped before this one) ",
                            (unsigned)self->dropped);

@@ -10,6 +10,7 @@
 typedef enum { GW_LOG_ERROR = 0, GW_LOG_WARNING, GW_LOG_INFO, GW_LOG_DEBUG, GW_LOG_LEVELS } gw_log_level_t;
 
 typedef struct gw_log {
+    const char *program;    ///< Whose lines they are; iwheel-gateway, unless changed after opening.
     iw_time_us_t credit_us; ///< Tokens were last added then.
     uint32_t credit;        ///< Lines that may still pass.
     uint32_t dropped;

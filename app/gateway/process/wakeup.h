@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: MIT
-/// The timer that ends a wait. It is set anew only if it would wake too late, or has woken: too early costs one look, setting
-/// it in every cycle one system call for each frame.
+/// The wait of the loop, until a descriptor has something to tell or a time has come: one system call that carries the
+/// deadline, precise to microseconds.
 #ifndef GATEWAY_WAKEUP_H
 #define GATEWAY_WAKEUP_H
 
 #include "iwheel/types.h"
 
+struct epoll_event;
+
 typedef struct {
-    int fd;              ///< To wait for; readable once the time has come.
-    iw_time_us_t due_us; ///< What it is set to; IW_NEVER: it has woken, or was never set.
+    int fd;         ///< The epoll set that is waited for.
+    bool two_calls; ///< The kernel (before 5.11) has no wait with such a deadline: one call waits, a second one looks.
 } gw_wakeup_t;
 
+/// An epoll set with nothing in it yet. The process asks the kernel to be woken without slack, which is 50 us elsewhere.
 /// 0, or an errno.
 int gw_wakeup_open(gw_wakeup_t *self);
 void gw_wakeup_close(gw_wakeup_t *self);
 
-/// Wakes no later than at this time of CLOCK_MONOTONIC; one that is past wakes at once. IW_NEVER is allowed. Returns whether it
-/// had to be set, which also takes back that it has woken.
-bool gw_wakeup_by(gw_wakeup_t *self, iw_time_us_t next_us);
-
-/// The wait has told that it has woken.
-void gw_wakeup_came(gw_wakeup_t *self);
+/// As epoll_wait, until this time of CLOCK_MONOTONIC, never sooner without an event: IW_NEVER waits for ever, one that is
+/// past only looks.
+int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t until_us);
 
 #endif

@@ -155,6 +155,7 @@ static void judge_machine(const gateway_config_t *config, inspect_findings_t *fi
     inspect_listen(&hal, LISTEN_US, &heard);
     if (opened.bus) {
         inspect_link(iw_linux_hal_link(&hal), &wish, findings);
+        inspect_room(iw_linux_hal_link(&hal), findings);
         inspect_bus(iw_linux_hal_link(&hal), &heard, &wish, findings);
     }
     if (opened.estop) {

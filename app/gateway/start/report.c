@@ -44,8 +44,8 @@ inspect_wish_t gw_report_wish(const gateway_config_t *config) {
 }
 
 gw_listener_wish_t gw_report_socket(const gateway_config_t *config, gw_right_t right) {
-    return (right == GW_DRIVE) ? (gw_listener_wish_t){right, config->northbound.socket, config->northbound.group,
-                                                      config->northbound.mode}
-                               : (gw_listener_wish_t){right, config->northbound.watch_socket,
+    return (right == GW_DRIVE) ? (gw_listener_wish_t){"iwheel-gateway", right, config->northbound.socket,
+                                                      config->northbound.group, config->northbound.mode}
+                               : (gw_listener_wish_t){"iwheel-gateway", right, config->northbound.watch_socket,
                                                       config->northbound.watch_group, config->northbound.watch_mode};
 }

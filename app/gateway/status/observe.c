@@ -208,14 +208,15 @@ void gw_observe(gw_status_t *self, const iw_snapshot_t *seen) {
 }
 
 static bool wants_periodic(const gw_client_t *client) {
-    return client->id != IW_CLIENT_NONE && !client->closing && !client->ended &&
+    return !client->closing && !client->ended &&
            (client->topics & ((1U << IWN_TOPIC_STATE) | (1U << IWN_TOPIC_FORCE))) != 0U;
 }
 
 /// Written once, for all who are due and watch the topic.
 static void send_periodic(gw_status_t *self, iwn_topic_t topic) {
     size_t length = 0;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    const gw_clients_t *clients = self->clients;
+    for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
         if (!self->clients->client[i].due || (self->clients->client[i].topics & (1U << topic)) == 0U) {
             continue;
         }
@@ -234,8 +235,9 @@ static void send_periodic(gw_status_t *self, iwn_topic_t topic) {
 }
 
 void gw_observe_periodic(gw_status_t *self) {
+    const gw_clients_t *clients = self->clients;
     bool any = false;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
         gw_client_t *client = &self->clients->client[i];
         client->due = wants_periodic(client) && self->wheels->now_us >= client->next_us;
         if (client->due) {
@@ -255,7 +257,7 @@ void gw_observe_periodic(gw_status_t *self) {
 
 iw_time_us_t gw_observe_next_us(const gw_clients_t *clients) {
     iw_time_us_t next_us = IW_NEVER;
-    for (uint32_t i = 0; i < GW_CLIENTS_MAX; i++) {
+    for (uint32_t i = gw_clients_from(clients, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(clients, i + 1U)) {
         const gw_client_t *client = &clients->client[i];
         if (wants_periodic(client) && client->next_us < next_us) {
             next_us = client->next_us;

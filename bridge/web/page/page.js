@@ -273,18 +273,25 @@ function show() {
 
 // ---- STOP ---------------------------------------------------------------------------------------------------------
 
-// Repeated until the gateway answers. Says loudly, and goes on saying, that it did not.
+// Repeated until the gateway answers. Says loudly, and goes on saying, that it did not. The second control takes the place of a stop that is
+// not delivered yet, never the other way round.
 async function deliver(name) {
+  deliver.verb = deliver.busy && deliver.verb === "estop" ? "estop" : name;
   if (deliver.busy) return;
   deliver.busy = true;
   let times = 0, why = "";
   tell(STRINGS.stopping_now);
   for (;;) {
     times++;
+    const asked = deliver.verb;
     try {
-      const answer = await ask("POST", `/api/${name}`, { signal: AbortSignal.timeout(STOP_TRY_MS), keepalive: true });
+      const answer = await ask("POST", `/api/${asked}`, { signal: AbortSignal.timeout(STOP_TRY_MS), keepalive: true });
       const body = await answer.json();
-      if (answer.ok) { tell(fill(STRINGS.delivered, { state: STRINGS.states[body.state] ?? body.state }), "good"); break; }
+      if (answer.ok) {
+        tell(fill(STRINGS.delivered, { state: STRINGS.states[body.state] ?? body.state }), "good");
+        if (asked === deliver.verb) break;
+        continue;
+      }
       why = body.message;
       if (answer.status === 401) { notDelivered(why, times); break; }
     } catch {
@@ -584,7 +591,9 @@ function setUp() {
   $("at").setAttribute("aria-label", STRINGS.player_label);
   $("source").textContent = STRINGS.source_live;
   setUpDriving();
-  $("stop").addEventListener("click", () => { release(STRINGS.why_let_go); deliver("stop"); });
+  const press = () => { release(STRINGS.why_let_go); deliver("stop"); };
+  $("stop").addEventListener("pointerdown", press); // When it is touched, not when the finger leaves it.
+  $("stop").addEventListener("click", (event) => { if (event.detail === 0) press(); }); // By Enter, or by a screen reader.
   $("estop-ask").addEventListener("click", async () => { if (await confirmed(STRINGS.ask_estop, STRINGS.ask_estop_yes)) deliver("estop"); });
   $("reset").addEventListener("click", async () => {
     if (!(await confirmed(STRINGS.ask_reset, STRINGS.ask_reset_yes))) return;

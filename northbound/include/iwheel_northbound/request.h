@@ -16,6 +16,7 @@
 #define IWN_NAME_MAX        64U  ///< Bytes of a client's name.
 #define IWN_REASON_MAX      200U ///< Bytes of the reason of an estop.
 #define IWN_FILE_MAX        63U  ///< Bytes of the name of a recording's file.
+#define IWN_KEY_MAX         40U  ///< Bytes of a key of the configuration.
 #define IWN_RATE_MAX_HZ     100  ///< The highest rate of events that is given.
 #define IWN_RATE_DEFAULT_HZ 10   ///< The rate where none is asked for.
 
@@ -36,8 +37,12 @@ typedef enum {
     IWN_CMD_CONFIRM,
     IWN_CMD_RECORDINGS,
     IWN_CMD_RECORDING,
+    IWN_CMD_CONFIG,
     IWN_CMDS,
 } iwn_cmd_t;
+
+/// True for what a client may ask that only watches: it looks, stops and e-stops.
+bool iwn_cmd_watches(iwn_cmd_t cmd);
 
 /// Of what type the id of a request is.
 typedef enum { IWN_ID_NONE = 0, IWN_ID_NUMBER, IWN_ID_TEXT } iwn_id_kind_t;
@@ -63,14 +68,17 @@ typedef struct {
     int64_t offset;                   ///< Of recording, in bytes; may be negative.
     bool has_current;                 ///< Both currents were given.
     bool takeover;                    ///< Of arm.
+    bool has_commit;                  ///< Of config: `commit` was given.
+    bool commit;                      ///< Of config, with `has_commit`.
     uint8_t topics;                   ///< Bit per iwn_topic_t.
     uint8_t sides;                    ///< IW_SIDES_..., of tare.
     iw_ledger_item_t item;            ///< Of confirm.
-    char value[IWN_VALUE_SIZE];       ///< Of confirm, a number in decimal digits; empty: not given.
+    char value[IWN_VALUE_SIZE];       ///< Of confirm and config, a number in decimal digits; empty: not given.
     char how[IWN_HOW_SIZE];           ///< Of confirm; empty: not given.
     char name[IWN_NAME_MAX + 1U];     ///< Empty: not given.
     char reason[IWN_REASON_MAX + 1U]; ///< Empty: not given.
     char file[IWN_FILE_MAX + 1U];     ///< The name that recording asks for.
+    char key[IWN_KEY_MAX + 1U];       ///< Of config; empty: not given.
 } iwn_request_t;
 
 /// Why not: the name, and cause and cure in words.

@@ -111,6 +111,10 @@ void iwn_tell_terms(const iw_snapshot_t *seen, const iwn_surroundings_t *around,
 /// The reply to `watch`: a bit for each iwn_topic_t, and the rate that was granted.
 void iwn_tell_watched(uint8_t topics, uint32_t rate_hz, bool limited, iwn_out_t *json);
 
+/// The zero of one wheel after a tare, over which window it was taken, and the one before.
+void iwn_tell_tare(const iw_force_t *force, const iw_force_quality_t *window, const iw_force_t *before,
+                   iwn_out_t *json);
+
 /// What was found wrong at the start, in sentences.
 void iwn_tell_warnings(const iwn_surroundings_t *around, iwn_out_t *json);
 

@@ -56,6 +56,10 @@ int iw_bus_fd(const iw_backend_store_t *store) {
     return seen(store)->watch_fd;
 }
 
+void iw_bus_waited(iw_backend_store_t *store, bool told) {
+    bus_of(store)->quiet = !told;
+}
+
 iw_time_us_t iw_bus_next_us(const iw_backend_store_t *store) {
     return seen(store)->look_us;
 }

@@ -50,7 +50,8 @@ typedef struct {
     uint32_t others_left;    ///< Until `others_us`.
     uint32_t errors_left;
     int watch_fd;
-    bool up; ///< Frames can pass.
+    bool up;    ///< Frames can pass.
+    bool quiet; ///< The last wait has found nothing at `watch_fd`.
 } iw_bus_t;
 
 /// A kind of bus: nothing of it is on a frame's way. The functions mean what those of backend.h do.

@@ -60,8 +60,9 @@ int iw_linux_hal_estop_fd(const iw_linux_hal_t *self) {
     return self->estop_ops->present ? self->estop_ops->watch_fd(&self->estop) : -1;
 }
 
-void iw_linux_hal_waited(iw_linux_hal_t *self, bool estop_told) {
-    self->estop_quiet = !estop_told;
+void iw_linux_hal_waited(iw_linux_hal_t *self, iw_linux_told_t told) {
+    self->estop_quiet = !told.estop;
+    iw_bus_waited(&self->bus, told.bus);
 }
 
 void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us) {

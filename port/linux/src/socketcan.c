@@ -58,6 +58,7 @@ static void note_link(iw_bus_t *bus, const iw_bus_link_t *reading) {
     bus->link.purge = before.purge;
     bus->link.changes = before.changes + 1U;
     bus->link.lost = before.lost;
+    bus->link.room_bytes = before.room_bytes;
     bus->link.load_permille = before.load_permille;
 }
 
@@ -78,6 +79,7 @@ static bool open_sockets(socketcan_t *can, int interface) {
         iw_socketcan_socket_open(&can->bus.others, interface, IW_SOCKETCAN_OTHERS) == 0 &&
         epoll_ctl(can->bus.watch_fd, EPOLL_CTL_ADD, can->bus.ours.fd, &interest) == 0) {
         can->interface = interface;
+        can->bus.link.room_bytes = iw_socketcan_socket_room(&can->bus.ours);
         return true;
     }
     close_sockets(can);
@@ -196,7 +198,7 @@ static void can_tend(iw_bus_t *bus) {
     }
     if (bus->up && iw_socketcan_socket_is_empty(&bus->ours)) {
         iw_bus_fill(bus);
-        if (bus->up && bus->ours.count == 0U) {
+        if (bus->up && bus->ours.count == 0U && !bus->quiet) {
             (void)iw_netlink_take_events(&can->events); // Not needed while up, but unread they would wake us for ever.
         }
     }

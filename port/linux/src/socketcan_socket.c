@@ -7,11 +7,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// Asked for. The kernel gives no more than net.core.rmem_max, and counts twice; as a rule that is twice of what a
-/// socket has anyway, and a full bus fills it in 26 ms.
-#define QUEUE_BYTES (400 * 1024)
-/// More than fits into that queue, at half a kilobyte for each frame.
-#define DROP_BATCHES_MAX 64
+/// More than fits into the room that is asked for, at half a kilobyte for each frame.
+#define DROP_BATCHES_MAX 512
 /// Marks that the hub sets in a frame's `__res0`: an echo of ours, or an error frame that another client made.
 #define MARK_ECHO   1U
 #define MARK_FORGED 2U
@@ -65,7 +62,7 @@ int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_sock
         return errno;
     }
     (void)set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1); // Without it FD frames are not seen, and so not counted.
-    (void)set(fd, SOL_SOCKET, SO_RCVBUF, QUEUE_BYTES);
+    (void)set(fd, SOL_SOCKET, SO_RCVBUF, (int)IW_LINK_ROOM_BYTES);
     if (!ask_for(fd, share) || bind(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
         const int error = errno;
         (void)close(fd);
@@ -73,6 +70,12 @@ int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_sock
     }
     iw_socketcan_socket_use(self, fd, false);
     return 0;
+}
+
+uint32_t iw_socketcan_socket_room(const iw_socketcan_socket_t *self) {
+    int room = 0;
+    socklen_t length = sizeof room;
+    return (getsockopt(self->fd, SOL_SOCKET, SO_RCVBUF, &room, &length) == 0) ? (uint32_t)room : 0U;
 }
 
 void iw_socketcan_socket_close(iw_socketcan_socket_t *self) {

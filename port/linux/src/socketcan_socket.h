@@ -76,6 +76,9 @@ void iw_socketcan_socket_use(iw_socketcan_socket_t *self, int fd, bool is_hub);
 /// Opens it, not blocking, on the interface with this index. IW_SOCKETCAN_OURS: with error frames, FD frames and own
 /// echoes. 0, or an errno.
 int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_socketcan_share_t share);
+
+/// `room_bytes` of the link: what the kernel has granted of IW_LINK_ROOM_BYTES, counted twice. 0: unknown.
+uint32_t iw_socketcan_socket_room(const iw_socketcan_socket_t *self);
 void iw_socketcan_socket_close(iw_socketcan_socket_t *self);
 
 /// True if all that was taken has been used.

@@ -456,3 +456,23 @@ class Piece(TypedDict):
     """CRC-32 (as zlib's) of these bytes"""
     file_crc32: Optional[int]
     """of the whole file; None unless this is its last piece"""
+
+
+class ConfiguredEntry(TypedDict):
+    """A key of the configuration."""
+
+    key: str
+    """section.key, as in the configuration file"""
+    value: Optional[str]
+    """as staged, else as in force; None: not set"""
+
+
+class Configured(TypedDict):
+    """The reply to `config`."""
+
+    keys: List[ConfiguredEntry]
+    """all there are"""
+    staged: bool
+    """something is staged and not committed"""
+    restarts: bool
+    """it was committed, and the gateway starts anew"""

@@ -165,14 +165,45 @@ class Flood(Measure):
         return {"ticks": used, "sent": sent, "lost": sent - lines}
 
 
+class FloodLoaded(Flood):
+    """The same on a machine with other work: whoever has too little room loses frames while it waits for the processor."""
+
+    hogs = 4
+
+    def turn(self, candidate):
+        hogs = [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in range(self.hogs)]
+        try:
+            return super().turn(candidate)
+        finally:
+            for hog in hogs:
+                hog.kill()
+                hog.wait()
+
+
 class Calls(Measure):
     """System calls for each frame of the wheels' telemetry; reading a clock is none where the kernel maps it."""
 
-    candidates = ("gateway", "attended", "candump", "python_can")
+    candidates = ("driving", "gateway", "attended", "candump", "python_can")
 
     def begin(self):
         self.around.start_wheels()
         time.sleep(0.5)
+
+    def driving(self):
+        """The gateway while a client drives."""
+        self.around.start_gateway()
+        client = self.around.client()
+        self.around.arm(client)
+        client.drive(100, 100)
+        renewal = Renewal(client)
+        try:
+            time.sleep(0.7)
+            return self.trace(self.around.gateway.child.pid)
+        finally:
+            renewal.end()
+            client.request("stop")
+            client.close()
+            self.around.end_gateway()
 
     def trace(self, pid):
         seconds = self.plan["calls_s"]
@@ -203,7 +234,7 @@ class Calls(Measure):
             self.around.end_gateway()
 
     def attended(self):
-        """The gateway while a client is connected, so that each frame is taken at once."""
+        """The gateway while a client is connected and watches no frames."""
         self.around.start_gateway()
         client = self.around.client()
         time.sleep(1.0)
@@ -411,4 +442,4 @@ class Estop(Measure):
             self.around.end_gateway()
 
 
-MEASURES = {"period_idle": Period, "period_loaded": PeriodLoaded, "flood": Flood, "calls": Calls, "line": Line, "told": Told, "estop": Estop}
+MEASURES = {"period_idle": Period, "period_loaded": PeriodLoaded, "flood": Flood, "flood_loaded": FloodLoaded, "calls": Calls, "line": Line, "told": Told, "estop": Estop}

@@ -60,6 +60,8 @@ class Surroundings:
         self.plan, self.folder = plan, os.getcwd()
         self.interface, self.gateway, self.wheels = "vcan0", None, None
         netdev.add_vcan(self.interface)
+        with open("/proc/sys/net/core/rmem_max", "w", encoding="ascii") as file:  # For all alike, as the package sets it.
+            file.write("4194304")
         self.chip = GpioChip("timed", "ESTOP")
         self.chip.pull(True)
         self.socket = os.path.join(self.folder, "gateway.sock")

@@ -8,6 +8,7 @@ from .lamp import Lamp
 
 BLOCK_SIZE = 0x400
 IRQ_EXTI0, IRQ_TRANSMIT, IRQ_RECEIVE, IRQ_ERROR = 6, 19, 20, 22
+IRQ_SERIAL_RECEIVE, IRQ_SERIAL_TRANSMIT, IRQ_SERIAL = 16, 17, 38
 
 
 class Board:
@@ -25,6 +26,8 @@ class Board:
         machine.clocks = self.clocks(machine)
         machine.clocks.crystal_hz = self.crystal_hz or machine.clocks.crystal_hz
         machine.exti, machine.watchdog, machine.uart = chip.Exti(), chip.Watchdog(self.lsi_hz), chip.Uart(machine)
+        machine.dma, machine.flash = self.dma(machine), self.flash(machine)
+        machine.map_flash(machine.flash)
         for name in self.ports:
             setattr(machine, name, self.port())
         machine.can = Controller(machine)
@@ -37,7 +40,7 @@ class Board:
 
     def reset(self, machine):
         machine.bus.chip_vanishes()
-        for part in (machine.clocks, machine.exti, machine.watchdog, machine.uart, machine.can, *(getattr(machine, name) for name in self.ports)):
+        for part in (machine.clocks, machine.exti, machine.watchdog, machine.uart, machine.dma, machine.flash, machine.can, *(getattr(machine, name) for name in self.ports)):
             part.reset()
         self.remap = 0
         machine.can_listens = False
@@ -66,6 +69,9 @@ class Board:
         lines = machine.can.lines()
         if machine.exti.line():
             yield IRQ_EXTI0
+        for device, irq in ((machine.dma.receive, IRQ_SERIAL_RECEIVE), (machine.dma.transmit, IRQ_SERIAL_TRANSMIT), (machine.uart, IRQ_SERIAL)):
+            if device.line():
+                yield irq
         if lines:
             for bit, irq in enumerate((IRQ_TRANSMIT, IRQ_RECEIVE, IRQ_ERROR)):
                 if lines >> bit & 1:
@@ -90,12 +96,13 @@ class Board:
             return port.read, lambda offset, value: self.write_port(port, offset, value)
         return {
             "rcc": (lambda offset: clocks.read(offset, machine.now_ns), self.write_clocks),
-            "flash": (lambda offset: clocks.acr, lambda offset, value: setattr(clocks, "acr", value)),
+            "flash": (machine.flash.read, machine.flash.write),
             "exti": (lambda offset: machine.exti.registers[offset], machine.exti.write),
             "selection": (lambda offset: machine.exti.selection if offset == 0x8 else self.remap, self.write_selection),
             "watchdog": (lambda offset: watchdog.read(offset, machine.now_ns),
                          lambda offset, value: watchdog.write(offset, value, machine.now_ns)),
             "uart": (machine.uart.read, machine.uart.write),
+            "dma": (machine.dma.read, machine.dma.write),
             "can": (machine.can.read, machine.can.write),
         }[name]
 
@@ -142,13 +149,14 @@ class Board:
 
 class Stm32f103(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32f103", arm.UC_CPU_ARM_CORTEX_M3, 14, 40_000, (30_000, 60_000)
+    dma, flash, unique_id_address = chip.DmaF1, chip.FlashF1, 0x1FFFF7E8
     clocks, port, lamp, remap_offset = chip.ClocksF1, chip.PortF1, ("port_c", 13, 0), 0x4
     ram_size = 20 * 1024
     blocks = {
         0x40021000: ("rcc", None), 0x40022000: ("flash", None), 0x40003000: ("watchdog", None),
         0x40010000: ("selection", (0x18, 0)), 0x40010400: ("exti", None), 0x40010800: ("port_a", (0x18, 2)),
         0x40010C00: ("port_b", (0x18, 3)), 0x40011000: ("port_c", (0x18, 4)), 0x40011400: ("port_d", (0x18, 5)),
-        0x40004400: ("uart", (0x1C, 17)), 0x40006400: ("can", (0x1C, 25)),
+        0x40020000: ("dma", (0x14, 0)), 0x40004400: ("uart", (0x1C, 17)), 0x40006400: ("can", (0x1C, 25)),
     }
 
     def is_mapped(self, transceiver):
@@ -159,13 +167,14 @@ class Stm32f103(Board):
 
 class Stm32f407(Board):
     name, cpu_model, banks, lsi_hz, lsi_limits_hz = "stm32f407", arm.UC_CPU_ARM_CORTEX_M4, 28, 32_000, (17_000, 47_000)
+    dma, flash, unique_id_address = chip.DmaF4, chip.FlashF4, 0x1FFF7A10
     clocks, port, lamp = chip.ClocksF4, chip.PortF4, ("port_d", 12, 1)
     ram_size = 128 * 1024
     blocks = {
         0x40023800: ("rcc", None), 0x40023C00: ("flash", None), 0x40003000: ("watchdog", None),
         0x40013800: ("selection", (0x44, 14)), 0x40013C00: ("exti", None), 0x40020000: ("port_a", (0x30, 0)),
         0x40020400: ("port_b", (0x30, 1)), 0x40020800: ("port_c", (0x30, 2)), 0x40020C00: ("port_d", (0x30, 3)),
-        0x40004400: ("uart", (0x40, 17)), 0x40006400: ("can", (0x40, 25)),
+        0x40026000: ("dma", (0x30, 21)), 0x40004400: ("uart", (0x40, 17)), 0x40006400: ("can", (0x40, 25)),
     }
 
 

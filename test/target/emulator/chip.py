@@ -291,7 +291,8 @@ class Exti:
 
 
 class Uart:
-    """USART2 with a terminal at its other end, without interrupts. `sent`: what the chip said; `send`: what somebody types."""
+    """USART2 with somebody at its other end. `sent`: what the chip said; `send`: what is said to it. Bytes pass one by one through DR, or
+    through the DMA; what the DMA carries is brought up to date whenever somebody looks."""
 
     baud = 115200
 
@@ -300,39 +301,310 @@ class Uart:
         self.reset()
 
     def reset(self):
-        self.brr = self.cr1 = 0
-        self.free_ns = self.came_ns = 0
+        self.brr = self.cr1 = self.cr3 = 0
+        self.free_ns = self.came_ns = 0 # The transmitter is free; the next byte from outside is there.
+        self.idle_ns, self.flags, self.noisy, self.said_sr = None, 0, 0, False
 
     def send(self, text):
+        if not self.typed:
+            self.came_ns = max(self.came_ns, self.chip.now_ns + self.byte_ns())
         self.typed += text
+
+    def disturb(self):
+        """The next byte from outside is damaged, and the chip sees noise."""
+        self.noisy += 1
 
     def byte_ns(self):
         return 10 * 10**9 // self.baud
 
+    def by_dma(self):
+        return self.cr3 & 0x40 and self.cr1 & 0x2004 == 0x2004
+
+    def check_line(self):
+        rate = self.chip.clocks.apb1_hz() / max(self.brr, 1)
+        self.chip.expect(abs(rate / self.baud - 1) < 0.02, f"the serial port runs at {rate:.0f} baud, not {self.baud}")
+        self.chip.expect(self.brr >= 16, "the serial port's clock is below 16 times its rate")
+        self.chip.expect(self.cr1 & 0x2008 == 0x2008, "the serial port's transmitter is off")
+        self.chip.expect(self.chip.board.uart_is_connected(), "the serial port is not on its pins")
+
+    def advance(self, now_ns):
+        """Bytes from outside go to memory, and a pause after them is seen."""
+        while self.typed and self.by_dma() and self.came_ns <= now_ns:
+            byte = self.typed.pop(0)
+            if self.noisy:
+                self.noisy, byte, self.flags = self.noisy - 1, byte ^ 0x55, self.flags | 4
+            self.chip.dma.receive.put(byte)
+            self.idle_ns = self.came_ns + self.byte_ns()
+            self.came_ns += self.byte_ns()
+        if self.idle_ns is not None and self.idle_ns <= now_ns and not self.typed:
+            self.idle_ns, self.flags = None, self.flags | 0x10
+
+    def next_event_ns(self):
+        """When something comes that may raise an interrupt."""
+        if self.typed and self.by_dma():
+            return self.came_ns + (min(len(self.typed), self.chip.dma.receive.until_event()) - 1) * self.byte_ns()
+        return self.idle_ns
+
+    def line(self):
+        return bool(self.flags & 0x10 and self.cr1 & 0x10 or self.flags & 0xE and self.cr3 & 1)
+
     def read(self, offset):
         now_ns = self.chip.now_ns
-        received = self.typed and self.cr1 & 4 and now_ns >= self.came_ns
+        self.advance(now_ns)
+        received = self.typed and self.cr1 & 4 and not self.by_dma() and now_ns >= self.came_ns
         if offset == 0:
-            return (0x80 if now_ns >= self.free_ns else 0) | (0x20 if received else 0)
+            self.said_sr = True
+            return self.flags | (0xC0 if now_ns >= self.free_ns else 0) | (0x20 if received else 0)
         if offset == 4 and received:
             self.came_ns = now_ns + self.byte_ns()
             return self.typed.pop(0)
-        return {8: self.brr, 0xC: self.cr1}.get(offset, 0)
+        if offset == 4:
+            self.flags = 0 if self.said_sr else self.flags
+            self.said_sr = False
+        return {8: self.brr, 0xC: self.cr1, 0x14: self.cr3}.get(offset, 0)
 
     def write(self, offset, value):
         now_ns = self.chip.now_ns
         if offset == 4:
-            rate = self.chip.clocks.apb1_hz() / max(self.brr, 1)
-            self.chip.expect(abs(rate / self.baud - 1) < 0.02, f"the serial port runs at {rate:.0f} baud")
-            self.chip.expect(self.cr1 & 0x2008 == 0x2008, "the serial port's transmitter is off")
+            self.check_line()
             self.chip.expect(now_ns >= self.free_ns, "a character was overwritten")
-            self.chip.expect(self.chip.board.uart_is_connected(), "the serial port is not on its pins")
             self.sent.append(value & 0xFF)
             self.free_ns = now_ns + self.byte_ns()
         elif offset == 8:
             self.brr = value
         elif offset == 0xC:
             self.cr1 = value
+        elif offset == 0x14:
+            self.cr3 = value
+
+
+class DmaChannel:
+    """What both families have in common. Subclasses name their registers and bits."""
+
+    def __init__(self, chip):
+        self.chip = chip
+        self.registers = dict.fromkeys(self.offsets, 0)
+        self.left = self.length = 0
+        self.half = self.end = False
+
+    def control(self):
+        return self.registers["control"]
+
+    def is_on(self):
+        return bool(self.control() & 1)
+
+    def begin(self):
+        self.left = self.length = self.registers["count"]
+        self.start_ns = max(self.chip.now_ns, self.chip.uart.free_ns)
+        self.chip.expect(self.registers["peripheral"] == 0x40004404, "the DMA does not serve the USART's data register")
+        self.chip.expect(0x20000000 <= self.registers["memory"] and self.registers["memory"] + self.length <= 0x20000000 + self.chip.board.ram_size,
+                         "the DMA reaches where no RAM is")
+
+    def put(self, byte):
+        if not self.is_on():
+            return
+        self.chip.cpu.mem_write(self.registers["memory"] + self.length - self.left, bytes((byte,)))
+        self.left -= 1
+        self.half |= self.left == self.length // 2
+        if self.left == 0:
+            self.end, self.left = True, self.length # Circular.
+
+    def until_event(self):
+        return max(self.left - self.length // 2 if self.left > self.length // 2 else self.left, 1)
+
+    def carry(self, now_ns):
+        """From memory to the line."""
+        uart = self.chip.uart
+        while self.is_on() and self.left and self.start_ns <= now_ns:
+            uart.sent += self.chip.cpu.mem_read(self.registers["memory"] + self.length - self.left, 1)
+            self.left -= 1
+            self.start_ns += uart.byte_ns()
+            uart.free_ns = self.start_ns
+            if self.left == 0:
+                self.finish()
+
+    def finish(self):
+        self.end = True
+
+    def next_event_ns(self):
+        if not self.is_on() or not self.left:
+            return None
+        return self.start_ns + (self.left - 1) * self.chip.uart.byte_ns()
+
+    def line(self):
+        return bool(self.half and self.control() & self.HALF or self.end and self.control() & self.END)
+
+
+class ChannelF1(DmaChannel):
+    offsets = ("control", "count", "peripheral", "memory")
+    HALF, END, FROM_MEMORY, WANTED = 4, 2, 0x10, 0x80
+
+
+class StreamF4(DmaChannel):
+    offsets = ("control", "count", "peripheral", "memory", "memory1", "fifo")
+    HALF, END, FROM_MEMORY, WANTED = 8, 0x10, 0x40, 4 << 25 | 0x400
+
+    def finish(self):
+        self.end = True
+        self.registers["control"] &= ~1
+
+
+class Dma:
+    """DMA1, as far as the port touches it: one channel from the USART, one to it."""
+
+    def __init__(self, chip):
+        self.chip = chip
+        self.reset()
+
+    def reset(self):
+        self.receive, self.transmit = self.kind(self.chip), self.kind(self.chip)
+
+    def advance(self, now_ns):
+        self.transmit.carry(now_ns)
+
+    def next_event_ns(self):
+        return self.transmit.next_event_ns()
+
+    def find(self, offset):
+        for channel, base in zip((self.receive, self.transmit), self.bases):
+            index = (offset - base) // 4
+            if 0 <= index < len(channel.offsets):
+                return channel, channel.offsets[index]
+        return None, None
+
+    def read(self, offset):
+        self.chip.uart.advance(self.chip.now_ns)
+        self.advance(self.chip.now_ns)
+        channel, name = self.find(offset)
+        if channel is None:
+            self.chip.expect(False, f"0x{offset:X} of the DMA was read, which is not modelled")
+            return 0
+        return channel.left if name == "count" else channel.registers[name]
+
+    def write(self, offset, value):
+        if offset == self.clear_offset:
+            for channel, bit in zip((self.receive, self.transmit), self.bits):
+                channel.half &= not value >> bit[0] & 1
+                channel.end &= not value >> bit[1] & 1
+            return
+        channel, name = self.find(offset)
+        if channel is None:
+            self.chip.expect(False, f"0x{offset:X} of the DMA was written, which is not modelled")
+            return
+        was_on = channel.is_on()
+        self.chip.expect(name == "control" or not was_on, "a channel of the DMA was changed while it runs")
+        channel.registers[name] = value
+        if name == "count":
+            channel.left = value
+        if name == "control" and value & 1 and not was_on:
+            self.chip.expect(not channel.end or self.kind is ChannelF1, "a stream was enabled with the flags of its last run")
+            self.chip.expect(value & channel.WANTED == channel.WANTED, f"a channel of the DMA is not set up for a serial port: {value:#x}")
+            self.chip.expect(bool(value & channel.FROM_MEMORY) == (channel is self.transmit), "a channel of the DMA works the wrong way round")
+            channel.begin()
+            if channel is self.transmit:
+                self.chip.uart.check_line()
+                self.chip.expect(self.chip.uart.cr3 & 0x80, "the serial port does not ask the DMA for bytes to send")
+
+
+class DmaF1(Dma):
+    kind, bases, clear_offset, bits = ChannelF1, (0x6C, 0x80), 4, ((22, 21), (26, 25))
+
+
+class DmaF4(Dma):
+    kind, bases, clear_offset, bits = StreamF4, (0x88, 0xA0), 0xC, ((10, 11), (20, 21))
+
+
+class Flash:
+    """Pages that the image may erase and program, by the registers of the flash interface. What takes time stops the CPU.
+
+    `cut_after`: power fails during the operation of that number from now on, which gets half of its bits through; `next_cut` is the
+    same for the time after the next power-on."""
+
+    def __init__(self, chip):
+        self.chip, self.memory = chip, bytearray(b"\xFF" * self.size)
+        self.operations, self.erasures, self.cut_after, self.next_cut = 0, 0, None, None
+        self.reset()
+
+    def reset(self):
+        self.sr, self.cr, self.ar, self.keys = 0, self.lock, 0, []
+
+    def fetch(self, address, size):
+        at = address - self.base
+        return int.from_bytes(self.memory[at:at + size], "little")
+
+    def spend_ns(self, span_ns):
+        self.chip.spend(span_ns * self.chip.clocks.core_hz // 10**9)
+
+    def is_cut(self):
+        if self.cut_after is None:
+            return False
+        self.cut_after -= 1
+        if self.cut_after < 0:
+            self.chip.lose_power()
+        return self.cut_after < 0
+
+    def program(self, address, size, value):
+        chip, at = self.chip, address - self.base
+        if chip.power_lost:
+            return
+        chip.expect(self.cr & (self.lock | 1) == 1, "the flash was written without PG")
+        chip.expect(size == self.unit, f"the flash was written with {size} bytes at a time")
+        old = self.fetch(address, size)
+        chip.expect(old == (1 << 8 * size) - 1, f"0x{address:08X} of the flash was programmed twice")
+        self.operations += 1
+        cut = self.is_cut()
+        self.memory[at:at + size] = (old & (value | (0x5A5A5A5A if cut else 0)) & (1 << 8 * size) - 1).to_bytes(size, "little")
+        self.spend_ns(self.program_ns)
+
+    def erase(self, address, size):
+        if self.chip.power_lost:
+            return
+        at = address - self.base
+        self.chip.expect(0 <= at < self.size, f"0x{address:08X} of the flash was erased, which is not for what is kept")
+        self.operations, self.erasures = self.operations + 1, self.erasures + 1
+        cut = self.is_cut()
+        self.memory[at:at + size] = bytes(old | 0xA5 for old in self.memory[at:at + size]) if cut else b"\xFF" * size
+        self.spend_ns(self.erase_ns)
+
+    def read(self, offset):
+        return {0: self.chip.clocks.acr, 0xC: self.sr, 0x10: self.cr, 0x14: self.ar}.get(offset, 0)
+
+    def write(self, offset, value):
+        if offset == 0:
+            self.chip.clocks.acr = value & ~0x1800
+        elif offset == 4:
+            self.keys = (self.keys + [value])[-2:]
+            self.cr &= ~self.lock if self.keys == [0x45670123, 0xCDEF89AB] else ~0
+        elif offset == 0xC:
+            self.sr &= ~value
+        elif offset == 0x10 and not self.cr & self.lock:
+            self.cr = value
+            self.keys = []
+            self.look()
+        elif offset == 0x14:
+            self.ar = value
+
+
+class FlashF1(Flash):
+    """The last two KiB of 64. Slow at the most that the data sheet allows."""
+
+    base, size, lock, unit, program_ns, erase_ns = 0x0800F800, 0x800, 1 << 7, 2, 70 * US, 40 * MS
+
+    def look(self):
+        if self.cr & 0x42 == 0x42:
+            self.erase(self.ar & ~0x3FF, 0x400)
+
+
+class FlashF4(Flash):
+    """Sectors 4 and 5."""
+
+    base, size, lock, unit, program_ns, erase_ns = 0x08010000, 0x30000, 1 << 31, 4, 100 * US, 2000 * MS
+
+    def look(self):
+        sector = self.cr >> 3 & 0xF
+        if self.cr & 0x10002 == 0x10002:
+            self.chip.expect(self.cr >> 8 & 3 == 2, "the flash is not told to work with 32 bits")
+            self.erase({4: 0x08010000, 5: 0x08020000}.get(sector, 0), 0x10000 * (sector - 3))
 
 
 class Watchdog:

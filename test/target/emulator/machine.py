@@ -12,7 +12,7 @@ from unicorn import arm_const as arm
 from unicorn.unicorn_py3.unicorn import MMIO_READ_CFUNC, MMIO_WRITE_CFUNC, uclib
 
 from .boards import BLOCK_SIZE
-from .chip import IWDGRSTF, SFTRSTF, US
+from .chip import IWDGRSTF, PORRSTF, SFTRSTF, US
 from .registers import Registers
 
 ACCESS_CYCLES = 12
@@ -41,7 +41,7 @@ class Machine:
     def __init__(self, board, image, seed=1):
         self.board, self.image, self.now_ns = board, image, 0
         self.violations, self.resets, self.alarms = [], [], []
-        self.nmi, self.frozen = False, False
+        self.nmi, self.frozen, self.power_lost = False, False, False
         self.busy_ns = self.faults = 0
         self.build_cpu()
         board.build(self, seed)
@@ -50,11 +50,16 @@ class Machine:
     def build_cpu(self):
         cpu = self.cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         cpu.ctl_set_cpu_model(self.board.cpu_model)
-        cpu.mem_map(0x08000000, 0x100000)
+        kept = range(self.board.flash.base & ~0xFFF, self.board.flash.base + self.board.flash.size) # map_flash has these.
+        assert 0x08000000 + len(self.image) <= kept.start, "the image reaches into what is kept"
+        cpu.mem_map(0x08000000, kept.start - 0x08000000)
+        cpu.mem_map(kept.stop, 0x08100000 - kept.stop)
         cpu.mem_map(0x20000000, self.board.ram_size)
         cpu.mem_write(0x08000000, self.image)
         cpu.mem_write(ENDLESS, bytes((0xFE, 0xE7)))
         cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
+        cpu.mem_map(0x1FFF0000, 0x10000) # What the maker wrote: the chip's own number.
+        cpu.mem_write(self.board.unique_id_address, bytes(range(0x41, 0x4D)))
         self.frame, self.after_entry = Registers(cpu, *FRAME, SP, PRIMASK), Registers(cpu, SP, XPSR, LR, PC)
         self.after_exit, self.pc = Registers(cpu, SP, *FRAME), Registers(cpu, PC)
         self.stack, self.result = Registers(cpu, SP), Registers(cpu, *FRAME[:2])
@@ -159,7 +164,7 @@ class Machine:
         return high << 32 | low
 
     def next_event_ns(self):
-        times = [self.tick_ns, self.watchdog.deadline_ns, self.bus.next_event_ns(self.now_ns)]
+        times = [self.tick_ns, self.watchdog.deadline_ns, self.bus.next_event_ns(self.now_ns), self.uart.next_event_ns(), self.dma.next_event_ns()]
         times += [self.alarms[0][0]] if self.alarms else []
         return min(time for time in times if time is not None)
 
@@ -170,11 +175,17 @@ class Machine:
         if not self.clocks.settled:
             self.clocks.update(self.now_ns)
         self.bus.advance(self.now_ns)
+        self.uart.advance(self.now_ns)
+        self.dma.advance(self.now_ns)
         self.count_tick()
         if self.port_a.changed or self.port_b.changed:
             self.look_at_pins()
         if self.watchdog.deadline_ns is not None and self.now_ns >= self.watchdog.deadline_ns:
             self.reset("watchdog", IWDGRSTF)
+        if self.power_lost:
+            self.cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
+            self.flash.cut_after, self.flash.next_cut, self.power_lost = self.flash.next_cut, None, False
+            self.reset("power", PORRSTF)
         if self.reset_requested:
             self.reset("software", SFTRSTF)
         if self.nmi:
@@ -264,6 +275,31 @@ class Machine:
         if status != UC_ERR_OK:
             raise UcError(status)
 
+    def map_flash(self, flash):
+        """The pages of the flash that the image writes. The rest of the first one's page of the emulator's is empty."""
+        base = flash.base & ~0xFFF
+
+        def guard(function, *arguments):
+            try:
+                return function(*arguments)
+            except Exception as error:
+                self.error = self.error or error
+                uclib.uc_emu_stop(self.cpu._uch)
+                return 0
+
+        callbacks = (MMIO_READ_CFUNC(lambda _, offset, size, __: guard(flash.fetch, base + offset, size)),
+                     MMIO_WRITE_CFUNC(lambda _, offset, size, value, __: guard(flash.program, base + offset, size, value) or 0))
+        self.callbacks += callbacks
+        status = uclib.uc_mmio_map(self.cpu._uch, base, flash.base + flash.size - base, *(pair for function in callbacks
+                                                                                          for pair in (ctypes.cast(function, ctypes.c_void_p), 0)))
+        if status != UC_ERR_OK:
+            raise UcError(status)
+
+    def lose_power(self):
+        """From the next instruction on; then it comes back."""
+        self.power_lost = True
+        self.clock.is_asked_to_stop = 1
+
     def tick_span_ns(self):
         return (self.syst[0x14] + 1) * 10**9 // self.clocks.core_hz
 
@@ -290,8 +326,8 @@ class Machine:
         if offset in self.syst:
             self.syst[offset] = value
             self.tick_ns = self.now_ns + self.tick_span_ns() if self.syst[0x10] & 1 else None
-        elif offset == 0x100:
-            self.enabled |= value
+        elif offset in (0x100, 0x104):
+            self.enabled |= value << 8 * (offset - 0x100)
         elif offset == 0xD0C:
             self.reset_requested = value >> 16 == 0x05FA and bool(value & 4)
         else:

@@ -30,6 +30,8 @@ void iw_bus_close(iw_backend_store_t *bus);
 int iw_bus_fd(const iw_backend_store_t *bus);
 /// Reopens a lost interface or connection when the retry is due, and closes a dead one. Call it before every step.
 void iw_bus_tend(iw_backend_store_t *bus, iw_time_us_t now_us);
+/// Whether the last wait has found its descriptor readable; if nobody ever tells, it is always looked at.
+void iw_bus_waited(iw_backend_store_t *bus, bool told);
 /// When `tend` has something to do; IW_NEVER if it has not.
 iw_time_us_t iw_bus_next_us(const iw_backend_store_t *bus);
 /// As `send` of iw_hal_t.

@@ -39,6 +39,7 @@ typedef struct {
     uint32_t queue_length;          ///< Frames that may wait in front of the controller.
     uint32_t changes;               ///< Another number than before: something above has changed.
     uint32_t lost;                  ///< Frames that came faster than we took them, since the link was last opened.
+    uint32_t room_bytes;            ///< For frames that have come and were not taken yet, as the kernel counts them.
     uint32_t load_permille;         ///< Of the last whole second, without stuff bits (up to a fifth more is possible).
 } iw_bus_link_t;
 
@@ -48,6 +49,10 @@ typedef struct {
 #define IW_TIMING_WRONG_PERMILLE 25U
 /// More frames than this in front of the controller could be old setpoints when a dead bus revives.
 #define IW_LINK_QUEUE_MAX 4U
+
+/// Room that is asked for; granted, the kernel counts it twice (`room_bytes`), and each frame as about 780 bytes: half
+/// a second of a full bus. It gives no more than net.core.rmem_max, as a rule a twentieth of this.
+#define IW_LINK_ROOM_BYTES (4U * 1024U * 1024U)
 
 /// What the link's timing is beside the wheels'.
 typedef enum {
@@ -68,7 +73,7 @@ static inline uint32_t iw_bus_frame_bits(const iw_can_frame_t *frame) {
     return around + 8U * (((frame->id & IW_CAN_REMOTE) != 0U) ? 0U : frame->dlc);
 }
 
-/// True if both tell the same of the interface: purge, changes, lost and load aside.
+/// True if both tell the same of the interface: purge, changes, lost, room and load aside.
 bool iw_bus_link_is_same(const iw_bus_link_t *one, const iw_bus_link_t *other);
 
 #endif

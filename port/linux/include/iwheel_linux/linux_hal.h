@@ -33,9 +33,15 @@ int iw_linux_hal_bus_fd(const iw_linux_hal_t *self);
 /// The same of the e-stop; -1: there is nothing to watch.
 int iw_linux_hal_estop_fd(const iw_linux_hal_t *self);
 
-/// May be called right after a wait for both descriptors, which saves reading of one that has nothing to tell: was the
-/// e-stop's found readable? It counts for one look.
-void iw_linux_hal_waited(iw_linux_hal_t *self, bool estop_told);
+/// What a wait for both descriptors has found readable.
+typedef struct {
+    bool bus;   ///< That of the bus.
+    bool estop; ///< That of the e-stop.
+} iw_linux_told_t;
+
+/// May be called right after such a wait, which saves reading of what has nothing to tell: edges of the e-stop in the
+/// next look, news of other interfaces until the next wait.
+void iw_linux_hal_waited(iw_linux_hal_t *self, iw_linux_told_t told);
 
 /// Call before every step.
 void iw_linux_hal_tend(iw_linux_hal_t *self, iw_time_us_t now_us);

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+// The gateway's side: there and gone, and what it says.
+#include "bridge_parts.h"
+
+#include <string.h>
+
+#define CONNECT_MS     200
+#define BACKOFF_MAX_US 2000000
+
+int64_t bridge_clock_us(clockid_t clock) {
+    struct timespec now;
+    (void)clock_gettime(clock, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
+static int64_t now_us(void) {
+    return bridge_clock_us(CLOCK_MONOTONIC);
+}
+
+// ---- there and gone -----------------------------------------------------------------------------------------------
+
+void bridge_lose(bridge_t *self, const char *why) {
+    ros_machine_t *machine = &self->facts.machine;
+    if (self->facts.link != ROS_LINK_GONE && machine->now.machine != IWC_LISTENING) {
+        ros_auto_stopped(&self->auto_arm, false);
+    }
+    iwc_close(self->gateway);
+    self->facts.link = ROS_LINK_GONE;
+    machine->now.ours = false;
+    (void)snprintf(self->facts.trouble, sizeof self->facts.trouble, "%s", why);
+    // Not all at once, where several wait for the same gateway.
+    self->retry_us = now_us() + self->backoff_us * 3 / 4 + now_us() % (self->backoff_us / 2);
+    self->backoff_us = (self->backoff_us < BACKOFF_MAX_US / 2) ? self->backoff_us * 2 : BACKOFF_MAX_US;
+    if (!self->told_gone) {
+        (void)fprintf(stderr, "iwheel-ros2: warning: no gateway at %s: %s; trying for ever\n",
+                      self->settings.gateway.socket, why);
+    }
+    self->told_gone = true;
+}
+
+/// What a stop before our time says of the wheels: the bridge has not caused it.
+static void read_last_stop(bridge_t *self) {
+    iwc_message_t why;
+    if (iwc_ask(self->gateway, "{\"cmd\":\"why\"}", BRIDGE_ASK_MS, &why) == IWC_OK &&
+        iwc_integer(&why, "number").value > 0) {
+        (void)iwc_text(&why, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
+        ros_auto_stopped(&self->auto_arm, false);
+    } else {
+        self->facts.machine.stop[0] = '\0';
+    }
+}
+
+static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
+    ros_machine_t *machine = &self->facts.machine;
+    if (!ros_facts_read(self->gateway, message, machine)) {
+        return;
+    }
+    self->facts.link = ROS_LINK_UP;
+    self->heard_us = now_us();
+    if (self->ledger_due) {
+        self->ledger_due = false;
+        ros_facts_read_ledger(message, machine);
+    }
+    if (machine->now.left.distance_mm.known && machine->now.right.distance_mm.known) {
+        const ros_ways_t ways = {machine->now.t_us, machine->now.left.distance_mm.value,
+                                 machine->now.right.distance_mm.value};
+        ros_odometry_step(&self->odometry, &ways, machine->track_mm);
+        self->facts.odometry_restarts = self->odometry.restarts;
+    }
+}
+
+iwc_result_t bridge_call(bridge_t *self) {
+    const unsigned topics = IWC_WATCH_STATE | IWC_WATCH_BUS | IWC_WATCH_ESTOP | IWC_WATCH_LEASE | IWC_WATCH_STOP;
+    iwc_message_t status;
+    iwc_result_t result = iwc_connect(self->gateway, self->settings.gateway.socket, CONNECT_MS);
+    const bool newer = result == IWC_NEWER;
+    result = newer ? IWC_OK : result;
+    if (result == IWC_OK) {
+        read_last_stop(self);
+        result = iwc_ask(self->gateway, "{\"cmd\":\"status\"}", BRIDGE_ASK_MS, &status);
+    }
+    if (result == IWC_OK) {
+        self->ledger_due = true;
+        take_snapshot(self, &status);
+        // Seen within 0.2 s: so often at least.
+        const int rate_hz = (self->settings.odometry.rate_hz < 20U) ? 20 : (int)self->settings.odometry.rate_hz;
+        result = iwc_watch(self->gateway, topics, rate_hz, BRIDGE_ASK_MS);
+    }
+    if (result != IWC_OK) {
+        bridge_lose(self, (result == IWC_REFUSED) ? iwc_reason(self->gateway) : iwc_words(result));
+        return result;
+    }
+    self->backoff_us = BRIDGE_BACKOFF_US;
+    self->told_gone = false;
+    (void)fprintf(
+        stderr, "iwheel-ros2: info: connected to %s%s\n", self->settings.gateway.socket,
+        newer ? ", whose protocol is newer: only watching and stopping; install the iwheel-ros2 that belongs to it"
+              : "");
+    if (self->facts.drive && self->facts.machine.setpoint_current) {
+        (void)fputs("iwheel-ros2: warning: current_role = setpoint: a twist carries no current, so driving is refused; "
+                    "watching works\n",
+                    stderr);
+    }
+    return IWC_OK;
+}
+
+// ---- what the gateway says ----------------------------------------------------------------------------------------
+
+static void take_stop(bridge_t *self, const iwc_message_t *event) {
+    const bool ours = iwc_integer(event, "client").value == iwc_number(self->gateway);
+    const bool silence =
+        iwc_is(event, "cause", "lease_lost") || (self->silenced && iwc_is(event, "cause", "client_stop"));
+    (void)iwc_text(event, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
+    ros_auto_stopped(&self->auto_arm, ours && silence && event->skipped == 0);
+    self->silenced = false;
+    self->commanded_us = 0;
+}
+
+/// Replies are those to commands: all else is waited for.
+static void take_reply(bridge_t *self, const iwc_message_t *reply) {
+    ros_commands_t *commands = &self->facts.commands;
+    commands->refusal[0] = '\0';
+    if (iwc_truth(reply, "ok").value == 0) {
+        commands->refused++;
+        (void)iwc_text(reply, "message", commands->refusal, sizeof commands->refusal);
+    }
+}
+
+void bridge_listen(bridge_t *self) {
+    iwc_message_t message;
+    bool fresh = false;
+    iwc_result_t result = iwc_next(self->gateway, 0, &message);
+    for (; result == IWC_OK; result = iwc_next(self->gateway, 0, &message)) {
+        if (!message.is_event) {
+            take_reply(self, &message);
+        } else if (iwc_is(&message, "event", "state")) {
+            take_snapshot(self, &message);
+            fresh = true;
+        } else if (iwc_is(&message, "event", "stop")) {
+            take_stop(self, &message);
+        } else if (iwc_is(&message, "event", "ledger")) {
+            self->ledger_due = true;
+        }
+    }
+    if (result != IWC_TIMEOUT && result != IWC_INTERRUPTED) {
+        bridge_lose(self, "it has ended, or closed the connection");
+    } else if (fresh) {
+        ros_publish_motion(self->ros, &self->facts.machine, &self->odometry);
+        ros_publish_wrench(self->ros, &self->facts.machine);
+    }
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+/// Private to the bridge: its gateway's side, for the one that decides. Who calls holds the lock.
+#ifndef ROS2_BRIDGE_PARTS_H
+#define ROS2_BRIDGE_PARTS_H
+
+#include "bridge.h"
+
+#include <time.h>
+
+/// For an answer of the gateway's; none in this time, and it hangs.
+#define BRIDGE_ASK_MS 150
+/// Between the first two tries to find the gateway again; it doubles.
+#define BRIDGE_BACKOFF_US 100000
+
+/// Calls the gateway and watches it; if that fails, it is lost.
+iwc_result_t bridge_call(bridge_t *self);
+
+/// The connection ends here, and the lease with it; `why` is told in /diagnostics.
+void bridge_lose(bridge_t *self, const char *why);
+
+/// Takes what the gateway has said, and publishes what is new of it.
+void bridge_listen(bridge_t *self);
+
+/// Microseconds.
+int64_t bridge_clock_us(clockid_t clock);
+
+#endif

@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: MIT
+#include "relay.h"
+
+#include "iwheel_northbound/tell.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+static relay_channel_t *channel_of(relay_t *self, const gw_client_t *client) {
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        if (self->channel[i].client == client->id) {
+            return &self->channel[i];
+        }
+    }
+    return NULL;
+}
+
+/// Its client leaves it; the board is told.
+static void release(relay_channel_t *channel) {
+    channel->client = IW_CLIENT_NONE;
+    channel->tell_open = false;
+    channel->tell_close = true;
+    channel->queue.count = 0;
+}
+
+/// The free one that was used longest ago: what is still on its way on it reaches nobody.
+static relay_channel_t *free_channel(relay_t *self) {
+    relay_channel_t *found = NULL;
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        relay_channel_t *channel = &self->channel[i];
+        if (channel->client == IW_CLIENT_NONE && (found == NULL || channel->used_us < found->used_us)) {
+            found = channel;
+        }
+    }
+    return found;
+}
+
+static void turn_away(relay_t *self, gw_client_t *client, const char *why) {
+    gw_log(&self->log, GW_LOG_INFO, "client %u (pid %d) is closed: %s", (unsigned)client->id, client->pid, why);
+    const iwn_id_t nobody = {.kind = IWN_ID_NONE};
+    iwn_refusal_t refusal = {.error = IWN_BUS_DOWN};
+    iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
+    IWN_TEXT_JOIN(&text, "no board on the serial line: ", why);
+    gw_clients_refuse(&self->clients, client, &nobody, &refusal);
+    gw_client_finish(client, self->now_us);
+}
+
+/// An answer to a `drive` comes no later, unless it is lost: a longest line may be before it.
+static uint64_t hold_us(const relay_t *self) {
+    return 30000U + (uint64_t)4608U * 10U * 1000000U / self->settings->board.baud;
+}
+
+static void welcome(void *context, gw_client_t *client) {
+    relay_t *self = (relay_t *)context;
+    relay_channel_t *channel = free_channel(self);
+    if (!self->link.linked || channel == NULL) {
+        turn_away(self, client, self->trouble);
+        return;
+    }
+    *channel = (relay_channel_t){.client = client->id,
+                                 .watch = client->right == GW_WATCH,
+                                 .tell_open = true,
+                                 .tell_close = channel->tell_close,
+                                 .since_us = self->now_us,
+                                 .used_us = self->now_us};
+    serial_queue_init(&channel->queue, hold_us(self));
+}
+
+/// Called once or oftener: who has gone holds no lease. Who only asks gets the answers it waits for.
+static void leave(void *context, gw_client_t *client) {
+    relay_channel_t *channel = channel_of((relay_t *)context, client);
+    if (channel != NULL && channel->granted) {
+        release(channel);
+    }
+}
+
+// ---- a request ----------------------------------------------------------------------------------------------------
+
+/// A refusal takes its turn among the answers.
+static void answer_here(relay_channel_t *channel, const iwn_id_t *id, iwn_error_t error, const char *message) {
+    serial_request_t *place = serial_queue_place(&channel->queue);
+    *place = (serial_request_t){.state = SERIAL_ANSWERED, .id = *id, .error = error};
+    iwn_text_t text = iwn_text_begin(place->json, sizeof place->json);
+    IWN_TEXT_JOIN(&text, message);
+    place->reason = place->json;
+    serial_queue_put(&channel->queue);
+}
+
+/// The request without its id, and with this one; its length, 0 if it does not fit.
+static size_t write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size) {
+    iwn_text_t text = iwn_text_begin(out, size);
+    iwn_json_t rest = iwn_json_inside(root);
+    iwn_json_t name;
+    iwn_json_t value;
+    IWN_TEXT_JOIN(&text, "{\"id\":");
+    iwn_text_int(&text, (int64_t)number);
+    while (iwn_json_next(&rest, &name, &value)) {
+        if (!iwn_json_is(name, "id")) {
+            iwn_text_span(&text, ",", 1);
+            iwn_text_span(&text, name.at, (size_t)(rest.at - name.at));
+        }
+    }
+    IWN_TEXT_JOIN(&text, "}");
+    return (text.length + 1U < size) ? text.length : 0U;
+}
+
+/// The same with what a command quotes; 0 also if no stamp had been heard by then.
+static size_t write_quoted(relay_t *self, const serial_request_t *request, size_t length, char *json) {
+    iwn_quote_t quote = {.seq = request->number};
+    char plain[SERIAL_JSON_MAX];
+    if (length == 0U || !serial_link_stamp(&self->link, request->came_us, &quote.t_us)) {
+        return 0;
+    }
+    memcpy(quote.boot, self->link.boot, sizeof quote.boot);
+    memcpy(plain, json, length);
+    return iwn_quote_write(&quote, plain, length, json, SERIAL_JSON_MAX);
+}
+
+/// Why a request that came then is not sent any more; NULL: it is.
+static const char *too_late(const relay_t *self, const relay_channel_t *channel, serial_kind_t kind, uint64_t came_us) {
+    if (kind != SERIAL_MOVES && kind != SERIAL_GRANTS) {
+        return NULL;
+    }
+    if (came_us < self->gap_us) {
+        return "the relay was stopped or starved while this waited, so it was not sent; ask again";
+    }
+    if (kind == SERIAL_MOVES && came_us < channel->armed_us) {
+        return "this command was sent before arm was answered; wait for that answer, then command anew";
+    }
+    if (kind == SERIAL_MOVES && self->now_us - came_us >= SERIAL_FRESH_US) {
+        return "this command waited too long behind earlier ones; send no faster than they are answered";
+    }
+    return NULL;
+}
+
+static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t *asked, iwn_json_t root,
+                    uint64_t came_us) {
+    serial_request_t *place = serial_queue_place(&channel->queue);
+    *place = (serial_request_t){.kind = serial_kind_of(asked->cmd), .id = asked->id, .came_us = came_us};
+    const char *late = too_late(self, channel, place->kind, came_us);
+    if (late != NULL) {
+        answer_here(channel, &asked->id, IWN_STALE_COMMAND, late);
+        return;
+    }
+    place->number = ++self->number;
+    place->length = write_numbered(root, place->number, place->json, SERIAL_JSON_MAX);
+    if (place->kind == SERIAL_MOVES) {
+        place->length = write_quoted(self, place, place->length, place->json);
+    }
+    if (place->length == 0U) {
+        answer_here(channel, &asked->id, IWN_LINE_TOO_LONG,
+                    "over this serial line a request has at most 380 bytes; shorten its texts");
+        return;
+    }
+    channel->granted = channel->granted || place->kind == SERIAL_GRANTS;
+    channel->arm_number = (asked->cmd == IWN_CMD_ARM) ? place->number : channel->arm_number;
+    serial_queue_put(&channel->queue);
+}
+
+static void carry_out(void *context, gw_client_t *client, const char *line, size_t length) {
+    relay_t *self = (relay_t *)context;
+    relay_channel_t *channel = channel_of(self, client);
+    iwn_request_t request;
+    iwn_refusal_t refusal;
+    iwn_json_t root;
+    if (channel == NULL || client->closing) {
+        return;
+    }
+    iwn_text_t fault = iwn_text_begin(refusal.message, sizeof refusal.message);
+    if (!iwn_request_read(line, length, &self->work, &request, &refusal)) {
+        answer_here(channel, &request.id, refusal.error, refusal.message);
+    } else if (channel->watch && !iwn_cmd_watches(request.cmd)) {
+        answer_here(
+            channel, &request.id, IWN_DENIED,
+            "this socket is for watching; to drive connect to [northbound] socket of iwheel-serial, as a member "
+            "of its group");
+    } else if (iwn_json_check(line, length, &self->work, &root, &fault)) {
+        const uint64_t since_us = (self->gap_us > channel->armed_us) ? self->gap_us : channel->armed_us;
+        forward(self, channel, &request, root, gw_client_sent_us(client, self->now_us, since_us));
+    }
+    client->arming = serial_queue_is_full(&channel->queue); // The next line stays where it is.
+}
+
+gw_servant_t relay_servant(relay_t *self) {
+    return (gw_servant_t){.welcome = welcome, .carry_out = carry_out, .leave = leave, .context = self};
+}
+
+// ---- an answer ----------------------------------------------------------------------------------------------------
+
+/// `rest` is what stands behind `ok` in a board's answer: the client gets it with the id that it gave.
+static void pass_reply(relay_t *self, gw_client_t *client, const serial_request_t *request, const char *rest,
+                       size_t length) {
+    iwn_out_t json = iwn_tell_reply(self->clients.line, sizeof self->clients.line, &request->id, request->ok);
+    if (length + 1U < json.size - json.length) {
+        memcpy(&json.data[json.length], rest, length);
+        json.data[json.length + length] = '\n';
+        gw_client_reply(client, json.data, json.length + length + 1U);
+    }
+}
+
+static void tell_answered(relay_t *self, relay_channel_t *channel, gw_client_t *client) {
+    const serial_request_t *request;
+    while ((request = serial_queue_answered(&channel->queue)) != NULL) {
+        iwn_refusal_t refusal = {.error = request->error};
+        if (request->state == SERIAL_HELD) {
+            pass_reply(self, client, request, request->json, request->length);
+        } else {
+            iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
+            IWN_TEXT_JOIN(&text, request->reason);
+            gw_clients_refuse(&self->clients, client, &request->id, &refusal);
+        }
+        serial_queue_drop(&channel->queue);
+    }
+}
+
+/// The text goes on behind what stands in `*at` and is `words`.
+static bool skip(const char **at, const char *end, const char *words) {
+    const size_t length = strlen(words);
+    const bool there = (size_t)(end - *at) >= length && memcmp(*at, words, length) == 0;
+    *at += there ? length : 0U;
+    return there;
+}
+
+/// `{"id":17,"ok":true`: the number, and whether it says yes; `*at` is behind it.
+static bool read_reply(const char **at, const char *end, uint64_t *out_number, bool *out_ok) {
+    *out_number = 0;
+    if (!skip(at, end, "{\"id\":")) {
+        return false;
+    }
+    while (*at < end && **at >= '0' && **at <= '9') {
+        *out_number = *out_number * 10U + (uint64_t)(**at - '0');
+        (*at)++;
+    }
+    *out_ok = skip(at, end, ",\"ok\":true");
+    return *out_ok || skip(at, end, ",\"ok\":false");
+}
+
+static void take_reply(relay_t *self, relay_channel_t *channel, gw_client_t *client, const iwn_line_t *line) {
+    const char *end = &line->json[line->length];
+    const char *at = line->json;
+    const serial_request_t *oldest = &channel->queue.ring[channel->queue.first];
+    uint64_t number;
+    bool ok;
+    if (!read_reply(&at, end, &number, &ok) ||
+        !serial_queue_take(&channel->queue, number, ok, at, (size_t)(end - at))) {
+        return; // It was given up, and its client told so.
+    }
+    channel->armed_us = (number == channel->arm_number) ? self->now_us : channel->armed_us;
+    if (oldest->number == number) {
+        pass_reply(self, client, oldest, at, (size_t)(end - at));
+        serial_queue_drop(&channel->queue);
+    }
+    tell_answered(self, channel, client);
+}
+
+static bool begins(const iwn_line_t *line, const char *words) {
+    const char *at = line->json;
+    return skip(&at, &line->json[line->length], words);
+}
+
+void relay_take_line(relay_t *self, const iwn_line_t *line) {
+    relay_channel_t *channel = &self->channel[line->channel];
+    gw_client_t *client = gw_clients_find(&self->clients, channel->client);
+    const bool hello = begins(line, "{\"event\":\"hello\"");
+    if (client == NULL || (!channel->welcomed && !hello) || line->length + 1U > sizeof self->clients.line) {
+        return; // Of whoever had this channel before.
+    }
+    if (begins(line, "{\"id\":")) {
+        take_reply(self, channel, client, line);
+        return;
+    }
+    memcpy(self->clients.line, line->json, line->length);
+    self->clients.line[line->length] = '\n';
+    if (hello && !channel->welcomed) {
+        channel->welcomed = true;
+        gw_client_reply(client, self->clients.line, line->length + 1U);
+    } else if (!hello) {
+        gw_client_event(client, self->clients.line, line->length + 1U);
+    }
+}
+
+// ---- coming and going ---------------------------------------------------------------------------------------------
+
+static void drop_client(relay_t *self, relay_channel_t *channel) {
+    gw_client_t *client = gw_clients_find(&self->clients, channel->client);
+    release(channel);
+    if (client != NULL) {
+        gw_client_finish(client, self->now_us);
+    }
+}
+
+void relay_drop_clients(relay_t *self) {
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        drop_client(self, &self->channel[i]);
+    }
+    self->out_length =
+        (self->out_sent > 0U) ? self->out_length : 0U; // Half a line is ended, or the next one would be lost too.
+}
+
+static void tend(relay_t *self, relay_channel_t *channel) {
+    gw_client_t *client = gw_clients_find(&self->clients, channel->client);
+    if (client == NULL || client->closing || client->failed) {
+        release(channel);
+        return;
+    }
+    if (!channel->welcomed && self->now_us >= channel->since_us + RELAY_WELCOME_US) {
+        release(channel);
+        turn_away(self, client, "the board does not answer to a new client; is its image `gateway`, and not too old?");
+        return;
+    }
+    serial_queue_age(&channel->queue, self->now_us);
+    if (channel->queue.unanswered >= RELAY_UNANSWERED) {
+        release(channel);
+        turn_away(self, client, "the board answered none of the last requests; connect again");
+        return;
+    }
+    tell_answered(self, channel, client);
+    client->reading = channel->queue.count > 0U; // Who has said all it has to say is kept for its answers.
+    if (client->arming && !serial_queue_is_full(&channel->queue)) {
+        client->arming = false;
+        gw_client_check_caught_up(client, self->now_us);
+    }
+}
+
+void relay_tend_channels(relay_t *self) {
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        if (self->channel[i].client != IW_CLIENT_NONE) {
+            tend(self, &self->channel[i]);
+        }
+    }
+}
+
+uint64_t relay_channels_next_us(const relay_t *self) {
+    uint64_t next_us = UINT64_MAX;
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        const relay_channel_t *channel = &self->channel[i];
+        const uint64_t then_us =
+            (channel->client != IW_CLIENT_NONE) ? serial_queue_next_us(&channel->queue, self->now_us) : UINT64_MAX;
+        next_us = (then_us < next_us) ? then_us : next_us;
+    }
+    return next_us;
+}
+
+// ---- what the board is told ---------------------------------------------------------------------------------------
+
+static size_t write_line(uint8_t channel, const char *json, size_t length, char *out, size_t size) {
+    return iwn_line_write(&(iwn_line_t){.channel = channel, .json = json, .length = length}, out, size);
+}
+
+/// Coming and going goes before everything else.
+static size_t next_open_or_close(relay_t *self, char *out, size_t size) {
+    char json[64];
+    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
+        relay_channel_t *channel = &self->channel[i];
+        const bool opens = channel->client != IW_CLIENT_NONE && !channel->welcomed &&
+                           (channel->tell_open || self->now_us >= channel->opened_us + RELAY_OPEN_US);
+        if (!channel->tell_close && !opens) {
+            continue;
+        }
+        if (channel->tell_close) {
+            channel->tell_close = false;
+            (void)snprintf(json, sizeof json, "{\"cmd\":\"close\",\"channel\":%u}", i);
+        } else {
+            channel->tell_open = false;
+            channel->opened_us = self->now_us;
+            (void)snprintf(json, sizeof json, "{\"cmd\":\"open\",\"channel\":%u,\"watch\":%s}", i,
+                           channel->watch ? "true" : "false");
+        }
+        return write_line(0, json, strlen(json), out, size);
+    }
+    return 0;
+}
+
+static size_t next_request(relay_t *self, bool stops_only, char *out, size_t size) {
+    for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
+        const unsigned number = 1U + (self->next_channel + i) % IWN_LINE_CHANNELS;
+        relay_channel_t *channel = &self->channel[number];
+        serial_request_t *request = (channel->client != IW_CLIENT_NONE && channel->welcomed)
+                                        ? serial_queue_next(&channel->queue, stops_only, self->now_us)
+                                        : NULL;
+        if (request != NULL) {
+            self->next_channel = number % IWN_LINE_CHANNELS;
+            serial_queue_sent(request, self->now_us);
+            return write_line((uint8_t)number, request->json, request->length, out, size);
+        }
+    }
+    return 0;
+}
+
+static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
+    static const char ask[] = "{\"cmd\":\"link\"}";
+    static const char alive[] = "{\"cmd\":\"alive\"}";
+    if (!self->link.linked && self->now_us >= self->asked_us + RELAY_ASK_US) {
+        self->asked_us = self->now_us;
+        return write_line(0, ask, sizeof ask - 1U, out, size);
+    }
+    return (self->link.linked && gw_clients_count(&self->clients) > 0U &&
+            self->now_us >= self->said_us + RELAY_ALIVE_US)
+               ? write_line(0, alive, sizeof alive - 1U, out, size)
+               : 0U;
+}
+
+size_t relay_next_line(relay_t *self, char *out, size_t size) {
+    size_t length = 0;
+    if (self->link.linked) {
+        length = next_open_or_close(self, out, size);
+        length = (length > 0U) ? length : next_request(self, true, out, size);
+    }
+    length = (length > 0U) ? length : next_sign_of_life(self, out, size);
+    return (length > 0U || !self->link.linked) ? length : next_request(self, false, out, size);
+}

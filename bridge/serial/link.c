@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: MIT
+#include "link.h"
+
+#include <string.h>
+
+void serial_link_init(serial_link_t *self, uint64_t now_us) {
+    self->linked = false;
+    self->boot[0] = '\0';
+    self->version[0] = '\0';
+    self->heard_us = now_us;
+    self->stamps = 0;
+    self->noise = (serial_noise_t){.bytes = 0};
+    iwn_receiver_init(&self->receiver, self->buffer, sizeof self->buffer, true);
+}
+
+static serial_stamp_t *newest(serial_link_t *self) {
+    return &self->stamp[(self->stamps - 1U) % SERIAL_STAMPS];
+}
+
+/// Of stamps that come close together the newest is kept only once another is far enough away: the ring reaches back.
+static void note_stamp(serial_link_t *self, uint64_t t_us, uint64_t now_us) {
+    const bool close =
+        self->stamps > 1U && now_us - self->stamp[(self->stamps - 2U) % SERIAL_STAMPS].heard_us < SERIAL_STAMP_US;
+    self->stamps += close ? 0U : 1U;
+    *newest(self) = (serial_stamp_t){now_us, t_us};
+}
+
+uint64_t serial_link_stamped_us(const serial_link_t *self) {
+    return (self->stamps > 0U) ? self->stamp[(self->stamps - 1U) % SERIAL_STAMPS].heard_us : 0U;
+}
+
+bool serial_link_stamp(const serial_link_t *self, uint64_t then_us, uint64_t *out_t_us) {
+    for (unsigned back = 1; back <= self->stamps && back <= SERIAL_STAMPS; back++) {
+        const serial_stamp_t *stamp = &self->stamp[(self->stamps - back) % SERIAL_STAMPS];
+        if (stamp->heard_us <= then_us) {
+            *out_t_us = stamp->t_us;
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool is_boot(const char *text) {
+    return strlen(text) == IWN_LINE_BOOT && strspn(text, "0123456789abcdef") == IWN_LINE_BOOT;
+}
+
+/// The event `link`. A boot that differs is another board, or the same after a reset.
+static serial_news_t take_link(serial_link_t *self, iwn_json_t event) {
+    char boot[IWN_LINE_BOOT + 1U];
+    iwn_json_t value;
+    if (!iwn_json_find(event, "boot", &value) || !iwn_json_text(value, boot, sizeof boot) || !is_boot(boot)) {
+        return SERIAL_NEWS_NONE;
+    }
+    if (!iwn_json_find(event, "version", &value) || !iwn_json_text(value, self->version, sizeof self->version)) {
+        self->version[0] = '\0';
+    }
+    if (self->linked && strcmp(boot, self->boot) == 0) {
+        return SERIAL_NEWS_NONE;
+    }
+    memcpy(self->boot, boot, sizeof boot);
+    self->linked = true;
+    return SERIAL_NEWS_LINKED;
+}
+
+static void take_complaint(serial_link_t *self, iwn_json_t event) {
+    iwn_json_t value;
+    if (iwn_json_find(event, "count", &value) && iwn_json_kind(value) == IWN_JSON_INTEGER &&
+        iwn_json_integer(value) > 0) {
+        self->complaints += (uint64_t)iwn_json_integer(value);
+    }
+}
+
+/// Channel 0.
+static serial_news_t take_event(serial_link_t *self, iwn_json_t event) {
+    iwn_json_t name;
+    if (!iwn_json_find(event, "event", &name)) {
+        return SERIAL_NEWS_NONE;
+    }
+    if (iwn_json_is(name, "link")) {
+        return take_link(self, event);
+    }
+    if (iwn_json_is(name, "line_error")) {
+        take_complaint(self, event);
+    }
+    return SERIAL_NEWS_NONE;
+}
+
+static serial_news_t take_line(serial_link_t *self, iwn_line_t *line, uint64_t now_us) {
+    char words[64];
+    iwn_text_t fault = iwn_text_begin(words, sizeof words);
+    iwn_json_t root;
+    const bool right =
+        line->length <= UINT16_MAX && iwn_json_check(line->json, line->length, &self->work, &root, &fault);
+    if (!right) {
+        self->noise.lines[IWN_LINE_MISFORMED]++;
+        self->refused++;
+        return SERIAL_NEWS_NONE;
+    }
+    self->heard_us = now_us;
+    self->noise = (serial_noise_t){.bytes = 0};
+    // A board's time falls when it starts anew, whatever it says of itself.
+    const bool fell = self->linked && self->stamps > 0U && line->t_us < newest(self)->t_us;
+    if (fell) {
+        self->linked = false;
+        self->stamps = 0;
+    }
+    const serial_news_t news = (line->channel == 0U) ? take_event(self, root)
+                               : self->linked        ? SERIAL_NEWS_LINE
+                                                     : SERIAL_NEWS_NONE;
+    self->stamps = (news == SERIAL_NEWS_LINKED) ? 0U : self->stamps;
+    if (self->linked) {
+        note_stamp(self, line->t_us, now_us);
+    }
+    return (fell && news != SERIAL_NEWS_LINKED) ? SERIAL_NEWS_LOST : news;
+}
+
+static void sample(serial_noise_t *noise, const char *bytes, size_t length) {
+    noise->sampled = (length < SERIAL_SAMPLE) ? length : SERIAL_SAMPLE;
+    for (size_t i = 0; i < noise->sampled; i++) {
+        noise->sample[i] = (char)((bytes[i] >= ' ' && bytes[i] <= '~') ? bytes[i] : '.');
+    }
+    noise->sample[noise->sampled] = '\0';
+}
+
+serial_news_t serial_link_put(serial_link_t *self, char byte, uint64_t now_us, iwn_line_t *out_line) {
+    const size_t length = self->receiver.length;
+    self->noise.bytes++;
+    self->noise.odd += ((byte < ' ' || byte > '~') && byte != '\n' && byte != '\r') ? 1U : 0U;
+    const iwn_line_verdict_t verdict = iwn_receiver_put(&self->receiver, byte, out_line);
+    if (verdict == IWN_LINE_GOOD) {
+        return take_line(self, out_line, now_us);
+    }
+    if (verdict != IWN_LINE_NOTHING) {
+        self->noise.lines[verdict]++;
+        self->refused++;
+        sample(&self->noise, self->buffer, length);
+    }
+    return SERIAL_NEWS_NONE;
+}
+
+bool serial_link_fell_silent(serial_link_t *self, uint64_t now_us) {
+    if (!self->linked || now_us < self->heard_us + SERIAL_SILENT_US) {
+        return false;
+    }
+    self->linked = false;
+    self->stamps = 0;
+    return true;
+}
+
+void serial_link_explain(const serial_link_t *self, const char *port, unsigned baud, char *out, size_t size) {
+    const serial_noise_t *noise = &self->noise;
+    const uint64_t unchecked = noise->lines[IWN_LINE_UNCHECKED];
+    if (noise->bytes == 0U) {
+        (void)snprintf(out, size,
+                       "nothing comes from %s: is the board powered, is it running the image `gateway`, and are "
+                       "both lines (TX, RX) and ground connected?",
+                       port);
+    } else if (noise->odd * 8U > noise->bytes) {
+        (void)snprintf(out, size,
+                       "%llu bytes came from %s that are no text: the baud rate is another than %u; set baud to "
+                       "that of the image, or the lines are disturbed",
+                       (unsigned long long)noise->bytes, port, baud);
+    } else if (noise->lines[IWN_LINE_CORRUPT] > 0U || noise->lines[IWN_LINE_LOST] > 0U) {
+        (void)snprintf(out, size,
+                       "lines come damaged from %s (%llu with a wrong CRC): a bad cable, ground, or two programs "
+                       "reading the port",
+                       port, (unsigned long long)noise->lines[IWN_LINE_CORRUPT]);
+    } else if (unchecked + noise->lines[IWN_LINE_MISFORMED] > 0U) {
+        (void)snprintf(out, size,
+                       "another protocol is spoken on %s (such as \"%s\"): it is another device, or the board runs "
+                       "another image than `gateway`",
+                       port, noise->sample);
+    } else {
+        (void)snprintf(out, size,
+                       "%llu bytes came from %s and no whole line: another protocol or baud rate, or a board that "
+                       "hangs",
+                       (unsigned long long)noise->bytes, port);
+    }
+}

@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: MIT
+#include "relay.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <sys/signalfd.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+/// Every descriptor at once, so that one that is not told of has nothing to tell.
+#define EVENTS_PER_WAIT (GW_CLIENTS_MAX + 6)
+/// Read of the port in one cycle.
+#define READS_PER_CYCLE 4U
+/// What waits in the kernel's buffer on purpose, so that the line never pauses: it is as old as that when it leaves.
+#define AHEAD_US 2000U
+/// Of opening the port again.
+#define BACKOFF_MIN_US 100000U
+#define BACKOFF_MAX_US 2000000U
+/// Of saying what is wrong: first after this, and then seldom.
+#define EXPLAIN_US       2500000U
+#define EXPLAIN_AGAIN_US 600000000U
+/// As rarely the loop comes round when there is nothing to do.
+#define IDLE_US 1000000U
+
+// ---- the port -----------------------------------------------------------------------------------------------------
+
+static void watch_port(relay_t *self, int operation) {
+    struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
+    interest.events |= (self->out_length > 0U) ? (uint32_t)EPOLLOUT : 0U;
+    (void)epoll_ctl(self->clients.epoll_fd, operation, self->port.fd, &interest);
+}
+
+static void set_trouble(relay_t *self, const char *words) {
+    if (strcmp(self->trouble, words) != 0) {
+        (void)snprintf(self->trouble, sizeof self->trouble, "%s", words);
+        gw_log(&self->log, GW_LOG_WARNING, "%s", self->trouble);
+    }
+}
+
+/// It will be opened again, later each time until a board answers.
+static void lose_port(relay_t *self, const char *words) {
+    serial_port_close(&self->port); // Which takes it out of the epoll set.
+    relay_drop_clients(self);
+    serial_link_init(&self->link, self->now_us);
+    self->out_length = 0;
+    self->out_sent = 0;
+    self->retry_us = self->now_us + self->backoff_us;
+    self->backoff_us = (self->backoff_us < BACKOFF_MAX_US / 2U) ? self->backoff_us * 2U : BACKOFF_MAX_US;
+    set_trouble(self, words);
+}
+
+/// 0, or the errno of opening it.
+static int open_port(relay_t *self) {
+    char why[512];
+    const int error =
+        serial_port_open(&self->port, self->settings->board.port, self->settings->board.baud, why, sizeof why);
+    if (error != 0) {
+        lose_port(self, why);
+        return error;
+    }
+    serial_link_init(&self->link, self->now_us);
+    self->explained_us = self->now_us + EXPLAIN_US;
+    self->asked_us = 0;
+    self->free_us = self->now_us;
+    memcpy(self->out, "\n", 1); // Ends half a line of whoever wrote before.
+    self->out_length = 1;
+    self->out_sent = 0;
+    watch_port(self, EPOLL_CTL_ADD);
+    return 0;
+}
+
+/// The board is there, or has started anew: whoever was served by the one of before is closed.
+static void greet(relay_t *self) {
+    gw_log(&self->log, GW_LOG_INFO, "board on %s: start %s, version %s", self->settings->board.port, self->link.boot,
+           (self->link.version[0] != '\0') ? self->link.version : "unknown");
+    self->backoff_us = BACKOFF_MIN_US;
+    self->trouble[0] = '\0';
+    relay_drop_clients(self);
+}
+
+static void take_news(relay_t *self, serial_news_t news, const iwn_line_t *line) {
+    switch (news) {
+    case SERIAL_NEWS_LINE:
+        relay_take_line(self, line);
+        break;
+    case SERIAL_NEWS_LINKED:
+        greet(self);
+        break;
+    case SERIAL_NEWS_LOST:
+        set_trouble(self, "the board has started anew");
+        relay_drop_clients(self);
+        self->asked_us = 0;
+        break;
+    case SERIAL_NEWS_NONE:
+    default:
+        break;
+    }
+}
+
+static void read_port(relay_t *self) {
+    char bytes[4096];
+    for (unsigned i = 0; i < READS_PER_CYCLE && self->port.fd >= 0; i++) {
+        const ssize_t count = serial_port_read(&self->port, bytes, sizeof bytes);
+        for (ssize_t n = 0; n < count; n++) {
+            iwn_line_t line;
+            const serial_news_t news = serial_link_put(&self->link, bytes[n], self->now_us, &line);
+            take_news(self, news, &line);
+        }
+        if (count < 0) {
+            lose_port(self, "the port has gone: was the cable pulled?");
+        }
+        if (count < (ssize_t)sizeof bytes) {
+            return;
+        }
+    }
+}
+
+static void tend_link(relay_t *self) {
+    char words[sizeof self->trouble];
+    if (serial_link_fell_silent(&self->link, self->now_us)) {
+        relay_drop_clients(self);
+        self->explained_us = 0;
+    }
+    if (!self->link.linked && self->now_us >= self->explained_us) {
+        self->explained_us = self->now_us + EXPLAIN_AGAIN_US;
+        serial_link_explain(&self->link, self->settings->board.port, self->settings->board.baud, words, sizeof words);
+        set_trouble(self, words);
+    }
+}
+
+/// Writes what is to be written, as far as it goes; a new line only when the ones before have left.
+static void write_port(relay_t *self) {
+    const bool waited = self->out_length > 0U;
+    while (self->port.fd >= 0) {
+        if (self->out_length == 0U && self->free_us <= self->now_us + AHEAD_US) {
+            self->out_length = relay_next_line(self, self->out, sizeof self->out);
+            self->out_sent = 0;
+        }
+        if (self->out_length == 0U) {
+            break;
+        }
+        const ssize_t count =
+            serial_port_write(&self->port, &self->out[self->out_sent], self->out_length - self->out_sent);
+        if (count < 0) {
+            lose_port(self, "the port has gone: was the cable pulled?");
+            return;
+        }
+        const uint64_t begin_us = (self->free_us > self->now_us) ? self->free_us : self->now_us;
+        self->free_us =
+            (count > 0) ? begin_us + (uint64_t)count * 10000000U / self->settings->board.baud : self->free_us;
+        self->said_us = (count > 0) ? self->now_us : self->said_us;
+        self->out_sent += (size_t)count;
+        if (self->out_sent < self->out_length) {
+            break; // Full: its next room wakes us.
+        }
+        self->out_length = 0;
+    }
+    if (self->port.fd >= 0 && (waited || self->out_length > 0U)) {
+        watch_port(self, EPOLL_CTL_MOD);
+    }
+}
+
+/// What the kernel holds back for so long is old by now, and so is all that would follow it.
+static void tend_port(relay_t *self) {
+    if (self->port.fd < 0 && self->now_us >= self->retry_us) {
+        (void)open_port(self);
+    } else if (self->port.fd >= 0 && self->out_length > 0U && self->now_us >= self->said_us + RELAY_STUCK_US &&
+               self->now_us >= self->free_us + RELAY_STUCK_US) {
+        serial_port_discard(&self->port);
+        lose_port(self, "the port takes nothing any more: does the board hang, or hold the line?");
+    }
+}
+
+// ---- the loop -----------------------------------------------------------------------------------------------------
+
+static int watch(const relay_t *self, int fd, uint64_t tag) {
+    struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
+    return (fd < 0 || epoll_ctl(self->clients.epoll_fd, EPOLL_CTL_ADD, fd, &interest) == 0) ? 0 : errno;
+}
+
+static int open_loop(relay_t *self) {
+    sigset_t set;
+    (void)sigemptyset(&set);
+    (void)sigaddset(&set, SIGTERM);
+    (void)sigaddset(&set, SIGINT);
+    (void)sigprocmask(SIG_BLOCK, &set, NULL);
+    (void)signal(SIGPIPE, SIG_IGN);
+    self->signal_fd = signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
+    const int error = gw_wakeup_open(&self->wakeup);
+    self->clients.epoll_fd = self->wakeup.fd;
+    if (self->signal_fd < 0 || error != 0 || watch(self, self->signal_fd, GW_TAG_SIGNAL) != 0 ||
+        watch(self, self->clients.listener[GW_DRIVE].fd, GW_TAG_LISTENER) != 0 ||
+        watch(self, self->clients.listener[GW_WATCH].fd, GW_TAG_WATCH_LISTENER) != 0) {
+        (void)fputs("iwheel-serial: cannot make the descriptors for the event loop; raise the limit of open files\n",
+                    stderr);
+        return EX_UNAVAILABLE;
+    }
+    return 0;
+}
+
+static uint64_t earlier(uint64_t a_us, uint64_t b_us) {
+    return (a_us < b_us) ? a_us : b_us;
+}
+
+/// When the loop must come round by itself.
+static uint64_t next_us(const relay_t *self) {
+    const bool busy = gw_clients_count(&self->clients) > 0U;
+    uint64_t then_us = self->now_us + (busy ? RELAY_ALIVE_US / 2U : IDLE_US);
+    then_us = earlier(then_us, gw_service_next_us(&self->clients));
+    if (self->port.fd < 0) {
+        return earlier(then_us, self->retry_us);
+    }
+    then_us = earlier(then_us, relay_channels_next_us(self));
+    if (!self->link.linked) {
+        return earlier(then_us, earlier(self->asked_us + RELAY_ASK_US, self->explained_us));
+    }
+    const bool waits = self->out_length == 0U && self->free_us > self->now_us + AHEAD_US;
+    return waits ? earlier(then_us, self->free_us - AHEAD_US) : then_us;
+}
+
+/// The loop was away: what its clients sent meanwhile must not be taken for new.
+static void judge_gap(relay_t *self) {
+    if (self->planned_us == 0U || self->now_us <= self->planned_us + RELAY_GAP_US) {
+        return;
+    }
+    const uint64_t away_us = self->now_us - self->planned_us;
+    self->gap_us = self->now_us;
+    if (gw_clients_count(&self->clients) == 0U) {
+        return;
+    }
+    gw_log(&self->log, GW_LOG_WARNING, "the relay was stopped or starved for %llu ms: what waited is not sent",
+           (unsigned long long)(away_us / 1000U));
+    if (away_us >= RELAY_LEFT_US) {
+        relay_drop_clients(self); // The board has closed their channels.
+    }
+}
+
+/// True if somebody wants to be let in.
+static bool note_event(relay_t *self, const struct epoll_event *event, bool *out_end) {
+    switch (event->data.u64) {
+    case GW_TAG_SIGNAL:
+        *out_end = true;
+        return false;
+    case GW_TAG_LISTENER:
+    case GW_TAG_WATCH_LISTENER:
+        return true;
+    case GW_TAG_BUS:
+        if ((event->events & (EPOLLHUP | EPOLLERR)) != 0U && self->port.fd >= 0) {
+            lose_port(self, "the port has gone: was the cable pulled?");
+        }
+        return false;
+    default: {
+        gw_client_t *client = &self->clients.client[event->data.u64 - GW_TAG_CLIENT];
+        client->readable = (event->events & (EPOLLIN | EPOLLRDHUP)) != 0U;
+        client->leaving = client->leaving || (event->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR)) != 0U;
+        client->hung_up = (event->events & (EPOLLHUP | EPOLLERR)) != 0U;
+        return false;
+    }
+    }
+}
+
+/// The clients are read before the board: a stamp that came while a command waited is not quoted by it.
+static void cycle(relay_t *self, bool somebody_knocks) {
+    gw_service_clients(&self->clients, IW_CLIENT_NONE);
+    if (self->port.fd >= 0) {
+        read_port(self);
+    }
+    tend_port(self);
+    tend_link(self);
+    if (somebody_knocks) {
+        gw_service_accept(&self->clients);
+    }
+    relay_tend_channels(self);
+    write_port(self);
+    gw_service_flush(&self->clients, IW_CLIENT_NONE);
+    bridge_service_round(&self->service, self->now_us);
+}
+
+static int loop(relay_t *self) {
+    bool ends = false;
+    bridge_service_tell(&self->service, "READY=1");
+    while (!ends) {
+        struct epoll_event events[EVENTS_PER_WAIT];
+        const uint64_t then_us = next_us(self);
+        bool knocks = false;
+        self->planned_us = (then_us > self->now_us) ? then_us : self->now_us;
+        const int count =
+            gw_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, gw_service_is_busy(&self->clients) ? 0U : then_us);
+        if (count < 0) {
+            if (errno != EINTR) {
+                return EX_SOFTWARE;
+            }
+            continue; // It has found nothing out: what waits is not to be taken for new.
+        }
+        self->now_us = iw_clock_now_us();
+        self->clients.now_us = self->now_us;
+        judge_gap(self);
+        for (int i = 0; i < count; i++) {
+            knocks = note_event(self, &events[i], &ends) || knocks;
+        }
+        cycle(self, knocks);
+    }
+    return 0;
+}
+
+// ---- begin and end ------------------------------------------------------------------------------------------------
+
+static int open_sockets(relay_t *self) {
+    const serial_settings_t *settings = self->settings;
+    const gw_listener_wish_t drive = {"iwheel-serial", GW_DRIVE, settings->northbound.socket,
+                                      settings->northbound.group, settings->northbound.mode};
+    const gw_listener_wish_t watching = {"iwheel-serial", GW_WATCH, settings->northbound.watch_socket,
+                                         settings->northbound.watch_group, settings->northbound.watch_mode};
+    gw_listener_t *listener = self->clients.listener;
+    int result = gw_listener_prepare(&listener[GW_DRIVE], &drive, stderr);
+    result = (result != 0) ? result : gw_listener_open(&listener[GW_DRIVE], &self->log, stderr);
+    if (result == 0 && strcmp(watching.path, "none") != 0) {
+        result = gw_listener_prepare(&listener[GW_WATCH], &watching, stderr);
+        result = (result != 0) ? result : gw_listener_open(&listener[GW_WATCH], &self->log, stderr);
+    }
+    return result;
+}
+
+static void compose(relay_t *self, const serial_settings_t *settings) {
+    memset(self, 0, sizeof *self);
+    self->settings = settings;
+    self->port.fd = -1;
+    self->clients.servant = relay_servant(self);
+    self->clients.log = &self->log;
+    self->clients.most[GW_DRIVE] = settings->northbound.max_clients;
+    self->clients.most[GW_WATCH] = settings->northbound.max_watchers;
+    for (unsigned right = 0; right < GW_RIGHTS; right++) {
+        self->clients.listener[right] = (gw_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
+    }
+    self->backoff_us = BACKOFF_MIN_US;
+    self->now_us = iw_clock_now_us();
+    self->clients.now_us = self->now_us;
+    gw_log_open(&self->log, GW_LOG_INFO);
+    self->log.program = "iwheel-serial";
+}
+
+/// The port first: who cannot have it must not take the sockets either. One that is not there yet may come.
+static int open_all(relay_t *self) {
+    int result = open_loop(self);
+    if (result == 0 && open_port(self) == EBUSY) {
+        return EX_UNAVAILABLE; // Has been said.
+    }
+    return result;
+}
+
+int relay_run(relay_t *self, const serial_settings_t *settings) {
+    compose(self, settings);
+    int result = open_sockets(self);
+    result = (result != 0) ? result : open_all(self);
+    if (result == 0) {
+        bridge_service_open(&self->service);
+        gw_log(&self->log, GW_LOG_INFO, "%s at %u bit/s, clients on %s", settings->board.port,
+               (unsigned)settings->board.baud, settings->northbound.socket);
+        result = loop(self);
+        bridge_service_tell(&self->service, "STOPPING=1");
+        relay_drop_clients(self);
+        write_port(self); // As far as it goes: the board also ends who says nothing.
+        gw_service_close_all(&self->clients);
+    }
+    serial_port_close(&self->port);
+    gw_listener_close(&self->clients.listener[GW_WATCH]);
+    gw_listener_close(&self->clients.listener[GW_DRIVE]);
+    gw_log_close(&self->log);
+    return result;
+}

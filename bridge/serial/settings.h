@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+/// What may be configured of the relay: share/serial.conf.
+#ifndef IW_SERIAL_SETTINGS_H
+#define IW_SERIAL_SETTINGS_H
+
+#include "settings/settings.h"
+
+/// Read when no `-c FILE` is given. Its absence is no error then.
+#define SERIAL_SETTINGS_PATH "/etc/iwheel/serial.conf"
+
+typedef struct {
+    struct {
+        char port[108];
+        uint32_t baud;
+    } board;
+    struct {
+        char socket[SETTINGS_PATH_SIZE];
+        uint16_t mode;
+        char group[33];
+        uint32_t max_clients;
+        char watch_socket[SETTINGS_PATH_SIZE]; ///< none: there is none.
+        uint16_t watch_mode;
+        char watch_group[33];
+        uint32_t max_watchers;
+    } northbound;
+} serial_settings_t;
+
+void serial_settings_default(serial_settings_t *out_settings);
+
+extern const settings_form_t serial_settings_form;
+
+#endif

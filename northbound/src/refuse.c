@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel_northbound/refuse.h"
+
+#include "iwheel_northbound/why.h"
+
+/// Where a message is being written.
+typedef struct {
+    const iwn_refuse_context_t *context;
+    const iw_snapshot_t *seen;
+    const iwn_request_t *request;
+    iwn_text_t text;
+} wording_t;
+
+#define SAY(self, ...) IWN_TEXT_JOIN(&(self)->text, __VA_ARGS__)
+
+static void number(wording_t *self, const char *before, int64_t value, const char *after) {
+    SAY(self, before);
+    iwn_text_int(&self->text, value);
+    SAY(self, after);
+}
+
+static int64_t ms_since(const wording_t *self, iw_time_us_t then_us) {
+    return (then_us < self->seen->at_us) ? (int64_t)((self->seen->at_us - then_us) / IW_US_PER_MS) : 0;
+}
+
+static void say_holder(wording_t *self) {
+    const iw_snapshot_t *seen = self->seen;
+    const bool over = seen->arming || seen->lease_until_us <= seen->at_us;
+    SAY(self, self->context->holder);
+    number(self, " holds the lease for another ",
+           over ? 0 : (int64_t)((seen->lease_until_us - seen->at_us) / IW_US_PER_MS),
+           " ms at least; let it stop first, or, with the wheels at rest, arm with takeover");
+}
+
+static void say_not_armed(wording_t *self) {
+    const iw_stop_t *stop = self->seen->stop;
+    const char *by = self->context->stopped_by;
+    if (self->context->shutting_down) {
+        SAY(self, "not armed: the gateway is shutting down");
+        return;
+    }
+    SAY(self, "not armed (", iwn_state_name(self->seen->state), ")");
+    if (stop->number == 0U) {
+        SAY(self, "; arm first");
+        return;
+    }
+    number(self, "; the last stop was ", ms_since(self, stop->at_us), " ms ago: ");
+    SAY(self, iwn_cause_name(stop->cause));
+    if (stop->cause == IW_CAUSE_CLIENT_STOP && by != NULL) {
+        SAY(self, ", asked for by ", by);
+    }
+    SAY(self, ". Arm first");
+}
+
+static void say_estop(wording_t *self) {
+    SAY(self, "the e-stop ", self->context->estop,
+        (self->context->estop_answer < 0)
+            ? " cannot be read, which counts as pressed; check its wire, then: iwheelctl reset"
+            : " is pressed; release the button, then: iwheelctl reset");
+}
+
+static void say_lost(wording_t *self) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const iw_snapshot_wheel_t *wheel = &self->seen->wheel[side];
+        if (wheel->heard) {
+            continue;
+        }
+        SAY(self, "the ", (side == IW_LEFT) ? "left" : "right");
+        if (wheel->speed_us == IW_NEVER) {
+            SAY(self, " wheel was never heard; ");
+        } else {
+            number(self, " wheel was last heard ", ms_since(self, wheel->speed_us), " ms ago; ");
+        }
+    }
+    SAY(self, "check its power, cable and termination");
+}
+
+static void say_not_at_rest(wording_t *self) {
+    const iw_snapshot_t *seen = self->seen;
+    number(self, "the wheels turn or are told to: left ", seen->wheel[IW_LEFT].told->speed.speed_rpm, " rpm, told ");
+    number(self, "", seen->applied.wheel[IW_LEFT].speed_mm_s, " mm/s; right ");
+    number(self, "", seen->wheel[IW_RIGHT].told->speed.speed_rpm, " rpm, told ");
+    number(self, "", seen->applied.wheel[IW_RIGHT].speed_mm_s, " mm/s; wait until both stand for ");
+    number(self, "", seen->config->rest_ms, " ms");
+}
+
+static void say_stalled(wording_t *self) {
+    const iw_time_us_t waiting_us = self->seen->waiting_us;
+    const char *more = self->context->stalled_cure;
+    if (waiting_us == IW_NEVER) {
+        number(self, "the zero setpoints were not acknowledged on the bus within ", self->seen->config->echo_ms, " ms");
+    } else {
+        number(self, "a setpoint has been waiting for ", ms_since(self, waiting_us),
+               " ms to be acknowledged on the bus");
+    }
+    SAY(self, "; check that the wheels have power and the bus is terminated");
+    if (waiting_us != IW_NEVER && more != NULL) {
+        SAY(self, more);
+    }
+}
+
+static void say_stale(wording_t *self) {
+    if (self->request->cmd == IWN_CMD_DRIVE || self->request->cmd == IWN_CMD_TWIST) {
+        SAY(self, "this command was sent before arm was answered; wait for that answer, then command anew");
+        return;
+    }
+    SAY(self, self->context->stale_client);
+    number(self, " sent a nonzero drive command ", ms_since(self, self->seen->stale_us), " ms ago");
+    number(self, "; let go of the stick, wait ", IW_STALE_COMMAND_US / IW_US_PER_MS, " ms, try again");
+}
+
+static void say_second_master(wording_t *self) {
+    number(self, "somebody else sent a setpoint (id 266 = 0x10A or 298 = 0x12A) ",
+           ms_since(self, self->seen->seen_us[IW_CAUSE_SECOND_MASTER]),
+           " ms ago; switch the other sender off, wait a second");
+}
+
+/// Whoever keeps stopping is to be found, whatever way it came in.
+static void say_estopped(wording_t *self) {
+    number(self, "estop_software was asked for ", ms_since(self, self->context->estopped_us), " ms ago by ");
+    SAY(self, self->context->estopped_by, "; end that program if it keeps asking, and wait a second");
+}
+
+static void say_present(wording_t *self) {
+    const uint32_t present = self->seen->present;
+    for (unsigned cause = 0; cause < IW_CAUSES; cause++) {
+        if ((present & (1U << cause)) == 0U) {
+            continue;
+        }
+        if (cause == IW_CAUSE_ESTOP_SOFTWARE && self->context->estopped_by != NULL) {
+            say_estopped(self);
+            return;
+        }
+        SAY(self, iwn_cause_name((iw_cause_t)cause));
+        number(self, " was seen ", ms_since(self, self->seen->seen_us[cause]), " ms ago; ");
+        SAY(self, iwn_why_cure((iw_cause_t)cause), ", and wait a second");
+        return;
+    }
+    number(self, "zeros are still being sent because the gateway died while armed; wait ",
+           self->seen->config->zero_hold_ms, " ms");
+}
+
+static void say_out_of_range(wording_t *self) {
+    const iwn_request_t *request = self->request;
+    if (request->cmd == IWN_CMD_TWIST) {
+        number(self, "", request->v_mm_s, " mm/s with ");
+        number(self, "", request->yaw_mrad_s, " mrad/s makes a wheel faster than 32767 mm/s; nothing was applied");
+        return;
+    }
+    number(self, "left ", request->left_mm_s, " mm/s, right ");
+    number(self, "", request->right_mm_s, " mm/s: allowed are -32768..32767 mm/s and ");
+    SAY(self, (self->seen->config->current_role == IW_ROLE_SETPOINT) ? "-2000..2000" : "0..2000",
+        " mA; nothing was applied");
+}
+
+static void say_type(wording_t *self) {
+    const bool type = self->seen->config->setpoint_type_set;
+    const bool role = self->seen->config->current_role != IW_ROLE_UNSET;
+    const char *it = (type || role) ? "it" : "them";
+    SAY(self, type ? "" : "setpoint_type", (type || role) ? "" : " and ", role ? "" : "current_role",
+        " not configured, and the wheels' document leaves ", it, " open; set ", it, " ", self->context->configure);
+}
+
+static void say_bus_down(wording_t *self) {
+    SAY(self, "bus ", self->context->bus, " is ", iwn_bus_state_name(self->seen->bus), "; ", self->context->bus_cure);
+}
+
+static void say_timing(wording_t *self) {
+    SAY(self, self->context->timing);
+}
+
+static void say_missing(wording_t *self) {
+    SAY(self, (self->request->cmd == IWN_CMD_TWIST) ? "twist" : "drive",
+        " needs currents because current_role is setpoint: use drive with left_mA and right_mA");
+}
+
+/// The last stop still holds.
+static void say_stop(wording_t *self) {
+    SAY(self, (self->seen->state == IW_STATE_LATCHED) ? "latched: " : "stopped: ", self->context->last_stop);
+}
+
+static void say_listen_only(wording_t *self) {
+    SAY(self, self->context->listen_only);
+}
+
+static void say_contradicted(wording_t *self) {
+    SAY(self, self->context->contradiction);
+}
+
+void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_t *request, iw_refusal_t refusal,
+                         iwn_refusal_t *out_refusal) {
+    static void (*const say[IW_REFUSALS])(wording_t * self) = {
+        [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range, [IW_REFUSE_MISSING_FIELD] = say_missing,
+        [IW_REFUSE_NOT_HOLDER] = say_holder,         [IW_REFUSE_BUSY] = say_holder,
+        [IW_REFUSE_NOT_ARMED] = say_not_armed,       [IW_REFUSE_LATCHED] = say_stop,
+        [IW_REFUSE_ESTOP_PRESSED] = say_estop,       [IW_REFUSE_BUS_DOWN] = say_bus_down,
+        [IW_REFUSE_TIMING_MISMATCH] = say_timing,    [IW_REFUSE_WHEEL_LOST] = say_lost,
+        [IW_REFUSE_WHEEL_BLOCKED] = say_stop,        [IW_REFUSE_NOT_AT_REST] = say_not_at_rest,
+        [IW_REFUSE_SEND_STALLED] = say_stalled,      [IW_REFUSE_SECOND_MASTER] = say_second_master,
+        [IW_REFUSE_CAUSE_PRESENT] = say_present,     [IW_REFUSE_TYPE_NOT_SET] = say_type,
+        [IW_REFUSE_STALE_COMMAND] = say_stale,       [IW_REFUSE_LISTEN_ONLY] = say_listen_only,
+        [IW_REFUSE_CONTRADICTED] = say_contradicted,
+    };
+    wording_t wording = {context, context->seen, request,
+                         iwn_text_begin(out_refusal->message, sizeof out_refusal->message)};
+    out_refusal->error = iwn_error_of(refusal);
+    if ((unsigned)refusal < IW_REFUSALS && say[refusal] != NULL) {
+        say[refusal](&wording);
+    } else {
+        number(&wording, "refused for a reason that has no name (", (int64_t)refusal, "); report this");
+    }
+}
+
+void iwn_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *out_refusal) {
+    static const struct {
+        iwn_error_t error;
+        const char *why;
+    } reasons[] = {
+        [IW_TARE_OK] = {IWN_OK, ""},
+        [IW_TARE_NO_FORCE] =
+            {IWN_WHEEL_LOST,
+             "has not sent force for two seconds without a gap; check its power and cable, wait two seconds"},
+        [IW_TARE_MOVING] = {IWN_NOT_AT_REST, "turned within the last two seconds; let it stand, wait two seconds"},
+        [IW_TARE_NOISY] = {IWN_DENIED, "has an unsteady force; let go of the machine, wait two seconds"},
+        [IW_TARE_LOADED] = {IWN_DENIED,
+                            "carries a load far from its earlier zero; let go of the machine, wait two seconds"},
+        [IW_TARE_SATURATED] = {IWN_DENIED, "shows a force at the end of its range; check the sensor"},
+    };
+    const bool known = (size_t)result < sizeof reasons / sizeof reasons[0];
+    iwn_text_t text = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    out_refusal->error = known ? reasons[result].error : IWN_INTERNAL;
+    IWN_TEXT_JOIN(&text, "the ", (side == IW_LEFT) ? "left" : "right", " wheel ",
+                  known ? reasons[result].why : "cannot be tared", "; nothing was changed");
+}

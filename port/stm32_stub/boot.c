@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+#include "boot.h"
+
+#include "board.h"
+
+#define UNIQUE_ID ((const volatile uint32_t *)IW_BOARD_UNIQUE_ID_ADDRESS) // 96 bits.
+
+__attribute__((section(".noinit"))) static volatile uint32_t count, inverse;
+
+/// One to one, so that two counts never give the same; the constants are those of a well-known mixer (splitmix64).
+static uint64_t mix(uint64_t value) {
+    value = (value ^ value >> 30) * 0xBF58476D1CE4E5B9U;
+    value = (value ^ value >> 27) * 0x94D049BB133111EBU;
+    return value ^ value >> 31;
+}
+
+uint64_t iw_boot_id(uint32_t power_ons) {
+    static uint64_t id;
+    if (id == 0U) {
+        count = (count == ~inverse) ? count + 1U : 1U;
+        inverse = ~count;
+        id = mix(mix(((uint64_t)UNIQUE_ID[0] << 32 | UNIQUE_ID[1]) ^ UNIQUE_ID[2]) + ((uint64_t)power_ons << 32) +
+                 count);
+    }
+    return id;
+}

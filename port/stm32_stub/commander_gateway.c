@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+// The image that a host drives over the serial line: in the place of a command source, and of report and console, for
+// the serial port is the host's.
+#include "commander.h"
+
+#include "bit_rate.h"
+#include "boot.h"
+#include "console.h"
+#include "cortex_m.h"
+#include "host.h"
+#include "kept.h"
+#include "pins.h"
+#include "report.h"
+#include "serial.h"
+
+/// Of a machine whose builder did not say; only twist needs it.
+#ifndef IWHEEL_TRACK_MM
+#define IWHEEL_TRACK_MM 540U
+#endif
+
+static_assert(IW_BOARD_APB1_HZ >= 16U * IW_SERIAL_BAUD,
+              "the USART's clock is 16 times its rate at the least: lower IWHEEL_BAUD");
+
+/// 40 % of the line's bytes, so that replies pass.
+#define RATE_MAX_HZ ((IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES > 0U) ? IW_SERIAL_BAUD / 25U / IW_HOST_LINE_BYTES : 1U)
+
+static iw_host_t host;
+static iw_kept_t kept;
+static bool is_begun;
+static bool is_complete; // It is configured well enough to send.
+static uint32_t track_mm = IWHEEL_TRACK_MM;
+
+const char *iw_commander_words(void) {
+    return "is driven over the serial line";
+}
+
+/// An image that cannot send listens without acknowledging.
+bool iw_commander_sends(void) {
+    return is_complete;
+}
+
+/// The counter of the power-ons is behind the name of this start, so that it is written before that name is told. The
+/// number of starts since then is kept in RAM.
+void iw_commander_open(bool power_on) {
+    iw_kept_open(&kept, power_on);
+}
+
+void iw_commander_configure(iw_config_t *config) {
+    if (kept.has_settings) {
+        track_mm = iw_settings_to(&kept.settings, config);
+    }
+    kept.settings = iw_settings_from(config, track_mm);
+    is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
+}
+
+bool iw_host_keep(const iw_settings_t *settings) {
+    return iw_kept_commit(&kept, settings);
+}
+
+static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
+    static char estop[] = "PA0";
+    estop[1] = (char)('A' + IW_BOARD_ESTOP / 16U);
+    const iw_host_place_t place = {
+        .gateway = gateway,
+        .version = IWHEEL_VERSION,
+        .bus = "can",
+        .estop = estop,
+        .bitrate_hz = IW_BOARD_APB1_HZ / IW_BIT_PRESCALER / IW_BIT_QUANTA,
+        .sample_point_permille = (1U + IW_BIT_BS1) * 1000U / IW_BIT_QUANTA,
+        .settings = kept.settings,
+        .track_mm = track_mm,
+        .rate_max_hz = RATE_MAX_HZ,
+        .boot = iw_boot_id(kept.power_ons),
+    };
+    iw_host_init(&host, &place, now_us);
+    is_begun = true;
+}
+
+void iw_commander_step(iw_commander_t *self, iw_gateway_t *gateway, iw_time_us_t now_us) {
+    (void)self;
+    if (!is_begun) {
+        begin(gateway, now_us);
+    }
+    if (iw_host_take(&host, now_us)) {
+        iw_wake(); // More lines wait: once round the loop, with its look at the e-stop, and then they.
+    }
+}
+
+void iw_report_step(const iw_snapshot_t *seen, bool estop_pressed) {
+    (void)iw_host_tell(&host, seen, estop_pressed);
+    if (iw_host_wants_restart(&host)) {
+        iw_system_reset();
+    }
+}
+
+/// The host is told by the event `link`, once there is a clock for the serial line.
+void iw_report_start(bool restarted) {
+    (void)restarted;
+}
+
+void iw_report_no_crystal(void) {}
+
+/// The internal oscillator is too slow for fast lines and too inexact for all of them.
+void iw_console_start(uint32_t apb1_hz) {
+    if (apb1_hz == IW_BOARD_APB1_HZ) {
+        iw_serial_start(apb1_hz);
+    }
+}
+
+bool iw_console_step(void) {
+    if (is_begun) {
+        iw_serial_step();
+    }
+    return false; // The DMA's end wakes the loop.
+}

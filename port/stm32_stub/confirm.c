@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+// The assumption ledger for clients: the operator's word on an item, and how an entry is told.
+#include "host.h"
+
+#include <string.h>
+
+/// Nobody measures a tyre better.
+#define TOLERANCE_PERCENT 2U
+
+/// Where an item is configured; NULL: nowhere, and its value is "yes".
+static const char *key_of(iw_ledger_item_t item) {
+    static const char *const keys[IW_LEDGER_ITEMS] = {
+        [IW_LEDGER_SETPOINT_TYPE] = "wheels.setpoint_type", [IW_LEDGER_CURRENT_ROLE] = "wheels.current_role",
+        [IW_LEDGER_FORCE_UNIT_LEFT] = "left.force_unit",    [IW_LEDGER_FORCE_UNIT_RIGHT] = "right.force_unit",
+        [IW_LEDGER_MOUNT_SIGN_LEFT] = "left.invert",        [IW_LEDGER_MOUNT_SIGN_RIGHT] = "right.invert",
+        [IW_LEDGER_WHEEL_RADIUS] = "wheels.radius_mm",      [IW_LEDGER_TRACK] = "wheels.track_mm",
+        [IW_LEDGER_GEAR_RATIO] = "wheels.gear_ratio",
+    };
+    return keys[item];
+}
+
+static bool is_near(uint32_t found, uint32_t wanted) {
+    const uint32_t off = (found > wanted) ? found - wanted : wanted - found;
+    return off * 100U <= wanted * TOLERANCE_PERCENT;
+}
+
+/// Whether what was found is what is in force. Only the item's own key differs between the two.
+static bool is_same(iw_ledger_item_t item, const iw_settings_t *found, const iw_settings_t *wanted) {
+    iw_config_t one;
+    iw_config_t other;
+    const uint32_t track_mm = iw_settings_to(found, &one);
+    const uint32_t wanted_mm = iw_settings_to(wanted, &other);
+    switch (item) {
+    case IW_LEDGER_WHEEL_RADIUS:
+        return is_near(one.radius_mm, other.radius_mm);
+    case IW_LEDGER_TRACK:
+        return is_near(track_mm, wanted_mm);
+    case IW_LEDGER_GEAR_RATIO:
+        return (uint32_t)one.gear_turns * other.gear_per == (uint32_t)other.gear_turns * one.gear_per;
+    default:
+        return memcmp(found, wanted, sizeof *found) == 0;
+    }
+}
+
+static bool has_failed(iw_host_t *self, iwn_error_t error, const char *text) {
+    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
+    self->refusal.error = error;
+    IWN_TEXT_JOIN(&why, text);
+    return false;
+}
+
+/// False, with `self->refusal`, if the request's value is none of the item's.
+static bool compare(iw_host_t *self, bool *out_same) {
+    const iwn_request_t *const request = &self->request;
+    const char *const key = key_of(request->item);
+    const bool is_told = request->value[0] != '\0';
+    char value[IW_SETTINGS_TEXT];
+    iw_settings_t found = self->place.settings;
+    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
+    *out_same = true;
+    self->refusal.error = IWN_BAD_VALUE;
+    if (key == NULL) {
+        *out_same = !is_told || strcmp(request->value, "yes") == 0;
+        return *out_same || strcmp(request->value, "no") == 0 ||
+               has_failed(self, IWN_BAD_VALUE, "value must be yes or no; leave it out to confirm it");
+    }
+    if (!iw_settings_value(&self->place.settings, key, value)) {
+        return has_failed(self, IWN_TYPE_NOT_SET,
+                          "it is not configured, so there is nothing to confirm; set it by the request config first");
+    }
+    if (is_told && !iw_settings_set(&found, key, request->value, &why)) {
+        return false;
+    }
+    *out_same = is_same(request->item, &found, &self->place.settings);
+    return true;
+}
+
+void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json) {
+    const iw_ledger_entry_t *const entry = &iw_host_look(self)->assumed[item];
+    const char *const key = key_of(item);
+    char value[IW_SETTINGS_TEXT] = "yes";
+    const bool is_set = key == NULL || iw_settings_value(&self->place.settings, key, value);
+    iwn_out_text(json, "item", iwn_ledger_item_name(item));
+    iwn_out_text(json, "state", iwn_ledger_state_name(entry->state));
+    iwn_out_text(json, "evidence", iwn_evidence_name(entry->evidence));
+    iwn_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
+    iwn_out_text(json, "value", is_set ? value : NULL);
+    iwn_out_null(json, "found");
+    iwn_out_null(json, "how");
+    iwn_out_null(json, "since_wall_us");
+    iwn_out_null(json, "reason");
+    iwn_out_null(json, "disabled");
+}
+
+void iw_answer_confirm(iw_host_t *self, iw_host_client_t *client) {
+    bool same;
+    if (!compare(self, &same)) {
+        iw_host_send_refusal(self, client, &self->request.id);
+        return;
+    }
+    const iw_ledger_entry_t entry = {same ? IW_LEDGER_CONFIRMED : IW_LEDGER_CONTRADICTED, IW_EVIDENCE_OPERATOR, 0};
+    iw_gateway_know(self->place.gateway, self->request.item, &entry);
+    iwn_out_t json = iw_host_begin_reply(self, &self->request.id);
+    iw_host_write_item(self, self->request.item, &json);
+    iw_host_send_reply(self, client, &json);
+}

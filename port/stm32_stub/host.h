@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: MIT
+/// The host on the other end of the serial line: several clients on numbered channels (docs/serial.md), each with
+/// its own requests, replies and events of the northbound protocol, and one lease among them.
+///
+///     CLOSED --open--> OPEN --close | link | relay silent--> CLOSED
+///
+/// Nothing of a line is believed before its CRC is right, and no command that moves unless it quotes this start of the
+/// board, a number that its channel has not had yet, and a stamp that is younger than the lease and than the channel: a
+/// line that was held up, doubled or kept from before feeds nothing. The lease runs from that stamp, not from when the
+/// line came.
+///
+/// Out: replies before events; what does not fit is dropped and counted. A snapshot is too long for the ring of small
+/// lines and is lent to the DMA from a buffer of its own, one at a time: who asks for it meanwhile is owed it.
+///
+/// No heap; one instance, all zero before `iw_host_init`; everything from the main loop.
+#ifndef IW_STM32_HOST_H
+#define IW_STM32_HOST_H
+
+#include "settings.h"
+
+#include "iwheel/gateway.h"
+#include "iwheel_northbound/line.h"
+#include "iwheel_northbound/refuse.h"
+#include "iwheel_northbound/tell.h"
+
+/// The longest line to the host, with its newline: told by the event link.
+#define IW_HOST_LINE_BYTES 4608U
+/// The longest line but a snapshot's.
+#define IW_HOST_SMALL_BYTES 1664U
+/// What events leave free of the line, for replies.
+#define IW_HOST_REPLY_ROOM 768U
+/// Lines that are carried out in one call at the most, so that the e-stop is looked at between them.
+#define IW_HOST_LINES_AT_ONCE 4U
+/// The event `link` comes this often, and with an armed client whenever nothing else has been stamped for so long:
+/// a command cannot quote a younger stamp than it has heard.
+#define IW_HOST_LINK_US       1000000U
+#define IW_HOST_LINK_ARMED_US 25000U
+/// At most one line_error in this time.
+#define IW_HOST_ERROR_US 200000U
+/// The answer to a commit has left by then, or nobody takes it.
+#define IW_HOST_RESTART_US 500000U
+
+/// A client of the relay's.
+typedef struct {
+    iw_client_t id; ///< IW_CLIENT_NONE: closed.
+    bool watches_only;
+    bool arming;      ///< An arm of its was granted and waits for its TX confirmation.
+    bool owed_status; ///< It asked for a snapshot, and
+    bool owed_state;  ///< its subscription is due one; the line was taken.
+    bool has_seq;     ///< `seq` is one.
+    uint8_t topics;   ///< Bit per iwn_topic_t.
+    uint32_t rate_hz; ///< Of state and force.
+    uint32_t lost;    ///< Lines dropped and not told yet.
+    uint64_t seq;     ///< Of its newest command.
+    iw_time_us_t opened_us;
+    iw_time_us_t next_us; ///< When state and force are due.
+    iwn_id_t arm_id;
+    iwn_id_t status_id;
+    char name[IWN_NAME_MAX + 1U];
+} iw_host_client_t;
+
+/// What was last told to those who watch.
+typedef struct {
+    iw_state_t state;
+    iw_bus_state_t bus;
+    iw_client_t holder;
+    uint32_t present;
+    uint32_t stop_number;
+    uint32_t still_moving;
+    uint32_t assumed_changes;
+    uint8_t assumed[IW_LEDGER_ITEMS]; ///< iw_ledger_state_t.
+    bool left_behind;
+    bool estop_high;
+    bool started;
+    char holder_name[IWN_NAME_MAX + 1U];
+} iw_host_told_t;
+
+/// Where the image runs.
+typedef struct {
+    iw_gateway_t *gateway;
+    const char *version;
+    const char *bus;     ///< Name of the bus, for messages.
+    const char *estop;   ///< Name of the e-stop's pin.
+    uint32_t bitrate_hz; ///< Of the bus.
+    uint32_t sample_point_permille;
+    iw_settings_t settings; ///< In force.
+    uint32_t track_mm;      ///< Between the wheels, for twist.
+    uint32_t rate_max_hz;   ///< Of snapshots that the serial line carries beside replies.
+    uint64_t boot;          ///< Another one at every start.
+} iw_host_place_t;
+
+typedef struct {
+    iw_host_place_t place;
+    iw_host_client_t client[IWN_LINE_CHANNELS]; ///< Channel 1 is the first.
+    iwn_receiver_t receiver;
+    char in[IWN_LINE_BOARD_MAX];
+    iw_time_us_t now_us;
+    iw_time_us_t heard_us;    ///< When the last good line came.
+    iw_time_us_t linked_us;   ///< When the last `link` was written.
+    iw_time_us_t stamped_us;  ///< When any line was.
+    iw_time_us_t error_us;    ///< When the last line_error was written.
+    uint32_t errors;          ///< Bad lines since the start.
+    uint32_t errors_told;     ///< Of them, those that a line_error has counted.
+    iwn_line_verdict_t fault; ///< Of the last of them.
+    iw_client_t last_id;
+    uint8_t next_owed; ///< Whose turn it is to have the long line, so that nobody keeps it.
+    bool estop_high;   ///< The level of the e-stop's pin.
+    iw_host_told_t told;
+    uint32_t lease_us;
+    iw_snapshot_t seen; ///< Of iw_host_look: too large for the stack.
+    iwn_request_t request;
+    iwn_refusal_t refusal;
+    iwn_stop_note_t stop;
+    iw_time_us_t stopped_us, estopped_us; ///< When a client last asked; 0: never.
+    iw_client_t stopped_by, estopped_by;
+    char estop_reason[IWN_REASON_MAX + 1U];
+    iw_settings_t staged; ///< By `config`; in force after a commit and the start that follows it.
+    bool has_staged;
+    iw_time_us_t restart_us; ///< A commit was answered: begin anew then, or when the answer is on the wire; 0: not.
+    union {
+        iwn_work_t work;                   ///< While a request is read, ...
+        char texts[4][IWN_NAME_MAX + 32U]; ///< then names for a sentence, ...
+        char small[IW_HOST_SMALL_BYTES];   ///< and at last the line with the reply or event.
+    } scratch;
+    char big[IW_HOST_LINE_BYTES]; ///< Lent to the serial line.
+} iw_host_t;
+
+/// Nobody is there yet.
+void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t now_us);
+
+/// Right before a step of the gateway: ends what must end, and carries out what came, in its order. True if there may
+/// be more: come again at once.
+bool iw_host_take(iw_host_t *self, iw_time_us_t now_us);
+
+/// Right after the step: answers the arms that it decided, tells what changed, and what is due. Returns when to come
+/// again at the latest.
+iw_time_us_t iw_host_tell(iw_host_t *self, const iw_snapshot_t *seen, bool estop_high);
+
+// For the files of this part.
+
+/// A line for that client: its JSON is begun as iwn_tell_reply and iwn_tell_event do it, and ended by one of the two
+/// below.
+iwn_out_t iw_host_begin_reply(iw_host_t *self, const iwn_id_t *id);
+iwn_out_t iw_host_begin_event(iw_host_t *self, const char *name);
+void iw_host_send_reply(iw_host_t *self, iw_host_client_t *client, iwn_out_t *json);
+/// To all who watch the topic.
+void iw_host_send_event(iw_host_t *self, iwn_topic_t topic, iwn_out_t *json);
+/// To one.
+void iw_host_send_event_to(iw_host_t *self, iw_host_client_t *client, iwn_out_t *json);
+void iw_host_send_refusal(iw_host_t *self, iw_host_client_t *client, const iwn_id_t *id);
+
+/// How many lines it has missed, if there is room to say so.
+void iw_host_tell_lost(iw_host_t *self, iw_host_client_t *client);
+/// Who speaks here, on the link, whatever client there is.
+void iw_host_tell_link(iw_host_t *self);
+/// Bad lines since the last time, if that is not too short ago.
+void iw_host_tell_fault(iw_host_t *self);
+
+/// Writes a snapshot into the line that is lent, if it is free: as reply with `id`, or as event `state` (NULL).
+void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id);
+
+/// Of this moment, until the next call.
+const iw_snapshot_t *iw_host_look(iw_host_t *self);
+iwn_surroundings_t iw_host_around(const iw_host_t *self, const iw_snapshot_t *seen);
+iw_host_client_t *iw_host_find(iw_host_t *self, iw_client_t id);
+
+/// `"joystick" (client 3)`, into one of `self->scratch.texts`.
+const char *iw_host_name(iw_host_t *self, iw_client_t id, unsigned text);
+
+/// By the image: keeps a configuration for the next start. False: it could not, and the one of before stays.
+bool iw_host_keep(const iw_settings_t *settings);
+
+/// True once the board is to begin anew.
+bool iw_host_wants_restart(const iw_host_t *self);
+
+/// Carries out `self->request`. `quote` is NULL if the line had none.
+void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote);
+/// Carries out `confirm`: the operator's word on an assumption, for this run.
+void iw_answer_confirm(iw_host_t *self, iw_host_client_t *client);
+/// Of the ledger, into an object that is open.
+void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json);
+/// Answers an arm that was granted and then failed or succeeded.
+void iw_answer_arming(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen);
+/// Refuses `self->request` for the core's reason.
+void iw_answer_refuse(iw_host_t *self, iw_host_client_t *client, iw_refusal_t refusal);
+
+/// Tells what has changed since the last call.
+void iw_observe(iw_host_t *self, const iw_snapshot_t *seen);
+
+#endif

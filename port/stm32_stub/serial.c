@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+#include "serial.h"
+
+#include "cortex_m.h"
+
+#include <stdatomic.h>
+#include <string.h>
+
+typedef struct {
+    volatile uint32_t SR, DR, BRR, CR1, CR2, CR3;
+} usart_t;
+
+#define USART2 ((usart_t *)0x40004400U)
+#define ERRORS (7U << 1) // SR: framing, noise, overrun.
+#define TC     (1U << 6)
+#define RE     (1U << 2) // CR1
+#define TE     (1U << 3)
+#define IDLEIE (1U << 4)
+#define UE     (1U << 13)
+#define EIE    (1U << 0) // CR3
+#define DMAR   (1U << 6)
+#define DMAT   (1U << 7)
+
+static_assert((IW_SERIAL_RECEIVE_BYTES & (IW_SERIAL_RECEIVE_BYTES - 1U)) == 0U &&
+                  (IW_SERIAL_SEND_BYTES & (IW_SERIAL_SEND_BYTES - 1U)) == 0U,
+              "the indices wrap at a power of two");
+
+// The DMA writes and reads these, and the interrupts' handlers have no argument: so they stand at file scope.
+static char received[IW_SERIAL_RECEIVE_BYTES];
+static char waiting[IW_SERIAL_SEND_BYTES];
+static uint32_t taken;     // Where the next byte received is read.
+static uint32_t put, sent; // Bytes of `waiting` since the start.
+static uint32_t sending;   // Of them, how many the DMA has now.
+static const char *lent;   // A buffer of somebody else's; NULL: none.
+static uint32_t lent_bytes;
+static uint32_t lent_at; // It goes before this byte of `waiting`.
+static bool lent_is_sending;
+static atomic_bool had_error;
+
+void iw_serial_start(uint32_t apb1_hz) {
+    USART2->CR1 = 0;
+    taken = put = sent = sending = 0;
+    lent = NULL;
+    lent_is_sending = false;
+    USART2->BRR = (apb1_hz + IW_SERIAL_BAUD / 2U) / IW_SERIAL_BAUD; // 27.3.4: sixteenths.
+    USART2->CR3 = DMAR | DMAT | EIE;
+    iw_serial_dma_start(&USART2->DR, received, sizeof received);
+    USART2->CR1 = UE | TE | RE | IDLEIE;
+    iw_irq_enable(IW_IRQ_SERIAL_RECEIVE);
+    iw_irq_enable(IW_IRQ_SERIAL_TRANSMIT);
+    iw_irq_enable(IW_IRQ_SERIAL);
+}
+
+size_t iw_serial_read(char *out, size_t size) {
+    const uint32_t head = IW_SERIAL_RECEIVE_BYTES - iw_serial_dma_left();
+    size_t count = 0;
+    while (count < size && taken != head % IW_SERIAL_RECEIVE_BYTES) {
+        out[count++] = received[taken];
+        taken = (taken + 1U) % IW_SERIAL_RECEIVE_BYTES;
+    }
+    return count;
+}
+
+bool iw_serial_had_error(void) {
+    return atomic_exchange_explicit(&had_error, false, memory_order_relaxed);
+}
+
+size_t iw_serial_room(void) {
+    return IW_SERIAL_SEND_BYTES - (put - sent);
+}
+
+bool iw_serial_write(const char *bytes, size_t length) {
+    if (length > iw_serial_room()) {
+        return false;
+    }
+    const size_t at = put % IW_SERIAL_SEND_BYTES;
+    const size_t first = (length < IW_SERIAL_SEND_BYTES - at) ? length : IW_SERIAL_SEND_BYTES - at;
+    memcpy(&waiting[at], bytes, first);
+    memcpy(waiting, &bytes[first], length - first);
+    put += (uint32_t)length;
+    return true;
+}
+
+bool iw_serial_lend(const char *bytes, size_t length) {
+    if (lent != NULL) {
+        return false;
+    }
+    lent = bytes;
+    lent_bytes = (uint32_t)length;
+    lent_at = put;
+    return true;
+}
+
+bool iw_serial_lends(void) {
+    return lent != NULL;
+}
+
+bool iw_serial_is_idle(void) {
+    return put == sent && lent == NULL && !iw_serial_dma_sends() && (USART2->SR & TC) != 0U;
+}
+
+/// What the DMA had is on its way.
+static void settle(void) {
+    if (lent_is_sending) {
+        lent_is_sending = false;
+        lent = NULL;
+    }
+    sent += sending;
+    sending = 0;
+}
+
+void iw_serial_step(void) {
+    if (iw_serial_dma_sends()) {
+        return;
+    }
+    settle();
+    if (lent != NULL && sent == lent_at) {
+        lent_is_sending = true;
+        iw_serial_dma_send(&USART2->DR, lent, lent_bytes);
+        return;
+    }
+    const uint32_t until = (lent != NULL) ? lent_at : put;
+    const uint32_t to_end = IW_SERIAL_SEND_BYTES - sent % IW_SERIAL_SEND_BYTES;
+    sending = (until - sent < to_end) ? until - sent : to_end;
+    if (sending > 0U) {
+        iw_serial_dma_send(&USART2->DR, &waiting[sent % IW_SERIAL_SEND_BYTES], sending);
+    }
+}
+
+/// Reading SR, then DR, ends pause and errors (27.6.1). The byte in DR has been fetched by the DMA already, or is
+/// damaged.
+void iw_serial_usart_handler(void) {
+    if ((USART2->SR & ERRORS) != 0U) {
+        atomic_store_explicit(&had_error, true, memory_order_relaxed);
+    }
+    (void)USART2->DR;
+    iw_wake();
+}
+
+void iw_serial_receive_handler(void) {
+    iw_serial_dma_acknowledge();
+    iw_wake();
+}
+
+void iw_serial_transmit_handler(void) {
+    iw_serial_dma_acknowledge();
+    iw_wake();
+}

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// Sections are those of RM0008: 7.3.6 clock enable, 13.4 DMA; table 78: USART2 is on channels 6 (receive) and 7
+// (transmit) of DMA1.
+#include "serial.h"
+
+typedef struct {
+    volatile uint32_t CCR, CNDTR, CPAR, CMAR;
+    uint32_t reserved;
+} channel_t;
+
+typedef struct {
+    volatile uint32_t ISR, IFCR;
+    channel_t channel[7];
+} dma_t;
+
+#define AHBENR   (*(volatile uint32_t *)0x40021014U)
+#define DMA1     ((dma_t *)0x40020000U)
+#define RECEIVE  (&DMA1->channel[5])
+#define TRANSMIT (&DMA1->channel[6])
+
+#define ENABLE      (1U << 0) // 13.4.3
+#define AT_END      (1U << 1)
+#define AT_HALF     (1U << 2)
+#define FROM_MEMORY (1U << 4)
+#define CIRCULAR    (1U << 5)
+#define MEMORY_NEXT (1U << 7)
+#define HIGH        (2U << 12) // Priority: a byte that waits too long is lost, one to be sent is not.
+
+#define ALL_FLAGS (0xFFU << 20) // 13.4.2: channels 6 and 7, four bits each.
+
+void iw_serial_dma_start(volatile uint32_t *data_register, char *buffer, uint32_t length) {
+    AHBENR |= 1U << 0;
+    RECEIVE->CCR = 0;
+    TRANSMIT->CCR = 0;
+    DMA1->IFCR = ALL_FLAGS;
+    RECEIVE->CPAR = (uint32_t)(uintptr_t)data_register;
+    RECEIVE->CMAR = (uint32_t)(uintptr_t)buffer;
+    RECEIVE->CNDTR = length;
+    RECEIVE->CCR = HIGH | MEMORY_NEXT | CIRCULAR | AT_HALF | AT_END | ENABLE;
+}
+
+uint32_t iw_serial_dma_left(void) {
+    return RECEIVE->CNDTR;
+}
+
+/// 13.3.3: the count can be written only while the channel is off.
+void iw_serial_dma_send(volatile uint32_t *data_register, const char *bytes, uint32_t length) {
+    TRANSMIT->CCR = 0;
+    TRANSMIT->CPAR = (uint32_t)(uintptr_t)data_register;
+    TRANSMIT->CMAR = (uint32_t)(uintptr_t)bytes;
+    TRANSMIT->CNDTR = length;
+    TRANSMIT->CCR = MEMORY_NEXT | FROM_MEMORY | AT_END | ENABLE;
+}
+
+bool iw_serial_dma_sends(void) {
+    return (TRANSMIT->CCR & ENABLE) != 0U && TRANSMIT->CNDTR != 0U;
+}
+
+void iw_serial_dma_acknowledge(void) {
+    DMA1->IFCR = ALL_FLAGS;
+}

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: MIT
+#include "settings.h"
+
+#include "iwheel_northbound/request.h"
+
+#include <string.h>
+
+/// Where a number is kept. Those below TYPE are the core's, in the order of iw_config_t.
+enum { TYPE = 18, ROLE, RPM_OF, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, TRACK, SETTINGS_END };
+IW_STATIC_ASSERT(SETTINGS_END == IW_SETTINGS && TYPE == (int)IW_CONFIG_SETPOINT_DLC, numbers_of_the_core_come_first);
+IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == 17U * sizeof(uint16_t), the_core_s_numbers_are_side_by_side);
+
+#define UNSET         0xFFFFU
+#define INDEX(fault)  ((uint8_t)(IW_CONFIG_##fault - 1))
+#define TRACK_MIN_MM  50U
+#define TRACK_MAX_MM  5000U
+#define NUMBER_DIGITS 5U
+
+/// How a value is written.
+typedef enum { NUMBER, BYTE, DISTANCE, GEAR, WORDS } kind_t;
+
+typedef struct {
+    const char *section;
+    const char *key;
+    uint8_t at;
+    uint8_t kind;
+    const char *word[2]; ///< Of WORDS: for 0 and 1; those of the role for 1 and 2.
+} row_t;
+
+static const row_t rows[] = {
+    {"wheels", "setpoint_type", TYPE, BYTE, {NULL, NULL}},
+    {"wheels", "current_role", ROLE, WORDS, {"limit", "setpoint"}},
+    {"wheels", "rpm_of", RPM_OF, WORDS, {"wheel", "rotor"}},
+    {"wheels", "radius_mm", INDEX(RADIUS), NUMBER, {NULL, NULL}},
+    {"wheels", "gear_ratio", INDEX(GEAR_TURNS), GEAR, {NULL, NULL}},
+    {"wheels", "track_mm", TRACK, DISTANCE, {NULL, NULL}},
+    {"wheels", "setpoint_dlc", INDEX(SETPOINT_DLC), NUMBER, {NULL, NULL}},
+    {"left", "invert", INVERT_LEFT, WORDS, {"no", "yes"}},
+    {"left", "force_unit", UNIT_LEFT, WORDS, {"cN", "dN"}},
+    {"right", "invert", INVERT_RIGHT, WORDS, {"no", "yes"}},
+    {"right", "force_unit", UNIT_RIGHT, WORDS, {"cN", "dN"}},
+    {"drive", "period_ms", INDEX(PERIOD), NUMBER, {NULL, NULL}},
+    {"drive", "lease_ms", INDEX(LEASE), NUMBER, {NULL, NULL}},
+    {"drive", "accel_mm_s2", INDEX(ACCEL), NUMBER, {NULL, NULL}},
+    {"drive", "decel_mm_s2", INDEX(DECEL), NUMBER, {NULL, NULL}},
+    {"drive", "max_speed_mm_s", INDEX(MAX_SPEED), NUMBER, {NULL, NULL}},
+    {"drive", "max_current_mA", INDEX(MAX_CURRENT), NUMBER, {NULL, NULL}},
+    {"drive", "zero_hold_ms", INDEX(ZERO_HOLD), NUMBER, {NULL, NULL}},
+    {"limits", "wheel_silent_ms", INDEX(WHEEL_SILENT), NUMBER, {NULL, NULL}},
+    {"limits", "echo_ms", INDEX(ECHO), NUMBER, {NULL, NULL}},
+    {"limits", "rest_rpm", INDEX(REST_RPM), NUMBER, {NULL, NULL}},
+    {"limits", "rest_ms", INDEX(REST), NUMBER, {NULL, NULL}},
+    {"limits", "follow_mm_s", INDEX(FOLLOW_SPEED), NUMBER, {NULL, NULL}},
+    {"limits", "follow_ms", INDEX(FOLLOW), NUMBER, {NULL, NULL}},
+    {"limits", "blocked_ms", INDEX(BLOCKED), NUMBER, {NULL, NULL}},
+};
+#define ROWS (sizeof rows / sizeof rows[0])
+
+iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm) {
+    iw_settings_t self;
+    memcpy(self.value, config, TYPE * sizeof self.value[0]);
+    self.value[TYPE] = config->setpoint_type_set ? config->setpoint_type : UNSET;
+    self.value[ROLE] = (uint16_t)config->current_role;
+    self.value[RPM_OF] = config->rpm_of_rotor ? 1U : 0U;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        self.value[INVERT_LEFT + side] = config->invert[side] ? 1U : 0U;
+        self.value[UNIT_LEFT + side] = (uint16_t)config->force_unit[side];
+    }
+    self.value[TRACK] = (uint16_t)track_mm;
+    return self;
+}
+
+uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
+    memcpy(config, self->value, TYPE * sizeof self->value[0]);
+    config->setpoint_type_set = self->value[TYPE] != UNSET;
+    config->setpoint_type = config->setpoint_type_set ? (uint8_t)self->value[TYPE] : 0U;
+    config->current_role = (iw_current_role_t)self->value[ROLE];
+    config->rpm_of_rotor = self->value[RPM_OF] != 0U;
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        config->invert[side] = self->value[INVERT_LEFT + side] != 0U;
+        config->force_unit[side] = (iw_force_unit_t)self->value[UNIT_LEFT + side];
+    }
+    return self->value[TRACK];
+}
+
+static const row_t *find(const char *key) {
+    for (size_t i = 0; i < ROWS; i++) {
+        const size_t length = strlen(rows[i].section);
+        if (strncmp(key, rows[i].section, length) == 0 && key[length] == '.' &&
+            strcmp(&key[length + 1U], rows[i].key) == 0) {
+            return &rows[i];
+        }
+    }
+    return NULL;
+}
+
+/// Digits up to the end, or up to `end`, which is then passed over.
+static bool read_number(const char **text, char end, uint32_t *out_number) {
+    unsigned digits = 0;
+    *out_number = 0;
+    for (; **text >= '0' && **text <= '9' && digits <= NUMBER_DIGITS; ++*text, digits++) {
+        *out_number = *out_number * 10U + (uint32_t)(**text - '0');
+    }
+    const bool good = digits > 0U && digits <= NUMBER_DIGITS && (**text == '\0' || **text == end);
+    *text += (**text != '\0') ? 1 : 0;
+    return good;
+}
+
+static iw_config_range_t range_of(const row_t *row) {
+    switch (row->kind) {
+    case BYTE:
+        return (iw_config_range_t){0U, UINT8_MAX};
+    case DISTANCE:
+        return (iw_config_range_t){TRACK_MIN_MM, TRACK_MAX_MM};
+    default:
+        return iw_config_range((iw_config_fault_t)(row->at + 1U));
+    }
+}
+
+static bool within(uint32_t number, iw_config_range_t range) {
+    return number >= range.min && number <= range.max;
+}
+
+static bool refuse_number(const row_t *row, iwn_text_t *why) {
+    const iw_config_range_t range = range_of(row);
+    IWN_TEXT_JOIN(why, row->section, ".", row->key, (row->kind == GEAR) ? " must be N or N/M, each of " : " must be ");
+    iwn_text_int(why, range.min);
+    IWN_TEXT_JOIN(why, " to ");
+    iwn_text_int(why, range.max);
+    return false;
+}
+
+static bool set_number(iw_settings_t *self, const row_t *row, const char *value, iwn_text_t *why) {
+    const iw_config_range_t range = range_of(row);
+    uint32_t number = 0;
+    uint32_t per = 1;
+    const bool first = read_number(&value, (row->kind == GEAR) ? '/' : '\0', &number);
+    const bool divided = value[0] != '\0';
+    if (!first || !within(number, range) || (divided && !read_number(&value, '\0', &per)) ||
+        !within(per, (row->kind == GEAR) ? range : (iw_config_range_t){1U, 1U})) {
+        return refuse_number(row, why);
+    }
+    self->value[row->at] = (uint16_t)number;
+    if (row->kind == GEAR) {
+        self->value[row->at + 1U] = (uint16_t)per;
+    }
+    return true;
+}
+
+static uint16_t first_word(const row_t *row) {
+    return (row->at == ROLE) ? (uint16_t)IW_ROLE_LIMIT : 0U;
+}
+
+bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iwn_text_t *why) {
+    const row_t *const row = find(key);
+    if (row == NULL) {
+        IWN_TEXT_JOIN(why, key,
+                      " is no key of this gateway: it has those of wheels, left, right, drive and limits; bus, estop, "
+                      "northbound and record are a daemon's, here they are built in");
+        return false;
+    }
+    if (row->kind != WORDS) {
+        return set_number(self, row, value, why);
+    }
+    for (uint16_t i = 0; i < 2U; i++) {
+        if (strcmp(value, row->word[i]) == 0) {
+            self->value[row->at] = (uint16_t)(first_word(row) + i);
+            return true;
+        }
+    }
+    IWN_TEXT_JOIN(why, key, " must be ", row->word[0], " or ", row->word[1]);
+    return false;
+}
+
+bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why) {
+    iw_config_t config;
+    iw_config_default(&config);
+    (void)iw_settings_to(self, &config);
+    switch (iw_config_check(&config)) {
+    case IW_CONFIG_OK:
+        return true;
+    case IW_CONFIG_STOP_BUDGET:
+        IWN_TEXT_JOIN(
+            why, "lease_ms + period_ms + max_speed_mm_s / decel_mm_s2 exceeds 1000 ms, after which the wheels stop "
+                 "by themselves: lower one of the first three, or raise decel_mm_s2");
+        return false;
+    case IW_CONFIG_GEAR_RATIO:
+        IWN_TEXT_JOIN(why, "gear_ratio must lie within 1 and 100");
+        return false;
+    default:
+        IWN_TEXT_JOIN(why, "a value is outside its range; set it anew");
+        return false;
+    }
+}
+
+static bool value_of(const iw_settings_t *self, const row_t *row, char out_text[IW_SETTINGS_TEXT]) {
+    const uint16_t value = self->value[row->at];
+    const unsigned word = (unsigned)value - first_word(row);
+    iwn_text_t text = iwn_text_begin(out_text, IW_SETTINGS_TEXT);
+    if (row->kind == WORDS) {
+        IWN_TEXT_JOIN(&text, (word < 2U) ? row->word[word] : "");
+        return word < 2U;
+    }
+    iwn_text_int(&text, value);
+    if (row->kind == GEAR && self->value[row->at + 1U] != 1U) {
+        IWN_TEXT_JOIN(&text, "/");
+        iwn_text_int(&text, self->value[row->at + 1U]);
+    }
+    return row->kind != BYTE || value != UNSET;
+}
+
+bool iw_settings_value(const iw_settings_t *self, const char *key, char out_text[IW_SETTINGS_TEXT]) {
+    const row_t *const row = find(key);
+    return row != NULL && value_of(self, row, out_text);
+}
+
+void iw_settings_write(const iw_settings_t *self, iwn_out_t *json) {
+    char name[IWN_KEY_MAX + 1U];
+    char value[IW_SETTINGS_TEXT];
+    iwn_out_open(json, "keys", '[');
+    for (size_t i = 0; i < ROWS; i++) {
+        iwn_text_t key = iwn_text_begin(name, sizeof name);
+        IWN_TEXT_JOIN(&key, rows[i].section, ".", rows[i].key);
+        iwn_out_open(json, NULL, '{');
+        iwn_out_text(json, "key", name);
+        iwn_out_text(json, "value", value_of(self, &rows[i], value) ? value : NULL);
+        iwn_out_close(json, '}');
+    }
+    iwn_out_close(json, ']');
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+/// The configuration as numbers that flash can keep, and as the keys and values of the gateway's configuration file.
+///
+/// Keys are "section.key" as in the file: drive.lease_ms. Those that only the daemon has (interfaces, sockets,
+/// recordings) are refused by name. The order of the numbers is what flash holds: new ones go to the end.
+#ifndef IW_STM32_SETTINGS_H
+#define IW_STM32_SETTINGS_H
+
+#include "iwheel/config.h"
+#include "iwheel_northbound/json_out.h"
+#include "iwheel_northbound/text.h"
+
+#define IW_SETTINGS 26U
+
+typedef struct {
+    uint16_t value[IW_SETTINGS];
+} iw_settings_t;
+
+iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm);
+
+/// What the core is given; its other fields are left alone. Returns the distance between the wheels in mm.
+uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config);
+
+/// One key. False, with nothing changed and the reason and the cure in `why`, if there is no such key or it cannot have
+/// that value.
+bool iw_settings_set(iw_settings_t *self, const char *key, const char *value, iwn_text_t *why);
+
+/// The value as the file writes it. False if there is no such key, or it is not set.
+#define IW_SETTINGS_TEXT 16U
+bool iw_settings_value(const iw_settings_t *self, const char *key, char out_text[IW_SETTINGS_TEXT]);
+
+/// The relations between keys. False, with the reason and the cure in `why`, if one does not hold.
+bool iw_settings_check(const iw_settings_t *self, iwn_text_t *why);
+
+/// The list `keys` of the reply to `config`, with the values as the file writes them; null where nothing is set.
+void iw_settings_write(const iw_settings_t *self, iwn_out_t *json);
+
+#endif

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT
+"""What the gateway's loop costs in the states that users are in: instructions (callgrind) and system calls (strace) for each frame received.
+
+Over the local bus at the nominal 617 frames/s, as a process. Frames come when the simulator is woken, so that the figures move by a few per cent:
+they are held against limits. A machine under load makes them smaller, never larger.
+"""
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+FRAMES_S = 617
+WATCH_S = 2.0
+COMMANDS_S = 20  # Commands of a client that drives, in a second.
+SETTLE_S = 0.7
+
+
+def quiet(_client, _quit_it):
+    """A client that only is there."""
+
+
+def watch(client, _quit_it):
+    client.ask(cmd="watch", topics=["state"], rate_hz=50)
+    threading.Thread(target=swallow, args=(client,), daemon=True).start()
+
+
+def swallow(client):
+    try:
+        while client.socket.recv(1 << 16):
+            pass
+    except OSError:
+        pass
+
+
+def drive(client, quit_it):
+    """Armed, and driving until the end."""
+    for _ in range(100):
+        if client.ask(cmd="arm", name="bench")["ok"]:
+            break
+        time.sleep(0.1)
+    client.driving = threading.Thread(target=keep_driving, args=(client, quit_it), daemon=True)
+    client.driving.start()
+
+
+def drive_once(client):
+    return client.ask(cmd="drive", left_mm_s=100, right_mm_s=100)["ok"]
+
+
+def keep_driving(client, quit_it):
+    while drive_once(client) and not quit_it.wait(1 / COMMANDS_S):
+        pass
+
+
+# What is done in a state, and by how many clients: the dearest first.
+STATES = {"driving": (drive, 1), "one client watching at 50 Hz": (watch, 1), "a client": (quiet, 1), "nobody": (None, 0)}
+# Of system calls, and of instructions. Tracing holds up a gateway that drives, so that its instructions are not counted.
+LIMITS = {"driving": (2.5, None), "one client watching at 50 Hz": (2.5, 7000), "a client": (2.5, 3000), "nobody": (2.5, 1000)}
+
+
+def in_state(pair, client_type, state, count):
+    """`count()` while the gateway is in that state."""
+    begin, clients = STATES[state]
+    quit_it = threading.Event()
+    connected = [client_type(pair.northbound) for _ in range(clients)]
+    try:
+        for client in connected:
+            begin(client, quit_it)
+        time.sleep(SETTLE_S)
+        figure = count()
+        if begin is drive and not all(client.driving.is_alive() for client in connected):
+            raise RuntimeError("the gateway has stopped")
+        return figure
+    finally:
+        quit_it.set()
+        time.sleep(2 / COMMANDS_S)
+        for client in connected:
+            client.socket.shutdown(2)
+            client.close()
+        time.sleep(SETTLE_S)
+
+
+def calls(pid):
+    """System calls in a second. A clock is none: the kernel maps it."""
+    trace = subprocess.Popen(["strace", "-f", "-c", "-q", "-p", str(pid)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    time.sleep(WATCH_S)
+    trace.send_signal(signal.SIGINT)
+    told = trace.communicate()[1]
+    total = re.search(r"^\s*100\.00\s+\S+\s+\S+\s+(\d+).*total$", told, re.M)
+    if total is None:
+        raise RuntimeError(f"strace has counted nothing: {told.strip()[-200:]}")
+    return int(total[1]) / WATCH_S
+
+
+def instructions(pid, folder):
+    """In a second."""
+    dump = ["callgrind_control", "-d", str(pid)]
+    subprocess.run(dump, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    begun, before = time.monotonic(), set(folder.glob("callgrind.*"))
+    time.sleep(WATCH_S)
+    subprocess.run(dump, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    took = time.monotonic() - begun
+    for path in set(folder.glob("callgrind.*")) - before:
+        total = re.search(r"^(?:totals|summary): (\d+)", path.read_text(), re.M)
+        if total:
+            return int(total[1]) / took
+    raise RuntimeError("callgrind has written nothing")
+
+
+def trial(pair, client_type, state, count):
+    """The same, once more if the gateway has stopped: on a machine with much to do it may be too late."""
+    for left in (2, 1, 0):
+        try:
+            return in_state(pair, client_type, state, count)
+        except RuntimeError as stopped:
+            if left == 0:
+                raise
+            print(f"{state}: {stopped}; once more", flush=True)
+    return None
+
+
+def rows(build, pair_type, client_type):
+    """(state, system calls and instructions for each frame), the dearest first; None: not measured."""
+    with tempfile.TemporaryDirectory(prefix="iwheel-bench-") as name:
+        folder = Path(name)
+        called = of_all(build, folder / "calls", pair_type, client_type, [], STATES, calls) if shutil.which("strace") else {}
+        under = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={folder}/counted/callgrind.out"]
+        counted = of_all(build, folder / "counted", pair_type, client_type, under, [state for state in STATES if LIMITS[state][1]],
+                         lambda pid: instructions(pid, folder / "counted"))
+    return [(state, called.get(state), counted.get(state)) for state in STATES]
+
+
+def of_all(build, folder, pair_type, client_type, under, states, count):
+    folder.mkdir()
+    pair = pair_type(build, folder, under)
+    try:
+        client_type(pair.northbound).close()
+        time.sleep(2 * SETTLE_S)
+        return {state: trial(pair, client_type, state, lambda: count(pair.gateway.pid)) / FRAMES_S for state in states}
+    finally:
+        pair.end()

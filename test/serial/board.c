@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+// A board without a board: the image `gateway`'s own code for its host (port/stm32_stub), with the same core, on this machine's
+// clock, with the simulator's wheels and with descriptor 0 for its serial line.
+//
+//     serial_board CONFIGURATION BUS ESTOP [restarted]
+//
+// SIGHUP resets it: another start, another boot, as if somebody had pressed the button of a board that was sending.
+#include "box/box.h"
+#include "config/gateway_config.h"
+#include "wheels/wheels.h"
+
+#include "host.h"
+#include "serial.h"
+
+#include "iwheel_linux/clock.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+// ---- the serial line ----------------------------------------------------------------------------------------------
+
+#define RING 2048U
+
+static char waiting[RING];
+static size_t waits;
+static const char *lent;
+static size_t lent_left;
+static bool line_ended;
+
+/// The image asks byte by byte.
+size_t iw_serial_read(char *out, size_t size) {
+    static char taken[4096];
+    static size_t at;
+    static size_t end;
+    if (at == end) {
+        const ssize_t count = read(STDIN_FILENO, taken, sizeof taken);
+        line_ended = line_ended || count == 0;
+        at = 0;
+        end = (count > 0) ? (size_t)count : 0U;
+    }
+    const size_t left = (end - at < size) ? end - at : size;
+    memcpy(out, &taken[at], left);
+    at += left;
+    return left;
+}
+
+bool iw_serial_had_error(void) {
+    return false;
+}
+
+size_t iw_serial_room(void) {
+    return RING - waits;
+}
+
+bool iw_serial_write(const char *bytes, size_t length) {
+    if (length > iw_serial_room()) {
+        return false;
+    }
+    memcpy(&waiting[waits], bytes, length);
+    waits += length;
+    return true;
+}
+
+bool iw_serial_lend(const char *bytes, size_t length) {
+    if (lent_left > 0U) {
+        return false;
+    }
+    lent = bytes;
+    lent_left = length;
+    return true;
+}
+
+bool iw_serial_lends(void) {
+    return lent_left > 0U;
+}
+
+bool iw_serial_is_idle(void) {
+    return waits == 0U && lent_left == 0U;
+}
+
+/// True if all of it went.
+static bool put(const char *bytes, size_t *left) {
+    const ssize_t count = (*left > 0U) ? write(STDIN_FILENO, bytes, *left) : 0;
+    *left -= (count > 0) ? (size_t)count : 0U;
+    return *left == 0U;
+}
+
+/// A line that is begun is ended before another one: of the two sources one at a time.
+void iw_serial_step(void) {
+    static bool in_lent;
+    if (!in_lent) {
+        const size_t before = waits;
+        const bool all = put(waiting, &waits);
+        memmove(waiting, &waiting[before - waits], waits);
+        in_lent = all && lent_left > 0U;
+    }
+    if (in_lent) {
+        const size_t before = lent_left;
+        in_lent = !put(lent, &lent_left);
+        lent += before - lent_left;
+    }
+}
+
+// ---- the machine --------------------------------------------------------------------------------------------------
+
+static volatile sig_atomic_t reset_pressed;
+
+static void on_hangup(int number) {
+    (void)number;
+    reset_pressed = 1;
+}
+
+static gateway_config_t config;
+static gw_box_t box;
+static gw_wheels_t wheels;
+static iw_host_t host;
+
+/// There is no flash here: a configuration lives as long as the file it was read from.
+bool iw_host_keep(const iw_settings_t *settings) {
+    (void)settings;
+    return false;
+}
+
+static void must(bool holds, const char *what) {
+    if (!holds) {
+        (void)fprintf(stderr, "serial_board: %s\n", what);
+        exit(1);
+    }
+}
+
+static void begin(char **arguments, bool restarted) {
+    const iw_estop_wish_t estop = {.name = arguments[3]};
+    const char *culprit = "";
+    uint64_t boot = 0;
+    must(gateway_config_load(arguments[1], &config, stderr) == 0, "the configuration");
+    must(gw_box_open(&box, &(gw_box_wish_t){.blackbox_s = 0}) == 0, "memory");
+    must(iw_linux_hal_open(&wheels.hal, arguments[2], &estop, &culprit) == 0, culprit);
+    must(getrandom(&boot, sizeof boot, 0) == (ssize_t)sizeof boot, "random numbers");
+    wheels.now_us = iw_clock_now_us();
+    must(gw_wheels_begin(&wheels, &config.core, box.ring, restarted) == IW_CONFIG_OK, "the configuration is refused");
+    const iw_bus_facts_t facts = {.timing_contradicted = false, .echo_proven = true};
+    iw_gateway_bus_facts(&wheels.core, &facts);
+    const iw_host_place_t place = {.gateway = &wheels.core,
+                                   .version = IWHEEL_VERSION,
+                                   .bus = "can",
+                                   .estop = "PA0",
+                                   .bitrate_hz = 500000,
+                                   .sample_point_permille = 875,
+                                   .settings = iw_settings_from(&config.core, 540),
+                                   .track_mm = 540,
+                                   .rate_max_hz = 10,
+                                   .boot = boot};
+    iw_host_init(&host, &place, wheels.now_us);
+}
+
+/// As cycle() of the image's main.c.
+static iw_time_us_t cycle(void) {
+    wheels.now_us = iw_clock_now_us();
+    iw_linux_hal_tend(&wheels.hal, wheels.now_us);
+    const bool more = iw_host_take(&host, wheels.now_us);
+    static iw_snapshot_t seen;
+    seen = gw_wheels_step(&wheels);
+    const iw_time_us_t tell_us = iw_host_tell(&host, &seen, wheels.hal.estop_last != 0);
+    iw_serial_step();
+    const iw_time_us_t next_us = (tell_us < wheels.step_us) ? tell_us : wheels.step_us;
+    return more ? wheels.now_us : next_us;
+}
+
+int main(int argc, char **argv) {
+    must(argc >= 4, "usage: serial_board CONFIGURATION BUS ESTOP [restarted]");
+    (void)signal(SIGHUP, on_hangup);
+    (void)signal(SIGPIPE, SIG_IGN);
+    (void)fcntl(STDIN_FILENO, F_SETFL, O_RDWR | O_NONBLOCK);
+    begin(argv, argc > 4);
+    while (!line_ended) {
+        const iw_time_us_t next_us = cycle();
+        const iw_time_us_t now_us = iw_clock_now_us();
+        struct pollfd entries[] = {{.fd = STDIN_FILENO, .events = POLLIN},
+                                   {.fd = iw_linux_hal_bus_fd(&wheels.hal), .events = POLLIN},
+                                   {.fd = iw_linux_hal_estop_fd(&wheels.hal), .events = POLLIN}};
+        entries[0].events = (short)(POLLIN | (iw_serial_is_idle() ? 0 : POLLOUT));
+        // At most 1 ms, as the image wakes for each frame and by its timer.
+        (void)poll(entries, 3, (next_us > now_us + 1000U) ? 1 : 0);
+        if (reset_pressed != 0) {
+            char *again[] = {argv[0], argv[1], argv[2], argv[3], gw_wheels_are_sent_to(&wheels) ? "restarted" : NULL,
+                             NULL};
+            iw_linux_hal_close(&wheels.hal);
+            (void)execv("/proc/self/exe", again);
+        }
+    }
+    return 0;
+}

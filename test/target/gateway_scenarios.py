@@ -1,0 +1,469 @@
+# SPDX-License-Identifier: MIT
+"""What the image `gateway` must do: a host drives it over the serial line, and the line, the relay and the clients fail in every way."""
+import random
+
+from emulator.can import LEFT
+from emulator.chip import MS, PINRSTF, US
+from host import Host, framed
+
+SECOND = 1000 * MS
+ZERO = (0, 2000)
+LEASE_NS, PERIOD_NS = 200 * MS, 20 * MS
+RAMP_NS = 110 * MS # From 100 mm/s at 1500 mm/s2, and a period.
+SPEED = 100
+EDGE_TO_ZERO_NS = 5 * MS
+
+
+def moving(rig, since_ns=0):
+    return [frame for frame in rig.setpoints(since_ns) if frame.setpoint()[0] != 0]
+
+
+def assert_stops(rig, since_ns, within_ns, after_ns=SECOND):
+    """The last setpoint that moves is at most that late, and nothing moves for as long as is run then."""
+    rig.run(within_ns + after_ns)
+    late = moving(rig, since_ns + within_ns)
+    assert not late, f"{late[0].setpoint()} {(late[0].time_ns - since_ns) / MS:.1f} ms after"
+    assert rig.setpoints(since_ns), "no zeros were sent"
+
+
+def start(rig, channel=1):
+    host = Host(rig)
+    host.begin(channel)
+    return host
+
+
+def start_driving(rig, span_ms=400):
+    """A host whose client 1 drives."""
+    host = start(rig)
+    host.arm()
+    host.keep_driving(SPEED, span_ms)
+    assert rig.setpoints()[-1].setpoint()[0] == SPEED, "the wheels are not driven"
+    return host
+
+
+def talks(rig):
+    """Every request has its answer, a stream of commands drives, and stop ends it."""
+    host = start(rig)
+    assert host.line_bytes == 4608 and len(host.boot) == 16
+    hello = host.ask(1, {"cmd": "hello"})
+    assert (hello["state"], hello["client"], hello["rights"]) == ("listening", 1, "drive"), hello
+    status = host.ask(1, {"cmd": "status"})
+    assert status["state"] == "listening" and status["left"]["heard"] and status["bus"]["bitrate"] == 1_000_000
+    assert status["wall_us"] is None and status["lease"]["pid"] is None and status["bus"]["load_permille"] is None
+    watched = host.ask(1, {"cmd": "watch", "topics": ["state", "stop", "lease", "frame"], "rate_hz": 100})
+    assert watched["topics"] == ["state", "lease", "stop"] and watched["limited"] and watched["rate_hz"] == 8, watched
+    terms = host.arm()
+    assert terms["state"] == "armed" and terms["lease_ms"] == 200, terms
+    host.keep_driving(SPEED, 400)
+    applied = host.drive(SPEED)
+    assert applied["ok"] and applied["left_mm_s"] == SPEED and not applied["limited"], applied
+    assert host.ask(1, {"cmd": "stop"}) == {"id": host.number, "ok": True, "state": "stopping"}
+    stop_ns = rig.machine.now_ns
+    assert_stops(rig, stop_ns, RAMP_NS)
+    assert "said stop" in host.ask(1, {"cmd": "why"})["sentence"]
+    assert host.events("stop") and host.events("lease")[0]["change"] == "gained" and len(host.events("state")) >= 8
+    assert longest_line(host) <= host.line_bytes
+    rig.note(f"stack {rig.stack_used()} B, {rig.machine.busy_ns * 100 / rig.machine.now_ns:.1f} % busy, longest line {longest_line(host)} B")
+
+
+def longest_line(host):
+    host.listen()
+    return max(len(line.json) + 33 for line in host.lines)
+
+
+def both_words_and_turns(rig):
+    """twist, tare, confirm of nothing, requests that are wrong, and those that a microcontroller has not."""
+    host = start(rig)
+    assert host.ask(1, {"cmd": "nonsense"})["error"] == "unknown_cmd"
+    assert host.ask(1, {"cmd": "arm", "speed": 1})["error"] == "unknown_field"
+    assert host.ask(1, {"cmd": "recordings"})["error"] == "denied"
+    host.ask(1, {"cmd": "watch", "topics": ["state"]})
+    assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius", "value": 194})["state"] == "confirmed"
+    assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius", "value": "wide"})["error"] == "bad_value"
+    assert host.ask(1, {"cmd": "confirm", "item": "mount_sign_left", "value": "yes"})["state"] == "contradicted"
+    assert host.ask(1, {"cmd": "arm"})["error"] == "denied", "armed although an assumption is contradicted"
+    assert host.ask(1, {"cmd": "confirm", "item": "mount_sign_left"})["state"] == "confirmed"
+    assert host.ask(1, {"cmd": "confirm", "item": "gear_ratio", "value": "2/2"})["state"] == "confirmed"
+    rig.run(20 * MS)
+    told = [event["item"] for event in host.events("ledger") if event["evidence"] == "operator"]
+    assert told == ["wheel_radius", "mount_sign_left", "mount_sign_left", "gear_ratio"], told
+    host.ask(1, {"cmd": "watch", "topics": []})
+    rig.run(2500 * MS)
+    tared = host.ask(1, {"cmd": "tare", "side": "left"})
+    assert tared["ok"] and tared["left"]["samples"] > 0, tared
+    host.arm()
+    body = {"cmd": "twist", "v_mm_s": 100, "yaw_mrad_s": 100, "id": 99}
+    host.say(1, host.quoted(1, body))
+    turned = host.wait(lambda line: line.message.get("id") == 99).message
+    assert (turned["left_mm_s"], turned["right_mm_s"]) == (73, 127), turned
+    host.say(1, {"ok": True, "id": 1000})
+    host.say(1, {"event": "stop"})
+    host.say(0, {"event": "link"})
+    rig.run(50 * MS)
+    host.listen()
+    assert not any(line.message.get("id") == 1000 or line.message.get("error") == "missing_field" for line in host.lines), "an answer was answered"
+    assert not host.events("line_error"), "an answer was answered"
+
+
+def lease_alone(rig):
+    """The client falls silent while its relay goes on: the lease stops the wheels."""
+    host = start_driving(rig)
+    silent_ns = rig.machine.now_ns
+    assert_stops(rig, silent_ns, LEASE_NS + PERIOD_NS + RAMP_NS)
+    assert "no drive command" in host.ask(1, {"cmd": "why"})["sentence"]
+
+
+def close_ends(rig):
+    """A closed channel ends its lease at once."""
+    host = start_driving(rig)
+    host.say(0, {"cmd": "close", "channel": 1})
+    assert_stops(rig, rig.machine.now_ns, PERIOD_NS + RAMP_NS)
+    host.open(2)
+    assert "disconnected" in host.ask(2, {"cmd": "why"})["sentence"]
+
+
+def silent_relay(rig):
+    """Nothing of the relay for half a second: every channel has ended, and is opened anew before anybody is heard."""
+    host = start_driving(rig)
+    host.open(2, watch=True)
+    host.fall_silent()
+    silent_ns = rig.machine.now_ns
+    assert_stops(rig, silent_ns, LEASE_NS + PERIOD_NS + RAMP_NS)
+    host.say(1, {"cmd": "hello", "id": "late"})
+    host.say(2, {"cmd": "hello", "id": "late"})
+    rig.run(300 * MS)
+    host.listen()
+    assert not any(line.message.get("id") == "late" for line in host.lines), "a channel outlived its relay"
+    assert host.events("line_error")
+
+
+def relay_killed_and_anew(rig):
+    """Another relay begins: the clients of the one before it have ended, and their commands are old."""
+    host = start_driving(rig)
+    old = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": SPEED, "right_mm_s": SPEED, "id": 7})) + b"\n"
+    host.say(0, {"cmd": "link"})
+    begun_ns = rig.machine.now_ns
+    rig.run(PERIOD_NS + RAMP_NS + 30 * MS)
+    assert not moving(rig, begun_ns + PERIOD_NS + RAMP_NS), "the clients of the relay before go on"
+    host.open(1)
+    host.raw(old)
+    assert not host.wait(lambda line: line.message.get("id") == 7).message["ok"]
+    assert_stops(rig, begun_ns, PERIOD_NS + RAMP_NS)
+    host.arm()
+    armed_ns = rig.machine.now_ns
+    host.raw(old.replace(b'"id":7', b'"id":8')) # Its CRC is wrong now; and as it was:
+    host.raw(old)
+    assert host.wait(lambda line: line.message.get("id") == 7).message["error"] == "stale_command"
+    assert not moving(rig, armed_ns)
+
+
+def relay_stopped_goes_on(rig):
+    """The relay is stopped for 0.3 s and goes on with what waited: none of it moves anything, since its stamps are old."""
+    host = start_driving(rig)
+    host.fall_silent()
+    backlog = [framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 300, "right_mm_s": 300})) + b"\n" for _ in range(15)]
+    stopped_ns = rig.machine.now_ns
+    rig.run(300 * MS)
+    host.raw(b"".join(backlog))
+    assert_stops(rig, stopped_ns, LEASE_NS + PERIOD_NS + RAMP_NS)
+    assert not [frame for frame in rig.setpoints() if frame.setpoint()[0] > SPEED], "an old command was obeyed"
+
+
+def stale_in_every_way(rig):
+    """Wrong start, old and equal number, old stamp, a stamp of the future, none at all: refused, and the lease runs out in spite of them."""
+    host = start_driving(rig)
+    last_ns, old_us, used = rig.machine.now_ns, host.t_us - 250_000, host.seq[1]
+    for turn in range(12):
+        if turn % 4 == 3: # The lease has run out meanwhile: armed again, without a command.
+            rig.run(2 * SECOND)
+            assert not moving(rig, last_ns + LEASE_NS + PERIOD_NS + RAMP_NS)
+            host.arm()
+        host.drive(SPEED, boot="0123456789abcdef")
+        host.drive(SPEED, seq=used)
+        host.drive(SPEED, seq=1)
+        host.drive(SPEED, t_us=old_us)
+        host.drive(SPEED, t_us=host.t_us + 10_000_000)
+        host.say(1, {"cmd": "drive", "left_mm_s": SPEED, "right_mm_s": SPEED, "id": -turn})
+    rig.run(30 * MS)
+    host.listen()
+    refused = [line.message for line in host.lines if line.message.get("error") == "stale_command"]
+    assert len(refused) >= 40, f"{len(refused)} of 72 were refused as stale"
+    assert not [line for line in host.lines if line.message.get("limited") is not None and line.t_us * 1000 > last_ns + 30 * MS], "one was obeyed"
+    assert_stops(rig, last_ns, rig.machine.now_ns - last_ns)
+    assert not moving(rig, last_ns + LEASE_NS + PERIOD_NS + RAMP_NS)
+
+
+def nobody_feeds_another(rig):
+    """A second client with good commands of its own is refused, and does not keep the first one's lease."""
+    host = start_driving(rig)
+    host.open(2)
+    last_ns = rig.machine.now_ns - 20 * MS
+    for _ in range(15):
+        assert host.drive(SPEED, channel=2)["error"] in ("not_holder", "not_armed")
+        host.ask(2, {"cmd": "hello"})
+        rig.run(20 * MS)
+    assert_stops(rig, last_ns, LEASE_NS + PERIOD_NS + RAMP_NS + 20 * MS)
+    watcher = host.open(3, watch=True)
+    assert watcher["rights"] == "watch" and host.ask(3, {"cmd": "arm"})["error"] == "denied"
+
+
+def estop_random(rig):
+    """The button at any phase of loop, line and bus, with a host that drives and asks: zero within 5 ms, and motion only after reset, arm and a
+    fresh command."""
+    host, chance, worst_ns = start_driving(rig), random.Random(21), 0
+    host.ask(1, {"cmd": "watch", "topics": ["state", "stop", "estop", "force"], "rate_hz": 100})
+    for _ in range(12):
+        host.keep_driving(SPEED, 200)
+        host.say(1, {"cmd": "status", "id": "big"})
+        host.drive(SPEED, wait=False)
+        rig.run(chance.randrange(20_000) * US)
+        rig.machine.board.drive("estop", None)
+        pressed_ns = rig.machine.now_ns
+        host.keep_driving(SPEED, 100)
+        after = rig.setpoints(pressed_ns)
+        zero = next(frame for frame in after if frame.setpoint() == ZERO)
+        worst_ns = max(worst_ns, zero.time_ns - pressed_ns)
+        assert not moving(rig, zero.time_ns), "motion after the e-stop"
+        assert host.ask(1, {"cmd": "reset"})["error"] == "estop_pressed"
+        rig.machine.board.drive("estop", 0)
+        rig.run(1300 * MS)
+        assert host.drive(SPEED)["error"] == "latched"
+        rig.run(600 * MS)
+        assert host.ask(1, {"cmd": "reset"})["ok"], host.lines[-1].message
+        assert not moving(rig, zero.time_ns), "a reset moved the wheels"
+        host.arm()
+    assert worst_ns <= EDGE_TO_ZERO_NS, f"first zero {worst_ns / MS:.3f} ms after the edge"
+    rig.note(f"edge to zero on the bus at most {worst_ns / MS:.2f} ms")
+
+
+def software_estop(rig):
+    """estop needs no lease; its reason comes back; reset and arm do not move."""
+    host = start_driving(rig)
+    host.open(2, watch=True)
+    assert host.ask(2, {"cmd": "estop", "reason": "test of it"})["state"] == "latched"
+    pressed_ns = rig.machine.now_ns
+    assert_stops(rig, pressed_ns, PERIOD_NS)
+    assert "test of it" in host.ask(2, {"cmd": "why"})["sentence"]
+    assert host.ask(1, {"cmd": "arm"})["error"] == "latched"
+    rig.run(500 * MS)
+    assert host.ask(1, {"cmd": "reset"})["state"] == "listening"
+    rig.run(100 * MS)
+    host.arm()
+    rig.run(100 * MS)
+    assert not moving(rig, pressed_ns + PERIOD_NS), "reset or arm moved the wheels"
+
+
+def reset_in_motion(rig):
+    """Both resets while the wheels turn: zeros first, another boot, and commands of before feed nothing."""
+    host = start_driving(rig)
+    boots = {host.boot}
+    for reset in (lambda: rig.machine.reset("pin", PINRSTF), lambda: rig.machine.divert()):
+        reset()
+        reset_ns = rig.machine.now_ns
+        old = host.boot
+        for _ in range(20): # The relay goes on as if nothing had happened.
+            host.drive(SPEED, wait=False, boot=old)
+            rig.run(20 * MS)
+        if len(boots) == 1:
+            after = rig.setpoints(reset_ns)
+            assert after and not moving(rig, reset_ns), "the wheels were not told to stand"
+        else:
+            hung = [when for when, cause in rig.machine.resets if cause == "watchdog"]
+            assert hung and not moving(rig, hung[-1]), "the wheels were not told to stand"
+        rig.run(1800 * MS)
+        host.rest = b"" # The reset cut a line.
+        host.uart.sent.clear()
+        host.say(0, {"cmd": "link"})
+        host.wait(lambda line: line.channel == 0 and line.message.get("event") == "link")
+        assert host.boot not in boots, "a start has the name of another"
+        boots.add(host.boot)
+        host.t_us = host.lines[-1].t_us
+        host.open(1)
+        host.arm()
+        host.keep_driving(SPEED, 300)
+        assert rig.setpoints()[-1].setpoint()[0] == SPEED
+    rig.expect_resets("pin", "watchdog")
+
+
+def keys_of(reply):
+    return {entry["key"]: entry["value"] for entry in reply["keys"]}
+
+
+def config_in_flash(rig):
+    """What is wrong or a daemon's is refused by name, nothing is written while anything is sent, and what is committed is in force after the start
+    that follows it, and after power-off."""
+    host = start(rig)
+    first = host.ask(1, {"cmd": "config"})
+    assert keys_of(first)["drive.lease_ms"] == "200" and keys_of(first)["wheels.setpoint_type"] == "1" and not first["staged"], first
+    for key, value, words in (("bus.interface", "can0", "a daemon's"), ("drive.lease", "200", "no key"), ("drive.lease_ms", "5000", "20 to 500"),
+                              ("wheels.gear_ratio", "1/x", "N or N/M"), ("left.invert", "maybe", "no or yes"), ("drive.lease_ms", "2e2", "20 to 500")):
+        refused = host.ask(1, {"cmd": "config", "key": key, "value": value})
+        assert refused["error"] == "bad_value" and words in refused["message"], refused
+    host.ask(1, {"cmd": "config", "key": "drive.max_speed_mm_s", "value": 5000})
+    assert "exceeds 1000 ms" in host.ask(1, {"cmd": "config", "commit": True})["message"]
+    assert keys_of(host.ask(1, {"cmd": "config", "commit": False})) == keys_of(first)
+    host.arm()
+    host.keep_driving(SPEED, 200)
+    for key, value in (("drive.lease_ms", 300), ("wheels.gear_ratio", "31/2"), ("wheels.track_mm", 600), ("right.invert", "yes"), ("wheels.current_role", "limit")):
+        assert host.ask(1, {"cmd": "config", "key": key, "value": value})["staged"]
+    assert host.ask(1, {"cmd": "config", "commit": True})["error"] == "denied", "written while the wheels turn"
+    host.ask(1, {"cmd": "stop"})
+    rig.run(300 * MS)
+    assert host.ask(1, {"cmd": "config", "commit": True})["error"] == "denied", "written in the hold"
+    rig.run(2 * SECOND)
+    before, boot = rig.machine.flash.erasures, host.boot
+    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
+    host.begin_again()
+    assert rig.machine.flash.erasures == before and host.boot != boot
+    wanted = {**keys_of(first), "drive.lease_ms": "300", "wheels.gear_ratio": "31/2", "wheels.track_mm": "600", "right.invert": "yes"}
+    assert keys_of(host.ask(1, {"cmd": "config"})) == wanted
+    rig.machine.lose_power()
+    host.begin_again()
+    assert keys_of(host.ask(1, {"cmd": "config"})) == wanted and host.ask(1, {"cmd": "status"})["lease"]["lease_ms"] == 300
+    assert host.arm()["lease_ms"] == 300
+    rig.expect_resets("software", "power")
+
+
+def power_cut_while_writing(rig):
+    """Power fails after any number of words of a commit, and during the counting of a power-on: the configuration is the old or the new one, and
+    no two starts have one name."""
+    host, boots, value, resets = start(rig), set(), 200, 0
+    cuts = range(0, 130, 9) if rig.machine.flash.unit == 2 else range(0, 66, 5)
+    for cut in cuts:
+        assert host.boot not in boots, "two starts have one name"
+        boots.add(host.boot)
+        value += 1
+        host.ask(1, {"cmd": "config", "key": "drive.lease_ms", "value": value})
+        rig.machine.flash.cut_after = cut
+        host.say(1, {"cmd": "config", "commit": True})
+        rig.run(100 * MS)
+        if rig.machine.flash.cut_after is not None: # The commit was through before.
+            rig.machine.flash.cut_after, rig.machine.flash.next_cut = None, cut // 2 # And now the counting of the next power-on.
+            rig.machine.lose_power()
+        host.begin_again()
+        now = int(keys_of(host.ask(1, {"cmd": "config"}))["drive.lease_ms"])
+        assert value - 1 <= now <= value, f"lease_ms is {now}, neither {value - 1} nor {value}"
+        value = now
+        resets = len(rig.machine.resets)
+    rig.expect_resets(*(cause for _, cause in rig.machine.resets))
+    assert resets >= len(cuts) and set(rig.expected_resets) <= {"power", "software"}
+    rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
+
+
+def bus_off_driven(rig):
+    """Bus-off under a host: latched, told, and nothing moves when the bus is back."""
+    host = start_driving(rig)
+    host.ask(1, {"cmd": "watch", "topics": ["stop", "bus"]})
+    rig.machine.bus.corrupt_chip = True
+    off_ns = rig.machine.now_ns
+    host.keep_driving(SPEED, 40)
+    rig.machine.bus.corrupt_chip = False
+    host.keep_driving(SPEED, 400)
+    assert rig.counter("bus_offs") >= 1 and rig.machine.can.is_on(), "no bus-off"
+    assert not moving(rig, off_ns), "motion after bus-off"
+    assert host.drive(SPEED)["error"] == "latched"
+    assert host.events("stop")[-1]["cause"] in ("bus_down", "send_stalled")
+
+
+def damaged(chance, line):
+    """One of the ways in which a line comes that was not sent like that."""
+    data, way = bytearray(line), chance.randrange(6)
+    at = chance.randrange(len(data) - 1)
+    if way == 0:
+        data[at] ^= 1 << chance.randrange(8)
+    elif way == 1:
+        del data[at:at + chance.randrange(1, 20)]
+    elif way == 2:
+        data[at:at] = bytes(chance.randrange(256) for _ in range(chance.randrange(1, 12)))
+    elif way == 3:
+        data = data[:at] + b"\n"
+    elif way == 4:
+        data = data[at:]
+    else:
+        other = chance.randrange(len(data) - 1)
+        data[at], data[other] = data[other], data[at]
+    return bytes(data)
+
+
+def hostile_line(rig):
+    """Some thousand damaged, cut, doubled and delayed commands to move, at full rate, while armed: none is obeyed, and the lease runs out."""
+    host, chance = start(rig), random.Random(4)
+    host.arm()
+    host.keep_driving(SPEED, 200)
+    kept, begun_ns = [], rig.machine.now_ns
+    good = None
+    count = 0
+    for turn in range(60):
+        for _ in range(12):
+            good = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 777, "right_mm_s": 777})) + b"\n"
+            kept.append(good)
+            bad = damaged(chance, good)
+            host.raw(bad if bad.rstrip(b"\n") != good.rstrip(b"\n") else b"\n")
+            count += 1
+        rig.run(20 * MS)
+    assert not [frame for frame in rig.setpoints() if frame.setpoint()[0] > SPEED], "a damaged line was obeyed"
+    assert not moving(rig, begun_ns + LEASE_NS + PERIOD_NS + RAMP_NS), "damaged lines kept the lease"
+    told = host.events("line_error")
+    assert told and len(told) <= 2 + 5 * (rig.machine.now_ns - begun_ns) / SECOND, f"{len(told)} line_errors"
+    assert host.ask(1, {"cmd": "hello"}, 500)["ok"], "the line did not recover"
+    host.arm()
+    for line in kept[::9]:
+        host.raw(line)
+        count += 1
+        rig.run(5 * MS)
+    assert not [frame for frame in rig.setpoints() if frame.setpoint()[0] > SPEED], "an old line was obeyed"
+    host.drive(50)
+    fresh = framed(b"1 " + host.quoted(1, {"cmd": "drive", "left_mm_s": 60, "right_mm_s": 60})) + b"\n"
+    for _ in range(50): # Doubled: obeyed once, fed once.
+        host.raw(fresh)
+        count += 1
+        rig.run(10 * MS)
+    assert not moving(rig, rig.machine.now_ns - 100 * MS), "one command, doubled, kept the lease"
+    rig.note(f"{count} bad lines")
+
+
+def noise_on_the_wire(rig):
+    """Bytes that the chip itself saw to be damaged, and a flood of rubbish: the e-stop still works in time."""
+    host = start_driving(rig)
+    for _ in range(30):
+        rig.machine.uart.disturb()
+        host.drive(SPEED, wait=False)
+        rig.run(10 * MS)
+    host.raw(bytes(random.Random(1).randrange(256) for _ in range(20000)))
+    rig.run(3 * MS)
+    rig.machine.board.drive("estop", None)
+    pressed_ns = rig.machine.now_ns
+    rig.run(300 * MS)
+    zero = next((frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO), None)
+    assert zero is not None and zero.time_ns - pressed_ns <= EDGE_TO_ZERO_NS
+    assert not moving(rig, zero.time_ns)
+
+
+def crowd(rig):
+    """Eight clients, all of whom watch and ask without end: the driver goes on, replies come before events, losses are told."""
+    host = start(rig)
+    host.arm()
+    for channel in range(2, 9):
+        host.open(channel, watch=channel % 2 == 0)
+        host.ask(channel, {"cmd": "watch", "topics": ["state", "force", "stop", "bus", "lease", "estop"], "rate_hz": 100})
+    begun_ns = rig.machine.now_ns
+    for turn in range(100):
+        for channel in range(2, 9):
+            host.say(channel, {"cmd": "status", "id": turn})
+        host.drive(SPEED, wait=False)
+        rig.run(20 * MS)
+        host.listen()
+    frames = rig.setpoints(begun_ns + 200 * MS)
+    assert frames and all(frame.setpoint()[0] == SPEED for frame in frames), "the crowd disturbed the driver"
+    times = [frame.time_ns for frame in frames if frame.id == LEFT]
+    gap_ns = max(b - a for a, b in zip(times, times[1:]))
+    assert gap_ns < 30 * MS, f"a gap of {gap_ns / MS:.1f} ms"
+    assert host.events("lost"), "losses were not told"
+    served = {line.channel for line in host.lines if line.message.get("id") is not None and "left" in line.message}
+    assert served >= set(range(2, 9)), f"only {served} had a snapshot"
+    rig.note(f"worst gap between setpoints {gap_ns / MS:.1f} ms")
+
+
+SCENARIOS = (talks, both_words_and_turns, lease_alone, close_ends, silent_relay, relay_killed_and_anew, relay_stopped_goes_on, stale_in_every_way,
+             nobody_feeds_another, estop_random, software_estop, reset_in_motion, config_in_flash, power_cut_while_writing, bus_off_driven, hostile_line, noise_on_the_wire, crowd)
+LONG = (both_words_and_turns, estop_random, hostile_line, crowd, reset_in_motion, nobody_feeds_another)

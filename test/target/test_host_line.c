@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: MIT
+// The image's own host code against a line that damages, cuts, doubles, delays and invents: a million lines, judged by what the
+// wheels are told. The clock is virtual, the serial driver is replaced by this file.
+#include "gateway_rig.h"
+#include "unity.h"
+
+#include "host.h"
+#include "serial.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define FAST_MM_S 777 // What every hostile line asks for.
+#define SLOW_MM_S 100 // What the good ones do.
+#define BOOT      0x0123456789abcdefU
+
+static gateway_rig_t rig;
+static iw_host_t host;
+static char wire[65536]; // To the board.
+static size_t wire_length, wire_taken;
+static uint64_t t_us, seq; // The newest stamp heard, and the newest number that was used.
+static bool has_used;      // ... since the channel was opened.
+static uint32_t errors, refused, accepted, written;
+static uint32_t chance = 1;
+
+size_t iw_serial_read(char *out, size_t size) {
+    const size_t count = (size < wire_length - wire_taken) ? size : wire_length - wire_taken;
+    memcpy(out, &wire[wire_taken], count);
+    wire_taken += count;
+    return count;
+}
+
+bool iw_serial_had_error(void) {
+    return false;
+}
+
+size_t iw_serial_room(void) {
+    return IW_SERIAL_SEND_BYTES;
+}
+
+/// Every line that the board writes is right.
+bool iw_serial_write(const char *bytes, size_t length) {
+    iwn_line_t line;
+    TEST_ASSERT_EQUAL_CHAR('\n', bytes[length - 1U]);
+    TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, iwn_line_read(bytes, length - 1U, true, &line));
+    t_us = line.t_us;
+    written++;
+    char text[IW_HOST_LINE_BYTES + 1U];
+    memcpy(text, line.json, line.length);
+    text[line.length] = '\0';
+    errors += (strstr(text, "line_error") != NULL) ? 1U : 0U;
+    refused += (strstr(text, "stale_command") != NULL) ? 1U : 0U;
+    accepted += (strstr(text, "\"limited\"") != NULL) ? 1U : 0U;
+    return true;
+}
+
+bool iw_serial_lend(const char *bytes, size_t length) {
+    return iw_serial_write(bytes, length);
+}
+
+bool iw_serial_lends(void) {
+    return false;
+}
+
+bool iw_serial_is_idle(void) {
+    return true;
+}
+
+bool iw_host_keep(const iw_settings_t *settings) {
+    (void)settings;
+    return true;
+}
+
+static uint32_t random_below(uint32_t limit) {
+    chance = chance * 1664525U + 1013904223U;
+    return (uint32_t)((uint64_t)(chance >> 8) * limit >> 24);
+}
+
+static void put(const void *bytes, size_t length) {
+    TEST_ASSERT_TRUE(wire_length + length <= sizeof wire);
+    memcpy(&wire[wire_length], bytes, length);
+    wire_length += length;
+}
+
+static size_t framed(uint8_t channel, const char *json, char out[IWN_LINE_BOARD_MAX]) {
+    const iwn_line_t line = {.json = json, .length = strlen(json), .channel = channel};
+    return iwn_line_write(&line, out, IWN_LINE_BOARD_MAX);
+}
+
+static void say(uint8_t channel, const char *json) {
+    char line[IWN_LINE_BOARD_MAX];
+    put(line, framed(channel, json, line));
+}
+
+/// Each with an id of its own: the halves of two lines never make a whole one.
+static size_t drive_line(int speed_mm_s, uint64_t boot, uint64_t number, uint64_t stamp_us,
+                         char out[IWN_LINE_BOARD_MAX]) {
+    static unsigned id;
+    char json[256];
+    (void)snprintf(json, sizeof json,
+                   "{\"boot\":\"%016llx\",\"seq\":%llu,\"t_us\":%llu,\"cmd\":\"drive\",\"left_mm_s\":%d,"
+                   "\"right_mm_s\":%d,\"id\":%u}",
+                   (unsigned long long)boot, (unsigned long long)number, (unsigned long long)stamp_us, speed_mm_s,
+                   speed_mm_s, ++id);
+    return framed(1, json, out);
+}
+
+/// Carries out what came, and lets time pass in steps of 5 ms, as the image's loop does it.
+static void run_ms(uint32_t span_ms) {
+    for (uint32_t ms = 0; ms < span_ms; ms += 5U) {
+        while (iw_host_take(&host, rig.now_us)) {
+        }
+        wire_length = wire_taken = 0;
+        gateway_rig_step(&rig);
+        const iw_snapshot_t seen = gateway_rig_look(&rig);
+        (void)iw_host_tell(&host, &seen, false);
+        gateway_rig_run(&rig, 5000);
+        for (unsigned side = 0; side < IW_SIDES; side++) {
+            TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(SLOW_MM_S, rig.bus.told_mm_s[side], "a hostile line was obeyed");
+        }
+        TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+    }
+}
+
+static void drive_slowly(void) {
+    char line[IWN_LINE_BOARD_MAX];
+    gateway_judge_asked(&rig.judge, true); // The judge sees no requests: it is told.
+    gateway_judge_drive(&rig.judge, true);
+    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line));
+    has_used = true;
+}
+
+static void arm(void) {
+    say(0, "{\"cmd\":\"alive\"}");
+    gateway_judge_renew(&rig.judge);
+    say(1, "{\"cmd\":\"arm\"}");
+    run_ms(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+}
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+    memset(&host, 0, sizeof host);
+    wire_length = wire_taken = 0;
+    errors = refused = accepted = written = 0;
+    seq = 0;
+    has_used = false;
+    chance = 1;
+    const iw_host_place_t place = {.gateway = &rig.gateway,
+                                   .version = "0.0.0",
+                                   .bus = "can",
+                                   .estop = "PB0",
+                                   .bitrate_hz = 1000000,
+                                   .sample_point_permille = 625,
+                                   .settings = iw_settings_from(&rig.config, 540),
+                                   .track_mm = 540,
+                                   .rate_max_hz = 10,
+                                   .boot = BOOT};
+    iw_host_init(&host, &place, rig.now_us);
+    gateway_rig_run(&rig, 600000);
+    say(0, "{\"cmd\":\"link\"}");
+    say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
+    run_ms(20);
+    arm();
+}
+
+void tearDown(void) {}
+
+/// With a byte that no line has: else the next one, its beginning missing, could be made whole by what is alike in both.
+static size_t end_short(char *line, size_t at) {
+    line[at] = '?';
+    return at + 1U;
+}
+
+/// One of the ways in which a line comes that was not sent like that.
+static size_t damage(char *line, size_t length) {
+    const uint32_t at =
+        1U + random_below((uint32_t)length - 2U); // Before its first byte a newline would leave it whole.
+    const uint32_t count = 1U + random_below(12);
+    switch (random_below(6)) {
+    case 0:
+        line[at] = (char)(line[at] ^ 1 << random_below(8));
+        return length;
+    case 1: // Cut out.
+        memmove(&line[at], &line[at + count], (at + count < length) ? length - at - count : 0U);
+        return (at + count < length) ? length - count : end_short(line, at);
+    case 2: // Bytes from nowhere.
+        memmove(&line[at + count], &line[at], length - at);
+        for (uint32_t i = 0; i < count; i++) {
+            line[at + i] = (char)random_below(256);
+        }
+        return length + count;
+    case 3: // Its end is missing, and the next line follows.
+        return end_short(line, at);
+    case 4: // Its beginning is missing.
+        memmove(line, &line[at], length - at);
+        return length - at;
+    default: // A digit becomes another.
+        line[at] = (char)((line[at] >= '0' && line[at] <= '9') ? '0' + (line[at] - '0' + 1) % 10 : line[at] ^ 0x20);
+        return length;
+    }
+}
+
+/// A hostile line: damaged, or whole and old, doubled, of another start, or without a quote.
+static void put_hostile(void) {
+    static char kept[64][IWN_LINE_BOARD_MAX];
+    static size_t kept_length[64];
+    char line[IWN_LINE_BOARD_MAX + 16U];
+    char good[IWN_LINE_BOARD_MAX];
+    const uint32_t slot = random_below(64);
+    size_t length = drive_line(FAST_MM_S, BOOT, seq + 1U + random_below(50), t_us, good);
+    switch (random_below(8)) {
+    case 0: // Held up for longer than the lease.
+        length = drive_line(FAST_MM_S, BOOT, seq + 1U, t_us - 205000U - random_below(1000000), line);
+        break;
+    case 1: // Doubled: its number has been used.
+        length = drive_line(FAST_MM_S, has_used ? BOOT : ~BOOT, (seq > 50U) ? seq - random_below(50) : seq, t_us, line);
+        break;
+    case 2: // Meant for another start.
+        length = drive_line(FAST_MM_S, BOOT ^ 1ULL << random_below(64), seq + 1U, t_us, line);
+        break;
+    case 3: // One of those, later.
+        length = kept_length[slot];
+        memcpy(line, kept[slot], length);
+        break;
+    default:
+        memcpy(line, good, length);
+        length = damage(line, length);
+        if (length > 0U && iwn_line_read(line, length - 1U, false, &(iwn_line_t){0}) == IWN_LINE_GOOD) {
+            length = 0; // It was damaged into itself, by two digits that were the same.
+        }
+        break;
+    }
+    kept_length[slot] = (length <= IWN_LINE_BOARD_MAX) ? length : 0U;
+    memcpy(kept[slot], line, kept_length[slot]);
+    put(line, length);
+    put("\n", random_below(2)); // Some run into the next line.
+}
+
+static void test_host_line_million_hostile_lines_none_is_obeyed(void) {
+    const char *const wish = getenv("IWHEEL_HOSTILE_LINES");
+    const uint32_t wanted = (wish != NULL) ? (uint32_t)strtoul(wish, NULL, 10) : 1000000U;
+    uint32_t lines = 0;
+    for (uint32_t turn = 0; lines < wanted; turn++) {
+        for (uint32_t i = 0; i < 60U; i++, lines++) {
+            put_hostile();
+        }
+        put("\n", 1);
+        say(0, "{\"cmd\":\"alive\"}");
+        if (turn % 64U < 32U) {
+            drive_slowly();
+        }
+        run_ms(20);
+        if (turn % 64U == 63U) {
+            TEST_ASSERT_EQUAL_INT_MESSAGE(0, rig.bus.told_mm_s[IW_LEFT], "hostile lines kept the lease");
+            run_ms(2500);
+            say(0, "{\"cmd\":\"link\"}"); // So long without a relay: its channels are gone.
+            say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
+            run_ms(20);
+            arm();
+            has_used = false;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(wanted / 10U, refused);
+    TEST_ASSERT_GREATER_THAN_UINT32(100, errors);
+    TEST_ASSERT_GREATER_THAN_UINT32(wanted / 60U / 4U, accepted);
+}
+
+static void test_host_line_errors_are_told_at_most_five_times_a_second(void) {
+    for (uint32_t turn = 0; turn < 200U; turn++) {
+        put("rubbish*00000000\n", 17);
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(5);
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(6, errors);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT32(4, errors);
+}
+
+/// The lease runs from the stamp that a command quotes, not from when it came.
+static void test_host_line_delayed_commands_lease_ends_from_their_stamp(void) {
+    char line[IWN_LINE_BOARD_MAX];
+    const uint64_t stamp_us = t_us;
+    run_ms(150);
+    say(0, "{\"cmd\":\"alive\"}");
+    gateway_judge_asked(&rig.judge, true);
+    gateway_judge_drive(&rig.judge, true);
+    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, stamp_us, line));
+    run_ms(40);
+    TEST_ASSERT_EQUAL_UINT32(1, accepted);
+    run_ms(35);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_host_line_million_hostile_lines_none_is_obeyed);
+    RUN_TEST(test_host_line_errors_are_told_at_most_five_times_a_second);
+    RUN_TEST(test_host_line_delayed_commands_lease_ends_from_their_stamp);
+    return UNITY_END();
+}

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: MIT
+// The records in flash, on a flash that is cut off from power after any number of writes and erasures.
+#include "unity.h"
+
+#include "flash.h"
+#include "store.h"
+
+#include <string.h>
+
+static uint32_t flash[IW_FLASH_PAGES][IW_FLASH_PAGE_WORDS];
+static unsigned operations; ///< Since the start.
+static unsigned cut_after;  ///< So many are carried out, and of the next one a part.
+static unsigned erasures;
+static bool is_dead;     ///< Nothing is carried out any more.
+static uint32_t torn_by; ///< Which bits of the operation that was cut got through.
+
+const volatile uint32_t *iw_flash_page(unsigned page) {
+    return flash[page];
+}
+
+static bool is_cut(void) {
+    is_dead = is_dead || operations > cut_after;
+    return operations++ >= cut_after;
+}
+
+bool iw_flash_erase(unsigned page) {
+    const bool cut = is_cut();
+    if (is_dead) {
+        return false;
+    }
+    erasures++;
+    for (unsigned word = 0; word < IW_FLASH_PAGE_WORDS; word++) {
+        flash[page][word] |= (cut && word % 3U != 0U) ? torn_by : UINT32_MAX;
+    }
+    return !cut;
+}
+
+bool iw_flash_write(unsigned page, unsigned word, uint32_t value) {
+    const bool cut = is_cut();
+    if (is_dead) {
+        return false;
+    }
+    TEST_ASSERT_EQUAL_HEX32_MESSAGE(UINT32_MAX, flash[page][word], "a word was written twice");
+    flash[page][word] = cut ? value | ~torn_by : value;
+    return !cut;
+}
+
+void setUp(void) {
+    memset(flash, 0xFF, sizeof flash);
+    operations = erasures = 0;
+    cut_after = UINT32_MAX;
+    is_dead = false;
+    torn_by = 0;
+}
+
+void tearDown(void) {}
+
+static void fill(uint32_t payload[IW_STORE_WORDS], uint32_t number) {
+    for (uint32_t word = 0; word < IW_STORE_WORDS; word++) {
+        payload[word] = number * 2654435761U + word * 40503U;
+    }
+}
+
+static void power_up(void) {
+    cut_after = UINT32_MAX;
+    is_dead = false;
+}
+
+/// The number of the record that is there; 0: none.
+static uint32_t newest(iw_store_t *store) {
+    uint32_t found[IW_STORE_WORDS];
+    uint32_t wanted[IW_STORE_WORDS];
+    if (!iw_store_open(store, found)) {
+        return 0;
+    }
+    fill(wanted, found[0] * 244002641U); // The inverse of the factor: which number it was made of.
+    TEST_ASSERT_EQUAL_HEX32_ARRAY_MESSAGE(wanted, found, IW_STORE_WORDS, "a record of parts of two");
+    return found[0] * 244002641U;
+}
+
+static bool write(iw_store_t *store, uint32_t number, bool may_erase) {
+    uint32_t payload[IW_STORE_WORDS];
+    fill(payload, number);
+    return iw_store_write(store, payload, may_erase);
+}
+
+static void test_store_blank_flash_has_no_record(void) {
+    iw_store_t store;
+    TEST_ASSERT_EQUAL_UINT32(0, newest(&store));
+    TEST_ASSERT_EQUAL_UINT(4, iw_store_blank(&store));
+}
+
+static void test_store_each_record_is_the_newest(void) {
+    iw_store_t store;
+    (void)newest(&store);
+    for (uint32_t number = 1; number <= 50U; number++) {
+        TEST_ASSERT_TRUE(write(&store, number, true));
+        TEST_ASSERT_EQUAL_UINT32(number, newest(&store));
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT(2, iw_store_blank(&store));
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(25, erasures);
+}
+
+static void test_store_without_erasing_full_page_refuses_and_keeps(void) {
+    iw_store_t store;
+    (void)newest(&store);
+    for (uint32_t number = 1; number <= 4U; number++) {
+        TEST_ASSERT_TRUE(write(&store, number, false));
+    }
+    TEST_ASSERT_FALSE(write(&store, 5, false));
+    TEST_ASSERT_TRUE(store.failed);
+    TEST_ASSERT_EQUAL_UINT(0, erasures);
+    TEST_ASSERT_EQUAL_UINT32(4, newest(&store));
+}
+
+/// One record after another with a cut after every operation of each, and whatever bits of the last one got through.
+static void test_store_cut_at_any_instant_leaves_old_or_new(void) {
+    static const uint32_t torn[] = {0, 0x0000FFFF, 0xFFFF0000, 0x55555555, UINT32_MAX};
+    for (unsigned way = 0; way < sizeof torn / sizeof torn[0]; way++) {
+        iw_store_t store;
+        uint32_t number = 0;
+        setUp();
+        torn_by = torn[way];
+        (void)newest(&store);
+        for (unsigned cut = 0; cut < 3U * 66U; cut++) {
+            const uint32_t before = newest(&store);
+            operations = 0;
+            cut_after = cut % 66U;
+            number++;
+            const bool done = write(&store, number, true);
+            power_up();
+            const uint32_t after = newest(&store);
+            TEST_ASSERT_TRUE_MESSAGE(after == before || after == number, "neither the old nor the new one");
+            TEST_ASSERT_TRUE_MESSAGE(!done || after == number, "it was said to be written and is not");
+        }
+        TEST_ASSERT_TRUE_MESSAGE(write(&store, number + 1U, true), "cuts left no way to go on");
+    }
+}
+
+static void test_store_flipped_bit_falls_back_to_the_record_before(void) {
+    iw_store_t store;
+    (void)newest(&store);
+    TEST_ASSERT_TRUE(write(&store, 1, true));
+    TEST_ASSERT_TRUE(write(&store, 2, true));
+    for (unsigned bit = 0; bit < 64U * 32U; bit++) {
+        uint32_t *const word = &flash[store.page][store.slot * 64U + bit / 32U];
+        *word ^= 1U << bit % 32U;
+        iw_store_t again;
+        TEST_ASSERT_EQUAL_UINT32(1, newest(&again));
+        *word ^= 1U << bit % 32U;
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_store_blank_flash_has_no_record);
+    RUN_TEST(test_store_each_record_is_the_newest);
+    RUN_TEST(test_store_without_erasing_full_page_refuses_and_keeps);
+    RUN_TEST(test_store_cut_at_any_instant_leaves_old_or_new);
+    RUN_TEST(test_store_flipped_bit_falls_back_to_the_record_before);
+    return UNITY_END();
+}

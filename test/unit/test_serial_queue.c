@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+// What waits between a client and a board: in order, bounded, replaced by what is newer, never sent late.
+#include "queue.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+#define NOW  1000000U
+#define HOLD 60000U
+
+static serial_queue_t queue;
+static uint64_t number;
+
+void setUp(void) {
+    serial_queue_init(&queue, HOLD);
+    number = 0;
+}
+
+void tearDown(void) {}
+
+static serial_request_t *put(serial_kind_t kind, uint64_t came_us) {
+    serial_request_t *place = serial_queue_place(&queue);
+    *place = (serial_request_t){.kind = kind, .number = ++number, .came_us = came_us, .length = 2, .json = "{}"};
+    serial_queue_put(&queue);
+    return place;
+}
+
+/// What goes to the wire now; NULL: nothing.
+static serial_request_t *send_next(uint64_t now_us) {
+    serial_request_t *next = serial_queue_next(&queue, false, now_us);
+    if (next != NULL) {
+        serial_queue_sent(next, now_us);
+    }
+    return next;
+}
+
+static bool answered(uint64_t which) {
+    return serial_queue_take(&queue, which, true, "}", 1);
+}
+
+static void test_kind_of_each_command_is_what_it_can_do(void) {
+    TEST_ASSERT_EQUAL_INT(SERIAL_MOVES, serial_kind_of(IWN_CMD_DRIVE));
+    TEST_ASSERT_EQUAL_INT(SERIAL_MOVES, serial_kind_of(IWN_CMD_TWIST));
+    TEST_ASSERT_EQUAL_INT(SERIAL_STOPS, serial_kind_of(IWN_CMD_STOP));
+    TEST_ASSERT_EQUAL_INT(SERIAL_STOPS, serial_kind_of(IWN_CMD_DISARM));
+    TEST_ASSERT_EQUAL_INT(SERIAL_STOPS, serial_kind_of(IWN_CMD_ESTOP));
+    TEST_ASSERT_EQUAL_INT(SERIAL_GRANTS, serial_kind_of(IWN_CMD_ARM));
+    TEST_ASSERT_EQUAL_INT(SERIAL_GRANTS, serial_kind_of(IWN_CMD_RESET));
+    TEST_ASSERT_EQUAL_INT(SERIAL_ASKS, serial_kind_of(IWN_CMD_STATUS));
+}
+
+static void test_queue_sends_one_and_the_next_when_it_is_answered(void) {
+    serial_request_t *first = put(SERIAL_ASKS, NOW);
+    serial_request_t *second = put(SERIAL_ASKS, NOW);
+    TEST_ASSERT_EQUAL_PTR(first, send_next(NOW));
+    TEST_ASSERT_NULL(send_next(NOW));
+    TEST_ASSERT_TRUE(answered(first->number));
+    serial_queue_drop(&queue);
+    TEST_ASSERT_EQUAL_PTR(second, send_next(NOW));
+}
+
+static void test_queue_newer_command_replaces_the_one_that_waits_and_not_the_one_sent(void) {
+    const serial_request_t *sent = put(SERIAL_MOVES, NOW);
+    (void)send_next(NOW);
+    const serial_request_t *waits = put(SERIAL_MOVES, NOW + 1U);
+    const serial_request_t *newest = put(SERIAL_MOVES, NOW + 2U);
+    TEST_ASSERT_EQUAL_INT(SERIAL_SENT, sent->state);
+    TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, waits->state);
+    TEST_ASSERT_EQUAL_INT(IWN_STALE_COMMAND, waits->error);
+    TEST_ASSERT_NOT_NULL(strstr(waits->reason, "replaced"));
+    TEST_ASSERT_EQUAL_INT(SERIAL_WAITING, newest->state);
+    TEST_ASSERT_NULL(send_next(NOW + 3U));
+}
+
+static void test_queue_answers_leave_in_the_order_of_the_requests(void) {
+    (void)put(SERIAL_MOVES, NOW);
+    (void)send_next(NOW);
+    (void)put(SERIAL_MOVES, NOW);
+    (void)put(SERIAL_MOVES, NOW);
+    TEST_ASSERT_NULL(serial_queue_answered(&queue));
+    TEST_ASSERT_TRUE(answered(1));
+    serial_queue_drop(&queue);
+    TEST_ASSERT_EQUAL_UINT(2, serial_queue_answered(&queue)->number);
+    serial_queue_drop(&queue);
+    TEST_ASSERT_NULL(serial_queue_answered(&queue));
+    TEST_ASSERT_EQUAL_UINT(3, send_next(NOW)->number);
+}
+
+static void test_queue_stop_goes_at_once_and_what_waits_before_it_and_moves_does_not(void) {
+    (void)put(SERIAL_ASKS, NOW);
+    (void)send_next(NOW);
+    const serial_request_t *arm = put(SERIAL_GRANTS, NOW);
+    const serial_request_t *drive = put(SERIAL_MOVES, NOW);
+    serial_request_t *stop = put(SERIAL_STOPS, NOW);
+    TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, arm->state);
+    TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, drive->state);
+    TEST_ASSERT_EQUAL_PTR(stop, serial_queue_next(&queue, true, NOW));
+}
+
+static void test_queue_stop_takes_questions_before_it_along(void) {
+    (void)put(SERIAL_ASKS, NOW);
+    (void)send_next(NOW);
+    serial_request_t *question = put(SERIAL_ASKS, NOW);
+    serial_request_t *stop = put(SERIAL_STOPS, NOW);
+    TEST_ASSERT_EQUAL_PTR(question, send_next(NOW));
+    TEST_ASSERT_EQUAL_PTR(stop, send_next(NOW));
+}
+
+static void test_queue_early_answer_is_held_until_its_turn(void) {
+    (void)put(SERIAL_ASKS, NOW);
+    (void)send_next(NOW);
+    serial_request_t *stop = put(SERIAL_STOPS, NOW);
+    (void)send_next(NOW);
+    TEST_ASSERT_TRUE(serial_queue_take(&queue, stop->number, true, ",\"state\":\"stopping\"}", 20));
+    TEST_ASSERT_EQUAL_INT(SERIAL_HELD, stop->state);
+    TEST_ASSERT_NULL(serial_queue_answered(&queue));
+    TEST_ASSERT_TRUE(answered(1));
+    serial_queue_drop(&queue);
+    TEST_ASSERT_EQUAL_PTR(stop, serial_queue_answered(&queue));
+    TEST_ASSERT_EQUAL_STRING_LEN(",\"state\":\"stopping\"}", stop->json, stop->length);
+}
+
+static void test_queue_stop_without_an_answer_is_sent_again_and_nothing_else_is(void) {
+    serial_request_t *drive = put(SERIAL_MOVES, NOW);
+    (void)send_next(NOW);
+    serial_request_t *stop = put(SERIAL_STOPS, NOW);
+    TEST_ASSERT_EQUAL_PTR(stop, send_next(NOW));
+    TEST_ASSERT_NULL(send_next(NOW + SERIAL_AGAIN_US - 1U));
+    TEST_ASSERT_EQUAL_UINT(NOW + SERIAL_AGAIN_US, stop->tried_us + SERIAL_AGAIN_US);
+    TEST_ASSERT_EQUAL_PTR(stop, send_next(NOW + SERIAL_AGAIN_US));
+    TEST_ASSERT_NULL(send_next(NOW + SERIAL_AGAIN_US));
+    TEST_ASSERT_EQUAL_INT(SERIAL_SENT, drive->state);
+}
+
+static void test_queue_command_that_waited_too_long_is_refused_and_not_sent(void) {
+    (void)put(SERIAL_ASKS, NOW);
+    (void)send_next(NOW);
+    const serial_request_t *drive = put(SERIAL_MOVES, NOW);
+    TEST_ASSERT_EQUAL_UINT(NOW + SERIAL_FRESH_US, serial_queue_next_us(&queue, NOW));
+    serial_queue_age(&queue, NOW + SERIAL_FRESH_US - 1U);
+    TEST_ASSERT_EQUAL_INT(SERIAL_WAITING, drive->state);
+    serial_queue_age(&queue, NOW + SERIAL_FRESH_US);
+    TEST_ASSERT_EQUAL_INT(SERIAL_ANSWERED, drive->state);
+    TEST_ASSERT_EQUAL_INT(IWN_STALE_COMMAND, drive->error);
+    TEST_ASSERT_TRUE(answered(1));
+    TEST_ASSERT_NULL(send_next(NOW + SERIAL_FRESH_US));
+}
+
+static void test_queue_lost_answer_holds_the_next_command_no_longer_than_told(void) {
+    (void)put(SERIAL_MOVES, NOW);
+    (void)send_next(NOW);
+    (void)put(SERIAL_MOVES, NOW + 10000U);
+    TEST_ASSERT_NULL(send_next(NOW + HOLD - 1U));
+    TEST_ASSERT_EQUAL_UINT(NOW + HOLD, serial_queue_next_us(&queue, NOW));
+    TEST_ASSERT_EQUAL_UINT(2, send_next(NOW + HOLD)->number);
+    serial_queue_age(&queue, NOW + SERIAL_MOVE_PATIENCE_US);
+    TEST_ASSERT_EQUAL_UINT(1, serial_queue_answered(&queue)->number);
+    TEST_ASSERT_EQUAL_UINT(1, queue.unanswered);
+}
+
+static void test_queue_answer_that_nobody_waits_for_is_known(void) {
+    (void)put(SERIAL_ASKS, NOW);
+    TEST_ASSERT_FALSE(answered(1));
+    (void)send_next(NOW);
+    TEST_ASSERT_FALSE(answered(7));
+    serial_queue_age(&queue, NOW + SERIAL_PATIENCE_US);
+    TEST_ASSERT_FALSE(answered(1));
+    TEST_ASSERT_EQUAL_INT(IWN_INTERNAL, serial_queue_answered(&queue)->error);
+}
+
+static void test_queue_is_full_and_empty_again(void) {
+    for (unsigned round = 0; round < 3U; round++) {
+        for (unsigned i = 0; i < SERIAL_QUEUE_SIZE; i++) {
+            TEST_ASSERT_FALSE(serial_queue_is_full(&queue));
+            (void)put(SERIAL_ASKS, NOW);
+        }
+        TEST_ASSERT_TRUE(serial_queue_is_full(&queue));
+        for (unsigned i = 0; i < SERIAL_QUEUE_SIZE; i++) {
+            const serial_request_t *sent = send_next(NOW);
+            TEST_ASSERT_NOT_NULL(sent);
+            TEST_ASSERT_TRUE(answered(sent->number));
+            serial_queue_drop(&queue);
+        }
+        TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, serial_queue_next_us(&queue, NOW));
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_kind_of_each_command_is_what_it_can_do);
+    RUN_TEST(test_queue_sends_one_and_the_next_when_it_is_answered);
+    RUN_TEST(test_queue_newer_command_replaces_the_one_that_waits_and_not_the_one_sent);
+    RUN_TEST(test_queue_answers_leave_in_the_order_of_the_requests);
+    RUN_TEST(test_queue_stop_goes_at_once_and_what_waits_before_it_and_moves_does_not);
+    RUN_TEST(test_queue_stop_takes_questions_before_it_along);
+    RUN_TEST(test_queue_early_answer_is_held_until_its_turn);
+    RUN_TEST(test_queue_stop_without_an_answer_is_sent_again_and_nothing_else_is);
+    RUN_TEST(test_queue_command_that_waited_too_long_is_refused_and_not_sent);
+    RUN_TEST(test_queue_lost_answer_holds_the_next_command_no_longer_than_told);
+    RUN_TEST(test_queue_answer_that_nobody_waits_for_is_known);
+    RUN_TEST(test_queue_is_full_and_empty_again);
+    return UNITY_END();
+}
