@@ -75,9 +75,11 @@ iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t
     if (iw_permit_state(&self->permit) != IW_STATE_LATCHED && self->ledger.doubt != IW_LEDGER_ITEMS) {
         return IW_REFUSE_CONTRADICTED;
     }
+    const bool held = self->permit.holder == client;
     const iw_refusal_t refusal = iw_permit_arm(&self->permit, now_us, client, takeover);
-    if (refusal == IW_REFUSE_NONE && iw_permit_arming(&self->permit)) {
-        iw_setpoint_hasten(&self->setpoint, now_us);
+    if (refusal == IW_REFUSE_NONE && !held) {
+        // R3: what was commanded before counts no more, even if no step has come between.
+        iw_setpoint_collapse(&self->setpoint, now_us);
     }
     return refusal;
 }

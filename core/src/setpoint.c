@@ -94,9 +94,7 @@ void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair
 
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us) {
     clear(self);
-    if (self->demand != IW_DEMAND_SILENCE) {
-        self->due_us = now_us + IW_SETPOINT_SPACING_US;
-    }
+    iw_setpoint_hasten(self, now_us);
 }
 
 bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us) {

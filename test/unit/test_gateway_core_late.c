@@ -214,6 +214,41 @@ static void test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_LEASE_LOST, rig.gateway.permit.stop.cause);
 }
 
+/// HOLDER's lease of arm still lasts, and a zero pair leaves in this moment; HOLDER's nonzero command comes now, but was
+/// sent longer ago than any command keeps arm from being granted.
+static void drive_that_waited_too_long(void) {
+    gateway_rig_arm(&rig);
+    const iw_time_us_t sent_us = rig.now_us;
+    gateway_rig_run(&rig, MS(600));
+    for (unsigned i = 0; i < 300U && rig.gateway.setpoint.last_us != rig.now_us; i++) {
+        gateway_rig_run(&rig, MS(1) / 10U);
+    }
+    TEST_ASSERT_EQUAL_UINT64(rig.now_us, rig.gateway.setpoint.last_us);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, drive_sent(sent_us));
+}
+
+static void assert_armed_and_still(void) {
+    for (unsigned i = 0; i < 50U; i++) {
+        gateway_rig_run(&rig, MS(10));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+        TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    }
+}
+
+static void test_gateway_takeover_does_not_inherit_a_command(void) {
+    drive_that_waited_too_long();
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, OTHER, true));
+    assert_armed_and_still();
+}
+
+static void test_gateway_stop_and_arm_in_one_moment_forget_the_command_before(void) {
+    drive_that_waited_too_long();
+    iw_gateway_stop(&rig.gateway, rig.now_us, HOLDER, IW_CAUSE_CLIENT_STOP);
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, iw_gateway_arm(&rig.gateway, rig.now_us, HOLDER, false));
+    gateway_rig_stall(&rig, MS(2)); // Both echoes are in one step.
+    assert_armed_and_still();
+}
+
 static void test_gateway_drive_that_waited_does_not_hide_a_later_one(void) {
     gateway_rig_arm(&rig);
     (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
@@ -238,5 +273,7 @@ int main(void) {
     RUN_TEST(test_gateway_drive_from_before_arm_is_stale);
     RUN_TEST(test_gateway_drive_that_waited_holds_the_lease_from_when_it_was_sent);
     RUN_TEST(test_gateway_drive_that_waited_does_not_hide_a_later_one);
+    RUN_TEST(test_gateway_takeover_does_not_inherit_a_command);
+    RUN_TEST(test_gateway_stop_and_arm_in_one_moment_forget_the_command_before);
     return UNITY_END();
 }

@@ -17,8 +17,9 @@ static void test_setpoint_collapse_is_zero_within_spacing_and_forgets_the_comman
     rig.now_us += 1;
     iw_setpoint_collapse(&rig.setpoint, rig.now_us);
     TEST_ASSERT_TRUE(iw_setpoint_next_is_zero(&rig.setpoint));
-    TEST_ASSERT_FALSE(iw_setpoint_due(&rig.setpoint, rig.now_us + IW_SETPOINT_SPACING_US - 1U));
-    (void)setpoint_rig_take_after(&rig, IW_SETPOINT_SPACING_US);
+    // Spaced from the last pair, which left 1 us ago.
+    TEST_ASSERT_FALSE(iw_setpoint_due(&rig.setpoint, rig.now_us + IW_SETPOINT_SPACING_US - 2U));
+    (void)setpoint_rig_take_after(&rig, IW_SETPOINT_SPACING_US - 1U);
     TEST_ASSERT_TRUE(setpoint_rig_is_zero(&rig));
     for (uint32_t n = 0; n < 100; n++) {
         (void)setpoint_rig_take_next(&rig);

@@ -48,9 +48,9 @@ void iw_setpoint_command(iw_setpoint_t *self, iw_time_us_t now_us, const iw_pair
 /// Moves the next pair forward, but not closer than IW_SETPOINT_SPACING_US to the last one. Nothing in silence.
 void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us);
 
-/// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole. The zero
-/// is due IW_SETPOINT_SPACING_US from now; under FOLLOW the ramp to the next command starts from it, also if the
-/// command comes before it.
+/// Zero at once, whatever the demand, and the command is forgotten: the last pair could not be sent whole, or somebody
+/// else commands from now on. The zero is hastened; under FOLLOW the ramp to the next command starts from it, also if
+/// the command comes before it.
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us);
 
 /// True if a pair must leave now.
