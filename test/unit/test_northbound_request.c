@@ -320,6 +320,23 @@ static void test_request_texts_with_what_moves_a_terminal_are_refused_in_every_f
     }
 }
 
+static void test_request_config_reads_stages_or_commits(void) {
+    accepted("{\"cmd\":\"config\"}", IWN_CMD_CONFIG);
+    TEST_ASSERT_EQUAL_STRING("", request.key);
+    TEST_ASSERT_FALSE(request.has_commit);
+    accepted("{\"cmd\":\"config\",\"key\":\"drive.lease_ms\",\"value\":300}", IWN_CMD_CONFIG);
+    TEST_ASSERT_EQUAL_STRING("drive.lease_ms", request.key);
+    TEST_ASSERT_EQUAL_STRING("300", request.value);
+    accepted("{\"cmd\":\"config\",\"commit\":false}", IWN_CMD_CONFIG);
+    TEST_ASSERT_TRUE(request.has_commit && !request.commit);
+    accepted("{\"cmd\":\"config\",\"commit\":true}", IWN_CMD_CONFIG);
+    TEST_ASSERT_TRUE(request.has_commit && request.commit);
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"config\",\"key\":\"\"}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"config\",\"key\":\"12345678901234567890123456789012345678901\"}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"config\",\"commit\":1}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"config\",\"item\":\"track\"}");
+}
+
 static void test_request_tare_takes_a_side_or_both(void) {
     accepted("{\"cmd\":\"tare\"}", IWN_CMD_TARE);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, request.sides);
@@ -350,6 +367,7 @@ int main(void) {
     RUN_TEST(test_request_watch_topics_become_bits_and_unknown_ones_refuse_all);
     RUN_TEST(test_request_texts_have_a_length_and_no_control_characters);
     RUN_TEST(test_request_texts_with_what_moves_a_terminal_are_refused_in_every_field_and_spelling);
+    RUN_TEST(test_request_config_reads_stages_or_commits);
     RUN_TEST(test_request_tare_takes_a_side_or_both);
     return UNITY_END();
 }
