@@ -42,7 +42,8 @@ typedef struct {
 
 static void help(void) {
     (void)fputs("iwheel-serial: joins a board that is a gateway of its own, on a serial port,\n"
-                "to the sockets that every client knows, iwheelctl too. It moves nothing itself.\n"
+                "to the sockets that iwheelctl, the clients and the bridges know.\n"
+                "It moves nothing itself.\n"
                 "\n"
                 "usage: iwheel-serial [options]\n"
                 "  -c, --config FILE   configuration (" SERIAL_SETTINGS_PATH ", if it exists)\n"

@@ -85,11 +85,11 @@ static void test_json_names_are_compared_each_with_each_and_as_many_as_fit_a_lin
 }
 
 static void test_json_text_longer_than_its_places_can_be_told_is_refused(void) {
-    static char text[65537];
+    static char text[IWN_JSON_MAX + 1U];
     memset(text, ' ', sizeof text);
     memcpy(text, "[]", 2);
-    TEST_ASSERT_TRUE(check(text, 65535U));
-    TEST_ASSERT_FALSE(check(text, 65536U));
+    TEST_ASSERT_TRUE(check(text, IWN_JSON_MAX));
+    TEST_ASSERT_FALSE(check(text, IWN_JSON_MAX + 1U));
 }
 
 static void test_json_refusal_tells_what_is_wrong_and_near_what(void) {
