@@ -4,7 +4,6 @@
 #include "common/link.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
@@ -84,14 +83,14 @@ static int complain(int code, const char *path, const char *what) {
 }
 
 static int read_credentials(mqtt_broker_t *self, const char *path) {
-    struct stat status;
+    struct stat status = {0};
     char line[512];
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
-    FILE *file = (fd >= 0) ? fdopen(fd, "r") : NULL;
-    if (file == NULL || fstat(fd, &status) != 0) {
+    FILE *file = fopen(path, "re");
+    if (file == NULL) {
         return complain(EX_NOPERM, path, strerror(errno));
     }
-    const bool ours = status.st_uid == geteuid() || status.st_uid == 0U;
+    const bool known = fstat(fileno(file), &status) == 0;
+    const bool ours = known && (status.st_uid == geteuid() || status.st_uid == 0U);
     // Root's may be read by the group that the bridge runs in: that is how an administrator gives it.
     const mode_t others = (status.st_uid == 0U) ? 0037U : 0077U;
     const bool read = fgets(line, sizeof line, file) != NULL;
