@@ -47,7 +47,8 @@ static void compare_requests(const iwn_request_t *now, const iwn_request_t *befo
                  "the same choices");
     fuzz_require(strcmp(now->name, before->name) == 0 && strcmp(now->reason, before->reason) == 0 &&
                      strcmp(now->value, before->value) == 0 && strcmp(now->how, before->how) == 0 &&
-                     strcmp(now->file, before->file) == 0 && now->offset == before->offset,
+                     strcmp(now->file, before->file) == 0 && strcmp(now->key, before->key) == 0 &&
+                     now->offset == before->offset && now->commit == before->commit,
                  "the same texts");
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The gateway's reader of requests as it was until version 0.1, on jansson: what the new one must agree with. For tests only.
+// The gateway's reader of requests as it was until version 0.1, on jansson, with the requests that came later: what the new one must
+// agree with. For tests only.
 #include "old_reader.h"
 
 #include "iwheel_northbound/text.h"
@@ -75,16 +76,18 @@ static const field_t fields[] = {
     {"reason", IN(reason), IWN_REASON_MAX, BIT(IWN_CMD_ESTOP), false, FIELD_TEXT},
     {"side", IN(sides), 0, BIT(IWN_CMD_TARE), false, FIELD_SIDE},
     {"item", IN(item), 0, BIT(IWN_CMD_CONFIRM), true, FIELD_ITEM},
-    {"value", IN(value), IWN_VALUE_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_VALUE},
+    {"value", IN(value), IWN_VALUE_SIZE - 1U, BIT(IWN_CMD_CONFIRM) | BIT(IWN_CMD_CONFIG), false, FIELD_VALUE},
     {"how", IN(how), IWN_HOW_SIZE - 1U, BIT(IWN_CMD_CONFIRM), false, FIELD_TEXT},
     {"name", IN(file), IWN_FILE_MAX, BIT(IWN_CMD_RECORDING), true, FIELD_TEXT},
     {"offset", IN(offset), 0, BIT(IWN_CMD_RECORDING), false, FIELD_INTEGER},
+    {"key", IN(key), IWN_KEY_MAX, BIT(IWN_CMD_CONFIG), false, FIELD_TEXT},
+    {"commit", IN(commit), 0, BIT(IWN_CMD_CONFIG), false, FIELD_FLAG},
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 
-static const char *const cmd_names[IWN_CMDS] = {"hello", "status", "watch",   "arm",        "drive",
-                                                "twist", "stop",   "disarm",  "estop",      "reset",
-                                                "tare",  "why",    "confirm", "recordings", "recording"};
+static const char *const cmd_names[IWN_CMDS] = {"hello",   "status",     "watch",     "arm",   "drive", "twist",
+                                                "stop",    "disarm",     "estop",     "reset", "tare",  "why",
+                                                "confirm", "recordings", "recording", "config"};
 
 __attribute__((format(printf, 3, 4))) static bool refuse(iwn_refusal_t *out_refusal, iwn_error_t error,
                                                          const char *format, ...) {
@@ -272,7 +275,7 @@ static bool read_cmd(const json_t *root, iwn_cmd_t *out_cmd, iwn_refusal_t *out_
     }
     return refuse(out_refusal, IWN_UNKNOWN_CMD,
                   "cmd must be one of hello status watch arm drive twist stop disarm estop reset tare why confirm "
-                  "recordings recording");
+                  "recordings recording config");
 }
 
 static const field_t *find_field(const char *name, iwn_cmd_t cmd) {
@@ -343,5 +346,6 @@ bool old_request_read(const char *line, size_t length, iwn_request_t *out_reques
         return false;
     }
     out_request->has_current = json_object_get(root, "left_mA") != NULL;
+    out_request->has_commit = json_object_get(root, "commit") != NULL;
     return true;
 }

@@ -9,7 +9,8 @@ from bugs import Bug
 MOTION, REQUESTS = ("unit_daemon_motion",), ("unit_daemon_requests",)
 CAN, GPIO, CLOCK = ("unit_linux_socketcan",), ("unit_linux_gpio_estop",), ("unit_linux_clock",)
 LOOP, DISPATCH, SERVICE = "app/gateway/loop.c", "app/gateway/answers/dispatch.c", "app/gateway/clients/service.c"
-REFUSE, WATCHERS = "app/gateway/answers/refuse.c", ("unit_daemon_watchers",)
+RIGHTS, WATCHERS = "northbound/src/request.c", ("unit_daemon_watchers",)
+REFUSE = "app/gateway/answers/refuse.c"
 CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/wheels/tape.c", "core/src/evidence.c"
 SOCKETCAN, BUS = "port/linux/src/socketcan.c", "port/linux/src/bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
@@ -64,10 +65,10 @@ PARTS = [
     Bug("events-take-the-replys-room", "R11", CLIENT, "if (length + reserve > sizeof self->out - waiting) {", "(void)reserve; if (length > sizeof self->out - waiting) {", ("unit_northbound_lines",)),
     Bug("lost-events-not-told", "northbound", CLIENT, "self->lost++;", "self->lost = 1;", ("unit_northbound_lines",)),
     # Who may only watch.
-    Bug("watcher-may-arm", "R1", REFUSE, "[IWN_CMD_HELLO] = true,", "[IWN_CMD_HELLO] = true, [IWN_CMD_ARM] = true,", WATCHERS),
-    Bug("watcher-may-reset", "R2", REFUSE, "[IWN_CMD_HELLO] = true,", "[IWN_CMD_HELLO] = true, [IWN_CMD_RESET] = true,", WATCHERS),
-    Bug("watcher-may-not-stop", "R2", REFUSE, "[IWN_CMD_STOP] = true,", "[IWN_CMD_STOP] = false,", WATCHERS),
-    Bug("watcher-may-not-estop", "R2", REFUSE, "[IWN_CMD_ESTOP] = true,", "[IWN_CMD_ESTOP] = false,", WATCHERS),
+    Bug("watcher-may-arm", "R1", RIGHTS, "const unsigned watching = BIT(HELLO) |", "const unsigned watching = BIT(ARM) | BIT(HELLO) |", WATCHERS),
+    Bug("watcher-may-reset", "R2", RIGHTS, "const unsigned watching = BIT(HELLO) |", "const unsigned watching = BIT(RESET) | BIT(HELLO) |", WATCHERS),
+    Bug("watcher-may-not-stop", "R2", RIGHTS, "BIT(WHY) | BIT(STOP)", "BIT(WHY)", WATCHERS),
+    Bug("watcher-may-not-estop", "R2", RIGHTS, "BIT(DISARM) | BIT(ESTOP) |", "BIT(DISARM) |", WATCHERS),
     Bug("watchers-take-the-slots-of-drivers", "R11", SERVICE, "self->count[right] < self->most[right]", "gw_clients_count(self) < self->most[right]", WATCHERS),
     Bug("watchers-without-a-limit", "R11", SERVICE, "i < part[right].slots && self->count[right] < self->most[right]", "i < part[right].slots", WATCHERS),
     Bug("watcher-asks-without-end", "R11", SERVICE, "pace(client, self->now_us);", "", WATCHERS),
@@ -207,6 +208,5 @@ PARTS = [
     Bug("client-unknown-is-zero", "client", "client/c/src/fields.c", "value.known = iwc_json_integer(iwc_json_find(object, key), &value.value);",
         "(void)iwc_json_integer(iwc_json_find(object, key), &value.value); value.known = true;", FIELDS),
     Bug("client-force-without-a-zero", "client", "client/c/src/fields.c", 'if (iwc_is(&inner, "force_validity", "valid")) {', "{", FIELDS),
-    Bug("client-number-wraps", "client", "client/c/src/json.c", "if (number > (limit - digit) / 10U) {", "if (false) {", FIELDS),
     Bug("client-key-begins-alike", "client", "client/c/src/json.c", ' && name.at[length + 1U] == \'"\'', "", FIELDS),
 ]
