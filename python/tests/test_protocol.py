@@ -22,7 +22,10 @@ from northbound import Description, camel  # noqa: E402
 
 TOPICS = ["state", "bus", "estop", "lease", "stop", "force", "frame"]
 # What this rig cannot bring about, with the reason. Everything else must be seen.
+A_BOARD = "only a gateway without a file of its own has it: a microcontroller"
 UNSEEN = {
+    **dict.fromkeys([f"reply to config.{field}: a value" for field in ("keys", "restarts", "staged")], A_BOARD),
+    **dict.fromkeys([f"configured_entry.{what}" for what in ("key: a value", "value: a value", "value: null")], A_BOARD),
     "bus_status.bitrate: a value": "a local bus has none",
     "bus_status.sample_point_permille: a value": "a local bus has none",
     "event offset.offset_mN: null": "a zero is replaced, and never taken away",

@@ -291,6 +291,7 @@ def test_plots_follow_freeze_zoom_and_are_saved(rig):
         newest = "plots.left.speed.uplot.scales.x.max"
         seen(page, f"{newest} > 0")
         page.click("#freeze")
+        time.sleep(0.2)  # What was on its way is drawn.
         frozen = page.evaluate(newest)
         time.sleep(0.5)
         assert page.evaluate(newest) == frozen

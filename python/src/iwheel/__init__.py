@@ -17,7 +17,23 @@ None means unknown, never 0.
 from ._aio import AsyncArmed, AsyncGateway
 from ._errors import ConnectionLost, GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._gateway import Armed, Gateway
-from ._protocol import Confirmed, Frame, Hello, LedgerEntry, Piece, RecordingEntry, Recordings, Status, Stop, StopSummary, Tared, Watched, WheelStatus
+from ._protocol import (
+    Configured,
+    ConfiguredEntry,
+    Confirmed,
+    Frame,
+    Hello,
+    LedgerEntry,
+    Piece,
+    RecordingEntry,
+    Recordings,
+    Status,
+    Stop,
+    StopSummary,
+    Tared,
+    Watched,
+    WheelStatus,
+)
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._version import __version__
 from ._wire import default_socket
@@ -27,6 +43,8 @@ __all__ = [
     "Armed",
     "AsyncArmed",
     "AsyncGateway",
+    "Configured",
+    "ConfiguredEntry",
     "Confirmed",
     "ConnectionLost",
     "Event",
