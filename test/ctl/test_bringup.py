@@ -762,7 +762,7 @@ def run_one(name):
     return name, done.returncode, done.stderr
 
 
-def run_all(at_a_time=8):
+def run_all(at_a_time=4):
     """What fails among others is judged once more, alone: these tests run in real time."""
     names = unittest.TestLoader().getTestCaseNames(Bringup)
     with concurrent.futures.ThreadPoolExecutor(at_a_time) as pool:
