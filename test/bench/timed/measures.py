@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Inside the kernel: what is measured. Each measure has candidates, and each candidate is one turn: it returns figures."""
 
+import contextlib
 import os
 import re
 import subprocess
@@ -39,6 +40,23 @@ class Renewal(threading.Thread):
     def end(self):
         self.quit.set()
         self.join()
+
+
+@contextlib.contextmanager
+def driven(around):
+    """A gateway of its own, which a client drives as long."""
+    around.start_gateway()
+    client = around.client()
+    around.arm(client)
+    client.drive(100, 100)
+    renewal = Renewal(client)
+    try:
+        yield
+    finally:
+        renewal.end()
+        client.request("stop")
+        client.close()
+        around.end_gateway()
 
 
 class Measure:
@@ -94,19 +112,9 @@ class Period(Measure):
         return self.judge(self.around.python_can("period", self.around.interface, PERIOD_US))
 
     def gateway(self):
-        self.around.start_gateway()
-        client = self.around.client()
-        self.around.arm(client)
-        client.drive(100, 100)
-        renewal = Renewal(client)
-        try:
+        with driven(self.around):
             time.sleep(0.7)
             return self.judge()
-        finally:
-            renewal.end()
-            client.request("stop")
-            client.close()
-            self.around.end_gateway()
 
 
 class PeriodLoaded(Period):
@@ -191,19 +199,9 @@ class Calls(Measure):
 
     def driving(self):
         """The gateway while a client drives."""
-        self.around.start_gateway()
-        client = self.around.client()
-        self.around.arm(client)
-        client.drive(100, 100)
-        renewal = Renewal(client)
-        try:
+        with driven(self.around):
             time.sleep(0.7)
             return self.trace(self.around.gateway.child.pid)
-        finally:
-            renewal.end()
-            client.request("stop")
-            client.close()
-            self.around.end_gateway()
 
     def trace(self, pid):
         seconds = self.plan["calls_s"]
