@@ -389,11 +389,10 @@ static size_t next_request(relay_t *self, bool stops_only, char *out, size_t siz
 }
 
 static size_t next_sign_of_life(relay_t *self, char *out, size_t size) {
-    static const char ask[] = "{\"cmd\":\"link\"}";
     static const char alive[] = "{\"cmd\":\"alive\"}";
     if (!self->link.linked && self->now_us >= self->asked_us + RELAY_ASK_US) {
         self->asked_us = self->now_us;
-        return write_line(0, ask, sizeof ask - 1U, out, size);
+        return write_line(0, RELAY_ASK, sizeof RELAY_ASK - 1U, out, size);
     }
     return (self->link.linked && gw_clients_count(&self->clients) > 0U &&
             self->now_us >= self->said_us + RELAY_ALIVE_US)

@@ -125,7 +125,9 @@ static int check(const serial_settings_t *settings, relay_t *relay) {
     serial_port_t port;
     serial_link_t *link = &relay->link;
     char words[512];
-    static const char ask[] = "\n0 {\"cmd\":\"link\"}*e2d27f9b\n";
+    char ask[64] = "\n"; // Half a line of before ends here.
+    const iwn_line_t question = {.json = RELAY_ASK, .length = sizeof RELAY_ASK - 1U};
+    const size_t length = 1U + iwn_line_write(&question, &ask[1], sizeof ask - 1U);
     (void)puts("ok    configuration");
     if (serial_port_open(&port, settings->board.port, settings->board.baud, words, sizeof words) != 0) {
         (void)printf("fail  %s\n", words);
@@ -136,7 +138,7 @@ static int check(const serial_settings_t *settings, relay_t *relay) {
         char bytes[512];
         iwn_line_t line;
         if (i % 30U == 0U) {
-            (void)serial_port_write(&port, ask, sizeof ask - 1U);
+            (void)serial_port_write(&port, ask, length);
         }
         (void)usleep(10000);
         const ssize_t count = serial_port_read(&port, bytes, sizeof bytes);

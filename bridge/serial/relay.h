@@ -29,7 +29,9 @@
 #define RELAY_ALIVE_US 50000U
 #define RELAY_GAP_US   100000U
 #define RELAY_LEFT_US  400000U
-#define RELAY_ASK_US   300000U
+/// The question who the board is, which begins the link.
+#define RELAY_ASK    "{\"cmd\":\"link\"}"
+#define RELAY_ASK_US 300000U
 /// An open that is not answered is said again, and given up.
 #define RELAY_OPEN_US    200000U
 #define RELAY_WELCOME_US 1500000U
