@@ -27,6 +27,9 @@ static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t elap
     if (speed_mm_s != 0 && last_mm_s != 0 && (speed_mm_s > 0) != (last_mm_s > 0)) {
         return false;
     }
+    if (to == from) {
+        return true;
+    }
     return (to > from) ? to - from <= allowance(self->config->accel_mm_s2, elapsed_us)
                        : from - to <= allowance(self->config->decel_mm_s2, elapsed_us);
 }

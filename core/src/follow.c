@@ -3,10 +3,8 @@
 
 #include "magnitude.h"
 
-#include <string.h>
-
-// iw_follow_restart sets every byte.
-IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, never_is_all_ones_to_follow);
+/// The bit of a verdict in `running`.
+#define BIT(verdict) (1U << (uint32_t)(verdict))
 
 void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
     self->config = config;
@@ -14,19 +12,28 @@ void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
 }
 
 void iw_follow_restart(iw_follow_t *self) {
-    memset(self->since_us, 0xFF, sizeof self->since_us); // IW_NEVER
+    self->running = 0;
 }
 
-/// Keeps the start of a condition; true once it has held without a break for `for_us`.
-static bool lasts(iw_time_us_t *since_us, iw_time_us_t now_us, bool holds, uint32_t for_us) {
-    if (!holds) {
-        *since_us = IW_NEVER;
-        return false;
+/// Starts the clocks of what holds since now, stops those of what holds no more. The gravest verdict that is due.
+static iw_follow_verdict_t run_clocks(iw_follow_t *self, iw_time_us_t now_us, uint32_t holds) {
+    const uint32_t for_us[IW_FOLLOW_VERDICTS] = {
+        [IW_FOLLOW_SIGN] = IW_FOLLOW_SIGN_US,
+        [IW_FOLLOW_OVERSPEED] = (uint32_t)self->config->follow_ms * IW_US_PER_MS,
+        [IW_FOLLOW_BLOCKED] = (uint32_t)self->config->blocked_ms * IW_US_PER_MS,
+    };
+    const uint32_t begun = holds & ~(uint32_t)self->running;
+    iw_follow_verdict_t verdict = IW_FOLLOW_OK;
+    self->running = (uint8_t)holds;
+    // All clocks run on, also behind a graver verdict: each condition must be timed by itself.
+    for (uint32_t i = 0; i < IW_FOLLOW_VERDICTS; i++) {
+        if ((begun & BIT(i)) != 0U) {
+            self->since_us[i] = now_us;
+        }
+        const bool lasted = (holds & BIT(i)) != 0U && now_us - self->since_us[i] >= for_us[i];
+        verdict = (lasted && verdict == IW_FOLLOW_OK) ? (iw_follow_verdict_t)i : verdict;
     }
-    if (*since_us == IW_NEVER) {
-        *since_us = now_us;
-    }
-    return now_us - *since_us >= for_us;
+    return verdict;
 }
 
 iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32_t applied_mm_s,
@@ -39,27 +46,19 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
     const bool same = (applied_mm_s < 0) == (measured_mm_s < 0);
     // Turning backwards is no progress.
     const int32_t progress = same ? measured : 0;
-    const bool holds[IW_FOLLOW_VERDICTS] = {
-        clear && same,
-        clear && !same,
-        measured > applied + (int32_t)config->follow_mm_s,
-        applied >= IW_FOLLOW_BLOCKED_MIN_MM_S && progress * 100 < applied * IW_FOLLOW_BLOCKED_PERCENT,
-    };
-    const uint32_t for_us[IW_FOLLOW_VERDICTS] = {
-        IW_FOLLOW_SIGN_US,
-        IW_FOLLOW_SIGN_US,
-        (uint32_t)config->follow_ms * IW_US_PER_MS,
-        (uint32_t)config->blocked_ms * IW_US_PER_MS,
-    };
-    // All clocks run on, also behind a graver verdict: each condition must be timed by itself.
-    iw_follow_verdict_t verdict = IW_FOLLOW_OK;
-    for (uint32_t i = 0; i < IW_FOLLOW_VERDICTS; i++) {
-        const bool lasted = lasts(&self->since_us[i], now_us, holds[i], for_us[i]);
-        verdict = (lasted && verdict == IW_FOLLOW_OK) ? (iw_follow_verdict_t)i : verdict;
+    uint32_t holds = 0;
+    if (clear) {
+        holds = same ? BIT(IW_FOLLOW_OK) : BIT(IW_FOLLOW_SIGN);
     }
-    return verdict;
+    if (measured > applied + (int32_t)config->follow_mm_s) {
+        holds |= BIT(IW_FOLLOW_OVERSPEED);
+    }
+    if (applied >= IW_FOLLOW_BLOCKED_MIN_MM_S && progress * 100 < applied * IW_FOLLOW_BLOCKED_PERCENT) {
+        holds |= BIT(IW_FOLLOW_BLOCKED);
+    }
+    return ((holds | self->running) == 0U) ? IW_FOLLOW_OK : run_clocks(self, now_us, holds);
 }
 
 bool iw_follow_sign_confirmed(const iw_follow_t *self, iw_time_us_t now_us) {
-    return self->since_us[IW_FOLLOW_OK] != IW_NEVER && now_us - self->since_us[IW_FOLLOW_OK] >= IW_FOLLOW_SIGN_US;
+    return (self->running & BIT(IW_FOLLOW_OK)) != 0U && now_us - self->since_us[IW_FOLLOW_OK] >= IW_FOLLOW_SIGN_US;
 }

@@ -2,7 +2,6 @@
 #include "iwheel/gateway.h"
 
 #include "magnitude.h"
-#include "step.h"
 
 #include <string.h>
 
@@ -48,18 +47,6 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     iw_sender_init(&self->sender, &self->config, &self->hal);
     assume(self);
     return IW_CONFIG_OK;
-}
-
-/// The order is a rule: what is received is drained before any age is judged (R7), and everything is judged
-/// before anything is sent, so that a fault of this step stops this step's pair.
-iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
-    iw_step_begin(self, now_us);
-    iw_step_receive(self, now_us);
-    iw_step_judge(self, now_us);
-    iw_step_send(self, now_us);
-    iw_step_keep_silent(self, now_us);
-    self->promised_us = iw_step_next_us(self, now_us);
-    return self->promised_us;
 }
 
 void iw_gateway_suspended(iw_gateway_t *self, iw_time_us_t for_us) {

@@ -18,7 +18,7 @@ typedef struct {
     uint32_t fraction;
 } axis_t;
 
-/// A speed and a current for each wheel.
+/// A speed and a current for each wheel, at the most.
 #define AXES ((size_t)2 * IW_SIDES)
 
 /// The command is zero from now on.
@@ -141,18 +141,26 @@ static uint32_t current_step(const iw_config_t *config, uint32_t step) {
 }
 
 /// Moves all quantities by one common share of their ways; braking ones do not wait for accelerating ones.
-static void advance_together(const axis_t *axes) {
+static void advance_together(const axis_t *axes, size_t count) {
     uint32_t braking = FRACTION_ONE;
     uint32_t all = FRACTION_ONE;
-    for (size_t i = 0; i < AXES; i++) {
+    for (size_t i = 0; i < count; i++) {
         all = (axes[i].fraction < all) ? axes[i].fraction : all;
         braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
     }
-    for (size_t i = 0; i < AXES; i++) {
+    for (size_t i = 0; i < count; i++) {
         const int64_t share = axes[i].braking ? braking : all;
         const int32_t way = axes[i].aim - *axes[i].value;
         *axes[i].value += (int32_t)(share * way / (int64_t)FRACTION_ONE);
     }
+}
+
+/// True if this wheel's speed and current are where they should be.
+static bool arrived(const iw_setpoint_t *self, iw_side_t side) {
+    const iw_command_t *const target = &self->target.wheel[side];
+    const bool ramps_current = self->config->current_role == IW_ROLE_SETPOINT;
+    return self->speed_um_s[side] == target->speed_mm_s * 1000 &&
+           self->current_uA[side] == (ramps_current ? target->current_mA * 1000 : 0);
 }
 
 static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us) {
@@ -160,18 +168,21 @@ static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us) {
     const iw_time_us_t granted_us = 2U * (iw_time_us_t)config->period_ms * IW_US_PER_MS;
     const uint32_t away = ramp_step(config->accel_mm_s2, (elapsed_us < granted_us) ? elapsed_us : granted_us);
     const uint32_t towards = ramp_step(config->decel_mm_s2, elapsed_us);
-    const uint32_t current_away = current_step(config, away);
-    const uint32_t current_towards = current_step(config, towards);
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
     axis_t axes[AXES];
+    size_t count = 0;
     for (size_t side = 0; side < IW_SIDES; side++) {
         const iw_command_t *const target = &self->target.wheel[side];
-        axes[2U * side].value = &self->speed_um_s[side];
-        axes[2U * side + 1U].value = &self->current_uA[side];
-        plan(&axes[2U * side], target->speed_mm_s * 1000, away, towards);
-        plan(&axes[2U * side + 1U], ramps_current ? target->current_mA * 1000 : 0, current_away, current_towards);
+        axes[count].value = &self->speed_um_s[side];
+        plan(&axes[count], target->speed_mm_s * 1000, away, towards);
+        count++;
+        if (ramps_current) {
+            axes[count].value = &self->current_uA[side];
+            plan(&axes[count], target->current_mA * 1000, current_step(config, away), current_step(config, towards));
+            count++;
+        }
     }
-    advance_together(axes);
+    advance_together(axes, count);
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {
@@ -181,7 +192,7 @@ static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us)
 }
 
 void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_pair) {
-    if (!self->from_zero) {
+    if (!self->from_zero && !(arrived(self, IW_LEFT) && arrived(self, IW_RIGHT))) {
         advance(self, now_us - self->last_us);
     }
     self->from_zero = false;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "step.h"
-
 #include "iwheel/gateway.h"
 
 #include "magnitude.h"
@@ -67,7 +65,8 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
     }
 }
 
-void iw_step_begin(iw_gateway_t *self, iw_time_us_t now_us) {
+/// Our own lateness, the e-stop line, the state of the bus.
+static void begin(iw_gateway_t *self, iw_time_us_t now_us) {
     const int pressed = self->hal.estop_pressed(self->hal.context);
     if (pressed != 0) {
         iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE,
@@ -199,7 +198,7 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
 }
 
 /// Everything before any age is judged (R7), but bounded: a babbling node must not keep the step from ending.
-void iw_step_receive(iw_gateway_t *self, iw_time_us_t now_us) {
+static void receive(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
     while (taken < IW_GATEWAY_DRAIN_MAX && self->hal.receive(self->hal.context, &frame) > 0) {
@@ -258,67 +257,68 @@ static iw_ledger_item_t sign_item(size_t side) {
 }
 
 static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s) {
+    static const uint8_t causes[IW_FOLLOW_VERDICTS] = {
+        [IW_FOLLOW_SIGN] = IW_CAUSE_FEEDBACK_SIGN,
+        [IW_FOLLOW_OVERSPEED] = IW_CAUSE_OVERSPEED,
+        [IW_FOLLOW_BLOCKED] = IW_CAUSE_WHEEL_BLOCKED,
+    };
     iw_follow_t *const follow = &self->follow[side];
-    const int32_t measured_mm_s = iw_wheel_speed_mm_s(&self->wheel[side]);
+    const iw_ledger_item_t item = sign_item(side);
+    const int32_t measured_mm_s = self->wheel[side].speed_mm_s;
+    const iw_follow_verdict_t verdict = iw_follow_step(follow, now_us, applied_mm_s, measured_mm_s);
     // As at a positive command.
     const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s;
-    const uint32_t detail = (uint32_t)iw_magnitude(measured_mm_s);
-    switch (iw_follow_step(follow, now_us, applied_mm_s, measured_mm_s)) {
-    case IW_FOLLOW_SIGN:
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_FEEDBACK_SIGN, side_bit(side), detail);
-        iw_ledger_contradict(&self->ledger, sign_item(side), IW_EVIDENCE_BUS, along_mm_s);
-        break;
-    case IW_FOLLOW_OVERSPEED:
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_OVERSPEED, side_bit(side), detail);
-        break;
-    case IW_FOLLOW_BLOCKED:
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_BLOCKED, side_bit(side), detail);
-        break;
-    case IW_FOLLOW_OK:
-    default:
-        break;
+    if (verdict != IW_FOLLOW_OK) {
+        iw_permit_raise(&self->permit, now_us, (iw_cause_t)causes[verdict], side_bit(side),
+                        (uint32_t)iw_magnitude(measured_mm_s));
     }
-    if (iw_follow_sign_confirmed(follow, now_us) && self->ledger.entry[sign_item(side)].state == IW_LEDGER_ASSUMED) {
-        iw_ledger_confirm(&self->ledger, sign_item(side), IW_EVIDENCE_BUS, along_mm_s);
+    if (verdict == IW_FOLLOW_SIGN) {
+        iw_ledger_contradict(&self->ledger, item, IW_EVIDENCE_BUS, along_mm_s);
+    }
+    if (self->ledger.entry[item].state == IW_LEDGER_ASSUMED && iw_follow_sign_confirmed(follow, now_us)) {
+        iw_ledger_confirm(&self->ledger, item, IW_EVIDENCE_BUS, along_mm_s);
     }
 }
 
-/// Only while we command: a machine that is pushed by hand in LISTENING is faster than its command of zero.
-static void watch_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side, int32_t applied_mm_s) {
+/// Only while we command: a machine that is pushed by hand in LISTENING is faster than its command of zero. Asked for
+/// each wheel anew: what the left one did may have ended our command.
+static void watch_wheel(iw_gateway_t *self, iw_time_us_t now_us, size_t side, bool heard, int32_t applied_mm_s) {
     const iw_state_t state = iw_permit_state(&self->permit);
     const bool ours = state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
-    if (ours && iw_wheel_heard(&self->wheel[side], now_us)) {
+    if (ours && heard) {
         watch_follow(self, now_us, side, applied_mm_s);
     } else {
         iw_follow_restart(&self->follow[side]);
     }
 }
 
-static void watch_wheels(iw_gateway_t *self, iw_time_us_t now_us) {
-    const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
-    watch_wheel(self, now_us, IW_LEFT, applied.wheel[IW_LEFT].speed_mm_s);
-    watch_wheel(self, now_us, IW_RIGHT, applied.wheel[IW_RIGHT].speed_mm_s);
-}
-
-/// How long both wheels have been at rest; 0: one turns, or is not heard.
+/// How long both wheels have been at rest; 0: one turns.
 static uint32_t both_rest_us(const iw_gateway_t *self, iw_time_us_t now_us) {
     const uint32_t left_us = iw_wheel_rest_us(&self->wheel[IW_LEFT], now_us);
     const uint32_t right_us = iw_wheel_rest_us(&self->wheel[IW_RIGHT], now_us);
     return (left_us < right_us) ? left_us : right_us;
 }
 
-void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
+/// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step. What several rules ask
+/// is found out once.
+static void judge(iw_gateway_t *self, iw_time_us_t now_us) {
     iw_permit_view_t view;
+    const bool left = iw_wheel_heard(&self->wheel[IW_LEFT], now_us);
+    const bool right = iw_wheel_heard(&self->wheel[IW_RIGHT], now_us);
+    const uint32_t rest_us = (left && right) ? both_rest_us(self, now_us) : 0U;
+    view.heard = left && right;
+    view.applied = iw_setpoint_applied(&self->setpoint);
     // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {
         iw_permit_keep_present(&self->permit);
     } else {
         watch_echo(self, now_us);
-        watch_silence(self, now_us);
-        watch_wheels(self, now_us);
+        if (!view.heard) { // Who is heard is not lost.
+            watch_silence(self, now_us);
+        }
+        watch_wheel(self, now_us, IW_LEFT, left, view.applied.wheel[IW_LEFT].speed_mm_s);
+        watch_wheel(self, now_us, IW_RIGHT, right, view.applied.wheel[IW_RIGHT].speed_mm_s);
     }
-    const uint32_t rest_us = both_rest_us(self, now_us);
-    view.heard = iw_wheel_heard(&self->wheel[IW_LEFT], now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], now_us);
     view.at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
     view.settled = rest_us >= IW_PERMIT_SETTLED_US;
     view.output_zero = iw_setpoint_is_zero(&self->setpoint);
@@ -326,17 +326,20 @@ void iw_step_judge(iw_gateway_t *self, iw_time_us_t now_us) {
     view.can_send = iw_confirmation_may_send(&self->sender.confirmation, IW_LEFT, true) &&
                     iw_confirmation_may_send(&self->sender.confirmation, IW_RIGHT, true);
     // Sent at or after the request: the echo of an older zero pair does not arm.
-    view.proven = iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;
-    view.applied = iw_setpoint_applied(&self->setpoint);
+    view.proven = iw_permit_arming(&self->permit) &&
+                  iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;
     iw_permit_step(&self->permit, now_us, &view);
 }
 
 /// Takes the pair that is due and sends it. R5 (both or none): a pair of which one frame was not taken is
 /// followed by zeros for both wheels.
 static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
-    const bool zero = iw_setpoint_next_is_zero(&self->setpoint);
     iw_pair_t pair;
-    if (!iw_setpoint_due(&self->setpoint, now_us) || !iw_sender_ready(&self->sender, zero)) {
+    if (!iw_setpoint_due(&self->setpoint, now_us)) {
+        return IW_SEND_DONE;
+    }
+    const bool zero = iw_setpoint_next_is_zero(&self->setpoint);
+    if (!iw_sender_ready(&self->sender, zero)) {
         return IW_SEND_DONE;
     }
     iw_setpoint_take(&self->setpoint, now_us, &pair);
@@ -347,26 +350,11 @@ static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
     return result;
 }
 
-void iw_step_send(iw_gateway_t *self, iw_time_us_t now_us) {
-    const iw_demand_t demand = iw_permit_demand(&self->permit);
-    iw_setpoint_demand(&self->setpoint, now_us, demand);
-    if (demand == IW_DEMAND_SILENCE) {
-        iw_sender_rest(&self->sender);
-    } else if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
-        // R12: scheduler and envelope disagree, so one of them is wrong. Zeros leave in this very step.
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
-        iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
-        (void)send_pair(self, now_us);
-    }
-}
-
-/// Purges whether or not a wheel is heard: the frame is stuck exactly when no wheel has power to acknowledge it. An
-/// echo may still come late (`echo_ms`) or stand in the backlog, so neither case counts as stuck yet.
-void iw_step_keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
-    if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE) {
-        self->purged_us = IW_NEVER; // Nothing is left behind either: arm was refused until it was gone.
-        return;
-    }
+/// While nothing is sent, no old setpoint may wait in a controller either: unacknowledged, it is repeated there until
+/// a wheel gets power, and then moves it (fault 18). It is purged, or reported as `left_behind`: whether or not a wheel is
+/// heard, since it is stuck exactly when no wheel has power to acknowledge it. An echo may still come late (`echo_ms`)
+/// or stand in the backlog, so neither case counts as stuck yet.
+static void keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
     if (overdue_us(self, now_us) == 0U) {
         self->left_behind = false;
         return;
@@ -382,11 +370,31 @@ void iw_step_keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
     self->counters.left_behind += (self->left_behind && !was_left) ? 1U : 0U;
 }
 
+/// Sends what is due under the permission's demand.
+static void send_due(iw_gateway_t *self, iw_time_us_t now_us) {
+    const iw_demand_t demand = iw_permit_demand(&self->permit);
+    iw_setpoint_demand(&self->setpoint, now_us, demand);
+    if (demand == IW_DEMAND_SILENCE) {
+        iw_sender_rest(&self->sender);
+        keep_silent(self, now_us);
+        return;
+    }
+    // Nothing is left behind either: arm was refused until it was gone.
+    self->purged_us = IW_NEVER;
+    if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
+        // R12: scheduler and envelope disagree, so one of them is wrong. Zeros leave in this very step.
+        iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
+        iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
+        (void)send_pair(self, now_us);
+    }
+}
+
 static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {
     return (a < b) ? a : b;
 }
 
-iw_time_us_t iw_step_next_us(const iw_gateway_t *self, iw_time_us_t now_us) {
+/// When to call again: not later than one period from now.
+static iw_time_us_t next_step_us(const iw_gateway_t *self, iw_time_us_t now_us) {
     const iw_time_us_t due_us = iw_setpoint_next_us(&self->setpoint);
     iw_time_us_t next_us =
         sooner(now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));
@@ -399,4 +407,15 @@ iw_time_us_t iw_step_next_us(const iw_gateway_t *self, iw_time_us_t now_us) {
         next_us = sooner(next_us, due_us);
     }
     return (next_us > now_us) ? next_us : now_us;
+}
+
+/// The order is a rule: what is received is drained before any age is judged (R7), and everything is judged
+/// before anything is sent, so that a fault of this step stops this step's pair.
+iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
+    begin(self, now_us);
+    receive(self, now_us);
+    judge(self, now_us);
+    send_due(self, now_us);
+    self->promised_us = next_step_us(self, now_us);
+    return self->promised_us;
 }

@@ -60,8 +60,9 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
 /// Rest is a run of frames without a gap: one frame at rest behind a silence says nothing of the time between.
 static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
+    const int32_t speed_um_s = speed->speed_rpm * (int32_t)self->um_s_per_rpm;
     const bool gap = !iw_wheel_heard(self, now_us);
-    self->speed = *speed;
+    self->speed_mm_s = (self->config->invert[self->side] ? -speed_um_s : speed_um_s) / 1000;
     self->speed_us = now_us;
     if (speed->speed_rpm > rest_rpm || speed->speed_rpm < -rest_rpm) {
         self->rest_since_us = IW_NEVER;
@@ -70,6 +71,7 @@ static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_spe
     }
     if (fresh) {
         self->heard_us = now_us;
+        self->heard_until_us = now_us + silent_us(self);
     }
 }
 
@@ -84,14 +86,14 @@ static bool tick_jump(const iw_wheel_t *self, uint32_t delta, iw_time_us_t elaps
 
 static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_status_t *status) {
     if (self->status_us != IW_NEVER) {
-        const uint32_t delta = (uint32_t)status->odometry_ticks - (uint32_t)self->status.odometry_ticks;
+        const uint32_t delta = (uint32_t)status->odometry_ticks - (uint32_t)self->odometry_ticks;
         if (tick_jump(self, delta, now_us - self->status_us)) {
             rebooted(self, now_us, IW_REBOOT_ODOMETRY);
         } else if (self->ticks >= -IW_WHEEL_TICKS_MAX && self->ticks <= IW_WHEEL_TICKS_MAX) {
             self->ticks += (delta > INT32_MAX) ? -(int64_t)(0U - delta) : (int64_t)delta;
         }
     }
-    self->status = *status;
+    self->odometry_ticks = status->odometry_ticks;
     self->status_us = now_us;
 }
 
@@ -123,10 +125,6 @@ void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
     }
 }
 
-bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us) {
-    return self->heard_us != IW_NEVER && now_us - self->heard_us < silent_us(self);
-}
-
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us) {
     const iw_time_us_t since_us = (self->heard_us > self->excused_us) ? self->heard_us : self->excused_us;
     return self->heard_us == IW_NEVER || now_us - since_us >= silent_us(self);
@@ -138,11 +136,6 @@ uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us) {
         return 0;
     }
     return (rest_us < UINT32_MAX) ? (uint32_t)rest_us : UINT32_MAX;
-}
-
-int32_t iw_wheel_speed_mm_s(const iw_wheel_t *self) {
-    const int32_t speed_um_s = self->speed.speed_rpm * (int32_t)self->um_s_per_rpm;
-    return (self->config->invert[self->side] ? -speed_um_s : speed_um_s) / 1000;
 }
 
 iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self) {

@@ -72,10 +72,11 @@ def arm_linked(work, cpu):
     return count_arm.text_size(elf)
 
 
-def driving(work, cpu):
+def driving(work, cpu, more=()):
     """The program of test/bench/step, with its gateway driving."""
-    elf = count_arm.build(work / f"step-{cpu}.elf", cpu, [HERE / "step/step.c", *sorted((CORE / "src").glob("*.c"))], INCLUDES,
-                          ["bench_prepare", "bench_idle", "bench_frame_in", "bench_pair", "bench_look", "bench_seen"])
+    elf = count_arm.build(work / f"step-{cpu}{''.join(more)}.elf", cpu, [HERE / "step/step.c", *sorted((CORE / "src").glob("*.c"))], INCLUDES,
+                          ["bench_prepare", "bench_idle", "bench_frame_in", "bench_pair", "bench_faster", "bench_look", "bench_seen"],
+                          (*count_arm.FREESTANDING, *more))
     program = count_arm.Program(elf, cpu)
     if program.call("bench_prepare")[0] != 1:
         raise SystemExit("the gateway of test/bench/step does not drive")
@@ -91,17 +92,20 @@ def arm_profile(work, cpu):
     return [*[(name, idle[name], pair[name]) for name in shown], ("all others together", *rest)]
 
 
-def arm_steps(work, cpu):
-    """{what is done in one step: instructions}"""
-    program = driving(work, cpu)
+def arm_steps(work, cpu, more=()):
+    """{what is done in one step: instructions}, with more flags of the compiler."""
+    program = driving(work, cpu, more)
     idle_sent, idle = program.call("bench_idle")
     received, frame = program.call("bench_frame_in")
     look = sum(count for name, count in program.profile("bench_look").items() if name != "bench_look")
     seen, _ = program.call("bench_seen")
     pair_sent, pair = program.call("bench_pair")
-    if (idle_sent, received, seen, pair_sent) != (0, 1, 1, 1):
-        raise SystemExit(f"the steps of test/bench/step did something else: {idle_sent} {received} {seen} {pair_sent}")
-    return {"nothing due": idle, "a frame in": frame, "a pair due": pair, "a look at everything": look}
+    faster, _ = program.call("bench_faster")
+    ramp_sent, ramp = program.call("bench_pair")
+    did = (idle_sent, received, seen, pair_sent, faster, ramp_sent)
+    if did != (0, 1, 1, 1, 1, 1):
+        raise SystemExit(f"the steps of test/bench/step did something else: {did}")
+    return {"nothing due": idle, "a frame in": frame, "a pair due": pair, "a pair due, of a ramp": ramp, "a look at everything": look}
 
 
 def status_events(build):

@@ -214,7 +214,6 @@ static void operate(iw_side_t side) {
 /// What a program shows of the wheels.
 static void look(iw_side_t side) {
     iw_snapshot_t seen;
-    (void)iw_wheel_speed_mm_s(&gateway.wheel[side]);
     (void)iw_force_validity(&gateway.force[side], now_us);
     (void)iw_force_raw_mN(&gateway.force[side]);
     (void)iw_force_net_mN(&gateway.force[side]);

@@ -58,32 +58,33 @@ typedef struct {
     bool limited;   ///< It differs from the request: both wheels scaled by one factor.
 } iw_applied_t;
 
-/// The whole of it. Members are the core's own: what may be known of them, snapshot.h tells.
+/// The whole of it. Members are the core's own: what may be known of them, snapshot.h tells. What is short stands
+/// first: a Cortex-M reaches it by shorter instructions.
 typedef struct iw_gateway {
-    iw_config_t config;              ///< Copied at init.
-    iw_hal_t hal;                    ///< Copied at init.
-    iw_codec_wheel_t told[IW_SIDES]; ///< Each wheel's last telemetry, message by message.
-    iw_wheel_t wheel[IW_SIDES];      ///< What is known of each wheel.
-    iw_force_t force[IW_SIDES];      ///< Its normal force.
-    iw_follow_t follow[IW_SIDES];    ///< Whether it does as told.
-    iw_permit_t permit;              ///< Whether the wheels may move.
-    iw_setpoint_t setpoint;          ///< Which pair is due.
-    iw_sender_t sender;              ///< How it gets to the bus.
-    iw_ledger_t ledger;              ///< What is assumed of the wheels.
-    iw_counters_t counters;          ///< Since init.
-    iw_time_us_t stalled_since_us;   ///< When the first of an unbroken run of stalled steps was due.
-    iw_time_us_t suspended_us;       ///< Reported by `iw_gateway_suspended` since the last step.
-    iw_time_us_t promised_us;        ///< When the last step asked to be called again.
-    iw_time_us_t pose_us;            ///< When the last pose came; IW_NEVER: none.
-    iw_time_us_t purged_us;          ///< When a purge was last tried in this silence; IW_NEVER: not yet.
-    uint32_t purged_stop;            ///< Number of the stop in whose zeros a purge was tried.
-    iw_bus_state_t bus;              ///< As the port reported it in this step.
-    iw_bus_facts_t facts;            ///< As the port told them last.
-    bool backlog;                    ///< The last step left frames behind.
-    bool stalled;                    ///< This step does not know when its frames came: nothing is judged by age.
+    iw_bus_state_t bus;   ///< As the port reported it in this step.
+    iw_bus_facts_t facts; ///< As the port told them last.
+    bool backlog;         ///< The last step left frames behind.
+    bool stalled;         ///< This step does not know when its frames came: nothing is judged by age.
     /// Nothing is sent, but an unconfirmed setpoint is still in a controller: the port cannot purge it, or did not
     /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
     bool left_behind;
+    uint32_t purged_stop;            ///< Number of the stop in whose zeros a purge was tried.
+    iw_hal_t hal;                    ///< Copied at init.
+    iw_config_t config;              ///< Copied at init.
+    iw_time_us_t promised_us;        ///< When the last step asked to be called again.
+    iw_time_us_t suspended_us;       ///< Reported by `iw_gateway_suspended` since the last step.
+    iw_time_us_t stalled_since_us;   ///< When the first of an unbroken run of stalled steps was due.
+    iw_time_us_t pose_us;            ///< When the last pose came; IW_NEVER: none.
+    iw_time_us_t purged_us;          ///< When a purge was last tried in this silence; IW_NEVER: not yet.
+    iw_counters_t counters;          ///< Since init.
+    iw_setpoint_t setpoint;          ///< Which pair is due.
+    iw_permit_t permit;              ///< Whether the wheels may move.
+    iw_sender_t sender;              ///< How a pair gets to the bus.
+    iw_wheel_t wheel[IW_SIDES];      ///< What is known of each wheel.
+    iw_follow_t follow[IW_SIDES];    ///< Whether it does as told.
+    iw_codec_wheel_t told[IW_SIDES]; ///< Each wheel's last telemetry, message by message.
+    iw_force_t force[IW_SIDES];      ///< Its normal force.
+    iw_ledger_t ledger;              ///< What is assumed of the wheels.
 } iw_gateway_t;
 
 /// Checks the configuration, copies it and the HAL, begins in LISTENING. With `restarted` it begins by sending zeros:

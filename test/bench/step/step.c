@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// A gateway that drives two obedient wheels, to be run by a counter of instructions: `bench_prepare` brings it to a steady drive, then
-/// `bench_idle` is one step with nothing due, `bench_pair` one in which a pair is due, `bench_frame_in` one that receives a speed; `bench_look` takes a snapshot.
+/// `bench_idle` is one step with nothing due, `bench_pair` one in which a pair is due (of a ramp after `bench_faster`), `bench_frame_in` one that receives a speed; `bench_look` takes a snapshot.
 #include "iwheel/gateway.h"
 
 #define CLIENT 7U
@@ -105,6 +105,15 @@ int bench_pair(void) {
     const uint32_t sent = bus.sent;
     (void)iw_gateway_step(&gateway, iw_setpoint_next_us(&gateway.setpoint));
     return bus.sent != sent;
+}
+
+/// The client wants another speed: the next pair is one of a ramp. 1 if it may.
+int bench_faster(void) {
+    const iw_drive_t drive = {{300, 280}, {0, 0}, false};
+    iw_applied_t applied;
+    now_us = gateway.setpoint.last_us + 1U;
+    (void)iw_gateway_step(&gateway, now_us); // Echoes.
+    return iw_gateway_drive(&gateway, now_us, CLIENT, &drive, &applied) == IW_REFUSE_NONE;
 }
 
 int bench_frame_in(void) {

@@ -27,9 +27,9 @@ typedef enum {
 
 /// The clocks of one wheel.
 typedef struct {
-    const iw_config_t *config; ///< The owner's.
-    /// Since when the condition of each verdict holds; IW_NEVER: it does not.
-    iw_time_us_t since_us[IW_FOLLOW_VERDICTS];
+    const iw_config_t *config;                 ///< The owner's.
+    uint8_t running;                           ///< Bit per verdict: its condition holds, and its clock runs.
+    iw_time_us_t since_us[IW_FOLLOW_VERDICTS]; ///< When each clock that runs was started.
 } iw_follow_t;
 
 /// `config` must be checked and outlive it.

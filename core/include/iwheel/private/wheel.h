@@ -44,23 +44,24 @@ typedef enum {
 
 /// What is known of a wheel.
 typedef struct {
-    const iw_config_t *config;  ///< The owner's.
-    iw_time_us_t first_us;      ///< First heard; IW_NEVER: not yet.
-    iw_time_us_t offset_us;     ///< Last offset frame of this run, or its start.
-    iw_time_us_t any_us;        ///< Last frame of any kind, or the end of our own stall, or the start.
-    iw_time_us_t heard_us;      ///< Last speed frame that counted for liveness.
-    iw_time_us_t speed_us;      ///< Last speed frame.
-    iw_time_us_t status_us;     ///< Last status frame.
-    iw_time_us_t rest_since_us; ///< Start of the unbroken run of speed frames at rest; IW_NEVER: moving.
-    iw_time_us_t excused_us;    ///< Our own stall ended here: silence before it is not the wheel's.
-    int64_t ticks;              ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
+    const iw_config_t *config;   ///< The owner's.
+    iw_time_us_t first_us;       ///< First heard; IW_NEVER: not yet.
+    iw_time_us_t offset_us;      ///< Last offset frame of this run, or its start.
+    iw_time_us_t any_us;         ///< Last frame of any kind, or the end of our own stall, or the start.
+    iw_time_us_t heard_us;       ///< Last speed frame that counted for liveness; IW_NEVER: none yet.
+    iw_time_us_t heard_until_us; ///< Without another one it is heard until here; 0: none yet.
+    iw_time_us_t speed_us;       ///< Last speed frame.
+    iw_time_us_t status_us;      ///< Last status frame.
+    iw_time_us_t rest_since_us;  ///< Start of the unbroken run of speed frames at rest; IW_NEVER: moving.
+    iw_time_us_t excused_us;     ///< Our own stall ended here: silence before it is not the wheel's.
+    int64_t ticks;               ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
     /// In the machine's frame: negative where `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64 bits.
     int32_t nm_per_tick;
     uint32_t um_s_per_rpm;      ///< Speed in um/s at 1 rpm of its telemetry.
     uint32_t us_per_tick_min;   ///< At IW_WHEEL_FASTEST_MM_S.
     uint32_t reboots;           ///< Recognised so far.
-    iw_codec_speed_t speed;     ///< The last one.
-    iw_codec_status_t status;   ///< The last one.
+    int32_t speed_mm_s;         ///< Last measured, in the machine's frame, rounded towards zero; stale while not heard.
+    int32_t odometry_ticks;     ///< Of the last status frame.
     iw_side_t side;             ///< Which wheel this is.
     iw_reboot_t pending_reboot; ///< Not yet taken.
     bool boot_seen;             ///< This run of the wheel began while we were listening, not before.
@@ -79,7 +80,9 @@ void iw_wheel_hear(iw_wheel_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, 
 void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us);
 
 /// True if its speed was heard less than `wheel_silent_ms` ago.
-bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us);
+static inline bool iw_wheel_heard(const iw_wheel_t *self, iw_time_us_t now_us) {
+    return now_us < self->heard_until_us;
+}
 
 /// True if it was never heard, or not for `wheel_silent_ms` and no stall of ours excuses that.
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
@@ -87,9 +90,6 @@ bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
 /// How long it has been heard with |rpm| <= rest_rpm, without a gap, UINT32_MAX at the most; 0: it turns, or is not
 /// heard.
 uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us);
-
-/// Measured speed in the machine's frame, rounded towards zero. Meaningless while not heard.
-int32_t iw_wheel_speed_mm_s(const iw_wheel_t *self);
 
 /// The evidence of a reboot since the last call, then IW_REBOOT_NONE.
 iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self);
