@@ -3,24 +3,121 @@
 
 #include <string.h>
 
-static uint64_t capacity_of(uint32_t seconds) {
-    const uint64_t wanted = (uint64_t)seconds * BLACKBOX_ENTRIES_PER_S;
-    return (wanted > BLACKBOX_ENTRIES_MIN) ? wanted : BLACKBOX_ENTRIES_MIN;
-}
+/// An entry: tag, a, b; time since the block's begin unless it is that of the entry before; number; what `as` holds. The tag is the kind
+/// and these bits.
+#define KIND      0x1FU
+#define SAME_TIME 0x20U
+#define LONG      0x40U ///< The number has four bytes, not two.
+#define FILLED    0x80U ///< `as` follows whole. Of a frame as many bytes follow as it has, without this bit.
+/// In the place of a tag: the rest of the block is empty.
+#define END KIND
+IW_STATIC_ASSERT(BLACKBOX_KINDS <= END, end_is_no_kind);
+
+#define OFFSET_MAX 0xFFFFFFU ///< Three bytes of time.
+#define PACKED_MIN 5U
+#define PACKED_MAX (PACKED_MIN + 3U + 2U + sizeof(((blackbox_entry_t *)0)->as))
 
 size_t blackbox_ring_size(uint32_t seconds) {
-    return sizeof(blackbox_ring_t) + (size_t)capacity_of(seconds) * sizeof(blackbox_entry_t);
+    const size_t wanted = (size_t)seconds * BLACKBOX_BLOCKS_PER_S;
+    return sizeof(blackbox_ring_t) +
+           ((wanted > BLACKBOX_BLOCKS_MIN) ? wanted : BLACKBOX_BLOCKS_MIN) * sizeof(blackbox_block_t);
 }
 
 void blackbox_ring_init(blackbox_ring_t *self, uint32_t seconds) {
     atomic_init(&self->written, 0);
+    atomic_init(&self->used, 0);
     atomic_init(&self->sending, false);
-    self->capacity = capacity_of(seconds);
+    self->blocks = (blackbox_ring_size(seconds) - sizeof *self) / sizeof(blackbox_block_t);
+    self->last_us = 0;
+}
+
+/// How many bytes of `as` follow.
+static size_t filling(const blackbox_entry_t *entry, uint8_t tag) {
+    if (entry->kind == (uint8_t)BLACKBOX_FRAME) {
+        return (entry->a < sizeof entry->as.data) ? entry->a : sizeof entry->as.data;
+    }
+    return ((tag & FILLED) != 0U) ? sizeof entry->as : 0U;
+}
+
+static bool is_filled(const blackbox_entry_t *entry) {
+    static const blackbox_entry_t empty;
+    return entry->kind != (uint8_t)BLACKBOX_FRAME && memcmp(&entry->as, &empty.as, sizeof empty.as) != 0;
+}
+
+static size_t put_number(uint8_t *to, uint32_t number, size_t size) {
+    for (size_t i = 0; i < size; i++) {
+        to[i] = (uint8_t)(number >> (8U * i));
+    }
+    return size;
+}
+
+static uint32_t take_number(const uint8_t *from, size_t size) {
+    uint32_t number = 0;
+    for (size_t i = 0; i < size; i++) {
+        number |= (uint32_t)from[i] << (8U * i);
+    }
+    return number;
+}
+
+/// Bytes written.
+static size_t pack(const blackbox_entry_t *entry, bool same_time, uint32_t offset_us, uint8_t *to) {
+    const bool is_long = entry->number > UINT16_MAX;
+    size_t at = 3;
+    to[0] = (uint8_t)(entry->kind | (same_time ? SAME_TIME : 0U) | (is_long ? LONG : 0U) |
+                      (is_filled(entry) ? FILLED : 0U));
+    to[1] = entry->a;
+    to[2] = entry->b;
+    at += same_time ? 0U : put_number(&to[at], offset_us, 3);
+    at += put_number(&to[at], entry->number, is_long ? 4U : 2U);
+    memcpy(&to[at], &entry->as, filling(entry, to[0]));
+    return at + filling(entry, to[0]);
+}
+
+/// Bytes read. `*out` is the entry before.
+static size_t unpack(const uint8_t *from, uint64_t begin_us, blackbox_entry_t *out) {
+    const uint8_t tag = from[0];
+    const uint64_t before_us = out->at_us;
+    const size_t number_size = ((tag & LONG) != 0U) ? 4U : 2U;
+    size_t at = 3;
+    *out = (blackbox_entry_t){.at_us = before_us, .kind = tag & KIND, .a = from[1], .b = from[2]};
+    if ((tag & SAME_TIME) == 0U) {
+        out->at_us = begin_us + take_number(&from[at], 3);
+        at += 3U;
+    }
+    out->number = take_number(&from[at], number_size);
+    at += number_size;
+    memcpy(&out->as, &from[at], filling(out, tag));
+    return at + filling(out, tag);
+}
+
+/// Ends the block and begins the next one. Bytes used with it.
+static uint64_t begin_block(blackbox_ring_t *self, uint64_t used, uint64_t number, uint64_t at_us) {
+    const uint64_t index = (used + BLACKBOX_BLOCK - 1U) / BLACKBOX_BLOCK;
+    blackbox_block_t *block = &self->block[index % self->blocks];
+    if (used % BLACKBOX_BLOCK != 0U) {
+        uint8_t *old = (uint8_t *)&self->block[(index - 1U) % self->blocks];
+        old[used % BLACKBOX_BLOCK] = END;
+    }
+    block->first = number;
+    block->at_us = at_us;
+    self->last_us = at_us;
+    return index * BLACKBOX_BLOCK + offsetof(blackbox_block_t, packed);
 }
 
 void blackbox_ring_put(blackbox_ring_t *self, const blackbox_entry_t *entry) {
     const uint64_t number = atomic_load_explicit(&self->written, memory_order_relaxed);
-    self->entry[number % self->capacity] = *entry;
+    uint64_t used = atomic_load_explicit(&self->used, memory_order_relaxed);
+    const size_t room = BLACKBOX_BLOCK - used % BLACKBOX_BLOCK;
+    const uint64_t begun_us = self->block[used / BLACKBOX_BLOCK % self->blocks].at_us;
+    // One byte more: for the end.
+    if (number == 0U || room <= PACKED_MAX || entry->at_us - begun_us > OFFSET_MAX) {
+        used = begin_block(self, used, number, entry->at_us);
+    }
+    blackbox_block_t *block = &self->block[used / BLACKBOX_BLOCK % self->blocks];
+    uint8_t *to = (uint8_t *)block + used % BLACKBOX_BLOCK;
+    used += pack(entry, entry->at_us == self->last_us, (uint32_t)(entry->at_us - block->at_us), to);
+    self->last_us = entry->at_us;
+    atomic_store_explicit(&self->used, used, memory_order_release);
     atomic_store_explicit(&self->written, number + 1U, memory_order_release);
 }
 
@@ -28,27 +125,68 @@ uint64_t blackbox_ring_written(const blackbox_ring_t *self) {
     return atomic_load_explicit(&self->written, memory_order_acquire);
 }
 
-/// The oldest entry that is surely whole: the slot of the one before it may be under the writer's hands.
+size_t blackbox_ring_most(const blackbox_ring_t *self) {
+    return (size_t)self->blocks * sizeof self->block[0].packed / PACKED_MIN;
+}
+
+/// Index of the oldest block that is surely whole: the writer may be at the next one already.
 static uint64_t oldest(const blackbox_ring_t *self) {
-    const uint64_t written = blackbox_ring_written(self);
-    return (written >= self->capacity) ? written - self->capacity + 1U : 0U;
+    const uint64_t next = atomic_load_explicit(&self->used, memory_order_acquire) / BLACKBOX_BLOCK + 1U;
+    return (next >= self->blocks) ? next - self->blocks + 1U : 0U;
+}
+
+bool blackbox_ring_is_whole(const blackbox_ring_t *self) {
+    return oldest(self) == 0U;
+}
+
+/// Index of the block that has the entry with this number; of the oldest one if that is gone.
+static uint64_t find(const blackbox_ring_t *self, uint64_t used, uint64_t number) {
+    const uint64_t least = oldest(self);
+    uint64_t index = used / BLACKBOX_BLOCK;
+    while (index > least && self->block[index % self->blocks].first > number) {
+        index--;
+    }
+    return index;
+}
+
+/// Unpacks the entries from..to of the first `size` bytes of a block. How many there were.
+static size_t take_block(const blackbox_block_t *block, size_t size, uint64_t from, uint64_t to,
+                         blackbox_entry_t *out) {
+    const uint8_t *bytes = (const uint8_t *)block;
+    blackbox_entry_t entry = {.at_us = block->at_us};
+    uint64_t number = block->first;
+    size_t count = 0;
+    for (size_t at = offsetof(blackbox_block_t, packed); at < size && bytes[at] != END && number < to; number++) {
+        at += unpack(&bytes[at], block->at_us, &entry);
+        if (number >= from) {
+            out[count++] = entry;
+        }
+    }
+    return count;
 }
 
 uint64_t blackbox_ring_copy(const blackbox_ring_t *self, uint64_t from, uint64_t to, blackbox_entry_t *out,
                             size_t *out_count) {
-    const uint64_t written = blackbox_ring_written(self);
-    const uint64_t end = (to < written) ? to : written;
-    uint64_t first = (from > oldest(self)) ? from : oldest(self);
-    for (uint64_t number = first; number < end; number++) {
-        out[number - first] = self->entry[number % self->capacity];
+    const uint64_t used = atomic_load_explicit(&self->used, memory_order_acquire);
+    uint64_t first = from;
+    bool begun = false;
+    size_t count = 0;
+    for (uint64_t index = find(self, used, from); index * BLACKBOX_BLOCK < used; index++) {
+        const blackbox_block_t block = self->block[index % self->blocks];
+        const uint64_t left = used - index * BLACKBOX_BLOCK;
+        atomic_thread_fence(memory_order_acquire);
+        if (index < oldest(self)) { // Overwritten meanwhile, it may be torn: what is copied begins behind it.
+            begun = false;
+            count = 0;
+            continue;
+        }
+        if (!begun && block.first > from) {
+            first = block.first;
+        }
+        begun = true;
+        count += take_block(&block, (left < BLACKBOX_BLOCK) ? (size_t)left : BLACKBOX_BLOCK, from, to, &out[count]);
     }
-    atomic_thread_fence(memory_order_acquire);
-    const uint64_t valid = oldest(self); // What was overwritten meanwhile may be torn.
-    const size_t copied = (first < end) ? (size_t)(end - first) : 0U;
-    const size_t torn = (valid <= first) ? 0U : (valid - first < copied) ? (size_t)(valid - first) : copied;
-    memmove(out, out + torn, (copied - torn) * sizeof *out);
-    first += torn;
-    *out_count = copied - torn;
+    *out_count = count;
     return first;
 }
 

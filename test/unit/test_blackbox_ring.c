@@ -5,8 +5,11 @@
 #include <string.h>
 #include <unity.h>
 
+/// More than a ring of one second ever has.
+#define MANY 20000U
+
 static blackbox_ring_t *ring;
-static blackbox_entry_t out[3U * BLACKBOX_ENTRIES_PER_S];
+static blackbox_entry_t out[MANY];
 
 void setUp(void) {
     const size_t size = blackbox_ring_size(1);
@@ -14,6 +17,7 @@ void setUp(void) {
     TEST_ASSERT_NOT_NULL(ring);
     memset(ring, 0xA5, size);
     blackbox_ring_init(ring, 1);
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(MANY, blackbox_ring_most(ring));
 }
 
 void tearDown(void) {
@@ -27,12 +31,14 @@ static void put(uint64_t from, uint64_t to) {
     }
 }
 
+/// Exactly the entries `first` and so on come back.
 static void expect(uint64_t from, uint64_t to, uint64_t first, size_t count) {
     size_t got;
     TEST_ASSERT_EQUAL_UINT64(first, blackbox_ring_copy(ring, from, to, out, &got));
     TEST_ASSERT_EQUAL_size_t(count, got);
     for (size_t i = 0; i < got; i++) {
         TEST_ASSERT_EQUAL_UINT64(first + i, out[i].at_us);
+        TEST_ASSERT_EQUAL_UINT32((uint32_t)(first + i), out[i].number);
     }
 }
 
@@ -50,24 +56,104 @@ static void test_entries_come_back_in_order(void) {
 }
 
 static void test_overwritten_entries_are_missing_and_nothing_else(void) {
-    put(0, BLACKBOX_ENTRIES_PER_S + 100U);
-    // The slot that will be written next counts as overwritten: the writer may be at it.
-    expect(0, UINT64_MAX, 101, BLACKBOX_ENTRIES_PER_S - 1U);
-    expect(50, 90, 101, 0);
-    expect(50, 110, 101, 9);
+    size_t count;
+    put(0, MANY);
+    const uint64_t first = blackbox_ring_copy(ring, 0, UINT64_MAX, out, &count);
+    TEST_ASSERT_FALSE(blackbox_ring_is_whole(ring));
+    TEST_ASSERT_GREATER_THAN_UINT64(0, first);
+    expect(0, UINT64_MAX, first, (size_t)(MANY - first));
+    expect(first + 700U, first + 900U, first + 700U, 200);
+    expect(0, first + 9U, first, 9);
+    expect(0, first / 2U, first, 0);
+    expect(MANY - 3U, MANY, MANY - 3U, 3);
+    expect(MANY, MANY, MANY, 0);
 }
 
-static void test_full_ring_keeps_all_but_the_slot_to_come(void) {
-    put(0, BLACKBOX_ENTRIES_PER_S - 1U);
-    expect(0, UINT64_MAX, 0, BLACKBOX_ENTRIES_PER_S - 1U);
-    put(BLACKBOX_ENTRIES_PER_S - 1U, BLACKBOX_ENTRIES_PER_S);
-    expect(0, UINT64_MAX, 1, BLACKBOX_ENTRIES_PER_S - 1U);
+static void test_ring_is_whole_until_the_first_block_is_overwritten(void) {
+    size_t count;
+    uint64_t n = 0;
+    for (; blackbox_ring_is_whole(ring); n++) {
+        expect(0, 1, 0, (n == 0U) ? 0U : 1U);
+        put(n, n + 1U);
+    }
+    TEST_ASSERT_GREATER_THAN_UINT64(0, blackbox_ring_copy(ring, 0, UINT64_MAX, out, &count));
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(blackbox_ring_most(ring), n);
+}
+
+/// What two wheels and a client at 50 Hz bring in a second, step by step as it comes in a quiet gateway.
+static void test_a_second_of_driving_fits_one_and_a_half_times(void) {
+    const blackbox_entry_t speed = {.kind = BLACKBOX_FRAME, .number = 256, .a = 4};
+    const blackbox_entry_t echo = {.kind = BLACKBOX_FRAME, .number = 266, .a = 5, .b = IW_CAN_ECHO};
+    const blackbox_entry_t drive = {.kind = BLACKBOX_DRIVE, .number = 1, .as = {.drive = {{300, 300}, {0, 0}, 1}}};
+    const blackbox_entry_t step = {.kind = BLACKBOX_STEP};
+    for (uint64_t us = 0; us < 1500000U; us += 20000U) {
+        for (unsigned i = 0; i < 21U; i++) {
+            blackbox_entry_t entry = (i < 13U) ? speed : (i < 15U) ? echo : (i < 16U) ? drive : step;
+            entry.at_us = us + 900U * i;
+            blackbox_ring_put(ring, &entry);
+        }
+    }
+    TEST_ASSERT_TRUE(blackbox_ring_is_whole(ring));
+}
+
+static void expect_back(const blackbox_entry_t *entries, size_t count) {
+    size_t got;
+    for (size_t i = 0; i < count; i++) {
+        blackbox_ring_put(ring, &entries[i]);
+    }
+    TEST_ASSERT_EQUAL_UINT64(0, blackbox_ring_copy(ring, 0, UINT64_MAX, out, &got));
+    TEST_ASSERT_EQUAL_size_t(count, got);
+    for (size_t i = 0; i < count; i++) {
+        TEST_ASSERT_EQUAL_UINT64(entries[i].at_us, out[i].at_us);
+        TEST_ASSERT_EQUAL_MEMORY(&entries[i].as, &out[i].as, sizeof out[i].as);
+        TEST_ASSERT_EQUAL_UINT32(entries[i].number, out[i].number);
+        TEST_ASSERT_EQUAL_UINT8(entries[i].kind, out[i].kind);
+        TEST_ASSERT_EQUAL_UINT8(entries[i].a, out[i].a);
+        TEST_ASSERT_EQUAL_UINT8(entries[i].b, out[i].b);
+    }
+}
+
+static void test_every_kind_of_entry_comes_back_as_it_was(void) {
+    blackbox_entry_t entries[3U * BLACKBOX_KINDS];
+    for (unsigned kind = 0; kind < BLACKBOX_KINDS; kind++) {
+        blackbox_entry_t *three = &entries[3U * kind];
+        three[0] = (blackbox_entry_t){.at_us = 1000U * kind, .kind = (uint8_t)kind};
+        three[1] =
+            (blackbox_entry_t){.at_us = 1000U * kind, .kind = (uint8_t)kind, .number = UINT16_MAX, .a = 8, .b = 1};
+        three[2] = (blackbox_entry_t){
+            .at_us = 1000U * kind + 1U, .kind = (uint8_t)kind, .number = UINT32_MAX, .a = 255, .b = 255};
+        memset(&three[1].as, 0x80, (kind == BLACKBOX_FRAME) ? 8U : sizeof three[1].as);
+        three[2].as.value = INT64_MIN;
+    }
+    expect_back(entries, sizeof entries / sizeof entries[0]);
+}
+
+static void test_frame_keeps_as_many_bytes_as_it_has(void) {
+    const blackbox_entry_t entry = {.kind = BLACKBOX_FRAME, .a = 3, .as = {.data = {1, 2, 3, 4, 5, 6, 7, 8}}};
+    const uint8_t kept[IW_CAN_DATA_MAX] = {1, 2, 3};
+    size_t count;
+    blackbox_ring_put(ring, &entry);
+    (void)blackbox_ring_copy(ring, 0, 1, out, &count);
+    TEST_ASSERT_EQUAL_MEMORY(kept, out[0].as.data, sizeof kept);
+}
+
+static void test_times_far_apart_and_backwards_come_back(void) {
+    const blackbox_entry_t entries[] = {
+        {.at_us = 5, .kind = BLACKBOX_STEP},
+        {.at_us = 5U + 0xFFFFFFU, .kind = BLACKBOX_STEP},
+        {.at_us = 5U + 0xFFFFFFU + 1U, .kind = BLACKBOX_STEP},
+        {.at_us = UINT64_MAX, .kind = BLACKBOX_STEP},
+        {.at_us = 7, .kind = BLACKBOX_STEP},
+        {.at_us = 7, .kind = BLACKBOX_BUS, .a = 3},
+    };
+    expect_back(entries, sizeof entries / sizeof entries[0]);
 }
 
 static void test_size_follows_the_seconds_and_has_a_least(void) {
-    TEST_ASSERT_EQUAL_size_t(sizeof *ring + 30U * BLACKBOX_ENTRIES_PER_S * sizeof(blackbox_entry_t),
+    TEST_ASSERT_EQUAL_size_t(sizeof *ring + (size_t)30U * BLACKBOX_BLOCKS_PER_S * BLACKBOX_BLOCK,
                              blackbox_ring_size(30));
-    TEST_ASSERT_EQUAL_size_t(sizeof *ring + BLACKBOX_ENTRIES_MIN * sizeof(blackbox_entry_t), blackbox_ring_size(0));
+    TEST_ASSERT_EQUAL_size_t(sizeof *ring + (size_t)BLACKBOX_BLOCKS_MIN * BLACKBOX_BLOCK, blackbox_ring_size(0));
+    TEST_ASSERT_LESS_THAN_size_t(640000U, blackbox_ring_size(30)); // What the page of recordings promises.
 }
 
 static void test_every_kind_has_a_name_of_its_own(void) {
@@ -83,7 +169,11 @@ int main(void) {
     RUN_TEST(test_empty_ring_has_nothing);
     RUN_TEST(test_entries_come_back_in_order);
     RUN_TEST(test_overwritten_entries_are_missing_and_nothing_else);
-    RUN_TEST(test_full_ring_keeps_all_but_the_slot_to_come);
+    RUN_TEST(test_ring_is_whole_until_the_first_block_is_overwritten);
+    RUN_TEST(test_a_second_of_driving_fits_one_and_a_half_times);
+    RUN_TEST(test_every_kind_of_entry_comes_back_as_it_was);
+    RUN_TEST(test_frame_keeps_as_many_bytes_as_it_has);
+    RUN_TEST(test_times_far_apart_and_backwards_come_back);
     RUN_TEST(test_size_follows_the_seconds_and_has_a_least);
     RUN_TEST(test_every_kind_has_a_name_of_its_own);
     return UNITY_END();

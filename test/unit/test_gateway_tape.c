@@ -9,7 +9,7 @@ static blackbox_ring_t *ring;
 static gw_tape_t tape;
 static iw_linux_hal_t port;
 static iw_hal_t hal;
-static blackbox_entry_t entries[BLACKBOX_ENTRIES_MIN];
+static blackbox_entry_t entries[8U * BLACKBOX_BLOCK];
 static size_t count;
 
 // A port that answers as it is told.

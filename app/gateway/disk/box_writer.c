@@ -23,7 +23,7 @@ typedef struct {
     int fd;
     const blackbox_ring_t *ring;
     const gw_box_wish_t *wish;
-    blackbox_entry_t *copy; ///< As many entries as the ring has.
+    blackbox_entry_t *copy; ///< Room for as many entries as the ring has.
     const gw_box_order_t *order;
     const char *bus; ///< As the file of frames names it.
     FILE *frames_file;
@@ -126,7 +126,7 @@ static int fill_files(writer_t *self) {
     const iw_time_us_t length_us = (iw_time_us_t)self->wish->blackbox_s * 1000000U;
     const iw_time_us_t since_us = (stop->at_us > length_us) ? stop->at_us - length_us : 1U;
     const iw_time_us_t begin_us = begin_of(self, since_us);
-    const bool from_start = blackbox_ring_written(self->ring) < self->ring->capacity && begin_us <= self->copy[0].at_us;
+    const bool from_start = blackbox_ring_is_whole(self->ring) && begin_us <= self->copy[0].at_us;
     self->next = 0;
     self->frames = 0;
     self->result.ms = (uint32_t)((stop->at_us - begin_us) / IW_US_PER_MS);
@@ -257,7 +257,7 @@ void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_wish_t 
     static writer_t self; // Too large for a stack.
     self = (writer_t){.fd = fd, .ring = ring, .wish = wish};
     self.bus = (strncmp(wish->bus, "unix:", 5) == 0) ? "local" : wish->bus;
-    self.copy = (blackbox_entry_t *)calloc(ring->capacity, sizeof *self.copy);
+    self.copy = (blackbox_entry_t *)calloc(blackbox_ring_most(ring), sizeof *self.copy);
     if (self.copy == NULL) {
         return;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 /// The HAL of the gateway's core: everything that goes into the core passes here and is noted in the black box on its way, and
-/// requests are noted beside it by the caller. Costs a copy of 32 bytes each; never waits, never fails.
+/// requests are noted beside it by the caller. Costs a copy of a dozen bytes each; never waits, never fails.
 ///
 ///     core --the one table of functions (hal.h)--> tape --> iw_bus_receive (port/linux) --> socket
 #ifndef GATEWAY_TAPE_H
