@@ -27,15 +27,6 @@ const iw_cause_row_t iw_cause_rows[IW_CAUSES] = {
     [IW_CAUSE_RESTART] = {IW_STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
 };
 
-/// Of several latching causes at once this order decides which one refuses: first what explains those behind it (a bus
-/// that is down also loses echoes and wheels).
-static const uint8_t telling[] = {
-    IW_CAUSE_ESTOP_LINE,   IW_CAUSE_ESTOP_SOFTWARE, IW_CAUSE_BUS_DOWN,   IW_CAUSE_SECOND_MASTER,
-    IW_CAUSE_SEND_STALLED, IW_CAUSE_WHEEL_REBOOTED, IW_CAUSE_WHEEL_LOST, IW_CAUSE_FEEDBACK_SIGN,
-    IW_CAUSE_OVERSPEED,    IW_CAUSE_LOOP_HUNG,      IW_CAUSE_INTERNAL,
-};
-#define TELLING (sizeof telling / sizeof telling[0])
-
 bool iw_cause_latches(iw_cause_t cause) {
     return iw_cause_rows[cause].effect != IW_STOPS;
 }
@@ -46,19 +37,21 @@ static bool seen_lately(iw_time_us_t now_us, iw_time_us_t seen_us) {
 
 uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us) {
     uint32_t present = 0;
-    for (size_t i = 0; i < TELLING; i++) {
-        const uint32_t bit = IW_CAUSE_BIT(telling[i]);
-        const bool is = iw_cause_rows[telling[i]].level ? (told & bit) != 0U : seen_lately(now_us, seen_us[telling[i]]);
-        present |= is ? bit : 0U;
+    for (uint32_t cause = IW_CAUSE_NONE; cause < IW_CAUSES; cause++) {
+        const iw_cause_row_t *const row = &iw_cause_rows[cause];
+        const uint32_t bit = IW_CAUSE_BIT(cause);
+        const bool is = row->level ? (told & bit) != 0U : seen_lately(now_us, seen_us[cause]);
+        present |= (is && row->effect != (uint8_t)IW_STOPS) ? bit : 0U;
     }
     return present;
 }
 
+/// Of several at once the first one refuses: iw_cause_t has first what explains those behind it (a bus that is down also
+/// loses echoes and wheels).
 iw_refusal_t iw_cause_refusal(uint32_t present) {
-    for (size_t i = 0; i < TELLING; i++) {
-        if ((present & IW_CAUSE_BIT(telling[i])) != 0U) {
-            return (iw_refusal_t)iw_cause_rows[telling[i]].refusal;
-        }
+    uint32_t cause = IW_CAUSE_NONE;
+    while (cause < IW_CAUSES && (present & IW_CAUSE_BIT(cause)) == 0U) {
+        cause++;
     }
-    return IW_REFUSE_NONE;
+    return (cause < IW_CAUSES) ? (iw_refusal_t)iw_cause_rows[cause].refusal : IW_REFUSE_NONE;
 }

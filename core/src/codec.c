@@ -2,6 +2,7 @@
 #include "iwheel/codec.h"
 
 #include "be.h"
+#include "magnitude.h"
 
 #include <string.h>
 
@@ -10,12 +11,6 @@
 
 /// The one bit in which the ids of both wheels differ.
 #define SIDE_BIT 0x20U
-
-#ifdef __GNUC__
-#define APART __attribute__((noinline)) static
-#else
-#define APART static
-#endif
 
 const iw_codec_row_t iw_codec_rows[IW_CODEC_ROWS] = {
     {IW_ID_LEFT_SPEED, 4, IW_DLC_SPEED, IW_CODEC_SPEED, IW_LEFT},
@@ -43,6 +38,14 @@ iw_side_t iw_codec_side(uint32_t id) {
 /// Two rows per kind, in the order of the enumeration; the pose, which only the right wheel sends, is the last.
 const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind) {
     return &iw_codec_rows[(size_t)2 * (size_t)kind];
+}
+
+uint8_t iw_codec_length(iw_codec_kind_t kind) {
+    static const uint8_t lengths[IW_CODEC_KINDS] = {
+        [IW_CODEC_SPEED] = IW_DLC_SPEED,   [IW_CODEC_STATUS] = IW_DLC_STATUS,     [IW_CODEC_FORCE] = IW_DLC_FORCE,
+        [IW_CODEC_OFFSET] = IW_DLC_OFFSET, [IW_CODEC_SETPOINT] = IW_DLC_SETPOINT, [IW_CODEC_POSE] = IW_DLC_POSE,
+    };
+    return lengths[kind];
 }
 
 const iw_codec_row_t *iw_codec_find(uint32_t id) {
@@ -122,7 +125,7 @@ static iw_codec_kind_t read_offset(const iw_can_frame_t *frame, uint32_t length,
 
 /// Any message but a good speed, the most frequent first. Kept apart, so that four frames of five save no registers; it
 /// is given both wheels, so that those four need no pointer to theirs before they are known to be good.
-APART iw_codec_kind_t read_other(const iw_can_frame_t *frame, iw_codec_wheel_t *wheel) {
+IW_APART iw_codec_kind_t read_other(const iw_can_frame_t *frame, iw_codec_wheel_t *wheel) {
     iw_codec_wheel_t *const self = &wheel[iw_codec_side(frame->id)];
     const uint32_t number = frame->id & ~(FORMAT_BITS | SIDE_BIT);
     // With a format bit in the length no length fits: a remote or extended frame with a known number is found and

@@ -6,33 +6,35 @@
 #include <string.h>
 
 typedef struct {
-    uint16_t offset;
     uint16_t standard;
     iw_config_range_t range;
 } field_t;
 
-/// By offset, so that one loop checks all fields and one table holds ranges and defaults.
-#define FIELD(name, standard, min, max)                                                                                \
-    {                                                                                                                  \
-        (uint16_t) offsetof(iw_config_t, name), standard, {                                                            \
-            min, max                                                                                                   \
-        }                                                                                                              \
-    }
-
+/// Ranges and defaults of the numbers that iw_config_t begins with, in its order: so one loop checks all of them.
 /// Indexed by iw_config_fault_t - IW_CONFIG_PERIOD.
 static const field_t fields[] = {
-    FIELD(period_ms, 20, 5, 50),           FIELD(lease_ms, 200, 20, 500),
-    FIELD(accel_mm_s2, 800, 50, 20000),    FIELD(decel_mm_s2, 1500, 100, 20000),
-    FIELD(max_speed_mm_s, 1000, 10, 5000), FIELD(max_current_mA, IW_CURRENT_LIMIT_mA, 0, IW_CURRENT_LIMIT_mA),
-    FIELD(zero_hold_ms, 1500, 1100, 5000), FIELD(wheel_silent_ms, 50, 20, 200),
-    FIELD(echo_ms, 50, 20, 200),           FIELD(rest_rpm, 2, 0, 20),
-    FIELD(rest_ms, 200, 50, 2000),         FIELD(follow_mm_s, 300, 50, 5000),
-    FIELD(follow_ms, 500, 100, 5000),      FIELD(blocked_ms, 1000, 200, 10000),
-    FIELD(radius_mm, 192, 20, 500),        FIELD(gear_turns, 1, 1, 1000),
-    FIELD(gear_per, 1, 1, 1000),           FIELD(setpoint_dlc, IW_DLC_SETPOINT, IW_DLC_SETPOINT, IW_CAN_DATA_MAX),
+    {20, {5, 50}},                                         // period_ms
+    {200, {20, 500}},                                      // lease_ms
+    {800, {50, 20000}},                                    // accel_mm_s2
+    {1500, {100, 20000}},                                  // decel_mm_s2
+    {1000, {10, 5000}},                                    // max_speed_mm_s
+    {IW_CURRENT_LIMIT_mA, {0, IW_CURRENT_LIMIT_mA}},       // max_current_mA
+    {1500, {1100, 5000}},                                  // zero_hold_ms
+    {50, {20, 200}},                                       // wheel_silent_ms
+    {50, {20, 200}},                                       // echo_ms
+    {2, {0, 20}},                                          // rest_rpm
+    {200, {50, 2000}},                                     // rest_ms
+    {300, {50, 5000}},                                     // follow_mm_s
+    {500, {100, 5000}},                                    // follow_ms
+    {1000, {200, 10000}},                                  // blocked_ms
+    {192, {20, 500}},                                      // radius_mm
+    {1, {1, 1000}},                                        // gear_turns
+    {1, {1, 1000}},                                        // gear_per
+    {IW_DLC_SETPOINT, {IW_DLC_SETPOINT, IW_CAN_DATA_MAX}}, // setpoint_dlc
 };
 #define FIELDS (sizeof fields / sizeof fields[0])
 IW_STATIC_ASSERT(FIELDS == IW_CONFIG_SETPOINT_DLC - IW_CONFIG_PERIOD + 1, one_row_per_field);
+IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == (FIELDS - 1U) * sizeof(uint16_t), numbers_come_first);
 
 #define WATCHDOG_MS (IW_WHEEL_WATCHDOG_US / IW_US_PER_MS)
 #define GEAR_MAX    100U
@@ -48,15 +50,20 @@ iw_config_range_t iw_config_range(iw_config_fault_t field) {
 void iw_config_default(iw_config_t *out_config) {
     memset(out_config, 0, sizeof *out_config);
     for (size_t i = 0; i < FIELDS; i++) {
-        memcpy((uint8_t *)out_config + fields[i].offset, &fields[i].standard, sizeof fields[i].standard);
+        memcpy((uint8_t *)out_config + i * sizeof(uint16_t), &fields[i].standard, sizeof(uint16_t));
     }
     out_config->force_unit[IW_LEFT] = IW_FORCE_CN;
     out_config->force_unit[IW_RIGHT] = IW_FORCE_DN;
 }
 
-/// R1: lease, period and ramp together must end before the wheel's own watchdog would.
+/// From the client's last command until the wheels are told to stand, at most: lease, period and ramp.
+static uint32_t client_lost_ms(const iw_config_t *config) {
+    return (uint32_t)config->lease_ms + config->period_ms +
+           divide_up(config->max_speed_mm_s * 1000U, config->decel_mm_s2);
+}
+
+/// R1: that must end before the wheel's own watchdog would.
 static iw_config_fault_t check_relations(const iw_config_t *config) {
-    const iw_stop_budget_t budget = iw_config_stop_budget(config);
     if (config->current_role > IW_ROLE_SETPOINT) {
         return IW_CONFIG_CURRENT_ROLE;
     }
@@ -67,13 +74,13 @@ static iw_config_fault_t check_relations(const iw_config_t *config) {
     if (config->gear_turns < config->gear_per || config->gear_turns > GEAR_MAX * config->gear_per) {
         return IW_CONFIG_GEAR_RATIO;
     }
-    return (budget.client_lost_ms > WATCHDOG_MS) ? IW_CONFIG_STOP_BUDGET : IW_CONFIG_OK;
+    return (client_lost_ms(config) > WATCHDOG_MS) ? IW_CONFIG_STOP_BUDGET : IW_CONFIG_OK;
 }
 
 iw_config_fault_t iw_config_check(const iw_config_t *config) {
     for (size_t i = 0; i < FIELDS; i++) {
         uint16_t value;
-        memcpy(&value, (const uint8_t *)config + fields[i].offset, sizeof value);
+        memcpy(&value, (const uint8_t *)config + i * sizeof value, sizeof value);
         if (value < fields[i].range.min || value > fields[i].range.max) {
             return (iw_config_fault_t)(IW_CONFIG_PERIOD + i);
         }
@@ -84,10 +91,9 @@ iw_config_fault_t iw_config_check(const iw_config_t *config) {
 iw_stop_budget_t iw_config_stop_budget(const iw_config_t *config) {
     const uint32_t speed = config->max_speed_mm_s;
     const uint32_t wait_ms = (uint32_t)config->lease_ms + config->period_ms;
-    const uint32_t ramp_ms = divide_up(speed * 1000U, config->decel_mm_s2);
     iw_stop_budget_t budget;
     // Worst case: the lease ends right after a pair was sent, at full speed on both wheels. v*v/2a is the ramp's way.
-    budget.client_lost_ms = wait_ms + ramp_ms;
+    budget.client_lost_ms = client_lost_ms(config);
     budget.client_lost_mm = divide_up(speed * wait_ms, 1000U) + divide_up(speed * speed, 2U * config->decel_mm_s2);
     budget.killed_ms = WATCHDOG_MS;
     budget.killed_mm = divide_up(speed * WATCHDOG_MS, 1000U);

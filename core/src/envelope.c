@@ -30,8 +30,9 @@ static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t elap
     if (to == from) {
         return true;
     }
-    return (to > from) ? to - from <= allowance(self->config->accel_mm_s2, elapsed_us)
-                       : from - to <= allowance(self->config->decel_mm_s2, elapsed_us);
+    const uint32_t slope_mm_s2 = (to > from) ? self->config->accel_mm_s2 : self->config->decel_mm_s2;
+    const uint32_t change = (to > from) ? to - from : from - to;
+    return change <= allowance(slope_mm_s2, elapsed_us);
 }
 
 /// Read as the wheel reads it, byte by byte, and not with our own codec: an error in that would judge itself right.

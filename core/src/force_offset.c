@@ -79,7 +79,9 @@ static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
     const uint32_t variance = sum / IW_FORCE_WINDOW_SAMPLES;
     // Scaled before the root where 32 bits allow it: else a deviation below one raw unit (0.1 N in dN) would round to
     // 0.
-    return (variance <= VARIANCE_FINE) ? square_root(variance * scale * scale) : square_root(variance) * scale;
+    const bool fine = variance <= VARIANCE_FINE;
+    const uint32_t root = square_root(fine ? variance * scale * scale : variance);
+    return fine ? root : root * scale;
 }
 
 /// The ring is full, so the oldest sample stands at `next`: the first half is the older one. Of several faults the

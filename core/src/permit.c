@@ -2,6 +2,7 @@
 #include "iwheel/private/permit.h"
 
 #include "cause.h"
+#include "magnitude.h"
 
 #include <string.h>
 
@@ -84,7 +85,7 @@ static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us)
 }
 
 /// R3: a joystick that is still deflected at arm or reset must not set the machine in motion.
-static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
+IW_APART bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
     return self->stale_us != IW_NEVER && now_us - self->stale_us < IW_STALE_COMMAND_US;
 }
 
@@ -349,11 +350,11 @@ void iw_permit_remember(iw_permit_t *self, iw_time_us_t now_us, iw_client_t clie
 }
 
 iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client, bool nonzero) {
-    const iw_refusal_t refusal = refuse_drive(self, sent_us, client);
     // A refused one too: it shows that somebody wants motion.
     if (nonzero) {
         iw_permit_remember(self, sent_us, client);
     }
+    const iw_refusal_t refusal = refuse_drive(self, sent_us, client);
     if (refusal == IW_REFUSE_NONE) {
         grant_lease(self, sent_us, (iw_time_us_t)self->config->lease_ms * IW_US_PER_MS);
     }

@@ -113,9 +113,8 @@ static uint32_t fraction_of(uint32_t part, uint32_t whole) {
     return fraction;
 }
 
-/// slope x time in thousandths of the slope's unit. The time is at most a second: then every ramp has ended.
-static uint32_t ramp_step(uint32_t slope, iw_time_us_t elapsed_us) {
-    const uint32_t us = (elapsed_us < IW_WHEEL_WATCHDOG_US) ? (uint32_t)elapsed_us : IW_WHEEL_WATCHDOG_US;
+/// slope x time in thousandths of the slope's unit, for at most a second.
+IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
 }
 
@@ -135,7 +134,7 @@ static void plan(axis_t *axis, int32_t target, uint32_t away, uint32_t towards) 
 
 /// A speed step as the same share of the maximum current. `step` is at most 20 m/s, the steepest slope for a second: 32
 /// bits suffice.
-static uint32_t current_step(const iw_config_t *config, uint32_t step) {
+IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) {
     const uint32_t speed = config->max_speed_mm_s;
     return step / speed * config->max_current_mA + step % speed * config->max_current_mA / speed;
 }
@@ -156,7 +155,7 @@ static void advance_together(const axis_t *axes, size_t count) {
 }
 
 /// True if this wheel's speed and current are where they should be.
-static bool arrived(const iw_setpoint_t *self, iw_side_t side) {
+IW_APART bool arrived(const iw_setpoint_t *self, iw_side_t side) {
     const iw_command_t *const target = &self->target.wheel[side];
     const bool ramps_current = self->config->current_role == IW_ROLE_SETPOINT;
     return self->speed_um_s[side] == target->speed_mm_s * 1000 &&
@@ -165,9 +164,11 @@ static bool arrived(const iw_setpoint_t *self, iw_side_t side) {
 
 static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us) {
     const iw_config_t *const config = self->config;
-    const iw_time_us_t granted_us = 2U * (iw_time_us_t)config->period_ms * IW_US_PER_MS;
-    const uint32_t away = ramp_step(config->accel_mm_s2, (elapsed_us < granted_us) ? elapsed_us : granted_us);
-    const uint32_t towards = ramp_step(config->decel_mm_s2, elapsed_us);
+    // After a second every ramp has ended.
+    const uint32_t us = (elapsed_us < IW_WHEEL_WATCHDOG_US) ? (uint32_t)elapsed_us : IW_WHEEL_WATCHDOG_US;
+    const uint32_t granted_us = 2U * config->period_ms * IW_US_PER_MS;
+    const uint32_t away = ramp_step(config->accel_mm_s2, (us < granted_us) ? us : granted_us);
+    const uint32_t towards = ramp_step(config->decel_mm_s2, us);
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
     axis_t axes[AXES];
     size_t count = 0;
@@ -223,10 +224,11 @@ bool iw_setpoint_is_zero(const iw_setpoint_t *self) {
 bool iw_setpoint_next_is_zero(const iw_setpoint_t *self) {
     const iw_command_t *const left = &self->target.wheel[IW_LEFT];
     const iw_command_t *const right = &self->target.wheel[IW_RIGHT];
-    const bool limit = self->config->current_role == IW_ROLE_LIMIT;
-    const bool speeds = left->speed_mm_s == 0 && right->speed_mm_s == 0;
-    const bool currents = limit || (left->current_mA == 0 && right->current_mA == 0);
-    return iw_setpoint_is_zero(self) && (self->from_zero || (speeds && currents));
+    if (self->from_zero || !iw_setpoint_is_zero(self)) {
+        return iw_setpoint_is_zero(self);
+    }
+    return left->speed_mm_s == 0 && right->speed_mm_s == 0 &&
+           (self->config->current_role == IW_ROLE_LIMIT || (left->current_mA == 0 && right->current_mA == 0));
 }
 
 iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self) {

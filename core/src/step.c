@@ -7,13 +7,17 @@
 #define ESTOP_PRESSED    1U
 #define ESTOP_UNREADABLE 2U
 
-static uint32_t whole_ms(iw_time_us_t span_us) {
+IW_APART uint32_t whole_ms(iw_time_us_t span_us) {
     return (span_us < UINT32_MAX) ? (uint32_t)span_us / IW_US_PER_MS : UINT32_MAX / IW_US_PER_MS;
 }
 
+static void raise_cause(iw_gateway_t *self, iw_cause_t cause, uint8_t sides, uint32_t detail) {
+    iw_permit_raise(&self->permit, self->now_us, cause, sides, detail);
+}
+
 /// A cause whose detail is a time.
-static void raise_after(iw_gateway_t *self, iw_time_us_t now_us, iw_cause_t cause, iw_time_us_t span_us) {
-    iw_permit_raise(&self->permit, now_us, cause, IW_SIDES_NONE, whole_ms(span_us));
+static void raise_after(iw_gateway_t *self, iw_cause_t cause, iw_time_us_t span_us) {
+    raise_cause(self, cause, IW_SIDES_NONE, whole_ms(span_us));
 }
 
 IW_STATIC_ASSERT(IW_SIDES_LEFT << IW_RIGHT == IW_SIDES_RIGHT, one_bit_per_side);
@@ -23,25 +27,25 @@ static uint8_t side_bit(size_t side) {
 }
 
 /// A wheel that was lost before our own stall began stays lost: judged at `promised_us`, not now.
-static void excuse_wheel(iw_gateway_t *self, iw_time_us_t now_us, iw_side_t side) {
+static void excuse_wheel(iw_gateway_t *self, iw_side_t side) {
     if (!iw_wheel_lost(&self->wheel[side], self->promised_us)) {
-        iw_wheel_excuse(&self->wheel[side], now_us);
+        iw_wheel_excuse(&self->wheel[side], self->now_us);
     }
     iw_follow_restart(&self->follow[side]);
 }
 
-/// The clock of `now_us` may stand still while the system is suspended; the wheels do not: a suspend counts as
+/// Our clock may stand still while the system is suspended; the wheels do not: a suspend counts as
 /// lateness.
-static iw_time_us_t take_lateness(iw_gateway_t *self, iw_time_us_t now_us) {
+static iw_time_us_t take_lateness(iw_gateway_t *self) {
     const iw_time_us_t suspended_us = self->suspended_us;
     self->suspended_us = 0;
-    return suspended_us + ((now_us > self->promised_us) ? now_us - self->promised_us : 0U);
+    return suspended_us + ((self->now_us > self->promised_us) ? self->now_us - self->promised_us : 0U);
 }
 
 /// R7 (own hang). One long stall, or one late step after another: what counts is for how long no fault could
 /// be judged, since telemetry of a late step has no known time of reception.
-static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t late_us = take_lateness(self, now_us);
+static void watch_loop(iw_gateway_t *self) {
+    const iw_time_us_t late_us = take_lateness(self);
     const bool late = late_us > IW_GATEWAY_LATE_US;
     const bool was_stalled = self->stalled;
     self->stalled = late || (was_stalled && self->backlog);
@@ -49,35 +53,34 @@ static void watch_loop(iw_gateway_t *self, iw_time_us_t now_us) {
         return;
     }
     if (!was_stalled) {
-        self->stalled_since_us = now_us - late_us;
+        self->stalled_since_us = self->now_us - late_us;
     }
     if (late) {
         self->counters.late_steps++;
-        excuse_wheel(self, now_us, IW_LEFT);
-        excuse_wheel(self, now_us, IW_RIGHT);
+        excuse_wheel(self, IW_LEFT);
+        excuse_wheel(self, IW_RIGHT);
     }
-    const iw_time_us_t run_us = now_us - self->stalled_since_us;
+    const iw_time_us_t run_us = self->now_us - self->stalled_since_us;
     const iw_time_us_t blind_us = (run_us > late_us) ? run_us : late_us;
     if (late_us > IW_GATEWAY_HUNG_US) {
-        raise_after(self, now_us, IW_CAUSE_LOOP_HUNG, late_us);
+        raise_after(self, IW_CAUSE_LOOP_HUNG, late_us);
     } else if (blind_us >= IW_GATEWAY_STOP_US) {
-        raise_after(self, now_us, IW_CAUSE_LOOP_LATE, blind_us);
+        raise_after(self, IW_CAUSE_LOOP_LATE, blind_us);
     }
 }
 
 /// Our own lateness, the e-stop line, the state of the bus.
-static void begin(iw_gateway_t *self, iw_time_us_t now_us) {
+static void begin(iw_gateway_t *self) {
     const int pressed = self->hal.estop_pressed(self->hal.context);
     if (pressed != 0) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE,
-                        (pressed > 0) ? ESTOP_PRESSED : ESTOP_UNREADABLE);
+        raise_cause(self, IW_CAUSE_ESTOP_LINE, IW_SIDES_NONE, (pressed > 0) ? ESTOP_PRESSED : ESTOP_UNREADABLE);
     }
-    watch_loop(self, now_us);
+    watch_loop(self);
     self->bus = self->hal.bus_state(self->hal.context);
     // The port's contract (hal.h): after a loss of the bus nothing sent before it is queued, so no echo is outstanding.
     if (self->bus < IW_BUS_PASSIVE) {
         iw_confirmation_clear(&self->sender.confirmation);
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_BUS_DOWN, IW_SIDES_NONE, (uint32_t)self->bus);
+        raise_cause(self, IW_CAUSE_BUS_DOWN, IW_SIDES_NONE, (uint32_t)self->bus);
     }
 }
 
@@ -97,16 +100,16 @@ static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
     }
 }
 
-static void hear_force(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side) {
+static void hear_force(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     const iw_codec_wheel_t *const told = &self->told[side];
     iw_force_t *const force = &self->force[side];
     const iw_unit_evidence_t before = force->evidence;
     if (kind == IW_CODEC_FORCE) {
         // By its last speed, however old: our own stall does not mean that the wheel moved.
         const bool still = iw_magnitude(told->speed.speed_rpm) <= self->config.rest_rpm;
-        iw_force_hear(force, now_us, told->force.force_raw, still);
+        iw_force_hear(force, self->now_us, told->force.force_raw, still);
     } else {
-        iw_force_hear_offset(force, now_us, told->offset.offset_dN);
+        iw_force_hear_offset(force, self->now_us, told->offset.offset_dN);
     }
     if (force->evidence != before) {
         note_force_evidence(self, side);
@@ -123,7 +126,7 @@ static void contradict_length(iw_gateway_t *self, uint8_t length) {
 /// The document lists bytes and states no DLC. A status frame as long as the table confirms the table's lengths; a
 /// message of another length contradicts them.
 static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length) {
-    if (length != iw_codec_row(kind)->length) {
+    if (length != iw_codec_length(kind)) {
         contradict_length(self, length);
     } else if (kind == IW_CODEC_STATUS) {
         iw_ledger_confirm(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
@@ -132,29 +135,29 @@ static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length
 
 /// Telemetry. A reboot is acted upon first: the frame that revealed it may be the first force or offset of the new run,
 /// which belongs into a new window.
-static void hear(iw_gateway_t *self, iw_time_us_t now_us, iw_codec_kind_t kind, iw_side_t side) {
+static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
     iw_wheel_t *const wheel = &self->wheel[side];
     const bool first = wheel->first_us == IW_NEVER;
     self->counters.received++;
-    iw_wheel_hear(wheel, now_us, kind, &self->told[side], !self->stalled);
+    iw_wheel_hear(wheel, self->now_us, kind, &self->told[side], !self->stalled);
     const iw_reboot_t reboot = iw_wheel_take_reboot(wheel);
     if (reboot != IW_REBOOT_NONE) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_REBOOTED, side_bit(side), (uint32_t)reboot);
+        raise_cause(self, IW_CAUSE_WHEEL_REBOOTED, side_bit(side), (uint32_t)reboot);
     }
     if (first || reboot != IW_REBOOT_NONE) {
         iw_force_reopen(&self->force[side], wheel->boot_seen);
     }
     if (kind == IW_CODEC_FORCE || kind == IW_CODEC_OFFSET) {
-        hear_force(self, now_us, kind, side);
+        hear_force(self, kind, side);
     } else if (kind == IW_CODEC_POSE) {
-        self->pose_us = now_us;
+        self->pose_us = self->now_us;
     }
 }
 
 /// Two masters on one bus: the wheels obey whoever sent last (fault 19).
-static void hear_foreign(iw_gateway_t *self, iw_time_us_t now_us, uint32_t id) {
+static void hear_foreign(iw_gateway_t *self, uint32_t id) {
     self->counters.foreign++;
-    iw_permit_raise(&self->permit, now_us, IW_CAUSE_SECOND_MASTER, side_bit(iw_codec_side(id)), id);
+    raise_cause(self, IW_CAUSE_SECOND_MASTER, side_bit(iw_codec_side(id)), id);
 }
 
 static bool is_setpoint_id(uint32_t id) {
@@ -162,19 +165,19 @@ static bool is_setpoint_id(uint32_t id) {
 }
 
 /// An echo is our own frame, confirmed by the controller; anything else with a setpoint's id has another sender.
-static void take_setpoint(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
+static void take_setpoint(iw_gateway_t *self, const iw_can_frame_t *frame) {
     if (frame->kind == IW_CAN_ECHO) {
         self->counters.echoes++;
         iw_confirmation_echo(&self->sender.confirmation, iw_codec_side(frame->id), frame);
     } else {
-        hear_foreign(self, now_us, frame->id);
+        hear_foreign(self, frame->id);
     }
 }
 
-static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
+static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
     // Before decoding: a foreign setpoint of any length must latch, also one that decodes to nothing.
     if (is_setpoint_id(frame->id)) {
-        take_setpoint(self, now_us, frame);
+        take_setpoint(self, frame);
         return;
     }
     const iw_codec_kind_t kind = iw_codec_decode(frame, self->told);
@@ -192,44 +195,44 @@ static void take_frame(iw_gateway_t *self, iw_time_us_t now_us, const iw_can_fra
         break;
     default:
         note_length(self, kind, frame->dlc);
-        hear(self, now_us, kind, side);
+        hear(self, kind, side);
         break;
     }
 }
 
 /// Everything before any age is judged (R7), but bounded: a babbling node must not keep the step from ending.
-static void receive(iw_gateway_t *self, iw_time_us_t now_us) {
+static void receive(iw_gateway_t *self) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
     while (taken < IW_GATEWAY_DRAIN_MAX && self->hal.receive(self->hal.context, &frame) > 0) {
-        take_frame(self, now_us, &frame);
+        take_frame(self, &frame);
         taken++;
     }
     self->backlog = taken == IW_GATEWAY_DRAIN_MAX;
 }
 
-static void watch_silence(iw_gateway_t *self, iw_time_us_t now_us) {
+static void watch_silence(iw_gateway_t *self) {
     uint8_t sides = IW_SIDES_NONE;
     uint32_t silent_ms = 0;
     for (size_t side = 0; side < IW_SIDES; side++) {
         const iw_wheel_t *const wheel = &self->wheel[side];
-        if (iw_wheel_lost(wheel, now_us)) {
+        if (iw_wheel_lost(wheel, self->now_us)) {
             sides |= side_bit(side);
-            silent_ms = (wheel->heard_us == IW_NEVER) ? UINT32_MAX : whole_ms(now_us - wheel->heard_us);
+            silent_ms = (wheel->heard_us == IW_NEVER) ? UINT32_MAX : whole_ms(self->now_us - wheel->heard_us);
         }
     }
     if (sides != IW_SIDES_NONE) {
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_WHEEL_LOST, sides, silent_ms);
+        raise_cause(self, IW_CAUSE_WHEEL_LOST, sides, silent_ms);
     }
 }
 
 /// How long a setpoint has waited for its echo, if too long; else 0.
-static iw_time_us_t overdue_us(const iw_gateway_t *self, iw_time_us_t now_us) {
+IW_APART iw_time_us_t overdue_us(const iw_gateway_t *self) {
     const iw_time_us_t waiting_us = iw_confirmation_waiting_us(&self->sender.confirmation);
-    if (waiting_us == IW_NEVER || now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
+    if (waiting_us == IW_NEVER || self->now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
         return 0;
     }
-    return now_us - waiting_us;
+    return self->now_us - waiting_us;
 }
 
 static int ask_back(iw_gateway_t *self) {
@@ -240,12 +243,12 @@ static int ask_back(iw_gateway_t *self) {
 
 /// A missing echo latches. The zeros of that stop would wait behind the stuck frame, so the port is asked to purge it:
 /// once per stop, because a purge may take the link down. (IW_CAUSE_SEND_STALLED leaves nothing but zeros to send.)
-static void watch_echo(iw_gateway_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t waited_us = overdue_us(self, now_us);
+static void watch_echo(iw_gateway_t *self) {
+    const iw_time_us_t waited_us = overdue_us(self);
     if (waited_us == 0U) {
         return;
     }
-    raise_after(self, now_us, IW_CAUSE_SEND_STALLED, waited_us);
+    raise_after(self, IW_CAUSE_SEND_STALLED, waited_us);
     if (iw_permit_demand(&self->permit) != IW_DEMAND_SILENCE && self->purged_stop != self->permit.stop.number) {
         self->purged_stop = self->permit.stop.number;
         (void)ask_back(self);
@@ -256,7 +259,7 @@ static iw_ledger_item_t sign_item(size_t side) {
     return (side == IW_LEFT) ? IW_LEDGER_FEEDBACK_SIGN_LEFT : IW_LEDGER_FEEDBACK_SIGN_RIGHT;
 }
 
-static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, int32_t applied_mm_s) {
+static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
     static const uint8_t causes[IW_FOLLOW_VERDICTS] = {
         [IW_FOLLOW_SIGN] = IW_CAUSE_FEEDBACK_SIGN,
         [IW_FOLLOW_OVERSPEED] = IW_CAUSE_OVERSPEED,
@@ -265,59 +268,57 @@ static void watch_follow(iw_gateway_t *self, iw_time_us_t now_us, size_t side, i
     iw_follow_t *const follow = &self->follow[side];
     const iw_ledger_item_t item = sign_item(side);
     const int32_t measured_mm_s = self->wheel[side].speed_mm_s;
-    const iw_follow_verdict_t verdict = iw_follow_step(follow, now_us, applied_mm_s, measured_mm_s);
+    const iw_follow_verdict_t verdict = iw_follow_step(follow, self->now_us, applied_mm_s, measured_mm_s);
     // As at a positive command.
     const int32_t along_mm_s = (applied_mm_s < 0) ? -measured_mm_s : measured_mm_s;
     if (verdict != IW_FOLLOW_OK) {
-        iw_permit_raise(&self->permit, now_us, (iw_cause_t)causes[verdict], side_bit(side),
-                        (uint32_t)iw_magnitude(measured_mm_s));
+        raise_cause(self, (iw_cause_t)causes[verdict], side_bit(side), (uint32_t)iw_magnitude(measured_mm_s));
     }
     if (verdict == IW_FOLLOW_SIGN) {
         iw_ledger_contradict(&self->ledger, item, IW_EVIDENCE_BUS, along_mm_s);
     }
-    if (self->ledger.entry[item].state == IW_LEDGER_ASSUMED && iw_follow_sign_confirmed(follow, now_us)) {
+    if (self->ledger.entry[item].state == IW_LEDGER_ASSUMED && iw_follow_sign_confirmed(follow, self->now_us)) {
         iw_ledger_confirm(&self->ledger, item, IW_EVIDENCE_BUS, along_mm_s);
     }
 }
 
 /// Only while we command: a machine that is pushed by hand in LISTENING is faster than its command of zero. Asked for
 /// each wheel anew: what the left one did may have ended our command.
-static void watch_wheel(iw_gateway_t *self, iw_time_us_t now_us, size_t side, bool heard, int32_t applied_mm_s) {
+static void watch_wheel(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
     const iw_state_t state = iw_permit_state(&self->permit);
     const bool ours = state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
-    if (ours && heard) {
-        watch_follow(self, now_us, side, applied_mm_s);
+    if (ours && iw_wheel_heard(&self->wheel[side], self->now_us)) {
+        watch_follow(self, side, applied_mm_s);
     } else {
         iw_follow_restart(&self->follow[side]);
     }
 }
 
 /// How long both wheels have been at rest; 0: one turns.
-static uint32_t both_rest_us(const iw_gateway_t *self, iw_time_us_t now_us) {
-    const uint32_t left_us = iw_wheel_rest_us(&self->wheel[IW_LEFT], now_us);
-    const uint32_t right_us = iw_wheel_rest_us(&self->wheel[IW_RIGHT], now_us);
+static uint32_t both_rest_us(const iw_gateway_t *self) {
+    const uint32_t left_us = iw_wheel_rest_us(&self->wheel[IW_LEFT], self->now_us);
+    const uint32_t right_us = iw_wheel_rest_us(&self->wheel[IW_RIGHT], self->now_us);
     return (left_us < right_us) ? left_us : right_us;
 }
 
 /// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step. What several rules ask
 /// is found out once.
-static void judge(iw_gateway_t *self, iw_time_us_t now_us) {
+static void judge(iw_gateway_t *self) {
     iw_permit_view_t view;
-    const bool left = iw_wheel_heard(&self->wheel[IW_LEFT], now_us);
-    const bool right = iw_wheel_heard(&self->wheel[IW_RIGHT], now_us);
-    const uint32_t rest_us = (left && right) ? both_rest_us(self, now_us) : 0U;
-    view.heard = left && right;
+    view.heard =
+        iw_wheel_heard(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], self->now_us);
+    const uint32_t rest_us = view.heard ? both_rest_us(self) : 0U;
     view.applied = iw_setpoint_applied(&self->setpoint);
     // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {
         iw_permit_keep_present(&self->permit);
     } else {
-        watch_echo(self, now_us);
+        watch_echo(self);
         if (!view.heard) { // Who is heard is not lost.
-            watch_silence(self, now_us);
+            watch_silence(self);
         }
-        watch_wheel(self, now_us, IW_LEFT, left, view.applied.wheel[IW_LEFT].speed_mm_s);
-        watch_wheel(self, now_us, IW_RIGHT, right, view.applied.wheel[IW_RIGHT].speed_mm_s);
+        watch_wheel(self, IW_LEFT, view.applied.wheel[IW_LEFT].speed_mm_s);
+        watch_wheel(self, IW_RIGHT, view.applied.wheel[IW_RIGHT].speed_mm_s);
     }
     view.at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
     view.settled = rest_us >= IW_PERMIT_SETTLED_US;
@@ -328,24 +329,24 @@ static void judge(iw_gateway_t *self, iw_time_us_t now_us) {
     // Sent at or after the request: the echo of an older zero pair does not arm.
     view.proven = iw_permit_arming(&self->permit) &&
                   iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;
-    iw_permit_step(&self->permit, now_us, &view);
+    iw_permit_step(&self->permit, self->now_us, &view);
 }
 
 /// Takes the pair that is due and sends it. R5 (both or none): a pair of which one frame was not taken is
 /// followed by zeros for both wheels.
-static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
+static iw_send_result_t send_pair(iw_gateway_t *self) {
     iw_pair_t pair;
-    if (!iw_setpoint_due(&self->setpoint, now_us)) {
+    if (!iw_setpoint_due(&self->setpoint, self->now_us)) {
         return IW_SEND_DONE;
     }
     const bool zero = iw_setpoint_next_is_zero(&self->setpoint);
     if (!iw_sender_ready(&self->sender, zero)) {
         return IW_SEND_DONE;
     }
-    iw_setpoint_take(&self->setpoint, now_us, &pair);
-    const iw_send_result_t result = iw_sender_send(&self->sender, now_us, &pair, zero);
+    iw_setpoint_take(&self->setpoint, self->now_us, &pair);
+    const iw_send_result_t result = iw_sender_send(&self->sender, self->now_us, &pair, zero);
     if (result == IW_SEND_LATER) {
-        iw_setpoint_collapse(&self->setpoint, now_us);
+        iw_setpoint_collapse(&self->setpoint, self->now_us);
     }
     return result;
 }
@@ -354,38 +355,38 @@ static iw_send_result_t send_pair(iw_gateway_t *self, iw_time_us_t now_us) {
 /// a wheel gets power, and then moves it (fault 18). It is purged, or reported as `left_behind`: whether or not a wheel is
 /// heard, since it is stuck exactly when no wheel has power to acknowledge it. An echo may still come late (`echo_ms`)
 /// or stand in the backlog, so neither case counts as stuck yet.
-static void keep_silent(iw_gateway_t *self, iw_time_us_t now_us) {
-    if (overdue_us(self, now_us) == 0U) {
+static void keep_silent(iw_gateway_t *self) {
+    if (overdue_us(self) == 0U) {
         self->left_behind = false;
         return;
     }
     const bool again = self->purged_us != IW_NEVER;
-    if (self->backlog || (again && now_us - self->purged_us < IW_GATEWAY_LOST_ECHO_US)) {
+    if (self->backlog || (again && self->now_us - self->purged_us < IW_GATEWAY_LOST_ECHO_US)) {
         return;
     }
     const bool was_left = self->left_behind;
     const int answer = ask_back(self);
-    self->purged_us = now_us;
+    self->purged_us = self->now_us;
     self->left_behind = answer < 0 || (answer == 0 && again);
     self->counters.left_behind += (self->left_behind && !was_left) ? 1U : 0U;
 }
 
 /// Sends what is due under the permission's demand.
-static void send_due(iw_gateway_t *self, iw_time_us_t now_us) {
+static void send_due(iw_gateway_t *self) {
     const iw_demand_t demand = iw_permit_demand(&self->permit);
-    iw_setpoint_demand(&self->setpoint, now_us, demand);
+    iw_setpoint_demand(&self->setpoint, self->now_us, demand);
     if (demand == IW_DEMAND_SILENCE) {
         iw_sender_rest(&self->sender);
-        keep_silent(self, now_us);
+        keep_silent(self);
         return;
     }
     // Nothing is left behind either: arm was refused until it was gone.
     self->purged_us = IW_NEVER;
-    if (self->bus >= IW_BUS_PASSIVE && send_pair(self, now_us) == IW_SEND_STOPPED) {
+    if (self->bus >= IW_BUS_PASSIVE && send_pair(self) == IW_SEND_STOPPED) {
         // R12: scheduler and envelope disagree, so one of them is wrong. Zeros leave in this very step.
-        iw_permit_raise(&self->permit, now_us, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
-        iw_setpoint_demand(&self->setpoint, now_us, iw_permit_demand(&self->permit));
-        (void)send_pair(self, now_us);
+        raise_cause(self, IW_CAUSE_INTERNAL, IW_SIDES_NONE, (uint32_t)self->sender.verdict);
+        iw_setpoint_demand(&self->setpoint, self->now_us, iw_permit_demand(&self->permit));
+        (void)send_pair(self);
     }
 }
 
@@ -394,28 +395,29 @@ static iw_time_us_t sooner(iw_time_us_t a, iw_time_us_t b) {
 }
 
 /// When to call again: not later than one period from now.
-static iw_time_us_t next_step_us(const iw_gateway_t *self, iw_time_us_t now_us) {
+static iw_time_us_t next_step_us(const iw_gateway_t *self) {
     const iw_time_us_t due_us = iw_setpoint_next_us(&self->setpoint);
     iw_time_us_t next_us =
-        sooner(now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));
+        sooner(self->now_us + (iw_time_us_t)self->config.period_ms * IW_US_PER_MS, iw_permit_next_us(&self->permit));
     if (self->backlog) {
-        return now_us;
+        return self->now_us;
     }
     // A pair that is overdue could not be sent (no echo yet, bus down): asking to be called at once would be a busy
     // loop.
-    if (due_us > now_us) {
+    if (due_us > self->now_us) {
         next_us = sooner(next_us, due_us);
     }
-    return (next_us > now_us) ? next_us : now_us;
+    return (next_us > self->now_us) ? next_us : self->now_us;
 }
 
 /// The order is a rule: what is received is drained before any age is judged (R7), and everything is judged
 /// before anything is sent, so that a fault of this step stops this step's pair.
 iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
-    begin(self, now_us);
-    receive(self, now_us);
-    judge(self, now_us);
-    send_due(self, now_us);
-    self->promised_us = next_step_us(self, now_us);
+    self->now_us = now_us;
+    begin(self);
+    receive(self);
+    judge(self);
+    send_due(self);
+    self->promised_us = next_step_us(self);
     return self->promised_us;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iwheel/private/wheel.h"
 
+#include "magnitude.h"
+
 #include <string.h>
 
 /// 2 pi / 60 in millionths: nanometres of circumference per tick (or of speed per rpm) and millimetre of radius.
@@ -64,7 +66,7 @@ static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_spe
     const bool gap = !iw_wheel_heard(self, now_us);
     self->speed_mm_s = (self->config->invert[self->side] ? -speed_um_s : speed_um_s) / 1000;
     self->speed_us = now_us;
-    if (speed->speed_rpm > rest_rpm || speed->speed_rpm < -rest_rpm) {
+    if (iw_magnitude(speed->speed_rpm) > rest_rpm) {
         self->rest_since_us = IW_NEVER;
     } else if (fresh && (gap || self->rest_since_us == IW_NEVER)) {
         self->rest_since_us = now_us;

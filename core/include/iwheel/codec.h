@@ -141,6 +141,9 @@ typedef struct {
 /// A row of that kind: what it says of length and period holds for both wheels.
 const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind);
 
+/// The least length of that kind of message.
+uint8_t iw_codec_length(iw_codec_kind_t kind);
+
 /// The row of a number of 11 bits; NULL if it is not one of the eleven.
 const iw_codec_row_t *iw_codec_find(uint32_t id);
 

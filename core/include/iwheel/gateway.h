@@ -71,6 +71,7 @@ typedef struct iw_gateway {
     uint32_t purged_stop;            ///< Number of the stop in whose zeros a purge was tried.
     iw_hal_t hal;                    ///< Copied at init.
     iw_config_t config;              ///< Copied at init.
+    iw_time_us_t now_us;             ///< Of the present step.
     iw_time_us_t promised_us;        ///< When the last step asked to be called again.
     iw_time_us_t suspended_us;       ///< Reported by `iw_gateway_suspended` since the last step.
     iw_time_us_t stalled_since_us;   ///< When the first of an unbroken run of stalled steps was due.
