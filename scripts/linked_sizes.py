@@ -18,7 +18,7 @@ EVIDENCE = "iw_motion_evidence_init iw_motion_evidence_look"
 USES = {
     "codec": ("codec.h", CODEC, 350),
     "codec, setpoints, force": ("codec.h force_offset.h private/setpoint.h", f"{CODEC} {SETPOINT} {FORCE}", 3276),
-    "gateway": ("gateway.h", GATEWAY, 11980),
+    "gateway": ("gateway.h", GATEWAY, 11040),
     "gateway, snapshot": ("gateway.h", f"{GATEWAY} iw_gateway_snapshot", None),
     "all": ("gateway.h evidence.h", f"{GATEWAY} {KNOWN} iw_gateway_snapshot {EVIDENCE}", None),
 }

@@ -125,7 +125,7 @@ static iw_codec_kind_t read_offset(const iw_can_frame_t *frame, uint32_t length,
 
 /// Any message but a good speed, the most frequent first. Kept apart, so that four frames of five save no registers; it
 /// is given both wheels, so that those four need no pointer to theirs before they are known to be good.
-IW_APART iw_codec_kind_t read_other(const iw_can_frame_t *frame, iw_codec_wheel_t *wheel) {
+static IW_APART iw_codec_kind_t read_other(const iw_can_frame_t *frame, iw_codec_wheel_t *wheel) {
     iw_codec_wheel_t *const self = &wheel[iw_codec_side(frame->id)];
     const uint32_t number = frame->id & ~(FORMAT_BITS | SIDE_BIT);
     // With a format bit in the length no length fits: a remote or extended frame with a known number is found and

@@ -62,14 +62,14 @@ void iw_confirmation_echo(iw_confirmation_t *self, iw_side_t side, const iw_can_
     self->waiting_us[side] = (self->pending[side] > 0U) ? self->sent_us[side][0] : IW_NEVER;
 }
 
-static iw_time_us_t earlier(const iw_time_us_t *times) {
-    return (times[IW_LEFT] < times[IW_RIGHT]) ? times[IW_LEFT] : times[IW_RIGHT];
-}
-
 iw_time_us_t iw_confirmation_proven_us(const iw_confirmation_t *self) {
-    return earlier(self->proven_us);
+    const iw_time_us_t left = self->proven_us[IW_LEFT];
+    const iw_time_us_t right = self->proven_us[IW_RIGHT];
+    return (left < right) ? left : right;
 }
 
 iw_time_us_t iw_confirmation_waiting_us(const iw_confirmation_t *self) {
-    return earlier(self->waiting_us);
+    const iw_time_us_t left = self->waiting_us[IW_LEFT];
+    const iw_time_us_t right = self->waiting_us[IW_RIGHT];
+    return (left < right) ? left : right;
 }

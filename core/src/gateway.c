@@ -72,7 +72,7 @@ iw_refusal_t iw_gateway_arm(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t
 }
 
 /// Scales both values by one factor, so that the larger is `limit`: the curve stays the same. True if they had to be.
-IW_APART bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
+static IW_APART bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
     const int32_t left = iw_magnitude(values[IW_LEFT]);
     const int32_t right = iw_magnitude(values[IW_RIGHT]);
     const int32_t largest = (left > right) ? left : right;

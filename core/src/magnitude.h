@@ -7,9 +7,9 @@
 
 /// A function that is kept once: compilers put what is short wherever it is called, also where that makes more of it.
 #ifdef __GNUC__
-#define IW_APART __attribute__((noinline)) static
+#define IW_APART __attribute__((noinline))
 #else
-#define IW_APART static
+#define IW_APART
 #endif
 
 /// |value| for values whose negation fits: everything here is far from INT32_MIN.

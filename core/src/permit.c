@@ -85,7 +85,7 @@ static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us)
 }
 
 /// R3: a joystick that is still deflected at arm or reset must not set the machine in motion.
-IW_APART bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
+static IW_APART bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
     return self->stale_us != IW_NEVER && now_us - self->stale_us < IW_STALE_COMMAND_US;
 }
 

@@ -114,7 +114,7 @@ static uint32_t fraction_of(uint32_t part, uint32_t whole) {
 }
 
 /// slope x time in thousandths of the slope's unit, for at most a second.
-IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
+static IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
     return slope * (us / 1000U) + slope * (us % 1000U) / 1000U;
 }
 
@@ -134,7 +134,7 @@ static void plan(axis_t *axis, int32_t target, uint32_t away, uint32_t towards) 
 
 /// A speed step as the same share of the maximum current. `step` is at most 20 m/s, the steepest slope for a second: 32
 /// bits suffice.
-IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) {
+static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) {
     const uint32_t speed = config->max_speed_mm_s;
     return step / speed * config->max_current_mA + step % speed * config->max_current_mA / speed;
 }
@@ -155,7 +155,7 @@ static void advance_together(const axis_t *axes, size_t count) {
 }
 
 /// True if this wheel's speed and current are where they should be.
-IW_APART bool arrived(const iw_setpoint_t *self, iw_side_t side) {
+static IW_APART bool arrived(const iw_setpoint_t *self, iw_side_t side) {
     const iw_command_t *const target = &self->target.wheel[side];
     const bool ramps_current = self->config->current_role == IW_ROLE_SETPOINT;
     return self->speed_um_s[side] == target->speed_mm_s * 1000 &&

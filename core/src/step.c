@@ -7,7 +7,7 @@
 #define ESTOP_PRESSED    1U
 #define ESTOP_UNREADABLE 2U
 
-IW_APART uint32_t whole_ms(iw_time_us_t span_us) {
+static IW_APART uint32_t whole_ms(iw_time_us_t span_us) {
     return (span_us < UINT32_MAX) ? (uint32_t)span_us / IW_US_PER_MS : UINT32_MAX / IW_US_PER_MS;
 }
 
@@ -227,7 +227,7 @@ static void watch_silence(iw_gateway_t *self) {
 }
 
 /// How long a setpoint has waited for its echo, if too long; else 0.
-IW_APART iw_time_us_t overdue_us(const iw_gateway_t *self) {
+static IW_APART iw_time_us_t overdue_us(const iw_gateway_t *self) {
     const iw_time_us_t waiting_us = iw_confirmation_waiting_us(&self->sender.confirmation);
     if (waiting_us == IW_NEVER || self->now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
         return 0;
