@@ -27,6 +27,10 @@ const iw_cause_row_t iw_cause_rows[IW_CAUSES] = {
     [IW_CAUSE_RESTART] = {IW_STOPS, false, true, IW_REFUSE_CAUSE_PRESENT},
 };
 
+/// Those that latch: they come first in iw_cause_t.
+#define FIRST IW_CAUSE_ESTOP_LINE
+#define LAST  IW_CAUSE_INTERNAL
+
 bool iw_cause_latches(iw_cause_t cause) {
     return iw_cause_rows[cause].effect != IW_STOPS;
 }
@@ -37,11 +41,10 @@ static bool seen_lately(iw_time_us_t now_us, iw_time_us_t seen_us) {
 
 uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us) {
     uint32_t present = 0;
-    for (uint32_t cause = IW_CAUSE_NONE; cause < IW_CAUSES; cause++) {
-        const iw_cause_row_t *const row = &iw_cause_rows[cause];
+    for (uint32_t cause = FIRST; cause <= LAST; cause++) {
         const uint32_t bit = IW_CAUSE_BIT(cause);
-        const bool is = row->level ? (told & bit) != 0U : seen_lately(now_us, seen_us[cause]);
-        present |= (is && row->effect != (uint8_t)IW_STOPS) ? bit : 0U;
+        const bool is = iw_cause_rows[cause].level ? (told & bit) != 0U : seen_lately(now_us, seen_us[cause]);
+        present |= is ? bit : 0U;
     }
     return present;
 }
@@ -49,9 +52,10 @@ uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], 
 /// Of several at once the first one refuses: iw_cause_t has first what explains those behind it (a bus that is down also
 /// loses echoes and wheels).
 iw_refusal_t iw_cause_refusal(uint32_t present) {
-    uint32_t cause = IW_CAUSE_NONE;
-    while (cause < IW_CAUSES && (present & IW_CAUSE_BIT(cause)) == 0U) {
-        cause++;
+    for (uint32_t cause = FIRST; cause <= LAST; cause++) {
+        if ((present & IW_CAUSE_BIT(cause)) != 0U) {
+            return (iw_refusal_t)iw_cause_rows[cause].refusal;
+        }
     }
-    return (cause < IW_CAUSES) ? (iw_refusal_t)iw_cause_rows[cause].refusal : IW_REFUSE_NONE;
+    return IW_REFUSE_NONE;
 }

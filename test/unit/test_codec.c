@@ -171,6 +171,7 @@ static void test_row_has_the_length_that_the_decoder_wants_and_the_encoder_gives
         iw_can_frame_t frame;
         TEST_ASSERT_EQUAL_INT(IW_OK, iw_codec_encode((iw_codec_kind_t)row->kind, (iw_side_t)row->side, &zero, &frame));
         TEST_ASSERT_EQUAL_UINT8(row->length, frame.dlc);
+        TEST_ASSERT_EQUAL_UINT8(row->length, iw_codec_length((iw_codec_kind_t)row->kind));
         TEST_ASSERT_EQUAL_INT(row->kind, iw_codec_decode(&frame, told));
         frame.dlc--;
         TEST_ASSERT_EQUAL_INT(IW_CODEC_BAD_LENGTH, iw_codec_decode(&frame, told));

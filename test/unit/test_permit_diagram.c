@@ -324,6 +324,7 @@ static void test_permit_cause_latches_what_is_armed_if_and_only_if_it_says_so(vo
         permit_rig_raise(&rig, (iw_cause_t)cause);
         const bool latched = iw_permit_state(&rig.permit) == IW_STATE_LATCHED;
         TEST_ASSERT_EQUAL_INT_MESSAGE(iw_cause_latches((iw_cause_t)cause), latched, what);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(cause <= IW_CAUSE_INTERNAL, latched, what); // They come first.
         TEST_ASSERT_EQUAL_INT_MESSAGE(latched ? IW_PHASE_CUT : IW_PHASE_BRAKING, rig.permit.phase, what);
         latching += latched ? 1U : 0U;
     }
