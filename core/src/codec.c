@@ -35,11 +35,6 @@ iw_side_t iw_codec_side(uint32_t id) {
     return ((id & SIDE_BIT) == 0U) ? IW_LEFT : IW_RIGHT;
 }
 
-/// Two rows per kind, in the order of the enumeration; the pose, which only the right wheel sends, is the last.
-const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind) {
-    return &iw_codec_rows[(size_t)2 * (size_t)kind];
-}
-
 uint8_t iw_codec_length(iw_codec_kind_t kind) {
     static const uint8_t lengths[IW_CODEC_KINDS] = {
         [IW_CODEC_SPEED] = IW_DLC_SPEED,   [IW_CODEC_STATUS] = IW_DLC_STATUS,     [IW_CODEC_FORCE] = IW_DLC_FORCE,

@@ -294,7 +294,7 @@ static void watch_wheel(iw_gateway_t *self, size_t side, int32_t applied_mm_s) {
     }
 }
 
-/// How long both wheels have been at rest; 0: one turns.
+/// How long both wheels have been at rest; 0: one turns, or is not heard.
 static uint32_t both_rest_us(const iw_gateway_t *self) {
     const uint32_t left_us = iw_wheel_rest_us(&self->wheel[IW_LEFT], self->now_us);
     const uint32_t right_us = iw_wheel_rest_us(&self->wheel[IW_RIGHT], self->now_us);
@@ -307,7 +307,7 @@ static void judge(iw_gateway_t *self) {
     iw_permit_view_t view;
     view.heard =
         iw_wheel_heard(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], self->now_us);
-    const uint32_t rest_us = view.heard ? both_rest_us(self) : 0U;
+    const uint32_t rest_us = both_rest_us(self);
     view.applied = iw_setpoint_applied(&self->setpoint);
     // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {

@@ -138,9 +138,6 @@ typedef struct {
     iw_codec_offset_t offset;     ///< In the first 60 s of its run.
 } iw_codec_wheel_t;
 
-/// A row of that kind: what it says of length and period holds for both wheels.
-const iw_codec_row_t *iw_codec_row(iw_codec_kind_t kind);
-
 /// The least length of that kind of message.
 uint8_t iw_codec_length(iw_codec_kind_t kind);
 
