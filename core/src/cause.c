@@ -49,8 +49,8 @@ uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], 
     return present;
 }
 
-/// Of several at once the first one refuses: iw_cause_t has first what explains those behind it (a bus that is down also
-/// loses echoes and wheels).
+/// Of several at once the first one refuses: iw_cause_t has first what explains those behind it (a bus that is down
+/// also loses echoes and wheels).
 iw_refusal_t iw_cause_refusal(uint32_t present) {
     for (uint32_t cause = FIRST; cause <= LAST; cause++) {
         if ((present & IW_CAUSE_BIT(cause)) != 0U) {

@@ -81,8 +81,8 @@ typedef enum {
     IW_DEMAND_FOLLOW,      ///< Ramp to the client's command.
 } iw_demand_t;
 
-/// Why the wheels were stopped. `iw_stop_t::detail` is given with each. Those that latch come first; of several that are
-/// present the first one refuses arm and reset.
+/// Why the wheels were stopped. `iw_stop_t::detail` is given with each. Those that latch come first; of several that
+/// are present the first one refuses arm and reset.
 typedef enum {
     IW_CAUSE_NONE = 0,
     IW_CAUSE_ESTOP_LINE,     ///< Pressed, an edge, or unreadable. Detail: 1 pressed or edge, 2 unreadable.
