@@ -353,8 +353,8 @@ static iw_send_result_t send_pair(iw_gateway_t *self) {
 
 /// While nothing is sent, no old setpoint may wait in a controller either: unacknowledged, it is repeated there until
 /// a wheel gets power, and then moves it (fault 18). It is purged, or reported as `left_behind`: whether or not a wheel
-/// is heard, since it is stuck exactly when no wheel has power to acknowledge it. An echo may still come late (`echo_ms`)
-/// or stand in the backlog, so neither case counts as stuck yet.
+/// is heard, since it is stuck exactly when no wheel has power to acknowledge it. An echo may still come late
+/// (`echo_ms`) or stand in the backlog, so neither case counts as stuck yet.
 static void keep_silent(iw_gateway_t *self) {
     if (overdue_us(self) == 0U) {
         self->left_behind = false;
