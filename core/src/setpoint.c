@@ -18,7 +18,7 @@ typedef struct {
     uint32_t fraction;
 } axis_t;
 
-/// A speed and a current for each wheel, at the most.
+/// A speed and a current for each wheel.
 #define AXES ((size_t)2 * IW_SIDES)
 
 /// The command is zero from now on.
@@ -140,14 +140,14 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
 }
 
 /// Moves all quantities by one common share of their ways; braking ones do not wait for accelerating ones.
-static void advance_together(const axis_t *axes, size_t count) {
+static void advance_together(const axis_t *axes) {
     uint32_t braking = FRACTION_ONE;
     uint32_t all = FRACTION_ONE;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < AXES; i++) {
         all = (axes[i].fraction < all) ? axes[i].fraction : all;
         braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
     }
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < AXES; i++) {
         const int64_t share = axes[i].braking ? braking : all;
         const int32_t way = axes[i].aim - *axes[i].value;
         *axes[i].value += (int32_t)(share * way / (int64_t)FRACTION_ONE);
@@ -170,20 +170,17 @@ static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us) {
     const uint32_t away = ramp_step(config->accel_mm_s2, (us < granted_us) ? us : granted_us);
     const uint32_t towards = ramp_step(config->decel_mm_s2, us);
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
+    const uint32_t current_away = ramps_current ? current_step(config, away) : 0U;
+    const uint32_t current_towards = ramps_current ? current_step(config, towards) : 0U;
     axis_t axes[AXES];
-    size_t count = 0;
     for (size_t side = 0; side < IW_SIDES; side++) {
         const iw_command_t *const target = &self->target.wheel[side];
-        axes[count].value = &self->speed_um_s[side];
-        plan(&axes[count], target->speed_mm_s * 1000, away, towards);
-        count++;
-        if (ramps_current) {
-            axes[count].value = &self->current_uA[side];
-            plan(&axes[count], target->current_mA * 1000, current_step(config, away), current_step(config, towards));
-            count++;
-        }
+        axes[2U * side].value = &self->speed_um_s[side];
+        axes[2U * side + 1U].value = &self->current_uA[side];
+        plan(&axes[2U * side], target->speed_mm_s * 1000, away, towards);
+        plan(&axes[2U * side + 1U], ramps_current ? target->current_mA * 1000 : 0, current_away, current_towards);
     }
-    advance_together(axes, count);
+    advance_together(axes);
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {

@@ -279,6 +279,7 @@ int main(void) {
     iw_config_t config;
     calculate();
     any_config(&config);
+    (void)iw_config_stop_budget(&config);
     now_us = any_time();
     if (iw_gateway_init(&gateway, &config, &hal, now_us, any_bool()) != IW_CONFIG_OK) {
         return 1;
