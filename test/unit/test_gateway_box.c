@@ -2,6 +2,7 @@
 #include "box/box.h"
 #include "config/gateway_config.h"
 #include "disk/box_files.h"
+#include "process/log.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -173,6 +174,37 @@ static void test_directory_that_cannot_be_is_told_at_once_and_with_each_stop(voi
     record("estop_line", ENOENT);
 }
 
+/// What is told of the next result, into `text`.
+static void told(const char *cause, char *text, size_t size) {
+    FILE *file = tmpfile();
+    gw_log_t log = {.program = "test", .credit = 10, .fd = fileno(file), .level = GW_LOG_INFO};
+    struct pollfd entry = {.fd = box.writer.fd, .events = POLLIN};
+    if (cause != NULL) {
+        const gw_box_order_t order = stopped(cause);
+        TEST_ASSERT_TRUE(gw_box_write(&box, &order));
+    }
+    TEST_ASSERT_EQUAL(1, poll(&entry, 1, 10000));
+    gw_record_take(&box, &log);
+    rewind(file);
+    text[fread(text, 1, size - 1U, file)] = '\0';
+    (void)fclose(file);
+}
+
+static void test_what_became_of_a_recording_is_told_in_words(void) {
+    char text[1024];
+    start();
+    told("estop_line", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop 3 is recorded in "), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop-000001-estop_line.log (10 frames, "), text);
+    gw_box_close(&box);
+    (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
+    start();
+    told(NULL, text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "no recording can be written to "), text);
+    told("estop_line", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop 3 is not recorded in "), text);
+}
+
 static void test_directory_that_appears_later_is_used(void) {
     char command[160];
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/folder", folder);
@@ -268,6 +300,7 @@ int main(void) {
     RUN_TEST(test_next_recording_has_the_next_number_also_after_a_restart);
     RUN_TEST(test_many_stops_keep_the_newest_and_touch_nothing_else);
     RUN_TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop);
+    RUN_TEST(test_what_became_of_a_recording_is_told_in_words);
     RUN_TEST(test_directory_that_appears_later_is_used);
     RUN_TEST(test_oldest_is_dropped_only_below_the_number);
     RUN_TEST(test_frozen_writer_never_blocks_the_gateway);
