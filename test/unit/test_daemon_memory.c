@@ -144,6 +144,15 @@ static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only
     TEST_ASSERT_NOT_EQUAL(4321, daemon_rig.daemon->wheels.core.force[IW_RIGHT].offset_mN);
 }
 
+static void test_memory_offset_of_an_earlier_run_keeps_its_time(void) {
+    store_offset(IW_LEFT, IW_FORCE_CN, 4321);
+    tell_stored();
+    daemon_rig_run(3000);
+    const gw_known_offset_t *kept = &daemon_rig.daemon->knowledge.known.offset[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT32(4321, kept->offset_mN);
+    TEST_ASSERT_EQUAL_INT64(1700000000000000, kept->wall_us);
+}
+
 static void test_memory_of_a_tare_has_the_figures_of_that_wheel(void) {
     daemon_rig_run(3000);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
@@ -316,6 +325,7 @@ int main(void) {
     RUN_TEST(test_memory_contradiction_stays_one);
     RUN_TEST(test_memory_contradiction_of_this_run_is_not_talked_over);
     RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
+    RUN_TEST(test_memory_offset_of_an_earlier_run_keeps_its_time);
     RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
     RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
     RUN_TEST(test_status_after_a_change_of_an_item_is_as_written_anew);

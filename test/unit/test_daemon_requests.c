@@ -322,6 +322,31 @@ static void test_reader_that_has_ended_leaves_nobody_waiting(void) {
     }
 }
 
+static void test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept(void) {
+    daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
+    daemon_rig.daemon->config.core.setpoint_type_set = false;
+    assert_reply("{\"cmd\":\"confirm\",\"item\":\"setpoint_type\"}", "\"error\":\"type_not_set\"");
+    assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"how\":\"x\"}", "\"ok\":true");
+    assert_reply("{\"cmd\":\"status\"}", "\"how\":\"x\"");
+}
+
+static void test_zero_that_changes_is_told_to_who_watches_the_force(void) {
+    daemon_rig_run(3000);
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":1}", "\"ok\":true");
+    (void)events_waiting("force");
+    static const char line[] = "{\"cmd\":\"tare\",\"side\":\"right\"}\n";
+    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    daemon_rig_run(60);
+    static char text[8192];
+    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
+    text[size] = '\0';
+    const char *told = strstr(text, "\"event\":\"offset\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"side\":\"right\",\"offset_mN\":"), told);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"provenance\":\"operator\",\"before_mN\":"), told);
+}
+
 /// Answers of the port that have changed, told again and again: they are news once.
 static void test_facts_of_the_bus_are_taken_once_for_each_change(void) {
     daemon_rig.link.changes++;
@@ -364,6 +389,8 @@ int main(void) {
     RUN_TEST(test_lease_runs_from_the_command_and_not_from_the_look_before_it);
     RUN_TEST(test_answer_to_arm_comes_without_waiting_for_the_next_period);
     RUN_TEST(test_reader_that_has_ended_leaves_nobody_waiting);
+    RUN_TEST(test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept);
+    RUN_TEST(test_zero_that_changes_is_told_to_who_watches_the_force);
     RUN_TEST(test_facts_of_the_bus_are_taken_once_for_each_change);
     return UNITY_END();
 }

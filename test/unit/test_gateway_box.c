@@ -129,6 +129,31 @@ static void test_stop_is_written_as_frames_events_and_configuration(void) {
     TEST_ASSERT_EQUAL_STRING(CONFIG, text);
 }
 
+static void test_what_happens_after_the_stop_is_written_too(void) {
+    char text[8192];
+    start();
+    const gw_box_order_t order = stopped("estop_line");
+    const blackbox_entry_t frame = {.at_us = order.note.stop.at_us + 1000U, .kind = BLACKBOX_FRAME, .number = 257, .a = 4};
+    const blackbox_entry_t state = {.at_us = order.note.stop.at_us + 2000U,
+                                    .kind = BLACKBOX_STATE,
+                                    .number = 5,
+                                    .a = IW_STATE_LATCHED,
+                                    .b = IW_STATE_ARMED,
+                                    .as = {.drive = {.speed_mm_s = {12, -34}}}};
+    blackbox_ring_put(box.ring, &frame);
+    blackbox_ring_put(box.ring, &state);
+    TEST_ASSERT_TRUE(gw_box_write(&box, &order));
+    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(11, box.last.frames);
+    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"bus\":\"can0\""), text);
+    const char *told = strstr(text, "{\"type\":\"state\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"state\":\"latched\""), told);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"applied_left_mm_s\":12,"), told);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"applied_right_mm_s\":-34"), told);
+}
+
 static void test_what_is_older_than_blackbox_s_is_left_out(void) {
     start();
     const blackbox_entry_t old = {.at_us = 1, .kind = BLACKBOX_FRAME, .number = 0x7FF};
@@ -296,6 +321,7 @@ static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_stop_is_written_as_frames_events_and_configuration);
+    RUN_TEST(test_what_happens_after_the_stop_is_written_too);
     RUN_TEST(test_what_is_older_than_blackbox_s_is_left_out);
     RUN_TEST(test_next_recording_has_the_next_number_also_after_a_restart);
     RUN_TEST(test_many_stops_keep_the_newest_and_touch_nothing_else);
