@@ -235,6 +235,38 @@ static void change_item(iw_ledger_item_t item) {
     expect_new_status("as if it had never been asked");
 }
 
+static void test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before(void) {
+    gw_knowledge_t *knowledge = &daemon_rig.daemon->knowledge;
+    knowledge->write_us = 0;
+    daemon_rig_run(3000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\"}"), "\"ok\":true"));
+    daemon_rig_run(1500);
+    const unsigned before = writes;
+    knowledge->keeper.waits = true;
+    news = GW_KEEPER_FAILED;
+    daemon_rig_run(50);
+    knowledge->keeper.waits = false;
+    TEST_ASSERT_EQUAL_INT(GW_MEMORY_FAILED, knowledge->state);
+    daemon_rig_run(GW_KNOWLEDGE_RETRY_US / IW_US_PER_MS - 200U);
+    TEST_ASSERT_EQUAL_UINT(before, writes);
+    daemon_rig_run(400);
+    TEST_ASSERT_EQUAL_UINT(before + 1U, writes);
+}
+
+static void test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus(void) {
+    gw_knowledge_t *knowledge = &daemon_rig.daemon->knowledge;
+    const iw_ledger_item_t item = IW_LEDGER_GEAR_RATIO;
+    (void)snprintf(knowledge->known.item[item].word.found, IWN_VALUE_SIZE, "27/2");
+    iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
+    iw_ledger_entry_t assumed[IW_LEDGER_ITEMS];
+    memcpy(assumed, seen.assumed, sizeof assumed);
+    assumed[item] = (iw_ledger_entry_t){.state = IW_LEDGER_CONFIRMED, .evidence = IW_EVIDENCE_BUS, .figure = 1000};
+    seen.assumed = assumed;
+    seen.assumed_changes++;
+    gw_knowledge_observe(knowledge, &seen);
+    TEST_ASSERT_EQUAL_STRING("", knowledge->known.item[item].word.found);
+}
+
 static void test_status_after_a_change_of_an_item_is_as_written_anew(void) {
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         change_item((iw_ledger_item_t)item);
@@ -328,6 +360,8 @@ int main(void) {
     RUN_TEST(test_memory_offset_of_an_earlier_run_keeps_its_time);
     RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
     RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
+    RUN_TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before);
+    RUN_TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus);
     RUN_TEST(test_status_after_a_change_of_an_item_is_as_written_anew);
     RUN_TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew);
     RUN_TEST(test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew);

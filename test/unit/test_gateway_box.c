@@ -269,6 +269,16 @@ static void test_frozen_writer_never_blocks_the_gateway(void) {
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
 }
 
+static void test_writer_outlives_what_a_terminal_or_a_service_sends_to_all(void) {
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    start();
+    record("estop_line", 0); // It has begun.
+    for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++) {
+        TEST_ASSERT_EQUAL(0, kill(box.writer.pid, signals[i]));
+        record("estop_line", 0);
+    }
+}
+
 static void test_killed_writer_is_noticed_and_started_again_later(void) {
     start();
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
@@ -330,6 +340,7 @@ int main(void) {
     RUN_TEST(test_directory_that_appears_later_is_used);
     RUN_TEST(test_oldest_is_dropped_only_below_the_number);
     RUN_TEST(test_frozen_writer_never_blocks_the_gateway);
+    RUN_TEST(test_writer_outlives_what_a_terminal_or_a_service_sends_to_all);
     RUN_TEST(test_killed_writer_is_noticed_and_started_again_later);
     RUN_TEST(test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not);
     RUN_TEST(test_without_seconds_there_is_no_writer_but_a_small_ring);
