@@ -253,6 +253,17 @@ static void test_memory_that_could_not_be_written_is_written_again_after_its_tim
     TEST_ASSERT_EQUAL_UINT(before + 1U, writes);
 }
 
+static void test_memory_keeps_the_offset_that_a_wheel_has_sent(void) {
+    iw_force_t *force = &daemon_rig.daemon->wheels.core.force[IW_LEFT];
+    force->provenance = IW_OFFSET_WHEEL;
+    force->offset_us = daemon_rig.now_us;
+    force->offset_mN = 1200;
+    observe();
+    const gw_known_offset_t *kept = &daemon_rig.daemon->knowledge.known.offset[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, kept->from);
+    TEST_ASSERT_EQUAL_INT32(1200, kept->offset_mN);
+}
+
 static void test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus(void) {
     gw_knowledge_t *knowledge = &daemon_rig.daemon->knowledge;
     const iw_ledger_item_t item = IW_LEDGER_GEAR_RATIO;
@@ -361,6 +372,7 @@ int main(void) {
     RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
     RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
     RUN_TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before);
+    RUN_TEST(test_memory_keeps_the_offset_that_a_wheel_has_sent);
     RUN_TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus);
     RUN_TEST(test_status_after_a_change_of_an_item_is_as_written_anew);
     RUN_TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew);

@@ -347,6 +347,30 @@ static void test_zero_that_changes_is_told_to_who_watches_the_force(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"provenance\":\"operator\",\"before_mN\":"), told);
 }
 
+static void test_stop_names_the_client_that_asked_for_it(void) {
+    assert_reply("{\"cmd\":\"arm\",\"name\":\"joystick\"}", "\"ok\":true");
+    daemon_rig_drive(client, 100, 100, 200);
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+    assert_reply("{\"cmd\":\"why\"}", "joystick");
+}
+
+static void test_wheel_that_goes_on_turning_is_told_once_and_whole(void) {
+    gw_daemon_t *daemon = daemon_rig.daemon;
+    static char text[8192];
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
+    iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
+    seen.still_moving++;
+    gw_observe(&daemon->status, &seen);
+    gw_observe(&daemon->status, &seen);
+    gw_service_flush(&daemon->clients, IW_CLIENT_NONE);
+    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
+    text[size] = '\0';
+    const char *told = strstr(text, "\"cause\":\"still_moving\",\"present\":true}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
+    TEST_ASSERT_NULL(strstr(told + strlen("\"cause\":\"still_moving"), "still_moving"));
+}
+
 /// Answers of the port that have changed, told again and again: they are news once.
 static void test_facts_of_the_bus_are_taken_once_for_each_change(void) {
     daemon_rig.link.changes++;
@@ -391,6 +415,8 @@ int main(void) {
     RUN_TEST(test_reader_that_has_ended_leaves_nobody_waiting);
     RUN_TEST(test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept);
     RUN_TEST(test_zero_that_changes_is_told_to_who_watches_the_force);
+    RUN_TEST(test_stop_names_the_client_that_asked_for_it);
+    RUN_TEST(test_wheel_that_goes_on_turning_is_told_once_and_whole);
     RUN_TEST(test_facts_of_the_bus_are_taken_once_for_each_change);
     return UNITY_END();
 }
