@@ -133,7 +133,8 @@ static void test_what_happens_after_the_stop_is_written_too(void) {
     char text[8192];
     start();
     const gw_box_order_t order = stopped("estop_line");
-    const blackbox_entry_t frame = {.at_us = order.note.stop.at_us + 1000U, .kind = BLACKBOX_FRAME, .number = 257, .a = 4};
+    const blackbox_entry_t frame = {
+        .at_us = order.note.stop.at_us + 1000U, .kind = BLACKBOX_FRAME, .number = 257, .a = 4};
     const blackbox_entry_t state = {.at_us = order.note.stop.at_us + 2000U,
                                     .kind = BLACKBOX_STATE,
                                     .number = 5,
