@@ -267,12 +267,25 @@ def counting(folder, case):
     return status or int(said.split()[-2]), said
 
 
+def of_mutation(name):
+    sys.path[:0] = [str(ROOT / "test/mutation"), str(ROOT / "test/planted")]
+    loader = importlib.machinery.SourceFileLoader(f"mutation_{name}", str(ROOT / "test/mutation" / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
+
+
+def around(_, found):
+    """The gate's word on bugs by meaning: (the word for one of them, those that are known, whether it is still there)"""
+    word, known, there = found
+    record = argparse.Namespace(files=["a.c"], mutants={"a.c | f | x; | y;": None} if there else {})
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        return of_mutation("around").verdict(record, known, {"a.c | f | x; | y;": word} if there else {}), said.getvalue()
+
+
 def mutation(_, kind):
     """The gate's word on the ledger's mutants when one of them is judged anew like that."""
-    sys.path[:0] = [str(ROOT / "test/mutation"), str(ROOT / "test/planted")]
-    loader = importlib.machinery.SourceFileLoader("mutation_run", str(ROOT / "test/mutation/run"))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("mutation_run", loader))
-    loader.exec_module(module)
+    module = of_mutation("run")
     record = module.Record({}, ["ledger.c"], {})
     campaign = module.Campaign(None, record, {}, argparse.Namespace(jobs=1, update=False))
     with contextlib.redirect_stdout(io.StringIO()) as said:
@@ -409,6 +422,11 @@ CASES = [
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),
     (mutation, "clang", "seen", "killed", False),
     (mutation, "clang", "lives", "lives", True),
+    (around, "clang", "seen", ("daemon_motion", {}, True), False),
+    (around, "clang", "lives, and its reason is known", ("!", {"a.c | f | x; | y;": "a reason"}, True), False),
+    (around, "clang", "lives", ("!", {}, True), True),
+    (around, "clang", "is known to live, and is seen", ("daemon_motion", {"a.c | f | x; | y;": "a reason"}, True), True),
+    (around, "clang", "is known to live, and is no more", ("", {"a.c | f | x; | y;": "a reason"}, False), True),
     (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),
     (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
     (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),
