@@ -291,7 +291,8 @@ void daemon_rig_crash(void) {
 void daemon_rig_begin(void) {
     daemon_rig_t *rig = &daemon_rig;
     sim_pair_config_t pair;
-    *rig = (daemon_rig_t){.now_us = START_US, .bus = IW_BUS_ACTIVE,
+    *rig = (daemon_rig_t){.now_us = START_US,
+                          .bus = IW_BUS_ACTIVE,
                           .link = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true},
                           .folder = "/tmp/iwheel-daemon-XXXXXX"};
     TEST_ASSERT_NOT_NULL(mkdtemp(rig->folder));
