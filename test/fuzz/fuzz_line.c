@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Any bytes on the serial wire: every line that is taken is one that would be written so, nothing is taken of the rest, the buffer
 // holds, and after a newline a good line is always heard.
-#include "fuzz_sequence.h"
+#include "fuzz.h"
 
 #include "iwheel_northbound/line.h"
 
@@ -40,10 +40,6 @@ static void judge(iwn_receiver_t *receiver, char byte, bool stamped) {
         judge_quote(&line);
     }
     fuzz_require(receiver->length < ROOM, "no byte beyond the buffer");
-}
-
-static size_t fuzz_unit(const uint8_t *data, size_t size) {
-    return fuzz_until(data, size, 0xFEU);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
