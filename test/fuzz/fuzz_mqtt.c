@@ -14,7 +14,7 @@
 
 /// The first line is the verb.
 static void judge(const uint8_t *data, size_t size) {
-    static const mqtt_rules_t rules = {"0123456789abcdef", 300, true, false};
+    static const mqtt_rules_t rules = {"0123456789abcdef", 300, true, false, "iwheel/w1/reply/"};
     mqtt_judge_t judge = {0};
     mqtt_order_t order;
     char verb[32] = "";
@@ -26,7 +26,7 @@ static void judge(const uint8_t *data, size_t size) {
     memcpy(verb, data, length);
     char *payload = malloc(size - length);
     memcpy(payload, newline + 1, size - length - 1U); // Of exactly its length: a byte read behind it is found.
-    const mqtt_command_t command = {verb, payload, size - length - 1U, false};
+    const mqtt_command_t command = {.verb = verb, .payload = payload, .length = size - length - 1U};
     mqtt_judge(&judge, &rules, &command, NOW_US, &order);
     fuzz_require(judge.counts[order.verdict] == 1U, "counted");
     fuzz_require((order.verdict == MQTT_TAKEN) == (order.request[0] != '\0'), "a request, or a reason");
