@@ -64,7 +64,8 @@ static const verb_t verbs[] = {
           "--since WHEN     2026-11-21T22:00, local time\n"
           "--until WHEN     now if not told\n"
           "--all            not only stops: faults, e-stop, bus, lease, ledger, zeros\n"
-          "--output FILE    where a recording's frames go, the rest beside it; ID-NAME.log if not told\n"
+          "--output FILE    where a recording's frames go, the rest beside it; ID-NAME.log if not told. Without a "
+          "verb: the rows as JSON, for iwheel-web\n"
           "--wait SECONDS   for a machine that does not answer; 60 if not told\n"
           "--for SECONDS    listen so long, then show the rows once; --json needs it\n"
           "--config FILE    whose [broker] to use\n"),

@@ -268,28 +268,46 @@ static const char *source_word(fleet_source_t source) {
     return words[source];
 }
 
+#define ROW_SIZE 1536U
+
+/// One machine as a JSON object; its length, without a newline.
+static size_t write_row(const fleet_machine_t *machine, uint64_t now_us, char line[ROW_SIZE]) {
+    iwn_out_t json;
+    iwn_out_init(&json, line, ROW_SIZE);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_text(&json, "machine", machine->id);
+    iwn_out_bool(&json, "online", machine->online);
+    iwn_out_text(&json, "state", (machine->state[0] != '\0') ? machine->state : NULL);
+    iwn_out_text(&json, "version", (machine->version[0] != '\0') ? machine->version : NULL);
+    iwn_out_known(&json, "left_battery_dV", machine->battery_dV[0].known, machine->battery_dV[0].value);
+    iwn_out_known(&json, "right_battery_dV", machine->battery_dV[1].known, machine->battery_dV[1].value);
+    iwn_out_text(&json, "left_zero", (machine->zero[0][0] != '\0') ? machine->zero[0] : NULL);
+    iwn_out_text(&json, "right_zero", (machine->zero[1][0] != '\0') ? machine->zero[1] : NULL);
+    iwn_out_text(&json, "cause", (machine->cause[0] != '\0') ? machine->cause : NULL);
+    iwn_out_known(&json, "stop_wall_us", machine->stop_wall_us > 0, machine->stop_wall_us);
+    iwn_out_text(&json, "sentence", (machine->sentence[0] != '\0') ? machine->sentence : NULL);
+    iwn_out_text(&json, "stop_from", source_word(machine->stop_from));
+    iwn_out_text(&json, "contradicted", machine->contradicted);
+    iwn_out_known(&json, "heard_ms", machine->heard_us > 0U, (int64_t)((now_us - machine->heard_us) / 1000U));
+    iwn_out_close(&json, '}');
+    const size_t length = iwn_out_finish(&json);
+    return (length > 0U) ? length - 1U : 0U;
+}
+
 void fleet_tell(const fleet_t *self, uint64_t now_us, FILE *out) {
+    char line[ROW_SIZE];
     for (size_t i = 0; i < self->count; i++) {
-        const fleet_machine_t *machine = &self->machines[i];
-        char line[1536];
-        iwn_out_t json;
-        iwn_out_init(&json, line, sizeof line);
-        iwn_out_open(&json, NULL, '{');
-        iwn_out_text(&json, "machine", machine->id);
-        iwn_out_bool(&json, "online", machine->online);
-        iwn_out_text(&json, "state", (machine->state[0] != '\0') ? machine->state : NULL);
-        iwn_out_text(&json, "version", (machine->version[0] != '\0') ? machine->version : NULL);
-        iwn_out_known(&json, "left_battery_dV", machine->battery_dV[0].known, machine->battery_dV[0].value);
-        iwn_out_known(&json, "right_battery_dV", machine->battery_dV[1].known, machine->battery_dV[1].value);
-        iwn_out_text(&json, "left_zero", (machine->zero[0][0] != '\0') ? machine->zero[0] : NULL);
-        iwn_out_text(&json, "right_zero", (machine->zero[1][0] != '\0') ? machine->zero[1] : NULL);
-        iwn_out_text(&json, "cause", (machine->cause[0] != '\0') ? machine->cause : NULL);
-        iwn_out_known(&json, "stop_wall_us", machine->stop_wall_us > 0, machine->stop_wall_us);
-        iwn_out_text(&json, "sentence", (machine->sentence[0] != '\0') ? machine->sentence : NULL);
-        iwn_out_text(&json, "stop_from", source_word(machine->stop_from));
-        iwn_out_text(&json, "contradicted", machine->contradicted);
-        iwn_out_known(&json, "heard_ms", machine->heard_us > 0U, (int64_t)((now_us - machine->heard_us) / 1000U));
-        iwn_out_close(&json, '}');
-        (void)fwrite(line, 1, iwn_out_finish(&json), out);
+        (void)fprintf(out, "%.*s\n", (int)write_row(&self->machines[i], now_us, line), line);
     }
+}
+
+void fleet_write(const fleet_t *self, uint64_t now_us, int64_t wall_us, FILE *out) {
+    char line[ROW_SIZE];
+    (void)fprintf(out, "{\"ok\":true,\"wall_us\":%" PRId64 ",\"stream\":%s,\"left_out\":%" PRIu64 ",\"machines\":[",
+                  wall_us, (self->stream != NULL) ? "true" : "false", self->left_out);
+    for (size_t i = 0; i < self->count; i++) {
+        const int length = (int)write_row(&self->machines[i], now_us, line);
+        (void)fprintf(out, "%s%.*s", (i > 0U) ? ",\n" : "\n", length, line);
+    }
+    (void)fputs("]}\n", out);
 }

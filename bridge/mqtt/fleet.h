@@ -69,4 +69,7 @@ void fleet_show(const fleet_t *self, uint64_t now_us, FILE *out);
 /// The same as one JSON object per machine and line.
 void fleet_tell(const fleet_t *self, uint64_t now_us, FILE *out);
 
+/// The same as one object, with the wall clock of the moment: for iwheel-web.
+void fleet_write(const fleet_t *self, uint64_t now_us, int64_t wall_us, FILE *out);
+
 #endif

@@ -50,6 +50,7 @@ static void help(void) {
                 "      --version, --help\n"
                 "table:\n"
                 "      --for SECONDS   listen so long, then show it once\n"
+                "  -o, --output FILE   as JSON into FILE, every second, for iwheel-web's page\n"
                 "history:\n"
                 "      --last SPAN     90min, 12h or 7d; 24h if nothing is told\n"
                 "      --since WHEN    2026-11-21T22:00, local time; with Z behind it UTC\n"
@@ -110,8 +111,13 @@ static int take_option(words_t *self, int option) {
     static const struct {
         int option;
         unsigned where;
-    } places[] = {{'f', IN(TABLE)},   {'l', IN(HISTORY)},   {'s', IN(HISTORY)},  {'u', IN(HISTORY)},
-                  {'a', IN(HISTORY)}, {'w', IN_RECORDINGS}, {'o', IN(RECORDING)}};
+    } places[] = {{'f', IN(TABLE)},
+                  {'l', IN(HISTORY)},
+                  {'s', IN(HISTORY)},
+                  {'u', IN(HISTORY)},
+                  {'a', IN(HISTORY)},
+                  {'w', IN_RECORDINGS},
+                  {'o', IN(RECORDING) | IN(TABLE)}};
     for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
         self->used &= (places[i].option == option) ? places[i].where : EVERYWHERE;
     }

@@ -7,7 +7,10 @@
 
 #include "common/service.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
+#include <string.h>
 #include <sysexits.h>
 #include <time.h>
 #include <unistd.h>
@@ -66,6 +69,27 @@ static void read_last_stops(console_t *self, const mqtt_settings_t *settings) {
     }
 }
 
+/// Rewrites the file: whoever reads it finds it whole.
+static int write_file(const console_t *self, const char *path) {
+    char part[1024];
+    const int length = snprintf(part, sizeof part, "%s.part", path);
+    const int fd = (length > 0 && (size_t)length < sizeof part)
+                       ? open(part, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0640)
+                       : -1;
+    FILE *file = (fd >= 0) ? fdopen(fd, "w") : NULL;
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    if (file != NULL) {
+        fleet_write(&self->fleet, self->now_us, (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000, file);
+    }
+    if (file == NULL || fclose(file) != 0 || rename(part, path) != 0) {
+        (void)fprintf(stderr, "iwheel-fleet: %s: %s; name a file in a folder that this user may write to\n", path,
+                      strerror(errno));
+        return EX_CANTCREAT;
+    }
+    return 0;
+}
+
 static void show(const console_t *self, const fleet_wanted_t *wanted) {
     if (wanted->json) {
         fleet_tell(&self->fleet, self->now_us, stdout);
@@ -87,15 +111,21 @@ static int listen_to(console_t *self, const fleet_wanted_t *wanted) {
         self->now_us = bridge_now_us();
         mqtt_broker_step(&self->broker, self->now_us);
         was_up = was_up || self->broker.state == MQTT_UP;
-        if (wanted->seconds == 0U && self->now_us >= show_us) {
+        if (self->now_us >= show_us) {
             show_us = self->now_us + SHOW_US;
-            show(self, wanted);
+            const int code = (wanted->out != NULL) ? write_file(self, wanted->out) : 0;
+            if (code != 0) {
+                return code;
+            }
+            if (wanted->out == NULL && wanted->seconds == 0U) {
+                show(self, wanted);
+            }
         }
         struct pollfd wait = {.fd = mqtt_broker_fd(&self->broker, &writes), .events = POLLIN};
         wait.events = (short)(POLLIN | (writes ? POLLOUT : 0));
         (void)poll(&wait, 1, 100);
     }
-    if (wanted->seconds > 0U) {
+    if (wanted->seconds > 0U && wanted->out == NULL) {
         show(self, wanted);
     }
     return was_up ? 0 : EX_UNAVAILABLE;

@@ -10,9 +10,10 @@
 
 /// What the command line says.
 typedef struct {
-    const char *id;      ///< Of a machine; NULL: none is named.
-    const char *name;    ///< Of a recording; NULL: the newest.
-    const char *out;     ///< Where its frames go; NULL: a name of its own, here.
+    const char *id;   ///< Of a machine; NULL: none is named.
+    const char *name; ///< Of a recording; NULL: the newest.
+    const char *
+        out; ///< Where its frames go; NULL: a name of its own, here. Of the table: a file that is rewritten every second.
     uint64_t seconds;    ///< The table, once after so long; 0: until it is told to end.
     uint64_t wait_s;     ///< For a machine that does not answer.
     bool json;           ///< Objects, one a line.

@@ -158,6 +158,12 @@ def test_history_without_a_stream_says_what_to_do_and_info_tells_the_last_stop(r
     until(lambda: (rows := lines(console(rig, config, "--for", "1", "--json")[1])) and rows[0]["stop_from"] == "info" and rows[0]["cause"] == "estop_line", 10, "info has it")
     text = console(rig, config, "--for", "1")[1]
     assert "last stops: of each machine's info" in text and "estop_line" in text, text
+    page = Path(rig.path("fleet.json"))
+    assert console(rig, config, "--for", "3", "--output", str(page))[:2] == (0, "")
+    told = json.loads(page.read_text(encoding="utf-8"))
+    assert told["ok"] and not told["stream"] and abs(told["wall_us"] / 1e6 - time.time()) < 5 and [row["machine"] for row in told["machines"]] == [ID], told
+    assert page.stat().st_mode & 0o007 == 0 and not Path(f"{page}.part").exists()
+    assert console(rig, config, "--for", "3", "--output", "/proc/nowhere/x")[0] == 73
     code, _, err = console(rig, config, "history", ID)
     assert code == 78 and "stream_port" in err and "share/fleet" in err, (code, err)
     for words in (("history", "--last", "12"), ("history", "a/b"), ("history", "--since", "yesterday"), ("recording",), ("nonsense",), ("recordings", ID, "--all"),
