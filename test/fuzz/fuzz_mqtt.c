@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a command by MQTT and as a spool's file. What is taken is this run's, in time, once, and one line for the gateway; what is
-// read of a file is whole.
+// Any bytes as a command by MQTT, as a spool's file, and as what the console reads. What is taken is this run's, in time, once, and one line for
+// the gateway; what is read of a file is whole; what the console shows moves no terminal and names no file of its own choice.
 #include "fuzz.h"
 
 #include "command.h"
+#include "fetch.h"
+#include "history.h"
 #include "spool.h"
 
 #include <fcntl.h>
@@ -73,8 +75,42 @@ static void read_file(const uint8_t *data, size_t size) {
     (void)unlink(path);
 }
 
+/// The same bytes as an event of the stream, and as the answer to whatever the console asks for.
+static void show(const uint8_t *data, size_t size) {
+    static const history_wish_t wish = {.since_us = 1, .until_us = INT64_MAX, .all = true};
+    static history_t history;
+    static fetch_t fetch;
+    char *text = NULL;
+    size_t length = 0;
+    const char *verb = "";
+    char asked[512];
+    char *payload = malloc(size + 1U);
+    memcpy(payload, data, size);
+    payload[size] = '\0'; // As the libraries hand it over.
+    FILE *out = open_memstream(&text, &length);
+    fuzz_require(out != NULL && history_open(&history, &wish, out), "memory");
+    (void)history_take(&history, "iwheel/w1/event/stop", payload, size, 1000000);
+    (void)history_take(&history, "iwheel/w1/event/fault", payload, size, 2000000);
+    (void)fclose(out);
+    fuzz_require(history.told + history.doubled + history.garbled == 2U && strchr(text, '\033') == NULL, "each once");
+    history_close(&history);
+    free(text);
+    fetch_begin(&fetch, "w1", "me", 60000000U, NOW_US);
+    fuzz_require(fetch_step(&fetch, NOW_US, &verb, asked), "it asks");
+    fetch.greets = false;
+    (void)fetch_take(&fetch, "reply/me", payload, size, NOW_US);
+    for (size_t i = 0; i < fetch.count; i++) {
+        fuzz_require(strncmp(fetch.list[i].name, "stop-", 5) == 0 && strpbrk(fetch.list[i].name, "/.") == NULL,
+                     "a name");
+    }
+    free(payload);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     judge(data, size);
+    if (size > 0U && data[0] == '{') {
+        show(data, size);
+    }
     if (size >= 8U && memcmp(data, "iwspool1", 8) == 0) {
         read_file(data, size);
     }
