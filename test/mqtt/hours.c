@@ -44,6 +44,7 @@ typedef struct {
     unsigned arrived; ///< Different ones.
     unsigned doubled;
     unsigned disordered; ///< New ones after newer ones.
+    unsigned states;
     unsigned stops;
     int64_t stop_number; ///< Of the newest stop, as the gateway counts.
     unsigned stop_gaps;
@@ -129,6 +130,7 @@ static void answer(const void *bytes, size_t length) {
 static void take_publish(uint8_t head, const uint8_t *body, size_t length) {
     static char payload[MQTT_SPOOL_EVENT_MAX + 1U];
     static const char events[] = "iwheel/w1/event/";
+    static const char state[] = "iwheel/w1/state";
     const size_t topic = (size_t)body[0] << 8U | body[1];
     const bool confirms = (head & 0x06U) != 0U;
     const size_t skip = 2U + topic + (confirms ? 2U : 0U);
@@ -139,6 +141,7 @@ static void take_publish(uint8_t head, const uint8_t *body, size_t length) {
         payload[length - skip] = '\0';
         write_down(payload);
     }
+    book.states += (topic == sizeof state - 1U && memcmp(body + 2, state, topic) == 0) ? 1U : 0U;
     if (confirms) {
         const uint8_t confirmation[] = {0x40, 2, body[2U + topic], body[3U + topic]};
         answer(confirmation, sizeof confirmation);
@@ -299,12 +302,13 @@ void tearDown(void) {
     (void)rmdir(folder);
 }
 
-static void begin(unsigned spool_kB) {
+static void begin(unsigned spool_kB, unsigned every_ms) {
     mqtt_settings_default(&settings);
     (void)snprintf(settings.machine.id, sizeof settings.machine.id, "w1");
     (void)snprintf(settings.spool.directory, sizeof settings.spool.directory, "%s", folder);
     settings.broker.port = far.port;
     settings.spool.max_kB = spool_kB;
+    settings.state.every_ms = every_ms;
     TEST_ASSERT_EQUAL_INT(0, mqtt_bridge_open(&bridge, &settings));
     pass(2000);
     TEST_ASSERT_EQUAL_INT(MQTT_UP, bridge.broker.state);
@@ -325,7 +329,7 @@ static void assert_each_once_in_order(void) {
 }
 
 static void test_network_cut_for_an_hour_each_event_once_in_order(void) {
-    begin(4096);
+    begin(4096, 5000);
     stop_all_the_time(60000, 10000);
     cut_network();
     tries = 0;
@@ -349,7 +353,7 @@ static void test_network_cut_for_an_hour_each_event_once_in_order(void) {
 }
 
 static void test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_counted(void) {
-    begin(256);
+    begin(256, 5000);
     cut_network();
     stop_all_the_time(HOUR_MS, 10000);
     mend_network();
@@ -367,7 +371,7 @@ static void test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_c
 }
 
 static void test_network_cut_behind_any_byte_each_event_once_in_order(void) {
-    begin(1024);
+    begin(1024, 5000);
     far.left = 1;
     stop_all_the_time(HOUR_MS / 3U, 10000);
     far.left = WHOLE;
@@ -376,6 +380,25 @@ static void test_network_cut_behind_any_byte_each_event_once_in_order(void) {
     TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, book.doubled, "what makes doubles was met");
     assert_each_once_in_order();
     tell("connection cut behind any byte, in 20 minutes of virtual time", cuts);
+}
+
+static void test_state_comes_as_often_as_configured_though_the_bridge_is_woken_unevenly(void) {
+    static const unsigned every_ms[] = {100, 500, 1000, 5000};
+    for (size_t i = 0; i < sizeof every_ms / sizeof every_ms[0]; i++) {
+        const unsigned wanted = 60000U / every_ms[i];
+        begin(1024, every_ms[i]);
+        book.states = 0;
+        for (unsigned ms = 0; ms < 60000U; ms += 150U) {
+            pass(50);
+            hours_run_gateway(40);
+            pass(50);
+            hours_run_gateway(10);
+        }
+        TEST_ASSERT_UINT_WITHIN(1U + wanted / 50U, wanted, book.states);
+        TEST_ASSERT_TRUE(mqtt_bridge_close(&bridge));
+        serve();
+    }
+    begin(1024, 5000); // For tearDown.
 }
 
 int main(int count, char **arguments) {
@@ -388,6 +411,7 @@ int main(int count, char **arguments) {
         return 0;
     }
     UNITY_BEGIN();
+    RUN_TEST(test_state_comes_as_often_as_configured_though_the_bridge_is_woken_unevenly);
     RUN_TEST(test_network_cut_for_an_hour_each_event_once_in_order);
     RUN_TEST(test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_counted);
     RUN_TEST(test_network_cut_behind_any_byte_each_event_once_in_order);

@@ -109,7 +109,7 @@ class Gateway:
     def __init__(self, path, tape, machines, rate_hz):
         self.path, self.tape, self.machines, self.rate_hz = path, tape, machines, rate_hz
         self.count = multiprocessing.Array("Q", 4)  # Connections, lines, stops, lines that a bridge did not take.
-        self.end = multiprocessing.Event()
+        self.go, self.end = multiprocessing.Event(), multiprocessing.Event()
         self.process = multiprocessing.get_context("fork").Process(target=self.run, daemon=True)
         self.process.start()
 
@@ -119,7 +119,7 @@ class Gateway:
         listener.listen(self.machines)
         poll, links, listening = select.epoll(), {}, []
         poll.register(listener, select.EPOLLIN)
-        begun, turn = time.monotonic(), 0
+        begun, turn = None, 0
         while not self.end.is_set():
             for fd, _ in poll.poll(0.002):
                 if fd == listener.fileno():
@@ -135,8 +135,10 @@ class Gateway:
                     if link in listening:  # A bridge that was not answered in time comes again.
                         listening.remove(link)
                 self.count[0] = len(listening)
+            if begun is None and self.go.is_set():
+                begun = time.monotonic()
             # Machine `turn % machines` is told its slot `turn / machines`.
-            due = int((time.monotonic() - begun) * self.machines * self.rate_hz)
+            due = int((time.monotonic() - begun) * self.machines * self.rate_hz) if begun else 0
             while turn < due:
                 turn += 1
                 machine = turn % self.machines
@@ -272,6 +274,7 @@ class Load:
         return [sum(cpu_s(child.pid) for child in group) for group in (self.brokers, [self.console], self.bridges)]
 
     def measure(self, seconds):
+        self.gateway.go.set()
         time.sleep(max(2, self.every_ms / 1000))
         begin_us, before = now_us(), self.times()
         time.sleep(seconds)
