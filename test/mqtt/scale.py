@@ -6,7 +6,7 @@ usage: test/mqtt/scale.py [--build DIR] [--broker KIND]... [--machines N]... [--
 
 A gateway beside simulated wheels is driven and stopped by its button once a minute; its lines are kept, for watchers at 1 Hz and at 10 Hz.
 Then one process is the gateway of all N machines: each bridge connects to it, asks, and is told these lines at their times, each machine's
-shifted against the others'. The console (iwheel-fleet) runs beside; how old each line is when it has dealt with it is noted in its
+shifted against the others'; where the recorded gateway was late with a state, the one before again. The console (iwheel-fleet) runs beside; how old each line is when it has dealt with it is noted in its
 process (stamps.c, preloaded). Brokers: mosquitto, nats (one nats-server with JetStream), nats3 (three, three replicas); all without TLS.
 
 Processor time is what the kernel counted for each process, so others on the machine change it little; latencies they do change.
@@ -81,12 +81,24 @@ class Tape:
             link.close()
             self.hello = lines[0][1] + b"\n"
             self.slots[rate_hz] = [[] for _ in range(int(seconds * rate_hz))]
+            first = next(at for at, line in lines if b'"event":"state"' in line) - 0.5 / rate_hz  # A state is in the middle of its slot.
             for at, line in lines:
                 head, found, tail = line.partition(b'"t_us":')
                 if found and b'"event":"hello"' not in line:
-                    self.slots[rate_hz][min(int(at * rate_hz), len(self.slots[rate_hz]) - 1)].append((head + found, tail.lstrip(b"0123456789") + b"\n"))
+                    self.slots[rate_hz][min(int(max(0, at - first) * rate_hz), len(self.slots[rate_hz]) - 1)].append((head + found, tail.lstrip(b"0123456789") + b"\n"))
+            self.fill(self.slots[rate_hz])
         self.stops = sum(b'"event":"stop"' in head + tail for slot in self.slots[1] for head, tail in slot)
         assert self.stops == 1, f"{self.stops} stops on the tape, not 1"
+
+    @staticmethod
+    def fill(slots):
+        """Where a gateway that was woken late said nothing, what it had said before: each slot has a state."""
+        last = next(line for slot in slots for line in slot if b'"event":"state"' in line[0])
+        for slot in slots:
+            states = [line for line in slot if b'"event":"state"' in line[0]]
+            last = states[-1] if states else last
+            if not states:
+                slot.append(last)
 
     def act(self, rig):
         """Most of a short tape is this; of a minute, the first seconds."""
@@ -284,13 +296,21 @@ class Load:
         lines = self.gateway.count[1]
         self.gateway.end.set()
         self.gateway.process.join(10)
-        time.sleep(2 + self.machines / 500)  # What is under way.
+        self.drain()
         self.console.terminate()
         self.console.wait(20)
         stamps = list(STAMP.iter_unpack(Path(self.folder, "stamps").read_bytes()))
         cpu = [(now - then) * 1e6 / (end_us - begin_us) * 1000 for now, then in zip(after, before)]
         self.lines_per_s, self.not_taken = lines, self.gateway.count[3]
         return self.judge(stamps, begin_us, end_us, cpu, memory)
+
+    def drain(self):
+        """Until broker and console have nothing to do any more; half a minute at most."""
+        for _ in range(15):
+            before = self.times()
+            time.sleep(2)
+            if sum(now - then for now, then in zip(self.times()[:2], before[:2])) < 0.02 + self.machines / 20000:
+                return
 
     def judge(self, stamps, begin_us, end_us, cpu, memory):
         inside = [stamp for stamp in stamps if begin_us <= stamp[0] - stamp[2] < end_us]
@@ -326,9 +346,13 @@ class Load:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
+def short(number):
+    return f"{number:.1f}" if number < 10 else f"{number:.0f}"
+
+
 def cells(row):
     period = f"{row['every_ms'] / 1000:g} s"
-    numbers = [f"{row['kB_s']:.0f}", *(f"{one:.0f}" for one in row["cpu"]), *(f"{one:.0f}" for one in row["memory"]), *(f"{one:.1f} ms" for one in row["late_ms"])]
+    numbers = [short(one) for one in (row["kB_s"], *row["cpu"], *row["memory"])] + [f"{short(one)} ms" for one in row["late_ms"]]
     return [row["kind"], str(row["machines"]), period, *numbers, f"{row['missing']} of {row['states'] + row['missing']}", *(str(one) for one in row["stops"])]
 
 
@@ -365,7 +389,7 @@ def update(rows):
     """Rows of the same broker, number and period take the place of those that are there."""
     begin = "<!-- figures: test/mqtt/scale.py --update -->"
     section = PAGE.read_text(encoding="utf-8").split(begin, 1)[1].split("<!-- end", 1)[0]
-    old = [[cell.strip() for cell in line.strip("|").split("|")] for line in section.splitlines() if line.startswith("| ")][1:]
+    old = [[cell.strip() for cell in line.strip("|").split("|")] for line in section.splitlines() if line.startswith("| ")][2:]
     every = {tuple(one[:3]): one for one in old + rows}
     kinds = list(BROKERS)
     order = sorted(every.values(), key=lambda one: (-float(one[2].split()[0]), kinds.index(one[0]), int(one[1])))
