@@ -19,7 +19,6 @@
 #include <unistd.h>
 
 #define PASS_MS    50U
-#define HOUR_MS    3600000U
 #define EVENTS_MAX 20000U
 #define TRIES_MAX  1000U
 #define WHOLE      (-1L)
@@ -57,6 +56,7 @@ static char folder[64];
 static far_t far = {.listener = -1, .fd = -1, .left = WHOLE};
 static book_t book;
 static int client = -1;
+static double hours = 1.0; ///< Of the first two.
 static uint32_t dice = 1;
 static uint64_t tries_us[TRIES_MAX]; ///< When the bridge tried to connect.
 static unsigned tries;
@@ -260,6 +260,10 @@ static void stop_once(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
 
+static unsigned hours_ms(void) {
+    return (unsigned)(hours * 3600e3);
+}
+
 static void stop_all_the_time(unsigned for_ms, unsigned every_ms) {
     const iw_time_us_t end_us = daemon_rig.now_us + MS(for_ms);
     while (daemon_rig.now_us < end_us) {
@@ -334,9 +338,10 @@ static void test_network_cut_for_an_hour_each_event_once_in_order(void) {
     cut_network();
     tries = 0;
     const iw_time_us_t cut_us = daemon_rig.now_us;
-    stop_all_the_time(HOUR_MS, 10000);
-    TEST_ASSERT_GREATER_THAN_UINT64(MS(HOUR_MS), daemon_rig.now_us - cut_us + 1U);
-    TEST_ASSERT_GREATER_THAN_size_t_MESSAGE(2000, bridge.spool.waiting, "events of 360 stops wait");
+    stop_all_the_time(hours_ms(), 10000);
+    TEST_ASSERT_GREATER_THAN_UINT64(MS(hours_ms()), daemon_rig.now_us - cut_us + 1U);
+    TEST_ASSERT_GREATER_THAN_size_t_MESSAGE((size_t)(2000.0 * hours), bridge.spool.waiting,
+                                            "events of 360 stops an hour wait");
     const unsigned tried = tries;
     mend_network();
     drain();
@@ -353,9 +358,9 @@ static void test_network_cut_for_an_hour_each_event_once_in_order(void) {
 }
 
 static void test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_counted(void) {
-    begin(256, 5000);
+    begin((unsigned)(256.0 * hours), 5000);
     cut_network();
-    stop_all_the_time(HOUR_MS, 10000);
+    stop_all_the_time(hours_ms(), 10000);
     mend_network();
     drain();
     TEST_ASSERT_GREATER_THAN_UINT64(0, bridge.spool.dropped);
@@ -373,10 +378,10 @@ static void test_network_cut_for_an_hour_spool_full_the_oldest_are_dropped_and_c
 static void test_network_cut_behind_any_byte_each_event_once_in_order(void) {
     begin(1024, 5000);
     far.left = 1;
-    stop_all_the_time(HOUR_MS / 3U, 10000);
+    stop_all_the_time(hours_ms() / 3U, 10000);
     far.left = WHOLE;
     drain();
-    TEST_ASSERT_GREATER_THAN_UINT(100, cuts);
+    TEST_ASSERT_GREATER_THAN_UINT((unsigned)(100.0 * hours), cuts);
     TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, book.doubled, "what makes doubles was met");
     assert_each_once_in_order();
     tell("connection cut behind any byte, in 20 minutes of virtual time", cuts);
@@ -404,12 +409,14 @@ static void test_state_comes_as_often_as_configured_though_the_bridge_is_woken_u
 int main(int count, char **arguments) {
     if (count > 1 && strcmp(arguments[1], "--help") == 0) {
         (void)puts(
-            "usage: mqtt_hours\n\nThe MQTT bridge and the gateway in virtual time, an hour with the network cut, "
+            "usage: mqtt_hours [HOURS]\n\nThe MQTT bridge and the gateway in virtual time, an hour with the network "
+            "cut, "
             "an hour with it cut and too small a\nspool, and with the line cut behind any byte, again and again. Each "
             "stop and "
             "fault must arrive once, in order.");
         return 0;
     }
+    hours = (count > 1) ? strtod(arguments[1], NULL) : hours;
     UNITY_BEGIN();
     RUN_TEST(test_state_comes_as_often_as_configured_though_the_bridge_is_woken_unevenly);
     RUN_TEST(test_network_cut_for_an_hour_each_event_once_in_order);
