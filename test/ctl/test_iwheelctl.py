@@ -425,6 +425,30 @@ class Asking(WithGateway):
         self.assertEqual("left", self.gateway.requests[0][1]["side"])
         self.assertEqual(2, self.ctl("tare")[1].count("zero now, 8.000 N"))
 
+    def test_config_shows_stages_and_commits_and_says_what_is_not_in_force(self):
+        self.assertEqual("wheels.setpoint_type is not set\ndrive.lease_ms = 200\n", self.ctl("config")[1])
+        _, out, _, _ = self.ctl("config", "set", "drive.lease_ms", "300")
+        self.assertEqual("drive.lease_ms = 300\nstaged, and not in force yet; next: iwheelctl config commit (or iwheelctl config discard)\n", out)
+        self.assertIn("committed: the board starts anew", self.ctl("config", "commit")[1])
+        self.assertEqual(0, self.ctl("config", "discard")[0])
+        self.assertEqual([{}, {"key": "drive.lease_ms", "value": "300"}, {"commit": True}, {"commit": False}],
+                         [{name: value for name, value in request.items() if name not in ("cmd", "id")} for _, request in self.gateway.requests])
+        code, _, err, _ = self.ctl("config", "set", "bus.interface", "can1")
+        self.assertEqual((1, True), (code, "no key of this gateway" in err), err)
+        for words in (("set",), ("set", "drive.lease_ms"), ("set", "a", "b", "c"), ("show", "me"), ("write",)):
+            self.assertEqual(64, self.ctl("config", *words)[0], words)
+
+    def test_a_ledger_in_figures_alone_is_told_in_the_same_words(self):
+        figures = {"force_unit_left": {"state": "confirmed", "evidence": "bus", "figure": 10012, "value": "cN"},
+                   "track": {"state": "assumed", "evidence": "none", "figure": None, "value": "540"},
+                   "wheel_radius": {"state": "contradicted", "evidence": "operator", "figure": None, "value": "192", "reason": None, "disabled": None}}
+        self.gateway.on_status = lambda *_: {"ok": True, **snapshot(ledger=figures)}
+        out = " ".join(self.ctl("ledger")[1].split())
+        for text in ("force_unit_left = cN: at rest, raw / offset is 10.012", "track = 540: not documented, not verified",
+                     "wheel_radius = 192: the operator found something else", "disabled: no speed in mm/s and no distance; correct radius_mm"):
+            self.assertIn(text, out)
+        self.assertIn("the operator found something else", " ".join(self.ctl("status")[1].split()))
+
     def test_confirm_sends_item_and_value_and_tells_what_that_makes_of_it(self):
         code, out, _, _ = self.ctl("confirm", "wheel_radius")
         self.assertEqual((0, "CONFIRMED     wheel_radius = 192: the operator ? says so\n"), (code, out))
