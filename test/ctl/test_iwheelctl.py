@@ -429,8 +429,8 @@ class Asking(WithGateway):
         self.assertEqual("wheels.setpoint_type is not set\ndrive.lease_ms = 200\n", self.ctl("config")[1])
         _, out, _, _ = self.ctl("config", "set", "drive.lease_ms", "300")
         self.assertEqual("drive.lease_ms = 300\nstaged, and not in force yet; next: iwheelctl config commit (or iwheelctl config discard)\n", out)
-        self.assertIn("committed: the board starts anew", self.ctl("config", "commit")[1])
-        self.assertEqual(0, self.ctl("config", "discard")[0])
+        self.assertEqual("committed: the board starts anew with it, and closes its clients; they come again\n", self.ctl("config", "commit")[1])
+        self.assertEqual("what was staged is forgotten\n", self.ctl("config", "discard")[1])
         self.assertEqual([{}, {"key": "drive.lease_ms", "value": "300"}, {"commit": True}, {"commit": False}],
                          [{name: value for name, value in request.items() if name not in ("cmd", "id")} for _, request in self.gateway.requests])
         code, _, err, _ = self.ctl("config", "set", "bus.interface", "can1")

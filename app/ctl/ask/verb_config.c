@@ -13,7 +13,7 @@ static void print_pair(const char *key, const char *value) {
     (void)putchar('\n');
 }
 
-/// "drive.lease_ms = 300", and whether it is in force.
+/// "drive.lease_ms = 300", of one key or of all, and whether it is in force.
 static void print_keys(json_t *reply, const char *only) {
     size_t i = 0;
     json_t *entry = NULL;
@@ -23,9 +23,7 @@ static void print_keys(json_t *reply, const char *only) {
             print_pair(key, json_string_value(json_object_get(entry, "value")));
         }
     }
-    if (json_is_true(json_object_get(reply, "restarts"))) {
-        (void)puts("committed: the board starts anew with it, and closes its clients; they come again");
-    } else if (json_is_true(json_object_get(reply, "staged"))) {
+    if (json_is_true(json_object_get(reply, "staged"))) {
         (void)puts("staged, and not in force yet; next: iwheelctl config commit (or iwheelctl config discard)");
     }
 }
@@ -68,7 +66,15 @@ int verb_config(ctl_t *self, int count, char **words) {
         return CTL_USAGE;
     }
     const int code = ctl_ask(self, request, &reply);
-    if (code == CTL_OK && !self->json) {
+    if (code != CTL_OK || self->json) {
+        json_decref(reply);
+        return code;
+    }
+    if (json_is_true(json_object_get(reply, "restarts"))) {
+        (void)puts("committed: the board starts anew with it, and closes its clients; they come again");
+    } else if (count > 0 && strcmp(words[0], "discard") == 0) {
+        (void)puts("what was staged is forgotten");
+    } else {
         print_keys(reply, only);
     }
     json_decref(reply);
