@@ -165,7 +165,7 @@ scenario = scenarios.scenario
 
 @scenario("corrupted, cut, doubled and late lines move nothing", 15)
 def bad_lines(t):
-    wires.send_bad_lines(t, 100_000 if FULL else 1000, 20)
+    wires.send_bad_lines(t, 5000 if FULL else 1000, 20)
 
 
 @scenario("the e-stop pin at any phase: zero within 5 ms, latched, and nothing moves before reset, arm and a fresh command", 14)
