@@ -13,7 +13,7 @@ import time
 from bus import now_us
 from client import Client, Closed
 from harness import Process
-from judge_log import Event
+from judge_log import Event, percentile
 from rig import framed, mutated
 from scenario import scenario
 
@@ -63,6 +63,7 @@ def drive(t):
     t.expect(other.request("watch", topics=["stop", "lease", "force"], rate_hz=10))
     t.drive_for(client, 250, 250, 1.0)
     t.check(rig.moving(now_us() - 100_000), "the wheels are driven")
+    tell_speed(t, rig, client)
     t.expect(other.drive(100, 100), "not_holder")
     t.expect(client.request("stop"))
     t.check(other.wait_event("stop"), "the stop is told to who watches")
@@ -73,6 +74,18 @@ def drive(t):
     t.check([r.get("id") for r in replies] == ["x", 7, 8, None], f"answers in their order, with the client's ids: {replies}")
     t.check([r.get("error") for r in replies] == ["missing_field", "unknown_cmd", None, "bad_json"], f"{replies}")
     end_well(t, rig, client)
+
+
+def tell_speed(t, rig, client):
+    """How long a command takes to its answer, and what the relay costs meanwhile, with 20 commands a second and a watcher."""
+    spans_us, begin_s, begin_us = [], rig.gateway.cpu_seconds(), now_us()
+    for _ in range(40):
+        sent_us = now_us()
+        t.expect(client.drive(250, 250))
+        spans_us.append(now_us() - sent_us)
+        time.sleep(0.05)
+    share = (rig.gateway.cpu_seconds() - begin_s) * 1e8 / (now_us() - begin_us)
+    t.figure(f"a drive is answered in {percentile(spans_us, 50) / 1000:.1f} ms, p99 {percentile(spans_us, 99) / 1000:.1f} ms; relay {share:.1f} % of a processor")
 
 
 @scenario("a client that is killed while it drives ends its lease at once", 3)

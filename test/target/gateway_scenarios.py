@@ -510,6 +510,24 @@ def noise_on_the_wire(rig):
     assert not moving(rig, zero.time_ns)
 
 
+def another_rate(rig):
+    """The slowest and the fastest line: a stream of commands drives over it without a gap, and the e-stop is in time."""
+    host = start(rig)
+    host.arm()
+    host.keep_driving(SPEED, 200)
+    begun_ns = rig.machine.now_ns + 200 * MS
+    host.keep_driving(SPEED, 1000)
+    frames = rig.setpoints(begun_ns)
+    assert len(frames) > 70 and all(frame.setpoint()[0] == SPEED for frame in frames), "the line did not carry the commands in time"
+    assert host.ask(1, {"cmd": "status"}, 600)["state"] == "armed" and not host.events("line_error")
+    host.keep_driving(SPEED, 40)
+    rig.machine.board.drive("estop", None)
+    pressed_ns = rig.machine.now_ns
+    rig.run(100 * MS)
+    zero = next(frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO)
+    assert zero.time_ns - pressed_ns <= EDGE_TO_ZERO_NS and not moving(rig, zero.time_ns)
+
+
 def crowd(rig):
     """Eight clients, all of whom watch and ask without end: the driver goes on, replies come before events, losses are told."""
     host = start(rig)
