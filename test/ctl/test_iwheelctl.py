@@ -532,6 +532,24 @@ class Driving(WithGateway):
         self.assertLessEqual(len(times), most)
         self.assertTrue(0.8 * seconds < spacing < 1.5 * seconds, spacing)
 
+    def test_a_command_lost_on_a_serial_line_does_not_end_the_drive_but_a_second_of_them_does(self):
+        class Lossy(FakeGateway):
+            last = 10**6  # Of the commands, after which none is obeyed.
+
+            def on_drive(self, connection, request):
+                done = super().on_drive(connection, request)
+                lost = self.driving > 1 and (self.driving % 3 == 0 or self.driving > self.last)
+                return {"ok": False, "error": "stale_command", "message": "lost on the line"} if lost else done
+
+        for last, wanted in ((10**6, 0), (20, 75)):
+            gateway = Lossy()
+            gateway.last = last
+            self.addCleanup(gateway.close)
+            code, _, err, _ = self.drive("200", "200", "--for", "2s", gateway=gateway)
+            self.assertEqual(wanted, code, err)
+            self.assertEqual(wanted == 75, "did not answer a drive command for 1 s" in err, err)
+            self.assert_stopped_once(gateway)
+
     def test_arms_drives_at_a_third_of_the_lease_and_stops(self):
         code, out, err, seconds = self.drive("-300", "250", "--for", "1s")
         self.assertEqual((0, ""), (code, err))
