@@ -383,6 +383,14 @@ class Showing(WithGateway):
                 return {"ok": True, "number": 0, "sentence": ""}
         self.assertEqual("no stop since the gateway's start\n", self.ctl("why", gateway=self.serve(Empty))[1])
 
+    def test_why_of_a_board_without_a_clock_of_the_day_tells_the_age_alone(self):
+        stop = {"ok": True, "number": 1, "sentence": "somebody said stop", "latched": False, "age_ms": 553}
+        for wall_us, wanted in ((None, r"\n0\.553 s ago; it did not latch\n"), (10**15, r"\nat 2001-09-0.*, 0\.553 s ago; it did not latch\n")):
+            gateway = FakeGateway()
+            self.addCleanup(gateway.close)
+            gateway.on_why = lambda *_, told=wall_us: {**stop, "wall_us": told}
+            self.assertRegex(self.ctl("why", gateway=gateway)[1], wanted)
+
     def test_why_without_a_stop_says_so(self):
         code, out, _, _ = self.ctl("why")
         self.assertEqual((0, "no stop since the gateway's start\n"), (code, out))
