@@ -63,8 +63,8 @@ static bool compare(iw_host_t *self, bool *out_same) {
     return true;
 }
 
-void iw_host_write_entry(const iw_host_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry,
-                         iwn_out_t *json) {
+void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json) {
+    const iw_ledger_entry_t *const entry = &iw_host_look(self)->assumed[item];
     const char *const key = iw_learnt_key(item);
     char plain[IW_SETTINGS_TEXT] = "yes";
     char whose[IW_SETTINGS_TEXT];
@@ -75,15 +75,11 @@ void iw_host_write_entry(const iw_host_t *self, iw_ledger_item_t item, const iw_
     if (item == IW_LEDGER_GEAR_RATIO && iw_settings_value(&self->place.settings, "wheels.rpm_of", whose)) {
         IWN_TEXT_JOIN(&text, ", rpm of the ", whose); // As the daemon says it.
     }
+    iwn_out_text(json, "item", iwn_ledger_item_name(item));
     iwn_out_text(json, "state", iwn_ledger_state_name(entry->state));
     iwn_out_text(json, "evidence", iwn_evidence_name(entry->evidence));
     iwn_out_known(json, "figure", entry->evidence == IW_EVIDENCE_BUS, entry->figure);
     iwn_out_text(json, "value", is_set ? value : NULL);
-}
-
-void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json) {
-    iwn_out_text(json, "item", iwn_ledger_item_name(item));
-    iw_host_write_entry(self, item, &iw_host_look(self)->assumed[item], json);
     iwn_out_null(json, "found");
     iwn_out_null(json, "how");
     iwn_out_null(json, "since_wall_us");

@@ -197,8 +197,7 @@ bool iw_host_wants_restart(const iw_host_t *self);
 void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote);
 /// Carries out `confirm`: the operator's word on an assumption, for this run.
 void iw_answer_confirm(iw_host_t *self, iw_host_client_t *client);
-/// Of the ledger, into an object that is open: what a snapshot has of an item, and what an answer or an event has.
-void iw_host_write_entry(const iw_host_t *self, iw_ledger_item_t item, const iw_ledger_entry_t *entry, iwn_out_t *json);
+/// Of the ledger, into an object that is open.
 void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json);
 /// Answers an arm that was granted and then failed or succeeded.
 void iw_answer_arming(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen);

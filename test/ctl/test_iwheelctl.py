@@ -448,11 +448,11 @@ class Asking(WithGateway):
 
     def test_a_ledger_in_figures_alone_is_told_in_the_same_words(self):
         figures = {"force_unit_left": {"state": "confirmed", "evidence": "bus", "figure": 10012, "value": "cN"},
-                   "track": {"state": "assumed", "evidence": "none", "figure": None, "value": "540"},
+                   "track": {"state": "assumed", "evidence": "none", "figure": None, "value": "540"}, "dlc": {"state": "confirmed", "evidence": "bus"},
                    "wheel_radius": {"state": "contradicted", "evidence": "operator", "figure": None, "value": "192", "reason": None, "disabled": None}}
         self.gateway.on_status = lambda *_: {"ok": True, **snapshot(ledger=figures)}
         out = " ".join(self.ctl("ledger")[1].split())
-        for text in ("force_unit_left = cN: at rest, raw / offset is 10.012", "track = 540: not documented, not verified",
+        for text in ("dlc: the bus showed it", "force_unit_left = cN: at rest, raw / offset is 10.012", "track = 540: not documented, not verified",
                      "wheel_radius = 192: the operator found something else", "disabled: no speed in mm/s and no distance; correct radius_mm"):
             self.assertIn(text, out)
         self.assertIn("the operator found something else", " ".join(self.ctl("status")[1].split()))

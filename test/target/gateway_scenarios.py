@@ -385,8 +385,8 @@ def learnt_in_flash(rig):
     left, ledger = status["left"], status["ledger"]
     assert status["memory"]["state"] == "kept"
     assert (left["offset_provenance"], left["offset_origin"], left["force_offset_mN"], left["offset_samples"]) == ("stored", "operator", tared, 40), left
-    assert ledger["wheel_radius"] == {"state": "confirmed", "evidence": "operator", "figure": None, "value": "192"}, ledger["wheel_radius"]
-    assert ledger["dlc"]["state"] == "confirmed" and ledger["dlc"]["evidence"] == "bus" and ledger["gear_ratio"]["value"] == "1, rpm of the wheel"
+    assert ledger["wheel_radius"] == {"state": "confirmed", "evidence": "operator"}, ledger["wheel_radius"]
+    assert ledger["dlc"]["state"] == "confirmed" and ledger["dlc"]["evidence"] == "bus"
     host.ask(1, {"cmd": "config", "key": "wheels.radius_mm", "value": 180})
     assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
     host.begin_again()

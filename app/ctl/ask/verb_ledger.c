@@ -31,6 +31,9 @@ static void explain(const char *name, json_t *entry) {
         known.evidence = is_it ? (iw_evidence_t)evidence : known.evidence;
     }
     gw_assumption_evidence(item, &known, &(gw_word_t){"", ""}, text);
+    if (known.evidence == IW_EVIDENCE_BUS && !json_is_integer(json_object_get(entry, "figure"))) {
+        (void)snprintf(text, sizeof text, "the bus showed it");
+    }
     (void)json_object_set_new(entry, "reason", json_string(text));
     if (known.state == IW_LEDGER_CONTRADICTED) {
         (void)json_object_set_new(entry, "disabled", json_string(gw_assumption_cost(item)));
@@ -49,8 +52,9 @@ void ctl_explain_ledger(json_t *ledger) {
 static void print_item(const paper_t *paper, const char *label, tone_t tone, const char *name, const json_t *entry) {
     char line[LINE];
     const char *disabled = json_string_value(json_object_get(entry, "disabled"));
-    (void)snprintf(line, sizeof line, "%.64s = %.64s: %.256s", name, text_word(entry, "value"),
-                   text_word(entry, "reason"));
+    const bool told = json_object_get(entry, "value") != NULL; // A board's snapshot has not all of them.
+    (void)snprintf(line, sizeof line, "%.64s%s%.64s: %.256s", name, told ? " = " : "",
+                   told ? text_word(entry, "value") : "", text_word(entry, "reason"));
     paper_wrap(paper, label, tone, line);
     if (disabled != NULL) {
         (void)snprintf(line, sizeof line, "disabled: %.256s", disabled);
