@@ -11,8 +11,8 @@
 #define SECOND_US 1000000U
 #define INFO_US   60000000U
 
-static const mqtt_way_t once = {1, false, false};
-static const mqtt_way_t retained = {1, true, false};
+static const mqtt_way_t once = {.qos = 1};
+static const mqtt_way_t retained = {.qos = 1, .retain = true};
 
 static mqtt_buffer_t buffer(mqtt_bridge_t *self) {
     return (mqtt_buffer_t){self->payload, sizeof self->payload};
@@ -46,7 +46,8 @@ static void tell_info(mqtt_bridge_t *self) {
                               .spooled = self->spool.waiting,
                               .dropped = self->spool.dropped,
                               .on_disk = !self->spool.behind,
-                              .unsent = self->broker.unsent};
+                              .unsent = self->broker.unsent,
+                              .stop = &self->stop};
     const size_t length = mqtt_tell_info(&info, buffer(self));
     self->info_due = mqtt_bridge_publish(self, "info", NULL, length, retained) == 0;
     self->info_us = self->now_us;
@@ -117,15 +118,32 @@ static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uin
     (void)mqtt_spool_add(&self->spool, name, self->payload, length, stop_us);
 }
 
+/// Of an event, or of a reply to `why`. A gateway that began anew knows none; the one before it is still this machine's last.
+static void remember_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
+    mqtt_stop_t *last = &self->stop;
+    if (iwc_integer(stop, "number").value <= 0) {
+        return;
+    }
+    last->number = iwc_integer(stop, "number").value;
+    last->wall_us = iwc_integer(stop, "wall_us").value;
+    (void)iwc_text(stop, "cause", last->cause, sizeof last->cause);
+    (void)iwc_text(stop, "sentence", last->sentence, sizeof last->sentence);
+    self->info_due = true;
+}
+
 static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
     const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
     keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
+    remember_stop(self, event);
     self->driver[0] = '\0';
 }
 
 static void take_why(void *context, const iwc_message_t *reply) {
     mqtt_bridge_t *self = context;
     const uint64_t stop_us = (reply != NULL) ? (uint64_t)iwc_integer(reply, "wall_us").value : 0U;
+    if (reply != NULL) {
+        remember_stop(self, reply);
+    }
     if (reply != NULL && iwc_integer(reply, "number").value > 0 && stop_us != self->spool.mark) {
         const size_t length = mqtt_tell_missed_stop(self->boot, self->spool.last + 1U, wall_us(), reply, buffer(self));
         keep_event(self, "stop", length, stop_us);
@@ -149,8 +167,14 @@ static void read_condition(const iwc_message_t *state, char *out, size_t size) {
                    iwc_truth(state, "left.heard").value == 1, iwc_truth(state, "right.heard").value == 1);
 }
 
+/// How often the gateway is asked to tell it.
+static uint32_t rate_hz(uint32_t every_ms) {
+    return (every_ms < 1000U) ? 1000U / every_ms : 1U;
+}
+
 static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, bool spare) {
-    const mqtt_way_t way = {0, false, spare};
+    // By MQTT 5: what is older than the next one is of no use.
+    const mqtt_way_t way = {.spare = spare, .labels = {.expiry_s = self->settings->state.every_ms / 1000U + 1U}};
     if (mqtt_bridge_publish(self, "state", NULL, mqtt_tell_state(self->boot, state, buffer(self)), way) != 0) {
         read_condition(state, self->condition, sizeof self->condition);
         self->state_us = self->now_us;
@@ -163,9 +187,11 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     memcpy(self->state, state->text, state->length);
     self->state_length = state->length;
     read_condition(state, condition, sizeof condition);
-    // A tenth of the period early: the gateway's and ours must not beat.
+    // Half a line early: the gateway's period and ours must not beat, however unevenly its lines come.
+    const uint32_t every_ms = self->settings->state.every_ms;
+    const uint32_t line_ms = 1000U / rate_hz(every_ms);
     if (strcmp(condition, self->condition) != 0 ||
-        self->now_us - self->state_us >= (uint64_t)self->settings->state.every_ms * 900U) {
+        self->now_us - self->state_us >= ((uint64_t)every_ms * 2U - line_ms) * 500U) {
         tell_state(self, state, true);
     }
     if (first) {
@@ -278,8 +304,7 @@ int mqtt_bridge_check(const mqtt_settings_t *settings) {
 int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
     const bridge_link_terms_t terms = {.program = "iwheel-mqtt",
                                        .socket = settings->gateway.socket,
-                                       .rate_hz =
-                                           (settings->state.every_ms < 1000U) ? 1000U / settings->state.every_ms : 1U,
+                                       .rate_hz = rate_hz(settings->state.every_ms),
                                        .drives = settings->drive.enabled};
     const bridge_listener_t gateway = {self, gateway_here, gateway_gone, take_event};
     *self = (mqtt_bridge_t){.settings = settings, .topics = {self->commands, NULL}};
