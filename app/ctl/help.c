@@ -22,6 +22,11 @@ static const char *side_choice(unsigned number) {
     return (number < 2U) ? sides[number] : NULL;
 }
 
+static const char *config_choice(unsigned number) {
+    static const char *const words[] = {"show", "set", "commit", "discard"};
+    return (number < sizeof words / sizeof words[0]) ? words[number] : NULL;
+}
+
 static const char *fleet_choice(unsigned number) {
     static const char *const verbs[] = {"history", "recordings", "recording"};
     return (number < 3U) ? verbs[number] : NULL;
@@ -104,6 +109,16 @@ static const verb_t verbs[] = {
           "right.\n"
           "--how TEXT  by what it was found: a tape, bringup; kept as the item's evidence, 127 bytes at most\n"),
      .choice = item_choice},
+    {VERB("config", verb_config, "[show|set KEY VALUE|commit|discard]",
+          "the configuration of a board behind iwheel-serial",
+          "For a gateway that keeps its configuration itself; that of iwheel-gateway is its file, and it refuses.\n"
+          "show           every key and its value, with what is staged; also without a word\n"
+          "set KEY VALUE  stages one, such as drive.lease_ms 300: keys and values as in the file\n"
+          "commit         writes what is staged into the board's flash, all or nothing, and starts it anew; only while "
+          "it "
+          "listens, silent after a stop. Its clients are closed and come again\n"
+          "discard        forgets what is staged\n"),
+     .choice = config_choice},
     {VERB("doctor", verb_doctor, "[IFACE] [--estop LINE] [--config FILE] [--listen TIME] [--no-press]",
           "what is wrong with bus, wheels and e-stop, and what mends it",
           "Sends nothing, moves nothing; works with and without a running gateway.\n"

@@ -55,7 +55,7 @@ static void welcome(void *context, gw_client_t *client) {
     relay_t *self = (relay_t *)context;
     relay_channel_t *channel = free_channel(self);
     if (!self->link.linked || channel == NULL) {
-        turn_away(self, client, self->trouble);
+        turn_away(self, client, (self->trouble[0] != '\0') ? self->trouble : "it has not answered yet; try again");
         return;
     }
     *channel = (relay_channel_t){.client = client->id,

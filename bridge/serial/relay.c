@@ -122,14 +122,15 @@ static void read_port(relay_t *self) {
 
 static void tend_link(relay_t *self) {
     char words[sizeof self->trouble];
-    if (serial_link_fell_silent(&self->link, self->now_us)) {
-        relay_drop_clients(self);
-        self->explained_us = 0;
-    }
+    const bool fell_silent = serial_link_fell_silent(&self->link, self->now_us);
+    self->explained_us = fell_silent ? 0U : self->explained_us;
     if (!self->link.linked && self->now_us >= self->explained_us) {
         self->explained_us = self->now_us + EXPLAIN_AGAIN_US;
         serial_link_explain(&self->link, self->settings->board.port, self->settings->board.baud, words, sizeof words);
         set_trouble(self, words);
+    }
+    if (fell_silent) { // Its clients are told why.
+        relay_drop_clients(self);
     }
 }
 

@@ -232,6 +232,7 @@ static void do_tare(iw_host_t *self, iw_host_client_t *client) {
     iwn_out_text(&json, "state", iwn_state_name(seen->state));
     for (unsigned side = 0; side < IW_SIDES; side++) {
         if ((sides & (1U << side)) != 0U) {
+            self->zero[side] = iw_learnt_zero(seen->wheel[side].force, &quality[side]);
             iwn_out_open(&json, (side == IW_LEFT) ? "left" : "right", '{');
             iwn_tell_tare(seen->wheel[side].force, &quality[side], &before[side], &json);
             iwn_out_close(&json, '}');
@@ -267,12 +268,6 @@ static bool stage(iw_host_t *self, iwn_text_t *why) {
     return true;
 }
 
-/// Nothing is sent, and nothing has been for the whole hold: what the flash costs in time, no wheel waits for.
-static bool is_silent(const iw_host_t *self) {
-    return iw_gateway_state(self->place.gateway) == IW_STATE_LISTENING && !iw_gateway_is_sending(self->place.gateway) &&
-           !iw_gateway_arming(self->place.gateway);
-}
-
 /// True if what was asked for is done, or there was nothing to do. `*out_error` else.
 static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
     const iwn_request_t *const request = &self->request;
@@ -292,7 +287,7 @@ static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) 
         return false;
     }
     *out_error = IWN_DENIED;
-    if (!is_silent(self)) {
+    if (!iw_host_is_silent(self)) {
         IWN_TEXT_JOIN(
             why,
             "the configuration is written only while the gateway is listening and silent: stop, and wait until it is");

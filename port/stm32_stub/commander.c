@@ -9,8 +9,9 @@
 #define STABLE_US 20000U
 
 /// Nothing is kept over power-off.
-void iw_commander_open(bool power_on) {
+void iw_commander_open(bool power_on, bool in_motion) {
     (void)power_on;
+    (void)in_motion;
 }
 
 /// The options of the build are all there is.

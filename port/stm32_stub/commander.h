@@ -40,7 +40,8 @@ const char *iw_commander_words(void);
 bool iw_commander_sends(void);
 
 /// Called once, right after a start and before the watchdog runs: what outlives power may be read and written here.
-void iw_commander_open(bool power_on);
+/// `in_motion`: the run before this one was sending, so nothing may take long.
+void iw_commander_open(bool power_on, bool in_motion);
 
 /// Called once, before the gateway begins: `config` has the defaults and the options of the build.
 void iw_commander_configure(iw_config_t *config);

@@ -41,20 +41,28 @@ bool iw_commander_sends(void) {
 
 /// The counter of the power-ons is behind the name of this start, so that it is written before that name is told. The
 /// number of starts since then is kept in RAM.
-void iw_commander_open(bool power_on) {
-    iw_kept_open(&kept, power_on);
+void iw_commander_open(bool power_on, bool in_motion) {
+    iw_kept_open(&kept, power_on, in_motion);
 }
 
 void iw_commander_configure(iw_config_t *config) {
-    if (kept.has_settings) {
-        track_mm = iw_settings_to(&kept.settings, config);
+    iw_settings_t settings;
+    if (iw_kept_settings(&kept, &settings)) {
+        track_mm = iw_settings_to(&settings, config);
     }
-    kept.settings = iw_settings_from(config, track_mm);
     is_complete = config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
 bool iw_host_keep(const iw_settings_t *settings) {
     return iw_kept_commit(&kept, settings);
+}
+
+bool iw_host_recall(iw_learnt_t *out_learnt) {
+    return iw_kept_learnt(&kept, out_learnt);
+}
+
+bool iw_host_remember(const iw_learnt_t *learnt) {
+    return iw_kept_learn(&kept, learnt);
 }
 
 static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
@@ -67,7 +75,7 @@ static void begin(iw_gateway_t *gateway, iw_time_us_t now_us) {
         .estop = estop,
         .bitrate_hz = IW_BOARD_APB1_HZ / IW_BIT_PRESCALER / IW_BIT_QUANTA,
         .sample_point_permille = (1U + IW_BIT_BS1) * 1000U / IW_BIT_QUANTA,
-        .settings = kept.settings,
+        .settings = iw_settings_from(&gateway->config, track_mm),
         .track_mm = track_mm,
         .rate_max_hz = RATE_MAX_HZ,
         .boot = iw_boot_id(kept.power_ons),

@@ -7,18 +7,6 @@
 /// Nobody measures a tyre better.
 #define TOLERANCE_PERCENT 2U
 
-/// Where an item is configured; NULL: nowhere, and its value is "yes".
-static const char *key_of(iw_ledger_item_t item) {
-    static const char *const keys[IW_LEDGER_ITEMS] = {
-        [IW_LEDGER_SETPOINT_TYPE] = "wheels.setpoint_type", [IW_LEDGER_CURRENT_ROLE] = "wheels.current_role",
-        [IW_LEDGER_FORCE_UNIT_LEFT] = "left.force_unit",    [IW_LEDGER_FORCE_UNIT_RIGHT] = "right.force_unit",
-        [IW_LEDGER_MOUNT_SIGN_LEFT] = "left.invert",        [IW_LEDGER_MOUNT_SIGN_RIGHT] = "right.invert",
-        [IW_LEDGER_WHEEL_RADIUS] = "wheels.radius_mm",      [IW_LEDGER_TRACK] = "wheels.track_mm",
-        [IW_LEDGER_GEAR_RATIO] = "wheels.gear_ratio",
-    };
-    return keys[item];
-}
-
 static bool is_near(uint32_t found, uint32_t wanted) {
     const uint32_t off = (found > wanted) ? found - wanted : wanted - found;
     return off * 100U <= wanted * TOLERANCE_PERCENT;
@@ -52,7 +40,7 @@ static bool has_failed(iw_host_t *self, iwn_error_t error, const char *text) {
 /// False, with `self->refusal`, if the request's value is none of the item's.
 static bool compare(iw_host_t *self, bool *out_same) {
     const iwn_request_t *const request = &self->request;
-    const char *const key = key_of(request->item);
+    const char *const key = iw_learnt_key(request->item);
     const bool is_told = request->value[0] != '\0';
     char value[IW_SETTINGS_TEXT];
     iw_settings_t found = self->place.settings;
@@ -77,9 +65,16 @@ static bool compare(iw_host_t *self, bool *out_same) {
 
 void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json) {
     const iw_ledger_entry_t *const entry = &iw_host_look(self)->assumed[item];
-    const char *const key = key_of(item);
-    char value[IW_SETTINGS_TEXT] = "yes";
-    const bool is_set = key == NULL || iw_settings_value(&self->place.settings, key, value);
+    const char *const key = iw_learnt_key(item);
+    char plain[IW_SETTINGS_TEXT] = "yes";
+    char whose[IW_SETTINGS_TEXT];
+    char value[2U * IW_SETTINGS_TEXT + 16U];
+    iwn_text_t text = iwn_text_begin(value, sizeof value);
+    const bool is_set = key == NULL || iw_settings_value(&self->place.settings, key, plain);
+    IWN_TEXT_JOIN(&text, plain);
+    if (item == IW_LEDGER_GEAR_RATIO && iw_settings_value(&self->place.settings, "wheels.rpm_of", whose)) {
+        IWN_TEXT_JOIN(&text, ", rpm of the ", whose); // As the daemon says it.
+    }
     iwn_out_text(json, "item", iwn_ledger_item_name(item));
     iwn_out_text(json, "state", iwn_ledger_state_name(entry->state));
     iwn_out_text(json, "evidence", iwn_evidence_name(entry->evidence));

@@ -47,6 +47,14 @@ iwn_surroundings_t iw_host_around(const iw_host_t *self, const iw_snapshot_t *se
                 .sample_point_permille = place->sample_point_permille},
         .estop = {.line = place->estop, .answer = self->estop_high ? 1 : 0, .present = true},
     };
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        const iw_learnt_zero_t *const zero = &self->zero[side];
+        const bool measured = zero->from == IW_OFFSET_ESTIMATED || zero->from == IW_OFFSET_OPERATOR;
+        around.zero[side] = (iwn_zero_note_t){.from = (iw_offset_provenance_t)zero->from,
+                                              .samples = measured ? IW_FORCE_WINDOW_SAMPLES : 0U,
+                                              .deviation_mN = zero->deviation_mN,
+                                              .drift_mN = zero->drift_mN};
+    }
     for (unsigned i = 0; i < IWN_LINE_CHANNELS; i++) {
         const iw_host_client_t *const client = &self->client[i];
         around.clients += (client->id != IW_CLIENT_NONE) ? 1U : 0U;
@@ -177,6 +185,40 @@ static void take_line(iw_host_t *self, const iwn_line_t *line) {
     }
 }
 
+/// Before the wheels are heard: what this run measures comes on top.
+static void recall(iw_host_t *self) {
+    iw_learnt_t learnt;
+    if (iw_host_recall(&learnt)) {
+        iw_learnt_restore(&learnt, &self->place.settings, self->place.gateway, self->zero);
+        self->memory = IW_MEMORY_KEPT;
+    }
+}
+
+bool iw_host_is_silent(const iw_host_t *self) {
+    return iw_gateway_state(self->place.gateway) == IW_STATE_LISTENING && !iw_gateway_is_sending(self->place.gateway) &&
+           !iw_gateway_arming(self->place.gateway);
+}
+
+/// Looks now and then, in the silence, whether there is anything that flash has not.
+static void learn(iw_host_t *self, const iw_snapshot_t *seen) {
+    iw_learnt_t now;
+    iw_learnt_t kept;
+    if (!iw_host_is_silent(self) || self->learn_us == 0U || self->restart_us != 0U) {
+        self->learn_us = seen->at_us + IW_LEARNT_SILENT_US;
+        return;
+    }
+    if (seen->at_us < self->learn_us) {
+        return;
+    }
+    self->learn_us = seen->at_us + IW_LEARNT_SILENT_US;
+    memset(&kept, 0, sizeof kept);
+    (void)iw_host_recall(&kept);
+    iw_learnt_note(&now, seen, &self->place.settings, self->zero);
+    if (iw_learnt_differs(&now, &kept)) {
+        self->memory = iw_host_remember(&now) ? IW_MEMORY_KEPT : IW_MEMORY_FAILED;
+    }
+}
+
 void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t now_us) {
     self->place = *place;
     self->now_us = now_us;
@@ -188,6 +230,7 @@ void iw_host_init(iw_host_t *self, const iw_host_place_t *place, iw_time_us_t no
     self->staged = place->settings;
     iwn_receiver_init(&self->receiver, self->in, sizeof self->in, false);
     iwn_why_sentence(&self->stop.stop, &(iwn_why_context_t){0}, self->stop.sentence, sizeof self->stop.sentence);
+    recall(self);
     iw_host_tell_link(self);
 }
 
@@ -288,6 +331,7 @@ iw_time_us_t iw_host_tell(iw_host_t *self, const iw_snapshot_t *seen, bool estop
     }
     pay(self, seen);
     iw_host_tell_fault(self);
+    learn(self, seen);
     const bool armed = seen->state == IW_STATE_ARMED;
     if (self->now_us - self->linked_us >= IW_HOST_LINK_US ||
         (armed && self->now_us - self->stamped_us >= IW_HOST_LINK_ARMED_US)) {

@@ -16,7 +16,7 @@
 #ifndef IW_STM32_HOST_H
 #define IW_STM32_HOST_H
 
-#include "settings.h"
+#include "learnt.h"
 
 #include "iwheel/gateway.h"
 #include "iwheel_northbound/line.h"
@@ -59,8 +59,18 @@ typedef struct {
     char name[IWN_NAME_MAX + 1U];
 } iw_host_client_t;
 
+/// Whether what is learnt of the wheels is kept, as the daemon tells it.
+typedef enum {
+    IW_MEMORY_NEW = 0, ///< Nothing has been, yet.
+    IW_MEMORY_KEPT,
+    IW_MEMORY_FAILED,
+} iw_memory_t;
+
 /// What was last told to those who watch.
 typedef struct {
+    iw_time_us_t offset_us[IW_SIDES]; ///< Of the zero in force, and the two after it.
+    int32_t offset_mN[IW_SIDES];
+    uint8_t provenance[IW_SIDES]; ///< iw_offset_provenance_t.
     iw_state_t state;
     iw_bus_state_t bus;
     iw_client_t holder;
@@ -116,6 +126,9 @@ typedef struct {
     char estop_reason[IWN_REASON_MAX + 1U];
     iw_settings_t staged; ///< By `config`; in force after a commit and the start that follows it.
     bool has_staged;
+    iw_learnt_zero_t zero[IW_SIDES]; ///< Where the zeros in force come from.
+    iw_time_us_t learn_us;           ///< Nothing that was learnt is written before.
+    iw_memory_t memory;
     iw_time_us_t restart_us; ///< A commit was answered: begin anew then, or when the answer is on the wire; 0: not.
     union {
         iwn_work_t work;                   ///< While a request is read, ...
@@ -169,6 +182,13 @@ const char *iw_host_name(iw_host_t *self, iw_client_t id, unsigned text);
 
 /// By the image: keeps a configuration for the next start. False: it could not, and the one of before stays.
 bool iw_host_keep(const iw_settings_t *settings);
+/// By the image: what was learnt of the wheels before. False: nothing.
+bool iw_host_recall(iw_learnt_t *out_learnt);
+/// By the image: keeps what was learnt. False: it could not.
+bool iw_host_remember(const iw_learnt_t *learnt);
+
+/// Nothing is sent, and nothing has been for the whole hold: what the flash costs in time, no wheel waits for.
+bool iw_host_is_silent(const iw_host_t *self);
 
 /// True once the board is to begin anew.
 bool iw_host_wants_restart(const iw_host_t *self);

@@ -113,6 +113,18 @@ void iw_host_tell_lost(iw_host_t *self, iw_host_client_t *client) {
     }
 }
 
+static void write_memory(const iw_host_t *self, iwn_out_t *json) {
+    static const char *const states[] = {
+        [IW_MEMORY_NEW] = "new", [IW_MEMORY_KEPT] = "kept", [IW_MEMORY_FAILED] = "failed"};
+    iwn_out_open(json, "memory", '{');
+    iwn_out_text(json, "file", "flash");
+    iwn_out_text(json, "state", states[self->memory]);
+    iwn_out_text(json, "reason",
+                 (self->memory == IW_MEMORY_FAILED) ? "it has no room left, or fails; switch the board off and on"
+                                                    : NULL);
+    iwn_out_close(json, '}');
+}
+
 void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_snapshot_t *seen, const iwn_id_t *id) {
     const iwn_surroundings_t around = iw_host_around(self, seen);
     char *const data = &self->big[IWN_LINE_PREFIX];
@@ -122,12 +134,13 @@ void iw_host_send_status(iw_host_t *self, iw_host_client_t *client, const iw_sna
     iwn_out_open(&json, "ledger", '{');
     for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
         iwn_out_open(&json, iwn_ledger_item_name((iw_ledger_item_t)item), '{');
+        // No more of it: while a snapshot is written, the e-stop waits.
         iwn_out_text(&json, "state", iwn_ledger_state_name(seen->assumed[item].state));
         iwn_out_text(&json, "evidence", iwn_evidence_name(seen->assumed[item].evidence));
         iwn_out_close(&json, '}');
     }
     iwn_out_close(&json, '}');
-    iwn_out_null(&json, "memory");
+    write_memory(self, &json);
     iwn_out_null(&json, "gaps");
     iwn_tell_rest(seen, &around, &json);
     size_t whole = 0;

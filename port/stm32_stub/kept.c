@@ -1,51 +1,68 @@
 // SPDX-License-Identifier: MIT
 #include "kept.h"
 
-#include <string.h>
-
-/// The layout of a payload. What grows is put to the end.
-typedef struct {
-    uint32_t power_ons;
-    uint32_t has_settings;
-    iw_settings_t settings;
+/// The layout of a payload. What grows is put to the end: an older record has zeros there.
+typedef union {
+    struct {
+        uint32_t power_ons;
+        uint32_t has_settings;
+        iw_settings_t settings;
+        uint32_t has_learnt;
+        iw_learnt_t learnt;
+    } is;
+    uint32_t words[IW_STORE_WORDS];
 } record_t;
 
-IW_STATIC_ASSERT(sizeof(record_t) <= IW_STORE_WORDS * 4U, a_record_fits);
+IW_STATIC_ASSERT(sizeof(record_t) == IW_STORE_WORDS * sizeof(uint32_t), a_record_fits);
 
-static bool write(iw_kept_t *self, const iw_settings_t *settings, bool may_erase) {
-    const record_t record = {
-        .power_ons = self->power_ons,
-        .has_settings = (settings != NULL) ? 1U : 0U,
-        .settings = (settings != NULL) ? *settings : (iw_settings_t){{0}},
-    };
-    uint32_t payload[IW_STORE_WORDS] = {0};
-    memcpy(payload, &record, sizeof record);
-    return iw_store_write(&self->store, payload, may_erase);
+/// Fewer blank slots, and a start makes room: one for a configuration, one for what is learnt.
+#define ROOM_LEAST 2U
+
+static void read(const iw_kept_t *self, record_t *out_record) {
+    if (!iw_store_read(&self->store, out_record->words)) {
+        *out_record = (record_t){.words = {0}};
+    }
 }
 
-void iw_kept_open(iw_kept_t *self, bool power_on) {
-    uint32_t payload[IW_STORE_WORDS];
-    record_t record = {.power_ons = 0};
+void iw_kept_open(iw_kept_t *self, bool power_on, bool is_urgent) {
+    record_t record;
+    iw_store_open(&self->store);
+    read(self, &record);
+    record.is.power_ons += power_on ? 1U : 0U;
+    self->power_ons = record.is.power_ons;
+    const bool is_short = iw_store_blank(&self->store) < ROOM_LEAST;
+    if ((power_on || (is_short && !is_urgent)) && !iw_store_write(&self->store, record.words, !is_urgent)) {
+        self->power_ons = power_on ? 0U : self->power_ons;
+    }
+}
+
+bool iw_kept_settings(const iw_kept_t *self, iw_settings_t *out_settings) {
+    record_t record;
     iwn_text_t nowhere = iwn_text_begin((char[1]){0}, 1);
-    if (iw_store_open(&self->store, payload)) {
-        memcpy(&record, payload, sizeof record);
-    }
-    self->power_ons = record.power_ons;
-    self->settings = record.settings;
-    self->has_settings = record.has_settings != 0U && iw_settings_check(&record.settings, &nowhere);
-    if (power_on) {
-        self->power_ons++;
-        if (!write(self, self->has_settings ? &self->settings : NULL, true)) {
-            self->power_ons = 0;
-        }
-    }
+    read(self, &record);
+    *out_settings = record.is.settings;
+    return record.is.has_settings != 0U && iw_settings_check(out_settings, &nowhere);
+}
+
+bool iw_kept_learnt(const iw_kept_t *self, iw_learnt_t *out_learnt) {
+    record_t record;
+    read(self, &record);
+    *out_learnt = record.is.learnt;
+    return record.is.has_learnt != 0U;
 }
 
 bool iw_kept_commit(iw_kept_t *self, const iw_settings_t *settings) {
-    if (!write(self, settings, false)) {
-        return false;
-    }
-    self->settings = *settings;
-    self->has_settings = true;
-    return true;
+    record_t record;
+    read(self, &record);
+    record.is.has_settings = 1U;
+    record.is.settings = *settings;
+    return iw_store_write(&self->store, record.words, false);
+}
+
+bool iw_kept_learn(iw_kept_t *self, const iw_learnt_t *learnt) {
+    record_t record;
+    read(self, &record);
+    record.is.has_learnt = 1U;
+    record.is.learnt = *learnt;
+    return iw_store_blank(&self->store) >= ROOM_LEAST && iw_store_write(&self->store, record.words, false);
 }

@@ -128,7 +128,7 @@ int main(void) {
     static iw_commander_t commander;
     const bool power_on = iw_clock_was_power_on();
     const bool restarted = iw_marker_take(power_on);
-    iw_commander_open(power_on);
+    iw_commander_open(power_on, restarted);
     iw_watchdog_start();
     iw_pins_init();
     wait_for_crystal();

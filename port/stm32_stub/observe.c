@@ -124,6 +124,31 @@ static void observe_ledger(iw_host_t *self, const iw_snapshot_t *seen) {
     }
 }
 
+/// Of the zero in force: where it comes from is noted, then told. A tare has been noted with its window.
+static void observe_offset(iw_host_t *self, unsigned side, const iw_force_t *force) {
+    iw_host_told_t *const told = &self->told;
+    const iw_offset_provenance_t former = (iw_offset_provenance_t)told->provenance[side];
+    const bool tared = force->provenance == IW_OFFSET_OPERATOR && force->offset_us != told->offset_us[side];
+    if (force->provenance == former && force->offset_mN == told->offset_mN[side] && !tared) {
+        return;
+    }
+    if ((force->provenance == IW_OFFSET_ESTIMATED || force->provenance == IW_OFFSET_WHEEL) &&
+        force->offset_us != IW_NEVER) {
+        static const iw_force_quality_t none = {0};
+        self->zero[side] = iw_learnt_zero(force, (force->provenance == IW_OFFSET_ESTIMATED) ? &force->quality : &none);
+    }
+    iwn_out_t json = begin(self, "offset");
+    iwn_out_text(&json, "side", (side == (unsigned)IW_LEFT) ? "left" : "right");
+    iwn_out_known(&json, "offset_mN", force->provenance != IW_OFFSET_NONE, force->offset_mN);
+    iwn_out_text(&json, "provenance", iwn_offset_word(force->provenance, force->offset_us));
+    iwn_out_known(&json, "before_mN", former != IW_OFFSET_NONE, told->offset_mN[side]);
+    iwn_out_text(&json, "before_provenance", iwn_offset_word(former, told->offset_us[side]));
+    iw_host_send_event(self, IWN_TOPIC_FORCE, &json);
+    told->provenance[side] = (uint8_t)force->provenance;
+    told->offset_mN[side] = force->offset_mN;
+    told->offset_us[side] = force->offset_us;
+}
+
 void iw_observe(iw_host_t *self, const iw_snapshot_t *seen) {
     const bool first = !self->told.started;
     self->told.started = true;
@@ -134,4 +159,7 @@ void iw_observe(iw_host_t *self, const iw_snapshot_t *seen) {
     observe_lease(self, seen);
     observe_state(self, seen, first);
     observe_ledger(self, seen);
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        observe_offset(self, side, seen->wheel[side].force);
+    }
 }

@@ -44,7 +44,7 @@ static bool is_blank(unsigned page, unsigned slot) {
     return true;
 }
 
-bool iw_store_open(iw_store_t *self, uint32_t out_payload[IW_STORE_WORDS]) {
+void iw_store_open(iw_store_t *self) {
     *self = (iw_store_t){.sequence = 0};
     for (unsigned page = 0; page < IW_FLASH_PAGES; page++) {
         for (unsigned slot = 0; slot < SLOTS; slot++) {
@@ -55,6 +55,9 @@ bool iw_store_open(iw_store_t *self, uint32_t out_payload[IW_STORE_WORDS]) {
             }
         }
     }
+}
+
+bool iw_store_read(const iw_store_t *self, uint32_t out_payload[IW_STORE_WORDS]) {
     for (unsigned word = 0; word < IW_STORE_WORDS && self->sequence != 0U; word++) {
         out_payload[word] = read(self->page, self->slot, 1U + word);
     }

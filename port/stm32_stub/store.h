@@ -25,8 +25,11 @@ typedef struct {
     bool failed; ///< The flash did not take a record.
 } iw_store_t;
 
-/// Finds the newest record. False if there is none: `out_payload` is left alone.
-bool iw_store_open(iw_store_t *self, uint32_t out_payload[IW_STORE_WORDS]);
+/// Finds the newest record.
+void iw_store_open(iw_store_t *self);
+
+/// Its payload. False if there is none: `out_payload` is left alone.
+bool iw_store_read(const iw_store_t *self, uint32_t out_payload[IW_STORE_WORDS]);
 
 /// Writes a record. `may_erase`: before the watchdog runs and with nothing being sent, so that it may take seconds;
 /// else false when no slot is blank. False, too, if the flash fails.

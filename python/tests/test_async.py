@@ -175,6 +175,8 @@ class Async(RigCase):
             async with AsyncGateway(self.socket) as gateway:
                 self.assertEqual((await gateway.confirm("wheel_radius", 192.0))["state"], "confirmed")
                 self.assertEqual((await gateway.confirm("track", 540, how="a tape"))["how"], "a tape")
+                with self.assertRaises(Refused):
+                    await gateway.config("drive.lease_ms", 300)
                 self.assertTrue((await gateway.watch("state", rate_hz=500.0))["limited"])
                 await gateway.watch()
                 await asyncio.sleep(3)

@@ -422,6 +422,14 @@ class Answers(RigCase):
             with self.assertRaises(ValueError):
                 gateway.confirm("wheel_radius", 192.5)
 
+    def test_config_of_a_daemon_is_refused_and_its_file_named(self):
+        with Gateway(self.socket) as gateway:
+            for words in ({}, {"key": "drive.lease_ms", "value": 300}, {"commit": True}, {"commit": False}):
+                with self.assertRaisesRegex(Refused, "configuration is a file"):
+                    gateway.config(**words)
+            with self.assertRaises(ValueError):
+                gateway.config("drive.lease_ms", 300.5)
+
     def test_watch_tells_what_was_granted_and_stops_tell_the_state(self):
         with Gateway(self.socket) as gateway:
             self.assertEqual(gateway.watch("state", rate_hz=500), {"topics": ["state"], "rate_hz": 100, "limited": True})

@@ -144,6 +144,12 @@ class FakeGateway:
                 "figure": None, "value": "192", "reason": "the operator \x1b says so",
                 "disabled": "no distance; correct radius_mm" if wrong else None}
 
+    def on_config(self, _connection, request):
+        if request.get("key", "").startswith("bus."):
+            return {"ok": False, "error": "bad_value", "message": "bus.interface is no key of this gateway"}
+        keys = [{"key": "wheels.setpoint_type", "value": None}, {"key": "drive.lease_ms", "value": request.get("value", "200")}]
+        return {"ok": True, "keys": keys, "staged": "key" in request, "restarts": request.get("commit", False)}
+
     def count(self, cmd):
         return sum(1 for _, request in self.requests if request["cmd"] == cmd)
 

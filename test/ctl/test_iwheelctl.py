@@ -383,6 +383,14 @@ class Showing(WithGateway):
                 return {"ok": True, "number": 0, "sentence": ""}
         self.assertEqual("no stop since the gateway's start\n", self.ctl("why", gateway=self.serve(Empty))[1])
 
+    def test_why_of_a_board_without_a_clock_of_the_day_tells_the_age_alone(self):
+        stop = {"ok": True, "number": 1, "sentence": "somebody said stop", "latched": False, "age_ms": 553}
+        for wall_us, wanted in ((None, r"\n0\.553 s ago; it did not latch\n"), (10**15, r"\nat 2001-09-0.*, 0\.553 s ago; it did not latch\n")):
+            gateway = FakeGateway()
+            self.addCleanup(gateway.close)
+            gateway.on_why = lambda *_, told=wall_us: {**stop, "wall_us": told}
+            self.assertRegex(self.ctl("why", gateway=gateway)[1], wanted)
+
     def test_why_without_a_stop_says_so(self):
         code, out, _, _ = self.ctl("why")
         self.assertEqual((0, "no stop since the gateway's start\n"), (code, out))
@@ -424,6 +432,30 @@ class Asking(WithGateway):
         self.assertEqual((0, "left: the present force is zero now, 8.000 N (40 samples, 0.110 N noise); it was -- (none)\n"), (code, out))
         self.assertEqual("left", self.gateway.requests[0][1]["side"])
         self.assertEqual(2, self.ctl("tare")[1].count("zero now, 8.000 N"))
+
+    def test_config_shows_stages_and_commits_and_says_what_is_not_in_force(self):
+        self.assertEqual("wheels.setpoint_type is not set\ndrive.lease_ms = 200\n", self.ctl("config")[1])
+        _, out, _, _ = self.ctl("config", "set", "drive.lease_ms", "300")
+        self.assertEqual("drive.lease_ms = 300\nstaged, and not in force yet; next: iwheelctl config commit (or iwheelctl config discard)\n", out)
+        self.assertEqual("committed: the board starts anew with it, and closes its clients; they come again\n", self.ctl("config", "commit")[1])
+        self.assertEqual("what was staged is forgotten\n", self.ctl("config", "discard")[1])
+        self.assertEqual([{}, {"key": "drive.lease_ms", "value": "300"}, {"commit": True}, {"commit": False}],
+                         [{name: value for name, value in request.items() if name not in ("cmd", "id")} for _, request in self.gateway.requests])
+        code, _, err, _ = self.ctl("config", "set", "bus.interface", "can1")
+        self.assertEqual((1, True), (code, "no key of this gateway" in err), err)
+        for words in (("set",), ("set", "drive.lease_ms"), ("set", "a", "b", "c"), ("show", "me"), ("write",)):
+            self.assertEqual(64, self.ctl("config", *words)[0], words)
+
+    def test_a_ledger_in_figures_alone_is_told_in_the_same_words(self):
+        figures = {"force_unit_left": {"state": "confirmed", "evidence": "bus", "figure": 10012, "value": "cN"},
+                   "track": {"state": "assumed", "evidence": "none", "figure": None, "value": "540"}, "dlc": {"state": "confirmed", "evidence": "bus"},
+                   "wheel_radius": {"state": "contradicted", "evidence": "operator", "figure": None, "value": "192", "reason": None, "disabled": None}}
+        self.gateway.on_status = lambda *_: {"ok": True, **snapshot(ledger=figures)}
+        out = " ".join(self.ctl("ledger")[1].split())
+        for text in ("dlc: the bus showed it", "force_unit_left = cN: at rest, raw / offset is 10.012", "track = 540: not documented, not verified",
+                     "wheel_radius = 192: the operator found something else", "disabled: no speed in mm/s and no distance; correct radius_mm"):
+            self.assertIn(text, out)
+        self.assertIn("the operator found something else", " ".join(self.ctl("status")[1].split()))
 
     def test_confirm_sends_item_and_value_and_tells_what_that_makes_of_it(self):
         code, out, _, _ = self.ctl("confirm", "wheel_radius")
@@ -507,6 +539,24 @@ class Driving(WithGateway):
         spacing = statistics.median(after - before for before, after in zip(times, times[1:]))
         self.assertLessEqual(len(times), most)
         self.assertTrue(0.8 * seconds < spacing < 1.5 * seconds, spacing)
+
+    def test_a_command_lost_on_a_serial_line_does_not_end_the_drive_but_a_second_of_them_does(self):
+        class Lossy(FakeGateway):
+            last = 10**6  # Of the commands, after which none is obeyed.
+
+            def on_drive(self, connection, request):
+                done = super().on_drive(connection, request)
+                lost = self.driving > 1 and (self.driving % 3 == 0 or self.driving > self.last)
+                return {"ok": False, "error": "stale_command", "message": "lost on the line"} if lost else done
+
+        for last, wanted in ((10**6, 0), (20, 75)):
+            gateway = Lossy()
+            gateway.last = last
+            self.addCleanup(gateway.close)
+            code, _, err, _ = self.drive("200", "200", "--for", "2s", gateway=gateway)
+            self.assertEqual(wanted, code, err)
+            self.assertEqual(wanted == 75, "did not answer a drive command for 1 s" in err, err)
+            self.assert_stopped_once(gateway)
 
     def test_arms_drives_at_a_third_of_the_lease_and_stops(self):
         code, out, err, seconds = self.drive("-300", "250", "--for", "1s")

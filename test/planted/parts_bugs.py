@@ -19,6 +19,8 @@ STATUS_LEDGER = "app/gateway/ledger/knowledge_json.c"
 LINK, QUEUE, ASKING = "client/c/src/connection.c", "client/c/src/queue.c", "client/c/src/requests.c"
 TALK, FIELDS = ("unit_client_talk",), ("unit_client_fields",)
 READER, CHECKER, SCANNER, WRITER = (f"northbound/src/{name}.c" for name in ("request", "json_in", "json_scan", "json_out"))
+RELAY_QUEUE, RELAY_LINK, LEARNT = "bridge/serial/queue.c", "bridge/serial/link.c", "port/stm32_stub/learnt.c"
+LINE_QUEUE, LINE_LINK, KEPT = ("unit_serial_queue",), ("unit_serial_link",), ("unit_learnt",)
 JSON, REQUEST, LINES = ("unit_json_in",), ("unit_northbound_request",), ("unit_json_out",)
 
 PARTS = [
@@ -188,6 +190,20 @@ PARTS = [
     Bug("learn-pose-that-wraps-jumps", "tools", LEARN, "(step > INT16_MAX) ? 65536U - step : step", "step", ("unit_ctl_learn",)),
     Bug("learn-turns-over-a-gap", "tools", LEARN, "gap_us <= 0 || gap_us >= RPM_GAP_US", "gap_us <= 0", ("unit_ctl_learn",)),
     Bug("learn-mixed-sender-is-one", "tools", LEARN, "(frame->mark == CANDUMP_SENT) ? 1U : 0U", "frame->mark == CANDUMP_SENT ? 1U : self->sent > 0U ? 1U : 0U", ("unit_ctl_learn",)),
+    # The relay to a board, and what a board keeps of its wheels.
+    Bug("relay-sends-what-waited", "serial", RELAY_QUEUE, "return (request->kind == SERIAL_MOVES) ? SERIAL_FRESH_US : SERIAL_GRANT_US;", "return SERIAL_GRANT_US;", LINE_QUEUE),
+    Bug("relay-sends-one-after-another", "serial", RELAY_QUEUE, "unanswered = unanswered || (request->state == SERIAL_SENT && !holds_no_more(self, request, now_us));", "", LINE_QUEUE),
+    Bug("relay-sends-the-command-before", "serial", RELAY_QUEUE, "if (request->kind == SERIAL_MOVES && newer->kind == SERIAL_MOVES) {", "if (false) {", LINE_QUEUE),
+    Bug("relay-moves-after-a-stop", "serial", RELAY_QUEUE, "newer->kind == SERIAL_STOPS && (request->kind", "false && (request->kind", LINE_QUEUE),
+    Bug("relay-stop-waits-its-turn", "serial", RELAY_QUEUE, "(i < hurried || (!unanswered && !stops_only))", "(!unanswered && !stops_only)", LINE_QUEUE),
+    Bug("relay-stop-is-said-once", "serial", RELAY_QUEUE, "const bool first = request->state", "if (again) { continue; } const bool first = request->state", LINE_QUEUE),
+    Bug("relay-quotes-the-newest-stamp", "serial", RELAY_LINK, "if (stamp->heard_us <= then_us) {", "{", LINE_LINK),
+    Bug("relay-overlooks-a-start", "serial", RELAY_LINK, "if (self->linked && strcmp(boot, self->boot) == 0) {", "if (self->linked) {", LINE_LINK),
+    Bug("relay-overlooks-a-clock-that-fell", "serial", RELAY_LINK, "self->linked && self->stamps > 0U && line->t_us < newest(self)->t_us;", "false;", LINE_LINK),
+    Bug("board-believes-evidence-for-another-setting", "stm32", LEARNT, "if (is_for(item, &self->settings, settings)) {", "{", KEPT),
+    Bug("board-stored-zero-is-a-tare", "stm32", LEARNT, "(zero->from == IW_OFFSET_OPERATOR) ? IW_OFFSET_OPERATOR : IW_OFFSET_STORED", "IW_OFFSET_OPERATOR", KEPT),
+    Bug("board-learns-into-the-last-slot", "stm32", "port/stm32_stub/kept.c", "iw_store_blank(&self->store) >= ROOM_LEAST && iw_store_write", "iw_store_write", KEPT),
+    Bug("board-erases-with-wheels-in-motion", "stm32", "port/stm32_stub/kept.c", "(is_short && !is_urgent)) && !iw_store_write(&self->store, record.words, !is_urgent)", "is_short) && !iw_store_write(&self->store, record.words, true)", KEPT),
     # libiwheel-client.
     Bug("client-half-a-command-leaves-later", "client", LINK, "if (result != IWC_OK && sent > 0) {", "if (false) {", TALK),
     Bug("client-drives-pile-up-in-the-socket", "client", ASKING, "*place = id;", "(void)place;", TALK),

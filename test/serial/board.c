@@ -127,6 +127,16 @@ bool iw_host_keep(const iw_settings_t *settings) {
     return false;
 }
 
+bool iw_host_recall(iw_learnt_t *out_learnt) {
+    (void)out_learnt;
+    return false;
+}
+
+bool iw_host_remember(const iw_learnt_t *learnt) {
+    (void)learnt;
+    return false;
+}
+
 static void must(bool holds, const char *what) {
     if (!holds) {
         (void)fprintf(stderr, "serial_board: %s\n", what);

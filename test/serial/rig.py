@@ -145,15 +145,16 @@ class SerialRig(Rig):
     def start_relay(self, *extra):
         with open(self.path("serial.conf"), "w", encoding="utf-8") as file:
             file.write("[northbound]\ngroup = none\nwatch_group = none\nmode = 0600\nwatch_mode = 0600\n")
+        self.said_before = len(self.gateway.text()) if self.gateway else 0
         self.gateway = Process(self.relay_command(*extra), self.path("relay.out"))
         self.processes.append(self.gateway)
         wait_connect(self.path("gateway.sock"), self.gateway).close()
         return self.gateway
 
     def await_relay(self, text, seconds=4.0):
-        """Until the relay has said this; False after that time."""
+        """Until this relay, not one before it, has said this; False after that time."""
         end = time.monotonic() + seconds
-        while text not in self.gateway.text():
+        while text not in self.gateway.text()[self.said_before:]:
             if time.monotonic() > end:
                 return False
             time.sleep(0.01)
@@ -177,6 +178,14 @@ class SerialRig(Rig):
     def moving(self, since_us):
         """Nonzero setpoints on the bus since then."""
         return [t_us for t_us, _, speed in self.bus.setpoints(since_us) if speed]
+
+    def times(self, count):
+        """How often something is repeated."""
+        return count
+
+    def note_after(self, wait_us, kind, **fields):
+        """On the timeline, so much later than now."""
+        self.timeline.append(Event(now_us() + wait_us, kind, **fields))
 
     def freeze(self, process, seconds):
         process.signal(signal.SIGSTOP)

@@ -213,13 +213,17 @@ class Rig:
             self.settings.setdefault(section, {}).update(keys)
         self.write_config()
         self.prepare()
-        self.sim = Sim(self, sim_args)
+        self.sim = self.start_wheels(sim_args)
         self.bus = self.listen()
 
     # What a rig on another bus does in another way (test/kernel) ------------------------------------------------------
 
     def prepare(self):
         """Before anything is started."""
+
+    def start_wheels(self, sim_args):
+        """Two wheels and their bus."""
+        return Sim(self, sim_args)
 
     def sim_arguments(self):
         """More arguments of the simulator."""

@@ -350,6 +350,77 @@ def power_cut_while_writing(rig):
     rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
 
 
+def learnt_in_flash(rig):
+    """What is learnt of the wheels is written only after two seconds of silence, comes back after power-off with where it came from, and is
+    forgotten with the setting it was found for."""
+    host, flash = start(rig), rig.machine.flash
+    assert host.ask(1, {"cmd": "status"})["memory"] == {"file": "flash", "state": "new", "reason": None}
+    host.ask(1, {"cmd": "watch", "topics": ["force"], "rate_hz": 1})
+    host.arm()
+    before = flash.operations
+    host.keep_driving(SPEED, 3000)
+    assert host.ask(1, {"cmd": "confirm", "item": "wheel_radius"})["state"] == "confirmed"
+    host.ask(1, {"cmd": "stop"})
+    while host.ask(1, {"cmd": "status"})["state"] != "listening":
+        assert flash.operations == before, "written while something can move"
+        rig.run(20 * MS)
+    rig.run(1900 * MS)
+    assert flash.operations == before, "written before two seconds of silence have passed"
+    rig.run(300 * MS)
+    assert flash.operations > before, "not written"
+    rig.run(2 * SECOND) # A tare wants two quiet seconds.
+    tared = host.ask(1, {"cmd": "tare", "side": "left"})["left"]["offset_mN"]
+    rig.run(20 * MS)
+    told = host.events("offset")
+    assert told and (told[-1]["side"], told[-1]["provenance"], told[-1]["offset_mN"]) == ("left", "operator", tared), told
+    rig.run(2300 * MS)
+    now = flash.operations
+    rig.run(5 * SECOND)
+    assert flash.operations == now, "the same is written again"
+    stack = rig.stack_used()
+    rig.machine.lose_power()
+    host.begin_again()
+    rig.run(600 * MS)
+    status = host.ask(1, {"cmd": "status"})
+    left, ledger = status["left"], status["ledger"]
+    assert status["memory"]["state"] == "kept"
+    assert (left["offset_provenance"], left["offset_origin"], left["force_offset_mN"], left["offset_samples"]) == ("stored", "operator", tared, 40), left
+    assert ledger["wheel_radius"] == {"state": "confirmed", "evidence": "operator"}, ledger["wheel_radius"]
+    assert ledger["dlc"]["state"] == "confirmed" and ledger["dlc"]["evidence"] == "bus"
+    host.ask(1, {"cmd": "config", "key": "wheels.radius_mm", "value": 180})
+    assert host.ask(1, {"cmd": "config", "commit": True})["restarts"]
+    host.begin_again()
+    status = host.ask(1, {"cmd": "status"})
+    assert status["ledger"]["wheel_radius"]["state"] == "assumed" and status["left"]["force_offset_mN"] == tared
+    rig.expect_resets("power", "software")
+    rig.note(f"stack {stack} B")
+
+
+def power_cut_while_learning(rig):
+    """Power fails after any number of words of what is learnt: it is the old or the new one, and the configuration stays."""
+    host, says, known = start(rig), True, "assumed"
+    host.ask(1, {"cmd": "config", "key": "drive.lease_ms", "value": 250})
+    host.ask(1, {"cmd": "config", "commit": True})
+    host.begin_again()
+    cuts = (*range(0, 125, 14), 140, 30, 140) if rig.machine.flash.unit == 2 else (*range(0, 62, 7), 70, 30, 70)
+    for cut in cuts:
+        says = known != "confirmed"
+        host.ask(1, {"cmd": "confirm", "item": "track", **({} if says else {"value": 700})})
+        rig.machine.flash.cut_after = cut
+        rig.run(2500 * MS)
+        rig.machine.flash.cut_after = None
+        rig.machine.lose_power()
+        host.begin_again()
+        now, status = keys_of(host.ask(1, {"cmd": "config"})), host.ask(1, {"cmd": "status"})
+        assert now["drive.lease_ms"] == "250", now
+        after = status["ledger"]["track"]["state"]
+        assert after in (known, "confirmed" if says else "contradicted"), f"{known} became {after}"
+        known = after
+    rig.expect_resets(*(cause for _, cause in rig.machine.resets))
+    assert known != "assumed", "nothing was ever kept"
+    rig.note(f"{len(cuts)} cuts, {rig.machine.flash.erasures} erasures")
+
+
 def bus_off_driven(rig):
     """Bus-off under a host: latched, told, and nothing moves when the bus is back."""
     host = start_driving(rig)
@@ -439,6 +510,24 @@ def noise_on_the_wire(rig):
     assert not moving(rig, zero.time_ns)
 
 
+def another_rate(rig):
+    """The slowest and the fastest line: a stream of commands drives over it without a gap, and the e-stop is in time."""
+    host = start(rig)
+    host.arm()
+    host.keep_driving(SPEED, 200)
+    begun_ns = rig.machine.now_ns + 200 * MS
+    host.keep_driving(SPEED, 1000)
+    frames = rig.setpoints(begun_ns)
+    assert len(frames) > 70 and all(frame.setpoint()[0] == SPEED for frame in frames), "the line did not carry the commands in time"
+    assert host.ask(1, {"cmd": "status"}, 600)["state"] == "armed" and not host.events("line_error")
+    host.keep_driving(SPEED, 40)
+    rig.machine.board.drive("estop", None)
+    pressed_ns = rig.machine.now_ns
+    rig.run(100 * MS)
+    zero = next(frame for frame in rig.setpoints(pressed_ns) if frame.setpoint() == ZERO)
+    assert zero.time_ns - pressed_ns <= EDGE_TO_ZERO_NS and not moving(rig, zero.time_ns)
+
+
 def crowd(rig):
     """Eight clients, all of whom watch and ask without end: the driver goes on, replies come before events, losses are told."""
     host = start(rig)
@@ -465,5 +554,5 @@ def crowd(rig):
 
 
 SCENARIOS = (talks, both_words_and_turns, lease_alone, close_ends, silent_relay, relay_killed_and_anew, relay_stopped_goes_on, stale_in_every_way,
-             nobody_feeds_another, estop_random, software_estop, reset_in_motion, config_in_flash, power_cut_while_writing, bus_off_driven, hostile_line, noise_on_the_wire, crowd)
-LONG = (both_words_and_turns, estop_random, hostile_line, crowd, reset_in_motion, nobody_feeds_another)
+             nobody_feeds_another, estop_random, software_estop, reset_in_motion, config_in_flash, power_cut_while_writing, learnt_in_flash, power_cut_while_learning, bus_off_driven, hostile_line, noise_on_the_wire, crowd)
+LONG = (both_words_and_turns, estop_random, hostile_line, crowd, reset_in_motion, nobody_feeds_another, power_cut_while_learning)

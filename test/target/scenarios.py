@@ -793,7 +793,8 @@ SCENARIOS = {
     "gateway": gateway_scenarios.SCENARIOS,
 }
 # The STM32F446 has the files of the STM32F407: what may differ is its clock.
-BY_BOARD = {"stm32f103": {**SCENARIOS, "usb": (usb_pins,), "crystal12": (other_crystal,)},
+BY_BOARD = {"stm32f103": {**SCENARIOS, "usb": (usb_pins,), "crystal12": (other_crystal,),
+                          "gateway_slow": (gateway_scenarios.another_rate,), "gateway_fast": (gateway_scenarios.another_rate,)},
             "stm32f407": {**SCENARIOS, "crystal": (other_crystal,)},
             "stm32f446": {"zero": (nominal, console), "clock": (clock_input,), "demo": (crystal_dies,), "gateway": (gateway_scenarios.talks,)}}
 # Long, and what they ask does not depend on the chip's family: on the second board only in ./check --full.
@@ -801,7 +802,8 @@ LONG = (wheel_lost, estop_chatters, demo_profile, demo_second_press_stops, demo_
         stuck_while_listening, time_passes_32_bits_of_microseconds, time_passes_32_bits_of_milliseconds, reset_by_button, reset_again,
         reset_while_listening, silence_is_silent, abort_without_end, reset_after_the_hold, reset_after_unproven_hold, *gateway_scenarios.LONG)
 # image -> of its serial port, where it is not 115200; and the stack that it may use, where it is not 1024.
-BAUD, STACK = {"gateway": host.BAUD}, {"gateway": 1900}
+BAUD = {"gateway": host.BAUD, "gateway_slow": 115_200, "gateway_fast": 2_000_000}
+STACK = dict.fromkeys(BAUD, 1900)
 # image -> what differs around the chip.
 WIRING = {"usb": {"transceiver": "PA11"}, "crystal": {"crystal_hz": 25_000_000}, "crystal12": {"crystal_hz": 12_000_000}}
 OSCILLATOR = {fast_watchdog: 1, hang: 0, loop_stuck: 0, stuck_while_listening: 0, no_crystal: 1, clock_input: 1}

@@ -80,6 +80,16 @@ bool iw_host_keep(const iw_settings_t *settings) {
     return true;
 }
 
+bool iw_host_recall(iw_learnt_t *out_learnt) {
+    (void)out_learnt;
+    return false;
+}
+
+bool iw_host_remember(const iw_learnt_t *learnt) {
+    (void)learnt;
+    return true;
+}
+
 static uint32_t random_below(uint32_t limit) {
     chance = chance * 1664525U + 1013904223U;
     return (uint32_t)((uint64_t)(chance >> 8) * limit >> 24);

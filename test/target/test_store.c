@@ -70,7 +70,8 @@ static void power_up(void) {
 static uint32_t newest(iw_store_t *store) {
     uint32_t found[IW_STORE_WORDS];
     uint32_t wanted[IW_STORE_WORDS];
-    if (!iw_store_open(store, found)) {
+    iw_store_open(store);
+    if (!iw_store_read(store, found)) {
         return 0;
     }
     fill(wanted, found[0] * 244002641U); // The inverse of the factor: which number it was made of.

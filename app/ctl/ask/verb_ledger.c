@@ -4,6 +4,7 @@
 #include "talk/ctl.h"
 #include "talk/words.h"
 #include "text/text.h"
+#include "words/assumption.h"
 
 #include "iwheel_northbound/words.h"
 
@@ -13,12 +14,47 @@
 
 #define LINE 512U
 
+/// A board has no room for sentences: what it tells in figures gets the daemon's words.
+static void explain(const char *name, json_t *entry) {
+    char text[GW_EVIDENCE_SIZE];
+    iw_ledger_item_t item;
+    iw_ledger_entry_t known = {.figure = (int32_t)json_integer_value(json_object_get(entry, "figure"))};
+    if (!iwn_ledger_item_of(name, &item) || json_is_string(json_object_get(entry, "reason"))) {
+        return;
+    }
+    for (int state = 0; state <= (int)IW_LEDGER_CONTRADICTED; state++) {
+        const bool is_it = strcmp(text_word(entry, "state"), iwn_ledger_state_name((iw_ledger_state_t)state)) == 0;
+        known.state = is_it ? (iw_ledger_state_t)state : known.state;
+    }
+    for (int evidence = 0; evidence <= (int)IW_EVIDENCE_OPERATOR; evidence++) {
+        const bool is_it = strcmp(text_word(entry, "evidence"), iwn_evidence_name((iw_evidence_t)evidence)) == 0;
+        known.evidence = is_it ? (iw_evidence_t)evidence : known.evidence;
+    }
+    gw_assumption_evidence(item, &known, &(gw_word_t){"", ""}, text);
+    if (known.evidence == IW_EVIDENCE_BUS && !json_is_integer(json_object_get(entry, "figure"))) {
+        (void)snprintf(text, sizeof text, "the bus showed it");
+    }
+    (void)json_object_set_new(entry, "reason", json_string(text));
+    if (known.state == IW_LEDGER_CONTRADICTED) {
+        (void)json_object_set_new(entry, "disabled", json_string(gw_assumption_cost(item)));
+    }
+}
+
+void ctl_explain_ledger(json_t *ledger) {
+    const char *name = NULL;
+    json_t *entry = NULL;
+    json_object_foreach(ledger, name, entry) {
+        explain(name, entry);
+    }
+}
+
 /// "force_unit_left = cN: at rest, raw / offset is ...", and what a contradiction costs.
 static void print_item(const paper_t *paper, const char *label, tone_t tone, const char *name, const json_t *entry) {
     char line[LINE];
     const char *disabled = json_string_value(json_object_get(entry, "disabled"));
-    (void)snprintf(line, sizeof line, "%.64s = %.64s: %.256s", name, text_word(entry, "value"),
-                   text_word(entry, "reason"));
+    const bool told = json_object_get(entry, "value") != NULL; // A board's snapshot has not all of them.
+    (void)snprintf(line, sizeof line, "%.64s%s%.64s: %.256s", name, told ? " = " : "",
+                   told ? text_word(entry, "value") : "", text_word(entry, "reason"));
     paper_wrap(paper, label, tone, line);
     if (disabled != NULL) {
         (void)snprintf(line, sizeof line, "disabled: %.256s", disabled);
@@ -52,6 +88,7 @@ int verb_ledger(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && !self->json) {
         const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
         json_t *ledger = json_object_get(status, "ledger");
+        ctl_explain_ledger(ledger);
         print_state(&paper, ledger, "contradicted", TONE_BAD);
         print_state(&paper, ledger, "confirmed", TONE_GOOD);
         print_state(&paper, ledger, "assumed", TONE_PLAIN);
@@ -118,6 +155,7 @@ int verb_confirm(ctl_t *self, int count, char **words) {
     if (code == CTL_OK && !self->json) {
         const paper_t paper = {.out = stdout, .colour = text_wants_colour(stdout)};
         const bool good = strcmp(text_word(reply, "state"), "confirmed") == 0;
+        explain(text_word(reply, "item"), reply);
         print_item(&paper, good ? "CONFIRMED" : "CONTRADICTED", good ? TONE_GOOD : TONE_BAD, text_word(reply, "item"),
                    reply);
     }

@@ -115,6 +115,10 @@ static end_t take_line(drive_t *self, json_t *line, int64_t now_us) {
         return END_NONE;
     }
     (void)snprintf(self->last_line, sizeof self->last_line, "%s", self->ctl->client.line);
+    // Replaced or lost on a serial line: it fed nothing, and the next may, as long as the lease lives. SILENT_US ends it else.
+    if (!json_is_true(ok) && self->begin_us > 0 && strcmp(text_word(line, "error"), "stale_command") == 0) {
+        return END_NONE;
+    }
     if (!json_is_true(ok)) {
         clear_progress(self);
         (void)ctl_refused(line);

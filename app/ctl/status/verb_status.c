@@ -284,6 +284,7 @@ int verb_status(ctl_t *self, int count, char **words) {
         json_decref(status);
         return code;
     }
+    ctl_explain_ledger(json_object_get(status, "ledger"));
     if (ctl_ask(self, json_pack("{s:s}", "cmd", "why"), &why) == CTL_OK) {
         draw(status, why);
     }

@@ -40,6 +40,7 @@ int verb_tare(ctl_t *self, int count, char **words);
 int verb_why(ctl_t *self, int count, char **words);
 int verb_ledger(ctl_t *self, int count, char **words);
 int verb_confirm(ctl_t *self, int count, char **words);
+int verb_config(ctl_t *self, int count, char **words);
 int verb_doctor(ctl_t *self, int count, char **words);
 int verb_learn(ctl_t *self, int count, char **words);
 int verb_record(ctl_t *self, int count, char **words);
@@ -72,6 +73,9 @@ int ctl_accept(const ctl_t *self, json_t **reply);
 
 /// Tells that the gateway said no: its error name and message. Returns CTL_NO.
 int ctl_refused(const json_t *reply);
+
+/// Fills in the sentences of a status's ledger where the gateway, a board, has told figures only.
+void ctl_explain_ledger(json_t *ledger);
 
 /// What a result of `client_receive` that brought no line means to the user. Returns the exit code.
 int ctl_lost(const ctl_t *self, iwc_result_t result);

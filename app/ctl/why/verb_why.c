@@ -50,17 +50,18 @@ static int parse(words_t *self, int count, char **words) {
 }
 
 static void print_when(const json_t *why) {
-    char wall[TEXT_CELL] = "--";
-    char age[TEXT_CELL];
+    char wall[TEXT_CELL];
+    char age[TEXT_CELL] = "";
     const json_t *wall_us = json_object_get(why, "wall_us");
     const json_t *age_ms = json_object_get(why, "age_ms");
+    if (age_ms != NULL) {
+        text_decimal(age_ms, 3, "s ago", age);
+    }
     if (json_is_integer(wall_us)) {
         text_when(json_integer_value(wall_us), wall);
-    }
-    (void)printf("at %s", wall);
-    if (age_ms != NULL) {
-        text_decimal(age_ms, 3, "s", age);
-        (void)printf(", %s ago", age);
+        (void)printf("at %s%s%s", wall, (age_ms != NULL) ? ", " : "", age);
+    } else { // A board has no clock of the day.
+        (void)fputs((age_ms != NULL) ? age : "at --", stdout);
     }
     (void)printf("; %s\n", json_is_true(json_object_get(why, "latched")) ? "it latched" : "it did not latch");
 }

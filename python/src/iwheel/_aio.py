@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any, AsyncIterator, Deque, Dict, Generator, List, Mapping, Optional, Type, Union, cast
 
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
-from ._protocol import Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._protocol import Configured, Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
     ALWAYS,
@@ -251,6 +251,13 @@ class AsyncGateway:
     async def confirm(self, item: str, value: Union[str, Whole, None] = None, how: Optional[str] = None) -> Confirmed:
         found = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Confirmed, without_envelope(await self._ask("confirm", item=item, value=found, how=how)))
+
+    async def config(
+        self, key: Optional[str] = None, value: Union[str, Whole, None] = None, *, commit: Optional[bool] = None
+    ) -> Configured:
+        """As `Gateway.config`."""
+        wanted = value if value is None or isinstance(value, str) else integer("value", value)
+        return cast(Configured, without_envelope(await self._ask("config", key=key, value=wanted, commit=commit)))
 
     def arm(self, name: Optional[str] = None, *, takeover: bool = False, wait: float = ARM_S) -> _Arming:
         """`async with gateway.arm("name") as wheels:`, or `wheels = await gateway.arm("name")`. `wait` as in `Gateway.arm`."""

@@ -12,7 +12,7 @@ from typing import Any, Iterator, List, Optional, Type, Union, cast
 
 from ._connection import Connection
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
-from ._protocol import Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._protocol import Configured, Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
     ALWAYS,
@@ -156,6 +156,17 @@ class Gateway:
         """
         found = value if value is None or isinstance(value, str) else integer("value", value)
         return cast(Confirmed, without_envelope(self._ask("confirm", item=item, value=found, how=how)))
+
+    def config(
+        self, key: Optional[str] = None, value: Union[str, Whole, None] = None, *, commit: Optional[bool] = None
+    ) -> Configured:
+        """The configuration of a gateway that keeps it itself (a board, docs/serial.md); a daemon's is its file, and it raises Refused.
+
+        Alone it reads; with `key` (`drive.lease_ms`) and `value` it stages that; with `commit` True it writes what is staged, after
+        which the board starts anew and this connection ends, with False it forgets it.
+        """
+        wanted = value if value is None or isinstance(value, str) else integer("value", value)
+        return cast(Configured, without_envelope(self._ask("config", key=key, value=wanted, commit=commit)))
 
     def arm(self, name: Optional[str] = None, *, takeover: bool = False, wait: float = ARM_S) -> Armed:
         """Asks for permission to drive; the wheels stay at zero until the first command. An older one of this Gateway ends.

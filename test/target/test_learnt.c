@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT
+// What a board keeps of its wheels: which of it comes back, which is forgotten, and what a power cut leaves.
+#include "gateway_rig.h"
+#include "unity.h"
+
+#include "flash.h"
+#include "kept.h"
+
+#include <string.h>
+
+static uint32_t flash[IW_FLASH_PAGES][IW_FLASH_PAGE_WORDS];
+static unsigned operations, cut_after, erasures;
+static gateway_rig_t rig;
+
+const volatile uint32_t *iw_flash_page(unsigned page) {
+    return flash[page];
+}
+
+bool iw_flash_erase(unsigned page) {
+    if (operations++ >= cut_after) {
+        return false;
+    }
+    erasures++;
+    memset(flash[page], 0xFF, sizeof flash[page]);
+    return true;
+}
+
+bool iw_flash_write(unsigned page, unsigned word, uint32_t value) {
+    if (operations++ >= cut_after) {
+        return false;
+    }
+    flash[page][word] = value;
+    return true;
+}
+
+void setUp(void) {
+    memset(flash, 0xFF, sizeof flash);
+    operations = erasures = 0;
+    cut_after = UINT32_MAX;
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {}
+
+static iw_settings_t settings_of(const char *key, const char *value) {
+    char why[200];
+    iwn_text_t text = iwn_text_begin(why, sizeof why);
+    iw_settings_t settings = iw_settings_from(&rig.config, 540);
+    TEST_ASSERT_TRUE_MESSAGE(key == NULL || iw_settings_set(&settings, key, value, &text), why);
+    return settings;
+}
+
+/// An operator's word, evidence of the bus, a tare on the left, the right wheel's own zero.
+static iw_learnt_t something(void) {
+    static const iw_ledger_entry_t said = {IW_LEDGER_CONFIRMED, IW_EVIDENCE_OPERATOR, 0};
+    static const iw_ledger_entry_t seen = {IW_LEDGER_CONTRADICTED, IW_EVIDENCE_BUS, 10012};
+    static const iw_learnt_zero_t zero[IW_SIDES] = {{12300, 3, 110, IW_OFFSET_OPERATOR},
+                                                    {-4500, 0, 0, IW_OFFSET_WHEEL}};
+    iw_learnt_t learnt;
+    const iw_settings_t settings = settings_of(NULL, NULL);
+    iw_gateway_know(&rig.gateway, IW_LEDGER_TRACK, &said);
+    iw_gateway_know(&rig.gateway, IW_LEDGER_GEAR_RATIO, &said);
+    iw_gateway_know(&rig.gateway, IW_LEDGER_DLC, &said);
+    iw_gateway_know(&rig.gateway, IW_LEDGER_FORCE_UNIT_RIGHT, &seen);
+    const iw_snapshot_t now = gateway_rig_look(&rig);
+    iw_learnt_note(&learnt, &now, &settings, zero);
+    return learnt;
+}
+
+/// Another run, with these settings. The gateway that knows what was kept.
+static iw_snapshot_t run_again(const iw_learnt_t *learnt, const iw_settings_t *settings,
+                               iw_learnt_zero_t zero[IW_SIDES]) {
+    gateway_rig_begin(&rig, false);
+    iw_learnt_restore(learnt, settings, &rig.gateway, zero);
+    return gateway_rig_look(&rig);
+}
+
+static void test_learnt_same_settings_comes_back_with_its_provenance(void) {
+    const iw_learnt_t learnt = something();
+    const iw_settings_t settings = settings_of(NULL, NULL);
+    iw_learnt_zero_t zero[IW_SIDES];
+    const iw_snapshot_t seen = run_again(&learnt, &settings, zero);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, seen.assumed[IW_LEDGER_TRACK].state);
+    TEST_ASSERT_EQUAL_INT(IW_EVIDENCE_OPERATOR, seen.assumed[IW_LEDGER_TRACK].evidence);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, seen.assumed[IW_LEDGER_FORCE_UNIT_RIGHT].state);
+    TEST_ASSERT_EQUAL_INT(10012, seen.assumed[IW_LEDGER_FORCE_UNIT_RIGHT].figure);
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, seen.assumed[IW_LEDGER_WHEEL_RADIUS].state);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_OPERATOR, seen.wheel[IW_LEFT].force->provenance);
+    TEST_ASSERT_EQUAL_INT(12300, seen.wheel[IW_LEFT].force->offset_mN);
+    TEST_ASSERT_TRUE(seen.wheel[IW_LEFT].force->offset_us == IW_NEVER);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_STORED, seen.wheel[IW_RIGHT].force->provenance);
+    TEST_ASSERT_EQUAL_INT(-4500, seen.wheel[IW_RIGHT].force->offset_mN);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, zero[IW_RIGHT].from);
+    iw_learnt_t again;
+    iw_learnt_note(&again, &seen, &settings, zero);
+    TEST_ASSERT_FALSE_MESSAGE(iw_learnt_differs(&again, &learnt), "each start would write the same once more");
+}
+
+static void test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else(void) {
+    static const struct {
+        const char *key;
+        const char *value;
+        iw_ledger_item_t item;
+    } cases[] = {{"wheels.track_mm", "600", IW_LEDGER_TRACK},
+                 {"wheels.gear_ratio", "2", IW_LEDGER_GEAR_RATIO},
+                 {"wheels.rpm_of", "rotor", IW_LEDGER_GEAR_RATIO},
+                 {"right.force_unit", "cN", IW_LEDGER_FORCE_UNIT_RIGHT}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        setUp();
+        const iw_learnt_t learnt = something();
+        const iw_settings_t settings = settings_of(cases[i].key, cases[i].value);
+        iw_learnt_zero_t zero[IW_SIDES];
+        const iw_snapshot_t seen = run_again(&learnt, &settings, zero);
+        unsigned known = 0;
+        for (unsigned item = 0; item < IW_LEDGER_ITEMS; item++) {
+            known += (seen.assumed[item].state != IW_LEDGER_ASSUMED) ? 1U : 0U;
+        }
+        TEST_ASSERT_EQUAL_INT_MESSAGE(IW_LEDGER_ASSUMED, seen.assumed[cases[i].item].state, cases[i].key);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(3, known, cases[i].key);
+        const bool unit = cases[i].item == IW_LEDGER_FORCE_UNIT_RIGHT;
+        TEST_ASSERT_EQUAL_INT(unit ? IW_OFFSET_NONE : IW_OFFSET_STORED, seen.wheel[IW_RIGHT].force->provenance);
+        iw_learnt_t again;
+        iw_learnt_note(&again, &seen, &settings, zero);
+        TEST_ASSERT_TRUE(iw_learnt_differs(&again, &learnt));
+    }
+}
+
+static void test_learnt_zero_that_no_wheel_has_is_not_restored(void) {
+    iw_learnt_t learnt = something();
+    const iw_settings_t settings = settings_of(NULL, NULL);
+    iw_learnt_zero_t zero[IW_SIDES];
+    learnt.zero[IW_LEFT].offset_mN = 327661;
+    learnt.zero[IW_RIGHT].from = 200;
+    const iw_snapshot_t seen = run_again(&learnt, &settings, zero);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, seen.wheel[IW_LEFT].force->provenance);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, seen.wheel[IW_RIGHT].force->provenance);
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_NONE, zero[IW_LEFT].from);
+}
+
+static void test_learnt_small_changes_are_not_worth_a_record(void) {
+    const iw_learnt_t kept = something();
+    iw_learnt_t now = kept;
+    now.figure[IW_LEDGER_FORCE_UNIT_RIGHT]++;
+    now.zero[IW_RIGHT].offset_mN += IW_LEARNT_MOVED_mN;
+    now.zero[IW_RIGHT].from = IW_OFFSET_ESTIMATED;
+    TEST_ASSERT_FALSE(iw_learnt_differs(&now, &kept));
+    now.zero[IW_RIGHT].offset_mN++;
+    TEST_ASSERT_TRUE(iw_learnt_differs(&now, &kept));
+    now = kept;
+    now.zero[IW_LEFT].offset_mN++; // Of a tare every millinewton is.
+    TEST_ASSERT_TRUE(iw_learnt_differs(&now, &kept));
+}
+
+static iw_kept_t power_on(void) {
+    iw_kept_t kept = {.power_ons = 0};
+    cut_after = UINT32_MAX;
+    iw_kept_open(&kept, true, false);
+    return kept;
+}
+
+static void test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was(void) {
+    const iw_settings_t settings = settings_of("wheels.track_mm", "540");
+    iw_learnt_t learnt = something();
+    iw_settings_t found;
+    iw_learnt_t read;
+    iw_kept_t kept = power_on();
+    TEST_ASSERT_FALSE(iw_kept_learnt(&kept, &read));
+    TEST_ASSERT_TRUE(iw_kept_commit(&kept, &settings));
+    learnt.zero[IW_LEFT].offset_mN = 0;
+    kept = power_on();
+    TEST_ASSERT_TRUE(iw_kept_learn(&kept, &learnt));
+    for (unsigned cut = 0; cut <= 64U; cut++) {
+        kept = power_on();
+        TEST_ASSERT_TRUE(iw_kept_learnt(&kept, &read));
+        const int32_t before = read.zero[IW_LEFT].offset_mN;
+        learnt.zero[IW_LEFT].offset_mN = before + 1;
+        operations = 0;
+        cut_after = cut;
+        const bool done = iw_kept_learn(&kept, &learnt);
+        kept = power_on();
+        TEST_ASSERT_TRUE(iw_kept_settings(&kept, &found) && iw_kept_learnt(&kept, &read));
+        TEST_ASSERT_EQUAL_MEMORY(&settings, &found, sizeof found);
+        TEST_ASSERT_EQUAL_INT(done ? before + 1 : before, read.zero[IW_LEFT].offset_mN);
+        TEST_ASSERT_TRUE_MESSAGE(done == (cut >= 62U), "sequence, payload and CRC are written, and nothing else");
+    }
+}
+
+static void test_learnt_last_blank_slot_is_the_configuration_s(void) {
+    const iw_settings_t settings = settings_of(NULL, NULL);
+    const iw_learnt_t learnt = something();
+    iw_kept_t kept = power_on();
+    while (iw_kept_learn(&kept, &learnt)) {
+    }
+    TEST_ASSERT_EQUAL_UINT(1, iw_store_blank(&kept.store));
+    TEST_ASSERT_TRUE(iw_kept_commit(&kept, &settings));
+    TEST_ASSERT_EQUAL_UINT(0, erasures);
+    const uint32_t power_ons = kept.power_ons;
+    iw_kept_open(&kept, false, true); // Wheels may be turning: nothing takes long.
+    TEST_ASSERT_EQUAL_UINT(0, erasures);
+    iw_kept_open(&kept, false, false);
+    TEST_ASSERT_EQUAL_UINT(1, erasures);
+    TEST_ASSERT_EQUAL_UINT(3, iw_store_blank(&kept.store));
+    TEST_ASSERT_EQUAL_UINT32(power_ons, kept.power_ons);
+    iw_learnt_t read;
+    iw_settings_t found;
+    TEST_ASSERT_TRUE(iw_kept_learnt(&kept, &read) && iw_kept_settings(&kept, &found));
+    iw_kept_open(&kept, false, false);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_learnt_same_settings_comes_back_with_its_provenance);
+    RUN_TEST(test_learnt_other_setting_forgets_what_was_found_for_it_and_nothing_else);
+    RUN_TEST(test_learnt_zero_that_no_wheel_has_is_not_restored);
+    RUN_TEST(test_learnt_small_changes_are_not_worth_a_record);
+    RUN_TEST(test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was);
+    RUN_TEST(test_learnt_last_blank_slot_is_the_configuration_s);
+    return UNITY_END();
+}
