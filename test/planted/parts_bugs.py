@@ -23,11 +23,12 @@ JSON, REQUEST, LINES = ("unit_json_in",), ("unit_northbound_request",), ("unit_j
 
 PARTS = [
     # The loop.
-    Bug("marker-gone-at-stopping", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels))",
-        "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels) && iw_gateway_state(&daemon->wheels.core) != IW_STATE_STOPPING)", MOTION),
-    Bug("marker-gone-when-latched", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels))",
-        "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels) && iw_gateway_state(&daemon->wheels.core) != IW_STATE_LATCHED)", MOTION),
-    Bug("marker-after-the-first-frame", "R3", LOOP, "daemon->status.observed.left_behind); mark_if_sending(daemon);", "daemon->status.observed.left_behind);", MOTION),
+    Bug("marker-gone-at-stopping", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, needed)",
+        "gw_runtime_mark(&daemon->runtime, needed && iw_gateway_state(&daemon->wheels.core) != IW_STATE_STOPPING)", MOTION),
+    Bug("marker-gone-when-latched", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, needed)",
+        "gw_runtime_mark(&daemon->runtime, needed && iw_gateway_state(&daemon->wheels.core) != IW_STATE_LATCHED)", MOTION),
+    Bug("marker-before-anything-was-sent", "R3", LOOP, "return daemon->runtime.marked || seen->sent->pairs != daemon->silent_pairs;", "return true;", MOTION),
+    Bug("marker-not-tried-again", "R3", "app/gateway/lock/runtime.c", "self->marked = done ? sending : self->marked;", "self->marked = sending;", MOTION),
     Bug("suspension-not-told", "R7", LOOP, "gw_wheels_slept(&daemon->wheels, suspended_us - daemon->suspended_us);", "", MOTION),
     Bug("suspension-told-again", "R7", LOOP, "daemon->suspended_us = (suspended_us > daemon->suspended_us) ? suspended_us : daemon->suspended_us;", "", MOTION),
     Bug("estop-gone-unseen-between-setpoints", "R2", LOOP, "(daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels))", "false", MOTION),

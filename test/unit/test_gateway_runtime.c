@@ -184,6 +184,9 @@ static void test_marker_that_cannot_be_set_or_removed_is_told_with_its_path(void
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[1], 0755));
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_STRING(first.place[1], first.marker_path);
+    TEST_ASSERT_FALSE(gw_runtime_mark(&first, true)); // Tried again.
+    TEST_ASSERT_EQUAL_INT(0, rmdir(first.place[1]));
+    TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, false));
     TEST_ASSERT_EQUAL_STRING(first.place[0], first.marker_path);
 }

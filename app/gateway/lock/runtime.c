@@ -130,6 +130,7 @@ bool gw_runtime_mark(gw_runtime_t *self, bool sending) {
     if (sending == self->marked) {
         return true;
     }
-    self->marked = sending;
-    return sending ? set_marker(self) : remove_markers(self);
+    const bool done = sending ? set_marker(self) : remove_markers(self);
+    self->marked = done ? sending : self->marked;
+    return done;
 }

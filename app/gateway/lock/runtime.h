@@ -34,8 +34,8 @@ void gw_runtime_close(gw_runtime_t *self);
 /// True if the process before us died while it was sending.
 bool gw_runtime_crashed(const gw_runtime_t *self);
 
-/// Sets or removes the marker, once per change. False if that failed. Does not wait for a disk: its directory is
-/// meant to be in memory.
+/// Sets or removes the marker, once per change. False if that failed; the next call tries again. Does not wait for a disk: its
+/// directory is meant to be in memory.
 bool gw_runtime_mark(gw_runtime_t *self, bool sending);
 
 #endif
