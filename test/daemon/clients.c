@@ -4,6 +4,7 @@
 #include "judge.h"
 #include "kernel.h"
 
+#include "iwheel_northbound/json_in.h"
 #include "iwheel_northbound/request.h"
 
 #include <stdarg.h>
@@ -23,6 +24,8 @@ typedef enum { STEP_RESET, STEP_ARM, STEP_ARMING, STEP_DRIVE, STEP_END } step_t;
 typedef struct {
     uint64_t end;
     said_t what;
+    int32_t left;
+    int32_t right;
 } mark_t;
 
 typedef struct {
@@ -137,7 +140,7 @@ __attribute__((format(printf, 3, 4))) static void say(client_t *client, said_t w
     const int length = vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
     if (client->marks < MARKS && put(client, line, (size_t)length)) {
-        client->mark[client->marks++] = (mark_t){client->sent, what};
+        client->mark[client->marks++] = (mark_t){client->sent, what, client->task.a, client->task.b};
         client->answer = -1;
         client->asked_us = vk.now_us;
     }
@@ -152,10 +155,26 @@ void clients_taken(int number) {
         }
         unsigned done = 0;
         while (done < client->marks && client->mark[done].end <= taken) {
-            judge_said((unsigned)number, client->mark[done++].what);
+            const mark_t *mark = &client->mark[done++];
+            if (mark->what == SAID_DRIVE) {
+                judge_wanted((unsigned)number, mark->left, mark->right);
+            }
+            judge_said((unsigned)number, mark->what);
         }
         client->marks -= done;
         memmove(&client->mark[0], &client->mark[done], client->marks * sizeof client->mark[0]);
+    }
+}
+
+/// Looked at only soon after a call has failed: what may tear a line is that one was sent in part.
+static void judge_line(const char *line, size_t length) {
+    static iwn_work_t work;
+    char why[128];
+    iwn_text_t text = iwn_text_begin(why, sizeof why);
+    iwn_json_t root;
+    if (vk.failed_us != 0U && vk.now_us - vk.failed_us < 1000U * MS &&
+        !iwn_json_check(line, length, &work, &root, &text)) {
+        judge_break(14, "a line to a client that is none: %.60s", line);
     }
 }
 
@@ -174,6 +193,7 @@ static void listen(client_t *client) {
         const size_t length = (size_t)(end - &stream->out[from]);
         (void)snprintf(head, sizeof head, "%.*s", (int)((length < sizeof head) ? length : sizeof head - 1U),
                        &stream->out[from]);
+        judge_line(&stream->out[from], length);
         if (strstr(head, wanted) != NULL) {
             client->answer = strstr(head, "\"ok\":true") != NULL;
         }
@@ -214,7 +234,10 @@ static void end_drive(client_t *client) {
         client->lives = false;
         break;
     case 2: // Falls silent; its connection stays.
-        break;
+        client->step = STEP_END;
+        client->driving_us = IW_NEVER;
+        client->next_us = vk.now_us + 3000U * MS;
+        return;
     case 3:
         ask(client, SAID_ESTOP, "estop", STEP_END);
         break;
@@ -291,19 +314,21 @@ static void run_noise(client_t *client) {
     static const struct {
         const char *text;
         said_t what;
-    } words[] = {{"{\"cmd\":\"status\",\"id\":1}\n", SAID_ZERO},
-                 {"{\"cmd\":\"why\"}\n", SAID_ZERO},
-                 {"{\"cmd\":\"arm\",\"takeover\":true}\n", SAID_ARM},
-                 {"{\"cmd\":\"arm\",\"id\":7}\n", SAID_ARM},
-                 {"{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":-200}\n", SAID_DRIVE},
-                 {"{\"cmd\":\"twist\",\"v_mm_s\":200,\"yaw_mrad_s\":300}\n", SAID_DRIVE},
-                 {"{\"cmd\":\"reset\"}\n", SAID_RESET},
-                 {"{\"cmd\":\"stop\"}\n", SAID_STOP},
-                 {"{\"cmd\":\"disarm\"}\n", SAID_STOP},
-                 {"{\"cmd\":\"hello\"}\n{\"cmd\":\"recordings\"}\n", SAID_ZERO},
-                 {"{\"cmd\":\"tare\",\"side\":\"left\"}\n", SAID_ZERO},
-                 {"{\"cmd\":\"drive\",\"left_mm_s\":1e99,\"right_mm_s\":0}\n", SAID_ZERO},
-                 {"no json at all\n\n\n", SAID_ZERO}};
+        int32_t left;
+        int32_t right;
+    } words[] = {{"{\"cmd\":\"status\",\"id\":1}\n", SAID_ZERO, 0, 0},
+                 {"{\"cmd\":\"why\"}\n", SAID_ZERO, 0, 0},
+                 {"{\"cmd\":\"arm\",\"takeover\":true}\n", SAID_ARM, 0, 0},
+                 {"{\"cmd\":\"arm\",\"id\":7}\n", SAID_ARM, 0, 0},
+                 {"{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":-200}\n", SAID_DRIVE, 300, -200},
+                 {"{\"cmd\":\"twist\",\"v_mm_s\":200,\"yaw_mrad_s\":300}\n", SAID_DRIVE, 119, 281},
+                 {"{\"cmd\":\"reset\"}\n", SAID_RESET, 0, 0},
+                 {"{\"cmd\":\"stop\"}\n", SAID_STOP, 0, 0},
+                 {"{\"cmd\":\"disarm\"}\n", SAID_STOP, 0, 0},
+                 {"{\"cmd\":\"hello\"}\n{\"cmd\":\"recordings\"}\n", SAID_ZERO, 0, 0},
+                 {"{\"cmd\":\"tare\",\"side\":\"left\"}\n", SAID_ZERO, 0, 0},
+                 {"{\"cmd\":\"drive\",\"left_mm_s\":1e99,\"right_mm_s\":0}\n", SAID_ZERO, 0, 0},
+                 {"no json at all\n\n\n", SAID_ZERO, 0, 0}};
     static char flood[VK_IN_SIZE / 2U];
     const unsigned choice = sim_random_below(&dice, sizeof words / sizeof words[0] + 2U);
     client->next_us = vk.now_us + sim_random_below(&dice, 120U) * MS;
@@ -315,7 +340,8 @@ static void run_noise(client_t *client) {
         const char *text = words[choice].text;
         const size_t first = sim_random_below(&dice, (uint32_t)strlen(text));
         if (put(client, text, first) && put(client, &text[first], strlen(text) - first) && client->marks < MARKS) {
-            client->mark[client->marks++] = (mark_t){client->sent, words[choice].what};
+            client->mark[client->marks++] =
+                (mark_t){client->sent, words[choice].what, words[choice].left, words[choice].right};
         }
     } else if (choice == sizeof words / sizeof words[0]) {
         // A line that is none; one that is too long is the last that is read of this connection.

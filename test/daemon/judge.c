@@ -18,6 +18,7 @@
 #define HOLD_MAX_US (13U * S)   ///< Ramp, ten seconds of zeros for wheels that will not stand, and some.
 #define CALM_US     (300U * MS) ///< After trouble with the bus, gaps are not judged for so long.
 #define WATCHDOG_US S           ///< Of the wheels.
+#define WANTED      3U          ///< Commands that may still be followed: the last ones.
 #define WAITS_MAX   8000U       ///< In a second.
 
 typedef struct {
@@ -44,6 +45,7 @@ static struct {
     side_t side[IW_SIDES];
     end_t end[ENDS];
     unsigned ends;
+    int32_t wanted[CLIENTS][WANTED][IW_SIDES];
     iw_time_us_t drive_us[CLIENTS]; ///< Its last nonzero drive was read.
     iw_time_us_t drive_stolen_us[CLIENTS];
     iw_time_us_t gone_us[CLIENTS];
@@ -142,6 +144,12 @@ void judge_said(unsigned client, said_t what) {
     self.reset_said = self.reset_said || what == SAID_RESET;
 }
 
+void judge_wanted(unsigned client, int32_t left, int32_t right) {
+    memmove(&self.wanted[client][1], &self.wanted[client][0], (WANTED - 1U) * sizeof self.wanted[client][0]);
+    self.wanted[client][0][IW_LEFT] = left;
+    self.wanted[client][0][IW_RIGHT] = right;
+}
+
 void judge_gone(unsigned client) {
     self.gone_us[client] = vk.now_us;
     self.gone_stolen_us[client] = vk.stolen_us;
@@ -169,39 +177,73 @@ void judge_echo(unsigned side) {
 
 // ---- what comes out ----------------------------------------------------------------------------------------------
 
-/// The end that forbids this client to move; NULL: none does.
-static const char *forbidden(unsigned client) {
-    const iw_config_t *config = self.config;
+typedef enum { MAY_STAND, MAY_FALL, MAY_MOVE } right_t;
+
+static right_t lesser(right_t one, right_t other) {
+    return (one < other) ? one : other;
+}
+
+/// What is left `since` something that ends by a ramp: as before for `free_us`, then towards zero.
+static right_t after(iw_time_us_t since_us, iw_time_us_t stolen_us, iw_time_us_t free_us) {
+    const iw_time_us_t passed_us = own_us(since_us, stolen_us);
+    return (passed_us <= free_us) ? MAY_MOVE : (passed_us <= free_us + ramp_us()) ? MAY_FALL : MAY_STAND;
+}
+
+static right_t after_end(const end_t *end) {
+    const iw_time_us_t passed_us = own_us(end->at_us, end->stolen_us);
+    if (passed_us > end->limit_us) {
+        return MAY_STAND;
+    }
+    return (end->limit_us > JUDGE_REACTION_US && passed_us > GONE_US) ? MAY_FALL : MAY_MOVE;
+}
+
+/// What this client's commands may do to the wheels, and which end forbids more.
+static right_t right_of(unsigned client, const char **out_why) {
+    const iw_time_us_t lease_us = ((iw_time_us_t)self.config->lease_ms + self.config->period_ms) * MS + LATE_US;
     if (self.drive_us[client] == IW_NEVER) {
-        return "nobody drives";
+        return MAY_STAND;
     }
-    const iw_time_us_t lease_us = ((iw_time_us_t)config->lease_ms + config->period_ms) * MS + ramp_us() + LATE_US;
-    if (own_us(self.drive_us[client], self.drive_stolen_us[client]) > lease_us) {
-        return "lease and ramp are over";
-    }
-    if (self.gone_us[client] != IW_NEVER &&
-        own_us(self.gone_us[client], self.gone_stolen_us[client]) > GONE_US + ramp_us()) {
-        return "its client has gone";
+    right_t right = after(self.drive_us[client], self.drive_stolen_us[client], lease_us);
+    *out_why = (right != MAY_MOVE) ? "its lease is over" : *out_why;
+    if (self.gone_us[client] != IW_NEVER) {
+        right = lesser(right, after(self.gone_us[client], self.gone_stolen_us[client], GONE_US));
+        *out_why = "its client has gone";
     }
     for (unsigned i = 0; i < self.ends; i++) {
         const end_t *end = &self.end[i];
-        if (!end->fresh[client] && own_us(end->at_us, end->stolen_us) > end->limit_us) {
-            return end->why;
-        }
+        const right_t left = end->fresh[client] ? MAY_MOVE : after_end(end);
+        *out_why = (left < right) ? end->why : *out_why;
+        right = lesser(right, left);
     }
-    return NULL;
+    return right;
 }
 
-static void judge_right(unsigned side, int32_t speed) {
-    const char *why = NULL;
-    for (unsigned i = 0; i < CLIENTS; i++) {
-        const char *one = forbidden(i);
-        if (one == NULL) {
-            return;
+static bool is_wanted(unsigned client, unsigned side, int32_t speed) {
+    for (unsigned i = 0; i < WANTED; i++) {
+        const int32_t wanted = self.wanted[client][i][side];
+        if ((int64_t)wanted * speed > 0 && abs(speed) <= abs(wanted) + 1) {
+            return true;
         }
-        why = (why == NULL || self.drive_us[i] != IW_NEVER) ? one : why;
     }
-    judge_break(1, "%s wheel told %d mm/s, but: %s", (side == IW_LEFT) ? "left" : "right", speed, why);
+    return false;
+}
+
+/// Slower is allowed as long as any ramp lasts; as fast as before or faster only if somebody who may wants it.
+static void judge_right(unsigned side, int32_t speed) {
+    // Both ramp together: rounded, the slower one may stay for a pair.
+    const int32_t before = abs(self.side[side].speed);
+    const bool falls = abs(speed) < before || (abs(speed) == before && before < abs(self.side[1U - side].speed));
+    const char *why = "nobody drives";
+    bool allowed = false;
+    for (unsigned i = 0; i < CLIENTS; i++) {
+        const right_t right = right_of(i, &why);
+        allowed =
+            allowed || (right == MAY_MOVE && (falls || is_wanted(i, side, speed))) || (right == MAY_FALL && falls);
+    }
+    if (!allowed) {
+        judge_break(1, "%s wheel told %d mm/s, before %d, but: %s", (side == IW_LEFT) ? "left" : "right", speed,
+                    self.side[side].speed, why);
+    }
 }
 
 static void judge_slope(const side_t *side, int32_t speed) {
@@ -338,7 +380,7 @@ void judge_life(void) {
     self.life_us = self.second_us = vk.now_us;
     self.second_waits = vk.waits;
     self.life_stolen_us = vk.stolen_us;
-    self.may_send_until_us = self.something ? vk.now_us + HOLD_MAX_US : 0U;
+    self.may_send_until_us = (self.something || vk.marker_failed) ? vk.now_us + HOLD_MAX_US : 0U;
     self.side[IW_LEFT].pending = self.side[IW_RIGHT].pending = 0;
     self.side[IW_LEFT].zeroed = self.side[IW_RIGHT].zeroed = false;
     self.side[IW_LEFT].speed = self.side[IW_RIGHT].speed = 0;
@@ -356,7 +398,7 @@ phase_t judge_phase(void) {
         return AT_ARMING;
     }
     if (self.side[IW_LEFT].speed != 0 || self.side[IW_RIGHT].speed != 0) {
-        return (self.trend > 0) ? AT_RAMP_UP : (self.trend < 0) ? AT_RAMP_DOWN : AT_STEADY;
+        return (self.trend > 0 || self.sum == 0) ? AT_RAMP_UP : (self.trend < 0) ? AT_RAMP_DOWN : AT_STEADY;
     }
     return judge_is_silent(GAP_US) ? AT_SILENCE : (self.moved_us > self.life_us) ? AT_HOLD : AT_ARMING;
 }
@@ -369,8 +411,7 @@ void judge_death(bool in_order) {
     self.killed_at = judge_phase();
     self.killed_us = vk.now_us;
     // Killed again before its zeros had come out, it still owes them.
-    self.something =
-        !in_order && ((self.something && self.frames == 0U && !self.armed_said) || (self.frames > 0U && !quiet));
+    self.something = !in_order && ((self.something && self.frames == 0U) || (self.frames > 0U && !quiet));
     self.owes = !in_order && (moving || self.owes) && vk.now_us - self.fault_us > CALM_US && !vk.marker_failed;
     self.alive = false;
     self.side[IW_LEFT].zeroed = self.side[IW_RIGHT].zeroed = false;

@@ -26,6 +26,7 @@ void judge_echo(unsigned side);
 void judge_bus_lost(void);
 void judge_end(const char *why, iw_time_us_t limit_us);
 void judge_said(unsigned client, said_t what);
+void judge_wanted(unsigned client, int32_t left, int32_t right); ///< A drive for these speeds was read.
 void judge_gone(unsigned client);
 void judge_stopped(iw_time_us_t span_us); ///< It did not run for so long.
 void judge_tick(void);

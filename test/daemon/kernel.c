@@ -512,7 +512,7 @@ vk_end_t vk_live(void) {
     static char option[] = "-c";
     static char file[] = "/etc/iwheel/gateway.conf";
     char *arguments[] = {program, option, file, NULL};
-    vk.doomed = vk.marker_failed = stealing = false;
+    vk.doomed = stealing = false;
     vk.alive = true;
     vk.signal = 0;
     vk.exit_code = -1;

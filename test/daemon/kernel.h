@@ -63,7 +63,7 @@ typedef struct {
     bool kill_after;           ///< After it has taken effect.
     bool doomed;               ///< It dies before it does anything else.
     iw_time_us_t failed_us;    ///< When a call was made to fail last.
-    bool marker_failed;        ///< One upon the crash marker was, in this life.
+    bool marker_failed;        ///< The last one upon the crash marker was.
     uint32_t fail_permille;    ///< Calls that fail.
     uint32_t late_us;          ///< Each wake-up is late by up to this.
     bool no_descriptors;       ///< None is left for anybody.

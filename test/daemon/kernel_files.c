@@ -82,8 +82,8 @@ static void resolve(int folder, const char *name, char out_path[PATH_SIZE]) {
     }
 }
 
-static void note_marker(const char *path) {
-    vk.marker_failed = vk.marker_failed || strcmp(path, VK_MARKER) == 0;
+static void note_marker(const char *path, bool failed) {
+    vk.marker_failed = (strcmp(path, VK_MARKER) == 0) ? failed : vk.marker_failed;
 }
 
 static int open_path(int folder, const char *name, int flags) {
@@ -92,7 +92,7 @@ static int open_path(int folder, const char *name, int flags) {
     char path[PATH_SIZE];
     resolve(folder, name, path);
     if (!vk_call("open", ((flags & O_CREAT) != 0) ? making : errors)) {
-        note_marker(path);
+        note_marker(path, true);
         return -1;
     }
     int file = find(path);
@@ -104,8 +104,8 @@ static int open_path(int folder, const char *name, int flags) {
         file = make(path, S_IFREG | 0600, "");
     }
     const int fd = (file < 0) ? -1 : vk_open_fd("open", VK_FILE, file);
-    if (file >= 0 && fd < 0) {
-        note_marker(path);
+    if (file >= 0) {
+        note_marker(path, fd < 0);
     }
     return (int)vk_done(fd);
 }
@@ -233,13 +233,14 @@ static int unlink_path(int folder, const char *name) {
     char path[PATH_SIZE];
     resolve(folder, name, path);
     if (!vk_call("unlink", errors)) {
-        note_marker(path);
+        note_marker(path, true);
         return -1;
     }
     const int file = find(path);
     if (file < 0) {
         return -1;
     }
+    note_marker(path, false);
     files[file].path[0] = '\0';
     return (int)vk_done(0);
 }

@@ -149,26 +149,35 @@ static int play_many(uint64_t first, double hours, bool quick) {
     return (failed == 0U && passed > 0U) ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
-/// The table of docs/fault-catalogue.md.
+static void tell_kills(const result_t *result) {
+    printf("| killed at | kills | nonzero in force | zeros after the start, worst | after the kill, worst "
+           "|\n|---|---:|---:|---:|---:|\n");
+    for (unsigned phase = 0; phase < AT_PHASES; phase++) {
+        const phase_stats_t *stats = &result->phase[phase];
+        printf("| %s | %u | %u |", world_phase_name(phase), (unsigned)stats->kills, (unsigned)stats->moving);
+        if (stats->moving == 0U) {
+            printf(" -- | -- |\n");
+        } else {
+            printf(" %.1f ms | %.1f ms |\n", (double)stats->worst_us / 1e3, (double)stats->between_us / 1e3);
+        }
+    }
+}
+
+/// The table of docs/simulated-hours.md.
 static int kill_many(uint64_t seed, uint32_t lives) {
     static scenario_t scenario;
     static result_t result;
     scenario_kills(&scenario, seed, lives);
     world_play(&scenario, IW_NEVER, &result);
-    printf("| killed at | kills | nonzero in force | zeros after the start, worst | after the kill, worst "
-           "|\n|---|---:|---:|---:|---:|\n");
-    for (unsigned phase = 0; phase < AT_PHASES; phase++) {
-        const phase_stats_t *stats = &result.phase[phase];
-        printf("| %s | %u | %u | %.1f ms | %.1f ms |\n", world_phase_name(phase), (unsigned)stats->kills,
-               (unsigned)stats->moving, (double)stats->worst_us / 1e3, (double)stats->between_us / 1e3);
-    }
-    if (result.rule != 0U) {
+    tell_kills(&result);
+    const bool good = result.rule == 0U;
+    if (!good) {
         const iw_time_us_t from_us = (result.broken_us > TRACE_US) ? result.broken_us - TRACE_US : 0U;
         tell_broken(&scenario, &result);
         world_play(&scenario, from_us, &result);
     }
-    printf("%u passed, %d failed, 0 skipped\n", (result.rule == 0U) ? (unsigned)lives : 0U, result.rule != 0U);
-    return (result.rule == 0U) ? EXIT_SUCCESS : EXIT_FAILURE;
+    printf("%u passed, %d failed, 0 skipped\n", good ? (unsigned)lives : 0U, !good);
+    return good ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
 typedef struct {
@@ -234,6 +243,7 @@ int main(int argc, char **argv) {
     if (options.one) {
         return play_one(options.seed, options.trace, options.events);
     }
-    return (options.kills > 0U) ? kill_many(options.first, (uint32_t)options.kills)
-                                : play_many(options.first, options.hours, options.quick);
+    const int result =
+        (options.kills == 0U || options.quick) ? play_many(options.first, options.hours, options.quick) : EXIT_SUCCESS;
+    return (result == EXIT_SUCCESS && options.kills > 0U) ? kill_many(options.first, (uint32_t)options.kills) : result;
 }

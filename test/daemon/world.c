@@ -21,7 +21,7 @@
 #define REST_US      (14U * S) ///< And then all must come to rest.
 #define WATCHDOG_US  S
 #define AIM_CALLS    400U
-#define START_CALLS  260U
+#define START_CALLS  180U
 #define ARM_CALLS    40U
 #define AIM_US       (20U * S) ///< A phase that does not come.
 #define LATE_DEFAULT 60U
@@ -38,6 +38,7 @@ static struct {
     iw_time_us_t until_us[EV_KINDS]; ///< 0: not going on.
     iw_time_us_t trace_us;
     iw_time_us_t fed_us; ///< The service manager heard last; IW_NEVER: the process is not ready.
+    iw_time_us_t fed_stolen_us;
     iw_time_us_t part_us;
     part_t part;
     bool proven;
@@ -207,6 +208,7 @@ void world_link_changed(bool up) {
     tell(up ? "link up" : "link down", "");
     judge_bus_lost();
     if (up) {
+        sim_world_bus_off(&world.sim, vk.now_us, false); // Set up anew, the controller takes part again.
         world.port = sim_world_connect(&world.sim);
     } else {
         judge_end("interface down", JUDGE_REACTION_US);
@@ -260,6 +262,7 @@ void world_taken(int stream) {
 void world_notified(const char *words, size_t size) {
     const bool ready = size == strlen("READY=1") && memcmp(words, "READY=1", size) == 0;
     const bool alive = size == strlen("WATCHDOG=1") && memcmp(words, "WATCHDOG=1", size) == 0;
+    world.fed_stolen_us = vk.stolen_us;
     world.fed_us = (ready || (alive && world.fed_us != IW_NEVER)) ? vk.now_us : world.fed_us;
 }
 
@@ -369,6 +372,19 @@ static void run_faults(void) {
     }
 }
 
+/// The service manager kills who does not tell for a second that it is alive.
+static void watch_over(void) {
+    if (!world.scenario->watchdog || world.fed_us == IW_NEVER || vk.now_us - world.fed_us <= WATCHDOG_US) {
+        return;
+    }
+    tell("the watchdog of the service kills it", "");
+    if (vk.failed_us < world.fed_us && vk.stolen_us - world.fed_stolen_us < WATCHDOG_US / 2U) {
+        judge_break(13, "it runs, and has not told the service manager for a second");
+    }
+    world.fed_us = IW_NEVER;
+    vk.doomed = true;
+}
+
 void world_run(void) {
     vk.trace = traces();
     run_bus();
@@ -384,11 +400,7 @@ void world_run(void) {
     world.troubled = troubled;
     judge_tick();
     aim();
-    if (world.scenario->watchdog && world.fed_us != IW_NEVER && vk.now_us - world.fed_us > WATCHDOG_US) {
-        tell("the watchdog of the service kills it", "");
-        world.fed_us = IW_NEVER;
-        vk.doomed = true;
-    }
+    watch_over();
     if (vk.now_us >= world.part_us) {
         next_part();
     }
@@ -428,12 +440,12 @@ static void begin(const scenario_t *scenario, iw_time_us_t trace_from_us, result
     clients_begin(scenario->seed);
 }
 
-/// How a life ended, and whether it may have.
-static void judge_ended(vk_end_t end, uint64_t failed_before, bool asked) {
+/// How a life ended, and whether it may have: for want of something before it had begun to wait, or because it was asked to.
+static void judge_ended(vk_end_t end, bool waited, bool asked) {
+    const bool wanting = vk.no_descriptors || vk.failed_us >= world.life_us;
     judge_death(end == VK_EXITED && vk.exit_code == 0);
     tell("process ended", (end == VK_EXITED) ? " by itself" : "");
-    if (end == VK_EXITED && !asked && vk.failed == failed_before && !vk.no_descriptors &&
-        vk.failed_us < world.life_us) {
+    if (end == VK_EXITED && !asked && (waited || !wanting)) {
         judge_break(12, "it ended by itself with status %d", vk.exit_code);
     }
 }
@@ -452,12 +464,12 @@ void world_play(const scenario_t *scenario, iw_time_us_t trace_from_us, result_t
     begin(scenario, trace_from_us, out_result);
     vk_end_t end;
     do {
-        const uint64_t failed = vk.failed;
+        const uint64_t waits = vk.waits;
         const uint32_t terms = out_result->events[EV_TERM];
         prepare_life();
         end = vk_live();
         if (end != VK_OVER) {
-            judge_ended(end, failed, out_result->events[EV_TERM] != terms);
+            judge_ended(end, vk.waits > waits + 1U, out_result->events[EV_TERM] != terms);
             world.kills += (end == VK_KILLED) ? 1U : 0U;
             world.fed_us = IW_NEVER;
             vk_idle(scenario->restart_us);
