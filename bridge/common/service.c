@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "service.h"
 
+#include <signal.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,10 +10,39 @@
 #include <time.h>
 #include <unistd.h>
 
+static volatile sig_atomic_t end_asked;
+
+static void ask_end(int number) {
+    (void)number;
+    end_asked = 1;
+}
+
 uint64_t bridge_now_us(void) {
     struct timespec now = {0};
     (void)clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000U + (uint64_t)now.tv_nsec / 1000U;
+}
+
+void bridge_service_take_signals(void) {
+    struct sigaction action = {.sa_handler = ask_end};
+    sigset_t ours;
+    (void)sigemptyset(&ours);
+    (void)sigaddset(&ours, SIGTERM);
+    (void)sigaddset(&ours, SIGINT);
+    (void)sigprocmask(SIG_BLOCK, &ours, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)signal(SIGPIPE, SIG_IGN);
+}
+
+bool bridge_service_wait(struct pollfd *fds, unsigned count, int wait_ms) {
+    const struct timespec wait = {wait_ms / 1000, (long)(wait_ms % 1000) * 1000000L};
+    sigset_t none;
+    (void)sigemptyset(&none);
+    if (end_asked == 0) {
+        (void)ppoll(fds, count, (wait_ms >= 0) ? &wait : NULL, &none);
+    }
+    return end_asked == 0;
 }
 
 void bridge_service_open(bridge_service_t *self) {

@@ -1,87 +1,40 @@
 // SPDX-License-Identifier: MIT
 #include "bridge.h"
 
+#include "common/program.h"
 #include "common/service.h"
 
-#include <getopt.h>
-#include <poll.h>
-#include <signal.h>
 #include <stdlib.h>
-#include <sys/signalfd.h>
 #include <sysexits.h>
-#include <unistd.h>
-
-typedef enum { RUN = 0, CHECK, PRINT_CONFIG, VERSION, HELP } action_t;
-
-enum { OPTION_CHECK = 256, OPTION_PRINT };
-
-static const struct option long_options[] = {
-    {"config", required_argument, NULL, 'c'},
-    {"check", no_argument, NULL, OPTION_CHECK},
-    {"print-config", no_argument, NULL, OPTION_PRINT},
-    {"version", no_argument, NULL, 'V'},
-    {"help", no_argument, NULL, 'h'},
-    {NULL, 0, NULL, 0},
-};
-
-static void help(void) {
-    (void)fputs("iwheel-ros2: the iWheel gateway as a node of ROS 2. It moves nothing until\n"
-                "somebody calls its service iwheel/arm and sends cmd_vel.\n"
-                "\n"
-                "usage: iwheel-ros2 [options]\n"
-                "  -c, --config FILE   configuration (" ROS_SETTINGS_PATH ", if it exists)\n"
-                "      --check         check configuration, gateway and DDS; move nothing\n"
-                "      --print-config  print the configuration in force\n"
-                "      --version, --help\n"
-                "\n"
-                "exit codes: 0 ok, 1 a check failed, 64 usage, 69 DDS unavailable,\n"
-                "77 the gateway's socket may not be used, 78 configuration\n",
-                stdout);
-}
-
-static int misuse(const char *what, const char *word) {
-    (void)fprintf(stderr, "iwheel-ros2: %s%s; see iwheel-ros2 --help\n", word, what);
-    return EX_USAGE;
-}
 
 // ---- running ------------------------------------------------------------------------------------------------------
 
-/// Blocked before DDS makes its threads, which inherit that. Both ends are the same: by a descriptor.
-static int open_signals(void) {
-    sigset_t set;
-    (void)sigemptyset(&set);
-    (void)sigaddset(&set, SIGTERM);
-    (void)sigaddset(&set, SIGINT);
-    (void)sigprocmask(SIG_BLOCK, &set, NULL);
-    return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-}
-
-static void loop(bridge_t *bridge, int signals) {
-    struct pollfd entries[3] = {{.fd = signals, .events = POLLIN}, {.fd = ros_fd(bridge->ros), .events = POLLIN}};
+static void loop(bridge_t *bridge) {
+    struct pollfd entries[2] = {{.fd = ros_fd(bridge->ros), .events = POLLIN}};
     bridge_service_t service;
+    int wait_ms = 0;
     bridge_service_open(&service);
     bridge_service_tell(&service, "READY=1");
-    while (entries[0].revents == 0) {
+    do {
         bridge_step(bridge);
         bridge_service_round(&service, bridge_now_us());
-        entries[2] = (struct pollfd){.events = POLLIN};
-        const int wait_ms = bridge_wait_ms(bridge, &entries[2].fd);
-        (void)poll(entries, 3, wait_ms);
-    }
+        entries[1] = (struct pollfd){.events = POLLIN};
+        wait_ms = bridge_wait_ms(bridge, &entries[1].fd);
+    } while (bridge_service_wait(entries, 2, wait_ms));
     bridge_service_tell(&service, "STOPPING=1");
 }
 
+/// The signals are taken before DDS makes its threads, which inherit that.
 static int run(const ros_settings_t *settings) {
-    const int signals = open_signals();
+    bridge_service_take_signals();
     bridge_t *bridge = calloc(1, sizeof *bridge);
-    if (signals < 0 || bridge == NULL) {
-        (void)fputs("iwheel-ros2: not enough memory or descriptors to start\n", stderr);
-        free(bridge);
+    if (bridge == NULL) {
+        (void)fputs("iwheel-ros2: not enough memory to start\n", stderr);
         return EX_UNAVAILABLE;
     }
     const int result = bridge_open(bridge, settings);
     if (result == 0) {
-        loop(bridge, signals);
+        loop(bridge);
         bridge_close(bridge);
     }
     free(bridge);
@@ -135,66 +88,26 @@ static int check(const ros_settings_t *settings) {
     return (failures > 0) ? 1 : 0;
 }
 
-/// What the command line says. `*out_action`, `*out_path`; 0, or an exit code after a complaint.
-static int parse(int argc, char **argv, action_t *out_action, const char **out_path) {
-    opterr = 0;
-    for (int option = 0; option != -1;) {
-        option = getopt_long(argc, argv, ":c:hV", long_options, NULL);
-        switch (option) {
-        case -1:
-            break;
-        case 'c':
-            *out_path = optarg;
-            break;
-        case OPTION_CHECK:
-            *out_action = CHECK;
-            break;
-        case OPTION_PRINT:
-            *out_action = PRINT_CONFIG;
-            break;
-        case 'V':
-            *out_action = VERSION;
-            return 0;
-        case 'h':
-            *out_action = HELP;
-            return 0;
-        default:
-            return misuse((option == ':') ? " needs a value" : " is no option of this program", argv[optind - 1]);
-        }
-    }
-    return (optind < argc) ? misuse(" means nothing: there are options only", argv[optind]) : 0;
-}
-
-static int act(action_t action, const char *path) {
-    ros_settings_t settings;
+int main(int count, char **arguments) {
+    static ros_settings_t settings;
+    static ros_settings_t standard;
+    const bridge_program_t program = {
+        .form = &ros_settings_form,
+        .path = ROS_SETTINGS_PATH,
+        .about = "iwheel-ros2: the iWheel gateway as a node of ROS 2. It moves nothing until\n"
+                 "somebody calls its service iwheel/arm and sends cmd_vel.\n",
+        .options = "      --check         check configuration, gateway and DDS; move nothing\n",
+        .exit_codes = "exit codes: 0 ok, 1 a check failed, 64 usage, 69 DDS unavailable,\n"
+                      "77 the gateway's socket may not be used, 78 configuration\n",
+        .settings = &settings,
+        .standard = &standard,
+    };
+    int action = BRIDGE_RUN;
     ros_settings_default(&settings);
-    if (path != NULL || access(ROS_SETTINGS_PATH, F_OK) == 0) {
-        const int result = ros_settings_load((path != NULL) ? path : ROS_SETTINGS_PATH, &settings, stderr);
-        if (result != 0) {
-            return result;
-        }
+    ros_settings_default(&standard);
+    const int code = bridge_program_begin(&program, count, arguments, &action);
+    if (code != BRIDGE_GO) {
+        return code;
     }
-    if (action == PRINT_CONFIG) {
-        ros_settings_print(&settings, stdout);
-        return 0;
-    }
-    return (action == CHECK) ? check(&settings) : run(&settings);
-}
-
-int main(int argc, char **argv) {
-    const char *path = NULL;
-    action_t action = RUN;
-    const int result = parse(argc, argv, &action, &path);
-    if (result != 0) {
-        return result;
-    }
-    if (action == VERSION) {
-        (void)puts("iwheel-ros2 " IWHEEL_VERSION);
-        return 0;
-    }
-    if (action == HELP) {
-        help();
-        return 0;
-    }
-    return act(action, path);
+    return (action == BRIDGE_CHECK) ? check(&settings) : run(&settings);
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "ros_settings.h"
 
-#include "settings/settings.h"
-
 #include <ctype.h>
 #include <string.h>
 
@@ -57,11 +55,6 @@ static const settings_key_t keys[] = {
     {"odometry", "tf", "", "yes: publish the transform too; no, if robot_localization does.",
      WORD(odometry.tf, no_yes)},
 };
-static const settings_form_t form = {.keys = keys,
-                                     .count = sizeof keys / sizeof keys[0],
-                                     .program = "iwheel-ros2",
-                                     .missing = "create it from share/ros2.conf"};
-
 void ros_settings_default(ros_settings_t *out_settings) {
     static const ros_settings_t standard = {
         .gateway = {"/run/iwheel/gateway.sock"},
@@ -72,29 +65,13 @@ void ros_settings_default(ros_settings_t *out_settings) {
     *out_settings = standard;
 }
 
-int ros_settings_load(const char *path, ros_settings_t *out_settings, FILE *err) {
-    ros_settings_t settings;
-    ros_settings_default(&settings);
-    const int result = settings_load(&form, path, &settings, err);
-    *out_settings = (result == 0) ? settings : *out_settings;
-    return result;
-}
-
-int ros_settings_parse(const char *name, const char *text, ros_settings_t *out_settings, FILE *err) {
-    settings_report_t report = {.name = name, .err = err};
-    ros_settings_t settings;
-    ros_settings_default(&settings);
-    const int result = settings_parse(&form, &report, text, strlen(text), &settings);
-    *out_settings = (result == 0) ? settings : *out_settings;
-    return result;
-}
-
-void ros_settings_print(const ros_settings_t *settings, FILE *out) {
-    ros_settings_t standard;
-    ros_settings_default(&standard);
-    settings_print(&form, settings, &standard, NULL, out);
-}
-
 const char *ros_settings_space(const ros_settings_t *settings) {
     return (strcmp(settings->ros.ns, "none") == 0) ? "" : settings->ros.ns;
 }
+
+const settings_form_t ros_settings_form = {
+    .keys = keys,
+    .count = sizeof keys / sizeof keys[0],
+    .program = "iwheel-ros2",
+    .missing = "create it from share/ros2.conf",
+};

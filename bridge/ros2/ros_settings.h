@@ -3,9 +3,7 @@
 #ifndef ROS2_ROS_SETTINGS_H
 #define ROS2_ROS_SETTINGS_H
 
-#include <stdbool.h>
-#include <stdint.h>
-#include <stdio.h>
+#include "settings/settings.h"
 
 /// Read when no `-c FILE` is given. Its absence is no error then.
 #define ROS_SETTINGS_PATH "/etc/iwheel/ros2.conf"
@@ -38,14 +36,7 @@ typedef struct {
 
 void ros_settings_default(ros_settings_t *out_settings);
 
-/// Reads the file over the defaults. 0, or SETTINGS_ERROR with `*out_settings` untouched and what is wrong on `err`.
-int ros_settings_load(const char *path, ros_settings_t *out_settings, FILE *err);
-
-/// The same for a text in memory; `name` stands for the file in messages.
-int ros_settings_parse(const char *name, const char *text, ros_settings_t *out_settings, FILE *err);
-
-/// Writes what is in force as a commented file, which reads back as the same.
-void ros_settings_print(const ros_settings_t *settings, FILE *out);
+extern const settings_form_t ros_settings_form;
 
 /// The namespace before a relative name; empty: there is none.
 const char *ros_settings_space(const ros_settings_t *settings);

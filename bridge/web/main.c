@@ -1,85 +1,22 @@
 // SPDX-License-Identifier: MIT
+#include "common/program.h"
 #include "common/service.h"
 #include "server.h"
 
-#include <getopt.h>
-#include <poll.h>
 #ifdef IWHEEL_WEB_QR
 #include <qrencode.h>
 #endif
-#include <signal.h>
 #include <string.h>
 #include <sysexits.h>
 #include <unistd.h>
 
-typedef enum { RUN, CHECK, PRINT, URL, VERSION, HELP } action_t;
+#define PRINT_URL BRIDGE_OWN
 
 #ifdef IWHEEL_WEB_QR
 static bool is_dark(const QRcode *code, int x, int y) {
     return x >= 0 && y >= 0 && x < code->width && y < code->width && (code->data[y * code->width + x] & 1U) != 0U;
 }
 #endif
-
-static volatile sig_atomic_t end_asked;
-
-static void ask_end(int number) {
-    (void)number;
-    end_asked = 1;
-}
-
-static void help(FILE *out) {
-    (void)fputs("iwheel-web: a page that shows what the wheels do, and stops them. It drives only if\n"
-                "configured to. No safety function.\n"
-                "\n"
-                "usage: iwheel-web [options]\n"
-                "  -c, --config FILE   configuration (" WEB_SETTINGS_PATH ", if it exists)\n"
-                "      --check         check configuration and files; open nothing\n"
-                "      --print-config  print the configuration in force\n"
-                "      --url           print the page's address with its token; on a\n"
-                "                      terminal as a QR code too\n"
-                "      --version, --help\n"
-                "\n"
-                "exit codes: 0 ok, 64 usage, 69 cannot listen, 71 no memory, 77 permission,\n"
-                "78 configuration\n",
-                out);
-}
-
-static int misuse(const char *what) {
-    (void)fprintf(stderr, "iwheel-web: %.200s; see iwheel-web --help\n", what);
-    return EX_USAGE;
-}
-
-static int parse(int count, char **arguments, const char **out_path, action_t *out_action) {
-    static const struct option options[] = {
-        {"config", required_argument, NULL, 'c'},
-        {"check", no_argument, NULL, CHECK},
-        {"print-config", no_argument, NULL, PRINT},
-        {"url", no_argument, NULL, URL},
-        {"version", no_argument, NULL, VERSION},
-        {"help", no_argument, NULL, HELP},
-        {NULL, 0, NULL, 0},
-    };
-    int option = 0;
-    opterr = 0;
-    while ((option = getopt_long(count, arguments, ":c:", options, NULL)) != -1) {
-        if (option == 'c') {
-            *out_path = optarg;
-        } else if (option == '?' || option == ':') {
-            return misuse((option == ':') ? "an option needs a value" : "there is no such option");
-        } else {
-            *out_action = (action_t)option;
-        }
-    }
-    return (optind < count) ? misuse("there are options only") : 0;
-}
-
-static int configure(const char *path, web_settings_t *out_settings) {
-    web_settings_default(out_settings);
-    if (path == NULL && access(WEB_SETTINGS_PATH, F_OK) != 0) {
-        return 0;
-    }
-    return settings_load(&web_settings_form, (path != NULL) ? path : WEB_SETTINGS_PATH, out_settings, stderr);
-}
 
 /// Two rows of squares in one of characters: upper and lower half blocks, dark on light whatever the terminal's colours.
 static void print_qr(const char *text) {
@@ -138,46 +75,30 @@ static int check(const web_settings_t *settings) {
 
 static int loop(web_server_t *server) {
     bridge_service_t service;
-    sigset_t none;
-    (void)sigemptyset(&none);
     bridge_service_open(&service);
     bridge_service_tell(&service, "READY=1");
-    while (end_asked == 0) {
+    for (;;) {
         int fds[WEB_SERVER_FDS];
         struct pollfd waits[WEB_SERVER_FDS + 1U] = {{bridge_link_fd(&server->link.gateway), POLLIN, 0}};
         web_server_fds(server, fds);
         for (size_t i = 0; i < WEB_SERVER_FDS; i++) {
             waits[i + 1U] = (struct pollfd){fds[i], POLLIN, 0};
         }
-        const int wait_ms = web_server_wait_ms(server);
-        const struct timespec wait = {wait_ms / 1000, (long)(wait_ms % 1000) * 1000000L};
-        (void)ppoll(waits, sizeof waits / sizeof waits[0], &wait, &none);
+        if (!bridge_service_wait(waits, sizeof waits / sizeof waits[0], web_server_wait_ms(server))) {
+            bridge_service_tell(&service, "STOPPING=1");
+            return 0;
+        }
         const int code = web_server_step(server);
         if (code != 0) {
             return code;
         }
         bridge_service_round(&service, bridge_now_us());
     }
-    bridge_service_tell(&service, "STOPPING=1");
-    return 0;
-}
-
-/// Both signals come only while the loop waits.
-static void take_signals(void) {
-    struct sigaction action = {.sa_handler = ask_end};
-    sigset_t ours;
-    (void)sigemptyset(&ours);
-    (void)sigaddset(&ours, SIGTERM);
-    (void)sigaddset(&ours, SIGINT);
-    (void)sigprocmask(SIG_BLOCK, &ours, NULL);
-    (void)sigaction(SIGTERM, &action, NULL);
-    (void)sigaction(SIGINT, &action, NULL);
-    (void)signal(SIGPIPE, SIG_IGN);
 }
 
 static int run(const web_settings_t *settings) {
     static web_server_t server;
-    take_signals();
+    bridge_service_take_signals();
     int code = web_server_open(&server, settings);
     if (code == 0) {
         (void)fprintf(stderr, "iwheel-web: on %s port %u; its address with the token: iwheel-web --url\n",
@@ -190,29 +111,30 @@ static int run(const web_settings_t *settings) {
 
 int main(int count, char **arguments) {
     static web_settings_t settings;
-    const char *path = NULL;
-    action_t action = RUN;
-    int code = parse(count, arguments, &path, &action);
-    if (code != 0) {
+    static web_settings_t standard;
+    const bridge_program_t program = {
+        .form = &web_settings_form,
+        .path = WEB_SETTINGS_PATH,
+        .about = "iwheel-web: a page that shows what the wheels do, and stops them. It drives only if\n"
+                 "configured to. No safety function.\n",
+        .options = "      --check         check configuration and files; open nothing\n"
+                   "      --url           print the page's address with its token; on a\n"
+                   "                      terminal as a QR code too\n",
+        .exit_codes = "exit codes: 0 ok, 64 usage, 69 cannot listen, 71 no memory, 77 permission,\n"
+                      "78 configuration\n",
+        .own = {{"url", NULL}},
+        .settings = &settings,
+        .standard = &standard,
+    };
+    int action = BRIDGE_RUN;
+    web_settings_default(&settings);
+    web_settings_default(&standard);
+    const int code = bridge_program_begin(&program, count, arguments, &action);
+    if (code != BRIDGE_GO) {
         return code;
     }
-    if (action == HELP || action == VERSION) {
-        if (action == HELP) {
-            help(stdout);
-        } else {
-            (void)printf("iwheel-web " IWHEEL_VERSION "\n");
-        }
-        return 0;
+    if (action == PRINT_URL) {
+        return print_url(&settings);
     }
-    code = configure(path, &settings);
-    if (code != 0) {
-        return code;
-    }
-    if (action == PRINT) {
-        web_settings_t defaults;
-        web_settings_default(&defaults);
-        settings_print(&web_settings_form, &settings, &defaults, NULL, stdout);
-        return 0;
-    }
-    return (action == CHECK) ? check(&settings) : (action == URL) ? print_url(&settings) : run(&settings);
+    return (action == BRIDGE_CHECK) ? check(&settings) : run(&settings);
 }
