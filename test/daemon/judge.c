@@ -15,6 +15,7 @@
 #define GONE_US     (60U * MS)  ///< From a client's death to the ramp.
 #define GAP_US      (100U * MS)
 #define RESTART_US  (100U * MS) ///< From the start of the process to the zeros.
+#define START_US    (5U * MS)   ///< The calls of a start take less.
 #define HOLD_MAX_US (13U * S)   ///< Ramp, ten seconds of zeros for wheels that will not stand, and some.
 #define CALM_US     (300U * MS) ///< After trouble with the bus, gaps are not judged for so long.
 #define WATCHDOG_US S           ///< Of the wheels.
@@ -51,6 +52,7 @@ static struct {
     iw_time_us_t gone_us[CLIENTS];
     iw_time_us_t gone_stolen_us[CLIENTS];
     iw_time_us_t may_send_until_us; ///< 0: not at all.
+    iw_time_us_t armed_us;          ///< An arm was read in silence.
     iw_time_us_t moved_us;          ///< The last nonzero one was accepted: zeros are held from then on.
     iw_time_us_t fault_us;          ///< Last trouble with the bus.
     iw_time_us_t fault_stolen_us;
@@ -129,6 +131,7 @@ void judge_said(unsigned client, said_t what) {
     }
     if (what == SAID_ARM || what == SAID_DRIVE) {
         self.armed_said = self.armed_said || what == SAID_ARM;
+        self.armed_us = (what == SAID_ARM && judge_is_silent(GAP_US)) ? vk.now_us : self.armed_us;
         self.may_send_until_us = self.armed_said ? until_us : self.may_send_until_us;
     }
     if (what == SAID_DRIVE) {
@@ -195,6 +198,13 @@ static right_t after_end(const end_t *end) {
         return MAY_STAND;
     }
     return (end->limit_us > JUDGE_REACTION_US && passed_us > GONE_US) ? MAY_FALL : MAY_MOVE;
+}
+
+/// Killed now, its next start must find that it was moving. A marker that could not be made is made soon.
+static void judge_marker(void) {
+    if (!vk_file_exists(VK_MARKER) && vk.now_us - vk.failed_us > CALM_US) {
+        judge_break(10, "a nonzero setpoint without a crash marker");
+    }
 }
 
 /// What this client's commands may do to the wheels, and which end forbids more.
@@ -335,6 +345,7 @@ void judge_frame(const iw_can_frame_t *frame, bool accepted) {
     }
     if (speed != 0) {
         judge_right(number, speed);
+        judge_marker();
         judge_slope(side, speed);
     }
     if (accepted) {
@@ -391,16 +402,16 @@ void judge_life(void) {
 }
 
 phase_t judge_phase(void) {
-    if (!self.armed_said) {
-        return (self.frames > 0U) ? AT_RESTART : (vk.now_us - self.life_us < RESTART_US) ? AT_START : AT_SILENCE;
-    }
-    if (self.frames == 0U) {
-        return AT_ARMING;
-    }
     if (self.side[IW_LEFT].speed != 0 || self.side[IW_RIGHT].speed != 0) {
         return (self.trend > 0 || self.sum == 0) ? AT_RAMP_UP : (self.trend < 0) ? AT_RAMP_DOWN : AT_STEADY;
     }
-    return judge_is_silent(GAP_US) ? AT_SILENCE : (self.moved_us > self.life_us) ? AT_HOLD : AT_ARMING;
+    if (self.armed_us > self.life_us && vk.now_us - self.armed_us < GAP_US) {
+        return AT_ARMING;
+    }
+    if (judge_is_silent(GAP_US)) {
+        return (vk.now_us - self.life_us < START_US) ? AT_START : AT_SILENCE;
+    }
+    return (self.moved_us > self.life_us) ? AT_HOLD : AT_RESTART;
 }
 
 void judge_death(bool in_order) {

@@ -268,10 +268,11 @@ void world_notified(const char *words, size_t size) {
 
 // ---- kills, one in each life ---------------------------------------------------------------------------------------
 
-/// In a call soon after its phase has begun.
+/// In a call soon after its phase has begun; while arming, once it has had time to find the wheels at rest.
 static void aim(void) {
     const iw_time_us_t since_us = vk.now_us - world.life_us;
-    if (!world.scenario->kills || world.aimed || (judge_phase() != world.aim && since_us < AIM_US)) {
+    const bool there = judge_phase() == world.aim && (world.aim != AT_ARMING || since_us > S / 2U);
+    if (!world.scenario->kills || world.aimed || (!there && since_us < AIM_US)) {
         return;
     }
     const uint32_t among = (world.aim == AT_START) ? START_CALLS : (world.aim == AT_ARMING) ? ARM_CALLS : AIM_CALLS;
@@ -378,7 +379,7 @@ static void watch_over(void) {
         return;
     }
     tell("the watchdog of the service kills it", "");
-    if (vk.failed_us < world.fed_us && vk.stolen_us - world.fed_stolen_us < WATCHDOG_US / 2U) {
+    if (vk.failed_us < world.fed_us && vk.stolen_us - world.fed_stolen_us < WATCHDOG_US / 4U) {
         judge_break(13, "it runs, and has not told the service manager for a second");
     }
     world.fed_us = IW_NEVER;
