@@ -312,7 +312,7 @@ static void note_accepted(unsigned number, int32_t speed) {
     side->speed = speed;
     side->sent_us = vk.now_us;
     side->stolen_us = vk.stolen_us;
-    side->pending++;
+    side->pending += vk.link.off ? 0U : 1U; // Bus-off, the controller keeps none.
     if (speed != 0) {
         self.reset_said = false;
         self.moved_us = vk.now_us;

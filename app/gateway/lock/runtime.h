@@ -21,6 +21,7 @@ typedef struct {
     const char *directory;                               ///< Of the first place, if it may be made; else NULL.
     const char *marker_path;                             ///< Where it is, or where the last change failed.
     bool marked;                                         ///< It is there, as far as we know.
+    bool unsure;                                         ///< The last change failed.
 } gw_runtime_t;
 
 /// Takes the lock of `bus` and looks for the marker, also beside `socket`. `directory` is GW_RUNTIME_DIRECTORY but in tests, and must outlive
