@@ -202,7 +202,7 @@ static right_t after_end(const end_t *end) {
 
 /// Killed now, its next start must find that it was moving. A marker that could not be made is made soon.
 static void judge_marker(void) {
-    if (!vk_file_exists(VK_MARKER) && vk.now_us - vk.failed_us > CALM_US) {
+    if (!vk_file_exists(VK_MARKER) && own_us(vk.failed_us, vk.failed_stolen_us) > CALM_US) {
         judge_break(10, "a nonzero setpoint without a crash marker");
     }
 }
@@ -456,7 +456,8 @@ void judge_tick(void) {
         self.second_us = vk.now_us;
         self.second_waits = vk.waits;
     }
-    const bool calm = own_us(self.fault_us, self.fault_stolen_us) > CALM_US && vk.now_us - vk.failed_us > CALM_US;
+    const bool calm =
+        own_us(self.fault_us, self.fault_stolen_us) > CALM_US && own_us(vk.failed_us, vk.failed_stolen_us) > CALM_US;
     if (!calm) {
         self.owes = self.owes && vk.failed_us < self.life_us && self.fault_us < self.life_us;
         return;

@@ -119,6 +119,11 @@ static void steal(iw_time_us_t until_us) {
     judge_stopped(vk.now_us - from_us);
 }
 
+void vk_note_failure(void) {
+    vk.failed_us = vk.now_us;
+    vk.failed_stolen_us = vk.stolen_us;
+}
+
 bool vk_call(const char *name, const int *errors) {
     vk.calls++;
     vk_pass(vk.now_us + 1U + sim_random_below(&vk.random, CALL_US));
@@ -144,7 +149,7 @@ bool vk_call(const char *name, const int *errors) {
     }
     errno = errors[sim_random_below(&vk.random, count)];
     vk.failed++;
-    vk.failed_us = vk.now_us;
+    vk_note_failure();
     if (vk.trace) {
         printf("  %11.6f s    %s fails: %s\n", (double)vk.now_us / 1e6, name, strerror(errno));
     }
@@ -185,7 +190,7 @@ int vk_open_fd(const char *name, vk_kind_t kind, int number) {
         }
     }
     errno = EMFILE;
-    vk.failed_us = vk.now_us;
+    vk_note_failure();
     return -1;
 }
 
@@ -250,7 +255,7 @@ uint32_t vk_ready(int fd) {
     case VK_SIGNAL:
         return (vk.signal != 0) ? EPOLLIN : 0U;
     case VK_GPIO:
-        return (vk.button.edges > 0) ? EPOLLIN : 0U;
+        return (vk.button.edges > 0 && entry->number == vk.button.number) ? EPOLLIN : 0U;
     default:
         return vk_ready_socket(entry);
     }

@@ -63,10 +63,11 @@ typedef struct {
     bool kill_after;           ///< After it has taken effect.
     bool doomed;               ///< It dies before it does anything else.
     iw_time_us_t failed_us;    ///< When a call was made to fail last.
-    bool marker_failed;        ///< The last one upon the crash marker was.
-    uint32_t fail_permille;    ///< Calls that fail.
-    uint32_t late_us;          ///< Each wake-up is late by up to this.
-    bool no_descriptors;       ///< None is left for anybody.
+    iw_time_us_t failed_stolen_us;
+    bool marker_failed;     ///< The last one upon the crash marker was.
+    uint32_t fail_permille; ///< Calls that fail.
+    uint32_t late_us;       ///< Each wake-up is late by up to this.
+    bool no_descriptors;    ///< None is left for anybody.
     bool trace;
     sim_random_t random;
     int signal; ///< Pending, or 0.
@@ -85,6 +86,7 @@ typedef struct {
     } link;
     struct {
         bool there;
+        int number; ///< Another after it was gone: who holds the one before reads nothing any more.
         bool pressed;
         int edges; ///< Not read yet.
     } button;
@@ -122,6 +124,9 @@ void vk_link_exist(bool exists);
 void vk_press(bool pressed);
 
 bool vk_file_exists(const char *path);
+
+/// A call fails, or might.
+void vk_note_failure(void);
 
 // For the parts of the kernel ---------------------------------------------------------------------------------------
 

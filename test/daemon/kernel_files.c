@@ -298,6 +298,11 @@ void vk_set_carrier(void) {
 static char chip; ///< The only one; and its line.
 static int line_fd = -1;
 
+/// The chip that the line was requested of is there still.
+static bool is_line_alive(void) {
+    return vk.button.there && line_fd >= 0 && vk_fd(line_fd)->number == vk.button.number;
+}
+
 struct gpiod_chip *gpiod_chip_open_by_name(const char *name) {
     (void)name;
     errno = ENOENT;
@@ -330,7 +335,7 @@ int gpiod_line_request_both_edges_events_flags(struct gpiod_line *line, const ch
     (void)consumer;
     (void)flags;
     vk.button.edges = 0;
-    line_fd = vk_open_fd("gpiod_line_request", VK_GPIO, 0);
+    line_fd = vk_open_fd("gpiod_line_request", VK_GPIO, vk.button.number);
     return (int)vk_done((line_fd < 0) ? -1 : 0);
 }
 
@@ -351,7 +356,7 @@ int gpiod_line_get_value(struct gpiod_line *line) {
     (void)line;
     (void)vk_call("gpiod_line_get_value", NULL);
     errno = ENODEV;
-    return (int)vk_done(vk.button.there ? (int)vk.button.pressed : -1);
+    return (int)vk_done(is_line_alive() ? (int)vk.button.pressed : -1);
 }
 
 int gpiod_line_event_read_fd_multiple(int fd, struct gpiod_line_event *events, unsigned count) {
@@ -361,8 +366,8 @@ int gpiod_line_event_read_fd_multiple(int fd, struct gpiod_line_event *events, u
     if (!vk_call("gpiod_line_event_read", errors)) {
         return -1;
     }
-    if (!vk.button.there || vk.button.edges == 0) {
-        errno = vk.button.there ? EAGAIN : ENODEV;
+    if (!is_line_alive() || vk.button.edges == 0) {
+        errno = is_line_alive() ? EAGAIN : ENODEV;
         return -1;
     }
     const int taken = (vk.button.edges < (int)count) ? vk.button.edges : (int)count;

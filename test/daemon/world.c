@@ -119,7 +119,7 @@ static void switch_fault(unsigned kind, bool on) {
         break;
     case EV_NO_FD:
         vk.no_descriptors = on;
-        vk.failed_us = vk.now_us;
+        vk_note_failure();
         break;
     case EV_PRESS:
         vk_press(on);
@@ -127,6 +127,7 @@ static void switch_fault(unsigned kind, bool on) {
         break;
     case EV_NO_BUTTON:
         vk.button.there = !on;
+        vk.button.number += on ? 1 : 0;
         judge_end("e-stop unreadable", JUDGE_REACTION_US);
         break;
     default:

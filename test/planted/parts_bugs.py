@@ -166,6 +166,7 @@ PARTS = [
     Bug("clock-that-can-be-set", "R10", "port/linux/src/clock.c", "return read_us(CLOCK_MONOTONIC);", "return read_us(CLOCK_REALTIME);", CLOCK),
     Bug("clock-that-counts-sleep", "R10", "port/linux/src/clock.c", "running_us = read_us(CLOCK_MONOTONIC);", "running_us = read_us(CLOCK_BOOTTIME);", CLOCK),
     Bug("sleep-unseen", "R7", "port/linux/src/clock.c", "read_us(CLOCK_BOOTTIME);", "read_us(CLOCK_MONOTONIC);", CLOCK),
+    Bug("sent-into-an-untold-bus-off", "R6", BUS, "if (bus->up && bus->unheeded < IW_BUS_PASSIVE) { return 0; }", "", ("unit_linux_socketcan",)),
     # The whole daemon, in simulated hours.
     Bug("estop-line-asked-only-when-told", "R2", "port/linux/src/linux_hal.c", "self->estop_ops->present ? self->estop_ops->pressed(&self->estop, self->estop_quiet) : 0;",
         "(self->estop_ops->present && !self->estop_quiet) ? self->estop_ops->pressed(&self->estop, self->estop_quiet) : 0;", DAEMON),
