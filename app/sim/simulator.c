@@ -162,7 +162,8 @@ static iw_time_us_t next_us(const sim_simulator_t *self) {
 void sim_simulator_run(sim_simulator_t *self) {
     while (!self->ended) {
         iw_time_us_t const log_us = sim_bus_log_step(&self->log, real_us(self, self->now_us));
-        self->wake_us = next_us(self);
+        iw_time_us_t const due_us = next_us(self);
+        self->wake_us = (due_us > self->now_us) ? due_us : self->now_us; // What is overdue was not slept through.
         iw_time_us_t const world_us = (self->wake_us == IW_NEVER) ? IW_NEVER : real_us(self, self->wake_us);
         sim_loop_wait(&self->loop, earlier(world_us, log_us), awake, self);
     }

@@ -66,7 +66,7 @@ class Campaign:
             "group": group.name,
             "tests": names,
             "virtual": group.virtual and not group.distribution,
-            "native": self.options.native or group.distribution,
+            "native": self.options.native or bool(group.distribution),
             "full": options.full,
             "seed": options.seed,
             "hours": options.hours,
@@ -84,7 +84,8 @@ class Campaign:
                 self.take(group, {"name": name, "verdict": "skipped", "figures": [reason]})
             return
         processor = self.take_processor(group)
-        boot = (EmulatedBoot if group.distribution else NativeBoot if self.options.native else Boot)(self.kernel, self.folder, group.name, plan, {processor})
+        boot_type = EmulatedBoot if group.distribution else NativeBoot if self.options.native else Boot
+        boot = boot_type(group.distribution or self.kernel, self.folder, group.name, plan, {processor})
         self.boots.append(boot)
         limit_s = group.full_limit_s if self.options.full else group.limit_s
         done, since = set(), 0
@@ -142,7 +143,7 @@ class Campaign:
     def why_skipped(self, group, plan):
         """What is missing for a group that wants another build; else that build is in the plan, and the answer None."""
         if group.distribution:
-            return why_not_emulated()
+            return why_not_emulated(group.distribution)
         if group.gpiod == 0:
             return None
         if gpiod2.generation(plan["build"]) == group.gpiod:

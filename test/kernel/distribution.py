@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""The distribution's own kernel in an emulated machine with two CAN controllers (SJA1000, Kvaser PCI cards) on one bus.
+"""The distribution's own kernel in an emulated machine with two CAN controllers on one bus: SJA1000 (Kvaser PCI cards), or CTU CAN FD.
 
 Nobody here configured that kernel, and its driver is one that boards have: bit timing over netlink, IFF_ECHO, restart-ms. Its clock
 counts instructions (2 ns each) and jumps while nobody works, so that no load on this machine makes it late. Neither bus errors nor the
 time that a frame takes are modelled, and Debian 12's kernel has no gpio-sim: the e-stop's button is the local one.
+
+Also for another architecture: then everything in that machine is Debian's for it, and the programs are those of the packages that
+test/cross/run has built.
 """
 
 import os
@@ -12,18 +15,43 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from typing import NamedTuple
 
 from boot import HERE, VIRTUAL_NICE, Boot
 from harness import die_with_parent
 
 ROOT = os.path.dirname(os.path.dirname(HERE))
-MACHINES = {"x86_64": "amd64"}
-EMULATOR = "qemu-system-x86_64"
+
+
+class Machine(NamedTuple):
+    """One that is emulated. `cards`: two controllers on the bus `bus`. `parts`: packages of its architecture that it is made of; without, of
+    this machine's own files. `built`: a driver that the distribution leaves out, by its folder in the kernel's source, and how it is asked for."""
+
+    architecture: str  # as Debian calls it
+    emulator: tuple
+    console: str
+    package: str  # of the emulator
+    cards: tuple
+    parts: tuple = ()
+    compiler: str = "gcc"
+    built: tuple = ()
+
+
+PARTS = ("linux-image-arm64", "libgpiod2", "libinih1", "libmnl0", "libncursesw6", "python3", "bash", "busybox-static", "coreutils", "iproute2", "mount", "util-linux")
+KVASER = ("-device", "kvaser_pci,canbus=bus") * 2
+AMD64 = Machine("amd64", ("qemu-system-x86_64", "-vga", "none"), "ttyS0", "qemu-system-x86", KVASER)
+CTUCAN = ("drivers/net/can/ctucanfd", "CONFIG_CAN_CTUCANFD=m", "CONFIG_CAN_CTUCANFD_PCI=m")
+MACHINES = {
+    "amd64": AMD64,
+    "ctucan": AMD64._replace(cards=("-device", "ctucan_pci,canbus0=bus,canbus1=bus"), built=CTUCAN),
+    "arm64": Machine("arm64", ("qemu-system-aarch64", "-M", "virt", "-cpu", "cortex-a57"), "ttyAMA0", "qemu-system-arm", KVASER, PARTS, "aarch64-linux-gnu-gcc"),
+}
+HERE_IS = {"x86_64": "amd64"}  # os.uname() and Debian
 CONTROLLERS = ("can0", "can1")
 # In the order in which they are loaded; what a kernel has built in is no file, and nothing is missing then.
-MODULES = "virtio_ring virtio virtio_pci_legacy_dev virtio_pci_modern_dev virtio_pci netfs fscache 9pnet 9pnet_virtio 9p can-dev can can-raw sja1000 kvaser_pci"
+MODULES = "virtio_ring virtio virtio_pci_legacy_dev virtio_pci_modern_dev virtio_pci netfs fscache 9pnet 9pnet_virtio 9p can-dev can can-raw sja1000 kvaser_pci ctucanfd ctucanfd_pci"
 TOOLS = ("bash", "busybox", "cat", "ip", "ln", "mkdir", "mount", "mountpoint", "sh", "sleep", "sync", "tc")
-PACKAGES = {EMULATOR: "qemu-system-x86", "cpio": "cpio", "busybox": "busybox-static", "ip": "iproute2", "apt-get": "apt", "dpkg-deb": "dpkg"}
+PACKAGES = {"cpio": "cpio", "busybox": "busybox-static", "ip": "iproute2", "apt-get": "apt", "dpkg-deb": "dpkg"}
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 OWN = ("app/gateway/iwheel-gateway", "app/sim/iwheel-sim", "app/ctl/iwheelctl", "test/kernel/iwheel-sleeper")
 SETTINGS = ("/etc/passwd", "/etc/group", "/etc/nsswitch.conf", "/etc/ld.so.cache")
@@ -50,53 +78,120 @@ def output(*command, **options):
     return done.stdout
 
 
+def here():
+    """Debian's name of this machine's architecture. RuntimeError if nothing is made for it."""
+    machine = os.uname().machine
+    if machine not in HERE_IS:
+        raise RuntimeError(f"made for {', '.join(HERE_IS)}, and this machine is {machine}")
+    return HERE_IS[machine]
+
+
 def package_name():
     """The kernel's package that this distribution installs today."""
-    machine = os.uname().machine
-    if machine not in MACHINES:
-        raise RuntimeError(f"made for {', '.join(MACHINES)}, and this machine is {machine}")
-    found = re.search(r"Depends: (linux-image-[0-9]\S+)", output("apt-cache", "depends", f"linux-image-{MACHINES[machine]}"))
+    found = re.search(r"Depends: (linux-image-[0-9]\S+)", output("apt-cache", "depends", f"linux-image-{here()}"))
     if not found:
-        raise RuntimeError(f"this distribution has no package linux-image-{MACHINES[machine]}")
+        raise RuntimeError(f"this distribution has no package linux-image-{here()}")
     return found.group(1)
 
 
-def find_kernel():
-    """A folder with `vmlinuz` and the modules that are needed, fetched once for each version. RuntimeError: why there is none."""
-    missing = sorted({package for program, package in PACKAGES.items() if not shutil.which(program, path=PATH)})
+def need(**packages):
+    missing = sorted({package for program, package in packages.items() if not shutil.which(program, path=PATH)})
     if missing:
         raise RuntimeError(f"apt-get install {' '.join(missing)}")
+
+
+def find_kernel(name):
+    """A folder with `vmlinuz` and the modules that are needed, fetched once for each version; of another architecture, also `root`. RuntimeError: why there is none."""
+    machine = MACHINES[name]
+    need(**PACKAGES, **{machine.emulator[0]: machine.package})
+    if machine.architecture != here():
+        return find_foreign(machine)
     package = package_name()
     version = re.search(r"Candidate: (\S+)", output("apt-cache", "policy", package)).group(1)
-    folder = os.path.join(cache(), f"{package}-{version}")
+    folder = os.path.join(cache(), "-".join([package, version, *(os.path.basename(path) for path in machine.built[:1])]))
     if not os.path.exists(os.path.join(folder, "vmlinuz")):
         os.makedirs(cache(), exist_ok=True)
         with tempfile.TemporaryDirectory(dir=cache()) as work:
             fetch(package, work)
+            if machine.built:
+                build_modules(package, version, machine.built, work)
             shutil.rmtree(folder, ignore_errors=True)
             os.rename(os.path.join(work, "kept"), folder)
     return folder
 
 
-def why_not_emulated():
+def find_foreign(machine):
+    """The same of another architecture, with all that such a machine has."""
+    folder = os.path.join(cache(), f"distribution-{machine.architecture}")
+    root = os.path.join(folder, "root")
+    fresh = not os.path.exists(os.path.join(root, "wanted"))
+    output(os.path.join(ROOT, "scripts/cross_root"), machine.architecture, root, *machine.parts)
+    if fresh or not os.path.exists(os.path.join(folder, "vmlinuz")):
+        keep(root, folder)
+    return folder
+
+
+def packages_of(architecture):
+    """The packages of this project for that architecture. RuntimeError: where they come from."""
+    folder = os.path.join(ROOT, "build", "cross", architecture)
+    names = [name for part in ("gateway", "tools") for name in (os.listdir(folder) if os.path.isdir(folder) else ()) if re.match(f"iwheel-{part}_.*_{architecture}.deb$", name)]
+    if len(names) != 2:
+        raise RuntimeError(f"no packages for {architecture}: ./check cross builds them")
+    return [os.path.join(folder, name) for name in names]
+
+
+def why_not_emulated(name):
     """What keeps that machine from being had, and the cure; None if nothing does."""
+    machine = MACHINES[name]
     try:
-        find_kernel()
+        find_kernel(name)
+        if machine.parts:
+            need(**{machine.compiler: f"gcc-{machine.compiler.removesuffix('-gcc')}"})
+            packages_of(machine.architecture)
     except RuntimeError as error:
         return f"no distribution's kernel: {error}"
     return None
 
 
+def download(packages, work):
+    """Without installing them; returns where they lie."""
+    output("apt-get", "-q", "-o", "APT::Sandbox::User=root", "download", *packages, cwd=work)
+    return [os.path.join(work, name) for name in sorted(os.listdir(work)) if name.endswith(".deb")]
+
+
 def fetch(package, work):
     """Downloads and unpacks it; what is needed lies in `work`/kept then. Nothing is installed."""
-    output("apt-get", "-q", "-o", "APT::Sandbox::User=root", "download", package, cwd=work)
-    archive = next(name for name in os.listdir(work) if name.endswith(".deb"))
-    output("dpkg-deb", "-x", os.path.join(work, archive), os.path.join(work, "all"))
-    kept = os.path.join(work, "kept")
-    os.makedirs(os.path.join(kept, "modules"))
-    boot = os.path.join(work, "all", "boot")
+    output("dpkg-deb", "-x", *download([package], work), os.path.join(work, "all"))
+    keep(os.path.join(work, "all"), os.path.join(work, "kept"))
+
+
+def build_modules(image, version, built, work):
+    """A driver from the source of the distribution's kernel, with its headers and its compiler, beside the modules in `work`/kept."""
+    need(make="make", gcc="gcc")
+    release, series = image.removeprefix("linux-image-"), ".".join(version.split(".")[:2])
+    headers = [f"linux-headers-{release}", f"linux-headers-{release.rsplit('-', 1)[0]}-common", f"linux-kbuild-{series}"]
+    folder, source = os.path.join(work, "build"), f"linux-source-{series}"
+    os.mkdir(folder)
+    for archive in download([*headers, source], folder):
+        output("dpkg-deb", "-x", archive, folder)
+    output("tar", "-xJf", os.path.join(folder, "usr", "src", f"{source}.tar.xz"), f"{source}/{built[0]}", cwd=folder)
+    tree = os.path.join(folder, "usr", "src", headers[0])
+    with open(os.path.join(tree, "Makefile"), "r+", encoding="ascii") as makefile:  # It names where its package is installed.
+        text = makefile.read().replace("/usr/src", os.path.join(folder, "usr", "src"))
+        makefile.seek(0)
+        makefile.write(text)
+    output("make", "-C", tree, f"M={os.path.join(folder, source, built[0])}", *built[1:], "modules")
+    for name in os.listdir(os.path.join(folder, source, built[0])):
+        if name.endswith(".ko"):
+            shutil.copy(os.path.join(folder, source, built[0], name), os.path.join(work, "kept", "modules"))
+
+
+def keep(root, kept):
+    """Kernel and modules of that root, into that folder."""
+    os.makedirs(os.path.join(kept, "modules"), exist_ok=True)
+    boot = os.path.join(root, "boot")
     shutil.copy(os.path.join(boot, next(name for name in os.listdir(boot) if name.startswith("vmlinuz"))), os.path.join(kept, "vmlinuz"))
-    for folder, _, files in os.walk(os.path.join(work, "all")):
+    for folder, _, files in os.walk(root):
         for name in files:
             module, _, ending = name.partition(".ko")
             if module in MODULES.split() and ending in ("", ".xz", ".zst"):
@@ -110,9 +205,6 @@ class Image:
 
     def __init__(self):
         self.files = set()
-        for link in ("/bin", "/sbin", "/lib", "/lib64"):
-            if os.path.islink(link):
-                self.files.add(link)
 
     def add(self, path):
         """With the folders above it, and what it links to."""
@@ -146,9 +238,10 @@ class Image:
             raise RuntimeError(f"cpio: {done.stderr.decode().strip()[-300:]}")
 
 
-def write_image(path, build, kernel, results):
-    """The image for tests of that build, whose results go to that folder of this machine's."""
+def own_files(build):
+    """This machine's own files that the tests need, and the programs of that build."""
     image = Image()
+    image.files |= set(filter(os.path.islink, ("/bin", "/sbin", "/lib", "/lib64")))
     for name in TOOLS:
         program = shutil.which(name, path=PATH)
         if program:
@@ -157,30 +250,62 @@ def write_image(path, build, kernel, results):
     image.add_tree(os.path.dirname(os.__file__), (*NOT_NEEDED, *(name for name in os.listdir(os.path.dirname(os.__file__)) if name.startswith("config-"))))
     for name in OWN:
         image.add_program(os.path.join(build, name))
+    return image
+
+
+def all_files(root, leave_out=()):
+    """Whatever is below that folder."""
+    image = Image()
+    for folder, folders, files in os.walk(root):
+        folders[:] = [name for name in folders if name not in leave_out]
+        image.files |= {os.path.join(folder, name) for name in folders + files}
+    return image
+
+
+def write_foreign(file, machine, kernel, work):
+    """Debian's files of that architecture, and over them the programs of this project's packages, at their places under /usr."""
+    root = os.path.join(kernel, "root")
+    all_files(root, (*NOT_NEEDED, "boot", "modules", "doc", "man", "locale", "include", "shlibs.local")).write(file, root)
+    with tempfile.TemporaryDirectory() as unpacked:  # Their /lib is a folder, the system's a link.
+        for package in packages_of(machine.architecture):
+            output("dpkg-deb", "-x", package, unpacked)
+        shutil.copytree(os.path.join(unpacked, "usr", "bin"), os.path.join(work, "usr", "bin"))
+    sleeper = os.path.join(work, "usr", "test", "kernel", "iwheel-sleeper")
+    os.makedirs(os.path.dirname(sleeper))
+    output(machine.compiler, "-O2", "-static", os.path.join(HERE, "sleeper.c"), "-o", sleeper)
+
+
+def write_image(path, machine, build, kernel, results):
+    """The image for tests of that build, whose results go to that folder of this machine's."""
+    tests = Image()
     for folder in ("test/system", "test/kernel", "share"):
-        image.add_tree(os.path.join(ROOT, folder), ("__pycache__",))
+        tests.add_tree(os.path.join(ROOT, folder), ("__pycache__",))
     for name in filter(os.path.exists, SETTINGS):
-        image.add(name)
+        tests.add(name)
     with tempfile.TemporaryDirectory() as work, open(path, "wb") as file:
-        image.write(file)
+        if machine.parts:
+            write_foreign(file, machine, kernel, work)
+        else:
+            own_files(build).write(file)
+        tests.write(file)
         first = os.path.join(work, "init")
         with open(first, "w", encoding="ascii") as script:
             script.write(FIRST.format(modules=MODULES, folder=results, init=os.path.join(HERE, "init")))
         os.chmod(first, 0o755)
         shutil.copytree(os.path.join(kernel, "modules"), os.path.join(work, "modules"))
-        own = Image()
-        own.files = {os.path.join(folder, name) for folder, folders, files in os.walk(work) for name in folders + files}
-        own.write(file, work)
+        all_files(work).write(file, work)
 
 
 class EmulatedBoot(Boot):
     """One boot of that machine; the same plan, the same results."""
 
-    def __init__(self, kernel, folder, name, plan, processors):
-        self.distribution = find_kernel()
+    def __init__(self, machine, folder, name, plan, processors):
+        self.machine, self.distribution = MACHINES[machine], find_kernel(machine)
         self.image = os.path.join(folder, f"{name}.image")
-        write_image(self.image, plan["build"], self.distribution, folder)
-        super().__init__(kernel, folder, name, plan, processors)
+        self.python = "/usr/bin/python3" if self.machine.parts else os.path.realpath(sys.executable)
+        plan = {**plan, "build": "/usr"} if self.machine.parts else plan
+        write_image(self.image, self.machine, plan["build"], self.distribution, folder)
+        super().__init__(None, folder, name, plan, processors)
 
     def prepare(self):
         die_with_parent()
@@ -188,12 +313,9 @@ class EmulatedBoot(Boot):
         os.nice(VIRTUAL_NICE)
 
     def command(self, kernel):
-        words = ["console=ttyS0", "quiet", "rdinit=/init", "panic=-1", f"iwheel_python={os.path.realpath(sys.executable)}"]
+        words = [f"console={self.machine.console}", "quiet", "rdinit=/init", "panic=-1", f"iwheel_python={self.python}"]
         words += [f"iwheel_guest={os.path.join(HERE, 'guest.py')}", f"iwheel_plan={self.path('json')}"]
-        command = [EMULATOR, "-accel", "tcg", "-icount", "shift=1,sleep=off", "-m", "1024", "-display", "none", "-vga", "none", "-nic", "none"]
+        command = [*self.machine.emulator, "-accel", "tcg", "-icount", "shift=1,sleep=off", "-m", "1024", "-display", "none", "-nic", "none"]
         command += ["-no-reboot", "-serial", "stdio", "-kernel", os.path.join(self.distribution, "vmlinuz"), "-initrd", self.image]
         command += ["-append", " ".join(words), "-virtfs", f"local,path={self.folder},mount_tag=results,security_model=none"]
-        command += ["-object", "can-bus,id=bus"]
-        for _ in CONTROLLERS:
-            command += ["-device", "kvaser_pci,canbus=bus"]
-        return command
+        return [*command, "-object", "can-bus,id=bus", *self.machine.cards]

@@ -19,7 +19,7 @@ class Group(NamedTuple):
     same_as: str = ""
     few: tuple = ()
     gpiod: int = 0  # the generation of libgpiod; 0: that of --build
-    distribution: bool = False  # on the kernel of distribution.py, whose clock no load makes late, though its processor is not infinitely fast
+    distribution: str = ""  # a machine of distribution.py, on the distribution's kernel, whose clock no load makes late, though its processor is not infinitely fast
 
     def runs(self, name, groups, full):
         """Whether a test of that name and those groups is one of this group's."""
@@ -29,7 +29,7 @@ class Group(NamedTuple):
 # What differs between the generations of libgpiod is how a line is opened, read, lost and found again.
 READS_THE_LINE = ("row11_presses_low", "row12_pulses_low", "row12_glitch", "row13_pressed", "row14_")
 # On the distribution's kernel: a drive, an interface that goes, a gateway that is killed.
-SHORT = ("sja1000_nominal", "sja1000_row15", "sja1000_row25_killed")
+SHORT = ("controller_nominal", "controller_row15", "controller_row25_killed")
 # The longest come first, so that no processor waits for one of them at the end.
 GROUPS = (
     Group("soak", "an hour of random faults, with --full a day", limit_s=3600, full_limit_s=24 * 3600),
@@ -43,7 +43,9 @@ GROUPS = (
     Group("bus", "interfaces that go, foreign and odd frames, a full bus"),
     Group("echo", "an interface with a proven echo, late or missing", kernel_arguments=("vcan.echo=1",)),
     Group("host", "clocks, processes, disks, a second gateway"),
-    Group("controllers", "two SJA1000 on one bus, by the driver of a kernel that nobody here configured", distribution=True, few=SHORT),
+    Group("controllers", "two SJA1000 on one bus, by the driver of a kernel that nobody here configured", distribution="amd64", few=SHORT),
+    Group("controllers-ctucan", "the same with CTU CAN FD", distribution="ctucan", same_as="controllers", few=SHORT, full_only=True),
+    Group("controllers-arm64", "the same with the packages for arm64, on its kernel", distribution="arm64", same_as="controllers", few=SHORT, full_only=True),
     Group("plumbing", "the rig's own tests"),
     Group("plumbing-echo", "the rig's own tests, with a proven echo", kernel_arguments=("vcan.echo=1",)),
     Group("plumbing-realtime", "the rig's own tests in real time", virtual=False),

@@ -74,7 +74,9 @@ tests with vcan, an adapter, GPIO lines and a planted late gateway); what it ans
 Kvaser PCI cards (SJA1000) on one bus: gateway on one, wheels and recorder on the other. Bit timing goes over netlink, the echo is the
 driver's, and another rate or sample point is told and refused. Neither bus errors nor the time of a frame are modelled there, and
 Debian 12's kernel has no gpio-sim, so that the button is the local one. Row 20 is left out: after a remote frame the emulated controller
-receives nothing any more, not even after down and up. A few tests run each time, all of them with `--full`.
+receives nothing any more, not even after down and up. A few tests run each time, all of them with `--full`. So do, with
+`--full`, two other machines: `controllers-ctucan` with CTU CAN FD, whose driver is built from the source of Debian's kernel (it says STOPPED
+until an error, so that the carrier decides), and `controllers-arm64` with the packages for arm64 on Debian's kernel and libraries for it.
 """
 
 

@@ -31,19 +31,19 @@ class Distribution(unittest.TestCase):
 
     def test_program_missing_names_its_package(self):
         with mock.patch.object(distribution.shutil, "which", side_effect=lambda name, path: None if name == "cpio" else name):
-            self.assertIn("apt-get install cpio", distribution.why_not_emulated())
+            self.assertIn("apt-get install cpio", distribution.why_not_emulated("amd64"))
 
     def test_another_machine_is_told(self):
         with mock.patch.object(distribution.os, "uname", return_value=mock.Mock(machine="riscv64")):
-            self.assertIn("this machine is riscv64", distribution.why_not_emulated())
+            self.assertIn("this machine is riscv64", distribution.why_not_emulated("amd64"))
 
     def test_a_distribution_without_such_a_package_is_told(self):
         with answers("linux-image-amd64\n"):
-            self.assertIn("no package linux-image-amd64", distribution.why_not_emulated())
+            self.assertIn("no package linux-image-amd64", distribution.why_not_emulated("amd64"))
 
     def test_what_apt_says_is_told(self):
         with answers("E: No packages found\n", code=100):
-            self.assertIn("E: No packages found", distribution.why_not_emulated())
+            self.assertIn("E: No packages found", distribution.why_not_emulated("amd64"))
 
     def test_a_kernel_that_was_fetched_is_not_fetched_again(self):
         kept = os.path.join(self.folder, "iwheel", "linux-image-6.1.0-1-amd64-6.1.9-1")
@@ -51,7 +51,26 @@ class Distribution(unittest.TestCase):
         with open(os.path.join(kept, "vmlinuz"), "w", encoding="ascii"):
             pass
         with answers("  Depends: linux-image-6.1.0-1-amd64\n", "  Candidate: 6.1.9-1\n"):
-            self.assertIsNone(distribution.why_not_emulated())
+            self.assertIsNone(distribution.why_not_emulated("amd64"))
+
+    def foreign(self, *packages):
+        """arm64 with its files already here and these packages of ours; why it cannot be emulated."""
+        root = os.path.join(self.folder, "iwheel", "distribution-arm64", "root")
+        ours = os.path.join(self.folder, "build", "cross", "arm64")
+        for folder in (os.path.join(root, "boot"), ours):
+            os.makedirs(folder)
+        for path in (os.path.join(root, "wanted"), os.path.join(root, "boot", "vmlinuz-6"), *(os.path.join(ours, name) for name in packages)):
+            with open(path, "w", encoding="ascii"):
+                pass
+        with mock.patch.object(distribution, "ROOT", self.folder), answers(""):
+            return distribution.why_not_emulated("arm64")
+
+    def test_another_architecture_takes_its_kernel_from_its_own_files(self):
+        self.assertIsNone(self.foreign("iwheel-gateway_1_arm64.deb", "iwheel-tools_1_arm64.deb"))
+        self.assertTrue(os.path.exists(os.path.join(self.folder, "iwheel", "distribution-arm64", "vmlinuz")))
+
+    def test_another_architecture_without_our_packages_is_told_with_the_cure(self):
+        self.assertIn("no packages for arm64: ./check cross", self.foreign("iwheel-gateway_1_arm64.deb"))
 
     def test_image_has_what_a_link_leads_to_and_the_folders_above(self):
         target, link = os.path.join(self.folder, "far", "target"), os.path.join(self.folder, "link")

@@ -4,6 +4,7 @@
 import errno
 import os
 import socket
+import subprocess
 import time
 
 import netdev
@@ -12,6 +13,7 @@ from can_bus import CAN_RAW_ERR_FILTER, CanBus, open_raw
 from catalogue import kernel_test
 from fake_slcan import FakeSlcan
 from gpio_sim import Edges, GpioChip
+from harness import find_program
 from kernel_rig import virtual
 
 EVERY_BOOT = "plumbing plumbing-echo plumbing-realtime"
@@ -111,6 +113,24 @@ def plumbing_gpio(t):
     edges.close()
     chip.remove()
     t.check(not os.path.exists(chip.folder), "removed")
+
+
+@kernel_test("the simulator on an interface that comes up later: its wheels are there at once", EVERY_BOOT, 0)
+def plumbing_late_interface(t):
+    bus = fresh_bus("vcan9")
+    netdev.down("vcan9")
+    time.sleep(1.0)  # Since the kernel began: what the simulator may not take for a pause of its own.
+    command = [find_program(t.plan["build"], "iwheel-sim"), "--can", "vcan9", "--estop", "none"]
+    simulator = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    time.sleep(0.7)
+    t.check(not bus.frames, "nothing while it is down")
+    netdev.up("vcan9")
+    t.check(len(seen(bus, 100)) >= 100, f"{len(bus.frames)} frames in two seconds")
+    simulator.terminate()
+    said = simulator.communicate()[0]
+    t.check("the interface is up" in said and "stood still" not in said, f"it said {said}")
+    bus.close()
+    netdev.delete("vcan9")
 
 
 def hear_errors(interface):
