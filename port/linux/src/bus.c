@@ -143,8 +143,8 @@ void iw_bus_fill(iw_bus_t *bus) {
     }
 }
 
-/// Success proves nothing: `send` also succeeds while bus-off. Only the echo does (hal.h). Between a bus-off and the call
-/// that tells of it nothing is sent: the core takes what was sent before that call for gone.
+/// Success proves nothing: `send` also succeeds while bus-off. Only the echo does (hal.h). Between a bus-off and the
+/// call that tells of it nothing is sent: the core takes what was sent before that call for gone.
 int iw_bus_send(iw_backend_store_t *store, const iw_can_frame_t *frame) {
     iw_bus_t *bus = bus_of(store);
     if (bus->up && bus->unheeded < IW_BUS_PASSIVE) {
