@@ -154,8 +154,8 @@ def main():
         if name == "iwheel-ros2.1.scd" and not os.path.exists(sources.program("iwheel-ros2")):
             print(f"note: man/{name} is not looked at: iwheel-ros2 was not built, cyclonedds-dev is missing")
             continue
-        if name in ("iwheel-fleet.1.scd", "iwheel-mqtt.1.scd") and not os.path.exists(sources.program("iwheel-mqtt")):
-            print(f"note: man/{name} is not looked at: iwheel-mqtt was not built, libmosquitto-dev is missing")
+        if name in ("iwheel-fleet.1.scd", "iwheel-mqtt.1.scd") and not os.path.exists(sources.program(name.split(".", maxsplit=1)[0])):
+            print(f"note: man/{name} is not looked at: libmosquitto-dev or libnats-dev is missing")
             continue
         new = renew(text, sources)
         if new != text:

@@ -22,6 +22,11 @@ static const char *side_choice(unsigned number) {
     return (number < 2U) ? sides[number] : NULL;
 }
 
+static const char *fleet_choice(unsigned number) {
+    static const char *const verbs[] = {"history", "recordings", "recording"};
+    return (number < 3U) ? verbs[number] : NULL;
+}
+
 static const char *item_choice(unsigned number) {
     return (number < (unsigned)IW_LEDGER_ITEMS) ? iwn_ledger_item_name((iw_ledger_item_t)number) : NULL;
 }
@@ -47,10 +52,24 @@ static const verb_t verbs[] = {
           "as a QR code too.\n"
           "WHO HAS THE ADDRESS MAY LOOK AND STOP, and drive if that is configured.\n"),
      .no_json = "web prints an address; it has no --json"},
-    {VERB("fleet", verb_fleet, "", "who of a fleet is there, who stopped and why, as its broker knows",
-          "Reads an MQTT broker, not this machine's gateway; needs the package iwheel-mqtt and /etc/iwheel/fleet.conf. "
-          "Ctrl-C ends it.\n"),
-     .no_json = "fleet draws a table; for JSON lines: iwheel-fleet --for 10 --json"},
+    {VERB("fleet", verb_fleet,
+          "[history|recordings|recording] [ID] [NAME] [--last SPAN] [--since WHEN] [--until WHEN] [--all] [--output "
+          "FILE] [--wait SECONDS] [--for SECONDS] [--config FILE]",
+          "who of a fleet is there, who stopped and why, as its broker knows",
+          "Asks an MQTT broker, not this machine's gateway; needs the package iwheel-mqtt and /etc/iwheel/fleet.conf.\n"
+          "Alone a row per machine, until Ctrl-C. history: the stops of one machine or all; recordings: which "
+          "recordings "
+          "a machine has; recording: fetches one (NAME or its number, else the newest) into files here, checked.\n"
+          "--last SPAN      of the history: 90min, 12h or 7d; 24h if not told\n"
+          "--since WHEN     2026-11-21T22:00, local time\n"
+          "--until WHEN     now if not told\n"
+          "--all            not only stops: faults, e-stop, bus, lease, ledger, zeros\n"
+          "--output FILE    where a recording's frames go, the rest beside it; ID-NAME.log if not told. Without a "
+          "verb: the rows as JSON, for iwheel-web\n"
+          "--wait SECONDS   for a machine that does not answer; 60 if not told\n"
+          "--for SECONDS    listen so long, then show the rows once; --json needs it\n"
+          "--config FILE    whose [broker] to use\n"),
+     .choice = fleet_choice},
     {VERB("watch", verb_watch, "[TOPIC...] [--rate HZ]", "events as they come, one JSON object per line",
           "Reads only. Topics: state bus estop lease stop force frame; without one: the first five.\n"
           "--rate HZ  1 to 100: events of state and force per second, 10 if not told\n"

@@ -11,8 +11,8 @@
 #define SECOND_US 1000000U
 #define INFO_US   60000000U
 
-static const mqtt_way_t once = {1, false, false};
-static const mqtt_way_t retained = {1, true, false};
+static const mqtt_way_t once = {.qos = 1};
+static const mqtt_way_t retained = {.qos = 1, .retain = true};
 
 static mqtt_buffer_t buffer(mqtt_bridge_t *self) {
     return (mqtt_buffer_t){self->payload, sizeof self->payload};
@@ -46,7 +46,8 @@ static void tell_info(mqtt_bridge_t *self) {
                               .spooled = self->spool.waiting,
                               .dropped = self->spool.dropped,
                               .on_disk = !self->spool.behind,
-                              .unsent = self->broker.unsent};
+                              .unsent = self->broker.unsent,
+                              .stop = &self->stop};
     const size_t length = mqtt_tell_info(&info, buffer(self));
     self->info_due = mqtt_bridge_publish(self, "info", NULL, length, retained) == 0;
     self->info_us = self->now_us;
@@ -117,15 +118,32 @@ static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uin
     (void)mqtt_spool_add(&self->spool, name, self->payload, length, stop_us);
 }
 
+/// Of an event, or of a reply to `why`. A gateway that began anew knows none; the one before it is still this machine's last.
+static void remember_stop(mqtt_bridge_t *self, const iwc_message_t *stop) {
+    mqtt_stop_t *last = &self->stop;
+    if (iwc_integer(stop, "number").value <= 0) {
+        return;
+    }
+    last->number = iwc_integer(stop, "number").value;
+    last->wall_us = iwc_integer(stop, "wall_us").value;
+    (void)iwc_text(stop, "cause", last->cause, sizeof last->cause);
+    (void)iwc_text(stop, "sentence", last->sentence, sizeof last->sentence);
+    self->info_due = true;
+}
+
 static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
     const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
     keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
+    remember_stop(self, event);
     self->driver[0] = '\0';
 }
 
 static void take_why(void *context, const iwc_message_t *reply) {
     mqtt_bridge_t *self = context;
     const uint64_t stop_us = (reply != NULL) ? (uint64_t)iwc_integer(reply, "wall_us").value : 0U;
+    if (reply != NULL) {
+        remember_stop(self, reply);
+    }
     if (reply != NULL && iwc_integer(reply, "number").value > 0 && stop_us != self->spool.mark) {
         const size_t length = mqtt_tell_missed_stop(self->boot, self->spool.last + 1U, wall_us(), reply, buffer(self));
         keep_event(self, "stop", length, stop_us);
@@ -150,7 +168,8 @@ static void read_condition(const iwc_message_t *state, char *out, size_t size) {
 }
 
 static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, bool spare) {
-    const mqtt_way_t way = {0, false, spare};
+    // By MQTT 5: what is older than the next one is of no use.
+    const mqtt_way_t way = {.spare = spare, .labels = {.expiry_s = self->settings->state.every_ms / 1000U + 1U}};
     if (mqtt_bridge_publish(self, "state", NULL, mqtt_tell_state(self->boot, state, buffer(self)), way) != 0) {
         read_condition(state, self->condition, sizeof self->condition);
         self->state_us = self->now_us;

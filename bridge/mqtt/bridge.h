@@ -50,6 +50,7 @@ typedef struct {
     char condition[128];   ///< What makes a state worth sending at once.
     char state[IWC_LINE_MAX + 1U];
     size_t state_length; ///< 0: not known.
+    mqtt_stop_t stop;    ///< The last one that the gateway told.
     char payload[MQTT_PAYLOAD_SIZE];
     mqtt_inflight_t inflight[MQTT_INFLIGHT_MAX];
     size_t inflights;
@@ -76,7 +77,7 @@ bool mqtt_bridge_close(mqtt_bridge_t *self);
 int mqtt_bridge_publish(mqtt_bridge_t *self, const char *what, const char *name, size_t length, mqtt_way_t way);
 
 /// What came to a topic of commands. `context` is the bridge.
-void mqtt_bridge_command(void *context, const struct mosquitto_message *message);
+void mqtt_bridge_command(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels);
 
 /// Once, and only what is ours: somebody else's lease is not this bridge's to end.
 void mqtt_bridge_stop_if_ours(mqtt_bridge_t *self);

@@ -4,6 +4,7 @@
 #include "common/link.h"
 
 #include <errno.h>
+#include <mqtt_protocol.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
@@ -63,16 +64,34 @@ static void on_disconnect(struct mosquitto *client, void *context, int code) {
     self->lost = true;
 }
 
-static void on_publish(struct mosquitto *client, void *context, int message) {
+static void on_publish(struct mosquitto *client, void *context, int message, int code,
+                       const mosquitto_property *properties) {
     mqtt_broker_t *self = context;
     (void)client;
+    (void)properties;
+    if (code >= MQTT_RC_UNSPECIFIED) {
+        self->refusal = code;
+        self->lost = true;
+        return;
+    }
     self->listener.sent(self->listener.context, message);
 }
 
-static void on_message(struct mosquitto *client, void *context, const struct mosquitto_message *message) {
+static void on_message(struct mosquitto *client, void *context, const struct mosquitto_message *message,
+                       const mosquitto_property *properties) {
     mqtt_broker_t *self = context;
+    mqtt_labels_t labels = {.expiry_s = 0};
+    char *answer_to = NULL;
+    void *correlation = NULL;
     (void)client;
-    self->listener.came(self->listener.context, message);
+    (void)mosquitto_property_read_string(properties, MQTT_PROP_RESPONSE_TOPIC, &answer_to, false);
+    (void)mosquitto_property_read_binary(properties, MQTT_PROP_CORRELATION_DATA, &correlation,
+                                         &labels.correlation_length, false);
+    labels.answer_to = answer_to;
+    labels.correlation = correlation;
+    self->listener.came(self->listener.context, message, &labels);
+    free(answer_to);
+    free(correlation);
 }
 
 // ---- files --------------------------------------------------------------------------------------------------------
@@ -165,6 +184,10 @@ static void *call(void *context) {
     return NULL;
 }
 
+static bool is_5(const mqtt_broker_t *self) {
+    return self->settings->broker.protocol == MQTT_PROTOCOL_5;
+}
+
 static bool set_up(mqtt_broker_t *self) {
     const mqtt_settings_t *settings = self->settings;
     const bool certificate = mqtt_settings_given(settings->broker.certificate);
@@ -176,9 +199,12 @@ static bool set_up(mqtt_broker_t *self) {
     mosquitto_log_callback_set(self->client, on_log);
     mosquitto_connect_callback_set(self->client, on_connect);
     mosquitto_disconnect_callback_set(self->client, on_disconnect);
-    mosquitto_publish_callback_set(self->client, on_publish);
-    mosquitto_message_callback_set(self->client, on_message);
-    return (will == NULL || mosquitto_will_set(self->client, will, 7, "offline", 1, true) == MOSQ_ERR_SUCCESS) &&
+    mosquitto_publish_v5_callback_set(self->client, on_publish);
+    mosquitto_message_v5_callback_set(self->client, on_message);
+    // No session expiry is told by MQTT 5: that is 0.
+    return mosquitto_int_option(self->client, MOSQ_OPT_PROTOCOL_VERSION,
+                                is_5(self) ? MQTT_PROTOCOL_V5 : MQTT_PROTOCOL_V311) == MOSQ_ERR_SUCCESS &&
+           (will == NULL || mosquitto_will_set(self->client, will, 7, "offline", 1, true) == MOSQ_ERR_SUCCESS) &&
            (self->user == NULL ||
             mosquitto_username_pw_set(self->client, self->user, self->password) == MOSQ_ERR_SUCCESS) &&
            (!mqtt_settings_given(settings->broker.ca) ||
@@ -232,6 +258,15 @@ static void end_connecting(mqtt_broker_t *self) {
 
 // ---- working ------------------------------------------------------------------------------------------------------
 
+static const char *words_of_refusal(const mqtt_broker_t *self) {
+    if (!is_5(self)) {
+        return mosquitto_connack_string(self->refusal);
+    }
+    return (self->refusal == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION)
+               ? "it does not speak MQTT 5; set protocol = 3.1.1 under [broker]"
+               : mosquitto_reason_string(self->refusal);
+}
+
 static void work(mqtt_broker_t *self) {
     int result = mosquitto_loop_read(self->client, PACKETS);
     if (result == MOSQ_ERR_SUCCESS && mosquitto_want_write(self->client)) {
@@ -245,7 +280,7 @@ static void work(mqtt_broker_t *self) {
         self->behind = 0;
     }
     if (self->refusal != 0) {
-        lose(self, mosquitto_connack_string(self->refusal));
+        lose(self, words_of_refusal(self));
     } else if (result != MOSQ_ERR_SUCCESS) {
         lose(self, (result == MOSQ_ERR_ERRNO) ? strerror(errno) : mosquitto_strerror(result));
     } else if (self->lost) {
@@ -288,11 +323,26 @@ int mqtt_broker_fd(const mqtt_broker_t *self, bool *out_writes) {
     return mosquitto_socket(self->client);
 }
 
+/// False: no memory, or a text that is none.
+static bool add_labels(const mqtt_labels_t *labels, mosquitto_property **out) {
+    return (labels->expiry_s == 0U || mosquitto_property_add_int32(out, MQTT_PROP_MESSAGE_EXPIRY_INTERVAL,
+                                                                   labels->expiry_s) == MOSQ_ERR_SUCCESS) &&
+           (labels->answer_to == NULL ||
+            mosquitto_property_add_string(out, MQTT_PROP_RESPONSE_TOPIC, labels->answer_to) == MOSQ_ERR_SUCCESS) &&
+           (labels->correlation == NULL ||
+            mosquitto_property_add_binary(out, MQTT_PROP_CORRELATION_DATA, labels->correlation,
+                                          labels->correlation_length) == MOSQ_ERR_SUCCESS);
+}
+
 int mqtt_broker_send(mqtt_broker_t *self, const char *topic, const char *payload, size_t length, mqtt_way_t way) {
     int number = 0;
-    if (self->state != MQTT_UP || self->behind >= (way.spare ? 1U : BEHIND_MAX) ||
-        mosquitto_publish(self->client, &number, topic, (int)length, payload, way.qos, way.retain) !=
-            MOSQ_ERR_SUCCESS) {
+    mosquitto_property *properties = NULL;
+    const bool sent = self->state == MQTT_UP && self->behind < (way.spare ? 1U : BEHIND_MAX) &&
+                      (!is_5(self) || add_labels(&way.labels, &properties)) &&
+                      mosquitto_publish_v5(self->client, &number, topic, (int)length, payload, way.qos, way.retain,
+                                           properties) == MOSQ_ERR_SUCCESS;
+    mosquitto_property_free_all(&properties);
+    if (!sent) {
         self->unsent += (self->state == MQTT_UP) ? 1U : 0U;
         return 0;
     }

@@ -3,6 +3,8 @@
 ///
 ///     AWAY --try--> CONNECTING --socket--> GREETING --CONNACK--> UP --lost--> AWAY, tried again after 0.5 s to 30 s
 ///
+/// A message that a broker refuses by MQTT 5 (its ACL, a quota) ends the connection, so that it is sent again, not lost.
+///
 /// CONNECTING asks for names and shakes hands, which may wait: a thread of its own does that, and touches nothing else. Clean sessions:
 /// the broker keeps nothing for this machine while it is away, so no command comes late from there.
 #ifndef IW_MQTT_BROKER_H
@@ -14,6 +16,14 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
+/// What MQTT 5 carries beside a message; by 3.1.1 nothing of it is sent, and nothing comes.
+typedef struct {
+    uint32_t expiry_s; ///< The broker drops what it could not deliver in this time; 0: never. Not read of what comes.
+    const char *answer_to;   ///< Response topic; NULL: none.
+    const void *correlation; ///< Correlation data; NULL: none.
+    uint16_t correlation_length;
+} mqtt_labels_t;
+
 typedef struct {
     const char *program;       ///< For the log.
     const char *name;          ///< Of the client at the broker; no other may have it.
@@ -23,7 +33,7 @@ typedef struct {
     void (*up)(void *context);
     void (*down)(void *context);
     void (*sent)(void *context, int message); ///< The broker has confirmed it.
-    void (*came)(void *context, const struct mosquitto_message *message);
+    void (*came)(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels);
 } mqtt_broker_listener_t; ///< The texts must outlive the connection.
 
 typedef enum { MQTT_AWAY, MQTT_CONNECTING, MQTT_GREETING, MQTT_UP } mqtt_broker_state_t;
@@ -52,7 +62,7 @@ typedef struct {
     char *password;            ///< Behind `user`.
     bool told_away;            ///< In the log.
     bool lost;                 ///< The library says so.
-    int refusal;               ///< Of the last CONNACK.
+    int refusal;               ///< Of the last CONNACK, or by MQTT 5 of a message.
     char words[160];           ///< What the library said last of its trouble.
     uint64_t now_us;
     uint64_t try_us;
@@ -82,6 +92,7 @@ typedef struct {
     int qos;
     bool retain;
     bool spare; ///< Only if all before it is gone already: there will be a newer one.
+    mqtt_labels_t labels;
 } mqtt_way_t;
 
 /// Hands a message over. Its number for `sent`; 0: it was not handed over, because the broker is not there or does not read.

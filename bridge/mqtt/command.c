@@ -5,6 +5,7 @@
 
 #include "iwheel_northbound/json_out.h"
 
+#include <stdio.h>
 #include <string.h>
 
 /// A sender who was silent so long may count anew: what it sent before is late by now, whatever its `seq`.
@@ -199,6 +200,27 @@ static bool find_verb(const char *word, mqtt_verb_t *out_verb) {
     return false;
 }
 
+/// Where the answer goes, and with what: as MQTT 5 tells it beside the command, else to `from`.
+static bool read_labels(const mqtt_rules_t *rules, const mqtt_command_t *command, mqtt_order_t *order) {
+    const size_t begin = (rules->replies != NULL) ? strlen(rules->replies) : 0U;
+    memcpy(order->to, order->from, sizeof order->to);
+    if (command->answer_to != NULL) {
+        if (begin == 0U || strncmp(command->answer_to, rules->replies, begin) != 0 ||
+            !mqtt_settings_is_name(command->answer_to + begin)) {
+            return drop(order, MQTT_GARBLED, "a response topic must be iwheel/ID/reply/NAME of this machine");
+        }
+        (void)snprintf(order->to, sizeof order->to, "%s", command->answer_to + begin);
+    }
+    if (command->correlation_length > sizeof order->correlation) {
+        return drop(order, MQTT_GARBLED, "correlation data has 64 bytes at most");
+    }
+    if (command->correlation_length > 0U) {
+        memcpy(order->correlation, command->correlation, command->correlation_length);
+        order->correlation_length = (uint16_t)command->correlation_length;
+    }
+    return true;
+}
+
 /// Who says which verb, in which object.
 static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_json_t *out_root, mqtt_order_t *order) {
     char fault[80];
@@ -228,6 +250,10 @@ static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const m
                           mqtt_order_t *order) {
     iwn_json_t root;
     if (!read_command(self, command, &root, order)) {
+        memcpy(order->to, order->from, sizeof order->to);
+        return false;
+    }
+    if (!read_labels(rules, command, order)) {
         return false;
     }
     if (command->retained) {

@@ -4,6 +4,8 @@
 /// Pure: no I/O, no clock, no heap. A command quotes `boot` and `t_us` of a message of this machine's and says who it is `from`, with a
 /// `seq` that rises. Its age is this machine's monotonic time since `t_us`: no other clock takes part. Whatever is retained, late, doubled,
 /// out of order or from another run of the bridge is dropped and counted, a stop too: its sender has to ask again, with what it is told.
+///
+/// A response topic of MQTT 5 counts only among this machine's replies: nobody makes the bridge write where only it may.
 #ifndef IW_MQTT_COMMAND_H
 #define IW_MQTT_COMMAND_H
 
@@ -14,7 +16,9 @@
 /// Bytes of a longer command are not looked at.
 #define MQTT_COMMAND_MAX 4096U
 #define MQTT_SENDER_SIZE 33U
-#define MQTT_SENDERS     16U
+/// Bytes of correlation data that are given back.
+#define MQTT_CORRELATION_MAX 64U
+#define MQTT_SENDERS         16U
 /// Bytes of `boot` with its terminator.
 #define MQTT_BOOT_SIZE 17U
 
@@ -51,6 +55,7 @@ typedef struct {
     uint32_t ttl_ms;  ///< Of commands that drive, at most MQTT_TTL_MAX_MS.
     bool may_drive;
     bool may_reset;
+    const char *replies; ///< `iwheel/ID/reply/`: what a response topic must begin with.
 } mqtt_rules_t;
 
 /// As it came.
@@ -59,16 +64,22 @@ typedef struct {
     const char *payload;
     size_t length;
     bool retained;
+    const char *answer_to;   ///< Response topic of MQTT 5; NULL: none.
+    const void *correlation; ///< Correlation data of MQTT 5.
+    size_t correlation_length;
 } mqtt_command_t;
 
 /// What it comes to.
 typedef struct {
     mqtt_verdict_t verdict;
     mqtt_verb_t verb;
-    char from[MQTT_SENDER_SIZE]; ///< Empty: not known, so there is nobody to answer.
-    int64_t seq;                 ///< 0: not known.
-    char why[160];               ///< Cause and cure, unless it is taken.
-    char request[1024];          ///< For the gateway, unless it is dropped or MQTT_HELLO.
+    char from[MQTT_SENDER_SIZE];               ///< Empty: not known, so there is nobody to answer.
+    char to[MQTT_SENDER_SIZE];                 ///< Who gets the answer: `from`, or who the response topic names.
+    uint8_t correlation[MQTT_CORRELATION_MAX]; ///< To be told with the answer.
+    uint16_t correlation_length;
+    int64_t seq;        ///< 0: not known.
+    char why[160];      ///< Cause and cure, unless it is taken.
+    char request[1024]; ///< For the gateway, unless it is dropped or MQTT_HELLO.
 } mqtt_order_t;
 
 /// Who sent what last. All zero at first.

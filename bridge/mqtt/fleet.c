@@ -39,8 +39,7 @@ static fleet_machine_t *machine_of(fleet_t *self, const char *id) {
     return &self->machines[place];
 }
 
-/// A text that moves no terminal.
-static void read_text(const iwc_message_t *message, const char *path, char *out, size_t size) {
+void fleet_text(const iwc_message_t *message, const char *path, char *out, size_t size) {
     char raw[256];
     if (iwc_text(message, path, raw, sizeof raw)) {
         iwn_plain_copy(raw, out, size);
@@ -79,12 +78,12 @@ static void read_zero(const iwc_message_t *state, const char *side, char out[16]
         return;
     }
     (void)snprintf(path, sizeof path, "%s.offset_provenance", side);
-    read_text(state, path, out, 16);
+    fleet_text(state, path, out, 16);
 }
 
 static void take_state(fleet_machine_t *machine, const iwc_message_t *state, iwn_json_t root) {
-    read_text(state, "state", machine->state, sizeof machine->state);
-    read_text(state, "version", machine->version, sizeof machine->version);
+    fleet_text(state, "state", machine->state, sizeof machine->state);
+    fleet_text(state, "version", machine->version, sizeof machine->version);
     machine->battery_dV[0] = iwc_integer(state, "left.battery_dV");
     machine->battery_dV[1] = iwc_integer(state, "right.battery_dV");
     read_zero(state, "left", machine->zero[0]);
@@ -92,33 +91,66 @@ static void take_state(fleet_machine_t *machine, const iwc_message_t *state, iwn
     read_contradictions(root, machine);
 }
 
-static void take_stop(fleet_machine_t *machine, const iwc_message_t *stop) {
-    read_text(stop, "cause", machine->cause, sizeof machine->cause);
-    read_text(stop, "sentence", machine->sentence, sizeof machine->sentence);
-    machine->stop_wall_us = iwc_integer(stop, "wall_us").value;
+/// What was heard just now is the last; of what others have kept the later one. Its fields stand behind `path`.
+static void take_stop(fleet_machine_t *machine, const iwc_message_t *stop, const char *path, fleet_source_t source) {
+    char cause[40];
+    char sentence[40];
+    char wall_us[40];
+    (void)snprintf(cause, sizeof cause, "%scause", path);
+    (void)snprintf(sentence, sizeof sentence, "%ssentence", path);
+    (void)snprintf(wall_us, sizeof wall_us, "%swall_us", path);
+    const int64_t when_us = iwc_integer(stop, wall_us).value;
+    char word[sizeof machine->cause];
+    fleet_text(stop, cause, word, sizeof word);
+    const bool later = machine->stop_from != FLEET_HEARD && when_us > machine->stop_wall_us;
+    if (word[0] == '\0' || (source != FLEET_HEARD && machine->stop_from != FLEET_NOBODY && !later)) {
+        return;
+    }
+    memcpy(machine->cause, word, sizeof word);
+    fleet_text(stop, sentence, machine->sentence, sizeof machine->sentence);
+    machine->stop_wall_us = when_us;
+    machine->stop_from = source;
 }
 
-/// `iwheel/ID/WHAT`; false: it is none.
-static bool split(const char *topic, char id[MQTT_ID_SIZE], const char **out_what) {
+bool fleet_split(const char *topic, char out_id[MQTT_ID_SIZE], const char **out_what) {
     static const char begin[] = "iwheel/";
     const char *slash = (strncmp(topic, begin, sizeof begin - 1U) == 0) ? strchr(topic + sizeof begin - 1U, '/') : NULL;
     const size_t length = (slash != NULL) ? (size_t)(slash - topic) - (sizeof begin - 1U) : 0U;
     if (length == 0U || length >= MQTT_ID_SIZE) {
         return false;
     }
-    memcpy(id, topic + sizeof begin - 1U, length);
-    id[length] = '\0';
+    memcpy(out_id, topic + sizeof begin - 1U, length);
+    out_id[length] = '\0';
     *out_what = slash + 1;
-    return mqtt_settings_is_name(id);
+    return mqtt_settings_is_name(out_id);
+}
+
+/// False: it is no object, and counted.
+static bool is_object(fleet_t *self, const char *payload, size_t length, iwn_json_t *out_root) {
+    char fault[80];
+    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
+    if (iwn_json_check(payload, length, &self->work, out_root, &words) && iwn_json_kind(*out_root) == IWN_JSON_OBJECT) {
+        return true;
+    }
+    self->left_out++;
+    return false;
+}
+
+void fleet_take_stored(fleet_t *self, const char *topic, const char *payload, size_t length) {
+    char id[MQTT_ID_SIZE];
+    const char *what = "";
+    iwn_json_t root;
+    fleet_machine_t *machine = fleet_split(topic, id, &what) ? machine_of(self, id) : NULL;
+    if (machine != NULL && is_object(self, payload, length, &root)) {
+        take_stop(machine, &(iwc_message_t){.text = payload, .length = length, .is_event = true}, "", FLEET_STREAM);
+    }
 }
 
 void fleet_take(fleet_t *self, const char *topic, const char *payload, size_t length, uint64_t now_us) {
     char id[MQTT_ID_SIZE];
-    char fault[80];
     const char *what = "";
     iwn_json_t root;
-    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
-    fleet_machine_t *machine = split(topic, id, &what) ? machine_of(self, id) : NULL;
+    fleet_machine_t *machine = fleet_split(topic, id, &what) ? machine_of(self, id) : NULL;
     if (machine == NULL) {
         self->left_out++;
         return;
@@ -127,16 +159,19 @@ void fleet_take(fleet_t *self, const char *topic, const char *payload, size_t le
         machine->online = length == 6U && memcmp(payload, "online", 6) == 0;
         return;
     }
-    if (!iwn_json_check(payload, length, &self->work, &root, &words) || iwn_json_kind(root) != IWN_JSON_OBJECT) {
-        self->left_out++;
+    if (!is_object(self, payload, length, &root)) {
         return;
     }
     const iwc_message_t message = {.text = payload, .length = length, .is_event = true};
+    if (strcmp(what, "info") == 0) { // Retained: no sign of life.
+        take_stop(machine, &message, "last_stop.", FLEET_INFO);
+        return;
+    }
     machine->heard_us = now_us;
     if (strcmp(what, "state") == 0) {
         take_state(machine, &message, root);
     } else if (strcmp(what, "event/stop") == 0) {
-        take_stop(machine, &message);
+        take_stop(machine, &message, "", FLEET_HEARD);
     }
 }
 
@@ -220,29 +255,59 @@ void fleet_show(const fleet_t *self, uint64_t now_us, FILE *out) {
     }
     (void)fputs("\n", out);
     show_contradictions(self, out);
+    if (self->stream != NULL) {
+        (void)fprintf(out, "last stops: of the stream at %s, of each machine's info, and as heard\n", self->stream);
+    } else {
+        (void)fputs("last stops: of each machine's info, which knows none from before its bridge began, and as heard\n",
+                    out);
+    }
+}
+
+static const char *source_word(fleet_source_t source) {
+    static const char *const words[] = {NULL, "info", "stream", "heard"};
+    return words[source];
+}
+
+#define ROW_SIZE 1536U
+
+/// One machine as a JSON object; its length, without a newline.
+static size_t write_row(const fleet_machine_t *machine, uint64_t now_us, char line[ROW_SIZE]) {
+    iwn_out_t json;
+    iwn_out_init(&json, line, ROW_SIZE);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_text(&json, "machine", machine->id);
+    iwn_out_bool(&json, "online", machine->online);
+    iwn_out_text(&json, "state", (machine->state[0] != '\0') ? machine->state : NULL);
+    iwn_out_text(&json, "version", (machine->version[0] != '\0') ? machine->version : NULL);
+    iwn_out_known(&json, "left_battery_dV", machine->battery_dV[0].known, machine->battery_dV[0].value);
+    iwn_out_known(&json, "right_battery_dV", machine->battery_dV[1].known, machine->battery_dV[1].value);
+    iwn_out_text(&json, "left_zero", (machine->zero[0][0] != '\0') ? machine->zero[0] : NULL);
+    iwn_out_text(&json, "right_zero", (machine->zero[1][0] != '\0') ? machine->zero[1] : NULL);
+    iwn_out_text(&json, "cause", (machine->cause[0] != '\0') ? machine->cause : NULL);
+    iwn_out_known(&json, "stop_wall_us", machine->stop_wall_us > 0, machine->stop_wall_us);
+    iwn_out_text(&json, "sentence", (machine->sentence[0] != '\0') ? machine->sentence : NULL);
+    iwn_out_text(&json, "stop_from", source_word(machine->stop_from));
+    iwn_out_text(&json, "contradicted", machine->contradicted);
+    iwn_out_known(&json, "heard_ms", machine->heard_us > 0U, (int64_t)((now_us - machine->heard_us) / 1000U));
+    iwn_out_close(&json, '}');
+    const size_t length = iwn_out_finish(&json);
+    return (length > 0U) ? length - 1U : 0U;
 }
 
 void fleet_tell(const fleet_t *self, uint64_t now_us, FILE *out) {
+    char line[ROW_SIZE];
     for (size_t i = 0; i < self->count; i++) {
-        const fleet_machine_t *machine = &self->machines[i];
-        char line[1536];
-        iwn_out_t json;
-        iwn_out_init(&json, line, sizeof line);
-        iwn_out_open(&json, NULL, '{');
-        iwn_out_text(&json, "machine", machine->id);
-        iwn_out_bool(&json, "online", machine->online);
-        iwn_out_text(&json, "state", (machine->state[0] != '\0') ? machine->state : NULL);
-        iwn_out_text(&json, "version", (machine->version[0] != '\0') ? machine->version : NULL);
-        iwn_out_known(&json, "left_battery_dV", machine->battery_dV[0].known, machine->battery_dV[0].value);
-        iwn_out_known(&json, "right_battery_dV", machine->battery_dV[1].known, machine->battery_dV[1].value);
-        iwn_out_text(&json, "left_zero", (machine->zero[0][0] != '\0') ? machine->zero[0] : NULL);
-        iwn_out_text(&json, "right_zero", (machine->zero[1][0] != '\0') ? machine->zero[1] : NULL);
-        iwn_out_text(&json, "cause", (machine->cause[0] != '\0') ? machine->cause : NULL);
-        iwn_out_known(&json, "stop_wall_us", machine->stop_wall_us > 0, machine->stop_wall_us);
-        iwn_out_text(&json, "sentence", (machine->sentence[0] != '\0') ? machine->sentence : NULL);
-        iwn_out_text(&json, "contradicted", machine->contradicted);
-        iwn_out_known(&json, "heard_ms", machine->heard_us > 0U, (int64_t)((now_us - machine->heard_us) / 1000U));
-        iwn_out_close(&json, '}');
-        (void)fwrite(line, 1, iwn_out_finish(&json), out);
+        (void)fprintf(out, "%.*s\n", (int)write_row(&self->machines[i], now_us, line), line);
     }
+}
+
+void fleet_write(const fleet_t *self, uint64_t now_us, int64_t wall_us, FILE *out) {
+    char line[ROW_SIZE];
+    (void)fprintf(out, "{\"ok\":true,\"wall_us\":%" PRId64 ",\"stream\":%s,\"left_out\":%" PRIu64 ",\"machines\":[",
+                  wall_us, (self->stream != NULL) ? "true" : "false", self->left_out);
+    for (size_t i = 0; i < self->count; i++) {
+        const int length = (int)write_row(&self->machines[i], now_us, line);
+        (void)fprintf(out, "%s%.*s", (i > 0U) ? ",\n" : "\n", length, line);
+    }
+    (void)fputs("]}\n", out);
 }

@@ -1,32 +1,32 @@
 // SPDX-License-Identifier: MIT
-// The console of a fleet: reads the broker, shows a row per machine, sends nothing.
-#include "broker.h"
-#include "fleet.h"
-
-#include "common/service.h"
+// The console of a fleet: its command line.
+#include "fleet_verbs.h"
 
 #include <getopt.h>
-#include <poll.h>
-#include <signal.h>
-#include <stdlib.h>
+#include <stdarg.h>
 #include <string.h>
 #include <sysexits.h>
+#include <time.h>
 #include <unistd.h>
 
 #define SETTINGS_PATH "/etc/iwheel/fleet.conf"
-#define SHOW_US       1000000U
+#define DAY_US        86400000000LL
+#define WAIT_S        60U
+
+typedef enum { TABLE, HISTORY, RECORDINGS, RECORDING, VERBS } verb_t;
+
+/// Where options are allowed.
+#define IN(verb)      (1U << (verb))
+#define IN_RECORDINGS (IN(RECORDINGS) | IN(RECORDING))
+#define EVERYWHERE    (IN(TABLE) | IN(HISTORY) | IN_RECORDINGS)
 
 typedef struct {
-    const char *path; ///< NULL: none is named.
-    uint64_t seconds; ///< 0: until Ctrl-C.
-    bool json;
-} wanted_t;
-
-typedef struct {
-    fleet_t fleet;
-    mqtt_broker_t broker;
-    uint64_t now_us;
-} console_t;
+    verb_t verb;
+    const char *path; ///< Of the configuration; NULL: none is named.
+    bool until;       ///< --until is given.
+    unsigned used;    ///< Verbs in which all options that were given are allowed.
+    fleet_wanted_t wanted;
+} words_t;
 
 static volatile sig_atomic_t end_asked;
 
@@ -36,139 +36,209 @@ static void ask_end(int number) {
 }
 
 static void help(void) {
-    (void)fputs("iwheel-fleet: who of a fleet is there, who stopped last and why, batteries, zeros,\n"
-                "versions, and what several machines contradict. Reads an MQTT broker, sends nothing.\n"
+    (void)fputs("iwheel-fleet: who of a fleet is there, who stopped last and why, batteries,\n"
+                "zeros, versions, and what several machines contradict; the history of stops; the\n"
+                "recording of one. Reads an MQTT broker and the stream behind it. It moves,\n"
+                "stops and changes nothing.\n"
                 "\n"
-                "usage: iwheel-fleet [options]\n"
-                "  -c, --config FILE   whose [broker] to use (" SETTINGS_PATH ", if it exists)\n"
-                "      --for SECONDS   listen so long, then show it once\n"
-                "      --json          one JSON object per machine; with --for\n"
+                "usage: iwheel-fleet [options]                  a row per machine\n"
+                "       iwheel-fleet history [ID] [options]     stops of a time, of one or all\n"
+                "       iwheel-fleet recordings ID              which recordings it has\n"
+                "       iwheel-fleet recording ID [NAME]        fetch one; else the newest\n"
+                "  -c, --config FILE   whose [broker] to use (" SETTINGS_PATH ", if there)\n"
+                "      --json          objects, one a line; of the table with --for\n"
                 "      --version, --help\n"
+                "table:\n"
+                "      --for SECONDS   listen so long, then show it once\n"
+                "  -o, --output FILE   as JSON into FILE, every second, for iwheel-web's page\n"
+                "history:\n"
+                "      --last SPAN     90min, 12h or 7d; 24h if nothing is told\n"
+                "      --since WHEN    2026-11-21T22:00, local time; with Z behind it UTC\n"
+                "      --until WHEN    now if not told\n"
+                "      --all           faults, e-stop, bus, lease, ledger and zeros, too\n"
+                "recordings:\n"
+                "      --wait SECONDS  for a machine that does not answer (60)\n"
+                "  -o, --output FILE   where the frames go; the rest beside it (ID-NAME.log)\n"
                 "\n"
-                "exit codes: 0 ok, 64 usage, 69 no broker, 71 no memory, 77 permission,\n"
-                "78 configuration\n",
+                "exit codes: 0 ok, 1 the machine says no, 64 usage, 65 damaged, 69 no broker,\n"
+                "no stream or no such machine, 71 no memory, 73 file, 75 no answer,\n"
+                "77 permission, 78 configuration\n",
                 stdout);
 }
 
-static int misuse(const char *what) {
-    (void)fprintf(stderr, "iwheel-fleet: %s; see iwheel-fleet --help\n", what);
+__attribute__((format(printf, 1, 2))) static int misuse(const char *format, ...) {
+    va_list list;
+    va_start(list, format);
+    (void)fputs("iwheel-fleet: ", stderr);
+    (void)vfprintf(stderr, format, list);
+    (void)fputs("; see iwheel-fleet --help\n", stderr);
+    va_end(list);
     return EX_USAGE;
 }
 
+static int64_t wall_us(void) {
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
 /// -1: go on; else the exit code.
-static int parse(int count, char **arguments, wanted_t *out_wanted) {
+static int take_number(const char *option, uint64_t *out_number) {
+    uint32_t number = 0;
+    if (!settings_digits(optarg, strlen(optarg), &number) || number == 0U) {
+        return misuse("%s wants a number of seconds, not \"%.40s\"", option, optarg);
+    }
+    *out_number = number;
+    return -1;
+}
+
+static int take_when(const char *option, int64_t *out_us) {
+    return history_when(optarg, out_us)
+               ? -1
+               : misuse("%s wants a time such as 2026-11-21T22:00, not \"%.40s\"", option, optarg);
+}
+
+static int take_last(history_wish_t *span) {
+    int64_t last_us = 0;
+    if (!history_span(optarg, &last_us)) {
+        return misuse("--last wants a span such as 90min, 12h or 7d, not \"%.40s\"", optarg);
+    }
+    span->since_us = wall_us() - last_us;
+    return -1;
+}
+
+static int take_option(words_t *self, int option) {
+    static const struct {
+        int option;
+        unsigned where;
+    } places[] = {{'f', IN(TABLE)},
+                  {'l', IN(HISTORY)},
+                  {'s', IN(HISTORY)},
+                  {'u', IN(HISTORY)},
+                  {'a', IN(HISTORY)},
+                  {'w', IN_RECORDINGS},
+                  {'o', IN(RECORDING) | IN(TABLE)}};
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        self->used &= (places[i].option == option) ? places[i].where : EVERYWHERE;
+    }
+    switch (option) {
+    case 'c':
+        self->path = optarg;
+        return -1;
+    case 'f':
+        return take_number("--for", &self->wanted.seconds);
+    case 'w':
+        return take_number("--wait", &self->wanted.wait_s);
+    case 'l':
+        return take_last(&self->wanted.span);
+    case 's':
+        return take_when("--since", &self->wanted.span.since_us);
+    case 'u':
+        self->until = true;
+        return take_when("--until", &self->wanted.span.until_us);
+    case 'a':
+        self->wanted.span.all = true;
+        return -1;
+    case 'j':
+        self->wanted.json = true;
+        return -1;
+    case 'o':
+        self->wanted.out = optarg;
+        return -1;
+    case 'V':
+        (void)printf("iwheel-fleet " IWHEEL_VERSION "\n");
+        return 0;
+    case 'h':
+        help();
+        return 0;
+    case ':':
+        return misuse("an option needs a value");
+    default:
+        return misuse("there is no such option");
+    }
+}
+
+/// The verb, and the names behind it.
+static int take_words(words_t *self, int count, char **words) {
+    static const char *const verbs[VERBS] = {
+        [HISTORY] = "history", [RECORDINGS] = "recordings", [RECORDING] = "recording"};
+    static const int most[VERBS] = {[TABLE] = 0, [HISTORY] = 2, [RECORDINGS] = 2, [RECORDING] = 3};
+    for (unsigned i = HISTORY; count > 0 && i < (unsigned)VERBS; i++) {
+        self->verb = (strcmp(words[0], verbs[i]) == 0) ? (verb_t)i : self->verb;
+    }
+    if (count > 0 && self->verb == TABLE) {
+        return misuse("\"%.40s\" is no verb; there are history, recordings and recording", words[0]);
+    }
+    if (count > most[self->verb]) {
+        return misuse("\"%.40s\" is one word too many", words[most[self->verb]]);
+    }
+    self->wanted.id = (count > 1) ? words[1] : NULL;
+    self->wanted.name = (count > 2) ? words[2] : NULL;
+    if (self->wanted.id != NULL && !mqtt_settings_is_name(self->wanted.id)) {
+        return misuse("\"%.40s\" is no machine's id: letters, digits, _ and -", self->wanted.id);
+    }
+    if (self->wanted.id == NULL && (self->verb == RECORDINGS || self->verb == RECORDING)) {
+        return misuse("%s wants the id of a machine", verbs[self->verb]);
+    }
+    return -1;
+}
+
+/// What cannot stand together.
+static int judge(words_t *self) {
+    history_wish_t *span = &self->wanted.span;
+    if ((self->used & IN(self->verb)) == 0U) {
+        return misuse("one of the options is of another verb");
+    }
+    if (self->verb == TABLE && self->wanted.json && self->wanted.seconds == 0U) {
+        return misuse("--json needs --for SECONDS");
+    }
+    span->machine = self->wanted.id;
+    span->json = self->wanted.json;
+    span->until_us = self->until ? span->until_us : wall_us();
+    span->since_us = (span->since_us > 0) ? span->since_us : span->until_us - DAY_US;
+    return (span->since_us < span->until_us) ? -1 : misuse("--since must lie before --until");
+}
+
+/// -1: go on; else the exit code.
+static int parse(words_t *self, int count, char **arguments) {
     static const struct option options[] = {
         {"config", required_argument, NULL, 'c'}, {"for", required_argument, NULL, 'f'},
+        {"last", required_argument, NULL, 'l'},   {"since", required_argument, NULL, 's'},
+        {"until", required_argument, NULL, 'u'},  {"wait", required_argument, NULL, 'w'},
+        {"output", required_argument, NULL, 'o'}, {"all", no_argument, NULL, 'a'},
         {"json", no_argument, NULL, 'j'},         {"version", no_argument, NULL, 'V'},
         {"help", no_argument, NULL, 'h'},         {NULL, 0, NULL, 0},
     };
     int option = 0;
-    uint32_t seconds = 0;
+    int code = -1;
     opterr = 0;
-    while ((option = getopt_long(count, arguments, ":c:", options, NULL)) != -1) {
-        if (option == 'c') {
-            out_wanted->path = optarg;
-        } else if (option == 'f' && settings_digits(optarg, strlen(optarg), &seconds) && seconds > 0U) {
-            out_wanted->seconds = seconds;
-        } else if (option == 'j') {
-            out_wanted->json = true;
-        } else if (option == 'h') {
-            help();
-            return 0;
-        } else if (option == 'V') {
-            (void)printf("iwheel-fleet " IWHEEL_VERSION "\n");
-            return 0;
-        } else {
-            return misuse("there is no such option, or its value is none");
-        }
+    while (code < 0 && (option = getopt_long(count, arguments, ":c:o:", options, NULL)) != -1) {
+        code = take_option(self, option);
     }
-    if (out_wanted->json && out_wanted->seconds == 0U) {
-        return misuse("--json needs --for SECONDS");
-    }
-    return (optind < count) ? misuse("there are options only") : -1;
-}
-
-static void up(void *context) {
-    (void)context;
-}
-
-static void sent(void *context, int message) {
-    (void)context;
-    (void)message;
-}
-
-static void came(void *context, const struct mosquitto_message *message) {
-    console_t *self = context;
-    fleet_take(&self->fleet, message->topic, message->payload, (size_t)message->payloadlen, self->now_us);
-}
-
-static void show(const console_t *self, const wanted_t *wanted) {
-    if (wanted->json) {
-        fleet_tell(&self->fleet, self->now_us, stdout);
-        return;
-    }
-    if (wanted->seconds == 0U && isatty(STDOUT_FILENO) == 1) {
-        (void)fputs("\033[H\033[2J", stdout);
-    }
-    fleet_show(&self->fleet, self->now_us, stdout);
-    (void)fflush(stdout);
-}
-
-static int listen_to(console_t *self, const wanted_t *wanted) {
-    const uint64_t end_us = (wanted->seconds > 0U) ? bridge_now_us() + wanted->seconds * 1000000U : UINT64_MAX;
-    uint64_t show_us = bridge_now_us() + SHOW_US;
-    bool was_up = false;
-    while (end_asked == 0 && self->now_us < end_us) {
-        bool writes = false;
-        self->now_us = bridge_now_us();
-        mqtt_broker_step(&self->broker, self->now_us);
-        was_up = was_up || self->broker.state == MQTT_UP;
-        if (wanted->seconds == 0U && self->now_us >= show_us) {
-            show_us = self->now_us + SHOW_US;
-            show(self, wanted);
-        }
-        struct pollfd wait = {.fd = mqtt_broker_fd(&self->broker, &writes), .events = POLLIN};
-        wait.events = (short)(POLLIN | (writes ? POLLOUT : 0));
-        (void)poll(&wait, 1, 100);
-    }
-    if (wanted->seconds > 0U) {
-        show(self, wanted);
-    }
-    return was_up ? 0 : EX_UNAVAILABLE;
+    code = (code < 0) ? take_words(self, count - optind, arguments + optind) : code;
+    return (code < 0) ? judge(self) : code;
 }
 
 int main(int count, char **arguments) {
-    static console_t console;
+    static int (*const verbs[VERBS])(const mqtt_settings_t *settings, const fleet_wanted_t *wanted) = {
+        fleet_verb_table, fleet_verb_history, fleet_verb_recordings, fleet_verb_recording};
     static mqtt_settings_t settings;
-    static const char *const topics[] = {"iwheel/+/availability", "iwheel/+/state", "iwheel/+/event/stop", NULL};
-    char name[32];
-    wanted_t wanted = {NULL, 0, false};
+    words_t words = {.used = EVERYWHERE, .wanted = {.wait_s = WAIT_S, .end_asked = &end_asked}};
     const struct sigaction action = {.sa_handler = ask_end};
-    int code = parse(count, arguments, &wanted);
+    int code = parse(&words, count, arguments);
     if (code >= 0) {
         return code;
     }
     mqtt_settings_default(&settings);
-    if (wanted.path != NULL || access(SETTINGS_PATH, F_OK) == 0) {
-        code =
-            settings_load(&mqtt_settings_form, (wanted.path != NULL) ? wanted.path : SETTINGS_PATH, &settings, stderr);
+    if (words.path != NULL || access(SETTINGS_PATH, F_OK) == 0) {
+        code = settings_load(&mqtt_settings_form, (words.path != NULL) ? words.path : SETTINGS_PATH, &settings, stderr);
     }
     if (code > 0) {
         return code;
     }
-    (void)sigaction(SIGTERM, &action, NULL);
-    (void)sigaction(SIGINT, &action, NULL);
-    (void)snprintf(name, sizeof name, "iwheel-fleet-%d", (int)getpid());
-    const mqtt_broker_listener_t listener = {"iwheel-fleet", name, topics, NULL, &console, up, up, sent, came};
-    if (!fleet_open(&console.fleet)) {
-        (void)fputs("iwheel-fleet: no memory\n", stderr);
-        return EX_OSERR;
+    if (words.verb != HISTORY) { // Which waits in a library that a signal does not wake: it just ends.
+        (void)sigaction(SIGTERM, &action, NULL);
+        (void)sigaction(SIGINT, &action, NULL);
     }
-    code = mqtt_broker_open(&console.broker, &settings, &listener);
-    code = (code == 0) ? listen_to(&console, &wanted) : code;
-    if (!mqtt_broker_close(&console.broker)) {
-        _exit(code);
-    }
-    fleet_close(&console.fleet);
-    return code;
+    return verbs[words.verb](&settings, &words.wanted);
 }

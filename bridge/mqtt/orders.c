@@ -4,6 +4,9 @@
 
 #include <string.h>
 
+/// Nobody waits longer for an answer.
+#define ANSWER_S 10U
+
 /// What was asked of the gateway, and for whom.
 typedef struct {
     mqtt_bridge_t *bridge;
@@ -14,11 +17,13 @@ typedef struct {
 static waiting_t waiting[BRIDGE_ASKED_MAX];
 
 static void answer(mqtt_bridge_t *self, const mqtt_order_t *order, const iwc_message_t *reply) {
-    const mqtt_way_t way = {0, false, false};
-    if (order->from[0] != '\0') {
+    const mqtt_way_t way = {.labels = {.expiry_s = ANSWER_S,
+                                       .correlation = (order->correlation_length > 0U) ? order->correlation : NULL,
+                                       .correlation_length = order->correlation_length}};
+    if (order->to[0] != '\0') {
         const size_t length = mqtt_tell_answer(self->boot, self->now_us, order, reply,
                                                (mqtt_buffer_t){self->payload, sizeof self->payload});
-        (void)mqtt_bridge_publish(self, "reply", order->from, length, way);
+        (void)mqtt_bridge_publish(self, "reply", order->to, length, way);
     }
 }
 
@@ -67,16 +72,24 @@ static void ask(mqtt_bridge_t *self, mqtt_order_t *order) {
     not_delivered(self, order);
 }
 
-void mqtt_bridge_command(void *context, const struct mosquitto_message *message) {
+void mqtt_bridge_command(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels) {
     mqtt_bridge_t *self = context;
     static mqtt_order_t order;
+    char replies[MQTT_TOPIC_SIZE];
     const mqtt_rules_t rules = {self->boot, self->settings->drive.ttl_ms, self->settings->drive.enabled,
-                                self->settings->drive.allow_reset};
+                                self->settings->drive.allow_reset, replies};
+    mqtt_topic(self->settings->machine.id, "reply", "", replies);
     const char *verb = mqtt_topic_verb(self->settings->machine.id, message->topic);
     if (verb == NULL) {
         return;
     }
-    const mqtt_command_t command = {verb, message->payload, (size_t)message->payloadlen, message->retain};
+    const mqtt_command_t command = {.verb = verb,
+                                    .payload = message->payload,
+                                    .length = (size_t)message->payloadlen,
+                                    .retained = message->retain,
+                                    .answer_to = labels->answer_to,
+                                    .correlation = labels->correlation,
+                                    .correlation_length = labels->correlation_length};
     mqtt_judge(&self->judge, &rules, &command, self->now_us, &order);
     self->info_due = self->info_due || order.verdict != MQTT_TAKEN;
     if (order.verdict != MQTT_TAKEN || order.verb == MQTT_HELLO) {

@@ -12,6 +12,7 @@
 #define TEXT(member)              .kind = SETTINGS_TEXT, FIELD(member)
 
 static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
+static const settings_word_t protocols[] = {{"3.1.1", MQTT_PROTOCOL_3}, {"5", MQTT_PROTOCOL_5}, {NULL, 0}};
 
 bool mqtt_settings_is_name(const char *text) {
     const size_t length = strlen(text);
@@ -39,6 +40,14 @@ static const settings_key_t keys[] = {
      "turn.",
      TEXT(broker.host)},
     {"broker", "port", "", "By custom 1883 without TLS, 8883 with it.", NUMBER(broker.port, 1, 65535)},
+    {"broker", "protocol", "",
+     "Of MQTT. 5: messages expire at the broker too, and commands may name a response topic. nats-server 2.9 speaks "
+     "3.1.1 only.",
+     .kind = SETTINGS_WORD, .words = protocols, FIELD(broker.protocol)},
+    {"broker", "stream_port", "",
+     "For iwheel-fleet: where these hosts, being nats-servers, speak NATS, by custom 4222: the fleet's history is read "
+     "there.\n0: there is none.",
+     NUMBER(broker.stream_port, 0, 65535)},
     {"broker", "keepalive_s", " s", "After 1.5 times this without a sign of life both sides count the other as gone.",
      NUMBER(broker.keepalive_s, 5, 3600)},
     {"broker", "credentials", "",
@@ -75,6 +84,7 @@ void mqtt_settings_default(mqtt_settings_t *out_settings) {
         .machine = {"none"},
         .broker = {.host = "127.0.0.1",
                    .port = 1883,
+                   .protocol = MQTT_PROTOCOL_3,
                    .keepalive_s = 10,
                    .credentials = "none",
                    .ca = "none",

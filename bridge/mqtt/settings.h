@@ -10,6 +10,9 @@
 /// Bytes of a machine's id with its terminator.
 #define MQTT_ID_SIZE   33U
 #define MQTT_HOST_SIZE 256U
+/// What `protocol` may be: 3.1.1, which every broker speaks, or 5.
+#define MQTT_PROTOCOL_3 3U
+#define MQTT_PROTOCOL_5 5U
 
 typedef struct {
     struct {
@@ -21,6 +24,8 @@ typedef struct {
     struct {
         char host[MQTT_HOST_SIZE]; ///< One or more, separated by blanks.
         uint32_t port;
+        uint8_t protocol;     ///< MQTT_PROTOCOL_3 or MQTT_PROTOCOL_5.
+        uint32_t stream_port; ///< Of NATS on the same hosts; 0: none.
         uint32_t keepalive_s;
         char credentials[108]; ///< A file; none.
         char ca[108];          ///< none: without TLS.

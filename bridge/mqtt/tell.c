@@ -140,6 +140,19 @@ static void tell_counts(const mqtt_info_t *info, iwn_out_t *out) {
     iwn_out_close(out, '}');
 }
 
+static void tell_stop(const mqtt_stop_t *stop, iwn_out_t *out) {
+    if (stop->number <= 0) {
+        iwn_out_null(out, "last_stop");
+        return;
+    }
+    iwn_out_open(out, "last_stop", '{');
+    iwn_out_int(out, "number", stop->number);
+    iwn_out_text(out, "cause", stop->cause);
+    iwn_out_known(out, "wall_us", stop->wall_us > 0, stop->wall_us);
+    iwn_out_text(out, "sentence", stop->sentence);
+    iwn_out_close(out, '}');
+}
+
 size_t mqtt_tell_info(const mqtt_info_t *info, mqtt_buffer_t buffer) {
     static const iwc_message_t nothing = {.text = "{}", .length = 2};
     const iwc_message_t *state = (info->state != NULL) ? info->state : &nothing;
@@ -159,6 +172,7 @@ size_t mqtt_tell_info(const mqtt_info_t *info, mqtt_buffer_t buffer) {
     copy(state, "listen_only", "listen_only", &out);
     copy(state, "warnings", "warnings", &out);
     tell_counts(info, &out);
+    tell_stop(info->stop, &out);
     return end(&out);
 }
 

@@ -40,6 +40,14 @@ size_t mqtt_tell_missed_stop(const char *boot, uint64_t number, int64_t wall_us,
 size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
                         mqtt_buffer_t out);
 
+/// What a machine says of its last stop in `info`, for who was not listening then.
+typedef struct {
+    int64_t number; ///< 0: none that this run of the bridge knows of.
+    int64_t wall_us;
+    char cause[32];
+    char sentence[256];
+} mqtt_stop_t;
+
 /// What is retained of the bridge and its machine. `state`: the newest; NULL: the gateway is away.
 typedef struct {
     const char *boot;
@@ -50,6 +58,7 @@ typedef struct {
     uint64_t dropped;       ///< that were dropped since the start,
     bool on_disk;           ///< and whether those that wait are on the disk.
     uint64_t unsent;        ///< Messages left out because the broker did not read.
+    const mqtt_stop_t *stop;
 } mqtt_info_t;
 
 size_t mqtt_tell_info(const mqtt_info_t *info, mqtt_buffer_t out);

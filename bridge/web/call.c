@@ -193,14 +193,14 @@ static enum MHD_Result send_health(web_call_t *self) {
     char text[384];
     iwc_message_t state;
     const bool good = web_link_state(&server->link, server->now_us, &state);
-    const int length =
-        snprintf(text, sizeof text,
-                 "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
-                 "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u}\n",
-                 good ? "true" : "false", server->link.gateway.is_here ? "connected" : "away",
-                 settings->drive.enabled ? "true" : "false",
-                 (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false",
-                 settings->drive.max_speed_mm_s, settings->drive.ttl_ms, settings->gateway.rate_hz);
+    const int length = snprintf(
+        text, sizeof text,
+        "{\"ok\":%s,\"version\":\"" IWHEEL_VERSION "\",\"gateway\":\"%s\",\"may_drive\":%s,\"may_reset\":%s,"
+        "\"max_speed_mm_s\":%u,\"ttl_ms\":%u,\"rate_hz\":%u,\"fleet\":%s}\n",
+        good ? "true" : "false", server->link.gateway.is_here ? "connected" : "away",
+        settings->drive.enabled ? "true" : "false",
+        (settings->drive.enabled && settings->drive.allow_reset) ? "true" : "false", settings->drive.max_speed_mm_s,
+        settings->drive.ttl_ms, settings->gateway.rate_hz, web_settings_has_fleet(settings) ? "true" : "false");
     self->status = good ? 200U : 503U;
     return send_text(self, text, (size_t)length, MHD_RESPMEM_MUST_COPY);
 }
@@ -241,6 +241,15 @@ static enum MHD_Result send_stops(web_call_t *self) {
         (void)fputs("]}\n", out);
     }
     return send_stream_text(self, out, &text, &length);
+}
+
+static enum MHD_Result send_fleet(web_call_t *self) {
+    size_t length = 0;
+    const char *text = web_server_fleet(self->server, &length);
+    return (text != NULL) ? send_text(self, text, length, MHD_RESPMEM_MUST_FREE)
+                          : refuse(self, 404, "not_there",
+                                   "there are no rows of a fleet; set source under [fleet], and see that iwheel-fleet "
+                                   "writes that file");
 }
 
 static ssize_t read_stream(void *context, uint64_t position, char *out, size_t size) {
@@ -292,6 +301,8 @@ static enum MHD_Result carry_out(web_call_t *self) {
         return ask(self, "{\"cmd\":\"recordings\"}");
     case WEB_RECORDING:
         return ask_recording(self);
+    case WEB_FLEET:
+        return send_fleet(self);
     case WEB_METRICS:
         return send_metrics(self);
     case WEB_HEALTH:

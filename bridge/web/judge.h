@@ -21,6 +21,7 @@ typedef enum {
     WEB_STOPS,
     WEB_RECORDINGS,
     WEB_RECORDING,
+    WEB_FLEET,
     WEB_METRICS,
     WEB_HEALTH,
     WEB_STOP,

@@ -5,6 +5,7 @@
 
 #include <arpa/inet.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -17,6 +18,8 @@
 #define LONGEST_WAIT_MS 250
 #define FILE_MAX        1000000L
 #define NEWCOMERS_MAX   16U
+/// Of a fleet's table: a thousand machines are some 500 kB.
+#define FLEET_BYTES_MAX 1048576
 /// Of a request with its headers, and of what is answered at a time.
 #define MEMORY_PER_CONNECTION 16384U
 
@@ -43,6 +46,24 @@ static char *read_all(const char *path, size_t *out_length) {
     text[*out_length] = '\0';
     char *fitting = realloc(text, *out_length + 1U);
     return (fitting != NULL) ? fitting : text;
+}
+
+char *web_server_fleet(const web_server_t *self, size_t *out_length) {
+    const int fd = open(self->settings->fleet.source, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    struct stat status = {.st_size = 0};
+    const bool good = fd >= 0 && fstat(fd, &status) == 0 && S_ISREG(status.st_mode) && status.st_size > 0 &&
+                      status.st_size <= FLEET_BYTES_MAX;
+    char *text = good ? malloc((size_t)status.st_size) : NULL;
+    const ssize_t length = (text != NULL) ? read(fd, text, (size_t)status.st_size) : -1;
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    if (length <= 0 || text[0] != '{') {
+        free(text);
+        return NULL;
+    }
+    *out_length = (size_t)length;
+    return text;
 }
 
 static int read_page(web_server_t *self) {

@@ -79,6 +79,10 @@ int web_server_open(web_server_t *self, const web_settings_t *settings);
 int web_server_check(web_server_t *self, const web_settings_t *settings);
 void web_server_close(web_server_t *self);
 
+/// What iwheel-fleet wrote last, as it is, to be freed; NULL: it cannot be read. It lies in memory (/run), so nothing waits for a disk; a
+/// link, a pipe or more than a megabyte is not read.
+char *web_server_fleet(const web_server_t *self, size_t *out_length);
+
 /// Whatever can be done now. 0, or an exit code.
 int web_server_step(web_server_t *self);
 

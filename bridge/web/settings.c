@@ -46,6 +46,10 @@ static const settings_key_t keys[] = {
     {"web", "page", "", "Folder with the page's files.", TEXT(web.page)},
     {"web", "certificate", "", "PEM file for TLS; none: without TLS, for this machine only.", TEXT(web.certificate)},
     {"web", "key", "", "PEM file of its private key.", TEXT(web.key)},
+    {"fleet", "source", "",
+     "File that iwheel-fleet --output rewrites, for the page /fleet: who has the token sees the whole fleet there; "
+     "none.",
+     TEXT(fleet.source)},
     {"drive", "enabled", "", "yes: WHO HAS THE TOKEN MAY ARM AND DRIVE. The bridge needs the right to drive for that.",
      SWITCH(drive.enabled)},
     {"drive", "allow_reset", "", "yes: who has the token may reset a latched stop. Needs enabled = yes.",
@@ -67,6 +71,7 @@ void web_settings_default(web_settings_t *out_settings) {
                 .page = IWHEEL_WEB_PAGE_DIR,
                 .certificate = "none",
                 .key = "none"},
+        .fleet = {"none"},
         .drive = {.max_speed_mm_s = 300, .ttl_ms = 300},
     };
     *out_settings = standard;
@@ -82,6 +87,10 @@ static bool is_given(const char *text) {
 
 bool web_settings_has_tls(const web_settings_t *settings) {
     return is_given(settings->web.certificate);
+}
+
+bool web_settings_has_fleet(const web_settings_t *settings) {
+    return is_given(settings->fleet.source);
 }
 
 const char *web_settings_hosts(const web_settings_t *settings) {

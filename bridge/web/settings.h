@@ -26,6 +26,9 @@ typedef struct {
         char key[108];
     } web;
     struct {
+        char source[108]; ///< What iwheel-fleet writes; none: there is no page of a fleet.
+    } fleet;
+    struct {
         bool enabled;
         bool allow_reset;
         uint32_t max_speed_mm_s;
@@ -41,6 +44,8 @@ extern const settings_form_t web_settings_form;
 bool web_settings_is_unix(const web_settings_t *settings);
 
 bool web_settings_has_tls(const web_settings_t *settings);
+
+bool web_settings_has_fleet(const web_settings_t *settings);
 
 /// Empty if there are none.
 const char *web_settings_hosts(const web_settings_t *settings);

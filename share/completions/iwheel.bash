@@ -22,11 +22,11 @@ _iwheel_offer() {
 # What the word behind an option is; 1: not known.
 _iwheel_value() {
     case $1 in
-    --socket | --config | -c | --from | --learn | --gateway | --directory | --control | --script | --log) echo FILE ;;
+    --socket | --config | -c | --from | --learn | --gateway | --directory | --control | --script | --log | --output) echo FILE ;;
     --can) echo BUS && echo unix: ;;
     --estop) printf '%s\n' none FILE ;;
     --log-level) printf '%s\n' error warning info debug ;;
-    --how | --for | --listen | --rate | --frames | --current | --seed | --uptime) ;;
+    --how | --for | --listen | --rate | --frames | --current | --seed | --uptime | --last | --since | --until | --wait) ;;
     *) return 1 ;;
     esac
 }

@@ -36,7 +36,7 @@ end
 function __iwheel_value
     set -l previous (commandline -opc)[-1]
     switch $previous
-        case --socket --config -c --from --learn --gateway --directory --control --script --log
+        case --socket --config -c --from --learn --gateway --directory --control --script --log --output
             __fish_complete_path (commandline -ct)
         case --can
             __iwheel_buses
@@ -45,7 +45,7 @@ function __iwheel_value
             __fish_complete_path (commandline -ct)
         case --log-level
             printf '%s\n' error warning info debug
-        case --how --for --listen --rate --frames --current --seed --uptime
+        case --how --for --listen --rate --frames --current --seed --uptime --last --since --until --wait
         case '*'
             return 1
     end

@@ -20,7 +20,7 @@ from harness import find_program  # noqa: E402
 
 BUILD = ""
 # Those that talk with a person.
-WITHOUT_JSON = {"top", "bringup", "help", "web", "fleet"}
+WITHOUT_JSON = {"top", "bringup", "help", "web"}
 
 
 def run(*words, program="iwheelctl", path=None, **more):
@@ -95,10 +95,10 @@ class Web(unittest.TestCase):
             self.assertIn("apt-get install ./iwheel-mqtt_*.deb", err)
             fake = os.path.join(folder, "iwheel-fleet")
             with open(fake, "w", encoding="ascii") as file:
-                file.write("#!/bin/sh\necho \"told $#\"\n")
+                file.write("#!/bin/sh\necho \"told $*\"\n")
             os.chmod(fake, 0o755)
-            self.assertEqual((0, "told 0\n", ""), run("fleet", path=folder))
-        self.assertEqual(64, run("fleet", "word")[0])
+            self.assertEqual((0, "told \n", ""), run("fleet", path=folder))
+            self.assertEqual((0, "told history w1 --last 12h --json\n", ""), run("fleet", "history", "w1", "--json", "--last", "12h", path=folder))
 
 
 class Json(unittest.TestCase):

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as a command by MQTT and as a spool's file. What is taken is this run's, in time, once, and one line for the gateway; what is
-// read of a file is whole.
+// Any bytes as a command by MQTT, as a spool's file, and as what the console reads. What is taken is this run's, in time, once, and one line for
+// the gateway; what is read of a file is whole; what the console shows moves no terminal and names no file of its own choice.
 #include "fuzz.h"
 
 #include "command.h"
+#include "fetch.h"
+#include "history.h"
 #include "spool.h"
 
 #include <fcntl.h>
@@ -14,7 +16,7 @@
 
 /// The first line is the verb.
 static void judge(const uint8_t *data, size_t size) {
-    static const mqtt_rules_t rules = {"0123456789abcdef", 300, true, false};
+    static const mqtt_rules_t rules = {"0123456789abcdef", 300, true, false, "iwheel/w1/reply/"};
     mqtt_judge_t judge = {0};
     mqtt_order_t order;
     char verb[32] = "";
@@ -26,7 +28,7 @@ static void judge(const uint8_t *data, size_t size) {
     memcpy(verb, data, length);
     char *payload = malloc(size - length);
     memcpy(payload, newline + 1, size - length - 1U); // Of exactly its length: a byte read behind it is found.
-    const mqtt_command_t command = {verb, payload, size - length - 1U, false};
+    const mqtt_command_t command = {.verb = verb, .payload = payload, .length = size - length - 1U};
     mqtt_judge(&judge, &rules, &command, NOW_US, &order);
     fuzz_require(judge.counts[order.verdict] == 1U, "counted");
     fuzz_require((order.verdict == MQTT_TAKEN) == (order.request[0] != '\0'), "a request, or a reason");
@@ -73,8 +75,42 @@ static void read_file(const uint8_t *data, size_t size) {
     (void)unlink(path);
 }
 
+/// The same bytes as an event of the stream, and as the answer to whatever the console asks for.
+static void show(const uint8_t *data, size_t size) {
+    static const history_wish_t wish = {.since_us = 1, .until_us = INT64_MAX, .all = true};
+    static history_t history;
+    static fetch_t fetch;
+    char *text = NULL;
+    size_t length = 0;
+    const char *verb = "";
+    char asked[512];
+    char *payload = malloc(size + 1U);
+    memcpy(payload, data, size);
+    payload[size] = '\0'; // As the libraries hand it over.
+    FILE *out = open_memstream(&text, &length);
+    fuzz_require(out != NULL && history_open(&history, &wish, out), "memory");
+    (void)history_take(&history, "iwheel/w1/event/stop", payload, size, 1000000);
+    (void)history_take(&history, "iwheel/w1/event/fault", payload, size, 2000000);
+    (void)fclose(out);
+    fuzz_require(history.told + history.doubled + history.garbled == 2U && strchr(text, '\033') == NULL, "each once");
+    history_close(&history);
+    free(text);
+    fetch_begin(&fetch, "w1", "me", 60000000U, NOW_US);
+    fuzz_require(fetch_step(&fetch, NOW_US, &verb, asked), "it asks");
+    fetch.greets = false;
+    (void)fetch_take(&fetch, "reply/me", payload, size, NOW_US);
+    for (size_t i = 0; i < fetch.count; i++) {
+        fuzz_require(strncmp(fetch.list[i].name, "stop-", 5) == 0 && strpbrk(fetch.list[i].name, "/.") == NULL,
+                     "a name");
+    }
+    free(payload);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     judge(data, size);
+    if (size > 0U && data[0] == '{') {
+        show(data, size);
+    }
     if (size >= 8U && memcmp(data, "iwspool1", 8) == 0) {
         read_file(data, size);
     }

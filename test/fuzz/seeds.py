@@ -44,7 +44,9 @@ def by_hand():
         "candump": [ODD_LINES.encode()],
         "line": [b'0 {"cmd":"link"}*e2d27f9b\n', b'3 1250000 {"ok":true}*e0f15d9c\n', b'1 {"boot":"0123456789abcdef","seq":1,"t_us":2,"cmd":"stop"}\xfe', b"8 {}\xfe\xff8 0 {}\xfe"],
         "web": [b"GET\n/\n[::1]\nnull\ncross-site\n\n", b"POST\n/api/estop\nwalker.lan:8470\nhttps://walker.lan:8470\nsame-origin\nbearer " + b"0" * 32],
-        "mqtt": [b"stop\n{\"from\":\"far\",\"seq\":1,\"boot\":\"0123456789abcdef\",\"t_us\":1}", b"estop\n{\"from\":\"a/b\"}", b"iwspool1" + bytes(40)],
+        "mqtt": [b"stop\n{\"from\":\"far\",\"seq\":1,\"boot\":\"0123456789abcdef\",\"t_us\":1}", b"estop\n{\"from\":\"a/b\"}", b"iwspool1" + bytes(40),
+                 b'{"boot":"a","t_us":1,"seq":1,"ok":true,"recordings":[{"name":"stop-000001-x","cause":"x","wall_us":1,"log_bytes":9}]}',
+                 b'{"id":"a-1","heard_wall_us":5,"sentence":"x\\u001b[2J","number":4,"missed":true,"wall_us":7,"present":false,"cause":"y"}'],
         "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
 

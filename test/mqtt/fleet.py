@@ -27,6 +27,7 @@ def make_certificates(rig):
     certificates(rig, "server", *HOSTS, "localhost")
     certificates(rig, "machine", ID, "w2")
     certificates(rig, "console")
+    certificates(rig, "keeper")
 
 
 def with_certificate(rig, name):

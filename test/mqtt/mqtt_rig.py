@@ -127,6 +127,7 @@ class Line(threading.Thread):
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
         self.left = None  # Bytes until it is cut; None: never.
+        self.delay = 0.0  # Of every 4 kB.
         self.start()
 
     def run(self):
@@ -149,6 +150,7 @@ class Line(threading.Thread):
             while data := one.recv(4096):
                 while self.frozen:
                     time.sleep(0.01)
+                time.sleep(self.delay)
                 if self.left is not None:
                     data = data[:max(0, self.left)]
                     self.left -= len(data)

@@ -18,13 +18,13 @@ static mqtt_order_t order;
 
 void setUp(void) {
     memset(&judge, 0, sizeof judge);
-    rules = (mqtt_rules_t){BOOT, 300, true, true};
+    rules = (mqtt_rules_t){BOOT, 300, true, true, "iwheel/w1/reply/"};
 }
 
 void tearDown(void) {}
 
 static mqtt_verdict_t judge_text(const char *verb, const char *text, uint64_t now_us) {
-    const mqtt_command_t command = {verb, text, strlen(text), false};
+    const mqtt_command_t command = {.verb = verb, .payload = text, .length = strlen(text)};
     const uint64_t before = judge.counts[MQTT_TAKEN];
     mqtt_judge(&judge, &rules, &command, now_us, &order);
     TEST_ASSERT_EQUAL(order.verdict == MQTT_TAKEN, judge.counts[MQTT_TAKEN] == before + 1U);
@@ -61,6 +61,43 @@ static void test_command_age_is_judged_to_the_microsecond(void) {
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 6, "", NOW_US + 300001U));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 7, ",\"ttl_ms\":100", NOW_US + 100000U));
     TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("stop", NOW_US, 8, ",\"ttl_ms\":100", NOW_US + 100001U));
+}
+
+/// With what MQTT 5 carries beside it.
+static mqtt_verdict_t judge_labelled(int seq, const char *answer_to, size_t correlation_length) {
+    static const char correlation[MQTT_CORRELATION_MAX + 1U] = "c\0d";
+    char text[128];
+    (void)snprintf(text, sizeof text, "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":%u,\"seq\":%d}", NOW_US, seq);
+    const mqtt_command_t command = {.verb = "stop",
+                                    .payload = text,
+                                    .length = strlen(text),
+                                    .answer_to = answer_to,
+                                    .correlation = correlation,
+                                    .correlation_length = correlation_length};
+    mqtt_judge(&judge, &rules, &command, NOW_US, &order);
+    return order.verdict;
+}
+
+static void test_command_response_topic_counts_among_this_machines_replies_only(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(1, NULL, 0));
+    TEST_ASSERT_EQUAL_STRING("far", order.to);
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(2, "iwheel/w1/reply/other", 0));
+    TEST_ASSERT_EQUAL_STRING("other", order.to);
+    static const char *const wrong[] = {"iwheel/w1/event/stop", "iwheel/w2/reply/far", "iwheel/w1/reply/",
+                                        "iwheel/w1/reply/a/b",  "iwheel/w1/reply/#",   ""};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(MQTT_GARBLED, judge_labelled(3, wrong[i], 0), wrong[i]);
+        TEST_ASSERT_EQUAL_STRING("far", order.to);
+        TEST_ASSERT_EQUAL_STRING("", order.request);
+    }
+}
+
+static void test_command_correlation_data_is_kept_up_to_its_limit(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(1, NULL, 3));
+    TEST_ASSERT_EQUAL_UINT16(3, order.correlation_length);
+    TEST_ASSERT_EQUAL_MEMORY("c\0d", order.correlation, 3);
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_labelled(2, NULL, MQTT_CORRELATION_MAX));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_labelled(3, NULL, MQTT_CORRELATION_MAX + 1U));
 }
 
 static void test_command_cannot_make_its_own_life_longer(void) {
@@ -105,7 +142,7 @@ static void test_command_retained_is_dropped_hello_too(void) {
     const char *text = "{\"from\":\"far\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":1}";
     static const char *const verbs[] = {"stop", "estop", "hello", "drive"};
     for (size_t i = 0; i < 4U; i++) {
-        const mqtt_command_t command = {verbs[i], text, strlen(text), true};
+        const mqtt_command_t command = {.verb = verbs[i], .payload = text, .length = strlen(text), .retained = true};
         mqtt_judge(&judge, &rules, &command, NOW_US, &order);
         TEST_ASSERT_EQUAL(MQTT_RETAINED, order.verdict);
     }
@@ -160,8 +197,8 @@ static void test_command_too_long_is_not_looked_at(void) {
     static char text[MQTT_COMMAND_MAX + 2U];
     memset(text, ' ', sizeof text);
     memcpy(text, "{\"from\":\"far\",\"seq\":1}", 22);
-    const mqtt_command_t command = {"hello", text, MQTT_COMMAND_MAX, false};
-    const mqtt_command_t longer = {"hello", text, MQTT_COMMAND_MAX + 1U, false};
+    const mqtt_command_t command = {.verb = "hello", .payload = text, .length = MQTT_COMMAND_MAX};
+    const mqtt_command_t longer = {.verb = "hello", .payload = text, .length = MQTT_COMMAND_MAX + 1U};
     mqtt_judge(&judge, &rules, &command, NOW_US, &order);
     TEST_ASSERT_EQUAL(MQTT_TAKEN, order.verdict);
     mqtt_judge(&judge, &rules, &longer, NOW_US, &order);
@@ -242,13 +279,20 @@ static void test_info_without_a_gateway_invents_nothing(void) {
     mqtt_settings_t settings;
     const uint64_t counts[MQTT_VERDICTS] = {1, 2};
     mqtt_settings_default(&settings);
-    const mqtt_info_t info = {.boot = BOOT, .settings = &settings, .counts = counts, .dropped = 3};
-    const size_t length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
+    mqtt_stop_t stop = {.number = 0};
+    const mqtt_info_t info = {.boot = BOOT, .settings = &settings, .counts = counts, .dropped = 3, .stop = &stop};
+    size_t length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
     text[length] = '\0';
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"last_stop\":null}"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"gateway\":\"away\",\"version\":null,"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"budget\":null"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"taken\":1,\"retained\":2,"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"dropped\":3,\"on_disk\":false"));
+    stop = (mqtt_stop_t){.number = 4, .cause = "wheel_lost", .sentence = "gone"};
+    length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
+    text[length] = '\0';
+    TEST_ASSERT_NOT_NULL(
+        strstr(text, "\"last_stop\":{\"number\":4,\"cause\":\"wheel_lost\",\"wall_us\":null,\"sentence\":\"gone\"}}"));
 }
 
 // ---- settings -----------------------------------------------------------------------------------------------------
@@ -299,6 +343,8 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_command_fresh_is_taken_as_the_gateways_request);
     RUN_TEST(test_command_age_is_judged_to_the_microsecond);
+    RUN_TEST(test_command_response_topic_counts_among_this_machines_replies_only);
+    RUN_TEST(test_command_correlation_data_is_kept_up_to_its_limit);
     RUN_TEST(test_command_cannot_make_its_own_life_longer);
     RUN_TEST(test_command_of_another_boot_is_dropped_before_its_age);
     RUN_TEST(test_command_seq_must_rise);

@@ -77,6 +77,36 @@ static void test_fleet_stop_is_told_with_its_cause_and_moves_no_terminal(void) {
     TEST_ASSERT_NOT_NULL(strstr(show(fleet_tell), "\"stop_wall_us\":1760000000000000,\"sentence\":\"left wheel\""));
 }
 
+static const char *row(void) {
+    return show(fleet_tell);
+}
+
+static void test_fleet_last_stop_is_the_latest_of_info_and_stream_and_what_is_heard_counts_most(void) {
+    take("iwheel/w1/info", "{\"last_stop\":null}");
+    TEST_ASSERT_NOT_NULL(strstr(row(), "\"stop_from\":null"));
+    take("iwheel/w1/info", "{\"last_stop\":{\"number\":1,\"cause\":\"client\",\"wall_us\":2000,\"sentence\":\"s\"}}");
+    TEST_ASSERT_NOT_NULL(
+        strstr(row(), "\"cause\":\"client\",\"stop_wall_us\":2000,\"sentence\":\"s\",\"stop_from\":\"info\""));
+    TEST_ASSERT_NOT_NULL(strstr(shown, "\"heard_ms\":null"));
+    const char *stored = "{\"event\":\"stop\",\"cause\":\"wheel_lost\",\"wall_us\":1000}";
+    fleet_take_stored(&fleet, "iwheel/w1/event/stop", stored, strlen(stored));
+    TEST_ASSERT_NOT_NULL(strstr(row(), "\"stop_from\":\"info\""));
+    stored = "{\"event\":\"stop\",\"cause\":\"wheel_lost\",\"wall_us\":3000}";
+    fleet_take_stored(&fleet, "iwheel/w1/event/stop", stored, strlen(stored));
+    TEST_ASSERT_NOT_NULL(strstr(row(), "\"stop_wall_us\":3000,\"sentence\":null,\"stop_from\":\"stream\""));
+    take("iwheel/w1/event/stop", "{\"event\":\"stop\",\"cause\":\"estop_line\",\"wall_us\":500}");
+    take("iwheel/w1/info", "{\"last_stop\":{\"number\":1,\"cause\":\"client\",\"wall_us\":9000}}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(row(), "\"stop_wall_us\":500,"), "a clock that was set back makes it no older");
+    fleet_take_stored(&fleet, "iwheel/w1/event/stop", "[", 1);
+    TEST_ASSERT_EQUAL_UINT64(1, fleet.left_out);
+}
+
+static void test_fleet_table_says_who_told_the_last_stops(void) {
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: of each machine's info"));
+    fleet.stream = "n1";
+    TEST_ASSERT_NOT_NULL(strstr(show(fleet_show), "last stops: of the stream at n1"));
+}
+
 static void test_fleet_garbage_is_left_out_and_counted(void) {
     static const char *const topics[] = {"iwheel/", "iwheel//state", "iwheel/a b/state", "other/w1/state", "iwheel/w1"};
     for (size_t i = 0; i < sizeof topics / sizeof topics[0]; i++) {
@@ -108,6 +138,8 @@ int main(void) {
     RUN_TEST(test_fleet_row_tells_state_battery_zero_and_what_is_unknown);
     RUN_TEST(test_fleet_contradictions_are_counted_across_machines);
     RUN_TEST(test_fleet_stop_is_told_with_its_cause_and_moves_no_terminal);
+    RUN_TEST(test_fleet_last_stop_is_the_latest_of_info_and_stream_and_what_is_heard_counts_most);
+    RUN_TEST(test_fleet_table_says_who_told_the_last_stops);
     RUN_TEST(test_fleet_garbage_is_left_out_and_counted);
     RUN_TEST(test_fleet_of_too_many_machines_is_counted_not_shown);
     return UNITY_END();

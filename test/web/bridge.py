@@ -22,7 +22,7 @@ from judge_log import GAP_US
 from trials import ROOT, Driver, Skip, braking_ms, full, longest_gap_ms, needs, until
 from web_rig import free_port
 
-ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/metrics", "/health")
+ROUTES = ("/api/status", "/api/events", "/api/stops", "/api/recordings", "/api/recording?name=a.log", "/api/fleet", "/metrics", "/health")
 COMMANDS = ("/api/stop", "/api/estop", "/api/arm", "/api/drive", "/api/reset")
 
 
@@ -550,3 +550,36 @@ def test_words_of_the_page_are_those_of_iwheelctl(rig):
     for name, words in re.findall(r'^    (\w+): "([^"]+)",$', strings[strings.index("  next: {"):strings.index("  cures: {")], re.MULTILINE):
         plain = re.split(r"\{\w+\}", words)
         assert all(part in joined for part in plain), (name, words)
+
+
+# ---- a fleet --------------------------------------------------------------------------------------------------------
+
+
+def test_fleet_is_what_iwheel_fleet_wrote_and_nothing_else_is_read(rig):
+    rig.start()
+    assert rig.ask_json("GET", "/api/fleet")[0] == 404 and rig.ask_json("GET", "/health")[1]["fleet"] is False
+    rig.web.signal(15)
+    rig.web.wait(5)
+    source = Path(rig.path("fleet.json"))
+    rig.web_settings["fleet"]["source"] = source
+    rig.start_web()
+    assert rig.ask_json("GET", "/health")[1]["fleet"] is True
+    text = '{"ok":true,"wall_us":1,"stream":false,"left_out":0,"machines":[]}'
+
+    def refused():
+        status, body = rig.ask_json("GET", "/api/fleet")
+        return status == 404 and "see that iwheel-fleet writes" in body["message"]
+    assert refused()
+    source.write_text(text, encoding="ascii")
+    assert rig.ask("GET", "/api/fleet") == (200, text)
+    assert rig.headers["Content-Type"] == "application/json" and rig.ask("GET", "/api/fleet", token="")[0] == 401
+    for wrong in ("", "[]", "{" * 1048577):
+        source.write_text(wrong, encoding="ascii")
+        assert refused(), wrong[:9]
+    for make in (lambda: os.mkfifo(source), lambda: source.symlink_to(rig.path("token")), source.mkdir):
+        source.unlink()
+        make()
+        assert refused()
+        if source.is_dir():
+            source.rmdir()
+            source.touch()

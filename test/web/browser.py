@@ -2,6 +2,7 @@
 """The page in a real browser: each element against the snapshot of the same moment, STOP against the bus log, keyboard, contrast, hiding."""
 
 import contextlib
+import json
 import os
 import shutil
 import signal
@@ -312,6 +313,56 @@ def test_plots_follow_freeze_zoom_and_are_saved(rig):
                 assert all(line.count(",") == 3 and float(line.split(",")[0]) > 0 for line in lines[1:])
                 assert any(line.split(",")[3] not in ("", "0") for line in lines[1:]), "it was driven"
     driver.end()
+
+
+def fleet_row(name, **other):
+    return {"machine": name, "online": True, "state": "listening", "version": "0.2.0", "left_battery_dV": 248, "right_battery_dV": 247, "left_zero": "operator", "right_zero": "operator",
+            "cause": None, "stop_wall_us": None, "sentence": None, "stop_from": None, "contradicted": "", "heard_ms": 10, **other}
+
+
+def write_fleet(rig, age_s=0.0):
+    now_us = int((time.time() - age_s) * 1e6)
+    sentence = "left wheel not heard for 204 ms while driving 300/300 mm/s; zero at once, latched at 16203.231 s; check the wheel's power and cable, then: iwheelctl reset"
+    rows = [fleet_row("walker-1"), fleet_row("walker-2", state="latched", cause="wheel_lost", stop_wall_us=now_us - 3600000000, sentence=sentence, right_zero="doubted", contradicted="wheel_radius"),
+            fleet_row("walker-3", online=False, state=None, left_battery_dV=None, right_battery_dV=None, left_zero=None, right_zero=None, version=None, contradicted="wheel_radius track"),
+            fleet_row("walker-4", cause="<b onclick='x'>x</b>", sentence="<img src=x onerror=alert(1)>", right_battery_dV=None)]
+    part = Path(rig.path("fleet.part"))
+    part.write_text(json.dumps({"ok": True, "wall_us": now_us, "stream": True, "left_out": 0, "machines": rows}), encoding="ascii")
+    part.rename(rig.path("fleet.json"))
+
+
+def test_fleet_page_shows_each_machine_says_when_it_is_old_and_fits(rig):
+    axe = ASSETS / "axe-core-4.14.1/axe.min.js"
+    rig.web_settings["fleet"]["source"] = rig.path("fleet.json")
+    rig.start()
+    url = rig.url.replace("/#", "/fleet#")
+    write_fleet(rig)
+    for size, scheme in (("desk", "light"), ("phone", "dark")):
+        with page_of(rig, size, scheme, url) as page:
+            write_fleet(rig)
+            seen(page, "document.querySelector('#news').className === 'good'")
+            cells = page.evaluate("[...document.querySelectorAll('#machines tr')].map((row) => [...row.children].map((cell) => cell.textContent))")
+            assert [row[0] for row in cells] == ["walker-1", "walker-2", "walker-3", "walker-4"]
+            assert cells[0][1:] == ["listening", "none known", "24.8 V / 24.7 V", "operator / operator", "0.2.0"], cells[0]
+            assert cells[1][1] == "latched" and "wheel_lost. left wheel not heard for 204 ms" in cells[1][2] and cells[1][4] == "operator / doubted", cells[1]
+            assert cells[2][1:] == ["offline", "none known", "unknown", "unknown", "unknown"], cells[2]
+            assert "<img src=x onerror=alert(1)>" in cells[3][2] and cells[3][3] == "24.8 V / unknown" and not page.query_selector("#machines img"), cells[3]
+            facts = page.evaluate("['count', 'online', 'latched', 'contradicted'].map((id) => document.getElementById(id).textContent)")
+            assert facts == ["4", "3", "walker-2", "wheel_radius on 2 of 4; track on 1 of 4"], facts
+            if os.environ.get("IWHEEL_WEB_SHOTS"):
+                page.screenshot(path=Path(os.environ["IWHEEL_WEB_SHOTS"]) / f"fleet-{size}.png", full_page=True)
+            assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0, size
+            if axe.is_file():
+                page.context.new_cdp_session(page).send("Runtime.evaluate", {"expression": axe.read_text(encoding="utf-8")})
+                found = page.evaluate("axe.run(document, {resultTypes: ['violations']})")["violations"]
+                assert not found, [(one["id"], [node["target"] for node in one["nodes"]][:4]) for one in found]
+            write_fleet(rig, 60)
+            seen(page, "document.querySelector('#news').textContent.startsWith('OLD')")
+            os.unlink(rig.path("fleet.json"))
+            seen(page, "document.querySelector('#news').textContent.startsWith('No answer')")
+    with page_of(rig) as page:
+        page.click("#to-fleet")
+        seen(page, "location.pathname === '/fleet' && document.querySelector('#login').hidden")
 
 
 def test_page_is_accessible_and_fits_in_light_and_dark_on_phone_and_desk(rig):

@@ -28,7 +28,7 @@ class WebRig(Rig):
 
     def __init__(self, build, driving=False, settings=None):
         self.driving, self.web, self.port = driving, None, free_port()
-        self.web_settings = {"gateway": {"rate_hz": 20}, "web": {"port": self.port}, "drive": {}}
+        self.web_settings = {"gateway": {"rate_hz": 20}, "web": {"port": self.port}, "fleet": {}, "drive": {}}
         super().__init__(str(build), CONFIG)
         self.web_settings["gateway"]["socket"] = self.path("gateway.sock" if driving else "watch.sock")
         self.web_settings["web"]["token_file"] = self.path("token")

@@ -8,6 +8,7 @@
 
 #include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -108,18 +109,31 @@ int verb_tare(ctl_t *self, int count, char **words) {
 }
 
 /// Another package's program in this one's place: it knows its configuration, and how to draw it.
-static int become(const char *program, const char *option, const char *package) {
-    (void)execlp(program, program, option, (char *)NULL);
-    return ctl_fail(CTL_UNAVAILABLE, "%s cannot be started (%s); install it: apt-get install ./%s_*.deb", program,
+static int become(char **words, const char *package) {
+    (void)execvp(words[0], words);
+    return ctl_fail(CTL_UNAVAILABLE, "%s cannot be started (%s); install it: apt-get install ./%s_*.deb", words[0],
                     strerror(errno), package);
 }
 
 int verb_web(ctl_t *self, int count, char **words) {
+    char program[] = "iwheel-web";
+    char option[] = "--url";
+    char *all[] = {program, option, NULL};
     (void)self;
-    return words_at_most("web", count, 0, words) ? become("iwheel-web", "--url", "iwheel-web") : CTL_USAGE;
+    return words_at_most("web", count, 0, words) ? become(all, "iwheel-web") : CTL_USAGE;
 }
 
 int verb_fleet(ctl_t *self, int count, char **words) {
-    (void)self;
-    return words_at_most("fleet", count, 0, words) ? become("iwheel-fleet", NULL, "iwheel-mqtt") : CTL_USAGE;
+    char program[] = "iwheel-fleet";
+    char json[] = "--json";
+    char **all = (char **)calloc((size_t)count + 3U, sizeof *all);
+    if (all == NULL) {
+        return ctl_fail(CTL_INTERNAL, "out of memory");
+    }
+    all[0] = program;
+    memcpy((void *)&all[1], (const void *)words, (size_t)count * sizeof *all);
+    all[count + 1] = self->json ? json : NULL;
+    const int code = become(all, "iwheel-mqtt");
+    free((void *)all);
+    return code;
 }

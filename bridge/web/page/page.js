@@ -61,6 +61,7 @@ async function listen() {
     if (health.status === 401) return;
     page.rights = await health.json();
     page.gateway = page.rights.gateway === "connected";
+    $("to-fleet").hidden = !page.rights.fleet;
     const answer = await ask("GET", "/api/events", { signal: control.signal });
     if (!answer.ok) throw new Error(answer.status);
     $("login").hidden = true;

@@ -64,8 +64,7 @@ static bool is_name(const char *name) {
     return length > 0U && length <= NAME_MAX_BYTES && strspn(name, all) == length;
 }
 
-/// True if the reply brings what comes next.
-static bool take(const iwc_message_t *reply, uint8_t *out, iwc_piece_t *piece) {
+bool iwc_piece_take(const iwc_message_t *reply, void *out, iwc_piece_t *piece) {
     size_t length = 0;
     const char *data = iwc_json(reply, "data", &length);
     const iwc_value_t from = iwc_integer(reply, "offset");
@@ -73,12 +72,13 @@ static bool take(const iwc_message_t *reply, uint8_t *out, iwc_piece_t *piece) {
     const iwc_value_t whole = iwc_integer(reply, "file_crc32");
     piece->size = iwc_integer(reply, "size").value;
     if (!from.known || from.value != piece->next || !crc.known ||
-        !decode((iwc_span_t){data, length}, out, &piece->length) || crc.value != crc32_of(0, out, piece->length)) {
+        !decode((iwc_span_t){data, length}, (uint8_t *)out, &piece->length) ||
+        crc.value != crc32_of(0, (const uint8_t *)out, piece->length)) {
         return false;
     }
     const bool goes_on = piece->length > 0U || piece->next == piece->size; // Else it would be asked for without end.
     piece->next += (int64_t)piece->length;
-    piece->crc32 = crc32_of(piece->crc32, out, piece->length);
+    piece->crc32 = crc32_of(piece->crc32, (const uint8_t *)out, piece->length);
     return goes_on && piece->next <= piece->size && (!whole.known || whole.value == piece->crc32);
 }
 
@@ -91,7 +91,7 @@ iwc_result_t iwc_recording(iwc_t *self, const char *name, int timeout_ms, void *
     (void)snprintf(request, sizeof request, "{\"cmd\":\"recording\",\"name\":\"%s\",\"offset\":%" PRId64 "}", name,
                    piece->next);
     const iwc_result_t result = iwc_ask(self, request, timeout_ms, &reply);
-    if (result == IWC_OK && !take(&reply, (uint8_t *)out, piece)) {
+    if (result == IWC_OK && !iwc_piece_take(&reply, out, piece)) {
         iwc_close(self); // Nothing that comes after it can be trusted either.
         return IWC_GARBLED;
     }

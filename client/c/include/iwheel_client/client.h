@@ -250,6 +250,10 @@ typedef struct {
 /// which the whole is not.
 IWC_API iwc_result_t iwc_recording(iwc_t *self, const char *name, int timeout_ms, void *out, iwc_piece_t *piece);
 
+/// The same for a reply that came another way, such as by MQTT. False: it is not the piece that comes next, or not as its checksum says, or
+/// with it the whole is not; `*piece` is of no use then.
+IWC_API bool iwc_piece_take(const iwc_message_t *reply, void *out, iwc_piece_t *piece);
+
 // ---- driving and stopping -----------------------------------------------------------------------------------------
 
 /// On what terms an arm was granted.

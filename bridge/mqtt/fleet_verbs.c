@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+// The table, and the history.
+#include "fleet_verbs.h"
+
+#include "broker.h"
+#include "stream.h"
+
+#include "common/service.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <string.h>
+#include <sysexits.h>
+#include <time.h>
+#include <unistd.h>
+
+#define SHOW_US 1000000U
+/// A machine's clock may be ahead of the servers' by this, and its events are found all the same.
+#define AHEAD_US 600000000LL
+
+typedef struct {
+    fleet_t fleet;
+    mqtt_broker_t broker;
+    char host[MQTT_HOST_SIZE]; ///< Whose stream told the last stops.
+    uint64_t now_us;
+} console_t;
+
+static int complain(int code, const char *why) {
+    (void)fprintf(stderr, "iwheel-fleet: %s\n", why);
+    return code;
+}
+
+// ---- the table ----------------------------------------------------------------------------------------------------
+
+static void up(void *context) {
+    (void)context;
+}
+
+static void sent(void *context, int message) {
+    (void)context;
+    (void)message;
+}
+
+static void came(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels) {
+    console_t *self = context;
+    (void)labels;
+    fleet_take(&self->fleet, message->topic, message->payload, (size_t)message->payloadlen, self->now_us);
+}
+
+static bool take_stored(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us) {
+    console_t *self = context;
+    (void)stored_us;
+    fleet_take_stored(&self->fleet, topic, payload, length);
+    return true;
+}
+
+/// What happened before this console began. Without a stream the machines' own word must do.
+static void read_last_stops(console_t *self, const mqtt_settings_t *settings) {
+    const stream_wish_t wish = {.event = "stop", .last = true};
+    char why[STREAM_WHY_SIZE];
+    if (settings->broker.stream_port == 0U) {
+        return;
+    }
+    if (stream_read(settings, &wish, take_stored, self, self->host, why) == 0) {
+        self->fleet.stream = self->host;
+    } else {
+        (void)complain(0, why);
+    }
+}
+
+/// Rewrites the file: whoever reads it finds it whole.
+static int write_file(const console_t *self, const char *path) {
+    char part[1024];
+    const int length = snprintf(part, sizeof part, "%s.part", path);
+    const int fd = (length > 0 && (size_t)length < sizeof part)
+                       ? open(part, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0640)
+                       : -1;
+    FILE *file = (fd >= 0) ? fdopen(fd, "w") : NULL;
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    if (file != NULL) {
+        fleet_write(&self->fleet, self->now_us, (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000, file);
+    }
+    if (file == NULL || fclose(file) != 0 || rename(part, path) != 0) {
+        (void)fprintf(stderr, "iwheel-fleet: %s: %s; name a file in a folder that this user may write to\n", path,
+                      strerror(errno));
+        return EX_CANTCREAT;
+    }
+    return 0;
+}
+
+static void show(const console_t *self, const fleet_wanted_t *wanted) {
+    if (wanted->json) {
+        fleet_tell(&self->fleet, self->now_us, stdout);
+        return;
+    }
+    if (wanted->seconds == 0U && isatty(STDOUT_FILENO) == 1) {
+        (void)fputs("\033[H\033[2J", stdout);
+    }
+    fleet_show(&self->fleet, self->now_us, stdout);
+    (void)fflush(stdout);
+}
+
+static int listen_to(console_t *self, const fleet_wanted_t *wanted) {
+    const uint64_t end_us = (wanted->seconds > 0U) ? bridge_now_us() + wanted->seconds * 1000000U : UINT64_MAX;
+    uint64_t show_us = bridge_now_us() + SHOW_US;
+    bool was_up = false;
+    while (*wanted->end_asked == 0 && self->now_us < end_us) {
+        bool writes = false;
+        self->now_us = bridge_now_us();
+        mqtt_broker_step(&self->broker, self->now_us);
+        was_up = was_up || self->broker.state == MQTT_UP;
+        if (self->now_us >= show_us) {
+            show_us = self->now_us + SHOW_US;
+            const int code = (wanted->out != NULL) ? write_file(self, wanted->out) : 0;
+            if (code != 0) {
+                return code;
+            }
+            if (wanted->out == NULL && wanted->seconds == 0U) {
+                show(self, wanted);
+            }
+        }
+        struct pollfd wait = {.fd = mqtt_broker_fd(&self->broker, &writes), .events = POLLIN};
+        wait.events = (short)(POLLIN | (writes ? POLLOUT : 0));
+        (void)poll(&wait, 1, 100);
+    }
+    if (wanted->seconds > 0U && wanted->out == NULL) {
+        show(self, wanted);
+    }
+    return was_up ? 0 : EX_UNAVAILABLE;
+}
+
+int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *wanted) {
+    static console_t console;
+    static const char *const topics[] = {"iwheel/+/availability", "iwheel/+/info", "iwheel/+/state",
+                                         "iwheel/+/event/stop", NULL};
+    char name[32];
+    (void)snprintf(name, sizeof name, "iwheel-fleet-%d", (int)getpid());
+    const mqtt_broker_listener_t listener = {"iwheel-fleet", name, topics, NULL, &console, up, up, sent, came};
+    if (!fleet_open(&console.fleet)) {
+        return complain(EX_OSERR, "no memory");
+    }
+    int code = mqtt_broker_open(&console.broker, settings, &listener);
+    if (code == 0) {
+        read_last_stops(&console, settings);
+        code = listen_to(&console, wanted);
+    }
+    if (!mqtt_broker_close(&console.broker)) {
+        _exit(code);
+    }
+    fleet_close(&console.fleet);
+    return code;
+}
+
+// ---- the history --------------------------------------------------------------------------------------------------
+
+int fleet_verb_history(const mqtt_settings_t *settings, const fleet_wanted_t *wanted) {
+    static history_t history;
+    char host[MQTT_HOST_SIZE];
+    char why[STREAM_WHY_SIZE];
+    const int64_t since_us = wanted->span.since_us - AHEAD_US;
+    const stream_wish_t wish = {.machine = wanted->span.machine, .since_us = (since_us > 0) ? since_us : 1};
+    if (!history_open(&history, &wanted->span, stdout)) {
+        return complain(EX_OSERR, "no memory");
+    }
+    const int code = stream_read(settings, &wish, history_take, &history, host, why);
+    if (code == 0) {
+        history_sum(&history, host);
+    } else {
+        (void)complain(code, why);
+    }
+    history_close(&history);
+    return code;
+}

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: MIT
+#include "history.h"
+
+#include "iwheel_northbound/json_out.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define MINUTE_US 60000000LL
+#define TIME_SIZE 32U
+
+bool history_open(history_t *self, const history_wish_t *wish, FILE *out) {
+    memset(self, 0, sizeof *self);
+    self->wish = *wish;
+    self->out = out;
+    self->machines = calloc(FLEET_MACHINES, sizeof *self->machines);
+    return self->machines != NULL;
+}
+
+void history_close(history_t *self) {
+    free(self->machines);
+    self->machines = NULL;
+}
+
+// ---- times --------------------------------------------------------------------------------------------------------
+
+static void write_time(int64_t wall_us, char out[TIME_SIZE]) {
+    const time_t seconds = (time_t)(wall_us / 1000000);
+    struct tm parts;
+    (void)snprintf(out, TIME_SIZE, "--");
+    if (wall_us > 0 && localtime_r(&seconds, &parts) != NULL) {
+        (void)strftime(out, TIME_SIZE, "%Y-%m-%d %H:%M:%S", &parts);
+    }
+}
+
+bool history_when(const char *text, int64_t *out_us) {
+    static const char *const forms[] = {"%Y-%m-%dT%H:%M:%S", "%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M", "%Y-%m-%d %H:%M",
+                                        "%Y-%m-%d"};
+    for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) {
+        struct tm parts = {.tm_isdst = -1};
+        const char *rest = strptime(text, forms[i], &parts);
+        const bool utc = rest != NULL && strcmp(rest, "Z") == 0;
+        if (rest == NULL || (rest[0] != '\0' && !utc)) {
+            continue;
+        }
+        const int day = parts.tm_mday;
+        const time_t seconds = utc ? timegm(&parts) : mktime(&parts);
+        if (seconds <= 0 || parts.tm_mday != day) { // 30 February is none, though it can be counted.
+            return false;
+        }
+        *out_us = (int64_t)seconds * 1000000;
+        return true;
+    }
+    return false;
+}
+
+bool history_span(const char *text, int64_t *out_us) {
+    static const struct {
+        const char *word;
+        int64_t seconds;
+    } units[] = {{"s", 1}, {"min", 60}, {"h", 3600}, {"d", 86400}};
+    const size_t digits = strspn(text, "0123456789");
+    uint32_t number = 0;
+    if (digits == 0U || !settings_digits(text, digits, &number) || number == 0U) {
+        return false;
+    }
+    for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {
+        if (strcmp(text + digits, units[i].word) == 0) {
+            *out_us = (int64_t)number * units[i].seconds * 1000000;
+            return true;
+        }
+    }
+    return false;
+}
+
+// ---- doubles and gaps ---------------------------------------------------------------------------------------------
+
+static history_machine_t *machine_of(history_t *self, const char *id) {
+    for (size_t i = 0; i < self->count; i++) {
+        if (strcmp(self->machines[i].id, id) == 0) {
+            return &self->machines[i];
+        }
+    }
+    if (self->count == FLEET_MACHINES) {
+        return NULL;
+    }
+    history_machine_t *machine = &self->machines[self->count++];
+    (void)snprintf(machine->id, sizeof machine->id, "%s", id);
+    return machine;
+}
+
+/// `id` is `BOOT-NUMBER`.
+static bool read_id(const iwc_message_t *event, char out_boot[MQTT_BOOT_SIZE], uint64_t *out_number) {
+    char id[48];
+    fleet_text(event, "id", id, sizeof id);
+    char *dash = strrchr(id, '-');
+    if (dash == NULL || dash == id || (size_t)(dash - id) >= MQTT_BOOT_SIZE || dash[1] == '\0' ||
+        strspn(dash + 1, "0123456789") != strlen(dash + 1)) {
+        return false;
+    }
+    *dash = '\0'; // Shorter than MQTT_BOOT_SIZE by now.
+    memcpy(out_boot, id, (size_t)(dash - id) + 1U);
+    *out_number = strtoull(dash + 1, NULL, 10);
+    return *out_number > 0U;
+}
+
+/// The run of the bridge that it is of; a new one in place of the oldest.
+static size_t run_of(history_machine_t *machine, const char *boot) {
+    for (size_t i = 0; i < HISTORY_BOOTS; i++) {
+        if (strcmp(machine->runs[i].boot, boot) == 0) {
+            return i;
+        }
+    }
+    const size_t next = (machine->number > 0U) ? (machine->run + 1U) % HISTORY_BOOTS : 0U;
+    (void)snprintf(machine->runs[next].boot, MQTT_BOOT_SIZE, "%s", boot);
+    machine->runs[next].number = 0;
+    return next;
+}
+
+/// What lies between `before`, unless it is 0, and `now`; counted from 1 on where it began anew.
+static uint64_t gap(uint64_t before, uint64_t now) {
+    const uint64_t from = (now > before) ? before : 0U;
+    return (before > 0U) ? now - from - 1U : 0U;
+}
+
+/// False: it is a double.
+static bool note(history_t *self, history_machine_t *machine, const iwc_message_t *event, bool is_stop) {
+    char boot[MQTT_BOOT_SIZE];
+    uint64_t number = 0;
+    if (!read_id(event, boot, &number)) {
+        return true; // Who sends no id cannot be told apart; better twice than not at all.
+    }
+    const size_t run = run_of(machine, boot);
+    if (number <= machine->runs[run].number) {
+        return false;
+    }
+    const uint64_t missing = gap(machine->number, number);
+    machine->began = machine->began || (machine->number > 0U && run != machine->run);
+    machine->runs[run].number = number;
+    machine->run = run;
+    machine->number = number;
+    machine->missing += missing;
+    self->missing += missing;
+    const iwc_value_t stop = iwc_integer(event, "number");
+    if (is_stop && stop.known && stop.value > 0) {
+        const uint64_t unheard = gap((uint64_t)machine->stop, (uint64_t)stop.value);
+        machine->stop = stop.value;
+        machine->unheard += unheard;
+        self->unheard += unheard;
+    }
+    return true;
+}
+
+// ---- telling ------------------------------------------------------------------------------------------------------
+
+/// Of an event that is no stop, what is in it that tells most.
+static void write_fields(const iwc_message_t *event, const char *name, char *out, size_t size) {
+    static const struct {
+        const char *event;
+        const char *fields[3];
+    } forms[] = {{"fault", {"cause", "present", NULL}},
+                 {"estop", {"state", NULL}},
+                 {"bus", {"state", NULL}},
+                 {"lease", {"change", "name", NULL}},
+                 {"ledger", {"item", "state", NULL}},
+                 {"offset", {"side", "provenance", NULL}},
+                 {"lost", {"count", NULL}}};
+    size_t used = 0;
+    out[0] = '\0';
+    for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) {
+        for (size_t k = 0; strcmp(forms[i].event, name) == 0 && forms[i].fields[k] != NULL && used < size; k++) {
+            char text[128];
+            size_t length = 0;
+            const char *raw = iwc_json(event, forms[i].fields[k], &length);
+            fleet_text(event, forms[i].fields[k], text, sizeof text);
+            if (raw != NULL && raw[0] != '"' && length < sizeof text) { // A number or a truth.
+                memcpy(text, raw, length);
+                text[length] = '\0';
+            }
+            used +=
+                (size_t)snprintf(out + used, size - used, "%s%s %s", (used > 0U) ? ", " : "", forms[i].fields[k], text);
+        }
+    }
+}
+
+static void show_note(const history_t *self, const history_machine_t *machine, uint64_t events, const char *words) {
+    (void)fprintf(self->out, "%-19s %-12s -- %" PRIu64 " %s\n", "", machine->id, events, words);
+}
+
+static void show(const history_t *self, const history_machine_t *machine, const iwc_message_t *event, const char *name,
+                 const int64_t times_us[2]) {
+    char when[TIME_SIZE];
+    char stored[TIME_SIZE];
+    char text[320];
+    const int64_t late_us = times_us[1] - times_us[0];
+    write_time(times_us[0], when);
+    write_time(times_us[1], stored);
+    fleet_text(event, "sentence", text, sizeof text);
+    if (text[0] == '\0') {
+        fleet_text(event, "cause", text, sizeof text);
+    }
+    if (strcmp(name, "stop") != 0) {
+        write_fields(event, name, text, sizeof text);
+    }
+    if (self->wish.all && machine->began) {
+        (void)fprintf(self->out, "%-19s %-12s -- its bridge began anew: boot %s\n", "", machine->id,
+                      machine->runs[machine->run].boot);
+    }
+    if (machine->missing > 0U) {
+        show_note(self, machine, machine->missing,
+                  "events before this one are not in the stream: dropped from its full spool");
+    }
+    if (machine->unheard > 0U) {
+        show_note(self, machine, machine->unheard,
+                  "stops before this one are not in the stream; what it recorded: iwheel-fleet recordings ID");
+    }
+    (void)fprintf(self->out, "%-19s %-12s %-6s %s%s", when, machine->id, name, text,
+                  (iwc_truth(event, "missed").value == 1) ? " (told late: its bridge did not run)" : "");
+    if (late_us > MINUTE_US) {
+        (void)fprintf(self->out, " (stored %s)", stored);
+    } else if (late_us < -MINUTE_US) {
+        (void)fprintf(self->out, " (THE CLOCK OF THIS MACHINE IS WRONG: stored %s)", stored);
+    }
+    (void)fputs("\n", self->out);
+}
+
+static void tell(const history_t *self, const history_machine_t *machine, const iwc_message_t *event,
+                 const int64_t times_us[2]) {
+    static char line[IWC_LINE_MAX + 1024U];
+    iwn_out_t json;
+    iwn_out_init(&json, line, sizeof line);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_text(&json, "machine", machine->id);
+    iwn_out_int(&json, "wall_us", times_us[0]);
+    iwn_out_int(&json, "stored_wall_us", times_us[1]);
+    iwn_out_int(&json, "missing_before", (int64_t)machine->missing);
+    iwn_out_int(&json, "stops_missing_before", (int64_t)machine->unheard);
+    iwn_out_bool(&json, "bridge_began_anew", machine->began);
+    iwn_out_span(&json, iwn_span("message"), (iwn_span_t){event->text, event->length});
+    iwn_out_close(&json, '}');
+    (void)fwrite(line, 1, iwn_out_finish(&json), self->out);
+}
+
+static bool is_within(const history_t *self, const int64_t times_us[2]) {
+    return (times_us[0] >= self->wish.since_us && times_us[0] < self->wish.until_us) ||
+           (times_us[1] >= self->wish.since_us && times_us[1] < self->wish.until_us);
+}
+
+bool history_take(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us) {
+    static const char begin[] = "event/";
+    history_t *self = context;
+    char id[MQTT_ID_SIZE];
+    char fault[80];
+    const char *what = "";
+    iwn_json_t root;
+    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
+    const bool split = fleet_split(topic, id, &what) && strncmp(what, begin, sizeof begin - 1U) == 0 &&
+                       mqtt_settings_is_name(what + sizeof begin - 1U);
+    history_machine_t *machine = split ? machine_of(self, id) : NULL;
+    if (machine == NULL || !iwn_json_check(payload, length, &self->work, &root, &words) ||
+        iwn_json_kind(root) != IWN_JSON_OBJECT) {
+        self->garbled++;
+        return true;
+    }
+    const char *name = what + sizeof begin - 1U;
+    const bool is_stop = strcmp(name, "stop") == 0;
+    const iwc_message_t event = {.text = payload, .length = length, .is_event = true};
+    const bool missed = iwc_truth(&event, "missed").value == 1 && iwc_integer(&event, "wall_us").value > 0;
+    const int64_t times_us[2] = {iwc_integer(&event, missed ? "wall_us" : "heard_wall_us").value, stored_us};
+    if (!note(self, machine, &event, is_stop)) {
+        self->doubled++;
+        return true;
+    }
+    if (!is_within(self, times_us) || !(self->wish.all || is_stop)) {
+        return true;
+    }
+    if (self->wish.json) {
+        tell(self, machine, &event, times_us);
+    } else {
+        show(self, machine, &event, name, times_us);
+    }
+    machine->missing = 0;
+    machine->unheard = 0;
+    machine->began = false;
+    machine->told = true;
+    self->told++;
+    return ferror(self->out) == 0;
+}
+
+void history_sum(const history_t *self, const char *host) {
+    char since[TIME_SIZE];
+    char until[TIME_SIZE];
+    size_t machines = 0;
+    for (size_t i = 0; i < self->count; i++) {
+        machines += self->machines[i].told ? 1U : 0U;
+    }
+    if (self->wish.json) {
+        (void)fprintf(self->out,
+                      "{\"events\":%" PRIu64 ",\"machines\":%zu,\"doubled\":%" PRIu64 ",\"garbled\":%" PRIu64
+                      ",\"missing\":%" PRIu64 ",\"stops_missing\":%" PRIu64 ",\"since_wall_us\":%" PRId64
+                      ",\"until_wall_us\":%" PRId64 "}\n",
+                      self->told, machines, self->doubled, self->garbled, self->missing, self->unheard,
+                      self->wish.since_us, self->wish.until_us);
+        return;
+    }
+    write_time(self->wish.since_us, since);
+    write_time(self->wish.until_us, until);
+    (void)fprintf(self->out, "%" PRIu64 " %s of %zu machines, %s to %s, from the stream at %s", self->told,
+                  self->wish.all ? "events" : "stops", machines, since, until, host);
+    if (self->doubled > 0U) {
+        (void)fprintf(self->out, "; %" PRIu64 " doubles left out", self->doubled);
+    }
+    if (self->garbled > 0U) {
+        (void)fprintf(self->out, "; %" PRIu64 " that cannot be read", self->garbled);
+    }
+    (void)fputs("\n", self->out);
+}

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+/// What happened to a fleet's machines in a span of time: the events of its stream, each once, with what is missing between them. Pure but
+/// for the stream that it writes to.
+///
+/// Doubles are known by their `id`: within a run of a bridge (`boot`) its number rises. A number left out is an event that was dropped from
+/// a full spool; a number of a stop left out is one that the bridge was not there for.
+///
+/// An event belongs to the span if the machine's clock (when it was heard; of one told late, when it happened) or the servers' (when it was
+/// stored) puts it there: so a wrong clock hides none. Where the two are more than a minute apart, both are told.
+#ifndef IW_MQTT_HISTORY_H
+#define IW_MQTT_HISTORY_H
+
+#include "command.h"
+#include "fleet.h"
+
+/// What is to be told. Wall clock in microseconds.
+typedef struct {
+    const char *machine; ///< NULL: of all.
+    int64_t since_us;
+    int64_t until_us;
+    bool all; ///< Every event, and where a bridge began anew; else stops only.
+    bool json;
+} history_wish_t;
+
+/// Runs of a bridge whose doubles are known.
+#define HISTORY_BOOTS 4U
+
+typedef struct {
+    char id[MQTT_ID_SIZE];
+    struct {
+        char boot[MQTT_BOOT_SIZE];
+        uint64_t number; ///< The newest of it.
+    } runs[HISTORY_BOOTS];
+    size_t run;       ///< The one that an event came from last.
+    uint64_t number;  ///< Of its newest event; 0: none yet.
+    int64_t stop;     ///< Of its newest stop; 0: none yet.
+    uint64_t missing; ///< Events that should lie before the next one that is told,
+    uint64_t unheard; ///< stops,
+    bool began;       ///< and whether its bridge began anew.
+    bool told;
+} history_machine_t;
+
+typedef struct {
+    history_wish_t wish;
+    FILE *out;
+    history_machine_t *machines; ///< FLEET_MACHINES of them, in the order in which they came.
+    size_t count;
+    uint64_t told;
+    uint64_t doubled;
+    uint64_t garbled; ///< Also those of machines beyond FLEET_MACHINES.
+    uint64_t missing;
+    uint64_t unheard;
+    iwn_work_t work;
+} history_t;
+
+/// False: no memory.
+bool history_open(history_t *self, const history_wish_t *wish, FILE *out);
+void history_close(history_t *self);
+
+/// One event of the stream, in the order in which they were stored. As `stream_take_t`, with the history as context: false when nobody
+/// reads any more.
+bool history_take(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us);
+
+/// The sum, and whose stream it was.
+void history_sum(const history_t *self, const char *host);
+
+/// A point in time as people write it: `2026-11-21T22:00`, with seconds or without, also a blank for the T, or a day alone, in local time;
+/// with Z in UTC. False: it is none.
+bool history_when(const char *text, int64_t *out_us);
+
+/// How long: `90min`, `12h`, `7d`. False: it is none, or not above 0.
+bool history_span(const char *text, int64_t *out_us);
+
+#endif

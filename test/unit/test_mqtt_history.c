@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT
+// What the stream has kept, told again: each event once, with what is missing, in the span that was asked for.
+#include "history.h"
+
+#include "unity.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define SECOND_US 1000000LL
+/// A wall clock: 2026-11-21 22:00:00 UTC.
+#define EVENING_US (1795298400LL * SECOND_US)
+
+static history_t history;
+static FILE *out;
+static char *told;
+static size_t told_size;
+
+static void begin(history_wish_t wish) {
+    out = open_memstream(&told, &told_size);
+    wish.since_us = (wish.since_us > 0) ? wish.since_us : EVENING_US;
+    wish.until_us = (wish.until_us > 0) ? wish.until_us : EVENING_US + 3600 * SECOND_US;
+    TEST_ASSERT_TRUE(history_open(&history, &wish, out));
+}
+
+void setUp(void) {
+    TEST_ASSERT_EQUAL_INT(0, setenv("TZ", "UTC0", 1));
+    tzset();
+}
+
+void tearDown(void) {
+    history_close(&history);
+    (void)fclose(out);
+    free(told);
+}
+
+static const char *text(void) {
+    (void)fflush(out);
+    return told;
+}
+
+/// A stop of w1: boot, number of the event, number of the stop, seconds after EVENING_US when it was heard and when it was stored.
+static void stop(const char *boot, int number, int stop_number, int heard_s, int stored_s) {
+    char payload[256];
+    (void)snprintf(payload, sizeof payload,
+                   "{\"id\":\"%s-%d\",\"boot\":\"%s\",\"heard_wall_us\":%lld,\"event\":\"stop\",\"number\":%d,"
+                   "\"cause\":\"wheel_lost\",\"sentence\":\"stop number %d\"}",
+                   boot, number, boot, (long long)(EVENING_US + heard_s * SECOND_US), stop_number, stop_number);
+    TEST_ASSERT_TRUE(
+        history_take(&history, "iwheel/w1/event/stop", payload, strlen(payload), EVENING_US + stored_s * SECOND_US));
+}
+
+static void other(const char *name, const char *payload) {
+    char topic[64];
+    (void)snprintf(topic, sizeof topic, "iwheel/w1/event/%s", name);
+    TEST_ASSERT_TRUE(history_take(&history, topic, payload, strlen(payload), EVENING_US + SECOND_US));
+}
+
+static void test_history_stop_is_told_in_one_line_with_its_time_and_sentence(void) {
+    begin((history_wish_t){0});
+    stop("a", 1, 1, 61, 62);
+    TEST_ASSERT_EQUAL_STRING("2026-11-21 22:01:01 w1           stop   stop number 1\n", text());
+    history_sum(&history, "n1");
+    TEST_ASSERT_NOT_NULL(
+        strstr(text(), "1 stops of 1 machines, 2026-11-21 22:00:00 to 2026-11-21 23:00:00, from the stream at n1\n"));
+}
+
+static void test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge(void) {
+    begin((history_wish_t){0});
+    stop("a", 1, 1, 1, 1);
+    stop("a", 2, 2, 2, 2);
+    stop("a", 1, 1, 1, 3);
+    stop("b", 3, 3, 3, 4);
+    stop("a", 2, 2, 2, 5);
+    stop("b", 3, 3, 3, 6);
+    stop("b", 4, 4, 4, 7);
+    TEST_ASSERT_EQUAL_UINT64(4, history.told);
+    TEST_ASSERT_EQUAL_UINT64(3, history.doubled);
+    TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.unheard);
+}
+
+static void test_history_gap_in_numbers_is_told_before_the_event_behind_it(void) {
+    begin((history_wish_t){0});
+    stop("a", 1, 1, 1, 1);
+    stop("a", 5, 2, 2, 2);
+    const char *note = strstr(text(), "-- 3 events before this one are not in the stream");
+    TEST_ASSERT_NOT_NULL(note);
+    TEST_ASSERT_NOT_NULL(strstr(note, "stop number 2"));
+    TEST_ASSERT_NULL(strstr(told, "stops before"));
+    TEST_ASSERT_EQUAL_UINT64(3, history.missing);
+}
+
+static void test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from_one(void) {
+    begin((history_wish_t){0});
+    stop("a", 1, 7, 1, 1);
+    stop("a", 2, 10, 2, 2);
+    TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 stops before this one are not in the stream"));
+    stop("a", 3, 1, 3, 3);
+    TEST_ASSERT_EQUAL_UINT64(2, history.unheard);
+    stop("a", 4, 3, 4, 4);
+    TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
+}
+
+static void test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_stop(void) {
+    begin((history_wish_t){0});
+    stop("a", 1, 1, 1, 1);
+    other("fault",
+          "{\"id\":\"a-4\",\"heard_wall_us\":1795298401000000,\"event\":\"fault\",\"cause\":\"bus\",\"present\":true}");
+    TEST_ASSERT_NULL(strstr(text(), "fault"));
+    stop("a", 5, 2, 2, 2);
+    TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 events before this one are not in the stream"));
+}
+
+static void test_history_all_tells_other_events_and_where_the_bridge_began_anew(void) {
+    begin((history_wish_t){.all = true});
+    stop("a", 1, 1, 1, 1);
+    other("fault",
+          "{\"id\":\"b-2\",\"heard_wall_us\":1795298401000000,\"event\":\"fault\",\"cause\":\"bus\",\"present\":true}");
+    TEST_ASSERT_NOT_NULL(strstr(text(), "w1           -- its bridge began anew: boot b\n"));
+    TEST_ASSERT_NOT_NULL(strstr(told, "w1           fault  cause bus, present true\n"));
+}
+
+static void test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing(void) {
+    begin((history_wish_t){0});
+    stop("a", 1, 1, -100, -90);
+    stop("a", 2, 2, 3599, 9000);
+    stop("a", 3, 3, -1000000, 10);
+    stop("a", 4, 4, 1000000, 20);
+    stop("a", 5, 5, 3600, 3601);
+    TEST_ASSERT_EQUAL_UINT64(3, history.told);
+    TEST_ASSERT_NOT_NULL(strstr(text(), "stop number 2 (stored 2026-11-22 00:30:00)\n"));
+    TEST_ASSERT_NOT_NULL(strstr(told, "stop number 3 (stored 2026-11-21 22:00:10)\n"));
+    TEST_ASSERT_NOT_NULL(
+        strstr(told, "stop number 4 (THE CLOCK OF THIS MACHINE IS WRONG: stored 2026-11-21 22:00:20)\n"));
+}
+
+static void test_history_missed_stop_is_told_at_its_own_time_and_as_told_late(void) {
+    begin((history_wish_t){0});
+    other("stop", "{\"id\":\"a-1\",\"heard_wall_us\":1795302000000001,\"event\":\"stop\",\"missed\":true,\"number\":4,"
+                  "\"cause\":\"wheel_lost\",\"wall_us\":1795298460000000,\"sentence\":\"gone\"}");
+    TEST_ASSERT_NOT_NULL(
+        strstr(text(), "2026-11-21 22:01:00 w1           stop   gone (told late: its bridge did not run)"));
+}
+
+static void test_history_json_nests_the_message_and_ends_with_the_sum(void) {
+    begin((history_wish_t){.json = true});
+    stop("a", 1, 1, 1, 2);
+    stop("b", 4, 4, 2, 3);
+    history_sum(&history, "n1");
+    TEST_ASSERT_NOT_NULL(strstr(text(),
+                                "{\"machine\":\"w1\",\"wall_us\":1795298401000000,\"stored_wall_us\":1795298402000000,"
+                                "\"missing_before\":0,\"stops_missing_before\":0,\"bridge_began_anew\":false,"
+                                "\"message\":{\"id\":\"a-1\""));
+    TEST_ASSERT_NOT_NULL(strstr(told, "\"missing_before\":2,\"stops_missing_before\":2,\"bridge_began_anew\":true"));
+    TEST_ASSERT_NOT_NULL(strstr(told, "{\"events\":2,\"machines\":1,\"doubled\":0,\"garbled\":0,\"missing\":2,"));
+}
+
+static void test_history_garbage_is_counted_and_moves_no_terminal(void) {
+    begin((history_wish_t){.all = true});
+    other("stop", "{");
+    other("stop", "[]");
+    other("stop", "");
+    TEST_ASSERT_TRUE(history_take(&history, "iwheel/w1/state", "{}", 2, EVENING_US));
+    TEST_ASSERT_TRUE(history_take(&history, "iwheel/w1/event/a b", "{}", 2, EVENING_US));
+    TEST_ASSERT_EQUAL_UINT64(5, history.garbled);
+    other("stop", "{\"id\":\"-\",\"sentence\":\"\\u001b[2J\"}");
+    other("fault", "{\"id\":7,\"cause\":\"\\u001b[2J\",\"present\":[\"\\u001b\"]}");
+    TEST_ASSERT_EQUAL_UINT64(2, history.told);
+    TEST_ASSERT_NULL(strchr(text(), '\033'));
+}
+
+static void test_history_ends_when_nobody_reads_it(void) {
+    begin((history_wish_t){0});
+    FILE *full = fopen("/dev/full", "w");
+    TEST_ASSERT_NOT_NULL(full);
+    (void)setvbuf(full, NULL, _IONBF, 0);
+    FILE *kept = history.out;
+    history.out = full;
+    static const char payload[] = "{\"id\":\"a-1\",\"heard_wall_us\":1795298401000000}";
+    TEST_ASSERT_FALSE(history_take(&history, "iwheel/w1/event/stop", payload, sizeof payload - 1U, EVENING_US));
+    history.out = kept;
+    (void)fclose(full);
+}
+
+static void test_times_are_read_as_people_write_them_and_nothing_else(void) {
+    int64_t us = 0;
+    begin((history_wish_t){0});
+    static const char *const good[] = {"2026-11-21T22:00:00", "2026-11-21 22:00", "2026-11-21T22:00",
+                                       "2026-11-21T22:00Z"};
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        TEST_ASSERT_TRUE_MESSAGE(history_when(good[i], &us), good[i]);
+        TEST_ASSERT_EQUAL_INT64_MESSAGE(EVENING_US, us, good[i]);
+    }
+    TEST_ASSERT_TRUE(history_when("2026-11-21", &us));
+    TEST_ASSERT_EQUAL_INT64(EVENING_US - 22 * 3600 * SECOND_US, us);
+    TEST_ASSERT_EQUAL_INT(0, setenv("TZ", "CET-1", 1));
+    tzset();
+    TEST_ASSERT_TRUE(history_when("2026-11-21T23:00", &us));
+    TEST_ASSERT_EQUAL_INT64(EVENING_US, us);
+    static const char *const bad[] = {"",           "22:00",      "2026-11-21T", "2026-11-21T22:00x",
+                                      "2026-02-30", "2026-13-01", "yesterday"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        TEST_ASSERT_FALSE_MESSAGE(history_when(bad[i], &us), bad[i]);
+    }
+    TEST_ASSERT_TRUE(history_span("12h", &us));
+    TEST_ASSERT_EQUAL_INT64(43200 * SECOND_US, us);
+    TEST_ASSERT_TRUE(history_span("7d", &us));
+    TEST_ASSERT_TRUE(history_span("90min", &us));
+    TEST_ASSERT_FALSE(history_span("12", &us));
+    TEST_ASSERT_FALSE(history_span("0h", &us));
+    TEST_ASSERT_FALSE(history_span("-1h", &us));
+    TEST_ASSERT_FALSE(history_span("h", &us));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_history_stop_is_told_in_one_line_with_its_time_and_sentence);
+    RUN_TEST(test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge);
+    RUN_TEST(test_history_gap_in_numbers_is_told_before_the_event_behind_it);
+    RUN_TEST(test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from_one);
+    RUN_TEST(test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_stop);
+    RUN_TEST(test_history_all_tells_other_events_and_where_the_bridge_began_anew);
+    RUN_TEST(test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing);
+    RUN_TEST(test_history_missed_stop_is_told_at_its_own_time_and_as_told_late);
+    RUN_TEST(test_history_json_nests_the_message_and_ends_with_the_sum);
+    RUN_TEST(test_history_garbage_is_counted_and_moves_no_terminal);
+    RUN_TEST(test_history_ends_when_nobody_reads_it);
+    RUN_TEST(test_times_are_read_as_people_write_them_and_nothing_else);
+    return UNITY_END();
+}
