@@ -7,7 +7,10 @@ usage: planted_faults.py
 Works in a temporary folder. The last line is "N passed, N failed, N skipped"; a gate whose tool is missing is skipped.
 """
 import argparse
+import atexit
 import contextlib
+import functools
+import hashlib
 import importlib.machinery
 import importlib.util
 import io
@@ -17,6 +20,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -195,6 +199,54 @@ def pages(folder, fault):
     return run(SCRIPTS / "pages.py", folder)
 
 
+def python_pins(folder, fault):
+    """The pinned PyPI packages with one change: file, what stands there, what stands there then; and a program beside them."""
+    (folder / "scripts").mkdir()
+    (folder / "tool").write_text('#!/bin/sh\n"$venv/bin/pip" install --require-hashes -r x\n')
+    (folder / "tool").chmod(0o755)
+    for name in ("python_packages", "requirements.in", "requirements.txt"):
+        shutil.copy(SCRIPTS / name, folder / "scripts")
+    name, old, new = fault
+    text = (folder / name).read_text()
+    assert re.search(old, text, re.M), f"{name} no longer has {old}"
+    (folder / name).write_text(re.sub(old, new, text, count=1, flags=re.M))
+    return run(sys.executable, folder / "scripts/python_packages", "--check")
+
+
+@functools.cache
+def an_environment():
+    folder = tempfile.mkdtemp()
+    atexit.register(shutil.rmtree, folder)
+    run(sys.executable, "-m", "venv", folder)
+    return Path(folder)
+
+
+def python_wheels(folder, lines):
+    """Two wheels, pinned; what is brought into an environment of its own is what has its checksum, and nothing else."""
+    sums = {}
+    for name in ("one", "two"):
+        with zipfile.ZipFile(folder / f"{name}-1-py3-none-any.whl", "w") as wheel:
+            wheel.writestr(f"{name}.py", "")
+            wheel.writestr(f"{name}-1.dist-info/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: 1\n")
+            wheel.writestr(f"{name}-1.dist-info/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+            wheel.writestr(f"{name}-1.dist-info/RECORD", "")
+        sums[name] = hashlib.sha256((folder / f"{name}-1-py3-none-any.whl").read_bytes()).hexdigest()
+    shutil.copy(SCRIPTS / "python_packages", folder)
+    (folder / "requirements.in").write_text("one\ntwo\n")
+    (folder / "requirements.txt").write_text(lines.format(**sums, other="0" * 64))
+    venv = an_environment()
+    for path in venv.glob("lib/python*/site-packages/*"):
+        if path.name.startswith(("one", "two")):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    status, said = run("env", "PIP_NO_INDEX=1", f"PIP_FIND_LINKS={folder}", sys.executable, folder / "python_packages", "--install", venv)
+    there = sorted(path.stem for path in venv.glob("lib/python*/site-packages/*.py") if path.stem in sums)
+    if lines.count("{") == 2 and "{other}" not in lines and there != (["one", "two"] if "two==1" in lines else ["one"]):
+        raise RuntimeError(f"installed: {there}\n{said}")
+    if "{other}" in lines and there:
+        raise RuntimeError(f"installed in spite of its checksum: {there}")
+    return status, said
+
+
 def dialect(folder, code):
     (folder / "app").mkdir()
     (folder / "app/planted.c").write_text(code)
@@ -215,12 +267,25 @@ def counting(folder, case):
     return status or int(said.split()[-2]), said
 
 
+def of_mutation(name):
+    sys.path[:0] = [str(ROOT / "test/mutation"), str(ROOT / "test/planted")]
+    loader = importlib.machinery.SourceFileLoader(f"mutation_{name}", str(ROOT / "test/mutation" / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
+
+
+def around(_, found):
+    """The gate's word on bugs by meaning: (the word for one of them, those that are known, whether it is still there)"""
+    word, known, there = found
+    record = argparse.Namespace(files=["a.c"], mutants={"a.c | f | x; | y;": None} if there else {})
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        return of_mutation("around").verdict(record, known, {"a.c | f | x; | y;": word} if there else {}), said.getvalue()
+
+
 def mutation(_, kind):
     """The gate's word on the ledger's mutants when one of them is judged anew like that."""
-    sys.path[:0] = [str(ROOT / "test/mutation"), str(ROOT / "test/planted")]
-    loader = importlib.machinery.SourceFileLoader("mutation_run", str(ROOT / "test/mutation/run"))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("mutation_run", loader))
-    loader.exec_module(module)
+    module = of_mutation("run")
     record = module.Record({}, ["ledger.c"], {})
     campaign = module.Campaign(None, record, {}, argparse.Namespace(jobs=1, update=False))
     with contextlib.redirect_stdout(io.StringIO()) as said:
@@ -344,11 +409,24 @@ CASES = [
     (pages, "python3", "a list without its pattern", ("docs/how-to-add.md", "pattern", "patern"), True),
     (pages, "python3", "an entry that the index lacks", ("test/more", "", "x\n"), True),
     (pages, "python3", "an indexed entry that is not there", ("scripts/README.md", "one.py", "two.py"), True),
+    (python_pins, "python3", "clean", ("tool", "sh", "sh"), False),
+    (python_pins, "python3", "a pin without a checksum", ("scripts/requirements.txt", r"^(lizard==\S+) \\\n.*\n", r"\1\n"), True),
+    (python_pins, "python3", "a wish that is not pinned", ("scripts/requirements.in", r"^lizard==.*$", "lizard==9.9"), True),
+    (python_pins, "python3", "a pin that nobody needs", ("scripts/requirements.in", r"^lizard==.*$", ""), True),
+    (python_pins, "python3", "a program that calls pip without checksums", ("tool", "--require-hashes ", ""), True),
+    (python_wheels, "python3", "clean", "one==1 --hash=sha256:{one}\ntwo==1 --hash=sha256:{two}\n", False),
+    (python_wheels, "python3", "a wheel with another checksum", "one==1 --hash=sha256:{one}\ntwo==1 --hash=sha256:{other}\n", True),
+    (python_wheels, "python3", "a wheel that does not fit this Python", "one==1 --hash=sha256:{one}\ntwo==2 --hash=sha256:{two}\n", True),
     (sizes, "python3", "clean", {"permit": [2039], "core": [9100]}, False),
     (sizes, "python3", "3 % larger", {"permit": [2060], "core": [9060]}, True),
     (sizes, "python3", "a module more", {"permit": [2000], "core": [9000], "new": [1]}, True),
     (mutation, "clang", "seen", "killed", False),
     (mutation, "clang", "lives", "lives", True),
+    (around, "clang", "seen", ("daemon_motion", {}, True), False),
+    (around, "clang", "lives, and its reason is known", ("!", {"a.c | f | x; | y;": "a reason"}, True), False),
+    (around, "clang", "lives", ("!", {}, True), True),
+    (around, "clang", "is known to live, and is seen", ("daemon_motion", {"a.c | f | x; | y;": "a reason"}, True), True),
+    (around, "clang", "is known to live, and is no more", ("", {"a.c | f | x; | y;": "a reason"}, False), True),
     (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),
     (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
     (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Is docs/safety-case.md true? No name that does not exist, no rule without code and test, no planted bug without a rule.
+And the threat model of SECURITY.md: each interface has tests, and they exist.
 
 usage: safety_case.py [--update]
 
@@ -12,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs/safety-case.md"
+PAGE, THREATS = ROOT / "docs/safety-case.md", ROOT / "SECURITY.md"
 sys.path.insert(0, str(ROOT / "test/planted"))
 FAULTS = {
     1: "client killed", 2: "client frozen, its socket open", 3: "client sends and never reads", 4: "two clients command",
@@ -26,6 +27,7 @@ FAULTS = {
     23: "force extremes, wrong unit, loaded or late start", 24: "wall clock set, process stopped, CPU starved", 25: "gateway killed, aborted, told to end",
     27: "disk full or read-only, stderr blocked", 28: "socket file exists, is a link, has wrong rights", 29: "bad configuration", 30: "two gateways on one interface",
 }
+INTERFACES = 11
 # Tested elsewhere under other names.
 OTHER_TESTS = {21: ("sim.directed",), 26: ("hang",)}
 FAULTS[26] = "loop alive but stuck"
@@ -36,8 +38,9 @@ def defined_tests():
     names = set()
     for path in (ROOT / "test").rglob("*.c"):
         names.update(re.findall(r"^static void (test_\w+)\(void\)", path.read_text(), re.M))
-    for path in (ROOT / "test").rglob("*.py"):
-        names.update(re.findall(r"^def (\w+)\(", path.read_text(), re.M))
+    for path in [*(ROOT / "test").rglob("*.py"), *(ROOT / "test").glob("*/run"), ROOT / "scripts/planted_faults.py"]:
+        names.update(re.findall(r"^ *def (\w+)\(|^(\w+)\(\) \{$", path.read_text(), re.M))
+    names = {name for found in names for name in ([found] if isinstance(found, str) else found)}
     return names
 
 
@@ -113,6 +116,18 @@ def findings(text, tests, bugs, rules):
                     for name in names if "." not in name and name not in tests)
 
 
+def threat_findings(text, tests):
+    """Of SECURITY.md: each interface with all that is asked of it, and tests that exist."""
+    rows = re.findall(r"^\| ([^|]+) \|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", text.partition("## Threats,")[2].partition("\n## ")[0], re.M)[1:]
+    for interface, who, _, stops, remains, tested in rows:
+        named = re.findall(r"`(\w+)`", tested)
+        yield from (f"SECURITY.md, {interface}: there is no test {name}" for name in named if name not in tests)
+        if not named or not all(cell.strip() for cell in (who, stops, remains)):
+            yield f"SECURITY.md, {interface}: an empty cell"
+    if len(rows) < INTERFACES:
+        yield f"SECURITY.md: {len(rows)} of {INTERFACES} interfaces have a row"
+
+
 def catalogue(tests):
     rows = ["| fault | what happens | tests |", "|---|---|---|"]
     for number in range(1, 31):
@@ -143,7 +158,10 @@ def self_test(text, tests, bugs, rules):
         re.sub(r"^- tests: .*\n", "", text, count=1, flags=re.M),
         re.sub(r"^\| 18 \|.*\n", "", text, flags=re.M),
     ]
-    return sum(fault == text or not list(findings(fault, tests, bugs, rules)) for fault in faults), len(faults)
+    missed = sum(fault == text or not list(findings(fault, tests, bugs, rules)) for fault in faults)
+    page = THREATS.read_text()
+    threats = [page.replace("`row20_odd_frames`", "`row20_even_frames`"), re.sub(r"^\| MQTT .*\n", "", page, flags=re.M), re.sub(r"(?m)^(\| CAN bus.*\|)[^|]*\|$", r"\1 |", page)]
+    return missed + sum(fault == page or not list(threat_findings(fault, tests)) for fault in threats), len(faults) + len(threats)
 
 
 def main(arguments):
@@ -156,7 +174,7 @@ def main(arguments):
     if "--update" in arguments:
         text = update(text, tests, bugs)
         PAGE.write_text(text)
-    found = list(findings(text, tests, bugs, rules))
+    found = [*findings(text, tests, bugs, rules), *threat_findings(THREATS.read_text(), tests)]
     missed, planted = self_test(text, tests, bugs, rules)
     print(*(f"failed: {finding}" for finding in found), sep="\n", end="\n" if found else "")
     if missed:

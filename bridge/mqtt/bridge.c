@@ -167,6 +167,11 @@ static void read_condition(const iwc_message_t *state, char *out, size_t size) {
                    iwc_truth(state, "left.heard").value == 1, iwc_truth(state, "right.heard").value == 1);
 }
 
+/// How often the gateway is asked to tell it.
+static uint32_t rate_hz(uint32_t every_ms) {
+    return (every_ms < 1000U) ? 1000U / every_ms : 1U;
+}
+
 static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, bool spare) {
     // By MQTT 5: what is older than the next one is of no use.
     const mqtt_way_t way = {.spare = spare, .labels = {.expiry_s = self->settings->state.every_ms / 1000U + 1U}};
@@ -182,9 +187,11 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     memcpy(self->state, state->text, state->length);
     self->state_length = state->length;
     read_condition(state, condition, sizeof condition);
-    // A tenth of the period early: the gateway's and ours must not beat.
+    // Half a line early: the gateway's period and ours must not beat, however unevenly its lines come.
+    const uint32_t every_ms = self->settings->state.every_ms;
+    const uint32_t line_ms = 1000U / rate_hz(every_ms);
     if (strcmp(condition, self->condition) != 0 ||
-        self->now_us - self->state_us >= (uint64_t)self->settings->state.every_ms * 900U) {
+        self->now_us - self->state_us >= ((uint64_t)every_ms * 2U - line_ms) * 500U) {
         tell_state(self, state, true);
     }
     if (first) {
@@ -297,8 +304,7 @@ int mqtt_bridge_check(const mqtt_settings_t *settings) {
 int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
     const bridge_link_terms_t terms = {.program = "iwheel-mqtt",
                                        .socket = settings->gateway.socket,
-                                       .rate_hz =
-                                           (settings->state.every_ms < 1000U) ? 1000U / settings->state.every_ms : 1U,
+                                       .rate_hz = rate_hz(settings->state.every_ms),
                                        .drives = settings->drive.enabled};
     const bridge_listener_t gateway = {self, gateway_here, gateway_gone, take_event};
     *self = (mqtt_bridge_t){.settings = settings, .topics = {self->commands, NULL}};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Any bytes as a recording: each line is a frame that is written and read back alike, or empty, or bad with a reason.
-#include "fuzz.h"
+#include "fuzz_sequence.h"
 
 #include "candump.h"
 
@@ -41,6 +41,10 @@ static void judge_line(const char *line, size_t length) {
         break;
     }
     free(copy);
+}
+
+static size_t fuzz_unit(const uint8_t *data, size_t size) {
+    return fuzz_until(data, size, '\n');
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

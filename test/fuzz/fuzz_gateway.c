@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A gateway in a world that does whatever the bytes say: times, frames, echoes that lie, bus, button, requests. Whatever
 // happens, only setpoints within the limits leave, and none but zero after a cut until arm and a drive were accepted.
-#include "fuzz.h"
+#include "fuzz_sequence.h"
 
 #include "../support/message.h"
 #include "iwheel/gateway.h"
@@ -250,6 +250,17 @@ static void act(world_t *world, fuzz_bytes_t *bytes) {
         ask(world, bytes, value);
         break;
     }
+}
+
+/// What `act` reads; the first three bytes are those of `begin`, and never a unit that harms.
+static size_t fuzz_unit(const uint8_t *data, size_t size) {
+    size_t length = 2;
+    if (data[0] % 12U == 6U) {
+        length += 2U + IW_CAN_DATA_MAX;
+    } else if (data[0] % 12U > 9U && size > 1U && data[1] / 2U % 7U < 2U) {
+        length += 1U + 3U * IW_SIDES;
+    }
+    return (length < size) ? length : size;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

@@ -47,8 +47,33 @@ def by_hand():
         "mqtt": [b"stop\n{\"from\":\"far\",\"seq\":1,\"boot\":\"0123456789abcdef\",\"t_us\":1}", b"estop\n{\"from\":\"a/b\"}", b"iwspool1" + bytes(40),
                  b'{"boot":"a","t_us":1,"seq":1,"ok":true,"recordings":[{"name":"stop-000001-x","cause":"x","wall_us":1,"log_bytes":9}]}',
                  b'{"id":"a-1","heard_wall_us":5,"sentence":"x\\u001b[2J","number":4,"missed":true,"wall_us":7,"present":false,"cause":"y"}'],
+        "memory": [checked(b'{"format":"iwheel-ledger"}\n')],
+        "session": [b"".join(b"%s%s\n+5\n" % (b"q" if b'"drive"' in line or b'"twist"' in line else b"", line) for line in (text.encode() for text in said) if b'"cmd"' in line)],
         "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
+
+
+def checked(text):
+    """As the file of what is known of the wheels is written: with its checksum."""
+    return text + b"%08x\n" % zlib.crc32(text)
+
+
+def memory():
+    """What is known of the wheels: nothing, something, and with an offset."""
+    items = (b"", b'"setpoint_type":{"state":"confirmed","evidence":"bus","figure":850,"value":"255","found":"","since_wall_us":0}',
+             b'"force_unit_left":{"state":"confirmed","evidence":"bus","figure":11500,"value":"cN","found":"","since_wall_us":1760000000000000}')
+    offset = b'"left":{"from":"wheel","unit":"cN","offset_mN":1200,"drift_mN":0,"deviation_mN":0,"samples":0,"wall_us":1760000000000000}'
+    texts = [(item, b"") for item in items] + [(b",".join(items[1:]), offset)]
+    return [checked(b'{"format":"iwheel-ledger","version":1,"bus":"can0","items":{%s},"offsets":{%s}}\n' % text) for text in texts]
+
+
+def session():
+    """Drives that are stopped in each way, for fuzz_session.c."""
+    drive = b'q{"cmd":"drive","id":1,"left_mm_s":200,"right_mm_s":-100}\n+40\n' * 4
+    begin = b'+700\n{"cmd":"arm"}\n+60\n' + drive
+    ends = (b'{"cmd":"stop","id":2}\n', b"^\n+900\n_\n+600\n" + b'q{"cmd":"reset","id":3}\n' + begin, b'{"cmd":"estop","reason":"x"}\n+900\nq{"cmd":"reset"}\n', b"+900\n",
+            b'q{"cmd":"twist","v_mm_s":100,"yaw_mrad_s":300}\n+40\n{"cmd":"watch","topics":["state","force"],"rate_hz":10}\n+300\n')
+    return [begin + end for end in ends]
 
 
 def frames():
@@ -171,4 +196,4 @@ def gateway():
 
 def recorded():
     """{target: [bytes]}: a target that does not take them has lost what it was for."""
-    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client(), "mqtt": mqtt(), "web": web(), "line": line()}
+    return {"codec": codec(), "gateway": gateway(), "request": request(), "config": config(), "candump": candump(), "client": client(), "mqtt": mqtt(), "web": web(), "line": line(), "memory": memory(), "session": session()}

@@ -366,6 +366,11 @@ def test_driving_by_the_watch_socket_ends_with_the_missing_right(rig):
 # ---- nothing lost ---------------------------------------------------------------------------------------------------
 
 
+def settle(far):
+    """Until nothing waits in the spool: what was told last has arrived, too."""
+    until(lambda: far.messages("info")[-1]["events"]["waiting"] == 0, 20, "the spool is empty")
+
+
 def test_broker_killed_and_back_each_stop_once_in_order(rig):
     line = rig.cut_here()
     rig.start()
@@ -378,7 +383,8 @@ def test_broker_killed_and_back_each_stop_once_in_order(rig):
     until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}")
     faults = [(event["cause"], event["present"]) for event in far.events("fault") if event["cause"] == "estop_line"]
     assert faults == [("estop_line", True), ("estop_line", False)] * last, faults
-    until(lambda: far.messages("info")[-1]["events"]["waiting"] == 0, 5, "the spool is empty")
+    settle(far)
+    far.tell("broker killed, back later")
 
 
 def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
@@ -393,6 +399,8 @@ def test_network_cut_at_any_byte_each_stop_once_in_order(rig):
         until(lambda: line.left <= 0, 40, "cut again")
     line.left = None
     until(lambda: numbers(far) == list(range(1, last + 1)), 40, "all six")
+    settle(far)
+    far.tell("connection cut behind a byte, also in the middle of a confirmation", 6)
 
 
 @full
@@ -406,6 +414,8 @@ def test_network_that_swallows_everything_is_noticed_and_each_stop_told(rig):
     until(lambda: "no broker" in rig.bridge.text(), 20, "noticed")
     line.frozen = False
     until(lambda: numbers(far) == list(range(1, last + 1)), 40, "all three")
+    settle(far)
+    far.tell("network that swallows everything, noticed after 1.5 times `keepalive_s` (`--full`)")
 
 
 def test_bridge_killed_while_it_keeps_events_each_stop_once_in_order(rig):
@@ -433,6 +443,7 @@ def test_bridge_killed_while_it_keeps_events_each_stop_once_in_order(rig):
     rig.online(far)
     time.sleep(0.5)
     assert numbers(far) == list(range(1, unseen + 1)), "a new start tells no stop again"
+    far.tell("bridge killed while events wait", 4)
 
 
 def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
@@ -451,6 +462,8 @@ def test_disk_full_events_wait_in_memory_and_it_is_said(rig):
     rig.bring_broker_back(line, far)
     until(lambda: numbers(far) == list(range(1, last + 1)), 20, f"all {last}")
     until(lambda: "on its disk again" in rig.bridge.text(), what="the disk is used again")
+    settle(far)
+    far.tell("disk full at 2 kB: events kept in memory, `on_disk` and the log say so")
 
 
 def test_clock_that_steps_changes_neither_ages_nor_order(rig):
@@ -467,6 +480,8 @@ def test_clock_that_steps_changes_neither_ages_nor_order(rig):
     assert far.ask("stop")["ok"] and far.ask("why")["ok"]
     make_stops(rig, 2)
     until(lambda: numbers(far) == [1, 2], what="both")
+    settle(far)
+    far.tell("wall clock that jumps by two years and back at each look")
     clocks = [event["heard_wall_us"] for event in far.events()]
     assert max(clocks) - min(clocks) > 86400_000_000, "the clock did step"
 
@@ -490,7 +505,8 @@ def test_campaign_of_kills_each_stop_once_in_order(rig):
             rig.bridge.wait(3)
             rig.start_bridge()
     until(lambda: numbers(far) == list(range(1, last + 1)), 60, f"all {last}")
-    print(f"        {last} stops, {len(far.events())} events, {far.doubled()} doubled", flush=True)
+    settle(far)
+    far.tell("bridge and broker killed in turn (`--full`)", 50)
 
 
 # ---- who is let in --------------------------------------------------------------------------------------------------

@@ -26,12 +26,21 @@ from trials import Skip, until  # noqa: E402
 # For any machine, however busy; as in the demonstration.
 CONFIG = {"limits": {"wheel_silent_ms": 200, "echo_ms": 200}, "drive": {"lease_ms": 500, "max_speed_mm_s": 500}}
 ID = "w1"
+FIGURES = []  # Rows of the table in docs/mqtt.md: (fault, how often, events sent, arrived, doubled, seconds until the last arrived).
 
 
 def free_port():
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return one.getsockname()[1]
+
+
+def put_table(page, maker, lines):
+    """Into the page, between the marks that name who makes it."""
+    text = page.read_text(encoding="utf-8")
+    begin, end = f"<!-- figures: {maker} -->\n", "<!-- end of figures -->"
+    before, rest = text.split(begin, 1)
+    page.write_text(before + begin + "\n" + "\n".join(lines) + "\n\n" + end + rest.split(end, 1)[1], encoding="utf-8")
 
 
 class Far:
@@ -66,6 +75,16 @@ class Far:
     def messages(self, what, machine=ID):
         return [json.loads(text) for text in self.texts(what, machine)]
 
+    def tell(self, fault, often=1, machine=ID):
+        """Each event of the bridge's has arrived, in order; and the row of it. What was sent, its numbers say."""
+        with self.lock:
+            told = [(json.loads(payload), at_us) for topic, payload, _, at_us in self.all if topic.startswith(f"iwheel/{machine}/event/")]
+        numbers = list(dict.fromkeys(int(event["id"].rsplit("-", 1)[1]) for event, _ in told))
+        assert numbers == list(range(numbers[0], numbers[-1] + 1)), f"a gap, or out of order: {numbers}"
+        latest_s = max(at_us - event["t_us"] for event, at_us in told) / 1e6
+        FIGURES.append((fault, often, numbers[-1] - numbers[0] + 1, len(numbers), len(told) - len(numbers), latest_s))
+        print("figures:", " | ".join(str(one) for one in FIGURES[-1][:-1]), f"| {latest_s:.1f} s", flush=True)
+
     def events(self, name=None, machine=ID):
         """(topic's name, event) in the order in which they came, doubles by id left out."""
         seen, found = set(), []
@@ -78,11 +97,6 @@ class Far:
                     found.append(event)
                 seen.add(event["id"])
         return found
-
-    def doubled(self, machine=ID):
-        with self.lock:
-            ids = [json.loads(payload)["id"] for topic, payload, _, _ in self.all if topic.startswith(f"iwheel/{machine}/event/")]
-        return len(ids) - len(set(ids))
 
     def send(self, verb, machine=ID, retain=False, **fields):
         """Publishes exactly these fields."""

@@ -48,10 +48,11 @@ def place(location):
 class Finder:
     """Walks the functions of one file."""
 
-    def __init__(self, path):
+    def __init__(self, path, flags=("-std=c99", f"-I{PUBLIC.parent}", f"-I{CORE}"), name=None):
         self.path, self.source, self.found = Path(path), Path(path).read_text(), []
+        self.name = name or self.path.name
         plain = re.sub(rf"(?<!#define )\b({'|'.join(HINTS)})(?=\()", lambda match: " " * len(match[1]), self.source)
-        tree = subprocess.run(["clang", "-Xclang", "-ast-dump=json", "-fsyntax-only", "-std=c99", "-w", f"-I{PUBLIC.parent}", f"-I{CORE}", "-xc", "-"],
+        tree = subprocess.run(["clang", "-Xclang", "-ast-dump=json", "-fsyntax-only", "-w", *flags, "-xc", "-"],
                               input=plain, capture_output=True, text=True, check=True).stdout
         names = set(re.findall(r"^[\w \*]*?\b(\w+)\([^;{}]*\) \{$", self.source, re.M))
         self.function = None
@@ -59,14 +60,14 @@ class Finder:
             if node["kind"] == "FunctionDecl" and node["name"] in names:
                 body = [child for child in node.get("inner", ()) if child["kind"] == "CompoundStmt"]
                 if body:
-                    self.function = node["name"]
+                    self.function, self.declaration = node["name"], node
                     self.visit(body[0], None)
 
     def add(self, kind, span, text):
         if span and re.search(rf"\b({'|'.join(HINTS)})$", self.source[:span[0]]):
             text = f"({text})"
         if span and self.source[span[0]:span[1]] != text:
-            self.found.append(Mutant(self.path.name, self.function, kind, *span, text))
+            self.found.append(Mutant(self.name, self.function, kind, *span, text))
 
     def span(self, node):
         """Where it stands; None if it has to do with a macro that takes arguments."""
@@ -186,6 +187,6 @@ def files():
     return sorted(CORE.glob("*.c")) + [path for path in headers if functions(path)]
 
 
-def mutants(path):
+def mutants(path, finder=Finder):
     """Each change once."""
-    return list({(mutant.begin, mutant.end, mutant.text): mutant for mutant in reversed(Finder(path).found)}.values())[::-1]
+    return list({(mutant.begin, mutant.end, mutant.text): mutant for mutant in reversed(finder(path).found)}.values())[::-1]

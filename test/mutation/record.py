@@ -18,12 +18,14 @@ HERE = Path(__file__).resolve().parent
 CAMPAIGN, EQUIVALENT, PAGE = HERE / "campaign.json", HERE / "equivalent.txt", ROOT / "docs/mutation.md"
 SIGNS = {SAME: "=", LIVES: "!", INVALID: "-"}
 UNKNOWN = "?"
+# That part of the page is written by `around`.
+AROUND_TITLE = "\n## Around the core\n"
 MEANS = [means for means, _, _ in WHOLE_CORE]
 
 
-def equivalents():
-    """{key: reason}"""
-    lines = [line for line in EQUIVALENT.read_text().splitlines() if line.strip() and not line.startswith("#")]
+def read_reasons(path):
+    """{key: reason} of a list of what no test can see."""
+    lines = [line for line in path.read_text().splitlines() if line.strip() and not line.startswith("#")]
     return {key.strip(): reason.strip() for key, _, reason in (line.rpartition(" | ") for line in lines)}
 
 
@@ -196,4 +198,5 @@ def write_page(record, named):
         lines += [f"- {reason}", *(f"  - `{' | '.join(key.split(' | ')[:2])}`: `{key.split(' | ', 3)[-1]}`" for key in sorted(keys))]
     if alive:
         lines += ["", "## Alive", "", *(f"- `{key}`" for key in sorted(alive))]
-    PAGE.write_text("\n".join(lines) + "\n")
+    _, title, around = PAGE.read_text().partition(AROUND_TITLE)
+    PAGE.write_text("\n".join(lines) + "\n" + title + around)

@@ -39,7 +39,7 @@ class Parts:
             raise RuntimeError(f"{self.build} has {len(found)} programs {program}: mend test/planted/parts_bugs.py, or build it")
         return found[0].parent.parent.parent, shlex.split(found[0].read_text())
 
-    def compile(self, source, changed, inside):
+    def compile(self, source, changed, inside, flags=("-O1",)):
         """(the object it replaces, the changed one, None or what the compiler said). `inside`: what the program is linked from by name."""
         commands = self.commands.get(source)
         if not commands:
@@ -50,22 +50,22 @@ class Parts:
         if out.exists():
             return chosen, out, None
         kept = [word for word in words if not word.startswith("-W") and word not in (str(source), output_of(words), "-o", "-c", "-g", "-O2")]
-        command = [*kept, "-O1", "-w", "-iquote", str(source.parent), "-c", str(changed), "-o", str(out)]
+        command = [*kept, *flags, "-w", "-iquote", str(source.parent), "-c", str(changed), "-o", str(out)]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         return chosen, out, None if done.returncode == 0 else done.stderr
 
-    def link(self, program, source, changed, out):
+    def link(self, program, source, changed, out, flags=("-O1",), more=()):
         """None, or why that program cannot be had with the changed file."""
         folder, words = self.link_of(program)
         inside = {(folder / word) for word in words if word.endswith(".o")}
-        chosen, changed_object, said = self.compile(source, changed, inside)
+        chosen, changed_object, said = self.compile(source, changed, inside, flags)
         if said:
             return f"does not compile: {said}"
         words = [str(changed_object) if folder / word == chosen else word for word in words]
         words[words.index("-o") + 1] = str(out)
         if chosen not in inside:
             words.insert(1, str(changed_object))
-        done = subprocess.run(words, cwd=folder, capture_output=True, text=True)
+        done = subprocess.run([*words, *more], cwd=folder, capture_output=True, text=True)
         return None if done.returncode == 0 else f"does not link: {done.stderr}"
 
     def change(self, name, file, text):

@@ -2,31 +2,23 @@
 // Hours of the bridge in virtual time: its own code and the gateway's own loop in one process, in the daemon's rig. ROS is another participant
 // of the DDS domain. Nothing may grow: heap, descriptors, DDS entities. See --help.
 //
-// The linker leads the bridge's and its client's clock_gettime, ppoll and connect here (--wrap). DDS itself lives in real time; between two
+// Virtual is what hours_rig.h says. DDS itself lives in real time; between two
 // participants of one process it delivers within the call, so nothing waits for it. What participants that come and go cost, over sockets, is
 // seen in real time (rides.py, publishers_come_and_go): DDS lets go of them after seconds that cannot be hurried.
 #include "bridge.h"
-#include "daemon_rig.h"
-#include "iwheel_linux/clock.h"
+#include "hours_rig.h"
 #include "ros_parts.h"
 #include "ros_types.h"
 
 #include "unity.h"
 
-#include <dirent.h>
-#include <errno.h>
 #include <malloc.h>
 #include <math.h>
-#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <time.h>
 #include <unistd.h>
 
 #define PASS_MS   5U
-#define WALL_S    1700000000
 #define MINUTE_MS 60000U
 /// What may come and go within an hour: buffers of DDS, samples on their way.
 #define HEAP_SLACK 16384
@@ -61,73 +53,12 @@ typedef struct {
 static bridge_t bridge;
 static peer_t peer;
 static tally_t tally;
-static bool in_daemon;
-static bool hangs; ///< The gateway stands still, as by SIGSTOP.
 static double hours = 0.2;
 static uint32_t dice = 1;
 
 void setUp(void) {}
 
 void tearDown(void) {}
-
-// ---- what the linker leads here -----------------------------------------------------------------------------------
-
-int __real_clock_gettime(clockid_t clock, struct timespec *out_time);
-int __wrap_clock_gettime(clockid_t clock, struct timespec *out_time);
-int __real_ppoll(struct pollfd *entries, nfds_t count, const struct timespec *timeout, const sigset_t *mask);
-int __wrap_ppoll(struct pollfd *entries, nfds_t count, const struct timespec *timeout, const sigset_t *mask);
-int __real_connect(int fd, const struct sockaddr *address, socklen_t size);
-int __wrap_connect(int fd, const struct sockaddr *address, socklen_t size);
-
-int __wrap_clock_gettime(clockid_t clock, struct timespec *out_time) {
-    const iw_time_us_t now_us = (clock == CLOCK_REALTIME) ? (iw_time_us_t)iw_clock_wall_us() : daemon_rig.now_us;
-    *out_time = (struct timespec){.tv_sec = (time_t)(now_us / 1000000U), .tv_nsec = (long)(now_us % 1000000U * 1000U)};
-    out_time->tv_sec += (clock == CLOCK_REALTIME) ? WALL_S : 0;
-    return 0;
-}
-
-/// The gateway's world goes on, if there is one that does.
-static void run_gateway(unsigned for_ms) {
-    if (daemon_rig.daemon == NULL || hangs) {
-        daemon_rig.now_us += MS(for_ms);
-        return;
-    }
-    in_daemon = true;
-    daemon_rig_run(for_ms);
-    in_daemon = false;
-}
-
-int __wrap_ppoll(struct pollfd *entries, nfds_t count, const struct timespec *timeout, const sigset_t *mask) {
-    static const struct timespec at_once = {0, 0};
-    if (in_daemon) {
-        return __real_ppoll(entries, count, timeout, mask);
-    }
-    TEST_ASSERT_NOT_NULL_MESSAGE(timeout, "the bridge would wait for ever");
-    const iw_time_us_t end_us =
-        daemon_rig.now_us + (iw_time_us_t)timeout->tv_sec * 1000000U + (iw_time_us_t)timeout->tv_nsec / 1000U;
-    int ready = __real_ppoll(entries, count, &at_once, mask);
-    while (ready == 0 && daemon_rig.now_us < end_us) {
-        run_gateway(1);
-        ready = __real_ppoll(entries, count, &at_once, mask);
-    }
-    return ready;
-}
-
-/// By whatever name it is called, it is the rig's gateway.
-int __wrap_connect(int fd, const struct sockaddr *address, socklen_t size) {
-    struct sockaddr_un there = {.sun_family = AF_UNIX};
-    socklen_t length = sizeof there;
-    if (address->sa_family != AF_UNIX || ((const struct sockaddr_un *)(const void *)address)->sun_path[0] != '/') {
-        return __real_connect(fd, address, size);
-    }
-    if (daemon_rig.daemon == NULL) {
-        errno = ECONNREFUSED;
-        return -1;
-    }
-    const int listener = daemon_rig.daemon->clients.listener[GW_DRIVE].fd;
-    TEST_ASSERT_EQUAL_INT(0, getsockname(listener, (struct sockaddr *)&there, &length));
-    return __real_connect(fd, (const struct sockaddr *)&there, length);
-}
 
 // ---- the other participant ------------------------------------------------------------------------------------------
 
@@ -160,9 +91,7 @@ static dds_entity_t reader_of(const char *name, const dds_topic_descriptor_t *ty
 }
 
 static int64_t stamp_ns(int64_t late_ms) {
-    struct timespec now;
-    (void)__wrap_clock_gettime(CLOCK_REALTIME, &now);
-    return ((int64_t)now.tv_sec * 1000 - late_ms) * 1000000 + now.tv_nsec;
+    return hours_wall_ns() - late_ms * 1000000;
 }
 
 static void command(double v, double yaw, int64_t late_ms) {
@@ -193,7 +122,7 @@ static void pass(unsigned for_ms) {
         const iw_time_us_t until_us = daemon_rig.now_us + MS(PASS_MS);
         bridge_step(&bridge); // May have waited.
         if (daemon_rig.now_us < until_us) {
-            run_gateway((unsigned)((until_us - daemon_rig.now_us + 999U) / IW_US_PER_MS));
+            hours_run_gateway((unsigned)((until_us - daemon_rig.now_us + 999U) / IW_US_PER_MS));
         }
         peer.odoms += take_all(peer.odom);
         peer.diagnoses += take_all(peer.diagnostics);
@@ -267,9 +196,9 @@ static void crash_gateway(void) {
 }
 
 static void hang_gateway(void) {
-    hangs = true;
+    hours_gateway_hangs = true;
     stream(0.3, 0.0, 50, 500U + roll(2000));
-    hangs = false;
+    hours_gateway_hangs = false;
     tally.hangs++;
     pass(5000);
     reset();
@@ -345,12 +274,7 @@ static unsigned count_entities(dds_entity_t entity) {
 }
 
 static size_of_all_t measure(void) {
-    size_of_all_t size = {.heap = mallinfo2().uordblks};
-    DIR *folder = opendir("/proc/self/fd");
-    while (folder != NULL && readdir(folder) != NULL) {
-        size.descriptors++;
-    }
-    (void)closedir(folder);
+    size_of_all_t size = {.heap = mallinfo2().uordblks, .descriptors = hours_descriptors()};
     size.entities = count_entities(bridge.ros->participant) + count_entities(peer.participant);
     return size;
 }

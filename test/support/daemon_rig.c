@@ -5,6 +5,7 @@
 #include "daemon.h"
 
 #include "iwheel_linux/clock.h"
+#include "iwheel_northbound/json_in.h"
 
 #include "unity.h"
 
@@ -131,9 +132,8 @@ int iw_bus_fd(const iw_backend_store_t *self) {
 }
 
 const iw_bus_link_t *iw_bus_link(const iw_backend_store_t *self) {
-    static const iw_bus_link_t link = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true};
     (void)self;
-    return &link;
+    return &daemon_rig.link;
 }
 
 static int rig_estop_fd(const void *self) {
@@ -294,7 +294,10 @@ void daemon_rig_crash(void) {
 void daemon_rig_begin(void) {
     daemon_rig_t *rig = &daemon_rig;
     sim_pair_config_t pair;
-    *rig = (daemon_rig_t){.now_us = START_US, .bus = IW_BUS_ACTIVE, .folder = "/tmp/iwheel-daemon-XXXXXX"};
+    *rig = (daemon_rig_t){.now_us = START_US,
+                          .bus = IW_BUS_ACTIVE,
+                          .link = {.presence = IW_LINK_LOCAL, .is_virtual = true, .echo_proven = true},
+                          .folder = "/tmp/iwheel-daemon-XXXXXX"};
     TEST_ASSERT_NOT_NULL(mkdtemp(rig->folder));
     rig->bus_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     rig->estop_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
@@ -340,6 +343,15 @@ int daemon_rig_connect(void) {
     return daemon_rig_connect_with(GW_DRIVE);
 }
 
+/// Whatever is asked: every line that is told is JSON to the letter.
+static void assert_json(const char *line, size_t length) {
+    static iwn_work_t work;
+    static char why[128];
+    iwn_json_t root;
+    iwn_text_t fault = iwn_text_begin(why, sizeof why);
+    TEST_ASSERT_TRUE_MESSAGE(iwn_json_check(line, length, &work, &root, &fault), why);
+}
+
 /// One line of what has come, without its end. False: there is no whole one.
 static bool take_line(int client, char *out_line, size_t size) {
     const ssize_t seen = recv(client, out_line, size - 1U, MSG_PEEK | MSG_DONTWAIT);
@@ -349,6 +361,7 @@ static bool take_line(int client, char *out_line, size_t size) {
     }
     const size_t length = (size_t)(end - out_line) + 1U;
     (void)recv(client, out_line, length, MSG_DONTWAIT);
+    assert_json(out_line, length - 1U);
     out_line[length - 1U] = '\0';
     return true;
 }

@@ -27,6 +27,7 @@ typedef struct {
     iw_time_us_t suspended_us;   ///< The machine's sleep so far, as the clocks tell it.
     iw_time_us_t stolen_us;      ///< The next wait takes that much longer: the process stands still.
     iw_bus_state_t bus;          ///< What the bus answers.
+    iw_bus_link_t link;          ///< What is known of its link.
     int estop;                   ///< What the button answers: 1 pressed, 0, -1 unreadable.
     bool estop_pulse;            ///< Edges wait to be read: pressed and released again. They wake.
     bool estop_silent;           ///< The next change of it wakes nobody, as when a GPIO chip goes.

@@ -23,6 +23,9 @@ static uint64_t t_us, seq; // The newest stamp heard, and the newest number that
 static bool has_used;      // ... since the channel was opened.
 static uint32_t errors, refused, accepted, written;
 static uint32_t chance = 1;
+static char answer[IW_HOST_LINE_BYTES + 1U]; // The last line with an id.
+static char heard[IW_HOST_LINE_BYTES + 1U];  // The last line at all.
+static uint32_t states;                      // Events `state`.
 
 size_t iw_serial_read(char *out, size_t size) {
     const size_t count = (size < wire_length - wire_taken) ? size : wire_length - wire_taken;
@@ -49,6 +52,11 @@ bool iw_serial_write(const char *bytes, size_t length) {
     char text[IW_HOST_LINE_BYTES + 1U];
     memcpy(text, line.json, line.length);
     text[line.length] = '\0';
+    memcpy(heard, text, line.length + 1U);
+    if (strstr(text, "\"id\":") != NULL) {
+        memcpy(answer, text, line.length + 1U);
+    }
+    states += (strstr(text, "\"event\":\"state\"") != NULL) ? 1U : 0U;
     errors += (strstr(text, "line_error") != NULL) ? 1U : 0U;
     refused += (strstr(text, "stale_command") != NULL) ? 1U : 0U;
     accepted += (strstr(text, "\"limited\"") != NULL) ? 1U : 0U;
@@ -292,10 +300,78 @@ static void test_host_line_delayed_commands_lease_ends_from_their_stamp(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
 }
 
+/// Asks, and looks at the answer.
+static void assert_answer(const char *json, const char *part) {
+    answer[0] = '\0';
+    say(1, json);
+    run_ms(60);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, part), (answer[0] != '\0') ? answer : json);
+    TEST_ASSERT_EQUAL_CHAR('}', answer[strlen(answer) - 1U]);
+}
+
+static void test_host_answers_tell_what_was_asked_and_what_became_of_it(void) {
+    gateway_judge_renew(&rig.judge);
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"hello\",\"id\":1}", "\"name\":\"iwheel-gateway\"");
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"arm\",\"id\":2}", "\"id\":2,\"ok\":true");
+    assert_answer("{\"cmd\":\"config\",\"id\":3,\"key\":\"no.such\",\"value\":\"1\"}", "\"id\":3,\"ok\":false");
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"recordings\",\"id\":4}", "\"error\":\"denied\"");
+    say(0, "{\"cmd\":\"link\"}");
+    run_ms(10);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(heard, "\"event\":\"link\",\"boot\":\"0123456789abcdef\","), heard);
+}
+
+static void test_host_answer_to_arm_comes_when_it_is_armed(void) {
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    say(1, "{\"cmd\":\"stop\"}");
+    for (unsigned i = 0; i < 10U; i++) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(200);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+    gateway_judge_renew(&rig.judge);
+    answer[0] = '\0';
+    say(1, "{\"cmd\":\"arm\",\"id\":7}");
+    run_ms(60);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"id\":7,\"ok\":true"), answer);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"state\":\"armed\""), answer);
+}
+
+static void test_host_twist_turns_the_right_wheel_faster(void) {
+    char line[IWN_LINE_BOARD_MAX];
+    char json[256];
+    gateway_judge_asked(&rig.judge, true);
+    gateway_judge_drive(&rig.judge, true);
+    (void)snprintf(json, sizeof json,
+                   "{\"boot\":\"%016llx\",\"seq\":%llu,\"t_us\":%llu,\"cmd\":\"twist\",\"v_mm_s\":50,"
+                   "\"yaw_mrad_s\":100}",
+                   (unsigned long long)BOOT, (unsigned long long)++seq, (unsigned long long)t_us);
+    put(line, framed(1, json, line));
+    run_ms(200);
+    TEST_ASSERT_GREATER_THAN_INT(0, rig.bus.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_GREATER_THAN_INT(rig.bus.told_mm_s[IW_LEFT] + 20, rig.bus.told_mm_s[IW_RIGHT]);
+}
+
+static void test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall(void) {
+    say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
+    states = 0;
+    for (unsigned i = 0; i < 10U; i++) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(100);
+    }
+    TEST_ASSERT_UINT_WITHIN(3, 10, states);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_host_line_million_hostile_lines_none_is_obeyed);
     RUN_TEST(test_host_line_errors_are_told_at_most_five_times_a_second);
     RUN_TEST(test_host_line_delayed_commands_lease_ends_from_their_stamp);
+    RUN_TEST(test_host_answers_tell_what_was_asked_and_what_became_of_it);
+    RUN_TEST(test_host_answer_to_arm_comes_when_it_is_armed);
+    RUN_TEST(test_host_twist_turns_the_right_wheel_faster);
+    RUN_TEST(test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall);
     return UNITY_END();
 }

@@ -144,6 +144,15 @@ static void test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only
     TEST_ASSERT_NOT_EQUAL(4321, daemon_rig.daemon->wheels.core.force[IW_RIGHT].offset_mN);
 }
 
+static void test_memory_offset_of_an_earlier_run_keeps_its_time(void) {
+    store_offset(IW_LEFT, IW_FORCE_CN, 4321);
+    tell_stored();
+    daemon_rig_run(3000);
+    const gw_known_offset_t *kept = &daemon_rig.daemon->knowledge.known.offset[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT32(4321, kept->offset_mN);
+    TEST_ASSERT_EQUAL_INT64(1700000000000000, kept->wall_us);
+}
+
 static void test_memory_of_a_tare_has_the_figures_of_that_wheel(void) {
     daemon_rig_run(3000);
     TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\",\"side\":\"right\"}"), "\"ok\":true"));
@@ -224,6 +233,49 @@ static void change_item(iw_ledger_item_t item) {
     expect_new_status("confirmed by the operator");
     ledger->entry[item] = (iw_ledger_entry_t){0};
     expect_new_status("as if it had never been asked");
+}
+
+static void test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before(void) {
+    gw_knowledge_t *knowledge = &daemon_rig.daemon->knowledge;
+    knowledge->write_us = 0;
+    daemon_rig_run(3000);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"tare\"}"), "\"ok\":true"));
+    daemon_rig_run(1500);
+    const unsigned before = writes;
+    knowledge->keeper.waits = true;
+    news = GW_KEEPER_FAILED;
+    daemon_rig_run(50);
+    knowledge->keeper.waits = false;
+    TEST_ASSERT_EQUAL_INT(GW_MEMORY_FAILED, knowledge->state);
+    daemon_rig_run(GW_KNOWLEDGE_RETRY_US / IW_US_PER_MS - 200U);
+    TEST_ASSERT_EQUAL_UINT(before, writes);
+    daemon_rig_run(400);
+    TEST_ASSERT_EQUAL_UINT(before + 1U, writes);
+}
+
+static void test_memory_keeps_the_offset_that_a_wheel_has_sent(void) {
+    iw_force_t *force = &daemon_rig.daemon->wheels.core.force[IW_LEFT];
+    force->provenance = IW_OFFSET_WHEEL;
+    force->offset_us = daemon_rig.now_us;
+    force->offset_mN = 1200;
+    observe();
+    const gw_known_offset_t *kept = &daemon_rig.daemon->knowledge.known.offset[IW_LEFT];
+    TEST_ASSERT_EQUAL_INT(IW_OFFSET_WHEEL, kept->from);
+    TEST_ASSERT_EQUAL_INT32(1200, kept->offset_mN);
+}
+
+static void test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus(void) {
+    gw_knowledge_t *knowledge = &daemon_rig.daemon->knowledge;
+    const iw_ledger_item_t item = IW_LEDGER_GEAR_RATIO;
+    (void)snprintf(knowledge->known.item[item].word.found, IWN_VALUE_SIZE, "27/2");
+    iw_snapshot_t seen = gw_wheels_look(&daemon_rig.daemon->wheels);
+    iw_ledger_entry_t assumed[IW_LEDGER_ITEMS];
+    memcpy(assumed, seen.assumed, sizeof assumed);
+    assumed[item] = (iw_ledger_entry_t){.state = IW_LEDGER_CONFIRMED, .evidence = IW_EVIDENCE_BUS, .figure = 1000};
+    seen.assumed = assumed;
+    seen.assumed_changes++;
+    gw_knowledge_observe(knowledge, &seen);
+    TEST_ASSERT_EQUAL_STRING("", knowledge->known.item[item].word.found);
 }
 
 static void test_status_after_a_change_of_an_item_is_as_written_anew(void) {
@@ -316,8 +368,12 @@ int main(void) {
     RUN_TEST(test_memory_contradiction_stays_one);
     RUN_TEST(test_memory_contradiction_of_this_run_is_not_talked_over);
     RUN_TEST(test_memory_offset_is_restored_to_its_own_wheel_in_its_own_unit_only);
+    RUN_TEST(test_memory_offset_of_an_earlier_run_keeps_its_time);
     RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
     RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
+    RUN_TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before);
+    RUN_TEST(test_memory_keeps_the_offset_that_a_wheel_has_sent);
+    RUN_TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus);
     RUN_TEST(test_status_after_a_change_of_an_item_is_as_written_anew);
     RUN_TEST(test_status_after_a_change_of_the_configuration_is_as_written_anew);
     RUN_TEST(test_status_after_a_tare_or_an_earlier_runs_file_is_as_written_anew);

@@ -219,6 +219,178 @@ static void test_stop_and_estop_need_no_lease(void) {
     (void)close(other);
 }
 
+/// The next entry of that kind in the black box, from `*at` on.
+static blackbox_entry_t noted(blackbox_kind_t kind, uint64_t *at) {
+    static blackbox_entry_t found[BLACKBOX_ENTRIES_MIN];
+    size_t count = 0;
+    const blackbox_ring_t *ring = daemon_rig.daemon->box.ring;
+    const uint64_t first = blackbox_ring_copy(ring, *at, blackbox_ring_written(ring), found, &count);
+    for (size_t i = 0; i < count; i++) {
+        if (found[i].kind == kind) {
+            *at = first + i + 1U;
+            return found[i];
+        }
+    }
+    TEST_FAIL_MESSAGE(blackbox_kind_name(kind));
+    return (blackbox_entry_t){0};
+}
+
+static uint64_t noted_so_far(void) {
+    return blackbox_ring_written(daemon_rig.daemon->box.ring);
+}
+
+static void test_each_request_is_noted_with_who_asked_and_what_became_of_it(void) {
+    const iw_client_t id = daemon_rig.daemon->clients.client[0].id;
+    uint64_t at = noted_so_far();
+    daemon_rig_arm(client);
+    const blackbox_entry_t arm = noted(BLACKBOX_ARM, &at);
+    TEST_ASSERT_EQUAL_UINT32(id, arm.number);
+    TEST_ASSERT_EQUAL_UINT8(IW_REFUSE_NONE, arm.b);
+    at = noted_so_far();
+    assert_reply("{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":-50}", "\"ok\":true");
+    const blackbox_entry_t drive = noted(BLACKBOX_DRIVE, &at);
+    TEST_ASSERT_EQUAL_UINT32(id, drive.number);
+    TEST_ASSERT_EQUAL_INT32(100, drive.as.drive.speed_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT32(-50, drive.as.drive.speed_mm_s[IW_RIGHT]);
+    at = noted_so_far();
+    assert_reply("{\"cmd\":\"estop\"}", "\"ok\":true");
+    TEST_ASSERT_EQUAL_UINT32(id, noted(BLACKBOX_ESTOPPED, &at).number);
+    daemon_rig_run(2000);
+    at = noted_so_far();
+    assert_reply("{\"cmd\":\"reset\"}", "\"ok\":true");
+    TEST_ASSERT_EQUAL_UINT8(IW_REFUSE_NONE, noted(BLACKBOX_RESET, &at).b);
+    at = noted_so_far();
+    assert_reply("{\"cmd\":\"tare\",\"side\":\"right\"}", "\"ok\":true");
+    const blackbox_entry_t tare = noted(BLACKBOX_TARE, &at);
+    TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, tare.a);
+    TEST_ASSERT_EQUAL_UINT8(IW_TARE_OK, tare.b);
+}
+
+static void test_tare_tells_of_each_wheel_the_zero_it_had(void) {
+    iw_force_t *force = daemon_rig.daemon->wheels.core.force;
+    daemon_rig_run(3000);
+    assert_reply("{\"cmd\":\"tare\"}", "\"ok\":true");
+    force[IW_LEFT].offset_mN += 1110;
+    force[IW_RIGHT].offset_mN -= 2220;
+    char left[64];
+    char right[64];
+    (void)snprintf(left, sizeof left, "\"before_mN\":%d,", (int)force[IW_LEFT].offset_mN);
+    (void)snprintf(right, sizeof right, "\"before_mN\":%d,", (int)force[IW_RIGHT].offset_mN);
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"tare\"}");
+    const char *second = strstr(reply, "\"right\":{");
+    TEST_ASSERT_NOT_NULL_MESSAGE(second, reply);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(second, right), reply);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, left), reply);
+    TEST_ASSERT_TRUE_MESSAGE(strstr(reply, left) < second, reply);
+}
+
+static void test_lease_runs_from_the_command_and_not_from_the_look_before_it(void) {
+    const iw_time_us_t lease_us = MS(daemon_rig.daemon->config.core.lease_ms);
+    daemon_rig_arm(client);
+    for (unsigned ms = 1; ms < 20U; ms += 6U) { // At any place between two setpoints.
+        daemon_rig_drive(client, 100, 100, 200);
+        daemon_rig_run(ms);
+        static const char line[] = "{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100}\n";
+        TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+        daemon_rig_run((unsigned)((lease_us - 500U) / IW_US_PER_MS));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    }
+}
+
+static void test_answer_to_arm_comes_without_waiting_for_the_next_period(void) {
+    const iw_time_us_t asked_us = daemon_rig.now_us;
+    daemon_rig_arm(client);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT64(MS(3), daemon_rig.now_us - asked_us);
+}
+
+static void test_reader_that_has_ended_leaves_nobody_waiting(void) {
+    const int others[] = {daemon_rig_connect(), daemon_rig_connect(), daemon_rig_connect()};
+    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    int pair[2];
+    TEST_ASSERT_EQUAL_INT(0, socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, pair));
+    daemon_rig.daemon->box.reader.fd = pair[0];
+    for (unsigned i = 0; i < 4U; i++) {
+        clients->client[i].reading = true;
+    }
+    (void)close(pair[1]);
+    TEST_ASSERT_FALSE(gw_recordings_take(&daemon_rig.daemon->box, clients));
+    for (unsigned i = 0; i < 4U; i++) {
+        TEST_ASSERT_FALSE(clients->client[i].reading);
+    }
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        (void)close(others[i]);
+    }
+}
+
+static void test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept(void) {
+    daemon_rig.daemon->wheels.core.config.setpoint_type_set = false;
+    daemon_rig.daemon->config.core.setpoint_type_set = false;
+    assert_reply("{\"cmd\":\"confirm\",\"item\":\"setpoint_type\"}", "\"error\":\"type_not_set\"");
+    assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"how\":\"x\"}", "\"ok\":true");
+    assert_reply("{\"cmd\":\"status\"}", "\"how\":\"x\"");
+}
+
+static void test_zero_that_changes_is_told_to_who_watches_the_force(void) {
+    daemon_rig_run(3000);
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":1}", "\"ok\":true");
+    (void)events_waiting("force");
+    static const char line[] = "{\"cmd\":\"tare\",\"side\":\"right\"}\n";
+    TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    daemon_rig_run(60);
+    static char text[8192];
+    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
+    text[size] = '\0';
+    const char *told = strstr(text, "\"event\":\"offset\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"side\":\"right\",\"offset_mN\":"), told);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"provenance\":\"operator\",\"before_mN\":"), told);
+}
+
+static void test_stop_names_the_client_that_asked_for_it(void) {
+    assert_reply("{\"cmd\":\"arm\",\"name\":\"joystick\"}", "\"ok\":true");
+    daemon_rig_drive(client, 100, 100, 200);
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+    assert_reply("{\"cmd\":\"why\"}", "joystick");
+}
+
+static void test_wheel_that_goes_on_turning_is_told_once_and_whole(void) {
+    gw_daemon_t *daemon = daemon_rig.daemon;
+    static char text[8192];
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"stop\"]}", "\"ok\":true");
+    iw_snapshot_t seen = gw_wheels_look(&daemon->wheels);
+    seen.still_moving++;
+    gw_observe(&daemon->status, &seen);
+    gw_observe(&daemon->status, &seen);
+    gw_service_flush(&daemon->clients, IW_CLIENT_NONE);
+    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
+    text[size] = '\0';
+    const char *told = strstr(text, "\"cause\":\"still_moving\",\"present\":true}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
+    TEST_ASSERT_NULL(strstr(told + strlen("\"cause\":\"still_moving"), "still_moving"));
+}
+
+/// Answers of the port that have changed, told again and again: they are news once.
+static void test_facts_of_the_bus_are_taken_once_for_each_change(void) {
+    daemon_rig.link.changes++;
+    daemon_rig_run(20);
+    uint64_t at = noted_so_far();
+    const uint32_t warnings = daemon_rig.daemon->wheels.warnings;
+    daemon_rig.link.changes++;
+    daemon_rig_run(900);
+    TEST_ASSERT_EQUAL_UINT32(warnings, daemon_rig.daemon->wheels.warnings);
+    (void)noted(BLACKBOX_FACTS, &at);
+    unsigned facts = 0;
+    static blackbox_entry_t found[BLACKBOX_ENTRIES_MIN];
+    size_t count = 0;
+    (void)blackbox_ring_copy(daemon_rig.daemon->box.ring, at, noted_so_far(), found, &count);
+    for (size_t i = 0; i < count; i++) {
+        facts += (found[i].kind == BLACKBOX_FACTS) ? 1U : 0U;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(1U, facts); // And once a second.
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_drive_reaches_the_wheel_it_is_for);
@@ -236,5 +408,15 @@ int main(void) {
     RUN_TEST(test_arm_with_what_motion_depends_on_contradicted_is_denied);
     RUN_TEST(test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall);
     RUN_TEST(test_stop_and_estop_need_no_lease);
+    RUN_TEST(test_each_request_is_noted_with_who_asked_and_what_became_of_it);
+    RUN_TEST(test_tare_tells_of_each_wheel_the_zero_it_had);
+    RUN_TEST(test_lease_runs_from_the_command_and_not_from_the_look_before_it);
+    RUN_TEST(test_answer_to_arm_comes_without_waiting_for_the_next_period);
+    RUN_TEST(test_reader_that_has_ended_leaves_nobody_waiting);
+    RUN_TEST(test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_is_kept);
+    RUN_TEST(test_zero_that_changes_is_told_to_who_watches_the_force);
+    RUN_TEST(test_stop_names_the_client_that_asked_for_it);
+    RUN_TEST(test_wheel_that_goes_on_turning_is_told_once_and_whole);
+    RUN_TEST(test_facts_of_the_bus_are_taken_once_for_each_change);
     return UNITY_END();
 }

@@ -2,6 +2,7 @@
 #include "box/box.h"
 #include "config/gateway_config.h"
 #include "disk/box_files.h"
+#include "process/log.h"
 
 #include "iwheel_linux/clock.h"
 
@@ -128,6 +129,32 @@ static void test_stop_is_written_as_frames_events_and_configuration(void) {
     TEST_ASSERT_EQUAL_STRING(CONFIG, text);
 }
 
+static void test_what_happens_after_the_stop_is_written_too(void) {
+    char text[8192];
+    start();
+    const gw_box_order_t order = stopped("estop_line");
+    const blackbox_entry_t frame = {
+        .at_us = order.note.stop.at_us + 1000U, .kind = BLACKBOX_FRAME, .number = 257, .a = 4};
+    const blackbox_entry_t state = {.at_us = order.note.stop.at_us + 2000U,
+                                    .kind = BLACKBOX_STATE,
+                                    .number = 5,
+                                    .a = IW_STATE_LATCHED,
+                                    .b = IW_STATE_ARMED,
+                                    .as = {.drive = {.speed_mm_s = {12, -34}}}};
+    blackbox_ring_put(box.ring, &frame);
+    blackbox_ring_put(box.ring, &state);
+    TEST_ASSERT_TRUE(gw_box_write(&box, &order));
+    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+    TEST_ASSERT_EQUAL(11, box.last.frames);
+    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"bus\":\"can0\""), text);
+    const char *told = strstr(text, "{\"type\":\"state\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(told, text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"state\":\"latched\""), told);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"applied_left_mm_s\":12,"), told);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(told, "\"applied_right_mm_s\":-34"), told);
+}
+
 static void test_what_is_older_than_blackbox_s_is_left_out(void) {
     start();
     const blackbox_entry_t old = {.at_us = 1, .kind = BLACKBOX_FRAME, .number = 0x7FF};
@@ -173,6 +200,37 @@ static void test_directory_that_cannot_be_is_told_at_once_and_with_each_stop(voi
     record("estop_line", ENOENT);
 }
 
+/// What is told of the next result, into `text`.
+static void told(const char *cause, char *text, size_t size) {
+    FILE *file = tmpfile();
+    gw_log_t log = {.program = "test", .credit = 10, .fd = fileno(file), .level = GW_LOG_INFO};
+    struct pollfd entry = {.fd = box.writer.fd, .events = POLLIN};
+    if (cause != NULL) {
+        const gw_box_order_t order = stopped(cause);
+        TEST_ASSERT_TRUE(gw_box_write(&box, &order));
+    }
+    TEST_ASSERT_EQUAL(1, poll(&entry, 1, 10000));
+    gw_record_take(&box, &log);
+    rewind(file);
+    text[fread(text, 1, size - 1U, file)] = '\0';
+    (void)fclose(file);
+}
+
+static void test_what_became_of_a_recording_is_told_in_words(void) {
+    char text[1024];
+    start();
+    told("estop_line", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop 3 is recorded in "), text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop-000001-estop_line.log (10 frames, "), text);
+    gw_box_close(&box);
+    (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/such/folder", folder);
+    start();
+    told(NULL, text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "no recording can be written to "), text);
+    told("estop_line", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "stop 3 is not recorded in "), text);
+}
+
 static void test_directory_that_appears_later_is_used(void) {
     char command[160];
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/no/folder", folder);
@@ -210,6 +268,16 @@ static void test_frozen_writer_never_blocks_the_gateway(void) {
     TEST_ASSERT_LESS_THAN(1000000U, iw_clock_now_us() - begin_us);
     TEST_ASSERT_EQUAL(GW_CHILD_SILENT, gw_box_take(&box));
     TEST_ASSERT_EQUAL(0, kill(box.writer.pid, SIGKILL));
+}
+
+static void test_writer_outlives_what_a_terminal_or_a_service_sends_to_all(void) {
+    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+    start();
+    record("estop_line", 0); // It has begun.
+    for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++) {
+        TEST_ASSERT_EQUAL(0, kill(box.writer.pid, signals[i]));
+        record("estop_line", 0);
+    }
 }
 
 static void test_killed_writer_is_noticed_and_started_again_later(void) {
@@ -264,13 +332,16 @@ static void test_without_seconds_there_is_no_writer_but_a_small_ring(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_stop_is_written_as_frames_events_and_configuration);
+    RUN_TEST(test_what_happens_after_the_stop_is_written_too);
     RUN_TEST(test_what_is_older_than_blackbox_s_is_left_out);
     RUN_TEST(test_next_recording_has_the_next_number_also_after_a_restart);
     RUN_TEST(test_many_stops_keep_the_newest_and_touch_nothing_else);
     RUN_TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop);
+    RUN_TEST(test_what_became_of_a_recording_is_told_in_words);
     RUN_TEST(test_directory_that_appears_later_is_used);
     RUN_TEST(test_oldest_is_dropped_only_below_the_number);
     RUN_TEST(test_frozen_writer_never_blocks_the_gateway);
+    RUN_TEST(test_writer_outlives_what_a_terminal_or_a_service_sends_to_all);
     RUN_TEST(test_killed_writer_is_noticed_and_started_again_later);
     RUN_TEST(test_death_of_a_sending_gateway_is_recorded_and_that_of_a_silent_one_is_not);
     RUN_TEST(test_without_seconds_there_is_no_writer_but_a_small_ring);

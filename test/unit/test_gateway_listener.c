@@ -202,7 +202,8 @@ static void test_link_and_plain_file_at_its_place_are_left_alone(void) {
     TEST_ASSERT_EQUAL_INT(0, prepare());
     TEST_ASSERT_EQUAL_INT(0, symlink("elsewhere", in_folder("gateway.sock")));
     TEST_ASSERT_EQUAL_INT(EX_UNAVAILABLE, make());
-    assert_said("symbolic link");
+    assert_said("is a symbolic link, which is not followed");
+    assert_said("; remove it, or name the real path");
     TEST_ASSERT_EQUAL_INT(0, unlink(in_folder("gateway.sock")));
     (void)close(open(in_folder("gateway.sock"), O_WRONLY | O_CREAT, 0600));
     TEST_ASSERT_EQUAL_INT(0, prepare());

@@ -218,6 +218,23 @@ static void test_client_that_filled_the_buffer_is_not_caught_up(void) {
     TEST_ASSERT_EQUAL_UINT64(0, client.caught_up_us);
 }
 
+static void test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ended(void) {
+    const size_t room = sizeof client.in;
+    while (client.in_length < room) {
+        const size_t part = (room - client.in_length < sizeof big) ? room - client.in_length : sizeof big;
+        TEST_ASSERT_EQUAL_INT((int)part, (int)send(peer, big, part, MSG_NOSIGNAL));
+        gw_client_read(&client);
+    }
+    TEST_ASSERT_EQUAL_INT(1, (int)send(peer, "x", 1, MSG_NOSIGNAL));
+    gw_client_read(&client);
+    TEST_ASSERT_FALSE(client.ended);
+    TEST_ASSERT_TRUE(gw_client_line_too_long(&client));
+    client.in_length = 0;
+    client.closing = true;
+    gw_client_read(&client);
+    TEST_ASSERT_EQUAL_UINT(0, client.in_length);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_client_byte_by_byte_makes_one_line_only_at_the_newline);
@@ -235,5 +252,6 @@ int main(void) {
     RUN_TEST(test_client_caught_up_later_is_not_forgotten_for_an_earlier_time);
     RUN_TEST(test_client_with_bytes_left_in_its_socket_is_not_caught_up);
     RUN_TEST(test_client_that_filled_the_buffer_is_not_caught_up);
+    RUN_TEST(test_client_with_a_full_line_or_closing_is_not_read_and_has_not_ended);
     return UNITY_END();
 }

@@ -3,8 +3,9 @@
 /// offsets, as text.
 ///
 /// The text is one line of JSON and one with its checksum. It names the bus it speaks of, and beside each piece of
-/// evidence the configured value for which it was found: evidence for another value is worth nothing. Whatever is not
-/// exactly as this program writes it is refused as a whole. Pure functions.
+/// evidence the configured value for which it was found: evidence for another value is worth nothing. Whatever no run of
+/// this program could have found is refused as a whole; blanks, and members of the line beside its own, are passed over. Pure
+/// functions.
 #ifndef GATEWAY_MEMORY_H
 #define GATEWAY_MEMORY_H
 
@@ -44,8 +45,8 @@ typedef struct {
 /// Writes the text. Its length; 0 if it does not fit.
 size_t gw_memory_write(const gw_known_t *known, const char *bus, char *out_text, size_t size);
 
-/// Reads a text. False, with the reason in words and `*out_known` untouched, unless it was written by gw_memory_write
-/// for this bus.
+/// Reads a text. False, with the reason in words and `*out_known` untouched, unless its checksum is right, it is for this
+/// bus, and gw_memory_write could have written what it says.
 bool gw_memory_read(const char *text, size_t length, const char *bus, gw_known_t *out_known,
                     char out_reason[GW_MEMORY_REASON_SIZE]);
 

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+// Any sequence of requests, in time, to a whole gateway with its wheels: by the board's host code, whose answers need no socket. Each line of
+// the input is one deed: `+N` lets N ms pass, `^` and `_` press and release the button, `q` asks on channel 1 with all that a command
+// must quote, anything else is said on channel 1 as it is. Whatever is asked in whatever order: every line that is answered is whole, an id is
+// answered once, the wheels are told no more than the limits, nothing while it listens, and in a latch never more than before.
+#include "fuzz_sequence.h"
+
+#include "../support/gateway_rig.h"
+#include "host.h"
+#include "serial.h"
+
+#define BOOT     0x0123456789abcdefU
+#define TOTAL_MS 20000U
+
+static gateway_rig_t rig;
+static iw_host_t host;
+static char wire[2U * IWN_LINE_BOARD_MAX];
+static size_t wire_length, wire_taken;
+static uint64_t t_us, seq, spent_ms, answers, asked, moved;
+
+static size_t fuzz_unit(const uint8_t *data, size_t size) {
+    return fuzz_until(data, size, '\n');
+}
+
+size_t iw_serial_read(char *out, size_t size) {
+    const size_t count = (size < wire_length - wire_taken) ? size : wire_length - wire_taken;
+    memcpy(out, &wire[wire_taken], count);
+    wire_taken += count;
+    return count;
+}
+
+bool iw_serial_had_error(void) {
+    return false;
+}
+
+size_t iw_serial_room(void) {
+    return IW_SERIAL_SEND_BYTES;
+}
+
+bool iw_serial_write(const char *bytes, size_t length) {
+    iwn_line_t line;
+    fuzz_require(length > 0U && bytes[length - 1U] == '\n' && memchr(bytes, '\n', length) == &bytes[length - 1U],
+                 "one line");
+    fuzz_require(iwn_line_read(bytes, length - 1U, true, &line) == IWN_LINE_GOOD, "every line told is right");
+    fuzz_require(line.t_us >= t_us, "time goes on");
+    t_us = line.t_us;
+    answers += (line.length >= 6U && line.channel == 1U && memcmp(line.json, "{\"id\":", 6) == 0) ? 1U : 0U;
+    return true;
+}
+
+bool iw_serial_lend(const char *bytes, size_t length) {
+    return iw_serial_write(bytes, length);
+}
+
+bool iw_serial_lends(void) {
+    return false;
+}
+
+bool iw_serial_is_idle(void) {
+    return true;
+}
+
+bool iw_host_keep(const iw_settings_t *settings) {
+    (void)settings;
+    return true;
+}
+
+static void say(uint8_t channel, const char *json, size_t length) {
+    const iwn_line_t line = {.json = json, .length = length, .channel = channel};
+    wire_taken = 0;
+    wire_length = iwn_line_write(&line, wire, IWN_LINE_BOARD_MAX);
+    while (iw_host_take(&host, rig.now_us)) {
+    }
+    wire_length = wire_taken = 0;
+}
+
+/// The relay's own word.
+static void say_text(const char *json) {
+    say(0, json, strlen(json));
+}
+
+static void judge(const int32_t before[IW_SIDES], bool was_latched) {
+    const iw_state_t state = iw_gateway_state(&rig.gateway);
+    fuzz_require(rig.gateway.sender.envelope.stopped == 0U && rig.gateway.sender.sent.clamped == 0U,
+                 "the gate has nothing to stop");
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        const int32_t told = rig.bus.told_mm_s[side];
+        fuzz_require(abs(told) <= rig.config.max_speed_mm_s, "within the limits");
+        fuzz_require(!was_latched || state != IW_STATE_LATCHED || abs(told) <= abs(before[side]),
+                     "a latch never goes faster");
+        moved += (told != 0) ? 1U : 0U;
+    }
+}
+
+static void pass(uint32_t span_ms) {
+    for (uint32_t ms = 0; ms < span_ms && spent_ms < TOTAL_MS; ms += 5U, spent_ms += 5U) {
+        const int32_t before[IW_SIDES] = {rig.bus.told_mm_s[IW_LEFT], rig.bus.told_mm_s[IW_RIGHT]};
+        const bool was_latched = iw_gateway_state(&rig.gateway) == IW_STATE_LATCHED;
+        if (ms % 100U == 0U) {
+            say_text("{\"cmd\":\"alive\"}"); // Else all ends after 500 ms.
+        }
+        gateway_rig_step(&rig);
+        const iw_snapshot_t seen = gateway_rig_look(&rig);
+        (void)iw_host_tell(&host, &seen, false);
+        rig.judge.violation = NULL; // It knows nothing of what was asked here.
+        gateway_rig_run(&rig, 5000);
+        judge(before, was_latched);
+    }
+}
+
+/// With boot, number and stamp before what is asked.
+static void say_quoted(const uint8_t *text, size_t size) {
+    static char json[IWN_LINE_BOARD_MAX];
+    const int head = snprintf(json, sizeof json, "{\"boot\":\"%016llx\",\"seq\":%llu,\"t_us\":%llu,",
+                              (unsigned long long)BOOT, (unsigned long long)++seq, (unsigned long long)t_us);
+    const size_t skip = (size > 0U && text[0] == '{') ? 1U : 0U;
+    const size_t length = (size_t)head + size - skip;
+    if (length < sizeof json) {
+        memcpy(&json[head], &text[skip], size - skip);
+        say(1, json, length);
+    }
+}
+
+static void act(const uint8_t *text, size_t size) {
+    asked++;
+    if (size > 0U && text[0] == '+') {
+        char number[8] = "";
+        memcpy(number, &text[1], (size - 1U < sizeof number - 1U) ? size - 1U : sizeof number - 1U);
+        pass((uint32_t)strtoul(number, NULL, 10) % 3000U);
+    } else if (size > 0U && (text[0] == '^' || text[0] == '_')) {
+        gateway_rig_press(&rig, text[0] == '^');
+        pass(10);
+    } else if (size > 0U && text[0] == 'q') {
+        say_quoted(&text[1], size - 1U);
+    } else if (size < IWN_LINE_BOARD_MAX - 32U) {
+        say(1, (const char *)text, size);
+    }
+    pass(5);
+}
+
+/// Beside wheels that have been standing for a while. Done once: every input begins from a copy of this.
+static void prepare(void) {
+    gateway_rig_init(&rig);
+    memset(&host, 0, sizeof host);
+    wire_length = wire_taken = 0;
+    t_us = seq = 0;
+    const iw_host_place_t place = {.gateway = &rig.gateway,
+                                   .version = "0.0.0",
+                                   .bus = "can",
+                                   .estop = "PB0",
+                                   .bitrate_hz = 1000000,
+                                   .sample_point_permille = 625,
+                                   .settings = iw_settings_from(&rig.config, 540),
+                                   .track_mm = 540,
+                                   .rate_max_hz = 10,
+                                   .boot = BOOT};
+    iw_host_init(&host, &place, rig.now_us);
+    gateway_rig_run(&rig, 600000);
+    say_text("{\"cmd\":\"link\"}");
+    say_text("{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
+    pass(20);
+}
+
+static void begin(void) {
+    static gateway_rig_t first_rig;
+    static iw_host_t first_host;
+    static uint64_t first_us;
+    if (first_us == 0U) {
+        prepare();
+        first_rig = rig;
+        first_host = host;
+        first_us = t_us;
+    }
+    rig = first_rig;
+    host = first_host;
+    t_us = first_us;
+    wire_length = wire_taken = 0;
+    seq = spent_ms = answers = asked = moved = 0;
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    begin();
+    for (size_t at = 0, unit; at < size && spent_ms < TOTAL_MS; at += unit) {
+        unit = fuzz_unit(&data[at], size - at);
+        act(&data[at], unit - ((data[at + unit - 1U] == '\n') ? 1U : 0U));
+    }
+    pass(100);
+    fuzz_require(answers <= asked, "a request is answered once");
+    fuzz_tell((moved > 0U) ? "taken" : "refused");
+    return 0;
+}

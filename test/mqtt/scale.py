@@ -1,0 +1,433 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""How many machines a broker and the console carry: iwheel-mqtt as it is, one process per machine, fed with what a gateway said.
+
+usage: test/mqtt/scale.py [--build DIR] [--broker KIND]... [--machines N]... [--every MS]... [--seconds N] [--update]
+
+A gateway beside simulated wheels is driven and stopped by its button once a minute; its lines are kept, for watchers at 1 Hz and at 10 Hz.
+Then one process is the gateway of all N machines: each bridge connects to it, asks, and is told these lines at their times, each machine's
+shifted against the others'; where the recorded gateway was late with a state, the one before again. The console (iwheel-fleet) runs beside; how old each line is when it has dealt with it is noted in its
+process (stamps.c, preloaded). Brokers: mosquitto, nats (one nats-server with JetStream), nats3 (three, three replicas); all without TLS.
+
+Processor time is what the kernel counted for each process, so others on the machine change it little; latencies they do change.
+--update puts the rows into docs/mqtt.md. What a run needs: some 2 MB of memory and 3 descriptors per machine.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import pwd
+import re
+import resource
+import select
+import shutil
+import signal
+import socket
+import statistics
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "system")]
+
+from bus import now_us  # noqa: E402
+from harness import die_with_parent, find_program, percentile  # noqa: E402
+from mqtt_rig import MqttRig, free_port, put_table  # noqa: E402
+from trials import ROOT, Skip, full, until  # noqa: E402
+
+PAGE = ROOT / "docs/mqtt.md"
+STAMP = struct.Struct("=QQIIII")  # As stamps.c writes it.
+HEAD = ["broker", "machines", "state every", "kB/s at the console", "processor, ms per s: broker", "console", "all bridges", "memory, MB: broker", "console",
+        "line to console: median", "99 %", "longest", "states missing", "stops sent", "arrived", "doubled"]
+MINUTE_S = 60
+BATCH = 25  # Bridges that start at once: a gateway is there within 0.2 s for each.
+
+
+# ---- what a gateway said ----------------------------------------------------------------------------------------------
+
+
+class Tape:
+    """A gateway's lines in slots of a watcher's period, each split around its time, and its answers."""
+
+    def __init__(self, rig, seconds):
+        self.seconds, self.slots, self.answers = seconds, {}, {}
+        watchers = {}
+        for rate_hz in (1, 10):
+            link = socket.socket(socket.AF_UNIX)
+            link.connect(rig.path("watch.sock"))
+            watchers[link] = (rate_hz, [], bytearray())
+        for number, cmd in enumerate(("hello", "why")):
+            self.answers[cmd] = re.sub(r'"id":\d+', '"id":%d', json.dumps(rig.client(name="tape").request(cmd), separators=(",", ":")).replace("%", "%%"), count=1)
+        for link, (rate_hz, *_) in watchers.items():
+            link.sendall(json.dumps({"cmd": "watch", "id": 1, "topics": ["state", "bus", "estop", "lease", "stop"], "rate_hz": rate_hz}).encode() + b"\n")
+        actor = threading.Thread(target=self.act, args=(rig,))
+        actor.start()
+        begun = time.monotonic()
+        while (passed := time.monotonic() - begun) < seconds:
+            for link in select.select(list(watchers), [], [], 0.05)[0]:
+                _, lines, rest = watchers[link]
+                rest += link.recv(65536)
+                *whole, last = rest.split(b"\n")
+                rest[:] = last
+                lines += [(passed, line) for line in whole]
+        actor.join()
+        for link, (rate_hz, lines, _) in watchers.items():
+            link.close()
+            self.hello = lines[0][1] + b"\n"
+            self.slots[rate_hz] = [[] for _ in range(int(seconds * rate_hz))]
+            first = next(at for at, line in lines if b'"event":"state"' in line) - 0.5 / rate_hz  # A state is in the middle of its slot.
+            for at, line in lines:
+                head, found, tail = line.partition(b'"t_us":')
+                if found and b'"event":"hello"' not in line:
+                    self.slots[rate_hz][min(int(max(0, at - first) * rate_hz), len(self.slots[rate_hz]) - 1)].append((head + found, tail.lstrip(b"0123456789") + b"\n"))
+            self.fill(self.slots[rate_hz])
+        self.stops = sum(b'"event":"stop"' in head + tail for slot in self.slots[1] for head, tail in slot)
+        assert self.stops == 1, f"{self.stops} stops on the tape, not 1"
+
+    @staticmethod
+    def fill(slots):
+        """Where a gateway that was woken late said nothing, what it had said before: each slot has a state."""
+        last = next(line for slot in slots for line in slot if b'"event":"state"' in line[0])
+        for slot in slots:
+            states = [line for line in slot if b'"event":"state"' in line[0]]
+            last = states[-1] if states else last
+            if not states:
+                slot.append(last)
+
+    def act(self, rig):
+        """Most of a short tape is this; of a minute, the first seconds."""
+        client = rig.client(name="walker")
+        time.sleep(0.5)
+        until(lambda: client.request("arm", name="walker")["ok"], what="armed")
+        for _ in range(20):
+            client.request("drive", left_mm_s=200, right_mm_s=200)
+            time.sleep(0.05)
+        rig.press()
+        time.sleep(0.6)
+        rig.press(False)
+        until(lambda: client.request("reset")["ok"], what="the latch is loose")
+        client.close()
+
+
+class Gateway:
+    """In a process of its own: the gateway of all machines, on one socket."""
+
+    def __init__(self, path, tape, machines, rate_hz):
+        self.path, self.tape, self.machines, self.rate_hz = path, tape, machines, rate_hz
+        self.count = multiprocessing.Array("Q", 4)  # Connections, lines, stops, lines that a bridge did not take.
+        self.go, self.end = multiprocessing.Event(), multiprocessing.Event()
+        self.process = multiprocessing.get_context("fork").Process(target=self.run, daemon=True)
+        self.process.start()
+
+    def run(self):
+        listener = socket.socket(socket.AF_UNIX)
+        listener.bind(self.path)
+        listener.listen(self.machines)
+        poll, links, listening = select.epoll(), {}, []
+        poll.register(listener, select.EPOLLIN)
+        begun, turn = None, 0
+        while not self.end.is_set():
+            for fd, _ in poll.poll(0.002):
+                if fd == listener.fileno():
+                    link = listener.accept()[0]
+                    link.setblocking(False)
+                    links[link.fileno()] = link
+                    poll.register(link, select.EPOLLIN)
+                    self.say(link, self.tape.hello)
+                elif not self.answer(links[fd], listening):
+                    poll.unregister(fd)
+                    link = links.pop(fd)
+                    link.close()
+                    if link in listening:  # A bridge that was not answered in time comes again.
+                        listening.remove(link)
+                self.count[0] = len(listening)
+            if begun is None and self.go.is_set():
+                begun = time.monotonic()
+            # Machine `turn % machines` is told its slot `turn / machines`.
+            due = int((time.monotonic() - begun) * self.machines * self.rate_hz) if begun else 0
+            while turn < due:
+                turn += 1
+                machine = turn % self.machines
+                if machine < len(listening):
+                    self.tell(listening[machine], turn // self.machines + 7 * machine)
+
+    def say(self, link, line):
+        try:
+            return link.send(line) == len(line)
+        except OSError:  # As the gateway: who reads slowly loses.
+            return False
+
+    def answer(self, link, listening):
+        try:
+            data = link.recv(65536)
+        except OSError:
+            return False
+        for line in data.splitlines():
+            asked = json.loads(line)
+            if asked["cmd"] == "watch":
+                assert asked["rate_hz"] == self.rate_hz, asked
+                reply = json.dumps({"id": asked["id"], "ok": True, "topics": asked["topics"], "rate_hz": self.rate_hz, "limited": False}, separators=(",", ":"))
+                listening.append(link)
+            else:
+                reply = self.tape.answers[asked["cmd"]] % asked["id"]
+            self.say(link, reply.encode() + b"\n")
+        return bool(data)
+
+    def tell(self, link, slot):
+        slots = self.tape.slots[self.rate_hz]
+        for head, tail in slots[slot % len(slots)]:
+            line = head + str(now_us()).encode() + tail
+            taken = self.say(link, line)
+            self.count[1] += taken
+            self.count[2] += taken and b'"event":"stop"' in line
+            self.count[3] += not taken
+
+
+# ---- brokers ------------------------------------------------------------------------------------------------------------
+
+
+def mosquitto_files(folder, port):
+    config = Path(folder, "mosquitto.conf")
+    config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\nuser {pwd.getpwuid(os.getuid()).pw_name}\n", encoding="ascii")
+    return [("127.0.0.1", ["mosquitto", "-c", str(config)])]
+
+
+def nats_files(folder, port, servers):
+    """One server, or three with their routes; as share/fleet/nats-server.conf, without TLS and rights."""
+    routes, made = free_port(), []
+    for number in range(1, servers + 1):
+        host, config = f"127.0.0.{number}", Path(folder, f"nats{number}.conf")
+        cluster = f'cluster {{ name: fleet, listen: "{host}:{routes}", routes: [{", ".join(f"nats-route://127.0.0.{one}:{routes}" for one in range(1, servers + 1))}] }}\n'
+        config.write_text(f'server_name: n{number}\nlisten: "{host}:{free_port()}"\njetstream {{ store_dir: "{folder}/n{number}" }}\n' + (cluster if servers > 1 else "") +
+                          f'mqtt {{ listen: "{host}:{port}", stream_replicas: {servers}, ack_wait: "10s" }}\n', encoding="ascii")
+        made.append((host, ["nats-server", "-c", str(config)]))
+    return made
+
+
+BROKERS = {"mosquitto": mosquitto_files, "nats": lambda folder, port: nats_files(folder, port, 1), "nats3": lambda folder, port: nats_files(folder, port, 3)}
+
+
+# ---- measuring ----------------------------------------------------------------------------------------------------------
+
+
+def cpu_s(pid):
+    """What the kernel has counted for all threads of a process, those that ended included."""
+    return time.clock_gettime((~pid << 3) | 2)
+
+
+def memory_kB(pid, what="Rss"):
+    return int(re.search(rf"^{what}:\s+(\d+)", Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii"), re.M)[1])
+
+
+class Load:
+    """Broker, console, machines. `measure` is a row of the table."""
+
+    def __init__(self, build, tape, kind, machines, every_ms):
+        if not shutil.which("mosquitto" if kind == "mosquitto" else "nats-server"):
+            raise Skip(f"{kind} is missing (scripts/install_tools check brings it)")
+        self.folder, self.kind, self.machines, self.every_ms = tempfile.mkdtemp(prefix="iwheel-"), kind, machines, every_ms
+        self.rate_hz, self.build, self.tape, self.port, self.children = max(1, 1000 // every_ms), build, tape, free_port(), []
+        resource.setrlimit(resource.RLIMIT_NOFILE, (resource.getrlimit(resource.RLIMIT_NOFILE)[1],) * 2)
+        try:
+            self.start()
+        except BaseException:
+            self.close()
+            raise
+
+    def spawn(self, name, command, **options):
+        with open(f"{self.folder}/{name}.out", "wb") as out:
+            child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=options.pop("stdout", out), stderr=out, preexec_fn=die_with_parent, **options)
+        self.children.append(child)
+        return child
+
+    def start(self):
+        made = BROKERS[self.kind](self.folder, self.port)
+        self.hosts = [host for host, _ in made]
+        self.brokers = [self.spawn(f"broker{number}", command) for number, (_, command) in enumerate(made)]
+        for host in self.hosts:
+            until(lambda host=host: socket.socket().connect_ex((host, self.port)) == 0, 30, f"the broker at {host}")
+        time.sleep(3 if len(self.hosts) > 1 else 0)  # Until they have elected.
+        self.gateway = Gateway(f"{self.folder}/gateway.sock", self.tape, self.machines, self.rate_hz)
+        self.console = self.start_console()
+        until(lambda: self.connected() == 1, 60, "the console is at the broker")
+        self.bridges = []
+        for number in range(self.machines):
+            self.bridges.append(self.start_bridge(number))
+            if number % BATCH == BATCH - 1 or number == self.machines - 1:
+                until(lambda: self.gateway.count[0] == len(self.bridges) and self.connected() == len(self.bridges) + 1, 60, f"{len(self.bridges)} bridges are at the broker")
+
+    def start_console(self):
+        library, config = f"{self.folder}/stamps.so", Path(self.folder, "fleet.conf")
+        subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", library, HERE / "stamps.c", "-ldl"], check=True)
+        config.write_text(f"[broker]\nhost = {self.hosts[0]}\nport = {self.port}\n", encoding="ascii")
+        return self.spawn("console", [find_program(self.build, "iwheel-fleet"), "-c", str(config)], stdout=subprocess.DEVNULL,
+                          env={**os.environ, "LD_PRELOAD": library, "IWHEEL_STAMPS": f"{self.folder}/stamps"})
+
+    def start_bridge(self, number):
+        spool, config = Path(self.folder, f"m{number:04}"), Path(self.folder, f"m{number:04}.conf")
+        spool.mkdir(mode=0o700)
+        place = number % len(self.hosts)
+        config.write_text(f"[gateway]\nsocket = {self.folder}/gateway.sock\n[machine]\nid = m{number:04}\n[broker]\nhost = {' '.join(self.hosts[place:] + self.hosts[:place])}\n"
+                          f"port = {self.port}\n[state]\nevery_ms = {self.every_ms}\n[spool]\ndirectory = {spool}\n", encoding="ascii")
+        return self.spawn(spool.name, [find_program(self.build, "iwheel-mqtt"), "-c", str(config)])
+
+    def connected(self):
+        """Connections that a broker has taken."""
+        lines = [line.split() for line in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:]]
+        return sum(line[1].endswith(f":{self.port:04X}") and line[3] == "01" for line in lines)
+
+    def times(self):
+        return [sum(cpu_s(child.pid) for child in group) for group in (self.brokers, [self.console], self.bridges)]
+
+    def measure(self, seconds):
+        self.gateway.go.set()
+        time.sleep(max(2, self.every_ms / 1000))
+        begin_us, before = now_us(), self.times()
+        time.sleep(seconds)
+        end_us, after = now_us(), self.times()
+        memory = [sum(memory_kB(child.pid) for child in group) / 1000 for group in (self.brokers, [self.console])]
+        self.bridge_kB = [statistics.median(memory_kB(child.pid, what) for child in self.bridges[:20]) for what in ("Rss", "Pss")]
+        lines = self.gateway.count[1]
+        self.gateway.end.set()
+        self.gateway.process.join(10)
+        self.drain()
+        self.console.terminate()
+        self.console.wait(20)
+        stamps = list(STAMP.iter_unpack(Path(self.folder, "stamps").read_bytes()))
+        cpu = [(now - then) * 1e6 / (end_us - begin_us) * 1000 for now, then in zip(after, before)]
+        self.lines_per_s, self.not_taken = lines, self.gateway.count[3]
+        return self.judge(stamps, begin_us, end_us, cpu, memory)
+
+    def drain(self):
+        """Until broker and console have nothing to do any more; half a minute at most."""
+        for _ in range(15):
+            before = self.times()
+            time.sleep(2)
+            if sum(now - then for now, then in zip(self.times()[:2], before[:2])) < 0.02 + self.machines / 20000:
+                return
+
+    def judge(self, stamps, begin_us, end_us, cpu, memory):
+        inside = [stamp for stamp in stamps if begin_us <= stamp[0] - stamp[2] < end_us]
+        late_ms = sorted(stamp[2] / 1000 for stamp in inside) or [float("nan")]
+        states, missing = {}, 0
+        for at_us, boot, late_us, number, _, _ in inside:
+            if number == 0:
+                states.setdefault(boot, []).append(at_us - late_us)
+        for told in states.values():
+            told.sort()
+            missing += sum(max(0, round((later - before) / 1000 / self.every_ms) - 1) for before, later in zip(told, told[1:]))
+        stops = [(boot, number) for _, boot, _, number, _, _ in stamps if number]
+        self.row = {"kind": self.kind, "machines": self.machines, "every_ms": self.every_ms, "states": sum(map(len, states.values())), "missing": missing, "heard": len(states),
+                    "kB_s": sum(stamp[4] for stamp in inside) / (end_us - begin_us) * 1000, "cpu": cpu, "memory": memory,
+                    "late_ms": (percentile(late_ms, 50), percentile(late_ms, 99), late_ms[-1]),
+                    "stops": (self.gateway.count[2], len(set(stops)), len(stops) - len(set(stops)))}
+        return self.row
+
+    def close(self):
+        if hasattr(self, "gateway"):
+            self.gateway.end.set()
+            self.gateway.process.join(5)
+        for number in (signal.SIGTERM, signal.SIGKILL):
+            for child in self.children:
+                if child.poll() is None:
+                    child.send_signal(number)
+            end = time.monotonic() + 10
+            for child in self.children:
+                try:
+                    child.wait(max(0.01, end - time.monotonic()))
+                except subprocess.TimeoutExpired:
+                    pass
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def short(number):
+    return f"{number:.1f}" if number < 10 else f"{number:.0f}"
+
+
+def cells(row):
+    period = f"{row['every_ms'] / 1000:g} s"
+    numbers = [short(one) for one in (row["kB_s"], *row["cpu"], *row["memory"])] + [f"{short(one)} ms" for one in row["late_ms"]]
+    return [row["kind"], str(row["machines"]), period, *numbers, f"{row['missing']} of {row['states'] + row['missing']}", *(str(one) for one in row["stops"])]
+
+
+# ---- in ./check ---------------------------------------------------------------------------------------------------------
+
+
+def run_load(rig, seconds, **load):
+    rig.start_gateway()
+    tape = Tape(rig, seconds)
+    one = Load(rig.build, tape, **load)
+    try:
+        row = one.measure(seconds)
+    finally:
+        one.close()
+    print("        " + ", ".join(f"{name} {cell}" for name, cell in zip(HEAD, cells(row))), flush=True)
+    sent, arrived, doubled = row["stops"]
+    assert arrived == sent > 0 and doubled == 0, row
+    assert row["heard"] == load["machines"] and row["missing"] <= row["states"] / 20, row
+
+
+def test_twenty_machines_at_ten_hertz_each_stop_reaches_the_console(rig):
+    run_load(rig, 4, kind="mosquitto", machines=20, every_ms=100)
+
+
+@full
+def test_three_hundred_machines_at_three_servers_each_stop_reaches_the_console(rig):
+    run_load(rig, 20, kind="nats3", machines=300, every_ms=5000)
+
+
+# ---- the table ------------------------------------------------------------------------------------------------------------
+
+
+def update(rows):
+    """Rows of the same broker, number and period take the place of those that are there."""
+    begin = "<!-- figures: test/mqtt/scale.py --update -->"
+    section = PAGE.read_text(encoding="utf-8").split(begin, 1)[1].split("<!-- end", 1)[0]
+    old = [[cell.strip() for cell in line.strip("|").split("|")] for line in section.splitlines() if line.startswith("| ")][2:]
+    every = {tuple(one[:3]): one for one in old + rows}
+    kinds = list(BROKERS)
+    order = sorted(every.values(), key=lambda one: (-float(one[2].split()[0]), kinds.index(one[0]), int(one[1])))
+    put_table(PAGE, "test/mqtt/scale.py --update", ["| " + " | ".join(one) + " |" for one in (HEAD, ["---"] + ["---:"] * (len(HEAD) - 1), *order)])
+
+
+def main():
+    parser = argparse.ArgumentParser(usage=__doc__.split("\n\n")[1].removeprefix("usage: "), description=__doc__.split("\n\n", 2)[2],
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", default=ROOT / "build/default")
+    parser.add_argument("--broker", action="append", choices=BROKERS, help="mosquitto")
+    parser.add_argument("--machines", action="append", type=int, help="1 10 100 300 1000")
+    parser.add_argument("--every", action="append", type=int, help="5000 and 100 ms")
+    parser.add_argument("--seconds", type=int, default=20)
+    parser.add_argument("--update", action="store_true")
+    options = parser.parse_args()
+    rig = MqttRig(options.build)
+    try:
+        rig.start_gateway()
+        tape = Tape(rig, MINUTE_S)
+    finally:
+        rig.close()
+    rows = []
+    for kind in options.broker or ["mosquitto"]:
+        for every_ms in options.every or [5000, 100]:
+            for machines in options.machines or [1, 10, 100, 300, 1000]:
+                load = Load(options.build, tape, kind, machines, every_ms)
+                try:
+                    rows.append(cells(load.measure(options.seconds)))
+                finally:
+                    load.close()
+                print(", ".join(f"{name} {cell}" for name, cell in zip(HEAD, rows[-1])))
+                print(f"        a bridge: {load.bridge_kB[0] / 1000:.1f} MB, of which its own and its share of what is shared {load.bridge_kB[1] / 1000:.1f} MB; "
+                      f"{load.not_taken} lines not taken", flush=True)
+                if options.update:
+                    update(rows)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
