@@ -43,6 +43,8 @@ typedef struct gw_daemon {
     int signal_fd;
     bool gave_way;          ///< It shuts down because somebody else's gateway goes before it.
     iw_time_us_t frames_us; ///< When frames were taken last.
+    iw_time_us_t mark_us;   ///< When a change of the crash marker that failed is tried again; 0: none did.
+    uint32_t silent_pairs;  ///< Setpoint pairs handed over until the last silence.
     iw_time_us_t look_us;   ///< When bus and e-stop are looked at though nothing has woken us.
     bool frames_may_wait;   ///< As far as the wheels are concerned.
     bool frames_wait;       ///< The bus wakes nobody for now: its frames are taken together.

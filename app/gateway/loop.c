@@ -26,6 +26,8 @@
 /// Frames that have not come for so long wake us again: nobody looks for nothing.
 #define FRAMES_GONE_US 20000U
 #define BOX_LOOK_US    100000U
+/// A crash marker that cannot be set or removed is tried again.
+#define MARK_AGAIN_US 100000U
 
 static int watch(const gw_daemon_t *daemon, int fd, uint64_t tag) {
     struct epoll_event interest = {.events = EPOLLIN, .data = {.u64 = tag}};
@@ -97,14 +99,33 @@ static void give_way(gw_daemon_t *daemon) {
     }
 }
 
-static void mark_if_sending(gw_daemon_t *daemon) {
-    if (!daemon->config.core.listen_only &&
-        !gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels))) {
+/// Once something has been handed over, and not before: the start after a crash sends nothing if nothing was sent. What is handed over
+/// first is a zero pair, and another step comes before anything else.
+static bool needs_marker(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
+    if (!gw_wheels_are_sent_to(&daemon->wheels)) {
+        daemon->silent_pairs = seen->sent->pairs;
+        return false;
+    }
+    return daemon->runtime.marked || seen->sent->pairs != daemon->silent_pairs;
+}
+
+/// What has failed is told once and tried again.
+static void mark_if_sending(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
+    const bool needed = needs_marker(daemon, seen);
+    if (daemon->config.core.listen_only || daemon->wheels.now_us < daemon->mark_us) {
+        return;
+    }
+    if (gw_runtime_mark(&daemon->runtime, needed)) {
+        daemon->mark_us = 0;
+        return;
+    }
+    if (daemon->mark_us == 0U) {
         gw_log(&daemon->log, GW_LOG_WARNING,
-               "cannot change the crash marker %s: %s; after a crash the wheels would keep their last command for a "
-               "second",
+               "cannot change the crash marker %s: %s; until that works the wheels would keep their last command for a "
+               "second after a crash",
                daemon->runtime.marker_path, strerror(errno));
     }
+    daemon->mark_us = daemon->wheels.now_us + MARK_AGAIN_US;
 }
 
 /// While the machine was suspended, the monotonic clock stood still and the wheels did not wait.
@@ -136,9 +157,8 @@ static void step(gw_daemon_t *daemon) {
     note_suspend(daemon, suspended_us);
     iw_linux_hal_tend(&wheels->hal, wheels->now_us);
     gw_bus_facts_follow(&daemon->facts, wheels, daemon->status.observed.left_behind);
-    mark_if_sending(daemon); // Before the first frame that it warns of.
     const iw_snapshot_t seen = gw_wheels_step(wheels);
-    mark_if_sending(daemon);
+    mark_if_sending(daemon, &seen);
     iw_motion_evidence_look(&wheels->evidence, &wheels->core, &seen);
     gw_observe(&daemon->status, &seen);
     gw_dispatch_arming(&daemon->answers, &seen);

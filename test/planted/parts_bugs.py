@@ -14,6 +14,7 @@ REFUSE = "app/gateway/answers/refuse.c"
 CLIENT, TAPE, EVIDENCE = "app/gateway/clients/client.c", "app/gateway/wheels/tape.c", "core/src/evidence.c"
 SOCKETCAN, BUS = "port/linux/src/socketcan.c", "port/linux/src/bus.c"
 ESTOP, BXCAN, FILTERS = "port/linux/src/gpio_estop.c", "port/stm32_stub/bxcan.c", "port/stm32_stub/bxcan_filters.c"
+DAEMON = ("test_daemon",)
 LEARN = "app/ctl/learn/learn.c"
 STATUS_LEDGER = "app/gateway/ledger/knowledge_json.c"
 LINK, QUEUE, ASKING = "client/c/src/connection.c", "client/c/src/queue.c", "client/c/src/requests.c"
@@ -25,11 +26,14 @@ JSON, REQUEST, LINES = ("unit_json_in",), ("unit_northbound_request",), ("unit_j
 
 PARTS = [
     # The loop.
-    Bug("marker-gone-at-stopping", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels))",
-        "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels) && iw_gateway_state(&daemon->wheels.core) != IW_STATE_STOPPING)", MOTION),
-    Bug("marker-gone-when-latched", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels))",
-        "gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(&daemon->wheels) && iw_gateway_state(&daemon->wheels.core) != IW_STATE_LATCHED)", MOTION),
-    Bug("marker-after-the-first-frame", "R3", LOOP, "daemon->status.observed.left_behind); mark_if_sending(daemon);", "daemon->status.observed.left_behind);", MOTION),
+    Bug("marker-gone-at-stopping", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, needed)",
+        "gw_runtime_mark(&daemon->runtime, needed && iw_gateway_state(&daemon->wheels.core) != IW_STATE_STOPPING)", MOTION),
+    Bug("marker-gone-when-latched", "R3", LOOP, "gw_runtime_mark(&daemon->runtime, needed)",
+        "gw_runtime_mark(&daemon->runtime, needed && iw_gateway_state(&daemon->wheels.core) != IW_STATE_LATCHED)", MOTION),
+    Bug("marker-before-anything-was-sent", "R3", LOOP, "return daemon->runtime.marked || seen->sent->pairs != daemon->silent_pairs;", "return true;", MOTION),
+    Bug("marker-not-tried-again", "R3", "app/gateway/lock/runtime.c", "self->marked = done ? sending : self->marked; self->unsure = !done;",
+        "self->marked = sending;", MOTION),
+    Bug("marker-half-removed-is-there", "R3", "app/gateway/lock/runtime.c", "self->unsure = !done;", "", ("unit_gateway_runtime",)),
     Bug("suspension-not-told", "R7", LOOP, "gw_wheels_slept(&daemon->wheels, suspended_us - daemon->suspended_us);", "", MOTION),
     Bug("suspension-told-again", "R7", LOOP, "daemon->suspended_us = (suspended_us > daemon->suspended_us) ? suspended_us : daemon->suspended_us;", "", MOTION),
     Bug("estop-gone-unseen-between-setpoints", "R2", LOOP, "(daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels))", "false", MOTION),
@@ -164,6 +168,23 @@ PARTS = [
     Bug("clock-that-can-be-set", "R10", "port/linux/src/clock.c", "return read_us(CLOCK_MONOTONIC);", "return read_us(CLOCK_REALTIME);", CLOCK),
     Bug("clock-that-counts-sleep", "R10", "port/linux/src/clock.c", "running_us = read_us(CLOCK_MONOTONIC);", "running_us = read_us(CLOCK_BOOTTIME);", CLOCK),
     Bug("sleep-unseen", "R7", "port/linux/src/clock.c", "read_us(CLOCK_BOOTTIME);", "read_us(CLOCK_MONOTONIC);", CLOCK),
+    Bug("sent-into-an-untold-bus-off", "R6", BUS, "if (bus->up && bus->unheeded < IW_BUS_PASSIVE) { return 0; }", "", ("unit_linux_socketcan",)),
+    # The whole daemon, in simulated hours.
+    Bug("estop-line-asked-only-when-told", "R2", "port/linux/src/linux_hal.c", "self->estop_ops->present ? self->estop_ops->pressed(&self->estop, self->estop_quiet) : 0;",
+        "(self->estop_ops->present && !self->estop_quiet) ? self->estop_ops->pressed(&self->estop, self->estop_quiet) : 0;", DAEMON),
+    Bug("interrupted-wait-ends-the-loop", "R11", LOOP, "if (count < 0 && errno != EINTR) {", "if (count < 0) {", DAEMON),
+    Bug("half-a-line-counts-as-sent", "northbound", "app/gateway/clients/client.c", "self->out_start += (size_t)count; }", "self->out_start = self->out_end; }", DAEMON),
+    Bug("anybodys-command-is-the-holders", "R1", "app/gateway/answers/dispatch.c", "iw_gateway_drive(&wheels->core, sent_us, call->client->id, wanted, out_applied);",
+        "iw_gateway_drive(&wheels->core, sent_us, gw_wheels_look(wheels).holder, wanted, out_applied);", DAEMON),
+    Bug("lease-of-the-dead-runs-out", "R1", "app/gateway/answers/dispatch.c", "gw_wheels_leave(self->wheels, client->id);", "", DAEMON),
+    Bug("lost-interface-goes-unsaid", "R13", BUS, "if (error != 0) { iw_bus_lose(bus, error); return; }", "if (error != 0) { return; }", DAEMON),
+    Bug("newcomers-left-out-for-ever", "R11", "app/gateway/clients/service.c", "listener->from_us = 0; listen_to_newcomers(self, listener, true);", "listener->from_us = 0;", DAEMON),
+    Bug("watchdog-unfed-while-nothing-is-sent", "R11", LOOP, "gw_notify_cycle(&daemon->notify, daemon->wheels.now_us);",
+        "if (gw_wheels_are_sent_to(&daemon->wheels)) { gw_notify_cycle(&daemon->notify, daemon->wheels.now_us); }", DAEMON),
+    Bug("marker-looked-for-elsewhere", "R3", "app/gateway/lock/runtime.c", "self->marked = self->marked || is_marked(&self->lock.names.owners, self->place[i]);",
+        "self->marked = self->marked || (i > 0U && self->place[1][0] == '?');", DAEMON),
+    Bug("marker-before-the-first-frame", "R3", LOOP, "const iw_snapshot_t seen = gw_wheels_step(wheels); mark_if_sending(daemon, &seen);",
+        "(void)gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(wheels)); const iw_snapshot_t seen = gw_wheels_step(wheels); mark_if_sending(daemon, &seen);", DAEMON),
     # The STM32 driver.
     Bug("stm32-setpoint-in-the-wrong-bytes", "R8", BXCAN, "word_of(&frame->data[4])", "word_of(&frame->data[3])", ("unit_bxcan_transmit",)),
     Bug("stm32-echo-is-a-foreign-setpoint", "R13", BXCAN, "heir->frame[heir->owed].kind = IW_CAN_ECHO;", "", ("unit_bxcan_transmit",)),

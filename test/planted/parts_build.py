@@ -13,6 +13,8 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+# What a test is to be asked beside its name.
+ARGUMENTS = {"test_daemon": ["--quick", "--kills", "500"]}
 TIMEOUT_S = 120  # Of tests that take less than a second, on the busiest machine.
 
 
@@ -86,7 +88,7 @@ class Parts:
 def find_failure(program, folder):
     """The first test that fails, or how the program ended; None if it passed."""
     try:
-        done = subprocess.run([str(program)], cwd=folder, capture_output=True, text=True, errors="replace",
+        done = subprocess.run([str(program), *ARGUMENTS.get(program.name, [])], cwd=folder, capture_output=True, text=True, errors="replace",
                               stdin=subprocess.DEVNULL, timeout=TIMEOUT_S)
     except subprocess.TimeoutExpired:
         return "does not end"
@@ -95,4 +97,7 @@ def find_failure(program, folder):
     found = re.search(r":(test_\w+):FAIL", done.stdout)
     if found:
         return found[1]
+    found = re.search(r"^FAILED seed (\d+) .* rule (\d+): ", done.stdout, re.M)
+    if found:
+        return f"rule {found[2]} of seed {found[1]}"
     return f"ends by {signal.Signals(-done.returncode).name}" if done.returncode < 0 else f"ends with status {done.returncode}"

@@ -79,9 +79,12 @@ int iw_bus_send(iw_backend_store_t *self, const iw_can_frame_t *frame) {
     if (rig->bus < IW_BUS_PASSIVE) {
         return -1;
     }
-    rig->unmarked += daemon_rig_marked() ? 0U : 1U;
+    if (rig->full) {
+        return 0;
+    }
     rig->sent[side]++;
     rig->told_mm_s[side] = (int16_t)(frame->data[1] << 8 | frame->data[2]);
+    rig->unmarked += (rig->told_mm_s[side] == 0 || daemon_rig_marked()) ? 0U : 1U;
     rig->told_mA[side] = (int16_t)(frame->data[3] << 8 | frame->data[4]);
     rig->sent_us = rig->now_us;
     sim_world_submit(&rig->world, rig->now_us, rig->port, frame);

@@ -33,7 +33,8 @@ typedef struct {
     bool estop_silent;           ///< The next change of it wakes nobody, as when a GPIO chip goes.
     uint32_t waits;              ///< Of the loop.
     bool ended;                  ///< The loop has come to its end by itself.
-    uint32_t unmarked;           ///< Setpoints handed over while there was no crash marker.
+    bool full;                   ///< The bus takes no frame.
+    uint32_t unmarked;           ///< Nonzero setpoints handed over while there was no crash marker.
     uint32_t sent[IW_SIDES];     ///< Setpoints handed over.
     int16_t told_mA[IW_SIDES];   ///< Of the last of them.
     int16_t told_mm_s[IW_SIDES]; ///< The last of them.

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -61,7 +62,7 @@ static void assert_next_start_sends_zeros(void) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
 }
 
-static void test_marker_is_there_before_the_first_setpoint_and_until_after_the_last(void) {
+static void test_marker_is_there_before_the_first_nonzero_setpoint_and_until_after_the_last(void) {
     TEST_ASSERT_FALSE(daemon_rig_marked());
     begin_driving();
     (void)close(client);
@@ -72,6 +73,28 @@ static void test_marker_is_there_before_the_first_setpoint_and_until_after_the_l
     }
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
     TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.unmarked);
+}
+
+static void test_killed_before_anything_was_sent_the_next_start_sends_nothing(void) {
+    daemon_rig.full = true;
+    (void)daemon_rig_ask(client, "{\"cmd\":\"arm\"}");
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+    daemon_rig_crash();
+    daemon_rig.full = false;
+    const uint32_t before = daemon_rig.sent[IW_LEFT];
+    daemon_rig_start();
+    daemon_rig_run(1000);
+    TEST_ASSERT_EQUAL_UINT32(before, daemon_rig.sent[IW_LEFT]);
+}
+
+static void test_marker_that_could_not_be_set_is_tried_again(void) {
+    char path[128];
+    (void)snprintf(path, sizeof path, "%s/bus.armed", daemon_rig.folder);
+    TEST_ASSERT_EQUAL_INT(0, mkdir(path, 0755)); // Not to be opened for writing, nor unlinked.
+    begin_driving();
+    TEST_ASSERT_EQUAL_INT(0, rmdir(path));
+    daemon_rig_drive(client, 500, 500, 200);
+    TEST_ASSERT_TRUE(daemon_rig_marked());
 }
 
 static void test_marker_outlives_a_latch_until_its_zeros_have_been_held(void) {
@@ -391,7 +414,9 @@ static void test_estop_wakes_a_loop_that_lets_frames_wait(void) {
 
 int main(void) {
     UNITY_BEGIN();
-    RUN_TEST(test_marker_is_there_before_the_first_setpoint_and_until_after_the_last);
+    RUN_TEST(test_marker_is_there_before_the_first_nonzero_setpoint_and_until_after_the_last);
+    RUN_TEST(test_killed_before_anything_was_sent_the_next_start_sends_nothing);
+    RUN_TEST(test_marker_that_could_not_be_set_is_tried_again);
     RUN_TEST(test_marker_outlives_a_latch_until_its_zeros_have_been_held);
     RUN_TEST(test_killed_while_armed_the_next_start_sends_zeros);
     RUN_TEST(test_killed_in_the_ramp_the_next_start_sends_zeros);

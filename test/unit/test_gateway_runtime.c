@@ -184,8 +184,23 @@ static void test_marker_that_cannot_be_set_or_removed_is_told_with_its_path(void
     TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[1], 0755));
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, true));
     TEST_ASSERT_EQUAL_STRING(first.place[1], first.marker_path);
+    TEST_ASSERT_FALSE(gw_runtime_mark(&first, true)); // Tried again.
+    TEST_ASSERT_EQUAL_INT(0, rmdir(first.place[1]));
+    TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
     TEST_ASSERT_FALSE(gw_runtime_mark(&first, false));
     TEST_ASSERT_EQUAL_STRING(first.place[0], first.marker_path);
+}
+
+static void test_marker_that_could_be_removed_in_one_place_only_is_set_anew(void) {
+    TEST_ASSERT_EQUAL_INT(0, open_runtime(&first, &one));
+    TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
+    TEST_ASSERT_EQUAL_INT(0, mkdir(first.place[1], 0755));
+    TEST_ASSERT_FALSE(gw_runtime_mark(&first, false));
+    TEST_ASSERT_FALSE(exists(first.place[0]));
+    TEST_ASSERT_TRUE(gw_runtime_mark(&first, true));
+    TEST_ASSERT_TRUE(exists(first.place[0]));
+    TEST_ASSERT_EQUAL_INT(0, rmdir(first.place[1]));
+    TEST_ASSERT_TRUE(gw_runtime_mark(&first, false));
 }
 
 // Strangers -----------------------------------------------------------------------------------------------------------
@@ -499,6 +514,7 @@ int main(void) {
     RUN_TEST(test_marker_of_interface_is_found_by_gateway_with_socket_elsewhere);
     RUN_TEST(test_marker_without_right_to_the_shared_directory_lies_beside_the_socket);
     RUN_TEST(test_marker_that_cannot_be_set_or_removed_is_told_with_its_path);
+    RUN_TEST(test_marker_that_could_be_removed_in_one_place_only_is_set_anew);
     RUN_TEST(test_lock_with_its_name_held_by_a_stranger_is_taken_and_the_stranger_is_named);
     RUN_TEST(test_lock_with_its_name_held_silently_by_a_stranger_is_taken_and_told);
     RUN_TEST(test_lock_with_every_name_held_by_a_stranger_excludes_by_its_file);

@@ -92,6 +92,20 @@ static void test_bus_off_between_frames_of_one_batch_is_told_although_frames_fol
     TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
 }
 
+static void test_nothing_is_sent_between_a_bus_off_and_its_being_told(void) {
+    for (unsigned i = 0; i < IW_SOCKETCAN_BATCH; i++) {
+        fake_interface_put(&fake_interface.ours, 256, 4, 0);
+    }
+    fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
+    fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state()); // Both are in the second batch.
+    (void)drain();
+    TEST_ASSERT_EQUAL_INT(0, send_setpoint());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
+    TEST_ASSERT_EQUAL_INT(1, send_setpoint());
+}
+
 static void test_restart_tells_of_a_loss_that_was_not_heard(void) {
     fake_interface_put_error(CAN_ERR_RESTARTED, 0, 0);
     wait_ms(1);
@@ -400,6 +414,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_bus_off_and_restart_in_one_batch_are_told_as_a_loss_once);
     RUN_TEST(test_bus_off_between_frames_of_one_batch_is_told_although_frames_follow);
+    RUN_TEST(test_nothing_is_sent_between_a_bus_off_and_its_being_told);
     RUN_TEST(test_restart_tells_of_a_loss_that_was_not_heard);
     RUN_TEST(test_bus_off_that_lasts_is_told_until_the_controller_is_back);
     RUN_TEST(test_bus_off_that_was_forged_is_told_once_and_checked_at_once);

@@ -127,9 +127,11 @@ static bool remove_markers(gw_runtime_t *self) {
 }
 
 bool gw_runtime_mark(gw_runtime_t *self, bool sending) {
-    if (sending == self->marked) {
+    if (sending == self->marked && !self->unsure) {
         return true;
     }
-    self->marked = sending;
-    return sending ? set_marker(self) : remove_markers(self);
+    const bool done = sending ? set_marker(self) : remove_markers(self);
+    self->marked = done ? sending : self->marked;
+    self->unsure = !done; // What has failed may have been done in part.
+    return done;
 }

@@ -21,6 +21,7 @@ typedef struct {
     const char *directory;                               ///< Of the first place, if it may be made; else NULL.
     const char *marker_path;                             ///< Where it is, or where the last change failed.
     bool marked;                                         ///< It is there, as far as we know.
+    bool unsure;                                         ///< The last change failed.
 } gw_runtime_t;
 
 /// Takes the lock of `bus` and looks for the marker, also beside `socket`. `directory` is GW_RUNTIME_DIRECTORY but in tests, and must outlive
@@ -34,8 +35,8 @@ void gw_runtime_close(gw_runtime_t *self);
 /// True if the process before us died while it was sending.
 bool gw_runtime_crashed(const gw_runtime_t *self);
 
-/// Sets or removes the marker, once per change. False if that failed. Does not wait for a disk: its directory is
-/// meant to be in memory.
+/// Sets or removes the marker, once per change. False if that failed; the next call tries again. Does not wait for a disk: its
+/// directory is meant to be in memory.
 bool gw_runtime_mark(gw_runtime_t *self, bool sending);
 
 #endif

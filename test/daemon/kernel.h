@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+/// The Linux kernel as the gateway's process sees it, in virtual time: descriptors, files, sockets, a CAN interface, a GPIO line.
+///
+/// The linker leads every system call of the gateway here (`--wrap`, list in CMakeLists.txt); its own objects run unchanged, `main` and
+/// all. One process lives at a time. Whatever it does takes virtual time only here, in a call, so that calls are all the instants
+/// at which anybody outside could tell one run from another; at each of them
+///
+/// - time passes, the outside world goes on (world.h), and the process may be stopped, or preempted
+/// - it may be killed, before the call takes effect or right after
+/// - the call may fail, with an errno that its manual page names
+///
+/// Child processes are not run: what they would do outside is played (the keeper finds no file and writes none, the black box's
+/// writer takes its orders, the one that purges takes the link down and up). There is one kernel, because libc has no context.
+#ifndef DAEMON_KERNEL_H
+#define DAEMON_KERNEL_H
+
+#include "iwheel/can_frame.h"
+#include "iwheel/hal.h"
+#include "iwheel_sim/random.h"
+
+#include <setjmp.h>
+#include <sys/types.h>
+
+#define VK_INTERFACE "can0"
+#define VK_MARKER    "/run/iwheel/can0.armed"
+#define VK_GATEWAY   "/run/iwheel/gateway.sock"
+#define VK_WATCHERS  "/run/iwheel/watch.sock"
+#define VK_LINE      "ESTOP"
+/// The bytes of a connection that wait for the gateway, or for the client.
+#define VK_IN_SIZE  16384U
+#define VK_OUT_SIZE 65536U
+#define VK_STREAMS  8U
+
+/// How a life ended.
+typedef enum { VK_EXITED, VK_KILLED, VK_OVER } vk_end_t;
+
+/// A client's connection; its number stands for it.
+typedef struct {
+    bool taken;      ///< In use by a client.
+    bool watches;    ///< To the socket for watchers.
+    bool waiting;    ///< Not accepted yet.
+    bool shut;       ///< The client will send no more.
+    bool client_end; ///< The client has closed.
+    bool closed;     ///< The gateway has closed, or died.
+    size_t in_length;
+    size_t out_length;
+    uint64_t in_total; ///< Bytes that the gateway has taken.
+    char in[VK_IN_SIZE];
+    char out[VK_OUT_SIZE];
+} vk_stream_t;
+
+typedef struct {
+    iw_time_us_t now_us;
+    iw_time_us_t stolen_us;    ///< Time in which the process was ready and did not run, since the beginning.
+    iw_time_us_t stop_us;      ///< Stopped until then.
+    iw_time_us_t suspended_us; ///< What CLOCK_MONOTONIC has not counted.
+    int64_t wall_off_us;       ///< Of the wall clock.
+    iw_time_us_t end_us;       ///< The life ends there as VK_OVER.
+    uint64_t calls;            ///< Of all lives.
+    uint64_t waits;            ///< Of these, waits of the loop.
+    uint64_t failed;           ///< Of these, made to fail.
+    uint64_t kill_at;          ///< The process dies in the call with this number; 0: in none.
+    bool kill_after;           ///< After it has taken effect.
+    bool doomed;               ///< It dies before it does anything else.
+    iw_time_us_t failed_us;    ///< When a call was made to fail last.
+    iw_time_us_t failed_stolen_us;
+    bool marker_failed;     ///< The last one upon the crash marker was.
+    uint32_t fail_permille; ///< Calls that fail.
+    uint32_t late_us;       ///< Each wake-up is late by up to this.
+    bool no_descriptors;    ///< None is left for anybody.
+    bool trace;
+    sim_random_t random;
+    int signal; ///< Pending, or 0.
+    int exit_code;
+    struct {
+        bool exists;
+        bool up;
+        bool off; ///< Bus-off.
+        bool may_restart;
+        int index;
+        int news;    ///< What the netlink socket for events has not told yet.
+        pid_t child; ///< That purges; 0: none.
+        iw_time_us_t down_at_us;
+        iw_time_us_t up_at_us;
+        int child_status;
+    } link;
+    struct {
+        bool there;
+        int number; ///< Another after it was gone: who holds the one before reads nothing any more.
+        bool pressed;
+        int edges; ///< Not read yet.
+    } button;
+    vk_stream_t stream[VK_STREAMS];
+    bool bound_drive; ///< Somebody listens.
+    bool bound_watch;
+    bool alive;
+    jmp_buf leave;
+} vk_t;
+
+extern vk_t vk;
+
+void vk_begin(uint64_t seed, iw_time_us_t now_us, const char *config);
+
+/// Runs the gateway from `main` on until it ends, is killed, or time is over. Descriptors close; files and link stay.
+vk_end_t vk_live(void);
+
+/// No process lives for so long.
+void vk_idle(iw_time_us_t for_us);
+
+/// Time goes on to there with all that happens outside. In a call of the process only.
+void vk_pass(iw_time_us_t to_us);
+
+/// A client connects. Its number, or -1: nobody listens, or no room.
+int vk_connect(bool watches);
+
+/// A frame was on the bus; `echo`: it was the gateway's own.
+void vk_deliver(const iw_can_frame_t *frame, bool echo);
+/// An error frame of these classes and, in byte 1, this state of the controller.
+void vk_deliver_error(uint32_t classes, uint8_t state);
+
+void vk_link_up(bool up);
+void vk_link_exist(bool exists);
+
+void vk_press(bool pressed);
+
+bool vk_file_exists(const char *path);
+
+/// A call fails, or might.
+void vk_note_failure(void);
+
+// For the parts of the kernel ---------------------------------------------------------------------------------------
+
+typedef enum {
+    VK_FREE = 0,
+    VK_FILE,
+    VK_EPOLL,
+    VK_SIGNAL,
+    VK_LISTENER,
+    VK_STREAM,
+    VK_SOCKET, ///< Not bound to anything, or one whose messages nobody answers.
+    VK_CAN,
+    VK_NETLINK,
+    VK_GPIO,
+    VK_CHILD,
+} vk_kind_t;
+
+typedef struct {
+    vk_kind_t kind;
+    int number;    ///< Of the file, the stream, the CAN socket, the epoll set; family of a socket.
+    size_t offset; ///< In a file.
+    bool locked;
+    bool events; ///< Of a netlink socket: it hears of changes.
+    char name[96];
+} vk_fd_t;
+
+vk_fd_t *vk_fd(int fd);
+
+/// Begins a call. False: it fails, errno is one of `errors` (ended by 0; NULL: it cannot).
+bool vk_call(const char *name, const int *errors);
+/// Ends it.
+long vk_done(long result);
+/// As `vk_call` and a new descriptor. -1: it failed.
+int vk_open_fd(const char *name, vk_kind_t kind, int number);
+/// True if something would be told; of what epoll knows.
+uint32_t vk_ready(int fd);
+uint32_t vk_ready_socket(const vk_fd_t *entry);
+void vk_close_socket(const vk_fd_t *entry);
+ssize_t vk_read_signal(void *out, size_t size);
+int vk_make_socket_file(const char *name);
+const char *vk_path_of(int file);
+void vk_files_begin(const char *config);
+void vk_forget_sockets(void);
+void vk_set_carrier(void);
+
+#endif
