@@ -201,7 +201,7 @@ static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
 }
 
 /// Everything before any age is judged (R7), but bounded: a babbling node must not keep the step from ending.
-static void receive(iw_gateway_t *self) {
+static IW_APART void receive(iw_gateway_t *self) {
     iw_can_frame_t frame;
     uint32_t taken = 0;
     while (taken < IW_GATEWAY_DRAIN_MAX && self->hal.receive(self->hal.context, &frame) > 0) {

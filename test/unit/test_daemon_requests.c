@@ -4,6 +4,7 @@
 
 #include "unity.h"
 
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -219,12 +220,26 @@ static void test_stop_and_estop_need_no_lease(void) {
     (void)close(other);
 }
 
+static uint64_t noted_so_far(void) {
+    return blackbox_ring_written(daemon_rig.daemon->box.ring);
+}
+
+static blackbox_entry_t *found; ///< By `look`, and kept until the next.
+
+/// What the black box holds from `*at` on; `*at` is the first of it then. How many.
+static size_t look(uint64_t *at) {
+    const blackbox_ring_t *ring = daemon_rig.daemon->box.ring;
+    size_t count = 0;
+    found = (blackbox_entry_t *)realloc(found, blackbox_ring_most(ring) * sizeof *found);
+    TEST_ASSERT_NOT_NULL(found);
+    *at = blackbox_ring_copy(ring, *at, noted_so_far(), found, &count);
+    return count;
+}
+
 /// The next entry of that kind in the black box, from `*at` on.
 static blackbox_entry_t noted(blackbox_kind_t kind, uint64_t *at) {
-    static blackbox_entry_t found[BLACKBOX_ENTRIES_MIN];
-    size_t count = 0;
-    const blackbox_ring_t *ring = daemon_rig.daemon->box.ring;
-    const uint64_t first = blackbox_ring_copy(ring, *at, blackbox_ring_written(ring), found, &count);
+    uint64_t first = *at;
+    const size_t count = look(&first);
     for (size_t i = 0; i < count; i++) {
         if (found[i].kind == kind) {
             *at = first + i + 1U;
@@ -233,10 +248,6 @@ static blackbox_entry_t noted(blackbox_kind_t kind, uint64_t *at) {
     }
     TEST_FAIL_MESSAGE(blackbox_kind_name(kind));
     return (blackbox_entry_t){0};
-}
-
-static uint64_t noted_so_far(void) {
-    return blackbox_ring_written(daemon_rig.daemon->box.ring);
 }
 
 static void test_each_request_is_noted_with_who_asked_and_what_became_of_it(void) {
@@ -382,9 +393,7 @@ static void test_facts_of_the_bus_are_taken_once_for_each_change(void) {
     TEST_ASSERT_EQUAL_UINT32(warnings, daemon_rig.daemon->wheels.warnings);
     (void)noted(BLACKBOX_FACTS, &at);
     unsigned facts = 0;
-    static blackbox_entry_t found[BLACKBOX_ENTRIES_MIN];
-    size_t count = 0;
-    (void)blackbox_ring_copy(daemon_rig.daemon->box.ring, at, noted_so_far(), found, &count);
+    const size_t count = look(&at);
     for (size_t i = 0; i < count; i++) {
         facts += (found[i].kind == BLACKBOX_FACTS) ? 1U : 0U;
     }
