@@ -44,10 +44,12 @@ static bool is_filled(const blackbox_entry_t *entry) {
     return entry->kind != (uint8_t)BLACKBOX_FRAME && memcmp(&entry->as, &empty.as, sizeof empty.as) != 0;
 }
 
+/// Writes four bytes, whose first `size` count: compilers make one store of them.
 static size_t put_number(uint8_t *to, uint32_t number, size_t size) {
-    for (size_t i = 0; i < size; i++) {
-        to[i] = (uint8_t)(number >> (8U * i));
-    }
+    to[0] = (uint8_t)number;
+    to[1] = (uint8_t)(number >> 8);
+    to[2] = (uint8_t)(number >> 16);
+    to[3] = (uint8_t)(number >> 24);
     return size;
 }
 
@@ -59,7 +61,7 @@ static uint32_t take_number(const uint8_t *from, size_t size) {
     return number;
 }
 
-/// Bytes written.
+/// Bytes that count of those written: what is behind them, up to PACKED_MAX, is written again by the next entry, or never read.
 static size_t pack(const blackbox_entry_t *entry, bool same_time, uint32_t offset_us, uint8_t *to) {
     const bool is_long = entry->number > UINT16_MAX;
     size_t at = 3;
@@ -69,7 +71,7 @@ static size_t pack(const blackbox_entry_t *entry, bool same_time, uint32_t offse
     to[2] = entry->b;
     at += same_time ? 0U : put_number(&to[at], offset_us, 3);
     at += put_number(&to[at], entry->number, is_long ? 4U : 2U);
-    memcpy(&to[at], &entry->as, filling(entry, to[0]));
+    memcpy(&to[at], &entry->as, sizeof entry->as);
     return at + filling(entry, to[0]);
 }
 

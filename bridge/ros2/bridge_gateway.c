@@ -50,6 +50,14 @@ static void read_last_stop(bridge_t *self) {
     }
 }
 
+/// A board's ledger has no values. Without its configuration the document's approximate measures would stand for them.
+static void read_values(bridge_t *self) {
+    iwc_message_t config;
+    if (iwc_ask(self->gateway, "{\"cmd\":\"config\"}", BRIDGE_ASK_MS, &config) == IWC_OK) {
+        ros_facts_read_config(&config, &self->facts.machine);
+    }
+}
+
 static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
     ros_machine_t *machine = &self->facts.machine;
     if (!ros_facts_read(self->gateway, message, machine)) {
@@ -77,6 +85,10 @@ iwc_result_t bridge_call(bridge_t *self) {
     result = newer ? IWC_OK : result;
     if (result == IWC_OK) {
         read_last_stop(self);
+        result = iwc_ask(self->gateway, "{\"cmd\":\"status\"}", BRIDGE_ASK_MS, &status);
+    }
+    if (result == IWC_OK && ros_facts_lack_values(&status)) {
+        read_values(self);
         result = iwc_ask(self->gateway, "{\"cmd\":\"status\"}", BRIDGE_ASK_MS, &status);
     }
     if (result == IWC_OK) {

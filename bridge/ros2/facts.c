@@ -21,12 +21,55 @@ bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_mach
     return true;
 }
 
-/// A number at the beginning of a ledger entry's value; `otherwise` if there is none above 0.
-static long value_of(const iwc_message_t *ledger, const char *item, long otherwise) {
+/// Items of the ledger, and where a configuration has their values.
+typedef enum { RADIUS, TRACK, GEAR, ROLE } valued_t;
+static const struct {
+    const char *item;
+    const char *key;
+} valued[ROS_CONFIGURED] = {[RADIUS] = {"wheel_radius", "wheels.radius_mm"},
+                            [TRACK] = {"track", "wheels.track_mm"},
+                            [GEAR] = {"gear_ratio", "wheels.gear_ratio"},
+                            [ROLE] = {"current_role", "wheels.current_role"}};
+
+bool ros_facts_lack_values(const iwc_message_t *snapshot) {
+    char value[48];
+    return !iwc_text(snapshot, "ledger.track.value", value, sizeof value);
+}
+
+void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine) {
+    size_t left = 0;
+    const char *at = iwc_json(reply, "keys", &left);
+    const char *end = (at != NULL) ? at + left : NULL;
+    // Objects of two texts: none has a brace in it.
+    while (at != NULL && (at = memchr(at, '{', (size_t)(end - at))) != NULL) {
+        const char *close = memchr(at, '}', (size_t)(end - at));
+        if (close == NULL) {
+            return;
+        }
+        const iwc_message_t entry = {.text = at, .length = (size_t)(close - at) + 1U};
+        for (size_t i = 0; i < ROS_CONFIGURED; i++) {
+            if (iwc_is(&entry, "key", valued[i].key)) {
+                (void)iwc_text(&entry, "value", machine->configured[i], sizeof machine->configured[i]);
+            }
+        }
+        at = close;
+    }
+}
+
+/// The value of a ledger's entry, or what is configured; empty: neither is known.
+static void text_of(const iwc_message_t *ledger, valued_t which, const ros_machine_t *machine, char out[48]) {
     char path[48];
+    (void)snprintf(path, sizeof path, "%s.value", valued[which].item);
+    if (!iwc_text(ledger, path, out, 48)) {
+        (void)snprintf(out, 48, "%s", machine->configured[which]);
+    }
+}
+
+/// A number at the beginning of it; `otherwise` if there is none above 0.
+static long value_of(const iwc_message_t *ledger, valued_t which, const ros_machine_t *machine, long otherwise) {
     char text[48];
-    (void)snprintf(path, sizeof path, "%s.value", item);
-    const long value = iwc_text(ledger, path, text, sizeof text) ? strtol(text, NULL, 10) : 0;
+    text_of(ledger, which, machine, text);
+    const long value = strtol(text, NULL, 10);
     return (value > 0) ? value : otherwise;
 }
 
@@ -65,7 +108,7 @@ void ros_facts_read_ledger(const iwc_message_t *message, ros_machine_t *machine)
                                         "pose_byte_order",
                                         "dlc"};
     char path[48];
-    char gear[32];
+    char text[48];
     char *slash;
     iwc_message_t ledger = {.is_event = true};
     ledger.text = iwc_json(message, "ledger", &ledger.length);
@@ -81,11 +124,12 @@ void ros_facts_read_ledger(const iwc_message_t *message, ros_machine_t *machine)
             tell_contradiction(&ledger, items[i], machine);
         }
     }
-    machine->setpoint_current = iwc_is(&ledger, "current_role.value", "setpoint");
-    machine->radius_mm = value_of(&ledger, "wheel_radius", 192);
-    machine->track_mm = value_of(&ledger, "track", 540);
-    (void)iwc_text(&ledger, "gear_ratio.value", gear, sizeof gear);
-    const double turns = strtod(gear, &slash);
+    text_of(&ledger, ROLE, machine, text);
+    machine->setpoint_current = strcmp(text, "setpoint") == 0;
+    machine->radius_mm = value_of(&ledger, RADIUS, machine, 192);
+    machine->track_mm = value_of(&ledger, TRACK, machine, 540);
+    text_of(&ledger, GEAR, machine, text);
+    const double turns = strtod(text, &slash);
     const double per = (*slash == '/') ? strtod(slash + 1, NULL) : 1.0;
     const double rotor_turns = (turns > 0.0 && per > 0.0) ? turns / per : 1.0;
     machine->measures = (ros_measures_t){

@@ -8,6 +8,8 @@
 #include "iwheel_client/client.h"
 
 #define ROS_SENTENCE_SIZE 600U
+/// Keys of the configuration that odometry and driving depend on.
+#define ROS_CONFIGURED 4U
 
 typedef enum {
     ROS_LINK_GONE = 0, ///< No connection to the gateway.
@@ -36,6 +38,8 @@ typedef struct {
     char timing[16];
     char holder[65]; ///< Name of who has the lease.
     int64_t lease_ms;
+    /// What a gateway without a file has in its configuration, by ros_facts_read_config: a board's ledger has no values.
+    char configured[ROS_CONFIGURED][24];
     int64_t radius_mm;
     int64_t track_mm;
     ros_measures_t measures;
@@ -56,6 +60,10 @@ typedef struct {
 
 /// Takes in a snapshot (event `state`, reply to `status`). False, with `*out_machine` untouched, if it is none.
 bool ros_facts_read(const iwc_t *gateway, const iwc_message_t *message, ros_machine_t *out_machine);
+
+/// Takes in the reply to `config`, if it is one. Whether the ledger lacks values, so that it has to be asked for: `ros_facts_lack_values`.
+void ros_facts_read_config(const iwc_message_t *reply, ros_machine_t *machine);
+bool ros_facts_lack_values(const iwc_message_t *snapshot);
 
 /// Takes in what the ledger of a snapshot says: measures, contradictions. Dearer, and seldom new.
 void ros_facts_read_ledger(const iwc_message_t *message, ros_machine_t *machine);

@@ -55,6 +55,9 @@ static int check_gateway(const ros_settings_t *settings) {
         return 1;
     }
     (void)printf("ok    gateway %s\n", settings->gateway.socket);
+    if (iwc_ask(gateway, "{\"cmd\":\"config\"}", 1000, &status) == IWC_OK) { // A board; others refuse it.
+        ros_facts_read_config(&status, &machine);
+    }
     if (iwc_ask(gateway, "{\"cmd\":\"status\"}", 1000, &status) == IWC_OK) {
         ros_facts_read_ledger(&status, &machine);
         if (settings->drive.enabled && machine.setpoint_current) {

@@ -160,6 +160,32 @@ static void test_ledger_gives_measures_and_what_is_contradicted(void) {
     TEST_ASSERT_TRUE(facts.machine.setpoint_current);
 }
 
+static void test_configuration_stands_for_the_values_that_a_board_has_not(void) {
+    static const char board[] =
+        "{\"event\":\"state\",\"ledger\":{\"wheel_radius\":{\"state\":\"assumed\",\"value\":null},"
+        "\"track\":{\"state\":\"confirmed\",\"value\":null},\"gear_ratio\":{\"value\":null}}}";
+    static const char config[] =
+        "{\"ok\":true,\"keys\":[{\"key\":\"wheels.current_role\",\"value\":\"setpoint\"},{\"key\":\"wheels.radius_mm\","
+        "\"value\":\"150\"},{\"key\":\"wheels.gear_ratio\",\"value\":\"5/"
+        "2\"},{\"key\":\"wheels.track_mm\",\"value\":\"610\"}],"
+        "\"staged\":false}";
+    const iwc_message_t seen = {.text = board, .length = sizeof board - 1U, .is_event = true};
+    const iwc_message_t reply = {.text = config, .length = sizeof config - 1U};
+    const iwc_message_t whole = snapshot();
+    TEST_ASSERT_TRUE(ros_facts_lack_values(&seen));
+    TEST_ASSERT_FALSE(ros_facts_lack_values(&whole));
+    ros_facts_read_config(&reply, &facts.machine);
+    ros_facts_read_ledger(&seen, &facts.machine);
+    TEST_ASSERT_EQUAL_INT64(150, facts.machine.radius_mm);
+    TEST_ASSERT_EQUAL_INT64(610, facts.machine.track_mm);
+    TEST_ASSERT_TRUE(facts.machine.setpoint_current && facts.machine.measures.track_confirmed);
+    expect_near(1e-9, 2.0 * M_PI * 0.15 / 60.0 / 2.5, facts.machine.measures.tick_m);
+    const iwc_message_t cut = {.text = config, .length = 60};
+    ros_facts_read_config(&cut, &facts.machine); // A reply that is none: what is known stays.
+    ros_facts_read_ledger(&whole, &facts.machine);
+    TEST_ASSERT_EQUAL_INT64(200, facts.machine.radius_mm);
+}
+
 // ---- diagnostics --------------------------------------------------------------------------------------------------
 
 static void expect(ros_tells_t which, ros_level_t level, const char *part) {
@@ -262,6 +288,7 @@ int main(void) {
     RUN_TEST(test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed);
     RUN_TEST(test_snapshot_is_read_and_unknown_stays_unknown);
     RUN_TEST(test_ledger_gives_measures_and_what_is_contradicted);
+    RUN_TEST(test_configuration_stands_for_the_values_that_a_board_has_not);
     RUN_TEST(test_diagnosis_all_in_order_is_ok);
     RUN_TEST(test_diagnosis_gateway_gone_is_an_error_and_the_rest_stale);
     RUN_TEST(test_diagnosis_each_stop_has_its_sentence_and_cure);
