@@ -49,8 +49,7 @@ class Interrupted(unittest.TestCase):
         with concurrent.futures.ThreadPoolExecutor(3) as pool:
             for what, (code, left, running, said) in pool.map(lambda p: (p, play(**p)), plays):
                 self.assertEqual(([], []), (left, running), (what, said[-600:]))
-                self.assertNotEqual(0, code, what)
-                if what["seconds"] >= 0.5:  # Before, it may be Python itself that is interrupted.
+                if what["seconds"] >= 0.5:  # Before, it may be Python itself that is interrupted, or that swallows it while it starts.
                     self.assertIn(code, (130, -signal.SIGINT), (what, said[-600:]))
                     self.assertNotIn("Traceback", said)
 
