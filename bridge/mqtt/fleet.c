@@ -249,7 +249,7 @@ void fleet_show(const fleet_t *self, uint64_t now_us, FILE *out) {
         show_time(machine->stop_wall_us, out);
         (void)fprintf(out, " %s\n", or_unknown(machine->cause));
     }
-    (void)fprintf(out, "%zu machines, %zu online", self->count, online);
+    (void)fprintf(out, "%zu machine%s, %zu online", self->count, (self->count == 1U) ? "" : "s", online);
     if (self->left_out > 0U) {
         (void)fprintf(out, "; %" PRIu64 " messages left out", self->left_out);
     }

@@ -307,8 +307,9 @@ void history_sum(const history_t *self, const char *host) {
     }
     write_time(self->wish.since_us, since);
     write_time(self->wish.until_us, until);
-    (void)fprintf(self->out, "%" PRIu64 " %s of %zu machines, %s to %s, from the stream at %s", self->told,
-                  self->wish.all ? "events" : "stops", machines, since, until, host);
+    (void)fprintf(self->out, "%" PRIu64 " %s%s of %zu machine%s, %s to %s, from the stream at %s", self->told,
+                  self->wish.all ? "event" : "stop", (self->told == 1U) ? "" : "s", machines,
+                  (machines == 1U) ? "" : "s", since, until, host);
     if (self->doubled > 0U) {
         (void)fprintf(self->out, "; %" PRIu64 " doubles left out", self->doubled);
     }

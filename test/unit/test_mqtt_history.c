@@ -63,7 +63,7 @@ static void test_history_stop_is_told_in_one_line_with_its_time_and_sentence(voi
     TEST_ASSERT_EQUAL_STRING("2026-11-21 22:01:01 w1           stop   stop number 1\n", text());
     history_sum(&history, "n1");
     TEST_ASSERT_NOT_NULL(
-        strstr(text(), "1 stops of 1 machines, 2026-11-21 22:00:00 to 2026-11-21 23:00:00, from the stream at n1\n"));
+        strstr(text(), "1 stop of 1 machine, 2026-11-21 22:00:00 to 2026-11-21 23:00:00, from the stream at n1\n"));
 }
 
 static void test_history_doubles_are_left_out_by_id_also_across_runs_of_the_bridge(void) {
