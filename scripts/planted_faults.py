@@ -411,6 +411,7 @@ CASES = [
     (pages, "python3", "an indexed entry that is not there", ("scripts/README.md", "one.py", "two.py"), True),
     (python_pins, "python3", "clean", ("tool", "sh", "sh"), False),
     (python_pins, "python3", "a pin without a checksum", ("scripts/requirements.txt", r"^(lizard==\S+) \\\n.*\n", r"\1\n"), True),
+    (python_pins, "python3", "a pin for one Python only", ("scripts/requirements.txt", r"^(cyclonedds==\S+ ; )", r'\1python_version == "3.13" and '), True),
     (python_pins, "python3", "a wish that is not pinned", ("scripts/requirements.in", r"^lizard==.*$", "lizard==9.9"), True),
     (python_pins, "python3", "a pin that nobody needs", ("scripts/requirements.in", r"^lizard==.*$", ""), True),
     (python_pins, "python3", "a program that calls pip without checksums", ("tool", "--require-hashes ", ""), True),

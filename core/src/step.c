@@ -303,7 +303,7 @@ static uint32_t both_rest_us(const iw_gateway_t *self) {
 
 /// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step. What several rules ask
 /// is found out once.
-static void judge(iw_gateway_t *self) {
+static void judge_wheels(iw_gateway_t *self) {
     iw_permit_view_t view;
     view.heard =
         iw_wheel_heard(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], self->now_us);
@@ -416,7 +416,7 @@ iw_time_us_t iw_gateway_step(iw_gateway_t *self, iw_time_us_t now_us) {
     self->now_us = now_us;
     begin(self);
     receive(self);
-    judge(self);
+    judge_wheels(self);
     send_due(self);
     self->promised_us = next_step_us(self);
     return self->promised_us;

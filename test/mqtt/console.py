@@ -188,7 +188,7 @@ def stop_with_recording(rig, seconds=0.0):
     make_stops(rig, 1)
     name = until(lambda: next(iter(sorted(Path(rig.folder).glob("stop-*.log"))), None), what="a recording").stem
     end = Path(rig.path(name + ".jsonl"))
-    until(lambda: '"end"' in end.read_text(encoding="utf-8").splitlines()[-1], what="it is whole")
+    until(lambda: end.exists() and '"end"' in "".join(end.read_text(encoding="utf-8").splitlines()[-1:]), what="it is whole")
     return name
 
 
