@@ -65,6 +65,20 @@ bool iw_host_keep(const iw_settings_t *settings) {
     return true;
 }
 
+static iw_learnt_t kept;
+static bool has_kept;
+
+bool iw_host_recall(iw_learnt_t *out_learnt) {
+    *out_learnt = kept;
+    return has_kept;
+}
+
+bool iw_host_remember(const iw_learnt_t *learnt) {
+    kept = *learnt;
+    has_kept = true;
+    return true;
+}
+
 static void say(uint8_t channel, const char *json, size_t length) {
     const iwn_line_t line = {.json = json, .length = length, .channel = channel};
     wire_taken = 0;
@@ -176,6 +190,7 @@ static void begin(void) {
     t_us = first_us;
     wire_length = wire_taken = 0;
     seq = spent_ms = answers = asked = moved = 0;
+    has_kept = false;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
