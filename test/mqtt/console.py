@@ -86,7 +86,7 @@ def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
     far = machine_at(rig, cluster)
     publish_stops(far, [("a", 1, 1, -9000), ("a", 2, 2, -60), ("a", 2, 2, -60), ("a", 5, 3, -50), ("b", 6, 6, -40), ("a", 5, 3, -50)])
     cluster.servers[cluster.leader()].signal(9)
-    until(lambda: console(rig, config, "history", "--last", "1h")[1].count(" stop ") == 6, 30, "all of them")
+    until(lambda: console(rig, config, "history", "--last", "1h")[1].count(" stop   ") == 6, 30, "all of them")
     code, out, err = console(rig, config, "history", "w2", "--last", "1h")
     assert code == 0 and "2 doubles left out" in out and "(stored " in out and ID not in out.split(), (code, out, err)
     assert re.search(r"-- 2 events before this one are not in the stream.*\n.*told as 3\n.*-- 2 stops before this one are not in the stream.*\n.*told as 6\n", out), out
@@ -96,7 +96,7 @@ def test_history_tells_each_stop_once_with_gaps_and_survives_the_leader(rig):
     assert total["events"] == 6 and total["machines"] == 2 and total["doubled"] == 2 and total["missing"] == 2 and total["stops_missing"] == 2, total
     before = datetime.fromtimestamp(time.time() - 8000, timezone.utc).strftime("%Y-%m-%dT%H:%MZ")
     code, out, err = console(rig, config, "history", "w2", "--since", "2020-01-01", "--until", before)
-    assert code == 0 and out.count(" stop ") == 1 and "told as 1" in out, (code, out, err)
+    assert code == 0 and out.count(" stop   ") == 1 and "told as 1" in out, (code, out, err)
     everything = lines(console(rig, config, "history", ID, "--all", "--json")[1])[:-1]
     assert {"stop", "estop"} <= {event["message"]["event"] for event in everything} and not any(event["missing_before"] for event in everything), everything
     rows = lines(console(rig, config, "--for", "3", "--json")[1])
