@@ -280,7 +280,7 @@ def around(_, found):
     word, known, there = found
     record = argparse.Namespace(files=["a.c"], mutants={"a.c | f | x; | y;": None} if there else {})
     with contextlib.redirect_stdout(io.StringIO()) as said:
-        return of_mutation("around").verdict(record, known, {"a.c | f | x; | y;": word} if there else {}), said.getvalue()
+        return of_mutation("around").verdict(record, known, {"a.c | f | x; | y;": word} if there else {}, True), said.getvalue()
 
 
 def mutation(_, kind):
