@@ -66,6 +66,7 @@ PARTS = [
     # Clients.
     Bug("lease-outlives-its-client", "R1", DISPATCH, "gw_wheels_leave(self->wheels, client->id);", "", MOTION),
     Bug("lease-ends-after-the-lines", "R1", SERVICE, "if (client->leaving) {", "if (client->leaving && !client->readable) {", MOTION),
+    Bug("arm-that-waited-through-a-stop", "R3", CLIENT, "return self->caught_up_us < self->stopped_us;", "return false;", REQUESTS),
     Bug("command-from-before-arm-is-prompt", "R3", CLIENT, "<= GW_PROMPT_US && self->caught_up_us >= since_us;", "<= GW_PROMPT_US; (void)since_us;", REQUESTS),
     Bug("caught-up-with-lines-left", "R1", CLIENT, "self->drained && gw_client_line(self, &length) == NULL", "gw_client_line(self, &length) == NULL", ("unit_northbound_lines",)),
     Bug("events-take-the-replys-room", "R11", CLIENT, "if (length + reserve > sizeof self->out - waiting) {", "(void)reserve; if (length > sizeof self->out - waiting) {", ("unit_northbound_lines",)),
