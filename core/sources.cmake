@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # The core's sources, for core/CMakeLists.txt and the Zephyr module.
 set(IWHEEL_CORE_SOURCES
+    src/age.c
     src/bit_timing.c
     src/cause.c
     src/codec.c

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "cause.h"
 
+#include "magnitude.h"
+
 IW_STATIC_ASSERT(IW_CAUSES <= 32, one_bit_per_cause);
 
 /// One row per cause: effect, level or event, without a ramp, refusal while present. R2, R7 and R13 say which of them
@@ -35,15 +37,12 @@ bool iw_cause_latches(iw_cause_t cause) {
     return iw_cause_rows[cause].effect != IW_STOPS;
 }
 
-static bool seen_lately(iw_time_us_t now_us, iw_time_us_t seen_us) {
-    return seen_us != IW_NEVER && now_us - seen_us < IW_PERMIT_EVENT_US;
-}
-
 uint32_t iw_cause_present(uint32_t told, const iw_time_us_t seen_us[IW_CAUSES], iw_time_us_t now_us) {
     uint32_t present = 0;
     for (uint32_t cause = FIRST; cause <= LAST; cause++) {
         const uint32_t bit = IW_CAUSE_BIT(cause);
-        const bool is = iw_cause_rows[cause].level ? (told & bit) != 0U : seen_lately(now_us, seen_us[cause]);
+        const bool is =
+            iw_cause_rows[cause].level ? (told & bit) != 0U : iw_age_us(seen_us[cause], now_us) < IW_PERMIT_EVENT_US;
         present |= is ? bit : 0U;
     }
     return present;

@@ -5,36 +5,55 @@
 
 #include <string.h>
 
-typedef struct {
-    uint16_t standard;
-    iw_config_range_t range;
-} field_t;
-
-/// Ranges and defaults of the numbers that iw_config_t begins with, in its order: so one loop checks all of them.
-/// Indexed by iw_config_fault_t - IW_CONFIG_PERIOD.
-static const field_t fields[] = {
-    {20, {5, 50}},                                         // period_ms
-    {200, {20, 500}},                                      // lease_ms
-    {800, {50, 20000}},                                    // accel_mm_s2
-    {1500, {100, 20000}},                                  // decel_mm_s2
-    {1000, {10, 5000}},                                    // max_speed_mm_s
-    {IW_CURRENT_LIMIT_mA, {0, IW_CURRENT_LIMIT_mA}},       // max_current_mA
-    {1500, {1100, 5000}},                                  // zero_hold_ms
-    {50, {20, 200}},                                       // wheel_silent_ms
-    {50, {20, 200}},                                       // echo_ms
-    {2, {0, 20}},                                          // rest_rpm
-    {200, {50, 2000}},                                     // rest_ms
-    {300, {50, 5000}},                                     // follow_mm_s
-    {500, {100, 5000}},                                    // follow_ms
-    {1000, {200, 10000}},                                  // blocked_ms
-    {192, {20, 500}},                                      // radius_mm
-    {1, {1, 1000}},                                        // gear_turns
-    {1, {1, 1000}},                                        // gear_per
-    {IW_DLC_SETPOINT, {IW_DLC_SETPOINT, IW_CAN_DATA_MAX}}, // setpoint_dlc
+/// The documented defaults.
+static const iw_config_t standard = {
+    .force_unit = {IW_FORCE_CN, IW_FORCE_DN},
+    .period_ms = 20,
+    .lease_ms = 200,
+    .accel_mm_s2 = 800,
+    .decel_mm_s2 = 1500,
+    .max_speed_mm_s = 1000,
+    .max_current_mA = IW_CURRENT_LIMIT_mA,
+    .zero_hold_ms = 1500,
+    .wheel_silent_ms = 50,
+    .echo_ms = 50,
+    .rest_rpm = 2,
+    .rest_ms = 200,
+    .follow_mm_s = 300,
+    .follow_ms = 500,
+    .blocked_ms = 1000,
+    .radius_mm = 192,
+    .gear_turns = 1,
+    .gear_per = 1,
+    .setpoint_dlc = IW_DLC_SETPOINT,
 };
-#define FIELDS (sizeof fields / sizeof fields[0])
+
+/// Ranges of the numbers of iw_config_t, in its order: so one loop checks all of them. Indexed by
+/// iw_config_fault_t - IW_CONFIG_PERIOD.
+static const iw_config_range_t ranges[] = {
+    {5, 50},                            // period_ms
+    {20, 500},                          // lease_ms
+    {50, 20000},                        // accel_mm_s2
+    {100, 20000},                       // decel_mm_s2
+    {10, 5000},                         // max_speed_mm_s
+    {0, IW_CURRENT_LIMIT_mA},           // max_current_mA
+    {1100, 5000},                       // zero_hold_ms
+    {20, 200},                          // wheel_silent_ms
+    {20, 200},                          // echo_ms
+    {0, 20},                            // rest_rpm
+    {50, 2000},                         // rest_ms
+    {50, 5000},                         // follow_mm_s
+    {100, 5000},                        // follow_ms
+    {200, 10000},                       // blocked_ms
+    {20, 500},                          // radius_mm
+    {1, 1000},                          // gear_turns
+    {1, 1000},                          // gear_per
+    {IW_DLC_SETPOINT, IW_CAN_DATA_MAX}, // setpoint_dlc
+};
+#define FIELDS (sizeof ranges / sizeof ranges[0])
 IW_STATIC_ASSERT(FIELDS == IW_CONFIG_SETPOINT_DLC - IW_CONFIG_PERIOD + 1, one_row_per_field);
-IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == (FIELDS - 1U) * sizeof(uint16_t), numbers_come_first);
+#define FIRST offsetof(iw_config_t, period_ms)
+IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + (FIELDS - 1U) * sizeof(uint16_t), numbers_in_a_row);
 
 #define WATCHDOG_MS (IW_WHEEL_WATCHDOG_US / IW_US_PER_MS)
 #define GEAR_MAX    100U
@@ -44,16 +63,11 @@ static uint32_t divide_up(uint32_t numerator, uint32_t denominator) {
 }
 
 iw_config_range_t iw_config_range(iw_config_fault_t field) {
-    return fields[field - IW_CONFIG_PERIOD].range;
+    return ranges[field - IW_CONFIG_PERIOD];
 }
 
 void iw_config_default(iw_config_t *out_config) {
-    memset(out_config, 0, sizeof *out_config);
-    for (size_t i = 0; i < FIELDS; i++) {
-        memcpy((uint8_t *)out_config + i * sizeof(uint16_t), &fields[i].standard, sizeof(uint16_t));
-    }
-    out_config->force_unit[IW_LEFT] = IW_FORCE_CN;
-    out_config->force_unit[IW_RIGHT] = IW_FORCE_DN;
+    memcpy(out_config, &standard, sizeof standard);
 }
 
 /// From the client's last command until the wheels are told to stand, at most: lease, period and ramp.
@@ -78,10 +92,10 @@ static iw_config_fault_t check_relations(const iw_config_t *config) {
 }
 
 iw_config_fault_t iw_config_check(const iw_config_t *config) {
+    uint16_t numbers[FIELDS];
+    memcpy(numbers, (const uint8_t *)config + FIRST, sizeof numbers);
     for (size_t i = 0; i < FIELDS; i++) {
-        uint16_t value;
-        memcpy(&value, (const uint8_t *)config + i * sizeof value, sizeof value);
-        if (value < fields[i].range.min || value > fields[i].range.max) {
+        if (numbers[i] < ranges[i].min || numbers[i] > ranges[i].max) {
             return (iw_config_fault_t)(IW_CONFIG_PERIOD + i);
         }
     }

@@ -3,13 +3,6 @@
 
 #include "be.h"
 
-#include <string.h>
-
-void iw_confirmation_init(iw_confirmation_t *self) {
-    memset(self, 0, sizeof *self);
-    iw_confirmation_clear(self);
-}
-
 void iw_confirmation_clear(iw_confirmation_t *self) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         self->pending[side] = 0;

@@ -4,27 +4,19 @@
 #include "iwheel/codec.h"
 #include "magnitude.h"
 
-#include <string.h>
-
-void iw_envelope_init(iw_envelope_t *self, const iw_config_t *config) {
-    memset(self, 0, sizeof *self);
-    self->config = config;
-}
-
 /// The largest change in mm/s that `slope` allows in that time, with 1 mm/s for the rounding of both ends.
-static uint32_t allowance(uint32_t slope_mm_s2, iw_time_us_t elapsed_us) {
-    const uint32_t elapsed =
-        (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? (uint32_t)elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
+static uint32_t allowance(uint32_t slope_mm_s2, uint32_t elapsed_us) {
+    const uint32_t elapsed = (elapsed_us < IW_ENVELOPE_ELAPSED_MAX_US) ? elapsed_us : IW_ENVELOPE_ELAPSED_MAX_US;
     const uint32_t change_um_s = slope_mm_s2 * (elapsed / 1000U) + slope_mm_s2 * (elapsed % 1000U) / 1000U;
     return 1U + change_um_s / 1000U;
 }
 
 /// A reversal must pass through a zero that was sent, even where both slopes together would allow the step.
-static bool slew_ok(const iw_envelope_t *self, iw_side_t side, iw_time_us_t elapsed_us, int32_t speed_mm_s) {
+static bool slew_ok(const iw_envelope_t *self, iw_side_t side, uint32_t elapsed_us, int32_t speed_mm_s) {
     const int32_t last_mm_s = self->last_mm_s[side];
     const uint32_t from = (uint32_t)iw_magnitude(last_mm_s);
     const uint32_t to = (uint32_t)iw_magnitude(speed_mm_s);
-    if (speed_mm_s != 0 && last_mm_s != 0 && (speed_mm_s > 0) != (last_mm_s > 0)) {
+    if (speed_mm_s != 0 && last_mm_s != 0 && (speed_mm_s < 0) != (last_mm_s < 0)) {
         return false;
     }
     if (to == from) {
@@ -73,13 +65,14 @@ static iw_envelope_verdict_t judge(const iw_envelope_t *self, iw_time_us_t now_u
         return IW_ENVELOPE_SPEED;
     }
     // R8: a stop is never held up by its own slope.
-    if (!is_zero(config, setpoint) && !slew_ok(self, side, now_us - self->last_us[side], setpoint->speed_mm_s)) {
+    if (!is_zero(config, setpoint) &&
+        !slew_ok(self, side, iw_age_us(self->last_us[side], now_us), setpoint->speed_mm_s)) {
         return IW_ENVELOPE_SLEW;
     }
     return IW_ENVELOPE_PASS;
 }
 
-iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame) {
+iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_t *frame, iw_time_us_t now_us) {
     const bool left = frame->id == IW_ID_LEFT_SETPOINT;
     const iw_side_t side = left ? IW_LEFT : IW_RIGHT;
     const iw_codec_setpoint_t setpoint = as_the_wheel_reads(frame->data);

@@ -11,10 +11,6 @@ void iw_follow_init(iw_follow_t *self, const iw_config_t *config) {
     iw_follow_restart(self);
 }
 
-void iw_follow_restart(iw_follow_t *self) {
-    self->running = 0;
-}
-
 /// Starts the clocks of what holds since now, stops those of what holds no more. The gravest verdict that is due.
 static iw_follow_verdict_t run_clocks(iw_follow_t *self, iw_time_us_t now_us, uint32_t holds) {
     const uint32_t for_us[IW_FOLLOW_VERDICTS] = {
@@ -30,7 +26,7 @@ static iw_follow_verdict_t run_clocks(iw_follow_t *self, iw_time_us_t now_us, ui
         if ((begun & BIT(i)) != 0U) {
             self->since_us[i] = now_us;
         }
-        const bool lasted = (holds & BIT(i)) != 0U && now_us - self->since_us[i] >= for_us[i];
+        const bool lasted = (holds & BIT(i)) != 0U && iw_age_us(self->since_us[i], now_us) >= for_us[i];
         verdict = (lasted && verdict == IW_FOLLOW_OK) ? (iw_follow_verdict_t)i : verdict;
     }
     return verdict;
@@ -60,5 +56,6 @@ iw_follow_verdict_t iw_follow_step(iw_follow_t *self, iw_time_us_t now_us, int32
 }
 
 bool iw_follow_sign_confirmed(const iw_follow_t *self, iw_time_us_t now_us) {
-    return (self->running & BIT(IW_FOLLOW_OK)) != 0U && now_us - self->since_us[IW_FOLLOW_OK] >= IW_FOLLOW_SIGN_US;
+    return (self->running & BIT(IW_FOLLOW_OK)) != 0U &&
+           iw_age_us(self->since_us[IW_FOLLOW_OK], now_us) >= IW_FOLLOW_SIGN_US;
 }

@@ -25,6 +25,10 @@ static bool saturated(int16_t raw) {
     return raw == INT16_MIN || raw == INT16_MAX;
 }
 
+static bool stale(const iw_force_t *self, iw_time_us_t now_us) {
+    return iw_age_us(self->raw_us, now_us) >= IW_FORCE_STALE_US;
+}
+
 void iw_force_init(iw_force_t *self, iw_force_unit_t unit) {
     memset(self, 0, sizeof *self);
     self->unit = unit;
@@ -84,30 +88,42 @@ static uint32_t deviation_mN(const iw_force_t *self, int32_t mean_raw) {
     return fine ? root : root * scale;
 }
 
-/// The ring is full, so the oldest sample stands at `next`: the first half is the older one. Of several faults the
-/// first of saturated, moving, noisy, drift is told: each would cause those behind it.
-iw_force_quality_t iw_force_measure(const iw_force_t *self) {
-    const int32_t scale = scale_mN(self);
-    iw_force_quality_t quality = {0, 0, 0, IW_FORCE_WINDOW_SAMPLES, IW_WINDOW_GOOD};
-    int32_t sum[2] = {0, 0};
-    for (size_t i = 0; i < IW_FORCE_WINDOW_SAMPLES; i++) {
-        const int16_t raw = self->sample[(self->next + i) % IW_FORCE_WINDOW_SAMPLES];
-        sum[i / HALF] += raw;
-        quality.window = saturated(raw) ? IW_WINDOW_SATURATED : quality.window;
-    }
-    quality.mean_mN = (sum[0] + sum[1]) * scale / (int32_t)IW_FORCE_WINDOW_SAMPLES;
-    quality.drift_mN = (sum[1] - sum[0]) * scale / (int32_t)HALF;
-    quality.deviation_mN = deviation_mN(self, (sum[0] + sum[1]) / (int32_t)IW_FORCE_WINDOW_SAMPLES);
-    if (quality.window == IW_WINDOW_SATURATED) {
-        return quality;
-    }
+/// Of several faults the first of moving, noisy, drift is told: each would cause those behind it.
+static iw_window_t judge_quality(const iw_force_t *self, const iw_force_quality_t *quality) {
     if (self->still < IW_FORCE_WINDOW_SAMPLES) {
-        quality.window = IW_WINDOW_MOVING;
-    } else if (quality.deviation_mN > IW_FORCE_QUIET_mN) {
-        quality.window = IW_WINDOW_NOISY;
-    } else if (iw_magnitude(quality.drift_mN) > (int32_t)IW_FORCE_DRIFT_mN) {
-        quality.window = IW_WINDOW_DRIFT;
+        return IW_WINDOW_MOVING;
     }
+    if (quality->deviation_mN > IW_FORCE_QUIET_mN) {
+        return IW_WINDOW_NOISY;
+    }
+    return (iw_magnitude(quality->drift_mN) > (int32_t)IW_FORCE_DRIFT_mN) ? IW_WINDOW_DRIFT : IW_WINDOW_GOOD;
+}
+
+/// The ring is full, so the oldest sample stands at `next`: the first half is the older one. A saturated sample comes
+/// before every other fault.
+static void measure(const iw_force_t *self, iw_force_quality_t *out_quality) {
+    const int32_t scale = scale_mN(self);
+    bool any_saturated = false;
+    int32_t sum = 0;
+    int32_t older = 0;
+    size_t at = self->next;
+    for (size_t i = 0; i < IW_FORCE_WINDOW_SAMPLES; i++) {
+        const int16_t raw = self->sample[at];
+        at = (at + 1U < IW_FORCE_WINDOW_SAMPLES) ? at + 1U : 0U;
+        older = (i == HALF) ? sum : older;
+        sum += raw;
+        any_saturated = saturated(raw) || any_saturated;
+    }
+    out_quality->samples = IW_FORCE_WINDOW_SAMPLES;
+    out_quality->mean_mN = sum * scale / (int32_t)IW_FORCE_WINDOW_SAMPLES;
+    out_quality->drift_mN = (sum - older - older) * scale / (int32_t)HALF;
+    out_quality->deviation_mN = deviation_mN(self, sum / (int32_t)IW_FORCE_WINDOW_SAMPLES);
+    out_quality->window = any_saturated ? IW_WINDOW_SATURATED : judge_quality(self, out_quality);
+}
+
+iw_force_quality_t iw_force_measure(const iw_force_t *self) {
+    iw_force_quality_t quality;
+    measure(self, &quality);
     return quality;
 }
 
@@ -115,20 +131,21 @@ static bool far_from_offset(const iw_force_t *self, int32_t mean_mN, uint32_t li
     return iw_magnitude(mean_mN - self->offset_mN) > (int32_t)limit_mN;
 }
 
+static IW_APART bool within(int32_t difference, int32_t whole, int32_t percent) {
+    return iw_magnitude(difference) * 100 <= whole * percent;
+}
+
 /// At rest raw divided by offset is about 10 (cN), 1 (dN) or 0 (offset already removed). The ranges do not overlap,
 /// since each is narrower than the gap to the next; a ratio that fits none of them is unclear.
 static iw_unit_evidence_t weigh(int32_t mean_raw, int32_t offset_dN) {
     const int32_t offset = iw_magnitude(offset_dN);
-    const bool fits_cn = iw_magnitude(mean_raw - 10 * offset_dN) * 100 <= 10 * offset * IW_FORCE_EVIDENCE_PERCENT;
-    const bool fits_dn = iw_magnitude(mean_raw - offset_dN) * 100 <= offset * IW_FORCE_EVIDENCE_PERCENT;
-    const bool fits_none = iw_magnitude(mean_raw) * 100 <= offset * IW_FORCE_REMOVED_PERCENT;
-    if (fits_cn) {
+    if (within(mean_raw - 10 * offset_dN, 10 * offset, IW_FORCE_EVIDENCE_PERCENT)) {
         return IW_UNIT_CN;
     }
-    if (fits_dn) {
+    if (within(mean_raw - offset_dN, offset, IW_FORCE_EVIDENCE_PERCENT)) {
         return IW_UNIT_DN;
     }
-    return fits_none ? IW_UNIT_OFFSET_REMOVED : IW_UNIT_UNCLEAR;
+    return within(mean_raw, offset, IW_FORCE_REMOVED_PERCENT) ? IW_UNIT_OFFSET_REMOVED : IW_UNIT_UNCLEAR;
 }
 
 /// Compares our own mean with the wheel's offset, once there are both and the window was good. Too small an offset
@@ -159,7 +176,7 @@ static void settle(iw_force_t *self, iw_time_us_t now_us) {
 }
 
 static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
-    self->quality = iw_force_measure(self);
+    measure(self, &self->quality);
     // A steady load looks like a quiet sensor: only an offset trusted before shows it.
     const bool known = self->provenance == IW_OFFSET_STORED || self->provenance == IW_OFFSET_OPERATOR;
     if (self->quality.window == IW_WINDOW_GOOD && known &&
@@ -172,16 +189,21 @@ static void judge_window(iw_force_t *self, iw_time_us_t now_us) {
     settle(self, now_us);
 }
 
+/// Counted up to a full ring.
+static uint8_t one_more(uint8_t samples) {
+    return (samples < IW_FORCE_WINDOW_SAMPLES) ? (uint8_t)(samples + 1U) : samples;
+}
+
 void iw_force_hear(iw_force_t *self, iw_time_us_t now_us, int16_t raw, bool still) {
-    if (self->raw_us == IW_NEVER || now_us - self->raw_us >= IW_FORCE_STALE_US) {
+    if (stale(self, now_us)) {
         self->count = 0;
     }
     self->raw = raw;
     self->raw_us = now_us;
     self->sample[self->next] = raw;
     self->next = (uint8_t)((self->next + 1U) % IW_FORCE_WINDOW_SAMPLES);
-    self->count = (uint8_t)(self->count + ((self->count < IW_FORCE_WINDOW_SAMPLES) ? 1U : 0U));
-    self->still = (uint8_t)(still ? self->still + ((self->still < IW_FORCE_WINDOW_SAMPLES) ? 1U : 0U) : 0U);
+    self->count = one_more(self->count);
+    self->still = still ? one_more(self->still) : 0U;
     if (self->quality.window == IW_WINDOW_OPEN && self->count == IW_FORCE_WINDOW_SAMPLES) {
         judge_window(self, now_us);
     }
@@ -193,12 +215,12 @@ void iw_force_hear_offset(iw_force_t *self, iw_time_us_t now_us, int16_t offset_
     settle(self, now_us);
 }
 
-/// Judges a tare without making it. `*out_mean_mN` is what it would make the zero.
-static iw_tare_t judge_tare(const iw_force_t *self, iw_time_us_t now_us, int32_t *out_mean_mN) {
-    if (self->count < IW_FORCE_WINDOW_SAMPLES || now_us - self->raw_us >= IW_FORCE_STALE_US) {
+iw_tare_t iw_force_may_tare(const iw_force_t *self, iw_time_us_t now_us) {
+    if (self->count < IW_FORCE_WINDOW_SAMPLES || stale(self, now_us)) {
         return IW_TARE_NO_FORCE;
     }
-    const iw_force_quality_t quality = iw_force_measure(self);
+    iw_force_quality_t quality;
+    measure(self, &quality);
     // An offset that is itself in doubt must not veto the tare that would replace it.
     const bool doubted = self->evidence == IW_UNIT_UNCLEAR || self->evidence == IW_UNIT_OFFSET_REMOVED;
     const bool known = self->provenance != IW_OFFSET_NONE && !doubted;
@@ -208,23 +230,15 @@ static iw_tare_t judge_tare(const iw_force_t *self, iw_time_us_t now_us, int32_t
     if (quality.window != IW_WINDOW_GOOD) {
         return (quality.window == IW_WINDOW_MOVING) ? IW_TARE_MOVING : IW_TARE_NOISY;
     }
-    if (known && far_from_offset(self, quality.mean_mN, IW_FORCE_LOADED_mN)) {
-        return IW_TARE_LOADED;
-    }
-    *out_mean_mN = quality.mean_mN;
-    return IW_TARE_OK;
-}
-
-iw_tare_t iw_force_may_tare(const iw_force_t *self, iw_time_us_t now_us) {
-    int32_t mean_mN = 0;
-    return judge_tare(self, now_us, &mean_mN);
+    return (known && far_from_offset(self, quality.mean_mN, IW_FORCE_LOADED_mN)) ? IW_TARE_LOADED : IW_TARE_OK;
 }
 
 iw_tare_t iw_force_tare(iw_force_t *self, iw_time_us_t now_us) {
-    int32_t mean_mN = 0;
-    const iw_tare_t result = judge_tare(self, now_us, &mean_mN);
+    const iw_tare_t result = iw_force_may_tare(self, now_us);
     if (result == IW_TARE_OK) {
-        adopt(self, now_us, IW_OFFSET_OPERATOR, mean_mN);
+        iw_force_quality_t quality;
+        measure(self, &quality);
+        adopt(self, now_us, IW_OFFSET_OPERATOR, quality.mean_mN);
     }
     return result;
 }
@@ -235,7 +249,7 @@ static bool unit_contradicted(const iw_force_t *self) {
 }
 
 iw_force_validity_t iw_force_validity(const iw_force_t *self, iw_time_us_t now_us) {
-    if (self->raw_us == IW_NEVER || now_us - self->raw_us >= IW_FORCE_STALE_US) {
+    if (stale(self, now_us)) {
         return IW_FORCE_NOT_HEARD;
     }
     if (saturated(self->raw)) {

@@ -24,6 +24,12 @@ static void assume(iw_gateway_t *self) {
     }
 }
 
+static IW_APART void init_wheel(iw_gateway_t *self, iw_side_t side, iw_time_us_t now_us) {
+    iw_wheel_init(&self->wheel[side], &self->config, side, now_us);
+    iw_force_init(&self->force[side], self->config.force_unit[side]);
+    iw_follow_init(&self->follow[side], &self->config);
+}
+
 iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config, const iw_hal_t *hal,
                                   iw_time_us_t now_us, bool restarted) {
     const iw_config_fault_t fault = iw_config_check(config);
@@ -32,16 +38,13 @@ iw_config_fault_t iw_gateway_init(iw_gateway_t *self, const iw_config_t *config,
     }
     // Copied before any part is initialised: the parts keep pointers to this copy, not to the caller's.
     memset(self, 0, sizeof *self);
-    self->config = *config;
-    self->hal = *hal;
+    memcpy(&self->config, config, sizeof self->config);
+    memcpy(&self->hal, hal, sizeof self->hal);
     self->promised_us = now_us;
     self->pose_us = IW_NEVER;
     self->purged_us = IW_NEVER;
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        iw_wheel_init(&self->wheel[side], &self->config, (iw_side_t)side, now_us);
-        iw_force_init(&self->force[side], self->config.force_unit[side]);
-        iw_follow_init(&self->follow[side], &self->config);
-    }
+    init_wheel(self, IW_LEFT, now_us);
+    init_wheel(self, IW_RIGHT, now_us);
     iw_permit_init(&self->permit, &self->config, now_us, restarted);
     iw_setpoint_init(&self->setpoint, &self->config);
     iw_sender_init(&self->sender, &self->config, &self->hal);
@@ -84,22 +87,24 @@ static IW_APART bool scale_pair(int32_t values[IW_SIDES], int32_t limit) {
     return true;
 }
 
-static bool drive_in_range(const iw_config_t *config, const iw_drive_t *request) {
+/// What is wrong with the values of a request, whoever sends it.
+static IW_APART iw_refusal_t refuse_values(const iw_config_t *config, const iw_drive_t *request) {
     // A current limit has no sign.
     const int32_t lowest_mA = (config->current_role == IW_ROLE_SETPOINT) ? -IW_CURRENT_LIMIT_mA : 0;
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (request->speed_mm_s[side] < INT16_MIN || request->speed_mm_s[side] > INT16_MAX) {
-            return false;
+            return IW_REFUSE_OUT_OF_RANGE;
         }
         if (request->has_current &&
             (request->current_mA[side] < lowest_mA || request->current_mA[side] > IW_CURRENT_LIMIT_mA)) {
-            return false;
+            return IW_REFUSE_OUT_OF_RANGE;
         }
     }
-    return true;
+    const bool missing = !request->has_current && config->current_role == IW_ROLE_SETPOINT;
+    return missing ? IW_REFUSE_MISSING_FIELD : IW_REFUSE_NONE;
 }
 
-static bool drive_nonzero(const iw_config_t *config, const iw_drive_t *request) {
+static IW_APART bool drive_nonzero(const iw_config_t *config, const iw_drive_t *request) {
     const bool speed = request->speed_mm_s[IW_LEFT] != 0 || request->speed_mm_s[IW_RIGHT] != 0;
     const bool current =
         request->has_current && (request->current_mA[IW_LEFT] != 0 || request->current_mA[IW_RIGHT] != 0);
@@ -127,14 +132,14 @@ iw_refusal_t iw_gateway_drive(iw_gateway_t *self, iw_time_us_t sent_us, iw_clien
                               iw_applied_t *out_applied) {
     const iw_config_t *const config = &self->config;
     const bool nonzero = drive_nonzero(config, request);
-    const bool in_range = drive_in_range(config, request);
-    if (!in_range || (!request->has_current && config->current_role == IW_ROLE_SETPOINT)) {
+    const iw_refusal_t wrong = refuse_values(config, request);
+    if (wrong != IW_REFUSE_NONE) {
         // Refused for its values, it still shows that somebody wants motion: arm and reset are refused for a while.
         if (nonzero) {
             iw_permit_remember(&self->permit, sent_us, client);
         }
-        self->counters.out_of_range += in_range ? 0U : 1U;
-        return in_range ? IW_REFUSE_MISSING_FIELD : IW_REFUSE_OUT_OF_RANGE;
+        self->counters.out_of_range += (wrong == IW_REFUSE_OUT_OF_RANGE) ? 1U : 0U;
+        return wrong;
     }
     const iw_refusal_t refusal = iw_permit_drive(&self->permit, sent_us, client, nonzero);
     if (refusal == IW_REFUSE_NONE) {
@@ -149,7 +154,8 @@ void iw_gateway_stop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client
 }
 
 void iw_gateway_estop(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t client) {
-    iw_permit_raise(&self->permit, now_us, IW_CAUSE_ESTOP_SOFTWARE, IW_SIDES_NONE, client);
+    const iw_event_t event = {IW_CAUSE_ESTOP_SOFTWARE, IW_SIDES_NONE, client};
+    iw_permit_raise(&self->permit, &event, now_us);
 }
 
 iw_refusal_t iw_gateway_reset(iw_gateway_t *self, iw_time_us_t now_us) {
@@ -160,19 +166,21 @@ void iw_gateway_disconnect(iw_gateway_t *self, iw_time_us_t now_us, iw_client_t 
     iw_permit_disconnect(&self->permit, now_us, client);
 }
 
+/// Whether one wheel could be tared (`judging`), or its tare.
+static IW_APART iw_tare_t tare_wheel(iw_gateway_t *self, iw_side_t side, iw_time_us_t now_us, bool judging) {
+    iw_force_t *const force = &self->force[side];
+    return judging ? iw_force_may_tare(force, now_us) : iw_force_tare(force, now_us);
+}
+
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side) {
-    // Both are judged before one is changed (R9: a request is applied whole or not at all).
-    for (size_t side = 0; side < IW_SIDES; side++) {
+    // R9: a request is applied whole or not at all. So twice over the wheels: both are judged before one is changed.
+    for (uint32_t i = 0; i < 2U * IW_SIDES; i++) {
+        const iw_side_t side = (iw_side_t)(i % IW_SIDES);
         const bool wanted = (sides & (1U << side)) != 0U;
-        const iw_tare_t result = wanted ? iw_force_may_tare(&self->force[side], now_us) : IW_TARE_OK;
+        const iw_tare_t result = wanted ? tare_wheel(self, side, now_us, i < IW_SIDES) : IW_TARE_OK;
         if (result != IW_TARE_OK) {
-            *out_side = (iw_side_t)side;
+            *out_side = side;
             return result;
-        }
-    }
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        if ((sides & (1U << side)) != 0U) {
-            (void)iw_force_tare(&self->force[side], now_us);
         }
     }
     return IW_TARE_OK;

@@ -76,10 +76,6 @@ void iw_ledger_contradict(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_
     change(self, item, &next);
 }
 
-iw_ledger_item_t iw_ledger_force_unit(iw_side_t side) {
-    return (side == IW_LEFT) ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
-}
-
 const iw_ledger_entry_t *iw_ledger_entry(const iw_ledger_t *self, iw_ledger_item_t item) {
     return &self->entry[item];
 }

@@ -39,6 +39,11 @@ iw_state_t iw_permit_state(const iw_permit_t *self) {
     return (iw_state_t)phases[self->phase].state;
 }
 
+/// The last phases: CUT and LATCHED.
+static bool is_latched(const iw_permit_t *self) {
+    return self->phase >= IW_PHASE_CUT;
+}
+
 iw_demand_t iw_permit_demand(const iw_permit_t *self) {
     const phase_row_t *const row = &phases[self->phase];
     return (iw_demand_t)(self->at_once ? row->at_once : row->demand);
@@ -59,15 +64,20 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     }
 }
 
-static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, iw_time_us_t span_us) {
+static void grant_lease(iw_permit_t *self, iw_time_us_t now_us, uint32_t span_us) {
     self->lease_from_us = now_us;
     self->lease_until_us = now_us + span_us;
 }
 
+/// From now on the holder drives: ARMED begins, or the lease changes hands.
+static IW_APART void begin_driving(iw_permit_t *self, iw_time_us_t now_us) {
+    self->armed_us = now_us;
+    grant_lease(self, now_us, IW_FIRST_LEASE_US);
+}
+
 /// How long ago the lease was last renewed.
 static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t unfed_us = now_us - self->lease_from_us;
-    return ((unfed_us < UINT32_MAX) ? (uint32_t)unfed_us : UINT32_MAX) / IW_US_PER_MS;
+    return iw_age_us(self->lease_from_us, now_us) / IW_US_PER_MS;
 }
 
 uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us) {
@@ -79,14 +89,13 @@ static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us)
 }
 
 /// The button comes first: no reset helps while it is pressed, and that is the one cure the user can see.
-static iw_refusal_t refuse_latched(const iw_permit_t *self, iw_time_us_t now_us) {
-    const bool pressed = refuse_present(self, now_us) == IW_REFUSE_ESTOP_PRESSED;
-    return pressed ? IW_REFUSE_ESTOP_PRESSED : IW_REFUSE_LATCHED;
+static iw_refusal_t refuse_latched(iw_refusal_t present) {
+    return (present == IW_REFUSE_ESTOP_PRESSED) ? present : IW_REFUSE_LATCHED;
 }
 
 /// R3: a joystick that is still deflected at arm or reset must not set the machine in motion.
-static IW_APART bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
-    return self->stale_us != IW_NEVER && now_us - self->stale_us < IW_STALE_COMMAND_US;
+static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
+    return iw_age_us(self->stale_us, now_us) < IW_STALE_COMMAND_US;
 }
 
 /// Arming failed: back to the phase it was asked from. `hold_us` tells BRAKING from HOLDING.
@@ -100,36 +109,42 @@ static void end_arming(iw_permit_t *self, iw_refusal_t refusal) {
 }
 
 /// Records why the wheels stop. Before the phase changes: `from`, holder and applied speeds are those of the moment.
-static void record_stop(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
+static IW_APART void record_stop(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     iw_stop_t *const stop = &self->stop;
     stop->at_us = now_us;
     stop->number++;
-    stop->detail = detail;
+    stop->detail = event->detail;
     stop->client = self->holder;
     stop->applied = self->view.applied;
-    stop->cause = cause;
+    stop->cause = event->cause;
     stop->from = iw_permit_state(self);
-    stop->sides = sides;
+    stop->sides = event->sides;
     stop->latched = false;
 }
 
 /// Release: a ramp, because a hard stop topples whoever leans on the machine. `at_once` where waiting is the greater
 /// risk.
-static void brake(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
-    record_stop(self, now_us, cause, sides, detail);
-    self->blocked = (cause == IW_CAUSE_WHEEL_BLOCKED) ? self->holder : IW_CLIENT_NONE;
+static IW_APART void brake(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
+    record_stop(self, event, now_us);
+    self->blocked = (event->cause == IW_CAUSE_WHEEL_BLOCKED) ? self->holder : IW_CLIENT_NONE;
     self->phase = IW_PHASE_BRAKING;
-    self->at_once = iw_cause_rows[cause].at_once;
+    self->at_once = iw_cause_rows[event->cause].at_once;
     self->hold_us = IW_NEVER;
     self->holder = IW_CLIENT_NONE;
 }
 
+/// A stop with nothing more to tell than its cause and a time.
+static void brake_after(iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us, uint32_t detail) {
+    const iw_event_t event = {cause, IW_SIDES_NONE, detail};
+    brake(self, &event, now_us);
+}
+
 /// From LISTENING no zeros are sent: nothing of ours moves the wheels, and another master may be driving them.
-static void latch(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
-    record_stop(self, now_us, cause, sides, detail);
+static void latch(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
+    record_stop(self, event, now_us);
     self->stop.latched = true;
     const bool silent = self->phase == IW_PHASE_LISTENING;
-    end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
+    end_arming(self, (iw_refusal_t)iw_cause_rows[event->cause].refusal);
     self->phase = silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
     self->hold_us = now_us;
     self->holder = IW_CLIENT_NONE;
@@ -154,23 +169,31 @@ static void count_stranger(iw_permit_t *self) {
     self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
 }
 
+/// A cause that neither latches nor stops a holder: it ends arming, and a ramp that is going on if it allows none.
+static void bear(iw_permit_t *self, iw_cause_t cause) {
+    end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
+    if (iw_cause_rows[cause].at_once) {
+        self->at_once = true;
+    }
+}
+
 /// LATCHED keeps its first cause: what follows is mostly a consequence of it.
-void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail) {
+void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
+    const iw_cause_t cause = event->cause;
     self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;
     self->quiet = false;
-    if (iw_permit_state(self) == IW_STATE_LATCHED) {
+    if (is_latched(self)) {
         return;
     }
     if (latches(self, cause)) {
-        latch(self, now_us, cause, sides, detail);
+        latch(self, event, now_us);
     } else if (self->phase == IW_PHASE_ARMED) {
-        brake(self, now_us, cause, sides, detail);
+        brake(self, event, now_us);
     } else if (self->phase == IW_PHASE_RESTARTING && cause == IW_CAUSE_SECOND_MASTER) {
         count_stranger(self);
     } else {
-        end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
-        self->at_once = self->at_once || iw_cause_rows[cause].at_once;
+        bear(self, cause);
     }
 }
 
@@ -179,13 +202,12 @@ void iw_permit_keep_present(iw_permit_t *self) {
 }
 
 static void step_arming(iw_permit_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t limit_us = (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
-    const iw_time_us_t waited_us = now_us - self->arming_us;
+    const uint32_t limit_us = self->config->echo_ms * IW_US_PER_MS;
+    const uint32_t waited_us = iw_age_us(self->arming_us, now_us);
     // An echo that comes too late does not arm, even if no step has ended the wait yet.
     if (self->view.proven && waited_us <= limit_us) {
         self->phase = IW_PHASE_ARMED;
-        self->armed_us = now_us;
-        grant_lease(self, now_us, IW_FIRST_LEASE_US);
+        begin_driving(self, now_us);
     } else if (waited_us >= limit_us) {
         end_arming(self, IW_REFUSE_SEND_STALLED);
     }
@@ -198,45 +220,39 @@ static bool time_is_enough(const iw_permit_t *self) {
 }
 
 /// Zeros for `zero_hold_ms` and until the wheels stand, but at most IW_PERMIT_HOLD_MAX_US: a wheel that is pushed or
-/// has a fault would otherwise be fed for ever. Then `phase` follows.
-static void step_hold(iw_permit_t *self, iw_time_us_t now_us, iw_phase_t phase) {
-    const iw_time_us_t held_us = now_us - self->hold_us;
-    const bool longest = held_us >= IW_PERMIT_HOLD_MAX_US;
-    const bool done = held_us >= (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self);
-    if (longest || done) {
-        // Silence with a moving wheel is an event that the operator must hear of.
-        self->still_moving += (longest && !self->view.settled) ? 1U : 0U;
-        self->phase = phase;
+/// has a fault would otherwise be fed for ever.
+static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
+    const uint32_t held_us = iw_age_us(self->hold_us, now_us);
+    // Silence with a moving wheel is an event that the operator must hear of.
+    const bool gives_up = held_us >= IW_PERMIT_HOLD_MAX_US && !self->view.settled;
+    self->still_moving += gives_up ? 1U : 0U;
+    if (gives_up || (held_us >= self->config->zero_hold_ms * IW_US_PER_MS && time_is_enough(self))) {
+        self->phase = (self->phase == IW_PHASE_CUT) ? IW_PHASE_LATCHED : IW_PHASE_LISTENING;
     }
 }
 
+/// Zeros are held, and time ends it.
+static bool is_holding(iw_phase_t phase) {
+    return phase >= IW_PHASE_HOLDING && phase <= IW_PHASE_CUT;
+}
+
 static void step_phase(iw_permit_t *self, iw_time_us_t now_us) {
-    switch (self->phase) {
-    case IW_PHASE_ARMED:
+    const iw_phase_t phase = self->phase;
+    if (phase == IW_PHASE_ARMED) {
         if (now_us >= self->lease_until_us) {
-            brake(self, now_us, IW_CAUSE_LEASE_LOST, IW_SIDES_NONE, unfed_ms(self, now_us));
+            brake_after(self, IW_CAUSE_LEASE_LOST, now_us, unfed_ms(self, now_us));
         }
-        break;
-    case IW_PHASE_BRAKING:
+    } else if (phase == IW_PHASE_BRAKING) {
         if (self->at_once || self->view.output_zero) {
             self->phase = IW_PHASE_HOLDING;
             self->hold_us = now_us;
         }
-        break;
-    case IW_PHASE_HOLDING:
-    case IW_PHASE_RESTARTING:
-        step_hold(self, now_us, IW_PHASE_LISTENING);
-        break;
-    case IW_PHASE_CUT:
-        step_hold(self, now_us, IW_PHASE_LATCHED);
-        break;
-    default:
-        break;
+    } else if (is_holding(phase)) {
+        step_hold(self, now_us);
     }
 }
 
-void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view_t *view) {
-    self->view = *view;
+void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us) {
     self->present = self->raised;
     self->raised = 0;
     self->quiet = self->quiet || iw_permit_present(self, now_us) == 0U;
@@ -252,8 +268,8 @@ static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us)
     if (self->config->listen_only) {
         return IW_REFUSE_LISTEN_ONLY;
     }
-    if (iw_permit_state(self) == IW_STATE_LATCHED) {
-        return refuse_latched(self, now_us);
+    if (is_latched(self)) {
+        return refuse_latched(present);
     }
     if (!may_send(self->config)) {
         return IW_REFUSE_TYPE_NOT_SET;
@@ -306,8 +322,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
     }
     self->holder = client;
     if (self->phase == IW_PHASE_ARMED) {
-        self->armed_us = now_us;
-        grant_lease(self, now_us, IW_FIRST_LEASE_US);
+        begin_driving(self, now_us);
     } else {
         begin_arming(self, now_us);
     }
@@ -330,7 +345,7 @@ static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, 
     const bool blocked = self->blocked == client;
     switch (iw_permit_state(self)) {
     case IW_STATE_LATCHED:
-        return refuse_latched(self, sent_us);
+        return refuse_latched(refuse_present(self, sent_us));
     case IW_STATE_STOPPING:
         return blocked ? IW_REFUSE_WHEEL_BLOCKED : IW_REFUSE_NOT_ARMED;
     case IW_STATE_ARMED:
@@ -356,14 +371,14 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_
     }
     const iw_refusal_t refusal = refuse_drive(self, sent_us, client);
     if (refusal == IW_REFUSE_NONE) {
-        grant_lease(self, sent_us, (iw_time_us_t)self->config->lease_ms * IW_US_PER_MS);
+        grant_lease(self, sent_us, self->config->lease_ms * IW_US_PER_MS);
     }
     return refusal;
 }
 
 void iw_permit_stop(iw_permit_t *self, iw_time_us_t now_us, iw_client_t client, iw_cause_t cause) {
     if (self->phase == IW_PHASE_ARMED) {
-        brake(self, now_us, cause, IW_SIDES_NONE, 0);
+        brake_after(self, cause, now_us, 0);
         self->stop.client = client;
     }
     end_arming(self, IW_REFUSE_NOT_ARMED);
@@ -374,14 +389,14 @@ void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t cl
         return;
     }
     if (self->phase == IW_PHASE_ARMED) {
-        brake(self, now_us, IW_CAUSE_CLIENT_GONE, IW_SIDES_NONE, 0);
+        brake_after(self, IW_CAUSE_CLIENT_GONE, now_us, 0);
     }
     end_arming(self, IW_REFUSE_NOT_ARMED);
 }
 
 iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
     const iw_refusal_t present = refuse_present(self, now_us);
-    if (iw_permit_state(self) != IW_STATE_LATCHED) {
+    if (!is_latched(self)) {
         return IW_REFUSE_NONE;
     }
     if (present != IW_REFUSE_NONE) {
@@ -401,18 +416,15 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
 }
 
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {
-    const iw_time_us_t zero_hold_us = (iw_time_us_t)self->config->zero_hold_ms * IW_US_PER_MS;
-    switch (self->phase) {
-    case IW_PHASE_ARMING:
-    case IW_PHASE_REARMING:
-        return self->arming_us + (iw_time_us_t)self->config->echo_ms * IW_US_PER_MS;
-    case IW_PHASE_ARMED:
-        return self->lease_until_us;
-    case IW_PHASE_HOLDING:
-    case IW_PHASE_RESTARTING:
-    case IW_PHASE_CUT:
-        return self->hold_us + (time_is_enough(self) ? zero_hold_us : IW_PERMIT_HOLD_MAX_US);
-    default:
-        return IW_NEVER;
+    const iw_config_t *const config = self->config;
+    if (iw_permit_arming(self)) {
+        return self->arming_us + config->echo_ms * IW_US_PER_MS;
     }
+    if (self->phase == IW_PHASE_ARMED) {
+        return self->lease_until_us;
+    }
+    if (is_holding(self->phase)) {
+        return self->hold_us + (time_is_enough(self) ? config->zero_hold_ms * IW_US_PER_MS : IW_PERMIT_HOLD_MAX_US);
+    }
+    return IW_NEVER;
 }

@@ -10,8 +10,8 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
     self->config = config;
     self->hal = hal;
     self->pair_us = IW_NEVER;
-    iw_confirmation_init(&self->confirmation);
-    iw_envelope_init(&self->envelope, config);
+    self->envelope.config = config;
+    iw_confirmation_clear(&self->confirmation);
 }
 
 /// A nonzero pair leaves whole or not at all (R5); a zero must not wait for the other wheel's echo (R6).
@@ -36,12 +36,12 @@ static bool prepare(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side, cons
         setpoint.current_mA = (int16_t)-setpoint.current_mA;
     }
     self->sent.clamped += iw_codec_encode_setpoint(side, &setpoint, (uint8_t)config->setpoint_dlc, frame) ? 1U : 0U;
-    const iw_envelope_verdict_t verdict = iw_envelope_check(&self->envelope, now_us, frame);
+    const iw_envelope_verdict_t verdict = iw_envelope_check(&self->envelope, frame, now_us);
     self->verdict = (verdict == IW_ENVELOPE_PASS) ? self->verdict : verdict;
     return verdict == IW_ENVELOPE_PASS;
 }
 
-static bool hand_over(iw_sender_t *self, iw_time_us_t now_us, iw_side_t side) {
+static bool hand_over(iw_sender_t *self, iw_side_t side, iw_time_us_t now_us) {
     const iw_can_frame_t *const frame = &self->frame[side];
     const bool accepted = self->hal->send(self->hal->context, frame) > 0;
     self->sent.later += accepted ? 0U : 1U;
@@ -64,10 +64,10 @@ static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
     const bool right = iw_confirmation_may_send(&self->confirmation, IW_RIGHT, zero);
     bool taken = true;
     if (left) {
-        taken = hand_over(self, now_us, IW_LEFT);
+        taken = hand_over(self, IW_LEFT, now_us);
     }
     if (right && (taken || zero)) {
-        taken = hand_over(self, now_us, IW_RIGHT) && taken;
+        taken = hand_over(self, IW_RIGHT, now_us) && taken;
     }
     if (taken && left && right) {
         measure_gap(self, now_us);
@@ -76,7 +76,7 @@ static bool hand_over_both(iw_sender_t *self, iw_time_us_t now_us, bool zero) {
 }
 
 /// Both frames are judged before the first one leaves, else a stopped right frame would leave the left one alone.
-iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero) {
+iw_send_result_t iw_sender_send(iw_sender_t *self, const iw_pair_t *pair, iw_time_us_t now_us, bool zero) {
     for (size_t side = 0; side < IW_SIDES; side++) {
         if (!prepare(self, now_us, (iw_side_t)side, &pair->wheel[side])) {
             return IW_SEND_STOPPED;

@@ -53,7 +53,7 @@ void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us) {
     if (self->demand == IW_DEMAND_SILENCE) {
         return;
     }
-    if (self->last_us != IW_NEVER && now_us < self->last_us + IW_SETPOINT_SPACING_US) {
+    if (iw_age_us(self->last_us, now_us) < IW_SETPOINT_SPACING_US) {
         due_us = self->last_us + IW_SETPOINT_SPACING_US;
     }
     if (due_us < self->due_us) {
@@ -97,10 +97,6 @@ void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us) {
     iw_setpoint_hasten(self, now_us);
 }
 
-bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us) {
-    return now_us >= self->due_us;
-}
-
 /// part / whole for part < whole < 2^24.
 static uint32_t fraction_of(uint32_t part, uint32_t whole) {
     uint32_t fraction = 0;
@@ -122,7 +118,7 @@ static IW_APART uint32_t ramp_step(uint32_t slope, uint32_t us) {
 /// of the core.
 static void plan(axis_t *axis, int32_t target, uint32_t away, uint32_t towards) {
     const int32_t *const value = axis->value;
-    const bool through_zero = *value != 0 && (target > 0) != (*value > 0);
+    const bool through_zero = *value != 0 && (target < 0) != (*value < 0);
     const int32_t aim = through_zero ? 0 : target;
     const uint32_t way = (uint32_t)iw_magnitude(aim - *value);
     const bool braking = (uint32_t)iw_magnitude(aim) < (uint32_t)iw_magnitude(*value);
@@ -140,17 +136,17 @@ static IW_APART uint32_t current_step(const iw_config_t *config, uint32_t step) 
 }
 
 /// Moves all quantities by one common share of their ways; braking ones do not wait for accelerating ones.
-static void advance_together(const axis_t *axes) {
+static void advance_together(const axis_t *axes, size_t count) {
     uint32_t braking = FRACTION_ONE;
     uint32_t all = FRACTION_ONE;
-    for (size_t i = 0; i < AXES; i++) {
+    for (size_t i = 0; i < count; i++) {
         all = (axes[i].fraction < all) ? axes[i].fraction : all;
         braking = (axes[i].braking && axes[i].fraction < braking) ? axes[i].fraction : braking;
     }
-    for (size_t i = 0; i < AXES; i++) {
-        const int64_t share = axes[i].braking ? braking : all;
-        const int32_t way = axes[i].aim - *axes[i].value;
-        *axes[i].value += (int32_t)(share * way / (int64_t)FRACTION_ONE);
+    for (const axis_t *axis = axes; axis < axes + count; axis++) {
+        const int64_t share = axis->braking ? braking : all;
+        const int32_t way = axis->aim - *axis->value;
+        *axis->value += (int32_t)(share * way / (int64_t)FRACTION_ONE);
     }
 }
 
@@ -162,25 +158,29 @@ static IW_APART bool arrived(const iw_setpoint_t *self, iw_side_t side) {
            self->current_uA[side] == (ramps_current ? target->current_mA * 1000 : 0);
 }
 
-static void advance(iw_setpoint_t *self, iw_time_us_t elapsed_us) {
+static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
     const iw_config_t *const config = self->config;
+    const iw_command_t *const target = self->target.wheel;
     // After a second every ramp has ended.
-    const uint32_t us = (elapsed_us < IW_WHEEL_WATCHDOG_US) ? (uint32_t)elapsed_us : IW_WHEEL_WATCHDOG_US;
+    const uint32_t us = (elapsed_us < IW_WHEEL_WATCHDOG_US) ? elapsed_us : IW_WHEEL_WATCHDOG_US;
     const uint32_t granted_us = 2U * config->period_ms * IW_US_PER_MS;
     const uint32_t away = ramp_step(config->accel_mm_s2, (us < granted_us) ? us : granted_us);
     const uint32_t towards = ramp_step(config->decel_mm_s2, us);
     const bool ramps_current = config->current_role == IW_ROLE_SETPOINT;
-    const uint32_t current_away = ramps_current ? current_step(config, away) : 0U;
-    const uint32_t current_towards = ramps_current ? current_step(config, towards) : 0U;
     axis_t axes[AXES];
     for (size_t side = 0; side < IW_SIDES; side++) {
-        const iw_command_t *const target = &self->target.wheel[side];
-        axes[2U * side].value = &self->speed_um_s[side];
-        axes[2U * side + 1U].value = &self->current_uA[side];
-        plan(&axes[2U * side], target->speed_mm_s * 1000, away, towards);
-        plan(&axes[2U * side + 1U], ramps_current ? target->current_mA * 1000 : 0, current_away, current_towards);
+        axes[side].value = &self->speed_um_s[side];
+        plan(&axes[side], target[side].speed_mm_s * 1000, away, towards);
     }
-    advance_together(axes);
+    if (ramps_current) {
+        const uint32_t current_away = current_step(config, away);
+        const uint32_t current_towards = current_step(config, towards);
+        for (size_t side = 0; side < IW_SIDES; side++) {
+            axes[IW_SIDES + side].value = &self->current_uA[side];
+            plan(&axes[IW_SIDES + side], target[side].current_mA * 1000, current_away, current_towards);
+        }
+    }
+    advance_together(axes, ramps_current ? AXES : (size_t)IW_SIDES);
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {
@@ -189,14 +189,14 @@ static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us)
     return (next_us >= now_us + IW_SETPOINT_SPACING_US) ? next_us : now_us + period_us;
 }
 
-void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_pair) {
+iw_pair_t iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us) {
     if (!self->from_zero && !(arrived(self, IW_LEFT) && arrived(self, IW_RIGHT))) {
-        advance(self, now_us - self->last_us);
+        advance(self, iw_age_us(self->last_us, now_us));
     }
     self->from_zero = false;
     self->due_us = next_on_grid(self, now_us);
     self->last_us = now_us;
-    *out_pair = iw_setpoint_applied(self);
+    return iw_setpoint_applied(self);
 }
 
 iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self) {
@@ -211,7 +211,7 @@ iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self) {
 }
 
 static bool all_zero(const int32_t *values) {
-    return values[IW_LEFT] == 0 && values[IW_RIGHT] == 0;
+    return (values[IW_LEFT] | values[IW_RIGHT]) == 0;
 }
 
 bool iw_setpoint_is_zero(const iw_setpoint_t *self) {
@@ -226,8 +226,4 @@ bool iw_setpoint_next_is_zero(const iw_setpoint_t *self) {
     }
     return left->speed_mm_s == 0 && right->speed_mm_s == 0 &&
            (self->config->current_role == IW_ROLE_LIMIT || (left->current_mA == 0 && right->current_mA == 0));
-}
-
-iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self) {
-    return self->due_us;
 }

@@ -7,17 +7,14 @@
 #define ESTOP_PRESSED    1U
 #define ESTOP_UNREADABLE 2U
 
-static IW_APART uint32_t whole_ms(iw_time_us_t span_us) {
-    return (span_us < UINT32_MAX) ? (uint32_t)span_us / IW_US_PER_MS : UINT32_MAX / IW_US_PER_MS;
-}
-
 static void raise_cause(iw_gateway_t *self, iw_cause_t cause, uint8_t sides, uint32_t detail) {
-    iw_permit_raise(&self->permit, self->now_us, cause, sides, detail);
+    const iw_event_t event = {cause, sides, detail};
+    iw_permit_raise(&self->permit, &event, self->now_us);
 }
 
 /// A cause whose detail is a time.
-static void raise_after(iw_gateway_t *self, iw_cause_t cause, iw_time_us_t span_us) {
-    raise_cause(self, cause, IW_SIDES_NONE, whole_ms(span_us));
+static IW_APART void raise_after(iw_gateway_t *self, iw_cause_t cause, uint32_t span_us) {
+    raise_cause(self, cause, IW_SIDES_NONE, span_us / IW_US_PER_MS);
 }
 
 IW_STATIC_ASSERT(IW_SIDES_LEFT << IW_RIGHT == IW_SIDES_RIGHT, one_bit_per_side);
@@ -35,17 +32,18 @@ static void excuse_wheel(iw_gateway_t *self, iw_side_t side) {
 }
 
 /// Our clock may stand still while the system is suspended; the wheels do not: a suspend counts as
-/// lateness.
-static iw_time_us_t take_lateness(iw_gateway_t *self) {
-    const iw_time_us_t suspended_us = self->suspended_us;
+/// lateness. UINT32_MAX at the most.
+static uint32_t take_lateness(iw_gateway_t *self) {
+    const iw_time_us_t late_us = (self->now_us > self->promised_us) ? self->now_us - self->promised_us : 0U;
+    const iw_time_us_t both_us = self->suspended_us + late_us;
     self->suspended_us = 0;
-    return suspended_us + ((self->now_us > self->promised_us) ? self->now_us - self->promised_us : 0U);
+    return (both_us < UINT32_MAX) ? (uint32_t)both_us : UINT32_MAX;
 }
 
 /// R7 (own hang). One long stall, or one late step after another: what counts is for how long no fault could
 /// be judged, since telemetry of a late step has no known time of reception.
 static void watch_loop(iw_gateway_t *self) {
-    const iw_time_us_t late_us = take_lateness(self);
+    const uint32_t late_us = take_lateness(self);
     const bool late = late_us > IW_GATEWAY_LATE_US;
     const bool was_stalled = self->stalled;
     self->stalled = late || (was_stalled && self->backlog);
@@ -60,8 +58,8 @@ static void watch_loop(iw_gateway_t *self) {
         excuse_wheel(self, IW_LEFT);
         excuse_wheel(self, IW_RIGHT);
     }
-    const iw_time_us_t run_us = self->now_us - self->stalled_since_us;
-    const iw_time_us_t blind_us = (run_us > late_us) ? run_us : late_us;
+    const uint32_t run_us = iw_age_us(self->stalled_since_us, self->now_us);
+    const uint32_t blind_us = (run_us > late_us) ? run_us : late_us;
     if (late_us > IW_GATEWAY_HUNG_US) {
         raise_after(self, IW_CAUSE_LOOP_HUNG, late_us);
     } else if (blind_us >= IW_GATEWAY_STOP_US) {
@@ -84,19 +82,26 @@ static void begin(iw_gateway_t *self) {
     }
 }
 
+/// The bus has shown that an assumption holds, or that it does not.
+static IW_APART void note(iw_gateway_t *self, iw_ledger_item_t item, bool holds, int32_t figure) {
+    if (holds) {
+        iw_ledger_confirm(&self->ledger, item, IW_EVIDENCE_BUS, figure);
+    } else {
+        iw_ledger_contradict(&self->ledger, item, IW_EVIDENCE_BUS, figure);
+    }
+}
+
 /// What the force module found out about units, as entries of the ledger. IW_UNIT_UNCLEAR is no entry: it makes this
 /// force doubtful (force_offset.h), but it proves no other unit.
 static void note_force_evidence(iw_gateway_t *self, iw_side_t side) {
     const iw_force_t *const force = &self->force[side];
-    const iw_ledger_item_t unit = iw_ledger_force_unit(side);
     const iw_unit_evidence_t configured = (self->config.force_unit[side] == IW_FORCE_CN) ? IW_UNIT_CN : IW_UNIT_DN;
-    if (force->evidence == IW_UNIT_OFFSET_REMOVED) {
-        iw_ledger_contradict(&self->ledger, IW_LEDGER_OFFSET_INCLUDED, IW_EVIDENCE_BUS, force->evidence_permille);
-    } else if (force->evidence == configured) {
-        iw_ledger_confirm(&self->ledger, unit, IW_EVIDENCE_BUS, force->evidence_permille);
-        iw_ledger_confirm(&self->ledger, IW_LEDGER_OFFSET_INCLUDED, IW_EVIDENCE_BUS, force->evidence_permille);
-    } else if (force->evidence == IW_UNIT_CN || force->evidence == IW_UNIT_DN) {
-        iw_ledger_contradict(&self->ledger, unit, IW_EVIDENCE_BUS, force->evidence_permille);
+    const bool fits = force->evidence == configured;
+    if (force->evidence == IW_UNIT_CN || force->evidence == IW_UNIT_DN) {
+        note(self, iw_ledger_force_unit(side), fits, force->evidence_permille);
+    }
+    if (fits || force->evidence == IW_UNIT_OFFSET_REMOVED) {
+        note(self, IW_LEDGER_OFFSET_INCLUDED, fits, force->evidence_permille);
     }
 }
 
@@ -118,8 +123,8 @@ static void hear_force(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side)
 
 /// Only the first one: each entry is a change that is reported and stored, and frames come 500 times a second.
 static void contradict_length(iw_gateway_t *self, uint8_t length) {
-    if (iw_ledger_entry(&self->ledger, IW_LEDGER_DLC)->state != IW_LEDGER_CONTRADICTED) {
-        iw_ledger_contradict(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
+    if (self->ledger.entry[IW_LEDGER_DLC].state != IW_LEDGER_CONTRADICTED) {
+        note(self, IW_LEDGER_DLC, false, length);
     }
 }
 
@@ -129,7 +134,7 @@ static void note_length(iw_gateway_t *self, iw_codec_kind_t kind, uint8_t length
     if (length != iw_codec_length(kind)) {
         contradict_length(self, length);
     } else if (kind == IW_CODEC_STATUS) {
-        iw_ledger_confirm(&self->ledger, IW_LEDGER_DLC, IW_EVIDENCE_BUS, length);
+        note(self, IW_LEDGER_DLC, true, length);
     }
 }
 
@@ -155,9 +160,9 @@ static void hear(iw_gateway_t *self, iw_codec_kind_t kind, iw_side_t side) {
 }
 
 /// Two masters on one bus: the wheels obey whoever sent last (fault 19).
-static void hear_foreign(iw_gateway_t *self, uint32_t id) {
+static void hear_foreign(iw_gateway_t *self, iw_side_t side, uint32_t id) {
     self->counters.foreign++;
-    raise_cause(self, IW_CAUSE_SECOND_MASTER, side_bit(iw_codec_side(id)), id);
+    raise_cause(self, IW_CAUSE_SECOND_MASTER, side_bit(side), id);
 }
 
 static bool is_setpoint_id(uint32_t id) {
@@ -165,23 +170,23 @@ static bool is_setpoint_id(uint32_t id) {
 }
 
 /// An echo is our own frame, confirmed by the controller; anything else with a setpoint's id has another sender.
-static void take_setpoint(iw_gateway_t *self, const iw_can_frame_t *frame) {
+static void take_setpoint(iw_gateway_t *self, iw_side_t side, const iw_can_frame_t *frame) {
     if (frame->kind == IW_CAN_ECHO) {
         self->counters.echoes++;
-        iw_confirmation_echo(&self->sender.confirmation, iw_codec_side(frame->id), frame);
+        iw_confirmation_echo(&self->sender.confirmation, side, frame);
     } else {
-        hear_foreign(self, frame->id);
+        hear_foreign(self, side, frame->id);
     }
 }
 
 static void take_frame(iw_gateway_t *self, const iw_can_frame_t *frame) {
+    const iw_side_t side = iw_codec_side(frame->id);
     // Before decoding: a foreign setpoint of any length must latch, also one that decodes to nothing.
     if (is_setpoint_id(frame->id)) {
-        take_setpoint(self, frame);
+        take_setpoint(self, side, frame);
         return;
     }
     const iw_codec_kind_t kind = iw_codec_decode(frame, self->told);
-    const iw_side_t side = iw_codec_side(frame->id);
     switch (kind) {
     case IW_CODEC_BAD_FORMAT:
         self->counters.bad_format++;
@@ -211,31 +216,33 @@ static IW_APART void receive(iw_gateway_t *self) {
     self->backlog = taken == IW_GATEWAY_DRAIN_MAX;
 }
 
-static void watch_silence(iw_gateway_t *self) {
-    uint8_t sides = IW_SIDES_NONE;
-    uint32_t silent_ms = 0;
-    for (size_t side = 0; side < IW_SIDES; side++) {
-        const iw_wheel_t *const wheel = &self->wheel[side];
-        if (iw_wheel_lost(wheel, self->now_us)) {
-            sides |= side_bit(side);
-            silent_ms = (wheel->heard_us == IW_NEVER) ? UINT32_MAX : whole_ms(self->now_us - wheel->heard_us);
-        }
+/// How long a wheel that is lost has been silent; 0: it is not lost.
+static IW_APART uint32_t lost_for_ms(const iw_gateway_t *self, iw_side_t side) {
+    const iw_wheel_t *const wheel = &self->wheel[side];
+    if (!iw_wheel_lost(wheel, self->now_us)) {
+        return 0;
     }
-    if (sides != IW_SIDES_NONE) {
-        raise_cause(self, IW_CAUSE_WHEEL_LOST, sides, silent_ms);
+    return (wheel->heard_us == IW_NEVER) ? UINT32_MAX : iw_age_us(wheel->heard_us, self->now_us) / IW_US_PER_MS;
+}
+
+static void watch_silence(iw_gateway_t *self) {
+    const uint32_t left_ms = lost_for_ms(self, IW_LEFT);
+    const uint32_t right_ms = lost_for_ms(self, IW_RIGHT);
+    const uint32_t left = (left_ms > 0U) ? IW_SIDES_LEFT : IW_SIDES_NONE;
+    const uint32_t right = (right_ms > 0U) ? IW_SIDES_RIGHT : IW_SIDES_NONE;
+    if ((left | right) != IW_SIDES_NONE) {
+        raise_cause(self, IW_CAUSE_WHEEL_LOST, (uint8_t)(left | right), (right_ms > 0U) ? right_ms : left_ms);
     }
 }
 
 /// How long a setpoint has waited for its echo, if too long; else 0.
-static IW_APART iw_time_us_t overdue_us(const iw_gateway_t *self) {
-    const iw_time_us_t waiting_us = iw_confirmation_waiting_us(&self->sender.confirmation);
-    if (waiting_us == IW_NEVER || self->now_us - waiting_us < (iw_time_us_t)self->config.echo_ms * IW_US_PER_MS) {
-        return 0;
-    }
-    return self->now_us - waiting_us;
+static IW_APART uint32_t overdue_us(const iw_gateway_t *self) {
+    const iw_time_us_t since_us = iw_confirmation_waiting_us(&self->sender.confirmation);
+    const uint32_t waited_us = (since_us == IW_NEVER) ? 0U : iw_age_us(since_us, self->now_us);
+    return (waited_us < self->config.echo_ms * IW_US_PER_MS) ? 0U : waited_us;
 }
 
-static int ask_back(iw_gateway_t *self) {
+static IW_APART int ask_back(iw_gateway_t *self) {
     const int answer = iw_sender_purge(&self->sender);
     self->counters.purges += (answer > 0) ? 1U : 0U;
     return answer;
@@ -244,7 +251,7 @@ static int ask_back(iw_gateway_t *self) {
 /// A missing echo latches. The zeros of that stop would wait behind the stuck frame, so the port is asked to purge it:
 /// once per stop, because a purge may take the link down. (IW_CAUSE_SEND_STALLED leaves nothing but zeros to send.)
 static void watch_echo(iw_gateway_t *self) {
-    const iw_time_us_t waited_us = overdue_us(self);
+    const uint32_t waited_us = overdue_us(self);
     if (waited_us == 0U) {
         return;
     }
@@ -275,10 +282,10 @@ static void watch_follow(iw_gateway_t *self, size_t side, int32_t applied_mm_s) 
         raise_cause(self, (iw_cause_t)causes[verdict], side_bit(side), (uint32_t)iw_magnitude(measured_mm_s));
     }
     if (verdict == IW_FOLLOW_SIGN) {
-        iw_ledger_contradict(&self->ledger, item, IW_EVIDENCE_BUS, along_mm_s);
+        note(self, item, false, along_mm_s);
     }
     if (self->ledger.entry[item].state == IW_LEDGER_ASSUMED && iw_follow_sign_confirmed(follow, self->now_us)) {
-        iw_ledger_confirm(&self->ledger, item, IW_EVIDENCE_BUS, along_mm_s);
+        note(self, item, true, along_mm_s);
     }
 }
 
@@ -304,38 +311,39 @@ static uint32_t both_rest_us(const iw_gateway_t *self) {
 /// Silence, reboots, echoes overdue, wheels that do not follow; then the permission's own step. What several rules ask
 /// is found out once.
 static void judge_wheels(iw_gateway_t *self) {
-    iw_permit_view_t view;
-    view.heard =
+    iw_permit_view_t *const view = &self->permit.view;
+    const bool heard =
         iw_wheel_heard(&self->wheel[IW_LEFT], self->now_us) && iw_wheel_heard(&self->wheel[IW_RIGHT], self->now_us);
     const uint32_t rest_us = both_rest_us(self);
-    view.applied = iw_setpoint_applied(&self->setpoint);
+    const iw_pair_t applied = iw_setpoint_applied(&self->setpoint);
     // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {
         iw_permit_keep_present(&self->permit);
     } else {
         watch_echo(self);
-        if (!view.heard) { // Who is heard is not lost.
+        if (!heard) { // Who is heard is not lost.
             watch_silence(self);
         }
-        watch_wheel(self, IW_LEFT, view.applied.wheel[IW_LEFT].speed_mm_s);
-        watch_wheel(self, IW_RIGHT, view.applied.wheel[IW_RIGHT].speed_mm_s);
+        watch_wheel(self, IW_LEFT, applied.wheel[IW_LEFT].speed_mm_s);
+        watch_wheel(self, IW_RIGHT, applied.wheel[IW_RIGHT].speed_mm_s);
     }
-    view.at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
-    view.settled = rest_us >= IW_PERMIT_SETTLED_US;
-    view.output_zero = iw_setpoint_is_zero(&self->setpoint);
-    view.timing_ok = !self->facts.timing_contradicted;
-    view.can_send = iw_confirmation_may_send(&self->sender.confirmation, IW_LEFT, true) &&
-                    iw_confirmation_may_send(&self->sender.confirmation, IW_RIGHT, true);
+    view->heard = heard;
+    view->applied = applied;
+    view->at_rest = rest_us >= (uint32_t)self->config.rest_ms * IW_US_PER_MS;
+    view->settled = rest_us >= IW_PERMIT_SETTLED_US;
+    view->output_zero = iw_setpoint_is_zero(&self->setpoint);
+    view->timing_ok = !self->facts.timing_contradicted;
+    view->can_send = iw_confirmation_may_send(&self->sender.confirmation, IW_LEFT, true) &&
+                     iw_confirmation_may_send(&self->sender.confirmation, IW_RIGHT, true);
     // Sent at or after the request: the echo of an older zero pair does not arm.
-    view.proven = iw_permit_arming(&self->permit) &&
-                  iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;
-    iw_permit_step(&self->permit, self->now_us, &view);
+    view->proven = iw_permit_arming(&self->permit) &&
+                   iw_confirmation_proven_us(&self->sender.confirmation) >= self->permit.arming_us;
+    iw_permit_step(&self->permit, self->now_us);
 }
 
 /// Takes the pair that is due and sends it. R5 (both or none): a pair of which one frame was not taken is
 /// followed by zeros for both wheels.
 static iw_send_result_t send_pair(iw_gateway_t *self) {
-    iw_pair_t pair;
     if (!iw_setpoint_due(&self->setpoint, self->now_us)) {
         return IW_SEND_DONE;
     }
@@ -343,8 +351,8 @@ static iw_send_result_t send_pair(iw_gateway_t *self) {
     if (!iw_sender_ready(&self->sender, zero)) {
         return IW_SEND_DONE;
     }
-    iw_setpoint_take(&self->setpoint, self->now_us, &pair);
-    const iw_send_result_t result = iw_sender_send(&self->sender, self->now_us, &pair, zero);
+    const iw_pair_t pair = iw_setpoint_take(&self->setpoint, self->now_us);
+    const iw_send_result_t result = iw_sender_send(&self->sender, &pair, self->now_us, zero);
     if (result == IW_SEND_LATER) {
         iw_setpoint_collapse(&self->setpoint, self->now_us);
     }
@@ -361,7 +369,7 @@ static void keep_silent(iw_gateway_t *self) {
         return;
     }
     const bool again = self->purged_us != IW_NEVER;
-    if (self->backlog || (again && self->now_us - self->purged_us < IW_GATEWAY_LOST_ECHO_US)) {
+    if (self->backlog || iw_age_us(self->purged_us, self->now_us) < IW_GATEWAY_LOST_ECHO_US) {
         return;
     }
     const bool was_left = self->left_behind;

@@ -38,7 +38,7 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
 }
 
 /// `status_us` is reset because the wheel's odometry begins anew: the next status frame is a start, not a step.
-static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence) {
+static IW_APART void rebooted(iw_wheel_t *self, iw_reboot_t evidence, iw_time_us_t now_us) {
     self->pending_reboot = evidence;
     self->reboots++;
     self->offset_us = now_us;
@@ -48,14 +48,14 @@ static void rebooted(iw_wheel_t *self, iw_time_us_t now_us, iw_reboot_t evidence
 
 /// Any frame of the wheel: was it away for so long that it may have been without power?
 static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
-    const bool was_away = now_us - self->any_us >= IW_WHEEL_REBOOT_SILENCE_US;
+    const bool was_away = iw_age_us(self->any_us, now_us) >= IW_WHEEL_REBOOT_SILENCE_US;
     self->any_us = now_us;
     if (self->first_us == IW_NEVER) {
         self->first_us = now_us;
         self->offset_us = now_us;
         self->boot_seen = was_away;
     } else if (was_away) {
-        rebooted(self, now_us, IW_REBOOT_SILENCE);
+        rebooted(self, IW_REBOOT_SILENCE, now_us);
     }
 }
 
@@ -79,9 +79,8 @@ static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_spe
 
 /// True if no wheel can have turned so far in that time. `delta` is modulo 2^32, as odometry wraps: the shorter way
 /// counts.
-static bool tick_jump(const iw_wheel_t *self, uint32_t delta, iw_time_us_t elapsed_us) {
-    const uint32_t elapsed = (elapsed_us < UINT32_MAX) ? (uint32_t)elapsed_us : UINT32_MAX;
-    const uint32_t limit = elapsed / self->us_per_tick_min;
+static bool tick_jump(const iw_wheel_t *self, uint32_t delta, uint32_t elapsed_us) {
+    const uint32_t limit = elapsed_us / self->us_per_tick_min;
     const uint32_t moved = (delta > INT32_MAX) ? 0U - delta : delta;
     return moved > IW_WHEEL_TICK_SLACK && moved - IW_WHEEL_TICK_SLACK > limit;
 }
@@ -89,10 +88,10 @@ static bool tick_jump(const iw_wheel_t *self, uint32_t delta, iw_time_us_t elaps
 static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_status_t *status) {
     if (self->status_us != IW_NEVER) {
         const uint32_t delta = (uint32_t)status->odometry_ticks - (uint32_t)self->odometry_ticks;
-        if (tick_jump(self, delta, now_us - self->status_us)) {
-            rebooted(self, now_us, IW_REBOOT_ODOMETRY);
+        if (tick_jump(self, delta, iw_age_us(self->status_us, now_us))) {
+            rebooted(self, IW_REBOOT_ODOMETRY, now_us);
         } else if (self->ticks >= -IW_WHEEL_TICKS_MAX && self->ticks <= IW_WHEEL_TICKS_MAX) {
-            self->ticks += (delta > INT32_MAX) ? -(int64_t)(0U - delta) : (int64_t)delta;
+            self->ticks += (int32_t)delta;
         }
     }
     self->odometry_ticks = status->odometry_ticks;
@@ -101,8 +100,8 @@ static void hear_status(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_st
 
 /// Judged after our own stall too: a wheel that rebooted meanwhile shows it by nothing else.
 static void hear_offset(iw_wheel_t *self, iw_time_us_t now_us) {
-    if (now_us - self->offset_us >= IW_WHEEL_OFFSET_BACK_US) {
-        rebooted(self, now_us, IW_REBOOT_OFFSET_FRAMES);
+    if (iw_age_us(self->offset_us, now_us) >= IW_WHEEL_OFFSET_BACK_US) {
+        rebooted(self, IW_REBOOT_OFFSET_FRAMES, now_us);
     }
     self->offset_us = now_us;
 }
@@ -129,19 +128,12 @@ void iw_wheel_excuse(iw_wheel_t *self, iw_time_us_t now_us) {
 
 bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us) {
     const iw_time_us_t since_us = (self->heard_us > self->excused_us) ? self->heard_us : self->excused_us;
-    return self->heard_us == IW_NEVER || now_us - since_us >= silent_us(self);
+    return iw_age_us(since_us, now_us) >= silent_us(self);
 }
 
 uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us) {
-    const iw_time_us_t rest_us = now_us - self->rest_since_us;
     if (self->rest_since_us == IW_NEVER || !iw_wheel_heard(self, now_us)) {
         return 0;
     }
-    return (rest_us < UINT32_MAX) ? (uint32_t)rest_us : UINT32_MAX;
-}
-
-iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self) {
-    const iw_reboot_t reboot = self->pending_reboot;
-    self->pending_reboot = IW_REBOOT_NONE;
-    return reboot;
+    return iw_age_us(self->rest_since_us, now_us);
 }

@@ -8,7 +8,9 @@
 /// Where a number is kept. Those below TYPE are the core's, in the order of iw_config_t.
 enum { TYPE = 18, ROLE, RPM_OF, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, TRACK, SETTINGS_END };
 IW_STATIC_ASSERT(SETTINGS_END == IW_SETTINGS && TYPE == (int)IW_CONFIG_SETPOINT_DLC, numbers_of_the_core_come_first);
-IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == 17U * sizeof(uint16_t), the_core_s_numbers_are_side_by_side);
+#define FIRST offsetof(iw_config_t, period_ms)
+IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + 17U * sizeof(uint16_t),
+                 the_core_s_numbers_are_side_by_side);
 
 #define UNSET         0xFFFFU
 #define INDEX(fault)  ((uint8_t)(IW_CONFIG_##fault - 1))
@@ -58,7 +60,7 @@ static const row_t rows[] = {
 
 iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm) {
     iw_settings_t self;
-    memcpy(self.value, config, TYPE * sizeof self.value[0]);
+    memcpy(self.value, (const uint8_t *)config + FIRST, TYPE * sizeof self.value[0]);
     self.value[TYPE] = config->setpoint_type_set ? config->setpoint_type : UNSET;
     self.value[ROLE] = (uint16_t)config->current_role;
     self.value[RPM_OF] = config->rpm_of_rotor ? 1U : 0U;
@@ -71,7 +73,7 @@ iw_settings_t iw_settings_from(const iw_config_t *config, uint32_t track_mm) {
 }
 
 uint32_t iw_settings_to(const iw_settings_t *self, iw_config_t *config) {
-    memcpy(config, self->value, TYPE * sizeof self->value[0]);
+    memcpy((uint8_t *)config + FIRST, self->value, TYPE * sizeof self->value[0]);
     config->setpoint_type_set = self->value[TYPE] != UNSET;
     config->setpoint_type = config->setpoint_type_set ? (uint8_t)self->value[TYPE] : 0U;
     config->current_role = (iw_current_role_t)self->value[ROLE];

@@ -75,7 +75,8 @@ void permit_rig_begin(permit_rig_t *self, permit_situation_t situation) {
 }
 
 void permit_rig_step(permit_rig_t *self) {
-    iw_permit_step(&self->permit, self->now_us, &self->view);
+    self->permit.view = self->view;
+    iw_permit_step(&self->permit, self->now_us);
 }
 
 void permit_rig_wait(permit_rig_t *self, iw_time_us_t for_us) {
@@ -84,7 +85,8 @@ void permit_rig_wait(permit_rig_t *self, iw_time_us_t for_us) {
 }
 
 void permit_rig_raise(permit_rig_t *self, iw_cause_t cause) {
-    iw_permit_raise(&self->permit, self->now_us, cause, IW_SIDES_BOTH, 42);
+    const iw_event_t event = {cause, IW_SIDES_BOTH, 42};
+    iw_permit_raise(&self->permit, &event, self->now_us);
 }
 
 iw_refusal_t permit_rig_arm(permit_rig_t *self, iw_client_t client) {

@@ -6,13 +6,11 @@
 #include "iwheel/private/transmit.h"
 #include "unity.h"
 
-#define POISON 0xA5
-
 static iw_confirmation_t account;
 
 void setUp(void) {
-    memset(&account, POISON, sizeof account);
-    iw_confirmation_init(&account);
+    memset(&account, 0, sizeof account);
+    iw_confirmation_clear(&account);
 }
 
 void tearDown(void) {}

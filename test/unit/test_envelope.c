@@ -5,7 +5,6 @@
 #include "iwheel/private/transmit.h"
 #include "unity.h"
 
-#define POISON   0xA5
 #define START_US 5000000123ULL
 #define AGES_US  3600000000ULL
 
@@ -17,8 +16,8 @@ void setUp(void) {
     config.setpoint_type = 1;
     config.setpoint_type_set = true;
     config.current_role = IW_ROLE_LIMIT;
-    memset(&envelope, POISON, sizeof envelope);
-    iw_envelope_init(&envelope, &config);
+    memset(&envelope, 0, sizeof envelope);
+    envelope.config = &config;
 }
 
 void tearDown(void) {}
@@ -26,8 +25,8 @@ void tearDown(void) {}
 /// The configuration was changed: a new envelope for it.
 static void restart(void) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
-    memset(&envelope, POISON, sizeof envelope);
-    iw_envelope_init(&envelope, &config);
+    memset(&envelope, 0, sizeof envelope);
+    envelope.config = &config;
 }
 
 /// Bytes written by hand, so that an error of the encoder does not hide one of the envelope.
@@ -48,7 +47,7 @@ static iw_can_frame_t setpoint(iw_side_t side, int32_t speed_mm_s, int32_t curre
 
 static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t speed_mm_s, int32_t current_mA) {
     const iw_can_frame_t frame = setpoint(side, speed_mm_s, current_mA);
-    return iw_envelope_check(&envelope, now_us, &frame);
+    return iw_envelope_check(&envelope, &frame, now_us);
 }
 
 /// Brings the wheel to a low speed: zero, and long after it the speed.
@@ -79,7 +78,7 @@ static uint32_t sweep_number(uint32_t number) {
         frame.dlc = (uint8_t)(rest / 16U % 16U);
         frame.kind = (uint8_t)(rest / 256U);
         const bool wanted = (frame.id == 266 || frame.id == 298) && frame.dlc == config.setpoint_dlc;
-        const iw_envelope_verdict_t verdict = iw_envelope_check(&envelope, START_US, &frame);
+        const iw_envelope_verdict_t verdict = iw_envelope_check(&envelope, &frame, START_US);
         if (verdict != (wanted ? IW_ENVELOPE_PASS : IW_ENVELOPE_NOT_A_SETPOINT)) {
             TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, frame.id, "wrong verdict for this id");
         }
@@ -105,7 +104,7 @@ static void test_check_wider_number_with_our_low_bits_is_stopped(void) {
     for (unsigned bit = 11; bit < 32; bit++) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.id |= (uint32_t)1 << bit;
-        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_NOT_A_SETPOINT, iw_envelope_check(&envelope, START_US, &frame));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_NOT_A_SETPOINT, iw_envelope_check(&envelope, &frame, START_US));
     }
 }
 
@@ -114,7 +113,7 @@ static void test_check_absurd_length_is_stopped(void) {
         iw_can_frame_t frame = setpoint(IW_RIGHT, 0, 0);
         frame.dlc = (uint8_t)dlc;
         const iw_envelope_verdict_t wanted = (dlc == 5) ? IW_ENVELOPE_PASS : IW_ENVELOPE_NOT_A_SETPOINT;
-        TEST_ASSERT_EQUAL_INT(wanted, iw_envelope_check(&envelope, START_US, &frame));
+        TEST_ASSERT_EQUAL_INT(wanted, iw_envelope_check(&envelope, &frame, START_US));
     }
 }
 
@@ -126,7 +125,7 @@ static void test_check_every_type_passes_the_configured_one_only(void) {
             iw_can_frame_t frame = setpoint(IW_LEFT, 0, 0);
             frame.data[0] = (uint8_t)type;
             const iw_envelope_verdict_t wanted = (type == configured) ? IW_ENVELOPE_PASS : IW_ENVELOPE_TYPE;
-            TEST_ASSERT_EQUAL_INT(wanted, iw_envelope_check(&envelope, START_US, &frame));
+            TEST_ASSERT_EQUAL_INT(wanted, iw_envelope_check(&envelope, &frame, START_US));
         }
     }
 }
@@ -137,7 +136,7 @@ static void test_check_type_not_configured_stops_every_type_even_at_zero(void) {
     for (unsigned type = 0; type < 256; type++) {
         iw_can_frame_t frame = setpoint(IW_LEFT, 0, 0);
         frame.data[0] = (uint8_t)type;
-        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, iw_envelope_check(&envelope, START_US, &frame));
+        TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, iw_envelope_check(&envelope, &frame, START_US));
     }
     TEST_ASSERT_EQUAL_UINT32(256, envelope.stopped);
 }
@@ -199,9 +198,9 @@ static void test_check_many_things_wrong_names_the_first_in_the_documented_order
     iw_can_frame_t frame = setpoint(IW_LEFT, 30000, 30000);
     frame.data[0] = 2;
     frame.id = 267;
-    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_NOT_A_SETPOINT, iw_envelope_check(&envelope, START_US, &frame));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_NOT_A_SETPOINT, iw_envelope_check(&envelope, &frame, START_US));
     frame.id = 266;
-    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, iw_envelope_check(&envelope, START_US, &frame));
+    TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_TYPE, iw_envelope_check(&envelope, &frame, START_US));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_CURRENT, check(START_US, IW_LEFT, 30000, 30000));
     TEST_ASSERT_EQUAL_INT(IW_ENVELOPE_SPEED, check(START_US, IW_LEFT, 30000, 0));
     TEST_ASSERT_EQUAL_UINT32(4, envelope.stopped);

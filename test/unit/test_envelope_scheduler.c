@@ -42,20 +42,18 @@ static void send_through_gate(iw_envelope_t *envelope, const iw_config_t *config
         const iw_codec_setpoint_t setpoint = {command->speed_mm_s, command->current_mA, config->setpoint_type};
         iw_can_frame_t frame;
         TEST_ASSERT_FALSE(iw_codec_encode_setpoint((iw_side_t)side, &setpoint, (uint8_t)config->setpoint_dlc, &frame));
-        TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check(envelope, now_us, &frame));
+        TEST_ASSERT_EQUAL(IW_ENVELOPE_PASS, iw_envelope_check(envelope, &frame, now_us));
     }
 }
 
 static void run_once(void) {
     const iw_config_t config = any_config();
     iw_setpoint_t setpoint;
-    iw_envelope_t envelope;
+    iw_envelope_t envelope = {.config = &config};
     iw_time_us_t now_us = 1000000U + draw(1000000U);
     iw_setpoint_init(&setpoint, &config);
-    iw_envelope_init(&envelope, &config);
     iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_ZERO);
     for (uint32_t i = 0; i < 400U; i++) {
-        iw_pair_t pair;
         if (draw(20) == 0U) {
             const iw_pair_t command = {{any_command(&config), any_command(&config)}};
             iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_FOLLOW);
@@ -65,7 +63,7 @@ static void run_once(void) {
             iw_setpoint_demand(&setpoint, now_us, IW_DEMAND_BRAKE);
         }
         now_us = iw_setpoint_next_us(&setpoint) + draw(30000U);
-        iw_setpoint_take(&setpoint, now_us, &pair);
+        const iw_pair_t pair = iw_setpoint_take(&setpoint, now_us);
         send_through_gate(&envelope, &config, now_us, &pair);
     }
 }

@@ -5,7 +5,6 @@
 #include "iwheel/private/transmit.h"
 #include "unity.h"
 
-#define POISON   0xA5
 #define START_US 5000000123ULL
 #define AGES_US  3600000000ULL
 /// A ramp in whole mm/s may be this much ahead of its slope; a verdict is demanded outside this band only.
@@ -16,8 +15,8 @@ static iw_envelope_t envelope;
 
 static void restart(void) {
     TEST_ASSERT_EQUAL_INT(IW_CONFIG_OK, iw_config_check(&config));
-    memset(&envelope, POISON, sizeof envelope);
-    iw_envelope_init(&envelope, &config);
+    memset(&envelope, 0, sizeof envelope);
+    envelope.config = &config;
 }
 
 void setUp(void) {
@@ -37,7 +36,7 @@ static iw_envelope_verdict_t check(iw_time_us_t now_us, iw_side_t side, int32_t 
                                   .dlc = 5,
                                   .data = {7, (uint8_t)(speed >> 8 & 0xFFU), (uint8_t)(speed & 0xFFU),
                                            (uint8_t)(current >> 8 & 0xFFU), (uint8_t)(current & 0xFFU)}};
-    return iw_envelope_check(&envelope, now_us, &frame);
+    return iw_envelope_check(&envelope, &frame, now_us);
 }
 
 /// Brings the wheel to a speed, as fast as the slope allows.

@@ -183,7 +183,8 @@ static void test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows(void) {
 
 static void test_permit_cause_of_no_wheel_is_told_as_such(void) {
     permit_rig_begin(&rig, PERMIT_ARMED);
-    iw_permit_raise(&rig.permit, rig.now_us, IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, UINT32_MAX);
+    const iw_event_t lost = {IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, UINT32_MAX};
+    iw_permit_raise(&rig.permit, &lost, rig.now_us);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_RIGHT, rig.permit.stop.sides);
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, rig.permit.stop.detail);
     TEST_ASSERT_EQUAL_INT(HOLDER, rig.permit.stop.client);

@@ -249,7 +249,8 @@ static void test_permit_restarted_without_any_wheel_ends_as_well(void) {
 }
 
 static void hear_foreign(uint8_t sides) {
-    iw_permit_raise(&rig.permit, rig.now_us, IW_CAUSE_SECOND_MASTER, sides, 42);
+    const iw_event_t foreign = {IW_CAUSE_SECOND_MASTER, sides, 42};
+    iw_permit_raise(&rig.permit, &foreign, rig.now_us);
 }
 
 static void test_permit_restarted_gives_way_to_the_fifth_foreign_setpoint(void) {
@@ -317,13 +318,13 @@ static void assert_next_is_right(void) {
     const iw_time_us_t next_us = iw_permit_next_us(&rig.permit);
     const iw_time_us_t before_us = (next_us == IW_NEVER) ? rig.now_us + MS(100000) : next_us - 1U;
     if (before_us >= rig.now_us) {
-        iw_permit_step(&rig.permit, before_us, &rig.view);
+        iw_permit_step(&rig.permit, before_us);
         TEST_ASSERT_EQUAL_HEX32_MESSAGE(outside(&now), outside(&rig.permit), "changed before next_us");
         rig.permit = now;
     }
     if (next_us != IW_NEVER) {
         TEST_ASSERT_TRUE_MESSAGE(next_us > rig.now_us, "asks to be called again at once");
-        iw_permit_step(&rig.permit, next_us, &rig.view);
+        iw_permit_step(&rig.permit, next_us);
         TEST_ASSERT_TRUE_MESSAGE(outside(&now) != outside(&rig.permit), "nothing changed at next_us");
         rig.permit = now;
     }

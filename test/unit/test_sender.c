@@ -28,7 +28,7 @@ static iw_send_result_t send(int16_t left_mm_s, int16_t right_mm_s) {
     iw_pair_t pair = zero_pair;
     pair.wheel[IW_LEFT].speed_mm_s = left_mm_s;
     pair.wheel[IW_RIGHT].speed_mm_s = right_mm_s;
-    return iw_sender_send(&sender, now_us, &pair, left_mm_s == 0 && right_mm_s == 0);
+    return iw_sender_send(&sender, &pair, now_us, left_mm_s == 0 && right_mm_s == 0);
 }
 
 static void echo(iw_side_t side) {

@@ -9,9 +9,16 @@
 
 #include "iwheel/types.h"
 
-/// Ranges are inclusive.
+/// Ranges are inclusive. What is short stands first: a Cortex-M reaches it by shorter instructions.
 typedef struct {
-    uint16_t period_ms;       ///< Spacing of setpoint pairs, 5..50.
+    uint8_t setpoint_type;          ///< Byte 0 of a setpoint. The document lists no values: valid only with `..._set`.
+    bool setpoint_type_set;         ///< The wheels do not move until this is true.
+    bool rpm_of_rotor;              ///< The rpm in telemetry are the rotor's, not the wheel's.
+    bool listen_only;               ///< Nothing is ever sent; arm is refused.
+    iw_current_role_t current_role; ///< The wheels do not move while it is IW_ROLE_UNSET.
+    bool invert[IW_SIDES];          ///< This wheel is mounted mirrored: negate its speed, both ways.
+    iw_force_unit_t force_unit[IW_SIDES]; ///< As documented unless the wheel proves otherwise.
+    uint16_t period_ms;                   ///< Spacing of setpoint pairs, 5..50.
     uint16_t lease_ms;        ///< A drive command holds this long, 20..500. Three client periods are a good value.
     uint16_t accel_mm_s2;     ///< Slope away from zero, 50..20000.
     uint16_t decel_mm_s2;     ///< Slope towards zero, 100..20000. Bounds the stop after a lost client.
@@ -29,13 +36,6 @@ typedef struct {
     uint16_t gear_turns;      ///< Rotor turns in `gear_per` wheel turns, 1..1000.
     uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1..100.
     uint16_t setpoint_dlc;    ///< 5..8, zero padded. The document's table has 5 bytes.
-    uint8_t setpoint_type;    ///< Byte 0 of a setpoint. The document lists no values: valid only with `..._set`.
-    bool setpoint_type_set;   ///< The wheels do not move until this is true.
-    bool rpm_of_rotor;        ///< The rpm in telemetry are the rotor's, not the wheel's.
-    bool listen_only;         ///< Nothing is ever sent; arm is refused.
-    iw_current_role_t current_role;       ///< The wheels do not move while it is IW_ROLE_UNSET.
-    bool invert[IW_SIDES];                ///< This wheel is mounted mirrored: negate its speed, both ways.
-    iw_force_unit_t force_unit[IW_SIDES]; ///< As documented unless the wheel proves otherwise.
 } iw_config_t;
 
 // Fixed by the safety rules.
@@ -47,7 +47,8 @@ typedef struct {
 /// Signs are compared only if command and measurement are both above this. Safety rule.
 #define IW_SIGN_MM_S 100
 
-/// Which field `iw_config_check` found wrong, in the order of the struct; then relations between fields.
+/// Which field `iw_config_check` found wrong: the numbers in the order of the struct, the others, relations between
+/// fields.
 typedef enum {
     IW_CONFIG_OK = 0,
     IW_CONFIG_PERIOD,

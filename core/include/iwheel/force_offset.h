@@ -114,24 +114,25 @@ typedef struct {
     iw_window_t window;    ///< The judgement.
 } iw_force_quality_t;
 
-/// The force on one wheel. Read it through the functions below.
+/// The force on one wheel. Read it through the functions below. What is short stands first: a Cortex-M reaches it by
+/// shorter instructions.
 typedef struct {
-    iw_time_us_t raw_us;     ///< When `raw` came; IW_NEVER: not yet.
-    iw_time_us_t offset_us;  ///< When the offset in force was taken; IW_NEVER: none, or by an earlier run.
-    int32_t offset_mN;       ///< The offset in force; 0 with IW_OFFSET_NONE.
-    int16_t wheel_offset_dN; ///< The wheel's own, as sent.
-    int16_t sample[IW_FORCE_WINDOW_SAMPLES]; ///< Ring of raw values, the last two seconds.
-    int16_t raw;                             ///< The last one, as on the bus.
     uint8_t count;                           ///< Samples in the ring.
     uint8_t still;                           ///< Of the newest samples, how many in a row came from a wheel at rest.
     uint8_t next;                            ///< Where the next sample goes.
+    bool wheel_offset_heard;                 ///< In this run of the wheel.
+    bool boot_seen;                          ///< The start of this run was observed.
     iw_force_unit_t unit;                    ///< Of `raw`.
     iw_offset_provenance_t provenance;       ///< Of the offset in force.
     iw_unit_evidence_t evidence;             ///< Of the unit.
-    int32_t evidence_permille;               ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
     iw_force_quality_t quality;              ///< Of the start-up window.
-    bool wheel_offset_heard;                 ///< In this run of the wheel.
-    bool boot_seen;                          ///< The start of this run was observed.
+    iw_time_us_t raw_us;                     ///< When `raw` came; IW_NEVER: not yet.
+    iw_time_us_t offset_us;                  ///< When that offset was taken; IW_NEVER: none, or by an earlier run.
+    int32_t offset_mN;                       ///< The offset in force; 0 with IW_OFFSET_NONE.
+    int32_t evidence_permille;               ///< 1000 x raw mean / wheel offset in dN, when evidence was judged.
+    int16_t wheel_offset_dN;                 ///< The wheel's own, as sent.
+    int16_t raw;                             ///< The last one, as on the bus.
+    int16_t sample[IW_FORCE_WINDOW_SAMPLES]; ///< Ring of raw values, the last two seconds.
 } iw_force_t;
 
 /// `unit`: as configured.

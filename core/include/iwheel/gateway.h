@@ -69,15 +69,15 @@ typedef struct iw_gateway {
     /// within IW_GATEWAY_LOST_ECHO_US. It may reach the bus when wheels get power.
     bool left_behind;
     uint32_t purged_stop;            ///< Number of the stop in whose zeros a purge was tried.
-    iw_hal_t hal;                    ///< Copied at init.
+    iw_counters_t counters;          ///< Since init.
     iw_config_t config;              ///< Copied at init.
+    iw_hal_t hal;                    ///< Copied at init.
     iw_time_us_t now_us;             ///< Of the present step.
     iw_time_us_t promised_us;        ///< When the last step asked to be called again.
     iw_time_us_t suspended_us;       ///< Reported by `iw_gateway_suspended` since the last step.
     iw_time_us_t stalled_since_us;   ///< When the first of an unbroken run of stalled steps was due.
     iw_time_us_t pose_us;            ///< When the last pose came; IW_NEVER: none.
     iw_time_us_t purged_us;          ///< When a purge was last tried in this silence; IW_NEVER: not yet.
-    iw_counters_t counters;          ///< Since init.
     iw_setpoint_t setpoint;          ///< Which pair is due.
     iw_permit_t permit;              ///< Whether the wheels may move.
     iw_sender_t sender;              ///< How a pair gets to the bus.

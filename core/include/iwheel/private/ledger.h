@@ -31,7 +31,9 @@ void iw_ledger_confirm(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t e
 void iw_ledger_contradict(iw_ledger_t *self, iw_ledger_item_t item, iw_evidence_t evidence, int32_t figure);
 
 /// The item of a wheel's force unit.
-iw_ledger_item_t iw_ledger_force_unit(iw_side_t side);
+static inline iw_ledger_item_t iw_ledger_force_unit(iw_side_t side) {
+    return (side == IW_LEFT) ? IW_LEDGER_FORCE_UNIT_LEFT : IW_LEDGER_FORCE_UNIT_RIGHT;
+}
 
 /// True if the wheels must not be moved while this item is contradicted: type, role and the signs.
 bool iw_ledger_guards_motion(iw_ledger_item_t item);

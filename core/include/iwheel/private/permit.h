@@ -40,14 +40,14 @@
 /// ... but at most this long.
 #define IW_PERMIT_HOLD_MAX_US 10000000U
 
-/// The states of the diagram above.
+/// The states of the diagram above. Those in which time ends the zeros stand together; the latched ones come last.
 typedef enum {
     IW_PHASE_LISTENING = 0, ///< Silent.
     IW_PHASE_ARMING,        ///< A zero pair waits for its TX confirmation.
+    IW_PHASE_REARMING,      ///< As ARMING, while zeros are held.
     IW_PHASE_ARMED,         ///< The holder drives.
     IW_PHASE_BRAKING,       ///< Ramp to zero, or zero at once.
     IW_PHASE_HOLDING,       ///< Zeros are held until the wheels stand.
-    IW_PHASE_REARMING,      ///< As ARMING, while zeros are held.
     IW_PHASE_RESTARTING,    ///< Zeros for a process that died.
     IW_PHASE_CUT,           ///< Latched; zeros at once, held.
     IW_PHASE_LATCHED,       ///< Latched; silent.
@@ -74,7 +74,7 @@ typedef struct {
     uint8_t strangers;           ///< Setpoints of other senders counted in RESTARTING.
     bool quiet;                  ///< No latching cause is there or happened lately: nothing to look for.
     bool at_once;                ///< BRAKING and what follows: zero without ramp.
-    iw_permit_view_t view;       ///< Of the last step: requests are judged by it.
+    iw_permit_view_t view;       ///< Of the last step, by the owner: requests are judged by it.
     iw_client_t stale_client;    ///< Who sent the last nonzero drive.
     iw_client_t holder;          ///< Of the lease; IW_CLIENT_NONE: nobody.
     iw_client_t blocked;         ///< Whose wheels were blocked when they stopped: refused as such until the hold ends.
@@ -91,6 +91,13 @@ typedef struct {
     iw_time_us_t seen_us[IW_CAUSES]; ///< When each cause was last seen; IW_NEVER: never.
 } iw_permit_t;
 
+/// A cause of a stop, and what is told of it.
+typedef struct {
+    iw_cause_t cause; ///< What is there, or has just happened.
+    uint8_t sides;    ///< Which wheel it speaks of: IW_SIDES_...
+    uint32_t detail;  ///< See iw_cause_t.
+} iw_event_t;
+
 /// `config` must be checked and outlive it. `restarted`: begin with zeros (STOPPING, cause RESTART) because the
 /// process before us died while armed. That hold gives way to another master, but not to what the dead process itself
 /// may have left in its controller: two setpoints per wheel.
@@ -98,13 +105,14 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
 
 /// Tells that a cause is present or has just happened. It takes effect at once; the first cause of a latch stays the
 /// cause.
-void iw_permit_raise(iw_permit_t *self, iw_time_us_t now_us, iw_cause_t cause, uint8_t sides, uint32_t detail);
+void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us);
 
 /// This step cannot judge what was received: SEND_STALLED and WHEEL_LOST stay present if they were.
 void iw_permit_keep_present(iw_permit_t *self);
 
-/// Everything that follows from time and from what the owner sees: end of lease, of arming and of the hold.
-void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us, const iw_permit_view_t *view);
+/// Everything that follows from time and from what the owner sees: end of lease, of arming and of the hold. The owner
+/// has written into `view` what it sees.
+void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us);
 
 /// What a client is told of the phase.
 iw_state_t iw_permit_state(const iw_permit_t *self);

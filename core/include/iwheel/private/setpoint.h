@@ -26,14 +26,14 @@
 
 /// Ramp and grid of both wheels.
 typedef struct {
-    const iw_config_t *config;    ///< The owner's.
-    iw_time_us_t last_us;         ///< When the last pair was taken.
-    iw_time_us_t due_us;          ///< When the next one is due; IW_NEVER in silence.
-    iw_pair_t target;             ///< The client's command, cleared whenever the demand is not FOLLOW.
+    const iw_config_t *config; ///< The owner's.
+    iw_demand_t demand;        ///< As told last.
+    bool from_zero;       ///< The next pair is zero whatever the command: the first after silence, ZERO or a collapse.
+    iw_time_us_t last_us; ///< When the last pair was taken.
+    iw_time_us_t due_us;  ///< When the next one is due; IW_NEVER in silence.
+    iw_pair_t target;     ///< The client's command, cleared whenever the demand is not FOLLOW.
     int32_t speed_um_s[IW_SIDES]; ///< Where the ramp is.
     int32_t current_uA[IW_SIDES]; ///< Ramped only with IW_ROLE_SETPOINT.
-    iw_demand_t demand;           ///< As told last.
-    bool from_zero; ///< The next pair is zero whatever the command: the first after silence, ZERO or a collapse.
 } iw_setpoint_t;
 
 /// `config` must be checked and outlive it. Begins in silence.
@@ -54,10 +54,12 @@ void iw_setpoint_hasten(iw_setpoint_t *self, iw_time_us_t now_us);
 void iw_setpoint_collapse(iw_setpoint_t *self, iw_time_us_t now_us);
 
 /// True if a pair must leave now.
-bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us);
+static inline bool iw_setpoint_due(const iw_setpoint_t *self, iw_time_us_t now_us) {
+    return now_us >= self->due_us;
+}
 
 /// Advances the ramp to now, hands out the pair that must leave now and sets the time of the next.
-void iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us, iw_pair_t *out_pair);
+iw_pair_t iw_setpoint_take(iw_setpoint_t *self, iw_time_us_t now_us);
 
 /// The pair as last taken, in the machine's frame (not inverted).
 iw_pair_t iw_setpoint_applied(const iw_setpoint_t *self);
@@ -69,6 +71,8 @@ bool iw_setpoint_is_zero(const iw_setpoint_t *self);
 bool iw_setpoint_next_is_zero(const iw_setpoint_t *self);
 
 /// When a pair is due; IW_NEVER in silence.
-iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self);
+static inline iw_time_us_t iw_setpoint_next_us(const iw_setpoint_t *self) {
+    return self->due_us;
+}
 
 #endif

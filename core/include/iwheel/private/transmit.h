@@ -40,19 +40,16 @@ typedef enum {
     IW_ENVELOPE_SLEW,
 } iw_envelope_verdict_t;
 
-/// What passed last, against which the next one is judged.
+/// What passed last, against which the next one is judged. It begins all zero but for `config`.
 typedef struct {
-    const iw_config_t *config;      ///< The owner's.
+    const iw_config_t *config;      ///< The owner's: checked.
     iw_time_us_t last_us[IW_SIDES]; ///< When the last frame passed.
     int32_t last_mm_s[IW_SIDES];    ///< Its speed, as on the bus; 0 at first.
     uint32_t stopped;               ///< Frames that did not pass.
 } iw_envelope_t;
 
-/// `config` must be checked and outlive it.
-void iw_envelope_init(iw_envelope_t *self, const iw_config_t *config);
-
 /// Judges one frame; what does not pass is counted and must not be sent.
-iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, iw_time_us_t now_us, const iw_can_frame_t *frame);
+iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, const iw_can_frame_t *frame, iw_time_us_t now_us);
 
 // ---- TX confirmation ----
 //
@@ -68,18 +65,15 @@ iw_envelope_verdict_t iw_envelope_check(iw_envelope_t *self, iw_time_us_t now_us
 //     FREE --sent--> ONE --zero sent--> TWO;  each matching echo goes one back;  clear: FREE
 //     (a frame that the port refused only starts the clock; an echo or the end of sending stops it)
 
-/// Frames handed over and not confirmed.
+/// Frames handed over and not confirmed. It begins all zero, and is then cleared.
 typedef struct {
+    uint8_t pending[IW_SIDES];         ///< Unconfirmed frames, 0..2.
+    uint32_t stray;                    ///< Echoes that no unconfirmed frame matched.
     iw_time_us_t waiting_us[IW_SIDES]; ///< Since when a setpoint waits for its echo; IW_NEVER: none does.
     iw_time_us_t sent_us[IW_SIDES][2]; ///< Of the unconfirmed frames, oldest first.
     iw_time_us_t proven_us[IW_SIDES];  ///< When the last confirmed frame had been sent; 0: none yet.
-    uint32_t stray;                    ///< Echoes that no unconfirmed frame matched.
     uint32_t value[IW_SIDES][2];       ///< Of the unconfirmed frames: speed and current, as they stand in the frame.
-    uint8_t pending[IW_SIDES];         ///< Unconfirmed frames, 0..2.
 } iw_confirmation_t;
-
-/// Nothing sent yet.
-void iw_confirmation_init(iw_confirmation_t *self);
 
 /// Forgets what is unconfirmed and what was confirmed: after a purge or a loss of the bus no echo is owed any more.
 void iw_confirmation_clear(iw_confirmation_t *self);
@@ -119,11 +113,11 @@ typedef enum {
 typedef struct {
     const iw_config_t *config;      ///< The owner's.
     const iw_hal_t *hal;            ///< The owner's.
-    iw_confirmation_t confirmation; ///< What is unconfirmed.
-    iw_envelope_t envelope;         ///< The last check.
-    iw_time_us_t pair_us;           ///< When the last whole pair was taken by the port; IW_NEVER: none since silence.
     iw_sent_t sent;                 ///< Counted since init.
     iw_envelope_verdict_t verdict;  ///< The last that was not IW_ENVELOPE_PASS.
+    iw_time_us_t pair_us;           ///< When the last whole pair was taken by the port; IW_NEVER: none since silence.
+    iw_confirmation_t confirmation; ///< What is unconfirmed.
+    iw_envelope_t envelope;         ///< The last check.
     iw_can_frame_t frame[IW_SIDES]; ///< The pair that is being sent: kept here to spare the stack.
 } iw_sender_t;
 
@@ -134,7 +128,7 @@ void iw_sender_init(iw_sender_t *self, const iw_config_t *config, const iw_hal_t
 bool iw_sender_ready(const iw_sender_t *self, bool zero);
 
 /// Sends the pair, given in the machine's frame, to the wheels that may have it.
-iw_send_result_t iw_sender_send(iw_sender_t *self, iw_time_us_t now_us, const iw_pair_t *pair, bool zero);
+iw_send_result_t iw_sender_send(iw_sender_t *self, const iw_pair_t *pair, iw_time_us_t now_us, bool zero);
 
 /// Nothing is being sent: gaps are measured anew from the next pair, and what was refused is forgotten.
 void iw_sender_rest(iw_sender_t *self);

@@ -42,9 +42,12 @@ typedef enum {
     IW_REBOOT_OFFSET_FRAMES,
 } iw_reboot_t;
 
-/// What is known of a wheel.
+/// What is known of a wheel. What is short stands first: a Cortex-M reaches it by shorter instructions.
 typedef struct {
     const iw_config_t *config;   ///< The owner's.
+    iw_side_t side;              ///< Which wheel this is.
+    iw_reboot_t pending_reboot;  ///< Not yet taken.
+    bool boot_seen;              ///< This run of the wheel began while we were listening, not before.
     iw_time_us_t first_us;       ///< First heard; IW_NEVER: not yet.
     iw_time_us_t offset_us;      ///< Last offset frame of this run, or its start.
     iw_time_us_t any_us;         ///< Last frame of any kind, or the end of our own stall, or the start.
@@ -57,14 +60,11 @@ typedef struct {
     int64_t ticks;               ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
     /// In the machine's frame: negative where `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64 bits.
     int32_t nm_per_tick;
-    uint32_t um_s_per_rpm;      ///< Speed in um/s at 1 rpm of its telemetry.
-    uint32_t us_per_tick_min;   ///< At IW_WHEEL_FASTEST_MM_S.
-    uint32_t reboots;           ///< Recognised so far.
-    int32_t speed_mm_s;         ///< Last measured, in the machine's frame, rounded towards zero; stale while not heard.
-    int32_t odometry_ticks;     ///< Of the last status frame.
-    iw_side_t side;             ///< Which wheel this is.
-    iw_reboot_t pending_reboot; ///< Not yet taken.
-    bool boot_seen;             ///< This run of the wheel began while we were listening, not before.
+    uint32_t um_s_per_rpm;    ///< Speed in um/s at 1 rpm of its telemetry.
+    uint32_t us_per_tick_min; ///< At IW_WHEEL_FASTEST_MM_S.
+    uint32_t reboots;         ///< Recognised so far.
+    int32_t speed_mm_s;       ///< Last measured, in the machine's frame, rounded towards zero; stale while not heard.
+    int32_t odometry_ticks;   ///< Of the last status frame.
 } iw_wheel_t;
 
 /// `config` must be checked and outlive the wheel.
@@ -92,6 +92,10 @@ bool iw_wheel_lost(const iw_wheel_t *self, iw_time_us_t now_us);
 uint32_t iw_wheel_rest_us(const iw_wheel_t *self, iw_time_us_t now_us);
 
 /// The evidence of a reboot since the last call, then IW_REBOOT_NONE.
-iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self);
+static inline iw_reboot_t iw_wheel_take_reboot(iw_wheel_t *self) {
+    const iw_reboot_t reboot = self->pending_reboot;
+    self->pending_reboot = IW_REBOOT_NONE;
+    return reboot;
+}
 
 #endif
