@@ -175,11 +175,11 @@ static IW_APART iw_tare_t tare_wheel(iw_gateway_t *self, iw_side_t side, iw_time
 iw_tare_t iw_gateway_tare(iw_gateway_t *self, iw_time_us_t now_us, uint8_t sides, iw_side_t *out_side) {
     // R9: a request is applied whole or not at all. So twice over the wheels: both are judged before one is changed.
     for (uint32_t i = 0; i < 2U * IW_SIDES; i++) {
-        const iw_side_t side = (iw_side_t)(i % IW_SIDES);
+        const uint32_t side = i % IW_SIDES;
         const bool wanted = (sides & (1U << side)) != 0U;
-        const iw_tare_t result = wanted ? tare_wheel(self, side, now_us, i < IW_SIDES) : IW_TARE_OK;
+        const iw_tare_t result = wanted ? tare_wheel(self, (iw_side_t)side, now_us, i < IW_SIDES) : IW_TARE_OK;
         if (result != IW_TARE_OK) {
-            *out_side = side;
+            *out_side = (iw_side_t)side;
             return result;
         }
     }
