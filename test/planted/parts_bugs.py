@@ -50,7 +50,7 @@ PARTS = [
     Bug("signal-without-a-stop", "R4", LOOP, "gw_wheels_stop(&daemon->wheels, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);", "", MOTION),
     Bug("watchers-wait-for-frames", "R11", LOOP, "wheels->tape.tapped < GW_FRAMES && gw_clients_watching(&daemon->clients, IWN_TOPIC_FRAME) == 0U;", "wheels->tape.tapped < GW_FRAMES;", MOTION),
     Bug("frames-wait-in-a-stop", "R7", LOOP, "daemon->frames_may_wait = !sending || driving;", "daemon->frames_may_wait = true;", MOTION),
-    Bug("frames-wait-too-long", "R7", LOOP, "daemon->look_us = seen->at_us + (sending ? sending_us : REST_LOOK_US);", "daemon->look_us = seen->at_us + 4U * REST_LOOK_US;", MOTION),
+    Bug("frames-wait-too-long", "R7", LOOP, "daemon->look_us = sending ? evenly(seen->at_us, daemon->wheels.step_us, sending_us) : seen->at_us + REST_LOOK_US;", "daemon->look_us = seen->at_us + 4U * REST_LOOK_US;", MOTION),
     Bug("latched-hold-is-no-sending", "R3", "app/gateway/wheels/wheels.c", "return iw_gateway_is_sending(&self->core);", "return iw_gateway_is_sending(&self->core) && iw_gateway_state(&self->core) != IW_STATE_LATCHED;", MOTION),
     Bug("latch-goes-with-its-client", "R2", "core/src/permit.c", "if (client != self->holder) { return; }",
         "if (self->phase == IW_PHASE_LATCHED && self->stop.detail == client) { self->phase = IW_PHASE_LISTENING; } if (client != self->holder) { return; }",
@@ -174,7 +174,8 @@ PARTS = [
     Bug("button-edge-lost-in-a-burst", "R2", "port/linux/src/estop_unix.c", "button->edge = button->edge || level ||", "button->edge = level ||", ("unit_linux_local",)),
     Bug("clock-that-can-be-set", "R10", "port/linux/src/clock.c", "return read_us(CLOCK_MONOTONIC);", "return read_us(CLOCK_REALTIME);", CLOCK),
     Bug("clock-that-counts-sleep", "R10", "port/linux/src/clock.c", "running_us = read_us(CLOCK_MONOTONIC);", "running_us = read_us(CLOCK_BOOTTIME);", CLOCK),
-    Bug("sleep-unseen", "R7", "port/linux/src/clock.c", "read_us(CLOCK_BOOTTIME);", "read_us(CLOCK_MONOTONIC);", CLOCK),
+    Bug("sleep-unseen", "R7", "port/linux/src/clock.c", "total_us = read_us(CLOCK_BOOTTIME);", "total_us = read_us(CLOCK_MONOTONIC);", CLOCK),
+    Bug("sleep-unseen-by-its-clock", "R7", "port/linux/src/clock.c", "whole_us = read_us(CLOCK_BOOTTIME);", "whole_us = read_us(CLOCK_MONOTONIC);", CLOCK),
     Bug("sent-into-an-untold-bus-off", "R6", BUS, "if (bus->up && bus->unheeded < IW_BUS_PASSIVE) { return 0; }", "", ("unit_linux_socketcan",)),
     # The whole daemon, in simulated hours.
     Bug("estop-line-asked-only-when-told", "R2", "port/linux/src/linux_hal.c", "self->estop_ops->present ? self->estop_ops->pressed(&self->estop, self->estop_quiet) : 0;",
