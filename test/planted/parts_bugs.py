@@ -192,7 +192,7 @@ PARTS = [
     Bug("marker-looked-for-elsewhere", "R3", "app/gateway/lock/runtime.c", "self->marked = self->marked || is_marked(&self->lock.names.owners, self->place[i]);",
         "self->marked = self->marked || (i > 0U && self->place[1][0] == '?');", DAEMON),
     Bug("marker-before-the-first-frame", "R3", LOOP, "const iw_snapshot_t seen = gw_wheels_step(wheels); mark_if_sending(daemon, &seen);",
-        "(void)gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(wheels)); const iw_snapshot_t seen = gw_wheels_step(wheels); mark_if_sending(daemon, &seen);", DAEMON),
+        "(void)gw_runtime_mark(&daemon->runtime, gw_wheels_are_sent_to(wheels)); const iw_snapshot_t seen = gw_wheels_step(wheels); mark_if_sending(daemon, &seen);", MOTION),
     # The STM32 driver.
     Bug("stm32-setpoint-in-the-wrong-bytes", "R8", BXCAN, "word_of(&frame->data[4])", "word_of(&frame->data[3])", ("unit_bxcan_transmit",)),
     Bug("stm32-echo-is-a-foreign-setpoint", "R13", BXCAN, "heir->frame[heir->owed].kind = IW_CAN_ECHO;", "", ("unit_bxcan_transmit",)),
