@@ -4,7 +4,8 @@
 ///
 /// One cycle of the loop (loop.c), always in this order:
 ///
-///     wait -> signals -> bus and e-stop (core step) -> what changed (status/) -> clients (answers/)
+///     wait -> signals -> who drives, if nothing else is due -> bus and e-stop (core step) -> what changed (status/)
+///          -> clients (answers/)
 ///          -> step again if they asked for something -> new clients -> flush -> what is kept (ledger/) -> watchdog
 ///
 /// so that the wheels come before everybody who talks about them. Work per cycle is bounded in each of these places.
@@ -38,6 +39,8 @@ typedef struct gw_daemon {
     gw_status_t status;
     gw_answers_t answers;
     iw_time_us_t suspended_us; ///< Of the machine, as last looked at.
+    iw_time_us_t clocks_us;    ///< When both clocks are read next, though nothing is late.
+    iw_time_us_t awaited_us;   ///< Until when the last wait was to last at the most.
     iw_time_us_t box_look_us;  ///< When the black box's writer is listened to next.
     iw_client_t holder;        ///< Of the lease, as of the last step: served first.
     int signal_fd;
@@ -46,6 +49,7 @@ typedef struct gw_daemon {
     iw_time_us_t mark_us;   ///< When a change of the crash marker that failed is tried again; 0: none did.
     uint32_t silent_pairs;  ///< Setpoint pairs handed over until the last silence.
     iw_time_us_t look_us;   ///< When bus and e-stop are looked at though nothing has woken us.
+    bool driving;           ///< The wheels are armed, and follow the holder of the lease.
     bool frames_may_wait;   ///< As far as the wheels are concerned.
     bool frames_wait;       ///< The bus wakes nobody for now: its frames are taken together.
 } gw_daemon_t;

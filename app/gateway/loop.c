@@ -26,6 +26,10 @@
 /// Frames that have not come for so long wake us again: nobody looks for nothing.
 #define FRAMES_GONE_US 20000U
 #define BOX_LOOK_US    100000U
+/// What comes so late may have slept: the machine was suspended.
+#define ASLEEP_US 500U
+/// Both clocks are read this often in any case.
+#define CLOCKS_US 1000000U
 /// A crash marker that cannot be set or removed is tried again.
 #define MARK_AGAIN_US 100000U
 
@@ -138,6 +142,13 @@ static void note_suspend(gw_daemon_t *daemon, iw_time_us_t suspended_us) {
     daemon->suspended_us = (suspended_us > daemon->suspended_us) ? suspended_us : daemon->suspended_us;
 }
 
+/// The next of looks no further apart than `most_us`, the last of which comes at `until_us`: none right before it, which would hold
+/// it up.
+static iw_time_us_t evenly(iw_time_us_t now_us, iw_time_us_t until_us, iw_time_us_t most_us) {
+    const iw_time_us_t left_us = (until_us > now_us) ? until_us - now_us : 0U;
+    return (left_us > most_us) ? now_us + left_us / ((left_us + most_us - 1U) / most_us) : now_us + most_us;
+}
+
 /// Frames may wait and be taken together while nothing depends on one of them at once: while nothing is sent, and while ARMED.
 /// Every step takes them before it judges, and what it judges is tens of milliseconds old. In a stop, and until the wheels are
 /// armed, each frame wakes us. The e-stop and the clients always do.
@@ -145,16 +156,27 @@ static void plan_look(gw_daemon_t *daemon, const iw_snapshot_t *seen) {
     const bool sending = gw_wheels_are_sent_to(&daemon->wheels);
     const bool driving = sending && seen->state == IW_STATE_ARMED && !seen->arming;
     const iw_time_us_t sending_us = (driving && seen->waiting_us != IW_NEVER) ? ECHO_LOOK_US : LOOK_US;
+    daemon->driving = driving;
     daemon->frames_may_wait = !sending || driving;
-    daemon->look_us = seen->at_us + (sending ? sending_us : REST_LOOK_US);
+    daemon->look_us = sending ? evenly(seen->at_us, daemon->wheels.step_us, sending_us) : seen->at_us + REST_LOOK_US;
+}
+
+/// By one clock, in which a suspend shows as lateness: what is late is looked at by both, and all is now and then.
+static void read_clock(gw_daemon_t *daemon) {
+    const iw_time_us_t now_us = iw_clock_awake_us(daemon->suspended_us);
+    if (now_us < daemon->awaited_us + ASLEEP_US && now_us < daemon->clocks_us) {
+        gw_wheels_time(&daemon->wheels, now_us);
+        return;
+    }
+    iw_time_us_t suspended_us;
+    gw_wheels_time(&daemon->wheels, iw_clock_read(&suspended_us));
+    daemon->clocks_us = daemon->wheels.now_us + CLOCKS_US;
+    note_suspend(daemon, suspended_us);
 }
 
 /// The core's cycle, and what follows from it at once.
 static void step(gw_daemon_t *daemon) {
     gw_wheels_t *wheels = &daemon->wheels;
-    iw_time_us_t suspended_us;
-    wheels->now_us = iw_clock_read(&suspended_us);
-    note_suspend(daemon, suspended_us);
     iw_linux_hal_tend(&wheels->hal, wheels->now_us);
     gw_bus_facts_follow(&daemon->facts, wheels, daemon->status.observed.left_behind);
     const iw_snapshot_t seen = gw_wheels_step(wheels);
@@ -242,10 +264,30 @@ static void listen_to_writer(gw_daemon_t *daemon) {
     }
 }
 
-static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
+/// Who drives, if it has said something while nothing else is due: its command is heard before the look at bus and e-stop, which
+/// then judges it too, so that it leaves after one look and not after two. NULL: the look comes first.
+static gw_client_t *heard_first(gw_daemon_t *daemon) {
+    const gw_wheels_t *wheels = &daemon->wheels;
+    const bool due = wheels->now_us >= wheels->step_us || wheels->requested;
+    gw_client_t *holder = (daemon->driving && !due) ? gw_clients_find(&daemon->clients, daemon->holder) : NULL;
+    return (holder != NULL && holder->readable && !holder->leaving) ? holder : NULL;
+}
+
+/// The core's step, in which everything is looked at before anything leaves.
+static void hear_and_step(gw_daemon_t *daemon, iw_linux_told_t told) {
+    gw_client_t *first = heard_first(daemon);
+    told.estop = told.estop || first != NULL; // Edges since the wait count too.
+    iw_linux_hal_waited(&daemon->wheels.hal, told);
+    if (first != NULL) {
+        gw_service_first(&daemon->clients, first);
+    }
     step(daemon);
+}
+
+static void cycle(gw_daemon_t *daemon, bool somebody_knocks) {
     gw_service_clients(&daemon->clients, daemon->holder);
     if (daemon->wheels.requested) {
+        read_clock(daemon);
         step(daemon); // A new command leaves at once.
     }
     if (somebody_knocks) {
@@ -265,21 +307,24 @@ int gw_loop_run(gw_daemon_t *daemon) {
     bool ready = false;
     while (!has_come_to_rest(daemon)) {
         struct epoll_event events[EVENTS_PER_WAIT];
-        const int count = gw_wakeup_wait(&daemon->wakeup, events, EVENTS_PER_WAIT, next_us(daemon));
+        daemon->awaited_us = next_us(daemon);
+        // What leaves has its time; all else may come later by as long as this cycle took.
+        const iw_time_us_t now_us = gw_wheels_are_sent_to(&daemon->wheels) ? 0U : daemon->wheels.now_us;
+        const int count = gw_wakeup_wait(&daemon->wakeup, events, EVENTS_PER_WAIT, now_us, daemon->awaited_us);
         if (count < 0 && errno != EINTR) {
             return errno;
         }
         bool somebody_knocks = false;
         // Interrupted, it has found nothing out.
         iw_linux_told_t told = {.bus = count < 0, .estop = count < 0};
-        daemon->wheels.now_us = iw_clock_now_us();
+        read_clock(daemon);
         daemon->clients.now_us = daemon->wheels.now_us;
         for (int i = 0; i < count; i++) {
             somebody_knocks = note_event(daemon, &events[i]) || somebody_knocks;
             told.bus = told.bus || events[i].data.u64 == GW_TAG_BUS;
             told.estop = told.estop || events[i].data.u64 == GW_TAG_ESTOP;
         }
-        iw_linux_hal_waited(&daemon->wheels.hal, told);
+        hear_and_step(daemon, told);
         cycle(daemon, somebody_knocks);
         if (!ready) {
             ready = true;

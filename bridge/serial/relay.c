@@ -290,7 +290,7 @@ static int loop(relay_t *self) {
         const uint64_t then_us = gw_service_is_busy(&self->clients) ? 0U : next_us(self);
         bool knocks = false;
         self->planned_us = (then_us > self->now_us) ? then_us : self->now_us;
-        const int count = gw_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, then_us);
+        const int count = gw_wakeup_wait(&self->wakeup, events, EVENTS_PER_WAIT, 0U, then_us);
         if (count < 0) {
             if (errno != EINTR) {
                 return EX_SOFTWARE;

@@ -60,7 +60,8 @@ def put_timed(rows):
         f"Made by `test/bench/run --timed` on {machine()}. All that is compared runs in turns in one boot of the kernel of test/kernel: Linux 6.1 as an "
         "ordinary process, with one processor, vcan and gpio-sim. There a system call costs much more than on bare metal, "
         "so that whoever calls less is further ahead; absolute times are worth nothing, ratios to the floor more. The floor is the leanest program that "
-        "does only this (`test/bench/timed/floor_*.c`). Medians of three rounds; a turn beside which somebody who sleeps a millisecond was woken "
+        "does only this (`test/bench/timed/floor_*.c`); *leanest that looks* is the leanest that looks at bus and e-stop before it acts, as whoever drives "
+        "somebody must (`floor_looks.c`). Medians of three rounds; a turn beside which somebody who sleeps a millisecond was woken "
         "10 ms late is repeated. System calls are counted in virtual time, where each frame comes alone, however slowly they are traced.",
         "", *table(["", "floor", "gateway", "peers", "goal"], rows)])
     put_readme()

@@ -32,6 +32,10 @@ iw_time_us_t iw_clock_now_us(void) {
     return daemon_rig.now_us;
 }
 
+iw_time_us_t iw_clock_awake_us(iw_time_us_t suspended_us) {
+    return daemon_rig.now_us + daemon_rig.suspended_us - suspended_us;
+}
+
 iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us) {
     *out_suspended_us = daemon_rig.suspended_us;
     return daemon_rig.now_us;
@@ -85,6 +89,7 @@ int iw_bus_send(iw_backend_store_t *self, const iw_can_frame_t *frame) {
     rig->sent[side]++;
     rig->told_mm_s[side] = (int16_t)(frame->data[1] << 8 | frame->data[2]);
     rig->unmarked += (rig->told_mm_s[side] == 0 || daemon_rig_marked()) ? 0U : 1U;
+    rig->most_mm_s = (abs(rig->told_mm_s[side]) > rig->most_mm_s) ? (int16_t)abs(rig->told_mm_s[side]) : rig->most_mm_s;
     rig->told_mA[side] = (int16_t)(frame->data[3] << 8 | frame->data[4]);
     rig->sent_us = rig->now_us;
     sim_world_submit(&rig->world, rig->now_us, rig->port, frame);
@@ -145,6 +150,9 @@ static int rig_pressed(void *self, bool quiet) {
     daemon_rig_t *rig = &daemon_rig;
     const bool pulse = rig->estop_pulse && !quiet; // Without a word from the wait, edges are not read.
     (void)self;
+    rig->looks++;
+    rig->unlooked_us = rig->now_us - rig->looked_us;
+    rig->looked_us = rig->now_us;
     rig->estop_told = rig->estop;
     rig->estop_pulse = rig->estop_pulse && quiet;
     return (rig->estop == 0 && pulse) ? 1 : rig->estop;
@@ -206,8 +214,10 @@ void gw_wakeup_close(gw_wakeup_t *self) {
     (void)close(self->fd);
 }
 
-int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t end_us) {
+int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t now_us,
+                   iw_time_us_t end_us) {
     daemon_rig_t *rig = &daemon_rig;
+    (void)now_us; // Here a cycle takes no time.
     rig->waits++;
     rig->now_us += rig->stolen_us;
     rig->stolen_us = 0;
@@ -215,6 +225,8 @@ int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int max,
         take_from_world(rig);
         const int count = find_events(rig, self->fd, events, max);
         if (count > 0 || (rig->now_us >= end_us && rig->now_us < rig->until_us)) {
+            rig->estop_pulse = rig->estop_pulse || (rig->estop_late && count > 0);
+            rig->estop_late = rig->estop_late && count == 0;
             return count;
         }
         if (rig->now_us >= rig->until_us) {

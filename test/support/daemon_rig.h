@@ -30,8 +30,13 @@ typedef struct {
     iw_bus_link_t link;          ///< What is known of its link.
     int estop;                   ///< What the button answers: 1 pressed, 0, -1 unreadable.
     bool estop_pulse;            ///< Edges wait to be read: pressed and released again. They wake.
+    bool estop_late;             ///< Such edges come as soon as the next wait has found something else.
     bool estop_silent;           ///< The next change of it wakes nobody, as when a GPIO chip goes.
     uint32_t waits;              ///< Of the loop.
+    uint32_t looks;              ///< At the button.
+    iw_time_us_t looked_us;      ///< When last.
+    iw_time_us_t unlooked_us;    ///< For how long nobody had looked before the last setpoint's own look.
+    int16_t most_mm_s;           ///< The fastest setpoint handed over since this was zero.
     bool ended;                  ///< The loop has come to its end by itself.
     bool full;                   ///< The bus takes no frame.
     uint32_t unmarked;           ///< Nonzero setpoints handed over while there was no crash marker.

@@ -201,6 +201,95 @@ static void test_estop_pulse_that_is_over_when_it_is_looked_at_latches(void) {
     TEST_ASSERT_TRUE(is_told_zero());
 }
 
+/// Sent, and not read yet.
+static void say(const char *line) {
+    TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
+}
+
+/// Driving, and well between two pairs, so that nothing but what is said next is due.
+static void begin_driving_between_pairs(void) {
+    begin_driving();
+    while (daemon_rig.now_us - daemon_rig.sent_us != MS(8)) {
+        daemon_rig_run(1);
+    }
+    daemon_rig.most_mm_s = 0;
+}
+
+#define SLOWER "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n"
+
+static void test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves(void) {
+    for (unsigned phase = 0; phase < 20U; phase++) {
+        begin_driving();
+        daemon_rig_run(phase);
+        daemon_rig.most_mm_s = 0;
+        say(SLOWER);
+        daemon_rig.estop_silent = phase % 2U == 1U;
+        daemon_rig.estop = (phase % 4U < 2U) ? 1 : -1;
+        daemon_rig_run(1);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_TRUE(is_told_zero());
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
+        tearDown();
+        setUp();
+    }
+}
+
+static void test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves(void) {
+    begin_driving_between_pairs();
+    daemon_rig.estop_late = true;
+    say(SLOWER);
+    daemon_rig_run(1);
+    TEST_ASSERT_FALSE(daemon_rig.estop_late);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
+}
+
+static void test_command_of_who_drives_leaves_after_one_look(void) {
+    begin_driving_between_pairs();
+    const uint32_t looks = daemon_rig.looks;
+    const uint32_t sent = daemon_rig.sent[IW_LEFT];
+    say(SLOWER);
+    daemon_rig_run(1);
+    TEST_ASSERT_EQUAL_UINT32(looks + 1U, daemon_rig.looks);
+    TEST_ASSERT_EQUAL_UINT32(sent + 1U, daemon_rig.sent[IW_LEFT]);
+    TEST_ASSERT_TRUE(daemon_rig.most_mm_s < 500);
+}
+
+static void test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next(void) {
+    begin_driving_between_pairs();
+    for (unsigned ms = 0; ms < 150U; ms++) {
+        const uint32_t sent = daemon_rig.sent[IW_LEFT];
+        daemon_rig_run(1);
+        TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.looked_us <= MS(3));
+        TEST_ASSERT_TRUE(daemon_rig.sent[IW_LEFT] == sent || daemon_rig.unlooked_us >= MS(2));
+    }
+}
+
+/// Taken for what it is: sent before the stop that it now comes behind.
+static void assert_refused_behind_a_stop(void) {
+    char reply[4096] = "";
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    (void)recv(client, reply, sizeof reply - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
+}
+
+static void test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop(void) {
+    begin_driving_between_pairs();
+    say(SLOWER);
+    daemon_rig.stolen_us = 150000U;
+    daemon_rig_run(1);
+    assert_refused_behind_a_stop();
+    daemon_rig_run(4000);
+    begin_driving_between_pairs();
+    say(SLOWER);
+    daemon_rig.suspended_us += 150000U;
+    daemon_rig_run(1);
+    assert_refused_behind_a_stop();
+}
+
 static void test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after(void) {
     static const unsigned hold_ms[] = {0, 100, 1000, 3000};
     for (size_t i = 0; i < sizeof hold_ms / sizeof hold_ms[0]; i++) {
@@ -242,6 +331,36 @@ static void test_suspension_counts_once_and_one_from_before_the_start_not_at_all
     daemon_rig_run(4000);
     begin_driving();
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
+static void test_time_never_goes_back_after_a_suspension_too_short_to_count(void) {
+    while (daemon_rig.now_us - daemon_rig.looked_us > MS(1)) {
+        daemon_rig_run(1);
+    }
+    daemon_rig.suspended_us += 2000U;
+    iw_time_us_t before_us = 0;
+    bool ahead = false;
+    for (unsigned ms = 0; ms < 1500U; ms++) {
+        (void)daemon_rig_ask(client, "{\"cmd\":\"hello\"}"); // Wakes it before it can be late.
+        const iw_time_us_t now_us = daemon_rig.daemon->wheels.now_us;
+        TEST_ASSERT_TRUE(now_us >= before_us);
+        ahead = ahead || now_us > daemon_rig.now_us;
+        TEST_ASSERT_TRUE(ms < 1010U || now_us <= daemon_rig.now_us);
+        before_us = now_us;
+    }
+    TEST_ASSERT_TRUE(ahead);
+    TEST_ASSERT_EQUAL_UINT32(0, gw_wheels_look(&daemon_rig.daemon->wheels).counters->late_steps);
+}
+
+static void test_second_request_after_one_reading_of_the_clock_has_a_time_of_its_own(void) {
+    gw_wheels_t *wheels = &daemon_rig.daemon->wheels;
+    const iw_time_us_t read_us = daemon_rig.now_us;
+    gw_wheels_time(wheels, read_us);
+    daemon_rig.now_us += 300U;
+    gw_wheels_time_request(wheels);
+    TEST_ASSERT_EQUAL_UINT64(read_us, wheels->now_us);
+    gw_wheels_time_request(wheels);
+    TEST_ASSERT_EQUAL_UINT64(read_us + 300U, wheels->now_us);
 }
 
 static void test_loop_that_stood_still_goes_on_with_zeros(void) {
@@ -429,6 +548,13 @@ int main(void) {
     RUN_TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds);
     RUN_TEST(test_estop_pulse_that_is_over_when_it_is_looked_at_latches);
     RUN_TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after);
+    RUN_TEST(test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves);
+    RUN_TEST(test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves);
+    RUN_TEST(test_command_of_who_drives_leaves_after_one_look);
+    RUN_TEST(test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next);
+    RUN_TEST(test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop);
+    RUN_TEST(test_time_never_goes_back_after_a_suspension_too_short_to_count);
+    RUN_TEST(test_second_request_after_one_reading_of_the_clock_has_a_time_of_its_own);
     RUN_TEST(test_suspended_machine_latches_with_zeros_first);
     RUN_TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all);
     RUN_TEST(test_loop_that_stood_still_goes_on_with_zeros);

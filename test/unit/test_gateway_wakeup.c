@@ -30,7 +30,7 @@ void tearDown(void) {
 
 static int wait_until(iw_time_us_t until_us) {
     struct epoll_event events[ROOM];
-    const int count = gw_wakeup_wait(&wakeup, events, ROOM, until_us);
+    const int count = gw_wakeup_wait(&wakeup, events, ROOM, 0U, until_us);
     if (count == 1) {
         TEST_ASSERT_EQUAL_UINT64(TAG, events[0].data.u64);
     }
@@ -44,6 +44,13 @@ static iw_time_us_t in_us(iw_time_us_t span_us) {
 static void check_wakes_at_its_time_and_not_before(void) {
     const iw_time_us_t due_us = in_us(SOON_US);
     TEST_ASSERT_EQUAL_INT(0, wait_until(due_us));
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iw_clock_now_us());
+}
+
+static void check_time_that_was_read_before_is_not_read_again(void) {
+    struct epoll_event events[ROOM];
+    const iw_time_us_t due_us = in_us(SOON_US);
+    TEST_ASSERT_EQUAL_INT(0, gw_wakeup_wait(&wakeup, events, ROOM, LATER_US, LATER_US + SOON_US));
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(due_us, iw_clock_now_us());
 }
 
@@ -63,6 +70,10 @@ static void test_wakes_at_its_time_and_not_before(void) {
     check_wakes_at_its_time_and_not_before();
 }
 
+static void test_time_that_was_read_before_is_not_read_again(void) {
+    check_time_that_was_read_before_is_not_read_again();
+}
+
 static void test_time_that_is_past_only_looks(void) {
     check_time_that_is_past_only_looks();
 }
@@ -74,6 +85,7 @@ static void test_event_wakes_before_any_time(void) {
 static void test_old_kernel_does_the_same_by_two_calls(void) {
     wakeup.two_calls = true;
     check_wakes_at_its_time_and_not_before();
+    check_time_that_was_read_before_is_not_read_again();
     check_time_that_is_past_only_looks();
     check_event_wakes_before_any_time();
 }
@@ -81,6 +93,7 @@ static void test_old_kernel_does_the_same_by_two_calls(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_wakes_at_its_time_and_not_before);
+    RUN_TEST(test_time_that_was_read_before_is_not_read_again);
     RUN_TEST(test_time_that_is_past_only_looks);
     RUN_TEST(test_event_wakes_before_any_time);
     RUN_TEST(test_old_kernel_does_the_same_by_two_calls);

@@ -59,6 +59,14 @@ static void test_clock_time_between_the_two_looks_is_never_taken_for_sleep(void)
     TEST_ASSERT_TRUE(suspended_us <= 2000000U);
 }
 
+static void test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_not_known(void) {
+    TEST_ASSERT_EQUAL_UINT64(iw_clock_now_us(), iw_clock_awake_us(0));
+    boot.tv_sec += 2;
+    wall.tv_sec += 3600;
+    TEST_ASSERT_EQUAL_UINT64(iw_clock_now_us() + 2000000U, iw_clock_awake_us(0));
+    TEST_ASSERT_EQUAL_UINT64(iw_clock_now_us(), iw_clock_awake_us(2000000U));
+}
+
 static void test_clock_of_the_wall_is_for_people_only(void) {
     TEST_ASSERT_EQUAL_INT64(1700000000987654, iw_clock_wall_us());
 }
@@ -68,6 +76,7 @@ int main(void) {
     RUN_TEST(test_clock_of_the_loop_is_monotonic_in_microseconds);
     RUN_TEST(test_clock_tells_sleep_that_the_loop_does_not_count);
     RUN_TEST(test_clock_time_between_the_two_looks_is_never_taken_for_sleep);
+    RUN_TEST(test_clock_of_one_reading_is_the_loops_and_ahead_by_a_sleep_that_is_not_known);
     RUN_TEST(test_clock_of_the_wall_is_for_people_only);
     return UNITY_END();
 }

@@ -7,7 +7,6 @@
 #include "status/observe.h"
 #include "wheels/wheels.h"
 
-#include "iwheel_linux/clock.h"
 #include "iwheel_northbound/refuse.h"
 
 #include <string.h>
@@ -328,14 +327,14 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
         send_refusal(&call, &refusal);
         return;
     }
-    self->wheels->now_us = iw_clock_now_us();
+    gw_wheels_time_request(self->wheels);
     handlers[request.cmd](&call);
     observe(self);
 }
 
 static void leave(void *context, gw_client_t *client) {
     gw_answers_t *self = (gw_answers_t *)context;
-    self->wheels->now_us = iw_clock_now_us();
+    gw_wheels_time_request(self->wheels);
     gw_wheels_leave(self->wheels, client->id);
     client->arming = false;
     observe(self);

@@ -113,6 +113,9 @@ void gw_service_accept(gw_clients_t *self);
 /// then the others who may drive, then the watchers, as many as the time allows, the rest in the next cycle.
 void gw_service_clients(gw_clients_t *self, iw_client_t holder);
 
+/// The same of this one alone, and before all others.
+void gw_service_first(gw_clients_t *self, gw_client_t *client);
+
 /// Sends what is queued, closes what is finished, and tells epoll what to watch next. In the same order, within the
 /// same time.
 void gw_service_flush(gw_clients_t *self, iw_client_t holder);

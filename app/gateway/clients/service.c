@@ -245,6 +245,10 @@ static bool serve_if_wanted(gw_clients_t *self, gw_client_t *client) {
     return wanted;
 }
 
+void gw_service_first(gw_clients_t *self, gw_client_t *client) {
+    (void)serve_if_wanted(self, client);
+}
+
 void gw_service_clients(gw_clients_t *self, iw_client_t holder) {
     self->some_wait = !go_round(self, holder, serve_if_wanted, self->next_served);
     for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {

@@ -52,9 +52,11 @@ static int wait_by_two_calls(int fd, struct epoll_event *events, int room, const
     return (ppoll(&watched, 1U, span, NULL) < 0) ? -1 : epoll_wait(fd, events, room, 0);
 }
 
-int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t until_us) {
-    const iw_time_us_t now_us = (until_us == 0U || until_us == IW_NEVER) ? 0U : iw_clock_now_us();
-    const iw_time_us_t span_us = (until_us > now_us) ? until_us - now_us : 0U;
+int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
+                   iw_time_us_t until_us) {
+    const bool known = now_us != 0U || until_us == 0U || until_us == IW_NEVER;
+    const iw_time_us_t from_us = known ? now_us : iw_clock_now_us();
+    const iw_time_us_t span_us = (until_us > from_us) ? until_us - from_us : 0U;
     if (self->two_calls) {
         const struct timespec span = {.tv_sec = (time_t)(span_us / US_PER_S),
                                       .tv_nsec = (long)(span_us % US_PER_S) * NS_PER_US};

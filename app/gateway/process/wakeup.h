@@ -19,7 +19,9 @@ int gw_wakeup_open(gw_wakeup_t *self);
 void gw_wakeup_close(gw_wakeup_t *self);
 
 /// As epoll_wait, until this time of CLOCK_MONOTONIC, never sooner without an event: IW_NEVER waits for ever, one that is
-/// past only looks.
-int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t until_us);
+/// past only looks. `now_us`: the time as read before, and it may be woken as much later as that is ago; 0: it is read, so that the
+/// wait ends in time.
+int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
+                   iw_time_us_t until_us);
 
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "wheels.h"
 
+#include "iwheel_linux/clock.h"
 #include "iwheel_northbound/words.h"
 
 #include <string.h>
@@ -56,6 +57,18 @@ iw_snapshot_t gw_wheels_look(const gw_wheels_t *self) {
     return seen;
 }
 
+void gw_wheels_time(gw_wheels_t *self, iw_time_us_t now_us) {
+    self->now_us = (now_us > self->now_us) ? now_us : self->now_us;
+    self->time_used = false;
+}
+
+void gw_wheels_time_request(gw_wheels_t *self) {
+    if (self->time_used) {
+        gw_wheels_time(self, iw_clock_now_us());
+    }
+    self->time_used = true;
+}
+
 bool gw_wheels_are_sent_to(const gw_wheels_t *self) {
     return iw_gateway_is_sending(&self->core);
 }
@@ -72,6 +85,7 @@ iw_snapshot_t gw_wheels_step(gw_wheels_t *self) {
 
 void gw_wheels_slept(gw_wheels_t *self, iw_time_us_t for_us) {
     iw_gateway_suspended(&self->core, for_us);
+    self->requested = true;
     gw_wheels_note(self, IW_CLIENT_NONE,
                    &(blackbox_entry_t){.kind = BLACKBOX_SUSPENDED, .as = {.value = (int64_t)for_us}});
 }

@@ -47,9 +47,10 @@ typedef struct gw_wheels {
     gw_gaps_t gaps;
     inspect_wish_t bus;   ///< As configured.
     const char *estop;    ///< The line, as configured.
-    iw_time_us_t now_us;  ///< Of the present cycle.
+    iw_time_us_t now_us;  ///< Of the present cycle; never goes back.
     iw_time_us_t step_us; ///< When the next step is due, as the last one wished.
     bool requested;       ///< A request has changed something since the last step.
+    bool time_used;       ///< A request was carried out at `now_us` already.
     bool shutting_down;
     uint32_t warnings; ///< What is wrong enough to be said at start, in `status` and with every arm.
     char warning[GW_WARNINGS][GW_WARNING_SIZE];
@@ -61,6 +62,12 @@ iw_config_fault_t gw_wheels_begin(gw_wheels_t *self, const iw_config_t *config, 
 
 /// What is known of the wheels now: after a step or a request, look again.
 iw_snapshot_t gw_wheels_look(const gw_wheels_t *self);
+
+/// A clock has just been read.
+void gw_wheels_time(gw_wheels_t *self, iw_time_us_t now_us);
+
+/// Before each request: the first one after a reading of the clock is carried out at that time, each other at a time of its own.
+void gw_wheels_time_request(gw_wheels_t *self);
 
 /// True while setpoints are sent, or about to be.
 bool gw_wheels_are_sent_to(const gw_wheels_t *self);

@@ -13,6 +13,11 @@ iw_time_us_t iw_clock_now_us(void) {
     return read_us(CLOCK_MONOTONIC);
 }
 
+iw_time_us_t iw_clock_awake_us(iw_time_us_t suspended_us) {
+    const iw_time_us_t whole_us = read_us(CLOCK_BOOTTIME);
+    return (whole_us > suspended_us) ? whole_us - suspended_us : 0U;
+}
+
 iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us) {
     // First: an interruption between the two reads makes the suspend seem shorter, never longer.
     const iw_time_us_t total_us = read_us(CLOCK_BOOTTIME);

@@ -253,7 +253,7 @@ class Calls(Measure):
 class Line(Measure):
     """From a client's line to the frame on the bus."""
 
-    candidates = ("floor", "gateway", "python_can", "cansend")
+    candidates = ("floor", "gateway", "looks", "python_can", "cansend")
     lines = ("50 50", "60 60")
 
     def begin(self):
@@ -283,6 +283,14 @@ class Line(Measure):
     def floor(self):
         return self.at_socket(lambda path: self.around.floor("line", self.around.interface, path))
 
+    def looking(self, *path, **options):
+        """The leanest program that looks at bus and e-stop before it acts, as the gateway does."""
+        chip = self.around.chip
+        return self.around.floor("looks", self.around.interface, f"/dev/{chip.chip}", chip.OFFSET, *path, **options)
+
+    def looks(self):
+        return self.at_socket(self.looking)
+
     def python_can(self):
         return self.at_socket(lambda path: self.around.python_can("line", self.around.interface, path))
 
@@ -303,7 +311,7 @@ class Line(Measure):
 class Told(Line):
     """From a frame on the bus to the line at a client."""
 
-    candidates = ("floor", "gateway", "candump")
+    candidates = ("floor", "gateway", "looks", "candump")
 
     def begin(self):
         """No wheels: the frame that is waited for is the only one."""
@@ -319,6 +327,9 @@ class Told(Line):
 
     def floor(self):
         return self.piped(self.around.floor("print", self.around.interface, piped=True))
+
+    def looks(self):
+        return self.piped(self.looking(piped=True))
 
     def candump(self):
         return self.piped(self.around.peer("candump", self.around.interface, piped=True))

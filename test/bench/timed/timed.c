@@ -2,12 +2,15 @@
 #include "timed.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <linux/can/raw.h>
+#include <linux/gpio.h>
 #include <net/if.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -122,4 +125,24 @@ int timed_receive(int can, canid_t id, struct can_frame *out_frame, int64_t *out
         left_ms = (int)((end_ns - timed_now_ns(CLOCK_MONOTONIC)) / (TIMED_NS_PER_S / 1000));
     }
     return 0;
+}
+
+int timed_accept(const char *path) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int listener = timed_need(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0), "socket");
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
+    (void)timed_need(bind(listener, (const struct sockaddr *)&address, sizeof address), path);
+    (void)timed_need(listen(listener, 1), path);
+    return timed_need(accept(listener, NULL, NULL), path);
+}
+
+int timed_line(const char *path, uint32_t offset) {
+    struct gpio_v2_line_request request = {
+        .offsets = {offset},
+        .consumer = "floor",
+        .config = {.flags = GPIO_V2_LINE_FLAG_INPUT | GPIO_V2_LINE_FLAG_EDGE_FALLING | GPIO_V2_LINE_FLAG_BIAS_PULL_UP},
+        .num_lines = 1};
+    const int chip = timed_need(open(path, O_RDWR | O_CLOEXEC), path);
+    (void)timed_need(ioctl(chip, GPIO_V2_GET_LINE_IOCTL, &request), "line");
+    return request.fd;
 }

@@ -35,4 +35,10 @@ void timed_ask_for_stamps(int can);
 /// A unix stream socket at that path.
 int timed_connect(const char *path);
 
+/// The first client of a unix stream socket that is made at that path.
+int timed_accept(const char *path);
+
+/// A line of a GPIO chip that tells of its falling edges.
+int timed_line(const char *path, uint32_t offset);
+
 #endif

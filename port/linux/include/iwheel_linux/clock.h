@@ -13,6 +13,10 @@ iw_time_us_t iw_clock_now_us(void);
 /// Never too much; too little by as long as this call was interrupted.
 iw_time_us_t iw_clock_suspended_us(void);
 
+/// CLOCK_MONOTONIC by one reading of a clock that goes on in a suspend: ahead by what the machine was suspended beyond
+/// `suspended_us`, so that a suspend shows as lateness.
+iw_time_us_t iw_clock_awake_us(iw_time_us_t suspended_us);
+
 /// Both at once.
 iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us);
 
