@@ -159,5 +159,5 @@ function(iwheel_unit_test name)
     target_include_directories(unit_${name} PRIVATE "${PROJECT_SOURCE_DIR}/test/support")
     target_link_libraries(unit_${name} PRIVATE iwheel::core iwheel_unity iwheel_warnings)
     add_test(NAME unit.${name} COMMAND unit_${name})
-    set_tests_properties(unit.${name} PROPERTIES LABELS unit TIMEOUT 300)
+    set_tests_properties(unit.${name} PROPERTIES LABELS unit TIMEOUT 1200) # Some steps of ./check get little of the processor.
 endfunction()
