@@ -15,6 +15,7 @@ import importlib.machinery
 import importlib.util
 import io
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -293,6 +294,36 @@ def mutation(_, kind):
         return module.verdict_on(campaign, argparse.Namespace(update=False)), said.getvalue()
 
 
+# What is done to the tree, whether `api` (which reads pages) and `eva` (which reads none) must run after it.
+DEEDS = (("nothing", ":", "--no-install", True, True), ("nothing more", ":", "--no-install", False, False), ("a file changed", "echo >>deed", "--no-install", True, True),
+         ("a file more", "echo >more", "--no-install", True, True), ("other rights", "chmod +x more", "--no-install", True, True),
+         ("a page changed", "echo >>page.md", "--no-install", True, False), ("what git ignores changed", "echo >>build/x", "--no-install", False, False),
+         ("--again", ":", "--again", True, True), ("a step named", ":", "api", True, False), ("the other option", ":", "--full", True, True),
+         ("it fails", "echo false >deed", "--no-install", True, True), ("it fails still", ":", "--no-install", True, True),
+         ("it skips", "echo echo 1 passed, 0 failed, 1 skipped >deed", "--no-install", True, True), ("it skips still", ":", "--no-install", False, True),
+         ("it changes the tree", "echo 'echo >new' >deed", "--no-install", True, True), ("changed back", "rm new", "--no-install", True, False)) # `api` makes it anew.
+
+
+def memory(folder, fault):
+    """./check of two steps that write down when they run, in a tree of its own, with the fault in one of its files: is what changed seen?"""
+    text = re.sub(r"^readonly (steps|in_real_time|computing)=\(.*?\)$", "", (ROOT / "check").read_text(), flags=re.S | re.M)
+    text = text.replace("# Seconds by the clock,", 'readonly steps=("build b" "api a" "eva e") in_real_time=("api eva") computing=()\n#', 1)
+    files = {"check": text, "scripts/fingerprint": (SCRIPTS / "fingerprint").read_text(), "bin/cmake": "#!/bin/sh\n", "page.md": "", "deed": ":\n", ".gitignore": "build/\n"}
+    files |= {name: f"#!/bin/sh\necho {step} >>build/ran\n. ./deed || exit\n" for step, name in (("api", "scripts/api_reference"), ("eva", "test/eva/run"))}
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(content.replace(fault[1], fault[2]) if fault and fault[0] == name else content)
+        (folder / name).chmod(0o644 if name in ("deed", "page.md") else 0o755)
+    run("git", "init", "-q", cwd=folder)
+    for what, deed, option, *must_run in DEEDS:
+        run("sh", "-c", f"mkdir -p build; rm -f build/ran; {deed}", cwd=folder)
+        _, said = run("env", f"PATH={folder}/bin:{os.environ['PATH']}", "./check", "--no-install", option, cwd=folder)
+        ran = (folder / "build/ran").read_text() if (folder / "build/ran").exists() else ""
+        if [name in ran for name in ("api", "eva")] != must_run:
+            return 1, f"{what}: ran: {ran}\n{said}"
+    return 0, ""
+
+
 def function(body, parameters="int a"):
     return CLEAN + f"int iw_g({parameters});\nint iw_g({parameters})\n{{\n{body}}}\n"
 
@@ -428,6 +459,11 @@ CASES = [
     (around, "clang", "lives", ("!", {}, True), True),
     (around, "clang", "is known to live, and is seen", ("daemon_motion", {"a.c | f | x; | y;": "a reason"}, True), True),
     (around, "clang", "is known to live, and is no more", ("", {"a.c | f | x; | y;": "a reason"}, False), True),
+    (memory, "git", "clean", None, False),
+    (memory, "git", "contents that are not read", ("scripts/fingerprint", 'sha256sum -- "$@"', ":"), True),
+    (memory, "git", "what is new is not read", ("scripts/fingerprint", "-co --exclude-standard", "-c"), True),
+    (memory, "git", "what failed is remembered", ("check", '[ "$status" -ne 0 ] || remember', "failed=0 && remember"), True),
+    (memory, "git", "what changed meanwhile is remembered", ("check", '&& [ "$(fingerprint "$1")" = "$2" ] ||', "||"), True),
     (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),
     (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
     (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),
