@@ -39,6 +39,7 @@ typedef struct {
     int16_t told_mA[IW_SIDES];   ///< Of the last of them.
     int16_t told_mm_s[IW_SIDES]; ///< The last of them.
     iw_time_us_t sent_us;        ///< When.
+    uint32_t sent_waits;         ///< After how many waits.
     iw_can_frame_t rx[DAEMON_RX_MAX];
     unsigned rx_count;
     unsigned rx_next;
@@ -76,6 +77,10 @@ const char *daemon_rig_ask(int client, const char *line);
 /// Arms, or drives for that long with a command every 20 ms; fails the test if that is refused.
 void daemon_rig_arm(int client);
 void daemon_rig_drive(int client, int left_mm_s, int right_mm_s, unsigned for_ms);
+
+/// From now on, what the gateway writes for people is kept.
+void daemon_rig_keep_log(void);
+const char *daemon_rig_log(void);
 
 /// True if the crash marker is there.
 bool daemon_rig_marked(void);

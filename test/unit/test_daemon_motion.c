@@ -93,8 +93,17 @@ static void test_marker_that_could_not_be_set_is_tried_again(void) {
     TEST_ASSERT_EQUAL_INT(0, mkdir(path, 0755)); // Not to be opened for writing, nor unlinked.
     begin_driving();
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64_MESSAGE(daemon_rig.now_us, daemon_rig.daemon->mark_us, "not in each cycle");
+    const iw_time_us_t failed_us = daemon_rig.daemon->mark_us;
+    while (daemon_rig.daemon->mark_us == failed_us) {
+        daemon_rig_run(1);
+    }
+    const iw_time_us_t again_us = daemon_rig.now_us + MS(100);
     TEST_ASSERT_EQUAL_INT(0, rmdir(path));
-    daemon_rig_drive(client, 500, 500, 200);
+    while (daemon_rig.now_us < again_us - MS(2)) {
+        TEST_ASSERT_FALSE(daemon_rig_marked());
+        daemon_rig_run(1);
+    }
+    daemon_rig_run(21);
     TEST_ASSERT_TRUE(daemon_rig_marked());
 }
 
@@ -196,9 +205,19 @@ static void test_estop_pulse_that_is_over_when_it_is_looked_at_latches(void) {
     begin_driving();
     daemon_rig_run(7);
     daemon_rig.estop_pulse = true;
+    daemon_rig.waits = 0;
     daemon_rig_run(1);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(1, daemon_rig.sent_waits, "zeros leave in the cycle that the edge has begun");
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     TEST_ASSERT_TRUE(is_told_zero());
+}
+
+static void test_command_that_comes_with_the_estop_is_refused(void) {
+    begin_driving();
+    daemon_rig.estop = 1;
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
 }
 
 static void test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after(void) {
@@ -244,6 +263,17 @@ static void test_suspension_counts_once_and_one_from_before_the_start_not_at_all
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
+static void test_suspension_counts_from_the_time_on_that_makes_a_step_late(void) {
+    daemon_rig_keep_log();
+    begin_driving();
+    daemon_rig.suspended_us += IW_GATEWAY_LATE_US;
+    daemon_rig_run(25);
+    TEST_ASSERT_EQUAL_STRING("", strstr(daemon_rig_log(), "suspended") ? daemon_rig_log() : "");
+    daemon_rig.suspended_us += IW_GATEWAY_LATE_US + 1000U;
+    daemon_rig_run(25);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_log(), "the machine was suspended for 21 ms"));
+}
+
 static void test_loop_that_stood_still_goes_on_with_zeros(void) {
     begin_driving();
     daemon_rig.stolen_us = 150000U;
@@ -287,6 +317,8 @@ static void test_lease_that_ends_with_the_connection_ends_before_anything_that_w
     TEST_ASSERT_TRUE(is_cause("client_gone"));
 }
 
+static unsigned told_ready;
+
 /// What the service manager has heard: the longest time between two words that feed its watchdog.
 static iw_time_us_t longest_unfed_us(int manager, unsigned for_ms) {
     char word[32];
@@ -296,6 +328,7 @@ static iw_time_us_t longest_unfed_us(int manager, unsigned for_ms) {
         daemon_rig_run(1);
         for (ssize_t n = recv(manager, word, sizeof word, MSG_DONTWAIT); n > 0;
              n = recv(manager, word, sizeof word, MSG_DONTWAIT)) {
+            told_ready += (strncmp(word, "READY=1", (size_t)n) == 0) ? 1U : 0U;
             fed_us = (strncmp(word, "WATCHDOG=1", (size_t)n) == 0) ? daemon_rig.now_us : fed_us;
         }
         longest_us = (daemon_rig.now_us - fed_us > longest_us) ? daemon_rig.now_us - fed_us : longest_us;
@@ -321,6 +354,7 @@ static void test_watchdog_is_fed_at_half_its_time_with_and_without_motion(void) 
     const iw_time_us_t armed_us = longest_unfed_us(manager, 900);
     (void)close(manager);
     (void)unlink(address.sun_path);
+    TEST_ASSERT_EQUAL_UINT(1U, told_ready);
     TEST_ASSERT_TRUE(at_rest_us <= MS(220));
     TEST_ASSERT_TRUE(armed_us <= MS(220));
 }
@@ -335,9 +369,9 @@ static void test_setpoints_keep_their_period_with_and_without_frames_of_the_whee
     }
 }
 
-static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
+static void end_by(int number) {
     begin_driving();
-    TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
+    TEST_ASSERT_EQUAL_INT(0, kill(getpid(), number));
     daemon_rig_run(1);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
     TEST_ASSERT_FALSE(is_told_zero());
@@ -347,6 +381,19 @@ static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
     TEST_ASSERT_TRUE(is_told_zero());
     TEST_ASSERT_TRUE(daemon_rig.now_us - told_us >= MS(1500));
     TEST_ASSERT_FALSE(daemon_rig_marked());
+}
+
+static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
+    static const int numbers[] = {SIGTERM, SIGINT, SIGHUP};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        sigset_t none;
+        (void)sigemptyset(&none);
+        (void)sigprocmask(SIG_SETMASK, &none, NULL); // As a process begins, before the loop is opened.
+        (void)signal(numbers[i], SIG_DFL);
+        tearDown();
+        setUp();
+        end_by(numbers[i]);
+    }
 }
 
 static uint32_t waits_in_a_second(void) {
@@ -428,9 +475,11 @@ int main(void) {
     RUN_TEST(test_estop_that_goes_without_a_word_is_seen_within_milliseconds);
     RUN_TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds);
     RUN_TEST(test_estop_pulse_that_is_over_when_it_is_looked_at_latches);
+    RUN_TEST(test_command_that_comes_with_the_estop_is_refused);
     RUN_TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after);
     RUN_TEST(test_suspended_machine_latches_with_zeros_first);
     RUN_TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all);
+    RUN_TEST(test_suspension_counts_from_the_time_on_that_makes_a_step_late);
     RUN_TEST(test_loop_that_stood_still_goes_on_with_zeros);
     RUN_TEST(test_lease_is_lost_when_commands_end_although_requests_go_on);
     RUN_TEST(test_lease_ends_with_the_connection_at_once);

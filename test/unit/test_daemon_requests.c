@@ -209,6 +209,37 @@ static void test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall(vo
     TEST_ASSERT_UINT_WITHIN(2, 5, events_waiting("\"event\":\"force\""));
 }
 
+static void test_telemetry_leaves_in_the_cycle_in_which_it_is_due(void) {
+    char text[8192];
+    assert_reply("{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":5}", "\"ok\":true");
+    for (unsigned event = 0; event < 5U; event++) {
+        const iw_time_us_t due_us = daemon_rig.daemon->clients.client[0].next_us;
+        while (recv(client, text, sizeof text, MSG_DONTWAIT) > 0) { // Of before.
+        }
+        while (daemon_rig.now_us <= due_us) {
+            daemon_rig_run(1);
+        }
+        TEST_ASSERT_GREATER_THAN_INT(0, (int)recv(client, text, sizeof text, MSG_DONTWAIT));
+    }
+}
+
+static void test_burst_of_requests_is_answered_without_waiting_for_periods(void) {
+    static const char line[] = "{\"cmd\":\"why\"}\n";
+    static char text[65536];
+    unsigned answers = 0;
+    for (unsigned i = 0; i < 3U * GW_LINES_PER_CYCLE; i++) {
+        TEST_ASSERT_EQUAL_INT((int)sizeof line - 1, (int)send(client, line, sizeof line - 1U, MSG_NOSIGNAL));
+    }
+    daemon_rig_run(1);
+    const ssize_t size = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, (int)size);
+    text[size] = '\0';
+    for (const char *at = strstr(text, "\"ok\":true"); at != NULL; at = strstr(at + 1, "\"ok\":true")) {
+        answers++;
+    }
+    TEST_ASSERT_EQUAL_UINT(3U * GW_LINES_PER_CYCLE, answers);
+}
+
 static void test_stop_and_estop_need_no_lease(void) {
     const int other = daemon_rig_connect();
     daemon_rig_arm(client);
@@ -339,6 +370,8 @@ static void test_word_on_what_is_not_configured_is_refused_and_one_of_a_letter_i
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"setpoint_type\"}", "\"error\":\"type_not_set\"");
     assert_reply("{\"cmd\":\"confirm\",\"item\":\"track\",\"how\":\"x\"}", "\"ok\":true");
     assert_reply("{\"cmd\":\"status\"}", "\"how\":\"x\"");
+    assert_reply("{\"cmd\":\"confirm\",\"item\":\"gear_ratio\",\"value\":\"7\"}", "\"ok\":true");
+    assert_reply("{\"cmd\":\"status\"}", "\"found\":\"7\"");
 }
 
 static void test_zero_that_changes_is_told_to_who_watches_the_force(void) {
@@ -400,6 +433,36 @@ static void test_facts_of_the_bus_are_taken_once_for_each_change(void) {
     TEST_ASSERT_LESS_OR_EQUAL_UINT(1U, facts); // And once a second.
 }
 
+static void test_purge_by_the_port_is_told_once_in_the_log(void) {
+    static const char *const words[] = {[IW_LINK_PURGE_DONE] = "taken down and up again",
+                                        [IW_LINK_PURGE_NOT_ALLOWED] = "may not empty it; do: ip link",
+                                        [IW_LINK_PURGE_FAILED] = "could not be emptied; look with: ip"};
+    daemon_rig_keep_log();
+    for (unsigned purge = IW_LINK_PURGE_DONE; purge <= IW_LINK_PURGE_FAILED; purge++) {
+        daemon_rig.link.purge = (iw_link_purge_t)purge;
+        daemon_rig_run(100);
+    }
+    for (unsigned purge = IW_LINK_PURGE_DONE; purge <= IW_LINK_PURGE_FAILED; purge++) {
+        const char *told = strstr(daemon_rig_log(), words[purge]);
+        TEST_ASSERT_NOT_NULL_MESSAGE(told, words[purge]);
+        TEST_ASSERT_NULL(strstr(told + 1, words[purge]));
+    }
+}
+
+static void test_warning_that_goes_on_is_said_once(void) {
+    static iw_estop_ops_t none;
+    none = *daemon_rig.daemon->wheels.hal.estop_ops;
+    none.present = false;
+    daemon_rig.daemon->wheels.hal.estop_ops = &none;
+    for (unsigned change = 0; change < 3U; change++) {
+        daemon_rig.link.changes++;
+        daemon_rig_run(1000);
+    }
+    const char *said = strstr(daemon_rig_ask(client, "{\"cmd\":\"status\"}"), "there is no e-stop line");
+    TEST_ASSERT_NOT_NULL(said);
+    TEST_ASSERT_NULL(strstr(said + 1, "there is no e-stop line"));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_drive_reaches_the_wheel_it_is_for);
@@ -416,6 +479,8 @@ int main(void) {
     RUN_TEST(test_arm_while_shutting_down_is_refused);
     RUN_TEST(test_arm_with_what_motion_depends_on_contradicted_is_denied);
     RUN_TEST(test_telemetry_keeps_its_rate_and_comes_in_no_burst_after_a_stall);
+    RUN_TEST(test_telemetry_leaves_in_the_cycle_in_which_it_is_due);
+    RUN_TEST(test_burst_of_requests_is_answered_without_waiting_for_periods);
     RUN_TEST(test_stop_and_estop_need_no_lease);
     RUN_TEST(test_each_request_is_noted_with_who_asked_and_what_became_of_it);
     RUN_TEST(test_tare_tells_of_each_wheel_the_zero_it_had);
@@ -427,5 +492,7 @@ int main(void) {
     RUN_TEST(test_stop_names_the_client_that_asked_for_it);
     RUN_TEST(test_wheel_that_goes_on_turning_is_told_once_and_whole);
     RUN_TEST(test_facts_of_the_bus_are_taken_once_for_each_change);
+    RUN_TEST(test_purge_by_the_port_is_told_once_in_the_log);
+    RUN_TEST(test_warning_that_goes_on_is_said_once);
     return UNITY_END();
 }
