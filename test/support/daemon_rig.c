@@ -29,6 +29,7 @@ daemon_rig_t daemon_rig;
 // The clocks ---------------------------------------------------------------------------------------------------------------
 
 iw_time_us_t iw_clock_now_us(void) {
+    daemon_rig.now_us += daemon_rig.look_takes_us;
     return daemon_rig.now_us;
 }
 

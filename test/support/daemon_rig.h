@@ -25,6 +25,7 @@ typedef struct {
     iw_time_us_t now_us;
     iw_time_us_t until_us;       ///< Where `daemon_rig_run` ends.
     iw_time_us_t suspended_us;   ///< The machine's sleep so far, as the clocks tell it.
+    iw_time_us_t look_takes_us;  ///< Each look at the clock takes that long.
     iw_time_us_t stolen_us;      ///< The next wait takes that much longer: the process stands still.
     iw_bus_state_t bus;          ///< What the bus answers.
     iw_bus_link_t link;          ///< What is known of its link.
