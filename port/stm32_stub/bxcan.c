@@ -189,7 +189,6 @@ static bool take_back(iw_bxcan_t *self) {
 /// as a loss of the bus, and nothing is sent before it has been joined anew: until then the reset masks the interrupts.
 static void start_anew(iw_bxcan_t *self) {
     iw_register_t *const reset = self->config.reset_register;
-    mask_transmit(self);
     iw_register_write(reset, iw_register_read(reset) | self->config.reset_bits);
     iw_register_write(reset, iw_register_read(reset) & ~self->config.reset_bits);
     forget(self);

@@ -219,6 +219,7 @@ static void test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_
     begin_first();
     TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(1, driver->resets);
+    TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, rig[0].reset, "the device is let go again");
     TEST_ASSERT_LESS_THAN(0, send(266, 2));
     join_again();
     assert_nothing_waits();
