@@ -328,7 +328,8 @@ static void test_lease_that_ends_with_the_connection_ends_before_anything_that_w
 static unsigned told_ready(int manager) {
     char word[32];
     unsigned count = 0;
-    for (ssize_t n = recv(manager, word, sizeof word, MSG_DONTWAIT); n > 0; n = recv(manager, word, sizeof word, MSG_DONTWAIT)) {
+    for (ssize_t n = recv(manager, word, sizeof word, MSG_DONTWAIT); n > 0;
+         n = recv(manager, word, sizeof word, MSG_DONTWAIT)) {
         count += (strncmp(word, "READY=1", (size_t)n) == 0) ? 1U : 0U;
     }
     return count;
@@ -409,6 +410,26 @@ static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
         setUp();
         end_by(numbers[i]);
     }
+}
+
+/// Root's name on the bus is our own; only a gateway of another user looks for it.
+static void test_gateway_that_gives_way_ramps_holds_says_why_and_ends(void) {
+    if (geteuid() != 0) {
+        return;
+    }
+    daemon_rig_keep_log();
+    begin_driving();
+    TEST_ASSERT_FALSE(daemon_rig.daemon->gave_way);
+    daemon_rig.daemon->runtime.lock.names.owners.own = 65534;
+    daemon_rig.daemon->runtime.lock.names.place = 1;
+    daemon_rig_run(10000);
+    TEST_ASSERT_TRUE(daemon_rig.ended);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->gave_way);
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+    char line[96];
+    (void)snprintf(line, sizeof line, "a gateway of user 0 (process %ld) serves unix:", (long)getpid());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), line), daemon_rig_log());
 }
 
 static uint32_t waits_in_a_second(void) {
@@ -503,6 +524,7 @@ int main(void) {
     RUN_TEST(test_watchdog_is_fed_at_half_its_time_with_and_without_motion);
     RUN_TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels);
     RUN_TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker);
+    RUN_TEST(test_gateway_that_gives_way_ramps_holds_says_why_and_ends);
     RUN_TEST(test_frames_that_nobody_watches_are_taken_together);
     RUN_TEST(test_frames_that_somebody_watches_are_taken_one_by_one);
     RUN_TEST(test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop);

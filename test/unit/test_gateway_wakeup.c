@@ -17,7 +17,7 @@
 #define ROOM     4
 
 static gw_wakeup_t wakeup;
-static bool asks_only;            // What a long wait asks the kernel for, without waiting.
+static bool asks_only; // What a long wait asks the kernel for, without waiting.
 static struct timespec asked_for;
 static int event_fd;
 
@@ -50,7 +50,8 @@ static iw_time_us_t in_us(iw_time_us_t span_us) {
 int ppoll(struct pollfd *watched, nfds_t count, const struct timespec *span, const sigset_t *mask) {
     (void)mask;
     if (!asks_only) {
-        return poll(watched, count, (span == NULL) ? -1 : (int)(span->tv_sec * 1000 + (span->tv_nsec + 999999) / 1000000));
+        return poll(watched, count,
+                    (span == NULL) ? -1 : (int)(span->tv_sec * 1000 + (span->tv_nsec + 999999) / 1000000));
     }
     asked_for = *span;
     return 0;
