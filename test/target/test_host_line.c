@@ -26,6 +26,12 @@ static uint32_t chance = 1;
 static char answer[IW_HOST_LINE_BYTES + 1U]; // The last line with an id.
 static char heard[IW_HOST_LINE_BYTES + 1U];  // The last line at all.
 static uint32_t states;                      // Events `state`.
+static char all[1U << 16];                   // The lines since `forget`, as many as fit.
+static size_t all_length;
+static bool estop_high;
+static iw_learnt_t flash; // What is kept of the wheels,
+static bool has_flash, flash_fails;
+static uint32_t flash_writes;
 
 size_t iw_serial_read(char *out, size_t size) {
     const size_t count = (size < wire_length - wire_taken) ? size : wire_length - wire_taken;
@@ -53,6 +59,10 @@ bool iw_serial_write(const char *bytes, size_t length) {
     memcpy(text, line.json, line.length);
     text[line.length] = '\0';
     memcpy(heard, text, line.length + 1U);
+    if (all_length + line.length < sizeof all) {
+        memcpy(&all[all_length], text, line.length + 1U);
+        all_length += line.length;
+    }
     if (strstr(text, "\"id\":") != NULL) {
         memcpy(answer, text, line.length + 1U);
     }
@@ -81,13 +91,15 @@ bool iw_host_keep(const iw_settings_t *settings) {
 }
 
 bool iw_host_recall(iw_learnt_t *out_learnt) {
-    (void)out_learnt;
-    return false;
+    *out_learnt = has_flash ? flash : *out_learnt;
+    return has_flash;
 }
 
 bool iw_host_remember(const iw_learnt_t *learnt) {
-    (void)learnt;
-    return true;
+    flash_writes++;
+    flash = flash_fails ? flash : *learnt;
+    has_flash = has_flash || !flash_fails;
+    return !flash_fails;
 }
 
 static uint32_t random_below(uint32_t limit) {
@@ -132,7 +144,7 @@ static void run_ms(uint32_t span_ms) {
         wire_length = wire_taken = 0;
         gateway_rig_step(&rig);
         const iw_snapshot_t seen = gateway_rig_look(&rig);
-        (void)iw_host_tell(&host, &seen, false);
+        (void)iw_host_tell(&host, &seen, estop_high);
         gateway_rig_run(&rig, 5000);
         for (unsigned side = 0; side < IW_SIDES; side++) {
             TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(SLOW_MM_S, rig.bus.told_mm_s[side], "a hostile line was obeyed");
@@ -157,7 +169,16 @@ static void arm(void) {
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
 }
 
+static void start(void);
+
 void setUp(void) {
+    has_flash = flash_fails = estop_high = false;
+    flash_writes = 0;
+    start();
+    arm();
+}
+
+static void start(void) {
     gateway_rig_init(&rig);
     memset(&host, 0, sizeof host);
     wire_length = wire_taken = 0;
@@ -180,7 +201,6 @@ void setUp(void) {
     say(0, "{\"cmd\":\"link\"}");
     say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
     run_ms(20);
-    arm();
 }
 
 void tearDown(void) {}
@@ -374,6 +394,197 @@ static void test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall(void
     TEST_ASSERT_UINT_WITHIN(3, 10, states);
 }
 
+/// The relay is there all the time.
+static void pass(uint32_t span_ms) {
+    for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(100);
+    }
+}
+
+static void forget(void) {
+    all[0] = '\0';
+    all_length = 0;
+}
+
+static unsigned count_of(const char *words) {
+    unsigned count = 0;
+    for (const char *at = strstr(all, words); at != NULL; at = strstr(at + 1, words)) {
+        count++;
+    }
+    return count;
+}
+
+static void watch_everything(void) {
+    say(1, "{\"cmd\":\"watch\",\"topics\":[\"force\",\"stop\",\"bus\",\"estop\",\"lease\"],\"rate_hz\":1}");
+    pass(100);
+    forget();
+}
+
+static void disarm(void) {
+    say(1, "{\"cmd\":\"stop\"}");
+    pass(2500);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+}
+
+static void test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once(void) {
+    disarm();
+    watch_everything();
+    estop_high = true;
+    pass(200);
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"estop\",\"t_us\""));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"state\":\"pressed\"}"), all);
+    iw_snapshot_t seen = gateway_rig_look(&rig);
+    seen.still_moving++;
+    seen.present |= 1U << IW_CAUSE_ESTOP_LINE;
+    iw_observe(&host, &seen);
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"still_moving\",\"present\":true"));
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"estop_line\",\"present\":true"));
+    TEST_ASSERT_EQUAL_UINT(2, count_of("\"event\":\"fault\""));
+}
+
+static void test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others(void) {
+    char line[IWN_LINE_BOARD_MAX];
+    watch_everything();
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    say(2, "{\"cmd\":\"stop\"}");
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"cause\":\"client_stop\""), all);
+    answer[0] = '\0';
+    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line));
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "client 2"), answer);
+    forget();
+    say(2, "{\"cmd\":\"estop\",\"reason\":\"test\"}");
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"cause\":\"estop_software\""), all);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "client 2"), all);
+    TEST_ASSERT_NULL_MESSAGE(strstr(all, "(gone)"), all);
+}
+
+static void test_host_zero_of_each_wheel_is_told_once_for_each_change(void) {
+    disarm();
+    watch_everything();
+    iw_snapshot_t seen = gateway_rig_look(&rig);
+    iw_force_t force = *seen.wheel[IW_RIGHT].force;
+    force.provenance = IW_OFFSET_STORED;
+    force.offset_mN = 1234;
+    force.offset_us = 77;
+    seen.wheel[IW_RIGHT].force = &force;
+    iw_observe(&host, &seen);
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"offset\""));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"side\":\"right\",\"offset_mN\":1234,"), all);
+    TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_NONE, host.zero[IW_RIGHT].from);
+    force.provenance = IW_OFFSET_OPERATOR;
+    force.offset_us = 99;
+    forget();
+    iw_observe(&host, &seen);
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"offset\""));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"before_mN\":1234,"), all);
+    force.offset_us = 100;
+    force.offset_mN = 55;
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT(2, count_of("\"event\":\"offset\""));
+    force.provenance = IW_OFFSET_ESTIMATED;
+    force.quality.deviation_mN = 31;
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_ESTIMATED, host.zero[IW_RIGHT].from);
+    TEST_ASSERT_EQUAL_UINT16(31, host.zero[IW_RIGHT].deviation_mN);
+}
+
+static void test_host_word_on_an_item_is_compared_with_what_is_in_force(void) {
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"530\"}", "\"state\":\"confirmed\"");
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"confirm\",\"id\":2,\"item\":\"track\",\"value\":\"551\"}", "\"state\":\"contradicted\"");
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"dlc\",\"value\":\"551\"}", "value must be yes or no");
+}
+
+static void test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often(void) {
+    forget();
+    for (unsigned i = 0; i < 10U; i++) {
+        say(0, "{\"cmd\":\"alive\"}");
+        gateway_judge_renew(&rig.judge);
+        run_ms(25);
+    }
+    TEST_ASSERT_UINT_WITHIN(2, 10, count_of("\"event\":\"link\""));
+}
+
+static void test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start(void) {
+    iw_ledger_state_t state;
+    disarm();
+    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
+    pass(2500);
+    const uint32_t writes = flash_writes;
+    TEST_ASSERT_GREATER_THAN_UINT32(0, writes);
+    TEST_ASSERT_EQUAL_INT(IW_MEMORY_KEPT, host.memory);
+    pass(5000);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(writes, flash_writes, "the flash wears");
+    start();
+    state = iw_host_look(&host)->assumed[IW_LEDGER_TRACK].state;
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, state);
+    TEST_ASSERT_EQUAL_INT(IW_MEMORY_KEPT, host.memory);
+    has_flash = false;
+    start();
+    state = iw_host_look(&host)->assumed[IW_LEDGER_TRACK].state;
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, state);
+    TEST_ASSERT_EQUAL_INT(IW_MEMORY_NEW, host.memory);
+    flash_fails = true;
+    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
+    pass(5000);
+    TEST_ASSERT_EQUAL_INT(IW_MEMORY_FAILED, host.memory);
+}
+
+static void test_host_command_older_than_its_channel_is_stale(void) {
+    char json[256];
+    (void)snprintf(json, sizeof json,
+                   "{\"boot\":\"%016llx\",\"seq\":1,\"t_us\":%llu,\"cmd\":\"drive\",\"left_mm_s\":100,"
+                   "\"right_mm_s\":100}",
+                   (unsigned long long)BOOT, (unsigned long long)t_us);
+    run_ms(5);
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    run_ms(5);
+    refused = 0;
+    say(2, json);
+    run_ms(5);
+    TEST_ASSERT_EQUAL_UINT32(1, refused);
+}
+
+static void test_host_state_after_a_stall_comes_in_no_burst(void) {
+    disarm();
+    say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
+    pass(300);
+    gateway_rig_run(&rig, 300000); // The image's loop stands still.
+    states = 0;
+    say(0, "{\"cmd\":\"alive\"}");
+    run_ms(50);
+    TEST_ASSERT_EQUAL_UINT32(1, states);
+}
+
+static void test_host_setting_out_of_its_range_is_refused(void) {
+    iw_settings_t settings = iw_settings_from(&rig.config, 540);
+    iw_config_t config = rig.config;
+    char text[256];
+    iwn_text_t why = iwn_text_begin(text, sizeof text);
+    TEST_ASSERT_TRUE(iw_settings_check(&settings, &why));
+    config.gear_turns = 1000;
+    config.gear_per = 1;
+    settings = iw_settings_from(&config, 540);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    config = rig.config;
+    config.lease_ms = 900;
+    settings = iw_settings_from(&config, 540);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    config = rig.config;
+    config.radius_mm = 0;
+    settings = iw_settings_from(&config, 540);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_host_line_million_hostile_lines_none_is_obeyed);
@@ -383,5 +594,14 @@ int main(void) {
     RUN_TEST(test_host_answer_to_arm_comes_when_it_is_armed);
     RUN_TEST(test_host_twist_turns_the_right_wheel_faster);
     RUN_TEST(test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall);
+    RUN_TEST(test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once);
+    RUN_TEST(test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others);
+    RUN_TEST(test_host_zero_of_each_wheel_is_told_once_for_each_change);
+    RUN_TEST(test_host_word_on_an_item_is_compared_with_what_is_in_force);
+    RUN_TEST(test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often);
+    RUN_TEST(test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start);
+    RUN_TEST(test_host_command_older_than_its_channel_is_stale);
+    RUN_TEST(test_host_state_after_a_stall_comes_in_no_burst);
+    RUN_TEST(test_host_setting_out_of_its_range_is_refused);
     return UNITY_END();
 }
