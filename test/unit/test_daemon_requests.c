@@ -594,6 +594,17 @@ static void test_purge_by_the_port_is_told_once_in_the_log(void) {
     }
 }
 
+static void test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link(void) {
+    daemon_rig.link = (iw_bus_link_t){.presence = IW_LINK_UP, .echo_proven = true, .bitrate_hz = 500000, .changes = 7};
+    daemon_rig.daemon->status.observed.left_behind = true;
+    gw_bus_facts_follow(&daemon_rig.daemon->facts, &daemon_rig.daemon->wheels, true);
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"status\"}");
+    const char *warnings = strstr(reply, "\"warnings\":[");
+    TEST_ASSERT_NOT_NULL_MESSAGE(warnings, reply);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "a setpoint is still in the controller"), warnings);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "500000 bit/s"), warnings);
+}
+
 static void test_warning_that_goes_on_is_said_once(void) {
     static iw_estop_ops_t none;
     none = *daemon_rig.daemon->wheels.hal.estop_ops;
@@ -647,6 +658,7 @@ int main(void) {
     RUN_TEST(test_wheel_that_goes_on_turning_is_told_once_and_whole);
     RUN_TEST(test_facts_of_the_bus_are_taken_once_for_each_change);
     RUN_TEST(test_purge_by_the_port_is_told_once_in_the_log);
+    RUN_TEST(test_warnings_say_what_was_left_in_the_controller_and_what_is_wrong_with_the_link);
     RUN_TEST(test_warning_that_goes_on_is_said_once);
     return UNITY_END();
 }
