@@ -177,6 +177,7 @@ static void test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone(vo
 
 static void test_can_socket_that_the_kernel_does_not_know_is_told_as_such(void) {
     unknown = true;
+    memset(&bus, 0xA5, sizeof bus);
     const int error = iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS);
     unknown = false;
     TEST_ASSERT_EQUAL_INT(EAFNOSUPPORT, error);

@@ -388,6 +388,39 @@ static void test_purge_restarts_the_link_once_and_tells_how_it_ended(void) {
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.restarts);
 }
 
+static void test_purge_is_remembered_over_a_reading_that_brings_something_else(void) {
+    (void)iw_bus_purge(&store);
+    fake_interface.restart_result = 0;
+    wait_ms(1);
+    fake_interface.ours.error = ENETDOWN;
+    wait_ms(1);
+    fake_interface.link.restart_ms = 77;
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_UINT32(77, link_now()->restart_ms);
+    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, link_now()->purge);
+}
+
+static void test_load_counts_the_frames_of_ours_and_of_others(void) {
+    wait_ms(1000);
+    TEST_ASSERT_EQUAL_UINT32(0, link_now()->load_permille);
+    for (unsigned i = 0; i < 20U; i++) {
+        fake_interface_put(&fake_interface.ours, 256, 8, 0);
+        wait_ms(10);
+        (void)drain();
+    }
+    wait_ms(800);
+    const uint32_t ours = link_now()->load_permille;
+    TEST_ASSERT_GREATER_THAN_UINT32(1, ours);
+    for (unsigned i = 0; i < 20U; i++) {
+        fake_interface_put(&fake_interface.ours, 256, 8, 0);
+        fake_interface_put(&fake_interface.others, 0x700, 8, 0);
+        wait_ms(10);
+        (void)drain();
+    }
+    wait_ms(800);
+    TEST_ASSERT_EQUAL_UINT32(2U * ours, link_now()->load_permille);
+}
+
 static void test_purge_that_was_not_allowed_is_not_tried_again(void) {
     (void)iw_bus_purge(&store);
     fake_interface.restart_result = EPERM;
@@ -521,6 +554,8 @@ int main(void) {
     RUN_TEST(test_interface_without_sockets_is_down_until_it_has_some);
     RUN_TEST(test_full_queue_is_no_loss);
     RUN_TEST(test_purge_restarts_the_link_once_and_tells_how_it_ended);
+    RUN_TEST(test_purge_is_remembered_over_a_reading_that_brings_something_else);
+    RUN_TEST(test_load_counts_the_frames_of_ours_and_of_others);
     RUN_TEST(test_purge_that_was_not_allowed_is_not_tried_again);
     RUN_TEST(test_purge_where_the_echo_proves_nothing_leaves_the_link_alone);
     RUN_TEST(test_flood_of_errors_takes_a_bounded_part_of_a_step);
