@@ -401,6 +401,17 @@ static void test_local_hub_that_stays_away_is_tried_less_and_less_often_each_tim
     }
 }
 
+static void test_local_hub_that_was_never_there_is_tried_as_one_that_went(void) {
+    static iw_linux_hal_t other;
+    const char *culprit = NULL;
+    char name[96];
+    (void)snprintf(name, sizeof name, "%s.nobody", bus_name);
+    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&other, name, &(iw_estop_wish_t){.name = "none"}, &culprit));
+    iw_bus_tend(&other.bus, now_us);
+    TEST_ASSERT_EQUAL_UINT64(now_us + 20000U, iw_bus_next_us(&other.bus));
+    iw_linux_hal_close(&other);
+}
+
 static void test_local_bus_off_lasts_until_the_hub_is_another(void) {
     iw_can_frame_t heard;
     tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
@@ -453,6 +464,7 @@ int main(void) {
     RUN_TEST(test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark);
     RUN_TEST(test_local_bus_has_no_timing_and_an_echo_that_proves);
     RUN_TEST(test_local_hub_that_stays_away_is_tried_less_and_less_often_each_time_it_goes);
+    RUN_TEST(test_local_hub_that_was_never_there_is_tried_as_one_that_went);
     RUN_TEST(test_local_bus_off_lasts_until_the_hub_is_another);
     RUN_TEST(test_local_without_a_descriptor_it_is_refused_and_later_tried_again_in_its_time);
     RUN_TEST(test_local_every_frame_of_several_batches_comes_in_order);
