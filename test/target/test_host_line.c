@@ -585,6 +585,108 @@ static void test_host_setting_out_of_its_range_is_refused(void) {
     TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
 }
 
+static void test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error(void) {
+    static const char *const good[] = {"{\"cmd\":\"alive\"}",
+                                       "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}",
+                                       "{\"cmd\":\"close\",\"channel\":2}",
+                                       "{\"cmd\":\"link\"}",
+                                       "{\"ok\":true}",
+                                       "{\"event\":\"x\"}"};
+    static const char *const bad[] = {"{\"cmd\":\"dance\"}",
+                                      "{\"cmd\":\"close\"}",
+                                      "{\"cmd\":\"close\",\"channel\":99}",
+                                      "{\"x\":1}",
+                                      "[]",
+                                      "{\"cmd\":\"open\",\"channel\":2}"};
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        say(0, good[i]);
+        run_ms(5);
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, host.errors, good[i]);
+    }
+    say(1, "{\"cmd\":\"hello\"}"); // With the relay begun anew nobody is there.
+    run_ms(5);
+    TEST_ASSERT_EQUAL_UINT32(1, host.errors);
+    for (uint32_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        say(0, bad[i]);
+        run_ms(5);
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(2U + i, host.errors, bad[i]);
+    }
+    say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
+    forget();
+    say(1, "{\"ok\":true}");
+    say(1, "{\"cmd\":\"hello\",\"id\":1}");
+    run_ms(5);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, count_of("\"ok\":false"), all);
+    TEST_ASSERT_EQUAL_UINT32(2U + sizeof bad / sizeof bad[0] - 1U, host.errors);
+}
+
+static void test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_told_as_who_it_was(void) {
+    watch_everything();
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
+    say(2, "{\"cmd\":\"watch\",\"topics\":[\"stop\"]}");
+    run_ms(10);
+    gateway_judge_renew(&rig.judge);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    forget();
+    say(0, "{\"cmd\":\"close\",\"channel\":1}");
+    run_ms(10);
+    TEST_ASSERT_TRUE(iw_gateway_state(&rig.gateway) != IW_STATE_ARMED);
+    TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, host.client[0].id);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"stop\""), all);
+    TEST_ASSERT_NULL_MESSAGE(strstr(all, "(gone)"), all);
+    run_ms(480);
+    TEST_ASSERT_TRUE(host.client[1].id != IW_CLIENT_NONE);
+    run_ms(30);
+    TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, host.client[1].id);
+}
+
+static void test_host_status_has_the_estop_and_of_each_wheel_its_own_zero(void) {
+    host.zero[IW_LEFT] = (iw_learnt_zero_t){.from = IW_OFFSET_OPERATOR, .deviation_mN = 11};
+    host.zero[IW_RIGHT] = (iw_learnt_zero_t){.from = IW_OFFSET_ESTIMATED, .deviation_mN = 22};
+    const iwn_surroundings_t around = iw_host_around(&host, iw_host_look(&host));
+    TEST_ASSERT_TRUE(around.estop.present);
+    TEST_ASSERT_EQUAL_UINT32(11, around.zero[IW_LEFT].deviation_mN);
+    TEST_ASSERT_EQUAL_UINT32(22, around.zero[IW_RIGHT].deviation_mN);
+}
+
+static void test_host_restarts_only_if_it_was_asked_to(void) {
+    TEST_ASSERT_FALSE(iw_host_wants_restart(&host));
+    host.restart_us = 1;
+    TEST_ASSERT_TRUE(iw_host_wants_restart(&host));
+}
+
+static void test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it(void) {
+    disarm();
+    pass(1000);
+    forget();
+    pass(3000);
+    TEST_ASSERT_EQUAL_UINT(3, count_of("\"event\":\"link\""));
+    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, iw_host_tell(&host, &seen, false));
+}
+
+static void test_host_hello_and_force_are_whole(void) {
+    forget();
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
+    say(2, "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":10}");
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(strstr(all, "\"event\":\"hello\""), "\"t_us\":"), all);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(strstr(all, "\"event\":\"force\""), "\"left\":{"), all);
+}
+
+static void test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_every_two_seconds(void) {
+    disarm();
+    const iw_time_us_t silent_us = host.learn_us;
+    TEST_ASSERT_TRUE(silent_us > rig.now_us - 2000000U && silent_us <= rig.now_us + 2000000U);
+    while (host.learn_us == silent_us) {
+        pass(100);
+    }
+    TEST_ASSERT_UINT64_WITHIN(110000U, rig.now_us + 2000000U, host.learn_us);
+    host.learn_us = 0; // As after motion.
+    pass(100);
+    TEST_ASSERT_UINT64_WITHIN(110000U, rig.now_us + 2000000U, host.learn_us);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_host_line_million_hostile_lines_none_is_obeyed);
@@ -603,5 +705,12 @@ int main(void) {
     RUN_TEST(test_host_command_older_than_its_channel_is_stale);
     RUN_TEST(test_host_state_after_a_stall_comes_in_no_burst);
     RUN_TEST(test_host_setting_out_of_its_range_is_refused);
+    RUN_TEST(test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error);
+    RUN_TEST(test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_told_as_who_it_was);
+    RUN_TEST(test_host_status_has_the_estop_and_of_each_wheel_its_own_zero);
+    RUN_TEST(test_host_restarts_only_if_it_was_asked_to);
+    RUN_TEST(test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it);
+    RUN_TEST(test_host_hello_and_force_are_whole);
+    RUN_TEST(test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_every_two_seconds);
     return UNITY_END();
 }
