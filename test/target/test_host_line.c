@@ -558,11 +558,13 @@ static void test_host_state_after_a_stall_comes_in_no_burst(void) {
     disarm();
     say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
     pass(300);
+    forget();
     gateway_rig_run(&rig, 300000); // The image's loop stands still.
     states = 0;
     say(0, "{\"cmd\":\"alive\"}");
     run_ms(50);
     TEST_ASSERT_EQUAL_UINT32(1, states);
+    TEST_ASSERT_EQUAL_UINT(0, count_of("\"event\":\"lost\""));
 }
 
 static void test_host_setting_out_of_its_range_is_refused(void) {
