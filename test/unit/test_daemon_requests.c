@@ -408,6 +408,18 @@ static void test_request_happens_when_it_is_carried_out_and_asks_for_a_step(void
     TEST_ASSERT_TRUE(daemon->wheels.requested);
 }
 
+static void test_reset_that_waited_through_a_stop_is_refused(void) {
+    gw_client_t *own = &daemon_rig.daemon->clients.client[0];
+    assert_reply("{\"cmd\":\"estop\"}", "\"ok\":true");
+    daemon_rig_run(2000);
+    own->stopped_us = own->caught_up_us + 1U;
+    carry_out("{\"cmd\":\"reset\"}");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    own->stopped_us = own->caught_up_us;
+    carry_out("{\"cmd\":\"reset\"}");
+    TEST_ASSERT_TRUE(daemon_rig_state() != IW_STATE_LATCHED);
+}
+
 static void test_change_of_state_is_noted_with_what_each_wheel_was_told(void) {
     daemon_rig_arm(client);
     for (unsigned i = 0; i < 50U; i++) {
@@ -681,6 +693,7 @@ int main(void) {
     RUN_TEST(test_status_tells_of_each_wheel_its_own_zero);
     RUN_TEST(test_arm_is_answered_once);
     RUN_TEST(test_turn_with_a_track_that_is_known_to_be_another_is_denied_with_the_reason);
+    RUN_TEST(test_reset_that_waited_through_a_stop_is_refused);
     RUN_TEST(test_change_of_state_is_noted_with_what_each_wheel_was_told);
     RUN_TEST(test_item_of_an_earlier_run_is_noted_as_it_is_from_then_on);
     RUN_TEST(test_frames_are_noted_at_the_time_of_the_step_that_took_them);

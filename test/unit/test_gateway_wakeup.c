@@ -49,6 +49,7 @@ static iw_time_us_t in_us(iw_time_us_t span_us) {
 /// The C library's, which waits; here the last wait only says for how long.
 int ppoll(struct pollfd *watched, nfds_t count, const struct timespec *span, const sigset_t *mask) {
     (void)mask;
+    TEST_ASSERT_EQUAL_UINT(1U, (unsigned)count);
     if (!asks_only) {
         return poll(watched, count,
                     (span == NULL) ? -1 : (int)(span->tv_sec * 1000 + (span->tv_nsec + 999999) / 1000000));
