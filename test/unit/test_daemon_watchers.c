@@ -444,6 +444,11 @@ static void test_round_of_sending_ends_when_its_time_is_up(void) {
     }
     TEST_ASSERT_UINT_WITHIN(1, GW_ROUND_US / 100U, reached);
     TEST_ASSERT_TRUE(gw_service_is_busy(clients));
+    daemon_rig_run(20); // All is sent: who has nothing waiting costs nothing of the time.
+    daemon_rig.look_takes_us = 2U * GW_ROUND_US;
+    gw_service_flush(clients, IW_CLIENT_NONE);
+    daemon_rig.look_takes_us = 0;
+    TEST_ASSERT_FALSE(clients->lines_wait);
 }
 
 int main(void) {
