@@ -275,7 +275,7 @@ static gw_client_t *heard_first(gw_daemon_t *daemon) {
 
 /// The core's step, in which everything is looked at before anything leaves.
 static void hear_and_step(gw_daemon_t *daemon, iw_linux_told_t told) {
-    gw_client_t *first = heard_first(daemon);
+    gw_client_t *first = told.estop ? NULL : heard_first(daemon);
     told.estop = told.estop || first != NULL; // Edges since the wait count too.
     iw_linux_hal_waited(&daemon->wheels.hal, told);
     if (first != NULL) {

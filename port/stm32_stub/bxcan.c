@@ -186,17 +186,15 @@ static bool take_back(iw_bxcan_t *self) {
 }
 
 /// An abort that does not end: the frame is lost in the controller, which is reset, mailboxes and all. STARTING is told
-/// as a loss of the bus, and nothing is sent before it has been joined anew.
+/// as a loss of the bus, and nothing is sent before it has been joined anew: until then the reset masks the interrupts.
 static void start_anew(iw_bxcan_t *self) {
     iw_register_t *const reset = self->config.reset_register;
-    mask_transmit(self);
     iw_register_write(reset, iw_register_read(reset) | self->config.reset_bits);
     iw_register_write(reset, iw_register_read(reset) & ~self->config.reset_bits);
     forget(self);
     self->resets++;
     self->phase = IW_BXCAN_STARTING;
     write_mcr(self, IW_MCR_INRQ);
-    unmask_transmit(self);
 }
 
 /// Off the bus nothing leaves: not in bus-off, which only `bus_state` ends, and it joins no bus before all is taken

@@ -14,6 +14,11 @@ DANGEROUS = re.compile(r"\b(?:kill|killpg|reboot)\(")
 OTHER = {"left": "right", "right": "left"}
 
 
+def calls(node):
+    """True if a function is called in it."""
+    return node.get("kind") == "CallExpr" or any(calls(child) for child in node.get("inner", ()))
+
+
 class Meanings(Finder):
     """Walks the functions of one file."""
 
@@ -31,9 +36,8 @@ class Meanings(Finder):
         for child in children[1:] if node.get("kind") == "CaseStmt" else children:
             if "kind" in child:
                 self.visit(child, node)
-
-    def mean_VarDecl(self, node):
-        self.times.append((node["name"], node["type"]["qualType"]))
+        if node.get("kind") == "VarDecl": # From here on: compilers tell of one that is used in its own beginning.
+            self.times.append((node["name"], node["type"]["qualType"]))
 
     def mean_IfStmt(self, node):
         condition, then = node["inner"][:2]
@@ -47,21 +51,31 @@ class Meanings(Finder):
         self.add("condition negated", self.span(node["inner"][0]), f"!({self.text(node['inner'][0])})")
 
     def mean_CompoundStmt(self, node):
-        before, is_void = None, self.declaration["type"]["qualType"].startswith("void (")
+        before, former, is_void = None, None, self.declaration["type"]["qualType"].startswith("void (")
         for number, child in enumerate(node.get("inner", ())):
             span = self.span(child) if child["kind"] in EFFECTS else None
             if span:
                 self.add("effect dropped", span, "")
                 if is_void and number > 0:
                     self.add("returns early", span, "return")
-                # In which order the members of an object are written means nothing.
-                both_told = before and all(self.source[slice(*one)].startswith("iwn_out_") for one in (before, span))
-                if before and not both_told and ";" not in self.source[slice(*before)]:
+                if before and ";" not in self.source[slice(*before)] and not self.is_order_free(former, child):
                     between = self.source[before[1]:span[0]]
                     self.add("order of two effects", (before[0], span[1]), self.source[slice(*span)] + between + self.source[slice(*before)])
-            before = span
+            before, former = span, child
             if child["kind"] == "ContinueStmt":
                 self.add("event not skipped", self.span(child), "")
+
+    def is_order_free(self, one, other):
+        """Nobody can tell which came first: members of an object, assignments of which neither has to do with the other, a line in the log beside what it does not tell."""
+        texts = [self.text(node) for node in (one, other)]
+        targets = [None if calls(node) else self.text(node["inner"][0]).lstrip("*") for node in (one, other)]
+        logs = [text.startswith("gw_log(") for text in texts]
+        if all(text.startswith("iwn_out_") for text in texts):
+            return True
+        if logs[0] != logs[1]:
+            told, target = texts[logs.index(True)].partition(",")[2], targets[logs.index(False)]
+            return target not in told if target else not re.search(r"->|\w\(", told)
+        return all(targets) and targets[0] not in texts[1] and targets[1] not in texts[0]
 
     def mean_DeclRefExpr(self, node):
         span, declared = self.span(node), node["referencedDecl"]

@@ -29,6 +29,7 @@ daemon_rig_t daemon_rig;
 // The clocks ---------------------------------------------------------------------------------------------------------------
 
 iw_time_us_t iw_clock_now_us(void) {
+    daemon_rig.now_us += daemon_rig.look_takes_us;
     return daemon_rig.now_us;
 }
 
@@ -92,6 +93,7 @@ int iw_bus_send(iw_backend_store_t *self, const iw_can_frame_t *frame) {
     rig->most_mm_s = (abs(rig->told_mm_s[side]) > rig->most_mm_s) ? (int16_t)abs(rig->told_mm_s[side]) : rig->most_mm_s;
     rig->told_mA[side] = (int16_t)(frame->data[3] << 8 | frame->data[4]);
     rig->sent_us = rig->now_us;
+    rig->sent_waits = rig->waits;
     sim_world_submit(&rig->world, rig->now_us, rig->port, frame);
     return 1;
 }
@@ -413,6 +415,24 @@ void daemon_rig_drive(int client, int left_mm_s, int right_mm_s, unsigned for_ms
         const unsigned used_ms = (unsigned)((daemon_rig.now_us - begin_us) / IW_US_PER_MS);
         daemon_rig_run((used_ms < 20U) ? 20U - used_ms : 1U);
     }
+}
+
+void daemon_rig_keep_log(void) {
+    gw_log_t *log = &daemon_rig.daemon->log;
+    gw_log_close(log);
+    char path[] = "/tmp/iwheel-log-XXXXXX";
+    log->fd = mkstemp(path);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, log->fd);
+    (void)unlink(path);
+    log->level = GW_LOG_INFO;
+}
+
+const char *daemon_rig_log(void) {
+    static char text[8192];
+    const ssize_t length = pread(daemon_rig.daemon->log.fd, text, sizeof text - 1U, 0);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, (int)length);
+    text[length] = '\0';
+    return text;
 }
 
 bool daemon_rig_marked(void) {

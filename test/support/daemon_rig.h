@@ -25,6 +25,7 @@ typedef struct {
     iw_time_us_t now_us;
     iw_time_us_t until_us;       ///< Where `daemon_rig_run` ends.
     iw_time_us_t suspended_us;   ///< The machine's sleep so far, as the clocks tell it.
+    iw_time_us_t look_takes_us;  ///< Each look at the clock takes that long.
     iw_time_us_t stolen_us;      ///< The next wait takes that much longer: the process stands still.
     iw_bus_state_t bus;          ///< What the bus answers.
     iw_bus_link_t link;          ///< What is known of its link.
@@ -44,6 +45,7 @@ typedef struct {
     int16_t told_mA[IW_SIDES];   ///< Of the last of them.
     int16_t told_mm_s[IW_SIDES]; ///< The last of them.
     iw_time_us_t sent_us;        ///< When.
+    uint32_t sent_waits;         ///< After how many waits.
     iw_can_frame_t rx[DAEMON_RX_MAX];
     unsigned rx_count;
     unsigned rx_next;
@@ -81,6 +83,10 @@ const char *daemon_rig_ask(int client, const char *line);
 /// Arms, or drives for that long with a command every 20 ms; fails the test if that is refused.
 void daemon_rig_arm(int client);
 void daemon_rig_drive(int client, int left_mm_s, int right_mm_s, unsigned for_ms);
+
+/// From now on, what the gateway writes for people is kept.
+void daemon_rig_keep_log(void);
+const char *daemon_rig_log(void);
 
 /// True if the crash marker is there.
 bool daemon_rig_marked(void);

@@ -8,13 +8,14 @@
 typedef struct {
     int level;       ///< Of the line; -1: it cannot be read.
     int edges;       ///< That wait to be read.
-    int edges_error; ///< errno of reading them; 0: none.
+    int edges_error; ///< errno of reading them; 0: none; -1: a read that brings nothing is no error.
     int chip_error;  ///< errno of opening the chip; 0: it opens.
     int busy_error;  ///< errno of asking for the line; 0: it is given.
 
     bool is_input;
     bool pulled_up;
     bool both_edges;
+    unsigned room;   ///< For edges that wait, with the kernel.
     unsigned offset; ///< That was asked for.
     int open;        ///< Chips open now.
     int requested;   ///< Lines held now.

@@ -43,7 +43,7 @@ void iw_socketcan_socket_init(iw_socketcan_socket_t *self) {
 
 int iw_socketcan_socket_open(iw_socketcan_socket_t *self, int interface, iw_socketcan_share_t share) {
     iw_socketcan_socket_init(self);
-    if (interface != fake_interface.index) {
+    if (interface != fake_interface.index || fake_interface.sockets_fail) {
         return ENODEV;
     }
     fake_interface.opened += (share == IW_SOCKETCAN_OURS) ? 1U : 0U;
@@ -111,20 +111,30 @@ int iw_socketcan_socket_send(const iw_socketcan_socket_t *self, const iw_can_fra
 }
 
 int iw_netlink_open(iw_netlink_t *self) {
-    *self = (iw_netlink_t){.sequence = (uint32_t)eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)};
-    return 0;
+    *self = (iw_netlink_t){0};
+    if (fake_interface.open_error == 0) {
+        self->sequence = (uint32_t)eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC) + 1U;
+    }
+    return fake_interface.open_error;
 }
 
 int iw_netlink_open_events(iw_netlink_t *self) {
-    return iw_netlink_open(self);
+    const int error = iw_netlink_open(self);
+    if (fake_interface.events_dead) {
+        iw_netlink_close(self);
+    }
+    return error;
 }
 
 void iw_netlink_close(iw_netlink_t *self) {
-    (void)close(iw_netlink_fd(self));
+    if (self->sequence > 0U) {
+        (void)close(iw_netlink_fd(self));
+    }
+    self->sequence = 0;
 }
 
 int iw_netlink_fd(const iw_netlink_t *self) {
-    return (int)self->sequence;
+    return (int)self->sequence - 1; // As a new one has it: none.
 }
 
 bool iw_netlink_take_events(iw_netlink_t *self) {

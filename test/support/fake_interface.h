@@ -28,6 +28,9 @@ typedef struct {
     iw_bus_state_t state; ///< As netlink tells it when it is read.
     iw_bus_link_t link;   ///< The same of the rest.
     bool netlink_fails;
+    int open_error;     ///< Of netlink's sockets.
+    bool events_dead;   ///< The socket that tells of interfaces has no descriptor.
+    bool sockets_fail;  ///< None can be opened on the interface.
     bool news;          ///< Some interface has changed.
     unsigned late;      ///< So many frames come while it is looked whether the interface is up.
     int send_result;    ///< 1, 0 no room, -1 lost.

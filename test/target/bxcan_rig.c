@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define STORM     100000
+#define IER       0x14U
 #define RESET_BIT 0x02000000U
 
 rig_device_t rig[RIG_DEVICES];
@@ -61,6 +62,8 @@ uint32_t iw_register_read(const iw_register_t *address) {
         return *address;
     }
     rig_device_t *const device = device_at(address, &offset);
+    TEST_ASSERT_TRUE_MESSAGE(is_serving || !device->mask_unread || offset == IER, "the mask was not read back");
+    device->mask_unread = device->mask_unread && is_serving;
     const uint32_t value = bxcan_model_read(&device->model, offset);
     if (device->on_read != NULL && !is_serving && !device->on_read(offset)) {
         device->on_read = NULL;
@@ -76,9 +79,12 @@ void iw_register_write(iw_register_t *address, uint32_t value) {
         TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, value & ~RESET_BIT, "another device was reset too");
         *address = value;
         bxcan_model_reset(&resetting->model, 28);
+        resetting->mask_unread = false;
         return;
     }
     rig_device_t *const device = device_at(address, &offset);
+    TEST_ASSERT_TRUE_MESSAGE(is_serving || !device->mask_unread, "the mask was not read back");
+    device->mask_unread = !is_serving && offset == IER && (value & IW_IER_TMEIE) == 0U;
     bxcan_model_write(&device->model, offset, value);
     serve(device);
 }
@@ -89,6 +95,7 @@ void rig_reset(void) {
         memset(&rig[i], 0xA5, sizeof rig[i]);
         rig[i].on_read = NULL;
         rig[i].reset = 0;
+        rig[i].mask_unread = false;
         rig[i].interrupts = 0;
         bxcan_model_reset(&rig[i].model, 28);
     }

@@ -16,7 +16,8 @@ typedef struct {
     iw_bxcan_registers_t window; ///< Only its address means something.
     iw_register_t reset;         ///< RCC's, with a bit for this device.
     iw_bxcan_t driver;
-    uint32_t interrupts;              ///< Served so far.
+    bool mask_unread;    ///< Interrupts were masked, and IER was not read back yet: that write may still be under way.
+    uint32_t interrupts; ///< Served so far.
     bool (*on_read)(uint32_t offset); ///< Called after each read of this device; false: not again.
 } rig_device_t;
 

@@ -219,6 +219,7 @@ static void test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_
     begin_first();
     TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
     TEST_ASSERT_EQUAL(1, driver->resets);
+    TEST_ASSERT_EQUAL_HEX32_MESSAGE(0, rig[0].reset, "the device is let go again");
     TEST_ASSERT_LESS_THAN(0, send(266, 2));
     join_again();
     assert_nothing_waits();
@@ -227,6 +228,18 @@ static void test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_
     assert_on_bus(266, 3);
     assert_echo(266, 3);
     assert_no_echo();
+}
+
+/// Sent and confirmed, but the core has not asked for it yet when the other frame has to be purged by force.
+static void test_purge_that_resets_the_controller_keeps_echoes_of_before_from_the_core(void) {
+    iw_can_frame_t echo;
+    (void)send(266, 1);
+    assert_on_bus(266, 1);
+    (void)send(298, 1);
+    model->abort_reads = UINT32_MAX;
+    TEST_ASSERT_EQUAL(1, iw_bxcan_purge(driver));
+    TEST_ASSERT_EQUAL(1, driver->resets);
+    TEST_ASSERT_EQUAL(-1, iw_bxcan_receive(driver, &echo));
 }
 
 static void test_purge_of_a_controller_that_ignores_aborts_resets_it(void) {
@@ -470,6 +483,7 @@ int main(void) {
     RUN_TEST(test_old_frame_that_fails_while_being_replaced_never_comes);
     RUN_TEST(test_frame_that_never_ends_is_waited_for_with_a_bound);
     RUN_TEST(test_purge_that_does_not_end_resets_the_controller_and_tells_a_loss_of_the_bus);
+    RUN_TEST(test_purge_that_resets_the_controller_keeps_echoes_of_before_from_the_core);
     RUN_TEST(test_purge_of_a_controller_that_ignores_aborts_resets_it);
     RUN_TEST(test_purge_on_a_bus_held_dominant_within_our_frame_leaves_nothing);
     RUN_TEST(test_failed_attempts_before_an_abort_are_no_echo);

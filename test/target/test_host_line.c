@@ -1,144 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The image's own host code against a line that damages, cuts, doubles, delays and invents: a million lines, judged by what the
-// wheels are told. The clock is virtual, the serial driver is replaced by this file.
-#include "gateway_rig.h"
-#include "unity.h"
-
-#include "host.h"
-#include "serial.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#define FAST_MM_S 777 // What every hostile line asks for.
-#define SLOW_MM_S 100 // What the good ones do.
-#define BOOT      0x0123456789abcdefU
-
-static gateway_rig_t rig;
-static iw_host_t host;
-static char wire[65536]; // To the board.
-static size_t wire_length, wire_taken;
-static uint64_t t_us, seq; // The newest stamp heard, and the newest number that was used.
-static bool has_used;      // ... since the channel was opened.
-static uint32_t errors, refused, accepted, written;
-static uint32_t chance = 1;
-static char answer[IW_HOST_LINE_BYTES + 1U]; // The last line with an id.
-static char heard[IW_HOST_LINE_BYTES + 1U];  // The last line at all.
-static uint32_t states;                      // Events `state`.
-
-size_t iw_serial_read(char *out, size_t size) {
-    const size_t count = (size < wire_length - wire_taken) ? size : wire_length - wire_taken;
-    memcpy(out, &wire[wire_taken], count);
-    wire_taken += count;
-    return count;
-}
-
-bool iw_serial_had_error(void) {
-    return false;
-}
-
-size_t iw_serial_room(void) {
-    return IW_SERIAL_SEND_BYTES;
-}
-
-/// Every line that the board writes is right.
-bool iw_serial_write(const char *bytes, size_t length) {
-    iwn_line_t line;
-    TEST_ASSERT_EQUAL_CHAR('\n', bytes[length - 1U]);
-    TEST_ASSERT_EQUAL_INT(IWN_LINE_GOOD, iwn_line_read(bytes, length - 1U, true, &line));
-    t_us = line.t_us;
-    written++;
-    char text[IW_HOST_LINE_BYTES + 1U];
-    memcpy(text, line.json, line.length);
-    text[line.length] = '\0';
-    memcpy(heard, text, line.length + 1U);
-    if (strstr(text, "\"id\":") != NULL) {
-        memcpy(answer, text, line.length + 1U);
-    }
-    states += (strstr(text, "\"event\":\"state\"") != NULL) ? 1U : 0U;
-    errors += (strstr(text, "line_error") != NULL) ? 1U : 0U;
-    refused += (strstr(text, "stale_command") != NULL) ? 1U : 0U;
-    accepted += (strstr(text, "\"limited\"") != NULL) ? 1U : 0U;
-    return true;
-}
-
-bool iw_serial_lend(const char *bytes, size_t length) {
-    return iw_serial_write(bytes, length);
-}
-
-bool iw_serial_lends(void) {
-    return false;
-}
-
-bool iw_serial_is_idle(void) {
-    return true;
-}
-
-bool iw_host_keep(const iw_settings_t *settings) {
-    (void)settings;
-    return true;
-}
-
-bool iw_host_recall(iw_learnt_t *out_learnt) {
-    (void)out_learnt;
-    return false;
-}
-
-bool iw_host_remember(const iw_learnt_t *learnt) {
-    (void)learnt;
-    return true;
-}
+// wheels are told.
+#include "host_rig.inc"
 
 static uint32_t random_below(uint32_t limit) {
     chance = chance * 1664525U + 1013904223U;
     return (uint32_t)((uint64_t)(chance >> 8) * limit >> 24);
-}
-
-static void put(const void *bytes, size_t length) {
-    TEST_ASSERT_TRUE(wire_length + length <= sizeof wire);
-    memcpy(&wire[wire_length], bytes, length);
-    wire_length += length;
-}
-
-static size_t framed(uint8_t channel, const char *json, char out[IWN_LINE_BOARD_MAX]) {
-    const iwn_line_t line = {.json = json, .length = strlen(json), .channel = channel};
-    return iwn_line_write(&line, out, IWN_LINE_BOARD_MAX);
-}
-
-static void say(uint8_t channel, const char *json) {
-    char line[IWN_LINE_BOARD_MAX];
-    put(line, framed(channel, json, line));
-}
-
-/// Each with an id of its own: the halves of two lines never make a whole one.
-static size_t drive_line(int speed_mm_s, uint64_t boot, uint64_t number, uint64_t stamp_us,
-                         char out[IWN_LINE_BOARD_MAX]) {
-    static unsigned id;
-    char json[256];
-    (void)snprintf(json, sizeof json,
-                   "{\"boot\":\"%016llx\",\"seq\":%llu,\"t_us\":%llu,\"cmd\":\"drive\",\"left_mm_s\":%d,"
-                   "\"right_mm_s\":%d,\"id\":%u}",
-                   (unsigned long long)boot, (unsigned long long)number, (unsigned long long)stamp_us, speed_mm_s,
-                   speed_mm_s, ++id);
-    return framed(1, json, out);
-}
-
-/// Carries out what came, and lets time pass in steps of 5 ms, as the image's loop does it.
-static void run_ms(uint32_t span_ms) {
-    for (uint32_t ms = 0; ms < span_ms; ms += 5U) {
-        while (iw_host_take(&host, rig.now_us)) {
-        }
-        wire_length = wire_taken = 0;
-        gateway_rig_step(&rig);
-        const iw_snapshot_t seen = gateway_rig_look(&rig);
-        (void)iw_host_tell(&host, &seen, false);
-        gateway_rig_run(&rig, 5000);
-        for (unsigned side = 0; side < IW_SIDES; side++) {
-            TEST_ASSERT_LESS_OR_EQUAL_INT_MESSAGE(SLOW_MM_S, rig.bus.told_mm_s[side], "a hostile line was obeyed");
-        }
-        TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
-    }
 }
 
 static void drive_slowly(void) {
@@ -148,42 +15,6 @@ static void drive_slowly(void) {
     put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line));
     has_used = true;
 }
-
-static void arm(void) {
-    say(0, "{\"cmd\":\"alive\"}");
-    gateway_judge_renew(&rig.judge);
-    say(1, "{\"cmd\":\"arm\"}");
-    run_ms(50);
-    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
-}
-
-void setUp(void) {
-    gateway_rig_init(&rig);
-    memset(&host, 0, sizeof host);
-    wire_length = wire_taken = 0;
-    errors = refused = accepted = written = 0;
-    seq = 0;
-    has_used = false;
-    chance = 1;
-    const iw_host_place_t place = {.gateway = &rig.gateway,
-                                   .version = "0.0.0",
-                                   .bus = "can",
-                                   .estop = "PB0",
-                                   .bitrate_hz = 1000000,
-                                   .sample_point_permille = 625,
-                                   .settings = iw_settings_from(&rig.config, 540),
-                                   .track_mm = 540,
-                                   .rate_max_hz = 10,
-                                   .boot = BOOT};
-    iw_host_init(&host, &place, rig.now_us);
-    gateway_rig_run(&rig, 600000);
-    say(0, "{\"cmd\":\"link\"}");
-    say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
-    run_ms(20);
-    arm();
-}
-
-void tearDown(void) {}
 
 /// With a byte that no line has: else the next one, its beginning missing, could be made whole by what is alike in both.
 static size_t end_short(char *line, size_t at) {
@@ -308,15 +139,6 @@ static void test_host_line_delayed_commands_lease_ends_from_their_stamp(void) {
     TEST_ASSERT_EQUAL_UINT32(1, accepted);
     run_ms(35);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, iw_gateway_state(&rig.gateway));
-}
-
-/// Asks, and looks at the answer.
-static void assert_answer(const char *json, const char *part) {
-    answer[0] = '\0';
-    say(1, json);
-    run_ms(60);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, part), (answer[0] != '\0') ? answer : json);
-    TEST_ASSERT_EQUAL_CHAR('}', answer[strlen(answer) - 1U]);
 }
 
 static void test_host_answers_tell_what_was_asked_and_what_became_of_it(void) {

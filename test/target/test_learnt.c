@@ -208,6 +208,13 @@ static void test_learnt_last_blank_slot_is_the_configuration_s(void) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
 }
 
+/// Commands that were kept from before a power loss quote another number of starts.
+static void test_learnt_every_power_on_is_counted(void) {
+    for (uint32_t starts = 1; starts < 20U; starts++) {
+        TEST_ASSERT_EQUAL_UINT32(starts, power_on().power_ons);
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_learnt_same_settings_comes_back_with_its_provenance);
@@ -216,5 +223,6 @@ int main(void) {
     RUN_TEST(test_learnt_small_changes_are_not_worth_a_record);
     RUN_TEST(test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was);
     RUN_TEST(test_learnt_last_blank_slot_is_the_configuration_s);
+    RUN_TEST(test_learnt_every_power_on_is_counted);
     return UNITY_END();
 }

@@ -127,6 +127,8 @@ static void test_assumption_gear_ratios_are_compared_as_ratios(void) {
     assert_found(GW_FOUND_SAME, IW_LEDGER_GEAR_RATIO, "10/3");
     assert_found(GW_FOUND_SAME, IW_LEDGER_GEAR_RATIO, "20/6");
     assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_GEAR_RATIO, "10");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_GEAR_RATIO, "1000/999");
+    assert_found(GW_FOUND_DIFFERENT, IW_LEDGER_GEAR_RATIO, "999/1000");
     static const char *const impossible[] = {"0", "1/0", "/3", "10/", "1001", "1/1001", "10/3, rpm of the rotor"};
     for (size_t i = 0; i < sizeof impossible / sizeof impossible[0]; i++) {
         assert_found(GW_FOUND_IMPOSSIBLE, IW_LEDGER_GEAR_RATIO, impossible[i]);

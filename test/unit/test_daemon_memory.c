@@ -7,6 +7,7 @@
 
 #include "unity.h"
 
+#include <errno.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -253,6 +254,16 @@ static void test_memory_that_could_not_be_written_is_written_again_after_its_tim
     TEST_ASSERT_EQUAL_UINT(before + 1U, writes);
 }
 
+static void test_memory_whose_process_has_gone_says_so(void) {
+    gw_knowledge_t *knowledge = &daemon_rig.daemon->knowledge;
+    knowledge->keeper.waits = true;
+    news = GW_KEEPER_GONE;
+    daemon_rig_run(50);
+    knowledge->keeper.waits = false;
+    TEST_ASSERT_EQUAL_INT(GW_MEMORY_FAILED, knowledge->state);
+    TEST_ASSERT_EQUAL_INT(ECHILD, knowledge->error);
+}
+
 static void test_memory_keeps_the_offset_that_a_wheel_has_sent(void) {
     iw_force_t *force = &daemon_rig.daemon->wheels.core.force[IW_LEFT];
     force->provenance = IW_OFFSET_WHEEL;
@@ -372,6 +383,7 @@ int main(void) {
     RUN_TEST(test_memory_of_a_tare_has_the_figures_of_that_wheel);
     RUN_TEST(test_memory_is_handed_over_soon_after_it_has_changed_and_no_more_often_than_once_a_second);
     RUN_TEST(test_memory_that_could_not_be_written_is_written_again_after_its_time_and_not_before);
+    RUN_TEST(test_memory_whose_process_has_gone_says_so);
     RUN_TEST(test_memory_keeps_the_offset_that_a_wheel_has_sent);
     RUN_TEST(test_memory_of_the_operators_word_ends_with_a_finding_of_the_bus);
     RUN_TEST(test_status_after_a_change_of_an_item_is_as_written_anew);

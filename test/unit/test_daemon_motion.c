@@ -93,8 +93,17 @@ static void test_marker_that_could_not_be_set_is_tried_again(void) {
     TEST_ASSERT_EQUAL_INT(0, mkdir(path, 0755)); // Not to be opened for writing, nor unlinked.
     begin_driving();
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64_MESSAGE(daemon_rig.now_us, daemon_rig.daemon->mark_us, "not in each cycle");
+    const iw_time_us_t failed_us = daemon_rig.daemon->mark_us;
+    while (daemon_rig.daemon->mark_us == failed_us) {
+        daemon_rig_run(1);
+    }
+    const iw_time_us_t again_us = daemon_rig.now_us + MS(100);
     TEST_ASSERT_EQUAL_INT(0, rmdir(path));
-    daemon_rig_drive(client, 500, 500, 200);
+    while (daemon_rig.now_us < again_us - MS(2)) {
+        TEST_ASSERT_FALSE(daemon_rig_marked());
+        daemon_rig_run(1);
+    }
+    daemon_rig_run(21);
     TEST_ASSERT_TRUE(daemon_rig_marked());
 }
 
@@ -196,7 +205,9 @@ static void test_estop_pulse_that_is_over_when_it_is_looked_at_latches(void) {
     begin_driving();
     daemon_rig_run(7);
     daemon_rig.estop_pulse = true;
+    daemon_rig.waits = 0;
     daemon_rig_run(1);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(1, daemon_rig.sent_waits, "zeros leave in the cycle that the edge has begun");
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     TEST_ASSERT_TRUE(is_told_zero());
 }
@@ -290,6 +301,14 @@ static void test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_
     assert_refused_behind_a_stop();
 }
 
+static void test_command_that_comes_with_the_estop_is_refused(void) {
+    begin_driving();
+    daemon_rig.estop = 1;
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+}
+
 static void test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after(void) {
     static const unsigned hold_ms[] = {0, 100, 1000, 3000};
     for (size_t i = 0; i < sizeof hold_ms / sizeof hold_ms[0]; i++) {
@@ -363,6 +382,17 @@ static void test_second_request_after_one_reading_of_the_clock_has_a_time_of_its
     TEST_ASSERT_EQUAL_UINT64(read_us + 300U, wheels->now_us);
 }
 
+static void test_suspension_counts_from_the_time_on_that_makes_a_step_late(void) {
+    daemon_rig_keep_log();
+    begin_driving();
+    daemon_rig.suspended_us += IW_GATEWAY_LATE_US;
+    daemon_rig_run(25);
+    TEST_ASSERT_EQUAL_STRING("", strstr(daemon_rig_log(), "suspended") ? daemon_rig_log() : "");
+    daemon_rig.suspended_us += IW_GATEWAY_LATE_US + 1000U;
+    daemon_rig_run(25);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_log(), "the machine was suspended for 21 ms"));
+}
+
 static void test_loop_that_stood_still_goes_on_with_zeros(void) {
     begin_driving();
     daemon_rig.stolen_us = 150000U;
@@ -388,6 +418,13 @@ static void test_lease_is_lost_when_commands_end_although_requests_go_on(void) {
     TEST_ASSERT_TRUE(is_cause("lease_lost"));
 }
 
+static void test_clients_are_served_at_the_time_of_the_cycle(void) {
+    for (unsigned ms = 0; ms < 50U; ms++) {
+        daemon_rig_run(1);
+        TEST_ASSERT_EQUAL_UINT64(daemon_rig.daemon->wheels.now_us, daemon_rig.daemon->clients.now_us);
+    }
+}
+
 static void test_lease_ends_with_the_connection_at_once(void) {
     begin_driving();
     (void)close(client);
@@ -404,6 +441,17 @@ static void test_lease_that_ends_with_the_connection_ends_before_anything_that_w
     daemon_rig_run(1);
     client = daemon_rig_connect();
     TEST_ASSERT_TRUE(is_cause("client_gone"));
+}
+
+/// How often the service manager has been told that this gateway is ready.
+static unsigned told_ready(int manager) {
+    char word[32];
+    unsigned count = 0;
+    for (ssize_t n = recv(manager, word, sizeof word, MSG_DONTWAIT); n > 0;
+         n = recv(manager, word, sizeof word, MSG_DONTWAIT)) {
+        count += (strncmp(word, "READY=1", (size_t)n) == 0) ? 1U : 0U;
+    }
+    return count;
 }
 
 /// What the service manager has heard: the longest time between two words that feed its watchdog.
@@ -433,6 +481,8 @@ static void test_watchdog_is_fed_at_half_its_time_with_and_without_motion(void) 
     daemon_rig_start();
     (void)unsetenv("NOTIFY_SOCKET");
     (void)unsetenv("WATCHDOG_USEC");
+    daemon_rig_run(500);
+    TEST_ASSERT_EQUAL_UINT(1U, told_ready(manager));
     const iw_time_us_t at_rest_us = longest_unfed_us(manager, 2000);
     (void)close(client);
     client = daemon_rig_connect();
@@ -454,9 +504,9 @@ static void test_setpoints_keep_their_period_with_and_without_frames_of_the_whee
     }
 }
 
-static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
+static void end_by(int number) {
     begin_driving();
-    TEST_ASSERT_EQUAL_INT(0, kill(getpid(), SIGTERM));
+    TEST_ASSERT_EQUAL_INT(0, kill(getpid(), number));
     daemon_rig_run(1);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
     TEST_ASSERT_FALSE(is_told_zero());
@@ -466,6 +516,39 @@ static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
     TEST_ASSERT_TRUE(is_told_zero());
     TEST_ASSERT_TRUE(daemon_rig.now_us - told_us >= MS(1500));
     TEST_ASSERT_FALSE(daemon_rig_marked());
+}
+
+static void test_signal_to_end_ramps_holds_and_ends_without_a_marker(void) {
+    static const int numbers[] = {SIGTERM, SIGINT, SIGHUP};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        sigset_t none;
+        (void)sigemptyset(&none);
+        (void)sigprocmask(SIG_SETMASK, &none, NULL); // As a process begins, before the loop is opened.
+        (void)signal(numbers[i], SIG_DFL);
+        tearDown();
+        setUp();
+        end_by(numbers[i]);
+    }
+}
+
+/// Root's name on the bus is our own; only a gateway of another user looks for it.
+static void test_gateway_that_gives_way_ramps_holds_says_why_and_ends(void) {
+    if (geteuid() != 0) {
+        return;
+    }
+    daemon_rig_keep_log();
+    begin_driving();
+    TEST_ASSERT_FALSE(daemon_rig.daemon->gave_way);
+    daemon_rig.daemon->runtime.lock.names.owners.own = 65534;
+    daemon_rig.daemon->runtime.lock.names.place = 1;
+    daemon_rig_run(10000);
+    TEST_ASSERT_TRUE(daemon_rig.ended);
+    TEST_ASSERT_TRUE(daemon_rig.daemon->gave_way);
+    TEST_ASSERT_TRUE(is_told_zero());
+    TEST_ASSERT_FALSE(daemon_rig_marked());
+    char line[96];
+    (void)snprintf(line, sizeof line, "a gateway of user 0 (process %ld) serves unix:", (long)getpid());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), line), daemon_rig_log());
 }
 
 static uint32_t waits_in_a_second(void) {
@@ -547,6 +630,7 @@ int main(void) {
     RUN_TEST(test_estop_that_goes_without_a_word_is_seen_within_milliseconds);
     RUN_TEST(test_estop_that_goes_without_a_word_from_a_silent_bus_is_seen_within_milliseconds);
     RUN_TEST(test_estop_pulse_that_is_over_when_it_is_looked_at_latches);
+    RUN_TEST(test_command_that_comes_with_the_estop_is_refused);
     RUN_TEST(test_software_estop_stays_latched_when_its_client_goes_in_the_hold_and_after);
     RUN_TEST(test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves);
     RUN_TEST(test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves);
@@ -557,13 +641,16 @@ int main(void) {
     RUN_TEST(test_second_request_after_one_reading_of_the_clock_has_a_time_of_its_own);
     RUN_TEST(test_suspended_machine_latches_with_zeros_first);
     RUN_TEST(test_suspension_counts_once_and_one_from_before_the_start_not_at_all);
+    RUN_TEST(test_suspension_counts_from_the_time_on_that_makes_a_step_late);
     RUN_TEST(test_loop_that_stood_still_goes_on_with_zeros);
     RUN_TEST(test_lease_is_lost_when_commands_end_although_requests_go_on);
+    RUN_TEST(test_clients_are_served_at_the_time_of_the_cycle);
     RUN_TEST(test_lease_ends_with_the_connection_at_once);
     RUN_TEST(test_lease_that_ends_with_the_connection_ends_before_anything_that_was_sent_last);
     RUN_TEST(test_watchdog_is_fed_at_half_its_time_with_and_without_motion);
     RUN_TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels);
     RUN_TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker);
+    RUN_TEST(test_gateway_that_gives_way_ramps_holds_says_why_and_ends);
     RUN_TEST(test_frames_that_nobody_watches_are_taken_together);
     RUN_TEST(test_frames_that_somebody_watches_are_taken_one_by_one);
     RUN_TEST(test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop);

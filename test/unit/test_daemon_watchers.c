@@ -9,7 +9,9 @@
 
 #include <errno.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #define CROWD GW_WATCHERS_MAX
@@ -282,6 +284,11 @@ static void test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "lines that have to wait keep nobody awake");
     daemon_rig_run(1000);
     TEST_ASSERT_UINT_WITHIN(2, 100U - GW_LINES_PER_CYCLE - 10U, replies_of(watcher));
+    for (unsigned i = 0; i < 10U; i++) {
+        say(watcher, "{\"cmd\":\"hello\"}\n");
+    }
+    daemon_rig_run(1);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(GW_LINES_PER_CYCLE, replies_of(watcher), "after a pause");
 }
 
 static void test_flood_of_estop_latches_once_and_leaves_the_black_box_alone(void) {
@@ -331,6 +338,119 @@ static void test_estop_of_a_watcher_that_goes_at_once_counts(void) {
     TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits - waits, "one that has gone keeps nobody awake");
 }
 
+static unsigned told(const char *words) {
+    unsigned count = 0;
+    for (const char *at = strstr(daemon_rig_log(), words); at != NULL; at = strstr(at + 1, words)) {
+        count++;
+    }
+    return count;
+}
+
+static void test_flood_of_newcomers_that_watch_is_let_in_one_by_one(void) {
+    daemon_rig_keep_log();
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    socklen_t length = sizeof address;
+    const gw_listener_t *listener = &daemon_rig.daemon->clients.listener[GW_WATCH];
+    TEST_ASSERT_EQUAL_INT(0, getsockname(listener->fd, (struct sockaddr *)&address, &length));
+    daemon_rig_run(10);
+    for (; crowded < 8U; crowded++) {
+        crowd[crowded] = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
+        TEST_ASSERT_EQUAL_INT(0, connect(crowd[crowded], (const struct sockaddr *)&address, length));
+    }
+    daemon_rig.waits = 0;
+    daemon_rig_run(9);
+    TEST_ASSERT_EQUAL_UINT(1U + 9000U / GW_WATCHER_ACCEPT_US + 1U, daemon_rig.daemon->clients.count[GW_WATCH]);
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(40, daemon_rig.waits, "those who have to wait keep nobody awake");
+    daemon_rig_run(20);
+    TEST_ASSERT_EQUAL_UINT(9, daemon_rig.daemon->clients.count[GW_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(0, told("turned away"));
+}
+
+static void test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come_in(void) {
+    daemon_rig_keep_log();
+    daemon_rig.daemon->clients.most[GW_WATCH] = 2;
+    connect_crowd(3);
+    TEST_ASSERT_EQUAL_UINT(1, told("a client was turned away: 2 watchers are connected"));
+    (void)close(crowd[0]);
+    crowd[0] = -1;
+    daemon_rig_run(10);
+    connect_crowd(2);
+    TEST_ASSERT_EQUAL_UINT(2, told("a client was turned away: 2 watchers are connected"));
+}
+
+static void test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one(void) {
+    gw_listener_t *listener = &daemon_rig.daemon->clients.listener[GW_DRIVE];
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    socklen_t length = sizeof address;
+    struct rlimit before;
+    daemon_rig_keep_log();
+    TEST_ASSERT_EQUAL_INT(0, getsockname(listener->fd, (struct sockaddr *)&address, &length));
+    if (listener->reserve_fd >= 0) {
+        (void)close(listener->reserve_fd);
+        listener->reserve_fd = -1;
+    }
+    crowd[crowded] = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
+    TEST_ASSERT_EQUAL_INT(0, connect(crowd[crowded++], (const struct sockaddr *)&address, length));
+    TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
+    const int lowest = dup(watcher);
+    (void)close(lowest);
+    const struct rlimit none = {.rlim_cur = (rlim_t)lowest, .rlim_max = before.rlim_max};
+    TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &none));
+    daemon_rig.waits = 0;
+    daemon_rig_run(GW_LISTENER_PAUSE_US / IW_US_PER_MS - 5U);
+    const unsigned count = daemon_rig.daemon->clients.count[GW_DRIVE];
+    const unsigned lines = told("cannot accept clients for want of descriptors; trying again in 200 ms");
+    const uint32_t waits = daemon_rig.waits;
+    TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
+    TEST_ASSERT_EQUAL_UINT(1, count);
+    TEST_ASSERT_EQUAL_UINT(1, lines);
+    TEST_ASSERT_LESS_THAN_UINT32_MESSAGE(100, waits, "meanwhile it keeps nobody awake");
+    TEST_ASSERT_EQUAL_UINT(1, daemon_rig.daemon->clients.count[GW_DRIVE]);
+    daemon_rig_run(10);
+    TEST_ASSERT_EQUAL_UINT(2, daemon_rig.daemon->clients.count[GW_DRIVE]);
+}
+
+static void test_requests_in_one_breath_are_answered_in_their_order(void) {
+    char text[4096];
+    say(driver, "{\"id\":71,\"cmd\":\"why\"}\n{\"id\":72,\"cmd\":\"hello\"}\n");
+    daemon_rig_run(1);
+    const ssize_t length = recv(driver, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, (int)length);
+    text[length] = '\0';
+    const char *first = strstr(text, "\"id\":71");
+    TEST_ASSERT_NOT_NULL_MESSAGE(first, text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(first, "\"id\":72"), text);
+}
+
+static void test_round_of_sending_ends_when_its_time_is_up(void) {
+    static char text[65536];
+    connect_crowd(CROWD - 1U);
+    for (unsigned i = 0; i < crowded; i++) {
+        say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\"]}\n");
+    }
+    daemon_rig_run(50);
+    for (unsigned i = 0; i < crowded; i++) {
+        (void)recv(crowd[i], text, sizeof text, MSG_DONTWAIT);
+    }
+    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    iwn_out_t json = gw_clients_begin_event(clients, "state");
+    gw_clients_send_event(clients, &json, IWN_TOPIC_STATE);
+    daemon_rig.look_takes_us = 100U;
+    gw_service_flush(clients, IW_CLIENT_NONE);
+    daemon_rig.look_takes_us = 0;
+    unsigned reached = 0;
+    for (unsigned i = 0; i < crowded; i++) {
+        reached += (recv(crowd[i], text, sizeof text, MSG_DONTWAIT) > 0) ? 1U : 0U;
+    }
+    TEST_ASSERT_UINT_WITHIN(1, GW_ROUND_US / 100U, reached);
+    TEST_ASSERT_TRUE(gw_service_is_busy(clients));
+    daemon_rig_run(20); // All is sent: who has nothing waiting costs nothing of the time.
+    daemon_rig.look_takes_us = 2U * GW_ROUND_US;
+    gw_service_flush(clients, IW_CLIENT_NONE);
+    daemon_rig.look_takes_us = 0;
+    TEST_ASSERT_FALSE(clients->lines_wait);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_right_of_each_request_on_each_socket_is_as_listed);
@@ -348,5 +468,10 @@ int main(void) {
     RUN_TEST(test_flood_of_estop_latches_once_and_leaves_the_black_box_alone);
     RUN_TEST(test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step);
     RUN_TEST(test_estop_of_a_watcher_that_goes_at_once_counts);
+    RUN_TEST(test_flood_of_newcomers_that_watch_is_let_in_one_by_one);
+    RUN_TEST(test_watcher_that_is_turned_away_is_told_in_the_log_once_until_one_has_come_in);
+    RUN_TEST(test_newcomer_for_whom_there_is_no_descriptor_is_let_in_when_there_is_one);
+    RUN_TEST(test_requests_in_one_breath_are_answered_in_their_order);
+    RUN_TEST(test_round_of_sending_ends_when_its_time_is_up);
     return UNITY_END();
 }

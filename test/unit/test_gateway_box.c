@@ -24,6 +24,12 @@ static gw_box_t box;
 static char folder[64];
 static bool open_box;
 
+/// Works, and leaves an errno, as any call may.
+int fsync(int fd) {
+    errno = (fd >= 0) ? ENOSPC : EBADF;
+    return (fd >= 0) ? 0 : -1;
+}
+
 void setUp(void) {
     gateway_config_default(&config);
     (void)snprintf(folder, sizeof folder, "/tmp/iwheel-box-XXXXXX");
@@ -42,7 +48,9 @@ void tearDown(void) {
     TEST_ASSERT_EQUAL(0, system(command));
 }
 
+/// As from a terminal, whatever started this program.
 static void start(void) {
+    (void)signal(SIGINT, SIG_DFL);
     const gw_box_wish_t wish = {.blackbox_s = config.record.blackbox_s,
                                 .directory = config.record.directory,
                                 .bus = config.bus.interface,
@@ -161,6 +169,37 @@ static void test_what_is_older_than_blackbox_s_is_left_out(void) {
     blackbox_ring_put(box.ring, &old);
     record("estop_line", 0);
     TEST_ASSERT_EQUAL(10, box.last.frames);
+}
+
+static void test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_from_the_start(void) {
+    static char text[8192];
+    start();
+    record("estop_line", 0);
+    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"from_start\":true"), text);
+    for (iw_time_us_t at_us = iw_clock_now_us() - GW_BOX_AFTER_US - 1000000U; blackbox_ring_is_whole(box.ring);) {
+        const blackbox_entry_t step = {.at_us = at_us, .kind = BLACKBOX_STEP};
+        blackbox_ring_put(box.ring, &step);
+    }
+    record("estop_line", 0);
+    read_file("stop-000002-estop_line.jsonl", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"from_start\":false"), text);
+}
+
+/// Standard streams and its end of the socket.
+static void test_writer_keeps_no_file_open(void) {
+    char path[64];
+    unsigned count = 0;
+    start();
+    record("estop_line", 0);
+    (void)snprintf(path, sizeof path, "/proc/%d/fd", (int)box.writer.pid);
+    DIR *list = opendir(path);
+    TEST_ASSERT_NOT_NULL(list);
+    for (const struct dirent *entry = readdir(list); entry != NULL; entry = readdir(list)) {
+        count += (entry->d_name[0] != '.') ? 1U : 0U;
+    }
+    (void)closedir(list);
+    TEST_ASSERT_EQUAL_UINT(4U, count);
 }
 
 static void test_next_recording_has_the_next_number_also_after_a_restart(void) {
@@ -334,6 +373,8 @@ int main(void) {
     RUN_TEST(test_stop_is_written_as_frames_events_and_configuration);
     RUN_TEST(test_what_happens_after_the_stop_is_written_too);
     RUN_TEST(test_what_is_older_than_blackbox_s_is_left_out);
+    RUN_TEST(test_recording_of_a_ring_that_went_round_does_not_say_it_has_all_from_the_start);
+    RUN_TEST(test_writer_keeps_no_file_open);
     RUN_TEST(test_next_recording_has_the_next_number_also_after_a_restart);
     RUN_TEST(test_many_stops_keep_the_newest_and_touch_nothing_else);
     RUN_TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop);

@@ -22,9 +22,15 @@
 
 static gateway_config_t config;
 static gw_listener_t listener;
-static gw_log_t quiet;
+static gw_log_t people; ///< What is written for them.
 static char folder[64];
 static char said[1024];
+
+static const char *in_folder(const char *name) {
+    static char path[96];
+    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
 
 void setUp(void) {
     gateway_config_default(&config);
@@ -34,13 +40,15 @@ void setUp(void) {
     (void)snprintf(config.northbound.group, sizeof config.northbound.group, "none");
     listener = (gw_listener_t){.fd = -1, .reserve_fd = -1, .folder = {.fd = -1}};
     memset(said, 0, sizeof said);
-    gw_log_open(&quiet, GW_LOG_ERROR);
+    gw_log_open(&people, GW_LOG_WARNING);
+    gw_log_close(&people);
+    people.fd = open(in_folder("log.txt"), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
 }
 
 void tearDown(void) {
     char command[96];
     gw_listener_close(&listener);
-    gw_log_close(&quiet);
+    gw_log_close(&people);
     (void)snprintf(command, sizeof command, "rm -rf %s", folder);
     TEST_ASSERT_EQUAL_INT(0, system(command));
 }
@@ -56,19 +64,21 @@ static int prepare(void) {
 
 static int make(void) {
     FILE *err = fmemopen(said, sizeof said, "w");
-    const int result = gw_listener_open(&listener, &quiet, err);
+    const int result = gw_listener_open(&listener, &people, err);
     (void)fclose(err);
     return result;
 }
 
-static const char *in_folder(const char *name) {
-    static char path[96];
-    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
-
 static void assert_said(const char *words) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, words), said);
+}
+
+static void assert_logged(const char *words) {
+    char text[512];
+    const ssize_t length = pread(people.fd, text, sizeof text - 1U, 0);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, (int)length);
+    text[length] = '\0';
+    TEST_ASSERT_TRUE_MESSAGE((words[0] == '\0') ? length == 0 : strstr(text, words) != NULL, text);
 }
 
 static void refused_to_prepare(int code, const char *why, const char *cure) {
@@ -162,6 +172,14 @@ static void test_socket_has_its_mode_and_group_and_the_process_stands_where_it_s
     TEST_ASSERT_EQUAL_INT(0, lstat(in_folder("gateway.sock"), &status));
     TEST_ASSERT_EQUAL_UINT32(0640, status.st_mode & 07777U);
     TEST_ASSERT_EQUAL_UINT32((geteuid() == 0) ? 1 : getegid(), status.st_gid);
+    assert_logged("");
+}
+
+static void test_group_that_cannot_have_the_socket_is_told_with_the_reason(void) {
+    (void)snprintf(config.northbound.group, sizeof config.northbound.group, "no-such-group");
+    TEST_ASSERT_EQUAL_INT(0, prepare());
+    TEST_ASSERT_EQUAL_INT(0, make());
+    assert_logged("there is no group no-such-group;");
 }
 
 /// Somebody's socket at our place; `fd` is -1 if nobody answers on it any more.
@@ -230,6 +248,7 @@ int main(void) {
     RUN_TEST(test_folder_behind_a_symbolic_link_is_refused);
     RUN_TEST(test_folder_that_is_turned_elsewhere_after_it_was_judged_gets_nothing);
     RUN_TEST(test_socket_has_its_mode_and_group_and_the_process_stands_where_it_stood);
+    RUN_TEST(test_group_that_cannot_have_the_socket_is_told_with_the_reason);
     RUN_TEST(test_socket_that_nobody_serves_is_replaced_and_one_that_is_served_is_not);
     RUN_TEST(test_socket_of_a_stranger_does_not_keep_root_from_starting_although_it_answers);
     RUN_TEST(test_link_and_plain_file_at_its_place_are_left_alone);

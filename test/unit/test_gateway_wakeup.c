@@ -3,6 +3,9 @@
 
 #include "iwheel_linux/clock.h"
 
+#include <poll.h>
+#include <signal.h>
+#include <stdbool.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -14,6 +17,8 @@
 #define ROOM     4
 
 static gw_wakeup_t wakeup;
+static bool asks_only; // What a long wait asks the kernel for, without waiting.
+static struct timespec asked_for;
 static int event_fd;
 
 void setUp(void) {
@@ -39,6 +44,18 @@ static int wait_until(iw_time_us_t until_us) {
 
 static iw_time_us_t in_us(iw_time_us_t span_us) {
     return iw_clock_now_us() + span_us;
+}
+
+/// The C library's, which waits; here the last wait only says for how long.
+int ppoll(struct pollfd *watched, nfds_t count, const struct timespec *span, const sigset_t *mask) {
+    (void)mask;
+    TEST_ASSERT_EQUAL_UINT(1U, (unsigned)count);
+    if (!asks_only) {
+        return poll(watched, count,
+                    (span == NULL) ? -1 : (int)(span->tv_sec * 1000 + (span->tv_nsec + 999999) / 1000000));
+    }
+    asked_for = *span;
+    return 0;
 }
 
 static void check_wakes_at_its_time_and_not_before(void) {
@@ -90,6 +107,15 @@ static void test_old_kernel_does_the_same_by_two_calls(void) {
     check_event_wakes_before_any_time();
 }
 
+static void test_wait_of_seconds_is_told_in_seconds_and_the_rest(void) {
+    wakeup.two_calls = true;
+    asks_only = true;
+    TEST_ASSERT_EQUAL_INT(0, wait_until(in_us(7800000U)));
+    asks_only = false;
+    TEST_ASSERT_EQUAL_INT(7, (int)asked_for.tv_sec);
+    TEST_ASSERT_INT_WITHIN(100000000, 700000000, (int)asked_for.tv_nsec);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_wakes_at_its_time_and_not_before);
@@ -97,5 +123,6 @@ int main(void) {
     RUN_TEST(test_time_that_is_past_only_looks);
     RUN_TEST(test_event_wakes_before_any_time);
     RUN_TEST(test_old_kernel_does_the_same_by_two_calls);
+    RUN_TEST(test_wait_of_seconds_is_told_in_seconds_and_the_rest);
     return UNITY_END();
 }

@@ -3,8 +3,11 @@
 #include "iwheel_linux/bus_link.h"
 
 #include "iwheel/bit_timing.h"
+#include "netlink.h"
 
 #include "unity.h"
+
+#include <stdio.h>
 
 void setUp(void) {}
 
@@ -65,6 +68,17 @@ static void test_same_looks_at_everything_the_interface_tells_and_nothing_else(v
 #undef DIFFERS
 }
 
+/// The loopback has a carrier, unless it is down: then the kernel gives no answer.
+static void test_carrier_is_what_the_kernel_tells_and_unknown_where_it_tells_nothing(void) {
+    char told[8] = "";
+    FILE *file = fopen("/sys/class/net/lo/carrier", "r");
+    TEST_ASSERT_NOT_NULL(file);
+    const bool known = fgets(told, sizeof told, file) != NULL;
+    (void)fclose(file);
+    TEST_ASSERT_EQUAL_INT(known ? told[0] - '0' : -1, iw_netdev_carrier("lo"));
+    TEST_ASSERT_EQUAL_INT(-1, iw_netdev_carrier("no-such-one"));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_timing_bands_around_the_wanted_sample_point);
@@ -72,5 +86,6 @@ int main(void) {
     RUN_TEST(test_timing_what_is_not_reported_is_unknown_but_what_is_reported_counts);
     RUN_TEST(test_timing_of_a_virtual_link_does_not_exist);
     RUN_TEST(test_same_looks_at_everything_the_interface_tells_and_nothing_else);
+    RUN_TEST(test_carrier_is_what_the_kernel_tells_and_unknown_where_it_tells_nothing);
     return UNITY_END();
 }

@@ -21,6 +21,7 @@ static unsigned count;
 static int refused;   // The option that the kernel does not take; 0: it takes all.
 static int come;      // What recvmmsg says: frames, or minus an errno.
 static ssize_t taken; // What send says; negative: minus an errno.
+static bool unknown;  // CAN, to this kernel.
 static int before;    // The errno that a call of before has left.
 static iw_socketcan_socket_t bus;
 
@@ -28,6 +29,10 @@ int socket(int domain, int type, int protocol) {
     TEST_ASSERT_EQUAL_INT(PF_CAN, domain);
     TEST_ASSERT_EQUAL_INT(CAN_RAW, protocol);
     TEST_ASSERT_EQUAL_INT(SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, type);
+    if (unknown) {
+        errno = EAFNOSUPPORT;
+        return -1;
+    }
     return open("/dev/null", O_RDWR | O_CLOEXEC);
 }
 
@@ -170,6 +175,24 @@ static void test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone(vo
     TEST_ASSERT_EQUAL_INT(-1, iw_socketcan_socket_send(&bus, &frame));
 }
 
+static void test_can_socket_that_the_kernel_does_not_know_is_told_as_such(void) {
+    unknown = true;
+    memset(&bus, 0xA5, sizeof bus);
+    const int error = iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS);
+    unknown = false;
+    TEST_ASSERT_EQUAL_INT(EAFNOSUPPORT, error);
+    TEST_ASSERT_EQUAL_INT(-1, bus.fd);
+    TEST_ASSERT_EQUAL_UINT(0, count);
+}
+
+static void test_can_socket_in_use_is_that_descriptor_and_a_hub_only_if_it_is_one(void) {
+    iw_socketcan_socket_use(&bus, 77, true);
+    TEST_ASSERT_EQUAL_INT(77, bus.fd);
+    TEST_ASSERT_TRUE(bus.is_hub);
+    TEST_ASSERT_EQUAL_INT(0, iw_socketcan_socket_open(&bus, 3, IW_SOCKETCAN_OURS));
+    TEST_ASSERT_FALSE(bus.is_hub);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_can_socket_of_ours_asks_for_errors_echoes_and_what_was_lost);
@@ -178,5 +201,7 @@ int main(void) {
     RUN_TEST(test_can_socket_tells_frames_nothing_and_an_interface_that_went);
     RUN_TEST(test_can_socket_that_is_emptied_keeps_nothing_and_is_not_known_to_be_drained);
     RUN_TEST(test_can_socket_frame_is_taken_refused_for_now_or_the_bus_is_gone);
+    RUN_TEST(test_can_socket_that_the_kernel_does_not_know_is_told_as_such);
+    RUN_TEST(test_can_socket_in_use_is_that_descriptor_and_a_hub_only_if_it_is_one);
     return UNITY_END();
 }

@@ -10,6 +10,7 @@
 #include <poll.h>
 #include <stdint.h>
 #include <sys/eventfd.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #define MS 1000U
@@ -191,6 +192,19 @@ static void test_estop_descriptor_wakes_for_the_line_that_is_open_now(void) {
     TEST_ASSERT_EQUAL_INT(1, poll(&wait, 1, 0));
 }
 
+static void test_estop_without_a_descriptor_for_waiting_is_refused(void) {
+    struct rlimit before;
+    tearDown();
+    TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
+    const struct rlimit none = {.rlim_cur = 0, .rlim_max = before.rlim_max};
+    const iw_estop_wish_t wish = {.name = "ESTOP"};
+    TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &none));
+    const int error = iw_gpio_estop_ops->open(&store, &wish);
+    TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
+    TEST_ASSERT_EQUAL_INT(EMFILE, error);
+    begin(false);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_estop_line_low_is_pressed_and_high_is_released);
@@ -202,5 +216,6 @@ int main(void) {
     RUN_TEST(test_estop_chip_that_is_gone_is_tried_again_once_in_a_while);
     RUN_TEST(test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can);
     RUN_TEST(test_estop_descriptor_wakes_for_the_line_that_is_open_now);
+    RUN_TEST(test_estop_without_a_descriptor_for_waiting_is_refused);
     return UNITY_END();
 }

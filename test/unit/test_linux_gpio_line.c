@@ -18,6 +18,9 @@ static iw_gpio_line_t line;
 int fake_gpio_take(unsigned room) {
     const int taken = (fake_gpio.edges < (int)room) ? fake_gpio.edges : (int)room;
     fake_gpio.reads++;
+    if (taken == 0 && fake_gpio.edges_error < 0) {
+        return 0;
+    }
     if (taken == 0) {
         errno = (fake_gpio.edges_error != 0) ? fake_gpio.edges_error : EAGAIN;
         return -1;
@@ -43,6 +46,7 @@ static void test_line_is_an_input_pulled_up_with_both_edges_and_does_not_wait(vo
     TEST_ASSERT_TRUE(fake_gpio.is_input);
     TEST_ASSERT_TRUE(fake_gpio.pulled_up);
     TEST_ASSERT_TRUE(fake_gpio.both_edges);
+    TEST_ASSERT_EQUAL_UINT(16U, fake_gpio.room);
     TEST_ASSERT_EQUAL_INT(fake_gpio.ends[0], line.fd);
     TEST_ASSERT_TRUE((fcntl(line.fd, F_GETFL) & O_NONBLOCK) != 0);
     TEST_ASSERT_EQUAL_UINT(FAKE_GPIO_OFFSET, fake_gpio.offset);
@@ -87,6 +91,9 @@ static void test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_i
     TEST_ASSERT_TRUE(iw_gpio_line_take_edges(&line) < 0); // Whatever there was before.
     fake_gpio.edges_error = EINTR;
     TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_take_edges(&line));
+    fake_gpio.edges = 5;
+    fake_gpio.edges_error = -1;
+    TEST_ASSERT_EQUAL_INT(5, iw_gpio_line_take_edges(&line));
 }
 
 static void test_line_that_cannot_be_had_says_why_and_leaves_nothing_open(void) {
@@ -104,6 +111,10 @@ static void test_line_that_cannot_be_had_says_why_and_leaves_nothing_open(void) 
     const iw_gpio_address_t nowhere = {.name = "gpiochip9", .offset = FAKE_GPIO_OFFSET, .by_offset = true};
     TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_line_open(&line, &nobody));
     TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_line_open(&line, &nowhere));
+    const iw_gpio_address_t no_such = {.name = FAKE_GPIO_CHIP, .offset = 99, .by_offset = true};
+    const int error = iw_gpio_line_open(&line, &no_such);
+    TEST_ASSERT_TRUE_MESSAGE(error == ENOENT || error == EINVAL, "as the library says it");
+    TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
 }
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "bus.h"
+
 #include "iwheel_linux/linux_hal.h"
 
 #include <unity.h>
@@ -13,7 +15,14 @@ static int fake_pressed(void *self, bool quiet) {
     return answer;
 }
 
-static const iw_estop_ops_t fake_ops = {.pressed = fake_pressed, .present = true};
+static iw_time_us_t estop_due_us;
+
+static iw_time_us_t fake_next_us(const void *self) {
+    (void)self;
+    return estop_due_us;
+}
+
+static const iw_estop_ops_t fake_ops = {.pressed = fake_pressed, .next_us = fake_next_us, .present = true};
 
 void setUp(void) {
     hal = (iw_linux_hal_t){.estop_ops = &fake_ops, .estop_last = -1};
@@ -57,6 +66,15 @@ static void test_last_answer_is_kept(void) {
     TEST_ASSERT_EQUAL_INT(1, hal.estop_last);
 }
 
+static void test_next_time_is_the_sooner_of_bus_and_estop(void) {
+    iw_bus_t *bus = (iw_bus_t *)(void *)&hal.bus;
+    bus->look_us = 200;
+    estop_due_us = 100;
+    TEST_ASSERT_EQUAL_UINT64(100, iw_linux_hal_next_us(&hal));
+    estop_due_us = 300;
+    TEST_ASSERT_EQUAL_UINT64(200, iw_linux_hal_next_us(&hal));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_estop_is_read_whole_by_whoever_does_not_wait);
@@ -64,5 +82,6 @@ int main(void) {
     RUN_TEST(test_estop_that_was_told_of_is_read_whole);
     RUN_TEST(test_wait_counts_for_one_look);
     RUN_TEST(test_last_answer_is_kept);
+    RUN_TEST(test_next_time_is_the_sooner_of_bus_and_estop);
     return UNITY_END();
 }

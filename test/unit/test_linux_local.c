@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -369,6 +370,90 @@ static void test_hal_without_an_estop_is_released_and_watches_nothing(void) {
     iw_linux_hal_close(&other);
 }
 
+static void lose_hub(void) {
+    iw_can_frame_t heard;
+    (void)close(hub);
+    TEST_ASSERT_TRUE(receive(&heard) < 0);
+}
+
+static void assert_waits_longer_and_longer(void) {
+    static const unsigned gaps_ms[] = {20, 40, 80, 160, 200, 200};
+    for (size_t i = 0; i < sizeof gaps_ms / sizeof gaps_ms[0]; i++) {
+        iw_bus_tend(&hal.bus, now_us);
+        TEST_ASSERT_EQUAL_UINT64(now_us + gaps_ms[i] * 1000U, iw_bus_next_us(&hal.bus));
+        now_us = iw_bus_next_us(&hal.bus);
+    }
+}
+
+static void come_back(void) {
+    bus_listener = listen_at(bus_name, SOCK_SEQPACKET);
+    iw_bus_tend(&hal.bus, now_us);
+    hub = accept(bus_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(hub >= 0);
+}
+
+static void test_local_hub_that_stays_away_is_tried_less_and_less_often_each_time_it_goes(void) {
+    for (unsigned time = 0; time < 2U; time++) {
+        (void)close(bus_listener);
+        lose_hub();
+        assert_waits_longer_and_longer();
+        come_back();
+    }
+}
+
+static void test_local_hub_that_was_never_there_is_tried_as_one_that_went(void) {
+    static iw_linux_hal_t other;
+    const char *culprit = NULL;
+    char name[96];
+    (void)snprintf(name, sizeof name, "%s.nobody", bus_name);
+    TEST_ASSERT_EQUAL_INT(0, iw_linux_hal_open(&other, name, &(iw_estop_wish_t){.name = "none"}, &culprit));
+    iw_bus_tend(&other.bus, now_us);
+    TEST_ASSERT_EQUAL_UINT64(now_us + 20000U, iw_bus_next_us(&other.bus));
+    iw_linux_hal_close(&other);
+}
+
+static void test_local_bus_off_lasts_until_the_hub_is_another(void) {
+    iw_can_frame_t heard;
+    tell(CAN_ERR_FLAG | CAN_ERR_BUSOFF, 8, 0, 0);
+    TEST_ASSERT_EQUAL_INT(0, receive(&heard));
+    for (unsigned ms = 0; ms < 5U; ms++) {
+        iw_bus_tend(&hal.bus, now_us += 1000U);
+        TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, bus());
+    }
+    (void)close(bus_listener);
+    lose_hub();
+    come_back();
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, bus());
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, bus());
+}
+
+static void test_local_without_a_descriptor_it_is_refused_and_later_tried_again_in_its_time(void) {
+    static iw_linux_hal_t other;
+    const char *culprit = NULL;
+    struct rlimit before;
+    lose_hub();
+    TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
+    const struct rlimit none = {.rlim_cur = 0, .rlim_max = before.rlim_max};
+    TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &none));
+    const int error = iw_linux_hal_open(&other, bus_name, &(iw_estop_wish_t){.name = "none"}, &culprit);
+    iw_bus_tend(&hal.bus, now_us);
+    const iw_time_us_t next_us = iw_bus_next_us(&hal.bus);
+    TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
+    TEST_ASSERT_EQUAL_INT(EMFILE, error);
+    TEST_ASSERT_EQUAL_UINT64(now_us + 20000U, next_us);
+    now_us = next_us;
+    iw_bus_tend(&hal.bus, now_us);
+    hub = accept(bus_listener, NULL, NULL);
+    TEST_ASSERT_TRUE(hub >= 0);
+}
+
+static void test_local_bus_has_no_timing_and_an_echo_that_proves(void) {
+    const iw_bus_link_t *link = iw_linux_hal_link(&hal);
+    TEST_ASSERT_EQUAL_INT(IW_LINK_LOCAL, link->presence);
+    TEST_ASSERT_TRUE(link->is_virtual);
+    TEST_ASSERT_TRUE(link->echo_proven);
+}
+
 int main(void) {
     if (mkdtemp(folder) == NULL) {
         return 1;
@@ -377,6 +462,11 @@ int main(void) {
     (void)snprintf(estop_name, sizeof estop_name, "unix:%s/estop", folder);
     UNITY_BEGIN();
     RUN_TEST(test_local_frame_is_sent_as_it_is_and_its_echo_is_known_by_its_mark);
+    RUN_TEST(test_local_bus_has_no_timing_and_an_echo_that_proves);
+    RUN_TEST(test_local_hub_that_stays_away_is_tried_less_and_less_often_each_time_it_goes);
+    RUN_TEST(test_local_hub_that_was_never_there_is_tried_as_one_that_went);
+    RUN_TEST(test_local_bus_off_lasts_until_the_hub_is_another);
+    RUN_TEST(test_local_without_a_descriptor_it_is_refused_and_later_tried_again_in_its_time);
     RUN_TEST(test_local_every_frame_of_several_batches_comes_in_order);
     RUN_TEST(test_local_formats_are_kept_apart);
     RUN_TEST(test_local_messages_of_another_size_are_left_out);

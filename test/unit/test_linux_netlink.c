@@ -1,21 +1,94 @@
 // SPDX-License-Identifier: MIT
-// What the kernel's description of an interface is read as.
+// What the kernel's description of an interface is read as, and how it is asked: the kernel's side is this file's own.
 #include "netlink.h"
 
 #include "unity.h"
 
+#include <errno.h>
 #include <libmnl/libmnl.h>
 #include <linux/can/netlink.h>
 #include <linux/if.h>
 #include <linux/if_arp.h>
 #include <linux/if_link.h>
 #include <linux/rtnetlink.h>
+#include <signal.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 static _Alignas(struct nlmsghdr) uint8_t buffer[4096];
 static struct nlmsghdr *message;
 static struct ifinfomsg *interface;
 static iw_netlink_reading_t reading;
+
+/// The kernel behind the socket; shared with the process that restarts a link.
+typedef struct {
+    unsigned opened;
+    unsigned closed;
+    unsigned groups;
+    pid_t port;
+    unsigned asked;    ///< Requests.
+    unsigned flags[8]; ///< Of each that sets an interface up or down.
+    int answer[8];     ///< To each of them: an errno.
+    unsigned slept;
+    uint32_t sequence; ///< Of the last.
+    bool bind_fails;
+    bool stale; ///< An answer to something else comes first.
+} kernel_t;
+
+static kernel_t *kernel;
+
+struct mnl_socket *mnl_socket_open2(int bus, int flags) {
+    TEST_ASSERT_EQUAL_INT(NETLINK_ROUTE, bus);
+    TEST_ASSERT_TRUE((flags & SOCK_CLOEXEC) != 0);
+    kernel->opened++;
+    return (struct mnl_socket *)(void *)kernel;
+}
+
+int mnl_socket_bind(struct mnl_socket *socket, unsigned groups, pid_t port) {
+    (void)socket;
+    kernel->groups = groups;
+    kernel->port = port;
+    errno = EADDRINUSE;
+    return kernel->bind_fails ? -1 : 0;
+}
+
+int mnl_socket_close(struct mnl_socket *socket) {
+    TEST_ASSERT_EQUAL_PTR(kernel, socket);
+    kernel->closed++;
+    errno = EBADF; // As any call may.
+    return 0;
+}
+
+ssize_t mnl_socket_sendto(const struct mnl_socket *socket, const void *request, size_t size) {
+    const struct nlmsghdr *header = (const struct nlmsghdr *)request;
+    (void)socket;
+    if (header->nlmsg_type == RTM_NEWLINK && kernel->asked < 8U) {
+        kernel->flags[kernel->asked] = ((const struct ifinfomsg *)mnl_nlmsg_get_payload(header))->ifi_flags;
+    }
+    kernel->sequence = header->nlmsg_seq;
+    kernel->asked++;
+    return (ssize_t)size;
+}
+
+ssize_t mnl_socket_recvfrom(const struct mnl_socket *socket, void *out, size_t size) {
+    struct nlmsghdr *reply = mnl_nlmsg_put_header(out);
+    (void)socket;
+    (void)size;
+    reply->nlmsg_type = NLMSG_ERROR;
+    reply->nlmsg_seq = kernel->sequence - (kernel->stale ? 1U : 0U);
+    struct nlmsgerr *verdict = (struct nlmsgerr *)mnl_nlmsg_put_extra_header(reply, sizeof *verdict);
+    verdict->error = kernel->stale ? -ENOSYS : -kernel->answer[(kernel->asked - 1U) % 8U];
+    kernel->stale = false;
+    return (ssize_t)reply->nlmsg_len;
+}
+
+unsigned sleep(unsigned seconds) {
+    kernel->slept += seconds;
+    return 0;
+}
 
 static void begin(unsigned flags) {
     memset(buffer, 0, sizeof buffer);
@@ -52,6 +125,7 @@ static void add_controller(const controller_t *controller) {
 }
 
 void setUp(void) {
+    memset(kernel, 0, sizeof *kernel);
     memset(&reading, 0xA5, sizeof reading);
 }
 
@@ -185,7 +259,78 @@ static void test_attributes_cut_short_anywhere_are_survived(void) {
     }
 }
 
+static void test_socket_is_bound_to_no_group_and_closed_once(void) {
+    iw_netlink_t netlink;
+    TEST_ASSERT_EQUAL_INT(0, iw_netlink_open(&netlink));
+    TEST_ASSERT_EQUAL_UINT(0, kernel->groups);
+    TEST_ASSERT_EQUAL_INT(MNL_SOCKET_AUTOPID, kernel->port);
+    iw_netlink_close(&netlink);
+    iw_netlink_close(&netlink);
+    TEST_ASSERT_EQUAL_UINT(1, kernel->closed);
+    kernel->bind_fails = true;
+    TEST_ASSERT_EQUAL_INT(EADDRINUSE, iw_netlink_open(&netlink));
+    TEST_ASSERT_EQUAL_UINT(2, kernel->opened);
+    TEST_ASSERT_EQUAL_UINT(2, kernel->closed);
+}
+
+static void test_request_has_the_answer_that_is_to_it(void) {
+    iw_netlink_t netlink;
+    TEST_ASSERT_EQUAL_INT(0, iw_netlink_open(&netlink));
+    kernel->answer[0] = EPERM;
+    kernel->stale = true;
+    TEST_ASSERT_EQUAL_INT(EPERM, iw_netlink_set_up(&netlink, 3, true));
+    TEST_ASSERT_EQUAL_INT(0, iw_netlink_set_up(&netlink, 3, false));
+    TEST_ASSERT_EQUAL_UINT(IFF_UP, kernel->flags[0]);
+    TEST_ASSERT_EQUAL_UINT(0, kernel->flags[1]);
+    iw_netlink_close(&netlink);
+}
+
+/// Waits for the process that restarts a link; what it ended with.
+static int restarted(void) {
+    pid_t process;
+    int result = IW_NETLINK_RESTART_RUNNING;
+    TEST_ASSERT_EQUAL_INT(0, iw_netlink_restart_start(3, &process));
+    siginfo_t ended;
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)process, &ended, WEXITED | WNOWAIT));
+    result = iw_netlink_restart_poll(process);
+    return result;
+}
+
+static void test_restart_takes_the_link_down_and_up_and_tries_up_again_until_it_is(void) {
+    kernel->answer[1] = kernel->answer[2] = EBUSY;
+    TEST_ASSERT_EQUAL_INT(0, restarted());
+    TEST_ASSERT_EQUAL_UINT(4, kernel->asked);
+    TEST_ASSERT_EQUAL_UINT(0, kernel->flags[0]);
+    TEST_ASSERT_EQUAL_UINT(IFF_UP, kernel->flags[3]);
+    TEST_ASSERT_GREATER_THAN_UINT(1, kernel->slept);
+}
+
+static void test_restart_that_is_not_allowed_or_of_a_link_that_is_gone_says_so_at_once(void) {
+    kernel->answer[0] = EPERM;
+    TEST_ASSERT_EQUAL_INT(EPERM, restarted());
+    TEST_ASSERT_EQUAL_UINT(1, kernel->asked);
+    setUp();
+    kernel->answer[1] = ENODEV;
+    TEST_ASSERT_EQUAL_INT(ENODEV, restarted());
+    TEST_ASSERT_EQUAL_UINT(2, kernel->asked);
+}
+
+static void test_restart_that_was_killed_has_failed(void) {
+    const pid_t process = fork();
+    siginfo_t ended;
+    if (process == 0) {
+        (void)raise(SIGKILL);
+    }
+    TEST_ASSERT_EQUAL_INT(0, waitid(P_PID, (id_t)process, &ended, WEXITED | WNOWAIT));
+    TEST_ASSERT_EQUAL_INT(EIO, iw_netlink_restart_poll(process));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, iw_netlink_restart_poll(process), "somebody else has taken its status");
+}
+
 int main(void) {
+    kernel = (kernel_t *)mmap(NULL, sizeof *kernel, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (kernel == MAP_FAILED) {
+        return 1;
+    }
     UNITY_BEGIN();
     RUN_TEST(test_controller_tells_all_it_is_asked_for);
     RUN_TEST(test_controller_states);
@@ -198,5 +343,10 @@ int main(void) {
     RUN_TEST(test_a_kind_that_only_begins_like_a_controller_is_none);
     RUN_TEST(test_messages_that_are_none_are_refused);
     RUN_TEST(test_attributes_cut_short_anywhere_are_survived);
+    RUN_TEST(test_socket_is_bound_to_no_group_and_closed_once);
+    RUN_TEST(test_request_has_the_answer_that_is_to_it);
+    RUN_TEST(test_restart_takes_the_link_down_and_up_and_tries_up_again_until_it_is);
+    RUN_TEST(test_restart_that_is_not_allowed_or_of_a_link_that_is_gone_says_so_at_once);
+    RUN_TEST(test_restart_that_was_killed_has_failed);
     return UNITY_END();
 }

@@ -7,6 +7,7 @@
 #include "unity.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <linux/can/error.h>
 #include <sys/socket.h>
 #include <sys/types.h>
@@ -15,12 +16,17 @@
 static const iw_can_frame_t setpoint = {.id = 266, .dlc = 5};
 static iw_backend_store_t store;
 static iw_time_us_t now_us;
+static bool no_can; ///< This kernel.
 
 /// `socket` is asked once, for looking at interfaces; this machine need not know CAN.
 int socket(int domain, int type, int protocol) {
     (void)domain;
     (void)type;
     (void)protocol;
+    if (no_can) {
+        errno = EAFNOSUPPORT;
+        return -1;
+    }
     return dup(STDERR_FILENO);
 }
 
@@ -116,6 +122,10 @@ static void test_restart_tells_of_a_loss_that_was_not_heard(void) {
 static void test_bus_off_that_lasts_is_told_until_the_controller_is_back(void) {
     fake_interface_put_error(CAN_ERR_BUSOFF, 0, 0);
     fake_interface.carrier = 0;
+    wait_ms(20);
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iw_bus_next_us(&store), "heard");
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(now_us + 200000U, iw_bus_next_us(&store), "seen");
     for (unsigned i = 0; i < 100U; i++) {
         wait_ms(20);
         TEST_ASSERT_EQUAL_INT(IW_BUS_OFF, state());
@@ -290,6 +300,72 @@ static void test_down_interface_is_looked_at_no_more_often_than_its_news_and_its
     TEST_ASSERT_EQUAL_UINT(before + 1U, fake_interface.readings);
 }
 
+static void test_interface_that_stays_down_is_no_news(void) {
+    fake_interface.ours.error = ENETDOWN;
+    fake_interface.presence = IW_LINK_DOWN;
+    wait_ms(1);
+    wait_ms(200);
+    const uint32_t changes = link_now()->changes;
+    wait_ms(200);
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_UINT32(changes, link_now()->changes);
+}
+
+static unsigned descriptors(void) {
+    unsigned count = 0;
+    for (int fd = 0; fd < 256; fd++) {
+        count += (fcntl(fd, F_GETFD) >= 0) ? 1U : 0U;
+    }
+    return count;
+}
+
+static void assert_not_opened(int error) {
+    TEST_ASSERT_EQUAL_INT(error, iw_bus_open(&store, "can0"));
+    no_can = false;
+    fake_interface.open_error = 0;
+    fake_interface.events_dead = false;
+}
+
+static void test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open(void) {
+    iw_bus_close(&store);
+    const unsigned before = descriptors();
+    no_can = true;
+    assert_not_opened(EAFNOSUPPORT);
+    fake_interface.open_error = EPROTONOSUPPORT;
+    assert_not_opened(EPROTONOSUPPORT);
+    fake_interface.events_dead = true;
+    assert_not_opened(EBADF);
+    TEST_ASSERT_EQUAL_UINT(before, descriptors());
+    setUp();
+    TEST_ASSERT_GREATER_THAN_UINT(before, descriptors());
+    iw_bus_close(&store);
+    TEST_ASSERT_EQUAL_UINT(before, descriptors());
+    setUp();
+}
+
+static void test_interface_that_is_down_at_start_is_told_so_though_netlink_says_nothing(void) {
+    iw_bus_close(&store);
+    fake_interface.presence = IW_LINK_DOWN;
+    fake_interface.netlink_fails = true;
+    TEST_ASSERT_EQUAL_INT(0, iw_bus_open(&store, "can0"));
+    TEST_ASSERT_EQUAL_INT(IW_LINK_DOWN, link_now()->presence);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+}
+
+static void test_interface_without_sockets_is_down_until_it_has_some(void) {
+    iw_can_frame_t frame;
+    iw_bus_close(&store);
+    fake_interface.sockets_fail = true;
+    TEST_ASSERT_EQUAL_INT(0, iw_bus_open(&store, "can0"));
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_DOWN, state());
+    TEST_ASSERT_EQUAL_INT(-1, receive(&frame));
+    TEST_ASSERT_EQUAL_INT(-1, send_setpoint());
+    fake_interface.sockets_fail = false;
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_INT(IW_BUS_ACTIVE, state());
+}
+
 static void test_full_queue_is_no_loss(void) {
     fake_interface.send_result = 0;
     TEST_ASSERT_EQUAL_INT(0, send_setpoint());
@@ -302,12 +378,47 @@ static void test_purge_restarts_the_link_once_and_tells_how_it_ended(void) {
     TEST_ASSERT_EQUAL_UINT(1, fake_interface.restarts);
     TEST_ASSERT_EQUAL_INT(3, fake_interface.restarted);
     const uint32_t changes = link_now()->changes;
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_NONE, link_now()->purge);
     fake_interface.restart_result = 0;
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, link_now()->purge);
     TEST_ASSERT_TRUE(link_now()->changes != changes);
     (void)iw_bus_purge(&store);
     TEST_ASSERT_EQUAL_UINT(2, fake_interface.restarts);
+}
+
+static void test_purge_is_remembered_over_a_reading_that_brings_something_else(void) {
+    (void)iw_bus_purge(&store);
+    fake_interface.restart_result = 0;
+    wait_ms(1);
+    fake_interface.ours.error = ENETDOWN;
+    wait_ms(1);
+    fake_interface.link.restart_ms = 77;
+    wait_ms(200);
+    TEST_ASSERT_EQUAL_UINT32(77, link_now()->restart_ms);
+    TEST_ASSERT_EQUAL_INT(IW_LINK_PURGE_DONE, link_now()->purge);
+}
+
+static void test_load_counts_the_frames_of_ours_and_of_others(void) {
+    wait_ms(1000);
+    TEST_ASSERT_EQUAL_UINT32(0, link_now()->load_permille);
+    for (unsigned i = 0; i < 20U; i++) {
+        fake_interface_put(&fake_interface.ours, 256, 8, 0);
+        wait_ms(10);
+        (void)drain();
+    }
+    wait_ms(800);
+    const uint32_t ours = link_now()->load_permille;
+    TEST_ASSERT_GREATER_THAN_UINT32(1, ours);
+    for (unsigned i = 0; i < 20U; i++) {
+        fake_interface_put(&fake_interface.ours, 256, 8, 0);
+        fake_interface_put(&fake_interface.others, 0x700, 8, 0);
+        wait_ms(10);
+        (void)drain();
+    }
+    wait_ms(800);
+    TEST_ASSERT_EQUAL_UINT32(2U * ours, link_now()->load_permille);
 }
 
 static void test_purge_that_was_not_allowed_is_not_tried_again(void) {
@@ -365,6 +476,13 @@ static void test_other_ids_come_after_ours_and_not_right_after_a_setpoint(void) 
     wait_ms(1);
     TEST_ASSERT_EQUAL_INT(1, receive(&frame));
     TEST_ASSERT_EQUAL_HEX32(0x701, frame.id);
+    wait_ms(20);
+    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    fake_interface_put(&fake_interface.others, 0x702, 4, 0);
+    wait_ms(9);
+    TEST_ASSERT_EQUAL_INT(0, receive(&frame));
+    wait_ms(1);
+    TEST_ASSERT_EQUAL_INT(1, receive(&frame));
 }
 
 static void test_echo_is_told_by_the_mark_of_the_message(void) {
@@ -430,8 +548,14 @@ int main(void) {
     RUN_TEST(test_link_that_comes_up_bus_off_is_bus_off_until_the_carrier_says_otherwise);
     RUN_TEST(test_netlink_that_does_not_answer_leaves_an_interface_that_is_up);
     RUN_TEST(test_down_interface_is_looked_at_no_more_often_than_its_news_and_its_period);
+    RUN_TEST(test_interface_that_stays_down_is_no_news);
+    RUN_TEST(test_bus_that_cannot_be_opened_says_why_and_keeps_nothing_open);
+    RUN_TEST(test_interface_that_is_down_at_start_is_told_so_though_netlink_says_nothing);
+    RUN_TEST(test_interface_without_sockets_is_down_until_it_has_some);
     RUN_TEST(test_full_queue_is_no_loss);
     RUN_TEST(test_purge_restarts_the_link_once_and_tells_how_it_ended);
+    RUN_TEST(test_purge_is_remembered_over_a_reading_that_brings_something_else);
+    RUN_TEST(test_load_counts_the_frames_of_ours_and_of_others);
     RUN_TEST(test_purge_that_was_not_allowed_is_not_tried_again);
     RUN_TEST(test_purge_where_the_echo_proves_nothing_leaves_the_link_alone);
     RUN_TEST(test_flood_of_errors_takes_a_bounded_part_of_a_step);

@@ -141,6 +141,36 @@ static void test_round_of_sending_reaches_everybody_in_turn(void) {
     }
 }
 
+/// What waits is moved to the front again and again.
+static void test_lines_come_whole_and_in_order_to_one_who_reads_a_little_at_a_time(void) {
+    gw_client_t *client = &daemon_->clients.client[0];
+    char line[64];
+    char expected[sizeof line];
+    size_t length = 0;
+    unsigned told = 0;
+    unsigned read_back = 0;
+    while (read_back < 20000U) {
+        while (client->out_end - client->out_start < GW_OUT_SIZE - sizeof line) {
+            (void)snprintf(line, sizeof line, "{\"line\":%u,\"and\":\"something to fill it\"}\n", told++);
+            gw_client_reply(client, line, strlen(line));
+        }
+        TEST_ASSERT_FALSE(client->failed);
+        gw_client_flush(client);
+        const ssize_t count = recv(peer[0], &drained[length], 4999U, MSG_DONTWAIT);
+        TEST_ASSERT_GREATER_THAN_INT(0, (int)count);
+        length += (size_t)count;
+        for (char *end = (char *)memchr(drained, '\n', length); end != NULL;
+             end = (char *)memchr(drained, '\n', length)) {
+            const size_t whole = (size_t)(end - drained) + 1U;
+            (void)snprintf(expected, sizeof expected, "{\"line\":%u,\"and\":\"something to fill it\"}\n", read_back++);
+            TEST_ASSERT_EQUAL_size_t(strlen(expected), whole);
+            TEST_ASSERT_EQUAL_MEMORY(expected, drained, whole);
+            length -= whole;
+            memmove(drained, &drained[whole], length);
+        }
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_round_serves_no_crowd_at_once_and_says_that_somebody_waits);
@@ -148,5 +178,6 @@ int main(void) {
     RUN_TEST(test_round_begins_with_the_holder_of_the_lease);
     RUN_TEST(test_round_a_client_that_was_not_reached_is_not_caught_up);
     RUN_TEST(test_round_of_sending_reaches_everybody_in_turn);
+    RUN_TEST(test_lines_come_whole_and_in_order_to_one_who_reads_a_little_at_a_time);
     return UNITY_END();
 }

@@ -35,8 +35,9 @@ const char *gw_client_line(const gw_client_t *self, size_t *out_length) {
 }
 
 void gw_client_drop_line(gw_client_t *self, size_t length) {
-    self->in_length -= length + 1U;
-    memmove(self->in, &self->in[length + 1U], self->in_length);
+    const size_t left = self->in_length - (length + 1U);
+    memmove(self->in, &self->in[length + 1U], left);
+    self->in_length = left;
 }
 
 void gw_client_note_caught_up(gw_client_t *self, iw_time_us_t then_us) {

@@ -102,7 +102,6 @@ static bool accept_one(gw_clients_t *self, gw_listener_t *listener) {
         welcome(self, client, fd);
     } else {
         turn_away(self, listener, fd);
-        gw_listener_restore(listener);
     }
     return true;
 }

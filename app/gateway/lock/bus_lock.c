@@ -11,7 +11,9 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-#define KEY "@iwheel-gateway/"
+/// Of a process id, with its newline: any number of 32 bits has fewer.
+#define DIGITS 15U
+#define KEY    "@iwheel-gateway/"
 
 static const char local_prefix[] = "unix:";
 
@@ -73,17 +75,15 @@ static bool is_ours(gw_bus_lock_t *self, int fd) {
 
 /// Who holds it has written its number into it.
 static void read_holder(gw_bus_lock_t *self, int fd) {
-    char digits[16] = "";
-    struct stat status = {.st_uid = (uid_t)-1};
-    (void)!pread(fd, digits, sizeof digits - 1U, 0);
-    (void)fstat(fd, &status);
+    char digits[DIGITS + 1] = "";
+    (void)!pread(fd, digits, DIGITS, 0);
     self->holder = (gw_holder_t){.uid = (uid_t)-1, .pid = (pid_t)strtol(digits, NULL, 10)};
     (void)snprintf(self->holder.name, sizeof self->holder.name, "%.*s", (int)GW_BUS_NAME_SIZE, self->path);
 }
 
 /// The service must be able to open what root has made.
 static void sign(const gw_bus_lock_t *self, int fd) {
-    char digits[16];
+    char digits[DIGITS + 1];
     const int length = snprintf(digits, sizeof digits, "%ld\n", (long)getpid());
     if (self->names.owners.own == 0U && self->names.owners.service != 0U) {
         (void)!fchown(fd, self->names.owners.service, (gid_t)-1);

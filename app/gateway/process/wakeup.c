@@ -47,9 +47,13 @@ void gw_wakeup_close(gw_wakeup_t *self) {
     (void)close(self->fd);
 }
 
-static int wait_by_two_calls(int fd, struct epoll_event *events, int room, const struct timespec *span) {
+static int wait_by_two_calls(int fd, struct epoll_event *events, int room, const struct __kernel_timespec *span) {
     struct pollfd watched = {.fd = fd, .events = POLLIN};
-    return (ppoll(&watched, 1U, span, NULL) < 0) ? -1 : epoll_wait(fd, events, room, 0);
+    struct timespec same = {0};
+    if (span != NULL) {
+        same = (struct timespec){.tv_sec = (time_t)span->tv_sec, .tv_nsec = (long)span->tv_nsec};
+    }
+    return (ppoll(&watched, 1U, (span != NULL) ? &same : NULL, NULL) < 0) ? -1 : epoll_wait(fd, events, room, 0);
 }
 
 int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t now_us,
@@ -57,12 +61,8 @@ int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room
     const bool known = now_us != 0U || until_us == 0U || until_us == IW_NEVER;
     const iw_time_us_t from_us = known ? now_us : iw_clock_now_us();
     const iw_time_us_t span_us = (until_us > from_us) ? until_us - from_us : 0U;
-    if (self->two_calls) {
-        const struct timespec span = {.tv_sec = (time_t)(span_us / US_PER_S),
-                                      .tv_nsec = (long)(span_us % US_PER_S) * NS_PER_US};
-        return wait_by_two_calls(self->fd, events, room, (until_us == IW_NEVER) ? NULL : &span);
-    }
     const struct __kernel_timespec span = {.tv_sec = (int64_t)(span_us / US_PER_S),
                                            .tv_nsec = (int64_t)(span_us % US_PER_S) * NS_PER_US};
-    return wait_with_deadline(self->fd, events, room, (until_us == IW_NEVER) ? NULL : &span);
+    const struct __kernel_timespec *limit = (until_us == IW_NEVER) ? NULL : &span;
+    return (self->two_calls ? wait_by_two_calls : wait_with_deadline)(self->fd, events, room, limit);
 }

@@ -14,10 +14,9 @@
 
 typedef struct {
     iw_unix_link_t link;
-    bool known;    ///< The button has told its level on this connection.
-    bool level;    ///< Pressed.
-    bool edge;     ///< It changed since the last call of `pressed`.
-    bool was_lost; ///< The connection broke since then.
+    bool known; ///< The button has told its level on this connection.
+    bool level; ///< Pressed.
+    bool edge;  ///< It changed since the last call of `pressed`.
 } unix_estop_t;
 
 IW_STATIC_ASSERT(sizeof(unix_estop_t) <= sizeof(iw_backend_store_t), unix_estop_fits);
@@ -47,7 +46,7 @@ static void take_levels(unix_estop_t *button, const char *levels, size_t count) 
     }
 }
 
-/// A broken connection latches even if it is back before the next look: presses may have been missed meanwhile.
+/// A broken connection is noticed here and nowhere else: this look finds it unreadable, however soon it is back.
 static void listen_to(unix_estop_t *button) {
     char levels[BURST_MAX];
     if (!iw_unix_link_is_up(&button->link)) {
@@ -59,7 +58,6 @@ static void listen_to(unix_estop_t *button) {
     } else if (count == 0 || (errno != EAGAIN && errno != EINTR)) {
         iw_unix_link_lose(&button->link);
         button->known = false;
-        button->was_lost = true;
     }
 }
 
@@ -80,11 +78,9 @@ static int button_pressed(void *self, bool quiet) {
     unix_estop_t *button = (unix_estop_t *)self;
     (void)quiet; // Level and edges come by the same messages, so they are always read.
     listen_to(button);
-    const bool unreadable = button->was_lost || !button->known;
     const bool pressed = button->edge || button->level;
     button->edge = false;
-    button->was_lost = false;
-    return unreadable ? -1 : (int)pressed;
+    return button->known ? (int)pressed : -1;
 }
 
 static int button_trouble(const void *self) {

@@ -20,7 +20,6 @@ typedef struct {
     int trouble; ///< Why it is closed.
     int watch_fd;
     bool active_high;
-    bool was_lost; ///< The line was lost, and `gpio_pressed` has not reported that yet.
 } gpio_estop_t;
 
 IW_STATIC_ASSERT(sizeof(gpio_estop_t) <= sizeof(iw_backend_store_t), gpio_estop_fits);
@@ -33,7 +32,6 @@ static bool is_open(const gpio_estop_t *estop) {
 static void lose(gpio_estop_t *estop, int trouble) {
     iw_gpio_line_close(&estop->line);
     estop->trouble = trouble;
-    estop->was_lost = true;
     estop->retry_us = estop->now_us + RETRY_US;
 }
 
@@ -108,12 +106,11 @@ static void look(gpio_estop_t *estop, bool quiet) {
     iw_gpio_release_see(&estop->release, estop->now_us, (level == 1) == estop->active_high, edges > 0);
 }
 
+/// A line is lost in such a look or before the first: it is told, however soon it is back.
 static int gpio_pressed(void *self, bool quiet) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
     look(estop, quiet);
-    const bool unreadable = estop->was_lost || !is_open(estop);
-    estop->was_lost = false;
-    if (unreadable) {
+    if (!is_open(estop)) {
         return -1;
     }
     return iw_gpio_release_take_pressed(&estop->release, estop->now_us) ? 1 : 0;

@@ -26,6 +26,7 @@ struct gpiod_chip *gpiod_chip_open_by_name(const char *name) {
 void gpiod_chip_close(struct gpiod_chip *chip) {
     (void)chip;
     fake_gpio.open--;
+    errno = EACCES; // As any call may.
 }
 
 struct gpiod_line *gpiod_chip_get_line(struct gpiod_chip *chip, unsigned offset) {
@@ -53,6 +54,7 @@ void gpiod_line_close_chip(struct gpiod_line *line) {
 static int give(int flags, bool both) {
     fake_gpio.is_input = true;
     fake_gpio.both_edges = both;
+    fake_gpio.room = 16U; // It cannot be chosen.
     fake_gpio.pulled_up = (flags & GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP) != 0;
     errno = fake_gpio.busy_error;
     if (fake_gpio.busy_error != 0 || pipe(fake_gpio.ends) != 0) {

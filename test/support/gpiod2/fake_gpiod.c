@@ -11,6 +11,7 @@ static char one;
 static struct dirent entry;
 static unsigned listed;
 static unsigned given;
+static unsigned wished_room;
 
 /// /dev has two chips; the line is on the second.
 DIR *opendir(const char *name) {
@@ -54,6 +55,7 @@ struct gpiod_chip *gpiod_chip_open(const char *path) {
 void gpiod_chip_close(struct gpiod_chip *chip) {
     (void)chip;
     fake_gpio.open--;
+    errno = EACCES; // As any call may.
 }
 
 int gpiod_chip_get_line_offset_from_name(struct gpiod_chip *chip, const char *name) {
@@ -71,6 +73,7 @@ struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, str
         return NULL;
     }
     fake_gpio.requested++;
+    fake_gpio.room = wished_room;
     return (struct gpiod_line_request *)(void *)&one;
 }
 
@@ -81,6 +84,7 @@ struct gpiod_line_settings *gpiod_line_settings_new(void) {
 
 void gpiod_line_settings_free(struct gpiod_line_settings *settings) {
     given -= (settings != NULL) ? 1U : 0U;
+    errno = EACCES; // As any call may.
 }
 
 int gpiod_line_settings_set_direction(struct gpiod_line_settings *settings, enum gpiod_line_direction direction) {
@@ -120,6 +124,7 @@ int gpiod_line_config_add_line_settings(struct gpiod_line_config *lines, const u
 
 struct gpiod_request_config *gpiod_request_config_new(void) {
     given++;
+    wished_room = 0;
     return (struct gpiod_request_config *)(void *)&one;
 }
 
@@ -134,7 +139,7 @@ void gpiod_request_config_set_consumer(struct gpiod_request_config *wish, const 
 
 void gpiod_request_config_set_event_buffer_size(struct gpiod_request_config *wish, size_t size) {
     (void)wish;
-    (void)size;
+    wished_room = (unsigned)size;
 }
 
 void gpiod_line_request_release(struct gpiod_line_request *line) {

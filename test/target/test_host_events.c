@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: MIT
+// What the image's host code tells of: events, stops, zeros, what it keeps, and whom it obeys.
+#include "host_rig.inc"
+
+/// The relay is there all the time.
+static void pass(uint32_t span_ms) {
+    for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(100);
+    }
+}
+
+static void forget(void) {
+    all[0] = '\0';
+    all_length = 0;
+}
+
+static unsigned count_of(const char *words) {
+    unsigned count = 0;
+    for (const char *at = strstr(all, words); at != NULL; at = strstr(at + 1, words)) {
+        count++;
+    }
+    return count;
+}
+
+static void watch_everything(void) {
+    say(1, "{\"cmd\":\"watch\",\"topics\":[\"force\",\"stop\",\"bus\",\"estop\",\"lease\"],\"rate_hz\":1}");
+    pass(100);
+    forget();
+}
+
+static void disarm(void) {
+    say(1, "{\"cmd\":\"stop\"}");
+    pass(2500);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+}
+
+static void test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once(void) {
+    disarm();
+    watch_everything();
+    estop_high = true;
+    pass(200);
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"estop\",\"t_us\""));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"state\":\"pressed\"}"), all);
+    iw_snapshot_t seen = gateway_rig_look(&rig);
+    seen.still_moving++;
+    seen.present |= 1U << IW_CAUSE_ESTOP_LINE;
+    iw_observe(&host, &seen);
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"still_moving\",\"present\":true"));
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"cause\":\"estop_line\",\"present\":true"));
+    TEST_ASSERT_EQUAL_UINT(2, count_of("\"event\":\"fault\""));
+}
+
+static void test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others(void) {
+    char line[IWN_LINE_BOARD_MAX];
+    watch_everything();
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    say(2, "{\"cmd\":\"stop\"}");
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"cause\":\"client_stop\""), all);
+    answer[0] = '\0';
+    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, t_us, line));
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "client 2"), answer);
+    forget();
+    say(2, "{\"cmd\":\"estop\",\"reason\":\"test\"}");
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"cause\":\"estop_software\""), all);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "client 2"), all);
+    TEST_ASSERT_NULL_MESSAGE(strstr(all, "(gone)"), all);
+}
+
+static void test_host_zero_of_each_wheel_is_told_once_for_each_change(void) {
+    disarm();
+    watch_everything();
+    iw_snapshot_t seen = gateway_rig_look(&rig);
+    iw_force_t force = *seen.wheel[IW_RIGHT].force;
+    force.provenance = IW_OFFSET_STORED;
+    force.offset_mN = 1234;
+    force.offset_us = 77;
+    seen.wheel[IW_RIGHT].force = &force;
+    iw_observe(&host, &seen);
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"offset\""));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"side\":\"right\",\"offset_mN\":1234,"), all);
+    TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_NONE, host.zero[IW_RIGHT].from);
+    force.provenance = IW_OFFSET_OPERATOR;
+    force.offset_us = 99;
+    forget();
+    iw_observe(&host, &seen);
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT(1, count_of("\"event\":\"offset\""));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"before_mN\":1234,"), all);
+    force.offset_us = 100;
+    force.offset_mN = 55;
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT(2, count_of("\"event\":\"offset\""));
+    force.provenance = IW_OFFSET_ESTIMATED;
+    force.quality.deviation_mN = 31;
+    iw_observe(&host, &seen);
+    TEST_ASSERT_EQUAL_UINT8(IW_OFFSET_ESTIMATED, host.zero[IW_RIGHT].from);
+    TEST_ASSERT_EQUAL_UINT16(31, host.zero[IW_RIGHT].deviation_mN);
+}
+
+static void test_host_word_on_an_item_is_compared_with_what_is_in_force(void) {
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"530\"}", "\"state\":\"confirmed\"");
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"confirm\",\"id\":2,\"item\":\"track\",\"value\":\"551\"}", "\"state\":\"contradicted\"");
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"confirm\",\"id\":3,\"item\":\"dlc\",\"value\":\"551\"}", "value must be yes or no");
+}
+
+static void test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often(void) {
+    forget();
+    for (unsigned i = 0; i < 10U; i++) {
+        say(0, "{\"cmd\":\"alive\"}");
+        gateway_judge_renew(&rig.judge);
+        run_ms(25);
+    }
+    TEST_ASSERT_UINT_WITHIN(2, 10, count_of("\"event\":\"link\""));
+}
+
+static void test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start(void) {
+    iw_ledger_state_t state;
+    disarm();
+    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
+    pass(2500);
+    const uint32_t writes = flash_writes;
+    TEST_ASSERT_GREATER_THAN_UINT32(0, writes);
+    TEST_ASSERT_EQUAL_INT(IW_MEMORY_KEPT, host.memory);
+    pass(5000);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(writes, flash_writes, "the flash wears");
+    start();
+    state = iw_host_look(&host)->assumed[IW_LEDGER_TRACK].state;
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, state);
+    TEST_ASSERT_EQUAL_INT(IW_MEMORY_KEPT, host.memory);
+    has_flash = false;
+    start();
+    state = iw_host_look(&host)->assumed[IW_LEDGER_TRACK].state;
+    TEST_ASSERT_EQUAL_INT(IW_LEDGER_ASSUMED, state);
+    TEST_ASSERT_EQUAL_INT(IW_MEMORY_NEW, host.memory);
+    flash_fails = true;
+    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"540\"}", "\"confirmed\"");
+    pass(5000);
+    TEST_ASSERT_EQUAL_INT(IW_MEMORY_FAILED, host.memory);
+}
+
+static void test_host_command_older_than_its_channel_is_stale(void) {
+    char json[256];
+    (void)snprintf(json, sizeof json,
+                   "{\"boot\":\"%016llx\",\"seq\":1,\"t_us\":%llu,\"cmd\":\"drive\",\"left_mm_s\":100,"
+                   "\"right_mm_s\":100}",
+                   (unsigned long long)BOOT, (unsigned long long)t_us);
+    run_ms(5);
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    run_ms(5);
+    refused = 0;
+    say(2, json);
+    run_ms(5);
+    TEST_ASSERT_EQUAL_UINT32(1, refused);
+}
+
+static void test_host_state_after_a_stall_comes_in_no_burst(void) {
+    disarm();
+    say(1, "{\"cmd\":\"watch\",\"topics\":[\"state\"],\"rate_hz\":10}");
+    pass(300);
+    forget();
+    gateway_rig_run(&rig, 300000); // The image's loop stands still.
+    states = 0;
+    say(0, "{\"cmd\":\"alive\"}");
+    run_ms(50);
+    TEST_ASSERT_EQUAL_UINT32(1, states);
+    TEST_ASSERT_EQUAL_UINT(0, count_of("\"event\":\"lost\""));
+}
+
+static void test_host_setting_out_of_its_range_is_refused(void) {
+    iw_settings_t settings = iw_settings_from(&rig.config, 540);
+    iw_config_t config = rig.config;
+    char text[256];
+    iwn_text_t why = iwn_text_begin(text, sizeof text);
+    TEST_ASSERT_TRUE(iw_settings_check(&settings, &why));
+    config.gear_turns = 1000;
+    config.gear_per = 1;
+    settings = iw_settings_from(&config, 540);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    config = rig.config;
+    config.lease_ms = 900;
+    settings = iw_settings_from(&config, 540);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+    config = rig.config;
+    config.radius_mm = 0;
+    settings = iw_settings_from(&config, 540);
+    TEST_ASSERT_FALSE(iw_settings_check(&settings, &why));
+}
+
+static void test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error(void) {
+    static const char *const good[] = {"{\"cmd\":\"alive\"}",
+                                       "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}",
+                                       "{\"cmd\":\"close\",\"channel\":2}",
+                                       "{\"cmd\":\"link\"}",
+                                       "{\"ok\":true}",
+                                       "{\"event\":\"x\"}"};
+    static const char *const bad[] = {"{\"cmd\":\"dance\"}",
+                                      "{\"cmd\":\"close\"}",
+                                      "{\"cmd\":\"close\",\"channel\":99}",
+                                      "{\"x\":1}",
+                                      "[]",
+                                      "{\"cmd\":\"open\",\"channel\":2}"};
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        say(0, good[i]);
+        run_ms(5);
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, host.errors, good[i]);
+    }
+    say(1, "{\"cmd\":\"hello\"}"); // With the relay begun anew nobody is there.
+    run_ms(5);
+    TEST_ASSERT_EQUAL_UINT32(1, host.errors);
+    for (uint32_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        say(0, bad[i]);
+        run_ms(5);
+        TEST_ASSERT_EQUAL_UINT32_MESSAGE(2U + i, host.errors, bad[i]);
+    }
+    say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
+    forget();
+    say(1, "{\"ok\":true}");
+    say(1, "{\"cmd\":\"hello\",\"id\":1}");
+    run_ms(5);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, count_of("\"ok\":false"), all);
+    TEST_ASSERT_EQUAL_UINT32(2U + sizeof bad / sizeof bad[0] - 1U, host.errors);
+}
+
+static void test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_told_as_who_it_was(void) {
+    watch_everything();
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
+    say(2, "{\"cmd\":\"watch\",\"topics\":[\"stop\"]}");
+    run_ms(10);
+    gateway_judge_renew(&rig.judge);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    forget();
+    say(0, "{\"cmd\":\"close\",\"channel\":1}");
+    run_ms(10);
+    TEST_ASSERT_TRUE(iw_gateway_state(&rig.gateway) != IW_STATE_ARMED);
+    TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, host.client[0].id);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"event\":\"stop\""), all);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "client 1 "), all);
+    run_ms(480);
+    TEST_ASSERT_TRUE(host.client[1].id != IW_CLIENT_NONE);
+    run_ms(30);
+    TEST_ASSERT_EQUAL_UINT32(IW_CLIENT_NONE, host.client[1].id);
+}
+
+static void test_host_status_has_the_estop_and_of_each_wheel_its_own_zero(void) {
+    host.zero[IW_LEFT] = (iw_learnt_zero_t){.from = IW_OFFSET_OPERATOR, .deviation_mN = 11};
+    host.zero[IW_RIGHT] = (iw_learnt_zero_t){.from = IW_OFFSET_ESTIMATED, .deviation_mN = 22};
+    const iwn_surroundings_t around = iw_host_around(&host, iw_host_look(&host));
+    TEST_ASSERT_TRUE(around.estop.present);
+    TEST_ASSERT_EQUAL_UINT32(11, around.zero[IW_LEFT].deviation_mN);
+    TEST_ASSERT_EQUAL_UINT32(22, around.zero[IW_RIGHT].deviation_mN);
+}
+
+static void test_host_restarts_only_if_it_was_asked_to(void) {
+    TEST_ASSERT_FALSE(iw_host_wants_restart(&host));
+    host.restart_us = 1;
+    TEST_ASSERT_TRUE(iw_host_wants_restart(&host));
+}
+
+static void test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it(void) {
+    disarm();
+    pass(1000);
+    forget();
+    pass(3000);
+    TEST_ASSERT_EQUAL_UINT(3, count_of("\"event\":\"link\""));
+    const iw_snapshot_t seen = gateway_rig_look(&rig);
+    TEST_ASSERT_EQUAL_UINT64(host.linked_us + 1000000U, iw_host_tell(&host, &seen, false));
+}
+
+static void test_host_hello_and_force_are_whole(void) {
+    forget();
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
+    say(2, "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":10}");
+    run_ms(20);
+    const char *const hello = strstr(all, "\"event\":\"hello\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(hello, all);
+    TEST_ASSERT_TRUE_MESSAGE(strstr(hello, "\"t_us\":") < strchr(hello, '}'), hello);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(strstr(all, "\"event\":\"force\""), "\"left\":{"), all);
+}
+
+static void test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_every_two_seconds(void) {
+    disarm();
+    const iw_time_us_t silent_us = host.learn_us;
+    TEST_ASSERT_TRUE(silent_us > rig.now_us - 2000000U && silent_us <= rig.now_us + 2000000U);
+    while (host.learn_us == silent_us) {
+        pass(100);
+    }
+    TEST_ASSERT_UINT64_WITHIN(110000U, rig.now_us + 2000000U, host.learn_us);
+    host.learn_us = 0; // As after motion.
+    pass(100);
+    TEST_ASSERT_UINT64_WITHIN(110000U, rig.now_us + 2000000U, host.learn_us);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_host_tells_of_the_estop_and_of_each_cause_by_its_name_once);
+    RUN_TEST(test_host_tells_of_a_stop_with_cause_and_client_and_who_stopped_refuses_others);
+    RUN_TEST(test_host_zero_of_each_wheel_is_told_once_for_each_change);
+    RUN_TEST(test_host_word_on_an_item_is_compared_with_what_is_in_force);
+    RUN_TEST(test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often);
+    RUN_TEST(test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start);
+    RUN_TEST(test_host_command_older_than_its_channel_is_stale);
+    RUN_TEST(test_host_state_after_a_stall_comes_in_no_burst);
+    RUN_TEST(test_host_setting_out_of_its_range_is_refused);
+    RUN_TEST(test_host_obeys_the_relay_and_counts_what_is_none_of_its_words_as_an_error);
+    RUN_TEST(test_host_client_that_is_closed_or_not_heard_for_half_a_second_is_gone_and_told_as_who_it_was);
+    RUN_TEST(test_host_status_has_the_estop_and_of_each_wheel_its_own_zero);
+    RUN_TEST(test_host_restarts_only_if_it_was_asked_to);
+    RUN_TEST(test_host_line_is_stamped_once_a_second_at_rest_and_wakes_for_it);
+    RUN_TEST(test_host_hello_and_force_are_whole);
+    RUN_TEST(test_host_looks_for_what_it_has_learnt_after_two_seconds_of_silence_and_every_two_seconds);
+    return UNITY_END();
+}

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+// What the gateway writes for people.
+#include "config/gateway_config.h"
+#include "process/log.h"
+#include "start/report.h"
+
+#include "unity.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static FILE *file;
+static gw_log_t people;
+static gateway_config_t config;
+static char text[8192];
+
+void setUp(void) {
+    file = tmpfile();
+    TEST_ASSERT_NOT_NULL(file);
+    gw_log_open(&people, GW_LOG_INFO);
+    gw_log_close(&people);
+    people.fd = dup(fileno(file));
+    gateway_config_default(&config);
+}
+
+void tearDown(void) {
+    gw_log_close(&people);
+    (void)fclose(file);
+}
+
+static const char *written(void) {
+    rewind(file);
+    text[fread(text, 1, sizeof text - 1U, file)] = '\0';
+    return text;
+}
+
+static void assert_line(const char *line) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(written(), line), line);
+}
+
+static void test_log_at_start_names_bus_sockets_estop_and_stop_budget(void) {
+    (void)snprintf(config.bus.interface, sizeof config.bus.interface, "can7");
+    (void)snprintf(config.estop.line, sizeof config.estop.line, "gpiochip0/17");
+    (void)snprintf(config.northbound.socket, sizeof config.northbound.socket, "/run/drive.sock");
+    (void)snprintf(config.northbound.watch_socket, sizeof config.northbound.watch_socket, "/run/watch.sock");
+    gw_report_start(&config, false, true, &people);
+    assert_line("iwheel-gateway: info: version " IWHEEL_VERSION "; bus can7; clients at /run/drive.sock\n");
+    assert_line("iwheel-gateway: info: watchers at /run/watch.sock\n");
+    assert_line("iwheel-gateway: info: e-stop: gpiochip0/17\n");
+    const iw_stop_budget_t budget = iw_config_stop_budget(&config.core);
+    char line[160];
+    (void)snprintf(line, sizeof line, "stop budget, client lost: %u ms and %u mm after its last command\n",
+                   (unsigned)budget.client_lost_ms, (unsigned)budget.client_lost_mm);
+    assert_line(line);
+    (void)snprintf(line, sizeof line, "stop budget, gateway killed: %u ms and %u mm at full command, then unknown\n",
+                   (unsigned)budget.killed_ms, (unsigned)budget.killed_mm);
+    assert_line(line);
+    assert_line("iwheel-gateway: warning: setpoint_type or current_role is not configured: arm will be refused; set "
+                "both under [wheels]\n");
+}
+
+static void test_log_at_start_is_silent_of_what_is_not(void) {
+    config.core.setpoint_type_set = true;
+    config.core.current_role = IW_ROLE_LIMIT;
+    config.core.listen_only = true;
+    gw_report_start(&config, true, false, &people);
+    assert_line("; listens only\n");
+    assert_line(" (SIMULATED)\n");
+    TEST_ASSERT_NULL(strstr(written(), "watchers"));
+    TEST_ASSERT_NULL(strstr(written(), "warning"));
+}
+
+static void test_log_passes_a_burst_and_tells_how_many_lines_it_dropped(void) {
+    for (unsigned i = 0; i < 45U; i++) {
+        gw_log(&people, GW_LOG_WARNING, "line %u", i);
+    }
+    people.credit_us -= 200000U; // Time for one line.
+    gw_log(&people, GW_LOG_ERROR, "last");
+    assert_line("warning: line 39\n");
+    TEST_ASSERT_NULL(strstr(written(), "line 40"));
+    assert_line("iwheel-gateway: error: (5 lines dropped before this one) last\n");
+}
+
+static void test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain(void) {
+    gw_log(&people, GW_LOG_DEBUG, "below");
+    gw_log(&people, GW_LOG_INFO, "two\nlines \033[1m");
+    TEST_ASSERT_NULL(strstr(written(), "below"));
+    TEST_ASSERT_NULL(strchr(written(), '\033'));
+    TEST_ASSERT_EQUAL_PTR(strrchr(written(), '\n'), strchr(written(), '\n'));
+    gw_log_level_t level = GW_LOG_ERROR;
+    TEST_ASSERT_TRUE(gw_log_level_of("debug", &level));
+    TEST_ASSERT_EQUAL_INT(GW_LOG_DEBUG, level);
+    TEST_ASSERT_FALSE(gw_log_level_of("loud", &level));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget);
+    RUN_TEST(test_log_at_start_is_silent_of_what_is_not);
+    RUN_TEST(test_log_passes_a_burst_and_tells_how_many_lines_it_dropped);
+    RUN_TEST(test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain);
+    return UNITY_END();
+}
