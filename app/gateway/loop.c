@@ -181,6 +181,7 @@ static iw_time_us_t next_us(const gw_daemon_t *daemon) {
     }
     iw_time_us_t next_us = earlier(daemon->wheels.step_us, iw_linux_hal_next_us(&daemon->wheels.hal));
     next_us = earlier(next_us, gw_observe_next_us(&daemon->clients));
+    next_us = earlier(next_us, gw_observe_frames_us(&daemon->status));
     next_us = earlier(next_us, gw_service_next_us(&daemon->clients));
     return looks(daemon) ? earlier(next_us, daemon->look_us) : next_us;
 }
@@ -191,7 +192,7 @@ static void heed_bus(gw_daemon_t *daemon) {
     daemon->frames_us = (wheels->tape.tapped > 0U) ? wheels->now_us : daemon->frames_us;
     const bool may_wait = daemon->frames_may_wait && wheels->now_us < daemon->frames_us + FRAMES_GONE_US &&
                           wheels->tape.tapped < GW_FRAMES &&
-                          !gw_clients_anybody_watches(&daemon->clients, IWN_TOPIC_FRAME);
+                          gw_clients_watching(&daemon->clients, IWN_TOPIC_FRAME) == 0U;
     struct epoll_event interest = {.events = may_wait ? 0U : EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
     if (may_wait != daemon->frames_wait &&
         epoll_ctl(daemon->clients.epoll_fd, EPOLL_CTL_MOD, iw_linux_hal_bus_fd(&daemon->wheels.hal), &interest) == 0) {

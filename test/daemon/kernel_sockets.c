@@ -298,12 +298,12 @@ static ssize_t give_can(const void *bytes, size_t size) {
     memcpy(&raw, bytes, sizeof raw);
     iw_can_frame_t frame = {.id = raw.can_id, .dlc = raw.len};
     memcpy(frame.data, raw.data, sizeof frame.data);
-    if (!vk_call("send", errors)) {
+    const int fault = vk_call("send", errors) ? 0 : errno;
+    if (fault != 0) {
         world_sent(&frame, false);
-        return -1;
     }
-    const int error = world_send(&frame);
-    errno = error;
+    const int error = (fault != 0) ? fault : world_send(&frame);
+    errno = error; // Those who judge have looked at files since.
     return vk_done((error == 0) ? (long)size : -1);
 }
 

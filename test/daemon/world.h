@@ -6,6 +6,8 @@
 #ifndef DAEMON_WORLD_H
 #define DAEMON_WORLD_H
 
+#include "../sim/campaign.h"
+
 #include "iwheel/can_frame.h"
 #include "iwheel/config.h"
 
@@ -42,16 +44,6 @@ typedef enum {
     EV_WATCHER, ///< One watches, and reads or not.
     EV_KINDS,
 } event_kind_t;
-
-typedef struct {
-    iw_time_us_t at_us;
-    uint32_t span_us;
-    int32_t a;
-    int32_t b;
-    uint8_t kind;
-    uint8_t who;
-    uint8_t style;
-} event_t;
 
 typedef struct {
     uint64_t seed;

@@ -42,7 +42,7 @@ PARTS = [
     Bug("signal-ends-in-the-hold", "R4", LOOP, "daemon->wheels.shutting_down && !gw_wheels_are_sent_to(&daemon->wheels)",
         "daemon->wheels.shutting_down && iw_gateway_state(&daemon->wheels.core) != IW_STATE_ARMED && daemon->wheels.core.permit.view.output_zero", MOTION),
     Bug("signal-without-a-stop", "R4", LOOP, "gw_wheels_stop(&daemon->wheels, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);", "", MOTION),
-    Bug("watchers-wait-for-frames", "R11", LOOP, "wheels->tape.tapped < GW_FRAMES && !gw_clients_anybody_watches(&daemon->clients, IWN_TOPIC_FRAME);", "wheels->tape.tapped < GW_FRAMES;", MOTION),
+    Bug("watchers-wait-for-frames", "R11", LOOP, "wheels->tape.tapped < GW_FRAMES && gw_clients_watching(&daemon->clients, IWN_TOPIC_FRAME) == 0U;", "wheels->tape.tapped < GW_FRAMES;", MOTION),
     Bug("frames-wait-in-a-stop", "R7", LOOP, "daemon->frames_may_wait = !sending || driving;", "daemon->frames_may_wait = true;", MOTION),
     Bug("frames-wait-too-long", "R7", LOOP, "daemon->look_us = seen->at_us + (sending ? sending_us : REST_LOOK_US);", "daemon->look_us = seen->at_us + 4U * REST_LOOK_US;", MOTION),
     Bug("latched-hold-is-no-sending", "R3", "app/gateway/wheels/wheels.c", "return iw_gateway_is_sending(&self->core);", "return iw_gateway_is_sending(&self->core) && iw_gateway_state(&self->core) != IW_STATE_LATCHED;", MOTION),
@@ -66,6 +66,7 @@ PARTS = [
     # Clients.
     Bug("lease-outlives-its-client", "R1", DISPATCH, "gw_wheels_leave(self->wheels, client->id);", "", MOTION),
     Bug("lease-ends-after-the-lines", "R1", SERVICE, "if (client->leaving) {", "if (client->leaving && !client->readable) {", MOTION),
+    Bug("arm-that-waited-through-a-stop", "R3", CLIENT, "return self->caught_up_us < self->stopped_us;", "return false;", REQUESTS),
     Bug("command-from-before-arm-is-prompt", "R3", CLIENT, "<= GW_PROMPT_US && self->caught_up_us >= since_us;", "<= GW_PROMPT_US; (void)since_us;", REQUESTS),
     Bug("caught-up-with-lines-left", "R1", CLIENT, "self->drained && gw_client_line(self, &length) == NULL", "gw_client_line(self, &length) == NULL", ("unit_northbound_lines",)),
     Bug("events-take-the-replys-room", "R11", CLIENT, "if (length + reserve > sizeof self->out - waiting) {", "(void)reserve; if (length > sizeof self->out - waiting) {", ("unit_northbound_lines",)),
@@ -82,7 +83,7 @@ PARTS = [
     Bug("estop-again-forgotten", "R2", DISPATCH, "wheels->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US", "true", WATCHERS),
     Bug("denied-without-words", "northbound", REFUSE, "say_right(answers, out_refusal); return true;", "out_refusal->error = IWN_DENIED; out_refusal->message[0] = 0; return true;", WATCHERS),
     Bug("holder-served-in-turn", "R11", SERVICE, "if (holder != NULL) { (void)service(self, holder); }", "holder = NULL;", ("unit_service_rounds",)),
-    Bug("burst-of-telemetry-after-a-stall", "R11", "app/gateway/status/observe.c", "if (client->next_us <= self->wheels->now_us) {", "if (false) {", REQUESTS),
+    Bug("burst-of-telemetry-after-a-stall", "R11", "app/gateway/status/observe.c", "client->next_us = self->wheels->now_us - self->wheels->now_us % period_us + period_us;", "client->next_us += period_us;", REQUESTS),
     # The northbound library.
     Bug("names-compared-as-they-are-spelt", "northbound", CHECKER, "a = iwn_scan_character(&one); b = iwn_scan_character(&other);",
         "a = (unsigned char)*one++; b = (unsigned char)*other++; a = (a == '\"') ? 0U : a; b = (b == '\"') ? 0U : b;", JSON),

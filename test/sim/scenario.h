@@ -6,11 +6,13 @@
 #ifndef SIM_TEST_SCENARIO_H
 #define SIM_TEST_SCENARIO_H
 
+#include "campaign.h"
+
 #include "iwheel/config.h"
 
 #include <stdio.h>
 
-#define SCENARIO_EVENTS  512U
+#define SCENARIO_EVENTS  CAMPAIGN_EVENTS_MAX
 #define SCENARIO_CLIENTS 4U
 /// The virtual time at which a run begins; events tell their time from there.
 #define SCENARIO_START_US ((iw_time_us_t)1000000U)
@@ -57,16 +59,6 @@ typedef enum {
     EV_TARE,
     EV_KINDS,
 } event_kind_t;
-
-typedef struct {
-    iw_time_us_t at_us;
-    uint32_t span_us;
-    int32_t a;
-    int32_t b;
-    uint8_t kind;
-    uint8_t who;
-    uint8_t style;
-} event_t;
 
 typedef struct {
     uint64_t seed;

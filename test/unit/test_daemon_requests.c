@@ -148,6 +148,35 @@ static void test_command_behind_arm_in_one_breath_is_stale(void) {
     }
 }
 
+static void say_at_once(int who, const char *lines) {
+    TEST_ASSERT_EQUAL_INT((int)strlen(lines), (int)send(who, lines, strlen(lines), MSG_NOSIGNAL));
+}
+
+/// What somebody has sent behind an arm, waits here for its answer.
+static void test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else(void) {
+    static const char *const stops[] = {"{\"cmd\":\"stop\"}\n", "{\"cmd\":\"estop\"}\n"};
+    static const iw_state_t after[] = {IW_STATE_LISTENING, IW_STATE_LATCHED};
+    const int other = daemon_rig_connect();
+    daemon_rig_run(20);
+    for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
+        say_at_once(client, "{\"cmd\":\"arm\"}\n{\"cmd\":\"reset\"}\n{\"id\":9,\"cmd\":\"arm\"}\n");
+        say_at_once(other, stops[i]);
+        daemon_rig_run(100);
+        TEST_ASSERT_EQUAL_INT(after[i], daemon_rig_state());
+        daemon_rig_run(2000); // Zeros are held as long.
+    }
+    assert_reply("{\"cmd\":\"reset\"}", "\"ok\":true"); // One that is sent now counts.
+    daemon_rig_arm(client);
+    (void)close(other);
+}
+
+static void test_stop_and_arm_of_one_client_in_one_breath_are_both_carried_out(void) {
+    daemon_rig_run(20);
+    say_at_once(client, "{\"cmd\":\"stop\"}\n{\"cmd\":\"arm\"}\n");
+    daemon_rig_run(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
 static void test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now(void) {
     static const char line[] = "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n";
     daemon_rig_arm(client);
@@ -411,6 +440,8 @@ int main(void) {
     RUN_TEST(test_tare_of_both_that_one_cannot_have_changes_neither);
     RUN_TEST(test_client_that_goes_while_it_arms_leaves_no_lease);
     RUN_TEST(test_command_behind_arm_in_one_breath_is_stale);
+    RUN_TEST(test_reset_and_arm_that_waited_do_not_undo_a_stop_of_somebody_else);
+    RUN_TEST(test_stop_and_arm_of_one_client_in_one_breath_are_both_carried_out);
     RUN_TEST(test_command_that_waited_in_the_socket_while_we_stood_still_does_not_renew_the_lease_from_now);
     RUN_TEST(test_takeover_is_refused_in_motion_and_moves_the_lease_at_rest);
     RUN_TEST(test_arm_while_shutting_down_is_refused);

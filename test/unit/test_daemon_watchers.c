@@ -3,6 +3,7 @@
 #include "answers/dispatch.h"
 #include "clients/clients.h"
 #include "daemon_rig.h"
+#include "status/observe.h"
 
 #include "unity.h"
 
@@ -211,6 +212,64 @@ static unsigned replies_of(int client) {
     return count;
 }
 
+static unsigned frames_of(int client) {
+    static char text[1U << 20];
+    unsigned count = 0;
+    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
+    text[(length > 0) ? length : 0] = '\0';
+    for (const char *at = strstr(text, "\"event\":\"frame\""); at != NULL; at = strstr(at + 1, "\"event\":\"frame\"")) {
+        count++;
+    }
+    return count;
+}
+
+/// In how many of the next 200 ms frames came to it, and how many.
+static unsigned moments_with_frames(int client, unsigned *out_frames) {
+    unsigned moments = 0;
+    *out_frames = 0;
+    (void)frames_of(client);
+    for (unsigned ms = 0; ms < 200U; ms++) {
+        daemon_rig_run(1);
+        const unsigned frames = frames_of(client);
+        moments += (frames > 0U) ? 1U : 0U;
+        *out_frames += frames;
+    }
+    return moments;
+}
+
+static void test_frames_come_one_by_one_to_few_and_together_to_many(void) {
+    unsigned to_few;
+    unsigned to_many;
+    connect_crowd(GW_FRAMES_ONE_BY_ONE + 1U);
+    for (unsigned i = 1; i < crowded; i++) {
+        say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
+    }
+    daemon_rig_run(20);
+    TEST_ASSERT_GREATER_THAN_UINT(60, moments_with_frames(crowd[1], &to_few));
+    say(crowd[0], "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n");
+    daemon_rig_run(20);
+    TEST_ASSERT_UINT_WITHIN(1, 200000U / GW_FRAMES_TOGETHER_US, moments_with_frames(crowd[1], &to_many));
+    TEST_ASSERT_UINT_WITHIN_MESSAGE(4, to_few, to_many, "each of them, once");
+}
+
+static void test_states_for_many_are_written_once(void) {
+    char first[GW_REPLY_MAX];
+    char second[GW_REPLY_MAX];
+    connect_crowd(2);
+    for (unsigned i = 0; i < crowded; i++) {
+        say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"force\"],\"rate_hz\":50}\n");
+        daemon_rig_run(7); // They have asked at different times.
+    }
+    daemon_rig_run(100);
+    (void)recv(crowd[0], first, sizeof first - 1U, MSG_DONTWAIT);
+    (void)recv(crowd[1], second, sizeof second - 1U, MSG_DONTWAIT);
+    daemon_rig_run(20);
+    const ssize_t length = recv(crowd[0], first, sizeof first - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(0, length);
+    TEST_ASSERT_EQUAL_INT(length, recv(crowd[1], second, sizeof second - 1U, MSG_DONTWAIT));
+    TEST_ASSERT_EQUAL_MEMORY(first, second, (size_t)length);
+}
+
 static void test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace(void) {
     for (unsigned i = 0; i < 100U; i++) {
         say(watcher, "{\"cmd\":\"hello\"}\n");
@@ -283,6 +342,8 @@ int main(void) {
     RUN_TEST(test_watchers_take_no_slot_of_a_driver);
     RUN_TEST(test_watcher_too_many_is_told_its_own_limit_and_a_slot_comes_free_again);
     RUN_TEST(test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing);
+    RUN_TEST(test_frames_come_one_by_one_to_few_and_together_to_many);
+    RUN_TEST(test_states_for_many_are_written_once);
     RUN_TEST(test_flood_of_requests_of_one_watcher_is_carried_out_at_its_own_pace);
     RUN_TEST(test_flood_of_estop_latches_once_and_leaves_the_black_box_alone);
     RUN_TEST(test_estop_repeated_within_a_tenth_of_a_second_is_answered_and_costs_no_step);

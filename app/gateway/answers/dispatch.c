@@ -67,12 +67,27 @@ static void reply_armed(gw_answers_t *self, const iw_snapshot_t *seen, gw_client
     gw_clients_send_reply(client, &json);
 }
 
+/// An arm or a reset that waited here, behind an earlier request of its client, is not to undo a stop that came meanwhile.
+static bool refuse_waited(const gw_call_t *call) {
+    static const iwn_refusal_t refusal = {
+        IWN_STALE_COMMAND,
+        "this request was sent before somebody else stopped the wheels; see why (iwheelctl why), then send it anew"};
+    const bool waited = gw_client_waited_through_stop(call->client);
+    if (waited) {
+        send_refusal(call, &refusal);
+    }
+    return waited;
+}
+
 static void do_arm(const gw_call_t *call) {
     gw_wheels_t *wheels = call->answers->wheels;
     gw_client_t *client = call->client;
     if (wheels->shutting_down) {
         const iwn_refusal_t refusal = {IWN_DENIED, "the gateway is shutting down; wait until it is started again"};
         send_refusal(call, &refusal);
+        return;
+    }
+    if (refuse_waited(call)) {
         return;
     }
     const iw_refusal_t refusal = iw_gateway_arm(&wheels->core, wheels->now_us, client->id, call->request->takeover);
@@ -180,6 +195,7 @@ static gw_stopper_t stopper_of(const gw_call_t *call) {
 }
 
 static void do_stop(const gw_call_t *call) {
+    gw_clients_note_stop(call->answers->clients, call->client);
     call->answers->status->stopped_by = stopper_of(call);
     gw_wheels_stop(call->answers->wheels, call->client->id, IW_CAUSE_CLIENT_STOP);
     reply_state(call);
@@ -189,6 +205,7 @@ static void do_estop(const gw_call_t *call) {
     gw_wheels_t *wheels = call->answers->wheels;
     gw_status_t *status = call->answers->status;
     const iw_snapshot_t seen = gw_wheels_look(wheels);
+    gw_clients_note_stop(call->answers->clients, call->client);
     status->estopped_by = stopper_of(call);
     if (seen.state == IW_STATE_LATCHED && wheels->now_us - seen.seen_us[IW_CAUSE_ESTOP_SOFTWARE] < GW_ESTOP_AGAIN_US) {
         reply_state(call); // In force already: a flood of it costs neither a step nor what the black box holds.
@@ -205,6 +222,9 @@ static void do_estop(const gw_call_t *call) {
 
 static void do_reset(const gw_call_t *call) {
     gw_wheels_t *wheels = call->answers->wheels;
+    if (refuse_waited(call)) {
+        return;
+    }
     const iw_refusal_t refusal = iw_gateway_reset(&wheels->core, wheels->now_us);
     note(call, &(blackbox_entry_t){.kind = BLACKBOX_RESET, .b = (uint8_t)refusal});
     if (refusal != IW_REFUSE_NONE) {

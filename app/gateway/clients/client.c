@@ -59,6 +59,10 @@ iw_time_us_t gw_client_sent_us(const gw_client_t *self, iw_time_us_t now_us, iw_
     return prompt ? now_us : self->caught_up_us;
 }
 
+bool gw_client_waited_through_stop(const gw_client_t *self) {
+    return self->caught_up_us < self->stopped_us;
+}
+
 bool gw_client_line_too_long(const gw_client_t *self) {
     return self->in_length == sizeof self->in && memchr(self->in, '\n', sizeof self->in) == NULL;
 }

@@ -45,6 +45,7 @@ typedef struct gw_client {
     uint32_t rate_hz;
     bool drained;              ///< The last read took all there was.
     iw_time_us_t caught_up_us; ///< Nothing of it was waiting then: what is there now was sent later.
+    iw_time_us_t stopped_us;   ///< Somebody else has stopped the wheels then; 0: nobody has.
     iw_time_us_t next_us;      ///< When the next periodic event is due.
     iw_time_us_t line_us;      ///< Of a watcher: its next line is carried out no earlier.
     bool due;                  ///< A periodic event is due in this cycle.
@@ -74,6 +75,9 @@ void gw_client_check_caught_up(gw_client_t *self, iw_time_us_t now_us);
 /// When a request of it that is carried out now was sent, as far as can be told: now, unless it may have waited for
 /// more than GW_PROMPT_US or since before `since_us`.
 iw_time_us_t gw_client_sent_us(const gw_client_t *self, iw_time_us_t now_us, iw_time_us_t since_us);
+
+/// Whether a request of it that is carried out now may have been sent before somebody else stopped the wheels.
+bool gw_client_waited_through_stop(const gw_client_t *self);
 
 /// True if the buffer is full without a newline.
 bool gw_client_line_too_long(const gw_client_t *self);

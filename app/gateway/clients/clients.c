@@ -16,17 +16,23 @@ uint32_t gw_clients_count(const gw_clients_t *self) {
     return self->count[GW_DRIVE] + self->count[GW_WATCH];
 }
 
+void gw_clients_note_stop(gw_clients_t *self, const gw_client_t *by) {
+    for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
+        gw_client_t *client = &self->client[i];
+        client->stopped_us = (client != by) ? self->now_us : client->stopped_us;
+    }
+}
+
 static bool watches(const gw_client_t *client, iwn_topic_t topic) {
     return (client->topics & (1U << topic)) != 0U;
 }
 
-bool gw_clients_anybody_watches(const gw_clients_t *self, iwn_topic_t topic) {
+uint32_t gw_clients_watching(const gw_clients_t *self, iwn_topic_t topic) {
+    uint32_t count = 0;
     for (uint32_t i = gw_clients_from(self, 0U); i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
-        if (watches(&self->client[i], topic)) {
-            return true;
-        }
+        count += watches(&self->client[i], topic) ? 1U : 0U;
     }
-    return false;
+    return count;
 }
 
 iwn_out_t gw_clients_begin_event(gw_clients_t *self, const char *name) {

@@ -61,7 +61,11 @@ static inline uint32_t gw_clients_from(const gw_clients_t *self, uint32_t slot) 
     return GW_CLIENTS_MAX;
 }
 
-bool gw_clients_anybody_watches(const gw_clients_t *self, iwn_topic_t topic);
+/// How many watch it.
+uint32_t gw_clients_watching(const gw_clients_t *self, iwn_topic_t topic);
+
+/// `by` stops the wheels, in this cycle: what others have sent before is not to undo it.
+void gw_clients_note_stop(gw_clients_t *self, const gw_client_t *by);
 
 /// An event, with its name.
 iwn_out_t gw_clients_begin_event(gw_clients_t *self, const char *name);

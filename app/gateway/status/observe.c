@@ -241,11 +241,9 @@ void gw_observe_periodic(gw_status_t *self) {
         gw_client_t *client = &self->clients->client[i];
         client->due = wants_periodic(client) && self->wheels->now_us >= client->next_us;
         if (client->due) {
+            // On a grid that all have in common, so that an event is written once for many; and after a stall no burst.
             const iw_time_us_t period_us = 1000000U / client->rate_hz;
-            client->next_us += period_us;
-            if (client->next_us <= self->wheels->now_us) {
-                client->next_us = self->wheels->now_us + period_us; // After a stall: no burst.
-            }
+            client->next_us = self->wheels->now_us - self->wheels->now_us % period_us + period_us;
             any = true;
         }
     }
@@ -274,12 +272,20 @@ static void tell_frame(gw_status_t *self, const gw_tapped_t *tapped) {
 
 void gw_observe_frames(gw_status_t *self) {
     gw_tape_t *tape = &self->wheels->tape;
-    if (gw_clients_anybody_watches(self->clients, IWN_TOPIC_FRAME)) {
-        for (uint32_t i = 0; i < tape->tapped; i++) {
-            tell_frame(self, &tape->tap[i]);
-        }
+    const iw_time_us_t now_us = self->wheels->now_us;
+    const uint32_t watching = gw_clients_watching(self->clients, IWN_TOPIC_FRAME);
+    if (watching > GW_FRAMES_ONE_BY_ONE && now_us < self->frames_us && tape->tapped <= GW_FRAMES / 2U) {
+        return;
+    }
+    for (uint32_t i = 0; i < tape->tapped && watching > 0U; i++) {
+        tell_frame(self, &tape->tap[i]);
     }
     tape->tapped = 0;
+    self->frames_us = now_us - now_us % GW_FRAMES_TOGETHER_US + GW_FRAMES_TOGETHER_US;
+}
+
+iw_time_us_t gw_observe_frames_us(const gw_status_t *self) {
+    return (self->wheels->tape.tapped > 0U) ? self->frames_us : IW_NEVER;
 }
 
 void gw_observe_write_hello(const gw_wheels_t *wheels, const gw_client_t *client, iwn_out_t *json) {

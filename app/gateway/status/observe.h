@@ -50,6 +50,7 @@ typedef struct gw_status {
     iwn_stop_note_t last_stop;
     gw_stopper_t stopped_by; ///< What the clients have asked for, until the stop that comes of it is told.
     gw_stopper_t estopped_by;
+    iw_time_us_t frames_us;                 ///< Frames that are told together wait until then.
     char estop_reason[IWN_REASON_MAX + 1U]; ///< Of the last software e-stop.
 } gw_status_t;
 
@@ -65,8 +66,15 @@ void gw_observe_periodic(gw_status_t *self);
 /// When `gw_observe_periodic` has something to do; IW_NEVER if nobody watches.
 iw_time_us_t gw_observe_next_us(const struct gw_clients *clients);
 
-/// Sends the frames that the tape has tapped since the last call to the watchers of the topic `frame`.
+/// So many watch each frame as it comes. More than these get them together, this often: telling costs a system call for each of them.
+#define GW_FRAMES_ONE_BY_ONE  8U
+#define GW_FRAMES_TOGETHER_US 5000U
+
+/// Sends the frames that the tape has tapped to the watchers of the topic `frame`, or leaves them there for a while.
 void gw_observe_frames(gw_status_t *self);
+
+/// When it has something to do though no frame comes; IW_NEVER if none is left there.
+iw_time_us_t gw_observe_frames_us(const gw_status_t *self);
 
 /// The event `hello`, to a new client.
 void gw_observe_hello(gw_status_t *self, gw_client_t *client);
