@@ -19,6 +19,18 @@ ODD_LINES = """(1760000000.000001) can0 100#00100000
 (1.5) vcan0 1FFFFFFF#R8
 (1760000000.123456) can0 20000080#0000000000000000
 (1760000000.123456) can0 123##1112233 R
+(1.5) can0 0ab#de.ad.be.ef.00.11.22.fF_9
+(1.5) can0 0aB#0011223344556677_F T
+(1.5) can0 123#R8_e
+(1.5) can0 123#R9
+(1.5) can0 123#R_9
+(1.5) can0 123#00_9
+(1.5) can0 123#0011223344556677_8
+(1.5) can0 123#001122334455667788
+(1.5) can0 123#0g
+(1.5) can0 123#001
+(1.5) can0 123##
+(1.5) can0 123##f1a
 # a comment
 """
 
@@ -44,13 +56,14 @@ def by_hand():
                    *(b"[drive]\nlease_ms = %d\nmax_speed_mm_s = %d\ndecel_mm_s2 = %d\n" % budget for budget in ((500, 1000, 1500), (20, 5000, 100), (200, 1000, 900)))],
         "candump": [ODD_LINES.encode()],
         "line": [b'0 {"cmd":"link"}*e2d27f9b\n', b'3 1250000 {"ok":true}*e0f15d9c\n', b'1 {"boot":"0123456789abcdef","seq":1,"t_us":2,"cmd":"stop"}\xfe', b"8 {}\xfe\xff8 0 {}\xfe",
-                 b'2 18446744073709551616 {}\xfe9 01 {}\xfe1 x {}\xfe1 5{}\xfe', b"{}*0000000G\n{}*00000000\n*\n\n", b'1 7 {"boot":"0123456789abcdef","seq":18446744073709551615,"t_us":01,"cmd":"stop"}\xfe'],
+                 b'2 18446744073709551616 {}\xfe9 01 {}\xfe1 x {}\xfe1 5{}\xfe', b"{}*0000000G\n{}*00000000\n*\n\n", b'1 7 {"boot":"0123456789abcdef","seq":18446744073709551615,"t_us":01,"cmd":"stop"}\xfe',
+                 b'1 {"boot":"0123456789abcdef","seq":18446744073709551616,"t_us":1,"a":1}\xfe1 {"boot":"0123456789abcdef","seq":01,"t_us":1,"a":1}\xfe1 {"boot":"0123456789abcdef","seq":1,"t_us":}\xfe', b"x" * 600 + b"\n0 {}\xfe"],
         "web": [b"GET\n/\n[::1]\nnull\ncross-site\n\n", b"POST\n/api/estop\nwalker.lan:8470\nhttps://walker.lan:8470\nsame-origin\nbearer " + b"0" * 32],
         "mqtt": [b"stop\n{\"from\":\"far\",\"seq\":1,\"boot\":\"0123456789abcdef\",\"t_us\":1}", b"estop\n{\"from\":\"a/b\"}", b"iwspool1" + bytes(40),
                  b'{"boot":"a","t_us":1,"seq":1,"ok":true,"recordings":[{"name":"stop-000001-x","cause":"x","wall_us":1,"log_bytes":9}]}',
                  b'{"id":"a-1","heard_wall_us":5,"sentence":"x\\u001b[2J","number":4,"missed":true,"wall_us":7,"present":false,"cause":"y"}', *mqtt_odd()],
         "memory": [checked(b'{"format":"iwheel-ledger"}\n')] + [ledger(item, b"") for item in memory_items()] + [ledger(b"", b'"%s":{"from":"%s","unit":"dN","offset_mN":%d,"drift_mN":%d,"deviation_mN":%d,"samples":%d,"wall_us":5}' % row)
-                   for row in ((b"left", b"estimated", 150, -900, 900, 40), (b"right", b"operator", -1200, 0, 0, 40), (b"right", b"wheel", 150, 0, 0, 0), (b"right", b"stored", 0, 0, 0, 0))],
+                   for row in ((b"left", b"estimated", 150, -900, 900, 40), (b"right", b"operator", -1200, 0, 0, 40), (b"right", b"wheel", -1200, 0, 0, 0), (b"right", b"stored", 0, 0, 0, 0))],
         "session": [b"".join(b"%s%s\n+5\n" % (b"q" if b'"drive"' in line or b'"twist"' in line else b"", line) for line in (text.encode() for text in said) if b'"cmd"' in line), *relayed()],
         "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
@@ -81,7 +94,7 @@ def mqtt_odd():
 def memory_items():
     """An entry of each kind, of the bus and of the operator, that can be."""
     bus = (("setpoint_type", 1000, "255"), ("force_unit_left", 10000, "cN"), ("force_unit_right", 1000, "dN"), ("offset_included", 10000, "yes"), ("feedback_sign_left", 200, "yes"), ("feedback_sign_right", 200, "yes"),
-           ("gear_ratio", 1000, "3/2, rpm of the rotor"), ("pose_byte_order", 9000, "yes"), ("dlc", 5, "yes"), ("dlc", 8, "yes"))
+           ("gear_ratio", 1000, "3/2, rpm of the rotor"), ("pose_byte_order", 9000, "yes"), ("dlc", 7, "yes"))
     against = (("force_unit_left", 1000, "cN"), ("offset_included", 0, "yes"), ("feedback_sign_left", -200, "yes"), ("gear_ratio", 500, "1"), ("pose_byte_order", 0, "yes"), ("dlc", 4, "yes"))
     words = (("current_role", "limit", "setpoint"), ("mount_sign_left", "no", "yes"), ("wheel_radius", "192", "200"), ("track", "540", "600"), ("gear_ratio", "1, rpm of the wheel", "2/1"), ("setpoint_type", "1", ""))
     row = '"%s":{"state":"%s","evidence":"%s","figure":%d,"value":"%s","found":"%s","since_wall_us":1%s}'
