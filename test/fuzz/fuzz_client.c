@@ -146,6 +146,17 @@ static iwc_result_t read_some(iwc_t *self, uint8_t how) {
     return result;
 }
 
+/// The same bytes as the first words of whoever is there.
+static void judge_greeting(iwc_t *self, const uint8_t *data, size_t size) {
+    tell(data, size);
+    wire.closed = (size % 2U) != 0U;
+    const iwc_result_t result = iwc_adopt(self, CONNECTION, 0);
+    fuzz_tell((result == IWC_OK || result == IWC_NEWER || result == IWC_REFUSED) ? "taken" : "refused");
+    fuzz_require((result == IWC_OK || result == IWC_NEWER) || self->fd < 0, "nobody is called who did not greet");
+    fuzz_require(result != IWC_REFUSED || strlen(iwc_reason(self)) < sizeof self->reason, "a refusal's words end");
+    iwc_close(self);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static iwc_t *self;
     fuzz_bytes_t bytes = {.data = data, .size = size};
@@ -156,8 +167,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     self = (self != NULL) ? self : iwc_new();
     wire.begin = wire.end = wire.taken = 0;
     wire.closed = wire.narrow = wire.shut = false;
+    fuzz_require(self != NULL, "there is memory");
+    if ((how & 0xF0U) == 0x90U) {
+        judge_greeting(self, data + bytes.at, size - bytes.at);
+        return 0;
+    }
     tell(HELLO, sizeof HELLO - 1U);
-    fuzz_require(self != NULL && iwc_adopt(self, CONNECTION, 1000) == IWC_OK, "it is greeted");
+    fuzz_require(iwc_adopt(self, CONNECTION, 1000) == IWC_OK, "it is greeted");
     wire.narrow = (how & 0xF0U) == 0x70U;
     self->requests = 0;
     // Cut where the first byte says, so that lines come torn.

@@ -65,7 +65,7 @@ def by_hand():
         "memory": [checked(b'{"format":"iwheel-ledger"}\n')] + [ledger(item, b"") for item in memory_items()] + [ledger(b"", b'"%s":{"from":"%s","unit":"dN","offset_mN":%d,"drift_mN":%d,"deviation_mN":%d,"samples":%d,"wall_us":5}' % row)
                    for row in ((b"left", b"estimated", 150, -900, 900, 40), (b"right", b"operator", -1200, 0, 0, 40), (b"right", b"wheel", -1200, 0, 0, 0), (b"right", b"stored", 0, 0, 0, 0))],
         "session": [b"".join(b"%s%s\n+5\n" % (b"q" if b'"drive"' in line or b'"twist"' in line else b"", line) for line in (text.encode() for text in said) if b'"cmd"' in line), *relayed()],
-        "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
+        "client": [b"\0" + told for told in states()] + [b"\x90" + told for told in greetings()] + [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
 
 
@@ -79,6 +79,19 @@ def odd_values():
     sections = re.findall(r"^(\[\w+\])$(.*?)(?=^\[|\Z)", (ROOT / "share/gateway.conf").read_text(), re.M | re.S)
     values = ("0", "1", "50", "4294967296", "012", "none", "yes", "dN", "low", "unix:/run/x", "'a'", "a b c", "27/2/", "")
     return [f"{head}\n{''.join(f'{key} = {value}{chr(10)}' for key in re.findall(r'^;?([a-z][a-z_A-Z0-9]*) = ', rows, re.M))}".encode() for head, rows in sections for value in values]
+
+
+def states():
+    """What a gateway tells of itself, with values of each kind."""
+    wheel = {"heard": True, "at_rest": False, "speed_mm_s": -100, "commanded_mm_s": 0, "applied_mm_s": 5, "distance_mm": 7, "battery_dV": 240, "temperature_degC": 30, "speed_age_ms": 1, "force_age_ms": None,
+             "force_validity": "valid", "force_net_mN": -9}
+    return [json.dumps({"event": "state", "t_us": 1, "state": state, "cause": "x", "lease": lease, "estop": {"state": "released"}, "bus": {"state": "active"}, "left": wheel, "right": {**wheel, "heard": 0, "force_validity": "x"}}).encode() + b"\n"
+            for state in ("listening", "armed", "stopping", "latched", "x") for lease in ({"holder": 3, "remaining_ms": 9}, {"holder": None})]
+
+
+def greetings():
+    hello = {"event": "hello", "api": 1, "client": 3}
+    return [json.dumps(told).encode() + b"\n" for told in (hello, {**hello, "api": 2}, {**hello, "rights": "watch"}, {"ok": False, "error": "too_many_clients", "message": "later"}, {"ok": True}, {"event": "state"})] + [b"", b"x\n"]
 
 
 def mqtt_odd():
