@@ -20,6 +20,8 @@ static const char fresh[] = MQTT_SPOOL_FILE ".new";
 #define CONFIRMED 'c'
 #define EVENT     'e'
 #define DONE_SIZE (HEAD_SIZE + BODY_SIZE)
+/// No event has a number above: one more must always be possible.
+#define NUMBER_MAX ((uint64_t)INT64_MAX)
 
 static uint32_t crc32_of(const uint8_t *bytes, size_t length) {
     uint32_t crc = UINT32_MAX;
@@ -187,7 +189,7 @@ static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left
     }
     const size_t length = length_of(record);
     const uint64_t number = number_of(record);
-    if (get(record + 4, 4) != crc32_of(record + HEAD_SIZE, length - HEAD_SIZE)) {
+    if (number > NUMBER_MAX || get(record + 4, 4) != crc32_of(record + HEAD_SIZE, length - HEAD_SIZE)) {
         return 0;
     }
     if (record[HEAD_SIZE] == CONFIRMED && length == DONE_SIZE) {

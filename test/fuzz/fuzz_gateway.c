@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A gateway in a world that does whatever the bytes say: times, frames, echoes that lie, bus, button, requests. Whatever
-// happens, only setpoints within the limits leave, and none but zero after a cut until arm and a drive were accepted.
+// A gateway in a world that does whatever the bytes say: times, frames, echoes that lie, bus, button, requests, what is
+// known. Whatever happens, only setpoints within the limits leave, and none but zero after a cut until arm and a drive were accepted.
 #include "fuzz_sequence.h"
 
 #include "../support/message.h"
@@ -212,6 +212,49 @@ static void calm(world_t *world, uint8_t steps) {
     }
 }
 
+/// Wheels that stand for a while with a load on them, so that a window of forces ends.
+static void weigh(world_t *world, int8_t load) {
+    for (unsigned i = 0; i < 45U; i++) {
+        for (int side = 0; side < IW_SIDES; side++) {
+            const message_t message = {IW_CODEC_FORCE, (iw_side_t)side, {.force = {.force_raw = (int16_t)(load * 16)}}};
+            iw_can_frame_t frame;
+            (void)message_encode(&message, &frame);
+            put(world, &frame);
+        }
+        calm(world, 10);
+    }
+}
+
+/// What the port and the operator tell, and what is looked at.
+static void learn(world_t *world, fuzz_bytes_t *bytes, uint8_t what) {
+    const uint8_t value = fuzz_byte(bytes);
+    const iw_bus_facts_t facts = {(value & 1U) != 0U, (value & 2U) != 0U};
+    const iw_ledger_entry_t entry = {(iw_ledger_state_t)(what / 8U % 3U), (iw_evidence_t)(what % 4U),
+                                     (int8_t)value * 99};
+    iw_snapshot_t seen;
+    iw_side_t side;
+    switch (what % 5U) {
+    case 0:
+        weigh(world, (int8_t)value);
+        break;
+    case 1:
+        (void)iw_gateway_tare(&world->gateway, world->now_us, value % 4U, &side);
+        break;
+    case 2:
+        iw_gateway_restore_offset(&world->gateway, (iw_side_t)(value & 1U), (iw_offset_provenance_t)(value / 2U % 5U),
+                                  (int8_t)value * 3000);
+        break;
+    case 3:
+        iw_gateway_know(&world->gateway, (iw_ledger_item_t)(value % IW_LEDGER_ITEMS), &entry);
+        break;
+    default:
+        iw_gateway_bus_facts(&world->gateway, &facts);
+        break;
+    }
+    iw_gateway_snapshot(&world->gateway, world->now_us, &seen);
+    fuzz_require(seen.state == iw_gateway_state(&world->gateway), "what is told is what is");
+}
+
 static void act(world_t *world, fuzz_bytes_t *bytes) {
     const uint8_t what = fuzz_byte(bytes);
     const uint8_t value = fuzz_byte(bytes);
@@ -244,7 +287,11 @@ static void act(world_t *world, fuzz_bytes_t *bytes) {
         world->estop = (value > 128U) ? 0 : (int)(value % 3U) - 1;
         break;
     case 9:
-        iw_gateway_suspended(&world->gateway, value * 10000U);
+        if (value < 200U) {
+            iw_gateway_suspended(&world->gateway, value * 10000U);
+        } else {
+            learn(world, bytes, value);
+        }
         break;
     default:
         ask(world, bytes, value);
@@ -257,6 +304,8 @@ static size_t fuzz_unit(const uint8_t *data, size_t size) {
     size_t length = 2;
     if (data[0] % 12U == 6U) {
         length += 2U + IW_CAN_DATA_MAX;
+    } else if (data[0] % 12U == 9U && size > 1U && data[1] >= 200U) {
+        length++;
     } else if (data[0] % 12U > 9U && size > 1U && data[1] / 2U % 7U < 2U) {
         length += 1U + 3U * IW_SIDES;
     }

@@ -8,41 +8,121 @@
 #include "history.h"
 #include "spool.h"
 
+#include "iwheel_northbound/line.h"
+
 #include <fcntl.h>
 #include <stdio.h>
 #include <unistd.h>
 
 #define NOW_US 50000000U
 
-/// The first line is the verb.
-static void judge(const uint8_t *data, size_t size) {
-    static const mqtt_rules_t rules = {"0123456789abcdef", 300, true, false, "iwheel/w1/reply/"};
+#define SPOOL "iwspool1"
+/// A record's length and checksum, and its letter, number and mark.
+#define HEAD_SIZE 8U
+#define BODY_SIZE 17U
+
+size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t max_size);
+size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsigned int seed);
+
+static bool is_spool(const uint8_t *data, size_t size) {
+    return size >= sizeof SPOOL - 1U && memcmp(data, SPOOL, sizeof SPOOL - 1U) == 0;
+}
+
+/// Lengths and checksums of the records put right; the last one ends with the file. Else no change to a spool would come behind them.
+static void seal(uint8_t *at, size_t left) {
+    while (left >= HEAD_SIZE + BODY_SIZE) {
+        size_t length = at[0] | (size_t)at[1] << 8;
+        length = (length >= BODY_SIZE && length + HEAD_SIZE <= left) ? length : left - HEAD_SIZE;
+        const uint32_t crc = iwn_line_crc(0, at + HEAD_SIZE, length);
+        for (unsigned i = 0; i < 4U; i++) {
+            at[i] = (uint8_t)(length >> (8U * i));
+            at[4U + i] = (uint8_t)(crc >> (8U * i));
+        }
+        at += HEAD_SIZE + length;
+        left -= HEAD_SIZE + length;
+    }
+}
+
+size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsigned int seed) {
+    const size_t magic = sizeof SPOOL - 1U;
+    if (!is_spool(data, size) || max_size < 2U * magic || seed % 8U == 0U) {
+        return LLVMFuzzerMutate(data, size, max_size);
+    }
+    const size_t length = LLVMFuzzerMutate(data + magic, size - magic, max_size - magic);
+    seal(data + magic, length);
+    return magic + length;
+}
+
+/// What has been taken counts once, and in time only. A greeting may come again.
+static void judge_again(mqtt_judge_t *judge, const mqtt_rules_t *rules, const mqtt_command_t *command) {
+    mqtt_order_t order;
+    mqtt_judge(judge, rules, command, NOW_US, &order);
+    fuzz_require(order.verb == MQTT_HELLO || order.verdict == MQTT_DOUBLED, "once");
+    mqtt_judge(judge, rules, command, NOW_US + 60000000U, &order);
+    fuzz_require(order.verb == MQTT_HELLO || order.verdict == MQTT_LATE, "not late");
+}
+
+static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *command, bool crowded) {
     mqtt_judge_t judge = {0};
     mqtt_order_t order;
-    char verb[32] = "";
-    const uint8_t *newline = memchr(data, '\n', size);
-    const size_t length = (newline != NULL) ? (size_t)(newline - data) : 0U;
-    if (newline == NULL || length >= sizeof verb) {
-        return;
+    for (unsigned i = 0; crowded && i < MQTT_SENDERS; i++) {
+        judge.senders[i].name[0] = (char)('A' + (char)i);
+        judge.senders[i].heard_us = NOW_US - 1U;
     }
-    memcpy(verb, data, length);
-    char *payload = malloc(size - length);
-    memcpy(payload, newline + 1, size - length - 1U); // Of exactly its length: a byte read behind it is found.
-    const mqtt_command_t command = {.verb = verb, .payload = payload, .length = size - length - 1U};
-    mqtt_judge(&judge, &rules, &command, NOW_US, &order);
+    mqtt_judge(&judge, rules, command, NOW_US, &order);
     fuzz_require(judge.counts[order.verdict] == 1U, "counted");
     fuzz_require((order.verdict == MQTT_TAKEN) == (order.request[0] != '\0'), "a request, or a reason");
     fuzz_tell((order.verdict == MQTT_TAKEN) ? "taken" : "refused");
-    if (order.verdict == MQTT_TAKEN) {
-        fuzz_require(order.from[0] != '\0' && strpbrk(order.from, "/+#\" ") == NULL, "a name");
-        fuzz_require(strchr(order.request, '\n') == NULL && strncmp(order.request, "{\"cmd\":\"", 8) == 0, "one line");
-        fuzz_require(strncmp(order.request + 8, verb, strlen(verb)) == 0, "of that verb");
-        fuzz_require(order.verb != MQTT_RESET, "not configured");
-        mqtt_judge(&judge, &rules, &command, NOW_US, &order);
-        fuzz_require(order.verb == MQTT_HELLO || order.verdict == MQTT_DOUBLED, "once");
-        mqtt_judge(&judge, &rules, &command, NOW_US + 60000000U, &order);
-        fuzz_require(order.verb == MQTT_HELLO || order.verdict == MQTT_LATE, "not late");
+    if (order.verdict != MQTT_TAKEN) {
+        fuzz_require(order.why[0] != '\0', "and why");
+        return;
     }
+    fuzz_require(order.from[0] != '\0' && strpbrk(order.from, "/+#\" ") == NULL, "a name");
+    fuzz_require(order.to[0] != '\0' && strpbrk(order.to, "/+#\" ") == NULL, "and to whom the answer goes");
+    fuzz_require(strchr(order.request, '\n') == NULL && strncmp(order.request, "{\"cmd\":\"", 8) == 0, "one line");
+    fuzz_require(strncmp(order.request + 8, command->verb, strlen(command->verb)) == 0, "of that verb");
+    fuzz_require(order.verb != MQTT_RESET || rules->may_reset, "not configured");
+    fuzz_require((order.verb != MQTT_ARM && order.verb != MQTT_DRIVE && order.verb != MQTT_TWIST) || rules->may_drive,
+                 "it watches only");
+    fuzz_require(!command->retained, "not retained");
+    fuzz_require(!crowded || order.verb == MQTT_HELLO || strlen(order.from) == 1U, "not crowded");
+    judge_again(&judge, rules, command);
+}
+
+/// The first line is the verb, where a tab follows: response topic, and behind another one correlation data. Before the verb may stand `!`: it
+/// is retained; `#`: sixteen others spoke just now; `-`: the bridge watches only; `+`: it may reset.
+static void judge(const uint8_t *data, size_t size) {
+    mqtt_rules_t rules = {"0123456789abcdef", 300, true, false, "iwheel/w1/reply/"};
+    mqtt_command_t command = {0};
+    char first[160] = "";
+    const uint8_t *newline = memchr(data, '\n', size);
+    const size_t length = (newline != NULL) ? (size_t)(newline - data) : 0U;
+    if (newline == NULL || length >= sizeof first) {
+        return;
+    }
+    memcpy(first, data, length);
+    char *verb = first + strspn(first, "!#-+");
+    const size_t flags = (size_t)(verb - first);
+    command.retained = memchr(first, '!', flags) != NULL;
+    rules.may_drive = memchr(first, '-', flags) == NULL;
+    rules.may_reset = memchr(first, '+', flags) != NULL;
+    char *tab = strchr(verb, '\t');
+    if (tab != NULL) {
+        *tab = '\0';
+        command.answer_to = tab + 1;
+        tab = strchr(tab + 1, '\t');
+        command.correlation = (tab != NULL) ? tab + 1 : NULL;
+        command.correlation_length = (tab != NULL) ? strlen(tab + 1) : 0U;
+    }
+    if (tab != NULL) {
+        *tab = '\0';
+    }
+    char *payload = malloc(size - length);
+    memcpy(payload, newline + 1, size - length - 1U); // Of exactly its length: a byte read behind it is found.
+    command.verb = verb;
+    command.payload = payload;
+    command.length = size - length - 1U;
+    judge_command(&rules, &command, memchr(first, '#', flags) != NULL);
     free(payload);
 }
 
@@ -71,6 +151,10 @@ static void read_file(const uint8_t *data, size_t size) {
     fuzz_tell((found > 0U) ? "taken" : "refused");
     fuzz_require(mqtt_spool_add(&spool, "stop", "{}", 2, 0), "it goes on");
     fuzz_require(mqtt_spool_after(&spool, number, &event) && strcmp(event.name, "stop") == 0, "in order");
+    const uint64_t added = event.number;
+    mqtt_spool_confirm(&spool, added - 1U);
+    fuzz_require(spool.waiting == 1U && mqtt_spool_after(&spool, 0, &event) && event.number == added,
+                 "what is confirmed is gone");
     (void)mqtt_spool_close(&spool);
     (void)unlink(path);
 }
@@ -111,7 +195,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (size > 0U && data[0] == '{') {
         show(data, size);
     }
-    if (size >= 8U && memcmp(data, "iwspool1", 8) == 0) {
+    if (is_spool(data, size)) {
         read_file(data, size);
     }
     return 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Any sequence of requests, in time, to a whole gateway with its wheels: by the board's host code, whose answers need no socket. Each line of
 // the input is one deed: `+N` lets N ms pass, `^` and `_` press and release the button, `q` asks on channel 1 with all that a command
-// must quote, anything else is said on channel 1 as it is. Whatever is asked in whatever order: every line that is answered is whole, an id is
+// must quote, `@` lets the relay speak, `2` a client on channel 2, anything else is said on channel 1 as it is. Whatever is asked in whatever order: every line that is answered is whole, an id is
 // answered once, the wheels are told no more than the limits, nothing while it listens, and in a latch never more than before.
 #include "fuzz_sequence.h"
 
@@ -146,6 +146,8 @@ static void act(const uint8_t *text, size_t size) {
         pass(10);
     } else if (size > 0U && text[0] == 'q') {
         say_quoted(&text[1], size - 1U);
+    } else if (size > 0U && (text[0] == '@' || text[0] == '2')) {
+        say((text[0] == '2') ? 2 : 0, (const char *)&text[1], (size < IWN_LINE_BOARD_MAX - 32U) ? size - 1U : 0U);
     } else if (size < IWN_LINE_BOARD_MAX - 32U) {
         say(1, (const char *)text, size);
     }

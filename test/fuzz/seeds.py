@@ -19,6 +19,18 @@ ODD_LINES = """(1760000000.000001) can0 100#00100000
 (1.5) vcan0 1FFFFFFF#R8
 (1760000000.123456) can0 20000080#0000000000000000
 (1760000000.123456) can0 123##1112233 R
+(1.5) can0 0ab#de.ad.be.ef.00.11.22.fF_9
+(1.5) can0 0aB#0011223344556677_F T
+(1.5) can0 123#R8_e
+(1.5) can0 123#R9
+(1.5) can0 123#R_9
+(1.5) can0 123#00_9
+(1.5) can0 123#0011223344556677_8
+(1.5) can0 123#001122334455667788
+(1.5) can0 123#0g
+(1.5) can0 123#001
+(1.5) can0 123##
+(1.5) can0 123##f1a
 # a comment
 """
 
@@ -40,16 +52,20 @@ def by_hand():
         "gateway": [drives, drives + bytes([8, 0, 2, 1]) + drives, bytes([2]) + drives[1:]],
         "request": [line.encode() for line in said] + json_vectors() + [b'{"cmd":"drive","left_mm_s":1e2,"right_mm_s":-1,"id":"x"}']
         + [b'{"cmd":"recording","name":"' + name + b'","offset":-1}' for name in (b"../x", b"a" * 64, b"stop-000001-a.log\\u0000", b"")],
-        "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ngear_ratio = 3/2\n"],
+        "config": [(ROOT / "share/gateway.conf").read_bytes(), b"[wheels]\nsetpoint_type = 1\ncurrent_role = limit\ngear_ratio = 3/2\n", *odd_values(),
+                   *(b"[drive]\nlease_ms = %d\nmax_speed_mm_s = %d\ndecel_mm_s2 = %d\n" % budget for budget in ((500, 1000, 1500), (20, 5000, 100), (200, 1000, 900)))],
         "candump": [ODD_LINES.encode()],
-        "line": [b'0 {"cmd":"link"}*e2d27f9b\n', b'3 1250000 {"ok":true}*e0f15d9c\n', b'1 {"boot":"0123456789abcdef","seq":1,"t_us":2,"cmd":"stop"}\xfe', b"8 {}\xfe\xff8 0 {}\xfe"],
+        "line": [b'0 {"cmd":"link"}*e2d27f9b\n', b'3 1250000 {"ok":true}*e0f15d9c\n', b'1 {"boot":"0123456789abcdef","seq":1,"t_us":2,"cmd":"stop"}\xfe', b"8 {}\xfe\xff8 0 {}\xfe",
+                 b'2 18446744073709551616 {}\xfe9 01 {}\xfe1 x {}\xfe1 5{}\xfe', b"{}*0000000G\n{}*00000000\n*\n\n", b'1 7 {"boot":"0123456789abcdef","seq":18446744073709551615,"t_us":01,"cmd":"stop"}\xfe',
+                 b'1 {"boot":"0123456789abcdef","seq":18446744073709551616,"t_us":1,"a":1}\xfe1 {"boot":"0123456789abcdef","seq":01,"t_us":1,"a":1}\xfe1 {"boot":"0123456789abcdef","seq":1,"t_us":}\xfe', b"x" * 600 + b"\n0 {}\xfe"],
         "web": [b"GET\n/\n[::1]\nnull\ncross-site\n\n", b"POST\n/api/estop\nwalker.lan:8470\nhttps://walker.lan:8470\nsame-origin\nbearer " + b"0" * 32],
         "mqtt": [b"stop\n{\"from\":\"far\",\"seq\":1,\"boot\":\"0123456789abcdef\",\"t_us\":1}", b"estop\n{\"from\":\"a/b\"}", b"iwspool1" + bytes(40),
                  b'{"boot":"a","t_us":1,"seq":1,"ok":true,"recordings":[{"name":"stop-000001-x","cause":"x","wall_us":1,"log_bytes":9}]}',
-                 b'{"id":"a-1","heard_wall_us":5,"sentence":"x\\u001b[2J","number":4,"missed":true,"wall_us":7,"present":false,"cause":"y"}'],
-        "memory": [checked(b'{"format":"iwheel-ledger"}\n')],
-        "session": [b"".join(b"%s%s\n+5\n" % (b"q" if b'"drive"' in line or b'"twist"' in line else b"", line) for line in (text.encode() for text in said) if b'"cmd"' in line)],
-        "client": [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
+                 b'{"id":"a-1","heard_wall_us":5,"sentence":"x\\u001b[2J","number":4,"missed":true,"wall_us":7,"present":false,"cause":"y"}', *mqtt_odd()],
+        "memory": [checked(b'{"format":"iwheel-ledger"}\n')] + [ledger(item, b"") for item in memory_items()] + [ledger(b"", b'"%s":{"from":"%s","unit":"dN","offset_mN":%d,"drift_mN":%d,"deviation_mN":%d,"samples":%d,"wall_us":5}' % row)
+                   for row in ((b"left", b"estimated", 150, -900, 900, 40), (b"right", b"operator", -1200, 0, 0, 40), (b"right", b"wheel", -1200, 0, 0, 0), (b"right", b"stored", 0, 0, 0, 0))],
+        "session": [b"".join(b"%s%s\n+5\n" % (b"q" if b'"drive"' in line or b'"twist"' in line else b"", line) for line in (text.encode() for text in said) if b'"cmd"' in line), *relayed()],
+        "client": [b"\0" + told for told in states()] + [b"\x90" + told for told in greetings()] + [bytes([how]) + b"".join(line.encode() + b"\n" for line in said if "cmd" not in line) for how in (0, 1, 2, 7, 15, 16, 255)],
     }
 
 
@@ -58,13 +74,69 @@ def checked(text):
     return text + b"%08x\n" % zlib.crc32(text)
 
 
+def odd_values():
+    """Each section of the example, with one odd value for all its keys."""
+    sections = re.findall(r"^(\[\w+\])$(.*?)(?=^\[|\Z)", (ROOT / "share/gateway.conf").read_text(), re.M | re.S)
+    values = ("0", "1", "50", "4294967296", "012", "none", "yes", "dN", "low", "unix:/run/x", "'a'", "a b c", "27/2/", "")
+    return [f"{head}\n{''.join(f'{key} = {value}{chr(10)}' for key in re.findall(r'^;?([a-z][a-z_A-Z0-9]*) = ', rows, re.M))}".encode() for head, rows in sections for value in values]
+
+
+def states():
+    """What a gateway tells of itself, with values of each kind."""
+    wheel = {"heard": True, "at_rest": False, "speed_mm_s": -100, "commanded_mm_s": 0, "applied_mm_s": 5, "distance_mm": 7, "battery_dV": 240, "temperature_degC": 30, "speed_age_ms": 1, "force_age_ms": None,
+             "force_validity": "valid", "force_net_mN": -9}
+    return [json.dumps({"event": "state", "t_us": 1, "state": state, "cause": "x", "lease": lease, "estop": {"state": "released"}, "bus": {"state": "active"}, "left": wheel, "right": {**wheel, "heard": 0, "force_validity": "x"}}).encode() + b"\n"
+            for state in ("listening", "armed", "stopping", "latched", "x") for lease in ({"holder": 3, "remaining_ms": 9}, {"holder": None})]
+
+
+def greetings():
+    hello = {"event": "hello", "api": 1, "client": 3}
+    return [json.dumps(told).encode() + b"\n" for told in (hello, {**hello, "api": 2}, {**hello, "rights": "watch"}, {"ok": False, "error": "too_many_clients", "message": "later"}, {"ok": True}, {"event": "state"})] + [b"", b"x\n"]
+
+
+def mqtt_odd():
+    """Commands of every kind, as retained ones, of others, late, early, to a bridge that only watches; with a response topic and correlation data."""
+    def said(**more):
+        return b"\n" + json.dumps({"from": "a", "seq": 1, "boot": "0123456789abcdef", "t_us": 49900000} | more).encode()
+    verbs = ("hello", "stop", "estop", "arm", "drive", "twist", "reset", "why", "recordings", "recording", "fly")
+    fields = ({"ttl_ms": 0}, {"ttl_ms": 1001}, {"seq": 0}, {"t_us": -1}, {"t_us": 50000001}, {"t_us": 1}, {"boot": "0"}, {"boot": 5}, {"from": "a" * 33}, {"left_mm_s": 1.5}, {"reason": "x" * 300}, {"reason": None})
+    return [flag + verb.encode() + said() for verb in verbs for flag in (b"", b"!", b"#", b"-", b"+")] + [verb + said(**more) for more in fields for verb in (b"estop", b"drive")] + \
+        [b"stop\t" + topic + b"\tlabel" + said() for topic in (b"iwheel/w1/reply/b", b"iwheel/w2/reply/b", b"iwheel/w1/reply/b+", b"")] + [b"stop\tiwheel/w1/reply/b\t" + b"x" * 65 + said()]
+
+
+def memory_items():
+    """An entry of each kind, of the bus and of the operator, that can be."""
+    bus = (("setpoint_type", 1000, "255"), ("force_unit_left", 10000, "cN"), ("force_unit_right", 1000, "dN"), ("offset_included", 10000, "yes"), ("feedback_sign_left", 200, "yes"), ("feedback_sign_right", 200, "yes"),
+           ("gear_ratio", 1000, "3/2, rpm of the rotor"), ("pose_byte_order", 9000, "yes"), ("dlc", 7, "yes"))
+    against = (("force_unit_left", 1000, "cN"), ("offset_included", 0, "yes"), ("feedback_sign_left", -200, "yes"), ("gear_ratio", 500, "1"), ("pose_byte_order", 0, "yes"), ("dlc", 4, "yes"))
+    words = (("current_role", "limit", "setpoint"), ("mount_sign_left", "no", "yes"), ("wheel_radius", "192", "200"), ("track", "540", "600"), ("gear_ratio", "1, rpm of the wheel", "2/1"), ("setpoint_type", "1", ""))
+    row = '"%s":{"state":"%s","evidence":"%s","figure":%d,"value":"%s","found":"%s","since_wall_us":1%s}'
+    return [(row % (name, state, "bus", figure, value, "", "")).encode() for state, told in (("confirmed", bus), ("contradicted", against)) for name, figure, value in told] + \
+        [(row % (name, state, "operator", 0, value, found, ',"how":"measured"')).encode() for state in ("confirmed", "contradicted") for name, value, found in words]
+
+
 def memory():
     """What is known of the wheels: nothing, something, and with an offset."""
     items = (b"", b'"setpoint_type":{"state":"confirmed","evidence":"bus","figure":850,"value":"255","found":"","since_wall_us":0}',
              b'"force_unit_left":{"state":"confirmed","evidence":"bus","figure":11500,"value":"cN","found":"","since_wall_us":1760000000000000}')
     offset = b'"left":{"from":"wheel","unit":"cN","offset_mN":1200,"drift_mN":0,"deviation_mN":0,"samples":0,"wall_us":1760000000000000}'
     texts = [(item, b"") for item in items] + [(b",".join(items[1:]), offset)]
-    return [checked(b'{"format":"iwheel-ledger","version":1,"bus":"can0","items":{%s},"offsets":{%s}}\n' % text) for text in texts]
+    return [ledger(*text) for text in texts]
+
+
+def ledger(items, offsets):
+    return checked(b'{"format":"iwheel-ledger","version":1,"bus":"can0","items":{%s},"offsets":{%s}}\n' % (items, offsets))
+
+
+def relayed():
+    """What a board is told beside requests: by its relay, by a second client, of its configuration and of what is known."""
+    keys = ("wheels.gear_ratio=3/2", "wheels.gear_ratio=0/1", "wheels.track_mm=600", "drive.lease_ms=9999", "left.invert=yes", "left.invert=maybe", "wheels.current_role=setpoint", "wheels.rpm_of=rotor", "bus.bitrate=5", "drive.period_ms=")
+    config = b"".join(b'{"cmd":"config","key":"%s","value":"%s"}\n' % tuple(pair.encode().split(b"=")) for pair in keys)
+    confirm = b"".join(b'{"cmd":"confirm","id":4,"item":"%s","value":"%s","how":"x"}\n' % pair for pair in ((b"wheel_radius", b"192"), (b"track", b"9"), (b"current_role", b"setpoint"), (b"gear_ratio", b"1"), (b"dlc", b"yes"), (b"mount_sign_left", b"no")))
+    tare = b'+700\n{"cmd":"tare","side":"left"}\n{"cmd":"tare"}\n{"cmd":"why"}\n{"cmd":"recordings"}\n{"cmd":"status"}\n'
+    return [config + b'{"cmd":"config","commit":true}\n{"cmd":"config","commit":false}\n{"cmd":"config"}\n', config[:60] + b'{"cmd":"config","commit":true}\n+900\n', confirm, tare,
+            b'@{"cmd":"open","channel":2,"watch":true}\n2{"cmd":"arm"}\n2{"cmd":"stop","id":9}\n2{"cmd":"status"}\n@{"cmd":"close","channel":1}\n@{"cmd":"open","channel":1,"watch":false}\n',
+            b'@{"cmd":"open","channel":2,"watch":false}\n2{"cmd":"arm","takeover":true,"name":"b"}\n+60\n{"cmd":"arm"}\n2{"cmd":"disarm"}\n@{"cmd":"link"}\n@{"cmd":"open","channel":9}\n@{"ok":true}\n@x\n']
 
 
 def session():

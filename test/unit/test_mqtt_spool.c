@@ -175,6 +175,14 @@ static void test_spool_half_written_new_file_is_of_no_account(void) {
     TEST_ASSERT_NOT_EQUAL_INT(0, access(fresh, F_OK));
 }
 
+static void test_spool_number_that_no_event_can_have_is_damage(void) {
+    add(1);
+    mqtt_spool_confirm(&spool, UINT64_MAX);
+    reopen();
+    add(2);
+    expect(1, 2);
+}
+
 static void test_spool_full_drops_the_oldest_and_counts(void) {
     unsigned last = 0;
     while (spool.dropped < 10U) {
@@ -274,6 +282,7 @@ int main(void) {
     RUN_TEST(test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut);
     RUN_TEST(test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it);
     RUN_TEST(test_spool_half_written_new_file_is_of_no_account);
+    RUN_TEST(test_spool_number_that_no_event_can_have_is_damage);
     RUN_TEST(test_spool_full_drops_the_oldest_and_counts);
     RUN_TEST(test_spool_file_stays_bounded_however_many_come_and_go);
     RUN_TEST(test_spool_event_too_long_is_counted);
