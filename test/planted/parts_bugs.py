@@ -6,7 +6,7 @@ The rule is one of docs/safety-case.md, or the page of docs/ whose promise is br
 """
 from bugs import Bug
 
-MOTION, REQUESTS = ("unit_daemon_motion",), ("unit_daemon_requests",)
+MOTION, LOOKS, REQUESTS = ("unit_daemon_motion",), ("unit_daemon_looks",), ("unit_daemon_requests",)
 CAN, GPIO, CLOCK = ("unit_linux_socketcan",), ("unit_linux_gpio_estop",), ("unit_linux_clock",)
 LOOP, DISPATCH, SERVICE = "app/gateway/loop.c", "app/gateway/answers/dispatch.c", "app/gateway/clients/service.c"
 RIGHTS, WATCHERS = "northbound/src/request.c", ("unit_daemon_watchers",)
@@ -38,18 +38,18 @@ PARTS = [
     Bug("suspension-told-again", "R7", LOOP, "daemon->suspended_us = (suspended_us > daemon->suspended_us) ? suspended_us : daemon->suspended_us;", "", MOTION),
     Bug("estop-gone-unseen-between-setpoints", "R2", LOOP, "(daemon->wheels.hal.estop_ops->present && gw_wheels_are_sent_to(&daemon->wheels))", "false", MOTION),
     Bug("estop-edge-lost-in-the-wait", "R2", LOOP, "told.estop = told.estop || events[i].data.u64 == GW_TAG_ESTOP;", "", MOTION),
-    Bug("command-heard-without-its-edges", "R2", LOOP, "told.estop = told.estop || first != NULL;", "", MOTION),
-    Bug("late-command-heard-first", "R7", LOOP, "const bool due = wheels->now_us >= wheels->step_us || wheels->requested;", "const bool due = false;", MOTION),
+    Bug("command-heard-without-its-edges", "R2", LOOP, "told.estop = told.estop || first != NULL;", "", LOOKS),
+    Bug("late-command-heard-first", "R7", LOOP, "const bool due = wheels->now_us >= wheels->step_us || wheels->requested;", "const bool due = false;", LOOKS),
     Bug("command-heard-first-after-a-sleep", "R7", "app/gateway/wheels/wheels.c", "iw_gateway_suspended(&self->core, for_us); self->requested = true;",
-        "iw_gateway_suspended(&self->core, for_us);", MOTION),
+        "iw_gateway_suspended(&self->core, for_us);", LOOKS),
     Bug("sleep-unseen-by-one-clock", "R7", LOOP, "now_us < daemon->awaited_us + ASLEEP_US && now_us < daemon->clocks_us", "true", MOTION),
     Bug("time-goes-back", "R1", "app/gateway/wheels/wheels.c", "self->now_us = (now_us > self->now_us) ? now_us : self->now_us;", "self->now_us = now_us;", MOTION),
     Bug("signal-ends-at-once", "R4", LOOP, "daemon->wheels.shutting_down && !gw_wheels_are_sent_to(&daemon->wheels)", "daemon->wheels.shutting_down", MOTION),
     Bug("signal-ends-in-the-hold", "R4", LOOP, "daemon->wheels.shutting_down && !gw_wheels_are_sent_to(&daemon->wheels)",
         "daemon->wheels.shutting_down && iw_gateway_state(&daemon->wheels.core) != IW_STATE_ARMED && daemon->wheels.core.permit.view.output_zero", MOTION),
     Bug("signal-without-a-stop", "R4", LOOP, "gw_wheels_stop(&daemon->wheels, IW_CLIENT_NONE, IW_CAUSE_SHUTDOWN);", "", MOTION),
-    Bug("watchers-wait-for-frames", "R11", LOOP, "wheels->tape.tapped < GW_FRAMES && gw_clients_watching(&daemon->clients, IWN_TOPIC_FRAME) == 0U;", "wheels->tape.tapped < GW_FRAMES;", MOTION),
-    Bug("frames-wait-in-a-stop", "R7", LOOP, "daemon->frames_may_wait = !sending || driving;", "daemon->frames_may_wait = true;", MOTION),
+    Bug("watchers-wait-for-frames", "R11", LOOP, "wheels->tape.tapped < GW_FRAMES && gw_clients_watching(&daemon->clients, IWN_TOPIC_FRAME) == 0U;", "wheels->tape.tapped < GW_FRAMES;", LOOKS),
+    Bug("frames-wait-in-a-stop", "R7", LOOP, "daemon->frames_may_wait = !sending || driving;", "daemon->frames_may_wait = true;", LOOKS),
     Bug("frames-wait-too-long", "R7", LOOP, "daemon->look_us = sending ? evenly(seen->at_us, daemon->wheels.step_us, sending_us) : seen->at_us + REST_LOOK_US;", "daemon->look_us = seen->at_us + 4U * REST_LOOK_US;", MOTION),
     Bug("latched-hold-is-no-sending", "R3", "app/gateway/wheels/wheels.c", "return iw_gateway_is_sending(&self->core);", "return iw_gateway_is_sending(&self->core) && iw_gateway_state(&self->core) != IW_STATE_LATCHED;", MOTION),
     Bug("latch-goes-with-its-client", "R2", "core/src/permit.c", "if (client != self->holder) { return; }",

@@ -444,3 +444,14 @@ bool daemon_rig_marked(void) {
 iw_state_t daemon_rig_state(void) {
     return iw_gateway_state(&daemon_rig.daemon->wheels.core);
 }
+
+void daemon_rig_begin_driving(int client) {
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 500, 500, 1000);
+    TEST_ASSERT_EQUAL_INT(500, daemon_rig.told_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT(500, daemon_rig.told_mm_s[IW_RIGHT]);
+}
+
+bool daemon_rig_is_told_zero(void) {
+    return daemon_rig.told_mm_s[IW_LEFT] == 0 && daemon_rig.told_mm_s[IW_RIGHT] == 0;
+}

@@ -93,4 +93,10 @@ bool daemon_rig_marked(void);
 
 iw_state_t daemon_rig_state(void);
 
+/// Arms, and drives both wheels at 500 mm/s until they are told so.
+void daemon_rig_begin_driving(int client);
+
+/// Both were told zero last.
+bool daemon_rig_is_told_zero(void);
+
 #endif

@@ -123,7 +123,8 @@ static void test_tare_of_one_wheel_tells_of_that_wheel(void) {
 /// The daemon's own steps stand still: what a request does, and at which time, is its own doing.
 static void carry_out(const char *line) {
     gw_daemon_t *daemon = daemon_rig.daemon;
-    daemon->wheels.now_us = daemon_rig.now_us - 5000U; // Of a cycle that has gone on for a while.
+    daemon->wheels.now_us = daemon_rig.now_us - 5000U; // Of a cycle that has gone on for a while,
+    daemon->wheels.time_used = true;                   // and in which there was a request before.
     daemon->wheels.requested = false;
     daemon->clients.servant.carry_out(daemon->clients.servant.context, &daemon->clients.client[0], line, strlen(line));
 }
@@ -146,6 +147,7 @@ static void test_request_happens_when_it_is_carried_out_and_asks_for_a_step(void
     daemon_rig_arm(client);
     daemon_rig_drive(client, 100, 100, 100);
     daemon->wheels.now_us = daemon_rig.now_us - 5000U;
+    daemon->wheels.time_used = true;
     daemon->wheels.requested = false;
     daemon->clients.servant.leave(daemon->clients.servant.context, &daemon->clients.client[0]);
     TEST_ASSERT_EQUAL_UINT64(daemon_rig.now_us, gw_wheels_look(&daemon->wheels).stop->at_us);

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+// What wakes the daemon's loop, and what it looks at before anything leaves, in virtual time.
+#include "daemon_rig.h"
+
+#include "unity.h"
+
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+static int client;
+
+void setUp(void) {
+    daemon_rig_begin();
+    client = daemon_rig_connect();
+}
+
+void tearDown(void) {
+    (void)close(client);
+    daemon_rig_end();
+}
+
+/// Sent, and not read yet.
+static void say(const char *line) {
+    TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(client, line, strlen(line), MSG_NOSIGNAL));
+}
+
+/// Driving, and well between two pairs, so that nothing but what is said next is due.
+static void begin_driving_between_pairs(void) {
+    daemon_rig_begin_driving(client);
+    while (daemon_rig.now_us - daemon_rig.sent_us != MS(8)) {
+        daemon_rig_run(1);
+    }
+    daemon_rig.most_mm_s = 0;
+}
+
+#define SLOWER "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n"
+
+static void test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves(void) {
+    for (unsigned phase = 0; phase < 20U; phase++) {
+        daemon_rig_begin_driving(client);
+        daemon_rig_run(phase);
+        daemon_rig.most_mm_s = 0;
+        say(SLOWER);
+        daemon_rig.estop_silent = phase % 2U == 1U;
+        daemon_rig.estop = (phase % 4U < 2U) ? 1 : -1;
+        daemon_rig_run(1);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
+        tearDown();
+        setUp();
+    }
+}
+
+static void test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves(void) {
+    begin_driving_between_pairs();
+    daemon_rig.estop_late = true;
+    say(SLOWER);
+    daemon_rig_run(1);
+    TEST_ASSERT_FALSE(daemon_rig.estop_late);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
+}
+
+static void test_command_of_who_drives_leaves_after_one_look(void) {
+    begin_driving_between_pairs();
+    const uint32_t looks = daemon_rig.looks;
+    const uint32_t sent = daemon_rig.sent[IW_LEFT];
+    say(SLOWER);
+    daemon_rig_run(1);
+    TEST_ASSERT_EQUAL_UINT32(looks + 1U, daemon_rig.looks);
+    TEST_ASSERT_EQUAL_UINT32(sent + 1U, daemon_rig.sent[IW_LEFT]);
+    TEST_ASSERT_TRUE(daemon_rig.most_mm_s < 500);
+}
+
+static void test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next(void) {
+    begin_driving_between_pairs();
+    for (unsigned ms = 0; ms < 150U; ms++) {
+        const uint32_t sent = daemon_rig.sent[IW_LEFT];
+        daemon_rig_run(1);
+        TEST_ASSERT_TRUE(daemon_rig.now_us - daemon_rig.looked_us <= MS(3));
+        TEST_ASSERT_TRUE(daemon_rig.sent[IW_LEFT] == sent || daemon_rig.unlooked_us >= MS(2));
+    }
+}
+
+/// Taken for what it is: sent before the stop that it now comes behind.
+static void assert_refused_behind_a_stop(void) {
+    char reply[4096] = "";
+    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    (void)recv(client, reply, sizeof reply - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
+}
+
+static void test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop(void) {
+    begin_driving_between_pairs();
+    say(SLOWER);
+    daemon_rig.stolen_us = 150000U;
+    daemon_rig_run(1);
+    assert_refused_behind_a_stop();
+    daemon_rig_run(4000);
+    begin_driving_between_pairs();
+    say(SLOWER);
+    daemon_rig.suspended_us += 150000U;
+    daemon_rig_run(1);
+    assert_refused_behind_a_stop();
+}
+
+static void test_command_that_comes_with_the_estop_is_refused(void) {
+    daemon_rig_begin_driving(client);
+    daemon_rig.estop = 1;
+    const char *reply = daemon_rig_ask(client, "{\"cmd\":\"drive\",\"left_mm_s\":500,\"right_mm_s\":500}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":false"), reply);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+}
+
+static uint32_t waits_in_a_second(void) {
+    daemon_rig_run(100);
+    daemon_rig.waits = 0;
+    daemon_rig_run(1000);
+    return daemon_rig.waits;
+}
+
+static void test_frames_that_nobody_watches_are_taken_together(void) {
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, waits_in_a_second());
+    (void)close(client);
+    client = -1;
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(230, waits_in_a_second());
+}
+
+static void test_frames_that_somebody_watches_are_taken_one_by_one(void) {
+    (void)daemon_rig_ask(client, "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}");
+    TEST_ASSERT_GREATER_THAN_UINT32(450, waits_in_a_second());
+}
+
+static void test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop(void) {
+    daemon_rig_begin_driving(client);
+    daemon_rig.waits = 0;
+    daemon_rig_run(190);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(90, daemon_rig.waits);
+    daemon_rig.estop = 1;
+    daemon_rig_run(1);
+    daemon_rig.waits = 0;
+    daemon_rig_run(1000);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    TEST_ASSERT_GREATER_THAN_UINT32(450, daemon_rig.waits);
+}
+
+static void test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wait(void) {
+    for (unsigned phase = 0; phase < 20U; phase++) {
+        daemon_rig_begin_driving(client);
+        daemon_rig_run(phase);
+        TEST_ASSERT_TRUE(daemon_rig.daemon->frames_wait);
+        const iw_time_us_t before_us = daemon_rig.now_us;
+        daemon_rig.rx[daemon_rig.rx_count++] =
+            (iw_can_frame_t){.id = IW_ID_LEFT_SETPOINT, .dlc = 5, .kind = IW_CAN_RECEIVED};
+        daemon_rig_run(4);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        TEST_ASSERT_TRUE(daemon_rig.sent_us - before_us <= MS(4));
+        tearDown();
+        setUp();
+    }
+}
+
+static void test_estop_wakes_a_loop_that_lets_frames_wait(void) {
+    (void)close(client);
+    client = -1;
+    daemon_rig_run(100);
+    for (unsigned phase = 0; phase < 10U; phase++) {
+        daemon_rig_run(7);
+        const iw_time_us_t before_us = daemon_rig.now_us;
+        daemon_rig.estop = (daemon_rig.estop == 0) ? 1 : 0;
+        daemon_rig_run(1);
+        TEST_ASSERT_EQUAL_INT(daemon_rig.estop, daemon_rig.estop_told);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+        TEST_ASSERT_TRUE(daemon_rig.now_us - before_us <= MS(1));
+    }
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves);
+    RUN_TEST(test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves);
+    RUN_TEST(test_command_of_who_drives_leaves_after_one_look);
+    RUN_TEST(test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next);
+    RUN_TEST(test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop);
+    RUN_TEST(test_command_that_comes_with_the_estop_is_refused);
+    RUN_TEST(test_frames_that_nobody_watches_are_taken_together);
+    RUN_TEST(test_frames_that_somebody_watches_are_taken_one_by_one);
+    RUN_TEST(test_frames_are_taken_together_while_armed_and_one_by_one_in_a_stop);
+    RUN_TEST(test_foreign_setpoint_stops_the_wheels_within_milliseconds_though_frames_wait);
+    RUN_TEST(test_estop_wakes_a_loop_that_lets_frames_wait);
+    return UNITY_END();
+}
