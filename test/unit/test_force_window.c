@@ -44,6 +44,21 @@ static void test_force_quiet_window_estimates_the_offset_with_its_last_sample(vo
     TEST_ASSERT_EQUAL_INT32(0, iw_force_net_mN(&rig.force));
 }
 
+static void test_force_is_measured_of_the_wheel_that_is_asked_for(void) {
+    force_rig_t other;
+    force_rig_init(&other);
+    force_rig_quiet(&other, 40, -77);
+    force_rig_quiet(&rig, 40, 1234);
+    for (unsigned i = 0; i < 2U; i++) {
+        const iw_force_quality_t of_other = iw_force_measure(&other.force);
+        const iw_force_quality_t of_this = iw_force_measure(&rig.force);
+        TEST_ASSERT_EQUAL_INT32(-770, of_other.mean_mN);
+        TEST_ASSERT_EQUAL_INT32(12340, of_this.mean_mN);
+        TEST_ASSERT_EQUAL_UINT8(IW_FORCE_WINDOW_SAMPLES, of_this.samples);
+        TEST_ASSERT_EQUAL_INT(IW_WINDOW_GOOD, of_this.window);
+    }
+}
+
 static void test_force_units_are_per_side_as_documented_or_configured(void) {
     begin(IW_RIGHT, false);
     force_rig_quiet(&rig, 40, -77);
@@ -345,6 +360,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_force_begins_open_and_knows_nothing);
     RUN_TEST(test_force_quiet_window_estimates_the_offset_with_its_last_sample);
+    RUN_TEST(test_force_is_measured_of_the_wheel_that_is_asked_for);
     RUN_TEST(test_force_units_are_per_side_as_documented_or_configured);
     RUN_TEST(test_force_noise_up_to_1_N_is_quiet_and_more_is_noisy);
     RUN_TEST(test_force_never_heard_is_not_heard_when_time_has_just_begun);

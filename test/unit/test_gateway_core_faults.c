@@ -179,7 +179,9 @@ static void test_gateway_silent_wheel_latches_within_its_limit_and_a_period(void
         (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
         assert_latched(IW_CAUSE_WHEEL_LOST);
         TEST_ASSERT_EQUAL_UINT8((side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
+        const iw_time_us_t silent_us = stop()->at_us - rig.gateway.wheel[side].heard_us;
         TEST_ASSERT_UINT32_WITHIN(20, 60, stop()->detail);
+        TEST_ASSERT_EQUAL_UINT32(silent_us / 1000U, stop()->detail);
         gateway_rig_run(&rig, MS(1100));
         TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_LOST, gateway_rig_reset(&rig));
         tearDown();

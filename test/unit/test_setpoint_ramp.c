@@ -56,6 +56,16 @@ static void test_setpoint_braking_follows_time_at_every_period(void) {
     }
 }
 
+/// 35 minutes: in 32 bits slope and time would make a step of nothing.
+static void test_setpoint_braking_has_ended_after_any_pause(void) {
+    rig.config.decel_mm_s2 = 2048;
+    setpoint_rig_cruise(&rig, 1000, 1000, 2000);
+    setpoint_rig_demand(&rig, IW_DEMAND_BRAKE);
+    const iw_pair_t pair = setpoint_rig_take_after(&rig, MS(2097152));
+    TEST_ASSERT_EQUAL_INT(0, pair.wheel[IW_LEFT].speed_mm_s);
+    TEST_ASSERT_EQUAL_INT(0, pair.wheel[IW_RIGHT].speed_mm_s);
+}
+
 static void test_setpoint_ramps_count_fractions_of_a_millisecond(void) {
     setpoint_rig_follow(&rig);
     const iw_time_us_t start_us = rig.now_us;
@@ -341,6 +351,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_setpoint_acceleration_follows_time_at_every_period);
     RUN_TEST(test_setpoint_braking_follows_time_at_every_period);
+    RUN_TEST(test_setpoint_braking_has_ended_after_any_pause);
     RUN_TEST(test_setpoint_ramps_count_fractions_of_a_millisecond);
     RUN_TEST(test_setpoint_step_of_a_ramp_is_exact_to_the_microsecond);
     RUN_TEST(test_setpoint_ramp_that_has_hardly_begun_goes_on);
