@@ -65,8 +65,8 @@ PARTS = [
         "saturate(v_mm_s + rim_mm_s), saturate(v_mm_s - rim_mm_s)", REQUESTS),
     Bug("lease-from-when-it-was-read", "R1", DISPATCH, "gw_client_sent_us(call->client, wheels->now_us, armed_us)",
         "wheels->now_us; (void)armed_us", REQUESTS),
-    Bug("tare-tries-the-left-wheel-twice", "R9", "core/src/gateway.c", "iw_force_may_tare(&self->force[side], now_us)", "iw_force_may_tare(&self->force[IW_LEFT], now_us)", REQUESTS),
-    Bug("tare-of-the-other-wheel", "ledger", "core/src/gateway.c", "iw_force_tare(&self->force[side], now_us)", "iw_force_tare(&self->force[1U - side], now_us)", REQUESTS),
+    Bug("tare-tries-the-left-wheel-twice", "R9", "core/src/gateway.c", "iw_force_may_tare(force, now_us)", "iw_force_may_tare(&self->force[IW_LEFT], now_us)", REQUESTS),
+    Bug("tare-of-the-other-wheel", "ledger", "core/src/gateway.c", "iw_force_tare(force, now_us)", "iw_force_tare(&self->force[1U - side], now_us)", REQUESTS),
     Bug("armed-while-ending", "R4", DISPATCH, "if (wheels->shutting_down) {", "if (false) {", REQUESTS),
     Bug("contradicted-type-drives", "R8", "core/src/gateway.c", "self->ledger.doubt != IW_LEDGER_ITEMS", "self->ledger.doubt > IW_LEDGER_ITEMS", REQUESTS),
     # Clients.
