@@ -219,7 +219,7 @@ void gw_wakeup_close(gw_wakeup_t *self) {
 int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int max, iw_time_us_t now_us,
                    iw_time_us_t end_us) {
     daemon_rig_t *rig = &daemon_rig;
-    (void)now_us; // Here a cycle takes no time.
+    rig->wait_from_us = now_us; // Here a cycle takes no time.
     rig->waits++;
     rig->now_us += rig->stolen_us;
     rig->stolen_us = 0;

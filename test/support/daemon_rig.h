@@ -34,6 +34,7 @@ typedef struct {
     bool estop_late;             ///< Such edges come as soon as the next wait has found something else.
     bool estop_silent;           ///< The next change of it wakes nobody, as when a GPIO chip goes.
     uint32_t waits;              ///< Of the loop.
+    iw_time_us_t wait_from_us;   ///< What the last of them was told that it is; 0: nothing, it reads the clock.
     uint32_t looks;              ///< At the button.
     iw_time_us_t looked_us;      ///< When last.
     iw_time_us_t unlooked_us;    ///< For how long nobody had looked before the last setpoint's own look.

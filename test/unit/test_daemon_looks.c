@@ -75,6 +75,18 @@ static void test_command_of_who_drives_leaves_after_one_look(void) {
     TEST_ASSERT_TRUE(daemon_rig.most_mm_s < 500);
 }
 
+static void test_wait_reads_the_clock_while_setpoints_leave_and_else_goes_by_what_was_read(void) {
+    daemon_rig_run(100);
+    TEST_ASSERT_TRUE(daemon_rig.wait_from_us > 0U);
+    daemon_rig_begin_driving(client);
+    TEST_ASSERT_EQUAL_UINT64(0, daemon_rig.wait_from_us);
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(client, "{\"cmd\":\"stop\"}"), "\"ok\":true"));
+    daemon_rig_run(1000);
+    TEST_ASSERT_EQUAL_UINT64(0, daemon_rig.wait_from_us);
+    daemon_rig_run(5000);
+    TEST_ASSERT_TRUE(daemon_rig.wait_from_us > 0U);
+}
+
 static void test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next(void) {
     begin_driving_between_pairs();
     for (unsigned ms = 0; ms < 150U; ms++) {
@@ -186,6 +198,7 @@ int main(void) {
     RUN_TEST(test_estop_pressed_between_a_command_and_its_wake_is_seen_before_anything_leaves);
     RUN_TEST(test_estop_pulse_between_a_wake_and_its_command_is_seen_before_anything_leaves);
     RUN_TEST(test_command_of_who_drives_leaves_after_one_look);
+    RUN_TEST(test_wait_reads_the_clock_while_setpoints_leave_and_else_goes_by_what_was_read);
     RUN_TEST(test_no_look_comes_right_before_a_setpoint_and_none_is_far_from_the_next);
     RUN_TEST(test_command_that_waited_while_the_loop_stood_or_slept_comes_behind_the_stop);
     RUN_TEST(test_command_that_comes_with_the_estop_is_refused);
