@@ -179,8 +179,10 @@ static void advance(iw_setpoint_t *self, uint32_t elapsed_us) {
             axes[IW_SIDES + side].value = &self->current_uA[side];
             plan(&axes[IW_SIDES + side], target[side].current_mA * 1000, current_away, current_towards);
         }
+        advance_together(axes, AXES);
+    } else {
+        advance_together(axes, IW_SIDES);
     }
-    advance_together(axes, ramps_current ? AXES : (size_t)IW_SIDES);
 }
 
 static iw_time_us_t next_on_grid(const iw_setpoint_t *self, iw_time_us_t now_us) {
