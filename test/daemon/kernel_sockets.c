@@ -292,13 +292,20 @@ int __wrap_setsockopt(int fd, int level, int name, const void *value, socklen_t 
     return (int)vk_done(0);
 }
 
-static ssize_t give_can(const void *bytes, size_t size) {
+/// What waits at a socket is told by the next call, before the frames that still wait; a send sends nothing then.
+static int take_error(can_queue_t *queue) {
+    const int error = queue->error;
+    queue->error = 0;
+    return error;
+}
+
+static ssize_t give_can(can_queue_t *queue, const void *bytes, size_t size) {
     static const int errors[] = {ENOBUFS, EAGAIN, EINTR, 0};
     struct can_frame raw;
     memcpy(&raw, bytes, sizeof raw);
     iw_can_frame_t frame = {.id = raw.can_id, .dlc = raw.len};
     memcpy(frame.data, raw.data, sizeof frame.data);
-    const int fault = vk_call("send", errors) ? 0 : errno;
+    const int fault = vk_call("send", errors) ? take_error(queue) : errno;
     if (fault != 0) {
         world_sent(&frame, false);
     }
@@ -312,7 +319,7 @@ ssize_t __wrap_send(int fd, const void *bytes, size_t size, int flags) {
     (void)flags;
     switch (entry->kind) {
     case VK_CAN:
-        return give_can(bytes, size);
+        return give_can(&queues[entry->number & 1], bytes, size);
     case VK_STREAM:
         return give_stream(&vk.stream[entry->number], bytes, size);
     case VK_CHILD:
@@ -462,13 +469,6 @@ void vk_link_exist(bool exists) {
     vk.link.news++;
 }
 
-/// Told before the frames that still wait.
-static int take_error(can_queue_t *queue) {
-    const int error = queue->error;
-    queue->error = 0;
-    return (error != 0) ? error : (queue->count == 0U) ? EAGAIN : 0;
-}
-
 static void hand_over(can_queue_t *queue, struct mmsghdr *message) {
     const unsigned at = queue->first;
     struct msghdr *head = &message->msg_hdr;
@@ -498,7 +498,8 @@ int __wrap_recvmmsg(int fd, struct mmsghdr *messages, unsigned count, int flags,
     if (!vk_call("recvmmsg", errors)) {
         return -1;
     }
-    const int error = take_error(queue);
+    const int told = take_error(queue);
+    const int error = (told != 0) ? told : (queue->count == 0U) ? EAGAIN : 0;
     if (error != 0) {
         errno = error;
         return (int)vk_done(-1);
