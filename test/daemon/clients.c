@@ -54,8 +54,18 @@ void clients_begin(uint64_t seed) {
     sim_random_init(&dice, seed ^ UINT64_C(0xC11E));
 }
 
+/// Nobody follows what the process reads of it from now on: an arm that it has not read yet may still be carried out.
+static void say_what_waits(const client_t *client) {
+    for (unsigned i = 0; i < client->marks; i++) {
+        if (client->mark[i].what == SAID_ARM) {
+            judge_said((unsigned)client->stream, SAID_ARM);
+        }
+    }
+}
+
 static void hang_up(client_t *client, bool half) {
     if (client->stream >= 0) {
+        say_what_waits(client);
         vk_stream_t *stream = &vk.stream[client->stream];
         stream->shut = true;
         stream->client_end = stream->client_end || !half;
