@@ -418,7 +418,8 @@ iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {
     const iw_config_t *const config = self->config;
     if (iw_permit_arming(self)) {
-        return self->arming_us + config->echo_ms * IW_US_PER_MS;
+        const uint32_t echo_us = config->echo_ms * IW_US_PER_MS;
+        return self->arming_us + echo_us;
     }
     if (self->phase == IW_PHASE_ARMED) {
         return self->lease_until_us;
