@@ -203,26 +203,24 @@ static void test_crowd_of_watchers_that_asks_without_end_costs_a_driver_nothing(
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-static unsigned replies_of(int client) {
+/// How often `words` stand in what waits for it, which is taken.
+static unsigned taken_with(int client, const char *words) {
     static char text[1U << 20];
     unsigned count = 0;
     const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
     text[(length > 0) ? length : 0] = '\0';
-    for (const char *at = strstr(text, "\"ok\":"); at != NULL; at = strstr(at + 1, "\"ok\":")) {
+    for (const char *at = strstr(text, words); at != NULL; at = strstr(at + 1, words)) {
         count++;
     }
     return count;
 }
 
+static unsigned replies_of(int client) {
+    return taken_with(client, "\"ok\":");
+}
+
 static unsigned frames_of(int client) {
-    static char text[1U << 20];
-    unsigned count = 0;
-    const ssize_t length = recv(client, text, sizeof text - 1U, MSG_DONTWAIT);
-    text[(length > 0) ? length : 0] = '\0';
-    for (const char *at = strstr(text, "\"event\":\"frame\""); at != NULL; at = strstr(at + 1, "\"event\":\"frame\"")) {
-        count++;
-    }
-    return count;
+    return taken_with(client, "\"event\":\"frame\"");
 }
 
 /// In how many of the next 200 ms frames came to it, and how many.
