@@ -72,7 +72,7 @@ class Boot:
 
     def command(self, kernel):
         plan, folder, name = self.plan, self.folder, self.name
-        command = [kernel, f"mem={plan.get('memory_MB', 384)}M", "rootfstype=hostfs", "rootflags=/", "rw"]
+        command = [kernel, f"mem={plan.get('memory_MB', 384)}M", "root=none", "rootfstype=hostfs", "rootflags=/", "rw"]
         command += [f"init={os.path.join(HERE, 'init')}", "con0=fd:0,fd:1", "con=null", "quiet", "random.trust_cpu=on"]
         command += [f"uml_dir={folder}", f"umid={name}", "panic=-1"]
         command += ["time-travel=inf-cpu"] if plan["virtual"] else []
