@@ -56,7 +56,7 @@ class Parts:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         return chosen, out, None if done.returncode == 0 else done.stderr
 
-    def link(self, program, source, changed, out, flags=("-O1",), more=()):
+    def link(self, program, source, changed, out, flags=("-O1",)):
         """None, or why that program cannot be had with the changed file."""
         folder, words = self.link_of(program)
         inside = {(folder / word) for word in words if word.endswith(".o")}
@@ -67,7 +67,7 @@ class Parts:
         words[words.index("-o") + 1] = str(out)
         if chosen not in inside:
             words.insert(1, str(changed_object))
-        done = subprocess.run([*words, *more], cwd=folder, capture_output=True, text=True)
+        done = subprocess.run([*words, "-s"], cwd=folder, capture_output=True, text=True)
         return None if done.returncode == 0 else f"does not link: {done.stderr}"
 
     def change(self, name, file, text):
