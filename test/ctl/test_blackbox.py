@@ -20,6 +20,7 @@ import unittest
 import zlib
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
+import several  # noqa: E402
 from client import Streamer  # noqa: E402
 from harness import Rig, find_program  # noqa: E402
 
@@ -497,9 +498,4 @@ class Learn(WithRig):
 
 if __name__ == "__main__":
     BUILD = os.path.abspath(sys.argv.pop(1))
-    program = unittest.main(verbosity=2, exit=False)
-    if failed := [case for case, _ in program.result.failures + program.result.errors]:
-        print("once more, alone, what may have been starved:", file=sys.stderr)
-        again = unittest.TextTestRunner(verbosity=2).run(unittest.TestSuite(type(case)(case._testMethodName) for case in failed))
-        sys.exit(0 if again.wasSuccessful() else 1)
-    sys.exit(0 if program.result.testsRun > 0 else 1)
+    several.main(BUILD)

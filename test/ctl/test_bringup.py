@@ -4,9 +4,8 @@
 
 Usage: test_bringup.py BUILD [unittest's arguments]
 
-Without further arguments several tests run at a time, each in a process of its own: they wait more than they work.
+Without further arguments several tests run at a time.
 """
-import concurrent.futures
 import os
 import shutil
 import signal
@@ -16,6 +15,7 @@ import tempfile
 import time
 import unittest
 
+import several
 from operator_at_terminal import Operator
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
@@ -755,29 +755,6 @@ class Bringup(unittest.TestCase):
             self.assertEqual(64, done.returncode, (words, done.stderr))
 
 
-def run_one(name):
-    """(name, exit code, output)"""
-    done = subprocess.run([sys.executable, os.path.abspath(__file__), BUILD, f"Bringup.{name}"], capture_output=True,
-                          text=True, check=False)
-    return name, done.returncode, done.stderr
-
-
-def run_all(at_a_time=4):
-    """What fails among others is judged once more, alone: these tests run in real time."""
-    names = unittest.TestLoader().getTestCaseNames(Bringup)
-    with concurrent.futures.ThreadPoolExecutor(at_a_time) as pool:
-        again = [name for name, code, _ in pool.map(run_one, names) if code]
-    failed = 0
-    for name in again:
-        _, code, output = run_one(name)
-        print(f"{'ok, alone' if code == 0 else 'FAIL'} {name}", output if code else "", flush=True)
-        failed += code != 0
-    print(f"{len(names) - failed} passed, {failed} failed, 0 skipped")
-    return 1 if failed else 0
-
-
 if __name__ == "__main__":
     BUILD = sys.argv.pop(1)
-    if len(sys.argv) > 1:
-        unittest.main()
-    sys.exit(run_all())
+    several.main(BUILD, at_a_time=8)

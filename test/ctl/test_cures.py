@@ -17,6 +17,7 @@ import unittest
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "test", "system"))
+import several  # noqa: E402
 from harness import Rig, find_program  # noqa: E402
 
 BUILD = ""
@@ -501,4 +502,4 @@ class Check(unittest.TestCase):
 
 if __name__ == "__main__":
     BUILD = sys.argv.pop(1)
-    unittest.main()
+    several.main(BUILD)
