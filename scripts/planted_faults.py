@@ -178,6 +178,19 @@ def house(folder, fault):
     return run(sys.executable, folder / "scripts/house.py", folder)
 
 
+def planted_texts(folder, fault):
+    """The tree, by links, with one change: file, what stands there, what stands there then."""
+    file, old, new = fault
+    for entry in ROOT.iterdir():
+        if entry.name != Path(file).parts[0]:
+            (folder / entry.name).symlink_to(entry)
+    shutil.copytree(ROOT / Path(file).parts[0], folder / Path(file).parts[0])
+    text = (folder / file).read_text()
+    assert old in text, f"{file} no longer has {old}"
+    (folder / file).write_text(text.replace(old, new, 1))
+    return run(sys.executable, SCRIPTS / "planted_texts.py", folder)
+
+
 def api(folder, fault):
     """The reference of small copies of the headers' folders, of which one is `fault`."""
     for name in ("core", "northbound", "client/c", "port/linux"):
@@ -421,6 +434,12 @@ CASES = [
     (dialect, "python3", "++ before a name", function("    ++a;\n    return a;\n"), True),
     (dialect, "python3", "a comparison that chooses", function("    return a > 1 ? a : 0;\n"), True),
     (dialect, "python3", "parentheses around what is no type", function("    return (int)sizeof(a);\n"), True),
+    (planted_texts, "python3", "clean", ("core/src/step.c", "#include", "#include"), False),
+    (planted_texts, "python3", "a text of test/fuzz/run is gone", ("core/src/codec.c", "wheel->pose.x_mm, wheel->pose.y_mm", "pose->x_mm, pose->y_mm"), True),
+    (planted_texts, "python3", "a text of test/planted/bugs.py stands twice", ("core/src/sender.c", "const bool invert =", "const int answer = self->hal->purge(self->hal->context); const bool invert ="), True),
+    (planted_texts, "python3", "a text of test/planted/parts_bugs.py is gone", ("app/gateway/loop.c", "events[i].data.u64 == GW_TAG_ESTOP", "events[i].data.u32 == GW_TAG_ESTOP"), True),
+    (planted_texts, "python3", "a text of test/target/planted_bugs.py is gone", ("port/stm32_stub/answers.c", "!iw_host_is_silent(self)", "!is_silent(self)"), True),
+    (planted_texts, "python3", "a text of planted_faults.py itself is gone", ("docs/northbound.md", "a wheel turns |", "a wheel is turning |"), True),
     (house, "gcc", "clean", ("port/stm32_stub/lamp.c", "#include", "#include"), False),
     (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\nint iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}'), True),
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),

@@ -165,8 +165,8 @@ a time, and somebody must see it: a unit test (of those that need only the core)
 optimising compiler (gcc -O2, -O3, -Os, clang -O2) makes the same object of is the same program: there is nothing to see. A mutant counts as *endless* if a
 test that ends with the core as it is uses more than ten times its processor time and three seconds more.
 
-`./check mutation` judges every mutant of a function that has changed since, or that was seen by a test that has changed since, and a sample of the others; it
-fails if one lives that [equivalent.txt](../test/mutation/equivalent.txt) does not name. Functions that stand in headers (reading and writing of frames) are
+`./check mutation` judges every mutant of a function that has changed since, or that was seen by a test that has changed since, and a sample of 130 of the others, each
+day another; it fails if one lives that [equivalent.txt](../test/mutation/equivalent.txt) does not name. Functions that stand in headers (reading and writing of frames) are
 changed in whoever includes them, in the tests too; of these gcc -Os, which leaves parts of them out, proves nothing.
 """
 COLUMNS = ["unit tests", *MEANS, "endless", "same code", "equivalent", "alive"]

@@ -5,6 +5,7 @@ Those of everything around the core are in parts_bugs.py.
 What stands in a file is told by a few words of code; blanks and line ends between them do not matter, and they must
 occur exactly once in the file.
 """
+import re
 from typing import NamedTuple
 
 
@@ -15,6 +16,12 @@ class Bug(NamedTuple):
     before: str
     after: str
     tests: tuple = ()  # Around the core: the tests that must fail, each of them.
+
+
+def find_code(text, words):
+    """Where these words of code stand, whatever blanks are between them."""
+    parts = re.findall(r"\w+|[^\w\s]", words)
+    return [match.span() for match in re.finditer(r"\s*".join(map(re.escape, parts)), text)]
 
 
 BUGS = [

@@ -27,16 +27,17 @@ WHICH = "which.c"
 # A judge is stopped when it has used so many times the processor time it needs with the core as it is, and so many seconds more:
 # far beyond what a busy machine can add, so that only what does not end is taken for an endless loop.
 TIMES, MORE_S, UNMEASURED_S = 10, 3, 600
+WAIT_S = 3600 # By the clock: who waits for ever uses no processor.
 OUTPUT_MAX = 64 << 20
 GCC = ["ccache", "gcc"] if shutil.which("ccache") else ["gcc"]
 # A change that reads or writes beyond an array must not pass unseen: it ends the program.
 BOUNDS = ("-fsanitize=bounds-strict,shift,signed-integer-overflow", "-fsanitize-undefined-trap-on-error")
 # What is read without having been written is the same in every run.
 PATTERN = ("-ftrivial-auto-var-init=pattern",)
-# By these signals a program ends because of what the core did; any other is somebody else's doing and proves nothing.
-CRASHES = {signal.SIGILL, signal.SIGTRAP, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT}
+# By these signals a program ends because of what was changed; any other is somebody else's doing and proves nothing.
+CRASHES = {signal.SIGILL, signal.SIGTRAP, signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE}
 NUMBER = "IWHEEL_MUTANT"
-ENDLESS = {signal.SIGXCPU, signal.SIGXFSZ}
+ENDLESS = {signal.SIGXCPU, signal.SIGXFSZ, signal.SIGALRM}
 # Unit tests that sweep every value come last: most changes are caught long before them.
 SLOW = ("confirmation", "gateway_core_walk", "bit_timing", "codec_sweep", "envelope_scheduler")
 
@@ -72,6 +73,7 @@ def play(command, core, limit_s):
         resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 5))
         resource.setrlimit(resource.RLIMIT_FSIZE, (OUTPUT_MAX, OUTPUT_MAX))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        signal.alarm(WAIT_S) # Kept through exec.
 
     with tempfile.TemporaryFile() as said:
         child = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.DEVNULL, cwd=core.folder,
@@ -83,6 +85,11 @@ def play(command, core, limit_s):
     if run.status < 0 and -run.status not in CRASHES | ENDLESS:
         raise RuntimeError(f"{command[0]} was ended from outside: {run.how}")
     return run
+
+
+def limit_s(unchanged):
+    """Seconds of processor time for what took so much as it is."""
+    return int(TIMES * unchanged.cpu_s) + MORE_S
 
 
 def compile_file(source, out, *flags, gcc=("gcc",), include=tuple(INCLUDE)):
@@ -98,7 +105,7 @@ class Judges:
         self.work, self.jobs = Path(work), jobs
         self.clean = Core(self.work / "clean")
         self.clean.folder.mkdir(parents=True, exist_ok=True)
-        self.unity, self.objects, self.limits, self.lock = unity, {}, {}, threading.Lock()
+        self.unity, self.objects, self.as_it_is, self.lock = unity, {}, {}, threading.Lock()
         self.tests = core_tests()
         sim = sorted((ROOT / "test/sim").glob("*.c"))
         programs = {f"unit_{name}": [*map(Path, sources), Path(unity) / "unity.c"] for name, sources in self.tests.items()}
@@ -182,21 +189,21 @@ class Judges:
             self.build(program, objects, folder)
         return folder / program
 
-    def limit_s(self, command, core):
-        """Seconds of processor time for it: measured once, with the core as it is. Held: the lock."""
-        if command not in self.limits:
+    def unchanged(self, command, core):
+        """How it ends with the core as it is, played once. Held: the lock."""
+        if command not in self.as_it_is:
             clean = core._replace(number=0) if core.has_judges else self.clean
             done = play(command, clean, UNMEASURED_S)
             if done.status != 0 and core.has_judges:
                 raise RuntimeError(f"{command[0].name}, built for changed headers of which none is in force, {done.how}")
-            self.limits[command] = int(TIMES * done.cpu_s) + MORE_S
-        return self.limits[command]
+            self.as_it_is[command] = done
+        return self.as_it_is[command]
 
     def run(self, core, program, *arguments):
         with self.lock:
             command = (self.judge_of(core, program), *arguments)
-            limit_s = self.limit_s(command, core)
-        return play(command, core, limit_s)
+            unchanged = self.unchanged(command, core)
+        return unchanged if core == self.clean else play(command, core, limit_s(unchanged))
 
     def failing(self, core, names):
         """(the first of these programs that fails, its first failing test, how it ended), or None."""

@@ -7,16 +7,16 @@ own. The tree and the build are never touched.
 """
 import json
 import re
-import resource
 import shlex
-import signal
 import subprocess
+import threading
 from pathlib import Path
+
+from core_build import UNMEASURED_S, Core, limit_s, play
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 # What a test is to be asked beside its name.
 ARGUMENTS = {"test_daemon": ["--quick", "--kills", "500"]}
-CPU_S, TIMEOUT_S = 60, 1200  # Of tests that take less than a second; by the clock they may take long.
 
 
 def output_of(words):
@@ -28,6 +28,7 @@ class Parts:
 
     def __init__(self, build, work):
         self.build, self.work = Path(build).resolve(), Path(work)
+        self.as_it_is, self.lock = {}, threading.Lock()
         self.commands = {}  # {source: {object: (folder, words)}}
         for entry in json.loads((self.build / "compile_commands.json").read_text()):
             words, folder = shlex.split(entry["command"]), Path(entry["directory"])
@@ -55,7 +56,7 @@ class Parts:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         return chosen, out, None if done.returncode == 0 else done.stderr
 
-    def link(self, program, source, changed, out, flags=("-O1",), more=()):
+    def link(self, program, source, changed, out, flags=("-O1",)):
         """None, or why that program cannot be had with the changed file."""
         folder, words = self.link_of(program)
         inside = {(folder / word) for word in words if word.endswith(".o")}
@@ -66,7 +67,7 @@ class Parts:
         words[words.index("-o") + 1] = str(out)
         if chosen not in inside:
             words.insert(1, str(changed_object))
-        done = subprocess.run([*words, *more], cwd=folder, capture_output=True, text=True)
+        done = subprocess.run([*words, "-s"], cwd=folder, capture_output=True, text=True)
         return None if done.returncode == 0 else f"does not link: {done.stderr}"
 
     def change(self, name, file, text):
@@ -76,31 +77,30 @@ class Parts:
         changed.write_text(text)
         return changed
 
+    def unchanged(self, test):
+        """How the program ends as it was built, played once."""
+        with self.lock:
+            if test not in self.as_it_is:
+                folder, words = self.link_of(test)
+                self.as_it_is[test] = play([folder / output_of(words), *ARGUMENTS.get(test, [])], Core(self.work), UNMEASURED_S)
+            return self.as_it_is[test]
+
     def judge(self, test, source=None, changed=None):
         """(what that test finds or None, None), or (None, why it cannot be told). Without a change: the program as it was built."""
+        unchanged = self.unchanged(test)
         if changed is None:
-            folder, words = self.link_of(test)
-            return find_failure(folder / output_of(words), self.work), None
+            return first_failure(unchanged), None
         program = changed.parent / test
         why = self.link(test, source, changed, program)
-        return (None, why) if why else (find_failure(program, changed.parent), None)
+        return (None, why) if why else (first_failure(play([program, *ARGUMENTS.get(test, [])], Core(changed.parent), limit_s(unchanged))), None)
 
 
-def find_failure(program, folder):
+def first_failure(run):
     """The first test that fails, or how the program ended; None if it passed."""
-    try:
-        done = subprocess.run([str(program), *ARGUMENTS.get(program.name, [])], cwd=folder, capture_output=True, text=True, errors="replace",
-                              stdin=subprocess.DEVNULL, timeout=TIMEOUT_S, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S + 5)))
-    except subprocess.TimeoutExpired:
-        return "does not end"
-    if done.returncode == -signal.SIGXCPU:
-        return "does not end"
-    if done.returncode == 0:
-        return None
-    found = re.search(r":(test_\w+):FAIL", done.stdout)
+    if run.status == 0 or run.endless:
+        return run.how if run.endless else None
+    found = re.search(r":(test_\w+):FAIL", run.output)
     if found:
         return found[1]
-    found = re.search(r"^FAILED seed (\d+) .* rule (\d+): ", done.stdout, re.M)
-    if found:
-        return f"rule {found[2]} of seed {found[1]}"
-    return f"ends by {signal.Signals(-done.returncode).name}" if done.returncode < 0 else f"ends with status {done.returncode}"
+    found = re.search(r"^FAILED seed (\d+) .* rule (\d+): ", run.output, re.M)
+    return f"rule {found[2]} of seed {found[1]}" if found else run.how

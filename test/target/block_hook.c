@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The emulated CPU's clock: called by Unicorn before each block of code, half a million times in a second of virtual time.
+// The emulated CPU's clock: called by Unicorn before each block of code, half a million times in a second of virtual time. And what ends
+// a run of code for another reason: an exception's end, or an abort.
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -10,10 +11,12 @@ typedef struct {
     int64_t spent; ///< Cycles since the user set it to 0.
     int32_t is_asked_to_stop;
     int32_t has_stopped;
+    int32_t trap;              ///< Unicorn's number of what ended the run, or -1.
     int (*stop)(void *engine); ///< uc_emu_stop.
 } block_clock_t;
 
 void block_hook(void *engine, uint64_t address, uint32_t size, void *clock);
+void trap_hook(void *engine, uint32_t number, void *clock);
 
 void block_hook(void *engine, uint64_t address, uint32_t size, void *clock) {
     block_clock_t *const self = clock;
@@ -26,4 +29,10 @@ void block_hook(void *engine, uint64_t address, uint32_t size, void *clock) {
     }
     self->left -= cycles;
     self->spent += cycles;
+}
+
+void trap_hook(void *engine, uint32_t number, void *clock) {
+    block_clock_t *const self = clock;
+    self->trap = (int32_t)number;
+    (void)self->stop(engine);
 }

@@ -7,6 +7,7 @@ usage: emulate.py MODEL_LIBRARY BUILDS [BOARD[.SCENARIO]]...
 BUILDS holds BOARD-IMAGE.elf for the boards and images that scenarios.py names; test/target/run makes them. Without names, what is long and the same on both families runs on the first board only, unless IWHEEL_FULL is 1.
 Needs the Python package unicorn. The last line is "N passed, N failed, N skipped".
 """
+import gc
 import os
 import re
 import subprocess
@@ -20,6 +21,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.dont_write_bytecode = True
 
+import beginnings
 import scenarios
 import symbols
 from emulator.boards import BOARDS
@@ -42,6 +44,7 @@ class Rig:
             self.machine.watchdog.lsi_hz = self.machine.board.lsi_limits_hz[oscillator]
         self.addresses, self.stack_area, self.elf = symbols.addresses(elf), symbols.stack_area(elf), elf
         self.notes, self.expected_resets = [], []
+        self.begun = None # See beginnings.py.
 
     def run(self, span_ns):
         self.machine.run(span_ns)
@@ -91,40 +94,69 @@ class Rig:
         assert not foreign, f"ids sent that are not ours: {foreign}"
 
 
-def play(task):
-    """(name, error or None, notes, seconds)"""
-    library, folder, board, image, scenario = task
-    Machine.library = Controller.library = load_model(library)
-    started, name = time.time(), f"{board}.{scenario.__name__}"
+def attempt(function, *arguments):
+    """None, or what went wrong."""
     try:
-        rig = Rig(board, Path(folder) / f"{board}-{image}.elf", scenarios.OSCILLATOR.get(scenario))
-        scenario(rig)
-        rig.judge()
-        return name, None, rig.notes, time.time() - started
+        function(*arguments)
     except AssertionError as error:
         line = traceback.extract_tb(error.__traceback__)[-1]
-        return name, f"{error or line.line} (line {line.lineno} of {Path(line.filename).name})", [], time.time() - started
+        return f"{error or line.line} (line {line.lineno} of {Path(line.filename).name})"
     except Exception:
-        return name, traceback.format_exc(), [], time.time() - started
+        return traceback.format_exc()
+    return None
+
+
+def judge(rig, scenario):
+    """(error or None, notes, seconds)"""
+    started = time.time()
+
+    def play():
+        scenario(rig)
+        rig.judge()
+    return attempt(play), rig.notes, time.time() - started
+
+
+def play(group):
+    """[(name, error or None, notes, seconds)] of scenarios that begin alike."""
+    library, folder, board, image, oscillator, several = group
+    Machine.library = Controller.library = load_model(library)
+    gc.disable() # It takes a twentieth of the time, and has little to find before the end.
+    rig = Rig(board, Path(folder) / f"{board}-{image}.elf", oscillator)
+    failed = attempt(beginnings.run, rig, beginnings.of(several[0]))
+    verdicts = []
+    for scenario in several:
+        verdict = (failed, [], 0) if failed else beginnings.apart(judge, rig, scenario) or ("it ended without a verdict", [], 0)
+        verdicts.append((f"{board}.{scenario.__name__}", *verdict))
+    del rig
+    gc.collect()
+    return verdicts
+
+
+def groups(chosen, full):
+    """(board, image, the watchdog's oscillator, scenarios that begin alike), the largest first."""
+    found = {}
+    for board in BOARDS:
+        for image, several in scenarios.BY_BOARD[board].items():
+            for scenario in several:
+                if board in chosen or f"{board}.{scenario.__name__}" in chosen or not chosen and (
+                        full or board != "stm32f407" or scenario not in scenarios.LONG):
+                    found.setdefault((board, image, scenarios.OSCILLATOR.get(scenario), beginnings.of(scenario)), []).append(scenario)
+    return sorted(((*alike[:3], several) for alike, several in found.items()), key=lambda group: -len(group[3]))
 
 
 def main(arguments):
     if len(arguments) < 3:
         sys.exit(__doc__)
-    library, folder, chosen = Path(arguments[1]).resolve(), arguments[2], arguments[3:]
-    full = os.environ.get("IWHEEL_FULL") == "1"
-    tasks = [(library, folder, board, image, scenario)
-             for board in BOARDS for image, several in scenarios.BY_BOARD[board].items() for scenario in several
-             if board in chosen or f"{board}.{scenario.__name__}" in chosen
-             or not chosen and (full or board != "stm32f407" or scenario not in scenarios.LONG)]
-    failed = 0
+    tasks = [(Path(arguments[1]).resolve(), arguments[2], *group) for group in groups(arguments[3:], os.environ.get("IWHEEL_FULL") == "1")]
+    passed = failed = 0
     with ProcessPoolExecutor(2) as pool:
-        for name, error, notes, seconds in pool.map(play, tasks):
-            failed += error is not None
-            told = f"FAIL: {error}" if error else "ok" + "".join(f", {note}" for note in notes)
-            print(f"{name:<36} {seconds:5.1f} s  {told}", flush=True)
-    print(f"{len(tasks) - failed} passed, {failed} failed, 0 skipped")
-    return 1 if failed or not tasks else 0
+        for verdicts in pool.map(play, tasks):
+            for name, error, notes, seconds in verdicts:
+                passed, failed = passed + (error is None), failed + (error is not None)
+                told = f"FAIL: {error}" if error else "ok" + "".join(f", {note}" for note in notes)
+                print(f"{name:<36} {seconds:5.1f} s  {told}", flush=True)
+    print(f"{passed} passed, {failed} failed, 0 skipped")
+    return 1 if failed or not passed else 0
 
 
 if __name__ == "__main__":

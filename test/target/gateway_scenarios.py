@@ -2,6 +2,7 @@
 """What the image `gateway` must do: a host drives it over the serial line, and the line, the relay and the clients fail in every way."""
 import random
 
+import beginnings
 from emulator.can import LEFT
 from emulator.chip import MS, PINRSTF, US
 from host import Host, framed
@@ -26,12 +27,14 @@ def assert_stops(rig, since_ns, within_ns, after_ns=SECOND):
     assert rig.setpoints(since_ns), "no zeros were sent"
 
 
+@beginnings.shared
 def start(rig, channel=1):
     host = Host(rig)
     host.begin(channel)
     return host
 
 
+@beginnings.shared
 def start_driving(rig, span_ms=400):
     """A host whose client 1 drives."""
     host = start(rig)

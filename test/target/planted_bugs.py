@@ -99,7 +99,7 @@ IMAGE = {
     "who may only watch may drive": ("answers.c", "client->watches_only && !may_watch", "false && !may_watch", "gateway", "nobody_feeds_another"),
     "a line is written over while it is being sent": ("serial.c", "    return lent != NULL;\n", "    return false;\n", "gateway", "crowd"),
     "two power-ons have one name": ("boot.c", "((uint64_t)power_ons << 32)", "0U", "gateway", "power_cut_while_writing"),
-    "a configuration is written while the wheels turn": ("answers.c", "    if (!is_silent(self)) {\n", "    if (false) {\n", "gateway", "config_in_flash"),
+    "a configuration is written while the wheels turn": ("answers.c", "    if (!iw_host_is_silent(self)) {\n", "    if (false) {\n", "gateway", "config_in_flash"),
     "what is learnt is written while something can move": ("host.c", "if (!iw_host_is_silent(self) || self->learn_us", "if (self->learn_us", "gateway", "learnt_in_flash"),
     "what is learnt is not put in force": ("host.c", "        iw_learnt_restore(&learnt, &self->place.settings, self->place.gateway, self->zero);\n", "", "gateway", "learnt_in_flash"),
     "half a record counts": ("store.c", "read(page, slot, CRC_AT) == crc_of(page, slot)", "true", "gateway", "power_cut_while_writing"),

@@ -5,6 +5,7 @@ Verdicts are passed on the bus, the lamp and the count of resets: on what can be
 """
 import re
 
+import beginnings
 import gateway_scenarios
 import host
 from emulator.can import LEFT, RIGHT, Frame
@@ -47,6 +48,7 @@ def assert_lamp_steady_since(rig, span_ns):
     assert changes[-1][1] and rig.machine.now_ns - changes[-1][0] >= span_ns, "not armed any more"
 
 
+@beginnings.shared
 def arm(rig, within_ns=SECOND):
     rig.run(within_ns)
     frames = rig.setpoints()
@@ -77,6 +79,7 @@ def press_button(rig, span_ns=60 * MS):
     rig.machine.board.drive("button", None)
 
 
+@beginnings.shared
 def start_demo(rig):
     arm(rig)
     press_button(rig)

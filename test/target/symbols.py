@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Where a field of a structure is in the image's RAM, asked of the compiler and of the linker."""
+import functools
 import re
 import subprocess
 from pathlib import Path
@@ -18,6 +19,7 @@ FIELDS = {
 }
 
 
+@functools.cache
 def offsets():
     """{name: offset in its structure}; every one is an uint32_t."""
     probe = '#include "bxcan.h"\n#include "iwheel/gateway.h"\n'

@@ -9,6 +9,7 @@ from .lamp import Lamp
 BLOCK_SIZE = 0x400
 IRQ_EXTI0, IRQ_TRANSMIT, IRQ_RECEIVE, IRQ_ERROR = 6, 19, 20, 22
 IRQ_SERIAL_RECEIVE, IRQ_SERIAL_TRANSMIT, IRQ_SERIAL = 16, 17, 38
+NO_DEVICE = None, (None, 0), None, None # Its clock is never on.
 
 
 class Board:
@@ -18,6 +19,7 @@ class Board:
     pins = {"estop": ("port_b", 0), "button": ("port_a", 1)}
     uart_pins, can_pairs = ("port_a", 3, 2), {"PB8": ("port_b", 8, 9), "PA11": ("port_a", 11, 12)}
     ports = ("port_a", "port_b", "port_c", "port_d")
+    without_interrupts = {*ports, "watchdog", "uart"} # For those of the serial port the code does not wait.
 
     def __init__(self, transceiver="PB8", crystal_hz=None):
         self.transceiver, self.crystal_hz = self.can_pairs[transceiver], crystal_hz
@@ -65,17 +67,11 @@ class Board:
         return getattr(self.machine, port).is_pair(rx, tx, 7)
 
     def interrupts(self, machine):
-        """The interrupts whose lines are up."""
+        """The interrupts whose lines are up, each a bit."""
         lines = machine.can.lines()
-        if machine.exti.line():
-            yield IRQ_EXTI0
-        for device, irq in ((machine.dma.receive, IRQ_SERIAL_RECEIVE), (machine.dma.transmit, IRQ_SERIAL_TRANSMIT), (machine.uart, IRQ_SERIAL)):
-            if device.line():
-                yield irq
-        if lines:
-            for bit, irq in enumerate((IRQ_TRANSMIT, IRQ_RECEIVE, IRQ_ERROR)):
-                if lines >> bit & 1:
-                    yield irq
+        return ((lines & 1) << IRQ_TRANSMIT | (lines >> 1 & 1) << IRQ_RECEIVE | (lines >> 2 & 1) << IRQ_ERROR | machine.exti.line() << IRQ_EXTI0
+                | machine.dma.receive.line() << IRQ_SERIAL_RECEIVE | machine.dma.transmit.line() << IRQ_SERIAL_TRANSMIT
+                | machine.uart.line() << IRQ_SERIAL)
 
     def connect_can(self):
         machine = self.machine
@@ -125,25 +121,23 @@ class Board:
 
     remap_offset = None
 
-    def find(self, block, offset):
-        """(name, read, write) of the device there, or Nones."""
-        name, clock, read, write = self.devices.get(block, (None, None, None, None))
-        if name is None:
-            self.machine.expect(False, f"0x{block + offset:08X} was accessed, which is not modelled")
-        elif clock is not None and not self.machine.clocks.is_enabled(*clock):
-            self.machine.expect(False, f"{name} was accessed without its clock")
-            return None, None, None
-        return name, read, write
+    def may_access(self, name, clock, address):
+        """A device is there, and its clock is on."""
+        if clock is None or self.machine.clocks.is_enabled(*clock):
+            return True
+        self.machine.expect(False, f"{name} was accessed without its clock" if name else f"0x{address:08X} was accessed, which is not modelled")
+        return False
 
     def read(self, block, offset):
-        name, read, _ = self.find(block, offset)
-        return read(offset) if name else 0
+        name, clock, read, _ = self.devices.get(block, NO_DEVICE)
+        return read(offset) if self.may_access(name, clock, block + offset) else 0
 
     def write(self, block, offset, value):
-        name, _, write = self.find(block, offset)
-        if name:
+        name, clock, _, write = self.devices.get(block, NO_DEVICE)
+        if self.may_access(name, clock, block + offset):
             write(offset, value)
-        if name not in (*self.ports, "watchdog", "uart"):
+        self.machine.touch()
+        if name not in self.without_interrupts:
             self.machine.clock.is_asked_to_stop = 1 # Other interrupts may come now.
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A bus at 1 Mbit/s with arbitration, acknowledgements and errors; the chip's controller on it; two wheels."""
 import ctypes
+import functools
 import math
 from dataclasses import dataclass, field
-from functools import partial
 from random import Random
 
 from .chip import MS, US
@@ -33,6 +33,26 @@ def load_model(path):
     return library
 
 
+@functools.cache
+def length_bits(identifier, data, remote_dlc):
+    """Length on the bus from start of frame to the end of the interframe space, with the stuff bits of its contents."""
+    dlc = len(data) if remote_dlc is None else remote_dlc
+    header = [0] + [identifier >> bit & 1 for bit in range(10, -1, -1)] + [int(remote_dlc is not None), 0, 0]
+    header += [dlc >> bit & 1 for bit in range(3, -1, -1)]
+    body = header + [byte >> bit & 1 for byte in data for bit in range(7, -1, -1)]
+    crc = 0
+    for bit in body:
+        crc = (crc << 1 ^ (0x4599 if bit ^ crc >> 14 & 1 else 0)) & 0x7FFF
+    body += [crc >> bit & 1 for bit in range(14, -1, -1)]
+    stuffed, run, last = 0, 0, None
+    for bit in body:
+        run = run + 1 if bit == last else 1
+        last = bit
+        if run == 5:
+            stuffed, run, last = stuffed + 1, 1, 1 - bit
+    return len(body) + stuffed + 3 + 7 + 3 # Delimiters and acknowledgement, end of frame, space.
+
+
 @dataclass
 class Frame:
     id: int
@@ -42,22 +62,7 @@ class Frame:
     remote_dlc: int = None # A remote frame with this length, and no data.
 
     def bits(self):
-        """Length on the bus from start of frame to the end of the interframe space, with the stuff bits of its contents."""
-        dlc = len(self.data) if self.remote_dlc is None else self.remote_dlc
-        header = [0] + [self.id >> bit & 1 for bit in range(10, -1, -1)] + [int(self.remote_dlc is not None), 0, 0]
-        header += [dlc >> bit & 1 for bit in range(3, -1, -1)]
-        body = header + [byte >> bit & 1 for byte in self.data for bit in range(7, -1, -1)]
-        crc = 0
-        for bit in body:
-            crc = (crc << 1 ^ (0x4599 if bit ^ crc >> 14 & 1 else 0)) & 0x7FFF
-        body += [crc >> bit & 1 for bit in range(14, -1, -1)]
-        stuffed, run, last = 0, 0, None
-        for bit in body:
-            run = run + 1 if bit == last else 1
-            last = bit
-            if run == 5:
-                stuffed, run, last = stuffed + 1, 1, 1 - bit
-        return len(body) + stuffed + 3 + 7 + 3 # Delimiters and acknowledgement, end of frame, space.
+        return length_bits(self.id, self.data, self.remote_dlc)
 
     def setpoint(self):
         """(speed in mm/s, current in mA) of a setpoint."""
@@ -73,7 +78,7 @@ class Controller:
         self.machine, self.model = machine, self.library.bxcan_model_create(machine.board.banks)
         for name in ("read", "write", "is_on", "recessive", "dominant", "hold", "offer", "begin", "end", "hear", "hear_error", "lines",
                      "violation", "overruns", "slow_aborts"):
-            setattr(self, name, partial(getattr(self.library, f"bxcan_model_{name}"), self.model))
+            setattr(self, name, functools.partial(getattr(self.library, f"bxcan_model_{name}"), self.model))
 
     def reset(self):
         self.library.bxcan_model_reset(self.model, self.machine.board.banks)
@@ -172,6 +177,7 @@ class Bus:
         self.acknowledge_chip = True
         self.current = None        # (frame, mailbox or None, end)
         self.idle_ns = 0
+        self.calm = False          # Nothing happens before what next_event_ns told last.
         self.suspended_ns = 0      # Until then the chip may not begin: an error-passive node waits 8 bits after each of its frames.
 
     def next_event_ns(self, now_ns):
@@ -179,12 +185,14 @@ class Bus:
         if self.current:
             times.append(self.current[2])
         elif not self.stuck:
+            at_rest = not self.machine.can_listens or self.machine.can.is_on()
             waiting = self.extra or self.flood or any(wheel.queue for wheel in self.wheels)
             times.append(max(self.idle_ns, now_ns) if waiting else None)
             times.append(self.idle_ns if self.idle_ns > now_ns else None)
             times.append(self.suspended_ns if self.suspended_ns > now_ns else None)
-            times.append(now_ns + 11 * BIT_NS if not self.machine.can.is_on() else None)
-        return min((time for time in times if time is not None), default=None)
+            times.append(None if at_rest else now_ns + 11 * BIT_NS)
+        self.calm = bool(self.current) or not self.stuck and at_rest
+        return min([time for time in times if time is not None], default=None)
 
     def hold_dominant(self, on):
         self.stuck = on

@@ -67,7 +67,9 @@ class Clocks:
             return self.cr
         if offset == self.csr_offset:
             return self.flags
-        return {**self.enable, self.cfgr_offset: self.cfgr, self.pllcfgr_offset: self.pllcfgr}.get(offset, 0)
+        if offset == self.cfgr_offset:
+            return self.cfgr
+        return self.pllcfgr if offset == self.pllcfgr_offset else self.enable.get(offset, 0)
 
     def write(self, offset, value, now_ns):
         if offset == 0:
@@ -173,16 +175,22 @@ class Port:
         self.reset()
 
     def drive(self, pin, level):
-        self.outside[pin], self.changed = level, True
+        self.outside[pin], self.changed, self.levels = level, True, None
 
     def release(self, pin):
         self.outside.pop(pin, None)
-        self.changed = True
+        self.changed, self.levels = True, None
+
+    def input(self):
+        """The levels of all pins; kept until something about them changes."""
+        if self.levels is None:
+            self.levels = sum(self.level(pin) << pin for pin in range(16))
+        return self.levels
 
 
 class PortF1(Port):
     def reset(self):
-        self.changed = True
+        self.changed, self.levels = True, None
         self.cr, self.odr = [0x44444444, 0x44444444], 0
 
     def field(self, pin):
@@ -206,12 +214,13 @@ class PortF1(Port):
     def read(self, offset):
         if offset in (0, 4):
             return self.cr[offset // 4]
-        return {8: sum(self.level(pin) << pin for pin in range(16)), 0xC: self.odr}.get(offset, 0)
+        return self.input() if offset == 8 else self.odr if offset == 0xC else 0
 
     def write(self, offset, value):
         """True if that may have changed a level."""
         if offset == 0x10 and (self.odr & ~(value >> 16) | value & 0xFFFF) == self.odr:
             return False
+        self.levels = None
         if offset in (0, 4):
             self.cr[offset // 4] = value
         elif offset == 0x10:
@@ -225,7 +234,7 @@ class PortF1(Port):
 
 class PortF4(Port):
     def reset(self):
-        self.changed = True
+        self.changed, self.levels = True, None
         self.registers = dict.fromkeys(range(0, 0x28, 4), 0)
         self.registers[0] = 0xA8000000
 
@@ -248,16 +257,14 @@ class PortF4(Port):
         return self.two(0, rx) == 2 and self.two(0, tx) == 2 and function == [wanted, wanted] and self.two(8, tx) != 0
 
     def read(self, offset):
-        if offset == 0x10:
-            return sum(self.level(pin) << pin for pin in range(16))
-        return self.registers[offset]
+        return self.input() if offset == 0x10 else self.registers[offset]
 
     def write(self, offset, value):
         """True if that may have changed a level."""
         if offset == 0x18:
             offset, value = 0x14, self.registers[0x14] & ~(value >> 16) | value & 0xFFFF
         changed = self.registers[offset] != value
-        self.registers[offset] = value
+        self.registers[offset], self.levels = value, None
         return changed
 
 
@@ -415,10 +422,11 @@ class DmaChannel:
     def carry(self, now_ns):
         """From memory to the line."""
         uart = self.chip.uart
-        while self.is_on() and self.left and self.start_ns <= now_ns:
-            uart.sent += self.chip.cpu.mem_read(self.registers["memory"] + self.length - self.left, 1)
-            self.left -= 1
-            self.start_ns += uart.byte_ns()
+        if self.is_on() and self.left and self.start_ns <= now_ns:
+            count = min(self.left, (now_ns - self.start_ns) // uart.byte_ns() + 1)
+            uart.sent += self.chip.cpu.mem_read(self.registers["memory"] + self.length - self.left, count)
+            self.left -= count
+            self.start_ns += count * uart.byte_ns()
             uart.free_ns = self.start_ns
             if self.left == 0:
                 self.finish()

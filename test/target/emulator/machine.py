@@ -20,6 +20,7 @@ EXC_RETURN = 0xFFFFFFF9
 EXCEPTION_EXIT = 8 # Unicorn's number for a return from an exception.
 ABORTS = (3, 4) # And those for code and data where the memory map allows none.
 NOWHERE = 0xFFFFFFFE
+NEVER_NS = 1 << 60
 BACK, ENDLESS = 0x080F0000, 0x080F0100 # In the flash, beyond every image; ENDLESS is an instruction that jumps to itself.
 SP, LR, PC, XPSR, PRIMASK = (getattr(arm, f"UC_ARM_REG_{name}") for name in ("SP", "LR", "PC", "XPSR", "PRIMASK"))
 FRAME = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, LR, PC, XPSR)
@@ -31,7 +32,7 @@ NO_MEMORY = (UC_ERR_READ_UNMAPPED, UC_ERR_WRITE_UNMAPPED, UC_ERR_FETCH_UNMAPPED)
 class BlockClock(ctypes.Structure):
     """As in block_hook.c."""
     _fields_ = [("left", ctypes.c_int64), ("spent", ctypes.c_int64), ("is_asked_to_stop", ctypes.c_int32),
-                ("has_stopped", ctypes.c_int32), ("stop", ctypes.c_void_p)]
+                ("has_stopped", ctypes.c_int32), ("trap", ctypes.c_int32), ("stop", ctypes.c_void_p)]
 
 
 class Machine:
@@ -44,6 +45,7 @@ class Machine:
         self.violations, self.resets, self.alarms = [], [], []
         self.nmi, self.frozen, self.power_lost = False, False, False
         self.busy_ns = self.faults = 0
+        self.due_ns = self.quiet_until_ns = 0 # See run.
         self.build_cpu()
         board.build(self, seed)
         self.reset_cpu()
@@ -68,10 +70,9 @@ class Machine:
         self.map_registers(0x40000000, 0x30000, self.board.read, self.board.write)
         self.map_registers(0xE000E000, 0x1000, self.read_system, self.write_system)
         self.clock = BlockClock(stop=ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p).value)
-        hook, function = ctypes.c_size_t(), ctypes.cast(self.library.block_hook, ctypes.c_void_p)
-        uclib.uc_hook_add(cpu._uch, ctypes.byref(hook), ctypes.c_int(UC_HOOK_BLOCK), function, ctypes.byref(self.clock),
-                          ctypes.c_uint64(1), ctypes.c_uint64(0))
-        cpu.hook_add(UC_HOOK_INTR, self.on_interrupt)
+        for kind, function in ((UC_HOOK_BLOCK, self.library.block_hook), (UC_HOOK_INTR, self.library.trap_hook)):
+            uclib.uc_hook_add(cpu._uch, ctypes.byref(ctypes.c_size_t()), ctypes.c_int(kind), ctypes.cast(function, ctypes.c_void_p),
+                              ctypes.byref(self.clock), ctypes.c_uint64(1), ctypes.c_uint64(0))
 
     def expect(self, condition, text):
         if not condition and text not in self.violations:
@@ -81,21 +82,20 @@ class Machine:
 
     def spend(self, cycles=0):
         """Brings `now_ns` up to date with the code that has run, and `cycles` more."""
-        span_ns = (self.clock.spent + cycles) * 10**9 // self.clocks.core_hz
-        self.clock.left -= cycles
-        self.clock.spent = 0
+        clock = self.clock
+        span_ns = (clock.spent + cycles) * 10**9 // self.clocks.core_hz
+        if cycles:
+            clock.left -= cycles
+        clock.spent = 0
         self.now_ns += span_ns
         self.busy_ns += span_ns
 
-    def on_interrupt(self, cpu, number, _):
-        self.trap = number
-        cpu.emu_stop()
-
     def execute(self, until_ns):
         """Runs code until that time, a WFI, a trap, or something that may change which interrupts come."""
-        clock, self.trap = self.clock, None
+        clock = self.clock
         clock.left = max((until_ns - self.now_ns) * self.clocks.core_hz // 10**9, 1)
         clock.is_asked_to_stop = clock.has_stopped = 0
+        clock.trap = -1
         pc, = self.pc.read()
         status = uclib.uc_emu_start(self.cpu._uch, pc | 1, self.until, 0, 0)
         if status in NO_MEMORY and self.error is None:
@@ -105,12 +105,12 @@ class Machine:
         if status != UC_ERR_OK or self.error is not None:
             raise RuntimeError(f"the CPU faulted at 0x{pc:08X}: {self.error or UcError(status)}") from self.error
         self.spend()
-        if self.trap == EXCEPTION_EXIT:
+        if clock.trap == EXCEPTION_EXIT:
             self.leave_exception()
-        elif self.trap in ABORTS:
+        elif clock.trap in ABORTS:
             self.hard_fault()
-        elif self.trap is not None:
-            raise RuntimeError(f"trap {self.trap} at 0x{self.pc.read()[0]:08X}")
+        elif clock.trap >= 0:
+            raise RuntimeError(f"trap {clock.trap} at 0x{self.pc.read()[0]:08X}")
         elif not clock.has_stopped:
             self.sleeping = True
 
@@ -128,10 +128,14 @@ class Machine:
         self.alarms.sort(key=lambda alarm: alarm[0])
 
     def run(self, span_ns):
+        """Everything but the CPU is attended to when something is due, and when code has touched it (`touch`): until then nothing about it
+        can change."""
         end_ns = self.now_ns + span_ns
+        self.touch() # So may have who called this.
         while self.now_ns < end_ns:
-            self.attend()
-            next_ns = max(min(end_ns, self.next_event_ns()), self.now_ns + 1)
+            if self.now_ns >= self.quiet_until_ns:
+                self.attend()
+            next_ns = max(min(end_ns, self.due_ns), self.now_ns + 1)
             if self.frozen or self.sleeping and not self.pending:
                 self.now_ns = next_ns
                 continue
@@ -160,16 +164,24 @@ class Machine:
         while self.pc.read()[0] != BACK:
             self.attend()
             if not self.enter_exception():
-                self.execute(self.now_ns + 1 if self.pending and not self.active else self.next_event_ns())
+                self.execute(self.now_ns + 1 if self.pending and not self.active else self.due_ns)
         low, high = self.result.read()
         self.cpu.context_restore(saved)
         self.sleeping, self.until = asleep, NOWHERE
         return high << 32 | low
 
-    def next_event_ns(self):
-        times = [self.tick_ns, self.watchdog.deadline_ns, self.bus.next_event_ns(self.now_ns), self.uart.next_event_ns(), self.dma.next_event_ns()]
-        times += [self.alarms[0][0]] if self.alarms else []
-        return min(time for time in times if time is not None)
+    def touch(self):
+        """Something may have changed before its time."""
+        self.quiet_until_ns = 0
+
+    def look_ahead(self):
+        """When the next event is due, and whether nothing can happen before. Not so while bytes pass between memory and line, which
+        goes on with every cycle, nor while the bus or the clocks come to rest."""
+        times = (self.tick_ns, self.watchdog.deadline_ns, self.bus.next_event_ns(self.now_ns), self.uart.next_event_ns(), self.dma.next_event_ns(),
+                 self.alarms[0][0] if self.alarms else None)
+        self.due_ns = min([time for time in times if time is not None], default=NEVER_NS)
+        calm = self.clocks.settled and self.bus.calm and not self.uart.typed and self.uart.idle_ns is None and times[4] is None
+        self.quiet_until_ns = self.due_ns if calm else 0
 
     def attend(self):
         """Everything but the CPU, up to now."""
@@ -194,9 +206,13 @@ class Machine:
         if self.nmi:
             self.nmi = False
             self.pending.add(NMI)
-        for irq in self.board.interrupts(self):
-            if self.enabled >> irq & 1 and IRQ + irq != self.active:
+        lines = self.board.interrupts(self) & self.enabled
+        while lines:
+            irq = lines.bit_length() - 1
+            lines ^= 1 << irq
+            if IRQ + irq != self.active:
                 self.pending.add(IRQ + irq)
+        self.look_ahead()
 
     def look_at_pins(self):
         for name in self.board.ports:
@@ -234,6 +250,8 @@ class Machine:
         stack += 32 + (4 if values[7] & 0x200 else 0)
         values[7] &= ~0x200
         self.after_exit.write(stack, *values)
+        if self.active != SYSTICK:
+            self.touch() # Its line may still be up.
         self.active = None
         self.spend(12)
 
@@ -259,24 +277,35 @@ class Machine:
 
     def map_registers(self, base, size, read, write):
         """`read` and `write` get the address of the block and the offset in it. What they raise ends the emulation."""
-        def guard(function, address, size, *value):
+        def on_read(_, offset, size, __):
             try:
                 self.spend(ACCESS_CYCLES)
                 if size != 4:
-                    self.expect(False, f"0x{address:08X} was accessed with {size} bytes")
-                return function(address & ~(BLOCK_SIZE - 1), address & (BLOCK_SIZE - 1), *value)
+                    self.expect(False, f"0x{base + offset:08X} was accessed with {size} bytes")
+                return read(base + offset & -BLOCK_SIZE, offset & BLOCK_SIZE - 1) & 0xFFFFFFFF
             except Exception as error:
-                self.error = self.error or error
-                uclib.uc_emu_stop(self.cpu._uch)
-                return 0
+                return self.fail(error)
 
-        callbacks = (MMIO_READ_CFUNC(lambda _, offset, size, __: guard(read, base + offset, size) & 0xFFFFFFFF),
-                     MMIO_WRITE_CFUNC(lambda _, offset, size, value, __: guard(write, base + offset, size, value)))
+        def on_write(_, offset, size, value, __):
+            try:
+                self.spend(ACCESS_CYCLES)
+                if size != 4:
+                    self.expect(False, f"0x{base + offset:08X} was accessed with {size} bytes")
+                write(base + offset & -BLOCK_SIZE, offset & BLOCK_SIZE - 1, value)
+            except Exception as error:
+                self.fail(error)
+
+        callbacks = (MMIO_READ_CFUNC(on_read), MMIO_WRITE_CFUNC(on_write))
         self.callbacks += callbacks
         status = uclib.uc_mmio_map(self.cpu._uch, base, size, *(pair for function in callbacks
                                                                 for pair in (ctypes.cast(function, ctypes.c_void_p), 0)))
         if status != UC_ERR_OK:
             raise UcError(status)
+
+    def fail(self, error):
+        self.error = self.error or error
+        uclib.uc_emu_stop(self.cpu._uch)
+        return 0
 
     def map_flash(self, flash):
         """The pages of the flash that the image writes. The rest of the first one's page of the emulator's is empty."""
@@ -286,9 +315,7 @@ class Machine:
             try:
                 return function(*arguments)
             except Exception as error:
-                self.error = self.error or error
-                uclib.uc_emu_stop(self.cpu._uch)
-                return 0
+                return self.fail(error)
 
         callbacks = (MMIO_READ_CFUNC(lambda _, offset, size, __: guard(flash.fetch, base + offset, size)),
                      MMIO_WRITE_CFUNC(lambda _, offset, size, value, __: guard(flash.program, base + offset, size, value) or 0))
@@ -302,6 +329,7 @@ class Machine:
         """From the next instruction on; then it comes back."""
         self.power_lost = True
         self.clock.is_asked_to_stop = 1
+        self.touch()
 
     def tick_span_ns(self):
         return (self.syst[0x14] + 1) * 10**9 // self.clocks.core_hz
@@ -326,6 +354,7 @@ class Machine:
     def write_system(self, block, offset, value):
         offset += block - 0xE000E000
         self.clock.is_asked_to_stop = 1
+        self.touch()
         if offset in self.syst:
             self.syst[offset] = value
             self.tick_ns = self.now_ns + self.tick_span_ns() if self.syst[0x10] & 1 else None

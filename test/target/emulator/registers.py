@@ -14,8 +14,6 @@ class Registers:
         self.pointers = (ctypes.c_void_p * self.count)(*(first + size * at for at in range(self.count)))
 
     def read(self):
-        for at in range(self.count):
-            self.slots[at] = 0
         uclib.uc_reg_read_batch(self.engine, self.ids, self.pointers, self.count)
         return self.slots[:]
 
