@@ -85,7 +85,8 @@ class Driving(RigCase):
         self.assertNotEqual(child.returncode, 0)
         self.assert_stood_by(sent_us, 600)
         with Gateway(self.socket) as gateway:
-            self.assertEqual(gateway.why()["cause"], "client_stop")
+            # Gone: the interrupt met a request that was half sent, which only the end of the connection undoes.
+            self.assertIn(gateway.why()["cause"], ("client_stop", "client_gone"))
 
     def test_kill_9_stops_although_a_forked_child_lives_on(self):
         script = (
