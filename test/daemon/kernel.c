@@ -16,6 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
+#include <sys/mman.h>
 #include <sys/signalfd.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -49,6 +50,8 @@ vk_t vk;
 static vk_fd_t table[DESCRIPTORS];
 static set_t sets[SETS];
 static void *blocks[BLOCKS]; // What the life has allocated.
+static void *ring;           // What it has mapped, for its black box,
+static size_t ring_size;     // and how much.
 static pid_t last_pid;
 static bool stealing; // The time that passes is not the process's.
 
@@ -490,6 +493,20 @@ void __wrap_free(void *block) {
     __real_free(block);
 }
 
+void *__real_mmap(void *at, size_t size, int rights, int kind, int fd, off_t offset);
+int __real_munmap(void *at, size_t size);
+
+void *__wrap_mmap(void *at, size_t size, int rights, int kind, int fd, off_t offset) {
+    ring = __real_mmap(at, size, rights, kind, fd, offset);
+    ring_size = size;
+    return ring;
+}
+
+int __wrap_munmap(void *at, size_t size) {
+    ring = NULL;
+    return __real_munmap(at, size);
+}
+
 FILE *__wrap_open_memstream(char **out_text, size_t *out_size) {
     const size_t size = 65536U;
     *out_text = (char *)__wrap_calloc(1, size);
@@ -508,6 +525,9 @@ static void close_all(void) {
     for (unsigned i = 0; i < BLOCKS; i++) {
         __real_free(blocks[i]);
         blocks[i] = NULL;
+    }
+    if (ring != NULL) { // Of who was killed: this process may have 65,000 of them.
+        (void)__wrap_munmap(ring, ring_size);
     }
     vk_forget_sockets();
 }

@@ -41,6 +41,8 @@ pid_t __wrap_fork(void);
 pid_t __wrap_waitpid(pid_t pid, int *status, int options);
 void *__wrap_calloc(size_t count, size_t size);
 void __wrap_free(void *block);
+void *__wrap_mmap(void *at, size_t size, int rights, int kind, int fd, off_t offset);
+int __wrap_munmap(void *at, size_t size);
 FILE *__wrap_open_memstream(char **out_text, size_t *out_size);
 
 int __wrap_open(const char *path, int flags, ...);
