@@ -13,10 +13,14 @@ def cases(suite):
         yield from cases(case) if isinstance(case, unittest.TestSuite) else [case]
 
 
+def line_of(case):
+    return getattr(case, case.id().rsplit(".", 1)[1]).__func__.__code__.co_firstlineno
+
+
 def names():
-    """What is run by itself: a test, or a whole class whose tests share what it prepares once."""
-    found = unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])
-    return list(dict.fromkeys(type(case).__name__ if "setUpClass" in vars(type(case)) else case.id().removeprefix("__main__.") for case in cases(found)))
+    """What is run by itself, as it stands in the file: a test, or a whole class whose tests share what it prepares once."""
+    found = sorted(cases(unittest.defaultTestLoader.loadTestsFromModule(sys.modules["__main__"])), key=line_of)
+    return list(dict.fromkeys(type(case).__name__ if "setUpClass" in vars(type(case)) else case.id().removeprefix("__main__.") for case in found))
 
 
 def run_one(build, name):

@@ -13,6 +13,8 @@ import tempfile
 import time
 import unittest
 
+import several
+
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 BUILD = ""
 
@@ -92,4 +94,4 @@ class Interrupted(unittest.TestCase):
 
 if __name__ == "__main__":
     BUILD = os.path.abspath(sys.argv.pop(1))
-    unittest.main()
+    several.main(BUILD)

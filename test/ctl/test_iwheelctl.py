@@ -17,6 +17,7 @@ import time
 import unittest
 
 from fake_gateway import FakeGateway, snapshot, wheel
+import several
 
 PROGRAM = ""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -850,4 +851,4 @@ if __name__ == "__main__":
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     PROGRAM = os.path.abspath(sys.argv.pop(1))
-    unittest.main()
+    several.main(PROGRAM)

@@ -21,6 +21,7 @@ try:
 except ImportError:
     print("skip: pyte is missing (pip install -r scripts/requirements.txt into .venv; ./check does it)")
     sys.exit(77)
+import several  # noqa: E402
 from fake_gateway import FakeGateway, snapshot  # noqa: E402
 from harness import Rig, find_program  # noqa: E402
 from operator_at_terminal import Operator  # noqa: E402
@@ -365,4 +366,4 @@ class WithoutWheels(unittest.TestCase):
 
 if __name__ == "__main__":
     BUILD = sys.argv.pop(1)
-    unittest.main()
+    several.main(BUILD, at_a_time=3)
