@@ -163,15 +163,20 @@ def style(folder, code):
     return run(sys.executable, SCRIPTS / "style_metrics.py", folder)
 
 
-def house(folder, fault):
-    """The tree with one change: file, what stands there, what stands there then. Of the programs only the one changed is compiled anew."""
+def put(folder, fault):
+    """One change in that copy of the tree: file, what stands there, what stands there then."""
     file, old, new = fault
-    for part in ("core", "northbound", "client", "port", "app", "bridge", "scripts"):
-        if (ROOT / part).is_dir():
-            shutil.copytree(ROOT / part, folder / part)
     text = (folder / file).read_text()
     assert old in text, f"{file} no longer has {old}"
     (folder / file).write_text(text.replace(old, new, 1))
+
+
+def house(folder, fault):
+    """The tree with one change. Of the programs only the one changed is compiled anew."""
+    for part in ("core", "northbound", "client", "port", "app", "bridge", "scripts"):
+        if (ROOT / part).is_dir():
+            shutil.copytree(ROOT / part, folder / part)
+    put(folder, fault)
     flags = [f"-I{folder / part}" for part in ("core/include", "port/stm32_stub", "port/stm32_stub/access", "port/stm32_stub/boards/stm32f103")]
     lamp = str(folder / "port/stm32_stub/lamp.c")
     (folder / "compile_commands.json").write_text(json.dumps([{"file": lamp, "directory": str(folder), "command": f"gcc -std=c99 {' '.join(flags)} -o a.o -c {lamp}"}]))
@@ -179,15 +184,13 @@ def house(folder, fault):
 
 
 def planted_texts(folder, fault):
-    """The tree, by links, with one change: file, what stands there, what stands there then."""
-    file, old, new = fault
+    """The tree, by links, with one change."""
+    changed = Path(fault[0]).parts[0]
     for entry in ROOT.iterdir():
-        if entry.name != Path(file).parts[0]:
+        if entry.name != changed:
             (folder / entry.name).symlink_to(entry)
-    shutil.copytree(ROOT / Path(file).parts[0], folder / Path(file).parts[0])
-    text = (folder / file).read_text()
-    assert old in text, f"{file} no longer has {old}"
-    (folder / file).write_text(text.replace(old, new, 1))
+    shutil.copytree(ROOT / changed, folder / changed)
+    put(folder, fault)
     return run(sys.executable, SCRIPTS / "planted_texts.py", folder)
 
 
