@@ -96,18 +96,25 @@ def calls(pid):
 
 
 def instructions(pid, folder):
-    """In a second."""
+    """In a second. Callgrind counts anew from when it has written a file: the time is that between two of these, not between our orders."""
     dump = ["callgrind_control", "-d", str(pid)]
-    subprocess.run(dump, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    begun, before = time.monotonic(), set(folder.glob("callgrind.*"))
+    begun, _ = written_by(dump, folder)
     time.sleep(WATCH_S)
+    ended, counted = written_by(dump, folder)
+    if begun is None or ended is None:
+        raise RuntimeError("callgrind has written nothing")
+    return counted / (ended - begun)
+
+
+def written_by(dump, folder):
+    """When callgrind wrote the file that it was told to write, and the instructions in it."""
+    before = set(folder.glob("callgrind.*"))
     subprocess.run(dump, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    took = time.monotonic() - begun
     for path in set(folder.glob("callgrind.*")) - before:
         total = re.search(r"^(?:totals|summary): (\d+)", path.read_text(), re.M)
         if total:
-            return int(total[1]) / took
-    raise RuntimeError("callgrind has written nothing")
+            return path.stat().st_mtime, int(total[1])
+    return None, 0
 
 
 def trial(pair, client_type, state, count):

@@ -227,6 +227,9 @@ static bool go_among(gw_clients_t *self, round_t *round, gw_right_t right, uint3
 
 /// The holder of the lease first, then who else may drive, then the watchers. True if all were served.
 static bool go_round(gw_clients_t *self, iw_client_t holder_id, service_t service, uint32_t next[GW_RIGHTS]) {
+    if ((self->open[GW_DRIVE] | self->open[GW_WATCH]) == 0U) {
+        return true; // Nobody is connected: most of a gateway's life.
+    }
     gw_client_t *holder = gw_clients_find(self, holder_id);
     round_t round = {.service = service, .holder = holder};
     if (holder != NULL) {
