@@ -100,11 +100,13 @@ class Interrupts:
     being made or taken away is made or taken away whole."""
 
     def __init__(self):
-        self.listens, self.came = False, False
+        self.listens, self.came, self.pid = False, False, os.getpid()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self.take)
 
     def take(self, _number, _frame):
+        if os.getpid() != self.pid:  # A child that is not another program yet.
+            os._exit(130)
         self.came = True
         if self.listens:
             self.listens = False

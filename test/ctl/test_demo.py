@@ -51,7 +51,8 @@ class Interrupted(unittest.TestCase):
         with concurrent.futures.ThreadPoolExecutor(3) as pool:
             for what, (code, left, running, said) in pool.map(lambda p: (p, play(**p)), plays):
                 self.assertEqual(([], []), (left, running), (what, said[-600:]))
-                if what["seconds"] >= 0.5:  # Before, it may be Python itself that is interrupted, or that swallows it while it starts.
+                stalled = code == 1 and "This machine was stalled" in said  # It has ended by itself, as it says, before it was interrupted.
+                if what["seconds"] >= 0.5 and not stalled:  # Before, it may be Python itself that is interrupted, or that swallows it while it starts.
                     self.assertIn(code, (130, -signal.SIGINT), (what, said[-600:]))
                     self.assertNotIn("Traceback", said)
 

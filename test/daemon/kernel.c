@@ -497,9 +497,10 @@ void *__real_mmap(void *at, size_t size, int rights, int kind, int fd, off_t off
 int __real_munmap(void *at, size_t size);
 
 void *__wrap_mmap(void *at, size_t size, int rights, int kind, int fd, off_t offset) {
-    ring = __real_mmap(at, size, rights, kind, fd, offset);
+    void *mapped = __real_mmap(at, size, rights, kind, fd, offset);
+    ring = (mapped != MAP_FAILED) ? mapped : NULL;
     ring_size = size;
-    return ring;
+    return mapped;
 }
 
 int __wrap_munmap(void *at, size_t size) {

@@ -1,30 +1,12 @@
 // SPDX-License-Identifier: MIT
 // What the daemon answers, notes in the black box and warns of, in virtual time.
-#include "daemon_rig.h"
+#include "daemon_client.h"
 
 #include "unity.h"
 
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <unistd.h>
-
-static int client;
-
-void setUp(void) {
-    daemon_rig_begin();
-    client = daemon_rig_connect();
-}
-
-void tearDown(void) {
-    (void)close(client);
-    daemon_rig_end();
-}
-
-static void assert_reply(const char *line, const char *part) {
-    const char *reply = daemon_rig_ask(client, line);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, part), (reply[0] != '\0') ? reply : line);
-}
 
 static uint64_t noted_so_far(void) {
     return blackbox_ring_written(daemon_rig.daemon->box.ring);

@@ -1,24 +1,12 @@
 // SPDX-License-Identifier: MIT
 // What wakes the daemon's loop, and what it looks at before anything leaves, in virtual time.
-#include "daemon_rig.h"
+#include "daemon_client.h"
 
 #include "unity.h"
 
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
-
-static int client;
-
-void setUp(void) {
-    daemon_rig_begin();
-    client = daemon_rig_connect();
-}
-
-void tearDown(void) {
-    (void)close(client);
-    daemon_rig_end();
-}
 
 /// Sent, and not read yet.
 static void say(const char *line) {

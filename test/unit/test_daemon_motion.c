@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The daemon's loop in motion, in virtual time: the crash marker, the e-stop, the clocks, the lease, the end.
-#include "daemon_rig.h"
+#include "daemon_client.h"
 
 #include "unity.h"
 
@@ -11,18 +11,6 @@
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
-
-static int client;
-
-void setUp(void) {
-    daemon_rig_begin();
-    client = daemon_rig_connect();
-}
-
-void tearDown(void) {
-    (void)close(client);
-    daemon_rig_end();
-}
 
 static const char *cause(void) {
     const char *at = strstr(daemon_rig_ask(client, "{\"cmd\":\"why\"}"), "\"cause\":\"");

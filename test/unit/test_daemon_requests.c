@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Requests as the daemon carries them out, from the line to the wheels, in virtual time.
-#include "daemon_rig.h"
+#include "daemon_client.h"
 
 #include "unity.h"
 
@@ -8,23 +8,6 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
-
-static int client;
-
-void setUp(void) {
-    daemon_rig_begin();
-    client = daemon_rig_connect();
-}
-
-void tearDown(void) {
-    (void)close(client);
-    daemon_rig_end();
-}
-
-static void assert_reply(const char *line, const char *part) {
-    const char *reply = daemon_rig_ask(client, line);
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, part), (reply[0] != '\0') ? reply : line);
-}
 
 /// The object `side` of the snapshot.
 static const char *wheel(const char *side) {
