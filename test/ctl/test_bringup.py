@@ -757,4 +757,4 @@ class Bringup(unittest.TestCase):
 
 if __name__ == "__main__":
     BUILD = sys.argv.pop(1)
-    several.main(BUILD)
+    several.main(BUILD, at_a_time=8)
