@@ -322,8 +322,8 @@ DEEDS = (("nothing", ":", "--no-install", True, True), ("nothing more", ":", "--
 
 def memory(folder, fault):
     """./check of two steps that write down when they run, in a tree of its own, with the fault in one of its files: is what changed seen?"""
-    text = re.sub(r"^readonly (steps|in_real_time|first_of_two_hands|computing)=\(.*?\)$", "", (ROOT / "check").read_text(), flags=re.S | re.M)
-    text = text.replace("# Seconds by the clock,", 'readonly steps=("build b" "api a" "eva e") in_real_time=("api eva") first_of_two_hands=() computing=()\n#', 1)
+    text = re.sub(r"^readonly (steps|in_real_time|computing)=\(.*?\)$", "", (ROOT / "check").read_text(), flags=re.S | re.M)
+    text = text.replace("# Seconds by the clock,", 'readonly steps=("build b" "api a" "eva e") in_real_time=("api eva") computing=()\n#', 1)
     files = {"check": text, "scripts/fingerprint": (SCRIPTS / "fingerprint").read_text(), "bin/cmake": "#!/bin/sh\n", "page.md": "", "deed": ":\n", ".gitignore": "build/\n"}
     files |= {name: f"#!/bin/sh\necho {step} >>build/ran\n. ./deed || exit\n" for step, name in (("api", "scripts/api_reference"), ("eva", "test/eva/run"))}
     for name, content in files.items():
