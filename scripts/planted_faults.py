@@ -136,7 +136,7 @@ def eva(folder, code):
 
 def eva_core(folder, fault):
     """A fault in the core itself: that the events of test/eva/main.c reach it, and that it is an alarm."""
-    status, said = run(ROOT / "test/eva/run", "--work", folder / "work", "--plant", fault)
+    status, said = run(ROOT / "test/eva/run", "--work", folder / "work", "--fault", fault)
     return (status if status == 77 else int("failed: no alarm" in said)), said
 
 
@@ -183,15 +183,16 @@ def house(folder, fault):
     return run(sys.executable, folder / "scripts/house.py", folder)
 
 
-def planted_texts(folder, fault):
-    """The tree, by links, with one change."""
-    changed = Path(fault[0]).parts[0]
-    for entry in ROOT.iterdir():
-        if entry.name != changed:
-            (folder / entry.name).symlink_to(entry)
-    shutil.copytree(ROOT / changed, folder / changed)
-    put(folder, fault)
-    return run(sys.executable, SCRIPTS / "planted_texts.py", folder)
+def faults(folder, fault):
+    """The product and its table of seeded faults with one change: each fault must apply, and its noticers must exist."""
+    for part in ("core", "northbound", "client", "port", "app", "bridge", "python", "test/faults"):
+        shutil.copytree(ROOT / part, folder / part)
+    for part in ("target", "fuzz", "support"):
+        (folder / "test" / part).symlink_to(ROOT / "test" / part)
+    put(folder, fault[:3])
+    if len(fault) > 3:
+        (folder / fault[0]).rename(folder / fault[3])
+    return run(sys.executable, folder / "test/faults/run", "--check", "--build", ROOT / "build/default")
 
 
 def api(folder, fault):
@@ -285,7 +286,7 @@ def counting(folder, case):
 
 
 def of_mutation(name):
-    sys.path[:0] = [str(ROOT / "test/mutation"), str(ROOT / "test/planted")]
+    sys.path[:0] = [str(ROOT / "test/mutation"), str(ROOT / "test/faults")]
     loader = importlib.machinery.SourceFileLoader(f"mutation_{name}", str(ROOT / "test/mutation" / name))
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
     loader.exec_module(module)
@@ -390,9 +391,9 @@ CASES = [
     (eva, "frama-c", "index off by one", SOME_INDEX.format(2), True),
     (eva, "frama-c", "signed overflow", "int main(void) { int a = Frama_C_interval(0, 2147483647); return a + 1; }\n", True),
     (eva, "frama-c", "an assertion that does not hold", "int main(void) { int a = Frama_C_interval(0, 1);\n//@ assert a == 0;\nreturn a; }\n", True),
-    (eva_core, "frama-c", "the core: ring index off by one", "force_offset.c | 1U) % IW_FORCE_WINDOW_SAMPLES); | 1U) % (IW_FORCE_WINDOW_SAMPLES + 1U));", True),
-    (eva_core, "frama-c", "the core: a queue of three in room for two", "confirmation.c | (zero ? 2U : 1U) | (zero ? 3U : 1U)", True),
-    (eva_core, "frama-c", "the core: negation of any number", "gateway.c | request->speed_mm_s[side] < INT16_MIN | false", True),
+    (eva_core, "frama-c", "the core: ring index off by one", "eva-ring-index-off-by-one", True),
+    (eva_core, "frama-c", "the core: a queue of three in room for two", "eva-queue-of-three-in-room-for-two", True),
+    (eva_core, "frama-c", "the core: negation of any number", "eva-negation-of-any-number", True),
     (tidy, "clang-tidy", "clean", CLEAN, False),
     (tidy, "clang-tidy", "size of the pointer", "#include <string.h>\nvoid f(int *p);\nvoid f(int *p) { memset(p, 0, sizeof(p)); }\n", True),
     (cppcheck, "cppcheck", "clean", CLEAN, False),
@@ -437,12 +438,17 @@ CASES = [
     (dialect, "python3", "++ before a name", function("    ++a;\n    return a;\n"), True),
     (dialect, "python3", "a comparison that chooses", function("    return a > 1 ? a : 0;\n"), True),
     (dialect, "python3", "parentheses around what is no type", function("    return (int)sizeof(a);\n"), True),
-    (planted_texts, "python3", "clean", ("core/src/step.c", "#include", "#include"), False),
-    (planted_texts, "python3", "a text of test/fuzz/run is gone", ("core/src/codec.c", "wheel->pose.x_mm, wheel->pose.y_mm", "pose->x_mm, pose->y_mm"), True),
-    (planted_texts, "python3", "a text of test/planted/bugs.py stands twice", ("core/src/sender.c", "const bool invert =", "const int answer = self->hal->purge(self->hal->context); const bool invert ="), True),
-    (planted_texts, "python3", "a text of test/planted/parts_bugs.py is gone", ("app/gateway/loop.c", "events[i].data.u64 == GW_TAG_ESTOP", "events[i].data.u32 == GW_TAG_ESTOP"), True),
-    (planted_texts, "python3", "a text of test/target/planted_bugs.py is gone", ("port/stm32_stub/answers.c", "!iw_host_is_silent(self)", "!is_silent(self)"), True),
-    (planted_texts, "python3", "a text of planted_faults.py itself is gone", ("docs/northbound.md", "a wheel turns |", "a wheel is turning |"), True),
+    (faults, "python3", "clean", ("core/src/step.c", "#include", "#include"), False),
+    (faults, "python3", "a function is renamed that no fault is in", ("app/gateway/answers/dispatch.c", "void carry_out(", "void carry_it_out("), False),
+    (faults, "python3", "a function is renamed that faults are in", ("app/gateway/answers/dispatch.c", "void do_twist(", "void do_turn("), False),
+    (faults, "python3", "a file has another name and place", ("app/gateway/loop.c", "#include", "#include", "app/cycle.c"), False),
+    (faults, "python3", "the code of a fault of the core is gone", ("core/src/codec.c", "wheel->pose.x_mm, wheel->pose.y_mm", "pose->x_mm, pose->y_mm"), True),
+    (faults, "python3", "the code of a fault occurs twice", ("core/src/sender.c", "const bool invert = config->invert[side];", "const bool invert = config->invert[side]; const bool invert = config->invert[side];"), True),
+    (faults, "python3", "the code of a fault of the daemon is gone", ("app/gateway/loop.c", "events[i].data.u64 == GW_TAG_ESTOP", "events[i].data.u32 == GW_TAG_ESTOP"), True),
+    (faults, "python3", "the code of a fault of the board is gone", ("port/stm32_stub/answers.c", "!iw_host_is_silent(self)", "!is_silent(self)"), True),
+    (faults, "python3", "a test that should notice is no test", ("test/faults/gateway.faults", "unit.daemon_watchers", "unit.daemon_watching"), True),
+    (faults, "python3", "a fault of the core with one noticer", ("test/faults/core.faults", "| unit sim orders\n", "| unit\n"), True),
+    (faults, "python3", "two faults of one name", ("test/faults/core.faults", "| disconnect-ignored |", "| lease-endless |"), True),
     (house, "gcc", "clean", ("port/stm32_stub/lamp.c", "#include", "#include"), False),
     (house, "gcc", "a program reads a part of the core", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/gateway.h"\nint iw_look(iw_gateway_t *g);\nint iw_look(iw_gateway_t *g) {\n    return (int)g->permit.phase;\n}'), True),
     (house, "gcc", "a program includes what is private", ("port/stm32_stub/lamp.c", '#include "lamp.h"', '#include "lamp.h"\n#include "iwheel/private/follow.h"'), True),

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Is docs/safety-case.md true? No name that does not exist, no rule without code and test, no planted bug without a rule.
+"""Is docs/safety-case.md true? No name that does not exist, no rule without code and test, no seeded fault without a rule.
 And the threat model of SECURITY.md: each interface has tests, and they exist.
 
 usage: safety_case.py [--update]
 
---update writes the lists of planted bugs and of the fault catalogue's tests anew; both follow from the sources.
+--update writes the lists of seeded faults and of the fault catalogue's tests; both follow from the sources.
 The last line is "N passed, N failed, N skipped".
 """
 import re
@@ -14,7 +14,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE, THREATS = ROOT / "docs/safety-case.md", ROOT / "SECURITY.md"
-sys.path.insert(0, str(ROOT / "test/planted"))
+sys.path.insert(0, str(ROOT / "test/faults"))
+import table
 FAULTS = {
     1: "client killed", 2: "client frozen, its socket open", 3: "client sends and never reads", 4: "two clients command",
     5: "observers die, flood, connect in crowds, no descriptors left", 6: "reconnection with an old intention",
@@ -60,7 +61,7 @@ def sections(text):
     """{rule: {what: the rest of that line}}"""
     found = {}
     for rule, body in re.findall(r"^### (R\d+) .*?\n(.*?)(?=^##)", text, re.M | re.S):
-        found[rule] = dict(re.findall(r"^- (code|oracle|tests|planted): (.+)$", body, re.M))
+        found[rule] = dict(re.findall(r"^- (code|oracle|tests|faults): (.+)$", body, re.M))
     return found
 
 
@@ -74,7 +75,7 @@ def has_function(file, name):
 
 
 def rule_findings(rule, entry, tests, bugs):
-    for what in ("code", "oracle", "tests", "planted"):
+    for what in ("code", "oracle", "tests", "faults"):
         if what not in entry:
             yield f"{rule}: no line '- {what}: ...'"
             return
@@ -87,10 +88,10 @@ def rule_findings(rule, entry, tests, bugs):
             yield f"{rule}: there is no test {name}"
     if not named or "`" not in entry["code"]:
         yield f"{rule}: without code or test"
-    if not re.match(r"none, ", entry["planted"]) and set(re.findall(r"`([\w-]+)`", entry["planted"])) != set(bugs_of(rule, bugs)):
-        yield f"{rule}: its planted bugs are others in test/planted/bugs.py and parts_bugs.py; scripts/safety_case.py --update writes them"
-    if re.match(r"none, ", entry["planted"]) and bugs_of(rule, bugs):
-        yield f"{rule}: says that no bug is planted, but there are some"
+    if not re.match(r"none, ", entry["faults"]) and set(re.findall(r"`([\w-]+)`", entry["faults"])) != set(bugs_of(rule, bugs)):
+        yield f"{rule}: its seeded faults are others in test/faults; scripts/safety_case.py --update writes them"
+    if re.match(r"none, ", entry["faults"]) and bugs_of(rule, bugs):
+        yield f"{rule}: says that no fault is seeded, but there are some"
 
 
 def findings(text, tests, bugs, rules):
@@ -99,7 +100,7 @@ def findings(text, tests, bugs, rules):
         yield from rule_findings(rule, entry, tests, bugs)
     for bug in bugs:
         if bug.rule not in found and not (ROOT / f"docs/{bug.rule}.md").exists():
-            yield f"planted bug {bug.name} belongs to {bug.rule}, which is neither here nor a page of docs/"
+            yield f"seeded fault {bug.name} belongs to {bug.rule}, which is neither here nor a page of docs/"
     told = set(re.findall(r"\d+", " ".join(entry.get("oracle", "") for entry in found.values())))
     yield from (f"rule {number} of the oracle belongs to no rule here" for number in sorted(rules - told))
     yield from (f"the oracle has no rule {number}" for number in sorted(told - rules))
@@ -137,11 +138,11 @@ def catalogue(tests):
 
 
 def update(text, tests, bugs):
-    def planted(match):
+    def listed(match):
         names = bugs_of(match[2], bugs)
         return match[1] + (", ".join(f"`{name}`" for name in names) if names else match[3])
 
-    text = re.sub(r"(^### (R\d+) (?:(?!^###).)*?^- planted: )([^\n]*)", planted, text, flags=re.M | re.S)
+    text = re.sub(r"(^### (R\d+) (?:(?!^###).)*?^- faults: )([^\n]*)", listed, text, flags=re.M | re.S)
     return re.sub(r"CATALOGUE|^\| fault \| what happens.*?(?=\n\n)", lambda _: catalogue(tests), text, flags=re.M | re.S)
 
 
@@ -165,9 +166,7 @@ def self_test(text, tests, bugs, rules):
 
 
 def main(arguments):
-    from bugs import BUGS as core_bugs
-    from parts_bugs import PARTS
-    bugs = [*core_bugs, *PARTS]
+    bugs = table.load()
     if any(word != "--update" for word in arguments[1:]):
         sys.exit(__doc__)
     text, tests, rules = PAGE.read_text(), defined_tests(), oracle_rules()
@@ -179,7 +178,7 @@ def main(arguments):
     print(*(f"failed: {finding}" for finding in found), sep="\n", end="\n" if found else "")
     if missed:
         print(f"failed: {missed} of {planted} faults planted in the page are not found")
-    print(f"{len(sections(text))} rules, {len(bugs)} planted bugs, {len(rules)} rules of the oracle")
+    print(f"{len(sections(text))} rules, {len(bugs)} seeded faults, {len(rules)} rules of the oracle")
     print(f"{len(sections(text)) + planted - missed - (1 if found else 0)} passed, {len(found) + missed} failed, 0 skipped")
     return 1 if found or missed else 0
 

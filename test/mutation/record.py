@@ -29,6 +29,17 @@ def read_reasons(path):
     return {key.strip(): reason.strip() for key, _, reason in (line.rpartition(" | ") for line in lines)}
 
 
+def settle(named, mutants):
+    """Of a list of what no test can see, the entries whose file or function has another name now follow it, if their lines occur once."""
+    by_lines = collections.defaultdict(list)
+    for key in mutants:
+        by_lines[key.split(" | ", 2)[2]].append(key)
+    for key in [key for key in named if key not in mutants]:
+        found = by_lines[key.split(" | ", 2)[2]]
+        if len(found) == 1 and found[0] not in named:
+            named[found[0]] = named.pop(key)
+
+
 def plain(text):
     """Without comments and layout."""
     return " ".join(re.sub(r"//.*?$|/\*.*?\*/", "", text, flags=re.M | re.S).split())
@@ -92,6 +103,7 @@ class Record:
             found = keyed(path)
             self.texts.update({(path.name, name): text for name, text in essences(path).items()})
             self.mutants.update(found)
+        settle(named, self.mutants)
         self.files = files or sorted({mutant.file for mutant in self.mutants.values()})
         self.load(stored)
 

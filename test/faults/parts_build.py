@@ -13,10 +13,9 @@ import threading
 from pathlib import Path
 
 from core_build import UNMEASURED_S, Core, limit_s, play
+from table import Broken
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-# What a test is to be asked beside its name.
-ARGUMENTS = {"test_daemon": ["--quick", "--kills", "500"]}
 
 
 def output_of(words):
@@ -38,7 +37,7 @@ class Parts:
         """(the folder it is linked in, the words of the command)"""
         found = list(self.build.glob(f"*/*/CMakeFiles/{program}.dir/link.txt"))
         if len(found) != 1:
-            raise RuntimeError(f"{self.build} has {len(found)} programs {program}: mend test/planted/parts_bugs.py, or build it")
+            raise RuntimeError(f"{self.build} has {len(found)} programs {program}: build it")
         return found[0].parent.parent.parent, shlex.split(found[0].read_text())
 
     def compile(self, source, changed, inside, flags=("-O1",)):
@@ -77,22 +76,24 @@ class Parts:
         changed.write_text(text)
         return changed
 
-    def unchanged(self, test):
-        """How the program ends as it was built, played once."""
+    def unchanged(self, command):
+        """How a program ends as it was built, run once."""
         with self.lock:
-            if test not in self.as_it_is:
-                folder, words = self.link_of(test)
-                self.as_it_is[test] = play([folder / output_of(words), *ARGUMENTS.get(test, [])], Core(self.work), UNMEASURED_S)
-            return self.as_it_is[test]
+            if command not in self.as_it_is:
+                self.as_it_is[command] = play(command, Core(self.work), UNMEASURED_S)
+            return self.as_it_is[command]
 
-    def judge(self, test, source=None, changed=None):
-        """(what that test finds or None, None), or (None, why it cannot be told). Without a change: the program as it was built."""
-        unchanged = self.unchanged(test)
+    def judge(self, command, source=None, changed=None):
+        """What that program finds, or None; without a change: as it was built. Raises Broken if it cannot be had with the changed file."""
+        command = tuple(command)
+        unchanged = self.unchanged(command)
         if changed is None:
-            return first_failure(unchanged), None
-        program = changed.parent / test
-        why = self.link(test, source, changed, program)
-        return (None, why) if why else (first_failure(play([program, *ARGUMENTS.get(test, [])], Core(changed.parent), limit_s(unchanged))), None)
+            return first_failure(unchanged)
+        program = changed.parent / Path(command[0]).name
+        why = self.link(program.name, source, changed, program)
+        if why:
+            raise Broken(why)
+        return first_failure(play([program, *command[1:]], Core(changed.parent), limit_s(unchanged)))
 
 
 def first_failure(run):

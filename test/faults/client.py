@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+"""Tests of the Python client with a copy of it that has a fault."""
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+from table import ROOT
+
+TIMEOUT_S = 60
+
+
+def judge(applied, tests, folder):
+    """The first test that fails, or None. `tests`: a file of python/tests without its ending, or a class or a test of it."""
+    shutil.copytree(ROOT / "python", folder / "python", ignore=shutil.ignore_patterns("__pycache__"))
+    if applied:
+        (folder / applied.file).write_text(applied.text)
+    try:
+        done = subprocess.run([sys.executable, "-m", "unittest", "-f", tests], cwd=folder / "python/tests", capture_output=True, text=True,
+                              timeout=TIMEOUT_S, env={**os.environ, "PYTHONPATH": str(folder / "python/src"), "PYTHONDONTWRITEBYTECODE": "1"})
+    except subprocess.TimeoutExpired:
+        return f"does not end within {TIMEOUT_S} s"
+    if done.returncode == 0:
+        return None
+    failed = re.search(r"^(?:FAIL|ERROR): (\w+)", done.stderr, re.M)
+    return failed[1] if failed else f"ends with status {done.returncode}"

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""The image of an STM32F103 with one file of the port changed, and one scenario of the emulated board."""
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from table import ROOT, Broken
+
+TARGET, PORT = ROOT / "test/target", ROOT / "port/stm32_stub"
+DRIVER_FILES = ("bxcan.c", "bxcan_filters.c", "frame_ring.c")
+IMAGE_FILES = (*DRIVER_FILES, "clock.c", "clock_f1.c", "cortex_m.c", "estop.c", "lamp.c", "main.c", "marker.c", "pins_f1.c", "startup.c", "watchdog.c")
+ALONE_FILES = ("commander.c", "console.c", "report.c")
+GATEWAY_FILES = ("answers.c", "boot.c", "confirm.c", "flash_f1.c", "host.c", "host_send.c", "kept.c", "learnt.c", "observe.c", "serial.c", "serial_dma_f1.c", "settings.c", "store.c")
+
+
+def run(command):
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True)
+
+
+def must(command):
+    done = run(command)
+    if done.returncode != 0:
+        raise Broken(f"does not build: {done.stderr[-1500:]}")
+
+
+def judge(work, applied, folder, image, scenario):
+    """What the scenario finds, or None. `work`: the builds of test/target/run."""
+    work = Path(work).resolve()
+    shutil.copytree(PORT, folder)
+    (folder / Path(applied.file).relative_to(PORT.relative_to(ROOT))).write_text(applied.text)
+    flags = ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-mfloat-abi=soft", "-Os", "-std=gnu11", "-w", "-ffunction-sections",
+             "-fdata-sections", "-fno-tree-loop-distribute-patterns", f"-I{folder}", f"-I{folder / 'access'}",
+             f"-I{folder / 'boards/stm32f103'}", f"-I{ROOT / 'core/include'}", f"-I{ROOT / 'northbound/include'}",
+             f"-DIWHEEL_SETPOINT_TYPE_IS_SET={'false' if image == 'listen' else 'true'}", "-DIWHEEL_SETPOINT_TYPE_VALUE=1",
+             '-DIWHEEL_VERSION="0.0.0"',
+             f"-DIWHEEL_CURRENT_ROLE_VALUE={'IW_ROLE_UNSET' if image == 'listen' else 'IW_ROLE_LIMIT'}"]
+    source = {"listen": "none"}.get(image, image)
+    (folder / "images").mkdir()
+    talk = GATEWAY_FILES if image == "gateway" else ALONE_FILES
+    libraries = [work / f"stm32f103/{name}/libiwheel_{name}.a" for name in ("northbound", "core")]
+    must([*flags, *(folder / name for name in (*IMAGE_FILES, *talk, f"commander_{source}.c")), *libraries,
+          "--specs=nano.specs", "-nostartfiles", f"-L{folder}", f"-T{folder / 'boards/stm32f103/memory.ld'}", "-Wl,--gc-sections",
+          "-o", folder / f"images/stm32f103-{image}.elf"])
+    done = run([sys.executable, TARGET / "emulate.py", work / "libmodel.so", folder / "images", f"stm32f103.{scenario}"])
+    found = re.search(r"FAIL: (.*)", done.stdout)
+    if "1 passed, 0 failed" not in done.stdout and not found:
+        raise Broken(f"the scenario cannot be judged: {(done.stdout + done.stderr)[-1500:]}")
+    return found and found[1]
