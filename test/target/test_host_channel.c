@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+// What opens, keeps and ends a channel of the serial line, and when the board may write its flash.
+#include "host_rig.inc"
+
+/// Lets time pass with a relay that says only `noise`, every 50 ms.
+static void run_with_noise(unsigned span_ms, const char *noise) {
+    for (unsigned ms = 0; ms < span_ms; ms += 50U) {
+        put(noise, strlen(noise));
+        run_ms(50);
+    }
+}
+
+static void assert_channel_ends_with(const char *noise) {
+    run_with_noise(IWN_LINE_SILENT_MS + 50U, noise);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(IW_CLIENT_NONE, host.client[0].id, noise);
+}
+
+static void test_channel_opened_again_has_no_lease(void) {
+    const iw_client_t before = host.client[0].id;
+    say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
+    run_ms(20);
+    TEST_ASSERT_NOT_EQUAL_UINT(before, host.client[0].id);
+    TEST_ASSERT_EQUAL_UINT(IW_CLIENT_NONE, gateway_rig_look(&rig).holder);
+    TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+    assert_answer("{\"cmd\":\"hello\",\"id\":3}", "\"name\":\"iwheel-gateway\"");
+}
+
+static void test_channel_of_a_relay_that_sends_noise_ends(void) {
+    assert_channel_ends_with("7f3a\n");
+}
+
+static void test_channel_of_a_relay_with_wrong_checksums_ends(void) {
+    assert_channel_ends_with("0 {\"cmd\":\"alive\"}*00000000\n");
+}
+
+static void test_channel_of_a_relay_that_is_alive_stays(void) {
+    char line[IWN_LINE_BOARD_MAX];
+    line[framed(0, "{\"cmd\":\"alive\"}", line)] = '\0';
+    run_with_noise(2U * IWN_LINE_SILENT_MS, line);
+    TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, host.client[0].id);
+}
+
+/// The gateway starts with another lease; its relay connects.
+static void start_with_lease(uint16_t lease_ms) {
+    iw_config_t config = rig.config;
+    iw_host_place_t place = host.place;
+    config.lease_ms = lease_ms;
+    place.settings = iw_settings_from(&config, 540);
+    memset(&host, 0, sizeof host);
+    iw_host_init(&host, &place, rig.now_us);
+    say(0, "{\"cmd\":\"link\"}");
+    say(0, "{\"cmd\":\"open\",\"channel\":1,\"watch\":false}");
+    run_ms(20);
+}
+
+/// A command with a stamp of that age.
+static void drive_with_age(uint32_t age_ms) {
+    char line[IWN_LINE_BOARD_MAX];
+    const uint64_t stamp_us = t_us;
+    refused = 0;
+    run_ms(age_ms);
+    put(line, drive_line(SLOW_MM_S, BOOT, ++seq, stamp_us, line));
+    run_ms(10);
+}
+
+static void test_command_older_than_a_short_lease_is_stale(void) {
+    start_with_lease(100);
+    drive_with_age(150);
+    TEST_ASSERT_EQUAL_UINT32(1, refused);
+}
+
+static void test_command_within_a_long_lease_is_not_stale(void) {
+    start_with_lease(450);
+    drive_with_age(300);
+    TEST_ASSERT_EQUAL_UINT32(0, refused);
+}
+
+static void run_until_listening(void) {
+    say(1, "{\"cmd\":\"stop\"}");
+    for (unsigned i = 0; i < 12U; i++) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(200);
+    }
+    TEST_ASSERT_TRUE(iw_host_is_silent(&host));
+}
+
+static void test_flash_is_not_written_while_an_arm_waits(void) {
+    run_until_listening();
+    say(0, "{\"cmd\":\"alive\"}");
+    gateway_judge_renew(&rig.judge);
+    say(1, "{\"cmd\":\"arm\"}"); // In the same batch: no step of the gateway lies between them.
+    say(1, "{\"cmd\":\"config\",\"commit\":true,\"id\":5}");
+    all_length = 0;
+    run_ms(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"error\":\"denied\""), all);
+    TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_channel_opened_again_has_no_lease);
+    RUN_TEST(test_channel_of_a_relay_that_sends_noise_ends);
+    RUN_TEST(test_channel_of_a_relay_with_wrong_checksums_ends);
+    RUN_TEST(test_channel_of_a_relay_that_is_alive_stays);
+    RUN_TEST(test_command_older_than_a_short_lease_is_stale);
+    RUN_TEST(test_command_within_a_long_lease_is_not_stale);
+    RUN_TEST(test_flash_is_not_written_while_an_arm_waits);
+    return UNITY_END();
+}

@@ -1,0 +1,302 @@
+// SPDX-License-Identifier: MIT
+// The relay's whole loop with a board and clients of this file's: time, waits and the port are here, the sockets are real.
+#include "relay.h"
+
+#include "iwheel_linux/clock.h"
+
+#include "unity.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#define BOOT    "0123456789abcdef"
+#define EARLY   700000
+#define LATE    900000
+#define STEP_MS 1U
+
+static relay_t relay;
+static serial_settings_t settings;
+static uint64_t now_us;
+static char folder[] = "/tmp/serial_relay_XXXXXX";
+static char to_relay[8192]; // What the board has written and the relay has not read yet.
+static size_t to_relay_length;
+static char to_board[65536]; // Everything that the relay has written.
+static size_t to_board_length;
+static bool port_is_full;
+static int client_fd;
+static unsigned step;
+static bool (*script)(void); // Called before each wait; true: the relay ends.
+
+// ---- instead of the port, the clock and the wait ------------------------------------------------------------------
+
+iw_time_us_t iw_clock_now_us(void) {
+    return now_us;
+}
+
+iw_time_us_t iw_clock_awake_us(iw_time_us_t suspended_us) {
+    return now_us - suspended_us;
+}
+
+iw_time_us_t iw_clock_read(iw_time_us_t *out_suspended_us) {
+    *out_suspended_us = 0;
+    return now_us;
+}
+
+iw_time_us_t iw_clock_suspended_us(void) {
+    return 0;
+}
+
+int64_t iw_clock_wall_us(void) {
+    return (int64_t)now_us;
+}
+
+int serial_port_open(serial_port_t *self, const char *path, uint32_t baud, char *out_why, size_t size) {
+    (void)path;
+    (void)baud;
+    (void)out_why;
+    (void)size;
+    self->fd = eventfd(0, EFD_CLOEXEC);
+    return 0;
+}
+
+void serial_port_close(serial_port_t *self) {
+    if (self->fd >= 0) {
+        (void)close(self->fd);
+    }
+    self->fd = -1;
+}
+
+ssize_t serial_port_read(const serial_port_t *self, char *out, size_t size) {
+    const size_t count = (to_relay_length < size) ? to_relay_length : size;
+    (void)self;
+    memcpy(out, to_relay, count);
+    memmove(to_relay, &to_relay[count], to_relay_length - count);
+    to_relay_length -= count;
+    return (ssize_t)count;
+}
+
+ssize_t serial_port_write(const serial_port_t *self, const char *bytes, size_t length) {
+    (void)self;
+    if (port_is_full) {
+        return 0;
+    }
+    TEST_ASSERT_TRUE(to_board_length + length < sizeof to_board);
+    memcpy(&to_board[to_board_length], bytes, length);
+    to_board_length += length;
+    to_board[to_board_length] = '\0';
+    return (ssize_t)length;
+}
+
+void serial_port_discard(const serial_port_t *self) {
+    (void)self;
+}
+
+bool serial_port_has_baud(uint32_t baud) {
+    return baud > 0U;
+}
+
+int gw_wakeup_open(gw_wakeup_t *self) {
+    self->fd = epoll_create1(EPOLL_CLOEXEC);
+    return 0;
+}
+
+void gw_wakeup_close(gw_wakeup_t *self) {
+    (void)close(self->fd);
+}
+
+int gw_wakeup_wait(const gw_wakeup_t *self, struct epoll_event *events, int room, iw_time_us_t read_us,
+                   iw_time_us_t until_us) {
+    (void)read_us;
+    (void)until_us;
+    now_us += STEP_MS * 1000U;
+    const bool ends = script();
+    step++;
+    int count = epoll_wait(self->fd, events, room - 2, 0);
+    if (to_relay_length > 0U) {
+        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = GW_TAG_BUS}};
+    }
+    if (ends) {
+        events[count++] = (struct epoll_event){.events = EPOLLIN, .data = {.u64 = GW_TAG_SIGNAL}};
+    }
+    return count;
+}
+
+// ---- the board and a client ---------------------------------------------------------------------------------------
+
+static void board_writes(uint8_t channel, uint64_t t_us, const char *json) {
+    const iwn_line_t line = {.channel = channel, .stamped = true, .t_us = t_us, .json = json, .length = strlen(json)};
+    to_relay_length += iwn_line_write(&line, &to_relay[to_relay_length], sizeof to_relay - to_relay_length);
+}
+
+static void board_links(uint64_t t_us) {
+    board_writes(0, t_us, "{\"event\":\"link\",\"boot\":\"" BOOT "\",\"version\":\"1\"}");
+}
+
+static void client_connects(void) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", settings.northbound.socket);
+    client_fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    TEST_ASSERT_EQUAL_INT(0, connect(client_fd, (struct sockaddr *)&address, sizeof address));
+}
+
+static void client_writes(const char *line) {
+    TEST_ASSERT_EQUAL_INT(strlen(line), write(client_fd, line, strlen(line)));
+}
+
+static unsigned written(const char *words) {
+    unsigned count = 0;
+    for (const char *at = to_board; (at = strstr(at, words)) != NULL; at++) {
+        count++;
+    }
+    return count;
+}
+
+static void run(bool (*play)(void)) {
+    script = play;
+    TEST_ASSERT_EQUAL_INT(0, relay_run(&relay, &settings));
+}
+
+void setUp(void) {
+    now_us = 10000000;
+    to_relay_length = to_board_length = 0;
+    to_board[0] = '\0';
+    port_is_full = false;
+    client_fd = -1;
+    step = 0;
+    serial_settings_default(&settings);
+    settings.northbound.group[0] = '\0';
+    settings.northbound.mode = 0600;
+    (void)snprintf(settings.northbound.socket, sizeof settings.northbound.socket, "%s/drive", folder);
+    (void)snprintf(settings.northbound.watch_socket, sizeof settings.northbound.watch_socket, "none");
+}
+
+void tearDown(void) {
+    if (client_fd >= 0) {
+        (void)close(client_fd);
+    }
+}
+
+// ---- tests --------------------------------------------------------------------------------------------------------
+
+/// The client goes while the line is full, before its `open` could be written.
+static bool client_goes_before_open(void) {
+    switch (step) {
+    case 2:
+        board_links(EARLY);
+        break;
+    case 10:
+        port_is_full = true;
+        client_connects();
+        break;
+    case 20:
+        (void)close(client_fd);
+        client_fd = -1;
+        break;
+    case 30:
+        port_is_full = false;
+        break;
+    default:
+        break;
+    }
+    return step == 500U;
+}
+
+static void test_relay_client_gone_before_open_opens_nothing(void) {
+    run(client_goes_before_open);
+    // A line that the port had half taken may still leave; a channel that stays open may not.
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(1, written("\"cmd\":\"open\""));
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT(1, written("\"cmd\":\"close\",\"channel\":1"));
+    const char *last_open = strstr(to_board, "\"cmd\":\"open\"");
+    TEST_ASSERT_TRUE(last_open == NULL || strstr(last_open, "\"cmd\":\"close\"") != NULL);
+}
+
+/// A client goes, and the next one comes before the line takes a byte.
+static bool client_follows_another(void) {
+    switch (step) {
+    case 2:
+        board_links(EARLY);
+        break;
+    case 10:
+        client_connects();
+        break;
+    case 20:
+        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
+        break;
+    case 30:
+        port_is_full = true;
+        (void)close(client_fd);
+        break;
+    case 40:
+        client_connects();
+        break;
+    case 50:
+        port_is_full = false;
+        break;
+    default:
+        break;
+    }
+    return step == 150U;
+}
+
+static void test_relay_closes_a_channel_before_it_opens_the_next(void) {
+    run(client_follows_another);
+    TEST_ASSERT_EQUAL_UINT(2, written("\"cmd\":\"open\""));
+    const char *close_at = strstr(to_board, "\"cmd\":\"close\",\"channel\":1");
+    TEST_ASSERT_NOT_NULL(close_at);
+    TEST_ASSERT_NOT_NULL(strstr(close_at, "\"cmd\":\"open\""));
+}
+
+/// In one wake-up the board's newer stamp and a command that was sent before it.
+static bool stamp_and_command_together(void) {
+    switch (step) {
+    case 2:
+        board_links(EARLY);
+        break;
+    case 10:
+        client_connects();
+        break;
+    case 20:
+        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
+        break;
+    case 30:
+        client_writes("{\"cmd\":\"arm\",\"id\":1}\n");
+        break;
+    case 40:
+        board_writes(1, EARLY + 2, "{\"id\":1,\"ok\":true}");
+        break;
+    case 100:
+        client_writes("{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1}\n");
+        board_links(LATE);
+        break;
+    default:
+        break;
+    }
+    return step == 150U;
+}
+
+static void test_relay_stamp_of_the_same_wake_up_is_not_quoted(void) {
+    char early[32];
+    char late[32];
+    run(stamp_and_command_together);
+    (void)snprintf(early, sizeof early, "\"t_us\":%u", EARLY + 2U);
+    (void)snprintf(late, sizeof late, "\"t_us\":%u", (unsigned)LATE);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"drive\""), to_board);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written(late), to_board);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written(early), to_board);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    RUN_TEST(test_relay_client_gone_before_open_opens_nothing);
+    RUN_TEST(test_relay_closes_a_channel_before_it_opens_the_next);
+    RUN_TEST(test_relay_stamp_of_the_same_wake_up_is_not_quoted);
+    (void)rmdir(folder);
+    return UNITY_END();
+}
