@@ -122,6 +122,7 @@ static char *print_config(const gateway_config_t *config) {
 static int open_box(gw_daemon_t *daemon, const char *config_text) {
     const gateway_config_t *config = &daemon->config;
     const gw_box_wish_t wish = {.blackbox_s = config->record.blackbox_s,
+                                .keep_stops = config->record.keep_stops,
                                 .directory = config->record.directory,
                                 .bus = config->bus.interface,
                                 .estop = config->estop.line,

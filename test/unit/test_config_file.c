@@ -86,6 +86,7 @@ static void test_parse_empty_file_gives_documented_defaults(void) {
     TEST_ASSERT_EQUAL_STRING("iwheel", config.northbound.group);
     TEST_ASSERT_EQUAL_UINT16(16, config.northbound.max_clients);
     TEST_ASSERT_EQUAL_UINT16(30, config.record.blackbox_s);
+    TEST_ASSERT_EQUAL_UINT16(200, config.record.keep_stops);
     TEST_ASSERT_EQUAL_STRING("/var/lib/iwheel", config.record.directory);
     TEST_ASSERT_EQUAL(IW_CONFIG_OK, iw_config_check(&config.core));
 }
@@ -167,6 +168,7 @@ static void test_parse_range_ends_are_accepted_and_beyond_refused(void) {
         {"limits", "follow_mm_s", 50, 5000},    {"limits", "follow_ms", 100, 5000},
         {"limits", "blocked_ms", 200, 10000},   {"estop", "debounce_ms", 0, 1000},
         {"northbound", "max_clients", 1, 64},   {"record", "blackbox_s", 0, 600},
+        {"record", "keep_stops", 8, 256},
     };
     char text[128];
     char cure[64];

@@ -431,6 +431,30 @@ static void test_gateway_that_gives_way_ramps_holds_says_why_and_ends(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), line), daemon_rig_log());
 }
 
+static void test_start_with_healthy_wheels_logs_no_fault(void) {
+    daemon_rig_crash();
+    daemon_rig_start();
+    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->status.observed.present); // The first look finds no telemetry yet.
+    daemon_rig_keep_log();
+    daemon_rig_run(2000);
+    TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());
+    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false);
+    daemon_rig_run(200);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "fault: wheel_lost"), daemon_rig_log());
+}
+
+static void test_start_without_wheels_logs_the_fault_after_a_second(void) {
+    sim_world_power(&daemon_rig.world, daemon_rig.now_us, false);
+    daemon_rig_crash();
+    daemon_rig_start();
+    TEST_ASSERT_EQUAL_UINT32(0, daemon_rig.daemon->status.observed.present);
+    daemon_rig_keep_log();
+    daemon_rig_run(900);
+    TEST_ASSERT_NULL_MESSAGE(strstr(daemon_rig_log(), "wheel_lost"), daemon_rig_log());
+    daemon_rig_run(200);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(daemon_rig_log(), "fault: wheel_lost"), daemon_rig_log());
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_marker_is_there_before_the_first_nonzero_setpoint_and_until_after_the_last);
@@ -461,5 +485,7 @@ int main(void) {
     RUN_TEST(test_setpoints_keep_their_period_with_and_without_frames_of_the_wheels);
     RUN_TEST(test_signal_to_end_ramps_holds_and_ends_without_a_marker);
     RUN_TEST(test_gateway_that_gives_way_ramps_holds_says_why_and_ends);
+    RUN_TEST(test_start_with_healthy_wheels_logs_no_fault);
+    RUN_TEST(test_start_without_wheels_logs_the_fault_after_a_second);
     return UNITY_END();
 }

@@ -13,6 +13,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mount.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <unity.h>
@@ -36,6 +38,7 @@ void setUp(void) {
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     (void)snprintf(config.record.directory, sizeof config.record.directory, "%s/records", folder);
     config.record.blackbox_s = 2;
+    config.record.keep_stops = 8;
 }
 
 void tearDown(void) {
@@ -44,6 +47,7 @@ void tearDown(void) {
         gw_box_close(&box);
         open_box = false;
     }
+    (void)umount2(config.record.directory, MNT_DETACH);
     (void)snprintf(command, sizeof command, "rm -rf %s", folder);
     TEST_ASSERT_EQUAL(0, system(command));
 }
@@ -52,6 +56,7 @@ void tearDown(void) {
 static void start(void) {
     (void)signal(SIGINT, SIG_DFL);
     const gw_box_wish_t wish = {.blackbox_s = config.record.blackbox_s,
+                                .keep_stops = config.record.keep_stops,
                                 .directory = config.record.directory,
                                 .bus = config.bus.interface,
                                 .estop = config.estop.line,
@@ -89,12 +94,40 @@ static gw_box_order_t stopped(const char *cause) {
     return order;
 }
 
-static void record(const char *cause, int error) {
-    const gw_box_order_t order = stopped(cause);
-    TEST_ASSERT_TRUE(gw_box_write(&box, &order));
+static void record_order(const gw_box_order_t *order, int error) {
+    TEST_ASSERT_TRUE(gw_box_write(&box, order));
     TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
     TEST_ASSERT_EQUAL(3, box.last.number);
     TEST_ASSERT_EQUAL(error, box.last.error);
+}
+
+static void record(const char *cause, int error) {
+    const gw_box_order_t order = stopped(cause);
+    record_order(&order, error);
+}
+
+/// A stop while the wheels were commanded.
+static void record_in_motion(const char *cause, int error) {
+    gw_box_order_t order = stopped(cause);
+    order.note.stop.applied.wheel[IW_RIGHT].speed_mm_s = -400;
+    record_order(&order, error);
+}
+
+/// A stop with both wheels at standstill, whatever becomes of its recording.
+static void record_harmless(const char *cause) {
+    gw_box_order_t order = stopped(cause);
+    const blackbox_entry_t rest = {
+        .at_us = order.note.stop.at_us - 1U, .kind = BLACKBOX_FRAME, .number = IW_ID_LEFT_SPEED, .a = 4};
+    blackbox_ring_put(box.ring, &rest);
+    order.mark = blackbox_ring_written(box.ring);
+    TEST_ASSERT_TRUE(gw_box_write(&box, &order));
+    TEST_ASSERT_EQUAL(GW_CHILD_SAID, wait_news());
+}
+
+static bool is_there(const char *name) {
+    char path[256];
+    (void)snprintf(path, sizeof path, "%s/%s", config.record.directory, name);
+    return access(path, F_OK) == 0;
 }
 
 static unsigned count_files(void) {
@@ -219,15 +252,142 @@ static void test_many_stops_keep_the_newest_and_touch_nothing_else(void) {
     FILE *mine = fopen(path, "w");
     TEST_ASSERT_NOT_NULL(mine);
     (void)fclose(mine);
-    for (unsigned i = 0; i < GW_BOX_RECORDINGS_MAX + 2U; i++) {
+    for (unsigned i = 0; i < config.record.keep_stops + 2U; i++) {
         record("estop_line", 0);
     }
-    TEST_ASSERT_EQUAL(3U * GW_BOX_RECORDINGS_MAX + 1U, count_files());
+    TEST_ASSERT_EQUAL(3U * config.record.keep_stops + 1U, count_files());
     TEST_ASSERT_EQUAL(0, access(path, F_OK));
-    (void)snprintf(path, sizeof path, "%s/stop-000003-estop_line.log", config.record.directory);
-    TEST_ASSERT_NOT_EQUAL(0, access(path, F_OK));
-    (void)snprintf(path, sizeof path, "%s/stop-000004-estop_line.log", config.record.directory);
-    TEST_ASSERT_EQUAL(0, access(path, F_OK));
+    TEST_ASSERT_FALSE(is_there("stop-000003-estop_line.log"));
+    TEST_ASSERT_TRUE(is_there("stop-000004-estop_line.log"));
+}
+
+static void test_harmless_stops_keep_recordings_of_motion(void) {
+    start();
+    record_in_motion("wheel_lost", 0);
+    for (unsigned i = 0; i < 40U; i++) {
+        record_harmless("estop_software");
+    }
+    TEST_ASSERT_TRUE(is_there("stop-000001-wheel_lost.log"));
+    TEST_ASSERT_EQUAL(3U * config.record.keep_stops, count_files());
+    for (unsigned i = 0; i < config.record.keep_stops; i++) {
+        record_in_motion("bus_down", 0);
+    }
+    TEST_ASSERT_FALSE(is_there("stop-000001-wheel_lost.log")); // Among its kind it is the oldest.
+    record_harmless("estop_software");                         // The newest stays, and costs none of them.
+    record_harmless("estop_software");
+    TEST_ASSERT_FALSE(is_there("stop-000050-estop_software.log"));
+    TEST_ASSERT_TRUE(is_there("stop-000051-estop_software.log"));
+    TEST_ASSERT_EQUAL(3U * (config.record.keep_stops + 1U), count_files());
+}
+
+static void test_wheel_that_turns_without_command_is_motion(void) {
+    char text[8192];
+    start();
+    gw_box_order_t order = stopped("estop_line");
+    const blackbox_entry_t turning = {.at_us = order.note.stop.at_us - 1U,
+                                      .kind = BLACKBOX_FRAME,
+                                      .number = IW_ID_RIGHT_SPEED,
+                                      .a = 4,
+                                      .as = {.data = {0xFF, 0xF0}}};
+    blackbox_ring_put(box.ring, &turning);
+    order.mark = blackbox_ring_written(box.ring);
+    record_order(&order, 0);
+    read_file("stop-000001-estop_line.jsonl", text, sizeof text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "\"in_motion\":true"), text);
+    TEST_ASSERT_FALSE(gw_box_line_is_harmless(text));
+}
+
+static void test_recordings_of_earlier_versions_are_judged_by_command(void) {
+    const char *head = "{\"type\":\"blackbox\"}\n{\"type\":\"why\",";
+    char lines[256];
+    const struct {
+        const char *fields;
+        bool harmless;
+    } rows[] = {{"\"applied_left_mm_s\":0,\"applied_right_mm_s\":0,\"at_us\":1}\n", true},
+                {"\"applied_left_mm_s\":0,\"applied_right_mm_s\":1,\"at_us\":1}\n", false},
+                {"\"applied_left_mm_s\":-1,\"applied_right_mm_s\":0,\"at_us\":1}\n", false},
+                {"\"in_motion\":true,\"applied_left_mm_s\":0,\"applied_right_mm_s\":0,\"at_us\":1}\n", false},
+                {"\"in_motion\":false,\"applied_left_mm_s\":0,\"applied_right_mm_s\":0,\"at_us\":1}\n", true},
+                {"", false}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        (void)snprintf(lines, sizeof lines, "%s%s", head, rows[i].fields);
+        TEST_ASSERT_EQUAL_MESSAGE(rows[i].harmless, gw_box_line_is_harmless(lines), lines);
+    }
+    TEST_ASSERT_FALSE(gw_box_line_is_harmless(""));
+}
+
+/// Recordings `first` to `last` of a stop with that speed, without the process that writes them.
+static void make_recordings(unsigned first, unsigned last, int speed_mm_s) {
+    for (unsigned number = first; number <= last; number++) {
+        char path[256];
+        (void)snprintf(path, sizeof path, "%s/stop-%06u-made.jsonl", config.record.directory, number);
+        FILE *file = fopen(path, "w");
+        TEST_ASSERT_NOT_NULL(file);
+        (void)fprintf(file, "{}\n{\"type\":\"why\",\"applied_left_mm_s\":%d,\"applied_right_mm_s\":0,\"at_us\":1}\n",
+                      speed_mm_s);
+        (void)fclose(file);
+    }
+}
+
+/// The second number of recordings needs more than one pass over the directory.
+static void test_rotation_of_ten_thousand_recordings_keeps_motion(void) {
+    const int directory = gw_box_files_open(config.record.directory);
+    make_recordings(1, 3, 500);
+    make_recordings(4, 10000, 0);
+    gw_box_files_rotate(directory, &(gw_box_room_t){8, UINT64_MAX, 10000, false});
+    TEST_ASSERT_EQUAL(8, count_files());
+    TEST_ASSERT_TRUE(is_there("stop-000001-made.jsonl"));
+    TEST_ASSERT_TRUE(is_there("stop-000003-made.jsonl"));
+    TEST_ASSERT_FALSE(is_there("stop-009995-made.jsonl"));
+    TEST_ASSERT_TRUE(is_there("stop-009996-made.jsonl"));
+    (void)close(directory);
+}
+
+/// Needs the right to mount.
+static bool mount_small_disk(void) {
+    (void)mkdir(config.record.directory, 0755);
+    return mount("none", config.record.directory, "tmpfs", 0, "size=1536k,mode=0755") == 0;
+}
+
+/// Fills the disk to its last byte, as any local user can.
+static void fill_disk(const char *name) {
+    static const char block[4096];
+    char path[256];
+    (void)snprintf(path, sizeof path, "%s/%s", config.record.directory, name);
+    FILE *file = fopen(path, "w");
+    TEST_ASSERT_NOT_NULL(file);
+    while (fwrite(block, 1, sizeof block, file) == sizeof block && fflush(file) == 0) {
+    }
+    (void)fclose(file);
+}
+
+static void test_full_disk_costs_harmless_recordings_first(void) {
+    if (!mount_small_disk()) {
+        TEST_IGNORE_MESSAGE("mounting a tmpfs is not permitted");
+    }
+    start();
+    record_in_motion("wheel_lost", 0);
+    for (unsigned i = 0; i < 4U; i++) {
+        record_harmless("estop_software");
+    }
+    TEST_ASSERT_TRUE(is_there("reserve"));
+    fill_disk("strangers");
+    record_in_motion("bus_down", 0); // The reserve has room for it.
+    TEST_ASSERT_TRUE(is_there("stop-000006-bus_down.jsonl"));
+    fill_disk("strangers2");
+    record_in_motion("echo_lost", 0);
+    TEST_ASSERT_TRUE(is_there("stop-000001-wheel_lost.log"));
+    TEST_ASSERT_TRUE(is_there("stop-000006-bus_down.log"));
+    TEST_ASSERT_TRUE(is_there("stop-000007-echo_lost.log"));
+    fill_disk("strangers3");
+    while (box.last.error == 0) { // Harmless ones replace each other, and then fail: they cost no other.
+        fill_disk("strangers4");
+        record_harmless("estop_software");
+        TEST_ASSERT_TRUE(is_there("stop-000007-echo_lost.log"));
+    }
+    TEST_ASSERT_EQUAL(ENOSPC, box.last.error);
+    TEST_ASSERT_TRUE(is_there("stop-000001-wheel_lost.log"));
+    TEST_ASSERT_TRUE(is_there("stop-000006-bus_down.log"));
 }
 
 static void test_directory_that_cannot_be_is_told_at_once_and_with_each_stop(void) {
@@ -285,11 +445,11 @@ static void test_oldest_is_dropped_only_below_the_number(void) {
     record("a", 0);
     record("b", 0);
     const int directory = gw_box_files_open(config.record.directory);
-    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, 2));
-    TEST_ASSERT_FALSE(gw_box_files_drop_oldest(directory, 2));
+    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, 2, true));
+    TEST_ASSERT_FALSE(gw_box_files_drop_oldest(directory, 2, true));
     TEST_ASSERT_EQUAL(3, count_files());
     TEST_ASSERT_EQUAL(3, gw_box_files_next(directory));
-    gw_box_files_rotate(directory, 0, 0); // The newest always stays.
+    gw_box_files_rotate(directory, &(gw_box_room_t){0, 0, 2, true}); // The newest always stays.
     TEST_ASSERT_EQUAL(3, count_files());
     (void)close(directory);
 }
@@ -377,6 +537,11 @@ int main(void) {
     RUN_TEST(test_writer_keeps_no_file_open);
     RUN_TEST(test_next_recording_has_the_next_number_also_after_a_restart);
     RUN_TEST(test_many_stops_keep_the_newest_and_touch_nothing_else);
+    RUN_TEST(test_harmless_stops_keep_recordings_of_motion);
+    RUN_TEST(test_wheel_that_turns_without_command_is_motion);
+    RUN_TEST(test_recordings_of_earlier_versions_are_judged_by_command);
+    RUN_TEST(test_rotation_of_ten_thousand_recordings_keeps_motion);
+    RUN_TEST(test_full_disk_costs_harmless_recordings_first);
     RUN_TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop);
     RUN_TEST(test_what_became_of_a_recording_is_told_in_words);
     RUN_TEST(test_directory_that_appears_later_is_used);

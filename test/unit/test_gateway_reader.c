@@ -269,9 +269,9 @@ static void test_folder_full_of_recordings_gives_the_newest_that_fit_into_a_line
         make(name, 0, 1);
     }
     (void)list();
-    TEST_ASSERT_NULL(strstr(answer.text, "stop-0000000128-"));
-    assert_says("[{\"name\":\"stop-0000000129-");
-    assert_says("stop-0000000192-");
+    TEST_ASSERT_NULL(strstr(answer.text, "stop-0000000520-"));
+    assert_says("[{\"name\":\"stop-0000000521-");
+    assert_says("stop-0000000780-");
 }
 
 static gw_box_t box;
@@ -284,6 +284,20 @@ static void wait_for_answer(gw_child_news_t wanted) {
 
 static void open_box(uint16_t seconds) {
     TEST_ASSERT_EQUAL(0, gw_box_open(&box, &(gw_box_wish_t){.blackbox_s = seconds, .directory = directory}));
+}
+
+static void test_refusal_after_a_longer_answer_ends_where_it_should(void) {
+    const gw_box_question_t piece = {.client = 9, .name = LOG};
+    const gw_box_question_t missing = {.client = 8, .name = "stop-000099-x.log"};
+    make(LOG, 0, 3U * GW_BOX_PIECE);
+    open_box(2);
+    TEST_ASSERT_TRUE(gw_box_ask(&box, &piece));
+    wait_for_answer(GW_CHILD_SAID);
+    TEST_ASSERT_TRUE(gw_box_ask(&box, &missing));
+    wait_for_answer(GW_CHILD_SAID);
+    TEST_ASSERT_EQUAL(IWN_DENIED, box.answer.error);
+    TEST_ASSERT_EQUAL(box.answer.length, strlen(box.answer.text));
+    gw_box_close(&box);
 }
 
 static void test_process_answers_and_one_that_is_frozen_holds_up_nobody(void) {
@@ -331,6 +345,7 @@ int main(void) {
     RUN_TEST(test_file_that_grows_or_goes_between_pieces_is_told);
     RUN_TEST(test_list_has_recordings_only_the_oldest_first);
     RUN_TEST(test_folder_full_of_recordings_gives_the_newest_that_fit_into_a_line);
+    RUN_TEST(test_refusal_after_a_longer_answer_ends_where_it_should);
     RUN_TEST(test_process_answers_and_one_that_is_frozen_holds_up_nobody);
     RUN_TEST(test_without_recordings_there_is_no_process);
     return UNITY_END();

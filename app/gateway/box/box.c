@@ -80,9 +80,13 @@ gw_child_news_t gw_box_hear(gw_box_t *self) {
     const size_t head = offsetof(gw_box_answer_t, text);
     size_t length;
     const gw_child_news_t news = gw_child_hear(&self->reader, &self->answer, sizeof self->answer, &length);
-    if (news == GW_CHILD_SAID && (length < head || length - head != self->answer.length)) {
+    if (news != GW_CHILD_SAID) {
+        return news;
+    }
+    if (length < head || length - head != self->answer.length || self->answer.length >= sizeof self->answer.text) {
         return not_understood(&self->reader);
     }
+    self->answer.text[self->answer.length] = '\0'; // The reader sends the text without it.
     return news;
 }
 

@@ -161,6 +161,8 @@ static const settings_key_t keys[] = {
     {"record", "blackbox_s", " s", "Ring in memory, written on every latched stop; 0: none.",
      NUMBER(record.blackbox_s, 0, 600)},
     {"record", "directory", "", "Where recordings are written.", TEXT(record.directory, settings_wrong_address)},
+    {"record", "keep_stops", "", "Number of recordings on disk; those of stops in motion are removed last.",
+     NUMBER(record.keep_stops, 8, 256)},
 };
 
 static void find_range(uint16_t range, uint32_t *out_min, uint32_t *out_max) {
@@ -242,7 +244,7 @@ void gateway_config_default(gateway_config_t *out_config) {
         .track_mm = 540U,
         .estop = {"ESTOP", true, 5U},
         .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U},
-        .record = {30U, "/var/lib/iwheel"},
+        .record = {30U, "/var/lib/iwheel", 200U},
     };
     *out_config = standard;
     iw_config_default(&out_config->core);

@@ -55,6 +55,7 @@ typedef struct gateway_config {
     struct {
         uint16_t blackbox_s; ///< Length of the ring in memory, 0 (none) ..600.
         char directory[GATEWAY_PATH_SIZE];
+        uint16_t keep_stops; ///< 8..GW_BOX_KEEP_MAX.
     } record;
 } gateway_config_t;
 

@@ -11,17 +11,29 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/// Holds room on the disk, so that a full one does not cost the recording of an accident.
+#define RESERVE    "reserve"
 #define DIGITS_MIN 6U
 #define DIGITS_MAX 10U
 #define LETTERS    "abcdefghijklmnopqrstuvwxyz_"
 
 const char *const gw_box_endings[GW_BOX_ENDINGS] = {".log", ".jsonl", ".conf"};
 
+/// A file of a recording. Once sorted by number, the first one of each recording stands for the whole recording.
 typedef struct {
-    uint32_t oldest; ///< 0: there is none.
-    uint32_t newest;
-    uint32_t recordings; ///< Counted by their .jsonl files and, lacking one, not at all.
     uint64_t bytes;
+    uint32_t number;
+    bool removed;                  ///< Chosen to be removed.
+    char cause[GW_BOX_CAUSE_SIZE]; ///< From the name of the event file; empty: it has none.
+} found_t;
+
+typedef struct {
+    found_t file[GW_BOX_SURVEYED];
+    size_t files;
+    bool partial;      ///< The directory has more files than that.
+    size_t recordings; ///< After sorting: the first entries of `file`.
+    size_t left;       ///< Of the recordings, those that are not chosen to be removed.
+    uint64_t bytes;    ///< Size of those that are left.
 } survey_t;
 
 int gw_box_files_open(const char *directory) {
@@ -62,23 +74,6 @@ static uint32_t number_of(const char *name) {
     return (number < UINT32_MAX) ? (uint32_t)number : 0U;
 }
 
-static bool is_event_file(const char *name) {
-    const char *ending = strrchr(name, '.');
-    return ending != NULL && strcmp(ending, ".jsonl") == 0;
-}
-
-static void count_file(int directory, const char *name, survey_t *survey) {
-    struct stat status;
-    const uint32_t number = number_of(name);
-    if (number == 0U || fstatat(directory, name, &status, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(status.st_mode)) {
-        return;
-    }
-    survey->oldest = (survey->oldest == 0U || number < survey->oldest) ? number : survey->oldest;
-    survey->newest = (number > survey->newest) ? number : survey->newest;
-    survey->recordings += is_event_file(name) ? 1U : 0U;
-    survey->bytes += (uint64_t)status.st_size;
-}
-
 /// Calls for each file; a directory that cannot be read has none.
 static void visit(int directory, void (*take)(int directory, const char *name, void *context), void *context) {
     const int fd = openat(directory, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -96,18 +91,19 @@ static void visit(int directory, void (*take)(int directory, const char *name, v
     (void)closedir(list);
 }
 
-static void take_count(int directory, const char *name, void *context) {
-    count_file(directory, name, (survey_t *)context);
-}
-
-static survey_t look(int directory) {
-    survey_t survey = {0};
-    visit(directory, take_count, &survey);
-    return survey;
+static void take_newest(int directory, const char *name, void *context) {
+    uint32_t *newest = (uint32_t *)context;
+    const uint32_t number = number_of(name);
+    (void)directory;
+    if (number > *newest) {
+        *newest = number;
+    }
 }
 
 uint32_t gw_box_files_next(int directory) {
-    return look(directory).newest + 1U;
+    uint32_t newest = 0;
+    visit(directory, take_newest, &newest);
+    return newest + 1U;
 }
 
 static void take_remove(int directory, const char *name, void *context) {
@@ -120,25 +116,141 @@ void gw_box_files_remove(int directory, uint32_t number) {
     visit(directory, take_remove, &number);
 }
 
-void gw_box_files_rotate(int directory, uint32_t most, uint64_t bytes) {
-    survey_t survey = look(directory);
-    while ((survey.recordings > most || survey.bytes > bytes) && survey.oldest < survey.newest) {
-        const uint32_t removed = survey.oldest;
-        gw_box_files_remove(directory, removed);
-        survey = look(directory);
-        if (survey.oldest == removed) {
-            return; // It cannot be removed: never try for ever.
+static void take_file(int directory, const char *name, void *context) {
+    survey_t *survey = (survey_t *)context;
+    struct stat status;
+    const uint32_t number = number_of(name);
+    if (number == 0U || fstatat(directory, name, &status, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(status.st_mode)) {
+        return;
+    }
+    if (survey->files == GW_BOX_SURVEYED) {
+        survey->partial = true;
+        return;
+    }
+    found_t *file = &survey->file[survey->files++];
+    *file = (found_t){.number = number, .bytes = (uint64_t)status.st_size};
+    const char *cause = strchr(name + sizeof GW_BOX_PREFIX - 1U, '-') + 1;
+    const size_t letters = strspn(cause, LETTERS);
+    if (strcmp(cause + letters, ".jsonl") == 0) {
+        memcpy(file->cause, cause, letters); // gw_box_files_stem: shorter than GW_BOX_CAUSE_SIZE.
+    }
+}
+
+static int lower_first(const void *a, const void *b) {
+    const uint32_t first = ((const found_t *)a)->number;
+    const uint32_t second = ((const found_t *)b)->number;
+    return (first > second) - (first < second);
+}
+
+/// Makes one entry of all files of a recording; `last` is that of the recording before, NULL: there is none.
+static void merge(survey_t *survey, found_t *last, const found_t *file) {
+    survey->bytes += file->bytes;
+    if (last == NULL || last->number != file->number) {
+        survey->file[survey->recordings++] = *file;
+        return;
+    }
+    last->bytes += file->bytes;
+    if (file->cause[0] != '\0') {
+        memcpy(last->cause, file->cause, sizeof last->cause);
+    }
+}
+
+/// Reads the directory once. Afterwards `file` has one entry for each recording, the oldest first.
+static void survey_directory(survey_t *survey, int directory) {
+    survey->files = survey->recordings = 0;
+    survey->bytes = 0;
+    survey->partial = false;
+    visit(directory, take_file, survey);
+    qsort(survey->file, survey->files, sizeof survey->file[0], lower_first);
+    for (size_t i = 0; i < survey->files; i++) {
+        const found_t file = survey->file[i];
+        merge(survey, (survey->recordings > 0U) ? &survey->file[survey->recordings - 1U] : NULL, &file);
+    }
+    survey->left = survey->recordings;
+}
+
+/// Whether the recording is of a stop in motion, by the first lines of its event file. One that cannot be read may be:
+/// it is not among those that are removed first.
+static bool was_in_motion(int directory, const found_t *recording) {
+    char name[GW_BOX_STEM_SIZE + 8U];
+    char text[2U * GW_BOX_LINE_SIZE];
+    (void)snprintf(name, sizeof name, GW_BOX_PREFIX "%06u-%s.jsonl", (unsigned)recording->number, recording->cause);
+    const int fd = openat(directory, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    const ssize_t got = (fd >= 0) ? read(fd, text, sizeof text - 1U) : -1;
+    text[(got > 0) ? (size_t)got : 0U] = '\0';
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    return !gw_box_line_is_harmless(text);
+}
+
+/// Chooses recordings to be removed, the oldest first, until what is left fits into `room`.
+static void choose(survey_t *survey, int directory, const gw_box_room_t *room, bool harmless_only) {
+    for (size_t i = 0; i < survey->recordings && (survey->left > room->recordings || survey->bytes > room->bytes);
+         i++) {
+        found_t *recording = &survey->file[i];
+        const bool stays = recording->removed || recording->number >= room->below;
+        if (!stays && !(harmless_only && was_in_motion(directory, recording))) {
+            recording->removed = true;
+            survey->bytes -= recording->bytes;
+            survey->left--;
         }
     }
 }
 
-bool gw_box_files_drop_oldest(int directory, uint32_t number) {
-    const uint32_t oldest = look(directory).oldest;
-    if (oldest == 0U || oldest >= number) {
+static void take_chosen(int directory, const char *name, void *context) {
+    survey_t *survey = (survey_t *)context;
+    const found_t key = {.number = number_of(name)};
+    const found_t *recording =
+        (const found_t *)bsearch(&key, survey->file, survey->recordings, sizeof key, lower_first);
+    if (recording != NULL && recording->removed && unlinkat(directory, name, 0) == 0) {
+        survey->files--;
+    }
+}
+
+/// One pass over the directory; returns the number of files removed.
+static size_t thin_out(survey_t *survey, int directory, const gw_box_room_t *room) {
+    choose(survey, directory, room, true);
+    if (room->in_motion) {
+        choose(survey, directory, room, false);
+    }
+    const size_t before = survey->files;
+    if (survey->left < survey->recordings) {
+        visit(directory, take_chosen, survey);
+    }
+    return before - survey->files;
+}
+
+void gw_box_files_rotate(int directory, const gw_box_room_t *room) {
+    static survey_t survey; // Too large for a stack.
+    do {
+        survey_directory(&survey, directory);
+    } while (thin_out(&survey, directory, room) > 0U && survey.partial);
+}
+
+bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion) {
+    static survey_t survey;
+    survey_directory(&survey, directory);
+    if (survey.recordings == 0U) {
         return false;
     }
-    gw_box_files_remove(directory, oldest);
-    return look(directory).oldest != oldest;
+    const gw_box_room_t room = {survey.recordings - 1U, UINT64_MAX, below, in_motion};
+    return thin_out(&survey, directory, &room) > 0U;
+}
+
+void gw_box_files_reserve(int directory, uint64_t bytes) {
+    const int fd = openat(directory, RESERVE, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
+    if (fd < 0) {
+        return; // It is there already, or cannot be.
+    }
+    if (fallocate(fd, 0, 0, (off_t)bytes) != 0) {
+        (void)unlinkat(directory, RESERVE, 0);
+    }
+    (void)close(fd);
+}
+
+bool gw_box_files_release(int directory) {
+    return unlinkat(directory, RESERVE, 0) == 0;
 }
 
 FILE *gw_box_files_create(int directory, const char *stem, const char *ending) {

@@ -32,11 +32,30 @@ int gw_box_files_open(const char *directory);
 /// The number after the highest there is.
 uint32_t gw_box_files_next(int directory);
 
-/// Removes the oldest recordings until no more than `most` with no more than `bytes` are left.
-void gw_box_files_rotate(int directory, uint32_t most, uint64_t bytes);
+/// Files that one pass over the directory looks at; more take more passes.
+#define GW_BOX_SURVEYED 8192U
 
-/// Removes the oldest recording below `number`. False if there is none.
-bool gw_box_files_drop_oldest(int directory, uint32_t number);
+/// What may stay in the directory, and what may be removed for it.
+typedef struct {
+    size_t recordings; ///< At most so many ...
+    uint64_t bytes;    ///< ... that are together no larger than this.
+    uint32_t below;    ///< Only recordings with lower numbers are removed.
+    bool in_motion;    ///< Recordings of stops in motion may be removed too, once no other is left.
+} gw_box_room_t;
+
+/// Removes recordings until the rest fits into `room`: first those of stops at standstill, then the others, of each kind
+/// the oldest first. Its time grows linearly with the number of files.
+void gw_box_files_rotate(int directory, const gw_box_room_t *room);
+
+/// Removes one recording below `below`, the first in the order above. False if there is none.
+bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion);
+
+/// Allocates that many bytes in a file of the directory, unless it exists already. File systems that cannot do so have
+/// no reserve.
+void gw_box_files_reserve(int directory, uint64_t bytes);
+
+/// Gives the reserve back to the disk. False if there is none.
+bool gw_box_files_release(int directory);
 
 /// Removes all files of that recording.
 void gw_box_files_remove(int directory, uint32_t number);
@@ -53,8 +72,12 @@ FILE *gw_box_files_create(int directory, const char *stem, const char *ending);
 size_t gw_box_line_head(const gw_box_wish_t *wish, const gw_box_order_t *order, bool from_start,
                         char out_line[GW_BOX_LINE_SIZE]);
 
-/// Second line: the stop.
-size_t gw_box_line_stop(const gw_box_order_t *order, char out_line[GW_BOX_LINE_SIZE]);
+/// Second line: the stop. `in_motion`: a wheel turned, or was commanded to.
+size_t gw_box_line_stop(const gw_box_order_t *order, bool in_motion, char out_line[GW_BOX_LINE_SIZE]);
+
+/// Whether the first two lines of an event file say that neither wheel turned or was commanded to. Recordings of earlier
+/// versions are judged by the commanded speeds alone; a text that does not say is not harmless.
+bool gw_box_line_is_harmless(const char *lines);
 
 /// An entry that is no frame; `frames` stand before it in the file of frames.
 size_t gw_box_line_entry(const blackbox_entry_t *entry, uint64_t frames, char out_line[GW_BOX_LINE_SIZE]);
@@ -85,8 +108,9 @@ void gw_box_writer_run(int fd, const blackbox_ring_t *ring, const gw_box_wish_t 
 ///
 /// Bytes of a piece: base64 of it has no padding unless it is the last.
 #define GW_BOX_PIECE 24576U
-/// Recordings that are listed; the writer keeps fewer.
-#define GW_BOX_LISTED 64U
+/// Recordings that are listed; the writer keeps no more, but for a recording at standstill that came after
+/// GW_BOX_KEEP_MAX in motion.
+#define GW_BOX_LISTED (GW_BOX_KEEP_MAX + 4U)
 
 /// Answers from the files as they are now. Waits for the disk.
 void gw_box_reader_answer(const char *directory, const gw_box_question_t *question, gw_box_answer_t *out_answer);

@@ -4,6 +4,8 @@
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/words.h"
 
+#include <string.h>
+
 #define FORMAT_VERSION 1
 
 static iwn_out_t begin(char out_line[GW_BOX_LINE_SIZE], const char *type) {
@@ -31,7 +33,7 @@ size_t gw_box_line_head(const gw_box_wish_t *wish, const gw_box_order_t *order, 
     return end(&json);
 }
 
-size_t gw_box_line_stop(const gw_box_order_t *order, char out_line[GW_BOX_LINE_SIZE]) {
+size_t gw_box_line_stop(const gw_box_order_t *order, bool in_motion, char out_line[GW_BOX_LINE_SIZE]) {
     const iw_stop_t *stop = &order->note.stop;
     iwn_out_t json = begin(out_line, "why");
     iwn_out_int(&json, "number", stop->number);
@@ -40,6 +42,7 @@ size_t gw_box_line_stop(const gw_box_order_t *order, char out_line[GW_BOX_LINE_S
     iwn_out_int(&json, "detail", stop->detail);
     iwn_out_text(&json, "from", order->from);
     iwn_out_bool(&json, "latched", stop->latched);
+    iwn_out_bool(&json, "in_motion", in_motion);
     iwn_out_known(&json, "client", stop->client != IW_CLIENT_NONE, stop->client);
     iwn_out_text(&json, "client_name", (order->note.client_name[0] != '\0') ? order->note.client_name : NULL);
     iwn_out_int(&json, "applied_left_mm_s", stop->applied.wheel[IW_LEFT].speed_mm_s);
@@ -48,6 +51,17 @@ size_t gw_box_line_stop(const gw_box_order_t *order, char out_line[GW_BOX_LINE_S
     iwn_out_int(&json, "wall_us", order->note.wall_us);
     iwn_out_text(&json, "sentence", order->note.sentence);
     return end(&json);
+}
+
+bool gw_box_line_is_harmless(const char *lines) {
+    const char *stop = strstr(lines, "\n{\"type\":\"why\"");
+    if (stop == NULL) {
+        return false;
+    }
+    if (strstr(stop, "\"in_motion\":") != NULL) {
+        return strstr(stop, "\"in_motion\":false") != NULL;
+    }
+    return strstr(stop, "\"applied_left_mm_s\":0,\"applied_right_mm_s\":0,") != NULL;
 }
 
 static void put_refusal(iwn_out_t *json, uint8_t refusal) {

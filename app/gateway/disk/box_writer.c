@@ -18,6 +18,11 @@
 #define FOLLOW_MS 50
 /// Numbers that somebody else may have taken meanwhile.
 #define TRIES 8U
+/// A wheel that turns faster was in motion: the default of rest_rpm.
+#define REST_RPM 2
+/// What a ring's entry takes on the disk, a line of candump's, and the most that is held in reserve.
+#define RESERVE_PER_ENTRY 48U
+#define RESERVE_MAX       ((uint64_t)4U * 1024U * 1024U)
 
 typedef struct {
     int fd;
@@ -30,13 +35,22 @@ typedef struct {
     FILE *events_file;
     uint64_t next; ///< Number of the next entry to write.
     uint64_t frames;
+    int error;      ///< The errno of the first write of this attempt that failed.
+    bool in_motion; ///< A wheel turned when the stop came, or was commanded to.
     gw_box_result_t result;
     char line[GW_BOX_LINE_SIZE]; ///< Where each line is made.
 } writer_t;
 
+/// Keeps the errno of a call that failed: stdio itself only keeps that there was one.
+static void keep_error(writer_t *self, bool failed) {
+    if (failed && self->error == 0) {
+        self->error = (errno != 0) ? errno : EIO;
+    }
+}
+
 /// Writes what has been made in `line`.
-static void put_line(const writer_t *self, FILE *file, size_t length) {
-    (void)fwrite(self->line, 1, length, file);
+static void put_line(writer_t *self, FILE *file, size_t length) {
+    keep_error(self, fwrite(self->line, 1, length, file) != length);
 }
 
 static void write_entry(writer_t *self, const blackbox_entry_t *entry) {
@@ -84,44 +98,37 @@ static bool is_called(const writer_t *self, int timeout_ms) {
     return poll(&entry, 1, timeout_ms) != 0;
 }
 
+static void flush(writer_t *self) {
+    keep_error(self, fflush(self->frames_file) != 0);
+    keep_error(self, fflush(self->events_file) != 0);
+}
+
 /// What happens after the stop, until it is over or the next order waits.
 static void follow(writer_t *self) {
     const iw_time_us_t until_us = self->order->note.stop.at_us + GW_BOX_AFTER_US;
     while (iw_clock_now_us() < until_us && !is_called(self, FOLLOW_MS)) {
         write_entries(self, UINT64_MAX, 0);
-        (void)fflush(self->frames_file);
-        (void)fflush(self->events_file);
+        flush(self);
     }
     write_entries(self, UINT64_MAX, 0);
 }
 
-/// 0 or an errno. Closes the file.
-static int finish_file(FILE *file) {
-    int error = (ferror(file) != 0) ? EIO : 0;
-    if (fflush(file) != 0 || fsync(fileno(file)) != 0) {
-        error = errno;
-    }
-    if (fclose(file) != 0 && error == 0) {
-        error = errno;
-    }
-    return error;
+static void finish_file(writer_t *self, FILE *file) {
+    keep_error(self, fflush(file) != 0);
+    keep_error(self, fsync(fileno(file)) != 0);
+    keep_error(self, fclose(file) != 0);
 }
 
-/// Flushes both; the errno of what did not work, as early as possible.
-static int flush(writer_t *self) {
-    return (fflush(self->frames_file) != 0 || fflush(self->events_file) != 0) ? errno : 0;
-}
-
-static int write_config(writer_t *self, int directory, const char *stem) {
+static void write_config(writer_t *self, int directory, const char *stem) {
     FILE *file = gw_box_files_create(directory, stem, ".conf");
-    if (file == NULL) {
-        return errno;
+    keep_error(self, file == NULL);
+    if (file != NULL) {
+        keep_error(self, fputs(self->wish->config, file) < 0);
+        finish_file(self, file);
     }
-    (void)fputs(self->wish->config, file);
-    return finish_file(file);
 }
 
-static int fill_files(writer_t *self) {
+static void fill_files(writer_t *self) {
     const iw_stop_t *stop = &self->order->note.stop;
     const iw_time_us_t length_us = (iw_time_us_t)self->wish->blackbox_s * 1000000U;
     const iw_time_us_t since_us = (stop->at_us > length_us) ? stop->at_us - length_us : 1U;
@@ -131,46 +138,57 @@ static int fill_files(writer_t *self) {
     self->frames = 0;
     self->result.ms = (uint32_t)((stop->at_us - begin_us) / IW_US_PER_MS);
     put_line(self, self->events_file, gw_box_line_head(self->wish, self->order, from_start, self->line));
-    put_line(self, self->events_file, gw_box_line_stop(self->order, self->line));
+    put_line(self, self->events_file, gw_box_line_stop(self->order, self->in_motion, self->line));
     write_entries(self, self->order->mark, since_us);
-    const int error = flush(self);
-    if (error != 0) {
-        return error;
+    flush(self);
+    if (self->error != 0) {
+        return; // As early as possible: what follows takes two seconds.
     }
     follow(self);
     self->result.frames = (uint32_t)self->frames;
     put_line(self, self->events_file, gw_box_line_end(self->frames, self->line));
-    return flush(self);
 }
 
-/// One attempt: all files of the recording, or none.
+/// One attempt: all files of the recording, or none. 0, or the errno of what failed first.
 static int write_files(writer_t *self, int directory, uint32_t number) {
     char stem[GW_BOX_STEM_SIZE];
     (void)snprintf(stem, sizeof stem, "stop-%06u-%s", (unsigned)number, self->order->cause);
     (void)snprintf(self->result.path, sizeof self->result.path, "%s/%s.log", self->wish->directory, stem);
-    int error = write_config(self, directory, stem);
-    if (error == EEXIST) {
-        return error; // Somebody else's: the gateway before us may still be writing its last.
+    self->error = 0;
+    write_config(self, directory, stem);
+    if (self->error == EEXIST) {
+        return EEXIST; // Somebody else's: the gateway before us may still be writing its last.
     }
-    self->frames_file = (error == 0) ? gw_box_files_create(directory, stem, ".log") : NULL;
+    self->frames_file = (self->error == 0) ? gw_box_files_create(directory, stem, ".log") : NULL;
     self->events_file = (self->frames_file != NULL) ? gw_box_files_create(directory, stem, ".jsonl") : NULL;
-    error = (error == 0 && self->events_file == NULL) ? errno : error;
+    keep_error(self, self->events_file == NULL);
     if (self->events_file != NULL) {
-        error = fill_files(self);
-        const int events_error = finish_file(self->events_file);
-        error = (error != 0) ? error : events_error;
+        fill_files(self);
+        finish_file(self, self->events_file);
     }
     if (self->frames_file != NULL) {
-        const int frames_error = finish_file(self->frames_file);
-        error = (error != 0) ? error : frames_error;
+        finish_file(self, self->frames_file);
     }
-    if (error != 0) {
+    if (self->error != 0) {
         gw_box_files_remove(directory, number);
     }
-    return error;
+    return self->error;
 }
 
-/// A full disk costs the oldest recordings, as far as there are any.
+/// Finds room on a full disk for recording `number`. A stop at standstill costs neither the reserve nor the recording of
+/// a stop in motion.
+static bool make_room(const writer_t *self, int directory, uint32_t number) {
+    return (self->in_motion && gw_box_files_release(directory)) ||
+           gw_box_files_drop_oldest(directory, number, self->in_motion);
+}
+
+/// As many bytes as a recording of a full ring has, within limits.
+static void reserve(const writer_t *self, int directory) {
+    const uint64_t bytes = (uint64_t)blackbox_ring_most(self->ring) * RESERVE_PER_ENTRY;
+    gw_box_files_reserve(directory, (bytes < RESERVE_MAX) ? bytes : RESERVE_MAX);
+}
+
+/// A full disk costs older recordings.
 static int write_recording(writer_t *self) {
     const int directory = gw_box_files_open(self->wish->directory);
     if (directory < 0) {
@@ -182,17 +200,57 @@ static int write_recording(writer_t *self) {
         number++;
         error = write_files(self, directory, number);
     }
-    while ((error == ENOSPC || error == EDQUOT) && gw_box_files_drop_oldest(directory, number)) {
+    while ((error == ENOSPC || error == EDQUOT) && make_room(self, directory, number)) {
         error = write_files(self, directory, number);
     }
-    gw_box_files_rotate(directory, GW_BOX_RECORDINGS_MAX, GW_BOX_BYTES_MAX);
+    gw_box_files_rotate(directory, &(gw_box_room_t){self->wish->keep_stops, GW_BOX_BYTES_MAX, number, self->in_motion});
+    reserve(self, directory);
     (void)fsync(directory);
     (void)close(directory);
     return error;
 }
 
+/// What the bus showed last before the stop.
+typedef struct {
+    iw_pair_t setpoints;   ///< In the wheels' own sense.
+    int16_t rpm[IW_SIDES]; ///< Measured; 0: no telemetry.
+} last_seen_t;
+
+static last_seen_t find_last(writer_t *self, uint64_t written) {
+    last_seen_t last = {.rpm = {0, 0}};
+    size_t count = 0;
+    (void)blackbox_ring_copy(self->ring, 0, written, self->copy, &count);
+    for (size_t i = 0; i < count; i++) {
+        iw_codec_wheel_t values[IW_SIDES];
+        iw_can_frame_t frame = {.id = self->copy[i].number, .dlc = self->copy[i].a};
+        memcpy(frame.data, self->copy[i].as.data, sizeof frame.data);
+        if (self->copy[i].kind != (uint8_t)BLACKBOX_FRAME) {
+            continue;
+        }
+        const iw_side_t side = iw_codec_side(frame.id);
+        const iw_codec_kind_t kind = iw_codec_decode(&frame, values);
+        if (kind == IW_CODEC_SETPOINT) {
+            last.setpoints.wheel[side].speed_mm_s = values[side].setpoint.speed_mm_s;
+        } else if (kind == IW_CODEC_SPEED) {
+            last.rpm[side] = values[side].speed.speed_rpm;
+        }
+    }
+    return last;
+}
+
+static bool is_in_motion(writer_t *self, const gw_box_order_t *order) {
+    const last_seen_t last = find_last(self, order->mark);
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        if (order->note.stop.applied.wheel[side].speed_mm_s != 0 || abs(last.rpm[side]) > REST_RPM) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static void carry_out(writer_t *self, const gw_box_order_t *order) {
     self->order = order;
+    self->in_motion = is_in_motion(self, order);
     self->result = (gw_box_result_t){.number = order->note.stop.number};
     self->result.error = write_recording(self);
     self->order = NULL;
@@ -207,25 +265,11 @@ static void try_directory(writer_t *self) {
         self->result.error = errno;
     }
     if (directory >= 0) {
+        reserve(self, directory);
         (void)close(directory);
     }
     if (self->result.error != 0) {
         (void)send(self->fd, &self->result, sizeof self->result, MSG_NOSIGNAL);
-    }
-}
-
-/// The last setpoints that were on the bus, in the wheels' own sense.
-static void find_last_setpoints(writer_t *self, uint64_t written, iw_pair_t *out_pair) {
-    size_t count = 0;
-    (void)blackbox_ring_copy(self->ring, 0, written, self->copy, &count);
-    for (size_t i = 0; i < count; i++) {
-        iw_codec_wheel_t told[IW_SIDES];
-        iw_can_frame_t frame = {.id = self->copy[i].number, .dlc = self->copy[i].a};
-        memcpy(frame.data, self->copy[i].as.data, sizeof frame.data);
-        const iw_side_t side = iw_codec_side(frame.id);
-        if (self->copy[i].kind == (uint8_t)BLACKBOX_FRAME && iw_codec_decode(&frame, told) == IW_CODEC_SETPOINT) {
-            out_pair->wheel[side].speed_mm_s = told[side].setpoint.speed_mm_s;
-        }
     }
 }
 
@@ -241,7 +285,7 @@ static void note_death(writer_t *self) {
     order.note.wall_us = iw_clock_wall_us();
     order.note.stop.at_us = iw_clock_now_us();
     order.wall_minus_us = order.note.wall_us - (int64_t)order.note.stop.at_us;
-    find_last_setpoints(self, order.mark, applied);
+    *applied = find_last(self, order.mark).setpoints;
     const unsigned long long ms = (unsigned long long)(order.note.stop.at_us / IW_US_PER_MS);
     (void)snprintf(
         order.note.sentence, sizeof order.note.sentence,

@@ -8,20 +8,22 @@
 #include "iwheel_northbound/request.h"
 #include "iwheel_northbound/why.h"
 
-/// Recordings on disk are never more, and together never larger, except that the newest is always kept.
-#define GW_BOX_RECORDINGS_MAX 32U
-#define GW_BOX_BYTES_MAX      ((uint64_t)128U * 1024U * 1024U)
+/// Recordings on disk are together never larger, except that the newest is always kept.
+#define GW_BOX_BYTES_MAX ((uint64_t)128U * 1024U * 1024U)
+/// The most recordings that a configuration can ask for: all their names fit into one reply.
+#define GW_BOX_KEEP_MAX 256U
 /// The recording goes on for this long after the stop.
 #define GW_BOX_AFTER_US   2000000U
 #define GW_BOX_CAUSE_SIZE 32U
 /// An answer of the process that reads: a piece in base64, or the list, and what is around it.
-#define GW_BOX_ANSWER_SIZE 34000U
+#define GW_BOX_ANSWER_SIZE 52000U
 /// Directory, '/', "stop-000001-", cause, ".jsonl".
 #define GW_BOX_PATH_SIZE (GW_PATH_SIZE + GW_BOX_CAUSE_SIZE + 48U)
 
 /// What is recorded, and where. The texts must outlive the box.
 typedef struct {
     uint16_t blackbox_s; ///< Length of the ring in memory; 0: nothing is recorded.
+    uint16_t keep_stops; ///< Recordings on disk, 1..GW_BOX_KEEP_MAX; those of stops in motion are removed last.
     const char *directory;
     const char *bus;    ///< As configured; also the next two.
     const char *estop;  ///< The line.

@@ -17,6 +17,9 @@
 #include <stdio.h>
 #include <string.h>
 
+/// A wheel that has power is received within this time.
+#define FIRST_TELEMETRY_US 1000000U
+
 static iwn_out_t begin_event(gw_status_t *self, const char *name) {
     iwn_out_t json = gw_clients_begin_event(self->clients, name);
     iwn_out_int(&json, "t_us", (int64_t)self->wheels->now_us);
@@ -142,10 +145,16 @@ static void tell_left_behind(gw_status_t *self) {
     }
 }
 
-/// While armed or stopping a cause makes a stop, which is told as such; here are the others.
+/// The first telemetry comes a moment after the start: until then a wheel without any is not a fault.
+static uint32_t faults_of(const gw_status_t *self, const iw_snapshot_t *seen) {
+    const bool starting = self->wheels->now_us < self->observed.started_us + FIRST_TELEMETRY_US;
+    return starting ? seen->present & ~(1U << IW_CAUSE_WHEEL_LOST) : seen->present;
+}
+
+/// While armed or stopping a cause makes a stop, which is reported as such; these are the others.
 static void observe_faults(gw_status_t *self, const iw_snapshot_t *seen) {
     gw_observed_t *observed = &self->observed;
-    const uint32_t present = seen->present;
+    const uint32_t present = faults_of(self, seen);
     const uint32_t changed = present ^ observed->present;
     for (unsigned cause = 0; cause < IW_CAUSES && changed != 0U; cause++) {
         if ((changed & (1U << cause)) != 0U) {
@@ -194,7 +203,10 @@ void gw_observe_begin(gw_status_t *self) {
 
 void gw_observe(gw_status_t *self, const iw_snapshot_t *seen) {
     const bool first = !self->observed.started;
-    self->observed.started = true;
+    if (first) {
+        self->observed.started = true;
+        self->observed.started_us = self->wheels->now_us;
+    }
     observe_bus(self, seen->bus, first);
     observe_purge(self);
     observe_estop(self, first);

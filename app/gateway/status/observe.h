@@ -28,7 +28,8 @@ typedef struct {
     uint32_t still_moving;
     bool left_behind;
     int estop;
-    bool started; ///< The first observation only takes notes.
+    bool started;            ///< The first observation only takes notes.
+    iw_time_us_t started_us; ///< When that was.
     char holder_name[IWN_NAME_MAX + 1U];
     char holder_text[GW_CLIENT_TEXT_SIZE];
 } gw_observed_t;
