@@ -72,7 +72,7 @@ static void take_snapshot(bridge_t *self, const iwc_message_t *message) {
     if (machine->now.left.distance_mm.known && machine->now.right.distance_mm.known) {
         const ros_ways_t ways = {machine->now.t_us, machine->now.left.distance_mm.value,
                                  machine->now.right.distance_mm.value};
-        ros_odometry_step(&self->odometry, &ways, machine->track_mm);
+        ros_odometry_step(&self->odometry, &ways, &machine->measures);
         self->facts.odometry_restarts = self->odometry.restarts;
     }
 }

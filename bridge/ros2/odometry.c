@@ -19,23 +19,33 @@ static bool has_jumped(const ros_ways_t *last, const ros_ways_t *now) {
     return left_mm > most_mm || left_mm < -most_mm || right_mm > most_mm || right_mm < -most_mm;
 }
 
-void ros_odometry_step(ros_odometry_t *self, const ros_ways_t *ways, int64_t track_mm) {
+/// Adds to the sum of turning. Ticks of the two wheels come one after the other, so that a straight way shows a heading
+/// that swings by up to one tick to either side: that is not turning.
+static void count_turning(ros_odometry_t *self, double yaw_rad, double tick_rad) {
+    const double away_rad = yaw_rad - self->settled_rad;
+    const double beyond_rad = fabs(away_rad) - tick_rad;
+    if (beyond_rad > 0.0) {
+        self->turned_rad += beyond_rad;
+        self->settled_rad += copysign(beyond_rad, away_rad);
+    }
+}
+
+void ros_odometry_step(ros_odometry_t *self, const ros_ways_t *ways, const ros_measures_t *measures) {
     if (!self->begun || has_jumped(&self->last, ways)) {
         const unsigned restarts = self->begun ? self->restarts + 1U : 0U;
         *self = (ros_odometry_t){.begun = true, .start = *ways, .last = *ways, .restarts = restarts};
         return;
     }
-    const double track = (double)track_mm;
     const double left_mm = (double)(ways->left_mm - self->last.left_mm);
     const double right_mm = (double)(ways->right_mm - self->last.right_mm);
     const double turned_mm = (double)((ways->right_mm - self->start.right_mm) - (ways->left_mm - self->start.left_mm));
     const double way_m = (left_mm + right_mm) / 2000.0;
-    const double yaw_rad = turned_mm / track;
+    const double yaw_rad = turned_mm / 1000.0 / measures->track_m;
     const double middle_rad = (self->yaw_rad + yaw_rad) / 2.0;
     self->x_m += way_m * cos(middle_rad);
     self->y_m += way_m * sin(middle_rad);
     self->path_m += fabs(way_m);
-    self->turned_rad += fabs(yaw_rad - self->yaw_rad);
+    count_turning(self, yaw_rad, measures->tick_m / measures->track_m);
     self->yaw_rad = yaw_rad;
     self->last = *ways;
 }

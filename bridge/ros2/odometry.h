@@ -19,26 +19,26 @@ typedef struct {
     int64_t right_mm;
 } ros_ways_t;
 
+/// How much of the machine's measures is known.
+typedef struct {
+    bool radius_confirmed;
+    bool track_confirmed;
+    double tick_m;  ///< Way of one odometry tick, above 0.
+    double track_m; ///< Above 0.
+} ros_measures_t;
+
 typedef struct {
     bool begun;
     ros_ways_t start;
     ros_ways_t last;
     double x_m, y_m, yaw_rad;
-    double path_m;     ///< Way of the middle, forwards and backwards alike.
-    double turned_rad; ///< The same for turning.
-    unsigned restarts; ///< Jumps so far.
+    double path_m;      ///< Way of the middle, forwards and backwards alike.
+    double turned_rad;  ///< The same for turning, without what the ticks alone can show on a straight way.
+    double settled_rad; ///< Heading up to which turning has been counted: within a tick of `yaw_rad`.
+    unsigned restarts;  ///< Jumps so far.
 } ros_odometry_t;
 
-/// `track_mm` above 0.
-void ros_odometry_step(ros_odometry_t *self, const ros_ways_t *ways, int64_t track_mm);
-
-/// How much of the machine's measures is known.
-typedef struct {
-    bool radius_confirmed;
-    bool track_confirmed;
-    double tick_m; ///< Way of one odometry tick.
-    double track_m;
-} ros_measures_t;
+void ros_odometry_step(ros_odometry_t *self, const ros_ways_t *ways, const ros_measures_t *measures);
 
 /// Standard deviations.
 typedef struct {

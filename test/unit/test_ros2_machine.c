@@ -34,7 +34,7 @@ void tearDown(void) {}
 
 static void go(int64_t t_us, int64_t left_mm, int64_t right_mm) {
     const ros_ways_t ways = {t_us, left_mm, right_mm};
-    ros_odometry_step(&odometry, &ways, TRACK);
+    ros_odometry_step(&odometry, &ways, &(ros_measures_t){.tick_m = 0.0201, .track_m = TRACK / 1000.0});
 }
 
 /// Unity's own may be built without doubles.
@@ -114,6 +114,18 @@ static void test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed(
     TEST_ASSERT_TRUE(later.x_m > 4.1 * 0.07 && later.yaw_rad > at_start.yaw_rad);
     TEST_ASSERT_TRUE(better.x_m < later.x_m && better.yaw_rad < later.yaw_rad && better.v_m_s < later.v_m_s);
     TEST_ASSERT_TRUE(better.x_m > 4.1 * 0.03); // Slip stays.
+}
+
+/// Whole ticks, those of the wheels half a tick apart, 4.7 m at 0.5 m/s.
+static void test_doubt_on_a_straight_way_ignores_tick_jitter(void) {
+    const ros_measures_t assumed = {false, false, 0.0201, TRACK / 1000.0};
+    for (int i = 0; i <= 470; i++) {
+        const double way_mm = 10.0 * i;
+        go(i * SECOND / 50, lround(floor(way_mm / 20.1) * 20.1), lround(floor(way_mm / 20.1 + 0.5) * 20.1));
+    }
+    const ros_doubt_t doubt = ros_odometry_doubt(&odometry, &assumed, 0.5, 0.0);
+    TEST_ASSERT_TRUE(doubt.yaw_rad < 0.03);
+    TEST_ASSERT_TRUE(doubt.x_m > 4.7 * 0.07 && doubt.x_m < 0.5);
 }
 
 // ---- a snapshot ---------------------------------------------------------------------------------------------------
@@ -286,6 +298,7 @@ int main(void) {
     RUN_TEST(test_odometry_messages_lost_on_a_straight_way_lose_no_way);
     RUN_TEST(test_odometry_ways_that_jump_start_anew);
     RUN_TEST(test_doubt_grows_with_the_way_and_less_where_measures_are_confirmed);
+    RUN_TEST(test_doubt_on_a_straight_way_ignores_tick_jitter);
     RUN_TEST(test_snapshot_is_read_and_unknown_stays_unknown);
     RUN_TEST(test_ledger_gives_measures_and_what_is_contradicted);
     RUN_TEST(test_configuration_stands_for_the_values_that_a_board_has_not);
