@@ -27,8 +27,6 @@ const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
     case ENOENT:
         return has_gpio() ? "there is no such line; gpioinfo lists them"
                           : "this machine has no GPIO chip (/dev/gpiochip*): load its driver, or use another input";
-    case ENOTUNIQ:
-        return "two lines have this name; set [estop] line to gpiochipN:OFFSET of the wired one (gpioinfo lists them)";
     case EBUSY:
         return "the line is busy: another program has it; gpioinfo names that program";
     case EACCES:

@@ -10,13 +10,13 @@ import subprocess
 import sys
 
 # They ask the system for nothing; or what they ask is the same in every run.
-PURE = """__ctype_b_loc __errno_location abort bcmp bsearch getenv getopt_long ini_parse_stream longjmp _setjmp memchr memcmp memcpy memmove memset mmap munmap qsort
+PURE = """__ctype_b_loc __errno_location abort bcmp getenv getopt_long ini_parse_stream longjmp _setjmp memchr memcmp memcpy memmove memset mmap munmap qsort
     optarg opterr optind setenv sigaddset sigemptyset snprintf strchr strcmp strcspn strerror strlen strncmp strpbrk strrchr strsignal strspn strstr strtod strtol
     strtoul strtoull unsetenv vsnprintf"""
 # To a stream of the test's own or in memory; stderr is nowhere.
 STREAMS = "stderr stdin stdout fclose ferror fflush fmemopen fopen fprintf fputs freopen fwrite printf puts"
 # Of child processes, which are played; of --check; of a bus or an e-stop unix:PATH; of kernels without epoll_pwait2; of a configured group.
-NOT_CALLED = """_exit access close_range closedir dup2 faccessat fallocate fchmod fchownat fdopen fdopendir fileno fsync getgrnam glob globfree ppoll readdir
+NOT_CALLED = """_exit access close_range closedir dup2 faccessat fchmod fchownat fdopen fdopendir fileno fsync getgrnam glob globfree ppoll readdir
     realpath renameat setpriority sleep"""
 # The real ones, called by the kernel itself.
 BEHIND = "calloc free"

@@ -297,7 +297,6 @@ void vk_set_carrier(void) {
 
 static char chip; ///< The only one; and its line.
 static int line_fd = -1;
-static bool iterated; ///< The search over all chips has had it.
 
 /// The chip that the line was requested of is there still.
 static bool is_line_alive(void) {
@@ -316,40 +315,19 @@ void gpiod_chip_close(struct gpiod_chip *unused) {
 
 struct gpiod_line *gpiod_chip_get_line(struct gpiod_chip *unused, unsigned offset) {
     (void)unused;
-    return (offset == 0U) ? (struct gpiod_line *)(void *)&chip : NULL;
+    (void)offset;
+    return NULL;
 }
 
-/// Opens all chips.
-struct gpiod_chip_iter *gpiod_chip_iter_new(void) {
+struct gpiod_line *gpiod_line_find(const char *name) {
     static const int errors[] = {EMFILE, ENOMEM, EINTR, 0};
     line_fd = -1;
-    if (!vk_call("gpiod_chip_iter_new", errors)) {
+    if (!vk_call("gpiod_line_find", errors)) {
         return NULL;
     }
-    iterated = false;
+    errno = ENOENT;
     (void)vk_done(0);
-    return (struct gpiod_chip_iter *)(void *)&chip;
-}
-
-struct gpiod_chip *gpiod_chip_iter_next_noclose(struct gpiod_chip_iter *iter) {
-    const bool next = vk.button.there && !iterated;
-    (void)iter;
-    iterated = true;
-    return next ? (struct gpiod_chip *)(void *)&chip : NULL;
-}
-
-void gpiod_chip_iter_free_noclose(struct gpiod_chip_iter *iter) {
-    (void)iter;
-}
-
-unsigned gpiod_chip_num_lines(struct gpiod_chip *unused) {
-    (void)unused;
-    return 1U;
-}
-
-const char *gpiod_line_name(struct gpiod_line *line) {
-    (void)line;
-    return VK_LINE;
+    return (vk.button.there && strcmp(name, VK_LINE) == 0) ? (struct gpiod_line *)(void *)&chip : NULL;
 }
 
 int gpiod_line_request_both_edges_events_flags(struct gpiod_line *line, const char *consumer, int flags) {

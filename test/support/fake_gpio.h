@@ -11,7 +11,6 @@ typedef struct {
     int edges_error; ///< errno of reading them; 0: none; -1: a read that brings nothing is no error.
     int chip_error;  ///< errno of opening the chip; 0: it opens.
     int busy_error;  ///< errno of asking for the line; 0: it is given.
-    int twin;        ///< 0: the line's name is unique; 1: another line of its chip has it; 2: one of another chip.
 
     bool is_input;
     bool pulled_up;
@@ -26,9 +25,6 @@ typedef struct {
 
 extern fake_gpio_t fake_gpio;
 
-/// Name of a line of the line's own chip, or of another one.
-const char *fake_gpio_name(bool own, unsigned offset);
-
 /// How many edges one read takes.
 int fake_gpio_take(unsigned room);
 
@@ -36,7 +32,5 @@ int fake_gpio_take(unsigned room);
 #define FAKE_GPIO_CHIP   "gpiochip3"
 #define FAKE_GPIO_NAME   "ESTOP"
 #define FAKE_GPIO_OFFSET 17U
-/// Lines of each chip.
-#define FAKE_GPIO_LINES 32U
 
 #endif

@@ -15,12 +15,6 @@ static const iw_gpio_address_t by_name = {.name = FAKE_GPIO_NAME};
 static const iw_gpio_address_t by_offset = {.name = FAKE_GPIO_CHIP, .offset = FAKE_GPIO_OFFSET, .by_offset = true};
 static iw_gpio_line_t line;
 
-const char *fake_gpio_name(bool own, unsigned offset) {
-    const bool twin = (fake_gpio.twin == 1 && own && offset == 30U) || (fake_gpio.twin == 2 && !own && offset == 0U);
-    const bool line_itself = own && offset == FAKE_GPIO_OFFSET;
-    return (twin || line_itself) ? FAKE_GPIO_NAME : (offset % 2U == 0U) ? NULL : "OTHER";
-}
-
 int fake_gpio_take(unsigned room) {
     const int taken = (fake_gpio.edges < (int)room) ? fake_gpio.edges : (int)room;
     fake_gpio.reads++;
@@ -124,17 +118,6 @@ static void test_line_that_cannot_be_had_says_why_and_leaves_nothing_open(void) 
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
 }
 
-static void test_line_name_that_exists_twice_is_refused(void) {
-    for (int twin = 1; twin <= 2; twin++) {
-        iw_gpio_line_close(&line);
-        fake_gpio.twin = twin;
-        TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iw_gpio_line_open(&line, &by_name));
-        TEST_ASSERT_EQUAL_INT(-1, line.fd);
-        TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
-        TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_open(&line, &by_offset));
-    }
-}
-
 static void test_line_that_is_closed_is_given_back(void) {
     iw_gpio_line_close(&line);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
@@ -151,7 +134,6 @@ int main(void) {
     RUN_TEST(test_edges_without_end_take_a_bounded_time);
     RUN_TEST(test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none);
     RUN_TEST(test_line_that_cannot_be_had_says_why_and_leaves_nothing_open);
-    RUN_TEST(test_line_name_that_exists_twice_is_refused);
     RUN_TEST(test_line_that_is_closed_is_given_back);
     return UNITY_END();
 }

@@ -29,7 +29,7 @@ typedef struct {
 } iw_gpio_line_t;
 
 /// Takes the line as input with pull-up and both edges. 0, or an errno, `*self` then closed: ENOENT no such line or
-/// chip, ENOTUNIQ two lines have that name, EBUSY another program has the line. Allocates.
+/// chip, EBUSY somebody else has it. Allocates.
 int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address);
 void iw_gpio_line_close(iw_gpio_line_t *self);
 

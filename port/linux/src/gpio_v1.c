@@ -5,54 +5,14 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <gpiod.h>
-#include <stdbool.h>
-#include <string.h>
 
 /// The kernel holds this many edges of a line.
 #define EVENTS 16U
 
-/// Looks for lines of that name on one chip; `*found` is the first of all so far. True: this is a second one.
-static bool search_chip(struct gpiod_chip *chip, const char *name, struct gpiod_line **found) {
-    const unsigned lines = gpiod_chip_num_lines(chip);
-    bool second = false;
-    for (unsigned offset = 0; offset < lines && !second; offset++) {
-        struct gpiod_line *line = gpiod_chip_get_line(chip, offset);
-        const char *own = (line == NULL) ? NULL : gpiod_line_name(line);
-        if (own != NULL && strcmp(own, name) == 0) {
-            second = *found != NULL;
-            *found = second ? *found : line;
-        }
-    }
-    return second;
-}
-
-/// The only line of that name on all chips. Its chip stays open until the line's chip is closed.
-static struct gpiod_line *find_by_name(const char *name) {
-    struct gpiod_chip_iter *chips = gpiod_chip_iter_new();
-    struct gpiod_line *found = NULL;
-    struct gpiod_chip *chip;
-    bool second = false;
-    if (chips == NULL) {
-        return NULL;
-    }
-    while ((chip = gpiod_chip_iter_next_noclose(chips)) != NULL) {
-        const struct gpiod_line *before = found;
-        second = search_chip(chip, name, &found) || second;
-        if (found == before) {
-            gpiod_chip_close(chip);
-        }
-    }
-    gpiod_chip_iter_free_noclose(chips);
-    if (second) {
-        gpiod_line_close_chip(found);
-    }
-    errno = second ? ENOTUNIQ : ENOENT;
-    return second ? NULL : found;
-}
-
+/// A line found by its name belongs to a chip that libgpiod opened: closing the line's chip frees both.
 static struct gpiod_line *find(const iw_gpio_address_t *address) {
     if (!address->by_offset) {
-        return find_by_name(address->name);
+        return gpiod_line_find(address->name);
     }
     struct gpiod_chip *chip = gpiod_chip_open_by_name(address->name);
     struct gpiod_line *line = (chip == NULL) ? NULL : gpiod_chip_get_line(chip, address->offset);

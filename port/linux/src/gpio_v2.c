@@ -13,75 +13,53 @@
 #define EVENTS    16U
 #define PATH_SIZE 320U
 
-/// Number of lines of that name on the chip; `*out_offset` is that of the first.
-static unsigned count_named(struct gpiod_chip *chip, const char *name, unsigned *out_offset) {
-    struct gpiod_chip_info *chip_info = gpiod_chip_get_info(chip);
-    const unsigned lines = (chip_info == NULL) ? 0U : (unsigned)gpiod_chip_info_get_num_lines(chip_info);
-    unsigned count = 0;
-    for (unsigned offset = 0; offset < lines; offset++) {
-        struct gpiod_line_info *info = gpiod_chip_get_line_info(chip, offset);
-        const char *own = (info == NULL) ? NULL : gpiod_line_info_get_name(info);
-        if (own != NULL && strcmp(own, name) == 0) {
-            *out_offset = (count == 0U) ? offset : *out_offset;
-            count++;
-        }
-        gpiod_line_info_free(info);
+/// The chip at this path, if it is one, and the line's offset on it.
+static struct gpiod_chip *try_chip(const char *path, const iw_gpio_address_t *address, unsigned *out_offset) {
+    struct gpiod_chip *chip = gpiod_is_gpiochip_device(path) ? gpiod_chip_open(path) : NULL;
+    if (chip == NULL) {
+        return NULL;
     }
-    gpiod_chip_info_free(chip_info);
-    return count;
-}
-
-static struct gpiod_chip *open_chip(const char *path) {
-    errno = ENOENT;
-    return gpiod_is_gpiochip_device(path) ? gpiod_chip_open(path) : NULL;
+    const int offset =
+        address->by_offset ? (int)address->offset : gpiod_chip_get_line_offset_from_name(chip, address->name);
+    if (offset < 0) {
+        gpiod_chip_close(chip);
+        errno = ENOENT;
+        return NULL;
+    }
+    *out_offset = (unsigned)offset;
+    return chip;
 }
 
 /// libgpiod 2 has no search by a line's name over all chips. A chip that we may not open is remembered: the line may be
-/// on it, and "permission denied" leads to the fix where "no such line" would mislead. Two lines of that name: neither.
-static struct gpiod_chip *search(const char *name, unsigned *out_offset) {
+/// on it, and "permission denied" is the cure where "no such line" would mislead.
+static struct gpiod_chip *search(const iw_gpio_address_t *address, unsigned *out_offset) {
     char path[PATH_SIZE];
-    struct gpiod_chip *found = NULL;
-    unsigned count = 0;
-    int refusal = ENOENT;
+    struct gpiod_chip *chip = NULL;
+    int refusal = 0;
     DIR *folder = opendir("/dev");
     const struct dirent *entry = (folder == NULL) ? NULL : readdir(folder);
-    for (; entry != NULL; entry = readdir(folder)) {
-        if (strncmp(entry->d_name, "gpiochip", 8) != 0) {
-            continue;
-        }
-        (void)snprintf(path, sizeof path, "/dev/%s", entry->d_name);
-        unsigned offset = 0;
-        struct gpiod_chip *chip = open_chip(path);
-        refusal = (chip == NULL && (errno == EACCES || errno == EPERM)) ? errno : refusal;
-        const unsigned here = (chip == NULL) ? 0U : count_named(chip, name, &offset);
-        count += here;
-        if (here > 0U && found == NULL) {
-            found = chip;
-            *out_offset = offset;
-        } else if (chip != NULL) {
-            gpiod_chip_close(chip);
+    for (; entry != NULL && chip == NULL; entry = readdir(folder)) {
+        if (strncmp(entry->d_name, "gpiochip", 8) == 0) {
+            (void)snprintf(path, sizeof path, "/dev/%s", entry->d_name);
+            chip = try_chip(path, address, out_offset);
+            refusal = (errno == EACCES || errno == EPERM) ? errno : refusal;
         }
     }
     if (folder != NULL) {
         (void)closedir(folder);
     }
-    if (count > 1U) {
-        gpiod_chip_close(found);
-        found = NULL;
-        refusal = ENOTUNIQ;
-    }
-    errno = refusal;
-    return found;
+    errno = (refusal != 0) ? refusal : ENOENT;
+    return chip;
 }
 
 static struct gpiod_chip *find(const iw_gpio_address_t *address, unsigned *out_offset) {
     char path[PATH_SIZE];
     if (!address->by_offset) {
-        return search(address->name, out_offset);
+        return search(address, out_offset);
     }
     (void)snprintf(path, sizeof path, "/dev/%s", address->name);
-    *out_offset = address->offset;
-    return open_chip(path);
+    errno = ENOENT;
+    return try_chip(path, address, out_offset);
 }
 
 /// Pull-up: a cut wire of a normally closed contact to ground reads high, like the pressed button.

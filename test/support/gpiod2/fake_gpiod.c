@@ -12,8 +12,6 @@ static struct dirent entry;
 static unsigned listed;
 static unsigned given;
 static unsigned wished_room;
-static bool shown_own;
-static unsigned shown_offset;
 
 /// /dev has two chips; the line is on the second.
 DIR *opendir(const char *name) {
@@ -60,34 +58,9 @@ void gpiod_chip_close(struct gpiod_chip *chip) {
     errno = EACCES; // As any call may.
 }
 
-struct gpiod_chip_info *gpiod_chip_get_info(struct gpiod_chip *chip) {
-    given++;
-    return (struct gpiod_chip_info *)(void *)chip;
-}
-
-size_t gpiod_chip_info_get_num_lines(struct gpiod_chip_info *info) {
-    (void)info;
-    return FAKE_GPIO_LINES;
-}
-
-void gpiod_chip_info_free(struct gpiod_chip_info *info) {
-    given -= (info != NULL) ? 1U : 0U;
-}
-
-struct gpiod_line_info *gpiod_chip_get_line_info(struct gpiod_chip *chip, unsigned offset) {
-    given++;
-    shown_own = (void *)chip == (void *)&one;
-    shown_offset = offset;
-    return (struct gpiod_line_info *)(void *)&one;
-}
-
-const char *gpiod_line_info_get_name(struct gpiod_line_info *info) {
-    (void)info;
-    return fake_gpio_name(shown_own, shown_offset);
-}
-
-void gpiod_line_info_free(struct gpiod_line_info *info) {
-    given -= (info != NULL) ? 1U : 0U;
+int gpiod_chip_get_line_offset_from_name(struct gpiod_chip *chip, const char *name) {
+    errno = ENOENT;
+    return ((void *)chip == (void *)&one && strcmp(name, FAKE_GPIO_NAME) == 0) ? (int)FAKE_GPIO_OFFSET : -1;
 }
 
 struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, struct gpiod_request_config *wish,

@@ -7,8 +7,6 @@
 #include <stddef.h>
 
 struct gpiod_chip;
-struct gpiod_chip_info;
-struct gpiod_line_info;
 struct gpiod_line_settings;
 struct gpiod_line_config;
 struct gpiod_request_config;
@@ -34,12 +32,7 @@ enum gpiod_line_bias {
 bool gpiod_is_gpiochip_device(const char *path);
 struct gpiod_chip *gpiod_chip_open(const char *path);
 void gpiod_chip_close(struct gpiod_chip *chip);
-struct gpiod_chip_info *gpiod_chip_get_info(struct gpiod_chip *chip);
-size_t gpiod_chip_info_get_num_lines(struct gpiod_chip_info *info);
-void gpiod_chip_info_free(struct gpiod_chip_info *info);
-struct gpiod_line_info *gpiod_chip_get_line_info(struct gpiod_chip *chip, unsigned offset);
-const char *gpiod_line_info_get_name(struct gpiod_line_info *info);
-void gpiod_line_info_free(struct gpiod_line_info *info);
+int gpiod_chip_get_line_offset_from_name(struct gpiod_chip *chip, const char *name);
 struct gpiod_line_request *gpiod_chip_request_lines(struct gpiod_chip *chip, struct gpiod_request_config *wish,
                                                     struct gpiod_line_config *lines);
 struct gpiod_line_settings *gpiod_line_settings_new(void);
