@@ -5,7 +5,8 @@
 usage: count_tests.py JUNIT_FILE
 
 A program that sums up in the words of Unity ("12 Tests 0 Failures 0 Ignored"), of our own runners ("12 passed, 0 failed,
-0 skipped") or of Python's unittest ("Ran 12 tests in 1.5s") counts as that many tests; any other as one. A program that failed counts at least one failure, whatever it said.
+0 skipped") or of Python's unittest ("Ran 12 tests in 1.5s") counts as that many tests; any other as one. A program that failed counts at least one failure, whatever it said,
+unless it says that it was not judged (test/support/verdict.py). Exit status 1 if one failed, 75 if one was not judged.
 """
 import re
 import sys
@@ -13,6 +14,8 @@ import xml.etree.ElementTree
 
 UNITY = re.compile(r"^(\d+) Tests (\d+) Failures (\d+) Ignored", re.MULTILINE)
 OURS = re.compile(r"^(\d+) passed, (\d+) failed(?:, (\d+) skipped)?$", re.MULTILINE)
+NOT_JUDGED = re.compile(r"^real time not judged: .*\n\d+ passed, 0 failed, \d+ skipped$", re.MULTILINE)
+INCONCLUSIVE = re.compile(r"^(?:\d+ inconclusive|real time not judged).*$", re.MULTILINE)
 PYTHON = re.compile(r"^Ran (\d+) tests? in .*\n\n(?:OK|FAILED)(.*)$", re.MULTILINE)
 
 
@@ -40,7 +43,7 @@ def count(case):
         passed, failed, skipped = 0, 0, 1
     else:
         passed, failed, skipped = 1, 0, 0
-    if case.get("status") == "fail" and failed == 0:
+    if case.get("status") == "fail" and failed == 0 and not NOT_JUDGED.search(output):
         passed, failed = (0, 1) if passed == 1 else (passed, 1)
     return passed, failed, skipped
 
@@ -48,15 +51,19 @@ def count(case):
 def main(arguments):
     if len(arguments) != 2:
         sys.exit(__doc__)
-    sums = [0, 0, 0]
+    sums, unjudged = [0, 0, 0], False
     for case in xml.etree.ElementTree.parse(arguments[1]).getroot().iter("testcase"):
         counts = count(case)
         sums = [total + one for total, one in zip(sums, counts)]
         for word, number in (("failed", counts[1]), ("skipped", counts[2])):
             if number:
                 print(f"{word}: {case.get('name')}: {number} of {sum(counts)}")
+        for line in INCONCLUSIVE.findall(case.findtext("system-out") or ""):
+            print(line)
+            unjudged = unjudged or line.startswith("real time")
     print(*sums)
+    return 1 if sums[1] else 75 if unjudged else 0
 
 
 if __name__ == "__main__":
-    main(sys.argv)
+    sys.exit(main(sys.argv))

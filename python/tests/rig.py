@@ -12,6 +12,8 @@ sys.path[:0] = [os.path.join(ROOT, "python", "src"), os.path.join(ROOT, "test", 
 
 from bus import now_us  # noqa: E402
 from harness import Rig  # noqa: E402
+from judge_log import ALWAYS_US  # noqa: E402
+from verdict import hold  # noqa: E402
 
 BUILD = os.environ.get("IWHEEL_BUILD", os.path.join(ROOT, "build", "default"))
 EXAMPLES = os.path.join(ROOT, "python", "examples")
@@ -37,6 +39,7 @@ class RigCase(unittest.TestCase):
         """No nonzero setpoint later than that, and zeros came after the last one."""
         last = self.last_motion_us()
         self.assertGreater(last, 0, "the wheels never moved: this test would prove nothing")
+        hold((last - t_us) / 1000 < within_ms + ALWAYS_US / 1000, f"motion {(last - t_us) / 1000:.0f} ms later, {within_ms} ms allowed")
         self.assertLess((last - t_us) / 1000, within_ms)
         self.assertTrue([1 for t, _, speed in self.rig.bus.setpoints(last) if speed == 0], "no zeros after the motion")
 

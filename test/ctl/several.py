@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Runs the tests of a file several at a time, each in a process of its own: they wait more than they work."""
-import concurrent.futures
 import os
 import re
 import subprocess
 import sys
 import unittest
+
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import verdict  # noqa: E402
+
+LIMIT_S = 240  # of one test
 
 
 def cases(suite):
@@ -23,24 +27,41 @@ def names():
     return list(dict.fromkeys(type(case).__name__ if "setUpClass" in vars(type(case)) else case.id().removeprefix("__main__.") for case in found))
 
 
-def run_one(build, name):
-    """(name, tests, whether they passed, output)"""
-    done = subprocess.run([sys.executable, os.path.abspath(sys.modules["__main__"].__file__), build, name], capture_output=True, text=True, check=False)
+def attempt(build, name):
+    """Runs it in a process of its own."""
+    command = [sys.executable, os.path.abspath(sys.modules["__main__"].__file__), build, "-v", name]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT_S)
+    except subprocess.TimeoutExpired as late:
+        return verdict.Attempt([verdict.Failure(f"did not end within {LIMIT_S} s\n{late.output}", verdict.CRASH)])
     ran = re.search(r"^Ran (\d+) tests? in", done.stderr, re.MULTILINE)
-    return name, int(ran[1]) if ran else 0, ran is not None and done.returncode == 0, done.stdout + done.stderr
+    output = done.stdout + done.stderr
+    if done.returncode < 0 or not ran:
+        return verdict.Attempt([verdict.Failure(f"the test's own process ended with {done.returncode}\n{output}", verdict.CRASH)])
+    if done.returncode != 0:
+        return verdict.of_text(output)
+    skips = re.findall(r"\.\.\. skipped ['\"](.*)['\"]$", done.stderr, re.MULTILINE)
+    return verdict.Attempt(tests=int(ran[1]), skips=len(skips), data=skips)
+
+
+def report(name, _, ended, tries):
+    words = "\n".join(failure.text for failure in ended.failures)
+    for reason in ended.data or ():
+        print(f"skip: {name}: {reason}", flush=True)
+    if ended.skip:
+        print(f"skip: {name}: {ended.skip}\n{words}", flush=True)
+    elif words or tries > 1:
+        print("FAILED" if words else f"ok, attempt {tries}, alone:", name, words, flush=True)
 
 
 def run_all(build, at_a_time):
-    """The exit status. What fails among others is judged once more, alone: these tests run in real time."""
-    with concurrent.futures.ThreadPoolExecutor(at_a_time) as pool:
-        results = list(pool.map(lambda name: run_one(build, name), names()))
-    results = [run_one(build, name) if not passed else (name, tests, True, "") for name, tests, passed, _ in results]
-    for name, _, passed, output in results:
-        if not passed or output:
-            print("ok, alone" if passed else "FAILED", name, "" if passed else output, flush=True)
-    failed = sum(not passed for _, _, passed, _ in results)
-    print(f"{sum(tests for _, tests, passed, _ in results if passed)} passed, {failed} failed, 0 skipped")
-    return 0 if results and not failed else 1
+    """The exit status. What stalls of the machine explain, decides test/support/verdict.py."""
+    session = verdict.Session(lambda name: attempt(build, name), report, verdict.Witness())
+    try:
+        session.run(names(), at_a_time)
+    finally:
+        session.witness.close()
+    return session.end()
 
 
 def main(build, at_a_time=4):

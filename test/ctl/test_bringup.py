@@ -20,6 +20,7 @@ from operator_at_terminal import Operator
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "system"))
 from harness import Rig, find_program  # noqa: E402
+from verdict import hold  # noqa: E402
 
 BUILD = ""
 GRAVITY = 9.8
@@ -29,21 +30,6 @@ FULL_TURN_M_PER_MM = 2 * 3.14159265 / 1000
 def environment(runtime=None):
     clean = {key: value for key, value in os.environ.items() if key not in ("IWHEEL_SOCKET", "NO_COLOR", "XDG_RUNTIME_DIR")}
     return {**clean, "TERM": "dumb", **({"XDG_RUNTIME_DIR": runtime} if runtime else {})}
-
-
-class Patient(Operator):
-    """Tries once more when the machine was too busy, as a person would."""
-
-    BUSY = ("held up for", "hardly in force", "both wheels not heard", "not acknowledged on the bus")
-
-    def pump(self, seconds):
-        alive = super().pump(seconds)
-        at = self.text.find("Once more? [n] ", self.seen)
-        if at >= 0 and any(word in " ".join(self.text[self.seen:at].split()) for word in self.BUSY):
-            self.seen = at + len("Once more? [n] ")
-            time.sleep(0.02)
-            self.type("y\n")
-        return alive
 
 
 class Bringup(unittest.TestCase):
@@ -87,7 +73,7 @@ class Bringup(unittest.TestCase):
         raise AssertionError(f"no child {name}")
 
     def start(self, *words):
-        operator = Patient([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--can",
+        operator = Operator([find_program(BUILD, "iwheelctl"), "bringup", self.out, "--can",
                              f"unix:{self.rig.path('bus')}", "--estop", f"unix:{self.rig.path('button')}", "--from",
                              self.out + ".from", *words],
                             environment(self.runtime))
@@ -410,7 +396,7 @@ class Bringup(unittest.TestCase):
         operator.process.kill()
         killed_us = time.clock_gettime_ns(time.CLOCK_MONOTONIC) // 1000
         time.sleep(4.5)
-        self.assertFalse([frame for frame in self.moving() if frame[0] > killed_us + 1_000_000])
+        hold(not [frame for frame in self.moving() if frame[0] > killed_us + 1_000_000], "the wheels are commanded to turn after bringup is gone")
         last = max(frame[0] for frame in self.rig.bus.setpoints())
         self.assertLess(last, killed_us + 4_000_000, "its gateway ended")
         operator.close()
@@ -433,7 +419,7 @@ class Bringup(unittest.TestCase):
         operator.answer("finger on the e-stop?", "y")
         operator.expect("Mend what failed")
         self.assertEqual(1, operator.wait())
-        self.assertFalse(self.rig.bus.setpoints())
+        hold(not self.rig.bus.setpoints(), "setpoints without the checks")
 
     def test_existing_file_is_replaced_only_when_asked_and_kept(self):
         with open(self.out, "w", encoding="utf-8") as file:

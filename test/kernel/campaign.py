@@ -25,6 +25,7 @@ from distribution import EmulatedBoot, why_not_emulated
 from groups import GROUPS
 from harness import find_program
 from native import why_not_native, NativeBoot
+from verdict import summary
 
 POLL_S = 0.1
 HOURS, HOURS_FULL = 1, 24  # of the soak
@@ -157,6 +158,9 @@ class Campaign:
     def take(self, group, result):
         result = {"figures": [], "failures": [], "measures": {}, "latencies": [], "from_level": [], "logs": [], "seconds": 0, "host_s": 0, **result}
         result["group"] = group.name
+        result["inconclusive"] = result["verdict"] == "inconclusive"
+        if result["inconclusive"]:
+            result["verdict"] = "skipped"
         with self.lock:
             self.results.append(result)
             self.tell(result)
@@ -286,9 +290,9 @@ def main(arguments):
             return 0
     outcomes = campaigns(options, kernel)
     totals = [sum(counts) for counts in zip([0, 0, 0], *(outcome.counts() for outcome in outcomes))]
+    results = [result for outcome in outcomes for result in outcome.results]
+    inconclusive = [f"{result['group']}/{result['name']}" for result in results if result.get("inconclusive")]
     if len(outcomes) < options.repeat:
         print(f"interrupted: {len(outcomes)} of {options.repeat} campaigns came to their end, and only those are counted")
-    print("{} passed, {} failed, {} skipped".format(*totals))
-    if len(outcomes) < options.repeat:
-        return INTERRUPTED
-    return 1 if totals[1] or not totals[0] else 0
+    code = summary(*totals, inconclusive, real_time=sum(result["group"] in repeated.REAL_TIME for result in results))
+    return INTERRUPTED if len(outcomes) < options.repeat else code

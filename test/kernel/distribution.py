@@ -278,7 +278,7 @@ def write_foreign(file, machine, kernel, work):
 def write_image(path, machine, build, kernel, results):
     """The image for tests of that build, whose results go to that folder of this machine's."""
     tests = Image()
-    for folder in ("test/system", "test/kernel", "share"):
+    for folder in ("test/support", "test/system", "test/kernel", "share"):
         tests.add_tree(os.path.join(ROOT, folder), ("__pycache__",))
     for name in filter(os.path.exists, SETTINGS):
         tests.add(name)

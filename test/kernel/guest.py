@@ -4,14 +4,13 @@
 
 Usage: guest.py PLAN.json
 The plan: {"build": DIR, "tests": [NAME...], "virtual": BOOL, "full": BOOL, "results": FILE, "seed": N}. One JSON object per test
-is appended to the results as the tests end: name, verdict (passed, failed, skipped), figures, failures, measures, latencies
+is appended to the results as the tests end: name, verdict (passed, failed, skipped, inconclusive), figures, failures, measures, latencies
 and from_level (microseconds from the e-stop's edge and from its level), seconds.
 """
 
 import json
 import os
 import sys
-import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(os.path.dirname(HERE), "system")]
@@ -29,25 +28,19 @@ def main(path):
     if not plan["virtual"]:
         run.watch()
     with open(plan["results"], "a", encoding="utf-8", buffering=1) as results:
-        stalled = [name for name in plan["tests"] if not work_off(run, name, run.test, results)]
-        for name in stalled:
-            work_off(run, name, run.test_alone, results)
+        run.report = lambda *what: results.write(json.dumps(result_of(run, *what)) + "\n")
+        run.run(plan["tests"])
     run.close()
     return 0
 
 
-def work_off(run, name, test, results):
-    """False, and nothing is told, if the machine stalled in each attempt: to be tried again at the end."""
-    begin, run.last, run.latencies = time.monotonic(), {}, {}
-    verdict, figures, failures = test(name)
-    if verdict == "stalled":
-        return False
-    result = {"name": name, "verdict": verdict, "figures": figures, "failures": failures}
-    result["seconds"] = time.monotonic() - begin
-    result.update(run.latencies)
-    result["measures"], result["logs"] = run.last.get("measures", {}), run.last.get("logs", [])
-    results.write(json.dumps(result) + "\n")
-    return True
+def result_of(run, name, verdict, attempt, tries):
+    """One line of the results. What is inconclusive counts as skipped; `verdict` says so all the same."""
+    data = attempt.data or {}
+    figures = data.get("figures", []) + ([attempt.skip] if attempt.skip else []) + ([f"attempt {tries}, alone"] if tries > 1 else [])
+    result = {"name": name, "verdict": verdict, "figures": figures, "failures": attempt.failures, "seconds": (attempt.end_us - attempt.begin_us) / 1e6}
+    latencies = run.take_latencies(data) if verdict == "passed" else {}
+    return {**result, **latencies, "measures": data.get("measures", {}), "logs": data.get("logs", [])}
 
 
 if __name__ == "__main__":

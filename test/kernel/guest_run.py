@@ -15,12 +15,10 @@ import traceback
 import kernel_rig
 from catalogue import ENTRIES
 from harness import SERVICE_NICE, as_a_service, die_with_parent
-from runner import AFTER_US, BEFORE_US, Run
+from runner import Run, attempt_of
 from scenario import Skip
+from verdict import CRASH, Failure, Session, explains, kind_of
 
-# What no late machine causes: motion that nobody permitted, a latch that does not hold, a setpoint of the wrong form.
-ALWAYS_JUDGED = ("latched expected", "nonzero_after_estop", "motion_", "must not unlatch")
-FORM = ("unknown_id: ", "dlc: ", "padding: ", "type: ", "speed: ", "current: ", "sent_in_listening: ")
 KINDS = ("latencies", "from_level")  # of the e-stop: since the edge, since the level
 SWITCH_S = 0.0005  # between threads of a test: a press does not wait for the recorder
 LIMIT_S, FULL_LIMIT_S, SOAK_LIMIT_S = 600, 3600, 100_000  # of one test, by the guest's clock
@@ -38,7 +36,8 @@ def run_one(entry, plan):
     except Exception as error:  # pylint: disable=broad-except
         where = [f"{os.path.basename(s.filename)}:{s.lineno}" for s in traceback.extract_tb(error.__traceback__)][-4:]
         output = "".join(rig.gateway.text()[-600:] for rig in test.rigs if rig.gateway)
-        test.failures.append([f"{type(error).__name__}: {error} ({' > '.join(where)}) {output}", "check", 0])
+        text = f"{type(error).__name__}: {error} ({' > '.join(where)}) {output}"
+        test.failures.append(Failure(text, kind_of(text)))
     logs = save_logs(test, plan, entry.name) if test.failures else []
     for rig in test.rigs:
         rig.close()
@@ -51,6 +50,8 @@ def run_one(entry, plan):
         "end_us": kernel_rig.now_us(),
         "latencies": test.latencies,
         "from_level": test.from_level,
+        "stalls": test.stalls,
+        "claims": test.claims,
         "logs": logs,
     }
 
@@ -72,7 +73,7 @@ def save_logs(test, plan, name):
 
 
 def died(text):
-    return {"failures": [[text, "rule", 0]], "figures": [], "measures": {}, "skip": None, "latencies": [], "from_level": [], "begin_us": 0, "end_us": 0}
+    return {"failures": [[text, CRASH]], "figures": [], "measures": {}, "skip": None, "latencies": [], "from_level": []}
 
 
 def hasten_received_frames():
@@ -87,7 +88,7 @@ def hasten_received_frames():
 
 
 class GuestRun(Run):
-    """The runner of the system tests, with forked workers; in virtual time nothing excuses anything.
+    """The runner of the system tests, with forked workers; in virtual time no machine is late, so every verdict is conclusive.
 
     In real time a witness runs beside, with the gateway's priority. Setting up a test always delays it a little (a fork is slow in
     such a kernel), so what counts is a delay that is long enough, and near enough, to have caused what is wrong.
@@ -96,9 +97,10 @@ class GuestRun(Run):
     command = "test/kernel/run"
 
     def __init__(self, plan):  # pylint: disable=super-init-not-called
-        self.plan, self.last, self.latencies = plan, {}, {}
+        Session.__init__(self, self.work_off)
+        self.plan = plan
         self.limit_s = SOAK_LIMIT_S if plan["group"] == "soak" else FULL_LIMIT_S if plan["full"] else LIMIT_S
-        self.witness = self.folder = None
+        self.folder = None
 
     def watch(self):
         """In real time: from now on the witness runs beside, until `close`."""
@@ -121,32 +123,19 @@ class GuestRun(Run):
     def stalls(self, begin_us, end_us):
         return kernel_rig.late_wakings(begin_us, end_us, kernel_rig.STALL_US)
 
-    def excused(self, result, failure):
-        text, kind, at_us = failure
-        if self.plan["virtual"] or kind == "rule" or any(always in text for always in ALWAYS_JUDGED):
-            return False
-        if text.startswith(FORM):
-            return False
-        if text.startswith("pair_spread"):  # the strictest of all, and over in a moment
-            return kernel_rig.machine_late(at_us - kernel_rig.TICK_US, at_us + kernel_rig.TICK_US, kernel_rig.PRESS_LATE_US)
-        near = (at_us - BEFORE_US, at_us + AFTER_US)
-        if not at_us or text.startswith("no_silence"):  # the end of a hold depends on all that was heard before
-            near = result["begin_us"], result["end_us"]
-        return kernel_rig.machine_late(*near, kernel_rig.STALL_US)
+    def explained(self, attempt, failure):
+        if failure.text.startswith("pair_spread"):  # the strictest of all, and over in a moment
+            around = failure.at_us - kernel_rig.TICK_US, failure.at_us + kernel_rig.TICK_US
+            return explains(failure, kernel_rig.late_wakings(*around, kernel_rig.PRESS_LATE_US))
+        if failure.text.startswith("no_silence"):  # the end of a hold depends on all that was heard before
+            failure = failure._replace(at_us=0)
+        return super().explained(attempt, failure)
 
-    def softened(self, result):
-        """In real time: what a stalled machine may have caused is a matter of time. Latching is judged all the same."""
-        if not self.plan["virtual"] and kernel_rig.machine_late(result["begin_us"], result["end_us"], kernel_rig.STALL_US):
-            for failure in result["failures"]:
-                failure[1] = "timing"
-        return result
+    def take_latencies(self, result):
+        """{kind: microseconds}. The test has left out those of presses beside which the machine was late."""
+        return {kind: [latency_us for _, latency_us in result[kind]] for kind in KINDS}
 
-    def take_latencies(self, name, result):
-        """The test has left out those of presses beside which the machine was late."""
-        for kind in KINDS:
-            self.latencies[kind] = [latency_us for _, latency_us in result[kind]]
-
-    def once(self, name):
+    def work_off(self, name):
         entry = ENTRIES[name]
         read_end, write_end = os.pipe()
         child = os.fork()
@@ -168,12 +157,12 @@ class GuestRun(Run):
             pass
         os.waitpid(child, 0)
         if text is None:
-            return died(f"did not end within {self.limit_s} s of the guest's clock")
-        self.last = self.softened(json.loads(text)) if text else died("the worker died")
-        for failure in self.last["failures"]:
-            excuse = "excused" if self.excused(self.last, failure) else "not excused"
-            print(f"{name}: {failure[1]}, {excuse}: {failure[0]}", flush=True)
-        return self.last
+            return attempt_of(died(f"did not end within {self.limit_s} s of the guest's clock"))
+        attempt = attempt_of(json.loads(text) if text else died("the worker died"))
+        for failure in attempt.failures:
+            explained = "explained by a stall" if self.explained(attempt, failure) else "not explained"
+            print(f"{name}: {failure.kind}, {explained}: {failure.text}", flush=True)
+        return attempt
 
 
 def read_all(descriptor, seconds):

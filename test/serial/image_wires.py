@@ -72,7 +72,7 @@ class BoardBus(threading.Thread):
         return self.boards[at] + min(wall_us - self.walls[at], SLICE_US) if at >= 0 else wall_us
 
     def stalls(self):
-        return [(a, b) for a, b in zip(self.walls, self.walls[1:]) if b - a > STALL_US]
+        return [(b, b - a) for a, b in zip(self.walls, self.walls[1:]) if b - a > STALL_US]
 
     def setpoints(self, since_us=0):
         """As Bus.setpoints, of a moment of ours."""
@@ -145,7 +145,7 @@ class ImageRig(SerialRig):
                       finished_us=finished_us, **options)
         judge.judge()
         judge.found += [Violation("chip", 0, f"the image did what the chip forbids: {text}", False) for text in self.bus.forbidden]
-        judge.bus_stalls = self.bus.stalls
+        judge.bus_stalls, judge.machine_stalls = list, self.bus.stalls
         return judge
 
 
@@ -185,14 +185,14 @@ def estop_pin(t):
         released_us = now_us()
         rig.pass_time(1.3)
         t.expect(client.drive(200, 200), "latched")
-        t.check(not rig.moving(released_us), f"moved by a release, turn {turn}")
+        t.rule(not rig.moving(released_us), f"moved by a release, turn {turn}")
         for _ in range(40):
             reply = client.request("reset")
             if reply["ok"]:
                 break
             rig.pass_time(0.1)
         t.expect(reply)
-        t.check(not rig.moving(released_us), f"moved by a reset, turn {turn}")
+        t.rule(not rig.moving(released_us), f"moved by a reset, turn {turn}")
         t.arm(client)
     t.expect(client.request("stop"))
     end_well(t, rig, client)

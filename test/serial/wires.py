@@ -247,7 +247,7 @@ def send_bad_lines(t, count, block_lines):
             client.request("hello")
     t.check(client.request("hello")["ok"], "the line is in order after them")
     time.sleep(0.2)
-    t.check(not rig.moving(before_us), f"{len(rig.moving(before_us))} setpoints that move, of lines that were bad or old")
+    t.rule(not rig.moving(before_us), f"{len(rig.moving(before_us))} setpoints that move, of lines that were bad or old")
     errors = bytes(rig.cable.told).count(b'"line_error"')
     t.check(0 < errors <= 5 * (now_us() - before_us) / 1e6 + 2, f"{errors} line_errors in {(now_us() - before_us) / 1e6:.1f} s")
     t.figure(f"{sent} lines in {(now_us() - before_us) / 1e6:.1f} s, {errors} answers")
@@ -326,7 +326,7 @@ def delayed(t):
     except Closed:
         pass  # A port that takes nothing for a second is opened anew.
     time.sleep(0.4)
-    t.check(not rig.moving(released_us), "nothing that waited in the wire moves a wheel")
+    t.rule(not rig.moving(released_us), "nothing that waited in the wire moves a wheel")
     end_well(t, rig, await_service(t, rig))
 
 

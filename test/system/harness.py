@@ -13,6 +13,8 @@ import sys
 import tempfile
 import time
 
+sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "support"))  # verdict.py
+
 from bus import Bus, now_us
 from client import Client, Closed
 from judge import Judge

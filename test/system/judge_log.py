@@ -70,7 +70,8 @@ class Violation(NamedTuple):
     rule: str
     t_us: int
     text: str
-    timing: bool  # a stalled machine could have caused it
+    timing: bool  # a stalled machine could have caused it,
+    excess_us: float = 0  # if it stalled for so long
 
 
 class Setpoint(NamedTuple):
@@ -113,7 +114,7 @@ class Reading:
 
     def _say(self, rule, t_us, text, excess_us=None):
         timing = excess_us is not None and excess_us < ALWAYS_US
-        self.found.append(Violation(rule, t_us, text, timing))
+        self.found.append(Violation(rule, t_us, text, timing, excess_us or 0))
 
     def _dead_windows(self):
         windows, since = [], None
@@ -140,9 +141,13 @@ class Reading:
         )
 
     def bus_stalls(self):
-        """When the simulated bus itself stood still: two wheels send a frame every 4 ms each. [(from_us, to_us)]"""
+        """When the simulated bus stood still, [(until_us, for_us)]: two wheels send a frame every 4 ms each. A scenario may be the cause."""
         times = [frame.t_us for frame in self.frames if frame.id in SPEED_IDS and not frame.own]
-        return [(a, b) for a, b in zip(times, times[1:]) if b - a > BUS_STALL_US]
+        return [(b, b - a) for a, b in zip(times, times[1:]) if b - a > BUS_STALL_US]
+
+    def machine_stalls(self):
+        """When whatever runs the wheels was stalled for certain, [(until_us, for_us)]; a rig that measures it knows."""
+        return []
 
     def _is_dead(self, from_us, to_us):
         return any(begin < to_us + GAP_US and from_us < end + GAP_US for begin, end in self.dead)

@@ -4,6 +4,7 @@
 import time
 
 from harness import Rig, percentile
+from verdict import CHECK, RULE, TIMING, Failure
 
 REGISTRY = {}
 # Refusals of arm that pass by themselves: the wheels roll out, or the last zero is still on its way.
@@ -25,13 +26,13 @@ def scenario(title, seconds=5):
 
 
 class Test:
-    """Collects failures as [text, kind, t_us]; kind: "rule" is always judged, "timing" and "check" not on a stalled machine."""
+    """Collects failures as verdict.Failure. Figures, and stalls that the test itself has seen, go with them."""
 
     rig_type = Rig
 
     def __init__(self, build):
         self.build = build
-        self.failures, self.figures, self.latencies, self.bus_stalls = [], [], [], []
+        self.failures, self.figures, self.latencies, self.stalls, self.claims = [], [], [], [], []
         self.rigs = []
 
     def rig(self, *arguments, **options):
@@ -45,9 +46,16 @@ class Test:
         rig.start_gateway()
         return rig, rig.client()
 
-    def check(self, condition, text, timing=False, at_us=0):
+    def check(self, condition, text, timing=False, at_us=0, need_us=None):
+        """`need_us`: the shortest stall of the machine that explains the failure, as in verdict.Failure."""
         if not condition:
-            self.failures.append([text, "timing" if timing else "check", at_us])
+            self.failures.append(Failure(text, TIMING if timing else CHECK, at_us, need_us))
+        return bool(condition)
+
+    def rule(self, condition, text, at_us=0):
+        """A safety rule holds, however late the machine is: no motion that is not permitted, no latch that opens on its own."""
+        if not condition:
+            self.failures.append(Failure(text, RULE, at_us))
         return bool(condition)
 
     def expect(self, reply, error=None):
@@ -94,17 +102,18 @@ class Test:
         if not self.check(hit is not None, f"{text}: never"):
             return None
         elapsed_ms = (hit - t_us) / 1000
-        self.check(elapsed_ms <= limit_ms, f"{text} after {elapsed_ms:.1f} ms, {limit_ms} ms allowed", True, hit)
+        self.check(elapsed_ms <= limit_ms, f"{text} after {elapsed_ms:.1f} ms, {limit_ms} ms allowed", True, hit, (elapsed_ms - limit_ms) * 1000)
         return elapsed_ms
 
     def judge(self, rig, moves=True, **options):
         judge = rig.judge(moves=moves, **options)
         for found in judge.found[:6]:
             at = f"at {(found.t_us - rig.timeline[0].t_us) / 1e6:.3f} s: " if found.t_us else ""
-            self.failures.append([f"{found.rule}: {at}{found.text}", "timing" if found.timing else "rule", found.t_us])
+            self.failures.append(Failure(f"{found.rule}: {at}{found.text}", TIMING if found.timing else RULE, found.t_us, found.excess_us))
         if judge.gap_max_us:
             self.figure(f"longest gap {judge.gap_max_us / 1000:.0f} ms")
-        self.bus_stalls += judge.bus_stalls()
+        self.claims += judge.bus_stalls()
+        self.stalls += judge.machine_stalls()
         if judge.estop_latencies:
             self.latencies += judge.estop_latencies
             values = [latency_us for _, latency_us in judge.estop_latencies]

@@ -6,15 +6,14 @@ import os
 import threading
 import time
 import traceback
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from bus import now_us
 from client import Closed
 from judge_log import LEFT, RIGHT
+from verdict import Attempt, Session, Witness, of_text
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-TRIES = 2
 
 
 class Skip(Exception):
@@ -99,36 +98,31 @@ def braking_ms(rig, since_us, seconds=2):
     return (until(found, seconds, "the wheels are told to brake") - since_us) / 1000
 
 
-def run(name, function, make_rig):
-    """None, or why it failed. The wheels are simulated in real time: on a busy machine a stop may have another cause, so it is tried again."""
-    for left in reversed(range(TRIES)):
-        rig = make_rig(**getattr(function, "rig", {}))
-        try:
-            function(rig)
-            return None
-        except Skip:
-            raise
-        except Exception as error:  # pylint: disable=broad-except
-            words = f"{type(error).__name__}: {error}\n{traceback.format_exc(limit=-4)}\n{rig.words()[-800:]}"
-            if left == 0:
-                return words
-            print(f"        {name}: once more: {str(error)[:200]}", flush=True)
-            time.sleep(1)
-        finally:
-            rig.close()
-    return None
-
-
-def judge(name, function, make_rig):
-    begun = time.monotonic()
+def attempt(function, make_rig):
+    """One attempt, as test/support/verdict.py judges it."""
+    rig = None
     try:
-        words = run(name, function, make_rig)
+        rig = make_rig(**getattr(function, "rig", {}))
+        function(rig)
+        return Attempt()
     except Skip as reason:
-        print(f"skip: {name}: {reason}", flush=True)
-        return "skip:"
-    verdict = "FAILED" if words else "ok"
-    print(f"{verdict:7} {name} ({time.monotonic() - begun:.1f} s){chr(10) + words if words else ''}", flush=True)
-    return verdict
+        return Attempt(skip=str(reason))
+    except Exception as error:  # pylint: disable=broad-except
+        logs = [rig.words()[-800:], rig.gateway.text()[-800:] if rig.gateway else ""] if rig else []
+        return of_text("\n".join([f"{type(error).__name__}: {error}", traceback.format_exc(limit=-4), *logs]))
+    finally:
+        if rig:
+            rig.close()
+
+
+def report(name, _, ended, tries):
+    seconds = (ended.end_us - ended.begin_us) / 1e6
+    words = "\n".join(failure.text for failure in ended.failures)
+    if ended.skip:
+        print(f"skip: {name}: {ended.skip}{chr(10) if words else ''}{words}", flush=True)
+    else:
+        later = f", attempt {tries}, alone" if tries > 1 else ""
+        print(f"{'FAILED' if words else 'ok':7} {name} ({seconds:.1f} s{later}){chr(10) if words else ''}{words}", flush=True)
 
 
 def parser(usage):
@@ -149,10 +143,11 @@ def main(options, modules, rig):
         return 0
     chosen = [one for one in tests if (not options.only or any(only in one[0] for only in options.only)) and
               (not getattr(one[1], "full", False) or os.environ.get("IWHEEL_FULL") == "1")]
-    verdicts = {"ok": 0, "FAILED": 0, "skip:": 0}
-    with ThreadPoolExecutor(options.jobs) as pool:
-        for verdict in pool.map(lambda one: judge(*one, lambda **what: rig(options.build, **what)), chosen):
-            verdicts[verdict] += 1
-    passed, failed, skipped = verdicts.values()
-    print(f"{passed} passed, {failed} failed, {skipped} skipped")
-    return 1 if failed or not passed else 0
+    functions = dict(chosen)
+    assert len(functions) == len(chosen), "two tests have one name"
+    session = Session(lambda name: attempt(functions[name], lambda **what: rig(options.build, **what)), report, Witness())
+    try:
+        session.run(list(functions), options.jobs)
+    finally:
+        session.witness.close()
+    return session.end()

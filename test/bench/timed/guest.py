@@ -31,20 +31,21 @@ def available(candidate, plan):
 
 
 def one_turn(around, measure, candidate):
-    """The figures, and how late somebody who sleeps a millisecond was woken meanwhile. A turn in which the machine stood is repeated."""
+    """The figures, and how late somebody who sleeps a millisecond was woken meanwhile. Only a turn in which the machine stalled is repeated."""
+    stall_us = around.plan.get("stall_us", STALL_US)
     for tries in range(1, TRIES + 1):
-        sleeper, figures = around.tool("sleeper", piped=True), None
+        sleeper, figures, failed = around.tool("sleeper", piped=True), None, None
         try:
             figures = measure.turn(candidate)
         except (RuntimeError, OSError, TimeoutError, subprocess.TimeoutExpired) as error:
-            if tries == TRIES:
-                raise
+            failed = error
+        late_us = int(sleeper.end() or 0)
+        if late_us >= stall_us and tries < TRIES:
             around.end_gateway()
-            print(f"{candidate}: {error}; once more", flush=True)
-        finally:
-            late_us = int(sleeper.end() or 0)
-        if figures is not None and (late_us < around.plan.get("stall_us", STALL_US) or tries == TRIES):
-            return {**figures, "late_us": late_us, "repeated": tries - 1}
+            continue
+        if failed:
+            raise failed
+        return {**figures, "late_us": late_us, "repeated": tries - 1}
     return None
 
 

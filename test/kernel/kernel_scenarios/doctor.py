@@ -60,7 +60,7 @@ def doctor_on_vcan(t):
     expect(t, checks, "interface", "fail", "not a CAN interface")
     _, checks = doctor(rig, rig.interface, "--estop", "NO_SUCH_LINE")
     expect(t, checks, "estop", "fail", "counts as pressed", "gpioinfo")
-    t.check(not rig.bus.setpoints(), "nothing was sent")
+    t.rule(not rig.bus.setpoints(), "nothing was sent")
 
 
 @kernel_test("doctor on an adapter without bit timing: unproven is said, beside a gateway too", "adapter", 0, SlcanRig, pace=1)
@@ -73,4 +73,4 @@ def doctor_on_an_adapter(t):
     rig.start_gateway()
     _, checks = doctor(rig)
     expect(t, checks, "gateway", "ok", f"serves {rig.adapter.interface}")
-    t.check(not rig.bus.setpoints(), "nothing was sent")
+    t.rule(not rig.bus.setpoints(), "nothing was sent")

@@ -40,7 +40,7 @@ def stale_after(t, rig, back_us, until_us=None):
     late = [(at, value) for at, _, value in rig.bus.setpoints(back_us) if at < until_us]
     moving = [(at - back_us, value) for at, value in late if value]
     t.measure("stale_frames", len(moving))
-    t.check(not moving, f"old frames after the bus came back: {moving[:6]}")
+    t.rule(not moving, f"old frames after the bus came back: {moving[:6]}")
     t.figure(f"{len(late)} zero frames after it came back")
 
 
@@ -99,7 +99,7 @@ def row15_blink(t):
         t.first_after(rig, back_us, lambda speed: speed == 0, "zero after the blink", REOPENED_MS)
         t.stopped_by(client, "bus_down")
         moving = [(at - back_us, value) for at, _, value in rig.bus.setpoints(back_us + 1) if value]
-        t.check(not moving, f"{phase_ms} ms: motion after the interface came back: {moving[:4]}")
+        t.rule(not moving, f"{phase_ms} ms: motion after the interface came back: {moving[:4]}")
         back_to_driving(t, rig, client)
         if t.failures or phase_ms == BLINKS_MS[-1]:
             break
@@ -164,7 +164,7 @@ def row15_down_while_listening(t):
     netdev.up(rig.interface)
     heard = rig.wait_status(client, lambda s: s["left"]["at_rest"] and s["right"]["at_rest"] and s["bus"]["state"] == "active")
     t.check(heard, "back without reset")
-    t.check(not rig.bus.setpoints(), "nothing was sent")
+    t.rule(not rig.bus.setpoints(), "nothing was sent")
     time.sleep(1.1)
     t.arm(client)
     t.drive_for(client, 200, 200, 0.5)
@@ -265,7 +265,7 @@ def row17_echo_too_late_at_arm(t):
     state = client.request("status")["state"]
     t.check(not reply["ok"] or state == "latched", f"arm without an echo in time: {reply}, {state}")
     t.check(client.request("why")["cause"] == "send_stalled" or reply.get("error") == "send_stalled", "and says why")
-    t.check(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing but zeros")
+    t.rule(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing but zeros")
     netdev.discipline(rig.interface)
     back_to_driving_if_latched(t, rig, client)
 
@@ -372,7 +372,7 @@ def lost_echo(t, cure):
     t.check(told == [True, False], f"and goes: {told}")
     t.check("still in the controller" not in " ".join(client.request("status")["warnings"]), "no warning remains")
     armed = [event.t_us for event in rig.timeline if event.kind == "arm" and event.ok and event.t_us > silent_us]
-    t.check(not [at for at, _, _ in rig.bus.setpoints(silent_us) if at < min(armed)], "nothing is sent before it is armed again")
+    t.rule(not [at for at, _, _ in rig.bus.setpoints(silent_us) if at < min(armed)], "nothing is sent before it is armed again")
     client.request("stop")
     time.sleep(0.3)
     t.judge(rig)
@@ -426,7 +426,7 @@ def power_cut(t, setup):
 @kernel_test("wheel power cut for 10 s at full command, link may be restarted: no old frame", "echo", 18)
 def row18_power_cut_purged(t):
     rig, client, late, moving = power_cut(t, None)
-    t.check(not moving, f"no old frame after a purge: {late[:6]}")
+    t.rule(not moving, f"no old frame after a purge: {late[:6]}")
     back_to_driving_if_latched(t, rig, client)
     t.judge(rig)
 

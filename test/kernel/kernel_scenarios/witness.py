@@ -12,8 +12,9 @@ from client import Streamer
 from guest_run import GuestRun, run_one
 from judge_log import LEFT, RIGHT
 from kernel_rig import ESTOP_US, LEVEL_US, PRESS_LATE_US, TICK_US, VcanRig, machine_late
-from runner import TRIES
+from runner import attempt_of
 from scenario import Skip
+from verdict import FAILED, INCONCLUSIVE, RETRIES
 
 LATE_S = 0.03
 HALT_S, HALT_LIMIT_S = 0.2, 5.0
@@ -28,14 +29,14 @@ class Rehearsal(GuestRun):
         self.entry = Entry("planted", "planted", function, (), 0, VcanRig, 1)
         self.attempts = 0
 
-    def once(self, name):
+    def work_off(self, _):
         self.attempts += 1
-        self.last = self.softened(run_one(self.entry, self.plan))
+        self.last = attempt_of(run_one(self.entry, self.plan))
         return self.last
 
     def disturbed(self):
         """Whether the machine was late in the last attempt."""
-        return machine_late(self.last["begin_us"], self.last["end_us"], PRESS_LATE_US)
+        return machine_late(self.last.begin_us, self.last.end_us, PRESS_LATE_US)
 
 
 def drive_while(halt, afterwards=None):
@@ -94,16 +95,16 @@ def verdict_on(t, halt, afterwards=None):
     """(verdict, rehearsal, failures) of the runner."""
     t.plan["asks"] = t.plan["results"].rsplit(".", 1)[0]
     rehearsal = Rehearsal(t, drive_while(halt, afterwards))
-    verdict, _, failures = rehearsal.test("planted")
-    return verdict, rehearsal, [text for text, _, _ in failures]
+    verdict, attempt, _ = rehearsal.again("planted")
+    return verdict, rehearsal, [failure.text for failure in attempt.failures]
 
 
 @kernel_test("a gateway that stands still for 200 ms in motion fails the test at once, and the machine is not blamed", "plumbing-realtime", 0)
 def plumbing_gateway_halted(t):
-    for _ in range(TRIES):
+    for _ in range(RETRIES):
         verdict, rehearsal, failures = verdict_on(t, halt_gateway)
-        if verdict == "failed" or not rehearsal.disturbed():
-            t.check(verdict == "failed", f"{verdict} after {rehearsal.attempts} attempts: {failures}")
+        if verdict == FAILED or not rehearsal.disturbed():
+            t.check(verdict == FAILED, f"{verdict} after {rehearsal.attempts} attempts: {failures}")
             t.figure(f"{verdict}: {len(failures)} failures")
             return
     raise Skip("the machine was late beside each attempt; needs a quieter one")
@@ -115,7 +116,7 @@ def plumbing_machine_halted(t):
     verdict, rehearsal, failures = verdict_on(t, halt_machine)
     t.check(rehearsal.disturbed(), "the witness saw the machine stand still")
     t.check(failures, "a machine that stood still left its traces")
-    t.check(verdict == "stalled" and rehearsal.attempts == TRIES, f"{verdict} after {rehearsal.attempts} attempts: {failures}")
+    t.check(verdict == INCONCLUSIVE and rehearsal.attempts == RETRIES, f"{verdict} after {rehearsal.attempts} attempts: {failures}")
     t.figure(f"{verdict} after {rehearsal.attempts} attempts, {len(failures)} failures in the last")
 
 
@@ -124,7 +125,7 @@ def plumbing_machine_no_excuse(t):
     need_a_machine(t)
     verdict, rehearsal, failures = verdict_on(t, halt_machine, motion_after_estop)
     t.check(rehearsal.disturbed(), "the witness saw the machine stand still")
-    t.check(verdict == "failed" and rehearsal.attempts == 1, f"{verdict} after {rehearsal.attempts} attempts")
+    t.check(verdict == FAILED and rehearsal.attempts == 1, f"{verdict} after {rehearsal.attempts} attempts")
     t.check(any(text.startswith("nonzero_after_estop") for text in failures), f"it is named: {failures}")
     t.figure(f"{verdict} although the machine stood still")
 
@@ -162,11 +163,11 @@ def stop_gateway(rig):
 
 @kernel_test("a gateway that stands still for 30 ms at a press is found out, and the machine is not blamed", "plumbing-realtime", 0)
 def plumbing_late_gateway(t):
-    for _ in range(TRIES):
+    for _ in range(RETRIES):
         latency_us, level_us, disturbed = late_press(t, stop_gateway)
         if not disturbed:
             t.check(latency_us > ESTOP_US, f"{latency_us / 1000:.2f} ms measured although the gateway stood still for 30 ms")
             t.check(level_us > LEVEL_US, f"{level_us / 1000:.2f} ms from the level although the gateway stood still for 30 ms")
             t.figure(f"{latency_us / 1000:.0f} ms measured, {level_us / 1000:.0f} ms from the level")
             return
-    raise Skip(f"the machine was late beside each of {TRIES} presses; needs a quieter one")
+    raise Skip(f"the machine was late beside each of {RETRIES} presses; needs a quieter one")

@@ -132,7 +132,7 @@ def row19_second_master_listening(t):
     t.check(
         any(e["event"] == "fault" and e["cause"] == "second_master" for e in client.collect(0.1)), "and the event comes"
     )
-    t.check(not rig.bus.setpoints(), "nothing is sent")
+    t.rule(not rig.bus.setpoints(), "nothing is sent")
     time.sleep(1.1)
     t.arm(client)
     time.sleep(0.1)
@@ -146,7 +146,7 @@ def row19_forged_error_frames(t):
         rig.bus.send(ERROR | 0x40, bytes(8))
         rig.bus.send(ERROR | 0x04, bytes([0, 0x30, 0, 0, 0, 0, 0, 0]))
         time.sleep(0.01)
-    t.check(not rig.bus.setpoints(), "nothing is sent while listening")
+    t.rule(not rig.bus.setpoints(), "nothing is sent while listening")
     time.sleep(1.2)
     rig.bus.send(ERROR | 0x100, bytes(8))
     time.sleep(0.2)
@@ -226,6 +226,6 @@ def row15_bus_gone(t):
     wait_reset(t, client)
     time.sleep(0.3)
     late = rig.bus.setpoints(back_us)
-    t.check(not any(speed for _, _, speed in late), f"nothing but zeros after the return: {late[:4]}")
+    t.rule(not any(speed for _, _, speed in late), f"nothing but zeros after the return: {late[:4]}")
     t.figure(f"{len(late)} zero frames after the return")
     t.judge(rig)

@@ -193,7 +193,7 @@ def row07_stale_command(t):
     t.expect(client.request("reset"))
     t.arm(client)
     time.sleep(0.2)
-    t.check(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing but zeros on the bus")
+    t.rule(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing but zeros on the bus")
     t.judge(rig, moves=False)
 
 

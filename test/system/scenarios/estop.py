@@ -51,7 +51,7 @@ def presses(t, seed):
         t.expect(pusher.request("reset"), "estop_pressed")
         rig.release()
         time.sleep(chance.uniform(0.0, 0.05))
-        t.check(pusher.request("status")["state"] == "latched", f"press {number}: release alone must not unlatch")
+        t.rule(pusher.request("status")["state"] == "latched", f"press {number}: release alone must not unlatch")
         reset(t, pusher)
         if t.failures:
             break
@@ -103,14 +103,14 @@ def row13_pressed_at_start(t):
         t.expect(client.request("reset"), "estop_pressed")
     rig.release()
     time.sleep(0.3)
-    t.check(client.request("status")["state"] == "latched", "release does not unlatch")
+    t.rule(client.request("status")["state"] == "latched", "release does not unlatch")
     reset(t, client)
     for _ in range(5):
         reply = client.request("reset")
         t.check(reply["ok"] and reply["state"] == "listening", f"repeated reset: {reply}")
     t.expect(client.drive(200, 200), "not_armed")
     time.sleep(0.3)
-    t.check(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
+    t.rule(not rig.bus.setpoints(), "latched from listening and reset: nothing is sent")
     t.judge(rig, moves=False)
 
 
@@ -210,7 +210,7 @@ def row14_button_dies(t):
     t.expect(client.request("reset"), "estop_pressed")
     button.open()
     t.check(rig.wait_status(client, lambda s: s["estop"]["state"] == "released", 3), "found again")
-    t.check(client.request("status")["state"] == "latched", "its return alone does not unlatch")
+    t.rule(client.request("status")["state"] == "latched", "its return alone does not unlatch")
     reset(t, client)
     button.die()
     time.sleep(0.2)

@@ -27,7 +27,7 @@ def crash(t, number):
     time.sleep(0.3)
     again = rig.bus.setpoints(killed_us + 20_000)
     t.check(again and again[0][0] - killed_us < 600_000, "zeros soon after the restart")
-    t.check(not any(speed for _, _, speed in again), f"nothing but zeros after the restart: {again[:3]}")
+    t.rule(not any(speed for _, _, speed in again), f"nothing but zeros after the restart: {again[:3]}")
     t.figure(
         f"answers after {answered_ms:.0f} ms, zeros {(again[0][0] - killed_us) / 1000 if again else 0:.0f} ms after the kill"
     )
@@ -43,7 +43,7 @@ def crash(t, number):
     rig.kill_gateway(number)
     rig.start_gateway()
     time.sleep(0.3)
-    t.check(not rig.bus.setpoints(silent_us), "killed while listening, nothing is sent at the next start")
+    t.rule(not rig.bus.setpoints(silent_us), "killed while listening, nothing is sent at the next start")
     t.judge(rig)
 
 
@@ -74,7 +74,7 @@ def row25_restart_beside_other_master(t):
     sent = rig.bus.setpoints(begin_us)
     span_ms = (sent[-1][0] - sent[0][0]) / 1000 if sent else 0
     t.check(span_ms < 200, f"hearing another master it falls silent; it sent for {span_ms:.0f} ms")
-    t.check(not any(speed for _, _, speed in sent), "and nothing but zeros")
+    t.rule(not any(speed for _, _, speed in sent), "and nothing but zeros")
     t.figure(f"{len(sent)} zero frames in {span_ms:.0f} ms")
 
 
@@ -122,7 +122,7 @@ def ended_by(t, number):
     quiet_us = now_us()
     rig.start_gateway()
     time.sleep(0.3)
-    t.check(not rig.bus.setpoints(quiet_us), "the next start sends nothing")
+    t.rule(not rig.bus.setpoints(quiet_us), "the next start sends nothing")
     t.judge(rig)
 
 
@@ -149,7 +149,7 @@ def listen_only(t):
     rig.press()
     time.sleep(0.5)
     t.check(client.request("status")["listen_only"] is True, "status says so")
-    t.check(not rig.bus.setpoints(), "nothing is sent")
+    t.rule(not rig.bus.setpoints(), "nothing is sent")
     rig.gateway.signal(signal.SIGTERM)
     t.check(rig.gateway.wait(3) == 0, "ends at once")
     t.judge(rig, moves=False)

@@ -41,7 +41,7 @@ def from_zero(t, rig, back_us, what):
     burst = len([at for at, _ in sent if at < back_us + 10_000])
     t.check(burst <= 4, f"{burst} setpoints in the first 10 ms")
     t.measure("stale_frames", len([value for _, value in sent if value]))
-    t.check(not any(value for _, value in sent), f"nothing but zeros afterwards: {sent[:6]}")
+    t.rule(not any(value for _, value in sent), f"nothing but zeros afterwards: {sent[:6]}")
 
 
 def stop_process(t, seconds):

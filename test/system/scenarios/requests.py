@@ -128,7 +128,7 @@ def row09_odd_json(t):
             )
         client.close()
     t.figure(f"{len(BAD_LINES)} lines")
-    t.check(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing moved")
+    t.rule(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing moved")
     t.expect(observer.request("hello"))
     t.judge(rig, moves=False)
 
@@ -156,7 +156,7 @@ def row10_out_of_range(t):
             t.check(not reply["ok"] and reply["error"] in allowed, f"{fields}: {reply}")
         time.sleep(0.03)
     t.stopped_by(client, "lease_lost", "stopping")
-    t.check(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing moved, neither left nor right")
+    t.rule(not any(speed for _, _, speed in rig.bus.setpoints()), "nothing moved, neither left nor right")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "silence")
     t.arm(client)
     t.drive_for(client, 150, 150, 0.3)

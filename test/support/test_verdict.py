@@ -1,0 +1,418 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The verdicts of test/support/verdict.py, by a fake runner whose attempts and stalls are made up; and that each fault seeded into the module is seen.
+
+usage: test/support/test_verdict.py [unittest's arguments]
+
+The last line sums up: "N passed, N failed, N skipped".
+"""
+
+import contextlib
+import io
+import os
+import subprocess
+import sys
+import tempfile
+import textwrap
+import time
+import types
+import unittest
+from unittest import mock
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+SOURCE = os.path.join(HERE, "verdict.py")
+sys.path.insert(0, HERE)
+sys.dont_write_bytecode = True
+import verdict  # noqa: E402
+
+AT_US = 3_000_000
+# What the module must decide is tried on copies of it, each with one of these faults: (what, old, new). Each must fail a test below.
+FAULTS = (
+    ("a broken rule is excused by a stall", "if failure.kind not in (TIMING, CHECK)", "if failure.kind not in (TIMING, CHECK, RULE)"),
+    ("a crash is excused by a stall", "if failure.kind not in (TIMING, CHECK)", "if failure.kind not in (TIMING, CHECK, CRASH)"),
+    ("one explained failure excuses the others", "INCONCLUSIVE if all(", "INCONCLUSIVE if any("),
+    ("no stall is needed", "or not stalls:", "or False:"),
+    ("a stall of any length explains a check", "CHECK_US = 20_000", "CHECK_US = 0"),
+    ("a stall of any length explains a missed limit", "else failure.need_us", "else 0"),
+    ("a stall explains what happened long after it", "BEFORE_US, AFTER_US = 400_000", "BEFORE_US, AFTER_US = 40_000_000"),
+    ("stalls of other tests count", "if begin_us <= at_us and at_us - late_us <= end_us", "if at_us"),
+    ("one stall seen on two processors counts twice", "if spans and begin_us <= spans[-1][1]:", "if False:"),
+    ("the gateway's own word is enough", "claims=[(now_us()", "stalls=[(now_us()"),
+    ("the gateway's own word is ignored", "[*stalls, *claims]", "stalls"),
+    ("a conclusive failure is repeated", "if verdict == INCONCLUSIVE:\n                undecided", "if verdict != PASSED:\n                undecided"),
+    ("the last attempt counts as passed", "self.counts[SKIPPED if verdict == INCONCLUSIVE", "self.counts[PASSED if verdict == INCONCLUSIVE"),
+    ("repeated until it passes", "if verdict != INCONCLUSIVE:\n                break", "if verdict == PASSED:\n                break"),
+    ("repeated without end", "RETRIES = 3", "RETRIES = 30"),
+    ("repeated among other tests", "for name in undecided:", "for name in []:"),
+    ("inconclusive tests are not named", "self.inconclusive.append(name)", "pass"),
+    ("all inconclusive is a success", "NOT_JUDGED if unjudged", "0 if unjudged"),
+    ("the quarter is a half", "4 * len(inconclusive)", "2 * len(inconclusive)"),
+    ("not judged hides a failure", "return 1 if failed else NOT_JUDGED if unjudged", "return NOT_JUDGED if unjudged else 1 if failed"),
+    ("nothing ran is a success", "else 0 if passed else 1", "else 0"),
+    ("a sanitizer's report is a matter of time", "(Address|Leak|", "(Leak|"),
+    ("a broken rule in a traceback is a matter of time", "return RULE if re", "return CHECK if re"),
+    ("what failed is skipped", "return SKIPPED if attempt.skip else PASSED", "return PASSED"),
+    ("the runner's own exception is inconclusive", "the runner failed: {error!r}\", CRASH", "the runner failed: {error!r}\", CHECK"),
+    ("a sleeper that never writes", "if late_us > LATE_US:", "if False:"),
+    ("a sleeper that always writes", "if late_us > LATE_US:", "if True:"),
+)
+
+
+# The same for what reads the runners' sums: (what, file, old, new).
+READER_FAULTS = (
+    ("check believes a second run", "check", "counted test/system/run --build build/default", "test/system/run || counted test/system/run"),
+    ("check takes 75 for success", "check", '[ ! -s "$out/unjudged" ] || exit 75', ":"),
+    ("check lets 75 outweigh a failure", "check", '[ "$sum_failed" -eq 0 ] || exit 1', '[ ! -s "$out/unjudged" ] || exit 75'),
+    ("check takes any status for 75", "check", '[ "$1" -ne 75 ] || [ "$status" -eq 1 ] || {', "{"),
+    ("check names nothing inconclusive", "check", '[ "$sum_inconclusive" -eq 0 ] ||', "true ||"),
+    ("CTest's reader takes 75 for a failure", "scripts/count_tests.py", "and not NOT_JUDGED.search(output)", ""),
+    ("CTest's reader takes 75 for success", "scripts/count_tests.py", "75 if unjudged else 0", "0"),
+    ("CTest's reader believes the sum of what died", "scripts/count_tests.py", "and not NOT_JUDGED.search(output)", "and not ours"),
+)
+
+
+class Made:
+    """A session whose attempts are made up: {name: attempts in their order}. `late`: stalls of the machine."""
+
+    def __init__(self, attempts, late=()):
+        self.attempts, self.late, self.made, self.printed = {name: list(all_of) for name, all_of in attempts.items()}, list(late), [], {}
+        self.session = verdict.Session(self.next, self.report)
+        self.session.stalls = lambda begin_us, end_us: verdict.within(self.late, begin_us, end_us)
+        self.session.await_quiet = lambda: None
+
+    def next(self, name):
+        self.made.append(name)
+        made = self.attempts[name].pop(0)
+        if isinstance(made, Exception):
+            raise made
+        return made._replace(begin_us=AT_US - 1_000_000, end_us=AT_US + 1_000_000)
+
+    def report(self, name, kind, attempt, tries):
+        self.printed[name] = (kind, attempt.skip, tries)
+
+    def run(self):
+        """(exit status, lines, how often each was made)"""
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            self.session.run(list(self.attempts))
+            status = self.session.end()
+        return status, out.getvalue().splitlines(), {name: self.made.count(name) for name in self.attempts}
+
+
+def ok():
+    return verdict.Attempt()
+
+
+def bad(kind, **fields):
+    return verdict.Attempt([verdict.Failure("it was wrong", kind, **fields)])
+
+
+def stall(late_us=200_000, at_us=AT_US):
+    return at_us, late_us
+
+
+class Conclusive(unittest.TestCase):
+    def final(self, first, late=()):
+        """One attempt, and a failure although the next one would pass."""
+        status, lines, made = Made({"one": [first, ok(), ok(), ok()], "two": [ok()]}, late).run()
+        self.assertEqual((1, ["1 passed, 1 failed, 0 skipped"], 1), (status, lines, made["one"]))
+
+    def test_broken_rule_then_pass_fails_whatever_the_machine_did(self):
+        self.final(bad(verdict.RULE))
+        self.final(bad(verdict.RULE, at_us=AT_US), [stall()])
+        self.final(bad(verdict.RULE, at_us=AT_US, need_us=0), [stall()])
+
+    def test_crash_or_hang_then_pass_fails_whatever_the_machine_did(self):
+        self.final(bad(verdict.CRASH))
+        self.final(bad(verdict.CRASH, at_us=AT_US), [stall()])
+
+    def test_late_on_a_quiet_machine_fails(self):
+        self.final(bad(verdict.TIMING, at_us=AT_US, need_us=0))
+        self.final(bad(verdict.CHECK))
+
+    def test_rule_next_to_an_explained_failure_fails(self):
+        both = verdict.Attempt([verdict.Failure("late", verdict.TIMING, AT_US, 0), verdict.Failure("moved", verdict.RULE, AT_US)])
+        self.final(both, [stall()])
+
+    def test_stall_shorter_than_the_excess_fails(self):
+        self.final(bad(verdict.TIMING, at_us=AT_US, need_us=60_000), [stall(50_000)])
+
+    def test_stall_too_short_for_a_check_fails(self):
+        self.final(bad(verdict.CHECK), [stall(19_999)])
+
+    def test_one_stall_on_two_processors_counts_once(self):
+        self.final(bad(verdict.TIMING, at_us=AT_US, need_us=60_000), [stall(40_000), stall(40_000, AT_US + 1_000)])
+
+    def test_stall_far_from_the_failure_fails(self):
+        self.final(bad(verdict.TIMING, at_us=AT_US, need_us=0), [stall(at_us=AT_US - 900_000)])
+
+    def test_stall_of_another_test_fails(self):
+        self.final(bad(verdict.CHECK), [stall(at_us=AT_US + 9_000_000), stall(at_us=AT_US - 9_000_000)])
+
+    def test_exception_of_the_runner_fails(self):
+        self.final(RuntimeError("no port"), [stall(60_000_000, verdict.now_us() + 60_000_000)])
+
+    def test_gateway_late_on_a_quiet_machine_fails(self):
+        self.final(verdict.of_text("the gateway itself was held up for 583 ms"))
+
+
+class Inconclusive(unittest.TestCase):
+    def test_pass_in_a_later_attempt_passes_and_is_named(self):
+        made = Made({"one": [bad(verdict.CHECK)] * 3 + [ok()], "two": [ok()]}, [stall()])
+        status, lines, times = made.run()
+        self.assertEqual((0, 4, ("passed", None, 4)), (status, times["one"], made.printed["one"]))
+        self.assertIn("later attempt", lines[0])
+        self.assertEqual("2 passed, 0 failed, 0 skipped", lines[-1])
+
+    def test_rule_broken_in_a_later_attempt_fails(self):
+        status, lines, made = Made({"one": [bad(verdict.CHECK), bad(verdict.RULE), ok()]}, [stall()]).run()
+        self.assertEqual((1, "0 passed, 1 failed, 0 skipped", 2), (status, lines[-1], made["one"]))
+
+    def test_stalled_each_time_is_skipped_by_name_with_the_stall(self):
+        made = Made({"one": [bad(verdict.TIMING, at_us=AT_US, need_us=90_000)] * 40, **{f"ok{n}": [ok()] for n in range(3)}}, [stall(123_000)])
+        status, lines, times = made.run()
+        self.assertEqual((0, 4), (status, times["one"]))
+        self.assertEqual(["1 inconclusive, counted as skipped: one", "3 passed, 0 failed, 1 skipped"], lines)
+        self.assertEqual(("inconclusive", "inconclusive in each of 4 attempts: the machine stalled for up to 123 ms", 4), made.printed["one"])
+
+    def test_others_end_before_it_is_repeated(self):
+        made = Made({"one": [bad(verdict.CHECK), ok()], "two": [ok()]}, [stall()])
+        made.run()
+        self.assertEqual(["one", "two", "one"], made.made)
+
+    def test_short_stalls_add_up_near_the_failure(self):
+        first = bad(verdict.TIMING, at_us=AT_US, need_us=60_000)
+        status, _, made = Made({"one": [first, ok()]}, [stall(40_000, AT_US - 100_000), stall(40_000)]).run()
+        self.assertEqual((0, 2), (status, made["one"]))
+
+    def test_gateway_late_next_to_a_late_machine_is_repeated(self):
+        first = verdict.of_text("why: the gateway itself\n  was held up for 583 ms")
+        first = first._replace(claims=[(AT_US, late_us) for _, late_us in first.claims])
+        status, _, made = Made({"one": [first, ok()]}, [stall(6_000)]).run()
+        self.assertEqual((0, 2), (status, made["one"]))
+
+    def test_stall_that_the_test_measured_itself_counts(self):
+        first = bad(verdict.CHECK)._replace(stalls=[stall()])
+        self.assertEqual(2, Made({"one": [first, ok()]}).run()[2]["one"])
+
+
+class Status(unittest.TestCase):
+    def of(self, passed, inconclusive, **more):
+        attempts = {f"ok{n}": [ok()] for n in range(passed)} | {f"late{n}": [bad(verdict.CHECK)] * 4 for n in range(inconclusive)} | more
+        return Made(attempts, [stall()]).run()
+
+    def test_all_stalled_is_75_and_says_so(self):
+        status, lines, _ = self.of(0, 3)
+        self.assertEqual((75, "0 passed, 0 failed, 3 skipped"), (status, lines[-1]))
+        self.assertTrue(lines[-2].startswith("real time not judged"), lines)
+
+    def test_more_than_a_quarter_is_75_and_a_quarter_is_not(self):
+        self.assertEqual(75, self.of(5, 2)[0])
+        self.assertEqual(0, self.of(6, 2)[0])
+
+    def test_a_quarter_of_what_runs_in_real_time(self):
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.assertEqual(75, verdict.summary(100, 0, 2, ["a", "b"], real_time=5))
+
+    def test_failure_outweighs_what_is_not_judged(self):
+        self.assertEqual(1, self.of(0, 3, bad=[bad(verdict.RULE)])[0])
+
+    def test_nothing_that_ran_is_no_success(self):
+        self.assertEqual(1, Made({}).run()[0])
+        self.assertEqual(1, Made({"one": [verdict.Attempt(skip="no port")]}).run()[0])
+
+    def test_skipped_is_counted_as_skipped(self):
+        self.assertEqual("1 passed, 0 failed, 1 skipped", Made({"one": [verdict.Attempt(skip="no port")], "two": [ok()]}).run()[1][-1])
+        self.assertEqual("2 passed, 0 failed, 1 skipped", Made({"one": [verdict.Attempt(tests=3, skips=1)]}).run()[1][-1])
+
+
+class Words(unittest.TestCase):
+    def kind(self, text):
+        return verdict.of_text(text).failures[0].kind
+
+    def test_kind_of_a_text(self):
+        for text in ("==1==ERROR: AddressSanitizer: heap-use-after-free", "a.c:3:1: runtime error: signed integer overflow", "iwheel-gateway ended with -11: "):
+            self.assertEqual(verdict.CRASH, self.kind(text))
+        self.assertEqual(verdict.RULE, self.kind("Traceback\nverdict.RuleBroken: nonzero after e-stop"))
+        self.assertEqual(verdict.CHECK, self.kind("AssertionError: not within 10 s: it is armed"))
+
+
+class Processes(unittest.TestCase):
+    """A runner with tests in processes, and the sleepers themselves."""
+
+    RUNNER = """
+        import sys, time, unittest, os
+        sys.path[:0] = [{ctl!r}]
+        import several
+        several.LIMIT_S = {limit}
+        several.verdict.Witness.stalls = lambda *_: [(several.verdict.now_us(), 500_000)]  # This machine is always late.
+        several.verdict.Session.await_quiet = lambda *_: None
+
+        class Fake(unittest.TestCase):
+            def test_{kind}(self):
+                with open({count!r}, "a") as file:
+                    file.write("x")
+                {body}
+
+        if __name__ == "__main__":
+            sys.argv.pop(1)
+            several.main("build")
+        """
+
+    def several(self, kind, body, limit=30):
+        """(exit status, last line, attempts)"""
+        with tempfile.TemporaryDirectory() as folder:
+            count, path = os.path.join(folder, "count"), os.path.join(folder, "fake.py")
+            with open(path, "w", encoding="ascii") as file:
+                file.write(textwrap.dedent(self.RUNNER).format(ctl=os.path.join(HERE, "..", "ctl"), count=count, kind=kind, body=body, limit=limit))
+            done = subprocess.run([sys.executable, path, "build"], capture_output=True, text=True, timeout=60, check=False)
+            return done.returncode, done.stdout.splitlines()[-1], os.path.getsize(count)
+
+    def test_broken_rule_crash_and_hang_are_final_on_a_late_machine(self):
+        final = (1, "0 passed, 1 failed, 0 skipped", 1)
+        self.assertEqual(final, self.several("rule", "raise several.verdict.RuleBroken('nonzero after e-stop')"))
+        self.assertEqual(final, self.several("crash", "os.abort()"))
+        self.assertEqual(final, self.several("hang", "time.sleep(60)", 4))
+
+    def test_late_test_on_a_late_machine_is_not_judged(self):
+        self.assertEqual((75, "0 passed, 0 failed, 1 skipped", 4), self.several("late", "self.fail('not within 1 s')"))
+
+    def test_sleepers_notice_a_machine_that_stands_still_and_end(self):
+        witness = verdict.Witness()
+        try:
+            time.sleep(0.5)
+            begin_us = verdict.now_us()
+            os.kill(witness.process.pid, 19)
+            time.sleep(0.2)
+            os.kill(witness.process.pid, 18)
+            time.sleep(0.2)
+            late = [late_us for _, late_us in witness.stalls(begin_us, verdict.now_us())]
+            self.assertTrue([late_us for late_us in late if late_us > 150_000], late)
+            self.assertGreater(min(late), 5_000, "a sleeper on time writes nothing")
+        finally:
+            witness.close()
+        self.assertFalse(os.path.exists(witness.folder))
+
+    def test_wait_until_the_machine_is_quiet_ends(self):
+        clock, session = [10.0], verdict.Session()
+        session.stalls = lambda begin_us, _: verdict.within([(12_000_000, 200_000)], begin_us, 1 << 60)
+        with mock.patch.object(verdict, "now_us", lambda: int(clock[0] * 1e6)), mock.patch.object(verdict, "time") as fake:
+            fake.monotonic, fake.sleep = (lambda: clock[0]), lambda seconds: clock.__setitem__(0, clock[0] + seconds)
+            session.await_quiet()
+        self.assertAlmostEqual(13.0, clock[0], delta=0.15)
+
+
+class Check(unittest.TestCase):
+    """./check itself, with the step `system`, whose runner is a script of this test, and `unit`, whose tests are a file of CTest's output."""
+
+    faulty = {}  # {file: (old, new)}: a fault that is seeded into it
+
+    def check(self, runner, *steps, junit=""):
+        """(exit status, lines, how often the runner ran)"""
+        with tempfile.TemporaryDirectory() as folder:
+            root = os.path.join(HERE, "..", "..")
+            files = {name: open(os.path.join(root, name), encoding="utf-8").read() for name in ("check", "scripts/fingerprint", "scripts/count_tests.py")}
+            for name, (old, new) in self.faulty.items():
+                assert files[name].count(old) == 1, f"{name}: {old}"
+                files[name] = files[name].replace(old, new)
+            files |= {"bin/cmake": "#!/bin/sh\n", "test/system/run": f"#!/bin/bash\necho x >>{folder}/ran\nran=$(wc -l <{folder}/ran)\n{runner}"}
+            files["bin/ctest"] = f"#!/bin/sh\ncat >build/check/unit.xml <<'END'\n<suite>{junit}</suite>\nEND\nexit 8\n"
+            for name, text in files.items():
+                os.makedirs(os.path.dirname(os.path.join(folder, name)), exist_ok=True)
+                with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+                    file.write(text)
+                os.chmod(file.name, 0o755)
+            done = subprocess.run(["./check", "--no-install", *steps], cwd=folder, capture_output=True, text=True, check=False,
+                                  env={**os.environ, "PATH": f"{folder}/bin:{os.environ['PATH']}"})
+            ran = os.path.join(folder, "ran")
+            return done.returncode, done.stdout.splitlines(), os.path.getsize(ran) // 2 if os.path.exists(ran) else 0
+
+    def test_broken_rule_that_shows_once_fails_check(self):
+        once = """if [ "$ran" = 1 ]; then
+            echo "FAIL row11 rule 202: nonzero after e-stop"; echo "3 passed, 1 failed, 0 skipped"; exit 1
+        fi
+        echo "4 passed, 0 failed, 0 skipped"
+        """
+        status, lines, ran = self.check(once, "system")
+        self.assertEqual((1, "3 passed, 1 failed, 0 skipped", 1), (status, lines[-1], ran), lines)
+
+    def test_not_judged_is_75_and_named(self):
+        status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(2, 0, 1, [\"row11\"]))'\n", "system")
+        self.assertEqual((75, "2 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
+        self.assertRegex(lines[-2], "^real time not judged: system ")
+        self.assertRegex(lines[-3], "^1 inconclusive, counted as skipped")
+        self.assertTrue([line for line in lines if line.startswith("system ") and "UNJUDGED" in line], lines)
+
+    def test_inconclusive_test_alone_is_told_and_no_failure(self):
+        status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(3, 0, 1, [\"row11\"]))'\n", "system")
+        self.assertEqual((0, "3 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
+        self.assertRegex(lines[-2], "^1 inconclusive, counted as skipped")
+
+    def test_runner_that_dies_of_another_status_fails_check(self):
+        for number in (1, 74, 134):
+            self.assertEqual(1, self.check(f"echo '4 passed, 0 failed, 0 skipped'; exit {number}\n", "system")[0])
+
+    @staticmethod
+    def case(output, status="fail"):
+        return f'<testcase name="ctl.x" status="{status}"><system-out>{output}</system-out></testcase>'
+
+    def test_not_judged_among_unit_tests_is_75(self):
+        late = self.case("1 inconclusive, counted as skipped: a\nreal time not judged: more\n2 passed, 0 failed, 1 skipped\n")
+        status, lines, _ = self.check("", "unit", junit=late)
+        self.assertEqual((75, "2 passed, 0 failed, 1 skipped"), (status, lines[-1]), lines)
+        died = self.case("2 passed, 0 failed, 1 skipped\n")
+        for junit in (died, late + died, late + self.case("1 passed, 1 failed, 0 skipped\n")):
+            self.assertEqual(1, self.check("", "unit", junit=junit)[0], junit)
+
+    def test_failure_of_one_step_outweighs_another_that_is_not_judged(self):
+        late = self.case("1 inconclusive, counted as skipped: a\nreal time not judged: more\n2 passed, 0 failed, 1 skipped\n")
+        self.assertEqual(1, self.check("echo '1 passed, 1 failed, 0 skipped'; exit 1\n", "unit", "system", junit=late)[0])
+
+
+def suite(classes=(Conclusive, Inconclusive, Status, Words)):
+    return unittest.TestSuite(map(unittest.defaultTestLoader.loadTestsFromTestCase, classes))
+
+
+def seed(old, new):
+    """The names of the tests that fail with this fault in the module."""
+    global verdict
+    with open(SOURCE, encoding="utf-8") as file:
+        text = file.read()
+    if text.count(old) != 1:
+        return None
+    sound, faulty = verdict, types.ModuleType("verdict")
+    with tempfile.TemporaryDirectory() as folder:
+        faulty.__file__ = os.path.join(folder, "verdict.py")  # Sleepers are started from it.
+        with open(faulty.__file__, "w", encoding="utf-8") as file:
+            file.write(text.replace(old, new))
+        exec(compile(text.replace(old, new), faulty.__file__, "exec"), faulty.__dict__)  # pylint: disable=exec-used
+        verdict, result = faulty, unittest.TestResult()
+        try:
+            suite().run(result)
+            if result.wasSuccessful():
+                Processes("test_sleepers_notice_a_machine_that_stands_still_and_end").run(result)
+        finally:
+            verdict = sound
+    return [case.id().split(".")[-1] for case, _ in result.failures + result.errors]
+
+
+def seed_reader(name, old, new):
+    Check.faulty, result = {name: (old, new)}, unittest.TestResult()
+    suite([Check]).run(result)
+    return [case.id().split(".")[-1] for case, _ in result.failures]
+
+
+def main():
+    result = unittest.TextTestRunner(stream=sys.stdout).run(suite((Conclusive, Inconclusive, Status, Words, Processes, Check)))
+    failed = len(result.failures + result.errors)
+    passed = result.testsRun - failed
+    seeded = [(what, seed(old, new)) for what, old, new in FAULTS] + [(what, seed_reader(*fault)) for what, *fault in READER_FAULTS] if not failed else []
+    for what, noticed in seeded:
+        print(f"{'ok  ' if noticed else 'FAIL'} seeded fault: {what}: " + ("its text is not in verdict.py once" if noticed is None else ", ".join(noticed) or "no test notices it"))
+        passed, failed = passed + bool(noticed), failed + (not noticed)
+    print(f"{passed} passed, {failed} failed, 0 skipped")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(unittest.main() if len(sys.argv) > 1 else main())

@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: MIT
+"""Decides what a test in real time has shown. A conclusive verdict is final: nothing repeats it.
+
+    attempt --no failure-------------------------------------------------------> PASSED
+            --RULE: a safety rule was broken-----------------------------------> FAILED, whatever the machine did
+            --CRASH: a program died, a sanitizer reported, no end in time------> FAILED, whatever the machine did
+            --TIMING, CHECK: no measured stall is long and near enough---------> FAILED
+            --TIMING, CHECK: a measured stall can have caused each of them-----> INCONCLUSIVE
+
+An inconclusive test runs again, alone, at most RETRIES times, until an attempt is conclusive. If none is, the test counts as skipped, by
+name, with the stall. The module depends on no runner: a runner passes a function that makes one attempt, and one that prints a verdict.
+
+    verdict.py --run NAME COMMAND...    the same for a command that is a test
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple, Optional
+
+PASSED, FAILED, SKIPPED, INCONCLUSIVE = "passed", "failed", "skipped", "inconclusive"
+RULE, CRASH, TIMING, CHECK = "rule", "crash", "timing", "check"
+RETRIES = 3
+NOT_JUDGED = 75  # exit status: more than a quarter of the tests is inconclusive
+LATE_US = 5_000  # a sleeper that wakes later than this has measured a stall
+CHECK_US = 20_000  # a shorter stall changes no decision of the gateway (IW_GATEWAY_LATE_US), so it explains no failed check
+BEFORE_US, AFTER_US = 400_000, 50_000  # a stall this near to a failure may have caused it
+QUIET_US, PATIENCE_S, POLL_S = 1_000_000, 10, 0.1  # before a test runs again
+PROCESSORS_MAX = 4
+
+DIED = re.compile(r"(Address|Leak|Thread|Memory|UndefinedBehavior)Sanitizer|runtime error: |Segmentation fault|core dumped|Aborted|"
+                  r"\bended with -(4|6|7|8|11)\b")
+GATEWAY_LATE = re.compile(r"gateway\s+itself\s+was\s+held\s+up\s+for\s+(\d+)\s+ms")
+
+
+class RuleBroken(AssertionError):
+    """A test raises this when a safety rule was broken: motion without permission, a latch that does not hold. See `hold`."""
+
+
+def hold(condition, text):
+    """A safety rule, for tests that fail by exceptions."""
+    if not condition:
+        raise RuleBroken(text)
+
+
+class Failure(NamedTuple):
+    """`need_us`: the shortest stall that can have caused it, e.g. by how much a limit was missed. None: unknown."""
+
+    text: str
+    kind: str = CHECK
+    at_us: int = 0  # CLOCK_MONOTONIC; 0: at any time in the test
+    need_us: Optional[float] = None
+
+
+class Attempt(NamedTuple):
+    """Stalls are pairs (end_us, late_us). `claims` are stalls that a program under test reports; they count only next to a measured one."""
+
+    failures: list = []
+    skip: Optional[str] = None
+    stalls: list = []
+    claims: list = []
+    begin_us: int = 0
+    end_us: int = 0
+    tests: int = 1  # what it counts as, if nothing failed
+    skips: int = 0  # of those
+    data: Any = None  # the runner's own
+
+
+def now_us():
+    return time.monotonic_ns() // 1000
+
+
+def kind_of(text):
+    """By the words of a failure: a traceback, or the output of a program."""
+    return RULE if re.search(r"\bRuleBroken\b", text) else CRASH if DIED.search(text) else CHECK
+
+
+def of_text(text, **fields):
+    """The attempt of a test that failed with these words."""
+    return Attempt([Failure(text, kind_of(text))], claims=[(now_us(), int(ms) * 1000) for ms in GATEWAY_LATE.findall(text)], **fields)
+
+
+def within(stalls, begin_us, end_us):
+    return [(at_us, late_us) for at_us, late_us in stalls if begin_us <= at_us and at_us - late_us <= end_us]
+
+
+def spans_us(stalls):
+    """How long the machine was stalled each time: stalls that overlap, on several processors, are one."""
+    spans = []
+    for begin_us, end_us in sorted((at_us - late_us, at_us) for at_us, late_us in stalls):
+        if spans and begin_us <= spans[-1][1]:
+            spans[-1][1] = max(spans[-1][1], end_us)
+        else:
+            spans.append([begin_us, end_us])
+    return [end_us - begin_us for begin_us, end_us in spans]
+
+
+def explains(failure, stalls, claims=()):
+    """Whether these stalls, all of them near enough, can have caused the failure."""
+    if failure.kind not in (TIMING, CHECK) or not stalls:
+        return False
+    spans = spans_us([*stalls, *claims])
+    need_us = CHECK_US if failure.need_us is None else failure.need_us
+    return (sum(spans) if failure.at_us else max(spans)) >= need_us
+
+
+def read_stalls(path, begin_us, end_us, more_than_us=0):
+    """What sleepers wrote into that file, of this time."""
+    with open(path, encoding="ascii") as file:
+        pairs = [tuple(map(int, line.split())) for line in file if line.endswith("\n")]
+    return within([pair for pair in pairs if pair[1] > more_than_us], begin_us, end_us)
+
+
+class Witness:
+    """One sleeper on each processor, in processes of their own, until `close`. They end with this process too."""
+
+    def __init__(self, nice=0):
+        self.folder = tempfile.mkdtemp(prefix="iwheel-witness-")
+        self.path = os.path.join(self.folder, "stalls")
+        open(self.path, "w", encoding="ascii").close()
+        self.process = subprocess.Popen([sys.executable, os.path.abspath(__file__), self.path, str(nice)], stdin=subprocess.DEVNULL)
+
+    def stalls(self, begin_us, end_us):
+        return read_stalls(self.path, begin_us, end_us)
+
+    def close(self):
+        self.process.kill()
+        self.process.wait()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Session:
+    """Runs tests and counts. `attempt(name)` makes an Attempt; `report(name, verdict, attempt, tries)` prints one verdict."""
+
+    def __init__(self, attempt=None, report=None, witness=None):
+        self.attempt, self.report, self.witness = attempt, report, witness
+        self.counts = {PASSED: 0, FAILED: 0, SKIPPED: 0}
+        self.inconclusive, self.repeated = [], []
+
+    def stalls(self, begin_us, end_us):
+        return self.witness.stalls(begin_us, end_us)
+
+    def measured(self, attempt, begin_us, end_us):
+        """By the sleepers, and by the test itself."""
+        return self.stalls(begin_us, end_us) + within(attempt.stalls, begin_us, end_us)
+
+    def await_quiet(self):
+        """Until no sleeper was late for a second, but not for ever."""
+        end = time.monotonic() + PATIENCE_S
+        while self.stalls(now_us() - QUIET_US, now_us()) and time.monotonic() < end:
+            time.sleep(POLL_S)
+
+    def explained(self, attempt, failure):
+        begin_us, end_us = attempt.begin_us, attempt.end_us
+        if failure.at_us:
+            begin_us, end_us = failure.at_us - BEFORE_US, failure.at_us + AFTER_US
+        return explains(failure, self.measured(attempt, begin_us, end_us), within(attempt.claims, begin_us, end_us))
+
+    def verdict_of(self, attempt):
+        if not attempt.failures:
+            return SKIPPED if attempt.skip else PASSED
+        return INCONCLUSIVE if all(self.explained(attempt, failure) for failure in attempt.failures) else FAILED
+
+    def once(self, name):
+        """(verdict, attempt)"""
+        begin_us = now_us()
+        try:
+            attempt = self.attempt(name)
+        except Exception as error:  # pylint: disable=broad-except
+            attempt = Attempt([Failure(f"the runner failed: {error!r}", CRASH)])
+        if not attempt.begin_us:
+            attempt = attempt._replace(begin_us=begin_us, end_us=now_us())
+        return self.verdict_of(attempt), attempt
+
+    def again(self, name):
+        """(verdict, attempt, how many): of an inconclusive test, alone, until an attempt is conclusive."""
+        for tries in range(1, RETRIES + 1):
+            self.await_quiet()
+            verdict, attempt = self.once(name)
+            if verdict != INCONCLUSIVE:
+                break
+        return verdict, attempt, tries
+
+    def stall_ms(self, attempt):
+        """The longest that was measured during the attempt."""
+        return max((late_us for _, late_us in self.measured(attempt, attempt.begin_us, attempt.end_us)), default=0) / 1000
+
+    def take(self, name, verdict, attempt, tries=1):
+        """Counts and prints a verdict. An inconclusive one counts as skipped."""
+        if verdict == INCONCLUSIVE:
+            self.inconclusive.append(name)
+            attempt = attempt._replace(skip=f"inconclusive in each of {tries} attempts: the machine stalled for up to {self.stall_ms(attempt):.0f} ms")
+        elif tries > 1:
+            self.repeated.append(name)
+        skips = attempt.skips if verdict == PASSED else 0
+        self.counts[SKIPPED if verdict == INCONCLUSIVE else verdict] += attempt.tests - skips if verdict == PASSED else 1
+        self.counts[SKIPPED] += skips
+        self.report(name, verdict, attempt, tries)
+
+    def run(self, names, jobs=1):
+        """Each test once, `jobs` at a time; then the inconclusive ones again, one by one."""
+        undecided = []
+
+        def first(name):
+            verdict, attempt = self.once(name)
+            if verdict == INCONCLUSIVE:
+                undecided.append(name)
+            else:
+                self.take(name, verdict, attempt)
+
+        with ThreadPoolExecutor(jobs) as pool:
+            list(pool.map(first, names))
+        for name in undecided:
+            verdict, attempt, tries = self.again(name)
+            self.take(name, verdict, attempt, tries + 1)
+
+    def end(self):
+        """Prints the sums and returns the exit status."""
+        return summary(*self.counts.values(), self.inconclusive, self.repeated)
+
+
+def summary(passed, failed, skipped, inconclusive=(), repeated=(), real_time=None):
+    """Prints the last lines of a runner: "N passed, N failed, N skipped", and before it what was inconclusive. Returns the exit status.
+    `real_time`: how many of the tests ran in real time, if not all."""
+    unjudged = 4 * len(inconclusive) > (passed + failed + skipped if real_time is None else real_time)
+    if repeated:
+        print(f"judged in a later attempt, because the machine stalled in the first: {', '.join(repeated)}")
+    if inconclusive:
+        print(f"{len(inconclusive)} inconclusive, counted as skipped: {', '.join(inconclusive)}")
+    if unjudged:
+        print("real time not judged: more than a quarter is inconclusive; run it on a machine that does less")
+    print(f"{passed} passed, {failed} failed, {skipped} skipped", flush=True)
+    return 1 if failed else NOT_JUDGED if unjudged else 0 if passed else 1
+
+
+def sleep_on(file, parent):
+    before = time.monotonic_ns()
+    while os.getppid() == parent:
+        time.sleep(0.001)
+        after = time.monotonic_ns()
+        late_us = (after - before) // 1000 - 1000
+        if late_us > LATE_US:
+            file.write(f"{after // 1000} {late_us}\n")
+        before = after
+
+
+def sleepers(path, nice):
+    """On each processor one, with the priority of what the tests run."""
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, nice)
+    except PermissionError:
+        pass
+    parent, own, processors = os.getppid(), os.getpid(), sorted(os.sched_getaffinity(0))[:PROCESSORS_MAX]
+    with open(path, "a", encoding="ascii", buffering=1) as file:
+        for processor in processors[1:]:
+            if os.fork() == 0:
+                os.sched_setaffinity(0, {processor})
+                sleep_on(file, own)
+                return
+        os.sched_setaffinity(0, {processors[0]})
+        sleep_on(file, parent)
+
+
+def run_command(name, command):
+    """One command is the test. Prints its output, and returns the exit status of a runner; 77 of the command means skipped."""
+
+    def attempt(_):
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False)
+        print(done.stdout, end="", flush=True)
+        if done.returncode == 77:
+            return Attempt(skip=(done.stdout.splitlines() or [""])[-1])
+        return Attempt() if done.returncode == 0 else of_text(f"ended with {done.returncode}\n{done.stdout}")
+
+    def report(_, verdict, ended, tries):
+        print(f"{verdict}: {name}" + (f", attempt {tries}" if tries > 1 else "") + (f": {ended.skip}" if ended.skip else ""), flush=True)
+
+    session = Session(attempt, report, Witness())
+    try:
+        session.run([name])
+    finally:
+        session.witness.close()
+    status = session.end()
+    return 77 if status == 1 and session.counts[SKIPPED] else status
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "--run":
+        sys.exit(run_command(sys.argv[2], sys.argv[3:]))
+    sleepers(sys.argv[1], int(sys.argv[2]))
