@@ -408,13 +408,15 @@ class DmaChannel:
                          "the DMA reaches where no RAM is")
 
     def put(self, byte):
-        if not self.is_on():
-            return
+        if not self.is_on() or not self.left:
+            return # Nobody fetches the byte, and the next one writes over it.
         self.chip.cpu.mem_write(self.registers["memory"] + self.length - self.left, bytes((byte,)))
         self.left -= 1
         self.half |= self.left == self.length // 2
         if self.left == 0:
-            self.end, self.left = True, self.length # Circular.
+            self.finish()
+        if self.left == 0 and self.control() & self.CIRCULAR: # RM0008 13.3.3, RM0090 10.3.9: else the channel serves no further request.
+            self.left = self.length
 
     def until_event(self):
         return max(self.left - self.length // 2 if self.left > self.length // 2 else self.left, 1)
@@ -445,16 +447,17 @@ class DmaChannel:
 
 class ChannelF1(DmaChannel):
     offsets = ("control", "count", "peripheral", "memory")
-    HALF, END, FROM_MEMORY, WANTED = 4, 2, 0x10, 0x80
+    HALF, END, FROM_MEMORY, CIRCULAR, WANTED = 4, 2, 0x10, 0x20, 0x80
 
 
 class StreamF4(DmaChannel):
     offsets = ("control", "count", "peripheral", "memory", "memory1", "fifo")
-    HALF, END, FROM_MEMORY, WANTED = 8, 0x10, 0x40, 4 << 25 | 0x400
+    HALF, END, FROM_MEMORY, CIRCULAR, WANTED = 8, 0x10, 0x40, 0x100, 4 << 25 | 0x400
 
     def finish(self):
         self.end = True
-        self.registers["control"] &= ~1
+        if not self.control() & self.CIRCULAR:
+            self.registers["control"] &= ~1
 
 
 class Dma:

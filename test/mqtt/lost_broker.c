@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+// What a lost broker does to a drive: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). There is no broker; the
+// commands and the loss are handed to the bridge as its connection hands them over.
+#include "bridge.h"
+#include "hours_rig.h"
+
+#include "unity.h"
+
+#include <mosquitto.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define PASS_MS 5U
+
+static mqtt_bridge_t bridge;
+static mqtt_settings_t settings;
+static char folder[64];
+static unsigned sequence;
+
+static void pass(unsigned for_ms) {
+    for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
+        TEST_ASSERT_EQUAL_INT(0, mqtt_bridge_step(&bridge, daemon_rig.now_us));
+        hours_run_gateway(PASS_MS);
+    }
+}
+
+static void command(const char *verb, const char *fields) {
+    char topic[64];
+    char payload[256];
+    const mqtt_labels_t labels = {.expiry_s = 0};
+    (void)snprintf(topic, sizeof topic, "iwheel/w1/cmd/%s", verb);
+    (void)snprintf(payload, sizeof payload, "{\"boot\":\"%s\",\"t_us\":%llu,\"from\":\"pad\",\"seq\":%u%s}", bridge.boot,
+                   (unsigned long long)bridge.now_us, ++sequence, fields);
+    const struct mosquitto_message message = {
+        .topic = topic, .payload = payload, .payloadlen = (int)strlen(payload), .qos = 0, .retain = false};
+    mqtt_bridge_command(&bridge, &message, &labels);
+}
+
+static void drive(unsigned for_ms) {
+    for (unsigned ms = 0; ms < for_ms; ms += 50U) {
+        command("drive", ",\"left_mm_s\":100,\"right_mm_s\":100");
+        pass(50);
+    }
+}
+
+static void broker_is_lost(void) {
+    bridge.broker.listener.down(bridge.broker.listener.context);
+}
+
+static iw_cause_t cause_of_the_stop(void) {
+    return gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause;
+}
+
+void setUp(void) {
+    (void)snprintf(folder, sizeof folder, "%s", "/tmp/iwheel-broker-XXXXXX");
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    daemon_rig_begin();
+    mqtt_settings_default(&settings);
+    (void)snprintf(settings.machine.id, sizeof settings.machine.id, "w1");
+    (void)snprintf(settings.spool.directory, sizeof settings.spool.directory, "%s", folder);
+    settings.drive.enabled = true;
+    (void)snprintf(settings.gateway.socket, sizeof settings.gateway.socket, "/run/iwheel/gateway.sock");
+    settings.broker.port = 1; // Nothing listens there.
+    TEST_ASSERT_EQUAL_INT(0, mqtt_bridge_open(&bridge, &settings));
+    pass(500);
+    command("arm", "");
+    pass(200);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    drive(500);
+    TEST_ASSERT_EQUAL_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+void tearDown(void) {
+    char path[96];
+    (void)snprintf(path, sizeof path, "%s/" MQTT_SPOOL_FILE, folder);
+    TEST_ASSERT_TRUE(mqtt_bridge_close(&bridge));
+    daemon_rig_end();
+    (void)unlink(path);
+    (void)rmdir(folder);
+}
+
+static void test_broker_lost_stops_the_wheels_with_the_cause_client_stop(void) {
+    broker_is_lost();
+    pass(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, daemon_rig_state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, cause_of_the_stop());
+}
+
+static void test_broker_lost_and_back_drives_nothing_without_arm(void) {
+    broker_is_lost();
+    pass(50);
+    drive(300);
+    pass(2000);
+    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+    TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_broker_lost_stops_the_wheels_with_the_cause_client_stop);
+    RUN_TEST(test_broker_lost_and_back_drives_nothing_without_arm);
+    return UNITY_END();
+}

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: MIT
+// Who holds the pad of the page, through what happens to the gateway: the server's own round, without HTTP and without a gateway.
+#include "server.h"
+
+#include "unity.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static web_server_t server;
+static web_settings_t settings;
+static uint64_t now_us;
+static char key[WEB_TOKEN_SIZE];
+
+uint64_t __wrap_bridge_now_us(void);
+int __wrap_web_link_step(web_link_t *self, uint64_t at_us);
+void __wrap_web_door_step(web_door_t *self, uint64_t at_us);
+int __wrap_web_door_take(web_door_t *self);
+enum MHD_Result __wrap_MHD_run(struct MHD_Daemon *daemon);
+
+uint64_t __wrap_bridge_now_us(void) {
+    return now_us;
+}
+
+int __wrap_web_link_step(web_link_t *self, uint64_t at_us) {
+    (void)self;
+    (void)at_us;
+    return 0;
+}
+
+void __wrap_web_door_step(web_door_t *self, uint64_t at_us) {
+    (void)self;
+    (void)at_us;
+}
+
+int __wrap_web_door_take(web_door_t *self) {
+    (void)self;
+    return -1;
+}
+
+enum MHD_Result __wrap_MHD_run(struct MHD_Daemon *daemon) {
+    (void)daemon;
+    return MHD_YES;
+}
+
+static void round_after(uint64_t span_us) {
+    now_us += span_us;
+    TEST_ASSERT_EQUAL_INT(0, web_server_step(&server));
+}
+
+static const char *drive(void) {
+    char told[24];
+    const web_limits_t limits = {.max_speed_mm_s = 500, .ttl_us = 300000};
+    web_twist_t twist;
+    (void)snprintf(told, sizeof told, "%llu", (unsigned long long)now_us);
+    const web_command_t command = {.key = key, .t_us = told, .sequence = "1", .v_mm_s = "100", .yaw_mrad_s = "0"};
+    return web_driver_take(&server.driver, &command, &limits, now_us, &twist);
+}
+
+void setUp(void) {
+    memset(&server, 0, sizeof server);
+    memset(&settings, 0, sizeof settings);
+    settings.web.max_connections = 16;
+    server.settings = &settings;
+    server.look_us = UINT64_MAX;
+    server.link.gateway.is_here = true;
+    now_us = 1000000;
+    TEST_ASSERT_TRUE(web_token_random(key));
+    web_driver_begin(&server.driver, key, now_us);
+}
+
+void tearDown(void) {}
+
+static void test_key_of_a_page_stays_while_the_gateway_is_there(void) {
+    round_after(1000);
+    TEST_ASSERT_NULL(drive());
+}
+
+static void test_key_of_a_page_ends_with_its_gateway(void) {
+    server.link.gateway.is_here = false;
+    round_after(1000);
+    server.link.gateway.is_here = true;
+    round_after(1000);
+    TEST_ASSERT_NOT_NULL(drive());
+}
+
+static void test_key_of_a_silent_page_ends(void) {
+    TEST_ASSERT_NULL(drive());
+    round_after(WEB_SILENT_US + 1000U);
+    TEST_ASSERT_NOT_NULL(drive());
+    TEST_ASSERT_EQUAL_CHAR('\0', server.driver.key[0]);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_key_of_a_page_stays_while_the_gateway_is_there);
+    RUN_TEST(test_key_of_a_page_ends_with_its_gateway);
+    RUN_TEST(test_key_of_a_silent_page_ends);
+    return UNITY_END();
+}
