@@ -308,6 +308,8 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
     }
     request->has_current = (seen & 1U << FIELD_left_mA) != 0U;
     request->has_commit = (seen & 1U << FIELD_commit) != 0U;
+    request->has_t_us = (seen & 1U << FIELD_t_us) != 0U;
+    request->has_stop = (seen & 1U << FIELD_stop) != 0U;
     if (request->has_current != ((seen & 1U << FIELD_right_mA) != 0U)) {
         return REFUSE(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
     }

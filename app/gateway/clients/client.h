@@ -53,7 +53,8 @@ typedef struct gw_client {
     size_t in_length;
     size_t out_start;
     size_t out_end;
-    char name[IWN_NAME_MAX + 1U]; ///< As given with arm; empty: none.
+    char name[IWN_NAME_MAX + 1U];     ///< As given with arm; empty: none.
+    char key[IWN_LEASE_KEY_MAX + 1U]; ///< Of its lease, drawn at each arm that is granted; empty: there was none.
     char in[IWN_LINE_MAX + 1U];
     char out[GW_OUT_SIZE];
 } gw_client_t;
