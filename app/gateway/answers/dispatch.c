@@ -409,8 +409,14 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
     iwn_request_t request;
     iwn_refusal_t refusal;
     const gw_call_t call = {self, client, &request};
-    if (!iwn_request_read(line, length, &self->work, &request, &refusal) ||
-        gw_refuse_by_right(self, client->right, request.cmd, &refusal) || is_late(self, &request, &refusal)) {
+    const bool is_right = iwn_request_read(line, length, &self->work, &request, &refusal);
+    if (client->right == GW_STOP && !(is_right && iwn_cmd_stops(request.cmd))) {
+        gw_service_refuse_crowd(self->clients, client, &refusal);
+        send_refusal(&call, &refusal);
+        return;
+    }
+    if (!is_right || gw_refuse_by_right(self, client->right, request.cmd, &refusal) ||
+        is_late(self, &request, &refusal)) {
         send_refusal(&call, &refusal);
         return;
     }

@@ -45,6 +45,9 @@ typedef enum {
 /// True for what a client may ask that only watches: it looks, stops and e-stops.
 bool iwn_cmd_watches(iwn_cmd_t cmd);
 
+/// True for what stops the wheels: a stop is never refused.
+bool iwn_cmd_stops(iwn_cmd_t cmd);
+
 /// Of what type the id of a request is.
 typedef enum { IWN_ID_NONE = 0, IWN_ID_NUMBER, IWN_ID_TEXT } iwn_id_kind_t;
 
