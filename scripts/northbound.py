@@ -258,7 +258,7 @@ FIELDS_HEADER = """// SPDX-License-Identifier: MIT
 /// In the order of iwn_cmd_t.
 """
 KINDS = {"text": "TEXT", "boolean": "FLAG", "topic": "TOPICS", "side": "SIDE", "ledger_item": "ITEM"}
-MEMBERS = {"side": "sides", "recording.name": "file"}  # Of iwn_request_t, where it is called otherwise.
+MEMBERS = {"side": "sides", "recording.name": "file", "drive.key": "lease_key", "twist.key": "lease_key"}  # Of iwn_request_t, where it is called otherwise.
 
 
 def c_kind(field):

@@ -25,7 +25,8 @@ void gw_daemon_compose(gw_daemon_t *self) {
                                    .status = &self->status,
                                    .clients = clients,
                                    .socket = config->northbound.socket,
-                                   .group = config->northbound.group};
+                                   .group = config->northbound.group,
+                                   .max_age_ms = config->northbound.max_age_ms};
     clients->servant = gw_dispatch_servant(&self->answers);
     clients->log = &self->log;
     clients->most[GW_DRIVE] = config->northbound.max_clients;

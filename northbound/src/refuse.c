@@ -211,6 +211,41 @@ void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_
     }
 }
 
+static bool refuse_late(iwn_refusal_t *out_refusal, const char *before, int64_t value, const char *after) {
+    iwn_text_t text = iwn_text_begin(out_refusal->message, sizeof out_refusal->message);
+    out_refusal->error = IWN_STALE_COMMAND;
+    IWN_TEXT_JOIN(&text, before);
+    iwn_text_int(&text, value);
+    IWN_TEXT_JOIN(&text, after);
+    return true;
+}
+
+bool iwn_refuse_late(const iwn_request_t *request, const iwn_moment_t *moment, iwn_refusal_t *out_refusal) {
+    const int64_t now_us = (int64_t)moment->now_us;
+    const int64_t t_us = request->t_us;
+    if (request->has_stop && request->stop != (int64_t)moment->stop) {
+        return refuse_late(out_refusal, "this request means another stop than the last one, number ", moment->stop,
+                           "; read why (iwheelctl why), then send it again");
+    }
+    if (!request->has_t_us) {
+        return false;
+    }
+    if (t_us > now_us && t_us - now_us > (int64_t)IWN_AHEAD_MAX_US) {
+        return refuse_late(out_refusal, "t_us is ahead of the gateway's clock, which is at ", now_us,
+                           " us; count from the t_us of its events");
+    }
+    if (t_us < now_us - (int64_t)moment->max_age_ms * (int64_t)IW_US_PER_MS) {
+        return refuse_late(out_refusal, "this request came too late, more than ", moment->max_age_ms,
+                           " ms after t_us; if it is still meant, send it again");
+    }
+    if (t_us < (int64_t)moment->stopped_us) {
+        return refuse_late(out_refusal, "the wheels were stopped after t_us of this request, ",
+                           (now_us - (int64_t)moment->stopped_us) / (int64_t)IW_US_PER_MS,
+                           " ms ago; read why (iwheelctl why), then send it again");
+    }
+    return false;
+}
+
 void iwn_refuse_describe_tare(iw_side_t side, iw_tare_t result, iwn_refusal_t *out_refusal) {
     static const struct {
         iwn_error_t error;

@@ -45,6 +45,10 @@ bool iwn_cmd_watches(iwn_cmd_t cmd) {
     return (watching & 1U << cmd) != 0U;
 }
 
+bool iwn_cmd_stops(iwn_cmd_t cmd) {
+    return (cmd == IWN_CMD_STOP) || (cmd == IWN_CMD_DISARM) || (cmd == IWN_CMD_ESTOP);
+}
+
 /// A number for a message.
 static const char *number(int64_t value, char out_digits[NUMBER_SIZE]) {
     iwn_text_t text = iwn_text_begin(out_digits, NUMBER_SIZE);
@@ -308,6 +312,8 @@ static bool is_complete(uint32_t seen, iwn_request_t *request, iwn_refusal_t *ou
     }
     request->has_current = (seen & 1U << FIELD_left_mA) != 0U;
     request->has_commit = (seen & 1U << FIELD_commit) != 0U;
+    request->has_t_us = (seen & 1U << FIELD_t_us) != 0U;
+    request->has_stop = (seen & 1U << FIELD_stop) != 0U;
     if (request->has_current != ((seen & 1U << FIELD_right_mA) != 0U)) {
         return REFUSE(out_refusal, IWN_MISSING_FIELD, "give both left_mA and right_mA, or neither");
     }

@@ -28,13 +28,16 @@
     ROW(rate_hz, rate_hz, RATE, 0, false, BIT(WATCH))                                                                  \
     ROW(name, name, TEXT, 64, false, BIT(ARM))                                                                         \
     ROW(takeover, takeover, FLAG, 0, false, BIT(ARM))                                                                  \
+    ROW(t_us, t_us, INTEGER, 0, false, BIT(ARM) | BIT(RESET) | BIT(CONFIRM))                                           \
     ROW(left_mm_s, left_mm_s, INTEGER, 0, true, BIT(DRIVE))                                                            \
     ROW(right_mm_s, right_mm_s, INTEGER, 0, true, BIT(DRIVE))                                                          \
     ROW(left_mA, left_mA, INTEGER, 0, false, BIT(DRIVE))                                                               \
     ROW(right_mA, right_mA, INTEGER, 0, false, BIT(DRIVE))                                                             \
+    ROW(key, lease_key, TEXT, 32, false, BIT(DRIVE) | BIT(TWIST))                                                      \
     ROW(v_mm_s, v_mm_s, INTEGER, 0, true, BIT(TWIST))                                                                  \
     ROW(yaw_mrad_s, yaw_mrad_s, INTEGER, 0, true, BIT(TWIST))                                                          \
     ROW(reason, reason, TEXT, 200, false, BIT(ESTOP))                                                                  \
+    ROW(stop, stop, INTEGER, 0, false, BIT(RESET))                                                                     \
     ROW(side, sides, SIDE, 0, false, BIT(TARE))                                                                        \
     ROW(item, item, ITEM, 0, true, BIT(CONFIRM))                                                                       \
     ROW(value, value, VALUE, 39, false, BIT(CONFIRM) | BIT(CONFIG))                                                    \

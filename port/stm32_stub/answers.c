@@ -134,13 +134,29 @@ static const char *stale(const iw_host_t *self, const iw_host_client_t *client, 
     return NULL;
 }
 
+/// A command that is refused before the core judges it: to the core one that is out of range, so that it is remembered as one that
+/// nobody may arm into.
+static void remember_wish(const iw_host_t *self, const iw_host_client_t *client, const iw_drive_t *wanted) {
+    const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
+    iw_applied_t applied;
+    if (wanted->speed_mm_s[IW_LEFT] != 0 || wanted->speed_mm_s[IW_RIGHT] != 0) {
+        (void)iw_gateway_drive(self->place.gateway, self->now_us, client->id, &unknown, &applied);
+    }
+}
+
 /// The lease runs from the stamp: whoever held the line up, the wheels stop lease_ms after a time at which the command
 /// did not exist yet.
 static void drive(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote, const iw_drive_t *wanted) {
     iw_applied_t applied;
     const bool armed = iw_gateway_state(self->place.gateway) == IW_STATE_ARMED;
+    if (armed && self->request.lease_key[0] != '\0') {
+        remember_wish(self, client, wanted);
+        REFUSE(self, client, IWN_NOT_HOLDER, "this gateway is a microcontroller, which gives no key; leave key out");
+        return;
+    }
     const char *const why = armed ? stale(self, client, quote) : NULL; // Else the core refuses it, whatever it quotes.
     if (why != NULL) {
+        remember_wish(self, client, wanted);
         REFUSE(self, client, IWN_STALE_COMMAND, "this command feeds nothing: ", why);
         return;
     }
@@ -374,9 +390,30 @@ static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote
     }
 }
 
+/// By what the request says of its age and its stop.
+static bool refuse_late(iw_host_t *self, iw_host_client_t *client) {
+    const iw_stop_t *const stop = iw_host_look(self)->stop;
+    iwn_moment_t moment = {
+        .now_us = self->now_us, .stopped_us = stop->at_us, .stop = stop->number, .max_age_ms = IWN_MAX_AGE_MS};
+    if (moment.stopped_us < self->stopped_us) {
+        moment.stopped_us = self->stopped_us;
+    }
+    if (moment.stopped_us < self->estopped_us) {
+        moment.stopped_us = self->estopped_us;
+    }
+    if (!iwn_refuse_late(&self->request, &moment, &self->refusal)) {
+        return false;
+    }
+    send_refusal(self, client);
+    return true;
+}
+
 void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
     if (client->watches_only && !may_watch(self->request.cmd)) {
         REFUSE(self, client, IWN_DENIED, "this channel is for watching, stop and estop");
+        return;
+    }
+    if (refuse_late(self, client)) {
         return;
     }
     carry_out(self, client, quote);

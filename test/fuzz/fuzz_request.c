@@ -19,10 +19,11 @@ static void judge_refusal(const iwn_refusal_t *refusal) {
 
 static void judge_request(const iwn_request_t *request) {
     fuzz_require(request->cmd < IWN_CMDS, "the command exists");
-    fuzz_require(terminated(request->name, sizeof request->name) &&
-                     terminated(request->reason, sizeof request->reason) &&
-                     terminated(request->value, sizeof request->value) && terminated(request->how, sizeof request->how),
-                 "texts end");
+    fuzz_require(
+        terminated(request->name, sizeof request->name) && terminated(request->reason, sizeof request->reason) &&
+            terminated(request->value, sizeof request->value) && terminated(request->how, sizeof request->how) &&
+            terminated(request->lease_key, sizeof request->lease_key),
+        "texts end");
     fuzz_require(request->cmd != IWN_CMD_WATCH || request->rate_hz >= 1, "the rate is positive");
     fuzz_require(request->cmd != IWN_CMD_TARE || (request->sides >= IW_SIDES_LEFT && request->sides <= IW_SIDES_BOTH),
                  "tare names a side");
@@ -45,10 +46,14 @@ static void compare_requests(const iwn_request_t *now, const iwn_request_t *befo
     fuzz_require(now->rate_hz == before->rate_hz && now->topics == before->topics, "the same subscription");
     fuzz_require(now->takeover == before->takeover && now->sides == before->sides && now->item == before->item,
                  "the same choices");
+    fuzz_require(now->has_t_us == before->has_t_us && now->t_us == before->t_us && now->has_stop == before->has_stop &&
+                     now->stop == before->stop,
+                 "the same time, the same stop");
     fuzz_require(strcmp(now->name, before->name) == 0 && strcmp(now->reason, before->reason) == 0 &&
                      strcmp(now->value, before->value) == 0 && strcmp(now->how, before->how) == 0 &&
                      strcmp(now->file, before->file) == 0 && strcmp(now->key, before->key) == 0 &&
-                     now->offset == before->offset && now->commit == before->commit,
+                     strcmp(now->lease_key, before->lease_key) == 0 && now->offset == before->offset &&
+                     now->commit == before->commit,
                  "the same texts");
 }
 

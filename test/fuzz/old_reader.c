@@ -73,6 +73,9 @@ static const field_t fields[] = {
     {"rate_hz", IN(rate_hz), 0, BIT(IWN_CMD_WATCH), false, FIELD_RATE},
     {"name", IN(name), IWN_NAME_MAX, BIT(IWN_CMD_ARM), false, FIELD_TEXT},
     {"takeover", IN(takeover), 0, BIT(IWN_CMD_ARM), false, FIELD_FLAG},
+    {"t_us", IN(t_us), 0, BIT(IWN_CMD_ARM) | BIT(IWN_CMD_RESET) | BIT(IWN_CMD_CONFIRM), false, FIELD_INTEGER},
+    {"stop", IN(stop), 0, BIT(IWN_CMD_RESET), false, FIELD_INTEGER},
+    {"key", IN(lease_key), IWN_LEASE_KEY_MAX, BIT(IWN_CMD_DRIVE) | BIT(IWN_CMD_TWIST), false, FIELD_TEXT},
     {"reason", IN(reason), IWN_REASON_MAX, BIT(IWN_CMD_ESTOP), false, FIELD_TEXT},
     {"side", IN(sides), 0, BIT(IWN_CMD_TARE), false, FIELD_SIDE},
     {"item", IN(item), 0, BIT(IWN_CMD_CONFIRM), true, FIELD_ITEM},
@@ -347,5 +350,7 @@ bool old_request_read(const char *line, size_t length, iwn_request_t *out_reques
     }
     out_request->has_current = json_object_get(root, "left_mA") != NULL;
     out_request->has_commit = json_object_get(root, "commit") != NULL;
+    out_request->has_t_us = json_object_get(root, "t_us") != NULL;
+    out_request->has_stop = json_object_get(root, "stop") != NULL;
     return true;
 }

@@ -246,7 +246,7 @@ static int listen_somewhere(void) {
     const struct sockaddr_un address = {.sun_family = AF_UNIX};
     const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
     TEST_ASSERT_EQUAL_INT(0, bind(fd, (const struct sockaddr *)&address, sizeof address.sun_family)); // Any free name.
-    TEST_ASSERT_EQUAL_INT(0, listen(fd, 8));
+    TEST_ASSERT_EQUAL_INT(0, listen(fd, 128));
     return fd;
 }
 

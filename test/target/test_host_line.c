@@ -171,6 +171,73 @@ static void test_host_answer_to_arm_comes_when_it_is_armed(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, "\"state\":\"armed\""), answer);
 }
 
+/// Keeps the link while time passes.
+static void wait_ms(uint32_t span_ms) {
+    for (uint32_t ms = 0; ms < span_ms; ms += 100U) {
+        say(0, "{\"cmd\":\"alive\"}");
+        run_ms(100);
+    }
+}
+
+static void assert_aged(const char *cmd, int64_t age_ms, const char *part) {
+    char json[128];
+    say(0, "{\"cmd\":\"alive\"}");
+    (void)snprintf(json, sizeof json, "{\"cmd\":\"%s\",\"id\":5,\"t_us\":%lld%s}", cmd,
+                   (long long)rig.now_us - age_ms * 1000, (strcmp(cmd, "confirm") == 0) ? ",\"item\":\"dlc\"" : "");
+    assert_answer(json, part);
+}
+
+static void test_one_person_board_refuses_what_is_too_old(void) {
+    static const int64_t late_ms[] = {1100, 10000, 60000, -200};
+    assert_answer("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
+    wait_ms(2500);
+    for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
+        assert_aged("reset", late_ms[i], "\"error\":\"stale_command\"");
+        assert_aged("confirm", late_ms[i], "\"error\":\"stale_command\"");
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
+    }
+    assert_aged("reset", 500, "\"ok\":true");
+    for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
+        assert_aged("arm", late_ms[i], "\"error\":\"stale_command\"");
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+    }
+    gateway_judge_renew(&rig.judge);
+    assert_aged("arm", 500, "\"ok\":true");
+    TEST_ASSERT_NULL_MESSAGE(strstr(answer, "key"), "a board has no random numbers");
+}
+
+static void test_one_person_board_reset_of_another_stop_is_refused(void) {
+    assert_answer("{\"cmd\":\"estop\",\"id\":1}", "\"ok\":true");
+    wait_ms(2500);
+    say(0, "{\"cmd\":\"alive\"}");
+    assert_answer("{\"cmd\":\"reset\",\"id\":2,\"stop\":2}", "\"error\":\"stale_command\"");
+    assert_answer("{\"cmd\":\"reset\",\"id\":3,\"stop\":0}", "\"error\":\"stale_command\"");
+    say(0, "{\"cmd\":\"alive\"}");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, iw_gateway_state(&rig.gateway));
+    assert_answer("{\"cmd\":\"reset\",\"id\":4,\"stop\":1}", "\"ok\":true");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+}
+
+/// Row 7: refused for its quote or its key, a command still shows that somebody wants motion.
+static void test_one_person_board_refused_drive_is_a_deflected_stick(void) {
+    static const char *const refused_for[] = {"\"cmd\":\"drive\",\"left_mm_s\":777,\"right_mm_s\":777",
+                                              "\"cmd\":\"drive\",\"left_mm_s\":777,\"right_mm_s\":777,\"key\":\"00\"",
+                                              "\"cmd\":\"drive\",\"left_mm_s\":0,\"right_mm_s\":0"};
+    for (size_t i = 0; i < sizeof refused_for / sizeof refused_for[0]; i++) {
+        char json[128];
+        (void)snprintf(json, sizeof json, "{\"id\":5,%s}", refused_for[i]); // It quotes nothing.
+        assert_answer(json, "\"ok\":false");
+        assert_answer("{\"cmd\":\"stop\",\"id\":6}", "\"ok\":true");
+        say(0, "{\"cmd\":\"alive\"}");
+        const bool counts = i < 2U;
+        gateway_judge_renew(&rig.judge);
+        assert_answer("{\"cmd\":\"arm\",\"id\":7}", counts ? "\"error\":\"stale_command\"" : "\"ok\":true");
+        wait_ms(2500);
+        gateway_judge_renew(&rig.judge);
+        assert_answer("{\"cmd\":\"arm\",\"id\":8}", "\"ok\":true");
+    }
+}
+
 static void test_host_twist_turns_the_right_wheel_faster(void) {
     char line[IWN_LINE_BOARD_MAX];
     char json[256];
@@ -203,6 +270,9 @@ int main(void) {
     RUN_TEST(test_host_line_delayed_commands_lease_ends_from_their_stamp);
     RUN_TEST(test_host_answers_tell_what_was_asked_and_what_became_of_it);
     RUN_TEST(test_host_answer_to_arm_comes_when_it_is_armed);
+    RUN_TEST(test_one_person_board_refuses_what_is_too_old);
+    RUN_TEST(test_one_person_board_reset_of_another_stop_is_refused);
+    RUN_TEST(test_one_person_board_refused_drive_is_a_deflected_stick);
     RUN_TEST(test_host_twist_turns_the_right_wheel_faster);
     RUN_TEST(test_host_state_comes_at_its_rate_and_in_no_burst_after_a_stall);
     return UNITY_END();

@@ -337,6 +337,46 @@ static void test_request_config_reads_stages_or_commits(void) {
     refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"config\",\"item\":\"track\"}");
 }
 
+static void test_request_time_and_stop_are_taken_as_sent(void) {
+    accepted("{\"cmd\":\"arm\",\"t_us\":9223372036854775807}", IWN_CMD_ARM);
+    TEST_ASSERT_TRUE(request.has_t_us);
+    TEST_ASSERT_EQUAL_INT64(INT64_MAX, request.t_us);
+    accepted("{\"cmd\":\"reset\",\"stop\":-1,\"t_us\":0}", IWN_CMD_RESET);
+    TEST_ASSERT_TRUE(request.has_t_us && request.has_stop);
+    TEST_ASSERT_EQUAL_INT64(0, request.t_us);
+    TEST_ASSERT_EQUAL_INT64(-1, request.stop);
+    accepted("{\"cmd\":\"confirm\",\"item\":\"dlc\",\"t_us\":5}", IWN_CMD_CONFIRM);
+    TEST_ASSERT_TRUE(request.has_t_us && !request.has_stop);
+    accepted("{\"cmd\":\"reset\"}", IWN_CMD_RESET);
+    TEST_ASSERT_FALSE(request.has_t_us || request.has_stop);
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"arm\",\"t_us\":1.0}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"arm\",\"t_us\":\"1\"}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"arm\",\"t_us\":null}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"reset\",\"stop\":\"7\"}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"reset\",\"stop\":7.5}");
+    refused(IWN_BAD_JSON, "{\"cmd\":\"arm\",\"t_us\":9223372036854775808}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"arm\",\"stop\":7}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"stop\",\"t_us\":7}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"estop\",\"t_us\":7}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"t_us\":7}");
+}
+
+static void test_request_drive_takes_a_key_of_32_bytes(void) {
+    accepted("{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"key\":\"0123456789abcdef0123456789abcdef\"}",
+             IWN_CMD_DRIVE);
+    TEST_ASSERT_EQUAL_STRING("0123456789abcdef0123456789abcdef", request.lease_key);
+    accepted("{\"cmd\":\"twist\",\"v_mm_s\":1,\"yaw_mrad_s\":1,\"key\":\"0\"}", IWN_CMD_TWIST);
+    TEST_ASSERT_EQUAL_STRING("0", request.lease_key);
+    accepted("{\"cmd\":\"twist\",\"v_mm_s\":1,\"yaw_mrad_s\":1}", IWN_CMD_TWIST);
+    TEST_ASSERT_EQUAL_STRING("", request.lease_key);
+    refused(IWN_BAD_VALUE,
+            "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"key\":\"0123456789abcdef0123456789abcdef0\"}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"key\":\"\"}");
+    refused(IWN_BAD_VALUE, "{\"cmd\":\"drive\",\"left_mm_s\":1,\"right_mm_s\":1,\"key\":7}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"arm\",\"key\":\"0\"}");
+    refused(IWN_UNKNOWN_FIELD, "{\"cmd\":\"stop\",\"key\":\"0\"}");
+}
+
 static void test_request_tare_takes_a_side_or_both(void) {
     accepted("{\"cmd\":\"tare\"}", IWN_CMD_TARE);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_BOTH, request.sides);
@@ -368,6 +408,8 @@ int main(void) {
     RUN_TEST(test_request_texts_have_a_length_and_no_control_characters);
     RUN_TEST(test_request_texts_with_what_moves_a_terminal_are_refused_in_every_field_and_spelling);
     RUN_TEST(test_request_config_reads_stages_or_commits);
+    RUN_TEST(test_request_time_and_stop_are_taken_as_sent);
+    RUN_TEST(test_request_drive_takes_a_key_of_32_bytes);
     RUN_TEST(test_request_tare_takes_a_side_or_both);
     return UNITY_END();
 }

@@ -10,6 +10,10 @@
 #include "iwheel_northbound/refuse.h"
 
 #include <string.h>
+#include <sys/random.h>
+
+/// Of a lease's key: 128 bits.
+#define KEY_BYTES (IWN_LEASE_KEY_MAX / 2U)
 
 static iwn_out_t begin_reply(const gw_call_t *call) {
     return gw_clients_begin_reply(call->answers->clients, &call->request->id);
@@ -63,7 +67,52 @@ static void reply_armed(gw_answers_t *self, const iw_snapshot_t *seen, gw_client
     const iwn_surroundings_t around = gw_snapshot_around(self->status, seen);
     iwn_out_t json = gw_clients_begin_reply(self->clients, &client->arm_id);
     iwn_tell_terms(seen, &around, &json);
+    iwn_out_text(&json, "key", client->key);
     gw_clients_send_reply(client, &json);
+}
+
+/// False: the kernel has no random numbers yet, which is so in the first seconds of some machines only.
+static bool draw_key(char out_key[IWN_LEASE_KEY_MAX + 1U]) {
+    static const char digits[] = "0123456789abcdef";
+    uint8_t bytes[KEY_BYTES];
+    if (getrandom(bytes, sizeof bytes, GRND_NONBLOCK) != (ssize_t)sizeof bytes) {
+        return false;
+    }
+    for (size_t i = 0; i < KEY_BYTES; i++) {
+        out_key[2U * i] = digits[bytes[i] >> 4];
+        out_key[2U * i + 1U] = digits[bytes[i] & 15U];
+    }
+    out_key[IWN_LEASE_KEY_MAX] = '\0';
+    return true;
+}
+
+/// In the same time wherever they differ.
+static bool is_same_key(const char a[IWN_LEASE_KEY_MAX + 1U], const char b[IWN_LEASE_KEY_MAX + 1U]) {
+    unsigned difference = 0;
+    for (size_t i = 0; i <= IWN_LEASE_KEY_MAX; i++) {
+        difference |= (unsigned)(uint8_t)a[i] ^ (uint8_t)b[i];
+    }
+    return difference == 0U;
+}
+
+static iw_time_us_t later(iw_time_us_t a_us, iw_time_us_t b_us) {
+    return (a_us > b_us) ? a_us : b_us;
+}
+
+/// By what a request says of its age and its stop.
+static bool is_late(const gw_answers_t *self, const iwn_request_t *request, iwn_refusal_t *out_refusal) {
+    if (!request->has_t_us && !request->has_stop) {
+        return false;
+    }
+    const iw_snapshot_t seen = gw_wheels_look(self->wheels);
+    const gw_status_t *status = self->status;
+    const iwn_moment_t moment = {
+        .now_us = self->wheels->now_us,
+        .stopped_us = later(seen.stop->at_us, later(status->stopped_by.at_us, status->estopped_by.at_us)),
+        .stop = seen.stop->number,
+        .max_age_ms = self->max_age_ms,
+    };
+    return iwn_refuse_late(request, &moment, out_refusal);
 }
 
 /// An arm or a reset that waited here, behind an earlier request of its client, is not to undo a stop that came meanwhile.
@@ -89,6 +138,13 @@ static void do_arm(const gw_call_t *call) {
     if (refuse_waited(call)) {
         return;
     }
+    char key[IWN_LEASE_KEY_MAX + 1U];
+    if (!draw_key(key)) {
+        const iwn_refusal_t refusal = {IWN_INTERNAL, "the kernel has no random numbers for a key yet; wait a second, "
+                                                     "then arm again"};
+        send_refusal(call, &refusal);
+        return;
+    }
     const iw_refusal_t refusal = iw_gateway_arm(&wheels->core, wheels->now_us, client->id, call->request->takeover);
     note(call, &(blackbox_entry_t){.kind = BLACKBOX_ARM, .a = call->request->takeover, .b = (uint8_t)refusal});
     if (refusal != IW_REFUSE_NONE) {
@@ -98,6 +154,7 @@ static void do_arm(const gw_call_t *call) {
     if (call->request->name[0] != '\0') {
         memcpy(client->name, call->request->name, sizeof client->name);
     }
+    memcpy(client->key, key, sizeof client->key);
     client->arming = true;
     client->arm_id = call->request->id;
     wheels->requested = true;
@@ -139,8 +196,41 @@ static iw_refusal_t judge_drive(const gw_call_t *call, const iw_drive_t *wanted,
     return refusal;
 }
 
+/// A command that is refused before the core judges it: to the core one that is out of range, so that it is remembered as one that
+/// nobody may arm into.
+static void remember_wish(const gw_call_t *call) {
+    const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
+    iw_applied_t applied;
+    (void)judge_drive(call, &unknown, &applied);
+}
+
+/// A command of the holder's connection with another key is another person's. Where the core refuses it in any case, its reason
+/// says more.
+static bool refuse_key(const gw_call_t *call, const iw_drive_t *wanted) {
+    static const iwn_refusal_t refusal = {IWN_NOT_HOLDER, "the key is not the one that the reply to the last arm gave; "
+                                                          "arm, and drive with the key of its reply"};
+    const char *key = call->request->lease_key;
+    if (key[0] == '\0' || is_same_key(key, call->client->key)) {
+        return false;
+    }
+    const iw_snapshot_t seen = gw_wheels_look(call->answers->wheels);
+    if (seen.state != IW_STATE_ARMED || seen.holder != call->client->id) {
+        return false;
+    }
+    const bool current = wanted->has_current && seen.config->current_role == IW_ROLE_SETPOINT &&
+                         (wanted->current_mA[IW_LEFT] != 0 || wanted->current_mA[IW_RIGHT] != 0);
+    if (current || wanted->speed_mm_s[IW_LEFT] != 0 || wanted->speed_mm_s[IW_RIGHT] != 0) {
+        remember_wish(call);
+    }
+    send_refusal(call, &refusal);
+    return true;
+}
+
 static void drive(const gw_call_t *call, const iw_drive_t *wanted) {
     iw_applied_t applied;
+    if (refuse_key(call, wanted)) {
+        return;
+    }
     const iw_refusal_t refusal = judge_drive(call, wanted, &applied);
     if (refusal != IW_REFUSE_NONE) {
         refuse(call, refusal);
@@ -162,13 +252,10 @@ static void do_drive(const gw_call_t *call) {
     drive(call, &wanted);
 }
 
-/// A turn for which no speeds are known: to the core a command that is out of range, so that it is remembered as one
-/// that nobody may arm into.
+/// A turn for which no speeds are known.
 static void refuse_turn(const gw_call_t *call) {
-    const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
-    iw_applied_t applied;
     iwn_refusal_t refusal = {.error = IWN_DENIED};
-    (void)judge_drive(call, &unknown, &applied);
+    remember_wish(call);
     gw_knowledge_describe_contradiction(call->answers->knowledge, IW_LEDGER_TRACK, refusal.message,
                                         sizeof refusal.message);
     send_refusal(call, &refusal);
@@ -322,8 +409,14 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
     iwn_request_t request;
     iwn_refusal_t refusal;
     const gw_call_t call = {self, client, &request};
-    if (!iwn_request_read(line, length, &self->work, &request, &refusal) ||
-        gw_refuse_by_right(self, client->right, request.cmd, &refusal)) {
+    const bool is_right = iwn_request_read(line, length, &self->work, &request, &refusal);
+    if (client->right == GW_STOP && !(is_right && iwn_cmd_stops(request.cmd))) {
+        gw_service_refuse_crowd(self->clients, client, &refusal);
+        send_refusal(&call, &refusal);
+        return;
+    }
+    if (!is_right || gw_refuse_by_right(self, client->right, request.cmd, &refusal) ||
+        is_late(self, &request, &refusal)) {
         send_refusal(&call, &refusal);
         return;
     }

@@ -27,7 +27,8 @@ typedef struct {
     struct gw_clients *clients;
     const char *socket; ///< By which one may drive, and its group, for messages.
     const char *group;
-    iwn_work_t work; ///< For reading requests.
+    uint32_t max_age_ms; ///< Of arm, reset and confirm.
+    iwn_work_t work;     ///< For reading requests.
 } gw_answers_t;
 
 /// One request being carried out.

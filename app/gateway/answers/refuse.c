@@ -110,7 +110,7 @@ static void say_right(const gw_answers_t *answers, iwn_refusal_t *out_refusal) {
 }
 
 bool gw_refuse_by_right(const gw_answers_t *answers, gw_right_t right, iwn_cmd_t cmd, iwn_refusal_t *out_refusal) {
-    if (right == GW_DRIVE || iwn_cmd_watches(cmd)) {
+    if (right == GW_DRIVE || iwn_cmd_watches(cmd)) { // Who has come to stop may stop: dispatch.c sees to the rest.
         return false;
     }
     say_right(answers, out_refusal);

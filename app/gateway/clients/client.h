@@ -36,6 +36,7 @@ typedef struct gw_client {
     bool ended;   ///< End of file: complete lines before it still count.
     bool closing; ///< Nothing more is read.
     bool failed;  ///< Cannot be written to any more.
+    bool said;    ///< Beyond the maximum: its one line was carried out.
     bool arming;  ///< An arm waits for its reply; later lines wait behind it.
     iwn_id_t arm_id;
     bool reading; ///< A question about recordings has no answer yet; later lines do not wait for it.
@@ -49,11 +50,12 @@ typedef struct gw_client {
     iw_time_us_t next_us;      ///< When the next periodic event is due.
     iw_time_us_t line_us;      ///< Of a watcher: its next line is carried out no earlier.
     bool due;                  ///< A periodic event is due in this cycle.
-    iw_time_us_t close_us;     ///< While closing: no later than this.
+    iw_time_us_t close_us;     ///< While closing, and beyond the maximum: no later than this.
     size_t in_length;
     size_t out_start;
     size_t out_end;
-    char name[IWN_NAME_MAX + 1U]; ///< As given with arm; empty: none.
+    char name[IWN_NAME_MAX + 1U];     ///< As given with arm; empty: none.
+    char key[IWN_LEASE_KEY_MAX + 1U]; ///< Of its lease, drawn at each arm that is granted; empty: there was none.
     char in[IWN_LINE_MAX + 1U];
     char out[GW_OUT_SIZE];
 } gw_client_t;

@@ -14,8 +14,19 @@ struct gw_log;
 /// Slots of those who may drive, and behind them of those who may only watch: neither takes the others'.
 #define GW_DRIVERS_MAX  64U
 #define GW_WATCHERS_MAX 64U
-#define GW_CLIENTS_MAX  (GW_DRIVERS_MAX + GW_WATCHERS_MAX)
 _Static_assert(GW_DRIVERS_MAX == 64U && GW_WATCHERS_MAX == 64U, "a word has a bit for each slot of one right");
+
+/// Behind them the places of those who come when all others of their socket are taken: a stop is never refused, and nobody is
+/// evicted for it. Each has one line, `stop`, `disarm` or `estop`, and GW_STOP_US for it. One user but root holds at most half of a
+/// socket's places; where they are all taken, one that has been silent for GW_STOP_LEAST_US makes room for the next, so that a
+/// thousand silent connections a second leave room for one that says stop a moment after it has come.
+#define GW_STOP_PLACES   8U ///< Of each socket.
+#define GW_STOP_US       200000U
+#define GW_STOP_LEAST_US 5000U
+
+/// A place more of each socket: whoever finds no other has it while its first line is looked for, and no longer.
+#define GW_STOP_SLOTS  (GW_STOP_PLACES + 1U)
+#define GW_CLIENTS_MAX (GW_DRIVERS_MAX + GW_WATCHERS_MAX + GW_RIGHTS * GW_STOP_SLOTS)
 
 /// What is done for a client beside reading and sending. Each is called with `context`.
 typedef struct gw_servant {
@@ -29,11 +40,11 @@ typedef struct gw_clients {
     gw_servant_t servant;
     struct gw_log *log;
     gw_listener_t listener[GW_RIGHTS];
-    uint32_t most[GW_RIGHTS];         ///< Connections, by the configuration.
-    uint32_t count[GW_RIGHTS];        ///< The same that are open.
-    uint64_t open[GW_RIGHTS];         ///< The same: a bit for each slot that is taken.
-    uint32_t next_served[GW_RIGHTS];  ///< Slot where the next round begins.
-    uint32_t next_flushed[GW_RIGHTS]; ///< The same of sending.
+    uint32_t most[GW_RIGHTS];        ///< Connections, by the configuration.
+    uint32_t count[GW_PARTS];        ///< The same that are open.
+    uint64_t open[GW_PARTS];         ///< The same: a bit for each slot that is taken.
+    uint32_t next_served[GW_PARTS];  ///< Slot where the next round begins.
+    uint32_t next_flushed[GW_PARTS]; ///< The same of sending.
     iw_client_t last_id;
     iw_time_us_t
         now_us; ///< When the wait of this cycle ended: what a client sends later than this was not waiting then.
@@ -94,19 +105,23 @@ enum { GW_TAG_SIGNAL = 0, GW_TAG_LISTENER, GW_TAG_WATCH_LISTENER, GW_TAG_BUS, GW
 /// Lines of one client that are carried out in one cycle.
 #define GW_LINES_PER_CYCLE 4U
 
-/// Connections accepted in one cycle.
-#define GW_ACCEPTS_PER_CYCLE 4U
+/// Connections accepted in one cycle by each socket, and in no more than GW_ROUND_US.
+#define GW_ACCEPTS_PER_CYCLE 8U
 
 /// Reading and carrying out, and then sending, take no longer than this each (and one client's turn) in one cycle: the
 /// wheels and the e-stop wait for no number of clients.
 #define GW_ROUND_US 500U
 
 /// Watchers come behind all who may drive, in what is left of that time (one of them always has a turn). After one
-/// turn of several, one line of each is carried out in so long, and one newcomer is let in: a flood of them, even of `estop`, is as slow as that.
+/// turn of several, one line of each is carried out in so long, and so many newcomers as in one cycle are let in: a flood of them, even
+/// of `estop`, is as slow as that, and yet a newcomer behind 1000 others in a second waits for a few ms only.
 #define GW_WATCHER_LINE_US   10000U
 #define GW_WATCHER_ACCEPT_US 2000U
 
-/// Takes newcomers, or tells them that there is no room.
+/// What a connection beyond the maximum is refused with, if its first line is no stop or does not come.
+void gw_service_refuse_crowd(const gw_clients_t *self, const gw_client_t *client, iwn_refusal_t *out_refusal);
+
+/// Takes newcomers; carries out the stops of those for whom there is no room, and tells the others.
 void gw_service_accept(gw_clients_t *self);
 
 /// Reads from the clients that have something to say and carries out their next lines: the holder of the lease first,

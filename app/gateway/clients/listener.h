@@ -24,9 +24,11 @@ struct gw_log;
 
 /// What a socket, and so who connects to it, may do.
 typedef enum {
-    GW_DRIVE = 0, ///< Everything.
-    GW_WATCH,     ///< Look, stop and e-stop.
-    GW_RIGHTS,
+    GW_DRIVE = 0,        ///< Everything.
+    GW_WATCH,            ///< Look, stop and e-stop.
+    GW_RIGHTS,           ///< Sockets: one for each right before.
+    GW_STOP = GW_RIGHTS, ///< Stop or e-stop, once: who comes when all places of its socket are taken.
+    GW_PARTS,
 } gw_right_t;
 
 typedef enum {

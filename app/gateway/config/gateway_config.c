@@ -157,6 +157,9 @@ static const settings_key_t keys[] = {
      TEXT(northbound.watch_group, settings_wrong_group)},
     {"northbound", "max_watchers", " clients", "Connections to it at the same time; they take none of max_clients.",
      NUMBER(northbound.max_watchers, 1, 64)},
+    {"northbound", "max_age_ms", " ms",
+     "An arm, reset or confirm that says since when it is wanted (t_us) may be so old; an older one is refused.",
+     NUMBER(northbound.max_age_ms, 200, 2000)},
 
     {"record", "blackbox_s", " s", "Ring in memory, written on every latched stop; 0: none.",
      NUMBER(record.blackbox_s, 0, 600)},
@@ -243,7 +246,7 @@ void gateway_config_default(gateway_config_t *out_config) {
         .bus = {"can0", 1000000U, 625U, GATEWAY_MISMATCH_REFUSE},
         .track_mm = 540U,
         .estop = {"ESTOP", true, 5U},
-        .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U},
+        .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U, 1000U},
         .record = {30U, "/var/lib/iwheel", 200U},
     };
     *out_config = standard;

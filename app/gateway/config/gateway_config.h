@@ -51,6 +51,7 @@ typedef struct gateway_config {
         uint16_t watch_mode;
         char watch_group[33];
         uint16_t max_watchers; ///< 1..64, beside max_clients.
+        uint16_t max_age_ms;   ///< The oldest `t_us` of arm, reset and confirm, 200..2000.
     } northbound;
     struct {
         uint16_t blackbox_s; ///< Length of the ring in memory, 0 (none) ..600.

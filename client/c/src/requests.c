@@ -166,10 +166,16 @@ static request_t begin_request(const char *cmd) {
     return request;
 }
 
-static void add_integer(request_t *self, const char *key, int32_t value) {
+static void add_integer(request_t *self, const char *key, int64_t value) {
     char text[48];
-    (void)snprintf(text, sizeof text, ",\"%s\":%ld", key, (long)value);
+    (void)snprintf(text, sizeof text, ",\"%s\":%lld", key, (long long)value);
     add(self, text);
+}
+
+static void add_known(request_t *self, const char *key, iwc_value_t value) {
+    if (value.known) {
+        add_integer(self, key, value.value);
+    }
 }
 
 /// False if the text may not stand in a request.
@@ -235,16 +241,26 @@ static int32_t number_at(const iwc_message_t *reply, const char *path) {
 }
 
 iwc_result_t iwc_arm(iwc_t *self, const char *name, bool takeover, int timeout_ms, iwc_terms_t *out_terms) {
+    const iwc_arm_t arm = {.name = name, .takeover = takeover};
+    return iwc_arm_as(self, &arm, timeout_ms, out_terms, NULL);
+}
+
+iwc_result_t iwc_arm_as(iwc_t *self, const iwc_arm_t *arm, int timeout_ms, iwc_terms_t *out_terms,
+                        char out_key[IWC_KEY_SIZE]) {
     iwc_message_t reply;
     request_t request = begin_request("arm");
-    if (!add_text(&request, "name", name, NAME_MAX_BYTES)) {
+    if (!add_text(&request, "name", arm->name, NAME_MAX_BYTES)) {
         return IWC_INVALID;
     }
-    add(&request, takeover ? ",\"takeover\":true}" : "}");
+    add_known(&request, "t_us", arm->t_us);
+    add(&request, arm->takeover ? ",\"takeover\":true}" : "}");
     const iwc_result_t result = iwc_ask(self, request.text, timeout_ms, &reply);
     if (result == IWC_OK && out_terms != NULL) {
         *out_terms = (iwc_terms_t){number_at(&reply, "lease_ms"), number_at(&reply, "first_lease_ms"),
                                    number_at(&reply, "stop_budget_ms"), number_at(&reply, "stop_budget_mm")};
+    }
+    if (result == IWC_OK && out_key != NULL) {
+        (void)iwc_text(&reply, "key", out_key, IWC_KEY_SIZE);
     }
     return result;
 }
@@ -265,7 +281,15 @@ static iwc_result_t command(iwc_t *self, const char *request, int timeout_ms, iw
 }
 
 iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *drive, int timeout_ms, iwc_applied_t *out_applied) {
+    return iwc_drive_as(self, drive, NULL, timeout_ms, out_applied);
+}
+
+iwc_result_t iwc_drive_as(iwc_t *self, const iwc_drive_t *drive, const char *key, int timeout_ms,
+                          iwc_applied_t *out_applied) {
     request_t request = begin_request("drive");
+    if (!add_text(&request, "key", key, IWC_KEY_SIZE - 1U)) {
+        return IWC_INVALID;
+    }
     add_integer(&request, "left_mm_s", drive->left_mm_s);
     add_integer(&request, "right_mm_s", drive->right_mm_s);
     if (drive->has_current) {
@@ -277,9 +301,18 @@ iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *drive, int timeout_ms, iw
 }
 
 iwc_result_t iwc_twist(iwc_t *self, int32_t v_mm_s, int32_t yaw_mrad_s, int timeout_ms, iwc_applied_t *out_applied) {
+    const iwc_twist_t twist = {v_mm_s, yaw_mrad_s};
+    return iwc_twist_as(self, &twist, NULL, timeout_ms, out_applied);
+}
+
+iwc_result_t iwc_twist_as(iwc_t *self, const iwc_twist_t *twist, const char *key, int timeout_ms,
+                          iwc_applied_t *out_applied) {
     request_t request = begin_request("twist");
-    add_integer(&request, "v_mm_s", v_mm_s);
-    add_integer(&request, "yaw_mrad_s", yaw_mrad_s);
+    if (!add_text(&request, "key", key, IWC_KEY_SIZE - 1U)) {
+        return IWC_INVALID;
+    }
+    add_integer(&request, "v_mm_s", twist->v_mm_s);
+    add_integer(&request, "yaw_mrad_s", twist->yaw_mrad_s);
     add(&request, "}");
     return command(self, request.text, timeout_ms, out_applied);
 }
@@ -306,5 +339,13 @@ iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms) {
 }
 
 iwc_result_t iwc_reset(iwc_t *self, int timeout_ms) {
-    return ask_plainly(self, "reset", timeout_ms);
+    return iwc_reset_as(self, &(iwc_reset_t){.stop = {.known = false}}, timeout_ms);
+}
+
+iwc_result_t iwc_reset_as(iwc_t *self, const iwc_reset_t *reset, int timeout_ms) {
+    request_t request = begin_request("reset");
+    add_known(&request, "stop", reset->stop);
+    add_known(&request, "t_us", reset->t_us);
+    add(&request, "}");
+    return iwc_ask(self, request.text, timeout_ms, NULL);
 }

@@ -28,6 +28,24 @@ typedef struct {
     bool shutting_down;        ///< Nobody can arm any more.
 } iwn_refuse_context_t;
 
+/// The limit of the age of `arm`, `reset` and `confirm` where none is configured.
+#define IWN_MAX_AGE_MS 1000U
+/// A request may be ahead of the gateway's clock by so much: clocks of one machine are read one after the other.
+#define IWN_AHEAD_MAX_US 100000U
+
+/// The moment at which a request that permits motion or clears a latch is judged.
+typedef struct {
+    iw_time_us_t now_us;
+    iw_time_us_t stopped_us; ///< Of the last stop, and of the last request for one; 0: there was none.
+    uint32_t stop;           ///< The number of the last stop; 0: there was none.
+    uint32_t max_age_ms;     ///< A request may be so old.
+} iwn_moment_t;
+
+/// True, with the refusal, if what the request says of its time (`t_us`) and of its stop (`stop`) keeps it from being carried out: it
+/// is too old, ahead of the clock, older than the last stop, or means another stop than the last. False for a request that says
+/// neither.
+bool iwn_refuse_late(const iwn_request_t *request, const iwn_moment_t *moment, iwn_refusal_t *out_refusal);
+
 /// The message for a refusal of the core, and its error.
 void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_t *request, iw_refusal_t refusal,
                          iwn_refusal_t *out_refusal);

@@ -17,6 +17,7 @@
 #define IWN_REASON_MAX      200U ///< Bytes of the reason of an estop.
 #define IWN_FILE_MAX        63U  ///< Bytes of the name of a recording's file.
 #define IWN_KEY_MAX         40U  ///< Bytes of a key of the configuration.
+#define IWN_LEASE_KEY_MAX   32U  ///< Hexadecimal digits of the key of a lease.
 #define IWN_RATE_MAX_HZ     100  ///< The highest rate of events that is given.
 #define IWN_RATE_DEFAULT_HZ 10   ///< The rate where none is asked for.
 
@@ -44,6 +45,9 @@ typedef enum {
 /// True for what a client may ask that only watches: it looks, stops and e-stops.
 bool iwn_cmd_watches(iwn_cmd_t cmd);
 
+/// True for what stops the wheels: a stop is never refused.
+bool iwn_cmd_stops(iwn_cmd_t cmd);
+
 /// Of what type the id of a request is.
 typedef enum { IWN_ID_NONE = 0, IWN_ID_NUMBER, IWN_ID_TEXT } iwn_id_kind_t;
 
@@ -56,29 +60,34 @@ typedef struct {
 
 /// Only the fields of its `cmd` mean anything. Numbers are as sent: any 64-bit integer.
 typedef struct {
-    iwn_id_t id;                      ///< What the reply repeats.
-    iwn_cmd_t cmd;                    ///< Tells which of the others mean anything.
-    int64_t left_mm_s;                ///< Of drive.
-    int64_t right_mm_s;               ///< Of drive.
-    int64_t left_mA;                  ///< Of drive, with `has_current`.
-    int64_t right_mA;                 ///< Of drive, with `has_current`.
-    int64_t v_mm_s;                   ///< Of twist: forward.
-    int64_t yaw_mrad_s;               ///< Of twist: positive to the left.
-    int64_t rate_hz;                  ///< At least 1; not limited yet.
-    int64_t offset;                   ///< Of recording, in bytes; may be negative.
-    bool has_current;                 ///< Both currents were given.
-    bool takeover;                    ///< Of arm.
-    bool has_commit;                  ///< Of config: `commit` was given.
-    bool commit;                      ///< Of config, with `has_commit`.
-    uint8_t topics;                   ///< Bit per iwn_topic_t.
-    uint8_t sides;                    ///< IW_SIDES_..., of tare.
-    iw_ledger_item_t item;            ///< Of confirm.
-    char value[IWN_VALUE_SIZE];       ///< Of confirm and config, a number in decimal digits; empty: not given.
-    char how[IWN_HOW_SIZE];           ///< Of confirm; empty: not given.
-    char name[IWN_NAME_MAX + 1U];     ///< Empty: not given.
-    char reason[IWN_REASON_MAX + 1U]; ///< Empty: not given.
-    char file[IWN_FILE_MAX + 1U];     ///< The name that recording asks for.
-    char key[IWN_KEY_MAX + 1U];       ///< Of config; empty: not given.
+    iwn_id_t id;                            ///< What the reply repeats.
+    iwn_cmd_t cmd;                          ///< Tells which of the others mean anything.
+    int64_t left_mm_s;                      ///< Of drive.
+    int64_t right_mm_s;                     ///< Of drive.
+    int64_t left_mA;                        ///< Of drive, with `has_current`.
+    int64_t right_mA;                       ///< Of drive, with `has_current`.
+    int64_t v_mm_s;                         ///< Of twist: forward.
+    int64_t yaw_mrad_s;                     ///< Of twist: positive to the left.
+    int64_t rate_hz;                        ///< At least 1; not limited yet.
+    int64_t offset;                         ///< Of recording, in bytes; may be negative.
+    int64_t t_us;                           ///< Of arm, reset and confirm, with `has_t_us`: since when it is wanted.
+    int64_t stop;                           ///< Of reset, with `has_stop`: the number of the stop that is meant.
+    bool has_t_us;                          ///< `t_us` was given.
+    bool has_stop;                          ///< `stop` was given.
+    bool has_current;                       ///< Both currents were given.
+    bool takeover;                          ///< Of arm.
+    bool has_commit;                        ///< Of config: `commit` was given.
+    bool commit;                            ///< Of config, with `has_commit`.
+    uint8_t topics;                         ///< Bit per iwn_topic_t.
+    uint8_t sides;                          ///< IW_SIDES_..., of tare.
+    iw_ledger_item_t item;                  ///< Of confirm.
+    char value[IWN_VALUE_SIZE];             ///< Of confirm and config, a number in decimal digits; empty: not given.
+    char how[IWN_HOW_SIZE];                 ///< Of confirm; empty: not given.
+    char name[IWN_NAME_MAX + 1U];           ///< Empty: not given.
+    char reason[IWN_REASON_MAX + 1U];       ///< Empty: not given.
+    char file[IWN_FILE_MAX + 1U];           ///< The name that recording asks for.
+    char key[IWN_KEY_MAX + 1U];             ///< Of config; empty: not given.
+    char lease_key[IWN_LEASE_KEY_MAX + 1U]; ///< Of drive and twist; empty: not given.
 } iwn_request_t;
 
 /// Why not: the name, and cause and cure in words.

@@ -268,6 +268,22 @@ typedef struct {
 /// `takeover` takes the lease from another holder, with both wheels at rest. As `iwc_ask`.
 IWC_API iwc_result_t iwc_arm(iwc_t *self, const char *name, bool takeover, int timeout_ms, iwc_terms_t *out_terms);
 
+/// Room for the key of a lease: 32 hexadecimal digits, terminated.
+#define IWC_KEY_SIZE 33U
+
+/// What an arm says. All zero: the same as `iwc_arm` without name and takeover.
+typedef struct {
+    const char *name; ///< As of `iwc_arm`.
+    bool takeover;    ///< As of `iwc_arm`.
+    iwc_value_t t_us; ///< Since when it is wanted, by the clock of the gateway's events; not known: not sent.
+} iwc_arm_t;
+
+/// As `iwc_arm`, for programs that pass on what a person wants: the gateway refuses ("stale_command") what is older than its limit.
+/// `out_key` (may be NULL) is the key of this lease, a secret between the gateway and the person who drives; empty: the gateway, a
+/// microcontroller, gives none.
+IWC_API iwc_result_t iwc_arm_as(iwc_t *self, const iwc_arm_t *arm, int timeout_ms, iwc_terms_t *out_terms,
+                                char out_key[IWC_KEY_SIZE]);
+
 /// A drive command.
 typedef struct {
     int32_t left_mm_s;  ///< -32768..32767.
@@ -294,6 +310,21 @@ IWC_API iwc_result_t iwc_drive(iwc_t *self, const iwc_drive_t *command, int time
 IWC_API iwc_result_t iwc_twist(iwc_t *self, int32_t v_mm_s, int32_t yaw_mrad_s, int timeout_ms,
                                iwc_applied_t *out_applied);
 
+/// As `iwc_drive`, with the key of the lease (up to 32 bytes, NULL: none): with another key than that of the last arm it is refused
+/// ("not_holder") and feeds nothing.
+IWC_API iwc_result_t iwc_drive_as(iwc_t *self, const iwc_drive_t *command, const char *key, int timeout_ms,
+                                  iwc_applied_t *out_applied);
+
+/// A drive command as speed and turning rate.
+typedef struct {
+    int32_t v_mm_s;     ///< Forward.
+    int32_t yaw_mrad_s; ///< Positive to the left.
+} iwc_twist_t;
+
+/// As `iwc_twist`, with the key of the lease as `iwc_drive_as`.
+IWC_API iwc_result_t iwc_twist_as(iwc_t *self, const iwc_twist_t *command, const char *key, int timeout_ms,
+                                  iwc_applied_t *out_applied);
+
 /// Ramp to zero, whoever drives. If it cannot be handed over or is not answered in time, or a signal ends the wait, the
 /// connection is closed, which stops the wheels if the lease was ours. As `iwc_ask`.
 IWC_API iwc_result_t iwc_stop(iwc_t *self, int timeout_ms);
@@ -304,6 +335,16 @@ IWC_API iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms);
 
 /// Leaves the latch, if its cause is gone. Moves nothing. As `iwc_ask`.
 IWC_API iwc_result_t iwc_reset(iwc_t *self, int timeout_ms);
+
+/// What a reset says. All zero: the same as `iwc_reset`.
+typedef struct {
+    iwc_value_t
+        stop; ///< The number of the stop that is meant, as `why` and the event `stop` give it; not known: not sent.
+    iwc_value_t t_us; ///< As of `iwc_arm_t`.
+} iwc_reset_t;
+
+/// As `iwc_reset`; refused ("stale_command") if another stop is the last one, or the request is too old. As `iwc_ask`.
+IWC_API iwc_result_t iwc_reset_as(iwc_t *self, const iwc_reset_t *reset, int timeout_ms);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: MIT
+// A lease belongs to one person, and what permits motion or clears a latch says since when it is wanted: in virtual time.
+#include "daemon_client.h"
+
+#include "unity.h"
+
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#define KEY_DIGITS 32U
+
+static char line_[256];
+
+static const char *aged(const char *cmd, int64_t age_ms) {
+    const long long t_us = (long long)daemon_rig.now_us - age_ms * 1000;
+    (void)snprintf(line_, sizeof line_, "{\"cmd\":\"%s\",\"t_us\":%lld%s}", cmd, t_us,
+                   (strcmp(cmd, "confirm") == 0) ? ",\"item\":\"track\"" : "");
+    return line_;
+}
+
+static void latch(void) {
+    assert_reply("{\"cmd\":\"estop\"}", "\"ok\":true");
+    daemon_rig_run(3000);
+}
+
+static unsigned stop_number(void) {
+    return gw_wheels_look(&daemon_rig.daemon->wheels).stop->number;
+}
+
+/// The key in a reply to arm.
+static void read_key(const char *reply, char out_key[KEY_DIGITS + 1U]) {
+    const char *at = strstr(reply, "\"key\":\"");
+    TEST_ASSERT_NOT_NULL_MESSAGE(at, reply);
+    memcpy(out_key, at + strlen("\"key\":\""), KEY_DIGITS);
+    out_key[KEY_DIGITS] = '\0';
+    TEST_ASSERT_EQUAL_size_t(KEY_DIGITS, strspn(out_key, "0123456789abcdef"));
+    TEST_ASSERT_EQUAL_CHAR('"', at[strlen("\"key\":\"") + KEY_DIGITS]);
+}
+
+static void arm_with_key(int who, char out_key[KEY_DIGITS + 1U]) {
+    const char *reply = daemon_rig_ask(who, "{\"cmd\":\"arm\"}");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"ok\":true"), reply);
+    read_key(reply, out_key);
+}
+
+static const char *drive_with(const char *key, int speed_mm_s) {
+    (void)snprintf(line_, sizeof line_, "{\"cmd\":\"drive\",\"left_mm_s\":%d,\"right_mm_s\":%d,\"key\":\"%s\"}",
+                   speed_mm_s, speed_mm_s, key);
+    return line_;
+}
+
+// Age --------------------------------------------------------------------------------------------------------------------
+
+/// Ages in ms beyond the default limit of 1000.
+static const int64_t late_ms[] = {1001, 1100, 2000, 10000, 60000};
+
+static void test_one_person_arm_too_old_changes_nothing(void) {
+    for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
+        assert_reply(aged("arm", late_ms[i]), "\"error\":\"stale_command\"");
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+        TEST_ASSERT_EQUAL_UINT(0, daemon_rig.sent[IW_LEFT]);
+    }
+    assert_reply(aged("arm", 900), "\"ok\":true");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
+static void test_one_person_reset_too_old_leaves_the_latch(void) {
+    latch();
+    for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
+        assert_reply(aged("reset", late_ms[i]), "\"error\":\"stale_command\"");
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    }
+    assert_reply(aged("reset", 900), "\"ok\":true");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+}
+
+static void test_one_person_confirm_too_old_is_refused(void) {
+    iw_ledger_t *ledger = &daemon_rig.daemon->wheels.core.ledger;
+    iw_ledger_contradict(ledger, IW_LEDGER_TRACK, IW_EVIDENCE_OPERATOR, 0);
+    for (size_t i = 0; i < sizeof late_ms / sizeof late_ms[0]; i++) {
+        assert_reply(aged("confirm", late_ms[i]), "\"error\":\"stale_command\"");
+        assert_reply("{\"cmd\":\"status\"}", "\"track\":{\"state\":\"contradicted\"");
+    }
+    assert_reply(aged("confirm", 900), "\"ok\":true");
+    assert_reply("{\"cmd\":\"status\"}", "\"track\":{\"state\":\"confirmed\"");
+}
+
+/// What a network held back comes at once.
+static void test_one_person_burst_of_old_requests_changes_nothing(void) {
+    static const char *const cmds[] = {"reset", "arm", "confirm"};
+    static const unsigned counts[] = {2, 10, 100};
+    latch();
+    const int late = daemon_rig_connect();
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+        for (unsigned n = 0; n < counts[i]; n++) {
+            const char *line = aged(cmds[n % 3U], late_ms[n % 5U]);
+            TEST_ASSERT_EQUAL_INT((int)strlen(line), (int)send(late, line, strlen(line), MSG_NOSIGNAL));
+            TEST_ASSERT_EQUAL_INT(1, (int)send(late, "\n", 1, MSG_NOSIGNAL));
+        }
+        daemon_rig_run(300);
+        TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    }
+    (void)close(late);
+}
+
+static void test_one_person_request_ahead_of_the_clock_is_refused(void) {
+    assert_reply(aged("arm", -101), "\"error\":\"stale_command\"");
+    assert_reply("{\"cmd\":\"arm\",\"t_us\":9223372036854775807}", "\"error\":\"stale_command\"");
+    assert_reply("{\"cmd\":\"arm\",\"t_us\":-9223372036854775808}", "\"error\":\"stale_command\"");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    assert_reply(aged("arm", -90), "\"ok\":true");
+}
+
+static void test_one_person_limit_of_the_age_is_configured(void) {
+    daemon_rig.daemon->answers.max_age_ms = 200;
+    assert_reply(aged("arm", 250), "more than 200 ms");
+    assert_reply(aged("arm", 150), "\"ok\":true");
+}
+
+static void test_one_person_arm_from_before_a_stop_is_refused(void) {
+    const int other = daemon_rig_connect();
+    daemon_rig_run(2000);
+    (void)daemon_rig_ask(other, "{\"cmd\":\"stop\"}"); // Nothing moves: no stop is recorded, but one was wanted.
+    daemon_rig_run(100);
+    (void)close(client);
+    client = daemon_rig_connect(); // Which has not waited through anything.
+    assert_reply(aged("arm", 500), "\"error\":\"stale_command\"");
+    assert_reply(aged("arm", 50), "\"ok\":true");
+    (void)close(other);
+}
+
+// The stop that a reset means ----------------------------------------------------------------------------------------------
+
+static void reset_of(unsigned stop, const char *part) {
+    (void)snprintf(line_, sizeof line_, "{\"cmd\":\"reset\",\"stop\":%u}", stop);
+    assert_reply(line_, part);
+}
+
+static void test_one_person_reset_of_another_stop_leaves_the_latch(void) {
+    latch();
+    const unsigned first = stop_number();
+    reset_of(first, "\"ok\":true");
+    latch();
+    TEST_ASSERT_NOT_EQUAL_UINT(first, stop_number());
+    reset_of(first, "\"error\":\"stale_command\"");
+    reset_of(stop_number() + 1U, "\"error\":\"stale_command\"");
+    reset_of(0, "\"error\":\"stale_command\"");
+    assert_reply("{\"cmd\":\"reset\",\"stop\":4294967297}", "\"error\":\"stale_command\"");
+    assert_reply("{\"cmd\":\"reset\",\"stop\":-1}", "\"error\":\"stale_command\"");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    reset_of(stop_number(), "\"ok\":true");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+}
+
+/// The latch keeps its first cause and its number: an e-stop on top of it makes an older reset late.
+static void test_one_person_reset_from_before_a_second_estop_is_late(void) {
+    const int other = daemon_rig_connect();
+    latch();
+    const iw_time_us_t pressed_us = daemon_rig.now_us;
+    (void)daemon_rig_ask(other, "{\"cmd\":\"estop\"}");
+    daemon_rig.daemon->answers.max_age_ms = 2000;
+    daemon_rig_run(1200); // The cause is no longer present.
+    (void)snprintf(line_, sizeof line_, "{\"cmd\":\"reset\",\"stop\":%u,\"t_us\":%llu}", stop_number(),
+                   (unsigned long long)pressed_us - 1000U);
+    assert_reply(line_, "\"error\":\"stale_command\"");
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    (void)close(other);
+}
+
+// The key ------------------------------------------------------------------------------------------------------------------
+
+static void test_one_person_key_is_new_for_every_grant(void) {
+    char key[4][KEY_DIGITS + 1U];
+    for (unsigned i = 0; i < 4U; i++) {
+        arm_with_key(client, key[i]); // The second of each two is the holder's own.
+        for (unsigned before = 0; before < i; before++) {
+            TEST_ASSERT_NOT_EQUAL_INT(0, strcmp(key[before], key[i]));
+        }
+        if (i == 1U) {
+            assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+            daemon_rig_run(3000);
+        }
+    }
+    assert_reply(drive_with(key[2], 100), "\"error\":\"not_holder\"");
+    assert_reply(drive_with(key[3], 100), "\"ok\":true");
+}
+
+static void test_one_person_refused_arm_leaves_the_key(void) {
+    char key[KEY_DIGITS + 1U];
+    arm_with_key(client, key);
+    assert_reply(aged("arm", 5000), "\"error\":\"stale_command\"");
+    assert_reply(drive_with(key, 100), "\"ok\":true");
+    TEST_ASSERT_NULL(strstr(daemon_rig.reply, "key"));
+}
+
+static void test_one_person_drive_with_another_key_feeds_nothing(void) {
+    char key[KEY_DIGITS + 1U];
+    arm_with_key(client, key);
+    char other[KEY_DIGITS + 1U];
+    memcpy(other, key, sizeof other);
+    other[KEY_DIGITS - 1U] = (key[KEY_DIGITS - 1U] == '0') ? '1' : '0';
+    const iw_time_us_t armed_us = daemon_rig.now_us;
+    while (daemon_rig_state() == IW_STATE_ARMED && daemon_rig.now_us - armed_us < MS(3000)) {
+        assert_reply(drive_with(other, 300), "\"error\":\"not_holder\"");
+        assert_reply(drive_with("0", 300), "\"error\":\"not_holder\"");
+        assert_reply(drive_with(other, 0), "\"error\":\"not_holder\"");
+        TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+        daemon_rig_run(20);
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT64(MS(1100), daemon_rig.now_us - armed_us); // The first lease, and not more.
+    TEST_ASSERT_EQUAL_INT(0, daemon_rig.most_mm_s);
+}
+
+static void test_one_person_twist_with_another_key_feeds_nothing(void) {
+    char key[KEY_DIGITS + 1U];
+    arm_with_key(client, key);
+    assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":100,\"yaw_mrad_s\":0,\"key\":\"0123456789abcdef0123456789abcdef\"}",
+                 "\"error\":\"not_holder\"");
+    (void)snprintf(line_, sizeof line_, "{\"cmd\":\"twist\",\"v_mm_s\":100,\"yaw_mrad_s\":0,\"key\":\"%s\"}", key);
+    assert_reply(line_, "\"ok\":true");
+}
+
+/// Row 7 holds for every command, accepted or not.
+static void test_one_person_drive_with_another_key_is_a_deflected_stick(void) {
+    char key[KEY_DIGITS + 1U];
+    const int other = daemon_rig_connect();
+    arm_with_key(client, key);
+    assert_reply(drive_with("wrong", 300), "\"error\":\"not_holder\"");
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"stale_command\""));
+    daemon_rig_run(3000);
+    arm_with_key(client, key);
+    assert_reply(drive_with("wrong", 0), "\"error\":\"not_holder\"");
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+    TEST_ASSERT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"stale_command\""));
+    (void)close(other);
+}
+
+static void test_one_person_key_is_in_no_other_line(void) {
+    static const char *const asked[] = {"{\"cmd\":\"hello\"}", "{\"cmd\":\"status\"}", "{\"cmd\":\"why\"}",
+                                        "{\"cmd\":\"stop\"}"};
+    static char text[1U << 17];
+    char key[KEY_DIGITS + 1U];
+    const int other = daemon_rig_connect();
+    daemon_rig_keep_log();
+    daemon_rig.daemon->log.level = GW_LOG_DEBUG;
+    (void)daemon_rig_ask(other,
+                         "{\"cmd\":\"watch\",\"topics\":[\"state\",\"lease\",\"stop\",\"frame\"],\"rate_hz\":100}");
+    arm_with_key(client, key);
+    assert_reply(drive_with(key, 100), "\"ok\":true");
+    assert_reply(drive_with("0123456789abcdef0123456789abcdef", 100), "\"error\":\"not_holder\"");
+    TEST_ASSERT_NULL(strstr(daemon_rig.reply, key));
+    for (size_t i = 0; i < sizeof asked / sizeof asked[0]; i++) {
+        assert_reply(asked[i], "\"ok\":true");
+        TEST_ASSERT_NULL(strstr(daemon_rig.reply, key));
+        daemon_rig_run(20);
+    }
+    const ssize_t length = recv(other, text, sizeof text - 1U, MSG_DONTWAIT);
+    TEST_ASSERT_GREATER_THAN_INT(1000, (int)length);
+    text[length] = '\0';
+    TEST_ASSERT_NULL(strstr(text, key));
+    TEST_ASSERT_NULL(strstr(daemon_rig_log(), key));
+    (void)close(other);
+}
+
+// Two people at the gateway ------------------------------------------------------------------------------------------------
+
+static void test_one_person_plain_arm_takes_no_lease_from_another(void) {
+    char key[KEY_DIGITS + 1U];
+    const int other = daemon_rig_connect();
+    assert_reply("{\"cmd\":\"arm\",\"name\":\"Ann\"}", "\"ok\":true");
+    for (unsigned i = 0; i < 3U; i++) {
+        const char *reply = daemon_rig_ask(other, "{\"cmd\":\"arm\",\"name\":\"Ann\"}"); // A name is no right.
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"error\":\"busy\""), reply);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "Ann"), reply);
+        TEST_ASSERT_NULL(strstr(reply, "key"));
+        reply = daemon_rig_ask(other, "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":-300}");
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"error\":\"not_holder\""), reply);
+    }
+    arm_with_key(client, key); // Whoever holds it may ask again.
+    const iw_time_us_t until_us = gw_wheels_look(&daemon_rig.daemon->wheels).lease_until_us;
+    arm_with_key(client, key);
+    TEST_ASSERT_EQUAL_UINT64(until_us,
+                             gw_wheels_look(&daemon_rig.daemon->wheels).lease_until_us); // Which feeds nothing.
+    assert_reply(drive_with(key, 300), "\"ok\":true");
+    (void)close(other);
+}
+
+static void test_one_person_key_of_another_connection_is_no_right(void) {
+    char key[KEY_DIGITS + 1U];
+    const int other = daemon_rig_connect();
+    arm_with_key(client, key);
+    const char *reply = daemon_rig_ask(other, drive_with(key, 300));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reply, "\"error\":\"not_holder\""), reply);
+    (void)close(other);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_one_person_arm_too_old_changes_nothing);
+    RUN_TEST(test_one_person_reset_too_old_leaves_the_latch);
+    RUN_TEST(test_one_person_confirm_too_old_is_refused);
+    RUN_TEST(test_one_person_burst_of_old_requests_changes_nothing);
+    RUN_TEST(test_one_person_request_ahead_of_the_clock_is_refused);
+    RUN_TEST(test_one_person_limit_of_the_age_is_configured);
+    RUN_TEST(test_one_person_arm_from_before_a_stop_is_refused);
+    RUN_TEST(test_one_person_reset_of_another_stop_leaves_the_latch);
+    RUN_TEST(test_one_person_reset_from_before_a_second_estop_is_late);
+    RUN_TEST(test_one_person_key_is_new_for_every_grant);
+    RUN_TEST(test_one_person_refused_arm_leaves_the_key);
+    RUN_TEST(test_one_person_drive_with_another_key_feeds_nothing);
+    RUN_TEST(test_one_person_twist_with_another_key_feeds_nothing);
+    RUN_TEST(test_one_person_drive_with_another_key_is_a_deflected_stick);
+    RUN_TEST(test_one_person_key_is_in_no_other_line);
+    RUN_TEST(test_one_person_plain_arm_takes_no_lease_from_another);
+    RUN_TEST(test_one_person_key_of_another_connection_is_no_right);
+    return UNITY_END();
+}

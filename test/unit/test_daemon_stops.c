@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: MIT
+// A stop is never refused and never queues: with every place of both sockets taken, in virtual time.
+#include "daemon_client.h"
+
+#include "unity.h"
+
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#define STOP_WITHIN_MS 60U ///< Fault 33, on this machine.
+#define CROWD          160U
+#define FOREIGN        65534U
+
+static const char *const stops[] = {"{\"cmd\":\"stop\"}\n", "{\"cmd\":\"estop\",\"reason\":\"crowd\"}\n",
+                                    "{\"id\":7,\"cmd\":\"disarm\"}\n"};
+static int crowd[CROWD];
+static unsigned crowded;
+static char text[1U << 17];
+
+/// Nothing of the gateway runs meanwhile.
+static int knock(gw_right_t door) {
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    socklen_t length = sizeof address;
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
+    TEST_ASSERT_EQUAL_INT(
+        0, getsockname(daemon_rig.daemon->clients.listener[door].fd, (struct sockaddr *)&address, &length));
+    TEST_ASSERT_EQUAL_INT(0, connect(fd, (const struct sockaddr *)&address, length));
+    return fd;
+}
+
+static void join(gw_right_t door, unsigned count) {
+    for (unsigned i = 0; i < count; i++) {
+        crowd[crowded++] = knock(door);
+        daemon_rig_run(2);
+    }
+}
+
+/// Every ordinary place of both sockets, with `client` in one of them.
+static void take_all_places(void) {
+    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    while (crowded > 0U) { // Of the test before.
+        (void)close(crowd[--crowded]);
+    }
+    clients->most[GW_DRIVE] = 16;
+    clients->most[GW_WATCH] = 16;
+    join(GW_DRIVE, 15);
+    join(GW_WATCH, 16);
+    TEST_ASSERT_EQUAL_UINT(16, clients->count[GW_DRIVE]);
+    TEST_ASSERT_EQUAL_UINT(16, clients->count[GW_WATCH]);
+}
+
+static void say(int fd, const char *lines) {
+    (void)send(fd, lines, strlen(lines), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+/// What has come, terminated.
+static const char *hear(int fd) {
+    const ssize_t length = recv(fd, text, sizeof text - 1U, MSG_DONTWAIT);
+    text[(length > 0) ? length : 0] = '\0';
+    return text;
+}
+
+static bool has_ended(int fd) {
+    char byte;
+    return recv(fd, &byte, 1, MSG_DONTWAIT) == 0;
+}
+
+/// The state without time for anything else to stop the wheels.
+static void begin_driving(void) {
+    if (daemon_rig_state() == IW_STATE_LATCHED) {
+        assert_reply("{\"cmd\":\"reset\"}", "\"ok\":true");
+    }
+    daemon_rig_arm(client);
+    daemon_rig_drive(client, 300, 300, 500);
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+/// The first slower setpoint leaves in time.
+static void assert_slower(const char *why) {
+    for (unsigned ms = 0; ms < STOP_WITHIN_MS; ms++) {
+        daemon_rig_run(1);
+        if (daemon_rig.told_mm_s[IW_LEFT] < 300 && daemon_rig.told_mm_s[IW_RIGHT] < 300) {
+            return;
+        }
+    }
+    TEST_FAIL_MESSAGE(why);
+}
+
+static void come_to_rest(void) {
+    daemon_rig_run(3500);
+}
+
+static void test_stop_never_refused_with_all_places_idle(void) {
+    take_all_places();
+    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+        for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
+            begin_driving();
+            const int fd = knock(door);
+            say(fd, stops[i]);
+            assert_slower(stops[i]);
+            daemon_rig_run(2);
+            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"ok\":true"), text);
+            TEST_ASSERT_TRUE(has_ended(fd));
+            (void)close(fd);
+            come_to_rest();
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[GW_DRIVE]); // Nobody was evicted.
+    TEST_ASSERT_EQUAL_UINT(16, daemon_rig.daemon->clients.count[GW_WATCH]);
+    TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[GW_STOP]);
+}
+
+/// Each of the crowd asks for more than it reads, without end.
+static void test_stop_never_refused_with_all_places_polling(void) {
+    take_all_places();
+    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+        begin_driving();
+        for (unsigned i = 0; i < crowded; i++) {
+            say(crowd[i], "{\"cmd\":\"watch\",\"topics\":[\"state\",\"frame\"],\"rate_hz\":100}\n{\"cmd\":\"status\"}\n"
+                          "{\"cmd\":\"why\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"status\"}\n{\"cmd\":\"why\"}\n");
+        }
+        const int fd = knock(door);
+        say(fd, stops[1]);
+        assert_slower("polling");
+        (void)close(fd);
+        come_to_rest();
+    }
+}
+
+/// Its line comes a while after it, into a place that waits for it.
+static void test_stop_never_refused_if_its_line_comes_later(void) {
+    take_all_places();
+    begin_driving();
+    const int fd = knock(GW_DRIVE);
+    daemon_rig_drive(client, 300, 300, 100);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE("", hear(fd), "no greeting: who waits for one does not stop");
+    say(fd, "{\"cmd\":");
+    daemon_rig_drive(client, 300, 300, 60);
+    say(fd, "\"stop\"}\n");
+    assert_slower("later");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"state\":\"stopping\""), text);
+    (void)close(fd);
+}
+
+static void test_stop_never_refused_without_descriptors(void) {
+    struct rlimit before;
+    take_all_places();
+    begin_driving();
+    TEST_ASSERT_EQUAL_INT(0, getrlimit(RLIMIT_NOFILE, &before));
+    const int fd = knock(GW_WATCH);
+    say(fd, stops[1]);
+    const int lowest = dup(fd);
+    (void)close(lowest);
+    const struct rlimit none = {.rlim_cur = (rlim_t)lowest, .rlim_max = before.rlim_max};
+    TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &none));
+    daemon_rig_run(STOP_WITHIN_MS);
+    TEST_ASSERT_EQUAL_INT(0, setrlimit(RLIMIT_NOFILE, &before));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    (void)close(fd);
+}
+
+/// A thousand silent connections a second, which stay as long as they are let, of the same user.
+static void flood(gw_right_t door, unsigned for_ms) {
+    static int open_ones[64];
+    static unsigned next;
+    for (unsigned ms = 0; ms < for_ms; ms++) {
+        if (open_ones[next] > 0) {
+            (void)close(open_ones[next]);
+        }
+        open_ones[next] = knock(door);
+        next = (next + 1U) % 64U;
+        daemon_rig_run(1);
+    }
+}
+
+static void test_stop_never_refused_beside_1000_connections_a_second(void) {
+    take_all_places();
+    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+        for (unsigned later_ms = 0; later_ms < 4U; later_ms++) { // The line, after its connection.
+            flood(door, 300);
+            begin_driving();
+            flood(door, 100);
+            const int fd = knock(door);
+            flood(door, later_ms);
+            say(fd, stops[later_ms % 3U]);
+            flood(door, 30);
+            TEST_ASSERT_LESS_THAN_INT_MESSAGE(300, daemon_rig.told_mm_s[IW_LEFT], "beside a flood");
+            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"ok\":true"), text);
+            (void)close(fd);
+            come_to_rest();
+        }
+    }
+}
+
+// What the places are not for ------------------------------------------------------------------------------------------------
+
+static void test_stop_place_for_anything_else_is_refused(void) {
+    static const char *const others[] = {"{\"cmd\":\"status\"}\n",
+                                         "{\"cmd\":\"hello\"}\n",
+                                         "{\"cmd\":\"arm\"}\n",
+                                         "{\"cmd\":\"reset\"}\n{\"cmd\":\"stop\"}\n",
+                                         "{\"cmd\":\"drive\",\"left_mm_s\":300,\"right_mm_s\":300}\n",
+                                         "{\"cmd\":\"watch\",\"topics\":[\"frame\"]}\n",
+                                         "stop\n",
+                                         "\n",
+                                         "{\"cmd\":\"stop\",\"now\":true}\n"};
+    take_all_places();
+    begin_driving();
+    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+        for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+            const int fd = knock(door);
+            say(fd, others[i]);
+            daemon_rig_drive(client, 300, 300, 20);
+            TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"error\":\"too_many_clients\""), others[i]);
+            TEST_ASSERT_NOT_NULL(strstr(text, (door == GW_DRIVE) ? "max_clients" : "max_watchers"));
+            TEST_ASSERT_TRUE_MESSAGE(has_ended(fd), others[i]);
+            (void)close(fd);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(300, daemon_rig.told_mm_s[IW_LEFT]); // Not even the stop behind another line.
+}
+
+static void test_stop_place_has_one_line(void) {
+    take_all_places();
+    const int fd = knock(GW_DRIVE);
+    say(fd, "{\"id\":1,\"cmd\":\"stop\"}\n{\"id\":2,\"cmd\":\"estop\"}\n{\"id\":3,\"cmd\":\"status\"}\n");
+    daemon_rig_run(20);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(fd), "\"id\":1,\"ok\":true"), text);
+    TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"id\":2"), text);
+    TEST_ASSERT_TRUE(has_ended(fd));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    (void)close(fd);
+}
+
+static void test_stop_place_of_the_silent_is_free_after_200_ms(void) {
+    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    take_all_places();
+    const unsigned before = crowded;
+    join(GW_DRIVE, GW_STOP_PLACES);
+    TEST_ASSERT_EQUAL_UINT(GW_STOP_PLACES, clients->count[GW_STOP]);
+    daemon_rig.waits = 0;
+    daemon_rig_run(150);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(GW_STOP_PLACES, clients->count[GW_STOP], "while nobody wants its place it stays");
+    TEST_ASSERT_LESS_THAN_UINT_MESSAGE(400, daemon_rig.waits, "and keeps nobody awake");
+    daemon_rig_run(60);
+    TEST_ASSERT_EQUAL_UINT(0, clients->count[GW_STOP]);
+    for (unsigned i = before; i < crowded; i++) {
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(crowd[i]), "\"error\":\"too_many_clients\""), text);
+        TEST_ASSERT_TRUE(has_ended(crowd[i]));
+    }
+}
+
+// A share for each user ----------------------------------------------------------------------------------------------------
+
+/// As another user connects it. -1: this test runs as a user who cannot be another.
+static int knock_as(uid_t uid, gw_right_t door) {
+    if (geteuid() != 0 || seteuid(uid) != 0) {
+        return -1;
+    }
+    const int fd = knock(door); // Its name is in no folder.
+    TEST_ASSERT_EQUAL_INT(0, seteuid(0));
+    return fd;
+}
+
+static unsigned held_by(uid_t uid) {
+    unsigned held = 0;
+    gw_clients_t *clients = &daemon_rig.daemon->clients;
+    for (uint32_t i = GW_DRIVERS_MAX + GW_WATCHERS_MAX; i < GW_CLIENTS_MAX; i++) {
+        held += (clients->client[i].id != IW_CLIENT_NONE && clients->client[i].uid == uid) ? 1U : 0U;
+    }
+    return held;
+}
+
+static void test_stop_places_of_one_user_are_half_of_them(void) {
+    take_all_places();
+    for (unsigned i = 0; i < 12U; i++) {
+        const int fd = knock_as(FOREIGN, GW_DRIVE);
+        if (fd < 0) {
+            TEST_IGNORE_MESSAGE("only root can connect as another user");
+        }
+        crowd[crowded++] = fd;
+        daemon_rig_run(10);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT(GW_STOP_PLACES / 2U, held_by(FOREIGN));
+    }
+    TEST_ASSERT_EQUAL_UINT(GW_STOP_PLACES / 2U, held_by(FOREIGN));
+    join(GW_DRIVE, GW_STOP_PLACES / 2U); // The other half is for others, and those are not pushed out.
+    TEST_ASSERT_EQUAL_UINT(GW_STOP_PLACES / 2U, held_by(0));
+    crowd[crowded++] = knock_as(FOREIGN, GW_DRIVE);
+    daemon_rig_run(10);
+    TEST_ASSERT_EQUAL_UINT(GW_STOP_PLACES / 2U, held_by(0));
+    begin_driving();
+    const int fd = knock_as(FOREIGN, GW_DRIVE); // And its stop needs no place.
+    say(fd, stops[0]);
+    assert_slower("beyond its share");
+    (void)close(fd);
+}
+
+static void test_stop_in_a_place_names_who_asked_for_it(void) {
+    char who[64];
+    take_all_places();
+    begin_driving();
+    const int fd = knock(GW_WATCH);
+    say(fd, stops[0]);
+    assert_slower("named");
+    (void)close(fd);
+    come_to_rest();
+    (void)snprintf(who, sizeof who, "(pid %d)", (int)getpid());
+    assert_reply("{\"cmd\":\"why\"}", who);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_stop_never_refused_with_all_places_idle);
+    RUN_TEST(test_stop_never_refused_with_all_places_polling);
+    RUN_TEST(test_stop_never_refused_if_its_line_comes_later);
+    RUN_TEST(test_stop_never_refused_without_descriptors);
+    RUN_TEST(test_stop_never_refused_beside_1000_connections_a_second);
+    RUN_TEST(test_stop_place_for_anything_else_is_refused);
+    RUN_TEST(test_stop_place_has_one_line);
+    RUN_TEST(test_stop_place_of_the_silent_is_free_after_200_ms);
+    RUN_TEST(test_stop_places_of_one_user_are_half_of_them);
+    RUN_TEST(test_stop_in_a_place_names_who_asked_for_it);
+    return UNITY_END();
+}
