@@ -3,66 +3,101 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/epoll.h>
 #include <sysexits.h>
 #include <unistd.h>
 
-#define TOPICS      (IWC_WATCH_STATE | IWC_WATCH_BUS | IWC_WATCH_ESTOP | IWC_WATCH_LEASE | IWC_WATCH_STOP)
 #define SHORTEST_US 100000U
 #define LONGEST_US  2000000U
-/// The gateway gives its socket away after it made it: only what lasts is missing rights.
+/// The gateway changes the group of its socket after it made it: rights are missing only if that lasts.
 #define DENIED_US 5000000U
 
 bool bridge_link_open(bridge_link_t *self, const bridge_link_terms_t *terms, const bridge_listener_t *listener) {
-    *self = (bridge_link_t){.terms = *terms,
-                            .listener = *listener,
-                            .wait_us = SHORTEST_US,
-                            .random = (uint64_t)getpid(), // Of many machines started by one switch.
-                            .gateway = iwc_new()};
-    return self->gateway != NULL;
+    memset(self, 0, sizeof *self);
+    self->terms = *terms;
+    self->listener = *listener;
+    self->wait_us = SHORTEST_US;
+    self->random = (uint64_t)getpid();
+    self->epoll_fd = epoll_create1(EPOLL_CLOEXEC);
+    const bool lines = bridge_line_open(&self->line, terms->socket, self->epoll_fd);
+    return bridge_stop_open(&self->stop, terms->socket, self->epoll_fd) && lines && self->epoll_fd >= 0;
+}
+
+/// Takes a waiting question out of its place.
+static bridge_question_t take_out(bridge_link_t *self, unsigned at) {
+    const bridge_question_t question = self->waits[at];
+    self->count--;
+    memmove(&self->waits[at], &self->waits[at + 1U], (self->count - at) * sizeof self->waits[0]);
+    return question;
+}
+
+static void answer_none(bridge_link_t *self, unsigned at) {
+    const bridge_question_t question = take_out(self, at); // First: the answer may ask again.
+    if (question.answer != NULL) {
+        question.answer(question.context, NULL);
+    }
 }
 
 void bridge_link_close(bridge_link_t *self) {
-    iwc_free(self->gateway);
+    bridge_line_close(&self->line);
+    for (unsigned left = self->count; left > 0U; left--) {
+        answer_none(self, 0);
+    }
+    bridge_stop_close(&self->stop);
+    (void)close(self->epoll_fd);
 }
 
-static void answer(bridge_question_t *question, const iwc_message_t *reply) {
-    const bridge_question_t asked = *question;
-    question->id = 0; // First: what is called may ask again.
-    if (asked.answer != NULL) {
-        asked.answer(asked.context, reply);
-    }
-}
+// ---- here and gone ------------------------------------------------------------------------------------------------
 
-static void lose(bridge_link_t *self, uint64_t now_us) {
-    iwc_close(self->gateway);
-    self->is_here = false;
-    self->try_us = now_us + SHORTEST_US;
-    self->wait_us = SHORTEST_US;
-    for (size_t i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        if (self->asked[i].id != 0) {
-            answer(&self->asked[i], NULL);
-        }
+static void say_away(bridge_link_t *self) {
+    const char *socket = self->terms.socket;
+    if (self->is_here) {
+        (void)fprintf(stderr, "%s: the gateway at %s is gone; waiting for it\n", self->terms.program, socket);
+    } else if (!self->told_away) {
+        (void)fprintf(stderr, "%s: no gateway at %s (%s); waiting for it\n", self->terms.program, socket,
+                      iwc_words(self->line.result));
     }
-    self->listener.gone(self->listener.context, now_us);
-    (void)fprintf(stderr, "%s: the gateway at %s is gone; waiting for it\n", self->terms.program, self->terms.socket);
     self->told_away = true;
 }
 
-// ---- connecting ---------------------------------------------------------------------------------------------------
-
-uint64_t bridge_backoff_us(uint64_t *wait_us, uint64_t longest_us, uint64_t *random, uint64_t now_us) {
-    *random = *random * 6364136223846793005U + (now_us | 1U);
-    *wait_us = (*wait_us * 2U > longest_us) ? longest_us : *wait_us * 2U;
-    return now_us + *wait_us / 2U + (*random >> 33) % (*wait_us / 2U);
+/// The line has ended, or was never there.
+static void lose(bridge_link_t *self) {
+    const bool was_here = self->is_here;
+    bridge_line_drop(&self->line, self->line.result);
+    say_away(self);
+    self->is_here = false;
+    for (unsigned left = self->count; was_here && left > 0U; left--) {
+        answer_none(self, 0);
+    }
+    if (was_here) {
+        self->wait_us = SHORTEST_US;
+        self->listener.gone(self->listener.context, self->now_us);
+    }
+    self->try_us = bridge_backoff_us(&self->wait_us, LONGEST_US, &self->random, self->now_us);
 }
 
-static int judge_rights(bridge_link_t *self, iwc_result_t result, uint64_t now_us) {
-    if (result == IWC_DENIED) {
-        self->denied_us = (self->denied_us != 0U) ? self->denied_us : now_us;
-    } else {
-        self->denied_us = 0;
+static void take_subscribed(void *context, const iwc_message_t *reply) {
+    bridge_link_t *self = context;
+    if (reply == NULL || iwc_truth(reply, "ok").value != 1) {
+        if (self->line.state == BRIDGE_HERE) {
+            self->line.result = (reply == NULL) ? IWC_TIMEOUT : IWC_REFUSED;
+        }
+        return; // `step` sees that it is not here, and that no question is on its way.
     }
-    if (self->terms.drives && result == IWC_OK && iwc_watches_only(self->gateway)) {
+    self->is_here = true;
+    self->told_away = false;
+    self->connections++;
+    (void)fprintf(stderr, "%s: connected to the gateway at %s\n", self->terms.program, self->terms.socket);
+    self->listener.here(self->listener.context, self->now_us);
+}
+
+static int judge_rights(bridge_link_t *self) {
+    if (self->line.state != BRIDGE_AWAY || self->line.result != IWC_DENIED) {
+        self->denied_us = 0;
+    } else if (self->denied_us == 0U) {
+        self->denied_us = self->now_us;
+    }
+    if (self->terms.drives && self->line.state == BRIDGE_HERE && iwc_watches_only(self->line.gateway)) {
         (void)fprintf(
             stderr,
             "%s: %s is for watching only; let socket under [gateway] name the one to drive by, or set enabled = no "
@@ -70,7 +105,7 @@ static int judge_rights(bridge_link_t *self, iwc_result_t result, uint64_t now_u
             self->terms.program, self->terms.socket);
         return EX_NOPERM;
     }
-    if (self->denied_us != 0U && now_us - self->denied_us >= DENIED_US) {
+    if (self->denied_us != 0U && self->now_us - self->denied_us >= DENIED_US) {
         (void)fprintf(stderr, "%s: %s may not be used by this user; put it into group %s\n", self->terms.program,
                       self->terms.socket,
                       self->terms.drives ? "iwheel (a drop-in for that is among the examples in /usr/share/doc)"
@@ -80,131 +115,133 @@ static int judge_rights(bridge_link_t *self, iwc_result_t result, uint64_t now_u
     return 0;
 }
 
-static int connect_now(bridge_link_t *self, uint64_t now_us) {
-    iwc_result_t result = iwc_connect(self->gateway, self->terms.socket, BRIDGE_GREETING_MS);
-    const int rights = judge_rights(self, result, now_us);
-    if (rights == 0 && (result == IWC_OK || result == IWC_NEWER)) {
-        result = iwc_watch(self->gateway, TOPICS, (int)self->terms.rate_hz, BRIDGE_GREETING_MS);
+static void subscribe(bridge_link_t *self) {
+    char request[128];
+    const bridge_sent_t sent = {0, self->now_us + BRIDGE_STOP_US, take_subscribed, self};
+    (void)snprintf(request, sizeof request,
+                   "{\"cmd\":\"watch\",\"topics\":[\"state\",\"bus\",\"estop\",\"lease\",\"stop\"],\"rate_hz\":%u}",
+                   self->terms.rate_hz);
+    if (bridge_line_send(&self->line, request, &sent) != IWC_OK) {
+        lose(self);
     }
-    if (rights != 0 || result != IWC_OK) {
-        if (!self->told_away) {
-            (void)fprintf(stderr, "%s: no gateway at %s (%s); waiting for it\n", self->terms.program,
-                          self->terms.socket, iwc_words(result));
+}
+
+/// Makes the connection, in steps that do not wait.
+static int come_here(bridge_link_t *self) {
+    const bridge_line_state_t before = self->line.state;
+    if (before == BRIDGE_AWAY) {
+        if (self->now_us < self->try_us) {
+            return 0;
         }
-        self->told_away = true;
-        iwc_close(self->gateway);
-        self->try_us = bridge_backoff_us(&self->wait_us, LONGEST_US, &self->random, now_us);
-        return rights;
+        if (!bridge_line_connect(&self->line, self->now_us)) {
+            lose(self);
+            return judge_rights(self);
+        }
     }
-    self->is_here = true;
-    self->told_away = false;
-    self->connections++;
-    (void)fprintf(stderr, "%s: connected to the gateway at %s\n", self->terms.program, self->terms.socket);
-    self->listener.here(self->listener.context, now_us);
+    if (self->line.state == BRIDGE_GREETING) {
+        if (bridge_line_greet(&self->line, self->now_us) == BRIDGE_AWAY) {
+            lose(self);
+        } else if (self->line.state == BRIDGE_HERE) {
+            subscribe(self);
+        }
+        return judge_rights(self);
+    }
     return 0;
 }
 
 // ---- listening ----------------------------------------------------------------------------------------------------
 
-static void take_reply(bridge_link_t *self, const iwc_message_t *message) {
-    for (size_t i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        if (message->id != 0 && self->asked[i].id == message->id) {
-            answer(&self->asked[i], message);
-            return;
+static void listen_now(bridge_link_t *self) {
+    iwc_message_t event;
+    if (self->terms.latest && self->is_here) {
+        (void)iwc_latest(self->line.gateway); // If it has ended, the next line finds that out.
+    }
+    for (unsigned i = 0; i < 256U && bridge_line_next(&self->line, &event); i++) {
+        if (self->is_here) {
+            self->listener.event(self->listener.context, &event, self->now_us);
         }
+    }
+    (void)bridge_line_expire(&self->line, self->now_us);
+    const bool subscribing = bridge_line_in_flight(&self->line) > 0U;
+    if (self->line.state == BRIDGE_AWAY || (!self->is_here && !subscribing)) {
+        lose(self);
     }
 }
 
-static void listen_now(bridge_link_t *self, uint64_t now_us) {
-    iwc_message_t message;
-    iwc_result_t result = self->terms.latest ? iwc_latest(self->gateway) : IWC_OK;
-    for (unsigned i = 0; i < 256U; i++) {
-        result = iwc_next(self->gateway, 0, &message);
-        if (result != IWC_OK) {
-            break;
-        }
-        if (message.is_event) {
-            self->listener.event(self->listener.context, &message, now_us);
+static void send_waiting(bridge_link_t *self) {
+    while (self->is_here && self->count > 0U && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX) {
+        const bridge_question_t *question = &self->waits[0];
+        const bridge_sent_t sent = {0, question->until_us, question->answer, question->context};
+        const iwc_result_t result = bridge_line_send(&self->line, question->request, &sent);
+        if (result == IWC_CLOSED) {
+            lose(self);
+        } else if (result != IWC_OK) {
+            answer_none(self, 0); // Never sent later.
         } else {
-            take_reply(self, &message);
+            (void)take_out(self, 0);
         }
-    }
-    if (result == IWC_CLOSED || result == IWC_GARBLED) {
-        lose(self, now_us);
     }
 }
 
-static void give_up(bridge_link_t *self, uint64_t now_us) {
-    bool stop_lost = false;
-    for (size_t i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        if (self->asked[i].id != 0 && now_us >= self->asked[i].until_us) {
-            stop_lost = stop_lost || self->asked[i].is_stop;
-            answer(&self->asked[i], NULL);
-        }
-    }
-    if (stop_lost && self->is_here) {
-        lose(self, now_us);
+static void give_up(bridge_link_t *self) {
+    while (self->count > 0U && self->now_us >= self->waits[0].until_us) {
+        answer_none(self, 0);
     }
 }
 
 int bridge_link_step(bridge_link_t *self, uint64_t now_us) {
-    if (self->is_here) {
-        listen_now(self, now_us);
-    } else if (now_us >= self->try_us) {
-        const int code = connect_now(self, now_us);
+    self->now_us = now_us;
+    bridge_stop_step(&self->stop, now_us); // First.
+    if (self->line.state != BRIDGE_HERE) {
+        const int code = come_here(self);
         if (code != 0) {
             return code;
         }
     }
-    give_up(self, now_us);
+    if (self->line.state == BRIDGE_HERE) {
+        listen_now(self);
+    }
+    send_waiting(self);
+    give_up(self);
     return 0;
 }
 
 uint64_t bridge_link_next_us(const bridge_link_t *self, uint64_t now_us) {
-    uint64_t next_us = self->is_here ? UINT64_MAX : self->try_us;
-    for (size_t i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        if (self->asked[i].id != 0 && self->asked[i].until_us < next_us) {
-            next_us = self->asked[i].until_us;
-        }
+    const uint64_t stop_us = bridge_stop_next_us(&self->stop, now_us);
+    uint64_t next_us = (self->line.state == BRIDGE_AWAY) ? self->try_us : bridge_line_next_us(&self->line, now_us);
+    if (self->count > 0U && self->waits[0].until_us < next_us) {
+        next_us = self->waits[0].until_us;
     }
-    return (self->is_here && iwc_pending(self->gateway)) ? now_us : next_us;
+    if (self->is_here && self->count > 0U && bridge_line_in_flight(&self->line) < BRIDGE_LINE_MAX) {
+        return now_us;
+    }
+    return (stop_us < next_us) ? stop_us : next_us;
 }
 
 int bridge_link_fd(const bridge_link_t *self) {
-    return self->is_here ? iwc_fd(self->gateway) : -1;
+    return self->epoll_fd;
 }
 
-static bool is_request(const char *request, const char *cmd) {
-    static const char begin[] = "{\"cmd\":\"";
-    const size_t length = strlen(cmd);
-    return strncmp(request, begin, sizeof begin - 1U) == 0 && strncmp(request + sizeof begin - 1U, cmd, length) == 0 &&
-           request[sizeof begin - 1U + length] == '"';
-}
-
-bool bridge_link_ask(bridge_link_t *self, const char *request, bridge_answer_t what, void *context, uint64_t now_us) {
-    const bool is_stop = is_request(request, "stop") || is_request(request, "estop");
-    for (size_t i = 0; self->is_here && i < BRIDGE_ASKED_MAX; i++) {
-        bridge_question_t *question = &self->asked[i];
-        if (question->id != 0) {
-            continue;
-        }
-        int64_t id = 0;
-        const iwc_result_t result = iwc_send(self->gateway, request, 0, &id);
-        if (result == IWC_OK) {
-            *question =
-                (bridge_question_t){id, now_us + (is_stop ? BRIDGE_STOP_US : BRIDGE_ANSWER_US), is_stop, what, context};
-        } else if (is_stop || result == IWC_CLOSED) {
-            lose(self, now_us);
-        }
-        return result == IWC_OK;
+bool bridge_link_ask(bridge_link_t *self, const char *request, bridge_answer_t answer, void *context, uint64_t now_us) {
+    self->now_us = now_us;
+    if (bridge_is_stop(request)) {
+        return bridge_stop_ask(&self->stop, request, answer, context, now_us);
     }
-    return false;
+    if (!self->is_here || self->count >= BRIDGE_ASKED_MAX || strlen(request) >= BRIDGE_REQUEST_SIZE) {
+        return false;
+    }
+    bridge_question_t *question = &self->waits[self->count++];
+    *question = (bridge_question_t){.until_us = now_us + BRIDGE_ANSWER_US, .answer = answer, .context = context};
+    (void)snprintf(question->request, sizeof question->request, "%s", request);
+    return true;
 }
 
 void bridge_link_forget(bridge_link_t *self, const void *context) {
-    for (size_t i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        if (self->asked[i].context == context) {
-            self->asked[i].answer = NULL;
+    bridge_stop_forget(&self->stop, context);
+    bridge_line_forget(&self->line, context);
+    for (unsigned i = self->count; i > 0U; i--) {
+        if (self->waits[i - 1U].context == context) {
+            (void)take_out(self, i - 1U);
         }
     }
 }

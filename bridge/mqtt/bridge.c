@@ -215,7 +215,7 @@ static void take_event(void *context, const iwc_message_t *event, uint64_t now_u
         take_stop(self, event);
     } else {
         const bool lease = strcmp(name, "lease") == 0;
-        if (lease && iwc_integer(event, "holder").value != iwc_number(self->link.gateway)) {
+        if (lease && iwc_integer(event, "holder").value != iwc_number(self->link.line.gateway)) {
             self->driver[0] = '\0';
         }
         const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));

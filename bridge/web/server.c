@@ -344,7 +344,7 @@ static void let_go(web_server_t *self) {
         return;
     }
     if (self->driver.key[0] != '\0' && web_link_state(&self->link, self->now_us, &message) &&
-        iwc_state(self->link.gateway.gateway, &message, &state) && state.ours) {
+        iwc_state(self->link.gateway.line.gateway, &message, &state) && state.ours) {
         (void)bridge_link_ask(&self->link.gateway, "{\"cmd\":\"stop\"}", NULL, NULL, self->now_us);
     }
     web_driver_end(&self->driver);

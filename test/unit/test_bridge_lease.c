@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+// One person, one drive connection, one key.
+#include "common/lease.h"
+
+#include "../support/fake_gateway.h"
+#include "unity.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+
+#define MS 1000U
+
+static fake_gateway_t gateway;
+static bridge_lease_t lease;
+static int epoll_fd;
+static uint64_t now_us;
+static int answered;
+static int refused; // Answered with NULL.
+static char last[400];
+static char line[2000];
+static char armed_key[BRIDGE_SECRET_SIZE];
+
+static const char *const ARM = "{\"cmd\":\"arm\",\"name\":\"a\"}";
+static const char *const DRIVE = "{\"cmd\":\"drive\",\"left_mm_s\":100,\"right_mm_s\":100}";
+static const char *const GIVEN = ",\"state\":\"armed\",\"key\":\"00112233445566778899aabbccddeeff\"";
+static const char *const KEY = "00112233445566778899aabbccddeeff";
+
+static void take_answer(void *context, const iwc_message_t *reply) {
+    (void)context;
+    *((reply != NULL) ? &answered : &refused) += 1;
+    (void)snprintf(last, sizeof last, "%s", (reply != NULL) ? reply->text : "");
+    (void)snprintf(armed_key, sizeof armed_key, "%s",
+                   (bridge_lease_key(&lease) != NULL) ? bridge_lease_key(&lease) : "");
+}
+
+static void step(void) {
+    fake_gateway_accept(&gateway);
+    bridge_lease_step(&lease, now_us);
+}
+
+void setUp(void) {
+    fake_gateway_open(&gateway);
+    now_us = 10000000U;
+    answered = refused = 0;
+    armed_key[0] = '\0';
+    epoll_fd = epoll_create1(EPOLL_CLOEXEC);
+    TEST_ASSERT_TRUE(bridge_lease_open(&lease, gateway.path, epoll_fd));
+}
+
+void tearDown(void) {
+    bridge_lease_close(&lease);
+    (void)close(epoll_fd);
+    fake_gateway_close(&gateway);
+}
+
+/// Arms as the next connection; the gateway's reply has `fields`.
+static void arm(const char *name, bool ok, const char *fields) {
+    const int connection = gateway.count;
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, name, ARM, take_answer, NULL, now_us));
+    step();
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, connection, line, sizeof line));
+    fake_gateway_reply(&gateway, connection, line, ok, fields);
+    step();
+}
+
+static void test_lease_viewer_has_no_connection(void) {
+    step();
+    TEST_ASSERT_EQUAL(0, gateway.count);
+    TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, bridge_lease_next_us(&lease, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, NULL, NULL, now_us));
+}
+
+static void test_one_person_key_of_the_gateway_is_in_each_drive(void) {
+    arm("a", true, GIVEN);
+    TEST_ASSERT_EQUAL_STRING(KEY, armed_key);
+    TEST_ASSERT_EQUAL_STRING("a", bridge_lease_name(&lease));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, take_answer, NULL, now_us));
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
+    TEST_ASSERT_NOT_NULL(strstr(line, "\"right_mm_s\":100,\"key\":\"00112233445566778899aabbccddeeff\"}"));
+}
+
+static void test_one_person_without_gateways_key_gets_a_drawn_one(void) {
+    arm("a", true, ",\"state\":\"armed\"");
+    TEST_ASSERT_EQUAL(32, strlen(armed_key));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, armed_key, DRIVE, take_answer, NULL, now_us));
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
+    TEST_ASSERT_NULL(strstr(line, "key"));
+}
+
+static void test_one_person_other_key_never_drives(void) {
+    static const char *const wrong[] = {NULL, "", "00112233445566778899aabbccddeefe", "00112233445566778899aabbccddeef",
+                                        "00112233445566778899aabbccddeefff"};
+    arm("a", true, GIVEN);
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, wrong[i], DRIVE, NULL, NULL, now_us));
+    }
+    TEST_ASSERT_FALSE(fake_gateway_read(&gateway, 0, line, sizeof line));
+}
+
+static void test_one_person_second_is_another_client_and_refused(void) {
+    arm("a", true, GIVEN);
+    arm("b", false, ",\"error\":\"busy\",\"message\":\"a drives\"");
+    TEST_ASSERT_NOT_NULL(strstr(last, "busy"));
+    TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 1));
+    TEST_ASSERT_FALSE(fake_gateway_is_closed(&gateway, 0));
+    TEST_ASSERT_EQUAL_STRING("a", bridge_lease_name(&lease));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, NULL, NULL, now_us));
+}
+
+static void test_one_person_third_is_busy_while_second_asks(void) {
+    arm("a", true, GIVEN);
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "b", ARM, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_BUSY, bridge_lease_arm(&lease, "c", ARM, take_answer, NULL, now_us));
+    step();
+    TEST_ASSERT_EQUAL(2, gateway.count);
+}
+
+static void test_one_person_takeover_ends_the_former_holder(void) {
+    arm("a", true, GIVEN);
+    arm("b", true, ",\"key\":\"ffeeddccbbaa99887766554433221100\"");
+    TEST_ASSERT_EQUAL_STRING("b", bridge_lease_name(&lease));
+    TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, NULL, NULL, now_us));
+}
+
+static void test_lease_end_voids_the_key_before_the_connection(void) {
+    arm("a", true, GIVEN);
+    bridge_lease_end(&lease, now_us);
+    TEST_ASSERT_NULL(bridge_lease_name(&lease));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, NULL, NULL, now_us));
+    TEST_ASSERT_FALSE(fake_gateway_is_closed(&gateway, 0));
+    TEST_ASSERT_EQUAL_UINT64(now_us + BRIDGE_ENDING_US, bridge_lease_next_us(&lease, now_us));
+    now_us += BRIDGE_ENDING_US;
+    step();
+    TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
+}
+
+static void test_lease_ending_place_makes_room_for_the_next(void) {
+    arm("a", true, GIVEN);
+    bridge_lease_end(&lease, now_us);
+    arm("b", true, GIVEN);
+    bridge_lease_end(&lease, now_us);
+    arm("c", true, GIVEN);
+    TEST_ASSERT_EQUAL_STRING("c", bridge_lease_name(&lease));
+    TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0) || fake_gateway_is_closed(&gateway, 1));
+}
+
+static void test_lease_end_refuses_who_asks(void) {
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, take_answer, NULL, now_us));
+    step();
+    bridge_lease_end(&lease, now_us);
+    TEST_ASSERT_EQUAL(1, refused);
+    TEST_ASSERT_NULL(bridge_lease_name(&lease));
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line)); // The arm; behind it the connection ends.
+    TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
+}
+
+static void test_lease_forgotten_asker_gets_no_lease(void) {
+    int who = 0;
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, take_answer, &who, now_us));
+    step();
+    bridge_lease_forget(&lease, &who);
+    TEST_ASSERT_EQUAL(0, answered + refused);
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
+    TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
+}
+
+static void test_lease_not_holder_ends_it(void) {
+    arm("a", true, GIVEN);
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, take_answer, NULL, now_us));
+    TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
+    fake_gateway_reply(&gateway, 0, line, false, ",\"error\":\"not_holder\",\"message\":\"m\"");
+    step();
+    TEST_ASSERT_NOT_NULL(strstr(last, "not_holder"));
+    TEST_ASSERT_NULL(bridge_lease_name(&lease));
+    TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
+}
+
+static void test_lease_lost_connection_answers_drives_once(void) {
+    arm("a", true, GIVEN);
+    for (int i = 0; i < 4; i++) {
+        TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, take_answer, NULL, now_us));
+    }
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_FULL, bridge_lease_drive(&lease, KEY, DRIVE, take_answer, NULL, now_us));
+    fake_gateway_hang_up(&gateway, 0);
+    step();
+    TEST_ASSERT_EQUAL(4, refused);
+    TEST_ASSERT_NULL(bridge_lease_name(&lease));
+}
+
+static void test_lease_arm_without_reply_ends(void) {
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, take_answer, NULL, now_us));
+    step();
+    now_us += BRIDGE_ARM_US;
+    step();
+    TEST_ASSERT_EQUAL(1, refused);
+    fake_gateway_close(&gateway);
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_AWAY, bridge_lease_arm(&lease, "a", ARM, take_answer, NULL, now_us));
+}
+
+static void test_movers_deflected_stick_is_named_for_its_time(void) {
+    bridge_movers_t movers = {0};
+    TEST_ASSERT_NULL(bridge_movers_who(&movers, NULL, 200, now_us));
+    bridge_movers_note(&movers, "b", now_us);
+    TEST_ASSERT_EQUAL_STRING("b", bridge_movers_who(&movers, NULL, 200, now_us + 499U * MS));
+    TEST_ASSERT_EQUAL_STRING("b", bridge_movers_who(&movers, "a", 200, now_us));
+    TEST_ASSERT_NULL(bridge_movers_who(&movers, "b", 200, now_us));
+    TEST_ASSERT_NULL(bridge_movers_who(&movers, NULL, 200, now_us + 500U * MS));
+    TEST_ASSERT_EQUAL_STRING("b", bridge_movers_who(&movers, NULL, 800, now_us + 799U * MS));
+}
+
+static void test_movers_many_sources_replace_the_oldest(void) {
+    bridge_movers_t movers = {0};
+    char name[8];
+    for (unsigned i = 0; i < 3U * BRIDGE_MOVERS_MAX; i++) {
+        (void)snprintf(name, sizeof name, "n%u", i);
+        bridge_movers_note(&movers, name, now_us + i);
+        TEST_ASSERT_NOT_NULL(bridge_movers_who(&movers, NULL, 200, now_us + i));
+    }
+    bridge_movers_note(&movers, name, now_us + 1000U * MS);
+    TEST_ASSERT_EQUAL_STRING(name, bridge_movers_who(&movers, NULL, 200, now_us + 1000U * MS));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_lease_viewer_has_no_connection);
+    RUN_TEST(test_one_person_key_of_the_gateway_is_in_each_drive);
+    RUN_TEST(test_one_person_without_gateways_key_gets_a_drawn_one);
+    RUN_TEST(test_one_person_other_key_never_drives);
+    RUN_TEST(test_one_person_second_is_another_client_and_refused);
+    RUN_TEST(test_one_person_third_is_busy_while_second_asks);
+    RUN_TEST(test_one_person_takeover_ends_the_former_holder);
+    RUN_TEST(test_lease_end_voids_the_key_before_the_connection);
+    RUN_TEST(test_lease_ending_place_makes_room_for_the_next);
+    RUN_TEST(test_lease_end_refuses_who_asks);
+    RUN_TEST(test_lease_forgotten_asker_gets_no_lease);
+    RUN_TEST(test_lease_not_holder_ends_it);
+    RUN_TEST(test_lease_lost_connection_answers_drives_once);
+    RUN_TEST(test_lease_arm_without_reply_ends);
+    RUN_TEST(test_movers_deflected_stick_is_named_for_its_time);
+    RUN_TEST(test_movers_many_sources_replace_the_oldest);
+    return UNITY_END();
+}
