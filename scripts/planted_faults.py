@@ -341,6 +341,11 @@ def memory(folder, fault):
     return 0, ""
 
 
+def proofs(folder, change):
+    (folder / "proofs.csv").write_text(change((ROOT / "docs/developer/proofs.csv").read_text()))
+    return run(SCRIPTS / "proofs.py", folder / "proofs.csv")
+
+
 def function(body, parameters="int a"):
     return CLEAN + f"int iw_g({parameters});\nint iw_g({parameters})\n{{\n{body}}}\n"
 
@@ -492,6 +497,11 @@ CASES = [
     (memory, "git", "what is new is not read", ("scripts/fingerprint", "-co --exclude-standard", "-c"), True),
     (memory, "git", "what failed is remembered", ("check", '[ "$status" -ne 0 ] || remember', "failed=0 && remember"), True),
     (memory, "git", "what changed meanwhile is remembered", ("check", '&& [ "$(fingerprint "$1")" = "$2" ] ||', "||"), True),
+    (proofs, "python3", "clean", str, False),
+    (proofs, "python3", "a proof with fewer single tests", lambda table: re.sub(r"^(unit.ctl,.*),\d+,check$", r"\1,9999,check", table, flags=re.M), True),
+    (proofs, "python3", "a proof that is gone", lambda table: table + "unit.gone,x,./check unit,1,check\n", True),
+    (proofs, "python3", "a step without a row", lambda table: re.sub(r"^demo,.*\n", "", table, flags=re.M), True),
+    (proofs, "python3", "a proof that changes its list", lambda table: re.sub(r"^(kernel.check,.*),check$", r"\1,full", table, flags=re.M), True),
     (counting, "python3", "clean", junit("run", "3 Tests 0 Failures 0 Ignored"), False),
     (counting, "python3", "a failed test", junit("fail", "3 Tests 1 Failures 0 Ignored"), True),
     (counting, "python3", "a failed Python test", junit("fail", "Ran 5 tests in 0.1s\n\nFAILED (failures=1, skipped=1)"), True),

@@ -41,31 +41,12 @@ def attempt(build, name):
     if done.returncode != 0:
         return verdict.of_text(output)
     skips = re.findall(r"\.\.\. skipped ['\"](.*)['\"]$", done.stderr, re.MULTILINE)
-    return verdict.Attempt(tests=int(ran[1]), skips=len(skips), data=skips)
-
-
-def report(name, _, ended, tries):
-    words = "\n".join(failure.text for failure in ended.failures)
-    for reason in ended.data or ():
-        print(f"skip: {name}: {reason}", flush=True)
-    if ended.skip:
-        print(f"skip: {name}: {ended.skip}\n{words}", flush=True)
-    elif words or tries > 1:
-        print("FAILED" if words else f"ok, attempt {tries}, alone:", name, words, flush=True)
-
-
-def run_all(build, at_a_time):
-    """The exit status. What stalls of the machine explain, decides test/support/verdict.py."""
-    session = verdict.Session(lambda name: attempt(build, name), report, verdict.Witness())
-    try:
-        session.run(names(), at_a_time)
-    finally:
-        session.witness.close()
-    return session.end()
+    print(*(f"skip: {name}: {reason}\n" for reason in skips), sep="", end="", flush=True)
+    return verdict.Attempt(tests=int(ran[1]), skips=len(skips))
 
 
 def main(build, at_a_time=4):
     """As unittest.main, if its arguments follow; else all of them."""
     if len(sys.argv) > 1:
         unittest.main()
-    sys.exit(run_all(build, at_a_time))
+    sys.exit(verdict.run_all(names(), lambda name: attempt(build, name), at_a_time).end())

@@ -266,6 +266,25 @@ def sleepers(path, nice):
         sleep_on(file, parent)
 
 
+def report(name, verdict, attempt, tries):
+    """Prints a verdict in a line, and why."""
+    words = "\n".join(failure.text for failure in attempt.failures)
+    later = f", attempt {tries}, alone" if tries > 1 else ""
+    seconds = (attempt.end_us - attempt.begin_us) / 1e6
+    head = f"skip: {name}: {attempt.skip}" if attempt.skip else f"{'ok' if verdict == PASSED else 'FAILED':7} {name} ({seconds:.1f} s{later})"
+    print(head + (f"\n{words}" if words else ""), flush=True)
+
+
+def run_all(names, attempt, jobs=1, tell=report):
+    """All of a runner's tests, next to a witness. Returns the session: `end` sums up."""
+    session = Session(attempt, tell, Witness())
+    try:
+        session.run(names, jobs)
+    finally:
+        session.witness.close()
+    return session
+
+
 def run_command(name, command):
     """One command is the test. Prints its output, and returns the exit status of a runner; 77 of the command means skipped."""
 
@@ -274,16 +293,9 @@ def run_command(name, command):
         print(done.stdout, end="", flush=True)
         if done.returncode == 77:
             return Attempt(skip=(done.stdout.splitlines() or [""])[-1])
-        return Attempt() if done.returncode == 0 else of_text(f"ended with {done.returncode}\n{done.stdout}")
+        return Attempt() if done.returncode == 0 else of_text(f"ended with {done.returncode}; its output is above\n{done.stdout}")
 
-    def report(_, verdict, ended, tries):
-        print(f"{verdict}: {name}" + (f", attempt {tries}" if tries > 1 else "") + (f": {ended.skip}" if ended.skip else ""), flush=True)
-
-    session = Session(attempt, report, Witness())
-    try:
-        session.run([name])
-    finally:
-        session.witness.close()
+    session = run_all([name], attempt)
     status = session.end()
     return 77 if status == 1 and session.counts[SKIPPED] else status
 

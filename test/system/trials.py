@@ -3,6 +3,7 @@
 
 import argparse
 import os
+import sys
 import threading
 import time
 import traceback
@@ -11,9 +12,10 @@ from pathlib import Path
 from bus import now_us
 from client import Closed
 from judge_log import LEFT, RIGHT
-from verdict import Attempt, Session, Witness, of_text
 
 ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path.append(str(ROOT / "test/support"))
+import verdict  # noqa: E402
 
 
 class Skip(Exception):
@@ -104,25 +106,15 @@ def attempt(function, make_rig):
     try:
         rig = make_rig(**getattr(function, "rig", {}))
         function(rig)
-        return Attempt()
+        return verdict.Attempt()
     except Skip as reason:
-        return Attempt(skip=str(reason))
+        return verdict.Attempt(skip=str(reason))
     except Exception as error:  # pylint: disable=broad-except
         logs = [rig.words()[-800:], rig.gateway.text()[-800:] if rig.gateway else ""] if rig else []
-        return of_text("\n".join([f"{type(error).__name__}: {error}", traceback.format_exc(limit=-4), *logs]))
+        return verdict.of_text("\n".join([f"{type(error).__name__}: {error}", traceback.format_exc(limit=-4), *logs]))
     finally:
         if rig:
             rig.close()
-
-
-def report(name, _, ended, tries):
-    seconds = (ended.end_us - ended.begin_us) / 1e6
-    words = "\n".join(failure.text for failure in ended.failures)
-    if ended.skip:
-        print(f"skip: {name}: {ended.skip}{chr(10) if words else ''}{words}", flush=True)
-    else:
-        later = f", attempt {tries}, alone" if tries > 1 else ""
-        print(f"{'FAILED' if words else 'ok':7} {name} ({seconds:.1f} s{later}){chr(10) if words else ''}{words}", flush=True)
 
 
 def parser(usage):
@@ -145,9 +137,4 @@ def main(options, modules, rig):
               (not getattr(one[1], "full", False) or os.environ.get("IWHEEL_FULL") == "1")]
     functions = dict(chosen)
     assert len(functions) == len(chosen), "two tests have one name"
-    session = Session(lambda name: attempt(functions[name], lambda **what: rig(options.build, **what)), report, Witness())
-    try:
-        session.run(list(functions), options.jobs)
-    finally:
-        session.witness.close()
-    return session.end()
+    return verdict.run_all(list(functions), lambda name: attempt(functions[name], lambda **what: rig(options.build, **what)), options.jobs).end()
