@@ -26,16 +26,20 @@ static void pass(unsigned for_ms) {
     }
 }
 
-static void command(const char *verb, const char *fields) {
+static void command_from(const char *from, const char *verb, const char *fields) {
     char topic[64];
     char payload[256];
     const mqtt_labels_t labels = {.expiry_s = 0};
     (void)snprintf(topic, sizeof topic, "iwheel/w1/cmd/%s", verb);
-    (void)snprintf(payload, sizeof payload, "{\"boot\":\"%s\",\"t_us\":%llu,\"from\":\"pad\",\"seq\":%u%s}", bridge.boot,
-                   (unsigned long long)bridge.now_us, ++sequence, fields);
+    (void)snprintf(payload, sizeof payload, "{\"boot\":\"%s\",\"t_us\":%llu,\"from\":\"%s\",\"seq\":%u%s}", bridge.boot,
+                   (unsigned long long)bridge.now_us, from, ++sequence, fields);
     const struct mosquitto_message message = {
         .topic = topic, .payload = payload, .payloadlen = (int)strlen(payload), .qos = 0, .retain = false};
     mqtt_bridge_command(&bridge, &message, &labels);
+}
+
+static void command(const char *verb, const char *fields) {
+    command_from("pad", verb, fields);
 }
 
 static void drive(unsigned for_ms) {
@@ -97,9 +101,27 @@ static void test_broker_lost_and_back_drives_nothing_without_arm(void) {
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
+static void test_sender_that_has_not_armed_drives_nothing(void) {
+    command_from("other", "drive", ",\"left_mm_s\":-100,\"right_mm_s\":-100");
+    pass(50);
+    TEST_ASSERT_EQUAL_UINT64(1, bridge.judge.counts[MQTT_DENIED]);
+    TEST_ASSERT_EQUAL_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
+    daemon_rig_crash();
+    pass(1000);
+    daemon_rig_start();
+    pass(6000);
+    drive(100);
+    TEST_ASSERT_EQUAL_UINT64(2, bridge.judge.counts[MQTT_DENIED]);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_broker_lost_stops_the_wheels_with_the_cause_client_stop);
     RUN_TEST(test_broker_lost_and_back_drives_nothing_without_arm);
+    RUN_TEST(test_sender_that_has_not_armed_drives_nothing);
+    RUN_TEST(test_sender_has_no_lease_after_the_gateway_restarted);
     return UNITY_END();
 }

@@ -91,10 +91,18 @@ static void test_key_of_a_silent_page_ends(void) {
     TEST_ASSERT_EQUAL_CHAR('\0', server.driver.key[0]);
 }
 
+static void test_key_of_another_page_begins_its_own_sequence(void) {
+    TEST_ASSERT_NULL(drive());
+    TEST_ASSERT_NOT_NULL(drive()); // The same sequence again.
+    web_driver_begin(&server.driver, key, now_us);
+    TEST_ASSERT_NULL(drive());
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_key_of_a_page_stays_while_the_gateway_is_there);
     RUN_TEST(test_key_of_a_page_ends_with_its_gateway);
     RUN_TEST(test_key_of_a_silent_page_ends);
+    RUN_TEST(test_key_of_another_page_begins_its_own_sequence);
     return UNITY_END();
 }
