@@ -108,8 +108,18 @@ static void test_sender_that_has_not_armed_drives_nothing(void) {
     TEST_ASSERT_EQUAL_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
 }
 
+static void test_sender_that_stopped_drives_nothing_without_arm(void) {
+    command("stop", "");
+    command("drive", ",\"left_mm_s\":100,\"right_mm_s\":100"); // Before the gateway could answer.
+    TEST_ASSERT_EQUAL_UINT64(1, bridge.judge.counts[MQTT_DENIED]);
+    pass(2000);
+    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+}
+
 static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
     daemon_rig_crash();
+    pass(100);
+    TEST_ASSERT_EQUAL_CHAR('\0', bridge.driver[0]);
     pass(1000);
     daemon_rig_start();
     pass(6000);
@@ -122,6 +132,7 @@ int main(void) {
     RUN_TEST(test_broker_lost_stops_the_wheels_with_the_cause_client_stop);
     RUN_TEST(test_broker_lost_and_back_drives_nothing_without_arm);
     RUN_TEST(test_sender_that_has_not_armed_drives_nothing);
+    RUN_TEST(test_sender_that_stopped_drives_nothing_without_arm);
     RUN_TEST(test_sender_has_no_lease_after_the_gateway_restarted);
     return UNITY_END();
 }
