@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What opens, keeps and ends a channel of the serial line, and when the board may write its flash.
+// Opening and ending of the channels of the serial line, the age limit of commands, and writes to flash.
 #include "host_rig.inc"
 
 /// Lets time pass with a relay that says only `noise`, every 50 ms.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What all bridges do with signals, and with a log that nobody reads.
+// The handling of signals that all bridges share, and a log without a reader.
 #include "common/service.h"
 
 #include "unity.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Several clients in one wake-up of the gateway: what they ask has one outcome, whoever is served first.
+// Several clients in one wake-up of the gateway: the outcome does not depend on the order in which the gateway serves them.
 #include "daemon_client.h"
 
 #include "unity.h"
@@ -30,8 +30,8 @@ static void put_line(int fd, const char *line) {
     TEST_ASSERT_EQUAL_INT(strlen(line), write(fd, line, strlen(line)));
 }
 
-/// What has come for that client so far.
-static const char *heard(int fd) {
+/// Everything that the client has received so far.
+static const char *received(int fd) {
     static char text[8192];
     const ssize_t length = read(fd, text, sizeof text - 1U);
     text[(length > 0) ? length : 0] = '\0';
@@ -44,12 +44,12 @@ static void test_two_takeovers_in_one_wake_up_grant_one_lease(void) {
     daemon_rig_arm(client);
     crowd_comes();
     for (unsigned i = 0; i < CROWD; i++) {
-        (void)heard(crowd[i]);
+        (void)received(crowd[i]);
         put_line(crowd[i], "{\"cmd\":\"arm\",\"takeover\":true,\"id\":7}\n");
     }
     daemon_rig_run(60);
     for (unsigned i = 0; i < CROWD; i++) {
-        const char *text = heard(crowd[i]);
+        const char *text = received(crowd[i]);
         granted += (strstr(text, "\"ok\":true") != NULL) ? 1U : 0U;
         refused += (strstr(text, "\"ok\":false") != NULL) ? 1U : 0U;
     }
@@ -98,7 +98,7 @@ static void test_log_without_a_reader_ends_nothing(void) {
 }
 
 int main(void) {
-    (void)signal(SIGPIPE, SIG_DFL); // The gateway ignores it; whoever started this may have, too.
+    (void)signal(SIGPIPE, SIG_DFL); // The gateway ignores it; the parent process may ignore it as well.
     UNITY_BEGIN();
     RUN_TEST(test_two_takeovers_in_one_wake_up_grant_one_lease);
     RUN_TEST(test_stop_and_command_in_one_wake_up_stop);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The relay's whole loop with a board and clients of this file's: time, waits and the port are here, the sockets are real.
+// The relay's whole loop with a simulated board: this file replaces time, waits and the port; the sockets are real.
 #include "relay.h"
 
 #include "iwheel_linux/clock.h"
@@ -345,9 +345,9 @@ static void test_relay_watcher_may_stop_and_not_arm(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"stop\""), to_board);
 }
 
-static char heard[1024];
+static char received[1024];
 
-/// An event of the client before comes on the channel, and then silence.
+/// An event for the previous client arrives on the channel before the hello.
 static bool event_before_hello(void) {
     switch (step) {
     case 2:
@@ -363,7 +363,7 @@ static bool event_before_hello(void) {
         board_writes(1, EARLY + 2, "{\"event\":\"hello\"}");
         break;
     case 150:
-        (void)recv(client_fd, heard, sizeof heard - 1U, MSG_DONTWAIT);
+        (void)recv(client_fd, received, sizeof received - 1U, MSG_DONTWAIT);
         break;
     default:
         break;
@@ -371,10 +371,10 @@ static bool event_before_hello(void) {
     return step == 150U;
 }
 
-static void test_relay_event_before_hello_reaches_nobody(void) {
-    memset(heard, 0, sizeof heard);
+static void test_relay_event_before_hello_is_dropped(void) {
+    memset(received, 0, sizeof received);
     run(event_before_hello);
-    TEST_ASSERT_EQUAL_STRING("{\"event\":\"hello\"}\n", heard);
+    TEST_ASSERT_EQUAL_STRING("{\"event\":\"hello\"}\n", received);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"alive\""), to_board);
 }
 
@@ -426,7 +426,7 @@ int main(void) {
     RUN_TEST(test_relay_stamp_of_the_same_wake_up_is_not_quoted);
     RUN_TEST(test_relay_arm_from_a_gap_is_not_sent);
     RUN_TEST(test_relay_watcher_may_stop_and_not_arm);
-    RUN_TEST(test_relay_event_before_hello_reaches_nobody);
+    RUN_TEST(test_relay_event_before_hello_is_dropped);
     RUN_TEST(test_relay_client_ends_with_its_start_of_the_board);
     RUN_TEST(test_relay_log_without_a_reader_ends_nothing);
     (void)rmdir(folder);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who holds the pad of the page, through what happens to the gateway: the server's own round, without HTTP and without a gateway.
+// The key of the page that drives: how long it is valid. The server runs without HTTP and without a gateway.
 #include "server.h"
 
 #include "unity.h"
@@ -49,11 +49,11 @@ static void round_after(uint64_t span_us) {
 }
 
 static const char *drive(void) {
-    char told[24];
+    char t_us[24];
     const web_limits_t limits = {.max_speed_mm_s = 500, .ttl_us = 300000};
     web_twist_t twist;
-    (void)snprintf(told, sizeof told, "%llu", (unsigned long long)now_us);
-    const web_command_t command = {.key = key, .t_us = told, .sequence = "1", .v_mm_s = "100", .yaw_mrad_s = "0"};
+    (void)snprintf(t_us, sizeof t_us, "%llu", (unsigned long long)now_us);
+    const web_command_t command = {.key = key, .t_us = t_us, .sequence = "1", .v_mm_s = "100", .yaw_mrad_s = "0"};
     return web_driver_take(&server.driver, &command, &limits, now_us, &twist);
 }
 
