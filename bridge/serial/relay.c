@@ -190,7 +190,6 @@ static int open_loop(relay_t *self) {
     (void)sigaddset(&set, SIGTERM);
     (void)sigaddset(&set, SIGINT);
     (void)sigprocmask(SIG_BLOCK, &set, NULL);
-    (void)signal(SIGPIPE, SIG_IGN);
     self->signal_fd = signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
     const int error = gw_wakeup_open(&self->wakeup);
     self->clients.epoll_fd = self->wakeup.fd;
@@ -327,6 +326,7 @@ static int open_sockets(relay_t *self) {
 }
 
 static void compose(relay_t *self, const serial_settings_t *settings) {
+    (void)signal(SIGPIPE, SIG_IGN); // Before the first line of the log, whose reader may be gone.
     memset(self, 0, sizeof *self);
     self->settings = settings;
     self->port.fd = -1;

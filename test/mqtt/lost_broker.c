@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a lost broker does to a drive: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). There is no broker; the
+// A lost broker while an MQTT client drives: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). There is no broker; the
 // commands and the loss are handed to the bridge as its connection hands them over.
 #include "bridge.h"
 #include "hours_rig.h"
@@ -26,16 +26,20 @@ static void pass(unsigned for_ms) {
     }
 }
 
-static void command(const char *verb, const char *fields) {
+static void command_from(const char *from, const char *verb, const char *fields) {
     char topic[64];
     char payload[256];
     const mqtt_labels_t labels = {.expiry_s = 0};
     (void)snprintf(topic, sizeof topic, "iwheel/w1/cmd/%s", verb);
-    (void)snprintf(payload, sizeof payload, "{\"boot\":\"%s\",\"t_us\":%llu,\"from\":\"pad\",\"seq\":%u%s}", bridge.boot,
-                   (unsigned long long)bridge.now_us, ++sequence, fields);
+    (void)snprintf(payload, sizeof payload, "{\"boot\":\"%s\",\"t_us\":%llu,\"from\":\"%s\",\"seq\":%u%s}", bridge.boot,
+                   (unsigned long long)bridge.now_us, from, ++sequence, fields);
     const struct mosquitto_message message = {
         .topic = topic, .payload = payload, .payloadlen = (int)strlen(payload), .qos = 0, .retain = false};
     mqtt_bridge_command(&bridge, &message, &labels);
+}
+
+static void command(const char *verb, const char *fields) {
+    command_from("pad", verb, fields);
 }
 
 static void drive(unsigned for_ms) {
@@ -62,8 +66,8 @@ void setUp(void) {
     (void)snprintf(settings.spool.directory, sizeof settings.spool.directory, "%s", folder);
     settings.drive.enabled = true;
     (void)snprintf(settings.gateway.socket, sizeof settings.gateway.socket, "/run/iwheel/gateway.sock");
-    settings.broker.port = 1; // Nothing listens there.
     TEST_ASSERT_EQUAL_INT(0, mqtt_bridge_open(&bridge, &settings));
+    bridge.broker.try_us = UINT64_MAX; // Never: a connection is made in a thread, in real time.
     pass(500);
     command("arm", "");
     pass(200);
@@ -97,9 +101,38 @@ static void test_broker_lost_and_back_drives_nothing_without_arm(void) {
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
+static void test_sender_that_has_not_armed_drives_nothing(void) {
+    command_from("other", "drive", ",\"left_mm_s\":-100,\"right_mm_s\":-100");
+    pass(50);
+    TEST_ASSERT_EQUAL_UINT64(1, bridge.judge.counts[MQTT_DENIED]);
+    TEST_ASSERT_EQUAL_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+static void test_sender_that_stopped_drives_nothing_without_arm(void) {
+    command("stop", "");
+    command("drive", ",\"left_mm_s\":100,\"right_mm_s\":100"); // Before the gateway could answer.
+    TEST_ASSERT_EQUAL_UINT64(1, bridge.judge.counts[MQTT_DENIED]);
+    pass(2000);
+    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
+}
+
+static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
+    daemon_rig_crash();
+    pass(100);
+    TEST_ASSERT_EQUAL_CHAR('\0', bridge.driver[0]);
+    pass(1000);
+    daemon_rig_start();
+    pass(6000);
+    drive(100);
+    TEST_ASSERT_EQUAL_UINT64(2, bridge.judge.counts[MQTT_DENIED]);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_broker_lost_stops_the_wheels_with_the_cause_client_stop);
     RUN_TEST(test_broker_lost_and_back_drives_nothing_without_arm);
+    RUN_TEST(test_sender_that_has_not_armed_drives_nothing);
+    RUN_TEST(test_sender_that_stopped_drives_nothing_without_arm);
+    RUN_TEST(test_sender_has_no_lease_after_the_gateway_restarted);
     return UNITY_END();
 }

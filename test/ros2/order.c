@@ -7,6 +7,7 @@
 #include "unity.h"
 
 #include <string.h>
+#include <unistd.h>
 
 #define PASS_MS 5U
 
@@ -164,14 +165,16 @@ static void test_ros_stop_that_came_with_a_command_stops(void) {
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
 }
 
-static void test_ros_silent_source_stops_within_its_timeout(void) {
+static void test_ros_silent_source_stops_before_the_lease_ends(void) {
+    bridge.settings.drive.timeout_ms = 100;
     arm();
     for (unsigned i = 0; i < 10U; i++) {
         command_comes(0.3);
         pass(20);
     }
-    pass(settings.drive.timeout_ms + 200U);
+    pass(150);
     TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, gw_wheels_look(&daemon_rig.daemon->wheels).stop->cause);
 }
 
 static void test_ros_command_that_was_late_is_not_passed(void) {
@@ -191,12 +194,58 @@ static void test_ros_command_that_was_late_is_not_passed(void) {
 
 static void test_ros_estop_latches_and_reset_is_not_for_the_network(void) {
     request_comes(ROS_ESTOP);
-    pass(100);
+    pass(3000); // The gateway itself would take a reset now.
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
     request_comes(ROS_RESET);
     pass(500);
     TEST_ASSERT_TRUE(answered && !success);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+}
+
+static void test_ros_command_with_an_old_header_is_not_passed(void) {
+    arm();
+    for (unsigned i = 0; i < 5U; i++) {
+        command_comes(0.0);
+        command.stamp_us = command.sent_us;
+        pass(20);
+    }
+    command_comes(0.3);
+    command.stamp_us = command.sent_us - 5000000;
+    pass(20);
+    TEST_ASSERT_EQUAL_UINT64(1, bridge.facts.commands.late);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+static void test_ros_arm_takes_no_lease_from_another_client(void) {
+    const int other = daemon_rig_connect();
+    daemon_rig_arm(other);
+    request_comes(ROS_ARM);
+    pass(100);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    TEST_ASSERT_FALSE(bridge.facts.machine.now.ours);
+    (void)close(other);
+}
+
+static void test_ros_arm_that_was_late_is_refused(void) {
+    arm();
+    request_comes(ROS_STOP);
+    pass(3000);
+    request_comes(ROS_ARM);
+    request.sent_us -= 5000000;
+    pass(200);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+}
+
+static void test_ros_command_that_arms_does_not_drive(void) {
+    bridge.settings.drive.auto_arm = true;
+    pass(3000);
+    command_comes(0.3);
+    pass(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    TEST_ASSERT_EQUAL_UINT64(0, bridge.facts.commands.passed);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
 }
 
 static void test_ros_bridge_that_only_watches_does_not_arm(void) {
@@ -211,9 +260,13 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_ros_command_that_came_with_arm_prevents_it);
     RUN_TEST(test_ros_stop_that_came_with_a_command_stops);
-    RUN_TEST(test_ros_silent_source_stops_within_its_timeout);
+    RUN_TEST(test_ros_silent_source_stops_before_the_lease_ends);
     RUN_TEST(test_ros_command_that_was_late_is_not_passed);
     RUN_TEST(test_ros_estop_latches_and_reset_is_not_for_the_network);
+    RUN_TEST(test_ros_command_with_an_old_header_is_not_passed);
+    RUN_TEST(test_ros_arm_takes_no_lease_from_another_client);
+    RUN_TEST(test_ros_arm_that_was_late_is_refused);
+    RUN_TEST(test_ros_command_that_arms_does_not_drive);
     RUN_TEST(test_ros_bridge_that_only_watches_does_not_arm);
     return UNITY_END();
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What opens, keeps and ends a channel of the serial line, and when the board may write its flash.
+// Opening and ending of the channels of the serial line, the age limit of commands, and writes to flash.
 #include "host_rig.inc"
 
 /// Lets time pass with a relay that says only `noise`, every 50 ms.
@@ -96,6 +96,25 @@ static void test_flash_is_not_written_while_an_arm_waits(void) {
     TEST_ASSERT_EQUAL_UINT64(0, host.restart_us);
 }
 
+static void test_channel_that_only_watches_may_not_arm(void) {
+    run_until_listening();
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":true}");
+    say(2, "{\"cmd\":\"arm\",\"id\":9}");
+    all_length = 0;
+    run_ms(60);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(all, "\"id\":9,\"ok\":false,\"error\":\"denied\""), all);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, iw_gateway_state(&rig.gateway));
+}
+
+static void test_channel_closed_leaves_the_others(void) {
+    say(0, "{\"cmd\":\"open\",\"channel\":2,\"watch\":false}");
+    say(0, "{\"cmd\":\"close\",\"channel\":2}");
+    run_ms(20);
+    TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, host.client[0].id);
+    TEST_ASSERT_EQUAL_UINT(IW_CLIENT_NONE, host.client[1].id);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_channel_opened_again_has_no_lease);
@@ -104,6 +123,8 @@ int main(void) {
     RUN_TEST(test_channel_of_a_relay_that_is_alive_stays);
     RUN_TEST(test_command_older_than_a_short_lease_is_stale);
     RUN_TEST(test_command_within_a_long_lease_is_not_stale);
+    RUN_TEST(test_channel_that_only_watches_may_not_arm);
+    RUN_TEST(test_channel_closed_leaves_the_others);
     RUN_TEST(test_flash_is_not_written_while_an_arm_waits);
     return UNITY_END();
 }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The relay's whole loop with a board and clients of this file's: time, waits and the port are here, the sockets are real.
+// The relay's whole loop with a simulated board: this file replaces time, waits and the port; the sockets are real.
 #include "relay.h"
 
 #include "iwheel_linux/clock.h"
 
 #include "unity.h"
 
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -138,11 +139,15 @@ static void board_links(uint64_t t_us) {
     board_writes(0, t_us, "{\"event\":\"link\",\"boot\":\"" BOOT "\",\"version\":\"1\"}");
 }
 
-static void client_connects(void) {
+static void connect_to(const char *path) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
-    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", settings.northbound.socket);
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
     client_fd = socket(AF_UNIX, SOCK_STREAM, 0);
     TEST_ASSERT_EQUAL_INT(0, connect(client_fd, (struct sockaddr *)&address, sizeof address));
+}
+
+static void client_connects(void) {
+    connect_to(settings.northbound.socket);
 }
 
 static void client_writes(const char *line) {
@@ -291,12 +296,139 @@ static void test_relay_stamp_of_the_same_wake_up_is_not_quoted(void) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written(early), to_board);
 }
 
+/// The relay stands still for 0.3 s while its client asks for the lease.
+static bool relay_stands_still(void) {
+    if (step < 30U) {
+        return stamp_and_command_together();
+    }
+    if (step == 60U) {
+        client_writes("{\"cmd\":\"arm\",\"id\":1}\n");
+        now_us += 300000U;
+    }
+    return step == 150U;
+}
+
+static void test_relay_arm_from_a_gap_is_not_sent(void) {
+    run(relay_stands_still);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written("\"cmd\":\"arm\""), to_board);
+}
+
+static bool watcher_commands(void) {
+    switch (step) {
+    case 2:
+        board_links(EARLY);
+        break;
+    case 10:
+        connect_to(settings.northbound.watch_socket);
+        break;
+    case 20:
+        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
+        break;
+    case 30:
+        client_writes("{\"cmd\":\"arm\",\"id\":1}\n");
+        break;
+    case 60:
+        client_writes("{\"cmd\":\"stop\",\"id\":2}\n");
+        break;
+    default:
+        break;
+    }
+    return step == 100U;
+}
+
+static void test_relay_watcher_may_stop_and_not_arm(void) {
+    settings.northbound.watch_mode = 0600;
+    settings.northbound.watch_group[0] = '\0';
+    (void)snprintf(settings.northbound.watch_socket, sizeof settings.northbound.watch_socket, "%s/watch", folder);
+    run(watcher_commands);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written("\"cmd\":\"arm\""), to_board);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"stop\""), to_board);
+}
+
+static char received[1024];
+
+/// An event for the previous client arrives on the channel before the hello.
+static bool event_before_hello(void) {
+    switch (step) {
+    case 2:
+        board_links(EARLY);
+        break;
+    case 10:
+        client_connects();
+        break;
+    case 20:
+        board_writes(1, EARLY + 1, "{\"event\":\"lease\",\"holder\":7}");
+        break;
+    case 30:
+        board_writes(1, EARLY + 2, "{\"event\":\"hello\"}");
+        break;
+    case 150:
+        (void)recv(client_fd, received, sizeof received - 1U, MSG_DONTWAIT);
+        break;
+    default:
+        break;
+    }
+    return step == 150U;
+}
+
+static void test_relay_event_before_hello_is_dropped(void) {
+    memset(received, 0, sizeof received);
+    run(event_before_hello);
+    TEST_ASSERT_EQUAL_STRING("{\"event\":\"hello\"}\n", received);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"alive\""), to_board);
+}
+
+/// The board's clock falls back: it has restarted, whatever it says.
+static bool board_restarts(void) {
+    if (step == 40U) {
+        board_writes(1, 5, "{\"event\":\"state\"}");
+    }
+    if (step == 45U) {
+        TEST_ASSERT_EQUAL_UINT(IW_CLIENT_NONE, relay.channel[1].client);
+    }
+    if (step == 39U) {
+        TEST_ASSERT_NOT_EQUAL_UINT(IW_CLIENT_NONE, relay.channel[1].client);
+    }
+    return (step < 40U) ? event_before_hello() : step == 50U;
+}
+
+static void test_relay_client_ends_with_its_start_of_the_board(void) {
+    run(board_restarts);
+}
+
+static bool board_comes(void) {
+    if (step == 2U) {
+        board_links(EARLY);
+    }
+    return step == 20U;
+}
+
+static void test_relay_log_without_a_reader_ends_nothing(void) {
+    const int kept = dup(STDERR_FILENO);
+    int ends[2];
+    TEST_ASSERT_EQUAL_INT(0, pipe(ends));
+    (void)close(ends[0]);
+    (void)dup2(ends[1], STDERR_FILENO);
+    (void)signal(SIGPIPE, SIG_DFL);
+    script = board_comes;
+    const int code = relay_run(&relay, &settings);
+    (void)dup2(kept, STDERR_FILENO);
+    (void)close(kept);
+    (void)close(ends[1]);
+    TEST_ASSERT_EQUAL_INT(0, code);
+}
+
 int main(void) {
     UNITY_BEGIN();
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     RUN_TEST(test_relay_client_gone_before_open_opens_nothing);
     RUN_TEST(test_relay_closes_a_channel_before_it_opens_the_next);
     RUN_TEST(test_relay_stamp_of_the_same_wake_up_is_not_quoted);
+    RUN_TEST(test_relay_arm_from_a_gap_is_not_sent);
+    RUN_TEST(test_relay_watcher_may_stop_and_not_arm);
+    RUN_TEST(test_relay_event_before_hello_is_dropped);
+    RUN_TEST(test_relay_client_ends_with_its_start_of_the_board);
+    RUN_TEST(test_relay_log_without_a_reader_ends_nothing);
     (void)rmdir(folder);
     return UNITY_END();
 }

@@ -333,8 +333,18 @@ static void test_motion_hand_is_stronger_than_the_motor_and_lets_go_at_rest(void
     TEST_ASSERT_INT32_WITHIN(5000, 500000, motion.speed_um_s);
 }
 
+/// 2^31 nm are 2.1 m.
+static void test_motion_way_of_many_metres_does_not_wrap(void) {
+    (void)drive(START_US, 20000U, 1000, 4000);
+    TEST_ASSERT_GREATER_THAN_INT64(17000, sim_motion_true_mm(&motion));
+    sim_motion_push(&motion, START_US + 30000U * MS, 5000);
+    sim_motion_advance(&motion, START_US + 60000U * MS);
+    TEST_ASSERT_GREATER_THAN_INT64(22000, sim_motion_true_mm(&motion));
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_motion_way_of_many_metres_does_not_wrap);
     RUN_TEST(test_random_same_seed_gives_same_numbers_and_another_seed_others);
     RUN_TEST(test_random_noise_stays_within_and_reaches_its_amplitude_around_zero);
     RUN_TEST(test_trig_known_angles_give_known_values);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Who holds the pad of the page, through what happens to the gateway: the server's own round, without HTTP and without a gateway.
+// The key of the page that drives: how long it is valid. The server runs without HTTP and without a gateway.
 #include "server.h"
 
 #include "unity.h"
@@ -49,11 +49,11 @@ static void round_after(uint64_t span_us) {
 }
 
 static const char *drive(void) {
-    char told[24];
+    char t_us[24];
     const web_limits_t limits = {.max_speed_mm_s = 500, .ttl_us = 300000};
     web_twist_t twist;
-    (void)snprintf(told, sizeof told, "%llu", (unsigned long long)now_us);
-    const web_command_t command = {.key = key, .t_us = told, .sequence = "1", .v_mm_s = "100", .yaw_mrad_s = "0"};
+    (void)snprintf(t_us, sizeof t_us, "%llu", (unsigned long long)now_us);
+    const web_command_t command = {.key = key, .t_us = t_us, .sequence = "1", .v_mm_s = "100", .yaw_mrad_s = "0"};
     return web_driver_take(&server.driver, &command, &limits, now_us, &twist);
 }
 
@@ -91,10 +91,18 @@ static void test_key_of_a_silent_page_ends(void) {
     TEST_ASSERT_EQUAL_CHAR('\0', server.driver.key[0]);
 }
 
+static void test_key_of_another_page_begins_its_own_sequence(void) {
+    TEST_ASSERT_NULL(drive());
+    TEST_ASSERT_NOT_NULL(drive()); // The same sequence again.
+    web_driver_begin(&server.driver, key, now_us);
+    TEST_ASSERT_NULL(drive());
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_key_of_a_page_stays_while_the_gateway_is_there);
     RUN_TEST(test_key_of_a_page_ends_with_its_gateway);
     RUN_TEST(test_key_of_a_silent_page_ends);
+    RUN_TEST(test_key_of_another_page_begins_its_own_sequence);
     return UNITY_END();
 }

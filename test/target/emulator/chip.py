@@ -409,7 +409,7 @@ class DmaChannel:
 
     def put(self, byte):
         if not self.is_on() or not self.left:
-            return # Nobody fetches the byte, and the next one writes over it.
+            return # The byte stays in the data register, and the next one overwrites it.
         self.chip.cpu.mem_write(self.registers["memory"] + self.length - self.left, bytes((byte,)))
         self.left -= 1
         self.half |= self.left == self.length // 2

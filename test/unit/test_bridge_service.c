@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// The handling of signals that all bridges share, and a log without a reader.
+#include "common/service.h"
+
+#include "unity.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+void setUp(void) {}
+
+void tearDown(void) {}
+
+static void test_service_log_without_a_reader_ends_nothing(void) {
+    static const char words[] = "iwheel: a line\n";
+    const int kept = dup(STDERR_FILENO);
+    int ends[2];
+    TEST_ASSERT_EQUAL_INT(0, pipe(ends));
+    (void)close(ends[0]);
+    (void)dup2(ends[1], STDERR_FILENO);
+    const ssize_t count = write(STDERR_FILENO, words, sizeof words - 1U);
+    (void)dup2(kept, STDERR_FILENO);
+    (void)close(kept);
+    (void)close(ends[1]);
+    TEST_ASSERT_EQUAL_INT(-1, count);
+}
+
+static void test_service_signal_ends_the_wait_and_the_next_one(void) {
+    TEST_ASSERT_TRUE(bridge_service_wait(NULL, 0, 0));
+    (void)raise(SIGTERM); // Blocked until the wait.
+    TEST_ASSERT_FALSE(bridge_service_wait(NULL, 0, 10000));
+    TEST_ASSERT_FALSE(bridge_service_wait(NULL, 0, -1));
+}
+
+int main(void) {
+    (void)signal(SIGPIPE, SIG_DFL);
+    bridge_service_take_signals();
+    UNITY_BEGIN();
+    RUN_TEST(test_service_log_without_a_reader_ends_nothing);
+    RUN_TEST(test_service_signal_ends_the_wait_and_the_next_one);
+    return UNITY_END();
+}
