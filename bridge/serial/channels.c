@@ -87,25 +87,7 @@ static void answer_here(relay_channel_t *channel, const iwn_id_t *id, iwn_error_
     serial_queue_put(&channel->queue);
 }
 
-/// The request without its id, and with this one; its length, 0 if it does not fit.
-static size_t write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size) {
-    iwn_text_t text = iwn_text_begin(out, size);
-    iwn_json_t rest = iwn_json_inside(root);
-    iwn_json_t name;
-    iwn_json_t value;
-    IWN_TEXT_JOIN(&text, "{\"id\":");
-    iwn_text_int(&text, (int64_t)number);
-    while (iwn_json_next(&rest, &name, &value)) {
-        if (!iwn_json_is(name, "id")) {
-            iwn_text_span(&text, ",", 1);
-            iwn_text_span(&text, name.at, (size_t)(rest.at - name.at));
-        }
-    }
-    IWN_TEXT_JOIN(&text, "}");
-    return (text.length + 1U < size) ? text.length : 0U;
-}
-
-/// The same with what a command quotes; 0 also if no stamp had been heard by then.
+/// Puts what a command quotes before the rest of it; its length, 0 also if no stamp had been heard by then.
 static size_t write_quoted(relay_t *self, const serial_request_t *request, size_t length, char *json) {
     iwn_quote_t quote = {.seq = request->number};
     char plain[SERIAL_JSON_MAX];
@@ -144,7 +126,7 @@ static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t
         return;
     }
     place->number = ++self->number;
-    place->length = write_numbered(root, place->number, place->json, SERIAL_JSON_MAX);
+    place->length = relay_write_numbered(root, place->number, place->json, SERIAL_JSON_MAX);
     if (place->kind == SERIAL_MOVES) {
         place->length = write_quoted(self, place, place->length, place->json);
     }
@@ -158,55 +140,10 @@ static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t
     serial_queue_put(&channel->queue);
 }
 
-/// The open channel with the fewest requests; NULL: none has room.
-static relay_channel_t *quietest_channel(relay_t *self) {
-    relay_channel_t *found = NULL;
-    for (unsigned i = 1; i <= IWN_LINE_CHANNELS; i++) {
-        relay_channel_t *channel = &self->channel[i];
-        const bool open = channel->client != IW_CLIENT_NONE && channel->welcomed && !channel->tell_close;
-        if (open && !serial_queue_is_full(&channel->queue) &&
-            (found == NULL || channel->queue.count < found->queue.count)) {
-            found = channel;
-        }
-    }
-    return found;
-}
-
-/// A stop of a client for which there is no channel goes by another's.
-static bool forward_stop(relay_t *self, gw_client_t *client, const iwn_request_t *asked, iwn_json_t root) {
-    relay_channel_t *channel = quietest_channel(self);
-    if (channel == NULL) {
-        return false;
-    }
-    serial_request_t *place = serial_queue_place(&channel->queue);
-    *place = (serial_request_t){.kind = SERIAL_STOPS, .id = asked->id, .came_us = self->now_us, .guest = client->id};
-    place->number = ++self->number;
-    place->length = write_numbered(root, place->number, place->json, SERIAL_JSON_MAX);
-    if (place->length == 0U) {
-        return false;
-    }
-    serial_queue_put(&channel->queue);
-    client->reading = true; // Until the board has answered, or its time is over.
-    return true;
-}
-
-static void carry_out_stop(relay_t *self, gw_client_t *client, const char *line, size_t length) {
-    iwn_request_t request;
-    iwn_refusal_t refusal;
-    iwn_json_t root;
-    iwn_text_t fault = iwn_text_begin(refusal.message, sizeof refusal.message);
-    const bool stops = iwn_request_read(line, length, &self->work, &request, &refusal) && iwn_cmd_stops(request.cmd) &&
-                       iwn_json_check(line, length, &self->work, &root, &fault);
-    if (!stops || !forward_stop(self, client, &request, root)) {
-        gw_service_refuse_crowd(&self->clients, client, &refusal);
-        gw_clients_refuse(&self->clients, client, &request.id, &refusal);
-    }
-}
-
 static void carry_out(void *context, gw_client_t *client, const char *line, size_t length) {
     relay_t *self = (relay_t *)context;
     if (client->right == GW_STOP) {
-        carry_out_stop(self, client, line, length);
+        relay_guest_carry_out(self, client, line, length);
         return;
     }
     relay_channel_t *channel = channel_of(self, client);
@@ -237,22 +174,10 @@ gw_servant_t relay_servant(relay_t *self) {
 
 // ---- an answer ----------------------------------------------------------------------------------------------------
 
-/// Who gets the answer: the client of the channel, or the guest that asked by it. NULL: it has gone.
-static gw_client_t *asker(relay_t *self, gw_client_t *client, const serial_request_t *request) {
-    if (request->guest == IW_CLIENT_NONE) {
-        return client;
-    }
-    gw_client_t *guest = gw_clients_find(&self->clients, request->guest);
-    if (guest != NULL) {
-        guest->reading = false;
-    }
-    return guest;
-}
-
 /// `rest` is what stands behind `ok` in a board's answer: the client gets it with the id that it gave.
 static void pass_reply(relay_t *self, gw_client_t *owner, const serial_request_t *request, const char *rest,
                        size_t length) {
-    gw_client_t *client = asker(self, owner, request);
+    gw_client_t *client = relay_guest_or(self, owner, request);
     if (client == NULL) {
         return;
     }
@@ -273,7 +198,7 @@ static void tell_answered(relay_t *self, relay_channel_t *channel, gw_client_t *
         } else {
             iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
             IWN_TEXT_JOIN(&text, request->reason);
-            gw_client_t *who = asker(self, client, request);
+            gw_client_t *who = relay_guest_or(self, client, request);
             if (who != NULL) {
                 gw_clients_refuse(&self->clients, who, &request->id, &refusal);
             }

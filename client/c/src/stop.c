@@ -76,7 +76,8 @@ static iwc_result_t stop_by_either(iwc_t *self, const char *const paths[2], cons
             if (is_settled(self, result)) {
                 return result;
             }
-            if (i == 0) {
+            if (i == 0 &&
+                (first.result == IWC_CLOSED || result != IWC_TIMEOUT)) { // Not that the time was over in the end.
                 keep(&first, self, result);
             }
             again = again || !is_closed_to_us(result);
