@@ -87,25 +87,7 @@ static void answer_here(relay_channel_t *channel, const iwn_id_t *id, iwn_error_
     serial_queue_put(&channel->queue);
 }
 
-/// The request without its id, and with this one; its length, 0 if it does not fit.
-static size_t write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size) {
-    iwn_text_t text = iwn_text_begin(out, size);
-    iwn_json_t rest = iwn_json_inside(root);
-    iwn_json_t name;
-    iwn_json_t value;
-    IWN_TEXT_JOIN(&text, "{\"id\":");
-    iwn_text_int(&text, (int64_t)number);
-    while (iwn_json_next(&rest, &name, &value)) {
-        if (!iwn_json_is(name, "id")) {
-            iwn_text_span(&text, ",", 1);
-            iwn_text_span(&text, name.at, (size_t)(rest.at - name.at));
-        }
-    }
-    IWN_TEXT_JOIN(&text, "}");
-    return (text.length + 1U < size) ? text.length : 0U;
-}
-
-/// The same with what a command quotes; 0 also if no stamp had been heard by then.
+/// Puts what a command quotes before the rest of it; its length, 0 also if no stamp had been heard by then.
 static size_t write_quoted(relay_t *self, const serial_request_t *request, size_t length, char *json) {
     iwn_quote_t quote = {.seq = request->number};
     char plain[SERIAL_JSON_MAX];
@@ -144,7 +126,7 @@ static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t
         return;
     }
     place->number = ++self->number;
-    place->length = write_numbered(root, place->number, place->json, SERIAL_JSON_MAX);
+    place->length = relay_write_numbered(root, place->number, place->json, SERIAL_JSON_MAX);
     if (place->kind == SERIAL_MOVES) {
         place->length = write_quoted(self, place, place->length, place->json);
     }
@@ -160,6 +142,10 @@ static void forward(relay_t *self, relay_channel_t *channel, const iwn_request_t
 
 static void carry_out(void *context, gw_client_t *client, const char *line, size_t length) {
     relay_t *self = (relay_t *)context;
+    if (client->right == GW_STOP) {
+        relay_guest_carry_out(self, client, line, length);
+        return;
+    }
     relay_channel_t *channel = channel_of(self, client);
     iwn_request_t request;
     iwn_refusal_t refusal;
@@ -189,8 +175,12 @@ gw_servant_t relay_servant(relay_t *self) {
 // ---- an answer ----------------------------------------------------------------------------------------------------
 
 /// `rest` is what stands behind `ok` in a board's answer: the client gets it with the id that it gave.
-static void pass_reply(relay_t *self, gw_client_t *client, const serial_request_t *request, const char *rest,
+static void pass_reply(relay_t *self, gw_client_t *owner, const serial_request_t *request, const char *rest,
                        size_t length) {
+    gw_client_t *client = relay_guest_or(self, owner, request);
+    if (client == NULL) {
+        return;
+    }
     iwn_out_t json = iwn_tell_reply(self->clients.line, sizeof self->clients.line, &request->id, request->ok);
     if (length + 1U < json.size - json.length) {
         memcpy(&json.data[json.length], rest, length);
@@ -208,7 +198,10 @@ static void tell_answered(relay_t *self, relay_channel_t *channel, gw_client_t *
         } else {
             iwn_text_t text = iwn_text_begin(refusal.message, sizeof refusal.message);
             IWN_TEXT_JOIN(&text, request->reason);
-            gw_clients_refuse(&self->clients, client, &request->id, &refusal);
+            gw_client_t *who = relay_guest_or(self, client, request);
+            if (who != NULL) {
+                gw_clients_refuse(&self->clients, who, &request->id, &refusal);
+            }
         }
         serial_queue_drop(&channel->queue);
     }

@@ -47,12 +47,13 @@ typedef enum { SERIAL_WAITING = 0, SERIAL_SENT, SERIAL_HELD, SERIAL_ANSWERED } s
 typedef struct {
     serial_state_t state;
     serial_kind_t kind;
-    uint64_t number;    ///< Its id on the wire; rises.
-    uint64_t came_us;   ///< When its client sent it, as far as can be told.
-    uint64_t sent_us;   ///< When it went to the wire first.
-    uint64_t tried_us;  ///< And last.
-    iwn_id_t id;        ///< The client's own.
-    iwn_error_t error;  ///< ANSWERED: why not,
+    uint64_t number;   ///< Its id on the wire; rises.
+    uint64_t came_us;  ///< When its client sent it, as far as can be told.
+    uint64_t sent_us;  ///< When it went to the wire first.
+    uint64_t tried_us; ///< And last.
+    iwn_id_t id;       ///< The client's own.
+    iw_client_t guest; ///< Who has asked, if not the client of this channel: a stop beyond the maximum; IW_CLIENT_NONE.
+    iwn_error_t error; ///< ANSWERED: why not,
     const char *reason; ///< and in words.
     bool ok;            ///< HELD: whether the board said yes; the rest of its answer is in `json`.
     size_t length;      ///< Of `json`.

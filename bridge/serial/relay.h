@@ -91,6 +91,15 @@ int relay_run(relay_t *self, const serial_settings_t *settings);
 
 gw_servant_t relay_servant(relay_t *self);
 
+/// Writes the request without its id, and with this one; its length, 0 if it does not fit.
+size_t relay_write_numbered(iwn_json_t root, uint64_t number, char *out, size_t size);
+
+/// The one line of a client beyond the maximum (guests.c): a stop goes by the channel of another client, all else is refused.
+void relay_guest_carry_out(relay_t *self, gw_client_t *client, const char *line, size_t length);
+
+/// Who gets the answer to a request: the channel's client, or the guest that asked by it. NULL: that one has gone.
+gw_client_t *relay_guest_or(relay_t *self, gw_client_t *client, const serial_request_t *request);
+
 /// A line of the board's for a client.
 void relay_take_line(relay_t *self, const iwn_line_t *line);
 

@@ -134,8 +134,8 @@ static const char *stale(const iw_host_t *self, const iw_host_client_t *client, 
     return NULL;
 }
 
-/// A command that is refused before the core judges it: to the core one that is out of range, so that it is remembered as one that
-/// nobody may arm into.
+/// A command that is refused before the core judges it: to the core one that is out of range, so that it is remembered
+/// as one that nobody may arm into.
 static void remember_wish(const iw_host_t *self, const iw_host_client_t *client, const iw_drive_t *wanted) {
     const iw_drive_t unknown = {.speed_mm_s = {INT32_MAX, INT32_MAX}};
     iw_applied_t applied;
@@ -391,21 +391,12 @@ static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote
 }
 
 /// By what the request says of its age and its stop.
-static bool refuse_late(iw_host_t *self, iw_host_client_t *client) {
+static bool is_late(iw_host_t *self) {
     const iw_stop_t *const stop = iw_host_look(self)->stop;
-    iwn_moment_t moment = {
-        .now_us = self->now_us, .stopped_us = stop->at_us, .stop = stop->number, .max_age_ms = IWN_MAX_AGE_MS};
-    if (moment.stopped_us < self->stopped_us) {
-        moment.stopped_us = self->stopped_us;
-    }
-    if (moment.stopped_us < self->estopped_us) {
-        moment.stopped_us = self->estopped_us;
-    }
-    if (!iwn_refuse_late(&self->request, &moment, &self->refusal)) {
-        return false;
-    }
-    send_refusal(self, client);
-    return true;
+    const iw_time_us_t asked_us = (self->stopped_us > self->estopped_us) ? self->stopped_us : self->estopped_us;
+    const iwn_moment_t moment = {self->now_us, (stop->at_us > asked_us) ? stop->at_us : asked_us, stop->number,
+                                 IWN_MAX_AGE_MS};
+    return iwn_refuse_late(&self->request, &moment, &self->refusal);
 }
 
 void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
@@ -413,7 +404,8 @@ void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quo
         REFUSE(self, client, IWN_DENIED, "this channel is for watching, stop and estop");
         return;
     }
-    if (refuse_late(self, client)) {
+    if (is_late(self)) {
+        send_refusal(self, client);
         return;
     }
     carry_out(self, client, quote);

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Gateway and Armed against the real daemon: whatever happens to the program, the wheels stop."""
 
+import asyncio
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -13,11 +15,49 @@ from fractions import Fraction
 
 from rig import ROOT, RigCase, now_us
 
-from iwheel import ConnectionLost, Gateway, GatewayUnavailable, LeaseEnded, NoAnswer, ProtocolError, Refused
+from iwheel import AsyncGateway, ConnectionLost, Gateway, GatewayUnavailable, LeaseEnded, NoAnswer, ProtocolError, Refused
 from iwheel._wire import add_piece
 
 BUDGET_MS = 987 + 100
 """Lease, period and ramp of the default configuration of rig.py, and what a busy machine adds."""
+
+
+class Crowded(RigCase):
+    """Every place of the gateway is taken."""
+
+    config = {**RigCase.config, "northbound": {"max_clients": 4}}
+
+    def setUp(self):
+        super().setUp()
+        self.wheels = Gateway(self.socket).arm("first")
+        self.crowd = [socket.socket(socket.AF_UNIX) for _ in range(3)]
+        for one in self.crowd:
+            self.addCleanup(one.close)
+            one.connect(self.socket)
+        time.sleep(0.1)
+
+    def test_stop_never_refused_without_a_place(self):
+        with self.assertRaises(GatewayUnavailable):
+            Gateway(self.socket).status()
+        self.wheels.drive(200, 200)
+        began = time.monotonic()
+        self.assertEqual(Gateway(self.socket).stop(), "stopping")
+        self.assertLess(time.monotonic() - began, 0.15)
+        self.assertEqual(Gateway(self.socket).estop("a crowd"), "latched")
+
+    def test_stop_never_refused_by_asyncio_without_a_place(self):
+        async def stop():
+            self.wheels.drive(200, 200)
+            return await AsyncGateway(self.socket).stop()
+
+        self.assertEqual(asyncio.run(stop()), "stopping")
+
+    def test_stop_never_refused_with_the_one_socket_gone(self):
+        os.rename(self.socket, self.socket + ".away")
+        os.makedirs(os.path.join(os.path.dirname(self.socket), "watch"), exist_ok=True)
+        os.symlink(self.socket + ".away", os.path.join(os.path.dirname(self.socket), "watch", os.path.basename(self.socket)))
+        self.assertEqual(Gateway(self.socket).estop(), "latched")
+        os.rename(self.socket + ".away", self.socket)
 
 
 class Driving(RigCase):

@@ -421,6 +421,13 @@ pid_t __wrap_getpid(void) {
     return FIRST_PID;
 }
 
+/// The same in every run, and with no fault and no time of its own: the seeds that found something stay what they are.
+ssize_t __wrap_getrandom(void *out, size_t size, unsigned flags) {
+    (void)flags;
+    memset(out, 7, size);
+    return (ssize_t)size;
+}
+
 uid_t __wrap_geteuid(void) {
     return VK_USER;
 }

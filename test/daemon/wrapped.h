@@ -36,6 +36,7 @@ int __wrap_sigprocmask(int how, const sigset_t *set, sigset_t *old);
 vk_handler_t __wrap_signal(int number, vk_handler_t handler);
 int __wrap_prctl(int option, ...);
 pid_t __wrap_getpid(void);
+ssize_t __wrap_getrandom(void *out, size_t size, unsigned flags);
 uid_t __wrap_geteuid(void);
 pid_t __wrap_fork(void);
 pid_t __wrap_waitpid(pid_t pid, int *status, int options);

@@ -235,34 +235,6 @@ static void test_ask_helpers_send_what_the_protocol_says(void) {
         hear());
 }
 
-static void test_ask_helpers_with_time_stop_and_key_send_them(void) {
-    const iwc_drive_t drive = {.left_mm_s = 1, .right_mm_s = 2};
-    const iwc_twist_t twist = {.v_mm_s = 5, .yaw_mrad_s = -6};
-    const iwc_arm_t arm = {.name = "a", .t_us = {true, 9000000000000}};
-    const iwc_reset_t reset = {.stop = {true, 17}, .t_us = {true, 5}};
-    (void)iwc_arm_as(gateway, &arm, 0, NULL, NULL);
-    (void)iwc_drive_as(gateway, &drive, "00ff", 0, NULL);
-    (void)iwc_twist_as(gateway, &twist, "00ff", 0, NULL);
-    (void)iwc_reset_as(gateway, &reset, 0);
-    TEST_ASSERT_EQUAL(IWC_INVALID, iwc_drive_as(gateway, &drive, "0123456789abcdef0123456789abcdef0", 0, NULL));
-    TEST_ASSERT_EQUAL(IWC_INVALID, iwc_twist_as(gateway, &twist, "a\nb", 0, NULL));
-    TEST_ASSERT_EQUAL_STRING("{\"id\":2,\"cmd\":\"arm\",\"name\":\"a\",\"t_us\":9000000000000}\n"
-                             "{\"id\":3,\"cmd\":\"drive\",\"key\":\"00ff\",\"left_mm_s\":1,\"right_mm_s\":2}\n"
-                             "{\"id\":5,\"cmd\":\"twist\",\"key\":\"00ff\",\"v_mm_s\":5,\"yaw_mrad_s\":-6}\n"
-                             "{\"id\":8,\"cmd\":\"reset\",\"stop\":17,\"t_us\":5}\n",
-                             hear());
-}
-
-static void test_ask_arm_gives_the_key_of_the_lease(void) {
-    char key[IWC_KEY_SIZE] = "before";
-    say("{\"id\":2,\"ok\":true,\"lease_ms\":200,\"key\":\"0123456789abcdef0123456789abcdef\"}\n");
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_arm_as(gateway, &(iwc_arm_t){.takeover = true}, SOON, NULL, key));
-    TEST_ASSERT_EQUAL_STRING("0123456789abcdef0123456789abcdef", key);
-    say("{\"id\":4,\"ok\":true,\"lease_ms\":200}\n"); // A microcontroller.
-    TEST_ASSERT_EQUAL(IWC_OK, iwc_arm_as(gateway, &(iwc_arm_t){.takeover = true}, SOON, NULL, key));
-    TEST_ASSERT_EQUAL_STRING("", key);
-}
-
 static void test_ask_terms_and_applied_values_come_back(void) {
     iwc_terms_t terms;
     iwc_applied_t applied;
@@ -602,8 +574,6 @@ int main(void) {
     RUN_TEST(test_ask_events_without_end_do_not_outlast_the_timeout);
     RUN_TEST(test_ask_what_is_no_request_is_not_sent);
     RUN_TEST(test_ask_helpers_send_what_the_protocol_says);
-    RUN_TEST(test_ask_helpers_with_time_stop_and_key_send_them);
-    RUN_TEST(test_ask_arm_gives_the_key_of_the_lease);
     RUN_TEST(test_ask_terms_and_applied_values_come_back);
     RUN_TEST(test_line_in_single_bytes_is_one_message);
     RUN_TEST(test_line_of_the_longest_length_is_taken_again_and_again);

@@ -418,6 +418,69 @@ static void test_relay_log_without_a_reader_ends_nothing(void) {
     TEST_ASSERT_EQUAL_INT(0, code);
 }
 
+static int guest_fd = -1; ///< Comes when every place is taken.
+static char guest_got[512];
+
+static void guest_says(const char *line) {
+    const int owner = client_fd;
+    client_connects();
+    guest_fd = client_fd;
+    client_fd = owner;
+    TEST_ASSERT_EQUAL_INT(strlen(line), write(guest_fd, line, strlen(line)));
+}
+
+static void guest_reads(void) {
+    const ssize_t length = recv(guest_fd, guest_got, sizeof guest_got - 1U, MSG_DONTWAIT);
+    guest_got[(length > 0) ? length : 0] = '\0';
+    (void)close(guest_fd);
+}
+
+/// The only place is taken, and a stop comes with another connection.
+static bool stop_beyond_the_places(void) {
+    switch (step) {
+    case 2:
+        board_links(EARLY);
+        break;
+    case 10:
+        client_connects();
+        break;
+    case 20:
+        board_writes(1, EARLY + 1, "{\"event\":\"hello\"}");
+        break;
+    case 30:
+        guest_says("{\"cmd\":\"stop\",\"id\":\"guest\"}\n");
+        break;
+    case 40:
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"stop\""), to_board);
+        board_writes(1, EARLY + 2, "{\"id\":1,\"ok\":true,\"state\":\"stopping\"}");
+        break;
+    case 60:
+        guest_reads();
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(guest_got, "{\"id\":\"guest\",\"ok\":true,\"state\":\"stopping\"}"),
+                                     guest_got);
+        guest_says("{\"cmd\":\"reset\",\"id\":\"guest\"}\n");
+        break;
+    case 80:
+        guest_reads();
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(guest_got, "too_many_clients"), guest_got);
+        break;
+    default:
+        break;
+    }
+    return step == 350U;
+}
+
+static void test_stop_never_refused_by_a_relay_without_a_place(void) {
+    settings.northbound.max_clients = 1;
+    run(stop_beyond_the_places);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, written("\"cmd\":\"open\""), to_board);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, written("\"cmd\":\"reset\""), to_board);
+    char text[512];
+    const ssize_t length = recv(client_fd, text, sizeof text - 1U, MSG_DONTWAIT);
+    text[(length > 0) ? length : 0] = '\0';
+    TEST_ASSERT_NULL_MESSAGE(strstr(text, "\"ok\""), text); // It has asked nothing.
+}
+
 int main(void) {
     UNITY_BEGIN();
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
@@ -429,6 +492,7 @@ int main(void) {
     RUN_TEST(test_relay_event_before_hello_is_dropped);
     RUN_TEST(test_relay_client_ends_with_its_start_of_the_board);
     RUN_TEST(test_relay_log_without_a_reader_ends_nothing);
+    RUN_TEST(test_stop_never_refused_by_a_relay_without_a_place);
     (void)rmdir(folder);
     return UNITY_END();
 }

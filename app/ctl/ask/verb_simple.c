@@ -17,8 +17,8 @@ static void print_line(const char *text) {
     (void)putchar('\n');
 }
 
-/// Asks; unless --json is given, prints the state the gateway is in now and what it means.
-static int ask_and_tell_state(ctl_t *self, json_t *request) {
+/// Unless --json is given, prints the state the gateway is in now and what it means.
+static void tell_state(const ctl_t *self, const json_t *reply) {
     static const struct {
         const char *state;
         const char *meaning;
@@ -28,15 +28,31 @@ static int ask_and_tell_state(ctl_t *self, json_t *request) {
         {"stopping", "stopping: ramp to zero, zeros until both wheels are at rest, then silence"},
         {"latched", "latched: zero; only a reset leaves this state (see: iwheelctl status)"},
     };
-    json_t *reply = NULL;
-    const int code = ctl_ask(self, request, &reply);
-    if (code == CTL_OK && !self->json) {
+    if (!self->json) {
         const char *state = text_word(reply, "state");
         const char *text = state;
         for (size_t i = 0; i < sizeof meanings / sizeof meanings[0]; i++) {
             text = (strcmp(meanings[i].state, state) == 0) ? meanings[i].meaning : text;
         }
         print_line(text);
+    }
+}
+
+static int ask_and_tell_state(ctl_t *self, json_t *request) {
+    json_t *reply = NULL;
+    const int code = ctl_ask(self, request, &reply);
+    if (code == CTL_OK) {
+        tell_state(self, reply);
+    }
+    json_decref(reply);
+    return code;
+}
+
+static int stop_and_tell_state(ctl_t *self, const ctl_stop_t *stop) {
+    json_t *reply = NULL;
+    const int code = ctl_stop(self, stop, &reply);
+    if (code == CTL_OK) {
+        tell_state(self, reply);
     }
     json_decref(reply);
     return code;
@@ -46,7 +62,7 @@ int verb_stop(ctl_t *self, int count, char **words) {
     if (!words_at_most("stop", count, 0, words)) {
         return CTL_USAGE;
     }
-    return ask_and_tell_state(self, json_pack("{s:s}", "cmd", "stop"));
+    return stop_and_tell_state(self, &(ctl_stop_t){.latches = false});
 }
 
 int verb_estop(ctl_t *self, int count, char **words) {
@@ -55,11 +71,7 @@ int verb_estop(ctl_t *self, int count, char **words) {
     for (int i = 0; i < count; i++) {
         IWN_TEXT_JOIN(&text, (i > 0) ? " " : "", words[i]);
     }
-    json_t *request = json_pack("{s:s}", "cmd", "estop");
-    if (text.length > 0U) {
-        (void)json_object_set_new(request, "reason", json_string(reason)); // None if it is no UTF-8.
-    }
-    return ask_and_tell_state(self, request);
+    return stop_and_tell_state(self, &(ctl_stop_t){.latches = true, .reason = (text.length > 0U) ? reason : NULL});
 }
 
 int verb_reset(ctl_t *self, int count, char **words) {

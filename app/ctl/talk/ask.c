@@ -127,19 +127,27 @@ int ctl_lost(const ctl_t *self, iwc_result_t result) {
     }
 }
 
+/// Finds the socket: in `out_path`, unless --socket names it. An exit code.
+static int find_one(ctl_t *self, char *out_path, size_t size) {
+    switch (choose(self, NULL, out_path, size)) {
+    case NEAR_FOUND:
+        return CTL_OK;
+    case NEAR_SEVERAL:
+        return ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", out_path);
+    case NEAR_DENIED:
+        return ctl_fail(CTL_PERMISSION, "%s may not be read by you; sudo usermod -aG iwheel $USER, then log in again",
+                        out_path);
+    default:
+        return ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", IWC_DIRECTORY, START_HINT);
+    }
+}
+
 /// Finds the socket and connects. An exit code.
 static int connect_to_one(ctl_t *self) {
     char found[512];
-    switch (choose(self, NULL, found, sizeof found)) {
-    case NEAR_FOUND:
-        break;
-    case NEAR_SEVERAL:
-        return ctl_fail(CTL_USAGE, "several gateways are running; choose one with --socket: %s", found);
-    case NEAR_DENIED:
-        return ctl_fail(CTL_PERMISSION, "%s may not be read by you; sudo usermod -aG iwheel $USER, then log in again",
-                        found);
-    default:
-        return ctl_fail(CTL_UNAVAILABLE, "no gateway's socket under %s; %s", IWC_DIRECTORY, START_HINT);
+    const int code = find_one(self, found, sizeof found);
+    if (code != CTL_OK) {
+        return code;
     }
     const char *path = (self->socket != NULL) ? self->socket : found;
     const iwc_result_t result = client_open(&self->client, path, client_now_us() + CLIENT_REPLY_US);
@@ -161,6 +169,43 @@ int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply) {
     }
     const iwc_result_t result = client_ask(&self->client, request, out_reply);
     return (result == IWC_OK) ? CTL_OK : ctl_lost(self, result);
+}
+
+static iwc_result_t stop_at(ctl_t *self, const char *path, const ctl_stop_t *stop) {
+    const int timeout_ms = (int)(CLIENT_REPLY_US / 1000);
+    iwc_t *gateway = self->client.gateway;
+    iwc_result_t result = IWC_INTERRUPTED;
+    iwc_let_in(gateway, signals_let_in());
+    while (result == IWC_INTERRUPTED && signals_count() == self->client.seen_signals) {
+        result = stop->latches ? iwc_estop_at(gateway, path, stop->reason, timeout_ms)
+                               : iwc_stop_at(gateway, path, timeout_ms);
+    }
+    return result;
+}
+
+/// A reason that is no text keeps nobody from stopping.
+static iwc_result_t stop_anyhow(ctl_t *self, const char *path, const ctl_stop_t *stop) {
+    const iwc_result_t result = stop_at(self, path, stop);
+    const bool spoilt = result == IWC_INVALID || result == IWC_REFUSED;
+    return (stop->reason != NULL && spoilt) ? stop_at(self, path, &(ctl_stop_t){.latches = true}) : result;
+}
+
+int ctl_stop(ctl_t *self, const ctl_stop_t *stop, json_t **out_reply) {
+    char found[512];
+    iwc_message_t reply;
+    *out_reply = NULL;
+    const int code = find_one(self, found, sizeof found);
+    if (code != CTL_OK) {
+        return code;
+    }
+    const char *path = (self->socket != NULL) ? self->socket : found;
+    const iwc_result_t result = stop_anyhow(self, path, stop);
+    if ((result != IWC_OK && result != IWC_REFUSED) || !iwc_reply(self->client.gateway, &reply)) {
+        return tell_unopened(self, path, result);
+    }
+    self->client.line = reply.text;
+    *out_reply = json_loadb(reply.text, reply.length, JSON_REJECT_DUPLICATES, NULL);
+    return (*out_reply != NULL) ? ctl_accept(self, out_reply) : ctl_lost(self, IWC_GARBLED);
 }
 
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply) {

@@ -64,6 +64,15 @@ int ctl_finish(int code);
 /// printed, whatever it says.
 int ctl_ask(ctl_t *self, json_t *request, json_t **out_reply);
 
+/// What kind of stop is asked for.
+typedef struct {
+    bool latches;       ///< An e-stop.
+    const char *reason; ///< Of an e-stop; NULL: none. One that may not stand in a request is left out.
+} ctl_stop_t;
+
+/// As `ctl_ask`, for a stop, through a connection of its own: by the gateway's other socket if the one has no place or does not answer.
+int ctl_stop(ctl_t *self, const ctl_stop_t *stop, json_t **out_reply);
+
 /// The first half of `ctl_ask`: 0 with the reply, whatever it says, in `*out_reply`; nothing is printed but what went wrong on the way.
 int ctl_exchange(ctl_t *self, json_t *request, json_t **out_reply);
 

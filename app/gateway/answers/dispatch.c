@@ -10,10 +10,6 @@
 #include "iwheel_northbound/refuse.h"
 
 #include <string.h>
-#include <sys/random.h>
-
-/// Of a lease's key: 128 bits.
-#define KEY_BYTES (IWN_LEASE_KEY_MAX / 2U)
 
 static iwn_out_t begin_reply(const gw_call_t *call) {
     return gw_clients_begin_reply(call->answers->clients, &call->request->id);
@@ -71,50 +67,6 @@ static void reply_armed(gw_answers_t *self, const iw_snapshot_t *seen, gw_client
     gw_clients_send_reply(client, &json);
 }
 
-/// False: the kernel has no random numbers yet, which is so in the first seconds of some machines only.
-static bool draw_key(char out_key[IWN_LEASE_KEY_MAX + 1U]) {
-    static const char digits[] = "0123456789abcdef";
-    uint8_t bytes[KEY_BYTES];
-    if (getrandom(bytes, sizeof bytes, GRND_NONBLOCK) != (ssize_t)sizeof bytes) {
-        return false;
-    }
-    for (size_t i = 0; i < KEY_BYTES; i++) {
-        out_key[2U * i] = digits[bytes[i] >> 4];
-        out_key[2U * i + 1U] = digits[bytes[i] & 15U];
-    }
-    out_key[IWN_LEASE_KEY_MAX] = '\0';
-    return true;
-}
-
-/// In the same time wherever they differ.
-static bool is_same_key(const char a[IWN_LEASE_KEY_MAX + 1U], const char b[IWN_LEASE_KEY_MAX + 1U]) {
-    unsigned difference = 0;
-    for (size_t i = 0; i <= IWN_LEASE_KEY_MAX; i++) {
-        difference |= (unsigned)(uint8_t)a[i] ^ (uint8_t)b[i];
-    }
-    return difference == 0U;
-}
-
-static iw_time_us_t later(iw_time_us_t a_us, iw_time_us_t b_us) {
-    return (a_us > b_us) ? a_us : b_us;
-}
-
-/// By what a request says of its age and its stop.
-static bool is_late(const gw_answers_t *self, const iwn_request_t *request, iwn_refusal_t *out_refusal) {
-    if (!request->has_t_us && !request->has_stop) {
-        return false;
-    }
-    const iw_snapshot_t seen = gw_wheels_look(self->wheels);
-    const gw_status_t *status = self->status;
-    const iwn_moment_t moment = {
-        .now_us = self->wheels->now_us,
-        .stopped_us = later(seen.stop->at_us, later(status->stopped_by.at_us, status->estopped_by.at_us)),
-        .stop = seen.stop->number,
-        .max_age_ms = self->max_age_ms,
-    };
-    return iwn_refuse_late(request, &moment, out_refusal);
-}
-
 /// An arm or a reset that waited here, behind an earlier request of its client, is not to undo a stop that came meanwhile.
 static bool refuse_waited(const gw_call_t *call) {
     static const iwn_refusal_t refusal = {
@@ -139,7 +91,7 @@ static void do_arm(const gw_call_t *call) {
         return;
     }
     char key[IWN_LEASE_KEY_MAX + 1U];
-    if (!draw_key(key)) {
+    if (!gw_grant_draw_key(key)) {
         const iwn_refusal_t refusal = {IWN_INTERNAL, "the kernel has no random numbers for a key yet; wait a second, "
                                                      "then arm again"};
         send_refusal(call, &refusal);
@@ -210,7 +162,7 @@ static bool refuse_key(const gw_call_t *call, const iw_drive_t *wanted) {
     static const iwn_refusal_t refusal = {IWN_NOT_HOLDER, "the key is not the one that the reply to the last arm gave; "
                                                           "arm, and drive with the key of its reply"};
     const char *key = call->request->lease_key;
-    if (key[0] == '\0' || is_same_key(key, call->client->key)) {
+    if (key[0] == '\0' || gw_grant_is_same_key(key, call->client->key)) {
         return false;
     }
     const iw_snapshot_t seen = gw_wheels_look(call->answers->wheels);
@@ -416,7 +368,7 @@ static void carry_out(void *context, gw_client_t *client, const char *line, size
         return;
     }
     if (!is_right || gw_refuse_by_right(self, client->right, request.cmd, &refusal) ||
-        is_late(self, &request, &refusal)) {
+        gw_grant_is_late(self, &request, &refusal)) {
         send_refusal(&call, &refusal);
         return;
     }

@@ -55,6 +55,15 @@ void gw_refuse_describe(const gw_answers_t *answers, const iwn_request_t *reques
 /// watch may ask for what moves nothing and for what stops.
 bool gw_refuse_by_right(const gw_answers_t *answers, gw_right_t right, iwn_cmd_t cmd, iwn_refusal_t *out_refusal);
 
+/// A new key for a lease, of the kernel's random numbers. False: it has none yet, as in the first seconds of some machines.
+bool gw_grant_draw_key(char out_key[IWN_LEASE_KEY_MAX + 1U]);
+
+/// Takes the same time wherever they differ.
+bool gw_grant_is_same_key(const char a[IWN_LEASE_KEY_MAX + 1U], const char b[IWN_LEASE_KEY_MAX + 1U]);
+
+/// True, with the refusal, if what the request says of its time and its stop keeps it from being carried out.
+bool gw_grant_is_late(const gw_answers_t *self, const iwn_request_t *request, iwn_refusal_t *out_refusal);
+
 /// Recordings for clients: passed on to the process that reads them (disk/box_files.h), answered when it answers.
 ///
 /// Nothing waits for it, not even later requests of the same client: a stop behind a slow disk is carried out at once. So a client has

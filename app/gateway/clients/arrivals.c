@@ -81,27 +81,44 @@ static gw_client_t *free_slot(gw_clients_t *self, gw_right_t right) {
     return NULL;
 }
 
-/// A place for this user among those beyond the maximum: a free one, or the one that has been silent for longest, if that is long
-/// enough. Whoever has its share makes room in it. NULL: there is none.
-static gw_client_t *stop_place(gw_clients_t *self, gw_client_t *first, uid_t uid) {
-    gw_client_t *free_one = NULL;
-    gw_client_t *oldest = NULL;
-    gw_client_t *own = NULL;
-    unsigned held = 0;
+/// What there is among a socket's places beyond the maximum, for one user.
+typedef struct {
+    gw_client_t *free_one;
+    gw_client_t *oldest; ///< Of those that have said nothing.
+    gw_client_t *own;    ///< The same of this user's.
+    unsigned held;       ///< By this user.
+} places_t;
+
+static gw_client_t *older(gw_client_t *known, gw_client_t *other) {
+    return (known == NULL || other->close_us < known->close_us) ? other : known;
+}
+
+static places_t look_over(gw_client_t *first, uid_t uid) {
+    places_t seen = {.held = 0};
     for (gw_client_t *place = first; place < &first[GW_STOP_PLACES]; place++) {
-        const bool taken = place->id != IW_CLIENT_NONE;
-        const bool its = taken && place->uid == uid;
-        const bool silent = taken && !place->said && !place->closing;
-        held += its ? 1U : 0U;
-        free_one = taken ? free_one : place;
-        oldest = (silent && (oldest == NULL || place->close_us < oldest->close_us)) ? place : oldest;
-        own = (silent && its && (own == NULL || place->close_us < own->close_us)) ? place : own;
+        if (place->id == IW_CLIENT_NONE) {
+            seen.free_one = place;
+            continue;
+        }
+        const bool own = place->uid == uid;
+        seen.held += own ? 1U : 0U;
+        if (!place->said && !place->closing) {
+            seen.oldest = older(seen.oldest, place);
+            seen.own = own ? older(seen.own, place) : seen.own;
+        }
     }
-    const bool has_share = uid != 0U && held >= GW_STOP_PLACES / 2U;
-    if (free_one != NULL && !has_share) {
-        return free_one;
+    return seen;
+}
+
+/// A place for this user: a free one, or the one that has been silent for longest, if that is long enough. Whoever has its share
+/// makes room in it. NULL: there is none.
+static gw_client_t *stop_place(gw_clients_t *self, gw_client_t *first, uid_t uid) {
+    const places_t seen = look_over(first, uid);
+    const bool has_share = uid != 0U && seen.held >= GW_STOP_PLACES / 2U;
+    if (seen.free_one != NULL && !has_share) {
+        return seen.free_one;
     }
-    gw_client_t *room = has_share ? own : oldest;
+    gw_client_t *room = has_share ? seen.own : seen.oldest;
     if (room == NULL || self->now_us + GW_STOP_US < room->close_us + GW_STOP_LEAST_US) {
         return NULL;
     }

@@ -245,9 +245,8 @@ static iwc_result_t call(iwc_t *self, int64_t deadline_us) {
     return IWC_OK;
 }
 
-iwc_result_t iwc_connect(iwc_t *self, const char *path, int timeout_ms) {
+iwc_result_t iwc_dial(iwc_t *self, const char *path, int64_t deadline_us) {
     char found[PATH_MAX];
-    const int64_t deadline_us = iwc_deadline_us(timeout_ms);
     begin(self);
     if (path == NULL) {
         const iwc_result_t result = iwc_find(NULL, found, sizeof found);
@@ -262,7 +261,12 @@ iwc_result_t iwc_connect(iwc_t *self, const char *path, int timeout_ms) {
     }
     memset(self->path, 0, sizeof self->path);
     memcpy(self->path, path, strlen(path));
-    const iwc_result_t result = call(self, deadline_us);
+    return call(self, deadline_us);
+}
+
+iwc_result_t iwc_connect(iwc_t *self, const char *path, int timeout_ms) {
+    const int64_t deadline_us = iwc_deadline_us(timeout_ms);
+    const iwc_result_t result = iwc_dial(self, path, deadline_us);
     return (result == IWC_OK) ? greet(self, deadline_us) : result;
 }
 

@@ -49,6 +49,9 @@ int64_t iwc_now_us(void);
 /// When a wait of `timeout_ms` from now is over; INT64_MAX: never.
 int64_t iwc_deadline_us(int timeout_ms);
 
+/// The first half of `iwc_connect`: connects, and awaits no greeting.
+iwc_result_t iwc_dial(iwc_t *self, const char *path, int64_t deadline_us);
+
 /// Reads once. IWC_OK: something came; IWC_TIMEOUT: nothing is there; else the connection is over.
 iwc_result_t iwc_fill(iwc_t *self);
 
@@ -63,6 +66,9 @@ void iwc_end(iwc_t *self, iwc_result_t result);
 
 /// Keeps name and words of a refusal.
 void iwc_keep_refusal(iwc_t *self, const iwc_message_t *reply);
+
+/// Sends a request that stops through a connection of its own, by one socket of the gateway or the other: stop.c.
+iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int timeout_ms);
 
 // ---- the lines in the buffer: queue.c -----------------------------------------------------------------------------
 

@@ -329,13 +329,28 @@ iwc_result_t iwc_stop(iwc_t *self, int timeout_ms) {
     return or_close(self, ask_plainly(self, "stop", timeout_ms));
 }
 
-iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms) {
-    request_t request = begin_request("estop");
-    if (!add_text(&request, "reason", reason, REASON_MAX_BYTES)) {
-        return IWC_INVALID;
+/// False if the reason may not stand in a request.
+static bool begin_estop(request_t *out_request, const char *reason) {
+    *out_request = begin_request("estop");
+    if (!add_text(out_request, "reason", reason, REASON_MAX_BYTES)) {
+        return false;
     }
-    add(&request, "}");
-    return or_close(self, iwc_ask(self, request.text, timeout_ms, NULL));
+    add(out_request, "}");
+    return true;
+}
+
+iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms) {
+    request_t request;
+    return begin_estop(&request, reason) ? or_close(self, iwc_ask(self, request.text, timeout_ms, NULL)) : IWC_INVALID;
+}
+
+iwc_result_t iwc_stop_at(iwc_t *self, const char *path, int timeout_ms) {
+    return iwc_stop_by(self, path, "{\"cmd\":\"stop\"}", timeout_ms);
+}
+
+iwc_result_t iwc_estop_at(iwc_t *self, const char *path, const char *reason, int timeout_ms) {
+    request_t request;
+    return begin_estop(&request, reason) ? iwc_stop_by(self, path, request.text, timeout_ms) : IWC_INVALID;
 }
 
 iwc_result_t iwc_reset(iwc_t *self, int timeout_ms) {

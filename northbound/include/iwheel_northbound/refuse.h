@@ -35,7 +35,7 @@ typedef struct {
 
 /// The moment at which a request that permits motion or clears a latch is judged.
 typedef struct {
-    iw_time_us_t now_us;
+    iw_time_us_t now_us;     ///< Of the gateway's clock.
     iw_time_us_t stopped_us; ///< Of the last stop, and of the last request for one; 0: there was none.
     uint32_t stop;           ///< The number of the last stop; 0: there was none.
     uint32_t max_age_ms;     ///< A request may be so old.

@@ -16,6 +16,7 @@ from typing import Any, AsyncIterator, Deque, Dict, Generator, List, Mapping, Op
 
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._protocol import Configured, Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._stop import stop_by_either
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
     ALWAYS,
@@ -237,10 +238,10 @@ class AsyncGateway:
             yield event
 
     async def stop(self) -> State:
-        return cast(State, (await self._ask("stop"))["state"])
+        return cast(State, (await self._stop("stop"))["state"])
 
     async def estop(self, reason: Optional[str] = None) -> State:
-        return cast(State, (await self._ask("estop", reason=reason))["state"])
+        return cast(State, (await self._stop("estop", reason=reason))["state"])
 
     async def reset(self) -> State:
         return cast(State, (await self._ask("reset"))["state"])
@@ -305,6 +306,21 @@ class AsyncGateway:
             if cmd not in REPEATABLE:
                 raise
         return result_of(cmd, await (await self._connected(deadline, cmd in ALWAYS)).ask(cmd, fields, self._timeout))
+
+    async def _stop(self, cmd: str, **fields: Any) -> Message:
+        """By the connection that is there, else by one of its own: no place is needed for it, and no greeting awaited."""
+        if self._stream is not None and self._stream.open:
+            try:
+                return result_of(cmd, await self._stream.ask(cmd, fields, self._timeout))
+            except GatewayUnavailable:
+                pass
+        path = self._path or default_socket()
+        try:
+            return result_of(cmd, await asyncio.to_thread(stop_by_either, path, cmd, fields, self._timeout))
+        except GatewayUnavailable:
+            if self._wait <= 0:
+                raise
+        return await self._ask(cmd, **fields)  # It may come yet.
 
     async def _arm(self, name: Optional[str], takeover: bool, wait: float) -> AsyncArmed:
         until = time.monotonic() + wait

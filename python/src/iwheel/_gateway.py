@@ -13,6 +13,7 @@ from typing import Any, Iterator, List, Optional, Type, Union, cast
 from ._connection import Connection
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._protocol import Configured, Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
+from ._stop import stop_by_either
 from ._types import Applied, Event, OnStatus, Terms, Whole
 from ._wire import (
     ALWAYS,
@@ -128,11 +129,11 @@ class Gateway:
 
     def stop(self) -> State:
         """Ramp to zero, whoever drives. The state after that."""
-        return cast(State, self._ask("stop")["state"])
+        return cast(State, self._stop("stop")["state"])
 
     def estop(self, reason: Optional[str] = None) -> State:
         """Zero without ramp, latched until `reset`. No substitute for the button that cuts power."""
-        return cast(State, self._ask("estop", reason=reason)["state"])
+        return cast(State, self._stop("estop", reason=reason)["state"])
 
     # What needs a decision -------------------------------------------------------------------------------------------
 
@@ -241,6 +242,21 @@ class Gateway:
                 if cmd not in REPEATABLE:
                     raise
             return result_of(cmd, self._connected(deadline, cmd in ALWAYS).ask(cmd, fields, self._timeout))
+
+    def _stop(self, cmd: str, **fields: Any) -> Message:
+        """By the connection that is there, else by one of its own: no place is needed for it, and no greeting awaited."""
+        with self._alone():
+            if self._connection is not None and self._connection.alive():
+                try:
+                    return result_of(cmd, self._connection.ask(cmd, fields, self._timeout))
+                except GatewayUnavailable:
+                    pass
+            try:
+                return result_of(cmd, stop_by_either(self._path or default_socket(), cmd, fields, self._timeout))
+            except GatewayUnavailable:
+                if self._wait <= 0:
+                    raise
+        return self._ask(cmd, **fields)  # It may come yet.
 
     def _ask_on(self, connection: Connection, cmd: str, fields: Message) -> Message:
         """On this connection or not at all. What has come is taken first: the connection's end may be among it."""

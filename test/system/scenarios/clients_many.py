@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Row 5: observers that die, flood, connect a thousand times, use up the descriptors."""
+"""Rows 5 and 33: observers that die, flood, connect a thousand times, use up descriptors and places."""
 
 import base64
 import os
 import resource
 import select
 import socket
+import subprocess
+import sys
 import threading
 import time
 import zlib
 
+from bus import now_us
 from client import Client, Streamer
+from judge_log import Event
 from scenario import scenario
 
+from .arguments import call
 from .bus_faults import wait_reset
 
 ROOM = 6  # Descriptors that are left when clients come in a crowd.
@@ -234,4 +239,152 @@ def row05_watchers_and_recordings(t):
     stream.stop()
     t.check(stream.refusal is not None and stream.refusal["error"] == "not_armed", f"after the stop: {stream.refusal}")
     time.sleep(1)
+    t.judge(rig)
+
+
+PLACES = 16
+STOP_MS = 60
+FIRST_LINES = {"stop": b'{"cmd":"stop"}\n', "estop": b'{"cmd":"estop"}\n'}
+RECONNECT = """
+import socket, sys, time
+begin, count = time.monotonic(), 0
+while True:
+    one = socket.socket(socket.AF_UNIX)
+    one.connect(sys.argv[1])
+    one.close()
+    count += 1
+    time.sleep(max(0, begin + count / 1000 - time.monotonic()))
+"""
+
+
+class Crowd:
+    """Every place of both sockets, held by connections that behave alike."""
+
+    def __init__(self, paths, taken, poll):
+        self.socks = [connect(path) for path in paths for _ in range(PLACES - taken.get(path, 0))]
+        self.over = threading.Event()
+        self.thread = threading.Thread(target=self._behave, args=(poll,))
+        self.thread.start()
+
+    def _behave(self, poll):
+        for sock in self.socks:
+            sock.setblocking(False)
+            if poll:
+                sock.sendall(b'{"cmd":"watch","topics":["state","frame"],"rate_hz":100}\n')
+        while not self.over.wait(0.01):
+            for sock in self.socks if poll else ():
+                try:
+                    sock.send(b'{"cmd":"status"}\n{"cmd":"why"}\n')
+                    sock.recv(1 << 20)
+                except OSError:
+                    pass
+
+    def leave(self):
+        self.over.set()
+        self.thread.join()
+        for sock in self.socks:
+            sock.close()
+        time.sleep(0.3)
+
+
+def stop_by(t, rig, path, verb):
+    """As a client that stops does it: the line with the connection, no greeting awaited."""
+    sent_us = now_us()
+    sock = connect(path)
+    sock.sendall(FIRST_LINES[verb])
+    rig.timeline.append(Event(sent_us, verb, sent_us + 1000))
+    reply = read_some(sock, 1)
+    sock.close()
+    time.sleep(0.2)  # Until the bus's log has what followed.
+    t.check(b'"ok":true' in reply, f"{verb} by {os.path.basename(path)}: {reply[:200]!r}")
+    return sent_us
+
+
+@scenario("every place of both sockets taken: stop and estop are carried out within 60 ms, nobody is evicted", 25)
+def row33_stop_never_refused(t):
+    rig = t.rig()
+    rig.settings["northbound"].update(watch_socket=rig.path("watch.sock"), watch_group="none", max_clients=PLACES)
+    rig.write_config()
+    rig.start_gateway()
+    owner = rig.client("owner")
+    paths = [rig.path("gateway.sock"), rig.path("watch.sock")]
+    worst = 0
+    for kind in ("idle", "poll", "reconnect"):
+        crowd = Crowd(paths, {paths[0]: 1}, kind == "poll")
+        floods = [
+            subprocess.Popen([sys.executable, "-c", RECONNECT, path]) for path in (paths if kind == "reconnect" else ())
+        ]
+        time.sleep(0.4)
+        try:
+            for path in paths:
+                for verb in FIRST_LINES:
+                    t.arm(owner)
+                    stream = Streamer(owner, 300, 300)
+                    time.sleep(0.6)
+                    sent_us = stop_by(t, rig, path, verb)
+                    slower = t.first_after(rig, sent_us, lambda mm_s: mm_s < 300, f"{verb} beside {kind}", STOP_MS)
+                    worst = max(worst, slower or 0)
+                    stream.stop()
+                    if verb == "estop":
+                        time.sleep(1.2)
+                        wait_reset(t, owner)
+        finally:
+            for flood in floods:
+                flood.kill()
+                flood.wait()
+            still = sum(not _has_left(sock) for sock in crowd.socks)
+            t.check(kind == "poll" or still == len(crowd.socks), f"{still} of {len(crowd.socks)} kept their place")
+            crowd.leave()
+    t.figure(f"slower after {worst:.1f} ms at most")
+    t.judge(rig)
+
+
+def _has_left(sock):
+    """The gateway has closed it."""
+    try:
+        while True:
+            if not sock.recv(1 << 16):
+                return True
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+@scenario("iwheelctl stops when its socket has no place, and by the other socket when it cannot use the one", 12)
+def row33_iwheelctl_stops(t):
+    rig = t.rig()
+    os.makedirs(rig.path("watch"), mode=0o755)
+    watch = rig.path("watch/gateway.sock")
+    rig.settings["northbound"].update(watch_socket=watch, watch_group="none", max_clients=PLACES)
+    rig.write_config()
+    rig.start_gateway()
+    owner = rig.client("owner")
+    crowd = Crowd([rig.path("gateway.sock"), watch], {rig.path("gateway.sock"): 1}, False)
+    away = rig.path("away")
+    try:
+        for moved in (None, rig.path("gateway.sock"), watch):
+            for verb in (["stop"], ["estop", "a", "crowd"]):
+                t.arm(owner)
+                stream = Streamer(owner, 300, 300)
+                time.sleep(0.5)
+                if moved:
+                    os.rename(moved, away)
+                sent_us = now_us()
+                path = rig.path("gateway.sock") if moved != watch else watch
+                code, text = call(rig, "iwheelctl", "--socket", path, *verb)
+                rig.timeline.append(Event(sent_us, verb[0], now_us()))
+                if moved:
+                    os.rename(away, moved)
+                t.check(code == 0, f"{verb[0]} with {moved} away: {code}: {text!r}")
+                time.sleep(0.1)
+                stream.stop()
+                t.check(stream.refusal is not None, f"{verb[0]} with {moved} away stopped nobody")
+                if verb[0] == "estop":
+                    time.sleep(1.2)
+                    wait_reset(t, owner)
+        code, text = call(rig, "iwheelctl", "--socket", rig.path("gateway.sock"), "status")
+        t.check(code == 1 and "too_many_clients" in text, f"what is no stop is refused: {code}: {text!r}")
+    finally:
+        crowd.leave()
     t.judge(rig)

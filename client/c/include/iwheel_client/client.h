@@ -333,6 +333,15 @@ IWC_API iwc_result_t iwc_stop(iwc_t *self, int timeout_ms);
 /// No substitute for the button that cuts power.
 IWC_API iwc_result_t iwc_estop(iwc_t *self, const char *reason, int timeout_ms);
 
+/// Ramp to zero, through a connection of its own: whatever `self` was connected to is closed before, and this one afterwards. For a
+/// program that is not connected: the gateway takes a stop even when all its places are taken, and awaits no greeting of ours. If the
+/// socket `path` (NULL: as `iwc_connect`) takes no connection or has no place, the gateway's other one is tried, which is watch/NAME.sock
+/// beside NAME.sock, and both again until the time is over. As `iwc_ask`, and the reasons of `iwc_connect`, those of `path`.
+IWC_API iwc_result_t iwc_stop_at(iwc_t *self, const char *path, int timeout_ms);
+
+/// The same with zero without ramp, latched; `reason` as of `iwc_estop`.
+IWC_API iwc_result_t iwc_estop_at(iwc_t *self, const char *path, const char *reason, int timeout_ms);
+
 /// Leaves the latch, if its cause is gone. Moves nothing. As `iwc_ask`.
 IWC_API iwc_result_t iwc_reset(iwc_t *self, int timeout_ms);
 

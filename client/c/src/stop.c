@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+// A stop through a connection of its own: by one socket of a gateway or by the other, whichever takes it.
+#include "connection.h"
+
+#include <limits.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+/// With another socket to try, one attempt takes no longer than this.
+#define ATTEMPT_US 300000
+/// Between two rounds of attempts.
+#define AGAIN_US 5000
+
+/// By custom: watch/NAME.sock beside NAME.sock. False: the path is too long.
+static bool find_other(const char *path, char *out, size_t size) {
+    const char *slash = strrchr(path, '/');
+    const char *name = (slash != NULL) ? slash + 1 : path;
+    const size_t folder = (size_t)(name - path); // With the slash.
+    const size_t watch = strlen(IWC_WATCH_DIRECTORY "/");
+    const bool watches = folder >= watch && strncmp(name - watch, IWC_WATCH_DIRECTORY "/", watch) == 0 &&
+                         (folder == watch || name[-(ptrdiff_t)watch - 1] == '/');
+    const int length = watches ? snprintf(out, size, "%.*s%s", (int)(folder - watch), path, name)
+                               : snprintf(out, size, "%.*s" IWC_WATCH_DIRECTORY "/%s", (int)folder, path, name);
+    return length > 0 && (size_t)length < size;
+}
+
+/// Another attempt cannot change it.
+static bool is_settled(const iwc_t *self, iwc_result_t result) {
+    const bool crowded = result == IWC_REFUSED && strcmp(self->error, "too_many_clients") == 0;
+    return result == IWC_OK || result == IWC_INTERRUPTED || (result == IWC_REFUSED && !crowded);
+}
+
+/// Nothing is to be expected of another attempt with the same socket soon.
+static bool is_closed_to_us(iwc_result_t result) {
+    return result == IWC_NOT_THERE || result == IWC_DENIED || result == IWC_INVALID;
+}
+
+static iwc_result_t attempt(iwc_t *self, const char *path, const char *request, int64_t deadline_us) {
+    const iwc_result_t result = iwc_dial(self, path, deadline_us);
+    const int64_t left_us = deadline_us - iwc_now_us();
+    const int64_t left_ms = (left_us > 0) ? left_us / 1000 + 1 : 0;
+    return (result == IWC_OK) ? iwc_ask(self, request, (left_ms < INT_MAX) ? (int)left_ms : IWC_FOREVER, NULL) : result;
+}
+
+/// What came of the first socket of all is the answer, if none stops.
+typedef struct {
+    iwc_result_t result;
+    int error_number;
+    char error[sizeof(((iwc_t *)NULL)->error)];
+    char reason[sizeof(((iwc_t *)NULL)->reason)];
+} outcome_t;
+
+static void keep(outcome_t *outcome, const iwc_t *self, iwc_result_t result) {
+    outcome->result = result;
+    outcome->error_number = self->error_number;
+    memcpy(outcome->error, self->error, sizeof outcome->error);
+    memcpy(outcome->reason, self->reason, sizeof outcome->reason);
+}
+
+static iwc_result_t restore(const outcome_t *outcome, iwc_t *self) {
+    self->error_number = outcome->error_number;
+    memcpy(self->error, outcome->error, sizeof self->error);
+    memcpy(self->reason, outcome->reason, sizeof self->reason);
+    return outcome->result;
+}
+
+static iwc_result_t stop_by_either(iwc_t *self, const char *const paths[2], const char *request, int64_t deadline_us) {
+    outcome_t first = {.result = IWC_CLOSED};
+    for (bool again = true; again;) {
+        again = false;
+        for (size_t i = 0; i < 2 && paths[i] != NULL; i++) {
+            const int64_t now_us = iwc_now_us();
+            const bool limited = paths[1] != NULL && deadline_us - now_us > ATTEMPT_US;
+            const iwc_result_t result = attempt(self, paths[i], request, limited ? now_us + ATTEMPT_US : deadline_us);
+            if (is_settled(self, result)) {
+                return result;
+            }
+            if (i == 0 &&
+                (first.result == IWC_CLOSED || result != IWC_TIMEOUT)) { // Not that the time was over in the end.
+                keep(&first, self, result);
+            }
+            again = again || !is_closed_to_us(result);
+        }
+        again = again && iwc_now_us() < deadline_us;
+        if (again && iwc_await(self, 0, iwc_now_us() + AGAIN_US) == IWC_INTERRUPTED) {
+            return IWC_INTERRUPTED;
+        }
+    }
+    return restore(&first, self);
+}
+
+iwc_result_t iwc_stop_by(iwc_t *self, const char *path, const char *request, int timeout_ms) {
+    const int64_t deadline_us = iwc_deadline_us(timeout_ms);
+    char found[PATH_MAX];
+    char other[PATH_MAX];
+    if (path == NULL) {
+        const iwc_result_t result = iwc_find(NULL, found, sizeof found);
+        if (result != IWC_OK) {
+            iwc_close(self);
+            return result;
+        }
+        path = found;
+    }
+    const char *const paths[2] = {path, find_other(path, other, sizeof other) ? other : NULL};
+    const iwc_result_t result = stop_by_either(self, paths, request, deadline_us);
+    iwc_close(self);
+    return result;
+}
