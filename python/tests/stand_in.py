@@ -79,6 +79,10 @@ class Client(asyncio.Protocol):
         stops = max((n for n, cmd in enumerate(cmds) if cmd == "stop"), default=-1)
         return self.open and "arm" in cmds[stops + 1 :]
 
+    def drove_since_stop(self):
+        cmds = [cmd for _, cmd in self.asked if cmd in ("drive", "stop")]
+        return bool(cmds) and cmds[-1] == "drive"
+
     def drives_since(self, t):
         return sum(cmd == "drive" and at > t for at, cmd in self.asked)
 

@@ -176,6 +176,8 @@ class Cancelled(unittest.TestCase):
         signal.setitimer(signal.ITIMER_REAL, 0)
         await asyncio.sleep(0.002)  # What is in the socket reaches the stand-in.
         for client in stand_in.clients[before:]:
+            if task is not drives_without_a_block:
+                self.assertFalse(client.drove_since_stop(), "its block was left without a stop")
             self.assertFalse(client.may_drive, "still armed and connected")
             self.assertLessEqual(client.drives_since(at + stall.worst), ON_ITS_WAY)
         self.assertLess(took, END_S + stall.worst, f"late by more than the stall of {stall.worst * 1000:.1f} ms")
@@ -190,6 +192,24 @@ class Cancelled(unittest.TestCase):
                         seconds = instants.random() * AT_MOST_S
                         with self.subTest(task=task.__name__, way=way.__name__, ms=seconds * 1000):
                             await self.one(stand_in, path, task, way, seconds)
+
+        self.with_stand_in(story)
+
+    def test_cancelled_while_it_arms_an_open_gateway_is_not_armed(self):
+        instants = random.Random(37)
+
+        async def story(stand_in, path):
+            async with AsyncGateway(path) as gateway:
+                for _ in range(200):
+                    task = asyncio.ensure_future(gateway.arm("arming"))
+                    await asyncio.sleep(instants.random() * 0.002)
+                    task.cancel()
+                    await asyncio.wait({task})
+                    await asyncio.sleep(0.002)
+                    if task.cancelled():
+                        self.assertFalse(any(client.may_drive for client in stand_in.clients))
+                    else:
+                        await task.result().stop()
 
         self.with_stand_in(story)
 
@@ -273,7 +293,14 @@ class Dropped(unittest.TestCase):
 
     def test_a_dropped_task_cancels_its_permission(self):
         async def story(stand_in, path):
-            work = drives_in_a_block(path)
+            gateway = AsyncGateway(path)
+
+            async def drive():
+                async with gateway.arm("dropped") as wheels:
+                    while True:
+                        await wheels.drive(100, 100)
+
+            work = drive()
             waits = None
             while not any(cmd == "drive" for client in stand_in.clients for _, cmd in client.asked):
                 waits = work.send(None)

@@ -150,6 +150,13 @@ class Hostile(unittest.TestCase):
     def test_silence_is_no_answer(self):
         self.both(b"", NoAnswer)
 
+    def test_no_answer_ends_the_connection_and_its_lease(self):
+        for ask in (self.ask_blocking, self.ask_async):
+            for cmd in ("arm", "reset"):
+                impostor = Impostor(b"")
+                self.addCleanup(impostor.end)
+                ask(impostor, NoAnswer, cmd)
+
     def test_half_an_answer_is_no_answer(self):
         self.both(b'{"id":1,"ok":true', NoAnswer)
 
@@ -212,23 +219,23 @@ class Hostile(unittest.TestCase):
 
     def test_a_lease_does_not_stay_after_a_reply_that_cannot_be_used(self):
         for says in (b"[" * 60000 + b"\n", b'{"id":1,"ok":true}\n'):
-            for arm in (self.arm_blocking, self.arm_async):
-                with self.subTest(says[:20], arm=arm.__name__):
+            for ask in (self.ask_blocking, self.ask_async):
+                with self.subTest(says[:20], ask=ask.__name__):
                     impostor = Impostor(says)
                     self.addCleanup(impostor.end)
-                    arm(impostor)
+                    ask(impostor)
 
-    def arm_blocking(self, impostor):
-        with Gateway(impostor.path) as gateway:
-            with self.assertRaises(ProtocolError):
-                gateway.arm()
+    def ask_blocking(self, impostor, error=ProtocolError, cmd="arm"):
+        with Gateway(impostor.path, timeout=0.2) as gateway:
+            with self.assertRaises(error):
+                getattr(gateway, cmd)()
             self.ended(impostor)
 
-    def arm_async(self, impostor):
+    def ask_async(self, impostor, error=ProtocolError, cmd="arm"):
         async def story():
-            async with AsyncGateway(impostor.path) as gateway:
-                with self.assertRaises(ProtocolError):
-                    await gateway.arm()
+            async with AsyncGateway(impostor.path, timeout=0.2) as gateway:
+                with self.assertRaises(error):
+                    await getattr(gateway, cmd)()
                 self.ended(impostor)
 
         asyncio.run(story())
