@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "candump_reader.h"
 
+#include "candump_form.h"
+
 #include <errno.h>
 #include <string.h>
 #include <unistd.h>
@@ -13,6 +15,7 @@ void candump_reader_init(candump_reader_t *self, int fd) {
     self->why = "";
     self->begin = 0;
     self->end = 0;
+    self->begun = false;
     self->ended = false;
     self->failed = false;
 }
@@ -79,7 +82,25 @@ static candump_read_t read_rest(candump_reader_t *self, candump_t *frame) {
                                 "if it is whole, add the line end");
 }
 
+/// Passes over a byte order mark. False, with `why`, if the first line is in another form.
+static bool begin(candump_reader_t *self) {
+    self->begun = true;
+    (void)find_newline(self);
+    self->begin += candump_form_mark(&self->buffer[self->begin], self->end - self->begin);
+    const char *why = candump_form_foreign(&self->buffer[self->begin], self->end - self->begin);
+    if (why != NULL) {
+        self->why = why;
+        self->line = 1;
+        self->begin = self->end;
+        self->ended = true;
+    }
+    return why == NULL;
+}
+
 candump_read_t candump_reader_next(candump_reader_t *self, candump_t *out_frame) {
+    if (!self->begun && !begin(self)) {
+        return CANDUMP_READ_FOREIGN;
+    }
     for (;;) {
         const char *newline = find_newline(self);
         if (newline == NULL) {

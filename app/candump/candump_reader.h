@@ -11,7 +11,8 @@
 
 typedef enum {
     CANDUMP_READ_FRAME = 0,
-    CANDUMP_READ_BAD, ///< `line` and `why` tell where and what.
+    CANDUMP_READ_BAD,     ///< `line` and `why` tell where and what.
+    CANDUMP_READ_FOREIGN, ///< Not in candump's log form: `why` names form and converter. Then CANDUMP_READ_END.
     CANDUMP_READ_END,
     CANDUMP_READ_FAILED, ///< errno tells why the file cannot be read.
 } candump_read_t;
@@ -22,6 +23,7 @@ typedef struct {
     size_t begin; ///< Unread bytes are [begin, end) of `buffer`.
     size_t end;
     int fd;
+    bool begun; ///< The first bytes were compared with the forms of other programs.
     bool ended;
     bool failed;
     char buffer[65536];

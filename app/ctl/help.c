@@ -172,15 +172,18 @@ static const verb_t verbs[] = {
           "wheel, "
           "message, values {what it carries, named as in the CSV}, note.\n"
           "Lines that cannot be understood are told with their number and left out; then the exit code is 65.\n")},
-    {VERB("learn", verb_learn, "FILE", "what a recording of another controller tells about the wheels",
+    {VERB("learn", verb_learn, "FILE [--interface NAME]",
+          "what a recording of another controller tells about the wheels",
           "Reads only; needs no gateway. Record while a controller that works drives both wheels: let it stand, go "
           "forwards and backwards for seconds each; best from the moment the wheels are switched on, unloaded. Tells "
           "setpoint types, ranges, lengths and periods, what speaks for (+) and against (-) the documented units and "
           "signs, and what no recording can tell. What was not seen is not concluded: such a line begins with ? and "
           "names what is missing.\n"
+          "--interface NAME  only the frames of this interface; needed if the recording has frames of several\n"
           "With --json one object: the figures, every sentence (item, side, verdict, value, text), the suggestions.\n"
           "Exit code 1: there is no setpoint in it.\n")},
-    {VERB("replay", verb_replay, "FILE [--config FILE]", "a recording through the gateway's core: what it decides",
+    {VERB("replay", verb_replay, "FILE [--config FILE] [--interface NAME]",
+          "a recording through the gateway's core: what it decides",
           "Reads only; needs no bus, and no gateway unless a recording of it is not to be read here: then it is asked "
           "for "
           "it. The same recording gives the same bytes each time.\n"
@@ -189,7 +192,8 @@ static const verb_t verbs[] = {
           "with them everything is decided again at the same times and compared with what was decided then. Any other "
           "recording "
           "is listened to: which wheels are heard, faults, force, assumptions.\n"
-          "--config FILE  the gateway's configuration; needed where none lies beside the recording\n"
+          "--config FILE     the gateway's configuration; needed where none lies beside the recording\n"
+          "--interface NAME  only the frames of this interface; needed if the recording has frames of several\n"
           "With --json one object per line: t_us, event, text; events note and summary tell the rest.\n")},
     {VERB("help", verb_help, "[VERB] [--list]", "this page, or the page of a verb",
           "--list  the bare words that may follow VERB, or all verbs, one a line; FILE and BUS stand for names of "

@@ -4,8 +4,11 @@
 
 usage: gamepad.py [--socket PATH] [--device /dev/input/js0] [--speed MM_S] [--yaw MRAD_S] [--button N]
 
-The left stick gives speed and turning rate, but only while the button (4: usually the left shoulder) is held. Let go, unplugged or
-out of battery (the device then goes away), the wheels stop.
+The left stick gives speed and turning rate, but only while the button (4: usually the left shoulder) is held. The wheels stop when the button is
+let go, and at once when the device disappears (unplugged).
+
+A wireless gamepad whose link dies reports nothing more, and its receiver stays. The wheels therefore also stop 2 s after the last report; from 1 s
+on a warning is printed. Move the stick a little to go on driving; after such a stop let go of the button and press it again.
 """
 
 import argparse
@@ -13,6 +16,7 @@ import os
 import select
 import struct
 import sys
+import time
 
 from iwheel import Gateway, IWheelError
 
@@ -21,6 +25,8 @@ BUTTON, AXIS, INITIAL = 0x01, 0x02, 0x80
 FULL = 32767
 CENTRE = 3000
 """Sticks rest not quite in the middle."""
+WARN_S, HELD_S = 1.0, 2.0
+"""Without a report of the device for so long: a warning; the button no longer counts as held."""
 
 
 class Gamepad:
@@ -30,7 +36,11 @@ class Gamepad:
         self.file = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
         self.axes = {0: 0, 1: 0}
         self.buttons: set[int] = set()
+        self.at_start: set[int] = set()
+        """Pressed by the kernel's own account of the state: no evidence of a hand."""
         self.pending = b""
+        self.reported = time.monotonic()
+        """When the device reported last: the evidence of a hand."""
 
     def update(self, seconds: float) -> None:
         if not select.select([self.file], [], [], seconds)[0]:
@@ -42,24 +52,53 @@ class Gamepad:
         while len(self.pending) >= EVENT.size:
             _, value, kind, number = EVENT.unpack(self.pending[: EVENT.size])
             self.pending = self.pending[EVENT.size :]
+            if not kind & INITIAL:
+                self.reported = time.monotonic()
             if kind & ~INITIAL == AXIS:
                 self.axes[number] = value if abs(value) > CENTRE else 0
             elif value:
-                self.buttons.add(number)
+                (self.at_start if kind & INITIAL else self.buttons).add(number)
             else:
                 self.buttons.discard(number)
+
+    def silent_s(self) -> float:
+        """Seconds since the last report."""
+        return time.monotonic() - self.reported
+
+
+class Hold:
+    """Whether the dead man's button counts as held: pressed, and the device has reported within HELD_S."""
+
+    def __init__(self, gamepad: Gamepad, button: int) -> None:
+        self.gamepad, self.button = gamepad, button
+        self.warned = False
+
+    def held(self) -> bool:
+        silent_s = self.gamepad.silent_s()
+        if self.button not in self.gamepad.buttons:
+            self.warned = False
+        elif silent_s >= HELD_S:
+            self.gamepad.buttons.clear()  # Motion begins again with a new press only, not with the link.
+            print(f"stopped: no report of the gamepad for {HELD_S:g} s; let go of the button, then press it again", file=sys.stderr)
+        elif silent_s >= WARN_S and not self.warned:
+            self.warned = True
+            print(f"no report of the gamepad for {WARN_S:g} s; move the stick, else the wheels stop", file=sys.stderr)
+        elif silent_s < WARN_S:
+            self.warned = False
+        return self.button in self.gamepad.buttons
 
 
 def steer(options: argparse.Namespace) -> None:
     gamepad = Gamepad(options.device)
     gamepad.update(0.2)
-    if options.button in gamepad.buttons:
+    if options.button in gamepad.buttons | gamepad.at_start:
         raise EOFError("the dead man's button is held already; let go of it, then start again")
     with Gateway(options.socket) as gateway, gateway.arm("gamepad") as wheels:
         print(f"armed: hold button {options.button} and steer with the left stick; Ctrl-C ends")
+        hold = Hold(gamepad, options.button)
         while True:
             gamepad.update(wheels.terms.lease_ms / 3000)
-            if options.button in gamepad.buttons:
+            if hold.held():
                 wheels.twist(-gamepad.axes[1] * options.speed // FULL, -gamepad.axes[0] * options.yaw // FULL)
             else:
                 wheels.twist(0, 0)

@@ -4,7 +4,8 @@
 
 usage: keys.py [--socket PATH] [--speed MM_S]
 
-A terminal tells that a key repeats, not that it was let go: a key holds for 0.6 s. The space bar and every other key stop at once.
+A terminal tells that a key repeats, not that it was let go: a key holds for 0.6 s. The space bar and every other key stop at once. The repeats
+come from the computer: if the link of a wireless keyboard dies with a key held, they go on. Use a keyboard with a cable.
 """
 
 import argparse

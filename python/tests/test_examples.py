@@ -108,6 +108,48 @@ class Examples(RigCase):
         self.assertIn("the gamepad is gone", child.stderr.read().decode())
         self.assert_stood_by(gone_us, 700)
 
+    def held(self):
+        pad, child = self.gamepad()
+        self.addCleanup(os.close, pad)
+        self.wait_until(lambda: self.holder() == "gamepad", 5)
+        os.write(pad, self.event(-32767, 2, 1) + self.event(1, 1, 4))
+        return pad, child, now_us()
+
+    def test_gamepad_whose_link_dies_stops_after_2_s(self):
+        pad, child, last_us = self.held()
+        time.sleep(1.7)
+        self.assertGreater(self.last_motion_us(), last_us + 1_500_000, "it stopped before")
+        os.set_blocking(child.stderr.fileno(), False)
+        self.assertIn("no report of the gamepad for 1 s", os.read(child.stderr.fileno(), 1000).decode())
+        time.sleep(1.8)
+        self.assert_stood_by(last_us, 2000 + 150 + 700)
+        self.assertIn("stopped: no report of the gamepad for 2 s", os.read(child.stderr.fileno(), 1000).decode())
+        os.write(pad, self.event(-32000, 2, 1))  # The link is back, the button was never let go.
+        time.sleep(0.5)
+        self.assert_stood_by(last_us, 2000 + 150 + 700)
+        os.write(pad, self.event(0, 1, 4) + self.event(1, 1, 4))
+        again_us = now_us()
+        time.sleep(0.5)
+        self.assertGreater(self.last_motion_us(), again_us)
+
+    def test_gamepad_that_reports_while_held_drives_on(self):
+        pad, _, last_us = self.held()
+        for n in range(12):
+            time.sleep(0.4)
+            os.write(pad, self.event(-32767 + n, 2, 1))
+        self.assertGreater(self.last_motion_us(), now_us() - 150_000)
+        gaps = sorted(t for t, _, speed in self.rig.bus.setpoints() if speed != 0 and t > last_us + 500_000)
+        self.assertLess(max(b - a for a, b in zip(gaps, gaps[1:])), 200_000, "it stopped in between")
+
+    def test_gamepad_state_from_the_kernel_is_no_evidence(self):
+        pad, _, last_us = self.held()
+        for _ in range(8):
+            time.sleep(0.4)
+            os.write(pad, self.event(-32767, 0x82, 1) + self.event(1, 0x81, 4))
+        os.write(pad, self.event(-32766, 2, 1))
+        time.sleep(0.3)
+        self.assert_stood_by(last_us, 2000 + 150 + 700)
+
     def test_a_button_held_at_the_start_does_not_arm(self):
         pad, child = self.gamepad([self.event(1, 0x81, 4)])
         self.assertEqual(child.wait(5), 1)

@@ -4,6 +4,7 @@
 import asyncio
 import json
 import os
+import resource
 import shutil
 import socket
 import tempfile
@@ -149,6 +150,13 @@ class Hostile(unittest.TestCase):
     def test_silence_is_no_answer(self):
         self.both(b"", NoAnswer)
 
+    def test_no_answer_ends_the_connection_and_its_lease(self):
+        for ask in (self.ask_blocking, self.ask_async):
+            for cmd in ("arm", "reset"):
+                impostor = Impostor(b"")
+                self.addCleanup(impostor.end)
+                ask(impostor, NoAnswer, cmd)
+
     def test_half_an_answer_is_no_answer(self):
         self.both(b'{"id":1,"ok":true', NoAnswer)
 
@@ -199,6 +207,56 @@ class Hostile(unittest.TestCase):
         for says in (b"SSH-2.0-x\r\n", b"[]\n", b'{"a":1}\n', b"\xff\xfe\n", b'{"ok":true,"event":"x"}\n', b"\n"):
             with self.subTest(says):
                 self.both(says, ProtocolError)
+
+    def test_json_without_end_of_depth_is_a_protocol_error(self):
+        for says in (b"[" * 60000 + b"\n", b'{"event":' * 7000 + b"\n"):
+            self.both(says, ProtocolError)
+
+    def test_a_number_or_name_of_another_type_is_a_protocol_error(self):
+        for says in (b'{"id":[1],"ok":true}\n', b'{"id":{},"ok":true}\n', b'{"event":[]}\n', b'{"event":null}\n'):
+            with self.subTest(says):
+                self.both(says, ProtocolError)
+
+    def test_a_lease_does_not_stay_after_a_reply_that_cannot_be_used(self):
+        for says in (b"[" * 60000 + b"\n", b'{"id":1,"ok":true}\n'):
+            for ask in (self.ask_blocking, self.ask_async):
+                with self.subTest(says[:20], ask=ask.__name__):
+                    impostor = Impostor(says)
+                    self.addCleanup(impostor.end)
+                    ask(impostor)
+
+    def ask_blocking(self, impostor, error=ProtocolError, cmd="arm"):
+        with Gateway(impostor.path, timeout=0.2) as gateway:
+            with self.assertRaises(error):
+                getattr(gateway, cmd)()
+            self.ended(impostor)
+
+    def ask_async(self, impostor, error=ProtocolError, cmd="arm"):
+        async def story():
+            async with AsyncGateway(impostor.path, timeout=0.2) as gateway:
+                with self.assertRaises(error):
+                    await getattr(gateway, cmd)()
+                self.ended(impostor)
+
+        asyncio.run(story())
+
+    def ended(self, impostor):
+        impostor.kept[0].settimeout(1)
+        self.assertEqual(impostor.kept[0].recv(100), b"", "the connection, and with it the lease, is still there")
+
+    def test_a_program_with_2000_open_files_stops(self):
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        if hard < 2100:
+            self.skipTest("at most 2100 open files must be permitted")
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 2100), hard))
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        for _ in range(2000):
+            self.addCleanup(os.close, os.open("/dev/null", os.O_RDONLY))
+        for ask in ("stop", "estop"):
+            impostor = Impostor(b'{"id":1,"ok":true,"state":"stopping"}\n')
+            self.addCleanup(impostor.end)
+            with Gateway(impostor.path) as gateway:
+                self.assertEqual(getattr(gateway, ask)(), "stopping")
 
     def test_an_endless_line_is_a_protocol_error(self):
         self.both(b"x" * 70000, ProtocolError)

@@ -576,6 +576,18 @@ class Driving(WithGateway):
         first = next(request for _, request in self.gateway.requests if request["cmd"] == "drive")
         self.assertEqual({"cmd": "drive", "left_mm_s": -300, "right_mm_s": 250, "id": first["id"]}, first)
 
+    def test_drive_past_a_reboot_reports_the_way_as_unknown(self):
+        class Rebooting(FakeGateway):
+            def on_status(self, connection, request):
+                status = super().on_status(connection, request)
+                if self.stopped_at is not None:
+                    status["left"].update(reboots=1, distance_mm=10013)
+                return status
+
+        code, out, err, _ = self.drive("200", "200", "--for", "200ms", gateway=self.serve(Rebooting))
+        self.assertEqual((0, ""), (code, err))
+        self.assertIn("left unknown, right 0.000 m", out)
+
     def test_takeover_and_currents_are_passed_on(self):
         self.assertEqual(0, self.drive("1", "2", "--takeover", "--current", "-5", "6", "--for", "100ms")[0])
         arm = next(request for _, request in self.gateway.requests if request["cmd"] == "arm")

@@ -32,6 +32,209 @@ def lines(*frames):
     return "".join(SECOND.format(1000 * i, frame) for i, frame in enumerate(frames))
 
 
+def drive_log(interface="can0", type_=1, set_clock=lambda n, t: t, count=1500):
+    """A controller that drives both wheels, and their speeds; every 20 ms. `set_clock(n, us)`: the time that is recorded."""
+    out = []
+    for n in range(count):
+        t = set_clock(n, 1700000000_000000 + n * 20000)
+        for us, frame in ((0, f"10A#{type_:02X}000007D0"), (300, f"12A#{type_:02X}000007D0"), (600, "100#00000000"), (900, "120#00000000")):
+            out.append(f"({(t + us) // 10**6}.{(t + us) % 10**6:06d}) {interface} {frame}\n")
+    return "".join(out)
+
+
+def merged(*logs):
+    return "".join(sorted("".join(logs).splitlines(keepends=True)))
+
+
+class Clock(unittest.TestCase):
+    """A clock that was set while something recorded, or a wrong stamp."""
+
+    S = 1_000_000
+    # name: time recorded for step n at t
+    CLOCKS = {
+        "1970, then NTP": lambda n, t: t if n >= 700 else 12_000000 + n * 20000,
+        "an hour and more ahead": lambda n, t: t + (7200_000000 if n >= 700 else 0),
+        "an hour back": lambda n, t: t - (3600_000000 if n >= 700 else 0),
+        "a second back": lambda n, t: t - (1_000000 if n >= 700 else 0),
+        "300 ms back": lambda n, t: t - (300_000 if n >= 700 else 0),
+        "ahead and back": lambda n, t: t + (9999_000000 if 500 <= n < 700 else 0),
+        "back and ahead": lambda n, t: t - (9999_000000 if 500 <= n < 700 else 0),
+        "back and ahead by 10 s": lambda n, t: t - (10_000000 if 500 <= n < 700 else 0),
+        "three steps": lambda n, t: t + (n // 400) * 90000_000000,
+    }
+    STAMPS = {"0": "(0.000000)", "far ahead": "(9700000000.000000)", "30 s ahead": "(1700000044.000000)", "5 s back": "(1700000009.000000)"}
+
+    def judge(self, text, words):
+        code, out, err = run("--json", "learn", "-", text=text)
+        self.assertEqual(code, 0, err)
+        seen = json.loads(out)
+        self.assertAlmostEqual(seen["duration_us"] / 1e6, 30, delta=0.5)
+        for each in (seen["setpoints"]["left"], *seen["telemetry"][:2]):
+            self.assertLess(each["longest_us"], 50_000)
+        self.assertIn(words, err)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a.log")
+            for name, log in (("a.log", text), ("b.log", drive_log())):
+                with open(os.path.join(folder, name), "w", encoding="utf-8") as file:
+                    file.write(log)
+            config = os.path.join(GOLDEN, "..", "..", "share", "gateway.conf")
+            _, told, _ = run("replay", path, "--config", config)
+            _, wanted, _ = run("replay", os.path.join(folder, "b.log"), "--config", config)
+            self.assertEqual(*([line.split(None, 1)[-1] for line in said.splitlines()[1:]] for said in (told, wanted)))
+
+    def test_clock_set_while_recording_invents_nothing(self):
+        for name, clock in self.CLOCKS.items():
+            with self.subTest(name):
+                self.judge(drive_log(set_clock=clock), "the clock was set")
+
+    def test_time_of_one_frame_wrong_invents_nothing(self):
+        for name, stamp in self.STAMPS.items():
+            with self.subTest(name):
+                rows = drive_log().splitlines(keepends=True)
+                rows[2800] = stamp + rows[2800][rows[2800].index(")") + 1:]
+                self.judge("".join(rows), "1 single times are wrong, first in line 2801")
+
+    def test_pause_of_ten_minutes_stays_a_pause(self):
+        code, out, err = run("--json", "learn", "-", text=drive_log(set_clock=lambda n, t: t + (600_000000 if n >= 700 else 0)))
+        self.assertEqual((code, err), (0, ""))
+        self.assertGreater(json.loads(out)["setpoints"]["left"]["longest_us"], 590_000_000)
+
+
+class Interfaces(unittest.TestCase):
+    """Several buses in one recording (candump any)."""
+
+    TWO = merged(drive_log("can0", 3, count=200), drive_log("can1", 7, count=200))
+    THREE = merged(TWO, drive_log("vcan2", 1, count=200))
+
+    def types(self, text, *words):
+        code, out, err = run("--json", "learn", "-", *words, text=text)
+        self.assertEqual((code, err), (0, ""))
+        return list(json.loads(out)["setpoints"]["left"]["types"])
+
+    def test_learn_of_several_interfaces_is_refused_by_name(self):
+        for text in (self.TWO, self.THREE):
+            code, out, err = run("learn", "-", text=text)
+            self.assertEqual((code, out), (65, ""))
+            self.assertIn("has frames of two interfaces, can0 and can1; choose one: --interface can0", err)
+            self.assertEqual(len(err.splitlines()), 1)
+
+    def test_learn_of_a_chosen_interface_mixes_nothing(self):
+        for text in (self.TWO, self.THREE):
+            self.assertEqual(self.types(text, "--interface", "can0"), ["3"])
+            self.assertEqual(self.types(text, "--interface", "can1"), ["7"])
+        self.assertEqual(self.types(self.THREE, "--interface", "vcan2"), ["1"])
+
+    def test_interface_that_is_not_in_it_is_refused(self):
+        code, _, err = run("learn", "-", "--interface", "can9", text=self.TWO)
+        self.assertEqual(code, 65)
+        self.assertIn("there is no frame of interface can9 in it", err)
+
+    def test_replay_wants_one_interface(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "two.log")
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(self.TWO)
+            config = os.path.join(GOLDEN, "..", "..", "share", "gateway.conf")
+            code, _, err = run("replay", path, "--config", config)
+            self.assertEqual(code, 65)
+            self.assertIn("choose one: --interface can0", err)
+            self.assertEqual(run("replay", path, "--config", config, "--interface", "can1")[0], 0)
+
+    def test_decode_shows_every_interface(self):
+        code, out, err = run("decode", "--csv", text=self.THREE)
+        self.assertEqual((code, err), (0, ""))
+        self.assertEqual({row["interface"] for row in csv.DictReader(io.StringIO(out))}, {"can0", "can1", "vcan2"})
+
+
+class Forms(unittest.TestCase):
+    """What other programs write: read, or refused in one line with the form and its converter."""
+
+    LOG = drive_log(count=3)
+    SCREEN = "  can0  10A   [5]  01 00 00 07 D0\n"
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    def file(self, name, data):
+        path = os.path.join(self.folder, name)
+        with open(path, "wb") as file:
+            file.write(data if isinstance(data, bytes) else data.encode())
+        return path
+
+    def refused(self, path, *words):
+        for verb in ("decode", "learn"):
+            code, out, err = run(verb, path)
+            self.assertEqual((code, out), (65, ""))
+            self.assertEqual(len(err.splitlines()), 1, err)
+            for word in words:
+                self.assertIn(word, err)
+
+    def test_forms_that_are_refused_name_their_converter(self):
+        import bz2
+        import gzip
+        import lzma
+        for name, data, words in (
+                ("gz", gzip.compress(self.LOG.encode()), ("gzip", "gunzip -c")),
+                ("bz2", bz2.compress(self.LOG.encode()), ("bzip2", "bzcat")),
+                ("xz", lzma.compress(self.LOG.encode()), ("xz", "xzcat")),
+                ("utf-16", self.LOG.encode("utf-16"), ("UTF-16", "iconv")),
+                ("utf-16-be with mark", b"\xfe\xff" + self.LOG.encode("utf-16-be"), ("UTF-16", "iconv")),
+                ("utf-16-le", self.LOG.encode("utf-16-le"), ("UTF-16", "iconv")),
+                ("utf-16-be", self.LOG.encode("utf-16-be"), ("UTF-16", "iconv")),
+                ("screen", self.SCREEN * 20, ("screen form", "candump -L")),
+                ("screen -ta", "".join(f" (17000000{n:02}.000000){self.SCREEN}" for n in range(20)), ("screen form", "candump -L")),
+                ("screen -x", "  can0  RX - -  10A   [5]  01 00 00 07 D0\n" * 20, ("screen form", "candump -L")),
+                ("savvycan", "Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n1,0000010A,false,Rx,0,1,01,\n" * 9, ("CSV",)),
+                ("jsonl", '{"event":"head"}\n', ("JSON", ".log")),
+                ("trc", ";$FILEVERSION=1.1\n;   x\n" * 9, ("TRC", "can_logconvert"))):
+            with self.subTest(name):
+                self.refused(self.file("a", data), *words)
+
+    def test_forms_that_are_read(self):
+        for name, data in (("mark", b"\xef\xbb\xbf" + self.LOG.encode()), ("CR LF", self.LOG.replace("\n", "\r\n")), ("R", self.LOG.replace("\n", " R\n")),
+                           ("T", self.LOG.replace("\n", " T\n")), ("spaces", self.LOG.replace(" can0 ", "  can0  ")), ("comment", "# a, b [1]\n" + self.LOG)):
+            with self.subTest(name):
+                code, out, err = run("decode", self.file("a.log", data))
+                self.assertEqual((code, err), (0, ""))
+                self.assertEqual(out.count("setpoint"), 6)
+
+    def test_can_utils_forms(self):
+        if not shutil.which("log2asc"):
+            self.skipTest("can-utils is missing")
+        asc = subprocess.run(["log2asc", "can0"], input=self.LOG, capture_output=True, text=True, check=True).stdout
+        self.refused(self.file("a.asc", asc), "ASC", "asc2log")
+        again = subprocess.run(["asc2log"], input=asc, capture_output=True, text=True, check=True).stdout
+        code, out, err = run("decode", self.file("b.log", again))
+        self.assertEqual((code, err), (0, ""))
+        self.assertEqual(out.count("setpoint"), 6)
+
+    def test_python_can_forms(self):
+        try:
+            import can
+        except ImportError:
+            self.skipTest("python-can is missing")
+        for ending, words in ((".log", None), (".asc", ("ASC",)), (".blf", ("BLF", "can_logconvert")), (".csv", ("CSV", "can_logconvert")),
+                              (".trc", ("TRC", "can_logconvert")), (".db", ("database", "can_logconvert")), (".txt", ("screen form",))):
+            with self.subTest(ending):
+                path = os.path.join(self.folder, "a" + ending)
+                with can.Logger(path) as logger:
+                    for n in range(30):
+                        logger(can.Message(timestamp=1700000000 + n / 50, arbitration_id=0x10A, is_extended_id=False, channel="can0", data=b"\1\0\0\7\xd0"))
+                if words:
+                    self.refused(path, *words)
+                else:
+                    code, out, err = run("decode", path)
+                    self.assertEqual((code, err), (0, ""))
+                    self.assertEqual(out.count("setpoint"), 30)
+
+    def test_extended_setpoints_name_the_option_of_python_can(self):
+        text = lines("0000010A#01000007D0", "0000012A#01000007D0")
+        self.assertIn("is_extended_id=False", run("decode", text=text)[1])
+        self.assertIn("is_extended_id=False", run("learn", "-", text=text)[1])
+
+
 class Decode(unittest.TestCase):
     def decode(self, text, *words):
         return run("decode", *words, text=text)
@@ -275,7 +478,7 @@ class Replay(unittest.TestCase):
 
     def test_long_silence_is_cut(self):
         with open(os.path.join(self.folder, "gap.log"), "w", encoding="utf-8") as file:
-            file.write("(1.0) can0 100#00000000\n(900000000000.0) can0 100#00000000\n(5.0) can0 100#00000000\n")
+            file.write("(1.0) can0 100#00000000\n(601.0) can0 100#00000000\n(600.95) can0 100#00000000\n")
         code, out, _ = self.replay("--config", "estop.conf", name="gap.log")
         self.assertEqual(0, code)
         self.assertIn("cut to 60 s", out)

@@ -13,9 +13,10 @@ TIMEOUT_S = 60
 
 def judge(applied, tests, folder):
     """The first test that fails, or None. `tests`: a file of python/tests without its ending, or a class or a test of it."""
-    shutil.copytree(ROOT / "python", folder / "python", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "python", folder / "python", ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
     for name in ("build", "scripts", "share", "test"):
-        (folder / name).symlink_to(ROOT / name)
+        if not (folder / name).exists():
+            (folder / name).symlink_to(ROOT / name)
     if applied:
         (folder / applied.file).write_text(applied.text)
     try:

@@ -53,6 +53,38 @@ static void expect_end(void) {
     TEST_ASSERT_EQUAL(CANDUMP_READ_END, candump_reader_next(&reader, &frame));
 }
 
+static void test_reader_byte_order_mark_is_passed_over(void) {
+    give("\xef\xbb\xbf(1.0) can0 100#00\n(1.1) can0 120#00\n");
+    end_input();
+    expect_frame(0x100, 1);
+    expect_frame(0x120, 2);
+    expect_end();
+}
+
+static void test_reader_foreign_form_is_named_once(void) {
+    candump_t frame;
+    give("date Tue Nov 14 22:13:20 2023\nbase hex  timestamps absolute\n0.0 1 10A Rx d 0\n");
+    end_input();
+    TEST_ASSERT_EQUAL(CANDUMP_READ_FOREIGN, candump_reader_next(&reader, &frame));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(reader.why, "asc2log"), reader.why);
+    expect_end();
+}
+
+static void test_reader_form_is_not_guessed_from_a_frame(void) {
+    static const char *const lines[] = {"(1.0) can0 100#00\n",
+                                        "# a, b [1]\n(1.0) can0 100#00\n",
+                                        "; a, b [1]\n(1.0) can0 100#00\n",
+                                        "\n(1.0) can0 100#00\n",
+                                        " (1.0) a,b 100#00\n",
+                                        "(1.0) x[1] 100#00\n"};
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        candump_t frame;
+        candump_reader_init(&reader, ends[0]);
+        give(lines[i]);
+        TEST_ASSERT_EQUAL_MESSAGE(CANDUMP_READ_FRAME, candump_reader_next(&reader, &frame), lines[i]);
+    }
+}
+
 static void test_lines_come_in_order_with_their_numbers(void) {
     give("(1.0) can0 100#00\r\n\n# comment\n(1.1) can0 120#00\nrubbish\n(1.2) can0 200#\n");
     end_input();
@@ -140,6 +172,9 @@ static void test_more_than_the_buffer_holds_comes_whole(void) {
 
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_reader_byte_order_mark_is_passed_over);
+    RUN_TEST(test_reader_foreign_form_is_named_once);
+    RUN_TEST(test_reader_form_is_not_guessed_from_a_frame);
     RUN_TEST(test_lines_come_in_order_with_their_numbers);
     RUN_TEST(test_empty_input_ends);
     RUN_TEST(test_line_is_handed_out_while_the_writer_goes_on);

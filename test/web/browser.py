@@ -249,6 +249,45 @@ def test_pad_held_by_a_key_stops_with_the_focus(rig):
         assert braking_ms(rig, since) < 500
 
 
+def move_by_key(page, n):
+    page.keyboard.down("ArrowUp")  # Again while it is down: a repeat.
+
+
+def move_by_mouse(page, n):
+    box = page.locator("#pad").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2 + n % 2, box["y"] + box["height"] / 4)
+
+
+@needs(driving=True)
+def test_pad_held_without_evidence_of_a_hand_stops_after_2_s(rig):
+    rig.start().connected()
+    with page_of(rig) as page:
+        live(page)
+        page.click("#arm")
+        page.click("#ask-yes")
+        page.focus("#pad")
+        for move, begin, end in ((move_by_key, lambda: None, lambda: page.keyboard.up("ArrowUp")), (move_by_mouse, page.mouse.down, page.mouse.up)):
+            move(page, 0)
+            begin()
+            turns(rig)
+            for n in range(10):
+                time.sleep(0.3)
+                move(page, n)
+            last = now_us()
+            time.sleep(0.5)  # The last movement has also changed the setpoints.
+            assert rig.ask_json("GET", "/api/status")[1]["state"] == "armed", f"it stopped although a hand moved: {page.inner_text('#pad-says')}"
+            seen(page, "document.querySelector('#pad-says').textContent.includes('Nothing moves on the pad')")
+            braked_ms = 500 + braking_ms(rig, last + 500_000, 3)
+            assert 1700 < braked_ms < 2500, f"{braked_ms} ms"
+            seen(page, "document.querySelector('#pad-says').textContent.includes('hold the pad again')")
+            until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+            move(page, 1)
+            time.sleep(0.5)
+            assert rig.ask_json("GET", "/api/status")[1]["state"] == "listening", "it began without a new press"
+            end()
+            time.sleep(0.6)
+
+
 def test_recording_is_opened_played_and_opened_again_from_its_files(rig):
     rig.start().connected()
     driver = Driver(rig)

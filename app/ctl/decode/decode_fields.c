@@ -103,7 +103,10 @@ void decode_fields(const iw_can_frame_t *frame, const iw_config_t *config, decod
         break;
     case IW_CODEC_BAD_FORMAT:
         out->message = "ignored";
-        out->note = "the wheels use only classic data frames with 11-bit ids: the gateway ignores this one";
+        out->note =
+            ((frame->id & IW_CAN_EXTENDED) != 0U)
+                ? "the wheels use only 11-bit ids: the gateway ignores this one; python-can: is_extended_id=False"
+                : "the wheels use only classic data frames with 11-bit ids: the gateway ignores this one";
         break;
     case IW_CODEC_BAD_LENGTH:
         out->message = "ignored";

@@ -145,6 +145,7 @@ int verb_decode(ctl_t *self, int count, char **words) {
     static decode_t decode;
     candump_t frame;
     iw_config_default(&decode.config);
+    decode.recording.every_interface = true;
     int code = parse_words(&decode, count, words);
     if (code == CTL_OK && decode.csv && self->json) {
         return ctl_fail(CTL_USAGE, "decode writes --csv or --json, not both");

@@ -234,11 +234,21 @@ static int wait_for_rest(drive_t *self) {
     }
 }
 
+/// Whether both snapshots count from the same beginning: a wheel that rebooted in between has lost its count.
+static bool counted_through(const json_t *first, const json_t *latest) {
+    const json_t *before = json_object_get(first, "reboots");
+    return json_is_integer(before) && json_equal(before, json_object_get(latest, "reboots")) == 1;
+}
+
 /// Metres a wheel went between both snapshots.
 static void way_of(const drive_t *self, const char *side, char out[TEXT_CELL]) {
-    const json_t *from = json_object_get(json_object_get(self->first, side), "distance_mm");
-    const json_t *to = json_object_get(json_object_get(self->latest, side), "distance_mm");
-    if (json_is_integer(from) && json_is_integer(to)) {
+    const json_t *first = json_object_get(self->first, side);
+    const json_t *latest = json_object_get(self->latest, side);
+    const json_t *from = json_object_get(first, "distance_mm");
+    const json_t *to = json_object_get(latest, "distance_mm");
+    if (!counted_through(first, latest)) {
+        (void)snprintf(out, TEXT_CELL, "unknown");
+    } else if (json_is_integer(from) && json_is_integer(to)) {
         text_number(json_integer_value(to) - json_integer_value(from), 3, "m", out);
     } else {
         (void)snprintf(out, TEXT_CELL, "--");

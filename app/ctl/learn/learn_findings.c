@@ -49,10 +49,12 @@ bool learn_suggests(const learn_findings_t *self, const learn_finding_t *finding
 
 static void weigh_frames(const learn_t *self, learn_findings_t *out) {
     if (self->strange > 0U) {
-        (void)learn_say(out, '-', "frames", LEARN_BOTH,
-                        "%" PRIu64
-                        " remote, extended or FD frames with one of the eleven numbers: the gateway ignores such",
-                        self->strange);
+        (void)learn_say(
+            out, '-', "frames", LEARN_BOTH,
+            "%" PRIu64
+            " remote, extended or FD frames with one of the eleven numbers: the gateway ignores such. python-can "
+            "sends extended ids by default: is_extended_id=False",
+            self->strange);
     }
     if (self->too_short > 0U) {
         (void)learn_say(out, '-', "frames", LEARN_BOTH,

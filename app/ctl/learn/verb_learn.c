@@ -9,7 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define CELL 26
+#define CELL     26
+#define EXTENDED "extended; the wheels' is standard (python-can: is_extended_id=False)"
 
 static void range_text(const learn_range_t *range, const char *unit, char *out) {
     if (learn_is_empty(range)) {
@@ -74,6 +75,11 @@ static void print_id(const learn_id_t *id, const char *said) {
                  id->id, id->count, length, period, said);
 }
 
+/// An extended id with the number of a standard one of the wheels.
+static bool is_extended_of_ours(const learn_t *self, const learn_id_t *id) {
+    return id->extended && learn_known(self, id->id) != NULL;
+}
+
 static void print_telemetry(const learn_t *self) {
     static const char *const documented[LEARN_IDS] = {
         [2] = "document: 4 bytes, 4 ms",
@@ -94,7 +100,7 @@ static void print_telemetry(const learn_t *self) {
         (void)puts("\nOther ids, not in the document");
     }
     for (uint32_t i = 0; i < self->others; i++) {
-        print_id(&self->other[i], "");
+        print_id(&self->other[i], is_extended_of_ours(self, &self->other[i]) ? EXTENDED : "");
     }
     if (self->more_others > 0U) {
         (void)printf("  and %" PRIu64 " frames of still other ids\n", self->more_others);
@@ -263,16 +269,24 @@ int verb_learn(ctl_t *self, int count, char **words) {
     static learn_findings_t findings;
     static recording_t recording;
     candump_t frame;
-    if (count != 1 || (words[0][0] == '-' && words[0][1] != '\0')) {
-        return ctl_fail(CTL_USAGE, "learn wants one recording (or -); see: iwheelctl learn --help");
+    const char *path = NULL;
+    const option_t options[] = {{OPTION("--interface", option_text, &recording.only)}, {.name = NULL}};
+    const words_syntax_t syntax = {"learn", options, words_is_file, &path};
+    int code = words_read(&syntax, count, words);
+    if (code == CTL_OK && path == NULL) {
+        code = ctl_fail(CTL_USAGE, "learn wants one recording (or -); see: iwheelctl learn --help");
     }
-    int code = recording_open(&recording, NULL, words[0]);
+    recording.even = true;
+    code = (code == CTL_OK) ? recording_open(&recording, NULL, path) : code;
     if (code != CTL_OK) {
         return code;
     }
     learn_init(&learn);
     while (recording_next(&recording, &frame)) {
         learn_frame(&learn, &frame);
+    }
+    if (recording.refused) {
+        return recording_close(&recording);
     }
     learn_weigh(&learn, &findings);
     const bool told = learn.setpoint[IW_LEFT].count + learn.setpoint[IW_RIGHT].count > 0U;

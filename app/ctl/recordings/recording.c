@@ -12,6 +12,12 @@
 #include <unistd.h>
 
 #define PREFIX "stop-"
+/// Frames of two buses in one recording may be this much out of order; a clock that was set goes back further.
+#define BACK_US 100000
+/// Two frames of a bus in use are closer together.
+#define AHEAD_US 2000000
+/// Further ahead the clock was set: nobody records a pause this long.
+#define PAUSE_MAX_US INT64_C(3600000000)
 /// A gateway whose disk is slow.
 #define PIECE_MS 20000
 /// The gateway keeps no more than 128 MiB of recordings together.
@@ -119,8 +125,15 @@ int recording_open(recording_t *self, ctl_t *ctl, const char *path) {
     const bool standard = strcmp(path, "-") == 0;
     struct stat status;
     self->name = standard ? "standard input" : path;
+    self->refused = false;
     self->frames = 0;
     self->bad = 0;
+    self->others = 0;
+    self->steps = 0;
+    self->wrong_stamps = 0;
+    self->shift_us = 0;
+    self->has_pending = false;
+    self->interface[0] = '\0';
     self->fd = standard ? STDIN_FILENO : source_open(ctl, path, SOURCE_WHOLE);
     if (self->fd < 0) {
         return tell_unopened(path, errno);
@@ -142,23 +155,108 @@ static void tell_bad(recording_t *self) {
     }
 }
 
-bool recording_next(recording_t *self, candump_t *out_frame) {
-    for (;;) {
+/// Whether the frame belongs to the interface that is read. A second interface without a choice refuses the recording.
+static bool is_chosen(recording_t *self, const candump_t *frame) {
+    if (self->every_interface) {
+        return true;
+    }
+    const char *chosen = (self->only != NULL) ? self->only : self->interface;
+    if (self->only == NULL && self->interface[0] == '\0') {
+        memcpy(self->interface, frame->interface, sizeof self->interface);
+    }
+    if (strcmp(frame->interface, chosen) == 0) {
+        return true;
+    }
+    self->others++;
+    if (self->only == NULL) {
+        self->refused = true;
+        (void)ctl_fail(CTL_DATA, "%s:%" PRIu64 ": has frames of two interfaces, %s and %s; choose one: --interface %s",
+                       self->name, self->reader.line, self->interface, frame->interface, self->interface);
+    }
+    return false;
+}
+
+/// The next frame of the chosen interface, as it stands there.
+static bool read_frame(recording_t *self, candump_t *out_frame) {
+    while (!self->refused) {
         switch (candump_reader_next(&self->reader, out_frame)) {
         case CANDUMP_READ_FRAME:
-            self->frames++;
-            return true;
+            if (is_chosen(self, out_frame)) {
+                return true;
+            }
+            break;
         case CANDUMP_READ_BAD:
             tell_bad(self);
+            break;
+        case CANDUMP_READ_FOREIGN:
+            self->refused = true;
+            (void)ctl_fail(CTL_DATA, "%s: %s", self->name, self->reader.why);
             break;
         default:
             return false;
         }
     }
+    return false;
+}
+
+static bool follows(int64_t time_us, int64_t before_us) {
+    return time_us >= before_us - BACK_US && time_us <= before_us + AHEAD_US;
+}
+
+/// The time of a frame that does not follow the one before it: a wrong stamp, a clock that was set, or a pause.
+static int64_t judge_jump(recording_t *self, int64_t stamp_us) {
+    if (follows(stamp_us, self->last_us)) { // It was set back to what it was before.
+        self->shift_us = 0;
+        return stamp_us;
+    }
+    const uint64_t line = self->reader.line;
+    self->has_pending = read_frame(self, &self->pending);
+    const bool wrong = self->has_pending && (follows(self->pending.time_us + self->shift_us, self->last_us) ||
+                                             follows(self->pending.time_us, self->last_us));
+    const int64_t jump_us = stamp_us + self->shift_us - self->last_us;
+    if (!wrong && jump_us >= 0 && jump_us <= PAUSE_MAX_US) {
+        return stamp_us + self->shift_us;
+    }
+    self->first_step = (self->steps + self->wrong_stamps == 0U) ? line : self->first_step;
+    self->steps += wrong ? 0U : 1U;
+    self->wrong_stamps += wrong ? 1U : 0U;
+    self->shift_us -= wrong ? 0 : jump_us;
+    return self->last_us;
+}
+
+static void even_time(recording_t *self, candump_t *frame) {
+    const int64_t time_us = frame->time_us + self->shift_us;
+    const bool first = self->frames == 1U;
+    frame->time_us = (first || follows(time_us, self->last_us)) ? time_us : judge_jump(self, frame->time_us);
+    self->last_us = frame->time_us;
+}
+
+bool recording_next(recording_t *self, candump_t *out_frame) {
+    if (self->has_pending) {
+        self->has_pending = false;
+        *out_frame = self->pending;
+    } else if (!read_frame(self, out_frame)) {
+        return false;
+    }
+    self->frames++;
+    if (self->even) {
+        even_time(self, out_frame);
+    }
+    return true;
 }
 
 bool recording_is_drained(const recording_t *self) {
-    return self->reader.begin == self->reader.end;
+    return self->reader.begin == self->reader.end && !self->has_pending;
+}
+
+static void report_clock(const recording_t *self) {
+    if (self->steps + self->wrong_stamps > 0U) {
+        (void)ctl_fail(CTL_OK,
+                       "%s: the clock was set: %" PRIu64 " times, and %" PRIu64
+                       " single times are wrong, first in line %" PRIu64 "; each such frame follows the one before it "
+                       "without a pause",
+                       self->name, self->steps, self->wrong_stamps, self->first_step);
+    }
 }
 
 int recording_close(recording_t *self) {
@@ -170,9 +268,18 @@ int recording_close(recording_t *self) {
         return ctl_fail(CTL_DATA, "%s: cannot be read further than line %" PRIu64 ": %s", self->name, self->reader.line,
                         strerror(error));
     }
+    report_clock(self);
+    if (self->refused) {
+        return CTL_DATA;
+    }
     if (self->bad > 0U) {
         return ctl_fail(CTL_DATA, "%s: %" PRIu64 " of %" PRIu64 " lines with something on them were left out",
                         self->name, self->bad, self->bad + self->frames);
+    }
+    if (self->frames == 0U && self->others > 0U) {
+        return ctl_fail(CTL_DATA,
+                        "%s: there is no frame of interface %s in it; name one of its own: iwheelctl decode %s",
+                        self->name, self->only, self->name);
     }
     if (self->frames == 0U) {
         return ctl_fail(CTL_DATA, "%s: there is no frame in it", self->name);

@@ -20,14 +20,27 @@
 #define RECORDING_TOLD_MAX 10U
 
 typedef struct {
-    const char *name; ///< As shown in messages.
+    const char *name;     ///< As shown in messages.
+    const char *only;     ///< Frames of this interface alone (option --interface); NULL: of the only one.
+    bool every_interface; ///< Frames of every interface, each with its name. Set before the first frame, as the next.
+    bool even;            ///< Times without the steps of a clock that was set; frames keep their order.
+    bool refused;         ///< Another form, or several interfaces: the cause and the fix were printed.
     uint64_t frames;
     uint64_t bad;
+    uint64_t others;       ///< Frames of interfaces that were not chosen.
+    uint64_t steps;        ///< The clock was set.
+    uint64_t wrong_stamps; ///< A single time far from its neighbours.
+    uint64_t first_step;   ///< Line of the first of them.
+    int64_t shift_us;      ///< Added to times as they stand there.
+    int64_t last_us;       ///< Of the frame before, after the shift.
+    candump_t pending;     ///< Read ahead.
+    bool has_pending;
+    char interface[CANDUMP_INTERFACE_SIZE];
     int fd;
     candump_reader_t reader;
 } recording_t;
 
-/// Opens it. An exit code, 0 for success; what is wrong has been told. `ctl`: to ask the gateway; NULL: files only.
+/// Opens it. `only`, `every_interface` and `even` stay as the caller has set them. An exit code, 0 for success; what is wrong has been told. `ctl`: to ask the gateway; NULL: files only.
 int recording_open(recording_t *self, ctl_t *ctl, const char *path);
 
 /// True with the next frame.

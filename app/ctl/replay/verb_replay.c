@@ -51,7 +51,11 @@ static bool beside(const char *path, const char *ending, char out[PATH_SIZE]) {
 }
 
 static int parse_words(verb_replay_t *self, int count, char **words) {
-    const option_t options[] = {{OPTION("--config", config_option_load, &self->config)}, {.name = NULL}};
+    const option_t options[] = {
+        {OPTION("--config", config_option_load, &self->config)},
+        {OPTION("--interface", option_text, &self->recording.only)},
+        {.name = NULL},
+    };
     const words_syntax_t syntax = {"replay", options, words_is_file, &self->path};
     const int code = words_read(&syntax, count, words);
     return (code != CTL_OK || self->path != NULL)
@@ -230,6 +234,7 @@ static void replay_frames(verb_replay_t *self) {
     replay_note(&self->out,
                 "%s, frames only: nobody arms. Setpoints marked T are the gateway's own, others another controller's",
                 self->path);
+    self->recording.even = true; // No entry of a monotonic clock corrects its times.
     if (peek_frame(self)) {
         replay_init(&self->replay, &self->config, time_of(self, &self->frame), self->out);
     }
@@ -250,7 +255,7 @@ static void replay_frames(verb_replay_t *self) {
 
 static int finish(verb_replay_t *self) {
     const int code = recording_close(&self->recording);
-    if (self->fed > 0U) {
+    if (self->fed > 0U && !self->recording.refused) {
         replay_finish(&self->replay);
     }
     if (self->events.lost > 0U || (self->events.file != NULL && !self->events.whole)) {

@@ -317,7 +317,9 @@ function notDelivered(why, times) {
 
 // ---- driving: only while somebody holds the pad -----------------------------------------------------------------------
 
-const drive = { on: false, held: false, key: "", sequence: 0, v: 0, yaw: 0, session: 0 };
+// No release comes from a mouse or keyboard whose link died: each report of it is evidence of a hand, and driving needs a fresh one.
+const HAND_WARN_MS = 1000, HAND_STOP_MS = 2000;
+const drive = { on: false, held: false, key: "", sequence: 0, v: 0, yaw: 0, session: 0, hand_ms: 0 };
 
 function padSays(words) {
   $("pad-says").textContent = words;
@@ -336,8 +338,13 @@ function aim(x, y) {
   $("knob").classList.toggle("moved", x !== 0 || y !== 0);
 }
 
+function hand() {
+  drive.hand_ms = performance.now();
+}
+
 async function hold(x, y) {
   if (!drive.on) return;
+  hand();
   aim(x, y);
   if (drive.held) return;
   drive.held = true;
@@ -359,11 +366,12 @@ async function hold(x, y) {
 // One command at a time, each quoting the newest time heard: what is late is dropped by the bridge, never carried out.
 async function feed(session) {
   while (drive.held && session === drive.session) {
-    const begun = performance.now();
+    const begun = performance.now(), still_ms = begun - drive.hand_ms;
+    if (still_ms > HAND_STOP_MS) return void letGo("why_no_hand");
     const query = new URLSearchParams({ key: drive.key, sequence: ++drive.sequence, t_us: page.t_us, v_mm_s: drive.v, yaw_mrad_s: drive.yaw });
     const answer = await ask("POST", `/api/drive?${query}`, { signal: AbortSignal.timeout(page.rights.ttl_ms) });
     if (!answer.ok) throw new Error((await answer.json()).message);
-    padSays(fill(STRINGS.pad_drives, { v: drive.v, yaw: drive.yaw }));
+    padSays(fill(still_ms > HAND_WARN_MS ? STRINGS.pad_no_hand : STRINGS.pad_drives, { v: drive.v, yaw: drive.yaw }));
     await new Promise((done) => setTimeout(done, Math.max(0, DRIVE_MS - (performance.now() - begun))));
   }
 }
@@ -390,9 +398,9 @@ function setUpDriving() {
   };
   pad.setAttribute("aria-label", STRINGS.pad);
   pad.addEventListener("pointerdown", (event) => { pad.setPointerCapture(event.pointerId); pad.focus(); hold(...from(event)); });
-  pad.addEventListener("pointermove", (event) => { if (drive.held) aim(...from(event)); });
+  pad.addEventListener("pointermove", (event) => { if (drive.held) { hand(); aim(...from(event)); } });
   for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(name, () => letGo("why_let_go"));
-  pad.addEventListener("keydown", (event) => { if (keys[event.key]) { event.preventDefault(); if (!event.repeat) hold(...keys[event.key]); } });
+  pad.addEventListener("keydown", (event) => { if (keys[event.key]) { event.preventDefault(); hand(); if (!event.repeat) hold(...keys[event.key]); } });
   pad.addEventListener("keyup", (event) => { if (keys[event.key]) letGo("why_let_go"); });
   pad.addEventListener("blur", () => letGo("why_hidden"));
   pad.addEventListener("contextmenu", (event) => event.preventDefault());

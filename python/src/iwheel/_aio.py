@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
 """The client for asyncio. Contract: as `Gateway` and `Armed`, with `await` before every request.
 
-Its one task only reads. No task repeats a command: when the program's own task hangs, the lease ends.
+No task runs behind the program's back, and nothing repeats a command: when the program's own task hangs, the lease ends.
 """
 
 from __future__ import annotations
 
 import asyncio
-import os
+import socket
 import time
 import warnings
 from collections import deque
 from types import TracebackType
 from typing import Any, AsyncIterator, Deque, Dict, Generator, List, Mapping, Optional, Type, Union, cast
 
+from ._connection import EVENTS_KEPT, ends_in_children
 from ._errors import GatewayUnavailable, IWheelError, LeaseEnded, NoAnswer, ProtocolError, Refused
 from ._protocol import Configured, Confirmed, Hello, Piece, RecordingEntry, State, Status, Stop, Tared, Watched
 from ._stop import stop_by_either
@@ -47,16 +48,21 @@ from ._wire import (
     without_envelope,
 )
 
-EVENTS_KEPT = 1000
+CONNECT_AGAIN_S = 0.005
 
 
-class _Stream:
-    """One connection: a task sorts what comes into replies and events."""
+class _Stream(asyncio.Protocol):
+    """One connection: what comes is sorted into replies and events by the event loop; no task of ours runs.
 
-    def __init__(self, path: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    Every wait of this package is a plain `await` on a future, with a timer that ends it. `asyncio.wait_for` of Python 3.10 and 3.11
+    loses a cancellation that meets a finished reply, and the cancelled task drives on.
+    """
+
+    def __init__(self, path: str, sock: socket.socket) -> None:
         self.path = path
         self.hello: "asyncio.Future[Message]" = asyncio.get_running_loop().create_future()
         """What the gateway says first. `client` in it is our number, as `lease.holder` in the status."""
+        self.hello.add_done_callback(_retrieved)
         self.arms = 0
         self.told = False
         """That it ended, to whoever reads the events."""
@@ -67,21 +73,23 @@ class _Stream:
         self._latest = False
         self._wire = Wire()
         self._waiting: Dict[int, "asyncio.Future[Message]"] = {}
-        self._reader, self._writer, self._pid = reader, writer, os.getpid()
-        self._task = asyncio.ensure_future(self._read())
+        self._socket, self._loop = sock, asyncio.get_running_loop()
+        self._transport: Optional[asyncio.Transport] = None
+        ends_in_children(self)
 
     @classmethod
     async def connect(cls, path: str, timeout: float) -> _Stream:
         """Nothing is asked before it is known who answers."""
+        until = time.monotonic() + timeout
+        stream = cls(path, await _connected_socket(path, until))
         try:
-            stream = cls(path, *await asyncio.open_unix_connection(path))
-        except OSError as error:
-            raise cannot_connect(path, error) from None
-        try:
-            await asyncio.wait_for(stream.hello, timeout)
-        except asyncio.TimeoutError:
-            stream.close()
-            raise NoAnswer(f"{path}: the gateway did not say hello within {timeout:g} s") from None
+            await stream._loop.create_unix_connection(lambda: stream, sock=stream._socket)
+            error = NoAnswer(f"{path}: the gateway did not say hello within {timeout:g} s")
+            timer = stream._loop.call_later(max(0.0, until - time.monotonic()), _end_wait, stream.hello, error)
+            try:
+                await stream.hello
+            finally:
+                timer.cancel()
         except BaseException:
             stream.close()
             raise
@@ -89,34 +97,61 @@ class _Stream:
 
     @property
     def open(self) -> bool:
+        if self.error is None and self._loop.is_closed():
+            self.close("its event loop is closed")
         return self.error is None
 
     def close(self, reason: str = "the connection is closed") -> None:
-        self._fail(GatewayUnavailable(f"{self.path}: {reason}"))
-        self._task.cancel()
+        """Ends the connection, and with it the lease, if it was ours. Works from any thread, with any state of the loop."""
+        error = GatewayUnavailable(f"{self.path}: {reason}")
+        try:
+            self._socket.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
+        if self._loop.is_closed():
+            self.error = self.error or error
+            self._socket.close()
+        elif _running_loop() is self._loop or not self._loop.is_running():
+            self._fail(error)
+        # Else the loop runs in another thread, and reads there that the connection has ended.
 
-    def post(self, cmd: str, fields: Mapping[str, Any]) -> "asyncio.Future[Message]":
-        """Hands the request over at once; its reply comes with the future."""
-        if self.error is not None:
-            raise self.error
-        if self._pid != os.getpid():
-            raise GatewayUnavailable(f"{self.path}: the connection belongs to the parent process")
+    def leave(self) -> None:
+        """In a forked child: lets go of what belongs to the parent, without ending it."""
+        self.error = GatewayUnavailable(f"{self.path}: the connection belongs to the parent process")
+        self._socket.close()
+
+    def post(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> "asyncio.Future[Message]":
+        """Hands the request over at once; its reply comes with the future. NoAnswer, with the connection closed, if it does not come in time."""
+        if not self.open or self._transport is None:
+            raise self.error or GatewayUnavailable(f"{self.path}: the connection is closed")
+        if _running_loop() is not self._loop:
+            raise RuntimeError("this AsyncGateway belongs to another event loop; give each event loop its own")
         number, line = self._wire.request(cmd, fields)
-        future: "asyncio.Future[Message]" = asyncio.get_running_loop().create_future()
+        future: "asyncio.Future[Message]" = self._loop.create_future()
         self._waiting[number] = future
-        future.add_done_callback(lambda _: self._waiting.pop(number, None))
-        self._writer.write(line)
+        timer = self._loop.call_later(timeout, self._no_answer, future, cmd, timeout)
+
+        def forget(done: "asyncio.Future[Message]") -> None:
+            timer.cancel()
+            self._waiting.pop(number, None)
+            _retrieved(done)
+
+        future.add_done_callback(forget)
+        self._transport.write(line)
         return future
 
     async def ask(self, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:
-        future = self.post(cmd, fields)
+        return await self.post(cmd, fields, timeout)
+
+    async def something(self, seconds: Optional[float]) -> None:
+        """Until an event came, or the connection ended, or that time is over."""
+        self.came.clear()
+        timer = None if seconds is None else self._loop.call_later(max(0.0, seconds), self.came.set)
         try:
-            return await asyncio.wait_for(future, timeout)
-        except asyncio.TimeoutError:
-            self.close()
-            raise NoAnswer(
-                f"{self.path}: no answer to {cmd} within {timeout:g} s; the connection was closed"
-            ) from None
+            await self.came.wait()
+        finally:
+            if timer is not None:
+                timer.cancel()
 
     def take_event(self, latest: bool = False) -> Optional[Event]:
         self._latest = latest
@@ -131,18 +166,23 @@ class _Stream:
         kept, left_out = newest(self.events)
         self.events, self._lost = deque(kept), self._lost + left_out
 
-    async def _read(self) -> None:
+    # What the event loop calls
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)
+
+    def data_received(self, data: bytes) -> None:
+        if self.error is not None:
+            return
         try:
-            while True:
-                data = await self._reader.read(65536)
-                if not data:
-                    raise GatewayUnavailable(f"{self.path}: the gateway closed the connection")
-                for message in self._wire.feed(data):
-                    self._sort(message)
-        except (GatewayUnavailable, ProtocolError) as error:
+            for message in self._wire.feed(data):
+                self._sort(message)
+        except GatewayUnavailable as error:
             self._fail(error)
-        except OSError as error:
-            self._fail(GatewayUnavailable(f"{self.path}: the connection broke ({error})"))
+
+    def connection_lost(self, problem: Optional[Exception]) -> None:
+        broke = "the gateway closed the connection" if problem is None else f"the connection broke ({problem})"
+        self._fail(GatewayUnavailable(f"{self.path}: {broke}"))
 
     def _sort(self, message: Message) -> None:
         if "ok" in message:
@@ -165,16 +205,62 @@ class _Stream:
         self.events.append(message)
         self.came.set()
 
+    def _no_answer(self, future: "asyncio.Future[Message]", cmd: str, timeout: float) -> None:
+        if not future.done():
+            what = f"{self.path}: no answer to {cmd} within {timeout:g} s; the connection was closed"
+            future.set_exception(NoAnswer(what))
+            self.close()
+
     def _fail(self, error: GatewayUnavailable) -> None:
         if self.error is not None:
             return
         self.error = error
-        self._writer.close()
-        waiting: List["asyncio.Future[Message]"] = [self.hello, *self._waiting.values()]
-        for future in waiting:
-            if not future.done():
-                future.set_exception(error)
+        if self._transport is not None:
+            self._transport.abort()
+        else:
+            self._socket.close()
+        for future in (self.hello, *self._waiting.values()):
+            _end_wait(future, error)
         self.came.set()
+
+
+async def _connected_socket(path: str, until: float) -> socket.socket:
+    """A connect to a local socket does not wait, unless too many others wait already."""
+    sock = socket.socket(socket.AF_UNIX)
+    try:
+        sock.setblocking(False)
+        while True:
+            try:
+                sock.connect(path)
+                return sock
+            except BlockingIOError as error:
+                if time.monotonic() > until:
+                    raise cannot_connect(path, error) from None
+            await asyncio.sleep(CONNECT_AGAIN_S)
+    except OSError as error:
+        sock.close()
+        raise cannot_connect(path, error) from None
+    except BaseException:
+        sock.close()
+        raise
+
+
+def _end_wait(future: "asyncio.Future[Message]", error: GatewayUnavailable) -> None:
+    if not future.done():
+        future.set_exception(error)
+
+
+def _retrieved(future: "asyncio.Future[Message]") -> None:
+    """An error that no task waits for any more, because it was cancelled, is no news."""
+    if not future.cancelled():
+        future.exception()
+
+
+def _running_loop() -> Optional[asyncio.AbstractEventLoop]:
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None
 
 
 class AsyncGateway:
@@ -204,6 +290,11 @@ class AsyncGateway:
         stream, self._stream = self._stream, None
         if stream is not None:
             stream.close()
+
+    def __del__(self) -> None:
+        """The event loop would keep the connection of a gateway that the program has dropped."""
+        if getattr(self, "_stream", None) is not None:
+            self.close()
 
     async def hello(self) -> Hello:
         return cast(Hello, without_envelope(await self._ask("hello")))
@@ -332,8 +423,8 @@ class AsyncGateway:
             except Refused as refusal:
                 if refusal.error not in PASSING or not time.monotonic() < until:
                     raise
-            except asyncio.CancelledError:
-                stream.close("a task was cancelled while arming")
+            except BaseException:  # Cancelled, dropped, no usable reply: only the end of the connection surely ends a lease that began.
+                stream.close("arming did not come to its end")
                 raise
             await asyncio.sleep(ARM_AGAIN_S)
 
@@ -348,12 +439,10 @@ class AsyncGateway:
                 return event
             if not stream.open:
                 return await self._gone(stream, deadline)
-            stream.came.clear()
             left = deadline - time.monotonic()
-            try:
-                await asyncio.wait_for(stream.came.wait(), max(0.0, left) if timeout is not None else None)
-            except asyncio.TimeoutError:
+            if left <= 0:
                 return None
+            await stream.something(left if timeout is not None else None)
         return None
 
     async def _gone(self, stream: _Stream, deadline: float) -> Optional[Event]:
@@ -387,7 +476,12 @@ class _Arming:
         return self._gateway._arm(self._name, self._takeover, self._wait).__await__()
 
     async def __aenter__(self) -> AsyncArmed:
-        self._armed = await self
+        try:
+            self._armed = await self
+        except BaseException:
+            if not self._gateway._kept:
+                self._gateway.close()
+            raise
         return self._armed
 
     async def __aexit__(
@@ -457,6 +551,10 @@ class AsyncArmed:
     async def __aexit__(
         self, kind: Optional[Type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
     ) -> None:
+        if kind is GeneratorExit:  # Its task was dropped: no wait is possible any more.
+            self._end("its block was dropped")
+            self._stream.close()
+            return
         trouble = "one of them still turns"
         at_rest = False
         try:
@@ -477,19 +575,23 @@ class AsyncArmed:
 
     async def _command(self, cmd: str, fields: Message) -> Applied:
         if self._number != self._stream.arms:
-            self._end("the same AsyncGateway was armed anew")
+            self._end("the same AsyncGateway was armed again")
         if self._ended is not None:
             raise LeaseEnded(f"this permission to drive is over ({self._ended}); arm again")
         asked = time.monotonic()
         try:
-            reply = await self._ask(cmd, fields)
+            applied = applied_of(await self._ask(cmd, fields))
         except Refused as refusal:
             if refusal.error in HARMLESS:
                 raise
             self._end(refusal.message)
             raise ended_by(refusal) from refusal
+        except ProtocolError as trouble:
+            self._end(str(trouble))
+            self._stream.close()
+            raise
         self._fed = asked
-        return applied_of(reply)
+        return applied
 
     async def _ask(self, cmd: str, fields: Message) -> Message:
         try:

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 import select
 import socket
 import time
 import weakref
 from collections import deque
-from typing import Any, Deque, Dict, Mapping, Optional, Set
+from typing import Any, Deque, Dict, Mapping, Optional, Protocol, Set
 
 from ._errors import GatewayUnavailable, NoAnswer, ProtocolError
 from ._types import Event
@@ -18,6 +19,10 @@ from ._wire import Message, Wire, cannot_connect, lost_event, newest
 EVENTS_KEPT = 1000
 SLICE_S = 0.05
 """A signal handler may have taken what is waited for: look again this often."""
+
+
+class _Left(Protocol):
+    def leave(self) -> None: ...
 
 
 class Connection:
@@ -48,7 +53,7 @@ class Connection:
         except OSError as error:
             self.close()
             raise cannot_connect(path, error) from None
-        _alive.add(self)
+        ends_in_children(self)
         self._greet(timeout)
 
     def _greet(self, timeout: float) -> None:
@@ -143,7 +148,16 @@ class Connection:
         return self._socket
 
     def _readable(self, seconds: float) -> bool:
-        return bool(select.select([self._require()], [], [], seconds)[0])
+        return self._ready(select.POLLIN, seconds)
+
+    def _ready(self, what: int, seconds: float) -> bool:
+        """By poll: select refuses a descriptor above 1023, and a program with as many open files could not stop."""
+        poller = select.poll()
+        try:
+            poller.register(self._require(), what)
+        except ValueError:  # A signal handler has closed it since.
+            raise GatewayUnavailable(f"{self.path}: the connection is closed") from None
+        return bool(poller.poll(math.ceil(seconds * 1000)))
 
     def _send(self, line: bytes, deadline: float, cmd: str) -> None:
         sock = self._require()
@@ -152,7 +166,7 @@ class Connection:
         self._sending = True
         while line:
             left = deadline - time.monotonic()
-            if left <= 0 or not select.select([], [sock], [], left)[1]:
+            if left <= 0 or not self._ready(select.POLLOUT, left):
                 raise self._fail(NoAnswer(f"{self.path}: the gateway does not take {cmd}; the connection was closed"))
             try:
                 line = line[sock.send(line) :]
@@ -195,7 +209,12 @@ class Connection:
         self.events.append(message)
 
 
-_alive: "weakref.WeakSet[Connection]" = weakref.WeakSet()
+_alive: "weakref.WeakSet[_Left]" = weakref.WeakSet()
+
+
+def ends_in_children(connection: _Left) -> None:
+    """A forked child would keep the parent's connection, and with it the lease, after the parent's death."""
+    _alive.add(connection)
 
 
 def _leave_all() -> None:
@@ -203,5 +222,4 @@ def _leave_all() -> None:
         connection.leave()
 
 
-# A child would keep the parent's connection, and with it the lease, after the parent's death.
 os.register_at_fork(after_in_child=_leave_all)

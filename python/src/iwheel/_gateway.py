@@ -188,7 +188,11 @@ class Gateway:
         connection = self._connection
         if connection is None:
             raise GatewayUnavailable("the connection was closed while arming")
-        return Armed(self, connection, terms_of(reply))
+        try:
+            return Armed(self, connection, terms_of(reply))
+        except ProtocolError:
+            connection.close()
+            raise
 
     # The inside ------------------------------------------------------------------------------------------------------
 
@@ -404,14 +408,18 @@ class Armed:
             raise LeaseEnded(f"this permission to drive is over ({self._ended}); arm again")
         asked = time.monotonic()
         try:
-            reply = self._ask(cmd, fields)
+            applied = applied_of(self._ask(cmd, fields))
         except Refused as refusal:
             if refusal.error in HARMLESS:
                 raise
             self._end(refusal.message)
             raise ended_by(refusal) from refusal
+        except ProtocolError as trouble:
+            self._end(str(trouble))
+            self._connection.close()
+            raise
         self._fed = asked  # The lease runs from when the command was sent, at the earliest.
-        return applied_of(reply)
+        return applied
 
     def _ask(self, cmd: str, fields: Message) -> Message:
         """On the connection that was armed; what breaks it ends the permission."""

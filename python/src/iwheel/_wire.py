@@ -39,6 +39,7 @@ DISTINCTIONS = {"fault": ("cause",), "offset": ("side",), "ledger": ("item",), "
 """What makes two events of one name different things."""
 
 Message = Dict[str, Any]
+NoneType = type(None)
 
 
 def default_socket() -> str:
@@ -107,11 +108,16 @@ class Wire:
     def _parse(line: bytes) -> Message:
         try:
             message = json.loads(line)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise ProtocolError(f"not JSON: {line[:60]!r}; is this the socket of an iwheel-gateway?") from error
-        if not isinstance(message, dict) or ("ok" in message) == ("event" in message):
+        if not isinstance(message, dict) or ("ok" in message) == ("event" in message) or not named(message):
             raise ProtocolError(f"neither reply nor event: {line[:60]!r}; is this the socket of an iwheel-gateway?")
         return message
+
+
+def named(message: Message) -> bool:
+    """The number of a reply and the name of an event are of the type that they are looked up by."""
+    return isinstance(message["event"], str) if "event" in message else isinstance(message.get("id"), (int, NoneType))
 
 
 def result_of(cmd: str, reply: Message) -> Message:
@@ -178,13 +184,20 @@ def check_api(path: str, hello: Message) -> None:
 
 
 def applied_of(reply: Message) -> Applied:
-    return Applied(**{name: reply[name] for name in Applied.__dataclass_fields__})
+    return Applied(**fields_of("drive", reply, Applied.__dataclass_fields__))
 
 
 def terms_of(reply: Message) -> Terms:
-    values = {name: reply[name] for name in Terms.__dataclass_fields__}
-    values["warnings"] = tuple(values["warnings"])
+    values = fields_of("arm", reply, Terms.__dataclass_fields__)
+    values["warnings"] = tuple(values["warnings"] or ())
     return Terms(**values)
+
+
+def fields_of(cmd: str, reply: Message, names: Iterable[str]) -> Message:
+    missing = [name for name in names if name not in reply]
+    if missing:
+        raise ProtocolError(f"the reply to {cmd} has no {missing[0]}; is this the socket of an iwheel-gateway?")
+    return {name: reply[name] for name in names}
 
 
 def without_envelope(reply: Message) -> Any:
