@@ -42,6 +42,12 @@ static void sent(void *context, int message) {
     (void)message;
 }
 
+static void refused(void *context, int message, const char *why) {
+    (void)context;
+    (void)message;
+    (void)why; // It sends by QoS 0 only, of which none comes.
+}
+
 static void came(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels) {
     console_t *self = context;
     (void)labels;
@@ -137,7 +143,7 @@ int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *want
                                          "iwheel/+/event/stop", NULL};
     char name[32];
     (void)snprintf(name, sizeof name, "iwheel-fleet-%d", (int)getpid());
-    const mqtt_broker_listener_t listener = {"iwheel-fleet", name, topics, NULL, &console, up, up, sent, came};
+    const mqtt_broker_listener_t listener = {"iwheel-fleet", name, topics, NULL, &console, up, up, sent, refused, came};
     if (!fleet_open(&console.fleet)) {
         return complain(EX_OSERR, "no memory");
     }

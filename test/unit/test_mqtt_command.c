@@ -287,7 +287,7 @@ static void test_info_without_a_gateway_invents_nothing(void) {
     TEST_ASSERT_NOT_NULL(strstr(text, "\"gateway\":\"away\",\"version\":null,"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"budget\":null"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"taken\":1,\"retained\":2,"));
-    TEST_ASSERT_NOT_NULL(strstr(text, "\"dropped\":3,\"on_disk\":false"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"dropped\":3,\"last\":0,\"aside\":0,\"on_disk\":false"));
     stop = (mqtt_stop_t){.number = 4, .cause = "wheel_lost", .sentence = "gone"};
     length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
     text[length] = '\0';
