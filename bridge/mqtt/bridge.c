@@ -62,7 +62,7 @@ int mqtt_bridge_publish(mqtt_bridge_t *self, const char *what, const char *name,
     return publish(self, topic, length, way);
 }
 
-static bool newest_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
+bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
     *out_state = (iwc_message_t){.text = self->state, .length = self->state_length, .is_event = true};
     return self->link.is_here && self->state_length > 0U;
 }
@@ -73,7 +73,7 @@ static void tell_info(mqtt_bridge_t *self) {
     iwc_message_t state;
     const mqtt_info_t info = {.boot = self->boot,
                               .settings = self->settings,
-                              .state = newest_state(self, &state) ? &state : NULL,
+                              .state = mqtt_bridge_state(self, &state) ? &state : NULL,
                               .counts = self->judge.counts,
                               .spooled = self->spool.waiting,
                               .dropped = self->spool.dropped,
@@ -326,7 +326,7 @@ static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
     const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
     keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
     remember_stop(self, event);
-    self->driver[0] = '\0';
+    bridge_lease_end(&self->lease, self->now_us);
 }
 
 static void take_why(void *context, const iwc_message_t *reply) {
@@ -392,6 +392,19 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     }
 }
 
+/// A person of this bridge who asks holds the lease before the reply is here: only another client's lease ends ours.
+static void take_lease(mqtt_bridge_t *self, const iwc_message_t *event) {
+    const iwc_value_t holder = iwc_integer(event, "holder");
+    bool ours = false;
+    for (size_t i = 0; i < sizeof self->lease.place / sizeof self->lease.place[0]; i++) {
+        const bridge_line_t *line = &self->lease.place[i].line;
+        ours = ours || (line->state == BRIDGE_HERE && holder.known && holder.value == iwc_number(line->gateway));
+    }
+    if (!ours && bridge_lease_key(&self->lease) != NULL) {
+        bridge_lease_end(&self->lease, self->now_us);
+    }
+}
+
 static void take_event(void *context, const iwc_message_t *event, uint64_t now_us) {
     mqtt_bridge_t *self = context;
     char name[32];
@@ -406,9 +419,8 @@ static void take_event(void *context, const iwc_message_t *event, uint64_t now_u
     if (strcmp(name, "stop") == 0) {
         take_stop(self, event);
     } else {
-        const bool lease = strcmp(name, "lease") == 0;
-        if (lease && iwc_integer(event, "holder").value != iwc_number(self->link.line.gateway)) {
-            self->driver[0] = '\0';
+        if (strcmp(name, "lease") == 0) {
+            take_lease(self, event);
         }
         const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
         keep_event(self, name, length, self->spool.mark);
@@ -423,10 +435,9 @@ static void gateway_here(void *context, uint64_t now_us) {
 
 static void gateway_gone(void *context, uint64_t now_us) {
     mqtt_bridge_t *self = context;
-    (void)now_us;
     self->state_length = 0;
     self->condition[0] = '\0';
-    self->driver[0] = '\0';
+    bridge_lease_end(&self->lease, now_us);
     tell_availability(self, false);
     tell_info(self);
 }
@@ -440,7 +451,7 @@ static void broker_up(void *context) {
     self->sent_number = 0;
     self->refusals.works = false;
     tell_availability(self, true);
-    if (newest_state(self, &state)) {
+    if (mqtt_bridge_state(self, &state)) {
         tell_state(self, &state, false);
     }
     tell_info(self);
@@ -532,7 +543,8 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
     if (!mqtt_spool_open(&self->spool, settings->spool.directory, (size_t)settings->spool.max_kB * 1000U)) {
         return no_spool(settings);
     }
-    if (!random || !bridge_link_open(&self->link, &terms, &gateway)) {
+    if (!random || !bridge_link_open(&self->link, &terms, &gateway) ||
+        !bridge_lease_open(&self->lease, settings->gateway.socket, self->link.epoll_fd)) {
         (void)fputs("iwheel-mqtt: no memory, or no random numbers\n", stderr);
         return EX_OSERR;
     }
@@ -577,7 +589,8 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
     self->now_us = now_us;
     mqtt_broker_step(&self->broker, now_us);
     const int code = bridge_link_step(&self->link, now_us);
-    if (self->driver[0] != '\0' && now_us >= self->silent_us) {
+    bridge_lease_step(&self->lease, now_us);
+    if (bridge_lease_key(&self->lease) != NULL && now_us >= self->silent_us) {
         mqtt_bridge_stop_if_ours(self);
     }
     send_events(self);
@@ -591,8 +604,9 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
 
 int mqtt_bridge_wait_ms(const mqtt_bridge_t *self) {
     const uint64_t now_us = self->now_us;
-    const uint64_t times[] = {bridge_link_next_us(&self->link, now_us), mqtt_broker_next_us(&self->broker),
-                              self->second_us, (self->driver[0] != '\0') ? self->silent_us : UINT64_MAX};
+    const uint64_t times[] = {bridge_link_next_us(&self->link, now_us), bridge_lease_next_us(&self->lease, now_us),
+                              mqtt_broker_next_us(&self->broker), self->second_us,
+                              (bridge_lease_key(&self->lease) != NULL) ? self->silent_us : UINT64_MAX};
     uint64_t next_us = times[0];
     for (size_t i = 1; i < sizeof times / sizeof times[0]; i++) {
         next_us = (times[i] < next_us) ? times[i] : next_us;
@@ -602,6 +616,7 @@ int mqtt_bridge_wait_ms(const mqtt_bridge_t *self) {
 
 bool mqtt_bridge_close(mqtt_bridge_t *self) {
     mqtt_bridge_stop_if_ours(self);
+    bridge_lease_close(&self->lease);
     bridge_link_close(&self->link);
     const bool done = mqtt_broker_close(&self->broker); // First: what it confirms is kept.
     return mqtt_spool_close(&self->spool) && done;

@@ -10,6 +10,7 @@
 #include "spool.h"
 #include "tell.h"
 
+#include "common/lease.h"
 #include "common/link.h"
 
 /// How long who has armed may take for the first command, and who drives between two.
@@ -57,6 +58,8 @@ typedef struct {
 typedef struct {
     const mqtt_settings_t *settings;
     bridge_link_t link;
+    bridge_lease_t lease; ///< Of the person who has armed: a connection, and the key that only the reply to `arm` has.
+    bridge_movers_t movers;
     mqtt_broker_t broker;
     mqtt_spool_t spool;
     mqtt_judge_t judge;
@@ -65,9 +68,8 @@ typedef struct {
     char commands[MQTT_TOPIC_SIZE];
     char sensors[MQTT_TOPIC_SIZE]; ///< Of Home Assistant: what is published there must come back.
     const char *topics[3];
-    char boot[MQTT_BOOT_SIZE];     ///< Of this run: random.
-    char driver[MQTT_SENDER_SIZE]; ///< Who has armed; empty: nobody by this bridge.
-    uint64_t silent_us;            ///< When the driver counts as silent.
+    char boot[MQTT_BOOT_SIZE]; ///< Of this run: random.
+    uint64_t silent_us;        ///< When the holder of the lease counts as silent.
     uint64_t now_us;
     uint64_t state_us;     ///< When `state` was sent last.
     uint64_t second_us;    ///< When what is done once a second is due.
@@ -117,7 +119,10 @@ void mqtt_bridge_sensor(mqtt_bridge_t *self, const struct mosquitto_message *mes
 /// What came to a topic of commands. `context` is the bridge.
 void mqtt_bridge_command(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels);
 
-/// Once, and only what is ours: somebody else's lease is not this bridge's to end.
+/// Sends `stop` once, and only if a person holds the lease by this bridge.
 void mqtt_bridge_stop_if_ours(mqtt_bridge_t *self);
+
+/// The newest state of the gateway. False: it is away.
+bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state);
 
 #endif

@@ -114,6 +114,9 @@ size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *o
     iwn_out_int(&out, "t_us", (int64_t)now_us);
     iwn_out_text(&out, "cmd", mqtt_verb_word(order->verb));
     iwn_out_known(&out, "seq", order->seq > 0, order->seq);
+    if (order->verb == MQTT_ARM && order->key[0] != '\0' && iwc_json(reply, "key", &(size_t){0}) == NULL) {
+        iwn_out_text(&out, "key", order->key);
+    }
     const char *comma = (reply != NULL) ? memchr(reply->text, ',', reply->length) : NULL;
     if (comma != NULL) { // Behind the id, which is of no use to others.
         return join(&out, buffer, reply->text, reply->length, (size_t)(comma - reply->text) + 1U);

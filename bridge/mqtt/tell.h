@@ -37,6 +37,7 @@ size_t mqtt_tell_missed_stop(const char *boot, uint64_t number, int64_t wall_us,
                              mqtt_buffer_t out);
 
 /// The answer to a command: to which, `boot`, `t_us` now, and the gateway's reply; without one (NULL) whether it was taken, and why not.
+/// `order->key` of an `arm`, unless it is empty, is added to a reply that has none.
 size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
                         mqtt_buffer_t out);
 
