@@ -125,6 +125,38 @@ static uint64_t gap(uint64_t before, uint64_t now) {
     return (before > 0U) ? now - from - 1U : 0U;
 }
 
+/// Remembers that the events between these two are missing; the oldest such gap is forgotten for it.
+static void open_gap(history_machine_t *machine, uint64_t before, uint64_t now) {
+    if (gap(before, now) > 0U) {
+        machine->gaps[machine->next_gap] = (history_gap_t){(now > before) ? before + 1U : 1U, now - 1U};
+        machine->next_gap = (machine->next_gap + 1U) % HISTORY_GAPS;
+    }
+}
+
+/// True of an event that was missing until now: one that was set aside, or sent again.
+static bool close_gap(history_machine_t *machine, uint64_t number) {
+    for (size_t i = 0; i < HISTORY_GAPS; i++) {
+        history_gap_t *one = &machine->gaps[i];
+        if (one->first == 0U || number < one->first || number > one->last) {
+            continue;
+        }
+        const history_gap_t whole = *one;
+        *one = (history_gap_t){number + 1U, whole.last}; // Without the number: its upper part, and its lower one.
+        if (one->first > one->last) {
+            *one = (history_gap_t){0};
+        }
+        open_gap(machine, whole.first - 1U, number);
+        return true;
+    }
+    return false;
+}
+
+/// One less of what is still to be reported, or of what was.
+static void take_back(uint64_t *pending, uint64_t *reported) {
+    uint64_t *from = (*pending > 0U) ? pending : reported;
+    *from -= (*from > 0U) ? 1U : 0U;
+}
+
 /// False: it is a double.
 static bool note(history_t *self, history_machine_t *machine, const iwc_message_t *event, bool is_stop) {
     char boot[MQTT_BOOT_SIZE];
@@ -134,23 +166,105 @@ static bool note(history_t *self, history_machine_t *machine, const iwc_message_
     }
     const size_t run = run_of(machine, boot);
     if (number <= machine->runs[run].number) {
-        return false;
+        const bool late = close_gap(machine, number);
+        if (late) {
+            take_back(&machine->missing, &self->missing);
+        }
+        if (late && is_stop) {
+            take_back(&machine->unheard, &self->unheard);
+        }
+        return late;
     }
-    const uint64_t missing = gap(machine->number, number);
+    machine->missing += gap(machine->number, number);
+    open_gap(machine, machine->number, number);
     machine->began = machine->began || (machine->number > 0U && run != machine->run);
     machine->runs[run].number = number;
     machine->run = run;
     machine->number = number;
-    machine->missing += missing;
-    self->missing += missing;
+    machine->event_us = iwc_integer(event, "heard_wall_us").value;
     const iwc_value_t stop = iwc_integer(event, "number");
     if (is_stop && stop.known && stop.value > 0) {
-        const uint64_t unheard = gap((uint64_t)machine->stop, (uint64_t)stop.value);
+        machine->unheard += gap((uint64_t)machine->stop, (uint64_t)stop.value);
         machine->stop = stop.value;
-        machine->unheard += unheard;
-        self->unheard += unheard;
+        machine->stop_wall_us = iwc_integer(event, "wall_us").value;
     }
     return true;
+}
+
+/// What is missing has been reported, or lies before the span.
+static void forget_gap(history_machine_t *machine) {
+    machine->missing = 0;
+    machine->unheard = 0;
+    machine->began = false;
+}
+
+// ---- what machines say of themselves ------------------------------------------------------------------------------
+
+static uint64_t count_of(const iwc_message_t *info, const char *path) {
+    const iwc_value_t value = iwc_integer(info, path);
+    return (value.known && value.value > 0) ? (uint64_t)value.value : 0U;
+}
+
+void history_take_info(history_t *self, const char *topic, const char *payload, size_t length) {
+    char id[MQTT_ID_SIZE];
+    char fault[80];
+    const char *what = "";
+    iwn_json_t root;
+    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
+    const bool is_info = fleet_split(topic, id, &what) && strcmp(what, "info") == 0 && length > 0U;
+    if (!is_info || !iwn_json_check(payload, length, &self->work, &root, &words) ||
+        iwn_json_kind(root) != IWN_JSON_OBJECT) {
+        return;
+    }
+    history_machine_t *machine = machine_of(self, id);
+    const iwc_message_t message = {.text = payload, .length = length, .is_event = true};
+    if (machine != NULL) {
+        machine->info = (history_info_t){.known = true,
+                                         .stop = (int64_t)count_of(&message, "last_stop.number"),
+                                         .stop_wall_us = (int64_t)count_of(&message, "last_stop.wall_us"),
+                                         .last = count_of(&message, "events.last"),
+                                         .waiting = count_of(&message, "events.waiting"),
+                                         .dropped = count_of(&message, "events.dropped")};
+        fleet_text(&message, "boot", machine->info.boot, sizeof machine->info.boot);
+    }
+}
+
+/// Stops that its `info` knows of and the stream does not have, as far as they may lie in the span.
+static uint64_t stops_behind(const history_t *self, const history_machine_t *machine) {
+    const history_info_t *info = &machine->info;
+    const bool later = machine->stop_wall_us > 0 && info->stop_wall_us > machine->stop_wall_us;
+    if (info->stop == 0 || (info->stop_wall_us > 0 && info->stop_wall_us < self->wish.since_us) ||
+        machine->stop_wall_us >= self->wish.until_us) {
+        return 0;
+    }
+    if (machine->stop == 0) { // The stream has none: at least this one.
+        return (info->stop_wall_us < self->wish.until_us) ? 1U : 0U;
+    }
+    if (info->stop > machine->stop) {
+        return (uint64_t)(info->stop - machine->stop);
+    }
+    return later ? (uint64_t)info->stop : 0U; // The gateway began anew, and counts from one.
+}
+
+/// Events likewise. The number of an event never begins anew.
+static uint64_t events_behind(const history_t *self, const history_machine_t *machine) {
+    const uint64_t there = machine->number + machine->info.waiting;
+    return (machine->number > 0U && machine->info.last > there && machine->event_us < self->wish.until_us)
+               ? machine->info.last - there
+               : 0U;
+}
+
+/// Why events may be missing, as far as the machine knows it.
+static void write_cause(const history_machine_t *machine, char *out, size_t size) {
+    const history_info_t *info = &machine->info;
+    if (!info->known || strcmp(info->boot, machine->runs[machine->run].boot) != 0) {
+        (void)snprintf(out, size, "dropped from its full spool, or confirmed by the broker and not stored");
+    } else if (info->dropped == 0U) {
+        (void)snprintf(out, size, "the broker confirmed them and did not store them; its spool dropped none");
+    } else {
+        (void)snprintf(out, size, "its full spool dropped %" PRIu64 " events; the broker did not store the others",
+                       info->dropped);
+    }
 }
 
 // ---- telling ------------------------------------------------------------------------------------------------------
@@ -209,8 +323,11 @@ static void show(const history_t *self, const history_machine_t *machine, const 
                       machine->runs[machine->run].boot);
     }
     if (machine->missing > 0U) {
-        show_note(self, machine, machine->missing,
-                  "events before this one are not in the stream: dropped from its full spool");
+        char cause[128];
+        char words[192];
+        write_cause(machine, cause, sizeof cause);
+        (void)snprintf(words, sizeof words, "events before this one are not in the stream: %s", cause);
+        show_note(self, machine, machine->missing, words);
     }
     if (machine->unheard > 0U) {
         show_note(self, machine, machine->unheard,
@@ -238,6 +355,11 @@ static void tell(const history_t *self, const history_machine_t *machine, const 
     iwn_out_int(&json, "missing_before", (int64_t)machine->missing);
     iwn_out_int(&json, "stops_missing_before", (int64_t)machine->unheard);
     iwn_out_bool(&json, "bridge_began_anew", machine->began);
+    if (machine->missing > 0U) {
+        char cause[128];
+        write_cause(machine, cause, sizeof cause);
+        iwn_out_text(&json, "missing_cause", cause);
+    }
     iwn_out_span(&json, iwn_span("message"), (iwn_span_t){event->text, event->length});
     iwn_out_close(&json, '}');
     (void)fwrite(line, 1, iwn_out_finish(&json), self->out);
@@ -246,6 +368,70 @@ static void tell(const history_t *self, const history_machine_t *machine, const 
 static bool is_within(const history_t *self, const int64_t times_us[2]) {
     return (times_us[0] >= self->wish.since_us && times_us[0] < self->wish.until_us) ||
            (times_us[1] >= self->wish.since_us && times_us[1] < self->wish.until_us);
+}
+
+static bool is_before(const history_t *self, const int64_t times_us[2]) {
+    return times_us[0] < self->wish.since_us && times_us[1] < self->wish.since_us;
+}
+
+/// One line, or two.
+static void show_end(const history_t *self, const history_machine_t *machine, uint64_t events, uint64_t stops) {
+    char words[256];
+    char when[TIME_SIZE];
+    char cause[128];
+    write_time(machine->info.stop_wall_us, when);
+    write_cause(machine, cause, sizeof cause);
+    if (stops > 0U) {
+        (void)snprintf(words, sizeof words,
+                       "stops after its last one here are not in the stream; its info names stop %" PRId64
+                       " of %s; what it recorded: iwheel-fleet recordings ID",
+                       machine->info.stop, when);
+        show_note(self, machine, stops, words);
+    }
+    if (events > 0U) {
+        (void)snprintf(words, sizeof words, "events after its last one here are not in the stream: %s", cause);
+        show_note(self, machine, events, words);
+    }
+    if (machine->info.waiting > 0U) {
+        show_note(self, machine, machine->info.waiting, "events wait at the machine and may still come");
+    }
+}
+
+static void tell_end(const history_t *self, const history_machine_t *machine, uint64_t events, uint64_t stops) {
+    char line[512];
+    char cause[128];
+    iwn_out_t json;
+    write_cause(machine, cause, sizeof cause);
+    iwn_out_init(&json, line, sizeof line);
+    iwn_out_open(&json, NULL, '{');
+    iwn_out_text(&json, "machine", machine->id);
+    iwn_out_int(&json, "missing_after", (int64_t)events);
+    iwn_out_int(&json, "stops_missing_after", (int64_t)stops);
+    iwn_out_known(&json, "info_stop", machine->info.stop > 0, machine->info.stop);
+    iwn_out_known(&json, "info_stop_wall_us", machine->info.stop_wall_us > 0, machine->info.stop_wall_us);
+    iwn_out_int(&json, "waiting", (int64_t)machine->info.waiting);
+    iwn_out_text(&json, "missing_cause", cause);
+    iwn_out_close(&json, '}');
+    (void)fwrite(line, 1, iwn_out_finish(&json), self->out);
+}
+
+void history_end(history_t *self) {
+    for (size_t i = 0; i < self->count; i++) {
+        const history_machine_t *machine = &self->machines[i];
+        const bool wished = self->wish.machine == NULL || strcmp(self->wish.machine, machine->id) == 0;
+        const uint64_t events = machine->missing + events_behind(self, machine);
+        const uint64_t stops = machine->unheard + stops_behind(self, machine);
+        if (!wished || events + stops == 0U) {
+            continue;
+        }
+        self->missing += events;
+        self->unheard += stops;
+        if (self->wish.json) {
+            tell_end(self, machine, events, stops);
+        } else {
+            show_end(self, machine, events, stops);
+        }
+    }
 }
 
 bool history_take(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us) {
@@ -273,6 +459,9 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
         self->doubled++;
         return true;
     }
+    if (is_before(self, times_us)) {
+        forget_gap(machine);
+    }
     if (!is_within(self, times_us) || !(self->wish.all || is_stop)) {
         return true;
     }
@@ -281,9 +470,9 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
     } else {
         show(self, machine, &event, name, times_us);
     }
-    machine->missing = 0;
-    machine->unheard = 0;
-    machine->began = false;
+    self->missing += machine->missing;
+    self->unheard += machine->unheard;
+    forget_gap(machine);
     machine->told = true;
     self->told++;
     return ferror(self->out) == 0;
@@ -299,10 +488,10 @@ void history_sum(const history_t *self, const char *host) {
     if (self->wish.json) {
         (void)fprintf(self->out,
                       "{\"events\":%" PRIu64 ",\"machines\":%zu,\"doubled\":%" PRIu64 ",\"garbled\":%" PRIu64
-                      ",\"missing\":%" PRIu64 ",\"stops_missing\":%" PRIu64 ",\"since_wall_us\":%" PRId64
-                      ",\"until_wall_us\":%" PRId64 "}\n",
+                      ",\"missing\":%" PRIu64 ",\"stops_missing\":%" PRIu64
+                      ",\"end_checked\":%s,\"since_wall_us\":%" PRId64 ",\"until_wall_us\":%" PRId64 "}\n",
                       self->told, machines, self->doubled, self->garbled, self->missing, self->unheard,
-                      self->wish.since_us, self->wish.until_us);
+                      self->has_info ? "true" : "false", self->wish.since_us, self->wish.until_us);
         return;
     }
     write_time(self->wish.since_us, since);
@@ -315,6 +504,13 @@ void history_sum(const history_t *self, const char *host) {
     }
     if (self->garbled > 0U) {
         (void)fprintf(self->out, "; %" PRIu64 " that cannot be read", self->garbled);
+    }
+    if (self->missing + self->unheard > 0U) {
+        (void)fprintf(self->out, "; MISSING: %" PRIu64 " stops, %" PRIu64 " events of any kind", self->unheard,
+                      self->missing);
+    }
+    if (!self->has_info) {
+        (void)fputs("; its end is not checked, because no broker answers: later stops may be missing", self->out);
     }
     (void)fputs("\n", self->out);
 }
