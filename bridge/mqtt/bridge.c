@@ -15,6 +15,8 @@
 #define SENSORS_US       5000000U
 #define ASIDE_FIRST_US   5000000U
 #define ASIDE_LONGEST_US 3600000000U
+/// After a loss events wait so long for the broker to answer what came before them.
+#define PROOF_US 5000000U
 /// Between two lines in the log about messages that were not accepted.
 #define REFUSED_US 10000000U
 
@@ -168,11 +170,14 @@ static bool next_event(mqtt_bridge_t *self, mqtt_spool_event_t *out_event) {
 }
 
 /// Hands the broker what it has not got, a few at a time: order is kept, and what is lost with the connection is sent again. After a loss
-/// one by one, so that it shows with which of them the connection ends.
+/// one by one, and when the broker has answered what came before, so that it shows with which of them the connection ends.
 static void send_events(mqtt_bridge_t *self) {
     mqtt_spool_event_t event;
     char topic[MQTT_TOPIC_SIZE];
-    const size_t most = (self->refusals.losses > 0U) ? 1U : MQTT_INFLIGHT_MAX;
+    const size_t most = self->refusals.careful ? 1U : MQTT_INFLIGHT_MAX;
+    if (self->refusals.careful && !self->refusals.works && self->now_us - self->broker.up_us < PROOF_US) {
+        return;
+    }
     while (self->broker.state == MQTT_UP && self->inflights < most && next_event(self, &event)) {
         mqtt_topic(self->settings->machine.id, "event", event.name, topic);
         const int message = mqtt_broker_send(&self->broker, topic, event.payload, event.length, once);
@@ -219,6 +224,7 @@ static void settle_events(mqtt_bridge_t *self) {
             continue;
         }
         self->refusals.losses = 0;
+        self->refusals.careful = false;
         if (oldest.aside) {
             mqtt_spool_confirm_aside(&self->spool, oldest.number);
         } else {
@@ -285,6 +291,7 @@ static void judge_loss(mqtt_bridge_t *self) {
         refusals->due_us = 0; // The next connection may be to a broker that accepts them.
     }
     refusals->tries = false;
+    refusals->careful = refusals->careful || self->inflights > 0U;
     if (self->inflights == 0U || self->inflight[0].aside || !refusals->works) {
         return;
     }

@@ -46,6 +46,7 @@ typedef struct {
     bool works;                       ///< and whether the broker has answered it: the line carries both ways.
     uint64_t suspect;                 ///< The oldest event under way when the connection ended; 0: none.
     unsigned losses;                  ///< How often in a row that was so.
+    bool careful;                     ///< The connection ended with events under way, and none was confirmed since.
     uint64_t count;                   ///< Messages that were not accepted.
     uint64_t told;                    ///< How many of them the log knows of,
     uint64_t told_us;                 ///< and since when.

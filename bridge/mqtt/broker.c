@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sysexits.h>
 #include <unistd.h>
@@ -232,6 +233,13 @@ static void lose(mqtt_broker_t *self, const char *why) {
     }
 }
 
+/// True if what the broker has sent begins with a CONNACK that refuses. Without TLS only.
+static bool is_refused(int fd) {
+    uint8_t head[4] = {0};
+    return recv(fd, head, sizeof head, MSG_PEEK | MSG_DONTWAIT) == (ssize_t)sizeof head && head[0] == 0x20U &&
+           head[3] != 0U;
+}
+
 /// Of what libmosquitto promises for it: that no other thread is in the same client.
 static void *call(void *context) {
     mqtt_caller_t *caller = context;
@@ -250,6 +258,9 @@ static void *call(void *context) {
     caller->error = errno;
     if (caller->guarded && caller->result == MOSQ_ERR_SUCCESS) { // The one that is used.
         caller->peer = mqtt_peer_judge(mosquitto_socket(caller->client), &caller->allowed, &caller->uid);
+        if (caller->peer == MQTT_PEER_UNKNOWN && is_refused(mosquitto_socket(caller->client))) {
+            caller->peer = MQTT_PEER_ALLOWED; // It has ended the connection already: there is no process to name.
+        }
     }
     atomic_store(&caller->ended, true);
     (void)!write(caller->wake, &one, sizeof one);
