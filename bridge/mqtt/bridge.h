@@ -114,11 +114,31 @@ bool mqtt_bridge_close(mqtt_bridge_t *self);
 /// Publishes `length` bytes of `payload`; as `mqtt_broker_send`. 0 bytes: it did not fit, which is MQTT_NEVER.
 int mqtt_bridge_publish(mqtt_bridge_t *self, const char *what, const char *name, size_t length, mqtt_way_t way);
 
+/// Publishes the sensors of Home Assistant, if it is switched on. Once a second: reports those that did not come back in time.
+void mqtt_sensors_send(mqtt_bridge_t *self);
+void mqtt_sensors_poll(mqtt_bridge_t *self);
+
 /// A message that is no command: a sensor of Home Assistant that this bridge has published comes back.
-void mqtt_bridge_sensor(mqtt_bridge_t *self, const struct mosquitto_message *message);
+void mqtt_sensors_take(mqtt_bridge_t *self, const struct mosquitto_message *message);
 
 /// What came to a topic of commands. `context` is the bridge.
 void mqtt_bridge_command(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels);
+
+/// The same to any topic.
+int mqtt_bridge_publish_to(mqtt_bridge_t *self, const char *topic, size_t length, mqtt_way_t way);
+
+/// Hands the broker what it has not got of the spool.
+void mqtt_events_send(mqtt_bridge_t *self);
+
+/// A connection is up, and all that comes before the events is sent. It is lost. Once a second: reports refusals, and tries again what is set
+/// aside.
+void mqtt_events_begin(mqtt_bridge_t *self);
+void mqtt_events_lost(mqtt_bridge_t *self);
+void mqtt_events_poll(mqtt_bridge_t *self);
+
+/// The broker has confirmed a message, or does not accept it. `context` is the bridge.
+void mqtt_events_sent(void *context, int message);
+void mqtt_events_refused(void *context, int message, const char *why);
 
 /// Sends `stop` once, and only if a person holds the lease by this bridge.
 void mqtt_bridge_stop_if_ours(mqtt_bridge_t *self);

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "broker.h"
 
+#include "credentials.h"
+#include "reasons.h"
+
 #include "common/link.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <mqtt_protocol.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
 #include <sysexits.h>
 #include <unistd.h>
 
@@ -117,63 +117,7 @@ static void on_message(struct mosquitto *client, void *context, const struct mos
     free(correlation);
 }
 
-// ---- files --------------------------------------------------------------------------------------------------------
-
-static int complain(int code, const char *path, const char *what) {
-    (void)fprintf(stderr, "iwheel: %s: %s\n", path, what);
-    return code;
-}
-
-/// Of a file with a secret in it. 0, or an exit code.
-static int judge_secret(int file, const char *path) {
-    struct stat status = {0};
-    const bool known = fstat(file, &status) == 0;
-    const bool ours = known && (status.st_uid == geteuid() || status.st_uid == 0U);
-    // Root's may be read by the group that the bridge runs in: that is how an administrator gives it.
-    const mode_t others = (status.st_uid == 0U) ? 0037U : 0077U;
-    return (ours && (status.st_mode & others) == 0U)
-               ? 0
-               : complain(EX_NOPERM, path, "others may read or change it; chown iwheel-mqtt and chmod 600 it");
-}
-
-static int read_credentials(mqtt_broker_t *self, const char *path) {
-    char line[512];
-    FILE *file = fopen(path, "re");
-    if (file == NULL) {
-        return complain(EX_NOPERM, path, strerror(errno));
-    }
-    const int code = judge_secret(fileno(file), path);
-    const bool read = code == 0 && fgets(line, sizeof line, file) != NULL;
-    (void)fclose(file);
-    if (code != 0) {
-        return code;
-    }
-    line[read ? strcspn(line, "\r\n") : 0U] = '\0';
-    char *colon = strchr(line, ':');
-    if (colon == NULL || colon == line) {
-        return complain(EX_CONFIG, path, "its first line is not USER:PASSWORD");
-    }
-    *colon = '\0';
-    self->user = strdup(line);
-    self->password = strdup(colon + 1);
-    explicit_bzero(line, sizeof line);
-    return (self->user != NULL && self->password != NULL) ? 0 : EX_OSERR;
-}
-
-static int look_at_files(const mqtt_settings_t *settings) {
-    const char *const files[] = {settings->broker.ca, settings->broker.certificate, settings->broker.key};
-    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
-        if (mqtt_settings_given(files[i]) && access(files[i], R_OK) != 0) {
-            return complain(EX_NOPERM, files[i], strerror(errno));
-        }
-    }
-    const int key = mqtt_settings_given(settings->broker.key) ? open(settings->broker.key, O_RDONLY | O_CLOEXEC) : -1;
-    const int code = (key >= 0) ? judge_secret(key, settings->broker.key) : 0;
-    if (key >= 0) {
-        (void)close(key);
-    }
-    return code;
-}
+// ---- opening ------------------------------------------------------------------------------------------------------
 
 int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const mqtt_broker_listener_t *listener) {
     *self = (mqtt_broker_t){.settings = settings,
@@ -183,12 +127,10 @@ int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const
                             .caller = {.wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK),
                                        .allowed = mqtt_peers_of(settings->broker.process_user)}};
     if (self->caller.wake < 0 || mosquitto_lib_init() != MOSQ_ERR_SUCCESS) {
-        return complain(EX_OSERR, "libmosquitto", strerror(errno));
+        (void)fprintf(stderr, "iwheel: libmosquitto: %s\n", strerror(errno));
+        return EX_OSERR;
     }
-    const int code = look_at_files(settings);
-    return (code != 0 || !mqtt_settings_given(settings->broker.credentials))
-               ? code
-               : read_credentials(self, settings->broker.credentials);
+    return mqtt_credentials_read(settings, &self->user, &self->password);
 }
 
 // ---- connecting ---------------------------------------------------------------------------------------------------
@@ -233,13 +175,6 @@ static void lose(mqtt_broker_t *self, const char *why) {
     }
 }
 
-/// True if what the broker has sent begins with a CONNACK that refuses. Without TLS only.
-static bool is_refused(int fd) {
-    uint8_t head[4] = {0};
-    return recv(fd, head, sizeof head, MSG_PEEK | MSG_DONTWAIT) == (ssize_t)sizeof head && head[0] == 0x20U &&
-           head[3] != 0U;
-}
-
 /// Of what libmosquitto promises for it: that no other thread is in the same client.
 static void *call(void *context) {
     mqtt_caller_t *caller = context;
@@ -258,7 +193,7 @@ static void *call(void *context) {
     caller->error = errno;
     if (caller->guarded && caller->result == MOSQ_ERR_SUCCESS) { // The one that is used.
         caller->peer = mqtt_peer_judge(mosquitto_socket(caller->client), &caller->allowed, &caller->uid);
-        if (caller->peer == MQTT_PEER_UNKNOWN && is_refused(mosquitto_socket(caller->client))) {
+        if (caller->peer == MQTT_PEER_UNKNOWN && mqtt_reason_is_refusal(mosquitto_socket(caller->client))) {
             caller->peer = MQTT_PEER_ALLOWED; // It has ended the connection already: there is no process to name.
         }
     }
@@ -357,15 +292,6 @@ static void end_connecting(mqtt_broker_t *self) {
 
 // ---- working ------------------------------------------------------------------------------------------------------
 
-static const char *words_of_refusal(const mqtt_broker_t *self) {
-    if (!is_5(self)) {
-        return mosquitto_connack_string(self->refusal);
-    }
-    return (self->refusal == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION)
-               ? "it does not speak MQTT 5; set protocol = 3.1.1 under [broker]"
-               : mosquitto_reason_string(self->refusal);
-}
-
 static void work(mqtt_broker_t *self) {
     int result = mosquitto_loop_read(self->client, PACKETS);
     if (result == MOSQ_ERR_SUCCESS && mosquitto_want_write(self->client)) {
@@ -379,7 +305,7 @@ static void work(mqtt_broker_t *self) {
         self->behind = 0;
     }
     if (self->refusal != 0) {
-        lose(self, words_of_refusal(self));
+        lose(self, mqtt_reason_of(self->refusal, is_5(self)));
     } else if (result != MOSQ_ERR_SUCCESS) {
         lose(self, (result == MOSQ_ERR_ERRNO) ? strerror(errno) : mosquitto_strerror(result));
     } else if (self->lost) {
@@ -433,12 +359,6 @@ static bool add_labels(const mqtt_labels_t *labels, mosquitto_property **out) {
                                           labels->correlation_length) == MOSQ_ERR_SUCCESS);
 }
 
-/// Trouble of the moment; all else is of the message.
-static bool may_pass(int result) {
-    return result == MOSQ_ERR_NOMEM || result == MOSQ_ERR_NO_CONN || result == MOSQ_ERR_CONN_LOST ||
-           result == MOSQ_ERR_ERRNO || result == MOSQ_ERR_TLS;
-}
-
 int mqtt_broker_send(mqtt_broker_t *self, const char *topic, const char *payload, size_t length, mqtt_way_t way) {
     int number = MQTT_NOT_NOW;
     mosquitto_property *properties = NULL;
@@ -454,7 +374,7 @@ int mqtt_broker_send(mqtt_broker_t *self, const char *topic, const char *payload
         return number;
     }
     self->unsent += (self->state == MQTT_UP) ? 1U : 0U;
-    if (may_pass(result)) {
+    if (mqtt_reason_may_pass(result)) {
         return MQTT_NOT_NOW;
     }
     self->unfit = mosquitto_strerror(result);

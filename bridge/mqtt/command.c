@@ -118,20 +118,25 @@ static bool read_drive(iwn_json_t root, mqtt_order_t *order) {
     return !iwn_json_find(root, "key", &value) || text_of(root, "key", order->key, sizeof order->key);
 }
 
-static bool write_request(iwn_json_t root, mqtt_order_t *order) {
+/// No field but those of every command and of this one.
+static bool is_of_fields(iwn_json_t root, mqtt_verb_t verb) {
     static const char *const common[] = {"boot", "t_us", "ttl_ms", "seq", "from", NULL};
-    const form_t *form = &forms[order->verb];
     iwn_json_t rest = iwn_json_inside(root);
     iwn_json_t name;
     iwn_json_t value;
-    iwn_out_t out;
     while (iwn_json_next(&rest, &name, &value)) {
-        const bool is_key = is_drive(order->verb) && iwn_json_is(name, "key"); // The bridge judges it.
-        if (!is_one_of(name, common) && !is_one_of(name, form->fields) && !is_key) {
+        const bool is_key = is_drive(verb) && iwn_json_is(name, "key"); // The bridge judges it.
+        if (!is_one_of(name, common) && !is_one_of(name, forms[verb].fields) && !is_key) {
             return false;
         }
     }
-    if (is_drive(order->verb) && !read_drive(root, order)) {
+    return true;
+}
+
+static bool write_request(iwn_json_t root, mqtt_order_t *order) {
+    const form_t *form = &forms[order->verb];
+    iwn_out_t out;
+    if (!is_of_fields(root, order->verb) || (is_drive(order->verb) && !read_drive(root, order))) {
         return false;
     }
     iwn_out_init(&out, order->request, sizeof order->request);

@@ -9,7 +9,6 @@
 #include <time.h>
 
 #define MINUTE_US 60000000LL
-#define TIME_SIZE 32U
 
 bool history_open(history_t *self, const history_wish_t *wish, FILE *out) {
     memset(self, 0, sizeof *self);
@@ -26,12 +25,12 @@ void history_close(history_t *self) {
 
 // ---- times --------------------------------------------------------------------------------------------------------
 
-static void write_time(int64_t wall_us, char out[TIME_SIZE]) {
+void history_time(int64_t wall_us, char out[HISTORY_TIME_SIZE]) {
     const time_t seconds = (time_t)(wall_us / 1000000);
     struct tm parts;
-    (void)snprintf(out, TIME_SIZE, "--");
+    (void)snprintf(out, HISTORY_TIME_SIZE, "--");
     if (wall_us > 0 && localtime_r(&seconds, &parts) != NULL) {
-        (void)strftime(out, TIME_SIZE, "%Y-%m-%d %H:%M:%S", &parts);
+        (void)strftime(out, HISTORY_TIME_SIZE, "%Y-%m-%d %H:%M:%S", &parts);
     }
 }
 
@@ -77,7 +76,7 @@ bool history_span(const char *text, int64_t *out_us) {
 
 // ---- doubles and gaps ---------------------------------------------------------------------------------------------
 
-static history_machine_t *machine_of(history_t *self, const char *id) {
+history_machine_t *history_machine(history_t *self, const char *id) {
     for (size_t i = 0; i < self->count; i++) {
         if (strcmp(self->machines[i].id, id) == 0) {
             return &self->machines[i];
@@ -198,75 +197,6 @@ static void forget_gap(history_machine_t *machine) {
     machine->began = false;
 }
 
-// ---- what machines say of themselves ------------------------------------------------------------------------------
-
-static uint64_t count_of(const iwc_message_t *info, const char *path) {
-    const iwc_value_t value = iwc_integer(info, path);
-    return (value.known && value.value > 0) ? (uint64_t)value.value : 0U;
-}
-
-void history_take_info(history_t *self, const char *topic, const char *payload, size_t length) {
-    char id[MQTT_ID_SIZE];
-    char fault[80];
-    const char *what = "";
-    iwn_json_t root;
-    iwn_text_t words = iwn_text_begin(fault, sizeof fault);
-    const bool is_info = fleet_split(topic, id, &what) && strcmp(what, "info") == 0 && length > 0U;
-    if (!is_info || !iwn_json_check(payload, length, &self->work, &root, &words) ||
-        iwn_json_kind(root) != IWN_JSON_OBJECT) {
-        return;
-    }
-    history_machine_t *machine = machine_of(self, id);
-    const iwc_message_t message = {.text = payload, .length = length, .is_event = true};
-    if (machine != NULL) {
-        machine->info = (history_info_t){.known = true,
-                                         .stop = (int64_t)count_of(&message, "last_stop.number"),
-                                         .stop_wall_us = (int64_t)count_of(&message, "last_stop.wall_us"),
-                                         .last = count_of(&message, "events.last"),
-                                         .waiting = count_of(&message, "events.waiting"),
-                                         .dropped = count_of(&message, "events.dropped")};
-        fleet_text(&message, "boot", machine->info.boot, sizeof machine->info.boot);
-    }
-}
-
-/// Stops that its `info` knows of and the stream does not have, as far as they may lie in the span.
-static uint64_t stops_behind(const history_t *self, const history_machine_t *machine) {
-    const history_info_t *info = &machine->info;
-    const bool later = machine->stop_wall_us > 0 && info->stop_wall_us > machine->stop_wall_us;
-    if (info->stop == 0 || (info->stop_wall_us > 0 && info->stop_wall_us < self->wish.since_us) ||
-        machine->stop_wall_us >= self->wish.until_us) {
-        return 0;
-    }
-    if (machine->stop == 0) { // The stream has none: at least this one.
-        return (info->stop_wall_us < self->wish.until_us) ? 1U : 0U;
-    }
-    if (info->stop > machine->stop) {
-        return (uint64_t)(info->stop - machine->stop);
-    }
-    return later ? (uint64_t)info->stop : 0U; // The gateway began anew, and counts from one.
-}
-
-/// Events likewise. The number of an event never begins anew.
-static uint64_t events_behind(const history_t *self, const history_machine_t *machine) {
-    const uint64_t there = machine->number + machine->info.waiting;
-    return (machine->number > 0U && machine->info.last > there && machine->event_us < self->wish.until_us)
-               ? machine->info.last - there
-               : 0U;
-}
-
-/// Why events may be missing, as far as the machine knows it.
-static void write_cause(const history_machine_t *machine, char *out, size_t size) {
-    const history_info_t *info = &machine->info;
-    if (!info->known || strcmp(info->boot, machine->runs[machine->run].boot) != 0) {
-        (void)snprintf(out, size, "dropped from its full spool, or confirmed by the broker and not stored");
-    } else if (info->dropped == 0U) {
-        (void)snprintf(out, size, "the broker confirmed them and did not store them; its spool dropped none");
-    } else {
-        (void)snprintf(out, size, "its full spool dropped %" PRIu64 " events; the broker did not store the others",
-                       info->dropped);
-    }
-}
-
 // ---- telling ------------------------------------------------------------------------------------------------------
 
 /// Of an event that is no stop, what is in it that tells most.
@@ -299,18 +229,18 @@ static void write_fields(const iwc_message_t *event, const char *name, char *out
     }
 }
 
-static void show_note(const history_t *self, const history_machine_t *machine, uint64_t events, const char *words) {
+void history_note(const history_t *self, const history_machine_t *machine, uint64_t events, const char *words) {
     (void)fprintf(self->out, "%-19s %-12s -- %" PRIu64 " %s\n", "", machine->id, events, words);
 }
 
 static void show(const history_t *self, const history_machine_t *machine, const iwc_message_t *event, const char *name,
                  const int64_t times_us[2]) {
-    char when[TIME_SIZE];
-    char stored[TIME_SIZE];
+    char when[HISTORY_TIME_SIZE];
+    char stored[HISTORY_TIME_SIZE];
     char text[320];
     const int64_t late_us = times_us[1] - times_us[0];
-    write_time(times_us[0], when);
-    write_time(times_us[1], stored);
+    history_time(times_us[0], when);
+    history_time(times_us[1], stored);
     fleet_text(event, "sentence", text, sizeof text);
     if (text[0] == '\0') {
         fleet_text(event, "cause", text, sizeof text);
@@ -325,13 +255,13 @@ static void show(const history_t *self, const history_machine_t *machine, const 
     if (machine->missing > 0U) {
         char cause[128];
         char words[192];
-        write_cause(machine, cause, sizeof cause);
+        history_cause(machine, cause, sizeof cause);
         (void)snprintf(words, sizeof words, "events before this one are not in the stream: %s", cause);
-        show_note(self, machine, machine->missing, words);
+        history_note(self, machine, machine->missing, words);
     }
     if (machine->unheard > 0U) {
-        show_note(self, machine, machine->unheard,
-                  "stops before this one are not in the stream; what it recorded: iwheel-fleet recordings ID");
+        history_note(self, machine, machine->unheard,
+                     "stops before this one are not in the stream; what it recorded: iwheel-fleet recordings ID");
     }
     (void)fprintf(self->out, "%-19s %-12s %-6s %s%s", when, machine->id, name, text,
                   (iwc_truth(event, "missed").value == 1) ? " (told late: its bridge did not run)" : "");
@@ -357,7 +287,7 @@ static void tell(const history_t *self, const history_machine_t *machine, const 
     iwn_out_bool(&json, "bridge_began_anew", machine->began);
     if (machine->missing > 0U) {
         char cause[128];
-        write_cause(machine, cause, sizeof cause);
+        history_cause(machine, cause, sizeof cause);
         iwn_out_text(&json, "missing_cause", cause);
     }
     iwn_out_span(&json, iwn_span("message"), (iwn_span_t){event->text, event->length});
@@ -374,66 +304,6 @@ static bool is_before(const history_t *self, const int64_t times_us[2]) {
     return times_us[0] < self->wish.since_us && times_us[1] < self->wish.since_us;
 }
 
-/// One line, or two.
-static void show_end(const history_t *self, const history_machine_t *machine, uint64_t events, uint64_t stops) {
-    char words[256];
-    char when[TIME_SIZE];
-    char cause[128];
-    write_time(machine->info.stop_wall_us, when);
-    write_cause(machine, cause, sizeof cause);
-    if (stops > 0U) {
-        (void)snprintf(words, sizeof words,
-                       "stops after its last one here are not in the stream; its info names stop %" PRId64
-                       " of %s; what it recorded: iwheel-fleet recordings ID",
-                       machine->info.stop, when);
-        show_note(self, machine, stops, words);
-    }
-    if (events > 0U) {
-        (void)snprintf(words, sizeof words, "events after its last one here are not in the stream: %s", cause);
-        show_note(self, machine, events, words);
-    }
-    if (machine->info.waiting > 0U) {
-        show_note(self, machine, machine->info.waiting, "events wait at the machine and may still come");
-    }
-}
-
-static void tell_end(const history_t *self, const history_machine_t *machine, uint64_t events, uint64_t stops) {
-    char line[512];
-    char cause[128];
-    iwn_out_t json;
-    write_cause(machine, cause, sizeof cause);
-    iwn_out_init(&json, line, sizeof line);
-    iwn_out_open(&json, NULL, '{');
-    iwn_out_text(&json, "machine", machine->id);
-    iwn_out_int(&json, "missing_after", (int64_t)events);
-    iwn_out_int(&json, "stops_missing_after", (int64_t)stops);
-    iwn_out_known(&json, "info_stop", machine->info.stop > 0, machine->info.stop);
-    iwn_out_known(&json, "info_stop_wall_us", machine->info.stop_wall_us > 0, machine->info.stop_wall_us);
-    iwn_out_int(&json, "waiting", (int64_t)machine->info.waiting);
-    iwn_out_text(&json, "missing_cause", cause);
-    iwn_out_close(&json, '}');
-    (void)fwrite(line, 1, iwn_out_finish(&json), self->out);
-}
-
-void history_end(history_t *self) {
-    for (size_t i = 0; i < self->count; i++) {
-        const history_machine_t *machine = &self->machines[i];
-        const bool wished = self->wish.machine == NULL || strcmp(self->wish.machine, machine->id) == 0;
-        const uint64_t events = machine->missing + events_behind(self, machine);
-        const uint64_t stops = machine->unheard + stops_behind(self, machine);
-        if (!wished || events + stops == 0U) {
-            continue;
-        }
-        self->missing += events;
-        self->unheard += stops;
-        if (self->wish.json) {
-            tell_end(self, machine, events, stops);
-        } else {
-            show_end(self, machine, events, stops);
-        }
-    }
-}
-
 bool history_take(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us) {
     static const char begin[] = "event/";
     history_t *self = context;
@@ -444,7 +314,7 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
     iwn_text_t words = iwn_text_begin(fault, sizeof fault);
     const bool split = fleet_split(topic, id, &what) && strncmp(what, begin, sizeof begin - 1U) == 0 &&
                        mqtt_settings_is_name(what + sizeof begin - 1U);
-    history_machine_t *machine = split ? machine_of(self, id) : NULL;
+    history_machine_t *machine = split ? history_machine(self, id) : NULL;
     if (machine == NULL || !iwn_json_check(payload, length, &self->work, &root, &words) ||
         iwn_json_kind(root) != IWN_JSON_OBJECT) {
         self->garbled++;
@@ -479,8 +349,8 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
 }
 
 void history_sum(const history_t *self, const char *host) {
-    char since[TIME_SIZE];
-    char until[TIME_SIZE];
+    char since[HISTORY_TIME_SIZE];
+    char until[HISTORY_TIME_SIZE];
     size_t machines = 0;
     for (size_t i = 0; i < self->count; i++) {
         machines += self->machines[i].told ? 1U : 0U;
@@ -494,8 +364,8 @@ void history_sum(const history_t *self, const char *host) {
                       self->has_info ? "true" : "false", self->wish.since_us, self->wish.until_us);
         return;
     }
-    write_time(self->wish.since_us, since);
-    write_time(self->wish.until_us, until);
+    history_time(self->wish.since_us, since);
+    history_time(self->wish.until_us, until);
     (void)fprintf(self->out, "%" PRIu64 " %s%s of %zu machine%s, %s to %s, from the stream at %s", self->told,
                   self->wish.all ? "event" : "stop", (self->told == 1U) ? "" : "s", machines,
                   (machines == 1U) ? "" : "s", since, until, host);

@@ -96,6 +96,24 @@ void history_end(history_t *self);
 /// The sum, and whose stream it was.
 void history_sum(const history_t *self, const char *host);
 
+// ---- between its parts --------------------------------------------------------------------------------------------
+
+#define HISTORY_TIME_SIZE 32U
+
+/// Local time, or `--`.
+void history_time(int64_t wall_us, char out[HISTORY_TIME_SIZE]);
+
+/// Its row; NULL: there are too many.
+history_machine_t *history_machine(history_t *self, const char *id);
+
+/// Why events of this machine may be missing, as far as the machine knows it.
+void history_cause(const history_machine_t *machine, char *out, size_t size);
+
+/// One line about a number of events.
+void history_note(const history_t *self, const history_machine_t *machine, uint64_t events, const char *words);
+
+// ---- times --------------------------------------------------------------------------------------------------------
+
 /// A point in time as people write it: `2026-11-21T22:00`, with seconds or without, also a blank for the T, or a day alone, in local time;
 /// with Z in UTC. False: it is none.
 bool history_when(const char *text, int64_t *out_us);

@@ -196,7 +196,7 @@ void mqtt_bridge_command(void *context, const struct mosquitto_message *message,
     mqtt_topic(self->settings->machine.id, "reply", "", replies);
     const char *verb = mqtt_topic_verb(self->settings->machine.id, message->topic);
     if (verb == NULL) {
-        mqtt_bridge_sensor(self, message);
+        mqtt_sensors_take(self, message);
         return;
     }
     const mqtt_command_t command = {.verb = verb,

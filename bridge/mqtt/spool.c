@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "spool.h"
 
+#include "folder.h"
 #include "settings.h"
 
 #include <errno.h>
@@ -10,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 static const char magic[8] = {'i', 'w', 's', 'p', 'o', 'o', 'l', '1'};
@@ -222,6 +222,26 @@ static bool append(mqtt_spool_t *self, const uint8_t *record, size_t length) {
 
 // ---- reading it again ---------------------------------------------------------------------------------------------
 
+static size_t read_event(mqtt_spool_t *self, const uint8_t *record, size_t length) {
+    const uint64_t number = number_of(record);
+    if ((record[HEAD_SIZE] != EVENT && !is_aside(record)) || number <= self->last ||
+        memchr(record + HEAD_SIZE + BODY_SIZE, '\0', length - HEAD_SIZE - BODY_SIZE) == NULL) {
+        return 0;
+    }
+    self->last = number;
+    self->mark = mark_of(record);
+    if (!mqtt_settings_is_name((const char *)record + HEAD_SIZE + BODY_SIZE)) { // No broker accepts such a topic.
+        self->dropped++;
+        return length;
+    }
+    uint8_t *copy = make_room(self, length);
+    memcpy(copy, record, length);
+    set_letter(copy, EVENT);
+    self->end += length;
+    self->waiting++;
+    return length;
+}
+
 /// One record of a file; its length, or 0: from here on there is none.
 static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left) {
     if (left < HEAD_SIZE + BODY_SIZE || get(record, 4) < BODY_SIZE || get(record, 4) > MQTT_SPOOL_EVENT_MAX ||
@@ -243,39 +263,7 @@ static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left
         self->mark = mark_of(record);
         return length;
     }
-    if ((record[HEAD_SIZE] != EVENT && !is_aside(record)) || number <= self->last ||
-        memchr(record + HEAD_SIZE + BODY_SIZE, '\0', length - HEAD_SIZE - BODY_SIZE) == NULL) {
-        return 0;
-    }
-    self->last = number;
-    self->mark = mark_of(record);
-    if (!mqtt_settings_is_name((const char *)record + HEAD_SIZE + BODY_SIZE)) { // No broker accepts such a topic.
-        self->dropped++;
-        return length;
-    }
-    uint8_t *copy = make_room(self, length);
-    memcpy(copy, record, length);
-    set_letter(copy, EVENT);
-    self->end += length;
-    self->waiting++;
-    return length;
-}
-
-static bool is_ours(uid_t owner) {
-    return owner == 0U || owner == geteuid();
-}
-
-/// The file that is there; -1 with errno: ENOENT if there is none, EPERM if it is none of this bridge's.
-static int open_file(int folder) {
-    struct stat status;
-    const int file = openat(folder, MQTT_SPOOL_FILE, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    if (file >= 0 &&
-        (fstat(file, &status) != 0 || !S_ISREG(status.st_mode) || status.st_nlink != 1U || !is_ours(status.st_uid))) {
-        (void)close(file);
-        errno = EPERM;
-        return -1;
-    }
-    return file;
+    return read_event(self, record, length);
 }
 
 static void read_file(mqtt_spool_t *self, int file) {
@@ -299,24 +287,12 @@ static void read_file(mqtt_spool_t *self, int file) {
 
 // ---- the spool ----------------------------------------------------------------------------------------------------
 
-int mqtt_spool_open_folder(const char *directory) {
-    struct stat status;
-    const int folder = open(directory, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (folder >= 0 &&
-        (fstat(folder, &status) != 0 || !is_ours(status.st_uid) || (status.st_mode & (S_IWGRP | S_IWOTH)) != 0U)) {
-        (void)close(folder);
-        errno = EPERM;
-        return -1;
-    }
-    return folder;
-}
-
 bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes) {
-    *self = (mqtt_spool_t){.folder = mqtt_spool_open_folder(directory), .file = -1};
+    *self = (mqtt_spool_t){.folder = mqtt_folder_open(directory), .file = -1};
     self->size = 2U * (size_t)MQTT_SPOOL_EVENT_MAX;
     self->size = (max_bytes > self->size) ? max_bytes : self->size;
     const bool ours = self->folder >= 0 && flock(self->folder, LOCK_EX | LOCK_NB) == 0;
-    const int file = ours ? open_file(self->folder) : -1;
+    const int file = ours ? mqtt_folder_open_file(self->folder, MQTT_SPOOL_FILE) : -1;
     self->data = (ours && (file >= 0 || errno == ENOENT)) ? malloc(self->size) : NULL;
     if (self->data == NULL) {
         const int error = errno;

@@ -57,12 +57,8 @@ typedef struct {
     bool aside;
 } mqtt_spool_event_t;
 
-/// Opens the directory, not through a symbolic link. A descriptor; -1 with errno, which is EPERM if it belongs neither to this user nor to
-/// root, or if others may write to it.
-int mqtt_spool_open_folder(const char *directory);
-
-/// Reads what is there, and keeps others out. False, with errno: no memory, no such directory, EPERM as above, also for a file in it that
-/// is no plain one with one name of this user's or root's, or EWOULDBLOCK: another process has it; then nothing is open. A record that is
+/// Reads what is there, and keeps others out. False, with errno: no memory, no such directory, EPERM as in folder.h, for the directory or the file in
+/// it, or EWOULDBLOCK: another process has it; then nothing is open. A record that is
 /// damaged ends the reading.
 bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes);
 

@@ -32,8 +32,8 @@ static void command(const char *verb, const char *fields) {
     char payload[256];
     const mqtt_labels_t labels = {.expiry_s = 0};
     (void)snprintf(topic, sizeof topic, "iwheel/w1/cmd/%s", verb);
-    (void)snprintf(payload, sizeof payload, "{\"boot\":\"%s\",\"t_us\":%llu,\"from\":\"pad\",\"seq\":%u%s}", bridge.boot,
-                   (unsigned long long)bridge.now_us, ++sequence, fields);
+    (void)snprintf(payload, sizeof payload, "{\"boot\":\"%s\",\"t_us\":%llu,\"from\":\"pad\",\"seq\":%u%s}",
+                   bridge.boot, (unsigned long long)bridge.now_us, ++sequence, fields);
     const struct mosquitto_message message = {
         .topic = topic, .payload = payload, .payloadlen = (int)strlen(payload), .qos = 0, .retain = false};
     mqtt_bridge_command(&bridge, &message, &labels);
