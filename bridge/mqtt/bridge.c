@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "bridge.h"
 
+#include "folder.h"
+
 #include <errno.h>
+#include <fcntl.h>
 #include <string.h>
 #include <sys/random.h>
 #include <sysexits.h>
@@ -11,7 +14,6 @@
 #define SECOND_US 1000000U
 #define INFO_US   60000000U
 
-static const mqtt_way_t once = {.qos = 1};
 static const mqtt_way_t retained = {.qos = 1, .retain = true};
 
 static mqtt_buffer_t buffer(mqtt_bridge_t *self) {
@@ -24,13 +26,7 @@ static int64_t wall_us(void) {
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-int mqtt_bridge_publish(mqtt_bridge_t *self, const char *what, const char *name, size_t length, mqtt_way_t way) {
-    char topic[MQTT_TOPIC_SIZE];
-    mqtt_topic(self->settings->machine.id, what, name, topic);
-    return (length > 0U) ? mqtt_broker_send(&self->broker, topic, self->payload, length, way) : 0;
-}
-
-static bool newest_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
+bool mqtt_bridge_state(const mqtt_bridge_t *self, iwc_message_t *out_state) {
     *out_state = (iwc_message_t){.text = self->state, .length = self->state_length, .is_event = true};
     return self->link.is_here && self->state_length > 0U;
 }
@@ -41,15 +37,24 @@ static void tell_info(mqtt_bridge_t *self) {
     iwc_message_t state;
     const mqtt_info_t info = {.boot = self->boot,
                               .settings = self->settings,
-                              .state = newest_state(self, &state) ? &state : NULL,
+                              .state = mqtt_bridge_state(self, &state) ? &state : NULL,
                               .counts = self->judge.counts,
                               .spooled = self->spool.waiting,
                               .dropped = self->spool.dropped,
+                              .last = self->spool.last,
+                              .aside = self->spool.aside,
+                              .sensors = self->sensors_sent,
+                              .sensors_seen = (size_t)__builtin_popcount(self->sensors_seen),
+                              .name_taken = self->broker.taken,
+                              .refused = self->refusals.count,
+                              .refusal = self->refusals.last,
                               .on_disk = !self->spool.behind,
                               .unsent = self->broker.unsent,
                               .stop = &self->stop};
     const size_t length = mqtt_tell_info(&info, buffer(self));
-    self->info_due = mqtt_bridge_publish(self, "info", NULL, length, retained) == 0;
+    self->info_due = false; // Before: a refusal of this one makes none due at once.
+    const int message = mqtt_bridge_publish(self, "info", NULL, length, retained);
+    self->info_due = message == MQTT_NOT_NOW;
     self->info_us = self->now_us;
     self->told_waiting = self->spool.waiting;
 }
@@ -65,49 +70,7 @@ static void tell_availability(mqtt_bridge_t *self, bool always) {
     }
 }
 
-static void tell_sensors(mqtt_bridge_t *self) {
-    char topic[MQTT_TOPIC_SIZE];
-    for (size_t i = 0;
-         self->settings->home_assistant.enabled && mqtt_tell_sensor(self->settings, i, topic, buffer(self)); i++) {
-        (void)mqtt_broker_send(&self->broker, topic, self->payload, strlen(self->payload), retained);
-    }
-}
-
 // ---- events -------------------------------------------------------------------------------------------------------
-
-/// Hands the broker what it has not got, a few at a time: order is kept, and what is lost with the connection is sent again.
-static void send_events(mqtt_bridge_t *self) {
-    mqtt_spool_event_t event;
-    char topic[MQTT_TOPIC_SIZE];
-    while (self->broker.state == MQTT_UP && self->inflights < MQTT_INFLIGHT_MAX &&
-           mqtt_spool_after(&self->spool, self->sent_number, &event)) {
-        mqtt_topic(self->settings->machine.id, "event", event.name, topic);
-        const int message = mqtt_broker_send(&self->broker, topic, event.payload, event.length, once);
-        if (message == 0) {
-            return;
-        }
-        self->inflight[self->inflights] = (mqtt_inflight_t){message, event.number, false};
-        self->inflights++;
-        self->sent_number = event.number;
-    }
-}
-
-static void event_sent(void *context, int message) {
-    mqtt_bridge_t *self = context;
-    size_t first = 0;
-    for (size_t i = 0; i < self->inflights; i++) {
-        self->inflight[i].confirmed = self->inflight[i].confirmed || self->inflight[i].message == message;
-    }
-    while (first < self->inflights && self->inflight[first].confirmed) {
-        first++;
-    }
-    if (first > 0U) {
-        mqtt_spool_confirm(&self->spool, self->inflight[first - 1U].number);
-        self->inflights -= first;
-        memmove(self->inflight, self->inflight + first, self->inflights * sizeof self->inflight[0]);
-    }
-    self->info_due = self->info_due || (self->told_waiting > 0U && self->spool.waiting == 0U);
-}
 
 /// An event that is worth to be kept; `stop_us` is the wall clock of the newest stop, by which one is known that happened unseen.
 static void keep_event(mqtt_bridge_t *self, const char *name, size_t length, uint64_t stop_us) {
@@ -135,7 +98,7 @@ static void take_stop(mqtt_bridge_t *self, const iwc_message_t *event) {
     const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
     keep_event(self, "stop", length, (uint64_t)iwc_integer(event, "wall_us").value);
     remember_stop(self, event);
-    self->driver[0] = '\0';
+    bridge_lease_end(&self->lease, self->now_us);
 }
 
 static void take_why(void *context, const iwc_message_t *reply) {
@@ -175,7 +138,8 @@ static uint32_t rate_hz(uint32_t every_ms) {
 static void tell_state(mqtt_bridge_t *self, const iwc_message_t *state, bool spare) {
     // By MQTT 5: what is older than the next one is of no use.
     const mqtt_way_t way = {.spare = spare, .labels = {.expiry_s = self->settings->state.every_ms / 1000U + 1U}};
-    if (mqtt_bridge_publish(self, "state", NULL, mqtt_tell_state(self->boot, state, buffer(self)), way) != 0) {
+    if (mqtt_bridge_publish(self, "state", NULL, mqtt_tell_state(self->boot, state, buffer(self)), way) !=
+        MQTT_NOT_NOW) {
         read_condition(state, self->condition, sizeof self->condition);
         self->state_us = self->now_us;
     }
@@ -200,6 +164,19 @@ static void take_state(mqtt_bridge_t *self, const iwc_message_t *state) {
     }
 }
 
+/// A person of this bridge who asks holds the lease before the reply is here: only another client's lease ends ours.
+static void take_lease(mqtt_bridge_t *self, const iwc_message_t *event) {
+    const iwc_value_t holder = iwc_integer(event, "holder");
+    bool ours = false;
+    for (size_t i = 0; i < sizeof self->lease.place / sizeof self->lease.place[0]; i++) {
+        const bridge_line_t *line = &self->lease.place[i].line;
+        ours = ours || (line->state == BRIDGE_HERE && holder.known && holder.value == iwc_number(line->gateway));
+    }
+    if (!ours && bridge_lease_key(&self->lease) != NULL) {
+        bridge_lease_end(&self->lease, self->now_us);
+    }
+}
+
 static void take_event(void *context, const iwc_message_t *event, uint64_t now_us) {
     mqtt_bridge_t *self = context;
     char name[32];
@@ -214,14 +191,13 @@ static void take_event(void *context, const iwc_message_t *event, uint64_t now_u
     if (strcmp(name, "stop") == 0) {
         take_stop(self, event);
     } else {
-        const bool lease = strcmp(name, "lease") == 0;
-        if (lease && iwc_integer(event, "holder").value != iwc_number(self->link.line.gateway)) {
-            self->driver[0] = '\0';
+        if (strcmp(name, "lease") == 0) {
+            take_lease(self, event);
         }
         const size_t length = mqtt_tell_event(self->boot, self->spool.last + 1U, wall_us(), event, buffer(self));
         keep_event(self, name, length, self->spool.mark);
     }
-    send_events(self);
+    mqtt_events_send(self);
 }
 
 static void gateway_here(void *context, uint64_t now_us) {
@@ -231,10 +207,9 @@ static void gateway_here(void *context, uint64_t now_us) {
 
 static void gateway_gone(void *context, uint64_t now_us) {
     mqtt_bridge_t *self = context;
-    (void)now_us;
     self->state_length = 0;
     self->condition[0] = '\0';
-    self->driver[0] = '\0';
+    bridge_lease_end(&self->lease, now_us);
     tell_availability(self, false);
     tell_info(self);
 }
@@ -244,20 +219,20 @@ static void gateway_gone(void *context, uint64_t now_us) {
 static void broker_up(void *context) {
     mqtt_bridge_t *self = context;
     iwc_message_t state;
-    self->inflights = 0;
-    self->sent_number = 0;
     tell_availability(self, true);
-    if (newest_state(self, &state)) {
+    if (mqtt_bridge_state(self, &state)) {
         tell_state(self, &state, false);
     }
     tell_info(self);
-    tell_sensors(self);
-    send_events(self);
+    mqtt_sensors_send(self);
+    mqtt_events_begin(self);
+    mqtt_events_send(self);
 }
 
 static void broker_down(void *context) {
     mqtt_bridge_t *self = context;
-    self->inflights = 0;
+    mqtt_events_lost(self);
+    self->sensors_us = 0;
     mqtt_bridge_stop_if_ours(self);
 }
 
@@ -280,10 +255,18 @@ static bool has_name(const mqtt_settings_t *settings) {
 }
 
 static int no_spool(const mqtt_settings_t *settings) {
+    const char *why = strerror(errno);
+    if (errno == EWOULDBLOCK) {
+        why = "another bridge uses it";
+    } else if (errno == EPERM) {
+        why = "others may write to the directory, or it or its file " MQTT_SPOOL_FILE " belongs to another user";
+    } else if (errno == ELOOP || errno == ENOTDIR) {
+        why = "a symbolic link, or no directory";
+    }
     (void)fprintf(stderr,
                   "iwheel-mqtt: %s: %s; make it, for this bridge alone, or name another one as directory under "
                   "[spool]\n",
-                  settings->spool.directory, (errno == EWOULDBLOCK) ? "another bridge uses it" : strerror(errno));
+                  settings->spool.directory, why);
     return EX_CANTCREAT;
 }
 
@@ -293,9 +276,11 @@ int mqtt_bridge_check(const mqtt_settings_t *settings) {
     if (!has_name(settings)) {
         return EX_CONFIG;
     }
-    if (access(settings->spool.directory, W_OK | X_OK) != 0) {
+    const int folder = mqtt_folder_open(settings->spool.directory);
+    if (folder < 0 || faccessat(folder, ".", W_OK | X_OK, AT_EACCESS) != 0) {
         return no_spool(settings);
     }
+    (void)close(folder);
     const int code = mqtt_broker_open(&broker, settings, &nobody);
     (void)mqtt_broker_close(&broker);
     return code;
@@ -307,19 +292,27 @@ int mqtt_bridge_open(mqtt_bridge_t *self, const mqtt_settings_t *settings) {
                                        .rate_hz = rate_hz(settings->state.every_ms),
                                        .drives = settings->drive.enabled};
     const bridge_listener_t gateway = {self, gateway_here, gateway_gone, take_event};
-    *self = (mqtt_bridge_t){.settings = settings, .topics = {self->commands, NULL}};
-    const mqtt_broker_listener_t broker = {"iwheel-mqtt", self->name,  self->topics, self->will,         self,
-                                           broker_up,     broker_down, event_sent,   mqtt_bridge_command};
-    (void)snprintf(self->name, sizeof self->name, "iwheel-%s", settings->machine.id);
+    *self = (mqtt_bridge_t){.settings = settings, .topics = {self->commands, NULL, NULL}};
+    const mqtt_broker_listener_t broker = {
+        "iwheel-mqtt", self->name,  self->topics,     self->will,          self,
+        broker_up,     broker_down, mqtt_events_sent, mqtt_events_refused, mqtt_bridge_command};
+    // Nobody who knows the machine's id can take this name at a broker and so keep the bridge away.
+    const bool random = make_boot(self->boot);
+    (void)snprintf(self->name, sizeof self->name, "iwheel-%s-%s", settings->machine.id, self->boot);
     mqtt_topic(settings->machine.id, "availability", NULL, self->will);
     mqtt_topic(settings->machine.id, "cmd", "+", self->commands);
+    if (settings->home_assistant.enabled) {
+        mqtt_sensor_topics(settings, self->sensors);
+        self->topics[1] = self->sensors;
+    }
     if (!has_name(settings)) {
         return EX_CONFIG;
     }
     if (!mqtt_spool_open(&self->spool, settings->spool.directory, (size_t)settings->spool.max_kB * 1000U)) {
         return no_spool(settings);
     }
-    if (!make_boot(self->boot) || !bridge_link_open(&self->link, &terms, &gateway)) {
+    if (!random || !bridge_link_open(&self->link, &terms, &gateway) ||
+        !bridge_lease_open(&self->lease, settings->gateway.socket, self->link.epoll_fd)) {
         (void)fputs("iwheel-mqtt: no memory, or no random numbers\n", stderr);
         return EX_OSERR;
     }
@@ -337,11 +330,15 @@ static void tend(mqtt_bridge_t *self) {
         self->info_due = true;
     }
     if (self->spool.dropped != self->told_dropped) {
-        (void)fprintf(stderr, "iwheel-mqtt: %llu events dropped so far, the oldest ones: the spool is full\n",
+        (void)fprintf(stderr,
+                      "iwheel-mqtt: events dropped so far: %llu; the spool was full, or an event too long: see max_kB "
+                      "under [spool]\n",
                       (unsigned long long)self->spool.dropped);
         self->told_dropped = self->spool.dropped;
         self->info_due = true;
     }
+    mqtt_events_poll(self);
+    mqtt_sensors_poll(self);
     if (self->info_due || self->now_us - self->info_us >= INFO_US) {
         tell_info(self);
     }
@@ -351,10 +348,11 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
     self->now_us = now_us;
     mqtt_broker_step(&self->broker, now_us);
     const int code = bridge_link_step(&self->link, now_us);
-    if (self->driver[0] != '\0' && now_us >= self->silent_us) {
+    bridge_lease_step(&self->lease, now_us);
+    if (bridge_lease_key(&self->lease) != NULL && now_us >= self->silent_us) {
         mqtt_bridge_stop_if_ours(self);
     }
-    send_events(self);
+    mqtt_events_send(self);
     mqtt_spool_sync(&self->spool);
     if (now_us >= self->second_us) {
         self->second_us = now_us + SECOND_US;
@@ -365,8 +363,9 @@ int mqtt_bridge_step(mqtt_bridge_t *self, uint64_t now_us) {
 
 int mqtt_bridge_wait_ms(const mqtt_bridge_t *self) {
     const uint64_t now_us = self->now_us;
-    const uint64_t times[] = {bridge_link_next_us(&self->link, now_us), mqtt_broker_next_us(&self->broker),
-                              self->second_us, (self->driver[0] != '\0') ? self->silent_us : UINT64_MAX};
+    const uint64_t times[] = {bridge_link_next_us(&self->link, now_us), bridge_lease_next_us(&self->lease, now_us),
+                              mqtt_broker_next_us(&self->broker), self->second_us,
+                              (bridge_lease_key(&self->lease) != NULL) ? self->silent_us : UINT64_MAX};
     uint64_t next_us = times[0];
     for (size_t i = 1; i < sizeof times / sizeof times[0]; i++) {
         next_us = (times[i] < next_us) ? times[i] : next_us;
@@ -376,6 +375,7 @@ int mqtt_bridge_wait_ms(const mqtt_bridge_t *self) {
 
 bool mqtt_bridge_close(mqtt_bridge_t *self) {
     mqtt_bridge_stop_if_ours(self);
+    bridge_lease_close(&self->lease);
     bridge_link_close(&self->link);
     const bool done = mqtt_broker_close(&self->broker); // First: what it confirms is kept.
     return mqtt_spool_close(&self->spool) && done;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "broker.h"
 
+#include "credentials.h"
+#include "reasons.h"
+
 #include "common/link.h"
 
 #include <errno.h>
@@ -9,14 +12,17 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
-#include <sys/stat.h>
 #include <sysexits.h>
 #include <unistd.h>
 
 #define SHORTEST_US 500000U
 #define LONGEST_US  30000000U
 #define GREETING_US 10000000U
-#define LOOK_US     500000U
+/// A connection that ends before this after it was accepted is a short one; so many in a row are mentioned, once a minute.
+#define SHORT_US      2000000U
+#define SHORT_MAX     3U
+#define SHORT_TOLD_US 60000000U
+#define LOOK_US       500000U
 /// Packets read at one go: a flood must not keep the gateway's words waiting.
 #define PACKETS 32
 /// Messages that may wait in the library for a broker that does not read; the spool's are among them.
@@ -42,26 +48,44 @@ static void on_connect(struct mosquitto *client, void *context, int code) {
         return;
     }
     self->state = MQTT_UP;
+    self->up_us = self->now_us;
     self->wait_us = SHORTEST_US;
     // QoS 0: what is under way when the connection ends is not sent again.
     for (size_t i = 0; self->listener.topics[i] != NULL && result == MOSQ_ERR_SUCCESS; i++) {
-        result = mosquitto_subscribe(client, NULL, self->listener.topics[i], 0);
+        result = mosquitto_subscribe(client, &self->subscriptions[i], self->listener.topics[i], 0);
     }
     if (result != MOSQ_ERR_SUCCESS) {
         self->lost = true;
         return;
     }
-    (void)fprintf(stderr, "%s: connected to the broker at %s port %u\n", self->listener.program, self->host,
-                  self->settings->broker.port);
-    self->told_away = false;
+    if (self->short_ones < SHORT_MAX) {
+        (void)fprintf(stderr, "%s: connected to the broker at %s port %u\n", self->listener.program, self->host,
+                      self->settings->broker.port);
+        self->told_away = false;
+    }
     self->listener.up(self->listener.context);
 }
 
-static void on_disconnect(struct mosquitto *client, void *context, int code) {
+/// `code` is the broker's reason if it gave one, which MQTT 5 has from 0x80 on; else one of the library.
+static void on_disconnect(struct mosquitto *client, void *context, int code, const mosquitto_property *properties) {
     mqtt_broker_t *self = context;
     (void)client;
-    (void)code;
+    (void)properties;
+    self->refusal = (code >= MQTT_RC_UNSPECIFIED) ? code : self->refusal;
     self->lost = true;
+}
+
+static void on_subscribe(struct mosquitto *client, void *context, int message, int count, const int *granted) {
+    const mqtt_broker_t *self = context;
+    (void)client;
+    for (size_t i = 0; count > 0 && granted[0] >= MQTT_RC_UNSPECIFIED && self->listener.topics[i] != NULL; i++) {
+        if (self->subscriptions[i] == message) {
+            (void)fprintf(
+                stderr,
+                "%s: the broker refuses to deliver %s: nothing arrives from there; see its rights for this user\n",
+                self->listener.program, self->listener.topics[i]);
+        }
+    }
 }
 
 static void on_publish(struct mosquitto *client, void *context, int message, int code,
@@ -70,8 +94,7 @@ static void on_publish(struct mosquitto *client, void *context, int message, int
     (void)client;
     (void)properties;
     if (code >= MQTT_RC_UNSPECIFIED) {
-        self->refusal = code;
-        self->lost = true;
+        self->listener.refused(self->listener.context, message, mosquitto_reason_string(code));
         return;
     }
     self->listener.sent(self->listener.context, message);
@@ -94,70 +117,49 @@ static void on_message(struct mosquitto *client, void *context, const struct mos
     free(correlation);
 }
 
-// ---- files --------------------------------------------------------------------------------------------------------
-
-static int complain(int code, const char *path, const char *what) {
-    (void)fprintf(stderr, "iwheel: %s: %s\n", path, what);
-    return code;
-}
-
-static int read_credentials(mqtt_broker_t *self, const char *path) {
-    struct stat status = {0};
-    char line[512];
-    FILE *file = fopen(path, "re");
-    if (file == NULL) {
-        return complain(EX_NOPERM, path, strerror(errno));
-    }
-    const bool known = fstat(fileno(file), &status) == 0;
-    const bool ours = known && (status.st_uid == geteuid() || status.st_uid == 0U);
-    // Root's may be read by the group that the bridge runs in: that is how an administrator gives it.
-    const mode_t others = (status.st_uid == 0U) ? 0037U : 0077U;
-    const bool read = fgets(line, sizeof line, file) != NULL;
-    (void)fclose(file);
-    if (!ours || (status.st_mode & others) != 0U) {
-        return complain(EX_NOPERM, path, "others may read or change it; chown iwheel-mqtt and chmod 600 it");
-    }
-    line[read ? strcspn(line, "\r\n") : 0U] = '\0';
-    char *colon = strchr(line, ':');
-    if (colon == NULL || colon == line) {
-        return complain(EX_CONFIG, path, "its first line is not USER:PASSWORD");
-    }
-    *colon = '\0';
-    self->user = strdup(line);
-    self->password = strdup(colon + 1);
-    explicit_bzero(line, sizeof line);
-    return (self->user != NULL && self->password != NULL) ? 0 : EX_OSERR;
-}
-
-static int look_at_files(const mqtt_settings_t *settings) {
-    const char *const files[] = {settings->broker.ca, settings->broker.certificate, settings->broker.key};
-    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
-        if (mqtt_settings_given(files[i]) && access(files[i], R_OK) != 0) {
-            return complain(EX_NOPERM, files[i], strerror(errno));
-        }
-    }
-    return 0;
-}
+// ---- opening ------------------------------------------------------------------------------------------------------
 
 int mqtt_broker_open(mqtt_broker_t *self, const mqtt_settings_t *settings, const mqtt_broker_listener_t *listener) {
     *self = (mqtt_broker_t){.settings = settings,
                             .listener = *listener,
                             .wait_us = SHORTEST_US,
                             .random = (uint64_t)getpid(),
-                            .caller = {.wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)}};
+                            .caller = {.wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK),
+                                       .allowed = mqtt_peers_of(settings->broker.process_user)}};
     if (self->caller.wake < 0 || mosquitto_lib_init() != MOSQ_ERR_SUCCESS) {
-        return complain(EX_OSERR, "libmosquitto", strerror(errno));
+        (void)fprintf(stderr, "iwheel: libmosquitto: %s\n", strerror(errno));
+        return EX_OSERR;
     }
-    const int code = look_at_files(settings);
-    return (code != 0 || !mqtt_settings_given(settings->broker.credentials))
-               ? code
-               : read_credentials(self, settings->broker.credentials);
+    return mqtt_credentials_read(settings, &self->user, &self->password);
 }
 
 // ---- connecting ---------------------------------------------------------------------------------------------------
 
+/// A broker that ends the connection just after it accepted it, again and again, has usually given its name to another client: MQTT 3.1.1
+/// has no word for that.
+static void judge_end(mqtt_broker_t *self) {
+    const bool taken = self->refusal == MQTT_RC_SESSION_TAKEN_OVER;
+    const bool was_short = self->state == MQTT_UP && self->now_us - self->up_us < SHORT_US;
+    self->short_ones = (was_short || self->state != MQTT_UP) ? self->short_ones + (was_short ? 1U : 0U) : 0U;
+    if (!taken && self->short_ones < SHORT_MAX) {
+        return;
+    }
+    self->taken++;
+    if (self->now_us >= self->short_us) {
+        (void)fprintf(
+            stderr,
+            "%s: the broker at %s ended the connection %s; the name %s or the user is used by another client: "
+            "give each machine and each console its own%s\n",
+            self->listener.program, self->host,
+            taken ? "because another client took it over" : "again and again just after it accepted it",
+            self->listener.name, taken ? "" : ", or see the broker's log for a message that it does not accept");
+        self->short_us = self->now_us + SHORT_TOLD_US;
+    }
+}
+
 static void lose(mqtt_broker_t *self, const char *why) {
     const bool was_up = self->state == MQTT_UP;
+    judge_end(self);
     if (!self->told_away) {
         (void)fprintf(stderr, "%s: no broker at %s port %u (%s%s%s); trying for ever\n", self->listener.program,
                       self->host, self->settings->broker.port, why, (self->words[0] != '\0') ? "; " : "", self->words);
@@ -177,8 +179,24 @@ static void lose(mqtt_broker_t *self, const char *why) {
 static void *call(void *context) {
     mqtt_caller_t *caller = context;
     const uint64_t one = 1;
-    caller->result = mosquitto_connect(caller->client, caller->host, caller->port, caller->keepalive_s);
+    char address[MQTT_ADDRESS_SIZE];
+    const int port = (caller->host[0] == '/') ? 0 : caller->port; // A unix socket has none.
+    (void)snprintf(address, sizeof address, "%s", caller->host);
+    caller->peer = MQTT_PEER_ALLOWED;
+    caller->result = MOSQ_ERR_ERRNO;
+    if (caller->guarded) { // Before any secret is sent.
+        caller->peer = mqtt_peer_probe(caller->host, port, &caller->allowed, address, &caller->uid);
+    }
+    if (caller->peer == MQTT_PEER_ALLOWED) {
+        caller->result = mosquitto_connect(caller->client, address, port, caller->keepalive_s);
+    }
     caller->error = errno;
+    if (caller->guarded && caller->result == MOSQ_ERR_SUCCESS) { // The one that is used.
+        caller->peer = mqtt_peer_judge(mosquitto_socket(caller->client), &caller->allowed, &caller->uid);
+        if (caller->peer == MQTT_PEER_UNKNOWN && mqtt_reason_is_refusal(mosquitto_socket(caller->client))) {
+            caller->peer = MQTT_PEER_ALLOWED; // It has ended the connection already: there is no process to name.
+        }
+    }
     atomic_store(&caller->ended, true);
     (void)!write(caller->wake, &one, sizeof one);
     return NULL;
@@ -198,7 +216,8 @@ static bool set_up(mqtt_broker_t *self) {
     }
     mosquitto_log_callback_set(self->client, on_log);
     mosquitto_connect_callback_set(self->client, on_connect);
-    mosquitto_disconnect_callback_set(self->client, on_disconnect);
+    mosquitto_disconnect_v5_callback_set(self->client, on_disconnect);
+    mosquitto_subscribe_callback_set(self->client, on_subscribe);
     mosquitto_publish_v5_callback_set(self->client, on_publish);
     mosquitto_message_v5_callback_set(self->client, on_message);
     // No session expiry is told by MQTT 5: that is 0.
@@ -230,6 +249,7 @@ static void begin_connecting(mqtt_broker_t *self) {
     }
     self->caller.client = self->client;
     self->caller.host = self->host;
+    self->caller.guarded = mqtt_settings_guarded(self->settings) && mqtt_settings_is_local(self->host);
     self->caller.port = (int)self->settings->broker.port;
     self->caller.keepalive_s = (int)self->settings->broker.keepalive_s;
     atomic_store(&self->caller.ended, false);
@@ -246,7 +266,21 @@ static void begin_connecting(mqtt_broker_t *self) {
 
 static void end_connecting(mqtt_broker_t *self) {
     uint64_t count = 0;
+    char why[160];
     (void)!read(self->caller.wake, &count, sizeof count);
+    if (self->caller.peer == MQTT_PEER_STRANGER) {
+        (void)snprintf(
+            why, sizeof why,
+            "its process belongs to user %u, not to root, this program's user or process_user; without TLS it "
+            "gets no secret and no right to drive",
+            (unsigned)self->caller.uid);
+        lose(self, why);
+        return;
+    }
+    if (self->caller.peer == MQTT_PEER_UNKNOWN) {
+        lose(self, "the kernel names no owner of its process: it may be in a container; use TLS, with ca");
+        return;
+    }
     if (self->caller.result != MOSQ_ERR_SUCCESS) {
         lose(self, (self->caller.result == MOSQ_ERR_ERRNO) ? strerror(self->caller.error)
                                                            : mosquitto_strerror(self->caller.result));
@@ -257,15 +291,6 @@ static void end_connecting(mqtt_broker_t *self) {
 }
 
 // ---- working ------------------------------------------------------------------------------------------------------
-
-static const char *words_of_refusal(const mqtt_broker_t *self) {
-    if (!is_5(self)) {
-        return mosquitto_connack_string(self->refusal);
-    }
-    return (self->refusal == MQTT_RC_UNSUPPORTED_PROTOCOL_VERSION)
-               ? "it does not speak MQTT 5; set protocol = 3.1.1 under [broker]"
-               : mosquitto_reason_string(self->refusal);
-}
 
 static void work(mqtt_broker_t *self) {
     int result = mosquitto_loop_read(self->client, PACKETS);
@@ -280,7 +305,7 @@ static void work(mqtt_broker_t *self) {
         self->behind = 0;
     }
     if (self->refusal != 0) {
-        lose(self, words_of_refusal(self));
+        lose(self, mqtt_reason_of(self->refusal, is_5(self)));
     } else if (result != MOSQ_ERR_SUCCESS) {
         lose(self, (result == MOSQ_ERR_ERRNO) ? strerror(errno) : mosquitto_strerror(result));
     } else if (self->lost) {
@@ -335,19 +360,25 @@ static bool add_labels(const mqtt_labels_t *labels, mosquitto_property **out) {
 }
 
 int mqtt_broker_send(mqtt_broker_t *self, const char *topic, const char *payload, size_t length, mqtt_way_t way) {
-    int number = 0;
+    int number = MQTT_NOT_NOW;
     mosquitto_property *properties = NULL;
-    const bool sent = self->state == MQTT_UP && self->behind < (way.spare ? 1U : BEHIND_MAX) &&
-                      (!is_5(self) || add_labels(&way.labels, &properties)) &&
-                      mosquitto_publish_v5(self->client, &number, topic, (int)length, payload, way.qos, way.retain,
-                                           properties) == MOSQ_ERR_SUCCESS;
-    mosquitto_property_free_all(&properties);
-    if (!sent) {
-        self->unsent += (self->state == MQTT_UP) ? 1U : 0U;
-        return 0;
+    int result = MOSQ_ERR_NO_CONN;
+    if (self->state == MQTT_UP && self->behind < (way.spare ? 1U : BEHIND_MAX) &&
+        (!is_5(self) || add_labels(&way.labels, &properties))) {
+        result =
+            mosquitto_publish_v5(self->client, &number, topic, (int)length, payload, way.qos, way.retain, properties);
     }
-    self->behind += mosquitto_want_write(self->client) ? 1U : 0U;
-    return number;
+    mosquitto_property_free_all(&properties);
+    if (result == MOSQ_ERR_SUCCESS) {
+        self->behind += mosquitto_want_write(self->client) ? 1U : 0U;
+        return number;
+    }
+    self->unsent += (self->state == MQTT_UP) ? 1U : 0U;
+    if (mqtt_reason_may_pass(result)) {
+        return MQTT_NOT_NOW;
+    }
+    self->unfit = mosquitto_strerror(result);
+    return MQTT_NEVER;
 }
 
 bool mqtt_broker_close(mqtt_broker_t *self) {

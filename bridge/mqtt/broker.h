@@ -3,13 +3,15 @@
 ///
 ///     AWAY --try--> CONNECTING --socket--> GREETING --CONNACK--> UP --lost--> AWAY, tried again after 0.5 s to 30 s
 ///
-/// A message that a broker refuses by MQTT 5 (its ACL, a quota) ends the connection, so that it is sent again, not lost.
+/// "Not now" and "never" are different: a message that cannot be sent now is tried again by the caller; of one that this broker does not
+/// accept (too large, its rights) the caller is informed, and the connection goes on.
 ///
 /// CONNECTING asks for names and shakes hands, which may wait: a thread of its own does that, and touches nothing else. Clean sessions:
 /// the broker keeps nothing for this machine while it is away, so no command comes late from there.
 #ifndef IW_MQTT_BROKER_H
 #define IW_MQTT_BROKER_H
 
+#include "peer.h"
 #include "settings.h"
 
 #include <mosquitto.h>
@@ -32,7 +34,8 @@ typedef struct {
     void *context;
     void (*up)(void *context);
     void (*down)(void *context);
-    void (*sent)(void *context, int message); ///< The broker has confirmed it.
+    void (*sent)(void *context, int message);                     ///< The broker has confirmed it.
+    void (*refused)(void *context, int message, const char *why); ///< By MQTT 5: the broker does not accept it.
     void (*came)(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels);
 } mqtt_broker_listener_t; ///< The texts must outlive the connection.
 
@@ -46,7 +49,11 @@ typedef struct {
     int keepalive_s;
     int result;
     int error;
-    int wake; ///< Where it tells that it has ended.
+    bool guarded;         ///< The other end is judged before and after.
+    mqtt_peers_t allowed; ///< By these,
+    mqtt_peer_t peer;     ///< with this result
+    uid_t uid;            ///< and this user.
+    int wake;             ///< Where it tells that it has ended.
     atomic_bool ended;
 } mqtt_caller_t;
 
@@ -61,6 +68,11 @@ typedef struct {
     char *user;                ///< NULL: none.
     char *password;            ///< Behind `user`.
     bool told_away;            ///< In the log.
+    int subscriptions[4];      ///< Message numbers, in the order of the listener's topics.
+    uint64_t up_us;            ///< When the broker accepted this connection.
+    unsigned short_ones;       ///< Connections in a row that ended at once after that.
+    uint64_t short_us;         ///< When the log may mention them again.
+    uint64_t taken;            ///< Connections that another client with this name has ended, as far as is known.
     bool lost;                 ///< The library says so.
     int refusal;               ///< Of the last CONNACK, or by MQTT 5 of a message.
     char words[160];           ///< What the library said last of its trouble.
@@ -72,6 +84,7 @@ typedef struct {
     uint64_t look_us;  ///< When the library wants to look at its keepalive.
     unsigned behind;   ///< Messages given while others were not gone yet.
     uint64_t unsent;   ///< Messages not given because of too many of those.
+    const char *unfit; ///< Why the last message with MQTT_NEVER was none for this broker.
 } mqtt_broker_t;
 
 /// Reads the credentials and looks at the files of TLS. 0, or an exit code of sysexits with a line on stderr.
@@ -95,7 +108,11 @@ typedef struct {
     mqtt_labels_t labels;
 } mqtt_way_t;
 
-/// Hands a message over. Its number for `sent`; 0: it was not handed over, because the broker is not there or does not read.
+#define MQTT_NOT_NOW 0
+#define MQTT_NEVER   (-1)
+
+/// Hands a message over. Its number for `sent` or `refused`. MQTT_NOT_NOW: the broker is not there or does not read. MQTT_NEVER: this broker
+/// does not accept it, with the reason in `unfit`.
 int mqtt_broker_send(mqtt_broker_t *self, const char *topic, const char *payload, size_t length, mqtt_way_t way);
 
 #endif

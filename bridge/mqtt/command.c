@@ -11,21 +11,21 @@
 /// A sender who was silent so long may count anew: what it sent before is late by now, whatever its `seq`.
 #define FORGET_US (MQTT_TTL_MAX_MS * 1000ULL)
 
-/// What a verb's own fields may be, and whether it moves the wheels or loosens a latch. Which of them are needed says the gateway.
+/// The fields of a verb, and whether it permits motion or clears a latch. The gateway judges which of them are needed.
 typedef struct {
     const char *word;
-    bool drives;
-    const char *fields[5]; ///< Ends with NULL.
+    bool permits;
+    const char *fields[6]; ///< Ends with NULL.
 } form_t;
 
 static const form_t forms[MQTT_VERBS] = {
     [MQTT_HELLO] = {"hello", false, {NULL}},
     [MQTT_STOP] = {"stop", false, {NULL}},
     [MQTT_ESTOP] = {"estop", false, {"reason", NULL}},
-    [MQTT_ARM] = {"arm", true, {NULL}},
+    [MQTT_ARM] = {"arm", true, {"takeover", NULL}},
     [MQTT_DRIVE] = {"drive", true, {"left_mm_s", "right_mm_s", "left_mA", "right_mA", NULL}},
     [MQTT_TWIST] = {"twist", true, {"v_mm_s", "yaw_mrad_s", NULL}},
-    [MQTT_RESET] = {"reset", false, {NULL}},
+    [MQTT_RESET] = {"reset", true, {"stop", NULL}},
     [MQTT_WHY] = {"why", false, {NULL}},
     [MQTT_RECORDINGS] = {"recordings", false, {NULL}},
     [MQTT_RECORDING] = {"recording", false, {"name", "offset", NULL}},
@@ -77,7 +77,7 @@ static bool is_one_of(iwn_json_t name, const char *const words[]) {
     return false;
 }
 
-/// Copies a field of the verb's. Numbers and texts only: what is written anew cannot be another request in disguise.
+/// Copies a field of the verb's. Numbers, texts and one truth only: what is written anew cannot be another request in disguise.
 static bool copy_field(iwn_json_t root, const char *name, iwn_out_t *out) {
     char text[256];
     iwn_json_t value;
@@ -88,6 +88,11 @@ static bool copy_field(iwn_json_t root, const char *name, iwn_out_t *out) {
         iwn_out_int(out, name, iwn_json_integer(value));
         return true;
     }
+    const bool truth = iwn_json_kind(value) == IWN_JSON_TRUE || iwn_json_kind(value) == IWN_JSON_FALSE;
+    if (truth && strcmp(name, "takeover") == 0) {
+        iwn_out_bool(out, name, iwn_json_kind(value) == IWN_JSON_TRUE);
+        return true;
+    }
     if (iwn_json_kind(value) == IWN_JSON_TEXT && iwn_json_text(value, text, sizeof text)) {
         iwn_out_text(out, name, text);
         return true;
@@ -95,17 +100,44 @@ static bool copy_field(iwn_json_t root, const char *name, iwn_out_t *out) {
     return false;
 }
 
-static bool write_request(iwn_json_t root, mqtt_order_t *order) {
+static bool is_drive(mqtt_verb_t verb) {
+    return verb == MQTT_DRIVE || verb == MQTT_TWIST;
+}
+
+static bool is_stop(mqtt_verb_t verb) {
+    return verb == MQTT_STOP || verb == MQTT_ESTOP;
+}
+
+/// The key of a command that drives, and whether it is for a deflected stick: both do not depend on its age or sender.
+static bool read_drive(iwn_json_t root, mqtt_order_t *order) {
+    iwn_json_t value;
+    for (size_t i = 0; forms[order->verb].fields[i] != NULL; i++) {
+        int64_t number = 0;
+        order->moves = order->moves || (number_of(root, forms[order->verb].fields[i], &number) && number != 0);
+    }
+    return !iwn_json_find(root, "key", &value) || text_of(root, "key", order->key, sizeof order->key);
+}
+
+/// No field but those of every command and of this one.
+static bool is_of_fields(iwn_json_t root, mqtt_verb_t verb) {
     static const char *const common[] = {"boot", "t_us", "ttl_ms", "seq", "from", NULL};
-    const form_t *form = &forms[order->verb];
     iwn_json_t rest = iwn_json_inside(root);
     iwn_json_t name;
     iwn_json_t value;
-    iwn_out_t out;
     while (iwn_json_next(&rest, &name, &value)) {
-        if (!is_one_of(name, common) && !is_one_of(name, form->fields)) {
+        const bool is_key = is_drive(verb) && iwn_json_is(name, "key"); // The bridge judges it.
+        if (!is_one_of(name, common) && !is_one_of(name, forms[verb].fields) && !is_key) {
             return false;
         }
+    }
+    return true;
+}
+
+static bool write_request(iwn_json_t root, mqtt_order_t *order) {
+    const form_t *form = &forms[order->verb];
+    iwn_out_t out;
+    if (!is_of_fields(root, order->verb) || (is_drive(order->verb) && !read_drive(root, order))) {
+        return false;
     }
     iwn_out_init(&out, order->request, sizeof order->request);
     iwn_out_open(&out, NULL, '{');
@@ -118,6 +150,10 @@ static bool write_request(iwn_json_t root, mqtt_order_t *order) {
         char who[MQTT_SENDER_SIZE + 8U] = "mqtt ";
         (void)strncat(who, order->from, MQTT_SENDER_SIZE);
         iwn_out_text(&out, "name", who);
+    }
+    int64_t told_us = 0;
+    if ((order->verb == MQTT_ARM || order->verb == MQTT_RESET) && number_of(root, "t_us", &told_us)) {
+        iwn_out_int(&out, "t_us", told_us); // The gateway judges its age, too, and whether a stop is newer.
     }
     iwn_out_close(&out, '}');
     const size_t length = iwn_out_finish(&out);
@@ -146,7 +182,7 @@ static size_t place_of(const mqtt_judge_t *self, const char *from, uint64_t now_
 
 /// Until when it counts, in ms after what it quotes; 0: `ttl_ms` is none.
 static int64_t ttl_of(const mqtt_rules_t *rules, iwn_json_t root, mqtt_verb_t verb) {
-    const int64_t most_ms = forms[verb].drives ? (int64_t)rules->ttl_ms : (int64_t)MQTT_TTL_MAX_MS;
+    const int64_t most_ms = forms[verb].permits ? (int64_t)rules->ttl_ms : (int64_t)MQTT_TTL_MAX_MS;
     int64_t asked_ms = most_ms;
     iwn_json_t value;
     if (iwn_json_find(root, "ttl_ms", &value) &&
@@ -176,6 +212,9 @@ static bool judge_age(const mqtt_rules_t *rules, iwn_json_t root, uint64_t now_u
 }
 
 static bool judge_count(mqtt_judge_t *self, uint64_t now_us, mqtt_order_t *order) {
+    if (is_stop(order->verb)) { // Twice is harmless; and anybody could use up its sender's numbers, or all places.
+        return true;
+    }
     const size_t place = place_of(self, order->from, now_us);
     if (place == MQTT_SENDERS) {
         return drop(order, MQTT_CROWDED, "too many senders within a second");
@@ -243,7 +282,7 @@ static bool read_command(mqtt_judge_t *self, const mqtt_command_t *command, iwn_
 }
 
 static bool is_allowed(const mqtt_rules_t *rules, mqtt_verb_t verb) {
-    return (rules->may_drive || !forms[verb].drives) && (rules->may_reset || verb != MQTT_RESET);
+    return (rules->may_drive || !forms[verb].permits) && (rules->may_reset || verb != MQTT_RESET);
 }
 
 static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const mqtt_command_t *command, uint64_t now_us,
@@ -256,11 +295,15 @@ static bool judge_command(mqtt_judge_t *self, const mqtt_rules_t *rules, const m
     if (!read_labels(rules, command, order)) {
         return false;
     }
+    if (!write_request(root, order)) {
+        return drop(order, MQTT_GARBLED, "it has a field that this command has not, or a value that is none");
+    }
     if (command->retained) {
         return drop(order, MQTT_RETAINED, "a command must not be retained");
     }
-    if (!write_request(root, order)) {
-        return drop(order, MQTT_GARBLED, "it has a field that this command has not, or a value that is none");
+    int64_t stop = 0;
+    if (order->verb == MQTT_RESET && (!number_of(root, "stop", &stop) || stop < 0)) {
+        return drop(order, MQTT_GARBLED, "reset needs stop, the number of the stop that it means: see info or why");
     }
     if (order->verb == MQTT_HELLO) {
         return true;

@@ -3,7 +3,8 @@
 ///
 /// Pure: no I/O, no clock, no heap. A command quotes `boot` and `t_us` of a message of this machine's and says who it is `from`, with a
 /// `seq` that rises. Its age is this machine's monotonic time since `t_us`: no other clock takes part. Whatever is retained, late, doubled,
-/// out of order or from another run of the bridge is dropped and counted, a stop too: its sender has to ask again, with what it is told.
+/// out of order or from another run of the bridge is dropped and counted. A stop needs its age only: no `seq` and no number of senders refuses
+/// it. `from` is a label: whoever may write there may use any. The right to drive is the `key` of the reply to `arm`.
 ///
 /// A response topic of MQTT 5 counts only among this machine's replies: nobody makes the bridge write where only it may.
 #ifndef IW_MQTT_COMMAND_H
@@ -16,6 +17,8 @@
 /// Bytes of a longer command are not looked at.
 #define MQTT_COMMAND_MAX 4096U
 #define MQTT_SENDER_SIZE 33U
+/// Bytes of a key with its terminator.
+#define MQTT_KEY_SIZE 33U
 /// Bytes of correlation data that are given back.
 #define MQTT_CORRELATION_MAX 64U
 #define MQTT_SENDERS         16U
@@ -52,7 +55,7 @@ typedef enum {
 
 typedef struct {
     const char *boot; ///< Of this run.
-    uint32_t ttl_ms;  ///< Of commands that drive, at most MQTT_TTL_MAX_MS.
+    uint32_t ttl_ms;  ///< Of commands that permit motion or clear a latch, at most MQTT_TTL_MAX_MS.
     bool may_drive;
     bool may_reset;
     const char *replies; ///< `iwheel/ID/reply/`: what a response topic must begin with.
@@ -77,9 +80,11 @@ typedef struct {
     char to[MQTT_SENDER_SIZE];                 ///< Who gets the answer: `from`, or who the response topic names.
     uint8_t correlation[MQTT_CORRELATION_MAX]; ///< To be told with the answer.
     uint16_t correlation_length;
-    int64_t seq;        ///< 0: not known.
-    char why[160];      ///< Cause and cure, unless it is taken.
-    char request[1024]; ///< For the gateway, unless it is dropped or MQTT_HELLO.
+    int64_t seq;             ///< 0: not known.
+    bool moves;              ///< A well-formed command with a value that is not zero, dropped or not.
+    char key[MQTT_KEY_SIZE]; ///< Of a command that drives; empty: it has none.
+    char why[160];           ///< Cause and cure, unless it is taken.
+    char request[1024];      ///< For the gateway, unless it is dropped or MQTT_HELLO.
 } mqtt_order_t;
 
 /// Who sent what last. All zero at first.

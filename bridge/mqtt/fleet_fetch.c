@@ -141,6 +141,12 @@ static void sent(void *context, int message) {
     (void)message;
 }
 
+static void refused(void *context, int message, const char *why) {
+    (void)context;
+    (void)message;
+    (void)why; // It sends by QoS 0 only, of which none comes.
+}
+
 /// On a terminal, how far it is.
 static void show_progress(const asking_t *self) {
     const fetch_t *fetch = &self->fetch;
@@ -227,7 +233,8 @@ static int with_list(const mqtt_settings_t *settings, const fleet_wanted_t *want
     mqtt_topic(wanted->id, "reply", self.from, self.topics[1]);
     self.listed[0] = self.topics[0];
     self.listed[1] = self.topics[1];
-    const mqtt_broker_listener_t listener = {"iwheel-fleet", self.from, self.listed, NULL, &self, up, down, sent, came};
+    const mqtt_broker_listener_t listener = {"iwheel-fleet", self.from, self.listed, NULL, &self, up,
+                                             down,           sent,      refused,     came};
     fetch_begin(&self.fetch, wanted->id, self.from, wanted->wait_s * 1000000U, bridge_now_us());
     int code = mqtt_broker_open(&self.broker, settings, &listener);
     code = (code == 0) ? run_to(&self, FETCH_LISTED) : code;

@@ -16,8 +16,12 @@
 #include <unistd.h>
 
 #define SHOW_US 1000000U
-/// A machine's clock may be ahead of the servers' by this, and its events are found all the same.
-#define AHEAD_US 600000000LL
+/// The stream is read from so long before the span: a machine's clock may be ahead of the servers', and a gap at the beginning of the span
+/// shows only by the event before it. Of a single machine all of it is read.
+#define AHEAD_US 86400000000LL
+/// For the broker to accept the connection, and from then on for the next retained message.
+#define INFO_UP_US   5000000U
+#define INFO_NEXT_US 1000000U
 
 typedef struct {
     fleet_t fleet;
@@ -40,6 +44,12 @@ static void up(void *context) {
 static void sent(void *context, int message) {
     (void)context;
     (void)message;
+}
+
+static void refused(void *context, int message, const char *why) {
+    (void)context;
+    (void)message;
+    (void)why; // It sends by QoS 0 only, of which none comes.
 }
 
 static void came(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels) {
@@ -137,7 +147,7 @@ int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *want
                                          "iwheel/+/event/stop", NULL};
     char name[32];
     (void)snprintf(name, sizeof name, "iwheel-fleet-%d", (int)getpid());
-    const mqtt_broker_listener_t listener = {"iwheel-fleet", name, topics, NULL, &console, up, up, sent, came};
+    const mqtt_broker_listener_t listener = {"iwheel-fleet", name, topics, NULL, &console, up, up, sent, refused, came};
     if (!fleet_open(&console.fleet)) {
         return complain(EX_OSERR, "no memory");
     }
@@ -155,17 +165,68 @@ int fleet_verb_table(const mqtt_settings_t *settings, const fleet_wanted_t *want
 
 // ---- the history --------------------------------------------------------------------------------------------------
 
+typedef struct {
+    history_t *history;
+    uint64_t until_us;
+} asking_info_t;
+
+static void info_up(void *context) {
+    asking_info_t *self = context;
+    self->until_us = bridge_now_us() + INFO_NEXT_US;
+    self->history->has_info = true;
+}
+
+static void info_down(void *context) {
+    (void)context;
+}
+
+static void info_came(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels) {
+    asking_info_t *self = context;
+    (void)labels;
+    self->until_us = bridge_now_us() + INFO_NEXT_US;
+    history_take_info(self->history, message->topic, message->payload, (size_t)message->payloadlen);
+}
+
+/// What the machines retain of themselves at the broker. Without a broker the history says that its end is not checked. An exit code.
+static int read_info(const mqtt_settings_t *settings, const fleet_wanted_t *wanted, history_t *history) {
+    static mqtt_broker_t broker; // A thread of it may wait for the network longer than this function.
+    asking_info_t self = {history, bridge_now_us() + INFO_UP_US};
+    char topic[64];
+    char name[40];
+    const char *const topics[] = {topic, NULL};
+    const mqtt_broker_listener_t listener = {"iwheel-fleet", name,      topics, NULL,    &self,
+                                             info_up,        info_down, sent,   refused, info_came};
+    (void)snprintf(topic, sizeof topic, "iwheel/%s/info", (wanted->span.machine != NULL) ? wanted->span.machine : "+");
+    (void)snprintf(name, sizeof name, "iwheel-fleet-history-%d", (int)getpid());
+    const int code = mqtt_broker_open(&broker, settings, &listener);
+    while (code == 0 && bridge_now_us() < self.until_us) {
+        bool writes = false;
+        mqtt_broker_step(&broker, bridge_now_us());
+        struct pollfd wait = {.fd = mqtt_broker_fd(&broker, &writes), .events = POLLIN};
+        wait.events = (short)(POLLIN | (writes ? POLLOUT : 0));
+        (void)poll(&wait, 1, 50);
+    }
+    (void)mqtt_broker_close(&broker);
+    return code;
+}
+
 int fleet_verb_history(const mqtt_settings_t *settings, const fleet_wanted_t *wanted) {
     static history_t history;
     char host[MQTT_HOST_SIZE];
     char why[STREAM_WHY_SIZE];
-    const int64_t since_us = wanted->span.since_us - AHEAD_US;
+    const int64_t since_us = (wanted->span.machine != NULL) ? 1 : wanted->span.since_us - AHEAD_US;
     const stream_wish_t wish = {.machine = wanted->span.machine, .since_us = (since_us > 0) ? since_us : 1};
     if (!history_open(&history, &wanted->span, stdout)) {
         return complain(EX_OSERR, "no memory");
     }
-    const int code = stream_read(settings, &wish, history_take, &history, host, why);
+    int code = (settings->broker.stream_port != 0U) ? read_info(settings, wanted, &history) : 0;
+    if (code != 0) {
+        history_close(&history);
+        return code;
+    }
+    code = stream_read(settings, &wish, history_take, &history, host, why);
     if (code == 0) {
+        history_end(&history);
         history_sum(&history, host);
     } else {
         (void)complain(code, why);

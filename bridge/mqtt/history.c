@@ -9,7 +9,6 @@
 #include <time.h>
 
 #define MINUTE_US 60000000LL
-#define TIME_SIZE 32U
 
 bool history_open(history_t *self, const history_wish_t *wish, FILE *out) {
     memset(self, 0, sizeof *self);
@@ -26,12 +25,12 @@ void history_close(history_t *self) {
 
 // ---- times --------------------------------------------------------------------------------------------------------
 
-static void write_time(int64_t wall_us, char out[TIME_SIZE]) {
+void history_time(int64_t wall_us, char out[HISTORY_TIME_SIZE]) {
     const time_t seconds = (time_t)(wall_us / 1000000);
     struct tm parts;
-    (void)snprintf(out, TIME_SIZE, "--");
+    (void)snprintf(out, HISTORY_TIME_SIZE, "--");
     if (wall_us > 0 && localtime_r(&seconds, &parts) != NULL) {
-        (void)strftime(out, TIME_SIZE, "%Y-%m-%d %H:%M:%S", &parts);
+        (void)strftime(out, HISTORY_TIME_SIZE, "%Y-%m-%d %H:%M:%S", &parts);
     }
 }
 
@@ -77,7 +76,7 @@ bool history_span(const char *text, int64_t *out_us) {
 
 // ---- doubles and gaps ---------------------------------------------------------------------------------------------
 
-static history_machine_t *machine_of(history_t *self, const char *id) {
+history_machine_t *history_machine(history_t *self, const char *id) {
     for (size_t i = 0; i < self->count; i++) {
         if (strcmp(self->machines[i].id, id) == 0) {
             return &self->machines[i];
@@ -125,6 +124,38 @@ static uint64_t gap(uint64_t before, uint64_t now) {
     return (before > 0U) ? now - from - 1U : 0U;
 }
 
+/// Remembers that the events between these two are missing; the oldest such gap is forgotten for it.
+static void open_gap(history_machine_t *machine, uint64_t before, uint64_t now) {
+    if (gap(before, now) > 0U) {
+        machine->gaps[machine->next_gap] = (history_gap_t){(now > before) ? before + 1U : 1U, now - 1U};
+        machine->next_gap = (machine->next_gap + 1U) % HISTORY_GAPS;
+    }
+}
+
+/// True of an event that was missing until now: one that was set aside, or sent again.
+static bool close_gap(history_machine_t *machine, uint64_t number) {
+    for (size_t i = 0; i < HISTORY_GAPS; i++) {
+        history_gap_t *one = &machine->gaps[i];
+        if (one->first == 0U || number < one->first || number > one->last) {
+            continue;
+        }
+        const history_gap_t whole = *one;
+        *one = (history_gap_t){number + 1U, whole.last}; // Without the number: its upper part, and its lower one.
+        if (one->first > one->last) {
+            *one = (history_gap_t){0};
+        }
+        open_gap(machine, whole.first - 1U, number);
+        return true;
+    }
+    return false;
+}
+
+/// One less of what is still to be reported, or of what was.
+static void take_back(uint64_t *pending, uint64_t *reported) {
+    uint64_t *from = (*pending > 0U) ? pending : reported;
+    *from -= (*from > 0U) ? 1U : 0U;
+}
+
 /// False: it is a double.
 static bool note(history_t *self, history_machine_t *machine, const iwc_message_t *event, bool is_stop) {
     char boot[MQTT_BOOT_SIZE];
@@ -134,23 +165,36 @@ static bool note(history_t *self, history_machine_t *machine, const iwc_message_
     }
     const size_t run = run_of(machine, boot);
     if (number <= machine->runs[run].number) {
-        return false;
+        const bool late = close_gap(machine, number);
+        if (late) {
+            take_back(&machine->missing, &self->missing);
+        }
+        if (late && is_stop) {
+            take_back(&machine->unheard, &self->unheard);
+        }
+        return late;
     }
-    const uint64_t missing = gap(machine->number, number);
+    machine->missing += gap(machine->number, number);
+    open_gap(machine, machine->number, number);
     machine->began = machine->began || (machine->number > 0U && run != machine->run);
     machine->runs[run].number = number;
     machine->run = run;
     machine->number = number;
-    machine->missing += missing;
-    self->missing += missing;
+    machine->event_us = iwc_integer(event, "heard_wall_us").value;
     const iwc_value_t stop = iwc_integer(event, "number");
     if (is_stop && stop.known && stop.value > 0) {
-        const uint64_t unheard = gap((uint64_t)machine->stop, (uint64_t)stop.value);
+        machine->unheard += gap((uint64_t)machine->stop, (uint64_t)stop.value);
         machine->stop = stop.value;
-        machine->unheard += unheard;
-        self->unheard += unheard;
+        machine->stop_wall_us = iwc_integer(event, "wall_us").value;
     }
     return true;
+}
+
+/// What is missing has been reported, or lies before the span.
+static void forget_gap(history_machine_t *machine) {
+    machine->missing = 0;
+    machine->unheard = 0;
+    machine->began = false;
 }
 
 // ---- telling ------------------------------------------------------------------------------------------------------
@@ -185,18 +229,18 @@ static void write_fields(const iwc_message_t *event, const char *name, char *out
     }
 }
 
-static void show_note(const history_t *self, const history_machine_t *machine, uint64_t events, const char *words) {
+void history_note(const history_t *self, const history_machine_t *machine, uint64_t events, const char *words) {
     (void)fprintf(self->out, "%-19s %-12s -- %" PRIu64 " %s\n", "", machine->id, events, words);
 }
 
 static void show(const history_t *self, const history_machine_t *machine, const iwc_message_t *event, const char *name,
                  const int64_t times_us[2]) {
-    char when[TIME_SIZE];
-    char stored[TIME_SIZE];
+    char when[HISTORY_TIME_SIZE];
+    char stored[HISTORY_TIME_SIZE];
     char text[320];
     const int64_t late_us = times_us[1] - times_us[0];
-    write_time(times_us[0], when);
-    write_time(times_us[1], stored);
+    history_time(times_us[0], when);
+    history_time(times_us[1], stored);
     fleet_text(event, "sentence", text, sizeof text);
     if (text[0] == '\0') {
         fleet_text(event, "cause", text, sizeof text);
@@ -209,12 +253,15 @@ static void show(const history_t *self, const history_machine_t *machine, const 
                       machine->runs[machine->run].boot);
     }
     if (machine->missing > 0U) {
-        show_note(self, machine, machine->missing,
-                  "events before this one are not in the stream: dropped from its full spool");
+        char cause[128];
+        char words[192];
+        history_cause(machine, cause, sizeof cause);
+        (void)snprintf(words, sizeof words, "events before this one are not in the stream: %s", cause);
+        history_note(self, machine, machine->missing, words);
     }
     if (machine->unheard > 0U) {
-        show_note(self, machine, machine->unheard,
-                  "stops before this one are not in the stream; what it recorded: iwheel-fleet recordings ID");
+        history_note(self, machine, machine->unheard,
+                     "stops before this one are not in the stream; what it recorded: iwheel-fleet recordings ID");
     }
     (void)fprintf(self->out, "%-19s %-12s %-6s %s%s", when, machine->id, name, text,
                   (iwc_truth(event, "missed").value == 1) ? " (told late: its bridge did not run)" : "");
@@ -238,6 +285,11 @@ static void tell(const history_t *self, const history_machine_t *machine, const 
     iwn_out_int(&json, "missing_before", (int64_t)machine->missing);
     iwn_out_int(&json, "stops_missing_before", (int64_t)machine->unheard);
     iwn_out_bool(&json, "bridge_began_anew", machine->began);
+    if (machine->missing > 0U) {
+        char cause[128];
+        history_cause(machine, cause, sizeof cause);
+        iwn_out_text(&json, "missing_cause", cause);
+    }
     iwn_out_span(&json, iwn_span("message"), (iwn_span_t){event->text, event->length});
     iwn_out_close(&json, '}');
     (void)fwrite(line, 1, iwn_out_finish(&json), self->out);
@@ -246,6 +298,10 @@ static void tell(const history_t *self, const history_machine_t *machine, const 
 static bool is_within(const history_t *self, const int64_t times_us[2]) {
     return (times_us[0] >= self->wish.since_us && times_us[0] < self->wish.until_us) ||
            (times_us[1] >= self->wish.since_us && times_us[1] < self->wish.until_us);
+}
+
+static bool is_before(const history_t *self, const int64_t times_us[2]) {
+    return times_us[0] < self->wish.since_us && times_us[1] < self->wish.since_us;
 }
 
 bool history_take(void *context, const char *topic, const char *payload, size_t length, int64_t stored_us) {
@@ -258,7 +314,7 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
     iwn_text_t words = iwn_text_begin(fault, sizeof fault);
     const bool split = fleet_split(topic, id, &what) && strncmp(what, begin, sizeof begin - 1U) == 0 &&
                        mqtt_settings_is_name(what + sizeof begin - 1U);
-    history_machine_t *machine = split ? machine_of(self, id) : NULL;
+    history_machine_t *machine = split ? history_machine(self, id) : NULL;
     if (machine == NULL || !iwn_json_check(payload, length, &self->work, &root, &words) ||
         iwn_json_kind(root) != IWN_JSON_OBJECT) {
         self->garbled++;
@@ -273,6 +329,9 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
         self->doubled++;
         return true;
     }
+    if (is_before(self, times_us)) {
+        forget_gap(machine);
+    }
     if (!is_within(self, times_us) || !(self->wish.all || is_stop)) {
         return true;
     }
@@ -281,17 +340,17 @@ bool history_take(void *context, const char *topic, const char *payload, size_t 
     } else {
         show(self, machine, &event, name, times_us);
     }
-    machine->missing = 0;
-    machine->unheard = 0;
-    machine->began = false;
+    self->missing += machine->missing;
+    self->unheard += machine->unheard;
+    forget_gap(machine);
     machine->told = true;
     self->told++;
     return ferror(self->out) == 0;
 }
 
 void history_sum(const history_t *self, const char *host) {
-    char since[TIME_SIZE];
-    char until[TIME_SIZE];
+    char since[HISTORY_TIME_SIZE];
+    char until[HISTORY_TIME_SIZE];
     size_t machines = 0;
     for (size_t i = 0; i < self->count; i++) {
         machines += self->machines[i].told ? 1U : 0U;
@@ -299,14 +358,14 @@ void history_sum(const history_t *self, const char *host) {
     if (self->wish.json) {
         (void)fprintf(self->out,
                       "{\"events\":%" PRIu64 ",\"machines\":%zu,\"doubled\":%" PRIu64 ",\"garbled\":%" PRIu64
-                      ",\"missing\":%" PRIu64 ",\"stops_missing\":%" PRIu64 ",\"since_wall_us\":%" PRId64
-                      ",\"until_wall_us\":%" PRId64 "}\n",
+                      ",\"missing\":%" PRIu64 ",\"stops_missing\":%" PRIu64
+                      ",\"end_checked\":%s,\"since_wall_us\":%" PRId64 ",\"until_wall_us\":%" PRId64 "}\n",
                       self->told, machines, self->doubled, self->garbled, self->missing, self->unheard,
-                      self->wish.since_us, self->wish.until_us);
+                      self->has_info ? "true" : "false", self->wish.since_us, self->wish.until_us);
         return;
     }
-    write_time(self->wish.since_us, since);
-    write_time(self->wish.until_us, until);
+    history_time(self->wish.since_us, since);
+    history_time(self->wish.until_us, until);
     (void)fprintf(self->out, "%" PRIu64 " %s%s of %zu machine%s, %s to %s, from the stream at %s", self->told,
                   self->wish.all ? "event" : "stop", (self->told == 1U) ? "" : "s", machines,
                   (machines == 1U) ? "" : "s", since, until, host);
@@ -315,6 +374,13 @@ void history_sum(const history_t *self, const char *host) {
     }
     if (self->garbled > 0U) {
         (void)fprintf(self->out, "; %" PRIu64 " that cannot be read", self->garbled);
+    }
+    if (self->missing + self->unheard > 0U) {
+        (void)fprintf(self->out, "; MISSING: %" PRIu64 " stops, %" PRIu64 " events of any kind", self->unheard,
+                      self->missing);
+    }
+    if (!self->has_info) {
+        (void)fputs("; its end is not checked, because no broker answers: later stops may be missing", self->out);
     }
     (void)fputs("\n", self->out);
 }

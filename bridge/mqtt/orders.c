@@ -2,6 +2,8 @@
 // Commands of the bridge: judged, asked of the gateway, answered.
 #include "bridge.h"
 
+#include "iwheel_northbound/json_out.h"
+
 #include <string.h>
 
 /// Nobody waits longer for an answer.
@@ -14,7 +16,30 @@ typedef struct {
     bool used;
 } waiting_t;
 
-static waiting_t waiting[BRIDGE_ASKED_MAX];
+/// Each kind has places of its own: questions cannot use up those of a stop or of the person who drives.
+typedef enum { QUESTION, LEASE, STOP, KINDS } kind_t;
+#define PLACES 64U
+
+static waiting_t waiting[KINDS][PLACES];
+
+static kind_t kind_of(mqtt_verb_t verb) {
+    if (verb == MQTT_STOP || verb == MQTT_ESTOP) {
+        return STOP;
+    }
+    return (verb == MQTT_ARM || verb == MQTT_DRIVE || verb == MQTT_TWIST) ? LEASE : QUESTION;
+}
+
+/// NULL: all places of its kind are taken.
+static waiting_t *place_for(mqtt_bridge_t *self, const mqtt_order_t *order) {
+    waiting_t *places = waiting[kind_of(order->verb)];
+    for (size_t i = 0; i < PLACES; i++) {
+        if (!places[i].used) {
+            places[i] = (waiting_t){self, *order, true};
+            return &places[i];
+        }
+    }
+    return NULL;
+}
 
 static void answer(mqtt_bridge_t *self, const mqtt_order_t *order, const iwc_message_t *reply) {
     const mqtt_way_t way = {.labels = {.expiry_s = ANSWER_S,
@@ -27,49 +52,139 @@ static void answer(mqtt_bridge_t *self, const mqtt_order_t *order, const iwc_mes
     }
 }
 
-static void refuse(mqtt_bridge_t *self, mqtt_order_t *order, mqtt_verdict_t verdict, const char *why) {
-    self->judge.counts[MQTT_TAKEN]--;
-    self->judge.counts[verdict]++;
-    order->verdict = verdict;
-    (void)snprintf(order->why, sizeof order->why, "%s", why);
-    answer(self, order, NULL);
+/// An answer in the gateway's form.
+static void decline(mqtt_bridge_t *self, const mqtt_order_t *order, const char *error, const char *message) {
+    char text[512];
+    iwn_out_t out;
+    iwn_out_init(&out, text, sizeof text);
+    iwn_out_open(&out, NULL, '{');
+    iwn_out_int(&out, "id", 0);
+    iwn_out_bool(&out, "ok", false);
+    iwn_out_text(&out, "error", error);
+    iwn_out_text(&out, "message", message);
+    iwn_out_close(&out, '}');
+    const size_t length = iwn_out_finish(&out);
+    answer(self, order, &(iwc_message_t){.text = text, .length = (length > 0U) ? length - 1U : 0U});
 }
 
-static void not_delivered(mqtt_bridge_t *self, mqtt_order_t *order) {
-    static const char gone[] = "{\"id\":0,\"ok\":false,\"error\":\"not_delivered\",\"message\":\"NOT DELIVERED: the "
-                               "gateway does not answer; see that it runs: systemctl status iwheel-gateway\"}";
-    const iwc_message_t reply = {.text = gone, .length = sizeof gone - 1U};
-    answer(self, order, &reply);
+static void not_delivered(mqtt_bridge_t *self, const mqtt_order_t *order) {
+    decline(self, order, "not_delivered",
+            "NOT DELIVERED: the gateway does not answer; see that it runs: systemctl status iwheel-gateway");
 }
 
 static void take_answer(void *context, const iwc_message_t *reply) {
     waiting_t *self = context;
     mqtt_bridge_t *bridge = self->bridge;
     self->used = false;
+    if (reply == NULL && self->order.verb == MQTT_ARM && bridge->link.is_here) {
+        decline(bridge, &self->order, "stale_command",
+                "the wheels were stopped meanwhile, or the gateway did not answer; arm again");
+        return;
+    }
     if (reply == NULL) {
         not_delivered(bridge, &self->order);
         return;
     }
     if (self->order.verb == MQTT_ARM && iwc_truth(reply, "ok").value == 1) {
-        memcpy(bridge->driver, self->order.from, sizeof bridge->driver);
+        const char *key = bridge_lease_key(&bridge->lease);
+        (void)snprintf(self->order.key, sizeof self->order.key, "%s", (key != NULL) ? key : "");
         bridge->silent_us = bridge->now_us + MQTT_FIRST_US;
     }
     answer(bridge, &self->order, reply);
 }
 
-static void ask(mqtt_bridge_t *self, mqtt_order_t *order) {
-    for (size_t i = 0; i < BRIDGE_ASKED_MAX; i++) {
-        if (waiting[i].used) {
-            continue;
-        }
-        waiting[i] = (waiting_t){self, *order, true};
-        if (!bridge_link_ask(&self->link, order->request, take_answer, &waiting[i], self->now_us)) {
-            waiting[i].used = false;
-            break;
-        }
+static void ask(mqtt_bridge_t *self, const mqtt_order_t *order) {
+    waiting_t *place = place_for(self, order);
+    if (place == NULL && kind_of(order->verb) != STOP) {
+        decline(self, order, "busy", "too many questions wait for the gateway; ask again later");
         return;
     }
-    not_delivered(self, order);
+    // Without a place a stop gets no answer, and is delivered.
+    if (!bridge_link_ask(&self->link, order->request, (place != NULL) ? take_answer : NULL, place, self->now_us)) {
+        if (place != NULL) {
+            place->used = false;
+        }
+        not_delivered(self, order);
+    }
+}
+
+// ---- the lease ----------------------------------------------------------------------------------------------------
+
+/// The source of a deflected stick, whose next command would move the wheels as soon as they may; NULL: there is none.
+static const char *mover(const mqtt_bridge_t *self, const mqtt_order_t *order) {
+    iwc_message_t state;
+    const char *holder = bridge_lease_name(&self->lease);
+    // While another person drives, the gateway refuses the arm as busy and names that person.
+    const char *except =
+        (order->verb == MQTT_ARM && holder != NULL && strcmp(holder, order->from) != 0) ? holder : NULL;
+    const int64_t lease_ms = mqtt_bridge_state(self, &state) ? iwc_integer(&state, "lease.lease_ms").value : 0;
+    return bridge_movers_who(&self->movers, except, (uint32_t)lease_ms, self->now_us);
+}
+
+static void refuse_mover(mqtt_bridge_t *self, const mqtt_order_t *order, const char *who) {
+    char message[160];
+    (void)snprintf(
+        message, sizeof message,
+        "mqtt %s sends a nonzero command: the wheels would move; let go of the stick, wait half a second and "
+        "send it again",
+        who);
+    decline(self, order, "stale_command", message);
+}
+
+static void arm(mqtt_bridge_t *self, const mqtt_order_t *order) {
+    waiting_t *place = place_for(self, order);
+    const bridge_lease_result_t result =
+        (place == NULL) ? BRIDGE_LEASE_FULL
+                        : bridge_lease_arm(&self->lease, order->from, order->request, take_answer, place, self->now_us);
+    if (result == BRIDGE_LEASE_OK) {
+        return;
+    }
+    if (place != NULL) {
+        place->used = false;
+    }
+    if (result == BRIDGE_LEASE_AWAY) {
+        not_delivered(self, order);
+    } else {
+        decline(self, order, "busy", "another person asks for the lease at this moment; arm again");
+    }
+}
+
+static void drive(mqtt_bridge_t *self, const mqtt_order_t *order) {
+    waiting_t *place = place_for(self, order);
+    const bridge_lease_result_t result = (place == NULL) ? BRIDGE_LEASE_FULL
+                                                         : bridge_lease_drive(&self->lease, order->key, order->request,
+                                                                              take_answer, place, self->now_us);
+    if (result == BRIDGE_LEASE_OK) {
+        self->silent_us = self->now_us + MQTT_SILENT_US;
+        return;
+    }
+    if (place != NULL) {
+        place->used = false;
+    }
+    if (result == BRIDGE_LEASE_WRONG) {
+        decline(self, order, "not_holder",
+                "its key is not that of the lease: it has not armed, was stopped, or another person drives; arm, and "
+                "send the key of the reply");
+    } else {
+        not_delivered(self, order);
+    }
+}
+
+static void carry_out(mqtt_bridge_t *self, const mqtt_order_t *order) {
+    const bool permits = order->verb == MQTT_ARM || order->verb == MQTT_RESET;
+    const char *who = permits ? mover(self, order) : NULL;
+    if (who != NULL) {
+        refuse_mover(self, order, who);
+    } else if (order->verb == MQTT_ARM) {
+        arm(self, order);
+    } else if (order->verb == MQTT_DRIVE || order->verb == MQTT_TWIST) {
+        drive(self, order);
+    } else {
+        if (kind_of(order->verb) == STOP) {
+            bridge_lease_end(&self->lease, self->now_us); // A command of the former holder comes too late.
+        }
+        ask(self, order);
+    }
 }
 
 void mqtt_bridge_command(void *context, const struct mosquitto_message *message, const mqtt_labels_t *labels) {
@@ -81,6 +196,7 @@ void mqtt_bridge_command(void *context, const struct mosquitto_message *message,
     mqtt_topic(self->settings->machine.id, "reply", "", replies);
     const char *verb = mqtt_topic_verb(self->settings->machine.id, message->topic);
     if (verb == NULL) {
+        mqtt_sensors_take(self, message);
         return;
     }
     const mqtt_command_t command = {.verb = verb,
@@ -92,26 +208,19 @@ void mqtt_bridge_command(void *context, const struct mosquitto_message *message,
                                     .correlation_length = labels->correlation_length};
     mqtt_judge(&self->judge, &rules, &command, self->now_us, &order);
     self->info_due = self->info_due || order.verdict != MQTT_TAKEN;
+    if (order.moves) {
+        bridge_movers_note(&self->movers, order.from, self->now_us);
+    }
     if (order.verdict != MQTT_TAKEN || order.verb == MQTT_HELLO) {
         answer(self, &order, NULL);
         return;
     }
-    const bool drives = order.verb == MQTT_DRIVE || order.verb == MQTT_TWIST;
-    if (drives && strcmp(self->driver, order.from) != 0) {
-        refuse(self, &order, MQTT_DENIED, "it has not armed, or was stopped; arm first");
-        return;
-    }
-    if (drives) {
-        self->silent_us = self->now_us + MQTT_SILENT_US;
-    } else if (order.verb == MQTT_STOP || order.verb == MQTT_ESTOP) {
-        self->driver[0] = '\0'; // What still comes of who drove is too late.
-    }
-    ask(self, &order);
+    carry_out(self, &order);
 }
 
 void mqtt_bridge_stop_if_ours(mqtt_bridge_t *self) {
-    if (self->driver[0] != '\0') {
-        self->driver[0] = '\0';
+    if (bridge_lease_key(&self->lease) != NULL) {
+        bridge_lease_end(&self->lease, self->now_us);
         (void)bridge_link_ask(&self->link, "{\"cmd\":\"stop\"}", NULL, NULL, self->now_us);
     }
 }

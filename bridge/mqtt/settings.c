@@ -3,6 +3,7 @@
 
 #include "command.h"
 
+#include <arpa/inet.h>
 #include <ctype.h>
 #include <string.h>
 
@@ -36,8 +37,8 @@ static const settings_key_t keys[] = {
      "many. With one user per machine at the broker it is that user's name.",
      TEXT(machine.id), .wrong = wrong_name},
     {"broker", "host", "",
-     "Name or address of the broker, as its certificate has it; of a cluster several, separated by blanks, tried in "
-     "turn.",
+     "Name or address of the broker, as its certificate has it, or the path of its unix socket; of a cluster several,\n"
+     "separated by blanks, tried in turn.",
      TEXT(broker.host)},
     {"broker", "port", "", "By custom 1883 without TLS, 8883 with it.", NUMBER(broker.port, 1, 65535)},
     {"broker", "protocol", "",
@@ -50,6 +51,10 @@ static const settings_key_t keys[] = {
      NUMBER(broker.stream_port, 0, 65535)},
     {"broker", "keepalive_s", " s", "After 1.5 times this without a sign of life both sides count the other as gone.",
      NUMBER(broker.keepalive_s, 5, 3600)},
+    {"broker", "process_user", "",
+     "User of the broker's process on this machine. Without TLS a broker that is not this user's, root's or this\n"
+     "program's own gets no credentials, and its commands do not drive.",
+     TEXT(broker.process_user)},
     {"broker", "credentials", "",
      "File with one line USER:PASSWORD, which only the bridge's user and root may read; none: without.",
      TEXT(broker.credentials)},
@@ -58,7 +63,7 @@ static const settings_key_t keys[] = {
      TEXT(broker.certificate)},
     {"broker", "key", "", "PEM file of its private key.", TEXT(broker.key)},
     {"broker", "allow_plain", "",
-     "yes: without TLS to another machine. WHOEVER IS BETWEEN READS ALL AND MAY SEND COMMANDS.",
+     "yes: without TLS to another machine. WHOEVER IS BETWEEN READS ALL AND MAY STOP. Not with [drive] enabled.",
      SWITCH(broker.allow_plain)},
     {"state", "every_ms", " ms",
      "How often iwheel/ID/state is sent (about 5 kB each), beside at once when it changes. 100 is for driving.",
@@ -86,6 +91,7 @@ void mqtt_settings_default(mqtt_settings_t *out_settings) {
                    .port = 1883,
                    .protocol = MQTT_PROTOCOL_3,
                    .keepalive_s = 10,
+                   .process_user = "mosquitto",
                    .credentials = "none",
                    .ca = "none",
                    .certificate = "none",
@@ -114,11 +120,24 @@ bool mqtt_settings_host(const mqtt_settings_t *settings, size_t number, char out
     return length > 0U;
 }
 
+bool mqtt_settings_is_local(const char *host) {
+    struct in_addr v4;
+    struct in6_addr v6;
+    return host[0] == '/' || strcmp(host, "localhost") == 0 ||
+           (inet_pton(AF_INET, host, &v4) == 1 && ntohl(v4.s_addr) >> 24U == 127U) ||
+           (inet_pton(AF_INET6, host, &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6));
+}
+
+bool mqtt_settings_guarded(const mqtt_settings_t *settings) {
+    return !mqtt_settings_given(settings->broker.ca) &&
+           (settings->drive.enabled || mqtt_settings_given(settings->broker.credentials));
+}
+
 static bool stays_on_this_machine(const mqtt_settings_t *settings) {
     char host[MQTT_HOST_SIZE];
     bool stays = true;
     for (size_t i = 0; mqtt_settings_host(settings, i, host); i++) {
-        stays = stays && (strncmp(host, "127.", 4) == 0 || strcmp(host, "::1") == 0 || strcmp(host, "localhost") == 0);
+        stays = stays && mqtt_settings_is_local(host);
     }
     return stays;
 }
@@ -139,7 +158,11 @@ static void relate(settings_report_t *report, const void *values, const unsigned
     if (certificate && !tls) {
         settings_complain(report, line_of("broker", "certificate", lines), "certificate needs TLS; give ca, too");
     }
-    if (!tls && !settings->broker.allow_plain && !stays_on_this_machine(settings)) {
+    if (!tls && settings->drive.enabled && !stays_on_this_machine(settings)) {
+        settings_complain(report, line_of("drive", "enabled", lines),
+                          "enabled = yes needs TLS to a broker on another machine; give ca under [broker], or set "
+                          "enabled = no");
+    } else if (!tls && !settings->broker.allow_plain && !stays_on_this_machine(settings)) {
         settings_complain(report, line_of("broker", "host", lines),
                           "host = %s is another machine, and without TLS whoever is between reads all and may send "
                           "commands; give ca, or say allow_plain = yes",

@@ -27,6 +27,7 @@ typedef struct {
         uint8_t protocol;     ///< MQTT_PROTOCOL_3 or MQTT_PROTOCOL_5.
         uint32_t stream_port; ///< Of NATS on the same hosts; 0: none.
         uint32_t keepalive_s;
+        char process_user[33]; ///< Of the broker's process, where it is on this machine and without TLS.
         char credentials[108]; ///< A file; none.
         char ca[108];          ///< none: without TLS.
         char certificate[108];
@@ -57,6 +58,12 @@ extern const settings_form_t mqtt_settings_form;
 
 /// The broker with this number, from 0 on; false: there are no more.
 bool mqtt_settings_host(const mqtt_settings_t *settings, size_t number, char out[MQTT_HOST_SIZE]);
+
+/// True of a host that is this machine by what it is written as: a loopback address, `localhost`, or the path of a unix socket.
+bool mqtt_settings_is_local(const char *host);
+
+/// True if a broker on this machine without TLS must prove whose process it is: it gets a password, or its commands drive.
+bool mqtt_settings_guarded(const mqtt_settings_t *settings);
 
 /// False for a text that says `none`.
 bool mqtt_settings_given(const char *text);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "spool.h"
 
+#include "folder.h"
+#include "settings.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -18,7 +21,9 @@ static const char fresh[] = MQTT_SPOOL_FILE ".new";
 #define HEAD_SIZE 8U
 #define BODY_SIZE 17U
 #define CONFIRMED 'c'
+#define ACCEPTED  'a' ///< As CONFIRMED, of this event alone.
 #define EVENT     'e'
+#define ASIDE     'r' ///< An event that the broker does not accept; read from a file it is an EVENT again.
 #define DONE_SIZE (HEAD_SIZE + BODY_SIZE)
 /// No event has a number above: one more must always be possible.
 #define NUMBER_MAX ((uint64_t)INT64_MAX)
@@ -56,6 +61,10 @@ static uint64_t number_of(const uint8_t *record) {
     return get(record + HEAD_SIZE + 1U, 8);
 }
 
+static bool is_aside(const uint8_t *record) {
+    return record[HEAD_SIZE] == ASIDE;
+}
+
 static uint64_t mark_of(const uint8_t *record) {
     return get(record + HEAD_SIZE + 9U, 8);
 }
@@ -71,15 +80,19 @@ static void seal(const mqtt_spool_t *self, uint8_t *record, uint8_t letter, uint
 
 // ---- in memory ----------------------------------------------------------------------------------------------------
 
-static void forget_oldest(mqtt_spool_t *self) {
-    self->begin += length_of(self->data + self->begin);
+/// Removes the record at this place; those before it, which are set aside, move up.
+static void forget_at(mqtt_spool_t *self, size_t at) {
+    const size_t length = length_of(self->data + at);
     self->waiting--;
+    self->aside -= is_aside(self->data + at) ? 1U : 0U;
+    memmove(self->data + self->begin + length, self->data + self->begin, at - self->begin);
+    self->begin += length;
 }
 
 /// Room for so many bytes behind the newest; at most the whole.
 static uint8_t *make_room(mqtt_spool_t *self, size_t length) {
     while (self->end - self->begin + length > self->size) {
-        forget_oldest(self);
+        forget_at(self, self->begin);
         self->dropped++;
     }
     if (self->end + length > self->size) {
@@ -92,8 +105,30 @@ static uint8_t *make_room(mqtt_spool_t *self, size_t length) {
 
 static void forget_until(mqtt_spool_t *self, uint64_t number) {
     while (self->begin < self->end && number_of(self->data + self->begin) <= number) {
-        forget_oldest(self);
+        forget_at(self, self->begin);
     }
+}
+
+/// Where the event with this number is; `end`: there is none.
+static size_t place_of(const mqtt_spool_t *self, uint64_t number) {
+    size_t at = self->begin;
+    while (at < self->end && number_of(self->data + at) != number) {
+        at += length_of(self->data + at);
+    }
+    return at;
+}
+
+static void forget_one(mqtt_spool_t *self, uint64_t number) {
+    const size_t at = place_of(self, number);
+    if (at < self->end) {
+        forget_at(self, at);
+    }
+}
+
+/// A new letter for a record in memory, with its CRC.
+static void set_letter(uint8_t *record, uint8_t letter) {
+    record[HEAD_SIZE] = letter;
+    put(record + 4, crc32_of(record + HEAD_SIZE, length_of(record) - HEAD_SIZE), 4);
 }
 
 bool mqtt_spool_after(const mqtt_spool_t *self, uint64_t number, mqtt_spool_event_t *out_event) {
@@ -102,8 +137,8 @@ bool mqtt_spool_after(const mqtt_spool_t *self, uint64_t number, mqtt_spool_even
         if (number_of(record) > number) {
             const char *name = (const char *)record + HEAD_SIZE + BODY_SIZE;
             const size_t skip = HEAD_SIZE + BODY_SIZE + strlen(name) + 1U;
-            *out_event =
-                (mqtt_spool_event_t){number_of(record), name, (const char *)record + skip, length_of(record) - skip};
+            *out_event = (mqtt_spool_event_t){number_of(record), name, (const char *)record + skip,
+                                              length_of(record) - skip, is_aside(record)};
             return true;
         }
     }
@@ -137,12 +172,18 @@ static void close_file(mqtt_spool_t *self) {
 
 /// The whole spool into a file of its own, which then takes the old one's place: at any time there is one that is whole.
 static bool write_anew(mqtt_spool_t *self) {
-    uint8_t done[DONE_SIZE];
-    const uint64_t confirmed = self->last - self->waiting;
-    const int file = openat(self->folder, fresh, O_CREAT | O_TRUNC | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0600);
-    seal(self, done, CONFIRMED, confirmed, 0);
-    const bool good = file >= 0 && write_all(file, magic, sizeof magic) && write_all(file, done, sizeof done) &&
-                      write_all(file, self->data + self->begin, self->end - self->begin) && fdatasync(file) == 0 &&
+    uint8_t first[DONE_SIZE];
+    uint8_t last[DONE_SIZE];
+    const bool empty = self->begin == self->end;
+    (void)unlinkat(self->folder, fresh, 0);
+    const int file = openat(self->folder, fresh, O_CREAT | O_EXCL | O_WRONLY | O_NOFOLLOW | O_CLOEXEC, 0600);
+    seal(self, first, CONFIRMED, empty ? self->last : number_of(self->data + self->begin) - 1U, 0);
+    seal(self, last, ACCEPTED, self->last,
+         0); // The newest event is the last record, unless it was confirmed before an older one.
+    const bool gone = empty || place_of(self, self->last) == self->end;
+    const bool good = file >= 0 && write_all(file, magic, sizeof magic) && write_all(file, first, sizeof first) &&
+                      write_all(file, self->data + self->begin, self->end - self->begin) &&
+                      write_all(file, last, gone ? sizeof last : 0U) && fdatasync(file) == 0 &&
                       renameat(self->folder, fresh, self->folder, MQTT_SPOOL_FILE) == 0;
     if (!good) {
         if (file >= 0) {
@@ -155,7 +196,7 @@ static bool write_anew(mqtt_spool_t *self) {
     (void)fsync(self->folder);
     close_file(self);
     self->file = file;
-    self->file_bytes = sizeof magic + sizeof done + self->end - self->begin;
+    self->file_bytes = sizeof magic + sizeof first + self->end - self->begin + (gone ? sizeof last : 0U);
     self->behind = false;
     self->unsynced = false;
     return true;
@@ -181,6 +222,26 @@ static bool append(mqtt_spool_t *self, const uint8_t *record, size_t length) {
 
 // ---- reading it again ---------------------------------------------------------------------------------------------
 
+static size_t read_event(mqtt_spool_t *self, const uint8_t *record, size_t length) {
+    const uint64_t number = number_of(record);
+    if ((record[HEAD_SIZE] != EVENT && !is_aside(record)) || number <= self->last ||
+        memchr(record + HEAD_SIZE + BODY_SIZE, '\0', length - HEAD_SIZE - BODY_SIZE) == NULL) {
+        return 0;
+    }
+    self->last = number;
+    self->mark = mark_of(record);
+    if (!mqtt_settings_is_name((const char *)record + HEAD_SIZE + BODY_SIZE)) { // No broker accepts such a topic.
+        self->dropped++;
+        return length;
+    }
+    uint8_t *copy = make_room(self, length);
+    memcpy(copy, record, length);
+    set_letter(copy, EVENT);
+    self->end += length;
+    self->waiting++;
+    return length;
+}
+
 /// One record of a file; its length, or 0: from here on there is none.
 static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left) {
     if (left < HEAD_SIZE + BODY_SIZE || get(record, 4) < BODY_SIZE || get(record, 4) > MQTT_SPOOL_EVENT_MAX ||
@@ -192,26 +253,20 @@ static size_t read_record(mqtt_spool_t *self, const uint8_t *record, size_t left
     if (number > NUMBER_MAX || get(record + 4, 4) != crc32_of(record + HEAD_SIZE, length - HEAD_SIZE)) {
         return 0;
     }
-    if (record[HEAD_SIZE] == CONFIRMED && length == DONE_SIZE) {
-        forget_until(self, number);
+    if ((record[HEAD_SIZE] == CONFIRMED || record[HEAD_SIZE] == ACCEPTED) && length == DONE_SIZE) {
+        if (record[HEAD_SIZE] == CONFIRMED) {
+            forget_until(self, number);
+        } else {
+            forget_one(self, number);
+        }
         self->last = (number > self->last) ? number : self->last;
         self->mark = mark_of(record);
         return length;
     }
-    if (record[HEAD_SIZE] != EVENT || number != self->last + 1U ||
-        memchr(record + HEAD_SIZE + BODY_SIZE, '\0', length - HEAD_SIZE - BODY_SIZE) == NULL) {
-        return 0;
-    }
-    memcpy(make_room(self, length), record, length);
-    self->end += length;
-    self->waiting++;
-    self->last = number;
-    self->mark = mark_of(record);
-    return length;
+    return read_event(self, record, length);
 }
 
-static void read_file(mqtt_spool_t *self) {
-    const int file = openat(self->folder, MQTT_SPOOL_FILE, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
+static void read_file(mqtt_spool_t *self, int file) {
     const size_t size = 2U * self->size + MQTT_SPOOL_EVENT_MAX + DONE_SIZE;
     uint8_t *bytes = (file >= 0) ? malloc(size) : NULL;
     size_t length = 0;
@@ -233,18 +288,22 @@ static void read_file(mqtt_spool_t *self) {
 // ---- the spool ----------------------------------------------------------------------------------------------------
 
 bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes) {
-    *self = (mqtt_spool_t){.folder = open(directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC), .file = -1};
+    *self = (mqtt_spool_t){.folder = mqtt_folder_open(directory), .file = -1};
     self->size = 2U * (size_t)MQTT_SPOOL_EVENT_MAX;
     self->size = (max_bytes > self->size) ? max_bytes : self->size;
     const bool ours = self->folder >= 0 && flock(self->folder, LOCK_EX | LOCK_NB) == 0;
-    self->data = ours ? malloc(self->size) : NULL;
+    const int file = ours ? mqtt_folder_open_file(self->folder, MQTT_SPOOL_FILE) : -1;
+    self->data = (ours && (file >= 0 || errno == ENOENT)) ? malloc(self->size) : NULL;
     if (self->data == NULL) {
         const int error = errno;
+        if (file >= 0) {
+            (void)close(file);
+        }
         (void)mqtt_spool_close(self);
         errno = error;
         return false;
     }
-    read_file(self);
+    read_file(self, file);
     (void)write_anew(self);
     return true;
 }
@@ -283,11 +342,39 @@ bool mqtt_spool_add(mqtt_spool_t *self, const char *name, const char *payload, s
     return true;
 }
 
-void mqtt_spool_confirm(mqtt_spool_t *self, uint64_t number) {
+static void append_done(mqtt_spool_t *self, uint8_t letter, uint64_t number) {
     uint8_t done[DONE_SIZE];
-    forget_until(self, number);
-    seal(self, done, CONFIRMED, number, 0);
+    seal(self, done, letter, number, 0);
     (void)append(self, done, sizeof done);
+}
+
+void mqtt_spool_confirm(mqtt_spool_t *self, uint64_t number) {
+    if (self->aside == 0U) {
+        forget_until(self, number);
+        append_done(self, CONFIRMED, number);
+        return;
+    }
+    for (size_t at = self->begin, next; at < self->end && number_of(self->data + at) <= number; at = next) {
+        const uint64_t one = number_of(self->data + at);
+        next = at + length_of(self->data + at);
+        if (!is_aside(self->data + at)) {
+            forget_at(self, at);
+            append_done(self, ACCEPTED, one);
+        }
+    }
+}
+
+void mqtt_spool_set_aside(mqtt_spool_t *self, uint64_t number) {
+    const size_t at = place_of(self, number);
+    if (at < self->end && !is_aside(self->data + at)) {
+        set_letter(self->data + at, ASIDE);
+        self->aside++;
+    }
+}
+
+void mqtt_spool_confirm_aside(mqtt_spool_t *self, uint64_t number) {
+    forget_one(self, number);
+    append_done(self, ACCEPTED, number);
 }
 
 void mqtt_spool_tend(mqtt_spool_t *self) {

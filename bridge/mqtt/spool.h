@@ -6,6 +6,8 @@
 /// cut; at the start, and when it has grown, it is written anew beside the old one and put in its place. If the disk takes nothing, the events
 /// stay in memory, in order, and the file is written again as soon as that works; `behind` says so meanwhile.
 ///
+/// An event that the broker does not accept is set aside: it stays, is marked, and what is confirmed behind it does not remove it.
+///
 /// Bounded: beyond `max_bytes` the oldest is dropped and counted. For one thread; a second one of its own waits for the disk, so that a slow
 /// one holds up nobody.
 #ifndef IW_MQTT_SPOOL_H
@@ -41,7 +43,8 @@ typedef struct {
     size_t end;     ///< Behind the newest.
     uint64_t last;  ///< Number of the newest event ever added.
     uint64_t mark;  ///< What the owner wants to know after a restart.
-    size_t waiting; ///< Events.
+    size_t waiting; ///< Events, those that are set aside among them.
+    size_t aside;   ///< Events that are set aside.
     uint64_t dropped;
 } mqtt_spool_t;
 
@@ -51,10 +54,12 @@ typedef struct {
     const char *name;
     const char *payload;
     size_t length; ///< Of `payload`.
+    bool aside;
 } mqtt_spool_event_t;
 
-/// Reads what is there, and keeps others out. False, with errno: no memory, no such directory, or EWOULDBLOCK: another process has it;
-/// then nothing is open. What cannot be read any more is left out.
+/// Reads what is there, and keeps others out. False, with errno: no memory, no such directory, EPERM as in folder.h, for the directory or the file in
+/// it, or EWOULDBLOCK: another process has it; then nothing is open. A record that is
+/// damaged ends the reading.
 bool mqtt_spool_open(mqtt_spool_t *self, const char *directory, size_t max_bytes);
 
 /// Waits for the disk, a second at most; False: it is not done, so the process ends by _exit().
@@ -66,8 +71,13 @@ bool mqtt_spool_add(mqtt_spool_t *self, const char *name, const char *payload, s
 /// The oldest one that is not confirmed with a number above `number`; false: there is none.
 bool mqtt_spool_after(const mqtt_spool_t *self, uint64_t number, mqtt_spool_event_t *out_event);
 
-/// All up to `number` are confirmed. Losing this with the power only sends them again.
+/// All up to `number` are confirmed, except those that are set aside. Losing this with the power only sends them again.
 void mqtt_spool_confirm(mqtt_spool_t *self, uint64_t number);
+
+/// Sets the event with this number aside, or confirms one that was. Without such an event nothing changes. After a restart of the process
+/// it is an event like the others.
+void mqtt_spool_set_aside(mqtt_spool_t *self, uint64_t number);
+void mqtt_spool_confirm_aside(mqtt_spool_t *self, uint64_t number);
 
 /// Begins to bring to the disk what was added, unless that is going on; call it in every round. Waits for nothing.
 void mqtt_spool_sync(mqtt_spool_t *self);

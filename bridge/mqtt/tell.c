@@ -114,6 +114,9 @@ size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *o
     iwn_out_int(&out, "t_us", (int64_t)now_us);
     iwn_out_text(&out, "cmd", mqtt_verb_word(order->verb));
     iwn_out_known(&out, "seq", order->seq > 0, order->seq);
+    if (order->verb == MQTT_ARM && order->key[0] != '\0' && iwc_json(reply, "key", &(size_t){0}) == NULL) {
+        iwn_out_text(&out, "key", order->key);
+    }
     const char *comma = (reply != NULL) ? memchr(reply->text, ',', reply->length) : NULL;
     if (comma != NULL) { // Behind the id, which is of no use to others.
         return join(&out, buffer, reply->text, reply->length, (size_t)(comma - reply->text) + 1U);
@@ -135,9 +138,20 @@ static void tell_counts(const mqtt_info_t *info, iwn_out_t *out) {
     iwn_out_open(out, "events", '{');
     iwn_out_int(out, "waiting", (int64_t)info->spooled);
     iwn_out_int(out, "dropped", (int64_t)info->dropped);
+    iwn_out_int(out, "last", (int64_t)info->last);
+    iwn_out_int(out, "aside", (int64_t)info->aside);
     iwn_out_bool(out, "on_disk", info->on_disk);
     iwn_out_int(out, "unsent", (int64_t)info->unsent);
+    iwn_out_int(out, "refused", (int64_t)info->refused);
+    iwn_out_text(out, "refusal", (info->refusal != NULL && info->refusal[0] != '\0') ? info->refusal : NULL);
     iwn_out_close(out, '}');
+    iwn_out_int(out, "name_taken", (int64_t)info->name_taken);
+    if (info->sensors > 0U) {
+        iwn_out_open(out, "home_assistant", '{');
+        iwn_out_int(out, "sensors", (int64_t)info->sensors);
+        iwn_out_int(out, "passed_on", (int64_t)info->sensors_seen);
+        iwn_out_close(out, '}');
+    }
 }
 
 static void tell_stop(const mqtt_stop_t *stop, iwn_out_t *out) {
@@ -210,6 +224,11 @@ static const sensor_t sensors[] = {
     {"sensor", "distance_right", "Distance right",
      "value_json.right.distance_mm / 1000 if value_json.right.distance_mm is number else None", "m", "distance"},
 };
+
+void mqtt_sensor_topics(const mqtt_settings_t *settings, char out[MQTT_TOPIC_SIZE]) {
+    (void)snprintf(out, MQTT_TOPIC_SIZE, "%s/+/iwheel_%s/+/config", settings->home_assistant.prefix,
+                   settings->machine.id);
+}
 
 static void tell_device(const mqtt_settings_t *settings, iwn_out_t *out) {
     char text[64];

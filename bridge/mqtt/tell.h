@@ -37,6 +37,7 @@ size_t mqtt_tell_missed_stop(const char *boot, uint64_t number, int64_t wall_us,
                              mqtt_buffer_t out);
 
 /// The answer to a command: to which, `boot`, `t_us` now, and the gateway's reply; without one (NULL) whether it was taken, and why not.
+/// `order->key` of an `arm`, unless it is empty, is added to a reply that has none.
 size_t mqtt_tell_answer(const char *boot, uint64_t now_us, const mqtt_order_t *order, const iwc_message_t *reply,
                         mqtt_buffer_t out);
 
@@ -56,12 +57,22 @@ typedef struct {
     const uint64_t *counts; ///< Of commands, by mqtt_verdict_t.
     uint64_t spooled;       ///< Events that wait,
     uint64_t dropped;       ///< that were dropped since the start,
+    uint64_t last;          ///< number of the newest,
+    uint64_t aside;         ///< of those that wait, set aside because the broker does not accept them,
     bool on_disk;           ///< and whether those that wait are on the disk.
     uint64_t unsent;        ///< Messages left out because the broker did not read.
+    size_t sensors;         ///< Of Home Assistant, that were sent; 0: it is switched off,
+    size_t sensors_seen;    ///< and that the broker passed on.
+    uint64_t name_taken;    ///< Connections that another client with the same name at the broker has ended.
+    uint64_t refused;       ///< Messages that the broker did not accept,
+    const char *refusal;    ///< and topic and reason of the last; NULL or empty: none.
     const mqtt_stop_t *stop;
 } mqtt_info_t;
 
 size_t mqtt_tell_info(const mqtt_info_t *info, mqtt_buffer_t out);
+
+/// Where all sensors of this machine are, as a subscription.
+void mqtt_sensor_topics(const mqtt_settings_t *settings, char out[MQTT_TOPIC_SIZE]);
 
 /// One sensor for Home Assistant. False: there is no such number. An unknown value stays unknown there.
 bool mqtt_tell_sensor(const mqtt_settings_t *settings, size_t number, char out_topic[MQTT_TOPIC_SIZE],

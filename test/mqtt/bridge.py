@@ -54,8 +54,9 @@ def make_stops(rig, count):
 
 
 def arm(far):
-    """Allowed is what is answered so; a busy machine may want a second try."""
-    return until(lambda: far.ask("arm")["ok"], what="armed")
+    """The key that drives; a busy machine may want a second try."""
+    far.key = until(lambda: (told := far.ask("arm"))["ok"] and told, what="armed")["key"]
+    return far.key
 
 
 def steer(far, seconds, speed=200, until_time=None):
@@ -63,7 +64,7 @@ def steer(far, seconds, speed=200, until_time=None):
     end, sent = until_time or time.monotonic() + seconds, 0
     while time.monotonic() < end:
         state = far.messages("state")[-1]
-        far.ask("drive", quote={"boot": state["boot"], "t_us": state["t_us"]}, wait=False, left_mm_s=speed, right_mm_s=speed)
+        far.ask("drive", quote={"boot": state["boot"], "t_us": state["t_us"]}, wait=False, key=far.key, left_mm_s=speed, right_mm_s=speed)
         sent += 1
         time.sleep(0.05)
     return sent
@@ -237,7 +238,7 @@ def test_garbage_is_dropped_counted_and_changes_nothing(rig):
 def test_bridge_that_watches_neither_arms_drives_nor_resets(rig):
     rig.start()
     far = rig.online()
-    for verb, fields in (("arm", {}), ("drive", {"left_mm_s": 1, "right_mm_s": 1}), ("twist", {"v_mm_s": 1, "yaw_mrad_s": 0}), ("reset", {})):
+    for verb, fields in (("arm", {}), ("drive", {"left_mm_s": 1, "right_mm_s": 1}), ("twist", {"v_mm_s": 1, "yaw_mrad_s": 0}), ("reset", {"stop": 0})):
         answer = far.ask(verb, **fields)
         assert answer["error"] == "denied" and "[drive]" in answer["message"], answer
     assert far.ask("stop")["ok"] and rig.gateway_state()["state"] == "listening"
@@ -305,7 +306,7 @@ def test_sender_drives_while_it_sends_and_no_longer(rig):
     assert braking_ms(rig, silent_us) < 700
     other = rig.far("other")
     arm(far)
-    assert other.ask("drive", left_mm_s=100, right_mm_s=100)["error"] == "denied", "another one drives"
+    assert other.ask("drive", left_mm_s=100, right_mm_s=100)["error"] == "not_holder", "another one drives"
 
 
 @needs(**DRIVING)

@@ -74,10 +74,10 @@ class Cluster:
         return next(host for host in HOSTS if host[-1] == name[-1])
 
 
-def collector(rig, cluster, host):
+def collector(rig, cluster, host, topics=("iwheel/+/event/+", "iwheel/+/availability")):
     """Who keeps events: a session that outlasts its connection, so that the cluster keeps for it what it has confirmed to a machine."""
     until(lambda: socket.socket().connect_ex((host, cluster.mqtt)) == 0, 10, "the server listens")
-    far = Far(cluster.mqtt, "console", topics=("iwheel/+/event/+", "iwheel/+/availability"), setup=with_certificate(rig, "console"), host=host, clean=False)
+    far = Far(cluster.mqtt, "console", topics=topics, setup=with_certificate(rig, "console"), host=host, clean=False)
     rig.fars.append(far)
     return far
 

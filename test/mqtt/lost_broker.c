@@ -18,6 +18,7 @@ static mqtt_bridge_t bridge;
 static mqtt_settings_t settings;
 static char folder[64];
 static unsigned sequence;
+static char key[MQTT_KEY_SIZE]; ///< Of the lease.
 
 static void pass(unsigned for_ms) {
     for (unsigned ms = 0; ms < for_ms; ms += PASS_MS) {
@@ -43,8 +44,10 @@ static void command(const char *verb, const char *fields) {
 }
 
 static void drive(unsigned for_ms) {
+    char fields[128];
+    (void)snprintf(fields, sizeof fields, ",\"left_mm_s\":100,\"right_mm_s\":100,\"key\":\"%s\"", key);
     for (unsigned ms = 0; ms < for_ms; ms += 50U) {
-        command("drive", ",\"left_mm_s\":100,\"right_mm_s\":100");
+        command("drive", fields);
         pass(50);
     }
 }
@@ -72,6 +75,8 @@ void setUp(void) {
     command("arm", "");
     pass(200);
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    TEST_ASSERT_NOT_NULL(bridge_lease_key(&bridge.lease));
+    (void)snprintf(key, sizeof key, "%s", bridge_lease_key(&bridge.lease));
     drive(500);
     TEST_ASSERT_EQUAL_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
 }

@@ -49,7 +49,7 @@ static void test_command_fresh_is_taken_as_the_gateways_request(void) {
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("drive", NOW_US, 3, ",\"left_mm_s\":-5,\"right_mm_s\":7", NOW_US));
     TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"drive\",\"left_mm_s\":-5,\"right_mm_s\":7}", order.request);
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("arm", NOW_US, 4, "", NOW_US));
-    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"arm\",\"name\":\"mqtt far\"}", order.request);
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"arm\",\"name\":\"mqtt far\",\"t_us\":50000000}", order.request);
 }
 
 static void test_command_age_is_judged_to_the_microsecond(void) {
@@ -112,30 +112,67 @@ static void test_command_of_another_boot_is_dropped_before_its_age(void) {
 }
 
 static void test_command_seq_must_rise(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 5, "", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("why", NOW_US, 5, "", NOW_US + 1U));
+    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("why", NOW_US, 4, "", NOW_US + 1000000U));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 6, "", NOW_US + 1000000U));
+}
+
+/// Whoever writes another's name uses up its numbers, or all places: neither refuses a stop.
+static void test_stop_never_needs_a_seq_that_rises_or_a_place(void) {
+    char text[256];
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 1000, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 5, "", NOW_US));
-    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("stop", NOW_US, 5, "", NOW_US + 1U));
-    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_it("stop", NOW_US, 4, "", NOW_US + 1000000U));
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 6, "", NOW_US + 1000000U));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 5, "", NOW_US));
+    for (unsigned i = 0; i <= MQTT_SENDERS; i++) {
+        (void)snprintf(text, sizeof text, "{\"from\":\"s%u\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":9}", i);
+        (void)judge_text("why", text, NOW_US);
+    }
+    TEST_ASSERT_EQUAL(MQTT_CROWDED, order.verdict);
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("estop", text, NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_text("stop", text, NOW_US + 1000001U));
+}
+
+static void test_command_reset_names_its_stop_and_is_as_young_as_a_drive(void) {
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, "", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("reset", NOW_US, 1, ",\"stop\":\"4\"", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("reset", NOW_US, 2, ",\"stop\":4", NOW_US + 300000U));
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"reset\",\"stop\":4,\"t_us\":50000000}", order.request);
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("reset", NOW_US, 3, ",\"stop\":4", NOW_US + 300001U));
+}
+
+static void test_command_key_is_kept_apart_and_a_deflected_stick_is_seen(void) {
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":0,\"key\":\"abc\"", NOW_US));
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"drive\",\"left_mm_s\":0}", order.request);
+    TEST_ASSERT_EQUAL_STRING("abc", order.key);
+    TEST_ASSERT_FALSE(order.moves);
+    TEST_ASSERT_EQUAL(MQTT_LATE, judge_it("drive", NOW_US, 2, ",\"left_mm_s\":-1", NOW_US + 900000U));
+    TEST_ASSERT_TRUE_MESSAGE(order.moves, "dropped, and yet a stick that is held");
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("twist", NOW_US, 3, ",\"v_mm_s\":0,\"key\":7", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("arm", NOW_US, 4, ",\"key\":\"abc\"", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("arm", NOW_US, 5, ",\"takeover\":true", NOW_US));
+    TEST_ASSERT_EQUAL_STRING("{\"cmd\":\"arm\",\"takeover\":true,\"name\":\"mqtt far\",\"t_us\":50000000}",
+                             order.request);
 }
 
 static void test_command_seq_may_begin_anew_only_when_all_before_is_late(void) {
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 500, "", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 500, "", NOW_US));
     for (uint64_t later_us = 0; later_us <= 3000000U; later_us += 1000U) {
-        TEST_ASSERT_NOT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 500, "", NOW_US + later_us));
+        TEST_ASSERT_NOT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US, 500, "", NOW_US + later_us));
     }
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US + 1000001U, 1, "", NOW_US + 1000001U));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("why", NOW_US + 1000001U, 1, "", NOW_US + 1000001U));
 }
 
 static void test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count(void) {
     char text[256];
     for (unsigned i = 0; i <= MQTT_SENDERS; i++) {
         (void)snprintf(text, sizeof text, "{\"from\":\"s%u\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":9}", i);
-        TEST_ASSERT_EQUAL((i < MQTT_SENDERS) ? MQTT_TAKEN : MQTT_CROWDED, judge_text("stop", text, NOW_US));
+        TEST_ASSERT_EQUAL((i < MQTT_SENDERS) ? MQTT_TAKEN : MQTT_CROWDED, judge_text("why", text, NOW_US));
     }
     (void)snprintf(text, sizeof text, "{\"from\":\"s0\",\"boot\":\"" BOOT "\",\"t_us\":50000000,\"seq\":9}");
-    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_text("stop", text, NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_DOUBLED, judge_text("why", text, NOW_US));
     (void)snprintf(text, sizeof text, "{\"from\":\"new\",\"boot\":\"" BOOT "\",\"t_us\":51000001,\"seq\":1}");
-    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("stop", text, NOW_US + 1000001U));
+    TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_text("why", text, NOW_US + 1000001U));
 }
 
 static void test_command_retained_is_dropped_hello_too(void) {
@@ -159,7 +196,8 @@ static void test_command_that_drives_needs_the_right_stop_never(void) {
     rules.may_drive = false;
     rules.may_reset = false;
     for (int i = 0; i < 4; i++) {
-        TEST_ASSERT_EQUAL(MQTT_DENIED, judge_it(verbs[i], NOW_US, i + 1, "", NOW_US));
+        const char *more = (i == 3) ? ",\"stop\":1" : "";
+        TEST_ASSERT_EQUAL(MQTT_DENIED, judge_it(verbs[i], NOW_US, i + 1, more, NOW_US));
     }
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("stop", NOW_US, 10, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_TAKEN, judge_it("estop", NOW_US, 11, "", NOW_US));
@@ -190,7 +228,7 @@ static void test_command_garbled_is_dropped(void) {
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("takeover", NOW_US, 1, "", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":{\"cmd\":\"arm\"}", NOW_US));
     TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"left_mm_s\":true", NOW_US));
-    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("arm", NOW_US, 1, ",\"takeover\":true", NOW_US));
+    TEST_ASSERT_EQUAL(MQTT_GARBLED, judge_it("drive", NOW_US, 1, ",\"takeover\":true", NOW_US));
 }
 
 static void test_command_too_long_is_not_looked_at(void) {
@@ -237,15 +275,15 @@ static void test_answer_quotes_time_and_seq_and_the_gateways_reply(void) {
     const mqtt_buffer_t buffer = {text, sizeof text};
     const char *line = "{\"id\":12,\"ok\":true,\"state\":\"stopping\"}";
     const iwc_message_t reply = {.text = line, .length = strlen(line)};
-    (void)judge_it("stop", NOW_US, 3, "", NOW_US);
+    (void)judge_it("why", NOW_US, 3, "", NOW_US);
     size_t length = mqtt_tell_answer(BOOT, NOW_US, &order, &reply, buffer);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT
-                                 "\",\"t_us\":50000000,\"cmd\":\"stop\",\"seq\":3,\"ok\":true,\"state\":\"stopping\"}",
+                                 "\",\"t_us\":50000000,\"cmd\":\"why\",\"seq\":3,\"ok\":true,\"state\":\"stopping\"}",
                                  text, length);
-    (void)judge_it("stop", NOW_US, 3, "", NOW_US);
+    (void)judge_it("why", NOW_US, 3, "", NOW_US);
     length = mqtt_tell_answer(BOOT, NOW_US, &order, NULL, buffer);
     TEST_ASSERT_EQUAL_STRING_LEN("{\"boot\":\"" BOOT
-                                 "\",\"t_us\":50000000,\"cmd\":\"stop\",\"seq\":3,\"ok\":false,\"error\":\"doubled\","
+                                 "\",\"t_us\":50000000,\"cmd\":\"why\",\"seq\":3,\"ok\":false,\"error\":\"doubled\","
                                  "\"message\":\"seq must rise with each command of a sender\"}",
                                  text, length);
 }
@@ -287,7 +325,7 @@ static void test_info_without_a_gateway_invents_nothing(void) {
     TEST_ASSERT_NOT_NULL(strstr(text, "\"gateway\":\"away\",\"version\":null,"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"budget\":null"));
     TEST_ASSERT_NOT_NULL(strstr(text, "\"taken\":1,\"retained\":2,"));
-    TEST_ASSERT_NOT_NULL(strstr(text, "\"dropped\":3,\"on_disk\":false"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\"dropped\":3,\"last\":0,\"aside\":0,\"on_disk\":false"));
     stop = (mqtt_stop_t){.number = 4, .cause = "wheel_lost", .sentence = "gone"};
     length = mqtt_tell_info(&info, (mqtt_buffer_t){text, sizeof text});
     text[length] = '\0';
@@ -348,6 +386,9 @@ int main(void) {
     RUN_TEST(test_command_cannot_make_its_own_life_longer);
     RUN_TEST(test_command_of_another_boot_is_dropped_before_its_age);
     RUN_TEST(test_command_seq_must_rise);
+    RUN_TEST(test_stop_never_needs_a_seq_that_rises_or_a_place);
+    RUN_TEST(test_command_reset_names_its_stop_and_is_as_young_as_a_drive);
+    RUN_TEST(test_command_key_is_kept_apart_and_a_deflected_stick_is_seen);
     RUN_TEST(test_command_seq_may_begin_anew_only_when_all_before_is_late);
     RUN_TEST(test_command_of_too_many_senders_is_dropped_never_one_of_those_that_count);
     RUN_TEST(test_command_retained_is_dropped_hello_too);

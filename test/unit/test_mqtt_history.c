@@ -22,6 +22,7 @@ static void begin(history_wish_t wish) {
     wish.since_us = (wish.since_us > 0) ? wish.since_us : EVENING_US;
     wish.until_us = (wish.until_us > 0) ? wish.until_us : EVENING_US + 3600 * SECOND_US;
     TEST_ASSERT_TRUE(history_open(&history, &wish, out));
+    history.has_info = true;
 }
 
 void setUp(void) {
@@ -110,6 +111,91 @@ static void test_history_gap_that_lies_among_events_not_shown_is_told_with_the_n
     TEST_ASSERT_NULL(strstr(text(), "fault"));
     stop("a", 5, 2, 2, 2);
     TEST_ASSERT_NOT_NULL(strstr(text(), "-- 2 events before this one are not in the stream"));
+}
+
+static void test_history_event_that_comes_late_is_no_double_and_no_gap(void) {
+    begin((history_wish_t){0});
+    stop("a", 1, 1, 1, 1);
+    stop("a", 5, 5, 2, 2);
+    TEST_ASSERT_EQUAL_UINT64(3, history.missing);
+    TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
+    stop("a", 3, 3, 1, 3);
+    TEST_ASSERT_NOT_NULL(strstr(text(), "stop number 3"));
+    stop("a", 3, 3, 1, 3);
+    TEST_ASSERT_EQUAL_UINT64(1, history.doubled);
+    TEST_ASSERT_EQUAL_UINT64(2, history.missing);
+    TEST_ASSERT_EQUAL_UINT64(2, history.unheard);
+    stop("a", 2, 2, 1, 4);
+    stop("a", 4, 4, 1, 4);
+    stop("a", 6, 6, 5, 5);
+    TEST_ASSERT_EQUAL_UINT64(0, history.missing + history.unheard);
+    TEST_ASSERT_EQUAL_UINT64(6, history.told);
+}
+
+/// `last_stop`, when it was in s after EVENING_US, and the counts of events.
+static void info(const char *boot, int stop_number, int when_s, int last, int waiting, int dropped) {
+    char payload[256];
+    (void)snprintf(
+        payload, sizeof payload,
+        "{\"boot\":\"%s\",\"events\":{\"waiting\":%d,\"dropped\":%d,\"last\":%d},\"last_stop\":{\"number\":%d,"
+        "\"wall_us\":%lld}}",
+        boot, waiting, dropped, last, stop_number, (long long)(EVENING_US + when_s * SECOND_US));
+    history_take_info(&history, "iwheel/w1/info", payload, strlen(payload));
+}
+
+static void test_history_gap_at_the_end_shows_by_info(void) {
+    begin((history_wish_t){0});
+    info("a", 7, 30, 12, 0, 0);
+    stop("a", 4, 4, 1, 1);
+    history_end(&history);
+    TEST_ASSERT_NOT_NULL(strstr(text(),
+                                "-- 3 stops after its last one here are not in the stream; its info names stop 7 "
+                                "of 2026-11-21 22:00:30"));
+    TEST_ASSERT_NOT_NULL(strstr(told, "-- 8 events after its last one here are not in the stream: the broker confirmed "
+                                      "them and did not store them; its spool dropped none"));
+    TEST_ASSERT_EQUAL_UINT64(3, history.unheard);
+}
+
+static void test_history_gap_of_a_machine_without_any_event_shows_by_info(void) {
+    begin((history_wish_t){0});
+    info("a", 7, 30, 12, 0, 0);
+    history_end(&history);
+    TEST_ASSERT_EQUAL_UINT64(1, history.unheard);
+    tearDown();
+    begin((history_wish_t){0});
+    info("a", 7, -30, 12, 0, 0);
+    history_end(&history);
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, history.unheard, "its last stop was before the span");
+}
+
+static void test_history_end_without_a_gap_says_nothing(void) {
+    begin((history_wish_t){0});
+    info("a", 4, 1, 6, 2, 0);
+    stop("a", 4, 4, 1, 1);
+    const size_t before = strlen(text());
+    history_end(&history);
+    TEST_ASSERT_EQUAL_size_t_MESSAGE(before, strlen(text()), "two events wait at the machine");
+}
+
+static void test_history_whose_end_is_not_checked_says_so(void) {
+    begin((history_wish_t){0});
+    history.has_info = false;
+    history_end(&history);
+    history_sum(&history, "n1");
+    TEST_ASSERT_NOT_NULL(strstr(text(), "; its end is not checked"));
+}
+
+static void test_history_gap_has_its_cause(void) {
+    begin((history_wish_t){0});
+    info("a", 4, 1, 9, 0, 5);
+    stop("a", 1, 1, 1, 1);
+    stop("a", 9, 2, 2, 2);
+    TEST_ASSERT_NOT_NULL(strstr(text(), "its full spool dropped 5 events"));
+    tearDown();
+    begin((history_wish_t){0});
+    stop("a", 1, 1, 1, 1);
+    stop("a", 9, 2, 2, 2);
+    TEST_ASSERT_NOT_NULL(strstr(text(), "dropped from its full spool, or confirmed by the broker and not stored"));
 }
 
 static void test_history_all_tells_other_events_and_where_the_bridge_began_anew(void) {
@@ -220,6 +306,12 @@ int main(void) {
     RUN_TEST(test_history_gap_in_numbers_is_told_before_the_event_behind_it);
     RUN_TEST(test_history_gap_in_stops_is_told_and_a_gateway_that_began_anew_counts_from_one);
     RUN_TEST(test_history_gap_that_lies_among_events_not_shown_is_told_with_the_next_stop);
+    RUN_TEST(test_history_event_that_comes_late_is_no_double_and_no_gap);
+    RUN_TEST(test_history_gap_at_the_end_shows_by_info);
+    RUN_TEST(test_history_gap_of_a_machine_without_any_event_shows_by_info);
+    RUN_TEST(test_history_end_without_a_gap_says_nothing);
+    RUN_TEST(test_history_gap_has_its_cause);
+    RUN_TEST(test_history_whose_end_is_not_checked_says_so);
     RUN_TEST(test_history_all_tells_other_events_and_where_the_bridge_began_anew);
     RUN_TEST(test_history_span_takes_either_clock_so_a_wrong_one_hides_nothing);
     RUN_TEST(test_history_missed_stop_is_told_at_its_own_time_and_as_told_late);

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define SMALL (2U * MQTT_SPOOL_EVENT_MAX)
@@ -109,6 +110,67 @@ static void test_spool_confirmed_events_do_not_come_back(void) {
     expect(1, 0);
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(5, spool.last, "numbers go on");
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(5, spool.mark, "the mark stays");
+}
+
+static void test_spool_event_set_aside_stays_while_others_go(void) {
+    mqtt_spool_event_t event;
+    for (unsigned i = 1; i <= 5; i++) {
+        add(i);
+    }
+    mqtt_spool_set_aside(&spool, 2);
+    mqtt_spool_set_aside(&spool, 9); // There is none.
+    mqtt_spool_confirm(&spool, 4);
+    TEST_ASSERT_EQUAL_size_t(1, spool.aside);
+    TEST_ASSERT_EQUAL_size_t(2, spool.waiting);
+    TEST_ASSERT_TRUE(mqtt_spool_after(&spool, 0, &event));
+    TEST_ASSERT_EQUAL_UINT64(2, event.number);
+    TEST_ASSERT_TRUE(event.aside);
+    mqtt_spool_confirm(&spool, 5);
+    for (unsigned i = 0; i < 2U; i++) { // The second time from a file that was written anew.
+        reopen();
+        TEST_ASSERT_EQUAL_UINT64_MESSAGE(5, spool.last, "numbers go on");
+        TEST_ASSERT_EQUAL_size_t(1, spool.waiting);
+        TEST_ASSERT_TRUE(mqtt_spool_after(&spool, 0, &event));
+        TEST_ASSERT_EQUAL_UINT64(2, event.number);
+        TEST_ASSERT_FALSE_MESSAGE(event.aside, "after a restart it is tried like the others");
+    }
+    mqtt_spool_set_aside(&spool, 2);
+    mqtt_spool_confirm_aside(&spool, 2);
+    reopen();
+    expect(1, 0);
+    add(6);
+    expect(6, 6);
+}
+
+static void test_spool_full_drops_what_is_set_aside_first(void) {
+    mqtt_spool_event_t event;
+    unsigned last = 1;
+    add(last);
+    mqtt_spool_set_aside(&spool, 1);
+    while (spool.dropped < 1U) {
+        last++;
+        add(last);
+    }
+    TEST_ASSERT_EQUAL_size_t(0, spool.aside);
+    TEST_ASSERT_TRUE(mqtt_spool_after(&spool, 0, &event));
+    TEST_ASSERT_EQUAL_UINT64(2, event.number);
+}
+
+static void test_spool_of_others_is_refused(void) {
+    char second[96];
+    TEST_ASSERT_TRUE(mqtt_spool_close(&spool));
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0777));
+    TEST_ASSERT_FALSE(mqtt_spool_open(&spool, folder, SMALL));
+    TEST_ASSERT_EQUAL_INT(EPERM, errno);
+    TEST_ASSERT_EQUAL_INT(0, chmod(folder, 0700));
+    (void)snprintf(second, sizeof second, "%s/second", folder);
+    char file[96];
+    (void)snprintf(file, sizeof file, "%s/" MQTT_SPOOL_FILE, folder);
+    TEST_ASSERT_EQUAL_INT(0, link(file, second));
+    TEST_ASSERT_FALSE(mqtt_spool_open(&spool, folder, SMALL));
+    TEST_ASSERT_EQUAL_INT(EPERM, errno);
+    TEST_ASSERT_EQUAL_INT(0, unlink(second));
+    TEST_ASSERT_TRUE(mqtt_spool_open(&spool, folder, SMALL));
 }
 
 static void test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut(void) {
@@ -279,6 +341,9 @@ int main(void) {
     RUN_TEST(test_spool_new_is_empty);
     RUN_TEST(test_spool_events_outlive_the_process_in_order);
     RUN_TEST(test_spool_confirmed_events_do_not_come_back);
+    RUN_TEST(test_spool_event_set_aside_stays_while_others_go);
+    RUN_TEST(test_spool_full_drops_what_is_set_aside_first);
+    RUN_TEST(test_spool_of_others_is_refused);
     RUN_TEST(test_spool_file_cut_at_every_byte_reads_as_all_before_the_cut);
     RUN_TEST(test_spool_byte_turned_over_costs_that_event_and_what_is_behind_it);
     RUN_TEST(test_spool_half_written_new_file_is_of_no_account);

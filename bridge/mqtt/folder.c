@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#include "folder.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdbool.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static bool is_ours(uid_t owner) {
+    return owner == 0U || owner == geteuid();
+}
+
+int mqtt_folder_open(const char *directory) {
+    struct stat status;
+    const int folder = open(directory, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (folder >= 0 &&
+        (fstat(folder, &status) != 0 || !is_ours(status.st_uid) || (status.st_mode & (S_IWGRP | S_IWOTH)) != 0U)) {
+        (void)close(folder);
+        errno = EPERM;
+        return -1;
+    }
+    return folder;
+}
+
+int mqtt_folder_open_file(int folder, const char *name) {
+    struct stat status;
+    const int file = openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (file >= 0 &&
+        (fstat(file, &status) != 0 || !S_ISREG(status.st_mode) || status.st_nlink != 1U || !is_ours(status.st_uid))) {
+        (void)close(file);
+        errno = EPERM;
+        return -1;
+    }
+    return file;
+}
