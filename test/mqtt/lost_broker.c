@@ -109,14 +109,16 @@ static void test_broker_lost_and_back_drives_nothing_without_arm(void) {
 static void test_sender_that_has_not_armed_drives_nothing(void) {
     command_from("other", "drive", ",\"left_mm_s\":-100,\"right_mm_s\":-100");
     pass(50);
-    TEST_ASSERT_EQUAL_UINT64(1, bridge.judge.counts[MQTT_DENIED]);
+    TEST_ASSERT_EQUAL_STRING(key, bridge_lease_key(&bridge.lease));
     TEST_ASSERT_EQUAL_INT16(100, daemon_rig.told_mm_s[IW_LEFT]);
 }
 
 static void test_sender_that_stopped_drives_nothing_without_arm(void) {
+    char fields[128];
+    (void)snprintf(fields, sizeof fields, ",\"left_mm_s\":100,\"right_mm_s\":100,\"key\":\"%s\"", key);
     command("stop", "");
-    command("drive", ",\"left_mm_s\":100,\"right_mm_s\":100"); // Before the gateway could answer.
-    TEST_ASSERT_EQUAL_UINT64(1, bridge.judge.counts[MQTT_DENIED]);
+    command("drive", fields); // Before the gateway could answer.
+    TEST_ASSERT_NULL(bridge_lease_key(&bridge.lease));
     pass(2000);
     TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
 }
@@ -124,12 +126,14 @@ static void test_sender_that_stopped_drives_nothing_without_arm(void) {
 static void test_sender_has_no_lease_after_the_gateway_restarted(void) {
     daemon_rig_crash();
     pass(100);
-    TEST_ASSERT_EQUAL_CHAR('\0', bridge.driver[0]);
+    TEST_ASSERT_NULL(bridge_lease_key(&bridge.lease));
     pass(1000);
     daemon_rig_start();
     pass(6000);
     drive(100);
-    TEST_ASSERT_EQUAL_UINT64(2, bridge.judge.counts[MQTT_DENIED]);
+    TEST_ASSERT_NULL(bridge_lease_key(&bridge.lease));
+    TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+    TEST_ASSERT_TRUE(daemon_rig_is_told_zero());
 }
 
 int main(void) {
