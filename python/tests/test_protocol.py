@@ -31,6 +31,7 @@ UNSEEN = {
     "event offset.offset_mN: null": "a zero is replaced, and never taken away",
     "bus_status.load_permille: a value": "a local bus is not measured",
     "bus_status.lost_frames: a value": "a local bus is not measured",
+    "reply to arm.key: left out": A_BOARD,
 }
 
 

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Callable, Dict, SupportsIndex, Union
+from dataclasses import dataclass, field
+from typing import Any, Callable, Dict, Optional, SupportsIndex, Union
 
 from ._protocol import Status
 
@@ -43,3 +43,5 @@ class Terms:
     stop_budget_mm: int
     """... and how far."""
     warnings: tuple[str, ...]
+    key: Optional[str] = field(default=None, repr=False)
+    """The secret of this lease; None: a microcontroller gives none."""

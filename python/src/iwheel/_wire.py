@@ -188,8 +188,10 @@ def applied_of(reply: Message) -> Applied:
 
 
 def terms_of(reply: Message) -> Terms:
-    values = fields_of("arm", reply, Terms.__dataclass_fields__)
+    named = [name for name in Terms.__dataclass_fields__ if name != "key"]
+    values = fields_of("arm", reply, named)
     values["warnings"] = tuple(values["warnings"] or ())
+    values["key"] = reply.get("key")
     return Terms(**values)
 
 
