@@ -88,7 +88,7 @@ if(TARGET iwheel-web)
     install(DIRECTORY $<TARGET_PROPERTY:iwheel-web,BINARY_DIR>/page/ DESTINATION ${CMAKE_INSTALL_DATADIR}/iwheel-web COMPONENT web)
     install(FILES share/web.conf DESTINATION ${CMAKE_INSTALL_SYSCONFDIR}/iwheel COMPONENT web)
     install(FILES share/sysusers.d/iwheel-web.conf DESTINATION lib/sysusers.d COMPONENT web)
-    install(FILES share/systemd/iwheel-web.service DESTINATION ${IWHEEL_SYSTEMD_DIR} COMPONENT web)
+    install(FILES share/systemd/iwheel-web.service share/systemd/iwheel-web.socket DESTINATION ${IWHEEL_SYSTEMD_DIR} COMPONENT web)
     install(FILES share/web/drive.conf share/web/grafana-dashboard.json share/web/prometheus-rules.yml
         DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/iwheel-web/examples COMPONENT web)
     if(IWHEEL_SCDOC)
