@@ -19,16 +19,15 @@ bool bridge_lease_open(bridge_lease_t *self, const char *socket, int epoll_fd) {
 /// Ends the connection of a place, and with it the gateway's lease if it was held there. Who asked is answered with `reply`.
 static void set_free(bridge_place_t *place, const iwc_message_t *reply) {
     const bool asked = place->state == BRIDGE_ASKING;
-    const bridge_answer_t answer = place->answer;
-    void *context = place->context;
+    const bridge_asker_t asker = place->asker;
     if (place->lease->holder == place) {
         place->lease->holder = NULL;
     }
     place->state = BRIDGE_FREE;
-    place->answer = NULL;
+    place->asker.answer = NULL;
     place->key[0] = '\0';
-    if (asked && answer != NULL) {
-        answer(context, reply); // Before the line goes: the reply lies in it.
+    if (asked && asker.answer != NULL) {
+        asker.answer(asker.context, reply); // Before the line goes: the reply lies in it.
     }
     bridge_line_drop(&place->line, IWC_CLOSED);
 }
@@ -46,7 +45,7 @@ void bridge_lease_close(bridge_lease_t *self) {
 
 static void hold(bridge_place_t *place, const iwc_message_t *reply) {
     bridge_lease_t *self = place->lease;
-    const bridge_answer_t answer = place->answer;
+    const bridge_asker_t asker = place->asker;
     place->key_is_gateways =
         iwc_text(reply, "key", place->key, sizeof place->key) && strlen(place->key) == BRIDGE_SECRET_SIZE - 1U;
     if (!place->key_is_gateways && !bridge_secret_draw(place->key)) {
@@ -58,9 +57,9 @@ static void hold(bridge_place_t *place, const iwc_message_t *reply) {
     }
     self->holder = place;
     place->state = BRIDGE_HELD;
-    place->answer = NULL;
-    if (answer != NULL) {
-        answer(place->context, reply);
+    place->asker.answer = NULL;
+    if (asker.answer != NULL) {
+        asker.answer(asker.context, reply);
     }
 }
 
@@ -91,7 +90,7 @@ static bridge_place_t *find_place(bridge_lease_t *self) {
 }
 
 bridge_lease_result_t bridge_lease_arm(bridge_lease_t *self, const char *name, const char *request,
-                                       bridge_answer_t answer, void *context, uint64_t now_us) {
+                                       bridge_asker_t asker, uint64_t now_us) {
     for (size_t i = 0; i < PLACES; i++) {
         if (self->place[i].state == BRIDGE_ASKING) {
             return BRIDGE_LEASE_BUSY;
@@ -105,8 +104,7 @@ bridge_lease_result_t bridge_lease_arm(bridge_lease_t *self, const char *name, c
         return BRIDGE_LEASE_AWAY;
     }
     place->state = BRIDGE_ASKING;
-    place->answer = answer;
-    place->context = context;
+    place->asker = asker;
     place->until_us = now_us + BRIDGE_ARM_US;
     (void)snprintf(place->name, sizeof place->name, "%s", name);
     (void)snprintf(place->request, sizeof place->request, "%s", request);
@@ -144,8 +142,8 @@ static void take_driven(void *context, const iwc_message_t *reply) {
     bridge_driven_t *driven = context;
     const bridge_driven_t asked = *driven;
     driven->place = NULL; // First: the answer may drive again.
-    if (asked.answer != NULL) {
-        asked.answer(asked.context, reply);
+    if (asked.asker.answer != NULL) {
+        asked.asker.answer(asked.asker.context, reply);
     }
     if (reply != NULL && iwc_is(reply, "error", "not_holder") && asked.place->state == BRIDGE_HELD) {
         set_free(asked.place, NULL);
@@ -162,7 +160,7 @@ static bridge_driven_t *find_driven(bridge_place_t *place) {
 }
 
 bridge_lease_result_t bridge_lease_drive(bridge_lease_t *self, const char *key, const char *request,
-                                         bridge_answer_t answer, void *context, uint64_t now_us) {
+                                         bridge_asker_t asker, uint64_t now_us) {
     char with_key[BRIDGE_REQUEST_SIZE];
     bridge_place_t *place = self->holder;
     if (!bridge_lease_is_holder(self, key)) {
@@ -179,7 +177,7 @@ bridge_lease_result_t bridge_lease_drive(bridge_lease_t *self, const char *key, 
     const bridge_sent_t sent = {0, now_us + BRIDGE_DRIVE_US, take_driven, driven};
     const iwc_result_t result = bridge_line_send(&place->line, with_key, &sent);
     if (result == IWC_OK) {
-        *driven = (bridge_driven_t){place, answer, context};
+        *driven = (bridge_driven_t){place, asker};
     } else if (result == IWC_CLOSED) {
         set_free(place, NULL);
         return BRIDGE_LEASE_AWAY;
@@ -205,12 +203,12 @@ void bridge_lease_forget(bridge_lease_t *self, const void *context) {
     for (size_t i = 0; i < PLACES; i++) {
         bridge_place_t *place = &self->place[i];
         for (size_t j = 0; j < BRIDGE_LINE_MAX; j++) {
-            if (place->driven[j].context == context) {
-                place->driven[j].answer = NULL;
+            if (place->driven[j].asker.context == context) {
+                place->driven[j].asker.answer = NULL;
             }
         }
-        if (place->state == BRIDGE_ASKING && place->context == context) {
-            place->answer = NULL;
+        if (place->state == BRIDGE_ASKING && place->asker.context == context) {
+            place->asker.answer = NULL;
             set_free(place, NULL);
         }
     }

@@ -36,11 +36,16 @@ typedef enum { BRIDGE_FREE, BRIDGE_ASKING, BRIDGE_HELD, BRIDGE_ENDING } bridge_p
 typedef struct bridge_lease bridge_lease_t;
 typedef struct bridge_place bridge_place_t;
 
+/// Who gets the answer. `answer` NULL: it is not needed.
+typedef struct {
+    bridge_answer_t answer;
+    void *context;
+} bridge_asker_t;
+
 /// A drive command without reply.
 typedef struct {
     bridge_place_t *place; ///< NULL: free.
-    bridge_answer_t answer;
-    void *context;
+    bridge_asker_t asker;
 } bridge_driven_t;
 
 struct bridge_place {
@@ -51,9 +56,8 @@ struct bridge_place {
     char key[BRIDGE_SECRET_SIZE];
     bool key_is_gateways;              ///< The gateway knows it, and wants it in each drive.
     char request[BRIDGE_REQUEST_SIZE]; ///< ASKING: the arm, until it is sent; then empty.
-    bridge_answer_t answer;            ///< ASKING: for the reply to arm.
-    void *context;
-    uint64_t until_us; ///< ASKING, ENDING: its end.
+    bridge_asker_t asker;              ///< ASKING: for the reply to arm.
+    uint64_t until_us;                 ///< ASKING, ENDING: its end.
     bridge_driven_t driven[BRIDGE_LINE_MAX];
 };
 
@@ -70,10 +74,10 @@ void bridge_lease_close(bridge_lease_t *self);
 void bridge_lease_step(bridge_lease_t *self, uint64_t now_us);
 uint64_t bridge_lease_next_us(const bridge_lease_t *self, uint64_t now_us);
 
-/// A person, called `name`, asks for the lease with this `arm` request. BRIDGE_LEASE_OK: `answer` is called later, once. If the reply
+/// A person, called `name`, asks for the lease with this `arm` request. BRIDGE_LEASE_OK: the answer is called later, once. If the reply
 /// grants it, `bridge_lease_key` is the person's key from then on, during the call already.
 bridge_lease_result_t bridge_lease_arm(bridge_lease_t *self, const char *name, const char *request,
-                                       bridge_answer_t answer, void *context, uint64_t now_us);
+                                       bridge_asker_t asker, uint64_t now_us);
 
 /// The holder's key; NULL: nobody holds the lease by this bridge.
 const char *bridge_lease_key(const bridge_lease_t *self);
@@ -82,10 +86,10 @@ const char *bridge_lease_name(const bridge_lease_t *self);
 /// True if `key` is the holder's. NULL is no key.
 bool bridge_lease_is_holder(const bridge_lease_t *self, const char *key);
 
-/// One `drive` or `twist` of the person who has `key`, once. BRIDGE_LEASE_OK: `answer` (NULL: not needed) is called later. A reply
+/// One `drive` or `twist` of the person who has `key`, once. BRIDGE_LEASE_OK: the answer is called later. A reply
 /// `not_holder` ends the lease.
 bridge_lease_result_t bridge_lease_drive(bridge_lease_t *self, const char *key, const char *request,
-                                         bridge_answer_t answer, void *context, uint64_t now_us);
+                                         bridge_asker_t asker, uint64_t now_us);
 
 /// The lease of this bridge ends: after a stop was asked for, or an event said so, or the person is gone. From now on no key is the
 /// right one, and who was asking is answered with NULL. It sends nothing: the caller sends the stop.

@@ -133,9 +133,10 @@ static void refuse_mover(mqtt_bridge_t *self, const mqtt_order_t *order, const c
 
 static void arm(mqtt_bridge_t *self, const mqtt_order_t *order) {
     waiting_t *place = place_for(self, order);
-    const bridge_lease_result_t result =
-        (place == NULL) ? BRIDGE_LEASE_FULL
-                        : bridge_lease_arm(&self->lease, order->from, order->request, take_answer, place, self->now_us);
+    const bridge_lease_result_t result = (place == NULL)
+                                             ? BRIDGE_LEASE_FULL
+                                             : bridge_lease_arm(&self->lease, order->from, order->request,
+                                                                (bridge_asker_t){take_answer, place}, self->now_us);
     if (result == BRIDGE_LEASE_OK) {
         return;
     }
@@ -151,9 +152,10 @@ static void arm(mqtt_bridge_t *self, const mqtt_order_t *order) {
 
 static void drive(mqtt_bridge_t *self, const mqtt_order_t *order) {
     waiting_t *place = place_for(self, order);
-    const bridge_lease_result_t result = (place == NULL) ? BRIDGE_LEASE_FULL
-                                                         : bridge_lease_drive(&self->lease, order->key, order->request,
-                                                                              take_answer, place, self->now_us);
+    const bridge_lease_result_t result = (place == NULL)
+                                             ? BRIDGE_LEASE_FULL
+                                             : bridge_lease_drive(&self->lease, order->key, order->request,
+                                                                  (bridge_asker_t){take_answer, place}, self->now_us);
     if (result == BRIDGE_LEASE_OK) {
         self->silent_us = self->now_us + MQTT_SILENT_US;
         return;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// One request: judged, asked of the gateway if it must be, answered.
-#include "server.h"
+// One request: judged, answered, or passed on to the gateway (ask.c).
+#include "call.h"
 
-#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 static web_peer_t *peer_of(struct MHD_Connection *connection) {
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
@@ -15,7 +15,7 @@ static const char *header(struct MHD_Connection *connection, const char *name) {
     return MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
 }
 
-static const char *argument(const web_call_t *self, const char *name) {
+const char *web_call_argument(const web_call_t *self, const char *name) {
     return MHD_lookup_connection_value(self->connection, MHD_GET_ARGUMENT_KIND, name);
 }
 
@@ -53,7 +53,10 @@ static enum MHD_Result send_response(const web_call_t *self, unsigned status, st
     }
     add_headers(response, type);
     if (status == 401U) {
-        (void)MHD_add_response_header(response, "WWW-Authenticate", "Bearer");
+        (void)MHD_add_response_header(response, "WWW-Authenticate", "IWheel");
+    }
+    if (status == 400U || status == 413U) {
+        (void)MHD_add_response_header(response, "Connection", "close"); // What follows is no request of its own.
     }
     const enum MHD_Result result = MHD_queue_response(self->connection, status, response);
     MHD_destroy_response(response);
@@ -69,7 +72,7 @@ static enum MHD_Result send_text(const web_call_t *self, const char *text, size_
     return send_response(self, self->status, MHD_create_response_from_buffer(length, bytes, mode), type);
 }
 
-static enum MHD_Result refuse(web_call_t *self, unsigned status, const char *error, const char *message) {
+enum MHD_Result web_call_refuse(web_call_t *self, unsigned status, const char *error, const char *message) {
     char text[512];
     const int length =
         snprintf(text, sizeof text, "{\"ok\":false,\"error\":\"%s\",\"message\":\"%s\"}\n", error, message);
@@ -79,112 +82,33 @@ static enum MHD_Result refuse(web_call_t *self, unsigned status, const char *err
     return send_text(self, text, (size_t)length, MHD_RESPMEM_MUST_COPY);
 }
 
-static const char *const not_there =
-    "NOT DELIVERED: the gateway does not answer; see that it runs: systemctl status iwheel-gateway";
-
-// ---- asking the gateway ---------------------------------------------------------------------------------------------
-
-static void keep(web_call_t *self, unsigned status, const char *before, const char *text, size_t length) {
-    const size_t head = strlen(before);
-    self->reply = malloc(head + length + 1U);
-    self->status = (self->reply != NULL) ? status : 500U;
-    if (self->reply != NULL) {
-        memcpy(self->reply, before, head);
-        memcpy(self->reply + head, text, length);
-        memcpy(self->reply + head + length, "\n", 1);
-        self->length = head + length + 1U;
-    }
-}
-
-static void begin_driving(web_call_t *self, const iwc_message_t *reply) {
-    char key[WEB_TOKEN_SIZE];
-    char before[WEB_TOKEN_SIZE + 16U];
-    if (!web_token_random(key)) {
-        return;
-    }
-    web_driver_begin(&self->server->driver, key, self->server->now_us);
-    (void)snprintf(before, sizeof before, "{\"key\":\"%s\",", key);
-    keep(self, 200, before, reply->text + 1, reply->length - 1U);
-}
-
-static void take_answer(void *context, const iwc_message_t *reply) {
-    web_call_t *self = context;
-    const bool good = reply != NULL && iwc_truth(reply, "ok").value == 1;
-    if (reply == NULL) {
-        static const char gone[] = "{\"ok\":false,\"error\":\"not_delivered\",\"message\":\"NOT DELIVERED: the gateway "
-                                   "did not answer in time\"}";
-        keep(self, 504, "", gone, sizeof gone - 1U);
-    } else if (good && self->verdict.route->verb == WEB_ARM) {
-        begin_driving(self, reply);
-    } else {
-        keep(self, good ? 200U : 409U, "", reply->text, reply->length);
-    }
-    web_call_resume(self);
-}
-
-static enum MHD_Result ask(web_call_t *self, const char *request) {
-    self->suspended = true;
-    MHD_suspend_connection(self->connection); // First: the answer may be there at once.
-    if (!bridge_link_ask(&self->server->link.gateway, request, take_answer, self, self->server->now_us)) {
-        static const char gone[] = "{\"ok\":false,\"error\":\"not_delivered\",\"message\":\"";
-        char text[256];
-        const int length = snprintf(text, sizeof text, "%s%s\"}", gone, not_there);
-        keep(self, 503, "", text, (size_t)length);
-        web_call_resume(self);
-    }
-    return MHD_YES;
-}
-
-static enum MHD_Result ask_recording(web_call_t *self) {
-    char request[128];
-    int64_t offset = 0;
-    const char *name = argument(self, "name");
-    const char *from = argument(self, "offset");
-    if (!web_recording_name(name) || (from != NULL && !web_number(from, 0, INT64_MAX, &offset))) {
-        return refuse(self, 400, "bad_value",
-                      "name is that of a recording with .log, .jsonl or .conf behind it, offset a number of bytes");
-    }
-    (void)snprintf(request, sizeof request, "{\"cmd\":\"recording\",\"name\":\"%s\",\"offset\":%" PRId64 "}", name,
-                   offset);
-    return ask(self, request);
-}
-
-static enum MHD_Result ask_arm(web_call_t *self) {
-    if (self->server->driver.key[0] != '\0') {
-        return refuse(self, 409, "busy", "another page drives; stop it first");
-    }
-    return ask(self, "{\"cmd\":\"arm\",\"name\":\"web page\"}");
-}
-
-static enum MHD_Result ask_drive(web_call_t *self) {
-    web_server_t *server = self->server;
-    char request[96];
-    web_twist_t twist = {0, 0};
-    const web_command_t command = {argument(self, "key"), argument(self, "t_us"), argument(self, "sequence"),
-                                   argument(self, "v_mm_s"), argument(self, "yaw_mrad_s")};
-    const web_limits_t limits = {server->settings->drive.max_speed_mm_s, server->settings->drive.ttl_ms * 1000U};
-    const char *why = web_driver_take(&server->driver, &command, &limits, server->now_us, &twist);
-    if (why != NULL) {
-        return refuse(self, 409, "dropped", why);
-    }
-    (void)snprintf(request, sizeof request, "{\"cmd\":\"twist\",\"v_mm_s\":%d,\"yaw_mrad_s\":%d}", (int)twist.v_mm_s,
-                   (int)twist.yaw_mrad_s);
-    return ask(self, request);
-}
-
-static enum MHD_Result ask_stop(web_call_t *self, const char *request) {
-    web_driver_end(&self->server->driver); // What still comes from the page that drove is too late.
-    return ask(self, request);
-}
-
 // ---- the bridge's own answers ---------------------------------------------------------------------------------------
 
 static enum MHD_Result send_file(web_call_t *self) {
     const web_file_t *file = &self->server->files[self->verdict.route - web_routes()];
     if (file->text == NULL) {
-        return refuse(self, 404, "not_there", "this file is not installed");
+        return web_call_refuse(self, 404, "not_there", "this file is not installed");
     }
     return send_text(self, file->text, file->length, MHD_RESPMEM_PERSISTENT);
+}
+
+static enum MHD_Result send_challenge(web_call_t *self) {
+    char text[160];
+    const char *nonce = web_proofs_nonce(&self->server->proofs, self->server->now_us);
+    if (nonce == NULL) {
+        return web_call_refuse(self, 503, "no_random", "the kernel gives no random numbers; see dmesg");
+    }
+    const int length =
+        snprintf(text, sizeof text, "{\"ok\":true,\"nonce\":\"%s\",\"boot\":\"%s\"}\n", nonce, self->server->boot);
+    return send_text(self, text, (size_t)length, MHD_RESPMEM_MUST_COPY);
+}
+
+/// From the newest state: nobody who looks asks the gateway anything.
+static enum MHD_Result send_status(web_call_t *self) {
+    size_t length = 0;
+    const char *text = web_link_status(&self->server->link, self->server->now_us, &length);
+    return (text != NULL) ? send_text(self, text, length, MHD_RESPMEM_MUST_FREE)
+                          : web_call_refuse(self, 503, "not_delivered", web_not_there);
 }
 
 static enum MHD_Result send_health(web_call_t *self) {
@@ -246,10 +170,11 @@ static enum MHD_Result send_stops(web_call_t *self) {
 static enum MHD_Result send_fleet(web_call_t *self) {
     size_t length = 0;
     const char *text = web_server_fleet(self->server, &length);
-    return (text != NULL) ? send_text(self, text, length, MHD_RESPMEM_MUST_FREE)
-                          : refuse(self, 404, "not_there",
-                                   "there are no rows of a fleet; set source under [fleet], and see that iwheel-fleet "
-                                   "writes that file");
+    return (text != NULL)
+               ? send_text(self, text, length, MHD_RESPMEM_MUST_FREE)
+               : web_call_refuse(self, 404, "not_there",
+                                 "there are no rows of a fleet; set source under [fleet], and see that iwheel-fleet "
+                                 "writes that file");
 }
 
 static ssize_t read_stream(void *context, uint64_t position, char *out, size_t size) {
@@ -276,7 +201,8 @@ static ssize_t read_stream(void *context, uint64_t position, char *out, size_t s
 
 static enum MHD_Result send_events(web_call_t *self) {
     if (self->server->stream_count >= web_server_streams_max(self->server)) {
-        return refuse(self, 503, "busy", "too many watch already: close a page, or raise max_connections under [web]");
+        return web_call_refuse(self, 503, "busy",
+                               "too many watch already: close a page, or raise max_connections under [web]");
     }
     web_reader_begin(&self->reader, &self->server->link.feed);
     self->next = self->server->streams;
@@ -291,34 +217,22 @@ static enum MHD_Result carry_out(web_call_t *self) {
     switch (self->verdict.route->verb) {
     case WEB_FILE:
         return send_file(self);
+    case WEB_CHALLENGE:
+        return send_challenge(self);
     case WEB_STATUS:
-        return ask(self, "{\"cmd\":\"status\"}");
+        return send_status(self);
     case WEB_EVENTS:
         return send_events(self);
     case WEB_STOPS:
         return send_stops(self);
-    case WEB_RECORDINGS:
-        return ask(self, "{\"cmd\":\"recordings\"}");
-    case WEB_RECORDING:
-        return ask_recording(self);
     case WEB_FLEET:
         return send_fleet(self);
     case WEB_METRICS:
         return send_metrics(self);
     case WEB_HEALTH:
         return send_health(self);
-    case WEB_STOP:
-        return ask_stop(self, "{\"cmd\":\"stop\"}");
-    case WEB_ESTOP:
-        return ask_stop(self, "{\"cmd\":\"estop\",\"reason\":\"web page\"}");
-    case WEB_ARM:
-        return ask_arm(self);
-    case WEB_DRIVE:
-        return ask_drive(self);
-    case WEB_RESET:
-        return ask(self, "{\"cmd\":\"reset\"}");
     default:
-        return MHD_NO;
+        return web_call_ask(self);
     }
 }
 
@@ -329,26 +243,66 @@ static bool has_body(struct MHD_Connection *connection) {
     return header(connection, "Transfer-Encoding") != NULL || (length != NULL && strcmp(length, "0") != 0);
 }
 
-static web_call_t *begin(web_server_t *server, struct MHD_Connection *connection, const char *url, const char *method) {
-    web_call_t *self = calloc(1, sizeof(*self));
-    web_peer_t *peer = peer_of(connection);
-    if (self != NULL) {
-        const web_settings_t *settings = server->settings;
-        const web_rules_t rules = {server->token.text, web_settings_hosts(settings), settings->drive.enabled,
-                                   settings->drive.enabled && settings->drive.allow_reset};
-        const web_asked_t asked = {method,
-                                   url,
-                                   header(connection, "Host"),
-                                   header(connection, "Origin"),
-                                   header(connection, "Sec-Fetch-Site"),
-                                   header(connection, "Authorization"),
-                                   has_body(connection)};
-        *self = (web_call_t){.server = server, .connection = connection, .verdict = web_judge(&rules, &asked)};
+/// Headers of which a second one would be read by some programs and the first by others.
+typedef struct {
+    unsigned count[4];
+    bool has_blank;
+} header_count_t;
+
+static enum MHD_Result count_header(void *context, enum MHD_ValueKind kind, const char *name, const char *value) {
+    static const char *const once[] = {"Host", "Content-Length", "Transfer-Encoding", "Authorization"};
+    header_count_t *self = context;
+    (void)kind;
+    (void)value;
+    self->has_blank = self->has_blank || strpbrk(name, " \t") != NULL;
+    for (size_t i = 0; i < sizeof once / sizeof once[0]; i++) {
+        self->count[i] += (strcasecmp(name, once[i]) == 0) ? 1U : 0U;
     }
+    return MHD_YES;
+}
+
+static bool is_doubled(struct MHD_Connection *connection) {
+    header_count_t found = {{0}, false};
+    (void)MHD_get_connection_values(connection, MHD_HEADER_KIND, count_header, &found);
+    bool doubled = found.has_blank;
+    for (size_t i = 0; i < sizeof found.count / sizeof found.count[0]; i++) {
+        doubled = doubled || found.count[i] > 1U;
+    }
+    return doubled;
+}
+
+static void begin(web_call_t *self, const char *url, const char *method) {
+    web_server_t *server = self->server;
+    web_peer_t *peer = peer_of(self->connection);
+    const web_settings_t *settings = server->settings;
+    const web_rules_t rules = {web_settings_hosts(settings), settings->drive.enabled,
+                               settings->drive.enabled && settings->drive.allow_reset};
+    const web_claim_t claim = {method, self->target, header(self->connection, "Authorization")};
+    const web_asked_t asked = {
+        method,
+        url,
+        header(self->connection, "Host"),
+        header(self->connection, "Origin"),
+        header(self->connection, "Sec-Fetch-Site"),
+        web_proofs_judge(&server->proofs, server->token.text, &claim, server->now_us, &self->session),
+        has_body(self->connection),
+        is_doubled(self->connection)};
+    self->verdict = web_judge(&rules, &asked);
+    self->begun = true;
     if (peer != NULL) {
         peer->asking = true;
-        peer->known =
-            peer->known || (self != NULL && self->verdict.route != NULL && self->verdict.route->verb != WEB_FILE);
+        peer->known = peer->known || asked.proof == WEB_PROOF_READ || asked.proof == WEB_PROOF_FULL;
+    }
+}
+
+void *web_call_new(void *context, const char *target, struct MHD_Connection *connection) {
+    web_call_t *self = calloc(1, sizeof(*self));
+    if (self != NULL) {
+        self->server = context;
+        self->connection = connection;
+        if (strlen(target) < sizeof self->target) {
+            (void)snprintf(self->target, sizeof self->target, "%s", target);
+        }
     }
     return self;
 }
@@ -356,15 +310,19 @@ static web_call_t *begin(web_server_t *server, struct MHD_Connection *connection
 enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection, const char *url, const char *method,
                                 const char *version, const char *upload, size_t *upload_size, void **place) {
     web_call_t *self = *place;
+    (void)context;
+    (void)connection;
     (void)version;
     (void)upload;
     if (self == NULL) {
-        self = begin(context, connection, url, method);
-        *place = self;
+        return MHD_NO;
+    }
+    if (!self->begun) {
+        begin(self, url, method);
         // A body is not awaited; all else is answered when the library asks again.
-        return (self == NULL)                   ? MHD_NO
-               : (self->verdict.status != 413U) ? MHD_YES
-                                                : refuse(self, 413, self->verdict.error, self->verdict.message);
+        return (self->verdict.status != 413U && self->verdict.status != 400U)
+                   ? MHD_YES
+                   : web_call_refuse(self, self->verdict.status, self->verdict.error, self->verdict.message);
     }
     if (*upload_size > 0U) {
         *upload_size = 0;
@@ -376,7 +334,7 @@ enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection
         return send_text(self, reply, self->length, MHD_RESPMEM_MUST_FREE);
     }
     if (self->verdict.status != 200U) {
-        return refuse(self, self->verdict.status, self->verdict.error, self->verdict.message);
+        return web_call_refuse(self, self->verdict.status, self->verdict.error, self->verdict.message);
     }
     return (self->status == 0U) ? carry_out(self) : MHD_NO;
 }
@@ -395,6 +353,7 @@ void web_call_completed(void *context, struct MHD_Connection *connection, void *
         return;
     }
     bridge_link_forget(&server->link.gateway, self);
+    bridge_lease_forget(&server->link.lease, self);
     for (web_call_t **at = &server->streams; *at != NULL; at = &(*at)->next) {
         if (*at == self) {
             *at = self->next;

@@ -9,8 +9,9 @@
 /// In one step: what else there is to do must not wait.
 #define AT_ONCE 64U
 
-bool web_door_open(web_door_t *self, int listen_fd) {
-    *self = (web_door_t){.listen_fd = listen_fd, .epoll_fd = epoll_create1(EPOLL_CLOEXEC)};
+bool web_door_open(web_door_t *self, const int listen_fds[WEB_DOOR_LISTENERS]) {
+    *self = (web_door_t){.epoll_fd = epoll_create1(EPOLL_CLOEXEC)};
+    memcpy(self->listen_fds, listen_fds, sizeof self->listen_fds);
     if (self->epoll_fd < 0) {
         web_door_close(self);
         return false;
@@ -33,23 +34,24 @@ void web_door_close(web_door_t *self) {
     while (self->count > 0U) {
         show_out_oldest(self);
     }
-    (void)close(self->listen_fd);
+    for (unsigned i = 0; i < WEB_DOOR_LISTENERS; i++) {
+        if (self->listen_fds[i] >= 0) {
+            (void)close(self->listen_fds[i]);
+        }
+    }
     if (self->epoll_fd >= 0) {
         (void)close(self->epoll_fd);
     }
-    *self = (web_door_t){.listen_fd = -1, .epoll_fd = -1};
+    *self = (web_door_t){.listen_fds = {-1, -1}, .epoll_fd = -1};
 }
 
 static bool has_room(const web_door_t *self, uint64_t now_us) {
     return self->count < WEB_DOOR_MAX || now_us - self->guests[0].since_us >= WEB_DOOR_GRACE_US;
 }
 
-void web_door_step(web_door_t *self, uint64_t now_us) {
-    while (self->count > 0U && now_us - self->guests[0].since_us >= WEB_DOOR_US) {
-        show_out_oldest(self);
-    }
-    for (unsigned i = 0; i < AT_ONCE && has_room(self, now_us); i++) {
-        const int fd = accept4(self->listen_fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+static void let_in(web_door_t *self, int listen_fd, uint64_t now_us) {
+    for (unsigned i = 0; i < AT_ONCE && listen_fd >= 0 && has_room(self, now_us); i++) {
+        const int fd = accept4(listen_fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
         struct epoll_event event = {.events = EPOLLIN | EPOLLRDHUP, .data.fd = fd};
         if (fd < 0) {
             return;
@@ -63,6 +65,15 @@ void web_door_step(web_door_t *self, uint64_t now_us) {
             self->crowded_out++;
         }
         self->guests[self->count++] = (web_guest_t){fd, now_us};
+    }
+}
+
+void web_door_step(web_door_t *self, uint64_t now_us) {
+    while (self->count > 0U && now_us - self->guests[0].since_us >= WEB_DOOR_US) {
+        show_out_oldest(self);
+    }
+    for (unsigned i = 0; i < WEB_DOOR_LISTENERS; i++) {
+        let_in(self, self->listen_fds[i], now_us);
     }
 }
 
@@ -82,8 +93,8 @@ int web_door_take(web_door_t *self) {
     return fd;
 }
 
-int web_door_fd(const web_door_t *self, uint64_t now_us) {
-    return has_room(self, now_us) ? self->listen_fd : -1;
+int web_door_fd(const web_door_t *self, unsigned listener, uint64_t now_us) {
+    return has_room(self, now_us) ? self->listen_fds[listener] : -1;
 }
 
 uint64_t web_door_next_us(const web_door_t *self, uint64_t now_us) {

@@ -9,8 +9,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define WEB_DOOR_MAX      256U
-#define WEB_DOOR_GRACE_US 50000U
+#define WEB_DOOR_LISTENERS 2U
+#define WEB_DOOR_MAX       256U
+#define WEB_DOOR_GRACE_US  50000U
 /// Who says nothing is not kept longer, even if there is room.
 #define WEB_DOOR_US 5000000U
 
@@ -20,15 +21,15 @@ typedef struct {
 } web_guest_t;
 
 typedef struct {
-    int listen_fd;
-    int epoll_fd; ///< For poll(): somebody who waits has spoken, or left.
+    int listen_fds[WEB_DOOR_LISTENERS]; ///< -1: there is none.
+    int epoll_fd;                       ///< For poll(): somebody who waits has spoken, or left.
     unsigned count;
     uint64_t crowded_out;             ///< Who made room for others.
     web_guest_t guests[WEB_DOOR_MAX]; ///< The oldest first.
 } web_door_t;
 
-/// Takes over a listening socket that does not block. False, with errno: no room can be made; the socket is closed.
-bool web_door_open(web_door_t *self, int listen_fd);
+/// Owns listening sockets that do not block (-1: none). False, with errno: no room can be made; they are closed.
+bool web_door_open(web_door_t *self, const int listen_fds[WEB_DOOR_LISTENERS]);
 void web_door_close(web_door_t *self);
 
 /// Lets in who can be let in, and shows out who must go.
@@ -37,8 +38,8 @@ void web_door_step(web_door_t *self, uint64_t now_us);
 /// Somebody who has spoken, and is no guest any more: a descriptor for the caller. -1: nobody.
 int web_door_take(web_door_t *self);
 
-/// For poll(): somebody knocks who could be let in; -1: the room is full.
-int web_door_fd(const web_door_t *self, uint64_t now_us);
+/// For poll(): there is a newcomer on this listening socket; -1: the room is full.
+int web_door_fd(const web_door_t *self, unsigned listener, uint64_t now_us);
 
 /// When `step` has something to do, whatever comes.
 uint64_t web_door_next_us(const web_door_t *self, uint64_t now_us);

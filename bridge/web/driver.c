@@ -6,22 +6,44 @@
 /// Of the pad: a full turn on the spot in six seconds.
 #define YAW_MAX_MRAD_S 1000
 
-void web_driver_begin(web_driver_t *self, const char *key, uint64_t now_us) {
-    memcpy(self->key, key, sizeof self->key);
+void web_driver_begin(web_driver_t *self, uint64_t now_us) {
+    self->is_driven = true;
     self->sequence = 0;
     self->silent_us = now_us + WEB_FIRST_US;
 }
 
 void web_driver_end(web_driver_t *self) {
-    self->key[0] = '\0';
+    self->is_driven = false;
+}
+
+bool web_command_moves(const web_command_t *command) {
+    int64_t v = 0;
+    int64_t yaw = 0;
+    return web_number(command->v_mm_s, INT32_MIN, INT32_MAX, &v) &&
+           web_number(command->yaw_mrad_s, INT32_MIN, INT32_MAX, &yaw) && (v != 0 || yaw != 0);
+}
+
+const char *web_age_wrong(const char *t_us, uint64_t now_us, int64_t *out_t_us) {
+    int64_t since_us = 0;
+    if (!web_number(t_us, 0, INT64_MAX, &since_us)) {
+        return "it does not say since when it is wanted: quote boot of /api/challenge, and t_us of the newest state";
+    }
+    if ((uint64_t)since_us > now_us + WEB_AHEAD_US) {
+        return "its t_us is in the future; quote t_us of the newest state";
+    }
+    if ((uint64_t)since_us < now_us && now_us - (uint64_t)since_us > WEB_AGE_US) {
+        return "it was on its way for more than a second; ask again";
+    }
+    *out_t_us = since_us;
+    return NULL;
 }
 
 static const char *judge(const web_driver_t *self, const web_command_t *command, const web_limits_t *limits,
                          uint64_t now_us) {
     int64_t sequence = 0;
     int64_t told_us = 0;
-    if (self->key[0] == '\0' || command->key == NULL || !web_token_is(self->key, command->key)) {
-        return "another page drives, or nobody: arm from this one";
+    if (!self->is_driven || !command->is_holders) {
+        return "this page does not hold the lease; arm from it";
     }
     if (!web_number(command->t_us, 0, INT64_MAX, &told_us) || !web_number(command->sequence, 1, INT64_MAX, &sequence)) {
         return "a command needs t_us and sequence";
@@ -56,5 +78,5 @@ const char *web_driver_take(web_driver_t *self, const web_command_t *command, co
 }
 
 bool web_driver_silent(const web_driver_t *self, uint64_t now_us) {
-    return self->key[0] != '\0' && now_us >= self->silent_us;
+    return self->is_driven && now_us >= self->silent_us;
 }

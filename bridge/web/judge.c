@@ -16,6 +16,7 @@ static const web_route_t routes[] = {
     {"GET", "/", WEB_FILE, "index.html", "text/html; charset=utf-8"},
     {"GET", "/page.css", WEB_FILE, "page.css", "text/css; charset=utf-8"},
     {"GET", "/strings.js", WEB_FILE, "strings.js", JS},
+    {"GET", "/proof.js", WEB_FILE, "proof.js", JS},
     {"GET", "/plots.js", WEB_FILE, "plots.js", JS},
     {"GET", "/recordings.js", WEB_FILE, "recordings.js", JS},
     {"GET", "/page.js", WEB_FILE, "page.js", JS},
@@ -24,6 +25,7 @@ static const web_route_t routes[] = {
     {"GET", "/uPlot.iife.min.js", WEB_FILE, "uPlot.iife.min.js", JS},
     {"GET", "/uPlot.min.css", WEB_FILE, "uPlot.min.css", "text/css; charset=utf-8"},
     {"GET", "/uPlot.LICENSE", WEB_FILE, "uPlot.LICENSE", TEXT},
+    {"GET", "/api/challenge", WEB_CHALLENGE, NULL, JSON},
     {"GET", "/api/status", WEB_STATUS, NULL, JSON},
     {"GET", "/api/events", WEB_EVENTS, NULL, "text/event-stream"},
     {"GET", "/api/stops", WEB_STOPS, NULL, JSON},
@@ -42,17 +44,6 @@ static const web_route_t routes[] = {
 
 const web_route_t *web_routes(void) {
     return routes;
-}
-
-bool web_token_is(const char *token, const char *given) {
-    const size_t length = strlen(token);
-    const size_t given_length = strlen(given);
-    unsigned difference = (length == given_length && length > 0U) ? 0U : 1U;
-    for (size_t i = 0; i < given_length; i++) {
-        difference |=
-            (unsigned)(unsigned char)given[i] ^ (unsigned)(unsigned char)token[(length > 0U) ? i % length : 0U];
-    }
-    return difference == 0U;
 }
 
 bool web_number(const char *text, int64_t min, int64_t max, int64_t *out_value) {
@@ -143,11 +134,12 @@ static bool is_our_page(const web_asked_t *asked) {
     return scheme > 0U && strcasecmp(origin + scheme, asked->host) == 0;
 }
 
-static bool has_token(const web_rules_t *rules, const web_asked_t *asked) {
-    static const char scheme[] = "Bearer ";
-    const char *given = asked->authorization;
-    return given != NULL && strncasecmp(given, scheme, sizeof scheme - 1U) == 0 &&
-           web_token_is(rules->token, given + sizeof scheme - 1U);
+/// STOP needs no proof: whoever sees the page may stop.
+static bool has_proof(const web_route_t *route, const web_asked_t *asked) {
+    if (route != NULL && (route->verb == WEB_FILE || route->verb == WEB_CHALLENGE || route->verb == WEB_STOP)) {
+        return true;
+    }
+    return asked->proof == WEB_PROOF_FULL || (asked->proof == WEB_PROOF_READ && strcmp(asked->method, "GET") == 0);
 }
 
 static const web_route_t *find_route(const web_asked_t *asked, bool *out_other_method) {
@@ -182,11 +174,20 @@ web_verdict_t web_judge(const web_rules_t *rules, const web_asked_t *asked) {
     if (!is_our_page(asked) && !is_navigation(route, asked)) {
         return refuse(403, "bad_origin", "another site's page asks: open the bridge's own page");
     }
+    if (asked->is_doubled) {
+        return refuse(400, "bad_header",
+                      "Host, Content-Length, Transfer-Encoding or Authorization is there twice, or a name has a blank; "
+                      "send each once");
+    }
     if (asked->has_body) {
         return refuse(413, "no_body", "requests have no body here: what they say stands in the address");
     }
-    if ((route == NULL || route->verb != WEB_FILE) && !has_token(rules, asked)) {
-        return refuse(401, "bad_token", "no valid token: open the address that `iwheelctl web` prints");
+    if (!has_proof(route, asked)) {
+        return (asked->proof == WEB_PROOF_OVER)
+                   ? refuse(401, "bad_session", "the session is not known; begin another one: GET /api/challenge")
+                   : refuse(401, "bad_token",
+                            "no valid proof of the token; open the address that `iwheelctl web` prints. Programs: see "
+                            "docs/web.md");
     }
     if (route == NULL) {
         return other_method ? refuse(405, "bad_method", "another method: see docs/web.md")

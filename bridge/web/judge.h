@@ -5,17 +5,20 @@
 #ifndef IW_WEB_JUDGE_H
 #define IW_WEB_JUDGE_H
 
+#include "proof.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 /// Bytes of a token with its terminator: 128 random bits as hexadecimal digits.
-#define WEB_TOKEN_SIZE 33U
+#define WEB_TOKEN_SIZE BRIDGE_SECRET_SIZE
 /// Bytes of a recording's file name with its terminator.
 #define WEB_NAME_SIZE 64U
 
 typedef enum {
     WEB_FILE, ///< One of the page's files.
+    WEB_CHALLENGE,
     WEB_STATUS,
     WEB_EVENTS,
     WEB_STOPS,
@@ -45,12 +48,12 @@ typedef struct {
     const char *host;
     const char *origin;
     const char *site; ///< Sec-Fetch-Site
-    const char *authorization;
+    web_proof_t proof;
     bool has_body;
+    bool is_doubled; ///< A header that counts is there twice, or a header's name has a blank.
 } web_asked_t;
 
 typedef struct {
-    const char *token;
     const char *hosts; ///< Names of this machine beside addresses and localhost, separated by blanks.
     bool may_drive;
     bool may_reset;
@@ -63,14 +66,12 @@ typedef struct {
     const web_route_t *route; ///< NULL unless `status` is 200.
 } web_verdict_t;
 
-/// The page's files are told to everybody who calls this machine by its own name; everything else needs the token.
+/// The page's files, the challenge and STOP are for everybody who calls this machine by its own name. To read needs the secret for reading or
+/// the token; everything else needs the token.
 web_verdict_t web_judge(const web_rules_t *rules, const web_asked_t *asked);
 
 /// All routes, the files first; ends with a null path.
 const web_route_t *web_routes(void);
-
-/// Compares in a time that does not depend on where they differ.
-bool web_token_is(const char *token, const char *given);
 
 /// A whole decimal number within the range, without blanks or plus. False, with `*out_value` untouched: it is none.
 bool web_number(const char *text, int64_t min, int64_t max, int64_t *out_value);

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "link.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define STALE_US 2000000U
 /// The frames after a stop are there then.
 #define WHY_US 2500000U
+/// All places for questions are in use.
+#define WHY_AGAIN_US 200000U
 
 // ---- listening ----------------------------------------------------------------------------------------------------
 
@@ -65,6 +68,7 @@ static void take_event(void *context, const iwc_message_t *message, uint64_t now
         return;
     }
     if (strcmp(name, "stop") == 0) {
+        bridge_lease_end(&self->lease, now_us);
         keep_stop(self, message); // Another one may come before its frames do.
         (void)bridge_link_ask(&self->gateway, "{\"cmd\":\"why\"}", take_why, self, now_us);
         self->why_us = now_us + WHY_US;
@@ -86,8 +90,8 @@ static void gateway_here(void *context, uint64_t now_us) {
 
 static void gateway_gone(void *context, uint64_t now_us) {
     web_link_t *self = context;
-    (void)now_us;
     self->why_us = 0;
+    bridge_lease_end(&self->lease, now_us);
     forget_state(self);
     (void)web_feed_add(&self->feed, "gateway", "{\"event\":\"gateway\",\"connected\":false}", 37, false);
 }
@@ -98,10 +102,12 @@ bool web_link_open(web_link_t *self, const char *socket, unsigned rate_hz, bool 
     const bridge_link_terms_t terms = {"iwheel-web", socket, rate_hz, drives, true};
     const bridge_listener_t listener = {self, gateway_here, gateway_gone, take_event};
     *self = (web_link_t){.why_us = 0};
-    return bridge_link_open(&self->gateway, &terms, &listener);
+    return bridge_link_open(&self->gateway, &terms, &listener) &&
+           bridge_lease_open(&self->lease, socket, self->gateway.epoll_fd);
 }
 
 void web_link_close(web_link_t *self) {
+    bridge_lease_close(&self->lease);
     bridge_link_close(&self->gateway);
     forget_state(self);
     web_feed_free(&self->feed);
@@ -112,15 +118,20 @@ void web_link_close(web_link_t *self) {
 
 int web_link_step(web_link_t *self, uint64_t now_us) {
     const int code = bridge_link_step(&self->gateway, now_us);
+    bridge_lease_step(&self->lease, now_us);
     if (self->gateway.is_here && self->why_us != 0U && now_us >= self->why_us) {
-        self->why_us = 0;
-        (void)bridge_link_ask(&self->gateway, "{\"cmd\":\"why\"}", take_why, self, now_us);
+        const bool asked = bridge_link_ask(&self->gateway, "{\"cmd\":\"why\"}", take_why, self, now_us);
+        self->why_us = asked ? 0U : now_us + WHY_AGAIN_US;
     }
     return code;
 }
 
 uint64_t web_link_next_us(const web_link_t *self, uint64_t now_us) {
-    const uint64_t next_us = bridge_link_next_us(&self->gateway, now_us);
+    const uint64_t lease_us = bridge_lease_next_us(&self->lease, now_us);
+    uint64_t next_us = bridge_link_next_us(&self->gateway, now_us);
+    if (lease_us < next_us) {
+        next_us = lease_us;
+    }
     const bool asks = self->gateway.is_here && self->why_us != 0U && self->why_us < next_us;
     return asks ? self->why_us : next_us;
 }
@@ -131,4 +142,15 @@ bool web_link_state(const web_link_t *self, uint64_t now_us, iwc_message_t *out_
     }
     *out_state = (iwc_message_t){.text = self->state, .length = self->state_length, .is_event = true};
     return true;
+}
+
+char *web_link_status(const web_link_t *self, uint64_t now_us, size_t *out_length) {
+    static const char yes[] = "{\"ok\":true,";
+    iwc_message_t state;
+    const char *rest = web_link_state(self, now_us, &state) ? strchr(state.text, ',') : NULL; // Behind "event":"state".
+    char *text = (rest != NULL) ? malloc(state.length + sizeof yes) : NULL;
+    if (text != NULL) {
+        *out_length = (size_t)sprintf(text, "%s%s", yes, rest + 1);
+    }
+    return text;
 }

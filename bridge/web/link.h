@@ -3,6 +3,7 @@
 #ifndef IW_WEB_LINK_H
 #define IW_WEB_LINK_H
 
+#include "common/lease.h"
 #include "common/link.h"
 #include "feed.h"
 
@@ -10,6 +11,7 @@
 
 typedef struct {
     bridge_link_t gateway;
+    bridge_lease_t lease; ///< Of the person who drives by this bridge.
     uint64_t why_us;      ///< When to ask why it stopped; 0: no need.
     uint64_t stop_number; ///< Of the newest in `stops`.
     uint64_t state_us;    ///< When the newest state came.
@@ -22,6 +24,9 @@ typedef struct {
 /// False: no memory. It must not be moved afterwards.
 bool web_link_open(web_link_t *self, const char *socket, unsigned rate_hz, bool drives);
 void web_link_close(web_link_t *self);
+
+/// The newest state with its answer of yes, as the reply to `status` has it; NULL: not known. To be freed.
+char *web_link_status(const web_link_t *self, uint64_t now_us, size_t *out_length);
 
 /// As `bridge_link_step`, `bridge_link_next_us`.
 int web_link_step(web_link_t *self, uint64_t now_us);

@@ -10,7 +10,8 @@
 #include <sysexits.h>
 #include <unistd.h>
 
-#define PRINT_URL BRIDGE_OWN
+#define PRINT_URL  BRIDGE_OWN
+#define PRINT_READ (BRIDGE_OWN + 1)
 
 #ifdef IWHEEL_WEB_QR
 static bool is_dark(const QRcode *code, int x, int y) {
@@ -36,6 +37,18 @@ static void print_qr(const char *text) {
 #else
     (void)text;
 #endif
+}
+
+static int print_read(const web_settings_t *settings) {
+    web_token_t token = {.path = settings->web.token_file, .only_reads = true};
+    char secret[BRIDGE_SECRET_SIZE];
+    bool changed = false;
+    if (!web_token_refresh(&token, &changed, stderr)) {
+        return EX_NOPERM;
+    }
+    web_read_secret(token.text, secret);
+    (void)printf("%s\n", secret);
+    return 0;
 }
 
 static int print_url(const web_settings_t *settings) {
@@ -119,10 +132,11 @@ int main(int count, char **arguments) {
                  "configured to. No safety function.\n",
         .options = "      --check         check configuration and files; open nothing\n"
                    "      --url           print the page's address with its token; on a\n"
-                   "                      terminal as a QR code too\n",
+                   "                      terminal as a QR code too\n"
+                   "      --read-secret   print what programs that only read send as Bearer\n",
         .exit_codes = "exit codes: 0 ok, 64 usage, 69 cannot listen, 71 no memory, 77 permission,\n"
                       "78 configuration\n",
-        .own = {{"url", NULL}},
+        .own = {{"url", NULL}, {"read-secret", NULL}},
         .settings = &settings,
         .standard = &standard,
     };
@@ -135,6 +149,9 @@ int main(int count, char **arguments) {
     }
     if (action == PRINT_URL) {
         return print_url(&settings);
+    }
+    if (action == PRINT_READ) {
+        return print_read(&settings);
     }
     return (action == BRIDGE_CHECK) ? check(&settings) : run(&settings);
 }

@@ -2,15 +2,14 @@
 #include "server.h"
 
 #include "common/service.h"
+#include "listen.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <sysexits.h>
 #include <unistd.h>
 
@@ -80,6 +79,12 @@ static int read_page(web_server_t *self) {
     return 0;
 }
 
+/// False if others may read the file. A file that is not there is judged when it is read.
+static bool is_secret(const char *path) {
+    struct stat status;
+    return stat(path, &status) != 0 || (status.st_mode & 0027U) == 0U;
+}
+
 static int read_certificate(web_server_t *self) {
     size_t length = 0;
     if (!web_settings_has_tls(self->settings)) {
@@ -90,52 +95,18 @@ static int read_certificate(web_server_t *self) {
         return complain(EX_CONFIG, self->settings->web.certificate,
                         "cannot be read; give a PEM file that the bridge's user may read");
     }
+    if (!is_secret(self->settings->web.key)) {
+        return complain(
+            EX_NOPERM, self->settings->web.key,
+            "may be read by others, or written by its group; chmod 0640, and let its group be the bridge's");
+    }
     self->key = read_all(self->settings->web.key, &length);
     return (self->key != NULL) ? 0
                                : complain(EX_CONFIG, self->settings->web.key,
                                           "cannot be read; give a PEM file that the bridge's user may read");
 }
 
-// ---- the socket -----------------------------------------------------------------------------------------------------
-
-static int open_unix(const char *path) {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    (void)snprintf(address.sun_path, sizeof address.sun_path, "%.107s", path);
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    const int other = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (connect(other, (const struct sockaddr *)&address, sizeof address) != 0 && errno == ECONNREFUSED) {
-        (void)unlink(path); // Left behind by one that was killed.
-    }
-    (void)close(other);
-    const mode_t before = umask(0117);
-    const int bound = bind(fd, (const struct sockaddr *)&address, sizeof address);
-    (void)umask(before);
-    if (bound != 0 || listen(fd, SOMAXCONN) != 0) {
-        (void)close(fd);
-        return -1;
-    }
-    return fd;
-}
-
-static int open_tcp(const web_settings_t *settings) {
-    const int one = 1;
-    struct sockaddr_in6 v6 = {.sin6_family = AF_INET6, .sin6_port = htons((uint16_t)settings->web.port)};
-    struct sockaddr_in v4 = {.sin_family = AF_INET, .sin_port = htons((uint16_t)settings->web.port)};
-    const bool is_v6 = inet_pton(AF_INET6, settings->web.listen, &v6.sin6_addr) == 1;
-    if (!is_v6) {
-        (void)inet_pton(AF_INET, settings->web.listen, &v4.sin_addr);
-    }
-    const struct sockaddr *address = is_v6 ? (const struct sockaddr *)&v6 : (const struct sockaddr *)&v4;
-    const int fd = socket(is_v6 ? AF_INET6 : AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
-    if (bind(fd, address, is_v6 ? sizeof v6 : sizeof v4) != 0 || listen(fd, SOMAXCONN) != 0) {
-        const int error = errno;
-        (void)close(fd);
-        errno = error;
-        return -1;
-    }
-    return fd;
-}
+// ---- the library ----------------------------------------------------------------------------------------------------
 
 /// Called at both ends of a connection.
 static void take_peer(void *context, struct MHD_Connection *connection, void **place,
@@ -177,9 +148,13 @@ static size_t unescape(void *context, struct MHD_Connection *connection, char *t
 }
 
 static struct MHD_Daemon *start(web_server_t *self) {
+    // TLS 1.2 and 1.3 with authenticated encryption and forward secrecy, nothing else.
+    static char priorities[] = "SECURE128:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2:-CIPHER-ALL:+AES-256-GCM:+AES-128-GCM:"
+                               "+CHACHA20-POLY1305:-MAC-ALL:+AEAD:-KX-ALL:+ECDHE-ECDSA:+ECDHE-RSA";
     const struct MHD_OptionItem tls[] = {
         {MHD_OPTION_HTTPS_MEM_CERT, 0, self->certificate},
         {MHD_OPTION_HTTPS_MEM_KEY, 0, self->key},
+        {MHD_OPTION_HTTPS_PRIORITIES, 0, priorities},
         {MHD_OPTION_END, 0, NULL},
     };
     const struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};
@@ -190,13 +165,14 @@ static struct MHD_Daemon *start(web_server_t *self) {
         (self->certificate != NULL) ? tls : plain, MHD_OPTION_CONNECTION_LIMIT, self->settings->web.max_connections,
         MHD_OPTION_CONNECTION_TIMEOUT, 15U, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)MEMORY_PER_CONNECTION,
         MHD_OPTION_NOTIFY_COMPLETED, web_call_completed, self, MHD_OPTION_NOTIFY_CONNECTION, take_peer, self,
-        MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL, MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
+        MHD_OPTION_URI_LOG_CALLBACK, web_call_new, self, MHD_OPTION_UNESCAPE_CALLBACK, unescape, NULL,
+        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
 }
 
 // ---- life -----------------------------------------------------------------------------------------------------------
 
 int web_server_check(web_server_t *self, const web_settings_t *settings) {
-    *self = (web_server_t){.settings = settings, .door = {.listen_fd = -1, .epoll_fd = -1}};
+    *self = (web_server_t){.settings = settings, .door = {.listen_fds = {-1, -1}, .epoll_fd = -1}};
     self->now_us = bridge_now_us();
     self->token = (web_token_t){.path = settings->web.token_file, .hours = settings->web.token_hours};
     const int code = read_page(self);
@@ -205,7 +181,8 @@ int web_server_check(web_server_t *self, const web_settings_t *settings) {
 
 int web_server_open(web_server_t *self, const web_settings_t *settings) {
     bool changed = false;
-    const int code = web_server_check(self, settings);
+    int fds[WEB_DOOR_LISTENERS];
+    int code = web_server_check(self, settings);
     if (code != 0) {
         return code;
     }
@@ -215,11 +192,15 @@ int web_server_open(web_server_t *self, const web_settings_t *settings) {
     if (!web_link_open(&self->link, settings->gateway.socket, settings->gateway.rate_hz, settings->drive.enabled)) {
         return complain(EX_OSERR, "memory", "there is not enough");
     }
-    const int fd = web_settings_is_unix(settings) ? open_unix(settings->web.listen + 5) : open_tcp(settings);
-    if (fd < 0 || !web_door_open(&self->door, fd)) {
-        char what[160];
-        (void)snprintf(what, sizeof what, "cannot listen on %s port %u", settings->web.listen, settings->web.port);
-        return complain((errno == EACCES) ? EX_NOPERM : EX_UNAVAILABLE, what, strerror(errno));
+    if (!bridge_secret_draw(self->boot)) {
+        return complain(EX_OSERR, "no random numbers", "see dmesg");
+    }
+    code = web_listen(settings, fds);
+    if (code != 0) {
+        return code;
+    }
+    if (!web_door_open(&self->door, fds)) {
+        return complain(EX_OSERR, "cannot wait for connections", strerror(errno));
     }
     self->daemon = start(self);
     if (self->daemon == NULL) {
@@ -239,11 +220,9 @@ void web_server_close(web_server_t *self) {
         web_link_close(&self->link); // Answers what still waits.
         MHD_stop_daemon(self->daemon);
     }
-    if (self->door.listen_fd >= 0) {
+    if (self->door.listen_fds[0] >= 0) {
         web_door_close(&self->door);
-        if (web_settings_is_unix(self->settings)) {
-            (void)unlink(self->settings->web.listen + 5);
-        }
+        web_listen_end(self->settings);
     }
     for (size_t i = 0; i < WEB_FILES; i++) {
         free(self->files[i].text);
@@ -283,6 +262,9 @@ static web_peer_t *who_makes_room(const web_server_t *self) {
     web_peer_t *stranger = NULL;
     web_peer_t *idle = NULL;
     for (web_peer_t *peer = self->peers; peer != NULL; peer = peer->next) {
+        if (peer->since_us == self->now_us) {
+            continue; // Let in since the library's last round: what it asks was not read yet.
+        }
         if (!peer->leaving && !peer->known) {
             stranger = peer;
         } else if (!peer->leaving && !peer->asking) {
@@ -336,18 +318,16 @@ static void look_at_token(web_server_t *self) {
     }
 }
 
-/// The page is silent, so nobody holds the pad. Another client's lease is not ours to end.
+/// The page that drives is silent, so no hand holds the pad. Another client's lease is not ours to end.
 static void let_go(web_server_t *self) {
-    iwc_message_t message;
-    iwc_state_t state;
-    if (!web_driver_silent(&self->driver, self->now_us) && self->link.gateway.is_here) {
-        return;
-    }
-    if (self->driver.key[0] != '\0' && web_link_state(&self->link, self->now_us, &message) &&
-        iwc_state(self->link.gateway.line.gateway, &message, &state) && state.ours) {
+    bridge_lease_t *lease = &self->link.lease;
+    if (bridge_lease_key(lease) == NULL) {
+        web_driver_end(&self->driver);
+    } else if (web_driver_silent(&self->driver, self->now_us)) {
+        web_driver_end(&self->driver);
+        bridge_lease_end(lease, self->now_us);
         (void)bridge_link_ask(&self->link.gateway, "{\"cmd\":\"stop\"}", NULL, NULL, self->now_us);
     }
-    web_driver_end(&self->driver);
 }
 
 int web_server_step(web_server_t *self) {
@@ -389,5 +369,7 @@ void web_server_fds(const web_server_t *self, int out_fds[WEB_SERVER_FDS]) {
     const union MHD_DaemonInfo *info = MHD_get_daemon_info(self->daemon, MHD_DAEMON_INFO_EPOLL_FD);
     out_fds[0] = (info != NULL) ? info->epoll_fd : -1;
     out_fds[1] = self->door.epoll_fd;
-    out_fds[2] = web_door_fd(&self->door, bridge_now_us());
+    for (unsigned i = 0; i < WEB_DOOR_LISTENERS; i++) {
+        out_fds[2U + i] = web_door_fd(&self->door, i, bridge_now_us());
+    }
 }

@@ -10,6 +10,7 @@
 #include "driver.h"
 #include "link.h"
 #include "metrics.h"
+#include "proof.h"
 #include "settings.h"
 #include "token.h"
 
@@ -25,7 +26,7 @@
 typedef struct web_peer {
     int fd;
     bool asking;  ///< In the middle of a complete request.
-    bool known;   ///< Has asked with the token.
+    bool known;   ///< Has proved that it has the token, or the secret for reading.
     bool leaving; ///< Shut down: the library forgets it in its next round.
     uint64_t since_us;
     struct web_peer *next;
@@ -37,6 +38,9 @@ typedef struct web_server web_server_t;
 typedef struct web_call {
     web_server_t *server;
     struct MHD_Connection *connection;
+    char target[WEB_TARGET_SIZE]; ///< As it was sent; empty: longer.
+    bool begun;                   ///< It was judged.
+    uint64_t session;             ///< Number of the session that proved the token; 0: none.
     web_verdict_t verdict;
     bool suspended;
     char *reply; ///< What it is answered, once it is known.
@@ -56,7 +60,11 @@ struct web_server {
     const web_settings_t *settings;
     web_link_t link;
     web_token_t token;
+    web_proofs_t proofs;
+    char boot[BRIDGE_SECRET_SIZE]; ///< Of this run, for ages.
     web_driver_t driver;
+    uint64_t driver_session; ///< Of the page that holds the lease.
+    bridge_movers_t movers;
     web_own_t own;
     web_file_t files[WEB_FILES]; ///< By their place among the routes.
     struct MHD_Daemon *daemon;
@@ -90,13 +98,14 @@ int web_server_step(web_server_t *self);
 int web_server_wait_ms(const web_server_t *self);
 
 /// The descriptors of HTTP, for poll(); -1: not now.
-#define WEB_SERVER_FDS 3U
+#define WEB_SERVER_FDS (2U + WEB_DOOR_LISTENERS)
 void web_server_fds(const web_server_t *self, int out_fds[WEB_SERVER_FDS]);
 
 /// How many may watch at once. The other connections are for who asks something, and for whom nobody knows yet.
 unsigned web_server_streams_max(const web_server_t *self);
 
-/// Answers one request: MHD_AccessHandlerCallback and MHD_RequestCompletedCallback of libmicrohttpd.
+/// Answers one request: LogCallback (its target as it was sent), MHD_AccessHandlerCallback and MHD_RequestCompletedCallback of libmicrohttpd.
+void *web_call_new(void *context, const char *target, struct MHD_Connection *connection);
 enum MHD_Result web_call_handle(void *context, struct MHD_Connection *connection, const char *url, const char *method,
                                 const char *version, const char *upload, size_t *upload_size, void **place);
 void web_call_completed(void *context, struct MHD_Connection *connection, void **place,

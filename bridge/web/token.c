@@ -5,20 +5,8 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-bool web_token_random(char out[WEB_TOKEN_SIZE]) {
-    unsigned char bytes[(WEB_TOKEN_SIZE - 1U) / 2U];
-    if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes) {
-        return false;
-    }
-    for (size_t i = 0; i < sizeof bytes; i++) {
-        (void)snprintf(out + 2U * i, 3, "%02x", bytes[i]);
-    }
-    return true;
-}
 
 static bool complain(const web_token_t *self, const char *what, FILE *err) {
     (void)fprintf(err, "iwheel-web: %s: %s\n", self->path, what);
@@ -32,7 +20,7 @@ static bool make(const web_token_t *self, FILE *err) {
     (void)snprintf(beside, sizeof beside, "%s.new", self->path);
     (void)unlink(beside);
     const int file = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (file < 0 || !web_token_random(token)) {
+    if (file < 0 || !bridge_secret_draw(token)) {
         (void)complain(self, strerror(errno), err);
         return complain(self, "cannot be made; let token_file name a folder in which the bridge may write", err);
     }

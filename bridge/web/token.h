@@ -16,9 +16,6 @@ typedef struct {
     char text[WEB_TOKEN_SIZE];
 } web_token_t;
 
-/// 32 random hexadecimal digits. False: the kernel gives none.
-bool web_token_random(char out[WEB_TOKEN_SIZE]);
-
 /// Reads the file, or makes it if it is not there or too old; `*out_changed`: the token is another than before. False, with a line on
 /// `err`, if that fails or if others could read it; the token is as before then.
 bool web_token_refresh(web_token_t *self, bool *out_changed, FILE *err);

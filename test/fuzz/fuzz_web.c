@@ -11,6 +11,7 @@
 #define FIELDS 12U
 
 static const char token[] = "00112233445566778899aabbccddeeff";
+static const char nonce[] = "0123456789abcdef0123456789abcdef";
 
 /// Cuts the bytes at each newline into texts of exactly their length: a byte read behind one is found. Missing ones are NULL.
 static void cut(const uint8_t *data, size_t size, char *fields[FIELDS]) {
@@ -30,13 +31,23 @@ static void cut(const uint8_t *data, size_t size, char *fields[FIELDS]) {
 }
 
 static void judge_request(char *fields[FIELDS], bool drives) {
-    const web_rules_t rules = {token, "walker.lan", drives, drives};
+    web_proofs_t proofs = {.nonce = {"0123456789abcdef0123456789abcdef"}, .renew_us = UINT64_MAX / 2U};
+    const web_claim_t claim = {(fields[0] != NULL) ? fields[0] : "", (fields[1] != NULL) ? fields[1] : "", fields[5]};
+    uint64_t session = 0;
+    const web_proof_t proof = web_proofs_judge(&proofs, token, &claim, 1, &session);
+    fuzz_require((proof == WEB_PROOF_FULL) == (session > 0U), "a session belongs to a proof");
+    fuzz_require(proof != WEB_PROOF_FULL || (strstr(fields[5], nonce) != NULL && strstr(fields[5], token) == NULL),
+                 "with the nonce, and without the token");
+    fuzz_require(proof != WEB_PROOF_FULL || web_proofs_judge(&proofs, token, &claim, 1, &session) == WEB_PROOF_WRONG,
+                 "a proof counts once");
+    const web_rules_t rules = {"walker.lan", drives, drives};
     const web_asked_t asked = {(fields[0] != NULL) ? fields[0] : "",
                                (fields[1] != NULL) ? fields[1] : "",
                                fields[2],
                                fields[3],
                                fields[4],
-                               fields[5],
+                               proof,
+                               false,
                                false};
     const web_verdict_t verdict = web_judge(&rules, &asked);
     fuzz_require((verdict.status == 200U) == (verdict.route != NULL), "a route, or a refusal");
@@ -50,9 +61,10 @@ static void judge_request(char *fields[FIELDS], bool drives) {
     }
     fuzz_tell("taken");
     fuzz_require(asked.host != NULL && asked.host[0] != '\0', "no host, no answer");
-    fuzz_require(verdict.route->verb == WEB_FILE ||
-                     (asked.authorization != NULL && strcmp(asked.authorization + 7, token) == 0),
-                 "the token was there");
+    fuzz_require(verdict.route->verb == WEB_FILE || verdict.route->verb == WEB_CHALLENGE ||
+                     verdict.route->verb == WEB_STOP || proof == WEB_PROOF_FULL ||
+                     (proof == WEB_PROOF_READ && strcmp(asked.method, "GET") == 0),
+                 "a proof was there");
     fuzz_require(asked.origin == NULL || strcasecmp(strstr(asked.origin, "//") + 2, asked.host) == 0, "our own page");
     fuzz_require(drives || (verdict.route->verb != WEB_ARM && verdict.route->verb != WEB_DRIVE &&
                             verdict.route->verb != WEB_RESET),
@@ -62,15 +74,16 @@ static void judge_request(char *fields[FIELDS], bool drives) {
 static void judge_drive(char *fields[FIELDS]) {
     web_driver_t driver = {0};
     web_twist_t twist = {0, 0};
-    const web_command_t command = {fields[6], fields[7], fields[8], fields[9], fields[10]};
+    const web_command_t command = {fields[6] != NULL && strcmp(fields[6], token) == 0, fields[7], fields[8], fields[9],
+                                   fields[10]};
     const web_limits_t limits = {300, 300000};
-    web_driver_begin(&driver, token, 0);
+    web_driver_begin(&driver, 0);
     if (web_driver_take(&driver, &command, &limits, 10000000U, &twist) == NULL) {
         fuzz_tell("taken");
         fuzz_require(twist.v_mm_s >= -300 && twist.v_mm_s <= 300 && twist.yaw_mrad_s >= -1000 &&
                          twist.yaw_mrad_s <= 1000,
                      "within the limits");
-        fuzz_require(strcmp(command.key, token) == 0 && driver.sequence > 0, "by the page that armed");
+        fuzz_require(command.is_holders && driver.sequence > 0, "by the page that armed");
         fuzz_require(web_driver_take(&driver, &command, &limits, 10000000U, &twist) != NULL, "once");
     } else {
         fuzz_require(driver.dropped == 1U, "counted");

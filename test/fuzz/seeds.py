@@ -2,6 +2,8 @@
 """What the fuzz targets begin with: by hand, and from what the product itself recorded (test/recordings)."""
 import ast
 import collections
+import hashlib
+import hmac
 import json
 import re
 import zlib
@@ -216,9 +218,16 @@ def mqtt():
 def web():
     """As a browser asks, with the token of fuzz_web.c: to look, and to drive."""
     token = b"00112233445566778899aabbccddeeff"
-    said = b"127.0.0.1:8470\nhttp://127.0.0.1:8470\nsame-origin\nBearer " + token
+    session, nonce = b"a" * 32, b"0123456789abcdef" * 2
+    said = b"127.0.0.1:8470\nhttp://127.0.0.1:8470\nsame-origin\n"
     drive = b"\n" + token + b"\n9900000\n1\n200\n-100\nstop-000001-estop_line.jsonl"
-    return [b"GET\n/api/events\n" + said + drive, b"POST\n/api/drive\n" + said + drive]
+
+    def proof(method, target):
+        mac = hmac.new(token, b"\n".join((method, target, session, nonce, b"1")), hashlib.sha256).hexdigest().encode()
+        return b"IWheel " + b" ".join((session, nonce, b"1", mac))
+    reads = b"Bearer " + hmac.new(token, b"iwheel-web read", hashlib.sha256).hexdigest()[:32].encode()
+    asked = [(b"GET", b"/api/events"), (b"POST", b"/api/drive")]
+    return [b"\n".join((*one, said + proof(*one))) + drive for one in asked] + [b"GET\n/metrics\n" + said + reads + drive]
 
 
 def put(number, data, own):

@@ -58,7 +58,8 @@ void tearDown(void) {
 /// Arms as the next connection; the gateway's reply has `fields`.
 static void arm(const char *name, bool ok, const char *fields) {
     const int connection = gateway.count;
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, name, ARM, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
+                      bridge_lease_arm(&lease, name, ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     step();
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, connection, line, sizeof line));
     fake_gateway_reply(&gateway, connection, line, ok, fields);
@@ -69,14 +70,15 @@ static void test_lease_viewer_has_no_connection(void) {
     step();
     TEST_ASSERT_EQUAL(0, gateway.count);
     TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, bridge_lease_next_us(&lease, now_us));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, NULL, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
 }
 
 static void test_one_person_key_of_the_gateway_is_in_each_drive(void) {
     arm("a", true, GIVEN);
     TEST_ASSERT_EQUAL_STRING(KEY, armed_key);
     TEST_ASSERT_EQUAL_STRING("a", bridge_lease_name(&lease));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
+                      bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
     TEST_ASSERT_NOT_NULL(strstr(line, "\"right_mm_s\":100,\"key\":\"00112233445566778899aabbccddeeff\"}"));
 }
@@ -84,7 +86,8 @@ static void test_one_person_key_of_the_gateway_is_in_each_drive(void) {
 static void test_one_person_without_gateways_key_gets_a_drawn_one(void) {
     arm("a", true, ",\"state\":\"armed\"");
     TEST_ASSERT_EQUAL(32, strlen(armed_key));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, armed_key, DRIVE, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
+                      bridge_lease_drive(&lease, armed_key, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
     TEST_ASSERT_NULL(strstr(line, "key"));
 }
@@ -94,7 +97,8 @@ static void test_one_person_other_key_never_drives(void) {
                                         "00112233445566778899aabbccddeefff"};
     arm("a", true, GIVEN);
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, wrong[i], DRIVE, NULL, NULL, now_us));
+        TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG,
+                          bridge_lease_drive(&lease, wrong[i], DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
     }
     TEST_ASSERT_FALSE(fake_gateway_read(&gateway, 0, line, sizeof line));
 }
@@ -106,13 +110,14 @@ static void test_one_person_second_is_another_client_and_refused(void) {
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 1));
     TEST_ASSERT_FALSE(fake_gateway_is_closed(&gateway, 0));
     TEST_ASSERT_EQUAL_STRING("a", bridge_lease_name(&lease));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, NULL, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
 }
 
 static void test_one_person_third_is_busy_while_second_asks(void) {
     arm("a", true, GIVEN);
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "b", ARM, take_answer, NULL, now_us));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_BUSY, bridge_lease_arm(&lease, "c", ARM, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "b", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_BUSY,
+                      bridge_lease_arm(&lease, "c", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     step();
     TEST_ASSERT_EQUAL(2, gateway.count);
 }
@@ -122,14 +127,14 @@ static void test_one_person_takeover_ends_the_former_holder(void) {
     arm("b", true, ",\"key\":\"ffeeddccbbaa99887766554433221100\"");
     TEST_ASSERT_EQUAL_STRING("b", bridge_lease_name(&lease));
     TEST_ASSERT_TRUE(fake_gateway_is_closed(&gateway, 0));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, NULL, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
 }
 
 static void test_lease_end_voids_the_key_before_the_connection(void) {
     arm("a", true, GIVEN);
     bridge_lease_end(&lease, now_us);
     TEST_ASSERT_NULL(bridge_lease_name(&lease));
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, NULL, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_WRONG, bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){NULL, NULL}, now_us));
     TEST_ASSERT_FALSE(fake_gateway_is_closed(&gateway, 0));
     TEST_ASSERT_EQUAL_UINT64(now_us + BRIDGE_ENDING_US, bridge_lease_next_us(&lease, now_us));
     now_us += BRIDGE_ENDING_US;
@@ -148,7 +153,7 @@ static void test_lease_ending_place_makes_room_for_the_next(void) {
 }
 
 static void test_lease_end_refuses_who_asks(void) {
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     step();
     bridge_lease_end(&lease, now_us);
     TEST_ASSERT_EQUAL(1, refused);
@@ -159,7 +164,7 @@ static void test_lease_end_refuses_who_asks(void) {
 
 static void test_lease_forgotten_asker_gets_no_lease(void) {
     int who = 0;
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, take_answer, &who, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, &who}, now_us));
     step();
     bridge_lease_forget(&lease, &who);
     TEST_ASSERT_EQUAL(0, answered + refused);
@@ -169,7 +174,8 @@ static void test_lease_forgotten_asker_gets_no_lease(void) {
 
 static void test_lease_not_holder_ends_it(void) {
     arm("a", true, GIVEN);
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
+                      bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
     TEST_ASSERT_TRUE(fake_gateway_read(&gateway, 0, line, sizeof line));
     fake_gateway_reply(&gateway, 0, line, false, ",\"error\":\"not_holder\",\"message\":\"m\"");
     step();
@@ -181,9 +187,11 @@ static void test_lease_not_holder_ends_it(void) {
 static void test_lease_lost_connection_answers_drives_once(void) {
     arm("a", true, GIVEN);
     for (int i = 0; i < 4; i++) {
-        TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_drive(&lease, KEY, DRIVE, take_answer, NULL, now_us));
+        TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK,
+                          bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
     }
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_FULL, bridge_lease_drive(&lease, KEY, DRIVE, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_FULL,
+                      bridge_lease_drive(&lease, KEY, DRIVE, (bridge_asker_t){take_answer, NULL}, now_us));
     fake_gateway_hang_up(&gateway, 0);
     step();
     TEST_ASSERT_EQUAL(4, refused);
@@ -191,13 +199,14 @@ static void test_lease_lost_connection_answers_drives_once(void) {
 }
 
 static void test_lease_arm_without_reply_ends(void) {
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_OK, bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
     step();
     now_us += BRIDGE_ARM_US;
     step();
     TEST_ASSERT_EQUAL(1, refused);
     fake_gateway_close(&gateway);
-    TEST_ASSERT_EQUAL(BRIDGE_LEASE_AWAY, bridge_lease_arm(&lease, "a", ARM, take_answer, NULL, now_us));
+    TEST_ASSERT_EQUAL(BRIDGE_LEASE_AWAY,
+                      bridge_lease_arm(&lease, "a", ARM, (bridge_asker_t){take_answer, NULL}, now_us));
 }
 
 static void test_movers_deflected_stick_is_named_for_its_time(void) {

@@ -225,6 +225,21 @@ static void test_gateway_that_does_not_greet_delays_nothing(void) {
     TEST_ASSERT_GREATER_THAN_UINT64(now_us, bridge_link_next_us(&link_, now_us));
 }
 
+static void test_stop_that_was_given_up_is_not_sent_late(void) {
+    gateway.greets = false;
+    step();
+    step();
+    TEST_ASSERT_TRUE(bridge_link_ask(&link_, "{\"cmd\":\"stop\"}", take_answer, NULL, now_us));
+    now_us += BRIDGE_STOP_US;
+    step();
+    TEST_ASSERT_EQUAL(1, refused);
+    fake_gateway_send(&gateway, STOPS, "{\"event\":\"hello\",\"api\":1,\"client\":1,\"rights\":\"drive\"}");
+    step();
+    step();
+    TEST_ASSERT_EQUAL(BRIDGE_HERE, link_.stop.line.state);
+    TEST_ASSERT_EQUAL(0, read_all(STOPS));
+}
+
 static void test_full_gateway_is_not_called_without_pause(void) {
     gateway.greets = false;
     for (int i = 0; i < 20; i++) {
@@ -277,6 +292,7 @@ int main(void) {
     RUN_TEST(test_stop_while_the_line_is_lost_connects_at_once);
     RUN_TEST(test_stop_without_gateway_is_not_accepted);
     RUN_TEST(test_gateway_that_does_not_greet_delays_nothing);
+    RUN_TEST(test_stop_that_was_given_up_is_not_sent_late);
     RUN_TEST(test_full_gateway_is_not_called_without_pause);
     RUN_TEST(test_lost_gateway_answers_all_questions_once);
     return UNITY_END();

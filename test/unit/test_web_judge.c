@@ -7,16 +7,12 @@
 
 #include <string.h>
 
-static const char token[] = "00112233445566778899aabbccddeeff";
 static web_rules_t rules;
 static web_asked_t asked;
 
 void setUp(void) {
-    rules = (web_rules_t){token, "walker.lan other", false, false};
-    asked = (web_asked_t){.method = "GET",
-                          .path = "/api/status",
-                          .host = "127.0.0.1:8470",
-                          .authorization = "Bearer 00112233445566778899aabbccddeeff"};
+    rules = (web_rules_t){"walker.lan other", false, false};
+    asked = (web_asked_t){.method = "GET", .path = "/api/status", .host = "127.0.0.1:8470", .proof = WEB_PROOF_FULL};
 }
 
 void tearDown(void) {}
@@ -89,31 +85,59 @@ static void test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link
     TEST_ASSERT_EQUAL_UINT(403, status());
 }
 
-static void test_token_missing_wrong_or_longer_is_refused(void) {
-    static const char *const wrong[] = {NULL,
-                                        "",
-                                        "Bearer",
-                                        "Bearer ",
-                                        "Bearer 00112233445566778899aabbccddeef0",
-                                        "Bearer 00112233445566778899aabbccddeeff0",
-                                        "Bearer 0",
-                                        "Basic 00112233445566778899aabbccddeeff",
-                                        "00112233445566778899aabbccddeeff",
-                                        "Bearer  00112233445566778899aabbccddeeff"};
+static void test_request_without_proof_is_refused(void) {
+    static const web_proof_t wrong[] = {WEB_PROOF_NONE, WEB_PROOF_WRONG, WEB_PROOF_OVER};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        asked.authorization = wrong[i];
+        asked.proof = wrong[i];
+        asked.method = "GET";
+        asked.path = "/api/status";
+        TEST_ASSERT_EQUAL_UINT(401, status());
+        TEST_ASSERT_EQUAL_STRING((wrong[i] == WEB_PROOF_OVER) ? "bad_session" : "bad_token",
+                                 web_judge(&rules, &asked).error);
+        asked.path = "/nowhere";
+        TEST_ASSERT_EQUAL_UINT(401, status());
+        asked.path = "/page.js";
+        TEST_ASSERT_EQUAL_UINT(200, status());
+        asked.path = "/api/challenge";
+        TEST_ASSERT_EQUAL_UINT(200, status());
+        asked.method = "POST";
+        asked.path = "/api/estop";
         TEST_ASSERT_EQUAL_UINT(401, status());
     }
-    asked.path = "/nowhere";
-    TEST_ASSERT_EQUAL_UINT(401, status());
-    asked.path = "/page.js";
-    TEST_ASSERT_EQUAL_UINT(200, status());
 }
 
-static void test_empty_token_of_ours_lets_nobody_in(void) {
-    rules.token = "";
-    asked.authorization = "Bearer ";
-    TEST_ASSERT_EQUAL_UINT(401, status());
+static void test_secret_for_reading_only_reads(void) {
+    static const char *const commands[] = {"/api/estop", "/api/arm", "/api/drive", "/api/reset"};
+    rules.may_drive = true;
+    rules.may_reset = true;
+    asked.proof = WEB_PROOF_READ;
+    TEST_ASSERT_EQUAL_UINT(200, status());
+    asked.method = "POST";
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        asked.path = commands[i];
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(401, status(), commands[i]);
+    }
+}
+
+static void test_stop_never_needs_a_proof(void) {
+    asked.method = "POST";
+    asked.path = "/api/stop";
+    for (int proof = WEB_PROOF_NONE; proof <= WEB_PROOF_FULL; proof++) {
+        asked.proof = (web_proof_t)proof;
+        TEST_ASSERT_EQUAL_UINT(200, status());
+    }
+    asked.origin = "http://evil.example";
+    TEST_ASSERT_EQUAL_UINT(403, status());
+    asked.origin = NULL;
+    asked.host = "evil.example";
+    TEST_ASSERT_EQUAL_UINT(421, status());
+}
+
+static void test_header_that_is_there_twice_is_refused(void) {
+    asked.is_doubled = true;
+    TEST_ASSERT_EQUAL_UINT(400, status());
+    asked.has_body = true;
+    TEST_ASSERT_EQUAL_UINT(400, status());
 }
 
 static void test_unknown_path_and_other_method_are_refused(void) {
@@ -199,8 +223,8 @@ static const char *take(uint64_t now_us) {
 
 static void begin(void) {
     driver = (web_driver_t){0};
-    command = (web_command_t){token, "4900000", "1", "200", "-100"};
-    web_driver_begin(&driver, token, NOW);
+    command = (web_command_t){true, "4900000", "1", "200", "-100"};
+    web_driver_begin(&driver, NOW);
 }
 
 static void test_drive_command_of_the_page_that_armed_is_taken_once(void) {
@@ -224,15 +248,41 @@ static void test_drive_command_that_is_late_or_from_the_future_is_dropped(void) 
 
 static void test_drive_command_of_another_page_is_dropped(void) {
     begin();
-    command.key = "ffeeddccbbaa99887766554433221100";
+    command.is_holders = false;
     TEST_ASSERT_NOT_NULL(take(NOW));
-    command.key = NULL;
-    TEST_ASSERT_NOT_NULL(take(NOW));
+    command.is_holders = true;
     web_driver_end(&driver);
-    command.key = "";
     TEST_ASSERT_NOT_NULL(take(NOW));
-    command.key = token;
-    TEST_ASSERT_NOT_NULL(take(NOW));
+}
+
+static void test_command_that_turns_a_wheel_is_noticed_beyond_limits_too(void) {
+    begin();
+    command.is_holders = false;
+    TEST_ASSERT_TRUE(web_command_moves(&command));
+    command.v_mm_s = "0";
+    TEST_ASSERT_TRUE(web_command_moves(&command));
+    command.yaw_mrad_s = "0";
+    TEST_ASSERT_FALSE(web_command_moves(&command));
+    command.v_mm_s = "-5000";
+    TEST_ASSERT_TRUE(web_command_moves(&command));
+    command.v_mm_s = "1.5";
+    TEST_ASSERT_FALSE(web_command_moves(&command));
+    command.v_mm_s = NULL;
+    TEST_ASSERT_FALSE(web_command_moves(&command));
+}
+
+static void test_age_of_arm_and_reset_has_two_ends(void) {
+    static const char *const wrong[] = {NULL, "", "x", "-1", "3999999", "5100001", "0", "9223372036854775807"};
+    static const char *const good[] = {"4000000", "5000000", "5100000"};
+    int64_t t_us = 7;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        TEST_ASSERT_NOT_NULL(web_age_wrong(wrong[i], NOW, &t_us));
+    }
+    TEST_ASSERT_EQUAL_INT64(7, t_us);
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        TEST_ASSERT_NULL(web_age_wrong(good[i], NOW, &t_us));
+    }
+    TEST_ASSERT_EQUAL_INT64(5100000, t_us);
 }
 
 static void test_drive_command_beyond_the_configured_speed_is_dropped(void) {
@@ -263,8 +313,10 @@ int main(void) {
     RUN_TEST(test_host_of_another_name_is_refused);
     RUN_TEST(test_origin_of_another_site_is_refused);
     RUN_TEST(test_request_that_a_browser_says_is_cross_site_is_refused_but_a_link_to_the_page_is_not);
-    RUN_TEST(test_token_missing_wrong_or_longer_is_refused);
-    RUN_TEST(test_empty_token_of_ours_lets_nobody_in);
+    RUN_TEST(test_request_without_proof_is_refused);
+    RUN_TEST(test_secret_for_reading_only_reads);
+    RUN_TEST(test_stop_never_needs_a_proof);
+    RUN_TEST(test_header_that_is_there_twice_is_refused);
     RUN_TEST(test_unknown_path_and_other_method_are_refused);
     RUN_TEST(test_driving_and_reset_are_refused_unless_configured);
     RUN_TEST(test_stop_and_estop_are_always_taken);
@@ -273,6 +325,8 @@ int main(void) {
     RUN_TEST(test_drive_command_of_the_page_that_armed_is_taken_once);
     RUN_TEST(test_drive_command_that_is_late_or_from_the_future_is_dropped);
     RUN_TEST(test_drive_command_of_another_page_is_dropped);
+    RUN_TEST(test_command_that_turns_a_wheel_is_noticed_beyond_limits_too);
+    RUN_TEST(test_age_of_arm_and_reset_has_two_ends);
     RUN_TEST(test_drive_command_beyond_the_configured_speed_is_dropped);
     RUN_TEST(test_driver_that_says_nothing_is_silent_and_nobody_is_not);
     return UNITY_END();

@@ -6,6 +6,8 @@ import json
 import os
 import shutil
 import signal
+import socket
+import threading
 import time
 from pathlib import Path
 
@@ -17,7 +19,7 @@ ASSETS = Path(os.environ.get("IWHEEL_WEB_ASSETS") or Path(os.environ.get("XDG_CA
 
 
 @contextlib.contextmanager
-def page_of(rig, size="desk", scheme="light", url=None):
+def page_of(rig, size="desk", scheme="light", url=None, **device):
     """The page, open and live; anything on its console is an error."""
     try:
         from playwright.sync_api import sync_playwright
@@ -30,7 +32,7 @@ def page_of(rig, size="desk", scheme="light", url=None):
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
         try:
-            page = browser.new_page(viewport=dict(zip(("width", "height"), SIZES[size])), color_scheme=scheme, accept_downloads=True)
+            page = browser.new_page(viewport=dict(zip(("width", "height"), SIZES[size])), color_scheme=scheme, accept_downloads=True, **device)
             page.set_default_timeout(15000)
             page.on("console", lambda message: said.append(message.text) if message.type == "error" and "Failed to load resource" not in message.text else None)
             page.on("pageerror", lambda error: said.append(str(error)))
@@ -425,6 +427,127 @@ def test_page_is_accessible_and_fits_in_light_and_dark_on_phone_and_desk(rig):
             assert wide <= 0, f"{size}: {wide} pixels too wide"
             small = page.evaluate("[...document.querySelectorAll('#bar button')].map((e) => e.getBoundingClientRect().height)")
             assert min(small) >= 44, small
+
+
+def press_stop(page, rig):
+    """Presses where STOP is seen on the screen, and measures until the bus."""
+    driver = Driver(rig)
+    at = page.evaluate("""() => { const b = document.querySelector('#stop').getBoundingClientRect(), v = visualViewport;
+        return [b.left + b.width / 2 - v.offsetLeft, b.top + b.height / 2 - v.offsetTop, v.width, v.height]; }""")
+    assert 0 < at[0] < at[2] and 0 < at[1] < at[3], f"STOP is not on the screen: {at}"
+    since = now_us()
+    page.context.new_cdp_session(page).send("Input.dispatchMouseEvent", {"type": "mousePressed", "x": at[0], "y": at[1], "button": "left", "clickCount": 1})
+    late = braking_ms(rig, since)
+    page.context.new_cdp_session(page).send("Input.dispatchMouseEvent", {"type": "mouseReleased", "x": at[0], "y": at[1], "button": "left", "clickCount": 1})
+    assert late < 1000, f"{late} ms"
+    driver.end()
+    until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+
+
+@needs(driving=True)
+def test_stop_never_dead_behind_a_question_of_the_page(rig):
+    rig.start().connected()
+    with page_of(rig, "phone") as page:
+        live(page)
+        for button in ("#estop-ask", "#arm"):
+            page.click(button)
+            assert page.evaluate("document.querySelector('#ask').open")
+            press_stop(page, rig)
+            assert not page.evaluate("document.querySelector('#ask').open"), "STOP answers the question with no"
+            assert rig.ask_json("GET", "/api/status")[1]["state"] == "listening"
+            assert not page.evaluate("drive.on")
+            page.click(button)
+            page.keyboard.press("s")
+            until(lambda: not page.evaluate("document.querySelector('#ask').open"))
+
+
+def test_stop_never_leaves_the_screen_by_zoom_or_size(rig):
+    rig.start().connected()
+    for width, height in ((320, 568), (568, 320), (390, 844), (1440, 900)):
+        with page_of(rig, "phone", is_mobile=True, has_touch=True) as page:
+            page.set_viewport_size({"width": width, "height": height})
+            live(page)
+            press_stop(page, rig)
+            page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": 3})
+            seen(page, "visualViewport.scale > 1.5")
+            time.sleep(0.3)
+            if os.environ.get("IWHEEL_WEB_SHOTS"):
+                page.screenshot(path=Path(os.environ["IWHEEL_WEB_SHOTS"]) / f"zoom-{width}.png")
+            press_stop(page, rig)
+
+
+def test_stop_never_needs_the_token_or_the_login(rig):
+    rig.start().connected()
+    with page_of(rig, "phone", url=rig.url.split("#")[0]) as page:
+        page.wait_for_selector("#login:not([hidden])")
+        press_stop(page, rig)
+
+
+def test_delivered_goes_with_the_next_state(rig):
+    rig.start().connected()
+    with page_of(rig) as page:
+        live(page)
+        driver = Driver(rig)
+        page.click("#stop")
+        seen(page, "document.querySelector('#delivered').textContent.startsWith('Stop delivered')")
+        driver.end()
+        until(lambda: rig.ask_json("GET", "/api/status")[1]["state"] == "listening", what="the wheels stand")
+        seen(page, "document.querySelector('#delivered').textContent === ''")
+
+
+def test_page_never_sends_its_token(rig):
+    """Another program takes the port while the bridge restarts, and reads all that the open page sends."""
+    rig.start().connected()
+    got = []
+
+    def listen(one):
+        while True:
+            try:
+                peer, _ = one.accept()
+                peer.settimeout(1)
+                got.append(peer.recv(65536))
+                peer.sendall(b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: 81\r\nConnection: close\r\n\r\n"
+                             b'{"ok":true,"nonce":"00000000000000000000000000000000","boot":"0000","gateway":"x"}')
+                peer.close()
+            except OSError:
+                if one.fileno() < 0:
+                    return
+
+    with page_of(rig) as page:
+        live(page)
+        rig.web.signal(signal.SIGKILL)
+        rig.web.wait(2)
+        with socket.create_server(("127.0.0.1", rig.port)) as thief:
+            threading.Thread(target=listen, args=(thief,), daemon=True).start()
+            until(lambda: sum(b"/api/" in one or b"/health" in one for one in got) >= 3, 20, "the page tries again")
+            page.click("#stop")
+            time.sleep(0.5)
+        assert not any(rig.token.encode() in one for one in got), got
+        page.said.clear()
+
+
+def test_page_has_no_service_worker(rig):
+    rig.start()
+    with page_of(rig) as page:
+        live(page)
+        assert page.evaluate("navigator.serviceWorker.getRegistrations().then((all) => all.length)") == 0
+        assert page.evaluate("navigator.serviceWorker.register('/page.js').then(() => 'registered', () => 'refused')") == "refused"
+        page.said.clear()
+
+
+@needs(driving=True)
+def test_reset_button_clears_the_stop_that_is_shown(rig):
+    rig.start().connected()
+    with page_of(rig) as page:
+        live(page)
+        rig.ask("POST", "/api/estop")
+        page.wait_for_selector("#reset:not([hidden])")
+        seen(page, "page.stop !== null")
+        time.sleep(1.2)
+        page.click("#reset")
+        rig.ask("POST", "/api/stop")
+        page.click("#ask-yes")
+        seen(page, "document.querySelector('#state').textContent === 'listening'")
 
 
 @full

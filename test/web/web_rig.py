@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Simulated wheels, gateway and web bridge in one private folder, and an HTTP client of ours that may send anything."""
 
+import hashlib
+import hmac
 import http.client
 import json
+import secrets
 import socket
 import sys
 from pathlib import Path
@@ -10,6 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "test/system"))
 
+from bus import now_us  # noqa: E402
 from harness import Process, Rig  # noqa: E402
 from trials import until  # noqa: E402
 
@@ -23,11 +27,59 @@ def free_port():
         return one.getsockname()[1]
 
 
+class Person:
+    """A sender with a token, as docs/web.md writes it down: a session of its own, and a proof with each request."""
+
+    def __init__(self, rig, token=None):
+        self.rig, self.token, self.session, self.sequence, self.challenge = rig, token, secrets.token_hex(16), 0, None
+
+    def begin(self):
+        self.challenge = json.loads(self.rig.ask("GET", "/api/challenge", token="")[1])
+        self.session, self.sequence = secrets.token_hex(16), 0
+
+    def mac(self, method, target, sequence):
+        text = "\n".join((method, target, self.session, self.challenge["nonce"], str(sequence)))
+        return hmac.new((self.token or self.rig.token).encode(), text.encode(), hashlib.sha256).hexdigest()
+
+    def header(self, method, target):
+        if self.challenge is None:
+            self.begin()
+        self.sequence += 1
+        return f"IWheel {self.session} {self.challenge['nonce']} {self.sequence} {self.mac(method, target, self.sequence)}"
+
+    def ask(self, method, target, **options):
+        """(status, JSON). A bridge that was started again does not know the session."""
+        for _ in range(2):
+            status, body = self.rig.ask(method, target, headers={"Authorization": self.header(method, target), **options.pop("headers", {})}, token="", **options)
+            answer = json.loads(body)
+            if status != 401 or answer["error"] != "bad_session":
+                break
+            self.begin()
+        return status, answer
+
+    @property
+    def boot(self):
+        if self.challenge is None:
+            self.begin()
+        return self.challenge["boot"]
+
+    def arm(self, t_us=None, **options):
+        return self.ask("POST", f"/api/arm?boot={self.boot}&t_us={t_us or now_us()}", **options)
+
+    def drive(self, key, sequence, age_us=0, v=150):
+        return self.ask("POST", f"/api/drive?key={key}&sequence={sequence}&t_us={now_us() - age_us}&v_mm_s={v}&yaw_mrad_s=0")
+
+    def reset(self, t_us=None, stop=None):
+        stop = self.ask("GET", "/api/stops")[1]["stops"][0]["number"] if stop is None else stop
+        return self.ask("POST", f"/api/reset?boot={self.boot}&t_us={t_us or now_us()}&stop={stop}")
+
+
 class WebRig(Rig):
     """`driving`: the page may drive and reset."""
 
     def __init__(self, build, driving=False, settings=None):
         self.driving, self.web, self.port = driving, None, free_port()
+        self.person, self.proved = Person(self), None
         self.web_settings = {"gateway": {"rate_hz": 20}, "web": {"port": self.port}, "fleet": {}, "drive": {}}
         super().__init__(str(build), CONFIG)
         self.web_settings["gateway"]["socket"] = self.path("gateway.sock" if driving else "watch.sock")
@@ -82,15 +134,22 @@ class WebRig(Rig):
     def url(self):
         return f"http://127.0.0.1:{self.port}/#token={self.token}"
 
+    @property
+    def read_secret(self):
+        return hmac.new(self.token.encode(), b"iwheel-web read", hashlib.sha256).hexdigest()[:32]
+
     def ask(self, method, path, headers=None, token=None, timeout=5):
-        """(status, body) of one request with the right token, unless another one is given; "" sends none."""
+        """(status, body) of one request. It is proved with the right token, unless another one is given; "" proves nothing."""
+        proof = {}
+        if token is None and not (headers and "Authorization" in headers):
+            proof = {"Authorization": self.prove(method, path)}
+        elif token:
+            person = Person(self, token)
+            proof = {"Authorization": person.header(method, path)}
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=timeout)
         try:
             connection.putrequest(method, path, skip_host=bool(headers and "Host" in headers))
-            given = self.token if token is None else token
-            if given:
-                connection.putheader("Authorization", f"Bearer {given}")
-            for name, value in (headers or {}).items():
+            for name, value in (*proof.items(), *(headers or {}).items()):
                 connection.putheader(name, value)
             connection.endheaders()
             answer = connection.getresponse()
@@ -99,6 +158,13 @@ class WebRig(Rig):
         finally:
             connection.close()
 
+    def prove(self, method, path):
+        """A session lasts as long as the bridge that knows it."""
+        if self.person.challenge is None or self.proved is not self.web:
+            self.person.begin()
+            self.proved = self.web
+        return self.person.header(method, path)
+
     def ask_json(self, method, path, **options):
         status, body = self.ask(method, path, **options)
         return status, json.loads(body)
@@ -106,7 +172,7 @@ class WebRig(Rig):
     def stream(self, seconds=5):
         """An open event stream: a socket file behind its header."""
         one = socket.create_connection(("127.0.0.1", self.port), timeout=seconds)
-        one.sendall(f"GET /api/events HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer {self.token}\r\n\r\n".encode())
+        one.sendall(f"GET /api/events HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer {self.read_secret}\r\n\r\n".encode())
         return one
 
 

@@ -5,14 +5,6 @@
 const $ = (id) => document.getElementById(id);
 const EVERY_MS = 2000, OLD_MS = 10000;
 
-function takeToken() {
-  const found = /[#&]token=([0-9a-f]{32})\b/.exec(location.hash);
-  if (found) {
-    sessionStorage.setItem("token", found[1]);
-    history.replaceState(null, "", location.pathname);
-  }
-}
-
 // Texts come from the machines: they are only ever put in as text.
 function cell(label, text, kind = "") {
   const made = document.createElement("td");
@@ -68,7 +60,7 @@ function show(fleet, now_ms) {
 
 async function look() {
   try {
-    const answer = await fetch("/api/fleet", { headers: { Authorization: `Bearer ${sessionStorage.getItem("token") ?? ""}` }, cache: "no-store", credentials: "omit" });
+    const answer = await askProved("GET", "/api/fleet");
     $("login").hidden = answer.status !== 401;
     $("main").hidden = answer.status === 401;
     const body = await answer.json();
@@ -82,7 +74,7 @@ async function look() {
 takeToken();
 $("login").addEventListener("submit", (event) => {
   event.preventDefault();
-  sessionStorage.setItem("token", $("token").value.trim());
+  setToken($("token").value.trim());
   look();
 });
 look();

@@ -3,15 +3,20 @@
 // The page: one stream of events from the bridge, what is known of it on the screen, and the stops.
 
 const $ = (id) => document.getElementById(id);
-const STALE_MS = 1000, STOP_TRY_MS = 400, DRIVE_MS = 100;
-const page = { token: "", state: null, heard: 0, gateway: null, stream: null, wait: 500, rights: {}, t_us: 0, frozen: false, recording: null };
+const STALE_MS = 1000, STOP_TRY_MS = 400, DRIVE_MS = 100, ASK_MS = 1000;
+const page = { state: null, heard: 0, gateway: null, stream: null, wait: 500, rights: {}, t_us: 0, frozen: false, recording: null, stop: null, delivered: null };
 
 // ---- asking the bridge --------------------------------------------------------------------------------------------
 
-async function ask(method, path, options = {}) {
-  const answer = await fetch(path, { method, headers: { Authorization: `Bearer ${page.token}` }, cache: "no-store", credentials: "omit", ...options });
+async function ask(method, path, options) {
+  const answer = await askProved(method, path, options);
   if (answer.status === 401) askToken();
   return answer;
+}
+
+// STOP needs no proof, and waits for none.
+function askStop(options) {
+  return fetch("/api/stop", { method: "POST", cache: "no-store", credentials: "omit", ...options });
 }
 
 async function askJson(path) {
@@ -27,33 +32,26 @@ function askToken() {
   page.stream?.abort();
 }
 
-function takeToken() {
-  const found = /[#&]token=([0-9a-f]{32})\b/.exec(location.hash);
-  if (found) {
-    sessionStorage.setItem("token", found[1]);
-    history.replaceState(null, "", location.pathname); // Nobody reads it over a shoulder, and no history keeps it.
-  }
-  page.token = sessionStorage.getItem("token") ?? "";
-}
-
 // Asks once, in words, before something that cannot be taken back.
+// Not modal: a modal dialog would make STOP inert. STOP answers it with no.
 function confirmed(text, yes) {
-  const dialog = $("ask");
+  const dialog = $("ask"), before = document.activeElement;
+  dialog.onclose?.(); // Another question takes its place.
   $("ask-says").textContent = text;
   $("ask-yes").textContent = yes;
-  dialog.showModal();
+  if (!dialog.open) dialog.show();
   $("ask-no").focus();
   return new Promise((done) => {
     $("ask-yes").onclick = () => { done(true); dialog.close(); };
     $("ask-no").onclick = () => dialog.close();
-    dialog.onclose = () => done(false);
+    dialog.onclose = () => { done(false); dialog.onclose = null; before?.focus(); };
   });
 }
 
 // ---- the stream ---------------------------------------------------------------------------------------------------
 
 async function listen() {
-  if (page.stream || !page.token || document.hidden) return;
+  if (page.stream || !proof.token || document.hidden) return;
   const control = new AbortController();
   page.stream = control;
   try {
@@ -112,6 +110,7 @@ function takeEvent(event) {
 
 function takeState(state) {
   page.state = state;
+  forgetDelivered(state);
   page.t_us = state.t_us;
   page.heard = performance.now();
   page.gateway = true;
@@ -286,10 +285,12 @@ async function deliver(name) {
     times++;
     const asked = deliver.verb;
     try {
-      const answer = await ask("POST", `/api/${asked}`, { signal: AbortSignal.timeout(STOP_TRY_MS), keepalive: true });
+      const options = { signal: AbortSignal.timeout(STOP_TRY_MS), keepalive: true };
+      const answer = await (asked === "stop" ? askStop(options) : ask("POST", "/api/estop", options));
       const body = await answer.json();
       if (answer.ok) {
         tell(fill(STRINGS.delivered, { state: STRINGS.states[body.state] ?? body.state }), "good");
+        page.delivered = { state: body.state, seen: false, ms: performance.now() };
         if (asked === deliver.verb) break;
         continue;
       }
@@ -305,9 +306,37 @@ async function deliver(name) {
   deliver.busy = false;
 }
 
+// What was said of a stop goes with the next state.
+function forgetDelivered(state) {
+  const said = page.delivered;
+  if (!said) return;
+  if (state.state === said.state) said.seen = true;
+  else if (said.seen || performance.now() - said.ms > 1000) tell("");
+}
+
 function tell(words, tone = "") {
+  page.delivered = null;
   $("delivered").className = tone;
   $("delivered").textContent = words;
+}
+
+// A zoom by two fingers moves what is fixed off the screen: the bar goes along, at its size.
+function keepStopInSight() {
+  const seen = visualViewport, bar = $("bar");
+  bar.style.transform = "";
+  const place = bar.getBoundingClientRect(), factor = seen.width / place.width;
+  if (factor > 0.99) return;
+  bar.style.transform = `translate(${seen.offsetLeft - place.left}px, ${seen.offsetTop + seen.height - place.bottom}px) scale(${factor})`;
+}
+
+async function reset(stop) {
+  try {
+    const query = new URLSearchParams({ boot: await bootOf(), t_us: page.t_us, stop });
+    const body = await (await ask("POST", `/api/reset?${query}`, { signal: AbortSignal.timeout(ASK_MS) })).json();
+    tell(body.ok ? "" : fill(STRINGS.refused, { why: body.message }));
+  } catch {
+    tell(fill(STRINGS.refused, { why: STRINGS.no_answer }));
+  }
 }
 
 function notDelivered(why, times) {
@@ -349,9 +378,10 @@ async function hold(x, y) {
   if (drive.held) return;
   drive.held = true;
   $("pad").classList.add("held");
-  const session = ++drive.session;
+  const session = ++drive.session, since = page.t_us; // Since when the hand is there, by the machine's own clock.
   try {
-    const answer = await ask("POST", "/api/arm", { signal: AbortSignal.timeout(1000) });
+    const query = new URLSearchParams({ boot: await bootOf(), t_us: since });
+    const answer = await ask("POST", `/api/arm?${query}`, { signal: AbortSignal.timeout(ASK_MS) });
     const body = await answer.json();
     if (!answer.ok) throw new Error(body.message);
     if (!drive.held || session !== drive.session) return void deliver("stop");
@@ -425,6 +455,7 @@ async function loadStops() {
     return;
   }
   const newest = stops[0];
+  page.stop = newest?.number ?? null;
   $("last-stop").textContent = newest ? fill(STRINGS.last_stop, newest) : "";
   const open = new Set([...document.querySelectorAll("#stops details[open]")].map((one) => one.dataset.number));
   $("stops").replaceChildren(...(stops.length ? stops.map((stop) => showStop(stop, open.has(String(stop.number)))) : [element("p", { text: STRINGS.no_stops, class: "quiet" })]));
@@ -600,19 +631,21 @@ function setUp() {
   $("at").setAttribute("aria-label", STRINGS.player_label);
   $("source").textContent = STRINGS.source_live;
   setUpDriving();
-  const press = () => { release(STRINGS.why_let_go); deliver("stop"); };
+  const press = () => { release(STRINGS.why_let_go); deliver("stop"); $("ask").close(); };
   $("stop").addEventListener("pointerdown", press); // When it is touched, not when the finger leaves it.
   $("stop").addEventListener("click", (event) => { if (event.detail === 0) press(); }); // By Enter, or by a screen reader.
   $("estop-ask").addEventListener("click", async () => { if (await confirmed(STRINGS.ask_estop, STRINGS.ask_estop_yes)) deliver("estop"); });
   $("reset").addEventListener("click", async () => {
-    if (!(await confirmed(STRINGS.ask_reset, STRINGS.ask_reset_yes))) return;
-    const body = await (await ask("POST", "/api/reset")).json();
-    tell(body.ok ? "" : fill(STRINGS.refused, { why: body.message }));
+    const stop = page.stop; // The one that the person sees: a later one is not cleared.
+    if (await confirmed(STRINGS.ask_reset, STRINGS.ask_reset_yes)) reset(stop);
   });
   document.addEventListener("keydown", (event) => {
     const typing = event.target.matches("input") && event.target.type !== "range";
-    if (event.key.toLowerCase() === "s" && !typing && !event.ctrlKey && !event.metaKey && !event.altKey && !event.repeat) deliver("stop");
+    if (event.key.toLowerCase() === "s" && !typing && !event.ctrlKey && !event.metaKey && !event.altKey && !event.repeat) press();
+    if (event.key === "Escape") $("ask").close();
   });
+  visualViewport.addEventListener("resize", keepStopInSight);
+  visualViewport.addEventListener("scroll", keepStopInSight);
   $("freeze").addEventListener("click", freeze);
   $("live").addEventListener("click", goLive);
   $("play").addEventListener("click", playOn);
@@ -621,8 +654,7 @@ function setUp() {
   $("files").addEventListener("change", (event) => openFiles(event.target.files));
   $("login").addEventListener("submit", (event) => {
     event.preventDefault();
-    page.token = $("token").value.trim();
-    sessionStorage.setItem("token", page.token);
+    setToken($("token").value.trim());
     listen();
   });
   window.addEventListener("blur", () => letGo("why_hidden"));
@@ -632,7 +664,7 @@ function setUp() {
     if (document.hidden) page.stream?.abort(); else { page.wait = 100; listen(); }
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { allPlots().forEach((plot) => plot.build()); path.dirty = true; });
-  if (!page.token) askToken();
+  if (!proof.token) askToken();
   listen();
   setInterval(show, 200);
   const paint = () => {
