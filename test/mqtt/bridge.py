@@ -61,6 +61,7 @@ def arm(far):
 
 def steer(far, seconds, speed=200, until_time=None):
     """Drives by quoting the newest state, as a page would; how many commands were sent."""
+    until(lambda: far.messages("state"), what="a state")
     end, sent = until_time or time.monotonic() + seconds, 0
     while time.monotonic() < end:
         state = far.messages("state")[-1]

@@ -213,8 +213,8 @@ void gw_service_accept(gw_clients_t *self) {
 }
 
 void gw_service_tend_arrivals(gw_clients_t *self) {
-    for (uint32_t i = gw_clients_from(self, gw_parts[GW_STOP].first); i < GW_CLIENTS_MAX;
-         i = gw_clients_from(self, i + 1U)) {
+    uint32_t i = (self->count[GW_STOP] > 0U) ? gw_clients_from(self, gw_parts[GW_STOP].first) : GW_CLIENTS_MAX;
+    for (; i < GW_CLIENTS_MAX; i = gw_clients_from(self, i + 1U)) {
         gw_client_t *client = &self->client[i];
         if (client->closing || self->now_us < client->close_us) {
             continue;

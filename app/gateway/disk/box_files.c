@@ -173,7 +173,7 @@ static void survey_directory(survey_t *survey, int directory) {
 /// it is not among those that are removed first.
 static bool was_in_motion(int directory, const found_t *recording) {
     char name[GW_BOX_STEM_SIZE + 8U];
-    char text[2U * GW_BOX_LINE_SIZE];
+    static char text[2U * GW_BOX_LINE_SIZE]; // Too large for a stack.
     (void)snprintf(name, sizeof name, GW_BOX_PREFIX "%06u-%s.jsonl", (unsigned)recording->number, recording->cause);
     const int fd = openat(directory, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     const ssize_t got = (fd >= 0) ? read(fd, text, sizeof text - 1U) : -1;

@@ -146,6 +146,7 @@ static void fill_files(writer_t *self) {
     }
     follow(self);
     self->result.frames = (uint32_t)self->frames;
+    flush(self); // The last line says that the rest is whole: it comes after all of it.
     put_line(self, self->events_file, gw_box_line_end(self->frames, self->line));
 }
 

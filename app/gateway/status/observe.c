@@ -147,8 +147,11 @@ static void tell_left_behind(gw_status_t *self) {
 
 /// The first telemetry comes a moment after the start: until then a wheel without any is not a fault.
 static uint32_t faults_of(const gw_status_t *self, const iw_snapshot_t *seen) {
-    const bool starting = self->wheels->now_us < self->observed.started_us + FIRST_TELEMETRY_US;
-    return starting ? seen->present & ~(1U << IW_CAUSE_WHEEL_LOST) : seen->present;
+    const uint32_t lost = 1U << IW_CAUSE_WHEEL_LOST;
+    if ((seen->present & lost) == 0U || self->wheels->now_us >= self->observed.started_us + FIRST_TELEMETRY_US) {
+        return seen->present;
+    }
+    return seen->present & ~lost;
 }
 
 /// While armed or stopping a cause makes a stop, which is reported as such; these are the others.
