@@ -43,6 +43,8 @@ STORY = (
 ABSENT = {"wall_us", "pid", "directory", "recording", "recording_error", "frames_before", "frames_after", "memory", "gaps", "load_permille", "lost_frames",
           "ledger", "bitrate", "sample_point_permille", "warnings", "timing", "name", "line", "simulated",
           "at_rest", "heard", "valid", "unit_evidence", "force_validity", "offset_provenance", "offset_origin", "before_provenance", "offset_window", "offset_contaminated"}
+# A board has no random source, so that its reply to arm has no key.
+DAEMON_ONLY = {"key"}
 # A number, or null where the wheels have not said it yet.
 MEASURED_OR_NULL = {"x_mm", "y_mm", "z_mm", "psi_mrad", "age_ms", "wheel_offset_mN", "speed_rpm", "speed_mm_s", "acceleration_raw", "offset_age_ms", "force_age_ms",
                     "force_net_mN", "force_offset_mN", "offset_samples", "offset_deviation_mN", "offset_drift_mN"}
@@ -61,7 +63,7 @@ def shape(value, names, key=None):
     if key in ABSENT:
         return "ABSENT"
     if isinstance(value, dict):
-        return {name: shape(part, names, name) for name, part in value.items()}
+        return {name: shape(part, names, name) for name, part in value.items() if name not in DAEMON_ONLY}
     if isinstance(value, list):
         return [shape(part, names) for part in value]
     if isinstance(value, str):
