@@ -38,7 +38,7 @@ def stop_by_either(path: str, cmd: str, fields: Mapping[str, Any], timeout: floa
             except GatewayUnavailable as error:
                 first = first or error
                 passing = passing or not isinstance(error.__cause__, (FileNotFoundError, ConnectionRefusedError, PermissionError))
-        if not passing or time.monotonic() > deadline:
+        if first is not None and (not passing or time.monotonic() > deadline):
             raise first
         time.sleep(AGAIN_S)
 
