@@ -155,8 +155,11 @@ static void merge(survey_t *survey, found_t *last, const found_t *file) {
     }
 }
 
-/// Reads the directory once. Afterwards `file` has one entry for each recording, the oldest first.
-static void survey_directory(survey_t *survey, int directory) {
+/// Reads the directory once. Afterwards `file` has one entry for each recording, the oldest first. What it returns is valid
+/// until the next call.
+static survey_t *survey_directory(int directory) {
+    static survey_t found; // Too large for a stack.
+    survey_t *const survey = &found;
     survey->files = survey->recordings = 0;
     survey->bytes = 0;
     survey->partial = false;
@@ -167,6 +170,7 @@ static void survey_directory(survey_t *survey, int directory) {
         merge(survey, (survey->recordings > 0U) ? &survey->file[survey->recordings - 1U] : NULL, &file);
     }
     survey->left = survey->recordings;
+    return survey;
 }
 
 /// Whether the recording is of a stop in motion, by the first lines of its event file. One that cannot be read may be:
@@ -222,20 +226,19 @@ static size_t thin_out(survey_t *survey, int directory, const gw_box_room_t *roo
 }
 
 void gw_box_files_rotate(int directory, const gw_box_room_t *room) {
-    static survey_t survey; // Too large for a stack.
+    survey_t *survey;
     do {
-        survey_directory(&survey, directory);
-    } while (thin_out(&survey, directory, room) > 0U && survey.partial);
+        survey = survey_directory(directory);
+    } while (thin_out(survey, directory, room) > 0U && survey->partial);
 }
 
 bool gw_box_files_drop_oldest(int directory, uint32_t below, bool in_motion) {
-    static survey_t survey;
-    survey_directory(&survey, directory);
-    if (survey.recordings == 0U) {
+    survey_t *const survey = survey_directory(directory);
+    if (survey->recordings == 0U) {
         return false;
     }
-    const gw_box_room_t room = {survey.recordings - 1U, UINT64_MAX, below, in_motion};
-    return thin_out(&survey, directory, &room) > 0U;
+    const gw_box_room_t room = {survey->recordings - 1U, UINT64_MAX, below, in_motion};
+    return thin_out(survey, directory, &room) > 0U;
 }
 
 void gw_box_files_reserve(int directory, uint64_t bytes) {
