@@ -38,9 +38,8 @@ static void tell_state(const ctl_t *self, const json_t *reply) {
     }
 }
 
-static int ask_and_tell_state(ctl_t *self, json_t *request) {
-    json_t *reply = NULL;
-    const int code = ctl_ask(self, request, &reply);
+/// Prints the state of the reply if there is one, releases the reply, and returns `code`.
+static int finish(ctl_t *self, int code, json_t *reply) {
     if (code == CTL_OK) {
         tell_state(self, reply);
     }
@@ -48,14 +47,16 @@ static int ask_and_tell_state(ctl_t *self, json_t *request) {
     return code;
 }
 
+static int ask_and_tell_state(ctl_t *self, json_t *request) {
+    json_t *reply = NULL;
+    const int code = ctl_ask(self, request, &reply);
+    return finish(self, code, reply);
+}
+
 static int stop_and_tell_state(ctl_t *self, const ctl_stop_t *stop) {
     json_t *reply = NULL;
     const int code = ctl_stop(self, stop, &reply);
-    if (code == CTL_OK) {
-        tell_state(self, reply);
-    }
-    json_decref(reply);
-    return code;
+    return finish(self, code, reply);
 }
 
 int verb_stop(ctl_t *self, int count, char **words) {
