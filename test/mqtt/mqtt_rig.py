@@ -132,8 +132,18 @@ class Far:
         self.client.loop_stop()
 
 
+def shut(end):
+    """Ends a connection in both directions, if it has not ended yet."""
+    try:
+        end.shutdown(socket.SHUT_RDWR)
+    except OSError:
+        pass
+
+
 class Line(threading.Thread):
     """A network between bridge and broker that can be cut: at any byte, or without a word."""
+
+    CHUNK = 4096  # Bytes that are passed on together.
 
     def __init__(self, port):
         super().__init__(daemon=True)
@@ -161,30 +171,29 @@ class Line(threading.Thread):
 
     def carry(self, one, other):
         try:
-            while data := one.recv(4096):
-                while self.frozen:
-                    time.sleep(0.01)
-                time.sleep(self.delay)
-                if self.left is not None:
-                    data = data[:max(0, self.left)]
-                    self.left -= len(data)
+            lasts = True
+            while lasts and (data := one.recv(self.CHUNK)):
+                data, lasts = self.passed(data)
                 other.sendall(data)
-                if self.left is not None and self.left <= 0:
-                    break
         except OSError:
             pass
-        for end in (one, other):
-            try:
-                end.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
+        shut(one)
+        shut(other)
+
+    def passed(self, data):
+        """(the part of it that goes on, whether the connection lasts)"""
+        while self.frozen:
+            time.sleep(0.01)
+        time.sleep(self.delay)
+        if self.left is None:
+            return data, True
+        data = data[:max(0, self.left)]
+        self.left -= len(data)
+        return data, self.left > 0
 
     def close(self):
         for one in (self.listener, *self.pairs):
-            try:
-                one.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
+            shut(one)
             one.close()
 
 
