@@ -5,7 +5,7 @@
 ///                     |                   |
 ///                     +---- refused ------+---- closed, not_holder ----> FREE
 ///
-/// There are two places: the holder's and that of a person who asks. Nobody else has a drive connection. The gateway decides who holds
+/// There are two places: the holder's and that of a person who asks. No other person has a drive connection. The gateway decides who holds
 /// the lease: to it two people are two clients, so the second gets `busy` with the name of the first, and `takeover` moves the lease at
 /// standstill only. Names are labels for messages; the key is the right, and it goes only to the person who armed.
 #ifndef IW_BRIDGE_LEASE_H
@@ -63,7 +63,7 @@ struct bridge_place {
 
 struct bridge_lease {
     bridge_place_t place[2];
-    bridge_place_t *holder; ///< NULL: nobody holds the lease by this bridge.
+    bridge_place_t *holder; ///< NULL: no person holds the lease through this bridge.
 };
 
 /// False: no memory. `socket` outlives it; `epoll_fd` is that of the link. It must not be moved afterwards.
@@ -79,9 +79,9 @@ uint64_t bridge_lease_next_us(const bridge_lease_t *self, uint64_t now_us);
 bridge_lease_result_t bridge_lease_arm(bridge_lease_t *self, const char *name, const char *request,
                                        bridge_asker_t asker, uint64_t now_us);
 
-/// The holder's key; NULL: nobody holds the lease by this bridge.
+/// The holder's key; NULL: no person holds the lease through this bridge.
 const char *bridge_lease_key(const bridge_lease_t *self);
-/// The holder's name; NULL: nobody holds it.
+/// The holder's name; NULL: no person holds it.
 const char *bridge_lease_name(const bridge_lease_t *self);
 /// True if `key` is the holder's. NULL is no key.
 bool bridge_lease_is_holder(const bridge_lease_t *self, const char *key);

@@ -7,7 +7,7 @@
 
 #define SHORTEST_US 100000U
 #define LONGEST_US  2000000U
-/// Between two tries while somebody waits for a stop.
+/// Interval between two tries while a person waits for a stop.
 #define URGENT_US 20000U
 /// A line that held so long is followed by a new one soon.
 #define LASTING_US 1000000U

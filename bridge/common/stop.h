@@ -34,7 +34,7 @@ typedef struct {
 
 struct bridge_stop {
     bridge_line_t line;
-    uint64_t try_us;  ///< When to connect next, if nobody asks.
+    uint64_t try_us;  ///< When to connect next, if no request comes.
     uint64_t wait_us; ///< Between two tries.
     uint64_t random;
     uint64_t since_us; ///< When the line came up last.

@@ -103,7 +103,7 @@ static enum MHD_Result send_challenge(web_call_t *self) {
     return send_text(self, text, (size_t)length, MHD_RESPMEM_MUST_COPY);
 }
 
-/// From the newest state: nobody who looks asks the gateway anything.
+/// Answered from the newest state: a viewer never asks the gateway anything.
 static enum MHD_Result send_status(web_call_t *self) {
     size_t length = 0;
     const char *text = web_link_status(&self->server->link, self->server->now_us, &length);

@@ -22,7 +22,7 @@ typedef struct {
 
 typedef struct {
     int listen_fds[WEB_DOOR_LISTENERS]; ///< -1: there is none.
-    int epoll_fd;                       ///< For poll(): somebody who waits has spoken, or left.
+    int epoll_fd;                       ///< For poll(): a waiting connection has sent something, or left.
     unsigned count;
     uint64_t crowded_out;             ///< Who made room for others.
     web_guest_t guests[WEB_DOOR_MAX]; ///< The oldest first.

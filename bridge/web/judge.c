@@ -134,7 +134,7 @@ static bool is_our_page(const web_asked_t *asked) {
     return scheme > 0U && strcasecmp(origin + scheme, asked->host) == 0;
 }
 
-/// STOP needs no proof: whoever sees the page may stop.
+/// STOP needs no proof: any person who sees the page may stop.
 static bool has_proof(const web_route_t *route, const web_asked_t *asked) {
     if (route != NULL && (route->verb == WEB_FILE || route->verb == WEB_CHALLENGE || route->verb == WEB_STOP)) {
         return true;

@@ -111,7 +111,7 @@ static unsigned wanted(const web_settings_t *settings, const char *out[WEB_DOOR_
     return loopback ? 2U : 1U;
 }
 
-/// Without IPv6 nobody can take its loopback.
+/// Without IPv6 no process can bind its loopback.
 static bool has_none(int error) {
     return error == EAFNOSUPPORT || error == EADDRNOTAVAIL;
 }

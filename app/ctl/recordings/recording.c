@@ -16,7 +16,7 @@
 #define BACK_US 100000
 /// Two frames of a bus in use are closer together.
 #define AHEAD_US 2000000
-/// Further ahead the clock was set: nobody records a pause this long.
+/// A stamp further ahead means that the clock was set: no recording has a pause this long.
 #define PAUSE_MAX_US INT64_C(3600000000)
 /// A gateway whose disk is slow.
 #define PIECE_MS 20000

@@ -183,7 +183,7 @@ static iwc_result_t stop_at(ctl_t *self, const char *path, const ctl_stop_t *sto
     return result;
 }
 
-/// A reason that is no text keeps nobody from stopping.
+/// A reason that is not a text does not keep a client from stopping.
 static iwc_result_t stop_anyhow(ctl_t *self, const char *path, const ctl_stop_t *stop) {
     const iwc_result_t result = stop_at(self, path, stop);
     const bool spoilt = result == IWC_INVALID || result == IWC_REFUSED;

@@ -158,7 +158,7 @@ static int write_files(writer_t *self, int directory, uint32_t number) {
     self->error = 0;
     write_config(self, directory, stem);
     if (self->error == EEXIST) {
-        return EEXIST; // Somebody else's: the gateway before us may still be writing its last.
+        return EEXIST; // Another process has it: the previous gateway may still be writing its last.
     }
     self->frames_file = (self->error == 0) ? gw_box_files_create(directory, stem, ".log") : NULL;
     self->events_file = (self->frames_file != NULL) ? gw_box_files_create(directory, stem, ".jsonl") : NULL;

@@ -12,7 +12,7 @@
 /// Between two rounds of attempts.
 #define AGAIN_US 5000
 
-/// By custom: watch/NAME.sock beside NAME.sock. False: the path is too long.
+/// The custom is watch/NAME.sock next to NAME.sock. Returns false if the path is too long.
 static bool find_other(const char *path, char *out, size_t size) {
     const char *slash = strrchr(path, '/');
     const char *name = (slash != NULL) ? slash + 1 : path;

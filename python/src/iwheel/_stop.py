@@ -17,14 +17,14 @@ AGAIN_S = 0.005
 
 
 def other_socket(path: str) -> str:
-    """The gateway's other socket, by custom: watch/NAME.sock beside NAME.sock."""
+    """The gateway's other socket, by custom: watch/NAME.sock next to NAME.sock."""
     folder, name = os.path.split(path)
     above, last = os.path.split(folder)
     return os.path.join(above, name) if last == WATCH_FOLDER else os.path.join(folder, WATCH_FOLDER, name)
 
 
 def stop_by_either(path: str, cmd: str, fields: Mapping[str, Any], timeout: float) -> Message:
-    """The reply to `stop` or `estop`. The line is sent with the connection: beyond its maximum a gateway greets nobody, and stops.
+    """The reply to `stop` or `estop`. The line is sent with the connection: beyond its maximum a gateway sends no greeting, and stops.
 
     Tries both sockets until the time is over. GatewayUnavailable tells what was wrong with `path`.
     """
