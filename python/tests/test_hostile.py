@@ -252,7 +252,7 @@ class Hostile(unittest.TestCase):
         self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
         for _ in range(2000):
             self.addCleanup(os.close, os.open("/dev/null", os.O_RDONLY))
-        for ask in ("stop", "estop"):
+        for ask in ("stop", "estop", "reset"):
             impostor = Impostor(b'{"id":1,"ok":true,"state":"stopping"}\n')
             self.addCleanup(impostor.end)
             with Gateway(impostor.path) as gateway:

@@ -101,7 +101,7 @@ static void test_questions_beyond_four_wait_in_order(void) {
     TEST_ASSERT_EQUAL_UINT64(now_us, bridge_link_next_us(&link_, now_us));
     step();
     for (int i = 0; i < 10; i++) {
-        char number[20];
+        char number[24];
         (void)snprintf(number, sizeof number, "\"number\":%d}", i);
         TEST_ASSERT_TRUE(fake_gateway_read(&gateway, WATCHES, line, sizeof line));
         TEST_ASSERT_NOT_NULL(strstr(line, number));

@@ -237,6 +237,39 @@ static void test_one_person_drive_with_another_key_is_a_deflected_stick(void) {
     (void)close(other);
 }
 
+/// One wheel is enough, and in the role of a setpoint a current.
+static void test_one_person_other_key_is_a_stick_by_any_value(void) {
+    static const char *const fields[] = {"\"left_mm_s\":300,\"right_mm_s\":0", "\"left_mm_s\":0,\"right_mm_s\":-300",
+                                         "\"left_mm_s\":0,\"right_mm_s\":0,\"left_mA\":500,\"right_mA\":0",
+                                         "\"left_mm_s\":0,\"right_mm_s\":0,\"left_mA\":0,\"right_mA\":500"};
+    char key[KEY_DIGITS + 1U];
+    const int other = daemon_rig_connect();
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
+        arm_with_key(client, key);
+        daemon_rig.daemon->wheels.core.config.current_role = (i < 2U) ? IW_ROLE_LIMIT : IW_ROLE_SETPOINT;
+        (void)snprintf(line_, sizeof line_, "{\"cmd\":\"drive\",%s,\"key\":\"wrong\"}", fields[i]);
+        assert_reply(line_, "\"error\":\"not_holder\"");
+        assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+        TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"stale_command\""));
+        daemon_rig_run(3000);
+    }
+    (void)close(other);
+}
+
+static void test_one_person_without_lease_is_not_armed_with_any_key(void) {
+    assert_reply(drive_with("wrong", 300), "\"error\":\"not_armed\"");
+}
+
+static void test_one_person_turn_by_wrong_track_is_a_stick(void) {
+    const int other = daemon_rig_connect();
+    daemon_rig_arm(client);
+    iw_ledger_contradict(&daemon_rig.daemon->wheels.core.ledger, IW_LEDGER_TRACK, IW_EVIDENCE_OPERATOR, 0);
+    assert_reply("{\"cmd\":\"twist\",\"v_mm_s\":0,\"yaw_mrad_s\":200}", "\"error\":\"denied\"");
+    assert_reply("{\"cmd\":\"stop\"}", "\"ok\":true");
+    TEST_ASSERT_NOT_NULL(strstr(daemon_rig_ask(other, "{\"cmd\":\"arm\"}"), "\"error\":\"stale_command\""));
+    (void)close(other);
+}
+
 static void test_one_person_key_is_in_no_other_line(void) {
     static const char *const asked[] = {"{\"cmd\":\"hello\"}", "{\"cmd\":\"status\"}", "{\"cmd\":\"why\"}",
                                         "{\"cmd\":\"stop\"}"};
@@ -312,6 +345,9 @@ int main(void) {
     RUN_TEST(test_one_person_drive_with_another_key_feeds_nothing);
     RUN_TEST(test_one_person_twist_with_another_key_feeds_nothing);
     RUN_TEST(test_one_person_drive_with_another_key_is_a_deflected_stick);
+    RUN_TEST(test_one_person_other_key_is_a_stick_by_any_value);
+    RUN_TEST(test_one_person_without_lease_is_not_armed_with_any_key);
+    RUN_TEST(test_one_person_turn_by_wrong_track_is_a_stick);
     RUN_TEST(test_one_person_key_is_in_no_other_line);
     RUN_TEST(test_one_person_plain_arm_takes_no_lease_from_another);
     RUN_TEST(test_one_person_key_of_another_connection_is_no_right);

@@ -113,6 +113,22 @@ static void test_stop_never_refused_with_all_places_idle(void) {
     TEST_ASSERT_EQUAL_UINT(0, daemon_rig.daemon->clients.count[GW_STOP]);
 }
 
+/// Eight connections wait for their first line; the next one at the same moment is refused without a wait.
+static void test_stop_places_are_eight_on_each_socket(void) {
+    take_all_places();
+    for (gw_right_t door = GW_DRIVE; door < GW_RIGHTS; door++) {
+        for (unsigned i = 0; i < GW_STOP_PLACES; i++) {
+            crowd[crowded++] = knock(door);
+        }
+        const int next = knock(door);
+        daemon_rig_run(GW_STOP_LEAST_US / IW_US_PER_MS - 1U);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(hear(next), "too_many_clients"), text);
+        TEST_ASSERT_TRUE(has_ended(next));
+        (void)close(next);
+        TEST_ASSERT_EQUAL_UINT((door + 1U) * GW_STOP_PLACES, daemon_rig.daemon->clients.count[GW_STOP]);
+    }
+}
+
 /// Each of the crowd asks for more than it reads, without end.
 static void test_stop_never_refused_with_all_places_polling(void) {
     take_all_places();
@@ -314,6 +330,7 @@ static void test_stop_in_a_place_names_who_asked_for_it(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_stop_never_refused_with_all_places_idle);
+    RUN_TEST(test_stop_places_are_eight_on_each_socket);
     RUN_TEST(test_stop_never_refused_with_all_places_polling);
     RUN_TEST(test_stop_never_refused_if_its_line_comes_later);
     RUN_TEST(test_stop_never_refused_without_descriptors);

@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mount.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -343,6 +344,29 @@ static void test_rotation_of_ten_thousand_recordings_keeps_motion(void) {
     (void)close(directory);
 }
 
+static void test_recording_of_a_single_file_can_be_dropped(void) {
+    const int directory = gw_box_files_open(config.record.directory);
+    make_recordings(1, 1, 0);
+    TEST_ASSERT_TRUE(gw_box_files_drop_oldest(directory, 2, false));
+    TEST_ASSERT_EQUAL(0, count_files());
+    (void)close(directory);
+}
+
+static void test_reserve_that_cannot_be_allocated_leaves_no_file(void) {
+    struct rlimit before;
+    const int directory = gw_box_files_open(config.record.directory);
+    TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_FSIZE, &before));
+    const struct rlimit small = {.rlim_cur = 4096, .rlim_max = before.rlim_max};
+    (void)signal(SIGXFSZ, SIG_IGN);
+    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_FSIZE, &small));
+    gw_box_files_reserve(directory, 1000000U);
+    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_FSIZE, &before));
+    TEST_ASSERT_FALSE(is_there("reserve"));
+    gw_box_files_reserve(directory, 1000000U);
+    TEST_ASSERT_TRUE(is_there("reserve"));
+    (void)close(directory);
+}
+
 /// Needs the right to mount.
 static bool mount_small_disk(void) {
     (void)mkdir(config.record.directory, 0755);
@@ -541,6 +565,8 @@ int main(void) {
     RUN_TEST(test_wheel_that_turns_without_command_is_motion);
     RUN_TEST(test_recordings_of_earlier_versions_are_judged_by_command);
     RUN_TEST(test_rotation_of_ten_thousand_recordings_keeps_motion);
+    RUN_TEST(test_recording_of_a_single_file_can_be_dropped);
+    RUN_TEST(test_reserve_that_cannot_be_allocated_leaves_no_file);
     RUN_TEST(test_full_disk_costs_harmless_recordings_first);
     RUN_TEST(test_directory_that_cannot_be_is_told_at_once_and_with_each_stop);
     RUN_TEST(test_what_became_of_a_recording_is_told_in_words);

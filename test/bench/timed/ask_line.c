@@ -4,6 +4,7 @@
 #include "timed.h"
 
 #include <poll.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +16,8 @@
 #define PERIOD_ms  19
 #define LINE_BYTES 512
 #define REPLY_ms   3000
+/// Between two tries to arm.
+#define REST_ms 100
 
 static void say(int client, const char *words) {
     char line[LINE_BYTES];
@@ -22,8 +25,9 @@ static void say(int client, const char *words) {
     (void)timed_need((int)send(client, line, (size_t)length, MSG_NOSIGNAL), "send");
 }
 
-static void hear_ok(int client) {
-    char answer[65536];
+/// False: the wheels still turn after an earlier measurement.
+static bool hear_ok(int client) {
+    static char answer[65536];
     size_t length = 0;
     struct pollfd ready = {.fd = client, .events = POLLIN};
     do {
@@ -31,11 +35,27 @@ static void hear_ok(int client) {
             (poll(&ready, 1, REPLY_ms) > 0) ? read(client, &answer[length], sizeof answer - 1U - length) : 0;
         length += (more > 0) ? (size_t)more : 0U;
         answer[length] = '\0';
+        if (strstr(answer, "\"error\":\"not_at_rest\"") != NULL) {
+            return false;
+        }
         if (more <= 0 || strstr(answer, "\"ok\":false") != NULL) {
             (void)fprintf(stderr, "no ok: %s\n", answer);
             exit(1);
         }
     } while (strstr(answer, "\"ok\":true") == NULL);
+    return true;
+}
+
+/// Says it until the wheels are at rest, for REPLY_ms at the most.
+static void ask_until_ok(int client, const char *words) {
+    for (int waited_ms = 0; waited_ms < REPLY_ms; waited_ms += REST_ms) {
+        say(client, words);
+        if (hear_ok(client)) {
+            return;
+        }
+        timed_sleep_until_ns(timed_now_ns(CLOCK_MONOTONIC) + REST_ms * INT64_C(1000000));
+    }
+    timed_fail("the wheels did not come to rest");
 }
 
 static void forget(int can, int client) {
@@ -61,8 +81,7 @@ int main(int argc, char **argv) {
     const int client = timed_connect(argv[2]);
     timed_ask_for_stamps(can);
     if (argc > 6) {
-        say(client, argv[6]);
-        hear_ok(client);
+        ask_until_ok(client, argv[6]);
     }
     for (long i = atol(argv[3]); i > 0; i--) {
         struct can_frame frame;
