@@ -10,6 +10,7 @@
 #define SPACING_US 60000
 #define REST_US    8000000
 #define SILENT_US  1000000
+#define ARM_TRIES  5U
 /// Snapshots at 50 Hz with the whole command in force, without which nothing was tried.
 #define IN_FORCE_MIN 4
 /// So many times as fast as would be enough of both, one alone is.
@@ -206,6 +207,23 @@ static void stop(run_t *run, burst_end_t end) {
     }
 }
 
+/// The reply to arm; NULL: the wheels are not ready. A wheel whose telemetry came late counts as not at rest a moment longer.
+static json_t *arm(bringup_t *self) {
+    json_t *armed = NULL;
+    for (unsigned tries = 0; tries < ARM_TRIES; tries++) {
+        json_decref(armed);
+        armed = near_ask(self->ctl, json_pack("{s:s,s:s}", "cmd", "arm", "name", "bringup"));
+        if (strcmp(text_word(armed, "error"), "not_at_rest") != 0) {
+            break;
+        }
+        if (!trial_wait_ready(self)) {
+            json_decref(armed);
+            return NULL;
+        }
+    }
+    return armed;
+}
+
 void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     run_t run = {.bringup = self, .burst = burst, .outcome = out_outcome};
     memset(out_outcome, 0, sizeof(*out_outcome));
@@ -217,9 +235,10 @@ void burst_run(bringup_t *self, const burst_t *burst, outcome_t *out_outcome) {
     run.stops = json_integer_value(json_object_get(why, "number"));
     json_decref(why);
     json_decref(near_ask(self->ctl, json_pack("{s:s,s:[s],s:i}", "cmd", "watch", "topics", "state", "rate_hz", 50)));
-    json_t *armed = near_ask(self->ctl, json_pack("{s:s,s:s}", "cmd", "arm", "name", "bringup"));
+    json_t *armed = arm(self);
     if (!json_is_true(json_object_get(armed, "ok"))) {
-        out_outcome->end = fail(&run, BURST_REFUSED, text_word(armed, "message"));
+        out_outcome->end =
+            fail(&run, BURST_REFUSED, (armed != NULL) ? text_word(armed, "message") : "the wheels are not ready");
         json_decref(armed);
         return;
     }
