@@ -171,7 +171,7 @@ class Campaign:
         title = ENTRIES[result["name"]].title
         times = f"{result['seconds']:.1f} s in {result['host_s']:.1f} s"
         print(f"{mark} {result['group']}/{result['name']}: {title}{figures}  {times}", flush=True)
-        for text, kind, _ in result["failures"]:
+        for text, kind, *_ in result["failures"]:
             print(f"       {kind}: " + text.replace("\n", "\n       | "), flush=True)
         for path in result["logs"]:
             self.tell_log(path)

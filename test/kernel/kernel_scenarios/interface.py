@@ -313,12 +313,12 @@ def row17_echo_missing(t):
 def restart_as_the_unit_does(t, interface):
     """What systemd would do for iwheel-can-restart@.path: once the file has been written, the commands of the service."""
     with open(os.path.join(UNITS, "iwheel-can-restart@.path"), encoding="utf-8") as unit:
-        wish = re.search(r"(?m)^PathChanged=(.*)$", unit.read())[1].replace("%I", interface)
+        wish = re.search(r"(?m)^PathChanged=(.*)$", unit.read())[1].replace("%i", interface)
     if not t.check(os.path.exists(wish), f"the gateway asks with {wish}"):
         return
     with open(os.path.join(UNITS, "iwheel-can-restart@.service"), encoding="utf-8") as unit:
         for command in re.findall(r"(?m)^ExecStart=(.*)$", unit.read()):
-            netdev.command(*command.replace("%I", interface).split())
+            netdev.command(*command.replace("%i", interface).split())
 
 
 def told_by_the_tool(t, rig):
