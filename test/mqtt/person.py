@@ -73,7 +73,8 @@ def test_stop_never_refused_for_other_senders(rig):
     for _ in range(3):
         driver = Driver(rig)
         thief.send("why", **{"from": far.name, "seq": 1 << 60, **thief.quote()})
-        assert far.ask("stop")["ok"]
+        reply = far.ask("stop")
+        assert reply["ok"], reply
         driver.end()
         until(lambda: rig.gateway_state()["state"] == "listening", what="stopped")
         time.sleep(0.6)
