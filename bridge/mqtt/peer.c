@@ -9,6 +9,7 @@
 #include <netinet/in.h>
 #include <pwd.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -65,11 +66,12 @@ static bool find_owner(const char *table, const char *local, const char *remote,
     FILE *file = fopen(table, "re");
     while (file != NULL && !found && fgets(line, sizeof line, file) != NULL) {
         char ends[2][END_SIZE];
-        unsigned uid = 0;
-        unsigned long inode = 0;
-        found = sscanf(line, " %*[^:]: %47s %47s %*s %*s %*s %*s %u %*u %lu", ends[0], ends[1], &uid, &inode) == 4 &&
-                inode != 0U && strcmp(ends[0], local) == 0 && strcmp(ends[1], remote) == 0;
-        *out_uid = found ? (uid_t)uid : *out_uid;
+        char uid[16];
+        char inode[24];
+        found = sscanf(line, " %*[^:]: %47s %47s %*s %*s %*s %*s %15[0-9] %*s %23[0-9]", ends[0], ends[1], uid,
+                       inode) == 4 &&
+                strtoul(inode, NULL, 10) != 0U && strcmp(ends[0], local) == 0 && strcmp(ends[1], remote) == 0;
+        *out_uid = found ? (uid_t)strtoul(uid, NULL, 10) : *out_uid;
     }
     if (file != NULL) {
         (void)fclose(file);

@@ -5,6 +5,7 @@
 #include <gnutls/gnutls.h>
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -60,7 +61,7 @@ static web_session_t *find_place(web_proofs_t *self, uint64_t now_us) {
         }
         oldest = (one->used_us < oldest->used_us) ? one : oldest;
     }
-    return (now_us - oldest->used_us > 2U * WEB_NONCE_US) ? oldest : NULL;
+    return (now_us - oldest->used_us > (uint64_t)2 * WEB_NONCE_US) ? oldest : NULL;
 }
 
 static bool is_fresh(web_proofs_t *self, const char *nonce, uint64_t now_us) {
@@ -90,10 +91,11 @@ static web_proof_t judge_mac(web_proofs_t *self, const char *token, const web_cl
     char given[WEB_MAC_SIZE] = "";
     char mac[WEB_MAC_SIZE];
     char text[WEB_TARGET_SIZE + 160U];
-    uint64_t sequence = 0;
+    char digits[19] = "";
     int end = 0;
-    const int found = sscanf(claim->authorization + strlen("IWheel "),
-                             "%32[0-9a-f] %32[0-9a-f] %18" SCNu64 " %64[0-9a-f]%n", id, nonce, &sequence, given, &end);
+    const int found = sscanf(claim->authorization + strlen("IWheel "), "%32[0-9a-f] %32[0-9a-f] %18[0-9] %64[0-9a-f]%n",
+                             id, nonce, digits, given, &end);
+    const uint64_t sequence = strtoull(digits, NULL, 10);
     if (found != 4 || claim->authorization[strlen("IWheel ") + (size_t)end] != '\0' || sequence == 0U ||
         strlen(id) != 32U || strlen(nonce) != 32U || strlen(claim->target) >= WEB_TARGET_SIZE) {
         return WEB_PROOF_WRONG;

@@ -53,11 +53,17 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t max_size, unsi
     return magic + length;
 }
 
-/// What has been taken counts once, and in time only. A greeting may come again.
+/// A stop needs no number that rises and no place among the senders: it is never refused for another's sake.
+static bool is_stop(mqtt_verb_t verb) {
+    return verb == MQTT_STOP || verb == MQTT_ESTOP;
+}
+
+/// What has been taken counts once, and in time only. A greeting may come again, and a stop while it is in time.
 static void judge_again(mqtt_judge_t *judge, const mqtt_rules_t *rules, const mqtt_command_t *command) {
     mqtt_order_t order;
     mqtt_judge(judge, rules, command, NOW_US, &order);
-    fuzz_require(order.verb == MQTT_HELLO || order.verdict == MQTT_DOUBLED, "once");
+    fuzz_require(order.verb == MQTT_HELLO || order.verdict == (is_stop(order.verb) ? MQTT_TAKEN : MQTT_DOUBLED),
+                 "once");
     mqtt_judge(judge, rules, command, NOW_US + 60000000U, &order);
     fuzz_require(order.verb == MQTT_HELLO || order.verdict == MQTT_LATE, "not late");
 }
@@ -85,7 +91,8 @@ static void judge_command(const mqtt_rules_t *rules, const mqtt_command_t *comma
     fuzz_require((order.verb != MQTT_ARM && order.verb != MQTT_DRIVE && order.verb != MQTT_TWIST) || rules->may_drive,
                  "it watches only");
     fuzz_require(!command->retained, "not retained");
-    fuzz_require(!crowded || order.verb == MQTT_HELLO || strlen(order.from) == 1U, "not crowded");
+    fuzz_require(!crowded || order.verb == MQTT_HELLO || is_stop(order.verb) || strlen(order.from) == 1U,
+                 "not crowded");
     judge_again(&judge, rules, command);
 }
 
