@@ -99,6 +99,9 @@ def error_passive(t, passive, active):
 def error_flood(t, errors, active):
     """`errors(rig, n)` makes the n-th part of the flood."""
     rig, client, stream = driving(t)
+    for number in range(50):  # Spends the lines that the log may print in one burst: how many are left depends on those of the start.
+        errors(rig, number)
+        time.sleep(0.005)
     lines = len(rig.gateway.text().splitlines())
     cpu, begin = rig.gateway.cpu_seconds(), time.monotonic()
     for number in range(400):
