@@ -99,6 +99,7 @@ def services(t):
     stream = ride.driving()
     t_us = now_us()
     t.check(ride.peer.call("iwheel/stop") == (True, ""), "stop")
+    time.sleep(0.15)  # The answer can come before the next setpoint.
     t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 100)
     ride.silence()
     t.check(ride.still(), "the stream goes on, the wheels do not")
