@@ -63,11 +63,13 @@ uint32_t gw_clients_count(const gw_clients_t *self);
 
 /// The first slot from this one on with an open connection; GW_CLIENTS_MAX: there is none. Free slots cost nothing.
 static inline uint32_t gw_clients_from(const gw_clients_t *self, uint32_t slot) {
-    for (; slot < GW_CLIENTS_MAX; slot = (slot / GW_DRIVERS_MAX + 1U) * GW_DRIVERS_MAX) {
-        const uint64_t open = self->open[slot / GW_DRIVERS_MAX] >> (slot % GW_DRIVERS_MAX);
+    uint32_t begin = slot % GW_DRIVERS_MAX;
+    for (uint32_t word = slot / GW_DRIVERS_MAX; word < sizeof self->open / sizeof self->open[0]; word++) {
+        const uint64_t open = self->open[word] >> begin;
         if (open != 0U) {
-            return slot + (uint32_t)__builtin_ctzll(open);
+            return word * GW_DRIVERS_MAX + begin + (uint32_t)__builtin_ctzll(open);
         }
+        begin = 0;
     }
     return GW_CLIENTS_MAX;
 }

@@ -66,12 +66,12 @@ static void note_offset(gw_knowledge_t *self, iw_side_t side, const iw_force_t *
 
 static void observe_offset(gw_knowledge_t *self, iw_side_t side, const iw_force_t *force) {
     gw_told_offset_t *told = &self->told[side];
-    gw_told_offset_t now = {
-        .offset_us = force->offset_us, .offset_mN = force->offset_mN, .provenance = force->provenance};
-    const bool tared = now.provenance == IW_OFFSET_OPERATOR && now.offset_us != told->offset_us;
-    if (now.provenance == told->provenance && now.offset_mN == told->offset_mN && !tared) {
+    const bool tared = force->provenance == IW_OFFSET_OPERATOR && force->offset_us != told->offset_us;
+    if (force->provenance == told->provenance && force->offset_mN == told->offset_mN && !tared) {
         return;
     }
+    gw_told_offset_t now = {
+        .offset_us = force->offset_us, .offset_mN = force->offset_mN, .provenance = force->provenance};
     if (now.provenance > IW_OFFSET_STORED && now.offset_us != IW_NEVER) {
         note_offset(self, side, force);
     }
