@@ -131,10 +131,11 @@ ON_ITS_WAY = 2
 
 
 class Stall:
-    """How late a task that sleeps 1 ms was at most: what the machine, not the client, adds to a time."""
+    """By how much a task that sleeps 1 ms was late in all: what the machine, not the client, adds to a time. A task that ends takes several rounds
+    of the loop, and a busy machine can hold up each of them."""
 
     async def __aenter__(self):
-        self.worst = 0.0
+        self.late = 0.0
         self.task = asyncio.ensure_future(self.sleep())
         return self
 
@@ -145,7 +146,7 @@ class Stall:
         while True:
             before = time.monotonic()
             await asyncio.sleep(0.001)
-            self.worst = max(self.worst, time.monotonic() - before - 0.001)
+            self.late += max(0.0, time.monotonic() - before - 0.001)
 
 
 class Cancelled(unittest.TestCase):
@@ -179,8 +180,8 @@ class Cancelled(unittest.TestCase):
             if task is not drives_without_a_block:
                 self.assertFalse(client.drove_since_stop(), "its block was left without a stop")
             self.assertFalse(client.may_drive, "still armed and connected")
-            self.assertLessEqual(client.drives_since(at + stall.worst), ON_ITS_WAY)
-        self.assertLess(took, END_S + stall.worst, f"late by more than the stall of {stall.worst * 1000:.1f} ms")
+            self.assertLessEqual(client.drives_since(at + stall.late), ON_ITS_WAY)
+        self.assertLess(took, END_S + stall.late, f"took {took * 1000:.1f} ms, of which the machine held it up for {stall.late * 1000:.1f} ms")
 
     def test_cancelled_at_any_instant_each_task_ends_and_stops(self):
         instants = random.Random(35)
