@@ -135,7 +135,7 @@ class Stall:
     of the loop, and a busy machine can hold up each of them."""
 
     async def __aenter__(self):
-        self.late = 0.0
+        self.late, self.begin = 0.0, time.monotonic()
         self.task = asyncio.ensure_future(self.sleep())
         return self
 
@@ -143,6 +143,7 @@ class Stall:
         self.task.cancel()
 
     async def sleep(self):
+        self.late = time.monotonic() - self.begin  # Before the first round an instant is chosen; a stall between them is one, too.
         while True:
             before = time.monotonic()
             await asyncio.sleep(0.001)
