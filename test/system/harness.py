@@ -440,7 +440,8 @@ class Rig:
 
 
 def find_program(build, name):
-    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "bridge/web", "iwheel-mqtt": "bridge/mqtt", "iwheel-fleet": "bridge/mqtt"}[name]
+    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "bridge/web", "iwheel-mqtt": "bridge/mqtt", "iwheel-fleet": "bridge/mqtt",
+              "iwheel-serial": "bridge/serial", "iwheel-ros2": "bridge/ros2"}[name]
     for path in (os.path.join(build, folder, name), os.path.join(build, "bin", name), os.path.join(build, name)):
         if os.access(path, os.X_OK):
             return path
