@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "help.h"
 
-#include <signal.h>
+#include "begin/begin.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -90,9 +91,12 @@ static int dispatch(const arguments_t *arguments) {
 int main(int count, char **arguments) {
     static ctl_t ctl;
     arguments_t self = {.ctl = &ctl};
-    (void)signal(SIGPIPE, SIG_IGN);
+    int code = begin_program("iwheelctl", count, arguments);
+    if (code != 0) {
+        return code;
+    }
+    code = CTL_INTERNAL;
     self.words = (char **)calloc((size_t)count + 1U, sizeof *self.words);
-    int code = CTL_INTERNAL;
     if (!client_init(&ctl.client) || self.words == NULL) {
         code = ctl_fail(CTL_INTERNAL, "out of memory");
     } else {

@@ -4,6 +4,8 @@
 #include "start/options.h"
 #include "start/report.h"
 
+#include "begin/begin.h"
+
 #include "iwheel_linux/clock.h"
 
 #include <fcntl.h>
@@ -12,16 +14,6 @@
 #include <string.h>
 #include <sysexits.h>
 #include <unistd.h>
-
-/// 0, 1 and 2 must be open, or a socket of ours would take the place of one and be written to.
-static void secure_standard_streams(void) {
-    FILE *const streams[] = {stdin, stdout, stderr};
-    for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
-        if (fcntl(fd, F_GETFD) < 0 && freopen("/dev/null", "r+", streams[fd]) == NULL) {
-            return; // Without /dev/null there are worse troubles.
-        }
-    }
-}
 
 static int open_hal(gw_daemon_t *daemon) {
     const char *culprit;
@@ -176,8 +168,8 @@ static int act(const gw_options_t *options, gw_daemon_t *daemon) {
 
 int main(int argc, char **argv) {
     gw_options_t options;
-    secure_standard_streams();
-    const int result = gw_options_parse(argc, argv, &options, stderr);
+    int result = begin_program("iwheel-gateway", argc, argv);
+    result = (result == 0) ? gw_options_parse(argc, argv, &options, stderr) : result;
     if (result != 0) {
         return result;
     }

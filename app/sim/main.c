@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "simulator.h"
 
+#include "begin/begin.h"
+
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -56,7 +58,11 @@ static int tell(const char *control_path, const char *command) {
 int main(int argc, char **argv) {
     static sim_simulator_t simulator;
     sim_options_t options;
-    int result = sim_options_read(&options, argc, argv);
+    int result = begin_program("iwheel-sim", argc, argv);
+    if (result != 0) {
+        return result;
+    }
+    result = sim_options_read(&options, argc, argv);
     if (result >= 0) {
         return result;
     }

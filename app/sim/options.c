@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "simulator.h"
 
+#include "begin/begin.h"
+
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -159,7 +161,7 @@ int sim_options_read(sim_options_t *out_options, int argc, char **argv) {
     default_path(out_options->estop_path, "estop");
     default_path(out_options->control_path, "control");
     while (result < 0 && (option = getopt_long(argc, argv, "+qVh", long_options, NULL)) != -1) {
-        result = set_option(out_options, option, optarg);
+        result = begin_is_value("iwheel-sim", optarg) ? set_option(out_options, option, optarg) : EX_USAGE;
     }
     return (result < 0) ? set_command(out_options, argc, argv) : result;
 }

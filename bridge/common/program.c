@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "program.h"
 
+#include "begin/begin.h"
+
 #include <getopt.h>
 #include <sysexits.h>
 #include <unistd.h>
@@ -71,6 +73,9 @@ static int parse(const bridge_program_t *self, int count, char **arguments, want
             return misuse(self, arguments[optind - 1],
                           (option == ':') ? "needs a value" : "is no option of this program");
         }
+        if (!begin_is_value(self->form->program, optarg)) {
+            return EX_USAGE;
+        }
         if (option == 'c') {
             out_wanted->path = optarg;
         } else if (option == PRINT) {
@@ -104,7 +109,8 @@ static int configure(const bridge_program_t *self, const wanted_t *wanted) {
 
 int bridge_program_begin(const bridge_program_t *self, int count, char **arguments, int *out_action) {
     wanted_t wanted = {.action = BRIDGE_RUN};
-    int code = parse(self, count, arguments, &wanted);
+    int code = begin_program(self->form->program, count, arguments);
+    code = (code == 0) ? parse(self, count, arguments, &wanted) : code;
     if (code != BRIDGE_GO) {
         return code;
     }

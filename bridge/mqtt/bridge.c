@@ -4,7 +4,6 @@
 #include "folder.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <string.h>
 #include <sys/random.h>
 #include <sysexits.h>
@@ -276,11 +275,17 @@ int mqtt_bridge_check(const mqtt_settings_t *settings) {
     if (!has_name(settings)) {
         return EX_CONFIG;
     }
-    const int folder = mqtt_folder_open(settings->spool.directory);
-    if (folder < 0 || faccessat(folder, ".", W_OK | X_OK, AT_EACCESS) != 0) {
+    int unwritten = 0;
+    errno = mqtt_folder_judge(settings->spool.directory, MQTT_SPOOL_FILE, &unwritten);
+    if (errno != 0) {
         return no_spool(settings);
     }
-    (void)close(folder);
+    if (unwritten != 0) {
+        (void)fprintf(stderr,
+                      "iwheel-mqtt: warning: %s: %s: it starts, and its end loses every event that the broker does not "
+                      "have yet; let the bridge write there, or name another one as directory under [spool]\n",
+                      settings->spool.directory, strerror(unwritten));
+    }
     const int code = mqtt_broker_open(&broker, settings, &nobody);
     (void)mqtt_broker_close(&broker);
     return code;

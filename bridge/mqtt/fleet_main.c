@@ -2,6 +2,8 @@
 // The console of a fleet: its command line.
 #include "fleet_verbs.h"
 
+#include "begin/begin.h"
+
 #include <getopt.h>
 #include <stdarg.h>
 #include <string.h>
@@ -213,7 +215,7 @@ static int parse(words_t *self, int count, char **arguments) {
     int code = -1;
     opterr = 0;
     while (code < 0 && (option = getopt_long(count, arguments, ":c:o:", options, NULL)) != -1) {
-        code = take_option(self, option);
+        code = begin_is_value("iwheel-fleet", optarg) ? take_option(self, option) : EX_USAGE;
     }
     code = (code < 0) ? take_words(self, count - optind, arguments + optind) : code;
     return (code < 0) ? judge(self) : code;
@@ -225,7 +227,8 @@ int main(int count, char **arguments) {
     static mqtt_settings_t settings;
     words_t words = {.used = EVERYWHERE, .wanted = {.wait_s = WAIT_S, .end_asked = &end_asked}};
     const struct sigaction action = {.sa_handler = ask_end};
-    int code = parse(&words, count, arguments);
+    int code = begin_program("iwheel-fleet", count, arguments);
+    code = (code == 0) ? parse(&words, count, arguments) : code;
     if (code >= 0) {
         return code;
     }

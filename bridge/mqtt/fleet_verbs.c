@@ -100,16 +100,17 @@ static int write_file(const console_t *self, const char *path) {
     return 0;
 }
 
-static void show(const console_t *self, const fleet_wanted_t *wanted) {
+/// False if nobody reads it.
+static bool show(const console_t *self, const fleet_wanted_t *wanted) {
     if (wanted->json) {
         fleet_tell(&self->fleet, self->now_us, stdout);
-        return;
+        return true;
     }
     if (wanted->seconds == 0U && isatty(STDOUT_FILENO) == 1) {
         (void)fputs("\033[H\033[2J", stdout);
     }
     fleet_show(&self->fleet, self->now_us, stdout);
-    (void)fflush(stdout);
+    return fflush(stdout) == 0;
 }
 
 static int listen_to(console_t *self, const fleet_wanted_t *wanted) {
@@ -127,8 +128,8 @@ static int listen_to(console_t *self, const fleet_wanted_t *wanted) {
             if (code != 0) {
                 return code;
             }
-            if (wanted->out == NULL && wanted->seconds == 0U) {
-                show(self, wanted);
+            if (wanted->out == NULL && wanted->seconds == 0U && !show(self, wanted)) {
+                break;
             }
         }
         struct pollfd wait = {.fd = mqtt_broker_fd(&self->broker, &writes), .events = POLLIN};
@@ -136,7 +137,7 @@ static int listen_to(console_t *self, const fleet_wanted_t *wanted) {
         (void)poll(&wait, 1, 100);
     }
     if (wanted->seconds > 0U && wanted->out == NULL) {
-        show(self, wanted);
+        (void)show(self, wanted);
     }
     return was_up ? 0 : EX_UNAVAILABLE;
 }

@@ -34,3 +34,17 @@ int mqtt_folder_open_file(int folder, const char *name) {
     }
     return file;
 }
+
+int mqtt_folder_judge(const char *directory, const char *name, int *out_unwritten) {
+    const int folder = mqtt_folder_open(directory);
+    const int file = (folder >= 0) ? mqtt_folder_open_file(folder, name) : -1;
+    const int error = (folder < 0 || (file < 0 && errno != ENOENT)) ? errno : 0;
+    *out_unwritten = (error == 0 && faccessat(folder, ".", W_OK | X_OK, AT_EACCESS) != 0) ? errno : 0;
+    if (file >= 0) {
+        (void)close(file);
+    }
+    if (folder >= 0) {
+        (void)close(folder);
+    }
+    return error;
+}

@@ -10,4 +10,8 @@ int mqtt_folder_open(const char *directory);
 /// to another user.
 int mqtt_folder_open_file(int folder, const char *name);
 
+/// Whether the directory or the file in it would be refused; locks and changes nothing. 0, or the errno of the two above; a missing file is
+/// no error. `*out_unwritten`: why nothing could be written there, else 0.
+int mqtt_folder_judge(const char *directory, const char *name, int *out_unwritten);
+
 #endif

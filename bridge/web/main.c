@@ -78,7 +78,10 @@ static int print_url(const web_settings_t *settings) {
 
 static int check(const web_settings_t *settings) {
     web_server_t server;
-    const int code = web_server_check(&server, settings);
+    int code = web_server_check(&server, settings);
+    if (code == 0 && !web_token_judge(&server.token, stderr)) {
+        code = EX_CONFIG;
+    }
     web_server_close(&server);
     if (code == 0) {
         (void)printf("iwheel-web: configuration and files are in order\n");

@@ -102,3 +102,16 @@ bool web_token_refresh(web_token_t *self, bool *out_changed, FILE *err) {
     }
     return good || complain(self, "holds no token; delete it, and the bridge makes a new one", err);
 }
+
+bool web_token_judge(const web_token_t *self, FILE *err) {
+    web_token_t seen = *self;
+    struct stat status = {0};
+    bool changed = false;
+    const int file = open_file(self);
+    const bool made = (file < 0) ? errno == ENOENT : (fstat(file, &status) == 0 && is_over(self, &status));
+    if (file >= 0) {
+        (void)close(file);
+    }
+    seen.only_reads = true;
+    return made || web_token_refresh(&seen, &changed, err);
+}

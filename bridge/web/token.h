@@ -20,4 +20,8 @@ typedef struct {
 /// `err`, if that fails or if others could read it; the token is as before then.
 bool web_token_refresh(web_token_t *self, bool *out_changed, FILE *err);
 
+/// Whether the start would refuse what the file holds; makes and changes nothing. True too where the start would make a token. False after
+/// a line on `err`.
+bool web_token_judge(const web_token_t *self, FILE *err);
+
 #endif

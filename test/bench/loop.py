@@ -51,7 +51,18 @@ def drive(client, quit_it):
 
 
 def drive_once(client):
-    return client.ask(cmd="drive", left_mm_s=100, right_mm_s=100)["ok"]
+    client.reply = client.ask(cmd="drive", left_mm_s=100, right_mm_s=100)
+    return client.reply["ok"]
+
+
+def reason(client):
+    """Why the gateway has stopped while a client drove, by the refusal that the client got and the gateway's last stop."""
+    refusal = {key: value for key, value in getattr(client, "reply", {}).items() if key in ("error", "message")}
+    try:
+        stop = client.ask(cmd="why")
+    except (OSError, ValueError) as silence:
+        return f"refused: {refusal}; it does not answer why: {silence}"
+    return f"refused: {refusal}; its last stop: { {key: value for key, value in stop.items() if not key.startswith('frames_')} }"
 
 
 def keep_driving(client, quit_it):
@@ -75,8 +86,10 @@ def in_state(pair, client_type, state, count):
             begin(client, quit_it)
         time.sleep(SETTLE_S)
         figure = count()
-        if begin is drive and not all(client.driving.is_alive() for client in connected):
-            raise RuntimeError("the gateway has stopped")
+        if begin is drive:
+            for client in connected:
+                if not client.driving.is_alive():
+                    raise RuntimeError(f"the gateway has stopped, {reason(client)}")
         return figure
     finally:
         quit_it.set()

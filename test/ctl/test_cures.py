@@ -18,7 +18,7 @@ import unittest
 ROOT = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 sys.path.insert(0, os.path.join(ROOT, "test", "system"))
 import several  # noqa: E402
-from harness import Rig, find_program  # noqa: E402
+from harness import Rig, find_program, read_only  # noqa: E402
 
 BUILD = ""
 # Programs of others that cures name: the Debian package, and the words that may follow. None: anything.
@@ -379,9 +379,9 @@ class Check(unittest.TestCase):
         self.rig = Rig(BUILD)
         self.addCleanup(self.rig.close)
 
-    def check(self, *words):
+    def check(self, *words, setup=None):
         done = subprocess.run([*self.rig.gateway_command("--check"), *words], capture_output=True, text=True, timeout=30,
-                              check=False)
+                              preexec_fn=setup, check=False)
         lines = [line.split(" ", 1) for line in done.stdout.splitlines()]
         return done.returncode, {verdict: [text for other, text in lines if other == verdict] for verdict, _ in lines}, done
 
@@ -389,8 +389,8 @@ class Check(unittest.TestCase):
         self.rig.settings.setdefault(section, {}).update(keys)
         self.rig.write_config()
 
-    def only(self, verdict, about):
-        code, found, done = self.check()
+    def only(self, verdict, about, setup=None):
+        code, found, done = self.check(setup=setup)
         texts = [text for text in found.get(verdict, []) if about in text]
         self.assertEqual(1, len(texts), done.stdout + done.stderr)
         return code, texts[0]
@@ -416,21 +416,25 @@ class Check(unittest.TestCase):
         self.set("northbound", **{key: value})
         self.assertEqual(0, self.gone("warn", "mode"))
 
-    def test_record_directory_that_cannot_be(self):
+    def test_record_directory_that_cannot_be_is_a_warning(self):
         with open(self.rig.path("file"), "w", encoding="utf-8"):
             pass
         self.set("record", directory=self.rig.path("file"))
-        self.assertEqual(1, self.only("fail", "is no directory")[0])
+        self.assertEqual(0, self.only("warn", "Not a directory")[0])
         self.set("record", directory=self.rig.path("a/b"))
-        code, text = self.only("fail", "record: directory")
-        self.assertEqual(1, code)
+        code, text = self.only("warn", "record: directory")
+        self.assertEqual(0, code)
         self.assertIn("No such file or directory", text)
+        self.assertIn("stops are not recorded", text)
         self.assertFalse(os.path.exists(self.rig.path("a")), "--check makes nothing")
+        self.rig.start_gateway()
+        self.rig.kill_gateway(signal.SIGTERM)
         command = re.search(r"make it: (.*)$", text).group(1).replace("sudo ", "")
         subprocess.run(command, shell=True, check=True)
-        self.assertEqual(0, self.gone("fail", "record"))
-        self.set("record", directory=self.rig.path("a/new"))
-        self.assertEqual(0, self.gone("fail", "record"))
+        self.assertEqual(0, self.gone("warn", "record"))
+        for new in ("a/new", "a/new/"):
+            self.set("record", directory=self.rig.path(new))
+            self.assertEqual(0, self.gone("warn", "record"))
         self.assertFalse(os.path.exists(self.rig.path("a/new")))
 
     def test_record_directory_of_somebody_else(self):
@@ -447,9 +451,69 @@ class Check(unittest.TestCase):
                                   capture_output=True, pass_fds=(descriptor,), user=65534, group=65534, extra_groups=[],
                                   check=False).stdout
         text = next(line for line in look().splitlines() if "record" in line)
-        self.assertIn("cannot be written by uid 65534", text)
+        self.assertIn("Permission denied", text)
         subprocess.run(re.search(r"sudo (chown \d+ \S+)", text).group(1), shell=True, check=True)
         self.assertIn("ok   record", look())
+
+    def test_record_directory_on_a_read_only_disk_is_a_warning(self):
+        if os.geteuid() != 0:
+            self.skipTest("needs root to mount")
+        os.mkdir(self.rig.path("disk"))
+        mount = read_only(self.rig.path("disk"))
+        for directory in ("disk", "disk/new"):
+            self.set("record", directory=self.rig.path(directory))
+            code, text = self.only("warn", "Read-only file system", setup=mount)
+            self.assertEqual(0, code, text)
+            self.assertIn("record: directory", text)
+            self.assertIn("mount it for writing", text)
+            self.assertNotIn("chown", text)
+            self.rig.start_gateway(setup=mount)
+            self.rig.kill_gateway(signal.SIGTERM)
+
+    def test_socket_on_a_read_only_disk_fails_as_the_start_does(self):
+        if os.geteuid() != 0:
+            self.skipTest("needs root to mount")
+        os.mkdir(self.rig.path("disk"))
+        mount = read_only(self.rig.path("disk"))
+        for directory in ("disk", "disk/new"):
+            self.rig.socket_name = f"{directory}/gateway.sock"
+            code, text = self.only("fail", "Read-only file system", setup=mount)
+            self.assertEqual(1, code)
+            self.assertIn("mount it for writing", text)
+            done = subprocess.run(self.rig.gateway_command(), capture_output=True, text=True, timeout=30, preexec_fn=mount,
+                                  check=False)
+            self.assertEqual(69, done.returncode, done.stderr)
+            self.assertIn("Read-only file system", done.stderr)
+
+    def test_socket_name_that_is_taken_fails_as_the_start_does(self):
+        os.symlink("nowhere", self.rig.path("link"))
+        with open(self.rig.path("file"), "w", encoding="utf-8"):
+            pass
+        for name, about in (("link", "is a symbolic link"), ("file", "exists and is no socket")):
+            self.rig.socket_name = name
+            self.assertEqual(1, self.only("fail", about)[0])
+            done = subprocess.run(self.rig.gateway_command(), capture_output=True, text=True, timeout=30, check=False)
+            self.assertEqual(69, done.returncode, done.stderr)
+            self.assertIn(about, done.stderr)
+            self.assertTrue(os.path.lexists(self.rig.path(name)))
+
+    def test_watch_socket_that_cannot_be_is_a_warning(self):
+        self.set("northbound", watch_socket=self.rig.path("a/b/watch.sock"))
+        code, text = self.only("warn", "No such file or directory")
+        self.assertEqual(0, code)
+        self.assertIn(self.rig.path("a/b/watch.sock"), text)
+        self.set("northbound", watch_socket="none")
+        self.assertEqual(0, self.gone("warn", "watch"))
+        self.set("northbound", watch_socket=self.rig.path("a/b/watch.sock"))
+        self.rig.start_gateway()
+
+    def test_socket_in_a_shared_directory_is_a_warning_as_at_the_start(self):
+        os.mkdir(self.rig.path("shared"))
+        os.chmod(self.rig.path("shared"), 0o1777)
+        self.rig.socket_name = "shared/gateway.sock"
+        self.assertEqual(0, self.only("warn", "anybody can put another socket there")[0])
+        os.symlink("nowhere", self.rig.path("shared/gateway.sock"))
+        self.assertEqual(1, self.only("fail", "is a symbolic link")[0])
 
     def test_socket_directory_that_anybody_may_write(self):
         os.mkdir(self.rig.path("open"))

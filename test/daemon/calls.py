@@ -17,7 +17,7 @@ PURE = """__ctype_b_loc __errno_location abort bcmp bsearch getenv getopt_long i
 STREAMS = "stderr stdin stdout fclose ferror fflush fmemopen fopen fprintf fputs freopen fwrite printf puts"
 # Of child processes, which are played; of --check; of a bus or an e-stop unix:PATH; of kernels without epoll_pwait2; of a configured group.
 NOT_CALLED = """_exit access close_range closedir dup2 faccessat fallocate fchmod fchownat fdopen fdopendir fileno fsync getgrnam glob globfree ppoll readdir
-    realpath renameat setpriority sleep"""
+    realpath renameat rewind setpriority sleep"""
 # The real ones, called by the kernel itself.
 BEHIND = "calloc free"
 

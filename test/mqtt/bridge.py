@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 from bus import now_us
+from harness import read_only
 from mqtt_rig import ID
 from trials import ROOT, Driver, Skip, braking_ms, full, needs, until
 from verdict import hold
@@ -580,15 +581,39 @@ def test_another_bridge_with_the_same_directory_is_kept_out(rig):
     assert first.child.poll() is None
 
 
+def check_of(rig, setup=None):
+    done = subprocess.run([rig.program("iwheel-mqtt"), "-c", rig.path("mqtt.conf"), "--check"], capture_output=True, text=True, preexec_fn=setup, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_check_refuses_a_spool_file_that_the_start_refuses(rig):
+    events = Path(rig.path("spool"), "events")
+    rig.start_bridge()
+    until(events.exists, what="the spool is there")
+    rig.bridge.end()
+    os.link(events, rig.path("second"))
+    assert rig.start_bridge().wait(3) == 73
+    code, words = check_of(rig)
+    assert code == 73 and "belongs to another user" in words, words
+    os.unlink(rig.path("second"))
+    assert check_of(rig)[0] == 0
+
+
+def test_check_of_a_spool_for_reading_only_warns_and_the_bridge_starts(rig):
+    if os.geteuid() != 0:
+        raise Skip("needs root to mount")
+    mount = read_only(rig.path("spool"))
+    assert rig.start_bridge(mount).wait(1) is None, rig.words()
+    rig.bridge.end()
+    code, words = check_of(rig, mount)
+    assert code == 0 and "warning" in words and "Read-only file system" in words, words
+
+
 def test_check_looks_at_everything_and_leaves_nothing_behind(rig):
     rig.start_bridge().end()
     for name in os.listdir(rig.path("spool")):
         os.unlink(os.path.join(rig.path("spool"), name))
-
-    def check():
-        done = subprocess.run([rig.program("iwheel-mqtt"), "-c", rig.path("mqtt.conf"), "--check"], capture_output=True, text=True, check=False)
-        return done.returncode, done.stdout + done.stderr
-    assert check() == (0, "iwheel-mqtt: configuration and files are in order\n") and not os.listdir(rig.path("spool"))
+    assert check_of(rig) == (0, "iwheel-mqtt: configuration and files are in order\n") and not os.listdir(rig.path("spool"))
     os.rmdir(rig.path("spool"))
-    code, words = check()
+    code, words = check_of(rig)
     assert code == 73 and "[spool]" in words, words

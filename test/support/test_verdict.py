@@ -64,6 +64,7 @@ READER_FAULTS = (
     ("check takes 75 for success", "check", '[ ! -s "$out/unjudged" ] || exit 75', ":"),
     ("check lets 75 outweigh a failure", "check", '[ "$sum_failed" -eq 0 ] || exit 1', '[ ! -s "$out/unjudged" ] || exit 75'),
     ("check takes any status for 75", "check", '[ "$1" -ne 75 ] || [ "$status" -eq 1 ] || {', "{"),
+    ("check cuts the reason of a failure", "check", "--no-group-separator -A 4", "--no-group-separator"),
     ("check names nothing inconclusive", "check", '[ "$sum_inconclusive" -eq 0 ] ||', "true ||"),
     ("CTest's reader takes 75 for a failure", "scripts/count_tests.py", "and not NOT_JUDGED.search(output)", ""),
     ("CTest's reader takes 75 for success", "scripts/count_tests.py", "75 if unjudged else 0", "0"),
@@ -335,6 +336,15 @@ class Check(unittest.TestCase):
         """
         status, lines, ran = self.check(once, "system")
         self.assertEqual((1, "3 passed, 1 failed, 0 skipped", 1), (status, lines[-1], ran), lines)
+
+    def test_check_shows_the_reason_that_follows_a_failure(self):
+        runner = "echo 'FAIL row11'; for i in 1 2 3 4 5; do echo \"  reason $i\"; done; seq 100 199; echo '0 passed, 1 failed, 0 skipped'; exit 1\n"
+        _, lines, _ = self.check(runner, "system")
+        shown = "\n".join(lines)
+        for what in ("FAIL row11", *(f"  reason {i}" for i in range(1, 5)), "199"):
+            self.assertIn(what, shown)
+        for what in ("reason 5", "150"):
+            self.assertNotIn(what, shown)
 
     def test_not_judged_is_75_and_named(self):
         status, lines, _ = self.check(f"cd {HERE}; python3 -c 'import sys, verdict; sys.exit(verdict.summary(2, 0, 1, [\"row11\"]))'\n", "system")

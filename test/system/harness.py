@@ -65,6 +65,22 @@ def become_stranger():
     os.setuid(STRANGER)
 
 
+def read_only(folder):
+    """To be called in a new process of root: there the folder is on a file system that is mounted for reading only."""
+
+    def mount():
+        libc = ctypes.CDLL(None, use_errno=True)
+        own, private, reads = 0x20000, 0x44000, 1  # CLONE_NEWNS, MS_REC | MS_PRIVATE, MS_RDONLY
+        if (
+            libc.unshare(own) != 0
+            or libc.mount(None, b"/", None, private, None) != 0
+            or libc.mount(b"none", os.fsencode(folder), b"tmpfs", reads, b"mode=0755") != 0
+        ):
+            raise OSError(ctypes.get_errno(), "mount")
+
+    return mount
+
+
 def die_with_parent():
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -424,7 +440,8 @@ class Rig:
 
 
 def find_program(build, name):
-    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "bridge/web", "iwheel-mqtt": "bridge/mqtt", "iwheel-fleet": "bridge/mqtt"}[name]
+    folder = {"iwheel-gateway": "app/gateway", "iwheelctl": "app/ctl", "iwheel-sim": "app/sim", "iwheel-web": "bridge/web", "iwheel-mqtt": "bridge/mqtt", "iwheel-fleet": "bridge/mqtt",
+              "iwheel-serial": "bridge/serial", "iwheel-ros2": "bridge/ros2"}[name]
     for path in (os.path.join(build, folder, name), os.path.join(build, "bin", name), os.path.join(build, name)):
         if os.access(path, os.X_OK):
             return path

@@ -867,6 +867,28 @@ def test_private_key_that_others_can_read_is_refused(rig):
             assert web.wait(5) == code and "may be read by others" in web.text(), (oct(mode), web.text())
 
 
+def test_check_refuses_a_token_that_the_start_refuses(rig):
+    rig.start_web(wait=False).end()
+    token = Path(rig.path("token"))
+
+    def check():
+        done = subprocess.run([rig.program("iwheel-web"), "-c", rig.path("web.conf"), "--check"], capture_output=True, text=True, check=False)
+        return done.returncode, done.stdout + done.stderr
+
+    token.unlink(missing_ok=True)
+    assert check()[0] == 0 and not token.exists(), "the start makes one"
+    for text, mode, about in (("a" * 32, 0o644, "others may read"), ("short", 0o600, "holds no token"), ("a" * 32, 0o600, None)):
+        token.write_text(text + "\n", encoding="ascii")
+        os.chmod(token, mode)
+        code, words = check()
+        web = rig.start_web(wait=False)
+        if about is None:
+            assert code == 0, words
+            until(lambda web=web: "its address with the token" in web.text(), what="it starts")
+        else:
+            assert code == web.wait(5) == 78 and about in words and about in web.text(), (code, words, web.text())
+
+
 def test_tls_is_new_and_authenticated_only(rig):
     certificate(rig, "ours")
     rig.start_gateway()

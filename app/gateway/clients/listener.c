@@ -108,19 +108,32 @@ static int remove_name(const gw_listener_t *self, bool stranger, FILE *err) {
     return complain_errno(self, err, errno);
 }
 
-/// Makes the name free, if it is safe to.
-static int clear_name(const gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
-    struct stat status;
-    if (fstatat(self->folder.fd, self->name, &status, AT_SYMLINK_NOFOLLOW) != 0) {
+/// Reads what has the name of the socket; `st_mode` 0: nothing. A link and a file are refused.
+static int read_name(const gw_listener_t *self, struct stat *out_status, FILE *err) {
+    *out_status = (struct stat){.st_mode = 0};
+    if (fstatat(self->folder.fd, self->name, out_status, AT_SYMLINK_NOFOLLOW) != 0) {
         return (errno == ENOENT) ? 0 : complain_errno(self, err, errno);
     }
-    if (S_ISLNK(status.st_mode)) {
+    if (S_ISLNK(out_status->st_mode)) {
         return complain(self, err, "is a symbolic link, which is not followed",
                         "remove it, or name the real path with");
     }
-    if (!S_ISSOCK(status.st_mode)) {
-        return complain(self, err, "exists and is no socket, so it is left alone",
-                        "remove it, or choose another path with");
+    return S_ISSOCK(out_status->st_mode) ? 0
+                                         : complain(self, err, "exists and is no socket, so it is left alone",
+                                                    "remove it, or choose another path with");
+}
+
+int gw_listener_judge(const gw_listener_t *self, FILE *err) {
+    struct stat status;
+    return read_name(self, &status, err);
+}
+
+/// Makes the name free, if it is safe to.
+static int clear_name(const gw_listener_t *self, const struct sockaddr_un *address, FILE *err) {
+    struct stat status;
+    const int result = read_name(self, &status, err);
+    if (result != 0 || status.st_mode == 0U) {
+        return result;
     }
     const bool stranger = !gw_owners_have(&self->owners, status.st_uid);
     if (!stranger && somebody_answers(address)) {

@@ -64,6 +64,10 @@ typedef struct {
 /// printed on `err`.
 int gw_listener_prepare(gw_listener_t *self, const gw_listener_wish_t *wish, FILE *err);
 
+/// After gw_listener_prepare: whether gw_listener_open would refuse what has the socket's name. Changes nothing, and does not ask
+/// whether another program answers there. 0, or a sysexits code after cause and cure have been printed on `err`.
+int gw_listener_judge(const gw_listener_t *self, FILE *err);
+
 /// After gw_listener_prepare. 0, or a sysexits code after cause and cure have been printed on `err`. A group that does
 /// not exist or may not be given is a warning in the log: the socket is then stricter than asked for.
 int gw_listener_open(gw_listener_t *self, struct gw_log *log, FILE *err);

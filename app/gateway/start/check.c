@@ -5,6 +5,7 @@
 #include "process/owners.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <grp.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -36,71 +37,132 @@ static void judge_config(const gateway_config_t *config, inspect_findings_t *fin
                 (unsigned)budget.killed_mm);
 }
 
-/// Whether files can be made in a directory, or it can be made itself, by who looks.
-static bool judge_directory(const char *check, const char *path, inspect_findings_t *findings) {
+// The directories, as the start would find them. Nothing is made. ---------------------------------------------------------
+
+/// Whether the start would make the directory; `*out_error`: why it could not, else 0.
+static bool is_to_be_made(const char *path, int *out_error) {
+    char bare[GATEWAY_PATH_SIZE];
     char above[GATEWAY_PATH_SIZE];
     struct stat status;
-    const char *const key = (strcmp(check, "record") == 0) ? "[record] directory" : "[northbound] socket";
-    gw_folder_of(path, above, sizeof above);
-    const bool there = stat(path, &status) == 0;
-    if (there && !S_ISDIR(status.st_mode)) {
-        inspect_say(findings, check, INSPECT_FAIL, "%s: %s is no directory", check, path);
-        inspect_cure(findings, "correct %s in the configuration", key);
-    } else if (!there && errno == ENOENT && access(above, W_OK | X_OK) == 0) {
-        inspect_say(findings, check, INSPECT_OK, "%s: directory %s will be made", check, path);
-        return true;
-    } else if (!there) {
-        inspect_say(findings, check, INSPECT_FAIL, "%s: directory %s: %s, and uid %u cannot make it", check, path,
-                    strerror(errno), (unsigned)geteuid());
-        inspect_cure(findings, "make it: sudo mkdir -p %s; sudo chown %u %s", path, (unsigned)geteuid(), path);
-    } else if (access(path, W_OK | X_OK) != 0) {
-        inspect_say(findings, check, INSPECT_FAIL, "%s: directory %s cannot be written by uid %u", check, path,
-                    (unsigned)geteuid());
-        inspect_cure(findings, "sudo chown %u %s (or check as the user whom the service has)", (unsigned)geteuid(),
-                     path);
-    } else {
-        inspect_say(findings, check, INSPECT_OK, "%s: directory %s can be written", check, path);
-        return true;
+    (void)snprintf(bare, sizeof bare, "%s", path);
+    for (size_t length = strlen(bare); length > 1U && bare[length - 1U] == '/'; length--) {
+        bare[length - 1U] = '\0'; // mkdir does not mind it either.
     }
-    return false;
+    *out_error = (lstat(bare, &status) == 0) ? 0 : errno;
+    if (*out_error != ENOENT) {
+        return false;
+    }
+    gw_folder_of(bare, above, sizeof above);
+    *out_error = (faccessat(AT_FDCWD, above, W_OK | X_OK, AT_EACCESS) == 0) ? 0 : errno;
+    return true;
 }
 
-/// What the start would refuse. The directory must be there, or it would be made.
-static void judge_safety(const gateway_config_t *config, inspect_findings_t *findings) {
-    char text[INSPECT_TEXT_SIZE] = "";
-    FILE *const memory = fmemopen(text, sizeof text, "w");
-    if (memory == NULL) {
-        return;
+static int write_error(int directory) {
+    return (faccessat(directory, ".", W_OK | X_OK, AT_EACCESS) == 0) ? 0 : errno;
+}
+
+/// `key`: what names the directory in the configuration.
+static void cure_directory(const char *path, const char *key, int error, inspect_findings_t *findings) {
+    const unsigned uid = (unsigned)geteuid();
+    switch (error) {
+    case ENOENT:
+        inspect_cure(findings, "make it: sudo mkdir -p %s; sudo chown %u %s", path, uid, path);
+        break;
+    case EACCES:
+    case EPERM:
+        inspect_cure(findings, "sudo chown %u %s (or check as the user whom the service has)", uid, path);
+        break;
+    case ENOTDIR:
+        inspect_cure(findings, "correct %s in the configuration", key);
+        break;
+    default:
+        inspect_cure(findings, "%s, or set %s to another directory", gw_folder_cure(error), key);
+        break;
     }
+}
+
+/// What the start prints, which ends in a cure.
+static void say_printed(char *text, inspect_verdict_t verdict, inspect_findings_t *findings) {
+    static const char *const prefixes[] = {"iwheel-gateway: ", "warning: "};
+    char *what = text;
+    for (size_t i = 0; i < sizeof prefixes / sizeof prefixes[0]; i++) {
+        const size_t length = strlen(prefixes[i]);
+        what += (strncmp(what, prefixes[i], length) == 0) ? length : 0U;
+    }
+    what[strcspn(what, "\n")] = '\0';
+    char *const cure = strstr(what, "; ");
+    if (cure != NULL) {
+        *cure = '\0';
+    }
+    inspect_say(findings, "socket", verdict, "%s", what);
+    inspect_cure(findings, "%s", (cure != NULL) ? cure + 2 : "choose another with --socket");
+}
+
+/// `text`: what the start would print.
+static int judge_place(const gw_listener_wish_t *wish, char *text, size_t size, int *out_error) {
     static gw_listener_t listener;
-    const gw_listener_wish_t wish = gw_report_socket(config, GW_DRIVE);
-    const int result = gw_listener_prepare(&listener, &wish, memory);
+    FILE *const memory = fmemopen(text, size, "w");
+    if (memory == NULL) {
+        return 0;
+    }
+    int result = gw_listener_prepare(&listener, wish, memory);
+    if (result == 0) {
+        *out_error = write_error(listener.folder.fd);
+        rewind(memory); // A warning about the directory stays if there is nothing worse.
+        result = gw_listener_judge(&listener, memory);
+    }
     (void)fclose(memory);
     gw_folder_close(&listener.folder);
+    return result;
+}
+
+/// Without the socket of those who may drive there is no start; without that of those who watch there is.
+static void judge_socket(const gw_listener_wish_t *wish, inspect_findings_t *findings) {
+    const inspect_verdict_t trouble = (wish->right == GW_DRIVE) ? INSPECT_FAIL : INSPECT_WARN;
+    char path[GATEWAY_PATH_SIZE];
+    char text[INSPECT_TEXT_SIZE] = "";
+    int error = 0;
+    gw_folder_of(wish->path, path, sizeof path);
+    const bool new = is_to_be_made(path, &error);
+    const int result = (new || error != 0) ? 0 : judge_place(wish, text, sizeof text, &error);
     if (result != 0) {
-        const char *const ours = "iwheel-gateway: ";
-        char *const what = (strncmp(text, ours, strlen(ours)) == 0) ? text + strlen(ours) : text;
-        char *const cure = strstr(what, "; ");
-        what[strcspn(what, "\n")] = '\0';
-        if (cure != NULL) {
-            *cure = '\0';
-        }
-        inspect_say(findings, "socket", INSPECT_FAIL, "%s", what);
-        inspect_cure(findings, "%s", (cure != NULL) ? cure + 2 : "choose another with --socket");
+        say_printed(text, trouble, findings);
+    } else if (error != 0) {
+        inspect_say(findings, "socket", trouble, "socket %s: directory %s: %s", wish->path, path, strerror(error));
+        cure_directory(path, (wish->right == GW_DRIVE) ? "[northbound] socket" : "[northbound] watch_socket", error,
+                       findings);
+    } else if (text[0] != '\0') {
+        say_printed(text, INSPECT_WARN, findings);
+    } else {
+        inspect_say(findings, "socket", INSPECT_OK, "socket: directory %s %s", path,
+                    new ? "will be made" : "can be written");
     }
 }
 
-/// Recordings and the ledger are written only where nobody else can put anything.
-static void judge_own(const char *path, inspect_findings_t *findings) {
-    const int fd = gw_folder_open_own(path);
-    if (fd >= 0) {
-        (void)close(fd);
-    } else if (errno != ENOENT) {
-        const int error = errno;
-        inspect_say(findings, "record", INSPECT_FAIL, "record: directory %s: %s", path, gw_folder_fault(error));
-        inspect_cure(findings, "%s", gw_folder_cure(error));
+/// The start does not depend on it: what cannot be stored is only reported. Recordings and the assumption store are
+/// written only where nobody else can put anything.
+static void judge_record(const char *path, inspect_findings_t *findings) {
+    int error = 0;
+    if (is_to_be_made(path, &error) && error == 0) {
+        inspect_say(findings, "record", INSPECT_OK, "record: directory %s will be made", path);
+        return;
     }
+    const int directory = (error == 0) ? gw_folder_open_own(path) : -1;
+    error = (error != 0) ? error : (directory < 0) ? errno : write_error(directory);
+    if (directory >= 0) {
+        (void)close(directory);
+    }
+    if (error == 0) {
+        inspect_say(findings, "record", INSPECT_OK, "record: directory %s can be written", path);
+        return;
+    }
+    inspect_say(findings, "record", INSPECT_WARN,
+                "record: directory %s: %s: it starts, stops are not recorded, no assumption is stored", path,
+                gw_folder_fault(error));
+    cure_directory(path, "[record] directory", error, findings);
 }
+
+// Who may use what ----------------------------------------------------------------------------------------------------
 
 /// `may`: what the group is allowed by that key of [northbound].
 static void judge_group(const char *key, const char *group, const char *may, inspect_findings_t *findings) {
@@ -130,15 +192,14 @@ static void judge_rights(const gateway_config_t *config, inspect_findings_t *fin
 }
 
 static void judge_files(const gateway_config_t *config, inspect_findings_t *findings) {
-    char directory[GATEWAY_PATH_SIZE];
-    gw_folder_of(config->northbound.socket, directory, sizeof directory);
-    if (judge_directory("socket", directory, findings) && access(directory, F_OK) == 0) {
-        judge_safety(config, findings);
+    const gw_listener_wish_t drive = gw_report_socket(config, GW_DRIVE);
+    const gw_listener_wish_t watch = gw_report_socket(config, GW_WATCH);
+    judge_socket(&drive, findings);
+    if (strcmp(watch.path, "none") != 0) {
+        judge_socket(&watch, findings);
     }
     judge_rights(config, findings);
-    if (judge_directory("record", config->record.directory, findings)) {
-        judge_own(config->record.directory, findings);
-    }
+    judge_record(config->record.directory, findings);
 }
 
 /// The bus and the e-stop, as far as they can be opened.

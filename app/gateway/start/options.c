@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "options.h"
 
+#include "begin/begin.h"
+
 #include "iwheel_northbound/text.h"
 
 #include <errno.h>
@@ -108,6 +110,9 @@ int gw_options_parse(int count, char **arguments, gw_options_t *out_options, FIL
     opterr = 0;
     optind = 1;
     while ((option = getopt_long(count, arguments, ":c:hV", long_options, NULL)) != -1) {
+        if (!begin_is_value("iwheel-gateway", optarg)) {
+            return EX_USAGE;
+        }
         if (option == OPTION_LOG) {
             if (!gw_log_level_of(optarg, &options.log_level)) {
                 return misuse(err, "--log-level must be error, warning, info or debug");

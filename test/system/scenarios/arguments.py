@@ -97,6 +97,93 @@ def arguments(t):
     t.figure(f"{len(cases) + 12} calls")
 
 
+PROGRAMS = ("iwheel-gateway", "iwheelctl", "iwheel-sim", "iwheel-serial", "iwheel-mqtt", "iwheel-fleet", "iwheel-web", "iwheel-ros2")
+
+
+def built(rig):
+    """The programs that are there: a bridge is built only where its libraries are."""
+    for program in PROGRAMS:
+        try:
+            rig.program(program)
+        except FileNotFoundError:
+            continue
+        yield program
+
+
+@scenario("arguments that mean nothing: a bare --, an empty one, an option in place of a value", 4)
+def meaningless_arguments(t):
+    rig = t.rig()
+    private = ("--control", rig.path("own"), "--can", f"unix:{rig.path('own-bus')}", "--estop", rig.path("own-button"))
+    calls = 0
+    for program in built(rig):
+        common = private if program == "iwheel-sim" else ()
+        verb = ("status",) if program == "iwheelctl" else ()
+        for words, about in (
+            (("--",), "--"),
+            ((*verb, "--"), "--"),
+            (("--", "--version"), "--"),
+            (("",), "is empty"),
+            ((*verb, ""), "is empty"),
+            (("--help", ""), "is empty"),
+        ):
+            code, text = call(rig, program, *common, *words, seconds=2)
+            t.check(code == USAGE, f"{program} {words}: exit code {code}: {text[:160]!r}")
+            t.check(about in text and "leave it out" in text, f"{program} {words} tells the fix: {text[:160]!r}")
+            calls += 1
+    valued = {
+        "iwheel-gateway": ("-c", "--can", "--socket", "--watch-socket", "--estop", "--log-level"),
+        "iwheelctl": ("--socket",),
+        "iwheel-sim": ("--can", "--estop", "--control", "--script", "--log", "--seed", "--uptime"),
+        "iwheel-serial": ("-c", "--port", "--baud", "--socket", "--watch-socket"),
+        "iwheel-fleet": ("-c", "--for", "--last", "--since", "--until", "--wait", "--output"),
+    }
+    for program in built(rig):
+        common = private if program == "iwheel-sim" else ()
+        for option in valued.get(program, ("-c",)):
+            code, text = call(rig, program, *common, option, "--version", seconds=2)
+            t.check(code == USAGE, f"{program} {option} --version: exit code {code}: {text[:160]!r}")
+            t.check("--version" in text or "wants" in text, f"{program} {option}: names what is wrong: {text[:160]!r}")
+            calls += 1
+    t.check(not os.path.exists("--version"), "no file of that name was made")
+    t.figure(f"{calls} calls")
+
+
+def closed_pipe():
+    """The writing end of a pipe whose reader is gone."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    return writer
+
+
+@scenario("a closed pipe as stderr or stdout ends no program early", 4)
+def closed_streams(t):
+    rig = t.rig()
+    for program in built(rig):
+        pipe = closed_pipe()
+        for words, code in ((("--nonsense",), USAGE), (("--version",), 0), (("--help",), 0)):
+            done = subprocess.run(
+                [rig.program(program), *words], stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, timeout=5, check=False
+            )
+            t.check(done.returncode == code, f"{program} {words}: {done.returncode}, not {code}")
+        os.close(pipe)
+    if "iwheel-fleet" in built(rig):
+        pipe = closed_pipe()
+        with subprocess.Popen([rig.program("iwheel-fleet")], stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe) as fleet:
+            try:
+                t.check(fleet.wait(5) >= 0, "iwheel-fleet ends when nobody reads its table")
+            except subprocess.TimeoutExpired:
+                fleet.kill()
+                t.check(False, "iwheel-fleet goes on although nobody reads its table")
+        os.close(pipe)
+    os.mkdir(rig.path("shared"))
+    os.chmod(rig.path("shared"), 0o1777)  # Worth a warning before anything else.
+    rig.socket_name = "shared/gateway.sock"
+    pipe = closed_pipe()
+    rig.start_gateway(setup=lambda: os.dup2(pipe, 2))
+    os.close(pipe)
+    t.check(rig.gateway.child.poll() is None, "the gateway runs")
+
+
 # (text, line that must be named, words that must appear)
 BAD_CONFIGURATIONS = [
     ("[wheels]\nsetpoint_typ = 1\n", 2, ["setpoint_typ"]),

@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""What the benchmark of the loop reports of a gateway that stops while it is measured, by a made-up client.
+
+usage: test/bench/test_loop.py [unittest's arguments]
+"""
+import sys
+import types
+import unittest
+from pathlib import Path
+from unittest import mock
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import loop  # noqa: E402
+
+STOPPED = {"ok": True, "cause": "stale_frames", "detail": "left wheel", "frames_before": ["x"] * 40, "recording": None}
+
+
+class Client:
+    """Of a gateway that accepts `drives` commands and then refuses; `why`: its reply to that, or the exception."""
+
+    why, drives = STOPPED, 3
+
+    def __init__(self, _path):
+        self.left, self.socket = self.drives, types.SimpleNamespace(shutdown=lambda _how: None)
+
+    def ask(self, cmd, **_fields):
+        if cmd == "why":
+            if isinstance(self.why, Exception):
+                raise self.why
+            return self.why
+        self.left -= cmd == "drive"
+        return {"ok": True} if self.left >= 0 else {"ok": False, "error": "not_holder", "message": "the lease has ended"}
+
+    def close(self):
+        pass
+
+
+class Stopped(unittest.TestCase):
+    def setUp(self):
+        for name, value in (("SETTLE_S", 0.05), ("COMMANDS_S", 1000)):
+            patch = mock.patch.object(loop, name, value)
+            patch.start()
+            self.addCleanup(patch.stop)
+
+    def stop(self, stalls=(), **client):
+        """What the trial raises."""
+        pair = types.SimpleNamespace(northbound="none", gateway=types.SimpleNamespace(poll=lambda: None))
+        witness = types.SimpleNamespace(stalls=lambda _begin_us, _end_us: list(stalls))
+        with self.assertRaises(RuntimeError) as raised:
+            loop.trial(pair, type("Made", (Client,), client), "driving", lambda: 1, witness)
+        return str(raised.exception)
+
+    def test_gateway_that_stops_is_asked_why(self):
+        text = self.stop()
+        for what in ("the gateway has stopped", "stale_frames", "left wheel", "not_holder", "the lease has ended"):
+            self.assertIn(what, text)
+        self.assertNotIn("frames_before", text)
+
+    def test_gateway_that_does_not_answer_is_reported_too(self):
+        text = self.stop(why=ConnectionResetError(104, "reset by peer"))
+        self.assertIn("does not answer", text)
+        self.assertIn("not_holder", text)
+
+    def test_reason_is_reported_although_the_machine_stalled(self):
+        self.assertIn("stale_frames", self.stop(stalls=[(0, 1)]))
+
+    def test_gateway_that_goes_on_is_measured(self):
+        pair = types.SimpleNamespace(northbound="none")
+        self.assertEqual(1, loop.trial(pair, type("Made", (Client,), {"drives": 10**9}), "driving", lambda: 1, None))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+// What every program does before anything else.
+#include "begin/begin.h"
+
+#include "unity.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <sysexits.h>
+#include <unistd.h>
+
+#define COUNT(array) ((int)(sizeof(array) / sizeof(array)[0]))
+
+static int kept[3];
+
+void setUp(void) {
+    (void)fflush(stdout); // One test opens it anew.
+    for (int fd = 0; fd < COUNT(kept); fd++) {
+        kept[fd] = fcntl(fd, F_DUPFD_CLOEXEC, COUNT(kept));
+    }
+    (void)signal(SIGPIPE, SIG_DFL);
+}
+
+void tearDown(void) {
+    (void)fflush(stderr);
+    for (int fd = 0; fd < COUNT(kept); fd++) {
+        (void)dup2(kept[fd], fd);
+        (void)close(kept[fd]);
+    }
+}
+
+static int begin(char *argument) {
+    char name[] = "program";
+    char good[] = "good";
+    char *arguments[] = {name, good, argument, NULL};
+    return begin_program("program", (argument != NULL) ? 3 : 2, arguments);
+}
+
+static void test_begin_log_without_a_reader_ends_nothing(void) {
+    int ends[2];
+    TEST_ASSERT_EQUAL_INT(0, pipe(ends));
+    (void)close(ends[0]);
+    (void)dup2(ends[1], STDERR_FILENO);
+    (void)close(ends[1]);
+    const int code = begin(NULL);
+    const ssize_t count = write(STDERR_FILENO, "x", 1);
+    (void)dup2(kept[STDERR_FILENO], STDERR_FILENO);
+    TEST_ASSERT_EQUAL_INT(0, code);
+    TEST_ASSERT_EQUAL_INT(-1, count);
+}
+
+static void test_begin_closed_streams_are_opened(void) {
+    struct stat null;
+    struct stat found[COUNT(kept)] = {{.st_rdev = 0}};
+    for (int fd = 0; fd < COUNT(kept); fd++) {
+        (void)close(fd);
+    }
+    (void)begin(NULL);
+    const int next = open("/dev/zero", O_RDONLY | O_CLOEXEC);
+    for (int fd = 0; fd < COUNT(kept); fd++) {
+        (void)fstat(fd, &found[fd]);
+        (void)dup2(kept[fd], fd);
+    }
+    TEST_ASSERT_EQUAL_INT(0, stat("/dev/null", &null));
+    TEST_ASSERT_TRUE(next > STDERR_FILENO);
+    (void)close(next);
+    for (int fd = 0; fd < COUNT(kept); fd++) {
+        TEST_ASSERT_TRUE(null.st_rdev == found[fd].st_rdev);
+    }
+}
+
+static void test_begin_open_streams_are_left_alone(void) {
+    struct stat before;
+    struct stat after;
+    (void)fstat(STDOUT_FILENO, &before);
+    (void)begin(NULL);
+    (void)fstat(STDOUT_FILENO, &after);
+    TEST_ASSERT_TRUE(before.st_ino == after.st_ino && before.st_dev == after.st_dev);
+}
+
+static void test_begin_argument_that_means_nothing_is_refused(void) {
+    char empty[] = "";
+    char bare[] = "--";
+    char *const refused[] = {empty, bare};
+    for (int i = 0; i < COUNT(refused); i++) {
+        TEST_ASSERT_EQUAL_INT(EX_USAGE, begin(refused[i]));
+    }
+}
+
+static void test_begin_argument_that_may_mean_something_is_accepted(void) {
+    char dash[] = "-";
+    char longer[] = "--x";
+    char three[] = "---";
+    char space[] = " ";
+    char *const accepted[] = {dash, longer, three, space};
+    for (int i = 0; i < COUNT(accepted); i++) {
+        TEST_ASSERT_EQUAL_INT(0, begin(accepted[i]));
+    }
+}
+
+static void test_begin_option_in_place_of_a_value_is_no_value(void) {
+    TEST_ASSERT_TRUE(begin_is_value("program", NULL));
+    TEST_ASSERT_TRUE(begin_is_value("program", "-"));
+    TEST_ASSERT_TRUE(begin_is_value("program", "a-b"));
+    TEST_ASSERT_FALSE(begin_is_value("program", "-b"));
+    TEST_ASSERT_FALSE(begin_is_value("program", "--listen-only"));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_begin_log_without_a_reader_ends_nothing);
+    RUN_TEST(test_begin_closed_streams_are_opened);
+    RUN_TEST(test_begin_open_streams_are_left_alone);
+    RUN_TEST(test_begin_argument_that_means_nothing_is_refused);
+    RUN_TEST(test_begin_argument_that_may_mean_something_is_accepted);
+    RUN_TEST(test_begin_option_in_place_of_a_value_is_no_value);
+    return UNITY_END();
+}
