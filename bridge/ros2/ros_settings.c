@@ -31,7 +31,9 @@ static const settings_key_t keys[] = {
     {"gateway", "socket", "", "Of the gateway; to watch only, its watch socket suffices.",
      TEXT(gateway.socket, settings_wrong_socket)},
     {"ros", "domain", "", "DDS domain, ROS_DOMAIN_ID of the others.", NUMBER(ros.domain, 0, 232)},
-    {"ros", "network", "", "default: as CYCLONEDDS_URI says; loopback: this machine only, without multicast.",
+    {"ros", "network", "",
+     "loopback: this machine only, without multicast. default: as CYCLONEDDS_URI says; the unit also keeps it on this\n"
+     "machine, docs/ros2.md tells how to open it.",
      WORD(ros.loopback, networks)},
     {"ros", "release", "", "jazzy: Iron and newer; humble: Humble and older. Only `ros2 node list` depends on it.",
      WORD(ros.humble, releases)},
@@ -58,7 +60,7 @@ static const settings_key_t keys[] = {
 void ros_settings_default(ros_settings_t *out_settings) {
     static const ros_settings_t standard = {
         .gateway = {"/run/iwheel/gateway.sock"},
-        .ros = {.ns = "none", .node = "iwheel"},
+        .ros = {.loopback = true, .ns = "none", .node = "iwheel"},
         .drive = {.enabled = true, .timeout_ms = 500},
         .odometry = {.rate_hz = 50, .odom_frame = "odom", .base_frame = "base_link"},
     };
