@@ -11,6 +11,7 @@
 
 static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
 static const settings_word_t networks[] = {{"default", 0}, {"loopback", 1}, {NULL, 0}};
+static const settings_word_t clocks[] = {{"unknown", 0}, {"synchronised", 1}, {NULL, 0}};
 static const settings_word_t releases[] = {{"jazzy", 0}, {"humble", 1}, {NULL, 0}};
 static const settings_word_t twists[] = {{"twist", 0}, {"twist_stamped", 1}, {NULL, 0}};
 
@@ -35,6 +36,10 @@ static const settings_key_t keys[] = {
      "loopback: this machine only, without multicast. default: as CYCLONEDDS_URI says; the unit also keeps it on this\n"
      "machine, docs/ros2.md tells how to open it.",
      WORD(ros.loopback, networks)},
+    {"ros", "clocks", "",
+     "Of other machines. synchronised: NTP or PTP keeps them equal to this one's; only then other machines may arm\n"
+     "and reset.",
+     WORD(ros.synchronised, clocks)},
     {"ros", "release", "", "jazzy: Iron and newer; humble: Humble and older. Only `ros2 node list` depends on it.",
      WORD(ros.humble, releases)},
     {"ros", "namespace", "", "Before all names, for several machines in one domain, or none.",

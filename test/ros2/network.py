@@ -135,6 +135,11 @@ def one_way(data):
     return data[:20] + b"".join(part for kind, part in submessages(data) if kind not in (ACKNACK, INFO_DST))
 
 
+def timeless(packets):
+    """The same without time stamps."""
+    return [(at, port, (bytes.fromhex(data)[:20] + b"".join(part for kind, part in submessages(bytes.fromhex(data)) if kind != INFO_TS)).hex()) for at, port, data in packets]
+
+
 def fresh(data, now):
     """The same, sent now by its own time stamps."""
     made = data[:20]
