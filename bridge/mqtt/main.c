@@ -2,12 +2,17 @@
 #include "bridge.h"
 
 #include "common/program.h"
+#include "common/reach.h"
 #include "common/service.h"
 
+#include <sysexits.h>
 #include <unistd.h>
 
 static int loop(mqtt_bridge_t *bridge) {
     bridge_service_t service;
+    if (!bridge_reach_is_local("iwheel-mqtt", NULL, 0)) { // It connects to others and accepts nobody.
+        return EX_UNAVAILABLE;
+    }
     bridge_service_open(&service);
     bridge_service_tell(&service, "READY=1");
     bool goes_on = true;
@@ -58,7 +63,7 @@ int main(int count, char **arguments) {
         .about = "iwheel-mqtt: tells an MQTT broker what the wheels do, loses no stop or fault, and\n"
                  "passes on stop and estop. It drives only if configured to. No safety function.\n",
         .options = "      --check         check configuration and files; connect to nothing\n",
-        .exit_codes = "exit codes: 0 ok, 64 usage, 71 no memory, 73 no directory for events,\n"
+        .exit_codes = "exit codes: 0 ok, 64 usage, 69 reachable, 71 no memory, 73 no directory for events,\n"
                       "77 permission, 78 configuration\n",
         .settings = &settings,
         .standard = &standard,

@@ -4,7 +4,6 @@
 #include <string.h>
 #include <sysexits.h>
 
-#define ARM_MS    400 ///< echo_ms is 200 at most.
 #define SECOND_US 1000000
 /// Two snapshots may be late; seen within 0.2 s also at the slowest rates, by status requests of our own.
 #define SILENT_US 150000
@@ -13,139 +12,79 @@ static int64_t now_us(void) {
     return bridge_clock_us(CLOCK_MONOTONIC);
 }
 
-// ---- commands and requests ----------------------------------------------------------------------------------------
+// ---- commands ----------------------------------------------------------------------------------------------------
 
-/// Empty: may drive.
-static const char *why_not_drive(const bridge_t *self) {
-    if (!self->facts.drive) {
-        return "this bridge only watches: [drive] enabled = no in ros2.conf";
+/// What a command is, besides what it wants.
+typedef struct {
+    ros_twist_t twist;
+    ros_age_t age;
+    int64_t age_us;
+    bool good;  ///< Of numbers.
+    bool moves; ///< Not zero, or not readable.
+} judged_t;
+
+static judged_t judge_age(bridge_t *self, const ros_command_t *command) {
+    const ros_moment_t now = bridge_moment();
+    judged_t judged = {.age = ROS_AGE_FRESH};
+    int64_t stamp_age_us = 0;
+    judged.age = ros_ages_command(&self->ages, command->source, command->sent_us, now, &judged.age_us);
+    if (command->stamp_us != 0) {
+        const ros_age_t by_stamp =
+            ros_ages_command(&self->stamp_ages, command->source, command->stamp_us, now, &stamp_age_us);
+        judged.age = (judged.age == ROS_AGE_FRESH) ? by_stamp : judged.age;
+        judged.age_us = (stamp_age_us > judged.age_us) ? stamp_age_us : judged.age_us;
     }
-    if (self->facts.link == ROS_LINK_GONE) {
-        return "there is no gateway; see /diagnostics";
-    }
-    if (self->facts.machine.setpoint_current) {
-        return "current_role = setpoint: a twist carries no current, so this bridge cannot drive such a machine";
-    }
-    return "";
+    return judged;
 }
 
-static iwc_result_t arm(bridge_t *self, iwc_terms_t *out_terms) {
-    const iwc_result_t result = iwc_arm(self->gateway, self->settings.ros.node, false, ARM_MS, out_terms);
-    self->commanded_us = 0;
-    self->silenced = false;
-    if (result != IWC_OK && result != IWC_REFUSED && result != IWC_NEWER) {
-        bridge_lose(self, iwc_words(result)); // Whether it is armed nobody knows: the end of the connection ends it.
+/// Counts what may not be carried out.
+static judged_t judge_command(bridge_t *self, const ros_command_t *command) {
+    judged_t judged = judge_age(self, command);
+    judged.good = ros_twist_read(command->linear, command->angular, &judged.twist) == ROS_TWIST_GOOD;
+    judged.moves = !judged.good || judged.twist.v_mm_s != 0 || judged.twist.yaw_mrad_s != 0;
+    self->coming_us = now_us();
+    self->moved_us = judged.moves ? self->coming_us : self->moved_us;
+    ros_commands_t *commands = &self->facts.commands;
+    if (!judged.good) {
+        commands->bad++;
+    } else if (judged.age == ROS_AGE_UNKNOWN) {
+        commands->unknown += judged.moves ? 1U : 0U;
+    } else if (judged.age != ROS_AGE_FRESH) {
+        commands->late++;
     }
-    return result;
-}
-
-/// True with the twist, if the command may be carried out: young, and of numbers. Counts what may not, and tells by `*out_may_arm` whether
-/// it may ask for the lease.
-static bool judge_command(bridge_t *self, const ros_command_t *command, ros_twist_t *out_twist, bool *out_may_arm) {
-    const int64_t now = now_us();
-    const int64_t stamp_us = command->stamp_us;
-    const bool sent_lately = ros_age_pass(&self->ages, command->source, command->sent_us, now);
-    const bool made_lately = stamp_us == 0 || ros_age_pass(&self->stamp_ages, command->source, stamp_us, now);
-    const bool good = ros_twist_read(command->linear, command->angular, out_twist) == ROS_TWIST_GOOD;
-    const bool moves = !good || out_twist->v_mm_s != 0 || out_twist->yaw_mrad_s != 0;
-    *out_may_arm = ros_auto_command(&self->auto_arm, moves, now) && self->settings.drive.auto_arm;
-    self->coming_us = now;
-    self->facts.commands.late += (sent_lately && made_lately) ? 0U : 1U;
-    self->facts.commands.bad += good ? 0U : 1U;
-    return sent_lately && made_lately && good;
+    return judged;
 }
 
 /// The command itself moves nothing; the next one drives.
-static void arm_for_command(bridge_t *self) {
+static void arm_for_command(bridge_t *self, int64_t age_us) {
     ros_commands_t *commands = &self->facts.commands;
     iwc_terms_t terms;
-    const bool refused = arm(self, &terms) == IWC_REFUSED;
+    const bool refused = bridge_arm(self, age_us, &terms) == IWC_REFUSED;
     (void)snprintf(commands->refusal, sizeof commands->refusal, "%s", refused ? iwc_reason(self->gateway) : "");
 }
 
 static void take_command(bridge_t *self, const ros_command_t *command) {
     const iwc_state_t *state = &self->facts.machine.now;
     ros_commands_t *commands = &self->facts.commands;
-    ros_twist_t twist = {0, 0};
-    bool may_arm = false;
-    if (!judge_command(self, command, &twist, &may_arm)) {
+    const judged_t judged = judge_command(self, command);
+    const bool quiet = ros_auto_command(&self->auto_arm, judged.moves, self->coming_us);
+    const bool zero_of_unknown = judged.age == ROS_AGE_UNKNOWN && !judged.moves;
+    if (!judged.good || (judged.age != ROS_AGE_FRESH && !zero_of_unknown)) {
         return;
     }
     commands->unsent++; // Until it is.
-    if (why_not_drive(self)[0] != '\0') {
+    if (bridge_why_not_drive(self)[0] != '\0') {
         return;
     }
-    if (may_arm && state->machine == IWC_LISTENING && !state->holder.known) {
-        arm_for_command(self);
+    if (quiet && self->settings.drive.auto_arm && judged.age == ROS_AGE_FRESH && state->machine == IWC_LISTENING &&
+        !state->holder.known) {
+        arm_for_command(self, judged.age_us);
         return;
     }
-    if (iwc_twist(self->gateway, twist.v_mm_s, twist.yaw_mrad_s, 0, NULL) == IWC_OK) {
+    if (iwc_twist(self->gateway, judged.twist.v_mm_s, judged.twist.yaw_mrad_s, 0, NULL) == IWC_OK) {
         commands->unsent--;
         commands->passed++;
         self->commanded_us = now_us();
-    }
-}
-
-static void answer_result(bridge_t *self, const ros_request_t *request, iwc_result_t result) {
-    const bool success = result == IWC_OK;
-    char words[ROS_SENTENCE_SIZE];
-    (void)snprintf(words, sizeof words, "%s",
-                   success                   ? ""
-                   : (result == IWC_REFUSED) ? iwc_reason(self->gateway)
-                                             : iwc_words(result));
-    ros_answer(self->ros, request, success, words);
-    if (iwc_fd(self->gateway) < 0 && self->facts.link != ROS_LINK_GONE) {
-        bridge_lose(self, iwc_words(result));
-    }
-}
-
-static void take_arm(bridge_t *self, const ros_request_t *request) {
-    iwc_terms_t terms = {.lease_ms = 0};
-    const char *reason = why_not_drive(self);
-    if (reason[0] != '\0') {
-        ros_answer(self->ros, request, false, reason);
-        return;
-    }
-    const iwc_result_t result = arm(self, &terms);
-    if (result != IWC_OK) {
-        answer_result(self, request, result);
-        return;
-    }
-    char words[160];
-    ros_auto_told(&self->auto_arm);
-    (void)snprintf(words, sizeof words,
-                   "armed: send cmd_vel at %d Hz or more, the first within %d ms; a pause above %d ms stops the wheels",
-                   (3000 + terms.lease_ms - 1) / ((terms.lease_ms > 0) ? terms.lease_ms : 1), terms.first_lease_ms,
-                   terms.lease_ms);
-    ros_answer(self->ros, request, true, words);
-}
-
-static void take_request(bridge_t *self, const ros_request_t *request) {
-    const bool young = ros_age_pass(&self->request_ages, request->source, request->sent_us, now_us());
-    if (self->facts.link == ROS_LINK_GONE) {
-        ros_answer(self->ros, request, false, "there is no gateway; see /diagnostics");
-        return;
-    }
-    switch (request->verb) {
-    case ROS_STOP:
-        answer_result(self, request, iwc_stop(self->gateway, BRIDGE_ASK_MS));
-        return;
-    case ROS_ESTOP:
-        answer_result(self, request, iwc_estop(self->gateway, "by ROS, iwheel/estop", BRIDGE_ASK_MS));
-        return;
-    default:
-        break;
-    }
-    if (!young) {
-        ros_answer(self->ros, request, false, "it came too late to be meant now; ask again");
-    } else if (request->verb == ROS_ARM) {
-        take_arm(self, request);
-    } else if (!self->settings.drive.allow_reset) {
-        ros_answer(self->ros, request, false,
-                   "not over the network: look at the machine, then iwheelctl reset; or set [drive] allow_reset = yes "
-                   "in ros2.conf");
-    } else {
-        answer_result(self, request, iwc_reset(self->gateway, BRIDGE_ASK_MS));
     }
 }
 
@@ -158,7 +97,7 @@ static void take_from_ros(bridge_t *self) {
         take_command(self, &command);
     }
     while (ros_take_request(self->ros, &request)) {
-        take_request(self, &request);
+        bridge_take_request(self, &request);
     }
 }
 
@@ -178,6 +117,16 @@ static void judge_silence(bridge_t *self, int64_t now) {
     }
 }
 
+/// Since when somebody can know of the last stop.
+static void show_stop(bridge_t *self, int64_t now) {
+    const iwc_value_t stop =
+        (self->facts.link == ROS_LINK_UP) ? self->facts.machine.stop_number : (iwc_value_t){.known = false};
+    if (stop.known && (!self->shown.known || self->shown.value != stop.value)) {
+        self->shown_us = now;
+    }
+    self->shown = stop;
+}
+
 static void tell(bridge_t *self, int64_t now) {
     char state[sizeof self->state];
     ros_status_t statuses[ROS_TELLS];
@@ -189,6 +138,7 @@ static void tell(bridge_t *self, int64_t now) {
     if (changed) {
         memcpy(self->state, state, sizeof state);
         ros_publish_state(self->ros, state);
+        show_stop(self, now);
     }
     self->facts.commands.publishers = ros_publishers(self->ros);
     self->facts.commands.coming = self->coming_us > 0 && now - self->coming_us < SECOND_US;
@@ -287,6 +237,8 @@ int bridge_open(bridge_t *self, const ros_settings_t *settings) {
     self->facts.drive = settings->drive.enabled;
     self->backoff_us = BRIDGE_BACKOFF_US;
     ros_auto_init(&self->auto_arm, now_us());
+    ros_ages_init(&self->ages, settings->ros.loopback, settings->ros.synchronised, bridge_moment());
+    self->stamp_ages = self->ages;
     const int result = open_both(self);
     (void)pthread_mutex_unlock(&self->lock);
     if (result != 0) {

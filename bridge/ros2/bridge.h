@@ -10,6 +10,7 @@
 #ifndef ROS2_BRIDGE_H
 #define ROS2_BRIDGE_H
 
+#include "ages.h"
 #include "commands.h"
 #include "ros.h"
 
@@ -22,16 +23,18 @@ typedef struct {
     ros_t *ros;
     ros_facts_t facts;
     ros_odometry_t odometry;
-    ros_age_t ages;       ///< By the time at which DDS says that a command was sent,
-    ros_age_t stamp_ages; ///< and by the one in its header.
-    ros_age_t request_ages;
+    ros_ages_t ages;       ///< By the time at which DDS says that a command or request was sent,
+    ros_ages_t stamp_ages; ///< and by the one in a command's header.
     ros_auto_t auto_arm;
     bool ledger_due;      ///< Read it out of the next snapshot.
     bool silenced;        ///< The stop that comes is ours: the source was silent.
     bool told_gone;       ///< The log knows already that the gateway is gone.
     int64_t heard_us;     ///< When the last snapshot came.
     int64_t commanded_us; ///< When the last command was passed on; 0: none since armed.
-    int64_t coming_us;    ///< When the last command came, passed or not.
+    int64_t coming_us;    ///< When the last command came, passed or not,
+    int64_t moved_us;     ///< and the last one that was not zero; 0: none.
+    iwc_value_t shown;    ///< Number of the stop that iwheel/state shows,
+    int64_t shown_us;     ///< since then.
     int64_t retry_us;     ///< When to connect again,
     int64_t backoff_us;   ///< and how long to wait after that.
     int64_t second_us;    ///< When what is told once a second is due.

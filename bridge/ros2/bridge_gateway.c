@@ -43,10 +43,12 @@ static void read_last_stop(bridge_t *self) {
     iwc_message_t why;
     if (iwc_ask(self->gateway, "{\"cmd\":\"why\"}", BRIDGE_ASK_MS, &why) == IWC_OK &&
         iwc_integer(&why, "number").value > 0) {
+        self->facts.machine.stop_number = iwc_integer(&why, "number");
         (void)iwc_text(&why, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
         ros_auto_stopped(&self->auto_arm, false);
     } else {
         self->facts.machine.stop[0] = '\0';
+        self->facts.machine.stop_number = (iwc_value_t){.known = false};
     }
 }
 
@@ -123,6 +125,7 @@ static void take_stop(bridge_t *self, const iwc_message_t *event) {
     const bool silence =
         iwc_is(event, "cause", "lease_lost") || (self->silenced && iwc_is(event, "cause", "client_stop"));
     (void)iwc_text(event, "sentence", self->facts.machine.stop, sizeof self->facts.machine.stop);
+    self->facts.machine.stop_number = iwc_integer(event, "number");
     ros_auto_stopped(&self->auto_arm, ours && silence && event->skipped == 0);
     self->silenced = false;
     self->commanded_us = 0;

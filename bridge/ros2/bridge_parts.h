@@ -24,4 +24,16 @@ void bridge_listen(bridge_t *self);
 /// Microseconds.
 int64_t bridge_clock_us(clockid_t clock);
 
+/// Executes a request, or refuses it with the reason, and answers it.
+void bridge_take_request(bridge_t *self, const ros_request_t *request);
+
+/// Asks for the lease; `age_us` ago somebody wanted it. Without an answer the gateway is lost.
+iwc_result_t bridge_arm(bridge_t *self, int64_t age_us, iwc_terms_t *out_terms);
+
+/// Empty: may drive.
+const char *bridge_why_not_drive(const bridge_t *self);
+
+/// By both clocks.
+ros_moment_t bridge_moment(void);
+
 #endif

@@ -2,37 +2,8 @@
 #include "commands.h"
 
 #include <math.h>
-#include <string.h>
 
 #define TWIST_MAX 32767.5 // Rounds to 32767.
-
-static ros_source_t *source_of(ros_age_t *self, uint64_t source, int64_t sent_us, int64_t now_us) {
-    ros_source_t *oldest = &self->sources[0];
-    for (size_t i = 0; i < ROS_SOURCES; i++) {
-        ros_source_t *entry = &self->sources[i];
-        if (entry->source == source) {
-            return entry;
-        }
-        if (entry->source == 0 || (oldest->source != 0 && entry->heard_us < oldest->heard_us)) {
-            oldest = (oldest->source == 0) ? oldest : entry;
-        }
-    }
-    *oldest = (ros_source_t){.source = source, .least_us = now_us - sent_us, .heard_us = now_us, .sent_us = sent_us};
-    return oldest;
-}
-
-bool ros_age_pass(ros_age_t *self, uint64_t source, int64_t sent_us, int64_t now_us) {
-    const int64_t way_us = now_us - sent_us;
-    ros_source_t *entry = source_of(self, source, sent_us, now_us);
-    entry->least_us += (now_us - entry->heard_us) / (1000000 / ROS_DRIFT_PPM);
-    entry->least_us = (way_us < entry->least_us) ? way_us : entry->least_us;
-    entry->heard_us = now_us;
-    if (way_us - entry->least_us > ROS_LATE_US || sent_us < entry->sent_us) {
-        return false;
-    }
-    entry->sent_us = sent_us;
-    return true;
-}
 
 ros_twist_verdict_t ros_twist_read(const double linear[3], const double angular[3], ros_twist_t *out_twist) {
     for (size_t i = 0; i < 3U; i++) {

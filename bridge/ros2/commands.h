@@ -1,10 +1,5 @@
 // SPDX-License-Identifier: MIT
-/// Which commands from the network pass to the gateway, and when the bridge may ask for the lease by itself. Pure: no clock, no I/O.
-///
-/// Age. A command carries the time at which its publisher sent it, by the publisher's clock, which may be any. What it took at most to get
-/// here is told by the difference to our CLOCK_MONOTONIC: it may exceed the smallest difference seen of this publisher by ROS_LATE_US.
-/// The smallest one rises by ROS_DRIFT_PPM, because two clocks never run alike. A publisher that was late from its first command on cannot
-/// be told from one whose clock is wrong; a clock that is set back by more makes its publisher too old until it starts anew.
+/// What a command from the network says, and when the bridge may ask for the lease by itself. Pure: no clock, no I/O.
 #ifndef ROS2_COMMANDS_H
 #define ROS2_COMMANDS_H
 
@@ -12,26 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define ROS_LATE_US   200000
-#define ROS_DRIFT_PPM 100
 /// So long nobody may have wanted to move before the bridge arms by itself; the gateway demands the same.
 #define ROS_QUIET_US 500000
-/// Publishers remembered; of more, the one that was silent for longest is forgotten.
-#define ROS_SOURCES 8U
-
-typedef struct {
-    uint64_t source;  ///< Which publisher; 0: unused.
-    int64_t least_us; ///< Smallest reception minus sending.
-    int64_t heard_us; ///< Reception of its last command.
-    int64_t sent_us;  ///< Sending of its newest command that passed.
-} ros_source_t;
-
-typedef struct {
-    ros_source_t sources[ROS_SOURCES];
-} ros_age_t;
-
-/// True if this command is young enough and none before it was sent later. `sent_us` by the publisher's clock, `now_us` by ours.
-bool ros_age_pass(ros_age_t *self, uint64_t source, int64_t sent_us, int64_t now_us);
 
 typedef struct {
     int32_t v_mm_s;

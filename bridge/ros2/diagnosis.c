@@ -131,6 +131,7 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
     add(status, "publishers", true, commands->publishers);
     add(status, "passed", true, (int64_t)commands->passed);
     add(status, "dropped_late", true, (int64_t)commands->late);
+    add(status, "dropped_unknown", true, (int64_t)commands->unknown);
     add(status, "dropped_bad", true, (int64_t)commands->bad);
     add(status, "dropped_unsent", true, (int64_t)commands->unsent);
     add(status, "refused", true, (int64_t)commands->refused);
@@ -146,6 +147,12 @@ static void tell_commands(const ros_facts_t *facts, ros_status_t *status) {
             commands->publishers);
     } else if (commands->coming && commands->refusal[0] != '\0') {
         say(status, ROS_WARN, "commands are refused: %s", commands->refusal);
+    } else if (commands->coming && commands->unknown > 0 && commands->passed == 0) {
+        say(status, ROS_WARN,
+            "%" PRIu64
+            " commands of publishers on other machines were dropped because their clocks are not known yet: publish "
+            "zeros for a second first, at 2 Hz or more; a publisher for each command never becomes known",
+            commands->unknown);
     } else if (commands->late > 0 || commands->bad > 0) {
         say(status, ROS_WARN,
             "%" PRIu64 " commands came too late, %" PRIu64
@@ -216,18 +223,23 @@ void ros_state_json(const ros_facts_t *facts, char *out, size_t size) {
     const ros_machine_t *machine = &facts->machine;
     char stop[2U * ROS_SENTENCE_SIZE];
     char holder[140];
+    char number[24] = "null";
     if (facts->link != ROS_LINK_UP) {
         (void)snprintf(out, size, "{\"gateway\":\"%s\"}", links[facts->link]);
         return;
     }
     quote(machine->stop, stop, sizeof stop);
     quote(machine->holder, holder, sizeof holder);
-    (void)snprintf(out, size,
-                   "{\"gateway\":\"up\",\"state\":\"%s\",\"cause\":%s%s%s,\"estop\":\"%s\",\"bus\":\"%s\","
-                   "\"lease\":%s,\"holder\":%s%s%s,\"left_heard\":%s,\"right_heard\":%s,\"last_stop\":\"%s\"}",
-                   word(machine->now.machine), (machine->now.cause[0] != '\0') ? "\"" : "null", machine->now.cause,
-                   (machine->now.cause[0] != '\0') ? "\"" : "", machine->estop, machine->bus,
-                   machine->now.ours ? "true" : "false", machine->now.holder.known ? "\"" : "null",
-                   machine->now.holder.known ? holder : "", machine->now.holder.known ? "\"" : "",
-                   machine->now.left.heard ? "true" : "false", machine->now.right.heard ? "true" : "false", stop);
+    if (machine->stop_number.known) {
+        (void)snprintf(number, sizeof number, "%" PRId64, machine->stop_number.value);
+    }
+    (void)snprintf(
+        out, size,
+        "{\"gateway\":\"up\",\"state\":\"%s\",\"cause\":%s%s%s,\"estop\":\"%s\",\"bus\":\"%s\","
+        "\"lease\":%s,\"holder\":%s%s%s,\"left_heard\":%s,\"right_heard\":%s,\"stop\":%s,\"last_stop\":\"%s\"}",
+        word(machine->now.machine), (machine->now.cause[0] != '\0') ? "\"" : "null", machine->now.cause,
+        (machine->now.cause[0] != '\0') ? "\"" : "", machine->estop, machine->bus, machine->now.ours ? "true" : "false",
+        machine->now.holder.known ? "\"" : "null", machine->now.holder.known ? holder : "",
+        machine->now.holder.known ? "\"" : "", machine->now.left.heard ? "true" : "false",
+        machine->now.right.heard ? "true" : "false", number, stop);
 }

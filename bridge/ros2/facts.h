@@ -21,7 +21,8 @@ typedef enum {
 typedef struct {
     unsigned publishers;             ///< Of cmd_vel, now.
     uint64_t passed;                 ///< Handed to the gateway, each once.
-    uint64_t late;                   ///< Too old, or overtaken.
+    uint64_t late;                   ///< Too old, from the future, or overtaken.
+    uint64_t unknown;                ///< Of a writer whose clock is not known yet, and not zero.
     uint64_t bad;                    ///< No numbers, or out of any range.
     uint64_t unsent;                 ///< The gateway was gone or did not read.
     uint64_t refused;                ///< By the gateway.
@@ -47,6 +48,7 @@ typedef struct {
     char contradicted[ROS_SENTENCE_SIZE]; ///< Of the assumption ledger, with the cure; empty: nothing.
     unsigned assumed;                     ///< Entries that nothing has verified yet.
     char stop[ROS_SENTENCE_SIZE];
+    iwc_value_t stop_number; ///< As the gateway counts; not known: there was none.
 } ros_machine_t;
 
 typedef struct {

@@ -2,6 +2,7 @@
 #include "bridge.h"
 
 #include "common/program.h"
+#include "common/reach.h"
 #include "common/service.h"
 
 #include <stdlib.h>
@@ -73,6 +74,20 @@ static int check_gateway(const ros_settings_t *settings) {
     return failures;
 }
 
+static void check_reach(const ros_settings_t *settings) {
+    char text[BRIDGE_REACH_TEXT];
+    const unsigned count = bridge_reach_count(NULL, 0, text);
+    if (count == 0U) {
+        (void)puts("ok    other machines cannot reach it");
+    } else {
+        (void)printf("warn  other machines can reach %u of its sockets: %s\n", count, text);
+    }
+    if (settings->drive.enabled) {
+        (void)printf("warn  %s may arm and drive; see SECURITY.md\n",
+                     (count == 0U) ? "every program on this machine" : "whoever reaches this DDS domain");
+    }
+}
+
 static int check(const ros_settings_t *settings) {
     (void)puts("ok    configuration");
     int failures = check_gateway(settings);
@@ -80,13 +95,11 @@ static int check(const ros_settings_t *settings) {
     if (ros != NULL) {
         (void)printf("ok    DDS domain %u, node %s in namespace %s\n", settings->ros.domain, settings->ros.node,
                      settings->ros.ns);
+        check_reach(settings);
         ros_close(ros);
     } else {
         (void)puts("fail  DDS: see above");
         failures++;
-    }
-    if (settings->drive.enabled) {
-        (void)puts("warn  whoever reaches this DDS domain may arm and drive; see SECURITY.md");
     }
     return (failures > 0) ? 1 : 0;
 }

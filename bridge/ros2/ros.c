@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "ros_parts.h"
 
+#include "common/reach.h"
 #include "ros_types.h"
 
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
@@ -211,10 +213,25 @@ static bool announce(ros_t *self) {
 
 // ---- joining and leaving ------------------------------------------------------------------------------------------
 
+/// CycloneDDS sends from the interface of its configuration, but its receiving sockets have the address 0.0.0.0. It opens them with the
+/// domain; no reader is there yet, so what came before they are bound to `lo` is passed to nobody.
+static bool keep_local(ros_t *self, FILE *err) {
+    self->domain = dds_create_domain(self->settings.ros.domain, LOOPBACK);
+    if (self->domain > 0 && !bridge_reach_bind_lo()) {
+        (void)fprintf(
+            err,
+            "iwheel-ros2: cannot keep the DDS sockets on this machine: %s; it needs Linux 5.7 and the interface "
+            "lo up, or set [ros] network = default\n",
+            strerror(errno));
+        return false;
+    }
+    return true;
+}
+
 static bool join(ros_t *self, FILE *err) {
     const char *const enclave = "enclave=/;";
-    if (self->settings.ros.loopback) {
-        self->domain = dds_create_domain(self->settings.ros.domain, LOOPBACK);
+    if (self->settings.ros.loopback && !keep_local(self, err)) {
+        return false;
     }
     dds_qos_t *qos = dds_create_qos();
     dds_qset_userdata(qos, enclave, strlen(enclave));
@@ -224,6 +241,9 @@ static bool join(ros_t *self, FILE *err) {
         (void)fprintf(
             err, "iwheel-ros2: cannot join DDS domain %u (%s); check the network, CYCLONEDDS_URI and [ros] network\n",
             self->settings.ros.domain, dds_strretcode(-self->participant));
+        return false;
+    }
+    if (self->settings.ros.loopback && !bridge_reach_is_local("iwheel-ros2", NULL, 0)) {
         return false;
     }
     if (!open_topics(self) || !announce(self)) {

@@ -11,6 +11,7 @@
 
 static const settings_word_t no_yes[] = {{"no", 0}, {"yes", 1}, {NULL, 0}};
 static const settings_word_t networks[] = {{"default", 0}, {"loopback", 1}, {NULL, 0}};
+static const settings_word_t clocks[] = {{"unknown", 0}, {"synchronised", 1}, {NULL, 0}};
 static const settings_word_t releases[] = {{"jazzy", 0}, {"humble", 1}, {NULL, 0}};
 static const settings_word_t twists[] = {{"twist", 0}, {"twist_stamped", 1}, {NULL, 0}};
 
@@ -31,8 +32,14 @@ static const settings_key_t keys[] = {
     {"gateway", "socket", "", "Of the gateway; to watch only, its watch socket suffices.",
      TEXT(gateway.socket, settings_wrong_socket)},
     {"ros", "domain", "", "DDS domain, ROS_DOMAIN_ID of the others.", NUMBER(ros.domain, 0, 232)},
-    {"ros", "network", "", "default: as CYCLONEDDS_URI says; loopback: this machine only, without multicast.",
+    {"ros", "network", "",
+     "loopback: this machine only, without multicast. default: as CYCLONEDDS_URI says; the unit also keeps it on this\n"
+     "machine, docs/ros2.md tells how to open it.",
      WORD(ros.loopback, networks)},
+    {"ros", "clocks", "",
+     "Of other machines. synchronised: NTP or PTP keeps them equal to this one's; only then other machines may arm\n"
+     "and reset.",
+     WORD(ros.synchronised, clocks)},
     {"ros", "release", "", "jazzy: Iron and newer; humble: Humble and older. Only `ros2 node list` depends on it.",
      WORD(ros.humble, releases)},
     {"ros", "namespace", "", "Before all names, for several machines in one domain, or none.",
@@ -58,7 +65,7 @@ static const settings_key_t keys[] = {
 void ros_settings_default(ros_settings_t *out_settings) {
     static const ros_settings_t standard = {
         .gateway = {"/run/iwheel/gateway.sock"},
-        .ros = {.ns = "none", .node = "iwheel"},
+        .ros = {.loopback = true, .ns = "none", .node = "iwheel"},
         .drive = {.enabled = true, .timeout_ms = 500},
         .odometry = {.rate_hz = 50, .odom_frame = "odom", .base_frame = "base_link"},
     };

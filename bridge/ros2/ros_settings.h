@@ -13,10 +13,11 @@ typedef struct {
         char socket[108];
     } gateway;
     struct {
-        uint32_t domain; ///< 0..232.
-        bool loopback;   ///< This machine only, without multicast; else as CYCLONEDDS_URI says.
-        bool humble;     ///< Ids of 24 bytes in ros_discovery_info, as before Iron.
-        char ns[65];     ///< Namespace, or `none`.
+        uint32_t domain;   ///< 0..232.
+        bool loopback;     ///< This machine only, without multicast; else as CYCLONEDDS_URI says.
+        bool synchronised; ///< Other machines have this one's clock.
+        bool humble;       ///< Ids of 24 bytes in ros_discovery_info, as before Iron.
+        char ns[65];       ///< Namespace, or `none`.
         char node[65];
     } ros;
     struct {

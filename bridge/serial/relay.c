@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "relay.h"
 
+#include "common/reach.h"
 #include "iwheel_linux/clock.h"
 
 #include <errno.h>
@@ -357,6 +358,9 @@ int relay_run(relay_t *self, const serial_settings_t *settings) {
     compose(self, settings);
     int result = open_sockets(self);
     result = (result != 0) ? result : open_all(self);
+    if (result == 0 && !bridge_reach_is_local("iwheel-serial", NULL, 0)) {
+        result = EX_UNAVAILABLE;
+    }
     if (result == 0) {
         bridge_service_open(&self->service);
         gw_log(&self->log, GW_LOG_INFO, "%s at %u bit/s, clients on %s", settings->board.port,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "listen.h"
 
+#include "common/reach.h"
+
 #include <arpa/inet.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -212,6 +214,12 @@ int web_listen(const web_settings_t *settings, int out_fds[WEB_DOOR_LISTENERS]) 
         }
     }
     return code;
+}
+
+int web_listen_verify(const web_settings_t *settings, const int fds[WEB_DOOR_LISTENERS]) {
+    const char *texts[WEB_DOOR_LISTENERS];
+    const bool local = web_settings_is_unix(settings) || wanted(settings, texts) > 1U;
+    return bridge_reach_is_local("iwheel-web", fds, local ? 0U : WEB_DOOR_LISTENERS) ? 0 : EX_UNAVAILABLE;
 }
 
 void web_listen_end(const web_settings_t *settings) {

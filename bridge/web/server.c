@@ -207,7 +207,7 @@ int web_server_open(web_server_t *self, const web_settings_t *settings) {
         return complain(EX_CONFIG, settings->web.certificate,
                         "is no certificate that fits the key; give another pair of PEM files");
     }
-    return 0;
+    return web_listen_verify(settings, self->door.listen_fds);
 }
 
 void web_server_close(web_server_t *self) {

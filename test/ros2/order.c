@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The order of what comes from ROS in one wake-up: the bridge's own code and the gateway's own loop in virtual time (hours_rig.h). ROS is this
 // file: one command and one request may wait when the bridge looks.
-#include "bridge.h"
+#include "bridge_parts.h"
 #include "hours_rig.h"
 
 #include "unity.h"
@@ -232,9 +232,147 @@ static void test_ros_arm_that_was_late_is_refused(void) {
     request_comes(ROS_STOP);
     pass(3000);
     request_comes(ROS_ARM);
-    request.sent_us -= 5000000;
+    request.sent_us -= 600000; // The gateway would take it.
     pass(200);
     TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+}
+
+static void test_ros_first_command_of_a_minute_ago_moves_nothing(void) {
+    arm();
+    for (unsigned i = 0; i < 40U; i++) {
+        command_comes(0.3);
+        command.source = 100U + i; // A writer for each.
+        command.sent_us -= 60000000;
+        pass(20);
+    }
+    TEST_ASSERT_EQUAL_UINT64(0, bridge.facts.commands.passed);
+    TEST_ASSERT_EQUAL_UINT64(40, bridge.facts.commands.late);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+static void test_ros_first_request_of_a_minute_ago_is_refused(void) {
+    bridge.settings.drive.allow_reset = true;
+    request_comes(ROS_ARM);
+    request.sent_us -= 60000000;
+    pass(200);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    request_comes(ROS_ESTOP);
+    pass(3000);
+    request_comes(ROS_RESET);
+    request.sent_us -= 60000000;
+    pass(200);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+}
+
+static void test_ros_stop_of_a_minute_ago_stops(void) {
+    arm();
+    command_comes(0.3);
+    pass(20);
+    request_comes(ROS_STOP);
+    request.sent_us -= 60000000;
+    pass(100);
+    TEST_ASSERT_TRUE(answered && success);
+    TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
+static void test_ros_reset_means_a_stop_that_was_shown_for_a_second(void) {
+    bridge.settings.drive.allow_reset = true;
+    request_comes(ROS_ESTOP);
+    pass(3000);
+    request_comes(ROS_STOP); // No new stop.
+    pass(100);
+    bridge.shown_us = bridge_clock_us(CLOCK_MONOTONIC) - 900000;
+    request_comes(ROS_RESET);
+    pass(20);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    pass(200);
+    bridge.shown.value++; // The reset of another stop.
+    request_comes(ROS_RESET);
+    pass(20);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, daemon_rig_state());
+    bridge.shown.value--;
+    request_comes(ROS_RESET);
+    pass(100);
+    TEST_ASSERT_TRUE(answered && success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+}
+
+static void test_ros_arm_from_before_a_stop_is_refused_by_the_gateway(void) {
+    const int other = daemon_rig_connect();
+    daemon_rig_ask(other, "{\"cmd\":\"stop\",\"id\":1}");
+    pass(100);
+    request_comes(ROS_ARM);
+    request.sent_us -= 200000; // Young enough, and meant before that stop.
+    pass(200);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    (void)close(other);
+}
+
+static void test_ros_arm_while_a_dropped_command_moves_is_refused(void) {
+    command_comes(0.3);
+    command.sent_us -= 5000000; // The gateway does not see it.
+    pass(300);
+    request_comes(ROS_ARM);
+    pass(100);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    pass(500);
+    arm();
+}
+
+// ---- writers on other machines ----------------------------------------------------------------------------------------
+
+static void on_a_network(bool synchronised) {
+    bridge_close(&bridge);
+    (void)pthread_mutex_unlock(&bridge.lock);
+    settings.ros.loopback = false;
+    settings.ros.synchronised = synchronised;
+    TEST_ASSERT_EQUAL_INT(0, bridge_open(&bridge, &settings));
+    pass(1000);
+}
+
+static void test_ros_other_machine_may_not_arm_without_synchronised_clocks(void) {
+    on_a_network(false);
+    request_comes(ROS_ARM);
+    pass(200);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    on_a_network(true);
+    arm();
+}
+
+static void test_ros_other_machine_drives_when_its_clock_is_known(void) {
+    on_a_network(true);
+    arm();
+    for (unsigned i = 0; i < 20U; i++) {
+        command_comes(0.3);
+        pass(20);
+    }
+    TEST_ASSERT_EQUAL_UINT64(20, bridge.facts.commands.unknown);
+    TEST_ASSERT_EQUAL_UINT64(0, bridge.facts.commands.passed);
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    for (unsigned i = 0; i < 60U; i++) { // Zeros pass, and teach.
+        command_comes(0.0);
+        pass(20);
+    }
+    TEST_ASSERT_EQUAL_UINT64(60, bridge.facts.commands.passed);
+    command_comes(0.3);
+    pass(40);
+    TEST_ASSERT_EQUAL_UINT64(61, bridge.facts.commands.passed);
+    TEST_ASSERT_GREATER_THAN_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+}
+
+static void test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command(void) {
+    settings.drive.auto_arm = true;
+    on_a_network(false);
+    command_comes(0.0);
+    pass(100);
     TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
 }
 
@@ -266,6 +404,15 @@ int main(void) {
     RUN_TEST(test_ros_command_with_an_old_header_is_not_passed);
     RUN_TEST(test_ros_arm_takes_no_lease_from_another_client);
     RUN_TEST(test_ros_arm_that_was_late_is_refused);
+    RUN_TEST(test_ros_first_command_of_a_minute_ago_moves_nothing);
+    RUN_TEST(test_ros_first_request_of_a_minute_ago_is_refused);
+    RUN_TEST(test_ros_stop_of_a_minute_ago_stops);
+    RUN_TEST(test_ros_reset_means_a_stop_that_was_shown_for_a_second);
+    RUN_TEST(test_ros_arm_from_before_a_stop_is_refused_by_the_gateway);
+    RUN_TEST(test_ros_arm_while_a_dropped_command_moves_is_refused);
+    RUN_TEST(test_ros_other_machine_may_not_arm_without_synchronised_clocks);
+    RUN_TEST(test_ros_other_machine_drives_when_its_clock_is_known);
+    RUN_TEST(test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command);
     RUN_TEST(test_ros_command_that_arms_does_not_drive);
     RUN_TEST(test_ros_bridge_that_only_watches_does_not_arm);
     return UNITY_END();

@@ -115,6 +115,13 @@ class Writer:
         self.type = peer.types.of(name)
         self.writer = DataWriter(peer.participant, Topic(peer.participant, topic, self.type), quality(**qos))
 
+    @classmethod
+    def of(cls, peer, topic, **qos):
+        """A further writer of a topic."""
+        made = cls.__new__(cls)
+        made.writer = DataWriter(peer.participant, topic, quality(**qos))
+        return made
+
     def write(self, message, at_ns=None):
         self.writer.write(message, at_ns)
 

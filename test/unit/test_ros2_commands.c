@@ -1,79 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Which commands from ROS pass: age, numbers, and when the bridge may arm by itself.
+// Which commands from ROS pass: numbers, and when the bridge may arm by itself.
 #include "commands.h"
 
 #include "unity.h"
 
 #include <math.h>
-#include <string.h>
 
 #define SECOND 1000000
 
-static ros_age_t age;
 static ros_auto_t automatic;
 
 void setUp(void) {
-    memset(&age, 0, sizeof age);
     ros_auto_init(&automatic, 0);
 }
 
 void tearDown(void) {}
-
-// ---- age ----------------------------------------------------------------------------------------------------------
-
-static void test_age_clock_of_the_publisher_is_wrong_passes(void) {
-    for (int64_t t = 0; t < 10 * SECOND; t += SECOND / 20) {
-        TEST_ASSERT_TRUE(ros_age_pass(&age, 7, t + 3600LL * SECOND, t + 1000));
-    }
-}
-
-static void test_age_late_by_the_limit_passes_and_by_more_is_refused(void) {
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 0, 1000));
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 1000, 2000 + ROS_LATE_US));
-    TEST_ASSERT_FALSE(ros_age_pass(&age, 7, 2000, 3100 + ROS_LATE_US));
-}
-
-static void test_age_backlog_after_a_stall_is_refused_until_it_is_young_again(void) {
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 0, 1000));
-    for (int64_t sent = SECOND; sent < 5 * SECOND; sent += SECOND / 10) {
-        TEST_ASSERT_FALSE(ros_age_pass(&age, 7, sent, 5 * SECOND + 300000));
-    }
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 5 * SECOND + 250000, 5 * SECOND + 300000));
-}
-
-static void test_age_overtaken_command_is_refused(void) {
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 50000, 51000));
-    TEST_ASSERT_FALSE(ros_age_pass(&age, 7, 49000, 52000));
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 50000, 53000));
-}
-
-static void test_age_faster_way_later_becomes_the_measure(void) {
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 0, 400000));
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, SECOND, SECOND + 1000));
-    TEST_ASSERT_FALSE(ros_age_pass(&age, 7, 2 * SECOND, 2 * SECOND + 400000));
-}
-
-static void test_age_clocks_that_drift_apart_for_a_day_pass(void) {
-    for (int64_t t = 0; t < 86400LL * SECOND; t += 10 * SECOND) {
-        TEST_ASSERT_TRUE(ros_age_pass(&age, 7, t - t / 20000, t)); // 50 ppm slow.
-    }
-}
-
-static void test_age_publisher_clock_set_back_is_refused_and_a_new_publisher_passes(void) {
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 7, 100 * SECOND, 1000));
-    TEST_ASSERT_FALSE(ros_age_pass(&age, 7, 90 * SECOND, 2000));
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 8, 90 * SECOND, 3000));
-}
-
-static void test_age_more_publishers_than_places_forget_the_longest_silent(void) {
-    for (uint64_t source = 1; source <= ROS_SOURCES; source++) {
-        TEST_ASSERT_TRUE(ros_age_pass(&age, source, 0, (int64_t)source));
-    }
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 1, 10, 20));
-    TEST_ASSERT_TRUE(ros_age_pass(&age, ROS_SOURCES + 1U, 0, 30)); // In the place of 2.
-    TEST_ASSERT_FALSE(ros_age_pass(&age, 1, 11, SECOND));
-    TEST_ASSERT_TRUE(ros_age_pass(&age, 2, 0, SECOND));
-}
 
 // ---- numbers ------------------------------------------------------------------------------------------------------
 
@@ -154,14 +95,6 @@ static void test_auto_arm_refused_by_the_gateway_asks_again_only_later(void) {
 
 int main(void) {
     UNITY_BEGIN();
-    RUN_TEST(test_age_clock_of_the_publisher_is_wrong_passes);
-    RUN_TEST(test_age_late_by_the_limit_passes_and_by_more_is_refused);
-    RUN_TEST(test_age_backlog_after_a_stall_is_refused_until_it_is_young_again);
-    RUN_TEST(test_age_overtaken_command_is_refused);
-    RUN_TEST(test_age_faster_way_later_becomes_the_measure);
-    RUN_TEST(test_age_clocks_that_drift_apart_for_a_day_pass);
-    RUN_TEST(test_age_publisher_clock_set_back_is_refused_and_a_new_publisher_passes);
-    RUN_TEST(test_age_more_publishers_than_places_forget_the_longest_silent);
     RUN_TEST(test_twist_metres_and_radians_become_thousandths);
     RUN_TEST(test_twist_what_is_no_number_anywhere_is_refused_whole);
     RUN_TEST(test_twist_beyond_every_range_is_refused);

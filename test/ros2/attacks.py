@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""Who must not drive, does not: other machines, and what is old."""
+
+import os
+import subprocess
+import sys
+import time
+
+from network import HERE_ADDRESS, Cable, Tape, ports_of, send_again, timeless
+from peer import Writer
+from ride import Ride, Stream, now_us
+from scenario import scenario
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+DRIVER = """
+import sys, time
+sys.path[:0] = sys.argv[2:]
+from peer import Peer
+peer = Peer(int(sys.argv[1]))
+print(peer.participant.guid.hex, flush=True)
+ask, writer = peer.writer("iwheel/ask", "std_msgs/msg/String"), peer.writer("cmd_vel", "geometry_msgs/msg/Twist")
+ask.await_match()
+writer.await_match()
+time.sleep(0.7)
+ask.write(peer.make("std_msgs/msg/String", data="arm"))
+time.sleep(0.2)
+for _ in range(30):
+    writer.write(peer.twist(0.3))
+    time.sleep(0.05)
+"""
+
+
+def anew(ride):
+    """A bridge that knows nobody yet; its ports."""
+    ride.bridge.end()
+    ride.state.take()
+    ride.start_bridge()
+    ride.t.check(ride.await_state(lambda s: s["gateway"] == "up"), "the bridge is up again")
+    return ports_of(ride.bridge.child.pid)
+
+
+def old(seconds):
+    return time.time_ns() - int(seconds * 1e9)
+
+
+@scenario("a writer's first sample of 60 s ago does nothing: cmd_vel, arm, reset", 20)
+def old_first_samples(t):
+    ride = Ride(t, {"drive": {"allow_reset": "yes"}})
+    late = ride.peer.call("iwheel/arm", at_ns=old(60))
+    t.check(late and not late[0] and "too late" in late[1], f"arm: {late}")
+    t.rule(ride.client.request("status")["state"] == "listening", "nobody has armed")
+    topic, writers = ride.commands().writer.topic, []
+    ride.arm()
+    begin_us = now_us()
+    for _ in range(20):
+        writers.append(Writer.of(ride.peer, topic))
+        writers[-1].await_match()
+        writers[-1].write(ride.peer.twist(0.3), old(60))
+    t.rule(not ride.tap.twists and not ride.moving(begin_us), f"{len(ride.tap.twists)} of 20 first commands of a minute ago are passed on")
+    writers.clear()
+    t.check(ride.await_diagnosis("cmd_vel", "came too late", 5) == 1, "told")
+    ride.silence()
+    ride.peer.call("iwheel/estop")
+    time.sleep(3)
+    late = ride.peer.call("iwheel/reset", at_ns=old(60))
+    t.check(late and not late[0] and "too late" in late[1], f"reset: {late}")
+    t.rule(ride.client.request("status")["state"] == "latched", "the latch is closed")
+    answer = ride.peer.call("iwheel/reset")
+    t.check(answer and answer[0], f"reset of now: {answer}")
+    t.judge(ride.rig, moves=False)
+
+
+@scenario("bursts of 2 to 100 commands that were held back move nothing, on this machine and on a network", 40)
+def held_back_bursts(t):
+    for network in ("loopback", "default"):  # The second is on this machine too, by CYCLONEDDS_URI, but does not know it.
+        ride = Ride(t, {"ros": {"network": network}, "drive": {"auto_arm": "yes"}})
+        topic = ride.commands().writer.topic
+        time.sleep(0.6)
+        begin_us = now_us()
+        for count in (2, 3, 5, 10, 20, 50, 100):
+            writer = Writer.of(ride.peer, topic, depth=100)
+            writer.await_match()
+            for i in range(count):  # The last one as old as the network is slow.
+                writer.write(ride.peer.twist(0.3), old(60 - i * 0.05))
+                time.sleep(0.001)
+            time.sleep(0.6)
+        t.rule(not ride.tap.twists and not ride.moving(begin_us), f"{network}: {len(ride.tap.twists)} commands of bursts are passed on")
+        t.rule(ride.client.request("status")["state"] == "listening", f"{network}: nobody has armed")
+        t.judge(ride.rig, moves=False)
+        ride.bridge.end()
+
+
+@scenario("a network: a writer drives when its clock is known; it may arm only with synchronised clocks", 20)
+def writers_of_a_network(t):
+    ride = Ride(t, {"ros": {"network": "default"}})
+    writer = ride.commands()
+    answer = ride.peer.call("iwheel/arm")
+    t.check(answer and not answer[0] and "clocks = synchronised" in answer[1], f"arm: {answer}")
+    stream = Stream(writer, lambda: (ride.peer.twist(0.3), old(-3600)), 0.05)
+    time.sleep(0.8)
+    t.check(not ride.tap.twists, f"nothing passes from a writer that is not known: {ride.tap.twists[:3]}")
+    t.check(ride.await_diagnosis("cmd_vel", "not known yet", 2) == 1, "told")
+    time.sleep(0.8)
+    t.check(ride.tap.twists, "an hour ahead, and known")
+    stream.stop()
+    ride.silence()
+    t.judge(ride.rig, moves=False)
+
+
+@scenario("loopback: another machine that sends a local driver's packets moves nothing", 30)
+def other_machine(t):
+    cable = Cable(t)
+    try:
+        tape, ride = Tape(), Ride(t)
+        ports = ports_of(ride.bridge.child.pid)
+        done = subprocess.run([sys.executable, "-c", DRIVER, str(ride.domain), HERE, *sys.path], capture_output=True, text=True, timeout=60, check=True)
+        t.check(ride.moving(now_us() - 1_500_000), "a program on this machine arms and drives")
+        tape.stop()
+        packets = tape.of(bytes.fromhex(done.stdout.strip())[:12], ports)
+        path = ride.rig.path("packets")
+        ride.silence()
+        time.sleep(0.6)
+        again = anew(ride)
+        t.check(again == ports, f"the same ports: {ports}, {again}")
+        count = len(ride.tap.twists)
+        send_again(cable, packets, path, HERE_ADDRESS)
+        t.rule(len(ride.tap.twists) == count and not ride.moving(now_us() - 4_000_000), f"another machine drives: {len(ride.tap.twists) - count} commands")
+        t.check(ride.client.request("status")["state"] == "listening", "nobody has armed")
+        # The same packets do drive where they may: what was sent is no noise.
+        again = anew(ride)
+        t.check(again == ports, f"the same ports: {ports}, {again}")
+        send_again(None, packets, path, "127.0.0.1")
+        passed = len(ride.tap.twists) - count
+        t.check(passed >= 20 and ride.moving(now_us() - 1_500_000), f"sent on this machine they drive: {passed} commands")
+        ride.silence()
+        again = anew(ride)
+        t.check(again == ports, f"the same ports: {ports}, {again}")
+        count = len(ride.tap.twists)
+        send_again(None, timeless(packets), path, "127.0.0.1")
+        t.rule(len(ride.tap.twists) == count and ride.client.request("status")["state"] == "listening", "what says not when it was sent drives")
+        t.figure(f"{len(packets)} packets: from there 0 commands, from here {passed}, without a time 0")
+        t.judge(ride.rig)
+    finally:
+        cable.close()
