@@ -14,6 +14,7 @@ set(IWHEEL_CORE_SOURCES
     src/gateway.c
     src/ledger.c
     src/permit.c
+    src/permit_refuse.c
     src/sender.c
     src/setpoint.c
     src/snapshot.c

@@ -28,6 +28,46 @@ static void set_blocked(const sim_call_t *call, sim_wheel_t *wheel) {
     wheel->motion.blocked = call->words->word[0][0] == 'b';
 }
 
+static void set_free(const sim_call_t *call, sim_wheel_t *wheel) {
+    sim_motion_advance(&wheel->motion, call->now_us);
+    wheel->motion.freewheels = call->value[0] != 0;
+}
+
+static void set_droop(const sim_call_t *call, sim_wheel_t *wheel) {
+    sim_motion_advance(&wheel->motion, call->now_us);
+    wheel->motion.droop_permille = (uint16_t)(call->value[0] / 100);
+}
+
+static void set_kerb(const sim_call_t *call, sim_wheel_t *wheel) {
+    sim_motion_advance(&wheel->motion, call->now_us);
+    wheel->motion.kerb_permille = (uint16_t)(call->value[0] / 100);
+}
+
+static void set_late(const sim_call_t *call, sim_wheel_t *wheel) {
+    wheel->late_us = (uint32_t)call->value[0] * 1000U;
+}
+
+static void set_lag(const sim_call_t *call, sim_wheel_t *wheel) {
+    sim_motion_advance(&wheel->motion, call->now_us);
+    wheel->motion.config.response_us = (uint32_t)call->value[0] * 1000U;
+}
+
+/// Standard gravity is 9807 mm/s2.
+static void set_slope(const sim_call_t *call, sim_wheel_t *wheel) {
+    const int32_t slope_mm_s2 = (int32_t)(call->value[0] * 9807 / 100000);
+    sim_motion_advance(&wheel->motion, call->now_us);
+    wheel->motion.slope_mm_s2 = call->world->pair.pose.mirrored[wheel->side] ? -slope_mm_s2 : slope_mm_s2;
+}
+
+static void set_yaw(const sim_call_t *call, sim_wheel_t *wheel) {
+    sim_motion_advance(&wheel->motion, call->now_us);
+    wheel->motion.config.yaw_permille = (int16_t)(call->value[0] / 100);
+}
+
+static void set_rounding(const sim_call_t *call, sim_wheel_t *wheel) {
+    wheel->truncates = call->value[0] != 0;
+}
+
 static void set_load(const sim_call_t *call, sim_wheel_t *wheel) {
     wheel->force.load_mN = (int32_t)call->value[0];
 }
@@ -148,6 +188,7 @@ static void set_ambient(const sim_call_t *call, sim_wheel_t *wheel) {
 #define FORCE MILLI(-4000000, 4000000)
 #define RAW   .kind = SIM_WHOLE, .range = {INT16_MIN, INT16_MAX}, .also = "auto", .value = SIM_FORCE_AUTO
 #define TYPE  .kind = SIM_WHOLE, .range = {0, 255}, .also = "any", .value = SIM_TYPE_ANY
+#define SHARE MILLI(0, 100000)
 #define MORE  .kind = SIM_WHOLE, .range = {1, 3000}, .optional = true
 #define PER   .kind = SIM_WHOLE, .range = {1, 1000}, .optional = true, .value = 1
 
@@ -161,6 +202,18 @@ const sim_command_t sim_wheel_commands[] = {
     {EACH("unblock", SIDE, "it can again", set_blocked, {SIDES})},
     {EACH("runaway", SIDE " on|off [MM_S]", "faster than told by MM_S (1000)", set_runaway, {SIDES}, {ON_OFF}, {MORE}),
      .run = check_runaway},
+    {EACH("free", SIDE " on|off", "the motor has no hold of the wheel: it coasts whatever it is told", set_free,
+          {SIDES}, {ON_OFF})},
+    {EACH("droop", SIDE " PERCENT", "stays so much below its setpoint, 0..100", set_droop, {SIDES}, {SHARE})},
+    {EACH("kerb", SIDE " PERCENT", "a kerb takes so much of its speed, 0..100, until 0", set_kerb, {SIDES}, {SHARE})},
+    {EACH("late", SIDE " MS", "obeys each setpoint so much later, 0..400", set_late, {SIDES}, {WHOLE(0, 400)})},
+    {EACH("lag", SIDE " MS", "time constant of its speed controller, 1..1000 (60)", set_lag, {SIDES},
+          {WHOLE(1, 1000)})},
+    {EACH("slope", "PERCENT", "gravity along the way, forwards; -50..50", set_slope, {MILLI(-50000, 50000)})},
+    {EACH("yaw", "PERCENT", "share of one wheel's motor that turns the other, -90..90 (0)", set_yaw,
+          {MILLI(-90000, 90000)})},
+    {EACH("rounding", SIDE " chance|truncated", "how rpm become whole numbers", set_rounding, {SIDES},
+          {CHOICE("truncated", "chance")})},
     {EACH("sign", SIDE " normal|swapped", "sign of rpm and ticks", set_sign, {SIDES}, {CHOICE("swapped", "normal")})},
     {EACH("load", SIDE " NEWTON", "force on the shaft, sways 5 %; -4000..4000", set_load, {SIDES}, {FORCE})},
     {EACH("unit", SIDE " cN|dN", "unit of the force frame; document: left cN, right dN", set_unit, {SIDES},

@@ -3,6 +3,7 @@
 
 #include "cause.h"
 #include "magnitude.h"
+#include "permit_refuse.h"
 
 #include <string.h>
 
@@ -30,18 +31,8 @@ IW_STATIC_ASSERT(IW_NEVER == UINT64_MAX, never_is_all_ones_to_permit);
 /// Setpoints without echo that a process can leave in its controller when it dies: two per wheel (R6).
 #define LEFT_BEHIND_MAX 4U
 
-/// True if the configuration allows sending at all.
-static bool may_send(const iw_config_t *config) {
-    return !config->listen_only && config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
-}
-
 iw_state_t iw_permit_state(const iw_permit_t *self) {
     return (iw_state_t)phases[self->phase].state;
-}
-
-/// The last phases: CUT and LATCHED.
-static bool is_latched(const iw_permit_t *self) {
-    return self->phase >= IW_PHASE_CUT;
 }
 
 iw_demand_t iw_permit_demand(const iw_permit_t *self) {
@@ -55,7 +46,7 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     self->stale_us = IW_NEVER;
     memset(self->seen_us, 0xFF, sizeof self->seen_us); // IW_NEVER
     // Fault 25: after a crash while ARMED the wheels keep the last command until their own watchdog ends it.
-    if (restarted && may_send(config)) {
+    if (restarted && iw_refuse_may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
         self->stop.cause = IW_CAUSE_RESTART;
@@ -82,20 +73,6 @@ static uint32_t unfed_ms(const iw_permit_t *self, iw_time_us_t now_us) {
 
 uint32_t iw_permit_present(const iw_permit_t *self, iw_time_us_t now_us) {
     return iw_cause_present(self->present | self->raised, self->seen_us, now_us);
-}
-
-static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us) {
-    return iw_cause_refusal(iw_permit_present(self, now_us));
-}
-
-/// The button comes first: no reset helps while it is pressed, and that is the one cure the user can see.
-static iw_refusal_t refuse_latched(iw_refusal_t present) {
-    return (present == IW_REFUSE_ESTOP_PRESSED) ? present : IW_REFUSE_LATCHED;
-}
-
-/// R3: a joystick that is still deflected at arm or reset must not set the machine in motion.
-static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
-    return iw_age_us(self->stale_us, now_us) < IW_STALE_COMMAND_US;
 }
 
 /// Arming failed: back to the phase it was asked from. `hold_us` tells BRAKING from HOLDING.
@@ -183,7 +160,7 @@ void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t no
     self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;
     self->quiet = false;
-    if (is_latched(self)) {
+    if (iw_refuse_latched(self)) {
         return;
     }
     if (latches(self, cause)) {
@@ -262,48 +239,6 @@ void iw_permit_step(iw_permit_t *self, iw_time_us_t now_us) {
     step_phase(self, now_us);
 }
 
-/// Reasons against sending at all: configuration and latch first, since what comes after them may pass by itself.
-static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us) {
-    const iw_refusal_t present = refuse_present(self, now_us);
-    if (self->config->listen_only) {
-        return IW_REFUSE_LISTEN_ONLY;
-    }
-    if (is_latched(self)) {
-        return refuse_latched(present);
-    }
-    if (!may_send(self->config)) {
-        return IW_REFUSE_TYPE_NOT_SET;
-    }
-    if (present != IW_REFUSE_NONE) {
-        return present;
-    }
-    if (!self->view.timing_ok) {
-        return IW_REFUSE_TIMING_MISMATCH;
-    }
-    if (!self->view.heard) {
-        return IW_REFUSE_WHEEL_LOST;
-    }
-    return (self->phase == IW_PHASE_RESTARTING) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
-}
-
-/// Reasons against giving the lease to this client now.
-static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
-    if (self->holder != IW_CLIENT_NONE && (!takeover || iw_permit_arming(self))) {
-        return IW_REFUSE_BUSY;
-    }
-    if (stale_command(self, now_us)) {
-        return IW_REFUSE_STALE_COMMAND;
-    }
-    if (!self->view.at_rest || !self->view.output_zero) {
-        return IW_REFUSE_NOT_AT_REST;
-    }
-    // Out of silence a frame still in the controller is an old one: arming behind it would send it first.
-    if (self->phase == IW_PHASE_LISTENING && !self->view.can_send) {
-        return IW_REFUSE_SEND_STALLED;
-    }
-    return IW_REFUSE_NONE;
-}
-
 static void begin_arming(iw_permit_t *self, iw_time_us_t now_us) {
     self->phase = (self->phase == IW_PHASE_LISTENING) ? IW_PHASE_ARMING : IW_PHASE_REARMING;
     self->arming_us = now_us;
@@ -315,8 +250,7 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
         // The lease is not renewed: only drive commands do that.
         return IW_REFUSE_NONE;
     }
-    const iw_refusal_t sending = refuse_sending(self, now_us);
-    const iw_refusal_t refusal = (sending != IW_REFUSE_NONE) ? sending : refuse_lease(self, now_us, takeover);
+    const iw_refusal_t refusal = iw_refuse_arm(self, now_us, takeover);
     if (refusal != IW_REFUSE_NONE) {
         return refusal;
     }
@@ -327,33 +261,6 @@ iw_refusal_t iw_permit_arm(iw_permit_t *self, iw_time_us_t now_us, iw_client_t c
         begin_arming(self, now_us);
     }
     return IW_REFUSE_NONE;
-}
-
-/// ARMED: only the holder drives, and only while the lease lasts, even if no step has ended it yet.
-static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
-    if (self->holder != client) {
-        return IW_REFUSE_NOT_HOLDER;
-    }
-    // It waited in a queue since before arm: not fresh (R3).
-    if (sent_us < self->armed_us) {
-        return IW_REFUSE_STALE_COMMAND;
-    }
-    return (sent_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;
-}
-
-static iw_refusal_t refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
-    const bool blocked = self->blocked == client;
-    switch (iw_permit_state(self)) {
-    case IW_STATE_LATCHED:
-        return refuse_latched(refuse_present(self, sent_us));
-    case IW_STATE_STOPPING:
-        return blocked ? IW_REFUSE_WHEEL_BLOCKED : IW_REFUSE_NOT_ARMED;
-    case IW_STATE_ARMED:
-        return refuse_holder(self, sent_us, client);
-    case IW_STATE_LISTENING:
-    default:
-        return self->config->listen_only ? IW_REFUSE_LISTEN_ONLY : IW_REFUSE_NOT_ARMED;
-    }
 }
 
 /// Commands of several clients need not come in the order in which they were sent: the latest counts.
@@ -369,7 +276,7 @@ iw_refusal_t iw_permit_drive(iw_permit_t *self, iw_time_us_t sent_us, iw_client_
     if (nonzero) {
         iw_permit_remember(self, sent_us, client);
     }
-    const iw_refusal_t refusal = refuse_drive(self, sent_us, client);
+    const iw_refusal_t refusal = iw_refuse_drive(self, sent_us, client);
     if (refusal == IW_REFUSE_NONE) {
         grant_lease(self, sent_us, self->config->lease_ms * IW_US_PER_MS);
     }
@@ -395,24 +302,14 @@ void iw_permit_disconnect(iw_permit_t *self, iw_time_us_t now_us, iw_client_t cl
 }
 
 iw_refusal_t iw_permit_reset(iw_permit_t *self, iw_time_us_t now_us) {
-    const iw_refusal_t present = refuse_present(self, now_us);
-    if (!is_latched(self)) {
+    if (!iw_refuse_latched(self)) {
         return IW_REFUSE_NONE;
     }
-    if (present != IW_REFUSE_NONE) {
-        return present;
+    const iw_refusal_t refusal = iw_refuse_reset(self, now_us);
+    if (refusal == IW_REFUSE_NONE) {
+        self->phase = IW_PHASE_LISTENING;
     }
-    if (!self->view.heard) {
-        return IW_REFUSE_WHEEL_LOST;
-    }
-    if (!self->view.at_rest) {
-        return IW_REFUSE_NOT_AT_REST;
-    }
-    if (stale_command(self, now_us)) {
-        return IW_REFUSE_STALE_COMMAND;
-    }
-    self->phase = IW_PHASE_LISTENING;
-    return IW_REFUSE_NONE;
+    return refusal;
 }
 
 iw_time_us_t iw_permit_next_us(const iw_permit_t *self) {

@@ -36,9 +36,11 @@ static int64_t clamp(int64_t value, int64_t bound) {
     return (value < -bound) ? -bound : value;
 }
 
+/// Friction holds a slope that is not steeper than it.
 static int64_t coasting(const sim_motion_t *self, int64_t speed_um_s, int64_t dt_us) {
     int64_t const friction = (int64_t)self->config.coast_mm_s2 * dt_us / 1000;
-    return speed_um_s - clamp(speed_um_s, friction);
+    int64_t const pulled = speed_um_s + (int64_t)self->slope_mm_s2 * dt_us / 1000;
+    return pulled - clamp(pulled, friction);
 }
 
 /// Acceleration that the current gives, in mm/s2, with the current's sign.
@@ -52,7 +54,9 @@ static int64_t approaching(const sim_motion_t *self, int64_t target_um_s, int64_
     int64_t const error = target_um_s - speed;
     int64_t const response = self->config.response_us;
     bool const braking = (error < 0) == (speed > 0) && speed != 0;
-    int64_t const helped = torque + (braking ? (int64_t)self->config.coast_mm_s2 : 0);
+    int64_t const uphill = (error < 0) ? self->slope_mm_s2 : -(int64_t)self->slope_mm_s2;
+    int64_t const left_over = torque + (braking ? (int64_t)self->config.coast_mm_s2 : 0) - uphill;
+    int64_t const helped = (left_over > 0) ? left_over : 0;
     int64_t const wanted = (dt_us >= response) ? error : error * dt_us / response;
     int64_t const next = speed + clamp(wanted, helped * dt_us / 1000);
     return (target_um_s == 0 && clamp(next, STICTION_um_s) == next) ? 0 : next;
@@ -60,7 +64,10 @@ static int64_t approaching(const sim_motion_t *self, int64_t target_um_s, int64_
 
 static int64_t driving(const sim_motion_t *self, int64_t dt_us) {
     int64_t const torque = torque_mm_s2(self);
-    int64_t const told = (int64_t)self->setpoint.speed_mm_s * 1000;
+    int64_t const told = (int64_t)self->setpoint.speed_mm_s * (1000 - self->droop_permille);
+    if (self->freewheels) {
+        return coasting(self, self->speed_um_s, dt_us);
+    }
     if (self->runaway_mm_s != 0) {
         int64_t const more = (int64_t)self->runaway_mm_s * 1000;
         return approaching(self, told + ((told < 0) ? -more : more), self->config.accel_mm_s2, dt_us);
@@ -91,9 +98,23 @@ static void follow_hand(sim_motion_t *self, int64_t dt_us) {
     int64_t const way_nm = clamp(self->push_nm, PUSH_um_s * dt_us / 1000);
     self->push_nm -= way_nm;
     self->accel_mm_s2 = 0;
+    self->motor_mm_s2 = 0;
     self->speed_um_s = (self->push_nm == 0) ? 0 : (self->push_nm > 0) ? PUSH_um_s : -PUSH_um_s;
     self->position_nm += way_nm;
     count_ticks(self, way_nm);
+}
+
+/// What is left of a speed on a kerb.
+static int64_t over_kerb(const sim_motion_t *self, int64_t speed_um_s) {
+    return speed_um_s * (1000 - self->kerb_permille) / 1000;
+}
+
+/// The motors of both wheels, shared out by the yaw inertia: the sum stays, the difference becomes smaller.
+static int64_t share_out(sim_motion_t *self, int64_t before, int64_t after, int64_t dt_us) {
+    int64_t const permille = self->config.yaw_permille;
+    int64_t const other = (int64_t)self->other_motor_mm_s2 * dt_us / 1000;
+    self->motor_mm_s2 = (int32_t)((after - before) * 1000 / dt_us);
+    return (permille == 0) ? after : before + ((after - before) * 1000 + other * permille) / (1000 + permille);
 }
 
 static void integrate(sim_motion_t *self, int64_t dt_us) {
@@ -103,10 +124,12 @@ static void integrate(sim_motion_t *self, int64_t dt_us) {
     }
     int64_t const before = self->speed_um_s;
     int64_t after = 0;
+    self->motor_mm_s2 = 0;
     if (!self->blocked) {
         after = self->driven ? driving(self, dt_us) : coasting(self, before, dt_us);
+        after = share_out(self, before, after, dt_us);
     }
-    int64_t const way_nm = (before + after) * dt_us / 2000;
+    int64_t const way_nm = over_kerb(self, before + after) * dt_us / 2000;
     self->speed_um_s = (int32_t)after;
     self->accel_mm_s2 = (int32_t)((after - before) * 1000 / dt_us);
     self->position_nm += way_nm;
@@ -124,8 +147,9 @@ static iw_time_us_t step_end_us(const sim_motion_t *self, iw_time_us_t to_us) {
 
 void sim_motion_advance(sim_motion_t *self, iw_time_us_t to_us) {
     while (self->now_us < to_us) {
-        if (!self->driven && self->speed_um_s == 0 && self->push_nm == 0) {
+        if (!self->driven && self->speed_um_s == 0 && self->push_nm == 0 && self->slope_mm_s2 == 0) {
             self->accel_mm_s2 = 0;
+            self->motor_mm_s2 = 0;
             self->now_us = to_us;
             return;
         }
@@ -163,7 +187,7 @@ void sim_motion_push(sim_motion_t *self, iw_time_us_t now_us, int32_t way_mm) {
 }
 
 int64_t sim_motion_milli_rpm(const sim_motion_t *self) {
-    int64_t const wheel = (int64_t)self->speed_um_s * 60000000 / CIRCUMFERENCE_nm;
+    int64_t const wheel = over_kerb(self, self->speed_um_s) * 60000000 / CIRCUMFERENCE_nm;
     int64_t const signed_wheel = self->swapped ? -wheel : wheel;
     if (!self->config.rpm_of_rotor) {
         return signed_wheel;
@@ -177,7 +201,7 @@ int32_t sim_motion_um_s_of_milli_rpm(const sim_motion_config_t *config, int64_t 
 }
 
 int32_t sim_motion_true_mm_s(const sim_motion_t *self) {
-    return (int32_t)((int64_t)self->speed_um_s * self->config.radius_mm / SIM_FIRMWARE_RADIUS_MM / 1000);
+    return (int32_t)(over_kerb(self, self->speed_um_s) * self->config.radius_mm / SIM_FIRMWARE_RADIUS_MM / 1000);
 }
 
 int64_t sim_motion_true_mm(const sim_motion_t *self) {

@@ -58,6 +58,14 @@ static void encode(const sim_pair_t *self, iw_side_t side, const sim_message_t *
     }
 }
 
+/// Each wheel learns what the other's motor adds, whenever one of them sends: every 2 ms.
+static void couple(sim_pair_t *self) {
+    sim_motion_t *const left = &self->wheel[IW_LEFT].motion;
+    sim_motion_t *const right = &self->wheel[IW_RIGHT].motion;
+    left->other_motor_mm_s2 = right->motor_mm_s2;
+    right->other_motor_mm_s2 = left->motor_mm_s2;
+}
+
 bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent) {
     for (;;) {
         iw_time_us_t const due_us = sim_pair_next_us(self);
@@ -66,6 +74,7 @@ bool sim_pair_step(sim_pair_t *self, iw_time_us_t now_us, sim_sent_t *out_sent) 
         }
         iw_side_t const side = (self->wheel[IW_LEFT].next_us == due_us) ? IW_LEFT : IW_RIGHT;
         sim_message_t message;
+        couple(self);
         if (sim_wheel_step(&self->wheel[side], sim_pair_battery_dV(self), &self->pose, &message)) {
             out_sent->due_us = due_us;
             out_sent->side = side;

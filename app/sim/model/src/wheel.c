@@ -44,6 +44,7 @@ void sim_wheel_init(sim_wheel_t *self, const sim_wheel_config_t *config, iw_side
 
 static void boot(sim_wheel_t *self, iw_time_us_t now_us) {
     silence(self);
+    self->late_count = 0U;
     sim_motion_release(&self->motion, now_us);
     self->state = SIM_WHEEL_BOOTING;
     self->next_us = now_us + self->boot_us;
@@ -108,9 +109,27 @@ static bool lose(sim_wheel_t *self) {
     return true;
 }
 
+/// What a late wheel has received and is to obey by now, each at its time.
+static void obey_late(sim_wheel_t *self, iw_time_us_t now_us) {
+    while (self->late_count > 0U && self->late[self->late_first].at_us <= now_us) {
+        sim_late_t const *const late = &self->late[self->late_first];
+        (void)sim_motion_hear(&self->motion, late->at_us, &late->setpoint);
+        self->late_first = (self->late_first + 1U) % SIM_WHEEL_LATE_MAX;
+        self->late_count -= 1U;
+    }
+}
+
 void sim_wheel_hear(sim_wheel_t *self, iw_time_us_t now_us, const iw_codec_setpoint_t *setpoint) {
-    if (self->state == SIM_WHEEL_RUNNING && !lose(self)) {
+    if (self->state != SIM_WHEEL_RUNNING || lose(self)) {
+        return;
+    }
+    obey_late(self, now_us);
+    if (self->late_us == 0U && self->late_count == 0U) {
         (void)sim_motion_hear(&self->motion, now_us, setpoint);
+    } else if (self->late_count < SIM_WHEEL_LATE_MAX) {
+        uint32_t const place = (self->late_first + self->late_count) % SIM_WHEEL_LATE_MAX;
+        self->late[place] = (sim_late_t){now_us + self->late_us, *setpoint};
+        self->late_count += 1U;
     }
 }
 
@@ -121,13 +140,22 @@ static int16_t saturate(int64_t value) {
     return (value < INT16_MIN) ? INT16_MIN : (int16_t)value;
 }
 
-/// Rounds up or down by chance, so that the mean over many frames is exact. At rest there is nothing to round.
+/// Rounds up or down by chance, so that the mean over many frames is exact, or cuts off. At rest there is nothing to
+/// round.
+static int64_t whole_rpm(sim_wheel_t *self) {
+    int64_t const milli_rpm = sim_motion_milli_rpm(&self->motion);
+    if (self->truncates) {
+        return milli_rpm / 1000;
+    }
+    int64_t const dithered = milli_rpm + sim_random_below(&self->random, RPM_DITHER);
+    return (dithered >= 0) ? dithered / 1000 : -((-dithered + 999) / 1000);
+}
+
 static void fill_speed(sim_wheel_t *self, iw_codec_speed_t *out_speed) {
-    int64_t const dithered = sim_motion_milli_rpm(&self->motion) + sim_random_below(&self->random, RPM_DITHER);
-    int64_t const floored = (dithered >= 0) ? dithered / 1000 : -((-dithered + 999) / 1000);
+    int64_t const rpm = whole_rpm(self);
     bool const at_rest = self->motion.speed_um_s == 0;
     int32_t const accel = self->motion.swapped ? -self->motion.accel_mm_s2 : self->motion.accel_mm_s2;
-    out_speed->speed_rpm = at_rest ? 0 : saturate(floored);
+    out_speed->speed_rpm = at_rest ? 0 : saturate(rpm);
     out_speed->acceleration_raw = saturate((int64_t)accel * 49736 / 1000000);
 }
 
@@ -178,6 +206,7 @@ static void fill(sim_wheel_t *self, iw_time_us_t now_us, sim_telemetry_t kind, s
 
 bool sim_wheel_step(sim_wheel_t *self, uint8_t battery_dV, sim_pose_t *pose, sim_message_t *out_message) {
     iw_time_us_t const now_us = self->next_us;
+    obey_late(self, now_us);
     sim_motion_advance(&self->motion, now_us);
     if (self->state == SIM_WHEEL_BOOTING) {
         if (self->side == IW_RIGHT) {

@@ -154,6 +154,11 @@ static void heal_wheel(sim_wheel_t *wheel) {
     wheel->force.zero_removed = false;
     wheel->motion.runaway_mm_s = 0;
     wheel->motion.blocked = false;
+    wheel->motion.freewheels = false;
+    wheel->motion.droop_permille = 0U;
+    wheel->motion.kerb_permille = 0U;
+    wheel->motion.slope_mm_s2 = 0;
+    wheel->late_us = 0U;
     wheel->motion.swapped = false;
     sim_wheel_slow(wheel, 1000U);
 }

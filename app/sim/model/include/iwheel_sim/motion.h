@@ -11,6 +11,11 @@
 /// - Current as a setpoint: with a speed, its magnitude bounds the torque; speed 0 with a current is torque without a
 ///   speed to hold, so the wheel runs; 0/0 coasts.
 /// - The unit of the acceleration field is rpm/s.
+/// - A slope is held by the controller as far as the torque suffices; it moves a wheel that coasts. What a load costs in
+///   speed is the droop.
+/// - A kerb takes a share of the speed for as long as it lasts, recovery included.
+/// - The yaw inertia of the machine passes a share of one wheel's motor on to the other (pair.h). Both together go as
+///   without it; turning is slower by (1 + share) / (1 - share).
 ///
 /// Integers only. Advanced to exact instants by its owner, so that nothing depends on how often it is called.
 #ifndef IWHEEL_SIM_MOTION_H
@@ -32,6 +37,7 @@ typedef struct {
     uint16_t gear_turns;   ///< Turns of the rotor in `gear_per` turns of the wheel.
     uint16_t gear_per;     ///< Not 0.
     int16_t accepted_type; ///< 0..255, other setpoint types are ignored; or SIM_TYPE_ANY.
+    int16_t yaw_permille;  ///< Share of the other wheel's motor that reaches this one, -900..900; 0: not coupled.
     bool rpm_of_rotor;     ///< Telemetry tells the rotor's rpm, not the wheel's.
     bool current_is_setpoint;
 } sim_motion_config_t;
@@ -45,13 +51,19 @@ typedef struct {
     int64_t push_nm;       ///< Way that a hand still turns the wheel, whatever it is told; at the firmware's radius.
     int32_t speed_um_s;    ///< At the firmware's radius, in the wheel's own sense of rotation.
     int32_t accel_mm_s2;
+    int32_t motor_mm_s2;       ///< What its own motor adds.
+    int32_t other_motor_mm_s2; ///< The same of the other wheel: written by the pair.
+    int32_t slope_mm_s2;       ///< Gravity along the way of this wheel.
     uint32_t ticks;
     uint32_t setpoints; ///< How many were taken.
     iw_codec_setpoint_t setpoint;
-    int16_t runaway_mm_s; ///< Fault: this much faster than told, as long as it is told anything. 0: none.
-    bool driven;          ///< The last setpoint still counts.
-    bool blocked;         ///< Fault: cannot turn.
-    bool swapped;         ///< Fault: rpm and ticks have the wrong sign.
+    int16_t runaway_mm_s;    ///< Fault: this much faster than told, as long as it is told anything. 0: none.
+    uint16_t droop_permille; ///< It settles so much below its setpoint; up to 1000.
+    uint16_t kerb_permille;  ///< A kerb takes so much of the speed; up to 1000.
+    bool driven;             ///< The last setpoint still counts.
+    bool freewheels;         ///< Fault: the motor has no hold of the wheel.
+    bool blocked;            ///< Fault: cannot turn.
+    bool swapped;            ///< Fault: rpm and ticks have the wrong sign.
 } sim_motion_t;
 
 /// A wheel of about 1 kg at the shaft: 4000 mm/s2, friction 700 mm/s2, 60 ms, gear 1, current as a limit.

@@ -34,6 +34,14 @@ typedef enum {
     SIM_TELEMETRY_KINDS,
 } sim_telemetry_t;
 
+/// Setpoints that a late wheel has received and not obeyed yet: 400 ms of them, at the shortest period.
+#define SIM_WHEEL_LATE_MAX 96U
+
+typedef struct {
+    iw_time_us_t at_us;
+    iw_codec_setpoint_t setpoint;
+} sim_late_t;
+
 typedef struct {
     sim_motion_t motion;
     sim_force_t force;
@@ -54,7 +62,11 @@ typedef struct {
     int32_t ambient_degC;
     iw_side_t side;
     sim_wheel_state_t state;
-    bool muted; ///< Fault: no telemetry.
+    bool muted;       ///< Fault: no telemetry.
+    bool truncates;   ///< The rpm are cut off; else rounded by chance, so that their mean is exact.
+    uint32_t late_us; ///< Fault: each setpoint is obeyed so much later; up to 400000.
+    uint32_t late_first, late_count;
+    sim_late_t late[SIM_WHEEL_LATE_MAX];
 } sim_wheel_t;
 
 typedef struct {

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+#include "permit_refuse.h"
+
+#include "cause.h"
+#include "magnitude.h"
+
+bool iw_refuse_may_send(const iw_config_t *config) {
+    return !config->listen_only && config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
+}
+
+bool iw_refuse_latched(const iw_permit_t *self) {
+    return self->phase >= IW_PHASE_CUT;
+}
+
+static iw_refusal_t refuse_present(const iw_permit_t *self, iw_time_us_t now_us) {
+    return iw_cause_refusal(iw_permit_present(self, now_us));
+}
+
+/// The button comes first: no reset helps while it is pressed, and that is the one cure the user can see.
+static iw_refusal_t refuse_latched(iw_refusal_t present) {
+    return (present == IW_REFUSE_ESTOP_PRESSED) ? present : IW_REFUSE_LATCHED;
+}
+
+/// R3: a joystick that is still deflected at arm or reset must not set the machine in motion.
+static bool stale_command(const iw_permit_t *self, iw_time_us_t now_us) {
+    return iw_age_us(self->stale_us, now_us) < IW_STALE_COMMAND_US;
+}
+
+/// Reasons against sending at all: configuration and latch first, since what comes after them may pass by itself.
+static iw_refusal_t refuse_sending(const iw_permit_t *self, iw_time_us_t now_us) {
+    const iw_refusal_t present = refuse_present(self, now_us);
+    if (self->config->listen_only) {
+        return IW_REFUSE_LISTEN_ONLY;
+    }
+    if (iw_refuse_latched(self)) {
+        return refuse_latched(present);
+    }
+    if (!iw_refuse_may_send(self->config)) {
+        return IW_REFUSE_TYPE_NOT_SET;
+    }
+    if (present != IW_REFUSE_NONE) {
+        return present;
+    }
+    if (!self->view.timing_ok) {
+        return IW_REFUSE_TIMING_MISMATCH;
+    }
+    if (!self->view.heard) {
+        return IW_REFUSE_WHEEL_LOST;
+    }
+    return (self->phase == IW_PHASE_RESTARTING) ? IW_REFUSE_CAUSE_PRESENT : IW_REFUSE_NONE;
+}
+
+/// Reasons against giving the lease to this client now.
+static iw_refusal_t refuse_lease(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
+    if (self->holder != IW_CLIENT_NONE && (!takeover || iw_permit_arming(self))) {
+        return IW_REFUSE_BUSY;
+    }
+    if (stale_command(self, now_us)) {
+        return IW_REFUSE_STALE_COMMAND;
+    }
+    if (!self->view.at_rest || !self->view.output_zero) {
+        return IW_REFUSE_NOT_AT_REST;
+    }
+    // Out of silence a frame still in the controller is an old one: arming behind it would send it first.
+    if (self->phase == IW_PHASE_LISTENING && !self->view.can_send) {
+        return IW_REFUSE_SEND_STALLED;
+    }
+    return IW_REFUSE_NONE;
+}
+
+iw_refusal_t iw_refuse_arm(const iw_permit_t *self, iw_time_us_t now_us, bool takeover) {
+    const iw_refusal_t sending = refuse_sending(self, now_us);
+    return (sending != IW_REFUSE_NONE) ? sending : refuse_lease(self, now_us, takeover);
+}
+
+/// ARMED: only the holder drives, and only while the lease lasts, even if no step has ended it yet.
+static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
+    if (self->holder != client) {
+        return IW_REFUSE_NOT_HOLDER;
+    }
+    // It waited in a queue since before arm: not fresh (R3).
+    if (sent_us < self->armed_us) {
+        return IW_REFUSE_STALE_COMMAND;
+    }
+    return (sent_us < self->lease_until_us) ? IW_REFUSE_NONE : IW_REFUSE_NOT_ARMED;
+}
+
+iw_refusal_t iw_refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
+    const bool blocked = self->blocked == client;
+    switch (iw_permit_state(self)) {
+    case IW_STATE_LATCHED:
+        return refuse_latched(refuse_present(self, sent_us));
+    case IW_STATE_STOPPING:
+        return blocked ? IW_REFUSE_WHEEL_BLOCKED : IW_REFUSE_NOT_ARMED;
+    case IW_STATE_ARMED:
+        return refuse_holder(self, sent_us, client);
+    case IW_STATE_LISTENING:
+    default:
+        return self->config->listen_only ? IW_REFUSE_LISTEN_ONLY : IW_REFUSE_NOT_ARMED;
+    }
+}
+
+iw_refusal_t iw_refuse_reset(const iw_permit_t *self, iw_time_us_t now_us) {
+    const iw_refusal_t present = refuse_present(self, now_us);
+    if (present != IW_REFUSE_NONE) {
+        return present;
+    }
+    if (!self->view.heard) {
+        return IW_REFUSE_WHEEL_LOST;
+    }
+    if (!self->view.at_rest) {
+        return IW_REFUSE_NOT_AT_REST;
+    }
+    return stale_command(self, now_us) ? IW_REFUSE_STALE_COMMAND : IW_REFUSE_NONE;
+}
