@@ -74,7 +74,16 @@ class Pair:
             f"directory = {self.folder}\n")
         self.simulator = subprocess.Popen([self.build / "app/sim/iwheel-sim", "--quiet", "--uptime", "120", "--can",
                                            f"unix:{self.folder}/bus", "--estop", f"{self.folder}/estop", "--control", f"{self.folder}/control"])
+        for name in ("bus", "estop"):  # A gateway that starts without its e-stop is latched.
+            self.await_file(name)
         self.gateway = self.start()
+
+    def await_file(self, name, seconds=20):
+        end = time.monotonic() + seconds
+        while not (self.folder / name).exists():
+            if time.monotonic() > end or self.simulator.poll() is not None:
+                raise RuntimeError(f"the simulator has not made {name}")
+            time.sleep(0.01)
 
     def start(self):
         environment = dict(os.environ, LD_PRELOAD=str(self.preload), BENCH_ALLOCATIONS=str(self.allocations))
