@@ -30,7 +30,13 @@ static std_msgs_msg_dds__Header_ header(int64_t wall_us, char *frame) {
 }
 
 static double in_thousands(iwc_value_t value) {
-    return value.known ? (double)value.value / 1000.0 : NAN;
+    return (double)value.value / 1000.0;
+}
+
+/// Whether the wheel's way is that of now: of a wheel without telemetry the last distance stays known, its speed does not. ROS has no place for an
+/// unknown part of a motion (a NaN spreads through TF and filters), so such a motion is left out.
+static bool is_moving_known(const iwc_wheel_t *wheel) {
+    return wheel->distance_mm.known && wheel->speed_mm_s.known;
 }
 
 static geometry_msgs_msg_dds__Quaternion_ heading(double yaw_rad) {
@@ -76,16 +82,22 @@ static void publish_joints(ros_t *self, const ros_machine_t *machine) {
     const iwc_wheel_t *wheels[2] = {&machine->now.left, &machine->now.right};
     const double radius_m = (double)machine->radius_mm / 1000.0;
     char *names[2] = {left_wheel, right_wheel};
+    char *known[2];
     double positions[2];
     double velocities[2];
+    uint32_t count = 0;
     for (size_t i = 0; i < 2U; i++) {
-        positions[i] = in_thousands(wheels[i]->distance_mm) / radius_m;
-        velocities[i] = in_thousands(wheels[i]->speed_mm_s) / radius_m;
+        if (is_moving_known(wheels[i])) {
+            known[count] = names[i];
+            positions[count] = in_thousands(wheels[i]->distance_mm) / radius_m;
+            velocities[count] = in_thousands(wheels[i]->speed_mm_s) / radius_m;
+            count++;
+        }
     }
     const sensor_msgs_msg_dds__JointState_ joints = {.header = header(machine->wall_us, nothing),
-                                                     .name = {._length = 2, ._buffer = names},
-                                                     .position = {._length = 2, ._buffer = positions},
-                                                     .velocity = {._length = 2, ._buffer = velocities}};
+                                                     .name = {._length = count, ._buffer = known},
+                                                     .position = {._length = count, ._buffer = positions},
+                                                     .velocity = {._length = count, ._buffer = velocities}};
     (void)dds_write(self->writers[WRITES_JOINTS], &joints);
 }
 
@@ -95,14 +107,16 @@ void ros_publish_motion(ros_t *self, const ros_machine_t *machine, const ros_odo
     if (!odometry->begun || machine->measures.track_m <= 0.0) {
         return;
     }
-    if (left->distance_mm.known && right->distance_mm.known) {
+    if (is_moving_known(left) && is_moving_known(right)) {
         publish_odometry(self, machine, odometry);
     }
-    if (left->distance_mm.known || right->distance_mm.known) {
+    if (machine->radius_mm > 0 && (is_moving_known(left) || is_moving_known(right))) {
         publish_joints(self, machine);
     }
 }
 
+/// The wrench of one force, the measured one along x at the frame's origin: the other parts of that force are zero by definition, whatever else
+/// acts on the handle. RViz drops a message in which any part is NaN. Without a known force there is no message.
 void ros_publish_wrench(ros_t *self, const ros_machine_t *machine) {
     const iwc_wheel_t *wheels[2] = {&machine->now.left, &machine->now.right};
     char *frames[2] = {left_handle, right_handle};
@@ -112,7 +126,7 @@ void ros_publish_wrench(ros_t *self, const ros_machine_t *machine) {
         }
         const geometry_msgs_msg_dds__WrenchStamped_ wrench = {
             .header = header(machine->wall_us, frames[i]),
-            .wrench = {.force = {in_thousands(wheels[i]->force_net_mN), NAN, NAN}, .torque = {NAN, NAN, NAN}}};
+            .wrench = {.force = {.x = in_thousands(wheels[i]->force_net_mN)}}};
         (void)dds_write(self->writers[WRITES_LEFT_WRENCH + i], &wrench);
     }
 }

@@ -63,7 +63,9 @@ def messages(t):
     battery = readers["left/battery_state"].all[-1][1]
     t.check(22 < battery.voltage < 27 and math.isnan(battery.percentage) and battery.present, f"{battery}")
     wrench = readers["left/wrench"].all[-1][1].wrench
-    t.check(abs(wrench.force.x) < 50 and math.isnan(wrench.force.y), f"what is not measured is no number: {wrench}")
+    parts = [getattr(vector, axis) for vector in (wrench.force, wrench.torque) for axis in "xyz"]
+    t.check(abs(parts[0]) < 50 and not any(parts[1:]), f"the wrench is that of the measured force alone: {wrench}")
+    t.check(all(map(math.isfinite, parts)), f"RViz drops a wrench with a part that is no number: {wrench}")
     seconds = readers["odom"].all[-1][2] - readers["odom"].all[0][2]
     t.figure(f"{len(readers['odom'].all)} odom, {sum(len(r.all) for r in readers.values())} messages compared, {seconds:.1f} s")
     ride.silence()
@@ -91,6 +93,34 @@ def odometry(t):
     t.check(abs(pose.position.x) > 0.5 and math.hypot(pose.position.x - x_m, pose.position.y - y_m) < 0.08, f"{pose.position}, the wheel itself says {x_m} {y_m} {psi}")
     t.figure(f"{pose.position.x:.2f} {pose.position.y:.2f} m, {yaw:.2f} rad; the wheel says {x_m:.2f} {y_m:.2f}, {psi:.2f}")
     t.judge(ride.rig)
+
+
+def numbers_of(message):
+    """All floating point numbers of a message, however deep."""
+    if isinstance(message, float):
+        return [message]
+    if hasattr(message, "__dict__"):
+        return [number for part in vars(message).values() for number in numbers_of(part)]
+    return [number for part in message for number in numbers_of(part)] if hasattr(message, "__len__") and not isinstance(message, (str, bytes)) else []
+
+
+@scenario("a wheel without telemetry: its motion is left out, and no part of a message is NaN", 10)
+def wheel_offline(t):
+    ride = Ride(t, {"odometry": {"tf": "yes"}})
+    readers = {name: ride.peer.reader(name, MESSAGES[name], depth=200) for name in ("odom", "/tf", "joint_states", "right/wrench")}
+    t.check(ride.rig.wait_status(ride.client, lambda s: s["right"]["force_validity"] == "valid", 8), "a zero of the force")
+    time.sleep(0.5)
+    ride.rig.sim.ask("mute left")
+    t.check(ride.rig.wait_status(ride.client, lambda s: s["left"]["speed_mm_s"] is None and s["left"]["distance_mm"] is not None), "its distance stays known")
+    off = now_us()
+    time.sleep(1)
+    for name, reader in readers.items():
+        reader.take()
+        bad = [message for _, message, _ in reader.all if not all(map(math.isfinite, numbers_of(message)))]
+        t.check(not bad, f"{name}: {len(bad)} of {len(reader.all)} have a part that is no number: {bad[:1]}")
+    late = [message for _, message, _ in readers["joint_states"].all if message.header.stamp.sec + message.header.stamp.nanosec / 1e9 > time.time() - (now_us() - off) / 1e6 + 0.2]
+    t.check(late and all(message.name == ["right_wheel_joint"] and len(message.position) == len(message.velocity) == 1 for message in late), f"the other wheel alone: {late[-1:]}")
+    t.judge(ride.rig, moves=False)
 
 
 @scenario("services: arm, stop, estop, reset; refused with the cure; the same by topic", 12)
