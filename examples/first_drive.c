@@ -16,18 +16,21 @@ bool first_drive_init(iw_gateway_t *gateway, const iw_hal_t *hal, iw_time_us_t n
 }
 
 void first_drive_command(iw_gateway_t *gateway, iw_time_us_t now_us) {
+    static bool was_armed; // A stop ends it: only a person begins again.
     const iw_drive_t forward = {.speed_mm_s = {200, 200}};
     iw_applied_t applied;
-    if (now_us < ARM_AT_us) {
+    const bool is_armed = iw_gateway_state(gateway) == IW_STATE_ARMED;
+    if (now_us < ARM_AT_us || (was_armed && !is_armed)) {
         return;
     }
+    was_armed = is_armed;
     if (now_us >= STOP_AT_us) {
-        if (iw_gateway_state(gateway) == IW_STATE_ARMED) {
+        if (is_armed) {
             iw_gateway_stop(gateway, now_us, CLIENT, IW_CAUSE_CLIENT_STOP);
         }
     } else if (iw_gateway_state(gateway) == IW_STATE_LISTENING && !iw_gateway_arming(gateway)) {
         (void)iw_gateway_arm(gateway, now_us, CLIENT, false); // Refused: asked again in the next step.
-    } else if (iw_gateway_state(gateway) == IW_STATE_ARMED) {
+    } else if (is_armed) {
         (void)iw_gateway_drive(gateway, now_us, CLIENT, &forward, &applied); // Feeds the lease.
     }
 }

@@ -130,6 +130,9 @@ static void take_what_permits(bridge_t *self, const ros_request_t *request) {
 }
 
 void bridge_take_request(bridge_t *self, const ros_request_t *request) {
+    if (request->verb == ROS_STOP || request->verb == ROS_ESTOP) {
+        ros_auto_person_stopped(&self->auto_arm);
+    }
     if (self->facts.link == ROS_LINK_GONE) {
         ros_answer(self->ros, request, false, "there is no gateway; see /diagnostics");
     } else if (request->verb == ROS_STOP) {

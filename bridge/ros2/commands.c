@@ -20,14 +20,27 @@ ros_twist_verdict_t ros_twist_read(const double linear[3], const double angular[
 }
 
 void ros_auto_init(ros_auto_t *self, int64_t now_us) {
-    *self = (ros_auto_t){.trusted = true, .moved_us = now_us, .tried_us = now_us};
+    *self = (ros_auto_t){.state = ROS_AUTO_TRUSTED, .moved_us = now_us, .heard_us = now_us, .tried_us = now_us};
+}
+
+static ros_auto_state_t state_after_command(const ros_auto_t *self, int64_t now_us) {
+    switch (self->state) {
+    case ROS_AUTO_STOPPED:
+        return ROS_AUTO_RESUMED;
+    case ROS_AUTO_RESUMED:
+        return (now_us - self->heard_us >= ROS_SILENT_US) ? ROS_AUTO_TRUSTED : ROS_AUTO_RESUMED;
+    default:
+        return self->state;
+    }
 }
 
 bool ros_auto_command(ros_auto_t *self, bool moves, int64_t now_us) {
     const bool quiet = now_us - self->moved_us >= ROS_QUIET_US;
+    self->state = state_after_command(self, now_us);
+    self->heard_us = now_us;
     self->moved_us = moves ? now_us : self->moved_us;
     // One attempt in that time too: a gateway that refuses is not asked with each command.
-    if (!self->trusted || !quiet || now_us - self->tried_us < ROS_QUIET_US) {
+    if (self->state != ROS_AUTO_TRUSTED || !quiet || now_us - self->tried_us < ROS_QUIET_US) {
         return false;
     }
     self->tried_us = now_us;
@@ -35,9 +48,13 @@ bool ros_auto_command(ros_auto_t *self, bool moves, int64_t now_us) {
 }
 
 void ros_auto_stopped(ros_auto_t *self, bool by_our_silence) {
-    self->trusted = self->trusted && by_our_silence;
+    self->state = by_our_silence ? self->state : ROS_AUTO_WAITING;
+}
+
+void ros_auto_person_stopped(ros_auto_t *self) {
+    self->state = (self->state == ROS_AUTO_WAITING) ? ROS_AUTO_WAITING : ROS_AUTO_STOPPED;
 }
 
 void ros_auto_told(ros_auto_t *self) {
-    self->trusted = true;
+    self->state = ROS_AUTO_TRUSTED;
 }

@@ -52,7 +52,7 @@ static const settings_key_t keys[] = {
      NUMBER(drive.timeout_ms, 50, 500)},
     {"drive", "auto_arm", "",
      "yes: a command after 500 ms of zeros or silence arms; not after a stop that had another reason than its\n"
-     "own source's silence.",
+     "own source's silence, and after a person's stop only once the source was silent for a second.",
      WORD(drive.auto_arm, no_yes)},
     {"drive", "allow_reset", "", "yes: the service iwheel/reset resets a latched stop.",
      WORD(drive.allow_reset, no_yes)},

@@ -190,10 +190,24 @@ static void do_drive(iw_host_t *self, iw_host_client_t *client, const iwn_quote_
     drive(self, client, quote, &wanted);
 }
 
+/// A turn for which no speeds are known.
+static void refuse_turn(iw_host_t *self, iw_host_client_t *client) {
+    const iw_drive_t turn = {.speed_mm_s = {-1, 1}};
+    remember_wish(self, client, &turn);
+    REFUSE(self, client, IWN_DENIED,
+           "the distance between the wheels is not that of wheels.track_mm, so a turn has no speeds; correct it by the "
+           "request config, "
+           "or drive without yaw_mrad_s");
+}
+
 static void do_twist(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote) {
     const int64_t limit = 1000000; // Far outside, and no product of it overflows.
     const int64_t v = self->request.v_mm_s;
     const int64_t yaw = self->request.yaw_mrad_s;
+    if (yaw != 0 && iw_host_look(self)->assumed[IW_LEDGER_TRACK].state == IW_LEDGER_CONTRADICTED) {
+        refuse_turn(self, client);
+        return;
+    }
     const int64_t v_mm_s = (v > limit) ? limit : (v < -limit) ? -limit : v;
     const int64_t yaw_mrad_s = (yaw > limit) ? limit : (yaw < -limit) ? -limit : yaw;
     const int64_t rim_mm_s = yaw_mrad_s * (int64_t)self->place.track_mm / 2000;
@@ -271,68 +285,6 @@ static void do_why(iw_host_t *self, iw_host_client_t *client) {
     iw_host_send_reply(self, client, &json);
 }
 
-static bool stage(iw_host_t *self, iwn_text_t *why) {
-    const iwn_request_t *const request = &self->request;
-    if (request->value[0] == '\0') {
-        IWN_TEXT_JOIN(why, "key needs a value; without both all keys are read");
-        return false;
-    }
-    if (!iw_settings_set(&self->staged, request->key, request->value, why)) {
-        return false;
-    }
-    self->has_staged = true;
-    return true;
-}
-
-/// True if what was asked for is done, or there was nothing to do. `*out_error` else.
-static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
-    const iwn_request_t *const request = &self->request;
-    *out_error = IWN_BAD_VALUE;
-    if (request->key[0] != '\0' || request->value[0] != '\0') {
-        return stage(self, why);
-    }
-    if (!request->has_commit) {
-        return true;
-    }
-    if (!request->commit) {
-        self->has_staged = false;
-        self->staged = self->place.settings;
-        return true;
-    }
-    if (!iw_settings_check(&self->staged, why)) {
-        return false;
-    }
-    *out_error = IWN_DENIED;
-    if (!iw_host_is_silent(self)) {
-        IWN_TEXT_JOIN(
-            why,
-            "the configuration is written only while the gateway is listening and silent: stop, and wait until it is");
-        return false;
-    }
-    *out_error = IWN_INTERNAL;
-    if (!iw_host_keep(&self->staged)) {
-        IWN_TEXT_JOIN(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
-                           "on, and try again");
-        return false;
-    }
-    self->has_staged = false;
-    self->restart_us = self->now_us + IW_HOST_RESTART_US;
-    return true;
-}
-
-static void do_config(iw_host_t *self, iw_host_client_t *client) {
-    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
-    if (!configure(self, &why, &self->refusal.error)) {
-        send_refusal(self, client);
-        return;
-    }
-    iwn_out_t json = iw_host_begin_reply(self, &self->request.id);
-    iw_settings_write(&self->staged, &json);
-    iwn_out_bool(&json, "staged", self->has_staged);
-    iwn_out_bool(&json, "restarts", self->restart_us != 0U);
-    iw_host_send_reply(self, client, &json);
-}
-
 static bool may_watch(iwn_cmd_t cmd) {
     static const bool allowed[IWN_CMDS] = {
         [IWN_CMD_HELLO] = true, [IWN_CMD_STATUS] = true, [IWN_CMD_WATCH] = true, [IWN_CMD_WHY] = true,
@@ -379,7 +331,7 @@ static void carry_out(iw_host_t *self, iw_host_client_t *client, const iwn_quote
         iw_answer_confirm(self, client);
         break;
     case IWN_CMD_CONFIG:
-        do_config(self, client);
+        iw_answer_config(self, client);
         break;
     case IWN_CMD_WHY:
         do_why(self, client);

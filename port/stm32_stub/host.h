@@ -196,6 +196,7 @@ bool iw_host_wants_restart(const iw_host_t *self);
 /// Carries out `self->request`. `quote` is NULL if the line had none.
 void iw_answer(iw_host_t *self, iw_host_client_t *client, const iwn_quote_t *quote);
 /// Carries out `confirm`: the operator's word on an assumption, for this run.
+void iw_answer_config(iw_host_t *self, iw_host_client_t *client);
 void iw_answer_confirm(iw_host_t *self, iw_host_client_t *client);
 /// Of the ledger, into an object that is open.
 void iw_host_write_item(iw_host_t *self, iw_ledger_item_t item, iwn_out_t *json);

@@ -386,6 +386,23 @@ static void test_ros_command_that_arms_does_not_drive(void) {
     TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
 }
 
+static void test_ros_stop_at_rest_ends_arming_by_commands(void) {
+    bridge.settings.drive.auto_arm = true;
+    pass(3000);
+    request_comes(ROS_STOP);
+    pass(1000);
+    for (unsigned i = 0; i < 100U; i++) {
+        command_comes(0.3);
+        pass(50);
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
+    pass(1100);
+    command_comes(0.3);
+    pass(50);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
 static void test_ros_bridge_that_only_watches_does_not_arm(void) {
     bridge.facts.drive = false;
     request_comes(ROS_ARM);
@@ -414,6 +431,7 @@ int main(void) {
     RUN_TEST(test_ros_other_machine_drives_when_its_clock_is_known);
     RUN_TEST(test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command);
     RUN_TEST(test_ros_command_that_arms_does_not_drive);
+    RUN_TEST(test_ros_stop_at_rest_ends_arming_by_commands);
     RUN_TEST(test_ros_bridge_that_only_watches_does_not_arm);
     return UNITY_END();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Somebody follows docs/porting.md: its files are compiled as they stand there, on a controller with two transmit slots that exists
-// nowhere. The time is virtual. Ends with 0 if the wheels are told what was wished, and 1 if they are not within 3 s.
+// nowhere. The time is virtual. Ends with 0 if the wheels are told what was wished, stand after the loop was held up while the switch stays on,
+// and go again when it was off and is on again; with 1 if they are not told it in time, and with 3 if they go on their own.
 #include "my_port.h"
 
 #include "iwheel/codec.h"
@@ -10,6 +11,8 @@
 
 #define SLOTS     2
 #define QUEUE_MAX 64U
+/// Of telemetry while the loop is held up: 120 ms, which stops the wheels and does not latch.
+#define HELD_UP_ROUNDS 30U
 
 static struct {
     iw_can_frame_t slot[SLOTS];
@@ -22,6 +25,9 @@ static iw_time_us_t time_us = 1000;
 static iw_time_us_t telemetry_us = 1000;
 static int16_t told_mm_s[IW_SIDES];
 static uint32_t feeds;
+
+static enum { FIRST_DRIVE, HELD_UP, SECOND_DRIVE } phase;
+static iw_time_us_t phase_us; // Since then.
 
 static void put(const iw_can_frame_t *frame) {
     if (my_can.count < QUEUE_MAX) {
@@ -84,8 +90,10 @@ int32_t my_wish_right(void) {
     return -80;
 }
 
+/// A switch: on when both wheels are known, still so for 5 s after the loop was held up, off for half a second, and on again.
 bool my_wish_to_arm(void) {
-    return true;
+    const iw_time_us_t for_us = time_us - phase_us;
+    return (phase == FIRST_DRIVE) ? for_us > 1000000U : (phase == HELD_UP || for_us > 500000U);
 }
 
 /// Everything in the slots is sent and acknowledged.
@@ -113,14 +121,49 @@ static void send_telemetry(void) {
     telemetry_us += 4000U;
 }
 
-void my_sleep_until(iw_time_us_t until_us) {
-    if (told_mm_s[IW_LEFT] == 120 && told_mm_s[IW_RIGHT] == -80 && feeds > 100U) {
-        exit(0);
+static bool is_told_wish(void) {
+    return told_mm_s[IW_LEFT] == 120 && told_mm_s[IW_RIGHT] == -80;
+}
+
+static void enter(int next) {
+    phase = next;
+    phase_us = time_us;
+}
+
+/// True if the loop is to be held up now.
+static bool follow_phases(void) {
+    const iw_time_us_t for_us = time_us - phase_us;
+    if (phase == HELD_UP) {
+        if (for_us > 1000000U && (told_mm_s[IW_LEFT] != 0 || told_mm_s[IW_RIGHT] != 0)) {
+            exit(3);
+        }
+        if (for_us > 5000000U) {
+            enter(SECOND_DRIVE);
+        }
+        return false;
     }
-    if (time_us > 3000000U) {
+    if (is_told_wish() && feeds > 100U) {
+        if (phase == SECOND_DRIVE) {
+            exit(0);
+        }
+        enter(HELD_UP);
+        return true;
+    }
+    if (for_us > 5000000U) {
         exit(1);
     }
+    return false;
+}
+
+void my_sleep_until(iw_time_us_t until_us) {
     send_slots();
+    if (follow_phases()) {
+        for (uint32_t i = 0; i < HELD_UP_ROUNDS; i++) { // Meanwhile the wheels go on.
+            send_telemetry();
+        }
+        time_us = telemetry_us;
+        return;
+    }
     time_us = (until_us < telemetry_us) ? until_us : telemetry_us;
     if (time_us >= telemetry_us) {
         send_telemetry();

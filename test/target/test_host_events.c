@@ -147,6 +147,16 @@ static void test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_th
     TEST_ASSERT_EQUAL_INT(IW_MEMORY_FAILED, host.memory);
 }
 
+static void test_host_turn_is_refused_when_the_track_is_contradicted(void) {
+    disarm();
+    assert_answer("{\"cmd\":\"confirm\",\"id\":1,\"item\":\"track\",\"value\":\"700\"}", "\"contradicted\"");
+    assert_answer("{\"cmd\":\"twist\",\"v_mm_s\":0,\"yaw_mrad_s\":0,\"id\":2}", "\"error\":\"not_armed\"");
+    assert_answer("{\"cmd\":\"arm\",\"id\":3}", "\"ok\":true");
+    disarm();
+    assert_answer("{\"cmd\":\"twist\",\"v_mm_s\":0,\"yaw_mrad_s\":10,\"id\":4}", "\"error\":\"denied\"");
+    assert_answer("{\"cmd\":\"arm\",\"id\":5}", "\"error\":\"stale_command\""); // It wants to turn.
+}
+
 static void test_host_command_older_than_its_channel_is_stale(void) {
     char json[256];
     (void)snprintf(json, sizeof json,
@@ -307,6 +317,7 @@ int main(void) {
     RUN_TEST(test_host_word_on_an_item_is_compared_with_what_is_in_force);
     RUN_TEST(test_host_line_is_stamped_every_25_ms_while_armed_and_not_more_often);
     RUN_TEST(test_host_keeps_what_was_learnt_in_the_silence_once_and_has_it_at_the_next_start);
+    RUN_TEST(test_host_turn_is_refused_when_the_track_is_contradicted);
     RUN_TEST(test_host_command_older_than_its_channel_is_stale);
     RUN_TEST(test_host_state_after_a_stall_comes_in_no_burst);
     RUN_TEST(test_host_setting_out_of_its_range_is_refused);

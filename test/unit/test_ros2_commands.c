@@ -82,6 +82,50 @@ static void test_auto_arm_foreign_stop_waits_for_the_service(void) {
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 3 * SECOND));
 }
 
+/// Commands at 20 Hz for so long; how many of them ask for the lease.
+static unsigned stream(int64_t from_us, int64_t until_us) {
+    unsigned asks = 0;
+    for (int64_t t = from_us; t < until_us; t += SECOND / 20) {
+        asks += ros_auto_command(&automatic, true, t) ? 1U : 0U;
+    }
+    return asks;
+}
+
+static void test_auto_arm_stream_after_a_persons_stop_does_not_ask(void) {
+    ros_auto_person_stopped(&automatic);
+    TEST_ASSERT_EQUAL_UINT(0, stream(5LL * SECOND, 65LL * SECOND)); // Also after silence: the stop came last.
+    TEST_ASSERT_EQUAL_UINT(0, stream(65LL * SECOND + ROS_SILENT_US - 50000 - 1, 70LL * SECOND));
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 70LL * SECOND));
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, true, 70LL * SECOND + ROS_SILENT_US));
+}
+
+static void test_auto_arm_persons_stop_ends_by_the_service(void) {
+    ros_auto_person_stopped(&automatic);
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
+    ros_auto_told(&automatic);
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 2LL * SECOND + 50000));
+}
+
+static void test_auto_arm_persons_stop_again_begins_anew(void) {
+    ros_auto_person_stopped(&automatic);
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
+    ros_auto_person_stopped(&automatic);
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 4LL * SECOND));
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 6LL * SECOND));
+}
+
+static void test_auto_arm_persons_stop_does_not_end_the_wait_for_the_service(void) {
+    ros_auto_stopped(&automatic, false);
+    ros_auto_person_stopped(&automatic);
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 4LL * SECOND));
+    setUp();
+    ros_auto_person_stopped(&automatic);
+    ros_auto_stopped(&automatic, false); // The gateway's word on it: the wheels turned.
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 2LL * SECOND));
+    TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, 4LL * SECOND));
+}
+
 static void test_auto_arm_silence_of_its_own_source_keeps_the_trust(void) {
     ros_auto_stopped(&automatic, true);
     TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, SECOND));
@@ -102,6 +146,10 @@ int main(void) {
     RUN_TEST(test_auto_arm_zeros_for_long_enough_ask);
     RUN_TEST(test_auto_arm_stream_that_never_rests_never_asks);
     RUN_TEST(test_auto_arm_foreign_stop_waits_for_the_service);
+    RUN_TEST(test_auto_arm_stream_after_a_persons_stop_does_not_ask);
+    RUN_TEST(test_auto_arm_persons_stop_ends_by_the_service);
+    RUN_TEST(test_auto_arm_persons_stop_again_begins_anew);
+    RUN_TEST(test_auto_arm_persons_stop_does_not_end_the_wait_for_the_service);
     RUN_TEST(test_auto_arm_silence_of_its_own_source_keeps_the_trust);
     RUN_TEST(test_auto_arm_refused_by_the_gateway_asks_again_only_later);
     return UNITY_END();

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// The request config: keys are staged, and written to the flash by commit.
+#include "host.h"
+
+static bool stage(iw_host_t *self, iwn_text_t *why) {
+    const iwn_request_t *const request = &self->request;
+    if (request->value[0] == '\0') {
+        IWN_TEXT_JOIN(why, "key needs a value; without both all keys are read");
+        return false;
+    }
+    if (!iw_settings_set(&self->staged, request->key, request->value, why)) {
+        return false;
+    }
+    self->has_staged = true;
+    return true;
+}
+
+/// True if what was asked for is done, or there was nothing to do. `*out_error` else.
+static bool configure(iw_host_t *self, iwn_text_t *why, iwn_error_t *out_error) {
+    const iwn_request_t *const request = &self->request;
+    *out_error = IWN_BAD_VALUE;
+    if (request->key[0] != '\0' || request->value[0] != '\0') {
+        return stage(self, why);
+    }
+    if (!request->has_commit) {
+        return true;
+    }
+    if (!request->commit) {
+        self->has_staged = false;
+        self->staged = self->place.settings;
+        return true;
+    }
+    if (!iw_settings_check(&self->staged, why)) {
+        return false;
+    }
+    *out_error = IWN_DENIED;
+    if (!iw_host_is_silent(self)) {
+        IWN_TEXT_JOIN(
+            why,
+            "the configuration is written only while the gateway is listening and silent: stop, and wait until it is");
+        return false;
+    }
+    *out_error = IWN_INTERNAL;
+    if (!iw_host_keep(&self->staged)) {
+        IWN_TEXT_JOIN(why, "the flash did not take it, and the configuration of before stays; switch the board off and "
+                           "on, and try again");
+        return false;
+    }
+    self->has_staged = false;
+    self->restart_us = self->now_us + IW_HOST_RESTART_US;
+    return true;
+}
+
+void iw_answer_config(iw_host_t *self, iw_host_client_t *client) {
+    iwn_text_t why = iwn_text_begin(self->refusal.message, sizeof self->refusal.message);
+    if (!configure(self, &why, &self->refusal.error)) {
+        iw_host_send_refusal(self, client, &self->request.id);
+        return;
+    }
+    iwn_out_t json = iw_host_begin_reply(self, &self->request.id);
+    iw_settings_write(&self->staged, &json);
+    iwn_out_bool(&json, "staged", self->has_staged);
+    iwn_out_bool(&json, "restarts", self->restart_us != 0U);
+    iw_host_send_reply(self, client, &json);
+}
