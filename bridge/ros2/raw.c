@@ -106,7 +106,11 @@ static void data_write(const struct ddsi_serdata *base, size_t from, size_t size
 }
 
 static struct ddsi_serdata *data_lend(const struct ddsi_serdata *base, size_t from, size_t size, ddsrt_iovec_t *out) {
-    out->iov_base = (void *)(uintptr_t)(data_of(base)->raw.bytes + from);
+    const union {
+        const uint8_t *lent;
+        void *unwritten; // CycloneDDS only reads it.
+    } bytes = {.lent = data_of(base)->raw.bytes + from};
+    out->iov_base = bytes.unwritten;
     out->iov_len = (ddsrt_iov_len_t)size;
     return ddsi_serdata_ref(base);
 }
