@@ -114,7 +114,9 @@ static void take_reset(bridge_t *self, const ros_request_t *request, int64_t age
 static void take_what_permits(bridge_t *self, const ros_request_t *request) {
     int64_t age_us = 0;
     const char *reason = why_not_meant(self, request, &age_us);
-    if (request->verb == ROS_ARM && bridge_why_not_drive(self)[0] != '\0') {
+    if (!request->by_topic && request->caller.form == ROS_FORM_UNREADABLE) {
+        reason = "this is no request of std_srvs/srv/Trigger: call the service with that type";
+    } else if (request->verb == ROS_ARM && bridge_why_not_drive(self)[0] != '\0') {
         reason = bridge_why_not_drive(self);
     } else if (request->verb == ROS_RESET && !self->settings.drive.allow_reset) {
         reason = "not over the network: look at the machine, then iwheelctl reset; or set [drive] allow_reset = yes in "

@@ -25,6 +25,18 @@ static void loop(bridge_t *bridge) {
     bridge_service_tell(&service, "STOPPING=1");
 }
 
+/// With another configuration than the unit's a network would only be silent.
+static void tell_reach(const ros_settings_t *settings) {
+    char text[BRIDGE_REACH_TEXT];
+    if (!settings->ros.loopback) {
+        (void)fprintf(
+            stderr,
+            "iwheel-ros2: info: %u sockets receive from every address (%s); the unit lets other machines through only "
+            "if it was edited as docs/ros2.md shows\n",
+            bridge_reach_count(NULL, 0, text), text);
+    }
+}
+
 /// The signals are taken before DDS makes its threads, which inherit that.
 static int run(const ros_settings_t *settings) {
     bridge_service_take_signals();
@@ -35,6 +47,7 @@ static int run(const ros_settings_t *settings) {
     }
     const int result = bridge_open(bridge, settings);
     if (result == 0) {
+        tell_reach(settings);
         loop(bridge);
         bridge_close(bridge);
     }

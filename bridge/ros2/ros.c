@@ -10,7 +10,6 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#define NAME_SIZE 200U
 /// Endpoints of a node, at most.
 #define ENDPOINTS_MAX 24U
 #define HASH(hex)     "typehash=RIHS01_" hex ";"
@@ -23,14 +22,6 @@ static const char LOOPBACK[] =
     "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address=\"localhost\"/></Peers></Discovery>"
     "</Domain></CycloneDDS>";
 
-/// By its hash a newer ROS knows whether both sides mean the same type (REP-2011).
-typedef struct {
-    const char *name; ///< With a leading / outside of the namespace.
-    const dds_topic_descriptor_t *type;
-    const char *hash;
-    bool kept; ///< Late readers get the last one: transient local.
-} topic_t;
-
 #define HASH_TWIST       HASH("9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a")
 #define HASH_STAMPED     HASH("5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64")
 #define HASH_STRING      HASH("df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18")
@@ -41,7 +32,7 @@ typedef struct {
 #define HASH_BATTERY     HASH("4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741")
 #define HASH_DIAGNOSTICS HASH("5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e")
 
-static const topic_t written[WRITERS] = {
+static const ros_topic_t written[WRITERS] = {
     [WRITES_ODOM] = {"odom", &nav_msgs_msg_dds__Odometry__desc, HASH_ODOMETRY, false},
     [WRITES_JOINTS] = {"joint_states", &sensor_msgs_msg_dds__JointState__desc, HASH_JOINTS, false},
     [WRITES_TF] = {"/tf", &tf2_msgs_msg_dds__TFMessage__desc, HASH_TF, false},
@@ -53,14 +44,13 @@ static const topic_t written[WRITERS] = {
     [WRITES_STATE] = {"iwheel/state", &std_msgs_msg_dds__String__desc, HASH_STRING, true},
     [WRITES_ANSWER] = {"iwheel/answer", &std_msgs_msg_dds__String__desc, HASH_STRING, false},
 };
-static const topic_t twist = {"cmd_vel", &geometry_msgs_msg_dds__Twist__desc, HASH_TWIST, false};
-static const topic_t twist_stamped = {"cmd_vel", &geometry_msgs_msg_dds__TwistStamped__desc, HASH_STAMPED, false};
-static const topic_t asked = {"iwheel/ask", &std_msgs_msg_dds__String__desc, HASH_STRING, false};
-static const char *const verbs[ROS_VERBS] = {"arm", "stop", "estop", "reset"};
+static const ros_topic_t twist = {"cmd_vel", &geometry_msgs_msg_dds__Twist__desc, HASH_TWIST, false};
+static const ros_topic_t twist_stamped = {"cmd_vel", &geometry_msgs_msg_dds__TwistStamped__desc, HASH_STAMPED, false};
+static const ros_topic_t asked = {"iwheel/ask", &std_msgs_msg_dds__String__desc, HASH_STRING, false};
 
 // ---- making entities ----------------------------------------------------------------------------------------------
 
-static dds_qos_t *qos_of(const char *user_data, int32_t depth, bool reliable, bool kept) {
+dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool kept) {
     const dds_data_representation_id_t classic = DDS_DATA_REPRESENTATION_XCDR1;
     dds_qos_t *qos = dds_create_qos();
     dds_qset_reliability(qos, reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, 0);
@@ -72,16 +62,19 @@ static dds_qos_t *qos_of(const char *user_data, int32_t depth, bool reliable, bo
     return qos;
 }
 
-/// `rt/odom`, in a namespace `rt/w1/odom`.
-static dds_entity_t topic_of(ros_t *self, const topic_t *topic, const char *prefix, const char *suffix) {
-    char name[NAME_SIZE];
-    const char *space = (topic->name[0] == '/') ? "" : ros_settings_space(&self->settings);
-    (void)snprintf(name, sizeof name, "%s%s%s/%s%s", prefix, (space[0] != '\0') ? "/" : "", space,
-                   topic->name + ((topic->name[0] == '/') ? 1 : 0), suffix);
+void ros_name(const ros_t *self, const char *name, const char *prefix, const char *suffix, char out[ROS_NAME_SIZE]) {
+    const char *space = (name[0] == '/') ? "" : ros_settings_space(&self->settings);
+    (void)snprintf(out, ROS_NAME_SIZE, "%s%s%s/%s%s", prefix, (space[0] != '\0') ? "/" : "", space,
+                   name + ((name[0] == '/') ? 1 : 0), suffix);
+}
+
+static dds_entity_t topic_of(const ros_t *self, const ros_topic_t *topic) {
+    char name[ROS_NAME_SIZE];
+    ros_name(self, topic->name, "rt", "", name);
     return dds_create_topic(self->participant, topic->type, name, NULL, NULL);
 }
 
-static void wake(dds_entity_t reader, void *context) {
+void ros_wake(dds_entity_t reader, void *context) {
     const uint64_t one = 1;
     const ros_t *self = context;
     (void)reader;
@@ -92,11 +85,11 @@ static void wake(dds_entity_t reader, void *context) {
 static void take_or_wake(dds_entity_t reader, void *context) {
     const ros_t *self = context;
     if (self->came == NULL || !self->came(self->context)) {
-        wake(reader, context);
+        ros_wake(reader, context);
     }
 }
 
-static dds_entity_t reader_of(ros_t *self, dds_entity_t topic, dds_qos_t *qos, dds_on_data_available_fn react) {
+dds_entity_t ros_reader(ros_t *self, dds_entity_t topic, dds_qos_t *qos, dds_on_data_available_fn react) {
     dds_listener_t *listener = dds_create_listener(self);
     dds_lset_data_available(listener, react);
     const dds_entity_t reader = dds_create_reader(self->participant, topic, qos, listener);
@@ -105,53 +98,32 @@ static dds_entity_t reader_of(ros_t *self, dds_entity_t topic, dds_qos_t *qos, d
     return reader;
 }
 
-static dds_entity_t writer_of(ros_t *self, dds_entity_t topic, dds_qos_t *qos) {
+dds_entity_t ros_writer(ros_t *self, dds_entity_t topic, dds_qos_t *qos) {
     const dds_entity_t writer = dds_create_writer(self->participant, topic, qos, NULL);
     dds_delete_qos(qos);
     return writer;
 }
 
-/// Request and reply know each other by an id in their user data, as rmw_cyclonedds does it.
-static bool open_service(ros_t *self, ros_verb_t verb) {
-    char name[40];
-    char user_data[80];
-    dds_guid_t guid;
-    (void)snprintf(name, sizeof name, "iwheel/%s", verbs[verb]);
-    const topic_t request = {name, &std_srvs_srv_dds__Trigger_Request__desc, NULL, false};
-    const topic_t reply = {name, &std_srvs_srv_dds__Trigger_Response__desc, NULL, false};
-    (void)dds_get_guid(self->participant, &guid);
-    int used = snprintf(user_data, sizeof user_data, "serviceid=%x", (unsigned)verb + 1U);
-    for (size_t i = 1; i < sizeof guid.v; i++) {
-        used += snprintf(user_data + used, sizeof user_data - (size_t)used, ".%x", guid.v[i]);
-    }
-    (void)snprintf(user_data + used, sizeof user_data - (size_t)used, ";");
-    self->requests[verb] =
-        reader_of(self, topic_of(self, &request, "rq", "Request"), qos_of(user_data, 10, true, false), wake);
-    self->replies[verb] = writer_of(self, topic_of(self, &reply, "rr", "Reply"), qos_of(user_data, 10, true, false));
-    return self->requests[verb] > 0 && self->replies[verb] > 0;
-}
-
 static bool open_topics(ros_t *self) {
     bool good = true;
     for (unsigned i = 0; i < WRITERS; i++) {
-        const topic_t *topic = &written[i];
+        const ros_topic_t *topic = &written[i];
         if (i == WRITES_TF && !self->settings.odometry.tf) {
             continue;
         }
-        self->writers[i] = writer_of(self, topic_of(self, topic, "rt", ""),
-                                     qos_of(topic->hash, topic->kept ? 1 : 10, true, topic->kept));
+        self->writers[i] =
+            ros_writer(self, topic_of(self, topic), ros_qos(topic->hash, topic->kept ? 1 : 10, true, topic->kept));
         good = good && self->writers[i] > 0;
     }
     if (self->settings.drive.enabled) {
         // Best effort matches every publisher, and what was lost never comes later.
-        const topic_t *topic = self->settings.drive.stamped ? &twist_stamped : &twist;
-        self->commands =
-            reader_of(self, topic_of(self, topic, "rt", ""), qos_of(topic->hash, 1, false, false), take_or_wake);
+        const ros_topic_t *topic = self->settings.drive.stamped ? &twist_stamped : &twist;
+        self->commands = ros_reader(self, topic_of(self, topic), ros_qos(topic->hash, 1, false, false), take_or_wake);
         good = good && self->commands > 0;
     }
-    self->asks = reader_of(self, topic_of(self, &asked, "rt", ""), qos_of(asked.hash, 10, true, false), wake);
+    self->asks = ros_reader(self, topic_of(self, &asked), ros_qos(asked.hash, 10, true, false), ros_wake);
     for (unsigned verb = 0; verb < ROS_VERBS; verb++) {
-        good = open_service(self, (ros_verb_t)verb) && good;
+        good = ros_open_service(self, (ros_verb_t)verb) && good;
     }
     return good && self->asks > 0;
 }
@@ -193,7 +165,7 @@ static bool announce(ros_t *self) {
                                       : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
     type.m_typename = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename;
     const dds_entity_t topic = dds_create_topic(self->participant, &type, "ros_discovery_info", NULL, NULL);
-    self->graph = writer_of(self, topic, qos_of("", 1, true, true));
+    self->graph = ros_writer(self, topic, ros_qos("", 1, true, true));
 
     // Both kinds of node differ in the size of what the buffers hold only.
     rmw_dds_common_msg_dds__NodeEntitiesInfo_ node = {
@@ -271,6 +243,7 @@ ros_t *ros_open(const ros_settings_t *settings, ros_came_t came, void *context, 
 }
 
 void ros_close(ros_t *self) {
+    ros_close_services(self);
     if (self->participant > 0) {
         (void)dds_delete(self->participant); // And all that belongs to it: afterwards nobody calls us.
     }
@@ -327,65 +300,4 @@ bool ros_take_command(ros_t *self, ros_command_t *out_command) {
 unsigned ros_publishers(const ros_t *self) {
     const dds_return_t count = (self->commands > 0) ? dds_get_matched_publications(self->commands, NULL, 0) : 0;
     return (count > 0) ? (unsigned)count : 0U;
-}
-
-static bool take_service(ros_t *self, ros_verb_t verb, ros_request_t *out_request) {
-    void *sample = NULL;
-    dds_sample_info_t info;
-    bool taken = false;
-    while (!taken && dds_take(self->requests[verb], &sample, &info, 1, 1) == 1) {
-        const std_srvs_srv_dds__Trigger_Request_ *request = sample;
-        taken = info.valid_data;
-        if (taken) {
-            *out_request = (ros_request_t){.verb = verb, .client = request->guid, .number = request->seq};
-            out_request->source = info.publication_handle;
-            out_request->sent_us = info.source_timestamp / 1000;
-        }
-        (void)dds_return_loan(self->requests[verb], &sample, 1);
-        sample = NULL;
-    }
-    return taken;
-}
-
-static bool take_ask(ros_t *self, ros_request_t *out_request) {
-    void *sample = NULL;
-    dds_sample_info_t info;
-    bool taken = false;
-    while (!taken && dds_take(self->asks, &sample, &info, 1, 1) == 1) {
-        const std_msgs_msg_dds__String_ *text = sample;
-        for (unsigned verb = 0; verb < ROS_VERBS && info.valid_data && !taken; verb++) {
-            taken = strcmp(text->data, verbs[verb]) == 0;
-            *out_request = (ros_request_t){.verb = (ros_verb_t)verb, .by_topic = true};
-            out_request->source = info.publication_handle;
-            out_request->sent_us = info.source_timestamp / 1000;
-        }
-        (void)dds_return_loan(self->asks, &sample, 1);
-        sample = NULL;
-    }
-    return taken;
-}
-
-bool ros_take_request(ros_t *self, ros_request_t *out_request) {
-    // What stops goes first.
-    static const ros_verb_t order[ROS_VERBS] = {ROS_ESTOP, ROS_STOP, ROS_RESET, ROS_ARM};
-    for (size_t i = 0; i < ROS_VERBS; i++) {
-        if (take_service(self, order[i], out_request)) {
-            return true;
-        }
-    }
-    return take_ask(self, out_request);
-}
-
-void ros_answer(ros_t *self, const ros_request_t *request, bool success, const char *text) {
-    if (request->by_topic) {
-        (void)snprintf(self->text, sizeof self->text, "%s: %s%s%s", verbs[request->verb], success ? "done" : "refused",
-                       (text[0] != '\0') ? ": " : "", text);
-        const std_msgs_msg_dds__String_ answer = {.data = self->text};
-        (void)dds_write(self->writers[WRITES_ANSWER], &answer);
-        return;
-    }
-    (void)snprintf(self->text, sizeof self->text, "%s", text);
-    const std_srvs_srv_dds__Trigger_Response_ reply = {
-        .guid = request->client, .seq = request->number, .success = success, .message = self->text};
-    (void)dds_write(self->replies[request->verb], &reply);
 }

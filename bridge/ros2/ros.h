@@ -8,6 +8,7 @@
 
 #include "diagnosis.h"
 #include "ros_settings.h"
+#include "services.h"
 
 typedef struct ros ros_t;
 
@@ -40,14 +41,14 @@ unsigned ros_publishers(const ros_t *self);
 
 typedef struct {
     ros_verb_t verb;
-    bool by_topic; ///< Else a service, with the header by which its client knows the answer.
-    uint64_t client;
-    int64_t number;
-    uint64_t source; ///< As of a command.
+    bool by_topic;       ///< Else a service, and `caller` knows the answer by what it sent.
+    ros_caller_t caller; ///< ROS_FORM_UNREADABLE: nobody can tell what was wanted, but on which topic.
+    uint64_t source;     ///< As of a command.
     int64_t sent_us;
 } ros_request_t;
 
-/// A request, from a service or the topic iwheel/ask; false: none.
+/// A request, from a service or the topic iwheel/ask; false: none. Every sample with data on the topic of a service is one; that a client
+/// comes, goes or disposes of something is none.
 bool ros_take_request(ros_t *self, ros_request_t *out_request);
 void ros_answer(ros_t *self, const ros_request_t *request, bool success, const char *text);
 

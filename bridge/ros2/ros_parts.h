@@ -7,6 +7,17 @@
 
 #include <dds/dds.h>
 
+/// The longest name of a DDS topic with its terminator.
+#define ROS_NAME_SIZE 200U
+
+/// By its hash a newer ROS knows whether both sides mean the same type (REP-2011).
+typedef struct {
+    const char *name; ///< With a leading / outside of the namespace.
+    const dds_topic_descriptor_t *type;
+    const char *hash;
+    bool kept; ///< Late readers get the last one: transient local.
+} ros_topic_t;
+
 typedef enum {
     WRITES_ODOM = 0,
     WRITES_JOINTS,
@@ -36,5 +47,22 @@ struct ros {
     void *context; ///< Of `came`.
     char text[2048];
 };
+
+/// `rt/odom`, in a namespace `rt/w1/odom`.
+void ros_name(const ros_t *self, const char *name, const char *prefix, const char *suffix, char out[ROS_NAME_SIZE]);
+
+/// The caller, or who makes the entity with it, deletes it.
+dds_qos_t *ros_qos(const char *user_data, int32_t depth, bool reliable, bool kept);
+dds_entity_t ros_reader(ros_t *self, dds_entity_t topic, dds_qos_t *qos, dds_on_data_available_fn react);
+dds_entity_t ros_writer(ros_t *self, dds_entity_t topic, dds_qos_t *qos);
+
+/// Makes `ros_fd` readable; for a reader that has something.
+void ros_wake(dds_entity_t reader, void *context);
+
+/// The service of a verb, in the form of every vendor. False: DDS refuses it.
+bool ros_open_service(ros_t *self, ros_verb_t verb);
+
+/// Nothing is a reply any more that leaves from here on.
+void ros_close_services(ros_t *self);
 
 #endif

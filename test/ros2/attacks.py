@@ -7,7 +7,7 @@ import sys
 import time
 
 from network import HERE_ADDRESS, Cable, Tape, ports_of, send_again, timeless
-from peer import Writer
+from peer import Topic, Writer, make_idl_struct
 from ride import Ride, Stream, now_us
 from scenario import scenario
 
@@ -106,6 +106,28 @@ def writers_of_a_network(t):
     stream.stop()
     ride.silence()
     t.judge(ride.rig, moves=False)
+
+
+@scenario("a stop that cannot be decoded stops; an arm that cannot be does not arm", 15)
+def undecodable_requests(t):
+    ride = Ride(t)
+    odd = make_idl_struct("Trigger_Request_", "std_srvs::srv::dds_::Trigger_Request_", {"data": str})
+    writers = {}
+    for verb in ("arm", "stop"):
+        writers[verb] = Writer.of(ride.peer, Topic(ride.peer.participant, ride.peer.topic(f"iwheel/{verb}", "rq") + "Request", odd))
+        writers[verb].await_match()
+    writers["arm"].write(odd(data="somebody's own type"))
+    time.sleep(0.5)
+    t.rule(ride.client.request("status")["state"] == "listening", "nobody has armed")
+    stream = ride.driving()
+    t_us = now_us()
+    writers["stop"].write(odd(data="somebody's own type"))
+    time.sleep(0.4)
+    t.first_after(ride.rig, t_us, lambda speed: speed < 300, "the ramp begins", 100)
+    stream.stop()
+    t.stopped_by(ride.client, "client_stop", "stopping")
+    ride.silence()
+    t.judge(ride.rig)
 
 
 @scenario("loopback: another machine that sends a local driver's packets moves nothing", 30)

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A peer of another make: Fast DDS, which ROS 2 uses by default. Reads odom, publishes cmd_vel and iwheel/ask; one line for each thing seen.
 //
-//     fast_peer DOMAIN SPEED_M_S     asks to arm, drives for 1.5 s, ends
+//     fast_peer DOMAIN SPEED_M_S          asks to arm, drives for 1.5 s, ends
+//     fast_peer DOMAIN SERVICE CALLS      calls a service so often, each time as a new client, as rmw_fastrtps does; 0: 100 clients that call nothing
 #include <fastcdr/Cdr.h>
 #include <fastcdr/FastBuffer.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -51,13 +52,16 @@ struct Values {
     std::vector<std::string> texts;
 };
 
-enum class Kind { Twist, String, Odometry };
+enum class Kind { Twist, String, Odometry, Request, Reply };
 
-static void write_values(const Values &values, rtps::SerializedPayload_t &payload) {
+static void write_values(Kind kind, const Values &values, rtps::SerializedPayload_t &payload) {
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char *>(payload.data), payload.max_size);
     Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, CDR);
     payload.encapsulation = CDR_LE;
     cdr.serialize_encapsulation();
+    if (kind == Kind::Request) {
+        cdr << static_cast<uint8_t>(0); // structure_needs_at_least_one_member
+    }
     for (double number : values.numbers) {
         cdr << number;
     }
@@ -81,6 +85,13 @@ static void read_values(Kind kind, rtps::SerializedPayload_t &payload, Values &v
         cdr >> values.texts[0];
         return;
     }
+    if (kind == Kind::Reply) {
+        bool success = false;
+        values.texts.resize(1);
+        cdr >> success >> values.texts[0];
+        values.numbers.push_back(success ? 1 : 0);
+        return;
+    }
     int32_t sec = 0;
     uint32_t nanosec = 0;
     values.texts.resize(2);
@@ -100,7 +111,7 @@ class Type : public TopicDataType {
         m_isGetKeyDefined = false;
     }
     bool serialize(void *data, rtps::SerializedPayload_t *payload) override {
-        write_values(*static_cast<Values *>(data), *payload);
+        write_values(kind_, *static_cast<Values *>(data), *payload);
         return true;
     }
     bool deserialize(rtps::SerializedPayload_t *payload, void *data) override {
@@ -121,7 +132,7 @@ class Type : public TopicDataType {
         is_compute_key_provided = false;
     }
     bool serialize(const void *const data, rtps::SerializedPayload_t &payload, DataRepresentationId_t) override {
-        write_values(*static_cast<const Values *>(data), payload);
+        write_values(kind_, *static_cast<const Values *>(data), payload);
         return true;
     }
     bool deserialize(rtps::SerializedPayload_t &payload, void *data) override {
@@ -179,15 +190,66 @@ static DomainParticipant *join(uint32_t domain) {
     return DomainParticipantFactory::get_instance()->create_participant(domain, qos);
 }
 
+// The clients of rmw_fastrtps: the request names the reader of its replies, and the reply that request's identity.
+static int call_service(Node &node, const std::string &name, int calls) {
+    Topic *request_topic = node.topic(Kind::Request, ("rq/" + name + "Request").c_str(), "std_srvs::srv::dds_::Trigger_Request_");
+    Topic *reply_topic = node.topic(Kind::Reply, ("rr/" + name + "Reply").c_str(), "std_srvs::srv::dds_::Trigger_Response_");
+    const int clients = (calls > 0) ? calls : 100;
+    for (int i = 0; i < clients; i++) {
+        DataReader *replies = node.reader(reply_topic);
+        DataWriter *requests = node.writer(request_topic);
+        PublicationMatchedStatus served = {};
+        for (int wait = 0; wait < 200 && served.current_count == 0; wait++) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+            requests->get_publication_matched_status(served);
+        }
+        SubscriptionMatchedStatus answers = {};
+        for (int wait = 0; wait < 200 && answers.current_count == 0; wait++) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+            replies->get_subscription_matched_status(answers);
+        }
+        if (calls > 0) {
+            Values values;
+            SampleInfo info;
+            rtps::WriteParams parameters;
+            parameters.related_sample_identity().writer_guid(replies->guid());
+            const auto begin = std::chrono::steady_clock::now();
+            requests->write(&values, parameters);
+            const rtps::SampleIdentity mine = parameters.sample_identity();
+            bool answered = false;
+            while (!answered && std::chrono::steady_clock::now() - begin < std::chrono::seconds(2)) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                while (!answered && replies->take_next_sample(&values, &info) == OK) {
+                    answered = info.valid_data && info.related_sample_identity.writer_guid() == replies->guid() &&
+                               info.related_sample_identity.sequence_number() == mine.sequence_number();
+                }
+            }
+            const auto took = std::chrono::steady_clock::now() - begin;
+            std::printf("%s %d after %d ms: %s\n", answered ? "reply" : "no reply", answered ? static_cast<int>(values.numbers[0]) : -1,
+                        static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(took).count()), answered ? values.texts[0].c_str() : "");
+            std::fflush(stdout);
+        }
+        node.publisher->delete_datawriter(requests);
+        node.subscriber->delete_datareader(replies);
+    }
+    std::printf("%d clients\n", clients);
+    return 0;
+}
+
 int main(int argc, char **argv) {
     const double speed = (argc == 3) ? std::atof(argv[2]) : 0.0;
     Node node = {};
-    node.participant = (argc == 3) ? join(static_cast<uint32_t>(std::atoi(argv[1]))) : nullptr;
+    node.participant = (argc == 3 || argc == 4) ? join(static_cast<uint32_t>(std::atoi(argv[1]))) : nullptr;
     if (node.participant == nullptr) {
         return 64;
     }
     node.publisher = node.participant->create_publisher(PUBLISHER_QOS_DEFAULT);
     node.subscriber = node.participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
+    if (argc == 4) {
+        (void)call_service(node, argv[2], std::atoi(argv[3]));
+        std::fflush(stdout);
+        std::_Exit(0);
+    }
     DataReader *odom = node.reader(node.topic(Kind::Odometry, "rt/odom", "nav_msgs::msg::dds_::Odometry_"));
     DataReader *answer = node.reader(node.topic(Kind::String, "rt/iwheel/answer", "std_msgs::msg::dds_::String_"));
     DataWriter *ask = node.writer(node.topic(Kind::String, "rt/iwheel/ask", "std_msgs::msg::dds_::String_"));

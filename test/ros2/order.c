@@ -102,7 +102,8 @@ static void command_comes(double v_m_s) {
 }
 
 static void request_comes(ros_verb_t verb) {
-    request = (ros_request_t){.verb = verb, .source = 2, .sent_us = hours_wall_ns() / 1000};
+    request =
+        (ros_request_t){.verb = verb, .source = 2, .sent_us = hours_wall_ns() / 1000, .caller.form = ROS_FORM_IDENTITY};
     has_request = true;
     answered = false;
 }
@@ -386,6 +387,20 @@ static void test_ros_command_that_arms_does_not_drive(void) {
     TEST_ASSERT_EQUAL_INT16(0, daemon_rig.told_mm_s[IW_LEFT]);
 }
 
+static void test_ros_request_that_cannot_be_read_only_stops(void) {
+    request_comes(ROS_ARM);
+    request.caller.form = ROS_FORM_UNREADABLE;
+    pass(200);
+    TEST_ASSERT_TRUE(answered && !success);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, daemon_rig_state());
+    arm();
+    request_comes(ROS_STOP);
+    request.caller.form = ROS_FORM_UNREADABLE;
+    pass(100);
+    TEST_ASSERT_TRUE(answered && success);
+    TEST_ASSERT_NOT_EQUAL_INT(IW_STATE_ARMED, daemon_rig_state());
+}
+
 static void test_ros_stop_at_rest_ends_arming_by_commands(void) {
     bridge.settings.drive.auto_arm = true;
     pass(3000);
@@ -431,6 +446,7 @@ int main(void) {
     RUN_TEST(test_ros_other_machine_drives_when_its_clock_is_known);
     RUN_TEST(test_ros_other_machine_of_an_unknown_clock_does_not_arm_by_command);
     RUN_TEST(test_ros_command_that_arms_does_not_drive);
+    RUN_TEST(test_ros_request_that_cannot_be_read_only_stops);
     RUN_TEST(test_ros_stop_at_rest_ends_arming_by_commands);
     RUN_TEST(test_ros_bridge_that_only_watches_does_not_arm);
     return UNITY_END();

@@ -3,8 +3,6 @@
 
 import math
 import os
-import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -580,26 +578,3 @@ def demo_square(t):
     done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
     t.check(done.returncode == 0 and "A square of 1 m" in done.stdout, f"{done.returncode} {done.stdout[-600:]} {done.stderr[-600:]}")
     t.figure(done.stdout.strip().splitlines()[-2] if done.returncode == 0 else "")
-
-
-@scenario("Fast DDS, another vendor's: hears the odometry, asks to arm, drives", 30)
-def fast_dds(t):
-    if not os.path.exists("/usr/include/fastdds/dds/domain/DomainParticipant.hpp") or shutil.which("c++") is None:
-        raise Skip("libfastrtps-dev or g++ is missing (scripts/install_tools check brings it)")
-    ride = Ride(t)
-    here = os.path.dirname(os.path.abspath(__file__))
-    program = os.path.join(os.path.abspath(t.build), "fast_peer")
-    source = os.path.join(here, "fast_peer.cpp")
-    if not os.path.exists(program) or os.path.getmtime(program) < os.path.getmtime(source):
-        library = "fastrtps" if os.path.exists("/usr/include/fastrtps") else "fastdds"  # Version 2 or 3.
-        command = ["c++", "-std=c++17", "-O0", "-o", program, source, f"-l{library}", "-lfastcdr"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
-        t.check(done.returncode == 0, f"it does not compile: {done.stderr[-600:]}")
-    done = subprocess.run([program, str(ride.domain), "0.3"], capture_output=True, text=True, timeout=60, check=False, cwd=ride.rig.folder)
-    t.check("answer arm: done" in done.stdout, f"its question is answered: {done.stdout[-300:]}")
-    odom = re.search(r"odom odom base_link x (\S+) v (\S+)", done.stdout)
-    t.check(odom and float(odom[1]) > 0.2 and abs(float(odom[2]) - 0.3) < 0.1, f"it hears the odometry: {done.stdout[-300:]}")
-    t.check(len(ride.tap.twists) >= 25, f"{len(ride.tap.twists)} of 30 commands")
-    t.figure(f"{len(ride.tap.twists)} of 30 commands, {odom[0] if odom else 'no odometry'}")
-    ride.silence()
-    t.judge(ride.rig)

@@ -253,7 +253,7 @@ static void test_ages_command_with_synchronised_clocks_needs_both(void) {
         pass(EVERY);
     }
     begin(false, true);
-    for (int64_t t = 0; t <= 2 * ROS_LEARN_US; t += EVERY) {
+    for (int64_t t = 0; t <= 2LL * ROS_LEARN_US; t += EVERY) {
         TEST_ASSERT_EQUAL_INT(ROS_AGE_LATE, command_of(9, SECOND));
         pass(EVERY);
     }
@@ -264,7 +264,7 @@ static void test_ages_more_writers_than_places_forget_the_longest_silent(void) {
     for (uint64_t source = 1; source <= ROS_SOURCES; source++) {
         for (int64_t t = 0; t <= ROS_LEARN_US; t += ROS_LEARN_US) {
             (void)command_of(source, 0);
-            pass(ROS_LEARN_US * ((t == 0) ? 1 : 0) + 1);
+            pass(((t == 0) ? ROS_LEARN_US : 0) + 1);
         }
     }
     pass(1000);

@@ -79,7 +79,7 @@ static void test_auto_arm_foreign_stop_waits_for_the_service(void) {
     ros_auto_stopped(&automatic, true);
     TEST_ASSERT_FALSE(ros_auto_command(&automatic, false, SECOND));
     ros_auto_told(&automatic);
-    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 3 * SECOND));
+    TEST_ASSERT_TRUE(ros_auto_command(&automatic, false, 3LL * SECOND));
 }
 
 /// Commands at 20 Hz for so long; how many of them ask for the lease.

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+// Requests: the services, in the forms of all vendors (services.h), and the topic iwheel/ask.
+#include "raw.h"
+#include "ros_parts.h"
+#include "ros_types.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+/// The longest UDP datagram.
+#define MESSAGE_MAX 65536U
+
+static const char *const verbs[ROS_VERBS] = {"arm", "stop", "estop", "reset"};
+
+_Static_assert((int)ROS_VERBS == (int)ROS_MARK_WRITERS, "a writer of replies for each service");
+
+// ---- the way out ------------------------------------------------------------------------------------------------------
+
+/// CycloneDDS calls `sendmsg` below in each of its threads, also to repeat a reply, and without a context: one node at a time.
+static struct {
+    pthread_mutex_t lock;
+    bool used; ///< A reply had to be marked.
+    ros_marks_t marks;
+    uint8_t message[MESSAGE_MAX];
+    uint8_t marked[MESSAGE_MAX];
+} out = {.lock = PTHREAD_MUTEX_INITIALIZER};
+
+/// The message in one piece; 0: it is longer than any.
+static size_t join_parts(const struct msghdr *message) {
+    size_t length = 0;
+    for (size_t i = 0; i < message->msg_iovlen; i++) {
+        const struct iovec *part = &message->msg_iov[i];
+        if (part->iov_len > sizeof out.message - length) {
+            return 0;
+        }
+        memcpy(out.message + length, part->iov_base, part->iov_len);
+        length += part->iov_len;
+    }
+    return length;
+}
+
+static ssize_t send_as_it_is(int fd, const struct msghdr *message, int flags) {
+    return (ssize_t)syscall(SYS_sendmsg, fd, message, flags);
+}
+
+/// In the place of libc's, for the whole process: a reply to a client of Fast DDS gets the identity of its request.
+ssize_t sendmsg(int fd, const struct msghdr *message, int flags) {
+    (void)pthread_mutex_lock(&out.lock);
+    const size_t length = out.used ? join_parts(message) : 0U;
+    const size_t marked = ros_service_mark(&out.marks, out.message, length, out.marked, sizeof out.marked);
+    ssize_t sent = 0;
+    if (marked > 0U) {
+        struct iovec whole = {.iov_base = out.marked, .iov_len = marked};
+        struct msghdr copy = *message;
+        copy.msg_iov = &whole;
+        copy.msg_iovlen = 1;
+        sent = send_as_it_is(fd, &copy, flags);
+        sent = (sent == (ssize_t)marked) ? (ssize_t)length : sent; // CycloneDDS compares it with what it gave.
+    }
+    const int error = errno;
+    (void)pthread_mutex_unlock(&out.lock);
+    errno = error;
+    return (marked > 0U) ? sent : send_as_it_is(fd, message, flags);
+}
+
+static void note_reply(ros_verb_t verb, const ros_caller_t *caller) {
+    (void)pthread_mutex_lock(&out.lock);
+    out.used = out.used || caller->form != ROS_FORM_HEADER;
+    ros_service_note(&out.marks, (unsigned)verb, caller);
+    (void)pthread_mutex_unlock(&out.lock);
+}
+
+/// It was not written: the next one gets its number.
+static void forget_reply(ros_verb_t verb) {
+    (void)pthread_mutex_lock(&out.lock);
+    out.marks.writers[verb].number--;
+    (void)pthread_mutex_unlock(&out.lock);
+}
+
+static void note_writer(const ros_t *self, ros_verb_t verb) {
+    dds_guid_t guid = {{0}};
+    (void)dds_get_guid(self->replies[verb], &guid);
+    (void)pthread_mutex_lock(&out.lock);
+    memcpy(out.marks.prefix, guid.v, ROS_PREFIX_SIZE);
+    memcpy(out.marks.writers[verb].id, guid.v + ROS_PREFIX_SIZE, sizeof out.marks.writers[verb].id);
+    (void)pthread_mutex_unlock(&out.lock);
+}
+
+void ros_close_services(ros_t *self) {
+    (void)self;
+    (void)pthread_mutex_lock(&out.lock);
+    out.used = false;
+    memset(&out.marks, 0, sizeof out.marks);
+    (void)pthread_mutex_unlock(&out.lock);
+}
+
+// ---- opening ----------------------------------------------------------------------------------------------------------
+
+static dds_entity_t topic_of(const ros_t *self, ros_verb_t verb, bool is_reply) {
+    char verb_name[40];
+    char name[ROS_NAME_SIZE];
+    (void)snprintf(verb_name, sizeof verb_name, "iwheel/%s", verbs[verb]);
+    ros_name(self, verb_name, is_reply ? "rr" : "rq", is_reply ? "Reply" : "Request", name);
+    return ros_raw_topic(self->participant, name,
+                         is_reply ? "std_srvs::srv::dds_::Trigger_Response_" : "std_srvs::srv::dds_::Trigger_Request_");
+}
+
+/// Request and reply know each other by an id in their user data, as rmw_cyclonedds does it.
+bool ros_open_service(ros_t *self, ros_verb_t verb) {
+    char user_data[80];
+    dds_guid_t guid;
+    (void)dds_get_guid(self->participant, &guid);
+    int used = snprintf(user_data, sizeof user_data, "serviceid=%x", (unsigned)verb + 1U);
+    for (size_t i = 1; i < sizeof guid.v; i++) {
+        used += snprintf(user_data + used, sizeof user_data - (size_t)used, ".%x", guid.v[i]);
+    }
+    (void)snprintf(user_data + used, sizeof user_data - (size_t)used, ";");
+    self->replies[verb] =
+        ros_writer(self, topic_of(self, verb, true), ros_qos(user_data, (int32_t)ROS_MARKS, true, false));
+    if (self->replies[verb] > 0) {
+        note_writer(self, verb);
+    }
+    self->requests[verb] = ros_reader(self, topic_of(self, verb, false), ros_qos(user_data, 10, true, false), ros_wake);
+    return self->requests[verb] > 0 && self->replies[verb] > 0;
+}
+
+// ---- requests -----------------------------------------------------------------------------------------------------------
+
+static bool take_service(ros_t *self, ros_verb_t verb, ros_request_t *out_request) {
+    ros_raw_t raw;
+    void *sample = &raw;
+    dds_sample_info_t info;
+    while (dds_take(self->requests[verb], &sample, &info, 1, 1) == 1) {
+        if (info.valid_data) {
+            *out_request = (ros_request_t){.verb = verb, .caller = raw.caller, .source = info.publication_handle};
+            out_request->sent_us = info.source_timestamp / 1000;
+            ros_service_read(raw.bytes, raw.size, &out_request->caller);
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool take_ask(ros_t *self, ros_request_t *out_request) {
+    void *sample = NULL;
+    dds_sample_info_t info;
+    bool taken = false;
+    while (!taken && dds_take(self->asks, &sample, &info, 1, 1) == 1) {
+        const std_msgs_msg_dds__String_ *text = sample;
+        for (unsigned verb = 0; verb < ROS_VERBS && info.valid_data && !taken; verb++) {
+            taken = strcmp(text->data, verbs[verb]) == 0;
+            *out_request = (ros_request_t){.verb = (ros_verb_t)verb, .by_topic = true};
+            out_request->source = info.publication_handle;
+            out_request->sent_us = info.source_timestamp / 1000;
+        }
+        (void)dds_return_loan(self->asks, &sample, 1);
+        sample = NULL;
+    }
+    return taken;
+}
+
+bool ros_take_request(ros_t *self, ros_request_t *out_request) {
+    // What stops goes first.
+    static const ros_verb_t order[ROS_VERBS] = {ROS_ESTOP, ROS_STOP, ROS_RESET, ROS_ARM};
+    for (size_t i = 0; i < ROS_VERBS; i++) {
+        if (take_service(self, order[i], out_request)) {
+            return true;
+        }
+    }
+    return take_ask(self, out_request);
+}
+
+void ros_answer(ros_t *self, const ros_request_t *request, bool success, const char *text) {
+    if (request->by_topic) {
+        (void)snprintf(self->text, sizeof self->text, "%s: %s%s%s", verbs[request->verb], success ? "done" : "refused",
+                       (text[0] != '\0') ? ": " : "", text);
+        const std_msgs_msg_dds__String_ answer = {.data = self->text};
+        (void)dds_write(self->writers[WRITES_ANSWER], &answer);
+        return;
+    }
+    ros_raw_t raw = {.size = 0};
+    raw.size = ros_service_write(&request->caller, success, text, raw.bytes, sizeof raw.bytes);
+    note_reply(request->verb, &request->caller);
+    if (dds_write(self->replies[request->verb], &raw) != DDS_RETCODE_OK) {
+        forget_reply(request->verb);
+    }
+}
