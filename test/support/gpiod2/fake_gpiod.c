@@ -69,6 +69,10 @@ size_t gpiod_chip_info_get_num_lines(struct gpiod_chip_info *info) {
     return FAKE_GPIO_LINES;
 }
 
+const char *gpiod_chip_info_get_label(struct gpiod_chip_info *info) {
+    return ((void *)info == (void *)&one) ? fake_gpio_label() : "another-chip";
+}
+
 void gpiod_chip_info_free(struct gpiod_chip_info *info) {
     given -= (info != NULL) ? 1U : 0U;
 }
