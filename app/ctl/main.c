@@ -95,7 +95,6 @@ int main(int count, char **arguments) {
     if (code != 0) {
         return code;
     }
-    code = CTL_INTERNAL;
     self.words = (char **)calloc((size_t)count + 1U, sizeof *self.words);
     if (!client_init(&ctl.client) || self.words == NULL) {
         code = ctl_fail(CTL_INTERNAL, "out of memory");

@@ -17,9 +17,7 @@
 
 static int open_hal(gw_daemon_t *daemon) {
     const char *culprit;
-    const iw_estop_wish_t estop = {.name = daemon->config.estop.line,
-                                   .active_high = daemon->config.estop.active_high,
-                                   .debounce_ms = daemon->config.estop.debounce_ms};
+    const iw_estop_wish_t estop = gw_report_estop(&daemon->config);
     const int error = iw_linux_hal_open(&daemon->wheels.hal, daemon->config.bus.interface, &estop, &culprit);
     if (error != 0) {
         gw_report_unopened(&daemon->config, culprit, error, stderr);

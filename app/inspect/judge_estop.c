@@ -29,6 +29,9 @@ const char *inspect_estop_trouble(const iw_linux_hal_t *hal) {
                           : "this machine has no GPIO chip (/dev/gpiochip*): load its driver, or use another input";
     case ENOTUNIQ:
         return "two lines have this name; set [estop] line to gpiochipN:OFFSET of the wired one (gpioinfo lists them)";
+    case EREMCHG:
+        return "the line is of another chip, or has another name, than [estop] chip and chip_line say: find the wired "
+               "one (gpiodetect, gpioinfo), correct [estop], and try its button: iwheelctl doctor";
     case EBUSY:
         return "the line is busy: another program has it; gpioinfo names that program";
     case EACCES:

@@ -13,6 +13,9 @@ typedef struct {
     int busy_error;  ///< errno of asking for the line; 0: it is given.
     int twin;        ///< 0: the line's name is unique; 1: another line of its chip has it; 2: one of another chip.
 
+    const char *label; ///< Of the line's chip; NULL: FAKE_GPIO_LABEL.
+    bool unnamed;      ///< The line has no name of its own.
+
     bool is_input;
     bool pulled_up;
     bool both_edges;
@@ -29,11 +32,15 @@ extern fake_gpio_t fake_gpio;
 /// Name of a line of the line's own chip, or of another one.
 const char *fake_gpio_name(bool own, unsigned offset);
 
+/// Label of the line's own chip.
+const char *fake_gpio_label(void);
+
 /// How many edges one read takes.
 int fake_gpio_take(unsigned room);
 
 /// The line's own chip, its name and its offset there.
 #define FAKE_GPIO_CHIP   "gpiochip3"
+#define FAKE_GPIO_LABEL  "pinctrl-fake"
 #define FAKE_GPIO_NAME   "ESTOP"
 #define FAKE_GPIO_OFFSET 17U
 /// Lines of each chip.

@@ -105,7 +105,9 @@ static void test_parse_every_key_reaches_its_field(void) {
         "setpoint_dlc=8\n[left]\ninvert=yes\nforce_unit=dN\n[right]\ninvert=no\nforce_unit=cN\n"
         "[drive]\nperiod_ms=10\nlease_ms=300\naccel_mm_s2=500\ndecel_mm_s2=2000\nmax_speed_mm_s=900\n"
         "max_current_mA=1500\nzero_hold_ms=1200\n[limits]\nwheel_silent_ms=60\necho_ms=70\nrest_rpm=3\nrest_ms=250\n"
-        "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\n[estop]\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\n"
+        "follow_mm_s=310\nfollow_ms=510\nblocked_ms=1100\n[estop]\nline=gpiochip0:4\nactive=low\ndebounce_ms=7\nchip="
+        "pinctrl-bcm2711\n"
+        "chip_line=GPIO4\n"
         "[northbound]\nsocket=/tmp/s\nmode=0600\ngroup=dialout\nmax_clients=4\n[record]\nblackbox_s=0\ndirectory=/"
         "tmp\n");
     const iw_config_t *core = &config.core;
@@ -133,6 +135,8 @@ static void test_parse_every_key_reaches_its_field(void) {
     const uint16_t wanted[] = {10, 300, 500, 2000, 900, 1500, 1200, 60, 70, 3, 250, 310, 510, 1100};
     TEST_ASSERT_EQUAL_UINT16_ARRAY(wanted, numbers, sizeof wanted / sizeof wanted[0]);
     TEST_ASSERT_EQUAL_STRING("gpiochip0:4", config.estop.line);
+    TEST_ASSERT_EQUAL_STRING("pinctrl-bcm2711", config.estop.chip);
+    TEST_ASSERT_EQUAL_STRING("GPIO4", config.estop.chip_line);
     TEST_ASSERT_FALSE(config.estop.active_high);
     TEST_ASSERT_EQUAL_UINT16(7, config.estop.debounce_ms);
     TEST_ASSERT_EQUAL_STRING("/tmp/s", config.northbound.socket);

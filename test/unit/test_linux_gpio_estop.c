@@ -21,13 +21,20 @@ static struct {
     int open_error;
     int opened;
     int fd;
+    iw_estop_seen_t expected;
 } wire;
 
 static iw_backend_store_t store;
 static iw_time_us_t now_us;
 
-int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
+int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
     (void)address;
+    *out_seen = (iw_estop_seen_t){"label", "name"};
+    return 0;
+}
+
+int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
+    wire.expected = address->expected;
     *self = (iw_gpio_line_t){.fd = -1};
     wire.opened++;
     if (wire.open_error != 0) {
@@ -179,6 +186,51 @@ static void test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_c
     TEST_ASSERT_EQUAL_UINT64(IW_NEVER, iw_gpio_estop_ops->next_us(&store));
 }
 
+static void test_estop_line_that_is_called_otherwise_counts_as_pressed(void) {
+    tearDown();
+    wire.open_error = EREMCHG;
+    begin(false);
+    TEST_ASSERT_EQUAL_INT(-1, pressed());
+    TEST_ASSERT_EQUAL_INT(EREMCHG, iw_gpio_estop_ops->trouble(&store));
+    tend(1000);
+    TEST_ASSERT_EQUAL_INT(-1, pressed());
+}
+
+static void test_estop_expects_what_is_configured_and_nothing_for_any(void) {
+    static const char *const longest = "0123456789012345678901234567890";
+    static const struct {
+        const char *chip;
+        const char *chip_line;
+        iw_estop_seen_t expected;
+    } cases[] = {{NULL, NULL, {"", ""}},
+                 {"any", "any", {"", ""}},
+                 {"pinctrl", "any", {"pinctrl", ""}},
+                 {"any", "GPIO4", {"", "GPIO4"}}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const iw_estop_wish_t wish = {.name = "ESTOP", .chip = cases[i].chip, .chip_line = cases[i].chip_line};
+        tearDown();
+        TEST_ASSERT_EQUAL_INT(0, iw_gpio_estop_ops->open(&store, &wish));
+        TEST_ASSERT_EQUAL_STRING(cases[i].expected.chip, wire.expected.chip);
+        TEST_ASSERT_EQUAL_STRING(cases[i].expected.line, wire.expected.line);
+    }
+    tearDown();
+    iw_estop_wish_t wish = {.name = "ESTOP", .chip = longest};
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_estop_ops->open(&store, &wish));
+    TEST_ASSERT_EQUAL_STRING(longest, wire.expected.chip);
+    tearDown();
+    wish.chip = "01234567890123456789012345678901";
+    TEST_ASSERT_EQUAL_INT(ENAMETOOLONG, iw_gpio_estop_ops->open(&store, &wish));
+    begin(false);
+}
+
+static void test_estop_that_is_no_line_is_called_nothing(void) {
+    iw_estop_seen_t seen;
+    TEST_ASSERT_EQUAL_INT(ENOTSUP, iw_estop_see("unix:/tmp/button", &seen));
+    TEST_ASSERT_EQUAL_INT(EINVAL, iw_estop_see("gpiochip:4", &seen));
+    TEST_ASSERT_EQUAL_INT(0, iw_estop_see("gpiochip0:4", &seen));
+    TEST_ASSERT_EQUAL_STRING("label", seen.chip);
+}
+
 static void test_estop_descriptor_wakes_for_the_line_that_is_open_now(void) {
     const uint64_t one = 1;
     struct pollfd wait = {.fd = iw_gpio_estop_ops->watch_fd(&store), .events = POLLIN};
@@ -215,6 +267,9 @@ int main(void) {
     RUN_TEST(test_estop_chip_that_went_and_came_between_two_looks_is_told_as_unreadable_once);
     RUN_TEST(test_estop_chip_that_is_gone_is_tried_again_once_in_a_while);
     RUN_TEST(test_estop_line_that_cannot_be_had_at_start_is_unreadable_until_it_can);
+    RUN_TEST(test_estop_line_that_is_called_otherwise_counts_as_pressed);
+    RUN_TEST(test_estop_expects_what_is_configured_and_nothing_for_any);
+    RUN_TEST(test_estop_that_is_no_line_is_called_nothing);
     RUN_TEST(test_estop_descriptor_wakes_for_the_line_that_is_open_now);
     RUN_TEST(test_estop_without_a_descriptor_for_waiting_is_refused);
     return UNITY_END();

@@ -18,7 +18,14 @@ static iw_gpio_line_t line;
 const char *fake_gpio_name(bool own, unsigned offset) {
     const bool twin = (fake_gpio.twin == 1 && own && offset == 30U) || (fake_gpio.twin == 2 && !own && offset == 0U);
     const bool line_itself = own && offset == FAKE_GPIO_OFFSET;
+    if (line_itself && fake_gpio.unnamed) {
+        return NULL;
+    }
     return (twin || line_itself) ? FAKE_GPIO_NAME : (offset % 2U == 0U) ? NULL : "OTHER";
+}
+
+const char *fake_gpio_label(void) {
+    return (fake_gpio.label != NULL) ? fake_gpio.label : FAKE_GPIO_LABEL;
 }
 
 int fake_gpio_take(unsigned room) {
@@ -135,6 +142,65 @@ static void test_line_name_that_exists_twice_is_refused(void) {
     }
 }
 
+static void test_line_that_is_called_otherwise_than_expected_is_not_taken(void) {
+    static const struct {
+        iw_estop_seen_t expected;
+        int error;
+    } cases[] = {{{"", ""}, 0},
+                 {{FAKE_GPIO_LABEL, ""}, 0},
+                 {{"", FAKE_GPIO_NAME}, 0},
+                 {{FAKE_GPIO_LABEL, FAKE_GPIO_NAME}, 0},
+                 {{"another-chip", FAKE_GPIO_NAME}, EREMCHG},
+                 {{FAKE_GPIO_LABEL, "OTHER"}, EREMCHG},
+                 {{"pinctrl-fak", ""}, EREMCHG},
+                 {{"pinctrl-fake2", ""}, EREMCHG}};
+    const iw_gpio_address_t *const addresses[] = {&by_name, &by_offset};
+    for (size_t i = 0; i < 2U * sizeof cases / sizeof cases[0]; i++) {
+        iw_gpio_address_t address = *addresses[i % 2U];
+        address.expected = cases[i / 2U].expected;
+        iw_gpio_line_close(&line);
+        TEST_ASSERT_EQUAL_INT(cases[i / 2U].error, iw_gpio_line_open(&line, &address));
+        TEST_ASSERT_EQUAL_INT((cases[i / 2U].error == 0) ? 1 : 0, fake_gpio.open);
+        TEST_ASSERT_EQUAL_INT((cases[i / 2U].error == 0) ? 1 : 0, fake_gpio.requested);
+    }
+}
+
+static void test_line_whose_chip_was_renumbered_is_not_taken(void) {
+    iw_gpio_address_t address = by_offset;
+    address.expected = (iw_estop_seen_t){FAKE_GPIO_LABEL, ""};
+    iw_gpio_line_close(&line);
+    fake_gpio.label = "raspberrypi-exp-gpio"; // Has the number of the other one now.
+    TEST_ASSERT_EQUAL_INT(EREMCHG, iw_gpio_line_open(&line, &address));
+    TEST_ASSERT_EQUAL_INT(-1, line.fd);
+    address.expected = (iw_estop_seen_t){"", FAKE_GPIO_NAME};
+    fake_gpio.unnamed = true;
+    TEST_ASSERT_EQUAL_INT(EREMCHG, iw_gpio_line_open(&line, &address));
+}
+
+static void test_line_is_seen_with_label_and_name_and_not_taken(void) {
+    const iw_gpio_address_t *const addresses[] = {&by_name, &by_offset};
+    for (size_t i = 0; i < 2U; i++) {
+        iw_estop_seen_t seen = {"x", "y"};
+        iw_gpio_line_close(&line);
+        fake_gpio.busy_error = EBUSY; // Somebody else has it.
+        TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_see(addresses[i], &seen));
+        TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_LABEL, seen.chip);
+        TEST_ASSERT_EQUAL_STRING(FAKE_GPIO_NAME, seen.line);
+        TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
+        TEST_ASSERT_EQUAL_INT(0, fake_gpio.requested);
+    }
+    iw_estop_seen_t seen;
+    fake_gpio.unnamed = true;
+    TEST_ASSERT_EQUAL_INT(0, iw_gpio_line_see(&by_offset, &seen));
+    TEST_ASSERT_EQUAL_STRING("", seen.line);
+    fake_gpio.unnamed = false;
+    fake_gpio.twin = 2;
+    TEST_ASSERT_EQUAL_INT(ENOTUNIQ, iw_gpio_line_see(&by_name, &seen));
+    const iw_gpio_address_t nobody = {.name = "NOBODY"};
+    TEST_ASSERT_EQUAL_INT(ENOENT, iw_gpio_line_see(&nobody, &seen));
+    TEST_ASSERT_EQUAL_INT(0, fake_gpio.open);
+}
+
 static void test_line_that_is_closed_is_given_back(void) {
     iw_gpio_line_close(&line);
     TEST_ASSERT_EQUAL_INT(-1, line.fd);
@@ -152,6 +218,9 @@ int main(void) {
     RUN_TEST(test_edges_of_a_line_that_is_gone_are_an_error_and_an_interruption_is_none);
     RUN_TEST(test_line_that_cannot_be_had_says_why_and_leaves_nothing_open);
     RUN_TEST(test_line_name_that_exists_twice_is_refused);
+    RUN_TEST(test_line_that_is_called_otherwise_than_expected_is_not_taken);
+    RUN_TEST(test_line_whose_chip_was_renumbered_is_not_taken);
+    RUN_TEST(test_line_is_seen_with_label_and_name_and_not_taken);
     RUN_TEST(test_line_that_is_closed_is_given_back);
     return UNITY_END();
 }

@@ -142,6 +142,12 @@ bool hand_went_one_way(const hand_t *hand, iw_side_t side);
 
 void bringup_checks(bringup_t *self);
 void bringup_estop(bringup_t *self);
+
+/// What an earlier bringup saw of the e-stop's line no longer counts.
+void bringup_forget_wiring(bringup_t *self);
+
+/// Puts the label of its chip and its own name into the configuration. A name that this cannot hold is left out.
+void bringup_store_wiring(bringup_t *self);
 void bringup_gear(bringup_t *self);
 void bringup_type(bringup_t *self);
 void bringup_role(bringup_t *self);

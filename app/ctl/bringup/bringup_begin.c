@@ -105,6 +105,7 @@ void bringup_estop(bringup_t *self) {
     talk_say("Seen. It will stop the wheels in everything that follows, and so does any key.");
     bringup_note(self, "estop", "line", NULL, "press and release were seen%s",
                  (strncmp(self->config.estop.line, "unix:", 5U) == 0) ? " (a SIMULATED button)" : "");
+    bringup_store_wiring(self);
     if (!trial_wait_ready(self)) {
         bringup_fail(self);
     }

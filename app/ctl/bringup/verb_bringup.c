@@ -56,6 +56,7 @@ static int configure(bringup_t *self, const words_t *words) {
     if (code != CTL_OK) {
         return code;
     }
+    bringup_forget_wiring(self);
     self->recording = words->learn;
     if (words->learn != NULL && access(words->learn, R_OK) != 0) {
         return ctl_fail(CTL_USAGE, "--learn %s: %s; name a recording in candump's form", words->learn, strerror(errno));

@@ -134,7 +134,9 @@ static bool is_occupied(const doctor_t *self) {
 static bool open_hal(doctor_t *self) {
     const iw_estop_wish_t line = {.name = is_occupied(self) ? "none" : self->config.estop.line,
                                   .active_high = self->config.estop.active_high,
-                                  .debounce_ms = self->config.estop.debounce_ms};
+                                  .debounce_ms = self->config.estop.debounce_ms,
+                                  .chip = self->config.estop.chip,
+                                  .chip_line = self->config.estop.chip_line};
     const inspect_opened_t opened = inspect_open(&self->hal, self->bus, &line, &self->findings);
     self->open = opened.hal;
     return opened.hal && opened.bus;

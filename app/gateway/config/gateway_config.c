@@ -139,6 +139,12 @@ static const settings_key_t keys[] = {
      "pressed. low is accepted with a warning: a cut wire would go unseen.",
      WORD(estop.active_high, low_high)},
     {"estop", "debounce_ms", " ms", "On release only; a press acts at once.", NUMBER(estop.debounce_ms, 0, 1000)},
+    {"estop", "chip", "",
+     "Label of the line's chip when its button was seen to work (bringup writes it; gpiodetect shows it); any: not\n"
+     "compared. A line of another chip is not read: it counts as pressed. Kernels renumber chips.",
+     TEXT(estop.chip, settings_wrong_address)},
+    {"estop", "chip_line", "", "The line's own name then (gpioinfo shows it); any: not compared.",
+     TEXT(estop.chip_line, settings_wrong_address)},
 
     {"northbound", "socket", "", "Where clients connect.", TEXT(northbound.socket, settings_wrong_socket)},
     {"northbound", "mode", "", "Permissions of the socket, octal: who may connect may move the wheels.",
@@ -245,7 +251,7 @@ void gateway_config_default(gateway_config_t *out_config) {
     static const gateway_config_t standard = {
         .bus = {"can0", 1000000U, 625U, GATEWAY_MISMATCH_REFUSE},
         .track_mm = 540U,
-        .estop = {"ESTOP", true, 5U},
+        .estop = {"ESTOP", true, 5U, "any", "any"},
         .northbound = {"/run/iwheel/gateway.sock", 0660U, "iwheel", 16U, "none", 0660U, "iwheel-watch", 16U, 1000U},
         .record = {30U, "/var/lib/iwheel", 200U},
     };

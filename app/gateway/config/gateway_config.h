@@ -41,6 +41,8 @@ typedef struct gateway_config {
         char line[GATEWAY_ADDRESS_SIZE]; ///< gpiod line name, `gpiochipN:OFFSET`, `unix:PATH` (SIMULATED) or `none`.
         bool active_high;                ///< Pressed, or a cut wire, reads high.
         uint16_t debounce_ms;            ///< On release only, 0..1000.
+        char chip[32];                   ///< Label of the line's chip, as seen at bringup; `any`: not compared.
+        char chip_line[32];              ///< The line's own name, as seen at bringup; `any`: not compared.
     } estop;
     struct {
         char socket[GATEWAY_PATH_SIZE];

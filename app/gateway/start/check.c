@@ -206,8 +206,7 @@ static void judge_files(const gateway_config_t *config, inspect_findings_t *find
 static void judge_machine(const gateway_config_t *config, inspect_findings_t *findings) {
     static iw_linux_hal_t hal;
     inspect_heard_t heard;
-    const iw_estop_wish_t line = {
-        .name = config->estop.line, .active_high = config->estop.active_high, .debounce_ms = config->estop.debounce_ms};
+    const iw_estop_wish_t line = gw_report_estop(config);
     const inspect_wish_t wish = gw_report_wish(config);
     const inspect_opened_t opened = inspect_open(&hal, config->bus.interface, &line, findings);
     if (!opened.hal) {

@@ -43,6 +43,14 @@ inspect_wish_t gw_report_wish(const gateway_config_t *config) {
     };
 }
 
+iw_estop_wish_t gw_report_estop(const gateway_config_t *config) {
+    return (iw_estop_wish_t){.name = config->estop.line,
+                             .active_high = config->estop.active_high,
+                             .debounce_ms = config->estop.debounce_ms,
+                             .chip = config->estop.chip,
+                             .chip_line = config->estop.chip_line};
+}
+
 gw_listener_wish_t gw_report_socket(const gateway_config_t *config, gw_right_t right) {
     return (right == GW_DRIVE) ? (gw_listener_wish_t){"iwheel-gateway", right, config->northbound.socket,
                                                       config->northbound.group, config->northbound.mode}

@@ -14,8 +14,9 @@ struct gw_log;
 /// watch by.
 void gw_report_start(const struct gateway_config *config, bool simulated, bool watched, struct gw_log *log);
 
-/// What the bus is to be, and a socket, by the configuration.
+/// What the bus, the e-stop and a socket are to be, by the configuration.
 inspect_wish_t gw_report_wish(const struct gateway_config *config);
+iw_estop_wish_t gw_report_estop(const struct gateway_config *config);
 gw_listener_wish_t gw_report_socket(const struct gateway_config *config, gw_right_t right);
 
 /// A bus or e-stop that cannot be opened: cause and cure.

@@ -47,6 +47,24 @@ int iw_gpio_address_parse(const char *text, iw_gpio_address_t *out_address) {
     return 0;
 }
 
+void iw_gpio_note(iw_estop_seen_t *out_seen, const char *chip, const char *line) {
+    const struct {
+        char *to;
+        const char *from;
+    } names[] = {{out_seen->chip, chip}, {out_seen->line, line}};
+    memset(out_seen, 0, sizeof *out_seen);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        const size_t length = (names[i].from != NULL) ? strlen(names[i].from) : 0U;
+        memcpy(names[i].to, (length > 0U) ? names[i].from : "", (length < IW_GPIO_NAME_SIZE) ? length : 0U);
+    }
+}
+
+bool iw_gpio_is_expected(const iw_gpio_address_t *address, const iw_estop_seen_t *seen) {
+    const iw_estop_seen_t *expected = &address->expected;
+    return (expected->chip[0] == '\0' || strcmp(expected->chip, seen->chip) == 0) &&
+           (expected->line[0] == '\0' || strcmp(expected->line, seen->line) == 0);
+}
+
 void iw_gpio_release_init(iw_gpio_release_t *self, uint32_t debounce_us) {
     *self = (iw_gpio_release_t){.debounce_us = debounce_us};
 }

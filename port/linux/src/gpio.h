@@ -4,16 +4,18 @@
 #define IW_GPIO_H
 
 #include "iwheel/types.h"
+#include "iwheel_linux/backend.h"
 
 /// How a GPIO line is named in the configuration: by its own name, or as `gpiochipN:OFFSET`.
 ///
 /// The kernel's names have at most 31 characters.
-#define IW_GPIO_NAME_SIZE 32U
+#define IW_GPIO_NAME_SIZE IW_ESTOP_NAME_SIZE
 
 typedef struct {
     char name[IW_GPIO_NAME_SIZE]; ///< Of the chip (`by_offset`) or of the line.
     unsigned offset;
     bool by_offset;
+    iw_estop_seen_t expected; ///< What the line must be called; empty: it is not compared.
 } iw_gpio_address_t;
 
 /// 0, or EINVAL (it begins like an address by offset and is none) or ENAMETOOLONG, `*out_address` untouched.
@@ -29,8 +31,18 @@ typedef struct {
 } iw_gpio_line_t;
 
 /// Takes the line as input with pull-up and both edges. 0, or an errno, `*self` then closed: ENOENT no such line or
-/// chip, ENOTUNIQ two lines have that name, EBUSY another program has the line. Allocates.
+/// chip, ENOTUNIQ two lines have that name, EREMCHG it is not called as expected, EBUSY another program has the line.
+/// Allocates.
 int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address);
+
+/// What the line is called, also while another program has it. 0, or an errno as above. Allocates.
+int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen);
+
+/// Copies both names; NULL: it has none.
+void iw_gpio_note(iw_estop_seen_t *out_seen, const char *chip, const char *line);
+
+/// Whether the line is called as the address expects.
+bool iw_gpio_is_expected(const iw_gpio_address_t *address, const iw_estop_seen_t *seen);
 void iw_gpio_line_close(iw_gpio_line_t *self);
 
 /// 1 high, 0 low, < 0 cannot be read any more.

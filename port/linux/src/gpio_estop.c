@@ -4,6 +4,7 @@
 #include "gpio.h"
 
 #include <errno.h>
+#include <string.h>
 #include <sys/epoll.h>
 #include <unistd.h>
 
@@ -50,13 +51,25 @@ static void try_open(gpio_estop_t *estop) {
     iw_gpio_release_init(&estop->release, estop->debounce_us);
 }
 
+/// An expectation as configured. "any": there is none.
+static int expect(char *out_name, const char *name) {
+    const size_t length = (name == NULL || strcmp(name, "any") == 0) ? 0U : strlen(name);
+    if (length >= IW_GPIO_NAME_SIZE) {
+        return ENAMETOOLONG;
+    }
+    memcpy(out_name, (length > 0U) ? name : "", length + 1U);
+    return 0;
+}
+
 /// Only a malformed name is an error. A line that is absent or busy is retried: until then it counts as pressed.
 static int gpio_open(void *self, const iw_estop_wish_t *wish) {
     gpio_estop_t *estop = (gpio_estop_t *)self;
     *estop = (gpio_estop_t){.line = {.fd = -1},
                             .debounce_us = (uint32_t)wish->debounce_ms * IW_US_PER_MS,
                             .active_high = wish->active_high};
-    const int error = iw_gpio_address_parse(wish->name, &estop->address);
+    int error = iw_gpio_address_parse(wish->name, &estop->address);
+    error = (error != 0) ? error : expect(estop->address.expected.chip, wish->chip);
+    error = (error != 0) ? error : expect(estop->address.expected.line, wish->chip_line);
     if (error != 0) {
         return error;
     }
@@ -118,6 +131,15 @@ static int gpio_pressed(void *self, bool quiet) {
 
 static int gpio_trouble(const void *self) {
     return ((const gpio_estop_t *)self)->trouble;
+}
+
+int iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
+    iw_gpio_address_t address;
+    if (strncmp(name, "unix:", 5U) == 0) {
+        return ENOTSUP;
+    }
+    const int error = iw_gpio_address_parse(name, &address);
+    return (error != 0) ? error : iw_gpio_line_see(&address, out_seen);
 }
 
 static const iw_estop_ops_t ops = {

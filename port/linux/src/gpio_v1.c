@@ -63,14 +63,39 @@ static struct gpiod_line *find(const iw_gpio_address_t *address) {
     return line;
 }
 
-int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
-    *self = (iw_gpio_line_t){.fd = -1};
+/// The line with what it is called; NULL with an errno.
+static struct gpiod_line *find_and_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
     errno = 0;
     struct gpiod_line *line = find(address);
     if (line == NULL) {
-        return (errno != 0) ? errno : ENOENT;
+        errno = (errno != 0) ? errno : ENOENT;
+        return NULL;
+    }
+    iw_gpio_note(out_seen, gpiod_chip_label(gpiod_line_get_chip(line)), gpiod_line_name(line));
+    return line;
+}
+
+int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
+    struct gpiod_line *line = find_and_see(address, out_seen);
+    if (line == NULL) {
+        return errno;
+    }
+    gpiod_line_close_chip(line);
+    return 0;
+}
+
+int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
+    iw_estop_seen_t seen;
+    *self = (iw_gpio_line_t){.fd = -1};
+    struct gpiod_line *line = find_and_see(address, &seen);
+    if (line == NULL) {
+        return errno;
     }
     self->line = line;
+    if (!iw_gpio_is_expected(address, &seen)) {
+        iw_gpio_line_close(self);
+        return EREMCHG;
+    }
     if (gpiod_line_request_both_edges_events_flags(line, "iwheel-gateway e-stop",
                                                    GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP) == 0) {
         self->fd = gpiod_line_event_get_fd(line);

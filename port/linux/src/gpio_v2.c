@@ -110,14 +110,51 @@ static struct gpiod_line_request *request(struct gpiod_chip *chip, unsigned offs
     return line;
 }
 
+static void see(struct gpiod_chip *chip, unsigned offset, iw_estop_seen_t *out_seen) {
+    struct gpiod_chip_info *chip_info = gpiod_chip_get_info(chip);
+    struct gpiod_line_info *info = gpiod_chip_get_line_info(chip, offset);
+    iw_gpio_note(out_seen, (chip_info == NULL) ? NULL : gpiod_chip_info_get_label(chip_info),
+                 (info == NULL) ? NULL : gpiod_line_info_get_name(info));
+    gpiod_line_info_free(info);
+    gpiod_chip_info_free(chip_info);
+}
+
+/// The chip with what the line is called; NULL with an errno.
+static struct gpiod_chip *find_and_see(const iw_gpio_address_t *address, unsigned *out_offset,
+                                       iw_estop_seen_t *out_seen) {
+    errno = 0;
+    struct gpiod_chip *chip = find(address, out_offset);
+    if (chip == NULL) {
+        errno = (errno != 0) ? errno : ENOENT;
+        return NULL;
+    }
+    see(chip, *out_offset, out_seen);
+    return chip;
+}
+
+int iw_gpio_line_see(const iw_gpio_address_t *address, iw_estop_seen_t *out_seen) {
+    unsigned offset = 0;
+    struct gpiod_chip *chip = find_and_see(address, &offset, out_seen);
+    if (chip == NULL) {
+        return errno;
+    }
+    gpiod_chip_close(chip);
+    return 0;
+}
+
 int iw_gpio_line_open(iw_gpio_line_t *self, const iw_gpio_address_t *address) {
     unsigned offset = 0;
+    iw_estop_seen_t seen;
     *self = (iw_gpio_line_t){.fd = -1};
-    errno = 0;
-    self->chip = find(address, &offset);
+    self->chip = find_and_see(address, &offset, &seen);
     if (self->chip == NULL) {
-        return (errno != 0) ? errno : ENOENT;
+        return errno;
     }
+    if (!iw_gpio_is_expected(address, &seen)) {
+        iw_gpio_line_close(self);
+        return EREMCHG;
+    }
+    errno = 0;
     self->line = request((struct gpiod_chip *)self->chip, offset);
     self->events = (self->line == NULL) ? NULL : gpiod_edge_event_buffer_new(EVENTS);
     self->fd = (self->events == NULL) ? -1 : gpiod_line_request_get_fd((struct gpiod_line_request *)self->line);

@@ -4,6 +4,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <gpiod.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -60,6 +61,9 @@ void gpiod_chip_close(struct gpiod_chip *chip) {
 }
 
 struct gpiod_chip_info *gpiod_chip_get_info(struct gpiod_chip *chip) {
+    if (chip == NULL) {
+        abort(); // As the library does.
+    }
     given++;
     return (struct gpiod_chip_info *)(void *)chip;
 }
@@ -67,6 +71,10 @@ struct gpiod_chip_info *gpiod_chip_get_info(struct gpiod_chip *chip) {
 size_t gpiod_chip_info_get_num_lines(struct gpiod_chip_info *info) {
     (void)info;
     return FAKE_GPIO_LINES;
+}
+
+const char *gpiod_chip_info_get_label(struct gpiod_chip_info *info) {
+    return ((void *)info == (void *)&one) ? fake_gpio_label() : "another-chip";
 }
 
 void gpiod_chip_info_free(struct gpiod_chip_info *info) {
@@ -86,6 +94,7 @@ const char *gpiod_line_info_get_name(struct gpiod_line_info *info) {
 }
 
 void gpiod_line_info_free(struct gpiod_line_info *info) {
+    shown_offset = FAKE_GPIO_LINES - 1U; // Its name is another one's now.
     given -= (info != NULL) ? 1U : 0U;
 }
 

@@ -50,7 +50,24 @@ typedef struct {
     const char *name;     ///< Must outlive the input.
     bool active_high;     ///< Pressed reads high. Only for real lines.
     uint16_t debounce_ms; ///< A release must last this long. Only for real lines.
+    /// What the line was called when somebody saw its button work; NULL or "any": not compared. A line that is called
+    /// otherwise is not read (EREMCHG), so it counts as pressed. Only for real lines.
+    const char *chip;      ///< Label of its chip: numbers of chips change, labels do not.
+    const char *chip_line; ///< Its own name.
 } iw_estop_wish_t;
+
+/// The kernel's names have at most 31 characters.
+#define IW_ESTOP_NAME_SIZE 32U
+
+/// What the kernel calls a line.
+typedef struct {
+    char chip[IW_ESTOP_NAME_SIZE]; ///< Label of its chip.
+    char line[IW_ESTOP_NAME_SIZE]; ///< Empty: it has no name of its own.
+} iw_estop_seen_t;
+
+/// Reads what the line of this name (as in iw_estop_wish_t) is called, also while another program has it. 0, or an
+/// errno: ENOTSUP for `unix:PATH` and without libgpiod, else as for opening.
+int iw_estop_see(const char *name, iw_estop_seen_t *out_seen);
 
 /// A kind of e-stop input. The functions mean the same as those of a bus; `self` is its state, of a type that only it
 /// knows.

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// What bringup stores of the e-stop's line, by a port that the test plays.
+#include "bringup/bringup.h"
+
+#include "iwheel_linux/backend.h"
+
+#include "unity.h"
+
+#include <errno.h>
+#include <string.h>
+
+int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen);
+
+static bringup_t bringup;
+static iw_estop_seen_t seen;
+static int error;
+
+int __wrap_iw_estop_see(const char *name, iw_estop_seen_t *out_seen) {
+    TEST_ASSERT_EQUAL_STRING("ESTOP", name);
+    *out_seen = seen;
+    return error;
+}
+
+void setUp(void) {
+    memset(&bringup, 0, sizeof bringup);
+    gateway_config_default(&bringup.config);
+    seen = (iw_estop_seen_t){"pinctrl-bcm2711", "ESTOP"};
+    error = 0;
+}
+
+void tearDown(void) {}
+
+static void stored(const char *chip, const char *line, unsigned notes) {
+    bringup_store_wiring(&bringup);
+    TEST_ASSERT_EQUAL_STRING(chip, bringup.config.estop.chip);
+    TEST_ASSERT_EQUAL_STRING(line, bringup.config.estop.chip_line);
+    TEST_ASSERT_EQUAL_UINT(notes, bringup.notes);
+}
+
+static void test_wiring_is_stored_with_a_note_for_each_name(void) {
+    stored("pinctrl-bcm2711", "ESTOP", 2);
+}
+
+static void test_wiring_of_a_line_without_a_name_is_that_of_its_chip(void) {
+    seen.line[0] = '\0';
+    stored("pinctrl-bcm2711", "any", 1);
+}
+
+static void test_wiring_that_cannot_be_read_is_not_stored(void) {
+    error = ENOTSUP;
+    stored("any", "any", 0);
+}
+
+static void test_wiring_that_a_configuration_cannot_hold_is_left_out(void) {
+    strcpy(seen.chip, "a;b");
+    stored("any", "ESTOP", 1);
+}
+
+static void test_wiring_of_an_earlier_bringup_is_forgotten(void) {
+    bringup_store_wiring(&bringup);
+    bringup_forget_wiring(&bringup);
+    TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip);
+    TEST_ASSERT_EQUAL_STRING("any", bringup.config.estop.chip_line);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_wiring_is_stored_with_a_note_for_each_name);
+    RUN_TEST(test_wiring_of_a_line_without_a_name_is_that_of_its_chip);
+    RUN_TEST(test_wiring_that_cannot_be_read_is_not_stored);
+    RUN_TEST(test_wiring_that_a_configuration_cannot_hold_is_left_out);
+    RUN_TEST(test_wiring_of_an_earlier_bringup_is_forgotten);
+    return UNITY_END();
+}
