@@ -7,6 +7,7 @@ set(IWHEEL_CORE_SOURCES
     src/codec.c
     src/config.c
     src/confirmation.c
+    src/diverge.c
     src/envelope.c
     src/evidence.c
     src/follow.c
@@ -19,4 +20,5 @@ set(IWHEEL_CORE_SOURCES
     src/setpoint.c
     src/snapshot.c
     src/step.c
+    src/watch_pair.c
     src/wheel.c)

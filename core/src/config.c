@@ -22,6 +22,9 @@ static const iw_config_t standard = {
     .follow_mm_s = 300,
     .follow_ms = 500,
     .blocked_ms = 1000,
+    .pair_mm = 60,
+    .pair_leak_ms = 1000,
+    .wheel_lag_ms = 60,
     .radius_mm = 192,
     .gear_turns = 1,
     .gear_per = 1,
@@ -45,6 +48,9 @@ static const iw_config_range_t ranges[] = {
     {50, 5000},                         // follow_mm_s
     {100, 5000},                        // follow_ms
     {200, 10000},                       // blocked_ms
+    {20, 150},                          // pair_mm
+    {500, 3000},                        // pair_leak_ms
+    {10, 300},                          // wheel_lag_ms
     {20, 500},                          // radius_mm
     {1, 1000},                          // gear_turns
     {1, 1000},                          // gear_per

@@ -22,7 +22,7 @@ static const phase_row_t phases[IW_PHASES] = {
     [IW_PHASE_HOLDING] = {IW_STATE_STOPPING, IW_DEMAND_BRAKE, IW_DEMAND_ZERO},
     [IW_PHASE_REARMING] = {IW_STATE_STOPPING, IW_DEMAND_BRAKE, IW_DEMAND_ZERO},
     [IW_PHASE_RESTARTING] = {IW_STATE_STOPPING, IW_DEMAND_ZERO, IW_DEMAND_ZERO},
-    [IW_PHASE_CUT] = {IW_STATE_LATCHED, IW_DEMAND_ZERO, IW_DEMAND_ZERO},
+    [IW_PHASE_CUT] = {IW_STATE_LATCHED, IW_DEMAND_BRAKE, IW_DEMAND_ZERO},
     [IW_PHASE_LATCHED] = {IW_STATE_LATCHED, IW_DEMAND_SILENCE, IW_DEMAND_SILENCE},
 };
 
@@ -44,12 +44,15 @@ void iw_permit_init(iw_permit_t *self, const iw_config_t *config, iw_time_us_t n
     memset(self, 0, sizeof *self);
     self->config = config;
     self->stale_us = IW_NEVER;
+    self->diverged_us[0] = IW_NEVER;
+    self->diverged_us[1] = IW_NEVER;
     memset(self->seen_us, 0xFF, sizeof self->seen_us); // IW_NEVER
     // Fault 25: after a crash while ARMED the wheels keep the last command until their own watchdog ends it.
     if (restarted && iw_refuse_may_send(config)) {
         self->phase = IW_PHASE_RESTARTING;
         self->hold_us = now_us;
         self->stop.cause = IW_CAUSE_RESTART;
+        self->stop.at_once = true;
         self->stop.at_us = now_us;
         self->stop.number = 1;
     }
@@ -85,6 +88,11 @@ static void end_arming(iw_permit_t *self, iw_refusal_t refusal) {
     }
 }
 
+/// Without a ramp: as the event says, else as its cause always does.
+static bool is_at_once(const iw_event_t *event) {
+    return (event->react == IW_REACT_BY_CAUSE) ? iw_cause_rows[event->cause].at_once : event->react == IW_REACT_ZERO;
+}
+
 /// Records why the wheels stop. Before the phase changes: `from`, holder and applied speeds are those of the moment.
 static IW_APART void record_stop(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     iw_stop_t *const stop = &self->stop;
@@ -97,22 +105,23 @@ static IW_APART void record_stop(iw_permit_t *self, const iw_event_t *event, iw_
     stop->from = iw_permit_state(self);
     stop->sides = event->sides;
     stop->latched = false;
+    stop->at_once = is_at_once(event);
 }
 
 /// Release: a ramp, because a hard stop topples whoever leans on the machine. `at_once` where waiting is the greater
 /// risk.
 static IW_APART void brake(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
     record_stop(self, event, now_us);
-    self->blocked = (event->cause == IW_CAUSE_WHEEL_BLOCKED) ? self->holder : IW_CLIENT_NONE;
+    self->blocked = iw_refuse_not_followed(event->cause) ? self->holder : IW_CLIENT_NONE;
     self->phase = IW_PHASE_BRAKING;
-    self->at_once = iw_cause_rows[event->cause].at_once;
+    self->at_once = is_at_once(event);
     self->hold_us = IW_NEVER;
     self->holder = IW_CLIENT_NONE;
 }
 
 /// A stop with nothing more to tell than its cause and a time.
 static void brake_after(iw_permit_t *self, iw_cause_t cause, iw_time_us_t now_us, uint32_t detail) {
-    const iw_event_t event = {cause, IW_SIDES_NONE, detail};
+    const iw_event_t event = {cause, IW_SIDES_NONE, detail, IW_REACT_BY_CAUSE};
     brake(self, &event, now_us);
 }
 
@@ -123,6 +132,7 @@ static void latch(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_u
     const bool silent = self->phase == IW_PHASE_LISTENING;
     end_arming(self, (iw_refusal_t)iw_cause_rows[event->cause].refusal);
     self->phase = silent ? IW_PHASE_LATCHED : IW_PHASE_CUT;
+    self->at_once = is_at_once(event);
     self->hold_us = now_us;
     self->holder = IW_CLIENT_NONE;
 }
@@ -146,11 +156,25 @@ static void count_stranger(iw_permit_t *self) {
     self->phase = (self->strangers > LEFT_BEHIND_MAX) ? IW_PHASE_LISTENING : self->phase;
 }
 
-/// A cause that neither latches nor stops a holder: it ends arming, and a ramp that is going on if it allows none.
+/// A cause that neither latches nor stops a holder: it ends arming.
 static void bear(iw_permit_t *self, iw_cause_t cause) {
     end_arming(self, (iw_refusal_t)iw_cause_rows[cause].refusal);
-    if (iw_cause_rows[cause].at_once) {
-        self->at_once = true;
+}
+
+/// A pair that diverges again and again has a fault that arming anew does not end: the third time latches.
+static bool diverges_again(iw_permit_t *self, iw_time_us_t now_us) {
+    const bool again = iw_age_us(self->diverged_us[1], now_us) < IW_PERMIT_DIVERGED_US;
+    self->diverged_us[1] = self->diverged_us[0];
+    self->diverged_us[0] = now_us;
+    return again;
+}
+
+/// ARMED: the wheels stop, and mostly that is all.
+static void stop_holder(iw_permit_t *self, const iw_event_t *event, iw_time_us_t now_us) {
+    if (event->cause == IW_CAUSE_PAIR_DIVERGES && diverges_again(self, now_us)) {
+        latch(self, event, now_us);
+    } else {
+        brake(self, event, now_us);
     }
 }
 
@@ -160,13 +184,15 @@ void iw_permit_raise(iw_permit_t *self, const iw_event_t *event, iw_time_us_t no
     self->raised |= IW_CAUSE_BIT(cause);
     self->seen_us[cause] = now_us;
     self->quiet = false;
+    // A ramp that is going on ends with whatever allows none.
+    self->at_once = self->at_once || is_at_once(event);
     if (iw_refuse_latched(self)) {
         return;
     }
     if (latches(self, cause)) {
         latch(self, event, now_us);
     } else if (self->phase == IW_PHASE_ARMED) {
-        brake(self, event, now_us);
+        stop_holder(self, event, now_us);
     } else if (self->phase == IW_PHASE_RESTARTING && cause == IW_CAUSE_SECOND_MASTER) {
         count_stranger(self);
     } else {
@@ -196,9 +222,17 @@ static bool time_is_enough(const iw_permit_t *self) {
     return self->view.settled || self->phase == IW_PHASE_RESTARTING;
 }
 
+/// One wheel offline, latched: the ramp goes on, and zeros are held from its end.
+static bool is_ramping(const iw_permit_t *self) {
+    return self->phase == IW_PHASE_CUT && !self->at_once && !self->view.output_zero;
+}
+
 /// Zeros for `zero_hold_ms` and until the wheels stand, but at most IW_PERMIT_HOLD_MAX_US: a wheel that is pushed or
 /// has a fault would otherwise be fed for ever.
 static void step_hold(iw_permit_t *self, iw_time_us_t now_us) {
+    if (is_ramping(self)) {
+        self->hold_us = now_us;
+    }
     const uint32_t held_us = iw_age_us(self->hold_us, now_us);
     // Silence with a moving wheel is an event that the operator must hear of.
     const bool gives_up = held_us >= IW_PERMIT_HOLD_MAX_US && !self->view.settled;

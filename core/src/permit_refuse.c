@@ -8,6 +8,10 @@ bool iw_refuse_may_send(const iw_config_t *config) {
     return !config->listen_only && config->setpoint_type_set && config->current_role != IW_ROLE_UNSET;
 }
 
+bool iw_refuse_not_followed(iw_cause_t cause) {
+    return cause == IW_CAUSE_WHEEL_BLOCKED || cause == IW_CAUSE_PAIR_DIVERGES;
+}
+
 bool iw_refuse_latched(const iw_permit_t *self) {
     return self->phase >= IW_PHASE_CUT;
 }
@@ -87,11 +91,15 @@ static iw_refusal_t refuse_holder(const iw_permit_t *self, iw_time_us_t sent_us,
 
 iw_refusal_t iw_refuse_drive(const iw_permit_t *self, iw_time_us_t sent_us, iw_client_t client) {
     const bool blocked = self->blocked == client;
+    const bool diverged = self->stop.cause == IW_CAUSE_PAIR_DIVERGES;
     switch (iw_permit_state(self)) {
     case IW_STATE_LATCHED:
         return refuse_latched(refuse_present(self, sent_us));
     case IW_STATE_STOPPING:
-        return blocked ? IW_REFUSE_WHEEL_BLOCKED : IW_REFUSE_NOT_ARMED;
+        if (!blocked) {
+            return IW_REFUSE_NOT_ARMED;
+        }
+        return diverged ? IW_REFUSE_PAIR_DIVERGES : IW_REFUSE_WHEEL_BLOCKED;
     case IW_STATE_ARMED:
         return refuse_holder(self, sent_us, client);
     case IW_STATE_LISTENING:
@@ -108,7 +116,8 @@ iw_refusal_t iw_refuse_reset(const iw_permit_t *self, iw_time_us_t now_us) {
     if (!self->view.heard) {
         return IW_REFUSE_WHEEL_LOST;
     }
-    if (!self->view.at_rest) {
+    // The ramp of one wheel offline goes on in LATCHED, and may end below what counts as rest.
+    if (!self->view.at_rest || !self->view.output_zero) {
         return IW_REFUSE_NOT_AT_REST;
     }
     return stale_command(self, now_us) ? IW_REFUSE_STALE_COMMAND : IW_REFUSE_NONE;

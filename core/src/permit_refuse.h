@@ -9,6 +9,9 @@
 /// True if the configuration allows sending at all.
 bool iw_refuse_may_send(const iw_config_t *config);
 
+/// The wheels did not follow: whoever drove is refused for that until the hold ends.
+bool iw_refuse_not_followed(iw_cause_t cause);
+
 /// The last phases: CUT and LATCHED.
 bool iw_refuse_latched(const iw_permit_t *self);
 

@@ -103,6 +103,8 @@ void iw_gateway_snapshot(const iw_gateway_t *self, iw_time_us_t now_us, iw_snaps
     out_snapshot->target = self->setpoint.target;
     out_snapshot->applied = iw_setpoint_applied(&self->setpoint);
     out_snapshot->output_zero = iw_setpoint_is_zero(&self->setpoint);
+    out_snapshot->pair_mm = self->diverge.path_um / 1000;
+    out_snapshot->pair_largest_mm = self->diverge.largest_um / 1000;
     out_snapshot->bus = self->bus;
     out_snapshot->echo_proven = self->facts.echo_proven;
     out_snapshot->left_behind = self->left_behind;

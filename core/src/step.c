@@ -2,13 +2,14 @@
 #include "iwheel/gateway.h"
 
 #include "magnitude.h"
+#include "watch_pair.h"
 
 /// Details of IW_CAUSE_ESTOP_LINE.
 #define ESTOP_PRESSED    1U
 #define ESTOP_UNREADABLE 2U
 
 static void raise_cause(iw_gateway_t *self, iw_cause_t cause, uint8_t sides, uint32_t detail) {
-    const iw_event_t event = {cause, sides, detail};
+    const iw_event_t event = {cause, sides, detail, IW_REACT_BY_CAUSE};
     iw_permit_raise(&self->permit, &event, self->now_us);
 }
 
@@ -230,8 +231,12 @@ static void watch_silence(iw_gateway_t *self) {
     const uint32_t right_ms = lost_for_ms(self, IW_RIGHT);
     const uint32_t left = (left_ms > 0U) ? IW_SIDES_LEFT : IW_SIDES_NONE;
     const uint32_t right = (right_ms > 0U) ? IW_SIDES_RIGHT : IW_SIDES_NONE;
-    if ((left | right) != IW_SIDES_NONE) {
-        raise_cause(self, IW_CAUSE_WHEEL_LOST, (uint8_t)(left | right), (right_ms > 0U) ? right_ms : left_ms);
+    const uint32_t sides = left | right;
+    // One of them may have been without power for long, and coasts: zero at once would turn the machine around it.
+    const iw_event_t event = {IW_CAUSE_WHEEL_LOST, (uint8_t)sides, (right_ms > 0U) ? right_ms : left_ms,
+                              (sides == IW_SIDES_BOTH) ? IW_REACT_ZERO : IW_REACT_RAMP};
+    if (sides != IW_SIDES_NONE) {
+        iw_permit_raise(&self->permit, &event, self->now_us);
     }
 }
 
@@ -319,6 +324,7 @@ static void judge_wheels(iw_gateway_t *self) {
     // A stalled step neither raises nor clears what is judged by age: the next step on time decides (R7).
     if (self->stalled) {
         iw_permit_keep_present(&self->permit);
+        iw_diverge_restart(&self->diverge, self->now_us);
     } else {
         watch_echo(self);
         if (!heard) { // Who is heard is not lost.
@@ -326,6 +332,7 @@ static void judge_wheels(iw_gateway_t *self) {
         }
         watch_wheel(self, IW_LEFT, applied.wheel[IW_LEFT].speed_mm_s);
         watch_wheel(self, IW_RIGHT, applied.wheel[IW_RIGHT].speed_mm_s);
+        iw_watch_pair(self, heard);
     }
     view->heard = heard;
     view->applied = applied;

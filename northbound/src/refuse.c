@@ -190,16 +190,16 @@ static void say_contradicted(wording_t *self) {
 void iwn_refuse_describe(const iwn_refuse_context_t *context, const iwn_request_t *request, iw_refusal_t refusal,
                          iwn_refusal_t *out_refusal) {
     static void (*const say[IW_REFUSALS])(wording_t * self) = {
-        [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range, [IW_REFUSE_MISSING_FIELD] = say_missing,
-        [IW_REFUSE_NOT_HOLDER] = say_holder,         [IW_REFUSE_BUSY] = say_holder,
-        [IW_REFUSE_NOT_ARMED] = say_not_armed,       [IW_REFUSE_LATCHED] = say_stop,
-        [IW_REFUSE_ESTOP_PRESSED] = say_estop,       [IW_REFUSE_BUS_DOWN] = say_bus_down,
-        [IW_REFUSE_TIMING_MISMATCH] = say_timing,    [IW_REFUSE_WHEEL_LOST] = say_lost,
-        [IW_REFUSE_WHEEL_BLOCKED] = say_stop,        [IW_REFUSE_NOT_AT_REST] = say_not_at_rest,
-        [IW_REFUSE_SEND_STALLED] = say_stalled,      [IW_REFUSE_SECOND_MASTER] = say_second_master,
-        [IW_REFUSE_CAUSE_PRESENT] = say_present,     [IW_REFUSE_TYPE_NOT_SET] = say_type,
-        [IW_REFUSE_STALE_COMMAND] = say_stale,       [IW_REFUSE_LISTEN_ONLY] = say_listen_only,
-        [IW_REFUSE_CONTRADICTED] = say_contradicted,
+        [IW_REFUSE_OUT_OF_RANGE] = say_out_of_range,   [IW_REFUSE_MISSING_FIELD] = say_missing,
+        [IW_REFUSE_NOT_HOLDER] = say_holder,           [IW_REFUSE_BUSY] = say_holder,
+        [IW_REFUSE_NOT_ARMED] = say_not_armed,         [IW_REFUSE_LATCHED] = say_stop,
+        [IW_REFUSE_ESTOP_PRESSED] = say_estop,         [IW_REFUSE_BUS_DOWN] = say_bus_down,
+        [IW_REFUSE_TIMING_MISMATCH] = say_timing,      [IW_REFUSE_WHEEL_LOST] = say_lost,
+        [IW_REFUSE_WHEEL_BLOCKED] = say_stop,          [IW_REFUSE_PAIR_DIVERGES] = say_stop,
+        [IW_REFUSE_NOT_AT_REST] = say_not_at_rest,     [IW_REFUSE_SEND_STALLED] = say_stalled,
+        [IW_REFUSE_SECOND_MASTER] = say_second_master, [IW_REFUSE_CAUSE_PRESENT] = say_present,
+        [IW_REFUSE_TYPE_NOT_SET] = say_type,           [IW_REFUSE_STALE_COMMAND] = say_stale,
+        [IW_REFUSE_LISTEN_ONLY] = say_listen_only,     [IW_REFUSE_CONTRADICTED] = say_contradicted,
     };
     wording_t wording = {context, context->seen, request,
                          iwn_text_begin(out_refusal->message, sizeof out_refusal->message)};

@@ -28,6 +28,7 @@ const char *iwn_cause_name(iw_cause_t cause) {
         [IW_CAUSE_INTERNAL] = "internal",
         [IW_CAUSE_LOOP_LATE] = "loop_late",
         [IW_CAUSE_WHEEL_BLOCKED] = "wheel_blocked",
+        [IW_CAUSE_PAIR_DIVERGES] = "pair_diverges",
         [IW_CAUSE_LEASE_LOST] = "lease_lost",
         [IW_CAUSE_CLIENT_GONE] = "client_gone",
         [IW_CAUSE_CLIENT_STOP] = "client_stop",

@@ -177,6 +177,14 @@ static void write_budget(const iw_snapshot_t *seen, iwn_out_t *json) {
     iwn_out_close(json, '}');
 }
 
+static void write_pair(const iw_snapshot_t *seen, iwn_out_t *json) {
+    iwn_out_open(json, "pair", '{');
+    iwn_out_int(json, "deviation_mm", seen->pair_mm);
+    iwn_out_int(json, "largest_mm", seen->pair_largest_mm);
+    iwn_out_int(json, "limit_mm", seen->config->pair_mm);
+    iwn_out_close(json, '}');
+}
+
 static void write_counters(const iw_snapshot_t *seen, iwn_out_t *json) {
     const iw_counters_t *counters = seen->counters;
     const iw_sent_t *sent = seen->sent;
@@ -211,6 +219,7 @@ void iwn_tell_warnings(const iwn_surroundings_t *around, iwn_out_t *json) {
 
 void iwn_tell_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json) {
     write_budget(seen, json);
+    write_pair(seen, json);
     write_counters(seen, json);
     iwn_out_int(json, "clients", around->clients);
     iwn_out_bool(json, "listen_only", seen->config->listen_only);

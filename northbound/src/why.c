@@ -69,6 +69,9 @@ static const row_t rows[IW_CAUSES] = {
     [IW_CAUSE_OVERSPEED] = {"$w turns faster than told, at $n mm/s",
                             "check radius, gear ratio and slope, then: iwheelctl reset"},
     [IW_CAUSE_WHEEL_BLOCKED] = {"$w blocked: only $n mm/s", "remove what blocks the wheel, then arm again"},
+    [IW_CAUSE_PAIR_DIVERGES] =
+        {"$w does not follow its command: the machine left its path by $n mm, right against left",
+         "check that the wheel turns freely and drives, then arm again"},
 };
 
 static const char *detail_words(const iw_stop_t *stop) {
@@ -129,9 +132,9 @@ static const char *manner(const iw_stop_t *stop) {
         return "nothing was being sent; latched";
     }
     if (stop->latched) {
-        return "zero at once, latched";
+        return stop->at_once ? "zero at once, latched" : "ramped to zero, latched";
     }
-    return (stop->cause == IW_CAUSE_LOOP_LATE || stop->cause == IW_CAUSE_RESTART) ? "zero at once" : "ramped to zero";
+    return stop->at_once ? "zero at once" : "ramped to zero";
 }
 
 /// What was going on.

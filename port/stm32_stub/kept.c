@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "kept.h"
 
+#include <stddef.h>
+#include <string.h>
+
 /// The layout of a payload. What grows is put to the end: an older record has zeros there.
 typedef union {
     struct {
         uint32_t power_ons;
-        uint32_t has_settings;
+        uint32_t flags; ///< HAS_SETTINGS, HAS_PAIR.
         iw_settings_t settings;
         uint32_t has_learnt;
         iw_learnt_t learnt;
@@ -18,9 +21,48 @@ IW_STATIC_ASSERT(sizeof(record_t) == IW_STORE_WORDS * sizeof(uint32_t), a_record
 /// Fewer blank slots, and a start makes room: one for a configuration, one for what is learnt.
 #define ROOM_LEAST 2U
 
+#define HAS_SETTINGS 1U ///< There are settings.
+#define HAS_PAIR     2U ///< The settings have the numbers of the pair; else it is a record of version 0.2.
+
+/// Settings as version 0.2 kept them: without `pair_mm`, `pair_leak_ms` and `wheel_lag_ms`, which came behind
+/// `blocked_ms`.
+#define BEFORE_VALUES 26U
+#define BEFORE_PAIR   ((size_t)IW_CONFIG_BLOCKED - IW_CONFIG_PERIOD + 1U)
+#define PAIR_VALUES   (IW_SETTINGS - BEFORE_VALUES)
+#define BEFORE_BYTES  (BEFORE_VALUES * sizeof(uint16_t))
+/// Of the words of its record: settings, whether something is learnt, and that.
+#define BEFORE_AT     2U
+#define BEFORE_LEARNT (BEFORE_AT + BEFORE_BYTES / sizeof(uint32_t))
+
+/// The same settings, with the defaults of the pair.
+static iw_settings_t from_before(const uint32_t *words) {
+    iw_config_t standard;
+    iw_config_default(&standard);
+    iw_settings_t settings = iw_settings_from(&standard, 0);
+    memcpy(settings.value, words, BEFORE_PAIR * sizeof(uint16_t));
+    memcpy(&settings.value[BEFORE_PAIR + PAIR_VALUES], (const uint8_t *)words + BEFORE_PAIR * sizeof(uint16_t),
+           (BEFORE_VALUES - BEFORE_PAIR) * sizeof(uint16_t));
+    return settings;
+}
+
+/// What a record of version 0.2 holds, in its new places.
+static void convert(record_t *record) {
+    const record_t before = *record;
+    const size_t rest = offsetof(iw_learnt_t, zero);
+    const uint8_t *const learnt = (const uint8_t *)&before.words[BEFORE_LEARNT + 1U];
+    record->is.settings = from_before(&before.words[BEFORE_AT]);
+    record->is.has_learnt = before.words[BEFORE_LEARNT];
+    record->is.learnt.settings = from_before(&before.words[BEFORE_LEARNT + 1U]);
+    memcpy((uint8_t *)&record->is.learnt + rest, learnt + BEFORE_BYTES, sizeof(iw_learnt_t) - rest);
+    record->is.flags |= HAS_PAIR;
+}
+
 static void read(const iw_kept_t *self, record_t *out_record) {
     if (!iw_store_read(&self->store, out_record->words)) {
-        *out_record = (record_t){.words = {0}};
+        *out_record = (record_t){.words = {0}}; // Converted, it has neither settings nor anything learnt.
+    }
+    if ((out_record->is.flags & HAS_PAIR) == 0U) {
+        convert(out_record);
     }
 }
 
@@ -41,7 +83,7 @@ bool iw_kept_settings(const iw_kept_t *self, iw_settings_t *out_settings) {
     iwn_text_t nowhere = iwn_text_begin((char[1]){0}, 1);
     read(self, &record);
     *out_settings = record.is.settings;
-    return record.is.has_settings != 0U && iw_settings_check(out_settings, &nowhere);
+    return (record.is.flags & HAS_SETTINGS) != 0U && iw_settings_check(out_settings, &nowhere);
 }
 
 bool iw_kept_learnt(const iw_kept_t *self, iw_learnt_t *out_learnt) {
@@ -54,7 +96,7 @@ bool iw_kept_learnt(const iw_kept_t *self, iw_learnt_t *out_learnt) {
 bool iw_kept_commit(iw_kept_t *self, const iw_settings_t *settings) {
     record_t record;
     read(self, &record);
-    record.is.has_settings = 1U;
+    record.is.flags |= HAS_SETTINGS;
     record.is.settings = *settings;
     return iw_store_write(&self->store, record.words, false);
 }

@@ -6,10 +6,10 @@
 #include <string.h>
 
 /// Where a number is kept. Those below TYPE are the core's, in the order of iw_config_t.
-enum { TYPE = 18, ROLE, RPM_OF, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, TRACK, SETTINGS_END };
+enum { TYPE = 21, ROLE, RPM_OF, INVERT_LEFT, INVERT_RIGHT, UNIT_LEFT, UNIT_RIGHT, TRACK, SETTINGS_END };
 IW_STATIC_ASSERT(SETTINGS_END == IW_SETTINGS && TYPE == (int)IW_CONFIG_SETPOINT_DLC, numbers_of_the_core_come_first);
 #define FIRST offsetof(iw_config_t, period_ms)
-IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + 17U * sizeof(uint16_t),
+IW_STATIC_ASSERT(offsetof(iw_config_t, setpoint_dlc) == FIRST + 20U * sizeof(uint16_t),
                  the_core_s_numbers_are_side_by_side);
 
 #define UNSET         0xFFFFU
@@ -55,6 +55,9 @@ static const row_t rows[] = {
     {"limits", "follow_mm_s", INDEX(FOLLOW_SPEED), NUMBER, {NULL, NULL}},
     {"limits", "follow_ms", INDEX(FOLLOW), NUMBER, {NULL, NULL}},
     {"limits", "blocked_ms", INDEX(BLOCKED), NUMBER, {NULL, NULL}},
+    {"limits", "pair_mm", INDEX(PAIR), NUMBER, {NULL, NULL}},
+    {"limits", "pair_leak_ms", INDEX(PAIR_LEAK), NUMBER, {NULL, NULL}},
+    {"limits", "wheel_lag_ms", INDEX(WHEEL_LAG), NUMBER, {NULL, NULL}},
 };
 #define ROWS (sizeof rows / sizeof rows[0])
 

@@ -10,7 +10,7 @@
 #include "iwheel_northbound/json_out.h"
 #include "iwheel_northbound/text.h"
 
-#define IW_SETTINGS 26U
+#define IW_SETTINGS 29U
 
 typedef struct {
     uint16_t value[IW_SETTINGS];

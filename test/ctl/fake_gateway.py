@@ -37,6 +37,7 @@ def snapshot(state="listening", **more):
         "ledger": {"setpoint_type": {"state": "assumed", "evidence": "configuration", "figure": None},
                    "current_role": {"state": "assumed", "evidence": "configuration", "figure": None}},
         "budget": {"client_lost_ms": 887, "client_lost_mm": 554, "killed_ms": 1000, "killed_mm": 1000},
+        "pair": {"deviation_mm": 0, "largest_mm": 12, "limit_mm": 60},
         "counters": {}, "clients": 1, "listen_only": False, "shutting_down": False, "warnings": []}
     values.update(more)
     return values

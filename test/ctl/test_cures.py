@@ -239,7 +239,7 @@ class CarriedOut(unittest.TestCase):
         self.rig.sim.ask(fault)
 
     LATCHES = {"wheel_lost": "mute left", "send_stalled": "ack off", "bus_down": "bus down",
-               "second_master": "foreign on", "overspeed": "runaway left on 1000"}
+               "second_master": "foreign on", "overspeed": "runaway both on 1000"}
 
     def test_what_status_says_next_leads_out_of_every_latch(self):
         for cause, fault in self.LATCHES.items():
@@ -279,12 +279,22 @@ class CarriedOut(unittest.TestCase):
             self.run_commands(err)
             self.drives()
 
-    def test_wheel_that_was_blocked_drives_when_it_is_free(self):
+    def test_wheels_that_were_blocked_drive_when_they_are_free(self):
         self.rig.start_gateway()
-        self.drive_into("block left")
+        self.drive_into("block both")
         self.wait_for(lambda s: s["cause"] == "wheel_blocked", "blocked")
         cure = self.next_step()
         self.assertIn("free the wheel, then arm again", self.ctl("status")[1].replace("\n", " ") + cure)
+        self.rig.sim.ask("unblock both")
+        self.wait_for(lambda s: s["state"] == "listening", "rest")
+        self.drives()
+
+    def test_wheel_that_was_blocked_alone_drives_when_it_is_free(self):
+        self.rig.start_gateway()
+        self.drive_into("block left")
+        self.wait_for(lambda s: s["cause"] == "pair_diverges", "the pair diverges")
+        cure = self.next_step()
+        self.assertIn("check that the wheel turns freely and drives, then arm again", self.ctl("status")[1].replace("\n", " ") + cure)
         self.rig.sim.ask("unblock left")
         self.wait_for(lambda s: s["state"] == "listening", "rest")
         self.drives()

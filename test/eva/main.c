@@ -120,6 +120,9 @@ static void any_config(iw_config_t *out_config) {
     out_config->follow_mm_s = any_within(IW_CONFIG_FOLLOW_SPEED);
     out_config->follow_ms = any_within(IW_CONFIG_FOLLOW);
     out_config->blocked_ms = any_within(IW_CONFIG_BLOCKED);
+    out_config->pair_mm = any_within(IW_CONFIG_PAIR);
+    out_config->pair_leak_ms = any_within(IW_CONFIG_PAIR_LEAK);
+    out_config->wheel_lag_ms = any_within(IW_CONFIG_WHEEL_LAG);
     out_config->radius_mm = any_within(IW_CONFIG_RADIUS);
     any_gear(out_config);
     out_config->setpoint_dlc = any_within(IW_CONFIG_SETPOINT_DLC);

@@ -54,6 +54,8 @@ In **virtual time** the processor is infinitely fast, so those figures show what
 the kernel runs on the machine of this run; its timer ticks every 10 ms, and between left and right it may let another process run for
 that long, so that pairs are allowed one tick more than the 5 ms of virtual time.
 
+Row 31, one wheel that does something else than the other, is measured in degrees: [pair.md](pair.md) has the table, before and after.
+
 | # | fault | tests: kernel | tests: local bus | longest gap | stop begins within | old frames |
 |---|---|---|---|---|---|---|
 """

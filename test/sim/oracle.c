@@ -97,6 +97,7 @@ void oracle_step_begin(oracle_t *self, iw_time_us_t now_us, iw_time_us_t promise
     for (size_t side = 0; side < IW_SIDES; side++) {
         oracle_wheel_t *const wheel = &self->wheel[side];
         wheel->tried_now = wheel->accepted_now = false;
+        wheel->before = wheel->speed;
         if (late && wheel->fresh_us != IW_NEVER && wheel->fresh_us >= wheel->excused_us) {
             wheel->excused_us = now_us;
         }
@@ -167,9 +168,8 @@ static void hear_ticks(oracle_t *self, iw_time_us_t now_us, oracle_wheel_t *whee
 /// Any telemetry of a wheel.
 static void hear_wheel(oracle_t *self, iw_time_us_t now_us, size_t side, bool offset) {
     oracle_wheel_t *const wheel = &self->wheel[side];
-    if (wheel->offset_us == IW_NEVER || wheel->reboots != self->gateway->wheel[side].reboots) {
+    if (wheel->offset_us == IW_NEVER) {
         wheel->offset_us = now_us;
-        wheel->reboots = self->gateway->wheel[side].reboots;
     }
     if (offset) {
         self->back_now = self->back_now || now_us - wheel->offset_us >= BACK_US;
@@ -329,7 +329,7 @@ static void judge_state(oracle_t *self, iw_time_us_t now_us, bool zero, int32_t 
         oracle_break(self, now_us, 502, "sent on latching from LISTENING");
     }
     if (state == IW_STATE_LATCHED && self->state == IW_STATE_LATCHED &&
-        (self->latched_silent || oracle_elapsed(now_us, self->latched_us, HOLD_MAX_US + oracle_us(100)))) {
+        (self->latched_silent || oracle_elapsed(now_us, self->held_us, HOLD_MAX_US + oracle_us(100)))) {
         oracle_break(self, now_us, 503, "sent while LATCHED and silent");
     }
     if (self->hard && zero && limit && current != self->config->max_current_mA) {
@@ -460,6 +460,23 @@ static void forget_sent(oracle_t *self, iw_time_us_t now_us) {
     }
 }
 
+/// Latches after the common ramp: one wheel offline, or the pair diverges for the third time.
+static bool latches_with_a_ramp(const oracle_t *self) {
+    const iw_stop_t *const stop = &self->gateway->permit.stop;
+    const bool one = stop->sides == IW_SIDES_LEFT || stop->sides == IW_SIDES_RIGHT;
+    return one && (stop->cause == IW_CAUSE_WHEEL_LOST || stop->cause == IW_CAUSE_PAIR_DIVERGES);
+}
+
+static void begin_latch(oracle_t *self, iw_time_us_t now_us) {
+    self->latched_us = self->held_us = now_us;
+    self->latched_silent = self->state == IW_STATE_LISTENING && !self->was_arming;
+    if (latches_with_a_ramp(self)) {
+        oracle_soft_stop(self, now_us);
+    } else {
+        oracle_hard_stop(self);
+    }
+}
+
 /// The public state changed, or may have: after every step and every request.
 void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(self->gateway);
@@ -469,9 +486,7 @@ void oracle_observe(oracle_t *self, iw_time_us_t now_us) {
         oracle_soft_stop(self, now_us);
     }
     if (state == IW_STATE_LATCHED && self->state != IW_STATE_LATCHED) {
-        self->latched_us = now_us;
-        self->latched_silent = self->state == IW_STATE_LISTENING && !self->was_arming;
-        oracle_hard_stop(self);
+        begin_latch(self, now_us);
     }
     if (state == IW_STATE_STOPPING && self->state != IW_STATE_STOPPING) {
         self->stopped_us = now_us;

@@ -28,7 +28,8 @@ typedef struct {
     uint32_t reboots;       ///< That the gateway knows of.
     int32_t ticks;
     int32_t rpm;
-    int32_t speed; ///< Last handed over, as on the bus.
+    int32_t speed;  ///< Last handed over, as on the bus.
+    int32_t before; ///< The same when this step began: the core judges before it sends.
     int32_t current;
     uint32_t old_on_bus; ///< Nonzero frames on the bus since the last e-stop edge.
     uint8_t pending;
@@ -67,6 +68,9 @@ typedef struct {
     bool latched_silent; ///< Latched while nothing was being sent.
     iw_time_us_t stopped_us;
     iw_time_us_t latched_us;
+    iw_time_us_t held_us; ///< In LATCHED: zeros are held since then, at the latest a period later.
+    iw_time_us_t path_at_us;
+    int64_t path_nm;        ///< How far the pair has left its path, without any lag: right minus left, leaking.
     iw_time_us_t silent_us; ///< Since when zeros are no longer held; IW_NEVER: they are, or it drives.
     uint32_t stops;
 

@@ -8,6 +8,8 @@
 #define SLOW_ECHO_US (20U * MS)
 /// A condition that must last is judged with this much more, for the time between steps.
 #define MARGIN_US (70U * MS)
+/// A step this long after the last one was late: the wheels have not been compared meanwhile.
+#define LATE_STEP_US (60U * MS)
 
 static bool sending_state(iw_state_t state) {
     return state == IW_STATE_ARMED || state == IW_STATE_STOPPING;
@@ -50,6 +52,12 @@ static void judge_reboot(oracle_t *self, iw_time_us_t now_us) {
         oracle_break(self, now_us, 712, "stopped for offset frames that had never stopped");
     }
     self->stops = stop->number;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        oracle_wheel_t *const wheel = &self->wheel[side];
+        // The pause of its offset frames begins anew in the step that finds the reboot, not with the next frame.
+        wheel->offset_us = (wheel->reboots != self->gateway->wheel[side].reboots) ? now_us : wheel->offset_us;
+        wheel->reboots = self->gateway->wheel[side].reboots;
+    }
 }
 
 static bool since(iw_time_us_t *since_us, iw_time_us_t now_us, bool condition, uint32_t span_ms) {
@@ -66,7 +74,8 @@ static void judge_following(oracle_t *self, iw_time_us_t now_us, size_t side, bo
     const int32_t told = wheel->speed;
     const int32_t measured = (int32_t)((int64_t)wheel->rpm * 20106 / 1000);
     const bool against = comparable && abs(told) > 105 && abs(measured) > 105 && (told > 0) != (measured > 0);
-    const bool faster = comparable && abs(measured) - abs(told) > self->config->follow_mm_s + 25;
+    const int32_t most = (abs(told) > abs(wheel->before)) ? abs(told) : abs(wheel->before);
+    const bool faster = comparable && abs(measured) - most > self->config->follow_mm_s + 25;
     const bool blocked = comparable && abs(told) >= 100 && abs(measured) * 5 + 100 < abs(told) &&
                          iw_gateway_state(self->gateway) == IW_STATE_ARMED;
     if (since(&wheel->against_us, now_us, against, 300)) {
@@ -81,8 +90,40 @@ static void judge_following(oracle_t *self, iw_time_us_t now_us, size_t side, bo
     }
 }
 
+/// Beyond any doubt: twice the limit, and what all lags together may come to when both wheels reverse.
+static int64_t far_away_nm(const oracle_t *self) {
+    const int64_t lags_ms = 60 + 2 * (int64_t)self->config->wheel_silent_ms + 2 * (int64_t)self->config->period_ms;
+    return 2 * (int64_t)self->config->pair_mm * 1000000 + 2 * (int64_t)self->config->max_speed_mm_s * lags_ms * 1000;
+}
+
+/// Speeds on the bus, in the machine's frame, by 192 mm as the setpoints.
+static int64_t difference_um_s(const oracle_t *self, size_t side) {
+    const oracle_wheel_t *const wheel = &self->wheel[side];
+    const int64_t away = (int64_t)wheel->rpm * 20106 - (int64_t)wheel->speed * 1000;
+    return self->config->invert[side] ? -away : away;
+}
+
+/// A machine that turns by itself: judged without any lag, so only where it is far away.
+static void judge_pair_path(oracle_t *self, iw_time_us_t now_us, bool comparable) {
+    const int64_t elapsed_us = (int64_t)(now_us - self->path_at_us);
+    self->path_at_us = now_us;
+    if (!comparable || elapsed_us > (int64_t)LATE_STEP_US) {
+        self->path_nm = 0;
+        return;
+    }
+    const int64_t leak_us = (int64_t)self->config->pair_leak_ms * (int64_t)MS;
+    const int64_t away = difference_um_s(self, IW_RIGHT) - difference_um_s(self, IW_LEFT);
+    self->path_nm += away * elapsed_us / 1000 - self->path_nm * elapsed_us / leak_us;
+    if (llabs(self->path_nm) > far_away_nm(self) && iw_gateway_state(self->gateway) == IW_STATE_ARMED) {
+        oracle_break(self, now_us, 713, "still ARMED although the pair left its path by %lld mm",
+                     (long long)(self->path_nm / 1000000));
+    }
+}
+
 static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
     const bool ours = sending_state(iw_gateway_state(self->gateway)) && !self->restarting;
+    unsigned offline = 0;
+    bool comparable = ours && !self->stalled;
     for (size_t side = 0; side < IW_SIDES; side++) {
         oracle_wheel_t *const wheel = &self->wheel[side];
         const iw_time_us_t heard_us =
@@ -91,6 +132,8 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
         const bool silent = now_us - heard_us >= silent_us;
         // Excused is not heard: what it does is known again with its next frame of known age.
         const bool known = wheel->fresh_us != IW_NEVER && !oracle_elapsed(now_us, wheel->fresh_us, silent_us);
+        comparable = comparable && known;
+        offline += silent ? 1U : 0U;
         judge_following(self, now_us, side, ours && known && !self->stalled);
         if (!ours || self->stalled) {
             continue;
@@ -103,6 +146,23 @@ static void judge_wheels(oracle_t *self, iw_time_us_t now_us) {
             oracle_break(self, now_us, 710, "not LATCHED although a frame was not echoed for %llu us",
                          (unsigned long long)(now_us - wheel->waiting[0]));
         }
+    }
+    judge_pair_path(self, now_us, comparable);
+    // One wheel offline may ramp; with both offline nothing but zero may follow.
+    if (offline == IW_SIDES && !self->stalled) {
+        oracle_hard_stop(self);
+    }
+}
+
+/// Zeros are held from the end of the ramp. What is asked is what everybody is told: iw_snapshot_t::output_zero.
+static void note_hold(oracle_t *self, iw_time_us_t now_us) {
+    iw_snapshot_t seen;
+    if (self->state != IW_STATE_LATCHED || self->latched_silent) {
+        return;
+    }
+    iw_gateway_snapshot(self->gateway, now_us, &seen);
+    if (!seen.output_zero) {
+        self->held_us = now_us;
     }
 }
 
@@ -157,9 +217,11 @@ static void watch_silence(oracle_t *self, iw_time_us_t now_us) {
     const iw_state_t state = iw_gateway_state(self->gateway);
     const bool listening = state == IW_STATE_LISTENING && !iw_gateway_arming(self->gateway);
     const bool silent = self->silent_us != IW_NEVER && self->silent_us > self->latched_us;
-    const bool held = oracle_elapsed(now_us, self->latched_us, oracle_us(self->config->zero_hold_ms));
+    const bool ramped = self->held_us != self->latched_us;
+    const iw_time_us_t zeros_us = self->held_us + (ramped ? oracle_us(self->config->period_ms) + SLOW_ECHO_US : 0U);
+    const bool held = now_us > zeros_us && oracle_elapsed(now_us, zeros_us, oracle_us(self->config->zero_hold_ms));
     const bool ended = (held && oracle_rested(self, now_us, SETTLED_US)) ||
-                       oracle_elapsed(now_us, self->latched_us, HOLD_MAX_US + oracle_us(100));
+                       (now_us > zeros_us && oracle_elapsed(now_us, zeros_us, HOLD_MAX_US + oracle_us(100)));
     if (listening || (state == IW_STATE_LATCHED && (self->latched_silent || ended || silent))) {
         self->silent_us = (self->silent_us == IW_NEVER) ? now_us : self->silent_us;
     } else {
@@ -178,6 +240,7 @@ void oracle_step_end(oracle_t *self, iw_time_us_t now_us) {
         oracle_break(self, now_us, 508, "no longer LATCHED although nobody asked for a reset");
     }
     oracle_observe(self, now_us);
+    note_hold(self, now_us);
     watch_silence(self, now_us);
     judge_wheels(self, now_us);
     judge_gaps(self, now_us);

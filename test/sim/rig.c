@@ -43,8 +43,8 @@ void rig_wake(rig_t *rig, iw_time_us_t at_us) {
 
 // ---- faults ------------------------------------------------------------------------------------------------------
 
-static void set_wheel(rig_t *rig, const event_t *event, bool on) {
-    sim_wheel_t *const wheel = &rig->world.pair.wheel[event->who];
+static void set_one(rig_t *rig, const event_t *event, iw_side_t side, bool on) {
+    sim_wheel_t *const wheel = &rig->world.pair.wheel[side];
     sim_motion_advance(&wheel->motion, rig->now_us);
     switch (event->kind) {
     case EV_MUTE:
@@ -62,10 +62,28 @@ static void set_wheel(rig_t *rig, const event_t *event, bool on) {
     case EV_RUNAWAY:
         wheel->motion.runaway_mm_s = on ? (int16_t)event->a : 0;
         break;
+    case EV_FREE:
+        wheel->motion.freewheels = on;
+        break;
+    case EV_DROOP:
+        wheel->motion.droop_permille = on ? (uint16_t)event->a : 0U;
+        break;
+    case EV_LATE:
+        wheel->late_us = on ? (uint32_t)event->a : 0U;
+        break;
     default:
         wheel->force.forced_raw = (on && event->b >= 0) ? event->a : SIM_FORCE_AUTO;
-        wheel->force.unit = (on == (event->who == IW_LEFT)) ? IW_FORCE_DN : IW_FORCE_CN;
+        wheel->force.unit = (on == (side == IW_LEFT)) ? IW_FORCE_DN : IW_FORCE_CN;
         break;
+    }
+}
+
+/// One wheel, or both: then they go straight, and what each of them does is judged.
+static void set_wheel(rig_t *rig, const event_t *event, bool on) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        if (event->who == side || event->who == IW_SIDES) {
+            set_one(rig, event, (iw_side_t)side, on);
+        }
     }
 }
 
@@ -144,6 +162,9 @@ static void switch_fault(rig_t *rig, const event_t *event, bool on) {
     case EV_SWAP:
     case EV_BLOCK:
     case EV_RUNAWAY:
+    case EV_FREE:
+    case EV_DROOP:
+    case EV_LATE:
     case EV_FORCE:
         set_wheel(rig, event, on);
         break;
@@ -474,18 +495,35 @@ const char *rig_cause_name(unsigned cause) {
     static const char *const names[IW_CAUSES] = {
         "none",         "e-stop line",    "software e-stop", "bus down",      "second master",
         "send stalled", "wheel rebooted", "wheel lost",      "feedback sign", "overspeed",
-        "loop hung",    "internal",       "loop late",       "wheel blocked", "lease lost",
-        "client gone",  "client stop",    "shutdown",        "restart",
+        "loop hung",    "internal",       "loop late",       "wheel blocked", "pair diverges",
+        "lease lost",   "client gone",    "client stop",     "shutdown",      "restart",
     };
     return names[cause];
 }
 
 const char *rig_refusal_name(unsigned refusal) {
     static const char *const names[RIG_REFUSALS] = {
-        "ok",          "out of range",   "missing field", "not holder",      "busy",         "not armed",
-        "latched",     "e-stop pressed", "bus down",      "timing mismatch", "wheel lost",   "wheel blocked",
-        "not at rest", "send stalled",   "second master", "cause present",   "type not set", "stale command",
-        "listen only", "contradicted",
+        "ok",
+        "out of range",
+        "missing field",
+        "not holder",
+        "busy",
+        "not armed",
+        "latched",
+        "e-stop pressed",
+        "bus down",
+        "timing mismatch",
+        "wheel lost",
+        "wheel blocked",
+        "pair diverges",
+        "not at rest",
+        "send stalled",
+        "second master",
+        "cause present",
+        "type not set",
+        "stale command",
+        "listen only",
+        "contradicted",
     };
     return names[refusal];
 }

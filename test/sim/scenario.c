@@ -40,9 +40,12 @@ static const draw_t draws[EV_KINDS] = {
     [EV_REBOOT] = {"wheel reboots", 0, 0, 3 * MS, 800 * MS, 2},
     [EV_POWER] = {"wheels without power", 20 * MS, 14 * S, 0, 0, 1},
     [EV_LOSS] = {"wheel loses frames", 100 * MS, 5 * S, 10, 950, 2},
-    [EV_SWAP] = {"wheel reports the wrong sign", 100 * MS, 5 * S, 0, 0, 2},
-    [EV_BLOCK] = {"wheel blocked", 100 * MS, 5 * S, 0, 0, 2},
-    [EV_RUNAWAY] = {"wheel too fast", 100 * MS, 14 * S, 100, 2500, 2},
+    [EV_SWAP] = {"wheel reports the wrong sign", 100 * MS, 5 * S, 0, 0, 3},
+    [EV_BLOCK] = {"wheel blocked", 100 * MS, 5 * S, 0, 0, 3},
+    [EV_RUNAWAY] = {"wheel too fast", 100 * MS, 14 * S, 100, 2500, 3},
+    [EV_FREE] = {"wheel coasts", 100 * MS, 5 * S, 0, 0, 3},
+    [EV_DROOP] = {"wheel slow", 100 * MS, 5 * S, 100, 900, 3},
+    [EV_LATE] = {"wheel late", 100 * MS, 5 * S, 20 * MS, 400 * MS, 3},
     [EV_FORCE] = {"force absurd", 100 * MS, 5 * S, -32768, 32767, 2},
     [EV_LOOP_STALL] = {"loop stalls", 10 * MS, 3 * S, 0, 0, 1},
     [EV_LOOP_SLOW] = {"loop slow", 50 * MS, 2 * S, 500, 150 * MS, 1},
@@ -102,6 +105,9 @@ static void draw_config(scenario_t *self, sim_random_t *random) {
         config->echo_ms = (uint16_t)between(random, 20, 90);
         config->setpoint_dlc = (uint16_t)between(random, 5, 8);
     }
+    // What is slower by so much needs limits to match.
+    config->wheel_lag_ms = (uint16_t)(60U + self->slow_permille * 2U / 1000U);
+    config->pair_mm = (uint16_t)(60U + self->seed % 4U * 30U);
     if (self->slow_permille > 1000U) {
         config->wheel_silent_ms = (uint16_t)between(random, self->slow_permille * 4U / 1000U * 3U, 200);
     } else if (chance(random, 50)) {

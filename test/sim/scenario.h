@@ -38,9 +38,12 @@ typedef enum {
     EV_REBOOT,      ///< Wheel `who` reboots, silent for `a` us.
     EV_POWER,       ///< Both wheels without power for `span`.
     EV_LOSS,        ///< Wheel `who` loses `a` permille for `span`.
-    EV_SWAP,        ///< Wheel `who` reports the wrong sign for `span`.
-    EV_BLOCK,       ///< Wheel `who` cannot turn for `span`.
-    EV_RUNAWAY,     ///< Wheel `who` is faster than told by `a` mm/s for `span`.
+    EV_SWAP,        ///< Wheel `who`, or both (2), reports the wrong sign for `span`.
+    EV_BLOCK,       ///< Wheel `who`, or both, cannot turn for `span`.
+    EV_RUNAWAY,     ///< Wheel `who`, or both, is faster than told by `a` mm/s for `span`.
+    EV_FREE,        ///< Wheel `who`, or both, coasts whatever it is told for `span`.
+    EV_DROOP,       ///< Wheel `who`, or both, stays `a` permille below its command for `span`.
+    EV_LATE,        ///< Wheel `who`, or both, obeys `a` us later for `span`.
     EV_FORCE,       ///< Wheel `who` sends its force in the other unit, or just `a` raw, for `span`.
     EV_LOOP_STALL,  ///< The gateway's process does not run for `span`.
     EV_LOOP_SLOW,   ///< Each wake-up comes up to `a` us late, for `span`.

@@ -46,7 +46,13 @@ static void judge_right_to_move(gateway_judge_t *self, iw_side_t side, int32_t s
     const iw_state_t state = iw_gateway_state(self->gateway);
     const bool grows = abs(speed_mm_s) > abs(before_mm_s) || speed_mm_s * before_mm_s < 0;
     blame(self, self->drive_us == IW_NEVER || self->bus->now_us > last_us, "1: moving too long after the last drive");
-    blame(self, state == IW_STATE_LATCHED || state == IW_STATE_LISTENING, "3: nonzero while latched or listening");
+    const iw_stop_t *const stop = &self->gateway->permit.stop;
+    const bool ramps =
+        stop->cause == IW_CAUSE_PAIR_DIVERGES || (stop->cause == IW_CAUSE_WHEEL_LOST && stop->sides != IW_SIDES_BOTH);
+    blame(self, state == IW_STATE_LISTENING, "3: nonzero while listening");
+    blame(self,
+          state == IW_STATE_LATCHED && (!ramps || self->bus->now_us > stop->at_us + ramp_us + MS(config->period_ms)),
+          "3: nonzero while latched, and no ramp of one wheel offline or of a pair that diverges");
     blame(self, self->no_tail, "2, 7: a ramp tail where zero was due at once");
     blame(self, !self->fresh && grows, "3: motion without a fresh command");
     blame(self, self->pair_broken, "5: nonzero after a broken pair");

@@ -77,6 +77,12 @@ static void advance(gateway_rig_t *self) {
     wheel_send(self, IW_RIGHT);
 }
 
+void gateway_rig_begin_apart(gateway_rig_t *self) {
+    self->config.pair_mm = 150;
+    self->config.pair_leak_ms = 500;
+    gateway_rig_begin(self, false);
+}
+
 void gateway_rig_step(gateway_rig_t *self) {
     const iw_time_us_t late_us = (self->now_us > self->wake_us) ? self->now_us - self->wake_us : 0;
     advance(self);

@@ -85,7 +85,7 @@ void permit_rig_wait(permit_rig_t *self, iw_time_us_t for_us) {
 }
 
 void permit_rig_raise(permit_rig_t *self, iw_cause_t cause) {
-    const iw_event_t event = {cause, IW_SIDES_BOTH, 42};
+    const iw_event_t event = {cause, IW_SIDES_BOTH, 42, IW_REACT_BY_CAUSE};
     iw_permit_raise(&self->permit, &event, self->now_us);
 }
 

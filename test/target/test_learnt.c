@@ -6,6 +6,7 @@
 #include "flash.h"
 #include "kept.h"
 
+#include <stddef.h>
 #include <string.h>
 
 static uint32_t flash[IW_FLASH_PAGES][IW_FLASH_PAGE_WORDS];
@@ -208,6 +209,50 @@ static void test_learnt_last_blank_slot_is_the_configuration_s(void) {
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, erasures, "each start would erase");
 }
 
+/// As version 0.2 wrote it: 26 values, without the three of the pair behind the 14th; then whether something is learnt, and that.
+static void write_as_before(iw_kept_t *kept, const iw_settings_t *settings, const iw_learnt_t *learnt) {
+    uint32_t words[IW_STORE_WORDS] = {7U, (settings != NULL) ? 1U : 0U};
+    uint8_t *const rest = (uint8_t *)&words[2];
+    if (settings != NULL) {
+        memcpy(rest, settings->value, 14U * sizeof(uint16_t));
+        memcpy(rest + 28U, &settings->value[17], 12U * sizeof(uint16_t));
+    }
+    if (learnt != NULL) {
+        words[15] = 1U;
+        memcpy(rest + 56U, learnt->settings.value, 14U * sizeof(uint16_t));
+        memcpy(rest + 84U, &learnt->settings.value[17], 12U * sizeof(uint16_t));
+        memcpy(rest + 108U, learnt->zero, sizeof *learnt - offsetof(iw_learnt_t, zero));
+    }
+    TEST_ASSERT_TRUE(iw_store_write(&kept->store, words, false));
+}
+
+static void test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_pair(void) {
+    const iw_settings_t settings = settings_of("wheels.track_mm", "777");
+    iw_learnt_t learnt = something();
+    iw_settings_t found;
+    iw_learnt_t read;
+    iw_kept_t kept = power_on();
+    write_as_before(&kept, &settings, &learnt);
+    for (unsigned start = 0; start < 2U; start++) { // The second one reads what the first has written anew.
+        kept = power_on();
+        TEST_ASSERT_EQUAL_UINT32(8U + start, kept.power_ons);
+        TEST_ASSERT_TRUE(iw_kept_settings(&kept, &found) && iw_kept_learnt(&kept, &read));
+        TEST_ASSERT_EQUAL_MEMORY(&settings, &found, sizeof found);
+        TEST_ASSERT_EQUAL_MEMORY(&learnt.settings, &read.settings, sizeof read.settings);
+        TEST_ASSERT_EQUAL_MEMORY(learnt.zero, read.zero, sizeof read - offsetof(iw_learnt_t, zero));
+    }
+}
+
+static void test_learnt_record_of_the_version_before_without_settings_has_none(void) {
+    iw_settings_t found;
+    iw_learnt_t read;
+    iw_kept_t kept = power_on();
+    write_as_before(&kept, NULL, NULL);
+    kept = power_on();
+    TEST_ASSERT_FALSE(iw_kept_settings(&kept, &found));
+    TEST_ASSERT_FALSE(iw_kept_learnt(&kept, &read));
+}
+
 /// Commands that were kept from before a power loss quote another number of starts.
 static void test_learnt_every_power_on_is_counted(void) {
     for (uint32_t starts = 1; starts < 20U; starts++) {
@@ -223,6 +268,8 @@ int main(void) {
     RUN_TEST(test_learnt_small_changes_are_not_worth_a_record);
     RUN_TEST(test_learnt_cut_at_any_word_leaves_the_old_or_the_new_and_the_rest_as_it_was);
     RUN_TEST(test_learnt_last_blank_slot_is_the_configuration_s);
+    RUN_TEST(test_learnt_record_of_the_version_before_is_read_with_the_defaults_of_the_pair);
+    RUN_TEST(test_learnt_record_of_the_version_before_without_settings_has_none);
     RUN_TEST(test_learnt_every_power_on_is_counted);
     return UNITY_END();
 }

@@ -30,6 +30,9 @@ static const limit_t limits[] = {
     {offsetof(iw_config_t, follow_mm_s), 50, 5000, IW_CONFIG_FOLLOW_SPEED},
     {offsetof(iw_config_t, follow_ms), 100, 5000, IW_CONFIG_FOLLOW},
     {offsetof(iw_config_t, blocked_ms), 200, 10000, IW_CONFIG_BLOCKED},
+    {offsetof(iw_config_t, pair_mm), 20, 150, IW_CONFIG_PAIR},
+    {offsetof(iw_config_t, pair_leak_ms), 500, 3000, IW_CONFIG_PAIR_LEAK},
+    {offsetof(iw_config_t, wheel_lag_ms), 10, 300, IW_CONFIG_WHEEL_LAG},
     {offsetof(iw_config_t, radius_mm), 20, 500, IW_CONFIG_RADIUS},
     {offsetof(iw_config_t, gear_turns), 1, 1000, IW_CONFIG_GEAR_TURNS},
     {offsetof(iw_config_t, gear_per), 1, 1000, IW_CONFIG_GEAR_PER},
@@ -75,6 +78,9 @@ static void test_default_is_the_documented_one(void) {
     TEST_ASSERT_EQUAL_UINT16(300, config.follow_mm_s);
     TEST_ASSERT_EQUAL_UINT16(500, config.follow_ms);
     TEST_ASSERT_EQUAL_UINT16(1000, config.blocked_ms);
+    TEST_ASSERT_EQUAL_UINT16(60, config.pair_mm);
+    TEST_ASSERT_EQUAL_UINT16(1000, config.pair_leak_ms);
+    TEST_ASSERT_EQUAL_UINT16(60, config.wheel_lag_ms);
     TEST_ASSERT_EQUAL_UINT16(192, config.radius_mm);
     TEST_ASSERT_EQUAL_UINT16(config.gear_per, config.gear_turns);
     TEST_ASSERT_EQUAL_UINT16(5, config.setpoint_dlc);

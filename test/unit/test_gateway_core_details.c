@@ -94,11 +94,12 @@ static void test_gateway_each_odd_frame_is_counted_once_under_one_name(void) {
 }
 
 static void test_gateway_sign_fault_is_evidence_from_the_bus(void) {
+    gateway_rig_begin_apart(&rig);
     gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(600));
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(600));
     rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = -15;
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(500));
+    rig.wheel[IW_LEFT].rpm = -6;
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
     TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_OVERSPEED] == IW_NEVER); // And nothing else.
     const iw_ledger_entry_t *const entry = iw_ledger_entry(&rig.gateway.ledger, IW_LEDGER_FEEDBACK_SIGN_LEFT);
@@ -208,18 +209,19 @@ static void test_gateway_wheel_that_was_away_for_a_second_at_first_has_been_seen
 }
 
 static void test_gateway_silent_wheel_is_not_judged_by_its_old_speed(void) {
+    gateway_rig_begin_apart(&rig);
     gateway_rig_arm(&rig);
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(600));
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(600));
     rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = -15;
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(100));
+    rig.wheel[IW_LEFT].rpm = -6;
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(100));
     rig.wheel[IW_LEFT].mute = true;
     gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(80)); // Excuses the wheel for a moment.
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(40));
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(40));
     rig.wheel[IW_LEFT].mute = false;
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(280));
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(280));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, iw_gateway_state(&rig.gateway));
-    (void)gateway_rig_cruise(&rig, 300, 300, MS(50));
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(50));
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_FEEDBACK_SIGN, rig.gateway.permit.stop.cause);
 }
 

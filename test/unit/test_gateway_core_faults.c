@@ -35,6 +35,19 @@ static void assert_latched(iw_cause_t cause) {
     TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
 }
 
+/// One wheel offline: from 400 mm/s the common ramp takes 267 ms.
+static void assert_latched_with_a_ramp(void) {
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LATCHED, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
+    TEST_ASSERT_FALSE(stop()->at_once);
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_EQUAL_INT(rig.bus.told_mm_s[IW_LEFT], rig.bus.told_mm_s[IW_RIGHT]);
+    gateway_rig_run(&rig, MS(200));
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    gateway_rig_run(&rig, MS(100));
+    assert_latched(IW_CAUSE_WHEEL_LOST);
+}
+
 static void assert_no_motion_until_armed_anew(void) {
     (void)gateway_rig_cruise(&rig, 400, 400, MS(300));
     gateway_rig_run(&rig, MS(1100));
@@ -177,7 +190,7 @@ static void test_gateway_silent_wheel_latches_within_its_limit_and_a_period(void
         (void)gateway_rig_cruise(&rig, 400, 400, MS(45));
         TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
         (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
-        assert_latched(IW_CAUSE_WHEEL_LOST);
+        assert_latched_with_a_ramp();
         TEST_ASSERT_EQUAL_UINT8((side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
         const iw_time_us_t silent_us = stop()->at_us - rig.gateway.wheel[side].heard_us;
         TEST_ASSERT_UINT32_WITHIN(20, 60, stop()->detail);
@@ -215,20 +228,23 @@ static void test_gateway_rebooted_wheel_latches(void) {
 }
 
 static void test_gateway_wheel_against_its_command_latches(void) {
+    gateway_rig_begin_apart(&rig);
     drive_on();
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
     rig.wheel[IW_RIGHT].rpm_fixed = true;
-    rig.wheel[IW_RIGHT].rpm = -10;
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(295));
+    rig.wheel[IW_RIGHT].rpm = -6;
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(295));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(30));
     assert_latched(IW_CAUSE_FEEDBACK_SIGN);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_RIGHT, stop()->sides);
-    TEST_ASSERT_EQUAL_UINT32(201, stop()->detail);
+    TEST_ASSERT_EQUAL_UINT32(120, stop()->detail);
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONTRADICTED, rig.gateway.ledger.entry[IW_LEDGER_FEEDBACK_SIGN_RIGHT].state);
     TEST_ASSERT_EQUAL_INT(IW_LEDGER_CONFIRMED, rig.gateway.ledger.entry[IW_LEDGER_FEEDBACK_SIGN_LEFT].state);
 }
 
 static void test_gateway_overspeeding_wheel_latches(void) {
+    gateway_rig_begin_apart(&rig);
     drive_on();
     rig.wheel[IW_LEFT].rpm_fixed = true;
     rig.wheel[IW_LEFT].rpm = 36;
@@ -240,17 +256,19 @@ static void test_gateway_overspeeding_wheel_latches(void) {
 }
 
 static void test_gateway_blocked_wheel_stops_with_a_ramp_and_no_latch(void) {
+    gateway_rig_begin_apart(&rig);
     drive_on();
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(500));
     rig.wheel[IW_LEFT].rpm_fixed = true;
-    rig.wheel[IW_LEFT].rpm = 3;
-    (void)gateway_rig_cruise(&rig, 400, 400, MS(995));
+    rig.wheel[IW_LEFT].rpm = 1;
+    (void)gateway_rig_cruise(&rig, 120, 120, MS(995));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
-    const iw_refusal_t refusal = gateway_rig_cruise(&rig, 400, 400, MS(60));
+    const iw_refusal_t refusal = gateway_rig_cruise(&rig, 120, 120, MS(60));
     TEST_ASSERT_EQUAL_INT(IW_REFUSE_WHEEL_BLOCKED, refusal);
     TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
     TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_BLOCKED, stop()->cause);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
-    TEST_ASSERT_EQUAL_UINT32(60, stop()->detail);
+    TEST_ASSERT_EQUAL_UINT32(20, stop()->detail);
     TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
 }
 
@@ -319,7 +337,7 @@ static void test_gateway_late_step_neither_fails_nor_refreshes_a_wheel(void) {
     gateway_rig_run(&rig, MS(45));
     TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
     (void)gateway_rig_cruise(&rig, 400, 400, MS(30));
-    assert_latched(IW_CAUSE_WHEEL_LOST);
+    assert_latched_with_a_ramp();
 }
 
 static void test_gateway_backlog_after_a_late_step_is_still_of_unknown_age(void) {

@@ -56,8 +56,28 @@ static void test_log_at_start_names_bus_sockets_estop_and_stop_budget(void) {
     (void)snprintf(line, sizeof line, "stop budget, gateway killed: %u ms and %u mm at full command, then unknown\n",
                    (unsigned)budget.killed_ms, (unsigned)budget.killed_mm);
     assert_line(line);
+    assert_line(
+        "angle budget, zero at once: a wheel blocked 16.2 degrees, slow 18.3, at 4700 mm/s2 assumed, not measured\n");
+    assert_line("angle budget, ramp: a wheel coasting 40.4 degrees, at 700 mm/s2 assumed, not measured; late by 100 ms "
+                "10.6\n");
+    assert_line(
+        "angle budget, unbounded: a wheel running on 106.1 degrees a second; up to 12.5 a second are not noticed\n");
     assert_line("iwheel-gateway: warning: setpoint_type or current_role is not configured: arm will be refused; set "
                 "both under [wheels]\n");
+}
+
+/// A narrower track turns further; a slow machine does not brake but settles, and its quarter may not even be noticed.
+static void test_log_at_start_reckons_angles_with_track_and_speed(void) {
+    config.track_mm = 270;
+    gw_report_start(&config, false, false, &people);
+    assert_line("running on 212.2 degrees a second;");
+    config.track_mm = 540;
+    config.core.max_speed_mm_s = 90;
+    gw_report_start(&config, false, false, &people);
+    assert_line("a wheel blocked 3.7 degrees, slow 7.2,");
+    config.core.decel_mm_s2 = 600;
+    gw_report_start(&config, false, false, &people);
+    assert_line("ramp: a wheel coasting 0.0 degrees");
 }
 
 static void test_log_at_start_is_silent_of_what_is_not(void) {
@@ -97,6 +117,7 @@ static void test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain(vo
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_log_at_start_names_bus_sockets_estop_and_stop_budget);
+    RUN_TEST(test_log_at_start_reckons_angles_with_track_and_speed);
     RUN_TEST(test_log_at_start_is_silent_of_what_is_not);
     RUN_TEST(test_log_passes_a_burst_and_tells_how_many_lines_it_dropped);
     RUN_TEST(test_log_leaves_out_what_is_below_its_level_and_makes_lines_plain);

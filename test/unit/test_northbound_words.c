@@ -23,6 +23,7 @@ static const char *sentence(iw_cause_t cause, uint8_t sides, uint32_t detail) {
     stop.from = IW_STATE_ARMED;
     stop.at_us = 12345678;
     stop.latched = cause < IW_CAUSE_LOOP_LATE;
+    stop.at_once = cause <= IW_CAUSE_LOOP_LATE;
     stop.applied.wheel[IW_LEFT].speed_mm_s = 300;
     stop.applied.wheel[IW_RIGHT].speed_mm_s = -299;
     iwn_why_sentence(&stop, &context, text, sizeof text);
@@ -45,6 +46,27 @@ static void test_why_names_cause_numbers_time_and_cure(void) {
     TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_LOOP_LATE, 0, 130), "held up for 130 ms"));
     TEST_ASSERT_NOT_NULL(
         strstr(sentence(IW_CAUSE_WHEEL_BLOCKED, IW_SIDES_RIGHT, 12), "right wheel blocked: only 12 mm/s"));
+    TEST_ASSERT_NOT_NULL(strstr(sentence(IW_CAUSE_PAIR_DIVERGES, IW_SIDES_LEFT, 61),
+                                "left wheel does not follow its command: the machine left its path by 61 mm"));
+}
+
+static void test_why_says_of_each_stop_whether_it_ramped(void) {
+    iw_stop_t stop;
+    char text[IWN_SENTENCE_SIZE];
+    memset(&stop, 0, sizeof stop);
+    stop.number = 1;
+    stop.cause = IW_CAUSE_WHEEL_LOST;
+    stop.from = IW_STATE_ARMED;
+    stop.latched = true;
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "; ramped to zero, latched at"));
+    stop.cause = IW_CAUSE_PAIR_DIVERGES;
+    stop.latched = false;
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "; ramped to zero at"));
+    stop.at_once = true;
+    iwn_why_sentence(&stop, &context, text, sizeof text);
+    TEST_ASSERT_NOT_NULL(strstr(text, "; zero at once at"));
 }
 
 static void test_why_after_a_crash_does_not_say_what_nobody_knows(void) {
@@ -53,6 +75,7 @@ static void test_why_after_a_crash_does_not_say_what_nobody_knows(void) {
     memset(&stop, 0, sizeof stop);
     stop.number = 1;
     stop.cause = IW_CAUSE_RESTART;
+    stop.at_once = true;
     iwn_why_sentence(&stop, &context, text, sizeof text);
     TEST_ASSERT_EQUAL_STRING("the gateway before this one died while the wheels were armed; zero at once at 0.000 s; "
                              "look for the crash in the log, then arm again",
@@ -156,6 +179,7 @@ static void test_text_of_every_code_point_reads_as_it_was_written(void) {
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_why_names_cause_numbers_time_and_cure);
+    RUN_TEST(test_why_says_of_each_stop_whether_it_ramped);
     RUN_TEST(test_why_after_a_crash_does_not_say_what_nobody_knows);
     RUN_TEST(test_why_has_a_sentence_and_a_name_for_every_cause);
     RUN_TEST(test_why_without_a_stop_says_so);

@@ -47,6 +47,7 @@ static const row_t rows[] = {
     MOVING(IW_CAUSE_LOOP_HUNG),
     {IW_CAUSE_LOOP_LATE, {NOTHING, END_ARMING, CUT, CUT, CUT, NOTHING}},
     {IW_CAUSE_WHEEL_BLOCKED, {NOTHING, END_ARMING, RAMP, NOTHING, NOTHING, NOTHING}},
+    {IW_CAUSE_PAIR_DIVERGES, {NOTHING, END_ARMING, RAMP, NOTHING, NOTHING, NOTHING}},
 };
 #define ROWS (sizeof rows / sizeof rows[0])
 
@@ -183,7 +184,7 @@ static void test_permit_cut_stop_stays_cut_when_a_lesser_cause_follows(void) {
 
 static void test_permit_cause_of_no_wheel_is_told_as_such(void) {
     permit_rig_begin(&rig, PERMIT_ARMED);
-    const iw_event_t lost = {IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, UINT32_MAX};
+    const iw_event_t lost = {IW_CAUSE_WHEEL_LOST, IW_SIDES_RIGHT, UINT32_MAX, IW_REACT_BY_CAUSE};
     iw_permit_raise(&rig.permit, &lost, rig.now_us);
     TEST_ASSERT_EQUAL_UINT8(IW_SIDES_RIGHT, rig.permit.stop.sides);
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, rig.permit.stop.detail);

@@ -249,7 +249,7 @@ static void test_permit_restarted_without_any_wheel_ends_as_well(void) {
 }
 
 static void hear_foreign(uint8_t sides) {
-    const iw_event_t foreign = {IW_CAUSE_SECOND_MASTER, sides, 42};
+    const iw_event_t foreign = {IW_CAUSE_SECOND_MASTER, sides, 42, IW_REACT_BY_CAUSE};
     iw_permit_raise(&rig.permit, &foreign, rig.now_us);
 }
 

@@ -22,15 +22,13 @@ typedef struct {
 
 /// Every field, in the order of the struct.
 static const place_t places[] = {
-    PLACE(at_us),        PLACE(config),         PLACE(counters),        PLACE(sent),
-    PLACE(stop),         PLACE(assumed),        PLACE(seen_us),         PLACES_OF_WHEEL(0),
-    PLACES_OF_WHEEL(1),  PLACE(stopped),        PLACE(stray_echoes),    PLACE(pose_us),
-    PLACE(armed_us),     PLACE(lease_until_us), PLACE(stale_us),        PLACE(waiting_us),
-    PLACE(confirmed_us), PLACE(holder),         PLACE(stale_client),    PLACE(target),
-    PLACE(applied),      PLACE(present),        PLACE(assumed_changes), PLACE(still_moving),
-    PLACE(state),        PLACE(arm_refusal),    PLACE(demand),          PLACE(bus),
-    PLACE(doubt),        PLACE(arming),         PLACE(output_zero),     PLACE(echo_proven),
-    PLACE(left_behind),
+    PLACE(at_us),        PLACE(config),       PLACE(counters),        PLACE(sent),           PLACE(stop),
+    PLACE(assumed),      PLACE(seen_us),      PLACES_OF_WHEEL(0),     PLACES_OF_WHEEL(1),    PLACE(stopped),
+    PLACE(stray_echoes), PLACE(pose_us),      PLACE(armed_us),        PLACE(lease_until_us), PLACE(stale_us),
+    PLACE(waiting_us),   PLACE(confirmed_us), PLACE(holder),          PLACE(stale_client),   PLACE(target),
+    PLACE(applied),      PLACE(present),      PLACE(assumed_changes), PLACE(pair_mm),        PLACE(pair_largest_mm),
+    PLACE(still_moving), PLACE(state),        PLACE(arm_refusal),     PLACE(demand),         PLACE(bus),
+    PLACE(doubt),        PLACE(arming),       PLACE(output_zero),     PLACE(echo_proven),    PLACE(left_behind),
 };
 #define PLACES (sizeof places / sizeof places[0])
 
@@ -77,6 +75,8 @@ static void assert_permit(const iw_snapshot_t *seen, iw_time_us_t now_us) {
     TEST_ASSERT_EQUAL_UINT32(permit->stale_client, seen->stale_client);
     TEST_ASSERT_EQUAL_HEX32(iw_permit_present(permit, now_us), seen->present);
     TEST_ASSERT_EQUAL_UINT32(permit->still_moving, seen->still_moving);
+    TEST_ASSERT_EQUAL_INT32(rig.gateway.diverge.path_um / 1000, seen->pair_mm);
+    TEST_ASSERT_EQUAL_INT32(rig.gateway.diverge.largest_um / 1000, seen->pair_largest_mm);
     TEST_ASSERT_EQUAL_INT(iw_permit_state(permit), seen->state);
     TEST_ASSERT_EQUAL_INT(permit->arm_refusal, seen->arm_refusal);
     TEST_ASSERT_EQUAL_INT(iw_permit_arming(permit), seen->arming);
@@ -356,12 +356,16 @@ static void test_snapshot_every_count_of_sending_is_its_own(void) {
     rig.gateway.sender.envelope.stopped = 103;
     rig.gateway.sender.confirmation.stray = 104;
     rig.gateway.permit.still_moving = 105;
+    rig.gateway.diverge.path_um = -1006999;
+    rig.gateway.diverge.largest_um = 1006999;
     const iw_snapshot_t seen = look();
     TEST_ASSERT_EQUAL_UINT32(101, seen.sent->later);
     TEST_ASSERT_EQUAL_UINT32(102, seen.sent->clamped);
     TEST_ASSERT_EQUAL_UINT32(103, seen.stopped);
     TEST_ASSERT_EQUAL_UINT32(104, seen.stray_echoes);
     TEST_ASSERT_EQUAL_UINT32(105, seen.still_moving);
+    TEST_ASSERT_EQUAL_INT32(-1006, seen.pair_mm);
+    TEST_ASSERT_EQUAL_INT32(1006, seen.pair_largest_mm);
 }
 
 int main(void) {

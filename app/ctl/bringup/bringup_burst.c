@@ -169,13 +169,19 @@ static bool ran_away(run_t *run, const json_t *why) {
     return true;
 }
 
+/// One wheel did not do what it was told, and the gateway stopped both: in the air that is a finding like any other.
+static bool diverged(const run_t *run, const json_t *why) {
+    return json_integer_value(json_object_get(why, "number")) > run->stops &&
+           strcmp(text_word(why, "cause"), "pair_diverges") == 0;
+}
+
 /// Whether it was our own stop that ended it, and whether there was something to end: that a wheel did not turn means
 /// nothing unless it was told to.
 static burst_end_t judge(run_t *run, burst_end_t end) {
     json_t *why = near_ask(run->bringup->ctl, json_pack("{s:s}", "cmd", "why"));
     const bool ours = json_integer_value(json_object_get(why, "number")) == run->stops + 1 &&
                       strcmp(text_word(why, "cause"), "client_stop") == 0;
-    if ((end == BURST_DONE || end == BURST_STOPPED) && ran_away(run, why)) {
+    if ((end == BURST_DONE || end == BURST_STOPPED) && (ran_away(run, why) || diverged(run, why))) {
         end = BURST_DONE;
     } else if (end == BURST_STOPPED || (end == BURST_DONE && !ours)) {
         end = fail(run, BURST_STOPPED, text_word(why, "sentence"));

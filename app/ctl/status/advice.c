@@ -26,6 +26,7 @@ static const cure_t cures[] = {
     {"internal", "a fault of the gateway itself: keep its log and report it"},
     {"loop_late", "the gateway got the processor late; lighten the machine's load"},
     {"wheel_blocked", "free the wheel, then arm again"},
+    {"pair_diverges", "check that the wheel turns freely and drives, then arm again"},
     {"lease_lost", "the client must send drive commands more often, or raise lease_ms"},
 };
 

@@ -245,6 +245,19 @@ static void draw_budget(const paper_t *paper, const json_t *budget) {
     }
 }
 
+/// How close the last drive, or this one, came to a stop. A gateway from before does not know.
+static void draw_pair(const paper_t *paper, const json_t *pair) {
+    char largest[TEXT_CELL];
+    char limit[TEXT_CELL];
+    if (json_is_object(pair)) {
+        text_integer(get(pair, "largest_mm"), "mm", largest);
+        text_integer(get(pair, "limit_mm"), "mm", limit);
+        paper_label(paper, "PAIR");
+        paper_say(paper, TONE_PLAIN, "largest deviation of the last drive: %s; it stops at %s", largest, limit);
+        paper_end(paper);
+    }
+}
+
 static void draw_warnings(const paper_t *paper, const json_t *warnings) {
     size_t index = 0;
     const json_t *warning = NULL;
@@ -266,6 +279,7 @@ static void draw(const json_t *status, const json_t *why) {
     paper_end(&paper);
     draw_pose(&paper, get(status, "pose"));
     draw_budget(&paper, get(status, "budget"));
+    draw_pair(&paper, json_object_get(status, "pair"));
     draw_contradictions(&paper, json_object_get(status, "ledger"));
     draw_ledger(&paper, json_object_get(status, "ledger"), "confirmed", TONE_GOOD);
     draw_ledger(&paper, json_object_get(status, "ledger"), "assumed", TONE_PLAIN);

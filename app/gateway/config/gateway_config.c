@@ -130,6 +130,12 @@ static const settings_key_t keys[] = {
     {"limits", "follow_ms", " ms", "... for this long latches.", CORE(follow_ms, IW_CONFIG_FOLLOW)},
     {"limits", "blocked_ms", " ms", "A wheel below 20 % of its command for this long stops the pair.",
      CORE(blocked_ms, IW_CONFIG_BLOCKED)},
+    {"limits", "pair_mm", " mm", "The pair stops when it leaves its commanded path by this, right wheel against left.",
+     CORE(pair_mm, IW_CONFIG_PAIR)},
+    {"limits", "pair_leak_ms", " ms", "An older deviation counts less and less, with this time constant.",
+     CORE(pair_leak_ms, IW_CONFIG_PAIR_LEAK)},
+    {"limits", "wheel_lag_ms", " ms", "A wheel follows its setpoint with this time constant.",
+     CORE(wheel_lag_ms, IW_CONFIG_WHEEL_LAG)},
 
     {"estop", "line", "", "gpiod line name, gpiochipN:OFFSET, unix:PATH (the simulator's button), or none.",
      TEXT(estop.line, settings_wrong_address)},

@@ -1,10 +1,28 @@
 // SPDX-License-Identifier: MIT
 #include "report.h"
 
+#include "angles.h"
 #include "config/gateway_config.h"
 #include "process/log.h"
 
 #include <inttypes.h>
+
+#define TENTHS(value) (value) / 10U, (value) % 10U
+
+/// What one wheel alone may do to the machine: every figure with what it assumes.
+static void report_angles(const gateway_config_t *config, gw_log_t *log) {
+    const gw_angles_t angles = gw_angles(config);
+    gw_log(log, GW_LOG_INFO,
+           "angle budget, zero at once: a wheel blocked %u.%u degrees, slow %u.%u, at %u mm/s2 assumed, not measured",
+           TENTHS(angles.blocked), TENTHS(angles.slow), GW_ANGLES_BRAKE_MM_S2);
+    gw_log(
+        log, GW_LOG_INFO,
+        "angle budget, ramp: a wheel coasting %u.%u degrees, at %u mm/s2 assumed, not measured; late by 100 ms %u.%u",
+        TENTHS(angles.coasting), GW_ANGLES_COAST_MM_S2, TENTHS(angles.late));
+    gw_log(log, GW_LOG_INFO,
+           "angle budget, unbounded: a wheel running on %u.%u degrees a second; up to %u.%u a second are not noticed",
+           TENTHS(angles.runs_on), TENTHS(angles.unnoticed));
+}
 
 void gw_report_start(const gateway_config_t *config, bool simulated, bool watched, gw_log_t *log) {
     const iw_stop_budget_t budget = iw_config_stop_budget(&config->core);
@@ -19,6 +37,7 @@ void gw_report_start(const gateway_config_t *config, bool simulated, bool watche
     gw_log(log, GW_LOG_INFO,
            "stop budget, gateway killed: %" PRIu32 " ms and %" PRIu32 " mm at full command, then unknown",
            budget.killed_ms, budget.killed_mm);
+    report_angles(config, log);
     if (!config->core.setpoint_type_set || config->core.current_role == IW_ROLE_UNSET) {
         gw_log(log, GW_LOG_WARNING,
                "setpoint_type or current_role is not configured: arm will be refused; set both under [wheels]");

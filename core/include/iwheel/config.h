@@ -32,6 +32,9 @@ typedef struct {
     uint16_t follow_mm_s;     ///< A wheel faster than applied by this, 50..5000 ...
     uint16_t follow_ms;       ///< ... for this long, 100..5000, latches.
     uint16_t blocked_ms;      ///< A wheel below 20 % of its command for this long, 200..10000, stops the pair.
+    uint16_t pair_mm;         ///< So far may the pair leave its path, right minus left, 20..150 ...
+    uint16_t pair_leak_ms;    ///< ... within about this time, 500..3000. Then it stops.
+    uint16_t wheel_lag_ms;    ///< Time constant with which a wheel follows its setpoint, 10..300.
     uint16_t radius_mm;       ///< Of the wheel, 20..500; the document says "approximately 192".
     uint16_t gear_turns;      ///< Rotor turns in `gear_per` wheel turns, 1..1000.
     uint16_t gear_per;        ///< 1..1000. Together the ratio must lie within 1..100.
@@ -65,6 +68,9 @@ typedef enum {
     IW_CONFIG_FOLLOW_SPEED,
     IW_CONFIG_FOLLOW,
     IW_CONFIG_BLOCKED,
+    IW_CONFIG_PAIR,
+    IW_CONFIG_PAIR_LEAK,
+    IW_CONFIG_WHEEL_LAG,
     IW_CONFIG_RADIUS,
     IW_CONFIG_GEAR_TURNS,
     IW_CONFIG_GEAR_PER,

@@ -11,7 +11,7 @@
 ///
 /// Size: docs/sizes.md. No heap, no floating point, no file-scope state.
 ///
-/// R1 to R13 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
+/// R1 to R14 in the core's comments are the rules of docs/safety-case.md, fault numbers the rows of its catalogue.
 #ifndef IW_GATEWAY_H
 #define IW_GATEWAY_H
 
@@ -19,6 +19,7 @@
 #include "iwheel/config.h"
 #include "iwheel/force_offset.h"
 #include "iwheel/hal.h"
+#include "iwheel/private/diverge.h"
 #include "iwheel/private/follow.h"
 #include "iwheel/private/ledger.h"
 #include "iwheel/private/permit.h"
@@ -83,6 +84,7 @@ typedef struct iw_gateway {
     iw_sender_t sender;              ///< How a pair gets to the bus.
     iw_wheel_t wheel[IW_SIDES];      ///< What is known of each wheel.
     iw_follow_t follow[IW_SIDES];    ///< Whether it does as told.
+    iw_diverge_t diverge;            ///< Whether both together do.
     iw_codec_wheel_t told[IW_SIDES]; ///< Each wheel's last telemetry, message by message.
     iw_force_t force[IW_SIDES];      ///< Its normal force.
     iw_ledger_t ledger;              ///< What is assumed of the wheels.

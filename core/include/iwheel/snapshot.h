@@ -76,6 +76,8 @@ typedef struct {
     /// Bit per latching cause that is there now, or happened less than a second ago: reset is refused.
     uint32_t present;
     uint32_t assumed_changes; ///< Grows with every change of what is assumed.
+    int32_t pair_mm;          ///< How far the pair has left its path, right against left; positive: to the left.
+    int32_t pair_largest_mm;  ///< The largest of it, either way, since ARMED began last.
     uint32_t still_moving;    ///< Holds that ended by their longest time with a wheel not at rest.
     iw_state_t state;         ///< What a client is told.
     iw_refusal_t arm_refusal; ///< Why the last arming failed.

@@ -98,6 +98,7 @@ typedef enum {
     IW_CAUSE_INTERNAL,       ///< An internal check failed. Detail: an iw_envelope_verdict_t.
     IW_CAUSE_LOOP_LATE,      ///< Late by 100 to 500 ms: zero without ramp. Detail: ms.
     IW_CAUSE_WHEEL_BLOCKED,  ///< Below 20 % of its command. Detail: |measured| mm/s.
+    IW_CAUSE_PAIR_DIVERGES,  ///< The pair leaves its path. Detail: by so many mm, right against left.
     IW_CAUSE_LEASE_LOST,     ///< The holder sent no drive command in time. Detail: ms since its last one, or since arm.
     IW_CAUSE_CLIENT_GONE,    ///< The holder disconnected. Detail: 0.
     IW_CAUSE_CLIENT_STOP,    ///< A client said stop or disarm. Detail: 0.
@@ -126,6 +127,7 @@ typedef enum {
     IW_REFUSE_TIMING_MISMATCH,
     IW_REFUSE_WHEEL_LOST,
     IW_REFUSE_WHEEL_BLOCKED,
+    IW_REFUSE_PAIR_DIVERGES,
     IW_REFUSE_NOT_AT_REST,
     IW_REFUSE_SEND_STALLED,
     IW_REFUSE_SECOND_MASTER,
@@ -148,6 +150,7 @@ typedef struct {
     iw_state_t from;    ///< The state that it ended.
     uint8_t sides;      ///< Which wheel the cause speaks of: IW_SIDES_...
     bool latched;       ///< It needs a reset.
+    bool at_once;       ///< Zero without a ramp.
 } iw_stop_t;
 
 /// What the document leaves open, and is therefore assumed until it is found out.

@@ -75,7 +75,7 @@ typedef struct {
 /// ledger, memory and gaps.
 void iwn_tell_machine(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
 
-/// The last part of a status: stop budget, counters, clients and warnings.
+/// The last part of a status: stop budget, deviation of the pair, counters, clients and warnings.
 void iwn_tell_rest(const iw_snapshot_t *seen, const iwn_surroundings_t *around, iwn_out_t *json);
 
 /// Time, and forces of both wheels: the event `force`.

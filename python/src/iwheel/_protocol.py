@@ -46,6 +46,7 @@ Cause = Literal[
     "internal",
     "loop_late",
     "wheel_blocked",
+    "pair_diverges",
     "lease_lost",
     "client_gone",
     "client_stop",
@@ -268,6 +269,17 @@ class Budget(TypedDict):
     killed_mm: int
 
 
+class Pair(TypedDict):
+    """How far the pair is from its commanded path, right wheel against left, in mm of the wheels' firmware (radius 192). What is ordinary does not count."""
+
+    deviation_mm: int
+    """now; positive: it turns to the left of its path"""
+    largest_mm: int
+    """of this drive, or of the last one, either way"""
+    limit_mm: int
+    """pair_mm: there it stops"""
+
+
 class Counters(TypedDict):
     """Of the bus and the loop, since the gateway's start."""
 
@@ -316,6 +328,7 @@ class Status(TypedDict):
     memory: Memory
     gaps: Gaps
     budget: Budget
+    pair: Pair
     counters: Counters
     clients: int
     listen_only: bool

@@ -65,16 +65,17 @@ def confirm_how_and_track(t):
 
 @scenario("a wheel against its command: contradicted, and no arm until the operator says so", 7)
 def contradicted_sign_refuses_arm(t):
-    rig, client, _ = fault_while_driving(t, "sign right swapped", "feedback_sign", 420, side="right")
-    rig.sim.ask("sign right normal")
+    rig, client, _ = fault_while_driving(t, "sign both swapped", "feedback_sign", 420)
+    rig.sim.ask("sign both normal")
     wait_reset(t, client)
-    entry = client.request("status")["ledger"]["feedback_sign_right"]
+    # The left one is judged first, and its stop is the end of the comparison.
+    entry = client.request("status")["ledger"]["feedback_sign_left"]
     t.check(
         entry["state"] == "contradicted" and entry["figure"] < 0 and "measured -" in entry["reason"],
         f"contradicted by the bus: {entry}",
     )
     t.expect(client.arm(), "denied")
-    t.expect(client.request("confirm", item="feedback_sign_right"))
+    t.expect(client.request("confirm", item="feedback_sign_left"))
     t.arm(client)
     t.drive_for(client, 150, 150, 0.3)
     t.judge(rig)

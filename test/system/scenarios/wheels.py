@@ -31,7 +31,7 @@ def fault_while_driving(t, command, cause, within_ms, speed=400, **expected):
 
 @scenario("left wheel silent", 6)
 def row22_left_silent(t):
-    rig, client, _ = fault_while_driving(t, "mute left", "wheel_lost", 80, side="left")
+    rig, client, _ = fault_while_driving(t, "mute left", "wheel_lost", 80, kind="ramp", side="left")
     t.check(not client.request("reset")["ok"], "no reset while it is silent")
     rig.sim.ask("unmute left")
     wait_reset(t, client)
@@ -48,30 +48,80 @@ def row22_both_silent(t):
     t.judge(rig)
 
 
-@scenario("feedback with the wrong sign", 6)
+@scenario("both wheels' feedback with the wrong sign", 6)
 def row22_sign_swapped(t):
-    rig, client, _ = fault_while_driving(t, "sign right swapped", "feedback_sign", 420, side="right")
-    rig.sim.ask("sign right normal")
+    rig, client, _ = fault_while_driving(t, "sign both swapped", "feedback_sign", 420)
+    rig.sim.ask("sign both normal")
     wait_reset(t, client)
     t.judge(rig)
 
 
-@scenario("a wheel faster than told", 6)
+@scenario("both wheels faster than told", 6)
 def row22_overspeed(t):
-    rig, client, _ = fault_while_driving(t, "runaway left on", "overspeed", 3000, side="left")
-    t.check(not client.request("reset")["ok"], "no reset while it turns")
-    rig.sim.ask("runaway left off")
+    rig, client, _ = fault_while_driving(t, "runaway both on", "overspeed", 3000)
+    t.check(not client.request("reset")["ok"], "no reset while they turn")
+    rig.sim.ask("runaway both off")
     wait_reset(t, client, 8)
     t.judge(rig)
 
 
-@scenario("a blocked wheel: ramp, not latched", 7)
+@scenario("both wheels blocked: ramp, not latched", 7)
 def row22_blocked(t):
-    rig, client, _ = fault_while_driving(
-        t, "block right", "wheel_blocked", 1600, kind="ramp", state="stopping", side="right"
-    )
-    rig.sim.ask("unblock right")
+    rig, client, _ = fault_while_driving(t, "block both", "wheel_blocked", 1600, kind="ramp", state="stopping")
+    rig.sim.ask("unblock both")
     t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening again without reset")
+    t.judge(rig)
+
+
+def alone(t, fault, cure, within_ms, kind):
+    """The right wheel alone does something else: the pair stops, and does not latch."""
+    rig, client, why = fault_while_driving(
+        t, fault, "pair_diverges", within_ms, kind=kind, state="stopping", side="right"
+    )
+    rig.sim.ask(cure)
+    largest = client.request("status")["pair"]
+    t.check(largest["largest_mm"] >= largest["limit_mm"], f"the deviation is told: {largest}, {why['sentence']}")
+    t.figure(f"{why['detail']} mm from its path")
+    t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening again without reset")
+    t.judge(rig)
+
+
+@scenario("one wheel blocked: zero at once, not latched", 7)
+def row31_blocked(t):
+    alone(t, "block right", "unblock right", 300, "cut")
+
+
+@scenario("one wheel reversed: zero at once, not latched", 7)
+def row31_reversed(t):
+    alone(t, "sign right swapped", "sign right normal", 300, "cut")
+
+
+@scenario("one wheel slow: zero at once, not latched", 7)
+def row31_slow(t):
+    alone(t, "droop right 70", "droop right 0", 500, "cut")
+
+
+@scenario("one wheel faster than told: ramp, not latched", 7)
+def row31_fast(t):
+    alone(t, "runaway right on 250", "runaway right off", 800, "ramp")
+
+
+@scenario("the third divergence within a minute latches", 14)
+def row31_third_latches(t):
+    rig, client = t.running()
+    for attempt in range(3):
+        t.arm(client)
+        stream = Streamer(client, 300, 300)
+        time.sleep(0.7)
+        rig.fault("block left", within_ms=300)
+        time.sleep(0.5)
+        stream.stop()
+        state = client.request("status")["state"]
+        t.check(state == ("latched" if attempt == 2 else "stopping"), f"stop {attempt + 1}: {state}")
+        rig.sim.ask("unblock left")
+        if attempt < 2:
+            t.check(rig.wait_status(client, lambda s: s["state"] == "listening", 4), "listening without reset")
+    wait_reset(t, client)
     t.judge(rig)
 
 
@@ -81,7 +131,7 @@ def trap07_reboot_while_driving(t):
     t.arm(client)
     stream = Streamer(client, 300, 300)
     time.sleep(0.9)
-    rig.fault("reboot right", within_ms=80)
+    rig.fault("reboot right", "ramp", within_ms=80)  # Silent at first: one wheel offline.
     time.sleep(0.4)
     stream.stop()
     status = client.request("status")

@@ -54,11 +54,11 @@ class Machine:
         cpu = self.cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         cpu.ctl_set_cpu_model(self.board.cpu_model)
         kept = range(self.board.flash.base & ~0xFFF, self.board.flash.base + self.board.flash.size) # map_flash has these.
-        assert 0x08000000 + len(self.image) <= kept.start, "the image reaches into what is kept"
+        assert 0x08000000 + len(self.image) <= self.board.flash.base, "the image reaches into what is kept"
         cpu.mem_map(0x08000000, kept.start - 0x08000000)
         cpu.mem_map(kept.stop, 0x08100000 - kept.stop)
         cpu.mem_map(0x20000000, self.board.ram_size)
-        cpu.mem_write(0x08000000, self.image)
+        cpu.mem_write(0x08000000, self.image[:kept.start - 0x08000000]) # Its end, texts and no code, may share a page with what is kept: map_flash.
         cpu.mem_write(ENDLESS, bytes((0xFE, 0xE7)))
         cpu.mem_write(0x20000000, bytes([self.POISON]) * self.board.ram_size)
         cpu.mem_map(0x1FFF0000, 0x10000) # What the maker wrote: the chip's own number.
@@ -308,8 +308,15 @@ class Machine:
         return 0
 
     def map_flash(self, flash):
-        """The pages of the flash that the image writes. The rest of the first one's page of the emulator's is empty."""
+        """The pages of the flash that the image writes. The rest of the first one's page of the emulator's has the end of the image, if it is
+        that long: it can be read, but not executed."""
         base = flash.base & ~0xFFF
+        before = self.image[base - 0x08000000:].ljust(flash.base - base, b"\xFF")
+
+        def fetch(address, size):
+            if address >= flash.base:
+                return flash.fetch(address, size)
+            return int.from_bytes(before[address - base:address - base + size], "little")
 
         def guard(function, *arguments):
             try:
@@ -317,7 +324,7 @@ class Machine:
             except Exception as error:
                 return self.fail(error)
 
-        callbacks = (MMIO_READ_CFUNC(lambda _, offset, size, __: guard(flash.fetch, base + offset, size)),
+        callbacks = (MMIO_READ_CFUNC(lambda _, offset, size, __: guard(fetch, base + offset, size)),
                      MMIO_WRITE_CFUNC(lambda _, offset, size, value, __: guard(flash.program, base + offset, size, value) or 0))
         self.callbacks += callbacks
         status = uclib.uc_mmio_map(self.cpu._uch, base, flash.base + flash.size - base, *(pair for function in callbacks

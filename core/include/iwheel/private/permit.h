@@ -49,10 +49,13 @@ typedef enum {
     IW_PHASE_BRAKING,       ///< Ramp to zero, or zero at once.
     IW_PHASE_HOLDING,       ///< Zeros are held until the wheels stand.
     IW_PHASE_RESTARTING,    ///< Zeros for a process that died.
-    IW_PHASE_CUT,           ///< Latched; zeros at once, held.
+    IW_PHASE_CUT,           ///< Latched; zeros, held. At once, but for one wheel offline.
     IW_PHASE_LATCHED,       ///< Latched; silent.
     IW_PHASES,
 } iw_phase_t;
+
+/// The third stop because the pair diverged within this time latches.
+#define IW_PERMIT_DIVERGED_US 60000000U
 
 /// What the owner knows at this step.
 typedef struct {
@@ -68,34 +71,43 @@ typedef struct {
 
 /// Phase, lease, causes and the last stop. What is short stands first: a Cortex-M reaches it by shorter instructions.
 typedef struct {
-    const iw_config_t *config;   ///< The owner's.
-    iw_phase_t phase;            ///< The state of the diagram.
-    iw_refusal_t arm_refusal;    ///< Why the last arming failed.
-    uint8_t strangers;           ///< Setpoints of other senders counted in RESTARTING.
-    bool quiet;                  ///< No latching cause is there or happened lately: nothing to look for.
-    bool at_once;                ///< BRAKING and what follows: zero without ramp.
-    iw_permit_view_t view;       ///< Of the last step, by the owner: requests are judged by it.
-    iw_client_t stale_client;    ///< Who sent the last nonzero drive.
-    iw_client_t holder;          ///< Of the lease; IW_CLIENT_NONE: nobody.
-    iw_client_t blocked;         ///< Whose wheels were blocked when they stopped: refused as such until the hold ends.
-    uint32_t raised;             ///< Bit per cause: raised since the last step.
-    uint32_t present;            ///< Bit per cause: raised in the step before.
-    uint32_t still_moving;       ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
-    iw_time_us_t armed_us;       ///< When ARMED began or the lease was taken over: only later commands are fresh.
-    iw_time_us_t lease_from_us;  ///< The last accepted drive command, or arm.
-    iw_time_us_t lease_until_us; ///< Without another one the lease ends here.
-    iw_time_us_t arming_us;      ///< When ARMING or REARMING began.
-    iw_time_us_t hold_us;        ///< When the zeros that are held began; IW_NEVER: not since the last stop.
-    iw_time_us_t stale_us;       ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
-    iw_stop_t stop;              ///< A record: nothing is decided by it.
+    const iw_config_t *config;  ///< The owner's.
+    iw_phase_t phase;           ///< The state of the diagram.
+    iw_refusal_t arm_refusal;   ///< Why the last arming failed.
+    uint8_t strangers;          ///< Setpoints of other senders counted in RESTARTING.
+    bool quiet;                 ///< No latching cause is there or happened lately: nothing to look for.
+    bool at_once;               ///< BRAKING, CUT and what follows: zero without ramp.
+    iw_permit_view_t view;      ///< Of the last step, by the owner: requests are judged by it.
+    iw_client_t stale_client;   ///< Who sent the last nonzero drive.
+    iw_client_t holder;         ///< Of the lease; IW_CLIENT_NONE: nobody.
+    iw_client_t blocked;        ///< Whose wheels did not follow when they stopped: refused as such until the hold ends.
+    uint32_t raised;            ///< Bit per cause: raised since the last step.
+    uint32_t present;           ///< Bit per cause: raised in the step before.
+    uint32_t still_moving;      ///< Holds that ended by IW_PERMIT_HOLD_MAX_US with a wheel not at rest.
+    iw_time_us_t armed_us;      ///< When ARMED began or the lease was taken over: only later commands are fresh.
+    iw_time_us_t lease_from_us; ///< The last accepted drive command, or arm.
+    iw_time_us_t lease_until_us;     ///< Without another one the lease ends here.
+    iw_time_us_t arming_us;          ///< When ARMING or REARMING began.
+    iw_time_us_t hold_us;            ///< When the zeros that are held began; IW_NEVER: not since the last stop.
+    iw_time_us_t stale_us;           ///< The last well-formed nonzero drive of anybody; IW_NEVER: none.
+    iw_time_us_t diverged_us[2];     ///< When the pair diverged last, and before that; IW_NEVER: never.
+    iw_stop_t stop;                  ///< A record: nothing is decided by it.
     iw_time_us_t seen_us[IW_CAUSES]; ///< When each cause was last seen; IW_NEVER: never.
 } iw_permit_t;
+
+/// Whether a stop ramps.
+typedef enum {
+    IW_REACT_BY_CAUSE = 0, ///< As its cause always does.
+    IW_REACT_RAMP,         ///< Common ramp.
+    IW_REACT_ZERO,         ///< Zero at once.
+} iw_react_t;
 
 /// A cause of a stop, and what is told of it.
 typedef struct {
     iw_cause_t cause; ///< What is there, or has just happened.
     uint8_t sides;    ///< Which wheel it speaks of: IW_SIDES_...
     uint32_t detail;  ///< See iw_cause_t.
+    uint8_t react;    ///< An iw_react_t.
 } iw_event_t;
 
 /// `config` must be checked and outlive it. `restarted`: begin with zeros (STOPPING, cause RESTART) because the

@@ -18,6 +18,8 @@
 /// A kerb under one wheel: so much of its speed, for so long, recovery included.
 #define SIM_RANGE_KERB_MAX_PERMILLE 500U
 #define SIM_RANGE_KERB_MAX_US       100000U
+/// The next one comes this much later at the earliest: deviations add up, and leak away within about this time.
+#define SIM_RANGE_KERB_APART_US 1000000U
 /// Tyre radius, each wheel on its own: 192 mm and 3 % either way. It changes the way, not what telemetry tells.
 #define SIM_RANGE_RADIUS_MIN_MM 187U
 #define SIM_RANGE_RADIUS_MAX_MM 197U

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+#include "iwheel/private/diverge.h"
+
+#include "iwheel/private/wheel.h"
+#include "magnitude.h"
+
+#include <string.h>
+
+/// Shares are in 1/2^16.
+#define SHARE_ONE 65536U
+/// More time than this between two steps does not count: the steps would be late, and late ones do not compare.
+#define ELAPSED_MAX_US 50000U
+/// No speed and no deviation counts beyond these: far more than is configurable.
+#define SPEED_MAX_UM_S 40000000
+#define PATH_MAX_UM    1000000
+
+void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config, uint32_t um_s_per_rpm) {
+    memset(self, 0, sizeof *self);
+    self->config = config;
+    self->rpm_um_s = (int32_t)(um_s_per_rpm * (IW_DIVERGE_RADIUS_MM * 7U) / (config->radius_mm * 8U));
+}
+
+void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us) {
+    if (self->begun_us != begun_us) {
+        self->begun_us = begun_us;
+        self->path_um = 0;
+        self->largest_um = 0;
+    }
+}
+
+static int32_t clamp(int32_t value, int32_t bound) {
+    if (value > bound) {
+        return bound;
+    }
+    return (value < -bound) ? -bound : value;
+}
+
+/// What was measured, at the radius that the setpoints mean.
+static IW_APART int32_t measured_um_s(const iw_diverge_t *self, size_t side) {
+    const int32_t at_radius = clamp(self->measured_mm_s[side], (int32_t)IW_WHEEL_FASTEST_MM_S);
+    return at_radius * (IW_DIVERGE_RADIUS_MM * 1000) / (int32_t)self->config->radius_mm;
+}
+
+void iw_diverge_restart(iw_diverge_t *self, iw_time_us_t now_us) {
+    self->at_us = now_us;
+    self->path_um = 0;
+    self->expected_um_s[IW_LEFT] = measured_um_s(self, IW_LEFT);
+    self->expected_um_s[IW_RIGHT] = measured_um_s(self, IW_RIGHT);
+}
+
+/// value x elapsed / span, but not more than value.
+static IW_APART int32_t share_of(int32_t value, uint32_t elapsed_us, uint32_t span_us) {
+    const uint32_t share = (elapsed_us < span_us) ? (elapsed_us * SHARE_ONE + span_us / 2U) / span_us : SHARE_ONE;
+    return (int32_t)((int64_t)value * (int64_t)share / (int64_t)SHARE_ONE);
+}
+
+/// By the middle of the time that has passed, so that long steps and short ones lead to the same.
+static IW_APART int32_t settle(int32_t value, uint32_t elapsed_us, uint32_t constant_ms) {
+    return share_of(value, elapsed_us, constant_ms * IW_US_PER_MS + elapsed_us / 2U);
+}
+
+/// Turning backwards is no progress.
+static IW_APART bool is_below(const iw_diverge_t *self, size_t side, int32_t percent) {
+    const int32_t expected = self->expected_um_s[side];
+    const int32_t measured = measured_um_s(self, side);
+    const int32_t progress = ((expected < 0) == (measured < 0)) ? iw_magnitude(measured) : 0;
+    return progress / percent < iw_magnitude(expected) / 100;
+}
+
+/// How much faster (slower: negative) a wheel is than it should be by now, beyond what is ordinary.
+static IW_APART int32_t beyond_um_s(const iw_diverge_t *self, size_t side) {
+    const int32_t expected = self->expected_um_s[side];
+    const int32_t difference = measured_um_s(self, side) - expected;
+    const int32_t ordinary = iw_magnitude(expected) / 100 * IW_DIVERGE_DROOP_PERCENT + self->rpm_um_s;
+    if (iw_magnitude(expected) >= IW_DIVERGE_GONE_UM_S && is_below(self, side, IW_DIVERGE_GONE_PERCENT)) {
+        return 2 * difference;
+    }
+    return difference - clamp(difference, ordinary);
+}
+
+static void advance(iw_diverge_t *self, uint32_t elapsed_us) {
+    const iw_config_t *const config = self->config;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        const int32_t short_of = self->applied_mm_s[side] * 1000 - self->expected_um_s[side];
+        const int32_t next = self->expected_um_s[side] + settle(short_of, elapsed_us, config->wheel_lag_ms);
+        self->expected_um_s[side] = clamp(next, SPEED_MAX_UM_S);
+    }
+    const int32_t left = beyond_um_s(self, IW_LEFT);
+    const int32_t right = beyond_um_s(self, IW_RIGHT);
+    const int32_t leaked = settle(self->path_um, elapsed_us, config->pair_leak_ms);
+    const int32_t moved = share_of(right - left, elapsed_us, IW_US_PER_MS * 1000U);
+    self->path_um = clamp(self->path_um - leaked + moved, PATH_MAX_UM);
+    self->side = (iw_magnitude(left) > iw_magnitude(right)) ? IW_LEFT : IW_RIGHT;
+}
+
+iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us) {
+    const uint32_t elapsed_us = iw_age_us(self->at_us, now_us);
+    if (elapsed_us >= IW_DIVERGE_STEP_US) {
+        advance(self, (elapsed_us < ELAPSED_MAX_US) ? elapsed_us : ELAPSED_MAX_US);
+        self->at_us = now_us;
+    }
+    const int32_t path_um = iw_magnitude(self->path_um);
+    self->largest_um = (path_um > self->largest_um) ? path_um : self->largest_um;
+    if (path_um < (int32_t)self->config->pair_mm * 1000) {
+        return IW_DIVERGE_NOT;
+    }
+    return is_below(self, self->side, IW_DIVERGE_SLOW_PERCENT) ? IW_DIVERGE_SLOW : IW_DIVERGE_AWAY;
+}

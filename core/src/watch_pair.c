@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#include "watch_pair.h"
+
+#include "iwheel/gateway.h"
+#include "magnitude.h"
+
+static void compare(iw_gateway_t *self) {
+    iw_diverge_t *const diverge = &self->diverge;
+    const iw_diverge_verdict_t verdict = iw_diverge_step(diverge, self->now_us);
+    if (verdict != IW_DIVERGE_NOT) {
+        const iw_event_t event = {IW_CAUSE_PAIR_DIVERGES, (uint8_t)(IW_SIDES_LEFT << diverge->side),
+                                  (uint32_t)iw_magnitude(diverge->path_um) / 1000U,
+                                  (verdict == IW_DIVERGE_SLOW) ? IW_REACT_ZERO : IW_REACT_RAMP};
+        iw_permit_raise(&self->permit, &event, self->now_us);
+    }
+}
+
+/// A ramp that has ended, as silence and zero at once, leaves nothing that a reaction could change.
+static bool has_ended(const iw_gateway_t *self) {
+    const iw_demand_t demand = iw_permit_demand(&self->permit);
+    return demand < IW_DEMAND_BRAKE || (demand == IW_DEMAND_BRAKE && iw_setpoint_is_zero(&self->setpoint));
+}
+
+void iw_watch_pair(iw_gateway_t *self, bool heard) {
+    iw_diverge_t *const diverge = &self->diverge;
+    for (size_t side = 0; side < IW_SIDES; side++) {
+        diverge->applied_mm_s[side] = self->setpoint.speed_um_s[side] / 1000;
+        diverge->measured_mm_s[side] = self->wheel[side].speed_mm_s;
+    }
+    iw_diverge_begin(diverge, self->permit.armed_us);
+    if (has_ended(self) || !heard || self->setpoint.from_zero) {
+        iw_diverge_restart(diverge, self->now_us);
+    } else {
+        compare(self);
+    }
+}

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+/// The rule of the pair in a step of the gateway: when both wheels are compared, and what follows.
+#ifndef IW_WATCH_PAIR_H
+#define IW_WATCH_PAIR_H
+
+#include <stdbool.h>
+
+struct iw_gateway;
+
+/// `heard`: both wheels are. Nothing is compared while nothing or zero at once is sent, or zeros are held: wheels then
+/// roll, or brake as they can.
+void iw_watch_pair(struct iw_gateway *self, bool heard);
+
+#endif

@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: MIT
+// Do both wheels together go where they are commanded? What counts, what is ordinary, when it is too much, and which wheel it is.
+#include "fixture.h"
+#include "iwheel/private/diverge.h"
+#include "unity.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/// At 192 mm, a wheel's own rpm.
+#define UM_S_PER_RPM 20106U
+#define STEP_US      2000U
+
+static iw_config_t config;
+static iw_diverge_t pair;
+static iw_time_us_t now_us;
+static iw_diverge_verdict_t verdict;
+
+static void begin(void) {
+    memset(&pair, FIXTURE_POISON, sizeof pair);
+    now_us = FIXTURE_START_US;
+    iw_diverge_init(&pair, &config, UM_S_PER_RPM);
+    iw_diverge_restart(&pair, now_us);
+}
+
+void setUp(void) {
+    fixture_config(&config);
+    begin();
+}
+
+void tearDown(void) {}
+
+typedef struct {
+    int32_t left_mm_s;
+    int32_t right_mm_s;
+} speeds_t;
+
+/// That applied and measured for so long; ends early when it diverges. The time it took.
+static uint32_t go_on(speeds_t applied, speeds_t measured, uint32_t for_ms) {
+    const iw_time_us_t from_us = now_us;
+    verdict = IW_DIVERGE_NOT;
+    pair.applied_mm_s[IW_LEFT] = applied.left_mm_s;
+    pair.applied_mm_s[IW_RIGHT] = applied.right_mm_s;
+    pair.measured_mm_s[IW_LEFT] = measured.left_mm_s;
+    pair.measured_mm_s[IW_RIGHT] = measured.right_mm_s;
+    while (verdict == IW_DIVERGE_NOT && now_us < from_us + MS(for_ms)) {
+        now_us += STEP_US;
+        verdict = iw_diverge_step(&pair, now_us);
+    }
+    return (uint32_t)((now_us - from_us) / 1000U);
+}
+
+/// Both go as commanded: nothing differs, and what is expected has settled.
+static void settle(speeds_t speeds) {
+    pair.measured_mm_s[IW_LEFT] = speeds.left_mm_s;
+    pair.measured_mm_s[IW_RIGHT] = speeds.right_mm_s;
+    pair.applied_mm_s[IW_LEFT] = speeds.left_mm_s;
+    pair.applied_mm_s[IW_RIGHT] = speeds.right_mm_s;
+    iw_diverge_restart(&pair, now_us);
+    TEST_ASSERT_EQUAL_INT32(speeds.left_mm_s * 1000, pair.expected_um_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT32(speeds.right_mm_s * 1000, pair.expected_um_s[IW_RIGHT]);
+}
+
+static void test_diverge_pair_that_follows_does_not(void) {
+    settle((speeds_t){800, -300});
+    (void)go_on((speeds_t){800, -300}, (speeds_t){800, -300}, 10000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
+    TEST_ASSERT_EQUAL_INT32(0, pair.largest_um);
+}
+
+static void test_diverge_expected_follows_what_is_applied_with_the_lag(void) {
+    pair.applied_mm_s[IW_LEFT] = 1000;
+    pair.applied_mm_s[IW_RIGHT] = -1000;
+    for (uint32_t i = 0; i < 30U; i++) {
+        now_us += STEP_US;
+        (void)iw_diverge_step(&pair, now_us);
+    }
+    TEST_ASSERT_INT32_WITHIN(4000, 632100, pair.expected_um_s[IW_LEFT]);
+    TEST_ASSERT_INT32_WITHIN(4000, -632100, pair.expected_um_s[IW_RIGHT]);
+}
+
+static void test_diverge_expected_is_the_same_by_long_steps_and_short_ones(void) {
+    pair.applied_mm_s[IW_LEFT] = 1000;
+    (void)iw_diverge_step(&pair, now_us + MS(20));
+    (void)iw_diverge_step(&pair, now_us + MS(40));
+    (void)iw_diverge_step(&pair, now_us + MS(60));
+    TEST_ASSERT_INT32_WITHIN(8000, 632100, pair.expected_um_s[IW_LEFT]);
+}
+
+static void test_diverge_lag_is_the_configured_one(void) {
+    config.wheel_lag_ms = 120;
+    pair.applied_mm_s[IW_LEFT] = 1000;
+    for (uint32_t i = 0; i < 60U; i++) {
+        now_us += STEP_US;
+        (void)iw_diverge_step(&pair, now_us);
+    }
+    TEST_ASSERT_INT32_WITHIN(4000, 632100, pair.expected_um_s[IW_LEFT]);
+}
+
+/// A wheel that is gone counts double: 60 mm at 2000 mm/s are 30 ms, a little more for what leaks.
+static void test_diverge_blocked_wheel_is_slow_within_its_millimetres(void) {
+    for (unsigned side = 0; side < IW_SIDES; side++) {
+        begin();
+        settle((speeds_t){1000, 1000});
+        const speeds_t measured = {(side == IW_LEFT) ? 0 : 1000, (side == IW_LEFT) ? 1000 : 0};
+        TEST_ASSERT_UINT32_WITHIN(3, 32, go_on((speeds_t){1000, 1000}, measured, 1000U));
+        TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+        TEST_ASSERT_EQUAL_UINT8(side, pair.side);
+        TEST_ASSERT_TRUE((side == IW_LEFT) ? pair.path_um >= 60000 : pair.path_um <= -60000);
+    }
+}
+
+static void test_diverge_blocked_wheel_backwards_is_slow_too(void) {
+    settle((speeds_t){-1000, -1000});
+    TEST_ASSERT_UINT32_WITHIN(3, 32, go_on((speeds_t){-1000, -1000}, (speeds_t){0, -1000}, 1000U));
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+    TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
+}
+
+static void test_diverge_wheel_that_turns_backwards_is_slow(void) {
+    settle((speeds_t){400, 400});
+    (void)go_on((speeds_t){400, 400}, (speeds_t){400, -400}, 1000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+    TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
+}
+
+static void test_diverge_no_speed_is_too_low_to_be_compared(void) {
+    settle((speeds_t){99, 99});
+    TEST_ASSERT_UINT32_WITHIN(10, 362, go_on((speeds_t){99, 99}, (speeds_t){0, 99}, 3000U));
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+}
+
+static void test_diverge_wheel_at_four_fifths_and_more_ramps_below_it_is_slow(void) {
+    settle((speeds_t){1000, 1000});
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){800, 1000}, 3000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
+    begin();
+    settle((speeds_t){1000, 1000});
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){799, 1000}, 3000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+}
+
+/// Below a quarter of what is expected the whole difference counts, and double.
+static void test_diverge_wheel_below_a_quarter_counts_double(void) {
+    settle((speeds_t){400, 400});
+    const uint32_t quarter_ms = go_on((speeds_t){400, 400}, (speeds_t){400, 100}, 1000U);
+    begin();
+    settle((speeds_t){400, 400});
+    const uint32_t below_ms = go_on((speeds_t){400, 400}, (speeds_t){400, 99}, 1000U);
+    TEST_ASSERT_UINT32_WITHIN(6, 252, quarter_ms);
+    TEST_ASSERT_UINT32_WITHIN(4, 106, below_ms);
+}
+
+/// Below 50 mm/s one rpm is too coarse to tell that a wheel is gone.
+static void test_diverge_slow_command_counts_once(void) {
+    settle((speeds_t){49, 49});
+    (void)go_on((speeds_t){49, 49}, (speeds_t){49, 0}, 20000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    begin();
+    settle((speeds_t){50, 50});
+    (void)go_on((speeds_t){50, 50}, (speeds_t){50, 0}, 20000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_SLOW, verdict);
+}
+
+static void test_diverge_wheel_that_runs_on_ramps(void) {
+    settle((speeds_t){1000, 1000});
+    (void)go_on((speeds_t){500, 500}, (speeds_t){500, 1000}, 3000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
+    TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
+}
+
+static void test_diverge_wheel_that_turns_uncommanded_ramps_either_way(void) {
+    (void)go_on((speeds_t){0, 0}, (speeds_t){0, -300}, 3000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
+    TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
+    begin();
+    (void)go_on((speeds_t){0, 0}, (speeds_t){300, 0}, 3000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
+    TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
+}
+
+static void test_diverge_droop_and_most_of_a_step_of_telemetry_are_ordinary(void) {
+    settle((speeds_t){1000, 1000});
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){943, 1000}, 10000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){935, 1000}, 10000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    TEST_ASSERT_INT32_WITHIN(500, 7004, pair.path_um);
+}
+
+static void test_diverge_both_wheels_slow_alike_do_not(void) {
+    settle((speeds_t){1000, 1000});
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 0}, 3000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
+}
+
+/// What leaks as fast as it comes stays below the limit: 60 mm in 1000 ms.
+static void test_diverge_steady_difference_below_its_limit_is_never_too_much(void) {
+    settle((speeds_t){500, 500});
+    (void)go_on((speeds_t){500, 500}, (speeds_t){500, 595}, 20000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, verdict);
+    TEST_ASSERT_GREATER_THAN_INT32(56000, pair.largest_um);
+    (void)go_on((speeds_t){500, 500}, (speeds_t){500, 600}, 20000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
+}
+
+static void test_diverge_leak_and_limit_are_the_configured_ones(void) {
+    config.pair_mm = 100;
+    config.pair_leak_ms = 3000;
+    settle((speeds_t){500, 500});
+    const uint32_t took_ms = go_on((speeds_t){500, 500}, (speeds_t){500, 600}, 20000U);
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, verdict);
+    TEST_ASSERT_UINT32_WITHIN(100, 2215, took_ms);
+    TEST_ASSERT_INT32_WITHIN(200, 100000, pair.path_um);
+}
+
+static void test_diverge_restart_forgets_the_deviation_but_not_the_largest(void) {
+    settle((speeds_t){1000, 1000});
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
+    TEST_ASSERT_GREATER_THAN_INT32(30000, pair.path_um);
+    const int32_t largest_um = pair.largest_um;
+    iw_diverge_restart(&pair, now_us);
+    TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
+    TEST_ASSERT_EQUAL_INT32(largest_um, pair.largest_um);
+    TEST_ASSERT_EQUAL_INT32(0, pair.expected_um_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT32(1000000, pair.expected_um_s[IW_RIGHT]);
+}
+
+static void test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on(void) {
+    iw_diverge_begin(&pair, 5000U);
+    settle((speeds_t){1000, 1000});
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){0, 1000}, 40U);
+    const int32_t path_um = pair.path_um;
+    iw_diverge_begin(&pair, 5000U);
+    TEST_ASSERT_EQUAL_INT32(path_um, pair.path_um);
+    TEST_ASSERT_EQUAL_INT32(path_um, pair.largest_um);
+    iw_diverge_begin(&pair, 6000U);
+    TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
+    TEST_ASSERT_EQUAL_INT32(0, pair.largest_um);
+}
+
+static void test_diverge_steps_within_a_millisecond_count_together(void) {
+    settle((speeds_t){1000, 1000});
+    pair.measured_mm_s[IW_LEFT] = 0;
+    (void)iw_diverge_step(&pair, now_us + IW_DIVERGE_STEP_US - 1U);
+    TEST_ASSERT_EQUAL_INT32(0, pair.path_um);
+    (void)iw_diverge_step(&pair, now_us + IW_DIVERGE_STEP_US);
+    TEST_ASSERT_INT32_WITHIN(20, 2014, pair.path_um);
+}
+
+static void test_diverge_long_pause_counts_as_50_ms(void) {
+    settle((speeds_t){1000, 1000});
+    pair.measured_mm_s[IW_LEFT] = 0;
+    (void)iw_diverge_step(&pair, now_us + MS(5000));
+    TEST_ASSERT_INT32_WITHIN(500, 100000, pair.path_um);
+}
+
+/// The wheel's firmware takes the radius to be 192 mm; `measured` is at the configured one.
+static void test_diverge_compares_in_the_unit_of_the_setpoints_at_any_radius(void) {
+    static const uint16_t radii[] = {60, 192, 400};
+    for (size_t i = 0; i < sizeof radii / sizeof radii[0]; i++) {
+        config.radius_mm = radii[i];
+        memset(&pair, FIXTURE_POISON, sizeof pair);
+        iw_diverge_init(&pair, &config, 104720U * radii[i] / 1000U);
+        const int32_t real_mm_s = 960 * radii[i] / 192;
+        TEST_ASSERT_INT32_WITHIN(100, 17592, pair.rpm_um_s);
+        pair.measured_mm_s[IW_LEFT] = real_mm_s;
+        pair.measured_mm_s[IW_RIGHT] = -real_mm_s;
+        iw_diverge_restart(&pair, now_us);
+        TEST_ASSERT_INT32_WITHIN(1000, 960000, pair.expected_um_s[IW_LEFT]);
+        TEST_ASSERT_INT32_WITHIN(1000, -960000, pair.expected_um_s[IW_RIGHT]);
+    }
+}
+
+/// Exact figures: each constant of the arithmetic has its share in them.
+static void test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand(void) {
+    TEST_ASSERT_EQUAL_INT32(17592, pair.rpm_um_s); // 20106 x 7 / 8.
+    pair.applied_mm_s[IW_LEFT] = 1000;
+    (void)iw_diverge_step(&pair, now_us + MS(40)); // Half of the way: 40 / (60 + 20).
+    TEST_ASSERT_EQUAL_INT32(500000, pair.expected_um_s[IW_LEFT]);
+    begin();
+    config.wheel_lag_ms = 300;
+    pair.applied_mm_s[IW_LEFT] = 1000;
+    (void)iw_diverge_step(&pair, now_us + MS(100)); // Counts as 50 / (300 + 25).
+    TEST_ASSERT_EQUAL_INT32(153839, pair.expected_um_s[IW_LEFT]);
+    begin();
+    config.wheel_lag_ms = 10;
+    pair.applied_mm_s[IW_LEFT] = 1000;
+    (void)iw_diverge_step(&pair, now_us + MS(50)); // All of it: 50 is more than 10 + 25.
+    TEST_ASSERT_EQUAL_INT32(1000000, pair.expected_um_s[IW_LEFT]);
+}
+
+static void test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rpm(void) {
+    settle((speeds_t){1000, 1000});
+    pair.measured_mm_s[IW_LEFT] = 942; // 58000 um/s less than it should: 408 more than 57592.
+    (void)iw_diverge_step(&pair, now_us + MS(50));
+    TEST_ASSERT_EQUAL_INT32(20, pair.path_um);
+    begin();
+    settle((speeds_t){1000, 1000});
+    pair.measured_mm_s[IW_LEFT] = 0;
+    (void)iw_diverge_step(&pair, now_us + MS(50));
+    TEST_ASSERT_EQUAL_INT32(100006, pair.path_um); // Double.
+}
+
+static void test_diverge_limit_is_exact(void) {
+    pair.path_um = 59999;
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, iw_diverge_step(&pair, now_us));
+    pair.path_um = 60000;
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
+    pair.path_um = -59999;
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_NOT, iw_diverge_step(&pair, now_us));
+    pair.path_um = -60000;
+    TEST_ASSERT_EQUAL_INT(IW_DIVERGE_AWAY, iw_diverge_step(&pair, now_us));
+}
+
+static void test_diverge_largest_stays_when_the_deviation_leaks_away(void) {
+    settle((speeds_t){1000, 1000});
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){500, 1000}, 60U);
+    const int32_t largest_um = pair.largest_um;
+    TEST_ASSERT_GREATER_THAN_INT32(20000, largest_um);
+    (void)go_on((speeds_t){1000, 1000}, (speeds_t){1000, 1000}, 3000U);
+    TEST_ASSERT_LESS_THAN_INT32(3000, pair.path_um);
+    TEST_ASSERT_EQUAL_INT32(largest_um, pair.largest_um);
+}
+
+static void test_diverge_names_the_wheel_that_differs_more(void) {
+    settle((speeds_t){500, 500});
+    (void)go_on((speeds_t){500, 500}, (speeds_t){420, 900}, 1000U);
+    TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
+    begin();
+    settle((speeds_t){500, 500});
+    (void)go_on((speeds_t){500, 500}, (speeds_t){900, 420}, 1000U);
+    TEST_ASSERT_EQUAL_UINT8(IW_LEFT, pair.side);
+    begin();
+    settle((speeds_t){500, 500});
+    (void)go_on((speeds_t){500, 500}, (speeds_t){400, 600}, 1000U); // Both alike: the right one.
+    TEST_ASSERT_EQUAL_UINT8(IW_RIGHT, pair.side);
+}
+
+static void test_diverge_no_measured_speed_counts_beyond_ten_metres_a_second(void) {
+    pair.measured_mm_s[IW_LEFT] = 10001;
+    pair.measured_mm_s[IW_RIGHT] = -10001;
+    iw_diverge_restart(&pair, now_us);
+    TEST_ASSERT_EQUAL_INT32(10000000, pair.expected_um_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT32(-10000000, pair.expected_um_s[IW_RIGHT]);
+    config.radius_mm = 20;
+    iw_diverge_restart(&pair, now_us);
+    TEST_ASSERT_EQUAL_INT32(96000000, pair.expected_um_s[IW_LEFT]);
+    (void)iw_diverge_step(&pair, now_us + MS(1));
+    TEST_ASSERT_EQUAL_INT32(40000000, pair.expected_um_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT32(-40000000, pair.expected_um_s[IW_RIGHT]);
+}
+
+static void test_diverge_absurd_values_stay_within_bounds(void) {
+    config.radius_mm = 20;
+    iw_diverge_init(&pair, &config, UM_S_PER_RPM);
+    for (uint32_t i = 0; i < 2000U; i++) {
+        now_us += MS(50);
+        pair.applied_mm_s[IW_LEFT] = INT16_MIN;
+        pair.applied_mm_s[IW_RIGHT] = INT16_MAX;
+        pair.measured_mm_s[IW_LEFT] = 2000000;
+        pair.measured_mm_s[IW_RIGHT] = -2000000;
+        (void)iw_diverge_step(&pair, now_us);
+        TEST_ASSERT_TRUE(abs(pair.path_um) <= 1000000);
+        TEST_ASSERT_TRUE(abs(pair.expected_um_s[IW_LEFT]) <= 40000000);
+    }
+    TEST_ASSERT_EQUAL_INT32(-1000000, pair.path_um);
+    TEST_ASSERT_EQUAL_INT32(1000000, pair.largest_um);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_diverge_pair_that_follows_does_not);
+    RUN_TEST(test_diverge_expected_follows_what_is_applied_with_the_lag);
+    RUN_TEST(test_diverge_expected_is_the_same_by_long_steps_and_short_ones);
+    RUN_TEST(test_diverge_lag_is_the_configured_one);
+    RUN_TEST(test_diverge_blocked_wheel_is_slow_within_its_millimetres);
+    RUN_TEST(test_diverge_blocked_wheel_backwards_is_slow_too);
+    RUN_TEST(test_diverge_wheel_that_turns_backwards_is_slow);
+    RUN_TEST(test_diverge_no_speed_is_too_low_to_be_compared);
+    RUN_TEST(test_diverge_wheel_at_four_fifths_and_more_ramps_below_it_is_slow);
+    RUN_TEST(test_diverge_wheel_below_a_quarter_counts_double);
+    RUN_TEST(test_diverge_slow_command_counts_once);
+    RUN_TEST(test_diverge_wheel_that_runs_on_ramps);
+    RUN_TEST(test_diverge_wheel_that_turns_uncommanded_ramps_either_way);
+    RUN_TEST(test_diverge_droop_and_most_of_a_step_of_telemetry_are_ordinary);
+    RUN_TEST(test_diverge_both_wheels_slow_alike_do_not);
+    RUN_TEST(test_diverge_steady_difference_below_its_limit_is_never_too_much);
+    RUN_TEST(test_diverge_leak_and_limit_are_the_configured_ones);
+    RUN_TEST(test_diverge_restart_forgets_the_deviation_but_not_the_largest);
+    RUN_TEST(test_diverge_a_new_drive_begins_from_zero_the_same_one_goes_on);
+    RUN_TEST(test_diverge_steps_within_a_millisecond_count_together);
+    RUN_TEST(test_diverge_long_pause_counts_as_50_ms);
+    RUN_TEST(test_diverge_compares_in_the_unit_of_the_setpoints_at_any_radius);
+    RUN_TEST(test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand);
+    RUN_TEST(test_diverge_ordinary_is_exactly_four_per_cent_and_its_part_of_an_rpm);
+    RUN_TEST(test_diverge_limit_is_exact);
+    RUN_TEST(test_diverge_largest_stays_when_the_deviation_leaks_away);
+    RUN_TEST(test_diverge_names_the_wheel_that_differs_more);
+    RUN_TEST(test_diverge_no_measured_speed_counts_beyond_ten_metres_a_second);
+    RUN_TEST(test_diverge_absurd_values_stay_within_bounds);
+    return UNITY_END();
+}

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: MIT
+// The pair in the whole gateway: what is compared and when, which wheel is named, ramp or zero at once, who is refused.
+#include "gateway_rig.h"
+
+#include "unity.h"
+
+static gateway_rig_t rig;
+
+void setUp(void) {
+    gateway_rig_init(&rig);
+}
+
+void tearDown(void) {
+    TEST_ASSERT_NULL_MESSAGE(rig.judge.violation, rig.judge.violation);
+}
+
+static iw_state_t state(void) {
+    return iw_gateway_state(&rig.gateway);
+}
+
+static const iw_stop_t *stop(void) {
+    return &rig.gateway.permit.stop;
+}
+
+static void drive_on(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+static void turn(iw_side_t side, int16_t rpm) {
+    rig.wheel[side].rpm_fixed = true;
+    rig.wheel[side].rpm = rpm;
+}
+
+static void assert_diverged(iw_side_t side, bool at_once) {
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_PAIR_DIVERGES, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT8((side == IW_LEFT) ? IW_SIDES_LEFT : IW_SIDES_RIGHT, stop()->sides);
+    TEST_ASSERT_EQUAL_INT(at_once, stop()->at_once);
+    TEST_ASSERT_FALSE(stop()->latched);
+    TEST_ASSERT_UINT32_WITHIN(2, 61, stop()->detail);
+    TEST_ASSERT_EQUAL_INT(at_once, gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_one_wheel_blocked_stops_both_at_once(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        setUp();
+        drive_on();
+        turn((iw_side_t)side, 0);
+        (void)gateway_rig_cruise(&rig, 400, 400, MS(60));
+        TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+        const iw_refusal_t refusal = gateway_rig_cruise(&rig, 400, 400, MS(60));
+        assert_diverged((iw_side_t)side, true);
+        TEST_ASSERT_EQUAL_INT(IW_REFUSE_PAIR_DIVERGES, refusal);
+        tearDown();
+    }
+}
+
+static void test_gateway_one_wheel_too_fast_ramps_both(void) {
+    for (int side = 0; side < IW_SIDES; side++) {
+        setUp();
+        drive_on();
+        turn((iw_side_t)side, 36); // 724 mm/s.
+        (void)gateway_rig_cruise(&rig, 400, 400, MS(240));
+        assert_diverged((iw_side_t)side, false);
+        TEST_ASSERT_EQUAL_INT(rig.bus.told_mm_s[IW_LEFT], rig.bus.told_mm_s[IW_RIGHT]);
+        tearDown();
+    }
+}
+
+static void test_gateway_pair_that_goes_as_commanded_in_a_curve_does_not_diverge(void) {
+    gateway_rig_arm(&rig);
+    for (unsigned i = 0; i < 10U; i++) {
+        (void)gateway_rig_cruise(&rig, 400, 100, MS(1000));
+        (void)gateway_rig_cruise(&rig, 100, 400, MS(1000));
+    }
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+static void test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(40));
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    turn(IW_LEFT, 0);
+    gateway_rig_run(&rig, MS(80));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_CLIENT_STOP, stop()->cause);
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_wheel_that_runs_on_in_a_ramp_does_not_end_it(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    turn(IW_LEFT, 49);
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(420));
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] != IW_NEVER);
+}
+
+static void test_gateway_pair_pushed_by_hand_while_listening_is_not_compared(void) {
+    gateway_rig_run(&rig, MS(500));
+    turn(IW_LEFT, 40);
+    gateway_rig_run(&rig, MS(2000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+    TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
+    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_largest_mm);
+}
+
+static void test_gateway_pair_pushed_by_hand_while_armed_stops(void) {
+    gateway_rig_arm(&rig);
+    turn(IW_RIGHT, -10);
+    (void)gateway_rig_cruise(&rig, 0, 0, MS(500));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_PAIR_DIVERGES, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_RIGHT, stop()->sides);
+    TEST_ASSERT_FALSE(stop()->at_once);
+}
+
+/// While zero at once is sent both wheels brake as they can: that is no deviation.
+static void test_gateway_pair_sent_zero_at_once_is_not_compared(void) {
+    drive_on();
+    turn(IW_LEFT, 10);
+    gateway_rig_press(&rig, true);
+    gateway_rig_run(&rig, MS(1000));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_ESTOP_LINE, stop()->cause);
+    TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
+}
+
+static void test_gateway_deviation_is_forgotten_where_a_wheel_is_not_heard(void) {
+    rig.config.wheel_silent_ms = 200;
+    gateway_rig_begin(&rig, false);
+    drive_on();
+    turn(IW_LEFT, 0);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(50));
+    TEST_ASSERT_GREATER_THAN_INT32(20000, rig.gateway.diverge.path_um);
+    rig.wheel[IW_LEFT].mute = true;
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(90)); // Excused for a while, and not heard.
+    TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
+}
+
+static void test_gateway_wheel_offline_is_not_compared_by_its_old_speed(void) {
+    drive_on();
+    turn(IW_LEFT, 10);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(40));
+    rig.wheel[IW_LEFT].mute = true;
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(70));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
+    gateway_rig_run(&rig, MS(150));
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
+    TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
+}
+
+/// In STOPPING too: a late loop stops without a ramp, and wheels then brake as they can.
+static void test_gateway_pair_after_a_late_loop_is_not_compared(void) {
+    drive_on();
+    (void)gateway_rig_drive(&rig, HOLDER, 400, 400);
+    gateway_rig_stall(&rig, rig.wake_us - rig.now_us + MS(110));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_LOOP_LATE, stop()->cause);
+    turn(IW_LEFT, 15);
+    gateway_rig_run(&rig, MS(500));
+    TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
+    TEST_ASSERT_INT32_WITHIN(1000, 301000, rig.gateway.diverge.expected_um_s[IW_LEFT]);
+}
+
+/// Somebody pushes the machine while zeros are held: nothing is left to stop, and the next arm begins from zero.
+static void test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared(void) {
+    drive_on();
+    gateway_rig_stop(&rig);
+    gateway_rig_run(&rig, MS(600));
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+    turn(IW_LEFT, 20);
+    gateway_rig_run(&rig, MS(500));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_STOPPING, state());
+    TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
+    TEST_ASSERT_TRUE(rig.gateway.permit.seen_us[IW_CAUSE_PAIR_DIVERGES] == IW_NEVER);
+}
+
+/// A pair that could not leave whole is followed by zero at once, though the client goes on.
+static void test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave(void) {
+    drive_on();
+    turn(IW_LEFT, 10);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(40));
+    TEST_ASSERT_GREATER_THAN_INT32(4000, rig.gateway.diverge.path_um);
+    iw_setpoint_collapse(&rig.gateway.setpoint, rig.now_us);
+    rig.gateway.setpoint.due_us = rig.now_us + MS(1);
+    (void)iw_gateway_step(&rig.gateway, rig.now_us);
+    TEST_ASSERT_EQUAL_INT32(0, rig.gateway.diverge.path_um);
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+}
+
+static void test_gateway_compares_whole_millimetres_and_tells_them(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    TEST_ASSERT_EQUAL_INT32(1000, rig.gateway.diverge.applied_mm_s[IW_LEFT]);
+    TEST_ASSERT_EQUAL_INT32(1000, rig.gateway.diverge.applied_mm_s[IW_RIGHT]);
+    rig.gateway.diverge.path_um = 61000;
+    rig.gateway.diverge.at_us = rig.now_us;
+    (void)iw_gateway_step(&rig.gateway, rig.now_us);
+    TEST_ASSERT_EQUAL_UINT32(61, stop()->detail);
+    setUp();
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    rig.gateway.diverge.path_um = 61999;
+    rig.gateway.diverge.at_us = rig.now_us;
+    (void)iw_gateway_step(&rig.gateway, rig.now_us);
+    TEST_ASSERT_EQUAL_UINT32(61, stop()->detail);
+}
+
+static void test_gateway_deviation_begins_anew_with_each_drive(void) {
+    drive_on();
+    turn(IW_LEFT, 0);
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(200));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_PAIR_DIVERGES, stop()->cause);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT32(60, gateway_rig_look(&rig).pair_largest_mm);
+    rig.wheel[IW_LEFT].rpm_fixed = false;
+    gateway_rig_run(&rig, MS(3000));
+    TEST_ASSERT_GREATER_OR_EQUAL_INT32(60, gateway_rig_look(&rig).pair_largest_mm);
+    gateway_rig_arm(&rig);
+    gateway_rig_step(&rig);
+    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_largest_mm);
+    TEST_ASSERT_EQUAL_INT32(0, gateway_rig_look(&rig).pair_mm);
+}
+
+static void test_gateway_third_divergence_within_a_minute_latches(void) {
+    for (unsigned i = 0; i < 3U; i++) {
+        gateway_rig_arm(&rig);
+        (void)gateway_rig_cruise(&rig, 400, 400, MS(1000));
+        turn(IW_RIGHT, 0);
+        (void)gateway_rig_cruise(&rig, 400, 400, MS(200));
+        TEST_ASSERT_EQUAL_INT((i < 2U) ? IW_STATE_STOPPING : IW_STATE_LATCHED, state());
+        rig.wheel[IW_RIGHT].rpm_fixed = false;
+        gateway_rig_run(&rig, MS(3000));
+    }
+    TEST_ASSERT_EQUAL_INT(IW_REFUSE_NONE, gateway_rig_reset(&rig));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_LISTENING, state());
+}
+
+static void test_gateway_second_wheel_that_goes_offline_ends_the_ramp_of_the_first(void) {
+    gateway_rig_arm(&rig);
+    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(2000));
+    rig.wheel[IW_LEFT].mute = true;
+    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(20));
+    rig.wheel[IW_RIGHT].mute = true;
+    (void)gateway_rig_cruise(&rig, 1000, 1000, MS(44));
+    TEST_ASSERT_EQUAL_INT(IW_CAUSE_WHEEL_LOST, stop()->cause);
+    TEST_ASSERT_EQUAL_UINT8(IW_SIDES_LEFT, stop()->sides);
+    TEST_ASSERT_FALSE(gateway_rig_told_zero(&rig));
+    gateway_rig_run(&rig, MS(20));
+    TEST_ASSERT_TRUE(gateway_rig_told_zero(&rig));
+}
+
+static void test_gateway_pair_is_compared_in_the_machines_frame(void) {
+    rig.config.invert[IW_RIGHT] = true;
+    gateway_rig_begin(&rig, false);
+    drive_on();
+    (void)gateway_rig_cruise(&rig, 400, 400, MS(2000));
+    TEST_ASSERT_EQUAL_INT(IW_STATE_ARMED, state());
+    TEST_ASSERT_LESS_THAN_INT32(5, gateway_rig_look(&rig).pair_largest_mm);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_one_wheel_blocked_stops_both_at_once);
+    RUN_TEST(test_gateway_one_wheel_too_fast_ramps_both);
+    RUN_TEST(test_gateway_pair_that_goes_as_commanded_in_a_curve_does_not_diverge);
+    RUN_TEST(test_gateway_wheel_blocked_in_a_ramp_ends_the_ramp);
+    RUN_TEST(test_gateway_wheel_that_runs_on_in_a_ramp_does_not_end_it);
+    RUN_TEST(test_gateway_pair_pushed_by_hand_while_listening_is_not_compared);
+    RUN_TEST(test_gateway_pair_pushed_by_hand_while_armed_stops);
+    RUN_TEST(test_gateway_pair_sent_zero_at_once_is_not_compared);
+    RUN_TEST(test_gateway_deviation_is_forgotten_where_a_wheel_is_not_heard);
+    RUN_TEST(test_gateway_wheel_offline_is_not_compared_by_its_old_speed);
+    RUN_TEST(test_gateway_pair_after_a_late_loop_is_not_compared);
+    RUN_TEST(test_gateway_pair_pushed_by_hand_in_the_hold_is_not_compared);
+    RUN_TEST(test_gateway_deviation_is_forgotten_when_a_pair_could_not_leave);
+    RUN_TEST(test_gateway_compares_whole_millimetres_and_tells_them);
+    RUN_TEST(test_gateway_deviation_begins_anew_with_each_drive);
+    RUN_TEST(test_gateway_third_divergence_within_a_minute_latches);
+    RUN_TEST(test_gateway_second_wheel_that_goes_offline_ends_the_ramp_of_the_first);
+    RUN_TEST(test_gateway_pair_is_compared_in_the_machines_frame);
+    return UNITY_END();
+}
