@@ -450,7 +450,7 @@ CASES = [
     (faults, "python3", "the code of a fault of the core is gone", ("core/src/codec.c", "wheel->pose.x_mm, wheel->pose.y_mm", "pose->x_mm, pose->y_mm"), True),
     (faults, "python3", "the code of a fault occurs twice", ("core/src/sender.c", "const bool invert = config->invert[side];", "const bool invert = config->invert[side]; const bool invert = config->invert[side];"), True),
     (faults, "python3", "the code of a fault of the daemon is gone", ("app/gateway/loop.c", "events[i].data.u64 == GW_TAG_ESTOP", "events[i].data.u32 == GW_TAG_ESTOP"), True),
-    (faults, "python3", "the code of a fault of the board is gone", ("port/stm32_stub/answers.c", "!iw_host_is_silent(self)", "!is_silent(self)"), True),
+    (faults, "python3", "the code of a fault of the board is gone", ("port/stm32_stub/configure.c", "!iw_host_is_silent(self)", "!is_silent(self)"), True),
     (faults, "python3", "a test that should notice is no test", ("test/faults/gateway.faults", "unit.daemon_watchers", "unit.daemon_watching"), True),
     (faults, "python3", "a fault of the core with one noticer", ("test/faults/core.faults", "| unit sim orders\n", "| unit\n"), True),
     (faults, "python3", "two faults of one name", ("test/faults/core.faults", "| disconnect-ignored |", "| lease-endless |"), True),

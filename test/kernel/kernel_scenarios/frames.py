@@ -119,7 +119,7 @@ def row20_odd_frames(t):
         rig.bus.send_fd(256, speed + bytes(8))
         time.sleep(0.004)
     stream.stop()
-    ms = t.first_after(rig, muted_us, lambda value: value < speed_mm_s, "a ramp although odd frames came", 80)
+    ms = t.first_after(rig, muted_us, lambda value: value < 300, "a ramp although odd frames came", 80)
     t.figure(f"ramp after {ms or 0:.0f} ms")
     t.stopped_by(client, "wheel_lost")
     after = client.request("status")["counters"]

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// What counts as ordinary of a machine on two wheels: nothing inside these ranges may stop it.
 ///
-/// They are fixed here before any threshold is chosen against them. They are assumptions: nobody has measured them on a
-/// real pair of wheels.
+/// They were fixed before the thresholds were chosen against them, but for the time between kerbs (docs/pair.md). They are
+/// assumptions: nobody has measured them on a real pair of wheels.
 ///
 /// What each of them means is in motion.h. Not in here: faults, such as a blocked wheel.
 #ifndef IWHEEL_SIM_RANGES_H
