@@ -184,6 +184,7 @@ class Story(unittest.TestCase):
         me, other = self.connect(), self.connect()
         for part in (self.without_wheels, self.wheels_appear, self.zeros, self.driving, self.stops, self.bus, self.files):
             part(me, other)
+        self.assertIsNotNone(slow.wait_event("lost"))  # The gateway writes it once there is room again.
         self.hear(slow)
         self.rig.kill_gateway(signal.SIGTERM)
         for ear in self.ears:
