@@ -110,7 +110,7 @@ class Soak:
 
     def fault_mute(self):
         side = self.chance.choice(("left", "right", "both"))
-        self.rig.fault(f"mute {side}", within_ms=90)
+        self.rig.fault(f"mute {side}", "cut" if side == "both" else "ramp", within_ms=90)
         self.wait(0.15, 2.0)
         self.rig.sim.ask(f"unmute {side}")
 
