@@ -108,14 +108,19 @@ class Soak:
         if self.counts[self.kind] == CHIPS_LOST_MAX:
             self.faults.remove(self.kind)
 
+    def lose(self, command, side, within_ms):
+        """One wheel offline ends in a ramp, both in zero at once."""
+        self.rig.fault(command, "cut" if side == "both" else "ramp", within_ms=within_ms)
+
     def fault_mute(self):
         side = self.chance.choice(("left", "right", "both"))
-        self.rig.fault(f"mute {side}", "cut" if side == "both" else "ramp", within_ms=90)
+        self.lose(f"mute {side}", side, 90)
         self.wait(0.15, 2.0)
         self.rig.sim.ask(f"unmute {side}")
 
     def fault_reboot(self):
-        self.rig.fault(f"reboot {self.chance.choice(('left', 'right', 'both'))}", within_ms=120)
+        side = self.chance.choice(("left", "right", "both"))
+        self.lose(f"reboot {side}", side, 120)  # It sends nothing for a while.
         self.wait(0.3, 1.0)
 
     def fault_down(self):
