@@ -199,7 +199,8 @@ static void type_allocate(void **out, const struct ddsi_sertype *type, void *bef
     (void)type;
     (void)before_count;
     ros_raw_t *samples = realloc(before, count * sizeof *samples);
-    for (size_t i = 0; samples != NULL && i < count; i++) {
+    out[0] = samples;
+    for (size_t i = 1; samples != NULL && i < count; i++) {
         out[i] = &samples[i];
     }
 }

@@ -55,7 +55,7 @@ static IW_APART int32_t share_of(int32_t value, uint32_t elapsed_us, uint32_t sp
 }
 
 /// By the middle of the time that has passed, so that long steps and short ones lead to the same.
-static IW_APART int32_t settle(int32_t value, uint32_t elapsed_us, uint32_t constant_ms) {
+static IW_APART int32_t lagging(int32_t value, uint32_t elapsed_us, uint32_t constant_ms) {
     return share_of(value, elapsed_us, constant_ms * IW_US_PER_MS + elapsed_us / 2U);
 }
 
@@ -78,16 +78,16 @@ static IW_APART int32_t beyond_um_s(const iw_diverge_t *self, size_t side) {
     return difference - clamp(difference, ordinary);
 }
 
-static void advance(iw_diverge_t *self, uint32_t elapsed_us) {
+static void integrate(iw_diverge_t *self, uint32_t elapsed_us) {
     const iw_config_t *const config = self->config;
     for (size_t side = 0; side < IW_SIDES; side++) {
         const int32_t short_of = self->applied_mm_s[side] * 1000 - self->expected_um_s[side];
-        const int32_t next = self->expected_um_s[side] + settle(short_of, elapsed_us, config->wheel_lag_ms);
+        const int32_t next = self->expected_um_s[side] + lagging(short_of, elapsed_us, config->wheel_lag_ms);
         self->expected_um_s[side] = clamp(next, SPEED_MAX_UM_S);
     }
     const int32_t left = beyond_um_s(self, IW_LEFT);
     const int32_t right = beyond_um_s(self, IW_RIGHT);
-    const int32_t leaked = settle(self->path_um, elapsed_us, config->pair_leak_ms);
+    const int32_t leaked = lagging(self->path_um, elapsed_us, config->pair_leak_ms);
     const int32_t moved = share_of(right - left, elapsed_us, IW_US_PER_MS * 1000U);
     self->path_um = clamp(self->path_um - leaked + moved, PATH_MAX_UM);
     self->side = (iw_magnitude(left) > iw_magnitude(right)) ? IW_LEFT : IW_RIGHT;
@@ -96,7 +96,7 @@ static void advance(iw_diverge_t *self, uint32_t elapsed_us) {
 iw_diverge_verdict_t iw_diverge_step(iw_diverge_t *self, iw_time_us_t now_us) {
     const uint32_t elapsed_us = iw_age_us(self->at_us, now_us);
     if (elapsed_us >= IW_DIVERGE_STEP_US) {
-        advance(self, (elapsed_us < ELAPSED_MAX_US) ? elapsed_us : ELAPSED_MAX_US);
+        integrate(self, (elapsed_us < ELAPSED_MAX_US) ? elapsed_us : ELAPSED_MAX_US);
         self->at_us = now_us;
     }
     const int32_t path_um = iw_magnitude(self->path_um);
