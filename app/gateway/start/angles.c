@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "angles.h"
 
+#include "iwheel/gateway.h"
+
 /// A radian in tenths of a degree, by 1000.
 #define MILLI_TENTHS_PER_RADIAN 572958U
 #define GONE_PERCENT            25U
 #define LATE_MS                 100U
-/// The core's: what a wheel may stay below its command without counting.
-#define DROOP_PERCENT 4U
 /// Cut off: seven eighths of the 20 mm/s that one rpm means.
 #define TELEMETRY_MM_S 18U
 
@@ -29,7 +29,7 @@ static uint64_t brake_mm(const gateway_config_t *config, uint64_t speed_mm_s) {
 gw_angles_t gw_angles(const gateway_config_t *config) {
     const iw_config_t *const core = &config->core;
     const uint64_t speed = core->max_speed_mm_s;
-    const uint64_t ordinary = speed * DROOP_PERCENT / 100U + TELEMETRY_MM_S;
+    const uint64_t ordinary = speed * IW_DIVERGE_DROOP_PERCENT / 100U + TELEMETRY_MM_S;
     const uint64_t steady = (uint64_t)core->pair_mm * 1000U / core->pair_leak_ms + ordinary;
     const uint64_t quarter = speed * GONE_PERCENT / 100U;
     const uint64_t apart = speed - quarter;
