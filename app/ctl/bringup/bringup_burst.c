@@ -169,7 +169,7 @@ static bool ran_away(run_t *run, const json_t *why) {
     return true;
 }
 
-/// One wheel did not do what it was told, and the gateway stopped both: in the air that is a finding like any other.
+/// One wheel did not follow its command, and the gateway stopped both: in the air that is a finding like any other.
 static bool diverged(const run_t *run, const json_t *why) {
     return json_integer_value(json_object_get(why, "number")) > run->stops &&
            strcmp(text_word(why, "cause"), "pair_diverges") == 0;
