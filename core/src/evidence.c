@@ -106,8 +106,8 @@ static void look_at_ratio(iw_motion_evidence_wheel_t *self, iw_gateway_t *gatewa
 
 static void look_at_type(iw_motion_evidence_wheel_t *self, iw_gateway_t *gateway, const iw_snapshot_t *seen,
                          const iw_snapshot_wheel_t *wheel, int16_t applied) {
-    const int32_t measured = wheel->speed_mm_s;
-    const int32_t slack = iw_magnitude(applied) * 15 / 100 + (int32_t)wheel->um_s_per_rpm / 1000 + 1;
+    const int32_t measured = wheel->own_mm_s;
+    const int32_t slack = iw_magnitude(applied) * 15 / 100 + (int32_t)wheel->own_um_s_per_rpm / 1000 + 1;
     const bool follows = seen->state == IW_STATE_ARMED && wheel->heard && iw_magnitude(measured - applied) <= slack;
     if (iw_magnitude(applied) < IW_EVIDENCE_TYPE_MM_S || !follows || applied != self->applied_mm_s) {
         self->steady_us = seen->at_us;

@@ -25,7 +25,7 @@ void iw_watch_pair(iw_gateway_t *self, bool heard) {
     iw_diverge_t *const diverge = &self->diverge;
     for (size_t side = 0; side < IW_SIDES; side++) {
         diverge->applied_mm_s[side] = self->setpoint.speed_um_s[side] / 1000;
-        diverge->measured_mm_s[side] = self->wheel[side].speed_mm_s;
+        diverge->measured_mm_s[side] = self->wheel[side].own_mm_s;
     }
     iw_diverge_begin(diverge, self->permit.armed_us);
     if (has_ended(self) || !heard || self->setpoint.from_zero) {
