@@ -16,7 +16,7 @@
 void iw_diverge_init(iw_diverge_t *self, const iw_config_t *config, uint32_t um_s_per_rpm) {
     memset(self, 0, sizeof *self);
     self->config = config;
-    self->rpm_um_s = (int32_t)(um_s_per_rpm * 7U / 8U);
+    self->um_s_per_rpm = (int32_t)um_s_per_rpm;
 }
 
 void iw_diverge_begin(iw_diverge_t *self, iw_time_us_t begun_us) {
@@ -68,7 +68,7 @@ static IW_APART bool is_below(const iw_diverge_t *self, size_t side, int32_t per
 static IW_APART int32_t beyond_um_s(const iw_diverge_t *self, size_t side) {
     const int32_t expected = self->expected_um_s[side];
     const int32_t difference = measured_um_s(self, side) - expected;
-    const int32_t ordinary = iw_magnitude(expected) / 100 * IW_DIVERGE_DROOP_PERCENT + self->rpm_um_s;
+    const int32_t ordinary = iw_magnitude(expected) / 100 * IW_DIVERGE_DROOP_PERCENT + self->um_s_per_rpm * 7 / 8;
     if (iw_magnitude(expected) >= IW_DIVERGE_GONE_UM_S && is_below(self, side, IW_DIVERGE_GONE_PERCENT)) {
         return 2 * difference;
     }

@@ -7,7 +7,6 @@
 
 /// 2 pi / 60 in millionths: nanometres of circumference per tick (or of speed per rpm) and millimetre of radius.
 #define NM_PER_TICK_AND_MM 104720U
-#define OWN_NM_PER_RPM     (NM_PER_TICK_AND_MM * IW_SETPOINT_RADIUS_MM)
 #define FASTEST_NM_PER_US  (IW_WHEEL_FASTEST_MM_S)
 
 /// mm/s are nm/us.
@@ -18,12 +17,6 @@ IW_STATIC_ASSERT(IW_WHEEL_OFFSET_BACK_US >= 5U * IW_WHEEL_OFFSET_PERIOD_US, four
 
 static uint32_t silent_us(const iw_wheel_t *self) {
     return (uint32_t)self->config->wheel_silent_ms * IW_US_PER_MS;
-}
-
-/// Of a turn of the rotor, by that of the wheel.
-static uint32_t geared(const iw_config_t *config, uint32_t wheel_nm) {
-    return wheel_nm / config->gear_turns * config->gear_per +
-           wheel_nm % config->gear_turns * config->gear_per / config->gear_turns;
 }
 
 void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, iw_time_us_t now_us) {
@@ -37,10 +30,10 @@ void iw_wheel_init(iw_wheel_t *self, const iw_config_t *config, iw_side_t side, 
     self->status_us = IW_NEVER;
     self->rest_since_us = IW_NEVER;
     self->any_us = now_us;
-    const uint32_t nm_per_tick = geared(config, nm_per_rpm);
+    const uint32_t nm_per_tick = nm_per_rpm / config->gear_turns * config->gear_per +
+                                 nm_per_rpm % config->gear_turns * config->gear_per / config->gear_turns;
     self->nm_per_tick = config->invert[side] ? -(int32_t)nm_per_tick : (int32_t)nm_per_tick;
     self->um_s_per_rpm = (config->rpm_of_rotor ? nm_per_tick : nm_per_rpm) / 1000U;
-    self->own_um_s_per_rpm = (config->rpm_of_rotor ? geared(config, OWN_NM_PER_RPM) : OWN_NM_PER_RPM) / 1000U;
     self->us_per_tick_min = nm_per_tick / FASTEST_NM_PER_US;
 }
 
@@ -69,10 +62,9 @@ static void note_presence(iw_wheel_t *self, iw_time_us_t now_us) {
 /// Rest is a run of frames without a gap: one frame at rest behind a silence says nothing of the time between.
 static void hear_speed(iw_wheel_t *self, iw_time_us_t now_us, const iw_codec_speed_t *speed, bool fresh) {
     const int32_t rest_rpm = self->config->rest_rpm;
-    const int32_t speed_rpm = self->config->invert[self->side] ? -speed->speed_rpm : speed->speed_rpm;
+    const int32_t speed_um_s = speed->speed_rpm * (int32_t)self->um_s_per_rpm;
     const bool gap = !iw_wheel_heard(self, now_us);
-    self->speed_mm_s = speed_rpm * (int32_t)self->um_s_per_rpm / 1000;
-    self->own_mm_s = speed_rpm * (int32_t)self->own_um_s_per_rpm / 1000;
+    self->speed_mm_s = (self->config->invert[self->side] ? -speed_um_s : speed_um_s) / 1000;
     self->speed_us = now_us;
     if (iw_magnitude(speed->speed_rpm) > rest_rpm) {
         self->rest_since_us = IW_NEVER;

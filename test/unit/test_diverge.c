@@ -260,7 +260,7 @@ static void test_diverge_long_pause_counts_as_50_ms(void) {
 
 /// Exact figures: each constant of the arithmetic has its share in them.
 static void test_diverge_one_step_gives_exactly_what_is_worked_out_by_hand(void) {
-    TEST_ASSERT_EQUAL_INT32(17592, pair.rpm_um_s); // 20106 x 7 / 8.
+    TEST_ASSERT_EQUAL_INT32(20106, pair.um_s_per_rpm);
     pair.applied_mm_s[IW_LEFT] = 1000;
     (void)iw_diverge_step(&pair, now_us + MS(40)); // Half of the way: 40 / (60 + 20).
     TEST_ASSERT_EQUAL_INT32(500000, pair.expected_um_s[IW_LEFT]);

@@ -311,8 +311,8 @@ static void test_evidence_a_stretch_without_a_status_frame_for_100000_ticks_begi
 static void drive_side(iw_side_t side, int16_t applied_mm_s, int32_t measured_mm_s, iw_time_us_t for_us) {
     seen.state = IW_STATE_ARMED;
     seen.wheel[side].heard = true;
-    seen.wheel[side].own_um_s_per_rpm = 20999;
-    seen.wheel[side].own_mm_s = measured_mm_s;
+    seen.wheel[side].um_s_per_rpm = 20999;
+    seen.wheel[side].speed_mm_s = measured_mm_s;
     seen.applied.wheel[side].speed_mm_s = applied_mm_s;
     look();
     seen.at_us += for_us;
@@ -344,9 +344,9 @@ static void test_evidence_a_speed_within_fifteen_percent_and_one_rpm_is_as_told(
     assert_drive(-1000, 1000, false);
 }
 
-static void test_evidence_one_rpm_is_in_the_unit_of_setpoints(void) {
+static void test_evidence_one_rpm_is_that_of_the_wheels_radius(void) {
     assert_drive(1000, 1172, false);
-    seen.wheel[IW_LEFT].own_um_s_per_rpm = 21000;
+    seen.wheel[IW_LEFT].um_s_per_rpm = 21000;
     look();
     seen.at_us += IW_EVIDENCE_TYPE_US;
     look();
@@ -377,7 +377,7 @@ static void test_evidence_either_wheel_confirms_the_type_after_a_second(void) {
 
 static void test_evidence_only_an_armed_wheel_that_is_heard_confirms_the_type(void) {
     assert_drive(200, 300, false);
-    seen.wheel[IW_LEFT].own_mm_s = 200;
+    seen.wheel[IW_LEFT].speed_mm_s = 200;
     seen.state = IW_STATE_STOPPING;
     look();
     seen.at_us += IW_EVIDENCE_TYPE_US;
@@ -538,7 +538,7 @@ int main(void) {
     RUN_TEST(test_evidence_looking_again_adds_nothing);
     RUN_TEST(test_evidence_a_stretch_without_a_status_frame_for_100000_ticks_begins_anew);
     RUN_TEST(test_evidence_a_speed_within_fifteen_percent_and_one_rpm_is_as_told);
-    RUN_TEST(test_evidence_one_rpm_is_in_the_unit_of_setpoints);
+    RUN_TEST(test_evidence_one_rpm_is_that_of_the_wheels_radius);
     RUN_TEST(test_evidence_a_wheel_told_less_than_150_mm_s_says_nothing_of_the_type);
     RUN_TEST(test_evidence_either_wheel_confirms_the_type_after_a_second);
     RUN_TEST(test_evidence_only_an_armed_wheel_that_is_heard_confirms_the_type);

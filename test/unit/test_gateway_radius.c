@@ -39,7 +39,8 @@ static void test_gateway_radius_full_speed_is_no_overspeed_and_no_divergence(voi
         world_rig_drive(&rig, 500, -500, 5000);
         assert_armed(radii[i]);
         TEST_ASSERT_INT_WITHIN(45, 500 * radii[i] / 192, rig.gateway.wheel[IW_LEFT].speed_mm_s);
-        TEST_ASSERT_INT_WITHIN(21, 500, rig.gateway.wheel[IW_LEFT].own_mm_s);
+        TEST_ASSERT_INT_WITHIN(21, 500, rig.gateway.diverge.measured_mm_s[IW_LEFT]);
+        TEST_ASSERT_INT_WITHIN(21, -500, rig.gateway.diverge.measured_mm_s[IW_RIGHT]);
     }
 }
 

@@ -230,33 +230,6 @@ static void test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere(void
     }
 }
 
-/// What is compared with setpoints: as if the radius were 192 mm, whatever it is.
-static void test_wheel_own_speed_is_in_the_unit_of_setpoints_at_any_radius(void) {
-    static const uint16_t radii_mm[] = {60, 192, 400};
-    for (size_t r = 0; r < 3; r++) {
-        config.radius_mm = radii_mm[r];
-        config.rpm_of_rotor = false;
-        config.gear_turns = 1;
-        config.gear_per = 1;
-        config.invert[IW_LEFT] = false;
-        begin_side(IW_LEFT);
-        TEST_ASSERT_EQUAL_UINT32(20106, wheel.own_um_s_per_rpm);
-        hear_speed(100);
-        TEST_ASSERT_EQUAL_INT(2010, wheel.own_mm_s);
-        TEST_ASSERT_INT_WITHIN(1, 2010 * radii_mm[r] / 192, wheel.speed_mm_s);
-        config.invert[IW_LEFT] = true;
-        hear_speed(100);
-        TEST_ASSERT_EQUAL_INT(-2010, wheel.own_mm_s);
-        config.rpm_of_rotor = true;
-        config.gear_turns = 25;
-        config.gear_per = 2;
-        begin_side(IW_LEFT);
-        TEST_ASSERT_EQUAL_UINT32(1608, wheel.own_um_s_per_rpm);
-        hear_speed(1000);
-        TEST_ASSERT_EQUAL_INT(-1608, wheel.own_mm_s);
-    }
-}
-
 static void test_wheel_speed_extremes_do_not_overflow(void) {
     static const int16_t extremes[] = {32767, -32768};
     for (int rotor = 0; rotor < 2; rotor++) {
@@ -311,7 +284,6 @@ int main(void) {
     RUN_TEST(test_wheel_distance_and_speed_of_the_documented_wheel);
     RUN_TEST(test_wheel_gear_ratio_divides_ticks_and_rotor_rpm_only);
     RUN_TEST(test_wheel_geometry_is_right_to_a_hundred_thousandth_everywhere);
-    RUN_TEST(test_wheel_own_speed_is_in_the_unit_of_setpoints_at_any_radius);
     RUN_TEST(test_wheel_speed_extremes_do_not_overflow);
     RUN_TEST(test_wheel_inverted_negates_what_the_machine_sees_only);
     RUN_TEST(test_wheel_distance_survives_reboots);

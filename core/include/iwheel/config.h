@@ -9,8 +9,8 @@
 
 #include "iwheel/types.h"
 
-/// The radius that the wheel's firmware assumes: a setpoint of 1 mm/s means 1 mm/s at this radius. What compares setpoints
-/// with measured speeds does so in this unit, whatever `radius_mm` is.
+/// The radius that the wheel's firmware assumes: a setpoint of 1 mm/s means 1 mm/s at this radius. Measured speeds are
+/// compared with setpoints in this unit, whatever `radius_mm` is.
 #define IW_SETPOINT_RADIUS_MM 192
 
 /// Ranges are inclusive. No value in them switches a safety rule off; a value outside is refused by `iw_config_check`.

@@ -44,9 +44,7 @@ typedef struct {
     int64_t ticks;                ///< Odometry, unwrapped, across reboots. The distance in nm is `ticks * nm_per_tick`.
     int32_t nm_per_tick;          ///< Negative where `invert` is set.
     int32_t speed_mm_s;           ///< Measured, rounded towards zero. Meaningless while not heard.
-    int32_t own_mm_s;             ///< The same in the unit of setpoints, at IW_SETPOINT_RADIUS_MM.
     uint32_t um_s_per_rpm;        ///< Speed in um/s at 1 rpm of its telemetry.
-    uint32_t own_um_s_per_rpm;    ///< The same at IW_SETPOINT_RADIUS_MM.
     uint32_t reboots;             ///< Seen since init.
     bool heard;                   ///< Its speed was heard less than `wheel_silent_ms` ago.
     bool at_rest;                 ///< Heard, and within `rest_rpm` for `rest_ms`.

@@ -44,7 +44,7 @@ typedef struct {
     uint8_t side;                    ///< An iw_side_t: whose speed differs more. Of the last step that compared.
     int32_t applied_mm_s[IW_SIDES];  ///< For the next step, written by the owner.
     int32_t measured_mm_s[IW_SIDES]; ///< The same, in the machine's frame.
-    int32_t rpm_um_s;                ///< A step of telemetry.
+    int32_t um_s_per_rpm;            ///< Speed in um/s at 1 rpm of telemetry, a step of it.
     int32_t expected_um_s[IW_SIDES]; ///< Where each wheel should be by now.
     int32_t path_um;                 ///< Right minus left: how far the pair has left its path, leaking.
     int32_t largest_um;              ///< The largest |path_um| since the drive began.

@@ -60,13 +60,11 @@ typedef struct {
     int64_t ticks;               ///< Unwrapped since the first status frame, across reboots; the wheel's own sign.
     /// In the machine's frame: negative where `invert` is set. IW_WHEEL_TICKS_MAX times this fits 64 bits.
     int32_t nm_per_tick;
-    uint32_t um_s_per_rpm;     ///< Speed in um/s at 1 rpm of its telemetry.
-    uint32_t own_um_s_per_rpm; ///< The same at IW_SETPOINT_RADIUS_MM.
-    uint32_t us_per_tick_min;  ///< At IW_WHEEL_FASTEST_MM_S.
-    uint32_t reboots;          ///< Recognised so far.
-    int32_t speed_mm_s;        ///< Last measured, in the machine's frame, rounded towards zero; stale while not heard.
-    int32_t own_mm_s; ///< The same in the unit of setpoints, at IW_SETPOINT_RADIUS_MM: what is compared with them.
-    int32_t odometry_ticks; ///< Of the last status frame.
+    uint32_t um_s_per_rpm;    ///< Speed in um/s at 1 rpm of its telemetry.
+    uint32_t us_per_tick_min; ///< At IW_WHEEL_FASTEST_MM_S.
+    uint32_t reboots;         ///< Recognised so far.
+    int32_t speed_mm_s;       ///< Last measured, in the machine's frame, rounded towards zero; stale while not heard.
+    int32_t odometry_ticks;   ///< Of the last status frame.
 } iw_wheel_t;
 
 /// `config` must be checked and outlive the wheel.
